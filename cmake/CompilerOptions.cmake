@@ -1,0 +1,33 @@
+# Warnings, sanitizers and the flags that make results equal on every machine.
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+
+if(NOT CMAKE_BUILD_TYPE)
+  set(CMAKE_BUILD_TYPE Release CACHE STRING "" FORCE)
+endif()
+
+find_program(TERRACE_CCACHE ccache)
+if(TERRACE_CCACHE)
+  set(CMAKE_CXX_COMPILER_LAUNCHER "${TERRACE_CCACHE}")
+endif()
+
+set(TERRACE_SANITIZER "" CACHE STRING "address or thread: build everything under that sanitizer (clang-14)")
+set_property(CACHE TERRACE_SANITIZER PROPERTY STRINGS "" address thread)
+
+add_library(terrace_options INTERFACE)
+target_compile_options(terrace_options INTERFACE
+  -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion -Werror=return-type
+  # The same input gives the same bytes: GCC fuses a*b+c into one rounding where the CPU can.
+  -ffp-contract=off)
+target_include_directories(terrace_options INTERFACE "${PROJECT_SOURCE_DIR}")
+
+if(TERRACE_SANITIZER STREQUAL "address")
+  # clang-14 reports Asio's coroutine frames under -fsanitize=function.
+  add_compile_options(-fsanitize=address,undefined -fno-sanitize=function -fno-sanitize-recover=all -fno-omit-frame-pointer -g1)
+  add_link_options(-fsanitize=address,undefined)
+elseif(TERRACE_SANITIZER STREQUAL "thread")
+  add_compile_options(-fsanitize=thread -fno-omit-frame-pointer -g1)
+  add_link_options(-fsanitize=thread)
+endif()

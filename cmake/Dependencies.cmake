@@ -1,0 +1,25 @@
+# Every third-party library, looked up once. Debian 12 packages; tools/install_deps.sh installs them.
+find_package(Threads REQUIRED)
+find_package(PkgConfig REQUIRED)
+
+# Boost: Debian's default 1.74 comes with GDAL's headers and lacks what the server needs; 1.81 cannot be installed beside it.
+# tools/install_deps.sh unpacks the 1.81 headers into .deps/boost.
+set(TERRACE_BOOST_ROOT "${PROJECT_SOURCE_DIR}/.deps/boost/usr" CACHE PATH "Prefix that holds the Boost 1.81 headers")
+if(EXISTS "${TERRACE_BOOST_ROOT}")
+  find_package(Boost 1.81 CONFIG REQUIRED COMPONENTS headers PATHS "${TERRACE_BOOST_ROOT}" NO_DEFAULT_PATH)
+else()
+  find_package(Boost 1.81 CONFIG REQUIRED COMPONENTS headers)
+endif()
+
+find_package(tl-expected REQUIRED)
+find_package(fmt REQUIRED)
+find_package(spdlog REQUIRED)
+find_package(nlohmann_json REQUIRED)
+find_package(CLI11 REQUIRED)
+find_package(GDAL REQUIRED)
+find_package(prometheus-cpp REQUIRED)
+pkg_check_modules(LIBDEFLATE REQUIRED IMPORTED_TARGET libdeflate)
+pkg_check_modules(XXHASH REQUIRED IMPORTED_TARGET libxxhash)
+if(TERRACE_BUILD_TESTS)
+  find_package(GTest REQUIRED)
+endif()

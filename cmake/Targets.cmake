@@ -1,0 +1,22 @@
+# terrace_library(NAME SOURCES a.cc b.cc [DEPS ...public] [PRIVATE_DEPS ...])
+# One folder, one target terrace::NAME, one namespace.
+function(terrace_library name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPS;PRIVATE_DEPS" ${ARGN})
+  add_library(terrace_${name} STATIC ${ARG_SOURCES})
+  add_library(terrace::${name} ALIAS terrace_${name})
+  target_link_libraries(terrace_${name} PUBLIC terrace_options ${ARG_DEPS} PRIVATE ${ARG_PRIVATE_DEPS})
+endfunction()
+
+# terrace_test(NAME SOURCES a_test.cc [DEPS ...] [LABELS ...] [TIMEOUT seconds])
+# One GoogleTest binary, one ctest entry.
+function(terrace_test name)
+  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;DEPS;LABELS" ${ARGN})
+  if(NOT ARG_TIMEOUT)
+    set(ARG_TIMEOUT 300)
+  endif()
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE terrace_options ${ARG_DEPS} GTest::gtest GTest::gtest_main Threads::Threads)
+  target_compile_definitions(${name} PRIVATE TERRACE_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+  add_test(NAME ${name} COMMAND ${name})
+  set_tests_properties(${name} PROPERTIES TIMEOUT ${ARG_TIMEOUT} LABELS "${ARG_LABELS}")
+endfunction()

@@ -1,0 +1,58 @@
+#include "engine/geo/ellipsoid.h"
+
+namespace terrace::geo {
+namespace {
+
+struct SinCos {
+  double sin, cos;
+};
+
+// Exact at multiples of 90 degrees, and rounded to 2^-44 elsewhere (0.4 micrometres on the ground): libm's last bit
+// differs between processors, and tiles must not.
+SinCos RoundedSinCos(double degrees) {
+  if (degrees == 0) return {0, 1};
+  if (degrees == 90 || degrees == -90) return {degrees / 90, 0};
+  if (degrees == 180 || degrees == -180) return {0, -1};
+  constexpr double kGrid = 17592186044416.0;  // 2^44
+  const double radians = ToRadians(degrees);
+  return {std::nearbyint(std::sin(radians) * kGrid) / kGrid, std::nearbyint(std::cos(radians) * kGrid) / kGrid};
+}
+
+double PrimeVerticalRadiusFromSine(double sine) {
+  return kSemiMajorAxis / std::sqrt(1 - kEccentricitySquared * sine * sine);
+}
+
+}  // namespace
+
+Vec3 Normalized(Vec3 a) {
+  const double length = Length(a);
+  return length > 0 ? a * (1 / length) : a;
+}
+
+Vec3 SurfaceNormal(double longitude_deg, double latitude_deg) {
+  const SinCos lon = RoundedSinCos(longitude_deg), lat = RoundedSinCos(latitude_deg);
+  return {lat.cos * lon.cos, lat.cos * lon.sin, lat.sin};
+}
+
+Vec3 ToEcef(double longitude_deg, double latitude_deg, double height_m) {
+  const SinCos lon = RoundedSinCos(longitude_deg), lat = RoundedSinCos(latitude_deg);
+  const double radius = PrimeVerticalRadiusFromSine(lat.sin);
+  const double from_axis = (radius + height_m) * lat.cos;
+  return {from_axis * lon.cos, from_axis * lon.sin, (radius * (1 - kEccentricitySquared) + height_m) * lat.sin};
+}
+
+double PrimeVerticalRadius(double latitude_deg) {
+  return PrimeVerticalRadiusFromSine(RoundedSinCos(latitude_deg).sin);
+}
+
+double MetresPerDegreeEast(double latitude_deg) {
+  return ToRadians(1) * PrimeVerticalRadius(latitude_deg) * RoundedSinCos(latitude_deg).cos;
+}
+
+double MetresPerDegreeNorth(double latitude_deg) {
+  const double radius = PrimeVerticalRadius(latitude_deg);
+  // M = N^3 (1 - e^2) / a^2, the meridian's radius of curvature.
+  return ToRadians(1) * radius * radius * radius * (1 - kEccentricitySquared) / (kSemiMajorAxis * kSemiMajorAxis);
+}
+
+}  // namespace terrace::geo

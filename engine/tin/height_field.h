@@ -1,0 +1,47 @@
+// A rectangular grid of height samples: what the mesher approximates.
+//
+// Coordinates: x is the column, y the row; a sample is (x, y) with 0 <= x < width, 0 <= y < height, stored row by row.
+// Counter-clockwise means counter-clockwise in these axes. Whether row 0 lies in the north or in the south is the
+// caller's business: tiles put row 0 in the SOUTH, rasters read from files put it in the NORTH.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "engine/core/result.h"
+
+namespace terrace::tin {
+
+class HeightField {
+ public:
+  // Coordinates stay below 2^15, which keeps the in-circle predicate inside 64 bits (predicates.h).
+  static constexpr int kMaxSide = 1 << 15;
+
+  // `heights` has width * height values in metres, row by row. NaN, infinities and whatever the caller turned into NaN
+  // are voids: they count in no error and lend their value to no vertex. Refuses fields smaller than 2 x 2, larger than
+  // kMaxSide a side, with a wrong number of values, or without a single valid sample.
+  static Result<HeightField> Make(int width, int height, std::vector<float> heights);
+
+  int width() const { return width_; }
+  int height() const { return height_; }
+  bool has_voids() const { return has_voids_; }
+
+  // NaN at a void.
+  float At(int x, int y) const { return heights_[static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x)]; }
+  const float* Row(int y) const { return heights_.data() + static_cast<std::size_t>(y) * static_cast<std::size_t>(width_); }
+
+  // The height a vertex at (x, y) gets: the sample, or where that is void (only corners and seeds can be) the height of
+  // the nearest valid sample, ties to the smaller row, then column.
+  float VertexHeight(int x, int y) const;
+
+ private:
+  HeightField(int width, int height, std::vector<float> heights, bool has_voids)
+      : width_(width), height_(height), has_voids_(has_voids), heights_(std::move(heights)) {}
+
+  int width_ = 0;
+  int height_ = 0;
+  bool has_voids_ = false;
+  std::vector<float> heights_;
+};
+
+}  // namespace terrace::tin

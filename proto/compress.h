@@ -1,0 +1,12 @@
+// Deterministic compression of response bodies.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace terrace::proto {
+
+// RFC 1952 gzip with libdeflate: no time stamp, no name, so that equal bytes compress to equal bytes.
+std::string Gzip(std::string_view bytes, int level = 6);
+
+}  // namespace terrace::proto

@@ -1,0 +1,27 @@
+// A finished tile, ready to leave: immutable and shared between the cache and every response that sends it.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <string>
+
+namespace terrace::server {
+
+// Where the time of a build went. Zero where a step did not run.
+struct StageTimes {
+  std::chrono::microseconds read{0}, refine{0}, encode{0}, compress{0};
+};
+
+struct EncodedTile {
+  std::string bytes;      // the body in its content coding
+  std::string etag;       // strong, with the quotes
+  double max_error_m = 0; // measured on the encoded integers: the Terrain-Max-Error header
+  std::uint32_t vertices = 0;
+  std::uint32_t triangles = 0;
+  StageTimes times;       // of the build that made it
+};
+
+using TilePtr = std::shared_ptr<const EncodedTile>;
+
+}  // namespace terrace::server

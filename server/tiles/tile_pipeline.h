@@ -1,0 +1,42 @@
+// From a request to bytes, as one plain blocking function: used as it is by the server, tests and benchmarks.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "engine/dem/dem_source.h"
+#include "server/tiles/encoded_tile.h"
+#include "server/tiles/tile_request.h"
+
+namespace terrace::server {
+
+// One served dataset: a name, a source and what its users should read.
+struct Dataset {
+  std::string name;
+  std::string attribution;
+  double error_fraction = 0.5;
+  std::unique_ptr<dem::DemSource> source;
+  std::uint64_t generation = 0;  // hash of the source's fingerprint and every option that changes bytes
+};
+
+// Thread-safe: Build may run on any number of threads at once.
+class TilePipeline {
+ public:
+  explicit TilePipeline(std::vector<Dataset> datasets);
+
+  const std::vector<Dataset>& datasets() const { return datasets_; }
+
+  // Reads, refines, quantizes, measures, encodes and compresses one tile.
+  // kNotFound: no such dataset or tile outside availability. kUnavailable: the source cannot be read now.
+  // kCancelled: `stop` was requested.
+  Result<EncodedTile> Build(const TileRequest& request, std::stop_token stop) const;
+
+ private:
+  std::vector<Dataset> datasets_;
+};
+
+}  // namespace terrace::server
