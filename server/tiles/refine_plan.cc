@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "engine/geo/ellipsoid.h"
+#include "proto/quantized_mesh.h"
 
 namespace terrace::server {
 namespace {

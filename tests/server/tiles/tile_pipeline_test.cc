@@ -34,12 +34,12 @@ const TilePipeline& Samples() {
   return *pipeline;
 }
 
-struct DecodedTile {
-  proto::test::DecodedMesh mesh;
+struct FetchedTile {
+  proto::DecodedTile mesh;
   EncodedTile encoded;
 };
 
-DecodedTile Fetch(std::uint32_t dataset, geo::TileKey key, int step) {
+FetchedTile Fetch(std::uint32_t dataset, geo::TileKey key, int step) {
   TileRequest request;
   request.dataset = dataset;
   request.key = key;
@@ -47,7 +47,7 @@ DecodedTile Fetch(std::uint32_t dataset, geo::TileKey key, int step) {
   request.normals = true;
   auto encoded = Samples().Build(request, {});
   EXPECT_TRUE(encoded.has_value()) << geo::ToString(key);
-  auto mesh = proto::test::DecodeQuantizedMesh(encoded->bytes);
+  auto mesh = proto::DecodeQuantizedMesh(encoded->bytes);
   EXPECT_TRUE(mesh.has_value()) << geo::ToString(key);
   return {*std::move(mesh), *std::move(encoded)};
 }
@@ -55,13 +55,14 @@ DecodedTile Fetch(std::uint32_t dataset, geo::TileKey key, int step) {
 // Position along the edge, height, normal of its vertices.
 using Edge = std::vector<std::tuple<int, double, int, int>>;
 
-Edge EdgeOf(const DecodedTile& tile, bool vertical, int fixed) {
+Edge EdgeOf(const FetchedTile& tile, bool vertical, int fixed) {
   Edge edge;
-  const auto& mesh = tile.mesh;
+  const proto::DecodedTile& mesh = tile.mesh;
+  const std::string& normals = mesh.extensions.at(0).bytes;
   const double min = static_cast<double>(mesh.min_height), max = static_cast<double>(mesh.max_height);
   for (std::size_t k = 0; k < mesh.u.size(); ++k) {
     if ((vertical ? mesh.u[k] : mesh.v[k]) != fixed) continue;
-    edge.emplace_back(vertical ? mesh.v[k] : mesh.u[k], min + (max - min) * mesh.h[k] / 32767, mesh.normals[2 * k], mesh.normals[2 * k + 1]);
+    edge.emplace_back(vertical ? mesh.v[k] : mesh.u[k], min + (max - min) * mesh.h[k] / 32767, normals[2 * k], normals[2 * k + 1]);
   }
   std::sort(edge.begin(), edge.end());
   return edge;
@@ -77,7 +78,7 @@ TEST(TilePipeline, NeighboursDecodeTheSameEdges) {
     for (const int step : {-8, 0, 6, 12, 24}) {
       for (int level = 1; level <= Samples().datasets()[dataset].source->max_level(); level += 2) {
         const geo::TileKey key = MiddleTile(dataset, level);
-        const DecodedTile tile = Fetch(dataset, key, step);
+        const FetchedTile tile = Fetch(dataset, key, step);
         const geo::TileKey east = geo::Neighbour(key, 1, 0), north = geo::Neighbour(key, 0, 1);
         if (Samples().datasets()[dataset].source->IsAvailable(east)) {
           EXPECT_EQ(EdgeOf(tile, true, 32767), EdgeOf(Fetch(dataset, east, step), true, 0)) << geo::ToString(key) << " step " << step;
@@ -103,7 +104,7 @@ TEST(TilePipeline, ReachesTheLadderError) {
   for (const std::uint32_t dataset : {0u, 1u}) {
     for (const int step : {-8, 0, 8}) {
       for (int level = 0; level <= Samples().datasets()[dataset].source->max_level(); ++level) {
-        const DecodedTile tile = Fetch(dataset, MiddleTile(dataset, level), step);
+        const FetchedTile tile = Fetch(dataset, MiddleTile(dataset, level), step);
         EXPECT_LE(tile.encoded.max_error_m, geo::LadderError(level, step)) << dataset << " level " << level << " step " << step;
       }
     }
