@@ -21,11 +21,11 @@ namespace terrace::dem {
 
 struct DemOptions {
   double error_fraction = 0.5;         // default error of a level, as a share of the clients' level error
-  std::optional<double> finest_error;  // metres: the deepest level is the first whose default error is at most this
-  std::optional<double> floor;         // metres: height outside the source and in large voids; default: lowest valid height
+  std::optional<double> finest_error = {};  // metres: the deepest level is the first whose default error is at most this
+  std::optional<double> floor = {};         // metres: height outside the source and in large voids; default: lowest valid height
   int max_void_gap = 64;               // source samples: voids narrower than this along a row, column or diagonal are filled
   // Called now and then while Open scans the source, with the share done, 0..1. May be empty.
-  std::function<void(double)> progress;
+  std::function<void(double)> progress = {};
 };
 
 // Metres above the ellipsoid (or whatever the source counts from where no datum is stated).
