@@ -40,7 +40,8 @@ class DemSource::Impl {
   std::uint64_t fingerprint = 0;
 
  private:
-  Result<std::vector<float>> ReadFilled(GDALDataset& dataset, int factor, const GridWindow& window, const std::stop_token& stop);
+  Result<std::vector<float>> ReadFilled(GDALDataset& dataset, int factor, const GridWindow& window,
+                                        const std::stop_token& stop);
   bool IsInside(const Position& position) const;
   std::optional<float> PoleHeight(const geo::Lattice& lattice, std::int64_t row) const;
 };

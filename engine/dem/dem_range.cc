@@ -22,10 +22,13 @@ struct PixelBox {
   }
 };
 
-// Pixels of a tile in a geographic grid: the part found going east from its western edge, and what lies a turn before it.
-std::vector<PixelBox> GeographicBoxes(const Georeference& georeference, const geo::Lattice& lattice, const geo::TileKey& key) {
-  std::array<Position, 2> corners = {{{lattice.Longitude(lattice.FirstColumn(key)), lattice.Latitude(lattice.FirstRow(key))},
-                                      {0, lattice.Latitude(lattice.FirstRow(key) + lattice.cells)}}};
+// Pixels of a tile in a geographic grid: the part found going east from its western edge, and what lies a turn before
+// it.
+std::vector<PixelBox> GeographicBoxes(const Georeference& georeference, const geo::Lattice& lattice,
+                                      const geo::TileKey& key) {
+  std::array<Position, 2> corners = {
+      {{lattice.Longitude(lattice.FirstColumn(key)), lattice.Latitude(lattice.FirstRow(key))},
+       {0, lattice.Latitude(lattice.FirstRow(key) + lattice.cells)}}};
   georeference.ToPixels(corners);
   const double columns = lattice.cells * lattice.StepDegrees() / 360 * georeference.period();
   const double west = georeference.columns_run_east() ? corners[0].x : corners[0].x - columns;
@@ -39,7 +42,8 @@ std::vector<PixelBox> GeographicBoxes(const Georeference& georeference, const ge
 }
 
 // A box around a tile's pixels in any CRS; nothing where it cannot be told.
-std::optional<PixelBox> ProjectedBox(const Georeference& georeference, const geo::Lattice& lattice, const geo::TileKey& key) {
+std::optional<PixelBox> ProjectedBox(const Georeference& georeference, const geo::Lattice& lattice,
+                                     const geo::TileKey& key) {
   if (key.level <= kLastWholeLevel) return std::nullopt;
   constexpr int kSteps = 4;
   std::array<Position, (kSteps + 1) * (kSteps + 1)> nodes;
@@ -69,7 +73,8 @@ HeightRange DemSource::Impl::RangeBound(const geo::TileKey& key) const {
   const double extent = lattice.cells * lattice.StepDegrees();
   const std::int64_t south_row = lattice.FirstRow(key), north_row = south_row + lattice.cells;
   HeightRange range{floor, floor};
-  if (!footprint.Touches(lattice.Longitude(lattice.FirstColumn(key)), lattice.Latitude(south_row), extent, extent)) return range;
+  if (!footprint.Touches(lattice.Longitude(lattice.FirstColumn(key)), lattice.Latitude(south_row), extent, extent))
+    return range;
 
   std::vector<PixelBox> boxes;
   bool floor_shows = false;

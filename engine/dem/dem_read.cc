@@ -1,5 +1,5 @@
-// From a tile key to heights: positions, window, voids, interpolation. Every step is a function of the global node, the level
-// and the source; the window decides only what is read, never what comes out.
+// From a tile key to heights: positions, window, voids, interpolation. Every step is a function of the global node, the
+// level and the source; the window decides only what is read, never what comes out.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -12,8 +12,8 @@
 namespace terrace::dem {
 namespace {
 
-// Interpolated positions are this close to exact ones, in samples of the grid they are read from: a slope of 45 degrees at
-// 30 m turns it into 0.3 mm.
+// Interpolated positions are this close to exact ones, in samples of the grid they are read from: a slope of 45 degrees
+// at 30 m turns it into 0.3 mm.
 constexpr double kPositionTolerance = 1e-5;
 // Positions this close to the raster's edge, in pixels, are on it.
 constexpr double kEdgeTolerance = 1e-6;
@@ -31,7 +31,8 @@ Cell CellAt(const Position& position, const GridAxis& columns, const GridAxis& r
   return {column.index, row.index, column.weight, row.weight};
 }
 
-// The smallest window with every cell, its columns counted from near `around` where the axis wraps. Moves the cells there.
+// The smallest window with every cell, its columns counted from near `around` where the axis wraps. Moves the cells
+// there.
 GridWindow WindowOf(std::vector<Cell>& cells, const GridAxis& columns, const GridAxis& rows) {
   const std::int64_t around = cells[cells.size() / 2].column, turn = columns.count();
   std::int64_t west = std::numeric_limits<std::int64_t>::max(), east = std::numeric_limits<std::int64_t>::min();

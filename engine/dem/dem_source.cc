@@ -19,7 +19,8 @@ namespace {
 Result<void> CheckOptions(const DemOptions& options) {
   const auto positive = [](double value) { return std::isfinite(value) && value > 0; };
   if (!positive(options.error_fraction)) {
-    return MakeError(ErrorCode::kInvalidArgument, "error fraction {}: must be a number above 0", options.error_fraction);
+    return MakeError(ErrorCode::kInvalidArgument, "error fraction {}: must be a number above 0",
+                     options.error_fraction);
   }
   if (options.finest_error && !positive(*options.finest_error)) {
     return MakeError(ErrorCode::kInvalidArgument, "finest error {} m: must be a number above 0", *options.finest_error);
@@ -29,7 +30,8 @@ Result<void> CheckOptions(const DemOptions& options) {
   }
   constexpr int kMaxGap = 4096;
   if (options.max_void_gap < 0 || options.max_void_gap > kMaxGap) {
-    return MakeError(ErrorCode::kInvalidArgument, "void gap {}: must be 0 (fill nothing) to {} samples", options.max_void_gap, kMaxGap);
+    return MakeError(ErrorCode::kInvalidArgument, "void gap {}: must be 0 (fill nothing) to {} samples",
+                     options.max_void_gap, kMaxGap);
   }
   return {};
 }
@@ -94,7 +96,8 @@ std::array<std::optional<float>, 2> PoleHeights(const Georeference& georeference
   return heights;
 }
 
-DemInfo Describe(GDALDataset& dataset, const std::string& path, const Georeference& georeference, const RasterLayout& layout) {
+DemInfo Describe(GDALDataset& dataset, const std::string& path, const Georeference& georeference,
+                 const RasterLayout& layout) {
   DemInfo info;
   info.path = path;
   info.driver = dataset.GetDriverName();
@@ -113,7 +116,8 @@ DemInfo Describe(GDALDataset& dataset, const std::string& path, const Georeferen
   return info;
 }
 
-void LogWhatMatters(GDALDataset& dataset, const DemInfo& info, const Georeference& georeference, const RasterLayout& layout) {
+void LogWhatMatters(GDALDataset& dataset, const DemInfo& info, const Georeference& georeference,
+                    const RasterLayout& layout) {
   if (dataset.GetRasterCount() > 1) {
     spdlog::info("{}: has {} bands, heights are read from band 1", info.path, dataset.GetRasterCount());
   }
@@ -134,7 +138,8 @@ DemSource::DemSource(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 DemSource::~DemSource() = default;
 
 Result<std::unique_ptr<DemSource>> DemSource::Open(const std::string& path, const DemOptions& options) {
-  if (auto checked = CheckOptions(options); !checked) return MakeError(checked.error().code, "{}: {}", path, checked.error().message);
+  if (auto checked = CheckOptions(options); !checked)
+    return MakeError(checked.error().code, "{}: {}", path, checked.error().message);
   auto dataset = OpenRaster(path);
   if (!dataset) return tl::unexpected(dataset.error());
   auto georeference = Georeference::Of(**dataset, path);
@@ -182,7 +187,8 @@ const std::vector<geo::TileRange>& DemSource::Available(int level) const {
 }
 
 bool DemSource::IsAvailable(const geo::TileKey& key) const {
-  return geo::IsValid(key) && std::ranges::any_of(Available(key.level), [&](const geo::TileRange& range) { return range.Contains(key); });
+  return geo::IsValid(key) &&
+         std::ranges::any_of(Available(key.level), [&](const geo::TileRange& range) { return range.Contains(key); });
 }
 
 HeightRange DemSource::RangeBound(const geo::TileKey& key) const {

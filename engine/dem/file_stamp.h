@@ -17,8 +17,8 @@ struct FileStamp {
 // Nothing when there is no regular file of that name.
 std::optional<FileStamp> StampOf(const std::string& path);
 
-// The files a raster is made of (the file itself, overviews and masks beside it, the parts of a mosaic) as they were when it
-// was opened. Immutable.
+// The files a raster is made of (the file itself, overviews and masks beside it, the parts of a mosaic) as they were
+// when it was opened. Immutable.
 class StampedFiles {
  public:
   StampedFiles() = default;

@@ -19,15 +19,17 @@ Result<HandlePool::Handle> HandlePool::Borrow() {
   }
   GDALDatasetUniquePtr dataset = ReopenRaster(path_);
   if (dataset == nullptr) {
-    return MakeError(ErrorCode::kUnavailable, "{}: cannot be opened any more ({}); restore the file", path_, TakeGdalError());
+    return MakeError(ErrorCode::kUnavailable, "{}: cannot be opened any more ({}); restore the file", path_,
+                     TakeGdalError());
   }
   return Handle(*this, std::move(dataset));
 }
 
 Result<void> HandlePool::CheckUnchanged() const {
   if (const auto changed = files_.FirstChanged()) {
-    return MakeError(ErrorCode::kUnavailable, "{}: {} was changed, replaced or removed since it was opened; load the dataset anew",
-                     path_, *changed == path_ ? "the file" : *changed);
+    return MakeError(ErrorCode::kUnavailable,
+                     "{}: {} was changed, replaced or removed since it was opened; load the dataset anew", path_,
+                     *changed == path_ ? "the file" : *changed);
   }
   return {};
 }

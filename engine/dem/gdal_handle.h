@@ -39,7 +39,8 @@ class HandlePool {
   // kUnavailable: a file of the raster is gone, was replaced or cannot be opened.
   Result<Handle> Borrow();
 
-  // Whether the files are still the ones that were opened; asked again after a read, as they may be overwritten meanwhile.
+  // Whether the files are still the ones that were opened; asked again after a read, as they may be overwritten
+  // meanwhile.
   Result<void> CheckUnchanged() const;
 
   const StampedFiles& files() const { return files_; }

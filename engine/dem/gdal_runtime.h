@@ -10,7 +10,8 @@ namespace terrace::dem {
 void InitGdal();
 
 // The last failure GDAL or PROJ reported on this thread since the last call; "no further detail" when there was none.
-// Library calls that can fail are preceded by ForgetGdalError, so that an older message cannot answer for a newer failure.
+// Library calls that can fail are preceded by ForgetGdalError, so that an older message cannot answer for a newer
+// failure.
 std::string TakeGdalError();
 void ForgetGdalError();
 

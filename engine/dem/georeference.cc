@@ -64,22 +64,28 @@ Result<Georeference> Georeference::Of(GDALDataset& dataset, const std::string& p
   self.height_ = dataset.GetRasterYSize();
   if (dataset.GetGeoTransform(self.to_crs_.data()) != CE_None) {
     if (dataset.GetGCPCount() > 0) {
-      return MakeError(ErrorCode::kInvalidArgument,
-                       "{}: is placed by ground control points only; resample it with `gdalwarp -t_srs EPSG:4326 in out`", path);
+      return MakeError(
+          ErrorCode::kInvalidArgument,
+          "{}: is placed by ground control points only; resample it with `gdalwarp -t_srs EPSG:4326 in out`", path);
     }
-    return MakeError(ErrorCode::kInvalidArgument,
-                     "{}: has no georeference; if you know where it lies, add one with `gdal_translate -a_srs EPSG:XXXX "
-                     "-a_ullr west north east south in out`", path);
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "{}: has no georeference; if you know where it lies, add one with `gdal_translate -a_srs EPSG:XXXX "
+        "-a_ullr west north east south in out`",
+        path);
   }
   if (GDALInvGeoTransform(self.to_crs_.data(), self.to_pixel_.data()) == 0) {
-    return MakeError(ErrorCode::kInvalidArgument,
-                     "{}: its georeference has no extent (pixel size {} x {}); set it with `gdal_translate -a_ullr west "
-                     "north east south in out`", path, self.to_crs_[1], self.to_crs_[5]);
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "{}: its georeference has no extent (pixel size {} x {}); set it with `gdal_translate -a_ullr west "
+        "north east south in out`",
+        path, self.to_crs_[1], self.to_crs_[5]);
   }
   const OGRSpatialReference* srs = dataset.GetSpatialRef();
   if (srs == nullptr || srs->IsEmpty()) {
     return MakeError(ErrorCode::kInvalidArgument,
-                     "{}: states no coordinate reference system; add it with `gdal_translate -a_srs EPSG:XXXX in out`", path);
+                     "{}: states no coordinate reference system; add it with `gdal_translate -a_srs EPSG:XXXX in out`",
+                     path);
   }
   if (auto crs = self.ReadCrs(*srs, path); !crs) return tl::unexpected(crs.error());
   return self;
@@ -94,7 +100,8 @@ Result<void> Georeference::ReadCrs(const OGRSpatialReference& srs, const std::st
   if (horizontal.IsGeographic() == 0 && horizontal.IsProjected() == 0) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "{}: its coordinate reference system \"{}\" is not tied to the Earth; assign the right one with "
-                     "`gdal_translate -a_srs EPSG:XXXX in out`", path, crs_);
+                     "`gdal_translate -a_srs EPSG:XXXX in out`",
+                     path, crs_);
   }
   const char* unit = nullptr;
   if (horizontal.IsGeographic() != 0) {
@@ -109,9 +116,10 @@ Result<void> Georeference::ReadCrs(const OGRSpatialReference& srs, const std::st
   const Position centre = Apply(to_crs_, {width_ / 2.0, height_ / 2.0});
   auto projector = Projector::Make(Wkt(horizontal), centre);
   if (!projector) {
-    return MakeError(ErrorCode::kInvalidArgument,
-                     "{}: {}: {}; resample it with `gdalwarp -t_srs EPSG:4326 in out` where the grids it needs are installed",
-                     path, crs_, projector.error().message);
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "{}: {}: {}; resample it with `gdalwarp -t_srs EPSG:4326 in out` where the grids it needs are installed", path,
+        crs_, projector.error().message);
   }
   if (!(*projector)->is_identity()) projector_ = *std::move(projector);
   return {};

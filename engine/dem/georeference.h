@@ -1,7 +1,7 @@
 // Where a raster lies on the globe: geographic positions to pixel positions and back.
 //
-// Pixel positions are GDAL's: (0, 0) is the outer corner of the first pixel, (.5, .5) its centre; columns to the right, rows
-// downwards in the file.
+// Pixel positions are GDAL's: (0, 0) is the outer corner of the first pixel, (.5, .5) its centre; columns to the right,
+// rows downwards in the file.
 #pragma once
 
 #include <gdal_priv.h>
@@ -22,8 +22,8 @@ class Georeference {
   // Errors say what is missing and the command that adds it.
   static Result<Georeference> Of(GDALDataset& dataset, const std::string& path);
 
-  // Degrees to pixels, in place; NaN where the CRS has no such position. Longitudes of geographic sources are counted modulo
-  // 360 degrees: the column is the one inside the raster if there is one.
+  // Degrees to pixels, in place; NaN where the CRS has no such position. Longitudes of geographic sources are counted
+  // modulo 360 degrees: the column is the one inside the raster if there is one.
   void ToPixels(std::span<Position> positions) const;
 
   // Pixels to degrees, in place; longitudes may lie beyond +-180.
@@ -36,7 +36,8 @@ class Georeference {
   bool columns_run_east() const { return to_crs_[1] > 0; }
   // Columns in 360 degrees, of a geographic grid; else 0.
   double period() const { return period_; }
-  // Columns after which the raster repeats itself, if it goes all around the Earth; else 0. Columns beyond are duplicates.
+  // Columns after which the raster repeats itself, if it goes all around the Earth; else 0. Columns beyond are
+  // duplicates.
   int wrap_columns() const { return wrap_columns_; }
 
   int width() const { return width_; }

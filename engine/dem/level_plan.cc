@@ -57,10 +57,11 @@ Result<SourceSpacing> SourceSpacing::Of(const Georeference& georeference, const 
   georeference.ToDegrees(cross);
   for (const Position& point : cross) {
     if (!std::isfinite(point.x) || std::abs(point.y) > 90) {
-      return MakeError(ErrorCode::kInvalidArgument,
-                       "{}: its centre has no place on Earth in {}; check the georeference with `gdalinfo {}` and correct it "
-                       "with `gdal_translate -a_srs EPSG:XXXX -a_ullr west north east south in out`",
-                       path, georeference.crs(), path);
+      return MakeError(
+          ErrorCode::kInvalidArgument,
+          "{}: its centre has no place on Earth in {}; check the georeference with `gdalinfo {}` and correct it "
+          "with `gdal_translate -a_srs EPSG:XXXX -a_ullr west north east south in out`",
+          path, georeference.crs(), path);
     }
   }
   const Step column = GroundStep(cross[1], cross[2], cross[0]), row = GroundStep(cross[3], cross[4], cross[0]);
@@ -73,8 +74,10 @@ Result<SourceSpacing> SourceSpacing::Of(const Georeference& georeference, const 
   spacing.east = std::abs(area) / std::hypot(row.north, column.north);
   spacing.north = std::abs(area) / std::hypot(row.east, column.east);
   if (!(spacing.finer > 0) || !std::isfinite(spacing.east) || !std::isfinite(spacing.north) || area == 0) {
-    return MakeError(ErrorCode::kInvalidArgument, "{}: its pixels have no extent on the ground in {}; check the georeference "
-                     "with `gdalinfo {}`", path, georeference.crs(), path);
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{}: its pixels have no extent on the ground in {}; check the georeference "
+                     "with `gdalinfo {}`",
+                     path, georeference.crs(), path);
   }
   return spacing;
 }

@@ -1,4 +1,5 @@
-// How deep a source is served, and which lattice and averaging factor each level uses: functions of source and level alone.
+// How deep a source is served, and which lattice and averaging factor each level uses: functions of source and level
+// alone.
 #pragma once
 
 #include <optional>

@@ -34,7 +34,8 @@ class TileNodes {
         first_row_(lattice.FirstRow(key) - 1),
         stride_(lattice.cells + 3),
         tolerance_(tolerance),
-        positions_(static_cast<std::size_t>(stride_) * static_cast<std::size_t>(stride_), Position{kNowhere, kNowhere}) {}
+        positions_(static_cast<std::size_t>(stride_) * static_cast<std::size_t>(stride_),
+                   Position{kNowhere, kNowhere}) {}
 
   std::vector<Position> Compute() && {
     if (georeference_.is_affine()) {
@@ -68,7 +69,8 @@ class TileNodes {
   };
   Part Inside(const Cell& cell) const {
     return {std::max(cell.column, first_column_), std::max(cell.row, first_row_),
-            std::min(cell.column + cell.size, first_column_ + stride_), std::min(cell.row + cell.size, first_row_ + stride_)};
+            std::min(cell.column + cell.size, first_column_ + stride_),
+            std::min(cell.row + cell.size, first_row_ + stride_)};
   }
 
   void FillExactly(std::int64_t column, std::int64_t row, std::int64_t columns, std::int64_t rows) {
@@ -152,8 +154,8 @@ class TileNodes {
 
 }  // namespace
 
-std::vector<Position> NodePositions(const Georeference& georeference, const Footprint& footprint, const geo::Lattice& lattice,
-                                    const geo::TileKey& key, double tolerance) {
+std::vector<Position> NodePositions(const Georeference& georeference, const Footprint& footprint,
+                                    const geo::Lattice& lattice, const geo::TileKey& key, double tolerance) {
   return TileNodes(georeference, footprint, lattice, key, tolerance).Compute();
 }
 

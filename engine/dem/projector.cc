@@ -52,7 +52,8 @@ Result<std::shared_ptr<const Projector>> Projector::Make(const std::string& wkt,
       operation == nullptr ? nullptr : proj_as_proj_string(context.get(), operation.get(), PJ_PROJ_5, nullptr);
   if (pipeline == nullptr) {
     const int error = proj_context_errno(context.get());
-    return MakeError(ErrorCode::kInvalidArgument, "no transformation from WGS 84 to its coordinate reference system ({})",
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "no transformation from WGS 84 to its coordinate reference system ({})",
                      error == 0 ? "none known" : proj_context_errno_string(context.get(), error));
   }
   const std::shared_ptr<Projector> projector(new Projector);

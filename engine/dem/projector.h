@@ -1,7 +1,8 @@
 // Positions on the globe to positions in a CRS and back, through one pinned PROJ operation.
 //
-// GDAL's own transformation picks, where several operations exist, the one that suits the mean of the points it is handed:
-// the same node could land elsewhere in another batch. Here the operation is chosen once, for the source's own area.
+// GDAL's own transformation picks, where several operations exist, the one that suits the mean of the points it is
+// handed: the same node could land elsewhere in another batch. Here the operation is chosen once, for the source's own
+// area.
 #pragma once
 
 #include <memory>

@@ -34,12 +34,14 @@ void RangeTable::AddWindow(int col, int row, int cols, int rows, const float* he
     const std::int64_t bottom =
         std::min<std::int64_t>(((std::int64_t{row + r} + 1) * pixel_step - 1) / kBlock, finest.rows - 1);
     for (int c = 0; c < cols; ++c) {
-      const float height = heights[static_cast<std::size_t>(r) * static_cast<std::size_t>(cols) + static_cast<std::size_t>(c)];
+      const float height =
+          heights[static_cast<std::size_t>(r) * static_cast<std::size_t>(cols) + static_cast<std::size_t>(c)];
       const std::int64_t left = std::int64_t{col + c} * pixel_step / kBlock;
       const std::int64_t right =
           std::min<std::int64_t>(((std::int64_t{col + c} + 1) * pixel_step - 1) / kBlock, finest.columns - 1);
       for (std::int64_t y = top; y <= bottom; ++y) {
-        for (std::int64_t x = left; x <= right; ++x) finest.blocks[static_cast<std::size_t>(y * finest.columns + x)].Add(height);
+        for (std::int64_t x = left; x <= right; ++x)
+          finest.blocks[static_cast<std::size_t>(y * finest.columns + x)].Add(height);
       }
     }
   }
@@ -52,8 +54,11 @@ void RangeTable::Finish() {
     coarse.blocks.resize(static_cast<std::size_t>(coarse.columns) * static_cast<std::size_t>(coarse.rows));
     for (int y = 0; y < fine.rows; ++y) {
       for (int x = 0; x < fine.columns; ++x) {
-        coarse.blocks[static_cast<std::size_t>(y / 2) * static_cast<std::size_t>(coarse.columns) + static_cast<std::size_t>(x / 2)]
-            .Add(fine.blocks[static_cast<std::size_t>(y) * static_cast<std::size_t>(fine.columns) + static_cast<std::size_t>(x)]);
+        coarse
+            .blocks[static_cast<std::size_t>(y / 2) * static_cast<std::size_t>(coarse.columns) +
+                    static_cast<std::size_t>(x / 2)]
+            .Add(fine.blocks[static_cast<std::size_t>(y) * static_cast<std::size_t>(fine.columns) +
+                             static_cast<std::size_t>(x)]);
       }
     }
     levels_.push_back(std::move(coarse));
@@ -80,7 +85,8 @@ BlockRange RangeTable::Query(double west, double north, double east, double sout
   const Level& blocks = levels_[level];
   for (int y = y0; y <= y1; ++y) {
     for (int x = x0; x <= x1; ++x) {
-      range.Add(blocks.blocks[static_cast<std::size_t>(y) * static_cast<std::size_t>(blocks.columns) + static_cast<std::size_t>(x)]);
+      range.Add(blocks.blocks[static_cast<std::size_t>(y) * static_cast<std::size_t>(blocks.columns) +
+                              static_cast<std::size_t>(x)]);
     }
   }
   return range;

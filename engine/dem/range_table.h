@@ -24,14 +24,15 @@ class RangeTable {
   RangeTable() = default;
   RangeTable(int width, int height);
 
-  // Adds the heights of a pixel window; `pixel_step` source pixels lie between its samples (1, or an overview's factor).
+  // Adds the heights of a pixel window; `pixel_step` source pixels lie between its samples (1, or an overview's
+  // factor).
   void AddWindow(int col, int row, int cols, int rows, const float* heights, int pixel_step = 1);
 
   // Makes the coarser levels. Call once after the last AddWindow and before the first Query.
   void Finish();
 
-  // At least the range of all pixels within the box (columns and rows, ends included, clipped to the raster). Cheap whatever
-  // the box's size: coarse blocks answer for large boxes.
+  // At least the range of all pixels within the box (columns and rows, ends included, clipped to the raster). Cheap
+  // whatever the box's size: coarse blocks answer for large boxes.
   BlockRange Query(double west, double north, double east, double south) const;
 
   BlockRange Whole() const { return levels_.back().blocks.front(); }

@@ -41,8 +41,10 @@ Result<void> CheckShape(GDALDataset& dataset, const std::string& path) {
   }
   GDALRasterBand& band = HeightBand(dataset);
   if (GDALDataTypeIsComplex(band.GetRasterDataType()) != 0) {
-    return MakeError(ErrorCode::kInvalidArgument, "{}: samples are complex numbers ({}), heights must be real; convert "
-                     "with `gdal_translate -ot Float32 in out`", path, GDALGetDataTypeName(band.GetRasterDataType()));
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{}: samples are complex numbers ({}), heights must be real; convert "
+                     "with `gdal_translate -ot Float32 in out`",
+                     path, GDALGetDataTypeName(band.GetRasterDataType()));
   }
   const std::int64_t width = dataset.GetRasterXSize(), height = dataset.GetRasterYSize();
   if (width < 2 || height < 2) {
@@ -81,8 +83,8 @@ Result<GDALDatasetUniquePtr> OpenRaster(const std::string& path) {
   GDALDatasetUniquePtr dataset = ReopenRaster(path);
   if (dataset == nullptr) {
     return MakeError(ErrorCode::kInvalidArgument,
-                     "{}: cannot be opened as a raster ({}); check the file with `gdalinfo {}` and its permissions", path,
-                     TakeGdalError(), path);
+                     "{}: cannot be opened as a raster ({}); check the file with `gdalinfo {}` and its permissions",
+                     path, TakeGdalError(), path);
   }
   if (auto shape = CheckShape(*dataset, path); !shape) return tl::unexpected(shape.error());
   return dataset;

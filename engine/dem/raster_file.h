@@ -9,8 +9,8 @@
 
 namespace terrace::dem {
 
-// Opens `path` read-only. Refuses, with the remedy: what is no regular file, no raster, has no band, complex samples, sides or
-// storage blocks of an absurd size. The name stands for a file and nothing else: no inline XML, no URL.
+// Opens `path` read-only. Refuses, with the remedy: what is no regular file, no raster, has no band, complex samples,
+// sides or storage blocks of an absurd size. The name stands for a file and nothing else: no inline XML, no URL.
 Result<GDALDatasetUniquePtr> OpenRaster(const std::string& path);
 
 // The same without the checks, for further handles on a file that passed them; null when it cannot be opened.

@@ -19,9 +19,11 @@ Result<void> ForEachChunk(GDALRasterBand& band, const SampleRules& rules, const 
   std::vector<float> heights;
   for (int row = 0; row < band.GetYSize(); row += kChunkRows) {
     for (int col = 0; col < band.GetXSize(); col += kChunkColumns) {
-      const Chunk chunk{col, row, std::min(kChunkColumns, band.GetXSize() - col), std::min(kChunkRows, band.GetYSize() - row)};
+      const Chunk chunk{col, row, std::min(kChunkColumns, band.GetXSize() - col),
+                        std::min(kChunkRows, band.GetYSize() - row)};
       heights.resize(static_cast<std::size_t>(chunk.cols) * static_cast<std::size_t>(chunk.rows));
-      if (auto read = ReadHeights(band, rules, chunk.col, chunk.row, chunk.cols, chunk.rows, heights.data(), {}); !read) {
+      if (auto read = ReadHeights(band, rules, chunk.col, chunk.row, chunk.cols, chunk.rows, heights.data(), {});
+          !read) {
         return read;
       }
       visit(chunk, heights);
@@ -41,12 +43,15 @@ struct Mean {
       ++count;
     }
   }
-  std::optional<double> value() const { return count == 0 ? std::nullopt : std::optional(sum / static_cast<double>(count)); }
+  std::optional<double> value() const {
+    return count == 0 ? std::nullopt : std::optional(sum / static_cast<double>(count));
+  }
 };
 
 }  // namespace
 
-Result<RasterScan> ScanRaster(GDALDataset& dataset, const RasterLayout& layout, const std::function<void(double)>& progress) {
+Result<RasterScan> ScanRaster(GDALDataset& dataset, const RasterLayout& layout,
+                              const std::function<void(double)>& progress) {
   GDALRasterBand& band = *dataset.GetRasterBand(1);
   RasterScan scan;
   scan.table = RangeTable(layout.width, layout.height);
@@ -67,7 +72,8 @@ Result<RasterScan> ScanRaster(GDALDataset& dataset, const RasterLayout& layout, 
   if (!read) return tl::unexpected(read.error());
   scan.valid = static_cast<std::uint64_t>(layout.width) * static_cast<std::uint64_t>(layout.height) - scan.voids;
   if (scan.valid == 0) {
-    return MakeError(ErrorCode::kInvalidArgument, "has no valid sample, only voids; check its nodata value with gdalinfo and "
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "has no valid sample, only voids; check its nodata value with gdalinfo and "
                      "correct it with `gdal_translate -a_nodata VALUE in out`");
   }
   RangeTable samples_only = scan.table;
@@ -77,9 +83,10 @@ Result<RasterScan> ScanRaster(GDALDataset& dataset, const RasterLayout& layout, 
   scan.edge_row_means = {first_row.value(), last_row.value()};
 
   for (const int factor : layout.overview_factors) {
-    read = ForEachChunk(*FindOverview(band, factor), layout.rules, [&](const Chunk& chunk, const std::vector<float>& heights) {
-      scan.table.AddWindow(chunk.col, chunk.row, chunk.cols, chunk.rows, heights.data(), factor);
-    });
+    read = ForEachChunk(*FindOverview(band, factor), layout.rules,
+                        [&](const Chunk& chunk, const std::vector<float>& heights) {
+                          scan.table.AddWindow(chunk.col, chunk.row, chunk.cols, chunk.rows, heights.data(), factor);
+                        });
     if (!read) return tl::unexpected(read.error());
   }
   scan.table.Finish();

@@ -13,13 +13,14 @@
 namespace terrace::dem {
 
 struct RasterScan {
-  RangeTable table;                // overviews that are read count too: their resampling may overshoot the samples
-  float lowest = 0, highest = 0;   // of the samples
+  RangeTable table;               // overviews that are read count too: their resampling may overshoot the samples
+  float lowest = 0, highest = 0;  // of the samples
   std::uint64_t valid = 0, voids = 0;
   std::array<std::optional<double>, 2> edge_row_means;  // of the first and the last row's valid samples
 };
 
 // kUnavailable: a part cannot be read. kInvalidArgument: nothing but voids. Errors do not name the file.
-Result<RasterScan> ScanRaster(GDALDataset& dataset, const RasterLayout& layout, const std::function<void(double)>& progress);
+Result<RasterScan> ScanRaster(GDALDataset& dataset, const RasterLayout& layout,
+                              const std::function<void(double)>& progress);
 
 }  // namespace terrace::dem

@@ -16,8 +16,10 @@ Result<RasterHeights> ReadRaster(const std::string& path, const std::function<vo
   raster.width = (*dataset)->GetRasterXSize();
   raster.height = (*dataset)->GetRasterYSize();
   if (std::int64_t{raster.width} * raster.height > kMostSamples) {
-    return MakeError(ErrorCode::kInvalidArgument, "{}: {} x {} samples are too many to mesh in one piece (at most {}); cut it "
-                     "with gdal_translate -srcwin", path, raster.width, raster.height, kMostSamples);
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{}: {} x {} samples are too many to mesh in one piece (at most {}); cut it "
+                     "with gdal_translate -srcwin",
+                     path, raster.width, raster.height, kMostSamples);
   }
   raster.georeferenced = (*dataset)->GetGeoTransform(raster.geo_transform.data()) == CE_None;
   GDALRasterBand& band = HeightBand(**dataset);

@@ -33,7 +33,8 @@ Result<Level> StartingLevel(GDALDataset& dataset, const RasterLayout& layout, in
 // Averages `rows` rows of blocks from strips of samples. Every block is summed row by row, whatever the window.
 class BlockAverages {
  public:
-  BlockAverages(std::int64_t blocks, int block) : block_(block), sums_(static_cast<std::size_t>(blocks)), counts_(sums_.size()) {}
+  BlockAverages(std::int64_t blocks, int block)
+      : block_(block), sums_(static_cast<std::size_t>(blocks)), counts_(sums_.size()) {}
 
   void AddRow(const float* samples, std::int64_t count) {
     for (std::int64_t i = 0; i < count; ++i) {
@@ -56,7 +57,8 @@ class BlockAverages {
   std::vector<int> counts_;
 };
 
-// Blocks `column` .. `column + columns` without wrapping, all rows of the window, into columns of `out` that is `stride` wide.
+// Blocks `column` .. `column + columns` without wrapping, all rows of the window, into columns of `out` that is
+// `stride` wide.
 Result<void> ReadBlocks(const Level& level, const SampleRules& rules, const GridWindow& window, float* out,
                         std::int64_t stride, const std::stop_token& stop) {
   const std::int64_t first = window.column * level.block;
@@ -69,8 +71,8 @@ Result<void> ReadBlocks(const Level& level, const SampleRules& rules, const Grid
     const std::int64_t top = (window.row + done) * level.block;
     const std::int64_t rows = std::min<std::int64_t>(level.rows - top, block_rows * level.block);
     samples.resize(static_cast<std::size_t>(count * rows));
-    if (auto read = ReadHeights(*level.band, rules, static_cast<int>(first), static_cast<int>(top), static_cast<int>(count),
-                                static_cast<int>(rows), samples.data(), stop);
+    if (auto read = ReadHeights(*level.band, rules, static_cast<int>(first), static_cast<int>(top),
+                                static_cast<int>(count), static_cast<int>(rows), samples.data(), stop);
         !read) {
       return read;
     }
@@ -113,8 +115,8 @@ GDALRasterBand* FindOverview(GDALRasterBand& band, int factor) {
   return nullptr;
 }
 
-Result<std::vector<float>> ReadGrid(GDALDataset& dataset, const RasterLayout& layout, int factor, const GridWindow& window,
-                                    const std::stop_token& stop) {
+Result<std::vector<float>> ReadGrid(GDALDataset& dataset, const RasterLayout& layout, int factor,
+                                    const GridWindow& window, const std::stop_token& stop) {
   const auto level = StartingLevel(dataset, layout, factor);
   if (!level) return tl::unexpected(level.error());
   const std::int64_t count = GridAxis(layout.columns, factor, layout.wraps).count();

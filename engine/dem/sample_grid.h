@@ -14,9 +14,9 @@ namespace terrace::dem {
 
 // How a raster is stored, as far as reading it goes. Immutable after Open.
 struct RasterLayout {
-  int width = 0, height = 0;          // of the file
-  int columns = 0;                    // of them in use: without the duplicates of a raster that goes all around the Earth
-  bool wraps = false;                 // column `columns` is column 0 again
+  int width = 0, height = 0;  // of the file
+  int columns = 0;            // of them in use: without the duplicates of a raster that goes all around the Earth
+  bool wraps = false;         // column `columns` is column 0 again
   SampleRules rules;
   std::vector<int> overview_factors;  // powers of two, ascending; overviews of other factors are left alone
 };
@@ -49,10 +49,10 @@ struct GridWindow {
   std::int64_t columns = 0, rows = 0;
 };
 
-// Averages of the valid samples of each block in the window, NaN where there is none, row by row from the north. A value is a
-// function of its block alone. Starts from the coarsest overview that `factor` is a multiple of.
-Result<std::vector<float>> ReadGrid(GDALDataset& dataset, const RasterLayout& layout, int factor, const GridWindow& window,
-                                    const std::stop_token& stop);
+// Averages of the valid samples of each block in the window, NaN where there is none, row by row from the north. A
+// value is a function of its block alone. Starts from the coarsest overview that `factor` is a multiple of.
+Result<std::vector<float>> ReadGrid(GDALDataset& dataset, const RasterLayout& layout, int factor,
+                                    const GridWindow& window, const std::stop_token& stop);
 
 // The overview of that factor; null when there is none (any more).
 GDALRasterBand* FindOverview(GDALRasterBand& band, int factor);

@@ -22,9 +22,15 @@ std::optional<double> NodataOf(GDALRasterBand& band) {
   int has = 0;
   double value = 0;
   switch (band.GetRasterDataType()) {
-    case GDT_Int64: value = static_cast<double>(band.GetNoDataValueAsInt64(&has)); break;
-    case GDT_UInt64: value = static_cast<double>(band.GetNoDataValueAsUInt64(&has)); break;
-    default: value = band.GetNoDataValue(&has); break;
+    case GDT_Int64:
+      value = static_cast<double>(band.GetNoDataValueAsInt64(&has));
+      break;
+    case GDT_UInt64:
+      value = static_cast<double>(band.GetNoDataValueAsUInt64(&has));
+      break;
+    default:
+      value = band.GetNoDataValue(&has);
+      break;
   }
   if (has != 0) return value;
   // Many 16-bit elevation files carry the SRTM void without declaring it; no place on Earth is there.
@@ -37,14 +43,31 @@ std::optional<double> NodataOf(GDALRasterBand& band) {
 std::optional<double> MetresPerUnit(const std::string& unit) {
   std::string name;
   for (const char c : unit) {
-    if (std::isalpha(static_cast<unsigned char>(c))) name += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    if (std::isalpha(static_cast<unsigned char>(c)))
+      name += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   }
   constexpr double kFoot = 0.3048, kSurveyFoot = 1200.0 / 3937.0;
   constexpr std::array<std::pair<std::string_view, double>, 20> kUnits = {{
-      {"", 1}, {"m", 1}, {"metre", 1}, {"metres", 1}, {"meter", 1}, {"meters", 1}, {"cm", .01}, {"mm", .001}, {"km", 1000},
-      {"centimetre", .01}, {"decimetre", .1}, {"ft", kFoot}, {"foot", kFoot}, {"feet", kFoot},
-      {"internationalfoot", kFoot}, {"ussurveyfoot", kSurveyFoot}, {"footussurvey", kSurveyFoot}, {"ftus", kSurveyFoot},
-      {"usft", kSurveyFoot}, {"ussurveyfeet", kSurveyFoot},
+      {"", 1},
+      {"m", 1},
+      {"metre", 1},
+      {"metres", 1},
+      {"meter", 1},
+      {"meters", 1},
+      {"cm", .01},
+      {"mm", .001},
+      {"km", 1000},
+      {"centimetre", .01},
+      {"decimetre", .1},
+      {"ft", kFoot},
+      {"foot", kFoot},
+      {"feet", kFoot},
+      {"internationalfoot", kFoot},
+      {"ussurveyfoot", kSurveyFoot},
+      {"footussurvey", kSurveyFoot},
+      {"ftus", kSurveyFoot},
+      {"usft", kSurveyFoot},
+      {"ussurveyfeet", kSurveyFoot},
   }};
   for (const auto& [known, metres] : kUnits) {
     if (known == name) return metres;
@@ -65,8 +88,8 @@ SampleRules SampleRules::Of(GDALRasterBand& band, const std::string& crs_unit) {
   return rules;
 }
 
-Result<void> ReadHeights(GDALRasterBand& band, const SampleRules& rules, int col, int row, int cols, int rows, float* out,
-                         const std::stop_token& stop) {
+Result<void> ReadHeights(GDALRasterBand& band, const SampleRules& rules, int col, int row, int cols, int rows,
+                         float* out, const std::stop_token& stop) {
   const int rows_at_once = std::clamp(kSamplesPerRead / cols, 1, rows);
   std::vector<double> raw(static_cast<std::size_t>(cols) * static_cast<std::size_t>(rows_at_once));
   std::vector<std::uint8_t> mask(rules.has_mask ? raw.size() : 0);
@@ -74,10 +97,11 @@ Result<void> ReadHeights(GDALRasterBand& band, const SampleRules& rules, int col
     if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "reading heights was stopped");
     const int count = std::min(rows_at_once, rows - done);
     ForgetGdalError();
-    CPLErr status = band.RasterIO(GF_Read, col, row + done, cols, count, raw.data(), cols, count, GDT_Float64, 0, 0, nullptr);
+    CPLErr status =
+        band.RasterIO(GF_Read, col, row + done, cols, count, raw.data(), cols, count, GDT_Float64, 0, 0, nullptr);
     if (status == CE_None && rules.has_mask) {
-      status = band.GetMaskBand()->RasterIO(GF_Read, col, row + done, cols, count, mask.data(), cols, count, GDT_Byte, 0, 0,
-                                            nullptr);
+      status = band.GetMaskBand()->RasterIO(GF_Read, col, row + done, cols, count, mask.data(), cols, count, GDT_Byte,
+                                            0, 0, nullptr);
     }
     if (status != CE_None) {
       return MakeError(ErrorCode::kUnavailable, "rows {}..{} cannot be read ({})", row + done, row + done + count - 1,

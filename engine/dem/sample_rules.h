@@ -15,12 +15,12 @@ namespace terrace::dem {
 inline constexpr double kMaxAbsHeight = 99998.0;
 
 struct SampleRules {
-  std::optional<double> nodata;  // in raw values
-  bool compare_as_float = false; // nodata of Float32 bands may be stated with more digits than the samples have
-  bool has_mask = false;         // a mask band says which samples are valid
-  double scale = 1, offset = 0;  // raw * scale + offset is in the band's unit
+  std::optional<double> nodata;   // in raw values
+  bool compare_as_float = false;  // nodata of Float32 bands may be stated with more digits than the samples have
+  bool has_mask = false;          // a mask band says which samples are valid
+  double scale = 1, offset = 0;   // raw * scale + offset is in the band's unit
   double metres_per_unit = 1;
-  std::string unit;              // as stated; empty: none
+  std::string unit;  // as stated; empty: none
 
   // `crs_unit`: the unit of the CRS's vertical axis, used where the band states none.
   static SampleRules Of(GDALRasterBand& band, const std::string& crs_unit);
@@ -42,7 +42,7 @@ std::optional<double> MetresPerUnit(const std::string& unit);
 
 // Heights of a pixel window of a band (or of one of its overviews), row by row into `out`, voids NaN.
 // kUnavailable: the band cannot be read. kCancelled: stopped.
-Result<void> ReadHeights(GDALRasterBand& band, const SampleRules& rules, int col, int row, int cols, int rows, float* out,
-                         const std::stop_token& stop);
+Result<void> ReadHeights(GDALRasterBand& band, const SampleRules& rules, int col, int row, int cols, int rows,
+                         float* out, const std::stop_token& stop);
 
 }  // namespace terrace::dem

@@ -55,7 +55,8 @@ class Filler {
 
 }  // namespace
 
-std::vector<float> FillVoids(const std::vector<float>& heights, const GridWindow& wide, const GridWindow& core, int max_gap) {
+std::vector<float> FillVoids(const std::vector<float>& heights, const GridWindow& wide, const GridWindow& core,
+                             int max_gap) {
   const Filler filler(heights, wide, max_gap);
   std::vector<float> filled;
   filled.reserve(static_cast<std::size_t>(core.columns * core.rows));

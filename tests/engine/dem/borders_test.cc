@@ -81,7 +81,8 @@ TEST(Borders, AreBitEqualInRotatedAndInternationalDatums) {
 }
 
 TEST(Borders, PoleRowsAreOneValue) {
-  for (const std::string name : {"etopo5_global_10min.tif", "etopo1_global_1deg_float32.tif", "pole_antarctica_bedmap_5km.tif"}) {
+  for (const std::string name :
+       {"etopo5_global_10min.tif", "etopo1_global_1deg_float32.tif", "pole_antarctica_bedmap_5km.tif"}) {
     SCOPED_TRACE(name);
     TERRACE_REQUIRE_DATA(path, name);
     const auto source = OpenOrFail(path);

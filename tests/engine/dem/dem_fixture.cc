@@ -40,7 +40,8 @@ std::string WriteRaster(const TempDir& dir, const RasterSpec& spec, const std::s
   std::vector<double> line(static_cast<std::size_t>(spec.width));
   for (int row = 0; row < spec.height; ++row) {
     for (int col = 0; col < spec.width; ++col) line[static_cast<std::size_t>(col)] = spec.value(col, row);
-    EXPECT_EQ(band.RasterIO(GF_Write, 0, row, spec.width, 1, line.data(), spec.width, 1, GDT_Float64, 0, 0, nullptr), CE_None);
+    EXPECT_EQ(band.RasterIO(GF_Write, 0, row, spec.width, 1, line.data(), spec.width, 1, GDT_Float64, 0, 0, nullptr),
+              CE_None);
   }
   std::vector<int> overviews = spec.overviews;
   if (!overviews.empty()) {
@@ -55,7 +56,9 @@ std::string WriteRaster(const TempDir& dir, const RasterSpec& spec, const std::s
 std::optional<std::string> TestDataFile(const std::string& name) {
   const char* folder = std::getenv("TERRACE_TEST_DATA");
   const std::filesystem::path path =
-      (folder != nullptr ? std::filesystem::path(folder) : std::filesystem::path(TERRACE_SOURCE_DIR) / "../shared/data") / name;
+      (folder != nullptr ? std::filesystem::path(folder)
+                         : std::filesystem::path(TERRACE_SOURCE_DIR) / "../shared/data") /
+      name;
   if (std::filesystem::exists(path)) return path.string();
   std::cerr << "test data missing: " << path << "; set TERRACE_TEST_DATA\n";
   return std::nullopt;
@@ -81,10 +84,18 @@ std::vector<geo::TileKey> SomeTiles(const DemSource& source, int level, int coun
 }
 
 std::vector<std::string> RealRasters() {
-  return {"srtm3_N46E008_swiss_alps.tif",    "antimeridian_hawaii_topobathy_5min.tif", "etopo1_global_1deg_float32.tif",
-          "etopo5_global_10min.tif",         "bigtujunga_30m_utm11.tif",               "greenland_80N_100m_custom_tm.tif",
-          "lidar_slovenia_1m_nodata.tif",    "ortho_pair_dtm_2m_byte.tif",             "pole_antarctica_bedmap_5km.tif",
-          "webmercator_sf_float32.tif",      "SainteHelens.dem",                       "n43e007.dt0"};
+  return {"srtm3_N46E008_swiss_alps.tif",
+          "antimeridian_hawaii_topobathy_5min.tif",
+          "etopo1_global_1deg_float32.tif",
+          "etopo5_global_10min.tif",
+          "bigtujunga_30m_utm11.tif",
+          "greenland_80N_100m_custom_tm.tif",
+          "lidar_slovenia_1m_nodata.tif",
+          "ortho_pair_dtm_2m_byte.tif",
+          "pole_antarctica_bedmap_5km.tif",
+          "webmercator_sf_float32.tif",
+          "SainteHelens.dem",
+          "n43e007.dt0"};
 }
 
 }  // namespace terrace::dem

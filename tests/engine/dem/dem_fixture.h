@@ -60,7 +60,7 @@ std::vector<std::string> RealRasters();
 
 }  // namespace terrace::dem
 
-#define TERRACE_REQUIRE_DATA(variable, name)                                                              \
-  const std::optional<std::string> variable##_found = ::terrace::dem::TestDataFile(name);                 \
+#define TERRACE_REQUIRE_DATA(variable, name)                                                                    \
+  const std::optional<std::string> variable##_found = ::terrace::dem::TestDataFile(name);                       \
   if (!variable##_found) GTEST_SKIP() << "SKIPPED, test data missing: " << (name) << "; set TERRACE_TEST_DATA"; \
   const std::string& variable = *variable##_found

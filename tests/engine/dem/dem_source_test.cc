@@ -12,8 +12,9 @@ namespace {
 
 TEST(DemSource, DepthFollowsTheSpacing) {
   const std::map<std::string, int> depths = {
-      {"srtm3_N46E008_swiss_alps.tif", 13}, {"srtm3_S33W071_andes.tif", 13},    {"bigtujunga_30m_utm11.tif", 14},
-      {"webmercator_sf_float32.tif", 17},   {"lidar_slovenia_1m_nodata.tif", 19}, {"lidar_greenriver_1m.tif", 19},
+      {"srtm3_N46E008_swiss_alps.tif", 13}, {"srtm3_S33W071_andes.tif", 13},
+      {"bigtujunga_30m_utm11.tif", 14},     {"webmercator_sf_float32.tif", 17},
+      {"lidar_slovenia_1m_nodata.tif", 19}, {"lidar_greenriver_1m.tif", 19},
       {"etopo5_global_10min.tif", 5},       {"antimeridian_hawaii_topobathy_5min.tif", 6}};
   for (const auto& [name, depth] : depths) {
     TERRACE_REQUIRE_DATA(path, name);
@@ -68,7 +69,8 @@ TEST(DemSource, InfoTellsWhatTheFileSays) {
 
 TEST(DemSource, CompoundCrsStatesItsVerticalDatum) {
   const TempDir dir;
-  const auto source = OpenOrFail(WriteRaster(dir, {.geo_transform = {500000, 30, 0, 5000000, 0, -30}, .crs = "EPSG:32611+5773"}));
+  const auto source =
+      OpenOrFail(WriteRaster(dir, {.geo_transform = {500000, 30, 0, 5000000, 0, -30}, .crs = "EPSG:32611+5773"}));
   ASSERT_NE(source, nullptr);
   EXPECT_EQ(source->info().vertical_datum, "EGM96 geoid");
   EXPECT_NE(source->info().crs.find("UTM zone 11N"), std::string::npos);

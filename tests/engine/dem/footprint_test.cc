@@ -11,7 +11,8 @@ void ExpectLawful(const DemSource& source) {
   EXPECT_TRUE(source.Available(source.max_level() + 1).empty());
   for (int level = 1; level <= source.max_level(); ++level) {
     for (const geo::TileRange& range : source.Available(level)) {
-      for (const geo::TileKey& corner : {geo::TileKey{level, range.start_x, range.start_y}, {level, range.end_x, range.end_y}}) {
+      for (const geo::TileKey& corner :
+           {geo::TileKey{level, range.start_x, range.start_y}, {level, range.end_x, range.end_y}}) {
         EXPECT_TRUE(geo::IsValid(corner));
         EXPECT_TRUE(source.IsAvailable({level - 1, corner.x / 2, corner.y / 2}));
         EXPECT_EQ(std::ranges::count_if(source.Available(level), [&](const auto& r) { return r.Contains(corner); }), 1);
@@ -69,7 +70,8 @@ TEST(Footprint, AroundAPoleHasAllLongitudes) {
 }
 
 TEST(Footprint, ReachesWhereverReadFindsHeights) {
-  for (const std::string name : {"bigtujunga_30m_utm11.tif", "greenland_80N_100m_custom_tm.tif", "lidar_slovenia_1m_nodata.tif"}) {
+  for (const std::string name :
+       {"bigtujunga_30m_utm11.tif", "greenland_80N_100m_custom_tm.tif", "lidar_slovenia_1m_nodata.tif"}) {
     SCOPED_TRACE(name);
     TERRACE_REQUIRE_DATA(path, name);
     const auto source = OpenOrFail(path, {.floor = -1000});

@@ -13,7 +13,8 @@ void ExpectRefused(const std::string& path, const std::vector<std::string>& part
   ASSERT_FALSE(source) << path;
   EXPECT_NE(source.error().message.find(path), std::string::npos) << source.error().message;
   for (const std::string& part : parts) {
-    EXPECT_NE(source.error().message.find(part), std::string::npos) << "no \"" << part << "\" in: " << source.error().message;
+    EXPECT_NE(source.error().message.find(part), std::string::npos)
+        << "no \"" << part << "\" in: " << source.error().message;
   }
 }
 
@@ -53,11 +54,14 @@ TEST(OpenErrors, RefuseBombsBeforeReading) {
   const TempDir dir;
   GDALAllRegister();
   GDALDriver* driver = GetGDALDriverManager()->GetDriverByName("GTiff");
-  const char* const sparse[] = {"SPARSE_OK=TRUE", "TILED=YES", "BIGTIFF=YES", "BLOCKXSIZE=4096", "BLOCKYSIZE=4096", nullptr};
-  GDALDatasetUniquePtr(driver->Create(dir.File("wide.tif").c_str(), 5'000'000, 16, 1, GDT_Byte, const_cast<char**>(sparse)));
+  const char* const sparse[] = {"SPARSE_OK=TRUE",  "TILED=YES",       "BIGTIFF=YES",
+                                "BLOCKXSIZE=4096", "BLOCKYSIZE=4096", nullptr};
+  GDALDatasetUniquePtr(
+      driver->Create(dir.File("wide.tif").c_str(), 5'000'000, 16, 1, GDT_Byte, const_cast<char**>(sparse)));
   ExpectRefused(dir.File("wide.tif"), {"5000000 x 16", "4194304 a side"});
   const char* const one_block[] = {"SPARSE_OK=TRUE", "TILED=YES", "BLOCKXSIZE=8192", "BLOCKYSIZE=8192", nullptr};
-  GDALDatasetUniquePtr(driver->Create(dir.File("block.tif").c_str(), 8192, 8192, 1, GDT_Float64, const_cast<char**>(one_block)));
+  GDALDatasetUniquePtr(
+      driver->Create(dir.File("block.tif").c_str(), 8192, 8192, 1, GDT_Float64, const_cast<char**>(one_block)));
   ExpectRefused(dir.File("block.tif"), {"blocks of 8192 x 8192", "TILED=YES"});
 }
 

@@ -11,7 +11,8 @@ void ExpectContained(const DemSource& source, const geo::TileKey& key) {
     for (int i = 0; i <= tile->lattice.cells; ++i) {
       const float height = tile->At(i, j);
       ASSERT_TRUE(height >= bound.min && height <= bound.max)
-          << geo::ToString(key) << ": " << height << " at " << i << ", " << j << " outside " << bound.min << " .. " << bound.max;
+          << geo::ToString(key) << ": " << height << " at " << i << ", " << j << " outside " << bound.min << " .. "
+          << bound.max;
     }
   }
 }

@@ -19,8 +19,10 @@ TEST(RangeTable, ContainsEverySampleOfAnyBox) {
   table.AddWindow(0, 0, kWidth, kHeight, heights.data());
   table.Finish();
   for (int i = 0; i < 300; ++i) {
-    const int x0 = static_cast<int>(random() % kWidth), x1 = std::min(kWidth - 1, x0 + static_cast<int>(random() % 700));
-    const int y0 = static_cast<int>(random() % kHeight), y1 = std::min(kHeight - 1, y0 + static_cast<int>(random() % 700));
+    const int x0 = static_cast<int>(random() % kWidth),
+              x1 = std::min(kWidth - 1, x0 + static_cast<int>(random() % 700));
+    const int y0 = static_cast<int>(random() % kHeight),
+              y1 = std::min(kHeight - 1, y0 + static_cast<int>(random() % 700));
     BlockRange truth;
     for (int y = y0; y <= y1; ++y) {
       for (int x = x0; x <= x1; ++x) truth.Add(heights[static_cast<std::size_t>(y * kWidth + x)]);

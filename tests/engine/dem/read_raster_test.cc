@@ -8,7 +8,12 @@ namespace {
 
 TEST(ReadRaster, KeepsTheFilesOrderAndMarksVoids) {
   const TempDir dir;
-  const std::string path = WriteRaster(dir, {.width = 5, .height = 3, .type = "Int16", .georeferenced = false, .crs = "", .nodata = 12,
+  const std::string path = WriteRaster(dir, {.width = 5,
+                                             .height = 3,
+                                             .type = "Int16",
+                                             .georeferenced = false,
+                                             .crs = "",
+                                             .nodata = 12,
                                              .value = [](int col, int row) { return col + 10 * row; }});
   double done = 0;
   const auto raster = ReadRaster(path, [&](double share) { done = share; });
@@ -24,7 +29,8 @@ TEST(ReadRaster, KeepsTheFilesOrderAndMarksVoids) {
 
 TEST(ReadRaster, AppliesScaleAndUnit) {
   const TempDir dir;
-  const auto raster = ReadRaster(WriteRaster(dir, {.type = "UInt16", .unit = "ft", .scale = .5, .offset = 100, .value = [](int, int) { return 20.0; }}));
+  const auto raster = ReadRaster(WriteRaster(
+      dir, {.type = "UInt16", .unit = "ft", .scale = .5, .offset = 100, .value = [](int, int) { return 20.0; }}));
   ASSERT_TRUE(raster);
   EXPECT_FLOAT_EQ(raster->heights[0], static_cast<float>(110 * 0.3048));
   EXPECT_TRUE(raster->georeferenced);

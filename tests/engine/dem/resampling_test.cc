@@ -8,7 +8,8 @@ namespace {
 
 // A plane over longitude and latitude, sampled at pixel centres.
 RasterSpec PlaneSpec(double west, double north, double step, int width, int height) {
-  RasterSpec spec{.width = width, .height = height, .type = "Float64", .geo_transform = {west, step, 0, north, 0, -step}};
+  RasterSpec spec{
+      .width = width, .height = height, .type = "Float64", .geo_transform = {west, step, 0, north, 0, -step}};
   spec.value = [=](int col, int row) { return 100 * (west + (col + .5) * step) - 30 * (north - (row + .5) * step); };
   return spec;
 }
@@ -96,11 +97,14 @@ TEST(Resampling, SmallVoidsAreBridgedAndLargeOnesFallToTheFloor) {
   const auto at = [&](double longitude, double latitude) {
     const int level = source->max_level();
     const double size = 180.0 / static_cast<double>(geo::TileRows(level));
-    const geo::TileKey key{level, static_cast<std::int64_t>((longitude + 180) / size), static_cast<std::int64_t>((latitude + 90) / size)};
+    const geo::TileKey key{level, static_cast<std::int64_t>((longitude + 180) / size),
+                           static_cast<std::int64_t>((latitude + 90) / size)};
     const auto tile = source->Read(key);
     const double step = tile->lattice.StepDegrees();
-    const int i = static_cast<int>(std::lround((longitude - tile->lattice.Longitude(tile->lattice.FirstColumn(key))) / step));
-    const int j = static_cast<int>(std::lround((latitude - tile->lattice.Latitude(tile->lattice.FirstRow(key))) / step));
+    const int i =
+        static_cast<int>(std::lround((longitude - tile->lattice.Longitude(tile->lattice.FirstColumn(key))) / step));
+    const int j =
+        static_cast<int>(std::lround((latitude - tile->lattice.Latitude(tile->lattice.FirstRow(key))) / step));
     return tile->At(i, j);
   };
   EXPECT_NEAR(at(11, 19), 100 * 11 - 30 * 19, .5);

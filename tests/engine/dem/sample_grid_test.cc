@@ -56,7 +56,9 @@ OpenGrid OpenAs(const std::string& path, bool wraps) {
 TEST(ReadGrid, AveragesTheValidSamplesOfAlignedBlocks) {
   const TempDir dir;
   RasterSpec spec{.width = 10, .height = 9, .nodata = -1};
-  spec.value = [](int col, int row) { return col < 4 && row < 4 ? (row == 2 ? 6.0 : -1.0) : col < 8 && row < 4 ? -1.0 : col; };
+  spec.value = [](int col, int row) {
+    return col < 4 && row < 4 ? (row == 2 ? 6.0 : -1.0) : col < 8 && row < 4 ? -1.0 : col;
+  };
   const OpenGrid grid = OpenAs(WriteRaster(dir, spec), false);
   const auto heights = ReadGrid(*grid.dataset, grid.layout, 4, {0, 0, 3, 3}, {});
   ASSERT_TRUE(heights) << heights.error().message;

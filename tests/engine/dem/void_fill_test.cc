@@ -29,7 +29,8 @@ TEST(FillVoids, ReproducesAPlane) {
   const GridWindow window{0, 0, 30, 30};
   std::vector<float> heights;
   for (int y = 0; y < 30; ++y) {
-    for (int x = 0; x < 30; ++x) heights.push_back(x > 8 && x < 20 && y > 10 && y < 25 ? kVoid : static_cast<float>(3 * x - 2 * y));
+    for (int x = 0; x < 30; ++x)
+      heights.push_back(x > 8 && x < 20 && y > 10 && y < 25 ? kVoid : static_cast<float>(3 * x - 2 * y));
   }
   const std::vector<float> filled = FillVoids(heights, window, window, 20);
   for (int y = 0; y < 30; ++y) {
@@ -44,7 +45,8 @@ TEST(FillVoids, DoesNotDependOnTheWindow) {
   for (float& height : heights) height = random() % 3 == 0 ? static_cast<float>(random() % 1000) / 7 : kVoid;
   const GridWindow whole{0, 0, kSide, kSide};
   const std::vector<float> truth = FillVoids(heights, whole, whole, kGap);
-  const GridWindow core{20, 25, 12, 10}, wide{core.column - kGap, core.row - kGap, core.columns + 2 * kGap, core.rows + 2 * kGap};
+  const GridWindow core{20, 25, 12, 10},
+      wide{core.column - kGap, core.row - kGap, core.columns + 2 * kGap, core.rows + 2 * kGap};
   std::vector<float> part;
   for (std::int64_t r = 0; r < wide.rows; ++r) {
     for (std::int64_t c = 0; c < wide.columns; ++c) {
