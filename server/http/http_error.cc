@@ -12,7 +12,6 @@ std::string_view TitleOf(int status) {
     case 400: return "Bad request";
     case 404: return "Not found";
     case 405: return "Method not allowed";
-    case 408: return "Request timeout";
     case 414: return "URI too long";
     case 431: return "Request header too large";
     default: return "Service unavailable";

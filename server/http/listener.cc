@@ -20,8 +20,9 @@ using boost::system::error_code;
 constexpr std::chrono::milliseconds kBackOff{10};
 
 Result<tcp::endpoint> Resolve(asio::io_context& io, const std::string& host, std::uint16_t port) {
+  const bool bracketed = host.size() > 2 && host.front() == '[' && host.back() == ']';  // as IPv6 stands in URLs
   error_code error;
-  const asio::ip::address address = asio::ip::make_address(host, error);
+  const asio::ip::address address = asio::ip::make_address(bracketed ? host.substr(1, host.size() - 2) : host, error);
   if (!error) return tcp::endpoint(address, port);
   tcp::resolver resolver(io);
   const auto found = resolver.resolve(host, "", tcp::resolver::passive, error);
