@@ -1,0 +1,43 @@
+# The few commands a contributor needs. CMake does the work; `make help` lists them.
+JOBS ?= $(shell nproc)
+CONFIG ?= config/samples/samples.json
+# Address of `make run`, HOST:PORT; empty: what CONFIG says.
+LISTEN ?=
+
+SOURCES = git ls-files '*.h' '*.cc'
+TERRACE = build/release/server/cli/terrace
+
+.DEFAULT_GOAL := help
+.PHONY: help deps test-deps build run test bench format lint clean
+
+help:  ## list these targets
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+deps:  ## install what building needs (Debian 12; root or sudo)
+	@tools/install_deps.sh
+
+test-deps:  ## and what the tests need
+	@tools/install_deps.sh --test
+
+build: deps  ## build the server into build/release
+	cmake --preset release -DTERRACE_BUILD_TESTS=OFF --log-level=WARNING
+	cmake --build build/release -j $(JOBS)
+
+run: build  ## build, then serve the sample data (LISTEN=HOST:PORT, CONFIG=FILE)
+	@echo "Open the address below in a browser. Ctrl-C ends the server."
+	@exec $(TERRACE) serve --config $(CONFIG) $(if $(LISTEN),--listen $(LISTEN))
+
+test: test-deps  ## build and run every test, then the unit tests under ASan + UBSan and TSan
+	@tools/run_tests.py --jobs $(JOBS)
+
+bench: test-deps  ## build and run the benchmarks; JSON results in build/bench/results
+	@tools/run_benchmarks.sh $(JOBS)
+
+format:  ## format the C++ sources
+	$(SOURCES) | xargs clang-format-14 -i
+
+lint:  ## layers, self-contained headers, formatting, clang-tidy where installed
+	@tools/lint.sh
+
+clean:  ## remove everything that was built
+	rm -rf build

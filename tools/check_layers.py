@@ -1,0 +1,234 @@
+#!/usr/bin/env python3
+"""Checks who includes whom: the rooms' order, and where third-party libraries may appear.
+
+    tools/check_layers.py               check the tree; exit status 1 and one line for each violation
+    tools/check_layers.py --self-test   check the checker
+
+Reads the #include lines alone. A quoted include names a file from the root of the repository. Tests may include everything.
+"""
+import collections
+import os
+import pathlib
+import re
+import sys
+import tempfile
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+
+# core <- {geo, tin} <- {dem, proto} <- server, and core <- config <- server. In the server: tiles <- http <- handlers <- cli.
+ROOMS = {
+    "engine/core": [],
+    "engine/geo": ["engine/core"],
+    "engine/tin": ["engine/core"],
+    "engine/dem": ["engine/core", "engine/geo"],
+    "proto": ["engine/core", "engine/geo", "engine/tin"],
+    "config": ["engine/core"],
+    "server": ["engine/core"],
+    "server/tiles": ["engine/core", "engine/geo", "engine/tin", "engine/dem", "proto", "config", "server"],
+    "server/http": ["engine/core", "engine/geo", "engine/dem", "proto", "config", "server", "server/tiles"],
+    "server/handlers": ["engine/core", "engine/geo", "engine/dem", "proto", "config", "server", "server/tiles", "server/http"],
+    "server/cli": ["engine/core", "engine/geo", "engine/tin", "engine/dem", "proto", "config", "server", "server/tiles",
+                   "server/http", "server/handlers"],
+}
+
+# Library: which headers are its own, and which files may name them (regular expressions on paths). The first match counts.
+Library = collections.namedtuple("Library", "name headers files")
+LIBRARIES = [
+    Library("expected", r"tl/.*", r"."),
+    Library("fmt", r"fmt/.*", r"."),
+    Library("Highway", r"hwy/.*", r"engine/tin/.*\.cc"),
+    Library("GDAL", r"(gdal|cpl|ogr|vrt)\w*\.h|proj\.h", r"engine/dem/"),
+    Library("nlohmann_json", r"nlohmann/.*", r"(config/|proto/.*\.cc|server/.*\.cc)"),
+    Library("libdeflate", r"libdeflate\.h", r"proto/.*\.cc"),
+    Library("Draco", r"draco/.*", r"proto/.*\.cc"),
+    Library("xxHash", r"xxhash\.h", r"(engine/dem|proto|server)/.*\.cc"),
+    Library("spdlog", r"spdlog/.*", r"(engine/dem|server)/.*\.cc"),
+    Library("Beast", r"boost/beast.*", r"server/http/((listener|session)\.(h|cc)|request\.cc)"),
+    Library("Boost", r"boost/.*", r"server/"),
+    Library("CLI11", r"CLI/.*", r"server/cli/"),
+    Library("prometheus-cpp", r"prometheus/.*", r"server/.*\.cc"),
+    # What a room promises not to know: threads and clocks, files, sockets.
+    Library("threads", r"(thread|mutex|shared_mutex|condition_variable|semaphore|future)", r"(engine/dem|server)/"),
+    Library("clocks", r"(chrono|ctime)", r"(config|server|engine/dem)/"),
+    Library("files", r"(filesystem|fstream)", r"(config/|engine/dem/|server/|proto/mesh_file)"),
+    Library("the operating system", r"(unistd|fcntl|glob|signal|dirent|pthread)\.h|(sys|arpa|netinet|linux)/.*",
+            r"(config|engine/dem|server)/.*\.cc"),
+    Library("the standard library", r"[a-z_0-9]+|(stdint|immintrin)\.h", r"."),
+]
+
+# May show in a header that another room includes; inside the server Boost may, too (awaitable results).
+PUBLIC = {"expected", "fmt", "the standard library", "threads", "clocks", "files"}
+
+INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*(?:<([^>\n]+)>|"([^"\n]+)")', re.MULTILINE)
+
+
+def room_of(path):
+    """The room a file belongs to: the longest that is a folder of its path."""
+    rooms = [room for room in ROOMS if path.startswith(room + "/")]
+    return max(rooms, key=len, default=None)
+
+
+def library_of(header):
+    return next((library for library in LIBRARIES if re.fullmatch(library.headers, header)), None)
+
+
+class Tree:
+    def __init__(self, root):
+        self.sources = {}  # path -> [(line, header or None, quoted path or None)]
+        for room in sorted({room.split("/")[0] for room in ROOMS}):
+            for folder, folders, names in os.walk(root / room):
+                folders[:] = sorted(set(folders) - {"node_modules"})
+                for name in sorted(names):
+                    if name.endswith((".h", ".cc")):
+                        path = pathlib.Path(folder, name)
+                        self.sources[path.relative_to(root).as_posix()] = self.includes(path)
+
+    @staticmethod
+    def includes(path):
+        text = path.read_text(encoding="utf-8")
+        return [(text.count("\n", 0, match.start(1) if match[1] else match.start(2)) + 1, match[1], match[2])
+                for match in INCLUDE.finditer(text)]
+
+    def libraries_behind(self, path, seen=None):
+        """Names of every library that including `path` brings in."""
+        seen = set() if seen is None else seen
+        names = set()
+        if path in seen:
+            return names
+        seen.add(path)
+        for _, header, quoted in self.sources.get(path, []):
+            if quoted:
+                names |= self.libraries_behind(quoted, seen)
+            elif library := library_of(header):
+                names.add(library.name)
+        return names
+
+    def violations(self):
+        for path, includes in self.sources.items():
+            for line, header, quoted in includes:
+                message = self.judge(path, quoted) if quoted else self.judge_library(path, header)
+                if message:
+                    yield f"{path}:{line}: {message}"
+
+    def judge(self, path, quoted):
+        if quoted not in self.sources:
+            return f'"{quoted}" is no file of a room: name it from the root of the repository'
+        room, other = room_of(path), room_of(quoted)
+        if room is None or other is None:
+            return f'"{quoted}": {path if room is None else quoted} lies in no room; add its folder to ROOMS'
+        if room == other:
+            return None
+        if other not in ROOMS[room]:
+            return f'{room} may not know {other} ("{quoted}")'
+        public = PUBLIC | ({"Boost"} if room.startswith("server") and other.startswith("server") else set())
+        if room == "server/cli" and other == "server/http":
+            public = public | {"Beast"}
+        hidden = self.libraries_behind(quoted) - public
+        if hidden:
+            return f'"{quoted}" shows {", ".join(sorted(hidden))} to {room}: keep it in .cc files or in headers of {other} alone'
+        return None
+
+    @staticmethod
+    def judge_library(path, header):
+        library = library_of(header)
+        if library is None:
+            return f"<{header}> belongs to no known library; add it to LIBRARIES"
+        if not re.match(library.files, path):
+            return f"{library.name} (<{header}>) may not appear here"
+        return None
+
+
+class SelfTest(unittest.TestCase):
+    def check(self, files):
+        with tempfile.TemporaryDirectory() as folder:
+            for path, text in files.items():
+                file = pathlib.Path(folder, path)
+                file.parent.mkdir(parents=True, exist_ok=True)
+                file.write_text(text, encoding="utf-8")
+            return list(Tree(pathlib.Path(folder)).violations())
+
+    def assert_clean(self, files):
+        self.assertEqual(self.check(files), [])
+
+    def assert_refused(self, files, part):
+        found = self.check(files)
+        self.assertEqual(len(found), 1, found)
+        self.assertIn(part, found[0])
+
+    def test_arrows_allowed(self):
+        self.assert_clean({
+            "engine/core/result.h": "#include <tl/expected.hpp>\n",
+            "engine/geo/key.h": '#include "engine/core/result.h"\n',
+            "engine/dem/source.h": '#include "engine/geo/key.h"\n#include <stop_token>\n',
+            "server/tiles/pipeline.h": '#include "engine/dem/source.h"\n',
+            "server/http/router.cc": '#include "server/tiles/pipeline.h"\n',
+        })
+
+    def test_arrows_refused(self):
+        for user, used in (("engine/core", "engine/geo"), ("engine/tin", "engine/geo"), ("engine/geo", "engine/tin"),
+                           ("proto", "engine/dem"), ("engine/dem", "proto"), ("config", "engine/geo"), ("engine/tin", "server/tiles"),
+                           ("server/tiles", "server/http"), ("server/http", "server/handlers"), ("server/handlers", "server/cli")):
+            with self.subTest(user=user, used=used):
+                self.assert_refused({f"{used}/b.h": "", f"{user}/a.cc": f'#include "{used}/b.h"\n'}, f"{user} may not know {used}")
+
+    def test_line_is_named(self):
+        self.assert_refused({"engine/geo/b.h": "", "engine/core/a.h": '// first\n\n#  include "engine/geo/b.h"\n'}, "engine/core/a.h:3:")
+
+    def test_unknown_file_and_folder(self):
+        self.assert_refused({"engine/geo/a.cc": '#include "key.h"\n'}, "is no file of a room")
+        self.assert_refused({"engine/a.h": "", "engine/geo/b.cc": '#include "engine/a.h"\n'}, "lies in no room")
+
+    def test_libraries_stay_in_their_places(self):
+        for path, header in (("engine/tin/a.cc", "gdal_priv.h"), ("server/tiles/a.cc", "gdal.h"), ("proto/a.cc", "cpl_conv.h"),
+                             ("server/http/router.cc", "boost/beast/http.hpp"), ("server/http/request.h", "boost/beast.hpp"),
+                             ("engine/dem/a.cc", "boost/asio.hpp"), ("proto/a.h", "nlohmann/json.hpp"),
+                             ("server/tiles/a.cc", "CLI/CLI.hpp"), ("engine/tin/a.h", "thread"), ("engine/geo/a.h", "chrono"),
+                             ("proto/a.cc", "sys/socket.h"), ("engine/tin/a.h", "hwy/highway.h"), ("server/cli/a.h", "spdlog/spdlog.h")):
+            with self.subTest(path=path, header=header):
+                self.assert_refused({path: f"#include <{header}>\n"}, "may not appear here")
+
+    def test_libraries_in_their_places(self):
+        self.assert_clean({
+            "engine/dem/handle.h": "#include <gdal_priv.h>\n#include <mutex>\n",
+            "engine/dem/source.cc": '#include "engine/dem/handle.h"\n#include <sys/stat.h>\n',
+            "server/http/session.cc": "#include <boost/beast/http.hpp>\n#include <boost/asio/awaitable.hpp>\n",
+            "server/cli/main.cc": "#include <CLI/CLI.hpp>\n",
+            "proto/compress.cc": "#include <libdeflate.h>\n#include <vector>\n",
+            "engine/tin/scan.cc": "#include <hwy/highway.h>\n#include <stop_token>\n",
+        })
+
+    def test_library_shown_through_another_header(self):
+        self.assert_refused({
+            "engine/dem/handle.h": "#include <gdal.h>\n",
+            "engine/dem/source.h": '#include "engine/dem/handle.h"\n',
+            "server/tiles/pipeline.cc": '#include "engine/dem/source.h"\n',
+        }, "shows GDAL to server/tiles")
+
+    def test_boost_crosses_rooms_of_the_server_only_without_beast(self):
+        self.assert_clean({
+            "server/asio.h": "#include <boost/asio/awaitable.hpp>\n",
+            "server/tiles/service.h": '#include "server/asio.h"\n',
+            "server/http/router.h": '#include "server/tiles/service.h"\n',
+        })
+        self.assert_refused({
+            "server/http/session.h": "#include <boost/beast/core.hpp>\n",
+            "server/handlers/tile.cc": '#include "server/http/session.h"\n',
+        }, "shows Beast to server/handlers")
+
+    def test_unknown_library(self):
+        self.assert_refused({"proto/a.cc": "#include <rapidjson/document.h>\n"}, "belongs to no known library")
+
+
+def main():
+    if sys.argv[1:] == ["--self-test"]:
+        unittest.main(argv=sys.argv[:1])
+    tree = Tree(ROOT)
+    found = list(tree.violations())
+    print(*found, sep="\n", end="\n" if found else "")
+    print(f"{len(tree.sources)} files, {len(found)} violations")
+    return 1 if found or not tree.sources else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

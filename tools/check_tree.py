@@ -1,0 +1,86 @@
+#!/usr/bin/env python3
+"""Checks what no compiler sees: machine paths, package hosts and leftovers in any text file of the tree.
+
+    tools/check_tree.py               check; exit status 1 and one line for each finding
+    tools/check_tree.py --self-test   check the checker
+"""
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+SKIPPED_FOLDERS = {".git", ".deps", "build", "node_modules", "data"}
+
+# In pieces, so that this file does not find itself.
+HOSTS = "|".join(("registry" r"\.npmjs", "registry" r"\.yarnpkg", "deb" r"\.debian\.org", "snapshot" r"\.debian", "security" r"\.debian\.org",
+                  "pypi" r"\.org", "files" r"\.pythonhosted", "deb" r"\.nodesource", "crates" r"\.io", "proxy" r"\.golang"))
+RULES = [
+    (re.compile(HOSTS), "names a package registry: the machine's own configuration knows where packages come from"),
+    (re.compile(r"(?<![\w.$}])/(?:work|root|home|Users)/[\w.]"), "names a path of one machine"),
+    (re.compile(r"^(?:<{7} |>{7} |={7}$)"), "is a conflict marker"),
+    (re.compile(r"\b(?:TO" r"DO|FIX" r"ME|X" r"XX)\b"), "is a note to oneself: do it, or open an issue"),
+    (re.compile(r"[ \t]+$"), "ends in blanks"),
+]
+
+
+def files():
+    """What git knows or would know; without git everything that was not built or fetched."""
+    listing = subprocess.run(["git", "ls-files", "--cached", "--others", "--exclude-standard", "-z"], cwd=ROOT,
+                             stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+    if listing.returncode == 0:
+        return sorted(ROOT / name for name in listing.stdout.decode().split("\0") if name)
+    found = []
+    for folder, folders, names in os.walk(ROOT):
+        folders[:] = [name for name in folders if name not in SKIPPED_FOLDERS]
+        found += [pathlib.Path(folder, name) for name in names]
+    return sorted(found)
+
+
+def findings(name, text):
+    for number, line in enumerate(text.splitlines(), 1):
+        for pattern, message in RULES:
+            if match := pattern.search(line):
+                yield f"{name}:{number}: '{match[0].strip()}' {message}"
+    if name.endswith(".h") and "#pragma once" not in text:
+        yield f"{name}:1: a header without #pragma once"
+    if text and not text.endswith("\n"):
+        yield f"{name}: does not end in a line feed"
+
+
+class SelfTest(unittest.TestCase):
+    def test_findings(self):
+        for text in ("https://registry" ".npmjs.org/cesium\n", "cd /wo" "rk/main\n", "'/ho" "me/ann/dem.tif'\n", "<<<<" "<<< HEAD\n",
+                     "// TO" "DO: later\n", "blank \n", "no line feed"):
+            with self.subTest(text=text):
+                self.assertEqual(len(list(findings("a.cc", text))), 1)
+        self.assertEqual(len(list(findings("a.h", "int a;\n"))), 1)
+
+    def test_no_findings(self):
+        for text in ("", "framework/roots/a\n", "https://example.org/home/page\n", "a / work / b\n", "#pragma once\n", "$HOME/root/x\n"):
+            with self.subTest(text=text):
+                self.assertEqual(list(findings("a.h" if "pragma" in text else "a.cc", text)), [])
+
+
+def main():
+    if sys.argv[1:] == ["--self-test"]:
+        unittest.main(argv=sys.argv[:1])
+    checked, found = 0, []
+    for path in files():
+        if not path.is_file():
+            continue
+        try:
+            text = path.read_text(encoding="utf-8")
+        except UnicodeDecodeError:
+            continue  # binary
+        checked += 1
+        found += findings(path.relative_to(ROOT).as_posix(), text)
+    print(*found, sep="\n", end="\n" if found else "")
+    print(f"{checked} files, {len(found)} findings")
+    return 1 if found or not checked else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

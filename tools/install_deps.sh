@@ -1,0 +1,97 @@
+#!/usr/bin/env bash
+# Installs what terrace needs on Debian 12: packages, the Boost 1.81 headers (.deps/boost), and the viewer's npm modules.
+# Does only what is missing, so that a second run takes a moment. Run as root, or as a user who may use sudo.
+#
+#   tools/install_deps.sh            what building and running need
+#   tools/install_deps.sh --test     and what the tests, benchmarks, formatting and load tests need
+set -euo pipefail
+export LC_ALL=C DEBIAN_FRONTEND=noninteractive
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+
+build_packages=(
+  g++ cmake ninja-build make git pkg-config ccache ca-certificates gzip python3
+  libgdal-dev gdal-bin nlohmann-json3-dev libspdlog-dev libfmt-dev libexpected-dev libcli11-dev prometheus-cpp-dev
+  libdeflate-dev libxxhash-dev
+)
+test_packages=(
+  libgtest-dev libbenchmark-dev zlib1g-dev chromium python3-jsonschema strace wrk
+  clang-14 libclang-rt-14-dev llvm-14 clang-format-14
+)
+
+die() { echo "install_deps: $*" >&2; exit 1; }
+
+with_tests=false
+case "${1:-}" in
+  "") ;;
+  --test) with_tests=true ;;
+  -h | --help) sed -n '2,/^set /{s/^# \{0,1\}//;/^set /!p}' "${BASH_SOURCE[0]}"; exit 0 ;;
+  *) echo "install_deps: unknown option '$1'; it takes --test or nothing" >&2; exit 2 ;;
+esac
+
+as_root() {
+  if [[ $EUID -eq 0 ]]; then "$@"
+  elif command -v sudo > /dev/null; then sudo --preserve-env=DEBIAN_FRONTEND,LC_ALL "$@"
+  else die "this needs root and there is no sudo; run as root: $*"
+  fi
+}
+
+lists_are_fresh=false
+refresh_package_lists() {
+  $lists_are_fresh && return
+  echo "install_deps: apt-get update"
+  as_root apt-get -qq update
+  lists_are_fresh=true
+}
+
+is_installed() { [[ $(dpkg-query -W -f='${db:Status-Status}' "$1" 2> /dev/null) == installed ]]; }
+
+install_packages() {
+  local wanted=("${build_packages[@]}") missing=() package
+  $with_tests && wanted+=("${test_packages[@]}")
+  # Node from another source serves as well as Debian's, and would be removed by it.
+  if ! command -v node > /dev/null || ! command -v npm > /dev/null; then wanted+=(nodejs npm); fi
+  for package in "${wanted[@]}"; do is_installed "$package" || missing+=("$package"); done
+  if [[ ${#missing[@]} -eq 0 ]]; then return; fi
+  command -v apt-get > /dev/null || die "apt-get not found; on other systems install the counterparts of: ${missing[*]}"
+  refresh_package_lists
+  echo "install_deps: apt-get install ${missing[*]}"
+  as_root apt-get -qq install -y --no-install-recommends "${missing[@]}"
+}
+
+# Boost 1.81 or later. Debian 12 has 1.81, but its -dev package conflicts with the 1.74 that libgdal-dev depends on: unpack
+# its headers beside the system's.
+boost_version() { sed -n 's/^#define BOOST_VERSION \([0-9]*\).*/\1/p' "$1/boost/version.hpp" 2> /dev/null || true; }
+
+install_boost() {
+  local prefix=$root/.deps/boost version package scratch
+  version=$(boost_version "$prefix/usr/include")
+  if [[ ${version:-0} -ge 108100 ]]; then return; fi
+  version=$(boost_version /usr/include)
+  if [[ ${version:-0} -ge 108100 ]]; then return; fi
+  refresh_package_lists
+  package=$(apt-cache search --names-only '^libboost1\.(8[1-9]|9[0-9])-dev$' | awk '{ print $1 }' | sort -V | head -n 1)
+  [[ -n $package ]] || die "no libboost1.81-dev or later in the package lists; put Boost >= 1.81 under $prefix/usr yourself"
+  echo "install_deps: unpacking the headers of $package into .deps/boost"
+  scratch=$(mktemp -d)
+  (cd "$scratch" && apt-get -qq -o APT::Sandbox::User=root download "$package" && dpkg -x "$package"_*.deb unpacked)
+  mkdir -p "$root/.deps"
+  rm -rf "$prefix"
+  chmod 755 "$scratch/unpacked"
+  mv "$scratch/unpacked" "$prefix"
+  rm -rf "$scratch"
+}
+
+# Installs exactly what package-lock.json of the folder says, if it is not there already.
+install_node_modules() {
+  local folder=$root/$1
+  [[ -f $folder/package-lock.json ]] || return 0
+  if [[ $folder/node_modules/.package-lock.json -nt $folder/package-lock.json ]]; then return; fi
+  echo "install_deps: npm ci in $1"
+  (cd "$folder" && npm ci --ignore-scripts --no-audit --no-fund --loglevel=error < /dev/null)
+  touch "$folder/node_modules/.package-lock.json"
+}
+
+install_packages
+install_boost
+install_node_modules server/viewer
+if $with_tests; then install_node_modules tests/e2e; fi

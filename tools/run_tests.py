@@ -1,0 +1,154 @@
+#!/usr/bin/env python3
+"""Builds and runs the tests: everything in release, the unit tests once more under both sanitizers.
+
+    tools/run_tests.py [--jobs N] [SUITE ...]     suites: release asan tsan; default: all three, in this order
+
+A sanitizer suite builds only what its tests run. The last line says `N passed, N failed`, counted from ctest's own
+reports; a test that could not be built or found counts as failed. Exit status 0 only if everything was built and
+nothing failed.
+"""
+import argparse
+import dataclasses
+import json
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+import time
+import xml.etree.ElementTree as ElementTree
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+
+
+@dataclasses.dataclass(frozen=True)
+class Suite:
+    name: str  # of the CMake preset
+    label: str | None = None  # run only tests with this ctest label
+    environment: dict = dataclasses.field(default_factory=dict)
+
+
+SANITIZER_TOOLS = {
+    # clang-14 looks for a symbolizer without its version in the name.
+    "ASAN_SYMBOLIZER_PATH": "/usr/bin/llvm-symbolizer-14",
+    "TSAN_SYMBOLIZER": "/usr/bin/llvm-symbolizer-14",
+}
+SUITES = {
+    suite.name: suite
+    for suite in (
+        Suite("release"),
+        Suite("asan", "unit", SANITIZER_TOOLS | {"UBSAN_OPTIONS": "print_stacktrace=1"}),
+        Suite("tsan", "unit", SANITIZER_TOOLS | {
+            "TSAN_OPTIONS": f"suppressions={ROOT}/tools/tsan.supp second_deadlock_stack=1 "
+                            "external_symbolizer_path=/usr/bin/llvm-symbolizer-14"}),
+    )
+}
+
+
+@dataclasses.dataclass
+class Outcome:
+    passed: int = 0
+    failed: int = 0
+    skipped: int = 0
+    broken: list = dataclasses.field(default_factory=list)  # steps other than tests that failed
+
+    def add(self, other):
+        self.passed += other.passed
+        self.failed += other.failed
+        self.skipped += other.skipped
+        self.broken += other.broken
+
+
+def run(command, **kwargs):
+    print("+", " ".join(map(str, command)), flush=True)
+    return subprocess.run(command, cwd=ROOT, stdin=subprocess.DEVNULL, **kwargs).returncode
+
+
+def listed_tests(build, label):
+    """What ctest would run, from its own description."""
+    command = ["ctest", "--test-dir", str(build), "--show-only=json-v1"]
+    if label:
+        command += ["-L", f"^{label}$"]
+    reply = subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.PIPE, stdin=subprocess.DEVNULL)
+    return json.loads(reply.stdout)["tests"]
+
+
+def build_targets(build, tests):
+    """Names of the build's targets that are executables of these tests: a test carries the name of its executable."""
+    reply = subprocess.run(["ninja", "-C", str(build), "-t", "targets", "all"], check=True, stdout=subprocess.PIPE, text=True)
+    known = {line.partition(":")[0] for line in reply.stdout.splitlines()}
+    return sorted({test["name"] for test in tests} & known)
+
+
+def count(report):
+    """Counts ctest's JUnit report."""
+    outcome = Outcome()
+    for case in ElementTree.parse(report).getroot().iter("testcase"):
+        status = case.get("status")
+        if status == "run":
+            outcome.passed += 1
+        elif status == "disabled" or (status == "notrun" and "SKIP" in (case.find("skipped").get("message") or "")):
+            outcome.skipped += 1
+        else:
+            outcome.failed += 1
+    return outcome
+
+
+def address_space_prefix():
+    """clang-14's ThreadSanitizer cannot live with the address randomization of recent kernels: ask for none, if allowed."""
+    prefix = ["setarch", os.uname().machine, "--addr-no-randomize"]
+    if shutil.which("setarch") and subprocess.run([*prefix, "true"], stderr=subprocess.DEVNULL).returncode == 0:
+        return prefix
+    return []
+
+
+def run_suite(suite, jobs):
+    started = time.monotonic()
+    build = ROOT / "build" / suite.name
+    if run(["cmake", "--preset", suite.name, "-DTERRACE_BUILD_TESTS=ON", "--log-level=WARNING"]) != 0:
+        return Outcome(broken=[f"{suite.name}: configure"])
+    outcome = Outcome()
+    tests = listed_tests(build, suite.label)
+    # -k 0: what can be built is built and tested, what cannot is reported by ctest as failed.
+    build_command = ["ninja", "-C", str(build), "-j", str(jobs), "-k", "0"]
+    if suite.label:
+        build_command += build_targets(build, tests)
+    if tests and run(build_command) != 0:
+        outcome.broken.append(f"{suite.name}: build")
+
+    report = build / "ctest.xml"
+    report.unlink(missing_ok=True)
+    ctest = ["ctest", "--test-dir", str(build), "--output-on-failure", "--no-tests=error", "-j", str(jobs),
+             "--output-junit", str(report)]
+    if suite.label:
+        ctest = address_space_prefix() + ctest + ["-L", f"^{suite.label}$"]
+    run(ctest, env=os.environ | suite.environment)
+    if report.exists():
+        outcome.add(count(report))
+    else:
+        outcome.broken.append(f"{suite.name}: no tests found")
+    print(f"{suite.name}: {outcome.passed} passed, {outcome.failed} failed, {outcome.skipped} skipped, "
+          f"{time.monotonic() - started:.0f} s", flush=True)
+    return outcome
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--jobs", type=int, default=os.cpu_count())
+    parser.add_argument("suites", nargs="*", metavar="SUITE", help="release, asan, tsan")
+    arguments = parser.parse_args()
+    unknown = set(arguments.suites) - set(SUITES)
+    if unknown:
+        parser.error(f"no suite {', '.join(sorted(unknown))}; there are {', '.join(SUITES)}")
+
+    total = Outcome()
+    for name in arguments.suites or SUITES:
+        total.add(run_suite(SUITES[name], arguments.jobs))
+    for step in total.broken:
+        print(f"did not work: {step}")
+    print(f"{total.passed} passed, {total.failed} failed", flush=True)
+    return 1 if total.failed or total.broken or not total.passed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
