@@ -1,14 +1,12 @@
 // The viewer: datasets from the server, controls from the panel, terrain on the globe, and the view in the URL.
-import { Globe, isGlobal } from "/viewer/globe.js";
-import { Panel } from "/viewer/panel.js";
+import { Globe, suggestedFraction } from "/viewer/globe.js";
+import { Panel, fractionOfStep, stepOfFraction } from "/viewer/panel.js";
 import { Traffic } from "/viewer/traffic.js";
 import { decodeView, encodeView } from "/viewer/view_url.js";
 
-const kDefaultFraction = 0.5;
-const kDefaultFractionGlobal = 2 ** -5;  // seen whole, a planet's relief is smaller than the level error: colours need more
 const kFlightSeconds = 2.5;
 
-const state = { datasets: [], dataset: undefined, fraction: kDefaultFraction, contours: false, wireframe: false, picked: undefined,
+const state = { datasets: [], dataset: undefined, fraction: 0.5, contours: false, wireframe: false, picked: undefined,
                 drawn: undefined, ready: false, problems: [] };
 
 const panel = new Panel({
@@ -34,6 +32,10 @@ function makeGlobe() {
     complain(`This browser cannot draw the globe: ${error.message}`);
     throw error;
   }
+}
+
+function defaultFraction(dataset) {
+  return fractionOfStep(stepOfFraction(suggestedFraction(dataset)));
 }
 
 async function fetchDatasets() {
@@ -63,7 +65,7 @@ async function show() {
 
 function choose(name) {
   state.dataset = state.datasets.find((dataset) => dataset.name === name) ?? state.datasets[0];
-  state.fraction = isGlobal(state.dataset) ? kDefaultFractionGlobal : kDefaultFraction;
+  state.fraction = defaultFraction(state.dataset);
   globe.lookAt(state.dataset, kFlightSeconds);
   return show();
 }
@@ -91,7 +93,7 @@ function remember() {
 
 function apply(view) {
   state.dataset = state.datasets.find((dataset) => dataset.name === view.dataset) ?? state.datasets[0];
-  state.fraction = view.fraction ?? (isGlobal(state.dataset) ? kDefaultFractionGlobal : kDefaultFraction);
+  state.fraction = view.fraction ?? defaultFraction(state.dataset);
   globe.exaggeration = view.exaggeration ?? 1;
   panel.setExaggeration(globe.exaggeration);
   if (view.camera) globe.camera = view.camera;

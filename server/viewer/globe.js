@@ -7,6 +7,8 @@ import { makeTerrainMaterial, niceInterval, setHeights } from "/viewer/material.
 
 const kMetresPerDegree = 111320;
 const kGlobalWidth = 100;  // a dataset wider than this, in degrees, is shown as a whole globe
+const kGlobalDistance = 1.75e7;  // metres from which the whole globe fits
+const kSoftware = /swiftshader|llvmpipe|software|basic render/i;  // drawn without a GPU: smooth edges cost too much there
 
 // Middle and size of [west, south, east, north], degrees; east < west means across the antimeridian.
 function boxOf([west, south, east, north]) {
@@ -14,8 +16,31 @@ function boxOf([west, south, east, north]) {
   return { longitude: west + width / 2, latitude: (south + north) / 2, width, height: north - south };
 }
 
-export function isGlobal(dataset) {
+function isGlobal(dataset) {
   return boxOf(dataset.bounds).width > kGlobalWidth;
+}
+
+// Diagonal of the dataset, metres.
+function extent(dataset) {
+  const { latitude, width, height } = boxOf(dataset.bounds);
+  return Math.hypot(width * Math.cos(CesiumMath.toRadians(latitude)), height) * kMetresPerDegree;
+}
+
+// Metres between the camera and the middle of a dataset seen whole.
+function viewDistance(dataset) {
+  return isGlobal(dataset) ? kGlobalDistance : extent(dataset) * (0.62 + 0.2 * Math.min(1, extent(dataset) / 5e6));
+}
+
+// Pixels of error at which CesiumJS goes a level deeper. Continents get more tiles, for the sake of their colours.
+function pixelTolerance(dataset) {
+  return extent(dataset) > 1.5e6 ? 0.5 : 1.5;
+}
+
+// The share of the level error that makes a first view of the dataset good: half of it, and less where the relief is so
+// small beside the extent that the level error (pixelTolerance pixels of 1.6 mm at one metre) exceeds 1/40 of it.
+export function suggestedFraction(dataset) {
+  const visible = (dataset.heights.max - dataset.heights.min) / 40;
+  return Math.min(0.5, visible / (0.0016 * pixelTolerance(dataset) * viewDistance(dataset)));
 }
 
 export class Globe {
@@ -42,13 +67,23 @@ export class Globe {
     const { globe, screenSpaceCameraController: controller } = this.scene;
     this.scene.sun.show = false;
     this.scene.moon.show = false;
+    this.scene.skyAtmosphere.atmosphereLightIntensity = 22;
     this.scene.backgroundColor = Color.fromCssColorString("#05080d");
     controller.tiltEventTypes.push(CameraEventType.RIGHT_DRAG);
     controller.zoomEventTypes = controller.zoomEventTypes.filter((type) => type !== CameraEventType.RIGHT_DRAG);
     globe.baseColor = Color.fromCssColorString("#1b232d");
-    globe.enableLighting = false;  // the material shades
+    globe.enableLighting = false;  // the material shades, and has its own haze
+    globe.showGroundAtmosphere = false;
+    this.scene.fog.renderable = false;
+    if (kSoftware.test(this.#renderer())) this.scene.msaaSamples = 1;
     globe.showWaterEffect = false;
     globe.material = this.material = makeTerrainMaterial();
+  }
+
+  #renderer() {
+    const gl = document.createElement("canvas").getContext("webgl2");
+    const names = gl?.getExtension("WEBGL_debug_renderer_info");
+    return names ? gl.getParameter(names.UNMASKED_RENDERER_WEBGL) : "";
   }
 
   // Shows `dataset` at `fraction` of the level error. Throws with a readable message if the server does not describe it.
@@ -65,7 +100,7 @@ export class Globe {
     setHeights(this.material, dataset.heights);
     this.material.uniforms.box = { x: radians(longitude), y: radians(latitude), z: radians(width / 2), w: radians(height / 2) };
     this.material.uniforms.shading = provider.hasVertexNormals ? 1 : 0;
-    this.scene.globe.maximumScreenSpaceError = isGlobal(dataset) ? 0.5 : 1.5;
+    this.scene.globe.maximumScreenSpaceError = pixelTolerance(dataset);
     this.widget.terrainProvider = provider;
     this.adaptToCamera();
   }
@@ -94,14 +129,14 @@ export class Globe {
     const { longitude, latitude, width, height } = boxOf(dataset.bounds);
     const narrow = Math.max(1, 0.8 * this.scene.canvas.clientHeight / this.scene.canvas.clientWidth);
     if (isGlobal(dataset)) {
-      const destination = Cartesian3.fromDegrees(width > 350 ? 82 : longitude, width > 350 ? 18 : latitude, 1.55e7 * narrow);
+      const destination = Cartesian3.fromDegrees(width > 350 ? 82 : longitude, width > 350 ? 18 : latitude, kGlobalDistance * narrow);
       return seconds > 0 ? camera.flyTo({ destination, duration: seconds }) : camera.setView({ destination });
     }
-    const size = Math.hypot(width * Math.cos(CesiumMath.toRadians(latitude)), height) * kMetresPerDegree;
-    const pitch = -28 - 30 * Math.min(1, size / 5e6);
+    const size = extent(dataset);
+    const pitch = -28 - 45 * Math.min(1, size / 5e6);
     const ground = Math.max(0, dataset.heights.min) * 0.6 + Math.max(0, dataset.heights.max) * 0.2;
     const sphere = new BoundingSphere(Cartesian3.fromDegrees(longitude, latitude, ground), size / 2);
-    const offset = new HeadingPitchRange(CesiumMath.toRadians(32), CesiumMath.toRadians(pitch), size * 0.62 * narrow);
+    const offset = new HeadingPitchRange(CesiumMath.toRadians(32), CesiumMath.toRadians(pitch), viewDistance(dataset) * narrow);
     camera.flyToBoundingSphere(sphere, { offset, duration: seconds });
   }
 
@@ -128,6 +163,7 @@ export class Globe {
   set wireframe(on) {
     this.scene.globe._surface.tileProvider._debug.wireframe = on;
     this.scene.globe.showSkirts = !on;
+    this.scene.skyAtmosphere.show = !on;  // it would shine through the mesh
     this.material.uniforms.wire = on ? 1 : 0;
     this.scene.requestRender();
   }
@@ -152,6 +188,7 @@ export class Globe {
     uniforms.contourInterval = this.contours ? this.interval : 0;
     uniforms.relief = CesiumMath.clamp(Math.pow(distance / 60000, 0.5), 1.15, 14);
     uniforms.farness = CesiumMath.clamp((Math.log10(distance) - 6.2) / 0.8, 0, 1);
+    uniforms.hazeDistance = Math.max(150000, distance * 5);
     uniforms.graticule = CesiumMath.toRadians(distance > 3e6 ? 10 : distance > 2e5 ? 1 : 0.1);
     this.scene.requestRender();
   }
@@ -179,15 +216,16 @@ export class Globe {
     return !this.scene.globe.tilesLoaded;
   }
 
-  // Tiles, triangles and vertices in the current picture, skirts not counted.
+  // What is in the current picture, skirts not counted. `keys` are the tiles' "z/x/y", y from the south.
   drawn() {
-    const sum = { tiles: 0, triangles: 0, vertices: 0, deepest: 0 };
+    const sum = { tiles: 0, triangles: 0, vertices: 0, deepest: 0, keys: [] };
     for (const tile of this.scene.globe._surface._tilesToRender) {
       const mesh = tile.data?.renderedMesh;
       if (!mesh) continue;
       sum.tiles += 1;
       sum.triangles += mesh.indexCountWithoutSkirts / 3;
       sum.vertices += mesh.vertexCountWithoutSkirts;
+      sum.keys.push(`${tile.level}/${tile.x}/${2 ** tile.level - 1 - tile.y}`);
       sum.deepest = Math.max(sum.deepest, tile.level);
     }
     return sum;

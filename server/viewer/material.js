@@ -4,7 +4,7 @@ import { Material } from "/viewer/cesium/index.js";
 
 // Depth and height as fractions of what the dataset has, and sRGB. Land is stretched towards low ground, where most of it lies.
 const kSea = [
-  [0.0, 4, 12, 38], [0.25, 8, 30, 74], [0.5, 14, 56, 112], [0.75, 28, 92, 150], [0.92, 62, 136, 182], [1.0, 132, 190, 208],
+  [0.0, 5, 16, 48], [0.25, 10, 44, 98], [0.5, 20, 78, 138], [0.75, 38, 112, 168], [0.93, 78, 154, 196], [1.0, 136, 196, 212],
 ];
 const kLand = [
   [0.0, 74, 122, 84], [0.07, 98, 144, 88], [0.16, 146, 166, 98], [0.28, 200, 184, 118], [0.42, 198, 154, 94],
@@ -12,6 +12,11 @@ const kLand = [
 ];
 // A lowest height above this is taken for land below the ellipsoid, not for a sea floor.
 const kShallowestSeaFloor = -200;
+// Datasets of land alone store the sea as a plain: low and level ground below this share of the heights is drawn as water,
+// if the dataset comes down to the sea at all.
+const kWaterShare = 0.025;
+const kHighestSea = 50;
+const kLeastRelief = 300;
 
 function colourAt(stops, t) {
   const next = Math.max(1, stops.findIndex((stop) => stop[0] >= t));
@@ -25,6 +30,11 @@ function colourAt(stops, t) {
 export function heightColour(height, { min, max }) {
   if (min > kShallowestSeaFloor) return colourAt(kLand, (height - min) / (max - min));
   return height < 0 ? colourAt(kSea, 1 - height / min) : colourAt(kLand, Math.pow(height / Math.max(max, 1), 0.8));
+}
+
+function waterline({ min, max }) {
+  const coastal = min > kShallowestSeaFloor && min < kHighestSea && max - min > kLeastRelief;
+  return coastal ? min + kWaterShare * (max - min) : -1e5;
 }
 
 // A one-pixel-high strip of the ramp, min on the left.
@@ -44,13 +54,17 @@ const kSource = /* glsl */ `
 const vec3 kRadii = vec3(6378137.0, 6378137.0, 6356752.314245);
 const vec3 kShadow = vec3(0.30, 0.33, 0.46);
 const vec3 kSunlight = vec3(1.0, 0.97, 0.90);
+const vec3 kAir = vec3(0.45, 0.62, 0.82);
+const vec3 kWater = vec3(0.20, 0.45, 0.62);
 const vec3 kElsewhere = vec3(0.105, 0.135, 0.175);
 
-// 1 on a line, 0 between lines; value is in units of the spacing. Fades where lines would be denser than every fourth pixel.
+// 1 on a line, 0 between lines; value is in units of the spacing. Fades where lines would be denser than every fourth pixel,
+// and on level ground, where all of it would be line.
 float lines(float value, float widthPixels) {
   float perPixel = max(fwidth(value), 1e-7);
   float distancePixels = abs(fract(value - 0.5) - 0.5) / perPixel;
-  return (1.0 - smoothstep(widthPixels * 0.5, widthPixels * 0.5 + 1.0, distancePixels)) * (1.0 - smoothstep(0.12, 0.3, perPixel));
+  return (1.0 - smoothstep(widthPixels * 0.5, widthPixels * 0.5 + 1.0, distancePixels)) * (1.0 - smoothstep(0.12, 0.3, perPixel))
+      * smoothstep(0.0, 0.002, perPixel);
 }
 
 // Brightness of a surface relative to level ground, lit from compass direction (x east, y north) at 40 degrees of altitude.
@@ -72,6 +86,8 @@ czm_material czm_getMaterial(czm_materialInput materialInput) {
   vec3 normalWC = czm_inverseNormal3D * materialInput.normalEC;
   vec3 normal = vec3(dot(normalWC, east), dot(normalWC, north), dot(normalWC, up));
   float steepness = 1.0 - clamp(normal.z, 0.0, 1.0);
+  float level = 1.0 - smoothstep(0.0004, 0.004, length(normal.xy));
+  colour = mix(colour, kWater, level * (1.0 - smoothstep(0.7, 1.0, (metres - heightRange.x) / max(water - heightRange.x, 1e-3))));
   normal = normalize(vec3(normal.xy * relief, max(normal.z, 0.02)));
 
   // Bare rock where it is too steep for soil or snow.
@@ -100,9 +116,14 @@ czm_material czm_getMaterial(czm_materialInput materialInput) {
   float grid = max(lines(longitude / graticule, 0.6), lines(latitude / graticule, 0.6));
   colour = mix(colour, (kElsewhere + 0.06 * grid) * mix(vec3(1.0), shade, 0.6), outside * (1.0 - wire));
 
-  // From afar the globe is round: lit over the viewer's left shoulder, darker towards the limb.
-  vec3 overShoulder = normalize(czm_inverseViewRotation * vec3(-0.45, 0.5, 0.85));
-  colour *= mix(1.0, 0.5 + 0.62 * max(0.0, dot(up, overShoulder)), farness * (1.0 - wire));
+  // From afar the globe is round: lit over the viewer's left shoulder, with a thin bright rim of air. Near the ground the
+  // air is between the viewer and the distance.
+  vec3 toEye = normalize(czm_viewerPositionWC - positionWC);
+  vec3 overShoulder = normalize(czm_inverseViewRotation * vec3(-0.5, 0.5, 0.8));
+  colour *= mix(1.0, 0.42 + 0.72 * max(0.0, dot(up, overShoulder)), farness * (1.0 - wire));
+  float rim = pow(1.0 - clamp(dot(up, toEye), 0.0, 1.0), 4.0) * farness;
+  float haze = (1.0 - exp(-pow(length(materialInput.positionToEyeEC) / hazeDistance, 2.0))) * (1.0 - farness);
+  colour = mix(colour, kAir, max(rim * 0.8, haze * 0.75) * (1.0 - wire));
 
   material.diffuse = mix(colour, min(vec3(1.0), colour * 1.25 + 0.12), wire);
   material.alpha = 1.0;
@@ -117,12 +138,14 @@ export function makeTerrainMaterial() {
       uniforms: {
         ramp: document.createElement("canvas"),
         heightRange: { x: 0, y: 1 },  // metres
+        water: -1e5,  // metres below which level ground is water
         contourInterval: 0,  // metres; 0 draws none
         relief: 1,           // exaggerates slopes for shading
         shading: 1,          // 0 where the tiles have no normals
         box: { x: 0, y: 0, z: 4, w: 4 },  // longitude and latitude of the middle, half width and height, radians
         graticule: 0.1745,   // radians between lines
         farness: 0,          // 0 near the ground, 1 with the whole globe in view
+        hazeDistance: 1e6,   // metres at which air hides most of the ground
         wire: 0,             // 1 while the surface is drawn as lines
       },
       source: kSource,
@@ -135,6 +158,7 @@ export function setHeights(material, heights) {
   canvas.width = kRampWidth;
   canvas.height = 1;
   material.uniforms.ramp = drawRamp(canvas, heights);
+  material.uniforms.water = waterline(heights);
   material.uniforms.heightRange = { x: heights.min, y: Math.max(heights.max, heights.min + 1) };
 }
 

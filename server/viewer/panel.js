@@ -9,13 +9,14 @@ export const fractionOfStep = (step) => 2 ** (-step / 2);
 export const stepOfFraction = (fraction) => Math.min(kFinest, Math.max(kCoarsest, Math.round(-2 * Math.log2(fraction))));
 
 const byId = (id) => document.getElementById(id);
-const whole = new Intl.NumberFormat("en");
+const number = new Intl.NumberFormat("en");
+const plain = { format: (value) => number.format(value).replace("-", "−") };
 const compact = new Intl.NumberFormat("en", { notation: "compact", maximumSignificantDigits: 3 });
 
-export function formatMetres(metres) {
+function formatMetres(metres) {
   const size = Math.abs(metres);
-  if (size >= 10000) return `${(metres / 1000).toFixed(1)} km`;
-  return `${size >= 100 ? whole.format(Math.round(metres)) : Number(metres.toFixed(size >= 10 ? 1 : 2))} m`;
+  const digits = size >= 100 ? 0 : size >= 10 ? 1 : 2;
+  return size >= 10000 ? `${plain.format(Math.round(metres / 100) / 10)} km` : `${plain.format(Number(metres.toFixed(digits)))} m`;
 }
 
 function formatBytes(bytes) {
@@ -28,7 +29,7 @@ function formatFraction(fraction) {
 
 function formatPosition({ longitude, latitude, height }) {
   const angle = (value, positive, negative) => `${Math.abs(value).toFixed(5)}° ${value < 0 ? negative : positive}`;
-  return `${angle(latitude, "N", "S")}  ${angle(longitude, "E", "W")}  ${whole.format(Number(height.toFixed(1)))} m`;
+  return `${angle(latitude, "N", "S")}  ${angle(longitude, "E", "W")}  ${plain.format(Number(height.toFixed(1)))} m`;
 }
 
 export class Panel {
@@ -103,16 +104,17 @@ export class Panel {
   }
 
   setStats(drawn, traffic) {
+    const worst = traffic.worstError(drawn.keys);
     const perTile = (phase) => traffic.milliseconds[phase] / Math.max(1, traffic.computed);
     const total = kPhases.reduce((sum, phase) => sum + perTile(phase), 0);
     const rows = [
       ["Triangles", compact.format(drawn.triangles)],
       ["Vertices", compact.format(drawn.vertices)],
       ["Tiles shown", `${drawn.tiles} · level ${drawn.deepest}`],
-      ["Tiles fetched", whole.format(traffic.tiles)],
+      ["Tiles fetched", plain.format(traffic.tiles)],
       ["Over the wire", formatBytes(traffic.bytes)],
       ["Cache hits", traffic.answers ? `${Math.round((100 * traffic.hits) / traffic.answers)} %` : "–"],
-      ["Worst error", traffic.worstError > 0 ? formatMetres(traffic.worstError) : "–"],
+      ["Worst error shown", worst === undefined ? "–" : formatMetres(worst)],
       ["Server per tile", traffic.computed ? `${total.toFixed(1)} ms` : "–"],
     ];
     byId("stats").replaceChildren(...rows.flatMap(([name, value]) => {

@@ -11,7 +11,8 @@ export class Traffic {
   }
 
   reset() {
-    Object.assign(this, { since: performance.now(), tiles: 0, bytes: 0, hits: 0, answers: 0, computed: 0, worstError: 0 });
+    Object.assign(this, { since: performance.now(), tiles: 0, bytes: 0, hits: 0, answers: 0, computed: 0 });
+    this.errors = new Map();  // metres, by "z/x/y"
     this.milliseconds = Object.fromEntries(kPhases.map((phase) => [phase, 0]));
   }
 
@@ -29,6 +30,12 @@ export class Traffic {
     for (const phase of kPhases) this.milliseconds[phase] += timing.get(phase)?.duration ?? 0;
   }
 
+  // The largest Terrain-Max-Error among these tiles, metres; undefined if none stated one.
+  worstError(keys) {
+    const errors = keys.filter((key) => this.errors.has(key)).map((key) => this.errors.get(key));
+    return errors.length > 0 ? Math.max(...errors) : undefined;
+  }
+
   // Response headers are not part of resource timing; the request that CesiumJS makes is the only place to see them.
   #watchErrorHeader() {
     const load = Resource._Implementations.loadWithXhr;
@@ -36,7 +43,8 @@ export class Traffic {
       const request = load(url, ...rest);
       request?.addEventListener?.("load", () => {
         const error = Number.parseFloat(request.getResponseHeader("Terrain-Max-Error"));
-        if (error > this.worstError) this.worstError = error;
+        const tile = /(\d+\/\d+\/\d+)\.terrain/.exec(url);
+        if (error >= 0 && tile) this.errors.set(tile[1], error);
       });
       return request;
     };
