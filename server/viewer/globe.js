@@ -184,9 +184,9 @@ export class Globe {
     const middle = camera.pickEllipsoid({ x: canvas.clientWidth / 2, y: canvas.clientHeight * 0.6 });
     const distance = middle ? Cartesian3.distance(middle, { x, y, z }) : camera.positionCartographic.height * 3;
     const { uniforms } = this.material;
-    this.interval = niceInterval(Math.max(1, Math.min(distance * 0.004, 2000)));
+    this.interval = niceInterval(Math.max(1, Math.min(distance * 0.0022, 2000)));
     uniforms.contourInterval = this.contours ? this.interval : 0;
-    uniforms.relief = CesiumMath.clamp(Math.pow(distance / 60000, 0.5), 1.15, 14);
+    uniforms.relief = CesiumMath.clamp(Math.pow(distance / 45000, 0.55), 1.15, 14);
     uniforms.farness = CesiumMath.clamp((Math.log10(distance) - 6.2) / 0.8, 0, 1);
     uniforms.hazeDistance = Math.max(150000, distance * 5);
     uniforms.graticule = CesiumMath.toRadians(distance > 3e6 ? 10 : distance > 2e5 ? 1 : 0.1);

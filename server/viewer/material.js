@@ -86,7 +86,9 @@ czm_material czm_getMaterial(czm_materialInput materialInput) {
   vec3 normalWC = czm_inverseNormal3D * materialInput.normalEC;
   vec3 normal = vec3(dot(normalWC, east), dot(normalWC, north), dot(normalWC, up));
   float steepness = 1.0 - clamp(normal.z, 0.0, 1.0);
-  float level = 1.0 - smoothstep(0.0004, 0.004, length(normal.xy));
+  // The triangle's own slope: an 8-bit normal cannot tell a sea from a plain.
+  float slope = fwidth(metres) / max(length(dFdx(materialInput.positionToEyeEC)) + length(dFdy(materialInput.positionToEyeEC)), 1e-6);
+  float level = 1.0 - smoothstep(0.0003, 0.0015, slope);
   colour = mix(colour, kWater, level * (1.0 - smoothstep(0.7, 1.0, (metres - heightRange.x) / max(water - heightRange.x, 1e-3))));
   normal = normalize(vec3(normal.xy * relief, max(normal.z, 0.02)));
 
@@ -125,7 +127,7 @@ czm_material czm_getMaterial(czm_materialInput materialInput) {
   float haze = (1.0 - exp(-pow(length(materialInput.positionToEyeEC) / hazeDistance, 2.0))) * (1.0 - farness);
   colour = mix(colour, kAir, max(rim * 0.8, haze * 0.75) * (1.0 - wire));
 
-  material.diffuse = mix(colour, min(vec3(1.0), colour * 1.25 + 0.12), wire);
+  material.diffuse = mix(colour, min(vec3(1.0), colour * 1.1 + 0.06), wire);
   material.alpha = 1.0;
   return material;
 }`;
