@@ -1,0 +1,47 @@
+// On which grid of heights the vertices of a tile's edges lie, so that neighbours decode the same numbers.
+//
+// quantized-mesh stores a height as a 15-bit multiple of the tile's own step. Two tiles agree on an edge bit for bit if the
+// heights there are multiples of a step that both tiles' own steps divide. All steps here are powers of two, and a tile's
+// own step (tile_mesh.h) is the finest that its relief allows, so it is enough that an edge's step is at least what either
+// side needs. What a tile needs is bounded from outside, by RangeBound of its heights, because the neighbour that computes
+// the same edge has not read the tile:
+//
+//   NeededStep(T) = smallest 2^k >= range(T) / 16384      half of the format's 32767 steps; the rest is for rounding up
+//   edge step     = max(largest 2^k <= error / 8, NeededStep of both tiles)
+//   corner step   = the same over the four tiles that meet; on a pole, over the whole dataset
+//
+// Proof that a tile's own step divides: rounding widens its relief by at most the largest edge step S of its edges, and
+// 16384 m + S <= 32767 m holds with m = its NeededStep as long as S <= 16383 m. S is at most 2 m (relief below 32768 m),
+// m at least 2^-10 m.
+#pragma once
+
+#include <array>
+
+#include "engine/tin/greedy.h"
+
+namespace terrace::proto {
+
+// Heights come in multiples of 2^-10 m; no edge needs a finer grid.
+inline constexpr double kHeightResolution = 1.0 / 1024;
+
+// Corners in the order south-west, south-east, north-east, north-west.
+struct EdgeSteps {
+  std::array<double, 4> side{};    // metres, by tin::Side: interior samples of the edge
+  std::array<double, 4> corner{};  // metres
+
+  // The coarsest step on a side, its two corners included.
+  double Coarsest(tin::Side side) const;
+};
+
+double NeededStep(double min_height, double max_height);
+
+// `needed[row][column]` holds NeededStep of the tile (row = column = 1) and its eight neighbours, row 0 in the SOUTH.
+// `pole_step`: NeededStep of all heights of the dataset. `at_south_pole` / `at_north_pole`: the tile touches that pole;
+// the rows of `needed` beyond it are not read.
+EdgeSteps MakeEdgeSteps(double error_m, const std::array<std::array<double, 3>, 3>& needed, double pole_step,
+                        bool at_south_pole, bool at_north_pole);
+
+// The multiple of `step` nearest to `height`; halves go up.
+double SnapHeight(double height, double step);
+
+}  // namespace terrace::proto

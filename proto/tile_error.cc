@@ -1,0 +1,172 @@
+#include "proto/tile_error.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+
+#include "engine/geo/ellipsoid.h"
+#include "proto/tile_mesh.h"
+
+namespace terrace::proto {
+namespace {
+
+// Coordinates in which both u, v and the lattice nodes are integers: 1 / (32767 * cells) of the tile. u * cells and
+// i * 32767 stay below 2^23, products of two below 2^46.
+struct Point {
+  std::int64_t x = 0, y = 0;
+};
+
+constexpr std::int64_t FloorDiv(std::int64_t a, std::int64_t b) { return a / b - ((a % b != 0 && (a < 0) != (b < 0)) ? 1 : 0); }
+constexpr std::int64_t CeilDiv(std::int64_t a, std::int64_t b) { return -FloorDiv(-a, b); }
+
+// A linear function over the tile: value at a corner of the triangle and its two gradients.
+struct Linear {
+  double origin = 0, dx = 0, dy = 0;
+  double At(double x, double y) const { return origin + dx * x + dy * y; }
+};
+
+class Meter {
+ public:
+  Meter(const LatticeView& lattice, const QuantizedTile& tile, double bound_m, bool curved)
+      : lattice_(lattice), tile_(tile), cells_(lattice.cells()), bound_(bound_m), curved_(curved) {
+    const double range = static_cast<double>(tile.max_height) - static_cast<double>(tile.min_height);
+    height_.reserve(tile.h.size());
+    for (const std::uint16_t h : tile.h) {
+      height_.push_back(static_cast<double>(tile.min_height) + range * h / kQuantizedMax);
+    }
+    is_vertex_.resize(static_cast<std::size_t>(cells_ + 1) * static_cast<std::size_t>(cells_ + 1));
+    for (std::size_t k = 0; k < tile.u.size(); ++k) is_vertex_[NodeIndex(NodeOf(tile.u[k]), NodeOf(tile.v[k]))] = true;
+    if (curved_) PrepareCurved();
+  }
+
+  TileError Measure() {
+    for (const auto& triangle : tile_.triangles) MeasureTriangle(triangle);
+    return std::move(result_);
+  }
+
+ private:
+  std::size_t NodeIndex(std::int64_t i, std::int64_t j) const {
+    return static_cast<std::size_t>(j) * static_cast<std::size_t>(cells_ + 1) + static_cast<std::size_t>(i);
+  }
+  // The lattice node whose rounded position this is.
+  std::int64_t NodeOf(std::uint16_t position) const { return (std::int64_t{position} * cells_ + kQuantizedMax / 2) / kQuantizedMax; }
+
+  void PrepareCurved() {
+    const double step = lattice_.lattice.StepDegrees();
+    const double west = lattice_.Longitude(0), south = lattice_.Latitude(0), width = step * cells_;
+    ecef_.reserve(height_.size());
+    for (std::size_t k = 0; k < height_.size(); ++k) {
+      ecef_.push_back(geo::ToEcef(west + width * tile_.u[k] / kQuantizedMax, south + width * tile_.v[k] / kQuantizedMax, height_[k]));
+    }
+    for (int i = 0; i <= cells_; ++i) column_up_.push_back(geo::SurfaceNormal(lattice_.Longitude(i), 0));
+    for (int j = 0; j <= cells_; ++j) {
+      const double latitude = lattice_.Latitude(j);
+      const geo::Vec3 up = geo::SurfaceNormal(0, latitude);
+      row_up_.push_back(up);
+      row_base_.push_back(geo::Dot(geo::ToEcef(0, latitude, 0), up));
+    }
+  }
+
+  template <typename Value>
+  Linear Through(const std::array<Point, 3>& p, double area, const Value& value) const {
+    const double x1 = static_cast<double>(p[1].x - p[0].x), y1 = static_cast<double>(p[1].y - p[0].y);
+    const double x2 = static_cast<double>(p[2].x - p[0].x), y2 = static_cast<double>(p[2].y - p[0].y);
+    const double d1 = value(1) - value(0), d2 = value(2) - value(0);
+    return {value(0), (d1 * y2 - d2 * y1) / area, (d2 * x1 - d1 * x2) / area};
+  }
+
+  // Rows and, in a row, columns of nodes inside the triangle or on its rim, in integers.
+  void MeasureTriangle(const std::array<std::uint32_t, 3>& triangle) {
+    std::array<Point, 3> p;
+    for (std::size_t k = 0; k < 3; ++k) {
+      p[k] = {std::int64_t{tile_.u[triangle[k]]} * cells_, std::int64_t{tile_.v[triangle[k]]} * cells_};
+    }
+    const std::int64_t area = (p[1].x - p[0].x) * (p[2].y - p[0].y) - (p[1].y - p[0].y) * (p[2].x - p[0].x);
+    if (area <= 0) return;
+    const double twice_area = static_cast<double>(area);
+    const Linear plane = Through(p, twice_area, [&](std::size_t k) { return height_[triangle[k]]; });
+    std::array<Linear, 3> chord{};
+    if (curved_) {
+      chord[0] = Through(p, twice_area, [&](std::size_t k) { return ecef_[triangle[k]].x; });
+      chord[1] = Through(p, twice_area, [&](std::size_t k) { return ecef_[triangle[k]].y; });
+      chord[2] = Through(p, twice_area, [&](std::size_t k) { return ecef_[triangle[k]].z; });
+    }
+    const auto [low, high] = std::minmax({p[0].y, p[1].y, p[2].y});
+    double worst_miss = bound_;
+    tin::SamplePosition miss;
+    bool missed = false;
+    for (std::int64_t j = CeilDiv(low, kQuantizedMax); j * kQuantizedMax <= high; ++j) {
+      const std::int64_t y = j * kQuantizedMax;
+      std::int64_t first = 0, last = cells_;
+      for (std::size_t k = 0; k < 3; ++k) ClipRow(p[k], p[(k + 1) % 3], y, first, last);
+      for (std::int64_t i = first; i <= last; ++i) {
+        const double dx = static_cast<double>(i * kQuantizedMax - p[0].x), dy = static_cast<double>(y - p[0].y);
+        const double error = ErrorAt(plane, chord, static_cast<int>(i), static_cast<int>(j), dx, dy);
+        result_.max_m = std::max(result_.max_m, error);
+        if (error > worst_miss && CanMend(i, j)) {
+          worst_miss = error;
+          miss = {static_cast<std::uint16_t>(i), static_cast<std::uint16_t>(j)};
+          missed = true;
+        }
+      }
+    }
+    if (missed) result_.misses.push_back(miss);
+  }
+
+  // Narrows [first, last] to the nodes of row y on the left of the edge a -> b or on it:
+  // (b - a) x (p - a) >= 0, that is dx (y - a.y) - dy (x - a.x) >= 0.
+  static void ClipRow(Point a, Point b, std::int64_t y, std::int64_t& first, std::int64_t& last) {
+    const std::int64_t dx = b.x - a.x, dy = b.y - a.y, reach = dx * (y - a.y) + dy * a.x;
+    if (dy > 0) {
+      last = std::min(last, FloorDiv(reach, dy * kQuantizedMax));
+    } else if (dy < 0) {
+      first = std::max(first, CeilDiv(-reach, -dy * kQuantizedMax));
+    } else if (dx * (y - a.y) < 0) {
+      last = first - 1;
+    }
+  }
+
+  double ErrorAt(const Linear& plane, const std::array<Linear, 3>& chord, int i, int j, double dx, double dy) const {
+    const double sample = lattice_.At(i, j);
+    const double error = std::abs(plane.At(dx, dy) - sample);
+    if (!curved_) return error;
+    const geo::Vec3& row = row_up_[static_cast<std::size_t>(j)];
+    const geo::Vec3& column = column_up_[static_cast<std::size_t>(i)];
+    const double above = row.x * (chord[0].At(dx, dy) * column.x + chord[1].At(dx, dy) * column.y) +
+                         row.z * chord[2].At(dx, dy) - row_base_[static_cast<std::size_t>(j)];
+    return std::max(error, std::abs(above - sample));
+  }
+
+  bool CanMend(std::int64_t i, std::int64_t j) const {
+    return i > 0 && j > 0 && i < cells_ && j < cells_ && !is_vertex_[NodeIndex(i, j)];
+  }
+
+  const LatticeView& lattice_;
+  const QuantizedTile& tile_;
+  const int cells_;
+  const double bound_;
+  const bool curved_;
+  std::vector<double> height_;     // metres, by vertex
+  std::vector<geo::Vec3> ecef_;    // by vertex
+  std::vector<bool> is_vertex_;    // by node
+  std::vector<geo::Vec3> column_up_, row_up_;
+  std::vector<double> row_base_;   // by row: the ellipsoid's surface along its normal there
+  TileError result_;
+};
+
+}  // namespace
+
+TileError MeasureTileError(const LatticeView& lattice, const QuantizedTile& tile, double bound_m, bool curved) {
+  return Meter(lattice, tile, bound_m, curved).Measure();
+}
+
+bool AllCounterClockwise(const QuantizedTile& tile) {
+  return std::all_of(tile.triangles.begin(), tile.triangles.end(), [&](const std::array<std::uint32_t, 3>& t) {
+    const int x1 = tile.u[t[1]] - tile.u[t[0]], y1 = tile.v[t[1]] - tile.v[t[0]];
+    const int x2 = tile.u[t[2]] - tile.u[t[0]], y2 = tile.v[t[2]] - tile.v[t[0]];
+    return std::int64_t{x1} * y2 > std::int64_t{y1} * x2;
+  });
+}
+
+}  // namespace terrace::proto

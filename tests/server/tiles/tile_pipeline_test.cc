@@ -1,0 +1,143 @@
+// The whole worker path on the shipped samples: promises 1 and 2 of the contract, measured on decoded bytes.
+#include "server/tiles/tile_pipeline.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <thread>
+#include <tuple>
+#include <vector>
+
+#include "engine/geo/error_ladder.h"
+#include "tests/proto/quantized_mesh_decoder.h"
+
+namespace terrace::server {
+namespace {
+
+Dataset OpenSample(const std::string& name) {
+  auto source = dem::DemSource::Open(std::string(TERRACE_SOURCE_DIR) + "/config/samples/" + name + ".tif");
+  EXPECT_TRUE(source.has_value()) << (source ? "" : source.error().message);
+  Dataset dataset;
+  dataset.name = name;
+  dataset.source = *std::move(source);
+  return dataset;
+}
+
+const TilePipeline& Samples() {
+  static const TilePipeline* const pipeline = [] {
+    std::vector<Dataset> datasets;
+    datasets.push_back(OpenSample("etopo5"));
+    datasets.push_back(OpenSample("jacksboro"));
+    return new TilePipeline(std::move(datasets));
+  }();
+  return *pipeline;
+}
+
+struct FetchedTile {
+  proto::DecodedTile mesh;
+  EncodedTile encoded;
+};
+
+FetchedTile Fetch(std::uint32_t dataset, geo::TileKey key, int step) {
+  TileRequest request;
+  request.dataset = dataset;
+  request.key = key;
+  request.error_step = step;
+  request.normals = true;
+  auto encoded = Samples().Build(request, {});
+  EXPECT_TRUE(encoded.has_value()) << geo::ToString(key);
+  auto mesh = proto::DecodeQuantizedMesh(encoded->bytes);
+  EXPECT_TRUE(mesh.has_value()) << geo::ToString(key);
+  return {*std::move(mesh), *std::move(encoded)};
+}
+
+// Position along the edge, height, normal of its vertices.
+using Edge = std::vector<std::tuple<int, double, int, int>>;
+
+Edge EdgeOf(const FetchedTile& tile, bool vertical, int fixed) {
+  Edge edge;
+  const proto::DecodedTile& mesh = tile.mesh;
+  const std::string& normals = mesh.extensions.at(0).bytes;
+  const double min = static_cast<double>(mesh.min_height), max = static_cast<double>(mesh.max_height);
+  for (std::size_t k = 0; k < mesh.u.size(); ++k) {
+    if ((vertical ? mesh.u[k] : mesh.v[k]) != fixed) continue;
+    edge.emplace_back(vertical ? mesh.v[k] : mesh.u[k], min + (max - min) * mesh.h[k] / 32767, normals[2 * k], normals[2 * k + 1]);
+  }
+  std::sort(edge.begin(), edge.end());
+  return edge;
+}
+
+geo::TileKey MiddleTile(std::uint32_t dataset, int level) {
+  const geo::TileRange& range = Samples().datasets()[dataset].source->Available(level).front();
+  return {level, (range.start_x + range.end_x) / 2, (range.start_y + range.end_y) / 2};
+}
+
+TEST(TilePipeline, NeighboursDecodeTheSameEdges) {
+  for (const std::uint32_t dataset : {0u, 1u}) {
+    for (const int step : {-8, 0, 6, 12, 24}) {
+      for (int level = 1; level <= Samples().datasets()[dataset].source->max_level(); level += 2) {
+        const geo::TileKey key = MiddleTile(dataset, level);
+        const FetchedTile tile = Fetch(dataset, key, step);
+        const geo::TileKey east = geo::Neighbour(key, 1, 0), north = geo::Neighbour(key, 0, 1);
+        if (Samples().datasets()[dataset].source->IsAvailable(east)) {
+          EXPECT_EQ(EdgeOf(tile, true, 32767), EdgeOf(Fetch(dataset, east, step), true, 0)) << geo::ToString(key) << " step " << step;
+        }
+        if (Samples().datasets()[dataset].source->IsAvailable(north)) {
+          EXPECT_EQ(EdgeOf(tile, false, 32767), EdgeOf(Fetch(dataset, north, step), false, 0)) << geo::ToString(key) << " step " << step;
+        }
+      }
+    }
+  }
+}
+
+TEST(TilePipeline, MatchesAcrossTheAntimeridianAndAtThePoles) {
+  for (const int level : {0, 1, 3, 5}) {
+    for (const std::int64_t y : {std::int64_t{0}, geo::TileRows(level) / 2, geo::TileRows(level) - 1}) {
+      const geo::TileKey west{level, geo::TileColumns(level) - 1, y}, east{level, 0, y};
+      EXPECT_EQ(EdgeOf(Fetch(0, west, 0), true, 32767), EdgeOf(Fetch(0, east, 0), true, 0)) << level << "/" << y;
+    }
+  }
+}
+
+TEST(TilePipeline, ReachesTheLadderError) {
+  for (const std::uint32_t dataset : {0u, 1u}) {
+    for (const int step : {-8, 0, 8}) {
+      for (int level = 0; level <= Samples().datasets()[dataset].source->max_level(); ++level) {
+        const FetchedTile tile = Fetch(dataset, MiddleTile(dataset, level), step);
+        EXPECT_LE(tile.encoded.max_error_m, geo::LadderError(level, step)) << dataset << " level " << level << " step " << step;
+      }
+    }
+  }
+}
+
+TEST(TilePipeline, GivesTheSameBytesOnEveryThread) {
+  const geo::TileKey key = MiddleTile(1, 11);
+  const EncodedTile expected = Fetch(1, key, 4).encoded;
+  std::vector<std::thread> threads;
+  for (int k = 0; k < 4; ++k) {
+    threads.emplace_back([&] { EXPECT_EQ(Fetch(1, key, 4).encoded.bytes, expected.bytes); });
+  }
+  for (std::thread& thread : threads) thread.join();
+}
+
+TEST(TilePipeline, RefusesWhatIsNotThere) {
+  TileRequest request;
+  request.dataset = 7;
+  EXPECT_EQ(Samples().Build(request, {}).error().code, ErrorCode::kNotFound);
+  request.dataset = 1;
+  request.key = {13, 0, 0};
+  EXPECT_EQ(Samples().Build(request, {}).error().code, ErrorCode::kNotFound);
+}
+
+TEST(TilePipeline, StopsWhenNobodyWaits) {
+  std::stop_source stop;
+  stop.request_stop();
+  TileRequest request;
+  request.dataset = 1;
+  request.key = MiddleTile(1, 10);
+  EXPECT_EQ(Samples().Build(request, stop.get_token()).error().code, ErrorCode::kCancelled);
+}
+
+}  // namespace
+}  // namespace terrace::server
