@@ -10,15 +10,16 @@
 
 namespace terrace::proto {
 
-inline constexpr int kQuantizedMax = 32767;           // u, v and heights have 15 bits
-inline constexpr std::size_t kMaxTileVertices = 65534;  // CesiumJS misreads exactly 65536; below that indices are 16 bits
+inline constexpr int kQuantizedMax = 32767;  // u, v and heights have 15 bits
+inline constexpr std::size_t kMaxTileVertices =
+    65534;  // CesiumJS misreads exactly 65536; below that indices are 16 bits
 
 // A tile as the wire will carry it: integers, and the two header heights that give them meaning.
 struct QuantizedTile {
   geo::TileKey key;
-  std::vector<std::uint16_t> u;  // 0 west .. 32767 east
-  std::vector<std::uint16_t> v;  // 0 south .. 32767 north
-  std::vector<std::uint16_t> h;  // 0 min_height .. 32767 max_height
+  std::vector<std::uint16_t> u;                         // 0 west .. 32767 east
+  std::vector<std::uint16_t> v;                         // 0 south .. 32767 north
+  std::vector<std::uint16_t> h;                         // 0 min_height .. 32767 max_height
   std::vector<std::array<std::uint32_t, 3>> triangles;  // counter-clockwise in (u, v)
   float min_height = 0;
   float max_height = 0;

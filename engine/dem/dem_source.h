@@ -1,7 +1,7 @@
 // A digital elevation model as terrace sees it: heights at lattice nodes, anywhere on the globe, at any level.
 //
-// DemSource is immutable after Open and safe to use from many threads: every thread gets its own GDAL handle. GDAL's types
-// stay behind this header.
+// DemSource is immutable after Open and safe to use from many threads: every thread gets its own GDAL handle. GDAL's
+// types stay behind this header.
 #pragma once
 
 #include <array>
@@ -20,12 +20,14 @@
 namespace terrace::dem {
 
 struct DemOptions {
-  double error_fraction = 0.5;         // default error of a level, as a share of the clients' level error
-  std::optional<double> finest_error;  // metres: the deepest level is the first whose default error is at most this
-  std::optional<double> floor;         // metres: height outside the source and in large voids; default: lowest valid height
-  int max_void_gap = 64;               // source samples: voids narrower than this along a row, column or diagonal are filled
+  double error_fraction = 0.5;  // default error of a level, as a share of the clients' level error
+  std::optional<double> finest_error =
+      {};  // metres: the deepest level is the first whose default error is at most this
+  std::optional<double> floor =
+      {};                 // metres: height outside the source and in large voids; default: lowest valid height
+  int max_void_gap = 64;  // source samples: voids narrower than this along a row, column or diagonal are filled
   // Called now and then while Open scans the source, with the share done, 0..1. May be empty.
-  std::function<void(double)> progress;
+  std::function<void(double)> progress = {};
 };
 
 // Metres above the ellipsoid (or whatever the source counts from where no datum is stated).
@@ -42,27 +44,27 @@ struct GeoBounds {
 // What `terrace info` prints and `/datasets` tells.
 struct DemInfo {
   std::string path;
-  std::string driver;             // GDAL's short name: "GTiff"
+  std::string driver;  // GDAL's short name: "GTiff"
   std::int64_t width = 0, height = 0;
-  std::string data_type;          // "Int16"
-  std::string crs;                // name and code: "WGS 84 / UTM zone 11N (EPSG:32611)"
-  std::string vertical_datum;     // as stated by the CRS; empty: not stated
-  std::string height_unit;        // as stated by the band; empty: metres assumed
+  std::string data_type;                     // "Int16"
+  std::string crs;                           // name and code: "WGS 84 / UTM zone 11N (EPSG:32611)"
+  std::string vertical_datum;                // as stated by the CRS; empty: not stated
+  std::string height_unit;                   // as stated by the band; empty: metres assumed
   double pixel_width = 0, pixel_height = 0;  // in units of the CRS
-  std::string pixel_unit;         // "degree", "metre"
-  double spacing_m = 0;           // finer ground axis at the centre, true metres
-  GeoBounds bounds;               // of the pixels' area
-  HeightRange heights;            // of all valid samples
+  std::string pixel_unit;                    // "degree", "metre"
+  double spacing_m = 0;                      // finer ground axis at the centre, true metres
+  GeoBounds bounds;                          // of the pixels' area
+  HeightRange heights;                       // of all valid samples
   std::uint64_t valid_samples = 0, void_samples = 0;
   std::optional<double> nodata;
   std::vector<int> overview_factors;
-  std::string transform;          // the PROJ operation from EPSG:4326 to the source, for the log; empty: none needed
+  std::string transform;  // the PROJ operation from EPSG:4326 to the source, for the log; empty: none needed
   double floor = 0;
   int max_level = 0;
 };
 
-// Height samples of a tile with one more sample on each side, row by row from the south-western halo sample. Every value
-// is finite. The same global node has the same bits in every tile.
+// Height samples of a tile with one more sample on each side, row by row from the south-western halo sample. Every
+// value is finite. The same global node has the same bits in every tile.
 struct TileHeights {
   geo::Lattice lattice;
   int stride = 0;              // cells + 3
@@ -70,7 +72,8 @@ struct TileHeights {
 
   // i, j in -1 .. cells + 1: columns from the west, rows from the SOUTH.
   float At(int i, int j) const {
-    return heights[static_cast<std::size_t>(j + 1) * static_cast<std::size_t>(stride) + static_cast<std::size_t>(i + 1)];
+    return heights[static_cast<std::size_t>(j + 1) * static_cast<std::size_t>(stride) +
+                   static_cast<std::size_t>(i + 1)];
   }
 };
 
@@ -87,12 +90,13 @@ class DemSource {
   int max_level() const;
   geo::Lattice LatticeOf(int level) const;
 
-  // Blocks of tiles, without overlap, that hold every tile of the level which touches the source; at level 0 both roots.
+  // Blocks of tiles, without overlap, that hold every tile of the level which touches the source; at level 0 both
+  // roots.
   const std::vector<geo::TileRange>& Available(int level) const;
   bool IsAvailable(const geo::TileKey& key) const;
 
-  // Heights no sample of the tile (halo not included) leaves: at least as wide as the truth, a function of the key alone.
-  // Any valid key; tiles away from the source hold only the floor.
+  // Heights no sample of the tile (halo not included) leaves: at least as wide as the truth, a function of the key
+  // alone. Any valid key; tiles away from the source hold only the floor.
   HeightRange RangeBound(const geo::TileKey& key) const;
 
   // Reads and resamples one tile. kUnavailable: the source cannot be read now. kCancelled: stopped.
@@ -107,7 +111,8 @@ class DemSource {
   std::unique_ptr<Impl> impl_;
 };
 
-// A raster's samples as they lie in the file, for `terrace mesh`: row 0 in the north, voids NaN, no georeference needed.
+// A raster's samples as they lie in the file, for `terrace mesh`: row 0 in the north, voids NaN, no georeference
+// needed.
 struct RasterHeights {
   int width = 0, height = 0;
   std::vector<float> heights;

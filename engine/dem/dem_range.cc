@@ -1,0 +1,119 @@
+// The bound on a tile's heights, from the block table alone.
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "engine/dem/dem_impl.h"
+
+namespace terrace::dem {
+namespace {
+
+// Up to this level a tile is so large that its outline in the source's CRS cannot be told from a few positions.
+constexpr int kLastWholeLevel = 4;
+
+struct PixelBox {
+  double west, north, east, south;
+
+  void Grow(double x, double y) {
+    west -= x;
+    east += x;
+    north -= y;
+    south += y;
+  }
+};
+
+// Pixels of a tile in a geographic grid: the part found going east from its western edge, and what lies a turn before
+// it.
+std::vector<PixelBox> GeographicBoxes(const Georeference& georeference, const geo::Lattice& lattice,
+                                      const geo::TileKey& key) {
+  std::array<Position, 2> corners = {
+      {{lattice.Longitude(lattice.FirstColumn(key)), lattice.Latitude(lattice.FirstRow(key))},
+       {0, lattice.Latitude(lattice.FirstRow(key) + lattice.cells)}}};
+  georeference.ToPixels(corners);
+  const double columns = lattice.cells * lattice.StepDegrees() / 360 * georeference.period();
+  const double west = georeference.columns_run_east() ? corners[0].x : corners[0].x - columns;
+  const auto [north, south] = std::minmax(corners[0].y, corners[1].y);
+  std::vector<PixelBox> boxes;
+  for (int turn = -1; turn <= 1; ++turn) {
+    const double shifted = west + turn * georeference.period();
+    boxes.push_back({shifted, north, shifted + columns, south});
+  }
+  return boxes;
+}
+
+// A box around a tile's pixels in any CRS; nothing where it cannot be told.
+std::optional<PixelBox> ProjectedBox(const Georeference& georeference, const geo::Lattice& lattice,
+                                     const geo::TileKey& key) {
+  if (key.level <= kLastWholeLevel) return std::nullopt;
+  constexpr int kSteps = 4;
+  std::array<Position, (kSteps + 1) * (kSteps + 1)> nodes;
+  for (int i = 0; i < static_cast<int>(nodes.size()); ++i) {
+    nodes[static_cast<std::size_t>(i)] = {
+        lattice.Longitude(lattice.FirstColumn(key) + i % (kSteps + 1) * lattice.cells / kSteps),
+        lattice.Latitude(lattice.FirstRow(key) + i / (kSteps + 1) * lattice.cells / kSteps)};
+  }
+  georeference.ToPixels(nodes);
+  PixelBox box{nodes[0].x, nodes[0].y, nodes[0].x, nodes[0].y};
+  for (const Position& node : nodes) {
+    if (std::isnan(node.x)) return std::nullopt;
+    box.west = std::min(box.west, node.x);
+    box.east = std::max(box.east, node.x);
+    box.north = std::min(box.north, node.y);
+    box.south = std::max(box.south, node.y);
+  }
+  // Between nodes a quarter of the tile apart its edges bulge by less than an eighth of it, down from level 5.
+  box.Grow((box.east - box.west) / 8, (box.south - box.north) / 8);
+  return box;
+}
+
+}  // namespace
+
+HeightRange DemSource::Impl::RangeBound(const geo::TileKey& key) const {
+  const auto& [lattice, factor] = Plan(key.level);
+  const double extent = lattice.cells * lattice.StepDegrees();
+  const std::int64_t south_row = lattice.FirstRow(key), north_row = south_row + lattice.cells;
+  HeightRange range{floor, floor};
+  if (!footprint.Touches(lattice.Longitude(lattice.FirstColumn(key)), lattice.Latitude(south_row), extent, extent))
+    return range;
+
+  std::vector<PixelBox> boxes;
+  bool floor_shows = false;
+  if (georeference.is_geographic_grid() && georeference.is_affine()) {
+    boxes = GeographicBoxes(georeference, lattice, key);
+    floor_shows = !layout.wraps && std::ranges::none_of(boxes, [&](const PixelBox& box) {
+      return box.west >= 0 && box.east <= layout.width;
+    });
+  } else if (const auto box = ProjectedBox(georeference, lattice, key)) {
+    boxes = {*box};
+    floor_shows = box->west < 0 || box->east > layout.width;
+  } else {
+    boxes = {{0, 0, static_cast<double>(layout.width), static_cast<double>(layout.height)}};
+    floor_shows = true;
+  }
+  BlockRange blocks;
+  for (PixelBox& box : boxes) {
+    floor_shows |= box.north < 0 || box.south > layout.height;
+    // Bilinear interpolation reaches one and a half samples of the grid.
+    box.Grow(1.5 * factor + 1, 1.5 * factor + 1);
+    BlockRange here = table.Query(box.west, box.north, box.east, box.south);
+    if (here.has_voids) {
+      box.Grow(max_void_gap + factor, max_void_gap + factor);
+      here.Add(table.Query(box.west, box.north, box.east, box.south));
+    }
+    blocks.Add(here);
+  }
+  if (blocks.min > blocks.max) return range;
+  // Rounding to 2^-10 m stays within these.
+  HeightRange bound{std::floor(blocks.min * 1024.0) / 1024, std::ceil(blocks.max * 1024.0) / 1024};
+  const auto include = [&](double height) {
+    bound.min = std::min(bound.min, height);
+    bound.max = std::max(bound.max, height);
+  };
+  if (floor_shows || blocks.has_voids) include(floor);
+  for (const std::int64_t row : {south_row, north_row}) {
+    if (const auto pole = PoleHeight(lattice, row)) include(*pole);
+  }
+  return bound;
+}
+
+}  // namespace terrace::dem

@@ -1,0 +1,35 @@
+// The part of the globe a raster covers, and the tiles that touch it.
+#pragma once
+
+#include <vector>
+
+#include "engine/dem/dem_source.h"
+#include "engine/dem/georeference.h"
+#include "engine/geo/tile_key.h"
+
+namespace terrace::dem {
+
+// Degrees. `west` lies in -180 .. 180, `east` east of it, up to west + 360: boxes that cross the antimeridian have east
+// > 180.
+struct Footprint {
+  double west = -180, south = -90, east = 180, north = 90;
+
+  // Of the pixels' area. Where positions of the raster's edge cannot be computed: the whole Earth.
+  static Footprint Of(const Georeference& georeference);
+
+  bool all_longitudes() const { return east - west >= 360; }
+  GeoBounds Bounds() const;
+
+  // A little larger on every side: what lies outside this box lies outside the raster, whatever the curvature of its
+  // edges.
+  Footprint Padded() const;
+
+  // Whether it touches the box from (west, south), `width` by `height` degrees large; west counts modulo 360.
+  bool Touches(double box_west, double box_south, double box_width, double box_height) const;
+};
+
+// Per level 0 .. max_level: blocks without overlap that hold every tile the footprint touches and every ancestor of
+// such a tile; at level 0 both roots.
+std::vector<std::vector<geo::TileRange>> TilesTouching(const Footprint& footprint, int max_level);
+
+}  // namespace terrace::dem

@@ -1,0 +1,158 @@
+#include "engine/dem/georeference.h"
+
+#include <cpl_conv.h>
+#include <ogr_spatialref.h>
+
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "engine/dem/gdal_runtime.h"
+
+namespace terrace::dem {
+namespace {
+
+// Positions this close to the raster's western edge, in pixels, are on it: SRTM's corners are not dyadic numbers.
+constexpr double kEdgeTolerance = 1e-6;
+
+Position Apply(const std::array<double, 6>& affine, Position p) {
+  return {affine[0] + p.x * affine[1] + p.y * affine[2], affine[3] + p.x * affine[4] + p.y * affine[5]};
+}
+
+std::string NameAndCode(const OGRSpatialReference& srs) {
+  const char* name = srs.GetName();
+  const char* authority = srs.GetAuthorityName(nullptr);
+  const char* code = srs.GetAuthorityCode(nullptr);
+  std::string text = name == nullptr ? "unnamed" : name;
+  if (authority != nullptr && code != nullptr) text += fmt::format(" ({}:{})", authority, code);
+  return text;
+}
+
+bool IsWgs84Degrees(const OGRSpatialReference& srs) {
+  OGRSpatialReference wgs84;
+  wgs84.SetWellKnownGeogCS("WGS84");
+  const char* const options[] = {"IGNORE_DATA_AXIS_TO_SRS_AXIS_MAPPING=YES",
+                                 "CRITERION=EQUIVALENT_EXCEPT_AXIS_ORDER_GEOGCRS", nullptr};
+  return srs.IsSame(&wgs84, options) != 0;
+}
+
+std::string Wkt(const OGRSpatialReference& srs) {
+  char* text = nullptr;
+  const char* const options[] = {"FORMAT=WKT2_2019", nullptr};
+  const bool written = srs.exportToWkt(&text, options) == OGRERR_NONE;
+  std::string wkt = written ? text : "";
+  CPLFree(text);
+  return wkt;
+}
+
+// Name and unit of what heights count from, as far as the CRS says.
+std::pair<std::string, std::string> VerticalPart(const OGRSpatialReference& srs) {
+  if (srs.IsCompound() != 0) {
+    const char* name = srs.GetAttrValue("COMPD_CS|VERT_CS|VERT_DATUM");
+    const char* unit = srs.GetAttrValue("COMPD_CS|VERT_CS|UNIT");
+    return {name == nullptr ? "unnamed" : name, unit == nullptr ? "" : unit};
+  }
+  if (srs.GetAxesCount() == 3) return {"ellipsoid", ""};
+  return {};
+}
+
+}  // namespace
+
+Result<Georeference> Georeference::Of(GDALDataset& dataset, const std::string& path) {
+  Georeference self;
+  self.width_ = dataset.GetRasterXSize();
+  self.height_ = dataset.GetRasterYSize();
+  if (dataset.GetGeoTransform(self.to_crs_.data()) != CE_None) {
+    if (dataset.GetGCPCount() > 0) {
+      return MakeError(
+          ErrorCode::kInvalidArgument,
+          "{}: is placed by ground control points only; resample it with `gdalwarp -t_srs EPSG:4326 in out`", path);
+    }
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "{}: has no georeference; if you know where it lies, add one with `gdal_translate -a_srs EPSG:XXXX "
+        "-a_ullr west north east south in out`",
+        path);
+  }
+  if (GDALInvGeoTransform(self.to_crs_.data(), self.to_pixel_.data()) == 0) {
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "{}: its georeference has no extent (pixel size {} x {}); set it with `gdal_translate -a_ullr west "
+        "north east south in out`",
+        path, self.to_crs_[1], self.to_crs_[5]);
+  }
+  const OGRSpatialReference* srs = dataset.GetSpatialRef();
+  if (srs == nullptr || srs->IsEmpty()) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{}: states no coordinate reference system; add it with `gdal_translate -a_srs EPSG:XXXX in out`",
+                     path);
+  }
+  if (auto crs = self.ReadCrs(*srs, path); !crs) return tl::unexpected(crs.error());
+  return self;
+}
+
+Result<void> Georeference::ReadCrs(const OGRSpatialReference& srs, const std::string& path) {
+  crs_ = NameAndCode(srs);
+  std::tie(vertical_datum_, vertical_unit_) = VerticalPart(srs);
+  OGRSpatialReference horizontal(srs);
+  if (horizontal.IsCompound() != 0) horizontal.StripVertical();
+  if (horizontal.GetAxesCount() == 3) horizontal.DemoteTo2D(nullptr);
+  if (horizontal.IsGeographic() == 0 && horizontal.IsProjected() == 0) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{}: its coordinate reference system \"{}\" is not tied to the Earth; assign the right one with "
+                     "`gdal_translate -a_srs EPSG:XXXX in out`",
+                     path, crs_);
+  }
+  const char* unit = nullptr;
+  if (horizontal.IsGeographic() != 0) {
+    horizontal.GetAngularUnits(&unit);
+    FindPeriod(horizontal);
+  } else {
+    horizontal.GetLinearUnits(&unit);
+  }
+  pixel_unit_ = unit == nullptr ? "" : unit;
+  if (IsWgs84Degrees(horizontal)) return {};
+
+  const Position centre = Apply(to_crs_, {width_ / 2.0, height_ / 2.0});
+  auto projector = Projector::Make(Wkt(horizontal), centre);
+  if (!projector) {
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "{}: {}: {}; resample it with `gdalwarp -t_srs EPSG:4326 in out` where the grids it needs are installed", path,
+        crs_, projector.error().message);
+  }
+  if (!(*projector)->is_identity()) projector_ = *std::move(projector);
+  return {};
+}
+
+void Georeference::FindPeriod(const OGRSpatialReference& srs) {
+  if (to_crs_[2] != 0 || to_crs_[4] != 0) return;
+  const double full_circle = 2 * std::numbers::pi / srs.GetAngularUnits(static_cast<const char**>(nullptr));
+  period_ = std::abs(full_circle / to_crs_[1]);
+  const double whole = std::round(period_);
+  // A pixel size of 0.008333333333 is meant to be 1/120: a hundredth of a pixel around the Earth is no gap.
+  if (std::abs(period_ - whole) < 0.01 && width_ >= whole) wrap_columns_ = static_cast<int>(whole);
+}
+
+double Georeference::CanonicalColumn(double column) const {
+  const double wrapped = column - period_ * std::floor(column / period_);
+  return wrapped > period_ - kEdgeTolerance ? wrapped - period_ : wrapped;
+}
+
+void Georeference::ToPixels(std::span<Position> positions) const {
+  if (projector_ != nullptr) projector_->Forward(positions);
+  for (Position& position : positions) {
+    position = Apply(to_pixel_, position);
+    if (period_ > 0) position.x = CanonicalColumn(position.x);
+  }
+}
+
+void Georeference::ToDegrees(std::span<Position> positions) const {
+  for (Position& position : positions) position = Apply(to_crs_, position);
+  if (projector_ != nullptr) projector_->Inverse(positions);
+}
+
+double Georeference::pixel_width() const { return std::hypot(to_crs_[1], to_crs_[4]); }
+double Georeference::pixel_height() const { return std::hypot(to_crs_[2], to_crs_[5]); }
+
+}  // namespace terrace::dem

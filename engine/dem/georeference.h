@@ -1,0 +1,69 @@
+// Where a raster lies on the globe: geographic positions to pixel positions and back.
+//
+// Pixel positions are GDAL's: (0, 0) is the outer corner of the first pixel, (.5, .5) its centre; columns to the right,
+// rows downwards in the file.
+#pragma once
+
+#include <gdal_priv.h>
+
+#include <array>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "engine/core/result.h"
+#include "engine/dem/projector.h"
+
+namespace terrace::dem {
+
+// Immutable and thread-safe.
+class Georeference {
+ public:
+  // Errors say what is missing and the command that adds it.
+  static Result<Georeference> Of(GDALDataset& dataset, const std::string& path);
+
+  // Degrees to pixels, in place; NaN where the CRS has no such position. Longitudes of geographic sources are counted
+  // modulo 360 degrees: the column is the one inside the raster if there is one.
+  void ToPixels(std::span<Position> positions) const;
+
+  // Pixels to degrees, in place; longitudes may lie beyond +-180.
+  void ToDegrees(std::span<Position> positions) const;
+
+  // Positions are an affine function of degrees: no PROJ, no interpolation.
+  bool is_affine() const { return projector_ == nullptr; }
+  // North is up and columns follow meridians, in degrees.
+  bool is_geographic_grid() const { return period_ > 0; }
+  bool columns_run_east() const { return to_crs_[1] > 0; }
+  // Columns in 360 degrees, of a geographic grid; else 0.
+  double period() const { return period_; }
+  // Columns after which the raster repeats itself, if it goes all around the Earth; else 0. Columns beyond are
+  // duplicates.
+  int wrap_columns() const { return wrap_columns_; }
+
+  int width() const { return width_; }
+  int height() const { return height_; }
+
+  const std::string& crs() const { return crs_; }
+  const std::string& vertical_datum() const { return vertical_datum_; }
+  const std::string& vertical_unit() const { return vertical_unit_; }
+  const std::string& pixel_unit() const { return pixel_unit_; }
+  double pixel_width() const;
+  double pixel_height() const;
+  std::string transform() const { return projector_ == nullptr ? "" : projector_->description(); }
+  std::string pipeline() const { return projector_ == nullptr ? "" : projector_->pipeline(); }
+
+ private:
+  Result<void> ReadCrs(const OGRSpatialReference& srs, const std::string& path);
+  void FindPeriod(const OGRSpatialReference& srs);
+  double CanonicalColumn(double column) const;
+
+  int width_ = 0, height_ = 0;
+  std::array<double, 6> to_crs_{};    // pixels -> CRS, GDAL's order
+  std::array<double, 6> to_pixel_{};  // CRS -> pixels
+  double period_ = 0;
+  int wrap_columns_ = 0;
+  std::shared_ptr<const Projector> projector_;  // null: the CRS is WGS 84 longitude and latitude
+  std::string crs_, vertical_datum_, vertical_unit_, pixel_unit_;
+};
+
+}  // namespace terrace::dem

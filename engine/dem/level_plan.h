@@ -1,0 +1,35 @@
+// How deep a source is served, and which lattice and averaging factor each level uses: functions of source and level
+// alone.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "engine/dem/georeference.h"
+#include "engine/geo/lattice.h"
+
+namespace terrace::dem {
+
+// Distances between samples on the ground at the source's centre, in true metres.
+struct SourceSpacing {
+  double east = 0, north = 0;  // one sample on, going east; going north
+  double finer = 0;            // the shorter of a column step and a row step
+  double latitude = 0;         // of the centre, degrees
+  bool geographic = false;     // columns follow meridians
+
+  static Result<SourceSpacing> Of(const Georeference& georeference, const std::string& path);
+};
+
+struct LevelPlan {
+  geo::Lattice lattice;
+  int factor = 1;  // samples of the source, per axis, averaged into one before interpolation; a power of two
+};
+
+// Plans of levels 0 .. geo::kMaxLevel.
+std::vector<LevelPlan> PlanLevels(const SourceSpacing& spacing);
+
+// The first level whose default error is at most a tenth of the finer spacing, or at most `finest_error`.
+int DeepestLevel(const SourceSpacing& spacing, double error_fraction, std::optional<double> finest_error);
+
+}  // namespace terrace::dem

@@ -1,0 +1,49 @@
+// Lowest and highest height and voids per block of 64 x 64 source pixels, and of ever larger blocks above.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+namespace terrace::dem {
+
+struct BlockRange {
+  float min = std::numeric_limits<float>::infinity();  // min > max: nothing but voids
+  float max = -std::numeric_limits<float>::infinity();
+  bool has_voids = false;
+
+  void Add(float height);  // NaN: a void
+  void Add(const BlockRange& other);
+};
+
+// Filled by one thread, then immutable and thread-safe.
+class RangeTable {
+ public:
+  static constexpr int kBlock = 64;  // source pixels
+
+  RangeTable() = default;
+  RangeTable(int width, int height);
+
+  // Adds the heights of a pixel window; `pixel_step` source pixels lie between its samples (1, or an overview's
+  // factor).
+  void AddWindow(int col, int row, int cols, int rows, const float* heights, int pixel_step = 1);
+
+  // Makes the coarser levels. Call once after the last AddWindow and before the first Query.
+  void Finish();
+
+  // At least the range of all pixels within the box (columns and rows, ends included, clipped to the raster). Cheap
+  // whatever the box's size: coarse blocks answer for large boxes.
+  BlockRange Query(double west, double north, double east, double south) const;
+
+  BlockRange Whole() const { return levels_.back().blocks.front(); }
+
+ private:
+  struct Level {
+    int columns = 0, rows = 0;
+    std::vector<BlockRange> blocks;
+  };
+  int width_ = 0, height_ = 0;
+  std::vector<Level> levels_;
+};
+
+}  // namespace terrace::dem

@@ -1,0 +1,93 @@
+#include "engine/dem/raster_file.h"
+
+#include <sys/stat.h>
+
+#include <cerrno>
+#include <cstdint>
+#include <system_error>
+
+#include "engine/dem/file_stamp.h"
+#include "engine/dem/gdal_runtime.h"
+
+namespace terrace::dem {
+namespace {
+
+// A one arc-second raster of the whole Earth has 1,296,000 columns.
+constexpr int kMaxSide = 1 << 22;
+constexpr std::int64_t kMaxSamples = std::int64_t{1} << 36;
+// GDAL decodes whole storage blocks, whatever its cache is allowed: a small file can claim a block of gigabytes.
+constexpr std::int64_t kMaxBlockBytes = std::int64_t{256} << 20;
+
+constexpr unsigned kOpenFlags = GDAL_OF_RASTER | GDAL_OF_READONLY | GDAL_OF_VERBOSE_ERROR;
+
+Result<void> CheckFile(const std::string& path) {
+  struct stat status {};
+  if (::stat(path.c_str(), &status) != 0) {
+    return MakeError(ErrorCode::kNotFound, "{}: {}; give the path of a raster file on this machine", path,
+                     std::generic_category().message(errno));
+  }
+  if (!S_ISREG(status.st_mode)) {
+    return MakeError(ErrorCode::kInvalidArgument, "{}: not a regular file; give the path of one raster file", path);
+  }
+  return {};
+}
+
+Result<void> CheckShape(GDALDataset& dataset, const std::string& path) {
+  if (dataset.GetRasterCount() < 1) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{}: has no raster bands; a container needs the name of one of its rasters: list them with "
+                     "`gdalinfo {}` and extract one with gdal_translate",
+                     path, path);
+  }
+  GDALRasterBand& band = HeightBand(dataset);
+  if (GDALDataTypeIsComplex(band.GetRasterDataType()) != 0) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{}: samples are complex numbers ({}), heights must be real; convert "
+                     "with `gdal_translate -ot Float32 in out`",
+                     path, GDALGetDataTypeName(band.GetRasterDataType()));
+  }
+  const std::int64_t width = dataset.GetRasterXSize(), height = dataset.GetRasterYSize();
+  if (width < 2 || height < 2) {
+    return MakeError(ErrorCode::kInvalidArgument, "{}: {} x {} samples are no surface; at least 2 x 2 are needed", path,
+                     width, height);
+  }
+  if (width > kMaxSide || height > kMaxSide || width * height > kMaxSamples) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{}: {} x {} samples; at most {} a side and {} in all can be served: cut it with gdal_translate "
+                     "-srcwin or coarsen it with `gdalwarp -tr`",
+                     path, width, height, kMaxSide, kMaxSamples);
+  }
+  int block_width = 0, block_height = 0;
+  band.GetBlockSize(&block_width, &block_height);
+  const std::int64_t block_bytes =
+      std::int64_t{block_width} * block_height * GDALGetDataTypeSizeBytes(band.GetRasterDataType());
+  if (block_bytes > kMaxBlockBytes) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{}: stored in blocks of {} x {} samples ({} MiB each), too large to read tiles from; rewrite it "
+                     "with `gdal_translate -co TILED=YES -co COMPRESS=DEFLATE in out.tif`",
+                     path, block_width, block_height, block_bytes >> 20);
+  }
+  return {};
+}
+
+}  // namespace
+
+GDALDatasetUniquePtr ReopenRaster(const std::string& path) {
+  InitGdal();
+  ForgetGdalError();
+  return GDALDatasetUniquePtr(GDALDataset::Open(path.c_str(), kOpenFlags));
+}
+
+Result<GDALDatasetUniquePtr> OpenRaster(const std::string& path) {
+  if (auto file = CheckFile(path); !file) return tl::unexpected(file.error());
+  GDALDatasetUniquePtr dataset = ReopenRaster(path);
+  if (dataset == nullptr) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{}: cannot be opened as a raster ({}); check the file with `gdalinfo {}` and its permissions",
+                     path, TakeGdalError(), path);
+  }
+  if (auto shape = CheckShape(*dataset, path); !shape) return tl::unexpected(shape.error());
+  return dataset;
+}
+
+}  // namespace terrace::dem

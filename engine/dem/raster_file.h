@@ -1,0 +1,22 @@
+// Opening a raster file as one band of heights, with every check that must come before its first sample is read.
+#pragma once
+
+#include <gdal_priv.h>
+
+#include <string>
+
+#include "engine/core/result.h"
+
+namespace terrace::dem {
+
+// Opens `path` read-only. Refuses, with the remedy: what is no regular file, no raster, has no band, complex samples,
+// sides or storage blocks of an absurd size. The name stands for a file and nothing else: no inline XML, no URL.
+Result<GDALDatasetUniquePtr> OpenRaster(const std::string& path);
+
+// The same without the checks, for further handles on a file that passed them; null when it cannot be opened.
+GDALDatasetUniquePtr ReopenRaster(const std::string& path);
+
+// Band 1: the heights. Precondition: the dataset came from OpenRaster or ReopenRaster.
+inline GDALRasterBand& HeightBand(GDALDataset& dataset) { return *dataset.GetRasterBand(1); }
+
+}  // namespace terrace::dem

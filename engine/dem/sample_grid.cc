@@ -1,0 +1,136 @@
+#include "engine/dem/sample_grid.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace terrace::dem {
+namespace {
+
+constexpr std::int64_t kSamplesPerStrip = std::int64_t{1} << 20;
+
+std::int64_t FloorMod(std::int64_t value, std::int64_t modulus) { return (value % modulus + modulus) % modulus; }
+
+// The band to read and how many of its samples, per axis, make one sample of the grid.
+struct Level {
+  GDALRasterBand* band;
+  int block;
+  int columns, rows;  // of the band in use
+};
+
+Result<Level> StartingLevel(GDALDataset& dataset, const RasterLayout& layout, int factor) {
+  GDALRasterBand* band = dataset.GetRasterBand(1);
+  int start = 1;
+  for (const int overview : layout.overview_factors) {
+    if (overview <= factor) start = overview;
+  }
+  if (start > 1) band = FindOverview(*band, start);
+  if (band == nullptr) {
+    return MakeError(ErrorCode::kUnavailable, "its overview of factor {} is gone since it was opened", start);
+  }
+  return Level{band, factor / start, (layout.columns + start - 1) / start, (layout.height + start - 1) / start};
+}
+
+// Averages `rows` rows of blocks from strips of samples. Every block is summed row by row, whatever the window.
+class BlockAverages {
+ public:
+  BlockAverages(std::int64_t blocks, int block)
+      : block_(block), sums_(static_cast<std::size_t>(blocks)), counts_(sums_.size()) {}
+
+  void AddRow(const float* samples, std::int64_t count) {
+    for (std::int64_t i = 0; i < count; ++i) {
+      if (std::isnan(samples[i])) continue;
+      sums_[static_cast<std::size_t>(i / block_)] += samples[i];
+      ++counts_[static_cast<std::size_t>(i / block_)];
+    }
+  }
+  void Take(float* out) {
+    for (std::size_t i = 0; i < sums_.size(); ++i) {
+      out[i] = counts_[i] == 0 ? SampleRules::kVoid : static_cast<float>(sums_[i] / counts_[i]);
+      sums_[i] = 0;
+      counts_[i] = 0;
+    }
+  }
+
+ private:
+  int block_;
+  std::vector<double> sums_;
+  std::vector<int> counts_;
+};
+
+// Blocks `column` .. `column + columns` without wrapping, all rows of the window, into columns of `out` that is
+// `stride` wide.
+Result<void> ReadBlocks(const Level& level, const SampleRules& rules, const GridWindow& window, float* out,
+                        std::int64_t stride, const std::stop_token& stop) {
+  const std::int64_t first = window.column * level.block;
+  const std::int64_t count = std::min<std::int64_t>(level.columns - first, window.columns * level.block);
+  const std::int64_t strip = std::max<std::int64_t>(1, kSamplesPerStrip / (count * level.block));  // in block rows
+  std::vector<float> samples;
+  BlockAverages averages(window.columns, level.block);
+  for (std::int64_t done = 0; done < window.rows; done += strip) {
+    const std::int64_t block_rows = std::min(strip, window.rows - done);
+    const std::int64_t top = (window.row + done) * level.block;
+    const std::int64_t rows = std::min<std::int64_t>(level.rows - top, block_rows * level.block);
+    samples.resize(static_cast<std::size_t>(count * rows));
+    if (auto read = ReadHeights(*level.band, rules, static_cast<int>(first), static_cast<int>(top),
+                                static_cast<int>(count), static_cast<int>(rows), samples.data(), stop);
+        !read) {
+      return read;
+    }
+    for (std::int64_t r = 0; r < rows; ++r) {
+      averages.AddRow(samples.data() + r * count, count);
+      if ((r + 1) % level.block == 0 || r + 1 == rows) averages.Take(out + (done + r / level.block) * stride);
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+double GridAxis::Center(std::int64_t index) const {
+  const std::int64_t block = wraps_ ? FloorMod(index, count_) : index;
+  const std::int64_t begin = block * factor_;
+  const std::int64_t end = std::min<std::int64_t>(begin + factor_, samples_);
+  const std::int64_t turns = (index - block) / count_;  // exact
+  return static_cast<double>(begin + end) / 2 + static_cast<double>(turns * samples_);
+}
+
+GridAxis::Place GridAxis::Locate(double position) const {
+  auto index = static_cast<std::int64_t>(std::floor(position / factor_ - 0.5));
+  // The last block's centre may lie nearer than a factor.
+  if ((wraps_ || index + 1 < count_) && position >= Center(index + 1)) ++index;
+  if (!wraps_) {
+    if (index < 0) return {0, 0};
+    if (index >= count_ - 1) return {count_ - 1, 0};
+  }
+  const double here = Center(index), next = Center(index + 1);
+  return {index, std::clamp((position - here) / (next - here), 0.0, 1.0)};
+}
+
+GDALRasterBand* FindOverview(GDALRasterBand& band, int factor) {
+  const int columns = (band.GetXSize() + factor - 1) / factor, rows = (band.GetYSize() + factor - 1) / factor;
+  for (int i = 0; i < band.GetOverviewCount(); ++i) {
+    GDALRasterBand* overview = band.GetOverview(i);
+    if (overview != nullptr && overview->GetXSize() == columns && overview->GetYSize() == rows) return overview;
+  }
+  return nullptr;
+}
+
+Result<std::vector<float>> ReadGrid(GDALDataset& dataset, const RasterLayout& layout, int factor,
+                                    const GridWindow& window, const std::stop_token& stop) {
+  const auto level = StartingLevel(dataset, layout, factor);
+  if (!level) return tl::unexpected(level.error());
+  const std::int64_t count = GridAxis(layout.columns, factor, layout.wraps).count();
+  std::vector<float> heights(static_cast<std::size_t>(window.columns * window.rows));
+  for (std::int64_t done = 0; done < window.columns;) {
+    GridWindow part = window;
+    part.column = FloorMod(window.column + done, count);
+    part.columns = std::min(window.columns - done, count - part.column);
+    if (auto read = ReadBlocks(*level, layout.rules, part, heights.data() + done, window.columns, stop); !read) {
+      return tl::unexpected(read.error());
+    }
+    done += part.columns;
+  }
+  return heights;
+}
+
+}  // namespace terrace::dem

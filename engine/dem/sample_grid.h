@@ -1,0 +1,60 @@
+// The source at the resolution of a level: its samples, or averages of aligned blocks of factor x factor of them.
+#pragma once
+
+#include <gdal_priv.h>
+
+#include <cstdint>
+#include <stop_token>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "engine/dem/sample_rules.h"
+
+namespace terrace::dem {
+
+// How a raster is stored, as far as reading it goes. Immutable after Open.
+struct RasterLayout {
+  int width = 0, height = 0;  // of the file
+  int columns = 0;            // of them in use: without the duplicates of a raster that goes all around the Earth
+  bool wraps = false;         // column `columns` is column 0 again
+  SampleRules rules;
+  std::vector<int> overview_factors;  // powers of two, ascending; overviews of other factors are left alone
+};
+
+// One axis of the averaged grid. Positions are in source pixels.
+class GridAxis {
+ public:
+  GridAxis(int samples, int factor, bool wraps)
+      : samples_(samples), factor_(factor), count_((samples + factor - 1) / factor), wraps_(wraps) {}
+
+  struct Place {
+    std::int64_t index;  // of the sample at or before the position; with wrapping it may be -1
+    double weight;       // of the next sample; 0 beyond the outermost centres
+  };
+  Place Locate(double position) const;
+
+  std::int64_t count() const { return count_; }
+  bool wraps() const { return wraps_; }
+  // Centre of the block; the last block of an axis may be a smaller one.
+  double Center(std::int64_t index) const;
+
+ private:
+  int samples_, factor_;
+  std::int64_t count_;
+  bool wraps_;
+};
+
+struct GridWindow {
+  std::int64_t column = 0, row = 0;  // columns may lie outside 0 .. count where the axis wraps
+  std::int64_t columns = 0, rows = 0;
+};
+
+// Averages of the valid samples of each block in the window, NaN where there is none, row by row from the north. A
+// value is a function of its block alone. Starts from the coarsest overview that `factor` is a multiple of.
+Result<std::vector<float>> ReadGrid(GDALDataset& dataset, const RasterLayout& layout, int factor,
+                                    const GridWindow& window, const std::stop_token& stop);
+
+// The overview of that factor; null when there is none (any more).
+GDALRasterBand* FindOverview(GDALRasterBand& band, int factor);
+
+}  // namespace terrace::dem

@@ -1,0 +1,119 @@
+#include "engine/dem/sample_rules.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "engine/dem/gdal_runtime.h"
+
+namespace terrace::dem {
+namespace {
+
+// Raw samples converted at a time: bounds the scratch memory of a read (8 MiB) and how late a stop is noticed.
+constexpr int kSamplesPerRead = 1 << 20;
+
+std::optional<double> NodataOf(GDALRasterBand& band) {
+  int has = 0;
+  double value = 0;
+  switch (band.GetRasterDataType()) {
+    case GDT_Int64:
+      value = static_cast<double>(band.GetNoDataValueAsInt64(&has));
+      break;
+    case GDT_UInt64:
+      value = static_cast<double>(band.GetNoDataValueAsUInt64(&has));
+      break;
+    default:
+      value = band.GetNoDataValue(&has);
+      break;
+  }
+  if (has != 0) return value;
+  // Many 16-bit elevation files carry the SRTM void without declaring it; no place on Earth is there.
+  if (band.GetRasterDataType() == GDT_Int16) return std::numeric_limits<std::int16_t>::min();
+  return std::nullopt;
+}
+
+}  // namespace
+
+std::optional<double> MetresPerUnit(const std::string& unit) {
+  std::string name;
+  for (const char c : unit) {
+    if (std::isalpha(static_cast<unsigned char>(c)))
+      name += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  }
+  constexpr double kFoot = 0.3048, kSurveyFoot = 1200.0 / 3937.0;
+  constexpr std::array<std::pair<std::string_view, double>, 20> kUnits = {{
+      {"", 1},
+      {"m", 1},
+      {"metre", 1},
+      {"metres", 1},
+      {"meter", 1},
+      {"meters", 1},
+      {"cm", .01},
+      {"mm", .001},
+      {"km", 1000},
+      {"centimetre", .01},
+      {"decimetre", .1},
+      {"ft", kFoot},
+      {"foot", kFoot},
+      {"feet", kFoot},
+      {"internationalfoot", kFoot},
+      {"ussurveyfoot", kSurveyFoot},
+      {"footussurvey", kSurveyFoot},
+      {"ftus", kSurveyFoot},
+      {"usft", kSurveyFoot},
+      {"ussurveyfeet", kSurveyFoot},
+  }};
+  for (const auto& [known, metres] : kUnits) {
+    if (known == name) return metres;
+  }
+  return std::nullopt;
+}
+
+SampleRules SampleRules::Of(GDALRasterBand& band, const std::string& crs_unit) {
+  SampleRules rules;
+  rules.nodata = NodataOf(band);
+  rules.compare_as_float = band.GetRasterDataType() == GDT_Float32;
+  rules.has_mask = (band.GetMaskFlags() & GMF_PER_DATASET) != 0;
+  rules.scale = band.GetScale();
+  rules.offset = band.GetOffset();
+  rules.unit = band.GetUnitType();
+  if (rules.unit.empty()) rules.unit = crs_unit;
+  rules.metres_per_unit = MetresPerUnit(rules.unit).value_or(1);
+  return rules;
+}
+
+Result<void> ReadHeights(GDALRasterBand& band, const SampleRules& rules, int col, int row, int cols, int rows,
+                         float* out, const std::stop_token& stop) {
+  const int rows_at_once = std::clamp(kSamplesPerRead / cols, 1, rows);
+  std::vector<double> raw(static_cast<std::size_t>(cols) * static_cast<std::size_t>(rows_at_once));
+  std::vector<std::uint8_t> mask(rules.has_mask ? raw.size() : 0);
+  for (int done = 0; done < rows; done += rows_at_once) {
+    if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "reading heights was stopped");
+    const int count = std::min(rows_at_once, rows - done);
+    ForgetGdalError();
+    CPLErr status =
+        band.RasterIO(GF_Read, col, row + done, cols, count, raw.data(), cols, count, GDT_Float64, 0, 0, nullptr);
+    if (status == CE_None && rules.has_mask) {
+      status = band.GetMaskBand()->RasterIO(GF_Read, col, row + done, cols, count, mask.data(), cols, count, GDT_Byte,
+                                            0, 0, nullptr);
+    }
+    if (status != CE_None) {
+      return MakeError(ErrorCode::kUnavailable, "rows {}..{} cannot be read ({})", row + done, row + done + count - 1,
+                       TakeGdalError());
+    }
+    const std::size_t samples = static_cast<std::size_t>(cols) * static_cast<std::size_t>(count);
+    for (std::size_t i = 0; i < samples; ++i) {
+      out[i] = rules.has_mask && mask[i] == 0 ? SampleRules::kVoid : rules.ToHeight(raw[i]);
+    }
+    out += samples;
+  }
+  return {};
+}
+
+}  // namespace terrace::dem

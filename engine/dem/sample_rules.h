@@ -1,0 +1,48 @@
+// What a raster band's raw values mean as heights: which are voids, and how the others become metres.
+#pragma once
+
+#include <gdal_priv.h>
+
+#include <optional>
+#include <stop_token>
+#include <string>
+
+#include "engine/core/result.h"
+
+namespace terrace::dem {
+
+// Nothing on Earth is higher or deeper; larger values are undeclared nodata marks (1.7e38, -99999).
+inline constexpr double kMaxAbsHeight = 99998.0;
+
+struct SampleRules {
+  std::optional<double> nodata;   // in raw values
+  bool compare_as_float = false;  // nodata of Float32 bands may be stated with more digits than the samples have
+  bool has_mask = false;          // a mask band says which samples are valid
+  double scale = 1, offset = 0;   // raw * scale + offset is in the band's unit
+  double metres_per_unit = 1;
+  std::string unit;  // as stated; empty: none
+
+  // `crs_unit`: the unit of the CRS's vertical axis, used where the band states none.
+  static SampleRules Of(GDALRasterBand& band, const std::string& crs_unit);
+
+  // Metres, or NaN for a void.
+  float ToHeight(double raw) const {
+    if (nodata && (raw == *nodata || (compare_as_float && static_cast<float>(raw) == static_cast<float>(*nodata)))) {
+      return kVoid;
+    }
+    const double height = (raw * scale + offset) * metres_per_unit;
+    return height >= -kMaxAbsHeight && height <= kMaxAbsHeight ? static_cast<float>(height) : kVoid;
+  }
+
+  static constexpr float kVoid = __builtin_nanf("");
+};
+
+// Metres per unit of a stated unit name; nothing when the name is unknown.
+std::optional<double> MetresPerUnit(const std::string& unit);
+
+// Heights of a pixel window of a band (or of one of its overviews), row by row into `out`, voids NaN.
+// kUnavailable: the band cannot be read. kCancelled: stopped.
+Result<void> ReadHeights(GDALRasterBand& band, const SampleRules& rules, int col, int row, int cols, int rows,
+                         float* out, const std::stop_token& stop);
+
+}  // namespace terrace::dem

@@ -1,0 +1,22 @@
+// A sample that may become a vertex, and the order in which samples do.
+#pragma once
+
+#include <cstdint>
+
+namespace terrace::tin {
+
+inline constexpr std::uint32_t kNoSample = 0xFFFFFFFF;
+
+// The default is "none": every real candidate comes before it.
+struct Candidate {
+  double error = 0;                 // metres, weighted; > 0 unless there is none
+  std::uint32_t sample = kNoSample;  // row-major index
+
+  // The total order of insertions: larger error first, then smaller index.
+  friend constexpr bool Precedes(const Candidate& a, const Candidate& b) {
+    return a.error > b.error || (a.error == b.error && a.sample < b.sample);
+  }
+  friend bool operator==(const Candidate&, const Candidate&) = default;
+};
+
+}  // namespace terrace::tin

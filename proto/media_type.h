@@ -1,0 +1,41 @@
+// What HTTP headers say about representations: content types, quantized-mesh extensions, content codings.
+// Pure functions of header texts; thread-safe; malformed input never fails, it asks for nothing.
+#pragma once
+
+#include <string_view>
+
+namespace terrace::proto {
+
+inline constexpr std::string_view kQuantizedMeshType = "application/vnd.quantized-mesh";
+inline constexpr std::string_view kJsonType = "application/json";
+inline constexpr std::string_view kProblemType = "application/problem+json";
+inline constexpr std::string_view kHtmlType = "text/html; charset=utf-8";
+inline constexpr std::string_view kTextType = "text/plain; charset=utf-8";
+
+// The extensions of quantized-mesh-1.0 that a client can ask for.
+struct TileExtensions {
+  bool octvertexnormals = false;
+  bool watermask = false;
+  bool metadata = false;
+
+  friend bool operator==(const TileExtensions&, const TileExtensions&) = default;
+  friend TileExtensions operator|(TileExtensions a, TileExtensions b) {
+    return {a.octvertexnormals || b.octvertexnormals, a.watermask || b.watermask, a.metadata || b.metadata};
+  }
+};
+
+// "octvertexnormals-metadata", the value of the `extensions` query parameter (cesium-native); unknown names are
+// ignored.
+TileExtensions ParseExtensions(std::string_view names);
+
+// The `extensions` parameter of an Accept header, whichever media range it hangs off: CesiumJS writes it behind
+// application/vnd.quantized-mesh, 3DTilesRendererJS behind application/octet-stream.
+TileExtensions ExtensionsInAccept(std::string_view accept);
+
+enum class ContentCoding { kIdentity, kGzip };
+
+// RFC 9110 section 12.5.3: gzip if the client takes it and does not prefer identity. Without the header, and where the
+// client refuses both, identity: every client can read that.
+ContentCoding ChooseCoding(std::string_view accept_encoding);
+
+}  // namespace terrace::proto

@@ -1,0 +1,259 @@
+#include "proto/mesh_file.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "engine/core/bytes.h"
+#include "engine/core/check.h"
+
+namespace terrace::proto {
+namespace {
+
+using Triangle = std::array<std::uint32_t, 3>;
+using Json = nlohmann::ordered_json;
+
+constexpr std::size_t kFlushBytes = 1 << 16;
+
+// Collects small writes: a stream call per number would cost more than formatting it.
+class BufferedText {
+ public:
+  explicit BufferedText(std::ostream& out) : out_(out) {}
+  ~BufferedText() { Flush(); }
+
+  template <typename... Args>
+  void Append(fmt::format_string<Args...> format, Args&&... args) {
+    fmt::format_to(std::back_inserter(buffer_), format, std::forward<Args>(args)...);
+    if (buffer_.size() >= kFlushBytes) Flush();
+  }
+
+ private:
+  void Flush() {
+    out_.write(buffer_.data(), static_cast<std::streamsize>(buffer_.size()));
+    buffer_.clear();
+  }
+
+  std::ostream& out_;
+  fmt::memory_buffer buffer_;
+};
+
+void Write(std::ostream& out, const std::string& bytes) {
+  out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+}
+
+void WriteObj(std::ostream& out, const std::vector<MeshVertex>& vertices, const std::vector<Triangle>& triangles) {
+  BufferedText text(out);
+  text.Append("# terrace: {} vertices, {} triangles\n", vertices.size(), triangles.size());
+  for (const MeshVertex& v : vertices) text.Append("v {} {} {}\n", v.x, v.y, v.z);
+  for (const Triangle& t : triangles) {  // OBJ counts from 1
+    text.Append("f {} {} {}\n", t[0] + std::uint64_t{1}, t[1] + std::uint64_t{1}, t[2] + std::uint64_t{1});
+  }
+}
+
+void WritePly(std::ostream& out, const std::vector<MeshVertex>& vertices, const std::vector<Triangle>& triangles) {
+  Write(out, fmt::format("ply\nformat binary_little_endian 1.0\ncomment terrace\nelement vertex {}\nproperty double x\n"
+                         "property double y\nproperty double z\nelement face {}\n"
+                         "property list uchar int vertex_indices\nend_header\n",
+                         vertices.size(), triangles.size()));
+  ByteWriter block;
+  const auto flush = [&](bool always) {
+    if (always || block.size() >= kFlushBytes) Write(out, block.Take());
+  };
+  for (const MeshVertex& v : vertices) {
+    block.Put(v.x);
+    block.Put(v.y);
+    block.Put(v.z);
+    flush(false);
+  }
+  for (const Triangle& t : triangles) {
+    block.Put(std::uint8_t{3});
+    for (std::uint32_t index : t) block.Put(static_cast<std::int32_t>(index));
+    flush(false);
+  }
+  flush(true);
+}
+
+using Vec3f = std::array<float, 3>;
+using Vec3d = std::array<double, 3>;
+
+Vec3d YUp(const MeshVertex& v) { return {v.x, v.z, -v.y}; }
+
+struct Box {
+  Vec3d min, max;
+};
+
+Box BoundsOf(const std::vector<MeshVertex>& vertices) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  Box box{{kInfinity, kInfinity, kInfinity}, {-kInfinity, -kInfinity, -kInfinity}};
+  for (const MeshVertex& vertex : vertices) {
+    const Vec3d p = YUp(vertex);
+    for (std::size_t i = 0; i < 3; ++i) {
+      box.min[i] = std::min(box.min[i], p[i]);
+      box.max[i] = std::max(box.max[i], p[i]);
+    }
+  }
+  return box;
+}
+
+// Two accessors over one buffer: positions, then indices. 65535 as a 16-bit index means "restart" in glTF.
+struct GlbLayout {
+  std::size_t vertices, indices;
+  Vec3d center;
+  Vec3f min, max;
+
+  bool wide() const { return vertices > 65535; }
+  std::size_t position_bytes() const { return vertices * sizeof(Vec3f); }
+  std::size_t index_bytes() const { return indices * (wide() ? sizeof(std::uint32_t) : sizeof(std::uint16_t)); }
+  std::size_t buffer_bytes() const { return (position_bytes() + index_bytes() + 3) / 4 * 4; }
+};
+
+GlbLayout MakeGlbLayout(const std::vector<MeshVertex>& vertices, std::size_t indices) {
+  const Box box = BoundsOf(vertices);
+  GlbLayout layout{vertices.size(), indices, {}, {}, {}};
+  for (std::size_t i = 0; i < 3; ++i) {
+    layout.center[i] = box.min[i] + (box.max[i] - box.min[i]) / 2;
+    // Subtraction and rounding to float are monotonic: the extremes of the doubles give those of the floats.
+    layout.min[i] = static_cast<float>(box.min[i] - layout.center[i]);
+    layout.max[i] = static_cast<float>(box.max[i] - layout.center[i]);
+  }
+  return layout;
+}
+
+std::string GlbJson(const GlbLayout& layout) {
+  constexpr int kFloat = 5126, kUnsignedShort = 5123, kUnsignedInt = 5125, kArrayBuffer = 34962, kIndexBuffer = 34963;
+  const Vec3d& c = layout.center;
+  Json json;
+  json["asset"] = {{"version", "2.0"}, {"generator", "terrace"}};
+  json["scene"] = 0;
+  json["scenes"] = Json::array({{{"nodes", {0}}}});
+  json["nodes"] = Json::array({{{"mesh", 0}, {"matrix", {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, c[0], c[1], c[2], 1}}}});
+  json["meshes"] =
+      Json::array({{{"primitives", Json::array({{{"attributes", {{"POSITION", 0}}}, {"indices", 1}, {"mode", 4}}})}}});
+  json["accessors"] = Json::array({{{"bufferView", 0},
+                                    {"componentType", kFloat},
+                                    {"count", layout.vertices},
+                                    {"type", "VEC3"},
+                                    {"min", layout.min},
+                                    {"max", layout.max}},
+                                   {{"bufferView", 1},
+                                    {"componentType", layout.wide() ? kUnsignedInt : kUnsignedShort},
+                                    {"count", layout.indices},
+                                    {"type", "SCALAR"}}});
+  json["bufferViews"] = Json::array(
+      {{{"buffer", 0}, {"byteOffset", 0}, {"byteLength", layout.position_bytes()}, {"target", kArrayBuffer}},
+       {{"buffer", 0},
+        {"byteOffset", layout.position_bytes()},
+        {"byteLength", layout.index_bytes()},
+        {"target", kIndexBuffer}}});
+  json["buffers"] = Json::array({{{"byteLength", layout.buffer_bytes()}}});
+  std::string text = json.dump();
+  text.append((4 - text.size() % 4) % 4, ' ');
+  return text;
+}
+
+std::string GlbBuffer(const GlbLayout& layout, const std::vector<MeshVertex>& vertices,
+                      const std::vector<Triangle>& triangles) {
+  ByteWriter buffer;
+  buffer.Reserve(layout.buffer_bytes());
+  for (const MeshVertex& vertex : vertices) {
+    const Vec3d p = YUp(vertex);
+    for (std::size_t i = 0; i < 3; ++i) buffer.Put(static_cast<float>(p[i] - layout.center[i]));
+  }
+  for (const Triangle& triangle : triangles) {
+    for (std::uint32_t index : triangle) {
+      if (layout.wide()) {
+        buffer.Put(index);
+      } else {
+        buffer.Put(static_cast<std::uint16_t>(index));
+      }
+    }
+  }
+  buffer.PadTo(4);
+  return buffer.Take();
+}
+
+Result<void> WriteGlb(std::ostream& out, const std::vector<MeshVertex>& vertices,
+                      const std::vector<Triangle>& triangles) {
+  constexpr std::uint32_t kGlbMagic = 0x46546C67, kJsonChunk = 0x4E4F534A, kBinaryChunk = 0x004E4942;
+  constexpr std::size_t kHeadersBytes = 12 + 8 + 8;
+  const GlbLayout layout = MakeGlbLayout(vertices, 3 * triangles.size());
+  const std::string json = GlbJson(layout);
+  const std::size_t total = kHeadersBytes + json.size() + layout.buffer_bytes();
+  if (total > std::numeric_limits<std::uint32_t>::max()) {
+    return MakeError(ErrorCode::kInvalidArgument, "a .glb file holds 4 GiB and this mesh needs {} bytes; write .ply",
+                     total);
+  }
+  ByteWriter head;
+  head.Put(kGlbMagic);
+  head.Put(std::uint32_t{2});
+  head.Put(static_cast<std::uint32_t>(total));
+  head.Put(static_cast<std::uint32_t>(json.size()));
+  head.Put(kJsonChunk);
+  head.PutBytes(json);
+  head.Put(static_cast<std::uint32_t>(layout.buffer_bytes()));
+  head.Put(kBinaryChunk);
+  Write(out, head.Take());
+  Write(out, GlbBuffer(layout, vertices, triangles));
+  return {};
+}
+
+Result<void> CheckMesh(const std::vector<MeshVertex>& vertices, const std::vector<Triangle>& triangles) {
+  if (triangles.empty()) return MakeError(ErrorCode::kInvalidArgument, "the mesh has no triangles; nothing to write");
+  if (vertices.size() > std::numeric_limits<std::int32_t>::max()) {
+    return MakeError(ErrorCode::kInvalidArgument, "{} vertices are more than mesh files can number; raise the error",
+                     vertices.size());
+  }
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    const MeshVertex& v = vertices[i];
+    if (!std::isfinite(v.x) || !std::isfinite(v.y) || !std::isfinite(v.z)) {
+      return MakeError(ErrorCode::kInvalidArgument, "vertex {} is ({}, {}, {}); mesh files hold finite numbers only", i,
+                       v.x, v.y, v.z);
+    }
+  }
+  for (const Triangle& triangle : triangles) {
+    for (std::uint32_t index : triangle) TERRACE_CHECK(index < vertices.size());
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<MeshFileFormat> MeshFileFormatOf(std::string_view file_name) {
+  constexpr std::array<std::pair<std::string_view, MeshFileFormat>, 3> kFormats = {
+      {{".obj", MeshFileFormat::kObj}, {".ply", MeshFileFormat::kPly}, {".glb", MeshFileFormat::kGlb}}};
+  std::string lower(file_name);
+  std::transform(lower.begin(), lower.end(), lower.begin(),
+                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
+  for (const auto& [extension, format] : kFormats) {
+    if (lower.ends_with(extension)) return format;
+  }
+  return MakeError(ErrorCode::kInvalidArgument, "{}: no mesh format has this extension; use .obj, .ply or .glb",
+                   file_name);
+}
+
+Result<void> WriteMesh(std::ostream& out, MeshFileFormat format, const std::vector<MeshVertex>& vertices,
+                       const std::vector<Triangle>& triangles) {
+  if (Result<void> checked = CheckMesh(vertices, triangles); !checked) return checked;
+  Result<void> written;
+  switch (format) {
+    case MeshFileFormat::kObj:
+      WriteObj(out, vertices, triangles);
+      break;
+    case MeshFileFormat::kPly:
+      WritePly(out, vertices, triangles);
+      break;
+    case MeshFileFormat::kGlb:
+      written = WriteGlb(out, vertices, triangles);
+      break;
+  }
+  out.flush();
+  if (written && !out) return MakeError(ErrorCode::kUnavailable, "writing the mesh failed; is the disk full?");
+  return written;
+}
+
+}  // namespace terrace::proto

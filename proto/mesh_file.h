@@ -1,0 +1,34 @@
+// Meshes as files that other programs open: Wavefront OBJ, PLY and binary glTF.
+//
+// OBJ is text whose numbers read back to the same doubles; PLY is binary little-endian doubles. Both keep x, y, z as
+// given. GLB has 32-bit floats relative to the centre of the mesh's box, and that centre in double precision in the
+// node's matrix. glTF is y-up: a point (x, y, z) with z up is stored as (x, z, -y), a rotation, so that viewers show
+// the terrain upright and triangles keep their sense.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <ostream>
+#include <string_view>
+#include <vector>
+
+#include "engine/core/result.h"
+
+namespace terrace::proto {
+
+enum class MeshFileFormat { kObj, kPly, kGlb };
+
+// By the extension of a file name, in either case. kInvalidArgument for others.
+Result<MeshFileFormat> MeshFileFormatOf(std::string_view file_name);
+
+struct MeshVertex {
+  double x = 0, y = 0, z = 0;
+};
+
+// Appends the whole file to `out`, which must be in binary mode. kInvalidArgument: a mesh without triangles, a
+// coordinate that is not finite, or more than the format can hold; nothing is written then. kUnavailable: `out` failed,
+// a full disk. Precondition: every index is below vertices.size().
+Result<void> WriteMesh(std::ostream& out, MeshFileFormat format, const std::vector<MeshVertex>& vertices,
+                       const std::vector<std::array<std::uint32_t, 3>>& triangles);
+
+}  // namespace terrace::proto

@@ -1,0 +1,76 @@
+#include "server/handlers/datasets_handler.h"
+
+#include <fmt/format.h>
+
+#include <iterator>
+#include <nlohmann/json.hpp>
+
+namespace terrace::server {
+namespace {
+
+std::string EscapeHtml(std::string_view text) {
+  std::string escaped;
+  for (const char c : text) {
+    switch (c) {
+      case '&': escaped += "&amp;"; break;
+      case '<': escaped += "&lt;"; break;
+      case '>': escaped += "&gt;"; break;
+      case '"': escaped += "&quot;"; break;
+      default: escaped += c;
+    }
+  }
+  return escaped;
+}
+
+}  // namespace
+
+std::string PercentEncode(std::string_view name) {
+  constexpr std::string_view kPlain = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-._~";
+  std::string encoded;
+  for (const char c : name) {
+    if (kPlain.find(c) != std::string_view::npos) {
+      encoded += c;
+    } else {
+      fmt::format_to(std::back_inserter(encoded), "%{:02X}", static_cast<unsigned char>(c));
+    }
+  }
+  return encoded;
+}
+
+std::string DatasetsJson(std::span<const DatasetView> datasets) {
+  using Json = nlohmann::ordered_json;
+  Json list = Json::array();
+  for (const DatasetView& dataset : datasets) {
+    const std::string base = "/" + PercentEncode(dataset.name);
+    Json entry;
+    entry["name"] = dataset.name;
+    entry["attribution"] = dataset.attribution;
+    entry["bounds"] = {dataset.west, dataset.south, dataset.east, dataset.north};
+    entry["min_level"] = 0;
+    entry["max_level"] = dataset.max_level();
+    entry["heights"]["min"] = dataset.min_height_m;
+    entry["heights"]["max"] = dataset.max_height_m;
+    entry["urls"]["layer"] = base + "/layer.json";
+    entry["urls"]["tiles"] = base + "/{z}/{x}/{y}.terrain";
+    list.push_back(std::move(entry));
+  }
+  Json document;
+  document["datasets"] = std::move(list);
+  // An attribution is the operator's text: bytes that are not UTF-8 must not take the whole list away.
+  return document.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+std::string IndexHtml(std::span<const DatasetView> datasets) {
+  std::string items;
+  for (const DatasetView& dataset : datasets) {
+    fmt::format_to(std::back_inserter(items), "<li><a href=\"/{}/layer.json\">{}</a></li>\n", PercentEncode(dataset.name),
+                   EscapeHtml(dataset.name));
+  }
+  return fmt::format(
+      "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>terrace</title></head>\n"
+      "<body><h1>terrace</h1>\n<p>Terrain for CesiumJS and other quantized-mesh clients. Datasets "
+      "(<a href=\"/datasets\">as JSON</a>):</p>\n<ul>\n{}</ul>\n</body></html>\n",
+      items);
+}
+
+}  // namespace terrace::server

@@ -1,0 +1,22 @@
+// GET /datasets
+#pragma once
+
+#include <span>
+#include <string>
+
+#include "server/tiles/dataset_view.h"
+
+namespace terrace::server {
+
+// {"datasets":[{"name","attribution","bounds":[w,s,e,n],"min_level","max_level","heights":{"min","max"},
+//   "urls":{"layer","tiles"}}]}
+// Degrees, west > east across the antimeridian; metres; URLs are absolute paths on this server.
+std::string DatasetsJson(std::span<const DatasetView> datasets);
+
+// What `/` shows where no viewer is installed.
+std::string IndexHtml(std::span<const DatasetView> datasets);
+
+// A dataset's name as one path segment of a URL.
+std::string PercentEncode(std::string_view name);
+
+}  // namespace terrace::server

@@ -1,0 +1,33 @@
+#include "server/handlers/document.h"
+
+#include <utility>
+
+#include "proto/compress.h"
+#include "server/http/negotiate.h"
+
+namespace terrace::server {
+
+Document Document::Make(std::string bytes, std::string_view content_type, std::optional<std::string> gzipped) {
+  Document document;
+  document.content_type = content_type;
+  std::string compressed = gzipped ? std::move(*gzipped) : proto::Gzip(bytes);
+  document.identity_etag = MakeEtag(bytes, Coding::kIdentity);
+  document.gzip_etag = MakeEtag(bytes, Coding::kGzip);
+  if (compressed.size() < bytes.size()) document.gzip = std::make_shared<const std::string>(std::move(compressed));
+  document.identity = std::make_shared<const std::string>(std::move(bytes));
+  return document;
+}
+
+Response Serve(const Document& document, const Request& request, std::string_view cache_control) {
+  const bool gzip = document.gzip && NegotiateCoding(request.accept_encoding) == Coding::kGzip;
+  Response response;
+  response.content_type = document.content_type;
+  response.coding = gzip ? Coding::kGzip : Coding::kIdentity;
+  response.body = gzip ? document.gzip : document.identity;
+  response.etag = gzip ? document.gzip_etag : document.identity_etag;
+  response.cache_control = cache_control;
+  response.vary = true;
+  return Conditional(std::move(response), request);
+}
+
+}  // namespace terrace::server

@@ -1,0 +1,58 @@
+#include "server/handlers/layer_handler.h"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "proto/layer_json.h"
+#include "server/http/http_error.h"
+#include "server/http/negotiate.h"
+
+namespace terrace::server {
+namespace {
+
+std::string Print(double value) {
+  std::string text = fmt::format("{}", value);
+  std::erase(text, '+');
+  return text;
+}
+
+Document MakeLayer(const DatasetView& dataset, std::string tile_query) {
+  proto::LayerDescription layer;
+  layer.name = dataset.name;
+  layer.attribution = dataset.attribution;
+  layer.available = dataset.available;
+  // layer.json has no way to cross the antimeridian.
+  const bool crosses = dataset.west > dataset.east;
+  layer.west = crosses ? -180 : dataset.west;
+  layer.east = crosses ? 180 : dataset.east;
+  layer.south = dataset.south;
+  layer.north = dataset.north;
+  layer.tile_query = std::move(tile_query);
+  return Document::Make(proto::EncodeLayerJson(layer), "application/json");
+}
+
+}  // namespace
+
+std::string TileQuery(const ErrorWish& wish) {
+  if (wish.error_m) return fmt::format("error={}&atleast=1", Print(*wish.error_m));
+  if (wish.fraction) return fmt::format("fraction={}", Print(*wish.fraction));
+  return {};
+}
+
+LayerHandler::LayerHandler(std::span<const DatasetView> datasets, std::string cache_control)
+    : datasets_(datasets), cache_control_(std::move(cache_control)) {
+  for (const DatasetView& dataset : datasets_) plain_.push_back(MakeLayer(dataset, ""));
+}
+
+Response LayerHandler::Handle(const Route& route, const Request& request) const {
+  const Result<std::uint32_t> dataset = FindDataset(route.dataset, datasets_);
+  if (!dataset) return ClientErrorResponse(dataset.error(), request.id);
+  const Result<TileParameters> parameters = ParseTileParameters(route.query, /*allow_at_least=*/false);
+  if (!parameters) return ClientErrorResponse(parameters.error(), request.id);
+  std::string tile_query = TileQuery(parameters->wish);
+  if (tile_query.empty()) return Serve(plain_[*dataset], request, cache_control_);
+  return Serve(MakeLayer(datasets_[*dataset], std::move(tile_query)), request, cache_control_);
+}
+
+}  // namespace terrace::server

@@ -1,0 +1,33 @@
+// GET /{dataset}/layer.json
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "server/handlers/document.h"
+#include "server/http/query.h"
+#include "server/http/router.h"
+#include "server/tiles/dataset_view.h"
+
+namespace terrace::server {
+
+class LayerHandler {
+ public:
+  // `datasets` must outlive this.
+  LayerHandler(std::span<const DatasetView> datasets, std::string cache_control);
+
+  // Precondition: a kLayer route. `?error=E` and `?fraction=F` go into the tile template.
+  Response Handle(const Route& route, const Request& request) const;
+
+ private:
+  const std::span<const DatasetView> datasets_;
+  const std::string cache_control_;
+  std::vector<Document> plain_;  // one per dataset: what is served without a wish
+};
+
+// What the tile template carries for a wish: "error=5&atleast=1", "fraction=0.25" or nothing. Numbers are printed anew,
+// shortest form, and without '+', which CesiumJS would turn into a space.
+std::string TileQuery(const ErrorWish& wish);
+
+}  // namespace terrace::server

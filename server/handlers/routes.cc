@@ -1,0 +1,76 @@
+#include "server/handlers/routes.h"
+
+#include <memory>
+#include <utility>
+
+#include "server/handlers/datasets_handler.h"
+#include "server/http/http_error.h"
+
+namespace terrace::server {
+namespace {
+
+// Files of the viewer change with the server: clients ask again, and usually hear 304.
+constexpr std::string_view kRevalidate = "no-cache";
+
+Response PlainText(int status, std::string_view content_type, std::string text) {
+  Response response;
+  response.status = status;
+  response.content_type = content_type;
+  response.body = std::make_shared<const std::string>(std::move(text));
+  response.cache_control = "no-store";
+  return response;
+}
+
+Response Ready(bool draining) {
+  if (!draining) return PlainText(200, "text/plain; charset=utf-8", "ready\n");
+  Response response = PlainText(503, "text/plain; charset=utf-8", "draining\n");
+  response.headers.emplace_back("Retry-After", "5");
+  return response;
+}
+
+}  // namespace
+
+Routes::Routes(std::span<const DatasetView> datasets, TileService& tiles, StaticFiles viewer, TileHandlerOptions options,
+               State state)
+    : tiles_(datasets, tiles, options),
+      layers_(datasets, options.cache_control),
+      viewer_(std::move(viewer)),
+      datasets_(Document::Make(DatasetsJson(datasets), "application/json")),
+      index_(Document::Make(IndexHtml(datasets), "text/html; charset=utf-8")),
+      state_(std::move(state)) {}
+
+asio::awaitable<Response> Routes::Serve(Request request) const {
+  const Result<Route> route = Match(request.target);
+  if (!route) co_return ClientErrorResponse(route.error(), request.id);
+  Response response;
+  if (route->kind == RouteKind::kTile) {
+    response = co_await tiles_.Handle(*route, std::move(request));
+  } else {
+    response = ServeNow(*route, request);
+  }
+  response.route = ToString(route->kind);
+  co_return response;
+}
+
+Response Routes::ServeNow(const Route& route, const Request& request) const {
+  if (route.kind == RouteKind::kViewer) return ServeViewer(route, request);
+  if (route.kind == RouteKind::kLayer) return layers_.Handle(route, request);
+  if (const Result<void> none = RefuseParameters(route.query); !none) {
+    return ClientErrorResponse(none.error(), request.id);
+  }
+  switch (route.kind) {
+    case RouteKind::kDatasets: return terrace::server::Serve(datasets_, request, kRevalidate);
+    case RouteKind::kReady: return Ready(state_.draining());
+    case RouteKind::kMetrics: return PlainText(200, "text/plain; version=0.0.4; charset=utf-8", state_.metrics_text());
+    default: return PlainText(200, "text/plain; charset=utf-8", "ok\n");
+  }
+}
+
+// Its pages keep their state in the query, so any query goes.
+Response Routes::ServeViewer(const Route& route, const Request& request) const {
+  if (const Document* file = viewer_.Find(route.file)) return terrace::server::Serve(*file, request, kRevalidate);
+  if (viewer_.empty() && route.file == "index.html") return terrace::server::Serve(index_, request, kRevalidate);
+  return ProblemResponse(404, "no such URL", request.id);
+}
+
+}  // namespace terrace::server

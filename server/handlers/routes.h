@@ -1,0 +1,48 @@
+// Every URL and who answers it.
+#pragma once
+
+#include <functional>
+#include <span>
+#include <string>
+
+#include "server/asio.h"
+#include "server/handlers/document.h"
+#include "server/handlers/layer_handler.h"
+#include "server/handlers/metrics.h"
+#include "server/handlers/static_files.h"
+#include "server/handlers/tile_handler.h"
+#include "server/http/request.h"
+#include "server/http/response.h"
+#include "server/http/router.h"
+
+namespace terrace::server {
+
+// Thread-safe: immutable after construction.
+class Routes {
+ public:
+  // What the probes and /metrics ask.
+  struct State {
+    std::function<bool()> draining;
+    std::function<std::string()> metrics_text;
+  };
+
+  // `datasets` and `tiles` must outlive this.
+  Routes(std::span<const DatasetView> datasets, TileService& tiles, StaticFiles viewer, TileHandlerOptions options,
+         State state);
+
+  // Answers GET and HEAD.
+  asio::awaitable<Response> Serve(Request request) const;
+
+ private:
+  Response ServeNow(const Route& route, const Request& request) const;
+  Response ServeViewer(const Route& route, const Request& request) const;
+
+  const TileHandler tiles_;
+  const LayerHandler layers_;
+  const StaticFiles viewer_;
+  const Document datasets_;
+  const Document index_;  // for `/` without a viewer
+  const State state_;
+};
+
+}  // namespace terrace::server

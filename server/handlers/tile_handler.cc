@@ -1,0 +1,84 @@
+#include "server/handlers/tile_handler.h"
+
+#include <fmt/format.h>
+
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/this_coro.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <charconv>
+#include <cmath>
+#include <iterator>
+#include <memory>
+#include <utility>
+
+#include "server/http/http_error.h"
+#include "server/http/negotiate.h"
+
+namespace terrace::server {
+namespace {
+
+std::string_view Name(CacheStatus cache) {
+  switch (cache) {
+    case CacheStatus::kHit: return "hit";
+    case CacheStatus::kMiss: return "miss";
+    case CacheStatus::kJoined: break;
+  }
+  return "join";
+}
+
+}  // namespace
+
+TileHandler::TileHandler(std::span<const DatasetView> datasets, TileService& tiles, TileHandlerOptions options)
+    : datasets_(datasets), tiles_(tiles), options_(std::move(options)) {}
+
+asio::awaitable<Response> TileHandler::Handle(Route route, Request request) const {
+  const Result<TileRequest> tile = Negotiate(route, request, datasets_);
+  if (!tile) co_return ClientErrorResponse(tile.error(), request.id);
+  const CacheKey key{*tile, datasets_[tile->dataset].generation};
+  const auto deadline = TileService::Clock::now() + options_.deadline;
+  const Result<ServedTile> served = co_await tiles_.Get(key, deadline);
+  if (served) co_return Reply(*served, *tile, request);
+  if (served.error().code == ErrorCode::kOverloaded) {
+    asio::steady_timer delay(co_await asio::this_coro::executor, options_.refusal_delay);
+    co_await delay.async_wait(asio::use_awaitable);
+  }
+  co_return BackendErrorResponse(served.error(), request.id);
+}
+
+Response TileHandler::Reply(const ServedTile& served, const TileRequest& tile, const Request& request) const {
+  Response response;
+  response.content_type = tile.normals ? "application/vnd.quantized-mesh;extensions=octvertexnormals"
+                                       : "application/vnd.quantized-mesh";
+  response.body = Body(served.tile, &served.tile->bytes);
+  response.coding = tile.coding;
+  response.etag = served.tile->etag;
+  response.cache_control = options_.cache_control;
+  response.vary = true;
+  response.headers.emplace_back("Terrain-Max-Error", FormatErrorUp(served.tile->max_error_m));
+  response.headers.emplace_back("Server-Timing", FormatServerTiming(served.cache, served.tile->times));
+  response.cache = Name(served.cache);
+  return Conditional(std::move(response), request);
+}
+
+std::string FormatErrorUp(double error_m) {
+  std::string text = fmt::format("{:.6g}", error_m);
+  double printed = 0;
+  std::from_chars(text.data(), text.data() + text.size(), printed);
+  if (printed >= error_m) return text;
+  // Rounding went down by less than half a unit of the last digit: one unit more rounds to the next number up.
+  const double unit = std::pow(10.0, std::floor(std::log10(error_m)) - 5);
+  return fmt::format("{:.6g}", error_m + unit);
+}
+
+std::string FormatServerTiming(CacheStatus cache, const StageTimes& times) {
+  std::string text = fmt::format("cache;desc={}", Name(cache));
+  if (cache != CacheStatus::kMiss) return text;
+  const std::pair<const char*, std::chrono::microseconds> steps[] = {
+      {"read", times.read}, {"refine", times.refine}, {"encode", times.encode}, {"compress", times.compress}};
+  for (const auto& [name, time] : steps) {
+    fmt::format_to(std::back_inserter(text), ", {};dur={:.3f}", name, static_cast<double>(time.count()) / 1000);
+  }
+  return text;
+}
+
+}  // namespace terrace::server

@@ -1,0 +1,47 @@
+// GET /{dataset}/{z}/{x}/{y}.terrain
+#pragma once
+
+#include <chrono>
+#include <span>
+#include <string>
+
+#include "server/asio.h"
+#include "server/http/request.h"
+#include "server/http/response.h"
+#include "server/http/router.h"
+#include "server/tiles/dataset_view.h"
+#include "server/tiles/tile_service.h"
+
+namespace terrace::server {
+
+struct TileHandlerOptions {
+  std::string cache_control = "public, max-age=3600";
+  std::chrono::milliseconds deadline{30'000};
+  // How long a refusal for overload is held back. A client that is refused at once asks again at once, and answering tens
+  // of thousands of refusals a second takes from the workers the time they need to become free.
+  std::chrono::milliseconds refusal_delay{200};
+};
+
+class TileHandler {
+ public:
+  // `datasets` and `tiles` must outlive this.
+  TileHandler(std::span<const DatasetView> datasets, TileService& tiles, TileHandlerOptions options);
+
+  // Precondition: a kTile route.
+  asio::awaitable<Response> Handle(Route route, Request request) const;
+
+ private:
+  Response Reply(const ServedTile& served, const TileRequest& tile, const Request& request) const;
+
+  const std::span<const DatasetView> datasets_;
+  TileService& tiles_;
+  const TileHandlerOptions options_;
+};
+
+// Metres with six significant digits, never below `error_m`.
+std::string FormatErrorUp(double error_m);
+
+// "cache;desc=miss, read;dur=1.234, ...": milliseconds, the steps on a miss only.
+std::string FormatServerTiming(CacheStatus cache, const StageTimes& times);
+
+}  // namespace terrace::server

@@ -1,0 +1,30 @@
+// One line of log for every reply.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <string>
+#include <string_view>
+
+namespace terrace::server {
+
+// What is told about a reply when its last byte was handed to the kernel. Valid during the call only.
+struct ReplyRecord {
+  std::string_view method;
+  std::string_view target;  // as sent by the client: anything may be in it
+  int status = 0;           // 499: the client left before there was a reply
+  std::size_t body_bytes = 0;
+  std::chrono::microseconds duration{0};  // from the end of the request's head
+  std::string_view route;
+  std::string_view cache;  // hit, miss, join or -
+  std::string_view request_id;
+  std::string_view peer;
+};
+
+inline constexpr std::size_t kMaxLoggedTargetBytes = 512;
+
+// GET "/maui/0/0/0.terrain" 200 4711 B 12.345 ms cache=miss id=0123456789abcdef peer=127.0.0.1:4242
+// Quotes, backslashes and whatever is not printable ASCII appear as \xHH, so that a line is one line.
+std::string FormatAccessLine(const ReplyRecord& record);
+
+}  // namespace terrace::server

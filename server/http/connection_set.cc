@@ -1,0 +1,63 @@
+#include "server/http/connection_set.h"
+
+namespace terrace::server {
+
+void ConnectionSet::Add(const std::shared_ptr<Connection>& connection) {
+  bool draining = false;
+  {
+    const std::lock_guard lock(mutex_);
+    connections_.emplace(connection.get(), connection);
+    draining = draining_;
+  }
+  if (draining) connection->Drain();
+}
+
+void ConnectionSet::Remove(const Connection* connection) {
+  const std::lock_guard lock(mutex_);
+  connections_.erase(connection);
+  if (connections_.empty()) emptied_.notify_all();
+}
+
+std::size_t ConnectionSet::size() const {
+  const std::lock_guard lock(mutex_);
+  return connections_.size();
+}
+
+bool ConnectionSet::draining() const {
+  const std::lock_guard lock(mutex_);
+  return draining_;
+}
+
+// Connections are told without the lock: the last reference to one may end here, and it then removes itself.
+std::vector<std::shared_ptr<Connection>> ConnectionSet::Snapshot() const {
+  std::vector<std::shared_ptr<Connection>> connections;
+  const std::lock_guard lock(mutex_);
+  connections.reserve(connections_.size());
+  for (const auto& [pointer, weak] : connections_) {
+    if (auto connection = weak.lock()) connections.push_back(std::move(connection));
+  }
+  return connections;
+}
+
+void ConnectionSet::CloseIdle() {
+  for (const auto& connection : Snapshot()) connection->CloseIfIdle();
+}
+
+void ConnectionSet::Drain() {
+  {
+    const std::lock_guard lock(mutex_);
+    draining_ = true;
+  }
+  for (const auto& connection : Snapshot()) connection->Drain();
+}
+
+void ConnectionSet::AbortAll() {
+  for (const auto& connection : Snapshot()) connection->Abort();
+}
+
+bool ConnectionSet::WaitUntilEmpty(std::chrono::milliseconds timeout) {
+  std::unique_lock lock(mutex_);
+  return emptied_.wait_for(lock, timeout, [this] { return connections_.empty(); });
+}
+
+}  // namespace terrace::server

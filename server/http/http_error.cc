@@ -1,0 +1,81 @@
+#include "server/http/http_error.h"
+
+#include <spdlog/spdlog.h>
+
+#include <nlohmann/json.hpp>
+
+namespace terrace::server {
+namespace {
+
+std::string_view TitleOf(int status) {
+  switch (status) {
+    case 400: return "Bad request";
+    case 404: return "Not found";
+    case 405: return "Method not allowed";
+    case 414: return "URI too long";
+    case 431: return "Request header too large";
+    default: return "Service unavailable";
+  }
+}
+
+std::string_view FixedDetail(ErrorCode code) {
+  switch (code) {
+    case ErrorCode::kInvalidArgument: return "the request cannot be understood";
+    case ErrorCode::kNotFound: return "no such tile";
+    case ErrorCode::kUnavailable: return "the tile's source cannot be read now";
+    case ErrorCode::kOverloaded: return "too many tiles are being built";
+    case ErrorCode::kCancelled: return "the tile was not ready in time";
+    case ErrorCode::kInternal: break;
+  }
+  return "the tile cannot be built now";
+}
+
+// Seconds. A full queue drains quickly; a source that cannot be read usually waits for a person.
+const char* RetryAfter(ErrorCode code) { return code == ErrorCode::kOverloaded ? "1" : "5"; }
+
+}  // namespace
+
+int StatusOf(ErrorCode code) {
+  switch (code) {
+    case ErrorCode::kInvalidArgument: return 400;
+    case ErrorCode::kNotFound: return 404;
+    case ErrorCode::kUnavailable:
+    case ErrorCode::kOverloaded:
+    case ErrorCode::kCancelled:
+    case ErrorCode::kInternal: break;
+  }
+  return 503;
+}
+
+Response ProblemResponse(int status, std::string_view detail, std::string_view request_id) {
+  nlohmann::ordered_json problem;
+  problem["type"] = "about:blank";
+  problem["title"] = TitleOf(status);
+  problem["status"] = status;
+  problem["detail"] = detail;
+  problem["request_id"] = request_id;
+
+  Response response;
+  response.status = status;
+  response.content_type = "application/problem+json";
+  response.body = std::make_shared<const std::string>(problem.dump());
+  response.cache_control = "no-store";
+  if (status == 405) response.headers.emplace_back("Allow", "GET, HEAD, OPTIONS");
+  return response;
+}
+
+Response ClientErrorResponse(const Error& error, std::string_view request_id) {
+  return ProblemResponse(StatusOf(error.code), error.message, request_id);
+}
+
+Response BackendErrorResponse(const Error& error, std::string_view request_id) {
+  // Refusals under load come by the thousand; the access log counts them.
+  const auto level = error.code == ErrorCode::kOverloaded ? spdlog::level::debug : spdlog::level::warn;
+  spdlog::log(level, "request {} failed ({}): {}", request_id, ToString(error.code), error.message);
+  const int status = StatusOf(error.code);
+  Response response = ProblemResponse(status, FixedDetail(error.code), request_id);
+  if (status == 503) response.headers.emplace_back("Retry-After", RetryAfter(error.code));
+  return response;
+}
+
+}  // namespace terrace::server

@@ -1,0 +1,126 @@
+#include "server/http/negotiate.h"
+
+#include <algorithm>
+#include <charconv>
+#include <limits>
+#include <optional>
+
+#include "engine/geo/error_ladder.h"
+
+namespace terrace::server {
+namespace {
+
+constexpr std::string_view kNormalsExtension = "octvertexnormals";
+
+char Lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
+
+bool EqualsIgnoringCase(std::string_view a, std::string_view b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](char x, char y) { return Lower(x) == Lower(y); });
+}
+
+std::string_view Trim(std::string_view text) {
+  const std::size_t first = text.find_first_not_of(" \t\"");
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(" \t\"") - first + 1);
+}
+
+// Cuts the piece before the next `separator` off `rest`, trimmed of blanks and quotes.
+std::string_view NextPiece(std::string_view& rest, std::string_view separators) {
+  const std::size_t end = std::min(rest.find_first_of(separators), rest.size());
+  const std::string_view piece = Trim(rest.substr(0, end));
+  rest.remove_prefix(std::min(end + 1, rest.size()));
+  return piece;
+}
+
+// A quality outside 0..1 or unreadable counts as 0: what a client says badly it does not get.
+double Quality(std::string_view parameters) {
+  while (!parameters.empty()) {
+    const std::string_view parameter = NextPiece(parameters, ";");
+    if (!parameter.starts_with("q=") && !parameter.starts_with("Q=")) continue;
+    double quality = 0;
+    const char* const last = parameter.data() + parameter.size();
+    const auto [end, error] = std::from_chars(parameter.data() + 2, last, quality, std::chars_format::fixed);
+    return error == std::errc() && end == last && quality >= 0 && quality <= 1 ? quality : 0;
+  }
+  return 1;
+}
+
+bool NamesNormals(std::string_view joined) {
+  while (!joined.empty()) {
+    if (NextPiece(joined, "-") == kNormalsExtension) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+Coding NegotiateCoding(std::string_view accept_encoding) {
+  std::optional<double> gzip, identity, any;
+  while (!accept_encoding.empty()) {
+    std::string_view item = NextPiece(accept_encoding, ",");
+    const std::string_view coding = NextPiece(item, ";");
+    const double quality = Quality(item);
+    if (EqualsIgnoringCase(coding, "gzip") || EqualsIgnoringCase(coding, "x-gzip")) {
+      gzip = std::max(gzip.value_or(0), quality);
+    } else if (EqualsIgnoringCase(coding, "identity")) {
+      identity = quality;
+    } else if (coding == "*") {
+      any = quality;
+    }
+  }
+  const double gzip_quality = gzip ? *gzip : any.value_or(0);
+  // An identity that is not mentioned is acceptable, but only if nothing else is.
+  const double identity_quality = identity.value_or(0);
+  return gzip_quality > 0 && gzip_quality >= identity_quality ? Coding::kGzip : Coding::kIdentity;
+}
+
+bool WantsNormals(std::string_view accept, const std::vector<std::string>& query_extensions) {
+  constexpr std::string_view kParameter = "extensions=";
+  while (!accept.empty()) {
+    const std::string_view piece = NextPiece(accept, ",;");
+    if (piece.size() < kParameter.size()) continue;
+    if (!EqualsIgnoringCase(piece.substr(0, kParameter.size()), kParameter)) continue;
+    if (NamesNormals(Trim(piece.substr(kParameter.size())))) return true;
+  }
+  return std::any_of(query_extensions.begin(), query_extensions.end(), NamesNormals);
+}
+
+int ErrorStep(const ErrorWish& wish, int level, double error_fraction) {
+  if (wish.fraction) {
+    // The product may leave the doubles; the ladder's ends are far inside.
+    const double error_m = std::clamp(*wish.fraction * geo::LevelError(level), std::numeric_limits<double>::min(),
+                                      std::numeric_limits<double>::max());
+    return geo::SnapToLadder(level, error_m, error_fraction);
+  }
+  if (!wish.error_m) return 0;
+  const int step = geo::SnapToLadder(level, *wish.error_m, error_fraction);
+  // max(error, default): steps above 0 are finer than the default.
+  return wish.at_least ? std::min(step, 0) : step;
+}
+
+Result<std::uint32_t> FindDataset(std::string_view name, std::span<const DatasetView> datasets) {
+  for (std::size_t i = 0; i < datasets.size(); ++i) {
+    if (datasets[i].name == name) return static_cast<std::uint32_t>(i);
+  }
+  return MakeError(ErrorCode::kNotFound, "no such dataset; /datasets lists them");
+}
+
+Result<TileRequest> Negotiate(const Route& route, const Request& request, std::span<const DatasetView> datasets) {
+  const Result<std::uint32_t> dataset = FindDataset(route.dataset, datasets);
+  if (!dataset) return tl::unexpected(dataset.error());
+  const DatasetView& view = datasets[*dataset];
+  const Result<TileParameters> parameters = ParseTileParameters(route.query, /*allow_at_least=*/true);
+  if (!parameters) return tl::unexpected(parameters.error());
+  if (!IsAvailable(view, route.key)) {
+    return MakeError(ErrorCode::kNotFound, "the dataset has no such tile; its layer.json lists what it has");
+  }
+  TileRequest tile;
+  tile.dataset = *dataset;
+  tile.key = route.key;
+  tile.error_step = ErrorStep(parameters->wish, route.key.level, view.error_fraction);
+  tile.coding = NegotiateCoding(request.accept_encoding);
+  tile.normals = WantsNormals(request.accept, parameters->extensions);
+  return tile;
+}
+
+}  // namespace terrace::server

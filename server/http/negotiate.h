@@ -1,0 +1,35 @@
+// From a route and a request's headers to a canonical TileRequest. Pure.
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "server/http/query.h"
+#include "server/http/request.h"
+#include "server/http/router.h"
+#include "server/tiles/dataset_view.h"
+#include "server/tiles/tile_request.h"
+
+namespace terrace::server {
+
+// kNotFound: no such dataset, or the tile lies outside what the dataset has. kInvalidArgument: see ParseTileParameters.
+// Precondition: a kTile route.
+Result<TileRequest> Negotiate(const Route& route, const Request& request, std::span<const DatasetView> datasets);
+
+// The dataset's index, or kNotFound.
+Result<std::uint32_t> FindDataset(std::string_view name, std::span<const DatasetView> datasets);
+
+// gzip where the client takes it at least as gladly as identity. Without Accept-Encoding: identity.
+Coding NegotiateCoding(std::string_view accept_encoding);
+
+// True when an `extensions=a-b` parameter anywhere in Accept, or one of the query's values, names octvertexnormals. Names
+// nobody knows are ignored. 3DTilesRendererJS hangs the parameter on application/octet-stream.
+bool WantsNormals(std::string_view accept, const std::vector<std::string>& query_extensions);
+
+// The step on the level's ladder that a wish comes to; 0 without a wish.
+int ErrorStep(const ErrorWish& wish, int level, double error_fraction);
+
+}  // namespace terrace::server

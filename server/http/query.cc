@@ -1,0 +1,116 @@
+#include "server/http/query.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+namespace terrace::server {
+namespace {
+
+int HexDigit(char c) {
+  if (c >= '0' && c <= '9') return c - '0';
+  if (c >= 'a' && c <= 'f') return c - 'a' + 10;
+  if (c >= 'A' && c <= 'F') return c - 'A' + 10;
+  return -1;
+}
+
+// Finite and above zero, the whole text. Numbers that overflow or underflow a double are refused by from_chars.
+std::optional<double> PositiveNumber(std::string_view text) {
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  if (!std::isfinite(value) || value <= 0) return std::nullopt;
+  return value;
+}
+
+Result<void> SetPositive(std::optional<double>& to, const char* name, std::string_view text) {
+  if (to) return MakeError(ErrorCode::kInvalidArgument, "{} is given more than once", name);
+  to = PositiveNumber(text);
+  if (!to) return MakeError(ErrorCode::kInvalidArgument, "{} must be a finite number above 0", name);
+  return {};
+}
+
+Result<void> CheckTogether(const ErrorWish& wish, bool at_least_given) {
+  if (wish.error_m && wish.fraction) {
+    return MakeError(ErrorCode::kInvalidArgument, "error and fraction exclude each other");
+  }
+  if (at_least_given && !wish.error_m) return MakeError(ErrorCode::kInvalidArgument, "atleast needs error");
+  return {};
+}
+
+}  // namespace
+
+std::optional<std::string> PercentDecode(std::string_view text) {
+  std::string decoded;
+  decoded.reserve(text.size());
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (text[i] != '%') {
+      decoded += text[i];
+      continue;
+    }
+    if (text.size() - i < 3) return std::nullopt;
+    const int high = HexDigit(text[i + 1]), low = HexDigit(text[i + 2]);
+    if (high < 0 || low < 0) return std::nullopt;
+    const int byte = high * 16 + low;
+    if (byte < 0x20 || byte == 0x7f) return std::nullopt;
+    decoded += static_cast<char>(byte);
+    i += 2;
+  }
+  return decoded;
+}
+
+Result<QueryParameters> ParseQuery(std::string_view query) {
+  QueryParameters parameters;
+  while (!query.empty()) {
+    const std::string_view piece = query.substr(0, query.find('&'));
+    query.remove_prefix(std::min(query.size(), piece.size() + 1));
+    if (piece.empty()) continue;
+    const std::size_t equals = std::min(piece.find('='), piece.size());
+    std::optional<std::string> name = PercentDecode(piece.substr(0, equals));
+    std::optional<std::string> value = PercentDecode(piece.substr(std::min(equals + 1, piece.size())));
+    if (!name || !value) return MakeError(ErrorCode::kInvalidArgument, "malformed percent-encoding in the query");
+    parameters.emplace_back(std::move(*name), std::move(*value));
+  }
+  return parameters;
+}
+
+Result<TileParameters> ParseTileParameters(std::string_view query, bool allow_at_least) {
+  const Result<QueryParameters> sent = ParseQuery(query);
+  if (!sent) return tl::unexpected(sent.error());
+  TileParameters parameters;
+  ErrorWish& wish = parameters.wish;
+  bool at_least_given = false;
+  for (const auto& [name, value] : *sent) {
+    Result<void> set;
+    if (name == "v") continue;
+    if (name == "extensions") {
+      parameters.extensions.push_back(value);
+    } else if (name == "error") {
+      set = SetPositive(wish.error_m, "error", value);
+    } else if (name == "fraction") {
+      set = SetPositive(wish.fraction, "fraction", value);
+    } else if (name == "atleast" && allow_at_least) {
+      if (at_least_given) return MakeError(ErrorCode::kInvalidArgument, "atleast is given more than once");
+      if (value != "0" && value != "1") return MakeError(ErrorCode::kInvalidArgument, "atleast must be 0 or 1");
+      at_least_given = true;
+      wish.at_least = value == "1";
+    } else {
+      set = MakeError(ErrorCode::kInvalidArgument, "unknown parameter; known are error, fraction{}",
+                      allow_at_least ? ", atleast, extensions" : "");
+    }
+    if (!set) return tl::unexpected(set.error());
+  }
+  if (const Result<void> fits = CheckTogether(wish, at_least_given); !fits) return tl::unexpected(fits.error());
+  return parameters;
+}
+
+Result<void> RefuseParameters(std::string_view query) {
+  const Result<QueryParameters> sent = ParseQuery(query);
+  if (!sent) return tl::unexpected(sent.error());
+  for (const auto& [name, value] : *sent) {
+    if (name != "v") return MakeError(ErrorCode::kInvalidArgument, "this URL takes no parameters");
+  }
+  return {};
+}
+
+}  // namespace terrace::server

@@ -1,0 +1,44 @@
+// The query part of a URL, and numbers in it.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "engine/core/result.h"
+
+namespace terrace::server {
+
+// Undoes percent-encoding once; nothing where a '%' is not followed by two hexadecimal digits, or encodes a control
+// character. '+' stays '+'.
+std::optional<std::string> PercentDecode(std::string_view text);
+
+// name -> value in the order sent, decoded. Pieces without '=' have an empty value; empty pieces are skipped.
+using QueryParameters = std::vector<std::pair<std::string, std::string>>;
+
+// kInvalidArgument: malformed percent-encoding.
+Result<QueryParameters> ParseQuery(std::string_view query);
+
+// What a client may say about the geometric error, all of it optional.
+struct ErrorWish {
+  std::optional<double> error_m;   // finite, > 0
+  std::optional<double> fraction;  // of the level's error; finite, > 0
+  bool at_least = false;           // error_m is a floor under the default errors
+};
+
+struct TileParameters {
+  ErrorWish wish;
+  std::vector<std::string> extensions;  // every `extensions` value
+};
+
+// The parameters of tile URLs (`allow_at_least`) and of layer.json. `v` and `extensions` may come any number of times:
+// clients append them on their own. kInvalidArgument, with a message for the client: an unknown or repeated parameter,
+// error and fraction together, atleast without error, or a value that is not what the parameter takes.
+Result<TileParameters> ParseTileParameters(std::string_view query, bool allow_at_least);
+
+// For URLs that take no parameters but `v`.
+Result<void> RefuseParameters(std::string_view query);
+
+}  // namespace terrace::server

@@ -1,0 +1,45 @@
+// One HTTP request without a body, and the only way to get one out of bytes from the network.
+//
+// Stricter than RFC 9112 wherever two readers of the same bytes could disagree about where a message ends: terrace has no
+// endpoint that takes a body, so a message that announces one is refused before another byte is read.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+
+#include "tl/expected.hpp"
+
+namespace terrace::server {
+
+inline constexpr std::size_t kMaxHeadBytes = 16 * 1024;
+inline constexpr std::size_t kMaxTargetBytes = 8 * 1024;
+
+enum class Method { kGet, kHead, kOptions, kOther };
+
+struct Request {
+  Method method = Method::kGet;
+  unsigned version = 11;   // 10 or 11
+  bool keep_alive = true;  // what the client wants
+  std::string method_name;  // as sent, for the log
+  std::string target;       // as sent
+  std::string accept;       // several fields joined with ", "
+  std::string accept_encoding;
+  std::string if_none_match;
+  std::string id;  // 16 hexadecimal digits, given by the server
+};
+
+// Why bytes are not a request. The connection is of no use afterwards: its framing cannot be trusted.
+struct BadRequest {
+  int status = 400;             // 400, 414 or 431
+  std::string_view detail;      // for the client; a literal
+};
+
+// Where the head in `bytes` ends (just past the empty line), 0 if it is not complete yet, or why it never can be.
+// `scanned` bytes were looked at by an earlier call with the same beginning.
+tl::expected<std::size_t, BadRequest> FindHeadEnd(std::string_view bytes, std::size_t scanned);
+
+// `head` ends with its empty line. Sets everything but `id`.
+tl::expected<Request, BadRequest> ParseHead(std::string_view head);
+
+}  // namespace terrace::server

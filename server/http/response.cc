@@ -1,0 +1,112 @@
+#include "server/http/response.h"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <xxhash.h>
+
+#include <algorithm>
+#include <ctime>
+#include <iterator>
+
+#include "engine/core/check.h"
+
+namespace terrace::server {
+namespace {
+
+constexpr std::string_view kCommonHeaders =
+    "Access-Control-Allow-Origin: *\r\n"
+    "Access-Control-Expose-Headers: ETag, Terrain-Max-Error, Terrain-Certified-Error, Retry-After, Server-Timing\r\n"
+    "Timing-Allow-Origin: *\r\n"
+    "X-Content-Type-Options: nosniff\r\n";
+
+std::string_view ReasonPhrase(int status) {
+  switch (status) {
+    case 200: return "OK";
+    case 204: return "No Content";
+    case 304: return "Not Modified";
+    case 400: return "Bad Request";
+    case 404: return "Not Found";
+    case 405: return "Method Not Allowed";
+    case 414: return "URI Too Long";
+    case 431: return "Request Header Fields Too Large";
+    case 503: return "Service Unavailable";
+    default: return "";
+  }
+}
+
+void Put(std::string& head, std::string_view name, std::string_view value) {
+  TERRACE_CHECK(std::none_of(value.begin(), value.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }));
+  fmt::format_to(std::back_inserter(head), "{}: {}\r\n", name, value);
+}
+
+bool HasBody(int status) { return status != 204 && status != 304; }
+
+std::string_view Trim(std::string_view text) {
+  while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);
+  while (!text.empty() && (text.back() == ' ' || text.back() == '\t')) text.remove_suffix(1);
+  return text;
+}
+
+}  // namespace
+
+std::string SerializeHead(const Response& response, unsigned version, bool keep_alive) {
+  std::string head = fmt::format("HTTP/1.{} {} {}\r\n", version % 10, response.status, ReasonPhrase(response.status));
+  head.reserve(1024);
+  Put(head, "Date", fmt::format("{:%a, %d %b %Y %H:%M:%S} GMT", fmt::gmtime(std::time(nullptr))));
+  if (HasBody(response.status)) {
+    if (!response.content_type.empty()) Put(head, "Content-Type", response.content_type);
+    if (response.coding == Coding::kGzip) Put(head, "Content-Encoding", "gzip");
+    Put(head, "Content-Length", fmt::to_string(response.body ? response.body->size() : 0));
+  }
+  if (!response.etag.empty()) Put(head, "ETag", response.etag);
+  if (!response.cache_control.empty()) Put(head, "Cache-Control", response.cache_control);
+  if (response.vary) Put(head, "Vary", "Accept, Accept-Encoding");
+  for (const Response::Header& header : response.headers) Put(head, header.name, header.value);
+  head += kCommonHeaders;
+  Put(head, "Connection", keep_alive ? "keep-alive" : "close");
+  head += "\r\n";
+  return head;
+}
+
+Response PreflightResponse() {
+  Response response;
+  response.status = 204;
+  response.route = "preflight";
+  response.headers.emplace_back("Allow", "GET, HEAD, OPTIONS");
+  response.headers.emplace_back("Access-Control-Allow-Methods", "GET, HEAD, OPTIONS");
+  // "*" does not cover Authorization.
+  response.headers.emplace_back("Access-Control-Allow-Headers", "*, Authorization");
+  response.headers.emplace_back("Access-Control-Max-Age", "86400");
+  return response;
+}
+
+Response Conditional(Response response, const Request& request) {
+  if (response.status != 200 || response.etag.empty()) return response;
+  if (!MatchesEtag(request.if_none_match, response.etag)) return response;
+  response.status = 304;
+  response.body = nullptr;
+  return response;
+}
+
+bool MatchesEtag(std::string_view if_none_match, std::string_view etag) {
+  std::string_view rest = Trim(if_none_match);
+  if (rest == "*") return true;
+  while (!rest.empty()) {
+    if (rest.starts_with("W/")) rest.remove_prefix(2);
+    if (!rest.starts_with('"')) return false;  // not a list of ETags: as if it were absent
+    const std::size_t close = rest.find('"', 1);
+    if (close == std::string_view::npos) return false;
+    if (rest.substr(0, close + 1) == etag) return true;
+    rest = Trim(rest.substr(close + 1));
+    if (!rest.empty() && rest.front() != ',') return false;
+    while (rest.starts_with(',')) rest = Trim(rest.substr(1));
+  }
+  return false;
+}
+
+std::string MakeEtag(std::string_view bytes, Coding coding) {
+  const XXH128_hash_t hash = XXH3_128bits(bytes.data(), bytes.size());
+  return fmt::format("\"{:016x}{:016x}{}\"", hash.high64, hash.low64, coding == Coding::kGzip ? "-gz" : "");
+}
+
+}  // namespace terrace::server

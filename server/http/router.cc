@@ -1,0 +1,134 @@
+#include "server/http/router.h"
+
+#include <algorithm>
+#include <charconv>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "server/http/query.h"
+#include "server/tiles/dataset_view.h"
+
+namespace terrace::server {
+namespace {
+
+tl::unexpected<Error> NotFound() { return MakeError(ErrorCode::kNotFound, "no such URL"); }
+
+// A path without scheme and authority, or nothing.
+std::optional<std::string_view> OriginForm(std::string_view target) {
+  for (const std::string_view scheme : {"http://", "https://"}) {
+    if (!target.starts_with(scheme)) continue;
+    target.remove_prefix(scheme.size());
+    const std::size_t path = target.find_first_of("/?");
+    if (path == std::string_view::npos) return "/";
+    return target[path] == '/' ? target.substr(path) : std::optional<std::string_view>();
+  }
+  if (!target.starts_with('/')) return std::nullopt;
+  return target;
+}
+
+// Plain decimal, no sign, no leading zero, at most 9 digits: one tile has one URL.
+std::optional<std::int64_t> TileNumber(std::string_view text) {
+  constexpr std::size_t kMaxDigits = 9;
+  if (text.empty() || text.size() > kMaxDigits || (text.size() > 1 && text[0] == '0') || text[0] == '-') {
+    return std::nullopt;
+  }
+  std::int64_t number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  return number;
+}
+
+std::optional<geo::TileKey> ParseTileKey(std::string_view z, std::string_view x, std::string_view y) {
+  constexpr std::string_view kSuffix = ".terrain";
+  if (!y.ends_with(kSuffix)) return std::nullopt;
+  y.remove_suffix(kSuffix.size());
+  const auto level = TileNumber(z), column = TileNumber(x), row = TileNumber(y);
+  if (!level || !column || !row || *level > geo::kMaxLevel) return std::nullopt;
+  const geo::TileKey key{static_cast<int>(*level), *column, *row};
+  return geo::IsValid(key) ? std::optional(key) : std::nullopt;
+}
+
+// The decoded segments of a path; an encoded '/' does not separate.
+std::optional<std::vector<std::string>> Segments(std::string_view path) {
+  std::vector<std::string> segments;
+  for (std::size_t at = 0; at != std::string_view::npos;) {
+    const std::size_t next = path.find('/', at + 1);
+    std::optional<std::string> segment =
+        PercentDecode(path.substr(at + 1, next == std::string_view::npos ? next : next - at - 1));
+    if (!segment) return std::nullopt;
+    segments.push_back(std::move(*segment));
+    at = next;
+  }
+  return segments;
+}
+
+std::optional<Route> MatchFixed(const std::vector<std::string>& segments) {
+  Route route;
+  if (segments[0] == "viewer" && segments.size() > 1) {
+    for (std::size_t i = 1; i < segments.size(); ++i) route.file += (i > 1 ? "/" : "") + segments[i];
+    if (route.file.empty()) route.file = "index.html";
+    return route;
+  }
+  if (segments.size() > 1) return std::nullopt;
+  if (segments[0].empty()) {
+    route.file = "index.html";
+    return route;
+  }
+  static constexpr std::pair<std::string_view, RouteKind> kFixed[] = {{"datasets", RouteKind::kDatasets},
+                                                                     {"livez", RouteKind::kLive},
+                                                                     {"readyz", RouteKind::kReady},
+                                                                     {"metrics", RouteKind::kMetrics}};
+  for (const auto& [name, kind] : kFixed) {
+    if (segments[0] != name) continue;
+    route.kind = kind;
+    return route;
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+std::string_view ToString(RouteKind kind) {
+  switch (kind) {
+    case RouteKind::kTile: return "tile";
+    case RouteKind::kLayer: return "layer";
+    case RouteKind::kDatasets: return "datasets";
+    case RouteKind::kViewer: return "viewer";
+    case RouteKind::kLive: return "livez";
+    case RouteKind::kReady: return "readyz";
+    case RouteKind::kMetrics: return "metrics";
+  }
+  return "none";
+}
+
+Result<Route> Match(std::string_view target) {
+  const std::optional<std::string_view> origin = OriginForm(target);
+  if (!origin || origin->find('#') != std::string_view::npos) {
+    return MakeError(ErrorCode::kInvalidArgument, "malformed request target");
+  }
+  const std::size_t question = std::min(origin->find('?'), origin->size());
+  const std::optional<std::vector<std::string>> segments = Segments(origin->substr(0, question));
+  if (!segments) return MakeError(ErrorCode::kInvalidArgument, "malformed percent-encoding in the path");
+
+  std::optional<Route> route = MatchFixed(*segments);
+  if (!route) {
+    route.emplace();
+    route->dataset = (*segments)[0];
+    if (segments->size() == 2 && (*segments)[1] == "layer.json") {
+      route->kind = RouteKind::kLayer;
+    } else if (segments->size() == 4) {
+      const auto key = ParseTileKey((*segments)[1], (*segments)[2], (*segments)[3]);
+      if (!key) return NotFound();
+      route->kind = RouteKind::kTile;
+      route->key = *key;
+    } else {
+      return NotFound();
+    }
+    if (IsReservedName(route->dataset)) return NotFound();
+  }
+  route->query = std::string(origin->substr(std::min(question + 1, origin->size())));
+  return std::move(*route);
+}
+
+}  // namespace terrace::server

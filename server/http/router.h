@@ -1,0 +1,38 @@
+// From a request target to what it names: the table of all URLs. Pure; knows no dataset.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "engine/core/result.h"
+#include "engine/geo/tile_key.h"
+
+namespace terrace::server {
+
+enum class RouteKind {
+  kTile,      // /{dataset}/{z}/{x}/{y}.terrain
+  kLayer,     // /{dataset}/layer.json
+  kDatasets,  // /datasets
+  kViewer,    // / and /viewer/...
+  kLive,      // /livez
+  kReady,     // /readyz
+  kMetrics,   // /metrics
+};
+
+// A short literal for logs and metrics.
+std::string_view ToString(RouteKind kind);
+
+struct Route {
+  RouteKind kind = RouteKind::kViewer;
+  std::string dataset;  // kTile, kLayer: decoded
+  geo::TileKey key;     // kTile: inside the tiling scheme
+  std::string file;     // kViewer: relative to the viewer's folder, decoded: "index.html" for "/"
+  std::string query;    // without '?', not decoded
+};
+
+// `target` in origin form ("/maui/0/0/0.terrain?error=5") or absolute form ("http://host/...").
+// kInvalidArgument: neither form, or malformed percent-encoding. kNotFound: no such URL; tile numbers that are not plain
+// decimal numbers, or lie outside the tiling scheme, name no tile.
+Result<Route> Match(std::string_view target);
+
+}  // namespace terrace::server

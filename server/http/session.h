@@ -1,0 +1,40 @@
+// One connection: reads requests, has them answered in order, writes the replies.
+//
+// Everything of a session happens on its own strand. What a client can make it hold is bounded: one read buffer of
+// kMaxHeadBytes, one request, one reply.
+#pragma once
+
+#include <boost/asio/ip/tcp.hpp>
+#include <chrono>
+#include <functional>
+#include <memory>
+
+#include "server/asio.h"
+#include "server/http/access_log.h"
+#include "server/http/connection_set.h"
+#include "server/http/request.h"
+#include "server/http/response.h"
+
+namespace terrace::server {
+
+struct SessionOptions {
+  std::chrono::milliseconds header_timeout{5'000};  // from a request's first byte to its empty line
+  std::chrono::milliseconds idle_timeout{30'000};   // between a reply and the next request
+  std::chrono::milliseconds write_timeout{20'000};  // without the client taking a single byte
+};
+
+// Answers GET and HEAD; the session leaves a HEAD's body away. Cancelled when the client leaves.
+using Handler = std::function<asio::awaitable<Response>(Request)>;
+
+// Shared by all sessions, outlives them all. `connections` and what the functions refer to must outlive the sessions too.
+struct SessionContext {
+  SessionOptions options;
+  Handler handler;
+  std::function<void(const ReplyRecord&)> observer;  // after every reply; called on any io thread
+  ConnectionSet* connections = nullptr;
+};
+
+// Takes over an accepted socket whose executor is a strand.
+void StartSession(asio::ip::tcp::socket socket, std::shared_ptr<const SessionContext> context);
+
+}  // namespace terrace::server

@@ -1,0 +1,40 @@
+// The server on top of the real tile pipeline; server.cc knows only views and a function.
+#include <utility>
+
+#include "server/server.h"
+#include "server/tiles/tile_pipeline.h"
+
+namespace terrace::server {
+namespace {
+
+DatasetView ViewOf(const Dataset& dataset) {
+  const dem::DemInfo& info = dataset.source->info();
+  DatasetView view;
+  view.name = dataset.name;
+  view.attribution = dataset.attribution;
+  view.error_fraction = dataset.error_fraction;
+  view.generation = dataset.generation;
+  for (int level = 0; level <= dataset.source->max_level(); ++level) {
+    view.available.push_back(dataset.source->Available(level));
+  }
+  view.west = info.bounds.west;
+  view.south = info.bounds.south;
+  view.east = info.bounds.east;
+  view.north = info.bounds.north;
+  view.min_height_m = info.heights.min;
+  view.max_height_m = info.heights.max;
+  return view;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Server>> Server::Start(std::shared_ptr<const TilePipeline> pipeline, ServerOptions options) {
+  std::vector<DatasetView> views;
+  for (const Dataset& dataset : pipeline->datasets()) views.push_back(ViewOf(dataset));
+  TileBuilder builder = [pipeline = std::move(pipeline)](const TileRequest& request, std::stop_token stop) {
+    return pipeline->Build(request, std::move(stop));
+  };
+  return Start(std::move(views), std::move(builder), std::move(options));
+}
+
+}  // namespace terrace::server

@@ -1,0 +1,216 @@
+#include "server/server.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <boost/asio/executor_work_guard.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/signal_set.hpp>
+#include <condition_variable>
+#include <csignal>
+#include <functional>
+#include <mutex>
+#include <set>
+#include <thread>
+#include <utility>
+
+#include "server/handlers/metrics.h"
+#include "server/handlers/routes.h"
+#include "server/handlers/static_files.h"
+#include "server/http/connection_set.h"
+#include "server/http/listener.h"
+#include "server/http/session.h"
+
+namespace terrace::server {
+namespace {
+
+// For replies to requests whose builds were just cancelled, and again for sockets that were just aborted.
+constexpr std::chrono::milliseconds kLastWords{1'000};
+
+Result<void> CheckNames(const std::vector<DatasetView>& datasets) {
+  std::set<std::string_view> names;
+  for (const DatasetView& dataset : datasets) {
+    if (dataset.name.empty()) return MakeError(ErrorCode::kInvalidArgument, "a dataset has no name; give it one");
+    if (IsReservedName(dataset.name) || dataset.name.find('/') != std::string::npos) {
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "dataset \"{}\": this name is taken by a URL of the server or holds a '/'; choose another",
+                       dataset.name);
+    }
+    if (!names.insert(dataset.name).second) {
+      return MakeError(ErrorCode::kInvalidArgument, "dataset \"{}\": two datasets have this name; rename one",
+                       dataset.name);
+    }
+  }
+  return {};
+}
+
+unsigned IoThreads(unsigned configured) {
+  return configured > 0 ? configured : std::max(1u, std::thread::hardware_concurrency() / 4);
+}
+
+TileServiceOptions ServiceOptions(const ServerOptions& options) {
+  TileServiceOptions service;
+  service.worker_threads = options.worker_threads;
+  service.queue_length = options.queue_length;
+  service.cache_bytes = options.cache_bytes;
+  return service;
+}
+
+}  // namespace
+
+// Members are destroyed from the last to the first: the io_context, whose unfinished coroutines hold sessions, goes before
+// everything a session refers to.
+class Server::Impl {
+ public:
+  Impl(std::vector<DatasetView> datasets, TileBuilder builder, StaticFiles viewer, ServerOptions options)
+      : options_(std::move(options)),
+        datasets_(std::move(datasets)),
+        metrics_(datasets_),
+        tiles_(ServiceOptions(options_), std::move(builder), std::bind_front(&Metrics::CountBuild, &metrics_)),
+        connections_(options_.max_connections),
+        routes_(datasets_, tiles_, std::move(viewer), HandlerOptions(), RouteState()),
+        work_(io_.get_executor()),
+        signals_(io_) {}
+
+  ~Impl() {
+    RequestStop();
+    Wait();
+  }
+
+  Result<void> Start() {
+    Result<std::shared_ptr<Listener>> listener = Listener::Open(io_, options_.host, options_.port, Context());
+    if (!listener) return tl::unexpected(listener.error());
+    listener_ = std::move(*listener);
+    if (options_.stop_on_signals) WatchSignals();
+    listener_->Start();
+    const unsigned count = IoThreads(options_.io_threads);
+    for (unsigned i = 0; i < count; ++i) io_threads_.emplace_back([this] { io_.run(); });
+    return {};
+  }
+
+  std::uint16_t port() const { return listener_->port(); }
+  const std::string& host() const { return options_.host; }
+
+  void RequestStop() {
+    const std::lock_guard lock(mutex_);
+    stop_requested_ = true;
+    stop_wanted_.notify_all();
+  }
+
+  bool Wait() {
+    {
+      std::unique_lock lock(mutex_);
+      stop_wanted_.wait(lock, [this] { return stop_requested_; });
+    }
+    const std::lock_guard lock(stopping_);
+    if (!stopped_) drained_ = Stop();
+    stopped_ = true;
+    return drained_;
+  }
+
+ private:
+  bool Stop() {
+    bool drained = true;
+    if (listener_) {
+      listener_->Close();
+      connections_.Drain();
+      drained = connections_.WaitUntilEmpty(options_.drain_timeout);
+      tiles_.CancelBuilds();
+      if (!drained && !connections_.WaitUntilEmpty(kLastWords)) {
+        spdlog::warn("{} connections are cut off: the drain timeout has passed", connections_.size());
+        connections_.AbortAll();
+        connections_.WaitUntilEmpty(kLastWords);
+      }
+    }
+    work_.reset();
+    io_.stop();
+    for (std::thread& thread : io_threads_) thread.join();
+    io_threads_.clear();
+    tiles_.Shutdown();
+    return drained;
+  }
+
+  void WatchSignals() {
+    signals_.add(SIGINT);
+    signals_.add(SIGTERM);
+    signals_.async_wait([this](const boost::system::error_code& error, int signal) {
+      if (error) return;
+      spdlog::info("stopping: signal {}", signal);
+      RequestStop();
+    });
+  }
+
+  TileHandlerOptions HandlerOptions() const {
+    TileHandlerOptions handler;
+    handler.cache_control = options_.cache_control;
+    handler.deadline = options_.request_deadline;
+    return handler;
+  }
+
+  Routes::State RouteState() {
+    Routes::State state;
+    state.draining = [this] { return connections_.draining(); };
+    state.metrics_text = [this] { return metrics_.Text(tiles_.stats(), connections_.size()); };
+    return state;
+  }
+
+  std::shared_ptr<const SessionContext> Context() {
+    auto context = std::make_shared<SessionContext>();
+    context->options.header_timeout = options_.header_timeout;
+    context->options.idle_timeout = options_.idle_timeout;
+    context->options.write_timeout = options_.write_timeout;
+    context->handler = std::bind_front(&Routes::Serve, &routes_);
+    context->observer = [this](const ReplyRecord& record) {
+      metrics_.CountReply(record);
+      spdlog::info("{}", FormatAccessLine(record));
+    };
+    context->connections = &connections_;
+    return context;
+  }
+
+  const ServerOptions options_;
+  const std::vector<DatasetView> datasets_;
+  Metrics metrics_;
+  TileService tiles_;
+  ConnectionSet connections_;
+  const Routes routes_;
+  asio::io_context io_;
+  asio::executor_work_guard<asio::io_context::executor_type> work_;
+  asio::signal_set signals_;
+  std::shared_ptr<Listener> listener_;
+  std::vector<std::thread> io_threads_;
+
+  std::mutex mutex_;
+  std::condition_variable stop_wanted_;
+  bool stop_requested_ = false;
+  std::mutex stopping_;  // held while stopping, so that a second Wait waits too
+  bool stopped_ = false;
+  bool drained_ = true;
+};
+
+Server::Server(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Server::~Server() = default;
+
+Result<std::unique_ptr<Server>> Server::Start(std::vector<DatasetView> datasets, TileBuilder builder,
+                                              ServerOptions options) {
+  if (const Result<void> named = CheckNames(datasets); !named) return tl::unexpected(named.error());
+  Result<StaticFiles> viewer = StaticFiles::Load(options.viewer_dir);
+  if (!viewer) return tl::unexpected(viewer.error());
+  auto impl = std::make_unique<Impl>(std::move(datasets), std::move(builder), std::move(*viewer), std::move(options));
+  if (const Result<void> started = impl->Start(); !started) return tl::unexpected(started.error());
+  return std::unique_ptr<Server>(new Server(std::move(impl)));
+}
+
+std::uint16_t Server::port() const { return impl_->port(); }
+
+std::string Server::url() const {
+  const std::string& host = impl_->host();
+  const bool bare_v6 = host.find(':') != std::string::npos && !host.starts_with('[');
+  return fmt::format("http://{}:{}/", bare_v6 ? "[" + host + "]" : host, port());
+}
+
+void Server::RequestStop() { impl_->RequestStop(); }
+bool Server::Wait() { return impl_->Wait(); }
+
+}  // namespace terrace::server

@@ -1,0 +1,70 @@
+// The server as one object: start it, ask it to stop, wait until it has.
+//
+// Threads: a few for the network, a bounded pool for building tiles. Stopping goes in this order: no new connections;
+// /readyz says draining; requests that have begun are answered (bounded by drain_timeout); builds are cancelled; threads
+// are joined.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "server/tiles/dataset_view.h"
+#include "server/tiles/tile_service.h"
+
+namespace terrace::server {
+
+class TilePipeline;
+
+struct ServerOptions {
+  std::string host = "127.0.0.1";
+  std::uint16_t port = 8080;    // 0: any that is free
+  unsigned io_threads = 0;      // 0: a quarter of the processors, at least one
+  unsigned worker_threads = 0;  // 0: as many as processors
+  std::size_t queue_length = 256;                    // builds that wait for a worker
+  std::size_t cache_bytes = std::size_t{256} << 20;  // of finished tiles; 0: none
+  std::size_t max_connections = 1024;
+  std::string cache_control = "public, max-age=3600";  // of tiles and layer.json
+  std::filesystem::path viewer_dir;                    // empty or missing: a plain page instead
+  std::chrono::milliseconds header_timeout{5'000};
+  std::chrono::milliseconds idle_timeout{30'000};
+  std::chrono::milliseconds write_timeout{20'000};
+  std::chrono::milliseconds request_deadline{30'000};  // of a tile, waiting for its build included
+  std::chrono::milliseconds drain_timeout{10'000};
+  bool stop_on_signals = false;  // SIGINT and SIGTERM act like RequestStop
+};
+
+class Server {
+ public:
+  // Listens when it returns. `builder` is called on worker threads; TileRequest::dataset is an index into `datasets`.
+  // kInvalidArgument: a dataset's name is reserved, empty or used twice. kUnavailable: the address cannot be listened on,
+  // or the viewer cannot be read. Messages name the remedy.
+  static Result<std::unique_ptr<Server>> Start(std::vector<DatasetView> datasets, TileBuilder builder,
+                                               ServerOptions options);
+
+  // The same for the datasets of a pipeline.
+  static Result<std::unique_ptr<Server>> Start(std::shared_ptr<const TilePipeline> pipeline, ServerOptions options);
+
+  // Stops and waits.
+  ~Server();
+
+  std::uint16_t port() const;
+  std::string url() const;  // "http://127.0.0.1:8080/"
+
+  // Returns at once. From any thread, any number of times; not from a signal handler.
+  void RequestStop();
+
+  // Blocks until somebody asks to stop and the server has. False: requests were cut off because drain_timeout passed.
+  bool Wait();
+
+ private:
+  class Impl;
+  explicit Server(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace terrace::server

@@ -1,0 +1,36 @@
+// What the HTTP side knows of a dataset: its name, its extent and which tiles exist; never how tiles are made.
+//
+// Immutable after start, so any thread reads it without a lock. A dataset's index in the server's list is
+// TileRequest::dataset.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "engine/geo/error_ladder.h"
+#include "engine/geo/tile_key.h"
+
+namespace terrace::server {
+
+struct DatasetView {
+  std::string name;
+  std::string attribution;
+  double error_fraction = geo::kDefaultErrorFraction;
+  std::uint64_t generation = 0;                         // changes whenever the bytes of its tiles may change
+  std::vector<std::vector<geo::TileRange>> available;  // by level, from 0; the deepest served level is the last
+  double west = -180, south = -90, east = 180, north = 90;  // degrees; west > east: across the antimeridian
+  double min_height_m = 0, max_height_m = 0;
+
+  int max_level() const { return static_cast<int>(available.size()) - 1; }
+};
+
+// False as well for keys outside the tiling scheme.
+bool IsAvailable(const DatasetView& dataset, const geo::TileKey& key);
+
+// True for the first path segments that the server answers itself: datasets, viewer, livez, readyz, metrics. No dataset
+// may be named like one of them.
+bool IsReservedName(std::string_view name);
+
+}  // namespace terrace::server

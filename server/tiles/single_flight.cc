@@ -1,0 +1,133 @@
+#include "server/tiles/single_flight.h"
+
+#include <algorithm>
+#include <boost/asio/post.hpp>
+#include <boost/asio/redirect_error.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/this_coro.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <optional>
+#include <vector>
+
+namespace terrace::server {
+
+// A waiter is a timer that runs until the waiter's deadline and is cancelled when the flight lands.
+using Waiter = std::shared_ptr<asio::steady_timer>;
+
+// Everything but `stop` is guarded by SingleFlight::mutex_.
+struct SingleFlight::Flight {
+  explicit Flight(Clock::time_point d) : deadline(d) {}
+
+  const Clock::time_point deadline;
+  std::stop_source stop;
+  std::vector<Waiter> waiters;
+  std::optional<Result<TilePtr>> outcome;
+};
+
+// Holds one waiter's place; giving it back may stop the flight. Lives in Join's frame, so that the place is given back
+// however the coroutine ends.
+class SingleFlight::Seat {
+ public:
+  Seat(SingleFlight& owner, CacheKey key, std::shared_ptr<Flight> flight, Waiter waiter)
+      : owner_(owner), key_(key), flight_(std::move(flight)), waiter_(std::move(waiter)) {}
+  Seat(const Seat&) = delete;
+  Seat& operator=(const Seat&) = delete;
+  ~Seat() {
+    std::unique_lock lock(owner_.mutex_);
+    std::erase(flight_->waiters, waiter_);
+    if (!flight_->waiters.empty() || flight_->outcome) return;
+    owner_.Forget(key_, flight_);
+    lock.unlock();  // stopping runs the builder's callbacks
+    flight_->stop.request_stop();
+  }
+
+ private:
+  SingleFlight& owner_;
+  const CacheKey key_;
+  const std::shared_ptr<Flight> flight_;
+  const Waiter waiter_;
+};
+
+asio::awaitable<SingleFlight::Landing> SingleFlight::Join(CacheKey key, Build build, Clock::time_point deadline) {
+  const auto executor = co_await asio::this_coro::executor;
+  const auto waiter = std::make_shared<asio::steady_timer>(executor);
+  std::unique_lock lock(mutex_);
+  bool joined = false;
+  const Result<std::shared_ptr<Flight>> boarded = Board(key, std::move(build), deadline, &joined);
+  if (!boarded) co_return Landing(tl::unexpected(boarded.error()), joined);
+  const std::shared_ptr<Flight> flight = *boarded;
+  flight->waiters.push_back(waiter);
+  lock.unlock();
+  const Seat seat(*this, key, flight, waiter);
+
+  // Nobody waits past the flight's deadline, so then its last waiter leaves, and it stops.
+  waiter->expires_at(std::min(deadline, flight->deadline));
+  boost::system::error_code ignored;  // landed, expired or cancelled: the outcome tells
+  co_await waiter->async_wait(asio::redirect_error(asio::use_awaitable, ignored));
+
+  lock.lock();
+  std::optional<Result<TilePtr>> outcome = flight->outcome;
+  lock.unlock();
+  if (!outcome) outcome = MakeError(ErrorCode::kCancelled, "tile {}: not ready before the request's deadline", geo::ToString(key.request.key));
+  co_return Landing(std::move(*outcome), joined);
+}
+
+// Finds the flight of `key` or starts one. mutex_ is held, so that nobody can board a flight the pool refused.
+Result<std::shared_ptr<SingleFlight::Flight>> SingleFlight::Board(const CacheKey& key, Build build,
+                                                                  Clock::time_point deadline, bool* joined) {
+  if (shut_down_) return MakeError(ErrorCode::kUnavailable, "the server is shutting down");
+  if (const auto found = flights_.find(key); found != flights_.end()) {
+    *joined = true;
+    joined_total_.fetch_add(1, std::memory_order_relaxed);
+    return found->second;
+  }
+  auto flight = std::make_shared<Flight>(deadline);
+  auto job = [this, key, flight, build = std::move(build)] { Fly(key, flight, build); };
+  if (!pool_.TrySubmit(std::move(job))) {
+    return MakeError(ErrorCode::kOverloaded, "tile {}: the queue of builds is full", geo::ToString(key.request.key));
+  }
+  flights_.emplace(key, flight);
+  return flight;
+}
+
+// On a worker thread.
+void SingleFlight::Fly(const CacheKey& key, const std::shared_ptr<Flight>& flight, const Build& build) {
+  Result<TilePtr> outcome = MakeError(ErrorCode::kCancelled, "tile {}: stopped before it began", geo::ToString(key.request.key));
+  if (!flight->stop.stop_requested()) outcome = build(flight->stop.get_token());
+
+  std::vector<Waiter> waiters;
+  {
+    const std::lock_guard lock(mutex_);
+    flight->outcome = std::move(outcome);
+    waiters = flight->waiters;
+    Forget(key, flight);
+  }
+  // A timer belongs to its coroutine's strand. The coroutine suspends in its wait before the strand runs anything else,
+  // so the cancellation always meets a wait.
+  for (Waiter& waiter : waiters) {
+    const auto executor = waiter->get_executor();
+    asio::post(executor, [waiter = std::move(waiter)] { waiter->cancel(); });
+  }
+}
+
+void SingleFlight::Forget(const CacheKey& key, const std::shared_ptr<Flight>& flight) {
+  const auto found = flights_.find(key);
+  if (found != flights_.end() && found->second == flight) flights_.erase(found);
+}
+
+void SingleFlight::Shutdown() {
+  decltype(flights_) stopped;
+  {
+    const std::lock_guard lock(mutex_);
+    shut_down_ = true;
+    stopped.swap(flights_);
+  }
+  for (const auto& [key, flight] : stopped) flight->stop.request_stop();
+}
+
+std::size_t SingleFlight::in_flight() const {
+  const std::lock_guard lock(mutex_);
+  return flights_.size();
+}
+
+}  // namespace terrace::server

@@ -1,0 +1,72 @@
+// One build per key, however many ask at once.
+//
+// The first who asks for a key starts its flight: a job on the worker pool. Whoever asks while it is under way waits for
+// the same outcome. Outcomes, failures too, go to everybody who waits and are forgotten here; keeping the good ones is
+// the cache's work.
+//
+// A flight is told to stop when its last waiter leaves, at its deadline (that of the request that started it), or at
+// shutdown. A stopped flight takes no more passengers; the next request starts a new one.
+//
+// Thread-safe, with one condition: a coroutine that waits in Join runs on a strand (or on a single thread).
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <stop_token>
+#include <unordered_map>
+#include <utility>
+
+#include "engine/core/result.h"
+#include "server/asio.h"
+#include "server/tiles/tile_cache.h"
+#include "server/tiles/worker_pool.h"
+
+namespace terrace::server {
+
+class SingleFlight {
+ public:
+  using Clock = std::chrono::steady_clock;
+  using Build = std::function<Result<TilePtr>(std::stop_token)>;
+
+  struct Landing {
+    Landing(Result<TilePtr> t, bool j) : tile(std::move(t)), joined(j) {}
+
+    Result<TilePtr> tile;
+    bool joined;  // false: this call started the flight
+  };
+
+  // `pool` must outlive this, and must be shut down before this is destroyed: its jobs refer to it.
+  explicit SingleFlight(WorkerPool& pool) : pool_(pool) {}
+  SingleFlight(const SingleFlight&) = delete;
+  SingleFlight& operator=(const SingleFlight&) = delete;
+
+  // Waits for the flight of `key`, which runs `build` if it has to be started. `build` must not throw.
+  // kOverloaded: the pool's queue is full. kCancelled: `deadline` or the flight's own passed, or the awaiting coroutine
+  // was cancelled. kUnavailable: shutting down. Otherwise whatever `build` returned.
+  asio::awaitable<Landing> Join(CacheKey key, Build build, Clock::time_point deadline);
+
+  // Stops every flight and starts no more.
+  void Shutdown();
+
+  std::size_t in_flight() const;
+  std::uint64_t joined_total() const { return joined_total_.load(std::memory_order_relaxed); }
+
+ private:
+  struct Flight;
+  class Seat;
+
+  Result<std::shared_ptr<Flight>> Board(const CacheKey& key, Build build, Clock::time_point deadline, bool* joined);
+  void Fly(const CacheKey& key, const std::shared_ptr<Flight>& flight, const Build& build);
+  void Forget(const CacheKey& key, const std::shared_ptr<Flight>& flight);  // mutex_ is held
+
+  WorkerPool& pool_;
+  mutable std::mutex mutex_;
+  std::unordered_map<CacheKey, std::shared_ptr<Flight>, CacheKeyHash> flights_;  // those that take passengers
+  bool shut_down_ = false;
+  std::atomic<std::uint64_t> joined_total_{0};
+};
+
+}  // namespace terrace::server

@@ -1,0 +1,77 @@
+// Tiles for requests: from the cache, from a flight that is under way, or from a new build on the worker pool.
+//
+// Thread-safe. How a tile is built is a function, so that this room knows neither elevation models nor codecs.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <functional>
+#include <stop_token>
+
+#include "engine/core/result.h"
+#include "server/asio.h"
+#include "server/tiles/encoded_tile.h"
+#include "server/tiles/single_flight.h"
+#include "server/tiles/tile_cache.h"
+#include "server/tiles/tile_request.h"
+#include "server/tiles/worker_pool.h"
+
+namespace terrace::server {
+
+// Blocking; called on many threads at once. An exception counts as kUnavailable.
+using TileBuilder = std::function<Result<EncodedTile>(const TileRequest&, std::stop_token)>;
+
+// Told about every build on the thread that ran it.
+using BuildObserver = std::function<void(const TileRequest&, const Result<TilePtr>&)>;
+
+struct TileServiceOptions {
+  unsigned worker_threads = 0;       // 0: as many as the machine has processors
+  std::size_t queue_length = 256;    // builds that wait for a worker; one more is refused
+  std::size_t cache_bytes = std::size_t{256} << 20;  // 0: no cache
+};
+
+enum class CacheStatus { kHit, kMiss, kJoined };
+
+struct ServedTile {
+  ServedTile(TilePtr t, CacheStatus c) : tile(std::move(t)), cache(c) {}
+
+  TilePtr tile;
+  CacheStatus cache;
+};
+
+class TileService {
+ public:
+  using Clock = SingleFlight::Clock;
+
+  TileService(TileServiceOptions options, TileBuilder builder, BuildObserver observer = nullptr);
+  ~TileService();
+
+  // Errors: those of the builder, and kOverloaded, kCancelled, kUnavailable of SingleFlight::Join. The coroutine has to
+  // run on a strand. Only successes are kept.
+  asio::awaitable<Result<ServedTile>> Get(CacheKey key, Clock::time_point deadline);
+
+  // Makes every Get that waits for a build fail soon, and every later one at once; the cache keeps answering.
+  void CancelBuilds();
+
+  // CancelBuilds, then waits for the workers to end.
+  void Shutdown();
+
+  struct Stats {
+    std::uint64_t hits = 0, misses = 0, joined = 0;
+    std::size_t queued = 0, in_flight = 0;
+    TileCache::Stats cache;
+  };
+  Stats stats() const;
+
+ private:
+  Result<TilePtr> BuildAndKeep(const CacheKey& key, std::stop_token stop);
+
+  const TileBuilder builder_;
+  const BuildObserver observer_;
+  TileCache cache_;
+  WorkerPool pool_;
+  SingleFlight flights_;
+  std::atomic<std::uint64_t> hits_{0}, misses_{0};
+};
+
+}  // namespace terrace::server

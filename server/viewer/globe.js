@@ -1,0 +1,233 @@
+// The CesiumJS side of the page: the widget, the terrain in it, the camera, picking, and what is being drawn.
+import {
+  BoundingSphere, CameraEventType, Cartesian3, Cartographic, CesiumTerrainProvider, CesiumWidget, Color, HeadingPitchRange,
+  Math as CesiumMath, PointPrimitiveCollection, ScreenSpaceEventHandler, ScreenSpaceEventType,
+} from "/viewer/cesium/index.js";
+import { makeTerrainMaterial, niceInterval, setHeights } from "/viewer/material.js";
+
+const kMetresPerDegree = 111320;
+const kGlobalWidth = 100;  // a dataset wider than this, in degrees, is shown as a whole globe
+const kGlobalDistance = 1.75e7;  // metres from which the whole globe fits
+const kSoftware = /swiftshader|llvmpipe|software|basic render/i;  // drawn without a GPU: smooth edges cost too much there
+
+// Middle and size of [west, south, east, north], degrees; east < west means across the antimeridian.
+function boxOf([west, south, east, north]) {
+  const width = east >= west ? east - west : east - west + 360;
+  return { longitude: west + width / 2, latitude: (south + north) / 2, width, height: north - south };
+}
+
+function isGlobal(dataset) {
+  return boxOf(dataset.bounds).width > kGlobalWidth;
+}
+
+// Diagonal of the dataset, metres.
+function extent(dataset) {
+  const { latitude, width, height } = boxOf(dataset.bounds);
+  return Math.hypot(width * Math.cos(CesiumMath.toRadians(latitude)), height) * kMetresPerDegree;
+}
+
+// Metres between the camera and the middle of a dataset seen whole.
+function viewDistance(dataset) {
+  return isGlobal(dataset) ? kGlobalDistance : extent(dataset) * (0.62 + 0.2 * Math.min(1, extent(dataset) / 5e6));
+}
+
+// Pixels of error at which CesiumJS goes a level deeper. Continents get more tiles, for the sake of their colours.
+function pixelTolerance(dataset) {
+  return extent(dataset) > 1.5e6 ? 0.5 : 1.5;
+}
+
+// The share of the level error that makes a first view of the dataset good: half of it, and less where the relief is so
+// small beside the extent that the level error (pixelTolerance pixels of 1.6 mm at one metre) exceeds 1/40 of it.
+export function suggestedFraction(dataset) {
+  const visible = (dataset.heights.max - dataset.heights.min) / 40;
+  return Math.min(0.5, visible / (0.0016 * pixelTolerance(dataset) * viewDistance(dataset)));
+}
+
+export class Globe {
+  // `onError` gets a sentence for the reader of the page.
+  constructor(container, onError) {
+    const credits = document.createElement("div");  // the page states the attribution itself
+    this.widget = new CesiumWidget(container, {
+      baseLayer: false, creditContainer: credits, creditViewport: credits, showRenderLoopErrors: false,
+      requestRenderMode: true, maximumRenderTimeChange: Infinity, useBrowserRecommendedResolution: false,
+    });
+    this.widget.resolutionScale = Math.min(2, devicePixelRatio) / devicePixelRatio;
+    this.scene = this.widget.scene;
+    this.onError = onError;
+    this.contours = false;
+    this.interval = 0;
+    this.#dressScene();
+    this.marker = this.scene.primitives.add(new PointPrimitiveCollection());
+    this.scene.camera.percentageChanged = 0.05;
+    this.scene.camera.changed.addEventListener(() => this.adaptToCamera());
+    this.scene.renderError.addEventListener((_, error) => onError(`Drawing stopped: ${error.message ?? error}`));
+  }
+
+  #dressScene() {
+    const { globe, screenSpaceCameraController: controller } = this.scene;
+    this.scene.sun.show = false;
+    this.scene.moon.show = false;
+    this.scene.skyAtmosphere.atmosphereLightIntensity = 22;
+    this.scene.backgroundColor = Color.fromCssColorString("#05080d");
+    controller.tiltEventTypes.push(CameraEventType.RIGHT_DRAG);
+    controller.zoomEventTypes = controller.zoomEventTypes.filter((type) => type !== CameraEventType.RIGHT_DRAG);
+    globe.baseColor = Color.fromCssColorString("#1b232d");
+    globe.enableLighting = false;  // the material shades, and has its own haze
+    globe.showGroundAtmosphere = false;
+    this.scene.fog.renderable = false;
+    if (kSoftware.test(this.#renderer())) this.scene.msaaSamples = 1;
+    globe.showWaterEffect = false;
+    globe.material = this.material = makeTerrainMaterial();
+  }
+
+  #renderer() {
+    const gl = document.createElement("canvas").getContext("webgl2");
+    const names = gl?.getExtension("WEBGL_debug_renderer_info");
+    return names ? gl.getParameter(names.UNMASKED_RENDERER_WEBGL) : "";
+  }
+
+  // Shows `dataset` at `fraction` of the level error. Throws with a readable message if the server does not describe it.
+  async show(dataset, fraction) {
+    const url = `${dataset.urls.layer.replace(/layer\.json.*$/, "")}?fraction=${fraction}`;
+    const provider = await CesiumTerrainProvider.fromUrl(url, { requestVertexNormals: true });
+    // CesiumJS takes a missing layer.json for an ancient server of height maps.
+    if (!provider.availability) throw new Error(`${url} does not describe any terrain`);
+    provider.errorEvent.addEventListener((failure) => this.onError(failure.message));
+
+    this.#drawCurtain();
+    const { longitude, latitude, width, height } = boxOf(dataset.bounds);
+    const radians = CesiumMath.toRadians;
+    setHeights(this.material, dataset.heights);
+    this.material.uniforms.box = { x: radians(longitude), y: radians(latitude), z: radians(width / 2), w: radians(height / 2) };
+    this.material.uniforms.shading = provider.hasVertexNormals ? 1 : 0;
+    this.scene.globe.maximumScreenSpaceError = pixelTolerance(dataset);
+    this.widget.terrainProvider = provider;
+    this.adaptToCamera();
+  }
+
+  // The last picture stays in front until the new terrain is there or the camera moves.
+  #drawCurtain() {
+    const { canvas, globe, camera } = this.scene;
+    if (globe.terrainProvider.availability === undefined) return;
+    this.scene.render();
+    const curtain = Object.assign(document.createElement("canvas"), { className: "curtain", width: canvas.width, height: canvas.height });
+    curtain.getContext("2d").drawImage(canvas, 0, 0);
+    canvas.parentElement.append(curtain);
+    const stop = [];
+    const lift = () => {
+      stop.forEach((remove) => remove());
+      curtain.classList.add("lifted");
+      setTimeout(() => curtain.remove(), 400);
+    };
+    stop.push(globe.tileLoadProgressEvent.addEventListener((queued) => queued === 0 && lift()));
+    stop.push(camera.moveStart.addEventListener(lift));
+  }
+
+  // A regional dataset from the south-west, low enough to see its relief; a global one as a whole planet.
+  lookAt(dataset, seconds) {
+    const { camera } = this.scene;
+    const { longitude, latitude, width, height } = boxOf(dataset.bounds);
+    const narrow = Math.max(1, 0.8 * this.scene.canvas.clientHeight / this.scene.canvas.clientWidth);
+    if (isGlobal(dataset)) {
+      const destination = Cartesian3.fromDegrees(width > 350 ? 82 : longitude, width > 350 ? 18 : latitude, kGlobalDistance * narrow);
+      return seconds > 0 ? camera.flyTo({ destination, duration: seconds }) : camera.setView({ destination });
+    }
+    const size = extent(dataset);
+    const pitch = -28 - 45 * Math.min(1, size / 5e6);
+    const ground = Math.max(0, dataset.heights.min) * 0.6 + Math.max(0, dataset.heights.max) * 0.2;
+    const sphere = new BoundingSphere(Cartesian3.fromDegrees(longitude, latitude, ground), size / 2);
+    const offset = new HeadingPitchRange(CesiumMath.toRadians(32), CesiumMath.toRadians(pitch), viewDistance(dataset) * narrow);
+    camera.flyToBoundingSphere(sphere, { offset, duration: seconds });
+  }
+
+  get camera() {
+    const { camera } = this.scene;
+    const { longitude, latitude, height } = camera.positionCartographic;
+    const degrees = CesiumMath.toDegrees;
+    return [degrees(longitude), degrees(latitude), height, degrees(camera.heading), degrees(camera.pitch)];
+  }
+
+  set camera([longitude, latitude, height, heading, pitch]) {
+    const radians = CesiumMath.toRadians;
+    this.scene.camera.setView({
+      destination: Cartesian3.fromDegrees(longitude, latitude, height),
+      orientation: { heading: radians(heading), pitch: radians(pitch), roll: 0 },
+    });
+  }
+
+  get wireframe() {
+    return this.material.uniforms.wire === 1;
+  }
+
+  // CesiumJS offers lines only through its inspector's switch.
+  set wireframe(on) {
+    this.scene.globe._surface.tileProvider._debug.wireframe = on;
+    this.scene.globe.showSkirts = !on;
+    this.scene.skyAtmosphere.show = !on;  // it would shine through the mesh
+    this.material.uniforms.wire = on ? 1 : 0;
+    this.scene.requestRender();
+  }
+
+  get exaggeration() {
+    return this.scene.verticalExaggeration;
+  }
+
+  set exaggeration(factor) {
+    this.scene.verticalExaggeration = factor;
+    this.scene.requestRender();
+  }
+
+  // What follows the distance: contour interval, strength of the shading, roundness of the globe.
+  adaptToCamera() {
+    const { camera, canvas } = this.scene;
+    const { x, y, z } = camera.position;
+    const middle = camera.pickEllipsoid({ x: canvas.clientWidth / 2, y: canvas.clientHeight * 0.6 });
+    const distance = middle ? Cartesian3.distance(middle, { x, y, z }) : camera.positionCartographic.height * 3;
+    const { uniforms } = this.material;
+    this.interval = niceInterval(Math.max(1, Math.min(distance * 0.0022, 2000)));
+    uniforms.contourInterval = this.contours ? this.interval : 0;
+    uniforms.relief = CesiumMath.clamp(Math.pow(distance / 45000, 0.55), 1.15, 14);
+    uniforms.farness = CesiumMath.clamp((Math.log10(distance) - 6.2) / 0.8, 0, 1);
+    uniforms.hazeDistance = Math.max(150000, distance * 5);
+    uniforms.graticule = CesiumMath.toRadians(distance > 3e6 ? 10 : distance > 2e5 ? 1 : 0.1);
+    this.scene.requestRender();
+  }
+
+  // Calls back with {longitude, latitude, height} (degrees, metres above the ellipsoid) of the clicked ground, or undefined.
+  onPick(callback) {
+    const handler = new ScreenSpaceEventHandler(this.scene.canvas);
+    handler.setInputAction(({ position }) => callback(this.pick(position)), ScreenSpaceEventType.LEFT_CLICK);
+  }
+
+  pick(windowPosition) {
+    const ray = this.scene.camera.getPickRay(windowPosition);
+    const point = ray && this.scene.globe.pick(ray, this.scene);
+    this.marker.removeAll();
+    this.scene.requestRender();
+    if (!point) return undefined;
+    this.marker.add({ position: point, pixelSize: 9, color: Color.fromCssColorString("#f7e3b4"), outlineColor: Color.BLACK,
+                      outlineWidth: 2, disableDepthTestDistance: 5e6 });
+    const ground = Cartographic.fromCartesian(point);
+    return { longitude: CesiumMath.toDegrees(ground.longitude), latitude: CesiumMath.toDegrees(ground.latitude),
+             height: ground.height / this.exaggeration };
+  }
+
+  get loading() {
+    return !this.scene.globe.tilesLoaded;
+  }
+
+  // What is in the current picture, skirts not counted. `keys` are the tiles' "z/x/y", y from the south.
+  drawn() {
+    const sum = { tiles: 0, triangles: 0, vertices: 0, deepest: 0, keys: [] };
+    for (const tile of this.scene.globe._surface._tilesToRender) {
+      const mesh = tile.data?.renderedMesh;
+      if (!mesh) continue;
+      sum.tiles += 1;
+      sum.triangles += mesh.indexCountWithoutSkirts / 3;
+      sum.vertices += mesh.vertexCountWithoutSkirts;
+      sum.keys.push(`${tile.level}/${tile.x}/${2 ** tile.level - 1 - tile.y}`);
+      sum.deepest = Math.max(sum.deepest, tile.level);
+    }
+    return sum;
+  }
+}

@@ -1,0 +1,172 @@
+// The look of the terrain: one globe material that colours by height, shades by the tiles' vertex normals and draws contour
+// lines. The light stands in the local north-west of every point, as on a printed map: no hemisphere is ever dark.
+import { Material } from "/viewer/cesium/index.js";
+
+// Depth and height as fractions of what the dataset has, and sRGB. Land is stretched towards low ground, where most of it lies.
+const kSea = [
+  [0.0, 5, 16, 48], [0.25, 10, 44, 98], [0.5, 20, 78, 138], [0.75, 38, 112, 168], [0.93, 78, 154, 196], [1.0, 136, 196, 212],
+];
+const kLand = [
+  [0.0, 74, 122, 84], [0.07, 98, 144, 88], [0.16, 146, 166, 98], [0.28, 200, 184, 118], [0.42, 198, 154, 94],
+  [0.56, 166, 116, 74], [0.7, 134, 96, 76], [0.82, 158, 142, 136], [0.92, 222, 219, 217], [1.0, 255, 255, 255],
+];
+// A lowest height above this is taken for land below the ellipsoid, not for a sea floor.
+const kShallowestSeaFloor = -200;
+// Datasets of land alone store the sea as a plain: low and level ground below this share of the heights is drawn as water,
+// if the dataset comes down to the sea at all.
+const kWaterShare = 0.025;
+const kHighestSea = 50;
+const kLeastRelief = 300;
+
+function colourAt(stops, t) {
+  const next = Math.max(1, stops.findIndex((stop) => stop[0] >= t));
+  const [t0, ...a] = stops[next - 1];
+  const [t1, ...b] = stops[next];
+  const s = Math.min(1, Math.max(0, (t - t0) / (t1 - t0)));
+  return a.map((channel, i) => Math.round(channel + s * (b[i] - channel)));
+}
+
+// sRGB colour of a height in a dataset whose heights run from `min` to `max`, metres.
+export function heightColour(height, { min, max }) {
+  if (min > kShallowestSeaFloor) return colourAt(kLand, (height - min) / (max - min));
+  return height < 0 ? colourAt(kSea, 1 - height / min) : colourAt(kLand, Math.pow(height / Math.max(max, 1), 0.8));
+}
+
+function waterline({ min, max }) {
+  const coastal = min > kShallowestSeaFloor && min < kHighestSea && max - min > kLeastRelief;
+  return coastal ? min + kWaterShare * (max - min) : -1e5;
+}
+
+// A one-pixel-high strip of the ramp, min on the left.
+export function drawRamp(canvas, heights) {
+  const pixels = canvas.getContext("2d").createImageData(canvas.width, 1);
+  for (let x = 0; x < canvas.width; ++x) {
+    const height = heights.min + (x / (canvas.width - 1)) * (heights.max - heights.min);
+    pixels.data.set([...heightColour(height, heights), 255], 4 * x);
+  }
+  canvas.getContext("2d").putImageData(pixels, 0, 0);
+  return canvas;
+}
+
+const kRampWidth = 2048;
+
+const kSource = /* glsl */ `
+const vec3 kRadii = vec3(6378137.0, 6378137.0, 6356752.314245);
+const vec3 kShadow = vec3(0.30, 0.33, 0.46);
+const vec3 kSunlight = vec3(1.0, 0.97, 0.90);
+const vec3 kAir = vec3(0.45, 0.62, 0.82);
+const vec3 kWater = vec3(0.20, 0.45, 0.62);
+const vec3 kElsewhere = vec3(0.105, 0.135, 0.175);
+
+// 1 on a line, 0 between lines; value is in units of the spacing. Fades where lines would be denser than every fourth pixel,
+// and on level ground, where all of it would be line.
+float lines(float value, float widthPixels) {
+  float perPixel = max(fwidth(value), 1e-7);
+  float distancePixels = abs(fract(value - 0.5) - 0.5) / perPixel;
+  return (1.0 - smoothstep(widthPixels * 0.5, widthPixels * 0.5 + 1.0, distancePixels)) * (1.0 - smoothstep(0.12, 0.3, perPixel))
+      * smoothstep(0.0, 0.002, perPixel);
+}
+
+// Brightness of a surface relative to level ground, lit from compass direction (x east, y north) at 40 degrees of altitude.
+float lit(vec3 normalENU, vec2 towards) {
+  return max(0.0, dot(normalENU, vec3(towards * 0.766, 0.643))) / 0.643;
+}
+
+czm_material czm_getMaterial(czm_materialInput materialInput) {
+  czm_material material = czm_getDefaultMaterial(materialInput);
+  float metres = materialInput.height;
+  vec3 positionWC = (czm_inverseView * vec4(-materialInput.positionToEyeEC, 1.0)).xyz;
+  vec3 up = normalize(positionWC / kRadii / kRadii * 1e7);
+  vec3 east = normalize(vec3(-up.y, up.x, 0.0) + vec3(0.0, 1e-6, 0.0));
+  vec3 north = cross(up, east);
+
+  float across = clamp((metres - heightRange.x) / (heightRange.y - heightRange.x), 0.0, 1.0);
+  vec3 colour = texture(ramp, vec2(mix(0.5, ${kRampWidth}.0 - 0.5, across) / ${kRampWidth}.0, 0.5)).rgb;
+
+  vec3 normalWC = czm_inverseNormal3D * materialInput.normalEC;
+  vec3 normal = vec3(dot(normalWC, east), dot(normalWC, north), dot(normalWC, up));
+  float steepness = 1.0 - clamp(normal.z, 0.0, 1.0);
+  // The triangle's own slope: an 8-bit normal cannot tell a sea from a plain.
+  float slope = fwidth(metres) / max(length(dFdx(materialInput.positionToEyeEC)) + length(dFdy(materialInput.positionToEyeEC)), 1e-6);
+  float level = 1.0 - smoothstep(0.0003, 0.0015, slope);
+  colour = mix(colour, kWater, level * (1.0 - smoothstep(0.7, 1.0, (metres - heightRange.x) / max(water - heightRange.x, 1e-3))));
+  normal = normalize(vec3(normal.xy * relief, max(normal.z, 0.02)));
+
+  // Bare rock where it is too steep for soil or snow.
+  float luminance = dot(colour, vec3(0.299, 0.587, 0.114));
+  colour = mix(colour, vec3(0.46, 0.42, 0.39) * (0.5 + luminance), smoothstep(0.18, 0.5, steepness) * 0.55);
+
+  // Most of the light from the north-west, some from its two neighbours so that ridges along it keep their form.
+  float light = 0.7 * lit(normal, vec2(-0.707, 0.707)) + 0.15 * lit(normal, vec2(-1.0, 0.0)) + 0.15 * lit(normal, vec2(0.0, 1.0));
+  vec3 shade = mix(kShadow, vec3(1.0), smoothstep(-0.15, 1.05, light)) + kSunlight * 0.28 * max(0.0, light - 1.0);
+  shade = mix(vec3(1.0), shade, shading);
+  colour *= shade;
+
+  if (contourInterval > 0.0) {
+    float fine = lines(metres / contourInterval, 0.6);
+    float index = lines(metres / (5.0 * contourInterval), 1.3);
+    colour = mix(colour, colour * 0.35, max(fine * 0.55, index * 0.85));
+  }
+
+  // Around a regional dataset: slate with a faint graticule.
+  float longitude = atan(up.y, up.x);
+  float latitude = asin(clamp(up.z, -1.0, 1.0));
+  vec2 offset = vec2(longitude - box.x, latitude - box.y);
+  offset.x -= czm_twoPi * floor(offset.x / czm_twoPi + 0.5);
+  vec2 beyond = abs(offset) - box.zw;
+  float outside = smoothstep(0.0, 0.012 * (box.z + box.w), max(beyond.x, beyond.y));
+  float grid = max(lines(longitude / graticule, 0.6), lines(latitude / graticule, 0.6));
+  colour = mix(colour, (kElsewhere + 0.06 * grid) * mix(vec3(1.0), shade, 0.6), outside * (1.0 - wire));
+
+  // From afar the globe is round: lit over the viewer's left shoulder, with a thin bright rim of air. Near the ground the
+  // air is between the viewer and the distance.
+  vec3 toEye = normalize(czm_viewerPositionWC - positionWC);
+  vec3 overShoulder = normalize(czm_inverseViewRotation * vec3(-0.5, 0.5, 0.8));
+  colour *= mix(1.0, 0.42 + 0.72 * max(0.0, dot(up, overShoulder)), farness * (1.0 - wire));
+  float rim = pow(1.0 - clamp(dot(up, toEye), 0.0, 1.0), 4.0) * farness;
+  float haze = (1.0 - exp(-pow(length(materialInput.positionToEyeEC) / hazeDistance, 2.0))) * (1.0 - farness);
+  colour = mix(colour, kAir, max(rim * 0.8, haze * 0.75) * (1.0 - wire));
+
+  material.diffuse = mix(colour, min(vec3(1.0), colour * 1.1 + 0.06), wire);
+  material.alpha = 1.0;
+  return material;
+}`;
+
+export function makeTerrainMaterial() {
+  return new Material({
+    translucent: false,
+    fabric: {
+      type: "TerraceTerrain",
+      uniforms: {
+        ramp: document.createElement("canvas"),
+        heightRange: { x: 0, y: 1 },  // metres
+        water: -1e5,  // metres below which level ground is water
+        contourInterval: 0,  // metres; 0 draws none
+        relief: 1,           // exaggerates slopes for shading
+        shading: 1,          // 0 where the tiles have no normals
+        box: { x: 0, y: 0, z: 4, w: 4 },  // longitude and latitude of the middle, half width and height, radians
+        graticule: 0.1745,   // radians between lines
+        farness: 0,          // 0 near the ground, 1 with the whole globe in view
+        hazeDistance: 1e6,   // metres at which air hides most of the ground
+        wire: 0,             // 1 while the surface is drawn as lines
+      },
+      source: kSource,
+    },
+  });
+}
+
+export function setHeights(material, heights) {
+  const canvas = document.createElement("canvas");
+  canvas.width = kRampWidth;
+  canvas.height = 1;
+  material.uniforms.ramp = drawRamp(canvas, heights);
+  material.uniforms.water = waterline(heights);
+  material.uniforms.heightRange = { x: heights.min, y: Math.max(heights.max, heights.min + 1) };
+}
+
+// 1, 2 or 5 times a power of ten.
+export function niceInterval(metres) {
+  const power = 10 ** Math.floor(Math.log10(metres));
+  const lead = metres / power;
+  return (lead < 1.5 ? 1 : lead < 3.5 ? 2 : lead < 7.5 ? 5 : 10) * power;
+}

@@ -1,0 +1,52 @@
+// What the tiles cost, read from the browser's own resource timing: bytes, cache hits, and the server's time by phase.
+import { Resource } from "/viewer/cesium/index.js";
+
+export const kPhases = ["read", "refine", "encode", "compress"];
+
+export class Traffic {
+  constructor() {
+    this.reset();
+    new PerformanceObserver((list) => list.getEntries().forEach((entry) => this.#add(entry))).observe({ type: "resource" });
+    this.#watchErrorHeader();
+  }
+
+  reset() {
+    Object.assign(this, { since: performance.now(), tiles: 0, bytes: 0, hits: 0, answers: 0, computed: 0 });
+    this.errors = new Map();  // metres, by "z/x/y"
+    this.milliseconds = Object.fromEntries(kPhases.map((phase) => [phase, 0]));
+  }
+
+  #add(entry) {
+    if (!/\.terrain(\?|$)/.test(entry.name) || entry.startTime < this.since) return;
+    this.tiles += 1;
+    this.bytes += entry.transferSize || 0;  // 0 for what came from the browser's cache
+    const timing = new Map((entry.serverTiming ?? []).map((metric) => [metric.name, metric]));
+    const cache = timing.get("cache")?.description;
+    if (!cache || entry.transferSize === 0) return;
+    this.answers += 1;
+    if (cache === "hit") this.hits += 1;
+    if (!kPhases.some((phase) => timing.has(phase))) return;
+    this.computed += 1;
+    for (const phase of kPhases) this.milliseconds[phase] += timing.get(phase)?.duration ?? 0;
+  }
+
+  // The largest Terrain-Max-Error among these tiles, metres; undefined if none stated one.
+  worstError(keys) {
+    const errors = keys.filter((key) => this.errors.has(key)).map((key) => this.errors.get(key));
+    return errors.length > 0 ? Math.max(...errors) : undefined;
+  }
+
+  // Response headers are not part of resource timing; the request that CesiumJS makes is the only place to see them.
+  #watchErrorHeader() {
+    const load = Resource._Implementations.loadWithXhr;
+    Resource._Implementations.loadWithXhr = (url, ...rest) => {
+      const request = load(url, ...rest);
+      request?.addEventListener?.("load", () => {
+        const error = Number.parseFloat(request.getResponseHeader("Terrain-Max-Error"));
+        const tile = /(\d+\/\d+\/\d+)\.terrain/.exec(url);
+        if (error >= 0 && tile) this.errors.set(tile[1], error);
+      });
+      return request;
+    };
+  }
+}

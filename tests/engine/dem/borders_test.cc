@@ -1,0 +1,104 @@
+// The same global node has the same bits in every tile.
+#include <bit>
+#include <cstdint>
+
+#include "tests/engine/dem/dem_fixture.h"
+
+namespace terrace::dem {
+namespace {
+
+std::uint32_t Bits(float value) { return std::bit_cast<std::uint32_t>(value); }
+
+// Compares the three rows or columns that a tile shares with its eastern and its northern neighbour.
+void ExpectSameBorders(const DemSource& source, const geo::TileKey& key) {
+  const auto tile = source.Read(key);
+  ASSERT_TRUE(tile) << tile.error().message;
+  const int n = tile->lattice.cells;
+  const auto east = source.Read(geo::Neighbour(key, 1, 0));
+  ASSERT_TRUE(east) << east.error().message;
+  int different = 0;
+  for (int j = -1; j <= n + 1; ++j) {
+    for (int i = -1; i <= 1; ++i) different += Bits(tile->At(n + i, j)) != Bits(east->At(i, j));
+  }
+  EXPECT_EQ(different, 0) << "east of " << geo::ToString(key);
+  const geo::TileKey above = geo::Neighbour(key, 0, 1);
+  if (!geo::IsValid(above)) return;
+  const auto north = source.Read(above);
+  ASSERT_TRUE(north) << north.error().message;
+  different = 0;
+  for (int i = -1; i <= n + 1; ++i) {
+    for (int j = -1; j <= 1; ++j) different += Bits(tile->At(i, n + j)) != Bits(north->At(i, j));
+  }
+  EXPECT_EQ(different, 0) << "north of " << geo::ToString(key);
+}
+
+TEST(Borders, AreBitEqualForEveryKindOfCrs) {
+  for (const std::string& name : RealRasters()) {
+    SCOPED_TRACE(name);
+    TERRACE_REQUIRE_DATA(path, name);
+    const auto source = OpenOrFail(path);
+    ASSERT_NE(source, nullptr);
+    for (int level = 0; level <= source->max_level(); ++level) {
+      for (const geo::TileKey& key : SomeTiles(*source, level, level < 4 ? 2 : 3)) ExpectSameBorders(*source, key);
+    }
+  }
+}
+
+TEST(Borders, AreBitEqualAcrossTheAntimeridian) {
+  for (const std::string name : {"antimeridian_hawaii_topobathy_5min.tif", "etopo5_global_10min.tif",
+                                 "etopo1_global_1deg_float32.tif", "pole_antarctica_bedmap_5km.tif"}) {
+    SCOPED_TRACE(name);
+    TERRACE_REQUIRE_DATA(path, name);
+    const auto source = OpenOrFail(path);
+    ASSERT_NE(source, nullptr);
+    for (int level = 0; level <= source->max_level(); ++level) {
+      for (const std::int64_t eighth : {0, 1, 4, 5}) {
+        ExpectSameBorders(*source, {level, geo::TileColumns(level) - 1, geo::TileRows(level) * eighth / 8});
+      }
+    }
+  }
+}
+
+TEST(Borders, AreBitEqualInRotatedAndInternationalDatums) {
+  const TempDir dir;
+  RasterSpec spec{.width = 200, .height = 150, .geo_transform = {7, .002, .0004, 47, .0003, -.0015}};
+  spec.value = [](int col, int row) { return col * 1.25 + row * row * 0.03; };
+  RasterSpec old_datum = spec;
+  old_datum.crs = "EPSG:4230";
+  old_datum.geo_transform = {7, .002, 0, 47, 0, -.0015};
+  RasterSpec antimeridian = old_datum;
+  antimeridian.crs = "EPSG:4322";
+  antimeridian.geo_transform = {179.8, .002, 0, 47, 0, -.0015};
+  int index = 0;
+  for (const RasterSpec& each : {spec, old_datum, antimeridian}) {
+    SCOPED_TRACE(index);
+    const auto source = OpenOrFail(WriteRaster(dir, each, std::to_string(index++) + ".tif"));
+    ASSERT_NE(source, nullptr);
+    for (int level = 0; level <= source->max_level(); ++level) {
+      for (const geo::TileKey& key : SomeTiles(*source, level, 3)) ExpectSameBorders(*source, key);
+    }
+  }
+}
+
+TEST(Borders, PoleRowsAreOneValue) {
+  for (const std::string name :
+       {"etopo5_global_10min.tif", "etopo1_global_1deg_float32.tif", "pole_antarctica_bedmap_5km.tif"}) {
+    SCOPED_TRACE(name);
+    TERRACE_REQUIRE_DATA(path, name);
+    const auto source = OpenOrFail(path);
+    ASSERT_NE(source, nullptr);
+    for (int level = 0; level <= source->max_level(); ++level) {
+      const auto first = source->Read({level, 0, 0});
+      const auto other = source->Read({level, geo::TileColumns(level) / 2 + 1 - (level == 0), 0});
+      ASSERT_TRUE(first && other);
+      EXPECT_NE(first->At(0, 0), source->info().floor) << level;
+      for (int i = -1; i <= first->lattice.cells + 1; ++i) {
+        ASSERT_EQ(Bits(first->At(i, 0)), Bits(first->At(0, 0)));
+        ASSERT_EQ(Bits(other->At(i, 0)), Bits(first->At(0, 0)));
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace terrace::dem

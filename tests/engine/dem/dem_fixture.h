@@ -1,0 +1,66 @@
+// Rasters for the tests: real ones from the folder TERRACE_TEST_DATA, small ones written on the spot.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "engine/dem/dem_source.h"
+
+namespace terrace::dem {
+
+// A folder that goes with the object.
+class TempDir {
+ public:
+  TempDir();
+  ~TempDir();
+  TempDir(const TempDir&) = delete;
+  TempDir& operator=(const TempDir&) = delete;
+  std::string File(const std::string& name) const { return (path_ / name).string(); }
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+struct RasterSpec {
+  int width = 16, height = 16;
+  std::string type = "Float32";
+  std::array<double, 6> geo_transform = {0, 1, 0, 0, 0, -1};
+  bool georeferenced = true;
+  std::string crs = "EPSG:4326";  // empty: none
+  std::optional<double> nodata = {};
+  std::string unit = {};
+  double scale = 1, offset = 0;
+  std::vector<int> overviews = {};
+  // Raw value of column and row.
+  std::function<double(int, int)> value = [](int, int) { return 0.0; };
+};
+
+// Writes a GeoTIFF and returns its path.
+std::string WriteRaster(const TempDir& dir, const RasterSpec& spec, const std::string& name = "dem.tif");
+
+// A file of the test data folder; nothing, and a loud note, when it is not there.
+std::optional<std::string> TestDataFile(const std::string& name);
+
+// Opens or fails the test; null then.
+std::unique_ptr<DemSource> OpenOrFail(const std::string& path, const DemOptions& options = {});
+
+// Tiles across the available ranges of a level, at most about `count`.
+std::vector<geo::TileKey> SomeTiles(const DemSource& source, int level, int count);
+
+// One real raster of every CRS kind, by file name.
+std::vector<std::string> RealRasters();
+
+}  // namespace terrace::dem
+
+#define TERRACE_REQUIRE_DATA(variable, name)                                                                    \
+  const std::optional<std::string> variable##_found = ::terrace::dem::TestDataFile(name);                       \
+  if (!variable##_found) GTEST_SKIP() << "SKIPPED, test data missing: " << (name) << "; set TERRACE_TEST_DATA"; \
+  const std::string& variable = *variable##_found

@@ -1,0 +1,160 @@
+// What Open finds out, and what Read promises on real rasters.
+#include "engine/dem/dem_source.h"
+
+#include <cmath>
+#include <future>
+#include <map>
+
+#include "tests/engine/dem/dem_fixture.h"
+
+namespace terrace::dem {
+namespace {
+
+TEST(DemSource, DepthFollowsTheSpacing) {
+  const std::map<std::string, int> depths = {
+      {"srtm3_N46E008_swiss_alps.tif", 13}, {"srtm3_S33W071_andes.tif", 13},
+      {"bigtujunga_30m_utm11.tif", 14},     {"webmercator_sf_float32.tif", 17},
+      {"lidar_slovenia_1m_nodata.tif", 19}, {"lidar_greenriver_1m.tif", 19},
+      {"etopo5_global_10min.tif", 5},       {"antimeridian_hawaii_topobathy_5min.tif", 6}};
+  for (const auto& [name, depth] : depths) {
+    TERRACE_REQUIRE_DATA(path, name);
+    const auto source = OpenOrFail(path);
+    ASSERT_NE(source, nullptr);
+    EXPECT_EQ(source->max_level(), depth) << name << ", spacing " << source->info().spacing_m;
+  }
+}
+
+TEST(DemSource, FinestErrorSetsTheDepth) {
+  const TempDir dir;
+  const std::string path = WriteRaster(dir, {.geo_transform = {7, .01, 0, 47, 0, -.01}});
+  EXPECT_EQ(OpenOrFail(path, {.finest_error = 1000})->max_level(), 6);
+  EXPECT_EQ(OpenOrFail(path, {.finest_error = 1e-9})->max_level(), geo::kMaxLevel);
+  EXPECT_EQ(OpenOrFail(path, {.error_fraction = 1, .finest_error = 1000})->max_level(), 7);
+}
+
+TEST(DemSource, LatticeIsTheCoarsestThatIsAsFineAsTheSource) {
+  TERRACE_REQUIRE_DATA(path, "srtm3_S33W071_andes.tif");
+  const auto source = OpenOrFail(path);
+  ASSERT_NE(source, nullptr);
+  EXPECT_EQ(source->LatticeOf(0).cells, 256);
+  EXPECT_EQ(source->LatticeOf(10).cells, 256);  // 2.47", the level above has 4.9"
+  EXPECT_EQ(source->LatticeOf(11).cells, 128);
+  EXPECT_EQ(source->LatticeOf(13).cells, 32);
+}
+
+TEST(DemSource, InfoTellsWhatTheFileSays) {
+  TERRACE_REQUIRE_DATA(path, "bigtujunga_30m_utm11.tif");
+  const auto source = OpenOrFail(path);
+  ASSERT_NE(source, nullptr);
+  const DemInfo& info = source->info();
+  EXPECT_EQ(info.driver, "GTiff");
+  EXPECT_EQ(info.width, 1197);
+  EXPECT_EQ(info.height, 643);
+  EXPECT_EQ(info.data_type, "Int16");
+  EXPECT_EQ(info.crs, "WGS 84 / UTM zone 11N (EPSG:32611)");
+  EXPECT_EQ(info.vertical_datum, "");
+  EXPECT_EQ(info.pixel_width, 30);
+  EXPECT_EQ(info.pixel_unit, "metre");
+  EXPECT_EQ(info.heights.min, 315);
+  EXPECT_EQ(info.heights.max, 2295);
+  EXPECT_EQ(info.floor, 315);
+  EXPECT_EQ(info.void_samples, 0u);
+  EXPECT_EQ(info.valid_samples, 1197u * 643u);
+  EXPECT_EQ(info.nodata, 32767);
+  EXPECT_NEAR(info.spacing_m, 30, .02);
+  EXPECT_NEAR(info.bounds.west, -118.3457, 1e-3);
+  EXPECT_NEAR(info.bounds.north, 34.4090, 1e-3);
+  EXPECT_FALSE(info.transform.empty());
+}
+
+TEST(DemSource, CompoundCrsStatesItsVerticalDatum) {
+  const TempDir dir;
+  const auto source =
+      OpenOrFail(WriteRaster(dir, {.geo_transform = {500000, 30, 0, 5000000, 0, -30}, .crs = "EPSG:32611+5773"}));
+  ASSERT_NE(source, nullptr);
+  EXPECT_EQ(source->info().vertical_datum, "EGM96 geoid");
+  EXPECT_NE(source->info().crs.find("UTM zone 11N"), std::string::npos);
+}
+
+TEST(DemSource, VoidsNeverAppearAsHeights) {
+  for (const std::string name : {"srtm3_N46E008_swiss_alps.tif", "lidar_slovenia_1m_nodata.tif",
+                                 "srtm1_N48W125_cape_flattery_half_void.tif", "pole_antarctica_bedmap_5km.tif"}) {
+    SCOPED_TRACE(name);
+    TERRACE_REQUIRE_DATA(path, name);
+    const auto source = OpenOrFail(path);
+    ASSERT_NE(source, nullptr);
+    ASSERT_GT(source->info().void_samples, 0u);
+    const auto [low, high] = source->info().heights;
+    for (int level = 0; level <= source->max_level(); ++level) {
+      for (const geo::TileKey& key : SomeTiles(*source, level, 4)) {
+        const auto tile = source->Read(key);
+        ASSERT_TRUE(tile) << tile.error().message;
+        for (const float height : tile->heights) {
+          ASSERT_TRUE(height >= low - 0.001 && height <= high + 0.001) << height << " in " << geo::ToString(key);
+          ASSERT_EQ(height * 1024, std::round(height * 1024)) << "not a multiple of 2^-10 m";
+        }
+      }
+    }
+  }
+}
+
+TEST(DemSource, ThreadsReadWhatOneThreadReads) {
+  TERRACE_REQUIRE_DATA(path, "bigtujunga_30m_utm11.tif");
+  const auto source = OpenOrFail(path);
+  ASSERT_NE(source, nullptr);
+  const std::vector<geo::TileKey> keys = SomeTiles(*source, 13, 40);
+  const auto read_all = [&] {
+    std::vector<std::vector<float>> tiles;
+    for (const geo::TileKey& key : keys) tiles.push_back(source->Read(key).value().heights);
+    return tiles;
+  };
+  const auto serial = read_all();
+  std::vector<std::future<std::vector<std::vector<float>>>> threads;
+  for (int i = 0; i < 4; ++i) threads.push_back(std::async(std::launch::async, read_all));
+  for (auto& thread : threads) EXPECT_EQ(thread.get(), serial);
+}
+
+TEST(DemSource, StopsWhenAsked) {
+  const TempDir dir;
+  const auto source = OpenOrFail(WriteRaster(dir, {}));
+  ASSERT_NE(source, nullptr);
+  std::stop_source stop;
+  stop.request_stop();
+  const auto tile = source->Read({0, 1, 0}, stop.get_token());
+  ASSERT_FALSE(tile);
+  EXPECT_EQ(tile.error().code, ErrorCode::kCancelled);
+}
+
+TEST(DemSource, ReportsProgressToTheEnd) {
+  const TempDir dir;
+  double last = 0;
+  DemOptions options;
+  options.progress = [&](double done) {
+    EXPECT_GE(done, last);
+    last = done;
+  };
+  OpenOrFail(WriteRaster(dir, {.width = 300, .height = 700, .geo_transform = {7, .01, 0, 47, 0, -.01}}), options);
+  EXPECT_EQ(last, 1);
+}
+
+TEST(DemSource, FingerprintFollowsFileAndOptions) {
+  const TempDir dir;
+  const std::string path = WriteRaster(dir, {});
+  const std::uint64_t before = OpenOrFail(path)->fingerprint();
+  EXPECT_EQ(OpenOrFail(path)->fingerprint(), before);
+  EXPECT_NE(OpenOrFail(path, {.floor = 7})->fingerprint(), before);
+  EXPECT_NE(OpenOrFail(path, {.max_void_gap = 3})->fingerprint(), before);
+  std::filesystem::last_write_time(path, std::filesystem::last_write_time(path) + std::chrono::seconds(2));
+  EXPECT_NE(OpenOrFail(path)->fingerprint(), before);
+}
+
+TEST(DemSource, LeavesNoFilesBesideTheSource) {
+  const TempDir dir;
+  const auto source = OpenOrFail(WriteRaster(dir, {}));
+  ASSERT_TRUE(source->Read({3, 8, 3}));
+  const std::filesystem::directory_iterator files(dir.path());
+  EXPECT_EQ(std::distance(begin(files), end(files)), 1);
+}
+
+}  // namespace
+}  // namespace terrace::dem

@@ -1,0 +1,94 @@
+#include <algorithm>
+
+#include "tests/engine/dem/dem_fixture.h"
+
+namespace terrace::dem {
+namespace {
+
+// Laws of availability: both roots; every ancestor of an available tile; no overlaps.
+void ExpectLawful(const DemSource& source) {
+  EXPECT_TRUE(source.IsAvailable({0, 0, 0}) && source.IsAvailable({0, 1, 0}));
+  EXPECT_TRUE(source.Available(source.max_level() + 1).empty());
+  for (int level = 1; level <= source.max_level(); ++level) {
+    for (const geo::TileRange& range : source.Available(level)) {
+      for (const geo::TileKey& corner :
+           {geo::TileKey{level, range.start_x, range.start_y}, {level, range.end_x, range.end_y}}) {
+        EXPECT_TRUE(geo::IsValid(corner));
+        EXPECT_TRUE(source.IsAvailable({level - 1, corner.x / 2, corner.y / 2}));
+        EXPECT_EQ(std::ranges::count_if(source.Available(level), [&](const auto& r) { return r.Contains(corner); }), 1);
+      }
+    }
+  }
+}
+
+TEST(Footprint, IsLawfulForEveryKindOfCrs) {
+  for (const std::string& name : RealRasters()) {
+    SCOPED_TRACE(name);
+    TERRACE_REQUIRE_DATA(path, name);
+    const auto source = OpenOrFail(path);
+    ASSERT_NE(source, nullptr);
+    ExpectLawful(*source);
+  }
+}
+
+TEST(Footprint, CrossesTheAntimeridianInTwoRanges) {
+  TERRACE_REQUIRE_DATA(path, "antimeridian_hawaii_topobathy_5min.tif");
+  const auto source = OpenOrFail(path);
+  ASSERT_NE(source, nullptr);
+  const GeoBounds bounds = source->info().bounds;
+  EXPECT_NEAR(bounds.west, 159.7917, 1e-3);
+  EXPECT_NEAR(bounds.east, -139.7917, 1e-3);
+  // Level 4: tiles of 11.25 degrees.
+  EXPECT_EQ(source->Available(4), (std::vector<geo::TileRange>{{0, 8, 3, 12}, {30, 8, 31, 12}}));
+}
+
+TEST(Footprint, OfAGlobalSourceIsTheWholeEarth) {
+  for (const std::string name : {"etopo5_global_10min.tif", "etopo1_global_1deg_float32.tif"}) {
+    TERRACE_REQUIRE_DATA(path, name);
+    const auto source = OpenOrFail(path);
+    ASSERT_NE(source, nullptr);
+    for (int level = 0; level <= source->max_level(); ++level) {
+      const geo::TileRange whole{0, 0, geo::TileColumns(level) - 1, geo::TileRows(level) - 1};
+      EXPECT_EQ(source->Available(level), std::vector<geo::TileRange>{whole}) << name << " " << level;
+    }
+    EXPECT_EQ(source->info().bounds.west, -180);
+    EXPECT_EQ(source->info().bounds.east, 180);
+    EXPECT_EQ(source->info().bounds.north, 90);
+  }
+}
+
+TEST(Footprint, AroundAPoleHasAllLongitudes) {
+  TERRACE_REQUIRE_DATA(path, "pole_antarctica_bedmap_5km.tif");
+  const auto source = OpenOrFail(path);
+  ASSERT_NE(source, nullptr);
+  const GeoBounds bounds = source->info().bounds;
+  EXPECT_EQ(bounds.south, -90);
+  EXPECT_EQ(bounds.west, -180);
+  EXPECT_EQ(bounds.east, 180);
+  EXPECT_NEAR(bounds.north, -48.46, .02);
+  EXPECT_EQ(source->Available(4), (std::vector<geo::TileRange>{{0, 0, 31, 3}}));
+}
+
+TEST(Footprint, ReachesWhereverReadFindsHeights) {
+  for (const std::string name :
+       {"bigtujunga_30m_utm11.tif", "greenland_80N_100m_custom_tm.tif", "lidar_slovenia_1m_nodata.tif"}) {
+    SCOPED_TRACE(name);
+    TERRACE_REQUIRE_DATA(path, name);
+    const auto source = OpenOrFail(path, {.floor = -1000});
+    ASSERT_NE(source, nullptr);
+    const int level = source->max_level() - 3;
+    const geo::TileRange range = source->Available(level).front();
+    for (std::int64_t x = range.start_x - 1; x <= range.end_x + 1; ++x) {
+      for (const std::int64_t y : {range.start_y - 1, range.end_y + 1}) {
+        const auto tile = source->Read({level, x, y});
+        ASSERT_TRUE(tile);
+        for (int j = 1; j < tile->lattice.cells; ++j) {
+          for (int i = 1; i < tile->lattice.cells; ++i) ASSERT_EQ(tile->At(i, j), -1000) << x << " " << y;
+        }
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace terrace::dem

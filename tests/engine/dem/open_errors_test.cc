@@ -1,0 +1,85 @@
+// Every bad input is refused with a message that names the file and the remedy.
+#include <gdal_priv.h>
+
+#include <fstream>
+
+#include "tests/engine/dem/dem_fixture.h"
+
+namespace terrace::dem {
+namespace {
+
+void ExpectRefused(const std::string& path, const std::vector<std::string>& parts, const DemOptions& options = {}) {
+  const auto source = DemSource::Open(path, options);
+  ASSERT_FALSE(source) << path;
+  EXPECT_NE(source.error().message.find(path), std::string::npos) << source.error().message;
+  for (const std::string& part : parts) {
+    EXPECT_NE(source.error().message.find(part), std::string::npos)
+        << "no \"" << part << "\" in: " << source.error().message;
+  }
+}
+
+TEST(OpenErrors, NameWhatIsNoFile) {
+  const TempDir dir;
+  ExpectRefused(dir.File("none.tif"), {"No such file"});
+  ExpectRefused(dir.path().string(), {"not a regular file"});
+  ExpectRefused("<VRTDataset rasterXSize=\"2\" rasterYSize=\"2\"></VRTDataset>", {"No such file"});
+  EXPECT_EQ(DemSource::Open(dir.File("none.tif")).error().code, ErrorCode::kNotFound);
+}
+
+TEST(OpenErrors, NameWhatIsNoRaster) {
+  const TempDir dir;
+  std::ofstream(dir.File("text.tif")) << "not a raster at all\n";
+  ExpectRefused(dir.File("text.tif"), {"cannot be opened as a raster", "gdalinfo"});
+  std::ofstream(dir.File("empty.tif")).flush();
+  ExpectRefused(dir.File("empty.tif"), {"cannot be opened as a raster"});
+}
+
+TEST(OpenErrors, OfferGeoreferencing) {
+  const TempDir dir;
+  ExpectRefused(WriteRaster(dir, {.georeferenced = false, .crs = ""}),
+                {"no georeference", "gdal_translate -a_srs EPSG:XXXX -a_ullr west north east south in out"});
+  ExpectRefused(WriteRaster(dir, {.geo_transform = {7, .1, 0, 47, 0, -.1}, .crs = ""}),
+                {"no coordinate reference system", "gdal_translate -a_srs EPSG:XXXX in out"});
+  ExpectRefused(WriteRaster(dir, {.crs = "LOCAL_CS[\"site grid\",UNIT[\"metre\",1]]"}), {"not tied to the Earth"});
+}
+
+TEST(OpenErrors, NameUnusableSamples) {
+  const TempDir dir;
+  ExpectRefused(WriteRaster(dir, {.type = "CFloat32"}), {"complex", "gdal_translate -ot Float32"});
+  ExpectRefused(WriteRaster(dir, {.nodata = 0}), {"only voids", "gdal_translate -a_nodata"});
+  ExpectRefused(WriteRaster(dir, {.width = 1}), {"1 x 16"});
+}
+
+TEST(OpenErrors, RefuseBombsBeforeReading) {
+  const TempDir dir;
+  GDALAllRegister();
+  GDALDriver* driver = GetGDALDriverManager()->GetDriverByName("GTiff");
+  const char* const sparse[] = {"SPARSE_OK=TRUE",  "TILED=YES",       "BIGTIFF=YES",
+                                "BLOCKXSIZE=4096", "BLOCKYSIZE=4096", nullptr};
+  GDALDatasetUniquePtr(
+      driver->Create(dir.File("wide.tif").c_str(), 5'000'000, 16, 1, GDT_Byte, const_cast<char**>(sparse)));
+  ExpectRefused(dir.File("wide.tif"), {"5000000 x 16", "4194304 a side"});
+  const char* const one_block[] = {"SPARSE_OK=TRUE", "TILED=YES", "BLOCKXSIZE=8192", "BLOCKYSIZE=8192", nullptr};
+  GDALDatasetUniquePtr(
+      driver->Create(dir.File("block.tif").c_str(), 8192, 8192, 1, GDT_Float64, const_cast<char**>(one_block)));
+  ExpectRefused(dir.File("block.tif"), {"blocks of 8192 x 8192", "TILED=YES"});
+}
+
+TEST(OpenErrors, NameBadOptions) {
+  const TempDir dir;
+  const std::string path = WriteRaster(dir, {});
+  ExpectRefused(path, {"error fraction"}, {.error_fraction = 0});
+  ExpectRefused(path, {"finest error"}, {.finest_error = -1});
+  ExpectRefused(path, {"floor"}, {.floor = 1e30});
+  ExpectRefused(path, {"void gap"}, {.max_void_gap = -1});
+}
+
+TEST(OpenErrors, NameDamagedFiles) {
+  const TempDir dir;
+  const std::string path = WriteRaster(dir, {.width = 600, .height = 600});
+  std::filesystem::resize_file(path, std::filesystem::file_size(path) / 2);
+  ExpectRefused(path, {});
+}
+
+}  // namespace
+}  // namespace terrace::dem

@@ -1,0 +1,51 @@
+#include <algorithm>
+#include <cmath>
+
+#include "tests/engine/dem/dem_fixture.h"
+
+namespace terrace::dem {
+namespace {
+
+TEST(ReadRaster, KeepsTheFilesOrderAndMarksVoids) {
+  const TempDir dir;
+  const std::string path = WriteRaster(dir, {.width = 5,
+                                             .height = 3,
+                                             .type = "Int16",
+                                             .georeferenced = false,
+                                             .crs = "",
+                                             .nodata = 12,
+                                             .value = [](int col, int row) { return col + 10 * row; }});
+  double done = 0;
+  const auto raster = ReadRaster(path, [&](double share) { done = share; });
+  ASSERT_TRUE(raster) << raster.error().message;
+  EXPECT_EQ(raster->width, 5);
+  EXPECT_EQ(raster->height, 3);
+  EXPECT_FALSE(raster->georeferenced);
+  EXPECT_EQ(done, 1);
+  EXPECT_EQ(raster->heights[4], 4);
+  EXPECT_EQ(raster->heights[13], 23);
+  EXPECT_TRUE(std::isnan(raster->heights[7]));
+}
+
+TEST(ReadRaster, AppliesScaleAndUnit) {
+  const TempDir dir;
+  const auto raster = ReadRaster(WriteRaster(
+      dir, {.type = "UInt16", .unit = "ft", .scale = .5, .offset = 100, .value = [](int, int) { return 20.0; }}));
+  ASSERT_TRUE(raster);
+  EXPECT_FLOAT_EQ(raster->heights[0], static_cast<float>(110 * 0.3048));
+  EXPECT_TRUE(raster->georeferenced);
+}
+
+TEST(ReadRaster, ReadsRastersWithoutGeoreference) {
+  TERRACE_REQUIRE_DATA(path, "crater.tif");
+  const auto raster = ReadRaster(path);
+  ASSERT_TRUE(raster);
+  EXPECT_EQ(raster->width, 336);
+  EXPECT_EQ(*std::ranges::min_element(raster->heights), 1533);
+  EXPECT_EQ(*std::ranges::max_element(raster->heights), 2478);
+}
+
+TEST(ReadRaster, NamesAMissingFile) { EXPECT_EQ(ReadRaster("/nowhere/dem.tif").error().code, ErrorCode::kNotFound); }
+
+}  // namespace
+}  // namespace terrace::dem

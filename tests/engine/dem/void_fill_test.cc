@@ -1,0 +1,67 @@
+#include "engine/dem/void_fill.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+namespace terrace::dem {
+namespace {
+
+const float kVoid = std::nanf("");
+
+TEST(FillVoids, InterpolatesBetweenTheRims) {
+  // One row: only the row's own pair exists.
+  const std::vector<float> row = {0, kVoid, kVoid, kVoid, 8};
+  const GridWindow window{0, 0, 5, 1};
+  EXPECT_EQ(FillVoids(row, window, window, 4), (std::vector<float>{0, 2, 4, 6, 8}));
+  const std::vector<float> open = FillVoids(row, window, window, 3);
+  EXPECT_TRUE(std::isnan(open[1]) && std::isnan(open[2]) && std::isnan(open[3]));
+}
+
+TEST(FillVoids, NeedsRimsOnBothSides) {
+  const std::vector<float> row = {5, kVoid, kVoid};
+  const GridWindow window{0, 0, 3, 1};
+  EXPECT_TRUE(std::isnan(FillVoids(row, window, window, 64)[1]));
+}
+
+TEST(FillVoids, ReproducesAPlane) {
+  const GridWindow window{0, 0, 30, 30};
+  std::vector<float> heights;
+  for (int y = 0; y < 30; ++y) {
+    for (int x = 0; x < 30; ++x)
+      heights.push_back(x > 8 && x < 20 && y > 10 && y < 25 ? kVoid : static_cast<float>(3 * x - 2 * y));
+  }
+  const std::vector<float> filled = FillVoids(heights, window, window, 20);
+  for (int y = 0; y < 30; ++y) {
+    for (int x = 0; x < 30; ++x) EXPECT_NEAR(filled[static_cast<std::size_t>(30 * y + x)], 3 * x - 2 * y, 1e-4);
+  }
+}
+
+TEST(FillVoids, DoesNotDependOnTheWindow) {
+  constexpr int kSide = 60, kGap = 9;
+  std::mt19937 random(3);
+  std::vector<float> heights(kSide * kSide);
+  for (float& height : heights) height = random() % 3 == 0 ? static_cast<float>(random() % 1000) / 7 : kVoid;
+  const GridWindow whole{0, 0, kSide, kSide};
+  const std::vector<float> truth = FillVoids(heights, whole, whole, kGap);
+  const GridWindow core{20, 25, 12, 10},
+      wide{core.column - kGap, core.row - kGap, core.columns + 2 * kGap, core.rows + 2 * kGap};
+  std::vector<float> part;
+  for (std::int64_t r = 0; r < wide.rows; ++r) {
+    for (std::int64_t c = 0; c < wide.columns; ++c) {
+      part.push_back(heights[static_cast<std::size_t>((wide.row + r) * kSide + wide.column + c)]);
+    }
+  }
+  const std::vector<float> filled = FillVoids(part, wide, core, kGap);
+  for (std::int64_t r = 0; r < core.rows; ++r) {
+    for (std::int64_t c = 0; c < core.columns; ++c) {
+      const float a = filled[static_cast<std::size_t>(r * core.columns + c)];
+      const float b = truth[static_cast<std::size_t>((core.row + r) * kSide + core.column + c)];
+      EXPECT_TRUE(a == b || (std::isnan(a) && std::isnan(b)));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace terrace::dem

@@ -1,0 +1,98 @@
+#include "engine/tin/border.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "engine/tin/greedy.h"
+#include "tests/engine/tin/mesh_laws.h"
+#include "tests/engine/tin/test_fields.h"
+
+namespace terrace::tin {
+namespace {
+
+TEST(Border, JudgesASampleByItsChord) {
+  const HeightField field = MakeField(5, 3, [](int x, int y) { return y == 0 ? static_cast<float>(x * x) : 0.f; });
+  const Corner west{0, 0, 0}, east{4, 0, 16};
+  EXPECT_EQ(SideOf(field, west, east), Side::kSouth);
+  EXPECT_EQ(WorstBorderSample(field, west, east, {}), (Candidate{4, 2}));
+  EXPECT_EQ(WorstBorderSample(field, east, west, {}), (Candidate{4, 2}));
+  EXPECT_EQ(WorstBorderSample(field, west, east, {3, 0.5}), (Candidate{18, 2}));
+  EXPECT_EQ(SquaredBorderDistances(field, west, east), 9 + 16 + 9);
+}
+
+TEST(Border, KnowsItsFourSides) {
+  const HeightField field = NoiseField(4, 6, 1);
+  EXPECT_EQ(SideOf(field, {0, 0, 0}, {3, 0, 0}), Side::kSouth);
+  EXPECT_EQ(SideOf(field, {3, 5, 0}, {0, 5, 0}), Side::kNorth);
+  EXPECT_EQ(SideOf(field, {3, 0, 0}, {3, 2, 0}), Side::kEast);
+  EXPECT_EQ(SideOf(field, {0, 4, 0}, {0, 2, 0}), Side::kWest);
+}
+
+// The 1-D greedy set of one border, found without any triangle.
+std::vector<int> SplitChord(const HeightField& field, int a, int b, double threshold, const BorderOptions& options) {
+  const Corner low{0, a, static_cast<double>(field.At(0, a))}, high{0, b, static_cast<double>(field.At(0, b))};
+  const Candidate worst = WorstBorderSample(field, low, high, options);
+  if (worst.error <= threshold) return {a, b};
+  const int k = static_cast<int>(worst.sample) / field.width();
+  std::vector<int> left = SplitChord(field, a, k, threshold, options);
+  const std::vector<int> right = SplitChord(field, k, b, threshold, options);
+  left.insert(left.end(), right.begin() + 1, right.end());
+  return left;
+}
+
+TEST(Border, HasTheVerticesOfItsOwnOneDimensionalSimplification) {
+  for (std::uint64_t seed = 0; seed < 6; ++seed) {
+    const HeightField field = HillField(65, 65, seed);
+    GreedyOptions options;
+    options.borders.fill({1.5, 0.01});
+    for (const double error : {40.0, 9.0, 2.0}) {
+      GreedyTriangulation tin(field, options);
+      EXPECT_TRUE(tin.Run({error}));
+      EXPECT_EQ(BorderVertices(field, tin.Mesh(), Side::kWest), SplitChord(field, 0, 64, error, options.borders[3]));
+    }
+  }
+}
+
+// Fields that share one border column and nothing else, as neighbours in east-west direction.
+TEST(Border, IsTheSameInBothNeighboursWhateverTheirInsides) {
+  constexpr int kSide = 65;
+  for (std::uint64_t seed = 0; seed < 12; ++seed) {
+    Random random(seed);
+    std::vector<float> shared;
+    for (int y = 0; y < kSide; ++y) shared.push_back(seed % 3 == 0 ? static_cast<float>(random.Below(6)) : HillHeight(0, y, seed));
+    const double roughness = std::pow(10, random.Below(4) - 1);
+    const HeightField west = MakeField(kSide, kSide, [&](int x, int y) {
+      return x == kSide - 1 ? shared[static_cast<std::size_t>(y)] : static_cast<float>(random.Unit() * roughness);
+    });
+    const HeightField east = MakeField(kSide, kSide, [&](int x, int y) {
+      return x == 0 ? shared[static_cast<std::size_t>(y)] : HillHeight(x, y, seed + 100);
+    });
+    GreedyOptions options;
+    options.borders.fill({1 + random.Below(3) * 0.7, random.Below(2) * 0.003});
+    if (seed % 2 == 1) options.seeds = {{40, 32}, {15, 16}, {6, 8}};
+    if (seed % 4 == 1) options.curvature = {std::vector<double>(kSide, 900.0), 1000.0, 6.4e5};
+    GreedyTriangulation west_tin(west, options), east_tin(east, options);
+    for (const double error : {60.0, 20.0, 10.0, 5.0, 3.0, 1.0, 0.4}) {
+      EXPECT_TRUE(west_tin.Run({error}));
+      EXPECT_TRUE(east_tin.Run({error}));
+      EXPECT_EQ(BorderVertices(west, west_tin.Mesh(), Side::kEast), BorderVertices(east, east_tin.Mesh(), Side::kWest)) << error;
+    }
+  }
+}
+
+TEST(Border, StaysAsItIsWhenInteriorSamplesAreInserted) {
+  const HeightField field = HillField(33, 33, 1);
+  GreedyTriangulation tin(field);
+  EXPECT_TRUE(tin.Run({10}));
+  const std::vector<int> before = BorderVertices(field, tin.Mesh(), Side::kNorth);
+  std::vector<SamplePosition> samples;
+  for (std::uint16_t i = 1; i < 32; ++i) samples.push_back({i, static_cast<std::uint16_t>(32 - i)});
+  tin.InsertInterior(samples);
+  EXPECT_TRUE(tin.Run({10}));
+  EXPECT_EQ(BorderVertices(field, tin.Mesh(), Side::kNorth), before);
+}
+
+}  // namespace
+}  // namespace terrace::tin

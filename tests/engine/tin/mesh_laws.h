@@ -1,0 +1,27 @@
+// What every mesh of the mesher must be, checked the slow way.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "engine/tin/greedy.h"
+#include "engine/tin/height_field.h"
+#include "engine/tin/tin_mesh.h"
+
+namespace terrace::tin {
+
+// Corners first, no vertex twice, counter-clockwise triangles whose areas add up to the field's and whose edges are each
+// used once in each direction or lie on the border.
+testing::AssertionResult CoversExactly(const HeightField& field, const TinMesh& mesh);
+
+// No vertex across an edge lies strictly inside the circle of the triangle: locally, hence globally, Delaunay.
+testing::AssertionResult IsDelaunay(const TinMesh& mesh);
+
+// Every valid sample is within `bound` of the mesh, as measured by MeasureError, and every valid sample was measured.
+testing::AssertionResult IsWithin(const HeightField& field, const TinMesh& mesh, double bound);
+
+// The positions of the vertices on one side along that side, ascending.
+std::vector<int> BorderVertices(const HeightField& field, const TinMesh& mesh, Side side);
+
+}  // namespace terrace::tin

@@ -1,0 +1,98 @@
+#include "tests/engine/tin/naive_greedy.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <utility>
+
+#include "engine/core/check.h"
+#include "engine/tin/candidate.h"
+#include "engine/tin/plane.h"
+#include "engine/tin/predicates.h"
+#include "engine/tin/triangulation.h"
+
+namespace terrace::tin {
+namespace {
+
+struct Pick {
+  Candidate candidate;
+  TriangleId triangle = 0;
+};
+
+class NaivePass {
+ public:
+  NaivePass(const HeightField& field, const std::array<BorderOptions, 4>& borders, const Triangulation& triangulation)
+      : field_(field), borders_(borders), triangulation_(triangulation) {}
+
+  Pick WorstOfAll() {
+    for (TriangleId t = 0; t < triangulation_.triangle_count(); ++t) {
+      for (int y = 0; y < field_.height(); ++y) {
+        for (int x = 0; x < field_.width(); ++x) Judge(t, x, y);
+      }
+    }
+    return pick_;
+  }
+
+ private:
+  Corner CornerAt(SamplePosition p) const { return {p.x, p.y, static_cast<double>(field_.VertexHeight(p.x, p.y))}; }
+
+  void Judge(TriangleId t, int x, int y) {
+    const SamplePosition p{static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)};
+    std::array<SamplePosition, 3> corners;
+    for (unsigned i = 0; i < 3; ++i) corners[i] = triangulation_.position(triangulation_.triangle(t)[i]);
+    for (unsigned i = 0; i < 3; ++i) {
+      if (p == corners[i] || Orientation(corners[i], corners[(i + 1) % 3], p) < 0) return;
+    }
+    const bool on_border = x == 0 || y == 0 || x == field_.width() - 1 || y == field_.height() - 1;
+    const double error = on_border ? BorderErrorOf(corners, p) : PlaneErrorOf(corners, p);
+    const Candidate candidate{error, static_cast<std::uint32_t>(y * field_.width() + x)};
+    if (error > 0 && Precedes(candidate, pick_.candidate)) pick_ = {candidate, t};  // false for NaN
+  }
+
+  double PlaneErrorOf(const std::array<SamplePosition, 3>& c, SamplePosition p) const {
+    const Plane plane(SortedByRow({CornerAt(c[0]), CornerAt(c[1]), CornerAt(c[2])}));
+    return std::abs(plane.At(p.x, plane.AtRow(p.y)) - static_cast<double>(field_.At(p.x, p.y)));
+  }
+
+  // p lies on the border and in the triangle, and is no corner: it lies on the one edge that is collinear with it.
+  double BorderErrorOf(const std::array<SamplePosition, 3>& corners, SamplePosition p) const {
+    for (unsigned i = 0; i < 3; ++i) {
+      SamplePosition low = corners[i], high = corners[(i + 1) % 3];
+      if (Orientation(low, high, p) != 0) continue;
+      if (high.x < low.x || high.y < low.y) std::swap(low, high);
+      const bool along_x = low.y == high.y;
+      const Side side = along_x ? (p.y == 0 ? Side::kSouth : Side::kNorth) : (p.x == 0 ? Side::kWest : Side::kEast);
+      const BorderOptions& options = borders_[static_cast<std::size_t>(side)];
+      const int a = along_x ? low.x : low.y, b = along_x ? high.x : high.y, k = along_x ? p.x : p.y;
+      const double h_a = CornerAt(low).z, h_b = CornerAt(high).z, h_k = static_cast<double>(field_.At(p.x, p.y));
+      const double error = std::abs((h_a * (b - k) + h_b * (k - a)) / (b - a) - h_k) + options.sagitta_m * (k - a) * (b - k);
+      return options.weight * error;
+    }
+    CheckFailed("a border sample lies on a border edge", __FILE__, __LINE__);
+  }
+
+  const HeightField& field_;
+  const std::array<BorderOptions, 4>& borders_;
+  const Triangulation& triangulation_;
+  Pick pick_;
+};
+
+}  // namespace
+
+TinMesh NaiveGreedy(const HeightField& field, const std::array<BorderOptions, 4>& borders, const GreedyGoal& goal) {
+  Triangulation triangulation(field.width(), field.height());
+  while (triangulation.vertex_count() < goal.max_points) {
+    const Pick worst = NaivePass(field, borders, triangulation).WorstOfAll();
+    if (worst.candidate.error <= goal.max_error) break;
+    const auto width = static_cast<std::uint32_t>(field.width());
+    triangulation.Insert({static_cast<std::uint16_t>(worst.candidate.sample % width),
+                          static_cast<std::uint16_t>(worst.candidate.sample / width)},
+                         worst.triangle);
+  }
+  TinMesh mesh{triangulation.positions(), {}};
+  for (TriangleId t = 0; t < triangulation.triangle_count(); ++t) mesh.triangles.push_back(triangulation.triangle(t));
+  return mesh;
+}
+
+}  // namespace terrace::tin

@@ -1,0 +1,100 @@
+#include "proto/media_type.h"
+
+#include <gtest/gtest.h>
+
+#include <ostream>
+#include <vector>
+
+namespace terrace::proto {
+
+void PrintTo(const TileExtensions& e, std::ostream* out) {
+  *out << "{" << e.octvertexnormals << e.watermask << e.metadata << "}";
+}
+
+namespace {
+
+constexpr TileExtensions kNone{}, kNormals{.octvertexnormals = true}, kAll{true, true, true};
+constexpr TileExtensions kNormalsAndMetadata{.octvertexnormals = true, .metadata = true};
+
+struct ExtensionsCase {
+  std::string_view text;
+  TileExtensions expected;
+};
+
+TEST(MediaType, ExtensionNamesAreJoinedByDashes) {
+  const std::vector<ExtensionsCase> cases = {
+      {"", kNone},
+      {"octvertexnormals", kNormals},
+      {"octvertexnormals-metadata", kNormalsAndMetadata},
+      {"metadata-watermask-octvertexnormals", kAll},
+      {"OctVertexNormals", kNormals},
+      {"vertexnormals", kNone},  // the old extension with a big-endian length
+      {"lightmap-octvertexnormals", kNormals},
+      {"-octvertexnormals--", kNormals},
+      {"octvertexnormalsx", kNone},
+      {"octvertexnormals,metadata", kNone},
+  };
+  for (const ExtensionsCase& c : cases) EXPECT_EQ(ParseExtensions(c.text), c.expected) << c.text;
+}
+
+TEST(MediaType, AcceptMayNameExtensionsAnywhere) {
+  const std::vector<ExtensionsCase> cases = {
+      {"", kNone},
+      {"*/*", kNone},
+      // CesiumJS
+      {"application/vnd.quantized-mesh,application/octet-stream;q=0.9,*/*;q=0.01", kNone},
+      {"application/vnd.quantized-mesh;extensions=octvertexnormals-watermask-metadata,application/octet-stream;q=0.9,"
+       "*/*;q=0.01",
+       kAll},
+      // 3DTilesRendererJS
+      {"application/vnd.quantized-mesh,application/octet-stream;q=0.9;extensions=octvertexnormals-metadata",
+       kNormalsAndMetadata},
+      {"a/b ; q=1 ; Extensions = octvertexnormals , c/d", kNormals},
+      {"a/b;extensions=\"octvertexnormals\"", kNormals},
+      {"a/b;extensions=octvertexnormals,c/d;extensions=metadata", kNormalsAndMetadata},
+      {"a/b;x=\"1;extensions=octvertexnormals\"", kNone},
+      {"extensions=octvertexnormals", kNone},  // a media type, not a parameter
+      {"a/b;extensions", kNone},
+      {";;,,;=,\"", kNone},
+  };
+  for (const ExtensionsCase& c : cases) EXPECT_EQ(ExtensionsInAccept(c.text), c.expected) << c.text;
+}
+
+TEST(MediaType, CodingFollowsTheWeights) {
+  constexpr ContentCoding kGzip = ContentCoding::kGzip, kIdentity = ContentCoding::kIdentity;
+  struct Case {
+    std::string_view header;
+    ContentCoding expected;
+  };
+  const std::vector<Case> cases = {
+      {"", kIdentity},
+      {"gzip", kGzip},
+      {"GZip", kGzip},
+      {"x-gzip", kGzip},
+      {"gzip, deflate, br, zstd", kGzip},
+      {"br", kIdentity},
+      {"identity", kIdentity},
+      {"*", kGzip},
+      {"gzip;q=0", kIdentity},
+      {"gzip;q=0.000, *", kIdentity},
+      {"gzip ; q=0.5", kGzip},
+      {"gzip;q=0.5, identity", kIdentity},
+      {"gzip;q=0.5, identity;q=0.5", kGzip},
+      {"gzip;q=0.5, identity;q=0.501", kIdentity},
+      {"identity;q=0, gzip;q=0.001", kGzip},
+      {"identity;q=0", kIdentity},
+      {"*;q=0", kIdentity},
+      {"*;q=0, gzip", kGzip},
+      {"identity;q=0.5, *;q=0", kIdentity},
+      {"identity, *;q=0.5", kIdentity},
+      {"gzip;q=abc", kIdentity},
+      {"gzip;q=1.001", kIdentity},
+      {"gzip;q=", kIdentity},
+      {"gzipped", kIdentity},
+      {",,;q=1,gzip", kGzip},
+  };
+  for (const Case& c : cases) EXPECT_EQ(ChooseCoding(c.header), c.expected) << c.header;
+}
+
+}  // namespace
+}  // namespace terrace::proto

@@ -1,0 +1,179 @@
+#include "proto/mesh_file.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+namespace terrace::proto {
+namespace {
+
+using Json = nlohmann::json;
+using Triangles = std::vector<std::array<std::uint32_t, 3>>;
+
+const std::vector<MeshVertex> kSquare = {
+    {500000.1, 4000000.2, 10}, {500010.1, 4000000.2, 1.0 / 3}, {500010.1, 4000020.2, -7.5}, {500000.1, 4000020.2, 12}};
+const Triangles kTwo = {{0, 1, 2}, {0, 2, 3}};
+
+std::string Written(MeshFileFormat format, const std::vector<MeshVertex>& vertices, const Triangles& triangles) {
+  std::ostringstream out;
+  const Result<void> result = WriteMesh(out, format, vertices, triangles);
+  EXPECT_TRUE(result.has_value()) << (result ? "" : result.error().message);
+  return out.str();
+}
+
+template <typename T>
+T At(const std::string& bytes, std::size_t offset) {
+  T value{};
+  EXPECT_LE(offset + sizeof(T), bytes.size());
+  if (offset + sizeof(T) <= bytes.size()) std::memcpy(&value, bytes.data() + offset, sizeof(T));
+  return value;
+}
+
+struct Glb {
+  Json json;
+  std::string buffer;
+};
+
+Glb ParseGlb(const std::string& bytes) {
+  EXPECT_EQ(bytes.substr(0, 4), "glTF");
+  EXPECT_EQ(At<std::uint32_t>(bytes, 4), 2u);
+  EXPECT_EQ(At<std::uint32_t>(bytes, 8), bytes.size());
+  const std::uint32_t json_size = At<std::uint32_t>(bytes, 12);
+  EXPECT_EQ(json_size % 4, 0u);
+  EXPECT_EQ(bytes.substr(16, 4), "JSON");
+  const std::uint32_t buffer_size = At<std::uint32_t>(bytes, 20 + json_size);
+  EXPECT_EQ(bytes.substr(24 + json_size, 4), std::string("BIN\0", 4));
+  EXPECT_EQ(28 + json_size + buffer_size, bytes.size());
+  EXPECT_EQ(buffer_size % 4, 0u);
+  return {Json::parse(bytes.substr(20, json_size)), bytes.substr(28 + json_size)};
+}
+
+// The position of a vertex in the mesh's own axes: node matrix applied, then y-up turned back to z-up.
+MeshVertex GlbVertex(const Glb& glb, std::size_t i) {
+  const Json& matrix = glb.json.at("nodes").at(0).at("matrix");
+  std::array<double, 3> p{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    p[axis] = matrix.at(12 + axis).get<double>() + static_cast<double>(At<float>(glb.buffer, (3 * i + axis) * 4));
+  }
+  return {p[0], -p[2], p[1]};
+}
+
+TEST(MeshFile, FormatFollowsTheExtension) {
+  EXPECT_EQ(MeshFileFormatOf("out/a.obj").value(), MeshFileFormat::kObj);
+  EXPECT_EQ(MeshFileFormatOf("a.b.PLY").value(), MeshFileFormat::kPly);
+  EXPECT_EQ(MeshFileFormatOf("a.Glb").value(), MeshFileFormat::kGlb);
+  for (const char* name : {"a.stl", "a", "", "obj", "a.obj/b", "a.gltf"}) {
+    const Result<MeshFileFormat> format = MeshFileFormatOf(name);
+    ASSERT_FALSE(format.has_value()) << name;
+    EXPECT_EQ(format.error().code, ErrorCode::kInvalidArgument);
+    EXPECT_NE(format.error().message.find(".obj, .ply or .glb"), std::string::npos);
+  }
+}
+
+TEST(MeshFile, ObjReadsBackToTheSameDoubles) {
+  std::istringstream in(Written(MeshFileFormat::kObj, kSquare, kTwo));
+  std::vector<std::array<double, 3>> vertices;
+  Triangles triangles;
+  for (std::string line; std::getline(in, line);) {
+    std::array<double, 3> p{};
+    std::array<std::uint32_t, 3> t{};
+    if (std::sscanf(line.c_str(), "v %lf %lf %lf", &p[0], &p[1], &p[2]) == 3) vertices.push_back(p);
+    if (std::sscanf(line.c_str(), "f %u %u %u", &t[0], &t[1], &t[2]) == 3) {
+      triangles.push_back({t[0] - 1, t[1] - 1, t[2] - 1});
+    }
+  }
+  ASSERT_EQ(vertices.size(), kSquare.size());
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    EXPECT_EQ(vertices[i], (std::array<double, 3>{kSquare[i].x, kSquare[i].y, kSquare[i].z}));
+  }
+  EXPECT_EQ(triangles, kTwo);
+}
+
+TEST(MeshFile, PlyHoldsDoublesAndIndicesBehindItsHeader) {
+  const std::string bytes = Written(MeshFileFormat::kPly, kSquare, kTwo);
+  const std::string end = "end_header\n";
+  const std::size_t data = bytes.find(end) + end.size();
+  EXPECT_EQ(
+      bytes.substr(0, data),
+      "ply\nformat binary_little_endian 1.0\ncomment terrace\nelement vertex 4\nproperty double x\n"
+      "property double y\nproperty double z\nelement face 2\nproperty list uchar int vertex_indices\nend_header\n");
+  ASSERT_EQ(bytes.size(), data + 4 * 24 + 2 * 13);
+  for (std::size_t i = 0; i < kSquare.size(); ++i) {
+    EXPECT_EQ(At<double>(bytes, data + 24 * i), kSquare[i].x);
+    EXPECT_EQ(At<double>(bytes, data + 24 * i + 8), kSquare[i].y);
+    EXPECT_EQ(At<double>(bytes, data + 24 * i + 16), kSquare[i].z);
+  }
+  for (std::size_t i = 0; i < kTwo.size(); ++i) {
+    EXPECT_EQ(bytes[data + 96 + 13 * i], 3);
+    for (std::size_t k = 0; k < 3; ++k) EXPECT_EQ(At<std::uint32_t>(bytes, data + 97 + 13 * i + 4 * k), kTwo[i][k]);
+  }
+}
+
+TEST(MeshFile, GlbPutsLargeCoordinatesIntoTheNode) {
+  const Glb glb = ParseGlb(Written(MeshFileFormat::kGlb, kSquare, kTwo));
+  EXPECT_EQ(glb.json.at("asset"), (Json{{"version", "2.0"}, {"generator", "terrace"}}));
+  for (std::size_t i = 0; i < kSquare.size(); ++i) {
+    const MeshVertex v = GlbVertex(glb, i);
+    EXPECT_NEAR(v.x, kSquare[i].x, 1e-6);
+    EXPECT_NEAR(v.y, kSquare[i].y, 1e-6);
+    EXPECT_NEAR(v.z, kSquare[i].z, 1e-6);
+  }
+  for (std::size_t i = 0; i < 6; ++i) EXPECT_EQ(At<std::uint16_t>(glb.buffer, 48 + 2 * i), kTwo[i / 3][i % 3]);
+}
+
+TEST(MeshFile, GlbBoundsAreThoseOfTheStoredFloats) {
+  const Glb glb = ParseGlb(Written(MeshFileFormat::kGlb, kSquare, kTwo));
+  const Json& accessor = glb.json.at("accessors").at(0);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    float min = std::numeric_limits<float>::infinity(), max = -min;
+    for (std::size_t i = 0; i < kSquare.size(); ++i) {
+      min = std::min(min, At<float>(glb.buffer, (3 * i + axis) * 4));
+      max = std::max(max, At<float>(glb.buffer, (3 * i + axis) * 4));
+    }
+    EXPECT_EQ(accessor.at("min").at(axis).get<double>(), min);
+    EXPECT_EQ(accessor.at("max").at(axis).get<double>(), max);
+  }
+}
+
+TEST(MeshFile, GlbWidensIndicesPast65535Vertices) {
+  for (std::uint32_t count : {65535u, 65536u}) {
+    const std::vector<MeshVertex> vertices(count);
+    const Glb glb = ParseGlb(Written(MeshFileFormat::kGlb, vertices, {{0, 1, count - 1}}));
+    const Json& accessor = glb.json.at("accessors").at(1);
+    const std::size_t offset = glb.json.at("bufferViews").at(1).at("byteOffset");
+    if (count == 65535) {
+      EXPECT_EQ(accessor.at("componentType"), 5123);
+      EXPECT_EQ(At<std::uint16_t>(glb.buffer, offset + 4), 65534);
+    } else {
+      EXPECT_EQ(accessor.at("componentType"), 5125);
+      EXPECT_EQ(At<std::uint32_t>(glb.buffer, offset + 8), 65535u);
+    }
+    EXPECT_EQ(glb.json.at("buffers").at(0).at("byteLength"), glb.buffer.size());
+  }
+}
+
+TEST(MeshFile, RefusesWhatNoFileCanHold) {
+  for (MeshFileFormat format : {MeshFileFormat::kObj, MeshFileFormat::kPly, MeshFileFormat::kGlb}) {
+    std::ostringstream out;
+    EXPECT_EQ(WriteMesh(out, format, kSquare, {}).error().code, ErrorCode::kInvalidArgument);
+    std::vector<MeshVertex> vertices = kSquare;
+    vertices[2].z = std::nan("");
+    const Result<void> result = WriteMesh(out, format, vertices, kTwo);
+    EXPECT_NE(result.error().message.find("vertex 2"), std::string::npos);
+    EXPECT_TRUE(out.str().empty());
+  }
+}
+
+TEST(MeshFile, ReportsAFailingStream) {
+  for (MeshFileFormat format : {MeshFileFormat::kObj, MeshFileFormat::kPly, MeshFileFormat::kGlb}) {
+    std::ostream broken(nullptr);
+    EXPECT_EQ(WriteMesh(broken, format, kSquare, kTwo).error().code, ErrorCode::kUnavailable);
+  }
+}
+
+}  // namespace
+}  // namespace terrace::proto
