@@ -1,5 +1,7 @@
 #include "proto/tile_normals.h"
 
+#include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "engine/geo/ellipsoid.h"
@@ -8,7 +10,11 @@
 namespace terrace::proto {
 namespace {
 
-// East, north and up of a node from the normals of its meridian and its parallel.
+// Steeper slopes are drawn as this one (88 degrees): the two bytes of a normal are up to 1 degree off and must not point
+// into the ground.
+constexpr double kSteepestSlope = 28;
+
+// East, north and up of a node, from the normals of its meridian and its parallel.
 struct LocalFrame {
   geo::Vec3 east, north, up;
 };
@@ -34,8 +40,10 @@ std::vector<std::array<std::uint8_t, 2>> LatticeNormals(const LatticeView& latti
     if (latitude > -90 && latitude < 90) {
       const double rise_east = static_cast<double>(lattice.At(p.x + 1, p.y)) - static_cast<double>(lattice.At(p.x - 1, p.y));
       const double rise_north = static_cast<double>(lattice.At(p.x, p.y + 1)) - static_cast<double>(lattice.At(p.x, p.y - 1));
-      normal = geo::Normalized(normal - frame.east * (rise_east / (2 * step * geo::MetresPerDegreeEast(latitude))) -
-                               frame.north * (rise_north / (2 * step * geo::MetresPerDegreeNorth(latitude))));
+      const double east = rise_east / (2 * step * geo::MetresPerDegreeEast(latitude));
+      const double north = rise_north / (2 * step * geo::MetresPerDegreeNorth(latitude));
+      const double tamed = kSteepestSlope / std::max(std::hypot(east, north), kSteepestSlope);
+      normal = geo::Normalized(frame.up - frame.east * (east * tamed) - frame.north * (north * tamed));
     }
     normals.push_back(OctEncode(normal));
   }
