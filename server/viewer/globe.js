@@ -3,6 +3,7 @@ import {
   BoundingSphere, CameraEventType, Cartesian3, Cartographic, CesiumTerrainProvider, CesiumWidget, Color, HeadingPitchRange,
   Math as CesiumMath, PointPrimitiveCollection, ScreenSpaceEventHandler, ScreenSpaceEventType,
 } from "/viewer/cesium/index.js";
+import { steerByKeyboard } from "/viewer/keyboard.js";
 import { makeTerrainMaterial, niceInterval, setHeights } from "/viewer/material.js";
 
 const kMetresPerDegree = 111320;
@@ -31,19 +32,22 @@ function viewDistance(dataset) {
   return isGlobal(dataset) ? kGlobalDistance : extent(dataset) * (0.62 + 0.2 * Math.min(1, extent(dataset) / 5e6));
 }
 
-// Pixels of error at which CesiumJS goes a level deeper. Continents get more tiles, for the sake of their colours.
-function pixelTolerance(dataset) {
-  return extent(dataset) > 1.5e6 ? 0.5 : 1.5;
+// Pixels of error at which CesiumJS goes a level deeper, from a distance in metres. A planet seen whole gets more tiles, for
+// the sake of its colours.
+function pixelTolerance(distance) {
+  return 1.5 - CesiumMath.clamp((Math.log10(distance) - 5.5) / 1.5, 0, 1);
 }
 
 // The share of the level error that makes a first view of the dataset good: half of it, and less where the relief is so
 // small beside the extent that the level error (pixelTolerance pixels of 1.6 mm at one metre) exceeds 1/40 of it.
 export function suggestedFraction(dataset) {
   const visible = (dataset.heights.max - dataset.heights.min) / 40;
-  return Math.min(0.5, visible / (0.0016 * pixelTolerance(dataset) * viewDistance(dataset)));
+  return Math.min(0.5, visible / (0.0016 * pixelTolerance(viewDistance(dataset)) * viewDistance(dataset)));
 }
 
 export class Globe {
+  #latest = 0;  // counts show(): of two that overlap only the later one may set the terrain
+
   // `onError` gets a sentence for the reader of the page.
   constructor(container, onError) {
     const credits = document.createElement("div");  // the page states the attribution itself
@@ -53,6 +57,7 @@ export class Globe {
     });
     this.widget.resolutionScale = Math.min(2, devicePixelRatio) / devicePixelRatio;
     this.scene = this.widget.scene;
+    this.container = container;
     this.onError = onError;
     this.contours = false;
     this.interval = 0;
@@ -89,9 +94,11 @@ export class Globe {
   // Shows `dataset` at `fraction` of the level error. Throws with a readable message if the server does not describe it.
   async show(dataset, fraction) {
     const url = `${dataset.urls.layer.replace(/layer\.json.*$/, "")}?fraction=${fraction}`;
+    const turn = ++this.#latest;
     const provider = await CesiumTerrainProvider.fromUrl(url, { requestVertexNormals: true });
     // CesiumJS takes a missing layer.json for an ancient server of height maps.
     if (!provider.availability) throw new Error(`${url} does not describe any terrain`);
+    if (turn !== this.#latest) return;
     provider.errorEvent.addEventListener((failure) => this.onError(failure.message));
 
     this.#drawCurtain();
@@ -100,7 +107,6 @@ export class Globe {
     setHeights(this.material, dataset.heights);
     this.material.uniforms.box = { x: radians(longitude), y: radians(latitude), z: radians(width / 2), w: radians(height / 2) };
     this.material.uniforms.shading = provider.hasVertexNormals ? 1 : 0;
-    this.scene.globe.maximumScreenSpaceError = pixelTolerance(dataset);
     this.widget.terrainProvider = provider;
     this.adaptToCamera();
   }
@@ -177,12 +183,12 @@ export class Globe {
     this.scene.requestRender();
   }
 
-  // What follows the distance: contour interval, strength of the shading, roundness of the globe.
+  // What follows the distance: depth of tiles, contour interval, strength of the shading, roundness of the globe.
   adaptToCamera() {
     const { camera, canvas } = this.scene;
-    const { x, y, z } = camera.position;
     const middle = camera.pickEllipsoid({ x: canvas.clientWidth / 2, y: canvas.clientHeight * 0.6 });
-    const distance = middle ? Cartesian3.distance(middle, { x, y, z }) : camera.positionCartographic.height * 3;
+    const distance = middle ? Cartesian3.distance(middle, camera.positionWC) : camera.positionCartographic.height * 3;
+    this.scene.globe.maximumScreenSpaceError = pixelTolerance(distance);
     const { uniforms } = this.material;
     this.interval = niceInterval(Math.max(1, Math.min(distance * 0.0022, 2000)));
     uniforms.contourInterval = this.contours ? this.interval : 0;
@@ -195,7 +201,10 @@ export class Globe {
 
   // Calls back with {longitude, latitude, height} (degrees, metres above the ellipsoid) of the clicked ground, or undefined.
   onPick(callback) {
-    const handler = new ScreenSpaceEventHandler(this.scene.canvas);
+    const { canvas, camera } = this.scene;
+    const handler = new ScreenSpaceEventHandler(canvas);
+    const middle = () => ({ x: canvas.clientWidth / 2, y: canvas.clientHeight / 2 });
+    steerByKeyboard(this.container, camera, () => callback(this.pick(middle())));
     handler.setInputAction(({ position }) => callback(this.pick(position)), ScreenSpaceEventType.LEFT_CLICK);
   }
 
