@@ -1,5 +1,5 @@
-// The camera by keyboard, while the globe has the focus: arrows travel, Shift and arrows turn, plus and minus zoom, Enter
-// reads the height in the middle.
+// The camera by keyboard, while the globe has the focus: arrows travel, Shift and arrows turn, plus and minus zoom,
+// Enter reads the height in the middle.
 import { Cartesian3, Math as CesiumMath } from "/viewer/cesium/index.js";
 
 const kTurn = CesiumMath.toRadians(4);

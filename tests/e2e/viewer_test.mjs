@@ -25,7 +25,9 @@ async function openPage(browser, url, size = { width: 800, height: 500 }) {
     if (grave) page.wrongs.push(`console ${message.type()}: ${message.text()}`);
   });
   page.on('pageerror', (error) => page.wrongs.push(`exception: ${error}`));
-  page.on('response', (response) => response.status() >= 400 && page.wrongs.push(`${response.status()} ${response.url()}`));
+  page.on('response', (response) => {
+    if (response.status() >= 400) page.wrongs.push(`${response.status()} ${response.url()}`);
+  });
   page.on('request', (request) => {
     page.requested.push(request.url());
     const local = /^(data|blob):/.test(request.url()) || new URL(request.url()).origin === origin;
@@ -102,7 +104,8 @@ describe('the viewer', () => {
       await page.waitForFunction((value) => terrace.state.fraction === value, fraction);
       await page.waitForTimeout(300);
       triangles.push((await settle(page)).triangles);
-      assert.ok(page.requested.some((asked) => asked.includes(`/layer.json?fraction=${fraction}`)), `layer.json at ${fraction}`);
+      const asked = `/layer.json?fraction=${fraction}`;
+      assert.ok(page.requested.some((url) => url.includes(asked)), asked);
     }
     assert.ok(triangles[1] > 1.5 * triangles[0], `${triangles[0]} triangles, then ${triangles[1]}`);
   });
@@ -146,8 +149,10 @@ describe('the viewer', () => {
 
   it('keeps the view in its address', async () => {
     await page.locator('#contours').check();
-    const state = () => page.evaluate(() => [terrace.state.dataset.name, terrace.state.fraction, terrace.state.contours,
-                                             ...terrace.globe.camera.slice(0, 3).map((value) => Number(value.toPrecision(5)))]);
+    const state = () => page.evaluate(() => {
+      const place = terrace.globe.camera.slice(0, 3).map((value) => Number(value.toPrecision(5)));
+      return [terrace.state.dataset.name, terrace.state.fraction, terrace.state.contours, ...place];
+    });
     const before = await state();
     await page.reload();
     await settle(page);
@@ -172,7 +177,8 @@ describe('the viewer', () => {
     await settle(phone);
     await phone.locator('summary').click();
     const panel = await phone.locator('#panel').boundingBox();
-    assert.ok(panel.x >= 0 && panel.x + panel.width <= 360 && panel.y >= 0 && panel.y + panel.height <= 640, JSON.stringify(panel));
+    const inside = panel.x >= 0 && panel.x + panel.width <= 360 && panel.y >= 0 && panel.y + panel.height <= 640;
+    assert.ok(inside, JSON.stringify(panel));
     assert.deepEqual(phone.wrongs, []);
     await phone.close();
   });
