@@ -14,7 +14,9 @@ TEST(ByteWriter, WritesLittleEndian) {
   writer.Put(1.0f);
   writer.PutBytes("ab");
   EXPECT_EQ(writer.size(), 9u);
-  EXPECT_EQ(writer.Take(), std::string("\x34\x12\xFF\x00\x00\x80\x3F" "ab", 9));
+  EXPECT_EQ(writer.Take(), std::string("\x34\x12\xFF\x00\x00\x80\x3F"
+                                       "ab",
+                                       9));
 }
 
 TEST(ByteWriter, PadsToAMultiple) {

@@ -49,7 +49,8 @@ TEST(ErrorLadder, APrintedLadderValueFindsItself) {
     for (int step = kCoarsestStep; step <= kFinestStep; ++step) {
       for (const double fraction : {0.5, 0.3}) {
         const std::string printed = fmt::format("{:.10g}", LadderError(level, step, fraction));
-        ASSERT_EQ(SnapToLadder(level, std::strtod(printed.c_str(), nullptr), fraction), step) << level << ' ' << printed;
+        ASSERT_EQ(SnapToLadder(level, std::strtod(printed.c_str(), nullptr), fraction), step)
+            << level << ' ' << printed;
       }
     }
   }
