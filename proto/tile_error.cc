@@ -6,7 +6,7 @@
 #include <cstdint>
 
 #include "engine/geo/ellipsoid.h"
-#include "proto/tile_mesh.h"
+#include "proto/tile_geometry.h"
 
 namespace terrace::proto {
 namespace {
@@ -53,12 +53,7 @@ class Meter {
   std::int64_t NodeOf(std::uint16_t position) const { return (std::int64_t{position} * cells_ + kQuantizedMax / 2) / kQuantizedMax; }
 
   void PrepareCurved() {
-    const double step = lattice_.lattice.StepDegrees();
-    const double west = lattice_.Longitude(0), south = lattice_.Latitude(0), width = step * cells_;
-    ecef_.reserve(height_.size());
-    for (std::size_t k = 0; k < height_.size(); ++k) {
-      ecef_.push_back(geo::ToEcef(west + width * tile_.u[k] / kQuantizedMax, south + width * tile_.v[k] / kQuantizedMax, height_[k]));
-    }
+    ecef_ = DecodePositions(tile_);
     for (int i = 0; i <= cells_; ++i) column_up_.push_back(geo::SurfaceNormal(lattice_.Longitude(i), 0));
     for (int j = 0; j <= cells_; ++j) {
       const double latitude = lattice_.Latitude(j);

@@ -1,14 +1,24 @@
 #include "proto/tile_normals.h"
 
+#include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "engine/geo/ellipsoid.h"
 #include "proto/oct_normal.h"
+#include "proto/tile_geometry.h"
 
 namespace terrace::proto {
 namespace {
 
-// East, north and up of a node from the normals of its meridian and its parallel.
+// Steeper slopes are drawn as this one (88 degrees): the two bytes of a normal are up to 1 degree off and must not point
+// into the ground.
+constexpr double kSteepestSlope = 28;
+constexpr double kLowestUp = 0.035;
+// 13 degrees.
+constexpr double kCosWidestTurn = 0.97437006478523525, kSinWidestTurn = 0.22495105434386500;
+
+// East, north and up of a node, from the normals of its meridian and its parallel.
 struct LocalFrame {
   geo::Vec3 east, north, up;
 };
@@ -21,21 +31,50 @@ LocalFrame FrameOf(double longitude, double latitude) {
           {parallel.x * meridian.x, parallel.x * meridian.y, parallel.z}};
 }
 
+geo::Vec3 LatticeNormal(const LatticeView& lattice, const LocalFrame& frame, tin::SamplePosition p) {
+  const double latitude = lattice.Latitude(p.y), step = lattice.lattice.StepDegrees();
+  if (latitude <= -90 || latitude >= 90) return frame.up;
+  const double rise_east = static_cast<double>(lattice.At(p.x + 1, p.y)) - static_cast<double>(lattice.At(p.x - 1, p.y));
+  const double rise_north = static_cast<double>(lattice.At(p.x, p.y + 1)) - static_cast<double>(lattice.At(p.x, p.y - 1));
+  const double east = rise_east / (2 * step * geo::MetresPerDegreeEast(latitude));
+  const double north = rise_north / (2 * step * geo::MetresPerDegreeNorth(latitude));
+  const double tamed = kSteepestSlope / std::max(std::hypot(east, north), kSteepestSlope);
+  return geo::Normalized(frame.up - frame.east * (east * tamed) - frame.north * (north * tamed));
+}
+
+// Sums of the cross products of the triangles around each vertex.
+std::vector<geo::Vec3> AreaWeightedNormals(const QuantizedTile& tile) {
+  const std::vector<geo::Vec3> position = DecodePositions(tile);
+  std::vector<geo::Vec3> normals(position.size());
+  for (const auto& [a, b, c] : tile.triangles) {
+    const geo::Vec3 cross = geo::Cross(position[b] - position[a], position[c] - position[a]);
+    for (const std::uint32_t k : {a, b, c}) normals[k] = normals[k] + cross;
+  }
+  return normals;
+}
+
+// `normal`, turned towards `goal` until they are at most kWidestTurn apart. Both are unit vectors.
+geo::Vec3 TurnTowards(geo::Vec3 normal, geo::Vec3 goal) {
+  const double cosine = geo::Dot(normal, goal);
+  if (cosine >= kCosWidestTurn) return normal;
+  const geo::Vec3 across = geo::Normalized(normal - goal * cosine);
+  return goal * kCosWidestTurn + across * kSinWidestTurn;
+}
+
 }  // namespace
 
-std::vector<std::array<std::uint8_t, 2>> LatticeNormals(const LatticeView& lattice, const tin::TinMesh& mesh) {
-  const double step = lattice.lattice.StepDegrees();
+std::vector<std::array<std::uint8_t, 2>> TileNormals(const LatticeView& lattice, const tin::TinMesh& mesh,
+                                                     const QuantizedTile& tile) {
+  const std::vector<geo::Vec3> of_mesh = AreaWeightedNormals(tile);
   std::vector<std::array<std::uint8_t, 2>> normals;
   normals.reserve(mesh.vertices.size());
-  for (const tin::SamplePosition p : mesh.vertices) {
-    const double latitude = lattice.Latitude(p.y);
-    const LocalFrame frame = FrameOf(lattice.Longitude(p.x), latitude);
-    geo::Vec3 normal = frame.up;
-    if (latitude > -90 && latitude < 90) {
-      const double rise_east = static_cast<double>(lattice.At(p.x + 1, p.y)) - static_cast<double>(lattice.At(p.x - 1, p.y));
-      const double rise_north = static_cast<double>(lattice.At(p.x, p.y + 1)) - static_cast<double>(lattice.At(p.x, p.y - 1));
-      normal = geo::Normalized(normal - frame.east * (rise_east / (2 * step * geo::MetresPerDegreeEast(latitude))) -
-                               frame.north * (rise_north / (2 * step * geo::MetresPerDegreeNorth(latitude))));
+  for (std::size_t k = 0; k < mesh.vertices.size(); ++k) {
+    const tin::SamplePosition p = mesh.vertices[k];
+    const LocalFrame frame = FrameOf(lattice.Longitude(p.x), lattice.Latitude(p.y));
+    geo::Vec3 normal = LatticeNormal(lattice, frame, p);
+    if (p.x > 0 && p.y > 0 && p.x < lattice.cells() && p.y < lattice.cells()) {
+      const geo::Vec3 turned = TurnTowards(normal, geo::Normalized(of_mesh[k]));
+      if (geo::Dot(turned, frame.up) > kLowestUp) normal = turned;
     }
     normals.push_back(OctEncode(normal));
   }

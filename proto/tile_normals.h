@@ -1,4 +1,4 @@
-// Normals of a tile's vertices from the height lattice.
+// Normals of a tile's vertices.
 #pragma once
 
 #include <array>
@@ -7,12 +7,17 @@
 
 #include "engine/tin/tin_mesh.h"
 #include "proto/lattice_view.h"
+#include "proto/quantized_mesh.h"
 
 namespace terrace::proto {
 
-// Oct-encoded unit normals in ECEF, one per vertex of `mesh`: central differences of the heights over one lattice step on
-// each side, so that they are a function of the global node and equal in every tile that shares it. On a pole the
-// ellipsoid's normal.
-std::vector<std::array<std::uint8_t, 2>> LatticeNormals(const LatticeView& lattice, const tin::TinMesh& mesh);
+// Oct-encoded unit normals in ECEF, one per vertex of `mesh`, which is the mesh that `tile` was quantized from.
+//
+// On the edges the gradient of the heights, by central differences over one lattice step on each side: a function of the
+// global node and so equal in every tile that shares it; on a pole the ellipsoid's normal. Inside the same, but turned to
+// within 13 degrees of the mesh's own area-weighted normal: where the mesh drops relief that the lattice has, and at
+// cliffs, light must still fit the triangles that it falls on.
+std::vector<std::array<std::uint8_t, 2>> TileNormals(const LatticeView& lattice, const tin::TinMesh& mesh,
+                                                     const QuantizedTile& tile);
 
 }  // namespace terrace::proto

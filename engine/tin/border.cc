@@ -21,8 +21,10 @@ struct BorderEdge {
   double HeightAt(int k) const { return static_cast<double>(along_x ? field.At(k, across) : field.At(across, k)); }
   double ChordAt(int k) const { return (h_a * (b - k) + h_b * (k - a)) / (b - a); }
   std::uint32_t SampleAt(int k) const {
-    return along_x ? static_cast<std::uint32_t>(across) * static_cast<std::uint32_t>(field.width()) + static_cast<std::uint32_t>(k)
-                   : static_cast<std::uint32_t>(k) * static_cast<std::uint32_t>(field.width()) + static_cast<std::uint32_t>(across);
+    return along_x ? static_cast<std::uint32_t>(across) * static_cast<std::uint32_t>(field.width()) +
+                         static_cast<std::uint32_t>(k)
+                   : static_cast<std::uint32_t>(k) * static_cast<std::uint32_t>(field.width()) +
+                         static_cast<std::uint32_t>(across);
   }
 
   const HeightField& field;

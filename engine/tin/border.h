@@ -1,7 +1,7 @@
 // One-dimensional simplification of a field's borders: how samples between two neighbouring border vertices are judged.
 //
-// Everything here is a function of the border's own samples and vertices (BorderOptions in greedy.h states the rule), so
-// that two fields with a border in common choose the same vertices on it. Safe to call from many threads at once.
+// Everything here is a function of the border's own samples and vertices (BorderOptions in greedy.h states the rule),
+// so that two fields with a border in common choose the same vertices on it. Safe to call from many threads at once.
 #pragma once
 
 #include <cstdint>

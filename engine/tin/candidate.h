@@ -9,7 +9,7 @@ inline constexpr std::uint32_t kNoSample = 0xFFFFFFFF;
 
 // The default is "none": every real candidate comes before it.
 struct Candidate {
-  double error = 0;                 // metres, weighted; > 0 unless there is none
+  double error = 0;                  // metres, weighted; > 0 unless there is none
   std::uint32_t sample = kNoSample;  // row-major index
 
   // The total order of insertions: larger error first, then smaller index.

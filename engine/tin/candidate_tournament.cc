@@ -58,7 +58,9 @@ bool CandidateTournament::Beats(std::uint32_t slot, std::uint32_t other) const {
 std::uint32_t CandidateTournament::Play(std::size_t level, std::size_t block) const {
   const std::size_t players = level == 0 ? candidates_.size() : levels_[level - 1].winners.size();
   const std::size_t first = block * kFanOut, last = std::min(first + kFanOut, players);
-  const auto player = [&](std::size_t i) { return level == 0 ? static_cast<std::uint32_t>(i) : levels_[level - 1].winners[i]; };
+  const auto player = [&](std::size_t i) {
+    return level == 0 ? static_cast<std::uint32_t>(i) : levels_[level - 1].winners[i];
+  };
   std::uint32_t winner = player(first);
   for (std::size_t i = first + 1; i < last; ++i) {
     // Players come in ascending slots, so an equal candidate keeps the smaller one.

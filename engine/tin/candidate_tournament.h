@@ -1,8 +1,9 @@
 // The queue of greedy insertion: one candidate per triangle slot, and which slot's candidate comes first.
 //
-// A max tournament of fan-out 64. Level 0 holds, for each block of 64 slots, the slot that wins it; each higher level does
-// the same for 64 blocks below. Changing a slot costs nothing but a mark, unless it takes the lead of its block at once;
-// marked blocks are played again when somebody asks for the winner. No back pointers into the slots, as a heap needs.
+// A max tournament of fan-out 64. Level 0 holds, for each block of 64 slots, the slot that wins it; each higher level
+// does the same for 64 blocks below. Changing a slot costs nothing but a mark, unless it takes the lead of its block at
+// once; marked blocks are played again when somebody asks for the winner. No back pointers into the slots, as a heap
+// needs.
 #pragma once
 
 #include <cstddef>
@@ -27,8 +28,8 @@ class CandidateTournament {
   static constexpr std::size_t kFanOut = 64;
 
   struct Level {
-    std::vector<std::uint32_t> winners;      // by block: the slot that wins it
-    std::vector<std::uint8_t> is_stale;      // by block
+    std::vector<std::uint32_t> winners;  // by block: the slot that wins it
+    std::vector<std::uint8_t> is_stale;  // by block
     std::vector<std::uint32_t> stale_blocks;
   };
 

@@ -106,8 +106,8 @@ bool GreedyTriangulation::Impl::Run(const GreedyGoal& goal, const std::stop_toke
   }
 }
 
-// Depends on the mesh alone until the goal is met: a run to a coarser error is a prefix of a run to a finer one. Hence seeds
-// are due at the larger of the current and the wanted error, and not only when a sample is to be inserted.
+// Depends on the mesh alone until the goal is met: a run to a coarser error is a prefix of a run to a finer one. Hence
+// seeds are due at the larger of the current and the wanted error, and not only when a sample is to be inserted.
 std::optional<GreedyTriangulation::Impl::Insertion> GreedyTriangulation::Impl::NextInsertion(const GreedyGoal& goal) {
   if (IsMet(goal)) return std::nullopt;
   if (const auto seed = NextSeed(goal)) return seed;

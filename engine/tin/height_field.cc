@@ -46,7 +46,8 @@ float HeightField::VertexHeight(int x, int y) const {
       for (int column = x - r; column <= x + r; column += step) {
         if (column < 0 || column >= width_ || std::isnan(At(column, row))) continue;
         const std::int64_t dx = column - x, dy = row - y, distance = dx * dx + dy * dy;
-        const bool nearer = distance < best || (distance == best && (row < best_y || (row == best_y && column < best_x)));
+        const bool nearer =
+            distance < best || (distance == best && (row < best_y || (row == best_y && column < best_x)));
         if (!nearer) continue;
         best = distance;
         best_x = column;

@@ -74,7 +74,8 @@ MeshError MeasureError(const HeightField& field, const TinMesh& mesh, std::stop_
         if (std::isnan(sample_height)) continue;
         const SamplePosition p{static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)};
         // Relative to one corner's height: exact at the corners, and no cancellation of large common heights.
-        const auto weight_b = static_cast<double>(Orientation(c, a, p)), weight_c = static_cast<double>(Orientation(a, b, p));
+        const auto weight_b = static_cast<double>(Orientation(c, a, p)),
+                   weight_c = static_cast<double>(Orientation(a, b, p));
         const double surface = z_a + (weight_b * (z_b - z_a) + weight_c * (z_c - z_a)) / doubled_area;
         measure(static_cast<std::size_t>(y) * width + static_cast<std::size_t>(x),
                 std::abs(surface - static_cast<double>(sample_height)));

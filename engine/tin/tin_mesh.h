@@ -15,8 +15,10 @@ struct SamplePosition {
 };
 
 struct TinMesh {
-  std::vector<SamplePosition> vertices;                 // the field's four corners first, then in order of insertion
-  std::vector<std::array<std::uint32_t, 3>> triangles;  // counter-clockwise in (x, y); they cover the field exactly once
+  // The field's four corners first, counter-clockwise from (0, 0), then in order of insertion.
+  std::vector<SamplePosition> vertices;
+  // Counter-clockwise in (x, y); they cover the field exactly once.
+  std::vector<std::array<std::uint32_t, 3>> triangles;
 };
 
 }  // namespace terrace::tin

@@ -42,7 +42,7 @@ PlaneMisfit WorstSample(const HeightField& field, const std::array<Corner, 3>& c
 
 double SquaredDistances(const HeightField& field, const std::array<Corner, 3>& corners) {
   const std::array<Corner, 3> sorted = SortedByRow(corners);
-  const auto& [a, b, c] = sorted;
+  const Corner &a = sorted[0], &b = sorted[1], &c = sorted[2];
   const Plane plane(sorted);
   double sum = 0;
   ForEachInnerSpan(sorted, plane.doubled_area, field.width(), field.height(), [&](int y, int first, int last) {

@@ -1,8 +1,8 @@
 // The worst sample of one triangle: the inner loop of greedy insertion.
 //
 // "Its samples" are those of ForEachInnerSpan: the closed triangle without its corners and without the field's border,
-// which is judged by a rule of its own (border.h). Voids are skipped. The result is a function of the field and the three
-// corners, in any order. Safe to call from many threads at once.
+// which is judged by a rule of its own (border.h). Voids are skipped. The result is a function of the field and the
+// three corners, in any order. Safe to call from many threads at once.
 #pragma once
 
 #include <array>

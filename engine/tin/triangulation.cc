@@ -3,8 +3,8 @@
 #include "engine/core/check.h"
 #include "engine/tin/predicates.h"
 
-// Invariant of an insertion: every triangle around the new vertex p is stored as (u, v, p), so that its half-edge 0 is the
-// edge opposite p. Splits establish it, flips keep it, and only opposite edges ever become suspect.
+// Invariant of an insertion: every triangle around the new vertex p is stored as (u, v, p), so that its half-edge 0 is
+// the edge opposite p. Splits establish it, flips keep it, and only opposite edges ever become suspect.
 namespace terrace::tin {
 
 Triangulation::Triangulation(int width, int height) {
@@ -46,8 +46,8 @@ std::span<const TriangleId> Triangulation::Insert(SamplePosition point, Triangle
 }
 
 TriangleId Triangulation::Locate(SamplePosition point, TriangleId start) const {
-  // In a Delaunay triangulation this walk visits no triangle twice: each step lowers the power of the point with respect
-  // to the triangle's circumcircle, or stays on one circle, whose triangles form a tree.
+  // In a Delaunay triangulation this walk visits no triangle twice: each step lowers the power of the point with
+  // respect to the triangle's circumcircle, or stays on one circle, whose triangles form a tree.
   TriangleId t = start;
   for (unsigned i = 0; i < 3;) {
     const HalfEdgeId edge = 3 * t + i;
@@ -183,8 +183,8 @@ void Triangulation::FlipOppositeEdge(TriangleId t) {
   star_.push_back(s);
 }
 
-// A flip that the in-circle test asks for is always possible: w lies strictly inside the circle through u, v, p and beyond
-// uv, so it is seen from p between u and v, and the quadrilateral is strictly convex.
+// A flip that the in-circle test asks for is always possible: w lies strictly inside the circle through u, v, p and
+// beyond uv, so it is seen from p between u and v, and the quadrilateral is strictly convex.
 void Triangulation::Legalize() {
   suspects_.assign(star_.rbegin(), star_.rend());
   while (!suspects_.empty()) {

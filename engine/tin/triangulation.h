@@ -1,13 +1,13 @@
 // The topology of a Delaunay triangulation of a rectangle of samples: insert a point, get the triangles that changed.
 //
-// Half-edges in compact parallel arrays: triangle t owns the half-edges 3t, 3t+1, 3t+2, counter-clockwise; half-edge e runs
-// from corner(e) to the corner of the next half-edge of its triangle, and twin(e) is the same edge seen from the
+// Half-edges in compact parallel arrays: triangle t owns the half-edges 3t, 3t+1, 3t+2, counter-clockwise; half-edge e
+// runs from corner(e) to the corner of the next half-edge of its triangle, and twin(e) is the same edge seen from the
 // neighbour, kNone on the border of the rectangle. Triangles are never freed: slots are reused by the triangles that
 // replace them, and new ones are appended.
 //
-// Guibas and Stolfi's incremental algorithm ("Primitives for the Manipulation of General Subdivisions", 1985) with Lawson
-// flips. Everything is decided in integers, and four points on one circle keep the diagonal they have: the triangulation
-// is a function of the sequence of insertions alone.
+// Guibas and Stolfi's incremental algorithm ("Primitives for the Manipulation of General Subdivisions", 1985) with
+// Lawson flips. Everything is decided in integers, and four points on one circle keep the diagonal they have: the
+// triangulation is a function of the sequence of insertions alone.
 //
 // Not thread-safe; different objects are independent.
 #pragma once
@@ -34,8 +34,8 @@ class Triangulation {
   Triangulation(int width, int height);
 
   // Inserts a vertex into `triangle`, which must contain the point in its inside or on an edge; it must not be a vertex
-  // yet. Returns the triangles around the new vertex: all that are new or changed, in a deterministic order, valid until
-  // the next insertion.
+  // yet. Returns the triangles around the new vertex: all that are new or changed, in a deterministic order, valid
+  // until the next insertion.
   std::span<const TriangleId> Insert(SamplePosition point, TriangleId triangle);
 
   // A triangle that contains the point, inside, on an edge or as a corner, found by a walk from `start`.
@@ -48,7 +48,9 @@ class Triangulation {
   SamplePosition position(VertexId vertex) const { return positions_[vertex]; }
   VertexId corner(HalfEdgeId edge) const { return corners_[edge]; }
   HalfEdgeId twin(HalfEdgeId edge) const { return twins_[edge]; }
-  std::array<VertexId, 3> triangle(TriangleId t) const { return {corners_[3 * t], corners_[3 * t + 1], corners_[3 * t + 2]}; }
+  std::array<VertexId, 3> triangle(TriangleId t) const {
+    return {corners_[3 * t], corners_[3 * t + 1], corners_[3 * t + 2]};
+  }
   const std::vector<SamplePosition>& positions() const { return positions_; }
 
   static constexpr HalfEdgeId Next(HalfEdgeId edge) { return edge % 3 == 2 ? edge - 2 : edge + 1; }

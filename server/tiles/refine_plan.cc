@@ -33,11 +33,11 @@ tin::Curvature MakeCurvature(const proto::LatticeView& lattice) {
   return curvature;
 }
 
-// The coarsest grid whose triangles sag at most a quarter of the error leaves the rest of it to the relief, and gives the
+// The coarsest grid whose triangles sag at most half of the error leaves the rest of it to the relief, and gives the
 // insertion triangles small enough to place samples by relief alone.
 tin::SeedGrid MakeSeedGrid(const proto::LatticeView& lattice, double error_m) {
   int divisions = 1;
-  while (divisions < lattice.cells() / 2 && GridSagitta(lattice.key.level, divisions) > error_m / 4) divisions *= 2;
+  while (divisions < lattice.cells() / 2 && GridSagitta(lattice.key.level, divisions) > error_m / 2) divisions *= 2;
   return {std::numeric_limits<double>::infinity(), lattice.cells() / divisions};
 }
 

@@ -135,7 +135,7 @@ Result<EncodedTile> TilePipeline::Build(const TileRequest& request, std::stop_to
   if (!proto::AllCounterClockwise(measured->tile)) {
     return MakeError(ErrorCode::kInternal, "{}/{}: a triangle turned over", dataset.name, geo::ToString(request.key));
   }
-  if (request.normals) measured->tile.normals = proto::LatticeNormals(lattice, measured->mesh);
+  if (request.normals) measured->tile.normals = proto::TileNormals(lattice, measured->mesh, measured->tile);
   encoded.bytes = proto::EncodeQuantizedMesh(measured->tile, {.normals = request.normals});
   encoded.times.encode = Since(start);
 

@@ -1,5 +1,6 @@
 // The viewer: datasets from the server, controls from the panel, terrain on the globe, and the view in the URL.
-import { Globe, suggestedFraction } from "/viewer/globe.js";
+import { suggestedFraction } from "/viewer/framing.js";
+import { Globe } from "/viewer/globe.js";
 import { Panel, fractionOfStep, stepOfFraction } from "/viewer/panel.js";
 import { Traffic } from "/viewer/traffic.js";
 import { decodeView, encodeView } from "/viewer/view_url.js";
@@ -119,7 +120,9 @@ async function start() {
   } catch (error) {
     return complain(`The list of datasets could not be read: ${error.message}. Is the server running?`);
   }
-  if (state.datasets.length === 0) return complain("This server has no datasets. Start it with a DEM: terrace serve maui.tif");
+  if (state.datasets.length === 0) {
+    return complain("This server has no datasets. Start it with a DEM: terrace serve maui.tif");
+  }
   panel.setDatasets(state.datasets);
   setInterval(refresh, 400);
   await apply(decodeView(location.hash));

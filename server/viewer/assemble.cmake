@@ -1,4 +1,5 @@
-# cmake -DSOURCE_DIR= -DOUTPUT_DIR= -DNPM= -DPAGE= -P assemble.cmake: builds the viewer's folder from scratch.
+# cmake -DSOURCE_DIR= -DOUTPUT_DIR= -DNPM= -DPAGE= -DSTAMP= -P assemble.cmake: builds the viewer's folder from scratch.
+# The stamp is set only when CesiumJS is in it: without, the next build tries again.
 file(REMOVE_RECURSE "${OUTPUT_DIR}")
 file(COPY ${PAGE} DESTINATION "${OUTPUT_DIR}")
 
@@ -21,3 +22,6 @@ endif()
 file(GLOB_RECURSE compressible "${OUTPUT_DIR}/*.html" "${OUTPUT_DIR}/*.css" "${OUTPUT_DIR}/*.js" "${OUTPUT_DIR}/*.json"
      "${OUTPUT_DIR}/*.wasm" "${OUTPUT_DIR}/*.svg")
 execute_process(COMMAND gzip -n -9 -k -f ${compressible} COMMAND_ERROR_IS_FATAL ANY)
+if(EXISTS "${OUTPUT_DIR}/cesium")
+  file(TOUCH "${STAMP}")
+endif()

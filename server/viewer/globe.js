@@ -1,49 +1,19 @@
 // The CesiumJS side of the page: the widget, the terrain in it, the camera, picking, and what is being drawn.
 import {
-  BoundingSphere, CameraEventType, Cartesian3, Cartographic, CesiumTerrainProvider, CesiumWidget, Color, HeadingPitchRange,
-  Math as CesiumMath, PointPrimitiveCollection, ScreenSpaceEventHandler, ScreenSpaceEventType,
+  BoundingSphere, CameraEventType, Cartesian3, Cartographic, CesiumTerrainProvider, CesiumWidget, Color,
+  HeadingPitchRange, Math as CesiumMath, PointPrimitiveCollection, ScreenSpaceEventHandler, ScreenSpaceEventType,
 } from "/viewer/cesium/index.js";
+import { boxOf, extent, isGlobal, kGlobalDistance, pixelTolerance, viewDistance } from "/viewer/framing.js";
+import { steerByKeyboard } from "/viewer/keyboard.js";
 import { makeTerrainMaterial, niceInterval, setHeights } from "/viewer/material.js";
 
-const kMetresPerDegree = 111320;
-const kGlobalWidth = 100;  // a dataset wider than this, in degrees, is shown as a whole globe
-const kGlobalDistance = 1.75e7;  // metres from which the whole globe fits
-const kSoftware = /swiftshader|llvmpipe|software|basic render/i;  // drawn without a GPU: smooth edges cost too much there
-
-// Middle and size of [west, south, east, north], degrees; east < west means across the antimeridian.
-function boxOf([west, south, east, north]) {
-  const width = east >= west ? east - west : east - west + 360;
-  return { longitude: west + width / 2, latitude: (south + north) / 2, width, height: north - south };
-}
-
-function isGlobal(dataset) {
-  return boxOf(dataset.bounds).width > kGlobalWidth;
-}
-
-// Diagonal of the dataset, metres.
-function extent(dataset) {
-  const { latitude, width, height } = boxOf(dataset.bounds);
-  return Math.hypot(width * Math.cos(CesiumMath.toRadians(latitude)), height) * kMetresPerDegree;
-}
-
-// Metres between the camera and the middle of a dataset seen whole.
-function viewDistance(dataset) {
-  return isGlobal(dataset) ? kGlobalDistance : extent(dataset) * (0.62 + 0.2 * Math.min(1, extent(dataset) / 5e6));
-}
-
-// Pixels of error at which CesiumJS goes a level deeper. Continents get more tiles, for the sake of their colours.
-function pixelTolerance(dataset) {
-  return extent(dataset) > 1.5e6 ? 0.5 : 1.5;
-}
-
-// The share of the level error that makes a first view of the dataset good: half of it, and less where the relief is so
-// small beside the extent that the level error (pixelTolerance pixels of 1.6 mm at one metre) exceeds 1/40 of it.
-export function suggestedFraction(dataset) {
-  const visible = (dataset.heights.max - dataset.heights.min) / 40;
-  return Math.min(0.5, visible / (0.0016 * pixelTolerance(dataset) * viewDistance(dataset)));
-}
+// Drawn without a GPU: smooth edges cost too much there.
+const kSoftware = /swiftshader|llvmpipe|software|basic render/i;
+const kWorldMiddle = [82, 18];  // longitude and latitude in front when all of the Earth is shown: the highest ground
 
 export class Globe {
+  #latest = 0;  // counts show(): of two that overlap only the later one may set the terrain
+
   // `onError` gets a sentence for the reader of the page.
   constructor(container, onError) {
     const credits = document.createElement("div");  // the page states the attribution itself
@@ -53,6 +23,7 @@ export class Globe {
     });
     this.widget.resolutionScale = Math.min(2, devicePixelRatio) / devicePixelRatio;
     this.scene = this.widget.scene;
+    this.container = container;
     this.onError = onError;
     this.contours = false;
     this.interval = 0;
@@ -86,21 +57,22 @@ export class Globe {
     return names ? gl.getParameter(names.UNMASKED_RENDERER_WEBGL) : "";
   }
 
-  // Shows `dataset` at `fraction` of the level error. Throws with a readable message if the server does not describe it.
+  // Shows `dataset` at `fraction` of the level error. Throws a readable message if the server does not describe it.
   async show(dataset, fraction) {
     const url = `${dataset.urls.layer.replace(/layer\.json.*$/, "")}?fraction=${fraction}`;
+    const turn = ++this.#latest;
     const provider = await CesiumTerrainProvider.fromUrl(url, { requestVertexNormals: true });
     // CesiumJS takes a missing layer.json for an ancient server of height maps.
     if (!provider.availability) throw new Error(`${url} does not describe any terrain`);
+    if (turn !== this.#latest) return;
     provider.errorEvent.addEventListener((failure) => this.onError(failure.message));
 
     this.#drawCurtain();
     const { longitude, latitude, width, height } = boxOf(dataset.bounds);
-    const radians = CesiumMath.toRadians;
     setHeights(this.material, dataset.heights);
-    this.material.uniforms.box = { x: radians(longitude), y: radians(latitude), z: radians(width / 2), w: radians(height / 2) };
+    const [x, y, z, w] = [longitude, latitude, width / 2, height / 2].map(CesiumMath.toRadians);
+    this.material.uniforms.box = { x, y, z, w };
     this.material.uniforms.shading = provider.hasVertexNormals ? 1 : 0;
-    this.scene.globe.maximumScreenSpaceError = pixelTolerance(dataset);
     this.widget.terrainProvider = provider;
     this.adaptToCamera();
   }
@@ -110,7 +82,8 @@ export class Globe {
     const { canvas, globe, camera } = this.scene;
     if (globe.terrainProvider.availability === undefined) return;
     this.scene.render();
-    const curtain = Object.assign(document.createElement("canvas"), { className: "curtain", width: canvas.width, height: canvas.height });
+    const { width, height } = canvas;
+    const curtain = Object.assign(document.createElement("canvas"), { className: "curtain", width, height });
     curtain.getContext("2d").drawImage(canvas, 0, 0);
     canvas.parentElement.append(curtain);
     const stop = [];
@@ -129,14 +102,16 @@ export class Globe {
     const { longitude, latitude, width, height } = boxOf(dataset.bounds);
     const narrow = Math.max(1, 0.8 * this.scene.canvas.clientHeight / this.scene.canvas.clientWidth);
     if (isGlobal(dataset)) {
-      const destination = Cartesian3.fromDegrees(width > 350 ? 82 : longitude, width > 350 ? 18 : latitude, kGlobalDistance * narrow);
+      const [eastward, northward] = width > 350 ? kWorldMiddle : [longitude, latitude];
+      const destination = Cartesian3.fromDegrees(eastward, northward, kGlobalDistance * narrow);
       return seconds > 0 ? camera.flyTo({ destination, duration: seconds }) : camera.setView({ destination });
     }
     const size = extent(dataset);
     const pitch = -28 - 45 * Math.min(1, size / 5e6);
     const ground = Math.max(0, dataset.heights.min) * 0.6 + Math.max(0, dataset.heights.max) * 0.2;
     const sphere = new BoundingSphere(Cartesian3.fromDegrees(longitude, latitude, ground), size / 2);
-    const offset = new HeadingPitchRange(CesiumMath.toRadians(32), CesiumMath.toRadians(pitch), viewDistance(dataset) * narrow);
+    const [heading, tilt] = [32, pitch].map(CesiumMath.toRadians);
+    const offset = new HeadingPitchRange(heading, tilt, viewDistance(dataset) * narrow);
     camera.flyToBoundingSphere(sphere, { offset, duration: seconds });
   }
 
@@ -177,12 +152,12 @@ export class Globe {
     this.scene.requestRender();
   }
 
-  // What follows the distance: contour interval, strength of the shading, roundness of the globe.
+  // What follows the distance: depth of tiles, contour interval, strength of the shading, roundness of the globe.
   adaptToCamera() {
     const { camera, canvas } = this.scene;
-    const { x, y, z } = camera.position;
     const middle = camera.pickEllipsoid({ x: canvas.clientWidth / 2, y: canvas.clientHeight * 0.6 });
-    const distance = middle ? Cartesian3.distance(middle, { x, y, z }) : camera.positionCartographic.height * 3;
+    const distance = middle ? Cartesian3.distance(middle, camera.positionWC) : camera.positionCartographic.height * 3;
+    this.scene.globe.maximumScreenSpaceError = pixelTolerance(distance);
     const { uniforms } = this.material;
     this.interval = niceInterval(Math.max(1, Math.min(distance * 0.0022, 2000)));
     uniforms.contourInterval = this.contours ? this.interval : 0;
@@ -193,9 +168,13 @@ export class Globe {
     this.scene.requestRender();
   }
 
-  // Calls back with {longitude, latitude, height} (degrees, metres above the ellipsoid) of the clicked ground, or undefined.
+  // Calls back with {longitude, latitude, height} of the clicked ground (degrees, metres above the ellipsoid), or
+  // undefined beside the globe.
   onPick(callback) {
-    const handler = new ScreenSpaceEventHandler(this.scene.canvas);
+    const { canvas, camera } = this.scene;
+    const handler = new ScreenSpaceEventHandler(canvas);
+    const middle = () => ({ x: canvas.clientWidth / 2, y: canvas.clientHeight / 2 });
+    steerByKeyboard(this.container, camera, () => callback(this.pick(middle())));
     handler.setInputAction(({ position }) => callback(this.pick(position)), ScreenSpaceEventType.LEFT_CLICK);
   }
 
@@ -205,8 +184,10 @@ export class Globe {
     this.marker.removeAll();
     this.scene.requestRender();
     if (!point) return undefined;
-    this.marker.add({ position: point, pixelSize: 9, color: Color.fromCssColorString("#f7e3b4"), outlineColor: Color.BLACK,
-                      outlineWidth: 2, disableDepthTestDistance: 5e6 });
+    this.marker.add({
+      position: point, pixelSize: 9, color: Color.fromCssColorString("#f7e3b4"), outlineColor: Color.BLACK,
+      outlineWidth: 2, disableDepthTestDistance: 5e6,
+    });
     const ground = Cartographic.fromCartesian(point);
     return { longitude: CesiumMath.toDegrees(ground.longitude), latitude: CesiumMath.toDegrees(ground.latitude),
              height: ground.height / this.exaggeration };

@@ -1,10 +1,11 @@
-// The look of the terrain: one globe material that colours by height, shades by the tiles' vertex normals and draws contour
-// lines. The light stands in the local north-west of every point, as on a printed map: no hemisphere is ever dark.
+// The look of the terrain: one globe material that colours by height, shades by the tiles' vertex normals and draws
+// contour lines. The light stands in the local north-west of every point, as on a printed map: no hemisphere is dark.
 import { Material } from "/viewer/cesium/index.js";
 
-// Depth and height as fractions of what the dataset has, and sRGB. Land is stretched towards low ground, where most of it lies.
+// Depth and height as fractions of what the dataset has, and sRGB. Low ground, where most land lies, gets most colours.
 const kSea = [
-  [0.0, 5, 16, 48], [0.25, 10, 44, 98], [0.5, 20, 78, 138], [0.75, 38, 112, 168], [0.93, 78, 154, 196], [1.0, 136, 196, 212],
+  [0.0, 5, 16, 48], [0.25, 10, 44, 98], [0.5, 20, 78, 138], [0.75, 38, 112, 168], [0.93, 78, 154, 196],
+  [1.0, 136, 196, 212],
 ];
 const kLand = [
   [0.0, 74, 122, 84], [0.07, 98, 144, 88], [0.16, 146, 166, 98], [0.28, 200, 184, 118], [0.42, 198, 154, 94],
@@ -12,8 +13,8 @@ const kLand = [
 ];
 // A lowest height above this is taken for land below the ellipsoid, not for a sea floor.
 const kShallowestSeaFloor = -200;
-// Datasets of land alone store the sea as a plain: low and level ground below this share of the heights is drawn as water,
-// if the dataset comes down to the sea at all.
+// Datasets of land alone store the sea as a plain: level ground below this share of the heights is drawn as water, if
+// the dataset comes down to the sea at all.
 const kWaterShare = 0.025;
 const kHighestSea = 50;
 const kLeastRelief = 300;
@@ -58,16 +59,16 @@ const vec3 kAir = vec3(0.45, 0.62, 0.82);
 const vec3 kWater = vec3(0.20, 0.45, 0.62);
 const vec3 kElsewhere = vec3(0.105, 0.135, 0.175);
 
-// 1 on a line, 0 between lines; value is in units of the spacing. Fades where lines would be denser than every fourth pixel,
-// and on level ground, where all of it would be line.
+// 1 on a line, 0 between lines; value is in units of the spacing. Fades where lines would be denser than every fourth
+// pixel, and on level ground, where all of it would be line.
 float lines(float value, float widthPixels) {
   float perPixel = max(fwidth(value), 1e-7);
   float distancePixels = abs(fract(value - 0.5) - 0.5) / perPixel;
-  return (1.0 - smoothstep(widthPixels * 0.5, widthPixels * 0.5 + 1.0, distancePixels)) * (1.0 - smoothstep(0.12, 0.3, perPixel))
-      * smoothstep(0.0, 0.002, perPixel);
+  float line = 1.0 - smoothstep(widthPixels * 0.5, widthPixels * 0.5 + 1.0, distancePixels);
+  return line * (1.0 - smoothstep(0.12, 0.3, perPixel)) * smoothstep(0.0, 0.002, perPixel);
 }
 
-// Brightness of a surface relative to level ground, lit from compass direction (x east, y north) at 40 degrees of altitude.
+// Brightness of a surface relative to level ground, lit from a compass direction (x east, y north), 40 degrees high.
 float lit(vec3 normalENU, vec2 towards) {
   return max(0.0, dot(normalENU, vec3(towards * 0.766, 0.643))) / 0.643;
 }
@@ -87,9 +88,11 @@ czm_material czm_getMaterial(czm_materialInput materialInput) {
   vec3 normal = vec3(dot(normalWC, east), dot(normalWC, north), dot(normalWC, up));
   float steepness = 1.0 - clamp(normal.z, 0.0, 1.0);
   // The triangle's own slope: an 8-bit normal cannot tell a sea from a plain.
-  float slope = fwidth(metres) / max(length(dFdx(materialInput.positionToEyeEC)) + length(dFdy(materialInput.positionToEyeEC)), 1e-6);
+  vec3 position = materialInput.positionToEyeEC;
+  float slope = fwidth(metres) / max(length(dFdx(position)) + length(dFdy(position)), 1e-6);
   float level = 1.0 - smoothstep(0.0003, 0.0015, slope);
-  colour = mix(colour, kWater, level * (1.0 - smoothstep(0.7, 1.0, (metres - heightRange.x) / max(water - heightRange.x, 1e-3))));
+  float towardsShore = (metres - heightRange.x) / max(water - heightRange.x, 1e-3);
+  colour = mix(colour, kWater, level * (1.0 - smoothstep(0.7, 1.0, towardsShore)));
   normal = normalize(vec3(normal.xy * relief, max(normal.z, 0.02)));
 
   // Bare rock where it is too steep for soil or snow.
@@ -97,7 +100,8 @@ czm_material czm_getMaterial(czm_materialInput materialInput) {
   colour = mix(colour, vec3(0.46, 0.42, 0.39) * (0.5 + luminance), smoothstep(0.18, 0.5, steepness) * 0.55);
 
   // Most of the light from the north-west, some from its two neighbours so that ridges along it keep their form.
-  float light = 0.7 * lit(normal, vec2(-0.707, 0.707)) + 0.15 * lit(normal, vec2(-1.0, 0.0)) + 0.15 * lit(normal, vec2(0.0, 1.0));
+  float light = 0.7 * lit(normal, vec2(-0.707, 0.707)) + 0.15 * lit(normal, vec2(-1.0, 0.0)) +
+                0.15 * lit(normal, vec2(0.0, 1.0));
   vec3 shade = mix(kShadow, vec3(1.0), smoothstep(-0.15, 1.05, light)) + kSunlight * 0.28 * max(0.0, light - 1.0);
   shade = mix(vec3(1.0), shade, shading);
   colour *= shade;
@@ -118,8 +122,8 @@ czm_material czm_getMaterial(czm_materialInput materialInput) {
   float grid = max(lines(longitude / graticule, 0.6), lines(latitude / graticule, 0.6));
   colour = mix(colour, (kElsewhere + 0.06 * grid) * mix(vec3(1.0), shade, 0.6), outside * (1.0 - wire));
 
-  // From afar the globe is round: lit over the viewer's left shoulder, with a thin bright rim of air. Near the ground the
-  // air is between the viewer and the distance.
+  // From afar the globe is round: lit over the viewer's left shoulder, with a thin bright rim of air. Near the ground
+  // the air is between the viewer and the distance.
   vec3 toEye = normalize(czm_viewerPositionWC - positionWC);
   vec3 overShoulder = normalize(czm_inverseViewRotation * vec3(-0.5, 0.5, 0.8));
   colour *= mix(1.0, 0.42 + 0.72 * max(0.0, dot(up, overShoulder)), farness * (1.0 - wire));

@@ -6,7 +6,8 @@ import { kPhases } from "/viewer/traffic.js";
 const kCoarsest = -4;
 const kFinest = 10;
 export const fractionOfStep = (step) => 2 ** (-step / 2);
-export const stepOfFraction = (fraction) => Math.min(kFinest, Math.max(kCoarsest, Math.round(-2 * Math.log2(fraction))));
+export const stepOfFraction = (fraction) =>
+  Math.min(kFinest, Math.max(kCoarsest, Math.round(-2 * Math.log2(fraction))));
 
 const byId = (id) => document.getElementById(id);
 const number = new Intl.NumberFormat("en");
@@ -16,7 +17,8 @@ const compact = new Intl.NumberFormat("en", { notation: "compact", maximumSignif
 function formatMetres(metres) {
   const size = Math.abs(metres);
   const digits = size >= 100 ? 0 : size >= 10 ? 1 : 2;
-  return size >= 10000 ? `${plain.format(Math.round(metres / 100) / 10)} km` : `${plain.format(Number(metres.toFixed(digits)))} m`;
+  if (size >= 10000) return `${plain.format(Math.round(metres / 100) / 10)} km`;
+  return `${plain.format(Number(metres.toFixed(digits)))} m`;
 }
 
 function formatBytes(bytes) {

@@ -6,7 +6,8 @@ export const kPhases = ["read", "refine", "encode", "compress"];
 export class Traffic {
   constructor() {
     this.reset();
-    new PerformanceObserver((list) => list.getEntries().forEach((entry) => this.#add(entry))).observe({ type: "resource" });
+    const observer = new PerformanceObserver((list) => list.getEntries().forEach((entry) => this.#add(entry)));
+    observer.observe({ type: "resource" });
     this.#watchErrorHeader();
   }
 

@@ -39,9 +39,11 @@ std::optional<TestRaster> ReadTestRaster(std::string_view name, int x, int y, in
   if (width == 0) width = dataset->GetRasterXSize() - x;
   if (height == 0) height = dataset->GetRasterYSize() - y;
 
-  TestRaster raster{width, height, std::vector<float>(static_cast<std::size_t>(width) * static_cast<std::size_t>(height))};
+  TestRaster raster{width, height,
+                    std::vector<float>(static_cast<std::size_t>(width) * static_cast<std::size_t>(height))};
   GDALRasterBand* band = dataset->GetRasterBand(1);
-  if (band->RasterIO(GF_Read, x, y, width, height, raster.heights.data(), width, height, GDT_Float32, 0, 0) != CE_None) {
+  if (band->RasterIO(GF_Read, x, y, width, height, raster.heights.data(), width, height, GDT_Float32, 0, 0) !=
+      CE_None) {
     return std::nullopt;
   }
   int has_nodata = 0;

@@ -22,8 +22,8 @@ struct TestRaster {
   std::vector<float> heights;
 };
 
-// A window at (x, y) of width x height samples, the whole raster when width is 0. Nothing when the file is missing, cannot
-// be read, or does not contain the window.
+// A window at (x, y) of width x height samples, the whole raster when width is 0. Nothing when the file is missing,
+// cannot be read, or does not contain the window.
 std::optional<TestRaster> ReadTestRaster(std::string_view name, int x = 0, int y = 0, int width = 0, int height = 0);
 
 }  // namespace terrace::test_support

@@ -61,7 +61,8 @@ TEST(Border, IsTheSameInBothNeighboursWhateverTheirInsides) {
   for (std::uint64_t seed = 0; seed < 12; ++seed) {
     Random random(seed);
     std::vector<float> shared;
-    for (int y = 0; y < kSide; ++y) shared.push_back(seed % 3 == 0 ? static_cast<float>(random.Below(6)) : HillHeight(0, y, seed));
+    for (int y = 0; y < kSide; ++y)
+      shared.push_back(seed % 3 == 0 ? static_cast<float>(random.Below(6)) : HillHeight(0, y, seed));
     const double roughness = std::pow(10, random.Below(4) - 1);
     const HeightField west = MakeField(kSide, kSide, [&](int x, int y) {
       return x == kSide - 1 ? shared[static_cast<std::size_t>(y)] : static_cast<float>(random.Unit() * roughness);
@@ -77,7 +78,8 @@ TEST(Border, IsTheSameInBothNeighboursWhateverTheirInsides) {
     for (const double error : {60.0, 20.0, 10.0, 5.0, 3.0, 1.0, 0.4}) {
       EXPECT_TRUE(west_tin.Run({error}));
       EXPECT_TRUE(east_tin.Run({error}));
-      EXPECT_EQ(BorderVertices(west, west_tin.Mesh(), Side::kEast), BorderVertices(east, east_tin.Mesh(), Side::kWest)) << error;
+      EXPECT_EQ(BorderVertices(west, west_tin.Mesh(), Side::kEast), BorderVertices(east, east_tin.Mesh(), Side::kWest))
+          << error;
     }
   }
 }

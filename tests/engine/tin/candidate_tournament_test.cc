@@ -19,7 +19,8 @@ TEST(CandidateTournament, AgreesWithALinearSearch) {
     if (slot == candidates.size()) candidates.emplace_back();
     Candidate candidate;
     // Few different errors and samples: many ties. Errors fall, as they do in a run.
-    if (random.Below(5) > 0) candidate = {1 + (30000 - round) / 3000 + random.Below(4) * 0.5, static_cast<std::uint32_t>(random.Below(50))};
+    if (random.Below(5) > 0)
+      candidate = {1 + (30000 - round) / 3000 + random.Below(4) * 0.5, static_cast<std::uint32_t>(random.Below(50))};
     candidates[slot] = candidate;
     tournament.Set(slot, candidate);
     if (round % 7 != 0) continue;

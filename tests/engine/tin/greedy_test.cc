@@ -52,7 +52,8 @@ TEST(Greedy, InsertsInTheOrderOfTheNaiveAlgorithm) {
 TEST(Greedy, InsertsInTheOrderOfTheNaiveAlgorithmAroundVoids) {
   for (std::uint64_t seed = 0; seed < 8; ++seed) {
     Random random(seed);
-    const HeightField field = MakeField(9, 11, [&](int, int) { return random.Below(3) == 0 ? kVoid : static_cast<float>(random.Unit() * 9); });
+    const HeightField field = MakeField(
+        9, 11, [&](int, int) { return random.Below(3) == 0 ? kVoid : static_cast<float>(random.Unit() * 9); });
     ASSERT_TRUE(AreEqual(MeshAt(field, {0.5}), NaiveGreedy(field, {}, {0.5})));
   }
 }
@@ -79,12 +80,15 @@ TEST(Greedy, SurvivesExtremeHeights) {
   const float largest = std::numeric_limits<float>::max(), smallest = std::numeric_limits<float>::denorm_min();
   for (const float scale : {1e30f, 1e-30f, largest / 2, smallest}) {
     Random random(1);
-    const HeightField field = MakeField(20, 20, [&](int, int) { return static_cast<float>(random.Below(3) - 1) * scale; });
+    const HeightField field =
+        MakeField(20, 20, [&](int, int) { return static_cast<float>(random.Below(3) - 1) * scale; });
     GreedyTriangulation tin(field);
-    EXPECT_TRUE(tin.Run({static_cast<double>(scale) / 4, std::numeric_limits<std::size_t>::max(), static_cast<double>(scale) / 8}));
+    EXPECT_TRUE(tin.Run(
+        {static_cast<double>(scale) / 4, std::numeric_limits<std::size_t>::max(), static_cast<double>(scale) / 8}));
     const MeshError error = MeasureError(field, tin.Mesh());
     EXPECT_TRUE(std::isfinite(error.max) && std::isfinite(error.rms));
-    EXPECT_TRUE(error.max <= static_cast<double>(scale) / 4 * (1 + 1e-9) || error.rms <= static_cast<double>(scale) / 8 * (1 + 1e-9));
+    EXPECT_TRUE(error.max <= static_cast<double>(scale) / 4 * (1 + 1e-9) ||
+                error.rms <= static_cast<double>(scale) / 8 * (1 + 1e-9));
   }
 }
 
@@ -117,7 +121,8 @@ TEST(Greedy, NeverMakesAnInteriorVoidAVertex) {
   const TinMesh mesh = MeshAt(field, {1});
   EXPECT_TRUE(IsWithin(field, mesh, 1));
   EXPECT_TRUE(CoversExactly(field, mesh));
-  for (std::size_t i = 4; i < mesh.vertices.size(); ++i) EXPECT_FALSE(std::isnan(field.At(mesh.vertices[i].x, mesh.vertices[i].y)));
+  for (std::size_t i = 4; i < mesh.vertices.size(); ++i)
+    EXPECT_FALSE(std::isnan(field.At(mesh.vertices[i].x, mesh.vertices[i].y)));
 }
 
 TEST(Greedy, StopsAtTheNumberOfPoints) {
@@ -130,7 +135,8 @@ TEST(Greedy, StopsAtTheNumberOfPoints) {
 TEST(Greedy, StopsAtTheFirstMeshWithinTheRootMeanSquare) {
   const HeightField hills = HillField(65, 65, 6);
   Random random(3);
-  const HeightField holes = MakeField(50, 41, [&](int x, int y) { return random.Below(6) == 0 ? kVoid : HillHeight(x, y, 7); });
+  const HeightField holes =
+      MakeField(50, 41, [&](int x, int y) { return random.Below(6) == 0 ? kVoid : HillHeight(x, y, 7); });
   for (const HeightField* field : {&hills, &holes}) {
     for (const double rms : {8.0, 3.0, 0.7}) {
       GreedyGoal goal;

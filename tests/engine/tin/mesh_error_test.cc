@@ -15,7 +15,9 @@ TinMesh TwoTriangles(std::uint16_t east, std::uint16_t north) {
 }
 
 TEST(MeshError, MeasuresEverySampleOnce) {
-  const HeightField field = MakeField(3, 3, [](int x, int y) { return x == 1 && y == 1 ? 3.f : x == 1 && y == 0 ? 4.f : 0.f; });
+  const HeightField field = MakeField(3, 3, [](int x, int y) {
+    return x == 1 && y == 1 ? 3.f : x == 1 && y == 0 ? 4.f : 0.f;
+  });
   const MeshError error = MeasureError(field, TwoTriangles(2, 2));
   EXPECT_EQ(error.samples, 9u);
   EXPECT_EQ(error.max, 4);
@@ -24,7 +26,8 @@ TEST(MeshError, MeasuresEverySampleOnce) {
 }
 
 TEST(MeshError, NamesTheFirstOfTheWorstSamples) {
-  const HeightField field = MakeField(5, 5, [](int x, int y) { return (x == 1 && y == 3) || (x == 3 && y == 1) ? -2.f : 0.f; });
+  const HeightField field =
+      MakeField(5, 5, [](int x, int y) { return (x == 1 && y == 3) || (x == 3 && y == 1) ? -2.f : 0.f; });
   EXPECT_EQ(MeasureError(field, TwoTriangles(4, 4)).worst, (SamplePosition{3, 1}));
 }
 

@@ -39,7 +39,8 @@ testing::AssertionResult CoversExactly(const HeightField& field, const TinMesh& 
   }
   for (std::size_t i = 0; i < 4; ++i) {
     const SamplePosition p = mesh.vertices[i];
-    if ((p.x != 0 && p.x != east) || (p.y != 0 && p.y != north)) return testing::AssertionFailure() << "corners not first";
+    if ((p.x != 0 && p.x != east) || (p.y != 0 && p.y != north))
+      return testing::AssertionFailure() << "corners not first";
   }
   std::int64_t doubled_area = 0;
   for (const auto& [a, b, c] : mesh.triangles) {
@@ -47,7 +48,8 @@ testing::AssertionResult CoversExactly(const HeightField& field, const TinMesh& 
     if (turn <= 0) return testing::AssertionFailure() << "triangle " << a << ' ' << b << ' ' << c << " turns " << turn;
     doubled_area += turn;
   }
-  if (doubled_area != std::int64_t{2} * east * north) return testing::AssertionFailure() << "area / 2: " << doubled_area;
+  if (doubled_area != std::int64_t{2} * east * north)
+    return testing::AssertionFailure() << "area / 2: " << doubled_area;
 
   const std::map<Edge, std::uint32_t> edges = DirectedEdges(mesh);
   if (edges.size() != 3 * mesh.triangles.size()) return testing::AssertionFailure() << "an edge is used twice";
@@ -84,7 +86,8 @@ testing::AssertionResult IsWithin(const HeightField& field, const TinMesh& mesh,
     }
   }
   const MeshError error = MeasureError(field, mesh);
-  if (error.samples != valid) return testing::AssertionFailure() << error.samples << " of " << valid << " samples covered";
+  if (error.samples != valid)
+    return testing::AssertionFailure() << error.samples << " of " << valid << " samples covered";
   // The measurement and the mesher round differently.
   if (error.max > bound + 1e-12 * magnitude) {
     return testing::AssertionFailure() << error.max << " off at " << error.worst.x << ", " << error.worst.y;
@@ -96,10 +99,18 @@ std::vector<int> BorderVertices(const HeightField& field, const TinMesh& mesh, S
   std::vector<int> along;
   for (const SamplePosition p : mesh.vertices) {
     switch (side) {
-      case Side::kSouth: if (p.y == 0) along.push_back(p.x); break;
-      case Side::kNorth: if (p.y == field.height() - 1) along.push_back(p.x); break;
-      case Side::kWest: if (p.x == 0) along.push_back(p.y); break;
-      case Side::kEast: if (p.x == field.width() - 1) along.push_back(p.y); break;
+      case Side::kSouth:
+        if (p.y == 0) along.push_back(p.x);
+        break;
+      case Side::kNorth:
+        if (p.y == field.height() - 1) along.push_back(p.x);
+        break;
+      case Side::kWest:
+        if (p.x == 0) along.push_back(p.y);
+        break;
+      case Side::kEast:
+        if (p.x == field.width() - 1) along.push_back(p.y);
+        break;
     }
   }
   std::sort(along.begin(), along.end());

@@ -11,8 +11,8 @@
 
 namespace terrace::tin {
 
-// Corners first, no vertex twice, counter-clockwise triangles whose areas add up to the field's and whose edges are each
-// used once in each direction or lie on the border.
+// Corners first, no vertex twice, counter-clockwise triangles whose areas add up to the field's and whose edges are
+// each used once in each direction or lie on the border.
 testing::AssertionResult CoversExactly(const HeightField& field, const TinMesh& mesh);
 
 // No vertex across an edge lies strictly inside the circle of the triangle: locally, hence globally, Delaunay.

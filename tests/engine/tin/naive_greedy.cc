@@ -66,7 +66,8 @@ class NaivePass {
       const BorderOptions& options = borders_[static_cast<std::size_t>(side)];
       const int a = along_x ? low.x : low.y, b = along_x ? high.x : high.y, k = along_x ? p.x : p.y;
       const double h_a = CornerAt(low).z, h_b = CornerAt(high).z, h_k = static_cast<double>(field_.At(p.x, p.y));
-      const double error = std::abs((h_a * (b - k) + h_b * (k - a)) / (b - a) - h_k) + options.sagitta_m * (k - a) * (b - k);
+      const double error =
+          std::abs((h_a * (b - k) + h_b * (k - a)) / (b - a) - h_k) + options.sagitta_m * (k - a) * (b - k);
       return options.weight * error;
     }
     CheckFailed("a border sample lies on a border edge", __FILE__, __LINE__);

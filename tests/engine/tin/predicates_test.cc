@@ -19,8 +19,8 @@ int Sign(Wide value) { return value > 0 ? 1 : value < 0 ? -1 : 0; }
 Wide WideInCircle(SamplePosition a, SamplePosition b, SamplePosition c, SamplePosition d) {
   const auto lifted = [](SamplePosition p) { return Wide{p.x} * p.x + Wide{p.y} * p.y; };
   const auto det3 = [&](SamplePosition p, SamplePosition q, SamplePosition r) {
-    return Wide{p.x} * (Wide{q.y} * lifted(r) - lifted(q) * r.y) - Wide{p.y} * (Wide{q.x} * lifted(r) - lifted(q) * r.x) +
-           lifted(p) * (Wide{q.x} * r.y - Wide{q.y} * r.x);
+    return Wide{p.x} * (Wide{q.y} * lifted(r) - lifted(q) * r.y) -
+           Wide{p.y} * (Wide{q.x} * lifted(r) - lifted(q) * r.x) + lifted(p) * (Wide{q.x} * r.y - Wide{q.y} * r.x);
   };
   return -det3(b, c, d) + det3(a, c, d) - det3(a, b, d) + det3(a, b, c);
 }
@@ -36,7 +36,8 @@ TEST(Predicates, OrientationIsAntisymmetric) {
   Random random(1);
   for (int i = 0; i < 1000; ++i) {
     std::array<SamplePosition, 3> p;
-    for (SamplePosition& q : p) q = {static_cast<std::uint16_t>(random.Below(1 << 15)), static_cast<std::uint16_t>(random.Below(1 << 15))};
+    for (SamplePosition& q : p)
+      q = {static_cast<std::uint16_t>(random.Below(1 << 15)), static_cast<std::uint16_t>(random.Below(1 << 15))};
     EXPECT_EQ(Orientation(p[0], p[1], p[2]), Orientation(p[1], p[2], p[0]));
     EXPECT_EQ(Orientation(p[0], p[1], p[2]), -Orientation(p[1], p[0], p[2]));
   }

@@ -65,14 +65,17 @@ TEST(RealFields, NeighbouringTilesShareTheirBorders) {
     std::vector<TinMesh> meshes;
     for (int i = 0; i < kBlock * kBlock; ++i) {
       // Row 0 of a field is its first row in the file; "north" below is merely the side of larger y.
-      fields.push_back(FieldOf(ReadTestRaster(kName, 300 + i % kBlock * (kSide - 1), 200 + i / kBlock * (kSide - 1), kSide, kSide)));
+      fields.push_back(
+          FieldOf(ReadTestRaster(kName, 300 + i % kBlock * (kSide - 1), 200 + i / kBlock * (kSide - 1), kSide, kSide)));
       GreedyTriangulation tin(fields.back(), options);
       EXPECT_TRUE(tin.Run({error}));
       meshes.push_back(tin.Mesh());
       EXPECT_TRUE(IsWithin(fields.back(), meshes.back(), error));
       EXPECT_TRUE(CoversExactly(fields.back(), meshes.back()));
     }
-    const auto border = [&](int i, Side side) { return BorderVertices(fields[static_cast<std::size_t>(i)], meshes[static_cast<std::size_t>(i)], side); };
+    const auto border = [&](int i, Side side) {
+      return BorderVertices(fields[static_cast<std::size_t>(i)], meshes[static_cast<std::size_t>(i)], side);
+    };
     for (int i = 0; i < kBlock * kBlock; ++i) {
       if (i % kBlock + 1 < kBlock) {
         EXPECT_EQ(border(i, Side::kEast), border(i + 1, Side::kWest));

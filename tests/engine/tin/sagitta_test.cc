@@ -45,7 +45,8 @@ TEST(SagittaBound, BoundsTheDepthUnderEveryTriangle) {
       if (u + v > 1) u = 1 - u, v = 1 - v;
       const double x = corners[0].x + u * (corners[1].x - corners[0].x) + v * (corners[2].x - corners[0].x);
       const double y = corners[0].y + u * (corners[1].y - corners[0].y) + v * (corners[2].y - corners[0].y);
-      const double on_plane = plane.origin.z + plane.per_column * (x - plane.origin.x) + plane.per_row * (y - plane.origin.y);
+      const double on_plane =
+          plane.origin.z + plane.per_column * (x - plane.origin.x) + plane.per_row * (y - plane.origin.y);
       deepest = std::max(deepest, on_plane - (x * kEast * x * kEast + y * kNorth * y * kNorth) / (2 * kRadius));
     }
     ASSERT_LE(deepest, SagittaBound(curvature, corners) + 1e-9);

@@ -37,8 +37,8 @@ HeightField StepField(int width, int height, int range, std::uint64_t seed) {
 
 float HillHeight(int x, int y, std::uint64_t seed) {
   const auto node = [&](int column, int row, int octave) {
-    Random random(seed * 1000003 + static_cast<std::uint64_t>(column) * 7919 + static_cast<std::uint64_t>(row) * 104729 +
-                  static_cast<std::uint64_t>(octave));
+    Random random(seed * 1000003 + static_cast<std::uint64_t>(column) * 7919 +
+                  static_cast<std::uint64_t>(row) * 104729 + static_cast<std::uint64_t>(octave));
     return random.Unit();
   };
   double height = 0;

@@ -70,7 +70,8 @@ TEST(EdgeCrossing, IsExactForTheLongestEdges) {
   constexpr int kLast = HeightField::kMaxSide - 1;
   Random random(2);
   for (int i = 0; i < 20000; ++i) {
-    Corner low{random.Below(kLast + 1), random.Below(kLast / 2), 0}, high{random.Below(kLast + 1), kLast - random.Below(kLast / 2), 0};
+    Corner low{random.Below(kLast + 1), random.Below(kLast / 2), 0},
+        high{random.Below(kLast + 1), kLast - random.Below(kLast / 2), 0};
     if (i % 3 == 0) low.x = 0, high.x = kLast;
     if (i % 3 == 1) low.x = kLast, high.x = 0;
     const EdgeCrossing crossing(low, high);
@@ -78,6 +79,19 @@ TEST(EdgeCrossing, IsExactForTheLongestEdges) {
     const std::int64_t dy = high.y - low.y, n = low.x * dy + std::int64_t{y - low.y} * (high.x - low.x);
     ASSERT_EQ(crossing.Floor(y), n / dy);
     ASSERT_EQ(crossing.Ceil(y), (n + dy - 1) / dy);
+  }
+}
+
+// The reciprocal of 49 times 49 is below 1: such quotients are where rounding would lose a sample.
+TEST(EdgeCrossing, IsExactWhereAnEdgeMeetsSamples) {
+  for (int dy = 1; dy < HeightField::kMaxSide; dy += 1 + dy / 500) {
+    for (const int x : {1, 49, 4097, HeightField::kMaxSide - 1}) {
+      const EdgeCrossing vertical({x, 0, 0}, {x, dy, 0}), rising({0, 0, 0}, {x, dy, 0});
+      ASSERT_EQ(vertical.Floor(dy), x) << dy;
+      ASSERT_EQ(vertical.Ceil(dy / 2), x) << dy;
+      ASSERT_EQ(rising.Floor(dy), x) << dy;
+      ASSERT_EQ(rising.Ceil(dy), x) << dy;
+    }
   }
 }
 
@@ -111,7 +125,8 @@ TEST(TriangleScan, DoesNotDependOnTheOrderOfTheCorners) {
   for (int i = 0; i < 500; ++i) {
     const auto [a, b, c] = RandomTriangle(random, field);
     const PlaneMisfit worst = WorstSample(field, {a, b, c});
-    for (const std::array<Corner, 3>& turned : {std::array<Corner, 3>{b, c, a}, {c, a, b}, {a, c, b}, {c, b, a}, {b, a, c}}) {
+    for (const std::array<Corner, 3>& turned :
+         {std::array<Corner, 3>{b, c, a}, {c, a, b}, {a, c, b}, {c, b, a}, {b, a, c}}) {
       const PlaneMisfit again = WorstSample(field, turned);
       ASSERT_EQ(again.distance, worst.distance);
       ASSERT_EQ(again.sample, worst.sample);
@@ -121,7 +136,9 @@ TEST(TriangleScan, DoesNotDependOnTheOrderOfTheCorners) {
 
 TEST(TriangleScan, SkipsVoids) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
-  const HeightField field = MakeField(5, 5, [&](int x, int y) { return x == 2 && y == 1 ? nan : x == 3 && y == 1 ? 7.f : 0.f; });
+  const HeightField field = MakeField(5, 5, [&](int x, int y) {
+    return x == 2 && y == 1 ? nan : x == 3 && y == 1 ? 7.f : 0.f;
+  });
   const PlaneMisfit worst = WorstSample(field, {Corner{0, 0, 0}, Corner{4, 0, 0}, Corner{4, 4, 0}});
   EXPECT_EQ(worst.distance, 7);
   EXPECT_EQ(worst.sample, 8u);

@@ -22,7 +22,8 @@ testing::AssertionResult TwinsAgree(const Triangulation& triangulation) {
   for (HalfEdgeId edge = 0; edge < 3 * triangulation.triangle_count(); ++edge) {
     const HalfEdgeId twin = triangulation.twin(edge);
     if (twin == Triangulation::kNone) continue;
-    if (triangulation.twin(twin) != edge || triangulation.corner(twin) != triangulation.corner(Triangulation::Next(edge)) ||
+    if (triangulation.twin(twin) != edge ||
+        triangulation.corner(twin) != triangulation.corner(Triangulation::Next(edge)) ||
         triangulation.corner(edge) != triangulation.corner(Triangulation::Next(twin))) {
       return testing::AssertionFailure() << "half-edge " << edge << " and its twin " << twin;
     }
@@ -59,8 +60,10 @@ TEST(Triangulation, IsDelaunayAfterEveryInsertionOfEverySample) {
     const HeightField field = NoiseField(width, height, seed);
     Triangulation triangulation(width, height);
     for (int i = 0; i < 10 * width * height; ++i) {
-      const SamplePosition p{static_cast<std::uint16_t>(random.Below(width)), static_cast<std::uint16_t>(random.Below(height))};
-      const TriangleId t = triangulation.Locate(p, static_cast<TriangleId>(random.Below(static_cast<int>(triangulation.triangle_count()))));
+      const SamplePosition p{static_cast<std::uint16_t>(random.Below(width)),
+                             static_cast<std::uint16_t>(random.Below(height))};
+      const TriangleId t = triangulation.Locate(
+          p, static_cast<TriangleId>(random.Below(static_cast<int>(triangulation.triangle_count()))));
       if (triangulation.IsCorner(p, t)) continue;
       triangulation.Insert(p, t);
       ASSERT_TRUE(TwinsAgree(triangulation));
@@ -102,8 +105,10 @@ TEST(Triangulation, LocatesEverySampleFromEverywhere) {
     for (std::uint16_t x = 0; x < 17; ++x) {
       for (TriangleId start = 0; start < triangulation.triangle_count(); ++start) {
         const auto [a, b, c] = triangulation.triangle(triangulation.Locate({x, y}, start));
-        const SamplePosition pa = triangulation.position(a), pb = triangulation.position(b), pc = triangulation.position(c);
-        ASSERT_TRUE(Orientation(pa, pb, {x, y}) >= 0 && Orientation(pb, pc, {x, y}) >= 0 && Orientation(pc, pa, {x, y}) >= 0);
+        const SamplePosition pa = triangulation.position(a), pb = triangulation.position(b),
+                             pc = triangulation.position(c);
+        ASSERT_TRUE(Orientation(pa, pb, {x, y}) >= 0 && Orientation(pb, pc, {x, y}) >= 0 &&
+                    Orientation(pc, pa, {x, y}) >= 0);
       }
     }
   }

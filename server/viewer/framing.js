@@ -1,0 +1,40 @@
+// How a dataset is best seen: from how far, and with how fine a mesh.
+import { Math as CesiumMath } from "/viewer/cesium/index.js";
+
+const kMetresPerDegree = 111320;
+const kGlobalWidth = 100;  // a dataset wider than this, in degrees, is shown as a whole globe
+export const kGlobalDistance = 1.75e7;  // metres from which the whole globe fits
+
+// Middle and size of [west, south, east, north], degrees; east < west means across the antimeridian.
+export function boxOf([west, south, east, north]) {
+  const width = east >= west ? east - west : east - west + 360;
+  return { longitude: west + width / 2, latitude: (south + north) / 2, width, height: north - south };
+}
+
+export function isGlobal(dataset) {
+  return boxOf(dataset.bounds).width > kGlobalWidth;
+}
+
+// Diagonal of the dataset, metres.
+export function extent(dataset) {
+  const { latitude, width, height } = boxOf(dataset.bounds);
+  return Math.hypot(width * Math.cos(CesiumMath.toRadians(latitude)), height) * kMetresPerDegree;
+}
+
+// Metres between the camera and the middle of a dataset seen whole.
+export function viewDistance(dataset) {
+  return isGlobal(dataset) ? kGlobalDistance : extent(dataset) * (0.62 + 0.2 * Math.min(1, extent(dataset) / 5e6));
+}
+
+// Pixels of error at which CesiumJS goes a level deeper, from a distance in metres. A planet seen whole gets more
+// tiles, for the sake of its colours.
+export function pixelTolerance(distance) {
+  return 1.5 - CesiumMath.clamp((Math.log10(distance) - 5.5) / 1.5, 0, 1);
+}
+
+// The share of the level error that makes a first view of the dataset good: half of it, and less where the relief is so
+// small beside the extent that the level error (pixelTolerance pixels of 1.6 mm at one metre) exceeds 1/40 of it.
+export function suggestedFraction(dataset) {
+  const visible = (dataset.heights.max - dataset.heights.min) / 40;
+  return Math.min(0.5, visible / (0.0016 * pixelTolerance(viewDistance(dataset)) * viewDistance(dataset)));
+}

@@ -1,0 +1,37 @@
+// The camera by keyboard, while the globe has the focus: arrows travel, Shift and arrows turn, plus and minus zoom,
+// Enter reads the height in the middle.
+import { Cartesian3, Math as CesiumMath } from "/viewer/cesium/index.js";
+
+const kTurn = CesiumMath.toRadians(4);
+const kStep = 0.12;  // of the height above the ellipsoid
+
+// Along the ground by `right` and `ahead`, in steps as seen from the camera.
+function travel(camera, right, ahead) {
+  const up = Cartesian3.normalize(camera.positionWC, new Cartesian3());
+  const northward = Cartesian3.cross(up, camera.rightWC, new Cartesian3());
+  const along = Cartesian3.multiplyByScalar(camera.rightWC, right, new Cartesian3());
+  Cartesian3.add(along, Cartesian3.multiplyByScalar(northward, ahead, northward), along);
+  const axis = Cartesian3.cross(along, up, new Cartesian3());
+  const angle = (kStep * camera.positionCartographic.height) / Cartesian3.magnitude(camera.positionWC);
+  camera.rotate(axis, Math.min(angle, 0.12));
+}
+
+function turn(camera, right, up) {
+  const pitch = CesiumMath.clamp(camera.pitch + up * kTurn, -CesiumMath.PI_OVER_TWO, 0.2);
+  camera.setView({ orientation: { heading: camera.heading + right * kTurn, pitch, roll: 0 } });
+}
+
+const kArrows = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+const kZooms = { "+": 1, "=": 1, "-": -1 };
+
+export function steerByKeyboard(element, camera, onEnter) {
+  element.tabIndex = 0;
+  element.addEventListener("keydown", (event) => {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    if (event.key in kArrows) (event.shiftKey ? turn : travel)(camera, ...kArrows[event.key]);
+    else if (event.key in kZooms) camera.zoomIn(kZooms[event.key] * 0.2 * camera.positionCartographic.height);
+    else if (event.key === "Enter") onEnter();
+    else return;
+    event.preventDefault();
+  });
+}

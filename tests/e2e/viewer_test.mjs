@@ -1,0 +1,199 @@
+// The viewer in a real browser: what it draws, what its controls do, and that it asks nobody but the server.
+// TERRACE_URL names a running server; otherwise TERRACE_BINARY is started with TERRACE_CONFIG.
+import assert from 'node:assert/strict';
+import fs from 'node:fs';
+import path from 'node:path';
+import { after, before, describe, it } from 'node:test';
+import { chromium } from 'playwright-core';
+import { samples, serve } from './harness.mjs';
+
+const kChromium = process.env.TERRACE_CHROMIUM ?? '/usr/bin/chromium';
+const kFlags = ['--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist',
+                '--disable-background-networking', '--no-first-run'];
+const kSettleMs = 90000;  // a software renderer on a busy machine draws two frames a second
+// What Chromium says about its own graphics driver.
+const kDriverTalk = /GL Driver Message|GPU stall|SwiftShader/i;
+
+// A page of the viewer that keeps everything that went wrong on it.
+async function openPage(browser, url, size = { width: 800, height: 500 }) {
+  const page = await browser.newPage({ viewport: size });
+  const origin = new URL(url).origin;
+  page.wrongs = [];
+  page.requested = [];
+  page.on('console', (message) => {
+    const grave = ['error', 'warning'].includes(message.type()) && !kDriverTalk.test(message.text());
+    if (grave) page.wrongs.push(`console ${message.type()}: ${message.text()}`);
+  });
+  page.on('pageerror', (error) => page.wrongs.push(`exception: ${error}`));
+  page.on('response', (response) => {
+    if (response.status() >= 400) page.wrongs.push(`${response.status()} ${response.url()}`);
+  });
+  page.on('request', (request) => {
+    page.requested.push(request.url());
+    const local = /^(data|blob):/.test(request.url()) || new URL(request.url()).origin === origin;
+    if (!local) page.wrongs.push(`another host: ${request.url()}`);
+  });
+  await page.goto(url);
+  return page;
+}
+
+// Waits until nothing has been loading for a second, the last picture's curtain is gone, and terrain is drawn.
+async function settle(page) {
+  await page.evaluate(() => (window.calmSince = undefined));
+  await page.waitForFunction(() => {
+    const busy = !window.terrace?.state.ready || terrace.globe.loading || terrace.globe.drawn().tiles < 2 ||
+        document.querySelector('.curtain');
+    if (busy) window.calmSince = undefined;
+    else window.calmSince ??= performance.now();
+    return !busy && performance.now() - window.calmSince > 1000;
+  }, undefined, { timeout: kSettleMs, polling: 100 });
+  return page.evaluate(() => terrace.globe.drawn());
+}
+
+// The picture without the panel, as coarse colours: 5 bits a channel, one number a pixel.
+async function picture(page) {
+  const png = (await page.screenshot({ clip: { x: 320, y: 0, width: 480, height: 500 } })).toString('base64');
+  return page.evaluate(async (base64) => {
+    const image = await createImageBitmap(await (await fetch(`data:image/png;base64,${base64}`)).blob());
+    const context = new OffscreenCanvas(image.width, image.height).getContext('2d');
+    context.drawImage(image, 0, 0);
+    const { data } = context.getImageData(0, 0, image.width, image.height);
+    return Array.from({ length: data.length / 4 }, (_, i) =>
+      ((data[4 * i] >> 3) << 10) | ((data[4 * i + 1] >> 3) << 5) | (data[4 * i + 2] >> 3));
+  }, png);
+}
+
+const shareOfChanged = (a, b) => a.filter((colour, i) => colour !== b[i]).length / a.length;
+const widthOf = ({ bounds: [west, , east] }) => (east >= west ? east - west : east - west + 360);
+
+describe('the viewer', () => {
+  let server, browser, page, url, regional, other;
+
+  before(async () => {
+    const config = process.env.TERRACE_CONFIG ?? path.join(samples, 'samples.json');
+    if (!process.env.TERRACE_URL) server = await serve('--config', config);
+    url = (process.env.TERRACE_URL ?? server.url).replace(/\/$/, '');
+    const { datasets } = await (await fetch(`${url}/datasets`)).json();
+    [regional, other] = [...datasets].sort((a, b) => widthOf(a) - widthOf(b));
+    assert.ok(other, 'the test needs two datasets');
+    assert.ok(fs.existsSync(kChromium), `${kChromium} is missing`);
+    browser = await chromium.launch({ executablePath: kChromium, args: kFlags });
+    page = await openPage(browser, `${url}/#dataset=${regional.name}`);
+  });
+
+  after(async () => {
+    await browser?.close();
+    await server?.stop();
+  });
+
+  it('draws terrain in many colours', async () => {
+    const drawn = await settle(page);
+    assert.ok(drawn.triangles > 100, `${drawn.triangles} triangles`);
+    const colours = new Set(await picture(page)).size;
+    assert.ok(colours > 150, `${colours} colours`);
+    assert.match(await page.title(), new RegExp(regional.name));
+    assert.match(await page.locator('#stats').innerText(), /Triangles\s+[\d.]+/);
+  });
+
+  it('fetches finer meshes when the slider moves', async () => {
+    const triangles = [];
+    await page.locator('#fraction').focus();
+    for (const key of ['Home', 'End']) {
+      await page.keyboard.press(key);
+      const fraction = key === 'Home' ? 4 : 1 / 32;
+      await page.waitForFunction((value) => terrace.state.fraction === value, fraction);
+      await page.waitForTimeout(300);
+      triangles.push((await settle(page)).triangles);
+      const asked = `/layer.json?fraction=${fraction}`;
+      assert.ok(page.requested.some((url) => url.includes(asked)), asked);
+    }
+    assert.ok(triangles[1] > 1.5 * triangles[0], `${triangles[0]} triangles, then ${triangles[1]}`);
+  });
+
+  for (const [name, least] of [['contours', 0.02], ['wireframe', 0.2]]) {
+    it(`switches ${name} on and off`, async () => {
+      const before = await picture(page);
+      await page.locator(`#${name}`).check();
+      await settle(page);
+      const changed = shareOfChanged(before, await picture(page));
+      assert.ok(changed > least, `${changed} of the pixels changed`);
+      await page.locator(`#${name}`).uncheck();
+      await settle(page);
+      const left = shareOfChanged(before, await picture(page));
+      assert.ok(left < 0.01, `${left} of the pixels stayed changed`);
+    });
+  }
+
+  it('tells position and height of a click', async () => {
+    await page.mouse.click(520, 320);
+    const readout = await page.locator('#readout').innerText();
+    assert.match(readout, /^\d+\.\d+° [NS]\s+\d+\.\d+° [EW]\s+−?[\d,.]+ m$/);
+    const { height } = await page.evaluate(() => terrace.state.picked);
+    assert.ok(height > regional.heights.min - 500 && height < regional.heights.max + 500, `${height} m`);
+  });
+
+  it('is steered by keyboard', async () => {
+    const camera = () => page.evaluate(() => terrace.globe.camera);
+    await page.locator('#globe').focus();
+    const [longitude, latitude, height, heading] = await camera();
+    await page.keyboard.press('Shift+ArrowRight');
+    assert.ok((await camera())[3] > heading + 3);
+    await page.keyboard.press('Shift+ArrowLeft');
+    await page.keyboard.press('ArrowUp');  // the first view looks to the north-east
+    const ahead = await camera();
+    assert.ok(ahead[1] > latitude && ahead[0] > longitude, `${[longitude, latitude]} to ${ahead}`);
+    await page.keyboard.press('+');
+    assert.ok((await camera())[2] < height);
+    await settle(page);
+  });
+
+  it('keeps the view in its address', async () => {
+    await page.locator('#contours').check();
+    const state = () => page.evaluate(() => {
+      const place = terrace.globe.camera.slice(0, 3).map((value) => Number(value.toPrecision(5)));
+      return [terrace.state.dataset.name, terrace.state.fraction, terrace.state.contours, ...place];
+    });
+    const before = await state();
+    await page.reload();
+    await settle(page);
+    assert.deepEqual(await state(), before);
+  });
+
+  it('flies to another dataset', async () => {
+    const from = await page.evaluate(() => terrace.globe.camera);
+    await page.locator('#dataset').selectOption(other.name);
+    await page.waitForTimeout(3000);
+    const drawn = await settle(page);
+    const to = await page.evaluate(() => terrace.globe.camera);
+    assert.ok(Math.hypot(to[0] - from[0], to[1] - from[1], Math.log10(to[2] / from[2])) > 0.5, `${from} to ${to}`);
+    assert.ok(drawn.tiles > 1 && page.requested.some((asked) => asked.includes(`/${other.name}/0/0/0.terrain`)));
+    assert.ok(new Set(await picture(page)).size > 150);
+  });
+
+  it('has raised no error and asked no other host', () => assert.deepEqual(page.wrongs, []));
+
+  it('fits a phone', async () => {
+    const phone = await openPage(browser, `${url}/#dataset=${regional.name}`, { width: 360, height: 640 });
+    await settle(phone);
+    await phone.locator('summary').click();
+    const panel = await phone.locator('#panel').boundingBox();
+    const inside = panel.x >= 0 && panel.x + panel.width <= 360 && panel.y >= 0 && panel.y + panel.height <= 640;
+    assert.ok(inside, JSON.stringify(panel));
+    assert.deepEqual(phone.wrongs, []);
+    await phone.close();
+  });
+
+  it('says in the page what failed', async () => {
+    const broken = await browser.newPage();
+    await broken.route('**/datasets', (route) => route.fulfill({ status: 503, body: '' }));
+    await broken.goto(url);
+    await broken.locator('#message').waitFor();
+    assert.match(await broken.locator('#message').innerText(), /503/);
+    await broken.unroute('**/datasets');
+    await broken.route('**/layer.json*', (route) => route.fulfill({ status: 404, body: '' }));
+    await broken.reload();
+    await broken.locator('#message').waitFor();
+    assert.match(await broken.locator('#message').innerText(), /could not be loaded/);
+    await broken.close();
+  });
+});
