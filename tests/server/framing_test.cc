@@ -75,6 +75,13 @@ TEST_F(Framing, LimitsHeadAndTarget) {
   ExpectOneAnswer(Get("/livez", many), 431);
 }
 
+// Sanitizers keep freed memory and shadow it: resident memory says nothing there.
+#if defined(__has_feature)
+constexpr bool kSanitized = __has_feature(address_sanitizer) || __has_feature(thread_sanitizer);
+#else
+constexpr bool kSanitized = false;
+#endif
+
 long ResidentKib() {
   std::ifstream statm("/proc/self/statm");
   long size = 0, resident = 0;
@@ -94,9 +101,9 @@ TEST_F(Framing, FortyMegabytesOfHeaderCostNothing) {
   const auto reply = client.Read();
   ASSERT_TRUE(reply);
   EXPECT_EQ(reply->status, 431);
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-  EXPECT_LT(ResidentKib() - before, 2048);
-#endif
+  if (!kSanitized) {
+    EXPECT_LT(ResidentKib() - before, 2048);
+  }
 }
 
 TEST_F(Framing, ClosesSlowSendersWhateverTheyTrickle) {

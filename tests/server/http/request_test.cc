@@ -81,8 +81,9 @@ TEST(Request, RefusesAmbiguousHeads) {
 }
 
 TEST(Request, RefusesNulBytes) {
-  EXPECT_FALSE(ParseHead(std::string("GET / HTTP/1.1\r\nHost: x\r\nA: b\0c\r\n\r\n", 39)));
-  EXPECT_FALSE(ParseHead(std::string("GET /\0 HTTP/1.1\r\nHost: x\r\n\r\n", 28)));
+  using std::string_view_literals::operator""sv;
+  EXPECT_FALSE(ParseHead("GET / HTTP/1.1\r\nHost: x\r\nA: b\0c\r\n\r\n"sv));
+  EXPECT_FALSE(ParseHead("GET /\0 HTTP/1.1\r\nHost: x\r\n\r\n"sv));
 }
 
 TEST(HeadEnd, IsFoundWhereverTheReadsAreCut) {

@@ -29,6 +29,8 @@ bool StopComes(const std::stop_token& stop) {
 
 class SingleFlightTest : public testing::Test {
  protected:
+  void TearDown() override { pool_.Shutdown(); }  // its jobs refer to the flights
+
   void Join(SingleFlight::Build build, SingleFlight::Clock::time_point deadline,
             asio::cancellation_slot slot = asio::cancellation_slot()) {
     auto keep = [this](std::exception_ptr, SingleFlight::Landing landing) { landings_.push_back(std::move(landing)); };
