@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
-"""Builds and runs the tests: everything in release, the unit tests once more under both sanitizers.
+"""Builds and runs the tests: everything in release, the GoogleTest binaries once more under both sanitizers.
 
     tools/run_tests.py [--jobs N] [SUITE ...]     suites: release asan tsan; default: all three, in this order
 
-A sanitizer suite builds only what its tests run. The last line says `N passed, N failed`, counted from ctest's own
+A sanitizer suite takes the tests that are executables of the build, without those labelled `slow`, and builds only these.
+The last line says `N passed, N failed`, counted from ctest's own
 reports; a test that could not be built or found counts as failed. Exit status 0 only if everything was built and
 nothing failed.
 """
@@ -24,7 +25,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 @dataclasses.dataclass(frozen=True)
 class Suite:
     name: str  # of the CMake preset
-    label: str | None = None  # run only tests with this ctest label
+    sanitizer: bool = False
     environment: dict = dataclasses.field(default_factory=dict)
 
 
@@ -37,8 +38,8 @@ SUITES = {
     suite.name: suite
     for suite in (
         Suite("release"),
-        Suite("asan", "unit", SANITIZER_TOOLS | {"UBSAN_OPTIONS": "print_stacktrace=1"}),
-        Suite("tsan", "unit", SANITIZER_TOOLS | {
+        Suite("asan", True, SANITIZER_TOOLS | {"UBSAN_OPTIONS": "print_stacktrace=1"}),
+        Suite("tsan", True, SANITIZER_TOOLS | {
             "TSAN_OPTIONS": f"suppressions={ROOT}/tools/tsan.supp second_deadlock_stack=1 "
                             "external_symbolizer_path=/usr/bin/llvm-symbolizer-14"}),
     )
@@ -64,20 +65,13 @@ def run(command, **kwargs):
     return subprocess.run(command, cwd=ROOT, stdin=subprocess.DEVNULL, **kwargs).returncode
 
 
-def listed_tests(build, label):
-    """What ctest would run, from its own description."""
-    command = ["ctest", "--test-dir", str(build), "--show-only=json-v1"]
-    if label:
-        command += ["-L", f"^{label}$"]
-    reply = subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.PIPE, stdin=subprocess.DEVNULL)
-    return json.loads(reply.stdout)["tests"]
-
-
-def build_targets(build, tests):
-    """Names of the build's targets that are executables of these tests: a test carries the name of its executable."""
-    reply = subprocess.run(["ninja", "-C", str(build), "-t", "targets", "all"], check=True, stdout=subprocess.PIPE, text=True)
-    known = {line.partition(":")[0] for line in reply.stdout.splitlines()}
-    return sorted({test["name"] for test in tests} & known)
+def sanitizer_tests(build):
+    """Names of the tests that are executables of the build (terrace_test gives both one name) and not labelled `slow`."""
+    listing = subprocess.run(["ctest", "--test-dir", str(build), "--show-only=json-v1", "-LE", "^slow$"], cwd=ROOT, check=True,
+                             stdout=subprocess.PIPE, stdin=subprocess.DEVNULL)
+    targets = subprocess.run(["ninja", "-C", str(build), "-t", "targets", "all"], check=True, stdout=subprocess.PIPE, text=True)
+    known = {line.partition(":")[0] for line in targets.stdout.splitlines()}
+    return sorted({test["name"] for test in json.loads(listing.stdout)["tests"]} & known)
 
 
 def count(report):
@@ -108,25 +102,25 @@ def run_suite(suite, jobs):
     if run(["cmake", "--preset", suite.name, "-DTERRACE_BUILD_TESTS=ON", "--log-level=WARNING"]) != 0:
         return Outcome(broken=[f"{suite.name}: configure"])
     outcome = Outcome()
-    tests = listed_tests(build, suite.label)
     # -k 0: what can be built is built and tested, what cannot is reported by ctest as failed.
     build_command = ["ninja", "-C", str(build), "-j", str(jobs), "-k", "0"]
-    if suite.label:
-        build_command += build_targets(build, tests)
-    if tests and run(build_command) != 0:
-        outcome.broken.append(f"{suite.name}: build")
-
     report = build / "ctest.xml"
     report.unlink(missing_ok=True)
     ctest = ["ctest", "--test-dir", str(build), "--output-on-failure", "--no-tests=error", "-j", str(jobs),
              "--output-junit", str(report)]
-    if suite.label:
-        ctest = address_space_prefix() + ctest + ["-L", f"^{suite.label}$"]
+    if suite.sanitizer:
+        tests = sanitizer_tests(build)
+        if not tests:
+            return Outcome(broken=[f"{suite.name}: no tests found"])
+        build_command += tests
+        ctest = address_space_prefix() + ctest + ["-R", f"^({'|'.join(tests)})$"]
+    if run(build_command) != 0:
+        outcome.broken.append(f"{suite.name}: build")
     run(ctest, env=os.environ | suite.environment)
     if report.exists():
         outcome.add(count(report))
     else:
-        outcome.broken.append(f"{suite.name}: no tests found")
+        outcome.broken.append(f"{suite.name}: ctest")
     print(f"{suite.name}: {outcome.passed} passed, {outcome.failed} failed, {outcome.skipped} skipped, "
           f"{time.monotonic() - started:.0f} s", flush=True)
     return outcome
