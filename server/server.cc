@@ -74,8 +74,9 @@ class Server::Impl {
         signals_(io_) {}
 
   ~Impl() {
+    if (!stopper_.joinable()) return;  // never started
     RequestStop();
-    Wait();
+    stopper_.join();
   }
 
   Result<void> Start() {
@@ -86,6 +87,7 @@ class Server::Impl {
     listener_->Start();
     const unsigned count = IoThreads(options_.io_threads);
     for (unsigned i = 0; i < count; ++i) io_threads_.emplace_back([this] { io_.run(); });
+    stopper_ = std::thread([this] { StopWhenAsked(); });
     return {};
   }
 
@@ -95,38 +97,41 @@ class Server::Impl {
   void RequestStop() {
     const std::lock_guard lock(mutex_);
     stop_requested_ = true;
-    stop_wanted_.notify_all();
+    changed_.notify_all();
   }
 
   bool Wait() {
-    {
-      std::unique_lock lock(mutex_);
-      stop_wanted_.wait(lock, [this] { return stop_requested_; });
-    }
-    const std::lock_guard lock(stopping_);
-    if (!stopped_) drained_ = Stop();
-    stopped_ = true;
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [this] { return stopped_; });
     return drained_;
   }
 
  private:
+  // On a thread of its own, because stopping blocks and joins the others.
+  void StopWhenAsked() {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [this] { return stop_requested_; });
+    lock.unlock();
+    const bool drained = Stop();
+    lock.lock();
+    drained_ = drained;
+    stopped_ = true;
+    changed_.notify_all();
+  }
+
   bool Stop() {
-    bool drained = true;
-    if (listener_) {
-      listener_->Close();
-      connections_.Drain();
-      drained = connections_.WaitUntilEmpty(options_.drain_timeout);
-      tiles_.CancelBuilds();
-      if (!drained && !connections_.WaitUntilEmpty(kLastWords)) {
-        spdlog::warn("{} connections are cut off: the drain timeout has passed", connections_.size());
-        connections_.AbortAll();
-        connections_.WaitUntilEmpty(kLastWords);
-      }
+    listener_->Close();
+    connections_.Drain();
+    const bool drained = connections_.WaitUntilEmpty(options_.drain_timeout);
+    tiles_.CancelBuilds();
+    if (!drained && !connections_.WaitUntilEmpty(kLastWords)) {
+      spdlog::warn("{} connections are cut off: the drain timeout has passed", connections_.size());
+      connections_.AbortAll();
+      connections_.WaitUntilEmpty(kLastWords);
     }
     work_.reset();
     io_.stop();
     for (std::thread& thread : io_threads_) thread.join();
-    io_threads_.clear();
     tiles_.Shutdown();
     return drained;
   }
@@ -182,11 +187,11 @@ class Server::Impl {
   std::vector<std::thread> io_threads_;
 
   std::mutex mutex_;
-  std::condition_variable stop_wanted_;
+  std::condition_variable changed_;
   bool stop_requested_ = false;
-  std::mutex stopping_;  // held while stopping, so that a second Wait waits too
   bool stopped_ = false;
-  bool drained_ = true;
+  bool drained_ = false;
+  std::thread stopper_;
 };
 
 Server::Server(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}

@@ -55,7 +55,7 @@ class Server {
   std::uint16_t port() const;
   std::string url() const;  // "http://127.0.0.1:8080/"
 
-  // Returns at once. From any thread, any number of times; not from a signal handler.
+  // Begins to stop and returns at once. From any thread, any number of times; not from a signal handler.
   void RequestStop();
 
   // Blocks until somebody asks to stop and the server has. False: requests were cut off because drain_timeout passed.

@@ -41,7 +41,7 @@ std::string DatasetsJson(std::span<const DatasetView> datasets) {
   using Json = nlohmann::ordered_json;
   Json list = Json::array();
   for (const DatasetView& dataset : datasets) {
-    const std::string base = "/" + PercentEncode(dataset.name);
+    const std::string base = fmt::format("/{}", PercentEncode(dataset.name));
     Json entry;
     entry["name"] = dataset.name;
     entry["attribution"] = dataset.attribution;

@@ -32,10 +32,11 @@ class SingleFlight {
   using Build = std::function<Result<TilePtr>(std::stop_token)>;
 
   struct Landing {
+    Landing() = default;
     Landing(Result<TilePtr> t, bool j) : tile(std::move(t)), joined(j) {}
 
     Result<TilePtr> tile;
-    bool joined;  // false: this call started the flight
+    bool joined = false;  // false: this call started the flight
   };
 
   // `pool` must outlive this, and must be shut down before this is destroyed: its jobs refer to it.

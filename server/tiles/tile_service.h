@@ -33,10 +33,11 @@ struct TileServiceOptions {
 enum class CacheStatus { kHit, kMiss, kJoined };
 
 struct ServedTile {
+  ServedTile() = default;
   ServedTile(TilePtr t, CacheStatus c) : tile(std::move(t)), cache(c) {}
 
   TilePtr tile;
-  CacheStatus cache;
+  CacheStatus cache = CacheStatus::kMiss;
 };
 
 class TileService {

@@ -1,0 +1,66 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <string_view>
+
+#include "config/config.h"
+
+namespace terrace::config {
+namespace {
+
+constexpr std::size_t kMaxNameLength = 64;
+
+// First path segments that the server itself answers.
+constexpr std::array<std::string_view, 5> kReservedNames = {"datasets", "viewer", "livez", "readyz", "metrics"};
+
+bool IsNameCharacter(char c) {
+  return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '.' || c == '_' || c == '-';
+}
+
+bool IsReserved(std::string_view name) {
+  return std::find(kReservedNames.begin(), kReservedNames.end(), name) != kReservedNames.end();
+}
+
+// URL parsers fold these two away before a request is sent (RFC 3986, section 5.2.4).
+bool IsDotSegment(std::string_view name) { return name == "." || name == ".."; }
+
+}  // namespace
+
+std::string CheckDatasetName(const std::string& name) {
+  if (name.empty() || name.size() > kMaxNameLength || !std::all_of(name.begin(), name.end(), IsNameCharacter) ||
+      IsDotSegment(name)) {
+    return fmt::format("must be 1 to {} letters, digits, '.', '_' or '-', as it becomes a part of URLs",
+                       kMaxNameLength);
+  }
+  if (IsReserved(name)) {
+    return fmt::format("\"{}\" is a URL of the server itself ({}); choose another name", name,
+                       fmt::join(kReservedNames, ", "));
+  }
+  return {};
+}
+
+std::string SanitizeDatasetName(const std::string& text) {
+  std::string name = text.substr(0, kMaxNameLength);
+  std::replace_if(
+      name.begin(), name.end(), [](char c) { return !IsNameCharacter(c); }, '-');
+  if (name.empty() || IsDotSegment(name)) return "dem";
+  if (IsReserved(name)) return name + "-dem";
+  return name;
+}
+
+std::vector<ConfigError> FindDuplicateNames(const std::vector<DatasetConfig>& datasets) {
+  std::vector<ConfigError> errors;
+  for (std::size_t later = 1; later < datasets.size(); ++later) {
+    for (std::size_t first = 0; first < later; ++first) {
+      if (datasets[first].name.empty() || datasets[first].name != datasets[later].name) continue;
+      errors.push_back({fmt::format("/datasets/{}/name", later),
+                        fmt::format("\"{}\" is the name of /datasets/{} too; every dataset needs its own",
+                                    datasets[later].name, first)});
+      break;
+    }
+  }
+  return errors;
+}
+
+}  // namespace terrace::config

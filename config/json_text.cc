@@ -1,0 +1,122 @@
+#include "config/json_text.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+
+namespace terrace::config {
+namespace {
+
+// Follows the parser through the text and reports keys that an object has twice: the library silently keeps the last.
+class DuplicateKeyFinder {
+ public:
+  explicit DuplicateKeyFinder(std::vector<ConfigError>& errors) : errors_(errors) {}
+
+  void OnEvent(Json::parse_event_t event, const Json& parsed) {
+    switch (event) {
+      case Json::parse_event_t::object_start:
+      case Json::parse_event_t::array_start:
+        Open(event == Json::parse_event_t::array_start);
+        break;
+      case Json::parse_event_t::key:
+        OnKey(parsed.get<std::string>());
+        break;
+      case Json::parse_event_t::value:
+        Advance();
+        break;
+      case Json::parse_event_t::object_end:
+      case Json::parse_event_t::array_end:
+        levels_.pop_back();
+        Advance();
+        break;
+    }
+  }
+
+ private:
+  struct Level {
+    bool is_array = false;
+    std::string path;  // of the container
+    std::string key;   // of the current value in an object
+    std::size_t index = 0;
+    std::set<std::string> seen;
+  };
+
+  void Open(bool is_array) {
+    std::string path;
+    if (!levels_.empty()) {
+      const Level& outer = levels_.back();
+      path = AppendKey(outer.path, outer.is_array ? std::to_string(outer.index) : outer.key);
+    }
+    levels_.push_back({is_array, std::move(path), {}, 0, {}});
+  }
+
+  void OnKey(const std::string& key) {
+    Level& level = levels_.back();
+    level.key = key;
+    if (!level.seen.insert(key).second)
+      errors_.push_back({AppendKey(level.path, key), "appears twice; keep one of them"});
+  }
+
+  void Advance() {
+    if (!levels_.empty()) ++levels_.back().index;
+  }
+
+  std::vector<ConfigError>& errors_;
+  std::vector<Level> levels_;
+};
+
+// "[json.exception.parse_error.101] parse error at line 3, column 5: what" -> "what"
+std::string Reason(std::string_view message) {
+  const std::size_t start = message.find("syntax error");
+  return std::string(start == std::string_view::npos ? message : message.substr(start));
+}
+
+std::string DescribeSyntaxError(std::string_view text, const nlohmann::detail::parse_error& error) {
+  // `byte` counts from 1 and is one past the end where the text stops too early.
+  const std::string_view before = text.substr(0, std::min(text.size(), error.byte == 0 ? 0 : error.byte - 1));
+  const auto line = 1 + std::count(before.begin(), before.end(), '\n');
+  const std::size_t line_start = before.rfind('\n') == std::string_view::npos ? 0 : before.rfind('\n') + 1;
+  return fmt::format("line {}, column {}: {}", line, before.size() - line_start + 1, Reason(error.what()));
+}
+
+}  // namespace
+
+Json ParseJsonText(std::string_view text, std::vector<ConfigError>& errors) {
+  DuplicateKeyFinder duplicates(errors);
+  const auto follow = [&](int, Json::parse_event_t event, Json& parsed) {
+    duplicates.OnEvent(event, parsed);
+    return true;
+  };
+  try {
+    return Json::parse(text, follow);
+  } catch (const nlohmann::detail::parse_error& error) {
+    errors.push_back({"", DescribeSyntaxError(text, error)});
+  } catch (const nlohmann::detail::exception& error) {
+    errors.push_back({"", error.what()});
+  }
+  return Json(Json::value_t::discarded);
+}
+
+std::string AppendKey(const std::string& path, std::string_view key) {
+  std::string result = path + '/';
+  for (const char c : key) {
+    if (c == '~') {
+      result += "~0";
+    } else if (c == '/') {
+      result += "~1";
+    } else {
+      result += c;
+    }
+  }
+  return result;
+}
+
+std::string Quote(const Json& value) {
+  constexpr std::size_t kLongest = 60;
+  std::string text = value.dump(-1, ' ', /*ensure_ascii=*/true, Json::error_handler_t::replace);
+  if (text.size() > kLongest) text = text.substr(0, kLongest) + "...";
+  return text;
+}
+
+}  // namespace terrace::config

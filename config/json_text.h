@@ -1,0 +1,26 @@
+// JSON text to a JSON value, stricter than the library: a key that appears twice is an error, and syntax errors tell
+// the line and the column. Used inside this room only.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "config/config.h"
+
+namespace terrace::config {
+
+// Keeps the order of keys, so that errors come in the order of the file.
+using Json = nlohmann::ordered_json;
+
+// The value; errors are appended. After a syntax error (path "") the value is discarded (Json::is_discarded).
+Json ParseJsonText(std::string_view text, std::vector<ConfigError>& errors);
+
+// `path` + "/" + `key`, escaped after RFC 6901.
+std::string AppendKey(const std::string& path, std::string_view key);
+
+// A value as an error message quotes it: on one line and not too long.
+std::string Quote(const Json& value);
+
+}  // namespace terrace::config

@@ -1,0 +1,133 @@
+// How the value of an option is read from JSON and written back. Used inside this room only.
+//
+// A codec is made for one member of Config or DatasetConfig. `read` either sets the member or reports to the place what
+// the value must be; `write` gives a value that `read` takes; `from_text` turns the text of a flag into such a value.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cmath>
+#include <functional>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "config/json_text.h"
+#include "config/place.h"
+
+namespace terrace::config {
+
+template <typename Target>
+struct Codec {
+  std::function<void(const Json&, const Place&, Target&)> read;
+  std::function<Json(const Target&)> write;
+  Json (*from_text)(const std::string&) = nullptr;  // none: the option has no flag
+};
+
+inline Json TextToJson(const std::string& text) { return text; }
+
+// "12" and "1e3" become numbers; everything else stays text and is refused, or understood, by the codec.
+Json NumberToJson(const std::string& text);
+// "true" and "false" become what they say.
+Json SwitchToJson(const std::string& text);
+
+// A whole number below 2^53, which JSON keeps exactly. 1e3 and 1000.0 are whole.
+std::optional<std::int64_t> WholeNumber(const Json& value);
+// 268435456, "512MB", "1GiB", "64 MiB"
+std::optional<std::int64_t> ByteCount(const Json& value);
+// Whole values without a fraction: 30, not 30.0.
+Json NumberOut(double value);
+
+template <typename Target, typename Member>
+Codec<Target> Integer(Member Target::*member, std::int64_t min, std::int64_t max) {
+  return {[=](const Json& value, const Place& place, Target& target) {
+            const std::optional<std::int64_t> number = WholeNumber(value);
+            if (!number || *number < min || *number > max) {
+              return place.Expected(fmt::format("a whole number from {} to {}", min, max), value);
+            }
+            target.*member = static_cast<Member>(*number);
+          },
+          [=](const Target& target) { return Json(target.*member); }, NumberToJson};
+}
+
+template <typename Target>
+Codec<Target> Bytes(std::size_t Target::*member, std::int64_t max) {
+  return {[=](const Json& value, const Place& place, Target& target) {
+            const std::optional<std::int64_t> number = ByteCount(value);
+            if (!number || *number < 0 || *number > max) {
+              return place.Expected(
+                  fmt::format("a number of bytes up to {}, or text such as \"512MB\" or \"1GiB\"", max), value);
+            }
+            target.*member = static_cast<std::size_t>(*number);
+          },
+          [=](const Target& target) { return Json(target.*member); }, NumberToJson};
+}
+
+// Both ends belong to the range.
+template <typename Target, typename Member>
+Codec<Target> Number(Member Target::*member, double min, double max) {
+  return {[=](const Json& value, const Place& place, Target& target) {
+            const double number = value.is_number() ? value.get<double>() : std::nan("");
+            if (!(number >= min && number <= max)) {
+              return place.Expected(fmt::format("a number from {} to {}", min, max), value);
+            }
+            target.*member = number;
+          },
+          [=](const Target& target) {
+            const std::optional<double> number = target.*member;
+            return number ? NumberOut(*number) : Json();
+          },
+          NumberToJson};
+}
+
+template <typename Target>
+Codec<Target> Seconds(std::chrono::milliseconds Target::*member, double min, double max) {
+  return {[=](const Json& value, const Place& place, Target& target) {
+            const double seconds = value.is_number() ? value.get<double>() : std::nan("");
+            if (!(seconds >= min && seconds <= max)) {
+              return place.Expected(fmt::format("a number of seconds from {} to {}", min, max), value);
+            }
+            target.*member = std::chrono::milliseconds(std::llround(seconds * 1000));
+          },
+          [=](const Target& target) { return NumberOut(static_cast<double>((target.*member).count()) / 1000); },
+          NumberToJson};
+}
+
+// One of a few words.
+template <typename Target, typename Member>
+Codec<Target> Choice(Member Target::*member, std::vector<std::pair<std::string, Member>> words) {
+  return {[=](const Json& value, const Place& place, Target& target) {
+            std::string allowed;
+            for (const auto& [word, meaning] : words) {
+              if (value == Json(word)) {
+                target.*member = meaning;
+                return;
+              }
+              allowed += (allowed.empty() ? "\"" : " or \"") + word + "\"";
+            }
+            place.Expected(allowed, value);
+          },
+          [=](const Target& target) {
+            for (const auto& [word, meaning] : words) {
+              if (meaning == target.*member) return Json(word);
+            }
+            return Json();
+          },
+          TextToJson};
+}
+
+// Text that `check` likes: it returns what would be right, or nothing.
+template <typename Target>
+Codec<Target> Text(std::string Target::*member, std::function<std::string(const std::string&)> check) {
+  return {[=](const Json& value, const Place& place, Target& target) {
+            if (!value.is_string()) return place.Expected("text", value);
+            std::string problem = check(value.get_ref<const std::string&>());
+            if (!problem.empty()) return place.Fail(std::move(problem) + ", not " + Quote(value));
+            target.*member = value.get<std::string>();
+          },
+          [=](const Target& target) { return Json(target.*member); }, TextToJson};
+}
+
+}  // namespace terrace::config

@@ -1,0 +1,210 @@
+#include "config/option_table.h"
+
+#include <algorithm>
+
+#include "config/nearest_name.h"
+#include "config/source_paths.h"
+
+namespace terrace::config {
+namespace {
+
+constexpr std::int64_t kMaxCacheBytes = std::int64_t{1} << 40;
+
+bool HasControlCharacter(const std::string& text) {
+  return std::any_of(text.begin(), text.end(),
+                     [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; });
+}
+
+std::string CheckAttribution(const std::string& text) {
+  return HasControlCharacter(text) ? "must be text on one line" : "";
+}
+
+// The value goes into a response header as it is: a line break there would let it add headers.
+std::string CheckCacheControl(const std::string& text) {
+  const bool ascii = std::all_of(text.begin(), text.end(), [](char c) { return static_cast<unsigned char>(c) < 0x7f; });
+  if (ascii && !text.empty() && !HasControlCharacter(text)) return {};
+  return "must be the value of a Cache-Control header in ASCII, such as \"public, max-age=3600\" or \"no-cache\"";
+}
+
+Codec<Config> Listen() {
+  return {[](const Json& value, const Place& place, Config& config) {
+            if (!value.is_string()) return place.Expected("text such as \"127.0.0.1:8080\"", value);
+            Result<ListenAddress> address = ParseListenAddress(value.get_ref<const std::string&>());
+            if (!address) return place.Fail(address.error().message);
+            config.listen = *std::move(address);
+          },
+          [](const Config& config) { return Json(ToString(config.listen)); }, TextToJson};
+}
+
+Codec<Config> Viewer() {
+  return {
+      [](const Json& value, const Place& place, Config& config) {
+        if (value.is_boolean()) {
+          config.viewer = {value.get<bool>(), {}};
+        } else if (value.is_string() && !value.get_ref<const std::string&>().empty()) {
+          config.viewer = {true, place.directory() / value.get<std::string>()};
+        } else {
+          place.Expected("the folder of a viewer, true (the viewer that comes with terrace) or false (none)", value);
+        }
+      },
+      [](const Config& config) {
+        return config.viewer.directory.empty() ? Json(config.viewer.enabled) : Json(config.viewer.directory.string());
+      },
+      SwitchToJson};
+}
+
+Codec<DatasetConfig> Vertical() {
+  Codec<DatasetConfig> codec = Choice(&DatasetConfig::vertical, {{"unknown", VerticalDatum::kUnknown}});
+  codec.read = [read_word = codec.read](const Json& value, const Place& place, DatasetConfig& dataset) {
+    if (!value.is_string() || value == "unknown") return read_word(value, place, dataset);
+    place.Fail(Quote(value) +
+               " is not supported yet; write \"unknown\" (heights are passed through as they are) and "
+               "convert the source to ellipsoidal heights beforehand where that matters");
+  };
+  return codec;
+}
+
+Codec<DatasetConfig> Sources() {
+  return {[](const Json& value, const Place& place, DatasetConfig& dataset) {
+            if (!value.is_array() || value.empty())
+              return place.Expected("a list of paths such as [\"dem.tif\"]", value);
+            bool complete = true;
+            for (std::size_t i = 0; i < value.size(); ++i) {
+              const bool is_path = value[i].is_string() && !value[i].get_ref<const std::string&>().empty();
+              Result<std::vector<std::string>> files;
+              if (!is_path) {
+                place.At(i).Expected("a path or a glob", value[i]);
+              } else if (files = ExpandSource(value[i].get<std::string>(), place.directory()); !files) {
+                place.At(i).Fail(files.error().message +
+                                 "; correct the path, which is relative to the folder of this file");
+              }
+              complete = complete && is_path && files;
+              if (is_path && files) dataset.sources.insert(dataset.sources.end(), files->begin(), files->end());
+            }
+            if (complete && dataset.sources.size() > 1) {
+              place.Fail(
+                  fmt::format("gives {} files, but mosaics are not supported yet: name one raster, or make one of them "
+                              "with gdalbuildvrt and gdal_translate",
+                              dataset.sources.size()));
+            }
+          },
+          [](const DatasetConfig& dataset) { return Json(dataset.sources); }};
+}
+
+Codec<Config> Datasets() {
+  return {[](const Json& value, const Place& place, Config& config) {
+            if (!value.is_array()) return place.Expected("a list of datasets", value);
+            for (std::size_t i = 0; i < value.size(); ++i) {
+              DatasetConfig& dataset = config.datasets.emplace_back();
+              ReadObject(value[i], place.At(i), DatasetOptionTable(), dataset);
+              for (const std::string_view required : {"name", "sources"}) {
+                if (value[i].is_object() && !value[i].contains(required)) {
+                  place.At(i).Fail(fmt::format("\"{}\" is missing; every dataset needs one", required));
+                }
+              }
+            }
+          },
+          [](const Config& config) {
+            Json list = Json::array();
+            for (const DatasetConfig& dataset : config.datasets)
+              list.push_back(WriteObject(dataset, DatasetOptionTable()));
+            return list;
+          }};
+}
+
+}  // namespace
+
+const std::vector<Option<Config>>& ServerOptionTable() {
+  static const std::vector<Option<Config>> table = {
+      {"listen", "HOST:PORT", "Where to listen; port 0 picks a free one", Listen()},
+      {"datasets", "", "What to serve; DEMs on the command line come on top", Datasets()},
+      {"viewer", "DIR|false", "Folder of the web page at /; true is the one that comes with terrace, false is none",
+       Viewer()},
+      {"cache_control", "TEXT", "The Cache-Control header of tiles and descriptions",
+       Text(&Config::cache_control, CheckCacheControl)},
+      {"io_threads", "N", "Threads that talk to clients", Integer(&Config::io_threads, 1, 64)},
+      {"worker_threads", "N", "Threads that build tiles; 0 is one per processor",
+       Integer(&Config::worker_threads, 0, 1024)},
+      {"queue_length", "N", "Builds that may wait for a worker; more get 503 with Retry-After",
+       Integer(&Config::queue_length, 1, 1'000'000)},
+      {"cache_bytes", "BYTES", "Memory for finished tiles, such as 512MB or 1GiB; 0 is no cache",
+       Bytes(&Config::cache_bytes, kMaxCacheBytes)},
+      {"max_connections", "N", "Connections at a time; more wait or are turned away",
+       Integer(&Config::max_connections, 1, 1'000'000)},
+      {"request_deadline_s", "SECONDS", "A request that takes longer gets 503",
+       Seconds(&Config::request_deadline, 0.1, 3600)},
+      {"header_timeout_s", "SECONDS", "Time for a client to send its request",
+       Seconds(&Config::header_timeout, 0.1, 3600)},
+      {"idle_timeout_s", "SECONDS", "Time an idle connection is kept open", Seconds(&Config::idle_timeout, 0.1, 3600)},
+      {"write_timeout_s", "SECONDS", "Time for a client to take a response",
+       Seconds(&Config::write_timeout, 0.1, 3600)},
+      {"drain_timeout_s", "SECONDS", "Time for open requests to finish when the server stops",
+       Seconds(&Config::drain_timeout, 0, 3600)},
+      {"log_level", "LEVEL", "The least important messages to log: debug, info, warn, error or off",
+       Choice(&Config::log_level, {{"debug", LogLevel::kDebug},
+                                   {"info", LogLevel::kInfo},
+                                   {"warn", LogLevel::kWarn},
+                                   {"error", LogLevel::kError},
+                                   {"off", LogLevel::kOff}})},
+      {"log_format", "FORMAT", "text for people, json for machines (one object a line); both on stderr",
+       Choice(&Config::log_format, {{"text", LogFormat::kText}, {"json", LogFormat::kJson}})},
+  };
+  return table;
+}
+
+const std::vector<Option<DatasetConfig>>& DatasetOptionTable() {
+  static const std::vector<Option<DatasetConfig>> table = {
+      {"name", "NAME", "The dataset's name in URLs; by default that of the file",
+       Text(&DatasetConfig::name, CheckDatasetName)},
+      {"sources", "", "Paths or globs of the rasters; exactly one raster for now", Sources()},
+      {"vertical", "DATUM", "What the heights count from; only unknown for now: heights are passed through",
+       Vertical()},
+      {"attribution", "TEXT", "Who to thank for the data; clients show it",
+       Text(&DatasetConfig::attribution, CheckAttribution)},
+      {"error_fraction", "SHARE", "Default error of a level as a share of the error that clients assume there",
+       Number(&DatasetConfig::error_fraction, 0.05, 1)},
+      {"finest_error", "METRES",
+       "Go as deep as needed for this default error; by default a tenth of the source's spacing",
+       Number(&DatasetConfig::finest_error, 0.001, 100'000)},
+      {"floor", "METRES", "Height outside the source and in large voids; by default its lowest height",
+       Number(&DatasetConfig::floor, -20'000, 20'000)},
+      {"max_void_gap", "SAMPLES", "Voids narrower than this many source samples are filled from their edges",
+       Integer(&DatasetConfig::max_void_gap, 0, 100'000)},
+  };
+  return table;
+}
+
+template <typename Target>
+void ReadObject(const Json& object, const Place& place, const std::vector<Option<Target>>& table, Target& target) {
+  if (!object.is_object())
+    return place.Expected("an object with keys such as \"" + std::string(table.front().key) + "\"", object);
+  std::vector<std::string_view> keys;
+  for (const Option<Target>& option : table) keys.push_back(option.key);
+  for (const auto& [key, value] : object.items()) {
+    const auto found = std::find(keys.begin(), keys.end(), key);
+    if (found != keys.end()) {
+      table[static_cast<std::size_t>(found - keys.begin())].codec.read(value, place.At(key), target);
+      continue;
+    }
+    const std::string_view nearest = NearestName(key, keys);
+    place.At(key).Fail(nearest.empty() ? fmt::format("unknown key; known are {}", fmt::join(keys, ", "))
+                                       : fmt::format("unknown key; did you mean \"{}\"?", nearest));
+  }
+}
+
+template <typename Target>
+Json WriteObject(const Target& source, const std::vector<Option<Target>>& table) {
+  Json object = Json::object();
+  for (const Option<Target>& option : table) {
+    Json value = option.codec.write(source);
+    if (!value.is_null()) object[std::string(option.key)] = std::move(value);
+  }
+  return object;
+}
+
+template void ReadObject(const Json&, const Place&, const std::vector<Option<Config>>&, Config&);
+template void ReadObject(const Json&, const Place&, const std::vector<Option<DatasetConfig>>&, DatasetConfig&);
+template Json WriteObject(const Config&, const std::vector<Option<Config>>&);
+template Json WriteObject(const DatasetConfig&, const std::vector<Option<DatasetConfig>>&);
+
+}  // namespace terrace::config

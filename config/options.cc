@@ -1,0 +1,56 @@
+#include "config/options.h"
+
+#include <algorithm>
+
+#include "config/option_table.h"
+#include "engine/core/check.h"
+
+namespace terrace::config {
+namespace {
+
+std::string FlagOf(std::string_view key) {
+  std::string flag = "--" + std::string(key);
+  std::replace(flag.begin(), flag.end(), '_', '-');
+  return flag;
+}
+
+template <typename Target>
+std::vector<OptionInfo> Infos(const std::vector<Option<Target>>& table) {
+  std::vector<OptionInfo> infos;
+  for (const Option<Target>& option : table) {
+    const Json value = option.codec.write(Target{});
+    const bool is_empty = value.is_null() || value == Json("") || value == Json::array();
+    infos.push_back({option.key, option.value, option.help, option.codec.from_text != nullptr,
+                     is_empty ? std::string() : value.dump()});
+  }
+  return infos;
+}
+
+template <typename Target>
+void SetFromText(const std::vector<Option<Target>>& table, std::string_view key, const std::string& text,
+                 Target& target, std::vector<ConfigError>& errors) {
+  const auto option =
+      std::find_if(table.begin(), table.end(), [&](const Option<Target>& candidate) { return candidate.key == key; });
+  TERRACE_CHECK(option != table.end() && option->codec.from_text != nullptr);
+  std::vector<ConfigError> found;
+  option->codec.read(option->codec.from_text(text), Place({}, "", found), target);
+  for (const ConfigError& error : found) errors.push_back({FlagOf(key), error.message});
+}
+
+}  // namespace
+
+std::string OptionInfo::Flag() const { return FlagOf(key); }
+
+std::vector<OptionInfo> ServerOptions() { return Infos(ServerOptionTable()); }
+std::vector<OptionInfo> DatasetOptions() { return Infos(DatasetOptionTable()); }
+
+void SetServerOption(std::string_view key, const std::string& text, Config& config, std::vector<ConfigError>& errors) {
+  SetFromText(ServerOptionTable(), key, text, config, errors);
+}
+
+void SetDatasetOption(std::string_view key, const std::string& text, DatasetConfig& dataset,
+                      std::vector<ConfigError>& errors) {
+  SetFromText(DatasetOptionTable(), key, text, dataset, errors);
+}
+
+}  // namespace terrace::config

@@ -1,0 +1,33 @@
+// The options of the configuration one by one: for the command line, where each of them is a flag, and for its help.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "config/config.h"
+
+namespace terrace::config {
+
+struct OptionInfo {
+  std::string_view key;    // in the JSON file: "cache_bytes"
+  std::string_view value;  // what stands for the value in help texts: "BYTES"
+  std::string_view help;   // one line
+  bool has_flag = false;
+  std::string default_value;  // as JSON; empty: there is none
+
+  // "--cache-bytes"
+  std::string Flag() const;
+};
+
+// Options at the top of the file, and options of one dataset.
+std::vector<OptionInfo> ServerOptions();
+std::vector<OptionInfo> DatasetOptions();
+
+// Sets the option `key` from the text of its flag. What is wrong is appended to `errors`, with the flag as its path.
+// Precondition: the option exists and has a flag.
+void SetServerOption(std::string_view key, const std::string& text, Config& config, std::vector<ConfigError>& errors);
+void SetDatasetOption(std::string_view key, const std::string& text, DatasetConfig& dataset,
+                      std::vector<ConfigError>& errors);
+
+}  // namespace terrace::config

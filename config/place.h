@@ -1,0 +1,39 @@
+// Where in the configuration a value was read: what it is relative to, and where its errors go. Used inside this room
+// only.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "config/config.h"
+#include "config/json_text.h"
+
+namespace terrace::config {
+
+class Place {
+ public:
+  // `errors` must outlive this and every place made from it.
+  Place(std::filesystem::path directory, std::string path, std::vector<ConfigError>& errors)
+      : directory_(std::move(directory)), path_(std::move(path)), errors_(&errors) {}
+
+  Place At(std::string_view key) const { return {directory_, AppendKey(path_, key), *errors_}; }
+  Place At(std::size_t index) const { return At(std::to_string(index)); }
+
+  void Fail(std::string message) const { errors_->push_back({path_, std::move(message)}); }
+  // "must be a number from 0 to 1, not "abc""
+  void Expected(std::string_view what, const Json& found) const {
+    Fail("must be " + std::string(what) + ", not " + Quote(found));
+  }
+
+  // What relative paths are relative to.
+  const std::filesystem::path& directory() const { return directory_; }
+
+ private:
+  std::filesystem::path directory_;
+  std::string path_;
+  std::vector<ConfigError>* errors_;
+};
+
+}  // namespace terrace::config

@@ -1,0 +1,21 @@
+// One subcommand of `terrace`: adds its flags to the parser, and runs.
+#pragma once
+
+namespace CLI {
+class App;
+}
+
+namespace terrace::cli {
+
+// What the process ends with.
+inline constexpr int kExitOk = 0;
+inline constexpr int kExitFailure = 1;  // the work could not be done
+inline constexpr int kExitUsage = 2;    // the command line or the configuration is wrong
+
+// Each adds its subcommand to `app`; when the user chose it, its work runs from the parser's callback, and the exit code
+// is stored in `exit_code`.
+void AddServe(CLI::App& app, int& exit_code);
+void AddMesh(CLI::App& app, int& exit_code);
+void AddInfo(CLI::App& app, int& exit_code);
+
+}  // namespace terrace::cli

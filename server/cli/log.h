@@ -1,0 +1,10 @@
+// The process's log: spdlog on stderr, so that stdout belongs to results.
+#pragma once
+
+#include "config/config.h"
+
+namespace terrace::cli {
+
+void SetUpLog(config::LogLevel level, config::LogFormat format);
+
+}  // namespace terrace::cli

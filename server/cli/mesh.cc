@@ -1,0 +1,205 @@
+// terrace mesh: one TIN of a whole raster, to a file.
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "engine/dem/dem_source.h"
+#include "engine/tin/greedy.h"
+#include "engine/tin/mesh_error.h"
+#include "proto/mesh_file.h"
+#include "server/cli/command.h"
+#include "server/cli/progress.h"
+
+namespace terrace::cli {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+struct MeshArguments {
+  std::string dem, out, criterion = "delaunay", coordinates;
+  double max_error = -1, rms = -1;
+  std::size_t points = 0;
+  int threads = 1;
+  bool compact = false, json = false;
+};
+
+double Since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+int Fail(const std::string& message, int code) {
+  std::fprintf(stderr, "terrace: %s\n", message.c_str());
+  return code;
+}
+
+// What is wrong with the arguments, or nothing.
+std::string Complain(const MeshArguments& arguments) {
+  const int goals = (arguments.max_error >= 0) + (arguments.points > 0) + (arguments.rms >= 0);
+  if (goals != 1) return "mesh needs exactly one goal: --max-error METRES, --points N or --rms METRES";
+  if (arguments.points > 0 && arguments.points < 4) return "--points must be at least 4, the corners of the raster";
+  if (arguments.criterion != "delaunay") return "--criterion " + arguments.criterion + " is not available yet; use delaunay";
+  if (arguments.compact) return "--compact is not available yet";
+  return {};
+}
+
+// Runs towards the goal in steps, so that progress can be shown: the error falls about as 1 / vertices.
+void Triangulate(tin::GreedyTriangulation& greedy, const tin::GreedyGoal& goal, std::size_t samples) {
+  Progress progress("meshing");
+  const std::size_t step = std::max<std::size_t>(10'000, samples / 200);
+  for (;;) {
+    tin::GreedyGoal part = goal;
+    part.max_points = std::min(goal.max_points, greedy.vertex_count() + step);
+    const std::size_t before = greedy.vertex_count();
+    greedy.Run(part);
+    if (greedy.vertex_count() < part.max_points || part.max_points == goal.max_points || greedy.vertex_count() == before) return;
+    const double share = goal.max_points < samples ? static_cast<double>(greedy.vertex_count()) / static_cast<double>(goal.max_points)
+                                                   : std::min(1.0, goal.max_error / greedy.CurrentError());
+    progress.Update(share);
+  }
+}
+
+std::vector<proto::MeshVertex> VerticesOf(const tin::TinMesh& mesh, const tin::HeightField& field,
+                                          const std::optional<std::array<double, 6>>& transform) {
+  std::vector<proto::MeshVertex> vertices;
+  vertices.reserve(mesh.vertices.size());
+  for (const tin::SamplePosition p : mesh.vertices) {
+    const double z = field.VertexHeight(p.x, p.y);
+    if (!transform) {
+      vertices.push_back({static_cast<double>(p.x), static_cast<double>(p.y), z});
+      continue;
+    }
+    const auto& t = *transform;
+    const double column = p.x + 0.5, row = p.y + 0.5;  // samples are pixel centres
+    vertices.push_back({t[0] + column * t[1] + row * t[2], t[3] + column * t[4] + row * t[5], z});
+  }
+  return vertices;
+}
+
+// The mesh is counter-clockwise in (column, row). A transform that mirrors, as north-up rasters do, turns it over.
+std::vector<std::array<std::uint32_t, 3>> TrianglesOf(const tin::TinMesh& mesh, const std::optional<std::array<double, 6>>& transform) {
+  std::vector<std::array<std::uint32_t, 3>> triangles = mesh.triangles;
+  if (transform && (*transform)[1] * (*transform)[5] - (*transform)[2] * (*transform)[4] < 0) {
+    for (auto& triangle : triangles) std::swap(triangle[1], triangle[2]);
+  }
+  return triangles;
+}
+
+// A file that a failure leaves as it was.
+Result<void> WriteFile(const std::string& path, proto::MeshFileFormat format, const std::vector<proto::MeshVertex>& vertices,
+                       const std::vector<std::array<std::uint32_t, 3>>& triangles) {
+  const std::string unfinished = fmt::format("{}.{}.part", path, getpid());
+  std::ofstream stream(unfinished, std::ios::binary);
+  if (!stream) return MakeError(ErrorCode::kUnavailable, "cannot write {}; is the folder there and writable?", path);
+  Result<void> written = proto::WriteMesh(stream, format, vertices, triangles);
+  stream.close();
+  if (written && !stream) written = MakeError(ErrorCode::kUnavailable, "writing {} failed; is the disk full?", path);
+  std::error_code error;
+  if (written) std::filesystem::rename(unfinished, path, error);
+  if (written && error) written = MakeError(ErrorCode::kUnavailable, "cannot replace {}: {}", path, error.message());
+  if (!written) std::filesystem::remove(unfinished, error);
+  return written;
+}
+
+struct Seconds {
+  double read = 0, triangulate = 0, write = 0;
+};
+
+void Print(const MeshArguments& arguments, const tin::HeightField& field, const tin::TinMesh& mesh,
+           const tin::MeshError& error, const Seconds& seconds) {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  if (arguments.json) {
+    const nlohmann::ordered_json statistics = {
+        {"input", {{"path", arguments.dem}, {"width", field.width()}, {"height", field.height()}}},
+        {"criterion", arguments.criterion},
+        {"points", mesh.vertices.size()},
+        {"triangles", mesh.triangles.size()},
+        {"max_error", error.max},
+        {"rms_error", error.rms},
+        {"seconds", {{"read", seconds.read}, {"triangulate", seconds.triangulate}, {"write", seconds.write}}},
+        {"peak_rss_bytes", static_cast<std::int64_t>(usage.ru_maxrss) * 1024}};
+    fmt::print("{}\n", statistics.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
+    return;
+  }
+  fmt::print("{}: {} vertices, {} triangles of {} samples; largest error {:.4g} m, RMS {:.4g} m; read {:.2f} s, mesh {:.2f} s, write {:.2f} s\n",
+             arguments.out, mesh.vertices.size(), mesh.triangles.size(), error.samples, error.max, error.rms,
+             seconds.read, seconds.triangulate, seconds.write);
+}
+
+int Mesh(const MeshArguments& arguments) {
+  spdlog::set_level(spdlog::level::err);
+  if (const std::string complaint = Complain(arguments); !complaint.empty()) return Fail(complaint, kExitUsage);
+  const auto format = proto::MeshFileFormatOf(arguments.out);
+  if (!format) return Fail(format.error().message, kExitUsage);
+
+  Seconds seconds;
+  Clock::time_point start = Clock::now();
+  Result<dem::RasterHeights> raster = [&] {
+    Progress progress("reading " + arguments.dem);
+    return dem::ReadRaster(arguments.dem, progress.Callback());
+  }();
+  if (!raster) return Fail(raster.error().message, kExitFailure);
+  std::optional<std::array<double, 6>> transform;
+  if (arguments.coordinates == "crs" && !raster->georeferenced) {
+    return Fail(arguments.dem + " has no georeference; use --coordinates pixel", kExitUsage);
+  }
+  if (raster->georeferenced && arguments.coordinates != "pixel") transform = raster->geo_transform;
+  const auto field = tin::HeightField::Make(raster->width, raster->height, std::move(raster->heights));
+  if (!field) return Fail(arguments.dem + ": " + field.error().message, kExitFailure);
+  seconds.read = Since(start);
+
+  start = Clock::now();
+  tin::GreedyGoal goal;
+  if (arguments.max_error >= 0) goal.max_error = arguments.max_error;
+  if (arguments.points > 0) goal.max_points = arguments.points;
+  if (arguments.rms >= 0) goal.rms_error = arguments.rms;
+  tin::GreedyTriangulation greedy(*field);
+  Triangulate(greedy, goal, static_cast<std::size_t>(field->width()) * static_cast<std::size_t>(field->height()));
+  const tin::TinMesh mesh = greedy.Mesh();
+  seconds.triangulate = Since(start);
+
+  start = Clock::now();
+  const Result<void> written = WriteFile(arguments.out, *format, VerticesOf(mesh, *field, transform), TrianglesOf(mesh, transform));
+  if (!written) return Fail(written.error().message, kExitFailure);
+  seconds.write = Since(start);
+  Print(arguments, *field, mesh, tin::MeasureError(*field, mesh), seconds);
+  return kExitOk;
+}
+
+}  // namespace
+
+void AddMesh(CLI::App& app, int& exit_code) {
+  auto arguments = std::make_shared<MeshArguments>();
+  CLI::App* command = app.add_subcommand(
+      "mesh", "Meshes a whole raster with greedy insertion into one .obj, .ply or .glb file");
+  command->footer(
+      "  terrace mesh alps.tif --out alps.obj --max-error 5\n"
+      "  terrace mesh alps.tif --out alps.glb --points 50000 --json\n\n"
+      "Errors are measured over every valid sample by a separate pass. Triangles are counter-clockwise in the\n"
+      "file's own x and y.");
+  command->add_option("DEM", arguments->dem, "A raster that GDAL can read; a georeference is not needed")->required();
+  command->add_option("--out", arguments->out, "The file to write; its extension is the format")->type_name("FILE")->required();
+  command->add_option("--max-error", arguments->max_error, "No sample is further off than this")->type_name("METRES")->check(CLI::NonNegativeNumber)->group("Goal, exactly one of");
+  command->add_option("--points", arguments->points, "Vertices, corners included")->type_name("N")->check(CLI::PositiveNumber)->group("Goal, exactly one of");
+  command->add_option("--rms", arguments->rms, "Root mean square error over all samples")->type_name("METRES")->check(CLI::NonNegativeNumber)->group("Goal, exactly one of");
+  command->add_option("--coordinates", arguments->coordinates, "pixel: x = column, y = row (from the top), z = height; crs: pixel centres in the raster's CRS (default where it has one)")
+      ->check(CLI::IsMember({"pixel", "crs"}));
+  command->add_option("--criterion", arguments->criterion, "How triangles are joined")->check(CLI::IsMember({"delaunay", "data-dependent"}))->capture_default_str();
+  command->add_option("--threads", arguments->threads, "Threads to use at most")->check(CLI::Range(1, 256))->capture_default_str();
+  command->add_flag("--compact", arguments->compact, "Drops vertices that the bound does not need");
+  command->add_flag("--json", arguments->json, "Statistics as JSON on stdout");
+  command->callback([arguments, &exit_code] { exit_code = Mesh(*arguments); });
+}
+
+}  // namespace terrace::cli

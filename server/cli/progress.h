@@ -1,0 +1,32 @@
+// Progress of work that takes longer than a second, as one line on stderr.
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <string>
+
+namespace terrace::cli {
+
+// "terrace: reading alps.tif 42 %". On a terminal the line is rewritten in place, elsewhere a line comes every ten seconds.
+// Says nothing about work that is over within a second.
+class Progress {
+ public:
+  explicit Progress(std::string what);
+  ~Progress();
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+
+  void Update(double share);  // 0 .. 1
+
+  // For APIs that take a function; must not outlive this object.
+  std::function<void(double)> Callback();
+
+ private:
+  const std::string what_;
+  const bool terminal_;
+  const std::chrono::steady_clock::time_point start_;
+  std::chrono::steady_clock::time_point last_{};
+  bool shown_ = false;
+};
+
+}  // namespace terrace::cli

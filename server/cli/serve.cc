@@ -1,0 +1,190 @@
+// terrace serve: datasets from a config file and from the command line, over HTTP.
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+#include <xxhash.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "config/config.h"
+#include "config/options.h"
+#include "config/parse.h"
+#include "server/cli/command.h"
+#include "server/cli/log.h"
+#include "server/cli/progress.h"
+#include "server/server.h"
+#include "server/tiles/tile_pipeline.h"
+
+namespace terrace::cli {
+namespace {
+
+struct ServeArguments {
+  std::vector<std::string> dems;
+  std::string config_file;
+  bool print_config = false;
+  std::map<std::string, std::string> server_flags, dataset_flags;  // by option key
+};
+
+int Report(const std::vector<config::ConfigError>& errors, const std::string& file) {
+  std::fprintf(stderr, "terrace: %zu %s in the configuration%s%s:\n", errors.size(),
+               errors.size() == 1 ? "thing is wrong" : "things are wrong", file.empty() ? "" : " ", file.c_str());
+  for (const config::ConfigError& error : errors) {
+    std::fprintf(stderr, "  %s%s%s\n", error.path.c_str(), error.path.empty() ? "" : ": ", error.message.c_str());
+  }
+  return kExitUsage;
+}
+
+// The file's options, then the flags, then a dataset per DEM of the command line. Everything wrong is collected.
+config::Config MakeConfig(const ServeArguments& arguments, std::vector<config::ConfigError>& errors) {
+  config::Config config;
+  if (!arguments.config_file.empty()) {
+    config::ConfigResult loaded = config::LoadConfig(arguments.config_file);
+    if (loaded) config = *std::move(loaded);
+    else errors = std::move(loaded).error();
+  }
+  for (const auto& [key, text] : arguments.server_flags) config::SetServerOption(key, text, config, errors);
+  if (arguments.dems.empty() && !arguments.dataset_flags.empty()) {
+    errors.push_back({"", "options of a dataset need a DEM on the command line; in a config file they stand in its dataset"});
+  }
+  for (const std::string& dem : arguments.dems) {
+    config::DatasetConfig dataset;
+    dataset.name = config::SanitizeDatasetName(std::filesystem::path(dem).stem().string());
+    dataset.sources = {dem};
+    for (const auto& [key, text] : arguments.dataset_flags) config::SetDatasetOption(key, text, dataset, errors);
+    config.datasets.push_back(std::move(dataset));
+  }
+  const std::vector<config::ConfigError> duplicates = config::FindDuplicateNames(config.datasets);
+  if (errors.empty()) errors = duplicates;
+  if (errors.empty() && config.datasets.empty()) {
+    errors.push_back({"", "there is nothing to serve; name a DEM ('terrace serve dem.tif') or a config file (--config)"});
+  }
+  return config;
+}
+
+// Changes when the source or an option that changes bytes does. The file's identity is in the source's fingerprint.
+std::uint64_t GenerationOf(const config::DatasetConfig& dataset, const dem::DemSource& source) {
+  const std::string text = fmt::format(TERRACE_VERSION " {} {}", source.fingerprint(), dataset.error_fraction);
+  return XXH3_64bits(text.data(), text.size());
+}
+
+// Opens every source; false if one could not be, after all of them had their message.
+bool OpenDatasets(const config::Config& config, std::vector<server::Dataset>& datasets) {
+  bool all_open = true;
+  for (const config::DatasetConfig& wanted : config.datasets) {
+    Progress progress("reading " + wanted.sources.front());
+    dem::DemOptions options;
+    options.error_fraction = wanted.error_fraction;
+    options.finest_error = wanted.finest_error;
+    options.floor = wanted.floor;
+    options.max_void_gap = wanted.max_void_gap;
+    options.progress = progress.Callback();
+    auto source = dem::DemSource::Open(wanted.sources.front(), options);
+    if (!source) {
+      std::fprintf(stderr, "terrace: dataset %s: %s\n", wanted.name.c_str(), source.error().message.c_str());
+      all_open = false;
+      continue;
+    }
+    server::Dataset dataset;
+    dataset.name = wanted.name;
+    dataset.attribution = wanted.attribution;
+    dataset.error_fraction = wanted.error_fraction;
+    dataset.generation = GenerationOf(wanted, **source);
+    dataset.source = *std::move(source);
+    spdlog::info("dataset {}: {}, levels 0 to {}", dataset.name, wanted.sources.front(), dataset.source->max_level());
+    datasets.push_back(std::move(dataset));
+  }
+  return all_open;
+}
+
+server::ServerOptions OptionsOf(const config::Config& config) {
+  server::ServerOptions options;
+  options.host = config.listen.host;
+  options.port = config.listen.port;
+  options.io_threads = config.io_threads;
+  options.worker_threads = config.worker_threads;
+  options.queue_length = config.queue_length;
+  options.cache_bytes = config.cache_bytes;
+  options.max_connections = config.max_connections;
+  options.cache_control = config.cache_control;
+  options.header_timeout = config.header_timeout;
+  options.idle_timeout = config.idle_timeout;
+  options.write_timeout = config.write_timeout;
+  options.request_deadline = config.request_deadline;
+  options.drain_timeout = config.drain_timeout;
+  options.stop_on_signals = true;
+  if (config.viewer.enabled) {
+    options.viewer_dir = config.viewer.directory;
+    if (options.viewer_dir.empty()) {
+      // Installed beside the binary, else where it was built.
+      std::error_code ignored;
+      const std::filesystem::path binary = std::filesystem::read_symlink("/proc/self/exe", ignored);
+      options.viewer_dir = binary.parent_path().parent_path() / "share/terrace/viewer";
+      if (!std::filesystem::exists(options.viewer_dir, ignored)) options.viewer_dir = TERRACE_VIEWER_DIR;
+    }
+  }
+  return options;
+}
+
+int Serve(const ServeArguments& arguments) {
+  std::vector<config::ConfigError> errors;
+  const config::Config config = MakeConfig(arguments, errors);
+  if (!errors.empty()) return Report(errors, arguments.config_file);
+  if (arguments.print_config) {
+    std::fputs(config::ToJson(config).c_str(), stdout);
+    return kExitOk;
+  }
+  SetUpLog(config.log_level, config.log_format);
+  std::vector<server::Dataset> datasets;
+  if (!OpenDatasets(config, datasets)) return kExitFailure;
+  const std::size_t count = datasets.size();
+  auto pipeline = std::make_shared<const server::TilePipeline>(std::move(datasets));
+  auto server = server::Server::Start(std::move(pipeline), OptionsOf(config));
+  if (!server) {
+    std::fprintf(stderr, "terrace: %s\n", server.error().message.c_str());
+    return kExitFailure;
+  }
+  std::printf("terrace: serving %zu dataset%s at %s\n", count, count == 1 ? "" : "s", (*server)->url().c_str());
+  std::fflush(stdout);
+  return (*server)->Wait() ? kExitOk : kExitFailure;
+}
+
+// Every option of the configuration is a flag; its text is kept until the file has been read, and checked then.
+void AddFlags(CLI::App& command, const std::vector<config::OptionInfo>& options, const std::string& group,
+              std::map<std::string, std::string>& values) {
+  for (const config::OptionInfo& option : options) {
+    if (!option.has_flag) continue;
+    const std::string key(option.key);
+    std::string help(option.help);
+    if (!option.default_value.empty()) help += " [" + option.default_value + "]";
+    command.add_option_function<std::string>(option.Flag(), [&values, key](const std::string& text) { values[key] = text; }, help)
+        ->type_name(std::string(option.value))
+        ->group(group);
+  }
+}
+
+}  // namespace
+
+void AddServe(CLI::App& app, int& exit_code) {
+  auto arguments = std::make_shared<ServeArguments>();
+  CLI::App* command = app.add_subcommand(
+      "serve", "Serves DEMs as terrain tiles over HTTP, with a viewer at /");
+  command->footer(
+      "  terrace serve alps.tif andes.tif\n"
+      "  terrace serve --config terrace.json --listen 0.0.0.0:8080\n\n"
+      "Each DEM becomes a dataset named after its file. Flags override the config file. Prints one line with\n"
+      "the URL when it is ready; logs go to stderr; SIGTERM and SIGINT end it after open requests are answered.");
+  command->add_option("DEM", arguments->dems, "Rasters that GDAL can read, one dataset each");
+  command->add_option("--config", arguments->config_file, "Configuration in JSON (config/config.schema.json)")->type_name("FILE");
+  command->add_flag("--print-config", arguments->print_config, "Prints the configuration in force as JSON and ends");
+  AddFlags(*command, config::ServerOptions(), "Server", arguments->server_flags);
+  AddFlags(*command, config::DatasetOptions(), "Datasets of the command line", arguments->dataset_flags);
+  command->callback([arguments, &exit_code] { exit_code = Serve(*arguments); });
+}
+
+}  // namespace terrace::cli

@@ -1,0 +1,108 @@
+// Stopping while clients are busy.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <csignal>
+#include <thread>
+#include <vector>
+
+#include "tests/server/server_fixture.h"
+
+namespace terrace::server {
+namespace {
+
+using namespace std::chrono_literals;
+
+class Drain : public ServerFixture {};
+
+TEST_F(Drain, CutsNoReplyShortUnderLoad) {
+  build_ms_ = 3;
+  ServerOptions options;
+  options.cache_bytes = 0;
+  Start(options);
+  std::atomic<int> answered{0}, cut{0}, failed{0};
+  std::vector<std::thread> clients;
+  for (int c = 0; c < 16; ++c) {
+    clients.emplace_back([&, c] {
+      RawClient client(port());
+      for (int i = 0;; ++i) {
+        if (!client.Send(Get("/maui/3/" + std::to_string((c + i) % 16) + "/" + std::to_string(i % 8) + ".terrain"))) return;
+        const auto reply = client.Read();
+        if (!reply) return;
+        ++(reply->status == 200 ? answered : reply->status == -1 ? cut : failed);
+        if (reply->Field("connection") == "close") return;
+      }
+    });
+  }
+  EXPECT_TRUE(Eventually([&] { return answered > 100; }));
+  const auto begun = std::chrono::steady_clock::now();
+  server_->RequestStop();
+  EXPECT_TRUE(server_->Wait());
+  EXPECT_LT(std::chrono::steady_clock::now() - begun, 3s);
+  for (std::thread& client : clients) client.join();
+  EXPECT_EQ(cut, 0);
+  EXPECT_EQ(failed, 0);
+}
+
+TEST_F(Drain, FinishesTheBuildThatAClientWaitsFor) {
+  build_ms_ = 500;
+  Start();
+  RawClient client(port());
+  client.Send(Get("/maui/0/0/0.terrain"));
+  ASSERT_TRUE(Eventually([&] { return builds_ == 1; }));
+  server_->RequestStop();
+  const auto reply = client.Read();
+  ASSERT_TRUE(reply);
+  EXPECT_EQ(reply->status, 200);
+  EXPECT_EQ(reply->Field("connection"), "close");
+  EXPECT_TRUE(server_->Wait());
+}
+
+TEST_F(Drain, CancelsWhatDoesNotFinishInTime) {
+  build_ms_ = 60'000;
+  ServerOptions options;
+  options.drain_timeout = 200ms;
+  Start(options);
+  RawClient client(port());
+  client.Send(Get("/maui/0/0/0.terrain"));
+  ASSERT_TRUE(Eventually([&] { return builds_ == 1; }));
+  const auto begun = std::chrono::steady_clock::now();
+  server_->RequestStop();
+  const auto reply = client.Read();
+  ASSERT_TRUE(reply);
+  EXPECT_EQ(reply->status, 503) << "told, not cut off";
+  EXPECT_FALSE(server_->Wait());
+  EXPECT_LT(std::chrono::steady_clock::now() - begun, 4s);
+}
+
+TEST_F(Drain, ClosesIdleConnectionsAtOnceAndTakesNoNewOnes) {
+  Start();
+  RawClient idle(port());
+  idle.Send(Get("/livez"));
+  ASSERT_TRUE(idle.Read());
+  const std::uint16_t port_then = port();
+  server_->RequestStop();
+  EXPECT_TRUE(idle.Ended());
+  EXPECT_TRUE(server_->Wait());
+  RawClient late(port_then);
+  EXPECT_FALSE(late.Send("x"));
+}
+
+TEST_F(Drain, StopsOnASignal) {
+  ServerOptions options;
+  options.stop_on_signals = true;
+  Start(options);
+  std::raise(SIGTERM);
+  EXPECT_TRUE(server_->Wait());
+}
+
+TEST_F(Drain, IsDoneOnceHoweverOftenAsked) {
+  Start();
+  server_->RequestStop();
+  server_->RequestStop();
+  EXPECT_TRUE(server_->Wait());
+  EXPECT_TRUE(server_->Wait());
+}
+
+}  // namespace
+}  // namespace terrace::server

@@ -1,0 +1,51 @@
+#include "server/handlers/datasets_handler.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <nlohmann/json.hpp>
+
+namespace terrace::server {
+namespace {
+
+std::array<DatasetView, 1> Datasets() {
+  std::array<DatasetView, 1> datasets;
+  datasets[0].name = "a <b>";
+  datasets[0].attribution = "\xff not UTF-8";
+  datasets[0].available.resize(3);
+  datasets[0].west = 177;
+  datasets[0].south = -20;
+  datasets[0].east = -178;
+  datasets[0].north = -15;
+  datasets[0].min_height_m = -12.5;
+  datasets[0].max_height_m = 1324;
+  return datasets;
+}
+
+TEST(DatasetsHandler, ListsWhatAClientNeeds) {
+  const auto list = nlohmann::json::parse(DatasetsJson(Datasets()));
+  ASSERT_EQ(list["datasets"].size(), 1u);
+  const auto& dataset = list["datasets"][0];
+  EXPECT_EQ(dataset["name"], "a <b>");
+  EXPECT_EQ(dataset["bounds"], nlohmann::json::parse("[177.0, -20.0, -178.0, -15.0]"));
+  EXPECT_EQ(dataset["min_level"], 0);
+  EXPECT_EQ(dataset["max_level"], 2);
+  EXPECT_EQ(dataset["heights"]["min"], -12.5);
+  EXPECT_EQ(dataset["heights"]["max"], 1324);
+  EXPECT_EQ(dataset["urls"]["layer"], "/a%20%3Cb%3E/layer.json");
+  EXPECT_EQ(dataset["urls"]["tiles"], "/a%20%3Cb%3E/{z}/{x}/{y}.terrain");
+}
+
+TEST(DatasetsHandler, EscapesNamesInThePlainPage) {
+  const std::string page = IndexHtml(Datasets());
+  EXPECT_NE(page.find("a &lt;b&gt;"), std::string::npos);
+  EXPECT_EQ(page.find("<b>"), std::string::npos);
+}
+
+TEST(DatasetsHandler, KnowsTheReservedNames) {
+  for (const char* name : {"datasets", "viewer", "livez", "readyz", "metrics"}) EXPECT_TRUE(IsReservedName(name));
+  EXPECT_FALSE(IsReservedName("maui"));
+}
+
+}  // namespace
+}  // namespace terrace::server

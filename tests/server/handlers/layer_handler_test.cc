@@ -1,0 +1,76 @@
+#include "server/handlers/layer_handler.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <nlohmann/json.hpp>
+
+namespace terrace::server {
+namespace {
+
+class LayerHandlerTest : public testing::Test {
+ protected:
+  LayerHandlerTest() {
+    datasets_[0].name = "maui";
+    datasets_[0].attribution = "USGS";
+    datasets_[0].available = {{{0, 0, 1, 0}}, {{0, 1, 0, 1}}};
+    datasets_[0].west = 170;
+    datasets_[0].east = -170;
+    handler_.emplace(datasets_, "max-age=1");
+  }
+  Response Get(const char* target, const char* accept_encoding = "") {
+    Request request;
+    request.accept_encoding = accept_encoding;
+    return handler_->Handle(*Match(target), request);
+  }
+
+  std::array<DatasetView, 1> datasets_;
+  std::optional<LayerHandler> handler_;
+};
+
+TEST_F(LayerHandlerTest, DescribesTheDataset) {
+  const Response response = Get("/maui/layer.json");
+  EXPECT_EQ(response.status, 200);
+  EXPECT_EQ(response.content_type, "application/json");
+  EXPECT_EQ(response.cache_control, "max-age=1");
+  const auto layer = nlohmann::json::parse(*response.body);
+  EXPECT_EQ(layer["maxzoom"], 1);
+  EXPECT_EQ(layer["available"].size(), 2u);
+  EXPECT_EQ(layer["bounds"][0], -180) << "across the antimeridian: the whole turn";
+  EXPECT_EQ(layer["bounds"][2], 180);
+}
+
+TEST_F(LayerHandlerTest, WritesWishesIntoTheTemplate) {
+  const auto tiles = [&](const char* target) {
+    return nlohmann::json::parse(*Get(target).body)["tiles"][0].get<std::string>();
+  };
+  EXPECT_NE(tiles("/maui/layer.json?error=5.00").find("error=5&atleast=1"), std::string::npos);
+  EXPECT_NE(tiles("/maui/layer.json?fraction=.250").find("fraction=0.25"), std::string::npos);
+  EXPECT_EQ(tiles("/maui/layer.json?v=1&extensions=a").find("error"), std::string::npos);
+}
+
+TEST_F(LayerHandlerTest, RefusesBadWishesAndUnknownDatasets) {
+  EXPECT_EQ(Get("/maui/layer.json?error=x").status, 400);
+  EXPECT_EQ(Get("/maui/layer.json?fraction=-1").status, 400);
+  EXPECT_EQ(Get("/maui/layer.json?foo=1").status, 400);
+  EXPECT_EQ(Get("/oahu/layer.json").status, 404);
+}
+
+TEST_F(LayerHandlerTest, CompressesOnRequest) {
+  const Response plain = Get("/maui/layer.json"), gzip = Get("/maui/layer.json", "gzip");
+  EXPECT_EQ(gzip.coding, Coding::kGzip);
+  EXPECT_NE(gzip.etag, plain.etag);
+  EXPECT_LT(gzip.body->size(), plain.body->size());
+}
+
+TEST(TileQuery, PrintsNumbersThatSurviveUrls) {
+  ErrorWish wish;
+  wish.error_m = 1e20;
+  EXPECT_EQ(TileQuery(wish), "error=1e20&atleast=1") << "a '+' would become a space";
+  wish.error_m = 0.1;
+  EXPECT_EQ(TileQuery(wish), "error=0.1&atleast=1");
+  EXPECT_EQ(TileQuery(ErrorWish()), "");
+}
+
+}  // namespace
+}  // namespace terrace::server

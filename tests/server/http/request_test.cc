@@ -1,0 +1,115 @@
+#include "server/http/request.h"
+
+#include <gtest/gtest.h>
+
+namespace terrace::server {
+namespace {
+
+std::string Get(const std::string& fields) { return "GET / HTTP/1.1\r\nHost: x\r\n" + fields + "\r\n"; }
+
+TEST(Request, ReadsWhatMatters) {
+  const auto request = ParseHead(
+      "GET /a?b HTTP/1.1\r\nHost: localhost:8080\r\nAccept: a/b\r\naccept: c/d\r\nACCEPT-ENCODING: gzip\r\n"
+      "If-None-Match: \"x\"\r\nIf-None-Match: \"y\"\r\n\r\n");
+  ASSERT_TRUE(request) << request.error().detail;
+  EXPECT_EQ(request->method, Method::kGet);
+  EXPECT_EQ(request->version, 11u);
+  EXPECT_TRUE(request->keep_alive);
+  EXPECT_EQ(request->target, "/a?b");
+  EXPECT_EQ(request->accept, "a/b, c/d");
+  EXPECT_EQ(request->accept_encoding, "gzip");
+  EXPECT_EQ(request->if_none_match, "\"x\", \"y\"");
+}
+
+TEST(Request, KnowsItsMethodAndPersistence) {
+  EXPECT_EQ(ParseHead("HEAD / HTTP/1.1\r\nHost: x\r\n\r\n")->method, Method::kHead);
+  EXPECT_EQ(ParseHead("OPTIONS * HTTP/1.1\r\nHost: x\r\n\r\n")->method, Method::kOptions);
+  EXPECT_EQ(ParseHead("DELETE / HTTP/1.1\r\nHost: x\r\n\r\n")->method, Method::kOther);
+  EXPECT_EQ(ParseHead("BREW / HTTP/1.1\r\nHost: x\r\n\r\n")->method, Method::kOther);
+  EXPECT_FALSE(ParseHead("GET / HTTP/1.0\r\n\r\n")->keep_alive);
+  EXPECT_TRUE(ParseHead("GET / HTTP/1.0\r\nConnection: keep-alive\r\n\r\n")->keep_alive);
+  EXPECT_EQ(ParseHead("GET / HTTP/1.0\r\n\r\n")->version, 10u);
+  EXPECT_FALSE(ParseHead(Get("Connection: close\r\n"))->keep_alive);
+}
+
+TEST(Request, AcceptsALengthOfZeroOnly) {
+  EXPECT_TRUE(ParseHead(Get("Content-Length: 0\r\n")));
+  for (const char* length : {"5", "00", "+0", "-0", "0x0", "0, 0", "", "18446744073709551616"}) {
+    EXPECT_FALSE(ParseHead(Get("Content-Length: " + std::string(length) + "\r\n"))) << length;
+  }
+  EXPECT_FALSE(ParseHead(Get("Content-Length: 0\r\nContent-Length: 0\r\n")));
+}
+
+TEST(Request, RefusesEveryTransferEncoding) {
+  for (const char* coding : {"chunked", "gzip", "identity", "gzip, chunked", "xchunked", " chunked", "\tchunked", ""}) {
+    EXPECT_FALSE(ParseHead(Get("Transfer-Encoding: " + std::string(coding) + "\r\n"))) << coding;
+  }
+  EXPECT_FALSE(ParseHead("GET / HTTP/1.0\r\nTransfer-Encoding: chunked\r\n\r\n"));
+}
+
+TEST(Request, RefusesAmbiguousHeads) {
+  for (const char* head : {
+           "GET / HTTP/1.1\r\n\r\n",                                        // no Host
+           "GET / HTTP/1.1\r\nHost: x\r\nHost: x\r\n\r\n",                  // two
+           "GET / HTTP/1.1\r\nHost: a b\r\n\r\n",                           // not a host
+           "GET / HTTP/1.1\r\nHost: x/y\r\n\r\n",                           //
+           "GET / HTTP/1.1\r\nHost: x\r\nA: b\r\n Content-Length: 5\r\n\r\n",    // folded
+           "GET / HTTP/1.1\r\nHost: x\r\nA: b\r\n\tTransfer-Encoding: chunked\r\n\r\n",
+           "GET / HTTP/1.1\r\n Host: x\r\n\r\n",                            //
+           "GET / HTTP/1.1\r\nHost: x\r\nContent-Length : 0\r\n\r\n",       // blank before the colon
+           "GET / HTTP/1.1\r\nHost: x\r\n: y\r\n\r\n",                      // no name
+           "GET / HTTP/1.1\r\nHost: x\r\nnonsense\r\n\r\n",                 // no colon
+           "GET / HTTP/1.1\r\nHost: x\r\nA: b\rC: d\r\n\r\n",               // bare CR
+           "GET / HTTP/1.1\r\nHost: x\r\nA: \x01\r\n\r\n",                  // control character
+           "GET / HTTP/1.1\r\nHost: x\r\nA(: b\r\n\r\n",                    // not a token
+           "GET / HTTP/2.0\r\nHost: x\r\n\r\n",
+           "GET / HTTP/1.2\r\nHost: x\r\n\r\n",
+           "GET / HTTP/0.9\r\nHost: x\r\n\r\n",
+           "GET / http/1.1\r\nHost: x\r\n\r\n",
+           "GET /\r\nHost: x\r\n\r\n",
+           "GET  / HTTP/1.1\r\nHost: x\r\n\r\n",
+           "GET / HTTP/1.1 \r\nHost: x\r\n\r\n",
+           "GET /a b HTTP/1.1\r\nHost: x\r\n\r\n",
+           " GET / HTTP/1.1\r\nHost: x\r\n\r\n",
+           "G@T / HTTP/1.1\r\nHost: x\r\n\r\n",
+           "/ HTTP/1.1\r\nHost: x\r\n\r\n",
+       }) {
+    const auto request = ParseHead(head);
+    ASSERT_FALSE(request) << head;
+    EXPECT_EQ(request.error().status, 400) << head;
+  }
+}
+
+TEST(Request, RefusesNulBytes) {
+  using std::string_view_literals::operator""sv;
+  EXPECT_FALSE(ParseHead("GET / HTTP/1.1\r\nHost: x\r\nA: b\0c\r\n\r\n"sv));
+  EXPECT_FALSE(ParseHead("GET /\0 HTTP/1.1\r\nHost: x\r\n\r\n"sv));
+}
+
+TEST(HeadEnd, IsFoundWhereverTheReadsAreCut) {
+  const std::string head = Get("A: b\r\n");
+  const std::string stream = head + "GET /next";
+  for (std::size_t cut = 0; cut < head.size(); ++cut) {
+    EXPECT_EQ(*FindHeadEnd(stream.substr(0, cut), 0), 0u);
+    EXPECT_EQ(*FindHeadEnd(stream, cut), head.size()) << cut;
+  }
+}
+
+TEST(HeadEnd, BoundsTheTargetAndTheHead) {
+  const std::string fits(kMaxTargetBytes - 1, 'a');
+  EXPECT_TRUE(ParseHead("GET /" + fits + " HTTP/1.1\r\nHost: x\r\n\r\n"));
+  EXPECT_EQ(ParseHead("GET /" + fits + "a HTTP/1.1\r\nHost: x\r\n\r\n").error().status, 414);
+  EXPECT_EQ(FindHeadEnd("GET /" + std::string(kMaxTargetBytes + 100, 'a'), 0).error().status, 414)
+      << "before the line is complete";
+  EXPECT_EQ(FindHeadEnd(Get("A: " + std::string(kMaxHeadBytes, 'b')), 0).error().status, 431);
+  EXPECT_EQ(FindHeadEnd(Get("").substr(0, 20) + std::string(kMaxHeadBytes, 'b'), 0).error().status, 431);
+}
+
+TEST(HeadEnd, RefusesLinesWithoutCr) {
+  EXPECT_EQ(FindHeadEnd("GET / HTTP/1.1\nHost: x\n\n", 0).error().status, 400);
+  EXPECT_EQ(FindHeadEnd("GET / HTTP/1.1\r\nA: b\nHost: x\r\n\r\n", 0).error().status, 400);
+  EXPECT_EQ(FindHeadEnd("\n", 0).error().status, 400);
+}
+
+}  // namespace
+}  // namespace terrace::server

@@ -1,0 +1,104 @@
+#include "server/http/response.h"
+
+#include <gtest/gtest.h>
+
+#include "server/http/http_error.h"
+
+namespace terrace::server {
+namespace {
+
+TEST(Response, SpeaksTheVersionOfTheRequest) {
+  EXPECT_TRUE(SerializeHead(Response(), 10, true).starts_with("HTTP/1.0 200 OK\r\n"));
+  EXPECT_TRUE(SerializeHead(Response(), 11, true).starts_with("HTTP/1.1 200 OK\r\n"));
+}
+
+TEST(Response, CarriesCorsAndALength) {
+  Response response;
+  response.content_type = "text/plain";
+  response.body = std::make_shared<const std::string>("hello");
+  response.coding = Coding::kGzip;
+  response.etag = "\"e\"";
+  response.vary = true;
+  const std::string head = SerializeHead(response, 11, false);
+  for (const char* line :
+       {"\r\nContent-Length: 5\r\n", "\r\nContent-Encoding: gzip\r\n", "\r\nETag: \"e\"\r\n",
+        "\r\nVary: Accept, Accept-Encoding\r\n", "\r\nAccess-Control-Allow-Origin: *\r\n",
+        "\r\nAccess-Control-Expose-Headers: ETag, Terrain-Max-Error, Terrain-Certified-Error, Retry-After, Server-Timing\r\n",
+        "\r\nTiming-Allow-Origin: *\r\n", "\r\nConnection: close\r\n", "\r\nDate: "}) {
+    EXPECT_NE(head.find(line), std::string::npos) << line;
+  }
+  EXPECT_TRUE(head.ends_with("\r\n\r\n"));
+}
+
+TEST(Response, HasNoBodyHeadersWithoutABody) {
+  Response response;
+  response.status = 304;
+  response.content_type = "text/plain";
+  response.coding = Coding::kGzip;
+  const std::string head = SerializeHead(response, 11, true);
+  EXPECT_EQ(head.find("\r\nContent-"), std::string::npos) << head;
+}
+
+TEST(Response, MatchesEtagsAsListsWeakAndStar) {
+  const struct {
+    const char* if_none_match;
+    bool matches;
+  } cases[] = {
+      {"", false},
+      {"*", true},
+      {" * ", true},
+      {"\"a\"", true},
+      {"W/\"a\"", true},
+      {"\"b\"", false},
+      {"\"b\", \"a\"", true},
+      {"\"b\",W/\"a\" , \"c\"", true},
+      {"\"b\",, \"a\"", true},
+      {"a", false},
+      {"\"a", false},
+      {"\"b\" \"a\"", false},
+      {"\"a,b\"", false},
+      {"\"*\"", false},
+  };
+  for (const auto& c : cases) EXPECT_EQ(MatchesEtag(c.if_none_match, "\"a\""), c.matches) << c.if_none_match;
+}
+
+TEST(Response, HasAnEtagPerCoding) {
+  EXPECT_NE(MakeEtag("x", Coding::kGzip), MakeEtag("x", Coding::kIdentity));
+  EXPECT_NE(MakeEtag("x", Coding::kGzip), MakeEtag("y", Coding::kGzip));
+  EXPECT_EQ(MakeEtag("x", Coding::kGzip), MakeEtag("x", Coding::kGzip));
+}
+
+TEST(Response, BecomesNotModifiedOnlyFromSuccess) {
+  Request request;
+  request.if_none_match = "*";
+  Response good;
+  good.etag = "\"a\"";
+  good.body = std::make_shared<const std::string>("x");
+  const Response unchanged = Conditional(good, request);
+  EXPECT_EQ(unchanged.status, 304);
+  EXPECT_EQ(unchanged.body, nullptr);
+  EXPECT_EQ(unchanged.etag, "\"a\"");
+  EXPECT_EQ(Conditional(ProblemResponse(404, "x", "id"), request).status, 404);
+}
+
+TEST(HttpError, NeverAnswersFiveHundred) {
+  EXPECT_EQ(StatusOf(ErrorCode::kInvalidArgument), 400);
+  EXPECT_EQ(StatusOf(ErrorCode::kNotFound), 404);
+  for (const ErrorCode code :
+       {ErrorCode::kUnavailable, ErrorCode::kOverloaded, ErrorCode::kCancelled, ErrorCode::kInternal}) {
+    EXPECT_EQ(StatusOf(code), 503);
+  }
+}
+
+TEST(HttpError, KeepsTheDetailFromTheClient) {
+  const Response response = BackendErrorResponse(Error{ErrorCode::kUnavailable, "/secret/maui.tif: gone"}, "id7");
+  EXPECT_EQ(response.status, 503);
+  EXPECT_EQ(response.body->find("secret"), std::string::npos);
+  EXPECT_NE(response.body->find("\"request_id\":\"id7\""), std::string::npos);
+  EXPECT_EQ(response.content_type, "application/problem+json");
+  EXPECT_EQ(response.coding, Coding::kIdentity);
+  EXPECT_NE(SerializeHead(response, 11, true).find("\r\nRetry-After: 5\r\n"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace terrace::server

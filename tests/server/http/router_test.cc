@@ -1,0 +1,87 @@
+#include "server/http/router.h"
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+namespace terrace::server {
+namespace {
+
+TEST(Router, FindsEveryUrl) {
+  const struct {
+    const char* target;
+    RouteKind kind;
+  } cases[] = {
+      {"/", RouteKind::kViewer},
+      {"/?dataset=maui", RouteKind::kViewer},
+      {"/viewer/", RouteKind::kViewer},
+      {"/viewer/app.js", RouteKind::kViewer},
+      {"/datasets", RouteKind::kDatasets},
+      {"/livez", RouteKind::kLive},
+      {"/readyz", RouteKind::kReady},
+      {"/metrics", RouteKind::kMetrics},
+      {"/maui/layer.json", RouteKind::kLayer},
+      {"/maui/layer.json?error=5", RouteKind::kLayer},
+      {"/maui/0/1/0.terrain", RouteKind::kTile},
+      {"http://example.test/maui/0/1/0.terrain", RouteKind::kTile},
+      {"http://example.test", RouteKind::kViewer},
+      {"/a%20b/layer.json", RouteKind::kLayer},
+  };
+  for (const auto& c : cases) {
+    const Result<Route> route = Match(c.target);
+    ASSERT_TRUE(route) << c.target << ": " << route.error().message;
+    EXPECT_EQ(route->kind, c.kind) << c.target;
+  }
+}
+
+TEST(Router, ReadsTheTileAndTheQuery) {
+  const Result<Route> route = Match("/ma%75i/9/533/388.terrain?error=5&v=1");
+  ASSERT_TRUE(route);
+  EXPECT_EQ(route->dataset, "maui");
+  EXPECT_EQ(route->key, (geo::TileKey{9, 533, 388}));
+  EXPECT_EQ(route->query, "error=5&v=1");
+  EXPECT_EQ(Match("/viewer/a/b.js")->file, "a/b.js");
+  EXPECT_EQ(Match("/")->file, "index.html");
+  EXPECT_EQ(Match("/viewer/")->file, "index.html");
+}
+
+TEST(Router, RefusesWhatIsNoUrl) {
+  const char* const not_found[] = {
+      "/nope", "/maui", "/maui/", "/maui/layer.json/", "//", "/maui/0/0", "/maui/0/0/0", "/maui/0/0/0.terrain/",
+      "/maui/0/0/0.png", "/maui/0/0/.terrain", "/datasets/", "/livez/x", "/datasets/layer.json", "/metrics/0/0/0.terrain",
+      "/viewer",
+      // Numbers that name no tile.
+      "/maui/x/0/0.terrain", "/maui/-1/0/0.terrain", "/maui/0/-1/0.terrain", "/maui/0/0/-0.terrain", "/maui/+1/0/0.terrain",
+      "/maui/0x1/0/0.terrain", "/maui/1e1/0/0.terrain", "/maui/1.0/0/0.terrain", "/maui/00/0/0.terrain",
+      "/maui/01/0/0.terrain", "/maui/%201/0/0.terrain", "/maui/1%20/0/0.terrain", "/maui/%2d1/0/0.terrain",
+      // Outside the tiling scheme, and out of any integer.
+      "/maui/0/2/0.terrain", "/maui/0/0/1.terrain", "/maui/25/0/0.terrain", "/maui/24/33554432/0.terrain",
+      "/maui/64/0/0.terrain", "/maui/999999999/0/0.terrain", "/maui/0/4294967296/0.terrain",
+      "/maui/0/18446744073709551616/0.terrain", "/maui/18446744073709551616/0/0.terrain",
+      "/maui/9/99999999999999999999999999999999999999/0.terrain", "/../etc/passwd", "/%2e%2e/%2e%2e/etc/passwd",
+  };
+  for (const char* target : not_found) {
+    const Result<Route> route = Match(target);
+    ASSERT_FALSE(route) << target;
+    EXPECT_EQ(route.error().code, ErrorCode::kNotFound) << target;
+  }
+}
+
+TEST(Router, TakesTheLastTileOfTheDeepestLevel) { EXPECT_TRUE(Match("/maui/24/33554431/16777215.terrain")); }
+
+TEST(Router, RefusesMalformedTargets) {
+  for (const char* target : {"", "maui", "*", "ftp://x/", "http://x?y", "/a#b", "/%", "/%4", "/%zz", "/a%00b/layer.json",
+                             "/a%0d%0ab/layer.json"}) {
+    const Result<Route> route = Match(target);
+    ASSERT_FALSE(route) << target;
+    EXPECT_EQ(route.error().code, ErrorCode::kInvalidArgument) << target;
+  }
+}
+
+TEST(Router, KeepsAnEncodedSlashInsideItsSegment) {
+  EXPECT_EQ(Match("/a%2Fb/layer.json")->dataset, "a/b");
+  EXPECT_EQ(Match("/viewer/..%2f..%2fetc%2fpasswd")->file, "../../etc/passwd") << "a key of a map, never a path";
+}
+
+}  // namespace
+}  // namespace terrace::server

@@ -1,0 +1,55 @@
+// A client that sends exactly the bytes it is given and reads replies as they come, for tests.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace terrace::server {
+
+struct Reply {
+  std::string version;  // "HTTP/1.1"
+  int status = 0;
+  std::map<std::string, std::string> fields;  // names in lower case
+  std::string body;
+
+  // Empty when there is no such field.
+  std::string Field(const std::string& name) const;
+};
+
+class RawClient {
+ public:
+  explicit RawClient(std::uint16_t port, int receive_buffer_bytes = 0);
+  ~RawClient();
+  RawClient(const RawClient&) = delete;
+  RawClient& operator=(const RawClient&) = delete;
+
+  // False: the server has closed the connection.
+  bool Send(std::string_view bytes);
+
+  // The next reply; `head` for replies without a body whatever their length says. Nothing: the connection ended before a
+  // reply began, or ten seconds passed. A reply that is cut short has status -1.
+  std::optional<Reply> Read(bool head = false);
+
+  // True when the server closes within ten seconds without sending anything more.
+  bool Ended();
+
+  void CloseOwnDirection();
+  void Reset();  // the kernel tells the server at once
+
+ private:
+  bool Fill();
+
+  int socket_;
+  std::string unread_;
+};
+
+// "GET {target} HTTP/1.1" with a Host and the extra fields ("Name: value\r\n").
+std::string Get(std::string_view target, std::string_view fields = "");
+
+// One request on a connection of its own.
+Reply Fetch(std::uint16_t port, std::string_view target, std::string_view fields = "");
+
+}  // namespace terrace::server

@@ -1,0 +1,57 @@
+#include "tests/server/server_fixture.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <thread>
+
+#include "proto/compress.h"
+
+namespace terrace::server {
+
+ServerFixture::ServerFixture() {
+  spdlog::set_level(spdlog::level::err);
+  builder_ = [this](const TileRequest& request, std::stop_token stop) -> Result<EncodedTile> {
+    ++builds_;
+    const auto until = std::chrono::steady_clock::now() + std::chrono::milliseconds(build_ms_);
+    while (std::chrono::steady_clock::now() < until) {
+      if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "stopped");
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    EncodedTile tile;
+    tile.bytes = BodyOf(request);
+    tile.etag = fmt::format("\"{:x}\"", std::hash<std::string>{}(tile.bytes));
+    if (request.coding == Coding::kGzip) tile.bytes = proto::Gzip(tile.bytes);
+    tile.max_error_m = 3.871234;
+    return tile;
+  };
+}
+
+void ServerFixture::Start(ServerOptions options) {
+  options.port = 0;
+  options.io_threads = 2;
+  if (options.worker_threads == 0) options.worker_threads = 2;
+  DatasetView maui;
+  maui.name = "maui";
+  maui.available = {{{0, 0, 1, 0}}, {{0, 0, 3, 1}}, {{0, 0, 7, 3}}, {{0, 0, 15, 7}}};
+  auto server = Server::Start({maui}, builder_, options);
+  ASSERT_TRUE(server) << server.error().message;
+  server_ = std::move(*server);
+}
+
+std::string ServerFixture::BodyOf(const TileRequest& request) {
+  std::string body = fmt::format("tile {} step {} coding {} normals {} ", geo::ToString(request.key), request.error_step,
+                                 static_cast<int>(request.coding), request.normals);
+  body.append(2000, '.');
+  return body;
+}
+
+bool Eventually(const std::function<bool()>& done) {
+  for (int i = 0; i < 2000; ++i) {
+    if (done()) return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  return false;
+}
+
+}  // namespace terrace::server

@@ -1,0 +1,37 @@
+// A real server on a free port with one made-up dataset, "maui", levels 0 to 3, and a builder that tests steer.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <mutex>
+
+#include "server/server.h"
+#include "tests/server/raw_client.h"
+
+namespace terrace::server {
+
+class ServerFixture : public testing::Test {
+ protected:
+  ServerFixture();
+
+  // Call once, after the knobs are set.
+  void Start(ServerOptions options = {});
+  std::uint16_t port() const { return server_->port(); }
+
+  // What the default builder makes of a request: readable, and different wherever the request differs.
+  static std::string BodyOf(const TileRequest& request);
+
+  TileBuilder builder_;         // default: counts and returns BodyOf, compressed when asked for
+  std::atomic<int> builds_{0};  // by the default builder
+  std::atomic<int> build_ms_{0};
+  std::unique_ptr<Server> server_;
+};
+
+// Sleeps until `done` or ten seconds have passed; then false.
+bool Eventually(const std::function<bool()>& done);
+
+}  // namespace terrace::server

@@ -1,0 +1,123 @@
+#include "server/tiles/tile_cache.h"
+
+#include <gtest/gtest.h>
+
+#include <thread>
+#include <vector>
+
+namespace terrace::server {
+namespace {
+
+constexpr std::size_t kBody = 1000;
+constexpr std::size_t kCharge = kBody + TileCache::kEntryOverheadBytes;
+
+CacheKey Key(int x, std::uint64_t generation = 1) {
+  CacheKey key;
+  key.request.key = geo::TileKey{10, x, 3};
+  key.generation = generation;
+  return key;
+}
+
+TilePtr Tile(char fill = 'x', std::size_t bytes = kBody) {
+  EncodedTile tile;
+  tile.bytes.assign(bytes, fill);
+  return std::make_shared<const EncodedTile>(std::move(tile));
+}
+
+TEST(TileCache, FindsWhatWasInserted) {
+  TileCache cache(10 * kCharge);
+  const TilePtr tile = Tile();
+  cache.Insert(Key(1), tile);
+  EXPECT_EQ(cache.Find(Key(1)), tile);
+  EXPECT_EQ(cache.Find(Key(2)), nullptr);
+}
+
+TEST(TileCache, EvictsOldestWhenOverBudget) {
+  TileCache cache(3 * kCharge);
+  for (int x = 1; x <= 4; ++x) cache.Insert(Key(x), Tile());
+  EXPECT_EQ(cache.Find(Key(1)), nullptr);
+  for (int x = 2; x <= 4; ++x) EXPECT_NE(cache.Find(Key(x)), nullptr) << x;
+  EXPECT_EQ(cache.stats().entries, 3u);
+  EXPECT_EQ(cache.stats().bytes, 3 * kCharge);
+}
+
+TEST(TileCache, KeepsWhatWasFoundLately) {
+  TileCache cache(3 * kCharge);
+  for (int x = 1; x <= 3; ++x) cache.Insert(Key(x), Tile());
+  ASSERT_NE(cache.Find(Key(1)), nullptr);
+  cache.Insert(Key(4), Tile());
+  EXPECT_NE(cache.Find(Key(1)), nullptr);
+  EXPECT_EQ(cache.Find(Key(2)), nullptr);
+}
+
+TEST(TileCache, EvictsSeveralSmallTilesForALargeOne) {
+  TileCache cache(4 * kCharge);
+  for (int x = 1; x <= 4; ++x) cache.Insert(Key(x), Tile());
+  cache.Insert(Key(5), Tile('y', 3 * kCharge - TileCache::kEntryOverheadBytes));
+  EXPECT_EQ(cache.stats().entries, 2u);
+  EXPECT_NE(cache.Find(Key(4)), nullptr);
+  EXPECT_NE(cache.Find(Key(5)), nullptr);
+}
+
+TEST(TileCache, ReplacesAnEntryWithoutChargingTwice) {
+  TileCache cache(3 * kCharge);
+  cache.Insert(Key(1), Tile('a'));
+  cache.Insert(Key(1), Tile('b'));
+  EXPECT_EQ(cache.Find(Key(1))->bytes[0], 'b');
+  EXPECT_EQ(cache.stats().bytes, kCharge);
+}
+
+TEST(TileCache, DoesNotKeepWhatIsLargerThanItsBudget) {
+  TileCache cache(3 * kCharge);
+  cache.Insert(Key(1), Tile());
+  cache.Insert(Key(2), Tile('y', 4 * kCharge));
+  EXPECT_NE(cache.Find(Key(1)), nullptr);
+  EXPECT_EQ(cache.Find(Key(2)), nullptr);
+}
+
+TEST(TileCache, IsOffWithoutCapacity) {
+  TileCache cache(0);
+  cache.Insert(Key(1), Tile('x', 0));
+  EXPECT_EQ(cache.Find(Key(1)), nullptr);
+  EXPECT_EQ(cache.stats().entries, 0u);
+}
+
+TEST(TileCache, SeparatesEverythingThatChangesBytes) {
+  TileCache cache(100 * kCharge);
+  std::vector<CacheKey> keys(7, Key(1));
+  keys[1].request.dataset = 1;
+  keys[2].request.error_step = -1;
+  keys[3].request.coding = Coding::kGzip;
+  keys[4].request.normals = true;
+  keys[5].generation = 2;
+  keys[6].request.key.level = 11;
+  for (std::size_t i = 0; i < keys.size(); ++i) cache.Insert(keys[i], Tile(static_cast<char>('a' + i)));
+  for (std::size_t i = 0; i < keys.size(); ++i) {
+    EXPECT_EQ(cache.Find(keys[i])->bytes[0], static_cast<char>('a' + i)) << i;
+  }
+}
+
+TEST(TileCache, StaysInBudgetUnderManyThreads) {
+  constexpr std::size_t kCapacity = std::size_t{64} << 20;  // large enough for shards
+  TileCache cache(kCapacity);
+  std::vector<std::thread> threads;
+  for (int t = 0; t < 4; ++t) {
+    threads.emplace_back([&cache, t] {
+      for (int i = 0; i < 2000; ++i) {
+        const int x = (i * 7 + t * 13) % 3000;
+        const TilePtr found = cache.Find(Key(x));
+        if (found) {
+          ASSERT_EQ(found->bytes[0], static_cast<char>(x % 100));
+        }
+        cache.Insert(Key(x), Tile(static_cast<char>(x % 100), 40'000));
+      }
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  const TileCache::Stats stats = cache.stats();
+  EXPECT_LE(stats.bytes, kCapacity);
+  EXPECT_EQ(stats.bytes, stats.entries * (40'000 + TileCache::kEntryOverheadBytes));
+}
+
+}  // namespace
+}  // namespace terrace::server

@@ -1,0 +1,80 @@
+#include "server/tiles/tile_service.h"
+
+#include <gtest/gtest.h>
+
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/use_future.hpp>
+#include <new>
+
+namespace terrace::server {
+namespace {
+
+Result<ServedTile> Get(TileService& service, CacheKey key = {}) {
+  asio::io_context io(1);
+  auto got = asio::co_spawn(io, service.Get(key, TileService::Clock::now() + std::chrono::seconds(10)), asio::use_future);
+  io.run();
+  return got.get();
+}
+
+TEST(TileService, BuildsOnceAndThenHits) {
+  std::atomic<int> builds{0};
+  TileService service({}, [&](const TileRequest&, std::stop_token) -> Result<EncodedTile> {
+    ++builds;
+    return EncodedTile();
+  });
+  EXPECT_EQ(Get(service)->cache, CacheStatus::kMiss);
+  EXPECT_EQ(Get(service)->cache, CacheStatus::kHit);
+  EXPECT_EQ(builds, 1);
+  EXPECT_EQ(service.stats().hits, 1u);
+  EXPECT_EQ(service.stats().misses, 1u);
+}
+
+TEST(TileService, KeepsNoFailure) {
+  std::atomic<int> builds{0};
+  TileService service({}, [&](const TileRequest&, std::stop_token) -> Result<EncodedTile> {
+    if (++builds == 1) return MakeError(ErrorCode::kUnavailable, "gone");
+    return EncodedTile();
+  });
+  EXPECT_EQ(Get(service).error().code, ErrorCode::kUnavailable);
+  EXPECT_TRUE(Get(service));
+}
+
+TEST(TileService, TurnsExceptionsIntoUnavailable) {
+  TileService service({}, [](const TileRequest&, std::stop_token) -> Result<EncodedTile> { throw std::bad_alloc(); });
+  EXPECT_EQ(Get(service).error().code, ErrorCode::kUnavailable);
+}
+
+TEST(TileService, BuildsAgainForAnotherGeneration) {
+  std::atomic<int> builds{0};
+  TileService service({}, [&](const TileRequest&, std::stop_token) -> Result<EncodedTile> {
+    ++builds;
+    return EncodedTile();
+  });
+  CacheKey key;
+  ASSERT_TRUE(Get(service, key));
+  key.generation = 2;
+  ASSERT_TRUE(Get(service, key));
+  EXPECT_EQ(builds, 2);
+}
+
+TEST(TileService, TellsTheObserverAboutEveryBuild) {
+  std::atomic<int> good{0}, bad{0};
+  TileService service(
+      {},
+      [](const TileRequest& request, std::stop_token) -> Result<EncodedTile> {
+        if (request.dataset == 1) return MakeError(ErrorCode::kInternal, "no");
+        return EncodedTile();
+      },
+      [&](const TileRequest&, const Result<TilePtr>& tile) { ++(tile ? good : bad); });
+  CacheKey key;
+  ASSERT_TRUE(Get(service, key));
+  ASSERT_TRUE(Get(service, key));
+  key.request.dataset = 1;
+  ASSERT_FALSE(Get(service, key));
+  EXPECT_EQ(good, 1);
+  EXPECT_EQ(bad, 1);
+}
+
+}  // namespace
+}  // namespace terrace::server
