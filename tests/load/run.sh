@@ -3,8 +3,9 @@
 #
 #   tests/load/run.sh http://HOST:PORT/DATASET [SECONDS] [CONNECTIONS]     default: 20 seconds, 32 connections
 #
-# Start the server afresh: the first row is only cold if nothing has been built yet. The second row sends the same requests
-# again. "built" counts tiles meshed in that time, from /metrics. Client and server share a machine unless you separate them.
+# cold: every tile of the walk once. Start the server afresh, or it has built some already; the column "built" tells.
+# warm: the walk as it is, popular tiles more often, by wrk, for SECONDS.
+# Client and server share a machine unless you separate them.
 set -euo pipefail
 export LC_ALL=C
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
@@ -18,7 +19,7 @@ WALK=$(mktemp)
 export WALK
 trap 'rm -f "$WALK"' EXIT
 "$here/walk.py" "$dataset" > "$WALK"
-echo "$(wc -l < "$WALK") requests for $(sort -u "$WALK" | wc -l) tiles, $connections connections, $seconds s each" >&2
+echo "$(wc -l < "$WALK") requests for $(sort -u "$WALK" | wc -l) tiles, $connections connections, $seconds s" >&2
 
 builds() {
   python3 - "$dataset" <<'PYTHON'
@@ -29,17 +30,21 @@ print(int(sum(float(line.split()[-1]) for line in lines if line.startswith("terr
 PYTHON
 }
 
-echo "| cache | requests/s | tiles built/s | p50 ms | p99 ms | MB/s | KB a tile | errors |"
-echo "|---|---|---|---|---|---|---|---|"
-for state in cold warm; do
-  before=$(builds)
-  figures=$(wrk -t 2 -c "$connections" -d "$seconds" --timeout 30s -s "$here/replay.lua" "$dataset" < /dev/null | grep '^{')
-  python3 - "$state" "$figures" "$(($(builds) - before))" <<'PYTHON'
+row() {  # NAME JSON TILES_BUILT
+  python3 - "$@" <<'PYTHON'
 import json, sys
-state, figures, built = sys.argv[1], json.loads(sys.argv[2]), int(sys.argv[3])
+name, figures, built = sys.argv[1], json.loads(sys.argv[2]), int(sys.argv[3])
 seconds, requests = figures["seconds"], max(figures["requests"], 1)
-print(f"| {state} | {figures['requests'] / seconds:,.0f} | {built / seconds:,.1f} | {figures['p50_ms']:.2f} | "
-      f"{figures['p99_ms']:.2f} | {figures['bytes'] / seconds / 1e6:.1f} | {figures['bytes'] / requests / 1e3:.1f} | "
-      f"{figures['status_errors'] + figures['socket_errors']} |")
+print(f"| {name} | {figures['requests']:,} | {built:,} | {figures['requests'] / seconds:,.0f} | {figures['p50_ms']:.2f} | "
+      f"{figures['p99_ms']:.2f} | {figures['bytes'] / seconds / 1e6:.1f} | {figures['bytes'] / requests / 1e3:.1f} | {figures['errors']} |")
 PYTHON
-done
+}
+
+echo "| cache | requests | built | requests/s | p50 ms | p99 ms | MB/s | KB each | errors |"
+echo "|---|---|---|---|---|---|---|---|---|"
+before=$(builds)
+figures=$("$here/once.py" "$dataset" "$WALK" "$connections")
+after=$(builds)
+row cold "$figures" $((after - before))
+figures=$(wrk -t 2 -c "$connections" -d "$seconds" --timeout 30s -s "$here/replay.lua" "$dataset" < /dev/null | grep '^{')
+row warm "$figures" $(($(builds) - after))
