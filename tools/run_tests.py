@@ -3,10 +3,9 @@
 
     tools/run_tests.py [--jobs N] [SUITE ...]     suites: release asan tsan; default: all three, in this order
 
-A sanitizer suite takes the tests that are executables of the build, without those labelled `slow`, and builds only these.
-The last line says `N passed, N failed`, counted from ctest's own
-reports; a test that could not be built or found counts as failed. Exit status 0 only if everything was built and
-nothing failed.
+A sanitizer suite takes the tests that are executables of the build, without those labelled `slow`, and builds only
+these. The last line says `N passed, N failed`, counted from ctest's own reports; a test that could not be built or found
+counts as failed. Exit status 0 only if everything was built and nothing failed.
 """
 import argparse
 import dataclasses
