@@ -59,8 +59,8 @@ TileServiceOptions ServiceOptions(const ServerOptions& options) {
 
 }  // namespace
 
-// Members are destroyed from the last to the first: the io_context, whose unfinished coroutines hold sessions, goes before
-// everything a session refers to.
+// Members are destroyed from the last to the first: the io_context, whose unfinished coroutines hold sessions, goes
+// before everything a session refers to.
 class Server::Impl {
  public:
   Impl(std::vector<DatasetView> datasets, TileBuilder builder, StaticFiles viewer, ServerOptions options)

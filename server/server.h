@@ -1,8 +1,8 @@
 // The server as one object: start it, ask it to stop, wait until it has.
 //
 // Threads: a few for the network, a bounded pool for building tiles. Stopping goes in this order: no new connections;
-// /readyz says draining; requests that have begun are answered (bounded by drain_timeout); builds are cancelled; threads
-// are joined.
+// /readyz says draining; requests that have begun are answered (bounded by drain_timeout); builds are cancelled;
+// threads are joined.
 #pragma once
 
 #include <chrono>
@@ -22,9 +22,9 @@ class TilePipeline;
 
 struct ServerOptions {
   std::string host = "127.0.0.1";
-  std::uint16_t port = 8080;    // 0: any that is free
-  unsigned io_threads = 0;      // 0: a quarter of the processors, at least one
-  unsigned worker_threads = 0;  // 0: as many as processors
+  std::uint16_t port = 8080;                         // 0: any that is free
+  unsigned io_threads = 0;                           // 0: a quarter of the processors, at least one
+  unsigned worker_threads = 0;                       // 0: as many as processors
   std::size_t queue_length = 256;                    // builds that wait for a worker
   std::size_t cache_bytes = std::size_t{256} << 20;  // of finished tiles; 0: none
   std::size_t max_connections = 1024;
@@ -41,8 +41,8 @@ struct ServerOptions {
 class Server {
  public:
   // Listens when it returns. `builder` is called on worker threads; TileRequest::dataset is an index into `datasets`.
-  // kInvalidArgument: a dataset's name is reserved, empty or used twice. kUnavailable: the address cannot be listened on,
-  // or the viewer cannot be read. Messages name the remedy.
+  // kInvalidArgument: a dataset's name is reserved, empty or used twice. kUnavailable: the address cannot be listened
+  // on, or the viewer cannot be read. Messages name the remedy.
   static Result<std::unique_ptr<Server>> Start(std::vector<DatasetView> datasets, TileBuilder builder,
                                                ServerOptions options);
 

@@ -12,11 +12,20 @@ std::string EscapeHtml(std::string_view text) {
   std::string escaped;
   for (const char c : text) {
     switch (c) {
-      case '&': escaped += "&amp;"; break;
-      case '<': escaped += "&lt;"; break;
-      case '>': escaped += "&gt;"; break;
-      case '"': escaped += "&quot;"; break;
-      default: escaped += c;
+      case '&':
+        escaped += "&amp;";
+        break;
+      case '<':
+        escaped += "&lt;";
+        break;
+      case '>':
+        escaped += "&gt;";
+        break;
+      case '"':
+        escaped += "&quot;";
+        break;
+      default:
+        escaped += c;
     }
   }
   return escaped;
@@ -63,8 +72,8 @@ std::string DatasetsJson(std::span<const DatasetView> datasets) {
 std::string IndexHtml(std::span<const DatasetView> datasets) {
   std::string items;
   for (const DatasetView& dataset : datasets) {
-    fmt::format_to(std::back_inserter(items), "<li><a href=\"/{}/layer.json\">{}</a></li>\n", PercentEncode(dataset.name),
-                   EscapeHtml(dataset.name));
+    fmt::format_to(std::back_inserter(items), "<li><a href=\"/{}/layer.json\">{}</a></li>\n",
+                   PercentEncode(dataset.name), EscapeHtml(dataset.name));
   }
   return fmt::format(
       "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>terrace</title></head>\n"

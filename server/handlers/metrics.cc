@@ -43,10 +43,11 @@ struct Metrics::Families {
                                                           .Name("terrace_http_requests_total")
                                                           .Help("Replies by route and status")
                                                           .Register(registry);
-  prometheus::Family<prometheus::Histogram>& durations = prometheus::BuildHistogram()
-                                                             .Name("terrace_http_request_duration_seconds")
-                                                             .Help("From the end of a request's head to its last byte sent")
-                                                             .Register(registry);
+  prometheus::Family<prometheus::Histogram>& durations =
+      prometheus::BuildHistogram()
+          .Name("terrace_http_request_duration_seconds")
+          .Help("From the end of a request's head to its last byte sent")
+          .Register(registry);
   prometheus::Family<prometheus::Counter>& builds = prometheus::BuildCounter()
                                                         .Name("terrace_tile_builds_total")
                                                         .Help("Tiles built, by dataset and result")
@@ -81,8 +82,7 @@ void Metrics::CountReply(const ReplyRecord& record) {
 
 void Metrics::CountBuild(const TileRequest& request, const Result<TilePtr>& tile) {
   const std::string_view result = tile ? "ok" : ToString(tile.error().code);
-  families_->builds
-      .Add({{"dataset", families_->dataset_names.at(request.dataset)}, {"result", std::string(result)}})
+  families_->builds.Add({{"dataset", families_->dataset_names.at(request.dataset)}, {"result", std::string(result)}})
       .Increment();
   if (!tile) {
     if (tile.error().code == ErrorCode::kUnavailable) families_->source_errors.Increment();
@@ -104,7 +104,8 @@ std::string Metrics::Text(const TileService::Stats& tiles, std::size_t open_conn
   };
   add(kCounter, "terrace_cache_hits_total", "Tiles served from the cache", tiles.hits);
   add(kCounter, "terrace_cache_misses_total", "Tile requests that started a build or were refused one", tiles.misses);
-  add(kCounter, "terrace_flights_joined_total", "Tile requests that waited for a build already under way", tiles.joined);
+  add(kCounter, "terrace_flights_joined_total", "Tile requests that waited for a build already under way",
+      tiles.joined);
   add(kGauge, "terrace_cache_entries", "Tiles in the cache", tiles.cache.entries);
   add(kGauge, "terrace_cache_bytes", "Bytes charged to the cache", tiles.cache.bytes);
   add(kGauge, "terrace_flights", "Builds under way or waiting", tiles.in_flight);

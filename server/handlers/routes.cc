@@ -30,8 +30,8 @@ Response Ready(bool draining) {
 
 }  // namespace
 
-Routes::Routes(std::span<const DatasetView> datasets, TileService& tiles, StaticFiles viewer, TileHandlerOptions options,
-               State state)
+Routes::Routes(std::span<const DatasetView> datasets, TileService& tiles, StaticFiles viewer,
+               TileHandlerOptions options, State state)
     : tiles_(datasets, tiles, options),
       layers_(datasets, options.cache_control),
       viewer_(std::move(viewer)),
@@ -59,10 +59,14 @@ Response Routes::ServeNow(const Route& route, const Request& request) const {
     return ClientErrorResponse(none.error(), request.id);
   }
   switch (route.kind) {
-    case RouteKind::kDatasets: return terrace::server::Serve(datasets_, request, kRevalidate);
-    case RouteKind::kReady: return Ready(state_.draining());
-    case RouteKind::kMetrics: return PlainText(200, "text/plain; version=0.0.4; charset=utf-8", state_.metrics_text());
-    default: return PlainText(200, "text/plain; charset=utf-8", "ok\n");
+    case RouteKind::kDatasets:
+      return terrace::server::Serve(datasets_, request, kRevalidate);
+    case RouteKind::kReady:
+      return Ready(state_.draining());
+    case RouteKind::kMetrics:
+      return PlainText(200, "text/plain; version=0.0.4; charset=utf-8", state_.metrics_text());
+    default:
+      return PlainText(200, "text/plain; charset=utf-8", "ok\n");
   }
 }
 

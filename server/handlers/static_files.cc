@@ -76,8 +76,8 @@ Result<StaticFiles> StaticFiles::Load(const fs::path& directory) {
     files.files_.emplace(walk->path().lexically_relative(directory).generic_string(), std::move(*document));
   }
   if (error) {
-    return MakeError(ErrorCode::kUnavailable, "{}: cannot be listed ({}); check the viewer's folder", directory.string(),
-                     error.message());
+    return MakeError(ErrorCode::kUnavailable, "{}: cannot be listed ({}); check the viewer's folder",
+                     directory.string(), error.message());
   }
   return files;
 }

@@ -16,8 +16,8 @@ class StaticFiles {
   // No files at all.
   StaticFiles() = default;
 
-  // Every regular file below `directory`. `a.js.gz` beside `a.js` is what clients get that take gzip; it must hold the same
-  // bytes. A directory that does not exist gives no files; one that cannot be read is an error.
+  // Every regular file below `directory`. `a.js.gz` beside `a.js` is what clients get that take gzip; it must hold the
+  // same bytes. A directory that does not exist gives no files; one that cannot be read is an error.
   static Result<StaticFiles> Load(const std::filesystem::path& directory);
 
   // `path` relative to the directory, with '/'. Null when there is no such file.

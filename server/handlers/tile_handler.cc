@@ -19,9 +19,12 @@ namespace {
 
 std::string_view Name(CacheStatus cache) {
   switch (cache) {
-    case CacheStatus::kHit: return "hit";
-    case CacheStatus::kMiss: return "miss";
-    case CacheStatus::kJoined: break;
+    case CacheStatus::kHit:
+      return "hit";
+    case CacheStatus::kMiss:
+      return "miss";
+    case CacheStatus::kJoined:
+      break;
   }
   return "join";
 }
@@ -47,8 +50,8 @@ asio::awaitable<Response> TileHandler::Handle(Route route, Request request) cons
 
 Response TileHandler::Reply(const ServedTile& served, const TileRequest& tile, const Request& request) const {
   Response response;
-  response.content_type = tile.normals ? "application/vnd.quantized-mesh;extensions=octvertexnormals"
-                                       : "application/vnd.quantized-mesh";
+  response.content_type =
+      tile.normals ? "application/vnd.quantized-mesh;extensions=octvertexnormals" : "application/vnd.quantized-mesh";
   response.body = Body(served.tile, &served.tile->bytes);
   response.coding = tile.coding;
   response.etag = served.tile->etag;

@@ -17,8 +17,8 @@ namespace terrace::server {
 struct TileHandlerOptions {
   std::string cache_control = "public, max-age=3600";
   std::chrono::milliseconds deadline{30'000};
-  // How long a refusal for overload is held back. A client that is refused at once asks again at once, and answering tens
-  // of thousands of refusals a second takes from the workers the time they need to become free.
+  // How long a refusal for overload is held back. A client that is refused at once asks again at once, and answering
+  // tens of thousands of refusals a second takes from the workers the time they need to become free.
   std::chrono::milliseconds refusal_delay{200};
 };
 

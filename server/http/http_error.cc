@@ -9,23 +9,35 @@ namespace {
 
 std::string_view TitleOf(int status) {
   switch (status) {
-    case 400: return "Bad request";
-    case 404: return "Not found";
-    case 405: return "Method not allowed";
-    case 414: return "URI too long";
-    case 431: return "Request header too large";
-    default: return "Service unavailable";
+    case 400:
+      return "Bad request";
+    case 404:
+      return "Not found";
+    case 405:
+      return "Method not allowed";
+    case 414:
+      return "URI too long";
+    case 431:
+      return "Request header too large";
+    default:
+      return "Service unavailable";
   }
 }
 
 std::string_view FixedDetail(ErrorCode code) {
   switch (code) {
-    case ErrorCode::kInvalidArgument: return "the request cannot be understood";
-    case ErrorCode::kNotFound: return "no such tile";
-    case ErrorCode::kUnavailable: return "the tile's source cannot be read now";
-    case ErrorCode::kOverloaded: return "too many tiles are being built";
-    case ErrorCode::kCancelled: return "the tile was not ready in time";
-    case ErrorCode::kInternal: break;
+    case ErrorCode::kInvalidArgument:
+      return "the request cannot be understood";
+    case ErrorCode::kNotFound:
+      return "no such tile";
+    case ErrorCode::kUnavailable:
+      return "the tile's source cannot be read now";
+    case ErrorCode::kOverloaded:
+      return "too many tiles are being built";
+    case ErrorCode::kCancelled:
+      return "the tile was not ready in time";
+    case ErrorCode::kInternal:
+      break;
   }
   return "the tile cannot be built now";
 }
@@ -37,12 +49,15 @@ const char* RetryAfter(ErrorCode code) { return code == ErrorCode::kOverloaded ?
 
 int StatusOf(ErrorCode code) {
   switch (code) {
-    case ErrorCode::kInvalidArgument: return 400;
-    case ErrorCode::kNotFound: return 404;
+    case ErrorCode::kInvalidArgument:
+      return 400;
+    case ErrorCode::kNotFound:
+      return 404;
     case ErrorCode::kUnavailable:
     case ErrorCode::kOverloaded:
     case ErrorCode::kCancelled:
-    case ErrorCode::kInternal: break;
+    case ErrorCode::kInternal:
+      break;
   }
   return 503;
 }

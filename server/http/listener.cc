@@ -27,10 +27,11 @@ Result<tcp::endpoint> Resolve(asio::io_context& io, const std::string& host, std
   tcp::resolver resolver(io);
   const auto found = resolver.resolve(host, "", tcp::resolver::passive, error);
   if (error || found.empty()) {
-    return MakeError(ErrorCode::kInvalidArgument,
-                     "cannot listen on {}:{}: the host is neither an address nor a name that resolves; give one such as "
-                     "127.0.0.1, 0.0.0.0 or [::]",
-                     host, port);
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "cannot listen on {}:{}: the host is neither an address nor a name that resolves; give one such as "
+        "127.0.0.1, 0.0.0.0 or [::]",
+        host, port);
   }
   return tcp::endpoint(found.begin()->endpoint().address(), port);
 }
@@ -86,8 +87,7 @@ asio::awaitable<void> Listener::AcceptAll() {
       if (error == asio::error::connection_aborted) continue;
     }
     if (!crowded) {
-      spdlog::warn("accepting no connections for now: {}",
-                   error ? error.message() : "as many as configured are open");
+      spdlog::warn("accepting no connections for now: {}", error ? error.message() : "as many as configured are open");
     }
     crowded = true;
     context_->connections->CloseIdle();

@@ -25,8 +25,8 @@ Result<std::uint32_t> FindDataset(std::string_view name, std::span<const Dataset
 // gzip where the client takes it at least as gladly as identity. Without Accept-Encoding: identity.
 Coding NegotiateCoding(std::string_view accept_encoding);
 
-// True when an `extensions=a-b` parameter anywhere in Accept, or one of the query's values, names octvertexnormals. Names
-// nobody knows are ignored. 3DTilesRendererJS hangs the parameter on application/octet-stream.
+// True when an `extensions=a-b` parameter anywhere in Accept, or one of the query's values, names octvertexnormals.
+// Names nobody knows are ignored. 3DTilesRendererJS hangs the parameter on application/octet-stream.
 bool WantsNormals(std::string_view accept, const std::vector<std::string>& query_extensions);
 
 // The step on the level's ladder that a wish comes to; 0 without a wish.

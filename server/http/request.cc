@@ -30,10 +30,14 @@ std::string Joined(const Fields& fields, http::field name) {
 
 Method ToMethod(http::verb verb) {
   switch (verb) {
-    case http::verb::get: return Method::kGet;
-    case http::verb::head: return Method::kHead;
-    case http::verb::options: return Method::kOptions;
-    default: return Method::kOther;
+    case http::verb::get:
+      return Method::kGet;
+    case http::verb::head:
+      return Method::kHead;
+    case http::verb::options:
+      return Method::kOptions;
+    default:
+      return Method::kOther;
   }
 }
 
@@ -45,8 +49,8 @@ bool IsHostValue(std::string_view value) {
   });
 }
 
-// Null when the message ends with its head. Beast reads a GET with `Transfer-Encoding: gzip` as body-less and takes what
-// follows for another request; this is where that ends.
+// Null when the message ends with its head. Beast reads a GET with `Transfer-Encoding: gzip` as body-less and takes
+// what follows for another request; this is where that ends.
 const char* FramingProblem(const Fields& fields) {
   if (fields.count(http::field::transfer_encoding) > 0) return "Transfer-Encoding is not accepted";
   const auto lengths = fields.count(http::field::content_length);

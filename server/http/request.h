@@ -1,7 +1,7 @@
 // One HTTP request without a body, and the only way to get one out of bytes from the network.
 //
-// Stricter than RFC 9112 wherever two readers of the same bytes could disagree about where a message ends: terrace has no
-// endpoint that takes a body, so a message that announces one is refused before another byte is read.
+// Stricter than RFC 9112 wherever two readers of the same bytes could disagree about where a message ends: terrace has
+// no endpoint that takes a body, so a message that announces one is refused before another byte is read.
 #pragma once
 
 #include <cstddef>
@@ -19,8 +19,8 @@ enum class Method { kGet, kHead, kOptions, kOther };
 
 struct Request {
   Method method = Method::kGet;
-  unsigned version = 11;   // 10 or 11
-  bool keep_alive = true;  // what the client wants
+  unsigned version = 11;    // 10 or 11
+  bool keep_alive = true;   // what the client wants
   std::string method_name;  // as sent, for the log
   std::string target;       // as sent
   std::string accept;       // several fields joined with ", "
@@ -31,8 +31,8 @@ struct Request {
 
 // Why bytes are not a request. The connection is of no use afterwards: its framing cannot be trusted.
 struct BadRequest {
-  int status = 400;             // 400, 414 or 431
-  std::string_view detail;      // for the client; a literal
+  int status = 400;         // 400, 414 or 431
+  std::string_view detail;  // for the client; a literal
 };
 
 // Where the head in `bytes` ends (just past the empty line), 0 if it is not complete yet, or why it never can be.

@@ -1,7 +1,7 @@
 // One HTTP reply, and the bytes of its head.
 //
-// Nothing of a request's text ever becomes a header: names are literals and values are numbers, literals or ETags that the
-// server made.
+// Nothing of a request's text ever becomes a header: names are literals and values are numbers, literals or ETags that
+// the server made.
 #pragma once
 
 #include <cstdint>
@@ -23,10 +23,10 @@ struct Response {
   std::string_view content_type;  // a literal; empty where there is no body
   Body body;                      // null: empty
   Coding coding = Coding::kIdentity;
-  std::string etag;               // with its quotes; may be empty
-  std::string cache_control;      // may be empty
-  bool vary = false;              // the reply depends on Accept and Accept-Encoding
-  bool close = false;             // end the connection after this reply
+  std::string etag;           // with its quotes; may be empty
+  std::string cache_control;  // may be empty
+  bool vary = false;          // the reply depends on Accept and Accept-Encoding
+  bool close = false;         // end the connection after this reply
 
   struct Header {
     Header(std::string_view n, std::string v) : name(n), value(std::move(v)) {}

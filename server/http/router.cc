@@ -76,9 +76,9 @@ std::optional<Route> MatchFixed(const std::vector<std::string>& segments) {
     return route;
   }
   static constexpr std::pair<std::string_view, RouteKind> kFixed[] = {{"datasets", RouteKind::kDatasets},
-                                                                     {"livez", RouteKind::kLive},
-                                                                     {"readyz", RouteKind::kReady},
-                                                                     {"metrics", RouteKind::kMetrics}};
+                                                                      {"livez", RouteKind::kLive},
+                                                                      {"readyz", RouteKind::kReady},
+                                                                      {"metrics", RouteKind::kMetrics}};
   for (const auto& [name, kind] : kFixed) {
     if (segments[0] != name) continue;
     route.kind = kind;
@@ -91,13 +91,20 @@ std::optional<Route> MatchFixed(const std::vector<std::string>& segments) {
 
 std::string_view ToString(RouteKind kind) {
   switch (kind) {
-    case RouteKind::kTile: return "tile";
-    case RouteKind::kLayer: return "layer";
-    case RouteKind::kDatasets: return "datasets";
-    case RouteKind::kViewer: return "viewer";
-    case RouteKind::kLive: return "livez";
-    case RouteKind::kReady: return "readyz";
-    case RouteKind::kMetrics: return "metrics";
+    case RouteKind::kTile:
+      return "tile";
+    case RouteKind::kLayer:
+      return "layer";
+    case RouteKind::kDatasets:
+      return "datasets";
+    case RouteKind::kViewer:
+      return "viewer";
+    case RouteKind::kLive:
+      return "livez";
+    case RouteKind::kReady:
+      return "readyz";
+    case RouteKind::kMetrics:
+      return "metrics";
   }
   return "none";
 }

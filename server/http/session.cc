@@ -96,9 +96,7 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   asio::awaitable<void> CloseGently();
   void Report(const Request& request, const Response& response, std::size_t bytes, Clock::time_point begun) const;
 
-  std::string_view Unread() const {
-    return {static_cast<const char*>(buffer_.data().data()), buffer_.size()};
-  }
+  std::string_view Unread() const { return {static_cast<const char*>(buffer_.data().data()), buffer_.size()}; }
 
   const std::shared_ptr<const SessionContext> context_;
   beast::tcp_stream stream_;
@@ -197,7 +195,7 @@ asio::awaitable<bool> Session::ServeOne(Request request) {
   const Body body = with_body ? response->body : nullptr;
   const bool written = co_await Write(SerializeHead(*response, request.version, keep), body);
   Report(request, *response, body ? body->size() : 0, begun);
-  co_return keep && written;
+  co_return keep&& written;
 }
 
 // Nothing: the client is gone.
@@ -227,8 +225,8 @@ asio::awaitable<Response> Session::Answer(Request request) {
   co_return BackendErrorResponse(error, id);
 }
 
-// Returns when the client has closed or reset the connection. A client that closes only its own direction counts as gone
-// as well, once its request takes longer than kPatience: browsers abandon requests that way.
+// Returns when the client has closed or reset the connection. A client that closes only its own direction counts as
+// gone as well, once its request takes longer than kPatience: browsers abandon requests that way.
 asio::awaitable<void> Session::ClientLeft() {
   asio::ip::tcp::socket& socket = stream_.socket();
   asio::steady_timer patience(stream_.get_executor(), kPatience);
@@ -263,8 +261,8 @@ asio::awaitable<void> Session::CloseGently() {
   stream_.expires_after(kLingerTime);
   for (std::size_t taken = 0; !error && taken < kLingerBytes;) {
     buffer_.clear();
-    taken += co_await stream_.async_read_some(buffer_.prepare(kReadBytes),
-                                              asio::redirect_error(asio::use_awaitable, error));
+    taken +=
+        co_await stream_.async_read_some(buffer_.prepare(kReadBytes), asio::redirect_error(asio::use_awaitable, error));
   }
   stream_.close();
 }

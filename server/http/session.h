@@ -26,7 +26,8 @@ struct SessionOptions {
 // Answers GET and HEAD; the session leaves a HEAD's body away. Cancelled when the client leaves.
 using Handler = std::function<asio::awaitable<Response>(Request)>;
 
-// Shared by all sessions, outlives them all. `connections` and what the functions refer to must outlive the sessions too.
+// Shared by all sessions, outlives them all. `connections` and what the functions refer to must outlive the sessions
+// too.
 struct SessionContext {
   SessionOptions options;
   Handler handler;

@@ -68,7 +68,9 @@ asio::awaitable<SingleFlight::Landing> SingleFlight::Join(CacheKey key, Build bu
   lock.lock();
   std::optional<Result<TilePtr>> outcome = flight->outcome;
   lock.unlock();
-  if (!outcome) outcome = MakeError(ErrorCode::kCancelled, "tile {}: not ready before the request's deadline", geo::ToString(key.request.key));
+  if (!outcome)
+    outcome = MakeError(ErrorCode::kCancelled, "tile {}: not ready before the request's deadline",
+                        geo::ToString(key.request.key));
   co_return Landing(std::move(*outcome), joined);
 }
 
@@ -92,7 +94,8 @@ Result<std::shared_ptr<SingleFlight::Flight>> SingleFlight::Board(const CacheKey
 
 // On a worker thread.
 void SingleFlight::Fly(const CacheKey& key, const std::shared_ptr<Flight>& flight, const Build& build) {
-  Result<TilePtr> outcome = MakeError(ErrorCode::kCancelled, "tile {}: stopped before it began", geo::ToString(key.request.key));
+  Result<TilePtr> outcome =
+      MakeError(ErrorCode::kCancelled, "tile {}: stopped before it began", geo::ToString(key.request.key));
   if (!flight->stop.stop_requested()) outcome = build(flight->stop.get_token());
 
   std::vector<Waiter> waiters;

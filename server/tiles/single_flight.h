@@ -1,8 +1,8 @@
 // One build per key, however many ask at once.
 //
-// The first who asks for a key starts its flight: a job on the worker pool. Whoever asks while it is under way waits for
-// the same outcome. Outcomes, failures too, go to everybody who waits and are forgotten here; keeping the good ones is
-// the cache's work.
+// The first who asks for a key starts its flight: a job on the worker pool. Whoever asks while it is under way waits
+// for the same outcome. Outcomes, failures too, go to everybody who waits and are forgotten here; keeping the good ones
+// is the cache's work.
 //
 // A flight is told to stop when its last waiter leaves, at its deadline (that of the request that started it), or at
 // shutdown. A stopped flight takes no more passengers; the next request starts a new one.

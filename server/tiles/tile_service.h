@@ -25,8 +25,8 @@ using TileBuilder = std::function<Result<EncodedTile>(const TileRequest&, std::s
 using BuildObserver = std::function<void(const TileRequest&, const Result<TilePtr>&)>;
 
 struct TileServiceOptions {
-  unsigned worker_threads = 0;       // 0: as many as the machine has processors
-  std::size_t queue_length = 256;    // builds that wait for a worker; one more is refused
+  unsigned worker_threads = 0;                       // 0: as many as the machine has processors
+  std::size_t queue_length = 256;                    // builds that wait for a worker; one more is refused
   std::size_t cache_bytes = std::size_t{256} << 20;  // 0: no cache
 };
 

@@ -1,7 +1,7 @@
 // The threads that compute and read files, behind a queue of bounded length.
 //
-// Thread-safe. A job that was taken is run, also during shutdown; a job that finds the queue full is refused, so that the
-// time a request waits is bounded by configuration and not by load.
+// Thread-safe. A job that was taken is run, also during shutdown; a job that finds the queue full is refused, so that
+// the time a request waits is bounded by configuration and not by load.
 #pragma once
 
 #include <condition_variable>

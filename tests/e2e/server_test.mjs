@@ -1,5 +1,6 @@
 // The real binary on port 0, asked as real clients ask.
 import assert from 'node:assert/strict';
+import { createHash } from 'node:crypto';
 import fs from 'node:fs';
 import net from 'node:net';
 import os from 'node:os';
@@ -140,14 +141,17 @@ describe('a served dataset', () => {
 
 describe('the same bytes', () => {
   it('after a restart, with one worker and with eight', async () => {
-    const paths = ['0/0/0', '0/1/0', '3/4/5', '9/270/360', '11/1082/1441', '13/4330/5766'];
     const fetchAll = async (workers) => {
       const server = await serve('--config', config, '--worker-threads', String(workers));
-      const tiles = await Promise.all(paths.map((tile) => request(`${server.url}/jacksboro/${tile}.terrain?extensions=octvertexnormals`)));
+      const base = `${server.url}/jacksboro/`, layer = await json(`${base}layer.json`);
+      const urls = layer.available.flatMap((ranges, z) => ranges.map((r) => tileOf(layer, base, z, r.endX, r.startY)));
+      const tiles = await Promise.all(urls.map((url) => request(`${url}&extensions=octvertexnormals`)));
       await server.stop();
-      return tiles.map((tile) => [tile.status, tile.headers.etag, tile.body.toString('base64')]);
+      return tiles.map((tile) => [tile.status, tile.headers.etag, createHash('sha256').update(tile.body).digest('hex')]);
     };
-    assert.deepEqual(await fetchAll(1), await fetchAll(8));
+    const one = await fetchAll(1);
+    assert.ok(one.length > 10 && one.every(([status]) => status === 200));
+    assert.deepEqual(one, await fetchAll(8));
   });
 });
 

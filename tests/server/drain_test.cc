@@ -26,7 +26,8 @@ TEST_F(Drain, CutsNoReplyShortUnderLoad) {
     clients.emplace_back([&, c] {
       RawClient client(port());
       for (int i = 0;; ++i) {
-        if (!client.Send(Get("/maui/3/" + std::to_string((c + i) % 16) + "/" + std::to_string(i % 8) + ".terrain"))) return;
+        if (!client.Send(Get("/maui/3/" + std::to_string((c + i) % 16) + "/" + std::to_string(i % 8) + ".terrain")))
+          return;
         const auto reply = client.Read();
         if (!reply) return;
         ++(reply->status == 200 ? answered : reply->status == -1 ? cut : failed);

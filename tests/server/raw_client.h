@@ -29,8 +29,8 @@ class RawClient {
   // False: the server has closed the connection.
   bool Send(std::string_view bytes);
 
-  // The next reply; `head` for replies without a body whatever their length says. Nothing: the connection ended before a
-  // reply began, or ten seconds passed. A reply that is cut short has status -1.
+  // The next reply; `head` for replies without a body whatever their length says. Nothing: the connection ended before
+  // a reply began, or ten seconds passed. A reply that is cut short has status -1.
   std::optional<Reply> Read(bool head = false);
 
   // True when the server closes within ten seconds without sending anything more.

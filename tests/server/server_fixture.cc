@@ -40,8 +40,8 @@ void ServerFixture::Start(ServerOptions options) {
 }
 
 std::string ServerFixture::BodyOf(const TileRequest& request) {
-  std::string body = fmt::format("tile {} step {} coding {} normals {} ", geo::ToString(request.key), request.error_step,
-                                 static_cast<int>(request.coding), request.normals);
+  std::string body = fmt::format("tile {} step {} coding {} normals {} ", geo::ToString(request.key),
+                                 request.error_step, static_cast<int>(request.coding), request.normals);
   body.append(2000, '.');
   return body;
 }

@@ -75,11 +75,19 @@ TEST_F(ServerTest, ReportsErrorsAsProblems) {
     const char* target;
     int status;
   } cases[] = {
-      {"/maui/0/0/0.terrain?error=abc", 400}, {"/maui/0/0/0.terrain?error=", 400},
-      {"/maui/0/0/0.terrain?error=1&fraction=1", 400}, {"/maui/0/0/0.terrain?x=1", 400},
-      {"/maui/layer.json?error=0", 400}, {"/datasets?x=1", 400}, {"/maui/4/0/0.terrain", 404},
-      {"/maui/0/2/0.terrain", 404}, {"/maui/0/0/18446744073709551616.terrain", 404}, {"/oahu/0/0/0.terrain", 404},
-      {"/oahu/layer.json", 404}, {"/nothing", 404}, {"/viewer/../../etc/passwd", 404},
+      {"/maui/0/0/0.terrain?error=abc", 400},
+      {"/maui/0/0/0.terrain?error=", 400},
+      {"/maui/0/0/0.terrain?error=1&fraction=1", 400},
+      {"/maui/0/0/0.terrain?x=1", 400},
+      {"/maui/layer.json?error=0", 400},
+      {"/datasets?x=1", 400},
+      {"/maui/4/0/0.terrain", 404},
+      {"/maui/0/2/0.terrain", 404},
+      {"/maui/0/0/18446744073709551616.terrain", 404},
+      {"/oahu/0/0/0.terrain", 404},
+      {"/oahu/layer.json", 404},
+      {"/nothing", 404},
+      {"/viewer/../../etc/passwd", 404},
   };
   for (const auto& c : cases) {
     const Reply reply = Fetch(port(), c.target, "Accept-Encoding: gzip\r\n");
@@ -160,14 +168,20 @@ TEST_F(ServerTest, ServesProbesMetricsDatasetsAndAPage) {
   EXPECT_EQ(Fetch(port(), "/readyz").body, "ready\n");
   EXPECT_NE(Fetch(port(), "/datasets").body.find("\"maui\""), std::string::npos);
   EXPECT_NE(Fetch(port(), "/").body.find("/maui/layer.json"), std::string::npos);
-  Fetch(port(), "/maui/0/0/0.terrain");
-  Fetch(port(), "/maui/0/0/0.terrain");
-  const std::string metrics = Fetch(port(), "/metrics").body;
-  for (const char* line :
-       {"terrace_http_requests_total{route=\"tile\",status=\"200\"} 2", "terrace_tile_builds_total{dataset=\"maui\",result=\"ok\"} 1",
-        "terrace_cache_hits_total 1", "terrace_cache_misses_total 1", "terrace_cache_entries 1", "terrace_http_connections ",
-        "terrace_http_request_duration_seconds_bucket{route=\"tile\"", "terrace_tile_build_stage_seconds_count{stage=\"refine\"} 1",
-        "terrace_queue_length 0", "terrace_source_read_errors_total 0", "terrace_flights_joined_total 0"}) {
+  // On one connection: a reply is counted after its last byte, but before the connection's next request is read.
+  RawClient client(port());
+  client.Send(Get("/maui/0/0/0.terrain") + Get("/maui/0/0/0.terrain") + Get("/metrics"));
+  ASSERT_TRUE(client.Read());
+  ASSERT_TRUE(client.Read());
+  const auto reply = client.Read();
+  ASSERT_TRUE(reply);
+  const std::string& metrics = reply->body;
+  for (const char* line : {"terrace_http_requests_total{route=\"tile\",status=\"200\"} 2",
+                           "terrace_tile_builds_total{dataset=\"maui\",result=\"ok\"} 1", "terrace_cache_hits_total 1",
+                           "terrace_cache_misses_total 1", "terrace_cache_entries 1", "terrace_http_connections ",
+                           "terrace_http_request_duration_seconds_bucket{route=\"tile\"",
+                           "terrace_tile_build_stage_seconds_count{stage=\"refine\"} 1", "terrace_queue_length 0",
+                           "terrace_source_read_errors_total 0", "terrace_flights_joined_total 0"}) {
     EXPECT_NE(metrics.find(line), std::string::npos) << line << "\n" << metrics;
   }
 }

@@ -50,7 +50,10 @@ TEST(Negotiate, FindsTheNormalsWhereverClientsAskForThem) {
       {"*/*", {}, false},
       {"application/vnd.quantized-mesh,application/octet-stream;q=0.9,*/*;q=0.01", {}, false},
       // CesiumJS
-      {"application/vnd.quantized-mesh;extensions=octvertexnormals-watermask-metadata,application/octet-stream;q=0.9,*/*;q=0.01", {}, true},
+      {"application/vnd.quantized-mesh;extensions=octvertexnormals-watermask-metadata,application/octet-stream;q=0.9,*/"
+       "*;q=0.01",
+       {},
+       true},
       {"application/vnd.quantized-mesh;extensions=metadata,application/octet-stream;q=0.9", {}, false},
       // 3DTilesRendererJS
       {"application/vnd.quantized-mesh,application/octet-stream;q=0.9;extensions=octvertexnormals-metadata", {}, true},

@@ -13,8 +13,8 @@ TEST(Query, DecodesPairsInOrder) {
 
 TEST(Query, TakesGoodTileParameters) {
   for (const char* query : {"", "v=1", "v=1.0.0&v=2", "extensions=a-b&extensions=c", "error=5", "error=5&atleast=1",
-                            "error=5&atleast=0", "error=0.001", "error=1e3", "error=1e-300", "error=%35", "fraction=0.5",
-                            "fraction=1e300", "&error=5&", "error=5&v=1&extensions=octvertexnormals"}) {
+                            "error=5&atleast=0", "error=0.001", "error=1e3", "error=1e-300", "error=%35",
+                            "fraction=0.5", "fraction=1e300", "&error=5&", "error=5&v=1&extensions=octvertexnormals"}) {
     EXPECT_TRUE(ParseTileParameters(query, true)) << query;
   }
   const Result<TileParameters> parameters = ParseTileParameters("error=2.5&atleast=1&extensions=a-b", true);
@@ -24,13 +24,44 @@ TEST(Query, TakesGoodTileParameters) {
 }
 
 TEST(Query, RefusesBadTileParameters) {
-  for (const char* query :
-       {"error=", "error", "error=abc", "error=0", "error=-1", "error=-0", "error=nan", "error=NaN", "error=inf",
-        "error=-inf", "error=infinity", "error=1e999", "error=1e-999", "error=0x10", "error=5m", "error=%205",
-        "error=5%20", "error=+5", "error=1,5", "error=5&error=5", "fraction=0", "fraction=", "fraction=1&fraction=1",
-        "error=5&fraction=1", "atleast=1", "atleast=1&fraction=1", "error=5&atleast=2", "error=5&atleast=",
-        "error=5&atleast=1&atleast=1", "Error=5", "x=1", "=", "=5", "error=%", "error=%4", "v=%zz", "error=5%00",
-        "error=99999999999999999999999999999999999999999999999999999999999999999999x"}) {
+  for (const char* query : {"error=",
+                            "error",
+                            "error=abc",
+                            "error=0",
+                            "error=-1",
+                            "error=-0",
+                            "error=nan",
+                            "error=NaN",
+                            "error=inf",
+                            "error=-inf",
+                            "error=infinity",
+                            "error=1e999",
+                            "error=1e-999",
+                            "error=0x10",
+                            "error=5m",
+                            "error=%205",
+                            "error=5%20",
+                            "error=+5",
+                            "error=1,5",
+                            "error=5&error=5",
+                            "fraction=0",
+                            "fraction=",
+                            "fraction=1&fraction=1",
+                            "error=5&fraction=1",
+                            "atleast=1",
+                            "atleast=1&fraction=1",
+                            "error=5&atleast=2",
+                            "error=5&atleast=",
+                            "error=5&atleast=1&atleast=1",
+                            "Error=5",
+                            "x=1",
+                            "=",
+                            "=5",
+                            "error=%",
+                            "error=%4",
+                            "v=%zz",
+                            "error=5%00",
+                            "error=99999999999999999999999999999999999999999999999999999999999999999999x"}) {
     const Result<TileParameters> parameters = ParseTileParameters(query, true);
     ASSERT_FALSE(parameters) << query;
     EXPECT_EQ(parameters.error().code, ErrorCode::kInvalidArgument) << query;

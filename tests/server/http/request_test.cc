@@ -49,19 +49,19 @@ TEST(Request, RefusesEveryTransferEncoding) {
 
 TEST(Request, RefusesAmbiguousHeads) {
   for (const char* head : {
-           "GET / HTTP/1.1\r\n\r\n",                                        // no Host
-           "GET / HTTP/1.1\r\nHost: x\r\nHost: x\r\n\r\n",                  // two
-           "GET / HTTP/1.1\r\nHost: a b\r\n\r\n",                           // not a host
-           "GET / HTTP/1.1\r\nHost: x/y\r\n\r\n",                           //
-           "GET / HTTP/1.1\r\nHost: x\r\nA: b\r\n Content-Length: 5\r\n\r\n",    // folded
+           "GET / HTTP/1.1\r\n\r\n",                                           // no Host
+           "GET / HTTP/1.1\r\nHost: x\r\nHost: x\r\n\r\n",                     // two
+           "GET / HTTP/1.1\r\nHost: a b\r\n\r\n",                              // not a host
+           "GET / HTTP/1.1\r\nHost: x/y\r\n\r\n",                              //
+           "GET / HTTP/1.1\r\nHost: x\r\nA: b\r\n Content-Length: 5\r\n\r\n",  // folded
            "GET / HTTP/1.1\r\nHost: x\r\nA: b\r\n\tTransfer-Encoding: chunked\r\n\r\n",
-           "GET / HTTP/1.1\r\n Host: x\r\n\r\n",                            //
-           "GET / HTTP/1.1\r\nHost: x\r\nContent-Length : 0\r\n\r\n",       // blank before the colon
-           "GET / HTTP/1.1\r\nHost: x\r\n: y\r\n\r\n",                      // no name
-           "GET / HTTP/1.1\r\nHost: x\r\nnonsense\r\n\r\n",                 // no colon
-           "GET / HTTP/1.1\r\nHost: x\r\nA: b\rC: d\r\n\r\n",               // bare CR
-           "GET / HTTP/1.1\r\nHost: x\r\nA: \x01\r\n\r\n",                  // control character
-           "GET / HTTP/1.1\r\nHost: x\r\nA(: b\r\n\r\n",                    // not a token
+           "GET / HTTP/1.1\r\n Host: x\r\n\r\n",                       //
+           "GET / HTTP/1.1\r\nHost: x\r\nContent-Length : 0\r\n\r\n",  // blank before the colon
+           "GET / HTTP/1.1\r\nHost: x\r\n: y\r\n\r\n",                 // no name
+           "GET / HTTP/1.1\r\nHost: x\r\nnonsense\r\n\r\n",            // no colon
+           "GET / HTTP/1.1\r\nHost: x\r\nA: b\rC: d\r\n\r\n",          // bare CR
+           "GET / HTTP/1.1\r\nHost: x\r\nA: \x01\r\n\r\n",             // control character
+           "GET / HTTP/1.1\r\nHost: x\r\nA(: b\r\n\r\n",               // not a token
            "GET / HTTP/2.0\r\nHost: x\r\n\r\n",
            "GET / HTTP/1.2\r\nHost: x\r\n\r\n",
            "GET / HTTP/0.9\r\nHost: x\r\n\r\n",

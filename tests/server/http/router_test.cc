@@ -47,18 +47,48 @@ TEST(Router, ReadsTheTileAndTheQuery) {
 
 TEST(Router, RefusesWhatIsNoUrl) {
   const char* const not_found[] = {
-      "/nope", "/maui", "/maui/", "/maui/layer.json/", "//", "/maui/0/0", "/maui/0/0/0", "/maui/0/0/0.terrain/",
-      "/maui/0/0/0.png", "/maui/0/0/.terrain", "/datasets/", "/livez/x", "/datasets/layer.json", "/metrics/0/0/0.terrain",
+      "/nope",
+      "/maui",
+      "/maui/",
+      "/maui/layer.json/",
+      "//",
+      "/maui/0/0",
+      "/maui/0/0/0",
+      "/maui/0/0/0.terrain/",
+      "/maui/0/0/0.png",
+      "/maui/0/0/.terrain",
+      "/datasets/",
+      "/livez/x",
+      "/datasets/layer.json",
+      "/metrics/0/0/0.terrain",
       "/viewer",
       // Numbers that name no tile.
-      "/maui/x/0/0.terrain", "/maui/-1/0/0.terrain", "/maui/0/-1/0.terrain", "/maui/0/0/-0.terrain", "/maui/+1/0/0.terrain",
-      "/maui/0x1/0/0.terrain", "/maui/1e1/0/0.terrain", "/maui/1.0/0/0.terrain", "/maui/00/0/0.terrain",
-      "/maui/01/0/0.terrain", "/maui/%201/0/0.terrain", "/maui/1%20/0/0.terrain", "/maui/%2d1/0/0.terrain",
+      "/maui/x/0/0.terrain",
+      "/maui/-1/0/0.terrain",
+      "/maui/0/-1/0.terrain",
+      "/maui/0/0/-0.terrain",
+      "/maui/+1/0/0.terrain",
+      "/maui/0x1/0/0.terrain",
+      "/maui/1e1/0/0.terrain",
+      "/maui/1.0/0/0.terrain",
+      "/maui/00/0/0.terrain",
+      "/maui/01/0/0.terrain",
+      "/maui/%201/0/0.terrain",
+      "/maui/1%20/0/0.terrain",
+      "/maui/%2d1/0/0.terrain",
       // Outside the tiling scheme, and out of any integer.
-      "/maui/0/2/0.terrain", "/maui/0/0/1.terrain", "/maui/25/0/0.terrain", "/maui/24/33554432/0.terrain",
-      "/maui/64/0/0.terrain", "/maui/999999999/0/0.terrain", "/maui/0/4294967296/0.terrain",
-      "/maui/0/18446744073709551616/0.terrain", "/maui/18446744073709551616/0/0.terrain",
-      "/maui/9/99999999999999999999999999999999999999/0.terrain", "/../etc/passwd", "/%2e%2e/%2e%2e/etc/passwd",
+      "/maui/0/2/0.terrain",
+      "/maui/0/0/1.terrain",
+      "/maui/25/0/0.terrain",
+      "/maui/24/33554432/0.terrain",
+      "/maui/64/0/0.terrain",
+      "/maui/999999999/0/0.terrain",
+      "/maui/0/4294967296/0.terrain",
+      "/maui/0/18446744073709551616/0.terrain",
+      "/maui/18446744073709551616/0/0.terrain",
+      "/maui/9/99999999999999999999999999999999999999/0.terrain",
+      "/../etc/passwd",
+      "/%2e%2e/%2e%2e/etc/passwd",
   };
   for (const char* target : not_found) {
     const Result<Route> route = Match(target);
@@ -70,8 +100,8 @@ TEST(Router, RefusesWhatIsNoUrl) {
 TEST(Router, TakesTheLastTileOfTheDeepestLevel) { EXPECT_TRUE(Match("/maui/24/33554431/16777215.terrain")); }
 
 TEST(Router, RefusesMalformedTargets) {
-  for (const char* target : {"", "maui", "*", "ftp://x/", "http://x?y", "/a#b", "/%", "/%4", "/%zz", "/a%00b/layer.json",
-                             "/a%0d%0ab/layer.json"}) {
+  for (const char* target : {"", "maui", "*", "ftp://x/", "http://x?y", "/a#b", "/%", "/%4", "/%zz",
+                             "/a%00b/layer.json", "/a%0d%0ab/layer.json"}) {
     const Result<Route> route = Match(target);
     ASSERT_FALSE(route) << target;
     EXPECT_EQ(route.error().code, ErrorCode::kInvalidArgument) << target;

@@ -34,7 +34,8 @@ class SingleFlightTest : public testing::Test {
   void Join(SingleFlight::Build build, SingleFlight::Clock::time_point deadline,
             asio::cancellation_slot slot = asio::cancellation_slot()) {
     auto keep = [this](std::exception_ptr, SingleFlight::Landing landing) { landings_.push_back(std::move(landing)); };
-    asio::co_spawn(io_, flights_.Join(CacheKey(), std::move(build), deadline), asio::bind_cancellation_slot(slot, keep));
+    asio::co_spawn(io_, flights_.Join(CacheKey(), std::move(build), deadline),
+                   asio::bind_cancellation_slot(slot, keep));
   }
   static SingleFlight::Clock::time_point Soon() { return SingleFlight::Clock::now() + 10s; }
 

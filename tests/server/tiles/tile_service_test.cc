@@ -12,7 +12,8 @@ namespace {
 
 Result<ServedTile> Get(TileService& service, CacheKey key = {}) {
   asio::io_context io(1);
-  auto got = asio::co_spawn(io, service.Get(key, TileService::Clock::now() + std::chrono::seconds(10)), asio::use_future);
+  auto got =
+      asio::co_spawn(io, service.Get(key, TileService::Clock::now() + std::chrono::seconds(10)), asio::use_future);
   io.run();
   return got.get();
 }
