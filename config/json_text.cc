@@ -66,10 +66,13 @@ class DuplicateKeyFinder {
   std::vector<Level> levels_;
 };
 
-// "[json.exception.parse_error.101] parse error at line 3, column 5: what" -> "what"
+// What the library says without its own names: "[json.exception.parse_error.101] parse error at line 3, column 5: what"
+// and "[json.exception.out_of_range.406] what" become "what".
 std::string Reason(std::string_view message) {
-  const std::size_t start = message.find("syntax error");
-  return std::string(start == std::string_view::npos ? message : message.substr(start));
+  if (const std::size_t start = message.find("syntax error"); start != std::string_view::npos)
+    return std::string(message.substr(start));
+  const std::size_t name_end = message.find("] ");
+  return std::string(name_end == std::string_view::npos ? message : message.substr(name_end + 2));
 }
 
 std::string DescribeSyntaxError(std::string_view text, const nlohmann::detail::parse_error& error) {
@@ -93,7 +96,7 @@ Json ParseJsonText(std::string_view text, std::vector<ConfigError>& errors) {
   } catch (const nlohmann::detail::parse_error& error) {
     errors.push_back({"", DescribeSyntaxError(text, error)});
   } catch (const nlohmann::detail::exception& error) {
-    errors.push_back({"", error.what()});
+    errors.push_back({"", Reason(error.what())});
   }
   return Json(Json::value_t::discarded);
 }

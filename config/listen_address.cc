@@ -12,6 +12,7 @@ namespace {
 constexpr std::string_view kExamples = "HOST:PORT such as 127.0.0.1:8080, 0.0.0.0:8080 or [::1]:8080";
 
 bool IsIpAddress(int family, const std::string& host) {
+  if (host.find('\0') != std::string::npos) return false;  // inet_pton would not read past it
   unsigned char bytes[sizeof(in6_addr)];
   return inet_pton(family, host.c_str(), bytes) == 1;
 }

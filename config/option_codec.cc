@@ -10,12 +10,13 @@ struct ByteUnit {
   std::string_view name;
   std::int64_t bytes;
 };
-constexpr std::array<ByteUnit, 10> kByteUnits = {{{"", 1},
+constexpr std::array<ByteUnit, 11> kByteUnits = {{{"", 1},
                                                   {"B", 1},
                                                   {"kB", 1'000},
                                                   {"KB", 1'000},
                                                   {"MB", 1'000'000},
                                                   {"GB", 1'000'000'000},
+                                                  {"TB", 1'000'000'000'000},
                                                   {"KiB", std::int64_t{1} << 10},
                                                   {"MiB", std::int64_t{1} << 20},
                                                   {"GiB", std::int64_t{1} << 30},

@@ -1,0 +1,77 @@
+#include "config/options.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/config/errors.h"
+
+namespace terrace::config {
+namespace {
+
+using testing::ElementsAre;
+using testing::IsEmpty;
+
+std::vector<ConfigError> Set(std::string_view key, const std::string& text, Config& config) {
+  std::vector<ConfigError> errors;
+  SetServerOption(key, text, config, errors);
+  return errors;
+}
+
+TEST(ServerOptions, TakeTheirDefaultsAsFlags) {
+  for (const OptionInfo& option : ServerOptions()) {
+    if (!option.has_flag) continue;
+    ASSERT_FALSE(option.default_value.empty()) << option.key;
+    std::string text = option.default_value;
+    if (text.front() == '"') text = text.substr(1, text.size() - 2);
+    Config config;
+    EXPECT_THAT(Set(option.key, text, config), IsEmpty()) << option.key;
+    EXPECT_EQ(config, Config{}) << option.key;
+  }
+}
+
+TEST(ServerOptions, NameEveryFlagAfterItsKey) {
+  for (const OptionInfo& option : ServerOptions()) {
+    EXPECT_EQ(option.Flag().find('_'), std::string::npos);
+    EXPECT_EQ(option.has_flag, option.key != "datasets");
+    EXPECT_FALSE(option.help.empty());
+  }
+  EXPECT_EQ(ServerOptions().front().Flag(), "--listen");
+}
+
+TEST(SetServerOption, ReportsTheFlag) {
+  Config config;
+  EXPECT_THAT(Set("cache_bytes", "lots", config), ElementsAre(IsError("--cache-bytes", "not \"lots\"")));
+  EXPECT_THAT(Set("io_threads", "", config), ElementsAre(IsError("--io-threads", "from 1 to 64, not \"\"")));
+  EXPECT_THAT(Set("io_threads", "2x", config), ElementsAre(IsError("--io-threads", "not \"2x\"")));
+  EXPECT_THAT(Set("request_deadline_s", "nan", config), ElementsAre(IsError("--request-deadline-s", "not \"nan\"")));
+  EXPECT_THAT(Set("viewer", "", config), ElementsAre(IsError("--viewer", "the folder of a viewer")));
+  EXPECT_EQ(config, Config{});
+}
+
+TEST(SetServerOption, ReadsNumbersSwitchesAndText) {
+  Config config;
+  EXPECT_THAT(Set("queue_length", "1e3", config), IsEmpty());
+  EXPECT_THAT(Set("idle_timeout_s", "0.25", config), IsEmpty());
+  EXPECT_THAT(Set("viewer", "false", config), IsEmpty());
+  EXPECT_THAT(Set("cache_control", "123", config), IsEmpty());  // text that looks like a number stays text
+  EXPECT_EQ(config.queue_length, 1000u);
+  EXPECT_EQ(config.idle_timeout, std::chrono::milliseconds(250));
+  EXPECT_FALSE(config.viewer.enabled);
+  EXPECT_EQ(config.cache_control, "123");
+}
+
+TEST(SetDatasetOption, SetsOneDataset) {
+  DatasetConfig dataset;
+  std::vector<ConfigError> errors;
+  SetDatasetOption("floor", "-3.5", dataset, errors);
+  SetDatasetOption("name", "2024", dataset, errors);
+  EXPECT_THAT(errors, IsEmpty());
+  EXPECT_EQ(dataset.floor, -3.5);
+  EXPECT_EQ(dataset.name, "2024");
+  SetDatasetOption("error_fraction", "2", dataset, errors);
+  SetDatasetOption("name", "livez", dataset, errors);
+  EXPECT_THAT(errors, ElementsAre(IsError("--error-fraction", "a number from 0.05 to 1, not 2"),
+                                  IsError("--name", "is a URL of the server itself")));
+}
+
+}  // namespace
+}  // namespace terrace::config

@@ -1,0 +1,137 @@
+#include "config/parse.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "tests/config/errors.h"
+
+namespace terrace::config {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+TEST(ParseConfig, GivesDefaultsForAnEmptyObject) {
+  const ConfigResult config = ParseConfig("{}", "/nowhere");
+  ASSERT_TRUE(config);
+  EXPECT_EQ(*config, Config{});
+}
+
+TEST(ParseConfig, SetsWhatTheTextSaysAndNothingElse) {
+  const ConfigResult config = ParseConfig(R"({
+    "listen": "[::1]:9000",
+    "datasets": [{"name": "maui", "sources": ["maui.tif"], "error_fraction": 0.25, "floor": -12.5, "max_void_gap": 0}],
+    "viewer": false, "cache_control": "no-cache", "io_threads": 1, "worker_threads": 3, "queue_length": 10,
+    "cache_bytes": "1GiB", "max_connections": 64, "request_deadline_s": 1.5, "header_timeout_s": 2,
+    "idle_timeout_s": 3, "write_timeout_s": 4, "drain_timeout_s": 0, "log_level": "debug", "log_format": "json"})",
+                                          "/data");
+  ASSERT_TRUE(config);
+  Config expected;
+  expected.listen = {"::1", 9000};
+  DatasetConfig maui;
+  maui.name = "maui";
+  maui.sources = {"/data/maui.tif"};
+  maui.error_fraction = 0.25;
+  maui.floor = -12.5;
+  maui.max_void_gap = 0;
+  expected.datasets = {maui};
+  expected.viewer = {false, {}};
+  expected.cache_control = "no-cache";
+  expected.io_threads = 1;
+  expected.worker_threads = 3;
+  expected.queue_length = 10;
+  expected.cache_bytes = std::size_t{1} << 30;
+  expected.max_connections = 64;
+  expected.request_deadline = std::chrono::milliseconds(1500);
+  expected.header_timeout = std::chrono::milliseconds(2000);
+  expected.idle_timeout = std::chrono::milliseconds(3000);
+  expected.write_timeout = std::chrono::milliseconds(4000);
+  expected.drain_timeout = std::chrono::milliseconds(0);
+  expected.log_level = LogLevel::kDebug;
+  expected.log_format = LogFormat::kJson;
+  EXPECT_EQ(*config, expected);
+}
+
+TEST(ParseConfig, ReportsAllErrorsTogetherInTheOrderOfTheText) {
+  EXPECT_THAT(ErrorsOf(R"({
+    "io_threads": 0,
+    "datasets": [{"sources": []}, {"name": "a b", "sources": ["x.tif", 7]}, 3],
+    "lissten": "0.0.0.0:80",
+    "log_level": "loud"})"),
+              ElementsAre(IsError("/io_threads", "a whole number from 1 to 64, not 0"),
+                          IsError("/datasets/0/sources", "a list of paths"),
+                          IsError("/datasets/0", "\"name\" is missing"),
+                          IsError("/datasets/1/name", "1 to 64 letters, digits"),
+                          IsError("/datasets/1/sources/1", "a path or a glob, not 7"),
+                          IsError("/datasets/2", "an object with keys such as \"name\", not 3"),
+                          IsError("/lissten", "did you mean \"listen\"?"),
+                          IsError("/log_level", "\"debug\" or \"info\" or \"warn\" or \"error\" or \"off\", not \"loud\"")));
+}
+
+TEST(ParseConfig, SuggestsTheNearestKeyAndListsAllWhenNoneIsNear) {
+  EXPECT_THAT(ErrorsOf(R"({"cache-bytes": 1})"), ElementsAre(IsError("/cache-bytes", "did you mean \"cache_bytes\"?")));
+  EXPECT_THAT(ErrorsOf(R"({"colour": 1})"), ElementsAre(IsError("/colour", "known are listen, datasets, viewer")));
+  EXPECT_THAT(ErrorsOf(R"({"datasets": [{"name": "a", "source": ["a.tif"]}]})"),
+              ElementsAre(IsError("/datasets/0/source", "did you mean \"sources\"?"),
+                          IsError("/datasets/0", "\"sources\" is missing")));
+}
+
+TEST(ParseConfig, EscapesKeysInPathsAsJsonPointersDo) {
+  EXPECT_THAT(ErrorsOf(R"({"a/b~c": 1})"), ElementsAre(IsError("/a~1b~0c", "unknown key")));
+}
+
+TEST(ParseConfig, RefusesTwoDatasetsOfOneName) {
+  EXPECT_THAT(ErrorsOf(R"({"datasets": [{"name": "a", "sources": ["a.tif"]}, {"name": "b", "sources": ["b.tif"]},
+                                        {"name": "a", "sources": ["c.tif"]}]})"),
+              ElementsAre(IsError("/datasets/2/name", "\"a\" is the name of /datasets/0 too")));
+}
+
+TEST(ParseConfig, RefusesAVerticalDatumItCannotConvert) {
+  EXPECT_THAT(ErrorsOf(R"({"datasets": [{"name": "a", "sources": ["a.tif"], "vertical": "egm96"}]})"),
+              ElementsAre(IsError("/datasets/0/vertical", "\"egm96\" is not supported yet; write \"unknown\"")));
+}
+
+TEST(ParseConfig, RefusesASecondSource) {
+  EXPECT_THAT(ErrorsOf(R"({"datasets": [{"name": "a", "sources": ["a.tif", "b.tif"]}]})"),
+              ElementsAre(IsError("/datasets/0/sources", "gives 2 files, but mosaics are not supported yet")));
+}
+
+TEST(ParseConfig, KeepsLineBreaksOutOfHeaders) {
+  EXPECT_THAT(ErrorsOf(R"({"cache_control": "no-cache\r\nSet-Cookie: a=b"})"),
+              ElementsAre(IsError("/cache_control", "a Cache-Control header in ASCII")));
+}
+
+TEST(ParseConfig, IgnoresTheSchemaKeyAtTheTopOnly) {
+  EXPECT_THAT(ErrorsOf(R"({"$schema": "config.schema.json"})"), IsEmpty());
+  EXPECT_THAT(ErrorsOf(R"({"datasets": [{"$schema": "x", "name": "a", "sources": ["a.tif"]}]})"),
+              ElementsAre(IsError("/datasets/0/$schema", "unknown key")));
+}
+
+TEST(ParseConfig, RefusesATextThatIsNotAnObject) {
+  EXPECT_THAT(ErrorsOf("[]"), ElementsAre(IsError("", "must be an object with keys such as \"listen\"")));
+}
+
+TEST(LoadConfig, TakesPathsRelativeToTheFile) {
+  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "load_config";
+  std::filesystem::create_directories(folder);
+  std::ofstream(folder / "terrace.json") << R"({"datasets": [{"name": "a", "sources": ["a.tif"]}], "viewer": "page"})";
+  const ConfigResult config = LoadConfig(folder / "terrace.json");
+  ASSERT_TRUE(config);
+  EXPECT_EQ(config->datasets.at(0).sources.at(0), (folder / "a.tif").string());
+  EXPECT_EQ(config->viewer.directory, folder / "page");
+}
+
+TEST(LoadConfig, SaysWhyAFileCannotBeRead) {
+  const ConfigResult missing = LoadConfig("/nowhere/terrace.json");
+  ASSERT_FALSE(missing);
+  EXPECT_THAT(missing.error(), ElementsAre(IsError("", "cannot be read: No such file or directory")));
+  const ConfigResult folder = LoadConfig(testing::TempDir());
+  ASSERT_FALSE(folder);
+  EXPECT_THAT(folder.error(), ElementsAre(IsError("", "is a folder; name a JSON file in it")));
+}
+
+}  // namespace
+}  // namespace terrace::config

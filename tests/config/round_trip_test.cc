@@ -1,0 +1,72 @@
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "config/option_table.h"
+#include "config/parse.h"
+
+namespace terrace::config {
+namespace {
+
+DatasetConfig Dataset(const std::string& name) {
+  DatasetConfig dataset;
+  dataset.name = name;
+  dataset.sources = {"/data/" + name + ".tif"};
+  return dataset;
+}
+
+void ExpectComesBack(const Config& config) {
+  const std::string text = ToJson(config);
+  const ConfigResult again = ParseConfig(text, "/elsewhere");
+  ASSERT_TRUE(again) << again.error().front().path << ": " << again.error().front().message;
+  EXPECT_EQ(*again, config) << text;
+  EXPECT_EQ(ToJson(*again), text);
+}
+
+TEST(ToJson, ComesBackAsTheDefaults) { ExpectComesBack(Config{}); }
+
+TEST(ToJson, ComesBackWithEveryOptionSet) {
+  Config config;
+  config.listen = {"2001:db8::1", 0};
+  DatasetConfig dataset{"a", {"/data/a.tif"}, VerticalDatum::kUnknown, "© \"ét\\é\"", 0.1, 1e-3, -0.3, 7};
+  config.datasets = {dataset, Dataset("b")};
+  config.viewer = {true, "/srv/page"};
+  config.cache_control = "no-cache";
+  config.io_threads = 64;
+  config.worker_threads = 5;
+  config.queue_length = 1;
+  config.cache_bytes = std::size_t{1} << 40;
+  config.max_connections = 7;
+  config.request_deadline = std::chrono::milliseconds(100);
+  config.header_timeout = std::chrono::milliseconds(1'234);
+  config.idle_timeout = std::chrono::milliseconds(3'600'000);
+  config.write_timeout = std::chrono::milliseconds(999);
+  config.drain_timeout = std::chrono::milliseconds(0);
+  config.log_level = LogLevel::kOff;
+  config.log_format = LogFormat::kJson;
+  ExpectComesBack(config);
+}
+
+TEST(ToJson, NamesEveryOption) {
+  Config config;
+  DatasetConfig dataset = Dataset("a");
+  dataset.finest_error = 1;
+  dataset.floor = 0;
+  config.datasets = {dataset};
+  const Json json = Json::parse(ToJson(config));
+  EXPECT_EQ(json.size(), ServerOptionTable().size());
+  EXPECT_EQ(json.at("datasets").at(0).size(), DatasetOptionTable().size());
+  EXPECT_EQ(ToJson(config).back(), '\n');
+}
+
+TEST(ToJson, KeepsEveryMillisecondOfATime) {
+  for (int ms = 100; ms < 3'600'000; ms += 7'919) {
+    Config config;
+    config.idle_timeout = std::chrono::milliseconds(ms);
+    const ConfigResult again = ParseConfig(ToJson(config), "/");
+    ASSERT_TRUE(again && again->idle_timeout == config.idle_timeout) << ms;
+  }
+}
+
+}  // namespace
+}  // namespace terrace::config

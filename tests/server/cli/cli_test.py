@@ -1,0 +1,106 @@
+"""Runs the terrace binary without serving: cli_test.py BINARY SOURCE_DIR."""
+import json
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+import unittest
+
+BINARY = pathlib.Path(sys.argv.pop(1)).resolve()
+SOURCE_DIR = pathlib.Path(sys.argv.pop(1)).resolve()
+
+
+def run(*arguments, cwd=None):
+    return subprocess.run([str(BINARY), *map(str, arguments)], cwd=cwd, capture_output=True, text=True, timeout=60)
+
+
+def flags_of(help_text):
+    return set(re.findall(r"--[a-z][a-z-]*", help_text))
+
+
+class Help(unittest.TestCase):
+    def test_every_command_has_help_on_stdout(self):
+        for command in ([], ["serve"], ["mesh"], ["info"]):
+            result = run(*command, "--help")
+            self.assertEqual((result.returncode, result.stderr), (0, ""), command)
+            self.assertIn("Usage: terrace", result.stdout)
+
+    def test_version_is_the_projects(self):
+        version = re.search(r"project\(.*?VERSION\s+([0-9.]+)", (SOURCE_DIR / "CMakeLists.txt").read_text(), re.S)
+        result = run("--version")
+        self.assertEqual((result.returncode, result.stdout), (0, f"terrace {version.group(1)}\n"))
+
+    def test_the_manual_has_every_flag_of_serve_and_no_other(self):
+        manual = (SOURCE_DIR / "docs/configuration.md").read_text(encoding="utf-8")
+        documented = set(re.findall(r"^\|[^|]*?(?:\|[^|]*?)?`(--[a-z-]+)` \|", manual, re.M))
+        self.assertEqual(flags_of(run("serve", "--help").stdout), documented)
+
+
+class Usage(unittest.TestCase):
+    def test_wrong_arguments_give_code_2_and_a_hint(self):
+        for arguments in (["bake"], ["--bogus"], ["serve", "--bogus"], ["info"], ["mesh"], ["serve", "--listen"]):
+            result = run(*arguments)
+            self.assertEqual((result.returncode, result.stdout), (2, ""), arguments)
+            self.assertRegex(result.stderr, r"^terrace: .+\nRun 'terrace .*--help' for what is accepted\.\n$")
+
+    def test_no_arguments_give_code_2_and_the_help(self):
+        result = run()
+        self.assertEqual(result.returncode, 2)
+        self.assertIn("Usage: terrace", result.stderr)
+
+    def test_a_missing_raster_gives_code_1(self):
+        for command in ("serve", "info"):
+            result = run(command, "/nowhere/dem.tif")
+            self.assertEqual((result.returncode, result.stdout), (1, ""), command)
+            self.assertIn("/nowhere/dem.tif", result.stderr)
+
+
+class Config(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+
+    def write(self, text):
+        path = self.folder / "terrace.json"
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    def test_printed_config_comes_back_the_same(self):
+        runs = (["/data/my dem.tif", "--floor", "-3.5", "--cache-bytes", "1GiB", "--listen", "[::1]:0"],
+                ["--config", SOURCE_DIR / "config/examples/production.json"],
+                ["--config", SOURCE_DIR / "config/samples/samples.json", "--viewer", "false"])
+        for arguments in runs:
+            printed = run("serve", *arguments, "--print-config")
+            self.assertEqual(printed.returncode, 0, printed.stderr)
+            again = run("serve", "--config", self.write(printed.stdout), "--print-config")
+            self.assertEqual((again.returncode, again.stdout), (0, printed.stdout), again.stderr)
+
+    def test_flags_override_the_file(self):
+        file = self.write('{"listen": "127.0.0.1:1", "io_threads": 3, "datasets": [{"name": "a", "sources": ["a.tif"]}]}')
+        config = json.loads(run("serve", "b.tif", "--config", file, "--listen", "127.0.0.1:2", "--print-config").stdout)
+        self.assertEqual((config["listen"], config["io_threads"]), ("127.0.0.1:2", 3))
+        self.assertEqual([dataset["name"] for dataset in config["datasets"]], ["a", "b"])
+
+    def test_the_manuals_error_example_is_what_is_printed(self):
+        manual = (SOURCE_DIR / "docs/configuration.md").read_text(encoding="utf-8").split("## Errors")[1]
+        file, output = re.findall(r"```(?:json)?\n(.*?)```", manual, re.S)
+        self.write(file)
+        result = run("serve", "--config", "terrace.json", "--io-threads", "0", cwd=self.folder)
+        self.assertEqual((result.returncode, result.stdout, result.stderr), (2, "", output))
+
+    def test_wrong_configurations_give_code_2(self):
+        for arguments, part in ((["/nowhere.tif", "--listen", "foo"], "--listen: \"foo\" has no port"),
+                                (["--config", "/nowhere.json"], "cannot be read"),
+                                (["--config", self.write("{,")], "line 1, column 2"),
+                                (["/a/x.tif", "/b/x.tif"], "\"x\" is the name of /datasets/0 too"),
+                                (["--floor", "0"], "options of a dataset need a DEM"),
+                                ([], "there is nothing to serve")):
+            result = run("serve", *arguments)
+            self.assertEqual((result.returncode, result.stdout), (2, ""), arguments)
+            self.assertIn(part, result.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
