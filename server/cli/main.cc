@@ -9,8 +9,7 @@ namespace terrace::cli {
 namespace {
 
 int Run(int argc, char** argv) {
-  CLI::App app{
-"Terrain from elevation models, meshed on demand at the error a client asks for.", "terrace"};
+  CLI::App app{"Terrain from elevation models, meshed on demand at the error a client asks for.", "terrace"};
   app.footer(
       "  terrace serve alps.tif                               tiles and a viewer at http://127.0.0.1:8080/\n"
       "  terrace mesh alps.tif --out alps.obj --max-error 5   one mesh of the whole raster\n"

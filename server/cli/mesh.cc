@@ -48,7 +48,8 @@ std::string Complain(const MeshArguments& arguments) {
   const int goals = (arguments.max_error >= 0) + (arguments.points > 0) + (arguments.rms >= 0);
   if (goals != 1) return "mesh needs exactly one goal: --max-error METRES, --points N or --rms METRES";
   if (arguments.points > 0 && arguments.points < 4) return "--points must be at least 4, the corners of the raster";
-  if (arguments.criterion != "delaunay") return "--criterion " + arguments.criterion + " is not available yet; use delaunay";
+  if (arguments.criterion != "delaunay")
+    return "--criterion " + arguments.criterion + " is not available yet; use delaunay";
   if (arguments.compact) return "--compact is not available yet";
   return {};
 }
@@ -62,9 +63,12 @@ void Triangulate(tin::GreedyTriangulation& greedy, const tin::GreedyGoal& goal, 
     part.max_points = std::min(goal.max_points, greedy.vertex_count() + step);
     const std::size_t before = greedy.vertex_count();
     greedy.Run(part);
-    if (greedy.vertex_count() < part.max_points || part.max_points == goal.max_points || greedy.vertex_count() == before) return;
-    const double share = goal.max_points < samples ? static_cast<double>(greedy.vertex_count()) / static_cast<double>(goal.max_points)
-                                                   : std::min(1.0, goal.max_error / greedy.CurrentError());
+    if (greedy.vertex_count() < part.max_points || part.max_points == goal.max_points ||
+        greedy.vertex_count() == before)
+      return;
+    const double share = goal.max_points < samples
+                             ? static_cast<double>(greedy.vertex_count()) / static_cast<double>(goal.max_points)
+                             : std::min(1.0, goal.max_error / greedy.CurrentError());
     progress.Update(share);
   }
 }
@@ -87,7 +91,8 @@ std::vector<proto::MeshVertex> VerticesOf(const tin::TinMesh& mesh, const tin::H
 }
 
 // The mesh is counter-clockwise in (column, row). A transform that mirrors, as north-up rasters do, turns it over.
-std::vector<std::array<std::uint32_t, 3>> TrianglesOf(const tin::TinMesh& mesh, const std::optional<std::array<double, 6>>& transform) {
+std::vector<std::array<std::uint32_t, 3>> TrianglesOf(const tin::TinMesh& mesh,
+                                                      const std::optional<std::array<double, 6>>& transform) {
   std::vector<std::array<std::uint32_t, 3>> triangles = mesh.triangles;
   if (transform && (*transform)[1] * (*transform)[5] - (*transform)[2] * (*transform)[4] < 0) {
     for (auto& triangle : triangles) std::swap(triangle[1], triangle[2]);
@@ -96,7 +101,8 @@ std::vector<std::array<std::uint32_t, 3>> TrianglesOf(const tin::TinMesh& mesh, 
 }
 
 // A file that a failure leaves as it was.
-Result<void> WriteFile(const std::string& path, proto::MeshFileFormat format, const std::vector<proto::MeshVertex>& vertices,
+Result<void> WriteFile(const std::string& path, proto::MeshFileFormat format,
+                       const std::vector<proto::MeshVertex>& vertices,
                        const std::vector<std::array<std::uint32_t, 3>>& triangles) {
   const std::string unfinished = fmt::format("{}.{}.part", path, getpid());
   std::ofstream stream(unfinished, std::ios::binary);
@@ -132,9 +138,11 @@ void Print(const MeshArguments& arguments, const tin::HeightField& field, const 
     fmt::print("{}\n", statistics.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
     return;
   }
-  fmt::print("{}: {} vertices, {} triangles of {} samples; largest error {:.4g} m, RMS {:.4g} m; read {:.2f} s, mesh {:.2f} s, write {:.2f} s\n",
-             arguments.out, mesh.vertices.size(), mesh.triangles.size(), error.samples, error.max, error.rms,
-             seconds.read, seconds.triangulate, seconds.write);
+  fmt::print(
+      "{}: {} vertices, {} triangles of {} samples; largest error {:.4g} m, RMS {:.4g} m; read {:.2f} s, mesh {:.2f} "
+      "s, write {:.2f} s\n",
+      arguments.out, mesh.vertices.size(), mesh.triangles.size(), error.samples, error.max, error.rms, seconds.read,
+      seconds.triangulate, seconds.write);
 }
 
 int Mesh(const MeshArguments& arguments) {
@@ -170,7 +178,8 @@ int Mesh(const MeshArguments& arguments) {
   seconds.triangulate = Since(start);
 
   start = Clock::now();
-  const Result<void> written = WriteFile(arguments.out, *format, VerticesOf(mesh, *field, transform), TrianglesOf(mesh, transform));
+  const Result<void> written =
+      WriteFile(arguments.out, *format, VerticesOf(mesh, *field, transform), TrianglesOf(mesh, transform));
   if (!written) return Fail(written.error().message, kExitFailure);
   seconds.write = Since(start);
   Print(arguments, *field, mesh, tin::MeasureError(*field, mesh), seconds);
@@ -181,22 +190,40 @@ int Mesh(const MeshArguments& arguments) {
 
 void AddMesh(CLI::App& app, int& exit_code) {
   auto arguments = std::make_shared<MeshArguments>();
-  CLI::App* command = app.add_subcommand(
-      "mesh", "Meshes a whole raster with greedy insertion into one .obj, .ply or .glb file");
+  CLI::App* command =
+      app.add_subcommand("mesh", "Meshes a whole raster with greedy insertion into one .obj, .ply or .glb file");
   command->footer(
       "  terrace mesh alps.tif --out alps.obj --max-error 5\n"
       "  terrace mesh alps.tif --out alps.glb --points 50000 --json\n\n"
       "Errors are measured over every valid sample by a separate pass. Triangles are counter-clockwise in the\n"
       "file's own x and y.");
   command->add_option("DEM", arguments->dem, "A raster that GDAL can read; a georeference is not needed")->required();
-  command->add_option("--out", arguments->out, "The file to write; its extension is the format")->type_name("FILE")->required();
-  command->add_option("--max-error", arguments->max_error, "No sample is further off than this")->type_name("METRES")->check(CLI::NonNegativeNumber)->group("Goal, exactly one of");
-  command->add_option("--points", arguments->points, "Vertices, corners included")->type_name("N")->check(CLI::PositiveNumber)->group("Goal, exactly one of");
-  command->add_option("--rms", arguments->rms, "Root mean square error over all samples")->type_name("METRES")->check(CLI::NonNegativeNumber)->group("Goal, exactly one of");
-  command->add_option("--coordinates", arguments->coordinates, "pixel: x = column, y = row (from the top), z = height; crs: pixel centres in the raster's CRS (default where it has one)")
+  command->add_option("--out", arguments->out, "The file to write; its extension is the format")
+      ->type_name("FILE")
+      ->required();
+  command->add_option("--max-error", arguments->max_error, "No sample is further off than this")
+      ->type_name("METRES")
+      ->check(CLI::NonNegativeNumber)
+      ->group("Goal, exactly one of");
+  command->add_option("--points", arguments->points, "Vertices, corners included")
+      ->type_name("N")
+      ->check(CLI::PositiveNumber)
+      ->group("Goal, exactly one of");
+  command->add_option("--rms", arguments->rms, "Root mean square error over all samples")
+      ->type_name("METRES")
+      ->check(CLI::NonNegativeNumber)
+      ->group("Goal, exactly one of");
+  command
+      ->add_option("--coordinates", arguments->coordinates,
+                   "pixel: x = column, y = row (from the top), z = height; crs: pixel centres in the raster's CRS "
+                   "(default where it has one)")
       ->check(CLI::IsMember({"pixel", "crs"}));
-  command->add_option("--criterion", arguments->criterion, "How triangles are joined")->check(CLI::IsMember({"delaunay", "data-dependent"}))->capture_default_str();
-  command->add_option("--threads", arguments->threads, "Threads to use at most")->check(CLI::Range(1, 256))->capture_default_str();
+  command->add_option("--criterion", arguments->criterion, "How triangles are joined")
+      ->check(CLI::IsMember({"delaunay", "data-dependent"}))
+      ->capture_default_str();
+  command->add_option("--threads", arguments->threads, "Threads to use at most")
+      ->check(CLI::Range(1, 256))
+      ->capture_default_str();
   command->add_flag("--compact", arguments->compact, "Drops vertices that the bound does not need");
   command->add_flag("--json", arguments->json, "Statistics as JSON on stdout");
   command->callback([arguments, &exit_code] { exit_code = Mesh(*arguments); });
