@@ -58,7 +58,7 @@ config::Config MakeConfig(const ServeArguments& arguments, std::vector<config::C
   for (const std::string& dem : arguments.dems) {
     config::DatasetConfig dataset;
     dataset.name = config::SanitizeDatasetName(std::filesystem::path(dem).stem().string());
-    dataset.sources = {dem};
+    dataset.sources = {std::filesystem::absolute(dem).string()};  // so that --print-config holds in any folder
     for (const auto& [key, text] : arguments.dataset_flags) config::SetDatasetOption(key, text, dataset, errors);
     config.datasets.push_back(std::move(dataset));
   }
