@@ -10,9 +10,11 @@
 //   edge step     = max(largest 2^k <= error / 8, NeededStep of both tiles)
 //   corner step   = the same over the four tiles that meet; on a pole, over the whole dataset
 //
-// Proof that a tile's own step divides: rounding widens its relief by at most the largest edge step S of its edges, and
-// 16384 m + S <= 32767 m holds with m = its NeededStep as long as S <= 16383 m. S is at most 2 m (relief below 32768
-// m), m at least 2^-10 m.
+// Proof that a tile's own step divides: it is a power of two, so it only has to be at most every edge's step. Let w be
+// the step wished for the error, m the tile's NeededStep, S the coarsest step of its edges. Rounding widens the relief
+// to at most 16384 m + S, and every edge's step is at least M = max(m, w). If S = M, that is 16385 M, less than 32767
+// M. Else S is the NeededStep of a neighbour, at most 2 m for any relief on Earth (below 32 km), and 16384 M + 2 <=
+// 32767 M holds since M >= 2^-10 m.
 #pragma once
 
 #include <array>

@@ -4,8 +4,7 @@
 
 #include <cmath>
 #include <limits>
-
-#include "engine/core/check.h"
+#include <new>
 
 namespace terrace::dem {
 namespace {
@@ -93,8 +92,8 @@ void Projector::Return(std::unique_ptr<Operation> operation) const {
 
 void Projector::Transform(std::span<Position> positions, bool forward) const {
   std::unique_ptr<Operation> operation = Borrow();
-  // The same string was set up once in Make. Where it cannot be now, for want of memory or of descriptors for its grids,
-  // no position is known; the caller's read fails.
+  // The same string was set up once in Make. Where it cannot be now, for want of memory or of descriptors for its
+  // grids, no position is known; the caller's read fails.
   if (operation == nullptr) throw std::bad_alloc();
   for (Position& position : positions) {
     const PJ_COORD result = proj_trans(operation->operation.get(), forward ? PJ_FWD : PJ_INV,

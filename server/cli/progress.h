@@ -25,7 +25,8 @@ class Progress {
   const std::string what_;
   const bool terminal_;
   const std::chrono::steady_clock::time_point start_;
-  std::chrono::steady_clock::time_point last_{};
+  std::chrono::steady_clock::time_point last_;
+  double share_ = 0;  // never falls
   bool shown_ = false;
 };
 

@@ -84,12 +84,13 @@ Result<MeasuredTile> Finish(tin::GreedyTriangulation& greedy, const proto::Latti
 }
 
 // Refines to the error, or to a coarser one inside the tile where the format's vertex count ends first. The edges never
-// depend on the inside: they keep the threshold of the error that was asked for.
+// depend on the inside: they keep the threshold of the error that was asked for, exactly, since doubling rounds
+// nothing.
 Result<MeasuredTile> RefineTile(const proto::LatticeView& lattice, const proto::EdgeSteps& steps, double error_m,
                                 std::stop_token stop) {
   const tin::HeightField field = FieldOf(lattice);
   const RefinePlan plan = MakeRefinePlan(lattice, steps, error_m);
-  for (double coarser = 1;; coarser *= 1.25) {
+  for (double coarser = 1;; coarser *= 2) {
     tin::GreedyOptions options = plan.options;
     for (tin::BorderOptions& border : options.borders) border.weight *= coarser;
     tin::GreedyTriangulation greedy(field, std::move(options));
