@@ -22,15 +22,18 @@ namespace {
 std::vector<std::string> AdviceFor(const dem::DemInfo& info) {
   std::vector<std::string> advice;
   if (std::max(info.width, info.height) > 4096 && info.overview_factors.empty()) {
-    advice.push_back(fmt::format("no overviews: shallow tiles read the whole raster; run 'gdaladdo -r average {}'", info.path));
+    advice.push_back(
+        fmt::format("no overviews: shallow tiles read the whole raster; run 'gdaladdo -r average {}'", info.path));
   }
   if (info.vertical_datum.empty()) {
     advice.push_back(
-        "no vertical datum stated: heights are taken as metres above the WGS 84 ellipsoid as they are; heights above mean "
+        "no vertical datum stated: heights are taken as metres above the WGS 84 ellipsoid as they are; heights above "
+        "mean "
         "sea level will be off by the geoid, up to 100 m");
   }
   if (info.void_samples > 0) {
-    advice.push_back(fmt::format("voids: small ones are filled from their edges, larger ones show the floor of {:g} m", info.floor));
+    advice.push_back(
+        fmt::format("voids: small ones are filled from their edges, larger ones show the floor of {:g} m", info.floor));
   }
   return advice;
 }
@@ -44,27 +47,45 @@ void PrintText(const dem::DemInfo& info) {
   fmt::print("{}\n", info.path);
   line("raster", fmt::format("{} x {}, {}, {}", info.width, info.height, info.data_type, info.driver));
   line("CRS", info.crs);
-  line("pixel", fmt::format("{:g} x {:g} {}, {:.3g} m on the ground", info.pixel_width, info.pixel_height, info.pixel_unit, info.spacing_m));
-  line("bounds", fmt::format("west {:.6g}, south {:.6g}, east {:.6g}, north {:.6g}", info.bounds.west, info.bounds.south, info.bounds.east, info.bounds.north));
-  line("heights", fmt::format("{:g} to {:g} m{}", info.heights.min, info.heights.max, info.height_unit.empty() ? "" : ", unit " + info.height_unit));
+  line("pixel", fmt::format("{:g} x {:g} {}, {:.3g} m on the ground", info.pixel_width, info.pixel_height,
+                            info.pixel_unit, info.spacing_m));
+  line("bounds", fmt::format("west {:.6g}, south {:.6g}, east {:.6g}, north {:.6g}", info.bounds.west,
+                             info.bounds.south, info.bounds.east, info.bounds.north));
+  line("heights", fmt::format("{:g} to {:g} m{}", info.heights.min, info.heights.max,
+                              info.height_unit.empty() ? "" : ", unit " + info.height_unit));
   line("datum", info.vertical_datum.empty() ? "not stated" : info.vertical_datum);
-  line("voids", info.void_samples == 0 ? "none" : fmt::format("{} samples, {}", info.void_samples, Percent(info.void_samples, info.valid_samples + info.void_samples)));
-  line("overviews", info.overview_factors.empty() ? "none" : fmt::format("1/{}", fmt::join(info.overview_factors, ", 1/")));
-  line("levels", fmt::format("0 to {}, default error {:.3g} m at the deepest", info.max_level, geo::DefaultError(info.max_level)));
+  line("voids", info.void_samples == 0
+                    ? "none"
+                    : fmt::format("{} samples, {}", info.void_samples,
+                                  Percent(info.void_samples, info.valid_samples + info.void_samples)));
+  line("overviews",
+       info.overview_factors.empty() ? "none" : fmt::format("1/{}", fmt::join(info.overview_factors, ", 1/")));
+  line("floor", fmt::format("{:g} m outside the raster and in large voids", info.floor));
+  line("levels", fmt::format("0 to {}, default error {:.3g} m at the deepest", info.max_level,
+                             geo::DefaultError(info.max_level)));
   if (!info.transform.empty()) line("transform", info.transform);
   for (const std::string& advice : AdviceFor(info)) line("note", advice);
 }
 
 nlohmann::json ToJson(const dem::DemInfo& info) {
-  return {{"path", info.path}, {"driver", info.driver}, {"width", info.width}, {"height", info.height},
-          {"data_type", info.data_type}, {"crs", info.crs}, {"vertical_datum", info.vertical_datum},
+  return {{"path", info.path},
+          {"driver", info.driver},
+          {"width", info.width},
+          {"height", info.height},
+          {"data_type", info.data_type},
+          {"crs", info.crs},
+          {"vertical_datum", info.vertical_datum},
           {"pixel", {{"width", info.pixel_width}, {"height", info.pixel_height}, {"unit", info.pixel_unit}}},
           {"spacing_m", info.spacing_m},
           {"bounds", {info.bounds.west, info.bounds.south, info.bounds.east, info.bounds.north}},
           {"heights", {{"min", info.heights.min}, {"max", info.heights.max}}},
-          {"valid_samples", info.valid_samples}, {"void_samples", info.void_samples},
-          {"overviews", info.overview_factors}, {"floor", info.floor}, {"levels", {0, info.max_level}},
-          {"transform", info.transform}, {"advice", AdviceFor(info)}};
+          {"valid_samples", info.valid_samples},
+          {"void_samples", info.void_samples},
+          {"overviews", info.overview_factors},
+          {"floor", info.floor},
+          {"levels", {0, info.max_level}},
+          {"transform", info.transform},
+          {"advice", AdviceFor(info)}};
 }
 
 int Info(const std::vector<std::string>& dems, bool json) {
@@ -94,8 +115,13 @@ int Info(const std::vector<std::string>& dems, bool json) {
 void AddInfo(CLI::App& app, int& exit_code) {
   auto dems = std::make_shared<std::vector<std::string>>();
   auto json = std::make_shared<bool>(false);
-  CLI::App* command = app.add_subcommand("info", "Tells what rasters hold, the levels they can serve, and what to mend");
-  command->footer("  terrace info alps.tif");
+  CLI::App* command =
+      app.add_subcommand("info", "Tells what rasters hold, the levels they can serve, and what to mend");
+  command->footer(
+      "Examples:\n"
+      "  terrace info alps.tif andes.tif\n"
+      "  terrace info alps.tif --json\n\n"
+      "A raster that cannot be served is told on stderr with the reason and the remedy; the others are still shown.");
   command->add_option("DEM", *dems, "Rasters that GDAL can read")->required();
   command->add_flag("--json", *json, "One JSON array instead of text");
   command->callback([dems, json, &exit_code] { exit_code = Info(*dems, *json); });

@@ -7,8 +7,8 @@
 
 namespace terrace::cli {
 
-// "terrace: reading alps.tif 42 %". On a terminal the line is rewritten in place, elsewhere a line comes every ten seconds.
-// Says nothing about work that is over within a second.
+// "terrace: reading alps.tif 42 %". On a terminal the line is rewritten in place, elsewhere a line comes every ten
+// seconds. Says nothing about work that is over within a second.
 class Progress {
  public:
   explicit Progress(std::string what);
