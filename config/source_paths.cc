@@ -32,7 +32,8 @@ Result<std::vector<std::string>> ExpandSource(const std::string& written, const 
   const std::unique_ptr<glob_t, void (*)(glob_t*)> owner(&matches, globfree);
   const int status = glob(pattern.c_str(), GLOB_ERR | GLOB_NOSORT, nullptr, &matches);
   if (status == GLOB_NOMATCH) return MakeError(ErrorCode::kNotFound, "no file matches {}", path);
-  if (status != 0) return MakeError(ErrorCode::kUnavailable, "a folder on the way to {} is missing or cannot be read", path);
+  if (status != 0)
+    return MakeError(ErrorCode::kUnavailable, "a folder on the way to {} is missing or cannot be read", path);
   std::vector<std::string> files(matches.gl_pathv, matches.gl_pathv + matches.gl_pathc);
   std::sort(files.begin(), files.end());  // glob itself would sort by locale
   return files;

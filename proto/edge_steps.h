@@ -1,18 +1,18 @@
 // On which grid of heights the vertices of a tile's edges lie, so that neighbours decode the same numbers.
 //
-// quantized-mesh stores a height as a 15-bit multiple of the tile's own step. Two tiles agree on an edge bit for bit if the
-// heights there are multiples of a step that both tiles' own steps divide. All steps here are powers of two, and a tile's
-// own step (tile_mesh.h) is the finest that its relief allows, so it is enough that an edge's step is at least what either
-// side needs. What a tile needs is bounded from outside, by RangeBound of its heights, because the neighbour that computes
-// the same edge has not read the tile:
+// quantized-mesh stores a height as a 15-bit multiple of the tile's own step. Two tiles agree on an edge bit for bit if
+// the heights there are multiples of a step that both tiles' own steps divide. All steps here are powers of two, and a
+// tile's own step (tile_mesh.h) is the finest that its relief allows, so it is enough that an edge's step is at least
+// what either side needs. What a tile needs is bounded from outside, by RangeBound of its heights, because the
+// neighbour that computes the same edge has not read the tile:
 //
 //   NeededStep(T) = smallest 2^k >= range(T) / 16384      half of the format's 32767 steps; the rest is for rounding up
 //   edge step     = max(largest 2^k <= error / 8, NeededStep of both tiles)
 //   corner step   = the same over the four tiles that meet; on a pole, over the whole dataset
 //
 // Proof that a tile's own step divides: rounding widens its relief by at most the largest edge step S of its edges, and
-// 16384 m + S <= 32767 m holds with m = its NeededStep as long as S <= 16383 m. S is at most 2 m (relief below 32768 m),
-// m at least 2^-10 m.
+// 16384 m + S <= 32767 m holds with m = its NeededStep as long as S <= 16383 m. S is at most 2 m (relief below 32768
+// m), m at least 2^-10 m.
 #pragma once
 
 #include <array>

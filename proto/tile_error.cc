@@ -17,7 +17,9 @@ struct Point {
   std::int64_t x = 0, y = 0;
 };
 
-constexpr std::int64_t FloorDiv(std::int64_t a, std::int64_t b) { return a / b - ((a % b != 0 && (a < 0) != (b < 0)) ? 1 : 0); }
+constexpr std::int64_t FloorDiv(std::int64_t a, std::int64_t b) {
+  return a / b - ((a % b != 0 && (a < 0) != (b < 0)) ? 1 : 0);
+}
 constexpr std::int64_t CeilDiv(std::int64_t a, std::int64_t b) { return -FloorDiv(-a, b); }
 
 // A linear function over the tile: value at a corner of the triangle and its two gradients.
@@ -50,7 +52,9 @@ class Meter {
     return static_cast<std::size_t>(j) * static_cast<std::size_t>(cells_ + 1) + static_cast<std::size_t>(i);
   }
   // The lattice node whose rounded position this is.
-  std::int64_t NodeOf(std::uint16_t position) const { return (std::int64_t{position} * cells_ + kQuantizedMax / 2) / kQuantizedMax; }
+  std::int64_t NodeOf(std::uint16_t position) const {
+    return (std::int64_t{position} * cells_ + kQuantizedMax / 2) / kQuantizedMax;
+  }
 
   void PrepareCurved() {
     ecef_ = DecodePositions(tile_);
@@ -142,11 +146,11 @@ class Meter {
   const int cells_;
   const double bound_;
   const bool curved_;
-  std::vector<double> height_;     // metres, by vertex
-  std::vector<geo::Vec3> ecef_;    // by vertex
-  std::vector<bool> is_vertex_;    // by node
+  std::vector<double> height_;   // metres, by vertex
+  std::vector<geo::Vec3> ecef_;  // by vertex
+  std::vector<bool> is_vertex_;  // by node
   std::vector<geo::Vec3> column_up_, row_up_;
-  std::vector<double> row_base_;   // by row: the ellipsoid's surface along its normal there
+  std::vector<double> row_base_;  // by row: the ellipsoid's surface along its normal there
   TileError result_;
 };
 

@@ -11,13 +11,14 @@ namespace terrace::proto {
 
 struct TileError {
   double max_m = 0;  // over every lattice sample of the tile
-  // For each triangle that misses the bound, its worst sample that an insertion can mend: inside the tile, no vertex yet.
+  // For each triangle that misses the bound, its worst sample that an insertion can mend: inside the tile, no vertex
+  // yet.
   std::vector<tin::SamplePosition> misses;
 };
 
 // Measures at every lattice sample the height interpolated in longitude and latitude, which is what clients sample, and
-// with `curved` the flat triangle in ECEF, which is what they draw: its point with the sample's barycentric coordinates,
-// along the ellipsoid's normal at the sample.
+// with `curved` the flat triangle in ECEF, which is what they draw: its point with the sample's barycentric
+// coordinates, along the ellipsoid's normal at the sample.
 TileError MeasureTileError(const LatticeView& lattice, const QuantizedTile& tile, double bound_m, bool curved);
 
 // True if all triangles are counter-clockwise in (u, v): rounding positions to 15 bits could turn a sliver.

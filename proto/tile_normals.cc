@@ -11,8 +11,8 @@
 namespace terrace::proto {
 namespace {
 
-// Steeper slopes are drawn as this one (88 degrees): the two bytes of a normal are up to 1 degree off and must not point
-// into the ground.
+// Steeper slopes are drawn as this one (88 degrees): the two bytes of a normal are up to 1 degree off and must not
+// point into the ground.
 constexpr double kSteepestSlope = 28;
 constexpr double kLowestUp = 0.035;
 // 13 degrees.
@@ -34,8 +34,10 @@ LocalFrame FrameOf(double longitude, double latitude) {
 geo::Vec3 LatticeNormal(const LatticeView& lattice, const LocalFrame& frame, tin::SamplePosition p) {
   const double latitude = lattice.Latitude(p.y), step = lattice.lattice.StepDegrees();
   if (latitude <= -90 || latitude >= 90) return frame.up;
-  const double rise_east = static_cast<double>(lattice.At(p.x + 1, p.y)) - static_cast<double>(lattice.At(p.x - 1, p.y));
-  const double rise_north = static_cast<double>(lattice.At(p.x, p.y + 1)) - static_cast<double>(lattice.At(p.x, p.y - 1));
+  const double rise_east =
+      static_cast<double>(lattice.At(p.x + 1, p.y)) - static_cast<double>(lattice.At(p.x - 1, p.y));
+  const double rise_north =
+      static_cast<double>(lattice.At(p.x, p.y + 1)) - static_cast<double>(lattice.At(p.x, p.y - 1));
   const double east = rise_east / (2 * step * geo::MetresPerDegreeEast(latitude));
   const double north = rise_north / (2 * step * geo::MetresPerDegreeNorth(latitude));
   const double tamed = kSteepestSlope / std::max(std::hypot(east, north), kSteepestSlope);

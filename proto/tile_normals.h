@@ -13,10 +13,10 @@ namespace terrace::proto {
 
 // Oct-encoded unit normals in ECEF, one per vertex of `mesh`, which is the mesh that `tile` was quantized from.
 //
-// On the edges the gradient of the heights, by central differences over one lattice step on each side: a function of the
-// global node and so equal in every tile that shares it; on a pole the ellipsoid's normal. Inside the same, but turned to
-// within 13 degrees of the mesh's own area-weighted normal: where the mesh drops relief that the lattice has, and at
-// cliffs, light must still fit the triangles that it falls on.
+// On the edges the gradient of the heights, by central differences over one lattice step on each side: a function of
+// the global node and so equal in every tile that shares it; on a pole the ellipsoid's normal. Inside the same, but
+// turned to within 13 degrees of the mesh's own area-weighted normal: where the mesh drops relief that the lattice has,
+// and at cliffs, light must still fit the triangles that it falls on.
 std::vector<std::array<std::uint8_t, 2>> TileNormals(const LatticeView& lattice, const tin::TinMesh& mesh,
                                                      const QuantizedTile& tile);
 

@@ -41,9 +41,7 @@ Vec3 ToEcef(double longitude_deg, double latitude_deg, double height_m) {
   return {from_axis * lon.cos, from_axis * lon.sin, (radius * (1 - kEccentricitySquared) + height_m) * lat.sin};
 }
 
-double PrimeVerticalRadius(double latitude_deg) {
-  return PrimeVerticalRadiusFromSine(RoundedSinCos(latitude_deg).sin);
-}
+double PrimeVerticalRadius(double latitude_deg) { return PrimeVerticalRadiusFromSine(RoundedSinCos(latitude_deg).sin); }
 
 double MetresPerDegreeEast(double latitude_deg) {
   return ToRadians(1) * PrimeVerticalRadius(latitude_deg) * RoundedSinCos(latitude_deg).cos;

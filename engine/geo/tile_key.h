@@ -1,7 +1,7 @@
 // The quadtree of the TMS "global-geodetic" scheme (EPSG:4326): two roots, 180 degrees wide.
 //
-// Axis order, stated once: x counts from the WEST (-180), y counts from the SOUTH (-90). Level z has 2^(z+1) columns and
-// 2^z rows of tiles that are 180 / 2^z degrees wide and high.
+// Axis order, stated once: x counts from the WEST (-180), y counts from the SOUTH (-90). Level z has 2^(z+1) columns
+// and 2^z rows of tiles that are 180 / 2^z degrees wide and high.
 #pragma once
 
 #include <cstdint>

@@ -1,9 +1,9 @@
 // Greedy insertion of height samples into a Delaunay triangulation.
 //
-// Garland and Heckbert, "Fast Triangular Approximation of Terrains and Height Fields" (1997), section 3.3, algorithm III:
-// every triangle keeps its worst sample as a candidate, a queue yields the worst of all, and only the triangles that an
-// insertion changed are scanned again. The result is a function of the field and the options alone: predicates are exact,
-// and equal errors are ordered by the row-major index of the sample.
+// Garland and Heckbert, "Fast Triangular Approximation of Terrains and Height Fields" (1997), section 3.3, algorithm
+// III: every triangle keeps its worst sample as a candidate, a queue yields the worst of all, and only the triangles
+// that an insertion changed are scanned again. The result is a function of the field and the options alone: predicates
+// are exact, and equal errors are ordered by the row-major index of the sample.
 //
 // Not thread-safe; different objects are independent.
 #pragma once
@@ -23,22 +23,28 @@
 namespace terrace::tin {
 
 // The four borders of a field.
-enum class Side : std::uint8_t { kSouth = 0 /* y = 0 */, kEast = 1 /* x = width-1 */, kNorth = 2 /* y = height-1 */, kWest = 3 /* x = 0 */ };
+enum class Side : std::uint8_t {
+  kSouth = 0 /* y = 0 */,
+  kEast = 1 /* x = width-1 */,
+  kNorth = 2 /* y = height-1 */,
+  kWest = 3 /* x = 0 */
+};
 
 // How samples on one border are judged. The error of a border sample k between the border's vertices a < b is
 //   |(h_a (b - k) + h_b (k - a)) / (b - a) - h_k| + sagitta_m (k - a) (b - k)
-// evaluated in double in exactly this form, a < b counted along increasing x or y: a function of that border's own samples.
-// Two fields that share a border with equal heights, weights and sagittas therefore insert the same border vertices,
-// whatever their insides look like.
+// evaluated in double in exactly this form, a < b counted along increasing x or y: a function of that border's own
+// samples. Two fields that share a border with equal heights, weights and sagittas therefore insert the same border
+// vertices, whatever their insides look like.
 struct BorderOptions {
   double weight = 1;     // border errors count `weight` times: a border threshold of E / weight in a run to the error E
   double sagitta_m = 0;  // metres: half the second difference of the ground that the border's chord cuts off
 };
 
 // The ground under the field is curved: a flat triangle with corners (dx, dy) samples apart cuts below it by up to its
-// sagitta. Squared lengths are q = dx^2 east_m2[row] + dy^2 north_m2, with the largest east_m2 of the triangle's rows; the
-// sagitta bound is (largest distance from a corner within the triangle)^2 / (2 radius): the squared circumradius for acute
-// triangles, else a quarter of the longest side squared. It is added to the error of every sample of the triangle.
+// sagitta. Squared lengths are q = dx^2 east_m2[row] + dy^2 north_m2, with the largest east_m2 of the triangle's rows;
+// the sagitta bound is (largest distance from a corner within the triangle)^2 / (2 radius): the squared circumradius
+// for acute triangles, else a quarter of the longest side squared. It is added to the error of every sample of the
+// triangle.
 struct Curvature {
   std::vector<double> east_m2;  // per row: squared metres per column step; empty: flat ground
   double north_m2 = 0;          // squared metres per row step
@@ -60,9 +66,9 @@ struct GreedyOptions {
 
 // A run stops as soon as one of these holds.
 struct GreedyGoal {
-  double max_error = 0;                                               // no sample is further off, metres
-  std::size_t max_points = std::numeric_limits<std::size_t>::max();   // vertices, the four corners included
-  double rms_error = 0;                                               // root mean square over the valid samples, metres; 0: not a goal
+  double max_error = 0;                                              // no sample is further off, metres
+  std::size_t max_points = std::numeric_limits<std::size_t>::max();  // vertices, the four corners included
+  double rms_error = 0;  // root mean square over the valid samples, metres; 0: not a goal
 };
 
 class GreedyTriangulation {
@@ -73,8 +79,8 @@ class GreedyTriangulation {
   GreedyTriangulation(GreedyTriangulation&&) noexcept;
   GreedyTriangulation& operator=(GreedyTriangulation&&) noexcept;
 
-  // Inserts samples, worst first, until a goal is met. A later call with a tighter goal goes on from there and ends in the
-  // mesh that one call with that goal would have made. False if stopped; the mesh is then valid but unfinished.
+  // Inserts samples, worst first, until a goal is met. A later call with a tighter goal goes on from there and ends in
+  // the mesh that one call with that goal would have made. False if stopped; the mesh is then valid but unfinished.
   bool Run(const GreedyGoal& goal, std::stop_token stop = {});
 
   // Inserts these samples as they are, in this order; those that are vertices already are skipped. Border samples are

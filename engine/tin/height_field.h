@@ -27,8 +27,12 @@ class HeightField {
   bool has_voids() const { return has_voids_; }
 
   // NaN at a void.
-  float At(int x, int y) const { return heights_[static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x)]; }
-  const float* Row(int y) const { return heights_.data() + static_cast<std::size_t>(y) * static_cast<std::size_t>(width_); }
+  float At(int x, int y) const {
+    return heights_[static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x)];
+  }
+  const float* Row(int y) const {
+    return heights_.data() + static_cast<std::size_t>(y) * static_cast<std::size_t>(width_);
+  }
 
   // The height a vertex at (x, y) gets: the sample, or where that is void (only corners and seeds can be) the height of
   // the nearest valid sample, ties to the smaller row, then column.

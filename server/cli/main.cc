@@ -39,12 +39,11 @@ std::string Explain(const CLI::App& app, const CLI::ParseError& error, const std
     if (word.starts_with('-')) return "unknown option " + word + DidYouMean(word, FlagNames(app));
     return "unknown command " + word + DidYouMean(word, CommandNames(app));
   }
-  if (dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr) {
-    const std::vector<std::string> unknown = app.remaining(/*recurse=*/true);
-    if (!unknown.empty() && unknown.front().starts_with('-')) {
-      const std::string flag = unknown.front().substr(0, unknown.front().find('='));
-      return "unknown option " + flag + DidYouMean(flag, FlagNames(app));
-    }
+  // A mistyped option often lacks as well: say what was typed, not what is missing.
+  for (const std::string& word : app.remaining(/*recurse=*/true)) {
+    if (!word.starts_with("--")) continue;
+    const std::string flag = word.substr(0, word.find('='));
+    return "unknown option " + flag + DidYouMean(flag, FlagNames(app));
   }
   return error.what();
 }

@@ -45,24 +45,31 @@ config::Config MakeConfig(const ServeArguments& arguments, std::vector<config::C
   config::Config config;
   if (!arguments.config_file.empty()) {
     config::ConfigResult loaded = config::LoadConfig(arguments.config_file);
-    if (loaded) config = *std::move(loaded);
-    else errors = std::move(loaded).error();
+    if (loaded)
+      config = *std::move(loaded);
+    else
+      errors = std::move(loaded).error();
   }
   for (const auto& [key, text] : arguments.server_flags) config::SetServerOption(key, text, config, errors);
   if (arguments.dems.empty() && !arguments.dataset_flags.empty()) {
-    errors.push_back({"", "options of a dataset need a DEM on the command line; in a config file they stand in its dataset"});
+    errors.push_back(
+        {"", "options of a dataset need a DEM on the command line; in a config file they stand in its dataset"});
   }
+  if (arguments.dems.size() > 1 && arguments.dataset_flags.contains("name")) {
+    errors.push_back({"--name", "names one dataset; give one DEM, or a config file with a name for each"});
+  }
+  config::DatasetConfig flags;  // checked once, however many DEMs they apply to
+  for (const auto& [key, text] : arguments.dataset_flags) config::SetDatasetOption(key, text, flags, errors);
   for (const std::string& dem : arguments.dems) {
-    config::DatasetConfig dataset;
-    dataset.name = config::SanitizeDatasetName(std::filesystem::path(dem).stem().string());
-    dataset.sources = {dem};
-    for (const auto& [key, text] : arguments.dataset_flags) config::SetDatasetOption(key, text, dataset, errors);
-    config.datasets.push_back(std::move(dataset));
+    config::DatasetConfig& dataset = config.datasets.emplace_back(flags);
+    if (dataset.name.empty()) dataset.name = config::SanitizeDatasetName(std::filesystem::path(dem).stem().string());
+    dataset.sources = {std::filesystem::absolute(dem).string()};  // so that --print-config holds in any folder
   }
   const std::vector<config::ConfigError> duplicates = config::FindDuplicateNames(config.datasets);
   if (errors.empty()) errors = duplicates;
-  if (errors.empty() && config.datasets.empty()) {
-    errors.push_back({"", "there is nothing to serve; name a DEM ('terrace serve dem.tif') or a config file (--config)"});
+  if (errors.empty() && config.datasets.empty() && !arguments.print_config) {
+    errors.push_back(
+        {"", "there is nothing to serve; name a DEM ('terrace serve dem.tif') or a config file (--config)"});
   }
   return config;
 }
@@ -162,7 +169,9 @@ void AddFlags(CLI::App& command, const std::vector<config::OptionInfo>& options,
     const std::string key(option.key);
     std::string help(option.help);
     if (!option.default_value.empty()) help += " [" + option.default_value + "]";
-    command.add_option_function<std::string>(option.Flag(), [&values, key](const std::string& text) { values[key] = text; }, help)
+    command
+        .add_option_function<std::string>(
+            option.Flag(), [&values, key](const std::string& text) { values[key] = text; }, help)
         ->type_name(std::string(option.value))
         ->group(group);
   }
@@ -172,15 +181,16 @@ void AddFlags(CLI::App& command, const std::vector<config::OptionInfo>& options,
 
 void AddServe(CLI::App& app, int& exit_code) {
   auto arguments = std::make_shared<ServeArguments>();
-  CLI::App* command = app.add_subcommand(
-      "serve", "Serves DEMs as terrain tiles over HTTP, with a viewer at /");
+  CLI::App* command = app.add_subcommand("serve", "Serves DEMs as terrain tiles over HTTP, with a viewer at /");
   command->footer(
+      "Examples:\n"
       "  terrace serve alps.tif andes.tif\n"
       "  terrace serve --config terrace.json --listen 0.0.0.0:8080\n\n"
       "Each DEM becomes a dataset named after its file. Flags override the config file. Prints one line with\n"
       "the URL when it is ready; logs go to stderr; SIGTERM and SIGINT end it after open requests are answered.");
   command->add_option("DEM", arguments->dems, "Rasters that GDAL can read, one dataset each");
-  command->add_option("--config", arguments->config_file, "Configuration in JSON (config/config.schema.json)")->type_name("FILE");
+  command->add_option("--config", arguments->config_file, "Configuration in JSON (config/config.schema.json)")
+      ->type_name("FILE");
   command->add_flag("--print-config", arguments->print_config, "Prints the configuration in force as JSON and ends");
   AddFlags(*command, config::ServerOptions(), "Server", arguments->server_flags);
   AddFlags(*command, config::DatasetOptions(), "Datasets of the command line", arguments->dataset_flags);

@@ -14,12 +14,12 @@ struct StageTimes {
 };
 
 struct EncodedTile {
-  std::string bytes;      // the body in its content coding
-  std::string etag;       // strong, with the quotes
-  double max_error_m = 0; // measured on the encoded integers: the Terrain-Max-Error header
+  std::string bytes;       // the body in its content coding
+  std::string etag;        // strong, with the quotes
+  double max_error_m = 0;  // measured on the encoded integers: the Terrain-Max-Error header
   std::uint32_t vertices = 0;
   std::uint32_t triangles = 0;
-  StageTimes times;       // of the build that made it
+  StageTimes times;  // of the build that made it
 };
 
 using TilePtr = std::shared_ptr<const EncodedTile>;

@@ -10,11 +10,12 @@
 namespace terrace::server {
 namespace {
 
-constexpr double kSmallestRadius = geo::kSemiMinorAxis * geo::kSemiMinorAxis / geo::kSemiMajorAxis;  // meridian, at the equator
-constexpr double kLargestRadius = geo::kSemiMajorAxis * geo::kSemiMajorAxis / geo::kSemiMinorAxis;   // at the poles
+constexpr double kSmallestRadius =
+    geo::kSemiMinorAxis * geo::kSemiMinorAxis / geo::kSemiMajorAxis;  // meridian, at the equator
+constexpr double kLargestRadius = geo::kSemiMajorAxis * geo::kSemiMajorAxis / geo::kSemiMinorAxis;  // at the poles
 
-// Metres that the right triangles of a grid of `divisions` x `divisions` over a tile of this level can sag. The same for
-// every tile of the level, so that neighbours start from the same grid: tiles are taken as wide as at the equator.
+// Metres that the right triangles of a grid of `divisions` x `divisions` over a tile of this level can sag. The same
+// for every tile of the level, so that neighbours start from the same grid: tiles are taken as wide as at the equator.
 double GridSagitta(int level, int divisions) {
   const double side = std::ldexp(geo::kSemiMajorAxis * geo::ToRadians(180), -level) / divisions;
   return side * side / (4 * kSmallestRadius);

@@ -1,5 +1,5 @@
-// How a tile is refined so that it keeps its error and matches its neighbours: derived from its level, its error and its
-// own border samples, and for the edges' height grid from height ranges of the neighbours.
+// How a tile is refined so that it keeps its error and matches its neighbours: derived from its level, its error and
+// its own border samples, and for the edges' height grid from height ranges of the neighbours.
 #pragma once
 
 #include "engine/tin/greedy.h"

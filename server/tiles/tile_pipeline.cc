@@ -36,7 +36,8 @@ proto::EdgeSteps EdgeStepsOf(const dem::DemSource& source, const geo::TileKey& k
       const geo::TileKey neighbour = geo::Neighbour(key, dx, dy);
       if (neighbour.y < 0 || neighbour.y >= rows) continue;
       const dem::HeightRange range = source.RangeBound(neighbour);
-      needed[static_cast<std::size_t>(dy + 1)][static_cast<std::size_t>(dx + 1)] = proto::NeededStep(range.min, range.max);
+      needed[static_cast<std::size_t>(dy + 1)][static_cast<std::size_t>(dx + 1)] =
+          proto::NeededStep(range.min, range.max);
     }
   }
   const dem::DemInfo& info = source.info();

@@ -39,7 +39,8 @@ TEST(ParseJsonText, RefusesNumbersThatNoDoubleHolds) {
 TEST(ParseJsonText, ReportsKeysThatAppearTwiceWithTheirPlace) {
   EXPECT_THAT(ErrorsOf(R"({"listen": "a:1", "listen": "b:2"})"), ElementsAre(IsError("/listen", "appears twice")));
   EXPECT_THAT(
-      ErrorsOf(R"({"datasets": [{"name": "a", "sources": ["a.tif"]}, {"name": "b", "sources": ["b.tif"], "name": "c"}]})"),
+      ErrorsOf(
+          R"({"datasets": [{"name": "a", "sources": ["a.tif"]}, {"name": "b", "sources": ["b.tif"], "name": "c"}]})"),
       ElementsAre(IsError("/datasets/1/name", "appears twice")));
 }
 

@@ -56,19 +56,19 @@ TEST(ParseConfig, SetsWhatTheTextSaysAndNothingElse) {
 }
 
 TEST(ParseConfig, ReportsAllErrorsTogetherInTheOrderOfTheText) {
-  EXPECT_THAT(ErrorsOf(R"({
+  EXPECT_THAT(
+      ErrorsOf(R"({
     "io_threads": 0,
     "datasets": [{"sources": []}, {"name": "a b", "sources": ["x.tif", 7]}, 3],
     "lissten": "0.0.0.0:80",
     "log_level": "loud"})"),
-              ElementsAre(IsError("/io_threads", "a whole number from 1 to 64, not 0"),
-                          IsError("/datasets/0/sources", "a list of paths"),
-                          IsError("/datasets/0", "\"name\" is missing"),
-                          IsError("/datasets/1/name", "1 to 64 letters, digits"),
-                          IsError("/datasets/1/sources/1", "a path or a glob, not 7"),
-                          IsError("/datasets/2", "an object with keys such as \"name\", not 3"),
-                          IsError("/lissten", "did you mean \"listen\"?"),
-                          IsError("/log_level", "\"debug\" or \"info\" or \"warn\" or \"error\" or \"off\", not \"loud\"")));
+      ElementsAre(IsError("/io_threads", "a whole number from 1 to 64, not 0"),
+                  IsError("/datasets/0/sources", "a list of paths"), IsError("/datasets/0", "\"name\" is missing"),
+                  IsError("/datasets/1/name", "1 to 64 letters, digits"),
+                  IsError("/datasets/1/sources/1", "a path or a glob, not 7"),
+                  IsError("/datasets/2", "an object with keys such as \"name\", not 3"),
+                  IsError("/lissten", "did you mean \"listen\"?"),
+                  IsError("/log_level", "\"debug\" or \"info\" or \"warn\" or \"error\" or \"off\", not \"loud\"")));
 }
 
 TEST(ParseConfig, SuggestsTheNearestKeyAndListsAllWhenNoneIsNear) {

@@ -35,7 +35,8 @@ Json DatasetText(const std::string& key, const Json& value) {
   return Json{{"datasets", Json::array({dataset})}};
 }
 
-void ExpectDescribed(const std::vector<OptionInfo>& options, Json schema, Json (*text)(const std::string&, const Json&)) {
+void ExpectDescribed(const std::vector<OptionInfo>& options, Json schema,
+                     Json (*text)(const std::string&, const Json&)) {
   schema.erase("$schema");
   EXPECT_EQ(schema.size(), options.size()) << "the schema has a key that is no option";
   for (const OptionInfo& option : options) {

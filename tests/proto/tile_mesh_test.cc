@@ -19,9 +19,11 @@ struct Ground {
   geo::Lattice lattice;
   std::vector<float> heights;
 
-  Ground(geo::TileKey tile, int cells, const std::function<double(int, int)>& height) : key(tile), lattice{tile.level, cells} {
+  Ground(geo::TileKey tile, int cells, const std::function<double(int, int)>& height)
+      : key(tile), lattice{tile.level, cells} {
     for (int j = -1; j <= cells + 1; ++j) {
-      for (int i = -1; i <= cells + 1; ++i) heights.push_back(static_cast<float>(std::floor(height(i, j) * 1024) / 1024));
+      for (int i = -1; i <= cells + 1; ++i)
+        heights.push_back(static_cast<float>(std::floor(height(i, j) * 1024) / 1024));
     }
   }
   LatticeView view() const { return {key, lattice, heights}; }
@@ -35,7 +37,8 @@ tin::TinMesh TwoTriangles(int cells) {
 tin::TinMesh EverySample(int cells) {
   tin::TinMesh mesh;
   for (int j = 0; j <= cells; ++j) {
-    for (int i = 0; i <= cells; ++i) mesh.vertices.push_back({static_cast<std::uint16_t>(i), static_cast<std::uint16_t>(j)});
+    for (int i = 0; i <= cells; ++i)
+      mesh.vertices.push_back({static_cast<std::uint16_t>(i), static_cast<std::uint16_t>(j)});
   }
   const auto side = static_cast<std::uint32_t>(cells) + 1;
   for (std::uint32_t j = 0; j + 1 < side; ++j) {
@@ -68,7 +71,8 @@ TEST(QuantizeTile, DecodesEdgeHeightsExactlyWhateverTheInside) {
   for (int run = 0; run < 200; ++run) {
     const double relief = std::exp2(std::uniform_real_distribution<double>(0, 12)(random));
     const double base = std::uniform_real_distribution<double>(-500, 4000)(random);
-    std::uniform_real_distribution<double> inside(base - relief, base + relief), edge(base - relief / 50, base + relief / 50);
+    std::uniform_real_distribution<double> inside(base - relief, base + relief),
+        edge(base - relief / 50, base + relief / 50);
     const Ground ground({11, 1080, 1440}, 32, [&](int i, int j) {
       return i <= 0 || j <= 0 || i >= 32 || j >= 32 ? edge(random) : inside(random);
     });
@@ -84,7 +88,8 @@ TEST(QuantizeTile, DecodesEdgeHeightsExactlyWhateverTheInside) {
         EXPECT_LE(std::abs(Decode(tile, k) - sample), step / 2);
       }
     }
-    const double low = *std::min_element(tile.h.begin(), tile.h.end()), high = *std::max_element(tile.h.begin(), tile.h.end());
+    const double low = *std::min_element(tile.h.begin(), tile.h.end()),
+                 high = *std::max_element(tile.h.begin(), tile.h.end());
     const double range = static_cast<double>(tile.max_height) - static_cast<double>(tile.min_height);
     const double ulp = std::ldexp(1.0, std::ilogb(std::max(std::abs(tile.min_height), std::abs(tile.max_height))) - 23);
     EXPECT_LE(range, 2 * range * (high - low) / kQuantizedMax * 1.001 + kQuantizedMax * ulp);
@@ -111,7 +116,8 @@ TEST(MeasureTileError, FindsOneLiftedSample) {
 
 TEST(MeasureTileError, DoesNotOfferEdgeSamples) {
   const Ground ground({11, 1080, 1440}, 32, [](int i, int j) { return i == 0 && j == 7 ? 150 : 100; });
-  const TileError error = MeasureTileError(ground.view(), QuantizeTile(ground.view(), TwoTriangles(32), AllSteps(0.25)), 5, false);
+  const TileError error =
+      MeasureTileError(ground.view(), QuantizeTile(ground.view(), TwoTriangles(32), AllSteps(0.25)), 5, false);
   EXPECT_EQ(error.max_m, 50);
   EXPECT_TRUE(error.misses.empty());
 }

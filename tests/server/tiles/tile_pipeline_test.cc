@@ -62,7 +62,8 @@ Edge EdgeOf(const FetchedTile& tile, bool vertical, int fixed) {
   const double min = static_cast<double>(mesh.min_height), max = static_cast<double>(mesh.max_height);
   for (std::size_t k = 0; k < mesh.u.size(); ++k) {
     if ((vertical ? mesh.u[k] : mesh.v[k]) != fixed) continue;
-    edge.emplace_back(vertical ? mesh.v[k] : mesh.u[k], min + (max - min) * mesh.h[k] / 32767, normals[2 * k], normals[2 * k + 1]);
+    edge.emplace_back(vertical ? mesh.v[k] : mesh.u[k], min + (max - min) * mesh.h[k] / 32767, normals[2 * k],
+                      normals[2 * k + 1]);
   }
   std::sort(edge.begin(), edge.end());
   return edge;
@@ -81,10 +82,12 @@ TEST(TilePipeline, NeighboursDecodeTheSameEdges) {
         const FetchedTile tile = Fetch(dataset, key, step);
         const geo::TileKey east = geo::Neighbour(key, 1, 0), north = geo::Neighbour(key, 0, 1);
         if (Samples().datasets()[dataset].source->IsAvailable(east)) {
-          EXPECT_EQ(EdgeOf(tile, true, 32767), EdgeOf(Fetch(dataset, east, step), true, 0)) << geo::ToString(key) << " step " << step;
+          EXPECT_EQ(EdgeOf(tile, true, 32767), EdgeOf(Fetch(dataset, east, step), true, 0))
+              << geo::ToString(key) << " step " << step;
         }
         if (Samples().datasets()[dataset].source->IsAvailable(north)) {
-          EXPECT_EQ(EdgeOf(tile, false, 32767), EdgeOf(Fetch(dataset, north, step), false, 0)) << geo::ToString(key) << " step " << step;
+          EXPECT_EQ(EdgeOf(tile, false, 32767), EdgeOf(Fetch(dataset, north, step), false, 0))
+              << geo::ToString(key) << " step " << step;
         }
       }
     }
@@ -105,7 +108,8 @@ TEST(TilePipeline, ReachesTheLadderError) {
     for (const int step : {-8, 0, 8}) {
       for (int level = 0; level <= Samples().datasets()[dataset].source->max_level(); ++level) {
         const FetchedTile tile = Fetch(dataset, MiddleTile(dataset, level), step);
-        EXPECT_LE(tile.encoded.max_error_m, geo::LadderError(level, step)) << dataset << " level " << level << " step " << step;
+        EXPECT_LE(tile.encoded.max_error_m, geo::LadderError(level, step))
+            << dataset << " level " << level << " step " << step;
       }
     }
   }
