@@ -102,9 +102,11 @@ HeightRange DemSource::Impl::RangeBound(const geo::TileKey& key) const {
     }
     blocks.Add(here);
   }
-  if (blocks.min > blocks.max) return range;
-  // Rounding to 2^-10 m stays within these.
-  HeightRange bound{std::floor(blocks.min * 1024.0) / 1024, std::ceil(blocks.max * 1024.0) / 1024};
+  HeightRange bound = range;  // of blocks without a valid sample: the floor
+  if (blocks.min <= blocks.max) {
+    // Rounding to 2^-10 m stays within these.
+    bound = {std::floor(blocks.min * 1024.0) / 1024, std::ceil(blocks.max * 1024.0) / 1024};
+  }
   const auto include = [&](double height) {
     bound.min = std::min(bound.min, height);
     bound.max = std::max(bound.max, height);

@@ -126,9 +126,10 @@ Result<void> Georeference::ReadCrs(const OGRSpatialReference& srs, const std::st
 }
 
 void Georeference::FindPeriod(const OGRSpatialReference& srs) {
+  full_circle_ = 2 * std::numbers::pi / srs.GetAngularUnits(static_cast<const char**>(nullptr));
+  centre_longitude_ = Apply(to_crs_, {width_ / 2.0, height_ / 2.0}).x;
   if (to_crs_[2] != 0 || to_crs_[4] != 0) return;
-  const double full_circle = 2 * std::numbers::pi / srs.GetAngularUnits(static_cast<const char**>(nullptr));
-  period_ = std::abs(full_circle / to_crs_[1]);
+  period_ = std::abs(full_circle_ / to_crs_[1]);
   const double whole = std::round(period_);
   // A pixel size of 0.008333333333 is meant to be 1/120: a hundredth of a pixel around the Earth is no gap.
   if (std::abs(period_ - whole) < 0.01 && width_ >= whole) wrap_columns_ = static_cast<int>(whole);
@@ -142,6 +143,10 @@ double Georeference::CanonicalColumn(double column) const {
 void Georeference::ToPixels(std::span<Position> positions) const {
   if (projector_ != nullptr) projector_->Forward(positions);
   for (Position& position : positions) {
+    if (full_circle_ > 0 && period_ == 0) {
+      // A rotated grid has no columns to wrap: its longitudes are those nearest to its centre.
+      position.x -= full_circle_ * std::round((position.x - centre_longitude_) / full_circle_);
+    }
     position = Apply(to_pixel_, position);
     if (period_ > 0) position.x = CanonicalColumn(position.x);
   }

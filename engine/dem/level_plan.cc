@@ -46,7 +46,8 @@ int FactorOf(const geo::Lattice& lattice, const SourceSpacing& spacing) {
   const double step = lattice.StepDegrees();
   const double east = step * geo::MetresPerDegreeEast(latitude) / spacing.east;
   const double north = step * geo::MetresPerDegreeNorth(latitude) / spacing.north;
-  return 1 << std::max(0, static_cast<int>(std::lround(std::log2(std::sqrt(east * north)))));
+  constexpr double kMost = 22;  // one block then holds the largest raster (raster_file.cc, kMaxSide)
+  return 1 << static_cast<int>(std::lround(std::clamp(std::log2(std::sqrt(east * north)), 0.0, kMost)));
 }
 
 }  // namespace

@@ -93,8 +93,9 @@ void Projector::Return(std::unique_ptr<Operation> operation) const {
 
 void Projector::Transform(std::span<Position> positions, bool forward) const {
   std::unique_ptr<Operation> operation = Borrow();
-  // The same string was set up once in Make: only exhausted memory stops it later.
-  TERRACE_CHECK(operation != nullptr);
+  // The same string was set up once in Make. Where it cannot be now, for want of memory or of descriptors for its grids,
+  // no position is known; the caller's read fails.
+  if (operation == nullptr) throw std::bad_alloc();
   for (Position& position : positions) {
     const PJ_COORD result = proj_trans(operation->operation.get(), forward ? PJ_FWD : PJ_INV,
                                        proj_coord(position.x, position.y, 0, HUGE_VAL));

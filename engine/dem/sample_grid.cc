@@ -45,7 +45,7 @@ class BlockAverages {
   }
   void Take(float* out) {
     for (std::size_t i = 0; i < sums_.size(); ++i) {
-      out[i] = counts_[i] == 0 ? SampleRules::kVoid : static_cast<float>(sums_[i] / counts_[i]);
+      out[i] = counts_[i] == 0 ? SampleRules::kVoid : static_cast<float>(sums_[i] / static_cast<double>(counts_[i]));
       sums_[i] = 0;
       counts_[i] = 0;
     }
@@ -54,7 +54,7 @@ class BlockAverages {
  private:
   int block_;
   std::vector<double> sums_;
-  std::vector<int> counts_;
+  std::vector<std::int64_t> counts_;
 };
 
 // Blocks `column` .. `column + columns` without wrapping, all rows of the window, into columns of `out` that is
@@ -63,22 +63,24 @@ Result<void> ReadBlocks(const Level& level, const SampleRules& rules, const Grid
                         std::int64_t stride, const std::stop_token& stop) {
   const std::int64_t first = window.column * level.block;
   const std::int64_t count = std::min<std::int64_t>(level.columns - first, window.columns * level.block);
-  const std::int64_t strip = std::max<std::int64_t>(1, kSamplesPerStrip / (count * level.block));  // in block rows
+  const std::int64_t top = window.row * level.block;
+  const std::int64_t rows = std::min<std::int64_t>(level.rows - top, window.rows * level.block);
+  // In sample rows: a row of blocks can be the whole raster.
+  const std::int64_t strip = std::max<std::int64_t>(1, kSamplesPerStrip / count);
   std::vector<float> samples;
   BlockAverages averages(window.columns, level.block);
-  for (std::int64_t done = 0; done < window.rows; done += strip) {
-    const std::int64_t block_rows = std::min(strip, window.rows - done);
-    const std::int64_t top = (window.row + done) * level.block;
-    const std::int64_t rows = std::min<std::int64_t>(level.rows - top, block_rows * level.block);
-    samples.resize(static_cast<std::size_t>(count * rows));
-    if (auto read = ReadHeights(*level.band, rules, static_cast<int>(first), static_cast<int>(top),
-                                static_cast<int>(count), static_cast<int>(rows), samples.data(), stop);
+  for (std::int64_t done = 0; done < rows; done += strip) {
+    const std::int64_t here = std::min(strip, rows - done);
+    samples.resize(static_cast<std::size_t>(count * here));
+    if (auto read = ReadHeights(*level.band, rules, static_cast<int>(first), static_cast<int>(top + done),
+                                static_cast<int>(count), static_cast<int>(here), samples.data(), stop);
         !read) {
       return read;
     }
-    for (std::int64_t r = 0; r < rows; ++r) {
+    for (std::int64_t r = 0; r < here; ++r) {
       averages.AddRow(samples.data() + r * count, count);
-      if ((r + 1) % level.block == 0 || r + 1 == rows) averages.Take(out + (done + r / level.block) * stride);
+      const std::int64_t at = done + r;
+      if ((at + 1) % level.block == 0 || at + 1 == rows) averages.Take(out + at / level.block * stride);
     }
   }
   return {};

@@ -7,8 +7,7 @@
 #include <cstddef>
 #include <string>
 #include <string_view>
-
-#include "tl/expected.hpp"
+#include <tl/expected.hpp>
 
 namespace terrace::server {
 
