@@ -74,7 +74,7 @@ struct ConfigError {
   friend bool operator==(const ConfigError&, const ConfigError&) = default;
 };
 
-// Empty if `name` can name a dataset, else what would be right.
+// Empty if `name` can name a dataset, else what is wrong with it, to be read after the name.
 std::string CheckDatasetName(const std::string& name);
 
 // Turns any text, a file's stem for instance, into a valid dataset name: other characters become '-'.

@@ -34,7 +34,7 @@ std::string CheckDatasetName(const std::string& name) {
                        kMaxNameLength);
   }
   if (IsReserved(name)) {
-    return fmt::format("\"{}\" is a URL of the server itself ({}); choose another name", name,
+    return fmt::format("is a URL of the server itself, as are {}; choose another name",
                        fmt::join(kReservedNames, ", "));
   }
   return {};

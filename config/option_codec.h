@@ -118,13 +118,13 @@ Codec<Target> Choice(Member Target::*member, std::vector<std::pair<std::string, 
           TextToJson};
 }
 
-// Text that `check` likes: it returns what would be right, or nothing.
+// Text that `check` likes: it returns "must be ...", or nothing.
 template <typename Target>
 Codec<Target> Text(std::string Target::*member, std::function<std::string(const std::string&)> check) {
   return {[=](const Json& value, const Place& place, Target& target) {
             if (!value.is_string()) return place.Expected("text", value);
-            std::string problem = check(value.get_ref<const std::string&>());
-            if (!problem.empty()) return place.Fail(std::move(problem) + ", not " + Quote(value));
+            const std::string problem = check(value.get_ref<const std::string&>());
+            if (!problem.empty()) return place.Fail(Quote(value) + " " + problem);
             target.*member = value.get<std::string>();
           },
           [=](const Target& target) { return Json(target.*member); }, TextToJson};

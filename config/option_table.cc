@@ -129,7 +129,7 @@ const std::vector<Option<Config>>& ServerOptionTable() {
        Integer(&Config::queue_length, 1, 1'000'000)},
       {"cache_bytes", "BYTES", "Memory for finished tiles, such as 512MB or 1GiB; 0 is no cache",
        Bytes(&Config::cache_bytes, kMaxCacheBytes)},
-      {"max_connections", "N", "Connections at a time; more wait or are turned away",
+      {"max_connections", "N", "Connections at a time; above it idle ones are closed and new ones wait",
        Integer(&Config::max_connections, 1, 1'000'000)},
       {"request_deadline_s", "SECONDS", "A request that takes longer gets 503",
        Seconds(&Config::request_deadline, 0.1, 3600)},

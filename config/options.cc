@@ -18,10 +18,9 @@ template <typename Target>
 std::vector<OptionInfo> Infos(const std::vector<Option<Target>>& table) {
   std::vector<OptionInfo> infos;
   for (const Option<Target>& option : table) {
-    const Json value = option.codec.write(Target{});
-    const bool is_empty = value.is_null() || value == Json("") || value == Json::array();
-    infos.push_back({option.key, option.value, option.help, option.codec.from_text != nullptr,
-                     is_empty ? std::string() : value.dump()});
+    const std::string value = option.codec.write(Target{}).dump();
+    const bool is_empty = value == "null" || value == "\"\"" || value == "[]";
+    infos.push_back({option.key, option.value, option.help, option.codec.from_text != nullptr, is_empty ? "" : value});
   }
   return infos;
 }

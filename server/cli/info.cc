@@ -60,6 +60,7 @@ void PrintText(const dem::DemInfo& info) {
                                   Percent(info.void_samples, info.valid_samples + info.void_samples)));
   line("overviews",
        info.overview_factors.empty() ? "none" : fmt::format("1/{}", fmt::join(info.overview_factors, ", 1/")));
+  line("floor", fmt::format("{:g} m outside the raster and in large voids", info.floor));
   line("levels", fmt::format("0 to {}, default error {:.3g} m at the deepest", info.max_level,
                              geo::DefaultError(info.max_level)));
   if (!info.transform.empty()) line("transform", info.transform);
@@ -116,7 +117,11 @@ void AddInfo(CLI::App& app, int& exit_code) {
   auto json = std::make_shared<bool>(false);
   CLI::App* command =
       app.add_subcommand("info", "Tells what rasters hold, the levels they can serve, and what to mend");
-  command->footer("  terrace info alps.tif");
+  command->footer(
+      "Examples:\n"
+      "  terrace info alps.tif andes.tif\n"
+      "  terrace info alps.tif --json\n\n"
+      "A raster that cannot be served is told on stderr with the reason and the remedy; the others are still shown.");
   command->add_option("DEM", *dems, "Rasters that GDAL can read")->required();
   command->add_flag("--json", *json, "One JSON array instead of text");
   command->callback([dems, json, &exit_code] { exit_code = Info(*dems, *json); });

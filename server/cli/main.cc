@@ -2,21 +2,70 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
+#include <string>
+#include <string_view>
+#include <vector>
 
+#include "config/nearest_name.h"
 #include "server/cli/command.h"
 
 namespace terrace::cli {
 namespace {
 
+std::string DidYouMean(std::string_view word, const std::vector<std::string>& known) {
+  const std::vector<std::string_view> candidates(known.begin(), known.end());
+  const std::string_view nearest = config::NearestName(word, candidates);
+  return nearest.empty() ? std::string() : "; did you mean " + std::string(nearest) + "?";
+}
+
+std::vector<std::string> CommandNames(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::App* command : app.get_subcommands({})) names.push_back(command->get_name());
+  return names;
+}
+
+std::vector<std::string> FlagNames(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : app.get_options()) {
+    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+  }
+  return names;
+}
+
+// What is wrong with the arguments that `error` stands for. `app` is the chosen command, or the program without one.
+std::string Explain(const CLI::App& app, const CLI::ParseError& error, const std::vector<std::string>& arguments) {
+  if (dynamic_cast<const CLI::RequiredError*>(&error) != nullptr && !CommandNames(app).empty()) {
+    const std::string& word = arguments.front();
+    if (word.starts_with('-')) return "unknown option " + word + DidYouMean(word, FlagNames(app));
+    return "unknown command " + word + DidYouMean(word, CommandNames(app));
+  }
+  // A mistyped option often lacks as well: say what was typed, not what is missing.
+  for (const std::string& word : app.remaining(/*recurse=*/true)) {
+    if (!word.starts_with("--")) continue;
+    const std::string flag = word.substr(0, word.find('='));
+    return "unknown option " + flag + DidYouMean(flag, FlagNames(app));
+  }
+  return error.what();
+}
+
+int ReportUsage(const CLI::App& app, const CLI::ParseError& error, const std::vector<std::string>& arguments) {
+  const std::vector<CLI::App*> chosen = app.get_subcommands();
+  const CLI::App& command = chosen.empty() ? app : *chosen.front();
+  const std::string name = chosen.empty() ? "" : command.get_name() + ' ';
+  std::fprintf(stderr, "terrace: %s\nRun 'terrace %s--help' for what is accepted.\n",
+               Explain(command, error, arguments).c_str(), name.c_str());
+  return kExitUsage;
+}
+
 int Run(int argc, char** argv) {
   CLI::App app{"Terrain from elevation models, meshed on demand at the error a client asks for.", "terrace"};
   app.footer(
+      "Examples:\n"
       "  terrace serve alps.tif                               tiles and a viewer at http://127.0.0.1:8080/\n"
       "  terrace mesh alps.tif --out alps.obj --max-error 5   one mesh of the whole raster\n"
       "  terrace info alps.tif                                what a raster holds and how deep it can be served");
   app.set_version_flag("--version", "terrace " TERRACE_VERSION);
   app.require_subcommand(1);
-  app.fallthrough(false);
   int exit_code = kExitOk;
   AddServe(app, exit_code);
   AddMesh(app, exit_code);
@@ -29,10 +78,7 @@ int Run(int argc, char** argv) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
-    const auto chosen = app.get_subcommands();
-    std::fprintf(stderr, "terrace: %s\nRun 'terrace %s%s--help' for what is accepted.\n", error.what(),
-                 chosen.empty() ? "" : chosen.front()->get_name().c_str(), chosen.empty() ? "" : " ");
-    return kExitUsage;
+    return ReportUsage(app, error, {argv + 1, argv + argc});
   }
   return exit_code;
 }

@@ -2,18 +2,18 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 #include <sys/resource.h>
-#include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
 #include <chrono>
-#include <cmath>
+#include <cstdint>
 #include <cstdio>
-#include <filesystem>
-#include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "engine/dem/dem_source.h"
@@ -21,6 +21,7 @@
 #include "engine/tin/mesh_error.h"
 #include "proto/mesh_file.h"
 #include "server/cli/command.h"
+#include "server/cli/output_file.h"
 #include "server/cli/progress.h"
 
 namespace terrace::cli {
@@ -47,7 +48,6 @@ int Fail(const std::string& message, int code) {
 std::string Complain(const MeshArguments& arguments) {
   const int goals = (arguments.max_error >= 0) + (arguments.points > 0) + (arguments.rms >= 0);
   if (goals != 1) return "mesh needs exactly one goal: --max-error METRES, --points N or --rms METRES";
-  if (arguments.points > 0 && arguments.points < 4) return "--points must be at least 4, the corners of the raster";
   if (arguments.criterion != "delaunay")
     return "--criterion " + arguments.criterion + " is not available yet; use delaunay";
   if (arguments.compact) return "--compact is not available yet";
@@ -100,23 +100,6 @@ std::vector<std::array<std::uint32_t, 3>> TrianglesOf(const tin::TinMesh& mesh,
   return triangles;
 }
 
-// A file that a failure leaves as it was.
-Result<void> WriteFile(const std::string& path, proto::MeshFileFormat format,
-                       const std::vector<proto::MeshVertex>& vertices,
-                       const std::vector<std::array<std::uint32_t, 3>>& triangles) {
-  const std::string unfinished = fmt::format("{}.{}.part", path, getpid());
-  std::ofstream stream(unfinished, std::ios::binary);
-  if (!stream) return MakeError(ErrorCode::kUnavailable, "cannot write {}; is the folder there and writable?", path);
-  Result<void> written = proto::WriteMesh(stream, format, vertices, triangles);
-  stream.close();
-  if (written && !stream) written = MakeError(ErrorCode::kUnavailable, "writing {} failed; is the disk full?", path);
-  std::error_code error;
-  if (written) std::filesystem::rename(unfinished, path, error);
-  if (written && error) written = MakeError(ErrorCode::kUnavailable, "cannot replace {}: {}", path, error.message());
-  if (!written) std::filesystem::remove(unfinished, error);
-  return written;
-}
-
 struct Seconds {
   double read = 0, triangulate = 0, write = 0;
 };
@@ -145,11 +128,33 @@ void Print(const MeshArguments& arguments, const tin::HeightField& field, const 
       seconds.triangulate, seconds.write);
 }
 
+// Checks of arguments; what they say is read after the name of the option. Their own descriptions stay out of the help.
+CLI::Validator NumberFrom(double min, double max, const std::string& what) {
+  const auto check = [=](const std::string& text) {
+    double number = 0;
+    const bool valid = CLI::detail::lexical_cast(text, number) && number >= min && number <= max;
+    return valid ? std::string() : fmt::format("must be {}, not \"{}\"", what, text);
+  };
+  return CLI::Validator(check, "");
+}
+
+CLI::Validator Metres() { return NumberFrom(0, 1e6, "a number of metres from 0 to 1000000"); }
+
+CLI::Validator OneOf(const std::vector<std::string>& words) {
+  const auto check = [=](const std::string& text) {
+    const bool valid = std::find(words.begin(), words.end(), text) != words.end();
+    return valid ? std::string() : fmt::format("must be {}, not \"{}\"", fmt::join(words, " or "), text);
+  };
+  return CLI::Validator(check, "");
+}
+
 int Mesh(const MeshArguments& arguments) {
   spdlog::set_level(spdlog::level::err);
   if (const std::string complaint = Complain(arguments); !complaint.empty()) return Fail(complaint, kExitUsage);
   const auto format = proto::MeshFileFormatOf(arguments.out);
   if (!format) return Fail(format.error().message, kExitUsage);
+  Result<OutputFile> file = OutputFile::Open(arguments.out);  // before the work: a folder that is missing costs no time
+  if (!file) return Fail(file.error().message, kExitFailure);
 
   Seconds seconds;
   Clock::time_point start = Clock::now();
@@ -178,8 +183,9 @@ int Mesh(const MeshArguments& arguments) {
   seconds.triangulate = Since(start);
 
   start = Clock::now();
-  const Result<void> written =
-      WriteFile(arguments.out, *format, VerticesOf(mesh, *field, transform), TrianglesOf(mesh, transform));
+  Result<void> written =
+      proto::WriteMesh(file->stream(), *format, VerticesOf(mesh, *field, transform), TrianglesOf(mesh, transform));
+  if (written) written = file->Commit();
   if (!written) return Fail(written.error().message, kExitFailure);
   seconds.write = Since(start);
   Print(arguments, *field, mesh, tin::MeasureError(*field, mesh), seconds);
@@ -193,6 +199,7 @@ void AddMesh(CLI::App& app, int& exit_code) {
   CLI::App* command =
       app.add_subcommand("mesh", "Meshes a whole raster with greedy insertion into one .obj, .ply or .glb file");
   command->footer(
+      "Examples:\n"
       "  terrace mesh alps.tif --out alps.obj --max-error 5\n"
       "  terrace mesh alps.tif --out alps.glb --points 50000 --json\n\n"
       "Errors are measured over every valid sample by a separate pass. Triangles are counter-clockwise in the\n"
@@ -203,28 +210,33 @@ void AddMesh(CLI::App& app, int& exit_code) {
       ->required();
   command->add_option("--max-error", arguments->max_error, "No sample is further off than this")
       ->type_name("METRES")
-      ->check(CLI::NonNegativeNumber)
+      ->check(Metres())
       ->group("Goal, exactly one of");
   command->add_option("--points", arguments->points, "Vertices, corners included")
       ->type_name("N")
-      ->check(CLI::PositiveNumber)
+      ->check(NumberFrom(4, 1e9, "a number from 4, the corners of the raster, on"))
       ->group("Goal, exactly one of");
   command->add_option("--rms", arguments->rms, "Root mean square error over all samples")
       ->type_name("METRES")
-      ->check(CLI::NonNegativeNumber)
+      ->check(Metres())
       ->group("Goal, exactly one of");
   command
       ->add_option("--coordinates", arguments->coordinates,
                    "pixel: x = column, y = row (from the top), z = height; crs: pixel centres in the raster's CRS "
                    "(default where it has one)")
-      ->check(CLI::IsMember({"pixel", "crs"}));
-  command->add_option("--criterion", arguments->criterion, "How triangles are joined")
-      ->check(CLI::IsMember({"delaunay", "data-dependent"}))
+      ->check(OneOf({"pixel", "crs"}))
+      ->type_name("pixel|crs");
+  command
+      ->add_option("--criterion", arguments->criterion,
+                   "How triangles are joined: delaunay; data-dependent is not available yet")
+      ->check(OneOf({"delaunay", "data-dependent"}))
+      ->type_name("NAME")
       ->capture_default_str();
-  command->add_option("--threads", arguments->threads, "Threads to use at most")
-      ->check(CLI::Range(1, 256))
+  command->add_option("--threads", arguments->threads, "Threads to use at most; the mesh does not depend on it")
+      ->check(NumberFrom(1, 256, "a number from 1 to 256"))
+      ->type_name("N")
       ->capture_default_str();
-  command->add_flag("--compact", arguments->compact, "Drops vertices that the bound does not need");
+  command->add_flag("--compact", arguments->compact, "Drops vertices that the bound does not need; not available yet");
   command->add_flag("--json", arguments->json, "Statistics as JSON on stdout");
   command->callback([arguments, &exit_code] { exit_code = Mesh(*arguments); });
 }

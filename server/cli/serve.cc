@@ -55,16 +55,19 @@ config::Config MakeConfig(const ServeArguments& arguments, std::vector<config::C
     errors.push_back(
         {"", "options of a dataset need a DEM on the command line; in a config file they stand in its dataset"});
   }
+  if (arguments.dems.size() > 1 && arguments.dataset_flags.contains("name")) {
+    errors.push_back({"--name", "names one dataset; give one DEM, or a config file with a name for each"});
+  }
+  config::DatasetConfig flags;  // checked once, however many DEMs they apply to
+  for (const auto& [key, text] : arguments.dataset_flags) config::SetDatasetOption(key, text, flags, errors);
   for (const std::string& dem : arguments.dems) {
-    config::DatasetConfig dataset;
-    dataset.name = config::SanitizeDatasetName(std::filesystem::path(dem).stem().string());
+    config::DatasetConfig& dataset = config.datasets.emplace_back(flags);
+    if (dataset.name.empty()) dataset.name = config::SanitizeDatasetName(std::filesystem::path(dem).stem().string());
     dataset.sources = {std::filesystem::absolute(dem).string()};  // so that --print-config holds in any folder
-    for (const auto& [key, text] : arguments.dataset_flags) config::SetDatasetOption(key, text, dataset, errors);
-    config.datasets.push_back(std::move(dataset));
   }
   const std::vector<config::ConfigError> duplicates = config::FindDuplicateNames(config.datasets);
   if (errors.empty()) errors = duplicates;
-  if (errors.empty() && config.datasets.empty()) {
+  if (errors.empty() && config.datasets.empty() && !arguments.print_config) {
     errors.push_back(
         {"", "there is nothing to serve; name a DEM ('terrace serve dem.tif') or a config file (--config)"});
   }
@@ -180,6 +183,7 @@ void AddServe(CLI::App& app, int& exit_code) {
   auto arguments = std::make_shared<ServeArguments>();
   CLI::App* command = app.add_subcommand("serve", "Serves DEMs as terrain tiles over HTTP, with a viewer at /");
   command->footer(
+      "Examples:\n"
       "  terrace serve alps.tif andes.tif\n"
       "  terrace serve --config terrace.json --listen 0.0.0.0:8080\n\n"
       "Each DEM becomes a dataset named after its file. Flags override the config file. Prints one line with\n"

@@ -42,7 +42,7 @@ TEST(SanitizeDatasetName, MakesAValidNameOfAnything) {
 
 TEST(FindDuplicateNames, ReportsEveryLaterDataset) {
   std::vector<DatasetConfig> datasets(5);
-  datasets[0].name = datasets[2].name = datasets[4].name = "a";
+  for (const std::size_t i : {0, 2, 4}) datasets[i].name = std::string(1, 'a');
   const std::vector<ConfigError> errors = FindDuplicateNames(datasets);
   ASSERT_EQ(errors.size(), 2u);  // names that are missing are reported elsewhere
   EXPECT_EQ(errors[0].path, "/datasets/2/name");

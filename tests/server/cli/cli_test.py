@@ -44,6 +44,12 @@ class Usage(unittest.TestCase):
             self.assertEqual((result.returncode, result.stdout), (2, ""), arguments)
             self.assertRegex(result.stderr, r"^terrace: .+\nRun 'terrace .*--help' for what is accepted\.\n$")
 
+    def test_typos_are_told_with_the_nearest_name(self):
+        for arguments, word, nearest in ((["serv"], "command serv", "serve"), (["--versoin"], "option --versoin", "--version"),
+                                         (["serve", "--cach-bytes=5"], "option --cach-bytes", "--cache-bytes"),
+                                         (["mesh", "--max-eror", "5"], "option --max-eror", "--max-error")):
+            self.assertIn(f"terrace: unknown {word}; did you mean {nearest}?\n", run(*arguments).stderr, arguments)
+
     def test_no_arguments_give_code_2_and_the_help(self):
         result = run()
         self.assertEqual(result.returncode, 2)
@@ -82,6 +88,15 @@ class Config(unittest.TestCase):
         config = json.loads(run("serve", "b.tif", "--config", file, "--listen", "127.0.0.1:2", "--print-config").stdout)
         self.assertEqual((config["listen"], config["io_threads"]), ("127.0.0.1:2", 3))
         self.assertEqual([dataset["name"] for dataset in config["datasets"]], ["a", "b"])
+
+    def test_defaults_are_printed_without_anything_to_serve(self):
+        printed = run("serve", "--print-config")
+        self.assertEqual((printed.returncode, json.loads(printed.stdout)["datasets"]), (0, []), printed.stderr)
+
+    def test_a_wrong_flag_is_told_once_for_all_rasters(self):
+        result = run("serve", "a.tif", "b.tif", "--floor", "low", "--name", "c")
+        self.assertEqual(result.returncode, 2)
+        self.assertEqual((result.stderr.count("--floor: "), result.stderr.count("--name: names one dataset")), (1, 1))
 
     def test_the_manuals_error_example_is_what_is_printed(self):
         manual = (SOURCE_DIR / "docs/configuration.md").read_text(encoding="utf-8").split("## Errors")[1]

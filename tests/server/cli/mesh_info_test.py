@@ -1,0 +1,205 @@
+"""terrace mesh and terrace info, and what all commands say about bad rasters: mesh_info_test.py BINARY SOURCE_DIR."""
+import json
+import math
+import pathlib
+import struct
+import subprocess
+import sys
+import tempfile
+import unittest
+
+BINARY = pathlib.Path(sys.argv.pop(1)).resolve()
+SAMPLE = pathlib.Path(sys.argv.pop(1)).resolve() / "config/samples/jacksboro.tif"
+
+
+def run(*arguments, cwd=None):
+    return subprocess.run([str(BINARY), *map(str, arguments)], cwd=cwd, capture_output=True, text=True, timeout=120)
+
+
+def read_obj(path):
+    vertices, triangles = [], []
+    for line in path.read_text().splitlines():
+        kind, *rest = line.split() or [""]
+        if kind == "v":
+            vertices.append(tuple(map(float, rest[:3])))
+        elif kind == "f":
+            triangles.append(tuple(int(part.split("/")[0]) - 1 for part in rest))
+    return vertices, triangles
+
+
+def area(a, b, c):
+    """Twice the signed area in x and y: positive counter-clockwise."""
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+
+
+def grid(heights, header):
+    """An ESRI ASCII grid."""
+    rows = "\n".join(" ".join(map(str, row)) for row in heights)
+    return f"ncols {len(heights[0])}\nnrows {len(heights)}\n{header}\n{rows}\n"
+
+
+BUMPS = [[round(20 * math.sin(x / 3) + 15 * math.cos(y / 4), 2) for x in range(40)] for y in range(30)]
+PLACE = "xllcorner 100\nyllcorner 200\ncellsize 2\nNODATA_value -9999"
+
+
+class InFolder(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+
+    def write(self, name, data):
+        path = self.folder / name
+        path.write_bytes(data if isinstance(data, bytes) else data.encode())
+        return path
+
+    def files(self):
+        return sorted(path.name for path in self.folder.iterdir())
+
+    def assert_refused(self, code, words, *arguments):
+        result = run(*arguments)
+        self.assertEqual((result.returncode, result.stdout), (code, ""), result.stderr)
+        for word in words:
+            self.assertIn(word, result.stderr)
+        self.assertTrue(result.stderr.startswith("terrace: "), result.stderr)
+
+
+class Mesh(InFolder):
+    def mesh(self, dem, name, *arguments):
+        out = self.folder / name
+        result = run("mesh", dem, "--out", out, "--json", *arguments)
+        self.assertEqual((result.returncode, result.stderr), (0, ""))
+        return json.loads(result.stdout), out
+
+    def test_keeps_the_error_it_promises(self):
+        dem = self.write("bumps.asc", grid(BUMPS, PLACE))
+        for bound in (20, 5, 1, 0):
+            statistics, out = self.mesh(dem, "bumps.obj", "--max-error", bound, "--coordinates", "pixel")
+            vertices, triangles = read_obj(out)
+            self.assertEqual((statistics["points"], statistics["triangles"]), (len(vertices), len(triangles)))
+            self.assertLessEqual(statistics["max_error"], bound)
+            worst, squares = self.measure(vertices, triangles)
+            self.assertAlmostEqual(worst, statistics["max_error"], delta=1e-3)
+            self.assertAlmostEqual(math.sqrt(squares / 1200), statistics["rms_error"], delta=1e-3)
+
+    def measure(self, vertices, triangles):
+        """Every sample under the first triangle that holds it; pixel coordinates make this possible."""
+        self.assertAlmostEqual(sum(area(*(vertices[i] for i in t)) for t in triangles), 2 * 39 * 29, places=6)
+        worst = squares = 0
+        for y, row in enumerate(BUMPS):
+            for x, height in enumerate(row):
+                for corners in ([vertices[i] for i in t] for t in triangles):
+                    weights = [area((x, y), corners[i - 2], corners[i - 1]) / area(*corners) for i in range(3)]
+                    if min(weights) > -1e-9:
+                        error = abs(sum(w * c[2] for w, c in zip(weights, corners)) - height)
+                        worst, squares = max(worst, error), squares + error * error
+                        break
+                else:
+                    self.fail(f"no triangle over {x}, {y}")
+        return worst, squares
+
+    def test_turns_triangles_counter_clockwise_in_the_files_axes(self):
+        dem = self.write("bumps.asc", grid(BUMPS, PLACE))
+        for coordinates in ("pixel", "crs"):
+            vertices, triangles = read_obj(self.mesh(dem, "a.obj", "--points", 60, "--coordinates", coordinates)[1])
+            self.assertGreater(min(area(*(vertices[i] for i in t)) for t in triangles), 0, coordinates)
+
+    def test_puts_vertices_on_pixel_centres_of_the_reference_system(self):
+        dem = self.write("bumps.asc", grid(BUMPS, PLACE))
+        vertices, _ = read_obj(self.mesh(dem, "a.obj", "--points", 4)[1])
+        self.assertEqual({v[:2] for v in vertices}, {(101, 201), (179, 201), (101, 259), (179, 259)})
+        top_left = next(v for v in vertices if v[:2] == (101, 259))
+        self.assertAlmostEqual(top_left[2], BUMPS[0][0], places=3)
+
+    def test_reaches_each_kind_of_goal(self):
+        self.assertEqual(self.mesh(SAMPLE, "a.ply", "--points", 1000)[0]["points"], 1000)
+        self.assertLessEqual(self.mesh(SAMPLE, "a.ply", "--rms", 4)[0]["rms_error"], 4)
+        statistics, _ = self.mesh(SAMPLE, "a.ply", "--max-error", 10)
+        self.assertLessEqual(statistics["max_error"], 10)
+        self.assertEqual(statistics["input"], {"path": str(SAMPLE), "width": 403, "height": 344})
+        self.assertEqual(statistics["criterion"], "delaunay")
+        self.assertEqual(set(statistics["seconds"]), {"read", "triangulate", "write"})
+        self.assertGreater(statistics["peak_rss_bytes"], 1 << 20)
+
+    def test_gives_the_same_bytes_whatever_the_threads(self):
+        _, one = self.mesh(SAMPLE, "one.glb", "--max-error", 20)
+        _, eight = self.mesh(SAMPLE, "eight.glb", "--max-error", 20, "--threads", 8)
+        self.assertEqual(one.read_bytes(), eight.read_bytes())
+        self.assertEqual(one.read_bytes()[:4], b"glTF")
+
+    def test_meshes_rasters_without_a_georeference(self):
+        pixels = b"".join(struct.pack("B", (x * y) % 251) for y in range(20) for x in range(30))
+        dem = self.write("plain.pgm", b"P5\n30 20\n255\n" + pixels)
+        vertices, _ = read_obj(self.mesh(dem, "a.obj", "--max-error", 0)[1])
+        self.assertEqual((max(v[0] for v in vertices), max(v[1] for v in vertices)), (29, 19))
+        self.assert_refused(2, ["no georeference", "--coordinates pixel"],
+                            "mesh", dem, "--out", self.folder / "b.obj", "--points", 4, "--coordinates", "crs")
+
+    def test_a_failure_leaves_no_file_and_keeps_the_old_one(self):
+        broken = self.write("broken.tif", b"II*\0 this is no raster")
+        out = self.write("a.obj", "kept")
+        self.assert_refused(1, ["broken.tif"], "mesh", broken, "--out", out, "--points", 4)
+        self.assertEqual((out.read_text(), self.files()), ("kept", ["a.obj", "broken.tif"]))
+
+    def test_says_what_is_wrong_with_its_arguments(self):
+        out = self.folder / "a.obj"
+        for words, arguments in ((["exactly one goal"], ["--out", out]),
+                                 (["exactly one goal"], ["--out", out, "--points", 9, "--rms", 1]),
+                                 (["--points", "from 4"], ["--out", out, "--points", 3]),
+                                 (["--max-error", "metres"], ["--out", out, "--max-error", "nan"]),
+                                 (["--max-error", "metres"], ["--out", out, "--max-error", -1]),
+                                 (["--threads", "1 to 256"], ["--out", out, "--points", 9, "--threads", 0]),
+                                 (["pixel or crs"], ["--out", out, "--points", 9, "--coordinates", "polar"]),
+                                 (["not available yet"], ["--out", out, "--points", 9, "--compact"]),
+                                 (["not available yet"], ["--out", out, "--points", 9, "--criterion", "data-dependent"]),
+                                 ([".obj", ".ply", ".glb"], ["--out", "a.txt", "--points", 9])):
+            self.assert_refused(2, words, "mesh", SAMPLE, *arguments)
+        self.assert_refused(1, ["/nowhere/a.obj", "folder"], "mesh", SAMPLE, "--out", "/nowhere/a.obj", "--points", 9)
+        self.assertEqual(self.files(), [])
+
+
+class Info(unittest.TestCase):
+    def test_tells_what_a_raster_holds(self):
+        result = run("info", SAMPLE)
+        self.assertEqual((result.returncode, result.stderr), (0, ""))
+        for part in ("403 x 344", "EPSG:4326", "levels", "floor", "voids", "overviews", "no vertical datum stated"):
+            self.assertIn(part, result.stdout)
+
+    def test_tells_the_same_as_json(self):
+        (info,) = json.loads(run("info", SAMPLE, "--json").stdout)
+        self.assertEqual((info["width"], info["height"], info["levels"][0]), (403, 344, 0))
+        self.assertEqual(info["valid_samples"] + info["void_samples"], 403 * 344)
+        self.assertLess(info["heights"]["min"], info["heights"]["max"])
+        self.assertTrue(info["advice"])
+
+    def test_shows_the_others_when_one_fails(self):
+        result = run("info", "/nowhere.tif", SAMPLE, "--json")
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("/nowhere.tif", result.stderr)
+        self.assertEqual(len(json.loads(result.stdout)), 1)
+
+
+class BadRasters(InFolder):
+    def test_are_refused_with_the_reason(self):
+        empty = self.write("empty.tif", b"")
+        text = self.write("notes.tif", "not a raster")
+        plain = self.write("plain.pgm", b"P5\n4 4\n255\n" + bytes(range(16)))
+        for command in ("serve", "info"):
+            for dem in ("/nowhere.tif", empty, text, self.folder):
+                self.assert_refused(1, [str(dem)], command, dem)
+            self.assert_refused(1, [str(plain), "georeference", "gdal_translate -a_srs", "-a_ullr"], command, plain)
+
+    def test_of_voids_only_are_refused(self):
+        voids = self.write("voids.asc", grid([[-9999] * 5] * 5, PLACE))
+        self.write("voids.prj", 'GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]],'
+                                'PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433]]')
+        for arguments in (["serve"], ["info"], ["mesh", "--points", "4", "--out", str(self.folder / "a.obj")]):
+            self.assert_refused(1, ["voids.asc"], *arguments, voids)
+        self.assertNotIn("a.obj", self.files())
+
+    def test_are_all_told_together(self):
+        self.assert_refused(1, ["/nowhere/a.tif", "/nowhere/b.tif"], "serve", "/nowhere/a.tif", "/nowhere/b.tif")
+
+
+if __name__ == "__main__":
+    unittest.main()
