@@ -1,5 +1,6 @@
 #include "engine/tin/border.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -40,12 +41,17 @@ Side SideOf(const HeightField& field, const Corner& a, const Corner& b) {
   return a.x == field.width() - 1 ? Side::kEast : Side::kWest;
 }
 
+double BorderError(double misfit_m, const BorderOptions& options) {
+  const double padded = misfit_m + options.padding_m;
+  return options.scale * std::min(std::max(padded * options.weight, padded + options.step_m), kMostBorderWeight * misfit_m);
+}
+
 Candidate WorstBorderSample(const HeightField& field, const Corner& a, const Corner& b, const BorderOptions& options) {
   const BorderEdge edge(field, a, b);
   Candidate worst;
   for (int k = edge.a + 1; k < edge.b; ++k) {
     const double sagitta = options.sagitta_m * (k - edge.a) * (edge.b - k);
-    const double error = options.weight * (std::abs(edge.ChordAt(k) - edge.HeightAt(k)) + sagitta);
+    const double error = BorderError(std::abs(edge.ChordAt(k) - edge.HeightAt(k)) + sagitta, options);
     if (error > worst.error) worst = {error, edge.SampleAt(k)};  // false for voids; the index grows with k
   }
   return worst;

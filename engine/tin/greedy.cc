@@ -7,9 +7,12 @@
 
 #include "engine/core/check.h"
 #include "engine/tin/border.h"
-#include "engine/tin/candidate_tournament.h"
+#include "engine/tin/candidate_queue.h"
+#include "engine/tin/insertion_recorder.h"
+#include "engine/tin/open_samples.h"
 #include "engine/tin/sagitta.h"
 #include "engine/tin/seed_cursor.h"
+#include "engine/tin/squared_distances.h"
 #include "engine/tin/squared_errors.h"
 #include "engine/tin/triangle_scan.h"
 #include "engine/tin/triangulation.h"
@@ -17,18 +20,23 @@
 namespace terrace::tin {
 namespace {
 
-// Insertions between two looks at the stop token: about a tenth of a millisecond.
+// Insertions between two looks at the stop token: about a twentieth of a millisecond.
 constexpr std::size_t kStopPeriod = 256;
 
-void CheckOptions(const HeightField& field, const GreedyOptions& options) {
+void CheckOptions(const GreedyOptions& options) {
   for (const BorderOptions& border : options.borders) {
-    TERRACE_CHECK(std::isfinite(border.weight) && border.weight >= 0);
-    TERRACE_CHECK(std::isfinite(border.sagitta_m) && border.sagitta_m >= 0);
+    for (const double value : {border.weight, border.padding_m, border.step_m, border.sagitta_m, border.scale}) {
+      TERRACE_CHECK(std::isfinite(value) && value >= 0);
+    }
   }
-  const Curvature& curvature = options.curvature;
-  if (curvature.east_m2.empty()) return;
-  TERRACE_CHECK(curvature.east_m2.size() == static_cast<std::size_t>(field.height()));
-  TERRACE_CHECK(curvature.north_m2 > 0 && curvature.radius_m > 0);
+}
+
+std::array<Triangulation::Vertex, 4> CornersOf(const HeightField& field) {
+  const int east = field.width() - 1, north = field.height() - 1;
+  const auto corner = [&](int x, int y) -> Triangulation::Vertex {
+    return {{static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)}, field.VertexHeight(x, y)};
+  };
+  return {corner(0, 0), corner(east, 0), corner(east, north), corner(0, north)};
 }
 
 std::size_t CountValid(const HeightField& field) {
@@ -45,56 +53,99 @@ std::size_t CountValid(const HeightField& field) {
 class GreedyTriangulation::Impl {
  public:
   Impl(const HeightField& field, GreedyOptions options);
+  Impl(const HeightField& field, GreedyOptions options, const Refinement& refinement);
 
   bool Run(const GreedyGoal& goal, const std::stop_token& stop);
-  void InsertInterior(std::span<const SamplePosition> samples);
   double CurrentError();
   std::size_t vertex_count() const { return triangulation_.vertex_count(); }
-  TinMesh Mesh() const;
+  TinMesh Mesh() const { return triangulation_.Mesh(); }
+  Refinement MakeRefinement() const;
 
  private:
   struct Insertion {
     SamplePosition sample;
     TriangleId triangle;  // contains the sample
+    float error_before;   // a run to this error ends before this insertion
+    bool is_seed;
   };
   std::optional<Insertion> NextInsertion(const GreedyGoal& goal);
   std::optional<Insertion> NextSeed(const GreedyGoal& goal);
   bool IsMet(const GreedyGoal& goal);
   void Insert(const Insertion& insertion);
 
-  void AddVertexHeight(SamplePosition sample) { vertex_heights_.push_back(field_->VertexHeight(sample.x, sample.y)); }
+  Triangulation::Vertex VertexOf(SamplePosition sample) const;
+  void ScanStarOf(const Star& star);
   void AwaitScan(TriangleId t);
   void ScanAwaiting();
-  Candidate WorstOf(TriangleId t) const;
+  void SetCandidate(const Star& star, std::size_t i);
+  Candidate WorstOnBorderOf(TriangleId t);
+  Candidate WorstOnBorder(VertexId from, VertexId to);
   double SquaresOf(TriangleId t) const;
-  std::array<Corner, 3> CornersOf(TriangleId t) const;
+  Corner CornerAt(VertexId vertex) const;
+  void MakeStar(TriangleId t, Star& star) const;
   SamplePosition PositionOf(std::uint32_t sample) const;
 
   const HeightField* field_;
   GreedyOptions options_;
+  Sagitta sagitta_;
   SeedCursor seeds_;
+  OpenSamples open_;
   Triangulation triangulation_;
-  std::vector<float> vertex_heights_;
   TriangleId last_changed_ = 0;  // where walks start
+  CandidateQueue candidates_;    // by triangle
+  std::optional<InsertionRecorder> recorder_;
 
-  // Triangles whose candidates and squares are out of date. Seeds pile them up: a triangle is scanned once it stays.
+  // Triangles whose candidates are out of date. Seeds pile them up: a triangle is scanned once it stays.
   std::vector<TriangleId> awaiting_scan_;
   std::vector<std::uint8_t> awaits_scan_;  // by triangle
-  CandidateTournament candidates_;         // by triangle
+
+  // The worst sample of each border edge, by side and the position where the edge begins.
+  struct BorderWorst {
+    std::uint16_t end = 0;  // of the edge that this is about; 0: of none
+    Candidate worst;
+  };
+  std::array<std::vector<BorderWorst>, 4> border_worst_;
 
   std::optional<SquaredErrors> squares_;  // by triangle; from the first root-mean-square goal on
   std::size_t valid_samples_ = 0;         // counted with it
+
+  // Of the star that is being scanned.
+  StarScan scan_star_ = BestStarScan();
+  std::vector<PlaneMisfit> misfits_;
+  Star lone_star_;  // of a triangle that awaited its scan
 };
 
 GreedyTriangulation::Impl::Impl(const HeightField& field, GreedyOptions options)
     : field_(&field),
       options_(std::move(options)),
+      sagitta_(options_.curvature, field.height()),
       seeds_(field, options_.seeds),
-      triangulation_(field.width(), field.height()) {
-  CheckOptions(field, options_);
-  for (const SamplePosition corner : triangulation_.positions()) AddVertexHeight(corner);
+      open_(field),
+      triangulation_(CornersOf(field)) {
+  CheckOptions(options_);
+  for (const Side side : {Side::kSouth, Side::kEast, Side::kNorth, Side::kWest}) {
+    const bool along_x = side == Side::kSouth || side == Side::kNorth;
+    border_worst_[static_cast<std::size_t>(side)].resize(
+        static_cast<std::size_t>(along_x ? field.width() : field.height()));
+  }
+  if (options_.record) recorder_.emplace();
   AwaitScan(0);
   AwaitScan(1);
+}
+
+GreedyTriangulation::Impl::Impl(const HeightField& field, GreedyOptions options, const Refinement& refinement)
+    : Impl(field, std::move(options)) {
+  TERRACE_CHECK(refinement.width() == field.width() && refinement.height() == field.height());
+  const TinMesh mesh = refinement.MeshOf(refinement.vertex_count());
+  std::vector<Triangulation::Vertex> vertices;
+  vertices.reserve(mesh.vertices.size());
+  for (const SamplePosition sample : mesh.vertices) {
+    vertices.push_back(VertexOf(sample));
+    open_.Close(sample);
+  }
+  triangulation_ = Triangulation(std::move(vertices), mesh.triangles);
+  if (recorder_) recorder_.emplace(refinement);
+  for (TriangleId t = 0; t < triangulation_.triangle_count(); ++t) AwaitScan(t);
 }
 
 bool GreedyTriangulation::Impl::Run(const GreedyGoal& goal, const std::stop_token& stop) {
@@ -113,16 +164,21 @@ std::optional<GreedyTriangulation::Impl::Insertion> GreedyTriangulation::Impl::N
   if (const auto seed = NextSeed(goal)) return seed;
   ScanAwaiting();
   const TriangleId worst = candidates_.Winner();
-  const Candidate& candidate = candidates_.At(worst);
-  if (candidate.error <= goal.max_error) return std::nullopt;
-  return Insertion{PositionOf(candidate.sample), worst};
+  if (worst == CandidateQueue::kNoSlot) return std::nullopt;
+  // What is inserted next lies anywhere: fetched while this one is at work.
+  if (const TriangleId t = candidates_.Upcoming(3); t != CandidateQueue::kNoSlot) triangulation_.Prefetch(t);
+  if (const TriangleId t = candidates_.Upcoming(1); t != CandidateQueue::kNoSlot) triangulation_.PrefetchAround(t);
+  const float error = candidates_.error(worst);
+  if (static_cast<double>(error) <= goal.max_error) return std::nullopt;
+  return Insertion{PositionOf(candidates_.sample(worst)), worst, error, false};
 }
 
 std::optional<GreedyTriangulation::Impl::Insertion> GreedyTriangulation::Impl::NextSeed(const GreedyGoal& goal) {
   while (seeds_.InGrid() || (seeds_.HasGrid() && seeds_.IsDue(std::max(CurrentError(), goal.max_error)))) {
+    const float below_error = seeds_.below_error();
     const SamplePosition seed = seeds_.Take();
     const TriangleId triangle = triangulation_.Locate(seed, last_changed_);
-    if (!triangulation_.IsCorner(seed, triangle)) return Insertion{seed, triangle};
+    if (!triangulation_.IsCorner(seed, triangle)) return Insertion{seed, triangle, below_error, true};
   }
   return std::nullopt;
 }
@@ -140,32 +196,44 @@ bool GreedyTriangulation::Impl::IsMet(const GreedyGoal& goal) {
 }
 
 void GreedyTriangulation::Impl::Insert(const Insertion& insertion) {
-  for (const TriangleId t : triangulation_.Insert(insertion.sample, insertion.triangle)) {
-    AwaitScan(t);
-    last_changed_ = t;
-  }
-  AddVertexHeight(insertion.sample);
-}
-
-void GreedyTriangulation::Impl::InsertInterior(std::span<const SamplePosition> samples) {
-  for (const SamplePosition sample : samples) {
-    TERRACE_CHECK(sample.x > 0 && sample.x < field_->width() - 1 && sample.y > 0 && sample.y < field_->height() - 1);
-    const TriangleId triangle = triangulation_.Locate(sample, last_changed_);
-    if (!triangulation_.IsCorner(sample, triangle)) Insert({sample, triangle});
+  const Star& star = triangulation_.InsertDelaunay(VertexOf(insertion.sample), insertion.triangle);
+  open_.Close(insertion.sample);
+  if (recorder_) recorder_->Append(insertion.sample, insertion.error_before, star);
+  last_changed_ = star.triangles[0];
+  if (insertion.is_seed || squares_) {
+    for (std::size_t i = 0; i < star.count; ++i) AwaitScan(star.triangles[i]);
+  } else {
+    ScanStarOf(star);
   }
 }
 
 double GreedyTriangulation::Impl::CurrentError() {
   ScanAwaiting();
-  return candidates_.At(candidates_.Winner()).error;
+  const TriangleId worst = candidates_.Winner();
+  return worst == CandidateQueue::kNoSlot ? 0 : static_cast<double>(candidates_.error(worst));
 }
 
-TinMesh GreedyTriangulation::Impl::Mesh() const {
-  TinMesh mesh;
-  mesh.vertices = triangulation_.positions();
-  mesh.triangles.reserve(triangulation_.triangle_count());
-  for (TriangleId t = 0; t < triangulation_.triangle_count(); ++t) mesh.triangles.push_back(triangulation_.triangle(t));
-  return mesh;
+Refinement GreedyTriangulation::Impl::MakeRefinement() const {
+  TERRACE_CHECK(recorder_.has_value());
+  return recorder_->Make(field_->width(), field_->height());
+}
+
+Triangulation::Vertex GreedyTriangulation::Impl::VertexOf(SamplePosition sample) const {
+  const float open = open_.At(sample);
+  return {sample, std::isnan(open) ? field_->VertexHeight(sample.x, sample.y) : open};
+}
+
+void GreedyTriangulation::Impl::ScanStarOf(const Star& star) {
+  if (misfits_.size() < star.count) misfits_.resize(star.ring.capacity());
+  scan_star_(open_, star, misfits_.data());
+  const bool is_plain = sagitta_.is_flat() && !star.has_border;
+  for (std::size_t i = 0; i < star.count; ++i) {
+    if (!is_plain) {
+      SetCandidate(star, i);
+    } else {
+      candidates_.Set(star.triangles[i], {std::max(misfits_[i].distance, 0.0), misfits_[i].sample});
+    }
+  }
 }
 
 void GreedyTriangulation::Impl::AwaitScan(TriangleId t) {
@@ -175,49 +243,94 @@ void GreedyTriangulation::Impl::AwaitScan(TriangleId t) {
   awaiting_scan_.push_back(t);
 }
 
+// Each triangle as a star of its own around its last corner: the centre of the star that made it.
 void GreedyTriangulation::Impl::ScanAwaiting() {
   for (const TriangleId t : awaiting_scan_) {
-    candidates_.Set(t, WorstOf(t));
+    MakeStar(t, lone_star_);
+    ScanStarOf(lone_star_);
     if (squares_) squares_->Set(t, SquaresOf(t));
     awaits_scan_[t] = 0;
   }
   awaiting_scan_.clear();
 }
 
-Candidate GreedyTriangulation::Impl::WorstOf(TriangleId t) const {
-  const std::array<Corner, 3> corners = CornersOf(t);
-  Candidate worst;
-  if (const PlaneMisfit misfit = WorstSample(*field_, corners); misfit.sample != kNoSample) {
-    const double error = misfit.distance + SagittaBound(options_.curvature, corners);
-    if (error > 0) worst = {error, misfit.sample};
+void GreedyTriangulation::Impl::MakeStar(TriangleId t, Star& star) const {
+  const auto [u, v, p] = triangulation_.triangle(t);
+  const SamplePosition centre = triangulation_.position(p);
+  star.centre = p;
+  star.x = centre.x;
+  star.y = centre.y;
+  star.height = triangulation_.height(p);
+  star.is_closed = false;
+  star.has_border = true;  // or not: it is looked for
+  star.count = 1;
+  if (star.triangles.empty()) {
+    star.ring.Grow(2);
+    star.triangles.resize(1);
+    star.outside.resize(1);
   }
-  for (unsigned i = 0; i < 3; ++i) {
-    if (triangulation_.twin(3 * t + i) != Triangulation::kNone) continue;
-    const Corner &a = corners[i], &b = corners[(i + 1) % 3];
-    const auto side = static_cast<std::size_t>(SideOf(*field_, a, b));
-    const Candidate on_border = WorstBorderSample(*field_, a, b, options_.borders[side]);
+  star.triangles[0] = t;
+  star.outside[0] = triangulation_.twin(4 * t);
+  for (const VertexId vertex : {u, v}) {
+    const SamplePosition position = triangulation_.position(vertex);
+    star.ring.Put(vertex == u ? 0 : 1,
+                  {vertex, position.x - centre.x, position.y - centre.y, triangulation_.height(vertex)});
+  }
+}
+
+void GreedyTriangulation::Impl::SetCandidate(const Star& star, std::size_t i) {
+  const TriangleId t = star.triangles[i];
+  Candidate worst;
+  if (misfits_[i].sample != kNoSample) {
+    const double sagitta = sagitta_.Bound(triangulation_.position(star.ring.ids[i]),
+                                          triangulation_.position(star.ring.ids[i + 1]),
+                                          {static_cast<std::uint16_t>(star.x), static_cast<std::uint16_t>(star.y)});
+    worst = {misfits_[i].distance + sagitta, misfits_[i].sample};
+  }
+  if (star.has_border) {
+    const Candidate on_border = WorstOnBorderOf(t);
     if (Precedes(on_border, worst)) worst = on_border;
+  }
+  candidates_.Set(t, worst);
+}
+
+Candidate GreedyTriangulation::Impl::WorstOnBorderOf(TriangleId t) {
+  Candidate worst;
+  for (HalfEdgeId edge = 4 * t; edge < 4 * t + 3; ++edge) {
+    if (triangulation_.twin(edge) != Triangulation::kNone) continue;
+    const Candidate candidate =
+        WorstOnBorder(triangulation_.corner(edge), triangulation_.corner(Triangulation::Next(edge)));
+    if (Precedes(candidate, worst)) worst = candidate;
   }
   return worst;
 }
 
+Candidate GreedyTriangulation::Impl::WorstOnBorder(VertexId from, VertexId to) {
+  const Corner a = CornerAt(from), b = CornerAt(to);
+  const auto side = static_cast<std::size_t>(SideOf(*field_, a, b));
+  const bool along_x = a.y == b.y;
+  const auto [begin, end] = along_x ? std::minmax(a.x, b.x) : std::minmax(a.y, b.y);
+  BorderWorst& known = border_worst_[side][static_cast<std::size_t>(begin)];
+  if (known.end != end) {
+    known = {static_cast<std::uint16_t>(end), WorstBorderSample(*field_, a, b, options_.borders[side])};
+  }
+  return known.worst;
+}
+
 double GreedyTriangulation::Impl::SquaresOf(TriangleId t) const {
-  const std::array<Corner, 3> corners = CornersOf(t);
+  const auto [u, v, p] = triangulation_.triangle(t);
+  const std::array<Corner, 3> corners = {CornerAt(u), CornerAt(v), CornerAt(p)};
   double squares = SquaredDistances(*field_, corners);
   for (unsigned i = 0; i < 3; ++i) {
-    if (triangulation_.twin(3 * t + i) != Triangulation::kNone) continue;
+    if (triangulation_.twin(4 * t + i) != Triangulation::kNone) continue;
     squares += SquaredBorderDistances(*field_, corners[i], corners[(i + 1) % 3]);
   }
   return squares;
 }
 
-std::array<Corner, 3> GreedyTriangulation::Impl::CornersOf(TriangleId t) const {
-  const auto corner = [&](VertexId vertex) {
-    const SamplePosition position = triangulation_.position(vertex);
-    return Corner{position.x, position.y, static_cast<double>(vertex_heights_[vertex])};
-  };
-  const std::array<VertexId, 3> vertices = triangulation_.triangle(t);
-  return {corner(vertices[0]), corner(vertices[1]), corner(vertices[2])};
+Corner GreedyTriangulation::Impl::CornerAt(VertexId vertex) const {
+  const SamplePosition position = triangulation_.position(vertex);
+  return {position.x, position.y, static_cast<double>(triangulation_.height(vertex))};
 }
 
 SamplePosition GreedyTriangulation::Impl::PositionOf(std::uint32_t sample) const {
@@ -227,14 +340,16 @@ SamplePosition GreedyTriangulation::Impl::PositionOf(std::uint32_t sample) const
 
 GreedyTriangulation::GreedyTriangulation(const HeightField& field, GreedyOptions options)
     : impl_(std::make_unique<Impl>(field, std::move(options))) {}
+GreedyTriangulation::GreedyTriangulation(const HeightField& field, GreedyOptions options, const Refinement& refinement)
+    : impl_(std::make_unique<Impl>(field, std::move(options), refinement)) {}
 GreedyTriangulation::~GreedyTriangulation() = default;
 GreedyTriangulation::GreedyTriangulation(GreedyTriangulation&&) noexcept = default;
 GreedyTriangulation& GreedyTriangulation::operator=(GreedyTriangulation&&) noexcept = default;
 
 bool GreedyTriangulation::Run(const GreedyGoal& goal, std::stop_token stop) { return impl_->Run(goal, stop); }
-void GreedyTriangulation::InsertInterior(std::span<const SamplePosition> samples) { impl_->InsertInterior(samples); }
 double GreedyTriangulation::CurrentError() const { return impl_->CurrentError(); }
 std::size_t GreedyTriangulation::vertex_count() const { return impl_->vertex_count(); }
 TinMesh GreedyTriangulation::Mesh() const { return impl_->Mesh(); }
+Refinement GreedyTriangulation::MakeRefinement() const { return impl_->MakeRefinement(); }
 
 }  // namespace terrace::tin

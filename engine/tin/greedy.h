@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "engine/tin/height_field.h"
+#include "engine/tin/refinement.h"
 #include "engine/tin/tin_mesh.h"
 
 namespace terrace::tin {
@@ -30,15 +31,22 @@ enum class Side : std::uint8_t {
   kWest = 3 /* x = 0 */
 };
 
-// How samples on one border are judged. The error of a border sample k between the border's vertices a < b is
-//   |(h_a (b - k) + h_b (k - a)) / (b - a) - h_k| + sagitta_m (k - a) (b - k)
-// evaluated in double in exactly this form, a < b counted along increasing x or y: a function of that border's own
-// samples. Two fields that share a border with equal heights, weights and sagittas therefore insert the same border
-// vertices, whatever their insides look like.
+// How samples on one border are judged. A border sample k between the border's vertices a < b misses by
+//   m = |(h_a (b - k) + h_b (k - a)) / (b - a) - h_k| + sagitta_m (k - a) (b - k)
+// evaluated in double in exactly this form, a < b counted along increasing x or y, and its error is
+//   scale min(max((m + padding_m) weight, m + padding_m + step_m), kMostBorderWeight m):
+// what a vertex on the border loses to a rounding that grows with the error (weight), to rounding by fixed amounts
+// (padding_m, step_m), with a limit so that a border full of cliffs does not take every sample for nothing. This is a
+// function of that border's own samples. Two fields that share a border with equal heights and options therefore insert
+// the same border vertices, whatever their insides look like.
 struct BorderOptions {
-  double weight = 1;     // border errors count `weight` times: a border threshold of E / weight in a run to the error E
-  double sagitta_m = 0;  // metres: half the second difference of the ground that the border's chord cuts off
+  double weight = 1;
+  double padding_m = 0;
+  double step_m = 0;
+  double sagitta_m = 0;  // half the second difference of the ground that the border's chord cuts off
+  double scale = 1;      // the error counts so many times: a border threshold of E / scale in a run to the error E
 };
+inline constexpr double kMostBorderWeight = 4;
 
 // The ground under the field is curved: a flat triangle with corners (dx, dy) samples apart cuts below it by up to its
 // sagitta. Squared lengths are q = dx^2 east_m2[row] + dy^2 north_m2, with the largest east_m2 of the triangle's rows;
@@ -46,7 +54,8 @@ struct BorderOptions {
 // for acute triangles, else a quarter of the longest side squared. It is added to the error of every sample of the
 // triangle.
 struct Curvature {
-  std::vector<double> east_m2;  // per row: squared metres per column step; empty: flat ground
+  // Per row: squared metres per column step; empty: flat ground. Rising up to some row, falling after it.
+  std::vector<double> east_m2;
   double north_m2 = 0;          // squared metres per row step
   double radius_m = 0;
 };
@@ -62,6 +71,7 @@ struct GreedyOptions {
   std::array<BorderOptions, 4> borders;  // by Side
   Curvature curvature;
   std::vector<SeedGrid> seeds;  // in order of decreasing below_error
+  bool record = false;          // keep the order of insertions for TakeRefinement
 };
 
 // A run stops as soon as one of these holds.
@@ -75,6 +85,9 @@ class GreedyTriangulation {
  public:
   // Starts with the two triangles of the field's corners. `field` must outlive this object.
   explicit GreedyTriangulation(const HeightField& field, GreedyOptions options = {});
+
+  // Goes on where a refinement of the same field with the same options has ended.
+  GreedyTriangulation(const HeightField& field, GreedyOptions options, const Refinement& refinement);
   ~GreedyTriangulation();
   GreedyTriangulation(GreedyTriangulation&&) noexcept;
   GreedyTriangulation& operator=(GreedyTriangulation&&) noexcept;
@@ -83,15 +96,15 @@ class GreedyTriangulation {
   // the mesh that one call with that goal would have made. False if stopped; the mesh is then valid but unfinished.
   bool Run(const GreedyGoal& goal, std::stop_token stop = {});
 
-  // Inserts these samples as they are, in this order; those that are vertices already are skipped. Border samples are
-  // refused (TERRACE_CHECK): borders are a function of their own samples.
-  void InsertInterior(std::span<const SamplePosition> samples);
-
   // The largest error that the next insertion would mend; 0 when every sample is met.
   double CurrentError() const;
   std::size_t vertex_count() const;
 
+  // Triangles in the order of their slots.
   TinMesh Mesh() const;
+
+  // Everything inserted so far. Precondition: options.record.
+  Refinement MakeRefinement() const;
 
  private:
   class Impl;

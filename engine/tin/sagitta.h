@@ -1,14 +1,28 @@
 // How far a flat triangle cuts below curved ground: the bound that Curvature in greedy.h states.
 #pragma once
 
-#include <array>
+#include <vector>
 
 #include "engine/tin/greedy.h"
-#include "engine/tin/plane.h"
+#include "engine/tin/tin_mesh.h"
 
 namespace terrace::tin {
 
-// Metres; 0 for flat ground. Corners in any order, not on one line.
-double SagittaBound(const Curvature& curvature, const std::array<Corner, 3>& corners);
+class Sagitta {
+ public:
+  // TERRACE_CHECKs what Curvature promises for a field of `rows` rows.
+  Sagitta(Curvature curvature, int rows);
+
+  bool is_flat() const { return east_m2_.empty(); }
+
+  // Metres; 0 for flat ground. Corners in any order, not on one line.
+  double Bound(SamplePosition a, SamplePosition b, SamplePosition c) const;
+
+ private:
+  std::vector<double> east_m2_;
+  double north_m2_;
+  double doubled_radius_;
+  int widest_row_ = 0;
+};
 
 }  // namespace terrace::tin

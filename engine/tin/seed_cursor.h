@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "engine/tin/candidate_queue.h"
 #include "engine/tin/greedy.h"
 #include "engine/tin/height_field.h"
 
@@ -18,7 +19,9 @@ class SeedCursor {
   bool InGrid() const { return begun_; }
   bool HasGrid() const { return grid_ < grids_.size(); }
   // Whether the next grid must be in every mesh with this error. Precondition: HasGrid.
-  bool IsDue(double error) const { return grids_[grid_].below_error > error; }
+  bool IsDue(double error) const { return static_cast<double>(below_error()) > error; }
+  // Of the grid that the next sample is from, rounded up.
+  float below_error() const { return CandidateQueue::RoundUp(grids_[grid_].below_error); }
 
   // The next sample, row by row. Precondition: HasGrid.
   SamplePosition Take();

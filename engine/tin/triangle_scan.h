@@ -1,16 +1,21 @@
-// The worst sample of one triangle: the inner loop of greedy insertion.
+// The worst sample of each triangle of a star: the inner loop of greedy insertion.
 //
-// "Its samples" are those of ForEachInnerSpan: the closed triangle without its corners and without the field's border,
-// which is judged by a rule of its own (border.h). Voids are skipped. The result is a function of the field and the
-// three corners, in any order. Safe to call from many threads at once.
+// A triangle's samples are the open ones (open_samples.h) in its inside and on its edges. With p the triangle's last
+// corner, u and v the others relative to it, D twice its area, A = v_y dz_u - u_y dz_v and B = u_x dz_v - v_x dz_u, the
+// distance of a sample is
+//   |D (h - z_p) - (A (x - x_p) + B (y - y_p))| / D
+// in double in exactly this form, never stepped, without fused operations. The result is the same on every processor, bit
+// for bit, whatever vectors it has; Highway picks the widest at run time. Floats as heights stay far from overflow
+// (2^128 * 2^32).
+//
+// Safe to call from many threads at once.
 #pragma once
 
-#include <array>
 #include <cstdint>
 
 #include "engine/tin/candidate.h"
-#include "engine/tin/height_field.h"
-#include "engine/tin/plane.h"
+#include "engine/tin/open_samples.h"
+#include "engine/tin/star.h"
 
 namespace terrace::tin {
 
@@ -19,11 +24,10 @@ struct PlaneMisfit {
   std::uint32_t sample = kNoSample;  // row-major index; the smallest of equally distant samples
 };
 
-// The sample that is furthest from the plane through the corners.
-PlaneMisfit WorstSample(const HeightField& field, const std::array<Corner, 3>& corners);
+// misfits[i] is that of triangle i of the star.
+using StarScan = void (*)(const OpenSamples& samples, const Star& star, PlaneMisfit* misfits);
 
-// Sum of the squared vertical distances of its samples. Those on an edge count one half: their other half is in the
-// triangle across.
-double SquaredDistances(const HeightField& field, const std::array<Corner, 3>& corners);
+// The scan for this processor.
+StarScan BestStarScan();
 
 }  // namespace terrace::tin

@@ -1,48 +1,106 @@
 #include "engine/tin/triangulation.h"
 
-#include "engine/core/check.h"
-#include "engine/tin/predicates.h"
+#include <utility>
 
-// Invariant of an insertion: every triangle around the new vertex p is stored as (u, v, p), so that its half-edge 0 is
-// the edge opposite p. Splits establish it, flips keep it, and only opposite edges ever become suspect.
 namespace terrace::tin {
 
-Triangulation::Triangulation(int width, int height) {
-  const auto east = static_cast<std::uint16_t>(width - 1), north = static_cast<std::uint16_t>(height - 1);
-  positions_ = {{0, 0}, {east, 0}, {east, north}, {0, north}};
+Triangulation::Triangulation(const std::array<Vertex, 4>& corners) : vertices_(corners.begin(), corners.end()) {
   //  3-----2
   //  | 1 / |
   //  | /  0|
   //  0-----1
-  AddTriangle();
-  AddTriangle();
-  SetTriangle(0, 0, 1, 2);
-  SetTriangle(1, 2, 3, 0);
-  Link(2, 5);
+  using Triangle = NarrowTriangles::Triangle;
+  narrow_.slots = {Triangle::Of(0, 1, 2, kNone, kNone, 6), Triangle::Of(2, 3, 0, kNone, kNone, 2)};
+  Grow();
 }
 
-std::span<const TriangleId> Triangulation::Insert(SamplePosition point, TriangleId triangle) {
-  const auto p = static_cast<VertexId>(positions_.size());
-  positions_.push_back(point);
-  star_.clear();
+Triangulation::Triangulation(std::vector<Vertex> vertices, const std::vector<std::array<std::uint32_t, 3>>& triangles)
+    : vertices_(std::move(vertices)), is_wide_(vertices_.size() > NarrowTriangles::kMostVertices) {
+  is_wide_ ? Join(wide_, triangles) : Join(narrow_, triangles);
+  Grow();
+}
 
-  HalfEdgeId on_edge = kNone;
-  for (HalfEdgeId edge = 3 * triangle; edge < 3 * triangle + 3; ++edge) {
-    const std::int64_t side = Orientation(positions_[corners_[edge]], positions_[corners_[Next(edge)]], point);
-    TERRACE_CHECK(side >= 0);
-    if (side > 0) continue;
-    TERRACE_CHECK(on_edge == kNone);  // on two edges: a corner
-    on_edge = edge;
+// Half-edges sorted by the corner they start from: the twin of (a, b) is found among the few that start from b.
+template <typename Triangles>
+void Triangulation::Join(Triangles& triangles, const std::vector<std::array<std::uint32_t, 3>>& corners) {
+  std::vector<std::uint32_t> first(vertices_.size() + 1, 0);
+  triangles.slots.reserve(corners.size());
+  for (const auto& [a, b, c] : corners) {
+    triangles.slots.push_back(Triangles::Triangle::Of(a, b, c, kNone, kNone, kNone));
+    for (const VertexId corner : {a, b, c}) ++first[corner + 1];
   }
-  if (on_edge == kNone) {
-    SplitTriangle(triangle, p);
-  } else if (twins_[on_edge] == kNone) {
-    SplitBorderEdge(on_edge, p);
-  } else {
-    SplitInteriorEdge(on_edge, p);
+  for (std::size_t vertex = 0; vertex < vertices_.size(); ++vertex) first[vertex + 1] += first[vertex];
+  std::vector<HalfEdgeId> leaving(3 * corners.size());
+  for (TriangleId t = 0; t < corners.size(); ++t) {
+    // Afterwards first[v] is where v's half-edges END.
+    for (unsigned i = 0; i < 3; ++i) leaving[first[corners[t][i]]++] = 4 * t + i;
   }
-  Legalize();
-  return star_;
+  for (TriangleId t = 0; t < corners.size(); ++t) {
+    for (unsigned i = 0; i < 3; ++i) {
+      if (triangles.slots[t].twin(i) != kNone) continue;
+      const VertexId a = corners[t][i], b = corners[t][(i + 1) % 3];
+      for (std::uint32_t k = b == 0 ? 0 : first[b - 1]; k < first[b]; ++k) {
+        const HalfEdgeId back = leaving[k];
+        if (corners[back / 4][(back % 4 + 1) % 3] != a) continue;
+        triangles.slots[t].set_twin(i, back);
+        triangles.slots[back / 4].set_twin(back % 4, 4 * t + i);
+        break;
+      }
+    }
+  }
+}
+
+// The in-circle test says yes where the point lies on the edge, which is inside the circle, and no where w is not seen:
+// a circle without vertices ends beyond the edge where the edge's own ends do.
+const Star& Triangulation::InsertDelaunay(const Vertex& vertex, TriangleId triangle) {
+  return Insert(vertex, triangle, [](const RingVertex& u, const RingVertex& v, const RingVertex& w, HalfEdgeId) {
+    return IsInsideCircle(v, u, w);
+  });
+}
+
+void Triangulation::Grow() {
+  const std::size_t capacity = 2 * pending_.size() + 64;
+  pending_.resize(capacity);
+  star_.ring.Grow(capacity);
+  star_.triangles.resize(capacity);
+  star_.outside.resize(capacity);
+  star_.removed.resize(capacity);
+}
+
+void Triangulation::Widen() {
+  wide_.slots.reserve(2 * narrow_.slots.size());
+  for (const NarrowTriangles::Triangle& t : narrow_.slots) {
+    wide_.slots.push_back({{t.corner(0), t.corner(1), t.corner(2)}, {t.twin(0), t.twin(1), t.twin(2)}});
+  }
+  narrow_.slots = {};
+  is_wide_ = true;
+}
+
+void Triangulation::PrefetchAround(TriangleId t) const {
+  for (HalfEdgeId edge = 4 * t; edge < 4 * t + 3; ++edge) {
+    __builtin_prefetch(&vertices_[corner(edge)]);
+    if (twin(edge) != kNone) Prefetch(twin(edge) / 4);
+  }
+}
+
+// Lets the ring begin after the edge that holds the centre.
+void Triangulation::OpenRing(std::size_t edges, std::size_t gap) {
+  const auto first = static_cast<std::ptrdiff_t>(gap + 1), count = static_cast<std::ptrdiff_t>(edges);
+  const auto turn = [=](auto& values) { std::rotate(values.begin(), values.begin() + first, values.begin() + count); };
+  turn(star_.ring.ids);
+  turn(star_.ring.dx);
+  turn(star_.ring.dy);
+  turn(star_.ring.heights);
+  turn(star_.outside);
+}
+
+TinMesh Triangulation::Mesh() const {
+  TinMesh mesh;
+  mesh.vertices.reserve(vertices_.size());
+  for (const Vertex& vertex : vertices_) mesh.vertices.push_back(vertex.position);
+  mesh.triangles.reserve(triangle_count());
+  for (TriangleId t = 0; t < triangle_count(); ++t) mesh.triangles.push_back(triangle(t));
+  return mesh;
 }
 
 TriangleId Triangulation::Locate(SamplePosition point, TriangleId start) const {
@@ -50,159 +108,23 @@ TriangleId Triangulation::Locate(SamplePosition point, TriangleId start) const {
   // respect to the triangle's circumcircle, or stays on one circle, whose triangles form a tree.
   TriangleId t = start;
   for (unsigned i = 0; i < 3;) {
-    const HalfEdgeId edge = 3 * t + i;
-    if (Orientation(positions_[corners_[edge]], positions_[corners_[Next(edge)]], point) >= 0) {
+    const HalfEdgeId edge = 4 * t + i;
+    if (Orientation(position(corner(edge)), position(corner(Next(edge))), point) >= 0) {
       ++i;
       continue;
     }
-    TERRACE_CHECK(twins_[edge] != kNone);  // the point lies outside the rectangle
-    t = twins_[edge] / 3;
+    TERRACE_CHECK(twin(edge) != kNone);  // the point lies outside the rectangle
+    t = twin(edge) / 4;
     i = 0;
   }
   return t;
 }
 
-bool Triangulation::IsCorner(SamplePosition point, TriangleId triangle) const {
-  for (const VertexId vertex : this->triangle(triangle)) {
-    if (positions_[vertex] == point) return true;
+bool Triangulation::IsCorner(SamplePosition point, TriangleId t) const {
+  for (const VertexId vertex : triangle(t)) {
+    if (position(vertex) == point) return true;
   }
   return false;
-}
-
-TriangleId Triangulation::AddTriangle() {
-  TERRACE_CHECK(corners_.size() < kNone - 3);
-  corners_.resize(corners_.size() + 3, kNone);
-  twins_.resize(twins_.size() + 3, kNone);
-  return static_cast<TriangleId>(corners_.size() / 3 - 1);
-}
-
-void Triangulation::SetTriangle(TriangleId t, VertexId a, VertexId b, VertexId c) {
-  corners_[3 * t] = a;
-  corners_[3 * t + 1] = b;
-  corners_[3 * t + 2] = c;
-}
-
-void Triangulation::Link(HalfEdgeId edge, HalfEdgeId twin) {
-  if (edge != kNone) twins_[edge] = twin;
-  if (twin != kNone) twins_[twin] = edge;
-}
-
-//        c                   c
-//       / \                 /|\              t0 = (a, b, p), in the slot of t
-//      /   \               / | \             t1 = (b, c, p)
-//     /  t  \     ->      /t2|t1\            t2 = (c, a, p)
-//    /   p   \           /  .p.  \           .
-//   /         \         /.'  t0 '.\          .
-//  a-----------b       a-----------b
-void Triangulation::SplitTriangle(TriangleId t, VertexId p) {
-  const auto [a, b, c] = triangle(t);
-  const HalfEdgeId outer_bc = twins_[3 * t + 1], outer_ca = twins_[3 * t + 2];
-  const TriangleId t1 = AddTriangle(), t2 = AddTriangle();
-  SetTriangle(t, a, b, p);
-  SetTriangle(t1, b, c, p);
-  SetTriangle(t2, c, a, p);
-  Link(3 * t1, outer_bc);
-  Link(3 * t2, outer_ca);
-  Link(3 * t + 1, 3 * t1 + 2);
-  Link(3 * t1 + 1, 3 * t2 + 2);
-  Link(3 * t2 + 1, 3 * t + 2);
-  star_.assign({t, t1, t2});
-}
-
-//        c                   c
-//       / \                 /|\              t0 = (c, a, p), in the slot of t
-//      / t \               / | \             t1 = (b, c, p)
-//     /     \             /t0|t1\            s0 = (a, d, p), in the slot of s
-//    a---p---b    ->     a---p---b           s1 = (d, b, p)
-//     \     /             \s0|s1/            .
-//      \ s /               \ | /             `edge` runs from a to b
-//       \ /                 \|/
-//        d                   d
-void Triangulation::SplitInteriorEdge(HalfEdgeId edge, VertexId p) {
-  const HalfEdgeId back = twins_[edge];
-  const TriangleId t = edge / 3, s = back / 3;
-  const VertexId a = corners_[edge], b = corners_[back], c = corners_[Previous(edge)], d = corners_[Previous(back)];
-  const HalfEdgeId outer_bc = twins_[Next(edge)], outer_ca = twins_[Previous(edge)];
-  const HalfEdgeId outer_ad = twins_[Next(back)], outer_db = twins_[Previous(back)];
-  const TriangleId t1 = AddTriangle(), s1 = AddTriangle();
-  SetTriangle(t, c, a, p);
-  SetTriangle(t1, b, c, p);
-  SetTriangle(s, a, d, p);
-  SetTriangle(s1, d, b, p);
-  Link(3 * t, outer_ca);
-  Link(3 * t1, outer_bc);
-  Link(3 * s, outer_ad);
-  Link(3 * s1, outer_db);
-  Link(3 * t + 1, 3 * s + 2);
-  Link(3 * s + 1, 3 * s1 + 2);
-  Link(3 * s1 + 1, 3 * t1 + 2);
-  Link(3 * t1 + 1, 3 * t + 2);
-  star_.assign({t, t1, s, s1});
-}
-
-//        c                   c
-//       / \                 /|\              t0 = (c, a, p), in the slot of t
-//      / t \               / | \             t1 = (b, c, p)
-//     /     \             /t0|t1\            .
-//    a---p---b    ->     a---p---b           `edge` runs from a to b along the border
-void Triangulation::SplitBorderEdge(HalfEdgeId edge, VertexId p) {
-  const TriangleId t = edge / 3;
-  const VertexId a = corners_[edge], b = corners_[Next(edge)], c = corners_[Previous(edge)];
-  const HalfEdgeId outer_bc = twins_[Next(edge)], outer_ca = twins_[Previous(edge)];
-  const TriangleId t1 = AddTriangle();
-  SetTriangle(t, c, a, p);
-  SetTriangle(t1, b, c, p);
-  Link(3 * t, outer_ca);
-  Link(3 * t1, outer_bc);
-  Link(3 * t1 + 1, 3 * t + 2);
-  twins_[3 * t + 1] = kNone;
-  twins_[3 * t1 + 2] = kNone;
-  star_.assign({t, t1});
-}
-
-//        p                   p
-//       / \                 /|\              t = (u, v, p)  ->  (u, w, p)
-//      / t \               / | \             s = (v, u, w)  ->  (w, v, p)
-//     /     \             /  |  \            .
-//    u-------v    ->     u t | s v           Half-edge 0 of both is again opposite p.
-//     \     /             \  |  /
-//      \ s /               \ | /
-//       \ /                 \|/
-//        w                   w
-void Triangulation::FlipOppositeEdge(TriangleId t) {
-  const HalfEdgeId back = twins_[3 * t];
-  const TriangleId s = back / 3;
-  const VertexId u = corners_[3 * t], v = corners_[3 * t + 1], p = corners_[3 * t + 2], w = corners_[Previous(back)];
-  const HalfEdgeId outer_uw = twins_[Next(back)], outer_wv = twins_[Previous(back)], spoke_v = twins_[3 * t + 1];
-  SetTriangle(t, u, w, p);
-  SetTriangle(s, w, v, p);
-  Link(3 * t, outer_uw);
-  Link(3 * s, outer_wv);
-  Link(3 * s + 1, spoke_v);
-  Link(3 * t + 1, 3 * s + 2);
-  star_.push_back(s);
-}
-
-// A flip that the in-circle test asks for is always possible: w lies strictly inside the circle through u, v, p and
-// beyond uv, so it is seen from p between u and v, and the quadrilateral is strictly convex.
-void Triangulation::Legalize() {
-  suspects_.assign(star_.rbegin(), star_.rend());
-  while (!suspects_.empty()) {
-    const TriangleId t = suspects_.back();
-    const HalfEdgeId back = twins_[3 * t];
-    if (back == kNone) {
-      suspects_.pop_back();
-      continue;
-    }
-    const auto [u, v, p] = triangle(t);
-    const VertexId w = corners_[Previous(back)];
-    if (InCircle(positions_[u], positions_[v], positions_[p], positions_[w]) <= 0) {
-      suspects_.pop_back();
-      continue;
-    }
-    FlipOppositeEdge(t);
-    suspects_.push_back(back / 3);
-  }
 }
 
 }  // namespace terrace::tin

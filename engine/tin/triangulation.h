@@ -1,77 +1,253 @@
-// The topology of a Delaunay triangulation of a rectangle of samples: insert a point, get the triangles that changed.
+// The topology of a triangulation of a rectangle of samples: insert a point, get the star of triangles around it.
 //
-// Half-edges in compact parallel arrays: triangle t owns the half-edges 3t, 3t+1, 3t+2, counter-clockwise; half-edge e
-// runs from corner(e) to the corner of the next half-edge of its triangle, and twin(e) is the same edge seen from the
-// neighbour, kNone on the border of the rectangle. Triangles are never freed: slots are reused by the triangles that
-// replace them, and new ones are appended.
+// Triangle t owns the half-edges 4t, 4t+1, 4t+2, counter-clockwise: half-edge 4t+i runs from its corner i to the next
+// one, and its twin is the same edge seen from the neighbour, kNone on the border of the rectangle. Slots are never
+// freed: an insertion reuses those of the triangles that it removes, and appends one or two.
 //
-// Guibas and Stolfi's incremental algorithm ("Primitives for the Manipulation of General Subdivisions", 1985) with
-// Lawson flips. Everything is decided in integers, and four points on one circle keep the diagonal they have: the
-// triangulation is a function of the sequence of insertions alone.
+// An insertion removes a cavity, all triangles that the new point replaces, and joins the cavity's outline to the
+// point. Where the cavity ends is the caller's criterion: by the in-circle test the result is Delaunay (Bowyer 1981,
+// Watson 1981; the same triangles as Lawson's flips), by a test of errors it is data-dependent. Four points on one
+// circle keep the diagonal they have. Everything is decided in integers: the triangulation is a function of the
+// sequence of insertions and of the criterion alone.
 //
 // Not thread-safe; different objects are independent.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <span>
+#include <type_traits>
 #include <vector>
 
+#include "engine/core/check.h"
+#include "engine/tin/predicates.h"
+#include "engine/tin/star.h"
 #include "engine/tin/tin_mesh.h"
+#include "engine/tin/triangle_store.h"
 
 namespace terrace::tin {
 
-using VertexId = std::uint32_t;
-using TriangleId = std::uint32_t;
-using HalfEdgeId = std::uint32_t;
-
 class Triangulation {
  public:
-  static constexpr std::uint32_t kNone = 0xFFFFFFFF;
+  static constexpr std::uint32_t kNone = kNoEdge;
 
-  // Two triangles over [0, width-1] x [0, height-1]. Vertices 0 to 3 are the corners, counter-clockwise from (0, 0).
-  Triangulation(int width, int height);
+  struct Vertex {
+    SamplePosition position;
+    float height = 0;  // metres
+  };
 
-  // Inserts a vertex into `triangle`, which must contain the point in its inside or on an edge; it must not be a vertex
-  // yet. Returns the triangles around the new vertex: all that are new or changed, in a deterministic order, valid
-  // until the next insertion.
-  std::span<const TriangleId> Insert(SamplePosition point, TriangleId triangle);
+  // Two triangles over a rectangle. `corners` are vertices 0 to 3, counter-clockwise from its smallest x and y.
+  explicit Triangulation(const std::array<Vertex, 4>& corners);
+
+  // Triangles in the order given. Precondition: they cover a rectangle once, counter-clockwise.
+  Triangulation(std::vector<Vertex> vertices, const std::vector<std::array<std::uint32_t, 3>>& triangles);
+
+  // Inserts a vertex into `triangle`, which must contain the point inside or on an edge; it must not be a vertex yet.
+  // `absorbs(u, v, w, back)` says whether the triangle (v, u, w) is removed as well: it lies beyond the outline's edge
+  // from u to v, and `back` is that edge seen from there. It must say yes where the point lies on the edge, and only
+  // where w lies strictly between u and v as seen from the point (Sees).
+  // The star is valid until the next insertion.
+  template <typename Absorbs>
+  const Star& Insert(const Vertex& vertex, TriangleId triangle, Absorbs&& absorbs);
+
+  const Star& InsertDelaunay(const Vertex& vertex, TriangleId triangle);
 
   // A triangle that contains the point, inside, on an edge or as a corner, found by a walk from `start`.
   TriangleId Locate(SamplePosition point, TriangleId start) const;
 
   bool IsCorner(SamplePosition point, TriangleId triangle) const;
 
-  std::size_t vertex_count() const { return positions_.size(); }
-  std::size_t triangle_count() const { return corners_.size() / 3; }
-  SamplePosition position(VertexId vertex) const { return positions_[vertex]; }
-  VertexId corner(HalfEdgeId edge) const { return corners_[edge]; }
-  HalfEdgeId twin(HalfEdgeId edge) const { return twins_[edge]; }
-  std::array<VertexId, 3> triangle(TriangleId t) const {
-    return {corners_[3 * t], corners_[3 * t + 1], corners_[3 * t + 2]};
+  // Bring a triangle that will be inserted into closer to the processor, and what an insertion into it reads first.
+  void Prefetch(TriangleId t) const {
+    __builtin_prefetch(is_wide_ ? static_cast<const void*>(&wide_.slots[t]) : &narrow_.slots[t]);
   }
-  const std::vector<SamplePosition>& positions() const { return positions_; }
+  void PrefetchAround(TriangleId t) const;
 
-  static constexpr HalfEdgeId Next(HalfEdgeId edge) { return edge % 3 == 2 ? edge - 2 : edge + 1; }
-  static constexpr HalfEdgeId Previous(HalfEdgeId edge) { return edge % 3 == 0 ? edge + 2 : edge - 1; }
+  TinMesh Mesh() const;
+
+  std::size_t vertex_count() const { return vertices_.size(); }
+  std::size_t triangle_count() const { return is_wide_ ? wide_.slots.size() : narrow_.slots.size(); }
+  SamplePosition position(VertexId vertex) const { return vertices_[vertex].position; }
+  float height(VertexId vertex) const { return vertices_[vertex].height; }
+  std::array<VertexId, 3> triangle(TriangleId t) const { return {corner(4 * t), corner(4 * t + 1), corner(4 * t + 2)}; }
+
+  // The corner where a half-edge starts, and its twin.
+  VertexId corner(HalfEdgeId edge) const {
+    return is_wide_ ? wide_.slots[edge / 4].corner(edge % 4) : narrow_.slots[edge / 4].corner(edge % 4);
+  }
+  HalfEdgeId twin(HalfEdgeId edge) const {
+    return is_wide_ ? wide_.slots[edge / 4].twin(edge % 4) : narrow_.slots[edge / 4].twin(edge % 4);
+  }
+
+  static constexpr HalfEdgeId Next(HalfEdgeId edge) { return edge % 4 == 2 ? edge - 2 : edge + 1; }
+  static constexpr HalfEdgeId Previous(HalfEdgeId edge) { return edge % 4 == 0 ? edge + 2 : edge - 1; }
 
  private:
-  TriangleId AddTriangle();
-  void SetTriangle(TriangleId t, VertexId a, VertexId b, VertexId c);
-  void Link(HalfEdgeId edge, HalfEdgeId twin);  // both ways; either may be kNone
+  // An edge of the outline that has not been looked across yet; it starts where the one before it ends.
+  struct PendingEdge {
+    HalfEdgeId back;
+    RingVertex end;
+  };
 
-  void SplitTriangle(TriangleId t, VertexId p);
-  void SplitInteriorEdge(HalfEdgeId edge, VertexId p);
-  void SplitBorderEdge(HalfEdgeId edge, VertexId p);
-  void FlipOppositeEdge(TriangleId t);
-  void Legalize();
+  static RingVertex Relative(const Vertex* vertices, VertexId id, SamplePosition point) {
+    const Vertex& vertex = vertices[id];
+    return {id, vertex.position.x - point.x, vertex.position.y - point.y, vertex.height};
+  }
+  template <typename Triangles, typename Absorbs>
+  void Replace(Triangles& triangles, SamplePosition point, TriangleId triangle, Absorbs&& absorbs);
+  template <typename Triangles>
+  void FillCavity(Triangles& triangles, std::size_t edges, std::size_t gap);
+  void OpenRing(std::size_t edges, std::size_t gap);
+  template <typename Triangles>
+  void Join(Triangles& triangles, const std::vector<std::array<std::uint32_t, 3>>& corners);
+  void Widen();
+  void Grow();
 
-  std::vector<SamplePosition> positions_;  // by vertex
-  std::vector<VertexId> corners_;          // by half-edge: where it starts
-  std::vector<HalfEdgeId> twins_;          // by half-edge
-  std::vector<TriangleId> star_;           // of the last insertion
-  std::vector<TriangleId> suspects_;       // stack of Legalize
+  std::vector<Vertex> vertices_;  // by id
+  NarrowTriangles narrow_;        // by slot, until there are too many vertices
+  WideTriangles wide_;
+  bool is_wide_ = false;
+
+  Star star_;                         // of the last insertion
+  std::vector<PendingEdge> pending_;  // stack
 };
+
+constexpr std::int64_t Cross(const RingVertex& a, const RingVertex& b) {
+  return static_cast<std::int64_t>(a.dx) * b.dy - static_cast<std::int64_t>(a.dy) * b.dx;
+}
+
+// Whether the point that u, v and w are relative to lies strictly inside the circle through v, u and w, which turn
+// counter-clockwise: the in-circle test of predicates.h with its widths, the point as d.
+constexpr bool IsInsideCircle(const RingVertex& v, const RingVertex& u, const RingVertex& w) {
+  const auto square = [](const RingVertex& a) {
+    return static_cast<std::int64_t>(a.dx) * a.dx + static_cast<std::int64_t>(a.dy) * a.dy;
+  };
+  return square(v) * Cross(u, w) + square(u) * Cross(w, v) + square(w) * Cross(v, u) > 0;
+}
+
+// Whether w lies strictly between u and v as seen from the point that they are relative to.
+constexpr bool Sees(const RingVertex& u, const RingVertex& v, const RingVertex& w) {
+  return Cross(u, w) > 0 && Cross(w, v) > 0;
+}
+
+template <typename Absorbs>
+const Star& Triangulation::Insert(const Vertex& vertex, TriangleId triangle, Absorbs&& absorbs) {
+  star_.centre = static_cast<VertexId>(vertices_.size());
+  star_.x = vertex.position.x;
+  star_.y = vertex.position.y;
+  star_.height = vertex.height;
+  vertices_.push_back(vertex);
+  if (!is_wide_ && vertices_.size() > NarrowTriangles::kMostVertices) Widen();
+  is_wide_ ? Replace(wide_, vertex.position, triangle, absorbs) : Replace(narrow_, vertex.position, triangle, absorbs);
+  return star_;
+}
+
+//        w                   w              The outline is walked counter-clockwise with a stack: either the triangle
+//       / \                 / \             beyond the edge (u, v) is absorbed and its two other edges are looked
+//      /   \               /   \            across in its place, or the edge stays.
+//     u-----v     ->      u     v
+//        .                   .
+//        p                   p
+template <typename Triangles, typename Absorbs>
+void Triangulation::Replace(Triangles& triangles, SamplePosition point, TriangleId triangle, Absorbs&& absorbs) {
+  const auto* const slots = triangles.slots.data();
+  const Vertex* const vertices = vertices_.data();
+  PendingEdge* stack = pending_.data();
+  std::size_t capacity = pending_.size();
+  const auto prefetch = [=](HalfEdgeId across) {
+    if (across != kNone) __builtin_prefetch(&slots[across / 4]);
+  };
+  const auto first = slots[triangle];
+  RingVertex u = Relative(vertices, first.corner(0), point);
+  stack[2] = {first.twin(0), Relative(vertices, first.corner(1), point)};
+  stack[1] = {first.twin(1), Relative(vertices, first.corner(2), point)};
+  stack[0] = {first.twin(2), u};
+  // The walk waits for triangles from all over the memory: the three that it certainly visits together.
+  for (std::size_t i = 0; i < 3; ++i) prefetch(stack[i].back);
+
+  star_.is_closed = true;
+  star_.has_border = false;
+  TriangleId* removed_slots = star_.removed.data();
+  removed_slots[0] = triangle;
+  std::size_t removed = 1, edges = 0, gap = 0, pending = 3;
+  while (pending > 0) {
+    const PendingEdge& edge = stack[pending - 1];
+    const HalfEdgeId back = edge.back;
+    if (back != kNone) {
+      const auto& beyond = slots[back / 4];
+      const unsigned next = Next(back) % 4, previous = Previous(back) % 4;
+      const RingVertex w = Relative(vertices, beyond.corner(previous), point);
+      if (absorbs(u, edge.end, w, back)) {
+        if (edges + pending + 3 > capacity) {
+          Grow();
+          stack = pending_.data();
+          removed_slots = star_.removed.data();
+          capacity = pending_.size();
+        }
+        removed_slots[removed++] = back / 4;
+        const HalfEdgeId across_uw = beyond.twin(next), across_wv = beyond.twin(previous);
+        prefetch(across_uw);
+        prefetch(across_wv);
+        stack[pending - 1].back = across_wv;
+        stack[pending].back = across_uw;
+        stack[pending].end = w;
+        ++pending;
+        continue;
+      }
+    } else {
+      star_.has_border = true;
+      if (Cross(u, edge.end) == 0) {
+        star_.is_closed = false;
+        gap = edges;
+      }
+    }
+    star_.ring.Put(edges, u);
+    star_.outside[edges++] = back;
+    u = edge.end;
+    --pending;
+  }
+  star_.removed_count = removed;
+  FillCavity(triangles, edges, gap);
+}
+
+//      u3---u2                u3---u2
+//     /       \              / \ t2/ \            t_i = (u_i, u_i+1, p), its half-edge 0 on the outline. Closed: t_i+1
+//    u4        u1    ->     u4--p---u1            follows t_i all around. Open: the edge u_k u_0 holds p and has no
+//     \       /              \ / \ t0/            triangle.
+//      u5---u0                u5---u0
+template <typename Triangles>
+void Triangulation::FillCavity(Triangles& triangles, std::size_t edges, std::size_t gap) {
+  if (star_.is_closed) {
+    star_.ring.Put(edges, star_.ring[0]);
+  } else {
+    OpenRing(edges--, gap);
+  }
+  star_.count = edges;
+  TriangleId* const made = star_.triangles.data();
+  std::copy_n(star_.removed.begin(), star_.removed_count, made);
+  const auto appended = static_cast<TriangleId>(triangles.slots.size());
+  TERRACE_CHECK(appended < kNone / 4 - 2);
+  for (std::size_t i = star_.removed_count; i < edges; ++i) {
+    made[i] = appended + static_cast<TriangleId>(i - star_.removed_count);
+  }
+  triangles.slots.resize(appended + edges - star_.removed_count);
+
+  auto* const slots = triangles.slots.data();
+  const VertexId* const ids = star_.ring.ids.data();
+  const HalfEdgeId* const outsides = star_.outside.data();
+  TriangleId before = made[edges - 1];
+  for (std::size_t i = 0; i < edges; ++i) {
+    const TriangleId t = made[i], after = made[i + 1 < edges ? i + 1 : 0];
+    const HalfEdgeId outside = outsides[i];
+    slots[t] = std::remove_reference_t<decltype(slots[t])>::Of(ids[i], ids[i + 1], star_.centre, outside, 4 * after + 2,
+                                                               4 * before + 1);
+    if (outside != kNone) slots[outside / 4].set_twin(outside % 4, 4 * t);
+    before = t;
+  }
+  if (star_.is_closed) return;
+  slots[made[edges - 1]].set_twin(1, kNone);
+  slots[made[0]].set_twin(2, kNone);
+}
 
 }  // namespace terrace::tin

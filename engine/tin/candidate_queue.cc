@@ -1,0 +1,135 @@
+#include "engine/tin/candidate_queue.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <limits>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "engine/tin/candidate_queue.cc"
+#include <hwy/foreach_target.h>  // includes this file once for each set of instructions
+
+#include <hwy/contrib/sort/vqsort.h>
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace terrace::tin {
+namespace HWY_NAMESPACE {
+namespace {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+}  // namespace
+
+// `count` is a multiple of kBlock: the arrays are padded with zeros.
+float Largest(const float* errors, std::size_t count) {
+  const hn::ScalableTag<float> floats;
+  const std::size_t lanes = hn::Lanes(floats);
+  auto most = hn::Zero(floats), also = hn::Zero(floats);
+  for (std::size_t i = 0; i < count; i += 2 * lanes) {
+    most = hn::Max(most, hn::LoadU(floats, errors + i));
+    also = hn::Max(also, hn::LoadU(floats, errors + i + lanes));
+  }
+  return hn::GetLane(hn::MaxOfLanes(floats, hn::Max(most, also)));
+}
+
+// Writes the indices of errors at or above the threshold, ascending, and one value beyond; returns how many.
+std::size_t Sweep(const float* errors, std::size_t count, float threshold, std::uint32_t* found) {
+  const hn::ScalableTag<float> floats;
+  const std::size_t lanes = hn::Lanes(floats);
+  const auto least = hn::Set(floats, threshold);
+  std::size_t n = 0;
+  for (std::size_t i = 0; i < count; i += 2 * lanes) {
+    const auto low = hn::LoadU(floats, errors + i), high = hn::LoadU(floats, errors + i + lanes);
+    if (hn::AllFalse(floats, hn::Ge(hn::Max(low, high), least))) continue;
+    for (std::size_t k = i; k < i + 2 * lanes; ++k) {
+      found[n] = static_cast<std::uint32_t>(k);
+      n += errors[k] >= threshold ? 1 : 0;
+    }
+  }
+  return n;
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace terrace::tin
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace terrace::tin {
+namespace {
+
+HWY_EXPORT(Largest);
+HWY_EXPORT(Sweep);
+
+constexpr std::size_t kBlock = 64;    // slots: two vectors of the widest there are
+constexpr std::size_t kSwept = 4096;  // slots swept in one go
+
+}  // namespace
+
+CandidateQueue::CandidateQueue() : threshold_(std::numeric_limits<float>::infinity()) {}
+
+std::uint32_t CandidateQueue::Winner() {
+  do {
+    while (true) {
+      const bool has_run = run_begin_ < run_.size();
+      if (!heap_.empty() && (!has_run || IsBehind()(run_[run_begin_], heap_.front()))) {
+        const Entry& entry = heap_.front();
+        if (OrderOf(entry.slot) == entry.order) return entry.slot;
+        std::pop_heap(heap_.begin(), heap_.end(), IsBehind());
+        heap_.pop_back();
+      } else if (has_run) {
+        const Entry& entry = run_[run_begin_];
+        if (OrderOf(entry.slot) == entry.order) return entry.slot;
+        ++run_begin_;
+      } else {
+        break;
+      }
+    }
+  } while (Refill());
+  return kNoSlot;
+}
+
+bool CandidateQueue::Refill() {
+  const float largest = HWY_DYNAMIC_DISPATCH(Largest)(errors_.data(), errors_.size());
+  if (!(largest > 0)) {
+    threshold_ = std::numeric_limits<float>::denorm_min();
+    return false;
+  }
+  const float finite = std::min(largest, std::numeric_limits<float>::max());
+  threshold_ = std::max(static_cast<float>(finite * step_), std::numeric_limits<float>::denorm_min());
+  std::vector<hwy::uint128_t> foremost;
+  std::array<std::uint32_t, kSwept + 1> found;
+  for (std::size_t first = 0; first < errors_.size(); first += kSwept) {
+    const std::size_t slots = std::min(kSwept, errors_.size() - first);
+    const std::size_t count = HWY_DYNAMIC_DISPATCH(Sweep)(errors_.data() + first, slots, threshold_, found.data());
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::uint32_t slot = static_cast<std::uint32_t>(first) + found[i];
+      foremost.push_back({slot, OrderOf(slot)});
+    }
+  }
+  hwy::Sorter()(foremost.data(), foremost.size(), hwy::SortDescending());
+  run_.clear();
+  run_begin_ = 0;
+  for (const hwy::uint128_t& entry : foremost) run_.push_back({entry.hi, static_cast<std::uint32_t>(entry.lo)});
+
+  // A sweep costs about one cycle for every 16 slots: worth it for a 256th of them.
+  const std::size_t wanted = std::max<std::size_t>(64, errors_.size() / 256);
+  if (run_.size() > 2 * wanted) step_ = std::sqrt(step_);
+  if (run_.size() < wanted / 2) step_ = std::max(step_ * step_, 0.25);
+  return true;
+}
+
+void CandidateQueue::Push(std::uint32_t slot) {
+  heap_.push_back({OrderOf(slot), slot});
+  std::push_heap(heap_.begin(), heap_.end(), IsBehind());
+}
+
+void CandidateQueue::Grow(std::size_t slots) {
+  const std::size_t padded = (slots + kBlock - 1) / kBlock * kBlock;
+  errors_.resize(padded, 0.0F);
+  samples_.resize(padded, kNoSample);
+}
+
+}  // namespace terrace::tin
+#endif

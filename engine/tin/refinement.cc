@@ -1,0 +1,117 @@
+#include "engine/tin/refinement.h"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <optional>
+#include <utility>
+
+#include "engine/core/check.h"
+
+namespace terrace::tin {
+namespace {
+
+using Wide = InsertionRecord<std::uint32_t>;
+using Narrow = InsertionRecord<std::uint16_t>;
+
+template <typename To, typename From>
+std::vector<To> Convert(const std::vector<From>& values, From special, To as) {
+  std::vector<To> converted(values.size());
+  std::transform(values.begin(), values.end(), converted.begin(),
+                 [=](From value) { return value == special ? as : static_cast<To>(value); });
+  return converted;
+}
+
+template <typename To, typename From>
+InsertionRecord<To> ConvertRecord(const InsertionRecord<From>& record) {
+  InsertionRecord<To> converted;
+  converted.sizes.reserve(record.sizes.size());
+  for (const From size : record.sizes) {
+    const bool is_open = (size & InsertionRecord<From>::kOpen) != 0;
+    const auto triangles = static_cast<To>(size & static_cast<From>(~InsertionRecord<From>::kOpen));
+    converted.sizes.push_back(is_open ? static_cast<To>(triangles | InsertionRecord<To>::kOpen) : triangles);
+  }
+  converted.rings.assign(record.rings.begin(), record.rings.end());
+  converted.removed = Convert<To, From>(record.removed, InsertionRecord<From>::kNever, InsertionRecord<To>::kNever);
+  return converted;
+}
+
+bool FitsNarrow(std::size_t vertices, const Wide& record) {
+  if (vertices >= Narrow::kNever) return false;
+  return std::all_of(record.sizes.begin(), record.sizes.end(),
+                     [](std::uint32_t size) { return (size & ~Wide::kOpen) < Narrow::kOpen; });
+}
+
+// One compare and one conditional step for each triangle ever made: what is gone is overwritten by what follows.
+template <typename Index>
+void CollectTriangles(const InsertionRecord<Index>& record, std::size_t insertions,
+                      std::vector<std::array<std::uint32_t, 3>>& triangles) {
+  // A triangulation of v vertices has fewer than 2 v triangles; one more takes what is overwritten last.
+  triangles.resize(2 * (insertions + 4) + 1);
+  auto* out = triangles.data();
+  const Index* removed = record.removed.data();
+  const auto emit = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
+    *out = {a, b, c};
+    out += *removed++ >= insertions ? 1 : 0;
+  };
+  emit(0, 1, 2);
+  emit(2, 3, 0);
+  const Index* ring = record.rings.data();
+  for (std::size_t i = 0; i < insertions; ++i) {
+    const bool is_open = (record.sizes[i] & InsertionRecord<Index>::kOpen) != 0;
+    const std::size_t count = record.sizes[i] & static_cast<Index>(~InsertionRecord<Index>::kOpen);
+    const auto centre = static_cast<std::uint32_t>(4 + i);
+    for (std::size_t k = 0; k + 1 < count; ++k) emit(ring[k], ring[k + 1], centre);
+    emit(ring[count - 1], is_open ? ring[count] : ring[0], centre);
+    ring += count + (is_open ? 1 : 0);
+  }
+  triangles.resize(static_cast<std::size_t>(out - triangles.data()));
+}
+
+}  // namespace
+
+Refinement::Refinement(int width, int height, std::vector<SamplePosition> inserted, std::vector<float> errors_before,
+                       InsertionRecord<std::uint32_t> record)
+    : width_(width), height_(height), inserted_(std::move(inserted)), errors_before_(std::move(errors_before)) {
+  TERRACE_CHECK(inserted_.size() == errors_before_.size() && inserted_.size() == record.sizes.size());
+  if (FitsNarrow(vertex_count(), record)) {
+    record_ = ConvertRecord<std::uint16_t>(record);
+  } else {
+    record_ = std::move(record);
+  }
+}
+
+std::size_t Refinement::PointsAt(double max_error) const {
+  const auto met = [=](float error) { return static_cast<double>(error) <= max_error; };
+  return 4 + static_cast<std::size_t>(std::find_if(errors_before_.begin(), errors_before_.end(), met) -
+                                      errors_before_.begin());
+}
+
+TinMesh Refinement::MeshOf(std::size_t points) const {
+  TERRACE_CHECK(points >= 4 && points <= vertex_count());
+  const auto east = static_cast<std::uint16_t>(width_ - 1), north = static_cast<std::uint16_t>(height_ - 1);
+  TinMesh mesh;
+  mesh.vertices.reserve(points);
+  mesh.vertices = {{0, 0}, {east, 0}, {east, north}, {0, north}};
+  mesh.vertices.insert(mesh.vertices.end(), inserted_.begin(),
+                       inserted_.begin() + static_cast<std::ptrdiff_t>(points - 4));
+  std::visit([&](const auto& record) { CollectTriangles(record, points - 4, mesh.triangles); }, record_);
+  return mesh;
+}
+
+std::size_t Refinement::bytes() const {
+  const std::size_t indices = std::visit(
+      [](const auto& record) {
+        return (record.sizes.capacity() + record.rings.capacity() + record.removed.capacity()) *
+               sizeof(record.sizes[0]);
+      },
+      record_);
+  return sizeof(Refinement) + inserted_.capacity() * sizeof(SamplePosition) + errors_before_.capacity() * sizeof(float) +
+         indices;
+}
+
+InsertionRecord<std::uint32_t> Refinement::WideRecord() const {
+  return std::visit([](const auto& record) { return ConvertRecord<std::uint32_t>(record); }, record_);
+}
+
+}  // namespace terrace::tin

@@ -1,0 +1,66 @@
+// The triangles around a vertex that has just been inserted.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace terrace::tin {
+
+using VertexId = std::uint32_t;
+using TriangleId = std::uint32_t;
+using HalfEdgeId = std::uint32_t;
+
+// A vertex seen from the centre of a star.
+struct RingVertex {
+  VertexId id = 0;
+  std::int32_t dx = 0, dy = 0;  // vertex minus centre
+  float height = 0;             // metres
+};
+
+// A ring of vertices in parallel arrays, for vectors to load: each has kPadding values more than may be used.
+class Ring {
+ public:
+  static constexpr std::size_t kPadding = 16;
+
+  std::size_t capacity() const { return ids.size() - kPadding; }
+  void Grow(std::size_t capacity);
+
+  RingVertex operator[](std::size_t i) const { return {ids[i], dx[i], dy[i], heights[i]}; }
+  void Put(std::size_t i, const RingVertex& vertex) {
+    ids[i] = vertex.id;
+    dx[i] = vertex.dx;
+    dy[i] = vertex.dy;
+    heights[i] = vertex.height;
+  }
+
+  std::vector<VertexId> ids = std::vector<VertexId>(kPadding);
+  std::vector<std::int32_t> dx = std::vector<std::int32_t>(kPadding), dy = dx;  // vertex minus centre
+  std::vector<float> heights = std::vector<float>(kPadding);                    // metres
+};
+
+// Triangle i, 0 <= i < count, joins ring[i], ring[i + 1] and the centre, counter-clockwise, and is stored with its corners
+// in that order. Closed: ring[count] repeats ring[0]. Open, when the centre lies on the border: the ring begins and ends
+// on that border.
+struct Star {
+  VertexId centre = 0;
+  std::int32_t x = 0, y = 0;  // of the centre
+  float height = 0;           // of the centre, metres
+  bool is_closed = true;
+  bool has_border = false;  // some triangle has an edge on the border
+  std::size_t count = 0;
+  Ring ring;
+  std::vector<TriangleId> triangles;   // `count` of them are valid
+  std::vector<HalfEdgeId> outside;     // by triangle: the twin of the ring's edge
+  std::vector<TriangleId> removed;     // whose place the triangles took; the first slots of `triangles`
+  std::size_t removed_count = 0;
+};
+
+inline void Ring::Grow(std::size_t capacity) {
+  ids.resize(capacity + kPadding);
+  dx.resize(capacity + kPadding);
+  dy.resize(capacity + kPadding);
+  heights.resize(capacity + kPadding);
+}
+
+}  // namespace terrace::tin
