@@ -28,12 +28,17 @@ class NaivePass {
       : field_(field), borders_(borders), triangulation_(triangulation) {}
 
   Pick WorstOfAll() {
+    Pick pick;
     for (TriangleId t = 0; t < triangulation_.triangle_count(); ++t) {
+      worst_ = {};
       for (int y = 0; y < field_.height(); ++y) {
         for (int x = 0; x < field_.width(); ++x) Judge(t, x, y);
       }
+      // Triangles are compared by errors rounded to float, samples of one triangle by their exact ones.
+      worst_.error = static_cast<double>(CandidateQueue::RoundUp(worst_.error));
+      if (Precedes(worst_, pick.candidate)) pick = {worst_, t};
     }
-    return pick_;
+    return pick;
   }
 
  private:
@@ -48,9 +53,8 @@ class NaivePass {
     }
     const bool on_border = x == 0 || y == 0 || x == field_.width() - 1 || y == field_.height() - 1;
     const double error = on_border ? BorderErrorOf(corners, p) : PlaneErrorOf(corners, p);
-    const Candidate candidate{static_cast<double>(CandidateQueue::RoundUp(error)),
-                              static_cast<std::uint32_t>(y * field_.width() + x)};
-    if (error > 0 && Precedes(candidate, pick_.candidate)) pick_ = {candidate, t};  // false for NaN
+    const Candidate candidate{error, static_cast<std::uint32_t>(y * field_.width() + x)};
+    if (error > 0 && Precedes(candidate, worst_)) worst_ = candidate;  // false for NaN
   }
 
   // The formula of triangle_scan.h, relative to the corner that was inserted last.
@@ -83,7 +87,7 @@ class NaivePass {
   const HeightField& field_;
   const std::array<BorderOptions, 4>& borders_;
   const Triangulation& triangulation_;
-  Pick pick_;
+  Candidate worst_;  // of the triangle at hand
 };
 
 }  // namespace
