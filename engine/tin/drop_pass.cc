@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <functional>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -29,6 +30,12 @@ void CheckOptions(const HeightField& field, const DropOptions& options) {
   TERRACE_CHECK(options.wire_columns.size() == width && options.wire_rows.size() == height);
 }
 
+// Together, for the sake of the cache: visits jump across the mesh.
+struct Vertex {
+  SamplePosition position;
+  float height = 0;  // HeightField::VertexHeight
+};
+
 class DropPass {
  public:
   DropPass(const HeightField& field, const TinMesh& mesh, const DropOptions& options);
@@ -46,9 +53,8 @@ class DropPass {
   bool TurnsOnWire(SamplePosition a, SamplePosition b, SamplePosition c) const;
 
   const HeightField& field_;
-  const std::vector<SamplePosition>& positions_;
   const DropOptions& options_;
-  std::vector<float> heights_;  // by vertex
+  std::vector<Vertex> vertices_;
   VertexRings rings_;
   Hole hole_;                         // of the vertex at hand
   std::vector<std::uint32_t> next_;   // vertices whose stars changed: the next sweep
@@ -56,14 +62,14 @@ class DropPass {
 };
 
 DropPass::DropPass(const HeightField& field, const TinMesh& mesh, const DropOptions& options)
-    : field_(field), positions_(mesh.vertices), options_(options), rings_(mesh), awaits_(mesh.vertices.size(), 0) {
-  heights_.reserve(positions_.size());
-  for (const SamplePosition p : positions_) heights_.push_back(field.VertexHeight(p.x, p.y));
+    : field_(field), options_(options), rings_(mesh), awaits_(mesh.vertices.size(), 0) {
+  vertices_.reserve(mesh.vertices.size());
+  for (const SamplePosition p : mesh.vertices) vertices_.push_back({p, field.VertexHeight(p.x, p.y)});
 }
 
 bool DropPass::Run(const std::stop_token& stop) {
-  for (std::uint32_t v = 0; v < positions_.size(); ++v) {
-    if (!IsOnBorder(positions_[v])) next_.push_back(v);
+  for (std::uint32_t v = 0; v < vertices_.size(); ++v) {
+    if (!IsOnBorder(vertices_[v].position)) next_.push_back(v);
   }
   for (const std::uint32_t v : next_) awaits_[v] = 1;
   for (std::size_t visits = 0; !next_.empty();) {
@@ -85,7 +91,7 @@ bool DropPass::Drop(std::uint32_t vertex) {
   for (const std::size_t apex : hole_.Fans(options_.max_error)) {
     if (!Fits(apex)) continue;
     for (const std::uint32_t neighbour : ring) {
-      if (awaits_[neighbour] || IsOnBorder(positions_[neighbour])) continue;
+      if (awaits_[neighbour] || IsOnBorder(vertices_[neighbour].position)) continue;
       awaits_[neighbour] = 1;
       next_.push_back(neighbour);
     }
@@ -96,10 +102,11 @@ bool DropPass::Drop(std::uint32_t vertex) {
 }
 
 void DropPass::LoadHole(std::uint32_t vertex) {
-  const SamplePosition p = positions_[vertex];
-  hole_.Begin(p, static_cast<double>(field_.At(p.x, p.y)));
+  const auto [p, height] = vertices_[vertex];
+  const bool is_void = field_.has_voids() && std::isnan(field_.At(p.x, p.y));
+  hole_.Begin(p, is_void ? std::numeric_limits<double>::quiet_NaN() : static_cast<double>(height));
   for (const std::uint32_t corner : rings_.Of(vertex)) {
-    hole_.AddCorner(positions_[corner], static_cast<double>(heights_[corner]));
+    hole_.AddCorner(vertices_[corner].position, static_cast<double>(vertices_[corner].height));
   }
 }
 
@@ -124,11 +131,11 @@ bool DropPass::TurnsOnWire(SamplePosition a, SamplePosition b, SamplePosition c)
 
 TinMesh DropPass::Mesh() const {
   TinMesh mesh;
-  std::vector<std::uint32_t> renamed(positions_.size());
-  for (std::uint32_t v = 0; v < positions_.size(); ++v) {
+  std::vector<std::uint32_t> renamed(vertices_.size());
+  for (std::uint32_t v = 0; v < vertices_.size(); ++v) {
     if (rings_.Of(v).empty()) continue;
     renamed[v] = static_cast<std::uint32_t>(mesh.vertices.size());
-    mesh.vertices.push_back(positions_[v]);
+    mesh.vertices.push_back(vertices_[v].position);
   }
   mesh.triangles = rings_.Triangles();
   for (auto& triangle : mesh.triangles) {

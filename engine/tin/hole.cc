@@ -2,23 +2,9 @@
 
 #include <cmath>
 
-#include "engine/core/check.h"
 #include "engine/tin/predicates.h"
 
 namespace terrace::tin {
-
-void Hole::Begin(SamplePosition vertex, double height) {
-  vertex_ = vertex;
-  height_ = height;
-  sides_ = 0;
-}
-
-void Hole::AddCorner(SamplePosition position, double height) {
-  TERRACE_CHECK(sides_ < kMaxSides);
-  positions_[sides_] = position;
-  heights_[sides_] = height;
-  ++sides_;
-}
 
 std::span<const std::size_t> Hole::Fans(double max_error) {
   // All fans of a triangle are one, and opposite apexes of a quadrilateral have the same.

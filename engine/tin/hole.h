@@ -24,8 +24,16 @@ class Hole {
   static constexpr std::size_t kMaxSides = 32;
 
   // `height` is the vertex's sample, NaN where that is void. Then the corners, counter-clockwise, at most kMaxSides.
-  void Begin(SamplePosition vertex, double height);
-  void AddCorner(SamplePosition position, double height);
+  void Begin(SamplePosition vertex, double height) {
+    vertex_ = vertex;
+    height_ = height;
+    sides_ = 0;
+  }
+  void AddCorner(SamplePosition position, double height) {
+    positions_[sides_] = position;
+    heights_[sides_] = height;
+    ++sides_;
+  }
 
   std::size_t triangle_count() const { return sides_ - 2; }  // of every fan
 

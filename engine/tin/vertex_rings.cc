@@ -14,21 +14,25 @@ struct Link {
   std::uint32_t from, to;
 };
 
+// Where the chain of links starts: at the end of an open one, at the smallest vertex of a closed one.
+std::size_t Head(std::span<const Link> links, bool closed) {
+  std::size_t head = 0;
+  for (std::size_t i = 0; i < links.size(); ++i) {
+    if (closed && links[i].from < links[head].from) head = i;
+    if (closed || std::any_of(links.begin(), links.end(), [&](const Link& link) { return link.to == links[i].from; }))
+      continue;
+    return i;
+  }
+  return head;
+}
+
 // Orders the links of one vertex head to tail and returns whether they close.
 bool Chain(std::span<Link> links) {
-  std::size_t first = 0;
-  bool closed = true;
-  for (std::size_t i = 0; i < links.size(); ++i) {
-    const bool is_tail =
-        std::none_of(links.begin(), links.end(), [&](const Link& link) { return link.to == links[i].from; });
-    if (is_tail) {
-      first = i;
-      closed = false;
-      break;
-    }
-    if (links[i].from < links[first].from) first = i;
-  }
-  std::swap(links[0], links[first]);
+  // Every vertex of a closed chain comes once as `from` and once as `to`; an open one has two that do not.
+  std::uint32_t unpaired = 0;
+  for (const Link& link : links) unpaired ^= link.from ^ link.to;
+  const bool closed = unpaired == 0;
+  std::swap(links[0], links[Head(links, closed)]);
   for (std::size_t i = 1; i < links.size(); ++i) {
     const auto next = std::find_if(links.begin() + static_cast<std::ptrdiff_t>(i), links.end(),
                                    [&](const Link& link) { return link.from == links[i - 1].to; });
