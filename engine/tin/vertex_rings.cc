@@ -1,13 +1,14 @@
 #include "engine/tin/vertex_rings.h"
 
 #include <algorithm>
-#include <array>
 #include <utility>
 
 #include "engine/core/check.h"
 
 namespace terrace::tin {
 namespace {
+
+constexpr std::size_t kMaxPool = 0xFFFFFFFF;  // what Ring::begin can name
 
 // The side of a triangle across from the vertex whose ring is being made.
 struct Link {
@@ -45,6 +46,7 @@ bool Chain(std::span<Link> links) {
 }  // namespace
 
 VertexRings::VertexRings(const TinMesh& mesh) : rings_(mesh.vertices.size()) {
+  TERRACE_CHECK(mesh.triangles.size() < kMaxPool / 4);  // three entries each, and one per border vertex
   std::vector<std::uint32_t> ends(mesh.vertices.size() + 1, 0);
   for (const auto& triangle : mesh.triangles) {
     for (const std::uint32_t vertex : triangle) ++ends[vertex];
@@ -97,6 +99,7 @@ void VertexRings::Replace(std::uint32_t vertex, std::uint32_t old, std::span<con
   Ring& ring = rings_[vertex];
   const auto new_size = static_cast<std::uint32_t>(ring.size - 1 + replacement.size());
   if (new_size > ring.capacity) {
+    TERRACE_CHECK(pool_.size() + 2 * std::size_t{new_size} < kMaxPool);
     const auto moved = static_cast<std::uint32_t>(pool_.size());
     pool_.resize(pool_.size() + 2 * std::size_t{new_size});
     std::copy_n(pool_.begin() + ring.begin, ring.size, pool_.begin() + moved);
