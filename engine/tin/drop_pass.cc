@@ -23,9 +23,10 @@ namespace {
 // Visits between two looks at the stop token: about a quarter of a millisecond.
 constexpr std::size_t kStopPeriod = 256;
 
-// Samples a side of the blocks that visits finish one by one. What a visit touches is then in the cache: a quarter less
-// time on 1024 x 1024 samples at 5 m, and the vertices that stay are as many as without blocks, within 0.3 %.
-constexpr int kBlock = 64;
+// Samples a side of the blocks that visits finish one by one, so that what a visit touches is in the cache. A field of
+// 257 x 257 samples is one block, its last row and column being border; smaller blocks miss more where a few straight
+// lines are all there is to keep.
+constexpr int kBlock = 256;
 
 void CheckOptions(const HeightField& field, const DropOptions& options) {
   TERRACE_CHECK(options.max_error >= 0);
@@ -168,7 +169,7 @@ TinMesh DropPass::Mesh() const {
 }  // namespace
 
 std::optional<TinMesh> DropVertices(const HeightField& field, const TinMesh& mesh, const DropOptions& options,
-                                    std::stop_token stop) {
+                                    const std::stop_token& stop) {
   CheckOptions(field, options);
   DropPass pass(field, mesh, options);
   if (!pass.Run(stop)) return std::nullopt;

@@ -2,11 +2,11 @@
 //
 // Greedy insertion never removes a vertex, though later ones often make an earlier one idle. Garland and Heckbert,
 // "Fast Triangular Approximation of Terrains and Height Fields" (1997), section 5, propose a hybrid of refinement and
-// decimation; this is one. Inner vertices are visited from the last inserted to the first, one block of 64 x 64 samples
-// after the other. One is dropped if its hole can be filled by a fan of triangles from one of its neighbours with every
-// sample of the hole within the bound. Fans are tried in the order of their error at the dropped vertex, smallest
-// first, then of their place in the ring (vertex_rings.h); the first that fits is taken. Neighbours of a dropped vertex
-// are visited again in the next sweep, until a sweep drops nothing.
+// decimation; this is one. Inner vertices are visited from the last inserted to the first, one block of 256 x 256
+// samples after the other. One is dropped if its hole can be filled by a fan of triangles from one of its neighbours
+// with every sample of the hole within the bound. Fans are tried in the order of their error at the dropped vertex,
+// smallest first, then of their place in the ring (vertex_rings.h); the first that fits is taken. Neighbours of a
+// dropped vertex are visited again in the next sweep, until a sweep drops nothing.
 //
 // Vertices on the border stay, and with them the border: fields that share one still match along it. The result is not
 // Delaunay, and no prefix of a finer one: it belongs to one threshold.
@@ -38,6 +38,6 @@ struct DropOptions {
 // result does not depend on the order of the triangles of `mesh` or of their corners. Nothing when stopped. Safe to
 // call from many threads at once.
 std::optional<TinMesh> DropVertices(const HeightField& field, const TinMesh& mesh, const DropOptions& options,
-                                    std::stop_token stop = {});
+                                    const std::stop_token& stop = {});
 
 }  // namespace terrace::tin

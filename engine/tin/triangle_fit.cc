@@ -10,7 +10,7 @@ namespace terrace::tin {
 // together with the squared extent, are judged exactly, however thin the triangle.
 bool SamplesAreWithin(const HeightField& field, const std::array<Corner, 3>& corners, double bound) {
   const std::array<Corner, 3> sorted = SortedByRow(corners);
-  const auto& [a, b, c] = sorted;
+  const Corner &a = sorted[0], &b = sorted[1], &c = sorted[2];
   const double dx_b = b.x - a.x, dy_b = b.y - a.y, dz_b = b.z - a.z;
   const double dx_c = c.x - a.x, dy_c = c.y - a.y, dz_c = c.z - a.z;
   const double doubled_area = dx_b * dy_c - dx_c * dy_b;  // negative when the sorted corners turn clockwise

@@ -106,13 +106,13 @@ TEST(DropVertices, LeavesOfACliffItsEnds) {
     int dx, dy;                 // downhill
     std::size_t before, after;  // vertices: at least, at most
   };
-  for (const auto& [dx, dy, before, after] : {Cliff{1, 0, 200, 8}, {0, 1, 200, 8}, {3, 1, 300, 12}}) {
-    const HeightField cliff =
-        MakeField(kSide, kSide, [&](int x, int y) { return dx * x + dy * y < 128 * (dx + dy) + 1 ? 0.f : 100.f; });
+  for (const Cliff& c : {Cliff{1, 0, 200, 8}, {0, 1, 200, 8}, {3, 1, 300, 12}}) {
+    const HeightField cliff = MakeField(
+        kSide, kSide, [&](int x, int y) { return c.dx * x + c.dy * y < 128 * (c.dx + c.dy) + 1 ? 0.f : 100.f; });
     const TinMesh greedy = GreedyMesh(cliff, 5);
     const TinMesh dropped = Dropped(cliff, greedy, {.max_error = 5});
-    EXPECT_GE(greedy.vertices.size(), before);
-    EXPECT_LE(dropped.vertices.size(), after);
+    EXPECT_GE(greedy.vertices.size(), c.before);
+    EXPECT_LE(dropped.vertices.size(), c.after);
     EXPECT_TRUE(IsFairDrop(cliff, greedy, dropped, 5));
   }
 }
