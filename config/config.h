@@ -51,7 +51,8 @@ struct Config {
   unsigned io_threads = 2;      // sockets only; everything that computes runs on workers
   unsigned worker_threads = 0;  // 0: one per processor
   std::size_t queue_length = 256;
-  std::size_t cache_bytes = std::size_t{256} << 20;  // 0: no cache
+  std::size_t cache_bytes = std::size_t{256} << 20;             // 0: no cache
+  std::size_t refinement_cache_bytes = std::size_t{128} << 20;  // 0: no cache
   std::size_t max_connections = 1024;
 
   std::chrono::milliseconds request_deadline{30'000};

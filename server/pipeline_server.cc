@@ -31,6 +31,7 @@ DatasetView ViewOf(const Dataset& dataset) {
 Result<std::unique_ptr<Server>> Server::Start(std::shared_ptr<const TilePipeline> pipeline, ServerOptions options) {
   std::vector<DatasetView> views;
   for (const Dataset& dataset : pipeline->datasets()) views.push_back(ViewOf(dataset));
+  options.refinement_stats = [pipeline] { return pipeline->refinements(); };
   TileBuilder builder = [pipeline = std::move(pipeline)](const TileRequest& request, std::stop_token stop) {
     return pipeline->Build(request, std::move(stop));
   };

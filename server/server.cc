@@ -153,10 +153,14 @@ class Server::Impl {
     return handler;
   }
 
+  ByteCacheStats RefinementStats() const {
+    return options_.refinement_stats ? options_.refinement_stats() : ByteCacheStats{};
+  }
+
   Routes::State RouteState() {
     Routes::State state;
     state.draining = [this] { return connections_.draining(); };
-    state.metrics_text = [this] { return metrics_.Text(tiles_.stats(), connections_.size()); };
+    state.metrics_text = [this] { return metrics_.Text(tiles_.stats(), RefinementStats(), connections_.size()); };
     return state;
   }
 

@@ -8,6 +8,7 @@
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -27,6 +28,7 @@ struct ServerOptions {
   unsigned worker_threads = 0;                       // 0: as many as processors
   std::size_t queue_length = 256;                    // builds that wait for a worker
   std::size_t cache_bytes = std::size_t{256} << 20;  // of finished tiles; 0: none
+  std::function<ByteCacheStats()> refinement_stats;  // of what tiles are made from; may be empty
   std::size_t max_connections = 1024;
   std::string cache_control = "public, max-age=3600";  // of tiles and layer.json
   std::filesystem::path viewer_dir;                    // empty or missing: a plain page instead

@@ -43,7 +43,8 @@ Side SideOf(const HeightField& field, const Corner& a, const Corner& b) {
 
 double BorderError(double misfit_m, const BorderOptions& options) {
   const double padded = misfit_m + options.padding_m;
-  return options.scale * std::min(std::max(padded * options.weight, padded + options.step_m), kMostBorderWeight * misfit_m);
+  return options.scale *
+         std::min(std::max(padded * options.weight, padded + options.step_m), kMostBorderWeight * misfit_m);
 }
 
 Candidate WorstBorderSample(const HeightField& field, const Corner& a, const Corner& b, const BorderOptions& options) {

@@ -8,9 +8,8 @@
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "engine/tin/candidate_queue.cc"
-#include <hwy/foreach_target.h>  // includes this file once for each set of instructions
-
 #include <hwy/contrib/sort/vqsort.h>
+#include <hwy/foreach_target.h>  // includes this file once for each set of instructions
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();

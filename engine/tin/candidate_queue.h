@@ -2,12 +2,12 @@
 //
 // Most candidates are replaced before their turn comes, so only the foremost are kept in order: those at or above a
 // threshold. One sweep over all errors finds and sorts them; what comes to the threshold later goes into a heap beside
-// them. What stays below costs one store, and an entry whose slot has changed since is dropped when its turn comes. When
-// none is left, the next sweep lowers the threshold. No back pointers from the slots, and the order is exact: larger
-// error first, then smaller index of the sample.
+// them. What stays below costs one store, and an entry whose slot has changed since is dropped when its turn comes.
+// When none is left, the next sweep lowers the threshold. No back pointers from the slots, and the order is exact:
+// larger error first, then smaller index of the sample.
 //
-// Errors are kept as floats, rounded up: the largest is never understated, and errors that differ by less are ordered by
-// their samples.
+// Errors are kept as floats, rounded up: the largest is never understated, and errors that differ by less are ordered
+// by their samples.
 #pragma once
 
 #include <bit>

@@ -56,7 +56,7 @@ inline constexpr double kMostBorderWeight = 4;
 struct Curvature {
   // Per row: squared metres per column step; empty: flat ground. Rising up to some row, falling after it.
   std::vector<double> east_m2;
-  double north_m2 = 0;          // squared metres per row step
+  double north_m2 = 0;  // squared metres per row step
   double radius_m = 0;
 };
 

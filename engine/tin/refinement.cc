@@ -160,16 +160,16 @@ std::size_t Refinement::bytes() const {
                sizeof(record.sizes[0]);
       },
       record_);
-  return sizeof(Refinement) + inserted_.capacity() * sizeof(SamplePosition) + errors_before_.capacity() * sizeof(float) +
-         indices;
+  return sizeof(Refinement) + inserted_.capacity() * sizeof(SamplePosition) +
+         errors_before_.capacity() * sizeof(float) + indices;
 }
 
 InsertionRecord<std::uint32_t> Refinement::WideRecord() const {
   return std::visit([](const auto& record) { return ConvertRecord<std::uint32_t>(record); }, record_);
 }
 
-// The form: kMagic, width, height, bytes of an index, then five arrays, each with its length in front, then the hash of all
-// that. Numbers are 32 bits but for the elements of arrays.
+// The form: kMagic, width, height, bytes of an index, then five arrays, each with its length in front, then the hash of
+// all that. Numbers are 32 bits but for the elements of arrays.
 std::string Refinement::Serialize() const {
   ByteWriter writer;
   writer.Reserve(bytes() + 64);

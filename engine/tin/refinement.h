@@ -3,8 +3,8 @@
 // Greedy insertion is progressive: the mesh to any error is what stood before the first insertion made at or below it.
 // So the whole pyramid of meshes is one list of insertions. For each one it holds the sample, the error before it, the
 // ring of vertices that it was joined to, and for each of the triangles made that way the insertion that removed it
-// again. The mesh after n insertions is every triangle made by one of the first n and removed by none of them: a filter,
-// no geometry.
+// again. The mesh after n insertions is every triangle made by one of the first n and removed by none of them: a
+// filter, no geometry.
 //
 // Immutable; safe to read from many threads at once.
 #pragma once

@@ -15,7 +15,8 @@ Sagitta::Sagitta(Curvature curvature, int rows)
   TERRACE_CHECK(east_m2_.size() == static_cast<std::size_t>(rows));
   TERRACE_CHECK(north_m2_ > 0 && doubled_radius_ > 0);
   const auto widest = std::max_element(east_m2_.begin(), east_m2_.end());
-  TERRACE_CHECK(std::is_sorted(east_m2_.begin(), widest) && std::is_sorted(east_m2_.rbegin(), std::reverse_iterator(widest)));
+  TERRACE_CHECK(std::is_sorted(east_m2_.begin(), widest) &&
+                std::is_sorted(east_m2_.rbegin(), std::reverse_iterator(widest)));
   widest_row_ = static_cast<int>(widest - east_m2_.begin());
 }
 

@@ -8,8 +8,9 @@
 
 namespace terrace::tin {
 
-// Sum of the squared vertical distances, in square metres, of the samples that ForEachInnerSpan visits. Those on an edge
-// count one half: their other half is in the triangle across. Voids are skipped. Safe to call from many threads at once.
+// Sum of the squared vertical distances, in square metres, of the samples that ForEachInnerSpan visits. Those on an
+// edge count one half: their other half is in the triangle across. Voids are skipped. Safe to call from many threads at
+// once.
 double SquaredDistances(const HeightField& field, const std::array<Corner, 3>& corners);
 
 }  // namespace terrace::tin

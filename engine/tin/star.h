@@ -39,9 +39,9 @@ class Ring {
   std::vector<float> heights = std::vector<float>(kPadding);                    // metres
 };
 
-// Triangle i, 0 <= i < count, joins ring[i], ring[i + 1] and the centre, counter-clockwise, and is stored with its corners
-// in that order. Closed: ring[count] repeats ring[0]. Open, when the centre lies on the border: the ring begins and ends
-// on that border.
+// Triangle i, 0 <= i < count, joins ring[i], ring[i + 1] and the centre, counter-clockwise, and is stored with its
+// corners in that order. Closed: ring[count] repeats ring[0]. Open, when the centre lies on the border: the ring begins
+// and ends on that border.
 struct Star {
   VertexId centre = 0;
   std::int32_t x = 0, y = 0;  // of the centre
@@ -50,9 +50,9 @@ struct Star {
   bool has_border = false;  // some triangle has an edge on the border
   std::size_t count = 0;
   Ring ring;
-  std::vector<TriangleId> triangles;   // `count` of them are valid
-  std::vector<HalfEdgeId> outside;     // by triangle: the twin of the ring's edge
-  std::vector<TriangleId> removed;     // whose place the triangles took; the first slots of `triangles`
+  std::vector<TriangleId> triangles;  // `count` of them are valid
+  std::vector<HalfEdgeId> outside;    // by triangle: the twin of the ring's edge
+  std::vector<TriangleId> removed;    // whose place the triangles took; the first slots of `triangles`
   std::size_t removed_count = 0;
 };
 

@@ -8,7 +8,6 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "engine/tin/triangle_scan.cc"
 #include <hwy/foreach_target.h>  // includes this file once for each set of instructions
-
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
@@ -32,12 +31,12 @@ struct ScannedTriangle {
   int px, py;
   double pz;
   double ux, uy, vx, vy;
-  double d, a, b;                 // D, A and B of the header
+  double d, a, b;                // D, A and B of the header
   int west, east, south, north;  // bounding box
 };
 
-// The furthest sample so far, lane by lane. Each lane meets its samples in row-major order, so that ">" keeps the first;
-// no comparison with NaN holds.
+// The furthest sample so far, lane by lane. Each lane meets its samples in row-major order, so that ">" keeps the
+// first; no comparison with NaN holds.
 class Furthest {
  public:
   HWY_INLINE Furthest() : numerator_(All(-1.0)), index_(hn::Zero(kDoubles)) {}
@@ -174,9 +173,9 @@ HWY_INLINE PlaneMisfit ScanBox(const OpenSamples& samples, const ScannedTriangle
 constexpr int kRows = 64;
 using Columns = std::array<std::int32_t, kRows + 16>;
 
-// Where the edge from (x0, y0) to (x1, y1), y0 < y1, crosses the rows: x = n / dy with integers n = x0 dy + (y - y0) dx,
-// rounded down, or up when dy - 1 is added to n. Exact with one multiplication: 0 <= n < 2^31 and dy < 2^15, so
-// n * (1 / dy) is off by less than 2^-20 / dy, and a quotient that is no integer lies at least 1 / dy > 2^-15 below the
+// Where the edge from (x0, y0) to (x1, y1), y0 < y1, crosses the rows: x = n / dy with integers n = x0 dy + (y - y0)
+// dx, rounded down, or up when dy - 1 is added to n. Exact with one multiplication: 0 <= n < 2^31 and dy < 2^15, so n *
+// (1 / dy) is off by less than 2^-20 / dy, and a quotient that is no integer lies at least 1 / dy > 2^-15 below the
 // next one: adding 2^-17 lifts an integer that was rounded down above itself, and lifts nothing else over an integer.
 HWY_INLINE void Cross(int x0, int y0, int x1, int y1, bool round_up, int first_row, int rows, Columns& columns) {
   const int dy = y1 - y0;
@@ -275,10 +274,10 @@ void ScanStar(const OpenSamples& samples, const Star& star, PlaneMisfit* misfits
         misfit = {};
         continue;
       }
-      const ScannedTriangle t = {star.x,      star.y,      static_cast<double>(star.height),
-                                 planes.ux[i], planes.uy[i], planes.vx[i],
-                                 planes.vy[i], planes.d[i],  planes.a[i],
-                                 planes.b[i],  planes.west[i], planes.east[i],
+      const ScannedTriangle t = {star.x,          star.y,         static_cast<double>(star.height),
+                                 planes.ux[i],    planes.uy[i],   planes.vx[i],
+                                 planes.vy[i],    planes.d[i],    planes.a[i],
+                                 planes.b[i],     planes.west[i], planes.east[i],
                                  planes.south[i], planes.north[i]};
       const int across = t.east - t.west;
       if (lanes >= 4 && across < 4 && t.north - t.south < 4) {

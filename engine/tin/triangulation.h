@@ -54,8 +54,8 @@ class Triangulation {
 
   const Star& InsertDelaunay(const Vertex& vertex, TriangleId triangle);
 
-  // A triangle that contains the point, inside, on an edge or as a corner, found by a walk from `start`; should the walk
-  // turn in circles, which it can where triangles are not Delaunay, by looking at all of them.
+  // A triangle that contains the point, inside, on an edge or as a corner, found by a walk from `start`; should the
+  // walk turn in circles, which it can where triangles are not Delaunay, by looking at all of them.
   TriangleId Locate(SamplePosition point, TriangleId start) const;
 
   bool IsCorner(SamplePosition point, TriangleId triangle) const;

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "engine/dem/dem_source.h"
+#include "engine/tin/drop_pass.h"
 #include "engine/tin/greedy.h"
 #include "engine/tin/mesh_error.h"
 #include "proto/mesh_file.h"
@@ -50,7 +51,8 @@ std::string Complain(const MeshArguments& arguments) {
   if (goals != 1) return "mesh needs exactly one goal: --max-error METRES, --points N or --rms METRES";
   if (arguments.criterion != "delaunay")
     return "--criterion " + arguments.criterion + " is not available yet; use delaunay";
-  if (arguments.compact) return "--compact is not available yet";
+  if (arguments.compact && arguments.max_error < 0)
+    return "--compact drops what an error bound does not need; give that bound with --max-error METRES";
   return {};
 }
 
@@ -112,6 +114,7 @@ void Print(const MeshArguments& arguments, const tin::HeightField& field, const 
     const nlohmann::ordered_json statistics = {
         {"input", {{"path", arguments.dem}, {"width", field.width()}, {"height", field.height()}}},
         {"criterion", arguments.criterion},
+        {"compact", arguments.compact},
         {"points", mesh.vertices.size()},
         {"triangles", mesh.triangles.size()},
         {"max_error", error.max},
@@ -179,7 +182,8 @@ int Mesh(const MeshArguments& arguments) {
   if (arguments.rms >= 0) goal.rms_error = arguments.rms;
   tin::GreedyTriangulation greedy(*field);
   Triangulate(greedy, goal, static_cast<std::size_t>(field->width()) * static_cast<std::size_t>(field->height()));
-  const tin::TinMesh mesh = greedy.Mesh();
+  tin::TinMesh mesh = greedy.Mesh();
+  if (arguments.compact) mesh = *tin::DropVertices(*field, mesh, {.max_error = goal.max_error});  // nobody stops it
   seconds.triangulate = Since(start);
 
   start = Clock::now();
@@ -236,7 +240,8 @@ void AddMesh(CLI::App& app, int& exit_code) {
       ->check(NumberFrom(1, 256, "a number from 1 to 256"))
       ->type_name("N")
       ->capture_default_str();
-  command->add_flag("--compact", arguments->compact, "Drops vertices that the bound does not need; not available yet");
+  command->add_flag("--compact", arguments->compact,
+                    "Drops vertices that the bound does not need; with --max-error only");
   command->add_flag("--json", arguments->json, "Statistics as JSON on stdout");
   command->callback([arguments, &exit_code] { exit_code = Mesh(*arguments); });
 }

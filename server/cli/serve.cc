@@ -150,7 +150,7 @@ int Serve(const ServeArguments& arguments) {
   std::vector<server::Dataset> datasets;
   if (!OpenDatasets(config, datasets)) return kExitFailure;
   const std::size_t count = datasets.size();
-  auto pipeline = std::make_shared<const server::TilePipeline>(std::move(datasets));
+  auto pipeline = std::make_shared<const server::TilePipeline>(std::move(datasets), config.refinement_cache_bytes);
   auto server = server::Server::Start(std::move(pipeline), OptionsOf(config));
   if (!server) {
     std::fprintf(stderr, "terrace: %s\n", server.error().message.c_str());

@@ -56,6 +56,14 @@ struct Metrics::Families {
                                                           .Name("terrace_tile_build_stage_seconds")
                                                           .Help("Time of each step of a build")
                                                           .Register(registry);
+  prometheus::Family<prometheus::Counter>& refinements =
+      prometheus::BuildCounter()
+          .Name("terrace_refinements_total")
+          .Help("Tiles built, by what was found of their refinement: replayed, continued, or made from the source")
+          .Register(registry);
+  prometheus::Counter& made = refinements.Add({{"use", "made"}});
+  prometheus::Counter& continued = refinements.Add({{"use", "continued"}});
+  prometheus::Counter& replayed = refinements.Add({{"use", "replayed"}});
   prometheus::Counter& source_errors = prometheus::BuildCounter()
                                            .Name("terrace_source_read_errors_total")
                                            .Help("Builds that failed because a source could not be read")
@@ -88,6 +96,17 @@ void Metrics::CountBuild(const TileRequest& request, const Result<TilePtr>& tile
     if (tile.error().code == ErrorCode::kUnavailable) families_->source_errors.Increment();
     return;
   }
+  switch ((*tile)->refinement) {
+    case RefinementUse::kMade:
+      families_->made.Increment();
+      break;
+    case RefinementUse::kContinued:
+      families_->continued.Increment();
+      break;
+    case RefinementUse::kReplayed:
+      families_->replayed.Increment();
+      break;
+  }
   const StageTimes& times = (*tile)->times;
   families_->read.Observe(InSeconds(times.read));
   families_->refine.Observe(InSeconds(times.refine));
@@ -95,7 +114,8 @@ void Metrics::CountBuild(const TileRequest& request, const Result<TilePtr>& tile
   families_->compress.Observe(InSeconds(times.compress));
 }
 
-std::string Metrics::Text(const TileService::Stats& tiles, std::size_t open_connections) const {
+std::string Metrics::Text(const TileService::Stats& tiles, const ByteCacheStats& refinements,
+                          std::size_t open_connections) const {
   constexpr auto kCounter = prometheus::MetricType::Counter;
   constexpr auto kGauge = prometheus::MetricType::Gauge;
   std::vector<prometheus::MetricFamily> all = families_->registry.Collect();
@@ -108,6 +128,8 @@ std::string Metrics::Text(const TileService::Stats& tiles, std::size_t open_conn
       tiles.joined);
   add(kGauge, "terrace_cache_entries", "Tiles in the cache", tiles.cache.entries);
   add(kGauge, "terrace_cache_bytes", "Bytes charged to the cache", tiles.cache.bytes);
+  add(kGauge, "terrace_refinement_cache_entries", "Refinements of tiles in the cache", refinements.entries);
+  add(kGauge, "terrace_refinement_cache_bytes", "Bytes charged to the cache of refinements", refinements.bytes);
   add(kGauge, "terrace_flights", "Builds under way or waiting", tiles.in_flight);
   add(kGauge, "terrace_queue_length", "Builds that wait for a worker", tiles.queued);
   add(kGauge, "terrace_http_connections", "Open connections", open_connections);

@@ -20,7 +20,8 @@ class Metrics {
   void CountBuild(const TileRequest& request, const Result<TilePtr>& tile);
 
   // Everything counted so far and the state given.
-  std::string Text(const TileService::Stats& tiles, std::size_t open_connections) const;
+  std::string Text(const TileService::Stats& tiles, const ByteCacheStats& refinements,
+                   std::size_t open_connections) const;
 
  private:
   struct Families;

@@ -17,6 +17,11 @@
 
 namespace terrace::server {
 
+struct ByteCacheStats {
+  std::size_t entries = 0;
+  std::size_t bytes = 0;  // as charged
+};
+
 // BytesOf(value), found beside the type of the values, says what a value takes.
 template <typename Key, typename Hash, typename Value>
 class ByteCache {
@@ -66,12 +71,8 @@ class ByteCache {
     shard.charged += charge;
   }
 
-  struct Stats {
-    std::size_t entries = 0;
-    std::size_t bytes = 0;  // as charged
-  };
-  Stats stats() const {
-    Stats stats;
+  ByteCacheStats stats() const {
+    ByteCacheStats stats;
     for (const auto& shard : shards_) {
       const std::lock_guard lock(shard->mutex);
       stats.entries += shard->entries.size();

@@ -13,6 +13,9 @@ struct StageTimes {
   std::chrono::microseconds read{0}, refine{0}, encode{0}, compress{0};
 };
 
+// What a build found of its tile's refinement.
+enum class RefinementUse : std::uint8_t { kMade, kContinued, kReplayed };
+
 struct EncodedTile {
   std::string bytes;       // the body in its content coding
   std::string etag;        // strong, with the quotes
@@ -20,6 +23,7 @@ struct EncodedTile {
   std::uint32_t vertices = 0;
   std::uint32_t triangles = 0;
   StageTimes times;  // of the build that made it
+  RefinementUse refinement = RefinementUse::kMade;
 };
 
 inline std::size_t BytesOf(const EncodedTile& tile) { return tile.bytes.size(); }

@@ -119,11 +119,15 @@ TilePipeline::TilePipeline(std::vector<Dataset> datasets, std::size_t refinement
 
 // From the cache where it goes as far as is asked; else read or continued, and kept.
 Result<RefinedTilePtr> TilePipeline::Refine(std::uint32_t index, const geo::TileKey& key, double error_m,
-                                            StageTimes& times, const std::stop_token& stop) const {
+                                            EncodedTile& encoded, const std::stop_token& stop) const {
   const Dataset& dataset = datasets_[index];
   const RefinedTileKey cache_key{index, dataset.generation, key};
   const RefinedTilePtr known = refinements_.Find(cache_key);
-  if (known && known->error_m <= error_m) return known;
+  if (known) encoded.refinement = RefinementUse::kContinued;
+  if (known && known->error_m <= error_m) {
+    encoded.refinement = RefinementUse::kReplayed;
+    return known;
+  }
 
   Clock::time_point start = Clock::now();
   dem::TileHeights heights;
@@ -133,7 +137,7 @@ Result<RefinedTilePtr> TilePipeline::Refine(std::uint32_t index, const geo::Tile
     Result<dem::TileHeights> read = dataset.source->Read(key, stop);
     if (!read) return tl::unexpected(std::move(read).error());
     heights = *std::move(read);
-    times.read = Since(start);
+    encoded.times.read = Since(start);
     start = Clock::now();
   }
   const proto::LatticeView lattice{key, heights.lattice, heights.heights};
@@ -146,7 +150,7 @@ Result<RefinedTilePtr> TilePipeline::Refine(std::uint32_t index, const geo::Tile
   goal.max_points = proto::kMaxTileVertices + 1;
   if (!greedy.Run(goal, stop)) return Cancelled();
   auto refined = std::make_shared<RefinedTile>(RefinedTile{std::move(heights), greedy.MakeRefinement(), error_m});
-  times.refine = Since(start);
+  encoded.times.refine = Since(start);
   // One that ended at the format's number of vertices holds no mesh to this error.
   if (refined->refinement.vertex_count() <= proto::kMaxTileVertices) {
     refinements_.Insert(cache_key, refined);
@@ -162,16 +166,17 @@ Result<EncodedTile> TilePipeline::Build(const TileRequest& request, std::stop_to
   }
   const double error_m = geo::LadderError(request.key.level, request.error_step, dataset.error_fraction);
   EncodedTile encoded;
-  const Result<RefinedTilePtr> refined = Refine(request.dataset, request.key, error_m, encoded.times, stop);
+  const Result<RefinedTilePtr> refined = Refine(request.dataset, request.key, error_m, encoded, stop);
   if (!refined) return tl::unexpected(refined.error());
 
   Clock::time_point start = Clock::now();
   const dem::TileHeights& heights = (*refined)->heights;
   const proto::LatticeView lattice{request.key, heights.lattice, heights.heights};
   double inside_error_m = error_m;
-  Result<tin::TinMesh> mesh = (*refined)->refinement.vertex_count() <= proto::kMaxTileVertices
-                                  ? (*refined)->refinement.MeshAt(error_m)
-                                  : CoarserInside(FieldOf(lattice), PlanOf(*dataset.source, lattice), inside_error_m, stop);
+  Result<tin::TinMesh> mesh =
+      (*refined)->refinement.vertex_count() <= proto::kMaxTileVertices
+          ? (*refined)->refinement.MeshAt(error_m)
+          : CoarserInside(FieldOf(lattice), PlanOf(*dataset.source, lattice), inside_error_m, stop);
   if (!mesh) return tl::unexpected(std::move(mesh).error());
   encoded.times.refine += Since(start);
 

@@ -41,10 +41,10 @@ class TilePipeline {
   // kCancelled: `stop` was requested.
   Result<EncodedTile> Build(const TileRequest& request, std::stop_token stop) const;
 
-  RefinementCache::Stats refinements() const { return refinements_.stats(); }
+  ByteCacheStats refinements() const { return refinements_.stats(); }
 
  private:
-  Result<RefinedTilePtr> Refine(std::uint32_t index, const geo::TileKey& key, double error_m, StageTimes& times,
+  Result<RefinedTilePtr> Refine(std::uint32_t index, const geo::TileKey& key, double error_m, EncodedTile& encoded,
                                 const std::stop_token& stop) const;
 
   std::vector<Dataset> datasets_;

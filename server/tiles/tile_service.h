@@ -60,7 +60,7 @@ class TileService {
   struct Stats {
     std::uint64_t hits = 0, misses = 0, joined = 0;
     std::size_t queued = 0, in_flight = 0;
-    TileCache::Stats cache;
+    ByteCacheStats cache;
   };
   Stats stats() const;
 

@@ -36,6 +36,7 @@ TEST(ToJson, ComesBackWithEveryOptionSet) {
   config.worker_threads = 5;
   config.queue_length = 1;
   config.cache_bytes = std::size_t{1} << 40;
+  config.refinement_cache_bytes = 12'345'678;
   config.max_connections = 7;
   config.request_deadline = std::chrono::milliseconds(100);
   config.header_timeout = std::chrono::milliseconds(1'234);

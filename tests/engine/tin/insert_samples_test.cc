@@ -49,7 +49,8 @@ TEST(InsertSamples, KeepsAnyMeshAMesh) {
   Random random(1);
   std::vector<SamplePosition> samples;
   for (int i = 0; i < 500; ++i) {
-    samples.push_back({static_cast<std::uint16_t>(1 + random.Below(39)), static_cast<std::uint16_t>(1 + random.Below(39))});
+    samples.push_back(
+        {static_cast<std::uint16_t>(1 + random.Below(39)), static_cast<std::uint16_t>(1 + random.Below(39))});
   }
   EXPECT_TRUE(CoversExactly(field, InsertSamples(fan, samples)));
 }

@@ -1,7 +1,6 @@
 #include "engine/tin/triangle_scan.h"
 
 #include <gtest/gtest.h>
-
 #include <hwy/targets.h>
 
 #include <array>
@@ -95,7 +94,8 @@ TEST(TriangleScan, EqualsTheFormulaOnEveryTargetBitForBit) {
     const HeightField field = i % 2 == 0 ? StepField(width, height, 3, seed) : NoiseField(width, height, seed);
     OpenSamples samples(field);
     for (int k = random.Below(width * height / 4); k > 0; --k) samples.Close(RandomSample(random, field));
-    const SamplePosition p = RandomSample(random, field), u = RandomSample(random, field), v = RandomSample(random, field);
+    const SamplePosition p = RandomSample(random, field), u = RandomSample(random, field),
+                         v = RandomSample(random, field);
     if (Orientation(p, u, v) <= 0) continue;
     for (const SamplePosition corner : {p, u, v}) samples.Close(corner);
     ExpectReference(field, samples, *TestStar(field, p, {u, v}));
@@ -120,7 +120,8 @@ TEST(TriangleScan, ScansStarsOfAnySize) {
 TEST(TriangleScan, ReachesTheLargestTriangleOfTheLongestField) {
   constexpr int kLength = HeightField::kMaxSide;
   const HeightField field = MakeField(kLength, 3, [](int x, int y) { return x == kLength - 3 && y == 1 ? 9.f : 0.f; });
-  const HeightField upright = MakeField(3, kLength, [](int x, int y) { return y == kLength - 3 && x == 1 ? 9.f : 0.f; });
+  const HeightField upright =
+      MakeField(3, kLength, [](int x, int y) { return y == kLength - 3 && x == 1 ? 9.f : 0.f; });
   const std::uint16_t last = kLength - 1;
   ExpectReference(field, OpenSamples(field), *TestStar(field, {0, 0}, {{last, 0}, {last, 2}}));
   ExpectReference(upright, OpenSamples(upright), *TestStar(upright, {0, 0}, {{2, 0}, {2, last}}));

@@ -127,6 +127,20 @@ class Mesh(InFolder):
         self.assertEqual(one.read_bytes(), eight.read_bytes())
         self.assertEqual(one.read_bytes()[:4], b"glTF")
 
+    def test_drops_what_the_bound_does_not_need(self):
+        dem = self.write("bumps.asc", grid(BUMPS, PLACE))
+        for bound in (5, 1):
+            arguments = "--max-error", bound, "--coordinates", "pixel"
+            greedy, _ = self.mesh(dem, "greedy.obj", *arguments)
+            compact, out = self.mesh(dem, "compact.obj", *arguments, "--compact")
+            self.assertEqual((greedy["compact"], compact["compact"]), (False, True))
+            self.assertLess(compact["points"], 0.9 * greedy["points"])
+            vertices, triangles = read_obj(out)
+            self.assertEqual((compact["points"], compact["triangles"]), (len(vertices), len(triangles)))
+            worst, _ = self.measure(vertices, triangles)
+            self.assertLessEqual(worst, bound + 1e-3)
+            self.assertAlmostEqual(worst, compact["max_error"], delta=1e-3)
+
     def test_meshes_rasters_without_a_georeference(self):
         pixels = b"".join(struct.pack("B", (x * y) % 251) for y in range(20) for x in range(30))
         dem = self.write("plain.pgm", b"P5\n30 20\n255\n" + pixels)
@@ -150,7 +164,8 @@ class Mesh(InFolder):
                                  (["--max-error", "metres"], ["--out", out, "--max-error", -1]),
                                  (["--threads", "1 to 256"], ["--out", out, "--points", 9, "--threads", 0]),
                                  (["pixel or crs"], ["--out", out, "--points", 9, "--coordinates", "polar"]),
-                                 (["not available yet"], ["--out", out, "--points", 9, "--compact"]),
+                                 (["--compact", "--max-error"], ["--out", out, "--points", 9, "--compact"]),
+                                 (["--compact", "--max-error"], ["--out", out, "--rms", 9, "--compact"]),
                                  (["not available yet"], ["--out", out, "--points", 9, "--criterion", "data-dependent"]),
                                  ([".obj", ".ply", ".glb"], ["--out", "a.txt", "--points", 9])):
             self.assert_refused(2, words, "mesh", SAMPLE, *arguments)

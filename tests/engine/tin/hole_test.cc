@@ -1,0 +1,60 @@
+#include "engine/tin/hole.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <vector>
+
+namespace terrace::tin {
+namespace {
+
+std::vector<std::size_t> FansOf(Hole& hole, double max_error) {
+  const auto fans = hole.Fans(max_error);
+  return {fans.begin(), fans.end()};
+}
+
+TEST(Hole, OffersEachFanOnce) {
+  Hole hole;
+  hole.Begin({2, 1}, 0);
+  for (const SamplePosition p : {SamplePosition{0, 0}, {4, 0}, {2, 4}}) hole.AddCorner(p, 0);
+  EXPECT_EQ(FansOf(hole, 0), (std::vector<std::size_t>{0}));
+  hole.Begin({2, 2}, 0);
+  for (const SamplePosition p : {SamplePosition{0, 0}, {4, 0}, {4, 4}, {0, 4}}) hole.AddCorner(p, 0);
+  EXPECT_EQ(FansOf(hole, 0), (std::vector<std::size_t>{0, 1}));
+}
+
+TEST(Hole, OffersTheNearestFanFirst) {
+  Hole hole;
+  hole.Begin({2, 2}, 10);
+  // The diagonal from corner 0 passes at height 4, that from corner 1 at 9.
+  hole.AddCorner({0, 0}, 4);
+  hole.AddCorner({4, 0}, 8);
+  hole.AddCorner({4, 4}, 4);
+  hole.AddCorner({0, 4}, 10);
+  EXPECT_EQ(FansOf(hole, 7), (std::vector<std::size_t>{1, 0}));
+  EXPECT_EQ(FansOf(hole, 6), (std::vector<std::size_t>{1, 0}));
+  EXPECT_EQ(FansOf(hole, 5.5), (std::vector<std::size_t>{1}));
+  EXPECT_EQ(FansOf(hole, 0.5), (std::vector<std::size_t>{}));
+}
+
+TEST(Hole, OffersNoFanThatTurnsOver) {
+  Hole hole;
+  // A dart, reflex at corner 1: only the diagonal from there is inside.
+  hole.Begin({6, 6}, 0);
+  for (const SamplePosition p : {SamplePosition{0, 8}, {5, 5}, {8, 0}, {8, 8}}) hole.AddCorner(p, 0);
+  EXPECT_EQ(FansOf(hole, 0), (std::vector<std::size_t>{1}));
+  // Three corners on one line: no triangle has them all.
+  hole.Begin({4, 1}, 0);
+  for (const SamplePosition p : {SamplePosition{0, 0}, {4, 0}, {8, 0}, {4, 8}}) hole.AddCorner(p, 0);
+  EXPECT_EQ(FansOf(hole, 0), (std::vector<std::size_t>{1}));
+}
+
+TEST(Hole, HasNoErrorAtAVoid) {
+  Hole hole;
+  hole.Begin({2, 1}, std::numeric_limits<double>::quiet_NaN());
+  for (const SamplePosition p : {SamplePosition{0, 0}, {4, 0}, {2, 4}}) hole.AddCorner(p, 1e30);
+  EXPECT_EQ(FansOf(hole, 0), (std::vector<std::size_t>{0}));
+}
+
+}  // namespace
+}  // namespace terrace::tin

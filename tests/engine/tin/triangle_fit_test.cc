@@ -1,0 +1,65 @@
+#include "engine/tin/triangle_fit.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "engine/tin/triangle_scan.h"
+#include "tests/engine/tin/test_fields.h"
+
+namespace terrace::tin {
+namespace {
+
+// Corners at random samples, with their heights; no triangle on a line.
+std::array<Corner, 3> RandomTriangle(const HeightField& field, Random& random) {
+  for (;;) {
+    std::array<Corner, 3> corners;
+    for (Corner& corner : corners) {
+      corner.x = random.Below(field.width());
+      corner.y = random.Below(field.height());
+      corner.z = static_cast<double>(field.VertexHeight(corner.x, corner.y));
+    }
+    if (Plane(corners).doubled_area != 0) return corners;
+  }
+}
+
+TEST(SamplesAreWithin, AgreesWithTheWorstSample) {
+  Random random(1);
+  for (int trial = 0; trial < 3000; ++trial) {
+    const HeightField field = NoiseField(2 + random.Below(20), 2 + random.Below(20), random.Next());
+    const std::array<Corner, 3> corners = RandomTriangle(field, random);
+    const double worst = WorstSample(field, corners).distance;
+    if (worst < 0) {
+      EXPECT_TRUE(SamplesAreWithin(field, corners, -1));
+      continue;
+    }
+    EXPECT_TRUE(SamplesAreWithin(field, corners, worst * (1 + 1e-9)));
+    EXPECT_FALSE(SamplesAreWithin(field, corners, worst * (1 - 1e-9)));
+    EXPECT_FALSE(SamplesAreWithin(field, corners, -1));
+  }
+}
+
+TEST(SamplesAreWithin, IsExactOnWholeMetres) {
+  // A third of a metre off: 1 / 3 in double is below one third, its successor above.
+  const HeightField field = MakeField(5, 4, [](int x, int y) { return x == 2 && y == 2 ? 1.f : 0.f; });
+  const std::array<Corner, 3> corners = {Corner{1, 1, 0}, {4, 1, 0}, {2, 3, 1}};  // (2, 2) lies at 1 / 2
+  EXPECT_TRUE(SamplesAreWithin(field, corners, 0.5));
+  EXPECT_FALSE(SamplesAreWithin(field, corners, std::nextafter(0.5, 0)));
+  const std::array<Corner, 3> thirds = {Corner{1, 0, 0}, {4, 1, 1}, {1, 3, 0}};  // (2, 1) and (3, 1) at 1/3 and 2/3
+  const HeightField flat = MakeField(5, 4, [](int, int) { return 0.f; });
+  EXPECT_TRUE(SamplesAreWithin(flat, thirds, std::nextafter(2.0 / 3, 1)));
+  EXPECT_FALSE(SamplesAreWithin(flat, thirds, std::nextafter(2.0 / 3, 0)));
+}
+
+TEST(SamplesAreWithin, SkipsVoidsCornersAndTheBorder) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const HeightField field = MakeField(5, 5, [&](int x, int y) {
+    return x == 1 && y == 1 ? nan : y == 0 || x == 0 ? 1e30f : 0.f;
+  });
+  EXPECT_TRUE(SamplesAreWithin(field, {Corner{0, 0, 0}, {4, 0, 0}, {0, 4, 0}}, 0));
+}
+
+}  // namespace
+}  // namespace terrace::tin
