@@ -114,7 +114,7 @@ TEST(TileCache, StaysInBudgetUnderManyThreads) {
     });
   }
   for (std::thread& thread : threads) thread.join();
-  const TileCache::Stats stats = cache.stats();
+  const ByteCacheStats stats = cache.stats();
   EXPECT_LE(stats.bytes, kCapacity);
   EXPECT_EQ(stats.bytes, stats.entries * (40'000 + TileCache::kEntryOverheadBytes));
 }
