@@ -1,0 +1,95 @@
+#include "tests/bench/parallel_insertion.h"
+
+#include <algorithm>
+#include <array>
+
+#include "engine/tin/border.h"
+#include "engine/tin/plane.h"
+#include "engine/tin/triangle_scan.h"
+
+namespace terrace::bench {
+
+using tin::Candidate;
+using tin::Corner;
+using tin::TriangleId;
+
+ParallelInsertion::ParallelInsertion(const tin::HeightField& field)
+    : field_(field), triangulation_(field.width(), field.height()), changed_{0, 1} {
+  ScanChanged();
+}
+
+std::size_t ParallelInsertion::FractionalPass(double alpha, std::size_t max_points) {
+  return Pass(alpha * CurrentError(), max_points);
+}
+
+std::size_t ParallelInsertion::ConstantPass(double epsilon, std::size_t max_points) {
+  return Pass(epsilon, max_points);
+}
+
+std::size_t ParallelInsertion::Pass(double threshold, std::size_t max_points) {
+  std::vector<Candidate> chosen;
+  for (const Candidate& candidate : candidates_) {
+    if (candidate.error > 0 && candidate.error >= threshold) chosen.push_back(candidate);
+  }
+  std::sort(chosen.begin(), chosen.end(), [](const Candidate& a, const Candidate& b) { return Precedes(a, b); });
+  std::size_t inserted = 0;
+  for (const Candidate& candidate : chosen) {
+    if (vertex_count() >= max_points) break;
+    if (Insert(candidate)) ++inserted;
+  }
+  ScanChanged();
+  return inserted;
+}
+
+// False if the sample is a vertex already: the triangles on both sides of an edge may have chosen the same.
+bool ParallelInsertion::Insert(const Candidate& candidate) {
+  const auto width = static_cast<std::uint32_t>(field_.width());
+  const tin::SamplePosition point{static_cast<std::uint16_t>(candidate.sample % width),
+                                  static_cast<std::uint16_t>(candidate.sample / width)};
+  const TriangleId start = changed_.empty() ? 0 : changed_.back();
+  const TriangleId triangle = triangulation_.Locate(point, start);
+  if (triangulation_.IsCorner(point, triangle)) return false;
+  const auto star = triangulation_.Insert(point, triangle);
+  changed_.insert(changed_.end(), star.begin(), star.end());
+  return true;
+}
+
+void ParallelInsertion::ScanChanged() {
+  std::sort(changed_.begin(), changed_.end());
+  changed_.erase(std::unique(changed_.begin(), changed_.end()), changed_.end());
+  candidates_.resize(triangulation_.triangle_count());
+  for (const TriangleId t : changed_) candidates_[t] = WorstOf(t);
+  changed_.clear();
+}
+
+Candidate ParallelInsertion::WorstOf(TriangleId t) const {
+  std::array<Corner, 3> corners;
+  for (unsigned i = 0; i < 3; ++i) {
+    const tin::SamplePosition p = triangulation_.position(triangulation_.triangle(t)[i]);
+    corners[i] = {p.x, p.y, static_cast<double>(field_.VertexHeight(p.x, p.y))};
+  }
+  Candidate worst;
+  if (const tin::PlaneMisfit misfit = tin::WorstSample(field_, corners); misfit.distance > 0) {
+    worst = {misfit.distance, misfit.sample};
+  }
+  for (unsigned i = 0; i < 3; ++i) {
+    if (triangulation_.twin(3 * t + i) != tin::Triangulation::kNone) continue;
+    const Candidate on_border = tin::WorstBorderSample(field_, corners[i], corners[(i + 1) % 3], {});
+    if (Precedes(on_border, worst)) worst = on_border;
+  }
+  return worst;
+}
+
+double ParallelInsertion::CurrentError() const {
+  double error = 0;
+  for (const Candidate& candidate : candidates_) error = std::max(error, candidate.error);
+  return error;
+}
+
+tin::TinMesh ParallelInsertion::Mesh() const {
+  tin::TinMesh mesh{triangulation_.positions(), {}};
+  for (TriangleId t = 0; t < triangulation_.triangle_count(); ++t) mesh.triangles.push_back(triangulation_.triangle(t));
+  return mesh;
+}
+
+}  // namespace terrace::bench
