@@ -23,22 +23,24 @@ void Table::Add(std::vector<Cell> row) {
   rows_.push_back(std::move(row));
 }
 
-void Table::Print(std::ostream& out) const {
+std::string Table::Markdown() const {
   std::vector<std::size_t> widths;
   for (std::size_t i = 0; i < columns_.size(); ++i) {
     widths.push_back(columns_[i].size());
     for (const std::vector<Cell>& row : rows_) widths[i] = std::max(widths[i], row[i].text.size());
   }
+  std::string text;
   const auto line = [&](const auto& text_of) {
-    for (std::size_t i = 0; i < columns_.size(); ++i) out << fmt::format("| {:<{}} ", text_of(i), widths[i]);
-    out << "|\n";
+    for (std::size_t i = 0; i < columns_.size(); ++i) text += fmt::format("| {:<{}} ", text_of(i), widths[i]);
+    text += "|\n";
   };
-  out << "### " << title_ << "\n\n";
   line([&](std::size_t i) { return columns_[i]; });
   line([&](std::size_t i) { return std::string(widths[i], '-'); });
   for (const std::vector<Cell>& row : rows_) line([&](std::size_t i) { return row[i].text; });
-  out << std::endl;
+  return text;
 }
+
+void Table::Print(std::ostream& out) const { out << "### " << title_ << "\n\n" << Markdown() << std::endl; }
 
 nlohmann::ordered_json Table::Json() const {
   nlohmann::ordered_json rows = nlohmann::ordered_json::array();
@@ -49,7 +51,7 @@ nlohmann::ordered_json Table::Json() const {
     }
     rows.push_back(std::move(object));
   }
-  return {{"title", title_}, {"rows", std::move(rows)}};
+  return {{"id", id_}, {"title", title_}, {"rows", std::move(rows)}, {"markdown", Markdown()}};
 }
 
 }  // namespace terrace::bench

@@ -29,18 +29,20 @@ Cell Number(double value, const char* unit, int digits);
 
 class Table {
  public:
-  // `columns` head the cells of every row; their names are the keys in JSON.
-  Table(std::string title, std::vector<std::string> columns) : title_(std::move(title)), columns_(std::move(columns)) {}
+  // `id` names the table in files, `columns` head the cells of every row; their names are the keys in JSON.
+  Table(std::string id, std::string title, std::vector<std::string> columns)
+      : id_(std::move(id)), title_(std::move(title)), columns_(std::move(columns)) {}
 
   // Missing cells at the end are empty.
   void Add(std::vector<Cell> row);
   bool empty() const { return rows_.empty(); }
 
+  std::string Markdown() const;  // the rows alone
   void Print(std::ostream& out) const;
   nlohmann::ordered_json Json() const;
 
  private:
-  std::string title_;
+  std::string id_, title_;
   std::vector<std::string> columns_;
   std::vector<std::vector<Cell>> rows_;
 };

@@ -71,7 +71,7 @@ std::optional<std::vector<tin::HeightField>> ReadTiles(const Area& area) {
 }  // namespace
 
 Table MeasureTiles(Environment& environment) {
-  Table table("T1: Delaunay, tiles of 257 x 257 samples", SpeedColumns());
+  Table table("T1", "T1: Delaunay, tiles of 257 x 257 samples", SpeedColumns());
   const std::array<const char*, 3> aims = {"4x (6x)", "5x (8x)", "7x (10x)"};
   for (std::size_t i = 0; i < kErrors.size(); ++i) {
     Contest sum{{}, Score{}, {}};
@@ -95,7 +95,7 @@ Table MeasureTiles(Environment& environment) {
 }
 
 Table MeasureVertexGoals(Environment& environment) {
-  Table table("T2: Delaunay, 1024 x 1024 samples to a number of vertices", SpeedColumns());
+  Table table("T2", "T2: Delaunay, 1024 x 1024 samples to a number of vertices", SpeedColumns());
   for (const auto& [name, file] : {std::pair{"west-us", "westUS.tif"}, {"ntc", "ntc.tif"}}) {
     for (const auto& [points, aim] : {std::pair{10486u, "8x (10x)"}, {52429u, "5x (8x)"}, {50000u, "5x (8x)"}}) {
       const std::string row = fmt::format("T2 {} {}", name, points);
@@ -111,7 +111,7 @@ Table MeasureVertexGoals(Environment& environment) {
 }
 
 Table MeasureLargeRasters(Environment& environment) {
-  Table table("T3: Delaunay, large rasters at an error", SpeedColumns());
+  Table table("T3", "T3: Delaunay, large rasters at an error", SpeedColumns());
   struct Case {
     const char* name;
     const char* file;

@@ -29,7 +29,7 @@ Peak MeshingPeak(const tin::HeightField& field, const tin::GreedyGoal& goal) {
 }  // namespace
 
 Table MeasureMemory(Environment& environment) {
-  Table table("T7: peak of the heap, bytes; the field itself takes 4 n",
+  Table table("T7", "T7: peak of the heap, bytes; the field itself takes 4 n",
               {"case", "samples n", "vertices m", "meshing", "(4 n + meshing - 4.1 n) / m", "with its mesh", "aim"});
   struct Case {
     const char* name;

@@ -41,8 +41,8 @@ tin::TinMesh UniformGrid(const tin::HeightField& field, int columns, int rows) {
     for (int i = 0; i + 1 < columns; ++i) {
       const std::uint32_t a = vertex_of[node(i, j)], b = vertex_of[node(i + 1, j)];
       const std::uint32_t c = vertex_of[node(i + 1, j + 1)], d = vertex_of[node(i, j + 1)];
-      mesh.triangles.push_back({a, b, c});
-      mesh.triangles.push_back({a, c, d});
+      mesh.triangles.push_back({a, b, d});
+      mesh.triangles.push_back({b, c, d});
     }
   }
   return mesh;

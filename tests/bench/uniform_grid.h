@@ -10,7 +10,7 @@
 namespace terrace::bench {
 
 // Nodes at evenly spaced columns and rows, rounded to samples, the borders among them; every cell is cut along the
-// diagonal from its smaller to its larger coordinates. 2 <= columns <= width, 2 <= rows <= height.
+// diagonal from its larger column and smaller row. 2 <= columns <= width, 2 <= rows <= height.
 tin::TinMesh UniformGrid(const tin::HeightField& field, int columns, int rows);
 
 // The grid of nearly square cells whose number of nodes is nearest to `points`.

@@ -1,0 +1,169 @@
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "engine/tin/greedy.h"
+#include "engine/tin/mesh_error.h"
+#include "tests/bench/environment.h"
+#include "tests/bench/paper.h"
+#include "tests/bench/paper_reference.h"
+#include "tests/bench/parallel_insertion.h"
+#include "tests/bench/rasters.h"
+#include "tests/bench/uniform_grid.h"
+
+namespace terrace::bench {
+namespace {
+
+tin::HeightField Model(const std::string& file) {
+  std::optional<tin::HeightField> field = ReadField(file);
+  if (!field) Die("the paper's elevation models are needed; set TERRACE_TEST_DATA");
+  return *std::move(field);
+}
+
+// 1, 2, 5, 10, ... times 100, up to a third of the samples: the axis of the curves.
+std::vector<std::size_t> VertexCounts(const tin::HeightField& field) {
+  const auto samples = static_cast<std::size_t>(field.width()) * static_cast<std::size_t>(field.height());
+  std::vector<std::size_t> counts;
+  for (std::size_t decade = 100; decade <= samples / 3; decade *= 10) {
+    for (const std::size_t step : {1, 2, 5}) {
+      if (decade * step <= samples / 3) counts.push_back(decade * step);
+    }
+  }
+  return counts;
+}
+
+Series GreedyCurve(const tin::HeightField& field) {
+  Series series{"greedy, Delaunay", {}};
+  tin::GreedyTriangulation tin(field);
+  for (const std::size_t points : VertexCounts(field)) {
+    tin.Run({0, points});
+    series.points.emplace_back(points, tin::MeasureError(field, tin.Mesh()).rms);
+  }
+  return series;
+}
+
+Series UniformCurve(const tin::HeightField& field) {
+  Series series{"uniform grid", {}};
+  for (const std::size_t points : VertexCounts(field)) {
+    const tin::TinMesh mesh = UniformGridOf(field, points);
+    series.points.emplace_back(mesh.vertices.size(), tin::MeasureError(field, mesh).rms);
+  }
+  return series;
+}
+
+std::string StrategyName(const reference::ParallelRow& row) {
+  return row.epsilon < 0 ? fmt::format("alpha = {:g}", row.alpha) : fmt::format("epsilon = {:g} m", row.epsilon);
+}
+
+// After every pass: vertices and RMS.
+Series ParallelCurve(const tin::HeightField& field, const reference::ParallelRow& row) {
+  constexpr std::size_t kMostPoints = 12000;
+  Series series{StrategyName(row), {}};
+  ParallelInsertion insertion(field);
+  while (insertion.vertex_count() < kMostPoints) {
+    const std::size_t inserted = row.epsilon < 0 ? insertion.FractionalPass(row.alpha, kMostPoints)
+                                                 : insertion.ConstantPass(row.epsilon, kMostPoints);
+    if (inserted == 0) break;
+    const bool is_worth_measuring =
+        series.points.empty() || static_cast<double>(insertion.vertex_count()) > series.points.back().first * 1.02;
+    if (!is_worth_measuring) continue;
+    series.points.emplace_back(insertion.vertex_count(), tin::MeasureError(field, insertion.Mesh()).rms);
+  }
+  return series;
+}
+
+// The curve's point whose number of vertices is nearest, as a ratio; nothing if none is within a factor of 1.35.
+std::optional<std::pair<double, double>> Nearest(const Series& series, std::size_t points) {
+  std::optional<std::pair<double, double>> nearest;
+  const auto distance = [&](double count) { return std::abs(std::log(count / static_cast<double>(points))); };
+  for (const auto& point : series.points) {
+    if (!nearest || distance(point.first) < distance(nearest->first)) nearest = point;
+  }
+  return nearest && distance(nearest->first) <= std::log(1.35) ? nearest : std::nullopt;
+}
+
+}  // namespace
+
+void ParallelInsertions(Findings& findings) {
+  const tin::HeightField crater = Model("crater.tif");
+  Figure figure{"parallel", "Crater: one and many insertions per pass (figure 12)", "vertices", "RMS error, m", {}};
+  Table table("parallel", "Crater: RMS error in m (vertices) of sequential and parallel insertion, Scape's in brackets",
+              {"strategy", "about 1542", "about 5000", "about 7711"});
+  figure.series.push_back(GreedyCurve(crater));
+  figure.series.back().name = "sequential";
+  std::erase_if(figure.series.back().points, [](const auto& point) { return point.first > 12000; });
+  std::vector<Cell> sequential{"sequential"};
+  tin::GreedyTriangulation tin(crater);
+  for (const reference::CraterRow& row : reference::kCrater) {
+    if (row.points != 1542 && row.points != 5000 && row.points != 7711) continue;
+    tin.Run({0, row.points});
+    const double rms = tin::MeasureError(crater, tin.Mesh()).rms;
+    sequential.emplace_back(fmt::format("{:.3g} ({}) [{:.3g}]", rms, row.points, row.delaunay_rms), rms);
+  }
+  table.Add(std::move(sequential));
+  for (const reference::ParallelRow& row : reference::kParallel) {
+    Series curve = ParallelCurve(crater, row);
+    std::vector<Cell> cells{curve.name};
+    for (std::size_t i = 0; i < reference::kParallelPoints.size(); ++i) {
+      const auto point = Nearest(curve, reference::kParallelPoints[i]);
+      const double theirs = row.rms[i];
+      cells.emplace_back((point ? fmt::format("{:.3g} ({:.0f})", point->second, point->first) : std::string("-")) +
+                         (theirs > 0 ? fmt::format(" [{:.3g}]", theirs) : ""));
+    }
+    table.Add(std::move(cells));
+    figure.series.push_back(std::move(curve));
+  }
+  findings.figures.push_back(std::move(figure));
+  findings.tables.push_back(std::move(table));
+}
+
+void CraterQuality(Findings& findings) {
+  const tin::HeightField crater = Model("crater.tif");
+  Table table("crater", "Crater: RMS and maximum error in m at m vertices, beside Scape's",
+              {"m", "RMS", "Scape's", "difference", "maximum", "Scape's maximum", "grid nodes", "uniform grid RMS",
+               "Scape's grid"});
+  tin::GreedyTriangulation tin(crater);
+  for (const reference::CraterRow& row : reference::kCrater) {
+    tin.Run({0, row.points});
+    const tin::MeshError error = tin::MeasureError(crater, tin.Mesh());
+    const tin::TinMesh grid = UniformGridOf(crater, row.points);
+    table.Add({Count(row.points), Number(error.rms, 5), Number(row.delaunay_rms, 5),
+               Percent(error.rms / row.delaunay_rms - 1), Number(error.max, 4), Number(row.delaunay_max, 4),
+               Count(grid.vertices.size()), Number(tin::MeasureError(crater, grid).rms, 5),
+               Number(row.uniform_rms, 5)});
+  }
+  findings.tables.push_back(std::move(table));
+}
+
+void QualityOverVertices(Findings& findings) {
+  const tin::HeightField ashby = Model("ashby.tif");
+  Table table("ashby", "Ashby: RMS error in m at m vertices, Scape's in brackets (figure 15)",
+              {"m", "Delaunay", "uniform grid"});
+  tin::GreedyTriangulation tin(ashby);
+  for (const reference::AshbyRow& row : reference::kAshby) {
+    tin.Run({0, row.points});
+    const double rms = tin::MeasureError(ashby, tin.Mesh()).rms;
+    const double grid = tin::MeasureError(ashby, UniformGridOf(ashby, row.points)).rms;
+    table.Add({Count(row.points),
+               {fmt::format("{:.4g} [{:.4g}]", rms, row.delaunay_rms), rms},
+               {fmt::format("{:.4g} [{:.4g}]", grid, row.uniform_rms), grid}});
+  }
+  findings.tables.push_back(std::move(table));
+  for (const auto& [id, title] : {std::pair{"ashby", "Ashby (figure 15)"},
+                                  {"crater", "Crater"},
+                                  {"westUS", "West US"},
+                                  {"ntc", "NTC"},
+                                  {"ozark", "Ozark"}}) {
+    const tin::HeightField field = Model(fmt::format("{}.tif", id));
+    findings.figures.push_back({fmt::format("quality-{}", id),
+                                fmt::format("{}: greedy insertion and uniform grids", title),
+                                "vertices",
+                                "RMS error, m",
+                                {GreedyCurve(field), UniformCurve(field)}});
+  }
+}
+
+}  // namespace terrace::bench
