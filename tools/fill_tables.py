@@ -35,11 +35,11 @@ def main():
         opening = block[0].splitlines()[0]
         name = block["id"]
         if name is None:
-            return f"{opening}\n{context_line(results['context'])}<!-- end -->\n"
+            return f"{opening}\n\n{context_line(results['context'])}\n<!-- end -->\n"
         if name not in tables:
             return block[0]
         placed.add(name)
-        return f"{opening}\n{tables[name]}<!-- end -->\n"
+        return f"{opening}\n\n{tables[name]}\n<!-- end -->\n"
 
     page.write_text(BLOCK.sub(fill, page.read_text(encoding="utf-8")), encoding="utf-8")
     if missing := sorted(set(tables) - placed):

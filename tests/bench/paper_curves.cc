@@ -60,29 +60,24 @@ std::string StrategyName(const reference::ParallelRow& row) {
 
 // After every pass: vertices and RMS.
 Series ParallelCurve(const tin::HeightField& field, const reference::ParallelRow& row) {
-  constexpr std::size_t kMostPoints = 12000;
+  constexpr std::size_t kEnough = 10000, kNoLimit = static_cast<std::size_t>(-1);
   Series series{StrategyName(row), {}};
   ParallelInsertion insertion(field);
-  while (insertion.vertex_count() < kMostPoints) {
-    const std::size_t inserted = row.epsilon < 0 ? insertion.FractionalPass(row.alpha, kMostPoints)
-                                                 : insertion.ConstantPass(row.epsilon, kMostPoints);
+  while (insertion.vertex_count() < kEnough) {
+    const std::size_t inserted =
+        row.epsilon < 0 ? insertion.FractionalPass(row.alpha, kNoLimit) : insertion.ConstantPass(row.epsilon, kNoLimit);
     if (inserted == 0) break;
-    const bool is_worth_measuring =
-        series.points.empty() || static_cast<double>(insertion.vertex_count()) > series.points.back().first * 1.02;
-    if (!is_worth_measuring) continue;
     series.points.emplace_back(insertion.vertex_count(), tin::MeasureError(field, insertion.Mesh()).rms);
   }
   return series;
 }
 
-// The curve's point whose number of vertices is nearest, as a ratio; nothing if none is within a factor of 1.35.
-std::optional<std::pair<double, double>> Nearest(const Series& series, std::size_t points) {
-  std::optional<std::pair<double, double>> nearest;
-  const auto distance = [&](double count) { return std::abs(std::log(count / static_cast<double>(points))); };
+// The curve's first point with that many vertices: where the pass ended that reached them.
+std::optional<std::pair<double, double>> FirstWith(const Series& series, std::size_t points) {
   for (const auto& point : series.points) {
-    if (!nearest || distance(point.first) < distance(nearest->first)) nearest = point;
+    if (point.first >= static_cast<double>(points)) return point;
   }
-  return nearest && distance(nearest->first) <= std::log(1.35) ? nearest : std::nullopt;
+  return std::nullopt;
 }
 
 }  // namespace
@@ -90,11 +85,12 @@ std::optional<std::pair<double, double>> Nearest(const Series& series, std::size
 void ParallelInsertions(Findings& findings) {
   const tin::HeightField crater = Model("crater.tif");
   Figure figure{"parallel", "Crater: one and many insertions per pass (figure 12)", "vertices", "RMS error, m", {}};
-  Table table("parallel", "Crater: RMS error in m (vertices) of sequential and parallel insertion, Scape's in brackets",
-              {"strategy", "about 1542", "about 5000", "about 7711"});
+  Table table("parallel",
+              "Crater: RMS error in m after the pass that reached m vertices (vertices), Scape's in brackets",
+              {"strategy", "m = 1542", "m = 5000", "m = 7711"});
   figure.series.push_back(GreedyCurve(crater));
   figure.series.back().name = "sequential";
-  std::erase_if(figure.series.back().points, [](const auto& point) { return point.first > 12000; });
+  std::erase_if(figure.series.back().points, [](const auto& point) { return point.first > 10000; });
   std::vector<Cell> sequential{"sequential"};
   tin::GreedyTriangulation tin(crater);
   for (const reference::CraterRow& row : reference::kCrater) {
@@ -108,7 +104,7 @@ void ParallelInsertions(Findings& findings) {
     Series curve = ParallelCurve(crater, row);
     std::vector<Cell> cells{curve.name};
     for (std::size_t i = 0; i < reference::kParallelPoints.size(); ++i) {
-      const auto point = Nearest(curve, reference::kParallelPoints[i]);
+      const auto point = FirstWith(curve, reference::kParallelPoints[i]);
       const double theirs = row.rms[i];
       cells.emplace_back((point ? fmt::format("{:.3g} ({:.0f})", point->second, point->first) : std::string("-")) +
                          (theirs > 0 ? fmt::format(" [{:.3g}]", theirs) : ""));

@@ -24,7 +24,8 @@ inline constexpr std::array<CraterRow, 7> kCrater = {{
     {50000, 0.36749, 1.0, 0.29590, 0.28940, 0.29874, 0.37578, 0.47556, 2.0292, 62.5},
 }};
 
-// Crater, insertion of many samples per pass: RMS at about 1542, 5000 and 7711 vertices; 0: not known.
+// Crater, insertion of many samples per pass: RMS after the pass that reached 1542, 5000 and
+// 7711 vertices; 0: not known.
 struct ParallelRow {
   double alpha, epsilon;  // one of them is -1
   std::array<double, 3> rms;
