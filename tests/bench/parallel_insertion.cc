@@ -2,15 +2,13 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
-#include "engine/tin/border.h"
-#include "engine/tin/plane.h"
-#include "engine/tin/triangle_scan.h"
+#include "tests/bench/triangle_samples.h"
 
 namespace terrace::bench {
 
 using tin::Candidate;
-using tin::Corner;
 using tin::TriangleId;
 
 ParallelInsertion::ParallelInsertion(const tin::HeightField& field)
@@ -63,20 +61,15 @@ void ParallelInsertion::ScanChanged() {
 }
 
 Candidate ParallelInsertion::WorstOf(TriangleId t) const {
-  std::array<Corner, 3> corners;
-  for (unsigned i = 0; i < 3; ++i) {
-    const tin::SamplePosition p = triangulation_.position(triangulation_.triangle(t)[i]);
-    corners[i] = {p.x, p.y, static_cast<double>(field_.VertexHeight(p.x, p.y))};
-  }
+  std::array<tin::SamplePosition, 3> corners;
+  for (unsigned i = 0; i < 3; ++i) corners[i] = triangulation_.position(triangulation_.triangle(t)[i]);
   Candidate worst;
-  if (const tin::PlaneMisfit misfit = tin::WorstSample(field_, corners); misfit.distance > 0) {
-    worst = {misfit.distance, misfit.sample};
-  }
-  for (unsigned i = 0; i < 3; ++i) {
-    if (triangulation_.twin(3 * t + i) != tin::Triangulation::kNone) continue;
-    const Candidate on_border = tin::WorstBorderSample(field_, corners[i], corners[(i + 1) % 3], {});
-    if (Precedes(on_border, worst)) worst = on_border;
-  }
+  ForEachSample(field_, corners, [&](tin::SamplePosition p, double height) {
+    const Candidate candidate{std::abs(height - static_cast<double>(field_.At(p.x, p.y))),
+                              static_cast<std::uint32_t>(p.y * field_.width() + p.x)};
+    const bool is_corner = std::find(corners.begin(), corners.end(), p) != corners.end();
+    if (!is_corner && candidate.error > 0 && Precedes(candidate, worst)) worst = candidate;  // false for NaN
+  });
   return worst;
 }
 

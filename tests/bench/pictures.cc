@@ -10,8 +10,7 @@
 #include <utility>
 
 #include "engine/core/check.h"
-#include "engine/tin/plane.h"
-#include "engine/tin/predicates.h"
+#include "tests/bench/triangle_samples.h"
 
 namespace terrace::bench {
 namespace {
@@ -20,24 +19,6 @@ using tin::SamplePosition;
 
 std::size_t IndexOf(int x, int y, int width) {
   return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
-}
-
-void SampleTriangle(const tin::HeightField& field, const std::array<SamplePosition, 3>& p,
-                    std::vector<float>& heights) {
-  std::array<tin::Corner, 3> corners;
-  for (unsigned i = 0; i < 3; ++i) {
-    corners[i] = {p[i].x, p[i].y, static_cast<double>(field.VertexHeight(p[i].x, p[i].y))};
-  }
-  const tin::Plane plane(tin::SortedByRow(corners));
-  const auto [west, east] = std::minmax({p[0].x, p[1].x, p[2].x});
-  const auto [first, last] = std::minmax({p[0].y, p[1].y, p[2].y});
-  for (int y = first; y <= last; ++y) {
-    for (int x = west; x <= east; ++x) {
-      const SamplePosition s{static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)};
-      if (Orientation(p[0], p[1], s) < 0 || Orientation(p[1], p[2], s) < 0 || Orientation(p[2], p[0], s) < 0) continue;
-      heights[IndexOf(x, y, field.width())] = static_cast<float>(plane.At(x, plane.AtRow(y)));
-    }
-  }
 }
 
 // Bresenham's line.
@@ -64,8 +45,10 @@ void DrawLine(int x, int y, int x_end, int y_end, Picture& picture) {
 tin::HeightField SampledMesh(const tin::HeightField& field, const tin::TinMesh& mesh) {
   std::vector<float> heights(IndexOf(0, field.height(), field.width()), 0.0f);
   for (const auto& triangle : mesh.triangles) {
-    SampleTriangle(field, {mesh.vertices[triangle[0]], mesh.vertices[triangle[1]], mesh.vertices[triangle[2]]},
-                   heights);
+    ForEachSample(field, {mesh.vertices[triangle[0]], mesh.vertices[triangle[1]], mesh.vertices[triangle[2]]},
+                  [&](SamplePosition p, double height) {
+                    heights[IndexOf(p.x, p.y, field.width())] = static_cast<float>(height);
+                  });
   }
   Result<tin::HeightField> sampled = tin::HeightField::Make(field.width(), field.height(), std::move(heights));
   TERRACE_CHECK(sampled.has_value());
