@@ -1,15 +1,17 @@
 #include "tests/bench/environment.h"
 
 #include <limits>
+#include <memory>
 #include <stdexcept>
 
 #include "engine/tin/mesh_error.h"
 
 namespace terrace::bench {
 
-Contender Environment::Peer(const std::string& command) {
-  return [this, command](const tin::HeightField& field, const tin::GreedyGoal& goal, Runs& runs) {
-    const auto path = files_.PathOf(field);
+Contender PeerContender(const std::string& command) {
+  const auto files = std::make_shared<FieldFiles>();
+  return [files, command](const tin::HeightField& field, const tin::GreedyGoal& goal, Runs& runs) {
+    const auto path = files->PathOf(field);
     if (!path) Die(path.error().message);
     const auto ran = RunPeer(command, *path, field, goal);
     if (!ran) Die(ran.error().message);

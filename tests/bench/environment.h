@@ -29,17 +29,16 @@ class Environment {
   bool Wants(const std::string& name) const { return std::regex_search(name, filter_); }
   const Options& options() const { return options_; }
 
-  // Runs `command` as a contender; it must be one of the options' peers. Dies when the command fails.
-  Contender Peer(const std::string& command);
-
  private:
   Options options_;
   std::regex filter_;
-  FieldFiles files_;
 };
 
 // Gives up: throws a std::runtime_error that only main() catches, so that temporary files go on the way.
 [[noreturn]] void Die(const std::string& message);
+
+// The command (peer.h) as a contender. Fields that it is raced on must outlive it. Dies when the command fails.
+Contender PeerContender(const std::string& command);
 
 // Dies unless the mesh meets the goal, measured by tin::MeasureError. Returns the root mean square error.
 double CheckMesh(const std::string& name, const tin::HeightField& field, const tin::GreedyGoal& goal,

@@ -51,7 +51,7 @@ Contest Contend(Environment& environment, const std::string& name, const std::ve
   }
   std::vector<Contender> contenders{MeshFromScratch};
   const std::string& peer = environment.options().peer;
-  if (!peer.empty()) contenders.push_back(environment.Peer(peer));
+  if (!peer.empty()) contenders.push_back(PeerContender(peer));
   const std::vector<Score> scores = Race(PointersTo(fields), goal, environment.options().runs, contenders);
   contest.ours = scores[0];
   if (scores.size() > 1) contest.theirs = scores[1];
