@@ -1,5 +1,6 @@
 #include "tests/bench/rasters.h"
 
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <iostream>
@@ -42,6 +43,26 @@ std::optional<tin::HeightField> ReadField(const std::string& name, const Window&
     if (std::isnan(height)) height = 0;
   }
   return MakeField(raster->width, raster->height, std::move(heights));
+}
+
+std::span<const Area> TileAreas() {
+  static const std::array<Area, 4> areas = {{
+      {"alps", "srtm3_N46E008_swiss_alps.tif", {{0, 0}, {826, 944}, {354, 826}, {826, 354}}},
+      {"andes", "srtm3_S33W071_andes.tif", {{100, 100}, {500, 300}, {800, 800}, {300, 850}}},
+      {"crater", "crater.tif", {{0, 0}, {79, 202}}},
+      {"west-us", "westUS.tif", {{0, 0}, {500, 200}, {700, 700}, {200, 600}}},
+  }};
+  return areas;
+}
+
+std::optional<std::vector<tin::HeightField>> ReadTiles(const Area& area) {
+  std::vector<tin::HeightField> fields;
+  for (const auto& [x, y] : area.corners) {
+    std::optional<tin::HeightField> field = ReadField(area.file, {x, y, kTileSide, kTileSide});
+    if (!field) return std::nullopt;
+    fields.push_back(*std::move(field));
+  }
+  return fields;
 }
 
 tin::HeightField MirroredFourfold(const tin::HeightField& field) {

@@ -2,45 +2,14 @@
 #include <optional>
 #include <utility>
 
-#include "tests/bench/cpu_clock.h"
+#include "tests/bench/greedy_runs.h"
 #include "tests/bench/rasters.h"
 #include "tests/bench/targets.h"
 
 namespace terrace::bench {
 namespace {
 
-constexpr int kTileSide = 257;
 constexpr std::array<double, 3> kErrors = {1, 5, 20};
-
-struct Area {
-  const char* name;
-  const char* file;
-  std::vector<std::pair<int, int>> corners;  // of windows of kTileSide
-};
-
-// Rough mountains at 3 arc-seconds (windows with few voids), and the paper's elevation models.
-const std::array<Area, 4> kAreas = {{
-    {"alps", "srtm3_N46E008_swiss_alps.tif", {{0, 0}, {826, 944}, {354, 826}, {826, 354}}},
-    {"andes", "srtm3_S33W071_andes.tif", {{100, 100}, {500, 300}, {800, 800}, {300, 850}}},
-    {"crater", "crater.tif", {{0, 0}, {79, 202}}},
-    {"west-us", "westUS.tif", {{0, 0}, {500, 200}, {700, 700}, {200, 600}}},
-}};
-
-std::vector<const tin::HeightField*> PointersTo(const std::vector<tin::HeightField>& fields) {
-  std::vector<const tin::HeightField*> pointers;
-  for (const tin::HeightField& field : fields) pointers.push_back(&field);
-  return pointers;
-}
-
-tin::TinMesh MeshOf(const tin::HeightField& field, const tin::GreedyGoal& goal) {
-  tin::GreedyTriangulation tin(field);
-  tin.Run(goal);
-  return tin.Mesh();
-}
-
-void MeshFromScratch(const tin::HeightField& field, const tin::GreedyGoal& goal, Runs& runs) {
-  runs.seconds.push_back(SecondsOf([&] { runs.points = MeshOf(field, goal).vertices.size(); }));
-}
 
 Contest Contend(Environment& environment, const std::string& name, const std::vector<tin::HeightField>& fields,
                 const tin::GreedyGoal& goal) {
@@ -58,16 +27,6 @@ Contest Contend(Environment& environment, const std::string& name, const std::ve
   return contest;
 }
 
-std::optional<std::vector<tin::HeightField>> ReadTiles(const Area& area) {
-  std::vector<tin::HeightField> fields;
-  for (const auto& [x, y] : area.corners) {
-    std::optional<tin::HeightField> field = ReadField(area.file, {x, y, kTileSide, kTileSide});
-    if (!field) return std::nullopt;
-    fields.push_back(*std::move(field));
-  }
-  return fields;
-}
-
 }  // namespace
 
 Table MeasureTiles(Environment& environment) {
@@ -76,7 +35,7 @@ Table MeasureTiles(Environment& environment) {
   for (std::size_t i = 0; i < kErrors.size(); ++i) {
     Contest sum{{}, Score{}, {}};
     std::size_t areas = 0;
-    for (const Area& area : kAreas) {
+    for (const Area& area : TileAreas()) {
       const std::string name = fmt::format("T1 {} {} m", area.name, kErrors[i]);
       if (!environment.Wants(name)) continue;
       const std::optional<std::vector<tin::HeightField>> tiles = ReadTiles(area);
@@ -87,7 +46,7 @@ Table MeasureTiles(Environment& environment) {
       if (contest.theirs) *sum.theirs += *contest.theirs;
       ++areas;
     }
-    if (areas < kAreas.size()) continue;
+    if (areas < TileAreas().size()) continue;
     if (environment.options().peer.empty()) sum.theirs.reset();
     AddRow(table, fmt::format("T1 all {} m", kErrors[i]), sum, aims[i]);
   }
