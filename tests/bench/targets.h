@@ -13,5 +13,6 @@ Table MeasureTiles(Environment& environment);         // T1: Delaunay, 257 x 257
 Table MeasureVertexGoals(Environment& environment);   // T2: Delaunay, 1024 x 1024 samples, at a number of vertices
 Table MeasureLargeRasters(Environment& environment);  // T3: Delaunay, 2401 x 2401 samples and more, at an error
 Table MeasureMemory(Environment& environment);        // T7: the heap's peak
+Table MeasureVertices(Environment& environment);      // T8: vertices beside one exact greedy run
 
 }  // namespace terrace::bench
