@@ -9,6 +9,7 @@
 #include "tests/bench/cpu_clock.h"
 #include "tests/bench/environment.h"
 #include "tests/bench/paper.h"
+#include "tests/bench/parallel_insertion.h"
 #include "tests/bench/rasters.h"
 
 namespace terrace::bench {
@@ -36,6 +37,21 @@ std::vector<Timing> TimeRun(const tin::HeightField& field, const std::vector<std
   return timings;
 }
 
+// The naive algorithm, one run.
+Series TimeNaive(const tin::HeightField& field, const std::vector<std::size_t>& counts) {
+  Series series{fmt::format("naive, n = {} x {}", field.width(), field.height()), {}};
+  ParallelInsertion insertion(field);
+  double seconds = 0;
+  for (const std::size_t count : counts) {
+    seconds += SecondsOf([&] {
+      while (insertion.vertex_count() < count && insertion.NaivePass(count) > 0) {
+      }
+    });
+    series.points.emplace_back(insertion.vertex_count(), seconds);
+  }
+  return series;
+}
+
 // The paper's cost, O((m + n) log m), as time = a n log2 m + b m log2 m: least squares of the relative errors.
 struct Fit {
   double a = 0, b = 0;
@@ -61,6 +77,7 @@ Fit FitCost(const std::vector<Timing>& timings) {
 void TimeOverVertices(Findings& findings) {
   Figure figure{"time", "West US: CPU time of greedy insertion (figure 3)", "vertices", "seconds", {}};
   std::vector<Timing> all;
+  Series naive;
   for (const int side : {128, 256, 512, 1024}) {
     const std::optional<tin::HeightField> field = ReadField("westUS.tif", {0, 0, side, side});
     if (!field) Die("the paper's elevation models are needed; set TERRACE_TEST_DATA");
@@ -75,7 +92,9 @@ void TimeOverVertices(Findings& findings) {
       series.points.emplace_back(timing.m, timing.seconds);
     }
     figure.series.push_back(std::move(series));
+    if (side == 128) naive = TimeNaive(*field, counts);
   }
+  figure.series.push_back(std::move(naive));
   const Fit fit = FitCost(all);
   double worst = 1;
   for (const Timing& t : all) {

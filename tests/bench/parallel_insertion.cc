@@ -24,6 +24,12 @@ std::size_t ParallelInsertion::ConstantPass(double epsilon, std::size_t max_poin
   return Pass(epsilon, max_points);
 }
 
+std::size_t ParallelInsertion::NaivePass(std::size_t max_points) {
+  for (TriangleId t = 0; t < triangulation_.triangle_count(); ++t) changed_.push_back(t);
+  ScanChanged();
+  return FractionalPass(1, max_points);
+}
+
 std::size_t ParallelInsertion::Pass(double threshold, std::size_t max_points) {
   std::vector<Candidate> chosen;
   for (const Candidate& candidate : candidates_) {

@@ -26,6 +26,9 @@ class ParallelInsertion {
   std::size_t FractionalPass(double alpha, std::size_t max_points);
   std::size_t ConstantPass(double epsilon, std::size_t max_points);
 
+  // A pass of section 3.2, algorithm I: looks at every sample of the field again and inserts the worst. O(n) each.
+  std::size_t NaivePass(std::size_t max_points);
+
   std::size_t vertex_count() const { return triangulation_.vertex_count(); }
   double CurrentError() const;
   tin::TinMesh Mesh() const;

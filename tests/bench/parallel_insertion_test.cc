@@ -22,6 +22,16 @@ TEST(ParallelInsertion, WithAlphaOneIsSequential) {
   EXPECT_EQ(parallel.Mesh().vertices, sequential.Mesh().vertices);
 }
 
+TEST(ParallelInsertion, NaivePassesAreSequential) {
+  const tin::HeightField field = tin::NoiseField(17, 22, 7);
+  ParallelInsertion naive(field);
+  while (naive.NaivePass(60) > 0) {
+  }
+  tin::GreedyTriangulation sequential(field);
+  ASSERT_TRUE(sequential.Run({0, 60}));
+  EXPECT_EQ(naive.Mesh().vertices, sequential.Mesh().vertices);
+}
+
 TEST(ParallelInsertion, WithAlphaZeroInsertsInEveryTriangle) {
   const tin::HeightField field = tin::NoiseField(40, 40, 4);
   ParallelInsertion parallel(field);
