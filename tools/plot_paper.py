@@ -16,13 +16,15 @@ COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#0
 
 
 class Axis:
-    """A logarithmic axis from `low` to `high`, drawn between the pixels `start` and `end`."""
+    """A logarithmic axis of `values`, drawn between the pixels `start` and `end`; a label takes `room` pixels."""
 
-    def __init__(self, values, start, end):
+    def __init__(self, values, start, end, room):
         self.low, self.high = math.log10(min(values)), math.log10(max(values))
         margin = max(0.03 * (self.high - self.low), 0.01)
         self.low, self.high = self.low - margin, self.high + margin
         self.start, self.end = start, end
+        decade = abs(end - start) / (self.high - self.low)
+        self.steps = (1, 2, 5) if decade * 0.3 >= room else (1,)  # from 1 to 2 it is 0.3 of a decade
 
     def at(self, value):
         share = (math.log10(value) - self.low) / (self.high - self.low)
@@ -30,8 +32,7 @@ class Axis:
 
     def ticks(self):
         decades = range(math.floor(self.low), math.ceil(self.high) + 1)
-        steps = (1, 2, 5) if self.high - self.low < 3.5 else (1,)
-        values = (step * 10.0**decade for decade in decades for step in steps)
+        values = (step * 10.0**decade for decade in decades for step in self.steps)
         return [value for value in values if self.low <= math.log10(value) <= self.high]
 
 
@@ -53,8 +54,8 @@ def curve(series, x_axis, y_axis, colour):
 
 def draw(figure):
     points = [point for series in figure["series"] for point in series["points"]]
-    x_axis = Axis([x for x, _ in points], LEFT, WIDTH - RIGHT)
-    y_axis = Axis([y for _, y in points], HEIGHT - BOTTOM, TOP)
+    x_axis = Axis([x for x, _ in points], LEFT, WIDTH - RIGHT, 60)
+    y_axis = Axis([y for _, y in points], HEIGHT - BOTTOM, TOP, 16)
     out = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" height="{HEIGHT}" '
            'font-family="sans-serif" font-size="12">',
            f'<rect width="{WIDTH}" height="{HEIGHT}" fill="white"/>',

@@ -54,6 +54,19 @@ Series UniformCurve(const tin::HeightField& field) {
   return series;
 }
 
+// Scape's Delaunay meshes, where they are known.
+std::optional<Series> ScapeMarks(const std::string& id) {
+  Series marks{"Scape, Delaunay", {}, true};
+  if (id == "crater") {
+    for (const reference::CraterRow& row : reference::kCrater) marks.points.emplace_back(row.points, row.delaunay_rms);
+  } else if (id == "ashby") {
+    for (const reference::AshbyRow& row : reference::kAshby) marks.points.emplace_back(row.points, row.delaunay_rms);
+  } else {
+    return std::nullopt;
+  }
+  return marks;
+}
+
 std::string StrategyName(const reference::ParallelRow& row) {
   return row.epsilon < 0 ? fmt::format("alpha = {:g}", row.alpha) : fmt::format("epsilon = {:g} m", row.epsilon);
 }
@@ -154,11 +167,13 @@ void QualityOverVertices(Findings& findings) {
                                   {"ntc", "NTC"},
                                   {"ozark", "Ozark"}}) {
     const tin::HeightField field = Model(fmt::format("{}.tif", id));
-    findings.figures.push_back({fmt::format("quality-{}", id),
-                                fmt::format("{}: greedy insertion and uniform grids", title),
-                                "vertices",
-                                "RMS error, m",
-                                {GreedyCurve(field), UniformCurve(field)}});
+    Figure figure{fmt::format("quality-{}", id),
+                  fmt::format("{}: greedy insertion and uniform grids", title),
+                  "vertices",
+                  "RMS error, m",
+                  {GreedyCurve(field), UniformCurve(field)}};
+    if (std::optional<Series> marks = ScapeMarks(id)) figure.series.push_back(*std::move(marks));
+    findings.figures.push_back(std::move(figure));
   }
 }
 
