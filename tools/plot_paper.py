@@ -72,7 +72,9 @@ def draw(figure):
         colour = COLOURS[number % len(COLOURS)]
         out += curve(series, x_axis, y_axis, colour)
         y = TOP + 14 + 20 * number
-        out += [f'<path d="M{WIDTH - RIGHT + 14} {y - 4}h20" stroke="{colour}" stroke-width="2.5"/>',
+        x = WIDTH - RIGHT + 14
+        out += [f'<circle cx="{x + 10}" cy="{y - 4}" r="3" fill="white" stroke="{colour}"/>' if series["reference"] else
+                f'<path d="M{x} {y - 4}h20" stroke="{colour}" stroke-width="2.5"/>',
                 text(WIDTH - RIGHT + 40, y, series["name"], "start")]
     return "\n".join(out + ["</svg>\n"])
 

@@ -72,7 +72,7 @@ class ToolsTest(unittest.TestCase):
         root = ElementTree.parse(self.folder / "plots" / "curve.svg").getroot()
         name = "{http://www.w3.org/2000/svg}"
         self.assertEqual(len(root.findall(f"{name}polyline")), 1)
-        self.assertEqual(len(root.findall(f"{name}circle")), 4)
+        self.assertEqual(len(root.findall(f"{name}circle")), 5)  # three points, one mark, and its legend
         places = [tuple(map(float, place.split(","))) for place in root.find(f"{name}polyline").get("points").split()]
         self.assertEqual(places, sorted(places))  # to the right with more vertices, and down with less error
         self.assertIn("A < B", [element.text for element in root.iter(f"{name}text")])
