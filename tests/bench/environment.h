@@ -44,7 +44,7 @@ Contender PeerContender(const std::string& command);
 double CheckMesh(const std::string& name, const tin::HeightField& field, const tin::GreedyGoal& goal,
                  const tin::TinMesh& mesh);
 
-// A race of ours against a peer, if there is one, as a row of `SpeedColumns`.
+// A race of ours against a peer, if there is one, as a row of SpeedColumns(), and of one column more for the RMS.
 std::vector<std::string> SpeedColumns();
 struct Contest {
   Score ours;
