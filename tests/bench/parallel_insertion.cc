@@ -11,8 +11,22 @@ namespace terrace::bench {
 using tin::Candidate;
 using tin::TriangleId;
 
+namespace {
+
+tin::Triangulation::Vertex VertexAt(const tin::HeightField& field, int x, int y) {
+  return {{static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)}, field.VertexHeight(x, y)};
+}
+
+tin::Triangulation CornersOf(const tin::HeightField& field) {
+  const int east = field.width() - 1, north = field.height() - 1;
+  return tin::Triangulation(std::array{VertexAt(field, 0, 0), VertexAt(field, east, 0), VertexAt(field, east, north),
+                                       VertexAt(field, 0, north)});
+}
+
+}  // namespace
+
 ParallelInsertion::ParallelInsertion(const tin::HeightField& field)
-    : field_(field), triangulation_(field.width(), field.height()), changed_{0, 1} {
+    : field_(field), triangulation_(CornersOf(field)), changed_{0, 1} {
   ScanChanged();
 }
 
@@ -53,8 +67,9 @@ bool ParallelInsertion::Insert(const Candidate& candidate) {
   const TriangleId start = changed_.empty() ? 0 : changed_.back();
   const TriangleId triangle = triangulation_.Locate(point, start);
   if (triangulation_.IsCorner(point, triangle)) return false;
-  const auto star = triangulation_.Insert(point, triangle);
-  changed_.insert(changed_.end(), star.begin(), star.end());
+  const tin::Star& star = triangulation_.InsertDelaunay(VertexAt(field_, point.x, point.y), triangle);
+  changed_.insert(changed_.end(), star.triangles.begin(),
+                  star.triangles.begin() + static_cast<std::ptrdiff_t>(star.count));
   return true;
 }
 
@@ -85,10 +100,6 @@ double ParallelInsertion::CurrentError() const {
   return error;
 }
 
-tin::TinMesh ParallelInsertion::Mesh() const {
-  tin::TinMesh mesh{triangulation_.positions(), {}};
-  for (TriangleId t = 0; t < triangulation_.triangle_count(); ++t) mesh.triangles.push_back(triangulation_.triangle(t));
-  return mesh;
-}
+tin::TinMesh ParallelInsertion::Mesh() const { return triangulation_.Mesh(); }
 
 }  // namespace terrace::bench

@@ -13,7 +13,8 @@ namespace {
 int Measure(const Options& options, const std::string& json_path) {
   Environment environment(options);
   nlohmann::ordered_json tables = nlohmann::ordered_json::array();
-  for (const auto& measure : {MeasureTiles, MeasureVertexGoals, MeasureLargeRasters, MeasureMemory, MeasureVertices}) {
+  for (const auto& measure : {MeasureTiles, MeasureVertexGoals, MeasureLargeRasters, MeasureReplay, MeasureSweep,
+                              MeasureDropPass, MeasureMemory, MeasureVertices}) {
     const Table table = measure(environment);
     if (table.empty()) continue;
     table.Print(std::cout);
