@@ -40,6 +40,14 @@ void* operator new(std::size_t size, std::align_val_t alignment) {
   const auto step = static_cast<std::size_t>(alignment);
   return terrace::bench::Track(std::aligned_alloc(step, (size + step - 1) / step * step));
 }
+// The library's own would do, were it not replaced itself under sanitizers.
+void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
+  try {
+    return operator new(size);
+  } catch (const std::bad_alloc&) {
+    return nullptr;
+  }
+}
 void operator delete(void* block) noexcept { terrace::bench::Release(block); }
 void operator delete(void* block, std::size_t) noexcept { terrace::bench::Release(block); }
 void operator delete(void* block, std::align_val_t) noexcept { terrace::bench::Release(block); }
