@@ -3,12 +3,14 @@ JOBS ?= $(shell nproc)
 CONFIG ?= config/samples/samples.json
 # Address of `make run`, HOST:PORT; empty: what CONFIG says.
 LISTEN ?=
+# Options of `make bench`, for instance BENCH="--peer 'COMMAND' --filter 'T1 '": see docs/performance.md.
+BENCH ?=
 
 SOURCES = git ls-files '*.h' '*.cc'
 TERRACE = build/release/server/cli/terrace
 
 .DEFAULT_GOAL := help
-.PHONY: help deps test-deps build run test bench format lint clean
+.PHONY: help deps test-deps build run test bench paper format lint clean
 
 help:  ## list these targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -31,7 +33,10 @@ test: test-deps  ## build and run every test, then the unit tests under ASan + U
 	@tools/run_tests.py --jobs $(JOBS)
 
 bench: test-deps  ## build and run the benchmarks; JSON results in build/bench/results
-	@tools/run_benchmarks.sh $(JOBS)
+	@tools/run_benchmarks.sh $(JOBS) $(BENCH)
+
+paper: test-deps  ## repeat the experiments of the paper (docs/engine.md) into build/paper
+	@tools/run_paper.sh $(JOBS)
 
 format:  ## format the C++ sources
 	$(SOURCES) | xargs clang-format-14 -i

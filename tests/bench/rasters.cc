@@ -1,0 +1,80 @@
+#include "tests/bench/rasters.h"
+
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <iostream>
+#include <set>
+#include <utility>
+
+#include "engine/core/check.h"
+#include "engine/dem/void_fill.h"
+#include "tests/support/test_data.h"
+
+namespace terrace::bench {
+namespace {
+
+constexpr int kMaxVoidGap = 64;  // samples
+
+std::string PathOf(const std::string& name) {
+  const std::filesystem::path sample = std::filesystem::path(TERRACE_SOURCE_DIR) / "config" / "samples" / name;
+  return std::filesystem::exists(sample) ? sample.string() : name;
+}
+
+tin::HeightField MakeField(int width, int height, std::vector<float> heights) {
+  Result<tin::HeightField> field = tin::HeightField::Make(width, height, std::move(heights));
+  TERRACE_CHECK(field.has_value());
+  return *std::move(field);
+}
+
+}  // namespace
+
+std::optional<tin::HeightField> ReadField(const std::string& name, const Window& window) {
+  std::optional<test_support::TestRaster> raster =
+      test_support::ReadTestRaster(PathOf(name), window.x, window.y, window.width, window.height);
+  if (!raster) {
+    static std::set<std::string> missed;
+    if (missed.insert(name).second) std::cerr << test_support::MissingTestData(name) << std::endl;
+    return std::nullopt;
+  }
+  const dem::GridWindow all{0, 0, raster->width, raster->height};
+  std::vector<float> heights = dem::FillVoids(raster->heights, all, all, kMaxVoidGap);
+  for (float& height : heights) {
+    if (std::isnan(height)) height = 0;
+  }
+  return MakeField(raster->width, raster->height, std::move(heights));
+}
+
+std::span<const Area> TileAreas() {
+  static const std::array<Area, 4> areas = {{
+      {"alps", "srtm3_N46E008_swiss_alps.tif", {{0, 0}, {826, 944}, {354, 826}, {826, 354}}},
+      {"andes", "srtm3_S33W071_andes.tif", {{100, 100}, {500, 300}, {800, 800}, {300, 850}}},
+      {"crater", "crater.tif", {{0, 0}, {79, 202}}},
+      {"west-us", "westUS.tif", {{0, 0}, {500, 200}, {700, 700}, {200, 600}}},
+  }};
+  return areas;
+}
+
+std::optional<std::vector<tin::HeightField>> ReadTiles(const Area& area) {
+  std::vector<tin::HeightField> fields;
+  for (const auto& [x, y] : area.corners) {
+    std::optional<tin::HeightField> field = ReadField(area.file, {x, y, kTileSide, kTileSide});
+    if (!field) return std::nullopt;
+    fields.push_back(*std::move(field));
+  }
+  return fields;
+}
+
+tin::HeightField MirroredFourfold(const tin::HeightField& field) {
+  const int width = 2 * field.width() - 1, height = 2 * field.height() - 1;
+  std::vector<float> heights;
+  heights.reserve(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      heights.push_back(field.At(x < field.width() ? x : width - 1 - x, y < field.height() ? y : height - 1 - y));
+    }
+  }
+  return MakeField(width, height, std::move(heights));
+}
+
+}  // namespace terrace::bench

@@ -1,0 +1,61 @@
+#include <array>
+#include <optional>
+
+#include "tests/bench/heap_peak.h"
+#include "tests/bench/rasters.h"
+#include "tests/bench/targets.h"
+
+namespace terrace::bench {
+namespace {
+
+struct Peak {
+  std::size_t meshing_bytes = 0;   // of the triangulation while it runs
+  std::size_t finished_bytes = 0;  // of the triangulation and of the mesh taken from it, whichever moment is worse
+  std::size_t points = 0;
+};
+
+Peak MeshingPeak(const tin::HeightField& field, const tin::GreedyGoal& goal) {
+  const std::size_t before = HeapBytes();
+  ResetHeapPeak();
+  Peak peak;
+  tin::GreedyTriangulation tin(field);
+  tin.Run(goal);
+  peak.meshing_bytes = HeapPeakBytes() - before;
+  peak.points = tin.Mesh().vertices.size();
+  peak.finished_bytes = HeapPeakBytes() - before;
+  return peak;
+}
+
+}  // namespace
+
+Table MeasureMemory(Environment& environment) {
+  Table table("T7", "T7: peak of the heap, bytes; the field itself takes 4 n",
+              {"case", "samples n", "vertices m", "meshing", "(4 n + meshing - 4.1 n) / m", "with its mesh", "aim"});
+  struct Case {
+    const char* name;
+    const char* file;
+    Window window;
+    tin::GreedyGoal goal;
+  };
+  const std::array<Case, 5> cases = {{
+      {"jacksboro 5 m", "jacksboro.tif", {}, {5}},
+      {"andes 257x257 5 m", "srtm3_S33W071_andes.tif", {500, 300, 257, 257}, {5}},
+      {"crater 5 m", "crater.tif", {}, {5}},
+      {"west-us 50000", "westUS.tif", {}, {0, 50000}},
+      {"west-us 5 m", "westUS.tif", {}, {5}},
+  }};
+  for (const Case& c : cases) {
+    const std::string row = fmt::format("T7 {}", c.name);
+    if (!environment.Wants(row)) continue;
+    const std::optional<tin::HeightField> field = ReadField(c.file, c.window);
+    if (!field) continue;
+    const Peak peak = MeshingPeak(*field, c.goal);
+    const auto n = static_cast<double>(field->width()) * static_cast<double>(field->height());
+    const double per_vertex = (static_cast<double>(peak.meshing_bytes) - 0.1 * n) / static_cast<double>(peak.points);
+    table.Add({row, Count(static_cast<std::size_t>(n)), Count(peak.points), Count(peak.meshing_bytes),
+               Number(per_vertex, 3), Count(peak.finished_bytes), "80"});
+  }
+  return table;
+}
+
+}  // namespace terrace::bench

@@ -1,0 +1,41 @@
+#include <optional>
+
+#include "tests/bench/greedy_runs.h"
+#include "tests/bench/parallel_insertion.h"
+#include "tests/bench/rasters.h"
+#include "tests/bench/targets.h"
+
+namespace terrace::bench {
+namespace {
+
+// Vertices of greedy insertion by the book: the worst sample of all on every pass, found with a plain scan. Equally bad
+// samples go in together.
+std::size_t ExactGreedyPoints(const tin::HeightField& field, double error) {
+  ParallelInsertion insertion(field);
+  while (insertion.CurrentError() > error) insertion.FractionalPass(1, static_cast<std::size_t>(-1));
+  return insertion.vertex_count();
+}
+
+}  // namespace
+
+Table MeasureVertices(Environment& environment) {
+  Table table("T8", "T8: vertices at the same bound, beside one exact greedy run",
+              {"case", "exact greedy", "ours", "more", "aim"});
+  for (const Area& area : TileAreas()) {
+    constexpr double kError = 20;
+    const std::string name = fmt::format("T8 {} tiles {} m", area.name, kError);
+    if (!environment.Wants(name)) continue;
+    const std::optional<std::vector<tin::HeightField>> tiles = ReadTiles(area);
+    if (!tiles) continue;
+    std::size_t exact = 0, ours = 0;
+    for (const tin::HeightField& tile : *tiles) {
+      exact += ExactGreedyPoints(tile, kError);
+      ours += MeshOf(tile, {kError}).vertices.size();
+    }
+    table.Add({name, Count(exact), Count(ours), Percent(static_cast<double>(ours) / static_cast<double>(exact) - 1),
+               "at most +1 % (equal)"});
+  }
+  return table;
+}
+
+}  // namespace terrace::bench
