@@ -18,10 +18,12 @@
 
 #include "engine/dem/dem_source.h"
 #include "engine/tin/drop_pass.h"
+#include "engine/tin/field_cut.h"
 #include "engine/tin/greedy.h"
 #include "engine/tin/mesh_error.h"
 #include "proto/mesh_file.h"
 #include "server/cli/command.h"
+#include "server/cli/mesh_blocks.h"
 #include "server/cli/output_file.h"
 #include "server/cli/progress.h"
 
@@ -57,7 +59,7 @@ std::string Complain(const MeshArguments& arguments) {
 }
 
 // Runs towards the goal in steps, so that progress can be shown: the error falls about as 1 / vertices.
-void Triangulate(tin::GreedyTriangulation& greedy, const tin::GreedyGoal& goal, std::size_t samples) {
+void RunTo(const tin::GreedyGoal& goal, std::size_t samples, tin::GreedyTriangulation& greedy) {
   Progress progress("meshing");
   const std::size_t step = std::max<std::size_t>(10'000, samples / 200);
   for (;;) {
@@ -73,6 +75,21 @@ void Triangulate(tin::GreedyTriangulation& greedy, const tin::GreedyGoal& goal, 
                              : std::min(1.0, goal.max_error / greedy.CurrentError());
     progress.Update(share);
   }
+}
+
+// Only an error can be asked of every block alone; the other goals are about the whole raster.
+tin::TinMesh Triangulate(const MeshArguments& arguments, const tin::HeightField& field) {
+  if (arguments.max_error >= 0) {
+    const tin::FieldCut cut = tin::FieldCut::For(field, arguments.max_error);
+    if (cut.size() > 1) return MeshBlocks(field, cut, arguments.max_error, arguments.threads);
+  }
+  tin::GreedyGoal goal;
+  if (arguments.max_error >= 0) goal.max_error = arguments.max_error;
+  if (arguments.points > 0) goal.max_points = arguments.points;
+  if (arguments.rms >= 0) goal.rms_error = arguments.rms;
+  tin::GreedyTriangulation greedy(field);
+  RunTo(goal, static_cast<std::size_t>(field.width()) * static_cast<std::size_t>(field.height()), greedy);
+  return greedy.Mesh();
 }
 
 std::vector<proto::MeshVertex> VerticesOf(const tin::TinMesh& mesh, const tin::HeightField& field,
@@ -176,14 +193,9 @@ int Mesh(const MeshArguments& arguments) {
   seconds.read = Since(start);
 
   start = Clock::now();
-  tin::GreedyGoal goal;
-  if (arguments.max_error >= 0) goal.max_error = arguments.max_error;
-  if (arguments.points > 0) goal.max_points = arguments.points;
-  if (arguments.rms >= 0) goal.rms_error = arguments.rms;
-  tin::GreedyTriangulation greedy(*field);
-  Triangulate(greedy, goal, static_cast<std::size_t>(field->width()) * static_cast<std::size_t>(field->height()));
-  tin::TinMesh mesh = greedy.Mesh();
-  if (arguments.compact) mesh = *tin::DropVertices(*field, mesh, {.max_error = goal.max_error});  // nobody stops it
+  tin::TinMesh mesh = Triangulate(arguments, *field);
+  // Nobody stops it.
+  if (arguments.compact) mesh = *tin::DropVertices(*field, mesh, {.max_error = arguments.max_error});
   seconds.triangulate = Since(start);
 
   start = Clock::now();
