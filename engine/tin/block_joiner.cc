@@ -8,9 +8,7 @@
 namespace terrace::tin {
 
 BlockJoiner::BlockJoiner(const FieldCut& cut)
-    : cut_(&cut),
-      ids_by_x_(static_cast<std::size_t>(cut.width())),
-      ids_by_y_(static_cast<std::size_t>(cut.height())) {
+    : cut_(&cut), ids_by_x_(static_cast<std::size_t>(cut.width())), ids_by_y_(static_cast<std::size_t>(cut.height())) {
   const auto last_x = static_cast<std::uint16_t>(cut.width() - 1);
   const auto last_y = static_cast<std::uint16_t>(cut.height() - 1);
   mesh_.vertices = {{0, 0}, {last_x, 0}, {last_x, last_y}, {0, last_y}};

@@ -21,6 +21,10 @@ constexpr BorderOptions kSharedBorder{.weight = 1.5};
 // A cut is good while the vertices on its borders are below this share of those estimated for all blocks.
 constexpr double kMostSharedVertices = 0.06;
 
+// And while so many are estimated for a block: with fewer, where the first of them lie changes the count by more than
+// the borders add, and the whole field is meshed in little time.
+constexpr double kFewestBlockVertices = 100;
+
 // Where blocks begin along a side of so many samples, and its last sample.
 std::vector<int> CutSide(int samples, int block_cells) {
   const int cells = samples - 1, blocks = std::max(1, (cells + block_cells / 2) / block_cells);
@@ -48,9 +52,10 @@ double CountBorderVertices(const HeightField& field, Corner from, Corner to, dou
   return count;
 }
 
-// The vertices on the borders between blocks, relative to an estimate for the blocks: as many as in a grid whose lines
-// have as many as the block's borders. A surface needs 1.5 to 5 times that, the more the coarser.
-double ShareOfSharedVertices(const HeightField& field, const FieldCut& cut, double max_error_m) {
+// Whether blocks have few enough vertices on the borders between them, relative to an estimate for their insides: as
+// many as in a grid whose lines have as many as the block's borders. A surface needs 1.5 to 5 times that, the more the
+// coarser.
+bool IsGood(const FieldCut& cut, const HeightField& field, double max_error_m) {
   const auto corner = [&](int x, int y) -> Corner { return {x, y, static_cast<double>(field.VertexHeight(x, y))}; };
   const auto count = [&](const Corner& a, const Corner& b) { return CountBorderVertices(field, a, b, max_error_m); };
   double shared = 0, in_blocks = 0;
@@ -68,7 +73,8 @@ double ShareOfSharedVertices(const HeightField& field, const FieldCut& cut, doub
     far_before = far_x;
     below = far_y;
   }
-  return shared / in_blocks;
+  return shared <= kMostSharedVertices * in_blocks &&
+         in_blocks >= kFewestBlockVertices * static_cast<double>(cut.size());
 }
 
 // The samples of a block as a field of its own. Its corners are vertices of the joined mesh and need the height that
@@ -108,7 +114,7 @@ FieldCut::FieldCut(int width, int height, int block_cells) {
 FieldCut FieldCut::For(const HeightField& field, double max_error_m) {
   for (int cells = kSmallestBlockCells;; cells *= 2) {
     FieldCut cut(field.width(), field.height(), cells);
-    if (cut.size() == 1 || ShareOfSharedVertices(field, cut, max_error_m) <= kMostSharedVertices) return cut;
+    if (cut.size() == 1 || IsGood(cut, field, max_error_m)) return cut;
   }
 }
 

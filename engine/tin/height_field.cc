@@ -32,30 +32,67 @@ Result<HeightField> HeightField::Make(int width, int height, std::vector<float> 
   return HeightField(width, height, std::move(heights), voids > 0);
 }
 
+HeightField::HeightField(int width, int height, std::vector<float> heights, bool has_voids)
+    : width_(width),
+      height_(height),
+      has_voids_(has_voids),
+      heights_(std::move(heights)),
+      patches_along_x_((width - 1) / kPatchSide + 1),
+      patches_along_y_((height - 1) / kPatchSide + 1) {
+  if (!has_voids_) return;
+  const auto along_x = static_cast<std::size_t>(patches_along_x_);
+  has_height_.resize(along_x * static_cast<std::size_t>(patches_along_y_));
+  for (int y = 0; y < height_; ++y) {
+    for (int column = 0; column < patches_along_x_; ++column) {
+      const std::size_t patch = static_cast<std::size_t>(y / kPatchSide) * along_x + static_cast<std::size_t>(column);
+      if (has_height_[patch]) continue;
+      const float* begin = Row(y) + column * kPatchSide;
+      const float* end = Row(y) + std::min((column + 1) * kPatchSide, width_);
+      has_height_[patch] = std::any_of(begin, end, [](float value) { return !std::isnan(value); });
+    }
+  }
+}
+
 float HeightField::VertexHeight(int x, int y) const {
   const float own = At(x, y);
   if (!std::isnan(own)) return own;
 
-  // Rings of growing Chebyshev distance r: every sample on ring r is at least r away, so a sample that was found at a
-  // squared distance below r^2 cannot be beaten any more; at r^2 exactly it can still be tied.
-  std::int64_t best = std::numeric_limits<std::int64_t>::max();
-  int best_x = 0, best_y = 0;
-  for (int r = 1; r < std::max(width_, height_) && std::int64_t{r} * r <= best; ++r) {
-    for (int row = std::max(y - r, 0); row <= std::min(y + r, height_ - 1); ++row) {
-      const int step = (row == y - r || row == y + r) ? 1 : 2 * r;
-      for (int column = x - r; column <= x + r; column += step) {
-        if (column < 0 || column >= width_ || std::isnan(At(column, row))) continue;
-        const std::int64_t dx = column - x, dy = row - y, distance = dx * dx + dy * dy;
-        const bool nearer =
-            distance < best || (distance == best && (row < best_y || (row == best_y && column < best_x)));
-        if (!nearer) continue;
-        best = distance;
-        best_x = column;
-        best_y = row;
+  // Rings of growing Chebyshev distance r, in patches: every sample on ring r is at least (r - 1) kPatchSide + 1 away.
+  // What was found nearer than that cannot be beaten any more; what is just as far can still be tied.
+  Nearest nearest{std::numeric_limits<std::int64_t>::max(), 0, 0};
+  const int own_column = x / kPatchSide, own_row = y / kPatchSide;
+  for (int r = 0; r < std::max(patches_along_x_, patches_along_y_); ++r) {
+    const std::int64_t clearance = std::max(0, (r - 1) * kPatchSide + 1);
+    if (clearance * clearance > nearest.squared_distance) break;
+    for (int row = std::max(own_row - r, 0); row <= std::min(own_row + r, patches_along_y_ - 1); ++row) {
+      const int step = (row == own_row - r || row == own_row + r) ? 1 : 2 * r;
+      for (int column = own_column - r; column <= own_column + r; column += step) {
+        if (column >= 0 && column < patches_along_x_) SearchPatch(column, row, x, y, nearest);
+        if (r == 0) break;
       }
     }
   }
-  return At(best_x, best_y);
+  return At(nearest.x, nearest.y);
+}
+
+void HeightField::SearchPatch(int column, int row, int x, int y, Nearest& nearest) const {
+  const auto along_x = static_cast<std::size_t>(patches_along_x_);
+  if (!has_height_[static_cast<std::size_t>(row) * along_x + static_cast<std::size_t>(column)]) return;
+  const int begin_x = column * kPatchSide, end_x = std::min(begin_x + kPatchSide, width_);
+  const int begin_y = row * kPatchSide, end_y = std::min(begin_y + kPatchSide, height_);
+  const std::int64_t patch_dx = std::clamp(x, begin_x, end_x - 1) - x;
+  for (int sample_y = begin_y; sample_y < end_y; ++sample_y) {
+    const std::int64_t row_dy = sample_y - y;
+    if (patch_dx * patch_dx + row_dy * row_dy > nearest.squared_distance) continue;
+    for (int sample_x = begin_x; sample_x < end_x; ++sample_x) {
+      if (std::isnan(At(sample_x, sample_y))) continue;
+      const std::int64_t dx = sample_x - x, dy = sample_y - y, distance = dx * dx + dy * dy;
+      const bool is_first = sample_y < nearest.y || (sample_y == nearest.y && sample_x < nearest.x);
+      if (distance < nearest.squared_distance || (distance == nearest.squared_distance && is_first)) {
+        nearest = {distance, sample_x, sample_y};
+      }
+    }
+  }
 }
 
 }  // namespace terrace::tin

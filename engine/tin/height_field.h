@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "engine/core/result.h"
@@ -39,13 +40,24 @@ class HeightField {
   float VertexHeight(int x, int y) const;
 
  private:
-  HeightField(int width, int height, std::vector<float> heights, bool has_voids)
-      : width_(width), height_(height), has_voids_(has_voids), heights_(std::move(heights)) {}
+  // Squares of 64 x 64 samples, so that the search for a valid one crosses wide voids in large steps.
+  static constexpr int kPatchSide = 64;
+
+  struct Nearest {
+    std::int64_t squared_distance;
+    int x, y;
+  };
+
+  HeightField(int width, int height, std::vector<float> heights, bool has_voids);
+
+  void SearchPatch(int column, int row, int x, int y, Nearest& nearest) const;
 
   int width_ = 0;
   int height_ = 0;
   bool has_voids_ = false;
   std::vector<float> heights_;
+  int patches_along_x_ = 0, patches_along_y_ = 0;
+  std::vector<bool> has_height_;  // by patch, row by row; empty where there are no voids
 };
 
 }  // namespace terrace::tin

@@ -2,8 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
+#include <vector>
 
 #include "tests/engine/tin/test_fields.h"
 
@@ -59,6 +62,29 @@ TEST(HeightField, LendsAVoidVertexTheNearestHeight) {
         }
         ASSERT_EQ(field.VertexHeight(x, y), expected);
       }
+    }
+  }
+}
+
+TEST(HeightField, FindsTheNearestHeightAcrossWideVoids) {
+  Random random(6);
+  for (int i = 0; i < 30; ++i) {
+    const int width = 2 + random.Below(400), height = 2 + random.Below(300);
+    std::vector<std::pair<int, int>> valid;
+    for (int k = 0; k < 6; ++k) valid.push_back({random.Below(width), random.Below(height)});
+    valid.push_back({width - 1 - valid[0].first, valid[0].second});  // ties are likely half way between them
+    std::vector<float> heights(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), kVoid);
+    for (const auto& [x, y] : valid)
+      heights[static_cast<std::size_t>(y * width + x)] = static_cast<float>(y * width + x);
+    const Result<HeightField> field = HeightField::Make(width, height, heights);
+    ASSERT_TRUE(field);
+    for (int k = 0; k < 300; ++k) {
+      const int x = k % 3 == 0 ? (width - 1) / 2 : random.Below(width), y = random.Below(height);
+      std::pair<int, int> nearest{std::numeric_limits<int>::max(), 0};  // squared distance, index
+      for (const auto& [column, row] : valid) {
+        nearest = std::min(nearest, {(column - x) * (column - x) + (row - y) * (row - y), row * width + column});
+      }
+      ASSERT_EQ(field->VertexHeight(x, y), static_cast<float>(nearest.second)) << x << ", " << y;
     }
   }
 }

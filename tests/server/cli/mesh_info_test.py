@@ -122,10 +122,15 @@ class Mesh(InFolder):
         self.assertGreater(statistics["peak_rss_bytes"], 1 << 20)
 
     def test_gives_the_same_bytes_whatever_the_threads(self):
-        _, one = self.mesh(SAMPLE, "one.glb", "--max-error", 20)
-        _, eight = self.mesh(SAMPLE, "eight.glb", "--max-error", 20, "--threads", 8)
-        self.assertEqual(one.read_bytes(), eight.read_bytes())
-        self.assertEqual(one.read_bytes()[:4], b"glTF")
+        rows = [[round(40 * math.sin(x / 9) * math.cos(y / 7 + x / 90), 2) for x in range(700)] for y in range(500)]
+        large = self.write("large.asc", grid(rows, PLACE))  # meshed in six blocks
+        for dem, bound in ((SAMPLE, 20), (large, 1)):
+            statistics, one = self.mesh(dem, "one.glb", "--max-error", bound)
+            self.assertLessEqual(statistics["max_error"], bound)
+            for threads in (2, 4):
+                more = self.mesh(dem, "more.glb", "--max-error", bound, "--threads", threads)[1]
+                self.assertEqual(one.read_bytes(), more.read_bytes())
+            self.assertEqual(one.read_bytes()[:4], b"glTF")
 
     def test_drops_what_the_bound_does_not_need(self):
         dem = self.write("bumps.asc", grid(BUMPS, PLACE))
