@@ -6,7 +6,8 @@
 // none is left, the next sweep lowers the threshold. No back pointers from the slots, and the order is exact: larger
 // error first, then smaller index of the sample.
 //
-// Errors are kept as floats, rounded up: the largest is never understated.
+// Errors are kept as floats, rounded up: the largest is never understated, and errors that differ by less are ordered by
+// their samples.
 #pragma once
 
 #include <bit>

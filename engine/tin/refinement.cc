@@ -1,11 +1,15 @@
 #include "engine/tin/refinement.h"
 
+#include <xxhash.h>
+
 #include <algorithm>
 #include <array>
+#include <cstring>
 #include <limits>
-#include <optional>
+#include <type_traits>
 #include <utility>
 
+#include "engine/core/bytes.h"
 #include "engine/core/check.h"
 
 namespace terrace::tin {
@@ -68,6 +72,56 @@ void CollectTriangles(const InsertionRecord<Index>& record, std::size_t insertio
   triangles.resize(static_cast<std::size_t>(out - triangles.data()));
 }
 
+constexpr std::string_view kMagic = "terrace refinement 1\n";
+constexpr std::uint32_t kMostSide = 1U << 16;  // of SamplePosition
+
+template <typename T>
+void PutArray(ByteWriter& writer, const std::vector<T>& values) {
+  static_assert(std::is_trivially_copyable_v<T>);
+  writer.Put(static_cast<std::uint32_t>(values.size()));
+  writer.PutBytes({reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T)});
+}
+
+template <typename T>
+bool GetArray(ByteReader& reader, std::vector<T>& values) {
+  const std::size_t count = reader.Get<std::uint32_t>();
+  const std::string_view raw = reader.GetBytes(count * sizeof(T));
+  if (!reader.ok()) return false;
+  values.resize(count);
+  if (count > 0) std::memcpy(values.data(), raw.data(), raw.size());
+  return true;
+}
+
+// Rings of earlier vertices, as many as the sizes say; every insertion removes two triangles fewer than it makes, one
+// fewer on the border.
+template <typename Index>
+bool IsSoundRecord(const InsertionRecord<Index>& record, std::size_t insertions) {
+  if (record.sizes.size() != insertions || record.removed.size() < 2) return false;
+  std::vector<std::size_t> removed(insertions, 0);
+  for (const Index by : record.removed) {
+    if (by == InsertionRecord<Index>::kNever) continue;
+    if (by >= insertions) return false;
+    ++removed[by];
+  }
+  std::size_t ring = 0, made = 2;
+  for (std::size_t i = 0; i < insertions; ++i) {
+    const bool is_open = (record.sizes[i] & InsertionRecord<Index>::kOpen) != 0;
+    const std::size_t count = record.sizes[i] & static_cast<Index>(~InsertionRecord<Index>::kOpen);
+    const std::size_t vertices = count + (is_open ? 1 : 0);
+    if (count == 0 || count != removed[i] + (is_open ? 1 : 2)) return false;
+    if (vertices > record.rings.size() - ring || count > record.removed.size() - made) return false;
+    for (std::size_t k = ring; k < ring + vertices; ++k) {
+      if (record.rings[k] >= 4 + i) return false;
+    }
+    for (std::size_t k = made; k < made + count; ++k) {
+      if (record.removed[k] <= i) return false;  // before it was made
+    }
+    ring += vertices;
+    made += count;
+  }
+  return ring == record.rings.size() && made == record.removed.size();
+}
+
 }  // namespace
 
 Refinement::Refinement(int width, int height, std::vector<SamplePosition> inserted, std::vector<float> errors_before,
@@ -112,6 +166,71 @@ std::size_t Refinement::bytes() const {
 
 InsertionRecord<std::uint32_t> Refinement::WideRecord() const {
   return std::visit([](const auto& record) { return ConvertRecord<std::uint32_t>(record); }, record_);
+}
+
+// The form: kMagic, width, height, bytes of an index, then five arrays, each with its length in front, then the hash of all
+// that. Numbers are 32 bits but for the elements of arrays.
+std::string Refinement::Serialize() const {
+  ByteWriter writer;
+  writer.Reserve(bytes() + 64);
+  writer.PutBytes(kMagic);
+  writer.Put(static_cast<std::uint32_t>(width_));
+  writer.Put(static_cast<std::uint32_t>(height_));
+  std::visit(
+      [&](const auto& record) {
+        writer.Put(static_cast<std::uint32_t>(sizeof(record.sizes[0])));
+        PutArray(writer, inserted_);
+        PutArray(writer, errors_before_);
+        PutArray(writer, record.sizes);
+        PutArray(writer, record.rings);
+        PutArray(writer, record.removed);
+      },
+      record_);
+  std::string bytes = writer.Take();
+  const std::uint64_t hash = XXH3_64bits(bytes.data(), bytes.size());
+  bytes.append(reinterpret_cast<const char*>(&hash), sizeof(hash));
+  return bytes;
+}
+
+Result<Refinement> Refinement::Parse(std::string_view bytes) {
+  const auto damaged = [] { return MakeError(ErrorCode::kInvalidArgument, "not a refinement, or a damaged one"); };
+  std::uint64_t hash = 0;
+  if (bytes.size() < kMagic.size() + sizeof(hash)) return damaged();
+  const std::string_view content = bytes.substr(0, bytes.size() - sizeof(hash));
+  std::memcpy(&hash, bytes.data() + content.size(), sizeof(hash));
+  if (hash != XXH3_64bits(content.data(), content.size())) return damaged();
+
+  ByteReader reader(content);
+  Refinement refinement;
+  if (reader.GetBytes(kMagic.size()) != kMagic) return damaged();
+  const auto width = reader.Get<std::uint32_t>(), height = reader.Get<std::uint32_t>();
+  if (width < 2 || height < 2 || width > kMostSide || height > kMostSide) return damaged();
+  refinement.width_ = static_cast<int>(width);
+  refinement.height_ = static_cast<int>(height);
+  const auto index_bytes = reader.Get<std::uint32_t>();
+  if (index_bytes == sizeof(std::uint32_t)) {
+    refinement.record_ = Wide{};
+  } else if (index_bytes != sizeof(std::uint16_t)) {
+    return damaged();
+  }
+  if (!GetArray(reader, refinement.inserted_) || !GetArray(reader, refinement.errors_before_)) return damaged();
+  const bool whole = std::visit(
+      [&](auto& record) {
+        return GetArray(reader, record.sizes) && GetArray(reader, record.rings) && GetArray(reader, record.removed) &&
+               reader.remaining() == 0;
+      },
+      refinement.record_);
+  if (!whole || !refinement.IsSound()) return damaged();
+  return refinement;
+}
+
+// What MeshOf relies on, whoever wrote the bytes.
+bool Refinement::IsSound() const {
+  for (const SamplePosition sample : inserted_) {
+    if (sample.x >= width_ || sample.y >= height_) return false;
+  }
+  return inserted_.size() == errors_before_.size() &&
+         std::visit([&](const auto& record) { return IsSoundRecord(record, inserted_.size()); }, record_);
 }
 
 }  // namespace terrace::tin

@@ -69,6 +69,7 @@ class Refinement {
 
  private:
   Refinement() = default;
+  bool IsSound() const;
 
   int width_ = 0, height_ = 0;
   std::vector<SamplePosition> inserted_;

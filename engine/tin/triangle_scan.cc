@@ -53,6 +53,14 @@ class Furthest {
     index_ = hn::IfThenElse(further, index, index_);
   }
 
+  // Of samples that were visited apart.
+  HWY_INLINE void Merge(const Furthest& other) {
+    const Inside further = hn::Gt(other.numerator_, numerator_);
+    const Inside tied = hn::And(hn::Eq(other.numerator_, numerator_), hn::Lt(other.index_, index_));
+    numerator_ = hn::Max(numerator_, other.numerator_);
+    index_ = hn::IfThenElse(hn::Or(further, tied), other.index_, index_);
+  }
+
   HWY_INLINE PlaneMisfit Of(double d) const {
     const Doubles most = hn::MaxOfLanes(kDoubles, numerator_);
     const double numerator = hn::GetLane(most);
@@ -134,24 +142,30 @@ HWY_INLINE PlaneMisfit ScanSmallBox(const OpenSamples& samples, const ScannedTri
   return furthest.Of(t.d);
 }
 
-// Every sample of the bounding box, masked: no spans, no divisions, no branches but the loop.
-HWY_INLINE PlaneMisfit ScanBox(const OpenSamples& samples, const ScannedTriangle& t) {
+// Every sample of some columns of the bounding box, masked: no spans, no divisions, no branches but the loop.
+HWY_INLINE Furthest ScanColumns(const OpenSamples& samples, const ScannedTriangle& t, int column) {
   const Doubles d = All(t.d), pz = All(t.pz), b = All(t.b), one = All(1.0), width = All(samples.width());
+  const Doubles x = hn::Iota(kDoubles, column), a_x = hn::Mul(All(t.a), x);
+  Doubles y = All(t.south);
+  Barycentric barycentric(t, x, y, 1);
+  const int first_row = t.py + t.south;
+  const float* from = samples.Row(first_row) + t.px + column;
+  Doubles index = hn::Iota(kDoubles, static_cast<double>(first_row) * samples.width() + t.px + column);
   Furthest furthest;
-  for (int column = t.west; column <= t.east; column += Lanes()) {
-    const Doubles x = hn::Iota(kDoubles, column), a_x = hn::Mul(All(t.a), x);
-    Doubles y = All(t.south);
-    Barycentric barycentric(t, x, y, 1);
-    const int first_row = t.py + t.south;
-    const float* from = samples.Row(first_row) + t.px + column;
-    Doubles index = hn::Iota(kDoubles, static_cast<double>(first_row) * samples.width() + t.px + column);
-    for (int j = t.south; j <= t.north; ++j) {
-      furthest.Visit(Numerator(HeightsAt(from), pz, d, hn::Add(a_x, hn::Mul(b, y))), index, barycentric.IsInside());
-      from += samples.width();
-      index = hn::Add(index, width);
-      y = hn::Add(y, one);
-      barycentric.Step();
-    }
+  for (int j = t.south; j <= t.north; ++j) {
+    furthest.Visit(Numerator(HeightsAt(from), pz, d, hn::Add(a_x, hn::Mul(b, y))), index, barycentric.IsInside());
+    from += samples.width();
+    index = hn::Add(index, width);
+    y = hn::Add(y, one);
+    barycentric.Step();
+  }
+  return furthest;
+}
+
+HWY_INLINE PlaneMisfit ScanBox(const OpenSamples& samples, const ScannedTriangle& t) {
+  Furthest furthest = ScanColumns(samples, t, t.west);
+  for (int column = t.west + Lanes(); column <= t.east; column += Lanes()) {
+    furthest.Merge(ScanColumns(samples, t, column));
   }
   return furthest.Of(t.d);
 }

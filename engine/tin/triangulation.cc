@@ -107,17 +107,24 @@ TriangleId Triangulation::Locate(SamplePosition point, TriangleId start) const {
   // In a Delaunay triangulation this walk visits no triangle twice: each step lowers the power of the point with
   // respect to the triangle's circumcircle, or stays on one circle, whose triangles form a tree.
   TriangleId t = start;
-  for (unsigned i = 0; i < 3;) {
-    const HalfEdgeId edge = 4 * t + i;
-    if (Orientation(position(corner(edge)), position(corner(Next(edge))), point) >= 0) {
-      ++i;
-      continue;
-    }
-    TERRACE_CHECK(twin(edge) != kNone);  // the point lies outside the rectangle
-    t = twin(edge) / 4;
-    i = 0;
+  for (std::size_t steps = 0; steps < triangle_count(); ++steps) {
+    const std::optional<HalfEdgeId> towards = EdgeTowards(point, t);
+    if (!towards) return t;
+    TERRACE_CHECK(twin(*towards) != kNone);  // the point lies outside the rectangle
+    t = twin(*towards) / 4;
   }
+  for (t = 0; t < triangle_count(); ++t) {
+    if (!EdgeTowards(point, t)) return t;
+  }
+  TERRACE_CHECK(t < triangle_count());
   return t;
+}
+
+std::optional<HalfEdgeId> Triangulation::EdgeTowards(SamplePosition point, TriangleId t) const {
+  for (HalfEdgeId edge = 4 * t; edge < 4 * t + 3; ++edge) {
+    if (Orientation(position(corner(edge)), position(corner(Next(edge))), point) < 0) return edge;
+  }
+  return std::nullopt;
 }
 
 bool Triangulation::IsCorner(SamplePosition point, TriangleId t) const {

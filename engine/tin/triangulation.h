@@ -17,6 +17,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <type_traits>
 #include <vector>
 
@@ -53,7 +54,8 @@ class Triangulation {
 
   const Star& InsertDelaunay(const Vertex& vertex, TriangleId triangle);
 
-  // A triangle that contains the point, inside, on an edge or as a corner, found by a walk from `start`.
+  // A triangle that contains the point, inside, on an edge or as a corner, found by a walk from `start`; should the walk
+  // turn in circles, which it can where triangles are not Delaunay, by looking at all of them.
   TriangleId Locate(SamplePosition point, TriangleId start) const;
 
   bool IsCorner(SamplePosition point, TriangleId triangle) const;
@@ -101,6 +103,8 @@ class Triangulation {
   void OpenRing(std::size_t edges, std::size_t gap);
   template <typename Triangles>
   void Join(Triangles& triangles, const std::vector<std::array<std::uint32_t, 3>>& corners);
+  // The first edge of a triangle that has the point on its other side; none when the triangle contains it.
+  std::optional<HalfEdgeId> EdgeTowards(SamplePosition point, TriangleId t) const;
   void Widen();
   void Grow();
 
@@ -163,6 +167,10 @@ void Triangulation::Replace(Triangles& triangles, SamplePosition point, Triangle
   stack[2] = {first.twin(0), Relative(vertices, first.corner(1), point)};
   stack[1] = {first.twin(1), Relative(vertices, first.corner(2), point)};
   stack[0] = {first.twin(2), u};
+  const std::int64_t sides[3] = {Cross(u, stack[2].end), Cross(stack[2].end, stack[1].end), Cross(stack[1].end, u)};
+  // Inside or on one edge; on two edges it would be a corner.
+  TERRACE_CHECK(sides[0] >= 0 && sides[1] >= 0 && sides[2] >= 0);
+  TERRACE_CHECK((sides[0] == 0) + (sides[1] == 0) + (sides[2] == 0) <= 1);
   // The walk waits for triangles from all over the memory: the three that it certainly visits together.
   for (std::size_t i = 0; i < 3; ++i) prefetch(stack[i].back);
 

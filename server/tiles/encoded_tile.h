@@ -22,6 +22,8 @@ struct EncodedTile {
   StageTimes times;  // of the build that made it
 };
 
+inline std::size_t BytesOf(const EncodedTile& tile) { return tile.bytes.size(); }
+
 using TilePtr = std::shared_ptr<const EncodedTile>;
 
 }  // namespace terrace::server

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <vector>
 
 #include "engine/geo/ellipsoid.h"
 #include "proto/quantized_mesh.h"
@@ -34,12 +34,14 @@ tin::Curvature MakeCurvature(const proto::LatticeView& lattice) {
   return curvature;
 }
 
-// The coarsest grid whose triangles sag at most half of the error leaves the rest of it to the relief, and gives the
-// insertion triangles small enough to place samples by relief alone.
-tin::SeedGrid MakeSeedGrid(const proto::LatticeView& lattice, double error_m) {
-  int divisions = 1;
-  while (divisions < lattice.cells() / 2 && GridSagitta(lattice.key.level, divisions) > error_m / 2) divisions *= 2;
-  return {std::numeric_limits<double>::infinity(), lattice.cells() / divisions};
+// Triangles that sag more than half of the error leave too little of it to the relief: from twice their sagitta on, the
+// next finer grid is due. The insertion then has triangles small enough to place samples by relief alone.
+std::vector<tin::SeedGrid> MakeSeedGrids(const proto::LatticeView& lattice) {
+  std::vector<tin::SeedGrid> grids;
+  for (int divisions = 2; divisions <= lattice.cells() / 2; divisions *= 2) {
+    grids.push_back({2 * GridSagitta(lattice.key.level, divisions / 2), lattice.cells() / divisions});
+  }
+  return grids;
 }
 
 // Half the second difference of the ground along an edge, per sample squared.
@@ -51,8 +53,8 @@ double BorderSagitta(const proto::LatticeView& lattice, tin::Side side) {
   return step * step * geo::PrimeVerticalRadius(latitude) * cosine * cosine / 2;
 }
 
-// What an edge loses to the wire: half a step of its height grid, and half a unit of position times its steepest slope.
-double BorderRounding(const proto::LatticeView& lattice, const proto::EdgeSteps& steps, tin::Side side) {
+// What an edge loses to the rounding of positions: half a unit of them times its steepest slope.
+double PositionRounding(const proto::LatticeView& lattice, tin::Side side) {
   const int cells = lattice.cells();
   const bool along_x = side == tin::Side::kSouth || side == tin::Side::kNorth;
   const int fixed = side == tin::Side::kSouth || side == tin::Side::kWest ? 0 : cells;
@@ -62,25 +64,28 @@ double BorderRounding(const proto::LatticeView& lattice, const proto::EdgeSteps&
     const double b = along_x ? lattice.At(k + 1, fixed) : lattice.At(fixed, k + 1);
     steepest = std::max(steepest, std::abs(b - a));
   }
-  return steps.Coarsest(side) / 2 + steepest * cells / (2.0 * proto::kQuantizedMax);
+  return steepest * cells / (2.0 * proto::kQuantizedMax);
 }
 
 }  // namespace
 
-RefinePlan MakeRefinePlan(const proto::LatticeView& lattice, const proto::EdgeSteps& steps, double error_m) {
-  RefinePlan plan;
-  plan.curved = GridSagitta(lattice.key.level, 1) > error_m / 100;
-  if (plan.curved) {
-    plan.options.curvature = MakeCurvature(lattice);
-    plan.options.seeds.push_back(MakeSeedGrid(lattice, error_m));
-  }
+// An edge's heights are rounded by half of its step, which is at most half of the larger of an eighth of the error and
+// what the edge needs at any error: the first is the border's weight, the second its step.
+tin::GreedyOptions MakeRefinePlan(const proto::LatticeView& lattice, const proto::EdgeSteps& needed) {
+  tin::GreedyOptions options;
+  options.curvature = MakeCurvature(lattice);
+  options.seeds = MakeSeedGrids(lattice);
+  options.record = true;
   for (const tin::Side side : {tin::Side::kSouth, tin::Side::kEast, tin::Side::kNorth, tin::Side::kWest}) {
-    tin::BorderOptions& border = plan.options.borders[static_cast<std::size_t>(side)];
-    // Cliffs can eat the whole bound; a quarter is kept so that the edge does not take every sample for nothing.
-    border.weight = error_m / std::max(error_m - BorderRounding(lattice, steps, side), error_m / 4);
-    border.sagitta_m = plan.curved ? BorderSagitta(lattice, side) : 0;
+    tin::BorderOptions& border = options.borders[static_cast<std::size_t>(side)];
+    border.weight = 16.0 / 15;
+    border.padding_m = PositionRounding(lattice, side);
+    border.step_m = needed.Coarsest(side) / 2;
+    border.sagitta_m = BorderSagitta(lattice, side);
   }
-  return plan;
+  return options;
 }
+
+bool IsCurved(int level, double error_m) { return GridSagitta(level, 1) > error_m / 100; }
 
 }  // namespace terrace::server

@@ -1,5 +1,6 @@
-// How a tile is refined so that it keeps its error and matches its neighbours: derived from its level, its error and
-// its own border samples, and for the edges' height grid from height ranges of the neighbours.
+// How a tile is refined so that it keeps any error and matches its neighbours: derived from its level, its own border
+// samples, and for the edges' height grid from height ranges of the neighbours. Not from the error: a refinement serves
+// every error (engine/tin/refinement.h).
 #pragma once
 
 #include "engine/tin/greedy.h"
@@ -8,12 +9,12 @@
 
 namespace terrace::server {
 
-struct RefinePlan {
-  bool curved = false;  // a triangle over the whole tile would sag more than 1 % of the error
-  tin::GreedyOptions options;
-};
+// Everything that decides the edges is a function of the level and of the edge's own samples and steps.
+// `needed`: the steps that the edges' heights need at any error, MakeEdgeSteps for the smallest one.
+tin::GreedyOptions MakeRefinePlan(const proto::LatticeView& lattice, const proto::EdgeSteps& needed);
 
-// Everything that decides the edges is a function of (level, error, the edge's own samples and steps).
-RefinePlan MakeRefinePlan(const proto::LatticeView& lattice, const proto::EdgeSteps& steps, double error_m);
+// Whether a triangle over the whole tile would sag more than 1 % of the error: then the flat triangle that clients draw
+// is measured as well.
+bool IsCurved(int level, double error_m);
 
 }  // namespace terrace::server

@@ -9,6 +9,7 @@
 #include "engine/core/check.h"
 #include "engine/geo/error_ladder.h"
 #include "engine/tin/greedy.h"
+#include "engine/tin/insert_samples.h"
 #include "proto/compress.h"
 #include "proto/edge_steps.h"
 #include "proto/quantized_mesh.h"
@@ -65,42 +66,45 @@ struct MeasuredTile {
 };
 
 // Inserts what the wire's rounding pushed over the bound, until nothing that an insertion can mend is left.
-Result<MeasuredTile> Finish(tin::GreedyTriangulation& greedy, const proto::LatticeView& lattice,
-                            const proto::EdgeSteps& steps, double error_m, bool curved, std::stop_token stop) {
+Result<MeasuredTile> Finish(tin::TinMesh mesh, const proto::LatticeView& lattice, const proto::EdgeSteps& steps,
+                            double error_m, bool curved, const std::stop_token& stop) {
   constexpr int kMaxRounds = 16;  // two are usual; a cliff may keep a sample out of reach for ever
   for (int round = 1;; ++round) {
     if (stop.stop_requested()) return Cancelled();
     MeasuredTile measured;
-    measured.mesh = greedy.Mesh();
-    measured.tile = proto::QuantizeTile(lattice, measured.mesh, steps);
-    proto::TileError error = proto::MeasureTileError(lattice, measured.tile, error_m, curved);
+    measured.tile = proto::QuantizeTile(lattice, mesh, steps);
+    const proto::TileError error = proto::MeasureTileError(lattice, measured.tile, error_m, curved);
     measured.max_error_m = error.max_m;
     if (error.misses.empty() || round == kMaxRounds ||
-        greedy.vertex_count() + error.misses.size() > proto::kMaxTileVertices) {
+        mesh.vertices.size() + error.misses.size() > proto::kMaxTileVertices) {
+      measured.mesh = std::move(mesh);
       return measured;
     }
-    greedy.InsertInterior(error.misses);
+    mesh = tin::InsertSamples(mesh, error.misses);
   }
 }
 
-// Refines to the error, or to a coarser one inside the tile where the format's vertex count ends first. The edges never
-// depend on the inside: they keep the threshold of the error that was asked for, exactly, since doubling rounds
-// nothing.
-Result<MeasuredTile> RefineTile(const proto::LatticeView& lattice, const proto::EdgeSteps& steps, double error_m,
-                                std::stop_token stop) {
-  const tin::HeightField field = FieldOf(lattice);
-  const RefinePlan plan = MakeRefinePlan(lattice, steps, error_m);
-  for (double coarser = 1;; coarser *= 2) {
-    tin::GreedyOptions options = plan.options;
-    for (tin::BorderOptions& border : options.borders) border.weight *= coarser;
+// A mesh for the format's number of vertices: a coarser one inside the tile. The edges never depend on the inside: they
+// keep the threshold of the error that was asked for, exactly, since scaling by a power of two rounds nothing.
+Result<tin::TinMesh> CoarserInside(const tin::HeightField& field, const tin::GreedyOptions& plan, double& error_m,
+                                   const std::stop_token& stop) {
+  for (double coarser = 2;; coarser *= 2) {
+    tin::GreedyOptions options = plan;
+    options.record = false;
+    for (tin::BorderOptions& border : options.borders) border.scale = coarser;
     tin::GreedyTriangulation greedy(field, std::move(options));
     tin::GreedyGoal goal;
     goal.max_error = error_m * coarser;
     goal.max_points = proto::kMaxTileVertices + 1;
     if (!greedy.Run(goal, stop)) return Cancelled();
     if (greedy.vertex_count() > proto::kMaxTileVertices) continue;
-    return Finish(greedy, lattice, steps, goal.max_error, plan.curved, stop);
+    error_m = goal.max_error;
+    return greedy.Mesh();
   }
+}
+
+tin::GreedyOptions PlanOf(const dem::DemSource& source, const proto::LatticeView& lattice) {
+  return MakeRefinePlan(lattice, EdgeStepsOf(source, lattice.key, proto::kHeightResolution));
 }
 
 std::string StrongETag(std::string_view bytes) {
@@ -110,7 +114,45 @@ std::string StrongETag(std::string_view bytes) {
 
 }  // namespace
 
-TilePipeline::TilePipeline(std::vector<Dataset> datasets) : datasets_(std::move(datasets)) {}
+TilePipeline::TilePipeline(std::vector<Dataset> datasets, std::size_t refinement_cache_bytes)
+    : datasets_(std::move(datasets)), refinements_(refinement_cache_bytes) {}
+
+// From the cache where it goes as far as is asked; else read or continued, and kept.
+Result<RefinedTilePtr> TilePipeline::Refine(std::uint32_t index, const geo::TileKey& key, double error_m,
+                                            StageTimes& times, const std::stop_token& stop) const {
+  const Dataset& dataset = datasets_[index];
+  const RefinedTileKey cache_key{index, dataset.generation, key};
+  const RefinedTilePtr known = refinements_.Find(cache_key);
+  if (known && known->error_m <= error_m) return known;
+
+  Clock::time_point start = Clock::now();
+  dem::TileHeights heights;
+  if (known) {
+    heights = known->heights;
+  } else {
+    Result<dem::TileHeights> read = dataset.source->Read(key, stop);
+    if (!read) return tl::unexpected(std::move(read).error());
+    heights = *std::move(read);
+    times.read = Since(start);
+    start = Clock::now();
+  }
+  const proto::LatticeView lattice{key, heights.lattice, heights.heights};
+  const tin::HeightField field = FieldOf(lattice);
+  tin::GreedyOptions plan = PlanOf(*dataset.source, lattice);
+  tin::GreedyTriangulation greedy = known ? tin::GreedyTriangulation(field, std::move(plan), known->refinement)
+                                          : tin::GreedyTriangulation(field, std::move(plan));
+  tin::GreedyGoal goal;
+  goal.max_error = error_m;
+  goal.max_points = proto::kMaxTileVertices + 1;
+  if (!greedy.Run(goal, stop)) return Cancelled();
+  auto refined = std::make_shared<RefinedTile>(RefinedTile{std::move(heights), greedy.MakeRefinement(), error_m});
+  times.refine = Since(start);
+  // One that ended at the format's number of vertices holds no mesh to this error.
+  if (refined->refinement.vertex_count() <= proto::kMaxTileVertices) {
+    refinements_.Insert(cache_key, refined);
+  }
+  return RefinedTilePtr(std::move(refined));
+}
 
 Result<EncodedTile> TilePipeline::Build(const TileRequest& request, std::stop_token stop) const {
   if (request.dataset >= datasets_.size()) return MakeError(ErrorCode::kNotFound, "no such dataset");
@@ -120,20 +162,23 @@ Result<EncodedTile> TilePipeline::Build(const TileRequest& request, std::stop_to
   }
   const double error_m = geo::LadderError(request.key.level, request.error_step, dataset.error_fraction);
   EncodedTile encoded;
+  const Result<RefinedTilePtr> refined = Refine(request.dataset, request.key, error_m, encoded.times, stop);
+  if (!refined) return tl::unexpected(refined.error());
 
   Clock::time_point start = Clock::now();
-  Result<dem::TileHeights> heights = dataset.source->Read(request.key, stop);
-  if (!heights) return tl::unexpected(std::move(heights).error());
-  encoded.times.read = Since(start);
+  const dem::TileHeights& heights = (*refined)->heights;
+  const proto::LatticeView lattice{request.key, heights.lattice, heights.heights};
+  double inside_error_m = error_m;
+  Result<tin::TinMesh> mesh = (*refined)->refinement.vertex_count() <= proto::kMaxTileVertices
+                                  ? (*refined)->refinement.MeshAt(error_m)
+                                  : CoarserInside(FieldOf(lattice), PlanOf(*dataset.source, lattice), inside_error_m, stop);
+  if (!mesh) return tl::unexpected(std::move(mesh).error());
+  encoded.times.refine += Since(start);
 
   start = Clock::now();
-  const proto::LatticeView lattice{request.key, heights->lattice, heights->heights};
-  const proto::EdgeSteps steps = EdgeStepsOf(*dataset.source, request.key, error_m);
-  Result<MeasuredTile> measured = RefineTile(lattice, steps, error_m, stop);
+  Result<MeasuredTile> measured = Finish(*std::move(mesh), lattice, EdgeStepsOf(*dataset.source, request.key, error_m),
+                                         inside_error_m, IsCurved(request.key.level, inside_error_m), stop);
   if (!measured) return tl::unexpected(std::move(measured).error());
-  encoded.times.refine = Since(start);
-
-  start = Clock::now();
   if (!proto::AllCounterClockwise(measured->tile)) {
     return MakeError(ErrorCode::kInternal, "{}/{}: a triangle turned over", dataset.name, geo::ToString(request.key));
   }

@@ -10,6 +10,7 @@
 #include "engine/core/result.h"
 #include "engine/dem/dem_source.h"
 #include "server/tiles/encoded_tile.h"
+#include "server/tiles/refined_tile.h"
 #include "server/tiles/tile_request.h"
 
 namespace terrace::server {
@@ -24,9 +25,14 @@ struct Dataset {
 };
 
 // Thread-safe: Build may run on any number of threads at once.
+//
+// What a tile is made from is kept between builds, as much as `refinement_cache_bytes` allows: another error, format or
+// coding of it costs a replay and an encoding. The bytes do not depend on it.
 class TilePipeline {
  public:
-  explicit TilePipeline(std::vector<Dataset> datasets);
+  explicit TilePipeline(std::vector<Dataset> datasets,
+                        std::size_t refinement_cache_bytes = kDefaultRefinementCacheBytes);
+  static constexpr std::size_t kDefaultRefinementCacheBytes = std::size_t{128} << 20;
 
   const std::vector<Dataset>& datasets() const { return datasets_; }
 
@@ -35,8 +41,14 @@ class TilePipeline {
   // kCancelled: `stop` was requested.
   Result<EncodedTile> Build(const TileRequest& request, std::stop_token stop) const;
 
+  RefinementCache::Stats refinements() const { return refinements_.stats(); }
+
  private:
+  Result<RefinedTilePtr> Refine(std::uint32_t index, const geo::TileKey& key, double error_m, StageTimes& times,
+                                const std::stop_token& stop) const;
+
   std::vector<Dataset> datasets_;
+  mutable RefinementCache refinements_;
 };
 
 }  // namespace terrace::server

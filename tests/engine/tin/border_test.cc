@@ -18,7 +18,17 @@ TEST(Border, JudgesASampleByItsChord) {
   EXPECT_EQ(SideOf(field, west, east), Side::kSouth);
   EXPECT_EQ(WorstBorderSample(field, west, east, {}), (Candidate{4, 2}));
   EXPECT_EQ(WorstBorderSample(field, east, west, {}), (Candidate{4, 2}));
-  EXPECT_EQ(WorstBorderSample(field, west, east, {3, 0.5}), (Candidate{18, 2}));
+  BorderOptions options;
+  options.sagitta_m = 0.5;
+  options.weight = 3;
+  EXPECT_EQ(WorstBorderSample(field, west, east, options), (Candidate{18, 2}));
+  options.padding_m = 1;
+  EXPECT_EQ(WorstBorderSample(field, west, east, options), (Candidate{21, 2}));
+  options.step_m = 16;
+  EXPECT_EQ(WorstBorderSample(field, west, east, options), (Candidate{23, 2}));
+  options.step_m = 50;
+  options.scale = 2;
+  EXPECT_EQ(WorstBorderSample(field, west, east, options), (Candidate{48, 2}));  // kMostBorderWeight
   EXPECT_EQ(SquaredBorderDistances(field, west, east), 9 + 16 + 9);
 }
 
@@ -46,7 +56,7 @@ TEST(Border, HasTheVerticesOfItsOwnOneDimensionalSimplification) {
   for (std::uint64_t seed = 0; seed < 6; ++seed) {
     const HeightField field = HillField(65, 65, seed);
     GreedyOptions options;
-    options.borders.fill({1.5, 0.01});
+    options.borders.fill({.weight = 1.5, .padding_m = 0.3, .sagitta_m = 0.01});
     for (const double error : {40.0, 9.0, 2.0}) {
       GreedyTriangulation tin(field, options);
       EXPECT_TRUE(tin.Run({error}));
@@ -71,7 +81,10 @@ TEST(Border, IsTheSameInBothNeighboursWhateverTheirInsides) {
       return x == 0 ? shared[static_cast<std::size_t>(y)] : HillHeight(x, y, seed + 100);
     });
     GreedyOptions options;
-    options.borders.fill({1 + random.Below(3) * 0.7, random.Below(2) * 0.003});
+    options.borders.fill({.weight = 1 + random.Below(3) * 0.7,
+                          .padding_m = random.Below(2) * 0.2,
+                          .step_m = random.Below(2) * 0.1,
+                          .sagitta_m = random.Below(2) * 0.003});
     if (seed % 2 == 1) options.seeds = {{40, 32}, {15, 16}, {6, 8}};
     if (seed % 4 == 1) options.curvature = {std::vector<double>(kSide, 900.0), 1000.0, 6.4e5};
     GreedyTriangulation west_tin(west, options), east_tin(east, options);
@@ -82,18 +95,6 @@ TEST(Border, IsTheSameInBothNeighboursWhateverTheirInsides) {
           << error;
     }
   }
-}
-
-TEST(Border, StaysAsItIsWhenInteriorSamplesAreInserted) {
-  const HeightField field = HillField(33, 33, 1);
-  GreedyTriangulation tin(field);
-  EXPECT_TRUE(tin.Run({10}));
-  const std::vector<int> before = BorderVertices(field, tin.Mesh(), Side::kNorth);
-  std::vector<SamplePosition> samples;
-  for (std::uint16_t i = 1; i < 32; ++i) samples.push_back({i, static_cast<std::uint16_t>(32 - i)});
-  tin.InsertInterior(samples);
-  EXPECT_TRUE(tin.Run({10}));
-  EXPECT_EQ(BorderVertices(field, tin.Mesh(), Side::kNorth), before);
 }
 
 }  // namespace

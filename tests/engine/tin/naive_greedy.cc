@@ -7,7 +7,9 @@
 #include <utility>
 
 #include "engine/core/check.h"
+#include "engine/tin/border.h"
 #include "engine/tin/candidate.h"
+#include "engine/tin/candidate_queue.h"
 #include "engine/tin/plane.h"
 #include "engine/tin/predicates.h"
 #include "engine/tin/triangulation.h"
@@ -26,12 +28,17 @@ class NaivePass {
       : field_(field), borders_(borders), triangulation_(triangulation) {}
 
   Pick WorstOfAll() {
+    Pick pick;
     for (TriangleId t = 0; t < triangulation_.triangle_count(); ++t) {
+      worst_ = {};
       for (int y = 0; y < field_.height(); ++y) {
         for (int x = 0; x < field_.width(); ++x) Judge(t, x, y);
       }
+      // Triangles are compared by errors rounded to float, samples of one triangle by their exact ones.
+      worst_.error = static_cast<double>(CandidateQueue::RoundUp(worst_.error));
+      if (Precedes(worst_, pick.candidate)) pick = {worst_, t};
     }
-    return pick_;
+    return pick;
   }
 
  private:
@@ -47,12 +54,16 @@ class NaivePass {
     const bool on_border = x == 0 || y == 0 || x == field_.width() - 1 || y == field_.height() - 1;
     const double error = on_border ? BorderErrorOf(corners, p) : PlaneErrorOf(corners, p);
     const Candidate candidate{error, static_cast<std::uint32_t>(y * field_.width() + x)};
-    if (error > 0 && Precedes(candidate, pick_.candidate)) pick_ = {candidate, t};  // false for NaN
+    if (error > 0 && Precedes(candidate, worst_)) worst_ = candidate;  // false for NaN
   }
 
-  double PlaneErrorOf(const std::array<SamplePosition, 3>& c, SamplePosition p) const {
-    const Plane plane(SortedByRow({CornerAt(c[0]), CornerAt(c[1]), CornerAt(c[2])}));
-    return std::abs(plane.At(p.x, plane.AtRow(p.y)) - static_cast<double>(field_.At(p.x, p.y)));
+  // The formula of triangle_scan.h, relative to the corner that was inserted last.
+  double PlaneErrorOf(const std::array<SamplePosition, 3>& corners, SamplePosition sample) const {
+    const Corner u = CornerAt(corners[0]), v = CornerAt(corners[1]), p = CornerAt(corners[2]);
+    const double ux = u.x - p.x, uy = u.y - p.y, uz = u.z - p.z, vx = v.x - p.x, vy = v.y - p.y, vz = v.z - p.z;
+    const double d = ux * vy - uy * vx, a = vy * uz - uy * vz, b = ux * vz - vx * uz;
+    const double height = static_cast<double>(field_.At(sample.x, sample.y));
+    return std::abs(d * (height - p.z) - (a * (sample.x - p.x) + b * (sample.y - p.y))) / d;
   }
 
   // p lies on the border and in the triangle, and is no corner: it lies on the one edge that is collinear with it.
@@ -68,7 +79,7 @@ class NaivePass {
       const double h_a = CornerAt(low).z, h_b = CornerAt(high).z, h_k = static_cast<double>(field_.At(p.x, p.y));
       const double error =
           std::abs((h_a * (b - k) + h_b * (k - a)) / (b - a) - h_k) + options.sagitta_m * (k - a) * (b - k);
-      return options.weight * error;
+      return BorderError(error, options);
     }
     CheckFailed("a border sample lies on a border edge", __FILE__, __LINE__);
   }
@@ -76,24 +87,24 @@ class NaivePass {
   const HeightField& field_;
   const std::array<BorderOptions, 4>& borders_;
   const Triangulation& triangulation_;
-  Pick pick_;
+  Candidate worst_;  // of the triangle at hand
 };
 
 }  // namespace
 
 TinMesh NaiveGreedy(const HeightField& field, const std::array<BorderOptions, 4>& borders, const GreedyGoal& goal) {
-  Triangulation triangulation(field.width(), field.height());
+  const auto vertex = [&](int x, int y) -> Triangulation::Vertex {
+    return {{static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)}, field.VertexHeight(x, y)};
+  };
+  const int east = field.width() - 1, north = field.height() - 1;
+  Triangulation triangulation({vertex(0, 0), vertex(east, 0), vertex(east, north), vertex(0, north)});
   while (triangulation.vertex_count() < goal.max_points) {
     const Pick worst = NaivePass(field, borders, triangulation).WorstOfAll();
     if (worst.candidate.error <= goal.max_error) break;
-    const auto width = static_cast<std::uint32_t>(field.width());
-    triangulation.Insert({static_cast<std::uint16_t>(worst.candidate.sample % width),
-                          static_cast<std::uint16_t>(worst.candidate.sample / width)},
-                         worst.triangle);
+    const auto sample = static_cast<int>(worst.candidate.sample);
+    triangulation.InsertDelaunay(vertex(sample % field.width(), sample / field.width()), worst.triangle);
   }
-  TinMesh mesh{triangulation.positions(), {}};
-  for (TriangleId t = 0; t < triangulation.triangle_count(); ++t) mesh.triangles.push_back(triangulation.triangle(t));
-  return mesh;
+  return triangulation.Mesh();
 }
 
 }  // namespace terrace::tin

@@ -1,7 +1,6 @@
 // Greedy insertion as section 3.2 of the paper has it: every pass looks at every sample of the field again.
 //
-// The oracle of the optimized algorithm. It shares the triangulation and the two formulas (Plane, WorstBorderSample's
-// chord) with it, and nothing of what makes it fast: no spans, no candidates, no queue, no update region.
+// The oracle of the optimized algorithm. It shares the triangulation and the rounding of errors with it, and nothing of what makes it fast: no spans, no candidates, no queue, no update region.
 #pragma once
 
 #include "engine/tin/greedy.h"

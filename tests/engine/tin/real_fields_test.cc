@@ -57,7 +57,7 @@ TEST(RealFields, NeighbouringTilesShareTheirBorders) {
   if (!TestDataPath(kName)) GTEST_SKIP() << MissingTestData(kName);
   constexpr int kSide = 129, kBlock = 3;
   GreedyOptions options;
-  options.borders.fill({1.25, 0.0005});
+  options.borders.fill({.weight = 1.25, .padding_m = 0.2, .sagitta_m = 0.0005});
   options.seeds = {{200, 64}, {50, 32}, {15, 16}};
   options.curvature = {std::vector<double>(kSide, 80.0 * 80), 92.0 * 92, 6.378e6};
   for (const double error : {100.0, 20.0, 5.0}) {

@@ -3,32 +3,42 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <vector>
 
+#include "engine/tin/plane.h"
 #include "tests/engine/tin/test_fields.h"
 
 namespace terrace::tin {
 namespace {
 
-TEST(SagittaBound, IsZeroOnFlatGround) {
-  EXPECT_EQ(SagittaBound({}, {Corner{0, 0, 0}, Corner{8, 0, 0}, Corner{0, 8, 0}}), 0);
+TEST(Sagitta, IsZeroOnFlatGround) {
+  EXPECT_TRUE(Sagitta({}, 9).is_flat());
+  EXPECT_EQ(Sagitta({}, 9).Bound({0, 0}, {8, 0}, {0, 8}), 0);
 }
 
-TEST(SagittaBound, IsAQuarterOfTheSquaredHypotenuseAtARightAngle) {
-  const Curvature curvature{std::vector<double>(9, 100.0), 100.0, 5.0};
-  EXPECT_DOUBLE_EQ(SagittaBound(curvature, {Corner{0, 0, 0}, Corner{6, 0, 0}, Corner{0, 8, 0}}), 100 * 100.0 / 4 / 10);
+TEST(Sagitta, IsAQuarterOfTheSquaredHypotenuseAtARightAngle) {
+  const Sagitta sagitta({std::vector<double>(9, 100.0), 100.0, 5.0}, 9);
+  EXPECT_DOUBLE_EQ(sagitta.Bound({0, 0}, {6, 0}, {0, 8}), 100 * 100.0 / 4 / 10);
+  EXPECT_EQ(sagitta.Bound({6, 0}, {0, 8}, {0, 0}), sagitta.Bound({0, 0}, {6, 0}, {0, 8}));
 }
 
-TEST(SagittaBound, UsesTheLongestRowOfTheTriangle) {
-  Curvature curvature{std::vector<double>(9, 1.0), 1.0, 0.5};
-  curvature.east_m2[3] = 4;
-  curvature.east_m2[7] = 100;
-  EXPECT_DOUBLE_EQ(SagittaBound(curvature, {Corner{0, 2, 0}, Corner{6, 2, 0}, Corner{0, 6, 0}}), (36 * 4 + 16) / 4.0);
+TEST(Sagitta, UsesTheWidestRowOfTheTriangle) {
+  const Sagitta sagitta({{1, 2, 3, 4, 9, 7, 5, 2, 1}, 1.0, 0.5}, 9);
+  EXPECT_DOUBLE_EQ(sagitta.Bound({0, 2}, {6, 2}, {0, 6}), (36 * 9 + 16) / 4.0);
+  EXPECT_DOUBLE_EQ(sagitta.Bound({0, 0}, {6, 0}, {0, 3}), (36 * 4 + 9) / 4.0);
+  EXPECT_DOUBLE_EQ(sagitta.Bound({0, 6}, {6, 6}, {0, 8}), (36 * 5 + 4) / 4.0);
+}
+
+TEST(SagittaDeathTest, RefusesRowsThatWidenTwice) {
+  EXPECT_DEATH(Sagitta({{1, 2, 1, 2}, 1.0, 0.5}, 4), "check failed");
+  EXPECT_DEATH(Sagitta({{1, 2, 1}, 1.0, 0.5}, 4), "check failed");
 }
 
 // With h(p) = |p|^2 / 2R, a triangle's plane is above the ground by at most its sagitta.
-TEST(SagittaBound, BoundsTheDepthUnderEveryTriangle) {
+TEST(Sagitta, BoundsTheDepthUnderEveryTriangle) {
   constexpr double kEast = 90, kNorth = 110, kRadius = 6.4e6;
-  const Curvature curvature{std::vector<double>(65, kEast * kEast), kNorth * kNorth, kRadius};
+  const Sagitta sagitta({std::vector<double>(65, kEast * kEast), kNorth * kNorth, kRadius}, 65);
   const auto ground = [&](int x, int y) { return (x * kEast * x * kEast + y * kNorth * y * kNorth) / (2 * kRadius); };
   Random random(1);
   for (int i = 0; i < 300; ++i) {
@@ -49,7 +59,10 @@ TEST(SagittaBound, BoundsTheDepthUnderEveryTriangle) {
           plane.origin.z + plane.per_column * (x - plane.origin.x) + plane.per_row * (y - plane.origin.y);
       deepest = std::max(deepest, on_plane - (x * kEast * x * kEast + y * kNorth * y * kNorth) / (2 * kRadius));
     }
-    ASSERT_LE(deepest, SagittaBound(curvature, corners) + 1e-9);
+    const auto at = [&](std::size_t k) -> SamplePosition {
+      return {static_cast<std::uint16_t>(corners[k].x), static_cast<std::uint16_t>(corners[k].y)};
+    };
+    ASSERT_LE(deepest, sagitta.Bound(at(0), at(1), at(2)) + 1e-9);
   }
 }
 

@@ -2,154 +2,157 @@
 
 #include <gtest/gtest.h>
 
+#include <hwy/targets.h>
+
+#include <array>
 #include <cmath>
 #include <limits>
-#include <utility>
 #include <vector>
 
+#include "engine/tin/height_field.h"
 #include "engine/tin/predicates.h"
-#include "engine/tin/triangle_spans.h"
 #include "tests/engine/tin/test_fields.h"
 
 namespace terrace::tin {
 namespace {
 
-SamplePosition PositionOf(const Corner& corner) {
-  return {static_cast<std::uint16_t>(corner.x), static_cast<std::uint16_t>(corner.y)};
-}
-
-std::array<Corner, 3> RandomTriangle(Random& random, const HeightField& field) {
-  for (;;) {
-    std::array<Corner, 3> corners;
-    for (Corner& corner : corners) {
-      corner.x = random.Below(field.width());
-      corner.y = random.Below(field.height());
-      corner.z = static_cast<double>(field.VertexHeight(corner.x, corner.y));
-    }
-    if (Orientation(PositionOf(corners[0]), PositionOf(corners[1]), PositionOf(corners[2])) > 0) return corners;
-  }
-}
-
-// 2: strictly inside, 1: on an edge, 0: outside, a corner, or on the field's border.
-int CoverageOf(const HeightField& field, const std::array<Corner, 3>& corners, int x, int y) {
-  if (x == 0 || y == 0 || x == field.width() - 1 || y == field.height() - 1) return 0;
-  const SamplePosition p{static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)};
-  int coverage = 2;
-  for (unsigned i = 0; i < 3; ++i) {
-    if (PositionOf(corners[i]) == p) return 0;
-    const std::int64_t side = Orientation(PositionOf(corners[i]), PositionOf(corners[(i + 1) % 3]), p);
-    if (side < 0) return 0;
-    if (side == 0) coverage = 1;
-  }
-  return coverage;
-}
-
-TEST(TriangleSpans, VisitsExactlyTheClosedTriangleInRowMajorOrder) {
-  Random random(1);
-  for (int i = 0; i < 3000; ++i) {
-    const int width = 2 + random.Below(20), height = 2 + random.Below(20);
-    const HeightField field = NoiseField(width, height, static_cast<std::uint64_t>(i));
-    const std::array<Corner, 3> sorted = SortedByRow(RandomTriangle(random, field));
-    std::vector<std::pair<int, int>> expected, visited;
-    const std::array<Corner, 3> counter_clockwise =
-        Plane(sorted).doubled_area > 0 ? sorted : std::array<Corner, 3>{sorted[0], sorted[2], sorted[1]};
-    for (int y = 0; y < height; ++y) {
-      for (int x = 0; x < width; ++x) {
-        if (CoverageOf(field, counter_clockwise, x, y) > 0) expected.emplace_back(y, x);
-      }
-    }
-    ForEachInnerSpan(sorted, Plane(sorted).doubled_area, width, height, [&](int y, int first, int last) {
-      ASSERT_LE(first, last);
-      for (int x = first; x <= last; ++x) visited.emplace_back(y, x);
-    });
-    ASSERT_EQ(visited, expected);
-  }
-}
-
-TEST(EdgeCrossing, IsExactForTheLongestEdges) {
-  constexpr int kLast = HeightField::kMaxSide - 1;
-  Random random(2);
-  for (int i = 0; i < 20000; ++i) {
-    Corner low{random.Below(kLast + 1), random.Below(kLast / 2), 0},
-        high{random.Below(kLast + 1), kLast - random.Below(kLast / 2), 0};
-    if (i % 3 == 0) low.x = 0, high.x = kLast;
-    if (i % 3 == 1) low.x = kLast, high.x = 0;
-    const EdgeCrossing crossing(low, high);
-    const int y = low.y + random.Below(high.y - low.y + 1);
-    const std::int64_t dy = high.y - low.y, n = low.x * dy + std::int64_t{y - low.y} * (high.x - low.x);
-    ASSERT_EQ(crossing.Floor(y), n / dy);
-    ASSERT_EQ(crossing.Ceil(y), (n + dy - 1) / dy);
-  }
-}
-
-// The reciprocal of 49 times 49 is below 1: such quotients are where rounding would lose a sample.
-TEST(EdgeCrossing, IsExactWhereAnEdgeMeetsSamples) {
-  for (int dy = 1; dy < HeightField::kMaxSide; dy += 1 + dy / 500) {
-    for (const int x : {1, 49, 4097, HeightField::kMaxSide - 1}) {
-      const EdgeCrossing vertical({x, 0, 0}, {x, dy, 0}), rising({0, 0, 0}, {x, dy, 0});
-      ASSERT_EQ(vertical.Floor(dy), x) << dy;
-      ASSERT_EQ(vertical.Ceil(dy / 2), x) << dy;
-      ASSERT_EQ(rising.Floor(dy), x) << dy;
-      ASSERT_EQ(rising.Ceil(dy), x) << dy;
+// Stars of one triangle or more, as long as they are counter-clockwise around their centre.
+class TestStar {
+ public:
+  TestStar(const HeightField& field, SamplePosition centre, const std::vector<SamplePosition>& ring) {
+    star_.x = centre.x;
+    star_.y = centre.y;
+    star_.height = field.VertexHeight(centre.x, centre.y);
+    star_.count = ring.size() - 1;
+    star_.ring.Grow(ring.size());
+    for (std::size_t i = 0; i < ring.size(); ++i) {
+      star_.ring.Put(i, {static_cast<VertexId>(i), ring[i].x - centre.x, ring[i].y - centre.y,
+                         field.VertexHeight(ring[i].x, ring[i].y)});
     }
   }
+  const Star& operator*() const { return star_; }
+
+ private:
+  Star star_;
+};
+
+// The header's formula, sample by sample.
+PlaneMisfit Reference(const OpenSamples& samples, int height, const Star& star, std::size_t i) {
+  const double ux = star.ring.dx[i], uy = star.ring.dy[i], vx = star.ring.dx[i + 1], vy = star.ring.dy[i + 1];
+  const double pz = static_cast<double>(star.height);
+  const double uz = static_cast<double>(star.ring.heights[i]) - pz;
+  const double vz = static_cast<double>(star.ring.heights[i + 1]) - pz;
+  const double d = ux * vy - uy * vx, a = vy * uz - uy * vz, b = ux * vz - vx * uz;
+  PlaneMisfit worst;
+  double most = -1;
+  for (int row = 0; row < height; ++row) {
+    for (int column = 0; column < samples.width(); ++column) {
+      const double x = column - star.x, y = row - star.y;
+      const double of_u = vy * x - vx * y, of_v = ux * y - uy * x;
+      if (of_u < 0 || of_v < 0 || d - of_u - of_v < 0) continue;
+      const double numerator = std::abs(d * (static_cast<double>(samples.Row(row)[column]) - pz) - (a * x + b * y));
+      if (!(numerator > most)) continue;
+      most = numerator;
+      worst = {numerator / d, static_cast<std::uint32_t>(row * samples.width() + column)};
+    }
+  }
+  return worst;
 }
 
-TEST(TriangleScan, FindsTheFirstOfTheWorstSamples) {
+SamplePosition RandomSample(Random& random, const HeightField& field) {
+  return {static_cast<std::uint16_t>(random.Below(field.width())),
+          static_cast<std::uint16_t>(random.Below(field.height()))};
+}
+
+// Every set of instructions that this processor has and that was compiled.
+std::vector<std::int64_t> Targets() {
+  std::vector<std::int64_t> targets;
+  for (const std::int64_t supported : hwy::SupportedAndGeneratedTargets()) targets.push_back(supported);
+  return targets;
+}
+
+void ExpectReference(const HeightField& field, const OpenSamples& samples, const Star& star) {
+  for (const std::int64_t target : Targets()) {
+    hwy::SetSupportedTargetsForTest(target);
+    std::vector<PlaneMisfit> misfits(star.count);
+    BestStarScan()(samples, star, misfits.data());
+    for (std::size_t i = 0; i < star.count; ++i) {
+      const PlaneMisfit expected = Reference(samples, field.height(), star, i);
+      ASSERT_EQ(misfits[i].distance, expected.distance) << hwy::TargetName(target);
+      ASSERT_EQ(misfits[i].sample, expected.sample) << hwy::TargetName(target);
+    }
+  }
+  hwy::SetSupportedTargetsForTest(0);
+}
+
+TEST(TriangleScan, EqualsTheFormulaOnEveryTargetBitForBit) {
   Random random(3);
-  for (int i = 0; i < 2000; ++i) {
-    const HeightField field = StepField(2 + random.Below(14), 2 + random.Below(14), 3, static_cast<std::uint64_t>(i));
-    const std::array<Corner, 3> corners = RandomTriangle(random, field);
-    const Plane plane(SortedByRow(corners));
-    PlaneMisfit expected;
-    double squares = 0;
-    for (int y = 0; y < field.height(); ++y) {
-      for (int x = 0; x < field.width(); ++x) {
-        const int coverage = CoverageOf(field, corners, x, y);
-        if (coverage == 0) continue;
-        const double distance = std::abs(plane.At(x, plane.AtRow(y)) - static_cast<double>(field.At(x, y)));
-        squares += coverage * 0.5 * distance * distance;
-        if (distance > expected.distance) expected = {distance, static_cast<std::uint32_t>(y * field.width() + x)};
-      }
-    }
-    const PlaneMisfit worst = WorstSample(field, corners);
-    ASSERT_EQ(worst.distance, expected.distance);
-    ASSERT_EQ(worst.sample, expected.sample);
-    ASSERT_NEAR(SquaredDistances(field, corners), squares, 1e-9 * (1 + squares));
+  for (int i = 0; i < 3000; ++i) {
+    // From boxes of a few samples to spans of several vectors, with ties and without.
+    const int side = 3 + random.Below(i % 3 == 0 ? 80 : 12);
+    const int width = side + random.Below(side), height = side + random.Below(side);
+    const auto seed = static_cast<std::uint64_t>(i);
+    const HeightField field = i % 2 == 0 ? StepField(width, height, 3, seed) : NoiseField(width, height, seed);
+    OpenSamples samples(field);
+    for (int k = random.Below(width * height / 4); k > 0; --k) samples.Close(RandomSample(random, field));
+    const SamplePosition p = RandomSample(random, field), u = RandomSample(random, field), v = RandomSample(random, field);
+    if (Orientation(p, u, v) <= 0) continue;
+    for (const SamplePosition corner : {p, u, v}) samples.Close(corner);
+    ExpectReference(field, samples, *TestStar(field, p, {u, v}));
+    if (HasFatalFailure()) return;
   }
 }
 
-TEST(TriangleScan, DoesNotDependOnTheOrderOfTheCorners) {
-  Random random(4);
-  const HeightField field = NoiseField(31, 29, 4);
-  for (int i = 0; i < 500; ++i) {
-    const auto [a, b, c] = RandomTriangle(random, field);
-    const PlaneMisfit worst = WorstSample(field, {a, b, c});
-    for (const std::array<Corner, 3>& turned :
-         {std::array<Corner, 3>{b, c, a}, {c, a, b}, {a, c, b}, {c, b, a}, {b, a, c}}) {
-      const PlaneMisfit again = WorstSample(field, turned);
-      ASSERT_EQ(again.distance, worst.distance);
-      ASSERT_EQ(again.sample, worst.sample);
-    }
+TEST(TriangleScan, ScansStarsOfAnySize) {
+  const HeightField field = NoiseField(101, 101, 4);
+  OpenSamples samples(field);
+  samples.Close({40, 60});
+  std::vector<SamplePosition> ring;
+  for (std::uint16_t x = 0; x <= 100; x += 4) ring.push_back({x, 0});
+  for (std::uint16_t y = 3; y <= 100; y += 7) ring.push_back({100, y});
+  for (std::size_t count = 2; count <= ring.size(); ++count) {
+    ExpectReference(field, samples,
+                    *TestStar(field, {40, 60}, {ring.begin(), ring.begin() + static_cast<std::ptrdiff_t>(count)}));
+    if (HasFatalFailure()) return;
   }
 }
 
-TEST(TriangleScan, SkipsVoids) {
+TEST(TriangleScan, ReachesTheLargestTriangleOfTheLongestField) {
+  constexpr int kLength = HeightField::kMaxSide;
+  const HeightField field = MakeField(kLength, 3, [](int x, int y) { return x == kLength - 3 && y == 1 ? 9.f : 0.f; });
+  const HeightField upright = MakeField(3, kLength, [](int x, int y) { return y == kLength - 3 && x == 1 ? 9.f : 0.f; });
+  const std::uint16_t last = kLength - 1;
+  ExpectReference(field, OpenSamples(field), *TestStar(field, {0, 0}, {{last, 0}, {last, 2}}));
+  ExpectReference(upright, OpenSamples(upright), *TestStar(upright, {0, 0}, {{2, 0}, {2, last}}));
+}
+
+TEST(TriangleScan, SkipsVoidsVerticesAndTheBorder) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const HeightField field = MakeField(5, 5, [&](int x, int y) {
-    return x == 2 && y == 1 ? nan : x == 3 && y == 1 ? 7.f : 0.f;
+    return x == 2 && y == 1 ? nan : x == 3 && y == 1 ? 7.f : x == 3 && y == 2 ? 8.f : x == 4 && y == 1 ? 99.f : 0.f;
   });
-  const PlaneMisfit worst = WorstSample(field, {Corner{0, 0, 0}, Corner{4, 0, 0}, Corner{4, 4, 0}});
+  OpenSamples samples(field);
+  samples.Close({3, 2});
+  PlaneMisfit worst;
+  BestStarScan()(samples, *TestStar(field, {4, 4}, {{0, 0}, {4, 0}}), &worst);
   EXPECT_EQ(worst.distance, 7);
   EXPECT_EQ(worst.sample, 8u);
-  EXPECT_EQ(SquaredDistances(field, {Corner{0, 0, 0}, Corner{4, 0, 0}, Corner{4, 4, 0}}), 49);
 }
 
 TEST(TriangleScan, TellsWhenThereIsNothingToScan) {
-  const HeightField field = NoiseField(5, 5, 1);
-  const PlaneMisfit worst = WorstSample(field, {Corner{1, 1, 3}, Corner{2, 1, 4}, Corner{1, 2, 5}});
+  const HeightField field = NoiseField(6, 6, 1);
+  OpenSamples samples(field);
+  for (const SamplePosition corner : {SamplePosition{1, 1}, {2, 1}, {1, 2}}) samples.Close(corner);
+  PlaneMisfit worst;
+  BestStarScan()(samples, *TestStar(field, {1, 1}, {{2, 1}, {1, 2}}), &worst);
   EXPECT_LT(worst.distance, 0);
   EXPECT_EQ(worst.sample, kNoSample);
+}
+
+TEST(TriangleScan, HasSeveralTargetsToCompare) {
+  // On x86 the baseline and what the processor has; elsewhere at least the one.
+  EXPECT_GE(Targets().size(), 1u);
+  RecordProperty("targets", static_cast<int>(Targets().size()));
 }
 
 }  // namespace

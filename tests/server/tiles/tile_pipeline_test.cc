@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <map>
+#include <memory>
 #include <thread>
 #include <tuple>
 #include <vector>
@@ -123,6 +124,37 @@ TEST(TilePipeline, GivesTheSameBytesOnEveryThread) {
     threads.emplace_back([&] { EXPECT_EQ(Fetch(1, key, 4).encoded.bytes, expected.bytes); });
   }
   for (std::thread& thread : threads) thread.join();
+}
+
+// The cached refinement serves coarser errors, is continued for finer ones, and never shows in the bytes.
+TEST(TilePipeline, GivesTheSameBytesFromScratchFromReplayAndContinued) {
+  const auto open = [](std::size_t cache_bytes) {
+    std::vector<Dataset> datasets;
+    datasets.push_back(OpenSample("etopo5"));
+    datasets.push_back(OpenSample("jacksboro"));
+    return std::make_unique<TilePipeline>(std::move(datasets), cache_bytes);
+  };
+  const auto scratch = open(0), cached = open(std::size_t{64} << 20);
+  for (const std::uint32_t dataset : {0u, 1u}) {
+    for (int level = 0; level <= Samples().datasets()[dataset].source->max_level(); level += 3) {
+      TileRequest request;
+      request.dataset = dataset;
+      request.key = MiddleTile(dataset, level);
+      for (const int step : {0, 8, 4, 20, -6, 24}) {
+        request.error_step = step;
+        const auto expected = scratch->Build(request, {}), tile = cached->Build(request, {});
+        ASSERT_TRUE(expected.has_value() && tile.has_value());
+        ASSERT_EQ(tile->bytes, expected->bytes) << dataset << "/" << geo::ToString(request.key) << " step " << step;
+        ASSERT_EQ(tile->max_error_m, expected->max_error_m);
+      }
+      // Everything was made from one read.
+      request.coding = Coding::kGzip;
+      request.normals = true;
+      EXPECT_EQ(cached->Build(request, {})->times.read.count(), 0);
+    }
+  }
+  EXPECT_EQ(scratch->refinements().entries, 0u);
+  EXPECT_GT(cached->refinements().entries, 5u);
 }
 
 TEST(TilePipeline, RefusesWhatIsNotThere) {

@@ -1,0 +1,126 @@
+#include "engine/tin/candidate_queue.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "tests/engine/tin/test_fields.h"
+
+namespace terrace::tin {
+namespace {
+
+struct Expected {
+  float error = 0;
+  std::uint32_t sample = kNoSample;
+};
+
+// The foremost of all, by looking at all.
+Expected Foremost(const std::vector<Candidate>& candidates) {
+  Expected best;
+  for (const Candidate& candidate : candidates) {
+    const float error = CandidateQueue::RoundUp(candidate.error);
+    if (error > best.error || (error == best.error && error > 0 && candidate.sample < best.sample)) {
+      best = {error, candidate.sample};
+    }
+  }
+  return best;
+}
+
+testing::AssertionResult Agrees(CandidateQueue& queue, const std::vector<Candidate>& candidates) {
+  const Expected expected = Foremost(candidates);
+  const std::uint32_t winner = queue.Winner();
+  if (winner == CandidateQueue::kNoSlot) {
+    if (expected.error == 0) return testing::AssertionSuccess();
+    return testing::AssertionFailure() << "no winner instead of " << expected.error;
+  }
+  if (queue.error(winner) == expected.error && queue.sample(winner) == expected.sample &&
+      candidates[winner].sample == expected.sample) {
+    return testing::AssertionSuccess();
+  }
+  return testing::AssertionFailure() << "slot " << winner << " with " << queue.error(winner) << " instead of "
+                                     << expected.error;
+}
+
+TEST(CandidateQueue, AgreesWithALinearSearch) {
+  for (const bool integers : {true, false}) {
+    Random random(1);
+    CandidateQueue queue;
+    std::vector<Candidate> candidates;
+    for (int round = 0; round < 20000; ++round) {
+      auto slot = static_cast<std::uint32_t>(candidates.size());
+      if (slot > 0 && random.Below(3) > 0) slot = static_cast<std::uint32_t>(random.Below(static_cast<int>(slot)));
+      if (slot == candidates.size()) candidates.emplace_back();
+      Candidate candidate;
+      // Few different errors and samples: many ties. Errors fall, as they do in a run, but not steadily.
+      if (random.Below(5) > 0) {
+        const double error = 1 + (20000 - round) / 2000 + random.Below(4) * 0.5;
+        candidate = {integers ? error : error * random.Unit(), static_cast<std::uint32_t>(1 + random.Below(50))};
+      }
+      candidates[slot] = candidate;
+      queue.Set(slot, candidate);
+      if (round % 7 == 0) {
+        ASSERT_TRUE(Agrees(queue, candidates)) << round;
+      }
+    }
+  }
+}
+
+// As greedy insertion uses it: the winner is replaced by smaller ones, until nothing is left.
+TEST(CandidateQueue, EmptiesInOrder) {
+  Random random(2);
+  CandidateQueue queue;
+  for (std::uint32_t slot = 0; slot < 5000; ++slot) queue.Set(slot, {random.Unit() * 100, slot + 1});
+  float before = std::numeric_limits<float>::infinity();
+  std::size_t count = 0;
+  for (std::uint32_t slot = queue.Winner(); slot != CandidateQueue::kNoSlot; slot = queue.Winner()) {
+    ASSERT_LE(queue.error(slot), before);
+    before = queue.error(slot);
+    queue.Set(slot, {});
+    ++count;
+  }
+  EXPECT_EQ(count, 5000u);
+  queue.Set(7, {1, 3});
+  EXPECT_EQ(queue.Winner(), 7u);
+}
+
+TEST(CandidateQueue, HoldsNoneWhereNothingWasSet) {
+  CandidateQueue queue;
+  EXPECT_EQ(queue.Winner(), CandidateQueue::kNoSlot);
+  queue.Set(200, {});
+  EXPECT_EQ(queue.Winner(), CandidateQueue::kNoSlot);
+  queue.Set(130, {1, 5});
+  EXPECT_EQ(queue.Winner(), 130u);
+  queue.Set(130, {});
+  EXPECT_EQ(queue.Winner(), CandidateQueue::kNoSlot);
+}
+
+TEST(CandidateQueue, OrdersTheSmallestAndTheLargestErrors) {
+  CandidateQueue queue;
+  queue.Set(0, {1e-310, 1});
+  queue.Set(1, {1e-320, 2});
+  EXPECT_EQ(queue.Winner(), 0u);
+  queue.Set(2, {1e300, 9});
+  queue.Set(3, {1e305, 8});
+  EXPECT_EQ(queue.Winner(), 3u);  // both too large for a float: the smaller sample
+  queue.Set(3, {});
+  EXPECT_EQ(queue.Winner(), 2u);
+  queue.Set(2, {});
+  EXPECT_GT(queue.error(queue.Winner()), 0);
+}
+
+TEST(CandidateQueue, RoundsUp) {
+  Random random(3);
+  for (int i = 0; i < 100000; ++i) {
+    const double error = std::ldexp(random.Unit(), random.Below(300) - 160);
+    const float rounded = CandidateQueue::RoundUp(error);
+    ASSERT_GE(static_cast<double>(rounded), error);
+    ASSERT_LT(static_cast<double>(std::nextafter(rounded, 0.0F)), error == 0 ? 1 : error);
+  }
+  EXPECT_EQ(CandidateQueue::RoundUp(0), 0);
+  EXPECT_EQ(CandidateQueue::RoundUp(5), 5);
+}
+
+}  // namespace
+}  // namespace terrace::tin

@@ -1,0 +1,65 @@
+#include "engine/tin/insert_samples.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "engine/tin/greedy.h"
+#include "tests/engine/tin/mesh_laws.h"
+#include "tests/engine/tin/test_fields.h"
+
+namespace terrace::tin {
+namespace {
+
+TEST(InsertSamples, AppendsWhatIsNoVertexYet) {
+  const HeightField field = HillField(33, 33, 2);
+  GreedyTriangulation tin(field);
+  EXPECT_TRUE(tin.Run({20}));
+  const TinMesh coarse = tin.Mesh();
+  std::vector<SamplePosition> samples;
+  for (std::uint16_t i = 1; i < 32; ++i) samples.push_back({i, i});
+  samples.push_back({5, 5});
+  const TinMesh mesh = InsertSamples(coarse, samples);
+  std::vector<SamplePosition> expected = coarse.vertices;
+  for (const SamplePosition sample : samples) {
+    if (std::find(expected.begin(), expected.end(), sample) == expected.end()) expected.push_back(sample);
+  }
+  EXPECT_EQ(mesh.vertices, expected);
+  EXPECT_TRUE(CoversExactly(field, mesh));
+  EXPECT_TRUE(IsDelaunay(mesh));
+  for (const Side side : {Side::kSouth, Side::kEast, Side::kNorth, Side::kWest}) {
+    EXPECT_EQ(BorderVertices(field, mesh, side), BorderVertices(field, coarse, side));
+  }
+}
+
+TEST(InsertSamples, KeepsAnyMeshAMesh) {
+  // A fan of slivers: nothing Delaunay about it.
+  TinMesh fan{{{0, 0}, {40, 0}, {40, 40}, {0, 40}}, {}};
+  for (std::uint16_t y = 1; y < 40; ++y) fan.vertices.push_back({40, y});
+  std::uint32_t before = 1;
+  for (std::uint32_t v = 4; v < fan.vertices.size(); ++v) {
+    fan.triangles.push_back({0, before, v});
+    before = v;
+  }
+  fan.triangles.push_back({0, before, 2});
+  fan.triangles.push_back({0, 2, 3});
+  const HeightField field = NoiseField(41, 41, 1);
+  ASSERT_TRUE(CoversExactly(field, fan));
+  Random random(1);
+  std::vector<SamplePosition> samples;
+  for (int i = 0; i < 500; ++i) {
+    samples.push_back({static_cast<std::uint16_t>(1 + random.Below(39)), static_cast<std::uint16_t>(1 + random.Below(39))});
+  }
+  EXPECT_TRUE(CoversExactly(field, InsertSamples(fan, samples)));
+}
+
+TEST(InsertSamplesDeathTest, RefusesBorderSamples) {
+  const HeightField field = HillField(33, 33, 2);
+  GreedyTriangulation tin(field);
+  const SamplePosition on_border{32, 4};
+  EXPECT_DEATH(InsertSamples(tin.Mesh(), {&on_border, 1}), "check failed");
+}
+
+}  // namespace
+}  // namespace terrace::tin
