@@ -26,6 +26,7 @@ double RangeOf(const HeightField& heights) {
 ExtendedField::ExtendedField(HeightField heights, std::vector<ColorSample> colors, double color_weight)
     : heights_(std::move(heights)),
       colors_(std::move(colors)),
+      color_weight_(color_weight),
       height_weight_(1 - color_weight),
       level_weight_(color_weight * RangeOf(heights_) / 3 / 255) {}
 

@@ -50,13 +50,14 @@ class ExtendedField {
   // The error of a sample that is missed by so many metres, and by so many 255ths of the range in the sum of its
   // colours.
   double Error(double metres, double levels) const { return height_weight_ * metres + level_weight_ * levels; }
-  double color_weight() const { return 1 - height_weight_; }
+  double color_weight() const { return color_weight_; }
 
  private:
   ExtendedField(HeightField heights, std::vector<ColorSample> colors, double color_weight);
 
   HeightField heights_;
   std::vector<ColorSample> colors_;
+  double color_weight_;   // w
   double height_weight_;  // 1 - w
   double level_weight_;   // w M / 3 / 255
 };

@@ -13,7 +13,7 @@ namespace terrace::cli {
 
 struct ColorArguments {
   std::string image;      // covers the DEM; empty: none
-  double weight = 0.5;    // of colour against height, 0 to 1
+  double weight = 0.1;    // of colour against height, 0 to 1
   bool is_image = false;  // the raster to mesh is an image: no heights
 
   bool IsUsed() const { return is_image || !image.empty(); }
