@@ -281,6 +281,28 @@ TEST(ExtendedGreedy, KeepsItsBoundForExtremeHeights) {
   }
 }
 
+TEST(ExtendedGreedy, KeepsItsBoundOnRandomFields) {
+  Random random(11);
+  for (int run = 0; run < 300; ++run) {
+    const int width = 2 + random.Below(14), height = 2 + random.Below(14), voids = random.Below(3),
+              clear = random.Below(3);
+    const float scale = std::ldexp(1.0F, random.Below(40) - 20);
+    const HeightField heights = MakeField(width, height, [&](int x, int y) {
+      const bool is_void = x + y > 0 && random.Below(8) < voids;
+      return is_void ? kVoid : scale * static_cast<float>(random.Below(1000));
+    });
+    const auto noise = [&](int x, int y) {
+      const auto level = [&] { return static_cast<std::uint8_t>(random.Below(256)); };
+      return ColorSample{level(), level(), level(),
+                         static_cast<std::uint8_t>(x + y > 0 && random.Below(8) < clear ? 0 : 255)};
+    };
+    const ExtendedField field = Make(heights, noise, random.Unit());
+    const double bound = static_cast<double>(scale) * 1000 * random.Unit();
+    const ColoredMesh mesh = MeshOf(field, {.max_error = bound});
+    EXPECT_LE(Measure(field, mesh).combined, bound * (1 + 1e-12)) << run;
+  }
+}
+
 TEST(ExtendedField, RefusesWhatHasNoMeaning) {
   const auto opaque = Colors(8, 6, [](int, int) { return ColorSample{1, 2, 3, 255}; });
   const auto fails = [&](std::vector<ColorSample> colors, double weight, const char* words) {
