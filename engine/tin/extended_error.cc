@@ -41,7 +41,7 @@ ExtendedError MeasureExtendedError(const ExtendedField& field, const ColoredMesh
       corners[i] = mesh.tin.vertices[vertex];
       surfaces[i] = SurfaceAt(field, corners[i], mesh.colors[vertex]);
     }
-    const auto [a, b, c] = corners;
+    const SamplePosition a = corners[0], b = corners[1], c = corners[2];
     const auto doubled_area = static_cast<double>(Orientation(a, b, c));
     ForEachRow(corners, [&](int y, int first, int last) {
       for (int x = first; x <= last; ++x) {

@@ -42,7 +42,7 @@ MeshError MeasureError(const HeightField& field, const TinMesh& mesh, std::stop_
     const auto& triangle = mesh.triangles[t];
     const std::array<SamplePosition, 3> corners = {mesh.vertices[triangle[0]], mesh.vertices[triangle[1]],
                                                    mesh.vertices[triangle[2]]};
-    const auto [a, b, c] = corners;
+    const SamplePosition a = corners[0], b = corners[1], c = corners[2];
     const double z_a = heights[triangle[0]], z_b = heights[triangle[1]], z_c = heights[triangle[2]];
     const auto doubled_area = static_cast<double>(Orientation(a, b, c));
     ForEachRow(corners, [&](int y, int first, int last) {
