@@ -46,28 +46,43 @@ void Write(std::ostream& out, const std::string& bytes) {
   out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
 }
 
-void WriteObj(std::ostream& out, const std::vector<MeshVertex>& vertices, const std::vector<Triangle>& triangles) {
+void WriteObj(std::ostream& out, const std::vector<MeshVertex>& vertices, const std::vector<Triangle>& triangles,
+              const std::vector<VertexColor>& colors) {
   BufferedText text(out);
   text.Append("# terrace: {} vertices, {} triangles\n", vertices.size(), triangles.size());
-  for (const MeshVertex& v : vertices) text.Append("v {} {} {}\n", v.x, v.y, v.z);
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    const MeshVertex& v = vertices[i];
+    text.Append("v {} {} {}", v.x, v.y, v.z);
+    if (!colors.empty()) {
+      for (const std::uint8_t level : colors[i]) text.Append(" {:.4g}", level / 255.0);
+    }
+    text.Append("\n");
+  }
   for (const Triangle& t : triangles) {  // OBJ counts from 1
     text.Append("f {} {} {}\n", t[0] + std::uint64_t{1}, t[1] + std::uint64_t{1}, t[2] + std::uint64_t{1});
   }
 }
 
-void WritePly(std::ostream& out, const std::vector<MeshVertex>& vertices, const std::vector<Triangle>& triangles) {
+void WritePly(std::ostream& out, const std::vector<MeshVertex>& vertices, const std::vector<Triangle>& triangles,
+              const std::vector<VertexColor>& colors) {
+  const std::string_view color_properties =
+      colors.empty() ? "" : "property uchar red\nproperty uchar green\nproperty uchar blue\n";
   Write(out, fmt::format("ply\nformat binary_little_endian 1.0\ncomment terrace\nelement vertex {}\nproperty double x\n"
-                         "property double y\nproperty double z\nelement face {}\n"
+                         "property double y\nproperty double z\n{}element face {}\n"
                          "property list uchar int vertex_indices\nend_header\n",
-                         vertices.size(), triangles.size()));
+                         vertices.size(), color_properties, triangles.size()));
   ByteWriter block;
   const auto flush = [&](bool always) {
     if (always || block.size() >= kFlushBytes) Write(out, block.Take());
   };
-  for (const MeshVertex& v : vertices) {
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    const MeshVertex& v = vertices[i];
     block.Put(v.x);
     block.Put(v.y);
     block.Put(v.z);
+    if (!colors.empty()) {
+      for (const std::uint8_t level : colors[i]) block.Put(level);
+    }
     flush(false);
   }
   for (const Triangle& t : triangles) {
@@ -100,21 +115,28 @@ Box BoundsOf(const std::vector<MeshVertex>& vertices) {
   return box;
 }
 
-// Two accessors over one buffer: positions, then indices. 65535 as a 16-bit index means "restart" in glTF.
+// Colours are aligned to 4 bytes, as glTF wants all vertex attributes.
+constexpr std::size_t kGlbColorBytes = 4 * sizeof(std::uint16_t);
+
+// Accessors over one buffer: positions, indices, and colours if there are any. 65535 as a 16-bit index means "restart"
+// in glTF.
 struct GlbLayout {
   std::size_t vertices, indices;
+  bool has_colors;
   Vec3d center;
   Vec3f min, max;
 
   bool wide() const { return vertices > 65535; }
   std::size_t position_bytes() const { return vertices * sizeof(Vec3f); }
   std::size_t index_bytes() const { return indices * (wide() ? sizeof(std::uint32_t) : sizeof(std::uint16_t)); }
-  std::size_t buffer_bytes() const { return (position_bytes() + index_bytes() + 3) / 4 * 4; }
+  std::size_t color_offset() const { return (position_bytes() + index_bytes() + 3) / 4 * 4; }
+  std::size_t color_bytes() const { return has_colors ? vertices * kGlbColorBytes : 0; }
+  std::size_t buffer_bytes() const { return color_offset() + color_bytes(); }
 };
 
-GlbLayout MakeGlbLayout(const std::vector<MeshVertex>& vertices, std::size_t indices) {
+GlbLayout MakeGlbLayout(const std::vector<MeshVertex>& vertices, std::size_t indices, bool has_colors) {
   const Box box = BoundsOf(vertices);
-  GlbLayout layout{vertices.size(), indices, {}, {}, {}};
+  GlbLayout layout{vertices.size(), indices, has_colors, {}, {}, {}};
   for (std::size_t i = 0; i < 3; ++i) {
     layout.center[i] = box.min[i] + (box.max[i] - box.min[i]) / 2;
     // Subtraction and rounding to float are monotonic: the extremes of the doubles give those of the floats.
@@ -122,6 +144,24 @@ GlbLayout MakeGlbLayout(const std::vector<MeshVertex>& vertices, std::size_t ind
     layout.max[i] = static_cast<float>(box.max[i] - layout.center[i]);
   }
   return layout;
+}
+
+void AddColors(const GlbLayout& layout, Json& json) {
+  constexpr int kUnsignedShort = 5123, kArrayBuffer = 34962;
+  json["materials"] = Json::array({{{"pbrMetallicRoughness", {{"metallicFactor", 0}, {"roughnessFactor", 1}}}}});
+  Json& primitive = json["meshes"][0]["primitives"][0];
+  primitive["attributes"]["COLOR_0"] = json["accessors"].size();
+  primitive["material"] = 0;
+  json["accessors"].push_back({{"bufferView", json["bufferViews"].size()},
+                               {"componentType", kUnsignedShort},
+                               {"normalized", true},
+                               {"count", layout.vertices},
+                               {"type", "VEC3"}});
+  json["bufferViews"].push_back({{"buffer", 0},
+                                 {"byteOffset", layout.color_offset()},
+                                 {"byteLength", layout.color_bytes()},
+                                 {"byteStride", kGlbColorBytes},
+                                 {"target", kArrayBuffer}});
 }
 
 std::string GlbJson(const GlbLayout& layout) {
@@ -150,14 +190,27 @@ std::string GlbJson(const GlbLayout& layout) {
         {"byteOffset", layout.position_bytes()},
         {"byteLength", layout.index_bytes()},
         {"target", kIndexBuffer}}});
+  if (layout.has_colors) AddColors(layout, json);
   json["buffers"] = Json::array({{{"byteLength", layout.buffer_bytes()}}});
   std::string text = json.dump();
   text.append((4 - text.size() % 4) % 4, ' ');
   return text;
 }
 
+// IEC 61966-2-1, to 16 bits. No entry comes closer than 2^-10 to the middle between two integers: whatever a CPU's pow
+// makes of the last bit, the table is the same.
+std::array<std::uint16_t, 256> LinearLevels() {
+  std::array<std::uint16_t, 256> levels{};
+  for (std::size_t i = 0; i < levels.size(); ++i) {
+    const double share = static_cast<double>(i) / 255;
+    const double linear = share <= 0.04045 ? share / 12.92 : std::pow((share + 0.055) / 1.055, 2.4);
+    levels[i] = static_cast<std::uint16_t>(linear * 65535 + 0.5);
+  }
+  return levels;
+}
+
 std::string GlbBuffer(const GlbLayout& layout, const std::vector<MeshVertex>& vertices,
-                      const std::vector<Triangle>& triangles) {
+                      const std::vector<Triangle>& triangles, const std::vector<VertexColor>& colors) {
   ByteWriter buffer;
   buffer.Reserve(layout.buffer_bytes());
   for (const MeshVertex& vertex : vertices) {
@@ -174,14 +227,19 @@ std::string GlbBuffer(const GlbLayout& layout, const std::vector<MeshVertex>& ve
     }
   }
   buffer.PadTo(4);
+  const std::array<std::uint16_t, 256> linear = LinearLevels();
+  for (const VertexColor& color : colors) {
+    for (const std::uint8_t level : color) buffer.Put(linear[level]);
+    buffer.Put(std::uint16_t{0});
+  }
   return buffer.Take();
 }
 
 Result<void> WriteGlb(std::ostream& out, const std::vector<MeshVertex>& vertices,
-                      const std::vector<Triangle>& triangles) {
+                      const std::vector<Triangle>& triangles, const std::vector<VertexColor>& colors) {
   constexpr std::uint32_t kGlbMagic = 0x46546C67, kJsonChunk = 0x4E4F534A, kBinaryChunk = 0x004E4942;
   constexpr std::size_t kHeadersBytes = 12 + 8 + 8;
-  const GlbLayout layout = MakeGlbLayout(vertices, 3 * triangles.size());
+  const GlbLayout layout = MakeGlbLayout(vertices, 3 * triangles.size(), !colors.empty());
   const std::string json = GlbJson(layout);
   const std::size_t total = kHeadersBytes + json.size() + layout.buffer_bytes();
   if (total > std::numeric_limits<std::uint32_t>::max()) {
@@ -198,7 +256,7 @@ Result<void> WriteGlb(std::ostream& out, const std::vector<MeshVertex>& vertices
   head.Put(static_cast<std::uint32_t>(layout.buffer_bytes()));
   head.Put(kBinaryChunk);
   Write(out, head.Take());
-  Write(out, GlbBuffer(layout, vertices, triangles));
+  Write(out, GlbBuffer(layout, vertices, triangles, colors));
   return {};
 }
 
@@ -237,18 +295,19 @@ Result<MeshFileFormat> MeshFileFormatOf(std::string_view file_name) {
 }
 
 Result<void> WriteMesh(std::ostream& out, MeshFileFormat format, const std::vector<MeshVertex>& vertices,
-                       const std::vector<Triangle>& triangles) {
+                       const std::vector<Triangle>& triangles, const std::vector<VertexColor>& colors) {
+  TERRACE_CHECK(colors.empty() || colors.size() == vertices.size());
   if (Result<void> checked = CheckMesh(vertices, triangles); !checked) return checked;
   Result<void> written;
   switch (format) {
     case MeshFileFormat::kObj:
-      WriteObj(out, vertices, triangles);
+      WriteObj(out, vertices, triangles, colors);
       break;
     case MeshFileFormat::kPly:
-      WritePly(out, vertices, triangles);
+      WritePly(out, vertices, triangles, colors);
       break;
     case MeshFileFormat::kGlb:
-      written = WriteGlb(out, vertices, triangles);
+      written = WriteGlb(out, vertices, triangles, colors);
       break;
   }
   out.flush();

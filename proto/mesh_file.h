@@ -1,9 +1,13 @@
-// Meshes as files that other programs open: Wavefront OBJ, PLY and binary glTF.
+// Meshes as files that other programs open: Wavefront OBJ, PLY and binary glTF, with a colour at every vertex or none.
 //
 // OBJ is text whose numbers read back to the same doubles; PLY is binary little-endian doubles. Both keep x, y, z as
 // given. GLB has 32-bit floats relative to the centre of the mesh's box, and that centre in double precision in the
 // node's matrix. glTF is y-up: a point (x, y, z) with z up is stored as (x, z, -y), a rotation, so that viewers show
 // the terrain upright and triangles keep their sense.
+//
+// Colours are sRGB, as images have them. PLY holds them as bytes; OBJ as shares of 1 behind the coordinates, with digits
+// enough to give the same bytes again. glTF wants vertex colours linear: GLB has COLOR_0 as normalized 16-bit integers,
+// since 8 linear bits are too few for dark colours, and a material that is no metal, which the default would be.
 #pragma once
 
 #include <array>
@@ -25,10 +29,14 @@ struct MeshVertex {
   double x = 0, y = 0, z = 0;
 };
 
+// Red, green, blue in sRGB.
+using VertexColor = std::array<std::uint8_t, 3>;
+
 // Appends the whole file to `out`, which must be in binary mode. kInvalidArgument: a mesh without triangles, a
 // coordinate that is not finite, or more than the format can hold; nothing is written then. kUnavailable: `out` failed,
-// a full disk. Precondition: every index is below vertices.size().
+// a full disk. Preconditions: every index is below vertices.size(); `colors` is empty or has one entry a vertex.
 Result<void> WriteMesh(std::ostream& out, MeshFileFormat format, const std::vector<MeshVertex>& vertices,
-                       const std::vector<std::array<std::uint32_t, 3>>& triangles);
+                       const std::vector<std::array<std::uint32_t, 3>>& triangles,
+                       const std::vector<VertexColor>& colors = {});
 
 }  // namespace terrace::proto

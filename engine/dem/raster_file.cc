@@ -2,6 +2,7 @@
 
 #include <sys/stat.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdint>
 #include <system_error>
@@ -71,6 +72,17 @@ Result<void> CheckShape(GDALDataset& dataset, const std::string& path) {
 }
 
 }  // namespace
+
+Result<void> CheckSizeToMesh(const std::string& path, int width, int height) {
+  // Two gigabytes of floats: what is meshed in one piece must fit in memory several times over.
+  constexpr std::int64_t kMostSamples = std::int64_t{1} << 29;
+  constexpr int kMostPerSide = 1 << 15;  // the mesher's coordinates have 15 bits
+  if (std::int64_t{width} * height <= kMostSamples && std::max(width, height) <= kMostPerSide) return {};
+  return MakeError(ErrorCode::kInvalidArgument,
+                   "{}: {} x {} samples are too many to mesh in one piece (at most {} in all and {} a side); cut it "
+                   "with gdal_translate -srcwin",
+                   path, width, height, kMostSamples, kMostPerSide);
+}
 
 GDALDatasetUniquePtr ReopenRaster(const std::string& path) {
   InitGdal();

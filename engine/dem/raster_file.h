@@ -16,6 +16,9 @@ Result<GDALDatasetUniquePtr> OpenRaster(const std::string& path);
 // The same without the checks, for further handles on a file that passed them; null when it cannot be opened.
 GDALDatasetUniquePtr ReopenRaster(const std::string& path);
 
+// Refuses what is too large to mesh in one piece.
+Result<void> CheckSizeToMesh(const std::string& path, int width, int height);
+
 // Band 1: the heights. Precondition: the dataset came from OpenRaster or ReopenRaster.
 inline GDALRasterBand& HeightBand(GDALDataset& dataset) { return *dataset.GetRasterBand(1); }
 

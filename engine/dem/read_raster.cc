@@ -7,22 +7,13 @@
 namespace terrace::dem {
 
 Result<RasterHeights> ReadRaster(const std::string& path, const std::function<void(double)>& progress) {
-  // Two gigabytes of floats: what is meshed in one piece must fit in memory several times over.
-  constexpr std::int64_t kMostSamples = std::int64_t{1} << 29;
-  constexpr int kMostPerSide = 1 << 15;  // the mesher's coordinates have 15 bits
   constexpr int kRowsAtOnce = 256;
   auto dataset = OpenRaster(path);
   if (!dataset) return tl::unexpected(dataset.error());
   RasterHeights raster;
   raster.width = (*dataset)->GetRasterXSize();
   raster.height = (*dataset)->GetRasterYSize();
-  if (std::int64_t{raster.width} * raster.height > kMostSamples ||
-      std::max(raster.width, raster.height) > kMostPerSide) {
-    return MakeError(ErrorCode::kInvalidArgument,
-                     "{}: {} x {} samples are too many to mesh in one piece (at most {} in all and {} a side); cut it "
-                     "with gdal_translate -srcwin",
-                     path, raster.width, raster.height, kMostSamples, kMostPerSide);
-  }
+  if (auto fits = CheckSizeToMesh(path, raster.width, raster.height); !fits) return tl::unexpected(fits.error());
   raster.georeferenced = (*dataset)->GetGeoTransform(raster.geo_transform.data()) == CE_None;
   GDALRasterBand& band = HeightBand(**dataset);
   const SampleRules rules = SampleRules::Of(band, "");

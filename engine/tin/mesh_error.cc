@@ -1,6 +1,5 @@
 #include "engine/tin/mesh_error.h"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -8,32 +7,12 @@
 
 #include "engine/tin/predicates.h"
 #include "engine/tin/squared_errors.h"
+#include "engine/tin/triangle_rows.h"
 
 namespace terrace::tin {
 namespace {
 
 constexpr std::size_t kStopPeriod = 1024;  // triangles
-
-std::int64_t FloorDivide(std::int64_t n, std::int64_t d) { return n / d - (n % d != 0 && (n < 0) != (d < 0)); }
-std::int64_t CeilDivide(std::int64_t n, std::int64_t d) { return -FloorDivide(-n, d); }
-
-struct Range {
-  std::int64_t first, last;
-};
-
-// Columns of row y inside a counter-clockwise triangle: each edge p -> q allows the half-line where
-// Orientation(p, q, (x, y)) = (q.x - p.x)(y - p.y) - (q.y - p.y)(x - p.x) >= 0.
-Range Columns(const std::array<SamplePosition, 3>& corners, int y) {
-  const auto [west, east] = std::minmax({corners[0].x, corners[1].x, corners[2].x});
-  Range range{west, east};
-  for (unsigned i = 0; i < 3; ++i) {
-    const SamplePosition p = corners[i], q = corners[(i + 1) % 3];
-    const std::int64_t dx = q.x - p.x, dy = q.y - p.y, n = dx * (y - p.y);
-    if (dy > 0) range.last = std::min(range.last, p.x + FloorDivide(n, dy));
-    if (dy < 0) range.first = std::max(range.first, p.x + CeilDivide(n, dy));
-  }
-  return range;
-}
 
 }  // namespace
 
@@ -63,14 +42,12 @@ MeshError MeasureError(const HeightField& field, const TinMesh& mesh, std::stop_
     const auto& triangle = mesh.triangles[t];
     const std::array<SamplePosition, 3> corners = {mesh.vertices[triangle[0]], mesh.vertices[triangle[1]],
                                                    mesh.vertices[triangle[2]]};
-    const auto [a, b, c] = corners;
+    const SamplePosition a = corners[0], b = corners[1], c = corners[2];
     const double z_a = heights[triangle[0]], z_b = heights[triangle[1]], z_c = heights[triangle[2]];
     const auto doubled_area = static_cast<double>(Orientation(a, b, c));
-    const auto [south, north] = std::minmax({a.y, b.y, c.y});
-    for (int y = south; y <= north; ++y) {
-      const Range columns = Columns(corners, y);
-      for (std::int64_t x = columns.first; x <= columns.last; ++x) {
-        const float sample_height = field.At(static_cast<int>(x), y);
+    ForEachRow(corners, [&](int y, int first, int last) {
+      for (int x = first; x <= last; ++x) {
+        const float sample_height = field.At(x, y);
         if (std::isnan(sample_height)) continue;
         const SamplePosition p{static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)};
         // Relative to one corner's height: exact at the corners, and no cancellation of large common heights.
@@ -80,7 +57,7 @@ MeshError MeasureError(const HeightField& field, const TinMesh& mesh, std::stop_
         measure(static_cast<std::size_t>(y) * width + static_cast<std::size_t>(x),
                 std::abs(surface - static_cast<double>(sample_height)));
       }
-    }
+    });
   }
   if (error.samples > 0) error.rms = std::sqrt(squares.Total() / static_cast<double>(error.samples));
   error.worst = {static_cast<std::uint16_t>(worst % width), static_cast<std::uint16_t>(worst / width)};

@@ -23,7 +23,10 @@
 #include "engine/tin/mesh_error.h"
 #include "proto/mesh_file.h"
 #include "server/cli/command.h"
+#include "server/cli/fail.h"
 #include "server/cli/mesh_blocks.h"
+#include "server/cli/mesh_color.h"
+#include "server/cli/mesh_placement.h"
 #include "server/cli/output_file.h"
 #include "server/cli/progress.h"
 
@@ -38,14 +41,10 @@ struct MeshArguments {
   std::size_t points = 0;
   int threads = 1;
   bool compact = false, json = false;
+  ColorArguments color;
 };
 
 double Since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
-
-int Fail(const std::string& message, int code) {
-  std::fprintf(stderr, "terrace: %s\n", message.c_str());
-  return code;
-}
 
 // What is wrong with the arguments, or nothing.
 std::string Complain(const MeshArguments& arguments) {
@@ -55,6 +54,10 @@ std::string Complain(const MeshArguments& arguments) {
     return "--criterion " + arguments.criterion + " is not available yet; use delaunay";
   if (arguments.compact && arguments.max_error < 0)
     return "--compact drops what an error bound does not need; give that bound with --max-error METRES";
+  if (arguments.color.IsUsed() && arguments.rms >= 0)
+    return "--rms is a goal for heights alone; with colours use --max-error or --points";
+  if (arguments.color.IsUsed() && arguments.compact)
+    return "--compact drops vertices by their heights alone; leave it out with colours";
   return {};
 }
 
@@ -90,33 +93,6 @@ tin::TinMesh Triangulate(const MeshArguments& arguments, const tin::HeightField&
   tin::GreedyTriangulation greedy(field);
   RunTo(goal, static_cast<std::size_t>(field.width()) * static_cast<std::size_t>(field.height()), greedy);
   return greedy.Mesh();
-}
-
-std::vector<proto::MeshVertex> VerticesOf(const tin::TinMesh& mesh, const tin::HeightField& field,
-                                          const std::optional<std::array<double, 6>>& transform) {
-  std::vector<proto::MeshVertex> vertices;
-  vertices.reserve(mesh.vertices.size());
-  for (const tin::SamplePosition p : mesh.vertices) {
-    const double z = field.VertexHeight(p.x, p.y);
-    if (!transform) {
-      vertices.push_back({static_cast<double>(p.x), static_cast<double>(p.y), z});
-      continue;
-    }
-    const auto& t = *transform;
-    const double column = p.x + 0.5, row = p.y + 0.5;  // samples are pixel centres
-    vertices.push_back({t[0] + column * t[1] + row * t[2], t[3] + column * t[4] + row * t[5], z});
-  }
-  return vertices;
-}
-
-// The mesh is counter-clockwise in (column, row). A transform that mirrors, as north-up rasters do, turns it over.
-std::vector<std::array<std::uint32_t, 3>> TrianglesOf(const tin::TinMesh& mesh,
-                                                      const std::optional<std::array<double, 6>>& transform) {
-  std::vector<std::array<std::uint32_t, 3>> triangles = mesh.triangles;
-  if (transform && (*transform)[1] * (*transform)[5] - (*transform)[2] * (*transform)[4] < 0) {
-    for (auto& triangle : triangles) std::swap(triangle[1], triangle[2]);
-  }
-  return triangles;
 }
 
 struct Seconds {
@@ -171,6 +147,12 @@ CLI::Validator OneOf(const std::vector<std::string>& words) {
 int Mesh(const MeshArguments& arguments) {
   spdlog::set_level(spdlog::level::err);
   if (const std::string complaint = Complain(arguments); !complaint.empty()) return Fail(complaint, kExitUsage);
+  if (arguments.color.IsUsed()) {
+    tin::ExtendedGoal goal;
+    if (arguments.max_error >= 0) goal.max_error = arguments.max_error;
+    if (arguments.points > 0) goal.max_points = arguments.points;
+    return MeshColored({arguments.dem, arguments.out, arguments.coordinates, goal, arguments.color, arguments.json});
+  }
   const auto format = proto::MeshFileFormatOf(arguments.out);
   if (!format) return Fail(format.error().message, kExitUsage);
   Result<OutputFile> file = OutputFile::Open(arguments.out);  // before the work: a folder that is missing costs no time
@@ -183,11 +165,8 @@ int Mesh(const MeshArguments& arguments) {
     return dem::ReadRaster(arguments.dem, progress.Callback());
   }();
   if (!raster) return Fail(raster.error().message, kExitFailure);
-  std::optional<std::array<double, 6>> transform;
-  if (arguments.coordinates == "crs" && !raster->georeferenced) {
-    return Fail(arguments.dem + " has no georeference; use --coordinates pixel", kExitUsage);
-  }
-  if (raster->georeferenced && arguments.coordinates != "pixel") transform = raster->geo_transform;
+  const auto placement = PlacementOf(arguments.dem, raster->georeferenced, raster->geo_transform, arguments.coordinates);
+  if (!placement) return Fail(placement.error().message, kExitUsage);
   const auto field = tin::HeightField::Make(raster->width, raster->height, std::move(raster->heights));
   if (!field) return Fail(arguments.dem + ": " + field.error().message, kExitFailure);
   seconds.read = Since(start);
@@ -200,7 +179,7 @@ int Mesh(const MeshArguments& arguments) {
 
   start = Clock::now();
   Result<void> written =
-      proto::WriteMesh(file->stream(), *format, VerticesOf(mesh, *field, transform), TrianglesOf(mesh, transform));
+      proto::WriteMesh(file->stream(), *format, VerticesOf(mesh, *field, *placement), TrianglesOf(mesh, *placement));
   if (written) written = file->Commit();
   if (!written) return Fail(written.error().message, kExitFailure);
   seconds.write = Since(start);
@@ -217,7 +196,9 @@ void AddMesh(CLI::App& app, int& exit_code) {
   command->footer(
       "Examples:\n"
       "  terrace mesh alps.tif --out alps.obj --max-error 5\n"
-      "  terrace mesh alps.tif --out alps.glb --points 50000 --json\n\n"
+      "  terrace mesh alps.tif --out alps.glb --points 50000 --json\n"
+      "  terrace mesh alps.tif --out alps.glb --max-error 10 --color photo.tif\n"
+      "  terrace mesh photo.png --image --out photo.glb --points 4000\n\n"
       "Errors are measured over every valid sample by a separate pass. Triangles are counter-clockwise in the\n"
       "file's own x and y.");
   command->add_option("DEM", arguments->dem, "A raster that GDAL can read; a georeference is not needed")->required();
@@ -254,6 +235,7 @@ void AddMesh(CLI::App& app, int& exit_code) {
       ->capture_default_str();
   command->add_flag("--compact", arguments->compact,
                     "Drops vertices that the bound does not need; with --max-error only");
+  AddColorOptions(*command, arguments->color);
   command->add_flag("--json", arguments->json, "Statistics as JSON on stdout");
   command->callback([arguments, &exit_code] { exit_code = Mesh(*arguments); });
 }

@@ -17,10 +17,12 @@ using Triangles = std::vector<std::array<std::uint32_t, 3>>;
 const std::vector<MeshVertex> kSquare = {
     {500000.1, 4000000.2, 10}, {500010.1, 4000000.2, 1.0 / 3}, {500010.1, 4000020.2, -7.5}, {500000.1, 4000020.2, 12}};
 const Triangles kTwo = {{0, 1, 2}, {0, 2, 3}};
+const std::vector<VertexColor> kColors = {{0, 127, 255}, {1, 2, 3}, {254, 100, 50}, {255, 255, 255}};
 
-std::string Written(MeshFileFormat format, const std::vector<MeshVertex>& vertices, const Triangles& triangles) {
+std::string Written(MeshFileFormat format, const std::vector<MeshVertex>& vertices, const Triangles& triangles,
+                    const std::vector<VertexColor>& colors = {}) {
   std::ostringstream out;
-  const Result<void> result = WriteMesh(out, format, vertices, triangles);
+  const Result<void> result = WriteMesh(out, format, vertices, triangles, colors);
   EXPECT_TRUE(result.has_value()) << (result ? "" : result.error().message);
   return out.str();
 }
@@ -154,6 +156,79 @@ TEST(MeshFile, GlbWidensIndicesPast65535Vertices) {
     }
     EXPECT_EQ(glb.json.at("buffers").at(0).at("byteLength"), glb.buffer.size());
   }
+}
+
+TEST(MeshFile, ObjColorsReadBackToTheSameBytes) {
+  std::vector<MeshVertex> vertices(256);
+  std::vector<VertexColor> colors;
+  for (int i = 0; i < 256; ++i) {
+    colors.push_back(
+        {static_cast<std::uint8_t>(i), static_cast<std::uint8_t>(255 - i), static_cast<std::uint8_t>(7 * i)});
+  }
+  std::istringstream in(Written(MeshFileFormat::kObj, vertices, {{0, 1, 2}}, colors));
+  std::size_t count = 0;
+  for (std::string line; std::getline(in, line);) {
+    std::array<double, 6> p{};
+    if (std::sscanf(line.c_str(), "v %lf %lf %lf %lf %lf %lf", &p[0], &p[1], &p[2], &p[3], &p[4], &p[5]) != 6) continue;
+    ASSERT_LT(count, colors.size());
+    for (std::size_t k = 0; k < 3; ++k) EXPECT_EQ(std::lround(255 * p[3 + k]), colors[count][k]);
+    ++count;
+  }
+  EXPECT_EQ(count, colors.size());
+}
+
+TEST(MeshFile, PlyHoldsColorsAsBytesBehindEachPosition) {
+  const std::string bytes = Written(MeshFileFormat::kPly, kSquare, kTwo, kColors);
+  EXPECT_NE(
+      bytes.find("property double z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nelement face 2"),
+      std::string::npos);
+  const std::string end = "end_header\n";
+  const std::size_t data = bytes.find(end) + end.size();
+  ASSERT_EQ(bytes.size(), data + 4 * 27 + 2 * 13);
+  for (std::size_t i = 0; i < kSquare.size(); ++i) {
+    EXPECT_EQ(At<double>(bytes, data + 27 * i + 16), kSquare[i].z);
+    EXPECT_EQ(At<VertexColor>(bytes, data + 27 * i + 24), kColors[i]);
+  }
+  EXPECT_EQ(bytes[data + 108], 3);
+}
+
+TEST(MeshFile, GlbColorsAreLinearAndAligned) {
+  const Triangles odd = {{0, 1, 2}};  // 6 bytes of indices
+  for (const Triangles& triangles : {kTwo, odd}) {
+    const Glb glb = ParseGlb(Written(MeshFileFormat::kGlb, kSquare, triangles, kColors));
+    const Json& primitive = glb.json.at("meshes").at(0).at("primitives").at(0);
+    EXPECT_EQ(glb.json.at("materials")
+                  .at(primitive.at("material").get<std::size_t>())
+                  .at("pbrMetallicRoughness")
+                  .at("metallicFactor"),
+              0);
+    const Json& accessor = glb.json.at("accessors").at(primitive.at("attributes").at("COLOR_0").get<std::size_t>());
+    EXPECT_EQ(accessor,
+              (Json{{"bufferView", 2}, {"componentType", 5123}, {"normalized", true}, {"count", 4}, {"type", "VEC3"}}));
+    const Json& view = glb.json.at("bufferViews").at(2);
+    const std::size_t offset = view.at("byteOffset"), stride = view.at("byteStride");
+    EXPECT_EQ(offset % 4 + stride % 4, 0u);
+    EXPECT_EQ(offset + view.at("byteLength").get<std::size_t>(), glb.buffer.size());
+    EXPECT_EQ(glb.json.at("buffers").at(0).at("byteLength"), glb.buffer.size());
+    for (std::size_t i = 0; i < kColors.size(); ++i) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        const double linear = At<std::uint16_t>(glb.buffer, offset + i * stride + 2 * k) / 65535.0;
+        const double srgb = linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
+        EXPECT_NEAR(255 * srgb, kColors[i][k], 0.03);
+      }
+    }
+  }
+}
+
+TEST(MeshFile, GlbColorsHaveTheSameBytesOnEveryMachine) {
+  std::vector<VertexColor> greys;
+  for (int i = 0; i < 256; ++i) greys.push_back({static_cast<std::uint8_t>(i), 0, 0});
+  const Glb glb = ParseGlb(Written(MeshFileFormat::kGlb, std::vector<MeshVertex>(256), {{0, 1, 2}}, greys));
+  const std::size_t offset = glb.json.at("bufferViews").at(2).at("byteOffset");
+  std::uint32_t sum = 0;
+  for (std::uint32_t i = 0; i < 256; ++i) sum = sum * 31 + At<std::uint16_t>(glb.buffer, offset + 8 * i);
+  EXPECT_EQ(sum, 2981720753u);
+  EXPECT_EQ(At<std::uint16_t>(glb.buffer, offset + 8 * 128), 14146);
 }
 
 TEST(MeshFile, RefusesWhatNoFileCanHold) {

@@ -1,0 +1,196 @@
+#include "server/cli/mesh_color.h"
+
+#include <fmt/format.h>
+#include <sys/resource.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "engine/dem/raster_colors.h"
+#include "engine/tin/extended_error.h"
+#include "engine/tin/extended_field.h"
+#include "proto/mesh_file.h"
+#include "server/cli/command.h"
+#include "server/cli/fail.h"
+#include "server/cli/mesh_placement.h"
+#include "server/cli/output_file.h"
+#include "server/cli/progress.h"
+
+namespace terrace::cli {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double Since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+struct Source {
+  tin::ExtendedField field;
+  Placement placement;
+};
+
+Result<Source> MakeSource(const std::string& path, tin::HeightField heights, std::vector<dem::ColorSample> colors,
+                          double weight, Placement placement) {
+  auto field = tin::ExtendedField::Make(std::move(heights), std::move(colors), weight);
+  if (!field) return MakeError(field.error().code, "{}: {}", path, field.error().message);
+  return Source{*std::move(field), std::move(placement)};
+}
+
+Result<Source> ReadDem(const ColoredMeshArguments& arguments) {
+  Progress progress("reading " + arguments.raster + " and " + arguments.color.image);
+  auto raster = dem::ReadRaster(arguments.raster, [&](double share) { progress.Update(share / 2); });
+  if (!raster) return tl::unexpected(raster.error());
+  auto placement = PlacementOf(arguments.raster, raster->georeferenced, raster->geo_transform, arguments.coordinates);
+  if (!placement) return tl::unexpected(placement.error());
+  auto colors = dem::ReadColors(arguments.color.image, arguments.raster, *raster,
+                                [&](double share) { progress.Update(0.5 + share / 2); });
+  if (!colors) return tl::unexpected(colors.error());
+  auto heights = tin::HeightField::Make(raster->width, raster->height, std::move(raster->heights));
+  if (!heights) return MakeError(heights.error().code, "{}: {}", arguments.raster, heights.error().message);
+  return MakeSource(arguments.color.image, *std::move(heights), *std::move(colors), arguments.color.weight,
+                    *std::move(placement));
+}
+
+// A flat field, upright: y counts from the lowest row of pixels, unless the image has a place of its own.
+Result<Source> ReadPicture(const ColoredMeshArguments& arguments) {
+  Progress progress("reading " + arguments.raster);
+  auto image = dem::ReadImage(arguments.raster, progress.Callback());
+  if (!image) return tl::unexpected(image.error());
+  auto placement = PlacementOf(arguments.raster, image->georeferenced, image->geo_transform, arguments.coordinates);
+  if (!placement) return tl::unexpected(placement.error());
+  if (!*placement && arguments.coordinates.empty()) *placement = {{-0.5, 1, 0, image->height - 0.5, 0, -1}};
+  auto heights = tin::HeightField::Make(image->width, image->height, std::vector<float>(image->colors.size(), 0.0F));
+  if (!heights) return MakeError(heights.error().code, "{}: {}", arguments.raster, heights.error().message);
+  return MakeSource(arguments.raster, *std::move(heights), std::move(image->colors), 1, *std::move(placement));
+}
+
+// In steps, so that progress can be shown: the error falls about as 1 / vertices.
+tin::ColoredMesh Triangulate(const tin::ExtendedField& field, const tin::ExtendedGoal& goal) {
+  constexpr std::size_t kStep = 10'000, kNoLimit = tin::ExtendedGoal{}.max_points;
+  Progress progress("meshing");
+  tin::ExtendedGreedy greedy(field);
+  tin::ExtendedGoal part = goal;
+  do {
+    part.max_points = std::min(goal.max_points, greedy.vertex_count() + kStep);
+    greedy.Run(part);
+    progress.Update(goal.max_points != kNoLimit
+                        ? static_cast<double>(greedy.vertex_count()) / static_cast<double>(goal.max_points)
+                        : std::min(1.0, goal.max_error / greedy.CurrentError()));
+  } while (greedy.vertex_count() == part.max_points && part.max_points != goal.max_points);
+  return greedy.Mesh();
+}
+
+struct Seconds {
+  double read = 0, triangulate = 0, write = 0;
+};
+
+nlohmann::ordered_json Statistics(const ColoredMeshArguments& arguments, const tin::ExtendedField& field,
+                                  const tin::ColoredMesh& mesh, const tin::ExtendedError& error,
+                                  const Seconds& seconds) {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  const bool is_image = arguments.color.is_image;
+  return {{"input", {{"path", arguments.raster}, {"width", field.width()}, {"height", field.height()}}},
+          {"criterion", "delaunay"},
+          {"points", mesh.tin.vertices.size()},
+          {"triangles", mesh.tin.triangles.size()},
+          {"max_error", error.height.max},
+          {"rms_error", error.height.rms},
+          {"color",
+           {{"path", is_image ? arguments.raster : arguments.color.image},
+            {"weight", field.color_weight()},
+            {"max_combined_error", error.max_combined},
+            {"rms_error", error.color_rms},
+            {"samples", error.color_samples}}},
+          {"seconds", {{"read", seconds.read}, {"triangulate", seconds.triangulate}, {"write", seconds.write}}},
+          {"peak_rss_bytes", static_cast<std::int64_t>(usage.ru_maxrss) * 1024}};
+}
+
+void Print(const ColoredMeshArguments& arguments, const tin::ExtendedField& field, const tin::ColoredMesh& mesh,
+           const tin::ExtendedError& error, const Seconds& seconds) {
+  if (arguments.json) {
+    fmt::print("{}\n", Statistics(arguments, field, mesh, error, seconds)
+                           .dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
+    return;
+  }
+  fmt::print("{}: {} vertices, {} triangles of {} samples; ", arguments.out, mesh.tin.vertices.size(),
+             mesh.tin.triangles.size(), error.height.samples);
+  if (arguments.color.is_image) {
+    fmt::print("largest error {:.4g} of the range of colours, RMS {:.4g}", error.max_combined, error.color_rms);
+  } else {
+    fmt::print("largest error {:.4g} m with colours, {:.4g} m of heights alone; RMS {:.4g} m, colours {:.4g}",
+               error.max_combined, error.height.max, error.height.rms, error.color_rms);
+  }
+  fmt::print("; read {:.2f} s, mesh {:.2f} s, write {:.2f} s\n", seconds.read, seconds.triangulate, seconds.write);
+}
+
+}  // namespace
+
+int MeshColored(const ColoredMeshArguments& arguments) {
+  const auto format = proto::MeshFileFormatOf(arguments.out);
+  if (!format) return Fail(format.error().message, kExitUsage);
+  Result<OutputFile> file = OutputFile::Open(arguments.out);  // before the work: a folder that is missing costs no time
+  if (!file) return Fail(file.error().message, kExitFailure);
+
+  Seconds seconds;
+  Clock::time_point start = Clock::now();
+  const Result<Source> source = arguments.color.is_image ? ReadPicture(arguments) : ReadDem(arguments);
+  if (!source) return Fail(source.error().message, kExitFailure);
+  seconds.read = Since(start);
+
+  start = Clock::now();
+  const tin::ColoredMesh mesh = Triangulate(source->field, arguments.goal);
+  seconds.triangulate = Since(start);
+
+  start = Clock::now();
+  Result<void> written =
+      proto::WriteMesh(file->stream(), *format, VerticesOf(mesh.tin, source->field.heights(), source->placement),
+                       TrianglesOf(mesh.tin, source->placement), mesh.colors);
+  if (written) written = file->Commit();
+  if (!written) return Fail(written.error().message, kExitFailure);
+  seconds.write = Since(start);
+  Print(arguments, source->field, mesh, tin::MeasureExtendedError(source->field, mesh), seconds);
+  return kExitOk;
+}
+
+void AddColorOptions(CLI::App& command, ColorArguments& arguments) {
+  constexpr const char* kGroup = "Colours";
+  const auto is_weight = [](const std::string& text) {
+    double number = 0;
+    const bool valid = CLI::detail::lexical_cast(text, number) && number >= 0 && number <= 1;
+    return valid ? std::string() : fmt::format("must be a number from 0 to 1, not \"{}\"", text);
+  };
+  CLI::Option* const image =
+      command
+          .add_option(
+              "--color", arguments.image,
+              "An image that covers the DEM: grey, RGB, RGBA or a palette. Placed by its georeference, else pixel "
+              "by sample. Vertices get its colours, and triangles follow them")
+          ->type_name("IMAGE")
+          ->group(kGroup);
+  command
+      .add_option(
+          "--color-weight", arguments.weight,
+          "W: a sample that is dz metres and dr, dg, db of the range of colours off has the error "
+          "(1 - W) dz + W M/3 (dr + dg + db), M the range of the heights. So --max-error E keeps heights within "
+          "E / (1 - W); with W = 0 triangles follow heights alone")
+      ->check(CLI::Validator(is_weight, ""))
+      ->type_name("W")
+      ->capture_default_str()
+      ->needs(image)
+      ->group(kGroup);
+  command
+      .add_flag(
+          "--image", arguments.is_image,
+          "DEM is an image: its colours are meshed on flat ground, z = 0, y upwards; --max-error is a share of the "
+          "range of colours, 0 to 1")
+      ->excludes(image)
+      ->group(kGroup);
+}
+
+}  // namespace terrace::cli

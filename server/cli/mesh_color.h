@@ -1,0 +1,35 @@
+// terrace mesh with colours: a DEM and an image that covers it, or an image alone.
+#pragma once
+
+#include <string>
+
+#include "engine/tin/extended_greedy.h"
+
+namespace CLI {
+class App;
+}
+
+namespace terrace::cli {
+
+struct ColorArguments {
+  std::string image;      // covers the DEM; empty: none
+  double weight = 0.1;    // of colour against height, 0 to 1
+  bool is_image = false;  // the raster to mesh is an image: no heights
+
+  bool IsUsed() const { return is_image || !image.empty(); }
+};
+
+// Adds --color, --color-weight and --image to the command.
+void AddColorOptions(CLI::App& command, ColorArguments& arguments);
+
+struct ColoredMeshArguments {
+  std::string raster, out, coordinates;  // as given; `coordinates` empty: by the raster
+  tin::ExtendedGoal goal;
+  ColorArguments color;
+  bool json = false;
+};
+
+// Reads, meshes, writes and prints the statistics; returns the exit code.
+int MeshColored(const ColoredMeshArguments& arguments);
+
+}  // namespace terrace::cli
