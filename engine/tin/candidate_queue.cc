@@ -113,7 +113,7 @@ bool CandidateQueue::Refill() {
   for (const hwy::uint128_t& entry : foremost) run_.push_back({entry.hi, static_cast<std::uint32_t>(entry.lo)});
 
   // A sweep costs about one cycle for every 16 slots: worth it for a 256th of them.
-  const std::size_t wanted = std::max<std::size_t>(64, errors_.size() / 256);
+  const std::size_t wanted = std::max<std::size_t>(128, errors_.size() / 64);
   if (run_.size() > 2 * wanted) step_ = std::sqrt(step_);
   if (run_.size() < wanted / 2) step_ = std::max(step_ * step_, 0.25);
   return true;

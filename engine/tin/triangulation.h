@@ -94,7 +94,8 @@ class Triangulation {
 
   static RingVertex Relative(const Vertex* vertices, VertexId id, SamplePosition point) {
     const Vertex& vertex = vertices[id];
-    return {id, vertex.position.x - point.x, vertex.position.y - point.y, vertex.height};
+    const std::int32_t dx = vertex.position.x - point.x, dy = vertex.position.y - point.y;
+    return {id, dx, dy, vertex.height, std::int64_t{dx} * dx + std::int64_t{dy} * dy};
   }
   template <typename Triangles, typename Absorbs>
   void Replace(Triangles& triangles, SamplePosition point, TriangleId triangle, Absorbs&& absorbs);
@@ -124,10 +125,7 @@ constexpr std::int64_t Cross(const RingVertex& a, const RingVertex& b) {
 // Whether the point that u, v and w are relative to lies strictly inside the circle through v, u and w, which turn
 // counter-clockwise: the in-circle test of predicates.h with its widths, the point as d.
 constexpr bool IsInsideCircle(const RingVertex& v, const RingVertex& u, const RingVertex& w) {
-  const auto square = [](const RingVertex& a) {
-    return static_cast<std::int64_t>(a.dx) * a.dx + static_cast<std::int64_t>(a.dy) * a.dy;
-  };
-  return square(v) * Cross(u, w) + square(u) * Cross(w, v) + square(w) * Cross(v, u) > 0;
+  return v.squared * Cross(u, w) + u.squared * Cross(w, v) + w.squared * Cross(v, u) > 0;
 }
 
 // Whether w lies strictly between u and v as seen from the point that they are relative to.
@@ -227,7 +225,7 @@ void Triangulation::Replace(Triangles& triangles, SamplePosition point, Triangle
 template <typename Triangles>
 void Triangulation::FillCavity(Triangles& triangles, std::size_t edges, std::size_t gap) {
   if (star_.is_closed) {
-    star_.ring.Put(edges, star_.ring[0]);
+    star_.ring.Repeat(0, edges);
   } else {
     OpenRing(edges--, gap);
   }
