@@ -104,19 +104,24 @@ TinMesh Triangulation::Mesh() const {
 }
 
 TriangleId Triangulation::Locate(SamplePosition point, TriangleId start) const {
-  // In a Delaunay triangulation this walk visits no triangle twice: each step lowers the power of the point with
-  // respect to the triangle's circumcircle, or stays on one circle, whose triangles form a tree.
-  TriangleId t = start;
-  for (unsigned i = 0; i < 3;) {
-    const HalfEdgeId edge = 4 * t + i;
-    if (Orientation(position(corner(edge)), position(corner(Next(edge))), point) >= 0) {
-      ++i;
-      continue;
+  // The edge that the point lies beyond, kNone if it is inside or on an edge.
+  const auto leaving = [&](TriangleId t) {
+    for (HalfEdgeId edge = 4 * t; edge < 4 * t + 3; ++edge) {
+      if (Orientation(position(corner(edge)), position(corner(Next(edge))), point) < 0) return edge;
     }
+    return kNone;
+  };
+  // In a Delaunay triangulation this walk visits no triangle twice: each step lowers the power of the point with
+  // respect to the triangle's circumcircle, or stays on one circle, whose triangles form a tree. In another one it may
+  // go round in circles.
+  TriangleId t = start;
+  for (std::size_t steps = 0; steps < triangle_count(); ++steps) {
+    const HalfEdgeId edge = leaving(t);
+    if (edge == kNone) return t;
     TERRACE_CHECK(twin(edge) != kNone);  // the point lies outside the rectangle
     t = twin(edge) / 4;
-    i = 0;
   }
+  for (t = 0; leaving(t) != kNone;) TERRACE_CHECK(++t < triangle_count());
   return t;
 }
 

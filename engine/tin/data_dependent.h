@@ -1,0 +1,100 @@
+// Data-dependent triangulation: which triangles an inserted vertex replaces, by how well they fit the samples.
+//
+// Garland and Heckbert (1997), section 3.4. Around a new vertex p, an edge (u, v) of the cavity's outline is suspect: the
+// quadrilateral (p, u, w, v) with the triangle beyond it is cut by u-v or by p-w, whichever fits better, and the edges that
+// take its place are suspect in turn. Spokes (edges at p) are not. Each test is a function of its quadrilateral alone, so
+// that the cavity does not depend on the order of the tests, on the triangle that the insertion starts from, or on slots.
+//
+// Scanned once: a triangle that was scanned for a test and ends up in the star is not scanned for its candidate again. The
+// test is lazy: first the shape, then samples whose errors are known, then one new triangle, then the other; it stops as
+// soon as p-w cannot fit better. The outcome is that of the full test.
+//
+// Whatever is chosen here, candidates are the exact worst samples of the final triangles: the bound is kept as with any
+// other criterion.
+//
+// Not thread-safe; different objects are independent.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "engine/tin/candidate_queue.h"
+#include "engine/tin/greedy.h"
+#include "engine/tin/height_field.h"
+#include "engine/tin/open_samples.h"
+#include "engine/tin/quadrilateral.h"
+#include "engine/tin/sagitta.h"
+#include "engine/tin/star.h"
+#include "engine/tin/triangle_scan.h"
+#include "engine/tin/triangulation.h"
+
+namespace terrace::tin {
+
+class DataDependentCriterion {
+ public:
+  // What it looks at belongs to the run and must outlive this object: the triangulation that is inserted into, and the
+  // queue with the worst sample of each triangle.
+  DataDependentCriterion(const HeightField& field, const OpenSamples& open, const Sagitta& sagitta,
+                         const Triangulation& triangulation, const CandidateQueue& candidates,
+                         DataDependentOptions options);
+
+  // One insertion: Begin, then Triangulation::Insert with Absorbs, then End with the star. The vertex is no open sample
+  // any more.
+  void Begin(const Triangulation::Vertex& vertex);
+  bool Absorbs(const RingVertex& u, const RingVertex& v, const RingVertex& w, HalfEdgeId back);
+  void End(const Star& star);
+
+  // What a StarScan finds, for the star of the last insertion or a triangle as a star of its own. The queue is then given
+  // the worst samples found before the next insertion begins.
+  void Scan(const Star& star, PlaneMisfit* misfits);
+
+ private:
+  static constexpr double kUnknown = -1;
+
+  // How well a triangle fits.
+  struct Fit {
+    double error = kUnknown;  // by the measure
+    PlaneMisfit misfit;       // if the error is known and the measure is one of maxima
+  };
+  // The triangle (u, v, p), p being inserted.
+  struct Spanned {
+    VertexId u, v;
+    Fit fit;
+  };
+
+  bool UsesMaxima() const { return options_.measure == FitMeasure::kSumMax || options_.measure == FitMeasure::kMaxMax; }
+  double Combine(double a, double b) const { return options_.measure == FitMeasure::kMaxMax ? std::max(a, b) : a + b; }
+
+  Fit TakePending(VertexId u, VertexId v);
+  bool IsBetterAlongPw(const Quadrilateral& q, TriangleId beyond, Fit& uv, Fit& uw, Fit& wv);
+  void RaiseLeastErrors(const Quadrilateral& q, std::uint32_t sample, double& uw, double& wv) const;
+  std::uint32_t WorstSampleOf(TriangleId t) const;
+  double ErrorBeyond(TriangleId t);
+  Fit FitOf(const RingVertex& u, const RingVertex& v);
+  Fit FitAround(const Triangulation::Vertex& centre, const RingVertex& u, const RingVertex& v);
+  double ErrorOf(const PlaneMisfit& misfit, SamplePosition u, SamplePosition v, SamplePosition p) const;
+  void CoverSlots();
+  void ScanUnknown(const Star& star, PlaneMisfit* misfits);
+
+  const HeightField* field_;
+  const OpenSamples* open_;
+  const Sagitta* sagitta_;
+  const Triangulation* triangulation_;
+  const CandidateQueue* candidates_;
+  DataDependentOptions options_;
+  StarScan scan_star_ = BestStarScan();
+
+  std::vector<double> errors_;  // by slot; kUnknown until somebody asks
+
+  // Of the insertion at work.
+  Triangulation::Vertex vertex_;
+  std::vector<Spanned> pending_;  // stack: spanned triangles whose edge has not been looked across yet
+  std::vector<Spanned> kept_;     // in the order of the outline
+  std::vector<Fit> fits_;         // by triangle of its star
+  VertexId centre_ = 0;           // whose star fits_ is about
+  Star scratch_;
+};
+
+}  // namespace terrace::tin
