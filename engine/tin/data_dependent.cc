@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <utility>
 
 #include "engine/core/check.h"
+#include "engine/tin/border.h"
 #include "engine/tin/plane.h"
 #include "engine/tin/squared_distances.h"
 
@@ -11,6 +14,16 @@ namespace terrace::tin {
 namespace {
 
 Corner CornerAt(SamplePosition position, float height) { return {position.x, position.y, static_cast<double>(height)}; }
+
+SamplePosition PositionOf(const Corner& corner) {
+  return {static_cast<std::uint16_t>(corner.x), static_cast<std::uint16_t>(corner.y)};
+}
+
+// An edge with both ends on one border is on that border.
+bool IsBorderEdge(const HeightField& field, const Corner& a, const Corner& b) {
+  return (a.x == b.x && (a.x == 0 || a.x == field.width() - 1)) ||
+         (a.y == b.y && (a.y == 0 || a.y == field.height() - 1));
+}
 
 // A star of `count` triangles with the ring yet to be put.
 void Prepare(Star& star, const Triangulation::Vertex& centre, std::size_t count) {
@@ -33,13 +46,11 @@ double DistanceFrom(const RingVertex& u, const RingVertex& v, float p_height, in
 }  // namespace
 
 DataDependentCriterion::DataDependentCriterion(const HeightField& field, const OpenSamples& open, const Sagitta& sagitta,
-                                               const Triangulation& triangulation, const CandidateQueue& candidates,
-                                               DataDependentOptions options)
+                                               const Triangulation& triangulation, DataDependentOptions options)
     : field_(&field),
       open_(&open),
       sagitta_(&sagitta),
       triangulation_(&triangulation),
-      candidates_(&candidates),
       options_(options) {
   TERRACE_CHECK(options_.qthresh >= 0 && options_.qthresh <= 1);
 }
@@ -82,14 +93,14 @@ bool DataDependentCriterion::IsBetterAlongPw(const Quadrilateral& q, TriangleId 
   }
   if (options_.measure == FitMeasure::kNormals) return BendsLessAlongPw(q);
 
-  const std::uint32_t worst_beyond = WorstSampleOf(beyond);
   if (uv.error == kUnknown) uv = FitOf(q.u, q.v);
   const double error = Combine(uv.error, ErrorBeyond(beyond));
+  const bool pw_wins_ties = quality.pw > quality.uv;
   if (error == 0) return false;
-  const auto cannot_win = [&](double of_uw, double of_wv) { return Combine(of_uw, of_wv) >= error; };
+  const auto cannot_win = [&](double of_uw, double of_wv) { return pw_wins_ties ? Combine(of_uw, of_wv) > error : Combine(of_uw, of_wv) >= error; };
   double least_uw = 0, least_wv = 0;
   if (UsesMaxima()) {
-    RaiseLeastErrors(q, worst_beyond, least_uw, least_wv);
+    RaiseLeastErrors(q, worst_[beyond], least_uw, least_wv);
     RaiseLeastErrors(q, uv.misfit.sample, least_uw, least_wv);
     if (cannot_win(least_uw, least_wv)) return false;
   }
@@ -120,11 +131,6 @@ void DataDependentCriterion::RaiseLeastErrors(const Quadrilateral& q, std::uint3
   if (Cross(q.w, seen) >= 0) wv = std::max(wv, DistanceFrom(q.w, q.v, vertex_.height, x, y, height));
 }
 
-std::uint32_t DataDependentCriterion::WorstSampleOf(TriangleId t) const {
-  const bool is_scanned = UsesMaxima() && t < errors_.size() && errors_[t] != kUnknown;
-  return is_scanned ? candidates_->sample(t) : kNoSample;
-}
-
 // From the triangle's last corner, as when it was made: rounding is that of the scan of its star.
 double DataDependentCriterion::ErrorBeyond(TriangleId t) {
   CoverSlots();
@@ -135,7 +141,9 @@ double DataDependentCriterion::ErrorBeyond(TriangleId t) {
     const SamplePosition position = triangulation_->position(id);
     return {id, position.x - centre.position.x, position.y - centre.position.y, triangulation_->height(id)};
   };
-  return errors_[t] = FitAround(centre, seen(a), seen(b)).error;
+  const Fit fit = FitAround(centre, seen(a), seen(b));
+  Note(t, fit);
+  return fit.error;
 }
 
 DataDependentCriterion::Fit DataDependentCriterion::FitOf(const RingVertex& u, const RingVertex& v) {
@@ -144,28 +152,41 @@ DataDependentCriterion::Fit DataDependentCriterion::FitOf(const RingVertex& u, c
 
 DataDependentCriterion::Fit DataDependentCriterion::FitAround(const Triangulation::Vertex& centre, const RingVertex& u,
                                                               const RingVertex& v) {
-  const SamplePosition at_u = triangulation_->position(u.id), at_v = triangulation_->position(v.id);
+  const std::array<Corner, 3> corners = {CornerOf(u.id), CornerOf(v.id), CornerAt(centre.position, centre.height)};
+  if (!UsesMaxima()) return {SquaredDistances(*field_, corners), {}};
   Fit fit;
-  if (UsesMaxima()) {
-    Prepare(scratch_, centre, 1);
-    scratch_.ring.Put(0, u);
-    scratch_.ring.Put(1, v);
-    scan_star_(*open_, scratch_, &fit.misfit);
-    fit.error = ErrorOf(fit.misfit, at_u, at_v, centre.position);
-  } else {
-    fit.error = SquaredDistances(
-        *field_, {CornerAt(at_u, u.height), CornerAt(at_v, v.height), CornerAt(centre.position, centre.height)});
-  }
+  Prepare(scratch_, centre, 1);
+  scratch_.ring.Put(0, u);
+  scratch_.ring.Put(1, v);
+  scan_star_(*open_, scratch_, &fit.misfit);
+  fit.error = ErrorOf(fit.misfit, corners[0], corners[1], corners[2]);
   return fit;
 }
 
-void DataDependentCriterion::CoverSlots() {
-  if (errors_.size() < triangulation_->triangle_count()) errors_.resize(triangulation_->triangle_count(), kUnknown);
+Corner DataDependentCriterion::CornerOf(VertexId vertex) const {
+  return CornerAt(triangulation_->position(vertex), triangulation_->height(vertex));
 }
 
-double DataDependentCriterion::ErrorOf(const PlaneMisfit& misfit, SamplePosition u, SamplePosition v,
-                                       SamplePosition p) const {
-  return std::max(misfit.distance, 0.0) + sagitta_->Bound(u, v, p);
+void DataDependentCriterion::CoverSlots() {
+  if (errors_.size() >= triangulation_->triangle_count()) return;
+  errors_.resize(triangulation_->triangle_count(), kUnknown);
+  worst_.resize(triangulation_->triangle_count(), kNoSample);
+}
+
+void DataDependentCriterion::Note(TriangleId t, const Fit& fit) {
+  errors_[t] = fit.error;
+  worst_[t] = fit.misfit.sample;
+}
+
+// With the triangle's border samples, by their plain distances: a weight would only favour one cut over the other where
+// the border is, and what is decided here is not the bound.
+double DataDependentCriterion::ErrorOf(const PlaneMisfit& misfit, const Corner& u, const Corner& v,
+                                       const Corner& p) const {
+  double distance = std::max(misfit.distance, 0.0);
+  for (const auto& [a, b] : {std::pair(u, v), {v, p}, {p, u}}) {
+    if (IsBorderEdge(*field_, a, b)) distance = std::max(distance, WorstBorderSample(*field_, a, b, {}).error);
+  }
+  return sagitta_->is_flat() ? distance : distance + sagitta_->Bound(PositionOf(u), PositionOf(v), PositionOf(p));
 }
 
 void DataDependentCriterion::End(const Star& star) {
@@ -178,7 +199,7 @@ void DataDependentCriterion::End(const Star& star) {
   for (std::size_t i = 0; i < star.count && next != kept_.end(); ++i) {
     if (next->u == star.ring.ids[i] && next->v == star.ring.ids[i + 1]) fits_[i] = (next++)->fit;
   }
-  for (std::size_t i = 0; i < star.count; ++i) errors_[star.triangles[i]] = fits_[i].error;
+  for (std::size_t i = 0; i < star.count; ++i) Note(star.triangles[i], fits_[i]);
 }
 
 void DataDependentCriterion::Scan(const Star& star, PlaneMisfit* misfits) {
@@ -189,10 +210,11 @@ void DataDependentCriterion::Scan(const Star& star, PlaneMisfit* misfits) {
   }
   if (!UsesMaxima()) return;
   CoverSlots();
+  const Corner p{star.x, star.y, static_cast<double>(star.height)};
   for (std::size_t i = 0; i < star.count; ++i) {
-    const SamplePosition p{static_cast<std::uint16_t>(star.x), static_cast<std::uint16_t>(star.y)};
-    errors_[star.triangles[i]] = ErrorOf(misfits[i], triangulation_->position(star.ring.ids[i]),
-                                         triangulation_->position(star.ring.ids[i + 1]), p);
+    const TriangleId t = star.triangles[i];
+    if (errors_[t] != kUnknown) continue;
+    Note(t, {ErrorOf(misfits[i], CornerOf(star.ring.ids[i]), CornerOf(star.ring.ids[i + 1]), p), misfits[i]});
   }
 }
 

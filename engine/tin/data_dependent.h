@@ -20,10 +20,10 @@
 #include <cstdint>
 #include <vector>
 
-#include "engine/tin/candidate_queue.h"
 #include "engine/tin/greedy.h"
 #include "engine/tin/height_field.h"
 #include "engine/tin/open_samples.h"
+#include "engine/tin/plane.h"
 #include "engine/tin/quadrilateral.h"
 #include "engine/tin/sagitta.h"
 #include "engine/tin/star.h"
@@ -34,11 +34,9 @@ namespace terrace::tin {
 
 class DataDependentCriterion {
  public:
-  // What it looks at belongs to the run and must outlive this object: the triangulation that is inserted into, and the
-  // queue with the worst sample of each triangle.
+  // What it looks at belongs to the run and must outlive this object.
   DataDependentCriterion(const HeightField& field, const OpenSamples& open, const Sagitta& sagitta,
-                         const Triangulation& triangulation, const CandidateQueue& candidates,
-                         DataDependentOptions options);
+                         const Triangulation& triangulation, DataDependentOptions options);
 
   // One insertion: Begin, then Triangulation::Insert with Absorbs, then End with the star. The vertex is no open sample
   // any more.
@@ -46,8 +44,7 @@ class DataDependentCriterion {
   bool Absorbs(const RingVertex& u, const RingVertex& v, const RingVertex& w, HalfEdgeId back);
   void End(const Star& star);
 
-  // What a StarScan finds, for the star of the last insertion or a triangle as a star of its own. The queue is then given
-  // the worst samples found before the next insertion begins.
+  // What a StarScan finds, for the star of the last insertion or a triangle as a star of its own.
   void Scan(const Star& star, PlaneMisfit* misfits);
 
  private:
@@ -70,23 +67,25 @@ class DataDependentCriterion {
   Fit TakePending(VertexId u, VertexId v);
   bool IsBetterAlongPw(const Quadrilateral& q, TriangleId beyond, Fit& uv, Fit& uw, Fit& wv);
   void RaiseLeastErrors(const Quadrilateral& q, std::uint32_t sample, double& uw, double& wv) const;
-  std::uint32_t WorstSampleOf(TriangleId t) const;
   double ErrorBeyond(TriangleId t);
   Fit FitOf(const RingVertex& u, const RingVertex& v);
   Fit FitAround(const Triangulation::Vertex& centre, const RingVertex& u, const RingVertex& v);
-  double ErrorOf(const PlaneMisfit& misfit, SamplePosition u, SamplePosition v, SamplePosition p) const;
+  double ErrorOf(const PlaneMisfit& misfit, const Corner& u, const Corner& v, const Corner& p) const;
+  Corner CornerOf(VertexId vertex) const;
   void CoverSlots();
+  void Note(TriangleId t, const Fit& fit);
   void ScanUnknown(const Star& star, PlaneMisfit* misfits);
 
   const HeightField* field_;
   const OpenSamples* open_;
   const Sagitta* sagitta_;
   const Triangulation* triangulation_;
-  const CandidateQueue* candidates_;
   DataDependentOptions options_;
   StarScan scan_star_ = BestStarScan();
 
-  std::vector<double> errors_;  // by slot; kUnknown until somebody asks
+  // By slot.
+  std::vector<double> errors_;        // kUnknown until somebody asks
+  std::vector<std::uint32_t> worst_;  // the open sample that is furthest off
 
   // Of the insertion at work.
   Triangulation::Vertex vertex_;

@@ -132,7 +132,7 @@ GreedyTriangulation::Impl::Impl(const HeightField& field, GreedyOptions options)
         static_cast<std::size_t>(along_x ? field.width() : field.height()));
   }
   if (options_.criterion == Criterion::kDataDependent) {
-    data_dependent_.emplace(field, open_, sagitta_, triangulation_, candidates_, options_.data_dependent);
+    data_dependent_.emplace(field, open_, sagitta_, triangulation_, options_.data_dependent);
   }
   if (options_.record) recorder_.emplace();
   AwaitScan(0);
