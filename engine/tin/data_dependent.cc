@@ -13,26 +13,25 @@
 namespace terrace::tin {
 namespace {
 
-Corner CornerAt(SamplePosition position, float height) { return {position.x, position.y, static_cast<double>(height)}; }
-
-SamplePosition PositionOf(const Corner& corner) {
-  return {static_cast<std::uint16_t>(corner.x), static_cast<std::uint16_t>(corner.y)};
+SamplePosition PositionOf(const RingVertex& vertex, SamplePosition p) {
+  return {static_cast<std::uint16_t>(p.x + vertex.dx), static_cast<std::uint16_t>(p.y + vertex.dy)};
 }
 
+Corner CornerAt(SamplePosition position, float height) { return {position.x, position.y, static_cast<double>(height)}; }
+
 // An edge with both ends on one border is on that border.
-bool IsBorderEdge(const HeightField& field, const Corner& a, const Corner& b) {
+bool IsBorderEdge(const HeightField& field, SamplePosition a, SamplePosition b) {
   return (a.x == b.x && (a.x == 0 || a.x == field.width() - 1)) ||
          (a.y == b.y && (a.y == 0 || a.y == field.height() - 1));
 }
 
-// A star of `count` triangles with the ring yet to be put.
-void Prepare(Star& star, const Triangulation::Vertex& centre, std::size_t count) {
-  star.x = centre.position.x;
-  star.y = centre.position.y;
-  star.height = centre.height;
-  star.is_closed = false;
+// A star of `count` triangles around p whose ring is yet to be put.
+void Prepare(Star& star, const Triangulation::Vertex& p, std::size_t count) {
+  star.x = p.position.x;
+  star.y = p.position.y;
+  star.height = p.height;
   star.count = count;
-  if (star.ring.capacity() < count + 1) star.ring.Grow(2 * count + 2);
+  if (star.ring.capacity() < count + 1) star.ring.Grow(2 * (count + 1));
 }
 
 // How far a sample is from the triangle (u, v, p), in the form of the scan: equal bit for bit. x and y are relative to p.
@@ -47,18 +46,24 @@ double DistanceFrom(const RingVertex& u, const RingVertex& v, float p_height, in
 
 DataDependentCriterion::DataDependentCriterion(const HeightField& field, const OpenSamples& open, const Sagitta& sagitta,
                                                const Triangulation& triangulation, DataDependentOptions options)
-    : field_(&field),
-      open_(&open),
-      sagitta_(&sagitta),
-      triangulation_(&triangulation),
-      options_(options) {
+    : field_(&field), open_(&open), sagitta_(&sagitta), triangulation_(&triangulation), options_(options) {
   TERRACE_CHECK(options_.qthresh >= 0 && options_.qthresh <= 1);
 }
 
-void DataDependentCriterion::Begin(const Triangulation::Vertex& vertex) {
+// The triangle's own three edges are the first to be suspect, and most of them stay: fitted together.
+void DataDependentCriterion::Begin(const Triangulation::Vertex& vertex, TriangleId triangle) {
   vertex_ = vertex;
   pending_.clear();
   kept_.clear();
+  if (!UsesMaxima()) return;
+  const auto [a, b, c] = triangulation_->triangle(triangle);
+  const std::array<RingVertex, 4> ring = {Seen(a, vertex.position), Seen(b, vertex.position), Seen(c, vertex.position),
+                                          Seen(a, vertex.position)};
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (Cross(ring[i], ring[i + 1]) == 0) return;  // on an edge: no triangle there
+  }
+  const std::array<Fit, 3> fits = FitsAround<3>(vertex, ring);
+  for (std::size_t i = 3; i-- > 0;) pending_.push_back({ring[i].id, ring[i + 1].id, fits[i]});
 }
 
 bool DataDependentCriterion::Absorbs(const RingVertex& u, const RingVertex& v, const RingVertex& w, HalfEdgeId back) {
@@ -85,35 +90,31 @@ DataDependentCriterion::Fit DataDependentCriterion::TakePending(VertexId u, Vert
   return {};
 }
 
-// Sets the fits that it had to find out.
+// Sets the fits that it had to find out. Equal fits, frequent where heights are whole metres: the better shape.
 bool DataDependentCriterion::IsBetterAlongPw(const Quadrilateral& q, TriangleId beyond, Fit& uv, Fit& uw, Fit& wv) {
   const ShapeQuality quality = ShapeQualityOf(q);
-  if (std::min(quality.uv, quality.pw) <= options_.qthresh * std::max(quality.uv, quality.pw)) {
-    return quality.pw > quality.uv;
-  }
+  const bool is_shaped_better = quality.pw > quality.uv;
+  if (std::min(quality.uv, quality.pw) <= options_.qthresh * std::max(quality.uv, quality.pw)) return is_shaped_better;
   if (options_.measure == FitMeasure::kNormals) return BendsLessAlongPw(q);
 
-  if (uv.error == kUnknown) uv = FitOf(q.u, q.v);
-  const double error = Combine(uv.error, ErrorBeyond(beyond));
-  const bool pw_wins_ties = quality.pw > quality.uv;
+  const KnownFit known = FitBeyond(beyond);
+  if (uv.error == kUnknown) uv = FitsAround<1>(vertex_, {q.u, q.v})[0];
+  const double error = Combine(uv.error, known.error);
   if (error == 0) return false;
-  const auto cannot_win = [&](double of_uw, double of_wv) { return pw_wins_ties ? Combine(of_uw, of_wv) > error : Combine(of_uw, of_wv) >= error; };
-  double least_uw = 0, least_wv = 0;
+  const auto wins = [&](double of_uw, double of_wv) {
+    const double other = Combine(of_uw, of_wv);
+    return is_shaped_better ? other <= error : other < error;
+  };
   if (UsesMaxima()) {
-    RaiseLeastErrors(q, worst_[beyond], least_uw, least_wv);
+    double least_uw = 0, least_wv = 0;
+    RaiseLeastErrors(q, known.worst, least_uw, least_wv);
     RaiseLeastErrors(q, uv.misfit.sample, least_uw, least_wv);
-    if (cannot_win(least_uw, least_wv)) return false;
+    if (!wins(least_uw, least_wv)) return false;
   }
-  if (least_uw >= least_wv) {
-    uw = FitOf(q.u, q.w);
-    if (cannot_win(uw.error, least_wv)) return false;
-    wv = FitOf(q.w, q.v);
-  } else {
-    wv = FitOf(q.w, q.v);
-    if (cannot_win(least_uw, wv.error)) return false;
-    uw = FitOf(q.u, q.w);
-  }
-  return !cannot_win(uw.error, wv.error);
+  const std::array<Fit, 2> fits = FitsAround<2>(vertex_, {q.u, q.w, q.v});
+  uw = fits[0];
+  wv = fits[1];
+  return wins(uw.error, wv.error);
 }
 
 // An open sample of the quadrilateral is in one of the new triangles: that one is off by no less than there. Rounding does
@@ -125,68 +126,64 @@ void DataDependentCriterion::RaiseLeastErrors(const Quadrilateral& q, std::uint3
   const SamplePosition position{static_cast<std::uint16_t>(sample % width), static_cast<std::uint16_t>(sample / width)};
   const float height = open_->At(position);
   const int x = position.x - vertex_.position.x, y = position.y - vertex_.position.y;
-  const RingVertex seen{0, x, y, height};
-  // A border sample is not open: NaN raises nothing.
-  if (Cross(q.w, seen) <= 0) uw = std::max(uw, DistanceFrom(q.u, q.w, vertex_.height, x, y, height));
-  if (Cross(q.w, seen) >= 0) wv = std::max(wv, DistanceFrom(q.w, q.v, vertex_.height, x, y, height));
+  const std::int64_t side = Cross(q.w, RingVertex{0, x, y, height});
+  if (side <= 0) uw = std::max(uw, DistanceFrom(q.u, q.w, vertex_.height, x, y, height));
+  if (side >= 0) wv = std::max(wv, DistanceFrom(q.w, q.v, vertex_.height, x, y, height));
 }
 
 // From the triangle's last corner, as when it was made: rounding is that of the scan of its star.
-double DataDependentCriterion::ErrorBeyond(TriangleId t) {
+DataDependentCriterion::KnownFit DataDependentCriterion::FitBeyond(TriangleId t) {
   CoverSlots();
-  if (errors_[t] != kUnknown) return errors_[t];
-  const auto [a, b, c] = triangulation_->triangle(t);
-  const Triangulation::Vertex centre{triangulation_->position(c), triangulation_->height(c)};
-  const auto seen = [&](VertexId id) -> RingVertex {
-    const SamplePosition position = triangulation_->position(id);
-    return {id, position.x - centre.position.x, position.y - centre.position.y, triangulation_->height(id)};
-  };
-  const Fit fit = FitAround(centre, seen(a), seen(b));
-  Note(t, fit);
-  return fit.error;
-}
-
-DataDependentCriterion::Fit DataDependentCriterion::FitOf(const RingVertex& u, const RingVertex& v) {
-  return FitAround(vertex_, u, v);
-}
-
-DataDependentCriterion::Fit DataDependentCriterion::FitAround(const Triangulation::Vertex& centre, const RingVertex& u,
-                                                              const RingVertex& v) {
-  const std::array<Corner, 3> corners = {CornerOf(u.id), CornerOf(v.id), CornerAt(centre.position, centre.height)};
-  if (!UsesMaxima()) return {SquaredDistances(*field_, corners), {}};
-  Fit fit;
-  Prepare(scratch_, centre, 1);
-  scratch_.ring.Put(0, u);
-  scratch_.ring.Put(1, v);
-  scan_star_(*open_, scratch_, &fit.misfit);
-  fit.error = ErrorOf(fit.misfit, corners[0], corners[1], corners[2]);
-  return fit;
-}
-
-Corner DataDependentCriterion::CornerOf(VertexId vertex) const {
-  return CornerAt(triangulation_->position(vertex), triangulation_->height(vertex));
-}
-
-void DataDependentCriterion::CoverSlots() {
-  if (errors_.size() >= triangulation_->triangle_count()) return;
-  errors_.resize(triangulation_->triangle_count(), kUnknown);
-  worst_.resize(triangulation_->triangle_count(), kNoSample);
-}
-
-void DataDependentCriterion::Note(TriangleId t, const Fit& fit) {
-  errors_[t] = fit.error;
-  worst_[t] = fit.misfit.sample;
-}
-
-// With the triangle's border samples, by their plain distances: a weight would only favour one cut over the other where
-// the border is, and what is decided here is not the bound.
-double DataDependentCriterion::ErrorOf(const PlaneMisfit& misfit, const Corner& u, const Corner& v,
-                                       const Corner& p) const {
-  double distance = std::max(misfit.distance, 0.0);
-  for (const auto& [a, b] : {std::pair(u, v), {v, p}, {p, u}}) {
-    if (IsBorderEdge(*field_, a, b)) distance = std::max(distance, WorstBorderSample(*field_, a, b, {}).error);
+  if (known_[t].error == kUnknown) {
+    const auto [a, b, c] = triangulation_->triangle(t);
+    const Triangulation::Vertex p{triangulation_->position(c), triangulation_->height(c)};
+    const Fit fit = FitsAround<1>(p, {Seen(a, p.position), Seen(b, p.position)})[0];
+    known_[t] = {fit.error, fit.misfit.sample};
   }
-  return sagitta_->is_flat() ? distance : distance + sagitta_->Bound(PositionOf(u), PositionOf(v), PositionOf(p));
+  return known_[t];
+}
+
+RingVertex DataDependentCriterion::Seen(VertexId vertex, SamplePosition from) const {
+  const SamplePosition position = triangulation_->position(vertex);
+  return {vertex, position.x - from.x, position.y - from.y, triangulation_->height(vertex)};
+}
+
+template <std::size_t kCount>
+std::array<DataDependentCriterion::Fit, kCount> DataDependentCriterion::FitsAround(
+    const Triangulation::Vertex& p, const std::array<RingVertex, kCount + 1>& ring) {
+  std::array<Fit, kCount> fits;
+  if (!UsesMaxima()) {
+    for (std::size_t i = 0; i < kCount; ++i) {
+      const RingVertex &u = ring[i], &v = ring[i + 1];
+      fits[i].error = SquaredDistances(*field_, {CornerAt(PositionOf(u, p.position), u.height),
+                                                 CornerAt(PositionOf(v, p.position), v.height),
+                                                 CornerAt(p.position, p.height)});
+    }
+    return fits;
+  }
+  std::array<PlaneMisfit, kCount> misfits;
+  Prepare(scratch_, p, kCount);
+  for (std::size_t i = 0; i <= kCount; ++i) scratch_.ring.Put(i, ring[i]);
+  scan_star_(*open_, scratch_, misfits.data());
+  for (std::size_t i = 0; i < kCount; ++i) fits[i] = {ErrorOf(misfits[i], p, ring[i], ring[i + 1]), misfits[i]};
+  return fits;
+}
+
+// With the triangle's border samples, by their plain distances: a weight would favour one cut over the other only for
+// being at the border, and what is decided here is not the bound.
+double DataDependentCriterion::ErrorOf(const PlaneMisfit& misfit, const Triangulation::Vertex& p, const RingVertex& u,
+                                       const RingVertex& v) const {
+  const SamplePosition at_u = PositionOf(u, p.position), at_v = PositionOf(v, p.position);
+  double distance = std::max(misfit.distance, 0.0);
+  const auto raise = [&](SamplePosition a, float a_height, SamplePosition b, float b_height) {
+    if (!IsBorderEdge(*field_, a, b)) return;
+    distance = std::max(distance,
+                        WorstBorderSample(*field_, CornerAt(a, a_height), CornerAt(b, b_height), BorderOptions{}).error);
+  };
+  raise(at_u, u.height, at_v, v.height);
+  raise(at_v, v.height, p.position, p.height);
+  raise(p.position, p.height, at_u, u.height);
+  return distance + sagitta_->Bound(at_u, at_v, p.position);
 }
 
 void DataDependentCriterion::End(const Star& star) {
@@ -196,25 +193,26 @@ void DataDependentCriterion::End(const Star& star) {
   fits_.assign(star.count, {});
   // Both are in the order of the outline. A ring that has been turned, on the border, may leave some out.
   auto next = kept_.begin();
-  for (std::size_t i = 0; i < star.count && next != kept_.end(); ++i) {
-    if (next->u == star.ring.ids[i] && next->v == star.ring.ids[i + 1]) fits_[i] = (next++)->fit;
+  for (std::size_t i = 0; i < star.count; ++i) {
+    if (next != kept_.end() && next->u == star.ring.ids[i] && next->v == star.ring.ids[i + 1]) fits_[i] = (next++)->fit;
+    known_[star.triangles[i]] = {fits_[i].error, fits_[i].misfit.sample};
   }
-  for (std::size_t i = 0; i < star.count; ++i) Note(star.triangles[i], fits_[i]);
 }
 
 void DataDependentCriterion::Scan(const Star& star, PlaneMisfit* misfits) {
-  if (!UsesMaxima() || star.count != fits_.size() || star.centre != centre_) {
-    scan_star_(*open_, star, misfits);
-  } else {
+  if (!UsesMaxima()) return scan_star_(*open_, star, misfits);
+  if (star.centre == centre_ && star.count == fits_.size()) {
     ScanUnknown(star, misfits);
+  } else {
+    scan_star_(*open_, star, misfits);
   }
-  if (!UsesMaxima()) return;
   CoverSlots();
-  const Corner p{star.x, star.y, static_cast<double>(star.height)};
+  const Triangulation::Vertex p{{static_cast<std::uint16_t>(star.x), static_cast<std::uint16_t>(star.y)}, star.height};
   for (std::size_t i = 0; i < star.count; ++i) {
-    const TriangleId t = star.triangles[i];
-    if (errors_[t] != kUnknown) continue;
-    Note(t, {ErrorOf(misfits[i], CornerOf(star.ring.ids[i]), CornerOf(star.ring.ids[i + 1]), p), misfits[i]});
+    KnownFit& known = known_[star.triangles[i]];
+    if (known.error == kUnknown) {
+      known = {ErrorOf(misfits[i], p, star.ring[i], star.ring[i + 1]), misfits[i].sample};
+    }
   }
 }
 
@@ -232,6 +230,10 @@ void DataDependentCriterion::ScanUnknown(const Star& star, PlaneMisfit* misfits)
     for (std::size_t k = first; k <= i; ++k) scratch_.ring.Put(k - first, star.ring[k]);
     scan_star_(*open_, scratch_, misfits + first);
   }
+}
+
+void DataDependentCriterion::CoverSlots() {
+  if (known_.size() < triangulation_->triangle_count()) known_.resize(triangulation_->triangle_count());
 }
 
 }  // namespace terrace::tin

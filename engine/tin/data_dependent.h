@@ -16,6 +16,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -23,7 +24,6 @@
 #include "engine/tin/greedy.h"
 #include "engine/tin/height_field.h"
 #include "engine/tin/open_samples.h"
-#include "engine/tin/plane.h"
 #include "engine/tin/quadrilateral.h"
 #include "engine/tin/sagitta.h"
 #include "engine/tin/star.h"
@@ -38,9 +38,9 @@ class DataDependentCriterion {
   DataDependentCriterion(const HeightField& field, const OpenSamples& open, const Sagitta& sagitta,
                          const Triangulation& triangulation, DataDependentOptions options);
 
-  // One insertion: Begin, then Triangulation::Insert with Absorbs, then End with the star. The vertex is no open sample
-  // any more.
-  void Begin(const Triangulation::Vertex& vertex);
+  // One insertion: Begin, then Triangulation::Insert of the same vertex into the same triangle with Absorbs, then End with
+  // the star. The vertex is no open sample any more.
+  void Begin(const Triangulation::Vertex& vertex, TriangleId triangle);
   bool Absorbs(const RingVertex& u, const RingVertex& v, const RingVertex& w, HalfEdgeId back);
   void End(const Star& star);
 
@@ -55,6 +55,11 @@ class DataDependentCriterion {
     double error = kUnknown;  // by the measure
     PlaneMisfit misfit;       // if the error is known and the measure is one of maxima
   };
+  // What is remembered of it, by slot.
+  struct KnownFit {
+    double error = kUnknown;
+    std::uint32_t worst = kNoSample;  // the open sample that is furthest off
+  };
   // The triangle (u, v, p), p being inserted.
   struct Spanned {
     VertexId u, v;
@@ -67,13 +72,13 @@ class DataDependentCriterion {
   Fit TakePending(VertexId u, VertexId v);
   bool IsBetterAlongPw(const Quadrilateral& q, TriangleId beyond, Fit& uv, Fit& uw, Fit& wv);
   void RaiseLeastErrors(const Quadrilateral& q, std::uint32_t sample, double& uw, double& wv) const;
-  double ErrorBeyond(TriangleId t);
-  Fit FitOf(const RingVertex& u, const RingVertex& v);
-  Fit FitAround(const Triangulation::Vertex& centre, const RingVertex& u, const RingVertex& v);
-  double ErrorOf(const PlaneMisfit& misfit, const Corner& u, const Corner& v, const Corner& p) const;
-  Corner CornerOf(VertexId vertex) const;
+  KnownFit FitBeyond(TriangleId t);
+  RingVertex Seen(VertexId vertex, SamplePosition from) const;
+  template <std::size_t kCount>
+  std::array<Fit, kCount> FitsAround(const Triangulation::Vertex& p, const std::array<RingVertex, kCount + 1>& ring);
+  double ErrorOf(const PlaneMisfit& misfit, const Triangulation::Vertex& p, const RingVertex& u,
+                 const RingVertex& v) const;
   void CoverSlots();
-  void Note(TriangleId t, const Fit& fit);
   void ScanUnknown(const Star& star, PlaneMisfit* misfits);
 
   const HeightField* field_;
@@ -83,9 +88,7 @@ class DataDependentCriterion {
   DataDependentOptions options_;
   StarScan scan_star_ = BestStarScan();
 
-  // By slot.
-  std::vector<double> errors_;        // kUnknown until somebody asks
-  std::vector<std::uint32_t> worst_;  // the open sample that is furthest off
+  std::vector<KnownFit> known_;  // by slot
 
   // Of the insertion at work.
   Triangulation::Vertex vertex_;

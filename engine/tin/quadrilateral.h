@@ -21,8 +21,9 @@ struct Quadrilateral {
   float height = 0;  // of p, metres
 };
 
-// Of one cut: the product of the areas of its triangles over the product of their diameters, which the paper (section 4)
-// uses as SHAPE_QUALITY. Larger is better. The diameter is that of the bounding box: its longer side.
+// Of each cut: the product of the areas of its triangles over the product of their diameters, which the paper (section 4)
+// uses as SHAPE_QUALITY, times one number for both. Larger is better. The diameter is that of the bounding box: its
+// longer side.
 struct ShapeQuality {
   double uv = 0;
   double pw = 0;
@@ -36,11 +37,12 @@ constexpr double BoxDiameter(const RingVertex& a, const RingVertex& b, const Rin
 
 constexpr ShapeQuality ShapeQualityOf(const Quadrilateral& q) {
   const RingVertex p;
-  const auto uv = static_cast<double>(Cross(q.u, q.v)), uw = static_cast<double>(Cross(q.u, q.w)),
-             wv = static_cast<double>(Cross(q.w, q.v));
-  const double beyond = uw + wv - uv;  // exact
-  return {uv * beyond / (BoxDiameter(q.u, q.v, p) * BoxDiameter(q.v, q.u, q.w)),
-          uw * wv / (BoxDiameter(q.u, q.w, p) * BoxDiameter(q.w, q.v, p))};
+  const auto uvp = static_cast<double>(Cross(q.u, q.v)), uwp = static_cast<double>(Cross(q.u, q.w)),
+             wvp = static_cast<double>(Cross(q.w, q.v));
+  const double vuw = uwp + wvp - uvp;  // exact
+  // Instead of a division by the one, a multiplication by the other.
+  return {uvp * vuw * (BoxDiameter(q.u, q.w, p) * BoxDiameter(q.w, q.v, p)),
+          uwp * wvp * (BoxDiameter(q.u, q.v, p) * BoxDiameter(q.v, q.u, q.w))};
 }
 
 // The upward normal (x, y, 1) of the plane through three vertices, in metres per sample.
