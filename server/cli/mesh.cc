@@ -29,9 +29,14 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+constexpr const char* kDataDependent = "data-dependent";
+
+// Names of --measure, in the order of tin::FitMeasure.
+const std::vector<std::string> kMeasures = {"sum-max", "sum-squares", "max-max", "normals"};
+
 struct MeshArguments {
-  std::string dem, out, criterion = "delaunay", coordinates;
-  double max_error = -1, rms = -1;
+  std::string dem, out, criterion = "delaunay", measure, coordinates;
+  double max_error = -1, rms = -1, qthresh = -1;
   std::size_t points = 0;
   int threads = 1;
   bool compact = false, json = false;
@@ -48,10 +53,22 @@ int Fail(const std::string& message, int code) {
 std::string Complain(const MeshArguments& arguments) {
   const int goals = (arguments.max_error >= 0) + (arguments.points > 0) + (arguments.rms >= 0);
   if (goals != 1) return "mesh needs exactly one goal: --max-error METRES, --points N or --rms METRES";
-  if (arguments.criterion != "delaunay")
-    return "--criterion " + arguments.criterion + " is not available yet; use delaunay";
+  if (arguments.criterion != kDataDependent && (!arguments.measure.empty() || arguments.qthresh >= 0))
+    return "--measure and --qthresh belong to --criterion data-dependent";
   if (arguments.compact) return "--compact is not available yet";
   return {};
+}
+
+tin::GreedyOptions OptionsOf(const MeshArguments& arguments) {
+  tin::GreedyOptions options;
+  if (arguments.criterion != kDataDependent) return options;
+  options.criterion = tin::Criterion::kDataDependent;
+  const auto measure = std::find(kMeasures.begin(), kMeasures.end(), arguments.measure);
+  if (measure != kMeasures.end()) {
+    options.data_dependent.measure = static_cast<tin::FitMeasure>(measure - kMeasures.begin());
+  }
+  if (arguments.qthresh >= 0) options.data_dependent.qthresh = arguments.qthresh;
+  return options;
 }
 
 // Runs towards the goal in steps, so that progress can be shown: the error falls about as 1 / vertices.
@@ -177,7 +194,7 @@ int Mesh(const MeshArguments& arguments) {
   if (arguments.max_error >= 0) goal.max_error = arguments.max_error;
   if (arguments.points > 0) goal.max_points = arguments.points;
   if (arguments.rms >= 0) goal.rms_error = arguments.rms;
-  tin::GreedyTriangulation greedy(*field);
+  tin::GreedyTriangulation greedy(*field, OptionsOf(arguments));
   Triangulate(greedy, goal, static_cast<std::size_t>(field->width()) * static_cast<std::size_t>(field->height()));
   const tin::TinMesh mesh = greedy.Mesh();
   seconds.triangulate = Since(start);
@@ -228,10 +245,21 @@ void AddMesh(CLI::App& app, int& exit_code) {
       ->type_name("pixel|crs");
   command
       ->add_option("--criterion", arguments->criterion,
-                   "How triangles are joined: delaunay; data-dependent is not available yet")
-      ->check(OneOf({"delaunay", "data-dependent"}))
+                   "How triangles are joined: delaunay, or data-dependent: fewer vertices for the same error, thinner "
+                   "triangles, about twice the time")
+      ->check(OneOf({"delaunay", kDataDependent}))
       ->type_name("NAME")
       ->capture_default_str();
+  command
+      ->add_option("--measure", arguments->measure,
+                   "What data-dependent triangles are compared by: sum-max (default), sum-squares, max-max or normals")
+      ->check(OneOf(kMeasures))
+      ->type_name("NAME");
+  command
+      ->add_option("--qthresh", arguments->qthresh,
+                   "Data-dependent: 0 looks at the fit alone, 1 at the shape of triangles alone (default 0.5)")
+      ->check(NumberFrom(0, 1, "a number from 0 to 1"))
+      ->type_name("SHARE");
   command->add_option("--threads", arguments->threads, "Threads to use at most; the mesh does not depend on it")
       ->check(NumberFrom(1, 256, "a number from 1 to 256"))
       ->type_name("N")

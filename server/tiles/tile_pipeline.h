@@ -9,6 +9,7 @@
 
 #include "engine/core/result.h"
 #include "engine/dem/dem_source.h"
+#include "engine/tin/greedy.h"
 #include "server/tiles/encoded_tile.h"
 #include "server/tiles/tile_request.h"
 
@@ -19,6 +20,7 @@ struct Dataset {
   std::string name;
   std::string attribution;
   double error_fraction = 0.5;
+  tin::Criterion criterion = tin::Criterion::kDelaunay;
   std::unique_ptr<dem::DemSource> source;
   std::uint64_t generation = 0;  // hash of the source's fingerprint and every option that changes bytes
 };
