@@ -13,7 +13,7 @@
 namespace terrace::tin {
 namespace {
 
-SamplePosition PositionOf(const RingVertex& vertex, SamplePosition p) {
+SamplePosition PositionAround(SamplePosition p, const RingVertex& vertex) {
   return {static_cast<std::uint16_t>(p.x + vertex.dx), static_cast<std::uint16_t>(p.y + vertex.dy)};
 }
 
@@ -56,6 +56,11 @@ void DataDependentCriterion::Begin(const Triangulation::Vertex& vertex, Triangle
   pending_.clear();
   kept_.clear();
   if (!UsesMaxima()) return;
+  CoverSlots();
+  for (HalfEdgeId edge = 4 * triangle; edge < 4 * triangle + 3; ++edge) {
+    const HalfEdgeId back = triangulation_->twin(edge);
+    if (back != kNoEdge) __builtin_prefetch(&known_[back / 4]);
+  }
   const auto [a, b, c] = triangulation_->triangle(triangle);
   const std::array<RingVertex, 4> ring = {Seen(a, vertex.position), Seen(b, vertex.position), Seen(c, vertex.position),
                                           Seen(a, vertex.position)};
@@ -107,8 +112,10 @@ bool DataDependentCriterion::IsBetterAlongPw(const Quadrilateral& q, TriangleId 
   };
   if (UsesMaxima()) {
     double least_uw = 0, least_wv = 0;
-    RaiseLeastErrors(q, known.worst, least_uw, least_wv);
-    RaiseLeastErrors(q, uv.misfit.sample, least_uw, least_wv);
+    if (known.worst != kNoSample) RaiseLeastErrors(q, known.worst, known.worst_height, least_uw, least_wv);
+    if (const std::uint32_t worst = uv.misfit.sample; worst != kNoSample) {
+      RaiseLeastErrors(q, worst, open_->At(PositionOf(worst)), least_uw, least_wv);
+    }
     if (!wins(least_uw, least_wv)) return false;
   }
   const std::array<Fit, 2> fits = FitsAround<2>(vertex_, {q.u, q.w, q.v});
@@ -119,16 +126,23 @@ bool DataDependentCriterion::IsBetterAlongPw(const Quadrilateral& q, TriangleId 
 
 // An open sample of the quadrilateral is in one of the new triangles: that one is off by no less than there. Rounding does
 // not matter, since maxima and sums of what is not negative are monotonic as computed.
-void DataDependentCriterion::RaiseLeastErrors(const Quadrilateral& q, std::uint32_t sample, double& uw,
+void DataDependentCriterion::RaiseLeastErrors(const Quadrilateral& q, std::uint32_t sample, float height, double& uw,
                                               double& wv) const {
-  if (sample == kNoSample) return;
-  const auto width = static_cast<std::uint32_t>(field_->width());
-  const SamplePosition position{static_cast<std::uint16_t>(sample % width), static_cast<std::uint16_t>(sample / width)};
-  const float height = open_->At(position);
+  const SamplePosition position = PositionOf(sample);
   const int x = position.x - vertex_.position.x, y = position.y - vertex_.position.y;
   const std::int64_t side = Cross(q.w, RingVertex{0, x, y, height});
   if (side <= 0) uw = std::max(uw, DistanceFrom(q.u, q.w, vertex_.height, x, y, height));
   if (side >= 0) wv = std::max(wv, DistanceFrom(q.w, q.v, vertex_.height, x, y, height));
+}
+
+SamplePosition DataDependentCriterion::PositionOf(std::uint32_t sample) const {
+  const auto width = static_cast<std::uint32_t>(field_->width());
+  return {static_cast<std::uint16_t>(sample % width), static_cast<std::uint16_t>(sample / width)};
+}
+
+DataDependentCriterion::KnownFit DataDependentCriterion::Remembered(const Fit& fit) const {
+  const std::uint32_t worst = fit.misfit.sample;
+  return {fit.error, worst, worst == kNoSample ? 0 : open_->At(PositionOf(worst))};
 }
 
 // From the triangle's last corner, as when it was made: rounding is that of the scan of its star.
@@ -138,7 +152,7 @@ DataDependentCriterion::KnownFit DataDependentCriterion::FitBeyond(TriangleId t)
     const auto [a, b, c] = triangulation_->triangle(t);
     const Triangulation::Vertex p{triangulation_->position(c), triangulation_->height(c)};
     const Fit fit = FitsAround<1>(p, {Seen(a, p.position), Seen(b, p.position)})[0];
-    known_[t] = {fit.error, fit.misfit.sample};
+    known_[t] = Remembered(fit);
   }
   return known_[t];
 }
@@ -155,8 +169,8 @@ std::array<DataDependentCriterion::Fit, kCount> DataDependentCriterion::FitsArou
   if (!UsesMaxima()) {
     for (std::size_t i = 0; i < kCount; ++i) {
       const RingVertex &u = ring[i], &v = ring[i + 1];
-      fits[i].error = SquaredDistances(*field_, {CornerAt(PositionOf(u, p.position), u.height),
-                                                 CornerAt(PositionOf(v, p.position), v.height),
+      fits[i].error = SquaredDistances(*field_, {CornerAt(PositionAround(p.position, u), u.height),
+                                                 CornerAt(PositionAround(p.position, v), v.height),
                                                  CornerAt(p.position, p.height)});
     }
     return fits;
@@ -173,7 +187,7 @@ std::array<DataDependentCriterion::Fit, kCount> DataDependentCriterion::FitsArou
 // being at the border, and what is decided here is not the bound.
 double DataDependentCriterion::ErrorOf(const PlaneMisfit& misfit, const Triangulation::Vertex& p, const RingVertex& u,
                                        const RingVertex& v) const {
-  const SamplePosition at_u = PositionOf(u, p.position), at_v = PositionOf(v, p.position);
+  const SamplePosition at_u = PositionAround(p.position, u), at_v = PositionAround(p.position, v);
   double distance = std::max(misfit.distance, 0.0);
   const auto raise = [&](SamplePosition a, float a_height, SamplePosition b, float b_height) {
     if (!IsBorderEdge(*field_, a, b)) return;
@@ -181,9 +195,12 @@ double DataDependentCriterion::ErrorOf(const PlaneMisfit& misfit, const Triangul
                         WorstBorderSample(*field_, CornerAt(a, a_height), CornerAt(b, b_height), BorderOptions{}).error);
   };
   raise(at_u, u.height, at_v, v.height);
-  raise(at_v, v.height, p.position, p.height);
-  raise(p.position, p.height, at_u, u.height);
-  return distance + sagitta_->Bound(at_u, at_v, p.position);
+  if (p.position.x == 0 || p.position.y == 0 || p.position.x == field_->width() - 1 ||
+      p.position.y == field_->height() - 1) {
+    raise(at_v, v.height, p.position, p.height);
+    raise(p.position, p.height, at_u, u.height);
+  }
+  return sagitta_->is_flat() ? distance : distance + sagitta_->Bound(at_u, at_v, p.position);
 }
 
 void DataDependentCriterion::End(const Star& star) {
@@ -195,7 +212,7 @@ void DataDependentCriterion::End(const Star& star) {
   auto next = kept_.begin();
   for (std::size_t i = 0; i < star.count; ++i) {
     if (next != kept_.end() && next->u == star.ring.ids[i] && next->v == star.ring.ids[i + 1]) fits_[i] = (next++)->fit;
-    known_[star.triangles[i]] = {fits_[i].error, fits_[i].misfit.sample};
+    known_[star.triangles[i]] = Remembered(fits_[i]);
   }
 }
 
@@ -211,7 +228,7 @@ void DataDependentCriterion::Scan(const Star& star, PlaneMisfit* misfits) {
   for (std::size_t i = 0; i < star.count; ++i) {
     KnownFit& known = known_[star.triangles[i]];
     if (known.error == kUnknown) {
-      known = {ErrorOf(misfits[i], p, star.ring[i], star.ring[i + 1]), misfits[i].sample};
+      known = Remembered({ErrorOf(misfits[i], p, star.ring[i], star.ring[i + 1]), misfits[i]});
     }
   }
 }

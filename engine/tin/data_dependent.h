@@ -59,6 +59,7 @@ class DataDependentCriterion {
   struct KnownFit {
     double error = kUnknown;
     std::uint32_t worst = kNoSample;  // the open sample that is furthest off
+    float worst_height = 0;           // beside it: a test need not fetch it from the field
   };
   // The triangle (u, v, p), p being inserted.
   struct Spanned {
@@ -71,8 +72,10 @@ class DataDependentCriterion {
 
   Fit TakePending(VertexId u, VertexId v);
   bool IsBetterAlongPw(const Quadrilateral& q, TriangleId beyond, Fit& uv, Fit& uw, Fit& wv);
-  void RaiseLeastErrors(const Quadrilateral& q, std::uint32_t sample, double& uw, double& wv) const;
+  void RaiseLeastErrors(const Quadrilateral& q, std::uint32_t sample, float height, double& uw, double& wv) const;
   KnownFit FitBeyond(TriangleId t);
+  KnownFit Remembered(const Fit& fit) const;
+  SamplePosition PositionOf(std::uint32_t sample) const;
   RingVertex Seen(VertexId vertex, SamplePosition from) const;
   template <std::size_t kCount>
   std::array<Fit, kCount> FitsAround(const Triangulation::Vertex& p, const std::array<RingVertex, kCount + 1>& ring);
