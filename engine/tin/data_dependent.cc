@@ -34,7 +34,8 @@ void Prepare(Star& star, const Triangulation::Vertex& p, std::size_t count) {
   if (star.ring.capacity() < count + 1) star.ring.Grow(2 * (count + 1));
 }
 
-// How far a sample is from the triangle (u, v, p), in the form of the scan: equal bit for bit. x and y are relative to p.
+// How far a sample is from the triangle (u, v, p), in the form of the scan: equal bit for bit. x and y are relative to
+// p.
 double DistanceFrom(const RingVertex& u, const RingVertex& v, float p_height, int x, int y, float height) {
   const double ux = u.dx, uy = u.dy, vx = v.dx, vy = v.dy, pz = static_cast<double>(p_height);
   const double uz = static_cast<double>(u.height) - pz, vz = static_cast<double>(v.height) - pz;
@@ -44,8 +45,9 @@ double DistanceFrom(const RingVertex& u, const RingVertex& v, float p_height, in
 
 }  // namespace
 
-DataDependentCriterion::DataDependentCriterion(const HeightField& field, const OpenSamples& open, const Sagitta& sagitta,
-                                               const Triangulation& triangulation, DataDependentOptions options)
+DataDependentCriterion::DataDependentCriterion(const HeightField& field, const OpenSamples& open,
+                                               const Sagitta& sagitta, const Triangulation& triangulation,
+                                               DataDependentOptions options)
     : field_(&field), open_(&open), sagitta_(&sagitta), triangulation_(&triangulation), options_(options) {
   TERRACE_CHECK(options_.qthresh >= 0 && options_.qthresh <= 1);
 }
@@ -99,7 +101,15 @@ DataDependentCriterion::Fit DataDependentCriterion::TakePending(VertexId u, Vert
 bool DataDependentCriterion::IsBetterAlongPw(const Quadrilateral& q, TriangleId beyond, Fit& uv, Fit& uw, Fit& wv) {
   const ShapeQuality quality = ShapeQualityOf(q);
   const bool is_shaped_better = quality.pw > quality.uv;
-  if (std::min(quality.uv, quality.pw) <= options_.qthresh * std::max(quality.uv, quality.pw)) return is_shaped_better;
+  const auto fit_new = [&] {
+    const std::array<Fit, 2> fits = FitsAround<2>(vertex_, {q.u, q.w, q.v});
+    uw = fits[0];
+    wv = fits[1];
+  };
+  if (std::min(quality.uv, quality.pw) <= options_.qthresh * std::max(quality.uv, quality.pw)) {
+    if (is_shaped_better && UsesMaxima()) fit_new();  // most of them stay: fitted together
+    return is_shaped_better;
+  }
   if (options_.measure == FitMeasure::kNormals) return BendsLessAlongPw(q);
 
   const KnownFit known = FitBeyond(beyond);
@@ -118,14 +128,12 @@ bool DataDependentCriterion::IsBetterAlongPw(const Quadrilateral& q, TriangleId 
     }
     if (!wins(least_uw, least_wv)) return false;
   }
-  const std::array<Fit, 2> fits = FitsAround<2>(vertex_, {q.u, q.w, q.v});
-  uw = fits[0];
-  wv = fits[1];
+  fit_new();
   return wins(uw.error, wv.error);
 }
 
-// An open sample of the quadrilateral is in one of the new triangles: that one is off by no less than there. Rounding does
-// not matter, since maxima and sums of what is not negative are monotonic as computed.
+// An open sample of the quadrilateral is in one of the new triangles: that one is off by no less than there. Rounding
+// does not matter, since maxima and sums of what is not negative are monotonic as computed.
 void DataDependentCriterion::RaiseLeastErrors(const Quadrilateral& q, std::uint32_t sample, float height, double& uw,
                                               double& wv) const {
   const SamplePosition position = PositionOf(sample);
@@ -169,9 +177,9 @@ std::array<DataDependentCriterion::Fit, kCount> DataDependentCriterion::FitsArou
   if (!UsesMaxima()) {
     for (std::size_t i = 0; i < kCount; ++i) {
       const RingVertex &u = ring[i], &v = ring[i + 1];
-      fits[i].error = SquaredDistances(*field_, {CornerAt(PositionAround(p.position, u), u.height),
-                                                 CornerAt(PositionAround(p.position, v), v.height),
-                                                 CornerAt(p.position, p.height)});
+      fits[i].error = SquaredDistances(
+          *field_, {CornerAt(PositionAround(p.position, u), u.height),
+                    CornerAt(PositionAround(p.position, v), v.height), CornerAt(p.position, p.height)});
     }
     return fits;
   }
@@ -191,8 +199,8 @@ double DataDependentCriterion::ErrorOf(const PlaneMisfit& misfit, const Triangul
   double distance = std::max(misfit.distance, 0.0);
   const auto raise = [&](SamplePosition a, float a_height, SamplePosition b, float b_height) {
     if (!IsBorderEdge(*field_, a, b)) return;
-    distance = std::max(distance,
-                        WorstBorderSample(*field_, CornerAt(a, a_height), CornerAt(b, b_height), BorderOptions{}).error);
+    distance = std::max(
+        distance, WorstBorderSample(*field_, CornerAt(a, a_height), CornerAt(b, b_height), BorderOptions{}).error);
   };
   raise(at_u, u.height, at_v, v.height);
   if (p.position.x == 0 || p.position.y == 0 || p.position.x == field_->width() - 1 ||

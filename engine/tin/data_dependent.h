@@ -1,13 +1,14 @@
 // Data-dependent triangulation: which triangles an inserted vertex replaces, by how well they fit the samples.
 //
-// Garland and Heckbert (1997), section 3.4. Around a new vertex p, an edge (u, v) of the cavity's outline is suspect: the
-// quadrilateral (p, u, w, v) with the triangle beyond it is cut by u-v or by p-w, whichever fits better, and the edges that
-// take its place are suspect in turn. Spokes (edges at p) are not. Each test is a function of its quadrilateral alone, so
-// that the cavity does not depend on the order of the tests, on the triangle that the insertion starts from, or on slots.
+// Garland and Heckbert (1997), section 3.4. Around a new vertex p, an edge (u, v) of the cavity's outline is suspect:
+// the quadrilateral (p, u, w, v) with the triangle beyond it is cut by u-v or by p-w, whichever fits better, and the
+// edges that take its place are suspect in turn. Spokes (edges at p) are not. Each test is a function of its
+// quadrilateral alone, so that the cavity does not depend on the order of the tests, on the triangle that the insertion
+// starts from, or on slots.
 //
-// Scanned once: a triangle that was scanned for a test and ends up in the star is not scanned for its candidate again. The
-// test is lazy: first the shape, then samples whose errors are known, then one new triangle, then the other; it stops as
-// soon as p-w cannot fit better. The outcome is that of the full test.
+// Scanned once: a triangle that was scanned for a test and ends up in the star is not scanned for its candidate again.
+// The test is lazy: first the shape, then the two samples whose errors are known to be largest, and the new triangles
+// only where p-w can still fit better. The outcome is that of the full test.
 //
 // Whatever is chosen here, candidates are the exact worst samples of the final triangles: the bound is kept as with any
 // other criterion.
@@ -38,8 +39,8 @@ class DataDependentCriterion {
   DataDependentCriterion(const HeightField& field, const OpenSamples& open, const Sagitta& sagitta,
                          const Triangulation& triangulation, DataDependentOptions options);
 
-  // One insertion: Begin, then Triangulation::Insert of the same vertex into the same triangle with Absorbs, then End with
-  // the star. The vertex is no open sample any more.
+  // One insertion: Begin, then Triangulation::Insert of the same vertex into the same triangle with Absorbs, then End
+  // with the star. The vertex is no open sample any more.
   void Begin(const Triangulation::Vertex& vertex, TriangleId triangle);
   bool Absorbs(const RingVertex& u, const RingVertex& v, const RingVertex& w, HalfEdgeId back);
   void End(const Star& star);

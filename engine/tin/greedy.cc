@@ -300,9 +300,9 @@ void GreedyTriangulation::Impl::SetCandidate(const Star& star, std::size_t i) {
   const TriangleId t = star.triangles[i];
   Candidate worst;
   if (misfits_[i].sample != kNoSample) {
-    const double sagitta = sagitta_.Bound(triangulation_.position(star.ring.ids[i]),
-                                          triangulation_.position(star.ring.ids[i + 1]),
-                                          {static_cast<std::uint16_t>(star.x), static_cast<std::uint16_t>(star.y)});
+    const double sagitta =
+        sagitta_.Bound(triangulation_.position(star.ring.ids[i]), triangulation_.position(star.ring.ids[i + 1]),
+                       {static_cast<std::uint16_t>(star.x), static_cast<std::uint16_t>(star.y)});
     worst = {misfits_[i].distance + sagitta, misfits_[i].sample};
   }
   if (star.has_border) {

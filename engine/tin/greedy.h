@@ -56,7 +56,7 @@ inline constexpr double kMostBorderWeight = 4;
 struct Curvature {
   // Per row: squared metres per column step; empty: flat ground. Rising up to some row, falling after it.
   std::vector<double> east_m2;
-  double north_m2 = 0;          // squared metres per row step
+  double north_m2 = 0;  // squared metres per row step
   double radius_m = 0;
 };
 
@@ -84,8 +84,8 @@ enum class FitMeasure : std::uint8_t {
 
 struct DataDependentOptions {
   FitMeasure measure = FitMeasure::kSumMax;
-  // From 0 to 1. A cut whose triangles are shaped worse by more than this ratio is not considered, however well it fits:
-  // 0 looks at the fit alone, 1 at the shape alone (section 3.4.2).
+  // From 0 to 1. A cut whose triangles are shaped worse by more than this ratio is not considered, however well it
+  // fits: 0 looks at the fit alone, 1 at the shape alone (section 3.4.2).
   double qthresh = 0.5;
 };
 

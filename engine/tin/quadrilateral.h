@@ -1,6 +1,7 @@
 // The two ways to cut a convex quadrilateral into triangles, compared by their shape and by their bend.
 //
-//        w           The quadrilateral (p, u, w, v), counter-clockwise, seen from the point p that is being inserted. It is
+//        w           The quadrilateral (p, u, w, v), counter-clockwise, seen from the point p that is being inserted.
+//        It is
 //       / \          cut by u-v into (u, v, p) and (v, u, w), or by p-w into (u, w, p) and (w, v, p).
 //      /   \         Everything here is a function of its four corners, in double without fused operations: the same on
 //     u-----v        every processor.
@@ -21,18 +22,19 @@ struct Quadrilateral {
   float height = 0;  // of p, metres
 };
 
-// Of each cut: the product of the areas of its triangles over the product of their diameters, which the paper (section 4)
-// uses as SHAPE_QUALITY, times one number for both. Larger is better. The diameter is that of the bounding box: its
+// Of each cut: the product of the areas of its triangles over the product of their diameters, which the paper (section
+// 4) uses as SHAPE_QUALITY, times one number for both. Larger is better. The diameter is that of the bounding box: its
 // longer side.
 struct ShapeQuality {
   double uv = 0;
   double pw = 0;
 };
 
+// Without branches, which nothing could foretell.
+constexpr int Extent(int a, int b, int c) { return std::max(std::max(a, b), c) - std::min(std::min(a, b), c); }
+
 constexpr double BoxDiameter(const RingVertex& a, const RingVertex& b, const RingVertex& c) {
-  const auto [west, east] = std::minmax({a.dx, b.dx, c.dx});
-  const auto [south, north] = std::minmax({a.dy, b.dy, c.dy});
-  return std::max(east - west, north - south);
+  return std::max(Extent(a.dx, b.dx, c.dx), Extent(a.dy, b.dy, c.dy));
 }
 
 constexpr ShapeQuality ShapeQualityOf(const Quadrilateral& q) {
@@ -63,7 +65,8 @@ inline double CosineBetween(const Normal& a, const Normal& b) {
 }
 
 // Whether the two triangles of the cut p-w are closer to one plane than those of u-v: the angle between normals of Dyn,
-// Levin and Rippa, "Data Dependent Triangulations for Piecewise Linear Interpolation" (1990), across the diagonal alone.
+// Levin and Rippa, "Data Dependent Triangulations for Piecewise Linear Interpolation" (1990), across the diagonal
+// alone.
 inline bool BendsLessAlongPw(const Quadrilateral& q) {
   const RingVertex p{0, 0, 0, q.height};
   return CosineBetween(Normal(q.u, q.w, p), Normal(q.w, q.v, p)) >

@@ -121,7 +121,11 @@ TriangleId Triangulation::Locate(SamplePosition point, TriangleId start) const {
     TERRACE_CHECK(twin(edge) != kNone);  // the point lies outside the rectangle
     t = twin(edge) / 4;
   }
-  for (t = 0; leaving(t) != kNone;) TERRACE_CHECK(++t < triangle_count());
+  t = 0;
+  while (leaving(t) != kNone) {
+    ++t;
+    TERRACE_CHECK(t < triangle_count());
+  }
   return t;
 }
 

@@ -53,7 +53,8 @@ class Triangulation {
 
   const Star& InsertDelaunay(const Vertex& vertex, TriangleId triangle);
 
-  // A triangle that contains the point, inside, on an edge or as a corner, found by a walk from `start`.
+  // A triangle that contains the point, inside, on an edge or as a corner: found by a walk from `start`, and if that
+  // does not end, as it may where triangles are not Delaunay, among all.
   TriangleId Locate(SamplePosition point, TriangleId start) const;
 
   bool IsCorner(SamplePosition point, TriangleId triangle) const;

@@ -118,8 +118,8 @@ class NaiveDataDependent {
         const double px = x - c.x, py = y - c.y;
         const double of_a = px * vy - py * vx, of_b = ux * py - uy * px;
         if (of_a < 0 || of_b < 0 || d - of_a - of_b < 0) continue;
-        const auto height = static_cast<double>(
-            open_.At({static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)}));
+        const auto height =
+            static_cast<double>(open_.At({static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)}));
         const double numerator = std::abs(d * (height - c.z) - (per_x * px + per_y * py));
         if (!(numerator > furthest)) continue;
         furthest = numerator;
@@ -354,12 +354,39 @@ TEST(DataDependent, NeedsFewerVerticesThanDelaunay) {
   }
 }
 
+TEST(DataDependent, IsAsCloseOnCraterLakeAsTheAuthorsProgram) {
+  constexpr const char* kName = "crater.tif";
+  if (!test_support::TestDataPath(kName)) GTEST_SKIP() << test_support::MissingTestData(kName);
+  const std::optional<test_support::TestRaster> raster = test_support::ReadTestRaster(kName);
+  ASSERT_TRUE(raster);
+  const HeightField crater = MakeField(raster->width, raster->height, [&](int x, int y) {
+    return raster->heights[static_cast<std::size_t>(y * raster->width + x)];
+  });
+  struct Column {
+    FitMeasure measure;
+    std::array<double, 4> rms;  // at 1542, 5000, 7711 and 20000 vertices
+  };
+  for (const auto& [measure, expected] : {Column{FitMeasure::kSumMax, {6.2564, 2.5224, 1.7434, 0.76026}},
+                                          Column{FitMeasure::kSumSquares, {6.3631, 2.5081, 1.7445, 0.74759}},
+                                          Column{FitMeasure::kMaxMax, {6.6430, 2.6140, 1.8270, 0.77380}},
+                                          Column{FitMeasure::kNormals, {7.4442, 3.0737, 2.1425, 0.91195}}}) {
+    GreedyTriangulation tin(crater, DataDependent(measure));
+    for (std::size_t i = 0; i < expected.size(); ++i) {
+      constexpr std::array<std::size_t, 4> kPoints = {1542, 5000, 7711, 20000};
+      EXPECT_TRUE(tin.Run({0, kPoints[i]}));
+      const MeshError error = MeasureError(crater, tin.Mesh());
+      EXPECT_LT(error.rms, 1.01 * expected[i]) << static_cast<int>(measure) << ' ' << kPoints[i];
+      EXPECT_LE(error.max, tin.CurrentError());
+    }
+  }
+}
+
 TEST(Quadrilateral, ComparesShapesByAreasOverDiameters) {
   // Both cuts of a rectangle are alike.
   const Quadrilateral rectangle{{1, 4, 0, 0}, {2, 0, 2, 0}, {3, 4, 2, 0}, 0};
   EXPECT_EQ(ShapeQualityOf(rectangle).uv, ShapeQualityOf(rectangle).pw);
-  // Corners p (0, 0), u (2, 1), w (1, 16), v (0, 1): twice the areas are 2 and 30 with diameters 2 and 15 along u-v, but 31
-  // and 1 with diameters 16 and 16 along p-w.
+  // Corners p (0, 0), u (2, 1), w (1, 16), v (0, 1): twice the areas are 2 and 30 with diameters 2 and 15 along u-v,
+  // but 31 and 1 with diameters 16 and 16 along p-w.
   const Quadrilateral kite{{1, 2, 1, 0}, {2, 0, 1, 0}, {3, 1, 16, 0}, 0};
   const ShapeQuality quality = ShapeQualityOf(kite);
   EXPECT_GT(quality.uv, quality.pw);
