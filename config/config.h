@@ -18,6 +18,8 @@ namespace terrace::config {
 
 // What the heights of a source count from. Further values come with the conversions that they need.
 enum class VerticalDatum : std::uint8_t { kUnknown };
+// How the triangles of a tile are joined: tin::Criterion, which this room does not know.
+enum class Criterion : std::uint8_t { kDelaunay, kDataDependent };
 enum class LogLevel : std::uint8_t { kDebug, kInfo, kWarn, kError, kOff };
 enum class LogFormat : std::uint8_t { kText, kJson };
 
@@ -30,6 +32,8 @@ struct DatasetConfig {
   std::optional<double> finest_error;  // metres; decides the deepest level
   std::optional<double> floor;         // metres; height outside the source and in large voids
   int max_void_gap = 64;               // source samples; narrower voids are filled
+  Criterion criterion = Criterion::kDelaunay;
+  bool compact = false;  // tiles go through the drop pass
 
   friend bool operator==(const DatasetConfig&, const DatasetConfig&) = default;
 };

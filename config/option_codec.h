@@ -83,6 +83,15 @@ Codec<Target> Number(Member Target::*member, double min, double max) {
 }
 
 template <typename Target>
+Codec<Target> Switch(bool Target::*member) {
+  return {[=](const Json& value, const Place& place, Target& target) {
+            if (!value.is_boolean()) return place.Expected("true or false", value);
+            target.*member = value.get<bool>();
+          },
+          [=](const Target& target) { return Json(target.*member); }, SwitchToJson};
+}
+
+template <typename Target>
 Codec<Target> Seconds(std::chrono::milliseconds Target::*member, double min, double max) {
   return {[=](const Json& value, const Place& place, Target& target) {
             const double seconds = value.is_number() ? value.get<double>() : std::nan("");

@@ -173,6 +173,12 @@ const std::vector<Option<DatasetConfig>>& DatasetOptionTable() {
        Number(&DatasetConfig::floor, -20'000, 20'000)},
       {"max_void_gap", "SAMPLES", "Voids narrower than this many source samples are filled from their edges",
        Integer(&DatasetConfig::max_void_gap, 0, 100'000)},
+      {"criterion", "NAME", "How triangles are joined: delaunay, or data-dependent: smaller tiles, more time to build",
+       Choice(&DatasetConfig::criterion,
+              {{"delaunay", Criterion::kDelaunay}, {"data-dependent", Criterion::kDataDependent}})},
+      {"compact", "true|false",
+       "Drop the vertices that a tile's error does not need: smaller tiles, more time to build",
+       Switch(&DatasetConfig::compact)},
   };
   return table;
 }

@@ -124,9 +124,10 @@ FieldBlock FieldCut::block(std::size_t i) const {
 }
 
 std::optional<TinMesh> MeshBlock(const HeightField& field, const FieldBlock& block, double max_error_m,
-                                 std::stop_token stop) {
-  if (block == FieldBlock{0, 0, field.width(), field.height()}) return MeshTo(field, {}, max_error_m, std::move(stop));
-  GreedyOptions options;
+                                 GreedyOptions options, std::stop_token stop) {
+  if (block == FieldBlock{0, 0, field.width(), field.height()}) {
+    return MeshTo(field, options, max_error_m, std::move(stop));
+  }
   const auto border = [&](Side side) -> BorderOptions& { return options.borders[static_cast<std::size_t>(side)]; };
   if (block.y > 0) border(Side::kSouth) = kSharedBorder;
   if (block.x > 0) border(Side::kWest) = kSharedBorder;

@@ -13,6 +13,7 @@
 #include <stop_token>
 #include <vector>
 
+#include "engine/tin/greedy.h"
 #include "engine/tin/height_field.h"
 #include "engine/tin/tin_mesh.h"
 
@@ -52,8 +53,9 @@ class FieldCut {
 
 // The mesh of one block to an error, in the block's own coordinates; nothing when stopped. Corners that are void have
 // the height that HeightField::VertexHeight gives them in the whole field, so that neighbours agree on it. Copies the
-// block's samples, unless the block is the field. Safe to call from many threads at once.
+// block's samples, unless the block is the field. Of the options the criterion counts; borders inside the field have
+// their own. Safe to call from many threads at once.
 std::optional<TinMesh> MeshBlock(const HeightField& field, const FieldBlock& block, double max_error_m,
-                                 std::stop_token stop = {});
+                                 GreedyOptions options = {}, std::stop_token stop = {});
 
 }  // namespace terrace::tin

@@ -8,6 +8,7 @@
 #include "engine/core/check.h"
 #include "engine/tin/border.h"
 #include "engine/tin/candidate_queue.h"
+#include "engine/tin/data_dependent.h"
 #include "engine/tin/insertion_recorder.h"
 #include "engine/tin/open_samples.h"
 #include "engine/tin/sagitta.h"
@@ -72,6 +73,7 @@ class GreedyTriangulation::Impl {
   std::optional<Insertion> NextSeed(const GreedyGoal& goal);
   bool IsMet(const GreedyGoal& goal);
   void Insert(const Insertion& insertion);
+  const Star& Insert(const Triangulation::Vertex& vertex, TriangleId triangle);
 
   Triangulation::Vertex VertexOf(SamplePosition sample) const;
   void ScanStarOf(const Star& star);
@@ -93,6 +95,7 @@ class GreedyTriangulation::Impl {
   Triangulation triangulation_;
   TriangleId last_changed_ = 0;  // where walks start
   CandidateQueue candidates_;    // by triangle
+  std::optional<DataDependentCriterion> data_dependent_;
   std::optional<InsertionRecorder> recorder_;
 
   // Triangles whose candidates are out of date. Seeds pile them up: a triangle is scanned once it stays.
@@ -127,6 +130,9 @@ GreedyTriangulation::Impl::Impl(const HeightField& field, GreedyOptions options)
     const bool along_x = side == Side::kSouth || side == Side::kNorth;
     border_worst_[static_cast<std::size_t>(side)].resize(
         static_cast<std::size_t>(along_x ? field.width() : field.height()));
+  }
+  if (options_.criterion == Criterion::kDataDependent) {
+    data_dependent_.emplace(field, open_, sagitta_, triangulation_, options_.data_dependent);
   }
   if (options_.record) recorder_.emplace();
   AwaitScan(0);
@@ -196,8 +202,9 @@ bool GreedyTriangulation::Impl::IsMet(const GreedyGoal& goal) {
 }
 
 void GreedyTriangulation::Impl::Insert(const Insertion& insertion) {
-  const Star& star = triangulation_.InsertDelaunay(VertexOf(insertion.sample), insertion.triangle);
+  const Triangulation::Vertex vertex = VertexOf(insertion.sample);
   open_.Close(insertion.sample);
+  const Star& star = Insert(vertex, insertion.triangle);
   if (recorder_) recorder_->Append(insertion.sample, insertion.error_before, star);
   last_changed_ = star.triangles[0];
   if (insertion.is_seed || squares_) {
@@ -205,6 +212,17 @@ void GreedyTriangulation::Impl::Insert(const Insertion& insertion) {
   } else {
     ScanStarOf(star);
   }
+}
+
+const Star& GreedyTriangulation::Impl::Insert(const Triangulation::Vertex& vertex, TriangleId triangle) {
+  if (!data_dependent_) return triangulation_.InsertDelaunay(vertex, triangle);
+  data_dependent_->Begin(vertex, triangle);
+  const Star& star = triangulation_.Insert(
+      vertex, triangle, [this](const RingVertex& u, const RingVertex& v, const RingVertex& w, HalfEdgeId back) {
+        return data_dependent_->Absorbs(u, v, w, back);
+      });
+  data_dependent_->End(star);
+  return star;
 }
 
 double GreedyTriangulation::Impl::CurrentError() {
@@ -225,7 +243,7 @@ Triangulation::Vertex GreedyTriangulation::Impl::VertexOf(SamplePosition sample)
 
 void GreedyTriangulation::Impl::ScanStarOf(const Star& star) {
   if (misfits_.size() < star.count) misfits_.resize(star.ring.capacity());
-  scan_star_(open_, star, misfits_.data());
+  data_dependent_ ? data_dependent_->Scan(star, misfits_.data()) : scan_star_(open_, star, misfits_.data());
   const bool is_plain = sagitta_.is_flat() && !star.has_border;
   for (std::size_t i = 0; i < star.count; ++i) {
     if (!is_plain) {

@@ -1,4 +1,4 @@
-// Greedy insertion of height samples into a Delaunay triangulation.
+// Greedy insertion of height samples into a triangulation: Delaunay, or chosen by how well it fits the samples.
 //
 // Garland and Heckbert, "Fast Triangular Approximation of Terrains and Height Fields" (1997), section 3.3, algorithm
 // III: every triangle keeps its worst sample as a candidate, a queue yields the worst of all, and only the triangles
@@ -67,7 +67,31 @@ struct SeedGrid {
   int step = 1;
 };
 
+// How the triangles around an inserted vertex are joined.
+enum class Criterion : std::uint8_t {
+  kDelaunay,
+  kDataDependent,  // section 3.4 of the paper: fewer vertices to the same error, thinner triangles, more time
+};
+
+// What data-dependent triangulation holds against a pair of triangles that could be cut along their other diagonal
+// (section 3.4.1).
+enum class FitMeasure : std::uint8_t {
+  kSumMax,      // the sum of their largest errors
+  kSumSquares,  // the sum of all squared distances
+  kMaxMax,      // the larger of their largest errors
+  kNormals,     // the angle between their normals, metres over samples: looks at no sample but the corners
+};
+
+struct DataDependentOptions {
+  FitMeasure measure = FitMeasure::kSumMax;
+  // From 0 to 1. A cut whose triangles are shaped worse by more than this ratio is not considered, however well it
+  // fits: 0 looks at the fit alone, 1 at the shape alone (section 3.4.2).
+  double qthresh = 0.5;
+};
+
 struct GreedyOptions {
+  Criterion criterion = Criterion::kDelaunay;
+  DataDependentOptions data_dependent;
   std::array<BorderOptions, 4> borders;  // by Side
   Curvature curvature;
   std::vector<SeedGrid> seeds;  // in order of decreasing below_error

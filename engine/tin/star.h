@@ -27,6 +27,9 @@ class Ring {
   std::size_t capacity() const { return ids.size() - kPadding; }
   void Grow(std::size_t capacity);
 
+  RingVertex operator[](std::size_t i) const {
+    return {ids[i], dx[i], dy[i], heights[i], std::int64_t{dx[i]} * dx[i] + std::int64_t{dy[i]} * dy[i]};
+  }
   void Repeat(std::size_t from, std::size_t to) {
     ids[to] = ids[from];
     dx[to] = dx[from];

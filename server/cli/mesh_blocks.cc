@@ -16,7 +16,8 @@
 
 namespace terrace::cli {
 
-tin::TinMesh MeshBlocks(const tin::HeightField& field, const tin::FieldCut& cut, double max_error_m, int threads) {
+tin::TinMesh MeshBlocks(const tin::HeightField& field, const tin::FieldCut& cut, double max_error_m,
+                        const tin::GreedyOptions& options, int threads) {
   std::atomic<std::size_t> next = 0;
   std::stop_source failed;
 
@@ -30,7 +31,7 @@ tin::TinMesh MeshBlocks(const tin::HeightField& field, const tin::FieldCut& cut,
   const auto mesh_blocks = [&] {
     try {
       for (std::size_t i = next++; i < cut.size(); i = next++) {
-        std::optional<tin::TinMesh> mesh = MeshBlock(field, cut.block(i), max_error_m, failed.get_token());
+        std::optional<tin::TinMesh> mesh = MeshBlock(field, cut.block(i), max_error_m, options, failed.get_token());
         if (!mesh) return;
         const std::lock_guard lock(mutex);
         waiting[i] = std::move(mesh);

@@ -76,8 +76,13 @@ config::Config MakeConfig(const ServeArguments& arguments, std::vector<config::C
 
 // Changes when the source or an option that changes bytes does. The file's identity is in the source's fingerprint.
 std::uint64_t GenerationOf(const config::DatasetConfig& dataset, const dem::DemSource& source) {
-  const std::string text = fmt::format(TERRACE_VERSION " {} {}", source.fingerprint(), dataset.error_fraction);
+  const std::string text = fmt::format(TERRACE_VERSION " {} {} {} {}", source.fingerprint(), dataset.error_fraction,
+                                       static_cast<int>(dataset.criterion), dataset.compact);
   return XXH3_64bits(text.data(), text.size());
+}
+
+tin::Criterion CriterionOf(config::Criterion criterion) {
+  return criterion == config::Criterion::kDataDependent ? tin::Criterion::kDataDependent : tin::Criterion::kDelaunay;
 }
 
 // Opens every source; false if one could not be, after all of them had their message.
@@ -101,6 +106,7 @@ bool OpenDatasets(const config::Config& config, std::vector<server::Dataset>& da
     dataset.name = wanted.name;
     dataset.attribution = wanted.attribution;
     dataset.error_fraction = wanted.error_fraction;
+    dataset.rules = {CriterionOf(wanted.criterion), wanted.compact};
     dataset.generation = GenerationOf(wanted, **source);
     dataset.source = *std::move(source);
     spdlog::info("dataset {}: {}, levels 0 to {}", dataset.name, wanted.sources.front(), dataset.source->max_level());

@@ -11,6 +11,7 @@
 #include "engine/dem/dem_source.h"
 #include "server/tiles/encoded_tile.h"
 #include "server/tiles/refined_tile.h"
+#include "server/tiles/tile_mesher.h"
 #include "server/tiles/tile_request.h"
 
 namespace terrace::server {
@@ -20,6 +21,7 @@ struct Dataset {
   std::string name;
   std::string attribution;
   double error_fraction = 0.5;
+  MeshRules rules;
   std::unique_ptr<dem::DemSource> source;
   std::uint64_t generation = 0;  // hash of the source's fingerprint and every option that changes bytes
 };

@@ -28,7 +28,9 @@ TEST(ToJson, ComesBackAsTheDefaults) { ExpectComesBack(Config{}); }
 TEST(ToJson, ComesBackWithEveryOptionSet) {
   Config config;
   config.listen = {"2001:db8::1", 0};
-  DatasetConfig dataset{"a", {"/data/a.tif"}, VerticalDatum::kUnknown, "© \"ét\\é\"", 0.1, 1e-3, -0.3, 7};
+  DatasetConfig dataset{
+      "a", {"/data/a.tif"}, VerticalDatum::kUnknown, "© \"ét\\é\"", 0.1, 1e-3, -0.3, 7, Criterion::kDataDependent,
+      true};
   config.datasets = {dataset, Dataset("b")};
   config.viewer = {true, "/srv/page"};
   config.cache_control = "no-cache";

@@ -175,7 +175,7 @@ TEST(FieldCut, StopsWhenAsked) {
   const HeightField field = HillField(70, 40, 11);
   std::stop_source source;
   source.request_stop();
-  EXPECT_FALSE(MeshBlock(field, {0, 0, 35, 40}, 0, source.get_token()));
+  EXPECT_FALSE(MeshBlock(field, {0, 0, 35, 40}, 0, {}, source.get_token()));
 }
 
 TEST(RealFields, ACutTakesNoMoreThanOneInAHundredVerticesMore) {

@@ -121,6 +121,14 @@ class Mesh(InFolder):
         self.assertEqual(set(statistics["seconds"]), {"read", "triangulate", "write"})
         self.assertGreater(statistics["peak_rss_bytes"], 1 << 20)
 
+    def test_joins_triangles_by_their_fit_on_request(self):
+        delaunay = self.mesh(SAMPLE, "a.ply", "--max-error", 10)[0]["points"]
+        for options in ([], ["--measure", "sum-squares"], ["--measure", "max-max"], ["--qthresh", 0.4]):
+            statistics, _ = self.mesh(SAMPLE, "b.ply", "--max-error", 10, "--criterion", "data-dependent", *options)
+            self.assertEqual(statistics["criterion"], "data-dependent")
+            self.assertLessEqual(statistics["max_error"], 10)
+            self.assertLess(statistics["points"], delaunay, options)
+
     def test_gives_the_same_bytes_whatever_the_threads(self):
         rows = [[round(40 * math.sin(x / 9) * math.cos(y / 7 + x / 90), 2) for x in range(700)] for y in range(500)]
         large = self.write("large.asc", grid(rows, PLACE))  # meshed in six blocks
@@ -171,7 +179,15 @@ class Mesh(InFolder):
                                  (["pixel or crs"], ["--out", out, "--points", 9, "--coordinates", "polar"]),
                                  (["--compact", "--max-error"], ["--out", out, "--points", 9, "--compact"]),
                                  (["--compact", "--max-error"], ["--out", out, "--rms", 9, "--compact"]),
-                                 (["not available yet"], ["--out", out, "--points", 9, "--criterion", "data-dependent"]),
+                                 (["delaunay or data-dependent"], ["--out", out, "--points", 9, "--criterion", "best"]),
+                                 (["belong to --criterion data-dependent"],
+                                  ["--out", out, "--points", 9, "--qthresh", 0.5]),
+                                 (["belong to --criterion data-dependent"],
+                                  ["--out", out, "--points", 9, "--measure", "max-max"]),
+                                 (["from 0 to 1"],
+                                  ["--out", out, "--points", 9, "--criterion", "data-dependent", "--qthresh", 2]),
+                                 (["sum-max or sum-squares or max-max or normals"],
+                                  ["--out", out, "--points", 9, "--criterion", "data-dependent", "--measure", "mean"]),
                                  ([".obj", ".ply", ".glb"], ["--out", "a.txt", "--points", 9])):
             self.assert_refused(2, words, "mesh", SAMPLE, *arguments)
         self.assert_refused(1, ["/nowhere/a.obj", "folder"], "mesh", SAMPLE, "--out", "/nowhere/a.obj", "--points", 9)

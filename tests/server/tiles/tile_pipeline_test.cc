@@ -126,6 +126,41 @@ TEST(TilePipeline, GivesTheSameBytesOnEveryThread) {
   for (std::thread& thread : threads) thread.join();
 }
 
+// Neighbours of every error match and keep it by any rules.
+TEST(TilePipeline, KeepsErrorsAndEdgesByEveryRule) {
+  for (const tin::Criterion criterion : {tin::Criterion::kDelaunay, tin::Criterion::kDataDependent}) {
+    for (const bool compact : {false, true}) {
+      if (criterion == tin::Criterion::kDelaunay && !compact) continue;
+      std::vector<Dataset> datasets;
+      datasets.push_back(OpenSample("jacksboro"));
+      datasets.back().rules = {criterion, compact};
+      const TilePipeline pipeline(std::move(datasets));
+      for (const int level : {7, 10, 12}) {
+        for (const int step : {0, 10}) {
+          TileRequest request;
+          request.key = MiddleTile(1, level);
+          request.error_step = step;
+          const auto tile = pipeline.Build(request, {});
+          ASSERT_TRUE(tile.has_value()) << tile.error().message;
+          EXPECT_LE(tile->max_error_m, geo::LadderError(level, step));
+          const FetchedTile plain = Fetch(1, request.key, step);
+          if (plain.encoded.vertices > 500) {
+            EXPECT_LT(tile->vertices, plain.encoded.vertices) << level << " step " << step;
+          }
+          // Edges do not know how the inside is meshed.
+          request.normals = true;
+          const auto with_normals = pipeline.Build(request, {});
+          FetchedTile fetched{*proto::DecodeQuantizedMesh(with_normals->bytes), *with_normals};
+          for (const bool vertical : {true, false}) {
+            EXPECT_EQ(EdgeOf(fetched, vertical, 0), EdgeOf(plain, vertical, 0));
+            EXPECT_EQ(EdgeOf(fetched, vertical, 32767), EdgeOf(plain, vertical, 32767));
+          }
+        }
+      }
+    }
+  }
+}
+
 // The cached refinement serves coarser errors, is continued for finer ones, and never shows in the bytes.
 TEST(TilePipeline, GivesTheSameBytesFromScratchFromReplayAndContinued) {
   const auto open = [](std::size_t cache_bytes) {

@@ -1,0 +1,106 @@
+// Data-dependent triangulation: which triangles an inserted vertex replaces, by how well they fit the samples.
+//
+// Garland and Heckbert (1997), section 3.4. Around a new vertex p, an edge (u, v) of the cavity's outline is suspect:
+// the quadrilateral (p, u, w, v) with the triangle beyond it is cut by u-v or by p-w, whichever fits better, and the
+// edges that take its place are suspect in turn. Spokes (edges at p) are not. Each test is a function of its
+// quadrilateral alone, so that the cavity does not depend on the order of the tests, on the triangle that the insertion
+// starts from, or on slots.
+//
+// Scanned once: a triangle that was scanned for a test and ends up in the star is not scanned for its candidate again.
+// The test is lazy: first the shape, then the two samples whose errors are known to be largest, and the new triangles
+// only where p-w can still fit better. The outcome is that of the full test.
+//
+// Whatever is chosen here, candidates are the exact worst samples of the final triangles: the bound is kept as with any
+// other criterion.
+//
+// Not thread-safe; different objects are independent.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "engine/tin/greedy.h"
+#include "engine/tin/height_field.h"
+#include "engine/tin/open_samples.h"
+#include "engine/tin/quadrilateral.h"
+#include "engine/tin/sagitta.h"
+#include "engine/tin/star.h"
+#include "engine/tin/triangle_scan.h"
+#include "engine/tin/triangulation.h"
+
+namespace terrace::tin {
+
+class DataDependentCriterion {
+ public:
+  // What it looks at belongs to the run and must outlive this object.
+  DataDependentCriterion(const HeightField& field, const OpenSamples& open, const Sagitta& sagitta,
+                         const Triangulation& triangulation, DataDependentOptions options);
+
+  // One insertion: Begin, then Triangulation::Insert of the same vertex into the same triangle with Absorbs, then End
+  // with the star. The vertex is no open sample any more.
+  void Begin(const Triangulation::Vertex& vertex, TriangleId triangle);
+  bool Absorbs(const RingVertex& u, const RingVertex& v, const RingVertex& w, HalfEdgeId back);
+  void End(const Star& star);
+
+  // What a StarScan finds, for the star of the last insertion or a triangle as a star of its own.
+  void Scan(const Star& star, PlaneMisfit* misfits);
+
+ private:
+  static constexpr double kUnknown = -1;
+
+  // How well a triangle fits.
+  struct Fit {
+    double error = kUnknown;  // by the measure
+    PlaneMisfit misfit;       // if the error is known and the measure is one of maxima
+  };
+  // What is remembered of it, by slot.
+  struct KnownFit {
+    double error = kUnknown;
+    std::uint32_t worst = kNoSample;  // the open sample that is furthest off
+    float worst_height = 0;           // beside it: a test need not fetch it from the field
+  };
+  // The triangle (u, v, p), p being inserted.
+  struct Spanned {
+    VertexId u, v;
+    Fit fit;
+  };
+
+  bool UsesMaxima() const { return options_.measure == FitMeasure::kSumMax || options_.measure == FitMeasure::kMaxMax; }
+  double Combine(double a, double b) const { return options_.measure == FitMeasure::kMaxMax ? std::max(a, b) : a + b; }
+
+  Fit TakePending(VertexId u, VertexId v);
+  bool IsBetterAlongPw(const Quadrilateral& q, TriangleId beyond, Fit& uv, Fit& uw, Fit& wv);
+  void RaiseLeastErrors(const Quadrilateral& q, std::uint32_t sample, float height, double& uw, double& wv) const;
+  KnownFit FitBeyond(TriangleId t);
+  KnownFit Remembered(const Fit& fit) const;
+  SamplePosition PositionOf(std::uint32_t sample) const;
+  RingVertex Seen(VertexId vertex, SamplePosition from) const;
+  template <std::size_t kCount>
+  std::array<Fit, kCount> FitsAround(const Triangulation::Vertex& p, const std::array<RingVertex, kCount + 1>& ring);
+  double ErrorOf(const PlaneMisfit& misfit, const Triangulation::Vertex& p, const RingVertex& u,
+                 const RingVertex& v) const;
+  void CoverSlots();
+  void ScanUnknown(const Star& star, PlaneMisfit* misfits);
+
+  const HeightField* field_;
+  const OpenSamples* open_;
+  const Sagitta* sagitta_;
+  const Triangulation* triangulation_;
+  DataDependentOptions options_;
+  StarScan scan_star_ = BestStarScan();
+
+  std::vector<KnownFit> known_;  // by slot
+
+  // Of the insertion at work.
+  Triangulation::Vertex vertex_;
+  std::vector<Spanned> pending_;  // stack: spanned triangles whose edge has not been looked across yet
+  std::vector<Spanned> kept_;     // in the order of the outline
+  std::vector<Fit> fits_;         // by triangle of its star
+  VertexId centre_ = 0;           // whose star fits_ is about
+  Star scratch_;
+};
+
+}  // namespace terrace::tin

@@ -1,0 +1,145 @@
+#include "server/tiles/tile_mesher.h"
+
+#include <array>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "engine/core/check.h"
+#include "engine/geo/tile_key.h"
+#include "engine/tin/drop_pass.h"
+#include "engine/tin/insert_samples.h"
+#include "proto/edge_steps.h"
+#include "proto/tile_error.h"
+#include "proto/tile_mesh.h"
+#include "server/tiles/refine_plan.h"
+
+namespace terrace::server {
+namespace {
+
+tl::unexpected<Error> Cancelled() { return MakeError(ErrorCode::kCancelled, "nobody waits for this tile any more"); }
+
+proto::EdgeSteps EdgeStepsOf(const dem::DemSource& source, const geo::TileKey& key, double error_m) {
+  const std::int64_t rows = geo::TileRows(key.level);
+  std::array<std::array<double, 3>, 3> needed{};
+  for (int dy = -1; dy <= 1; ++dy) {
+    for (int dx = -1; dx <= 1; ++dx) {
+      const geo::TileKey neighbour = geo::Neighbour(key, dx, dy);
+      if (neighbour.y < 0 || neighbour.y >= rows) continue;
+      const dem::HeightRange range = source.RangeBound(neighbour);
+      needed[static_cast<std::size_t>(dy + 1)][static_cast<std::size_t>(dx + 1)] =
+          proto::NeededStep(range.min, range.max);
+    }
+  }
+  const dem::DemInfo& info = source.info();
+  const double pole_step =
+      proto::NeededStep(std::min(info.heights.min, info.floor), std::max(info.heights.max, info.floor));
+  return proto::MakeEdgeSteps(error_m, needed, pole_step, key.y == 0, key.y == rows - 1);
+}
+
+// Inserts what the wire's rounding pushed over the bound, until nothing that an insertion can mend is left.
+Result<MeshedTile> Finish(tin::TinMesh mesh, const proto::LatticeView& lattice, const proto::EdgeSteps& steps,
+                          double error_m, bool curved, const std::stop_token& stop) {
+  constexpr int kMaxRounds = 16;  // two are usual; a cliff may keep a sample out of reach for ever
+  for (int round = 1;; ++round) {
+    if (stop.stop_requested()) return Cancelled();
+    MeshedTile measured;
+    measured.tile = proto::QuantizeTile(lattice, mesh, steps);
+    const proto::TileError error = proto::MeasureTileError(lattice, measured.tile, error_m, curved);
+    measured.max_error_m = error.max_m;
+    if (error.misses.empty() || round == kMaxRounds ||
+        mesh.vertices.size() + error.misses.size() > proto::kMaxTileVertices) {
+      measured.mesh = std::move(mesh);
+      return measured;
+    }
+    mesh = tin::InsertSamples(mesh, error.misses);
+  }
+}
+
+// A mesh for the format's number of vertices: a coarser one inside the tile. The edges never depend on the inside: they
+// keep the threshold of the error that was asked for, exactly, since scaling by a power of two rounds nothing.
+Result<tin::TinMesh> CoarserInside(const tin::HeightField& field, const tin::GreedyOptions& plan, double& error_m,
+                                   const std::stop_token& stop) {
+  for (double coarser = 2;; coarser *= 2) {
+    tin::GreedyOptions options = plan;
+    options.record = false;
+    for (tin::BorderOptions& border : options.borders) border.scale = coarser;
+    tin::GreedyTriangulation greedy(field, std::move(options));
+    tin::GreedyGoal goal;
+    goal.max_error = error_m * coarser;
+    goal.max_points = proto::kMaxTileVertices + 1;
+    if (!greedy.Run(goal, stop)) return Cancelled();
+    if (greedy.vertex_count() > proto::kMaxTileVertices) continue;
+    error_m = goal.max_error;
+    return greedy.Mesh();
+  }
+}
+
+// The drop pass spends the whole bound it is given; what the wire's rounding then pushes over it would have to be
+// inserted again. A 32nd is kept for that.
+Result<tin::TinMesh> Compact(const tin::HeightField& field, const tin::TinMesh& mesh, const tin::GreedyOptions& plan,
+                             double error_m, const std::stop_token& stop) {
+  std::vector<std::uint16_t> wire;
+  for (int i = 0; i < field.width(); ++i) wire.push_back(proto::QuantizedPosition(i, field.width() - 1));
+  tin::DropOptions options;
+  options.max_error = error_m * 31 / 32;
+  options.curvature = plan.curvature;
+  options.wire_columns = wire;
+  options.wire_rows = wire;
+  std::optional<tin::TinMesh> dropped = tin::DropVertices(field, mesh, options, stop);
+  if (!dropped) return Cancelled();
+  return *std::move(dropped);
+}
+
+}  // namespace
+
+tin::HeightField FieldOf(const proto::LatticeView& lattice) {
+  const int side = lattice.cells() + 1;
+  std::vector<float> heights;
+  heights.reserve(static_cast<std::size_t>(side) * static_cast<std::size_t>(side));
+  for (int j = 0; j < side; ++j) {
+    for (int i = 0; i < side; ++i) heights.push_back(lattice.At(i, j));
+  }
+  auto field = tin::HeightField::Make(side, side, std::move(heights));
+  TERRACE_CHECK(field.has_value());  // every lattice height is finite
+  return *std::move(field);
+}
+
+tin::GreedyOptions PlanOf(const dem::DemSource& source, const proto::LatticeView& lattice, tin::Criterion criterion) {
+  tin::GreedyOptions plan = MakeRefinePlan(lattice, EdgeStepsOf(source, lattice.key, proto::kHeightResolution));
+  plan.criterion = criterion;
+  return plan;
+}
+
+Result<MeshedTile> MeshTile(const dem::DemSource& source, const proto::LatticeView& lattice,
+                            const tin::Refinement& refinement, const MeshRules& rules, double error_m,
+                            const std::stop_token& stop) {
+  const int level = lattice.key.level;
+  const proto::EdgeSteps steps = EdgeStepsOf(source, lattice.key, error_m);
+  Result<tin::TinMesh> mesh =
+      refinement.vertex_count() <= proto::kMaxTileVertices
+          ? refinement.MeshAt(error_m)
+          : CoarserInside(FieldOf(lattice), PlanOf(source, lattice, rules.criterion), error_m, stop);
+  if (mesh && rules.compact) {
+    mesh = Compact(FieldOf(lattice), *mesh, PlanOf(source, lattice, rules.criterion), error_m, stop);
+  }
+  if (!mesh) return tl::unexpected(std::move(mesh).error());
+  Result<MeshedTile> meshed = Finish(*std::move(mesh), lattice, steps, error_m, IsCurved(level, error_m), stop);
+  if (!meshed || proto::AllCounterClockwise(meshed->tile)) return meshed;
+
+  tin::GreedyOptions plain = PlanOf(source, lattice, tin::Criterion::kDelaunay);
+  plain.record = false;
+  const tin::HeightField field = FieldOf(lattice);
+  tin::GreedyTriangulation greedy(field, std::move(plain));
+  tin::GreedyGoal goal;
+  goal.max_error = error_m;
+  goal.max_points = proto::kMaxTileVertices;
+  if (!greedy.Run(goal, stop)) return Cancelled();
+  meshed = Finish(greedy.Mesh(), lattice, steps, error_m, IsCurved(level, error_m), stop);
+  if (meshed && !proto::AllCounterClockwise(meshed->tile)) {
+    return MakeError(ErrorCode::kInternal, "{}: a triangle turned over", geo::ToString(lattice.key));
+  }
+  return meshed;
+}
+
+}  // namespace terrace::server

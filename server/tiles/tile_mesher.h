@@ -1,0 +1,43 @@
+// From heights and their refinement to the mesh of a tile as it goes on the wire.
+#pragma once
+
+#include <stop_token>
+
+#include "engine/core/result.h"
+#include "engine/dem/dem_source.h"
+#include "engine/tin/greedy.h"
+#include "engine/tin/height_field.h"
+#include "engine/tin/refinement.h"
+#include "engine/tin/tin_mesh.h"
+#include "proto/lattice_view.h"
+#include "proto/quantized_mesh.h"
+
+namespace terrace::server {
+
+// How a dataset wants its tiles meshed.
+struct MeshRules {
+  tin::Criterion criterion = tin::Criterion::kDelaunay;
+  bool compact = false;  // with the drop pass (engine/tin/drop_pass.h)
+};
+
+struct MeshedTile {
+  tin::TinMesh mesh;
+  proto::QuantizedTile tile;
+  double max_error_m = 0;  // measured on the encoded integers
+};
+
+// The samples of a tile without the halo.
+tin::HeightField FieldOf(const proto::LatticeView& lattice);
+
+// How the tile is refined, for every error at once (refine_plan.h).
+tin::GreedyOptions PlanOf(const dem::DemSource& source, const proto::LatticeView& lattice, tin::Criterion criterion);
+
+// The tile's mesh to the error: replayed, dropped where the rules say so, quantized, measured, and mended where the
+// wire's rounding pushed a sample over the bound. `refinement` is PlanOf's run to this error or a finer one, or one
+// that ended above the format's number of vertices: then the inside is coarser, the edges are not. A tile with a
+// triangle that rounding would turn over is meshed by the plain rules. kCancelled: stopped.
+Result<MeshedTile> MeshTile(const dem::DemSource& source, const proto::LatticeView& lattice,
+                            const tin::Refinement& refinement, const MeshRules& rules, double error_m,
+                            const std::stop_token& stop);
+
+}  // namespace terrace::server

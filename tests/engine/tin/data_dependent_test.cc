@@ -1,0 +1,414 @@
+#include "engine/tin/data_dependent.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "engine/tin/border.h"
+#include "engine/tin/candidate_queue.h"
+#include "engine/tin/greedy.h"
+#include "engine/tin/mesh_error.h"
+#include "engine/tin/predicates.h"
+#include "engine/tin/quadrilateral.h"
+#include "engine/tin/squared_distances.h"
+#include "tests/engine/tin/mesh_laws.h"
+#include "tests/engine/tin/test_fields.h"
+#include "tests/support/test_data.h"
+
+namespace terrace::tin {
+namespace {
+
+constexpr float kVoid = std::numeric_limits<float>::quiet_NaN();
+constexpr std::array kMeasures = {FitMeasure::kSumMax, FitMeasure::kSumSquares, FitMeasure::kMaxMax,
+                                  FitMeasure::kNormals};
+
+GreedyOptions DataDependent(FitMeasure measure = FitMeasure::kSumMax, double qthresh = 0.5) {
+  GreedyOptions options;
+  options.criterion = Criterion::kDataDependent;
+  options.data_dependent = {measure, qthresh};
+  return options;
+}
+
+TinMesh MeshAt(const HeightField& field, const GreedyGoal& goal, const GreedyOptions& options) {
+  GreedyTriangulation tin(field, options);
+  EXPECT_TRUE(tin.Run(goal));
+  return tin.Mesh();
+}
+
+HeightField FieldWithVoids(int width, int height, std::uint64_t seed) {
+  Random random(seed);
+  return MakeField(width, height, [&](int x, int y) {
+    return random.Below(5) == 0 || (x - 9) * (x - 9) + (y - 7) * (y - 7) < 12 ? kVoid : HillHeight(x, y, seed);
+  });
+}
+
+// Whatever the slots are: triangles from their smallest vertex on, sorted.
+std::set<std::array<VertexId, 3>> Triangles(const TinMesh& mesh) {
+  std::set<std::array<VertexId, 3>> triangles;
+  for (std::array<VertexId, 3> triangle : mesh.triangles) {
+    std::rotate(triangle.begin(), std::min_element(triangle.begin(), triangle.end()), triangle.end());
+    triangles.insert(triangle);
+  }
+  return triangles;
+}
+
+testing::AssertionResult AreEqual(const TinMesh& a, const TinMesh& b) {
+  if (a.vertices != b.vertices) {
+    return testing::AssertionFailure() << a.vertices.size() << " and " << b.vertices.size() << " vertices";
+  }
+  if (Triangles(a) != Triangles(b)) return testing::AssertionFailure() << "triangles differ";
+  return testing::AssertionSuccess();
+}
+
+// Data-dependent greedy insertion with nothing that makes it quick: no queue, no fit that is remembered, every test in
+// full, every sample of the field looked at for every triangle.
+class NaiveDataDependent {
+ public:
+  NaiveDataDependent(const HeightField& field, DataDependentOptions options)
+      : field_(field), options_(options), open_(field), triangulation_(Corners(field)) {}
+
+  TinMesh Run(double max_error) {
+    for (;;) {
+      Candidate worst;
+      TriangleId at = 0;
+      for (TriangleId t = 0; t < triangulation_.triangle_count(); ++t) {
+        const auto [a, b, c] = triangulation_.triangle(t);
+        Candidate candidate = WorstOpen(At(a), At(b), At(c));
+        if (const Candidate border = WorstBorder(At(a), At(b), At(c)); Precedes(border, candidate)) candidate = border;
+        candidate.error = static_cast<double>(CandidateQueue::RoundUp(candidate.error));
+        if (Precedes(candidate, worst)) {
+          worst = candidate;
+          at = t;
+        }
+      }
+      if (worst.error <= max_error) return triangulation_.Mesh();
+      Insert(worst.sample, at);
+    }
+  }
+
+ private:
+  static std::array<Triangulation::Vertex, 4> Corners(const HeightField& field) {
+    const auto at = [&](int x, int y) -> Triangulation::Vertex {
+      return {{static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)}, field.VertexHeight(x, y)};
+    };
+    const int east = field.width() - 1, north = field.height() - 1;
+    return {at(0, 0), at(east, 0), at(east, north), at(0, north)};
+  }
+
+  Corner At(VertexId vertex) const {
+    const SamplePosition p = triangulation_.position(vertex);
+    return {p.x, p.y, static_cast<double>(triangulation_.height(vertex))};
+  }
+
+  Candidate WorstOpen(const Corner& a, const Corner& b, const Corner& c) const {
+    const double ux = a.x - c.x, uy = a.y - c.y, vx = b.x - c.x, vy = b.y - c.y;
+    const double d = ux * vy - uy * vx;
+    const double per_x = vy * (a.z - c.z) - uy * (b.z - c.z), per_y = ux * (b.z - c.z) - vx * (a.z - c.z);
+    double furthest = -1;
+    std::uint32_t sample = kNoSample;
+    for (int y = 0; y < field_.height(); ++y) {
+      for (int x = 0; x < field_.width(); ++x) {
+        const double px = x - c.x, py = y - c.y;
+        const double of_a = px * vy - py * vx, of_b = ux * py - uy * px;
+        if (of_a < 0 || of_b < 0 || d - of_a - of_b < 0) continue;
+        const auto height =
+            static_cast<double>(open_.At({static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)}));
+        const double numerator = std::abs(d * (height - c.z) - (per_x * px + per_y * py));
+        if (!(numerator > furthest)) continue;
+        furthest = numerator;
+        sample = static_cast<std::uint32_t>(y * field_.width() + x);
+      }
+    }
+    return {std::max(furthest, 0.0) / d, sample};
+  }
+
+  Candidate WorstBorder(const Corner& a, const Corner& b, const Corner& c) const {
+    Candidate worst;
+    const int east = field_.width() - 1, north = field_.height() - 1;
+    for (const auto& [p, q] : {std::pair(a, b), {b, c}, {c, a}}) {
+      const bool on_border = (p.x == q.x && (p.x == 0 || p.x == east)) || (p.y == q.y && (p.y == 0 || p.y == north));
+      if (!on_border) continue;
+      if (const Candidate on_edge = WorstBorderSample(field_, p, q, {}); Precedes(on_edge, worst)) worst = on_edge;
+    }
+    return worst;
+  }
+
+  double Error(const Corner& a, const Corner& b, const Corner& c) const {
+    if (options_.measure == FitMeasure::kSumSquares) return SquaredDistances(field_, {a, b, c});
+    return std::max(WorstOpen(a, b, c).error, WorstBorder(a, b, c).error);
+  }
+
+  bool Swaps(const Quadrilateral& q, const Corner& p, TriangleId beyond) const {
+    const ShapeQuality quality = ShapeQualityOf(q);
+    const bool is_shaped_better = quality.pw > quality.uv;
+    if (std::min(quality.uv, quality.pw) <= options_.qthresh * std::max(quality.uv, quality.pw)) {
+      return is_shaped_better;
+    }
+    if (options_.measure == FitMeasure::kNormals) return BendsLessAlongPw(q);
+    const auto [a, b, c] = triangulation_.triangle(beyond);
+    const Corner u = At(q.u.id), v = At(q.v.id), w = At(q.w.id);
+    const double uvp = Error(u, v, p), vuw = Error(At(a), At(b), At(c)), uwp = Error(u, w, p), wvp = Error(w, v, p);
+    const bool takes_larger = options_.measure == FitMeasure::kMaxMax;
+    const double now = takes_larger ? std::max(uvp, vuw) : uvp + vuw;
+    const double then = takes_larger ? std::max(uwp, wvp) : uwp + wvp;
+    return then < now || (then == now && now > 0 && is_shaped_better);
+  }
+
+  void Insert(std::uint32_t sample, TriangleId triangle) {
+    const auto width = static_cast<std::uint32_t>(field_.width());
+    const SamplePosition at{static_cast<std::uint16_t>(sample % width), static_cast<std::uint16_t>(sample / width)};
+    open_.Close(at);
+    const float height = field_.At(at.x, at.y);
+    const Corner p{at.x, at.y, static_cast<double>(height)};
+    triangulation_.Insert({at, height}, triangle,
+                          [&](const RingVertex& u, const RingVertex& v, const RingVertex& w, HalfEdgeId back) {
+                            return Cross(u, v) == 0 || (Sees(u, v, w) && Swaps({u, v, w, height}, p, back / 4));
+                          });
+  }
+
+  const HeightField& field_;
+  DataDependentOptions options_;
+  OpenSamples open_;
+  Triangulation triangulation_;
+};
+
+TEST(DataDependent, ChoosesAsTheFullTestOfEveryQuadrilateral) {
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    Random random(seed);
+    const int width = 3 + random.Below(14), height = 3 + random.Below(14);
+    const HeightField field = seed % 4 == 0   ? NoiseField(width, height, seed)
+                              : seed % 4 == 1 ? StepField(width, height, 3, seed)
+                              : seed % 4 == 2 ? HillField(width, height, seed)
+                                              : FieldWithVoids(width, height, seed);
+    for (const FitMeasure measure : kMeasures) {
+      for (const double qthresh : {0.0, 0.5, 1.0}) {
+        ASSERT_TRUE(AreEqual(MeshAt(field, {0.5}, DataDependent(measure, qthresh)),
+                             NaiveDataDependent(field, {measure, qthresh}).Run(0.5)))
+            << seed << ", measure " << static_cast<int>(measure) << ", " << qthresh;
+      }
+    }
+  }
+}
+
+TEST(DataDependent, KeepsTheBoundAtEverySampleByEveryMeasure) {
+  const HeightField fields[] = {HillField(65, 65, 1), NoiseField(40, 33, 2), StepField(30, 30, 50, 3),
+                                FieldWithVoids(40, 40, 4)};
+  for (const FitMeasure measure : kMeasures) {
+    for (const double qthresh : {0.0, 0.5, 1.0}) {
+      for (const HeightField& field : fields) {
+        for (const double bound : {0.0, 0.3, 9.0, 60.0}) {
+          const TinMesh mesh = MeshAt(field, {bound}, DataDependent(measure, qthresh));
+          EXPECT_TRUE(IsWithin(field, mesh, bound));
+          EXPECT_TRUE(CoversExactly(field, mesh));
+        }
+      }
+    }
+  }
+}
+
+TEST(DataDependent, KeepsTheBoundOnRandomFields) {
+  for (std::uint64_t seed = 0; seed < 300; ++seed) {
+    Random random(seed);
+    const int width = 2 + random.Below(20), height = 2 + random.Below(20), range = 1 + random.Below(40);
+    const HeightField field = StepField(width, height, range, seed);
+    const double bound = random.Below(4) * 0.125 * range;
+    const TinMesh mesh = MeshAt(field, {bound}, DataDependent(kMeasures[seed % 4], random.Unit()));
+    ASSERT_TRUE(IsWithin(field, mesh, bound)) << seed;
+    ASSERT_TRUE(CoversExactly(field, mesh)) << seed;
+  }
+}
+
+TEST(DataDependent, CatchesSpikesCliffsAndStrips) {
+  const HeightField spike = MakeField(33, 33, [](int x, int y) { return x == 20 && y == 7 ? 500.f : 10.f; });
+  const HeightField cliff = MakeField(33, 33, [](int x, int y) { return x > 14 + y % 3 ? 300.f : 0.f; });
+  const HeightField strip = NoiseField(2, 200, 4), flat_strip = NoiseField(200, 2, 5), row = NoiseField(3, 50, 6);
+  for (const HeightField* field : {&spike, &cliff, &strip, &flat_strip, &row}) {
+    for (const FitMeasure measure : kMeasures) {
+      for (const double bound : {0.0, 1.0, 20.0}) {
+        const TinMesh mesh = MeshAt(*field, {bound}, DataDependent(measure));
+        EXPECT_TRUE(IsWithin(*field, mesh, bound));
+        EXPECT_TRUE(CoversExactly(*field, mesh));
+      }
+    }
+  }
+}
+
+TEST(DataDependent, SurvivesExtremeHeights) {
+  const float largest = std::numeric_limits<float>::max(), smallest = std::numeric_limits<float>::denorm_min();
+  for (const FitMeasure measure : kMeasures) {
+    for (const float scale : {1e30f, 1e-30f, largest / 2, smallest}) {
+      Random random(1);
+      const HeightField field =
+          MakeField(20, 20, [&](int, int) { return static_cast<float>(random.Below(3) - 1) * scale; });
+      const double bound = static_cast<double>(scale) / 4;
+      const TinMesh mesh = MeshAt(field, {bound}, DataDependent(measure));
+      EXPECT_LE(MeasureError(field, mesh).max, bound * (1 + 1e-9));
+      EXPECT_TRUE(CoversExactly(field, mesh));
+    }
+  }
+}
+
+TEST(DataDependent, TakesTheSameBorderVerticesAsDelaunay) {
+  for (std::uint64_t seed = 0; seed < 6; ++seed) {
+    const HeightField field = seed % 2 == 0 ? HillField(65, 49, seed) : StepField(33, 40, 30, seed);
+    for (const FitMeasure measure : kMeasures) {
+      GreedyOptions options = DataDependent(measure);
+      options.borders.fill({1.25, 0.0005, 0.125});
+      for (const double bound : {1.0, 4.0, 20.0}) {
+        const TinMesh mesh = MeshAt(field, {bound}, options);
+        GreedyOptions delaunay = options;
+        delaunay.criterion = Criterion::kDelaunay;
+        const TinMesh other = MeshAt(field, {bound}, delaunay);
+        for (const Side side : {Side::kSouth, Side::kEast, Side::kNorth, Side::kWest}) {
+          EXPECT_EQ(BorderVertices(field, mesh, side), BorderVertices(field, other, side));
+        }
+      }
+    }
+  }
+}
+
+GreedyOptions WithSeedsAndCurvature(GreedyOptions options) {
+  options.seeds = {{80, 32}, {30, 16}, {12, 8}, {3, 4}};
+  options.borders.fill({2, 0.001});
+  options.curvature = {std::vector<double>(65, 900.0), 1000.0, 6.4e4};
+  return options;
+}
+
+TEST(DataDependent, GoesOnFromACoarserRunToTheMeshOfOneRun) {
+  const HeightField field = HillField(65, 65, 9);
+  for (const FitMeasure measure : kMeasures) {
+    for (const GreedyOptions& options : {DataDependent(measure), WithSeedsAndCurvature(DataDependent(measure))}) {
+      GreedyTriangulation tin(field, options);
+      for (const double error : {50.0, 20.0, 10.0, 5.0, 1.0}) {
+        EXPECT_TRUE(tin.Run({error}));
+        EXPECT_LE(tin.CurrentError(), error);
+        EXPECT_EQ(tin.Mesh().triangles, MeshAt(field, {error}, options).triangles) << error;
+      }
+    }
+  }
+}
+
+TEST(DataDependent, ReplaysEveryPrefixOfARun) {
+  for (const HeightField& field : {HillField(65, 65, 9), StepField(65, 65, 40, 2)}) {
+    for (const FitMeasure measure : kMeasures) {
+      for (GreedyOptions options : {DataDependent(measure), WithSeedsAndCurvature(DataDependent(measure))}) {
+        options.record = true;
+        GreedyTriangulation tin(field, options);
+        EXPECT_TRUE(tin.Run({1}));
+        const Refinement refinement = tin.MakeRefinement();
+        EXPECT_TRUE(AreEqual(refinement.MeshOf(refinement.vertex_count()), tin.Mesh()));
+        for (const double error : {50.0, 20.0, 10.0, 5.0}) {
+          EXPECT_TRUE(AreEqual(refinement.MeshAt(error), MeshAt(field, {error}, options))) << error;
+        }
+      }
+    }
+  }
+}
+
+// The refinement numbers slots anew.
+TEST(DataDependent, ContinuesARefinementToTheRefinementOfOneRun) {
+  for (const HeightField& field : {HillField(65, 65, 9), StepField(65, 65, 9, 2), FieldWithVoids(65, 65, 3)}) {
+    for (const FitMeasure measure : kMeasures) {
+      for (GreedyOptions options : {DataDependent(measure), WithSeedsAndCurvature(DataDependent(measure))}) {
+        options.record = true;
+        if (!options.seeds.empty() && field.has_voids()) continue;
+        GreedyTriangulation coarse(field, options), fine(field, options);
+        EXPECT_TRUE(coarse.Run({20}));
+        EXPECT_TRUE(fine.Run({1}));
+        GreedyTriangulation continued(field, options, coarse.MakeRefinement());
+        EXPECT_TRUE(continued.Run({1}));
+        EXPECT_TRUE(AreEqual(continued.Mesh(), fine.Mesh()));
+        EXPECT_EQ(continued.MakeRefinement(), fine.MakeRefinement());
+      }
+    }
+  }
+}
+
+TEST(DataDependent, StopsAtTheFirstMeshWithinTheRootMeanSquare) {
+  const HeightField field = HillField(65, 65, 6);
+  for (const double rms : {8.0, 3.0, 0.7}) {
+    const TinMesh mesh = MeshAt(field, {0, std::numeric_limits<std::size_t>::max(), rms}, DataDependent());
+    EXPECT_LE(MeasureError(field, mesh).rms, rms * (1 + 1e-12));
+    EXPECT_TRUE(AreEqual(mesh, MeshAt(field, {0, mesh.vertices.size()}, DataDependent())));
+    EXPECT_GT(MeasureError(field, MeshAt(field, {0, mesh.vertices.size() - 1}, DataDependent())).rms,
+              rms * (1 - 1e-12));
+  }
+}
+
+TEST(DataDependent, NeedsFewerVerticesThanDelaunay) {
+  const HeightField hills = MakeField(129, 129, [](int x, int y) {
+    return static_cast<float>(40 * std::sin((x + 2 * y) / 11.0) + 20 * std::cos((3 * x - y) / 17.0));
+  });
+  for (const double error : {1.0, 4.0}) {
+    const auto delaunay = static_cast<double>(MeshAt(hills, {error}, {}).vertices.size());
+    for (const FitMeasure measure : {FitMeasure::kSumMax, FitMeasure::kSumSquares, FitMeasure::kMaxMax}) {
+      EXPECT_LT(static_cast<double>(MeshAt(hills, {error}, DataDependent(measure)).vertices.size()), 0.95 * delaunay);
+    }
+  }
+}
+
+TEST(DataDependent, IsAsCloseOnCraterLakeAsTheAuthorsProgram) {
+  constexpr const char* kName = "crater.tif";
+  if (!test_support::TestDataPath(kName)) GTEST_SKIP() << test_support::MissingTestData(kName);
+  const std::optional<test_support::TestRaster> raster = test_support::ReadTestRaster(kName);
+  ASSERT_TRUE(raster);
+  const HeightField crater = MakeField(raster->width, raster->height, [&](int x, int y) {
+    return raster->heights[static_cast<std::size_t>(y * raster->width + x)];
+  });
+  struct Column {
+    FitMeasure measure;
+    std::array<double, 4> rms;  // at 1542, 5000, 7711 and 20000 vertices
+  };
+  for (const auto& [measure, expected] : {Column{FitMeasure::kSumMax, {6.2564, 2.5224, 1.7434, 0.76026}},
+                                          Column{FitMeasure::kSumSquares, {6.3631, 2.5081, 1.7445, 0.74759}},
+                                          Column{FitMeasure::kMaxMax, {6.6430, 2.6140, 1.8270, 0.77380}},
+                                          Column{FitMeasure::kNormals, {7.4442, 3.0737, 2.1425, 0.91195}}}) {
+    GreedyTriangulation tin(crater, DataDependent(measure));
+    for (std::size_t i = 0; i < expected.size(); ++i) {
+      constexpr std::array<std::size_t, 4> kPoints = {1542, 5000, 7711, 20000};
+      EXPECT_TRUE(tin.Run({0, kPoints[i]}));
+      const MeshError error = MeasureError(crater, tin.Mesh());
+      EXPECT_LT(error.rms, 1.01 * expected[i]) << static_cast<int>(measure) << ' ' << kPoints[i];
+      EXPECT_LE(error.max, tin.CurrentError());
+    }
+  }
+}
+
+TEST(Quadrilateral, ComparesShapesByAreasOverDiameters) {
+  // Both cuts of a rectangle are alike.
+  const Quadrilateral rectangle{{1, 4, 0, 0}, {2, 0, 2, 0}, {3, 4, 2, 0}, 0};
+  EXPECT_EQ(ShapeQualityOf(rectangle).uv, ShapeQualityOf(rectangle).pw);
+  // Corners p (0, 0), u (2, 1), w (1, 16), v (0, 1): twice the areas are 2 and 30 with diameters 2 and 15 along u-v,
+  // but 31 and 1 with diameters 16 and 16 along p-w.
+  const Quadrilateral kite{{1, 2, 1, 0}, {2, 0, 1, 0}, {3, 1, 16, 0}, 0};
+  const ShapeQuality quality = ShapeQualityOf(kite);
+  EXPECT_GT(quality.uv, quality.pw);
+}
+
+TEST(Quadrilateral, BendsLessWhereThreeCornersAreLevel) {
+  // A square with one corner lifted: the cut that leaves the other three in one triangle.
+  const auto lifted = [](float u, float v, float w, float p) {
+    return Quadrilateral{{1, 4, 0, u}, {2, 0, 4, v}, {3, 4, 4, w}, p};
+  };
+  EXPECT_TRUE(BendsLessAlongPw(lifted(9, 0, 0, 0)));
+  EXPECT_TRUE(BendsLessAlongPw(lifted(0, 9, 0, 0)));
+  EXPECT_FALSE(BendsLessAlongPw(lifted(0, 0, 9, 0)));
+  EXPECT_FALSE(BendsLessAlongPw(lifted(0, 0, 0, 9)));
+  EXPECT_FALSE(BendsLessAlongPw(lifted(4, 8, 12, 0)));  // a plane
+}
+
+TEST(DataDependentDeathTest, RefusesAQthreshOutsideItsRange) {
+  const HeightField field = HillField(9, 9, 1);
+  EXPECT_DEATH(GreedyTriangulation(field, DataDependent(FitMeasure::kSumMax, 1.5)), "check failed");
+  EXPECT_DEATH(GreedyTriangulation(field, DataDependent(FitMeasure::kSumMax, std::nan(""))), "check failed");
+}
+
+}  // namespace
+}  // namespace terrace::tin
