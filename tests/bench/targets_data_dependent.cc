@@ -97,7 +97,8 @@ Table MeasureDataDependentQuality(Environment& environment) {
     const char *name, *file;
     std::array<std::size_t, 3> points;
   };
-  for (const Case& c : {Case{"crater", "crater.tif", {1542, 7711, 50000}},
+  for (const Case& c : {Case{"jacksboro", "jacksboro.tif", {1386, 6932, 50000}},
+                        {"crater", "crater.tif", {1542, 7711, 50000}},
                         {"west-us", "westUS.tif", {10486, 52429, 200000}},
                         {"ntc", "ntc.tif", {10486, 52429, 200000}}}) {
     for (const std::size_t points : c.points) {
