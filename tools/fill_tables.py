@@ -8,7 +8,8 @@ RESULTS.json is what terrace_tin_bench or terrace_paper wrote. In the page, what
     <!-- table T1 -->
     <!-- end -->
 
-becomes the table of that id, and between `<!-- context -->` and `<!-- end -->` the machine and the compiler. Tables that
+becomes the table of that id, and between `<!-- context -->` and `<!-- end -->` the machine, its load when the run began, and
+the compiler. Tables that
 the file does not hold stay as they are. An id of the file without a place in the page is an error.
 """
 import json
@@ -20,7 +21,8 @@ BLOCK = re.compile(r"^<!-- (table (?P<id>[\w-]+)|context) -->\n.*?^<!-- end -->\
 
 
 def context_line(context):
-    return f"{context['cpu']}; {context['compiler']}, `{context['flags']}`; commit {context['commit']}, {context['date'][:10]}.\n"
+    return (f"{context['cpu']}, {context['cores']} cores, load {context['load']}; {context['compiler']}, "
+            f"`{context['flags']}`; commit {context['commit']}, {context['date'][:10]}.\n")
 
 
 def main():

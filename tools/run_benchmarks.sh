@@ -3,8 +3,11 @@
 # (executables named *_bench). Results go to build/bench/results/NAME.json, with the machine, the compiler and the commit.
 #
 #   tools/run_benchmarks.sh [JOBS] [options of terrace_tin_bench, such as --peer 'COMMAND' or --filter 'T1 ']
+#   tools/run_benchmarks.sh --docs [JOBS] [options]     and puts the tables into docs/performance.md
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
+docs=false
+if [[ ${1:-} == --docs ]]; then docs=true; shift; fi
 jobs=$(nproc)
 if [[ ${1:-} =~ ^[0-9]+$ ]]; then jobs=$1; shift; fi
 
@@ -13,6 +16,7 @@ cmake --build build/bench -j "$jobs" --target benchmarks
 results=build/bench/results
 mkdir -p "$results"
 build/bench/tests/bench/terrace_tin_bench --json "$results/tin.json" "$@"
+if $docs; then tools/fill_tables.py "$results/tin.json" docs/performance.md; fi
 
 cpu=$(sed -n 's/^model name[[:space:]]*: //p' /proc/cpuinfo | head -n 1)
 compiler=$(c++ --version | head -n 1)

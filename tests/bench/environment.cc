@@ -39,7 +39,7 @@ std::vector<std::string> SpeedColumns() {
   return {"case", "ours ms", "ours median", "peer ms", "peer median", "ratio", "aim", "vertices", "peer's", "more"};
 }
 
-void AddRow(Table& table, const std::string& name, const Contest& contest, const std::string& target) {
+std::vector<Cell> SpeedRow(const std::string& name, const Contest& contest, const std::string& target) {
   const Score& ours = contest.ours;
   std::vector<Cell> row{name, Milliseconds(ours.min_seconds), Milliseconds(ours.median_seconds)};
   if (contest.theirs) {
@@ -51,8 +51,7 @@ void AddRow(Table& table, const std::string& name, const Contest& contest, const
   } else {
     row.insert(row.end(), {{}, {}, {}, target, Count(ours.points), {}, {}});
   }
-  if (contest.rms) row.push_back(Number(*contest.rms, 4));
-  table.Add(std::move(row));
+  return row;
 }
 
 }  // namespace terrace::bench

@@ -44,13 +44,12 @@ Contender PeerContender(const std::string& command);
 double CheckMesh(const std::string& name, const tin::HeightField& field, const tin::GreedyGoal& goal,
                  const tin::TinMesh& mesh);
 
-// A race of ours against a peer, if there is one, as a row of SpeedColumns(), and of one column more for the RMS.
+// A race of ours against a peer, if there is one, as a row of SpeedColumns().
 std::vector<std::string> SpeedColumns();
 struct Contest {
   Score ours;
   std::optional<Score> theirs;
-  std::optional<double> rms;
 };
-void AddRow(Table& table, const std::string& name, const Contest& contest, const std::string& target);
+std::vector<Cell> SpeedRow(const std::string& name, const Contest& contest, const std::string& target);
 
 }  // namespace terrace::bench

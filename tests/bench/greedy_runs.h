@@ -1,23 +1,53 @@
 // The engine as a contender.
 #pragma once
 
+#include <functional>
+#include <utility>
 #include <vector>
 
+#include "engine/tin/block_joiner.h"
+#include "engine/tin/field_cut.h"
 #include "engine/tin/greedy.h"
 #include "tests/bench/cpu_clock.h"
 #include "tests/bench/race.h"
 
 namespace terrace::bench {
 
-inline tin::TinMesh MeshOf(const tin::HeightField& field, const tin::GreedyGoal& goal) {
-  tin::GreedyTriangulation tin(field);
+using Mesher = std::function<tin::TinMesh(const tin::HeightField&, const tin::GreedyGoal&)>;
+
+// From two triangles to the mesh.
+inline tin::TinMesh MeshOf(const tin::HeightField& field, const tin::GreedyGoal& goal,
+                           const tin::GreedyOptions& options = {}) {
+  tin::GreedyTriangulation tin(field, options);
   tin.Run(goal);
   return tin.Mesh();
 }
 
-// From two triangles to the mesh.
-inline void MeshFromScratch(const tin::HeightField& field, const tin::GreedyGoal& goal, Runs& runs) {
-  runs.seconds.push_back(SecondsOf([&] { runs.points = MeshOf(field, goal).vertices.size(); }));
+inline Mesher GreedyMesher(const tin::GreedyOptions& options = {}) {
+  return [options](const tin::HeightField& field, const tin::GreedyGoal& goal) { return MeshOf(field, goal, options); };
+}
+
+// The same, cut into blocks where the engine thinks that this pays; all of them on this thread. An error is the goal.
+inline tin::TinMesh MeshInBlocks(const tin::HeightField& field, const tin::GreedyGoal& goal) {
+  const tin::FieldCut cut = tin::FieldCut::For(field, goal.max_error);
+  tin::BlockJoiner joiner(cut);
+  while (joiner.added() < cut.size()) {
+    joiner.Add(*tin::MeshBlock(field, cut.block(joiner.added()), goal.max_error));
+  }
+  return std::move(joiner).Take();
+}
+
+inline Contender Timed(Mesher mesher) {
+  return [mesher = std::move(mesher)](const tin::HeightField& field, const tin::GreedyGoal& goal, Runs& runs) {
+    runs.seconds.push_back(SecondsOf([&] { runs.points = mesher(field, goal).vertices.size(); }));
+  };
+}
+
+inline tin::GreedyOptions DataDependent(tin::FitMeasure measure = tin::FitMeasure::kSumMax, double qthresh = 0.5) {
+  tin::GreedyOptions options;
+  options.criterion = tin::Criterion::kDataDependent;
+  options.data_dependent = {measure, qthresh};
+  return options;
 }
 
 inline std::vector<const tin::HeightField*> PointersTo(const std::vector<tin::HeightField>& fields) {

@@ -1,10 +1,13 @@
 #include "tests/bench/machine.h"
 
 #include <array>
+#include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <ctime>
 #include <fstream>
 #include <memory>
+#include <thread>
 
 namespace terrace::bench {
 namespace {
@@ -27,6 +30,12 @@ std::string Date() {
   return text.data();
 }
 
+nlohmann::ordered_json Load() {
+  double one_minute = 0;
+  if (getloadavg(&one_minute, 1) != 1) return "unknown";
+  return std::round(one_minute * 10) / 10;
+}
+
 }  // namespace
 
 std::string FirstLineOf(const std::string& command) {
@@ -41,6 +50,8 @@ std::string FirstLineOf(const std::string& command) {
 nlohmann::ordered_json MachineContext() {
   const std::string commit = FirstLineOf("git -C '" TERRACE_SOURCE_DIR "' describe --always --dirty 2> /dev/null");
   return {{"cpu", CpuModel()},
+          {"cores", std::thread::hardware_concurrency()},
+          {"load", Load()},
           {"compiler", TERRACE_BENCH_COMPILER},
           {"flags", TERRACE_BENCH_FLAGS},
           {"commit", commit.empty() ? "unknown" : commit},

@@ -6,7 +6,8 @@
 
 namespace terrace::bench {
 
-// {"cpu", "compiler", "flags", "commit", "date"}; "unknown" for what cannot be found out.
+// {"cpu", "cores", "load", "compiler", "flags", "commit", "date"}; "unknown" for what cannot be found out. "load": how
+// many threads wanted a core in the minute before.
 nlohmann::ordered_json MachineContext();
 
 // The first line that a shell command prints; empty if it fails.

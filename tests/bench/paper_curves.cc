@@ -7,8 +7,9 @@
 
 #include "engine/tin/greedy.h"
 #include "engine/tin/mesh_error.h"
-#include "tests/bench/environment.h"
+#include "tests/bench/greedy_runs.h"
 #include "tests/bench/paper.h"
+#include "tests/bench/paper_models.h"
 #include "tests/bench/paper_reference.h"
 #include "tests/bench/parallel_insertion.h"
 #include "tests/bench/rasters.h"
@@ -16,34 +17,6 @@
 
 namespace terrace::bench {
 namespace {
-
-tin::HeightField Model(const std::string& file) {
-  std::optional<tin::HeightField> field = ReadField(file);
-  if (!field) Die("the paper's elevation models are needed; set TERRACE_TEST_DATA");
-  return *std::move(field);
-}
-
-// 1, 2, 5, 10, ... times 100, up to a third of the samples: the axis of the curves.
-std::vector<std::size_t> VertexCounts(const tin::HeightField& field) {
-  const auto samples = static_cast<std::size_t>(field.width()) * static_cast<std::size_t>(field.height());
-  std::vector<std::size_t> counts;
-  for (std::size_t decade = 100; decade <= samples / 3; decade *= 10) {
-    for (const std::size_t step : {1, 2, 5}) {
-      if (decade * step <= samples / 3) counts.push_back(decade * step);
-    }
-  }
-  return counts;
-}
-
-Series GreedyCurve(const tin::HeightField& field) {
-  Series series{"greedy, Delaunay", {}};
-  tin::GreedyTriangulation tin(field);
-  for (const std::size_t points : VertexCounts(field)) {
-    tin.Run({0, points});
-    series.points.emplace_back(points, tin::MeasureError(field, tin.Mesh()).rms);
-  }
-  return series;
-}
 
 Series UniformCurve(const tin::HeightField& field) {
   Series series{"uniform grid", {}};
@@ -54,17 +27,24 @@ Series UniformCurve(const tin::HeightField& field) {
   return series;
 }
 
-// Scape's Delaunay meshes, where they are known.
-std::optional<Series> ScapeMarks(const std::string& id) {
-  Series marks{"Scape, Delaunay", {}, true};
+// Scape's meshes, where they are known.
+void AddScapeMarks(const std::string& id, Figure& figure) {
+  Series delaunay{"Scape, Delaunay", {}, true}, data_dependent{"Scape, data-dependent", {}, true};
   if (id == "crater") {
-    for (const reference::CraterRow& row : reference::kCrater) marks.points.emplace_back(row.points, row.delaunay_rms);
+    for (const reference::CraterRow& row : reference::kCrater) {
+      delaunay.points.emplace_back(row.points, row.delaunay_rms);
+      data_dependent.points.emplace_back(row.points, row.sum_max_rms);
+    }
   } else if (id == "ashby") {
-    for (const reference::AshbyRow& row : reference::kAshby) marks.points.emplace_back(row.points, row.delaunay_rms);
+    for (const reference::AshbyRow& row : reference::kAshby) {
+      delaunay.points.emplace_back(row.points, row.delaunay_rms);
+      data_dependent.points.emplace_back(row.points, row.data_dependent_rms);
+    }
   } else {
-    return std::nullopt;
+    return;
   }
-  return marks;
+  figure.series.push_back(std::move(delaunay));
+  figure.series.push_back(std::move(data_dependent));
 }
 
 std::string StrategyName(const reference::ParallelRow& row) {
@@ -101,8 +81,7 @@ void ParallelInsertions(Findings& findings) {
   Table table("parallel",
               "Crater: RMS error in m after the pass that reached m vertices (vertices), Scape's in brackets",
               {"strategy", "m = 1542", "m = 5000", "m = 7711"});
-  figure.series.push_back(GreedyCurve(crater));
-  figure.series.back().name = "sequential";
+  figure.series.push_back(GreedyCurve(crater, "sequential", {}));
   std::erase_if(figure.series.back().points, [](const auto& point) { return point.first > 10000; });
   std::vector<Cell> sequential{"sequential"};
   tin::GreedyTriangulation tin(crater);
@@ -150,14 +129,17 @@ void CraterQuality(Findings& findings) {
 void QualityOverVertices(Findings& findings) {
   const tin::HeightField ashby = Model("ashby.tif");
   Table table("ashby", "Ashby: RMS error in m at m vertices, Scape's in brackets (figure 15)",
-              {"m", "Delaunay", "uniform grid"});
-  tin::GreedyTriangulation tin(ashby);
+              {"m", "Delaunay", "data-dependent", "uniform grid"});
+  tin::GreedyTriangulation tin(ashby), data_dependent(ashby, DataDependent());
   for (const reference::AshbyRow& row : reference::kAshby) {
     tin.Run({0, row.points});
     const double rms = tin::MeasureError(ashby, tin.Mesh()).rms;
+    data_dependent.Run({0, row.points});
+    const double fitted = tin::MeasureError(ashby, data_dependent.Mesh()).rms;
     const double grid = tin::MeasureError(ashby, UniformGridOf(ashby, row.points)).rms;
     table.Add({Count(row.points),
                {fmt::format("{:.4g} [{:.4g}]", rms, row.delaunay_rms), rms},
+               {fmt::format("{:.4g} [{:.4g}]", fitted, row.data_dependent_rms), fitted},
                {fmt::format("{:.4g} [{:.4g}]", grid, row.uniform_rms), grid}});
   }
   findings.tables.push_back(std::move(table));
@@ -171,8 +153,9 @@ void QualityOverVertices(Findings& findings) {
                   fmt::format("{}: greedy insertion and uniform grids", title),
                   "vertices",
                   "RMS error, m",
-                  {GreedyCurve(field), UniformCurve(field)}};
-    if (std::optional<Series> marks = ScapeMarks(id)) figure.series.push_back(*std::move(marks));
+                  {GreedyCurve(field, kDelaunayName, {}), GreedyCurve(field, kDataDependentName, DataDependent()),
+                   UniformCurve(field)}};
+    AddScapeMarks(id, figure);
     findings.figures.push_back(std::move(figure));
   }
 }

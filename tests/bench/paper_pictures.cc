@@ -1,25 +1,19 @@
 #include <fmt/format.h>
 
 #include <array>
-#include <optional>
 
 #include "engine/tin/greedy.h"
 #include "tests/bench/environment.h"
+#include "tests/bench/greedy_runs.h"
 #include "tests/bench/paper.h"
+#include "tests/bench/paper_models.h"
 #include "tests/bench/pictures.h"
-#include "tests/bench/rasters.h"
 
 namespace terrace::bench {
 namespace {
 
 void Write(const Picture& picture, const std::string& path) {
   if (const auto written = WritePng(picture, path); !written) Die(written.error().message);
-}
-
-tin::HeightField Model(const std::string& file, const Window& window) {
-  std::optional<tin::HeightField> field = ReadField(file, window);
-  if (!field) Die("the paper's elevation models are needed; set TERRACE_TEST_DATA");
-  return *std::move(field);
 }
 
 std::size_t PercentOf(const tin::HeightField& field, std::size_t percent) {
@@ -29,7 +23,7 @@ std::size_t PercentOf(const tin::HeightField& field, std::size_t percent) {
 }  // namespace
 
 void DrawPictures(const std::string& folder) {
-  const tin::HeightField crater = Model("crater.tif", {});
+  const tin::HeightField crater = Model("crater.tif");
   constexpr double kCraterSpacing = 30;
   Write(Hillshade(crater, kCraterSpacing), folder + "/crater.png");
   tin::GreedyTriangulation tin(crater);
@@ -39,6 +33,9 @@ void DrawPictures(const std::string& folder) {
     Write(Hillshade(SampledMesh(crater, mesh), kCraterSpacing), fmt::format("{}/crater-{}.png", folder, percent));
     Write(Wireframe(crater, mesh, 2), fmt::format("{}/crater-{}-mesh.png", folder, percent));
   }
+  const tin::TinMesh fitted = MeshOf(crater, {0, PercentOf(crater, 1)}, DataDependent());
+  Write(Hillshade(SampledMesh(crater, fitted), kCraterSpacing), folder + "/crater-1-data-dependent.png");
+  Write(Wireframe(crater, fitted, 2), folder + "/crater-1-data-dependent-mesh.png");
 
   const tin::HeightField area = Model("westUS.tif", {500, 200, 257, 257});
   constexpr double kWestUsSpacing = 90;

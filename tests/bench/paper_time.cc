@@ -7,10 +7,9 @@
 
 #include "engine/tin/greedy.h"
 #include "tests/bench/cpu_clock.h"
-#include "tests/bench/environment.h"
 #include "tests/bench/paper.h"
+#include "tests/bench/paper_models.h"
 #include "tests/bench/parallel_insertion.h"
-#include "tests/bench/rasters.h"
 
 namespace terrace::bench {
 namespace {
@@ -79,20 +78,19 @@ void TimeOverVertices(Findings& findings) {
   std::vector<Timing> all;
   Series naive;
   for (const int side : {128, 256, 512, 1024}) {
-    const std::optional<tin::HeightField> field = ReadField("westUS.tif", {0, 0, side, side});
-    if (!field) Die("the paper's elevation models are needed; set TERRACE_TEST_DATA");
+    const tin::HeightField field = Model("westUS.tif", {0, 0, side, side});
     std::vector<std::size_t> counts;
     for (std::size_t count = 100; count <= static_cast<std::size_t>(side) * static_cast<std::size_t>(side) / 5;
          count *= 2) {
       counts.push_back(count);
     }
     Series series{fmt::format("n = {} x {}", side, side), {}};
-    for (const Timing& timing : TimeRun(*field, counts)) {
+    for (const Timing& timing : TimeRun(field, counts)) {
       all.push_back(timing);
       series.points.emplace_back(timing.m, timing.seconds);
     }
     figure.series.push_back(std::move(series));
-    if (side == 128) naive = TimeNaive(*field, counts);
+    if (side == 128) naive = TimeNaive(field, counts);
   }
   figure.series.push_back(std::move(naive));
   const Fit fit = FitCost(all);

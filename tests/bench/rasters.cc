@@ -65,6 +65,24 @@ std::optional<std::vector<tin::HeightField>> ReadTiles(const Area& area) {
   return fields;
 }
 
+std::span<const LargeRaster> LargeRasters() {
+  static const std::array<LargeRaster, 6> rasters = {{
+      {"jacksboro 403x344", "jacksboro.tif", {}, false},
+      {"west-us 1024x1024", "westUS.tif", {}, false},
+      {"ntc 1024x1024", "ntc.tif", {}, false},
+      {"andes mirrored 2401x2401", "srtm3_S33W071_andes.tif", {}, true},
+      {"maui 2401x2401", "srtm1_N20W157_maui_se_haleakala.tif", {1200, 0, 2401, 2401}, false},
+      {"maui 3601x3601", "srtm1_N20W157_maui_se_haleakala.tif", {}, false},
+  }};
+  return rasters;
+}
+
+std::optional<tin::HeightField> ReadLarge(const LargeRaster& raster) {
+  std::optional<tin::HeightField> field = ReadField(raster.file, raster.window);
+  if (field && raster.is_mirrored) return MirroredFourfold(*field);
+  return field;
+}
+
 tin::HeightField MirroredFourfold(const tin::HeightField& field) {
   const int width = 2 * field.width() - 1, height = 2 * field.height() - 1;
   std::vector<float> heights;

@@ -33,6 +33,16 @@ std::span<const Area> TileAreas();
 // All tiles of the area; nothing when its file is missing.
 std::optional<std::vector<tin::HeightField>> ReadTiles(const Area& area);
 
+// Rasters to be meshed whole, the first of them part of the repository.
+struct LargeRaster {
+  const char* name;
+  const char* file;
+  Window window;
+  bool is_mirrored;  // MirroredFourfold
+};
+std::span<const LargeRaster> LargeRasters();
+std::optional<tin::HeightField> ReadLarge(const LargeRaster& raster);
+
 // The field, its mirror image to the east of it, and both of them mirrored to the north: four times the land with no
 // seam between.
 tin::HeightField MirroredFourfold(const tin::HeightField& field);

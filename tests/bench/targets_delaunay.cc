@@ -2,6 +2,7 @@
 #include <optional>
 #include <utility>
 
+#include "engine/tin/mesh_error.h"
 #include "tests/bench/greedy_runs.h"
 #include "tests/bench/rasters.h"
 #include "tests/bench/targets.h"
@@ -13,18 +14,12 @@ constexpr std::array<double, 3> kErrors = {1, 5, 20};
 
 Contest Contend(Environment& environment, const std::string& name, const std::vector<tin::HeightField>& fields,
                 const tin::GreedyGoal& goal) {
-  Contest contest;
-  for (const tin::HeightField& field : fields) {
-    const double rms = CheckMesh(name, field, goal, MeshOf(field, goal));
-    if (goal.max_error == 0) contest.rms = rms;
-  }
-  std::vector<Contender> contenders{MeshFromScratch};
+  for (const tin::HeightField& field : fields) CheckMesh(name, field, goal, MeshOf(field, goal));
+  std::vector<Contender> contenders{Timed(GreedyMesher())};
   const std::string& peer = environment.options().peer;
   if (!peer.empty()) contenders.push_back(PeerContender(peer));
   const std::vector<Score> scores = Race(PointersTo(fields), goal, environment.options().runs, contenders);
-  contest.ours = scores[0];
-  if (scores.size() > 1) contest.theirs = scores[1];
-  return contest;
+  return {scores[0], peer.empty() ? std::optional<Score>() : scores[1]};
 }
 
 }  // namespace
@@ -33,7 +28,7 @@ Table MeasureTiles(Environment& environment) {
   Table table("T1", "T1: Delaunay, tiles of 257 x 257 samples", SpeedColumns());
   const std::array<const char*, 3> aims = {"4x (6x)", "5x (8x)", "7x (10x)"};
   for (std::size_t i = 0; i < kErrors.size(); ++i) {
-    Contest sum{{}, Score{}, {}};
+    Contest sum{{}, Score{}};
     std::size_t areas = 0;
     for (const Area& area : TileAreas()) {
       const std::string name = fmt::format("T1 {} {} m", area.name, kErrors[i]);
@@ -41,14 +36,14 @@ Table MeasureTiles(Environment& environment) {
       const std::optional<std::vector<tin::HeightField>> tiles = ReadTiles(area);
       if (!tiles) continue;
       const Contest contest = Contend(environment, name, *tiles, {kErrors[i]});
-      AddRow(table, name, contest, "");
+      table.Add(SpeedRow(name, contest, ""));
       sum.ours += contest.ours;
       if (contest.theirs) *sum.theirs += *contest.theirs;
       ++areas;
     }
     if (areas < TileAreas().size()) continue;
     if (environment.options().peer.empty()) sum.theirs.reset();
-    AddRow(table, fmt::format("T1 all {} m", kErrors[i]), sum, aims[i]);
+    table.Add(SpeedRow(fmt::format("T1 all {} m", kErrors[i]), sum, aims[i]));
   }
   return table;
 }
@@ -65,35 +60,10 @@ Table MeasureVertexGoals(Environment& environment) {
       if (!field) continue;
       std::vector<tin::HeightField> fields;
       fields.push_back(*std::move(field));
-      AddRow(table, row, Contend(environment, row, fields, {0, points}), aim);
+      std::vector<Cell> cells = SpeedRow(row, Contend(environment, row, fields, {0, points}), aim);
+      cells.push_back(Number(tin::MeasureError(fields[0], MeshOf(fields[0], {0, points})).rms, 4));
+      table.Add(std::move(cells));
     }
-  }
-  return table;
-}
-
-Table MeasureLargeRasters(Environment& environment) {
-  Table table("T3", "T3: Delaunay, large rasters at an error", SpeedColumns());
-  struct Case {
-    const char* name;
-    const char* file;
-    Window window;
-    bool mirrored;
-    const char* aim;
-  };
-  const std::array<Case, 4> cases = {{
-      {"jacksboro 403x344", "jacksboro.tif", {}, false, ""},  // the one without test data
-      {"andes mirrored 2401x2401", "srtm3_S33W071_andes.tif", {}, true, "9x (15x)"},
-      {"maui 2401x2401", "srtm1_N20W157_maui_se_haleakala.tif", {1200, 0, 2401, 2401}, false, "9x (15x)"},
-      {"maui 3601x3601", "srtm1_N20W157_maui_se_haleakala.tif", {}, false, "9x (15x)"},
-  }};
-  for (const Case& c : cases) {
-    const std::string row = fmt::format("T3 {} 5 m", c.name);
-    if (!environment.Wants(row)) continue;
-    std::optional<tin::HeightField> field = ReadField(c.file, c.window);
-    if (!field) continue;
-    std::vector<tin::HeightField> fields;
-    fields.push_back(c.mirrored ? MirroredFourfold(*field) : *std::move(field));
-    AddRow(table, row, Contend(environment, row, fields, {5}), c.aim);
   }
   return table;
 }

@@ -16,10 +16,6 @@ tin::TinMesh DroppedMesh(const tin::HeightField& field, const tin::GreedyGoal& g
   return *std::move(mesh);
 }
 
-void MeshAndDrop(const tin::HeightField& field, const tin::GreedyGoal& goal, Runs& runs) {
-  runs.seconds.push_back(SecondsOf([&] { runs.points = DroppedMesh(field, goal).vertices.size(); }));
-}
-
 }  // namespace
 
 Table MeasureDropPass(Environment& environment) {
@@ -38,7 +34,7 @@ Table MeasureDropPass(Environment& environment) {
       if (!tiles) continue;
       const tin::GreedyGoal goal{aim.error};
       for (const tin::HeightField& tile : *tiles) CheckMesh(name, tile, goal, DroppedMesh(tile, goal));
-      std::vector<Contender> contenders{MeshAndDrop, MeshFromScratch};
+      std::vector<Contender> contenders{Timed(DroppedMesh), Timed(GreedyMesher())};
       const std::string& peer = environment.options().peer;
       if (!peer.empty()) contenders.push_back(PeerContender(peer));
       const std::vector<Score> scores = Race(PointersTo(*tiles), goal, environment.options().runs, contenders);

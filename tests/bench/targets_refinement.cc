@@ -18,8 +18,7 @@ constexpr std::array<double, 4> kReplayed = {2, 4, 8, 24};
 constexpr int kLadderSteps = 10;
 double LadderError(int step) { return kFinestError * std::exp2(step / 4.0); }
 
-tin::Refinement RefinementTo(const tin::HeightField& field, double error) {
-  tin::GreedyOptions options;
+tin::Refinement RefinementTo(const tin::HeightField& field, double error, tin::GreedyOptions options = {}) {
   options.record = true;
   tin::GreedyTriangulation tin(field, options);
   tin.Run({error});
@@ -74,6 +73,18 @@ std::vector<Cell> RowOf(const std::string& name, const std::vector<Score>& score
           Number(replay.min_seconds / static_cast<double>(replay.points) * 1e9, 3)};
 }
 
+// One recorded run to the finest error and a replay to each of the ten.
+Contender Sweep(const tin::GreedyOptions& options) {
+  return [options](const tin::HeightField& field, const tin::GreedyGoal& goal, Runs& runs) {
+    runs.seconds.push_back(SecondsOf([&] {
+      const tin::Refinement refinement = RefinementTo(field, goal.max_error, options);
+      for (int step = 0; step < kLadderSteps; ++step) {
+        runs.points = refinement.MeshAt(LadderError(step)).vertices.size();
+      }
+    }));
+  };
+}
+
 }  // namespace
 
 Table MeasureReplay(Environment& environment) {
@@ -98,7 +109,7 @@ Table MeasureReplay(Environment& environment) {
       for (const tin::HeightField& tile : *tiles) CheckReplay(name, tile, recorded.Of(tile), error);
       std::vector<Cell> row = RowOf(name,
                                     Race(PointersTo(*tiles), {error}, environment.options().runs,
-                                         std::array<Contender, 2>{replay, MeshFromScratch}),
+                                         std::array<Contender, 2>{replay, Timed(GreedyMesher())}),
                                     "8x (14x)");
       row.push_back(Number(recorded.SerializedBytesPerVertex(), 3));
       table.Add(std::move(row));
@@ -111,22 +122,19 @@ Table MeasureSweep(Environment& environment) {
   Table table("T4-sweep", "T4: ten thresholds of a tile, 1 m to 4.8 m: one recorded run and ten replays",
               {"case", "sweep ms", "sweep median", "1 m alone ms", "1 m median", "sweep over 1 m alone", "aim"});
   for (const Area& area : TileAreas()) {
-    const std::string name = fmt::format("T4 {} sweep", area.name);
-    if (!environment.Wants(name)) continue;
-    const std::optional<std::vector<tin::HeightField>> tiles = ReadTiles(area);
-    if (!tiles) continue;
-    const Contender sweep = [](const tin::HeightField& field, const tin::GreedyGoal&, Runs& runs) {
-      runs.seconds.push_back(SecondsOf([&] {
-        const tin::Refinement refinement = RefinementTo(field, kFinestError);
-        for (int step = 0; step < kLadderSteps; ++step)
-          runs.points = refinement.MeshAt(LadderError(step)).vertices.size();
-      }));
-    };
-    const std::vector<Score> scores = Race(PointersTo(*tiles), {kFinestError}, environment.options().runs,
-                                           std::array<Contender, 2>{sweep, MeshFromScratch});
-    table.Add({name, Milliseconds(scores[0].min_seconds), Milliseconds(scores[0].median_seconds),
-               Milliseconds(scores[1].min_seconds), Milliseconds(scores[1].median_seconds),
-               Ratio(scores[0].min_seconds / scores[1].min_seconds), "at most 1.5x"});
+    for (const auto& [criterion, options] :
+         {std::pair{"Delaunay", tin::GreedyOptions{}}, {"data-dependent", DataDependent()}}) {
+      const std::string name = fmt::format("T4 {} sweep {}", area.name, criterion);
+      if (!environment.Wants(name)) continue;
+      const std::optional<std::vector<tin::HeightField>> tiles = ReadTiles(area);
+      if (!tiles) continue;
+      const std::array<Contender, 2> contenders{Sweep(options), Timed(GreedyMesher(options))};
+      const std::vector<Score> scores =
+          Race(PointersTo(*tiles), {kFinestError}, environment.options().runs, contenders);
+      table.Add({name, Milliseconds(scores[0].min_seconds), Milliseconds(scores[0].median_seconds),
+                 Milliseconds(scores[1].min_seconds), Milliseconds(scores[1].median_seconds),
+                 Ratio(scores[0].min_seconds / scores[1].min_seconds), "at most 1.5x"});
+    }
   }
   return table;
 }

@@ -1,4 +1,5 @@
 #include <optional>
+#include <utility>
 
 #include "tests/bench/greedy_runs.h"
 #include "tests/bench/parallel_insertion.h"
@@ -16,11 +17,16 @@ std::size_t ExactGreedyPoints(const tin::HeightField& field, double error) {
   return insertion.vertex_count();
 }
 
+void AddRow(Table& table, const std::string& name, std::size_t exact, std::size_t ours, const Cell& blocks) {
+  table.Add({name, Count(exact), Count(ours), Percent(static_cast<double>(ours) / static_cast<double>(exact) - 1),
+             "at most +1 % (equal)", blocks});
+}
+
 }  // namespace
 
 Table MeasureVertices(Environment& environment) {
   Table table("T8", "T8: vertices at the same bound, beside one exact greedy run",
-              {"case", "exact greedy", "ours", "more", "aim"});
+              {"case", "exact greedy", "ours", "more", "aim", "blocks"});
   for (const Area& area : TileAreas()) {
     constexpr double kError = 20;
     const std::string name = fmt::format("T8 {} tiles {} m", area.name, kError);
@@ -32,8 +38,17 @@ Table MeasureVertices(Environment& environment) {
       exact += ExactGreedyPoints(tile, kError);
       ours += MeshOf(tile, {kError}).vertices.size();
     }
-    table.Add({name, Count(exact), Count(ours), Percent(static_cast<double>(ours) / static_cast<double>(exact) - 1),
-               "at most +1 % (equal)"});
+    AddRow(table, name, exact, ours, {});
+  }
+  for (const LargeRaster& raster : LargeRasters()) {
+    for (const double error : {1.0, 5.0, 20.0}) {
+      const std::string name = fmt::format("T8 {} {} m", raster.name, error);
+      if (!environment.Wants(name)) continue;
+      const std::optional<tin::HeightField> field = ReadLarge(raster);
+      if (!field) continue;
+      AddRow(table, name, MeshOf(*field, {error}).vertices.size(), MeshInBlocks(*field, {error}).vertices.size(),
+             Count(tin::FieldCut::For(*field, error).size()));
+    }
   }
   return table;
 }

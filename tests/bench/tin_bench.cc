@@ -13,8 +13,10 @@ namespace {
 int Measure(const Options& options, const std::string& json_path) {
   Environment environment(options);
   nlohmann::ordered_json tables = nlohmann::ordered_json::array();
-  for (const auto& measure : {MeasureTiles, MeasureVertexGoals, MeasureLargeRasters, MeasureReplay, MeasureSweep,
-                              MeasureDropPass, MeasureMemory, MeasureVertices}) {
+  const nlohmann::ordered_json context = MachineContext();  // first: later the load would be our own
+  for (const auto& measure :
+       {MeasureTiles, MeasureVertexGoals, MeasureLargeRasters, MeasureReplay, MeasureSweep, MeasureDataDependent,
+        MeasureDataDependentQuality, MeasureDropPass, MeasureMemory, MeasureVertices}) {
     const Table table = measure(environment);
     if (table.empty()) continue;
     table.Print(std::cout);
@@ -23,7 +25,7 @@ int Measure(const Options& options, const std::string& json_path) {
   if (tables.empty()) Die("no case left: look at --filter and TERRACE_TEST_DATA");
   if (json_path.empty()) return 0;
   std::ofstream out(json_path);
-  out << nlohmann::ordered_json{{"context", MachineContext()},
+  out << nlohmann::ordered_json{{"context", context},
                                 {"options",
                                  {{"runs", options.runs},
                                   {"peer", options.peer},

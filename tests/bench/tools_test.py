@@ -9,7 +9,8 @@ import unittest
 import xml.etree.ElementTree as ElementTree
 
 TOOLS = pathlib.Path(__file__).resolve().parents[2] / "tools"
-CONTEXT = {"cpu": "A CPU", "compiler": "GNU 1", "flags": "-O2", "commit": "abc", "date": "2026-01-02T03:04:05Z"}
+CONTEXT = {"cpu": "A CPU", "cores": 2, "load": 0.3, "compiler": "GNU 1", "flags": "-O2", "commit": "abc",
+           "date": "2026-01-02T03:04:05Z"}
 PAGE = """# Page
 
 <!-- context -->
@@ -49,7 +50,7 @@ class ToolsTest(unittest.TestCase):
         page = self.page.read_text(encoding="utf-8")
         self.assertNotIn("old", page)
         self.assertIn("<!-- table T1 -->\n\n| table of T1 |\n\n<!-- end -->\nkept\n", page)
-        self.assertIn("A CPU; GNU 1, `-O2`; commit abc, 2026-01-02.", page)
+        self.assertIn("A CPU, 2 cores, load 0.3; GNU 1, `-O2`; commit abc, 2026-01-02.", page)
         self.assertIn("measured before", page)
 
     def test_filling_again_changes_nothing(self):
