@@ -110,7 +110,8 @@ class GreedyTriangulation {
   // Starts with the two triangles of the field's corners. `field` must outlive this object.
   explicit GreedyTriangulation(const HeightField& field, GreedyOptions options = {});
 
-  // Goes on where a refinement of the same field with the same options has ended.
+  // Goes on where a refinement of the same field with the same options has ended. Precondition: its run met an error
+  // or there are no seeds; one that ended inside a seed grid goes on with another order of insertions.
   GreedyTriangulation(const HeightField& field, GreedyOptions options, const Refinement& refinement);
   ~GreedyTriangulation();
   GreedyTriangulation(GreedyTriangulation&&) noexcept;

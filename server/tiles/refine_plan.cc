@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <numeric>
 #include <vector>
 
 #include "engine/geo/ellipsoid.h"
@@ -28,6 +30,13 @@ tin::Curvature MakeCurvature(const proto::LatticeView& lattice) {
     const double east = geo::MetresPerDegreeEast(lattice.Latitude(j)) * step;
     curvature.east_m2.push_back(east * east);
   }
+  // Near the equator neighbouring rows differ by less than the rounding of their sines: rows towards the widest one are
+  // at least as wide as those before, as Curvature promises.
+  const auto wider = [](double a, double b) { return std::max(a, b); };
+  const auto begin = curvature.east_m2.begin(), widest = std::max_element(begin, curvature.east_m2.end());
+  std::inclusive_scan(begin, widest, begin, wider);
+  const auto back = curvature.east_m2.rbegin(), widest_back = std::make_reverse_iterator(widest);
+  std::inclusive_scan(back, widest_back, back, wider);
   const double north = geo::ToRadians(step) * kLargestRadius;
   curvature.north_m2 = north * north;
   curvature.radius_m = kSmallestRadius;

@@ -56,14 +56,16 @@ Result<MeshedTile> Finish(tin::TinMesh mesh, const proto::LatticeView& lattice, 
   }
 }
 
-// A mesh for the format's number of vertices: a coarser one inside the tile. The edges never depend on the inside: they
-// keep the threshold of the error that was asked for, exactly, since scaling by a power of two rounds nothing.
-Result<tin::TinMesh> CoarserInside(const tin::HeightField& field, const tin::GreedyOptions& plan, double& error_m,
-                                   const std::stop_token& stop) {
-  for (double coarser = 2;; coarser *= 2) {
+// A mesh within the format's number of vertices: `coarser` times the error inside the tile, more where that is not
+// enough. The edges never depend on the inside: they keep the threshold of the error that was asked for and the seeds
+// that are due at it, exactly, since scaling by a power of two rounds nothing. Sets the error that was reached.
+Result<tin::TinMesh> RefineWithinFormat(const tin::HeightField& field, const tin::GreedyOptions& plan, double coarser,
+                                        double& error_m, const std::stop_token& stop) {
+  for (;; coarser *= 2) {
     tin::GreedyOptions options = plan;
     options.record = false;
     for (tin::BorderOptions& border : options.borders) border.scale = coarser;
+    for (tin::SeedGrid& grid : options.seeds) grid.below_error *= coarser;
     tin::GreedyTriangulation greedy(field, std::move(options));
     tin::GreedyGoal goal;
     goal.max_error = error_m * coarser;
@@ -112,14 +114,15 @@ tin::GreedyOptions PlanOf(const dem::DemSource& source, const proto::LatticeView
 }
 
 Result<MeshedTile> MeshTile(const dem::DemSource& source, const proto::LatticeView& lattice,
-                            const tin::Refinement& refinement, const MeshRules& rules, double error_m,
+                            const tin::Refinement& refinement, const MeshRules& rules, double wanted_error_m,
                             const std::stop_token& stop) {
   const int level = lattice.key.level;
-  const proto::EdgeSteps steps = EdgeStepsOf(source, lattice.key, error_m);
+  const proto::EdgeSteps steps = EdgeStepsOf(source, lattice.key, wanted_error_m);
+  double error_m = wanted_error_m;
   Result<tin::TinMesh> mesh =
       refinement.vertex_count() <= proto::kMaxTileVertices
           ? refinement.MeshAt(error_m)
-          : CoarserInside(FieldOf(lattice), PlanOf(source, lattice, rules.criterion), error_m, stop);
+          : RefineWithinFormat(FieldOf(lattice), PlanOf(source, lattice, rules.criterion), 2, error_m, stop);
   if (mesh && rules.compact) {
     mesh = Compact(FieldOf(lattice), *mesh, PlanOf(source, lattice, rules.criterion), error_m, stop);
   }
@@ -127,15 +130,10 @@ Result<MeshedTile> MeshTile(const dem::DemSource& source, const proto::LatticeVi
   Result<MeshedTile> meshed = Finish(*std::move(mesh), lattice, steps, error_m, IsCurved(level, error_m), stop);
   if (!meshed || proto::AllCounterClockwise(meshed->tile)) return meshed;
 
-  tin::GreedyOptions plain = PlanOf(source, lattice, tin::Criterion::kDelaunay);
-  plain.record = false;
-  const tin::HeightField field = FieldOf(lattice);
-  tin::GreedyTriangulation greedy(field, std::move(plain));
-  tin::GreedyGoal goal;
-  goal.max_error = error_m;
-  goal.max_points = proto::kMaxTileVertices;
-  if (!greedy.Run(goal, stop)) return Cancelled();
-  meshed = Finish(greedy.Mesh(), lattice, steps, error_m, IsCurved(level, error_m), stop);
+  error_m = wanted_error_m;
+  mesh = RefineWithinFormat(FieldOf(lattice), PlanOf(source, lattice, tin::Criterion::kDelaunay), 1, error_m, stop);
+  if (!mesh) return tl::unexpected(std::move(mesh).error());
+  meshed = Finish(*std::move(mesh), lattice, steps, error_m, IsCurved(level, error_m), stop);
   if (meshed && !proto::AllCounterClockwise(meshed->tile)) {
     return MakeError(ErrorCode::kInternal, "{}: a triangle turned over", geo::ToString(lattice.key));
   }

@@ -37,7 +37,7 @@ tin::GreedyOptions PlanOf(const dem::DemSource& source, const proto::LatticeView
 // that ended above the format's number of vertices: then the inside is coarser, the edges are not. A tile with a
 // triangle that rounding would turn over is meshed by the plain rules. kCancelled: stopped.
 Result<MeshedTile> MeshTile(const dem::DemSource& source, const proto::LatticeView& lattice,
-                            const tin::Refinement& refinement, const MeshRules& rules, double error_m,
+                            const tin::Refinement& refinement, const MeshRules& rules, double wanted_error_m,
                             const std::stop_token& stop);
 
 }  // namespace terrace::server

@@ -4,8 +4,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdint>
+#include <fstream>
+#include <iomanip>
 #include <map>
 #include <memory>
+#include <string>
 #include <thread>
 #include <tuple>
 #include <vector>
@@ -190,6 +194,55 @@ TEST(TilePipeline, GivesTheSameBytesFromScratchFromReplayAndContinued) {
   }
   EXPECT_EQ(scratch->refinements().entries, 0u);
   EXPECT_GT(cached->refinements().entries, 5u);
+}
+
+// A raster of level 5's own lattice: cliffs in tile 32/16, flat ground east of it.
+std::unique_ptr<dem::DemSource> OpenCliffs() {
+  constexpr double kStep = 5.625 / 256;
+  constexpr int kColumns = 516, kRows = 260;
+  const std::string path = testing::TempDir() + "/cliffs.img";
+  std::vector<float> heights;
+  std::uint32_t state = 1;
+  for (int j = 0; j < kRows; ++j) {
+    for (int i = 0; i < kColumns; ++i) {
+      state = state * 1664525 + 1013904223;
+      heights.push_back(i >= 1 && i < 257 ? static_cast<float>(state >> 18) : 0);
+    }
+  }
+  std::ofstream(path, std::ios::binary)
+      .write(reinterpret_cast<const char*>(heights.data()),
+             static_cast<std::streamsize>(heights.size() * sizeof(float)));
+  std::ofstream(testing::TempDir() + "/cliffs.hdr")
+      << "ENVI\nsamples = " << kColumns << "\nlines = " << kRows
+      << "\nbands = 1\ndata type = 4\ninterleave = bsq\nbyte order = 0\nmap info = {Geographic Lat/Lon, 1, 1, "
+      << std::setprecision(17) << -1.5 * kStep << ", " << 5.625 + 1.5 * kStep << ", " << kStep << ", " << kStep
+      << ", WGS-84}\n";
+  auto source = dem::DemSource::Open(path);
+  EXPECT_TRUE(source.has_value()) << (source ? "" : source.error().message);
+  return source ? *std::move(source) : nullptr;
+}
+
+// The seeds on an edge are those of the error that was asked for, however coarse the inside has to be.
+TEST(TilePipeline, MatchesEdgesOfTilesThatTheFormatCannotHold) {
+  std::vector<Dataset> datasets(1);
+  datasets[0].source = OpenCliffs();
+  ASSERT_NE(datasets[0].source, nullptr);
+  const TilePipeline pipeline(std::move(datasets));
+  TileRequest request;
+  request.error_step = 24;
+  request.normals = true;
+  Edge edges[2];
+  for (const int k : {0, 1}) {
+    request.key = {5, 32 + k, 16};
+    const auto tile = pipeline.Build(request, {});
+    ASSERT_TRUE(tile.has_value()) << tile.error().message;
+    if (k == 0) {
+      EXPECT_GT(tile->max_error_m, geo::LadderError(5, 24));  // else this tests nothing
+    }
+    edges[k] = EdgeOf({*proto::DecodeQuantizedMesh(tile->bytes), *tile}, true, k == 0 ? 32767 : 0);
+  }
+  EXPECT_GT(edges[0].size(), 2u);
+  EXPECT_EQ(edges[0], edges[1]);
 }
 
 TEST(TilePipeline, RefusesWhatIsNotThere) {
