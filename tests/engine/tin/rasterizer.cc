@@ -102,8 +102,8 @@ class Raster {
     for (std::size_t i = 0; i < 3; ++i) {
       weighted += static_cast<long double>(weights[i]) * static_cast<long double>(heights_[triangle[i]]);
     }
-    const auto error = static_cast<double>(
-        std::abs(weighted / static_cast<long double>(area) - static_cast<long double>(sample)));
+    const auto error =
+        static_cast<double>(std::abs(weighted / static_cast<long double>(area) - static_cast<long double>(sample)));
     if (error <= result_.max_error) return;
     result_.max_error = error;
     result_.worst = {static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)};

@@ -39,7 +39,6 @@ struct Dem {
   int width, height;  // of the whole raster
 };
 
-// Large ones lie apart, so that shards take as long as each other.
 constexpr Dem kDems[] = {
     {"N43E007.hgt.zip", 1201, 1201},
     {"SainteHelens.dem", 327, 468},
@@ -83,7 +82,8 @@ Result<HeightField> Read(const Dem& dem) {
   const bool is_whole = std::int64_t{dem.width} * dem.height <= kMostSamples || AreLongTestsWanted();
   const int width = is_whole ? dem.width : std::min(kWindow, dem.width);
   const int height = is_whole ? dem.height : std::min(kWindow, dem.height);
-  auto raster = test_support::ReadTestRaster(dem.file, (dem.width - width) / 2, (dem.height - height) / 2, width, height);
+  auto raster =
+      test_support::ReadTestRaster(dem.file, (dem.width - width) / 2, (dem.height - height) / 2, width, height);
   if (!raster) return MakeError(ErrorCode::kUnavailable, "{}: cannot be read", dem.file);
   return HeightField::Make(raster->width, raster->height, std::move(raster->heights));
 }
