@@ -26,18 +26,28 @@ using tin::TinMesh;
 
 constexpr int kMostSide = 20;
 
-// A palette of heights and an index for each sample, so that few bytes make a field with ties and plateaus, or a float
-// of its own for each.
-HeightField FieldOf(FuzzInput& input) {
+enum class Sort { kAnyBits, kPalette, kWholeMetres };
+
+// One byte a sample makes fields with ties and plateaus, four a field of any floats.
+HeightField FieldOf(Sort sort, FuzzInput& input) {
   const int width = 2 + input.Below(kMostSide - 1), height = 2 + input.Below(kMostSide - 1);
-  const bool has_palette = input.Below(2) == 0;
   std::array<float, 8> palette{};
-  if (has_palette) {
+  if (sort == Sort::kPalette) {
     for (float& value : palette) value = input.Take<float>();
   }
   std::vector<float> heights;
   for (int i = 0; i < width * height; ++i) {
-    heights.push_back(has_palette ? palette[static_cast<std::size_t>(input.Below(8))] : input.Take<float>());
+    switch (sort) {
+      case Sort::kAnyBits:
+        heights.push_back(input.Take<float>());
+        break;
+      case Sort::kPalette:
+        heights.push_back(palette[static_cast<std::size_t>(input.Below(8))]);
+        break;
+      case Sort::kWholeMetres:
+        heights.push_back(static_cast<float>(input.Take<std::int8_t>()));
+        break;
+    }
   }
   std::size_t valid = 0;
   for (const float value : heights) valid += std::isfinite(value) ? 1 : 0;
@@ -60,9 +70,11 @@ void Run(FuzzInput& input) {
   options.record = true;
   options.criterion = static_cast<Criterion>(input.Below(2));
   options.data_dependent = {static_cast<FitMeasure>(input.Below(4)), input.Below(5) / 4.0};
-  const float given = std::abs(input.Take<float>());
+  const auto sort = static_cast<Sort>(input.Below(3));
+  const float given = sort == Sort::kWholeMetres ? static_cast<float>(input.Take<std::uint16_t>()) / 1024
+                                                 : std::abs(input.Take<float>());
   const double bound = std::isfinite(given) ? static_cast<double>(given) : 0;
-  const HeightField field = FieldOf(input);
+  const HeightField field = FieldOf(sort, input);
 
   tin::GreedyTriangulation greedy(field, options);
   TERRACE_CHECK(greedy.Run({bound}));
