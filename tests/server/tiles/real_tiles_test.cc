@@ -6,19 +6,18 @@
 #include <array>
 #include <cctype>
 #include <cstddef>
-#include <cstdint>
-#include <iterator>
 #include <map>
-#include <optional>
 #include <ostream>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "engine/dem/dem_source.h"
 #include "engine/geo/error_ladder.h"
 #include "engine/geo/tile_key.h"
 #include "server/tiles/tile_pipeline.h"
+#include "tests/server/tiles/decoded_error.h"
 #include "tests/server/tiles/fetched_tile.h"
 #include "tests/support/test_data.h"
 
@@ -93,12 +92,31 @@ int ExpectMatchingEdges(const Block& block) {
   return edges;
 }
 
-void ExpectErrors(const Block& block, double error_m) {
-  for (const auto& column : block) {
-    for (const FetchedTile& tile : column) {
-      if (IsServed(tile)) {
-        EXPECT_LE(tile.encoded.max_error_m, error_m);
-      }
+// By tile, as Block.
+using BlockHeights = std::array<std::array<dem::TileHeights, kSide>, kSide>;
+
+BlockHeights ReadHeights(const dem::DemSource& source, const geo::TileKey& first) {
+  BlockHeights heights;
+  for (int x = 0; x < kSide; ++x) {
+    for (int y = 0; y < kSide; ++y) {
+      const geo::TileKey key = geo::Neighbour(first, x, y);
+      if (!source.IsAvailable(key)) continue;
+      auto read = source.Read(key);
+      EXPECT_TRUE(read.has_value()) << geo::ToString(key);
+      if (read) heights[static_cast<std::size_t>(x)][static_cast<std::size_t>(y)] = *std::move(read);
+    }
+  }
+  return heights;
+}
+
+// What the header says is within the ladder error, and true.
+void ExpectErrors(const Block& block, const BlockHeights& heights, double error_m) {
+  for (std::size_t x = 0; x < kSide; ++x) {
+    for (std::size_t y = 0; y < kSide; ++y) {
+      const FetchedTile& tile = block[x][y];
+      if (!IsServed(tile)) continue;
+      EXPECT_LE(tile.encoded.max_error_m, error_m);
+      EXPECT_LE(DecodedError(tile.mesh, heights[x][y]), tile.encoded.max_error_m * (1 + 1e-9));
     }
   }
 }
@@ -107,23 +125,24 @@ TEST_P(RealTiles, MatchAndKeepTheirErrorsByEveryRule) {
   if (GetParam().file != nullptr && !test_support::TestDataPath(GetParam().file)) {
     GTEST_SKIP() << test_support::MissingTestData(GetParam().file);
   }
-  Dataset dataset = Open();
-  ASSERT_NE(dataset.source, nullptr);
   std::map<int, int> edges;  // by level
   for (const tin::Criterion criterion : {tin::Criterion::kDelaunay, tin::Criterion::kDataDependent}) {
     for (const bool compact : {false, true}) {
-      dataset = Open();
+      Dataset dataset = Open();
+      ASSERT_NE(dataset.source, nullptr);
       dataset.rules = {criterion, compact};
       std::vector<Dataset> datasets;
       datasets.push_back(std::move(dataset));
       const TilePipeline pipeline(std::move(datasets));
       const dem::DemSource& source = *pipeline.datasets().front().source;
       for (const int level : {source.max_level() - 1, source.max_level()}) {
-        for (const auto& [step, block] : FetchBlocks(pipeline, FirstTile(source, level))) {
+        const geo::TileKey first = FirstTile(source, level);
+        const BlockHeights heights = ReadHeights(source, first);
+        for (const auto& [step, block] : FetchBlocks(pipeline, first)) {
           SCOPED_TRACE(testing::Message() << "level " << level << ", step " << step << ", criterion "
                                           << static_cast<int>(criterion) << (compact ? ", compact" : ""));
           edges[level] = ExpectMatchingEdges(block);
-          ExpectErrors(block, geo::LadderError(level, step));
+          ExpectErrors(block, heights, geo::LadderError(level, step));
         }
       }
     }
