@@ -7,27 +7,16 @@
 #include <cstdint>
 #include <fstream>
 #include <iomanip>
-#include <map>
 #include <memory>
 #include <string>
 #include <thread>
-#include <tuple>
 #include <vector>
 
 #include "engine/geo/error_ladder.h"
-#include "tests/proto/quantized_mesh_decoder.h"
+#include "tests/server/tiles/fetched_tile.h"
 
 namespace terrace::server {
 namespace {
-
-Dataset OpenSample(const std::string& name) {
-  auto source = dem::DemSource::Open(std::string(TERRACE_SOURCE_DIR) + "/config/samples/" + name + ".tif");
-  EXPECT_TRUE(source.has_value()) << (source ? "" : source.error().message);
-  Dataset dataset;
-  dataset.name = name;
-  dataset.source = *std::move(source);
-  return dataset;
-}
 
 const TilePipeline& Samples() {
   static const TilePipeline* const pipeline = [] {
@@ -39,39 +28,12 @@ const TilePipeline& Samples() {
   return *pipeline;
 }
 
-struct FetchedTile {
-  proto::DecodedTile mesh;
-  EncodedTile encoded;
-};
-
 FetchedTile Fetch(std::uint32_t dataset, geo::TileKey key, int step) {
   TileRequest request;
   request.dataset = dataset;
   request.key = key;
   request.error_step = step;
-  request.normals = true;
-  auto encoded = Samples().Build(request, {});
-  EXPECT_TRUE(encoded.has_value()) << geo::ToString(key);
-  auto mesh = proto::DecodeQuantizedMesh(encoded->bytes);
-  EXPECT_TRUE(mesh.has_value()) << geo::ToString(key);
-  return {*std::move(mesh), *std::move(encoded)};
-}
-
-// Position along the edge, height, normal of its vertices.
-using Edge = std::vector<std::tuple<int, double, int, int>>;
-
-Edge EdgeOf(const FetchedTile& tile, bool vertical, int fixed) {
-  Edge edge;
-  const proto::DecodedTile& mesh = tile.mesh;
-  const std::string& normals = mesh.extensions.at(0).bytes;
-  const double min = static_cast<double>(mesh.min_height), max = static_cast<double>(mesh.max_height);
-  for (std::size_t k = 0; k < mesh.u.size(); ++k) {
-    if ((vertical ? mesh.u[k] : mesh.v[k]) != fixed) continue;
-    edge.emplace_back(vertical ? mesh.v[k] : mesh.u[k], min + (max - min) * mesh.h[k] / 32767, normals[2 * k],
-                      normals[2 * k + 1]);
-  }
-  std::sort(edge.begin(), edge.end());
-  return edge;
+  return FetchTile(Samples(), request);
 }
 
 geo::TileKey MiddleTile(std::uint32_t dataset, int level) {
@@ -152,9 +114,7 @@ TEST(TilePipeline, KeepsErrorsAndEdgesByEveryRule) {
             EXPECT_LT(tile->vertices, plain.encoded.vertices) << level << " step " << step;
           }
           // Edges do not know how the inside is meshed.
-          request.normals = true;
-          const auto with_normals = pipeline.Build(request, {});
-          FetchedTile fetched{*proto::DecodeQuantizedMesh(with_normals->bytes), *with_normals};
+          const FetchedTile fetched = FetchTile(pipeline, request);
           for (const bool vertical : {true, false}) {
             EXPECT_EQ(EdgeOf(fetched, vertical, 0), EdgeOf(plain, vertical, 0));
             EXPECT_EQ(EdgeOf(fetched, vertical, 32767), EdgeOf(plain, vertical, 32767));
