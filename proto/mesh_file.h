@@ -5,9 +5,10 @@
 // node's matrix. glTF is y-up: a point (x, y, z) with z up is stored as (x, z, -y), a rotation, so that viewers show
 // the terrain upright and triangles keep their sense.
 //
-// Colours are sRGB, as images have them. PLY holds them as bytes; OBJ as shares of 1 behind the coordinates, with digits
-// enough to give the same bytes again. glTF wants vertex colours linear: GLB has COLOR_0 as normalized 16-bit integers,
-// since 8 linear bits are too few for dark colours, and a material that is no metal, which the default would be.
+// Colours are sRGB, as images have them. PLY holds them as bytes; OBJ as shares of 1 behind the coordinates, with
+// digits enough to give the same bytes again. glTF wants vertex colours linear: GLB has COLOR_0 as normalized 16-bit
+// integers, since 8 linear bits are too few for dark colours, and a material that is no metal, which the default would
+// be.
 #pragma once
 
 #include <array>

@@ -40,10 +40,11 @@ Result<ImageBins> ImageBins::Read(ImageFile& image, int side, const std::vector<
   bins.cols_ = east - west + 1;
   bins.rows_ = south - north + 1;
   if (std::int64_t{bins.cols_} * bins.rows_ > kMostBins) {
-    return MakeError(ErrorCode::kInvalidArgument,
-                     "{}: {} x {} of its pixels are needed at once; cut it to the DEM, and to the DEM's resolution, with "
-                     "gdalwarp -te -tr",
-                     image.path(), bins.cols_, bins.rows_);
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "{}: {} x {} of its pixels are needed at once; cut it to the DEM, and to the DEM's resolution, with "
+        "gdalwarp -te -tr",
+        image.path(), bins.cols_, bins.rows_);
   }
   bins.bins_.resize(static_cast<std::size_t>(bins.cols_) * static_cast<std::size_t>(bins.rows_));
   if (auto filled = bins.Fill(image); !filled) return tl::unexpected(filled.error());

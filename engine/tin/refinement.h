@@ -57,8 +57,8 @@ class Refinement {
 
   // Little-endian, with a version and a checksum.
   std::string Serialize() const;
-  // kInvalidArgument for what was damaged or cannot be a record. Whatever is accepted has meshes of vertices it has; that
-  // they are triangulations is up to whoever wrote it, so go on only with what Serialize has written.
+  // kInvalidArgument for what was damaged or cannot be a record. Whatever is accepted has meshes of vertices it has;
+  // that they are triangulations is up to whoever wrote it, so go on only with what Serialize has written.
   static Result<Refinement> Parse(std::string_view bytes);
 
   const std::vector<SamplePosition>& inserted() const { return inserted_; }
