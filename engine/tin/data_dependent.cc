@@ -64,8 +64,9 @@ void DataDependentCriterion::Begin(const Triangulation::Vertex& vertex, Triangle
     if (back != kNoEdge) __builtin_prefetch(&known_[back / 4]);
   }
   const auto [a, b, c] = triangulation_->triangle(triangle);
-  const std::array<RingVertex, 4> ring = {Seen(a, vertex.position), Seen(b, vertex.position), Seen(c, vertex.position),
-                                          Seen(a, vertex.position)};
+  const std::array<RingVertex, 4> ring = {
+      triangulation_->Seen(a, vertex.position), triangulation_->Seen(b, vertex.position),
+      triangulation_->Seen(c, vertex.position), triangulation_->Seen(a, vertex.position)};
   for (std::size_t i = 0; i < 3; ++i) {
     if (Cross(ring[i], ring[i + 1]) == 0) return;  // on an edge: no triangle there
   }
@@ -124,7 +125,7 @@ bool DataDependentCriterion::IsBetterAlongPw(const Quadrilateral& q, TriangleId 
     double least_uw = 0, least_wv = 0;
     if (known.worst != kNoSample) RaiseLeastErrors(q, known.worst, known.worst_height, least_uw, least_wv);
     if (const std::uint32_t worst = uv.misfit.sample; worst != kNoSample) {
-      RaiseLeastErrors(q, worst, open_->At(PositionOf(worst)), least_uw, least_wv);
+      RaiseLeastErrors(q, worst, open_->At(PositionOf(worst, field_->width())), least_uw, least_wv);
     }
     if (!wins(least_uw, least_wv)) return false;
   }
@@ -136,21 +137,16 @@ bool DataDependentCriterion::IsBetterAlongPw(const Quadrilateral& q, TriangleId 
 // does not matter, since maxima and sums of what is not negative are monotonic as computed.
 void DataDependentCriterion::RaiseLeastErrors(const Quadrilateral& q, std::uint32_t sample, float height, double& uw,
                                               double& wv) const {
-  const SamplePosition position = PositionOf(sample);
+  const SamplePosition position = PositionOf(sample, field_->width());
   const int x = position.x - vertex_.position.x, y = position.y - vertex_.position.y;
   const std::int64_t side = Cross(q.w, RingVertex{0, x, y, height});
   if (side <= 0) uw = std::max(uw, DistanceFrom(q.u, q.w, vertex_.height, x, y, height));
   if (side >= 0) wv = std::max(wv, DistanceFrom(q.w, q.v, vertex_.height, x, y, height));
 }
 
-SamplePosition DataDependentCriterion::PositionOf(std::uint32_t sample) const {
-  const auto width = static_cast<std::uint32_t>(field_->width());
-  return {static_cast<std::uint16_t>(sample % width), static_cast<std::uint16_t>(sample / width)};
-}
-
 DataDependentCriterion::KnownFit DataDependentCriterion::Remembered(const Fit& fit) const {
   const std::uint32_t worst = fit.misfit.sample;
-  return {fit.error, worst, worst == kNoSample ? 0 : open_->At(PositionOf(worst))};
+  return {fit.error, worst, worst == kNoSample ? 0 : open_->At(PositionOf(worst, field_->width()))};
 }
 
 // From the triangle's last corner, as when it was made: rounding is that of the scan of its star.
@@ -159,15 +155,10 @@ DataDependentCriterion::KnownFit DataDependentCriterion::FitBeyond(TriangleId t)
   if (known_[t].error == kUnknown) {
     const auto [a, b, c] = triangulation_->triangle(t);
     const Triangulation::Vertex p{triangulation_->position(c), triangulation_->height(c)};
-    const Fit fit = FitsAround<1>(p, {Seen(a, p.position), Seen(b, p.position)})[0];
+    const Fit fit = FitsAround<1>(p, {triangulation_->Seen(a, p.position), triangulation_->Seen(b, p.position)})[0];
     known_[t] = Remembered(fit);
   }
   return known_[t];
-}
-
-RingVertex DataDependentCriterion::Seen(VertexId vertex, SamplePosition from) const {
-  const SamplePosition position = triangulation_->position(vertex);
-  return {vertex, position.x - from.x, position.y - from.y, triangulation_->height(vertex)};
 }
 
 template <std::size_t kCount>

@@ -76,8 +76,6 @@ class DataDependentCriterion {
   void RaiseLeastErrors(const Quadrilateral& q, std::uint32_t sample, float height, double& uw, double& wv) const;
   KnownFit FitBeyond(TriangleId t);
   KnownFit Remembered(const Fit& fit) const;
-  SamplePosition PositionOf(std::uint32_t sample) const;
-  RingVertex Seen(VertexId vertex, SamplePosition from) const;
   template <std::size_t kCount>
   std::array<Fit, kCount> FitsAround(const Triangulation::Vertex& p, const std::array<RingVertex, kCount + 1>& ring);
   double ErrorOf(const PlaneMisfit& misfit, const Triangulation::Vertex& p, const RingVertex& u,

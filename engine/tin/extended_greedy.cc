@@ -12,14 +12,6 @@ namespace {
 // Insertions between two looks at the stop token: well below a millisecond.
 constexpr std::size_t kStopPeriod = 256;
 
-std::array<Triangulation::Vertex, 4> CornersOf(const HeightField& heights) {
-  const int east = heights.width() - 1, north = heights.height() - 1;
-  const auto corner = [&](int x, int y) -> Triangulation::Vertex {
-    return {{static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)}, heights.VertexHeight(x, y)};
-  };
-  return {corner(0, 0), corner(east, 0), corner(east, north), corner(0, north)};
-}
-
 // A triangle as one plane for z, r, g and b each, relative to its last corner p and times D, twice its area: a sample
 // at (x, y) from p misses channel c by |D (c - c_p) - (a x + b y)| / D. With colours all of this is exact: D < 2^30,
 // |x|, |y| < 2^15, |a|, |b| < 2^24.
@@ -88,8 +80,7 @@ Planes PlanesOf(const Triangulation& triangulation, const std::vector<Color>& co
 
 }  // namespace
 
-ExtendedGreedy::ExtendedGreedy(const ExtendedField& field)
-    : field_(&field), triangulation_(CornersOf(field.heights())) {
+ExtendedGreedy::ExtendedGreedy(const ExtendedField& field) : field_(&field), triangulation_(field.heights()) {
   for (VertexId vertex = 0; vertex < 4; ++vertex) {
     const auto [x, y] = triangulation_.position(vertex);
     const ColorSample& color = field.ColorAt(x, y);
@@ -116,9 +107,7 @@ double ExtendedGreedy::CurrentError() {
 }
 
 void ExtendedGreedy::Insert(TriangleId triangle) {
-  const auto width = static_cast<std::uint32_t>(field_->width());
-  const std::uint32_t index = candidates_.sample(triangle);
-  const SamplePosition sample = {static_cast<std::uint16_t>(index % width), static_cast<std::uint16_t>(index / width)};
+  const SamplePosition sample = PositionOf(candidates_.sample(triangle), field_->width());
   colors_.push_back(ColorOfVertex(sample, triangle));
   const Star& star = triangulation_.InsertDelaunay({sample, field_->heights().At(sample.x, sample.y)}, triangle);
   for (std::size_t i = 0; i < star.count; ++i) Scan(star.triangles[i]);

@@ -32,14 +32,6 @@ void CheckOptions(const GreedyOptions& options) {
   }
 }
 
-std::array<Triangulation::Vertex, 4> CornersOf(const HeightField& field) {
-  const int east = field.width() - 1, north = field.height() - 1;
-  const auto corner = [&](int x, int y) -> Triangulation::Vertex {
-    return {{static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)}, field.VertexHeight(x, y)};
-  };
-  return {corner(0, 0), corner(east, 0), corner(east, north), corner(0, north)};
-}
-
 std::size_t CountValid(const HeightField& field) {
   std::size_t valid = 0;
   for (int y = 0; y < field.height(); ++y) {
@@ -79,13 +71,12 @@ class GreedyTriangulation::Impl {
   void ScanStarOf(const Star& star);
   void AwaitScan(TriangleId t);
   void ScanAwaiting();
-  void SetCandidate(const Star& star, std::size_t i);
+  Candidate CandidateOf(const Star& star, std::size_t i);
   Candidate WorstOnBorderOf(TriangleId t);
   Candidate WorstOnBorder(VertexId from, VertexId to);
   double SquaresOf(TriangleId t) const;
   Corner CornerAt(VertexId vertex) const;
   void MakeStar(TriangleId t, Star& star) const;
-  SamplePosition PositionOf(std::uint32_t sample) const;
 
   const HeightField* field_;
   GreedyOptions options_;
@@ -124,7 +115,7 @@ GreedyTriangulation::Impl::Impl(const HeightField& field, GreedyOptions options)
       sagitta_(options_.curvature, field.height()),
       seeds_(field, options_.seeds),
       open_(field),
-      triangulation_(CornersOf(field)) {
+      triangulation_(field) {
   CheckOptions(options_);
   for (const Side side : {Side::kSouth, Side::kEast, Side::kNorth, Side::kWest}) {
     const bool along_x = side == Side::kSouth || side == Side::kNorth;
@@ -150,6 +141,8 @@ GreedyTriangulation::Impl::Impl(const HeightField& field, GreedyOptions options,
     open_.Close(sample);
   }
   triangulation_ = Triangulation(std::move(vertices), mesh.triangles);
+  // The seeds start again: a grid that is in the mesh was due above the error that was met, so it is due at once, and
+  // all of its samples are vertices already.
   if (recorder_) recorder_.emplace(refinement);
   for (TriangleId t = 0; t < triangulation_.triangle_count(); ++t) AwaitScan(t);
 }
@@ -176,7 +169,7 @@ std::optional<GreedyTriangulation::Impl::Insertion> GreedyTriangulation::Impl::N
   if (const TriangleId t = candidates_.Upcoming(1); t != CandidateQueue::kNoSlot) triangulation_.PrefetchAround(t);
   const float error = candidates_.error(worst);
   if (static_cast<double>(error) <= goal.max_error) return std::nullopt;
-  return Insertion{PositionOf(candidates_.sample(worst)), worst, error, false};
+  return Insertion{PositionOf(candidates_.sample(worst), field_->width()), worst, error, false};
 }
 
 std::optional<GreedyTriangulation::Impl::Insertion> GreedyTriangulation::Impl::NextSeed(const GreedyGoal& goal) {
@@ -246,11 +239,8 @@ void GreedyTriangulation::Impl::ScanStarOf(const Star& star) {
   data_dependent_ ? data_dependent_->Scan(star, misfits_.data()) : scan_star_(open_, star, misfits_.data());
   const bool is_plain = sagitta_.is_flat() && !star.has_border;
   for (std::size_t i = 0; i < star.count; ++i) {
-    if (!is_plain) {
-      SetCandidate(star, i);
-    } else {
-      candidates_.Set(star.triangles[i], {std::max(misfits_[i].distance, 0.0), misfits_[i].sample});
-    }
+    candidates_.Set(star.triangles[i], is_plain ? Candidate{std::max(misfits_[i].distance, 0.0), misfits_[i].sample}
+                                                : CandidateOf(star, i));
   }
 }
 
@@ -289,15 +279,11 @@ void GreedyTriangulation::Impl::MakeStar(TriangleId t, Star& star) const {
   }
   star.triangles[0] = t;
   star.outside[0] = triangulation_.twin(4 * t);
-  for (const VertexId vertex : {u, v}) {
-    const SamplePosition position = triangulation_.position(vertex);
-    star.ring.Put(vertex == u ? 0 : 1,
-                  {vertex, position.x - centre.x, position.y - centre.y, triangulation_.height(vertex)});
-  }
+  star.ring.Put(0, triangulation_.Seen(u, centre));
+  star.ring.Put(1, triangulation_.Seen(v, centre));
 }
 
-void GreedyTriangulation::Impl::SetCandidate(const Star& star, std::size_t i) {
-  const TriangleId t = star.triangles[i];
+Candidate GreedyTriangulation::Impl::CandidateOf(const Star& star, std::size_t i) {
   Candidate worst;
   if (misfits_[i].sample != kNoSample) {
     const double sagitta =
@@ -306,10 +292,10 @@ void GreedyTriangulation::Impl::SetCandidate(const Star& star, std::size_t i) {
     worst = {misfits_[i].distance + sagitta, misfits_[i].sample};
   }
   if (star.has_border) {
-    const Candidate on_border = WorstOnBorderOf(t);
+    const Candidate on_border = WorstOnBorderOf(star.triangles[i]);
     if (Precedes(on_border, worst)) worst = on_border;
   }
-  candidates_.Set(t, worst);
+  return worst;
 }
 
 Candidate GreedyTriangulation::Impl::WorstOnBorderOf(TriangleId t) {
@@ -349,11 +335,6 @@ double GreedyTriangulation::Impl::SquaresOf(TriangleId t) const {
 Corner GreedyTriangulation::Impl::CornerAt(VertexId vertex) const {
   const SamplePosition position = triangulation_.position(vertex);
   return {position.x, position.y, static_cast<double>(triangulation_.height(vertex))};
-}
-
-SamplePosition GreedyTriangulation::Impl::PositionOf(std::uint32_t sample) const {
-  const auto width = static_cast<std::uint32_t>(field_->width());
-  return {static_cast<std::uint16_t>(sample % width), static_cast<std::uint16_t>(sample / width)};
 }
 
 GreedyTriangulation::GreedyTriangulation(const HeightField& field, GreedyOptions options)

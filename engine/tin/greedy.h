@@ -13,7 +13,6 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
-#include <span>
 #include <stop_token>
 #include <vector>
 
@@ -95,7 +94,7 @@ struct GreedyOptions {
   std::array<BorderOptions, 4> borders;  // by Side
   Curvature curvature;
   std::vector<SeedGrid> seeds;  // in order of decreasing below_error
-  bool record = false;          // keep the order of insertions for TakeRefinement
+  bool record = false;          // keep the order of insertions for MakeRefinement
 };
 
 // A run stops as soon as one of these holds.

@@ -14,6 +14,12 @@ struct SamplePosition {
   friend bool operator==(SamplePosition, SamplePosition) = default;
 };
 
+// Of a row-major index in a field of `width` columns.
+constexpr SamplePosition PositionOf(std::uint32_t index, int width) {
+  const auto columns = static_cast<std::uint32_t>(width);
+  return {static_cast<std::uint16_t>(index % columns), static_cast<std::uint16_t>(index / columns)};
+}
+
 struct TinMesh {
   // The field's four corners first, counter-clockwise from (0, 0), then in order of insertion.
   std::vector<SamplePosition> vertices;

@@ -4,6 +4,10 @@
 
 namespace terrace::tin {
 
+Triangulation::Vertex Triangulation::VertexAt(const HeightField& field, int x, int y) {
+  return {{static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)}, field.VertexHeight(x, y)};
+}
+
 Triangulation::Triangulation(const std::array<Vertex, 4>& corners) : vertices_(corners.begin(), corners.end()) {
   //  3-----2
   //  | 1 / |
@@ -13,6 +17,10 @@ Triangulation::Triangulation(const std::array<Vertex, 4>& corners) : vertices_(c
   narrow_.slots = {Triangle::Of(0, 1, 2, kNone, kNone, 6), Triangle::Of(2, 3, 0, kNone, kNone, 2)};
   Grow();
 }
+
+Triangulation::Triangulation(const HeightField& field)
+    : Triangulation({VertexAt(field, 0, 0), VertexAt(field, field.width() - 1, 0),
+                     VertexAt(field, field.width() - 1, field.height() - 1), VertexAt(field, 0, field.height() - 1)}) {}
 
 Triangulation::Triangulation(std::vector<Vertex> vertices, const std::vector<std::array<std::uint32_t, 3>>& triangles)
     : vertices_(std::move(vertices)), is_wide_(vertices_.size() > NarrowTriangles::kMostVertices) {

@@ -22,6 +22,7 @@
 #include <vector>
 
 #include "engine/core/check.h"
+#include "engine/tin/height_field.h"
 #include "engine/tin/predicates.h"
 #include "engine/tin/star.h"
 #include "engine/tin/tin_mesh.h"
@@ -37,9 +38,13 @@ class Triangulation {
     SamplePosition position;
     float height = 0;  // metres
   };
+  static Vertex VertexAt(const HeightField& field, int x, int y);
 
   // Two triangles over a rectangle. `corners` are vertices 0 to 3, counter-clockwise from its smallest x and y.
   explicit Triangulation(const std::array<Vertex, 4>& corners);
+
+  // Two triangles over the field.
+  explicit Triangulation(const HeightField& field);
 
   // Triangles in the order given. Precondition: they cover a rectangle once, counter-clockwise.
   Triangulation(std::vector<Vertex> vertices, const std::vector<std::array<std::uint32_t, 3>>& triangles);
@@ -73,6 +78,9 @@ class Triangulation {
   SamplePosition position(VertexId vertex) const { return vertices_[vertex].position; }
   float height(VertexId vertex) const { return vertices_[vertex].height; }
   std::array<VertexId, 3> triangle(TriangleId t) const { return {corner(4 * t), corner(4 * t + 1), corner(4 * t + 2)}; }
+
+  // The vertex as part of a ring around `from`.
+  RingVertex Seen(VertexId vertex, SamplePosition from) const { return Relative(vertices_.data(), vertex, from); }
 
   // The corner where a half-edge starts, and its twin.
   VertexId corner(HalfEdgeId edge) const {

@@ -26,8 +26,8 @@
 #include "server/cli/fail.h"
 #include "server/cli/mesh_blocks.h"
 #include "server/cli/mesh_color.h"
+#include "server/cli/mesh_output.h"
 #include "server/cli/mesh_placement.h"
-#include "server/cli/output_file.h"
 #include "server/cli/progress.h"
 
 namespace terrace::cli {
@@ -48,8 +48,6 @@ struct MeshArguments {
   bool compact = false, json = false;
   ColorArguments color;
 };
-
-double Since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 // What is wrong with the arguments, or nothing.
 std::string Complain(const MeshArguments& arguments) {
@@ -114,12 +112,8 @@ tin::TinMesh Triangulate(const MeshArguments& arguments, const tin::HeightField&
   return greedy.Mesh();
 }
 
-struct Seconds {
-  double read = 0, triangulate = 0, write = 0;
-};
-
 void Print(const MeshArguments& arguments, const tin::HeightField& field, const tin::TinMesh& mesh,
-           const tin::MeshError& error, const Seconds& seconds) {
+           const tin::MeshError& error, const MeshSeconds& seconds) {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
   if (arguments.json) {
@@ -172,12 +166,13 @@ int Mesh(const MeshArguments& arguments) {
     if (arguments.points > 0) goal.max_points = arguments.points;
     return MeshColored({arguments.dem, arguments.out, arguments.coordinates, goal, arguments.color, arguments.json});
   }
-  const auto format = proto::MeshFileFormatOf(arguments.out);
-  if (!format) return Fail(format.error().message, kExitUsage);
-  Result<OutputFile> file = OutputFile::Open(arguments.out);  // before the work: a folder that is missing costs no time
-  if (!file) return Fail(file.error().message, kExitFailure);
+  Result<MeshOutput> output = MeshOutput::Open(arguments.out);
+  if (!output) {
+    const bool is_usage = output.error().code == ErrorCode::kInvalidArgument;
+    return Fail(output.error().message, is_usage ? kExitUsage : kExitFailure);
+  }
 
-  Seconds seconds;
+  MeshSeconds seconds;
   Clock::time_point start = Clock::now();
   Result<dem::RasterHeights> raster = [&] {
     Progress progress("reading " + arguments.dem);
@@ -189,20 +184,18 @@ int Mesh(const MeshArguments& arguments) {
   if (!placement) return Fail(placement.error().message, kExitUsage);
   const auto field = tin::HeightField::Make(raster->width, raster->height, std::move(raster->heights));
   if (!field) return Fail(arguments.dem + ": " + field.error().message, kExitFailure);
-  seconds.read = Since(start);
+  seconds.read = SecondsSince(start);
 
   start = Clock::now();
   tin::TinMesh mesh = Triangulate(arguments, *field);
   // Nobody stops it.
   if (arguments.compact) mesh = *tin::DropVertices(*field, mesh, {.max_error = arguments.max_error});
-  seconds.triangulate = Since(start);
+  seconds.triangulate = SecondsSince(start);
 
   start = Clock::now();
-  Result<void> written =
-      proto::WriteMesh(file->stream(), *format, VerticesOf(mesh, *field, *placement), TrianglesOf(mesh, *placement));
-  if (written) written = file->Commit();
+  const Result<void> written = output->Write(VerticesOf(mesh, *field, *placement), TrianglesOf(mesh, *placement));
   if (!written) return Fail(written.error().message, kExitFailure);
-  seconds.write = Since(start);
+  seconds.write = SecondsSince(start);
   Print(arguments, *field, mesh, tin::MeasureError(*field, mesh), seconds);
   return kExitOk;
 }

@@ -18,16 +18,14 @@
 #include "proto/mesh_file.h"
 #include "server/cli/command.h"
 #include "server/cli/fail.h"
+#include "server/cli/mesh_output.h"
 #include "server/cli/mesh_placement.h"
-#include "server/cli/output_file.h"
 #include "server/cli/progress.h"
 
 namespace terrace::cli {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-double Since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 struct Source {
   tin::ExtendedField field;
@@ -85,13 +83,9 @@ tin::ColoredMesh Triangulate(const tin::ExtendedField& field, const tin::Extende
   return greedy.Mesh();
 }
 
-struct Seconds {
-  double read = 0, triangulate = 0, write = 0;
-};
-
 nlohmann::ordered_json Statistics(const ColoredMeshArguments& arguments, const tin::ExtendedField& field,
                                   const tin::ColoredMesh& mesh, const tin::ExtendedError& error,
-                                  const Seconds& seconds) {
+                                  const MeshSeconds& seconds) {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
   const bool is_image = arguments.color.is_image;
@@ -112,7 +106,7 @@ nlohmann::ordered_json Statistics(const ColoredMeshArguments& arguments, const t
 }
 
 void Print(const ColoredMeshArguments& arguments, const tin::ExtendedField& field, const tin::ColoredMesh& mesh,
-           const tin::ExtendedError& error, const Seconds& seconds) {
+           const tin::ExtendedError& error, const MeshSeconds& seconds) {
   if (arguments.json) {
     fmt::print("{}\n", Statistics(arguments, field, mesh, error, seconds)
                            .dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
@@ -132,28 +126,27 @@ void Print(const ColoredMeshArguments& arguments, const tin::ExtendedField& fiel
 }  // namespace
 
 int MeshColored(const ColoredMeshArguments& arguments) {
-  const auto format = proto::MeshFileFormatOf(arguments.out);
-  if (!format) return Fail(format.error().message, kExitUsage);
-  Result<OutputFile> file = OutputFile::Open(arguments.out);  // before the work: a folder that is missing costs no time
-  if (!file) return Fail(file.error().message, kExitFailure);
+  Result<MeshOutput> output = MeshOutput::Open(arguments.out);
+  if (!output) {
+    const bool is_usage = output.error().code == ErrorCode::kInvalidArgument;
+    return Fail(output.error().message, is_usage ? kExitUsage : kExitFailure);
+  }
 
-  Seconds seconds;
+  MeshSeconds seconds;
   Clock::time_point start = Clock::now();
   const Result<Source> source = arguments.color.is_image ? ReadPicture(arguments) : ReadDem(arguments);
   if (!source) return Fail(source.error().message, kExitFailure);
-  seconds.read = Since(start);
+  seconds.read = SecondsSince(start);
 
   start = Clock::now();
   const tin::ColoredMesh mesh = Triangulate(source->field, arguments.goal);
-  seconds.triangulate = Since(start);
+  seconds.triangulate = SecondsSince(start);
 
   start = Clock::now();
-  Result<void> written =
-      proto::WriteMesh(file->stream(), *format, VerticesOf(mesh.tin, source->field.heights(), source->placement),
-                       TrianglesOf(mesh.tin, source->placement), mesh.colors);
-  if (written) written = file->Commit();
+  const Result<void> written = output->Write(VerticesOf(mesh.tin, source->field.heights(), source->placement),
+                                             TrianglesOf(mesh.tin, source->placement), mesh.colors);
   if (!written) return Fail(written.error().message, kExitFailure);
-  seconds.write = Since(start);
+  seconds.write = SecondsSince(start);
   Print(arguments, source->field, mesh, tin::MeasureExtendedError(source->field, mesh), seconds);
   return kExitOk;
 }

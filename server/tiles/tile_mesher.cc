@@ -1,7 +1,9 @@
 #include "server/tiles/tile_mesher.h"
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -17,7 +19,7 @@
 namespace terrace::server {
 namespace {
 
-tl::unexpected<Error> Cancelled() { return MakeError(ErrorCode::kCancelled, "nobody waits for this tile any more"); }
+using Clock = std::chrono::steady_clock;
 
 proto::EdgeSteps EdgeStepsOf(const dem::DemSource& source, const geo::TileKey& key, double error_m) {
   const std::int64_t rows = geo::TileRows(key.level);
@@ -95,6 +97,8 @@ Result<tin::TinMesh> Compact(const tin::HeightField& field, const tin::TinMesh& 
 
 }  // namespace
 
+tl::unexpected<Error> Cancelled() { return MakeError(ErrorCode::kCancelled, "nobody waits for this tile any more"); }
+
 tin::HeightField FieldOf(const proto::LatticeView& lattice) {
   const int side = lattice.cells() + 1;
   std::vector<float> heights;
@@ -119,6 +123,7 @@ Result<MeshedTile> MeshTile(const dem::DemSource& source, const proto::LatticeVi
   const int level = lattice.key.level;
   const proto::EdgeSteps steps = EdgeStepsOf(source, lattice.key, wanted_error_m);
   double error_m = wanted_error_m;
+  const Clock::time_point start = Clock::now();
   Result<tin::TinMesh> mesh =
       refinement.vertex_count() <= proto::kMaxTileVertices
           ? refinement.MeshAt(error_m)
@@ -127,7 +132,9 @@ Result<MeshedTile> MeshTile(const dem::DemSource& source, const proto::LatticeVi
     mesh = Compact(FieldOf(lattice), *mesh, PlanOf(source, lattice, rules.criterion), error_m, stop);
   }
   if (!mesh) return tl::unexpected(std::move(mesh).error());
+  const auto replayed = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - start);
   Result<MeshedTile> meshed = Finish(*std::move(mesh), lattice, steps, error_m, IsCurved(level, error_m), stop);
+  if (meshed) meshed->replayed = replayed;
   if (!meshed || proto::AllCounterClockwise(meshed->tile)) return meshed;
 
   error_m = wanted_error_m;

@@ -1,6 +1,7 @@
 // From heights and their refinement to the mesh of a tile as it goes on the wire.
 #pragma once
 
+#include <chrono>
 #include <stop_token>
 
 #include "engine/core/result.h"
@@ -23,8 +24,12 @@ struct MeshRules {
 struct MeshedTile {
   tin::TinMesh mesh;
   proto::QuantizedTile tile;
-  double max_error_m = 0;  // measured on the encoded integers
+  double max_error_m = 0;                // measured on the encoded integers
+  std::chrono::microseconds replayed{};  // time until the mesh stood; quantizing and measuring came after it
 };
+
+// What a build ends with when it was stopped.
+tl::unexpected<Error> Cancelled();
 
 // The samples of a tile without the halo.
 tin::HeightField FieldOf(const proto::LatticeView& lattice);

@@ -21,8 +21,6 @@ std::chrono::microseconds Since(Clock::time_point start) {
   return std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - start);
 }
 
-tl::unexpected<Error> Cancelled() { return MakeError(ErrorCode::kCancelled, "nobody waits for this tile any more"); }
-
 std::string StrongETag(std::string_view bytes) {
   const XXH128_hash_t hash = XXH3_128bits(bytes.data(), bytes.size());
   return fmt::format("\"{:016x}{:016x}\"", hash.high64, hash.low64);
@@ -67,8 +65,10 @@ Result<RefinedTilePtr> TilePipeline::Refine(std::uint32_t index, const geo::Tile
   if (!greedy.Run(goal, stop)) return Cancelled();
   auto refined = std::make_shared<RefinedTile>(RefinedTile{std::move(heights), greedy.MakeRefinement(), error_m});
   encoded.times.refine = Since(start);
-  // One that ended at the format's number of vertices holds no mesh to this error.
-  if (refined->refinement.vertex_count() <= proto::kMaxTileVertices) {
+  // One that ended at the format's number of vertices holds no mesh to this error. Another build may have gone further
+  // meanwhile.
+  const RefinedTilePtr other = refinements_.Find(cache_key);
+  if (refined->refinement.vertex_count() <= proto::kMaxTileVertices && !(other && other->error_m <= error_m)) {
     refinements_.Insert(cache_key, refined);
   }
   return RefinedTilePtr(std::move(refined));
@@ -93,7 +93,8 @@ Result<EncodedTile> TilePipeline::Build(const TileRequest& request, std::stop_to
   if (!measured) return tl::unexpected(std::move(measured).error());
   if (request.normals) measured->tile.normals = proto::TileNormals(lattice, measured->mesh, measured->tile);
   encoded.bytes = proto::EncodeQuantizedMesh(measured->tile, {.normals = request.normals});
-  encoded.times.encode = Since(start);
+  encoded.times.refine += measured->replayed;
+  encoded.times.encode = Since(start) - measured->replayed;
 
   if (request.coding == Coding::kGzip) {
     start = Clock::now();

@@ -11,22 +11,8 @@ namespace terrace::bench {
 using tin::Candidate;
 using tin::TriangleId;
 
-namespace {
-
-tin::Triangulation::Vertex VertexAt(const tin::HeightField& field, int x, int y) {
-  return {{static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)}, field.VertexHeight(x, y)};
-}
-
-tin::Triangulation CornersOf(const tin::HeightField& field) {
-  const int east = field.width() - 1, north = field.height() - 1;
-  return tin::Triangulation(std::array{VertexAt(field, 0, 0), VertexAt(field, east, 0), VertexAt(field, east, north),
-                                       VertexAt(field, 0, north)});
-}
-
-}  // namespace
-
 ParallelInsertion::ParallelInsertion(const tin::HeightField& field)
-    : field_(field), triangulation_(CornersOf(field)), changed_{0, 1} {
+    : field_(field), triangulation_(field), changed_{0, 1} {
   ScanChanged();
 }
 
@@ -61,13 +47,12 @@ std::size_t ParallelInsertion::Pass(double threshold, std::size_t max_points) {
 
 // False if the sample is a vertex already: the triangles on both sides of an edge may have chosen the same.
 bool ParallelInsertion::Insert(const Candidate& candidate) {
-  const auto width = static_cast<std::uint32_t>(field_.width());
-  const tin::SamplePosition point{static_cast<std::uint16_t>(candidate.sample % width),
-                                  static_cast<std::uint16_t>(candidate.sample / width)};
+  const tin::SamplePosition point = tin::PositionOf(candidate.sample, field_.width());
   const TriangleId start = changed_.empty() ? 0 : changed_.back();
   const TriangleId triangle = triangulation_.Locate(point, start);
   if (triangulation_.IsCorner(point, triangle)) return false;
-  const tin::Star& star = triangulation_.InsertDelaunay(VertexAt(field_, point.x, point.y), triangle);
+  const tin::Star& star =
+      triangulation_.InsertDelaunay(tin::Triangulation::VertexAt(field_, point.x, point.y), triangle);
   changed_.insert(changed_.end(), star.triangles.begin(),
                   star.triangles.begin() + static_cast<std::ptrdiff_t>(star.count));
   return true;

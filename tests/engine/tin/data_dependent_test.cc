@@ -72,7 +72,7 @@ testing::AssertionResult AreEqual(const TinMesh& a, const TinMesh& b) {
 class NaiveDataDependent {
  public:
   NaiveDataDependent(const HeightField& field, DataDependentOptions options)
-      : field_(field), options_(options), open_(field), triangulation_(Corners(field)) {}
+      : field_(field), options_(options), open_(field), triangulation_(field) {}
 
   TinMesh Run(double max_error) {
     for (;;) {
@@ -94,14 +94,6 @@ class NaiveDataDependent {
   }
 
  private:
-  static std::array<Triangulation::Vertex, 4> Corners(const HeightField& field) {
-    const auto at = [&](int x, int y) -> Triangulation::Vertex {
-      return {{static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)}, field.VertexHeight(x, y)};
-    };
-    const int east = field.width() - 1, north = field.height() - 1;
-    return {at(0, 0), at(east, 0), at(east, north), at(0, north)};
-  }
-
   Corner At(VertexId vertex) const {
     const SamplePosition p = triangulation_.position(vertex);
     return {p.x, p.y, static_cast<double>(triangulation_.height(vertex))};
@@ -162,8 +154,7 @@ class NaiveDataDependent {
   }
 
   void Insert(std::uint32_t sample, TriangleId triangle) {
-    const auto width = static_cast<std::uint32_t>(field_.width());
-    const SamplePosition at{static_cast<std::uint16_t>(sample % width), static_cast<std::uint16_t>(sample / width)};
+    const SamplePosition at = PositionOf(sample, field_.width());
     open_.Close(at);
     const float height = field_.At(at.x, at.y);
     const Corner p{at.x, at.y, static_cast<double>(height)};

@@ -93,16 +93,12 @@ class NaivePass {
 }  // namespace
 
 TinMesh NaiveGreedy(const HeightField& field, const std::array<BorderOptions, 4>& borders, const GreedyGoal& goal) {
-  const auto vertex = [&](int x, int y) -> Triangulation::Vertex {
-    return {{static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)}, field.VertexHeight(x, y)};
-  };
-  const int east = field.width() - 1, north = field.height() - 1;
-  Triangulation triangulation({vertex(0, 0), vertex(east, 0), vertex(east, north), vertex(0, north)});
+  Triangulation triangulation(field);
   while (triangulation.vertex_count() < goal.max_points) {
     const Pick worst = NaivePass(field, borders, triangulation).WorstOfAll();
     if (worst.candidate.error <= goal.max_error) break;
-    const auto sample = static_cast<int>(worst.candidate.sample);
-    triangulation.InsertDelaunay(vertex(sample % field.width(), sample / field.width()), worst.triangle);
+    const SamplePosition sample = PositionOf(worst.candidate.sample, field.width());
+    triangulation.InsertDelaunay(Triangulation::VertexAt(field, sample.x, sample.y), worst.triangle);
   }
   return triangulation.Mesh();
 }

@@ -15,6 +15,19 @@ std::uint64_t Random::Next() {
   return z ^ (z >> 31);
 }
 
+std::array<Corner, 3> RandomTriangle(Random& random, const HeightField& field) {
+  while (true) {
+    std::array<Corner, 3> corners;
+    for (Corner& corner : corners) {
+      corner.x = random.Below(field.width());
+      corner.y = random.Below(field.height());
+      corner.z = static_cast<double>(field.VertexHeight(corner.x, corner.y));
+    }
+    const auto& [a, b, c] = corners;
+    if ((b.x - a.x) * (c.y - a.y) > (b.y - a.y) * (c.x - a.x)) return corners;
+  }
+}
+
 HeightField MakeField(int width, int height, const std::function<float(int x, int y)>& at) {
   std::vector<float> heights;
   for (int y = 0; y < height; ++y) {

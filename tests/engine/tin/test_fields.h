@@ -1,10 +1,12 @@
 // Height fields to try the mesher on.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
 
 #include "engine/tin/height_field.h"
+#include "engine/tin/plane.h"
 
 namespace terrace::tin {
 
@@ -19,6 +21,9 @@ class Random {
  private:
   std::uint64_t state_;
 };
+
+// Three samples that turn counter-clockwise, with their heights.
+std::array<Corner, 3> RandomTriangle(Random& random, const HeightField& field);
 
 HeightField MakeField(int width, int height, const std::function<float(int x, int y)>& at);
 

@@ -5,25 +5,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "engine/tin/triangle_spans.h"
 #include "tests/engine/tin/test_fields.h"
 
 namespace terrace::tin {
 namespace {
-
-// Corners at random samples, with their heights; no triangle on a line.
-std::array<Corner, 3> RandomTriangle(const HeightField& field, Random& random) {
-  for (;;) {
-    std::array<Corner, 3> corners;
-    for (Corner& corner : corners) {
-      corner.x = random.Below(field.width());
-      corner.y = random.Below(field.height());
-      corner.z = static_cast<double>(field.VertexHeight(corner.x, corner.y));
-    }
-    if (Plane(corners).doubled_area != 0) return corners;
-  }
-}
 
 // Looked for among all samples; negative when there is none.
 double WorstDistance(const HeightField& field, const std::array<Corner, 3>& corners) {
@@ -42,7 +30,8 @@ TEST(SamplesAreWithin, AgreesWithTheWorstSample) {
   Random random(1);
   for (int trial = 0; trial < 3000; ++trial) {
     const HeightField field = NoiseField(2 + random.Below(20), 2 + random.Below(20), random.Next());
-    const std::array<Corner, 3> corners = RandomTriangle(field, random);
+    std::array<Corner, 3> corners = RandomTriangle(random, field);
+    if (random.Below(2) == 0) std::swap(corners[0], corners[1]);  // in any order
     const double worst = WorstDistance(field, corners);
     if (worst < 0) {
       EXPECT_TRUE(SamplesAreWithin(field, corners, -1));

@@ -18,18 +18,6 @@ SamplePosition PositionOf(const Corner& corner) {
   return {static_cast<std::uint16_t>(corner.x), static_cast<std::uint16_t>(corner.y)};
 }
 
-std::array<Corner, 3> RandomTriangle(Random& random, const HeightField& field) {
-  for (;;) {
-    std::array<Corner, 3> corners;
-    for (Corner& corner : corners) {
-      corner.x = random.Below(field.width());
-      corner.y = random.Below(field.height());
-      corner.z = static_cast<double>(field.VertexHeight(corner.x, corner.y));
-    }
-    if (Orientation(PositionOf(corners[0]), PositionOf(corners[1]), PositionOf(corners[2])) > 0) return corners;
-  }
-}
-
 // 2: strictly inside, 1: on an edge, 0: outside, a corner, or on the field's border.
 int CoverageOf(const HeightField& field, const std::array<Corner, 3>& corners, int x, int y) {
   if (x == 0 || y == 0 || x == field.width() - 1 || y == field.height() - 1) return 0;
