@@ -39,10 +39,19 @@ std::optional<std::int64_t> TileNumber(std::string_view text) {
   return number;
 }
 
+// Cuts the extension of a tile URL off its last segment.
+std::optional<TileFormat> CutFormat(std::string_view& name) {
+  constexpr std::pair<std::string_view, TileFormat> kSuffixes[] = {{".terrain", TileFormat::kQuantizedMesh},
+                                                                   {".glb", TileFormat::kGlb}};
+  for (const auto& [suffix, format] : kSuffixes) {
+    if (!name.ends_with(suffix)) continue;
+    name.remove_suffix(suffix.size());
+    return format;
+  }
+  return std::nullopt;
+}
+
 std::optional<geo::TileKey> ParseTileKey(std::string_view z, std::string_view x, std::string_view y) {
-  constexpr std::string_view kSuffix = ".terrain";
-  if (!y.ends_with(kSuffix)) return std::nullopt;
-  y.remove_suffix(kSuffix.size());
   const auto level = TileNumber(z), column = TileNumber(x), row = TileNumber(y);
   if (!level || !column || !row || *level > geo::kMaxLevel) return std::nullopt;
   const geo::TileKey key{static_cast<int>(*level), *column, *row};
@@ -125,10 +134,13 @@ Result<Route> Match(std::string_view target) {
     if (segments->size() == 2 && (*segments)[1] == "layer.json") {
       route->kind = RouteKind::kLayer;
     } else if (segments->size() == 4) {
-      const auto key = ParseTileKey((*segments)[1], (*segments)[2], (*segments)[3]);
-      if (!key) return NotFound();
+      std::string_view row = (*segments)[3];
+      const auto format = CutFormat(row);
+      const auto key = ParseTileKey((*segments)[1], (*segments)[2], row);
+      if (!format || !key) return NotFound();
       route->kind = RouteKind::kTile;
       route->key = *key;
+      route->format = *format;
     } else {
       return NotFound();
     }
