@@ -144,7 +144,7 @@ std::optional<double> HeightOn(const proto::DecodedGlb& glb, const std::array<st
                   ac = glb.positions[triangle[2]] - a;
   const geo::Vec3 h = geo::Cross(up, ac);
   const double determinant = geo::Dot(ab, h);
-  if (determinant <= 0) return std::nullopt;  // seen from below, or a skirt edge-on
+  if (determinant >= 0) return std::nullopt;  // its back, or a skirt edge-on
   const geo::Vec3 s = base - a;
   const double u = geo::Dot(s, h) / determinant;
   const geo::Vec3 q = geo::Cross(s, ab);
