@@ -81,19 +81,23 @@ std::uint32_t CandidateQueue::Winner() {
 bool CandidateQueue::Refill() {
   if (entered_ > 2 * wanted_) step_ = std::sqrt(step_);
   if (entered_ < wanted_ / 2) step_ = std::max(step_ * step_, 0.25);
-  // A sweep costs a cycle for every 16 slots or so, an entry one for every 16 that it is put before.
-  wanted_ = std::max(kLeastWanted, static_cast<std::size_t>(2 * std::sqrt(static_cast<double>(errors_.size()))));
+  // A sweep costs a cycle for every 16 slots or so, an entry one for every few that it is put before.
+  wanted_ = std::max(kLeastWanted, static_cast<std::size_t>(4 * std::sqrt(static_cast<double>(errors_.size()))));
+  entered_ = 0;
+  // What is left lies below the threshold, most often just below.
+  if (SweepFrom(threshold_)) return true;
+  const float largest = HWY_DYNAMIC_DISPATCH(Largest)(errors_.data(), errors_.size());
+  if (SweepFrom(std::min(largest, std::numeric_limits<float>::max()))) return true;
+  threshold_ = std::numeric_limits<float>::denorm_min();
+  return false;
+}
 
+// Fills the run with all candidates that are not much smaller than `most`; false if there are none.
+bool CandidateQueue::SweepFrom(float most) {
   run_.clear();
   run_begin_ = 0;
-  entered_ = 0;
-  const float largest = HWY_DYNAMIC_DISPATCH(Largest)(errors_.data(), errors_.size());
-  if (!(largest > 0)) {
-    threshold_ = std::numeric_limits<float>::denorm_min();
-    return false;
-  }
-  const float finite = std::min(largest, std::numeric_limits<float>::max());
-  threshold_ = std::max(static_cast<float>(finite * step_), std::numeric_limits<float>::denorm_min());
+  if (!(most > 0) || std::isinf(most)) return false;
+  threshold_ = std::max(static_cast<float>(most * step_), std::numeric_limits<float>::denorm_min());
   std::vector<hwy::uint128_t> foremost;
   std::array<std::uint32_t, kSwept + 1> found;
   for (std::size_t first = 0; first < errors_.size(); first += kSwept) {
@@ -104,6 +108,7 @@ bool CandidateQueue::Refill() {
       foremost.push_back({slot, OrderOf(slot)});
     }
   }
+  if (foremost.empty()) return false;
   hwy::Sorter()(foremost.data(), foremost.size(), hwy::SortDescending());
   for (const hwy::uint128_t& entry : foremost) run_.push_back({entry.hi, static_cast<std::uint32_t>(entry.lo)});
   entered_ = run_.size();

@@ -61,6 +61,7 @@ class CandidateQueue {
   void Grow(std::size_t slots);
   void Insert(std::uint32_t slot);
   bool Refill();
+  bool SweepFrom(float most);
   void Shorten();
   std::uint64_t OrderOf(std::uint32_t slot) const {
     return std::uint64_t{std::bit_cast<std::uint32_t>(errors_[slot])} << 32 | ~samples_[slot];

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstdint>
 #include <limits>
 
@@ -76,17 +77,6 @@ class Furthest {
 
 HWY_INLINE Doubles HeightsAt(const float* from) { return hn::PromoteTo(kDoubles, hn::LoadU(kFloats, from)); }
 
-// Four columns of one row, or of two where a vector takes them.
-HWY_INLINE Doubles FourColumnsAt(const float* from, int stride) {
-#if HWY_MAX_BYTES >= 64
-  const hn::Half<decltype(kFloats)> row;
-  return hn::PromoteTo(kDoubles, hn::Combine(kFloats, hn::LoadU(row, from + stride), hn::LoadU(row, from)));
-#else
-  static_cast<void>(stride);
-  return HeightsAt(from);
-#endif
-}
-
 // Barycentric coordinates times D of samples relative to p: integers, exact, also when stepped from row to row. Inside
 // and on the edges none is negative.
 class Barycentric {
@@ -114,31 +104,6 @@ class Barycentric {
 // D times the distance of the samples of one row or two.
 HWY_INLINE Doubles Numerator(Doubles heights, Doubles pz, Doubles d, Doubles plane) {
   return hn::Abs(hn::Sub(hn::Mul(d, hn::Sub(heights, pz)), plane));
-}
-
-// A bounding box of up to 4 x 4 samples, most of them once a mesh is fine: no branch at all.
-HWY_INLINE PlaneMisfit ScanSmallBox(const OpenSamples& samples, const ScannedTriangle& t) {
-  constexpr int kSide = 4;
-  const int rows = Lanes() / kSide;  // at once
-  HWY_ALIGN static constexpr double kColumn[8] = {0, 1, 2, 3, 0, 1, 2, 3}, kRow[8] = {0, 0, 0, 0, 1, 1, 1, 1};
-  const Doubles column = hn::Load(kDoubles, kColumn), row = hn::Load(kDoubles, kRow);
-  const Doubles d = All(t.d), pz = All(t.pz), b = All(t.b);
-  const Doubles x = hn::Add(All(t.west), column), a_x = hn::Mul(All(t.a), x);
-  Doubles y = hn::Add(All(t.south), row);
-  Barycentric barycentric(t, x, y, rows);
-  const double width = samples.width();
-  Doubles index = hn::Add(hn::Add(All((t.py + t.south) * width + (t.px + t.west)), column), hn::Mul(row, All(width)));
-  const float* from = samples.Row(t.py + t.south) + t.px + t.west;
-  Furthest furthest;
-  for (int j = 0; j < kSide; j += rows) {
-    const Doubles heights = FourColumnsAt(from, samples.width());
-    furthest.Visit(Numerator(heights, pz, d, hn::Add(a_x, hn::Mul(b, y))), index, barycentric.IsInside());
-    from += rows * samples.width();
-    index = hn::Add(index, All(rows * width));
-    y = hn::Add(y, All(rows));
-    barycentric.Step();
-  }
-  return furthest.Of(t.d);
 }
 
 // Every sample of some columns of the bounding box, masked: no spans, no divisions, no branches but the loop.
@@ -230,65 +195,213 @@ HWY_INLINE PlaneMisfit ScanSpans(const OpenSamples& samples, const ScannedTriang
   return furthest.Of(t.d);
 }
 
+// ScannedTriangle's numbers from the ring, one by one.
+HWY_INLINE ScannedTriangle TriangleOf(const Star& star, std::size_t i) {
+  const int ux = star.ring.dx[i], uy = star.ring.dy[i], vx = star.ring.dx[i + 1], vy = star.ring.dy[i + 1];
+  const double pz = static_cast<double>(star.height);
+  const double uz = static_cast<double>(star.ring.heights[i]) - pz;
+  const double vz = static_cast<double>(star.ring.heights[i + 1]) - pz;
+  ScannedTriangle t;
+  t.px = star.x, t.py = star.y, t.pz = pz;
+  t.ux = ux, t.uy = uy, t.vx = vx, t.vy = vy;
+  t.d = t.ux * t.vy - t.uy * t.vx;
+  t.a = t.vy * uz - t.uy * vz;
+  t.b = t.ux * vz - t.vx * uz;
+  t.west = std::min({ux, vx, 0}), t.east = std::max({ux, vx, 0});
+  t.south = std::min({uy, vy, 0}), t.north = std::max({uy, vy, 0});
+  return t;
+}
+
+HWY_INLINE PlaneMisfit ScanExactly(const OpenSamples& samples, const Star& star, std::size_t i) {
+  const ScannedTriangle t = TriangleOf(star, i);
+  // Up to two vectors of columns the box is quicker than its spans.
+  return t.east - t.west < 2 * Lanes() ? ScanBox(samples, t) : ScanSpans(samples, t);
+}
+
+#if HWY_TARGET != HWY_SCALAR
+
+// Small triangles are scanned in single precision, which is exact there most of the time: all heights are multiples of
+// a quantum (OpenSamples::quantum), so all that the formula adds and multiplies is, and every multiple up to 2^24 times
+// the quantum is a float. Where that bound may be exceeded, the triangle is scanned in double precision instead.
+const hn::CappedTag<float, 16> kQuick;
+using Quick = hn::Vec<decltype(kQuick)>;
+const hn::RebindToSigned<decltype(kQuick)> kQuickInts;
+
+HWY_INLINE Quick Every(float value) { return hn::Set(kQuick, value); }
+HWY_INLINE Quick Magnitude(Quick value) { return hn::Abs(value); }
+
+// Blocks of kSide x kSide samples, a few rows to a vector.
+constexpr int kMostLanes = 16;
+HWY_ALIGN constexpr float kColumnsBy4[kMostLanes] = {0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3};
+HWY_ALIGN constexpr float kRowsBy4[kMostLanes] = {0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3};
+HWY_ALIGN constexpr float kColumnsBy8[kMostLanes] = {0, 1, 2, 3, 4, 5, 6, 7, 0, 1, 2, 3, 4, 5, 6, 7};
+HWY_ALIGN constexpr float kRowsBy8[kMostLanes] = {0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1};
+
+#if HWY_MAX_BYTES >= 32
+constexpr int kLargeSide = 8;
+#else
+constexpr int kLargeSide = 4;
+#endif
+
+template <int kSide>
+HWY_INLINE Quick RowsFrom(const float* from, int stride) {
+  constexpr int kRowsAtOnce = static_cast<int>(hn::MaxLanes(kQuick)) / kSide;
+  if constexpr (kRowsAtOnce == 1) {
+    static_cast<void>(stride);
+    return hn::LoadU(kQuick, from);
+  } else if constexpr (kRowsAtOnce == 2) {
+    const hn::Half<decltype(kQuick)> row;
+    return hn::Combine(kQuick, hn::LoadU(row, from + stride), hn::LoadU(row, from));
+  } else {
+    const hn::Half<decltype(kQuick)> two;
+    const hn::Half<decltype(two)> row;
+    return hn::Combine(kQuick,
+                       hn::Combine(two, hn::LoadU(row, from + 3 * stride), hn::LoadU(row, from + 2 * stride)),
+                       hn::Combine(two, hn::LoadU(row, from + stride), hn::LoadU(row, from)));
+  }
+}
+
 // What the triangles of a star need, for as many of them at once as there are lanes.
 struct StarPlanes {
-  static constexpr std::size_t kMost = hn::MaxLanes(kDoubles);
+  static constexpr std::size_t kMost = hn::MaxLanes(kQuick);
 
   HWY_INLINE void Work(const Star& star, std::size_t first) {
     const std::int32_t *dx = star.ring.dx.data() + first, *dy = star.ring.dy.data() + first;
     const float* heights = star.ring.heights.data() + first;
-    const auto u_x = hn::LoadU(kInts, dx), v_x = hn::LoadU(kInts, dx + 1), none = hn::Zero(kInts);
-    const auto u_y = hn::LoadU(kInts, dy), v_y = hn::LoadU(kInts, dy + 1);
-    const Doubles pz = All(static_cast<double>(star.height));
-    const Doubles u_z = hn::Sub(HeightsAt(heights), pz), v_z = hn::Sub(HeightsAt(heights + 1), pz);
-    const Doubles ux_d = hn::PromoteTo(kDoubles, u_x), uy_d = hn::PromoteTo(kDoubles, u_y);
-    const Doubles vx_d = hn::PromoteTo(kDoubles, v_x), vy_d = hn::PromoteTo(kDoubles, v_y);
-    hn::Store(ux_d, kDoubles, ux);
-    hn::Store(uy_d, kDoubles, uy);
-    hn::Store(vx_d, kDoubles, vx);
-    hn::Store(vy_d, kDoubles, vy);
-    hn::Store(hn::Sub(hn::Mul(ux_d, vy_d), hn::Mul(uy_d, vx_d)), kDoubles, d);
-    hn::Store(hn::Sub(hn::Mul(vy_d, u_z), hn::Mul(uy_d, v_z)), kDoubles, a);
-    hn::Store(hn::Sub(hn::Mul(ux_d, v_z), hn::Mul(vx_d, u_z)), kDoubles, b);
-    hn::Store(hn::Min(hn::Min(u_x, v_x), none), kInts, west);
-    hn::Store(hn::Max(hn::Max(u_x, v_x), none), kInts, east);
-    hn::Store(hn::Min(hn::Min(u_y, v_y), none), kInts, south);
-    hn::Store(hn::Max(hn::Max(u_y, v_y), none), kInts, north);
+    const auto u_x = hn::LoadU(kQuickInts, dx), v_x = hn::LoadU(kQuickInts, dx + 1), none = hn::Zero(kQuickInts);
+    const auto u_y = hn::LoadU(kQuickInts, dy), v_y = hn::LoadU(kQuickInts, dy + 1);
+    const Quick pz = Every(star.height);
+    const Quick u_z = hn::Sub(hn::LoadU(kQuick, heights), pz), v_z = hn::Sub(hn::LoadU(kQuick, heights + 1), pz);
+    const Quick of_ux = hn::ConvertTo(kQuick, u_x), of_uy = hn::ConvertTo(kQuick, u_y);
+    const Quick of_vx = hn::ConvertTo(kQuick, v_x), of_vy = hn::ConvertTo(kQuick, v_y);
+    hn::Store(of_ux, kQuick, ux);
+    hn::Store(of_uy, kQuick, uy);
+    hn::Store(of_vx, kQuick, vx);
+    hn::Store(of_vy, kQuick, vy);
+    hn::Store(hn::Sub(hn::Mul(of_ux, of_vy), hn::Mul(of_uy, of_vx)), kQuick, d);
+    const Quick vy_uz = hn::Mul(of_vy, u_z), uy_vz = hn::Mul(of_uy, v_z);
+    const Quick ux_vz = hn::Mul(of_ux, v_z), vx_uz = hn::Mul(of_vx, u_z);
+    const Quick of_a = hn::Sub(vy_uz, uy_vz), of_b = hn::Sub(ux_vz, vx_uz);
+    hn::Store(of_a, kQuick, a);
+    hn::Store(of_b, kQuick, b);
+    const auto low_x = hn::Min(hn::Min(u_x, v_x), none), high_x = hn::Max(hn::Max(u_x, v_x), none);
+    const auto low_y = hn::Min(hn::Min(u_y, v_y), none), high_y = hn::Max(hn::Max(u_y, v_y), none);
+    hn::Store(low_x, kQuickInts, west);
+    hn::Store(low_y, kQuickInts, south);
+    hn::Store(hn::Max(hn::Sub(high_x, low_x), hn::Sub(high_y, low_y)), kQuickInts, extent);
+    // No column or row of the triangle is further from p than its box is wide or high.
+    const Quick across = hn::ConvertTo(kQuick, hn::Sub(high_x, low_x)), up = hn::ConvertTo(kQuick, hn::Sub(high_y, low_y));
+    const Quick products = hn::Add(hn::Max(Magnitude(vy_uz), Magnitude(uy_vz)), hn::Max(Magnitude(ux_vz), Magnitude(vx_uz)));
+    const Quick most_plane = hn::Add(hn::Mul(Magnitude(of_a), across), hn::Mul(Magnitude(of_b), up));
+    hn::Store(hn::Add(products, most_plane), kQuick, largest);
   }
 
-  HWY_ALIGN double ux[kMost], uy[kMost], vx[kMost], vy[kMost], d[kMost], a[kMost], b[kMost];
-  HWY_ALIGN std::int32_t west[kMost], east[kMost], south[kMost], north[kMost];
+  HWY_ALIGN float ux[kMost], uy[kMost], vx[kMost], vy[kMost], d[kMost], a[kMost], b[kMost];
+  HWY_ALIGN float largest[kMost];                                  // no product or sum of the planes' is larger
+  HWY_ALIGN std::int32_t west[kMost], south[kMost], extent[kMost];  // bounding box: its first sample, its larger side
 };
+
+struct QuickMisfit {
+  float numerator = -1;
+  std::uint32_t sample = kNoSample;
+};
+
+// One block, from (west, south) relative to p. No branch: which triangle lies where in its block cannot be foretold.
+template <int kSide>
+HWY_INLINE QuickMisfit ScanBlock(const OpenSamples& samples, const Star& star, const StarPlanes& planes, std::size_t i,
+                                 int west, int south) {
+  constexpr int kLanes = static_cast<int>(hn::MaxLanes(kQuick)), kRowsAtOnce = kLanes / kSide;
+  constexpr int kVectors = kSide * kSide / kLanes;
+  const Quick columns = hn::Load(kQuick, kSide == 4 ? kColumnsBy4 : kColumnsBy8);
+  const Quick rows = hn::Load(kQuick, kSide == 4 ? kRowsBy4 : kRowsBy8);
+  const Quick x = hn::Add(Every(static_cast<float>(west)), columns);
+  Quick y = hn::Add(Every(static_cast<float>(south)), rows);
+  const Quick ux = Every(planes.ux[i]), uy = Every(planes.uy[i]), vx = Every(planes.vx[i]), vy = Every(planes.vy[i]);
+  const Quick d = Every(planes.d[i]), b = Every(planes.b[i]), pz = Every(star.height);
+  const Quick a_x = hn::Mul(Every(planes.a[i]), x);
+  Quick of_u = hn::Sub(hn::Mul(vy, x), hn::Mul(vx, y)), of_v = hn::Sub(hn::Mul(ux, y), hn::Mul(uy, x));
+  Quick of_p = hn::Sub(d, hn::Add(of_u, of_v));
+  const Quick at_once = Every(static_cast<float>(kRowsAtOnce));
+  const Quick step_u = hn::Mul(vx, at_once), step_v = hn::Mul(ux, at_once), step_p = hn::Sub(step_u, step_v);
+
+  const Quick none = Every(-1.0F), zero = hn::Zero(kQuick);
+  const int width = samples.width();
+  const float* const from = samples.Row(star.y + south) + star.x + west;
+  HWY_ALIGN float numerators[kSide * kSide];
+  Quick most = none;
+#pragma GCC unroll 8
+  for (int k = 0; k < kVectors; ++k) {
+    const Quick heights = RowsFrom<kSide>(from + k * kRowsAtOnce * width, width);
+    const Quick numerator = hn::Abs(hn::Sub(hn::Mul(d, hn::Sub(heights, pz)), hn::Add(a_x, hn::Mul(b, y))));
+    const auto inside = hn::Ge(hn::Min(hn::Min(of_u, of_v), of_p), zero);
+    const Quick counted = hn::IfThenElse(hn::And(inside, hn::Ge(numerator, zero)), numerator, none);
+    hn::Store(counted, kQuick, numerators + k * kLanes);
+    most = hn::Max(most, counted);
+    y = hn::Add(y, at_once);
+    of_u = hn::Sub(of_u, step_u);
+    of_v = hn::Add(of_v, step_v);
+    of_p = hn::Add(of_p, step_p);
+  }
+  most = hn::MaxOfLanes(kQuick, most);
+  std::uint64_t found = 0;
+#pragma GCC unroll 8
+  for (int k = 0; k < kVectors; ++k) {
+    std::uint16_t bits = 0;
+    hn::StoreMaskBits(kQuick, hn::Eq(hn::Load(kQuick, numerators + k * kLanes), most),
+                      reinterpret_cast<std::uint8_t*>(&bits));
+    found |= std::uint64_t{bits} << (k * kLanes);
+  }
+  const int first = std::countr_zero(found);
+  const int sample = (star.y + south + first / kSide) * width + star.x + west + first % kSide;
+  return {hn::GetLane(most), static_cast<std::uint32_t>(sample)};
+}
+
+HWY_INLINE QuickMisfit ScanBlocks(const OpenSamples& samples, const Star& star, const StarPlanes& planes,
+                                  std::size_t i) {
+  const int west = planes.west[i], south = planes.south[i], extent = planes.extent[i];
+  if (extent < 4) return ScanBlock<4>(samples, star, planes, i, west, south);
+  QuickMisfit misfit;
+  for (int row = south; row <= south + extent; row += kLargeSide) {
+    for (int column = west; column <= west + extent; column += kLargeSide) {
+      const QuickMisfit other = ScanBlock<kLargeSide>(samples, star, planes, i, column, row);
+      const bool precedes = other.numerator > misfit.numerator ||
+                            (other.numerator == misfit.numerator && other.sample < misfit.sample);
+      if (precedes) misfit = other;
+    }
+  }
+  return misfit;
+}
+
+HWY_INLINE PlaneMisfit ScanQuickly(const OpenSamples& samples, const Star& star, const StarPlanes& planes,
+                                   std::size_t i, std::size_t first, float most_exact) {
+  if (planes.d[i] == 1) return {};  // Pick's theorem: no sample but its corners
+  const QuickMisfit quick = ScanBlocks(samples, star, planes, i);
+  if (quick.numerator < 0) return {};
+  if (!(quick.numerator + planes.largest[i] < most_exact)) return ScanExactly(samples, star, first + i);
+  return {static_cast<double>(quick.numerator) / static_cast<double>(planes.d[i]), quick.sample};
+}
+
+#endif
 
 }  // namespace
 
 void ScanStar(const OpenSamples& samples, const Star& star, PlaneMisfit* misfits) {
+#if HWY_TARGET == HWY_SCALAR
+  for (std::size_t i = 0; i < star.count; ++i) misfits[i] = ScanExactly(samples, star, i);
+#else
   StarPlanes planes;
-  const auto lanes = static_cast<std::size_t>(Lanes());
+  const std::size_t lanes = hn::Lanes(kQuick);
+  const float most_exact = samples.quantum() * 0xFFFF00;
   for (std::size_t first = 0; first < star.count; first += lanes) {
     planes.Work(star, first);
     const std::size_t count = std::min(lanes, star.count - first);
     for (std::size_t i = 0; i < count; ++i) {
-      PlaneMisfit& misfit = misfits[first + i];
-      if (planes.d[i] == 1) {  // Pick's theorem: no sample but its corners
-        misfit = {};
-        continue;
-      }
-      const ScannedTriangle t = {star.x,          star.y,         static_cast<double>(star.height),
-                                 planes.ux[i],    planes.uy[i],   planes.vx[i],
-                                 planes.vy[i],    planes.d[i],    planes.a[i],
-                                 planes.b[i],     planes.west[i], planes.east[i],
-                                 planes.south[i], planes.north[i]};
-      const int across = t.east - t.west;
-      if (lanes >= 4 && across < 4 && t.north - t.south < 4) {
-        misfit = ScanSmallBox(samples, t);
-      } else if (across < 2 * Lanes()) {  // up to two vectors of columns the box is quicker than its spans
-        misfit = ScanBox(samples, t);
-      } else {
-        misfit = ScanSpans(samples, t);
-      }
+      misfits[first + i] = planes.extent[i] < 2 * kLargeSide && planes.largest[i] < most_exact
+                               ? ScanQuickly(samples, star, planes, i, first, most_exact)
+                               : ScanExactly(samples, star, first + i);
     }
   }
+#endif
 }
 
 }  // namespace HWY_NAMESPACE
