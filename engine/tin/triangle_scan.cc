@@ -70,8 +70,7 @@ class Furthest {
 
   // Of samples that were visited apart.
   HWY_INLINE void Merge(const Furthest& other) {
-    const auto tied = hn::And(hn::Eq(other.numerator_, numerator_),
-                              hn::RebindMask(kTag, hn::Lt(other.index_, index_)));
+    const auto tied = hn::And(hn::Eq(other.numerator_, numerator_), hn::RebindMask(kTag, hn::Lt(other.index_, index_)));
     Keep(hn::Or(hn::Gt(other.numerator_, numerator_), tied), other.numerator_, other.index_);
   }
 
@@ -116,9 +115,7 @@ class Barycentric {
         of_v_(hn::Sub(hn::Mul(step_v_, y), hn::Mul(All(kTag, t.uy), x))),
         of_p_(hn::Sub(All(kTag, t.d), hn::Add(of_u_, of_v_))) {}
 
-  HWY_INLINE hn::Mask<Tag> IsInside() const {
-    return hn::Ge(hn::Min(hn::Min(of_u_, of_v_), of_p_), hn::Zero(kTag));
-  }
+  HWY_INLINE hn::Mask<Tag> IsInside() const { return hn::Ge(hn::Min(hn::Min(of_u_, of_v_), of_p_), hn::Zero(kTag)); }
   HWY_INLINE void Step() {
     of_u_ = hn::Sub(of_u_, step_u_);
     of_v_ = hn::Add(of_v_, step_v_);
@@ -299,8 +296,7 @@ HWY_INLINE Floats RowsFrom(const float* from, int stride) {
   } else {
     const hn::Half<decltype(kFloats)> two;
     const hn::Half<decltype(two)> row;
-    return hn::Combine(kFloats,
-                       hn::Combine(two, hn::LoadU(row, from + 3 * stride), hn::LoadU(row, from + 2 * stride)),
+    return hn::Combine(kFloats, hn::Combine(two, hn::LoadU(row, from + 3 * stride), hn::LoadU(row, from + 2 * stride)),
                        hn::Combine(two, hn::LoadU(row, from + stride), hn::LoadU(row, from)));
   }
 }
@@ -334,14 +330,15 @@ struct StarPlanes {
     hn::Store(low_y, kInts, south);
     hn::Store(hn::Max(hn::Sub(high_x, low_x), hn::Sub(high_y, low_y)), kInts, extent);
     // No column or row of the triangle is further from p than its box is wide or high.
-    const Floats across = hn::ConvertTo(kFloats, hn::Sub(high_x, low_x)), up = hn::ConvertTo(kFloats, hn::Sub(high_y, low_y));
+    const Floats across = hn::ConvertTo(kFloats, hn::Sub(high_x, low_x)),
+                 up = hn::ConvertTo(kFloats, hn::Sub(high_y, low_y));
     const Floats products = hn::Add(hn::Max(hn::Abs(vy_uz), hn::Abs(uy_vz)), hn::Max(hn::Abs(ux_vz), hn::Abs(vx_uz)));
     const Floats most_plane = hn::Add(hn::Mul(hn::Abs(of_a), across), hn::Mul(hn::Abs(of_b), up));
     hn::Store(hn::Add(products, most_plane), kFloats, largest);
   }
 
   HWY_ALIGN float ux[kMost], uy[kMost], vx[kMost], vy[kMost], d[kMost], a[kMost], b[kMost];
-  HWY_ALIGN float largest[kMost];                                  // no product or sum of the planes' is larger
+  HWY_ALIGN float largest[kMost];                                   // no product or sum of the planes' is larger
   HWY_ALIGN std::int32_t west[kMost], south[kMost], extent[kMost];  // bounding box: its first sample, its larger side
 };
 
@@ -363,7 +360,8 @@ HWY_INLINE QuickMisfit ScanBlock(const OpenSamples& samples, const Star& star, c
   const Floats rows = hn::Load(kFloats, kSide == 4 ? kRowsBy4 : kRowsBy8);
   const Floats x = hn::Add(All(kFloats, west), columns);
   Floats y = hn::Add(All(kFloats, south), rows);
-  const Floats ux = All(kFloats, planes.ux[i]), uy = All(kFloats, planes.uy[i]), vx = All(kFloats, planes.vx[i]), vy = All(kFloats, planes.vy[i]);
+  const Floats ux = All(kFloats, planes.ux[i]), uy = All(kFloats, planes.uy[i]), vx = All(kFloats, planes.vx[i]),
+               vy = All(kFloats, planes.vy[i]);
   const Floats d = All(kFloats, planes.d[i]), b = All(kFloats, planes.b[i]), pz = All(kFloats, star.height);
   const Floats a_x = hn::Mul(All(kFloats, planes.a[i]), x);
   Floats of_u = hn::Sub(hn::Mul(vy, x), hn::Mul(vx, y)), of_v = hn::Sub(hn::Mul(ux, y), hn::Mul(uy, x));
