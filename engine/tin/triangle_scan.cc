@@ -452,7 +452,8 @@ namespace terrace::tin {
 HWY_EXPORT(ScanStar);
 
 StarScan BestStarScan() {
-  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+  // Asking the processor costs a run of a small tile where it is a virtual one.
+  if (!hwy::GetChosenTarget().IsInitialized()) hwy::GetChosenTarget().Update(hwy::SupportedTargets());
   return HWY_DYNAMIC_DISPATCH(ScanStar);
 }
 

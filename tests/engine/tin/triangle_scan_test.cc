@@ -83,6 +83,7 @@ std::vector<std::int64_t> Targets() {
 void ExpectReference(const HeightField& field, const OpenSamples& samples, const Star& star) {
   for (const std::int64_t target : Targets()) {
     hwy::SetSupportedTargetsForTest(target);
+    hwy::GetChosenTarget().DeInit();  // chosen anew
     std::vector<PlaneMisfit> misfits(star.count);
     BestStarScan()(samples, star, misfits.data());
     for (std::size_t i = 0; i < star.count; ++i) {
@@ -92,6 +93,7 @@ void ExpectReference(const HeightField& field, const OpenSamples& samples, const
     }
   }
   hwy::SetSupportedTargetsForTest(0);
+  hwy::GetChosenTarget().DeInit();
 }
 
 TEST(TriangleScan, EqualsTheFormulaOnEveryTargetBitForBit) {
