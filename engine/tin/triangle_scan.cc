@@ -452,7 +452,7 @@ namespace terrace::tin {
 HWY_EXPORT(ScanStar);
 
 StarScan BestStarScan() {
-  // Asking the processor costs a run of a small tile where it is a virtual one.
+  // Not at each call: the question traps where the processor is a virtual one.
   if (!hwy::GetChosenTarget().IsInitialized()) hwy::GetChosenTarget().Update(hwy::SupportedTargets());
   return HWY_DYNAMIC_DISPATCH(ScanStar);
 }
