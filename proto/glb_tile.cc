@@ -160,7 +160,7 @@ std::string IndexBytes(const std::vector<std::array<std::uint32_t, 3>>& triangle
 GltfMesh Describe(const GlbOptions& options) {
   GltfMesh gltf;
   gltf.generator = options.generator;
-  gltf.material = {kGroundColor};
+  gltf.material = GltfMaterial{kGroundColor};
   return gltf;
 }
 
@@ -175,7 +175,7 @@ std::size_t AddView(GltfMesh& gltf, ByteWriter& buffer, std::string_view bytes, 
 std::size_t AddMeshoptView(GltfMesh& gltf, ByteWriter& buffer, std::string_view bytes, std::size_t count,
                            std::size_t stride, GltfTarget target) {
   const std::size_t view = AddView(gltf, buffer, bytes, stride, target);
-  gltf.views[view].meshopt = {target == GltfTarget::kIndices ? "TRIANGLES" : "ATTRIBUTES", "NONE", count};
+  gltf.views[view].meshopt = GltfMeshopt{target == GltfTarget::kIndices ? "TRIANGLES" : "ATTRIBUTES", "NONE", count};
   return view;
 }
 
@@ -201,7 +201,7 @@ Result<GlbTile> EncodeWithDraco(const GridMesh& mesh, const GlbOptions& options)
   gltf.matrix = NodeMatrix(origin, 1);
   ByteWriter buffer;
   const std::size_t view = AddView(gltf, buffer, draco->bytes, 0, GltfTarget::kNone);
-  gltf.draco = {view, {{"POSITION", draco->position_id}, {"NORMAL", draco->normal_id}}};
+  gltf.draco = GltfDraco{view, {{"POSITION", draco->position_id}, {"NORMAL", draco->normal_id}}};
   GltfAccessor position{.count = draco->points};
   position.min.assign(draco->min.begin(), draco->min.end());
   position.max.assign(draco->max.begin(), draco->max.end());

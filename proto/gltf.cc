@@ -89,7 +89,7 @@ std::string GltfJson(const GltfMesh& mesh) {
   json["meshes"] = Json::array({{{"primitives", Json::array({PrimitiveJson(mesh)})}}});
   if (mesh.material) {
     Json& pbr = json["materials"][0]["pbrMetallicRoughness"];
-    if (mesh.material->color != GltfMesh::Material{}.color) pbr["baseColorFactor"] = mesh.material->color;
+    if (mesh.material->color != GltfMaterial{}.color) pbr["baseColorFactor"] = mesh.material->color;
     pbr["metallicFactor"] = 0;
     pbr["roughnessFactor"] = 1;
   }

@@ -19,18 +19,18 @@ namespace terrace::proto {
 enum class GltfComponent { kByte = 5120, kUnsignedShort = 5123, kUnsignedInt = 5125, kFloat = 5126 };
 enum class GltfTarget { kNone = 0, kVertices = 34962, kIndices = 34963 };
 
+struct GltfMeshopt {
+  std::string_view mode, filter;  // "ATTRIBUTES", "TRIANGLES"; "NONE", "OCTAHEDRAL", "EXPONENTIAL"
+  std::size_t count = 0;
+};
+
 // A part of the buffer. With `meshopt` the bytes in the buffer are compressed (EXT_meshopt_compression), and stride and
 // count describe what they decode to.
 struct GltfView {
-  struct Meshopt {
-    std::string_view mode, filter;  // "ATTRIBUTES", "TRIANGLES"; "NONE", "OCTAHEDRAL", "EXPONENTIAL"
-    std::size_t count = 0;
-  };
-
   std::size_t offset = 0, length = 0;
   std::size_t stride = 0;  // 0: not stated, tightly packed
   GltfTarget target = GltfTarget::kNone;
-  std::optional<Meshopt> meshopt = {};
+  std::optional<GltfMeshopt> meshopt = {};
 };
 
 struct GltfAccessor {
@@ -42,6 +42,16 @@ struct GltfAccessor {
   std::vector<double> min = {}, max = {};  // empty: not stated
 };
 
+// KHR_draco_mesh_compression: the view of the Draco bytes, and Draco's unique id of each attribute.
+struct GltfDraco {
+  std::size_t view = 0;
+  std::vector<std::pair<std::string_view, unsigned>> attributes;
+};
+
+struct GltfMaterial {
+  std::array<double, 4> color{1, 1, 1, 1};  // linear
+};
+
 struct GltfMesh {
   std::array<double, 16> matrix{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};  // of the node, column by column
   std::string_view generator = "terrace";
@@ -50,17 +60,8 @@ struct GltfMesh {
   std::vector<GltfAccessor> accessors;
   std::vector<std::pair<std::string_view, std::size_t>> attributes;  // "POSITION" -> accessor
   std::size_t indices = 0;                                           // accessor
-  // KHR_draco_mesh_compression: the view of the Draco bytes, and Draco's unique id of each attribute.
-  struct Draco {
-    std::size_t view = 0;
-    std::vector<std::pair<std::string_view, unsigned>> attributes;
-  };
-  std::optional<Draco> draco;
-  // Without one, glTF's default material applies, which is a metal.
-  struct Material {
-    std::array<double, 4> color{1, 1, 1, 1};  // linear
-  };
-  std::optional<Material> material;
+  std::optional<GltfDraco> draco;
+  std::optional<GltfMaterial> material;  // without one, glTF's default applies, which is a metal
   std::size_t buffer_bytes = 0;
 };
 
