@@ -117,6 +117,7 @@ Result<TileRequest> Negotiate(const Route& route, const Request& request, std::s
   TileRequest tile;
   tile.dataset = *dataset;
   tile.key = route.key;
+  tile.format = route.format;
   tile.error_step = ErrorStep(parameters->wish, route.key.level, view.error_fraction);
   tile.coding = NegotiateCoding(request.accept_encoding);
   tile.normals = WantsNormals(request.accept, parameters->extensions);

@@ -8,7 +8,7 @@
 
 namespace terrace::server {
 
-enum class TileFormat : std::uint8_t { kQuantizedMesh };
+enum class TileFormat : std::uint8_t { kQuantizedMesh, kGlb };
 enum class Coding : std::uint8_t { kIdentity, kGzip };
 
 struct TileRequest {
