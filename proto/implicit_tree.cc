@@ -29,9 +29,8 @@ std::vector<geo::TileKey> ImplicitRoots(Availability available) {
       for (std::int64_t x = range.start_x; x <= range.end_x; ++x) roots.push_back({static_cast<int>(level), x, y});
     }
   }
-  std::sort(roots.begin(), roots.end(), [](const geo::TileKey& a, const geo::TileKey& b) {
-    return a.y != b.y ? a.y < b.y : a.x < b.x;
-  });
+  std::sort(roots.begin(), roots.end(),
+            [](const geo::TileKey& a, const geo::TileKey& b) { return a.y != b.y ? a.y < b.y : a.x < b.x; });
   return roots;
 }
 
@@ -45,9 +44,9 @@ std::vector<std::vector<geo::TileRange>> BlocksBelow(Availability available, con
     const std::int64_t last = (std::int64_t{1} << k) - 1;
     const geo::TileKey corner = TileUnder(top, static_cast<int>(k), 0, 0);
     for (const geo::TileRange& range : available[level]) {
-      const geo::TileRange here{
-          std::max<std::int64_t>(range.start_x - corner.x, 0), std::max<std::int64_t>(range.start_y - corner.y, 0),
-          std::min(range.end_x - corner.x, last), std::min(range.end_y - corner.y, last)};
+      const geo::TileRange here{std::max<std::int64_t>(range.start_x - corner.x, 0),
+                                std::max<std::int64_t>(range.start_y - corner.y, 0),
+                                std::min(range.end_x - corner.x, last), std::min(range.end_y - corner.y, last)};
       if (here.start_x <= here.end_x && here.start_y <= here.end_y) blocks[k].push_back(here);
     }
   }

@@ -1,8 +1,8 @@
 // The tiles of a dataset as implicit quadtrees of 3D Tiles 1.1 (OGC 22-025r4, "Implicit Tiling"): where the trees are
 // rooted, and what lies in a subtree of them. Pure functions, thread-safe.
 //
-// A tree is rooted at a TMS tile. Inside it a tile has the level, column and row that it has under that root: level 0 is
-// the root, x counts from the west and y from the SOUTH, as in TMS, so that the numbers differ by a shift alone.
+// A tree is rooted at a TMS tile. Inside it a tile has the level, column and row that it has under that root: level 0
+// is the root, x counts from the west and y from the SOUTH, as in TMS, so that the numbers differ by a shift alone.
 #pragma once
 
 #include <cstdint>

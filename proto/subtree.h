@@ -16,8 +16,8 @@ inline constexpr int kMaxSubtreeLevels = 10;  // 350,000 tiles; clients make an 
 
 struct Subtree {
   int levels = 1;  // 1 .. kMaxSubtreeLevels
-  // Entry k, 0 .. levels: blocks without overlap of the available tiles k levels below the subtree's root, numbered from
-  // its south-western corner. Entry `levels` holds the roots of child subtrees.
+  // Entry k, 0 .. levels: blocks without overlap of the available tiles k levels below the subtree's root, numbered
+  // from its south-western corner. Entry `levels` holds the roots of child subtrees.
   std::vector<std::vector<geo::TileRange>> tiles;
 };
 

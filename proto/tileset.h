@@ -1,4 +1,5 @@
-// tileset.json of 3D Tiles 1.1: implicit quadtrees over TMS tiles (OGC 22-025r4). Knows nothing of what a tile contains.
+// tileset.json of 3D Tiles 1.1: implicit quadtrees over TMS tiles (OGC 22-025r4). Knows nothing of what a tile
+// contains.
 #pragma once
 
 #include <string>

@@ -13,6 +13,7 @@ DatasetView ViewOf(const Dataset& dataset) {
   view.name = dataset.name;
   view.attribution = dataset.attribution;
   view.error_fraction = dataset.error_fraction;
+  view.glb_compression = dataset.glb.compression;
   view.generation = dataset.generation;
   for (int level = 0; level <= dataset.source->max_level(); ++level) {
     view.available.push_back(dataset.source->Available(level));

@@ -29,6 +29,11 @@ std::string_view Name(CacheStatus cache) {
   return "join";
 }
 
+std::string_view ContentTypeOf(const TileRequest& tile) {
+  if (tile.format == TileFormat::kGlb) return "model/gltf-binary";
+  return tile.normals ? "application/vnd.quantized-mesh;extensions=octvertexnormals" : "application/vnd.quantized-mesh";
+}
+
 }  // namespace
 
 TileHandler::TileHandler(std::span<const DatasetView> datasets, TileService& tiles, TileHandlerOptions options)
@@ -50,8 +55,7 @@ asio::awaitable<Response> TileHandler::Handle(Route route, Request request) cons
 
 Response TileHandler::Reply(const ServedTile& served, const TileRequest& tile, const Request& request) const {
   Response response;
-  response.content_type =
-      tile.normals ? "application/vnd.quantized-mesh;extensions=octvertexnormals" : "application/vnd.quantized-mesh";
+  response.content_type = ContentTypeOf(tile);
   response.body = Body(served.tile, &served.tile->bytes);
   response.coding = tile.coding;
   response.etag = served.tile->etag;

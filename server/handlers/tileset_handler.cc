@@ -24,7 +24,17 @@ int SubtreeLevels(const DatasetView& dataset, int root_level) {
   return std::min(kSubtreeLevels, LevelsUnder(dataset, root_level));
 }
 
-Document MakeTileset(const DatasetView& dataset, const ErrorWish& wish) {
+// What the content templates carry for a request. The value of `compression` has been checked.
+std::string ContentQuery(const ErrorWish& wish, std::string_view query) {
+  std::string content = TileQuery(wish);
+  const QueryParameters parameters = ParseQuery(query).value_or(QueryParameters());
+  for (const auto& [name, value] : parameters) {
+    if (name == "compression") content += (content.empty() ? "compression=" : "&compression=") + value;
+  }
+  return content;
+}
+
+Document MakeTileset(const DatasetView& dataset, const ErrorWish& wish, std::string content_query) {
   proto::TilesetDescription tileset;
   tileset.attribution = dataset.attribution;
   tileset.roots = proto::ImplicitRoots(dataset.available);
@@ -34,9 +44,11 @@ Document MakeTileset(const DatasetView& dataset, const ErrorWish& wish) {
   // The roots have the largest error, and with it the deepest skirts and the coarsest rounding of heights.
   const double error_m =
       geo::LadderError(level, ErrorStep(wish, level, dataset.error_fraction), dataset.error_fraction);
-  tileset.min_height_m = std::min(dataset.min_height_m, dataset.floor_m) - error_m - proto::SkirtDepth(level, error_m);
-  tileset.max_height_m = std::max(dataset.max_height_m, dataset.floor_m) + error_m;
-  tileset.content_query = TileQuery(wish);
+  const double rounding_m = error_m / 32;
+  tileset.min_height_m =
+      std::min(dataset.min_height_m, dataset.floor_m) - proto::SkirtDepth(level, error_m) - rounding_m;
+  tileset.max_height_m = std::max(dataset.max_height_m, dataset.floor_m) + rounding_m;
+  tileset.content_query = std::move(content_query);
   return Document::Make(proto::EncodeTileset(tileset), "application/json");
 }
 
@@ -44,23 +56,26 @@ Document MakeTileset(const DatasetView& dataset, const ErrorWish& wish) {
 
 TilesetHandler::TilesetHandler(std::span<const DatasetView> datasets, std::string cache_control)
     : datasets_(datasets), cache_control_(std::move(cache_control)) {
-  for (const DatasetView& dataset : datasets_) plain_.push_back(MakeTileset(dataset, {}));
+  for (const DatasetView& dataset : datasets_) plain_.push_back(MakeTileset(dataset, {}, ""));
 }
 
 Response TilesetHandler::Handle(const Route& route, const Request& request) const {
   const Result<std::uint32_t> dataset = FindDataset(route.dataset, datasets_);
   if (!dataset) return ClientErrorResponse(dataset.error(), request.id);
-  const Result<TileParameters> parameters = ParseTileParameters(route.query, /*allow_at_least=*/false);
+  const Result<TileParameters> parameters =
+      ParseTileParameters(route.query, /*allow_at_least=*/false, /*allow_compression=*/true);
   if (!parameters) return ClientErrorResponse(parameters.error(), request.id);
-  if (!parameters->wish.error_m && !parameters->wish.fraction) return Serve(plain_[*dataset], request, cache_control_);
-  return Serve(MakeTileset(datasets_[*dataset], parameters->wish), request, cache_control_);
+  std::string content_query = ContentQuery(parameters->wish, route.query);
+  if (content_query.empty()) return Serve(plain_[*dataset], request, cache_control_);
+  return Serve(MakeTileset(datasets_[*dataset], parameters->wish, std::move(content_query)), request, cache_control_);
 }
 
 Response TilesetHandler::HandleSubtree(const Route& route, const Request& request) const {
   const Result<std::uint32_t> index = FindDataset(route.dataset, datasets_);
   if (!index) return ClientErrorResponse(index.error(), request.id);
   // Clients hang the tileset's own query on every URL under it; it changes nothing here.
-  const Result<TileParameters> parameters = ParseTileParameters(route.query, /*allow_at_least=*/true);
+  const Result<TileParameters> parameters =
+      ParseTileParameters(route.query, /*allow_at_least=*/true, /*allow_compression=*/true);
   if (!parameters) return ClientErrorResponse(parameters.error(), request.id);
   const DatasetView& dataset = datasets_[*index];
   if (!IsAvailable(dataset, route.key) ||

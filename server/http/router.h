@@ -11,7 +11,7 @@
 namespace terrace::server {
 
 enum class RouteKind {
-  kTile,      // /{dataset}/{z}/{x}/{y}.terrain and /{dataset}/3dtiles/{root}/{level}/{x}/{y}.glb
+  kTile,      // /{dataset}/{z}/{x}/{y}.terrain, .glb; /{dataset}/3dtiles/{root}/{level}/{x}/{y}.glb
   kLayer,     // /{dataset}/layer.json
   kTileset,   // /{dataset}/tileset.json
   kSubtree,   // /{dataset}/3dtiles/{root}/{level}/{x}/{y}.subtree
@@ -27,12 +27,12 @@ std::string_view ToString(RouteKind kind);
 
 struct Route {
   RouteKind kind = RouteKind::kViewer;
-  std::string dataset;  // of URLs that begin with one: decoded
-  geo::TileKey key;     // kTile, kSubtree: inside the tiling scheme, counted from the globe's roots
-  geo::TileKey root;    // kSubtree: of the implicit tree that the URL counts in; an ancestor of `key`
-  TileFormat format = TileFormat::kQuantizedMesh;  // kTile
-  std::string file;     // kViewer: relative to the viewer's folder, decoded: "index.html" for "/"
-  std::string query;    // without '?', not decoded
+  std::string dataset;                             // where the URL begins with one: decoded
+  geo::TileKey key;                                // kTile, kSubtree: inside the tiling scheme
+  geo::TileKey root;                               // kSubtree: of the tree the URL counts in, an ancestor of `key`
+  TileFormat format = TileFormat::kQuantizedMesh;  // kTile: by the extension
+  std::string file;   // kViewer: relative to the viewer's folder, decoded: "index.html" for "/"
+  std::string query;  // without '?', not decoded
 };
 
 // `target` in origin form ("/maui/0/0/0.terrain?error=5") or absolute form ("http://host/...").

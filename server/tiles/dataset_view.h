@@ -11,6 +11,7 @@
 
 #include "engine/geo/error_ladder.h"
 #include "engine/geo/tile_key.h"
+#include "proto/glb_tile.h"
 
 namespace terrace::server {
 
@@ -18,6 +19,7 @@ struct DatasetView {
   std::string name;
   std::string attribution;
   double error_fraction = geo::kDefaultErrorFraction;
+  proto::GlbCompression glb_compression = proto::GlbCompression::kDraco;  // for requests that name none
   std::uint64_t generation = 0;                             // changes whenever the bytes of its tiles may change
   std::vector<std::vector<geo::TileRange>> available;       // by level, from 0; the deepest served level is the last
   double west = -180, south = -90, east = 180, north = 90;  // degrees; west > east: across the antimeridian

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "engine/geo/tile_key.h"
+#include "proto/glb_tile.h"
 
 namespace terrace::server {
 
@@ -16,8 +17,9 @@ struct TileRequest {
   geo::TileKey key;
   int error_step = 0;  // on the ladder of the key's level (engine/geo/error_ladder.h)
   TileFormat format = TileFormat::kQuantizedMesh;
+  proto::GlbCompression compression = proto::GlbCompression::kDraco;  // kGlb only
   Coding coding = Coding::kIdentity;
-  bool normals = false;
+  bool normals = false;  // kQuantizedMesh only; GLB tiles always have them
 
   friend bool operator==(const TileRequest&, const TileRequest&) = default;
 };
