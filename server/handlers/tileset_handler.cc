@@ -34,7 +34,8 @@ std::string ContentQuery(const ErrorWish& wish, std::string_view query) {
   return content;
 }
 
-Document MakeTileset(const DatasetView& dataset, const ErrorWish& wish, std::string content_query) {
+Document MakeTileset(const DatasetView& dataset, ErrorWish wish, std::string content_query) {
+  wish.at_least = wish.error_m.has_value();  // as TileQuery writes it into the templates
   proto::TilesetDescription tileset;
   tileset.attribution = dataset.attribution;
   tileset.roots = proto::ImplicitRoots(dataset.available);
