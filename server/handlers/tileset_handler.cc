@@ -29,7 +29,8 @@ std::string ContentQuery(const ErrorWish& wish, std::string_view query) {
   std::string content = TileQuery(wish);
   const QueryParameters parameters = ParseQuery(query).value_or(QueryParameters());
   for (const auto& [name, value] : parameters) {
-    if (name == "compression") content += (content.empty() ? "compression=" : "&compression=") + value;
+    if (name != "compression") continue;
+    return content + (content.empty() ? "compression=" : "&compression=") + value;
   }
   return content;
 }
