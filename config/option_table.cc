@@ -179,6 +179,15 @@ const std::vector<Option<DatasetConfig>>& DatasetOptionTable() {
       {"compact", "true|false",
        "Drop the vertices that a tile's error does not need: smaller tiles, more time to build",
        Switch(&DatasetConfig::compact)},
+      {"glb_compression", "NAME", "How GLB tiles are compressed by default: draco, none, quantized or meshopt",
+       Choice(&DatasetConfig::glb_compression, {{"draco", GlbCompression::kDraco},
+                                                {"none", GlbCompression::kNone},
+                                                {"quantized", GlbCompression::kQuantized},
+                                                {"meshopt", GlbCompression::kMeshopt}})},
+      {"draco_speed", "N", "Draco's effort for GLB tiles: 0 is smallest, 10 is fastest",
+       Integer(&DatasetConfig::draco_speed, 0, 10)},
+      {"draco_normal_bits", "N", "Bits of each of the two coordinates of a normal in Draco tiles",
+       Integer(&DatasetConfig::draco_normal_bits, 4, 16)},
   };
   return table;
 }

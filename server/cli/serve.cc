@@ -76,13 +76,35 @@ config::Config MakeConfig(const ServeArguments& arguments, std::vector<config::C
 
 // Changes when the source or an option that changes bytes does. The file's identity is in the source's fingerprint.
 std::uint64_t GenerationOf(const config::DatasetConfig& dataset, const dem::DemSource& source) {
-  const std::string text = fmt::format(TERRACE_VERSION " {} {} {} {}", source.fingerprint(), dataset.error_fraction,
-                                       static_cast<int>(dataset.criterion), dataset.compact);
+  const std::string text =
+      fmt::format(TERRACE_VERSION " {} {} {} {} {} {}", source.fingerprint(), dataset.error_fraction,
+                  static_cast<int>(dataset.criterion), dataset.compact, dataset.draco_speed, dataset.draco_normal_bits);
   return XXH3_64bits(text.data(), text.size());
 }
 
 tin::Criterion CriterionOf(config::Criterion criterion) {
   return criterion == config::Criterion::kDataDependent ? tin::Criterion::kDataDependent : tin::Criterion::kDelaunay;
+}
+
+proto::GlbOptions GlbOptionsOf(const config::DatasetConfig& dataset) {
+  proto::GlbOptions options;
+  options.generator = "terrace " TERRACE_VERSION;
+  options.draco = {dataset.draco_speed, dataset.draco_normal_bits};
+  switch (dataset.glb_compression) {
+    case config::GlbCompression::kDraco:
+      options.compression = proto::GlbCompression::kDraco;
+      break;
+    case config::GlbCompression::kNone:
+      options.compression = proto::GlbCompression::kNone;
+      break;
+    case config::GlbCompression::kQuantized:
+      options.compression = proto::GlbCompression::kQuantized;
+      break;
+    case config::GlbCompression::kMeshopt:
+      options.compression = proto::GlbCompression::kMeshopt;
+      break;
+  }
+  return options;
 }
 
 // Opens every source; false if one could not be, after all of them had their message.
@@ -107,6 +129,7 @@ bool OpenDatasets(const config::Config& config, std::vector<server::Dataset>& da
     dataset.attribution = wanted.attribution;
     dataset.error_fraction = wanted.error_fraction;
     dataset.rules = {CriterionOf(wanted.criterion), wanted.compact};
+    dataset.glb = GlbOptionsOf(wanted);
     dataset.generation = GenerationOf(wanted, **source);
     dataset.source = *std::move(source);
     spdlog::info("dataset {}: {}, levels 0 to {}", dataset.name, wanted.sources.front(), dataset.source->max_level());
