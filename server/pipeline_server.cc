@@ -24,6 +24,7 @@ DatasetView ViewOf(const Dataset& dataset) {
   view.north = info.bounds.north;
   view.min_height_m = info.heights.min;
   view.max_height_m = info.heights.max;
+  view.floor_m = info.floor;
   return view;
 }
 

@@ -58,6 +58,34 @@ std::optional<geo::TileKey> ParseTileKey(std::string_view z, std::string_view x,
   return geo::IsValid(key) ? std::optional(key) : std::nullopt;
 }
 
+// "9-272-359": level, column and row of an implicit tree's root.
+std::optional<geo::TileKey> ParseRoot(std::string_view name) {
+  const std::size_t first = name.find('-'), second = name.find('-', first + 1);
+  if (first == std::string_view::npos || second == std::string_view::npos) return std::nullopt;
+  return ParseTileKey(name.substr(0, first), name.substr(first + 1, second - first - 1), name.substr(second + 1));
+}
+
+// A content or a subtree of an implicit tree: 3dtiles/{root}/{level}/{x}/{y}.{glb|subtree}, counted from the root.
+std::optional<Route> MatchImplicit(const std::vector<std::string>& segments) {
+  constexpr std::string_view kSubtreeSuffix = ".subtree";
+  if (segments.size() != 6 || segments[1] != "3dtiles") return std::nullopt;
+  std::string_view row = segments[5];
+  const bool is_subtree = row.ends_with(kSubtreeSuffix);
+  if (is_subtree) row.remove_suffix(kSubtreeSuffix.size());
+  if (!is_subtree && CutFormat(row) != TileFormat::kGlb) return std::nullopt;
+  const auto root = ParseRoot(segments[2]);
+  const auto level = TileNumber(segments[3]), x = TileNumber(segments[4]), y = TileNumber(row);
+  if (!root || !level || !x || !y || root->level + *level > geo::kMaxLevel) return std::nullopt;
+  const std::int64_t side = std::int64_t{1} << *level;
+  if (*x >= side || *y >= side) return std::nullopt;
+  Route route;
+  route.root = *root;
+  route.key = {root->level + static_cast<int>(*level), root->x * side + *x, root->y * side + *y};
+  route.kind = is_subtree ? RouteKind::kSubtree : RouteKind::kTile;
+  route.format = TileFormat::kGlb;
+  return route;
+}
+
 // The decoded segments of a path; an encoded '/' does not separate.
 std::optional<std::vector<std::string>> Segments(std::string_view path) {
   std::vector<std::string> segments;
@@ -104,6 +132,10 @@ std::string_view ToString(RouteKind kind) {
       return "tile";
     case RouteKind::kLayer:
       return "layer";
+    case RouteKind::kTileset:
+      return "tileset";
+    case RouteKind::kSubtree:
+      return "subtree";
     case RouteKind::kDatasets:
       return "datasets";
     case RouteKind::kViewer:
@@ -129,9 +161,13 @@ Result<Route> Match(std::string_view target) {
 
   std::optional<Route> route = MatchFixed(*segments);
   if (!route) {
-    route.emplace();
+    route = MatchImplicit(*segments).value_or(Route());
     route->dataset = (*segments)[0];
-    if (segments->size() == 2 && (*segments)[1] == "layer.json") {
+    if (route->kind != RouteKind::kViewer) {
+      // An implicit tree's.
+    } else if (segments->size() == 2 && (*segments)[1] == "tileset.json") {
+      route->kind = RouteKind::kTileset;
+    } else if (segments->size() == 2 && (*segments)[1] == "layer.json") {
       route->kind = RouteKind::kLayer;
     } else if (segments->size() == 4) {
       std::string_view row = (*segments)[3];

@@ -11,8 +11,10 @@
 namespace terrace::server {
 
 enum class RouteKind {
-  kTile,      // /{dataset}/{z}/{x}/{y}.terrain, .glb
+  kTile,      // /{dataset}/{z}/{x}/{y}.terrain, .glb; /{dataset}/3dtiles/{root}/{level}/{x}/{y}.glb
   kLayer,     // /{dataset}/layer.json
+  kTileset,   // /{dataset}/tileset.json
+  kSubtree,   // /{dataset}/3dtiles/{root}/{level}/{x}/{y}.subtree
   kDatasets,  // /datasets
   kViewer,    // / and /viewer/...
   kLive,      // /livez
@@ -25,8 +27,9 @@ std::string_view ToString(RouteKind kind);
 
 struct Route {
   RouteKind kind = RouteKind::kViewer;
-  std::string dataset;                             // kTile, kLayer: decoded
-  geo::TileKey key;                                // kTile: inside the tiling scheme
+  std::string dataset;                             // where the URL begins with one: decoded
+  geo::TileKey key;                                // kTile, kSubtree: inside the tiling scheme
+  geo::TileKey root;                               // kSubtree: of the tree the URL counts in, an ancestor of `key`
   TileFormat format = TileFormat::kQuantizedMesh;  // kTile: by the extension
   std::string file;   // kViewer: relative to the viewer's folder, decoded: "index.html" for "/"
   std::string query;  // without '?', not decoded

@@ -23,7 +23,8 @@ struct DatasetView {
   std::uint64_t generation = 0;                             // changes whenever the bytes of its tiles may change
   std::vector<std::vector<geo::TileRange>> available;       // by level, from 0; the deepest served level is the last
   double west = -180, south = -90, east = 180, north = 90;  // degrees; west > east: across the antimeridian
-  double min_height_m = 0, max_height_m = 0;
+  double min_height_m = 0, max_height_m = 0;                // of the data
+  double floor_m = 0;                                       // height where there is no data
 
   int max_level() const { return static_cast<int>(available.size()) - 1; }
 };

@@ -1,0 +1,141 @@
+#include "proto/tileset.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "engine/core/check.h"
+#include "engine/geo/ellipsoid.h"
+#include "engine/geo/error_ladder.h"
+#include "proto/implicit_tree.h"
+
+namespace terrace::proto {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// Metres. What is missing while nothing is drawn: CesiumJS asks for nothing at all while this comes to 16 pixels or
+// less, so it must be large enough for any distance from which the Earth is looked at.
+constexpr double kNothingDrawn = 1e7;
+
+Json Region(const TilesetDescription& tileset, const geo::TileRange& block) {
+  const double tile = std::ldexp(180, -tileset.roots.front().level);
+  const auto edge = [&](std::int64_t number, double first) {
+    return geo::ToRadians(first + static_cast<double>(number) * tile);
+  };
+  return {{"region",
+           {edge(block.start_x, -180), edge(block.start_y, -90), edge(block.end_x + 1, -180),
+            edge(block.end_y + 1, -90), tileset.min_height_m, tileset.max_height_m}}};
+}
+
+Json ImplicitRoot(const TilesetDescription& tileset, const geo::TileKey& root) {
+  const std::string tile = "3dtiles/" + RootName(root) + "/{level}/{x}/{y}";
+  Json json;
+  json["boundingVolume"] = Region(tileset, {root.x, root.y, root.x, root.y});
+  json["geometricError"] = GeometricError(root.level);
+  json["refine"] = "REPLACE";
+  json["content"]["uri"] = tile + ".glb" + (tileset.content_query.empty() ? "" : "?" + tileset.content_query);
+  Json& tiling = json["implicitTiling"];
+  tiling["subdivisionScheme"] = "QUADTREE";
+  tiling["availableLevels"] = tileset.levels;
+  tiling["subtreeLevels"] = tileset.subtree_levels;
+  tiling["subtrees"]["uri"] = tile + ".subtree";
+  return json;
+}
+
+// Columns counted eastwards from the far side of the widest gap between roots: `end_x` may lie beyond the level's last
+// column, across the antimeridian.
+geo::TileRange BlockOf(const std::vector<geo::TileKey>& roots) {
+  const std::int64_t columns = geo::TileColumns(roots.front().level);
+  std::set<std::int64_t> used;
+  geo::TileRange block{0, roots.front().y, 0, roots.front().y};
+  for (const geo::TileKey& root : roots) {
+    used.insert(root.x);
+    block.start_y = std::min(block.start_y, root.y);
+    block.end_y = std::max(block.end_y, root.y);
+  }
+  std::int64_t widest = *used.begin() + columns - *used.rbegin();  // from the last root around to the first
+  block.start_x = *used.begin();
+  for (auto west = used.begin(), east = std::next(west); east != used.end(); ++west, ++east) {
+    if (*east - *west <= widest) continue;
+    widest = *east - *west;
+    block.start_x = *east;
+  }
+  block.end_x = block.start_x + columns - widest;
+  return block;
+}
+
+// About the middle of the block, as far as half its width and half its height along the ground, and its whole range of
+// heights, take one together.
+Json Sphere(const TilesetDescription& tileset, const geo::TileRange& block) {
+  const double tile = std::ldexp(180, -tileset.roots.front().level);
+  const double width = static_cast<double>(block.end_x + 1 - block.start_x) * tile;
+  const double south = -90 + static_cast<double>(block.start_y) * tile;
+  const double north = -90 + static_cast<double>(block.end_y + 1) * tile;
+  const double longitude = -180 + static_cast<double>(block.start_x) * tile + width / 2;
+  const geo::Vec3 middle = geo::ToEcef(longitude, (south + north) / 2, tileset.min_height_m);
+  constexpr double kLargestRadius = geo::kSemiMajorAxis * geo::kSemiMajorAxis / geo::kSemiMinorAxis;
+  const double along = kLargestRadius * geo::ToRadians(width / 2 + (north - south) / 2);
+  return {{"sphere", {middle.x, middle.y, middle.z, along + tileset.max_height_m - tileset.min_height_m}}};
+}
+
+// 3DTilesRendererJS reads a region whose west is greater than its east as lying on the other side of the Earth, and
+// CesiumJS none that goes beyond 180 degrees; a region all the way round would have clients frame the whole Earth.
+Json BoundsOf(const TilesetDescription& tileset) {
+  const geo::TileRange block = BlockOf(tileset.roots);
+  const bool crosses = block.end_x >= geo::TileColumns(tileset.roots.front().level);
+  return crosses ? Sphere(tileset, block) : Region(tileset, block);
+}
+
+Json Root(const TilesetDescription& tileset) {
+  if (tileset.roots.size() == 1) return ImplicitRoot(tileset, tileset.roots[0]);
+  Json json;
+  json["boundingVolume"] = BoundsOf(tileset);
+  json["geometricError"] = kNothingDrawn;
+  json["refine"] = "REPLACE";
+  json["children"] = Json::array();
+  for (const geo::TileKey& root : tileset.roots) json["children"].push_back(ImplicitRoot(tileset, root));
+  return json;
+}
+
+// CesiumJS shows credits as HTML.
+std::string EscapeHtml(const std::string& text) {
+  std::string escaped;
+  for (const char c : text) {
+    if (c == '&') {
+      escaped += "&amp;";
+    } else if (c == '<') {
+      escaped += "&lt;";
+    } else if (c == '>') {
+      escaped += "&gt;";
+    } else {
+      escaped += c;
+    }
+  }
+  return escaped;
+}
+
+}  // namespace
+
+double GeometricError(int level) {
+  constexpr double kTilesetPixels = 16, kTerrainPixels = 2;
+  return kTilesetPixels / kTerrainPixels * geo::LevelError(level);
+}
+
+std::string EncodeTileset(const TilesetDescription& tileset) {
+  TERRACE_CHECK(!tileset.roots.empty());
+  Json json;
+  json["asset"]["version"] = "1.1";
+  if (!tileset.attribution.empty()) {
+    // The schema has no place for a credit; this is where CesiumJS looks for one.
+    json["asset"]["extras"]["cesium"]["credits"] = Json::array({{{"html", EscapeHtml(tileset.attribution)}}});
+  }
+  json["geometricError"] = kNothingDrawn;
+  json["root"] = Root(tileset);
+  // Attributions come from files: bytes that are not UTF-8 become U+FFFD instead of an exception.
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+}  // namespace terrace::proto
