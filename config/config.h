@@ -23,6 +23,15 @@ enum class Criterion : std::uint8_t { kDelaunay, kDataDependent };
 enum class LogLevel : std::uint8_t { kDebug, kInfo, kWarn, kError, kOff };
 enum class LogFormat : std::uint8_t { kText, kJson };
 
+// Where the water of a dataset's water mask comes from: one of both, or neither.
+struct WaterConfig {
+  std::string mask;                 // a raster that is not zero on water; empty: none
+  std::optional<double> sea_level;  // metres in what the source counts from; heights at or below it are water
+
+  bool any() const { return !mask.empty() || sea_level.has_value(); }
+  friend bool operator==(const WaterConfig&, const WaterConfig&) = default;
+};
+
 struct DatasetConfig {
   std::string name;                  // the first part of its URLs: [A-Za-z0-9._-]{1,64}
   std::vector<std::string> sources;  // files, after globs are expanded; exactly one for now
@@ -33,7 +42,9 @@ struct DatasetConfig {
   std::optional<double> floor;         // metres; height outside the source and in large voids
   int max_void_gap = 64;               // source samples; narrower voids are filled
   Criterion criterion = Criterion::kDelaunay;
-  bool compact = false;  // tiles go through the drop pass
+  bool compact = false;           // tiles go through the drop pass
+  WaterConfig water;
+  int metadata_availability = 0;  // levels; tiles of every so many tell what is below them, 0: none
 
   friend bool operator==(const DatasetConfig&, const DatasetConfig&) = default;
 };

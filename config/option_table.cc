@@ -1,6 +1,8 @@
 #include "config/option_table.h"
 
 #include <algorithm>
+#include <cmath>
+#include <filesystem>
 
 #include "config/nearest_name.h"
 #include "config/source_paths.h"
@@ -9,6 +11,7 @@ namespace terrace::config {
 namespace {
 
 constexpr std::int64_t kMaxCacheBytes = std::int64_t{1} << 40;
+constexpr double kMostMetres = 20'000;  // of heights, up and down
 
 bool HasControlCharacter(const std::string& text) {
   return std::any_of(text.begin(), text.end(),
@@ -91,6 +94,41 @@ Codec<DatasetConfig> Sources() {
           [](const DatasetConfig& dataset) { return Json(dataset.sources); }};
 }
 
+// As a flag: a number is a sea level, everything else the path of a mask.
+Json WaterToJson(const std::string& text) {
+  Json number = NumberToJson(text);
+  if (number.is_number()) return Json{{"sea_level", std::move(number)}};
+  return Json{{"mask", std::filesystem::absolute(text).string()}};
+}
+
+void ReadWater(const Json& value, const Place& place, DatasetConfig& dataset) {
+  const std::size_t keys = value.is_object() ? value.size() : 0;
+  if (keys != 1 || !(value.contains("mask") || value.contains("sea_level"))) {
+    return place.Expected(R"({"mask": "water.tif"} or {"sea_level": 0}, one of both)", value);
+  }
+  if (value.contains("sea_level")) {
+    const Json& level = value["sea_level"];
+    const double metres = level.is_number() ? level.get<double>() : std::nan("");
+    if (!(std::abs(metres) <= kMostMetres)) {
+      return place.At("sea_level").Expected(fmt::format("a number from {} to {}", -kMostMetres, kMostMetres), level);
+    }
+    dataset.water = {"", metres};
+    return;
+  }
+  const Json& mask = value["mask"];
+  if (!mask.is_string() || mask.get_ref<const std::string&>().empty()) {
+    return place.At("mask").Expected("the path of a raster", mask);
+  }
+  dataset.water = {(place.directory() / mask.get<std::string>()).string(), std::nullopt};
+}
+
+Json WriteWater(const DatasetConfig& dataset) {
+  if (dataset.water.sea_level) return Json{{"sea_level", NumberOut(*dataset.water.sea_level)}};
+  return dataset.water.mask.empty() ? Json() : Json{{"mask", dataset.water.mask}};
+}
+
+Codec<DatasetConfig> Water() { return {ReadWater, WriteWater, WaterToJson}; }
+
 Codec<Config> Datasets() {
   return {[](const Json& value, const Place& place, Config& config) {
             if (!value.is_array()) return place.Expected("a list of datasets", value);
@@ -170,7 +208,7 @@ const std::vector<Option<DatasetConfig>>& DatasetOptionTable() {
        "Go as deep as needed for this default error; by default a tenth of the source's spacing",
        Number(&DatasetConfig::finest_error, 0.001, 100'000)},
       {"floor", "METRES", "Height outside the source and in large voids; by default its lowest height",
-       Number(&DatasetConfig::floor, -20'000, 20'000)},
+       Number(&DatasetConfig::floor, -kMostMetres, kMostMetres)},
       {"max_void_gap", "SAMPLES", "Voids narrower than this many source samples are filled from their edges",
        Integer(&DatasetConfig::max_void_gap, 0, 100'000)},
       {"criterion", "NAME", "How triangles are joined: delaunay, or data-dependent: smaller tiles, more time to build",
@@ -179,6 +217,9 @@ const std::vector<Option<DatasetConfig>>& DatasetOptionTable() {
       {"compact", "true|false",
        "Drop the vertices that a tile's error does not need: smaller tiles, more time to build",
        Switch(&DatasetConfig::compact)},
+      {"water", "METRES|FILE", "Water masks: a sea level, or a raster that is not zero on water", Water()},
+      {"metadata_availability", "LEVELS", "Tiles of every so many levels tell which tiles are below them; 0: none do",
+       Integer(&DatasetConfig::metadata_availability, 0, 24)},
   };
   return table;
 }

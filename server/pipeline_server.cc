@@ -23,6 +23,8 @@ DatasetView ViewOf(const Dataset& dataset) {
   view.north = info.bounds.north;
   view.min_height_m = info.heights.min;
   view.max_height_m = info.heights.max;
+  view.has_water = dataset.water.any();
+  view.metadata_levels = dataset.metadata_levels;
   return view;
 }
 

@@ -102,4 +102,14 @@ Result<GDALDatasetUniquePtr> OpenRaster(const std::string& path) {
   return dataset;
 }
 
+std::vector<std::string> FilesOf(GDALDataset& dataset, const std::string& path) {
+  std::vector<std::string> files = {path};
+  char** list = dataset.GetFileList();
+  for (char** name = list; name != nullptr && *name != nullptr; ++name) {
+    if (path != *name) files.emplace_back(*name);
+  }
+  CSLDestroy(list);
+  return files;
+}
+
 }  // namespace terrace::dem

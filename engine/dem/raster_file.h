@@ -4,6 +4,7 @@
 #include <gdal_priv.h>
 
 #include <string>
+#include <vector>
 
 #include "engine/core/result.h"
 
@@ -15,6 +16,9 @@ Result<GDALDatasetUniquePtr> OpenRaster(const std::string& path);
 
 // The same without the checks, for further handles on a file that passed them; null when it cannot be opened.
 GDALDatasetUniquePtr ReopenRaster(const std::string& path);
+
+// The file, and those that GDAL reads with it: overviews, masks, the parts of a mosaic.
+std::vector<std::string> FilesOf(GDALDataset& dataset, const std::string& path);
 
 // Refuses what is too large to mesh in one piece.
 Result<void> CheckSizeToMesh(const std::string& path, int width, int height);

@@ -75,14 +75,27 @@ config::Config MakeConfig(const ServeArguments& arguments, std::vector<config::C
 }
 
 // Changes when the source or an option that changes bytes does. The file's identity is in the source's fingerprint.
-std::uint64_t GenerationOf(const config::DatasetConfig& dataset, const dem::DemSource& source) {
-  const std::string text = fmt::format(TERRACE_VERSION " {} {} {} {}", source.fingerprint(), dataset.error_fraction,
-                                       static_cast<int>(dataset.criterion), dataset.compact);
+std::uint64_t GenerationOf(const config::DatasetConfig& dataset, const dem::DemSource& source,
+                           const server::WaterRules& water) {
+  const std::string text =
+      fmt::format(TERRACE_VERSION " {} {} {} {} {} {} {}", source.fingerprint(), dataset.error_fraction,
+                  static_cast<int>(dataset.criterion), dataset.compact, water.mask ? water.mask->fingerprint() : 0,
+                  water.sea_level_m ? fmt::format("{}", *water.sea_level_m) : "", dataset.metadata_availability);
   return XXH3_64bits(text.data(), text.size());
 }
 
 tin::Criterion CriterionOf(config::Criterion criterion) {
   return criterion == config::Criterion::kDataDependent ? tin::Criterion::kDataDependent : tin::Criterion::kDelaunay;
+}
+
+Result<server::WaterRules> OpenWater(const config::WaterConfig& wanted, const dem::DemSource& source) {
+  server::WaterRules water;
+  water.sea_level_m = wanted.sea_level;
+  if (wanted.mask.empty()) return water;
+  auto mask = dem::WaterRaster::Open(wanted.mask, source.info().bounds);
+  if (!mask) return MakeError(mask.error().code, "water mask {}", mask.error().message);
+  water.mask = *std::move(mask);
+  return water;
 }
 
 // Opens every source; false if one could not be, after all of them had their message.
@@ -97,8 +110,11 @@ bool OpenDatasets(const config::Config& config, std::vector<server::Dataset>& da
     options.max_void_gap = wanted.max_void_gap;
     options.progress = progress.Callback();
     auto source = dem::DemSource::Open(wanted.sources.front(), options);
-    if (!source) {
-      std::fprintf(stderr, "terrace: dataset %s: %s\n", wanted.name.c_str(), source.error().message.c_str());
+    Result<server::WaterRules> water;
+    if (source) water = OpenWater(wanted.water, **source);
+    if (!source || !water) {
+      const Error& error = source ? water.error() : source.error();
+      std::fprintf(stderr, "terrace: dataset %s: %s\n", wanted.name.c_str(), error.message.c_str());
       all_open = false;
       continue;
     }
@@ -107,7 +123,9 @@ bool OpenDatasets(const config::Config& config, std::vector<server::Dataset>& da
     dataset.attribution = wanted.attribution;
     dataset.error_fraction = wanted.error_fraction;
     dataset.rules = {CriterionOf(wanted.criterion), wanted.compact};
-    dataset.generation = GenerationOf(wanted, **source);
+    dataset.generation = GenerationOf(wanted, **source, *water);
+    dataset.water = *std::move(water);
+    dataset.metadata_levels = wanted.metadata_availability;
     dataset.source = *std::move(source);
     spdlog::info("dataset {}: {}, levels 0 to {}", dataset.name, wanted.sources.front(), dataset.source->max_level());
     datasets.push_back(std::move(dataset));

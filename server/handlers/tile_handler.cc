@@ -11,6 +11,7 @@
 #include <memory>
 #include <utility>
 
+#include "proto/media_type.h"
 #include "server/http/http_error.h"
 #include "server/http/negotiate.h"
 
@@ -50,8 +51,7 @@ asio::awaitable<Response> TileHandler::Handle(Route route, Request request) cons
 
 Response TileHandler::Reply(const ServedTile& served, const TileRequest& tile, const Request& request) const {
   Response response;
-  response.content_type =
-      tile.normals ? "application/vnd.quantized-mesh;extensions=octvertexnormals" : "application/vnd.quantized-mesh";
+  response.content_type = proto::QuantizedMeshContentType({tile.normals, tile.water_mask, tile.metadata});
   response.body = Body(served.tile, &served.tile->bytes);
   response.coding = tile.coding;
   response.etag = served.tile->etag;

@@ -22,6 +22,8 @@ struct DatasetView {
   std::vector<std::vector<geo::TileRange>> available;       // by level, from 0; the deepest served level is the last
   double west = -180, south = -90, east = 180, north = 90;  // degrees; west > east: across the antimeridian
   double min_height_m = 0, max_height_m = 0;
+  bool has_water = false;   // tiles have a water mask
+  int metadata_levels = 0;  // tiles of every so many levels tell what is below them; 0: none
 
   int max_level() const { return static_cast<int>(available.size()) - 1; }
 };

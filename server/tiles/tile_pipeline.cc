@@ -10,6 +10,7 @@
 #include "proto/compress.h"
 #include "proto/quantized_mesh.h"
 #include "proto/tile_normals.h"
+#include "server/tiles/tile_extensions.h"
 #include "server/tiles/tile_mesher.h"
 
 namespace terrace::server {
@@ -92,7 +93,9 @@ Result<EncodedTile> TilePipeline::Build(const TileRequest& request, std::stop_to
       MeshTile(*dataset.source, lattice, (*refined)->refinement, dataset.rules, error_m, stop);
   if (!measured) return tl::unexpected(std::move(measured).error());
   if (request.normals) measured->tile.normals = proto::TileNormals(lattice, measured->mesh, measured->tile);
-  encoded.bytes = proto::EncodeQuantizedMesh(measured->tile, {.normals = request.normals});
+  const Result<proto::QuantizedMeshOptions> options = AddExtensions(dataset, request, lattice, measured->tile, stop);
+  if (!options) return tl::unexpected(options.error());
+  encoded.bytes = proto::EncodeQuantizedMesh(measured->tile, *options);
   encoded.times.refine += measured->replayed;
   encoded.times.encode = Since(start) - measured->replayed;
 

@@ -17,7 +17,10 @@ struct TileRequest {
   int error_step = 0;  // on the ladder of the key's level (engine/geo/error_ladder.h)
   TileFormat format = TileFormat::kQuantizedMesh;
   Coding coding = Coding::kIdentity;
+  // Extensions of quantized-mesh, each only where the client asks for it and the tile has it.
   bool normals = false;
+  bool water_mask = false;
+  bool metadata = false;
 
   friend bool operator==(const TileRequest&, const TileRequest&) = default;
 };
