@@ -42,7 +42,7 @@ struct DatasetConfig {
   std::optional<double> floor;         // metres; height outside the source and in large voids
   int max_void_gap = 64;               // source samples; narrower voids are filled
   Criterion criterion = Criterion::kDelaunay;
-  bool compact = false;           // tiles go through the drop pass
+  bool compact = false;  // tiles go through the drop pass
   WaterConfig water;
   int metadata_availability = 0;  // levels; tiles of every so many tell what is below them, 0: none
 

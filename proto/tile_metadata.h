@@ -9,8 +9,8 @@
 
 namespace terrace::proto {
 
-// Whether a tile carries metadata where every `metadata_levels`-th level does (layer.json's metadataAvailability): those
-// of levels 0, N, 2N ..., save on the deepest level. 0: none does.
+// Whether a tile carries metadata where every `metadata_levels`-th level does (layer.json's metadataAvailability):
+// those of levels 0, N, 2N ..., save on the deepest level. 0: none does.
 bool CarriesMetadata(int level, int metadata_levels, int max_level);
 
 // {"available":[[ranges of the next level], [of the one after it], ...]}: what `available`, by level from 0, has below

@@ -1,5 +1,5 @@
-// Interpolation in the averaged grid of a source (sample_grid.h): which four samples a position lies between, the window
-// that holds those of many positions, and the value there.
+// Interpolation in the averaged grid of a source (sample_grid.h): which four samples a position lies between, the
+// window that holds those of many positions, and the value there.
 #pragma once
 
 #include <cstdint>

@@ -81,7 +81,8 @@ class TileNodes {
 
   void FillExactly(std::int64_t column, std::int64_t row, std::int64_t columns, std::int64_t rows) {
     for (std::int64_t r = row; r < row + rows; ++r) {
-      for (std::int64_t c = column; c < column + columns; ++c) *At(c, r) = centres_ ? CentreDegrees(c, r) : Degrees(c, r);
+      for (std::int64_t c = column; c < column + columns; ++c)
+        *At(c, r) = centres_ ? CentreDegrees(c, r) : Degrees(c, r);
       georeference_.ToPixels({At(column, r), static_cast<std::size_t>(columns)});
     }
   }

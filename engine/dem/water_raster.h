@@ -29,8 +29,8 @@ class WaterRaster {
   //
   // A pixel is a function of its level and global position alone. Where the raster is finer than the pixels, its
   // samples are averaged; where it is coarser, the coast is the line where half of the interpolated samples are water,
-  // drawn as sharp as the pixels allow. Overviews are read where the raster has them: they should be made with `gdaladdo
-  // -r nearest` or `-r mode`, as any sample but zero counts as water.
+  // drawn as sharp as the pixels allow. Overviews are read where the raster has them: they should be made with
+  // `gdaladdo -r nearest` or `-r mode`, as any sample but zero counts as water.
   //
   // Any valid key. kUnavailable: the raster cannot be read now. kCancelled: stopped.
   Result<std::vector<std::uint8_t>> Read(const geo::TileKey& key, std::stop_token stop = {}) const;

@@ -109,8 +109,7 @@ Result<TileRequest> Negotiate(const Route& route, const Request& request, std::s
   const proto::TileExtensions wanted = WantedExtensions(request.accept, parameters->extensions);
   tile.normals = wanted.octvertexnormals;
   tile.water_mask = wanted.watermask && view.has_water;
-  tile.metadata =
-      wanted.metadata && proto::CarriesMetadata(route.key.level, view.metadata_levels, view.max_level());
+  tile.metadata = wanted.metadata && proto::CarriesMetadata(route.key.level, view.metadata_levels, view.max_level());
   return tile;
 }
 

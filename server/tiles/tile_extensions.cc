@@ -35,8 +35,8 @@ Result<proto::QuantizedMeshOptions> AddExtensions(const Dataset& dataset, const 
   proto::QuantizedMeshOptions options;
   options.normals = request.normals;
   options.water_mask = request.water_mask && dataset.water.any();
-  options.metadata = request.metadata && proto::CarriesMetadata(request.key.level, dataset.metadata_levels,
-                                                                dataset.source->max_level());
+  options.metadata = request.metadata &&
+                     proto::CarriesMetadata(request.key.level, dataset.metadata_levels, dataset.source->max_level());
   if (options.water_mask) {
     Result<proto::WaterMask> mask = WaterMaskOf(dataset.water, lattice, stop);
     if (!mask) return tl::unexpected(std::move(mask).error());

@@ -34,7 +34,7 @@ struct Dataset {
   MeshRules rules;
   std::unique_ptr<dem::DemSource> source;
   WaterRules water;
-  int metadata_levels = 0;  // tiles of every so many levels tell what is below them; 0: none
+  int metadata_levels = 0;       // tiles of every so many levels tell what is below them; 0: none
   std::uint64_t generation = 0;  // hash of the source's fingerprint and every option that changes bytes
 };
 

@@ -73,5 +73,17 @@ TEST(SetDatasetOption, SetsOneDataset) {
                                   IsError("--name", "is a URL of the server itself")));
 }
 
+TEST(SetDatasetOption, TellsASeaLevelFromAMask) {
+  DatasetConfig dataset;
+  std::vector<ConfigError> errors;
+  SetDatasetOption("water", "-2.5", dataset, errors);
+  EXPECT_EQ(dataset.water, (WaterConfig{"", -2.5}));
+  SetDatasetOption("water", "/data/water.tif", dataset, errors);
+  EXPECT_EQ(dataset.water, (WaterConfig{"/data/water.tif", std::nullopt}));
+  EXPECT_THAT(errors, IsEmpty());
+  SetDatasetOption("water", "1e9", dataset, errors);
+  EXPECT_THAT(errors, ElementsAre(IsError("--water", "a number from -20000 to 20000")));
+}
+
 }  // namespace
 }  // namespace terrace::config
