@@ -6,17 +6,16 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
-#include <nlohmann/json.hpp>
 #include <string>
 
 #include "engine/core/bytes.h"
 #include "engine/core/check.h"
+#include "proto/gltf.h"
 
 namespace terrace::proto {
 namespace {
 
 using Triangle = std::array<std::uint32_t, 3>;
-using Json = nlohmann::ordered_json;
 
 constexpr std::size_t kFlushBytes = 1 << 16;
 
@@ -146,55 +145,32 @@ GlbLayout MakeGlbLayout(const std::vector<MeshVertex>& vertices, std::size_t ind
   return layout;
 }
 
-void AddColors(const GlbLayout& layout, Json& json) {
-  constexpr int kUnsignedShort = 5123, kArrayBuffer = 34962;
-  json["materials"] = Json::array({{{"pbrMetallicRoughness", {{"metallicFactor", 0}, {"roughnessFactor", 1}}}}});
-  Json& primitive = json["meshes"][0]["primitives"][0];
-  primitive["attributes"]["COLOR_0"] = json["accessors"].size();
-  primitive["material"] = 0;
-  json["accessors"].push_back({{"bufferView", json["bufferViews"].size()},
-                               {"componentType", kUnsignedShort},
-                               {"normalized", true},
-                               {"count", layout.vertices},
-                               {"type", "VEC3"}});
-  json["bufferViews"].push_back({{"buffer", 0},
-                                 {"byteOffset", layout.color_offset()},
-                                 {"byteLength", layout.color_bytes()},
-                                 {"byteStride", kGlbColorBytes},
-                                 {"target", kArrayBuffer}});
-}
-
-std::string GlbJson(const GlbLayout& layout) {
-  constexpr int kFloat = 5126, kUnsignedShort = 5123, kUnsignedInt = 5125, kArrayBuffer = 34962, kIndexBuffer = 34963;
-  const Vec3d& c = layout.center;
-  Json json;
-  json["asset"] = {{"version", "2.0"}, {"generator", "terrace"}};
-  json["scene"] = 0;
-  json["scenes"] = Json::array({{{"nodes", {0}}}});
-  json["nodes"] = Json::array({{{"mesh", 0}, {"matrix", {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, c[0], c[1], c[2], 1}}}});
-  json["meshes"] =
-      Json::array({{{"primitives", Json::array({{{"attributes", {{"POSITION", 0}}}, {"indices", 1}, {"mode", 4}}})}}});
-  json["accessors"] = Json::array({{{"bufferView", 0},
-                                    {"componentType", kFloat},
-                                    {"count", layout.vertices},
-                                    {"type", "VEC3"},
-                                    {"min", layout.min},
-                                    {"max", layout.max}},
-                                   {{"bufferView", 1},
-                                    {"componentType", layout.wide() ? kUnsignedInt : kUnsignedShort},
-                                    {"count", layout.indices},
-                                    {"type", "SCALAR"}}});
-  json["bufferViews"] = Json::array(
-      {{{"buffer", 0}, {"byteOffset", 0}, {"byteLength", layout.position_bytes()}, {"target", kArrayBuffer}},
-       {{"buffer", 0},
-        {"byteOffset", layout.position_bytes()},
-        {"byteLength", layout.index_bytes()},
-        {"target", kIndexBuffer}}});
-  if (layout.has_colors) AddColors(layout, json);
-  json["buffers"] = Json::array({{{"byteLength", layout.buffer_bytes()}}});
-  std::string text = json.dump();
-  text.append((4 - text.size() % 4) % 4, ' ');
-  return text;
+GltfMesh GltfOf(const GlbLayout& layout) {
+  GltfMesh mesh;
+  for (std::size_t i = 0; i < 3; ++i) mesh.matrix[12 + i] = layout.center[i];
+  mesh.views = {{0, layout.position_bytes(), 0, GltfTarget::kVertices},
+                {layout.position_bytes(), layout.index_bytes(), 0, GltfTarget::kIndices}};
+  GltfAccessor positions{.view = 0, .count = layout.vertices};
+  positions.min.assign(layout.min.begin(), layout.min.end());
+  positions.max.assign(layout.max.begin(), layout.max.end());
+  mesh.accessors = {positions,
+                    {.view = 1,
+                     .component = layout.wide() ? GltfComponent::kUnsignedInt : GltfComponent::kUnsignedShort,
+                     .type = "SCALAR",
+                     .count = layout.indices}};
+  mesh.attributes = {{"POSITION", 0}};
+  mesh.indices = 1;
+  if (layout.has_colors) {
+    mesh.attributes.emplace_back("COLOR_0", mesh.accessors.size());
+    mesh.material.emplace();
+    mesh.accessors.push_back({.view = mesh.views.size(),
+                              .component = GltfComponent::kUnsignedShort,
+                              .count = layout.vertices,
+                              .normalized = true});
+    mesh.views.push_back({layout.color_offset(), layout.color_bytes(), kGlbColorBytes, GltfTarget::kVertices});
+  }
+  mesh.buffer_bytes = layout.buffer_bytes();
+  return mesh;
 }
 
 // IEC 61966-2-1, to 16 bits. No entry comes closer than 2^-10 to the middle between two integers: whatever a CPU's pow
@@ -237,25 +213,14 @@ std::string GlbBuffer(const GlbLayout& layout, const std::vector<MeshVertex>& ve
 
 Result<void> WriteGlb(std::ostream& out, const std::vector<MeshVertex>& vertices,
                       const std::vector<Triangle>& triangles, const std::vector<VertexColor>& colors) {
-  constexpr std::uint32_t kGlbMagic = 0x46546C67, kJsonChunk = 0x4E4F534A, kBinaryChunk = 0x004E4942;
-  constexpr std::size_t kHeadersBytes = 12 + 8 + 8;
   const GlbLayout layout = MakeGlbLayout(vertices, 3 * triangles.size(), !colors.empty());
-  const std::string json = GlbJson(layout);
-  const std::size_t total = kHeadersBytes + json.size() + layout.buffer_bytes();
-  if (total > std::numeric_limits<std::uint32_t>::max()) {
-    return MakeError(ErrorCode::kInvalidArgument, "a .glb file holds 4 GiB and this mesh needs {} bytes; write .ply",
-                     total);
+  const std::string head = GlbHead(GltfJson(GltfOf(layout)), layout.buffer_bytes());
+  if (head.empty()) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "a .glb file holds 4 GiB and this mesh needs more than {} bytes; write .ply",
+                     layout.buffer_bytes());
   }
-  ByteWriter head;
-  head.Put(kGlbMagic);
-  head.Put(std::uint32_t{2});
-  head.Put(static_cast<std::uint32_t>(total));
-  head.Put(static_cast<std::uint32_t>(json.size()));
-  head.Put(kJsonChunk);
-  head.PutBytes(json);
-  head.Put(static_cast<std::uint32_t>(layout.buffer_bytes()));
-  head.Put(kBinaryChunk);
-  Write(out, head.Take());
+  Write(out, head);
   Write(out, GlbBuffer(layout, vertices, triangles, colors));
   return {};
 }

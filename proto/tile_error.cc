@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <utility>
 
 #include "engine/geo/ellipsoid.h"
 #include "proto/tile_geometry.h"
@@ -11,8 +12,8 @@
 namespace terrace::proto {
 namespace {
 
-// Coordinates in which both u, v and the lattice nodes are integers: 1 / (32767 * cells) of the tile. u * cells and
-// i * 32767 stay below 2^23, products of two below 2^46.
+// Coordinates in which both the vertices and the lattice nodes are integers. Quantized ones: 1 / (32767 * cells) of the
+// tile; u * cells and i * 32767 stay below 2^23, products of two below 2^46. Of a mesh on the lattice: its cells.
 struct Point {
   std::int64_t x = 0, y = 0;
 };
@@ -28,22 +29,32 @@ struct Linear {
   double At(double x, double y) const { return origin + dx * x + dy * y; }
 };
 
+// What the meter needs to know of a mesh. A reading without data is not measured.
+struct Surface {
+  std::int64_t unit = 1;        // from one lattice node to the next
+  std::vector<Point> points;    // by vertex
+  std::vector<double> heights;  // by vertex, metres: the reading in longitude and latitude
+  std::vector<geo::Vec3> ecef;  // by vertex: the flat triangles
+  const std::vector<std::array<std::uint32_t, 3>>& triangles;
+};
+
 class Meter {
  public:
-  Meter(const LatticeView& lattice, const QuantizedTile& tile, double bound_m, bool curved)
-      : lattice_(lattice), tile_(tile), cells_(lattice.cells()), bound_(bound_m), curved_(curved) {
-    const double range = static_cast<double>(tile.max_height) - static_cast<double>(tile.min_height);
-    height_.reserve(tile.h.size());
-    for (const std::uint16_t h : tile.h) {
-      height_.push_back(static_cast<double>(tile.min_height) + range * h / kQuantizedMax);
-    }
+  Meter(const LatticeView& lattice, Surface surface, double bound_m)
+      : lattice_(lattice),
+        surface_(std::move(surface)),
+        cells_(lattice.cells()),
+        unit_(surface_.unit),
+        bound_(bound_m),
+        planar_(!surface_.heights.empty()),
+        curved_(!surface_.ecef.empty()) {
     is_vertex_.resize(static_cast<std::size_t>(cells_ + 1) * static_cast<std::size_t>(cells_ + 1));
-    for (std::size_t k = 0; k < tile.u.size(); ++k) is_vertex_[NodeIndex(NodeOf(tile.u[k]), NodeOf(tile.v[k]))] = true;
+    for (const Point& p : surface_.points) is_vertex_[NodeIndex(NodeOf(p.x), NodeOf(p.y))] = true;
     if (curved_) PrepareCurved();
   }
 
   TileError Measure() {
-    for (const auto& triangle : tile_.triangles) MeasureTriangle(triangle);
+    for (const auto& triangle : surface_.triangles) MeasureTriangle(triangle);
     return std::move(result_);
   }
 
@@ -52,12 +63,9 @@ class Meter {
     return static_cast<std::size_t>(j) * static_cast<std::size_t>(cells_ + 1) + static_cast<std::size_t>(i);
   }
   // The lattice node whose rounded position this is.
-  std::int64_t NodeOf(std::uint16_t position) const {
-    return (std::int64_t{position} * cells_ + kQuantizedMax / 2) / kQuantizedMax;
-  }
+  std::int64_t NodeOf(std::int64_t coordinate) const { return (coordinate + unit_ / 2) / unit_; }
 
   void PrepareCurved() {
-    ecef_ = DecodePositions(tile_);
     for (int i = 0; i <= cells_; ++i) column_up_.push_back(geo::SurfaceNormal(lattice_.Longitude(i), 0));
     for (int j = 0; j <= cells_; ++j) {
       const double latitude = lattice_.Latitude(j);
@@ -78,29 +86,28 @@ class Meter {
   // Rows and, in a row, columns of nodes inside the triangle or on its rim, in integers.
   void MeasureTriangle(const std::array<std::uint32_t, 3>& triangle) {
     std::array<Point, 3> p;
-    for (std::size_t k = 0; k < 3; ++k) {
-      p[k] = {std::int64_t{tile_.u[triangle[k]]} * cells_, std::int64_t{tile_.v[triangle[k]]} * cells_};
-    }
+    for (std::size_t k = 0; k < 3; ++k) p[k] = surface_.points[triangle[k]];
     const std::int64_t area = (p[1].x - p[0].x) * (p[2].y - p[0].y) - (p[1].y - p[0].y) * (p[2].x - p[0].x);
     if (area <= 0) return;
     const double twice_area = static_cast<double>(area);
-    const Linear plane = Through(p, twice_area, [&](std::size_t k) { return height_[triangle[k]]; });
+    Linear plane;
+    if (planar_) plane = Through(p, twice_area, [&](std::size_t k) { return surface_.heights[triangle[k]]; });
     std::array<Linear, 3> chord{};
     if (curved_) {
-      chord[0] = Through(p, twice_area, [&](std::size_t k) { return ecef_[triangle[k]].x; });
-      chord[1] = Through(p, twice_area, [&](std::size_t k) { return ecef_[triangle[k]].y; });
-      chord[2] = Through(p, twice_area, [&](std::size_t k) { return ecef_[triangle[k]].z; });
+      chord[0] = Through(p, twice_area, [&](std::size_t k) { return surface_.ecef[triangle[k]].x; });
+      chord[1] = Through(p, twice_area, [&](std::size_t k) { return surface_.ecef[triangle[k]].y; });
+      chord[2] = Through(p, twice_area, [&](std::size_t k) { return surface_.ecef[triangle[k]].z; });
     }
     const auto [low, high] = std::minmax({p[0].y, p[1].y, p[2].y});
     double worst_miss = bound_;
     tin::SamplePosition miss;
     bool missed = false;
-    for (std::int64_t j = CeilDiv(low, kQuantizedMax); j * kQuantizedMax <= high; ++j) {
-      const std::int64_t y = j * kQuantizedMax;
+    for (std::int64_t j = CeilDiv(low, unit_); j * unit_ <= high; ++j) {
+      const std::int64_t y = j * unit_;
       std::int64_t first = 0, last = cells_;
       for (std::size_t k = 0; k < 3; ++k) ClipRow(p[k], p[(k + 1) % 3], y, first, last);
       for (std::int64_t i = first; i <= last; ++i) {
-        const double dx = static_cast<double>(i * kQuantizedMax - p[0].x), dy = static_cast<double>(y - p[0].y);
+        const double dx = static_cast<double>(i * unit_ - p[0].x), dy = static_cast<double>(y - p[0].y);
         const double error = ErrorAt(plane, chord, static_cast<int>(i), static_cast<int>(j), dx, dy);
         result_.max_m = std::max(result_.max_m, error);
         if (error > worst_miss && CanMend(i, j)) {
@@ -115,12 +122,12 @@ class Meter {
 
   // Narrows [first, last] to the nodes of row y on the left of the edge a -> b or on it:
   // (b - a) x (p - a) >= 0, that is dx (y - a.y) - dy (x - a.x) >= 0.
-  static void ClipRow(Point a, Point b, std::int64_t y, std::int64_t& first, std::int64_t& last) {
+  void ClipRow(Point a, Point b, std::int64_t y, std::int64_t& first, std::int64_t& last) const {
     const std::int64_t dx = b.x - a.x, dy = b.y - a.y, reach = dx * (y - a.y) + dy * a.x;
     if (dy > 0) {
-      last = std::min(last, FloorDiv(reach, dy * kQuantizedMax));
+      last = std::min(last, FloorDiv(reach, dy * unit_));
     } else if (dy < 0) {
-      first = std::max(first, CeilDiv(-reach, -dy * kQuantizedMax));
+      first = std::max(first, CeilDiv(-reach, -dy * unit_));
     } else if (dx * (y - a.y) < 0) {
       last = first - 1;
     }
@@ -128,7 +135,7 @@ class Meter {
 
   double ErrorAt(const Linear& plane, const std::array<Linear, 3>& chord, int i, int j, double dx, double dy) const {
     const double sample = lattice_.At(i, j);
-    const double error = std::abs(plane.At(dx, dy) - sample);
+    const double error = planar_ ? std::abs(plane.At(dx, dy) - sample) : 0;
     if (!curved_) return error;
     const geo::Vec3& row = row_up_[static_cast<std::size_t>(j)];
     const geo::Vec3& column = column_up_[static_cast<std::size_t>(i)];
@@ -142,12 +149,11 @@ class Meter {
   }
 
   const LatticeView& lattice_;
-  const QuantizedTile& tile_;
+  const Surface surface_;
   const int cells_;
+  const std::int64_t unit_;
   const double bound_;
-  const bool curved_;
-  std::vector<double> height_;   // metres, by vertex
-  std::vector<geo::Vec3> ecef_;  // by vertex
+  const bool planar_, curved_;
   std::vector<bool> is_vertex_;  // by node
   std::vector<geo::Vec3> column_up_, row_up_;
   std::vector<double> row_base_;  // by row: the ellipsoid's surface along its normal there
@@ -157,7 +163,24 @@ class Meter {
 }  // namespace
 
 TileError MeasureTileError(const LatticeView& lattice, const QuantizedTile& tile, double bound_m, bool curved) {
-  return Meter(lattice, tile, bound_m, curved).Measure();
+  Surface surface{kQuantizedMax, {}, {}, {}, tile.triangles};
+  surface.points.reserve(tile.u.size());
+  surface.heights.reserve(tile.u.size());
+  const std::int64_t cells = lattice.cells();
+  for (std::size_t k = 0; k < tile.u.size(); ++k) {
+    surface.points.push_back({tile.u[k] * cells, tile.v[k] * cells});
+    surface.heights.push_back(HeightAt(tile, tile.h[k]));
+  }
+  if (curved) surface.ecef = DecodePositions(tile);
+  return Meter(lattice, std::move(surface), bound_m).Measure();
+}
+
+TileError MeasureFlatError(const LatticeView& lattice, const tin::TinMesh& mesh,
+                           const std::vector<geo::Vec3>& positions, double bound_m) {
+  Surface surface{1, {}, {}, positions, mesh.triangles};
+  surface.points.reserve(mesh.vertices.size());
+  for (const tin::SamplePosition p : mesh.vertices) surface.points.push_back({p.x, p.y});
+  return Meter(lattice, std::move(surface), bound_m).Measure();
 }
 
 bool AllCounterClockwise(const QuantizedTile& tile) {

@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "engine/geo/ellipsoid.h"
 #include "engine/tin/tin_mesh.h"
 #include "proto/lattice_view.h"
 #include "proto/quantized_mesh.h"
@@ -20,6 +21,12 @@ struct TileError {
 // with `curved` the flat triangle in ECEF, which is what they draw: its point with the sample's barycentric
 // coordinates, along the ellipsoid's normal at the sample.
 TileError MeasureTileError(const LatticeView& lattice, const QuantizedTile& tile, double bound_m, bool curved);
+
+// The same for `mesh` with its vertices at exact lattice positions in longitude and latitude and at `positions` in
+// ECEF: measures the flat triangles that clients draw. Triangles whose corners merged on the way count as what is left
+// of them, a line.
+TileError MeasureFlatError(const LatticeView& lattice, const tin::TinMesh& mesh,
+                           const std::vector<geo::Vec3>& positions, double bound_m);
 
 // True if all triangles are counter-clockwise in (u, v): rounding positions to 15 bits could turn a sliver.
 bool AllCounterClockwise(const QuantizedTile& tile);

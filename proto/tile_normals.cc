@@ -45,10 +45,10 @@ geo::Vec3 LatticeNormal(const LatticeView& lattice, const LocalFrame& frame, tin
 }
 
 // Sums of the cross products of the triangles around each vertex.
-std::vector<geo::Vec3> AreaWeightedNormals(const QuantizedTile& tile) {
-  const std::vector<geo::Vec3> position = DecodePositions(tile);
+std::vector<geo::Vec3> AreaWeightedNormals(const std::vector<std::array<std::uint32_t, 3>>& triangles,
+                                           const std::vector<geo::Vec3>& position) {
   std::vector<geo::Vec3> normals(position.size());
-  for (const auto& [a, b, c] : tile.triangles) {
+  for (const auto& [a, b, c] : triangles) {
     const geo::Vec3 cross = geo::Cross(position[b] - position[a], position[c] - position[a]);
     for (const std::uint32_t k : {a, b, c}) normals[k] = normals[k] + cross;
   }
@@ -65,10 +65,10 @@ geo::Vec3 TurnTowards(geo::Vec3 normal, geo::Vec3 goal) {
 
 }  // namespace
 
-std::vector<std::array<std::uint8_t, 2>> TileNormals(const LatticeView& lattice, const tin::TinMesh& mesh,
-                                                     const QuantizedTile& tile) {
-  const std::vector<geo::Vec3> of_mesh = AreaWeightedNormals(tile);
-  std::vector<std::array<std::uint8_t, 2>> normals;
+std::vector<geo::Vec3> VertexNormals(const LatticeView& lattice, const tin::TinMesh& mesh,
+                                     const std::vector<geo::Vec3>& positions) {
+  const std::vector<geo::Vec3> of_mesh = AreaWeightedNormals(mesh.triangles, positions);
+  std::vector<geo::Vec3> normals;
   normals.reserve(mesh.vertices.size());
   for (std::size_t k = 0; k < mesh.vertices.size(); ++k) {
     const tin::SamplePosition p = mesh.vertices[k];
@@ -78,9 +78,19 @@ std::vector<std::array<std::uint8_t, 2>> TileNormals(const LatticeView& lattice,
       const geo::Vec3 turned = TurnTowards(normal, geo::Normalized(of_mesh[k]));
       if (geo::Dot(turned, frame.up) > kLowestUp) normal = turned;
     }
-    normals.push_back(OctEncode(normal));
+    normals.push_back(normal);
   }
   return normals;
+}
+
+std::vector<std::array<std::uint8_t, 2>> TileNormals(const LatticeView& lattice, const tin::TinMesh& mesh,
+                                                     const QuantizedTile& tile) {
+  std::vector<std::array<std::uint8_t, 2>> encoded;
+  encoded.reserve(mesh.vertices.size());
+  for (const geo::Vec3& normal : VertexNormals(lattice, mesh, DecodePositions(tile))) {
+    encoded.push_back(OctEncode(normal));
+  }
+  return encoded;
 }
 
 }  // namespace terrace::proto

@@ -5,18 +5,23 @@
 #include <cstdint>
 #include <vector>
 
+#include "engine/geo/ellipsoid.h"
 #include "engine/tin/tin_mesh.h"
 #include "proto/lattice_view.h"
 #include "proto/quantized_mesh.h"
 
 namespace terrace::proto {
 
-// Oct-encoded unit normals in ECEF, one per vertex of `mesh`, which is the mesh that `tile` was quantized from.
+// Unit normals in ECEF, one per vertex of `mesh`, whose vertices the wire puts at `positions` (ECEF).
 //
 // On the edges the gradient of the heights, by central differences over one lattice step on each side: a function of
 // the global node and so equal in every tile that shares it; on a pole the ellipsoid's normal. Inside the same, but
 // turned to within 13 degrees of the mesh's own area-weighted normal: where the mesh drops relief that the lattice has,
 // and at cliffs, light must still fit the triangles that it falls on.
+std::vector<geo::Vec3> VertexNormals(const LatticeView& lattice, const tin::TinMesh& mesh,
+                                     const std::vector<geo::Vec3>& positions);
+
+// The same oct-encoded, for the mesh that `tile` was quantized from.
 std::vector<std::array<std::uint8_t, 2>> TileNormals(const LatticeView& lattice, const tin::TinMesh& mesh,
                                                      const QuantizedTile& tile);
 

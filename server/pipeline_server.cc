@@ -13,6 +13,7 @@ DatasetView ViewOf(const Dataset& dataset) {
   view.name = dataset.name;
   view.attribution = dataset.attribution;
   view.error_fraction = dataset.error_fraction;
+  view.glb_compression = dataset.glb.compression;
   view.generation = dataset.generation;
   for (int level = 0; level <= dataset.source->max_level(); ++level) {
     view.available.push_back(dataset.source->Available(level));
@@ -25,6 +26,7 @@ DatasetView ViewOf(const Dataset& dataset) {
   view.max_height_m = info.heights.max;
   view.has_water = dataset.water.any();
   view.metadata_levels = dataset.metadata_levels;
+  view.floor_m = info.floor;
   return view;
 }
 

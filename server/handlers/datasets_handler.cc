@@ -60,6 +60,7 @@ std::string DatasetsJson(std::span<const DatasetView> datasets) {
     entry["heights"]["min"] = dataset.min_height_m;
     entry["heights"]["max"] = dataset.max_height_m;
     entry["urls"]["layer"] = base + "/layer.json";
+    entry["urls"]["tileset"] = base + "/tileset.json";
     entry["urls"]["tiles"] = base + "/{z}/{x}/{y}.terrain";
     list.push_back(std::move(entry));
   }

@@ -30,6 +30,11 @@ std::string_view Name(CacheStatus cache) {
   return "join";
 }
 
+std::string_view ContentTypeOf(const TileRequest& tile) {
+  if (tile.format == TileFormat::kGlb) return "model/gltf-binary";
+  return proto::QuantizedMeshContentType({tile.normals, tile.water_mask, tile.metadata});
+}
+
 }  // namespace
 
 TileHandler::TileHandler(std::span<const DatasetView> datasets, TileService& tiles, TileHandlerOptions options)
@@ -51,7 +56,7 @@ asio::awaitable<Response> TileHandler::Handle(Route route, Request request) cons
 
 Response TileHandler::Reply(const ServedTile& served, const TileRequest& tile, const Request& request) const {
   Response response;
-  response.content_type = proto::QuantizedMeshContentType({tile.normals, tile.water_mask, tile.metadata});
+  response.content_type = ContentTypeOf(tile);
   response.body = Body(served.tile, &served.tile->bytes);
   response.coding = tile.coding;
   response.etag = served.tile->etag;

@@ -1,4 +1,4 @@
-// GET /{dataset}/{z}/{x}/{y}.terrain
+// GET /{dataset}/{z}/{x}/{y}.terrain and .glb
 #pragma once
 
 #include <chrono>

@@ -44,6 +44,12 @@ double Quality(std::string_view parameters) {
   return 1;
 }
 
+// Draco's and meshopt's bytes are entropy-coded or nearly so already.
+bool GzipHelps(const TileRequest& tile) {
+  return tile.format == TileFormat::kQuantizedMesh || tile.compression == proto::GlbCompression::kNone ||
+         tile.compression == proto::GlbCompression::kQuantized;
+}
+
 }  // namespace
 
 Coding NegotiateCoding(std::string_view accept_encoding) {
@@ -96,7 +102,8 @@ Result<TileRequest> Negotiate(const Route& route, const Request& request, std::s
   const Result<std::uint32_t> dataset = FindDataset(route.dataset, datasets);
   if (!dataset) return tl::unexpected(dataset.error());
   const DatasetView& view = datasets[*dataset];
-  const Result<TileParameters> parameters = ParseTileParameters(route.query, /*allow_at_least=*/true);
+  const Result<TileParameters> parameters =
+      ParseTileParameters(route.query, /*allow_at_least=*/true, /*allow_compression=*/route.format == TileFormat::kGlb);
   if (!parameters) return tl::unexpected(parameters.error());
   if (!IsAvailable(view, route.key)) {
     return MakeError(ErrorCode::kNotFound, "the dataset has no such tile; its layer.json lists what it has");
@@ -105,11 +112,15 @@ Result<TileRequest> Negotiate(const Route& route, const Request& request, std::s
   tile.dataset = *dataset;
   tile.key = route.key;
   tile.error_step = ErrorStep(parameters->wish, route.key.level, view.error_fraction);
-  tile.coding = NegotiateCoding(request.accept_encoding);
-  const proto::TileExtensions wanted = WantedExtensions(request.accept, parameters->extensions);
-  tile.normals = wanted.octvertexnormals;
-  tile.water_mask = wanted.watermask && view.has_water;
-  tile.metadata = wanted.metadata && proto::CarriesMetadata(route.key.level, view.metadata_levels, view.max_level());
+  tile.format = route.format;
+  if (route.format == TileFormat::kGlb) tile.compression = parameters->compression.value_or(view.glb_compression);
+  if (GzipHelps(tile)) tile.coding = NegotiateCoding(request.accept_encoding);
+  if (route.format == TileFormat::kQuantizedMesh) {
+    const proto::TileExtensions wanted = WantedExtensions(request.accept, parameters->extensions);
+    tile.normals = wanted.octvertexnormals;
+    tile.water_mask = wanted.watermask && view.has_water;
+    tile.metadata = wanted.metadata && proto::CarriesMetadata(route.key.level, view.metadata_levels, view.max_level());
+  }
   return tile;
 }
 

@@ -30,6 +30,20 @@ Result<void> SetPositive(std::optional<double>& to, const char* name, std::strin
   return {};
 }
 
+Result<void> SetCompression(std::optional<proto::GlbCompression>& to, std::string_view text) {
+  if (to) return MakeError(ErrorCode::kInvalidArgument, "compression is given more than once");
+  constexpr std::pair<std::string_view, proto::GlbCompression> kNames[] = {
+      {"draco", proto::GlbCompression::kDraco},
+      {"none", proto::GlbCompression::kNone},
+      {"quantized", proto::GlbCompression::kQuantized},
+      {"meshopt", proto::GlbCompression::kMeshopt}};
+  for (const auto& [name, compression] : kNames) {
+    if (text == name) to = compression;
+  }
+  if (!to) return MakeError(ErrorCode::kInvalidArgument, "compression must be draco, none, quantized or meshopt");
+  return {};
+}
+
 Result<void> CheckTogether(const ErrorWish& wish, bool at_least_given) {
   if (wish.error_m && wish.fraction) {
     return MakeError(ErrorCode::kInvalidArgument, "error and fraction exclude each other");
@@ -74,7 +88,7 @@ Result<QueryParameters> ParseQuery(std::string_view query) {
   return parameters;
 }
 
-Result<TileParameters> ParseTileParameters(std::string_view query, bool allow_at_least) {
+Result<TileParameters> ParseTileParameters(std::string_view query, bool allow_at_least, bool allow_compression) {
   const Result<QueryParameters> sent = ParseQuery(query);
   if (!sent) return tl::unexpected(sent.error());
   TileParameters parameters;
@@ -94,9 +108,11 @@ Result<TileParameters> ParseTileParameters(std::string_view query, bool allow_at
       if (value != "0" && value != "1") return MakeError(ErrorCode::kInvalidArgument, "atleast must be 0 or 1");
       at_least_given = true;
       wish.at_least = value == "1";
+    } else if (name == "compression" && allow_compression) {
+      set = SetCompression(parameters.compression, value);
     } else {
-      set = MakeError(ErrorCode::kInvalidArgument, "unknown parameter; known are error, fraction{}",
-                      allow_at_least ? ", atleast, extensions" : "");
+      set = MakeError(ErrorCode::kInvalidArgument, "unknown parameter; known are error, fraction{}{}",
+                      allow_at_least ? ", atleast, extensions" : "", allow_compression ? ", compression" : "");
     }
     if (!set) return tl::unexpected(set.error());
   }

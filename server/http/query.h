@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "engine/core/result.h"
+#include "proto/glb_tile.h"
 
 namespace terrace::server {
 
@@ -31,12 +32,14 @@ struct ErrorWish {
 struct TileParameters {
   ErrorWish wish;
   std::vector<std::string> extensions;  // every `extensions` value
+  std::optional<proto::GlbCompression> compression;
 };
 
-// The parameters of tile URLs (`allow_at_least`) and of layer.json. `v` and `extensions` may come any number of times:
-// clients append them on their own. kInvalidArgument, with a message for the client: an unknown or repeated parameter,
-// error and fraction together, atleast without error, or a value that is not what the parameter takes.
-Result<TileParameters> ParseTileParameters(std::string_view query, bool allow_at_least);
+// The parameters of tile URLs (`allow_at_least`), among them those of .glb (`allow_compression`), and of layer.json.
+// `v` and `extensions` may come any number of times: clients append them on their own. kInvalidArgument, with a message
+// for the client: an unknown or repeated parameter, error and fraction together, atleast without error, or a value that
+// is not what the parameter takes.
+Result<TileParameters> ParseTileParameters(std::string_view query, bool allow_at_least, bool allow_compression = false);
 
 // For URLs that take no parameters but `v`.
 Result<void> RefuseParameters(std::string_view query);

@@ -39,14 +39,51 @@ std::optional<std::int64_t> TileNumber(std::string_view text) {
   return number;
 }
 
+// Cuts the extension of a tile URL off its last segment.
+std::optional<TileFormat> CutFormat(std::string_view& name) {
+  constexpr std::pair<std::string_view, TileFormat> kSuffixes[] = {{".terrain", TileFormat::kQuantizedMesh},
+                                                                   {".glb", TileFormat::kGlb}};
+  for (const auto& [suffix, format] : kSuffixes) {
+    if (!name.ends_with(suffix)) continue;
+    name.remove_suffix(suffix.size());
+    return format;
+  }
+  return std::nullopt;
+}
+
 std::optional<geo::TileKey> ParseTileKey(std::string_view z, std::string_view x, std::string_view y) {
-  constexpr std::string_view kSuffix = ".terrain";
-  if (!y.ends_with(kSuffix)) return std::nullopt;
-  y.remove_suffix(kSuffix.size());
   const auto level = TileNumber(z), column = TileNumber(x), row = TileNumber(y);
   if (!level || !column || !row || *level > geo::kMaxLevel) return std::nullopt;
   const geo::TileKey key{static_cast<int>(*level), *column, *row};
   return geo::IsValid(key) ? std::optional(key) : std::nullopt;
+}
+
+// "9-272-359": level, column and row of an implicit tree's root.
+std::optional<geo::TileKey> ParseRoot(std::string_view name) {
+  const std::size_t first = name.find('-'), second = name.find('-', first + 1);
+  if (first == std::string_view::npos || second == std::string_view::npos) return std::nullopt;
+  return ParseTileKey(name.substr(0, first), name.substr(first + 1, second - first - 1), name.substr(second + 1));
+}
+
+// A content or a subtree of an implicit tree: 3dtiles/{root}/{level}/{x}/{y}.{glb|subtree}, counted from the root.
+std::optional<Route> MatchImplicit(const std::vector<std::string>& segments) {
+  constexpr std::string_view kSubtreeSuffix = ".subtree";
+  if (segments.size() != 6 || segments[1] != "3dtiles") return std::nullopt;
+  std::string_view row = segments[5];
+  const bool is_subtree = row.ends_with(kSubtreeSuffix);
+  if (is_subtree) row.remove_suffix(kSubtreeSuffix.size());
+  if (!is_subtree && CutFormat(row) != TileFormat::kGlb) return std::nullopt;
+  const auto root = ParseRoot(segments[2]);
+  const auto level = TileNumber(segments[3]), x = TileNumber(segments[4]), y = TileNumber(row);
+  if (!root || !level || !x || !y || root->level + *level > geo::kMaxLevel) return std::nullopt;
+  const std::int64_t side = std::int64_t{1} << *level;
+  if (*x >= side || *y >= side) return std::nullopt;
+  Route route;
+  route.root = *root;
+  route.key = {root->level + static_cast<int>(*level), root->x * side + *x, root->y * side + *y};
+  route.kind = is_subtree ? RouteKind::kSubtree : RouteKind::kTile;
+  route.format = TileFormat::kGlb;
+  return route;
 }
 
 // The decoded segments of a path; an encoded '/' does not separate.
@@ -95,6 +132,10 @@ std::string_view ToString(RouteKind kind) {
       return "tile";
     case RouteKind::kLayer:
       return "layer";
+    case RouteKind::kTileset:
+      return "tileset";
+    case RouteKind::kSubtree:
+      return "subtree";
     case RouteKind::kDatasets:
       return "datasets";
     case RouteKind::kViewer:
@@ -120,15 +161,22 @@ Result<Route> Match(std::string_view target) {
 
   std::optional<Route> route = MatchFixed(*segments);
   if (!route) {
-    route.emplace();
+    route = MatchImplicit(*segments).value_or(Route());
     route->dataset = (*segments)[0];
-    if (segments->size() == 2 && (*segments)[1] == "layer.json") {
+    if (route->kind != RouteKind::kViewer) {
+      // An implicit tree's.
+    } else if (segments->size() == 2 && (*segments)[1] == "tileset.json") {
+      route->kind = RouteKind::kTileset;
+    } else if (segments->size() == 2 && (*segments)[1] == "layer.json") {
       route->kind = RouteKind::kLayer;
     } else if (segments->size() == 4) {
-      const auto key = ParseTileKey((*segments)[1], (*segments)[2], (*segments)[3]);
-      if (!key) return NotFound();
+      std::string_view row = (*segments)[3];
+      const auto format = CutFormat(row);
+      const auto key = ParseTileKey((*segments)[1], (*segments)[2], row);
+      if (!format || !key) return NotFound();
       route->kind = RouteKind::kTile;
       route->key = *key;
+      route->format = *format;
     } else {
       return NotFound();
     }

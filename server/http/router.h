@@ -6,12 +6,15 @@
 
 #include "engine/core/result.h"
 #include "engine/geo/tile_key.h"
+#include "server/tiles/tile_request.h"
 
 namespace terrace::server {
 
 enum class RouteKind {
-  kTile,      // /{dataset}/{z}/{x}/{y}.terrain
+  kTile,      // /{dataset}/{z}/{x}/{y}.terrain, .glb; /{dataset}/3dtiles/{root}/{level}/{x}/{y}.glb
   kLayer,     // /{dataset}/layer.json
+  kTileset,   // /{dataset}/tileset.json
+  kSubtree,   // /{dataset}/3dtiles/{root}/{level}/{x}/{y}.subtree
   kDatasets,  // /datasets
   kViewer,    // / and /viewer/...
   kLive,      // /livez
@@ -24,10 +27,12 @@ std::string_view ToString(RouteKind kind);
 
 struct Route {
   RouteKind kind = RouteKind::kViewer;
-  std::string dataset;  // kTile, kLayer: decoded
-  geo::TileKey key;     // kTile: inside the tiling scheme
-  std::string file;     // kViewer: relative to the viewer's folder, decoded: "index.html" for "/"
-  std::string query;    // without '?', not decoded
+  std::string dataset;                             // where the URL begins with one: decoded
+  geo::TileKey key;                                // kTile, kSubtree: inside the tiling scheme
+  geo::TileKey root;                               // kSubtree: of the tree the URL counts in, an ancestor of `key`
+  TileFormat format = TileFormat::kQuantizedMesh;  // kTile: by the extension
+  std::string file;   // kViewer: relative to the viewer's folder, decoded: "index.html" for "/"
+  std::string query;  // without '?', not decoded
 };
 
 // `target` in origin form ("/maui/0/0/0.terrain?error=5") or absolute form ("http://host/...").

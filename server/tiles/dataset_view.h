@@ -11,6 +11,7 @@
 
 #include "engine/geo/error_ladder.h"
 #include "engine/geo/tile_key.h"
+#include "proto/glb_tile.h"
 
 namespace terrace::server {
 
@@ -18,11 +19,13 @@ struct DatasetView {
   std::string name;
   std::string attribution;
   double error_fraction = geo::kDefaultErrorFraction;
+  proto::GlbCompression glb_compression = proto::GlbCompression::kDraco;  // for requests that name none
   std::uint64_t generation = 0;                             // changes whenever the bytes of its tiles may change
   std::vector<std::vector<geo::TileRange>> available;       // by level, from 0; the deepest served level is the last
   double west = -180, south = -90, east = 180, north = 90;  // degrees; west > east: across the antimeridian
-  double min_height_m = 0, max_height_m = 0;
-  bool has_water = false;   // tiles have a water mask
+  double min_height_m = 0, max_height_m = 0;                // of the data
+  double floor_m = 0;                                       // height where there is no data
+  bool has_water = false;                                   // tiles have a water mask
   int metadata_levels = 0;  // tiles of every so many levels tell what is below them; 0: none
 
   int max_level() const { return static_cast<int>(available.size()) - 1; }

@@ -117,13 +117,10 @@ tin::GreedyOptions PlanOf(const dem::DemSource& source, const proto::LatticeView
   return plan;
 }
 
-Result<MeshedTile> MeshTile(const dem::DemSource& source, const proto::LatticeView& lattice,
-                            const tin::Refinement& refinement, const MeshRules& rules, double wanted_error_m,
-                            const std::stop_token& stop) {
-  const int level = lattice.key.level;
-  const proto::EdgeSteps steps = EdgeStepsOf(source, lattice.key, wanted_error_m);
+Result<StartedMesh> StartMesh(const dem::DemSource& source, const proto::LatticeView& lattice,
+                              const tin::Refinement& refinement, const MeshRules& rules, double wanted_error_m,
+                              const std::stop_token& stop) {
   double error_m = wanted_error_m;
-  const Clock::time_point start = Clock::now();
   Result<tin::TinMesh> mesh =
       refinement.vertex_count() <= proto::kMaxTileVertices
           ? refinement.MeshAt(error_m)
@@ -132,13 +129,26 @@ Result<MeshedTile> MeshTile(const dem::DemSource& source, const proto::LatticeVi
     mesh = Compact(FieldOf(lattice), *mesh, PlanOf(source, lattice, rules.criterion), error_m, stop);
   }
   if (!mesh) return tl::unexpected(std::move(mesh).error());
+  return StartedMesh{*std::move(mesh), error_m};
+}
+
+Result<MeshedTile> MeshTile(const dem::DemSource& source, const proto::LatticeView& lattice,
+                            const tin::Refinement& refinement, const MeshRules& rules, double wanted_error_m,
+                            const std::stop_token& stop) {
+  const int level = lattice.key.level;
+  const proto::EdgeSteps steps = EdgeStepsOf(source, lattice.key, wanted_error_m);
+  const Clock::time_point start = Clock::now();
+  Result<StartedMesh> started = StartMesh(source, lattice, refinement, rules, wanted_error_m, stop);
+  if (!started) return tl::unexpected(std::move(started).error());
+  double error_m = started->error_m;
   const auto replayed = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - start);
-  Result<MeshedTile> meshed = Finish(*std::move(mesh), lattice, steps, error_m, IsCurved(level, error_m), stop);
+  Result<MeshedTile> meshed = Finish(std::move(started->mesh), lattice, steps, error_m, IsCurved(level, error_m), stop);
   if (meshed) meshed->replayed = replayed;
   if (!meshed || proto::AllCounterClockwise(meshed->tile)) return meshed;
 
   error_m = wanted_error_m;
-  mesh = RefineWithinFormat(FieldOf(lattice), PlanOf(source, lattice, tin::Criterion::kDelaunay), 1, error_m, stop);
+  Result<tin::TinMesh> mesh =
+      RefineWithinFormat(FieldOf(lattice), PlanOf(source, lattice, tin::Criterion::kDelaunay), 1, error_m, stop);
   if (!mesh) return tl::unexpected(std::move(mesh).error());
   meshed = Finish(*std::move(mesh), lattice, steps, error_m, IsCurved(level, error_m), stop);
   if (meshed && !proto::AllCounterClockwise(meshed->tile)) {

@@ -28,6 +28,11 @@ struct MeshedTile {
   std::chrono::microseconds replayed{};  // time until the mesh stood; quantizing and measuring came after it
 };
 
+struct StartedMesh {
+  tin::TinMesh mesh;
+  double error_m = 0;  // what its inside holds; more than was wanted where the vertices would not fit the format
+};
+
 // What a build ends with when it was stopped.
 tl::unexpected<Error> Cancelled();
 
@@ -36,6 +41,12 @@ tin::HeightField FieldOf(const proto::LatticeView& lattice);
 
 // How the tile is refined, for every error at once (refine_plan.h).
 tin::GreedyOptions PlanOf(const dem::DemSource& source, const proto::LatticeView& lattice, tin::Criterion criterion);
+
+// The tile's mesh to the error before any wire rounds it: replayed, and dropped where the rules say so. `refinement` is
+// as for MeshTile. kCancelled: stopped.
+Result<StartedMesh> StartMesh(const dem::DemSource& source, const proto::LatticeView& lattice,
+                              const tin::Refinement& refinement, const MeshRules& rules, double wanted_error_m,
+                              const std::stop_token& stop);
 
 // The tile's mesh to the error: replayed, dropped where the rules say so, quantized, measured, and mended where the
 // wire's rounding pushed a sample over the bound. `refinement` is PlanOf's run to this error or a finer one, or one

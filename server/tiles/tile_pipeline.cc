@@ -10,6 +10,7 @@
 #include "proto/compress.h"
 #include "proto/quantized_mesh.h"
 #include "proto/tile_normals.h"
+#include "server/tiles/glb_mesher.h"
 #include "server/tiles/tile_extensions.h"
 #include "server/tiles/tile_mesher.h"
 
@@ -75,6 +76,45 @@ Result<RefinedTilePtr> TilePipeline::Refine(std::uint32_t index, const geo::Tile
   return RefinedTilePtr(std::move(refined));
 }
 
+Result<void> TilePipeline::EncodeQuantizedMesh(const TileRequest& request, const RefinedTile& refined, double error_m,
+                                               EncodedTile& encoded, const std::stop_token& stop) const {
+  const Dataset& dataset = datasets_[request.dataset];
+  const Clock::time_point start = Clock::now();
+  const proto::LatticeView lattice{request.key, refined.heights.lattice, refined.heights.heights};
+  Result<MeshedTile> measured = MeshTile(*dataset.source, lattice, refined.refinement, dataset.rules, error_m, stop);
+  if (!measured) return tl::unexpected(std::move(measured).error());
+  if (request.normals) measured->tile.normals = proto::TileNormals(lattice, measured->mesh, measured->tile);
+  const Result<proto::QuantizedMeshOptions> options = AddExtensions(dataset, request, lattice, measured->tile, stop);
+  if (!options) return tl::unexpected(options.error());
+  encoded.bytes = proto::EncodeQuantizedMesh(measured->tile, *options);
+  encoded.times.refine += measured->replayed;
+  encoded.times.encode = Since(start) - measured->replayed;
+  encoded.max_error_m = measured->max_error_m;
+  encoded.vertices = static_cast<std::uint32_t>(measured->tile.u.size());
+  encoded.triangles = static_cast<std::uint32_t>(measured->tile.triangles.size());
+  return {};
+}
+
+Result<void> TilePipeline::EncodeGlb(const TileRequest& request, const RefinedTile& refined, double error_m,
+                                     EncodedTile& encoded, const std::stop_token& stop) const {
+  const Dataset& dataset = datasets_[request.dataset];
+  const Clock::time_point start = Clock::now();
+  const proto::LatticeView lattice{request.key, refined.heights.lattice, refined.heights.heights};
+  const Result<MeshedGlb> meshed = MeshGlb(*dataset.source, lattice, refined.refinement, dataset.rules, error_m, stop);
+  if (!meshed) return tl::unexpected(meshed.error());
+  proto::GlbOptions options = dataset.glb;
+  options.compression = request.compression;
+  Result<proto::GlbTile> glb = proto::EncodeGlb(meshed->mesh, options);
+  if (!glb) return tl::unexpected(std::move(glb).error());
+  encoded.bytes = std::move(glb->bytes);
+  encoded.times.refine += meshed->replayed;
+  encoded.times.encode = Since(start) - meshed->replayed;
+  encoded.max_error_m = meshed->max_error_m;
+  encoded.vertices = glb->vertices;
+  encoded.triangles = glb->triangles;
+  return {};
+}
+
 Result<EncodedTile> TilePipeline::Build(const TileRequest& request, std::stop_token stop) const {
   if (request.dataset >= datasets_.size()) return MakeError(ErrorCode::kNotFound, "no such dataset");
   const Dataset& dataset = datasets_[request.dataset];
@@ -86,28 +126,17 @@ Result<EncodedTile> TilePipeline::Build(const TileRequest& request, std::stop_to
   const Result<RefinedTilePtr> refined = Refine(request.dataset, request.key, error_m, encoded, stop);
   if (!refined) return tl::unexpected(refined.error());
 
-  Clock::time_point start = Clock::now();
-  const dem::TileHeights& heights = (*refined)->heights;
-  const proto::LatticeView lattice{request.key, heights.lattice, heights.heights};
-  Result<MeshedTile> measured =
-      MeshTile(*dataset.source, lattice, (*refined)->refinement, dataset.rules, error_m, stop);
-  if (!measured) return tl::unexpected(std::move(measured).error());
-  if (request.normals) measured->tile.normals = proto::TileNormals(lattice, measured->mesh, measured->tile);
-  const Result<proto::QuantizedMeshOptions> options = AddExtensions(dataset, request, lattice, measured->tile, stop);
-  if (!options) return tl::unexpected(options.error());
-  encoded.bytes = proto::EncodeQuantizedMesh(measured->tile, *options);
-  encoded.times.refine += measured->replayed;
-  encoded.times.encode = Since(start) - measured->replayed;
+  const Result<void> done = request.format == TileFormat::kGlb
+                                ? EncodeGlb(request, **refined, error_m, encoded, stop)
+                                : EncodeQuantizedMesh(request, **refined, error_m, encoded, stop);
+  if (!done) return tl::unexpected(done.error());
 
   if (request.coding == Coding::kGzip) {
-    start = Clock::now();
+    const Clock::time_point start = Clock::now();
     encoded.bytes = proto::Gzip(encoded.bytes);
     encoded.times.compress = Since(start);
   }
   encoded.etag = StrongETag(encoded.bytes);
-  encoded.max_error_m = measured->max_error_m;
-  encoded.vertices = static_cast<std::uint32_t>(measured->tile.u.size());
-  encoded.triangles = static_cast<std::uint32_t>(measured->tile.triangles.size());
   return encoded;
 }
 

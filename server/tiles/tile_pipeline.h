@@ -11,6 +11,7 @@
 #include "engine/core/result.h"
 #include "engine/dem/dem_source.h"
 #include "engine/dem/water_raster.h"
+#include "proto/glb_tile.h"
 #include "server/tiles/encoded_tile.h"
 #include "server/tiles/refined_tile.h"
 #include "server/tiles/tile_mesher.h"
@@ -32,6 +33,7 @@ struct Dataset {
   std::string attribution;
   double error_fraction = 0.5;
   MeshRules rules;
+  proto::GlbOptions glb;  // compression: what GLB requests get that name none
   std::unique_ptr<dem::DemSource> source;
   WaterRules water;
   int metadata_levels = 0;       // tiles of every so many levels tell what is below them; 0: none
@@ -50,7 +52,7 @@ class TilePipeline {
 
   const std::vector<Dataset>& datasets() const { return datasets_; }
 
-  // Reads, refines, quantizes, measures, encodes and compresses one tile.
+  // Reads, refines, quantizes, measures, encodes and compresses one tile. All formats share the refinement.
   // kNotFound: no such dataset or tile outside availability. kUnavailable: the source cannot be read now.
   // kCancelled: `stop` was requested.
   Result<EncodedTile> Build(const TileRequest& request, std::stop_token stop) const;
@@ -60,6 +62,11 @@ class TilePipeline {
  private:
   Result<RefinedTilePtr> Refine(std::uint32_t index, const geo::TileKey& key, double error_m, EncodedTile& encoded,
                                 const std::stop_token& stop) const;
+
+  Result<void> EncodeQuantizedMesh(const TileRequest& request, const RefinedTile& refined, double error_m,
+                                   EncodedTile& encoded, const std::stop_token& stop) const;
+  Result<void> EncodeGlb(const TileRequest& request, const RefinedTile& refined, double error_m, EncodedTile& encoded,
+                         const std::stop_token& stop) const;
 
   std::vector<Dataset> datasets_;
   mutable RefinementCache refinements_;

@@ -5,10 +5,11 @@
 #include <string>
 
 #include "engine/geo/tile_key.h"
+#include "proto/glb_tile.h"
 
 namespace terrace::server {
 
-enum class TileFormat : std::uint8_t { kQuantizedMesh };
+enum class TileFormat : std::uint8_t { kQuantizedMesh, kGlb };
 enum class Coding : std::uint8_t { kIdentity, kGzip };
 
 struct TileRequest {
@@ -16,8 +17,10 @@ struct TileRequest {
   geo::TileKey key;
   int error_step = 0;  // on the ladder of the key's level (engine/geo/error_ladder.h)
   TileFormat format = TileFormat::kQuantizedMesh;
+  proto::GlbCompression compression = proto::GlbCompression::kDraco;  // kGlb only
   Coding coding = Coding::kIdentity;
-  // Extensions of quantized-mesh, each only where the client asks for it and the tile has it.
+  // Extensions of quantized-mesh, each only where the client asks for it and the tile has it. GLB tiles always have
+  // normals.
   bool normals = false;
   bool water_mask = false;
   bool metadata = false;

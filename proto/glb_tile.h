@@ -1,0 +1,39 @@
+// A GridMesh as a GLB tile of 3D Tiles: docs/formats/glb.md has the layout.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "engine/core/result.h"
+#include "proto/draco_mesh.h"
+#include "proto/grid_mesh.h"
+
+namespace terrace::proto {
+
+// All of them decode to the same positions, bit for bit.
+enum class GlbCompression : std::uint8_t {
+  kDraco,      // KHR_draco_mesh_compression
+  kNone,       // 32-bit floats
+  kQuantized,  // KHR_mesh_quantization: 16-bit positions and 8-bit normals; floats where a tile spans 2^16 steps or
+               // more
+  kMeshopt,    // EXT_meshopt_compression of what kQuantized holds
+};
+
+struct GlbOptions {
+  GlbCompression compression = GlbCompression::kDraco;
+  DracoOptions draco;
+  std::string generator = "terrace";  // asset.generator
+};
+
+struct GlbTile {
+  std::string bytes;
+  // Of what the bytes decode to, skirts included.
+  std::uint32_t vertices = 0;
+  std::uint32_t triangles = 0;
+};
+
+// Pure and thread-safe. kInternal: a coder failed, or decodes to something else (draco_mesh.h).
+// Precondition: at least one triangle.
+Result<GlbTile> EncodeGlb(const GridMesh& mesh, const GlbOptions& options);
+
+}  // namespace terrace::proto

@@ -1,0 +1,75 @@
+// The glTF 2.0 around a single mesh: the JSON that describes its arrays, and the GLB container of both.
+//
+// One buffer, one primitive of triangles, one node that carries the mesh's place in double precision as a matrix. That
+// node is scene.nodes[0] and has a `matrix`, not a translation: loaders.gl keeps double precision for no other form.
+// Pure functions; thread-safe.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace terrace::proto {
+
+// glTF's own numbers.
+enum class GltfComponent { kByte = 5120, kUnsignedShort = 5123, kUnsignedInt = 5125, kFloat = 5126 };
+enum class GltfTarget { kNone = 0, kVertices = 34962, kIndices = 34963 };
+
+// A part of the buffer. With `meshopt` the bytes in the buffer are compressed (EXT_meshopt_compression), and stride and
+// count describe what they decode to.
+struct GltfView {
+  struct Meshopt {
+    std::string_view mode, filter;  // "ATTRIBUTES", "TRIANGLES"; "NONE", "OCTAHEDRAL", "EXPONENTIAL"
+    std::size_t count = 0;
+  };
+
+  std::size_t offset = 0, length = 0;
+  std::size_t stride = 0;  // 0: not stated, tightly packed
+  GltfTarget target = GltfTarget::kNone;
+  std::optional<Meshopt> meshopt = {};
+};
+
+struct GltfAccessor {
+  std::optional<std::size_t> view = {};  // none: the data come from Draco
+  GltfComponent component = GltfComponent::kFloat;
+  std::string_view type = "VEC3";
+  std::size_t count = 0;
+  bool normalized = false;
+  std::vector<double> min = {}, max = {};  // empty: not stated
+};
+
+struct GltfMesh {
+  std::array<double, 16> matrix{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};  // of the node, column by column
+  std::string_view generator = "terrace";
+  std::vector<std::string_view> extensions;  // used and required
+  std::vector<GltfView> views;
+  std::vector<GltfAccessor> accessors;
+  std::vector<std::pair<std::string_view, std::size_t>> attributes;  // "POSITION" -> accessor
+  std::size_t indices = 0;                                           // accessor
+  // KHR_draco_mesh_compression: the view of the Draco bytes, and Draco's unique id of each attribute.
+  struct Draco {
+    std::size_t view = 0;
+    std::vector<std::pair<std::string_view, unsigned>> attributes;
+  };
+  std::optional<Draco> draco;
+  // Without one, glTF's default material applies, which is a metal.
+  struct Material {
+    std::array<double, 4> color{1, 1, 1, 1};  // linear
+  };
+  std::optional<Material> material;
+  std::size_t buffer_bytes = 0;
+};
+
+// UTF-8 JSON, not padded.
+std::string GltfJson(const GltfMesh& mesh);
+
+// Everything of a .glb file in front of its buffer: header, JSON chunk, header of the binary chunk. Exactly
+// `buffer_bytes` bytes must follow. Empty where the file would exceed the format's 4 GiB. Precondition: buffer_bytes is
+// a multiple of 4.
+std::string GlbHead(std::string json, std::size_t buffer_bytes);
+
+}  // namespace terrace::proto

@@ -1,0 +1,56 @@
+#include "proto/implicit_tree.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <numeric>
+
+#include "engine/core/check.h"
+
+namespace terrace::proto {
+namespace {
+
+std::int64_t Count(const std::vector<geo::TileRange>& ranges) {
+  return std::accumulate(ranges.begin(), ranges.end(), std::int64_t{0},
+                         [](std::int64_t sum, const geo::TileRange& range) {
+                           return sum + (range.end_x - range.start_x + 1) * (range.end_y - range.start_y + 1);
+                         });
+}
+
+}  // namespace
+
+std::vector<geo::TileKey> ImplicitRoots(Availability available) {
+  TERRACE_CHECK(!available.empty() && !available[0].empty());
+  std::size_t level = available.size() - 1;
+  while (level > 0 && Count(available[level]) > kMaxImplicitRoots) --level;
+  std::vector<geo::TileKey> roots;
+  for (const geo::TileRange& range : available[level]) {
+    for (std::int64_t y = range.start_y; y <= range.end_y; ++y) {
+      for (std::int64_t x = range.start_x; x <= range.end_x; ++x) roots.push_back({static_cast<int>(level), x, y});
+    }
+  }
+  std::sort(roots.begin(), roots.end(),
+            [](const geo::TileKey& a, const geo::TileKey& b) { return a.y != b.y ? a.y < b.y : a.x < b.x; });
+  return roots;
+}
+
+std::string RootName(const geo::TileKey& root) { return fmt::format("{}-{}-{}", root.level, root.x, root.y); }
+
+std::vector<std::vector<geo::TileRange>> BlocksBelow(Availability available, const geo::TileKey& top, int depth) {
+  std::vector<std::vector<geo::TileRange>> blocks(static_cast<std::size_t>(depth) + 1);
+  for (std::size_t k = 0; k < blocks.size(); ++k) {
+    const std::size_t level = static_cast<std::size_t>(top.level) + k;
+    if (level >= available.size()) break;
+    const std::int64_t last = (std::int64_t{1} << k) - 1;
+    const geo::TileKey corner = TileUnder(top, static_cast<int>(k), 0, 0);
+    for (const geo::TileRange& range : available[level]) {
+      const geo::TileRange here{std::max<std::int64_t>(range.start_x - corner.x, 0),
+                                std::max<std::int64_t>(range.start_y - corner.y, 0),
+                                std::min(range.end_x - corner.x, last), std::min(range.end_y - corner.y, last)};
+      if (here.start_x <= here.end_x && here.start_y <= here.end_y) blocks[k].push_back(here);
+    }
+  }
+  return blocks;
+}
+
+}  // namespace terrace::proto

@@ -1,0 +1,38 @@
+// The tiles of a dataset as implicit quadtrees of 3D Tiles 1.1 (OGC 22-025r4, "Implicit Tiling"): where the trees are
+// rooted, and what lies in a subtree of them. Pure functions, thread-safe.
+//
+// A tree is rooted at a TMS tile. Inside it a tile has the level, column and row that it has under that root: level 0
+// is the root, x counts from the west and y from the SOUTH, as in TMS, so that the numbers differ by a shift alone.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "engine/geo/tile_key.h"
+
+namespace terrace::proto {
+
+// By level, from 0: what dem::DemSource::Available gives, every ancestor of an available tile included.
+using Availability = std::span<const std::vector<geo::TileRange>>;
+
+inline constexpr std::int64_t kMaxImplicitRoots = 4;
+
+// All tiles of the deepest level that has at most kMaxImplicitRoots of them; from west to east, then from south to
+// north. Level 0 never has more than its two, so there is always an answer. Precondition: level 0 is not empty.
+std::vector<geo::TileKey> ImplicitRoots(Availability available);
+
+// How a root is called in URLs: "9-272-359", level, column and row.
+std::string RootName(const geo::TileKey& root);
+
+// The tile `level` levels under the root, in the tree's own numbering.
+constexpr geo::TileKey TileUnder(const geo::TileKey& root, int level, std::int64_t x, std::int64_t y) {
+  return {root.level + level, (root.x << level) + x, (root.y << level) + y};
+}
+
+// Entry k, 0 .. depth: blocks of the available tiles k levels below `top`, numbered from top's south-western corner.
+// Levels below the deepest available one are empty.
+std::vector<std::vector<geo::TileRange>> BlocksBelow(Availability available, const geo::TileKey& top, int depth);
+
+}  // namespace terrace::proto

@@ -1,0 +1,14 @@
+// How deep the skirts of a GLB tile hang, so that no gap shows where tiles of different levels meet.
+#pragma once
+
+namespace terrace::proto {
+
+// Metres along the ellipsoid's normal: the tile's error, that of its parent at the same request, and what the edge's
+// chords cut off the curved ground. A function of level and error alone, so that both sides of an edge agree, and what
+// a tileset's root region must reach below the lowest height.
+//
+// The parent's error is taken as twice the tile's: at one `fraction` it is that, and at one `error` it is at most that,
+// whichever end of the ladder clamps (engine/geo/error_ladder.h).
+double SkirtDepth(int level, double error_m);
+
+}  // namespace terrace::proto

@@ -1,0 +1,32 @@
+// A binary .subtree of 3D Tiles 1.1 implicit tiling: which tiles of a quadtree exist, a few levels at a time
+// (OGC 22-025r4, "Implicit Tiling", sections "Subtrees" and "Subtree Binary Format").
+//
+// Bits come in level order and in Morton order within a level (x in the even bits), least significant bit first.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "engine/geo/tile_key.h"
+
+namespace terrace::proto {
+
+inline constexpr int kMaxSubtreeLevels = 10;  // 350,000 tiles; clients make an object for each at once
+
+struct Subtree {
+  int levels = 1;  // 1 .. kMaxSubtreeLevels
+  // Entry k, 0 .. levels: blocks without overlap of the available tiles k levels below the subtree's root, numbered
+  // from its south-western corner. Entry `levels` holds the roots of child subtrees.
+  std::vector<std::vector<geo::TileRange>> tiles;
+};
+
+// The whole file. Every available tile has content. Where all bits of a bitstream are equal, the JSON says so and the
+// bitstream is left out. Preconditions: tiles has levels + 1 entries, the root is available, and so is the parent of
+// every available tile.
+std::string EncodeSubtree(const Subtree& subtree);
+
+// Where tile (x, y) of a level stands in Morton order. x and y below 2^16.
+std::uint32_t MortonIndex(std::uint32_t x, std::uint32_t y);
+
+}  // namespace terrace::proto

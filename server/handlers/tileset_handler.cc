@@ -1,0 +1,91 @@
+#include "server/handlers/tileset_handler.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "proto/implicit_tree.h"
+#include "proto/skirt.h"
+#include "proto/subtree.h"
+#include "proto/tileset.h"
+#include "server/handlers/layer_handler.h"
+#include "server/http/http_error.h"
+#include "server/http/negotiate.h"
+
+namespace terrace::server {
+namespace {
+
+// Of a .subtree: 1,365 tiles at most. CesiumJS makes an object for each of them as soon as the file is there, so more
+// would cost frames, and fewer would cost one more round trip on the way down to level 13.
+constexpr int kSubtreeLevels = 6;
+
+int LevelsUnder(const DatasetView& dataset, int root_level) { return dataset.max_level() - root_level + 1; }
+
+int SubtreeLevels(const DatasetView& dataset, int root_level) {
+  return std::min(kSubtreeLevels, LevelsUnder(dataset, root_level));
+}
+
+// What the content templates carry for a request. The value of `compression` has been checked.
+std::string ContentQuery(const ErrorWish& wish, std::string_view query) {
+  std::string content = TileQuery(wish);
+  const QueryParameters parameters = ParseQuery(query).value_or(QueryParameters());
+  for (const auto& [name, value] : parameters) {
+    if (name == "compression") content += (content.empty() ? "compression=" : "&compression=") + value;
+  }
+  return content;
+}
+
+Document MakeTileset(const DatasetView& dataset, const ErrorWish& wish, std::string content_query) {
+  proto::TilesetDescription tileset;
+  tileset.attribution = dataset.attribution;
+  tileset.roots = proto::ImplicitRoots(dataset.available);
+  const int level = tileset.roots.front().level;
+  tileset.levels = LevelsUnder(dataset, level);
+  tileset.subtree_levels = SubtreeLevels(dataset, level);
+  // The roots have the largest error, and with it the deepest skirts and the coarsest rounding of heights.
+  const double error_m =
+      geo::LadderError(level, ErrorStep(wish, level, dataset.error_fraction), dataset.error_fraction);
+  const double rounding_m = error_m / 32;
+  tileset.min_height_m =
+      std::min(dataset.min_height_m, dataset.floor_m) - proto::SkirtDepth(level, error_m) - rounding_m;
+  tileset.max_height_m = std::max(dataset.max_height_m, dataset.floor_m) + rounding_m;
+  tileset.content_query = std::move(content_query);
+  return Document::Make(proto::EncodeTileset(tileset), "application/json");
+}
+
+}  // namespace
+
+TilesetHandler::TilesetHandler(std::span<const DatasetView> datasets, std::string cache_control)
+    : datasets_(datasets), cache_control_(std::move(cache_control)) {
+  for (const DatasetView& dataset : datasets_) plain_.push_back(MakeTileset(dataset, {}, ""));
+}
+
+Response TilesetHandler::Handle(const Route& route, const Request& request) const {
+  const Result<std::uint32_t> dataset = FindDataset(route.dataset, datasets_);
+  if (!dataset) return ClientErrorResponse(dataset.error(), request.id);
+  const Result<TileParameters> parameters =
+      ParseTileParameters(route.query, /*allow_at_least=*/false, /*allow_compression=*/true);
+  if (!parameters) return ClientErrorResponse(parameters.error(), request.id);
+  std::string content_query = ContentQuery(parameters->wish, route.query);
+  if (content_query.empty()) return Serve(plain_[*dataset], request, cache_control_);
+  return Serve(MakeTileset(datasets_[*dataset], parameters->wish, std::move(content_query)), request, cache_control_);
+}
+
+Response TilesetHandler::HandleSubtree(const Route& route, const Request& request) const {
+  const Result<std::uint32_t> index = FindDataset(route.dataset, datasets_);
+  if (!index) return ClientErrorResponse(index.error(), request.id);
+  // Clients hang the tileset's own query on every URL under it; it changes nothing here.
+  const Result<TileParameters> parameters =
+      ParseTileParameters(route.query, /*allow_at_least=*/true, /*allow_compression=*/true);
+  if (!parameters) return ClientErrorResponse(parameters.error(), request.id);
+  const DatasetView& dataset = datasets_[*index];
+  if (!IsAvailable(dataset, route.key) ||
+      (route.key.level - route.root.level) % SubtreeLevels(dataset, route.root.level) != 0) {
+    return ProblemResponse(404, "the dataset has no such subtree; its tileset.json says where they begin", request.id);
+  }
+  proto::Subtree subtree;
+  subtree.levels = SubtreeLevels(dataset, route.root.level);
+  subtree.tiles = proto::BlocksBelow(dataset.available, route.key, subtree.levels);
+  return Serve(Document::Make(proto::EncodeSubtree(subtree), "application/octet-stream"), request, cache_control_);
+}
+
+}  // namespace terrace::server

@@ -1,0 +1,60 @@
+#include "server/tiles/glb_mesher.h"
+
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "engine/tin/insert_samples.h"
+#include "proto/quantized_mesh.h"
+#include "proto/skirt.h"
+#include "proto/tile_error.h"
+#include "proto/tile_normals.h"
+
+namespace terrace::server {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// Far coarser than what processors differ by, far finer than light can show: 0.003 degrees.
+double RoundNormal(double component) {
+  constexpr double kGrid = 16384;
+  return std::floor(component * kGrid + 0.5) / kGrid;
+}
+
+std::vector<geo::Vec3> RoundedNormals(std::vector<geo::Vec3> normals) {
+  for (geo::Vec3& n : normals) n = {RoundNormal(n.x), RoundNormal(n.y), RoundNormal(n.z)};
+  return normals;
+}
+
+}  // namespace
+
+Result<MeshedGlb> MeshGlb(const dem::DemSource& source, const proto::LatticeView& lattice,
+                          const tin::Refinement& refinement, const MeshRules& rules, double wanted_error_m,
+                          const std::stop_token& stop) {
+  constexpr int kMaxRounds = 16;  // as for quantized-mesh
+  const Clock::time_point start = Clock::now();
+  Result<StartedMesh> started = StartMesh(source, lattice, refinement, rules, wanted_error_m, stop);
+  if (!started) return tl::unexpected(std::move(started).error());
+  MeshedGlb meshed;
+  meshed.replayed = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - start);
+
+  tin::TinMesh& mesh = started->mesh;
+  const double step_m = proto::GridStep(lattice.lattice, wanted_error_m);
+  for (int round = 1;; ++round) {
+    if (stop.stop_requested()) return Cancelled();
+    const std::vector<proto::GridPoint> points = proto::SnapVertices(lattice, mesh, step_m);
+    const std::vector<geo::Vec3> positions = proto::GridPositions(points, step_m);
+    const proto::TileError error = proto::MeasureFlatError(lattice, mesh, positions, started->error_m);
+    meshed.max_error_m = error.max_m;
+    if (error.misses.empty() || round == kMaxRounds ||
+        mesh.vertices.size() + error.misses.size() > proto::kMaxTileVertices) {
+      meshed.mesh =
+          proto::MakeGridMesh(lattice, mesh, points, RoundedNormals(proto::VertexNormals(lattice, mesh, positions)),
+                              step_m, proto::SkirtDepth(lattice.key.level, wanted_error_m));
+      return meshed;
+    }
+    mesh = tin::InsertSamples(mesh, error.misses);
+  }
+}
+
+}  // namespace terrace::server
