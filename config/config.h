@@ -32,6 +32,20 @@ struct WaterConfig {
   friend bool operator==(const WaterConfig&, const WaterConfig&) = default;
 };
 
+// How textures are written: proto::TextureFormat, which this room does not know.
+enum class Texture : std::uint8_t { kNone, kJpeg, kWebp };
+
+// The image that textures of GLB tiles are cut from.
+struct ImageryConfig {
+  std::string image;  // empty: none
+  std::string attribution;
+  Texture texture = Texture::kJpeg;  // of tiles whose requests name none
+  int size = 512;                    // pixels along the edge of a tile, at most
+  int quality = 80;
+
+  friend bool operator==(const ImageryConfig&, const ImageryConfig&) = default;
+};
+
 struct DatasetConfig {
   std::string name;                  // the first part of its URLs: [A-Za-z0-9._-]{1,64}
   std::vector<std::string> sources;  // files, after globs are expanded; exactly one for now
@@ -44,6 +58,7 @@ struct DatasetConfig {
   Criterion criterion = Criterion::kDelaunay;
   bool compact = false;  // tiles go through the drop pass
   WaterConfig water;
+  ImageryConfig imagery;
   int metadata_availability = 0;  // levels; tiles of every so many tell what is below them, 0: none
 
   friend bool operator==(const DatasetConfig&, const DatasetConfig&) = default;

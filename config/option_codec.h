@@ -104,23 +104,23 @@ Codec<Target> Seconds(std::chrono::milliseconds Target::*member, double min, dou
           NumberToJson};
 }
 
-// One of a few words.
+// One of a few words or numbers.
 template <typename Target, typename Member>
-Codec<Target> Choice(Member Target::*member, std::vector<std::pair<std::string, Member>> words) {
+Codec<Target> Choice(Member Target::*member, std::vector<std::pair<Json, Member>> words) {
   return {[=](const Json& value, const Place& place, Target& target) {
             std::string allowed;
             for (const auto& [word, meaning] : words) {
-              if (value == Json(word)) {
+              if (value == word) {
                 target.*member = meaning;
                 return;
               }
-              allowed += (allowed.empty() ? "\"" : " or \"") + word + "\"";
+              allowed += (allowed.empty() ? "" : " or ") + word.dump();
             }
             place.Expected(allowed, value);
           },
           [=](const Target& target) {
             for (const auto& [word, meaning] : words) {
-              if (meaning == target.*member) return Json(word);
+              if (meaning == target.*member) return word;
             }
             return Json();
           },

@@ -129,6 +129,40 @@ Json WriteWater(const DatasetConfig& dataset) {
 
 Codec<DatasetConfig> Water() { return {ReadWater, WriteWater, WaterToJson}; }
 
+Codec<ImageryConfig> ImageryImage() {
+  return {[](const Json& value, const Place& place, ImageryConfig& imagery) {
+            if (!value.is_string() || value.get_ref<const std::string&>().empty()) {
+              return place.Expected("the path of an image", value);
+            }
+            imagery.image = (place.directory() / value.get<std::string>()).string();
+          },
+          [](const ImageryConfig& imagery) { return Json(imagery.image); }, TextToJson};
+}
+
+const std::vector<Option<ImageryConfig>>& ImageryOptionTable() {
+  static const std::vector<Option<ImageryConfig>> table = {
+      {"image", "FILE", "The image", ImageryImage()},
+      {"attribution", "TEXT", "Who to thank for it", Text(&ImageryConfig::attribution, CheckAttribution)},
+      {"texture", "FORMAT", "jpeg, webp or none",
+       Choice(&ImageryConfig::texture, {{"jpeg", Texture::kJpeg}, {"webp", Texture::kWebp}, {"none", Texture::kNone}})},
+      {"size", "PIXELS", "Pixels along the edge of a tile",
+       Choice(&ImageryConfig::size, {{Json(64), 64}, {Json(128), 128}, {Json(256), 256}, {Json(512), 512}, {Json(1024), 1024}})},
+      {"quality", "N", "1 smallest .. 100 best", Integer(&ImageryConfig::quality, 1, 100)},
+  };
+  return table;
+}
+
+Codec<DatasetConfig> Imagery() {
+  return {[](const Json& value, const Place& place, DatasetConfig& dataset) {
+            ReadObject(value, place, ImageryOptionTable(), dataset.imagery);
+            if (value.is_object() && !value.contains("image")) place.Fail("\"image\" is missing: the path of an image");
+          },
+          [](const DatasetConfig& dataset) {
+            return dataset.imagery.image.empty() ? Json() : WriteObject(dataset.imagery, ImageryOptionTable());
+          },
+          [](const std::string& text) { return Json{{"image", std::filesystem::absolute(text).string()}}; }};
+}
+
 Codec<Config> Datasets() {
   return {[](const Json& value, const Place& place, Config& config) {
             if (!value.is_array()) return place.Expected("a list of datasets", value);
@@ -218,6 +252,7 @@ const std::vector<Option<DatasetConfig>>& DatasetOptionTable() {
        "Drop the vertices that a tile's error does not need: smaller tiles, more time to build",
        Switch(&DatasetConfig::compact)},
       {"water", "METRES|FILE", "Water masks: a sea level, or a raster that is not zero on water", Water()},
+      {"imagery", "FILE", "An image that the textures of GLB tiles are cut from", Imagery()},
       {"metadata_availability", "LEVELS", "Tiles of every so many levels tell which tiles are below them; 0: none do",
        Integer(&DatasetConfig::metadata_availability, 0, 24)},
   };

@@ -61,6 +61,13 @@ struct GltfMesh {
     std::array<double, 4> color{1, 1, 1, 1};  // linear
   };
   std::optional<Material> material;
+  // The material's colour, times this picture: clamped at its edges.
+  struct Texture {
+    std::size_t view = 0;  // of the image file
+    std::string_view media_type;
+  };
+  std::optional<Texture> texture;
+  std::string_view copyright;  // empty: none
   std::size_t buffer_bytes = 0;
 };
 

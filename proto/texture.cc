@@ -1,14 +1,15 @@
 #include "proto/texture.h"
 
+// clang-format off
+#include <cstdio>  // jpeglib.h needs FILE
+#include <jpeglib.h>
+// clang-format on
 #include <webp/encode.h>
 
 #include <csetjmp>
 #include <cstddef>
-#include <cstdio>  // jpeglib.h needs FILE
 #include <cstdlib>
 #include <memory>
-
-#include <jpeglib.h>
 
 #include "engine/core/check.h"
 

@@ -40,8 +40,7 @@ class Imagery::Impl {
   Footprint footprint;  // padded: outside it there is no picture
 };
 
-Result<std::optional<TilePicture>> Imagery::Impl::Read(const geo::TileKey& key, int side,
-                                                       const std::stop_token& stop) {
+Result<std::optional<TilePicture>> Imagery::Impl::Read(const geo::TileKey& key, int side, const std::stop_token& stop) {
   if (auto unchanged = pool.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
   const geo::Lattice lattice{key.level, side};
   const double extent = lattice.cells * lattice.StepDegrees();
@@ -100,7 +99,7 @@ Result<std::unique_ptr<Imagery>> Imagery::Open(const std::string& path, const Ge
 
 int Imagery::SideOf(int level, int most) const {
   TERRACE_CHECK(IsSide(most));
-  constexpr double kSlack = 1 + 1e-9;  // as fine as the image is fine enough, whatever the last bits of its pixel size
+  constexpr double kSlack = 1.01;  // what is as fine as the image is fine enough, however its spacing was measured
   int side = most;
   while (side > kLeastSideOfCoarseImages && SamplesPerCell({level, side / 2}, impl_->spacing) <= kSlack) side /= 2;
   return side;

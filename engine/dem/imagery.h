@@ -29,8 +29,8 @@ class Imagery {
   // Where there is no picture of a part of a tile: a middle grey, as sRGB has it.
   static constexpr std::array<std::uint8_t, 3> kNoPicture = {188, 188, 188};
 
-  // What raster_colors.h reads, with a georeference. kInvalidArgument, with the remedy: what OpenRaster and Georeference
-  // refuse, bands that are no colours, and an image that lies nowhere in `around`.
+  // What raster_colors.h reads, with a georeference. kInvalidArgument, with the remedy: what OpenRaster and
+  // Georeference refuse, bands that are no colours, and an image that lies nowhere in `around`.
   static Result<std::unique_ptr<Imagery>> Open(const std::string& path, const GeoBounds& around);
   ~Imagery();
 
@@ -40,8 +40,8 @@ class Imagery {
   int SideOf(int level, int most) const;
 
   // The picture of a tile, `side` x `side` pixels; nothing where the image shows no part of it. A pixel is the image at
-  // the pixel's centre, interpolated bilinearly; where the image is finer, between averages of its pixels. Overviews are
-  // used where they are fine enough. A pixel is a function of its level, `side` and global position alone.
+  // the pixel's centre, interpolated bilinearly; where the image is finer, between averages of its pixels. Overviews
+  // are used where they are fine enough. A pixel is a function of its level, `side` and global position alone.
   // Preconditions: a valid key; side as above. kUnavailable: the image cannot be read now. kCancelled: stopped.
   Result<std::optional<TilePicture>> Read(const geo::TileKey& key, int side, std::stop_token stop = {}) const;
 

@@ -76,11 +76,12 @@ config::Config MakeConfig(const ServeArguments& arguments, std::vector<config::C
 
 // Changes when the source or an option that changes bytes does. The file's identity is in the source's fingerprint.
 std::uint64_t GenerationOf(const config::DatasetConfig& dataset, const dem::DemSource& source,
-                           const server::WaterRules& water) {
+                           const server::WaterRules& water, const server::ImageryRules& imagery) {
   const std::string text =
-      fmt::format(TERRACE_VERSION " {} {} {} {} {} {} {}", source.fingerprint(), dataset.error_fraction,
+      fmt::format(TERRACE_VERSION " {} {} {} {} {} {} {} {} {} {} {}", source.fingerprint(), dataset.error_fraction,
                   static_cast<int>(dataset.criterion), dataset.compact, water.mask ? water.mask->fingerprint() : 0,
-                  water.sea_level_m ? fmt::format("{}", *water.sea_level_m) : "", dataset.metadata_availability);
+                  water.sea_level_m ? fmt::format("{}", *water.sea_level_m) : "", dataset.metadata_availability,
+                  imagery.image ? imagery.image->fingerprint() : 0, imagery.side, imagery.quality, imagery.attribution);
   return XXH3_64bits(text.data(), text.size());
 }
 
@@ -98,6 +99,47 @@ Result<server::WaterRules> OpenWater(const config::WaterConfig& wanted, const de
   return water;
 }
 
+proto::TextureFormat TextureOf(config::Texture texture) {
+  switch (texture) {
+    case config::Texture::kJpeg:
+      return proto::TextureFormat::kJpeg;
+    case config::Texture::kWebp:
+      return proto::TextureFormat::kWebp;
+    case config::Texture::kNone:
+      break;
+  }
+  return proto::TextureFormat::kNone;
+}
+
+Result<server::ImageryRules> OpenImagery(const config::ImageryConfig& wanted, const dem::DemSource& source) {
+  server::ImageryRules imagery;
+  if (wanted.image.empty()) return imagery;
+  auto image = dem::Imagery::Open(wanted.image, source.info().bounds);
+  if (!image) return MakeError(image.error().code, "imagery {}", image.error().message);
+  imagery.image = *std::move(image);
+  imagery.texture = TextureOf(wanted.texture);
+  imagery.side = wanted.size;
+  imagery.quality = wanted.quality;
+  imagery.attribution = wanted.attribution;
+  return imagery;
+}
+
+// Puts source, water and imagery into `dataset`.
+Result<void> OpenSources(const config::DatasetConfig& wanted, const dem::DemOptions& options,
+                         server::Dataset& dataset) {
+  auto source = dem::DemSource::Open(wanted.sources.front(), options);
+  if (!source) return tl::unexpected(source.error());
+  auto water = OpenWater(wanted.water, **source);
+  if (!water) return tl::unexpected(water.error());
+  auto imagery = OpenImagery(wanted.imagery, **source);
+  if (!imagery) return tl::unexpected(imagery.error());
+  dataset.generation = GenerationOf(wanted, **source, *water, *imagery);
+  dataset.source = *std::move(source);
+  dataset.water = *std::move(water);
+  dataset.imagery = *std::move(imagery);
+  return {};
+}
+
 // Opens every source; false if one could not be, after all of them had their message.
 bool OpenDatasets(const config::Config& config, std::vector<server::Dataset>& datasets) {
   bool all_open = true;
@@ -109,24 +151,17 @@ bool OpenDatasets(const config::Config& config, std::vector<server::Dataset>& da
     options.floor = wanted.floor;
     options.max_void_gap = wanted.max_void_gap;
     options.progress = progress.Callback();
-    auto source = dem::DemSource::Open(wanted.sources.front(), options);
-    Result<server::WaterRules> water;
-    if (source) water = OpenWater(wanted.water, **source);
-    if (!source || !water) {
-      const Error& error = source ? water.error() : source.error();
-      std::fprintf(stderr, "terrace: dataset %s: %s\n", wanted.name.c_str(), error.message.c_str());
+    server::Dataset dataset;
+    if (const Result<void> opened = OpenSources(wanted, options, dataset); !opened) {
+      std::fprintf(stderr, "terrace: dataset %s: %s\n", wanted.name.c_str(), opened.error().message.c_str());
       all_open = false;
       continue;
     }
-    server::Dataset dataset;
     dataset.name = wanted.name;
     dataset.attribution = wanted.attribution;
     dataset.error_fraction = wanted.error_fraction;
     dataset.rules = {CriterionOf(wanted.criterion), wanted.compact};
-    dataset.generation = GenerationOf(wanted, **source, *water);
-    dataset.water = *std::move(water);
     dataset.metadata_levels = wanted.metadata_availability;
-    dataset.source = *std::move(source);
     spdlog::info("dataset {}: {}, levels 0 to {}", dataset.name, wanted.sources.front(), dataset.source->max_level());
     datasets.push_back(std::move(dataset));
   }

@@ -24,12 +24,12 @@ int SubtreeLevels(const DatasetView& dataset, int root_level) {
   return std::min(kSubtreeLevels, LevelsUnder(dataset, root_level));
 }
 
-// What the content templates carry for a request. The value of `compression` has been checked.
+// What the content templates carry for a request. The values of `compression` and `texture` have been checked.
 std::string ContentQuery(const ErrorWish& wish, std::string_view query) {
   std::string content = TileQuery(wish);
   const QueryParameters parameters = ParseQuery(query).value_or(QueryParameters());
   for (const auto& [name, value] : parameters) {
-    if (name == "compression") content += (content.empty() ? "compression=" : "&compression=") + value;
+    if (name == "compression" || name == "texture") content += (content.empty() ? "" : "&") + name + "=" + value;
   }
   return content;
 }

@@ -113,7 +113,10 @@ Result<TileRequest> Negotiate(const Route& route, const Request& request, std::s
   tile.key = route.key;
   tile.error_step = ErrorStep(parameters->wish, route.key.level, view.error_fraction);
   tile.format = route.format;
-  if (route.format == TileFormat::kGlb) tile.compression = parameters->compression.value_or(view.glb_compression);
+  if (route.format == TileFormat::kGlb) {
+    tile.compression = parameters->compression.value_or(view.glb_compression);
+    if (view.texture) tile.texture = parameters->texture.value_or(*view.texture);
+  }
   if (GzipHelps(tile)) tile.coding = NegotiateCoding(request.accept_encoding);
   if (route.format == TileFormat::kQuantizedMesh) {
     const proto::TileExtensions wanted = WantedExtensions(request.accept, parameters->extensions);

@@ -9,6 +9,7 @@
 
 #include "engine/core/result.h"
 #include "proto/glb_tile.h"
+#include "proto/texture.h"
 
 namespace terrace::server {
 
@@ -33,6 +34,7 @@ struct TileParameters {
   ErrorWish wish;
   std::vector<std::string> extensions;  // every `extensions` value
   std::optional<proto::GlbCompression> compression;
+  std::optional<proto::TextureFormat> texture;
 };
 
 // The parameters of tile URLs (`allow_at_least`), among them those of .glb (`allow_compression`), and of layer.json.

@@ -13,6 +13,7 @@
 #include "server/tiles/glb_mesher.h"
 #include "server/tiles/tile_extensions.h"
 #include "server/tiles/tile_mesher.h"
+#include "server/tiles/tile_texture.h"
 
 namespace terrace::server {
 namespace {
@@ -104,6 +105,9 @@ Result<void> TilePipeline::EncodeGlb(const TileRequest& request, const RefinedTi
   if (!meshed) return tl::unexpected(meshed.error());
   proto::GlbOptions options = dataset.glb;
   options.compression = request.compression;
+  if (const Result<void> added = AddTexture(dataset.imagery, request, options, stop); !added) {
+    return tl::unexpected(added.error());
+  }
   Result<proto::GlbTile> glb = proto::EncodeGlb(meshed->mesh, options);
   if (!glb) return tl::unexpected(std::move(glb).error());
   encoded.bytes = std::move(glb->bytes);

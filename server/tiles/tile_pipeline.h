@@ -10,8 +10,10 @@
 
 #include "engine/core/result.h"
 #include "engine/dem/dem_source.h"
+#include "engine/dem/imagery.h"
 #include "engine/dem/water_raster.h"
 #include "proto/glb_tile.h"
+#include "proto/texture.h"
 #include "server/tiles/encoded_tile.h"
 #include "server/tiles/refined_tile.h"
 #include "server/tiles/tile_mesher.h"
@@ -27,6 +29,15 @@ struct WaterRules {
   bool any() const { return mask != nullptr || sea_level_m.has_value(); }
 };
 
+// What textures of GLB tiles are cut from.
+struct ImageryRules {
+  std::unique_ptr<dem::Imagery> image;  // null: none
+  proto::TextureFormat texture = proto::TextureFormat::kJpeg;  // what requests get that name none
+  int side = 512;                                              // pixels along a tile's edge, at most
+  int quality = 80;                                            // of EncodePicture
+  std::string attribution;
+};
+
 // One served dataset: a name, a source and what its users should read.
 struct Dataset {
   std::string name;
@@ -36,6 +47,7 @@ struct Dataset {
   proto::GlbOptions glb;  // compression: what GLB requests get that name none
   std::unique_ptr<dem::DemSource> source;
   WaterRules water;
+  ImageryRules imagery;
   int metadata_levels = 0;       // tiles of every so many levels tell what is below them; 0: none
   std::uint64_t generation = 0;  // hash of the source's fingerprint and every option that changes bytes
 };

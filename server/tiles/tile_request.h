@@ -6,6 +6,7 @@
 
 #include "engine/geo/tile_key.h"
 #include "proto/glb_tile.h"
+#include "proto/texture.h"
 
 namespace terrace::server {
 
@@ -18,6 +19,7 @@ struct TileRequest {
   int error_step = 0;  // on the ladder of the key's level (engine/geo/error_ladder.h)
   TileFormat format = TileFormat::kQuantizedMesh;
   proto::GlbCompression compression = proto::GlbCompression::kDraco;  // kGlb only
+  proto::TextureFormat texture = proto::TextureFormat::kNone;         // kGlb only
   Coding coding = Coding::kIdentity;
   // Extensions of quantized-mesh, each only where the client asks for it and the tile has it. GLB tiles always have
   // normals.
