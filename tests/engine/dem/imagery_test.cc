@@ -151,7 +151,7 @@ TEST(Imagery, HasNothingForTilesThatItDoesNotShow) {
   const TempDir dir;
   ImageSpec spec = TileSpec();
   spec.nodata = 9;
-  spec.color = [](int column, int) { return column < 128 ? Color{9, 9, 9} : Color{1, 1, 1}; };
+  spec.color = [](int column, int) { return column < 130 ? Color{9, 9, 9} : Color{1, 1, 1}; };
   const auto imagery = OpenImage(WriteImage(dir, spec));
   EXPECT_FALSE(ReadOrFail(*imagery, {6, 3, 3}, 256).has_value());
   EXPECT_FALSE(ReadOrFail(*imagery, {7, 130, 65}, 256).has_value()) << "no data alone";
