@@ -20,6 +20,8 @@ namespace terrace::config {
 enum class VerticalDatum : std::uint8_t { kUnknown };
 // How the triangles of a tile are joined: tin::Criterion, which this room does not know.
 enum class Criterion : std::uint8_t { kDelaunay, kDataDependent };
+// How GLB tiles are compressed unless a request says: proto::GlbCompression, which this room does not know.
+enum class GlbCompression : std::uint8_t { kDraco, kNone, kQuantized, kMeshopt };
 enum class LogLevel : std::uint8_t { kDebug, kInfo, kWarn, kError, kOff };
 enum class LogFormat : std::uint8_t { kText, kJson };
 
@@ -57,6 +59,9 @@ struct DatasetConfig {
   int max_void_gap = 64;               // source samples; narrower voids are filled
   Criterion criterion = Criterion::kDelaunay;
   bool compact = false;  // tiles go through the drop pass
+  GlbCompression glb_compression = GlbCompression::kDraco;
+  int draco_speed = 5;        // 0 smallest tiles .. 10 fastest
+  int draco_normal_bits = 8;  // of each of the two coordinates of a normal
   WaterConfig water;
   ImageryConfig imagery;
   int metadata_availability = 0;  // levels; tiles of every so many tell what is below them, 0: none

@@ -18,13 +18,18 @@ namespace {
 
 using Position = std::array<std::int32_t, 3>;
 
-// The corner of the positions' box, and the bits that hold its longest side in steps.
-struct Box {
-  Position min{};
+// What Draco is told of the grid.
+struct Quantization {
+  Position origin{};  // in steps
   int bits = 1;
 };
 
-Box BoxOf(const GridMesh& mesh) {
+// The library passes origin and range on as text with six decimals, so both must be numbers that survive this: the
+// origin is on whole metres, and the range at least 16 m, where floats are more than 10^-6 apart. Neither moves a grid
+// point; the range costs bits that are always 0.
+Quantization QuantizationOf(const GridMesh& mesh) {
+  constexpr double kMinRange_m = 16;
+  const auto whole = static_cast<std::int32_t>(std::max(1.0, 1 / mesh.step_m));
   Position min = mesh.positions.front(), max = min;
   for (const Position& p : mesh.positions) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -32,11 +37,15 @@ Box BoxOf(const GridMesh& mesh) {
       max[axis] = std::max(max[axis], p[axis]);
     }
   }
-  std::uint32_t longest = 1;
+  Quantization quantization;
+  auto longest = static_cast<std::uint32_t>(std::ceil(kMinRange_m / mesh.step_m));
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    longest = std::max(longest, static_cast<std::uint32_t>(max[axis] - min[axis]));
+    const std::int32_t above = ((min[axis] % whole) + whole) % whole;
+    quantization.origin[axis] = min[axis] - above;
+    longest = std::max(longest, static_cast<std::uint32_t>(max[axis] - quantization.origin[axis]));
   }
-  return {min, static_cast<int>(std::bit_width(longest))};
+  quantization.bits = static_cast<int>(std::bit_width(longest));
+  return quantization;
 }
 
 int AddAttribute(draco::Mesh& mesh, draco::GeometryAttribute::Type type, std::size_t count, int components = 3) {
@@ -188,21 +197,20 @@ Result<void> ReadBack(const GridMesh& grid, const DracoOptions& options, DracoMe
 
 Result<DracoMesh> EncodeDraco(const GridMesh& grid, const DracoOptions& options) {
   TERRACE_CHECK(!grid.triangles.empty());
-  constexpr int kFloatBits = 24;
-  const Box box = BoxOf(grid);
-  if (box.bits > kFloatBits) return Failed("the grid is too fine for 32-bit floats");
-  // Dividing by the range in floats gives 1 / step exactly: it is a power of two times 2^bits - 1, which has at most 24
-  // bits.
-  const std::array<float, 3> origin{Metres(box.min[0], grid.step_m), Metres(box.min[1], grid.step_m),
-                                    Metres(box.min[2], grid.step_m)};
-  const auto range = static_cast<float>(std::ldexp(1.0, box.bits) - 1) * static_cast<float>(grid.step_m);
+  constexpr int kMaxBits = 23;  // FitsFloats leaves room for the origin's rounding
+  const Quantization quantization = QuantizationOf(grid);
+  if (quantization.bits > kMaxBits) return Failed("the grid is too fine for 32-bit floats");
+  // Dividing by the range in floats gives 1 / step exactly: it is a power of two times 2^bits - 1, which a float holds.
+  std::array<float, 3> origin{};
+  for (std::size_t axis = 0; axis < 3; ++axis) origin[axis] = Metres(quantization.origin[axis], grid.step_m);
+  const auto range = static_cast<float>(std::ldexp(1.0, quantization.bits) - 1) * static_cast<float>(grid.step_m);
 
   int position_attribute = 0, normal_attribute = 0;
   const std::unique_ptr<draco::Mesh> mesh = ToDraco(grid, position_attribute, normal_attribute);
   const int uv_attribute = options.uv ? AddTextureCoordinates(grid, *mesh) : -1;
   draco::ExpertEncoder encoder(*mesh);
   encoder.SetSpeedOptions(options.speed, options.speed);
-  encoder.SetAttributeExplicitQuantization(position_attribute, box.bits, 3, origin.data(), range);
+  encoder.SetAttributeExplicitQuantization(position_attribute, quantization.bits, 3, origin.data(), range);
   encoder.SetAttributeQuantization(normal_attribute, options.normal_bits);
   if (options.uv) {
     constexpr std::array<float, 2> kCorner{0, 0};

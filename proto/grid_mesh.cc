@@ -110,24 +110,27 @@ void Weld(const std::vector<GridPoint>& points, const std::vector<geo::Vec3>& no
   }
 }
 
-GridPoint MiddleOf(const std::vector<GridPoint>& points) {
-  GridPoint low = points.front(), high = low;
+struct Box {
+  GridPoint min{}, max{};
+};
+
+Box BoxOf(const std::vector<GridPoint>& points) {
+  Box box{points.front(), points.front()};
   for (const GridPoint& p : points) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      low[axis] = std::min(low[axis], p[axis]);
-      high[axis] = std::max(high[axis], p[axis]);
+      box.min[axis] = std::min(box.min[axis], p[axis]);
+      box.max[axis] = std::max(box.max[axis], p[axis]);
     }
   }
-  GridPoint middle{};
-  for (std::size_t axis = 0; axis < 3; ++axis) middle[axis] = low[axis] + (high[axis] - low[axis]) / 2;
-  return middle;
+  return box;
 }
 
 }  // namespace
 
 double GridStep(const geo::Lattice& lattice, double error_m) {
+  constexpr double kFinestStep_m = 0x1p-16;
   const double cell_m = geo::kSemiMajorAxis * geo::ToRadians(lattice.StepDegrees());
-  return PowerOfTwoUpTo(std::min(error_m / 32, cell_m / 64));
+  return std::max(PowerOfTwoUpTo(std::min(error_m / 32, cell_m / 64)), kFinestStep_m);
 }
 
 std::vector<GridPoint> SnapVertices(const LatticeView& lattice, const tin::TinMesh& mesh, double step_m) {
@@ -136,6 +139,16 @@ std::vector<GridPoint> SnapVertices(const LatticeView& lattice, const tin::TinMe
   points.reserve(mesh.vertices.size());
   for (const tin::SamplePosition node : mesh.vertices) points.push_back(Snap(placer.Place(node, 0), 1 / step_m));
   return points;
+}
+
+bool FitsFloats(const std::vector<GridPoint>& points, double step_m, double skirt_depth_m) {
+  constexpr double kMaxSteps = 0x1p22;
+  const Box box = BoxOf(points);
+  const double feet = skirt_depth_m / step_m + 2;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (static_cast<double>(box.max[axis] - box.min[axis]) + feet >= kMaxSteps) return false;
+  }
+  return true;
 }
 
 std::vector<geo::Vec3> GridPositions(const std::vector<GridPoint>& points, double step_m) {
@@ -170,7 +183,10 @@ GridMesh MakeGridMesh(const LatticeView& lattice, const tin::TinMesh& mesh, cons
   VertexOrder order = OrderByFirstUse(triangles, all.size());
   GridMesh grid;
   grid.step_m = step_m;
-  grid.origin = MiddleOf(all);
+  const Box box = BoxOf(all);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    grid.origin[axis] = box.min[axis] + (box.max[axis] - box.min[axis]) / 2;
+  }
   grid.triangles = std::move(order.triangles);
   grid.cells = lattice.cells();
   grid.uv.reserve(order.old_index.size());

@@ -18,8 +18,9 @@
 namespace terrace::proto {
 
 // Metres, a power of two: at most a 32nd of the error, so that rounding takes at most 3 % of it on level ground, and at
-// most a 64th of a lattice cell's height, so that few triangles turn over. At the default error of a level a tile then
-// spans less than 2^16 steps; at the finest, less than 2^23.
+// most a 64th of a lattice cell's height, so that few triangles turn over; but never below 2^-16 m, which matters to
+// errors below half a millimetre. At the default error of a level a tile then spans less than 2^16 steps; at the
+// finest, less than 2^22.
 double GridStep(const geo::Lattice& lattice, double error_m);
 
 // Whole steps along the axes of ECEF.
@@ -29,6 +30,12 @@ using GridPoint = std::array<std::int64_t, 3>;
 // depend on the tile that asks. libm's sine may differ in the last bit between processors; geo::ToEcef rounds it to a
 // micrometre, so two processors can differ here only where a coordinate lies within one of a tie.
 std::vector<GridPoint> SnapVertices(const LatticeView& lattice, const tin::TinMesh& mesh, double step_m);
+
+// Whether decoders that compute in 32-bit floats find every point, and the feet of skirts of this depth: the tile spans
+// less than 2^22 steps, two bits less than a float has, since Draco adds a half on the way. False where a cliff is
+// higher than a deep and fine tile can say: hundreds of metres within a few. Then the tile takes a step twice as
+// coarse, until it fits, and its edges are off by up to half of that step.
+bool FitsFloats(const std::vector<GridPoint>& points, double step_m, double skirt_depth_m);
 
 // Metres.
 std::vector<geo::Vec3> GridPositions(const std::vector<GridPoint>& points, double step_m);

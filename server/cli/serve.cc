@@ -17,6 +17,7 @@
 #include "config/parse.h"
 #include "server/cli/command.h"
 #include "server/cli/log.h"
+#include "server/cli/open_layers.h"
 #include "server/cli/progress.h"
 #include "server/server.h"
 #include "server/tiles/tile_pipeline.h"
@@ -76,12 +77,10 @@ config::Config MakeConfig(const ServeArguments& arguments, std::vector<config::C
 
 // Changes when the source or an option that changes bytes does. The file's identity is in the source's fingerprint.
 std::uint64_t GenerationOf(const config::DatasetConfig& dataset, const dem::DemSource& source,
-                           const server::WaterRules& water, const server::ImageryRules& imagery) {
-  const std::string text =
-      fmt::format(TERRACE_VERSION " {} {} {} {} {} {} {} {} {} {} {}", source.fingerprint(), dataset.error_fraction,
-                  static_cast<int>(dataset.criterion), dataset.compact, water.mask ? water.mask->fingerprint() : 0,
-                  water.sea_level_m ? fmt::format("{}", *water.sea_level_m) : "", dataset.metadata_availability,
-                  imagery.image ? imagery.image->fingerprint() : 0, imagery.side, imagery.quality, imagery.attribution);
+                           const std::string& layers) {
+  const std::string text = fmt::format(TERRACE_VERSION " {} {} {} {} {} {} {}", source.fingerprint(),
+                                       dataset.error_fraction, static_cast<int>(dataset.criterion), dataset.compact,
+                                       dataset.draco_speed, dataset.draco_normal_bits, layers);
   return XXH3_64bits(text.data(), text.size());
 }
 
@@ -89,55 +88,25 @@ tin::Criterion CriterionOf(config::Criterion criterion) {
   return criterion == config::Criterion::kDataDependent ? tin::Criterion::kDataDependent : tin::Criterion::kDelaunay;
 }
 
-Result<server::WaterRules> OpenWater(const config::WaterConfig& wanted, const dem::DemSource& source) {
-  server::WaterRules water;
-  water.sea_level_m = wanted.sea_level;
-  if (wanted.mask.empty()) return water;
-  auto mask = dem::WaterRaster::Open(wanted.mask, source.info().bounds);
-  if (!mask) return MakeError(mask.error().code, "water mask {}", mask.error().message);
-  water.mask = *std::move(mask);
-  return water;
-}
-
-proto::TextureFormat TextureOf(config::Texture texture) {
-  switch (texture) {
-    case config::Texture::kJpeg:
-      return proto::TextureFormat::kJpeg;
-    case config::Texture::kWebp:
-      return proto::TextureFormat::kWebp;
-    case config::Texture::kNone:
+proto::GlbOptions GlbOptionsOf(const config::DatasetConfig& dataset) {
+  proto::GlbOptions options;
+  options.generator = "terrace " TERRACE_VERSION;
+  options.draco = {dataset.draco_speed, dataset.draco_normal_bits};
+  switch (dataset.glb_compression) {
+    case config::GlbCompression::kDraco:
+      options.compression = proto::GlbCompression::kDraco;
+      break;
+    case config::GlbCompression::kNone:
+      options.compression = proto::GlbCompression::kNone;
+      break;
+    case config::GlbCompression::kQuantized:
+      options.compression = proto::GlbCompression::kQuantized;
+      break;
+    case config::GlbCompression::kMeshopt:
+      options.compression = proto::GlbCompression::kMeshopt;
       break;
   }
-  return proto::TextureFormat::kNone;
-}
-
-Result<server::ImageryRules> OpenImagery(const config::ImageryConfig& wanted, const dem::DemSource& source) {
-  server::ImageryRules imagery;
-  if (wanted.image.empty()) return imagery;
-  auto image = dem::Imagery::Open(wanted.image, source.info().bounds);
-  if (!image) return MakeError(image.error().code, "imagery {}", image.error().message);
-  imagery.image = *std::move(image);
-  imagery.texture = TextureOf(wanted.texture);
-  imagery.side = wanted.size;
-  imagery.quality = wanted.quality;
-  imagery.attribution = wanted.attribution;
-  return imagery;
-}
-
-// Puts source, water and imagery into `dataset`.
-Result<void> OpenSources(const config::DatasetConfig& wanted, const dem::DemOptions& options,
-                         server::Dataset& dataset) {
-  auto source = dem::DemSource::Open(wanted.sources.front(), options);
-  if (!source) return tl::unexpected(source.error());
-  auto water = OpenWater(wanted.water, **source);
-  if (!water) return tl::unexpected(water.error());
-  auto imagery = OpenImagery(wanted.imagery, **source);
-  if (!imagery) return tl::unexpected(imagery.error());
-  dataset.generation = GenerationOf(wanted, **source, *water, *imagery);
-  dataset.source = *std::move(source);
-  dataset.water = *std::move(water);
-  dataset.imagery = *std::move(imagery);
-  return {};
+  return options;
 }
 
 // Opens every source; false if one could not be, after all of them had their message.
@@ -151,17 +120,25 @@ bool OpenDatasets(const config::Config& config, std::vector<server::Dataset>& da
     options.floor = wanted.floor;
     options.max_void_gap = wanted.max_void_gap;
     options.progress = progress.Callback();
-    server::Dataset dataset;
-    if (const Result<void> opened = OpenSources(wanted, options, dataset); !opened) {
-      std::fprintf(stderr, "terrace: dataset %s: %s\n", wanted.name.c_str(), opened.error().message.c_str());
+    auto source = dem::DemSource::Open(wanted.sources.front(), options);
+    if (!source) {
+      std::fprintf(stderr, "terrace: dataset %s: %s\n", wanted.name.c_str(), source.error().message.c_str());
       all_open = false;
       continue;
     }
+    server::Dataset dataset;
     dataset.name = wanted.name;
     dataset.attribution = wanted.attribution;
     dataset.error_fraction = wanted.error_fraction;
     dataset.rules = {CriterionOf(wanted.criterion), wanted.compact};
-    dataset.metadata_levels = wanted.metadata_availability;
+    dataset.glb = GlbOptionsOf(wanted);
+    dataset.source = *std::move(source);
+    if (const Result<void> layers = OpenLayers(wanted, dataset); !layers) {
+      std::fprintf(stderr, "terrace: dataset %s: %s\n", wanted.name.c_str(), layers.error().message.c_str());
+      all_open = false;
+      continue;
+    }
+    dataset.generation = GenerationOf(wanted, *dataset.source, LayersFingerprint(dataset));
     spdlog::info("dataset {}: {}, levels 0 to {}", dataset.name, wanted.sources.front(), dataset.source->max_level());
     datasets.push_back(std::move(dataset));
   }

@@ -39,10 +39,12 @@ Result<MeshedGlb> MeshGlb(const dem::DemSource& source, const proto::LatticeView
   meshed.replayed = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - start);
 
   tin::TinMesh& mesh = started->mesh;
-  const double step_m = proto::GridStep(lattice.lattice, wanted_error_m);
+  double step_m = proto::GridStep(lattice.lattice, wanted_error_m);
+  const double depth_m = proto::SkirtDepth(lattice.key.level, wanted_error_m);
   for (int round = 1;; ++round) {
     if (stop.stop_requested()) return Cancelled();
-    const std::vector<proto::GridPoint> points = proto::SnapVertices(lattice, mesh, step_m);
+    std::vector<proto::GridPoint> points = proto::SnapVertices(lattice, mesh, step_m);
+    while (!proto::FitsFloats(points, step_m, depth_m)) points = proto::SnapVertices(lattice, mesh, step_m *= 2);
     const std::vector<geo::Vec3> positions = proto::GridPositions(points, step_m);
     const proto::TileError error = proto::MeasureFlatError(lattice, mesh, positions, started->error_m);
     meshed.max_error_m = error.max_m;

@@ -24,7 +24,8 @@ TEST(ParseConfig, SetsWhatTheTextSaysAndNothingElse) {
   const ConfigResult config = ParseConfig(R"({
     "listen": "[::1]:9000",
     "datasets": [{"name": "maui", "sources": ["maui.tif"], "error_fraction": 0.25, "floor": -12.5, "max_void_gap": 0,
-                  "criterion": "data-dependent", "compact": true}],
+                  "criterion": "data-dependent", "compact": true,
+                  "glb_compression": "quantized", "draco_speed": 7, "draco_normal_bits": 10}],
     "viewer": false, "cache_control": "no-cache", "io_threads": 1, "worker_threads": 3, "queue_length": 10,
     "cache_bytes": "1GiB", "refinement_cache_bytes": "10 MiB", "max_connections": 64, "request_deadline_s": 1.5, "header_timeout_s": 2,
     "idle_timeout_s": 3, "write_timeout_s": 4, "drain_timeout_s": 0, "log_level": "debug", "log_format": "json"})",
@@ -40,6 +41,9 @@ TEST(ParseConfig, SetsWhatTheTextSaysAndNothingElse) {
   maui.max_void_gap = 0;
   maui.criterion = Criterion::kDataDependent;
   maui.compact = true;
+  maui.glb_compression = GlbCompression::kQuantized;
+  maui.draco_speed = 7;
+  maui.draco_normal_bits = 10;
   expected.datasets = {maui};
   expected.viewer = {false, {}};
   expected.cache_control = "no-cache";

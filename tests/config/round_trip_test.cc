@@ -30,8 +30,9 @@ TEST(ToJson, ComesBackWithEveryOptionSet) {
   config.listen = {"2001:db8::1", 0};
   DatasetConfig dataset{
       "a", {"/data/a.tif"}, VerticalDatum::kUnknown, "© \"ét\\é\"", 0.1, 1e-3, -0.3, 7, Criterion::kDataDependent,
-      true, WaterConfig{}, ImageryConfig{}, 7};
+      true};
   dataset.water.sea_level = -1.25;
+  dataset.metadata_availability = 7;
   config.datasets = {dataset, Dataset("b")};
   config.datasets[1].water.mask = "/data/water.tif";
   config.datasets[1].imagery = {"/data/photo.tif", "© \"é\"", Texture::kWebp, 64, 99};

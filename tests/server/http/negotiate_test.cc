@@ -163,5 +163,46 @@ TEST(Negotiate, MakesACanonicalRequest) {
   EXPECT_EQ(negotiate("/maui/0/0/0.terrain?error=nan").error().code, ErrorCode::kInvalidArgument);
 }
 
+TEST(Negotiate, GlbTilesAreCanonicalToo) {
+  DatasetView view;
+  view.name = "maui";
+  view.available = {{{0, 0, 1, 0}}};
+  view.glb_compression = proto::GlbCompression::kMeshopt;
+  const std::vector<DatasetView> datasets = {view};
+  Request request;
+  request.accept_encoding = "gzip";
+  request.accept = "a/b;extensions=octvertexnormals";
+  const auto negotiate = [&](const char* target) { return Negotiate(*Match(target), request, datasets); };
+
+  const Result<TileRequest> tile = negotiate("/maui/0/1/0.glb?extensions=octvertexnormals-metadata");
+  ASSERT_TRUE(tile);
+  EXPECT_EQ(tile->format, TileFormat::kGlb);
+  EXPECT_EQ(tile->compression, proto::GlbCompression::kMeshopt);
+  EXPECT_FALSE(tile->normals) << "they have normals whatever is asked for";
+  EXPECT_EQ(*tile, *negotiate("/maui/0/1/0.glb?compression=meshopt"));
+  EXPECT_FALSE(*tile == *negotiate("/maui/0/1/0.glb?compression=draco"));
+  EXPECT_EQ(negotiate("/maui/0/1/0.glb?compression=draco")->coding, Coding::kIdentity);
+  EXPECT_EQ(tile->coding, Coding::kIdentity);
+  EXPECT_EQ(negotiate("/maui/0/1/0.glb?compression=none")->coding, Coding::kGzip);
+  EXPECT_EQ(negotiate("/maui/0/1/0.glb?compression=quantized")->coding, Coding::kGzip);
+  EXPECT_EQ(negotiate("/maui/0/1/0.glb?compression=zip").error().code, ErrorCode::kInvalidArgument);
+  EXPECT_EQ(negotiate("/maui/0/1/0.terrain?compression=none").error().code, ErrorCode::kInvalidArgument);
+  // The dataset's word for GLB tiles makes no second variant of the others.
+  EXPECT_EQ(negotiate("/maui/0/1/0.terrain")->compression, TileRequest{}.compression);
+}
+
+// What skirts rely on (proto/skirt.h): whatever is asked for, a parent's error is at most twice that of its child.
+TEST(Negotiate, AParentIsAtMostTwiceAsCoarse) {
+  for (int level = 1; level <= geo::kMaxLevel; ++level) {
+    for (double wish_m = 1e-5; wish_m < 1e8; wish_m *= 1.31) {
+      for (const ErrorWish& wish : {ErrorWish{wish_m, {}, false}, ErrorWish{wish_m, {}, true},
+                                    ErrorWish{{}, wish_m / 1000, false}, ErrorWish{}}) {
+        const auto error = [&](int at) { return geo::LadderError(at, ErrorStep(wish, at, 0.5), 0.5); };
+        EXPECT_LE(error(level - 1), 2 * error(level) * (1 + 1e-12)) << level << ", " << wish_m;
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace terrace::server

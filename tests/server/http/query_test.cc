@@ -68,6 +68,23 @@ TEST(Query, RefusesBadTileParameters) {
   }
 }
 
+TEST(Query, TakesACompressionWhereItIsOffered) {
+  const std::pair<const char*, proto::GlbCompression> cases[] = {
+      {"compression=draco", proto::GlbCompression::kDraco},
+      {"error=5&compression=none", proto::GlbCompression::kNone},
+      {"compression=quantized&v=1", proto::GlbCompression::kQuantized},
+      {"compression=meshopt", proto::GlbCompression::kMeshopt}};
+  for (const auto& [query, compression] : cases) {
+    EXPECT_EQ(ParseTileParameters(query, true, true)->compression, compression) << query;
+    EXPECT_FALSE(ParseTileParameters(query, true)) << query;
+  }
+  EXPECT_EQ(ParseTileParameters("", true, true)->compression, std::nullopt);
+  for (const char* query :
+       {"compression=", "compression=Draco", "compression=gzip", "compression=none&compression=none"}) {
+    EXPECT_FALSE(ParseTileParameters(query, true, true)) << query;
+  }
+}
+
 TEST(Query, RefusesAtLeastWhereItIsNotOffered) { EXPECT_FALSE(ParseTileParameters("error=5&atleast=1", false)); }
 
 TEST(Query, RefusesParametersWhereThereAreNone) {

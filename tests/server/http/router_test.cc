@@ -23,6 +23,7 @@ TEST(Router, FindsEveryUrl) {
       {"/maui/layer.json", RouteKind::kLayer},
       {"/maui/layer.json?error=5", RouteKind::kLayer},
       {"/maui/0/1/0.terrain", RouteKind::kTile},
+      {"/maui/0/1/0.glb", RouteKind::kTile},
       {"http://example.test/maui/0/1/0.terrain", RouteKind::kTile},
       {"http://example.test", RouteKind::kViewer},
       {"/a%20b/layer.json", RouteKind::kLayer},
@@ -40,6 +41,11 @@ TEST(Router, ReadsTheTileAndTheQuery) {
   EXPECT_EQ(route->dataset, "maui");
   EXPECT_EQ(route->key, (geo::TileKey{9, 533, 388}));
   EXPECT_EQ(route->query, "error=5&v=1");
+  EXPECT_EQ(route->format, TileFormat::kQuantizedMesh);
+  const Result<Route> glb = Match("/maui/9/533/388.glb?compression=none");
+  ASSERT_TRUE(glb);
+  EXPECT_EQ(glb->key, route->key);
+  EXPECT_EQ(glb->format, TileFormat::kGlb);
   EXPECT_EQ(Match("/viewer/a/b.js")->file, "a/b.js");
   EXPECT_EQ(Match("/")->file, "index.html");
   EXPECT_EQ(Match("/viewer/")->file, "index.html");
@@ -57,6 +63,9 @@ TEST(Router, RefusesWhatIsNoUrl) {
       "/maui/0/0/0.terrain/",
       "/maui/0/0/0.png",
       "/maui/0/0/.terrain",
+      "/maui/0/0/.glb",
+      "/maui/0/0/0.glb.terrain",
+      "/maui/0/2/0.glb",
       "/datasets/",
       "/livez/x",
       "/datasets/layer.json",

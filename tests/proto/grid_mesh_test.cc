@@ -1,0 +1,193 @@
+#include "proto/grid_mesh.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <vector>
+
+#include "engine/geo/error_ladder.h"
+#include "proto/skirt.h"
+#include "tests/proto/ground.h"
+
+namespace terrace::proto {
+namespace {
+
+TEST(GridStep, IsAPowerOfTwoWithinItsShareOfTheError) {
+  for (int level = 0; level <= geo::kMaxLevel; ++level) {
+    for (int step = geo::kCoarsestStep; step <= geo::kFinestStep; ++step) {
+      for (const int cells : {32, 256}) {
+        const double error = geo::LadderError(level, step), grid = GridStep({level, cells}, error);
+        EXPECT_EQ(grid, std::exp2(std::round(std::log2(grid))));
+        EXPECT_LE(grid, std::max(error / 32, std::exp2(-16)));
+        // The longest side of a tile is its diagonal.
+        const double side = geo::kSemiMajorAxis * geo::ToRadians(180) / std::exp2(level);
+        EXPECT_LT(std::sqrt(2.0) * side, std::exp2(22) * grid);
+      }
+    }
+    const double side = geo::kSemiMajorAxis * geo::ToRadians(180) / std::exp2(level);
+    EXPECT_LT(std::sqrt(2.0) * side, 65535 * GridStep({level, 256}, geo::LadderError(level, 0)));
+  }
+}
+
+// Tiles that meet: inside, across the two roots, across the antimeridian, beside the poles.
+struct Meeting {
+  geo::TileKey a, b;
+  bool east;  // b lies east of a; else north
+};
+
+std::vector<Meeting> Meetings() {
+  std::vector<Meeting> meetings;
+  for (const int level : {0, 1, 3, 6, 11, 17, 24}) {
+    const std::int64_t columns = geo::TileColumns(level), rows = geo::TileRows(level);
+    for (const std::int64_t y : {std::int64_t{0}, rows / 3, rows / 2, rows - 1}) {
+      for (const std::int64_t x : {std::int64_t{0}, columns / 2 - 1, columns / 7, columns - 1}) {
+        const geo::TileKey key{level, x, y};
+        meetings.push_back({key, geo::Neighbour(key, 1, 0), true});
+        if (y + 1 < rows) meetings.push_back({key, geo::Neighbour(key, 0, 1), false});
+      }
+    }
+  }
+  return meetings;
+}
+
+// The points of one edge, by position along it.
+std::vector<GridPoint> EdgePoints(const GlobalGround& ground, const tin::TinMesh& mesh, double step, bool vertical,
+                                  int fixed) {
+  const std::vector<GridPoint> points = SnapVertices(ground.view(), mesh, step);
+  std::vector<std::pair<int, GridPoint>> edge;
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    const auto [x, y] = mesh.vertices[k];
+    if ((vertical ? x : y) == fixed) edge.emplace_back(vertical ? y : x, points[k]);
+  }
+  std::sort(edge.begin(), edge.end());
+  std::vector<GridPoint> ordered;
+  for (const auto& [along, point] : edge) ordered.push_back(point);
+  return ordered;
+}
+
+TEST(SnapVertices, GivesNeighboursTheSamePoints) {
+  for (const int cells : {32, 64}) {
+    const tin::TinMesh mesh = RegularMesh(cells, 1);
+    for (const Meeting& meeting : Meetings()) {
+      const GlobalGround a(meeting.a, cells, Scattered(3000)), b(meeting.b, cells, Scattered(3000));
+      for (const int ladder : {geo::kCoarsestStep, -5, 0, 7, geo::kFinestStep}) {
+        const double step = GridStep(a.lattice, geo::LadderError(meeting.a.level, ladder));
+        const std::vector<GridPoint> edge = EdgePoints(a, mesh, step, meeting.east, cells);
+        EXPECT_EQ(edge.size(), static_cast<std::size_t>(cells) + 1);
+        EXPECT_EQ(edge, EdgePoints(b, mesh, step, meeting.east, 0))
+            << geo::ToString(meeting.a) << " and " << geo::ToString(meeting.b) << " step " << step;
+      }
+    }
+  }
+}
+
+TEST(SnapVertices, StaysWithinHalfAStepOfThePlace) {
+  const GlobalGround ground({9, 533, 388}, 32, Scattered(4000));
+  const tin::TinMesh mesh = RegularMesh(32, 1);
+  const double step = 0.5;
+  const std::vector<GridPoint> points = SnapVertices(ground.view(), mesh, step);
+  const LatticeView view = ground.view();
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    const auto [x, y] = mesh.vertices[k];
+    const geo::Vec3 place = geo::ToEcef(view.Longitude(x), view.Latitude(y), static_cast<double>(view.At(x, y)));
+    const geo::Vec3 off = GridPositions({points[k]}, step)[0] - place;
+    EXPECT_LE(std::max({std::abs(off.x), std::abs(off.y), std::abs(off.z)}), step / 2 + 1e-6);
+  }
+}
+
+TEST(SkirtDepth, HoldsBothErrorsAndTheCurvature) {
+  for (int level = 0; level <= geo::kMaxLevel; ++level) {
+    const double edge = geo::kSemiMajorAxis * geo::ToRadians(180) / std::exp2(level);
+    for (int step = geo::kCoarsestStep; step <= geo::kFinestStep; ++step) {
+      const double error = geo::LadderError(level, step), depth = SkirtDepth(level, error);
+      EXPECT_GE(depth, 3 * error);
+      EXPECT_LE(depth, 4 * error);
+      EXPECT_GE(depth, 3 * error + std::min(error, edge * edge / (8 * geo::kSemiMajorAxis)));
+    }
+  }
+}
+
+std::vector<geo::Vec3> Upwards(const GlobalGround& ground, const tin::TinMesh& mesh) {
+  std::vector<geo::Vec3> normals;
+  for (const auto [x, y] : mesh.vertices) {
+    normals.push_back(geo::SurfaceNormal(ground.view().Longitude(x), ground.view().Latitude(y)));
+  }
+  return normals;
+}
+
+GridMesh Meshed(const GlobalGround& ground, const tin::TinMesh& mesh, double step, double depth) {
+  return MakeGridMesh(ground.view(), mesh, SnapVertices(ground.view(), mesh, step), Upwards(ground, mesh), step, depth);
+}
+
+TEST(MakeGridMesh, HangsSkirtsStraightDownFromEveryEdgeVertex) {
+  const GlobalGround ground({9, 533, 388}, 32, Scattered(500));
+  const tin::TinMesh mesh = RegularMesh(32, 4);
+  const double step = 0.25, depth = 300;
+  const GridMesh grid = Meshed(ground, mesh, step, depth);
+  const std::size_t rim = 4 * 8;
+  EXPECT_EQ(grid.positions.size(), mesh.vertices.size() + rim);
+  EXPECT_EQ(grid.triangles.size(), mesh.triangles.size() + 2 * rim);
+
+  std::set<GridPoint> points;
+  for (const auto& p : grid.positions) {
+    points.insert({grid.origin[0] + p[0], grid.origin[1] + p[1], grid.origin[2] + p[2]});
+  }
+  const LatticeView view = ground.view();
+  for (const auto [x, y] : mesh.vertices) {
+    if (x != 0 && y != 0 && x != 32 && y != 32) continue;
+    const double height = static_cast<double>(view.At(x, y)) - depth;
+    const geo::Vec3 foot = geo::ToEcef(view.Longitude(x), view.Latitude(y), height);
+    bool found = false;
+    for (const GridPoint& p : points) {
+      found = found || geo::Length(GridPositions({p}, step)[0] - foot) <= std::sqrt(3.0) * step / 2 + 1e-6;
+    }
+    EXPECT_TRUE(found) << x << ", " << y;
+  }
+}
+
+// Away from the tile's middle and never into it: a ray from the middle of the tile leaves through the skirts' backs.
+TEST(MakeGridMesh, SkirtsFaceOutwards) {
+  const GlobalGround ground({9, 533, 388}, 32, Scattered(500));
+  const tin::TinMesh mesh = RegularMesh(32, 4);
+  const GridMesh grid = Meshed(ground, mesh, 0.25, 300);
+  const geo::Vec3 up = geo::SurfaceNormal(ground.view().Longitude(16), ground.view().Latitude(16));
+  int walls = 0;
+  for (const auto& [a, b, c] : grid.triangles) {
+    const auto at = [&](std::uint32_t k) {
+      const auto& [x, y, z] = grid.positions[k];
+      return geo::Vec3{x * grid.step_m, y * grid.step_m, z * grid.step_m};
+    };
+    const geo::Vec3 normal = geo::Normalized(geo::Cross(at(b) - at(a), at(c) - at(a)));
+    if (std::abs(geo::Dot(normal, up)) > 0.02) continue;  // the ground
+    ++walls;
+    EXPECT_GT(geo::Dot(normal, at(a)), 0);  // the origin is the middle of the box
+  }
+  EXPECT_EQ(walls, 64);
+}
+
+// All of the pole's row is one point; near it whole columns merge.
+TEST(MakeGridMesh, IsClosedAtThePoles) {
+  for (const int level : {0, 2, 5}) {
+    for (const std::int64_t y : {std::int64_t{0}, geo::TileRows(level) - 1}) {
+      const GlobalGround ground({level, 1, y}, 32, Scattered(2000));
+      const tin::TinMesh mesh = RegularMesh(32, 1);
+      const GridMesh grid = Meshed(ground, mesh, GridStep(ground.lattice, geo::LadderError(level, 0)), 50'000);
+      EXPECT_LT(grid.triangles.size(), mesh.triangles.size() + 2 * 128);
+      for (const auto& [a, b, c] : grid.triangles) {
+        EXPECT_NE(grid.positions[a], grid.positions[b]);
+        EXPECT_NE(grid.positions[b], grid.positions[c]);
+        EXPECT_NE(grid.positions[c], grid.positions[a]);
+      }
+      std::set<std::array<std::int32_t, 3>> on_axis;
+      for (const auto& p : grid.positions) {
+        if (grid.origin[0] + p[0] == 0 && grid.origin[1] + p[1] == 0) on_axis.insert(p);
+      }
+      EXPECT_EQ(on_axis.size(), level == 0 ? 4u : 2u);  // each pole and the skirt's foot below it
+    }
+  }
+}
+
+}  // namespace
+}  // namespace terrace::proto
