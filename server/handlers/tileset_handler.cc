@@ -28,13 +28,15 @@ int SubtreeLevels(const DatasetView& dataset, int root_level) {
 std::string ContentQuery(const ErrorWish& wish, std::string_view query) {
   std::string content = TileQuery(wish);
   const QueryParameters parameters = ParseQuery(query).value_or(QueryParameters());
-  for (const auto& [name, value] : parameters) {
-    if (name == "compression" || name == "texture") content += (content.empty() ? "" : "&") + name + "=" + value;
+  for (const std::string_view wanted : {"compression", "texture"}) {
+    const auto sent = std::ranges::find(parameters, wanted, &QueryParameters::value_type::first);
+    if (sent != parameters.end()) content += (content.empty() ? "" : "&") + sent->first + "=" + sent->second;
   }
   return content;
 }
 
-Document MakeTileset(const DatasetView& dataset, const ErrorWish& wish, std::string content_query) {
+Document MakeTileset(const DatasetView& dataset, ErrorWish wish, std::string content_query) {
+  wish.at_least = wish.error_m.has_value();  // as TileQuery writes it into the templates
   proto::TilesetDescription tileset;
   tileset.attribution = dataset.attribution;
   tileset.roots = proto::ImplicitRoots(dataset.available);

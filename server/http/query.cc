@@ -23,37 +23,45 @@ std::optional<double> PositiveNumber(std::string_view text) {
   return value;
 }
 
-Result<void> SetPositive(std::optional<double>& to, const char* name, std::string_view text) {
-  if (to) return MakeError(ErrorCode::kInvalidArgument, "{} is given more than once", name);
-  to = PositiveNumber(text);
-  if (!to) return MakeError(ErrorCode::kInvalidArgument, "{} must be a finite number above 0", name);
+// A value that is there already may come again where `repeatable`, but no other.
+template <typename T>
+Result<void> SetOnce(std::optional<T>& to, T value, const char* name, bool repeatable) {
+  if (to && !(repeatable && *to == value)) {
+    return MakeError(ErrorCode::kInvalidArgument, "{} is given more than once", name);
+  }
+  to = value;
   return {};
 }
 
+Result<void> SetPositive(std::optional<double>& to, const char* name, std::string_view text, bool repeatable) {
+  const std::optional<double> value = PositiveNumber(text);
+  if (!value) return MakeError(ErrorCode::kInvalidArgument, "{} must be a finite number above 0", name);
+  return SetOnce(to, *value, name, repeatable);
+}
+
 Result<void> SetCompression(std::optional<proto::GlbCompression>& to, std::string_view text) {
-  if (to) return MakeError(ErrorCode::kInvalidArgument, "compression is given more than once");
   constexpr std::pair<std::string_view, proto::GlbCompression> kNames[] = {
       {"draco", proto::GlbCompression::kDraco},
       {"none", proto::GlbCompression::kNone},
       {"quantized", proto::GlbCompression::kQuantized},
       {"meshopt", proto::GlbCompression::kMeshopt}};
   for (const auto& [name, compression] : kNames) {
-    if (text == name) to = compression;
+    if (text == name) return SetOnce(to, compression, "compression", /*repeatable=*/true);
   }
-  if (!to) return MakeError(ErrorCode::kInvalidArgument, "compression must be draco, none, quantized or meshopt");
-  return {};
+  return MakeError(ErrorCode::kInvalidArgument, "compression must be draco, none, quantized or meshopt");
 }
 
 Result<void> SetTexture(std::optional<proto::TextureFormat>& to, std::string_view text) {
-  if (to) return MakeError(ErrorCode::kInvalidArgument, "texture is given more than once");
   constexpr std::pair<std::string_view, proto::TextureFormat> kNames[] = {{"none", proto::TextureFormat::kNone},
                                                                           {"jpeg", proto::TextureFormat::kJpeg},
                                                                           {"webp", proto::TextureFormat::kWebp}};
   for (const auto& [name, texture] : kNames) {
-    if (text == name) to = texture;
+    if (text != name) continue;
+    if (to && *to != texture) return MakeError(ErrorCode::kInvalidArgument, "texture is given more than once");
+    to = texture;
+    return {};
   }
-  if (!to) return MakeError(ErrorCode::kInvalidArgument, "texture must be jpeg, webp or none");
-  return {};
+  return MakeError(ErrorCode::kInvalidArgument, "texture must be jpeg, webp or none");
 }
 
 Result<void> CheckTogether(const ErrorWish& wish, bool at_least_given) {
@@ -106,15 +114,16 @@ Result<TileParameters> ParseTileParameters(std::string_view query, bool allow_at
   TileParameters parameters;
   ErrorWish& wish = parameters.wish;
   bool at_least_given = false;
+  const bool repeatable = allow_compression;
   for (const auto& [name, value] : *sent) {
     Result<void> set;
     if (name == "v") continue;
     if (name == "extensions") {
       parameters.extensions.push_back(value);
     } else if (name == "error") {
-      set = SetPositive(wish.error_m, "error", value);
+      set = SetPositive(wish.error_m, "error", value, repeatable);
     } else if (name == "fraction") {
-      set = SetPositive(wish.fraction, "fraction", value);
+      set = SetPositive(wish.fraction, "fraction", value, repeatable);
     } else if (name == "atleast" && allow_at_least) {
       if (at_least_given) return MakeError(ErrorCode::kInvalidArgument, "atleast is given more than once");
       if (value != "0" && value != "1") return MakeError(ErrorCode::kInvalidArgument, "atleast must be 0 or 1");

@@ -7,16 +7,18 @@ import { decodeView, encodeView } from "/viewer/view_url.js";
 
 const kFlightSeconds = 2.5;
 
-const state = { datasets: [], dataset: undefined, fraction: 0.5, contours: false, wireframe: false, picked: undefined,
-                drawn: undefined, ready: false, problems: [] };
+const state = { datasets: [], dataset: undefined, fraction: 0.5, contours: false, wireframe: false, tiles3d: false,
+                picked: undefined, drawn: undefined, ready: false, problems: [] };
 
 const panel = new Panel({
   dataset: (name) => choose(name),
   home: () => globe.lookAt(state.dataset, kFlightSeconds),
   fraction: (fraction) => refetch(fraction),
   exaggeration: (factor) => { globe.exaggeration = factor; remember(); },
-  contours: (on) => setSwitches({ contours: on, wireframe: state.wireframe }),
-  wireframe: (on) => setSwitches({ contours: state.contours, wireframe: on }),
+  contours: (on) => setSwitches({ ...state, contours: on }),
+  wireframe: (on) => setSwitches({ ...state, wireframe: on }),
+  tiles3d: (on) => { setSwitches({ ...state, tiles3d: on }); return show(); },
+  split: (share) => { globe.split = share; remember(); },
 });
 const traffic = new Traffic();
 const globe = makeGlobe();
@@ -46,7 +48,8 @@ async function fetchDatasets() {
     ...dataset,
     bounds: dataset.bounds ?? [-180, -90, 180, 90],
     heights: { min: dataset.heights?.min ?? 0, max: dataset.heights?.max ?? 4000 },
-    urls: { layer: `/${encodeURIComponent(dataset.name)}/layer.json`, ...dataset.urls },
+    urls: { layer: `/${encodeURIComponent(dataset.name)}/layer.json`,
+            tileset: `/${encodeURIComponent(dataset.name)}/tileset.json`, ...dataset.urls },
   }));
 }
 
@@ -55,7 +58,7 @@ async function show() {
   panel.setFraction(state.fraction);
   traffic.reset();
   try {
-    await globe.show(state.dataset, state.fraction);
+    await globe.show(state.dataset, state.fraction, state.tiles3d);
     panel.setMessage(undefined);
     state.ready = true;
   } catch (error) {
@@ -76,8 +79,8 @@ function refetch(fraction) {
   return show();
 }
 
-function setSwitches({ contours, wireframe }) {
-  Object.assign(state, { contours, wireframe });
+function setSwitches({ contours, wireframe, tiles3d }) {
+  Object.assign(state, { contours, wireframe, tiles3d });
   globe.contours = contours;
   globe.wireframe = wireframe;
   globe.adaptToCamera();
@@ -88,7 +91,8 @@ function setSwitches({ contours, wireframe }) {
 // Keeps the address bar on what is shown, without filling the history.
 function remember() {
   if (!state.ready) return;
-  const view = { ...state, dataset: state.dataset.name, camera: globe.camera, exaggeration: globe.exaggeration };
+  const view = { ...state, dataset: state.dataset.name, camera: globe.camera, exaggeration: globe.exaggeration,
+                 split: globe.split };
   history.replaceState(undefined, "", encodeView(view));
 }
 
@@ -97,6 +101,7 @@ function apply(view) {
   state.fraction = view.fraction ?? defaultFraction(state.dataset);
   globe.exaggeration = view.exaggeration ?? 1;
   panel.setExaggeration(globe.exaggeration);
+  panel.splitter.place = globe.split = view.split;
   if (view.camera) globe.camera = view.camera;
   else globe.lookAt(state.dataset, 0);
   setSwitches(view);
@@ -105,7 +110,7 @@ function apply(view) {
 
 function refresh() {
   state.drawn = globe.drawn();
-  panel.setStats(state.drawn, traffic);
+  panel.setStats(state.drawn, traffic, state.tiles3d ? globe.tiles3d.drawn() : undefined);
   panel.setInterval(state.contours ? globe.interval : 0);
   panel.setActivity(globe.loading ? "loading" : "");
 }

@@ -6,6 +6,7 @@ import {
 import { boxOf, extent, isGlobal, kGlobalDistance, pixelTolerance, viewDistance } from "/viewer/framing.js";
 import { steerByKeyboard } from "/viewer/keyboard.js";
 import { makeTerrainMaterial, niceInterval, setHeights } from "/viewer/material.js";
+import { Tiles3d } from "/viewer/tiles3d.js";
 
 // Drawn without a GPU: smooth edges cost too much there.
 const kSoftware = /swiftshader|llvmpipe|software|basic render/i;
@@ -28,6 +29,7 @@ export class Globe {
     this.contours = false;
     this.interval = 0;
     this.#dressScene();
+    this.tiles3d = new Tiles3d(this.scene, this.material.uniforms);
     this.marker = this.scene.primitives.add(new PointPrimitiveCollection());
     this.scene.camera.percentageChanged = 0.05;
     this.scene.camera.changed.addEventListener(() => this.adaptToCamera());
@@ -57,8 +59,9 @@ export class Globe {
     return names ? gl.getParameter(names.UNMASKED_RENDERER_WEBGL) : "";
   }
 
-  // Shows `dataset` at `fraction` of the level error. Throws a readable message if the server does not describe it.
-  async show(dataset, fraction) {
+  // Shows `dataset` at `fraction` of the level error, its 3D Tiles too if `compare`. Throws a readable message if the
+  // server does not describe it.
+  async show(dataset, fraction, compare) {
     const url = `${dataset.urls.layer.replace(/layer\.json.*$/, "")}?fraction=${fraction}`;
     const turn = ++this.#latest;
     const provider = await CesiumTerrainProvider.fromUrl(url, { requestVertexNormals: true });
@@ -75,6 +78,25 @@ export class Globe {
     this.material.uniforms.shading = provider.hasVertexNormals ? 1 : 0;
     this.widget.terrainProvider = provider;
     this.adaptToCamera();
+    await this.compare(compare ? `${dataset.urls.tileset}?fraction=${fraction}` : undefined);
+  }
+
+  // 3D Tiles from this URL to the right of the splitter; without one, terrain everywhere.
+  async compare(url) {
+    this.material.uniforms.split = url ? 1 : 0;
+    if (url) await this.tiles3d.show(url, this.onError);
+    else this.tiles3d.hide();
+    this.scene.requestRender();
+  }
+
+  get split() {
+    return this.scene.splitPosition;
+  }
+
+  // Where the splitter stands, as a share of the picture's width.
+  set split(share) {
+    this.scene.splitPosition = share;
+    this.scene.requestRender();
   }
 
   // The last picture stays in front until the new terrain is there or the camera moves.
@@ -194,17 +216,19 @@ export class Globe {
   }
 
   get loading() {
-    return !this.scene.globe.tilesLoaded;
+    return !this.scene.globe.tilesLoaded || this.tiles3d.loading;
   }
 
-  // What is in the current picture, skirts not counted. `keys` are the tiles' "z/x/y", y from the south.
+  // What is in the current picture, skirts not counted but where it says so. `keys` are the tiles' "z/x/y", y from the
+  // south.
   drawn() {
-    const sum = { tiles: 0, triangles: 0, vertices: 0, deepest: 0, keys: [] };
+    const sum = { tiles: 0, triangles: 0, withSkirts: 0, vertices: 0, deepest: 0, keys: [] };
     for (const tile of this.scene.globe._surface._tilesToRender) {
       const mesh = tile.data?.renderedMesh;
       if (!mesh) continue;
       sum.tiles += 1;
       sum.triangles += mesh.indexCountWithoutSkirts / 3;
+      sum.withSkirts += mesh.indices.length / 3;
       sum.vertices += mesh.vertexCountWithoutSkirts;
       sum.keys.push(`${tile.level}/${tile.x}/${2 ** tile.level - 1 - tile.y}`);
       sum.deepest = Math.max(sum.deepest, tile.level);

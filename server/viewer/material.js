@@ -49,9 +49,11 @@ export function drawRamp(canvas, heights) {
   return canvas;
 }
 
-const kRampWidth = 2048;
+export const kRampWidth = 2048;
 
-const kSource = /* glsl */ `
+// What a point of the ground looks like, from uniforms of the names below. `tiles` are the points of 3D Tiles, which
+// have the right of the picture beyond the splitter to themselves.
+export const kLook = /* glsl */ `
 const vec3 kRadii = vec3(6378137.0, 6378137.0, 6356752.314245);
 const vec3 kShadow = vec3(0.30, 0.33, 0.46);
 const vec3 kSunlight = vec3(1.0, 0.97, 0.90);
@@ -73,10 +75,8 @@ float lit(vec3 normalENU, vec2 towards) {
   return max(0.0, dot(normalENU, vec3(towards * 0.766, 0.643))) / 0.643;
 }
 
-czm_material czm_getMaterial(czm_materialInput materialInput) {
-  czm_material material = czm_getDefaultMaterial(materialInput);
-  float metres = materialInput.height;
-  vec3 positionWC = (czm_inverseView * vec4(-materialInput.positionToEyeEC, 1.0)).xyz;
+vec3 terrainColour(float metres, vec3 positionToEyeEC, vec3 normalEC, bool tiles) {
+  vec3 positionWC = (czm_inverseView * vec4(-positionToEyeEC, 1.0)).xyz;
   vec3 up = normalize(positionWC / kRadii / kRadii * 1e7);
   vec3 east = normalize(vec3(-up.y, up.x, 0.0) + vec3(0.0, 1e-6, 0.0));
   vec3 north = cross(up, east);
@@ -84,11 +84,11 @@ czm_material czm_getMaterial(czm_materialInput materialInput) {
   float across = clamp((metres - heightRange.x) / (heightRange.y - heightRange.x), 0.0, 1.0);
   vec3 colour = texture(ramp, vec2(mix(0.5, ${kRampWidth}.0 - 0.5, across) / ${kRampWidth}.0, 0.5)).rgb;
 
-  vec3 normalWC = czm_inverseNormal3D * materialInput.normalEC;
+  vec3 normalWC = czm_inverseNormal3D * normalEC;
   vec3 normal = vec3(dot(normalWC, east), dot(normalWC, north), dot(normalWC, up));
   float steepness = 1.0 - clamp(normal.z, 0.0, 1.0);
   // The triangle's own slope: an 8-bit normal cannot tell a sea from a plain.
-  vec3 position = materialInput.positionToEyeEC;
+  vec3 position = positionToEyeEC;
   float slope = fwidth(metres) / max(length(dFdx(position)) + length(dFdy(position)), 1e-6);
   float level = 1.0 - smoothstep(0.0003, 0.0015, slope);
   float towardsShore = (metres - heightRange.x) / max(water - heightRange.x, 1e-3);
@@ -118,6 +118,7 @@ czm_material czm_getMaterial(czm_materialInput materialInput) {
   vec2 offset = vec2(longitude - box.x, latitude - box.y);
   offset.x -= czm_twoPi * floor(offset.x / czm_twoPi + 0.5);
   vec2 beyond = abs(offset) - box.zw;
+  if (!tiles && split > 0.5 && gl_FragCoord.x > czm_splitPosition && max(beyond.x, beyond.y) < 0.0) discard;
   float outside = smoothstep(0.0, 0.012 * (box.z + box.w), max(beyond.x, beyond.y));
   float grid = max(lines(longitude / graticule, 0.6), lines(latitude / graticule, 0.6));
   colour = mix(colour, (kElsewhere + 0.06 * grid) * mix(vec3(1.0), shade, 0.6), outside * (1.0 - wire));
@@ -128,10 +129,17 @@ czm_material czm_getMaterial(czm_materialInput materialInput) {
   vec3 overShoulder = normalize(czm_inverseViewRotation * vec3(-0.5, 0.5, 0.8));
   colour *= mix(1.0, 0.42 + 0.72 * max(0.0, dot(up, overShoulder)), farness * (1.0 - wire));
   float rim = pow(1.0 - clamp(dot(up, toEye), 0.0, 1.0), 4.0) * farness;
-  float haze = (1.0 - exp(-pow(length(materialInput.positionToEyeEC) / hazeDistance, 2.0))) * (1.0 - farness);
+  float haze = (1.0 - exp(-pow(length(positionToEyeEC) / hazeDistance, 2.0))) * (1.0 - farness);
   colour = mix(colour, kAir, max(rim * 0.8, haze * 0.75) * (1.0 - wire));
 
-  material.diffuse = mix(colour, min(vec3(1.0), colour * 1.1 + 0.06), wire);
+  return mix(colour, min(vec3(1.0), colour * 1.1 + 0.06), wire);
+}`;
+
+const kSource = /* glsl */ `
+${kLook}
+czm_material czm_getMaterial(czm_materialInput materialInput) {
+  czm_material material = czm_getDefaultMaterial(materialInput);
+  material.diffuse = terrainColour(materialInput.height, materialInput.positionToEyeEC, materialInput.normalEC, false);
   material.alpha = 1.0;
   return material;
 }`;
@@ -153,6 +161,7 @@ export function makeTerrainMaterial() {
         farness: 0,          // 0 near the ground, 1 with the whole globe in view
         hazeDistance: 1e6,   // metres at which air hides most of the ground
         wire: 0,             // 1 while the surface is drawn as lines
+        split: 0,            // 1 while 3D Tiles are drawn to the right of the splitter
       },
       source: kSource,
     },

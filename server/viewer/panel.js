@@ -1,5 +1,6 @@
 // The controls and the numbers beside the globe. Knows the page's elements, not CesiumJS.
 import { drawRamp } from "/viewer/material.js";
+import { Splitter } from "/viewer/splitter.js";
 import { kPhases } from "/viewer/traffic.js";
 
 // The slider counts half powers of two, to the right the finer: 4, 2.83, ... 1/32.
@@ -35,7 +36,8 @@ function formatPosition({ longitude, latitude, height }) {
 }
 
 export class Panel {
-  // `actions`: dataset(name), home(), fraction(value), exaggeration(value), contours(on), wireframe(on).
+  // `actions`: dataset(name), home(), fraction(value), exaggeration(value), contours(on), wireframe(on),
+  // tiles3d(on), split(share).
   constructor(actions) {
     byId("dataset").addEventListener("change", (event) => actions.dataset(event.target.value));
     byId("home").addEventListener("click", actions.home);
@@ -51,9 +53,10 @@ export class Panel {
       this.setExaggeration(event.target.valueAsNumber);
       actions.exaggeration(event.target.valueAsNumber);
     });
-    for (const name of ["contours", "wireframe"]) {
+    for (const name of ["contours", "wireframe", "tiles3d"]) {
       byId(name).addEventListener("change", (event) => actions[name](event.target.checked));
     }
+    this.splitter = new Splitter(byId("splitter"), actions.split);
     if (matchMedia("(max-width: 560px)").matches) byId("panel").open = false;
   }
 
@@ -82,9 +85,11 @@ export class Panel {
     byId("exaggeration-value").textContent = factor === 1 ? "true to scale" : `${factor} ×`;
   }
 
-  setSwitches({ contours, wireframe }) {
+  setSwitches({ contours, wireframe, tiles3d }) {
     byId("contours").checked = contours;
     byId("wireframe").checked = wireframe;
+    byId("tiles3d").checked = tiles3d;
+    byId("splitter").hidden = !tiles3d;
   }
 
   setInterval(metres) {
@@ -105,27 +110,34 @@ export class Panel {
     byId("message").textContent = text ?? "";
   }
 
-  setStats(drawn, traffic) {
-    const worst = traffic.worstError(drawn.keys);
+  // `tiles3d`: what of 3D Tiles is drawn, where they are.
+  setStats(drawn, traffic, tiles3d) {
+    const error = (keys) => {
+      const worst = traffic.worstError(keys);
+      return worst === undefined ? "–" : formatMetres(worst);
+    };
     const perTile = (phase) => traffic.milliseconds[phase] / Math.max(1, traffic.computed);
     const total = kPhases.reduce((sum, phase) => sum + perTile(phase), 0);
-    const rows = [
+    const rows = tiles3d ? [
+      ["", "mesh", "3D Tiles"],
+      ["Triangles, skirts too", compact.format(drawn.withSkirts), compact.format(tiles3d.triangles)],
+      ["Tiles shown", plain.format(drawn.tiles), plain.format(tiles3d.tiles)],
+      ["Tiles fetched", plain.format(traffic.tiles), plain.format(traffic.tiles3d.tiles)],
+      ["Over the wire", formatBytes(traffic.bytes), formatBytes(traffic.tiles3d.bytes)],
+      ["Worst error shown", error(drawn.keys), error(tiles3d.keys)],
+    ] : [
       ["Triangles", compact.format(drawn.triangles)],
       ["Vertices", compact.format(drawn.vertices)],
       ["Tiles shown", `${drawn.tiles} · level ${drawn.deepest}`],
       ["Tiles fetched", plain.format(traffic.tiles)],
       ["Over the wire", formatBytes(traffic.bytes)],
       ["Cache hits", traffic.answers ? `${Math.round((100 * traffic.hits) / traffic.answers)} %` : "–"],
-      ["Worst error shown", worst === undefined ? "–" : formatMetres(worst)],
+      ["Worst error shown", error(drawn.keys)],
       ["Server per tile", traffic.computed ? `${total.toFixed(1)} ms` : "–"],
     ];
-    byId("stats").replaceChildren(...rows.flatMap(([name, value]) => {
-      const term = document.createElement("dt");
-      const definition = document.createElement("dd");
-      term.textContent = name;
-      definition.textContent = value;
-      return [term, definition];
-    }));
+    byId("stats").classList.toggle("two", tiles3d !== undefined);
+    byId("stats").replaceChildren(...rows.flatMap(([name, ...values]) => [["dt", name], ...values.map((value) => ["dd", value])]
+      .map(([tag, textContent]) => Object.assign(document.createElement(tag), { textContent, className: name ? "" : "heading" }))));
     byId("phases").replaceChildren(...kPhases.map((phase) => {
       const bar = document.createElement("span");
       bar.className = phase;

@@ -1,4 +1,4 @@
-// What the tiles cost, read from the browser's own resource timing: bytes, cache hits, and the server's time by phase.
+// What the tiles cost, by format, read from the browser's own resource timing: bytes, cache hits, and the server's time by phase.
 import { Resource } from "/viewer/cesium/index.js";
 
 export const kPhases = ["read", "refine", "encode", "compress"];
@@ -13,12 +13,20 @@ export class Traffic {
 
   reset() {
     Object.assign(this, { since: performance.now(), tiles: 0, bytes: 0, hits: 0, answers: 0, computed: 0 });
-    this.errors = new Map();  // metres, by "z/x/y"
+    this.tiles3d = { tiles: 0, bytes: 0 };  // the same of 3D Tiles; the bytes of subtrees and tileset.json with them
+    this.errors = new Map();  // metres, by "z/x/y", of 3D Tiles by "root/level/x/y"
     this.milliseconds = Object.fromEntries(kPhases.map((phase) => [phase, 0]));
   }
 
   #add(entry) {
-    if (!/\.terrain(\?|$)/.test(entry.name) || entry.startTime < this.since) return;
+    if (entry.startTime < this.since) return;
+    const kind = /\.(terrain|glb|subtree)(\?|$)|\/(tileset)\.json/.exec(entry.name);
+    if (!kind) return;
+    if (kind[1] !== "terrain") {
+      this.tiles3d.tiles += kind[1] === "glb" ? 1 : 0;
+      this.tiles3d.bytes += entry.transferSize || 0;
+      return;
+    }
     this.tiles += 1;
     this.bytes += entry.transferSize || 0;  // 0 for what came from the browser's cache
     const timing = new Map((entry.serverTiming ?? []).map((metric) => [metric.name, metric]));
@@ -44,7 +52,7 @@ export class Traffic {
       const request = load(url, ...rest);
       request?.addEventListener?.("load", () => {
         const error = Number.parseFloat(request.getResponseHeader("Terrain-Max-Error"));
-        const tile = /(\d+\/\d+\/\d+)\.terrain/.exec(url);
+        const tile = /(\d+\/\d+\/\d+)\.terrain/.exec(url) ?? /3dtiles\/(\S+)\.glb/.exec(url);
         if (error >= 0 && tile) this.errors.set(tile[1], error);
       });
       return request;

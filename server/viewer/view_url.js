@@ -1,11 +1,13 @@
 // A view as the page's URL fragment: #dataset=maui&fraction=0.25&camera=-156.2,20.6,9000,30,-25&contours&wireframe
-const kSwitches = ["contours", "wireframe"];
+// With 3D Tiles beside the terrain, &tiles3d and, where the line between them was moved, &split=0.4.
+const kSwitches = ["contours", "wireframe", "tiles3d"];
 
-export function encodeView({ dataset, fraction, exaggeration, camera, ...switches }) {
+export function encodeView({ dataset, fraction, exaggeration, camera, split, ...switches }) {
   const parts = [`dataset=${encodeURIComponent(dataset)}`, `fraction=${Number(fraction.toPrecision(6))}`];
   if (camera) parts.push(`camera=${camera.map((value, i) => Number(value.toFixed(i < 2 ? 6 : 1))).join(",")}`);
   if (exaggeration !== 1) parts.push(`exaggeration=${exaggeration}`);
   for (const name of kSwitches) if (switches[name]) parts.push(name);
+  if (switches.tiles3d && split !== 0.5) parts.push(`split=${Number(split.toFixed(3))}`);
   return `#${parts.join("&")}`;
 }
 
@@ -17,6 +19,8 @@ export function decodeView(fragment) {
   if (query.get("dataset")) view.dataset = query.get("dataset");
   if (Number(query.get("fraction")) > 0) view.fraction = Number(query.get("fraction"));
   if (Number(query.get("exaggeration")) > 0) view.exaggeration = Number(query.get("exaggeration"));
+  const split = Number(query.get("split") ?? 0.5);
+  view.split = split >= 0 && split <= 1 ? split : 0.5;
   if (camera?.length === 5 && camera.every(Number.isFinite)) view.camera = camera;
   for (const name of kSwitches) view[name] = query.has(name);
   return view;

@@ -124,6 +124,31 @@ describe('the viewer', () => {
     });
   }
 
+  it('shows 3D Tiles to the right of a line', async () => {
+    const before = await picture(page);
+    await page.locator('#tiles3d').check();
+    await page.waitForFunction(() => terrace.globe.tiles3d.drawn().tiles > 1, undefined, { timeout: kSettleMs });
+    const mesh = await settle(page);
+    const tiles = await page.evaluate(() => terrace.globe.tiles3d.drawn());
+    assert.ok(tiles.triangles > mesh.withSkirts / 8 && tiles.triangles < mesh.withSkirts * 8, `${tiles.triangles} ${mesh.withSkirts}`);
+    assert.ok(await page.evaluate(() => terrace.traffic.tiles3d.bytes > 1000));
+    // The same ground in the same colours: other triangles, but not another picture.
+    const after = await picture(page);
+    const hue = (colour) => [colour >> 10, (colour >> 5) & 31, colour & 31];
+    const far = after.filter((colour, i) => hue(colour).some((channel, k) => Math.abs(channel - hue(before[i])[k]) > 6));
+    assert.ok(far.length / after.length < 0.1, `${far.length} of ${after.length} pixels are of another colour`);
+    assert.match(await page.locator('#stats').innerText(), /Triangles, skirts too\s+[\d.]+K?\s+[\d.]+K?/);
+
+    await page.locator('#splitter').focus();
+    await page.keyboard.press('ArrowLeft');
+    assert.equal(await page.evaluate(() => terrace.globe.split), 0.48);
+    assert.match(page.url(), /&tiles3d&split=0\.48/);
+    await page.locator('#tiles3d').uncheck();
+    await settle(page);
+    assert.ok(await page.locator('#splitter').isHidden());
+    assert.equal(await page.evaluate(() => terrace.globe.tiles3d.drawn().tiles), 0);
+  });
+
   it('tells position and height of a click', async () => {
     await page.mouse.click(520, 320);
     const readout = await page.locator('#readout').innerText();

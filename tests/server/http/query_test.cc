@@ -87,6 +87,18 @@ TEST(Query, TakesACompressionWhereItIsOffered) {
 
 TEST(Query, RefusesAtLeastWhereItIsNotOffered) { EXPECT_FALSE(ParseTileParameters("error=5&atleast=1", false)); }
 
+// deck.gl appends the query of tileset.json to the URLs under it, which carry it already.
+TEST(Query, TakesAnEqualValueAgainOn3dTilesUrls) {
+  const auto accepts = [](const char* query) {
+    return ParseTileParameters(query, /*allow_at_least=*/true, /*allow_compression=*/true).has_value();
+  };
+  EXPECT_TRUE(accepts("error=5&atleast=1&error=5.00"));
+  EXPECT_TRUE(accepts("fraction=0.25&compression=none&fraction=0.25&compression=none"));
+  EXPECT_FALSE(accepts("error=5&error=6"));
+  EXPECT_FALSE(accepts("compression=none&compression=draco"));
+  EXPECT_FALSE(accepts("error=5&error=x"));
+}
+
 TEST(Query, RefusesParametersWhereThereAreNone) {
   EXPECT_TRUE(RefuseParameters(""));
   EXPECT_TRUE(RefuseParameters("v=1"));

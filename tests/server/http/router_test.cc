@@ -22,6 +22,9 @@ TEST(Router, FindsEveryUrl) {
       {"/metrics", RouteKind::kMetrics},
       {"/maui/layer.json", RouteKind::kLayer},
       {"/maui/layer.json?error=5", RouteKind::kLayer},
+      {"/maui/tileset.json?error=5", RouteKind::kTileset},
+      {"/maui/3dtiles/9-272-359/0/0/0.subtree", RouteKind::kSubtree},
+      {"/maui/3dtiles/9-272-359/0/0/0.glb?error=5&atleast=1", RouteKind::kTile},
       {"/maui/0/1/0.terrain", RouteKind::kTile},
       {"/maui/0/1/0.glb", RouteKind::kTile},
       {"http://example.test/maui/0/1/0.terrain", RouteKind::kTile},
@@ -51,6 +54,18 @@ TEST(Router, ReadsTheTileAndTheQuery) {
   EXPECT_EQ(Match("/viewer/")->file, "index.html");
 }
 
+TEST(Router, CountsImplicitTilesFromTheGlobesRoots) {
+  const Result<Route> content = Match("/maui/3dtiles/9-272-359/3/5/2.glb");
+  ASSERT_TRUE(content);
+  EXPECT_EQ(content->dataset, "maui");
+  EXPECT_EQ(content->format, TileFormat::kGlb);
+  EXPECT_EQ(content->key, (geo::TileKey{12, 272 * 8 + 5, 359 * 8 + 2}));
+  const Result<Route> subtree = Match("/maui/3dtiles/0-1-0/6/63/0.subtree");
+  ASSERT_TRUE(subtree);
+  EXPECT_EQ(subtree->root, (geo::TileKey{0, 1, 0}));
+  EXPECT_EQ(subtree->key, (geo::TileKey{6, 64 + 63, 0}));
+}
+
 TEST(Router, RefusesWhatIsNoUrl) {
   const char* const not_found[] = {
       "/nope",
@@ -66,6 +81,25 @@ TEST(Router, RefusesWhatIsNoUrl) {
       "/maui/0/0/.glb",
       "/maui/0/0/0.glb.terrain",
       "/maui/0/2/0.glb",
+      // No root, no place under it, or below the deepest level.
+      "/maui/3dtiles/9-272-359/0/0/0.terrain",
+      "/maui/3dtiles/9-272-359/0/0/0",
+      "/maui/3dtiles/9-272-359/0/0/.subtree",
+      "/maui/3dtiles/9-272-359/0/0/0.subtree.glb",
+      "/maui/3dtiles/9-272/0/0/0.subtree",
+      "/maui/3dtiles/9-272-359-0/0/0/0.subtree",
+      "/maui/3dtiles/9-272--359/0/0/0.subtree",
+      "/maui/3dtiles/09-272-359/0/0/0.subtree",
+      "/maui/3dtiles/0-2-0/0/0/0.subtree",
+      "/maui/3dtiles/9-272-359/0/1/0.subtree",
+      "/maui/3dtiles/9-272-359/2/0/4.glb",
+      "/maui/3dtiles/9-272-359/16/0/0.subtree",
+      "/maui/3dtiles/9-272-359/999999999/0/0.subtree",
+      "/maui/3dtiles/9-272-359/00/0/0.subtree",
+      "/maui/3dtiles/9-272-359/0/0",
+      "/maui/3dtile/9-272-359/0/0/0.subtree",
+      "/viewer2/tileset.json/",
+      "/metrics/tileset.json",
       "/datasets/",
       "/livez/x",
       "/datasets/layer.json",

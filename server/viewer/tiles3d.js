@@ -1,0 +1,127 @@
+// The dataset's 3D Tiles to the right of a line on the screen, in the scene of the terrain and with its look, so that
+// the two can be compared. Both deepen at the same distance: the tileset's geometric errors are eight times the level
+// errors that CesiumJS assumes of terrain, and so is the tolerance set here.
+import {
+  Cartesian2, Cartesian4, Cesium3DTileset, CustomShader, LightingModel, SplitDirection, TextureUniform,
+  UniformType,
+} from "/viewer/cesium/index.js";
+import { kLook, kRampWidth } from "/viewer/material.js";
+
+const kErrorRatio = 8;
+const kTexels = 4 * kRampWidth;
+
+// Heights come from the ellipsoid's equation f = 1, written as a difference from the camera: an Earth-centred position
+// in 32-bit floats is only good to half a metre.
+const kFragment = /* glsl */ `
+${kLook}
+void fragmentMain(FragmentInput fsInput, inout czm_modelMaterial material) {
+  vec3 positionEC = fsInput.attributes.positionEC;
+  vec3 fromCamera = czm_inverseViewRotation * positionEC;
+  vec3 camera = czm_viewerPositionWC / kRadii;
+  vec3 offset = fromCamera / kRadii;
+  float f = cameraLevel + dot(offset, 2.0 * camera + offset);
+  float height = f / (sqrt(1.0 + f) + 1.0) * sqrt(1.0 + f) / length((camera + offset) / kRadii);
+  vec3 colour = terrainColour(height / exaggeration, -positionEC, normalize(fsInput.attributes.normalEC), true);
+  material.diffuse = czm_srgbToLinear(colour);
+}`;
+
+const kTypes = {
+  heightRange: UniformType.VEC2, box: UniformType.VEC4, water: UniformType.FLOAT, contourInterval: UniformType.FLOAT,
+  relief: UniformType.FLOAT, shading: UniformType.FLOAT, graticule: UniformType.FLOAT, farness: UniformType.FLOAT,
+  hazeDistance: UniformType.FLOAT, wire: UniformType.FLOAT, split: UniformType.FLOAT,
+};
+
+function valueFor(type, value) {
+  if (type === UniformType.VEC2) return Cartesian2.fromElements(value.x, value.y);
+  if (type === UniformType.VEC4) return Cartesian4.fromElements(value.x, value.y, value.z, value.w);
+  return value;
+}
+
+function makeShader() {
+  const uniforms = {
+    ramp: { type: UniformType.SAMPLER_2D, value: new TextureUniform({ typedArray: new Uint8Array(kTexels), width: kRampWidth, height: 1 }) },
+    cameraLevel: { type: UniformType.FLOAT, value: 0 },
+    exaggeration: { type: UniformType.FLOAT, value: 1 },
+  };
+  for (const [name, type] of Object.entries(kTypes)) {
+    uniforms[name] = { type, value: valueFor(type, { x: 0, y: 1, z: 0, w: 0 }) };
+    if (type === UniformType.FLOAT) uniforms[name].value = 0;
+  }
+  return new CustomShader({ lightingModel: LightingModel.UNLIT, uniforms, fragmentShaderText: kFragment });
+}
+
+export class Tiles3d {
+  #latest = 0;  // counts show() and hide(): of loads that overlap only the last may enter the scene
+
+  // `look`: the uniforms of the terrain's material, which the tiles follow from frame to frame.
+  constructor(scene, look) {
+    Object.assign(this, { scene, look, tileset: undefined, pending: false, wireframe: false });
+    scene.preUpdate.addEventListener(() => this.tileset && this.#follow());
+  }
+
+  // Throws what CesiumJS throws if the tileset cannot be read. `onError` gets a sentence for each tile that fails.
+  async show(url, onError) {
+    const turn = ++this.#latest;
+    this.pending = true;
+    try {
+      const shader = makeShader();
+      const tileset = await Cesium3DTileset.fromUrl(url, {
+        customShader: shader, splitDirection: SplitDirection.RIGHT, enableDebugWireframe: true, shadows: 0,
+      });
+      if (turn !== this.#latest) return tileset.destroy();
+      this.#remove();
+      tileset.tileFailed.addEventListener(({ message, url: tile }) => onError(`${tile} failed: ${message}`));
+      this.shader = shader;
+      this.tileset = this.scene.primitives.add(tileset);
+      this.#setRamp();
+      this.#follow();
+    } finally {
+      if (turn === this.#latest) this.pending = false;
+    }
+  }
+
+  hide() {
+    ++this.#latest;
+    this.pending = false;
+    this.#remove();
+  }
+
+  #remove() {
+    if (this.tileset) this.scene.primitives.remove(this.tileset);  // which destroys it
+    this.tileset = undefined;
+    this.scene.requestRender();
+  }
+
+  get loading() {
+    return this.pending || (this.tileset !== undefined && !this.tileset.tilesLoaded);
+  }
+
+  // What is in the current picture, skirts counted: GLB tiles carry theirs. `keys` are "root/level/x/y".
+  drawn() {
+    const sum = { tiles: 0, triangles: 0, keys: [] };
+    for (const { content } of this.tileset?._selectedTiles ?? []) {
+      const key = /3dtiles\/(\S+)\.glb/.exec(content.url)?.[1];
+      if (!key) continue;
+      sum.tiles += 1;
+      sum.triangles += content.trianglesLength;
+      sum.keys.push(key);
+    }
+    return sum;
+  }
+
+  #setRamp() {
+    const pixels = this.look.ramp.getContext("2d").getImageData(0, 0, kRampWidth, 1).data;
+    const typedArray = new Uint8Array(pixels.buffer);
+    this.shader.setUniform("ramp", new TextureUniform({ typedArray, width: kRampWidth, height: 1 }));
+  }
+
+  #follow() {
+    const { camera, ellipsoid, globe, verticalExaggeration } = this.scene;
+    this.tileset.maximumScreenSpaceError = kErrorRatio * globe.maximumScreenSpaceError;
+    this.tileset.debugWireframe = this.look.wire === 1;
+    for (const [name, type] of Object.entries(kTypes)) this.shader.setUniform(name, valueFor(type, this.look[name]));
+    const { x, y, z } = ellipsoid.transformPositionToScaledSpace(camera.positionWC);
+    this.shader.setUniform("cameraLevel", x * x + y * y + z * z - 1);
+    this.shader.setUniform("exaggeration", verticalExaggeration);
+  }
+}

@@ -1,0 +1,81 @@
+#include "proto/implicit_tree.h"
+
+#include <gtest/gtest.h>
+
+namespace terrace::proto {
+namespace {
+
+using Levels = std::vector<std::vector<geo::TileRange>>;
+using Keys = std::vector<geo::TileKey>;
+
+// What a dataset offers whose deepest tiles are `deepest`: those, all ancestors, and both roots.
+Levels Above(const std::vector<geo::TileRange>& deepest, int max_level) {
+  Levels levels(static_cast<std::size_t>(max_level) + 1);
+  for (int level = 1; level <= max_level; ++level) {
+    const int up = max_level - level;
+    for (const geo::TileRange& r : deepest) {
+      levels[static_cast<std::size_t>(level)].push_back(
+          {r.start_x >> up, r.start_y >> up, r.end_x >> up, r.end_y >> up});
+    }
+  }
+  levels[0] = {{0, 0, 1, 0}};
+  return levels;
+}
+
+TEST(ImplicitRoots, OfTheWholeGlobeAreBothTilesOfLevelZero) {
+  const Levels available = {{{0, 0, 1, 0}}, {{0, 0, 3, 1}}, {{0, 0, 7, 3}}};
+  EXPECT_EQ(ImplicitRoots(available), (Keys{{0, 0, 0}, {0, 1, 0}}));
+  EXPECT_EQ(ImplicitRoots(Levels{{{0, 0, 1, 0}}}), (Keys{{0, 0, 0}, {0, 1, 0}}));
+}
+
+TEST(ImplicitRoots, LieAsDeepAsFourTilesHoldTheData) {
+  // 16 x 12 tiles of level 13 fill two by two tiles of level 10, the upper two by half.
+  EXPECT_EQ(ImplicitRoots(Above({{32, 64, 47, 75}}, 13)), (Keys{{10, 4, 8}, {10, 5, 8}, {10, 4, 9}, {10, 5, 9}}));
+  EXPECT_EQ(ImplicitRoots(Above({{33, 64, 36, 64}}, 13)),
+            (Keys{{13, 33, 64}, {13, 34, 64}, {13, 35, 64}, {13, 36, 64}}));
+  EXPECT_EQ(ImplicitRoots(Above({{7, 9, 7, 9}}, 13)), (Keys{{13, 7, 9}}));
+}
+
+TEST(ImplicitRoots, AcrossLongitudeZeroAndTheAntimeridianStayDeep) {
+  // A block that straddles x = 512 of level 9 is in both hemispheres, and the smallest common tile would be the world.
+  EXPECT_EQ(ImplicitRoots(Above({{508, 300, 515, 303}}, 9)), (Keys{{7, 127, 75}, {7, 128, 75}}));
+  EXPECT_EQ(ImplicitRoots(Above({{0, 300, 3, 303}, {1020, 300, 1023, 303}}, 9)), (Keys{{7, 0, 75}, {7, 255, 75}}));
+}
+
+TEST(ImplicitRoots, AreNamedByLevelColumnAndRow) { EXPECT_EQ(RootName({9, 272, 359}), "9-272-359"); }
+
+TEST(TileUnder, CountsFromTheRootsSouthWesternCorner) {
+  EXPECT_EQ(TileUnder({9, 272, 359}, 0, 0, 0), (geo::TileKey{9, 272, 359}));
+  EXPECT_EQ(TileUnder({9, 272, 359}, 3, 5, 2), (geo::TileKey{12, 272 * 8 + 5, 359 * 8 + 2}));
+}
+
+TEST(BlocksBelow, AreClippedToTheTile) {
+  const Levels available = Above({{33, 64, 36, 70}}, 8);
+  // Tile 6/8/16 has tiles 32..35 x 64..67 of level 8 below it.
+  const Levels blocks = BlocksBelow(available, {6, 8, 16}, 4);
+  ASSERT_EQ(blocks.size(), 5u);
+  EXPECT_EQ(blocks[0], (std::vector<geo::TileRange>{{0, 0, 0, 0}}));
+  EXPECT_EQ(blocks[1], (std::vector<geo::TileRange>{{0, 0, 1, 1}}));
+  EXPECT_EQ(blocks[2], (std::vector<geo::TileRange>{{1, 0, 3, 3}}));
+  EXPECT_TRUE(blocks[3].empty() && blocks[4].empty()) << "nothing below the deepest level";
+}
+
+TEST(BlocksBelow, HoldAnyTileThatIsAvailable) {
+  const Levels available = Above({{500, 301, 520, 309}, {530, 301, 533, 309}}, 9);
+  const geo::TileKey top{5, 32, 18};
+  const Levels blocks = BlocksBelow(available, top, 4);
+  for (int k = 0; k <= 4; ++k) {
+    for (std::int64_t y = 0; y < 1 << k; ++y) {
+      for (std::int64_t x = 0; x < 1 << k; ++x) {
+        const geo::TileKey key = TileUnder(top, k, x, y);
+        int listed = 0, there = 0;
+        for (const auto& range : available[static_cast<std::size_t>(key.level)]) there += range.Contains(key);
+        for (const auto& range : blocks[static_cast<std::size_t>(k)]) listed += range.Contains({k, x, y});
+        ASSERT_EQ(listed > 0, there > 0) << geo::ToString(key);
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace terrace::proto

@@ -1,0 +1,115 @@
+#include "proto/tileset.h"
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "engine/geo/error_ladder.h"
+
+namespace terrace::proto {
+namespace {
+
+using Json = nlohmann::json;
+
+TilesetDescription Maui() {
+  TilesetDescription tileset;
+  tileset.attribution = "© a <survey> & \"Co\"";
+  tileset.roots = {{7, 16, 78}};
+  tileset.levels = 8;
+  tileset.subtree_levels = 6;
+  tileset.min_height_m = -1500;
+  tileset.max_height_m = 3055.5;
+  return tileset;
+}
+
+TEST(Tileset, OneRootIsTheImplicitRootItself) {
+  const Json json = Json::parse(EncodeTileset(Maui()));
+  EXPECT_EQ(json.at("asset").at("version"), "1.1");
+  EXPECT_FALSE(json.contains("extensionsUsed")) << "implicit tiling and GLB content are core 1.1";
+  const Json& root = json.at("root");
+  EXPECT_EQ(root.at("refine"), "REPLACE");
+  EXPECT_EQ(root.at("content").at("uri"), "3dtiles/7-16-78/{level}/{x}/{y}.glb");
+  EXPECT_EQ(root.at("implicitTiling"), Json::parse(R"({"subdivisionScheme":"QUADTREE","availableLevels":8,
+      "subtreeLevels":6,"subtrees":{"uri":"3dtiles/7-16-78/{level}/{x}/{y}.subtree"}})"));
+  for (const char* forbidden : {"children", "metadata", "transform"}) EXPECT_FALSE(root.contains(forbidden));
+  EXPECT_FALSE(root.at("content").contains("boundingVolume"));
+}
+
+TEST(Tileset, RegionIsTheRootTileInRadians) {
+  const Json json = Json::parse(EncodeTileset(Maui()));
+  const Json& region = json.at("root").at("boundingVolume").at("region");
+  const double tile = std::numbers::pi / 128;
+  EXPECT_NEAR(region[0], -std::numbers::pi + 16 * tile, 1e-12);
+  EXPECT_NEAR(region[1], -std::numbers::pi / 2 + 78 * tile, 1e-12);
+  EXPECT_NEAR(region[2], -std::numbers::pi + 17 * tile, 1e-12);
+  EXPECT_NEAR(region[3], -std::numbers::pi / 2 + 79 * tile, 1e-12);
+  EXPECT_EQ(region[4], -1500);
+  EXPECT_EQ(region[5], 3055.5);
+}
+
+TEST(Tileset, SeveralRootsAreChildrenWithoutContentAbove) {
+  TilesetDescription tileset = Maui();
+  tileset.roots = {{0, 0, 0}, {0, 1, 0}};
+  const Json json = Json::parse(EncodeTileset(tileset));
+  const Json& root = json.at("root");
+  EXPECT_FALSE(root.contains("content") || root.contains("implicitTiling"));
+  ASSERT_EQ(root.at("children").size(), 2u);
+  const Json &west = root.at("children")[0].at("boundingVolume").at("region"),
+             &east = root.at("children")[1].at("boundingVolume").at("region");
+  EXPECT_EQ(west[2], east[0]) << "the same bits: no seam at longitude 0";
+  // CesiumJS throws beyond pi.
+  EXPECT_EQ(west[0], -std::numbers::pi);
+  EXPECT_EQ(east[2], std::numbers::pi);
+  EXPECT_EQ(root.at("boundingVolume").at("region")[0], -std::numbers::pi);
+  EXPECT_EQ(root.at("boundingVolume").at("region")[2], std::numbers::pi);
+}
+
+TEST(Tileset, RootsAcrossTheAntimeridianHaveOneRegionAllTheWayRound) {
+  TilesetDescription tileset = Maui();
+  tileset.roots = {{7, 0, 110}, {7, 255, 110}};
+  const Json json = Json::parse(EncodeTileset(tileset));
+  const Json& region = json.at("root").at("boundingVolume").at("region");
+  EXPECT_EQ(region[0], -std::numbers::pi);
+  EXPECT_EQ(region[2], std::numbers::pi);
+  EXPECT_LT(region[1], region[3]);
+}
+
+TEST(Tileset, GeometricErrorsFallFromTheTopAndFitTerrainClients) {
+  // 16 pixels of it are 2 pixels of the level error that terrain clients assume.
+  EXPECT_DOUBLE_EQ(GeometricError(9), 8 * geo::LevelError(9));
+  for (int level = 0; level < geo::kMaxLevel; ++level) EXPECT_EQ(GeometricError(level + 1), GeometricError(level) / 2);
+  TilesetDescription tileset = Maui();
+  tileset.roots = {{0, 0, 0}, {0, 1, 0}};
+  const Json json = Json::parse(EncodeTileset(tileset));
+  const double top = json.at("geometricError"), root = json.at("root").at("geometricError"),
+               implicit = json.at("root").at("children")[0].at("geometricError");
+  EXPECT_GE(top, root);
+  EXPECT_GT(root, implicit);
+  EXPECT_EQ(implicit, GeometricError(0));
+  // Seen from ten Earth radii, on 1,080 lines of 60 degrees: well above the 16 pixels below which nothing is loaded.
+  EXPECT_GT(top * 1080 / (10 * 6378137.0 * 2 * 0.577), 100);
+}
+
+TEST(Tileset, QueryGoesToTheContentsAlone) {
+  TilesetDescription tileset = Maui();
+  tileset.content_query = "error=5&atleast=1&compression=none";
+  const Json json = Json::parse(EncodeTileset(tileset));
+  const Json& root = json.at("root");
+  EXPECT_EQ(root.at("content").at("uri"), "3dtiles/7-16-78/{level}/{x}/{y}.glb?error=5&atleast=1&compression=none");
+  EXPECT_EQ(root.at("implicitTiling").at("subtrees").at("uri"), "3dtiles/7-16-78/{level}/{x}/{y}.subtree");
+}
+
+TEST(Tileset, CreditIsWhereCesiumLooksAndNoMarkup) {
+  const Json json = Json::parse(EncodeTileset(Maui()));
+  EXPECT_EQ(json.at("asset").at("extras").at("cesium").at("credits").at(0).at("html"),
+            "© a &lt;survey&gt; &amp; \"Co\"");
+  TilesetDescription silent = Maui();
+  silent.attribution.clear();
+  EXPECT_FALSE(Json::parse(EncodeTileset(silent)).at("asset").contains("extras"));
+  silent.attribution = "Universit\xe9";  // Latin-1
+  EXPECT_NO_THROW(Json::parse(EncodeTileset(silent)));
+}
+
+}  // namespace
+}  // namespace terrace::proto

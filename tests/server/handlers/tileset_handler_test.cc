@@ -1,0 +1,141 @@
+#include "server/handlers/tileset_handler.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <nlohmann/json.hpp>
+
+#include "engine/geo/error_ladder.h"
+#include "proto/skirt.h"
+#include "tests/proto/subtree_reader.h"
+
+namespace terrace::server {
+namespace {
+
+using Json = nlohmann::json;
+
+class TilesetHandlerTest : public testing::Test {
+ protected:
+  // 40 x 24 tiles of level 12, all ancestors of them, and both roots: rooted at two tiles of level 7.
+  TilesetHandlerTest() {
+    DatasetView& maui = datasets_[0];
+    maui.name = "maui";
+    maui.attribution = "USGS";
+    maui.min_height_m = 100;
+    maui.max_height_m = 3000;
+    maui.floor_m = -20;
+    maui.available.resize(13);
+    for (int level = 1; level <= 12; ++level) {
+      const int up = 12 - level;
+      maui.available[static_cast<std::size_t>(level)] = {{512 >> up, 1024 >> up, 551 >> up, 1047 >> up}};
+    }
+    maui.available[0] = {{0, 0, 1, 0}};
+    handler_.emplace(datasets_, "max-age=1");
+  }
+  Response Get(const std::string& target, const char* accept_encoding = "") {
+    const Result<Route> route = Match(target);
+    EXPECT_TRUE(route) << target;
+    Request request;
+    request.accept_encoding = accept_encoding;
+    return route->kind == RouteKind::kTileset ? handler_->Handle(*route, request)
+                                              : handler_->HandleSubtree(*route, request);
+  }
+  Json Tileset(const std::string& query = "") { return Json::parse(*Get("/maui/tileset.json" + query).body); }
+
+  std::array<DatasetView, 1> datasets_;
+  std::optional<TilesetHandler> handler_;
+};
+
+TEST_F(TilesetHandlerTest, RootsTheTreesWhereTheDataIs) {
+  const Json root = Tileset().at("root");
+  ASSERT_EQ(root.at("children").size(), 2u);
+  const Json& west = root.at("children")[0];
+  EXPECT_EQ(west.at("content").at("uri"), "3dtiles/7-16-32/{level}/{x}/{y}.glb");
+  EXPECT_EQ(west.at("implicitTiling").at("availableLevels"), 6);
+  EXPECT_EQ(west.at("implicitTiling").at("subtreeLevels"), 6);
+}
+
+TEST_F(TilesetHandlerTest, RegionHoldsDataFloorAndSkirtsOfTheErrorAskedFor) {
+  const auto region = [&](const char* query) {
+    return Tileset(query).at("root").at("children")[0].at("boundingVolume").at("region");
+  };
+  const auto holds = [](const Json& box, double error_m) {
+    EXPECT_LE(box[4], -20 - proto::SkirtDepth(7, error_m)) << error_m;
+    EXPECT_GE(box[4], -20 - proto::SkirtDepth(7, error_m) - error_m / 16) << "not for nothing: " << error_m;
+    EXPECT_GE(box[5], 3000.0);
+  };
+  holds(region(""), geo::DefaultError(7));
+  holds(region("?error=5"), geo::DefaultError(7));  // at least the default is asked for
+  holds(region("?error=1000"), geo::LadderError(7, geo::SnapToLadder(7, 1000)));
+  holds(region("?fraction=0.05"), geo::LadderError(7, geo::SnapToLadder(7, 0.05 * geo::LevelError(7))));
+}
+
+TEST_F(TilesetHandlerTest, WritesWishesIntoTheContentTemplates) {
+  const auto content = [&](const char* query) {
+    return Tileset(query).at("root").at("children")[1].at("content").at("uri").get<std::string>();
+  };
+  EXPECT_EQ(content("?error=5.00"), "3dtiles/7-17-32/{level}/{x}/{y}.glb?error=5&atleast=1");
+  EXPECT_EQ(content("?fraction=.250&compression=none"),
+            "3dtiles/7-17-32/{level}/{x}/{y}.glb?fraction=0.25&compression=none");
+  EXPECT_EQ(content("?compression=meshopt"), "3dtiles/7-17-32/{level}/{x}/{y}.glb?compression=meshopt");
+  EXPECT_EQ(content("?v=1"), "3dtiles/7-17-32/{level}/{x}/{y}.glb");
+}
+
+TEST_F(TilesetHandlerTest, SubtreesHoldExactlyTheTilesOfTheDataset) {
+  for (const char* const root : {"7-16-32", "7-17-32"}) {
+    const Response response = Get(std::string("/maui/3dtiles/") + root + "/0/0/0.subtree");
+    ASSERT_EQ(response.status, 200);
+    EXPECT_EQ(response.cache_control, "max-age=1");
+    const Result<proto::ReadSubtree> read = proto::ParseSubtree(*response.body, 6);
+    ASSERT_TRUE(read) << read.error().message;
+    // Of level 12: 32 columns and 24 rows in the western tree, 8 columns in the eastern one.
+    const bool west = std::string_view(root) == "7-16-32";
+    EXPECT_EQ(std::count(read->tiles.begin() + 341, read->tiles.end(), true), west ? 32 * 24 : 8 * 24) << root;
+    EXPECT_TRUE(read->children_constant && !read->children[0]);
+  }
+}
+
+TEST_F(TilesetHandlerTest, SubtreesGoOnWhereTheFirstOnesEnd) {
+  // From the globe's root: levels 0..5, 6..11 and 12.
+  EXPECT_EQ(Get("/maui/3dtiles/0-0-0/0/0/0.subtree").status, 200);
+  const Response deepest = Get("/maui/3dtiles/0-0-0/12/512/1024.subtree");
+  ASSERT_EQ(deepest.status, 200);
+  const Result<proto::ReadSubtree> read = proto::ParseSubtree(*deepest.body, 6);
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(std::count(read->tiles.begin(), read->tiles.end(), true), 1);
+}
+
+TEST_F(TilesetHandlerTest, IsNotThereWhereNoSubtreeBegins) {
+  for (const char* const target : {"/maui/3dtiles/7-18-32/0/0/0.subtree",  // a root without tiles
+                                   "/maui/3dtiles/7-16-32/1/0/0.subtree",  // within the first subtree
+                                   "/maui/3dtiles/7-16-32/6/0/0.subtree",  // below the deepest level
+                                   "/maui/3dtiles/0-0-0/6/0/0.subtree",    // outside the data
+                                   "/oahu/3dtiles/7-16-32/0/0/0.subtree", "/oahu/tileset.json"}) {
+    EXPECT_EQ(Get(target).status, 404) << target;
+  }
+}
+
+TEST_F(TilesetHandlerTest, TakesTheTilesetsParametersOnSubtreesToo) {
+  const Response plain = Get("/maui/3dtiles/7-16-32/0/0/0.subtree");
+  EXPECT_EQ(*Get("/maui/3dtiles/7-16-32/0/0/0.subtree?error=5&compression=none&v=1").body, *plain.body);
+  EXPECT_EQ(Get("/maui/3dtiles/7-16-32/0/0/0.subtree?colour=red").status, 400);
+}
+
+TEST_F(TilesetHandlerTest, RefusesBadWishes) {
+  for (const char* const query : {"?error=x", "?fraction=-1", "?foo=1", "?compression=zip", "?error=5&error=6",
+                                  "?error=5&fraction=1", "?atleast=1"}) {
+    EXPECT_EQ(Get(std::string("/maui/tileset.json") + query).status, 400) << query;
+  }
+}
+
+TEST_F(TilesetHandlerTest, CompressesOnRequest) {
+  for (const char* const target : {"/maui/tileset.json", "/maui/3dtiles/7-16-32/0/0/0.subtree"}) {
+    const Response plain = Get(target), gzip = Get(target, "gzip");
+    EXPECT_EQ(gzip.coding, Coding::kGzip) << target;
+    EXPECT_NE(gzip.etag, plain.etag) << target;
+    EXPECT_LT(gzip.body->size(), plain.body->size()) << target;
+  }
+}
+
+}  // namespace
+}  // namespace terrace::server
