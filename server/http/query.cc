@@ -56,10 +56,7 @@ Result<void> SetTexture(std::optional<proto::TextureFormat>& to, std::string_vie
                                                                           {"jpeg", proto::TextureFormat::kJpeg},
                                                                           {"webp", proto::TextureFormat::kWebp}};
   for (const auto& [name, texture] : kNames) {
-    if (text != name) continue;
-    if (to && *to != texture) return MakeError(ErrorCode::kInvalidArgument, "texture is given more than once");
-    to = texture;
-    return {};
+    if (text == name) return SetOnce(to, texture, "texture", /*repeatable=*/true);
   }
   return MakeError(ErrorCode::kInvalidArgument, "texture must be jpeg, webp or none");
 }

@@ -204,5 +204,20 @@ TEST(Negotiate, AParentIsAtMostTwiceAsCoarse) {
   }
 }
 
+TEST(Negotiate, GivesATextureOnlyToGlbTilesOfDatasetsWithImagery) {
+  std::array<DatasetView, 2> datasets;
+  datasets[0].name = "bare";
+  datasets[1].name = "photo";
+  datasets[1].texture = proto::TextureFormat::kJpeg;
+  for (DatasetView& dataset : datasets) dataset.available = {{{0, 0, 1, 0}}};
+  const auto texture = [&](const char* target) { return Negotiate(*Match(target), Request(), datasets)->texture; };
+  EXPECT_EQ(texture("/bare/0/0/0.glb"), proto::TextureFormat::kNone);
+  EXPECT_EQ(texture("/bare/0/0/0.glb?texture=webp"), proto::TextureFormat::kNone);
+  EXPECT_EQ(texture("/photo/0/0/0.glb"), proto::TextureFormat::kJpeg);
+  EXPECT_EQ(texture("/photo/0/0/0.glb?texture=webp"), proto::TextureFormat::kWebp);
+  EXPECT_EQ(texture("/photo/0/0/0.glb?texture=none"), proto::TextureFormat::kNone);
+  EXPECT_EQ(texture("/photo/0/0/0.terrain"), proto::TextureFormat::kNone);
+}
+
 }  // namespace
 }  // namespace terrace::server
