@@ -80,7 +80,7 @@ TEST(Query, TakesACompressionWhereItIsOffered) {
   }
   EXPECT_EQ(ParseTileParameters("", true, true)->compression, std::nullopt);
   for (const char* query :
-       {"compression=", "compression=Draco", "compression=gzip", "compression=none&compression=none"}) {
+       {"compression=", "compression=Draco", "compression=gzip", "compression=none&compression=draco"}) {
     EXPECT_FALSE(ParseTileParameters(query, true, true)) << query;
   }
 }
