@@ -60,7 +60,7 @@ struct DatasetConfig {
   Criterion criterion = Criterion::kDelaunay;
   bool compact = false;  // tiles go through the drop pass
   GlbCompression glb_compression = GlbCompression::kDraco;
-  int draco_speed = 5;        // 0 smallest tiles .. 10 fastest
+  int draco_speed = 7;        // 0 smallest tiles .. 10 fastest
   int draco_normal_bits = 8;  // of each of the two coordinates of a normal
   WaterConfig water;
   ImageryConfig imagery;

@@ -44,10 +44,9 @@ double Quality(std::string_view parameters) {
   return 1;
 }
 
-// Draco's and meshopt's bytes are entropy-coded or nearly so already.
+// Draco ends in an entropy coder; meshopt leaves that to the transport.
 bool GzipHelps(const TileRequest& tile) {
-  return tile.format == TileFormat::kQuantizedMesh || tile.compression == proto::GlbCompression::kNone ||
-         tile.compression == proto::GlbCompression::kQuantized;
+  return tile.format == TileFormat::kQuantizedMesh || tile.compression != proto::GlbCompression::kDraco;
 }
 
 }  // namespace

@@ -25,7 +25,7 @@ TEST(ParseConfig, SetsWhatTheTextSaysAndNothingElse) {
     "listen": "[::1]:9000",
     "datasets": [{"name": "maui", "sources": ["maui.tif"], "error_fraction": 0.25, "floor": -12.5, "max_void_gap": 0,
                   "criterion": "data-dependent", "compact": true,
-                  "glb_compression": "quantized", "draco_speed": 7, "draco_normal_bits": 10}],
+                  "glb_compression": "quantized", "draco_speed": 3, "draco_normal_bits": 10}],
     "viewer": false, "cache_control": "no-cache", "io_threads": 1, "worker_threads": 3, "queue_length": 10,
     "cache_bytes": "1GiB", "refinement_cache_bytes": "10 MiB", "max_connections": 64, "request_deadline_s": 1.5, "header_timeout_s": 2,
     "idle_timeout_s": 3, "write_timeout_s": 4, "drain_timeout_s": 0, "log_level": "debug", "log_format": "json"})",
@@ -42,7 +42,7 @@ TEST(ParseConfig, SetsWhatTheTextSaysAndNothingElse) {
   maui.criterion = Criterion::kDataDependent;
   maui.compact = true;
   maui.glb_compression = GlbCompression::kQuantized;
-  maui.draco_speed = 7;
+  maui.draco_speed = 3;
   maui.draco_normal_bits = 10;
   expected.datasets = {maui};
   expected.viewer = {false, {}};

@@ -182,7 +182,7 @@ TEST(Negotiate, GlbTilesAreCanonicalToo) {
   EXPECT_EQ(*tile, *negotiate("/maui/0/1/0.glb?compression=meshopt"));
   EXPECT_FALSE(*tile == *negotiate("/maui/0/1/0.glb?compression=draco"));
   EXPECT_EQ(negotiate("/maui/0/1/0.glb?compression=draco")->coding, Coding::kIdentity);
-  EXPECT_EQ(tile->coding, Coding::kIdentity);
+  EXPECT_EQ(tile->coding, Coding::kGzip);
   EXPECT_EQ(negotiate("/maui/0/1/0.glb?compression=none")->coding, Coding::kGzip);
   EXPECT_EQ(negotiate("/maui/0/1/0.glb?compression=quantized")->coding, Coding::kGzip);
   EXPECT_EQ(negotiate("/maui/0/1/0.glb?compression=zip").error().code, ErrorCode::kInvalidArgument);
