@@ -33,6 +33,12 @@ Json NumberToJson(const std::string& text);
 // "true" and "false" become what they say.
 Json SwitchToJson(const std::string& text);
 
+inline constexpr double kMostHeight = 20'000;  // metres, up and down
+
+bool HasControlCharacter(const std::string& text);
+// For Text: "must be text on one line", or nothing.
+std::string CheckOneLine(const std::string& text);
+
 // A whole number below 2^53, which JSON keeps exactly. 1e3 and 1000.0 are whole.
 std::optional<std::int64_t> WholeNumber(const Json& value);
 // 268435456, "512MB", "1GiB", "64 MiB"

@@ -1,9 +1,8 @@
 #include "config/option_table.h"
 
 #include <algorithm>
-#include <cmath>
-#include <filesystem>
 
+#include "config/layer_options.h"
 #include "config/nearest_name.h"
 #include "config/source_paths.h"
 
@@ -11,16 +10,6 @@ namespace terrace::config {
 namespace {
 
 constexpr std::int64_t kMaxCacheBytes = std::int64_t{1} << 40;
-constexpr double kMostMetres = 20'000;  // of heights, up and down
-
-bool HasControlCharacter(const std::string& text) {
-  return std::any_of(text.begin(), text.end(),
-                     [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; });
-}
-
-std::string CheckAttribution(const std::string& text) {
-  return HasControlCharacter(text) ? "must be text on one line" : "";
-}
 
 // The value goes into a response header as it is: a line break there would let it add headers.
 std::string CheckCacheControl(const std::string& text) {
@@ -92,75 +81,6 @@ Codec<DatasetConfig> Sources() {
             }
           },
           [](const DatasetConfig& dataset) { return Json(dataset.sources); }};
-}
-
-// As a flag: a number is a sea level, everything else the path of a mask.
-Json WaterToJson(const std::string& text) {
-  Json number = NumberToJson(text);
-  if (number.is_number()) return Json{{"sea_level", std::move(number)}};
-  return Json{{"mask", std::filesystem::absolute(text).string()}};
-}
-
-void ReadWater(const Json& value, const Place& place, DatasetConfig& dataset) {
-  const std::size_t keys = value.is_object() ? value.size() : 0;
-  if (keys != 1 || !(value.contains("mask") || value.contains("sea_level"))) {
-    return place.Expected(R"({"mask": "water.tif"} or {"sea_level": 0}, one of both)", value);
-  }
-  if (value.contains("sea_level")) {
-    const Json& level = value["sea_level"];
-    const double metres = level.is_number() ? level.get<double>() : std::nan("");
-    if (!(std::abs(metres) <= kMostMetres)) {
-      return place.At("sea_level").Expected(fmt::format("a number from {} to {}", -kMostMetres, kMostMetres), level);
-    }
-    dataset.water = {"", metres};
-    return;
-  }
-  const Json& mask = value["mask"];
-  if (!mask.is_string() || mask.get_ref<const std::string&>().empty()) {
-    return place.At("mask").Expected("the path of a raster", mask);
-  }
-  dataset.water = {(place.directory() / mask.get<std::string>()).string(), std::nullopt};
-}
-
-Json WriteWater(const DatasetConfig& dataset) {
-  if (dataset.water.sea_level) return Json{{"sea_level", NumberOut(*dataset.water.sea_level)}};
-  return dataset.water.mask.empty() ? Json() : Json{{"mask", dataset.water.mask}};
-}
-
-Codec<DatasetConfig> Water() { return {ReadWater, WriteWater, WaterToJson}; }
-
-Codec<ImageryConfig> ImageryImage() {
-  return {[](const Json& value, const Place& place, ImageryConfig& imagery) {
-            if (!value.is_string() || value.get_ref<const std::string&>().empty()) {
-              return place.Expected("the path of an image", value);
-            }
-            imagery.image = (place.directory() / value.get<std::string>()).string();
-          },
-          [](const ImageryConfig& imagery) { return Json(imagery.image); }, TextToJson};
-}
-
-const std::vector<Option<ImageryConfig>>& ImageryOptionTable() {
-  static const std::vector<Option<ImageryConfig>> table = {
-      {"image", "FILE", "The image", ImageryImage()},
-      {"attribution", "TEXT", "Who to thank for it", Text(&ImageryConfig::attribution, CheckAttribution)},
-      {"texture", "FORMAT", "jpeg, webp or none",
-       Choice(&ImageryConfig::texture, {{"jpeg", Texture::kJpeg}, {"webp", Texture::kWebp}, {"none", Texture::kNone}})},
-      {"size", "PIXELS", "Pixels along the edge of a tile",
-       Choice(&ImageryConfig::size, {{Json(64), 64}, {Json(128), 128}, {Json(256), 256}, {Json(512), 512}, {Json(1024), 1024}})},
-      {"quality", "N", "1 smallest .. 100 best", Integer(&ImageryConfig::quality, 1, 100)},
-  };
-  return table;
-}
-
-Codec<DatasetConfig> Imagery() {
-  return {[](const Json& value, const Place& place, DatasetConfig& dataset) {
-            ReadObject(value, place, ImageryOptionTable(), dataset.imagery);
-            if (value.is_object() && !value.contains("image")) place.Fail("\"image\" is missing: the path of an image");
-          },
-          [](const DatasetConfig& dataset) {
-            return dataset.imagery.image.empty() ? Json() : WriteObject(dataset.imagery, ImageryOptionTable());
-          },
-          [](const std::string& text) { return Json{{"image", std::filesystem::absolute(text).string()}}; }};
 }
 
 Codec<Config> Datasets() {
@@ -235,14 +155,14 @@ const std::vector<Option<DatasetConfig>>& DatasetOptionTable() {
       {"vertical", "DATUM", "What the heights count from; only unknown for now: heights are passed through",
        Vertical()},
       {"attribution", "TEXT", "Who to thank for the data; clients show it",
-       Text(&DatasetConfig::attribution, CheckAttribution)},
+       Text(&DatasetConfig::attribution, CheckOneLine)},
       {"error_fraction", "SHARE", "Default error of a level as a share of the error that clients assume there",
        Number(&DatasetConfig::error_fraction, 0.05, 1)},
       {"finest_error", "METRES",
        "Go as deep as needed for this default error; by default a tenth of the source's spacing",
        Number(&DatasetConfig::finest_error, 0.001, 100'000)},
       {"floor", "METRES", "Height outside the source and in large voids; by default its lowest height",
-       Number(&DatasetConfig::floor, -kMostMetres, kMostMetres)},
+       Number(&DatasetConfig::floor, -kMostHeight, kMostHeight)},
       {"max_void_gap", "SAMPLES", "Voids narrower than this many source samples are filled from their edges",
        Integer(&DatasetConfig::max_void_gap, 0, 100'000)},
       {"criterion", "NAME", "How triangles are joined: delaunay, or data-dependent: smaller tiles, more time to build",
@@ -260,8 +180,8 @@ const std::vector<Option<DatasetConfig>>& DatasetOptionTable() {
        Integer(&DatasetConfig::draco_speed, 0, 10)},
       {"draco_normal_bits", "N", "Bits of each of the two coordinates of a normal in Draco tiles",
        Integer(&DatasetConfig::draco_normal_bits, 4, 16)},
-      {"water", "METRES|FILE", "Water masks: a sea level, or a raster that is not zero on water", Water()},
-      {"imagery", "FILE", "An image that the textures of GLB tiles are cut from", Imagery()},
+      {"water", "METRES|FILE", "Water masks: a sea level, or a raster that is not zero on water", WaterCodec()},
+      {"imagery", "FILE", "An image that the textures of GLB tiles are cut from", ImageryCodec()},
       {"metadata_availability", "LEVELS", "Tiles of every so many levels tell which tiles are below them; 0: none do",
        Integer(&DatasetConfig::metadata_availability, 0, 24)},
   };
@@ -298,7 +218,9 @@ Json WriteObject(const Target& source, const std::vector<Option<Target>>& table)
 
 template void ReadObject(const Json&, const Place&, const std::vector<Option<Config>>&, Config&);
 template void ReadObject(const Json&, const Place&, const std::vector<Option<DatasetConfig>>&, DatasetConfig&);
+template void ReadObject(const Json&, const Place&, const std::vector<Option<ImageryConfig>>&, ImageryConfig&);
 template Json WriteObject(const Config&, const std::vector<Option<Config>>&);
 template Json WriteObject(const DatasetConfig&, const std::vector<Option<DatasetConfig>>&);
+template Json WriteObject(const ImageryConfig&, const std::vector<Option<ImageryConfig>>&);
 
 }  // namespace terrace::config

@@ -29,7 +29,7 @@ struct DatasetView {
   double floor_m = 0;                                       // height where there is no data
   bool has_water = false;                                   // tiles have a water mask
   std::optional<proto::TextureFormat> texture;  // of GLB tiles, for requests that name none; nothing: no imagery
-  int metadata_levels = 0;  // tiles of every so many levels tell what is below them; 0: none
+  int metadata_levels = 0;                      // tiles of every so many levels tell what is below them; 0: none
 
   int max_level() const { return static_cast<int>(available.size()) - 1; }
 };

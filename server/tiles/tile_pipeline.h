@@ -31,7 +31,7 @@ struct WaterRules {
 
 // What textures of GLB tiles are cut from.
 struct ImageryRules {
-  std::unique_ptr<dem::Imagery> image;  // null: none
+  std::unique_ptr<dem::Imagery> image;                         // null: none
   proto::TextureFormat texture = proto::TextureFormat::kJpeg;  // what requests get that name none
   int side = 512;                                              // pixels along a tile's edge, at most
   int quality = 80;                                            // of EncodePicture

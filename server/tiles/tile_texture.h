@@ -10,8 +10,9 @@
 
 namespace terrace::server {
 
-// Cuts the picture of the tile that `request` asks for out of the imagery and puts it into `options`; nothing where none
-// is wanted or the image shows no part of the tile. kUnavailable: the image cannot be read now. kCancelled: stopped.
+// Cuts the picture of the tile that `request` asks for out of the imagery and puts it into `options`; nothing where
+// none is wanted or the image shows no part of the tile. kUnavailable: the image cannot be read now. kCancelled:
+// stopped.
 Result<void> AddTexture(const ImageryRules& imagery, const TileRequest& request, proto::GlbOptions& options,
                         const std::stop_token& stop);
 

@@ -82,7 +82,21 @@ TEST(SetDatasetOption, TellsASeaLevelFromAMask) {
   EXPECT_EQ(dataset.water, (WaterConfig{"/data/water.tif", std::nullopt}));
   EXPECT_THAT(errors, IsEmpty());
   SetDatasetOption("water", "1e9", dataset, errors);
-  EXPECT_THAT(errors, ElementsAre(IsError("--water", "a number from -20000 to 20000")));
+  SetDatasetOption("water", "", dataset, errors);
+  EXPECT_THAT(errors, ElementsAre(IsError("--water", "a number from -20000 to 20000"),
+                                  IsError("--water", "the path of a raster")));
+}
+
+TEST(SetDatasetOption, TakesTheImageOfImageryAlone) {
+  DatasetConfig dataset;
+  std::vector<ConfigError> errors;
+  SetDatasetOption("imagery", "/data/photo.tif", dataset, errors);
+  EXPECT_THAT(errors, IsEmpty());
+  ImageryConfig expected;
+  expected.image = "/data/photo.tif";
+  EXPECT_EQ(dataset.imagery, expected);
+  SetDatasetOption("imagery", "", dataset, errors);
+  EXPECT_THAT(errors, ElementsAre(IsError("--imagery", "the path of an image")));
 }
 
 }  // namespace
