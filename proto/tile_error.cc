@@ -18,10 +18,38 @@ struct Point {
   std::int64_t x = 0, y = 0;
 };
 
-constexpr std::int64_t FloorDiv(std::int64_t a, std::int64_t b) {
-  return a / b - ((a % b != 0 && (a < 0) != (b < 0)) ? 1 : 0);
-}
-constexpr std::int64_t CeilDiv(std::int64_t a, std::int64_t b) { return -FloorDiv(-a, b); }
+constexpr std::int64_t CeilDiv(std::int64_t a, std::int64_t b) { return a >= 0 ? (a + b - 1) / b : -(-a / b); }
+
+// Where an edge a -> b crosses the rows of nodes: the nodes of row y on its left or on it are those with
+//   (b - a) x (p - a) >= 0, that is dx (y - a.y) - dy (x - a.x) >= 0.
+class EdgeRows {
+ public:
+  // `unit`: from one lattice node to the next.
+  EdgeRows(Point a, Point b, std::int64_t unit)
+      : dx_(b.x - a.x), dy_(b.y - a.y), at_zero_(dy_ * a.x - dx_ * a.y), inverse_(InverseOf(std::abs(dy_) * unit)) {}
+
+  // Narrows the columns [first, last] of a row between the triangle's lowest and highest.
+  void Clip(std::int64_t y, std::int64_t& first, std::int64_t& last) const {
+    if (dy_ > 0) last = std::min(last, Floor(y));
+    if (dy_ < 0) first = std::max(first, -Floor(y));
+  }
+
+ private:
+  static double InverseOf(std::int64_t d) { return d == 0 ? 0 : 1 / static_cast<double>(d); }
+
+  // Of n = dx y + dy a.x - dx a.y over d = |dy| unit, exact with one multiplication: n is a double without rounding,
+  // the quotient is below 2^9 in magnitude, so n * (1 / d) is off by less than 2^-42; one that is no integer lies at
+  // least 1 / d > 2^-39 below the next. Adding 2^-41 lifts an integer that was rounded down above itself, and lifts
+  // nothing else over an integer.
+  std::int64_t Floor(std::int64_t y) const {
+    const double quotient = static_cast<double>(dx_ * y + at_zero_) * inverse_ + 0x1p-41;
+    const auto towards_zero = static_cast<std::int64_t>(quotient);
+    return towards_zero - (static_cast<double>(towards_zero) > quotient ? 1 : 0);
+  }
+
+  std::int64_t dx_, dy_, at_zero_;
+  double inverse_;
+};
 
 // A linear function over the tile: value at a corner of the triangle and its two gradients.
 struct Linear {
@@ -99,13 +127,15 @@ class Meter {
       chord[2] = Through(p, twice_area, [&](std::size_t k) { return surface_.ecef[triangle[k]].z; });
     }
     const auto [low, high] = std::minmax({p[0].y, p[1].y, p[2].y});
+    const std::array<EdgeRows, 3> edges = {EdgeRows(p[0], p[1], unit_), EdgeRows(p[1], p[2], unit_),
+                                           EdgeRows(p[2], p[0], unit_)};
     double worst_miss = bound_;
     tin::SamplePosition miss;
     bool missed = false;
     for (std::int64_t j = CeilDiv(low, unit_); j * unit_ <= high; ++j) {
       const std::int64_t y = j * unit_;
       std::int64_t first = 0, last = cells_;
-      for (std::size_t k = 0; k < 3; ++k) ClipRow(p[k], p[(k + 1) % 3], y, first, last);
+      for (const EdgeRows& edge : edges) edge.Clip(y, first, last);
       for (std::int64_t i = first; i <= last; ++i) {
         const double dx = static_cast<double>(i * unit_ - p[0].x), dy = static_cast<double>(y - p[0].y);
         const double error = ErrorAt(plane, chord, static_cast<int>(i), static_cast<int>(j), dx, dy);
@@ -118,19 +148,6 @@ class Meter {
       }
     }
     if (missed) result_.misses.push_back(miss);
-  }
-
-  // Narrows [first, last] to the nodes of row y on the left of the edge a -> b or on it:
-  // (b - a) x (p - a) >= 0, that is dx (y - a.y) - dy (x - a.x) >= 0.
-  void ClipRow(Point a, Point b, std::int64_t y, std::int64_t& first, std::int64_t& last) const {
-    const std::int64_t dx = b.x - a.x, dy = b.y - a.y, reach = dx * (y - a.y) + dy * a.x;
-    if (dy > 0) {
-      last = std::min(last, FloorDiv(reach, dy * unit_));
-    } else if (dy < 0) {
-      first = std::max(first, CeilDiv(-reach, -dy * unit_));
-    } else if (dx * (y - a.y) < 0) {
-      last = first - 1;
-    }
   }
 
   double ErrorAt(const Linear& plane, const std::array<Linear, 3>& chord, int i, int j, double dx, double dy) const {

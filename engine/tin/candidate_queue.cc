@@ -70,33 +70,34 @@ CandidateQueue::CandidateQueue() : threshold_(std::numeric_limits<float>::infini
 
 std::uint32_t CandidateQueue::Winner() {
   do {
-    while (true) {
-      const bool has_run = run_begin_ < run_.size();
-      if (!heap_.empty() && (!has_run || IsBehind()(run_[run_begin_], heap_.front()))) {
-        const Entry& entry = heap_.front();
-        if (OrderOf(entry.slot) == entry.order) return entry.slot;
-        std::pop_heap(heap_.begin(), heap_.end(), IsBehind());
-        heap_.pop_back();
-      } else if (has_run) {
-        const Entry& entry = run_[run_begin_];
-        if (OrderOf(entry.slot) == entry.order) return entry.slot;
-        ++run_begin_;
-      } else {
-        break;
-      }
+    for (; run_begin_ < run_.size(); ++run_begin_) {
+      const Entry& entry = run_[run_begin_];
+      if (OrderOf(entry.slot) == entry.order) return entry.slot;
     }
   } while (Refill());
   return kNoSlot;
 }
 
 bool CandidateQueue::Refill() {
+  if (entered_ > 2 * wanted_) step_ = std::sqrt(step_);
+  if (entered_ < wanted_ / 2) step_ = std::max(step_ * step_, 0.25);
+  // A sweep costs a cycle for every 16 slots or so, an entry one for every few that it is put before.
+  wanted_ = std::max(kLeastWanted, static_cast<std::size_t>(4 * std::sqrt(static_cast<double>(errors_.size()))));
+  entered_ = 0;
+  // What is left lies below the threshold, most often just below.
+  if (SweepFrom(threshold_)) return true;
   const float largest = HWY_DYNAMIC_DISPATCH(Largest)(errors_.data(), errors_.size());
-  if (!(largest > 0)) {
-    threshold_ = std::numeric_limits<float>::denorm_min();
-    return false;
-  }
-  const float finite = std::min(largest, std::numeric_limits<float>::max());
-  threshold_ = std::max(static_cast<float>(finite * step_), std::numeric_limits<float>::denorm_min());
+  if (SweepFrom(std::min(largest, std::numeric_limits<float>::max()))) return true;
+  threshold_ = std::numeric_limits<float>::denorm_min();
+  return false;
+}
+
+// Fills the run with all candidates that are not much smaller than `most`; false if there are none.
+bool CandidateQueue::SweepFrom(float most) {
+  run_.clear();
+  run_begin_ = 0;
+  if (!(most > 0) || std::isinf(most)) return false;
+  threshold_ = std::max(static_cast<float>(most * step_), std::numeric_limits<float>::denorm_min());
   std::vector<hwy::uint128_t> foremost;
   std::array<std::uint32_t, kSwept + 1> found;
   for (std::size_t first = 0; first < errors_.size(); first += kSwept) {
@@ -107,21 +108,41 @@ bool CandidateQueue::Refill() {
       foremost.push_back({slot, OrderOf(slot)});
     }
   }
+  if (foremost.empty()) return false;
   hwy::Sorter()(foremost.data(), foremost.size(), hwy::SortDescending());
-  run_.clear();
-  run_begin_ = 0;
   for (const hwy::uint128_t& entry : foremost) run_.push_back({entry.hi, static_cast<std::uint32_t>(entry.lo)});
-
-  // A sweep costs about one cycle for every 16 slots: worth it for a 256th of them.
-  const std::size_t wanted = std::max<std::size_t>(128, errors_.size() / 64);
-  if (run_.size() > 2 * wanted) step_ = std::sqrt(step_);
-  if (run_.size() < wanted / 2) step_ = std::max(step_ * step_, 0.25);
+  entered_ = run_.size();
   return true;
 }
 
-void CandidateQueue::Push(std::uint32_t slot) {
-  heap_.push_back({OrderOf(slot), slot});
-  std::push_heap(heap_.begin(), heap_.end(), IsBehind());
+void CandidateQueue::Insert(std::uint32_t slot) {
+  const Entry entry{OrderOf(slot), slot};
+  // Behind all that precede it, found without a branch.
+  std::size_t first = run_begin_, length = run_.size() - run_begin_;
+  while (length > 0) {
+    const std::size_t half = (length + 1) / 2;
+    first += run_[first + half - 1].order > entry.order ? half : 0;
+    length -= half;
+  }
+  if (run_begin_ > 0 && first - run_begin_ < run_.size() - first) {
+    std::copy(run_.begin() + run_begin_, run_.begin() + first, run_.begin() + run_begin_ - 1);
+    --run_begin_;
+    run_[first - 1] = entry;
+  } else {
+    run_.insert(run_.begin() + first, entry);
+  }
+  ++entered_;
+  if (run_.size() - run_begin_ > 4 * wanted_) Shorten();
+}
+
+// Lets go of the hindmost half. Equal errors go or stay together: the threshold tells them apart from others only.
+void CandidateQueue::Shorten() {
+  const auto error_of = [](const Entry& entry) { return static_cast<std::uint32_t>(entry.order >> 32); };
+  std::size_t end = run_begin_ + 2 * wanted_;
+  while (end < run_.size() && error_of(run_[end]) == error_of(run_[end - 1])) ++end;
+  if (end == run_.size()) return;
+  run_.resize(end);
+  threshold_ = std::bit_cast<float>(error_of(run_[end - 1]));
 }
 
 void CandidateQueue::Grow(std::size_t slots) {

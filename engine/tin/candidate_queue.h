@@ -1,10 +1,11 @@
 // The queue of greedy insertion: one candidate per triangle slot, and which one comes first.
 //
 // Most candidates are replaced before their turn comes, so only the foremost are kept in order: those at or above a
-// threshold. One sweep over all errors finds and sorts them; what comes to the threshold later goes into a heap beside
-// them. What stays below costs one store, and an entry whose slot has changed since is dropped when its turn comes.
-// When none is left, the next sweep lowers the threshold. No back pointers from the slots, and the order is exact:
-// larger error first, then smaller index of the sample.
+// threshold, in a short sorted array, the run. One sweep over all errors finds and sorts them; what comes to the
+// threshold later is put where it belongs. What stays below costs one store, and an entry whose slot has changed since
+// is dropped when its turn comes. When none is left, the next sweep lowers the threshold; when there are too many, the
+// threshold rises. No back pointers from the slots, and the order is exact: larger error first, then smaller index of
+// the sample.
 //
 // Errors are kept as floats, rounded up: the largest is never understated, and errors that differ by less are ordered
 // by their samples.
@@ -31,7 +32,7 @@ class CandidateQueue {
     const float error = RoundUp(candidate.error);
     errors_[slot] = error;
     samples_[slot] = candidate.sample;
-    if (error >= threshold_) Push(slot);
+    if (error >= threshold_) Insert(slot);
   }
 
   // The slot whose candidate precedes all others; kNoSlot when there is no candidate at all.
@@ -46,33 +47,34 @@ class CandidateQueue {
   // The smallest float that is not below a non-negative error.
   static float RoundUp(double error) {
     const auto nearest = static_cast<float>(error);
-    if (static_cast<double>(nearest) >= error) return nearest;
-    return std::bit_cast<float>(std::bit_cast<std::uint32_t>(nearest) + 1);
+    const std::uint32_t above = static_cast<double>(nearest) < error ? 1 : 0;  // added: a branch would be a coin toss
+    return std::bit_cast<float>(std::bit_cast<std::uint32_t>(nearest) + above);
   }
 
  private:
+  static constexpr std::size_t kLeastWanted = 128;
+
   struct Entry {
     std::uint64_t order;  // non-negative floats compare like their bits: those, then the complement of the sample
     std::uint32_t slot;
   };
-  struct IsBehind {
-    bool operator()(const Entry& a, const Entry& b) const { return a.order < b.order; }
-  };
-
   void Grow(std::size_t slots);
-  void Push(std::uint32_t slot);
+  void Insert(std::uint32_t slot);
   bool Refill();
+  bool SweepFrom(float most);
+  void Shorten();
   std::uint64_t OrderOf(std::uint32_t slot) const {
     return std::uint64_t{std::bit_cast<std::uint32_t>(errors_[slot])} << 32 | ~samples_[slot];
   }
 
   std::vector<float> errors_;           // by slot; 0: no candidate
   std::vector<std::uint32_t> samples_;  // by slot
-  float threshold_;                     // every current candidate at or above it is in the run or in the heap
+  float threshold_;                     // every current candidate at or above it is in the run
   double step_ = 0.9;                   // the next threshold as a fraction of the largest error
-  std::vector<Entry> run_;              // found by the last sweep, foremost first
+  std::vector<Entry> run_;              // foremost first, from run_begin_ on
   std::size_t run_begin_ = 0;
-  std::vector<Entry> heap_;  // later ones
+  std::size_t wanted_ = kLeastWanted;  // entries between two sweeps
+  std::size_t entered_ = 0;            // since the last one
 };
 
 }  // namespace terrace::tin

@@ -1,7 +1,6 @@
 // The samples of a field that may still become vertices inside it: what triangles are scanned for.
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <limits>
 #include <vector>
@@ -16,18 +15,9 @@ namespace terrace::tin {
 class OpenSamples {
  public:
   // What may be read beyond the last row: a scan loads whole vectors, and small boxes whole.
-  static constexpr std::size_t kPaddingRows = 4, kPadding = 16;
+  static constexpr std::size_t kPaddingRows = 8, kPadding = 16;
 
-  explicit OpenSamples(const HeightField& field)
-      : width_(field.width()), stride_(static_cast<std::size_t>(field.width())) {
-    const float none = std::numeric_limits<float>::quiet_NaN();
-    const auto rows = static_cast<std::size_t>(field.height());
-    heights_.assign(stride_ * (rows + kPaddingRows) + kPadding, none);
-    for (std::size_t y = 1; y + 1 < rows; ++y) {
-      const float* row = field.Row(static_cast<int>(y));
-      std::copy(row + 1, row + stride_ - 1, heights_.begin() + static_cast<std::ptrdiff_t>(y * stride_ + 1));
-    }
-  }
+  explicit OpenSamples(const HeightField& field);
 
   void Close(SamplePosition sample) {
     heights_[sample.y * stride_ + sample.x] = std::numeric_limits<float>::quiet_NaN();
@@ -36,6 +26,10 @@ class OpenSamples {
   // NaN where not open.
   float At(SamplePosition sample) const { return heights_[sample.y * stride_ + sample.x]; }
 
+  // A power of two that all heights of the field are multiples of, metres; 0 if none is known. Sums and products by
+  // integers are exact in single precision as long as they stay below 2^24 of it.
+  float quantum() const { return quantum_; }
+
   int width() const { return width_; }
   const float* Row(int y) const { return heights_.data() + static_cast<std::size_t>(y) * stride_; }
 
@@ -43,6 +37,7 @@ class OpenSamples {
   int width_;
   std::size_t stride_;
   std::vector<float> heights_;
+  float quantum_;
 };
 
 }  // namespace terrace::tin

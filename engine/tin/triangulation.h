@@ -90,8 +90,11 @@ class Triangulation {
     return is_wide_ ? wide_.slots[edge / 4].twin(edge % 4) : narrow_.slots[edge / 4].twin(edge % 4);
   }
 
-  static constexpr HalfEdgeId Next(HalfEdgeId edge) { return edge % 4 == 2 ? edge - 2 : edge + 1; }
-  static constexpr HalfEdgeId Previous(HalfEdgeId edge) { return edge % 4 == 0 ? edge + 2 : edge - 1; }
+  // 0 -> 1 -> 2 -> 0 from tables of two bits each: a comparison would be a branch that cannot be foretold.
+  static constexpr HalfEdgeId Next(HalfEdgeId edge) { return (edge & ~HalfEdgeId{3}) + NextCorner(edge % 4); }
+  static constexpr HalfEdgeId Previous(HalfEdgeId edge) { return (edge & ~HalfEdgeId{3}) + PreviousCorner(edge % 4); }
+  static constexpr unsigned NextCorner(unsigned i) { return (0b001001U >> (2 * i)) & 3; }
+  static constexpr unsigned PreviousCorner(unsigned i) { return (0b010010U >> (2 * i)) & 3; }
 
  private:
   // An edge of the outline that has not been looked across yet; it starts where the one before it ends.
@@ -190,7 +193,7 @@ void Triangulation::Replace(Triangles& triangles, SamplePosition point, Triangle
     const HalfEdgeId back = edge.back;
     if (back != kNone) {
       const auto& beyond = slots[back / 4];
-      const unsigned next = Next(back) % 4, previous = Previous(back) % 4;
+      const unsigned next = NextCorner(back % 4), previous = PreviousCorner(back % 4);
       const RingVertex w = Relative(vertices, beyond.corner(previous), point);
       if (absorbs(u, edge.end, w, back)) {
         if (edges + pending + 3 > capacity) {

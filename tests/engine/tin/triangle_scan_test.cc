@@ -63,6 +63,16 @@ SamplePosition RandomSample(Random& random, const HeightField& field) {
           static_cast<std::uint16_t>(random.Below(field.height()))};
 }
 
+// Multiples of a quantum, from so few of them that single precision is exact to so many that it never is: all that lies
+// between is a triangle's own matter.
+HeightField RoundedField(int width, int height, int kind, std::uint64_t seed) {
+  const float quantum = kind % 3 == 0 ? 1.0F : kind % 3 == 1 ? 0x1p-10F : 0x1p-14F;
+  const double most = quantum * std::ldexp(1.0, 4 + kind / 3 % 20);
+  Random random(seed);
+  return MakeField(width, height,
+                   [&](int, int) { return static_cast<float>(std::floor(random.Unit() * most / quantum)) * quantum; });
+}
+
 // Every set of instructions that this processor has and that was compiled.
 std::vector<std::int64_t> Targets() {
   std::vector<std::int64_t> targets;
@@ -73,6 +83,7 @@ std::vector<std::int64_t> Targets() {
 void ExpectReference(const HeightField& field, const OpenSamples& samples, const Star& star) {
   for (const std::int64_t target : Targets()) {
     hwy::SetSupportedTargetsForTest(target);
+    hwy::GetChosenTarget().DeInit();  // chosen anew
     std::vector<PlaneMisfit> misfits(star.count);
     BestStarScan()(samples, star, misfits.data());
     for (std::size_t i = 0; i < star.count; ++i) {
@@ -82,6 +93,7 @@ void ExpectReference(const HeightField& field, const OpenSamples& samples, const
     }
   }
   hwy::SetSupportedTargetsForTest(0);
+  hwy::GetChosenTarget().DeInit();
 }
 
 TEST(TriangleScan, EqualsTheFormulaOnEveryTargetBitForBit) {
@@ -91,7 +103,9 @@ TEST(TriangleScan, EqualsTheFormulaOnEveryTargetBitForBit) {
     const int side = 3 + random.Below(i % 3 == 0 ? 80 : 12);
     const int width = side + random.Below(side), height = side + random.Below(side);
     const auto seed = static_cast<std::uint64_t>(i);
-    const HeightField field = i % 2 == 0 ? StepField(width, height, 3, seed) : NoiseField(width, height, seed);
+    const HeightField field = i % 2 == 0   ? StepField(width, height, 3, seed)
+                              : i % 4 == 1 ? NoiseField(width, height, seed)
+                                           : RoundedField(width, height, i, seed);
     OpenSamples samples(field);
     for (int k = random.Below(width * height / 4); k > 0; --k) samples.Close(RandomSample(random, field));
     const SamplePosition p = RandomSample(random, field), u = RandomSample(random, field),
@@ -101,6 +115,20 @@ TEST(TriangleScan, EqualsTheFormulaOnEveryTargetBitForBit) {
     ExpectReference(field, samples, *TestStar(field, p, {u, v}));
     if (HasFatalFailure()) return;
   }
+}
+
+TEST(OpenSamples, FindsTheQuantumOfTheHeights) {
+  const auto quantum_of = [](float unit, float odd) {
+    return OpenSamples(MakeField(9, 7, [&](int x, int y) { return x == 4 && y == 3 ? odd : unit * (x * 7 - y); }))
+        .quantum();
+  };
+  EXPECT_EQ(quantum_of(1, 5), 1);
+  EXPECT_EQ(quantum_of(1, std::numeric_limits<float>::quiet_NaN()), 1);
+  EXPECT_EQ(quantum_of(1, 0.5F), 0x1p-10F);
+  EXPECT_EQ(quantum_of(0x1p-10F, 8848), 0x1p-10F);
+  EXPECT_EQ(quantum_of(0x1p-14F, 1), 0x1p-14F);
+  EXPECT_EQ(quantum_of(1, 0.1F), 0);
+  EXPECT_EQ(quantum_of(1, 1e30F), 0);
 }
 
 TEST(TriangleScan, ScansStarsOfAnySize) {

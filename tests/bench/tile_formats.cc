@@ -1,0 +1,144 @@
+// terrace_tile_formats: what a tile costs in every format and coding, in CPU time of one core and in bytes. The whole
+// pipeline runs, over a block of tiles in the middle of a level: docs/formats/glb.md has the results.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <iostream>
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "engine/dem/dem_source.h"
+#include "server/tiles/tile_pipeline.h"
+#include "tests/bench/cpu_clock.h"
+#include "tests/bench/table.h"
+
+namespace terrace::bench {
+namespace {
+
+using proto::GlbCompression;
+using server::Coding;
+using server::TileFormat;
+
+struct Arguments {
+  std::string dem;
+  int level = 0, step = 0, tiles = 24, runs = 3;
+};
+
+struct Variant {
+  std::string name;
+  TileFormat format = TileFormat::kGlb;
+  GlbCompression compression = GlbCompression::kDraco;
+  Coding coding = Coding::kIdentity;
+  proto::DracoOptions draco = {};
+};
+
+std::vector<Variant> Variants() {
+  std::vector<Variant> variants;
+  const auto both = [&](Variant variant) {
+    variants.push_back(variant);
+    variant.name += ", gzip";
+    variant.coding = Coding::kGzip;
+    variants.push_back(variant);
+  };
+  both({"quantized-mesh with normals", TileFormat::kQuantizedMesh});
+  both({"draco"});
+  for (const int speed : {0, 3, 5, 10}) {
+    variants.push_back({.name = fmt::format("draco, speed {}", speed), .draco = {.speed = speed}});
+  }
+  both({.name = "meshopt", .compression = GlbCompression::kMeshopt});
+  both({.name = "quantized", .compression = GlbCompression::kQuantized});
+  both({.name = "none", .compression = GlbCompression::kNone});
+  return variants;
+}
+
+// The first tiles of the level's first block that do not lie on its rim.
+std::vector<geo::TileKey> TilesOf(const dem::DemSource& source, const Arguments& arguments) {
+  const geo::TileRange& range = source.Available(arguments.level).front();
+  std::vector<geo::TileKey> keys;
+  for (std::int64_t y = range.start_y + 1; y < range.end_y; ++y) {
+    for (std::int64_t x = range.start_x + 1; x < range.end_x; ++x) {
+      if (keys.size() < static_cast<std::size_t>(arguments.tiles)) keys.push_back({arguments.level, x, y});
+    }
+  }
+  return keys;
+}
+
+struct Cost {
+  double cold_s = std::numeric_limits<double>::infinity(), warm_s = cold_s;  // of a tile, the best run's mean
+  double bytes = 0, vertices = 0;                                            // of a tile
+};
+
+// A build of all tiles without what they are made from, and one with it.
+Result<Cost> Measure(const Variant& variant, const Arguments& arguments) {
+  Cost cost;
+  for (int run = 0; run < arguments.runs; ++run) {
+    auto source = dem::DemSource::Open(arguments.dem);
+    if (!source) return tl::unexpected(source.error());
+    const std::vector<geo::TileKey> keys = TilesOf(**source, arguments);
+    if (keys.empty()) return MakeError(ErrorCode::kInvalidArgument, "no tiles inside level {}", arguments.level);
+    std::vector<server::Dataset> datasets(1);
+    datasets[0].source = *std::move(source);
+    datasets[0].glb.draco = variant.draco;
+    const server::TilePipeline pipeline(std::move(datasets), std::size_t{1} << 30);
+    const auto count = static_cast<double>(keys.size());
+    for (double* const best : {&cost.cold_s, &cost.warm_s}) {
+      cost.bytes = cost.vertices = 0;
+      const double start = ThreadSeconds();
+      for (const geo::TileKey& key : keys) {
+        server::TileRequest request;
+        request.key = key;
+        request.error_step = arguments.step;
+        request.format = variant.format;
+        request.compression = variant.compression;
+        request.coding = variant.coding;
+        request.normals = variant.format == TileFormat::kQuantizedMesh;
+        const Result<server::EncodedTile> tile = pipeline.Build(request, {});
+        if (!tile) return tl::unexpected(tile.error());
+        cost.bytes += static_cast<double>(tile->bytes.size()) / count;
+        cost.vertices += tile->vertices / count;
+      }
+      *best = std::min(*best, (ThreadSeconds() - start) / count);
+    }
+  }
+  return cost;
+}
+
+Result<void> Run(const Arguments& arguments) {
+  Table table("tile_formats",
+              fmt::format("Tiles of {}, level {}, ladder step {}", arguments.dem, arguments.level, arguments.step),
+              {"format", "bytes", "vertices", "cold, ms", "warm, ms", "warm, of the first"});
+  double baseline_s = 0;
+  for (const Variant& variant : Variants()) {
+    const Result<Cost> cost = Measure(variant, arguments);
+    if (!cost) return tl::unexpected(cost.error());
+    if (baseline_s == 0) baseline_s = cost->warm_s;
+    table.Add({variant.name, Count(static_cast<std::size_t>(cost->bytes)),
+               Count(static_cast<std::size_t>(cost->vertices)), Milliseconds(cost->cold_s), Milliseconds(cost->warm_s),
+               Ratio(cost->warm_s / baseline_s)});
+  }
+  table.Print(std::cout);
+  return {};
+}
+
+}  // namespace
+}  // namespace terrace::bench
+
+int main(int argc, char** argv) {
+  terrace::bench::Arguments arguments;
+  CLI::App app("Measures the cost of a tile in every format: cold, and with its refinement in the cache");
+  app.add_option("dem", arguments.dem, "A raster")->required()->check(CLI::ExistingFile);
+  app.add_option("--level", arguments.level, "Level of the tiles")->required()->check(CLI::Range(0, 24));
+  app.add_option("--step", arguments.step, "Ladder step of the error, from -16 (coarse) to 24")
+      ->check(CLI::Range(-16, 24));
+  app.add_option("--tiles", arguments.tiles, "How many tiles, at most")->check(CLI::PositiveNumber);
+  app.add_option("--runs", arguments.runs, "Runs; the fastest counts")->check(CLI::PositiveNumber);
+  CLI11_PARSE(app, argc, argv);
+  const terrace::Result<void> done = terrace::bench::Run(arguments);
+  if (done) return 0;
+  std::fprintf(stderr, "terrace_tile_formats: %s\n", done.error().message.c_str());
+  return 1;
+}
