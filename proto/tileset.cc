@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "engine/core/check.h"
 #include "engine/geo/ellipsoid.h"
@@ -43,21 +45,54 @@ Json ImplicitRoot(const TilesetDescription& tileset, const geo::TileKey& root) {
   return json;
 }
 
-// Columns 0 and the last one next to each other lie across the antimeridian. Their region goes all the way round: not
-// every client reads a region whose west is greater than its east.
+// Columns counted eastwards from the far side of the widest gap between roots: `end_x` may lie beyond the level's last
+// column, across the antimeridian.
 geo::TileRange BlockOf(const std::vector<geo::TileKey>& roots) {
-  geo::TileRange block{roots[0].x, roots[0].y, roots[0].x, roots[0].y};
+  const std::int64_t columns = geo::TileColumns(roots.front().level);
+  std::set<std::int64_t> used;
+  geo::TileRange block{0, roots.front().y, 0, roots.front().y};
   for (const geo::TileKey& root : roots) {
-    block = {std::min(block.start_x, root.x), std::min(block.start_y, root.y), std::max(block.end_x, root.x),
-             std::max(block.end_y, root.y)};
+    used.insert(root.x);
+    block.start_y = std::min(block.start_y, root.y);
+    block.end_y = std::max(block.end_y, root.y);
   }
+  std::int64_t widest = *used.begin() + columns - *used.rbegin();  // from the last root around to the first
+  block.start_x = *used.begin();
+  for (auto west = used.begin(), east = std::next(west); east != used.end(); ++west, ++east) {
+    if (*east - *west <= widest) continue;
+    widest = *east - *west;
+    block.start_x = *east;
+  }
+  block.end_x = block.start_x + columns - widest;
   return block;
+}
+
+// About the middle of the block, as far as half its width and half its height along the ground, and its whole range of
+// heights, take one together.
+Json Sphere(const TilesetDescription& tileset, const geo::TileRange& block) {
+  const double tile = std::ldexp(180, -tileset.roots.front().level);
+  const double width = static_cast<double>(block.end_x + 1 - block.start_x) * tile;
+  const double south = -90 + static_cast<double>(block.start_y) * tile;
+  const double north = -90 + static_cast<double>(block.end_y + 1) * tile;
+  const double longitude = -180 + static_cast<double>(block.start_x) * tile + width / 2;
+  const geo::Vec3 middle = geo::ToEcef(longitude, (south + north) / 2, tileset.min_height_m);
+  constexpr double kLargestRadius = geo::kSemiMajorAxis * geo::kSemiMajorAxis / geo::kSemiMinorAxis;
+  const double along = kLargestRadius * geo::ToRadians(width / 2 + (north - south) / 2);
+  return {{"sphere", {middle.x, middle.y, middle.z, along + tileset.max_height_m - tileset.min_height_m}}};
+}
+
+// 3DTilesRendererJS reads a region whose west is greater than its east as lying on the other side of the Earth, and
+// CesiumJS none that goes beyond 180 degrees; a region all the way round would have clients frame the whole Earth.
+Json BoundsOf(const TilesetDescription& tileset) {
+  const geo::TileRange block = BlockOf(tileset.roots);
+  const bool crosses = block.end_x >= geo::TileColumns(tileset.roots.front().level);
+  return crosses ? Sphere(tileset, block) : Region(tileset, block);
 }
 
 Json Root(const TilesetDescription& tileset) {
   if (tileset.roots.size() == 1) return ImplicitRoot(tileset, tileset.roots[0]);
   Json json;
-  json["boundingVolume"] = Region(tileset, BlockOf(tileset.roots));
+  json["boundingVolume"] = BoundsOf(tileset);
   json["geometricError"] = kNothingDrawn;
   json["refine"] = "REPLACE";
   json["children"] = Json::array();
