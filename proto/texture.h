@@ -13,7 +13,7 @@ namespace terrace::proto {
 enum class TextureFormat : std::uint8_t {
   kNone,  // no texture
   kJpeg,  // baseline, which every glTF client reads
-  kWebp,  // lossy; about a quarter smaller for EXT_texture_webp's readers
+  kWebp,  // lossy; smaller at the same quality number, for readers of EXT_texture_webp
 };
 
 // "image/jpeg", "image/webp". Precondition: not kNone.
