@@ -25,6 +25,29 @@ enum class GlbCompression : std::uint8_t { kDraco, kNone, kQuantized, kMeshopt }
 enum class LogLevel : std::uint8_t { kDebug, kInfo, kWarn, kError, kOff };
 enum class LogFormat : std::uint8_t { kText, kJson };
 
+// Where the water of a dataset's water mask comes from: one of both, or neither.
+struct WaterConfig {
+  std::string mask;                 // a raster that is not zero on water; empty: none
+  std::optional<double> sea_level;  // metres in what the source counts from; heights at or below it are water
+
+  bool any() const { return !mask.empty() || sea_level.has_value(); }
+  friend bool operator==(const WaterConfig&, const WaterConfig&) = default;
+};
+
+// How textures are written: proto::TextureFormat, which this room does not know.
+enum class Texture : std::uint8_t { kNone, kJpeg, kWebp };
+
+// The image that textures of GLB tiles are cut from.
+struct ImageryConfig {
+  std::string image;  // empty: none
+  std::string attribution;
+  Texture texture = Texture::kJpeg;  // of tiles whose requests name none
+  int size = 512;                    // pixels along the edge of a tile, at most
+  int quality = 80;
+
+  friend bool operator==(const ImageryConfig&, const ImageryConfig&) = default;
+};
+
 struct DatasetConfig {
   std::string name;                  // the first part of its URLs: [A-Za-z0-9._-]{1,64}
   std::vector<std::string> sources;  // files, after globs are expanded; exactly one for now
@@ -39,6 +62,9 @@ struct DatasetConfig {
   GlbCompression glb_compression = GlbCompression::kDraco;
   int draco_speed = 7;        // 0 smallest tiles .. 10 fastest
   int draco_normal_bits = 8;  // of each of the two coordinates of a normal
+  WaterConfig water;
+  ImageryConfig imagery;
+  int metadata_availability = 0;  // levels; tiles of every so many tell what is below them, 0: none
 
   friend bool operator==(const DatasetConfig&, const DatasetConfig&) = default;
 };

@@ -1,5 +1,6 @@
 #include "config/option_codec.h"
 
+#include <algorithm>
 #include <array>
 #include <string_view>
 
@@ -35,6 +36,15 @@ Json SwitchToJson(const std::string& text) {
   if (text == "true") return true;
   if (text == "false") return false;
   return text;
+}
+
+bool HasControlCharacter(const std::string& text) {
+  return std::any_of(text.begin(), text.end(),
+                     [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; });
+}
+
+std::string CheckOneLine(const std::string& text) {
+  return HasControlCharacter(text) ? "must be text on one line" : "";
 }
 
 std::optional<std::int64_t> WholeNumber(const Json& value) {

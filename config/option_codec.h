@@ -33,6 +33,12 @@ Json NumberToJson(const std::string& text);
 // "true" and "false" become what they say.
 Json SwitchToJson(const std::string& text);
 
+inline constexpr double kMostHeight = 20'000;  // metres, up and down
+
+bool HasControlCharacter(const std::string& text);
+// For Text: "must be text on one line", or nothing.
+std::string CheckOneLine(const std::string& text);
+
 // A whole number below 2^53, which JSON keeps exactly. 1e3 and 1000.0 are whole.
 std::optional<std::int64_t> WholeNumber(const Json& value);
 // 268435456, "512MB", "1GiB", "64 MiB"
@@ -104,23 +110,23 @@ Codec<Target> Seconds(std::chrono::milliseconds Target::*member, double min, dou
           NumberToJson};
 }
 
-// One of a few words.
+// One of a few words or numbers.
 template <typename Target, typename Member>
-Codec<Target> Choice(Member Target::*member, std::vector<std::pair<std::string, Member>> words) {
+Codec<Target> Choice(Member Target::*member, std::vector<std::pair<Json, Member>> words) {
   return {[=](const Json& value, const Place& place, Target& target) {
             std::string allowed;
             for (const auto& [word, meaning] : words) {
-              if (value == Json(word)) {
+              if (value == word) {
                 target.*member = meaning;
                 return;
               }
-              allowed += (allowed.empty() ? "\"" : " or \"") + word + "\"";
+              allowed += (allowed.empty() ? "" : " or ") + word.dump();
             }
             place.Expected(allowed, value);
           },
           [=](const Target& target) {
             for (const auto& [word, meaning] : words) {
-              if (meaning == target.*member) return Json(word);
+              if (meaning == target.*member) return word;
             }
             return Json();
           },

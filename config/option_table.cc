@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "config/layer_options.h"
 #include "config/nearest_name.h"
 #include "config/source_paths.h"
 
@@ -9,15 +10,6 @@ namespace terrace::config {
 namespace {
 
 constexpr std::int64_t kMaxCacheBytes = std::int64_t{1} << 40;
-
-bool HasControlCharacter(const std::string& text) {
-  return std::any_of(text.begin(), text.end(),
-                     [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; });
-}
-
-std::string CheckAttribution(const std::string& text) {
-  return HasControlCharacter(text) ? "must be text on one line" : "";
-}
 
 // The value goes into a response header as it is: a line break there would let it add headers.
 std::string CheckCacheControl(const std::string& text) {
@@ -163,14 +155,14 @@ const std::vector<Option<DatasetConfig>>& DatasetOptionTable() {
       {"vertical", "DATUM", "What the heights count from; only unknown for now: heights are passed through",
        Vertical()},
       {"attribution", "TEXT", "Who to thank for the data; clients show it",
-       Text(&DatasetConfig::attribution, CheckAttribution)},
+       Text(&DatasetConfig::attribution, CheckOneLine)},
       {"error_fraction", "SHARE", "Default error of a level as a share of the error that clients assume there",
        Number(&DatasetConfig::error_fraction, 0.05, 1)},
       {"finest_error", "METRES",
        "Go as deep as needed for this default error; by default a tenth of the source's spacing",
        Number(&DatasetConfig::finest_error, 0.001, 100'000)},
       {"floor", "METRES", "Height outside the source and in large voids; by default its lowest height",
-       Number(&DatasetConfig::floor, -20'000, 20'000)},
+       Number(&DatasetConfig::floor, -kMostHeight, kMostHeight)},
       {"max_void_gap", "SAMPLES", "Voids narrower than this many source samples are filled from their edges",
        Integer(&DatasetConfig::max_void_gap, 0, 100'000)},
       {"criterion", "NAME", "How triangles are joined: delaunay, or data-dependent: smaller tiles, more time to build",
@@ -188,6 +180,10 @@ const std::vector<Option<DatasetConfig>>& DatasetOptionTable() {
        Integer(&DatasetConfig::draco_speed, 0, 10)},
       {"draco_normal_bits", "N", "Bits of each of the two coordinates of a normal in Draco tiles",
        Integer(&DatasetConfig::draco_normal_bits, 4, 16)},
+      {"water", "METRES|FILE", "Water masks: a sea level, or a raster that is not zero on water", WaterCodec()},
+      {"imagery", "FILE", "An image that the textures of GLB tiles are cut from", ImageryCodec()},
+      {"metadata_availability", "LEVELS", "Tiles of every so many levels tell which tiles are below them; 0: none do",
+       Integer(&DatasetConfig::metadata_availability, 0, 24)},
   };
   return table;
 }
@@ -222,7 +218,9 @@ Json WriteObject(const Target& source, const std::vector<Option<Target>>& table)
 
 template void ReadObject(const Json&, const Place&, const std::vector<Option<Config>>&, Config&);
 template void ReadObject(const Json&, const Place&, const std::vector<Option<DatasetConfig>>&, DatasetConfig&);
+template void ReadObject(const Json&, const Place&, const std::vector<Option<ImageryConfig>>&, ImageryConfig&);
 template Json WriteObject(const Config&, const std::vector<Option<Config>>&);
 template Json WriteObject(const DatasetConfig&, const std::vector<Option<DatasetConfig>>&);
+template Json WriteObject(const ImageryConfig&, const std::vector<Option<ImageryConfig>>&);
 
 }  // namespace terrace::config

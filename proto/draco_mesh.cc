@@ -48,9 +48,10 @@ Quantization QuantizationOf(const GridMesh& mesh) {
   return quantization;
 }
 
-int AddAttribute(draco::Mesh& mesh, draco::GeometryAttribute::Type type, std::size_t count) {
+int AddAttribute(draco::Mesh& mesh, draco::GeometryAttribute::Type type, std::size_t count, int components = 3) {
   draco::GeometryAttribute attribute;
-  attribute.Init(type, nullptr, 3, draco::DT_FLOAT32, false, 3 * sizeof(float), 0);
+  attribute.Init(type, nullptr, static_cast<std::int8_t>(components), draco::DT_FLOAT32, false,
+                 components * static_cast<std::int64_t>(sizeof(float)), 0);
   return mesh.AddAttribute(attribute, /*identity_mapping=*/true,
                            static_cast<draco::AttributeValueIndex::ValueType>(count));
 }
@@ -82,6 +83,20 @@ std::unique_ptr<draco::Mesh> ToDraco(const GridMesh& grid, int& position_attribu
   return mesh;
 }
 
+// Of each texture coordinate. A 4095th of the picture's edge is an eighth of a pixel of 512.
+constexpr int kUvBits = 12;
+
+int AddTextureCoordinates(const GridMesh& grid, draco::Mesh& mesh) {
+  const int id = AddAttribute(mesh, draco::GeometryAttribute::TEX_COORD, grid.uv.size(), 2);
+  draco::PointAttribute* const coordinates = mesh.attribute(id);
+  for (std::uint32_t k = 0; k < grid.uv.size(); ++k) {
+    const auto cells = static_cast<float>(grid.cells);
+    const std::array<float, 2> uv{static_cast<float>(grid.uv[k][0]) / cells, static_cast<float>(grid.uv[k][1]) / cells};
+    coordinates->SetAttributeValue(draco::AttributeValueIndex(k), uv.data());
+  }
+  return id;
+}
+
 std::uint64_t Mix(std::uint64_t value) {
   value = (value ^ (value >> 30)) * 0xbf58476d1ce4e5b9;
   value = (value ^ (value >> 27)) * 0x94d049bb133111eb;
@@ -92,6 +107,8 @@ std::uint64_t HashOf(const Position& p) {
   const auto bits = [&](std::size_t axis) { return static_cast<std::uint64_t>(static_cast<std::uint32_t>(p[axis])); };
   return Mix(Mix(bits(0) << 32 | bits(1)) ^ (bits(2) + 0x9e3779b97f4a7c15));
 }
+
+std::uint64_t HashOf(const std::array<std::uint16_t, 2>& uv) { return Mix(std::uint64_t{uv[0]} << 32 | uv[1]); }
 
 // A sum over the triangles that neither their order nor their first corner changes; their sense does.
 class TriangleSum {
@@ -106,10 +123,11 @@ class TriangleSum {
   std::uint64_t sum_ = 0, triples_ = 0;
 };
 
-TriangleSum SumOf(const GridMesh& grid) {
+TriangleSum SumOf(const GridMesh& grid, bool uv) {
   std::vector<std::uint64_t> hash;
   hash.reserve(grid.positions.size());
   for (const Position& p : grid.positions) hash.push_back(HashOf(p));
+  for (std::size_t k = 0; uv && k < hash.size(); ++k) hash[k] ^= HashOf(grid.uv[k]);
   TriangleSum sum;
   for (const auto& [a, b, c] : grid.triangles) sum.Add(hash[a], hash[b], hash[c]);
   return sum;
@@ -118,7 +136,7 @@ TriangleSum SumOf(const GridMesh& grid) {
 tl::unexpected<Error> Failed(const char* what) { return MakeError(ErrorCode::kInternal, "Draco: {}", what); }
 
 // Fills in what the bytes decode to.
-Result<void> ReadBack(const GridMesh& grid, DracoMesh& encoded) {
+Result<void> ReadBack(const GridMesh& grid, const DracoOptions& options, DracoMesh& encoded) {
   draco::DecoderBuffer buffer;
   buffer.Init(encoded.bytes.data(), encoded.bytes.size());
   draco::Decoder decoder;
@@ -150,12 +168,28 @@ Result<void> ReadBack(const GridMesh& grid, DracoMesh& encoded) {
     }
     hash.push_back(HashOf(steps));
   }
+  if (options.uv) {
+    const draco::PointAttribute* const coordinates = mesh.GetAttributeByUniqueId(encoded.uv_id);
+    if (!coordinates) return Failed("the texture coordinates are missing");
+    for (std::uint32_t k = 0; k < encoded.points; ++k) {
+      std::array<float, 2> uv{};
+      coordinates->GetMappedValue(draco::PointIndex(k), uv.data());
+      std::array<std::uint16_t, 2> node{};
+      for (std::size_t axis = 0; axis < 2; ++axis) {
+        // Half a step of 12 bits is less than half a lattice cell.
+        const double cells = std::floor(static_cast<double>(uv[axis]) * grid.cells + 0.5);
+        if (!(cells >= 0 && cells <= grid.cells)) return Failed("a texture coordinate left the picture");
+        node[axis] = static_cast<std::uint16_t>(cells);
+      }
+      hash[k] ^= HashOf(node);
+    }
+  }
   TriangleSum sum;
   for (std::uint32_t t = 0; t < mesh.num_faces(); ++t) {
     const draco::Mesh::Face& face = mesh.face(draco::FaceIndex(t));
     sum.Add(hash[face[0].value()], hash[face[1].value()], hash[face[2].value()]);
   }
-  if (!(sum == SumOf(grid))) return Failed("a triangle came back changed");
+  if (!(sum == SumOf(grid, options.uv))) return Failed("a triangle came back changed");
   return {};
 }
 
@@ -173,10 +207,15 @@ Result<DracoMesh> EncodeDraco(const GridMesh& grid, const DracoOptions& options)
 
   int position_attribute = 0, normal_attribute = 0;
   const std::unique_ptr<draco::Mesh> mesh = ToDraco(grid, position_attribute, normal_attribute);
+  const int uv_attribute = options.uv ? AddTextureCoordinates(grid, *mesh) : -1;
   draco::ExpertEncoder encoder(*mesh);
   encoder.SetSpeedOptions(options.speed, options.speed);
   encoder.SetAttributeExplicitQuantization(position_attribute, quantization.bits, 3, origin.data(), range);
   encoder.SetAttributeQuantization(normal_attribute, options.normal_bits);
+  if (options.uv) {
+    constexpr std::array<float, 2> kCorner{0, 0};
+    encoder.SetAttributeExplicitQuantization(uv_attribute, kUvBits, 2, kCorner.data(), 1);
+  }
   draco::EncoderBuffer buffer;
   if (const draco::Status status = encoder.EncodeToBuffer(&buffer); !status.ok()) return Failed(status.error_msg());
 
@@ -184,7 +223,8 @@ Result<DracoMesh> EncodeDraco(const GridMesh& grid, const DracoOptions& options)
   encoded.bytes.assign(buffer.data(), buffer.size());
   encoded.position_id = mesh->attribute(position_attribute)->unique_id();
   encoded.normal_id = mesh->attribute(normal_attribute)->unique_id();
-  if (const Result<void> same = ReadBack(grid, encoded); !same) return tl::unexpected(same.error());
+  if (options.uv) encoded.uv_id = mesh->attribute(uv_attribute)->unique_id();
+  if (const Result<void> same = ReadBack(grid, options, encoded); !same) return tl::unexpected(same.error());
   return encoded;
 }
 

@@ -58,9 +58,9 @@ bool FitsShort(const Box& box) {
 
 // The arrays of a tile before compression, and how glTF describes them.
 struct Arrays {
-  std::string positions, normals;
-  std::size_t position_stride = 0, normal_stride = 0;
-  GltfAccessor position, normal;
+  std::string positions, normals, uv;
+  std::size_t position_stride = 0, normal_stride = 0, uv_stride = 0;
+  GltfAccessor position, normal, texture;
   Vec3d origin{};
   double scale = 1;
 };
@@ -126,6 +126,29 @@ void PutFloatNormals(const GridMesh& mesh, Arrays& arrays) {
   arrays.normal_stride = 12;
 }
 
+// Lattice columns and rows to 0 .. 65535: off by less than a 65,536th of the picture's edge.
+void PutShortTextureCoordinates(const GridMesh& mesh, Arrays& arrays) {
+  ByteWriter out;
+  out.Reserve(4 * mesh.uv.size());
+  for (const auto& uv : mesh.uv) {
+    for (const int node : uv) out.Put(static_cast<std::uint16_t>((2 * 65535 * node + mesh.cells) / (2 * mesh.cells)));
+  }
+  arrays.uv = out.Take();
+  arrays.uv_stride = 4;
+  arrays.texture = {.component = GltfComponent::kUnsignedShort, .type = "VEC2", .normalized = true};
+}
+
+void PutFloatTextureCoordinates(const GridMesh& mesh, Arrays& arrays) {
+  ByteWriter out;
+  out.Reserve(8 * mesh.uv.size());
+  for (const auto& uv : mesh.uv) {
+    for (const int node : uv) out.Put(static_cast<float>(node) / static_cast<float>(mesh.cells));
+  }
+  arrays.uv = out.Take();
+  arrays.uv_stride = 8;
+  arrays.texture = {.type = "VEC2"};
+}
+
 Arrays MakeArrays(const GridMesh& mesh, bool quantized) {
   const Box box = BoxOf(mesh);
   Arrays arrays;
@@ -136,10 +159,12 @@ Arrays MakeArrays(const GridMesh& mesh, bool quantized) {
   }
   if (quantized) {
     PutByteNormals(mesh, arrays);
+    PutShortTextureCoordinates(mesh, arrays);
   } else {
     PutFloatNormals(mesh, arrays);
+    PutFloatTextureCoordinates(mesh, arrays);
   }
-  arrays.position.count = arrays.normal.count = mesh.positions.size();
+  arrays.position.count = arrays.normal.count = arrays.texture.count = mesh.positions.size();
   return arrays;
 }
 
@@ -160,7 +185,9 @@ std::string IndexBytes(const std::vector<std::array<std::uint32_t, 3>>& triangle
 GltfMesh Describe(const GlbOptions& options) {
   GltfMesh gltf;
   gltf.generator = options.generator;
-  gltf.material = GltfMaterial{kGroundColor};
+  gltf.material.emplace();
+  if (!options.texture) gltf.material->color = kGroundColor;
+  if (options.texture) gltf.copyright = options.copyright;
   return gltf;
 }
 
@@ -179,6 +206,13 @@ std::size_t AddMeshoptView(GltfMesh& gltf, ByteWriter& buffer, std::string_view 
   return view;
 }
 
+// The last of the views, so that a texture moves no other.
+void AddTexture(const std::optional<GlbTexture>& texture, GltfMesh& gltf, ByteWriter& buffer) {
+  if (!texture) return;
+  gltf.texture = {AddView(gltf, buffer, texture->bytes, 0, GltfTarget::kNone), texture->media_type};
+  if (texture->media_type == "image/webp") gltf.extensions.push_back("EXT_texture_webp");
+}
+
 Result<GlbTile> Assemble(GltfMesh gltf, ByteWriter buffer) {
   buffer.PadTo(4);
   gltf.buffer_bytes = buffer.size();
@@ -192,7 +226,9 @@ Result<GlbTile> Assemble(GltfMesh gltf, ByteWriter buffer) {
 }
 
 Result<GlbTile> EncodeWithDraco(const GridMesh& mesh, const GlbOptions& options) {
-  const Result<DracoMesh> draco = EncodeDraco(mesh, options.draco);
+  DracoOptions draco_options = options.draco;
+  draco_options.uv = options.texture.has_value();
+  const Result<DracoMesh> draco = EncodeDraco(mesh, draco_options);
   if (!draco) return tl::unexpected(draco.error());
   GltfMesh gltf = Describe(options);
   gltf.extensions = {"KHR_draco_mesh_compression"};
@@ -210,6 +246,12 @@ Result<GlbTile> EncodeWithDraco(const GridMesh& mesh, const GlbOptions& options)
                     {.component = IndexComponent(draco->points), .type = "SCALAR", .count = 3 * draco->triangles}};
   gltf.attributes = {{"POSITION", 0}, {"NORMAL", 1}};
   gltf.indices = 2;
+  if (options.texture) {
+    gltf.draco->attributes.emplace_back("TEXCOORD_0", draco->uv_id);
+    gltf.accessors.push_back({.type = "VEC2", .count = draco->points});
+    gltf.attributes.emplace_back("TEXCOORD_0", 3);
+  }
+  AddTexture(options.texture, gltf, buffer);
   return Assemble(std::move(gltf), std::move(buffer));
 }
 
@@ -231,28 +273,41 @@ Result<GlbTile> EncodeArrays(const GridMesh& mesh, const GlbOptions& options) {
     arrays.normal.view =
         AddMeshoptView(gltf, buffer, EncodeMeshoptVertices(arrays.normals, count, arrays.normal_stride), count,
                        arrays.normal_stride, GltfTarget::kVertices);
+    if (options.texture) {
+      arrays.texture.view = AddMeshoptView(gltf, buffer, EncodeMeshoptVertices(arrays.uv, count, arrays.uv_stride),
+                                           count, arrays.uv_stride, GltfTarget::kVertices);
+    }
     const std::size_t width = index.component == GltfComponent::kUnsignedInt ? 4 : 2;
     index.view = AddMeshoptView(gltf, buffer, EncodeMeshoptTriangles(mesh.triangles, count), corners, width,
                                 GltfTarget::kIndices);
   } else {
     arrays.position.view = AddView(gltf, buffer, arrays.positions, arrays.position_stride, GltfTarget::kVertices);
     arrays.normal.view = AddView(gltf, buffer, arrays.normals, arrays.normal_stride, GltfTarget::kVertices);
+    if (options.texture) {
+      arrays.texture.view = AddView(gltf, buffer, arrays.uv, arrays.uv_stride, GltfTarget::kVertices);
+    }
     index.view = AddView(gltf, buffer, IndexBytes(mesh.triangles, count), 0, GltfTarget::kIndices);
   }
   gltf.accessors = {std::move(arrays.position), std::move(arrays.normal), std::move(index)};
   gltf.attributes = {{"POSITION", 0}, {"NORMAL", 1}};
   gltf.indices = 2;
+  if (options.texture) {
+    gltf.accessors.push_back(std::move(arrays.texture));
+    gltf.attributes.emplace_back("TEXCOORD_0", 3);
+  }
+  AddTexture(options.texture, gltf, buffer);
   return Assemble(std::move(gltf), std::move(buffer));
 }
 
 GridMesh Reordered(const GridMesh& mesh) {
   MeshoptOrder order = OrderForMeshopt(mesh.triangles, mesh.positions.size());
-  GridMesh reordered{mesh.step_m, mesh.origin, {}, {}, std::move(order.triangles)};
+  GridMesh reordered{mesh.step_m, mesh.origin, {}, {}, std::move(order.triangles), mesh.cells, {}};
   reordered.positions.reserve(order.old_index.size());
   reordered.normals.reserve(order.old_index.size());
   for (const std::uint32_t old : order.old_index) {
     reordered.positions.push_back(mesh.positions[old]);
     reordered.normals.push_back(mesh.normals[old]);
+    if (!mesh.uv.empty()) reordered.uv.push_back(mesh.uv[old]);
   }
   return reordered;
 }

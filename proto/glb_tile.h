@@ -2,7 +2,9 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
+#include <string_view>
 
 #include "engine/core/result.h"
 #include "proto/draco_mesh.h"
@@ -19,10 +21,18 @@ enum class GlbCompression : std::uint8_t {
   kMeshopt,    // EXT_meshopt_compression of what kQuantized holds
 };
 
+// A picture of the tile: an image file, whose edges are the tile's.
+struct GlbTexture {
+  std::string bytes;
+  std::string_view media_type;  // a literal: "image/jpeg", "image/webp"
+};
+
 struct GlbOptions {
   GlbCompression compression = GlbCompression::kDraco;
   DracoOptions draco;
   std::string generator = "terrace";  // asset.generator
+  std::optional<GlbTexture> texture;  // none: the ground is plain grey
+  std::string copyright;              // asset.copyright, of the texture
 };
 
 struct GlbTile {

@@ -74,11 +74,27 @@ Json PrimitiveJson(const GltfMesh& mesh) {
   return json;
 }
 
+// glTF itself knows JPEG and PNG.
+void PutTexture(const GltfTexture& texture, Json& json) {
+  constexpr int kLinear = 9729, kLinearMipmapLinear = 9987, kClampToEdge = 33071;
+  Json source = {{"sampler", 0}};
+  if (texture.media_type == "image/webp") {
+    source["extensions"]["EXT_texture_webp"] = {{"source", 0}};
+  } else {
+    source["source"] = 0;
+  }
+  json["textures"] = Json::array({std::move(source)});
+  json["images"] = Json::array({{{"bufferView", texture.view}, {"mimeType", texture.media_type}}});
+  json["samplers"] = Json::array(
+      {{{"magFilter", kLinear}, {"minFilter", kLinearMipmapLinear}, {"wrapS", kClampToEdge}, {"wrapT", kClampToEdge}}});
+}
+
 }  // namespace
 
 std::string GltfJson(const GltfMesh& mesh) {
   Json json;
   json["asset"] = {{"version", "2.0"}, {"generator", mesh.generator}};
+  if (!mesh.copyright.empty()) json["asset"]["copyright"] = mesh.copyright;
   if (!mesh.extensions.empty()) {
     json["extensionsUsed"] = mesh.extensions;
     json["extensionsRequired"] = mesh.extensions;
@@ -90,9 +106,11 @@ std::string GltfJson(const GltfMesh& mesh) {
   if (mesh.material) {
     Json& pbr = json["materials"][0]["pbrMetallicRoughness"];
     if (mesh.material->color != GltfMaterial{}.color) pbr["baseColorFactor"] = mesh.material->color;
+      if (mesh.texture) pbr["baseColorTexture"] = {{"index", 0}};
     pbr["metallicFactor"] = 0;
     pbr["roughnessFactor"] = 1;
   }
+  if (mesh.texture) PutTexture(*mesh.texture, json);
   json["accessors"] = Json::array();
   for (const GltfAccessor& accessor : mesh.accessors) json["accessors"].push_back(AccessorJson(accessor));
   Fallback fallback;
@@ -102,7 +120,8 @@ std::string GltfJson(const GltfMesh& mesh) {
   if (fallback.bytes > 0) {
     json["buffers"].push_back({{"byteLength", fallback.bytes}, {"extensions", {{kMeshopt, {{"fallback", true}}}}}});
   }
-  return json.dump();
+  // A copyright is the operator's text: bytes that are not UTF-8 become U+FFFD.
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
 std::string GlbHead(std::string json, std::size_t buffer_bytes) {

@@ -52,6 +52,12 @@ struct GltfMaterial {
   std::array<double, 4> color{1, 1, 1, 1};  // linear
 };
 
+// The material's colour, times this picture: clamped at its edges.
+struct GltfTexture {
+  std::size_t view = 0;  // of the image file
+  std::string_view media_type;
+};
+
 struct GltfMesh {
   std::array<double, 16> matrix{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};  // of the node, column by column
   std::string_view generator = "terrace";
@@ -62,6 +68,8 @@ struct GltfMesh {
   std::size_t indices = 0;                                           // accessor
   std::optional<GltfDraco> draco;
   std::optional<GltfMaterial> material;  // without one, glTF's default applies, which is a metal
+  std::optional<GltfTexture> texture;
+  std::string_view copyright;  // empty: none
   std::size_t buffer_bytes = 0;
 };
 

@@ -168,9 +168,11 @@ GridMesh MakeGridMesh(const LatticeView& lattice, const tin::TinMesh& mesh, cons
   const std::vector<std::uint32_t> rim = Rim(mesh, lattice.cells());
   std::vector<GridPoint> all = points;
   std::vector<geo::Vec3> all_normals = normals;
+  std::vector<tin::SamplePosition> nodes = mesh.vertices;
   for (const std::uint32_t top : rim) {
     all.push_back(Snap(placer.Place(mesh.vertices[top], skirt_depth_m), 1 / step_m));
     all_normals.push_back(normals[top]);
+    nodes.push_back(mesh.vertices[top]);
   }
   std::vector<Triangle> triangles = mesh.triangles;
   HangSkirt(rim, static_cast<std::uint32_t>(points.size()), triangles);
@@ -186,6 +188,8 @@ GridMesh MakeGridMesh(const LatticeView& lattice, const tin::TinMesh& mesh, cons
     grid.origin[axis] = box.min[axis] + (box.max[axis] - box.min[axis]) / 2;
   }
   grid.triangles = std::move(order.triangles);
+  grid.cells = lattice.cells();
+  grid.uv.reserve(order.old_index.size());
   grid.positions.reserve(order.old_index.size());
   grid.normals.reserve(order.old_index.size());
   for (const std::uint32_t old : order.old_index) {
@@ -194,6 +198,8 @@ GridMesh MakeGridMesh(const LatticeView& lattice, const tin::TinMesh& mesh, cons
       position[axis] = static_cast<std::int32_t>(all[old][axis] - grid.origin[axis]);
     }
     grid.normals.push_back(all_normals[old]);
+    grid.uv.push_back(
+        {static_cast<std::uint16_t>(nodes[old].x), static_cast<std::uint16_t>(grid.cells - nodes[old].y)});
   }
   return grid;
 }

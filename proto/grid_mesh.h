@@ -46,6 +46,10 @@ struct GridMesh {
   std::vector<std::array<std::int32_t, 3>> positions;   // ECEF axes, in steps; the middle of their box is near 0
   std::vector<geo::Vec3> normals;                       // unit, ECEF, one per position
   std::vector<std::array<std::uint32_t, 3>> triangles;  // counter-clockwise from outside
+  // Where each position is in a picture of the tile: lattice columns from the west, rows from the NORTH, 0 .. cells.
+  // The feet of skirts have those of the rim above them.
+  int cells = 1;
+  std::vector<std::array<std::uint16_t, 2>> uv;
 };
 
 // The tile's surface and, hanging down from its four edges, its skirts: their upper rim is the edge's own vertices,

@@ -49,6 +49,11 @@ std::string EncodeLayerJson(const LayerDescription& layer) {
   json["bounds"] = Bounds(layer);
   json["attribution"] = layer.attribution;
   json["extensions"] = Json::array({"octvertexnormals"});
+  if (layer.water_mask) json["extensions"].push_back("watermask");
+  if (layer.metadata_levels > 0) {
+    json["extensions"].push_back("metadata");
+    json["metadataAvailability"] = layer.metadata_levels;
+  }
   json["available"] = Available(layer.available);
   // Names and attributions come from files: bytes that are not UTF-8 become U+FFFD instead of an exception.
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);

@@ -16,11 +16,14 @@ struct LayerDescription {
   // Degrees. west > east, or east > 180, is a box across the antimeridian: layer.json then spans all longitudes,
   // because its readers know only boxes with west < east.
   double west = -180, south = -90, east = 180, north = 90;
-  std::string tile_query;  // appended to the tile template, without '?': "error=5&atleast=1"; may be empty
+  bool water_mask = false;  // tiles have it for those who ask
+  int metadata_levels = 0;  // tiles of every so many levels have metadata for those who ask; 0: none
+  std::string tile_query;   // appended to the tile template, without '?': "error=5&atleast=1"; may be empty
 };
 
-// UTF-8 JSON. The metadata extension (availability inside tiles) is never offered, so `available` must be complete:
-// from both roots down, every ancestor of an available tile included. Precondition: available is not empty.
+// UTF-8 JSON. `available` must be complete: from both roots down, every ancestor of an available tile included. It is
+// written whatever `metadata_levels` is: CesiumJS and cesium-native then ignore it for the metadata of tiles, others
+// read nothing else. Precondition: available is not empty.
 std::string EncodeLayerJson(const LayerDescription& layer);
 
 }  // namespace terrace::proto

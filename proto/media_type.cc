@@ -102,6 +102,21 @@ TileExtensions ExtensionsInAccept(std::string_view accept) {
   return extensions;
 }
 
+std::string_view QuantizedMeshContentType(TileExtensions extensions) {
+  // By bits: normals 1, water mask 2, metadata 4.
+  static constexpr std::string_view kTypes[] = {
+      "application/vnd.quantized-mesh",
+      "application/vnd.quantized-mesh;extensions=octvertexnormals",
+      "application/vnd.quantized-mesh;extensions=watermask",
+      "application/vnd.quantized-mesh;extensions=octvertexnormals-watermask",
+      "application/vnd.quantized-mesh;extensions=metadata",
+      "application/vnd.quantized-mesh;extensions=octvertexnormals-metadata",
+      "application/vnd.quantized-mesh;extensions=watermask-metadata",
+      "application/vnd.quantized-mesh;extensions=octvertexnormals-watermask-metadata",
+  };
+  return kTypes[(extensions.octvertexnormals ? 1 : 0) + (extensions.watermask ? 2 : 0) + (extensions.metadata ? 4 : 0)];
+}
+
 ContentCoding ChooseCoding(std::string_view accept_encoding) {
   const Weights weights = ParseCodings(accept_encoding);
   const int gzip = weights.gzip.value_or(weights.any.value_or(0));

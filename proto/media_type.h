@@ -32,6 +32,9 @@ TileExtensions ParseExtensions(std::string_view names);
 // application/vnd.quantized-mesh, 3DTilesRendererJS behind application/octet-stream.
 TileExtensions ExtensionsInAccept(std::string_view accept);
 
+// The Content-Type of a quantized-mesh tile with these extensions: a literal.
+std::string_view QuantizedMeshContentType(TileExtensions extensions);
+
 enum class ContentCoding { kIdentity, kGzip };
 
 // RFC 9110 section 12.5.3: gzip if the client takes it and does not prefer identity. Without the header, and where the

@@ -12,7 +12,7 @@ namespace terrace::proto {
 namespace {
 
 constexpr std::size_t kHeaderBytes = 88;
-constexpr std::uint8_t kOctVertexNormals = 1;
+constexpr std::uint8_t kOctVertexNormals = 1, kWaterMask = 2, kMetadata = 4;  // extension ids
 
 // Indices are 16 bits wide up to 65,536 vertices, and all of them start on even offsets (88 + 4 + 6n), so that the
 // format never needs padding here.
@@ -22,6 +22,9 @@ void CheckPreconditions(const QuantizedTile& tile, const QuantizedMeshOptions& o
   const std::size_t count = tile.u.size();
   TERRACE_CHECK(tile.v.size() == count && tile.h.size() == count && count <= kMaxTileVertices);
   TERRACE_CHECK(!options.normals || tile.normals.size() == count);
+  constexpr std::size_t kWaterPixels = std::size_t{kWaterMaskSide} * kWaterMaskSide;
+  TERRACE_CHECK(!options.water_mask || tile.water_mask.size() == 1 || tile.water_mask.size() == kWaterPixels);
+  TERRACE_CHECK(!options.metadata || !tile.metadata.empty());
   TERRACE_CHECK(tile.triangles.size() >= 2);
   TERRACE_CHECK(geo::IsValid(tile.key));
   const auto fits = [](std::uint16_t value) { return value <= kQuantizedMax; };
@@ -102,6 +105,20 @@ void PutNormals(ByteWriter& out, const std::vector<std::array<std::uint8_t, 2>>&
   }
 }
 
+void PutWaterMask(ByteWriter& out, const WaterMask& mask) {
+  out.Put(kWaterMask);
+  out.Put(static_cast<std::uint32_t>(mask.size()));
+  out.PutBytes({reinterpret_cast<const char*>(mask.data()), mask.size()});
+}
+
+// Its JSON has a length of its own inside the extension's.
+void PutMetadata(ByteWriter& out, const std::string& json) {
+  out.Put(kMetadata);
+  out.Put(static_cast<std::uint32_t>(sizeof(std::uint32_t) + json.size()));
+  out.Put(static_cast<std::uint32_t>(json.size()));
+  out.PutBytes(json);
+}
+
 }  // namespace
 
 std::string EncodeQuantizedMesh(const QuantizedTile& tile, const QuantizedMeshOptions& options) {
@@ -130,6 +147,8 @@ std::string EncodeQuantizedMesh(const QuantizedTile& tile, const QuantizedMeshOp
   PutEdge(out, ordered.u, kQuantizedMax, ordered.v);  // east
   PutEdge(out, ordered.v, kQuantizedMax, ordered.u);  // north
   if (options.normals) PutNormals(out, ordered.normals);
+  if (options.water_mask) PutWaterMask(out, tile.water_mask);
+  if (options.metadata) PutMetadata(out, tile.metadata);
   return out.Take();
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "engine/geo/tile_key.h"
+#include "proto/water_mask.h"
 
 namespace terrace::proto {
 
@@ -24,15 +25,20 @@ struct QuantizedTile {
   float min_height = 0;
   float max_height = 0;
   std::vector<std::array<std::uint8_t, 2>> normals;  // oct-encoded, ECEF, one per vertex
+  WaterMask water_mask;
+  std::string metadata;  // JSON (tile_metadata.h)
 };
 
 struct QuantizedMeshOptions {
-  bool normals = false;  // extension 1, octvertexnormals
+  bool normals = false;     // extension 1, octvertexnormals
+  bool water_mask = false;  // extension 2, watermask
+  bool metadata = false;    // extension 4, metadata
 };
 
 // Renumbers the vertices in order of first use (high-water-mark coding needs it), lists the edges, computes centre,
 // bounding sphere and horizon occlusion point from the decoded vertices, and writes the bytes.
-// Preconditions: at least 2 triangles, at most kMaxTileVertices vertices, all four edges complete.
+// Preconditions: at least 2 triangles, at most kMaxTileVertices vertices, all four edges complete, and what the options
+// name is in the tile.
 std::string EncodeQuantizedMesh(const QuantizedTile& tile, const QuantizedMeshOptions& options);
 
 }  // namespace terrace::proto

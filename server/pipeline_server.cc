@@ -24,6 +24,9 @@ DatasetView ViewOf(const Dataset& dataset) {
   view.north = info.bounds.north;
   view.min_height_m = info.heights.min;
   view.max_height_m = info.heights.max;
+  view.has_water = dataset.water.any();
+  if (dataset.imagery.image) view.texture = dataset.imagery.texture;
+  view.metadata_levels = dataset.metadata_levels;
   view.floor_m = info.floor;
   return view;
 }

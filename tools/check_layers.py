@@ -45,6 +45,8 @@ LIBRARIES = [
     Library("nlohmann_json", r"nlohmann/.*", r"(config/|proto/.*\.cc|server/.*\.cc)"),
     Library("libdeflate", r"libdeflate\.h", r"proto/.*\.cc"),
     Library("Draco", r"draco/.*", r"proto/.*\.cc"),
+    Library("libjpeg", r"jpeglib\.h", r"proto/.*\.cc"),
+    Library("libwebp", r"webp/.*", r"proto/.*\.cc"),
     Library("meshoptimizer", r"meshoptimizer\.h", r"proto/.*\.cc"),
     Library("xxHash", r"xxhash\.h", r"(engine/dem|engine/tin|proto|server)/.*\.cc"),
     Library("spdlog", r"spdlog/.*", r"(engine/dem|server)/.*\.cc"),

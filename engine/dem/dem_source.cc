@@ -36,14 +36,6 @@ Result<void> CheckOptions(const DemOptions& options) {
   return {};
 }
 
-std::vector<int> OverviewFactors(GDALRasterBand& band) {
-  std::vector<int> factors;
-  for (int factor = 2; factor <= 1 << 16 && factor < std::max(band.GetXSize(), band.GetYSize()); factor *= 2) {
-    if (FindOverview(band, factor) != nullptr) factors.push_back(factor);
-  }
-  return factors;
-}
-
 RasterLayout LayoutOf(GDALDataset& dataset, const Georeference& georeference) {
   RasterLayout layout;
   layout.width = georeference.width();
@@ -53,16 +45,6 @@ RasterLayout LayoutOf(GDALDataset& dataset, const Georeference& georeference) {
   layout.rules = SampleRules::Of(HeightBand(dataset), georeference.vertical_unit());
   layout.overview_factors = OverviewFactors(HeightBand(dataset));
   return layout;
-}
-
-std::vector<std::string> FilesOf(GDALDataset& dataset, const std::string& path) {
-  std::vector<std::string> files = {path};
-  char** list = dataset.GetFileList();
-  for (char** name = list; name != nullptr && *name != nullptr; ++name) {
-    if (path != *name) files.emplace_back(*name);
-  }
-  CSLDestroy(list);
-  return files;
 }
 
 std::uint64_t FingerprintOf(const StampedFiles& files, const DemOptions& options, double floor) {

@@ -1,6 +1,9 @@
 #include "engine/dem/file_stamp.h"
 
 #include <sys/stat.h>
+#include <xxhash.h>
+
+#include "engine/core/bytes.h"
 
 namespace terrace::dem {
 
@@ -28,6 +31,15 @@ std::optional<std::string> StampedFiles::FirstChanged() const {
     if (StampOf(paths_[i]) != stamps_[i]) return paths_[i];
   }
   return std::nullopt;
+}
+
+std::uint64_t StampedFiles::fingerprint() const {
+  ByteWriter writer;
+  for (const FileStamp& stamp : stamps_) {
+    for (const std::uint64_t part : {stamp.device, stamp.inode, stamp.size, stamp.modified_ns}) writer.Put(part);
+  }
+  const std::string bytes = writer.Take();
+  return XXH3_64bits(bytes.data(), bytes.size());
 }
 
 }  // namespace terrace::dem

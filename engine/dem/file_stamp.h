@@ -30,6 +30,9 @@ class StampedFiles {
 
   const std::vector<FileStamp>& stamps() const { return stamps_; }
 
+  // A hash of the stamps.
+  std::uint64_t fingerprint() const;
+
  private:
   std::vector<std::string> paths_;
   std::vector<FileStamp> stamps_;

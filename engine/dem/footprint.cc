@@ -71,6 +71,14 @@ Footprint Footprint::Of(const Georeference& georeference) {
   return Normalized(box);
 }
 
+Footprint Footprint::Of(const GeoBounds& bounds) {
+  return {bounds.west, bounds.south, bounds.west > bounds.east ? bounds.east + 360 : bounds.east, bounds.north};
+}
+
+bool Footprint::Touches(const Footprint& other) const {
+  return Touches(other.west, other.south, other.east - other.west, other.north - other.south);
+}
+
 GeoBounds Footprint::Bounds() const { return {west, south, east > 180 ? east - 360 : east, north}; }
 
 Footprint Footprint::Padded() const {
@@ -85,6 +93,17 @@ bool Footprint::Touches(double box_west, double box_south, double box_width, dou
   if (all_longitudes()) return true;
   const double offset = box_west - west - 360 * std::floor((box_west - west) / 360);  // 0 <= offset < 360
   return offset <= east - west || offset + box_width >= 360;
+}
+
+Result<void> CheckOverlap(const Footprint& footprint, const GeoBounds& around, const std::string& path) {
+  if (footprint.Touches(Footprint::Of(around))) return {};
+  const GeoBounds bounds = footprint.Bounds();
+  return MakeError(ErrorCode::kInvalidArgument,
+                   "{}: covers longitudes {:.4f} to {:.4f} and latitudes {:.4f} to {:.4f}, nothing of the dataset at "
+                   "{:.4f} to {:.4f} and {:.4f} to {:.4f}; name a raster of the same area, or correct its georeference "
+                   "with `gdal_translate -a_srs EPSG:XXXX -a_ullr west north east south in out`",
+                   path, bounds.west, bounds.east, bounds.south, bounds.north, around.west, around.east, around.south,
+                   around.north);
 }
 
 std::vector<std::vector<geo::TileRange>> TilesTouching(const Footprint& footprint, int max_level) {

@@ -1,8 +1,10 @@
 // The part of the globe a raster covers, and the tiles that touch it.
 #pragma once
 
+#include <string>
 #include <vector>
 
+#include "engine/core/result.h"
 #include "engine/dem/dem_source.h"
 #include "engine/dem/georeference.h"
 #include "engine/geo/tile_key.h"
@@ -24,9 +26,17 @@ struct Footprint {
   // edges.
   Footprint Padded() const;
 
+  // Of a box in degrees.
+  static Footprint Of(const GeoBounds& bounds);
+
+  bool Touches(const Footprint& other) const;
+
   // Whether it touches the box from (west, south), `width` by `height` degrees large; west counts modulo 360.
   bool Touches(double box_west, double box_south, double box_width, double box_height) const;
 };
+
+// kInvalidArgument, with both boxes, where `path`, which covers `footprint`, lies nowhere in `around`.
+Result<void> CheckOverlap(const Footprint& footprint, const GeoBounds& around, const std::string& path);
 
 // Per level 0 .. max_level: blocks without overlap that hold every tile the footprint touches and every ancestor of
 // such a tile; at level 0 both roots.

@@ -20,7 +20,8 @@ ImageBins::Between ImageBins::Around(double position, int side, int last) {
   return {lower, std::min(lower + 1, last), at - lower};
 }
 
-Result<ImageBins> ImageBins::Read(ImageFile& image, int side, const std::vector<Position>& positions) {
+Result<ImageBins> ImageBins::Read(ImageFile& image, int side, const std::vector<Position>& positions,
+                                  const std::stop_token& stop) {
   ImageBins bins;
   bins.side_ = side;
   bins.last_col_ = (image.width() - 1) / side;
@@ -47,17 +48,18 @@ Result<ImageBins> ImageBins::Read(ImageFile& image, int side, const std::vector<
         image.path(), bins.cols_, bins.rows_);
   }
   bins.bins_.resize(static_cast<std::size_t>(bins.cols_) * static_cast<std::size_t>(bins.rows_));
-  if (auto filled = bins.Fill(image); !filled) return tl::unexpected(filled.error());
+  if (auto filled = bins.Fill(image, stop); !filled) return tl::unexpected(filled.error());
   return bins;
 }
 
-Result<void> ImageBins::Fill(ImageFile& image) {
+Result<void> ImageBins::Fill(ImageFile& image, const std::stop_token& stop) {
   const int west = first_col_ * side_, north = first_row_ * side_;
   const int east = std::min((first_col_ + cols_) * side_, image.width()),
             south = std::min((first_row_ + rows_) * side_, image.height());
   const int width = east - west, rows_at_once = std::clamp(kPixelsAtOnce / width, 1, south - north);
   std::vector<ColorSample> pixels(static_cast<std::size_t>(width) * static_cast<std::size_t>(rows_at_once));
   for (int row = north; row < south; row += rows_at_once) {
+    if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "{}: reading it was stopped", image.path());
     const int rows = std::min(rows_at_once, south - row);
     if (auto read = image.Read(west, row, width, rows, pixels.data()); !read) return read;
     const ColorSample* pixel = pixels.data();

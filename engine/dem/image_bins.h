@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <stop_token>
 #include <vector>
 
 #include "engine/core/result.h"
@@ -19,7 +20,9 @@ class ImageBins {
 
   // Reads the squares, `side` pixels wide and counted from the image's first pixel, that interpolation at these pixel
   // positions needs; NaNs need none. kInvalidArgument: more than fit in memory. kUnavailable: the image cannot be read.
-  static Result<ImageBins> Read(ImageFile& image, int side, const std::vector<Position>& positions);
+  // kCancelled: stopped.
+  static Result<ImageBins> Read(ImageFile& image, int side, const std::vector<Position>& positions,
+                                const std::stop_token& stop = {});
 
   // Bilinear between the averages of the nearest four squares, as far as they have a colour, and the image's own edge
   // where it ends; no colour where none of them has one, or at a NaN.
@@ -38,7 +41,7 @@ class ImageBins {
   };
   static Between Around(double position, int side, int last);
 
-  Result<void> Fill(ImageFile& image);
+  Result<void> Fill(ImageFile& image, const std::stop_token& stop);
 
   int side_ = 1;
   int last_col_ = 0, last_row_ = 0;                          // of the image's squares

@@ -9,8 +9,8 @@
 
 namespace terrace::dem {
 
-Result<ImageFile> ImageFile::Open(const std::string& path) {
-  auto dataset = OpenRaster(path);
+Result<ImageFile> ImageFile::Open(const std::string& path, int overview) {
+  auto dataset = OpenRaster(path, overview);
   if (!dataset) return tl::unexpected(dataset.error());
   ImageFile image(path, *std::move(dataset));
   if (auto found = image.FindBands(); !found) return tl::unexpected(found.error());

@@ -17,7 +17,8 @@ namespace terrace::dem {
 class ImageFile {
  public:
   // Refuses, with the remedy, what OpenRaster refuses and bands that are no colours.
-  static Result<ImageFile> Open(const std::string& path);
+  // `overview`: the image as GDAL's overview of that number has it; -1: in full.
+  static Result<ImageFile> Open(const std::string& path, int overview = -1);
 
   const std::string& path() const { return path_; }
   GDALDataset& dataset() const { return *dataset_; }

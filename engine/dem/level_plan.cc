@@ -37,19 +37,6 @@ int CellsOf(int level, const SourceSpacing& spacing) {
   return kFinest;
 }
 
-// The power of two nearest to the ratio of lattice to source spacing, the geometric mean of both axes.
-int FactorOf(const geo::Lattice& lattice, const SourceSpacing& spacing) {
-  // Around a pole meridians meet: the centre of a polar map says nothing about lattice cells elsewhere in it. In a
-  // geographic source its columns meet as well.
-  constexpr double kMostPolar = 75;
-  const double latitude = spacing.geographic ? spacing.latitude : std::clamp(spacing.latitude, -kMostPolar, kMostPolar);
-  const double step = lattice.StepDegrees();
-  const double east = step * geo::MetresPerDegreeEast(latitude) / spacing.east;
-  const double north = step * geo::MetresPerDegreeNorth(latitude) / spacing.north;
-  constexpr double kMost = 22;  // one block then holds the largest raster (raster_file.cc, kMaxSide)
-  return 1 << static_cast<int>(std::lround(std::clamp(std::log2(std::sqrt(east * north)), 0.0, kMost)));
-}
-
 }  // namespace
 
 Result<SourceSpacing> SourceSpacing::Of(const Georeference& georeference, const std::string& path) {
@@ -83,11 +70,27 @@ Result<SourceSpacing> SourceSpacing::Of(const Georeference& georeference, const 
   return spacing;
 }
 
+double SamplesPerCell(const geo::Lattice& lattice, const SourceSpacing& spacing) {
+  // Around a pole meridians meet: the centre of a polar map says nothing about lattice cells elsewhere in it. In a
+  // geographic source its columns meet as well.
+  constexpr double kMostPolar = 75;
+  const double latitude = spacing.geographic ? spacing.latitude : std::clamp(spacing.latitude, -kMostPolar, kMostPolar);
+  const double step = lattice.StepDegrees();
+  const double east = step * geo::MetresPerDegreeEast(latitude) / spacing.east;
+  const double north = step * geo::MetresPerDegreeNorth(latitude) / spacing.north;
+  return std::sqrt(east * north);
+}
+
+int AveragingFactor(double samples_per_cell) {
+  constexpr double kMost = 22;  // one block then holds the largest raster (raster_file.cc, kMaxSide)
+  return 1 << static_cast<int>(std::lround(std::clamp(std::log2(samples_per_cell), 0.0, kMost)));
+}
+
 std::vector<LevelPlan> PlanLevels(const SourceSpacing& spacing) {
   std::vector<LevelPlan> levels;
   for (int level = 0; level <= geo::kMaxLevel; ++level) {
     const geo::Lattice lattice{level, CellsOf(level, spacing)};
-    levels.push_back({lattice, FactorOf(lattice, spacing)});
+    levels.push_back({lattice, AveragingFactor(SamplesPerCell(lattice, spacing))});
   }
   return levels;
 }

@@ -26,6 +26,12 @@ struct LevelPlan {
   int factor = 1;  // samples of the source, per axis, averaged into one before interpolation; a power of two
 };
 
+// Samples of the source along the edge of a lattice cell, the geometric mean of both axes.
+double SamplesPerCell(const geo::Lattice& lattice, const SourceSpacing& spacing);
+
+// The nearest power of two, at least 1: how many samples per axis are averaged into one.
+int AveragingFactor(double samples_per_cell);
+
 // Plans of levels 0 .. geo::kMaxLevel.
 std::vector<LevelPlan> PlanLevels(const SourceSpacing& spacing);
 

@@ -18,21 +18,24 @@ struct Cell {
 };
 
 // Quadratic Lagrange weights on nodes -1, 0, 1.
-std::array<double, 3> Weights(int step, int size) {
-  const double t = 2.0 * step / size - 1;
+std::array<double, 3> Weights(double step, int size) {
+  const double t = 2 * step / size - 1;
   return {t * (t - 1) / 2, 1 - t * t, t * (t + 1) / 2};
 }
 
+// With a `halo` of 1: nodes. Without: centres of cells, each counted as the node at its south-western corner.
 class TileNodes {
  public:
   TileNodes(const Georeference& georeference, const Footprint& footprint, const geo::Lattice& lattice,
-            const geo::TileKey& key, double tolerance)
+            const geo::TileKey& key, double tolerance, int halo)
       : georeference_(georeference),
         footprint_(footprint),
         lattice_(lattice),
-        first_column_(lattice.FirstColumn(key) - 1),
-        first_row_(lattice.FirstRow(key) - 1),
-        stride_(lattice.cells + 3),
+        halves_{lattice.level, 2 * lattice.cells},
+        centres_(halo == 0),
+        first_column_(lattice.FirstColumn(key) - halo),
+        first_row_(lattice.FirstRow(key) - halo),
+        stride_(halo == 0 ? lattice.cells : lattice.cells + 1 + 2 * halo),
         tolerance_(tolerance),
         positions_(static_cast<std::size_t>(stride_) * static_cast<std::size_t>(stride_),
                    Position{kNowhere, kNowhere}) {}
@@ -48,7 +51,7 @@ class TileNodes {
         }
       }
     }
-    FillPoleRows();
+    if (!centres_) FillPoleRows();
     return std::move(positions_);
   }
 
@@ -57,6 +60,9 @@ class TileNodes {
 
   Position Degrees(std::int64_t column, std::int64_t row) const {
     return {lattice_.Longitude(column), lattice_.Latitude(row)};
+  }
+  Position CentreDegrees(std::int64_t column, std::int64_t row) const {
+    return {halves_.Longitude(2 * column + 1), halves_.Latitude(2 * row + 1)};
   }
   Position* At(std::int64_t column, std::int64_t row) {
     return &positions_[static_cast<std::size_t>((row - first_row_) * stride_ + (column - first_column_))];
@@ -75,7 +81,8 @@ class TileNodes {
 
   void FillExactly(std::int64_t column, std::int64_t row, std::int64_t columns, std::int64_t rows) {
     for (std::int64_t r = row; r < row + rows; ++r) {
-      for (std::int64_t c = column; c < column + columns; ++c) *At(c, r) = Degrees(c, r);
+      for (std::int64_t c = column; c < column + columns; ++c)
+        *At(c, r) = centres_ ? CentreDegrees(c, r) : Degrees(c, r);
       georeference_.ToPixels({At(column, r), static_cast<std::size_t>(columns)});
     }
   }
@@ -109,9 +116,9 @@ class TileNodes {
     known[10] = Degrees(cell.column + half, cell.row + quarter);
     georeference_.ToPixels(known);
     if (std::ranges::any_of(known, [](const Position& p) { return std::isnan(p.x); })) return false;
-    const auto at = [&](std::int64_t column, std::int64_t row) {
-      const auto x = Weights(static_cast<int>(column - cell.column), cell.size);
-      const auto y = Weights(static_cast<int>(row - cell.row), cell.size);
+    const auto at = [&](std::int64_t column, std::int64_t row, double shift) {
+      const auto x = Weights(static_cast<double>(column - cell.column) + shift, cell.size);
+      const auto y = Weights(static_cast<double>(row - cell.row) + shift, cell.size);
       Position sum;
       for (std::size_t j = 0; j < 3; ++j) {
         for (std::size_t i = 0; i < 3; ++i) {
@@ -124,12 +131,13 @@ class TileNodes {
     const auto close = [&](const Position& a, const Position& b) {
       return std::abs(a.x - b.x) <= tolerance_ && std::abs(a.y - b.y) <= tolerance_;
     };
-    if (!close(at(cell.column + quarter, cell.row + half), known[9]) ||
-        !close(at(cell.column + half, cell.row + quarter), known[10])) {
+    if (!close(at(cell.column + quarter, cell.row + half, 0), known[9]) ||
+        !close(at(cell.column + half, cell.row + quarter, 0), known[10])) {
       return false;
     }
+    const double shift = centres_ ? 0.5 : 0;
     for (std::int64_t row = part.south; row < part.north; ++row) {
-      for (std::int64_t column = part.west; column < part.east; ++column) *At(column, row) = at(column, row);
+      for (std::int64_t column = part.west; column < part.east; ++column) *At(column, row) = at(column, row, shift);
     }
     return true;
   }
@@ -145,7 +153,8 @@ class TileNodes {
 
   const Georeference& georeference_;
   const Footprint& footprint_;
-  const geo::Lattice lattice_;
+  const geo::Lattice lattice_, halves_;
+  const bool centres_;
   const std::int64_t first_column_, first_row_;
   const int stride_;
   const double tolerance_;
@@ -156,7 +165,12 @@ class TileNodes {
 
 std::vector<Position> NodePositions(const Georeference& georeference, const Footprint& footprint,
                                     const geo::Lattice& lattice, const geo::TileKey& key, double tolerance) {
-  return TileNodes(georeference, footprint, lattice, key, tolerance).Compute();
+  return TileNodes(georeference, footprint, lattice, key, tolerance, /*halo=*/1).Compute();
+}
+
+std::vector<Position> CellCentrePositions(const Georeference& georeference, const Footprint& footprint,
+                                          const geo::Lattice& lattice, const geo::TileKey& key, double tolerance) {
+  return TileNodes(georeference, footprint, lattice, key, tolerance, /*halo=*/0).Compute();
 }
 
 }  // namespace terrace::dem

@@ -19,4 +19,9 @@ namespace terrace::dem {
 std::vector<Position> NodePositions(const Georeference& georeference, const Footprint& footprint,
                                     const geo::Lattice& lattice, const geo::TileKey& key, double tolerance);
 
+// The same for the centres of the tile's cells x cells lattice cells, without a halo: where the pixels of an image of
+// the tile are sampled.
+std::vector<Position> CellCentrePositions(const Georeference& georeference, const Footprint& footprint,
+                                          const geo::Lattice& lattice, const geo::TileKey& key, double tolerance);
+
 }  // namespace terrace::dem

@@ -84,15 +84,17 @@ Result<void> CheckSizeToMesh(const std::string& path, int width, int height) {
                    path, width, height, kMostSamples, kMostPerSide);
 }
 
-GDALDatasetUniquePtr ReopenRaster(const std::string& path) {
+GDALDatasetUniquePtr ReopenRaster(const std::string& path, int overview) {
   InitGdal();
   ForgetGdalError();
-  return GDALDatasetUniquePtr(GDALDataset::Open(path.c_str(), kOpenFlags));
+  const std::string level = fmt::format("OVERVIEW_LEVEL={}", overview);
+  const char* const options[] = {overview < 0 ? nullptr : level.c_str(), nullptr};
+  return GDALDatasetUniquePtr(GDALDataset::Open(path.c_str(), kOpenFlags, nullptr, options));
 }
 
-Result<GDALDatasetUniquePtr> OpenRaster(const std::string& path) {
+Result<GDALDatasetUniquePtr> OpenRaster(const std::string& path, int overview) {
   if (auto file = CheckFile(path); !file) return tl::unexpected(file.error());
-  GDALDatasetUniquePtr dataset = ReopenRaster(path);
+  GDALDatasetUniquePtr dataset = ReopenRaster(path, overview);
   if (dataset == nullptr) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "{}: cannot be opened as a raster ({}); check the file with `gdalinfo {}` and its permissions",
@@ -100,6 +102,16 @@ Result<GDALDatasetUniquePtr> OpenRaster(const std::string& path) {
   }
   if (auto shape = CheckShape(*dataset, path); !shape) return tl::unexpected(shape.error());
   return dataset;
+}
+
+std::vector<std::string> FilesOf(GDALDataset& dataset, const std::string& path) {
+  std::vector<std::string> files = {path};
+  char** list = dataset.GetFileList();
+  for (char** name = list; name != nullptr && *name != nullptr; ++name) {
+    if (path != *name) files.emplace_back(*name);
+  }
+  CSLDestroy(list);
+  return files;
 }
 
 }  // namespace terrace::dem

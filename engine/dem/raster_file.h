@@ -4,6 +4,7 @@
 #include <gdal_priv.h>
 
 #include <string>
+#include <vector>
 
 #include "engine/core/result.h"
 
@@ -11,10 +12,14 @@ namespace terrace::dem {
 
 // Opens `path` read-only. Refuses, with the remedy: what is no regular file, no raster, has no band, complex samples,
 // sides or storage blocks of an absurd size. The name stands for a file and nothing else: no inline XML, no URL.
-Result<GDALDatasetUniquePtr> OpenRaster(const std::string& path);
+// `overview`: the raster as the overview of that number has it; -1: in full.
+Result<GDALDatasetUniquePtr> OpenRaster(const std::string& path, int overview = -1);
 
 // The same without the checks, for further handles on a file that passed them; null when it cannot be opened.
-GDALDatasetUniquePtr ReopenRaster(const std::string& path);
+GDALDatasetUniquePtr ReopenRaster(const std::string& path, int overview = -1);
+
+// The file, and those that GDAL reads with it: overviews, masks, the parts of a mosaic.
+std::vector<std::string> FilesOf(GDALDataset& dataset, const std::string& path);
 
 // Refuses what is too large to mesh in one piece.
 Result<void> CheckSizeToMesh(const std::string& path, int width, int height);

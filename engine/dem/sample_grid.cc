@@ -117,6 +117,14 @@ GDALRasterBand* FindOverview(GDALRasterBand& band, int factor) {
   return nullptr;
 }
 
+std::vector<int> OverviewFactors(GDALRasterBand& band) {
+  std::vector<int> factors;
+  for (int factor = 2; factor <= 1 << 16 && factor < std::max(band.GetXSize(), band.GetYSize()); factor *= 2) {
+    if (FindOverview(band, factor) != nullptr) factors.push_back(factor);
+  }
+  return factors;
+}
+
 Result<std::vector<float>> ReadGrid(GDALDataset& dataset, const RasterLayout& layout, int factor,
                                     const GridWindow& window, const std::stop_token& stop) {
   const auto level = StartingLevel(dataset, layout, factor);

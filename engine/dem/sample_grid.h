@@ -57,4 +57,7 @@ Result<std::vector<float>> ReadGrid(GDALDataset& dataset, const RasterLayout& la
 // The overview of that factor; null when there is none (any more).
 GDALRasterBand* FindOverview(GDALRasterBand& band, int factor);
 
+// The factors, powers of two, of the overviews that ReadGrid can use.
+std::vector<int> OverviewFactors(GDALRasterBand& band);
+
 }  // namespace terrace::dem

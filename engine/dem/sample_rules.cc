@@ -109,7 +109,7 @@ Result<void> ReadHeights(GDALRasterBand& band, const SampleRules& rules, int col
     }
     const std::size_t samples = static_cast<std::size_t>(cols) * static_cast<std::size_t>(count);
     for (std::size_t i = 0; i < samples; ++i) {
-      out[i] = rules.has_mask && mask[i] == 0 ? SampleRules::kVoid : rules.ToHeight(raw[i]);
+      out[i] = rules.has_mask && mask[i] == 0 ? rules.Hidden() : rules.ToHeight(raw[i]);
     }
     out += samples;
   }

@@ -3,6 +3,7 @@
 
 #include <gdal_priv.h>
 
+#include <cmath>
 #include <optional>
 #include <stop_token>
 #include <string>
@@ -18,6 +19,7 @@ struct SampleRules {
   std::optional<double> nodata;   // in raw values
   bool compare_as_float = false;  // nodata of Float32 bands may be stated with more digits than the samples have
   bool has_mask = false;          // a mask band says which samples are valid
+  bool is_indicator = false;      // samples become 1 where they are there and not zero, else 0
   double scale = 1, offset = 0;   // raw * scale + offset is in the band's unit
   double metres_per_unit = 1;
   std::string unit;  // as stated; empty: none
@@ -25,14 +27,20 @@ struct SampleRules {
   // `crs_unit`: the unit of the CRS's vertical axis, used where the band states none.
   static SampleRules Of(GDALRasterBand& band, const std::string& crs_unit);
 
-  // Metres, or NaN for a void.
+  bool IsNodata(double raw) const {
+    return nodata && (raw == *nodata || (compare_as_float && static_cast<float>(raw) == static_cast<float>(*nodata)));
+  }
+
+  // Metres, or NaN for a void; of an indicator 0 or 1.
   float ToHeight(double raw) const {
-    if (nodata && (raw == *nodata || (compare_as_float && static_cast<float>(raw) == static_cast<float>(*nodata)))) {
-      return kVoid;
-    }
+    if (is_indicator) return raw != 0 && !std::isnan(raw) && !IsNodata(raw) ? 1.0f : 0.0f;
+    if (IsNodata(raw)) return kVoid;
     const double height = (raw * scale + offset) * metres_per_unit;
     return height >= -kMaxAbsHeight && height <= kMaxAbsHeight ? static_cast<float>(height) : kVoid;
   }
+
+  // What a sample that a mask band hides becomes.
+  float Hidden() const { return is_indicator ? 0.0f : kVoid; }
 
   static constexpr float kVoid = __builtin_nanf("");
 };

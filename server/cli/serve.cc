@@ -17,6 +17,7 @@
 #include "config/parse.h"
 #include "server/cli/command.h"
 #include "server/cli/log.h"
+#include "server/cli/open_layers.h"
 #include "server/cli/progress.h"
 #include "server/server.h"
 #include "server/tiles/tile_pipeline.h"
@@ -75,10 +76,11 @@ config::Config MakeConfig(const ServeArguments& arguments, std::vector<config::C
 }
 
 // Changes when the source or an option that changes bytes does. The file's identity is in the source's fingerprint.
-std::uint64_t GenerationOf(const config::DatasetConfig& dataset, const dem::DemSource& source) {
-  const std::string text =
-      fmt::format(TERRACE_VERSION " {} {} {} {} {} {}", source.fingerprint(), dataset.error_fraction,
-                  static_cast<int>(dataset.criterion), dataset.compact, dataset.draco_speed, dataset.draco_normal_bits);
+std::uint64_t GenerationOf(const config::DatasetConfig& dataset, const dem::DemSource& source,
+                           const std::string& layers) {
+  const std::string text = fmt::format(TERRACE_VERSION " {} {} {} {} {} {} {}", source.fingerprint(),
+                                       dataset.error_fraction, static_cast<int>(dataset.criterion), dataset.compact,
+                                       dataset.draco_speed, dataset.draco_normal_bits, layers);
   return XXH3_64bits(text.data(), text.size());
 }
 
@@ -130,8 +132,13 @@ bool OpenDatasets(const config::Config& config, std::vector<server::Dataset>& da
     dataset.error_fraction = wanted.error_fraction;
     dataset.rules = {CriterionOf(wanted.criterion), wanted.compact};
     dataset.glb = GlbOptionsOf(wanted);
-    dataset.generation = GenerationOf(wanted, **source);
     dataset.source = *std::move(source);
+    if (const Result<void> layers = OpenLayers(wanted, dataset); !layers) {
+      std::fprintf(stderr, "terrace: dataset %s: %s\n", wanted.name.c_str(), layers.error().message.c_str());
+      all_open = false;
+      continue;
+    }
+    dataset.generation = GenerationOf(wanted, *dataset.source, LayersFingerprint(dataset));
     spdlog::info("dataset {}: {}, levels 0 to {}", dataset.name, wanted.sources.front(), dataset.source->max_level());
     datasets.push_back(std::move(dataset));
   }

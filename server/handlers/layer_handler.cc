@@ -28,6 +28,8 @@ Document MakeLayer(const DatasetView& dataset, std::string tile_query) {
   layer.east = crosses ? 180 : dataset.east;
   layer.south = dataset.south;
   layer.north = dataset.north;
+  layer.water_mask = dataset.has_water;
+  layer.metadata_levels = dataset.metadata_levels;
   layer.tile_query = std::move(tile_query);
   return Document::Make(proto::EncodeLayerJson(layer), "application/json");
 }

@@ -11,6 +11,7 @@
 #include <memory>
 #include <utility>
 
+#include "proto/media_type.h"
 #include "server/http/http_error.h"
 #include "server/http/negotiate.h"
 
@@ -31,7 +32,7 @@ std::string_view Name(CacheStatus cache) {
 
 std::string_view ContentTypeOf(const TileRequest& tile) {
   if (tile.format == TileFormat::kGlb) return "model/gltf-binary";
-  return tile.normals ? "application/vnd.quantized-mesh;extensions=octvertexnormals" : "application/vnd.quantized-mesh";
+  return proto::QuantizedMeshContentType({tile.normals, tile.water_mask, tile.metadata});
 }
 
 }  // namespace

@@ -24,13 +24,13 @@ int SubtreeLevels(const DatasetView& dataset, int root_level) {
   return std::min(kSubtreeLevels, LevelsUnder(dataset, root_level));
 }
 
-// What the content templates carry for a request. The value of `compression` has been checked.
+// What the content templates carry for a request. The values of `compression` and `texture` have been checked.
 std::string ContentQuery(const ErrorWish& wish, std::string_view query) {
   std::string content = TileQuery(wish);
   const QueryParameters parameters = ParseQuery(query).value_or(QueryParameters());
-  for (const auto& [name, value] : parameters) {
-    if (name != "compression") continue;
-    return content + (content.empty() ? "compression=" : "&compression=") + value;
+  for (const std::string_view wanted : {"compression", "texture"}) {
+    const auto sent = std::ranges::find(parameters, wanted, &QueryParameters::value_type::first);
+    if (sent != parameters.end()) content += (content.empty() ? "" : "&") + sent->first + "=" + sent->second;
   }
   return content;
 }

@@ -6,11 +6,10 @@
 #include <optional>
 
 #include "engine/geo/error_ladder.h"
+#include "proto/tile_metadata.h"
 
 namespace terrace::server {
 namespace {
-
-constexpr std::string_view kNormalsExtension = "octvertexnormals";
 
 char Lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
 
@@ -45,13 +44,6 @@ double Quality(std::string_view parameters) {
   return 1;
 }
 
-bool NamesNormals(std::string_view joined) {
-  while (!joined.empty()) {
-    if (NextPiece(joined, "-") == kNormalsExtension) return true;
-  }
-  return false;
-}
-
 // Draco ends in an entropy coder; meshopt leaves that to the transport.
 bool GzipHelps(const TileRequest& tile) {
   return tile.format == TileFormat::kQuantizedMesh || tile.compression != proto::GlbCompression::kDraco;
@@ -79,15 +71,10 @@ Coding NegotiateCoding(std::string_view accept_encoding) {
   return gzip_quality > 0 && gzip_quality >= identity_quality ? Coding::kGzip : Coding::kIdentity;
 }
 
-bool WantsNormals(std::string_view accept, const std::vector<std::string>& query_extensions) {
-  constexpr std::string_view kParameter = "extensions=";
-  while (!accept.empty()) {
-    const std::string_view piece = NextPiece(accept, ",;");
-    if (piece.size() < kParameter.size()) continue;
-    if (!EqualsIgnoringCase(piece.substr(0, kParameter.size()), kParameter)) continue;
-    if (NamesNormals(Trim(piece.substr(kParameter.size())))) return true;
-  }
-  return std::any_of(query_extensions.begin(), query_extensions.end(), NamesNormals);
+proto::TileExtensions WantedExtensions(std::string_view accept, const std::vector<std::string>& query_extensions) {
+  proto::TileExtensions wanted = proto::ExtensionsInAccept(accept);
+  for (const std::string& names : query_extensions) wanted = wanted | proto::ParseExtensions(names);
+  return wanted;
 }
 
 int ErrorStep(const ErrorWish& wish, int level, double error_fraction) {
@@ -125,10 +112,16 @@ Result<TileRequest> Negotiate(const Route& route, const Request& request, std::s
   tile.key = route.key;
   tile.error_step = ErrorStep(parameters->wish, route.key.level, view.error_fraction);
   tile.format = route.format;
-  if (route.format == TileFormat::kGlb) tile.compression = parameters->compression.value_or(view.glb_compression);
+  if (route.format == TileFormat::kGlb) {
+    tile.compression = parameters->compression.value_or(view.glb_compression);
+    if (view.texture) tile.texture = parameters->texture.value_or(*view.texture);
+  }
   if (GzipHelps(tile)) tile.coding = NegotiateCoding(request.accept_encoding);
   if (route.format == TileFormat::kQuantizedMesh) {
-    tile.normals = WantsNormals(request.accept, parameters->extensions);
+    const proto::TileExtensions wanted = WantedExtensions(request.accept, parameters->extensions);
+    tile.normals = wanted.octvertexnormals;
+    tile.water_mask = wanted.watermask && view.has_water;
+    tile.metadata = wanted.metadata && proto::CarriesMetadata(route.key.level, view.metadata_levels, view.max_level());
   }
   return tile;
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "engine/core/result.h"
+#include "proto/media_type.h"
 #include "server/http/query.h"
 #include "server/http/request.h"
 #include "server/http/router.h"
@@ -25,9 +26,9 @@ Result<std::uint32_t> FindDataset(std::string_view name, std::span<const Dataset
 // gzip where the client takes it at least as gladly as identity. Without Accept-Encoding: identity.
 Coding NegotiateCoding(std::string_view accept_encoding);
 
-// True when an `extensions=a-b` parameter anywhere in Accept, or one of the query's values, names octvertexnormals.
-// Names nobody knows are ignored. 3DTilesRendererJS hangs the parameter on application/octet-stream.
-bool WantsNormals(std::string_view accept, const std::vector<std::string>& query_extensions);
+// What `extensions=a-b` parameters anywhere in Accept, and the query's values, name together. Names nobody knows are
+// ignored. 3DTilesRendererJS hangs the parameter on application/octet-stream.
+proto::TileExtensions WantedExtensions(std::string_view accept, const std::vector<std::string>& query_extensions);
 
 // The step on the level's ladder that a wish comes to; 0 without a wish.
 int ErrorStep(const ErrorWish& wish, int level, double error_fraction);

@@ -51,6 +51,16 @@ Result<void> SetCompression(std::optional<proto::GlbCompression>& to, std::strin
   return MakeError(ErrorCode::kInvalidArgument, "compression must be draco, none, quantized or meshopt");
 }
 
+Result<void> SetTexture(std::optional<proto::TextureFormat>& to, std::string_view text) {
+  constexpr std::pair<std::string_view, proto::TextureFormat> kNames[] = {{"none", proto::TextureFormat::kNone},
+                                                                          {"jpeg", proto::TextureFormat::kJpeg},
+                                                                          {"webp", proto::TextureFormat::kWebp}};
+  for (const auto& [name, texture] : kNames) {
+    if (text == name) return SetOnce(to, texture, "texture", /*repeatable=*/true);
+  }
+  return MakeError(ErrorCode::kInvalidArgument, "texture must be jpeg, webp or none");
+}
+
 Result<void> CheckTogether(const ErrorWish& wish, bool at_least_given) {
   if (wish.error_m && wish.fraction) {
     return MakeError(ErrorCode::kInvalidArgument, "error and fraction exclude each other");
@@ -118,9 +128,11 @@ Result<TileParameters> ParseTileParameters(std::string_view query, bool allow_at
       wish.at_least = value == "1";
     } else if (name == "compression" && allow_compression) {
       set = SetCompression(parameters.compression, value);
+    } else if (name == "texture" && allow_compression) {
+      set = SetTexture(parameters.texture, value);
     } else {
       set = MakeError(ErrorCode::kInvalidArgument, "unknown parameter; known are error, fraction{}{}",
-                      allow_at_least ? ", atleast, extensions" : "", allow_compression ? ", compression" : "");
+                      allow_at_least ? ", atleast, extensions" : "", allow_compression ? ", compression, texture" : "");
     }
     if (!set) return tl::unexpected(set.error());
   }

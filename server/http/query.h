@@ -9,6 +9,7 @@
 
 #include "engine/core/result.h"
 #include "proto/glb_tile.h"
+#include "proto/texture.h"
 
 namespace terrace::server {
 
@@ -33,14 +34,14 @@ struct TileParameters {
   ErrorWish wish;
   std::vector<std::string> extensions;  // every `extensions` value
   std::optional<proto::GlbCompression> compression;
+  std::optional<proto::TextureFormat> texture;
 };
 
 // The parameters of tile URLs (`allow_at_least`), among them those of .glb (`allow_compression`), and of layer.json.
 // `v` and `extensions` may come any number of times: clients append them on their own. deck.gl appends the query of
-// tileset.json to every URL under it, so error, fraction and compression may come again there with the same value.
-// kInvalidArgument, with a message
-// for the client: an unknown or repeated parameter, error and fraction together, atleast without error, or a value that
-// is not what the parameter takes.
+// tileset.json to every URL under it, so error, fraction, compression and texture may come again there with the same
+// value. kInvalidArgument, with a message for the client: an unknown or repeated parameter, error and fraction
+// together, atleast without error, or a value that is not what the parameter takes.
 Result<TileParameters> ParseTileParameters(std::string_view query, bool allow_at_least, bool allow_compression = false);
 
 // For URLs that take no parameters but `v`.

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -12,6 +13,7 @@
 #include "engine/geo/error_ladder.h"
 #include "engine/geo/tile_key.h"
 #include "proto/glb_tile.h"
+#include "proto/texture.h"
 
 namespace terrace::server {
 
@@ -25,6 +27,9 @@ struct DatasetView {
   double west = -180, south = -90, east = 180, north = 90;  // degrees; west > east: across the antimeridian
   double min_height_m = 0, max_height_m = 0;                // of the data
   double floor_m = 0;                                       // height where there is no data
+  bool has_water = false;                                   // tiles have a water mask
+  std::optional<proto::TextureFormat> texture;  // of GLB tiles, for requests that name none; nothing: no imagery
+  int metadata_levels = 0;                      // tiles of every so many levels tell what is below them; 0: none
 
   int max_level() const { return static_cast<int>(available.size()) - 1; }
 };

@@ -11,7 +11,9 @@
 #include "proto/quantized_mesh.h"
 #include "proto/tile_normals.h"
 #include "server/tiles/glb_mesher.h"
+#include "server/tiles/tile_extensions.h"
 #include "server/tiles/tile_mesher.h"
+#include "server/tiles/tile_texture.h"
 
 namespace terrace::server {
 namespace {
@@ -83,7 +85,9 @@ Result<void> TilePipeline::EncodeQuantizedMesh(const TileRequest& request, const
   Result<MeshedTile> measured = MeshTile(*dataset.source, lattice, refined.refinement, dataset.rules, error_m, stop);
   if (!measured) return tl::unexpected(std::move(measured).error());
   if (request.normals) measured->tile.normals = proto::TileNormals(lattice, measured->mesh, measured->tile);
-  encoded.bytes = proto::EncodeQuantizedMesh(measured->tile, {.normals = request.normals});
+  const Result<proto::QuantizedMeshOptions> options = AddExtensions(dataset, request, lattice, measured->tile, stop);
+  if (!options) return tl::unexpected(options.error());
+  encoded.bytes = proto::EncodeQuantizedMesh(measured->tile, *options);
   encoded.times.refine += measured->replayed;
   encoded.times.encode = Since(start) - measured->replayed;
   encoded.max_error_m = measured->max_error_m;
@@ -101,6 +105,9 @@ Result<void> TilePipeline::EncodeGlb(const TileRequest& request, const RefinedTi
   if (!meshed) return tl::unexpected(meshed.error());
   proto::GlbOptions options = dataset.glb;
   options.compression = request.compression;
+  if (const Result<void> added = AddTexture(dataset.imagery, request, options, stop); !added) {
+    return tl::unexpected(added.error());
+  }
   Result<proto::GlbTile> glb = proto::EncodeGlb(meshed->mesh, options);
   if (!glb) return tl::unexpected(std::move(glb).error());
   encoded.bytes = std::move(glb->bytes);

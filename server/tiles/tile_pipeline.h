@@ -3,19 +3,40 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <stop_token>
 #include <string>
 #include <vector>
 
 #include "engine/core/result.h"
 #include "engine/dem/dem_source.h"
+#include "engine/dem/imagery.h"
+#include "engine/dem/water_raster.h"
 #include "proto/glb_tile.h"
+#include "proto/texture.h"
 #include "server/tiles/encoded_tile.h"
 #include "server/tiles/refined_tile.h"
 #include "server/tiles/tile_mesher.h"
 #include "server/tiles/tile_request.h"
 
 namespace terrace::server {
+
+// Where a dataset's water comes from: one of both, or neither, and it has none.
+struct WaterRules {
+  std::unique_ptr<dem::WaterRaster> mask;
+  std::optional<double> sea_level_m;  // in what the source's heights count from
+
+  bool any() const { return mask != nullptr || sea_level_m.has_value(); }
+};
+
+// What textures of GLB tiles are cut from.
+struct ImageryRules {
+  std::unique_ptr<dem::Imagery> image;                         // null: none
+  proto::TextureFormat texture = proto::TextureFormat::kJpeg;  // what requests get that name none
+  int side = 512;                                              // pixels along a tile's edge, at most
+  int quality = 80;                                            // of EncodePicture
+  std::string attribution;
+};
 
 // One served dataset: a name, a source and what its users should read.
 struct Dataset {
@@ -25,6 +46,9 @@ struct Dataset {
   MeshRules rules;
   proto::GlbOptions glb;  // compression: what GLB requests get that name none
   std::unique_ptr<dem::DemSource> source;
+  WaterRules water;
+  ImageryRules imagery;
+  int metadata_levels = 0;       // tiles of every so many levels tell what is below them; 0: none
   std::uint64_t generation = 0;  // hash of the source's fingerprint and every option that changes bytes
 };
 

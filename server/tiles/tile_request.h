@@ -6,6 +6,7 @@
 
 #include "engine/geo/tile_key.h"
 #include "proto/glb_tile.h"
+#include "proto/texture.h"
 
 namespace terrace::server {
 
@@ -18,8 +19,13 @@ struct TileRequest {
   int error_step = 0;  // on the ladder of the key's level (engine/geo/error_ladder.h)
   TileFormat format = TileFormat::kQuantizedMesh;
   proto::GlbCompression compression = proto::GlbCompression::kDraco;  // kGlb only
+  proto::TextureFormat texture = proto::TextureFormat::kNone;         // kGlb only
   Coding coding = Coding::kIdentity;
-  bool normals = false;  // kQuantizedMesh only; GLB tiles always have them
+  // Extensions of quantized-mesh, each only where the client asks for it and the tile has it. GLB tiles always have
+  // normals.
+  bool normals = false;
+  bool water_mask = false;
+  bool metadata = false;
 
   friend bool operator==(const TileRequest&, const TileRequest&) = default;
 };

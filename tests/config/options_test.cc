@@ -73,5 +73,31 @@ TEST(SetDatasetOption, SetsOneDataset) {
                                   IsError("--name", "is a URL of the server itself")));
 }
 
+TEST(SetDatasetOption, TellsASeaLevelFromAMask) {
+  DatasetConfig dataset;
+  std::vector<ConfigError> errors;
+  SetDatasetOption("water", "-2.5", dataset, errors);
+  EXPECT_EQ(dataset.water, (WaterConfig{"", -2.5}));
+  SetDatasetOption("water", "/data/water.tif", dataset, errors);
+  EXPECT_EQ(dataset.water, (WaterConfig{"/data/water.tif", std::nullopt}));
+  EXPECT_THAT(errors, IsEmpty());
+  SetDatasetOption("water", "1e9", dataset, errors);
+  SetDatasetOption("water", "", dataset, errors);
+  EXPECT_THAT(errors, ElementsAre(IsError("--water", "a number from -20000 to 20000"),
+                                  IsError("--water", "the path of a raster")));
+}
+
+TEST(SetDatasetOption, TakesTheImageOfImageryAlone) {
+  DatasetConfig dataset;
+  std::vector<ConfigError> errors;
+  SetDatasetOption("imagery", "/data/photo.tif", dataset, errors);
+  EXPECT_THAT(errors, IsEmpty());
+  ImageryConfig expected;
+  expected.image = "/data/photo.tif";
+  EXPECT_EQ(dataset.imagery, expected);
+  SetDatasetOption("imagery", "", dataset, errors);
+  EXPECT_THAT(errors, ElementsAre(IsError("--imagery", "the path of an image")));
+}
+
 }  // namespace
 }  // namespace terrace::config

@@ -31,7 +31,11 @@ TEST(ToJson, ComesBackWithEveryOptionSet) {
   DatasetConfig dataset{
       "a", {"/data/a.tif"}, VerticalDatum::kUnknown, "© \"ét\\é\"", 0.1, 1e-3, -0.3, 7, Criterion::kDataDependent,
       true};
+  dataset.water.sea_level = -1.25;
+  dataset.metadata_availability = 7;
   config.datasets = {dataset, Dataset("b")};
+  config.datasets[1].water.mask = "/data/water.tif";
+  config.datasets[1].imagery = {"/data/photo.tif", "© \"é\"", Texture::kWebp, 64, 99};
   config.viewer = {true, "/srv/page"};
   config.cache_control = "no-cache";
   config.io_threads = 64;
@@ -55,6 +59,8 @@ TEST(ToJson, NamesEveryOption) {
   DatasetConfig dataset = Dataset("a");
   dataset.finest_error = 1;
   dataset.floor = 0;
+  dataset.water.sea_level = 0;
+  dataset.imagery.image = "/data/photo.tif";
   config.datasets = {dataset};
   const Json json = Json::parse(ToJson(config));
   EXPECT_EQ(json.size(), ServerOptionTable().size());

@@ -56,7 +56,9 @@ std::optional<std::vector<double>> ReadAccessor(const Json& json, std::size_t in
   const std::optional<View> view =
       ReadView(json.at("bufferViews").at(accessor.at("bufferView").get<std::size_t>()), json.at("buffers"), buffer);
   if (!view) return std::nullopt;
-  const std::size_t count = accessor.at("count"), columns = accessor.at("type") == "VEC3" ? 3 : 1;
+  const std::size_t count = accessor.at("count"), columns = accessor.at("type") == "VEC3"   ? 3
+                                                            : accessor.at("type") == "VEC2" ? 2
+                                                                                            : 1;
   const int component = accessor.at("componentType");
   const std::size_t size = component == 5120 ? 1 : component == 5123 ? 2 : 4;
   const std::size_t stride = view->stride > 0 ? view->stride : size * columns;
@@ -71,27 +73,27 @@ std::optional<std::vector<double>> ReadAccessor(const Json& json, std::size_t in
       if (component == 5123) number = At<std::uint16_t>(bytes, at);
       if (component == 5125) number = At<std::uint32_t>(bytes, at);
       if (component == 5126) number = static_cast<double>(At<float>(bytes, at));
-      if (accessor.value("normalized", false)) number = std::max(number / 127, -1.0);
+      if (accessor.value("normalized", false)) number = std::max(number / (component == 5120 ? 127 : 65535), -1.0);
       numbers.push_back(number);
     }
   }
   return numbers;
 }
 
-std::vector<double> DracoNumbers(const draco::Mesh& mesh, std::uint32_t unique_id) {
+std::vector<double> DracoNumbers(const draco::Mesh& mesh, std::uint32_t unique_id, std::size_t columns = 3) {
   std::vector<double> numbers;
   const draco::PointAttribute* const attribute = mesh.GetAttributeByUniqueId(unique_id);
   if (!attribute) return numbers;
   for (draco::PointIndex point(0); point < mesh.num_points(); ++point) {
     std::array<float, 3> value{};
     attribute->GetMappedValue(point, value.data());
-    for (const float number : value) numbers.push_back(static_cast<double>(number));
+    for (std::size_t i = 0; i < columns; ++i) numbers.push_back(static_cast<double>(value[i]));
   }
   return numbers;
 }
 
 struct Numbers {
-  std::vector<double> positions, normals, indices;
+  std::vector<double> positions, normals, indices, uv;
 };
 
 std::optional<Numbers> ReadDraco(const Json& json, const Json& extension, std::string_view buffer) {
@@ -107,6 +109,9 @@ std::optional<Numbers> ReadDraco(const Json& json, const Json& extension, std::s
   Numbers numbers;
   numbers.positions = DracoNumbers(mesh, extension.at("attributes").at("POSITION"));
   numbers.normals = DracoNumbers(mesh, extension.at("attributes").at("NORMAL"));
+  if (extension.at("attributes").contains("TEXCOORD_0")) {
+    numbers.uv = DracoNumbers(mesh, extension.at("attributes").at("TEXCOORD_0"), 2);
+  }
   for (draco::FaceIndex face(0); face < mesh.num_faces(); ++face) {
     for (int corner = 0; corner < 3; ++corner) numbers.indices.push_back(mesh.face(face)[corner].value());
   }
@@ -121,7 +126,13 @@ std::optional<Numbers> ReadNumbers(const Json& json, const Json& primitive, std:
   const auto normals = ReadAccessor(json, primitive.at("attributes").at("NORMAL"), buffer);
   const auto indices = ReadAccessor(json, primitive.at("indices"), buffer);
   if (!positions || !normals || !indices) return std::nullopt;
-  return Numbers{*positions, *normals, *indices};
+  Numbers numbers{*positions, *normals, *indices, {}};
+  if (primitive.at("attributes").contains("TEXCOORD_0")) {
+    const auto uv = ReadAccessor(json, primitive.at("attributes").at("TEXCOORD_0"), buffer);
+    if (!uv) return std::nullopt;
+    numbers.uv = *uv;
+  }
+  return numbers;
 }
 
 std::optional<DecodedGlb> Decode(std::string_view bytes) {
@@ -148,6 +159,18 @@ std::optional<DecodedGlb> Decode(std::string_view bytes) {
       count(primitive.at("attributes").at("NORMAL")) != vertices ||
       numbers->indices.size() != count(primitive.at("indices")) || numbers->indices.size() % 3 != 0) {
     return std::nullopt;
+  }
+  if (primitive.at("attributes").contains("TEXCOORD_0") != !numbers->uv.empty() ||
+      (!numbers->uv.empty() &&
+       (numbers->uv.size() != 2 * vertices || count(primitive.at("attributes").at("TEXCOORD_0")) != vertices))) {
+    return std::nullopt;
+  }
+  for (std::size_t k = 0; k < numbers->uv.size(); k += 2) glb.uv.push_back({numbers->uv[k], numbers->uv[k + 1]});
+  if (glb.json.contains("images")) {
+    const std::size_t index = glb.json.at("images").at(0).at("bufferView");
+    const std::optional<View> view = ReadView(glb.json.at("bufferViews").at(index), glb.json.at("buffers"), buffer);
+    if (!view) return std::nullopt;
+    glb.image = view->bytes;
   }
   const auto m = glb.json.at("nodes").at(0).at("matrix").get<std::array<double, 16>>();
   for (std::size_t k = 0; k < vertices; ++k) {

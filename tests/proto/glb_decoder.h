@@ -20,6 +20,8 @@ struct DecodedGlb {
   std::vector<geo::Vec3> positions;           // ECEF metres
   std::vector<geo::Vec3> normals;             // ECEF
   std::vector<std::array<std::uint32_t, 3>> triangles;
+  std::vector<std::array<double, 2>> uv;  // texture coordinates; empty: none
+  std::string image;                      // bytes of the only image; empty: none
 };
 
 // Nothing where anything is missing, left over or out of range: counts and lengths that disagree, an index without a

@@ -44,6 +44,19 @@ TEST(LayerJson, ListsEveryRangeOfEveryLevel) {
   EXPECT_EQ(Json::parse(EncodeLayerJson(Maui())).at("available"), expected);
 }
 
+TEST(LayerJson, NamesTheExtensionsThatTilesHave) {
+  LayerDescription layer = Maui();
+  layer.water_mask = true;
+  Json json = Json::parse(EncodeLayerJson(layer));
+  EXPECT_EQ(json.at("extensions"), Json::array({"octvertexnormals", "watermask"}));
+  EXPECT_FALSE(json.contains("metadataAvailability"));
+  layer.metadata_levels = 4;
+  json = Json::parse(EncodeLayerJson(layer));
+  EXPECT_EQ(json.at("extensions"), Json::array({"octvertexnormals", "watermask", "metadata"}));
+  EXPECT_EQ(json.at("metadataAvailability"), 4);
+  EXPECT_EQ(json.at("available").size(), 2u) << "for clients that read no metadata";
+}
+
 TEST(LayerJson, OneTemplateCarriesVersionAndQuery) {
   LayerDescription layer = Maui();
   EXPECT_EQ(Json::parse(EncodeLayerJson(layer)).at("tiles"), Json::array({"{z}/{x}/{y}.terrain?v={version}"}));

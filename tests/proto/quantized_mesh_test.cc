@@ -171,6 +171,32 @@ TEST(QuantizedMesh, ExtensionsAreSentOnlyWhenAskedFor) {
   EXPECT_EQ(normals.size(), plain.size() + 5 + 2 * 4);
 }
 
+TEST(QuantizedMesh, ExtensionsAreTheseBytesInOrderOfTheirIds) {
+  QuantizedTile tile = SmallTile();
+  tile.water_mask = {255};
+  tile.metadata = R"({"available":[]})";
+  const std::string plain = EncodeQuantizedMesh(tile, kPlain);
+  const std::string bytes = EncodeQuantizedMesh(tile, {.normals = true, .water_mask = true, .metadata = true});
+  EXPECT_EQ(bytes.substr(0, plain.size()), plain);
+  EXPECT_EQ(Hex(bytes.substr(plain.size())),
+            "01080000000102030407080506"          // normals
+            "0201000000ff"                        // water mask
+            "041400000010000000"                  // metadata: 4 + 16 bytes, 16 bytes of JSON
+            "7b22617661696c61626c65223a5b5d7d");  // {"available":[]}
+  const DecodedTile decoded = Decoded(bytes);
+  ASSERT_EQ(decoded.extensions.size(), 3u);
+  EXPECT_EQ(decoded.extensions[1].bytes, "\xff");
+}
+
+TEST(QuantizedMesh, AWholeWaterMaskKeepsItsRows) {
+  QuantizedTile tile = SmallTile();
+  for (int i = 0; i < 65536; ++i) tile.water_mask.push_back(static_cast<std::uint8_t>(i / 256));
+  const DecodedTile decoded = Decoded(EncodeQuantizedMesh(tile, {.normals = false, .water_mask = true}));
+  ASSERT_EQ(decoded.extensions.size(), 1u);
+  EXPECT_EQ(decoded.extensions[0].id, 2);
+  EXPECT_EQ(decoded.extensions[0].bytes, std::string(tile.water_mask.begin(), tile.water_mask.end()));
+}
+
 TEST(QuantizedMesh, UnusedVerticesAreNotSent) {
   QuantizedTile tile = SmallTile();
   for (auto* values : {&tile.u, &tile.v, &tile.h}) values->push_back(16000);
@@ -222,6 +248,11 @@ TEST(QuantizedMeshDeathTest, WhatTheFormatCannotHoldIsAMistake) {
   QuantizedTile without_an_east_edge = SmallTile();
   without_an_east_edge.u[1] = 32766;
   expect_death(without_an_east_edge);
+  QuantizedTile half_a_mask = SmallTile();
+  half_a_mask.water_mask.resize(32768);
+  EXPECT_DEATH(EncodeQuantizedMesh(half_a_mask, {.normals = false, .water_mask = true}), "check failed");
+  EXPECT_DEATH(EncodeQuantizedMesh(SmallTile(), {.normals = false, .water_mask = false, .metadata = true}),
+               "check failed");
   QuantizedTile one_triangle = SmallTile();
   one_triangle.triangles.pop_back();
   expect_death(one_triangle);

@@ -55,6 +55,19 @@ class Usage(unittest.TestCase):
         self.assertEqual(result.returncode, 2)
         self.assertIn("Usage: terrace", result.stderr)
 
+    def test_layers_of_another_place_are_refused(self):
+        with tempfile.TemporaryDirectory() as folder:
+            far = pathlib.Path(folder) / "far.img"
+            far.write_bytes(bytes([1] * 16))
+            far.with_suffix(".hdr").write_text(
+                "ENVI\nsamples = 4\nlines = 4\nbands = 1\ndata type = 1\ninterleave = bsq\nbyte order = 0\n"
+                "map info = {Geographic Lat/Lon, 1, 1, 10, 20, 1, 1, WGS-84}\n")
+            for flag, layer in (("--water", "water mask"), ("--imagery", "imagery")):
+                result = run("serve", SOURCE_DIR / "config/samples/jacksboro.tif", flag, far, "--listen", "127.0.0.1:0")
+                self.assertEqual((result.returncode, result.stdout), (1, ""), flag)
+                self.assertIn(f"terrace: dataset jacksboro: {layer} {far}: covers longitudes 10.0000 to 14.0000",
+                              result.stderr)
+
     def test_a_missing_raster_gives_code_1(self):
         for command in ("serve", "info"):
             result = run(command, "/nowhere/dem.tif")

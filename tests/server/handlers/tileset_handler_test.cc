@@ -78,6 +78,8 @@ TEST_F(TilesetHandlerTest, WritesWishesIntoTheContentTemplates) {
   EXPECT_EQ(content("?fraction=.250&compression=none"),
             "3dtiles/7-17-32/{level}/{x}/{y}.glb?fraction=0.25&compression=none");
   EXPECT_EQ(content("?compression=meshopt"), "3dtiles/7-17-32/{level}/{x}/{y}.glb?compression=meshopt");
+  EXPECT_EQ(content("?texture=webp&compression=none&texture=webp"),
+            "3dtiles/7-17-32/{level}/{x}/{y}.glb?compression=none&texture=webp");
   EXPECT_EQ(content("?v=1"), "3dtiles/7-17-32/{level}/{x}/{y}.glb");
 }
 

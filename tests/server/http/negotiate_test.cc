@@ -40,32 +40,58 @@ TEST(Negotiate, ChoosesTheCodingByQuality) {
   for (const auto& c : cases) EXPECT_EQ(NegotiateCoding(c.accept_encoding), c.coding) << c.accept_encoding;
 }
 
-TEST(Negotiate, FindsTheNormalsWhereverClientsAskForThem) {
+TEST(Negotiate, FindsExtensionsWhereverClientsAskForThem) {
+  const proto::TileExtensions none, normals{true, false, false}, metadata{false, false, true},
+      normals_metadata{true, false, true}, all{true, true, true};
   const struct {
     const char* accept;
     std::vector<std::string> query;
-    bool normals;
+    proto::TileExtensions wanted;
   } cases[] = {
-      {"", {}, false},
-      {"*/*", {}, false},
-      {"application/vnd.quantized-mesh,application/octet-stream;q=0.9,*/*;q=0.01", {}, false},
+      {"", {}, none},
+      {"*/*", {}, none},
+      {"application/vnd.quantized-mesh,application/octet-stream;q=0.9,*/*;q=0.01", {}, none},
       // CesiumJS
       {"application/vnd.quantized-mesh;extensions=octvertexnormals-watermask-metadata,application/octet-stream;q=0.9,*/"
        "*;q=0.01",
        {},
-       true},
-      {"application/vnd.quantized-mesh;extensions=metadata,application/octet-stream;q=0.9", {}, false},
+       all},
+      {"application/vnd.quantized-mesh;extensions=metadata,application/octet-stream;q=0.9", {}, metadata},
       // 3DTilesRendererJS
-      {"application/vnd.quantized-mesh,application/octet-stream;q=0.9;extensions=octvertexnormals-metadata", {}, true},
+      {"application/vnd.quantized-mesh,application/octet-stream;q=0.9;extensions=octvertexnormals-metadata",
+       {},
+       normals_metadata},
       // cesium-native
-      {"", {"octvertexnormals-metadata"}, true},
-      {"*/*", {"metadata", "watermask-octvertexnormals"}, true},
-      {"", {"octvertexnormalsx"}, false},
-      {"a/b; Extensions=\"octvertexnormals\"", {}, true},
-      {"a/b;extensions=", {""}, false},
-      {"a/b;xextensions=octvertexnormals", {}, false},
+      {"", {"octvertexnormals-metadata"}, normals_metadata},
+      {"*/*", {"metadata", "watermask-octvertexnormals"}, all},
+      {"a/b;extensions=octvertexnormals", {"watermask-metadata"}, all},
+      {"", {"octvertexnormalsx"}, none},
+      {"a/b; Extensions=\"octvertexnormals\"", {}, normals},
+      {"a/b;extensions=", {""}, none},
+      {"a/b;xextensions=octvertexnormals", {}, none},
   };
-  for (const auto& c : cases) EXPECT_EQ(WantsNormals(c.accept, c.query), c.normals) << c.accept;
+  for (const auto& c : cases) EXPECT_EQ(WantedExtensions(c.accept, c.query), c.wanted) << c.accept;
+}
+
+TEST(Negotiate, GivesNoExtensionThatTheTileHasNot) {
+  std::array<DatasetView, 2> datasets;
+  datasets[0].name = "dry";
+  datasets[1].name = "wet";
+  datasets[1].has_water = true;
+  datasets[1].metadata_levels = 2;
+  for (DatasetView& dataset : datasets) dataset.available = {{{0, 0, 1, 0}}, {{0, 0, 3, 1}}, {{0, 0, 7, 3}}};
+  Request request;
+  request.accept = "a/b;extensions=octvertexnormals-watermask-metadata";
+  const auto extensions = [&](const char* target) {
+    const TileRequest tile = *Negotiate(*Match(target), request, datasets);
+    return proto::TileExtensions{tile.normals, tile.water_mask, tile.metadata};
+  };
+  EXPECT_EQ(extensions("/dry/0/0/0.terrain"), (proto::TileExtensions{true, false, false}));
+  EXPECT_EQ(extensions("/wet/0/0/0.terrain"), (proto::TileExtensions{true, true, true}));
+  EXPECT_EQ(extensions("/wet/1/0/0.terrain"), (proto::TileExtensions{true, true, false})) << "between two levels";
+  EXPECT_EQ(extensions("/wet/2/0/0.terrain"), (proto::TileExtensions{true, true, false})) << "nothing is below";
+  request.accept.clear();
+  EXPECT_EQ(extensions("/wet/0/0/0.terrain"), proto::TileExtensions{});
 }
 
 ErrorWish Wish(std::optional<double> error_m, bool at_least = false, std::optional<double> fraction = {}) {
@@ -176,6 +202,21 @@ TEST(Negotiate, AParentIsAtMostTwiceAsCoarse) {
       }
     }
   }
+}
+
+TEST(Negotiate, GivesATextureOnlyToGlbTilesOfDatasetsWithImagery) {
+  std::array<DatasetView, 2> datasets;
+  datasets[0].name = "bare";
+  datasets[1].name = "photo";
+  datasets[1].texture = proto::TextureFormat::kJpeg;
+  for (DatasetView& dataset : datasets) dataset.available = {{{0, 0, 1, 0}}};
+  const auto texture = [&](const char* target) { return Negotiate(*Match(target), Request(), datasets)->texture; };
+  EXPECT_EQ(texture("/bare/0/0/0.glb"), proto::TextureFormat::kNone);
+  EXPECT_EQ(texture("/bare/0/0/0.glb?texture=webp"), proto::TextureFormat::kNone);
+  EXPECT_EQ(texture("/photo/0/0/0.glb"), proto::TextureFormat::kJpeg);
+  EXPECT_EQ(texture("/photo/0/0/0.glb?texture=webp"), proto::TextureFormat::kWebp);
+  EXPECT_EQ(texture("/photo/0/0/0.glb?texture=none"), proto::TextureFormat::kNone);
+  EXPECT_EQ(texture("/photo/0/0/0.terrain"), proto::TextureFormat::kNone);
 }
 
 }  // namespace

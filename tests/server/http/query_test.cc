@@ -99,6 +99,17 @@ TEST(Query, TakesAnEqualValueAgainOn3dTilesUrls) {
   EXPECT_FALSE(accepts("error=5&error=x"));
 }
 
+TEST(Query, ReadsTheTextureOf3dTilesUrls) {
+  EXPECT_EQ(ParseTileParameters("", true, true)->texture, std::nullopt);
+  EXPECT_EQ(ParseTileParameters("texture=jpeg", true, true)->texture, proto::TextureFormat::kJpeg);
+  EXPECT_EQ(ParseTileParameters("texture=webp&texture=webp", true, true)->texture, proto::TextureFormat::kWebp);
+  EXPECT_EQ(ParseTileParameters("texture=none", true, true)->texture, proto::TextureFormat::kNone);
+  for (const char* query : {"texture=", "texture=JPEG", "texture=png", "texture=jpeg&texture=none"}) {
+    EXPECT_FALSE(ParseTileParameters(query, true, true)) << query;
+  }
+  EXPECT_FALSE(ParseTileParameters("texture=jpeg", true));
+}
+
 TEST(Query, RefusesParametersWhereThereAreNone) {
   EXPECT_TRUE(RefuseParameters(""));
   EXPECT_TRUE(RefuseParameters("v=1"));

@@ -1,0 +1,15 @@
+// The options `water` and `imagery` of a dataset: objects with keys of their own. Used inside this room only.
+#pragma once
+
+#include "config/config.h"
+#include "config/option_codec.h"
+
+namespace terrace::config {
+
+// {"mask": "water.tif"} or {"sea_level": 0}. As a flag a number is a sea level and everything else the path of a mask.
+Codec<DatasetConfig> WaterCodec();
+
+// {"image": "photo.tif", "attribution": ..., ...}. As a flag the path alone.
+Codec<DatasetConfig> ImageryCodec();
+
+}  // namespace terrace::config

@@ -1,0 +1,123 @@
+#include "engine/dem/water_raster.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "engine/core/check.h"
+#include "engine/dem/footprint.h"
+#include "engine/dem/gdal_handle.h"
+#include "engine/dem/georeference.h"
+#include "engine/dem/grid_cells.h"
+#include "engine/dem/level_plan.h"
+#include "engine/dem/node_positions.h"
+#include "engine/dem/raster_file.h"
+#include "engine/dem/sample_grid.h"
+
+namespace terrace::dem {
+namespace {
+
+// In samples of the grid that is read: far below what shows in 8 bits.
+constexpr double kPositionTolerance = 1e-3;
+
+RasterLayout LayoutOf(GDALDataset& dataset, const Georeference& georeference) {
+  RasterLayout layout;
+  layout.width = georeference.width();
+  layout.height = georeference.height();
+  layout.wraps = georeference.wrap_columns() > 0;
+  layout.columns = layout.wraps ? georeference.wrap_columns() : layout.width;
+  layout.rules = SampleRules::Of(HeightBand(dataset), "");
+  layout.rules.is_indicator = true;
+  layout.overview_factors = OverviewFactors(HeightBand(dataset));
+  return layout;
+}
+
+}  // namespace
+
+class WaterRaster::Impl {
+ public:
+  Impl(std::string path_of_file, StampedFiles files, Georeference where)
+      : path(std::move(path_of_file)), handles(path, std::move(files)), georeference(std::move(where)) {}
+
+  Result<std::vector<std::uint8_t>> Read(const geo::TileKey& key, const std::stop_token& stop);
+
+  const std::string path;
+  HandlePool handles;
+  const Georeference georeference;
+  SourceSpacing spacing;
+  RasterLayout layout;
+  Footprint footprint;  // padded: outside it there is no water
+
+ private:
+  bool IsInside(const Position& position) const {  // false for NaN
+    const bool row = position.y >= 0 && position.y <= layout.height;
+    return row && (layout.wraps ? !std::isnan(position.x) : position.x >= 0 && position.x <= layout.width);
+  }
+};
+
+Result<std::vector<std::uint8_t>> WaterRaster::Impl::Read(const geo::TileKey& key, const std::stop_token& stop) {
+  std::vector<std::uint8_t> pixels(std::size_t{kSide} * kSide, 0);
+  const geo::Lattice lattice{key.level, kSide};
+  const double samples_per_pixel = SamplesPerCell(lattice, spacing);
+  const int factor = AveragingFactor(samples_per_pixel);
+  // From all land to all water in one pixel, however far apart the samples are.
+  const double sharpness = std::max(1.0, factor / samples_per_pixel);
+
+  const std::vector<Position> positions =
+      CellCentrePositions(georeference, footprint, lattice, key, kPositionTolerance * factor);
+  const GridAxis columns(layout.columns, factor, layout.wraps), rows(layout.height, factor, false);
+  std::vector<Cell> cells;
+  std::vector<std::size_t> targets;  // pixel of each cell
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    if (!IsInside(positions[i])) continue;
+    cells.push_back(CellAt(positions[i], columns, rows, layout.width, layout.height));
+    const std::size_t row_from_south = i / kSide;
+    targets.push_back((kSide - 1 - row_from_south) * kSide + i % kSide);
+  }
+  // Files are looked at even where nothing must be read: no tile may outlive its mask.
+  auto handle = handles.Borrow();
+  if (!handle) return tl::unexpected(handle.error());
+  if (cells.empty()) return pixels;
+  const GridWindow window = WindowOf(cells, columns, rows);
+  const auto shares = ReadGrid(**handle, layout, factor, window, stop);
+  if (!shares) {
+    return MakeError(shares.error().code, "{}: tile {}: {}", path, geo::ToString(key), shares.error().message);
+  }
+  if (auto unchanged = handles.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    const double share = Interpolate(*shares, window, cells[i]).value_or(0);
+    const double sharp = std::clamp(0.5 + (share - 0.5) * sharpness, 0.0, 1.0);
+    pixels[targets[i]] = static_cast<std::uint8_t>(std::lround(255 * sharp));
+  }
+  return pixels;
+}
+
+WaterRaster::WaterRaster(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+WaterRaster::~WaterRaster() = default;
+
+Result<std::unique_ptr<WaterRaster>> WaterRaster::Open(const std::string& path, const GeoBounds& around) {
+  auto dataset = OpenRaster(path);
+  if (!dataset) return tl::unexpected(dataset.error());
+  auto georeference = Georeference::Of(**dataset, path);
+  if (!georeference) return tl::unexpected(georeference.error());
+  const auto spacing = SourceSpacing::Of(*georeference, path);
+  if (!spacing) return tl::unexpected(spacing.error());
+  const Footprint footprint = Footprint::Of(*georeference);
+  if (auto touches = CheckOverlap(footprint, around, path); !touches) return tl::unexpected(touches.error());
+
+  auto impl = std::make_unique<Impl>(path, StampedFiles(FilesOf(**dataset, path)), *std::move(georeference));
+  impl->spacing = *spacing;
+  impl->layout = LayoutOf(**dataset, impl->georeference);
+  impl->footprint = footprint.Padded();
+  if (auto unchanged = impl->handles.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
+  return std::unique_ptr<WaterRaster>(new WaterRaster(std::move(impl)));
+}
+
+Result<std::vector<std::uint8_t>> WaterRaster::Read(const geo::TileKey& key, std::stop_token stop) const {
+  TERRACE_CHECK(geo::IsValid(key));
+  return impl_->Read(key, stop);
+}
+
+std::uint64_t WaterRaster::fingerprint() const { return impl_->handles.files().fingerprint(); }
+
+}  // namespace terrace::dem

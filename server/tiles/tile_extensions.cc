@@ -1,0 +1,49 @@
+#include "server/tiles/tile_extensions.h"
+
+#include <utility>
+#include <vector>
+
+#include "proto/tile_metadata.h"
+#include "proto/water_mask.h"
+
+namespace terrace::server {
+namespace {
+
+static_assert(dem::WaterRaster::kSide == proto::kWaterMaskSide);
+
+Result<proto::WaterMask> WaterMaskOf(const WaterRules& water, const proto::LatticeView& lattice,
+                                     const std::stop_token& stop) {
+  if (water.sea_level_m) return proto::Shortest(proto::SeaLevelMask(lattice, *water.sea_level_m));
+  Result<proto::WaterMask> mask = water.mask->Read(lattice.key, stop);
+  if (mask) *mask = proto::Shortest(*std::move(mask));
+  return mask;
+}
+
+std::string MetadataOf(const Dataset& dataset, const geo::TileKey& key) {
+  std::vector<std::vector<geo::TileRange>> available;
+  for (int level = 0; level <= dataset.source->max_level(); ++level) {
+    available.push_back(dataset.source->Available(level));
+  }
+  return proto::EncodeTileMetadata(key, available, dataset.metadata_levels);
+}
+
+}  // namespace
+
+Result<proto::QuantizedMeshOptions> AddExtensions(const Dataset& dataset, const TileRequest& request,
+                                                  const proto::LatticeView& lattice, proto::QuantizedTile& tile,
+                                                  const std::stop_token& stop) {
+  proto::QuantizedMeshOptions options;
+  options.normals = request.normals;
+  options.water_mask = request.water_mask && dataset.water.any();
+  options.metadata = request.metadata &&
+                     proto::CarriesMetadata(request.key.level, dataset.metadata_levels, dataset.source->max_level());
+  if (options.water_mask) {
+    Result<proto::WaterMask> mask = WaterMaskOf(dataset.water, lattice, stop);
+    if (!mask) return tl::unexpected(std::move(mask).error());
+    tile.water_mask = *std::move(mask);
+  }
+  if (options.metadata) tile.metadata = MetadataOf(dataset, request.key);
+  return options;
+}
+
+}  // namespace terrace::server

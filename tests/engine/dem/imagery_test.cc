@@ -1,0 +1,248 @@
+#include "engine/dem/imagery.h"
+
+#include <gdal_priv.h>
+#include <gtest/gtest.h>
+#include <ogr_spatialref.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <functional>
+#include <thread>
+
+#include "tests/engine/dem/dem_fixture.h"
+
+namespace terrace::dem {
+namespace {
+
+using Color = std::array<int, 3>;
+constexpr Color kNone = {Imagery::kNoPicture[0], Imagery::kNoPicture[1], Imagery::kNoPicture[2]};
+
+struct ImageSpec {
+  int width = 256, height = 256;
+  std::array<double, 6> geo_transform = {};
+  std::string crs = "EPSG:4326";
+  std::vector<int> overviews = {};
+  int nodata = -1;  // none
+  std::function<Color(int, int)> color = [](int, int) { return Color{1, 2, 3}; };
+};
+
+// Tile 6/65/32, 2.8125 degrees wide, in 256 pixels times `finer`.
+ImageSpec TileSpec(int finer = 1) {
+  constexpr double kWidth = 180.0 / 64;
+  ImageSpec spec;
+  spec.width = spec.height = 256 * finer;
+  spec.geo_transform = {kWidth, kWidth / spec.width, 0, kWidth, 0, -kWidth / spec.width};
+  return spec;
+}
+constexpr geo::TileKey kTile{6, 65, 32};
+
+std::string WriteImage(const TempDir& dir, const ImageSpec& spec) {
+  GDALAllRegister();
+  const std::string path = dir.File("image.tif");
+  GDALDriver* const driver = GetGDALDriverManager()->GetDriverByName("GTiff");
+  GDALDatasetUniquePtr dataset(driver->Create(path.c_str(), spec.width, spec.height, 3, GDT_Byte, nullptr));
+  std::array<double, 6> transform = spec.geo_transform;
+  dataset->SetGeoTransform(transform.data());
+  OGRSpatialReference srs;
+  EXPECT_EQ(srs.SetFromUserInput(spec.crs.c_str()), OGRERR_NONE);
+  srs.SetAxisMappingStrategy(OAMS_TRADITIONAL_GIS_ORDER);
+  dataset->SetSpatialRef(&srs);
+  std::vector<std::uint8_t> line(static_cast<std::size_t>(spec.width));
+  for (int band = 0; band < 3; ++band) {
+    if (spec.nodata >= 0) dataset->GetRasterBand(band + 1)->SetNoDataValue(spec.nodata);
+    for (int row = 0; row < spec.height; ++row) {
+      for (int column = 0; column < spec.width; ++column) {
+        line[static_cast<std::size_t>(column)] =
+            static_cast<std::uint8_t>(spec.color(column, row)[static_cast<std::size_t>(band)]);
+      }
+      EXPECT_EQ(dataset->GetRasterBand(band + 1)->RasterIO(GF_Write, 0, row, spec.width, 1, line.data(), spec.width, 1,
+                                                           GDT_Byte, 0, 0, nullptr),
+                CE_None);
+    }
+  }
+  if (!spec.overviews.empty()) {
+    std::vector<int> factors = spec.overviews;
+    dataset->FlushCache(false);
+    EXPECT_EQ(dataset->BuildOverviews("AVERAGE", static_cast<int>(factors.size()), factors.data(), 0, nullptr,
+                                      GDALDummyProgress, nullptr),
+              CE_None);
+  }
+  return path;
+}
+
+std::unique_ptr<Imagery> OpenImage(const std::string& path, const GeoBounds& around = {}) {
+  auto imagery = Imagery::Open(path, around);
+  EXPECT_TRUE(imagery.has_value()) << (imagery ? "" : imagery.error().message);
+  return imagery ? *std::move(imagery) : nullptr;
+}
+
+std::optional<TilePicture> ReadOrFail(const Imagery& imagery, const geo::TileKey& key, int side) {
+  auto picture = imagery.Read(key, side);
+  EXPECT_TRUE(picture.has_value()) << (picture ? "" : picture.error().message);
+  return picture ? *std::move(picture) : std::nullopt;
+}
+
+Color At(const TilePicture& picture, int row, int column) {
+  const std::uint8_t* const p = picture.rgb.data() + 3 * (row * picture.side + column);
+  return {p[0], p[1], p[2]};
+}
+
+TEST(Imagery, PixelsAreTheImagesWhereBothAgree) {
+  const TempDir dir;
+  ImageSpec spec = TileSpec();
+  spec.color = [](int column, int row) { return Color{column, row, (column + row) % 256}; };
+  const auto picture = ReadOrFail(*OpenImage(WriteImage(dir, spec)), kTile, 256);
+  ASSERT_TRUE(picture.has_value());
+  EXPECT_EQ(picture->side, 256);
+  for (int row = 0; row < 256; ++row) {
+    for (int column = 0; column < 256; ++column) {
+      ASSERT_EQ(At(*picture, row, column), spec.color(column, row)) << row << " " << column;
+    }
+  }
+}
+
+TEST(Imagery, AveragesFinerPixelsWithAndWithoutOverviews) {
+  for (const bool has_overviews : {false, true}) {
+    const TempDir dir;
+    ImageSpec spec = TileSpec(4);
+    if (has_overviews) spec.overviews = {2, 4, 8};
+    spec.color = [](int column, int row) { return Color{column % 4 * 10, row % 2 * 50, 7}; };
+    const auto picture = ReadOrFail(*OpenImage(WriteImage(dir, spec)), kTile, 256);
+    ASSERT_TRUE(picture.has_value());
+    for (const int at : {0, 77, 255}) EXPECT_EQ(At(*picture, at, at), (Color{15, 25, 7})) << has_overviews;
+  }
+}
+
+TEST(Imagery, InterpolatesCoarserPixelsAcrossTiles) {
+  const TempDir dir;
+  ImageSpec spec = TileSpec();
+  spec.color = [](int column, int) { return Color{column, 0, 255 - column}; };
+  const auto imagery = OpenImage(WriteImage(dir, spec));
+  const auto west = ReadOrFail(*imagery, {9, 65 * 8 + 3, 32 * 8 + 4}, 256);
+  const auto east = ReadOrFail(*imagery, {9, 65 * 8 + 4, 32 * 8 + 4}, 256);
+  ASSERT_TRUE(west.has_value() && east.has_value());
+  // 8 pixels to one of the image's: the ramp goes on over the edge.
+  EXPECT_LE(At(*west, 9, 255)[0], At(*east, 9, 0)[0]);
+  EXPECT_LE(At(*east, 9, 0)[0] - At(*west, 9, 255)[0], 1);
+  for (int column = 1; column < 256; ++column) {
+    const int step = At(*west, 9, column)[0] - At(*west, 9, column - 1)[0];
+    EXPECT_TRUE(step == 0 || step == 1) << column;
+  }
+}
+
+TEST(Imagery, IsGreyWhereTheImageEndsOrHasNoData) {
+  const TempDir dir;
+  ImageSpec spec = TileSpec();
+  spec.nodata = 0;
+  spec.color = [](int column, int) { return column < 100 ? Color{0, 0, 0} : Color{200, 100, 50}; };
+  const auto imagery = OpenImage(WriteImage(dir, spec));
+  const auto picture = ReadOrFail(*imagery, kTile, 256);
+  ASSERT_TRUE(picture.has_value());
+  EXPECT_EQ(At(*picture, 128, 50), kNone);
+  EXPECT_EQ(At(*picture, 128, 200), (Color{200, 100, 50}));
+  const auto parent = ReadOrFail(*imagery, {5, 32, 16}, 256);  // the image is its south-eastern quarter
+  ASSERT_TRUE(parent.has_value());
+  EXPECT_EQ(At(*parent, 200, 250), (Color{200, 100, 50}));
+  EXPECT_EQ(At(*parent, 64, 250), kNone);
+  EXPECT_EQ(At(*parent, 200, 64), kNone);
+}
+
+TEST(Imagery, HasNothingForTilesThatItDoesNotShow) {
+  const TempDir dir;
+  ImageSpec spec = TileSpec();
+  spec.nodata = 9;
+  spec.color = [](int column, int) { return column < 130 ? Color{9, 9, 9} : Color{1, 1, 1}; };
+  const auto imagery = OpenImage(WriteImage(dir, spec));
+  EXPECT_FALSE(ReadOrFail(*imagery, {6, 3, 3}, 256).has_value());
+  EXPECT_FALSE(ReadOrFail(*imagery, {7, 130, 65}, 256).has_value()) << "no data alone";
+  EXPECT_TRUE(ReadOrFail(*imagery, {7, 131, 65}, 256).has_value());
+}
+
+TEST(Imagery, HasFewerPixelsWhereTheImageHasNoMore) {
+  const TempDir dir;
+  const auto imagery = OpenImage(WriteImage(dir, TileSpec()));  // as fine as 256 pixels at level 6
+  EXPECT_EQ(imagery->SideOf(6, 1024), 256);
+  EXPECT_EQ(imagery->SideOf(5, 1024), 512);
+  EXPECT_EQ(imagery->SideOf(4, 1024), 1024);
+  EXPECT_EQ(imagery->SideOf(0, 512), 512);
+  EXPECT_EQ(imagery->SideOf(12, 1024), 256);
+  EXPECT_EQ(imagery->SideOf(12, 64), 64);
+}
+
+TEST(Imagery, PlacesImagesOfOtherReferenceSystems) {
+  const TempDir dir;
+  ImageSpec spec;
+  spec.width = spec.height = 1024;
+  spec.crs = "EPSG:32633";  // central meridian 15 degrees east
+  spec.geo_transform = {500000 - 512 * 100, 100, 0, 5000000 + 512 * 100, 0, -100};
+  spec.color = [](int column, int) { return column >= 512 ? Color{250, 0, 0} : Color{0, 250, 0}; };
+  const auto imagery = OpenImage(WriteImage(dir, spec));
+  // Tile 8/277/192: 14.7656 to 15.4688 degrees east, 45 to 45.7 north; the meridian is at pixel 85.3.
+  const auto picture = ReadOrFail(*imagery, {8, 277, 192}, 256);
+  ASSERT_TRUE(picture.has_value());
+  EXPECT_EQ(At(*picture, 240, 83), (Color{0, 250, 0}));
+  EXPECT_EQ(At(*picture, 240, 88), (Color{250, 0, 0}));
+}
+
+TEST(Imagery, ReadsARealPhotoOfARealModel) {
+  TERRACE_REQUIRE_DATA(photo, "ortho_pair_rgb_2m.tif");
+  TERRACE_REQUIRE_DATA(model, "ortho_pair_dtm_2m_byte.tif");
+  const auto source = OpenOrFail(model);
+  const auto imagery = OpenImage(photo, source->info().bounds);
+  int pictures = 0;
+  for (const geo::TileKey& key : SomeTiles(*source, 14, 4)) {
+    const auto picture = ReadOrFail(*imagery, key, imagery->SideOf(14, 512));
+    if (!picture) continue;
+    ++pictures;
+    EXPECT_EQ(picture->side, 512);
+    EXPECT_GT(std::count_if(picture->rgb.begin(), picture->rgb.end(), [](int level) { return level != 188; }), 3000);
+  }
+  EXPECT_GT(pictures, 0);
+}
+
+TEST(Imagery, AnImageOfAnotherPlaceIsRefused) {
+  const TempDir dir;
+  const auto refused = Imagery::Open(WriteImage(dir, TileSpec()), {-80, 20, -70, 30});
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_EQ(refused.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_NE(refused.error().message.find("nothing of the dataset"), std::string::npos) << refused.error().message;
+}
+
+TEST(Imagery, ARasterOfHeightsIsRefused) {
+  const TempDir dir;
+  const auto refused = Imagery::Open(WriteRaster(dir, {}), {});
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_NE(refused.error().message.find("colours must have 8 or 16 bits"), std::string::npos)
+      << refused.error().message;
+}
+
+TEST(Imagery, SaysWhenItsFileChanged) {
+  const TempDir dir;
+  const std::string path = WriteImage(dir, TileSpec());
+  const auto imagery = OpenImage(path);
+  const std::uint64_t before = imagery->fingerprint();
+  std::filesystem::resize_file(path, 1000);
+  EXPECT_EQ(imagery->Read(kTile, 256).error().code, ErrorCode::kUnavailable);
+  WriteImage(dir, TileSpec(2));
+  EXPECT_NE(OpenImage(path)->fingerprint(), before);
+}
+
+TEST(Imagery, StopsAndServesManyThreads) {
+  const TempDir dir;
+  ImageSpec spec = TileSpec();
+  spec.color = [](int column, int row) { return Color{column, row, 0}; };
+  const auto imagery = OpenImage(WriteImage(dir, spec));
+  std::stop_source stop;
+  stop.request_stop();
+  EXPECT_EQ(imagery->Read(kTile, 256, stop.get_token()).error().code, ErrorCode::kCancelled);
+  const auto expected = ReadOrFail(*imagery, kTile, 256);
+  ASSERT_TRUE(expected.has_value());
+  std::vector<std::thread> threads;
+  for (int k = 0; k < 4; ++k) {
+    threads.emplace_back([&] { EXPECT_EQ(ReadOrFail(*imagery, kTile, 256)->rgb, expected->rgb); });
+  }
+  for (std::thread& thread : threads) thread.join();
+}
+
+}  // namespace
+}  // namespace terrace::dem

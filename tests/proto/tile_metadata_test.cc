@@ -1,0 +1,62 @@
+#include "proto/tile_metadata.h"
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+namespace terrace::proto {
+namespace {
+
+using Json = nlohmann::json;
+
+// Roots, a block across both, and one in the east.
+const std::vector<std::vector<geo::TileRange>> kAvailable = {
+    {{0, 0, 1, 0}}, {{1, 0, 2, 1}}, {{3, 1, 4, 2}}, {{6, 3, 8, 4}}};
+
+TEST(CarriesMetadata, EveryNthLevelButTheDeepest) {
+  std::vector<int> levels;
+  for (int level = 0; level <= 9; ++level) {
+    if (CarriesMetadata(level, 3, 9)) levels.push_back(level);
+    EXPECT_FALSE(CarriesMetadata(level, 0, 9));
+  }
+  EXPECT_EQ(levels, (std::vector<int>{0, 3, 6}));
+}
+
+TEST(TileMetadata, AreTheseBytes) {
+  EXPECT_EQ(EncodeTileMetadata({1, 1, 1}, kAvailable, 1),
+            R"({"available":[[{"startX":3,"startY":2,"endX":3,"endY":2}]]})");
+}
+
+TEST(TileMetadata, ListsWhatIsBelowTheTileAndNoMore) {
+  EXPECT_EQ(Json::parse(EncodeTileMetadata({0, 0, 0}, kAvailable, 2)),
+            Json::parse(R"({"available":[[{"startX":1,"startY":0,"endX":1,"endY":1}],
+                                         [{"startX":3,"startY":1,"endX":3,"endY":2}]]})"));
+  EXPECT_EQ(Json::parse(EncodeTileMetadata({0, 1, 0}, kAvailable, 2)),
+            Json::parse(R"({"available":[[{"startX":2,"startY":0,"endX":2,"endY":1}],
+                                         [{"startX":4,"startY":1,"endX":4,"endY":2}]]})"));
+}
+
+TEST(TileMetadata, EndsAtTheDeepestLevel) {
+  EXPECT_EQ(Json::parse(EncodeTileMetadata({2, 3, 1}, kAvailable, 5)),
+            Json::parse(R"({"available":[[{"startX":6,"startY":3,"endX":7,"endY":3}]]})"));
+}
+
+TEST(TileMetadata, KeepsALevelWithoutTiles) {
+  EXPECT_EQ(EncodeTileMetadata({1, 0, 0}, kAvailable, 2), R"({"available":[[],[]]})");
+}
+
+// What all tiles of a level say together is what layer.json lists.
+TEST(TileMetadata, TogetherCoverWhatIsAvailable) {
+  std::int64_t tiles = 0;
+  for (std::int64_t x = 0; x < 2; ++x) {
+    const Json available = Json::parse(EncodeTileMetadata({0, x, 0}, kAvailable, 3)).at("available");
+    for (const Json& range : available.at(2)) {
+      tiles += (range["endX"].get<std::int64_t>() - range["startX"].get<std::int64_t>() + 1) *
+               (range["endY"].get<std::int64_t>() - range["startY"].get<std::int64_t>() + 1);
+    }
+  }
+  EXPECT_EQ(tiles, 6);
+}
+
+}  // namespace
+}  // namespace terrace::proto
