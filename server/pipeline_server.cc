@@ -23,6 +23,7 @@ DatasetView ViewOf(const Dataset& dataset) {
   view.north = info.bounds.north;
   view.min_height_m = info.heights.min;
   view.max_height_m = info.heights.max;
+  view.max_mercator_depth = info.max_mercator_depth;
   return view;
 }
 

@@ -2,10 +2,10 @@
 // level and the source; the window decides only what is read, never what comes out.
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "engine/core/check.h"
 #include "engine/dem/dem_impl.h"
+#include "engine/dem/grid_cells.h"
 #include "engine/dem/node_positions.h"
 #include "engine/dem/void_fill.h"
 
@@ -17,59 +17,6 @@ namespace {
 constexpr double kPositionTolerance = 1e-5;
 // Positions this close to the raster's edge, in pixels, are on it.
 constexpr double kEdgeTolerance = 1e-6;
-
-// Four samples of the grid around a node, and how far it is from the first to the next.
-struct Cell {
-  std::int64_t column, row;
-  double x, y;
-};
-
-Cell CellAt(const Position& position, const GridAxis& columns, const GridAxis& rows, int width, int height) {
-  const double x = columns.wraps() ? position.x : std::clamp(position.x, 0.0, static_cast<double>(width));
-  const GridAxis::Place column = columns.Locate(x);
-  const GridAxis::Place row = rows.Locate(std::clamp(position.y, 0.0, static_cast<double>(height)));
-  return {column.index, row.index, column.weight, row.weight};
-}
-
-// The smallest window with every cell, its columns counted from near `around` where the axis wraps. Moves the cells
-// there.
-GridWindow WindowOf(std::vector<Cell>& cells, const GridAxis& columns, const GridAxis& rows) {
-  const std::int64_t around = cells[cells.size() / 2].column, turn = columns.count();
-  std::int64_t west = std::numeric_limits<std::int64_t>::max(), east = std::numeric_limits<std::int64_t>::min();
-  std::int64_t north = west, south = east;
-  for (Cell& cell : cells) {
-    if (columns.wraps()) {
-      if (cell.column - around > turn / 2) cell.column -= turn;
-      if (around - cell.column > turn / 2) cell.column += turn;
-    }
-    west = std::min(west, cell.column);
-    east = std::max(east, cell.column + 1);
-    north = std::min(north, cell.row);
-    south = std::max(south, cell.row + 1);
-  }
-  if (!columns.wraps()) east = std::min(east, columns.count() - 1);
-  south = std::min(south, rows.count() - 1);
-  return {west, north, east - west + 1, south - north + 1};
-}
-
-// Bilinear, weights renormalized over valid samples; nothing where there is none.
-std::optional<double> Interpolate(const std::vector<float>& heights, const GridWindow& window, const Cell& cell) {
-  double sum = 0, weights = 0;
-  const auto add = [&](std::int64_t dx, std::int64_t dy, double weight) {
-    if (weight <= 0) return;
-    const std::int64_t at = (cell.row - window.row + dy) * window.columns + cell.column - window.column + dx;
-    const float height = heights[static_cast<std::size_t>(at)];
-    if (std::isnan(height)) return;
-    sum += weight * height;
-    weights += weight;
-  };
-  add(0, 0, (1 - cell.x) * (1 - cell.y));
-  add(1, 0, cell.x * (1 - cell.y));
-  add(0, 1, (1 - cell.x) * cell.y);
-  add(1, 1, cell.x * cell.y);
-  if (weights == 0) return std::nullopt;
-  return sum / weights;
-}
 
 GridWindow Grown(const GridWindow& window, int halo, const GridAxis& columns, const GridAxis& rows) {
   GridWindow wide{window.column - halo, window.row - halo, window.columns + 2 * halo, window.rows + 2 * halo};
@@ -115,42 +62,62 @@ Result<std::vector<float>> DemSource::Impl::ReadFilled(GDALDataset& dataset, int
   return FillVoids(*around, wide, window, gap);
 }
 
-Result<TileHeights> DemSource::Impl::Read(const geo::TileKey& key, const std::stop_token& stop) {
-  const auto& [lattice, factor] = Plan(key.level);
-  TileHeights tile{lattice, lattice.cells + 3, {}};
-  const std::vector<Position> positions =
-      NodePositions(georeference, footprint, lattice, key, kPositionTolerance * factor);
-  tile.heights.assign(positions.size(), floor);
-
+// Heights under the rules of tiles: averaged by the factor, small voids filled, the floor elsewhere.
+Result<std::vector<float>> DemSource::Impl::ReadFloored(std::span<const Position> positions, int factor,
+                                                        const std::string& what, const std::stop_token& stop) {
+  std::vector<float> out(positions.size(), floor);
   const GridAxis columns(layout.columns, factor, layout.wraps), rows(layout.height, factor, false);
-  std::vector<Cell> cells;
+  std::vector<GridCell> cells;
   std::vector<std::size_t> nodes;  // node of each cell
   for (std::size_t i = 0; i < positions.size(); ++i) {
     if (!IsInside(positions[i])) continue;
     cells.push_back(CellAt(positions[i], columns, rows, layout.width, layout.height));
     nodes.push_back(i);
   }
-  if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "{}: reading a tile was stopped", info.path);
+  if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "{}: reading {} was stopped", info.path, what);
   // Files are looked at even where nothing must be read: a tile of floor must not outlive its source.
   auto handle = handles.Borrow();
   if (!handle) return tl::unexpected(handle.error());
-  if (!cells.empty()) {
-    const GridWindow window = WindowOf(cells, columns, rows);
-    const auto heights = ReadFilled(**handle, factor, window, stop);
-    if (!heights) {
-      return MakeError(heights.error().code, "{}: tile {}: {}", info.path, geo::ToString(key), heights.error().message);
-    }
-    if (auto unchanged = handles.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
-    for (std::size_t i = 0; i < cells.size(); ++i) {
-      if (const auto height = Interpolate(*heights, window, cells[i])) tile.heights[nodes[i]] = RoundHeight(*height);
+  if (cells.empty()) return out;
+  const GridWindow window = WindowOf(cells, columns, rows);
+  const auto heights = ReadFilled(**handle, factor, window, stop);
+  if (!heights) {
+    return MakeError(heights.error().code, "{}: {}: {}", info.path, what, heights.error().message);
+  }
+  if (auto unchanged = handles.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    if (const auto height = Interpolate(*heights, window, cells[i])) out[nodes[i]] = RoundHeight(*height);
+  }
+  return out;
+}
+
+Result<std::vector<float>> DemSource::Impl::ReadNodes(int level, const NodeWindow& window, const std::string& what,
+                                                      const std::stop_token& stop) {
+  const auto& [lattice, factor] = Plan(level);
+  const auto positions = NodePositions(georeference, footprint, lattice, window, kPositionTolerance * factor);
+  auto heights = ReadFloored(positions, factor, what, stop);
+  if (!heights) return heights;
+  for (int row = 0; row < window.rows; ++row) {
+    if (const auto pole = PoleHeight(lattice, window.row + row)) {
+      std::fill_n(heights->begin() + std::ptrdiff_t{row} * window.columns, window.columns, *pole);
     }
   }
-  for (int row = 0; row < tile.stride; ++row) {
-    if (const auto pole = PoleHeight(lattice, lattice.FirstRow(key) - 1 + row)) {
-      std::fill_n(tile.heights.begin() + row * tile.stride, tile.stride, *pole);
-    }
-  }
-  return tile;
+  return heights;
+}
+
+Result<TileHeights> DemSource::Impl::Read(const geo::TileKey& key, const std::stop_token& stop) {
+  const geo::Lattice& lattice = Plan(key.level).lattice;
+  auto heights = ReadNodes(key.level, WindowOfTile(lattice, key), "tile " + geo::ToString(key), stop);
+  if (!heights) return tl::unexpected(std::move(heights).error());
+  return TileHeights{lattice, lattice.cells + 3, *std::move(heights)};
+}
+
+Result<std::vector<float>> DemSource::Impl::ReadMercator(int depth, const NodeWindow& window,
+                                                         const std::stop_token& stop) {
+  const int factor = mercator_factors[static_cast<std::size_t>(depth)];
+  const auto positions =
+      NodePositions(georeference, footprint, geo::MercatorGrid{depth}, window, kPositionTolerance * factor);
+  return ReadFloored(positions, factor, fmt::format("Mercator pixels of depth {}", depth), stop);
 }
 
 }  // namespace terrace::dem

@@ -37,17 +37,31 @@ int CellsOf(int level, const SourceSpacing& spacing) {
   return kFinest;
 }
 
-// The power of two nearest to the ratio of lattice to source spacing, the geometric mean of both axes.
-int FactorOf(const geo::Lattice& lattice, const SourceSpacing& spacing) {
-  // Around a pole meridians meet: the centre of a polar map says nothing about lattice cells elsewhere in it. In a
-  // geographic source its columns meet as well.
+// Around a pole meridians meet: the centre of a polar map says nothing about grid cells elsewhere in it. In a
+// geographic source its columns meet as well.
+double RepresentativeLatitude(const SourceSpacing& spacing) {
   constexpr double kMostPolar = 75;
-  const double latitude = spacing.geographic ? spacing.latitude : std::clamp(spacing.latitude, -kMostPolar, kMostPolar);
-  const double step = lattice.StepDegrees();
-  const double east = step * geo::MetresPerDegreeEast(latitude) / spacing.east;
-  const double north = step * geo::MetresPerDegreeNorth(latitude) / spacing.north;
+  return spacing.geographic ? spacing.latitude : std::clamp(spacing.latitude, -kMostPolar, kMostPolar);
+}
+
+// The power of two nearest to the geometric mean of both axes' ratios of grid to source spacing.
+int FactorOf(double east_ratio, double north_ratio) {
   constexpr double kMost = 22;  // one block then holds the largest raster (raster_file.cc, kMaxSide)
-  return 1 << static_cast<int>(std::lround(std::clamp(std::log2(std::sqrt(east * north)), 0.0, kMost)));
+  const double doublings = std::clamp(std::log2(std::sqrt(east_ratio * north_ratio)), 0.0, kMost);
+  return 1 << static_cast<int>(std::lround(doublings));
+}
+
+int LatticeFactor(const geo::Lattice& lattice, const SourceSpacing& spacing) {
+  const double latitude = RepresentativeLatitude(spacing), step = lattice.StepDegrees();
+  return FactorOf(step * geo::MetresPerDegreeEast(latitude) / spacing.east,
+                  step * geo::MetresPerDegreeNorth(latitude) / spacing.north);
+}
+
+// Metres on the ground from one Web Mercator pixel to the next, the same in both axes but for the Earth's flattening.
+double MercatorStep(int depth, const SourceSpacing& spacing) {
+  constexpr double kMostPolar = geo::kMercatorLatitude;
+  const double latitude = std::clamp(RepresentativeLatitude(spacing), -kMostPolar, kMostPolar);
+  return geo::MercatorGrid{depth}.StepDegrees() * geo::MetresPerDegreeEast(latitude);
 }
 
 }  // namespace
@@ -87,9 +101,25 @@ std::vector<LevelPlan> PlanLevels(const SourceSpacing& spacing) {
   std::vector<LevelPlan> levels;
   for (int level = 0; level <= geo::kMaxLevel; ++level) {
     const geo::Lattice lattice{level, CellsOf(level, spacing)};
-    levels.push_back({lattice, FactorOf(lattice, spacing)});
+    levels.push_back({lattice, LatticeFactor(lattice, spacing)});
   }
   return levels;
+}
+
+int DeepestMercator(const SourceSpacing& spacing) {
+  constexpr double kSlack = 1 + 1e-9;  // pixels that equal the source's are fine enough
+  int depth = 1;
+  while (depth < geo::kMaxLevel && MercatorStep(depth, spacing) > spacing.finer * kSlack) ++depth;
+  return depth;
+}
+
+std::vector<int> MercatorFactors(const SourceSpacing& spacing) {
+  std::vector<int> factors;
+  for (int depth = 0; depth <= geo::kMaxLevel; ++depth) {
+    const double step = MercatorStep(depth, spacing);
+    factors.push_back(FactorOf(step / spacing.east, step / spacing.north));
+  }
+  return factors;
 }
 
 int DeepestLevel(const SourceSpacing& spacing, double error_fraction, std::optional<double> finest_error) {

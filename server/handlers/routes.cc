@@ -34,6 +34,7 @@ Routes::Routes(std::span<const DatasetView> datasets, TileService& tiles, Static
                TileHandlerOptions options, State state)
     : tiles_(datasets, tiles, options),
       layers_(datasets, options.cache_control),
+      tile_json_(datasets, options.cache_control),
       viewer_(std::move(viewer)),
       datasets_(Document::Make(DatasetsJson(datasets), "application/json")),
       index_(Document::Make(IndexHtml(datasets), "text/html; charset=utf-8")),
@@ -55,6 +56,7 @@ asio::awaitable<Response> Routes::Serve(Request request) const {
 Response Routes::ServeNow(const Route& route, const Request& request) const {
   if (route.kind == RouteKind::kViewer) return ServeViewer(route, request);
   if (route.kind == RouteKind::kLayer) return layers_.Handle(route, request);
+  if (route.kind == RouteKind::kTileJson) return tile_json_.Handle(route, request);
   if (const Result<void> none = RefuseParameters(route.query); !none) {
     return ClientErrorResponse(none.error(), request.id);
   }

@@ -11,6 +11,7 @@
 #include "server/handlers/metrics.h"
 #include "server/handlers/static_files.h"
 #include "server/handlers/tile_handler.h"
+#include "server/handlers/tile_json_handler.h"
 #include "server/http/request.h"
 #include "server/http/response.h"
 #include "server/http/router.h"
@@ -39,6 +40,7 @@ class Routes {
 
   const TileHandler tiles_;
   const LayerHandler layers_;
+  const TileJsonHandler tile_json_;
   const StaticFiles viewer_;
   const Document datasets_;
   const Document index_;  // for `/` without a viewer

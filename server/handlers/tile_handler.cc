@@ -17,6 +17,11 @@
 namespace terrace::server {
 namespace {
 
+std::string_view ContentTypeOf(const TileRequest& tile) {
+  if (tile.format == TileFormat::kHeightPng) return "image/png";
+  return tile.normals ? "application/vnd.quantized-mesh;extensions=octvertexnormals" : "application/vnd.quantized-mesh";
+}
+
 std::string_view Name(CacheStatus cache) {
   switch (cache) {
     case CacheStatus::kHit:
@@ -50,13 +55,12 @@ asio::awaitable<Response> TileHandler::Handle(Route route, Request request) cons
 
 Response TileHandler::Reply(const ServedTile& served, const TileRequest& tile, const Request& request) const {
   Response response;
-  response.content_type =
-      tile.normals ? "application/vnd.quantized-mesh;extensions=octvertexnormals" : "application/vnd.quantized-mesh";
+  response.content_type = ContentTypeOf(tile);
   response.body = Body(served.tile, &served.tile->bytes);
   response.coding = tile.coding;
   response.etag = served.tile->etag;
   response.cache_control = options_.cache_control;
-  response.vary = true;
+  response.vary = tile.format == TileFormat::kQuantizedMesh;
   response.headers.emplace_back("Terrain-Max-Error", FormatErrorUp(served.tile->max_error_m));
   response.headers.emplace_back("Server-Timing", FormatServerTiming(served.cache, served.tile->times));
   response.cache = Name(served.cache);

@@ -1,4 +1,4 @@
-// GET /{dataset}/{z}/{x}/{y}.terrain
+// GET /{dataset}/{z}/{x}/{y}.terrain and .png
 #pragma once
 
 #include <chrono>

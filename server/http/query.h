@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "engine/core/result.h"
+#include "server/tiles/tile_request.h"
 
 namespace terrace::server {
 
@@ -37,6 +38,14 @@ struct TileParameters {
 // clients append them on their own. kInvalidArgument, with a message for the client: an unknown or repeated parameter,
 // error and fraction together, atleast without error, or a value that is not what the parameter takes.
 Result<TileParameters> ParseTileParameters(std::string_view query, bool allow_at_least);
+
+struct HeightTileParameters {
+  proto::HeightEncoding encoding = proto::HeightEncoding::kMapbox;
+  int size = kHeightSizes[0];
+};
+
+// `encoding` and `size`, of height tiles and of the TileJSON that describes them. `v` may come any number of times.
+Result<HeightTileParameters> ParseHeightTileParameters(std::string_view query);
 
 // For URLs that take no parameters but `v`.
 Result<void> RefuseParameters(std::string_view query);

@@ -111,6 +111,8 @@ tl::expected<Request, BadRequest> ParseHead(std::string_view head) {
   request.accept = Joined(fields, http::field::accept);
   request.accept_encoding = Joined(fields, http::field::accept_encoding);
   request.if_none_match = Joined(fields, http::field::if_none_match);
+  request.host = std::string(fields[http::field::host]);
+  request.forwarded_proto = std::string(fields["X-Forwarded-Proto"]);
   return request;
 }
 

@@ -25,7 +25,9 @@ struct Request {
   std::string accept;       // several fields joined with ", "
   std::string accept_encoding;
   std::string if_none_match;
-  std::string id;  // 16 hexadecimal digits, given by the server
+  std::string host;             // host and port: letters, digits and "-._~%!$&'()*+,;=:[]"; may be empty
+  std::string forwarded_proto;  // of a proxy before the server: "https", "http", or whatever else was sent
+  std::string id;               // 16 hexadecimal digits, given by the server
 };
 
 // Why bytes are not a request. The connection is of no use afterwards: its framing cannot be trusted.

@@ -39,14 +39,29 @@ std::optional<std::int64_t> TileNumber(std::string_view text) {
   return number;
 }
 
-std::optional<geo::TileKey> ParseTileKey(std::string_view z, std::string_view x, std::string_view y) {
-  constexpr std::string_view kSuffix = ".terrain";
-  if (!y.ends_with(kSuffix)) return std::nullopt;
-  y.remove_suffix(kSuffix.size());
+// Web Mercator has one root, TMS geodetic two side by side.
+bool IsInScheme(const geo::TileKey& key, TileFormat format) {
+  return geo::IsValid(key) && (format != TileFormat::kHeightPng || key.x < geo::TileRows(key.level));
+}
+
+// Cuts the suffix off that names the format.
+std::optional<TileFormat> TakeFormat(std::string_view& y) {
+  static constexpr std::pair<std::string_view, TileFormat> kSuffixes[] = {{".terrain", TileFormat::kQuantizedMesh},
+                                                                          {".png", TileFormat::kHeightPng}};
+  for (const auto& [suffix, format] : kSuffixes) {
+    if (!y.ends_with(suffix)) continue;
+    y.remove_suffix(suffix.size());
+    return format;
+  }
+  return std::nullopt;
+}
+
+std::optional<geo::TileKey> ParseTileKey(std::string_view z, std::string_view x, std::string_view y,
+                                         TileFormat format) {
   const auto level = TileNumber(z), column = TileNumber(x), row = TileNumber(y);
   if (!level || !column || !row || *level > geo::kMaxLevel) return std::nullopt;
   const geo::TileKey key{static_cast<int>(*level), *column, *row};
-  return geo::IsValid(key) ? std::optional(key) : std::nullopt;
+  return IsInScheme(key, format) ? std::optional(key) : std::nullopt;
 }
 
 // The decoded segments of a path; an encoded '/' does not separate.
@@ -95,6 +110,8 @@ std::string_view ToString(RouteKind kind) {
       return "tile";
     case RouteKind::kLayer:
       return "layer";
+    case RouteKind::kTileJson:
+      return "tilejson";
     case RouteKind::kDatasets:
       return "datasets";
     case RouteKind::kViewer:
@@ -124,11 +141,16 @@ Result<Route> Match(std::string_view target) {
     route->dataset = (*segments)[0];
     if (segments->size() == 2 && (*segments)[1] == "layer.json") {
       route->kind = RouteKind::kLayer;
+    } else if (segments->size() == 2 && (*segments)[1] == "tiles.json") {
+      route->kind = RouteKind::kTileJson;
     } else if (segments->size() == 4) {
-      const auto key = ParseTileKey((*segments)[1], (*segments)[2], (*segments)[3]);
+      std::string_view y = (*segments)[3];
+      const auto format = TakeFormat(y);
+      const auto key = format ? ParseTileKey((*segments)[1], (*segments)[2], y, *format) : std::nullopt;
       if (!key) return NotFound();
       route->kind = RouteKind::kTile;
       route->key = *key;
+      route->format = *format;
     } else {
       return NotFound();
     }

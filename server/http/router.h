@@ -6,12 +6,14 @@
 
 #include "engine/core/result.h"
 #include "engine/geo/tile_key.h"
+#include "server/tiles/tile_request.h"
 
 namespace terrace::server {
 
 enum class RouteKind {
-  kTile,      // /{dataset}/{z}/{x}/{y}.terrain
+  kTile,      // /{dataset}/{z}/{x}/{y}.terrain, .png
   kLayer,     // /{dataset}/layer.json
+  kTileJson,  // /{dataset}/tiles.json
   kDatasets,  // /datasets
   kViewer,    // / and /viewer/...
   kLive,      // /livez
@@ -24,10 +26,11 @@ std::string_view ToString(RouteKind kind);
 
 struct Route {
   RouteKind kind = RouteKind::kViewer;
-  std::string dataset;  // kTile, kLayer: decoded
-  geo::TileKey key;     // kTile: inside the tiling scheme
-  std::string file;     // kViewer: relative to the viewer's folder, decoded: "index.html" for "/"
-  std::string query;    // without '?', not decoded
+  std::string dataset;                             // kTile, kLayer, kTileJson: decoded
+  geo::TileKey key;                                // kTile: inside the tiling scheme of its format
+  TileFormat format = TileFormat::kQuantizedMesh;  // kTile
+  std::string file;   // kViewer: relative to the viewer's folder, decoded: "index.html" for "/"
+  std::string query;  // without '?', not decoded
 };
 
 // `target` in origin form ("/maui/0/0/0.terrain?error=5") or absolute form ("http://host/...").

@@ -22,12 +22,18 @@ struct DatasetView {
   std::vector<std::vector<geo::TileRange>> available;       // by level, from 0; the deepest served level is the last
   double west = -180, south = -90, east = 180, north = 90;  // degrees; west > east: across the antimeridian
   double min_height_m = 0, max_height_m = 0;
+  int max_mercator_depth = 1;  // the deepest geo::MercatorGrid that height tiles are cut from
 
   int max_level() const { return static_cast<int>(available.size()) - 1; }
 };
 
 // False as well for keys outside the tiling scheme.
 bool IsAvailable(const DatasetView& dataset, const geo::TileKey& key);
+
+// Web Mercator tiles of `size` pixels: levels 0 .. MaxHeightLevel, wherever they meet the dataset's bounds. False as
+// well for keys outside the scheme.
+bool IsHeightTileAvailable(const DatasetView& dataset, const geo::TileKey& key, int size);
+int MaxHeightLevel(const DatasetView& dataset, int size);
 
 // True for the first path segments that the server answers itself: datasets, viewer, livez, readyz, metrics. No dataset
 // may be named like one of them.

@@ -13,7 +13,9 @@ std::uint64_t Mix(std::uint64_t value) {
 }  // namespace
 
 std::size_t TileRequestHash::operator()(const TileRequest& request) const noexcept {
-  const auto variant = static_cast<std::uint64_t>(request.format) << 16 |
+  const auto variant = static_cast<std::uint64_t>(request.height_size) << 32 |
+                       static_cast<std::uint64_t>(request.height_encoding) << 24 |
+                       static_cast<std::uint64_t>(request.format) << 16 |
                        static_cast<std::uint64_t>(request.coding) << 8 | static_cast<std::uint64_t>(request.normals);
   std::uint64_t hash = Mix(request.dataset + 0x9e3779b97f4a7c15);
   hash = Mix(hash ^ static_cast<std::uint64_t>(request.key.level));

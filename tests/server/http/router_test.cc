@@ -23,6 +23,8 @@ TEST(Router, FindsEveryUrl) {
       {"/maui/layer.json", RouteKind::kLayer},
       {"/maui/layer.json?error=5", RouteKind::kLayer},
       {"/maui/0/1/0.terrain", RouteKind::kTile},
+      {"/maui/0/0/0.png", RouteKind::kTile},
+      {"/maui/tiles.json", RouteKind::kTileJson},
       {"http://example.test/maui/0/1/0.terrain", RouteKind::kTile},
       {"http://example.test", RouteKind::kViewer},
       {"/a%20b/layer.json", RouteKind::kLayer},
@@ -40,6 +42,8 @@ TEST(Router, ReadsTheTileAndTheQuery) {
   EXPECT_EQ(route->dataset, "maui");
   EXPECT_EQ(route->key, (geo::TileKey{9, 533, 388}));
   EXPECT_EQ(route->query, "error=5&v=1");
+  EXPECT_EQ(route->format, TileFormat::kQuantizedMesh);
+  EXPECT_EQ(Match("/maui/3/7/0.png")->format, TileFormat::kHeightPng);
   EXPECT_EQ(Match("/viewer/a/b.js")->file, "a/b.js");
   EXPECT_EQ(Match("/")->file, "index.html");
   EXPECT_EQ(Match("/viewer/")->file, "index.html");
@@ -55,7 +59,12 @@ TEST(Router, RefusesWhatIsNoUrl) {
       "/maui/0/0",
       "/maui/0/0/0",
       "/maui/0/0/0.terrain/",
-      "/maui/0/0/0.png",
+      "/maui/0/0/0.jpg",
+      "/maui/0/1/0.png",  // Web Mercator has one root
+      "/maui/1/0/2.png",
+      "/maui/1/2/0.png",
+      "/maui/25/0/0.png",
+      "/tiles.json",
       "/maui/0/0/.terrain",
       "/datasets/",
       "/livez/x",
