@@ -134,6 +134,8 @@ const std::vector<Option<Config>>& ServerOptionTable() {
        Bytes(&Config::refinement_cache_bytes, kMaxCacheBytes)},
       {"max_connections", "N", "Connections at a time; above it idle ones are closed and new ones wait",
        Integer(&Config::max_connections, 1, 1'000'000)},
+      {"max_locations", "N", "Points that one request for heights may name",
+       Integer(&Config::max_locations, 1, 1'000'000)},
       {"request_deadline_s", "SECONDS", "A request that takes longer gets 503",
        Seconds(&Config::request_deadline, 0.1, 3600)},
       {"header_timeout_s", "SECONDS", "Time for a client to send its request",

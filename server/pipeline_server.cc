@@ -33,6 +33,10 @@ Result<std::unique_ptr<Server>> Server::Start(std::shared_ptr<const TilePipeline
   std::vector<DatasetView> views;
   for (const Dataset& dataset : pipeline->datasets()) views.push_back(ViewOf(dataset));
   options.refinement_stats = [pipeline] { return pipeline->refinements(); };
+  options.read_points = [pipeline](std::uint32_t dataset, std::span<const dem::GeoPosition> points,
+                                   std::stop_token stop) {
+    return pipeline->datasets()[dataset].source->ReadPoints(points, std::move(stop));
+  };
   TileBuilder builder = [pipeline = std::move(pipeline)](const TileRequest& request, std::stop_token stop) {
     return pipeline->Build(request, std::move(stop));
   };

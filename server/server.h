@@ -29,6 +29,8 @@ struct ServerOptions {
   std::size_t queue_length = 256;                    // builds that wait for a worker
   std::size_t cache_bytes = std::size_t{256} << 20;  // of finished tiles; 0: none
   std::function<ByteCacheStats()> refinement_stats;  // of what tiles are made from; may be empty
+  PointReader read_points;                           // for heights; empty where there are none
+  std::size_t max_locations = 10'000;                // in one request for heights
   std::size_t max_connections = 1024;
   std::string cache_control = "public, max-age=3600";  // of tiles and layer.json
   std::filesystem::path viewer_dir;                    // empty or missing: a plain page instead

@@ -31,8 +31,9 @@ Response Ready(bool draining) {
 }  // namespace
 
 Routes::Routes(std::span<const DatasetView> datasets, TileService& tiles, StaticFiles viewer,
-               TileHandlerOptions options, State state)
+               TileHandlerOptions options, Heights heights, State state)
     : tiles_(datasets, tiles, options),
+      heights_(datasets, tiles, std::move(heights.read), options, heights.max_locations),
       layers_(datasets, options.cache_control),
       tile_json_(datasets, options.cache_control),
       viewer_(std::move(viewer)),
@@ -46,6 +47,8 @@ asio::awaitable<Response> Routes::Serve(Request request) const {
   Response response;
   if (route->kind == RouteKind::kTile) {
     response = co_await tiles_.Handle(*route, std::move(request));
+  } else if (route->kind == RouteKind::kHeights) {
+    response = co_await heights_.Handle(*route, std::move(request));
   } else {
     response = ServeNow(*route, request);
   }

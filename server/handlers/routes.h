@@ -7,6 +7,7 @@
 
 #include "server/asio.h"
 #include "server/handlers/document.h"
+#include "server/handlers/heights_handler.h"
 #include "server/handlers/layer_handler.h"
 #include "server/handlers/metrics.h"
 #include "server/handlers/static_files.h"
@@ -26,12 +27,16 @@ class Routes {
     std::function<bool()> draining;
     std::function<std::string()> metrics_text;
   };
+  struct Heights {
+    PointReader read;
+    std::size_t max_locations = 0;
+  };
 
   // `datasets` and `tiles` must outlive this.
   Routes(std::span<const DatasetView> datasets, TileService& tiles, StaticFiles viewer, TileHandlerOptions options,
-         State state);
+         Heights heights, State state);
 
-  // Answers GET and HEAD.
+  // Answers GET, HEAD, and POST where TakesPost says so.
   asio::awaitable<Response> Serve(Request request) const;
 
  private:
@@ -39,6 +44,7 @@ class Routes {
   Response ServeViewer(const Route& route, const Request& request) const;
 
   const TileHandler tiles_;
+  const HeightsHandler heights_;
   const LayerHandler layers_;
   const TileJsonHandler tile_json_;
   const StaticFiles viewer_;

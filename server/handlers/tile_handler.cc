@@ -2,15 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <boost/asio/steady_timer.hpp>
-#include <boost/asio/this_coro.hpp>
-#include <boost/asio/use_awaitable.hpp>
 #include <charconv>
 #include <cmath>
 #include <iterator>
 #include <memory>
 #include <utility>
 
+#include "server/handlers/backend_failure.h"
 #include "server/http/http_error.h"
 #include "server/http/negotiate.h"
 
@@ -46,11 +44,7 @@ asio::awaitable<Response> TileHandler::Handle(Route route, Request request) cons
   const auto deadline = TileService::Clock::now() + options_.deadline;
   const Result<ServedTile> served = co_await tiles_.Get(key, deadline);
   if (served) co_return Reply(*served, *tile, request);
-  if (served.error().code == ErrorCode::kOverloaded) {
-    asio::steady_timer delay(co_await asio::this_coro::executor, options_.refusal_delay);
-    co_await delay.async_wait(asio::use_awaitable);
-  }
-  co_return BackendErrorResponse(served.error(), request.id);
+  co_return co_await BackendFailure(served.error(), request.id, options_.refusal_delay);
 }
 
 Response TileHandler::Reply(const ServedTile& served, const TileRequest& tile, const Request& request) const {

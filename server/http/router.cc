@@ -112,6 +112,8 @@ std::string_view ToString(RouteKind kind) {
       return "layer";
     case RouteKind::kTileJson:
       return "tilejson";
+    case RouteKind::kHeights:
+      return "heights";
     case RouteKind::kDatasets:
       return "datasets";
     case RouteKind::kViewer:
@@ -143,6 +145,8 @@ Result<Route> Match(std::string_view target) {
       route->kind = RouteKind::kLayer;
     } else if (segments->size() == 2 && (*segments)[1] == "tiles.json") {
       route->kind = RouteKind::kTileJson;
+    } else if (segments->size() == 2 && (*segments)[1] == "heights") {
+      route->kind = RouteKind::kHeights;
     } else if (segments->size() == 4) {
       std::string_view y = (*segments)[3];
       const auto format = TakeFormat(y);

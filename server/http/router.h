@@ -14,6 +14,7 @@ enum class RouteKind {
   kTile,      // /{dataset}/{z}/{x}/{y}.terrain, .png
   kLayer,     // /{dataset}/layer.json
   kTileJson,  // /{dataset}/tiles.json
+  kHeights,   // /{dataset}/heights
   kDatasets,  // /datasets
   kViewer,    // / and /viewer/...
   kLive,      // /livez
@@ -26,12 +27,15 @@ std::string_view ToString(RouteKind kind);
 
 struct Route {
   RouteKind kind = RouteKind::kViewer;
-  std::string dataset;                             // kTile, kLayer, kTileJson: decoded
+  std::string dataset;                             // kTile, kLayer, kTileJson, kHeights: decoded
   geo::TileKey key;                                // kTile: inside the tiling scheme of its format
   TileFormat format = TileFormat::kQuantizedMesh;  // kTile
   std::string file;   // kViewer: relative to the viewer's folder, decoded: "index.html" for "/"
   std::string query;  // without '?', not decoded
 };
+
+// Whether it answers POST, and so takes a body.
+constexpr bool TakesPost(RouteKind kind) { return kind == RouteKind::kHeights; }
 
 // `target` in origin form ("/maui/0/0/0.terrain?error=5") or absolute form ("http://host/...").
 // kInvalidArgument: neither form, or malformed percent-encoding. kNotFound: no such URL; tile numbers that are not
