@@ -136,6 +136,8 @@ const std::vector<Option<Config>>& ServerOptionTable() {
        Integer(&Config::max_connections, 1, 1'000'000)},
       {"max_locations", "N", "Points that one request for heights may name",
        Integer(&Config::max_locations, 1, 1'000'000)},
+      {"max_mesh_samples", "N", "Height samples that one mesh of an area may be made from",
+       Integer(&Config::max_mesh_samples, 4, 100'000'000)},
       {"request_deadline_s", "SECONDS", "A request that takes longer gets 503",
        Seconds(&Config::request_deadline, 0.1, 3600)},
       {"header_timeout_s", "SECONDS", "Time for a client to send its request",

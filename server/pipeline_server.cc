@@ -37,6 +37,14 @@ Result<std::unique_ptr<Server>> Server::Start(std::shared_ptr<const TilePipeline
                                    std::stop_token stop) {
     return pipeline->datasets()[dataset].source->ReadPoints(points, std::move(stop));
   };
+  options.area_mesher.plan = [pipeline, most = options.max_mesh_samples](std::uint32_t index, const AreaRequest& area) {
+    const Dataset& dataset = pipeline->datasets()[index];
+    return PlanArea(*dataset.source, dataset.error_fraction, area, most);
+  };
+  options.area_mesher.build = [pipeline](std::uint32_t index, const AreaPlan& plan, const AreaRequest& area,
+                                         std::stop_token stop) {
+    return BuildAreaMesh(*pipeline->datasets()[index].source, plan, area, std::move(stop));
+  };
   TileBuilder builder = [pipeline = std::move(pipeline)](const TileRequest& request, std::stop_token stop) {
     return pipeline->Build(request, std::move(stop));
   };

@@ -73,7 +73,8 @@ class Server::Impl {
         metrics_(datasets_),
         tiles_(ServiceOptions(options_), std::move(builder), std::bind_front(&Metrics::CountBuild, &metrics_)),
         connections_(options_.max_connections),
-        routes_(datasets_, tiles_, std::move(viewer), HandlerOptions(), HeightsOptions(), RouteState()),
+        routes_(datasets_, tiles_, std::move(viewer), HandlerOptions(), HeightsOptions(), options_.area_mesher,
+                RouteState()),
         work_(io_.get_executor()),
         signals_(io_) {}
 

@@ -31,9 +31,10 @@ Response Ready(bool draining) {
 }  // namespace
 
 Routes::Routes(std::span<const DatasetView> datasets, TileService& tiles, StaticFiles viewer,
-               TileHandlerOptions options, Heights heights, State state)
+               TileHandlerOptions options, Heights heights, AreaMesher mesher, State state)
     : tiles_(datasets, tiles, options),
       heights_(datasets, tiles, std::move(heights.read), options, heights.max_locations),
+      areas_(datasets, tiles, std::move(mesher), options),
       layers_(datasets, options.cache_control),
       tile_json_(datasets, options.cache_control),
       viewer_(std::move(viewer)),
@@ -49,6 +50,8 @@ asio::awaitable<Response> Routes::Serve(Request request) const {
     response = co_await tiles_.Handle(*route, std::move(request));
   } else if (route->kind == RouteKind::kHeights) {
     response = co_await heights_.Handle(*route, std::move(request));
+  } else if (route->kind == RouteKind::kMesh) {
+    response = co_await areas_.Handle(*route, std::move(request));
   } else {
     response = ServeNow(*route, request);
   }

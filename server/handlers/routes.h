@@ -6,6 +6,7 @@
 #include <string>
 
 #include "server/asio.h"
+#include "server/handlers/area_handler.h"
 #include "server/handlers/document.h"
 #include "server/handlers/heights_handler.h"
 #include "server/handlers/layer_handler.h"
@@ -34,7 +35,7 @@ class Routes {
 
   // `datasets` and `tiles` must outlive this.
   Routes(std::span<const DatasetView> datasets, TileService& tiles, StaticFiles viewer, TileHandlerOptions options,
-         Heights heights, State state);
+         Heights heights, AreaMesher mesher, State state);
 
   // Answers GET, HEAD, and POST where TakesPost says so.
   asio::awaitable<Response> Serve(Request request) const;
@@ -45,6 +46,7 @@ class Routes {
 
   const TileHandler tiles_;
   const HeightsHandler heights_;
+  const AreaHandler areas_;
   const LayerHandler layers_;
   const TileJsonHandler tile_json_;
   const StaticFiles viewer_;

@@ -114,6 +114,8 @@ std::string_view ToString(RouteKind kind) {
       return "tilejson";
     case RouteKind::kHeights:
       return "heights";
+    case RouteKind::kMesh:
+      return "mesh";
     case RouteKind::kDatasets:
       return "datasets";
     case RouteKind::kViewer:
@@ -147,6 +149,8 @@ Result<Route> Match(std::string_view target) {
       route->kind = RouteKind::kTileJson;
     } else if (segments->size() == 2 && (*segments)[1] == "heights") {
       route->kind = RouteKind::kHeights;
+    } else if (segments->size() == 2 && (*segments)[1] == "mesh") {
+      route->kind = RouteKind::kMesh;
     } else if (segments->size() == 4) {
       std::string_view y = (*segments)[3];
       const auto format = TakeFormat(y);

@@ -15,6 +15,7 @@ enum class RouteKind {
   kLayer,     // /{dataset}/layer.json
   kTileJson,  // /{dataset}/tiles.json
   kHeights,   // /{dataset}/heights
+  kMesh,      // /{dataset}/mesh
   kDatasets,  // /datasets
   kViewer,    // / and /viewer/...
   kLive,      // /livez
@@ -27,7 +28,7 @@ std::string_view ToString(RouteKind kind);
 
 struct Route {
   RouteKind kind = RouteKind::kViewer;
-  std::string dataset;                             // kTile, kLayer, kTileJson, kHeights: decoded
+  std::string dataset;                             // kTile, kLayer, kTileJson, kHeights, kMesh: decoded
   geo::TileKey key;                                // kTile: inside the tiling scheme of its format
   TileFormat format = TileFormat::kQuantizedMesh;  // kTile
   std::string file;   // kViewer: relative to the viewer's folder, decoded: "index.html" for "/"

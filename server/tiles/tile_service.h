@@ -13,6 +13,7 @@
 #include "engine/core/result.h"
 #include "engine/dem/dem_source.h"
 #include "server/asio.h"
+#include "server/tiles/area_mesh.h"
 #include "server/tiles/encoded_tile.h"
 #include "server/tiles/single_flight.h"
 #include "server/tiles/tile_cache.h"
@@ -27,6 +28,13 @@ using TileBuilder = std::function<Result<EncodedTile>(const TileRequest&, std::s
 // Heights of a dataset at points, NaN where it has none. Blocking; called on many threads at once.
 using PointReader = std::function<Result<std::vector<float>>(
     std::uint32_t dataset, std::span<const dem::GeoPosition> points, std::stop_token)>;
+
+// Meshes of areas, by the dataset's index: `plan` refuses what is too large, at once and without reading; `build`
+// blocks. Both are called on many threads at once.
+struct AreaMesher {
+  std::function<Result<AreaPlan>(std::uint32_t dataset, const AreaRequest&)> plan;
+  std::function<Result<EncodedTile>(std::uint32_t dataset, const AreaPlan&, const AreaRequest&, std::stop_token)> build;
+};
 
 // Told about every build on the thread that ran it.
 using BuildObserver = std::function<void(const TileRequest&, const Result<TilePtr>&)>;

@@ -26,6 +26,7 @@ TEST(Router, FindsEveryUrl) {
       {"/maui/0/0/0.png", RouteKind::kTile},
       {"/maui/tiles.json", RouteKind::kTileJson},
       {"/maui/heights?locations=1,2", RouteKind::kHeights},
+      {"/maui/mesh?bbox=0,0,1,1&error=5", RouteKind::kMesh},
       {"http://example.test/maui/0/1/0.terrain", RouteKind::kTile},
       {"http://example.test", RouteKind::kViewer},
       {"/a%20b/layer.json", RouteKind::kLayer},
