@@ -68,8 +68,7 @@ asio::awaitable<Response> HeightsHandler::Handle(Route route, Request request) c
 }
 
 std::string HeightsJson(const HeightsQuery& query, std::span<const float> heights, std::string_view dataset) {
-  const std::string name =
-      nlohmann::json(dataset).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  const std::string name = nlohmann::json(dataset).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
   std::string json = "{\"results\":[";
   const auto out = std::back_inserter(json);
   for (std::size_t i = 0; i < heights.size(); ++i) {

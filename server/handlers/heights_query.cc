@@ -46,8 +46,8 @@ Result<dem::GeoPosition> ParseLocation(std::string_view item, const char* name, 
 }
 
 tl::unexpected<Error> TooMany(const char* what, std::size_t max_locations) {
-  return MakeError(ErrorCode::kInvalidArgument, "{}: more than {} points, which is the most this server answers at once",
-                   what, max_locations);
+  return MakeError(ErrorCode::kInvalidArgument,
+                   "{}: more than {} points, which is the most this server answers at once", what, max_locations);
 }
 
 Result<std::vector<dem::GeoPosition>> ParseLocations(std::string_view text, const char* name,

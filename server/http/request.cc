@@ -66,8 +66,8 @@ std::optional<std::size_t> PlainLength(const Fields& fields) {
   return length;
 }
 
-// Null when the message ends with its head or, of a POST, so many bytes after it. Beast reads a GET with `Transfer-Encoding: gzip` as body-less and takes
-// what follows for another request; this is where that ends.
+// Null when the message ends with its head or, of a POST, so many bytes after it. Beast reads a GET with
+// `Transfer-Encoding: gzip` as body-less and takes what follows for another request; this is where that ends.
 const char* FramingProblem(const Fields& fields) {
   if (fields.count(http::field::transfer_encoding) > 0) return "Transfer-Encoding is not accepted";
   const auto lengths = fields.count(http::field::content_length);

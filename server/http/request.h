@@ -32,7 +32,7 @@ struct Request {
   std::size_t content_length = 0;  // of a POST
   bool expects_continue = false;   // the client waits for a 100 before it sends the body
   std::string body;                // of a POST, once the session has read it
-  std::string id;               // 16 hexadecimal digits, given by the server
+  std::string id;                  // 16 hexadecimal digits, given by the server
 };
 
 // Why bytes are not a request. The connection is of no use afterwards: its framing cannot be trusted.

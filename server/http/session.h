@@ -24,7 +24,8 @@ struct SessionOptions {
   std::size_t max_body_bytes = 0;                   // of a POST
 };
 
-// Answers GET, HEAD, and POST where TakesPost says so; the session leaves a HEAD's body away. Cancelled when the client leaves.
+// Answers GET, HEAD, and POST where TakesPost says so; the session leaves a HEAD's body away. Cancelled when the client
+// leaves.
 using Handler = std::function<asio::awaitable<Response>(Request)>;
 
 // Shared by all sessions, outlives them all. `connections` and what the functions refer to must outlive the sessions

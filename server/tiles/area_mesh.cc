@@ -31,10 +31,11 @@ std::chrono::microseconds Since(Clock::time_point start) {
 std::optional<AreaRequest> Clip(const AreaRequest& area, const dem::GeoBounds& bounds) {
   const double bounds_east = bounds.east < bounds.west ? bounds.east + 360 : bounds.east;
   AreaRequest best = area;
-  best.west = best.east = 0;
+  const bool all_around = bounds_east - bounds.west >= 360;
+  if (!all_around) best.west = best.east = 0;
   for (const double turn : {-360.0, 0.0, 360.0}) {
     const double west = std::max(area.west, bounds.west + turn), east = std::min(area.east, bounds_east + turn);
-    if (east - west <= best.east - best.west) continue;
+    if (all_around || east - west <= best.east - best.west) continue;
     best.west = west;
     best.east = east;
   }

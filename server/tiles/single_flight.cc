@@ -76,8 +76,7 @@ asio::awaitable<SingleFlight::Landing> SingleFlight::Join(CacheKey key, Build bu
   lock.lock();
   std::optional<Result<TilePtr>> outcome = flight->outcome;
   lock.unlock();
-  if (!outcome)
-    outcome = MakeError(ErrorCode::kCancelled, "{}: not ready before the request's deadline", NameOf(key));
+  if (!outcome) outcome = MakeError(ErrorCode::kCancelled, "{}: not ready before the request's deadline", NameOf(key));
   co_return Landing(std::move(*outcome), joined);
 }
 
@@ -101,8 +100,7 @@ Result<std::shared_ptr<SingleFlight::Flight>> SingleFlight::Board(const CacheKey
 
 // On a worker thread.
 void SingleFlight::Fly(const CacheKey& key, const std::shared_ptr<Flight>& flight, const Build& build) {
-  Result<TilePtr> outcome =
-      MakeError(ErrorCode::kCancelled, "{}: stopped before it began", NameOf(key));
+  Result<TilePtr> outcome = MakeError(ErrorCode::kCancelled, "{}: stopped before it began", NameOf(key));
   if (!flight->stop.stop_requested()) outcome = build(flight->stop.get_token());
 
   std::vector<Waiter> waiters;

@@ -100,7 +100,8 @@ TEST(HeightsQuery, WalksAlongAPath) {
 }
 
 TEST(HeightsQuery, ReadsBodies) {
-  const auto json = ParseHeightsBody("Application/JSON; charset=utf-8", R"({"path": "1,2|3,4", "step": 50.5, "samples": 3})");
+  const auto json =
+      ParseHeightsBody("Application/JSON; charset=utf-8", R"({"path": "1,2|3,4", "step": 50.5, "samples": 3})");
   ASSERT_TRUE(json);
   EXPECT_EQ(*json, (QueryParameters{{"path", "1,2|3,4"}, {"samples", "3"}, {"step", "50.5"}}));
   const auto form = ParseHeightsBody("application/x-www-form-urlencoded", "locations=1%2C2%7C3%2C+4&v=1");
@@ -109,14 +110,16 @@ TEST(HeightsQuery, ReadsBodies) {
 }
 
 TEST(HeightsQuery, RefusesOtherBodies) {
-  for (const char* body : {"", "{", "[]", "null", "\"1,2\"", R"({"locations": ["1,2"]})", R"({"locations": null})",
-                           R"({"locations": {"a": 1}})", R"({"locations": true})", "{\"locations\": \"\xff\"}", "NaN"}) {
+  for (const char* body :
+       {"", "{", "[]", "null", "\"1,2\"", R"({"locations": ["1,2"]})", R"({"locations": null})",
+        R"({"locations": {"a": 1}})", R"({"locations": true})", "{\"locations\": \"\xff\"}", "NaN"}) {
     EXPECT_FALSE(ParseHeightsBody("application/json", body)) << body;
   }
   const std::string deep(200'000, '[');
   EXPECT_FALSE(ParseHeightsBody("application/json", deep));
   EXPECT_FALSE(ParseHeightsBody("application/x-www-form-urlencoded", "locations=%zz"));
-  for (const char* type : {"", "text/plain", "application/xml", "multipart/form-data; boundary=x", "application/jsonx"}) {
+  for (const char* type :
+       {"", "text/plain", "application/xml", "multipart/form-data; boundary=x", "application/jsonx"}) {
     EXPECT_FALSE(ParseHeightsBody(type, R"({"locations": "1,2"})")) << type;
   }
 }
