@@ -89,6 +89,8 @@ struct Config {
   std::size_t cache_bytes = std::size_t{256} << 20;             // 0: no cache
   std::size_t refinement_cache_bytes = std::size_t{128} << 20;  // 0: no cache
   std::size_t max_connections = 1024;
+  std::size_t max_mesh_samples = 1'000'000;
+  std::size_t max_locations = 10'000;  // in one request for heights
 
   std::chrono::milliseconds request_deadline{30'000};
   std::chrono::milliseconds header_timeout{5'000};

@@ -28,6 +28,7 @@ DatasetView ViewOf(const Dataset& dataset) {
   if (dataset.imagery.image) view.texture = dataset.imagery.texture;
   view.metadata_levels = dataset.metadata_levels;
   view.floor_m = info.floor;
+  view.max_mercator_depth = info.max_mercator_depth;
   return view;
 }
 
@@ -37,6 +38,18 @@ Result<std::unique_ptr<Server>> Server::Start(std::shared_ptr<const TilePipeline
   std::vector<DatasetView> views;
   for (const Dataset& dataset : pipeline->datasets()) views.push_back(ViewOf(dataset));
   options.refinement_stats = [pipeline] { return pipeline->refinements(); };
+  options.read_points = [pipeline](std::uint32_t dataset, std::span<const dem::GeoPosition> points,
+                                   std::stop_token stop) {
+    return pipeline->datasets()[dataset].source->ReadPoints(points, std::move(stop));
+  };
+  options.area_mesher.plan = [pipeline, most = options.max_mesh_samples](std::uint32_t index, const AreaRequest& area) {
+    const Dataset& dataset = pipeline->datasets()[index];
+    return PlanArea(*dataset.source, dataset.error_fraction, area, most);
+  };
+  options.area_mesher.build = [pipeline](std::uint32_t index, const AreaPlan& plan, const AreaRequest& area,
+                                         std::stop_token stop) {
+    return BuildAreaMesh(*pipeline->datasets()[index].source, plan, area, std::move(stop));
+  };
   TileBuilder builder = [pipeline = std::move(pipeline)](const TileRequest& request, std::stop_token stop) {
     return pipeline->Build(request, std::move(stop));
   };

@@ -28,6 +28,10 @@ namespace {
 // For replies to requests whose builds were just cancelled, and again for sockets that were just aborted.
 constexpr std::chrono::milliseconds kLastWords{1'000};
 
+// A request for heights has a body of at most so many bytes, and so many for each location that it may name: two
+// numbers with all their digits, a form's three bytes for each separator.
+constexpr std::size_t kBodyBytes = 4096, kBytesPerLocation = 64;
+
 Result<void> CheckNames(const std::vector<DatasetView>& datasets) {
   std::set<std::string_view> names;
   for (const DatasetView& dataset : datasets) {
@@ -69,7 +73,8 @@ class Server::Impl {
         metrics_(datasets_),
         tiles_(ServiceOptions(options_), std::move(builder), std::bind_front(&Metrics::CountBuild, &metrics_)),
         connections_(options_.max_connections),
-        routes_(datasets_, tiles_, std::move(viewer), HandlerOptions(), RouteState()),
+        routes_(datasets_, tiles_, std::move(viewer), HandlerOptions(), HeightsOptions(), options_.area_mesher,
+                RouteState()),
         work_(io_.get_executor()),
         signals_(io_) {}
 
@@ -153,6 +158,8 @@ class Server::Impl {
     return handler;
   }
 
+  Routes::Heights HeightsOptions() const { return {options_.read_points, options_.max_locations}; }
+
   ByteCacheStats RefinementStats() const {
     return options_.refinement_stats ? options_.refinement_stats() : ByteCacheStats{};
   }
@@ -169,6 +176,7 @@ class Server::Impl {
     context->options.header_timeout = options_.header_timeout;
     context->options.idle_timeout = options_.idle_timeout;
     context->options.write_timeout = options_.write_timeout;
+    context->options.max_body_bytes = kBodyBytes + kBytesPerLocation * options_.max_locations;
     context->handler = std::bind_front(&Routes::Serve, &routes_);
     context->observer = [this](const ReplyRecord& record) {
       metrics_.CountReply(record);

@@ -41,7 +41,7 @@ LIBRARIES = [
     Library("expected", r"tl/.*", r"."),
     Library("fmt", r"fmt/.*", r"."),
     Library("Highway", r"hwy/.*", r"engine/tin/.*\.cc"),
-    Library("GDAL", r"(gdal|cpl|ogr|vrt)\w*\.h|proj\.h", r"engine/dem/"),
+    Library("GDAL", r"(gdal|cpl|ogr|vrt)\w*\.h|(proj|geodesic)\.h", r"engine/dem/"),
     Library("nlohmann_json", r"nlohmann/.*", r"(config/|proto/.*\.cc|server/.*\.cc)"),
     Library("libdeflate", r"libdeflate\.h", r"proto/.*\.cc"),
     Library("Draco", r"draco/.*", r"proto/.*\.cc"),

@@ -14,7 +14,7 @@ build_packages=(
   libdeflate-dev libxxhash-dev libhwy-dev libdraco-dev libmeshoptimizer-dev libjpeg62-turbo-dev libwebp-dev
 )
 test_packages=(
-  libgtest-dev libgmock-dev libbenchmark-dev zlib1g-dev chromium python3-jsonschema strace wrk
+  libgtest-dev libgmock-dev libbenchmark-dev zlib1g-dev libpng-dev chromium python3-jsonschema strace wrk
   clang-14 libclang-rt-14-dev llvm-14 clang-format-14
 )
 

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,11 @@ class DemSource::Impl {
       : handles(std::move(path), std::move(files)), georeference(std::move(where)) {}
 
   Result<TileHeights> Read(const geo::TileKey& key, const std::stop_token& stop);
+  // `what` is read, for messages.
+  Result<std::vector<float>> ReadNodes(int level, const NodeWindow& window, const std::string& what,
+                                       const std::stop_token& stop);
+  Result<std::vector<float>> ReadMercator(int depth, const NodeWindow& window, const std::stop_token& stop);
+  Result<std::vector<float>> ReadPoints(std::span<const GeoPosition> points, const std::stop_token& stop);
   HeightRange RangeBound(const geo::TileKey& key) const;
 
   const LevelPlan& Plan(int level) const;  // 0 .. geo::kMaxLevel, also beyond the deepest level served
@@ -31,6 +37,7 @@ class DemSource::Impl {
   RasterLayout layout;
   Footprint footprint;  // padded: outside it there is nothing but the floor
   std::vector<LevelPlan> levels;
+  std::vector<int> mercator_factors;  // by depth
   std::vector<std::vector<geo::TileRange>> available;
   RangeTable table;
   float floor = 0;
@@ -42,6 +49,8 @@ class DemSource::Impl {
  private:
   Result<std::vector<float>> ReadFilled(GDALDataset& dataset, int factor, const GridWindow& window,
                                         const std::stop_token& stop);
+  Result<std::vector<float>> ReadFloored(std::span<const Position> positions, int factor, const std::string& what,
+                                         const std::stop_token& stop);
   bool IsInside(const Position& position) const;
   std::optional<float> PoleHeight(const geo::Lattice& lattice, std::int64_t row) const;
 };

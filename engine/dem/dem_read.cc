@@ -62,42 +62,62 @@ Result<std::vector<float>> DemSource::Impl::ReadFilled(GDALDataset& dataset, int
   return FillVoids(*around, wide, window, gap);
 }
 
-Result<TileHeights> DemSource::Impl::Read(const geo::TileKey& key, const std::stop_token& stop) {
-  const auto& [lattice, factor] = Plan(key.level);
-  TileHeights tile{lattice, lattice.cells + 3, {}};
-  const std::vector<Position> positions =
-      NodePositions(georeference, footprint, lattice, key, kPositionTolerance * factor);
-  tile.heights.assign(positions.size(), floor);
-
+// Heights under the rules of tiles: averaged by the factor, small voids filled, the floor elsewhere.
+Result<std::vector<float>> DemSource::Impl::ReadFloored(std::span<const Position> positions, int factor,
+                                                        const std::string& what, const std::stop_token& stop) {
+  std::vector<float> out(positions.size(), floor);
   const GridAxis columns(layout.columns, factor, layout.wraps), rows(layout.height, factor, false);
-  std::vector<Cell> cells;
+  std::vector<GridCell> cells;
   std::vector<std::size_t> nodes;  // node of each cell
   for (std::size_t i = 0; i < positions.size(); ++i) {
     if (!IsInside(positions[i])) continue;
     cells.push_back(CellAt(positions[i], columns, rows, layout.width, layout.height));
     nodes.push_back(i);
   }
-  if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "{}: reading a tile was stopped", info.path);
+  if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "{}: reading {} was stopped", info.path, what);
   // Files are looked at even where nothing must be read: a tile of floor must not outlive its source.
   auto handle = handles.Borrow();
   if (!handle) return tl::unexpected(handle.error());
-  if (!cells.empty()) {
-    const GridWindow window = WindowOf(cells, columns, rows);
-    const auto heights = ReadFilled(**handle, factor, window, stop);
-    if (!heights) {
-      return MakeError(heights.error().code, "{}: tile {}: {}", info.path, geo::ToString(key), heights.error().message);
-    }
-    if (auto unchanged = handles.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
-    for (std::size_t i = 0; i < cells.size(); ++i) {
-      if (const auto height = Interpolate(*heights, window, cells[i])) tile.heights[nodes[i]] = RoundHeight(*height);
+  if (cells.empty()) return out;
+  const GridWindow window = WindowOf(cells, columns, rows);
+  const auto heights = ReadFilled(**handle, factor, window, stop);
+  if (!heights) {
+    return MakeError(heights.error().code, "{}: {}: {}", info.path, what, heights.error().message);
+  }
+  if (auto unchanged = handles.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    if (const auto height = Interpolate(*heights, window, cells[i])) out[nodes[i]] = RoundHeight(*height);
+  }
+  return out;
+}
+
+Result<std::vector<float>> DemSource::Impl::ReadNodes(int level, const NodeWindow& window, const std::string& what,
+                                                      const std::stop_token& stop) {
+  const auto& [lattice, factor] = Plan(level);
+  const auto positions = NodePositions(georeference, footprint, lattice, window, kPositionTolerance * factor);
+  auto heights = ReadFloored(positions, factor, what, stop);
+  if (!heights) return heights;
+  for (int row = 0; row < window.rows; ++row) {
+    if (const auto pole = PoleHeight(lattice, window.row + row)) {
+      std::fill_n(heights->begin() + std::ptrdiff_t{row} * window.columns, window.columns, *pole);
     }
   }
-  for (int row = 0; row < tile.stride; ++row) {
-    if (const auto pole = PoleHeight(lattice, lattice.FirstRow(key) - 1 + row)) {
-      std::fill_n(tile.heights.begin() + row * tile.stride, tile.stride, *pole);
-    }
-  }
-  return tile;
+  return heights;
+}
+
+Result<TileHeights> DemSource::Impl::Read(const geo::TileKey& key, const std::stop_token& stop) {
+  const geo::Lattice& lattice = Plan(key.level).lattice;
+  auto heights = ReadNodes(key.level, WindowOfTile(lattice, key), "tile " + geo::ToString(key), stop);
+  if (!heights) return tl::unexpected(std::move(heights).error());
+  return TileHeights{lattice, lattice.cells + 3, *std::move(heights)};
+}
+
+Result<std::vector<float>> DemSource::Impl::ReadMercator(int depth, const NodeWindow& window,
+                                                         const std::stop_token& stop) {
+  const int factor = mercator_factors[static_cast<std::size_t>(depth)];
+  const auto positions =
+      NodePositions(georeference, footprint, geo::MercatorGrid{depth}, window, kPositionTolerance * factor);
+  return ReadFloored(positions, factor, fmt::format("Mercator pixels of depth {}", depth), stop);
 }
 
 }  // namespace terrace::dem

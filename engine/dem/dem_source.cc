@@ -138,6 +138,8 @@ Result<std::unique_ptr<DemSource>> DemSource::Open(const std::string& path, cons
   const Footprint footprint = Footprint::Of(impl->georeference);
   impl->footprint = footprint.Padded();
   impl->levels = PlanLevels(*spacing);
+  impl->mercator_factors = MercatorFactors(*spacing);
+  impl->info.max_mercator_depth = DeepestMercator(*spacing);
   impl->info.max_level = DeepestLevel(*spacing, options.error_fraction, options.finest_error);
   impl->available = TilesTouching(footprint, impl->info.max_level);
   impl->table = std::move(scan->table);
@@ -181,6 +183,22 @@ HeightRange DemSource::RangeBound(const geo::TileKey& key) const {
 Result<TileHeights> DemSource::Read(const geo::TileKey& key, std::stop_token stop) const {
   TERRACE_CHECK(geo::IsValid(key));
   return impl_->Read(key, stop);
+}
+
+Result<std::vector<float>> DemSource::ReadNodes(int level, const NodeWindow& window, std::stop_token stop) const {
+  TERRACE_CHECK(level >= 0 && level <= geo::kMaxLevel && window.columns > 0 && window.rows > 0);
+  TERRACE_CHECK(window.row >= 0 && window.row + window.rows - 1 <= LatticeOf(level).rows());
+  return impl_->ReadNodes(level, window, fmt::format("an area of level {}", level), stop);
+}
+
+Result<std::vector<float>> DemSource::ReadMercator(int depth, const NodeWindow& window, std::stop_token stop) const {
+  TERRACE_CHECK(depth >= 0 && depth <= geo::kMaxLevel && window.columns > 0 && window.rows > 0);
+  TERRACE_CHECK(window.row >= 0 && window.row + window.rows <= geo::MercatorGrid{depth}.rows());
+  return impl_->ReadMercator(depth, window, stop);
+}
+
+Result<std::vector<float>> DemSource::ReadPoints(std::span<const GeoPosition> points, std::stop_token stop) const {
+  return impl_->ReadPoints(points, stop);
 }
 
 }  // namespace terrace::dem

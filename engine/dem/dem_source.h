@@ -9,6 +9,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <stop_token>
 #include <string>
 #include <vector>
@@ -41,6 +42,17 @@ struct GeoBounds {
   double west = -180, south = -90, east = 180, north = 90;
 };
 
+// Degrees.
+struct GeoPosition {
+  double longitude = 0, latitude = 0;
+};
+
+// A block of a grid of nodes: first column and row, and how many of each.
+struct NodeWindow {
+  std::int64_t column = 0, row = 0;
+  int columns = 0, rows = 0;
+};
+
 // What `terrace info` prints and `/datasets` tells.
 struct DemInfo {
   std::string path;
@@ -61,6 +73,7 @@ struct DemInfo {
   std::string transform;  // the PROJ operation from EPSG:4326 to the source, for the log; empty: none needed
   double floor = 0;
   int max_level = 0;
+  int max_mercator_depth = 1;
 };
 
 // Height samples of a tile with one more sample on each side, row by row from the south-western halo sample. Every
@@ -101,6 +114,20 @@ class DemSource {
 
   // Reads and resamples one tile. kUnavailable: the source cannot be read now. kCancelled: stopped.
   Result<TileHeights> Read(const geo::TileKey& key, std::stop_token stop = {}) const;
+
+  // Heights at nodes of a level's lattice, row by row from the south-western one: the same bits as in its tiles. Any
+  // level up to geo::kMaxLevel; columns count modulo 360 degrees; rows lie within the lattice.
+  Result<std::vector<float>> ReadNodes(int level, const NodeWindow& window, std::stop_token stop = {}) const;
+
+  // Heights at pixel centres of a Web Mercator grid, row by row from the north-western one, under the rules of tiles:
+  // averaged to the grid's resolution, small voids filled, the floor elsewhere. A height is a function of depth and
+  // pixel alone. Depths 0 .. geo::kMaxLevel; the first that is as fine as the source is info().max_mercator_depth.
+  Result<std::vector<float>> ReadMercator(int depth, const NodeWindow& window, std::stop_token stop = {}) const;
+
+  // Heights as measured: bilinear between the samples of the full resolution, in the order of `points`; NaN outside the
+  // source and where the sample whose pixel holds the point is void. Nothing is filled. A height does not depend on
+  // the other points. Precondition: finite longitudes, latitudes in -90 .. 90.
+  Result<std::vector<float>> ReadPoints(std::span<const GeoPosition> points, std::stop_token stop = {}) const;
 
   // Identifies content and options: device, inode, size, mtime of the file and every option that changes heights.
   std::uint64_t fingerprint() const;

@@ -37,6 +37,20 @@ int CellsOf(int level, const SourceSpacing& spacing) {
   return kFinest;
 }
 
+// Around a pole meridians meet: the centre of a polar map says nothing about grid cells elsewhere in it. In a
+// geographic source its columns meet as well.
+double RepresentativeLatitude(const SourceSpacing& spacing) {
+  constexpr double kMostPolar = 75;
+  return spacing.geographic ? spacing.latitude : std::clamp(spacing.latitude, -kMostPolar, kMostPolar);
+}
+
+// Metres on the ground from one Web Mercator pixel to the next, the same in both axes but for the Earth's flattening.
+double MercatorStep(int depth, const SourceSpacing& spacing) {
+  constexpr double kMostPolar = geo::kMercatorLatitude;
+  const double latitude = std::clamp(RepresentativeLatitude(spacing), -kMostPolar, kMostPolar);
+  return geo::MercatorGrid{depth}.StepDegrees() * geo::MetresPerDegreeEast(latitude);
+}
+
 }  // namespace
 
 Result<SourceSpacing> SourceSpacing::Of(const Georeference& georeference, const std::string& path) {
@@ -71,11 +85,7 @@ Result<SourceSpacing> SourceSpacing::Of(const Georeference& georeference, const 
 }
 
 double SamplesPerCell(const geo::Lattice& lattice, const SourceSpacing& spacing) {
-  // Around a pole meridians meet: the centre of a polar map says nothing about lattice cells elsewhere in it. In a
-  // geographic source its columns meet as well.
-  constexpr double kMostPolar = 75;
-  const double latitude = spacing.geographic ? spacing.latitude : std::clamp(spacing.latitude, -kMostPolar, kMostPolar);
-  const double step = lattice.StepDegrees();
+  const double latitude = RepresentativeLatitude(spacing), step = lattice.StepDegrees();
   const double east = step * geo::MetresPerDegreeEast(latitude) / spacing.east;
   const double north = step * geo::MetresPerDegreeNorth(latitude) / spacing.north;
   return std::sqrt(east * north);
@@ -93,6 +103,22 @@ std::vector<LevelPlan> PlanLevels(const SourceSpacing& spacing) {
     levels.push_back({lattice, AveragingFactor(SamplesPerCell(lattice, spacing))});
   }
   return levels;
+}
+
+int DeepestMercator(const SourceSpacing& spacing) {
+  constexpr double kSlack = 1 + 1e-9;  // pixels that equal the source's are fine enough
+  int depth = 1;
+  while (depth < geo::kMaxLevel && MercatorStep(depth, spacing) > spacing.finer * kSlack) ++depth;
+  return depth;
+}
+
+std::vector<int> MercatorFactors(const SourceSpacing& spacing) {
+  std::vector<int> factors;
+  for (int depth = 0; depth <= geo::kMaxLevel; ++depth) {
+    const double step = MercatorStep(depth, spacing);
+    factors.push_back(AveragingFactor(std::sqrt(step / spacing.east * (step / spacing.north))));
+  }
+  return factors;
 }
 
 int DeepestLevel(const SourceSpacing& spacing, double error_fraction, std::optional<double> finest_error) {

@@ -8,6 +8,7 @@
 #include "engine/core/result.h"
 #include "engine/dem/georeference.h"
 #include "engine/geo/lattice.h"
+#include "engine/geo/mercator_grid.h"
 
 namespace terrace::dem {
 
@@ -34,6 +35,12 @@ int AveragingFactor(double samples_per_cell);
 
 // Plans of levels 0 .. geo::kMaxLevel.
 std::vector<LevelPlan> PlanLevels(const SourceSpacing& spacing);
+
+// The first depth of Web Mercator's pixels that is at least as fine as the source at its centre, 1 .. geo::kMaxLevel.
+int DeepestMercator(const SourceSpacing& spacing);
+
+// Factors of Web Mercator's depths 0 .. geo::kMaxLevel.
+std::vector<int> MercatorFactors(const SourceSpacing& spacing);
 
 // The first level whose default error is at most a tenth of the finer spacing, or at most `finest_error`.
 int DeepestLevel(const SourceSpacing& spacing, double error_fraction, std::optional<double> finest_error);

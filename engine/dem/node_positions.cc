@@ -8,7 +8,7 @@
 namespace terrace::dem {
 namespace {
 
-constexpr int kCellNodes = 32;  // lattices have a multiple of it, so cells never cross the antimeridian or a pole
+constexpr int kCellNodes = 32;  // grids have a multiple of it, so cells never cross the antimeridian or a pole
 constexpr double kNowhere = std::numeric_limits<double>::quiet_NaN();
 
 // A square of `size` x `size` nodes; it owns the nodes on its western and southern edges.
@@ -23,35 +23,49 @@ std::array<double, 3> Weights(double step, int size) {
   return {t * (t - 1) / 2, 1 - t * t, t * (t + 1) / 2};
 }
 
-// With a `halo` of 1: nodes. Without: centres of cells, each counted as the node at its south-western corner.
-class TileNodes {
+// Centres of a lattice's cells, each counted as the node at its south-western corner.
+struct CellCentres {
+  explicit CellCentres(const geo::Lattice& lattice) : halves{lattice.level, 2 * lattice.cells} {}
+
+  double Longitude(std::int64_t column) const { return halves.Longitude(2 * column + 1); }
+  double Latitude(std::int64_t row) const { return halves.Latitude(2 * row + 1); }
+  double StepDegrees() const { return 2 * halves.StepDegrees(); }
+  std::int64_t rows() const { return halves.rows() / 2; }
+
+  geo::Lattice halves;
+};
+
+// Pole rows, and what lies beyond them, are one position each; Web Mercator and the centres of cells have none.
+bool IsPoleRow(const geo::Lattice& lattice, std::int64_t row) { return row <= 0 || row >= lattice.rows(); }
+bool IsPoleRow(const geo::MercatorGrid&, std::int64_t) { return false; }
+bool IsPoleRow(const CellCentres&, std::int64_t) { return false; }
+
+template <typename Grid>
+class GridNodes {
  public:
-  TileNodes(const Georeference& georeference, const Footprint& footprint, const geo::Lattice& lattice,
-            const geo::TileKey& key, double tolerance, int halo)
+  GridNodes(const Georeference& georeference, const Footprint& footprint, const Grid& grid, const NodeWindow& window,
+            double tolerance)
       : georeference_(georeference),
         footprint_(footprint),
-        lattice_(lattice),
-        halves_{lattice.level, 2 * lattice.cells},
-        centres_(halo == 0),
-        first_column_(lattice.FirstColumn(key) - halo),
-        first_row_(lattice.FirstRow(key) - halo),
-        stride_(halo == 0 ? lattice.cells : lattice.cells + 1 + 2 * halo),
+        grid_(grid),
+        window_(window),
         tolerance_(tolerance),
-        positions_(static_cast<std::size_t>(stride_) * static_cast<std::size_t>(stride_),
+        positions_(static_cast<std::size_t>(window.columns) * static_cast<std::size_t>(window.rows),
                    Position{kNowhere, kNowhere}) {}
 
   std::vector<Position> Compute() && {
     if (georeference_.is_affine()) {
-      FillExactly(first_column_, first_row_, stride_, stride_);
+      FillExactly(window_.column, window_.row, window_.columns, window_.rows);
     } else {
-      const std::int64_t last_row = std::min(first_row_ + stride_ - 1, lattice_.rows() - 1);
-      for (std::int64_t row = FloorCell(std::max<std::int64_t>(first_row_, 0)); row <= last_row; row += kCellNodes) {
-        for (std::int64_t column = FloorCell(first_column_); column < first_column_ + stride_; column += kCellNodes) {
+      const std::int64_t last_row = std::min(window_.row + window_.rows - 1, grid_.rows() - 1);
+      const std::int64_t east = window_.column + window_.columns;
+      for (std::int64_t row = FloorCell(std::max<std::int64_t>(window_.row, 0)); row <= last_row; row += kCellNodes) {
+        for (std::int64_t column = FloorCell(window_.column); column < east; column += kCellNodes) {
           Fill({column, row, kCellNodes});
         }
       }
     }
-    if (!centres_) FillPoleRows();
+    FillPoleRows();
     return std::move(positions_);
   }
 
@@ -59,13 +73,10 @@ class TileNodes {
   static std::int64_t FloorCell(std::int64_t node) { return node - (node % kCellNodes + kCellNodes) % kCellNodes; }
 
   Position Degrees(std::int64_t column, std::int64_t row) const {
-    return {lattice_.Longitude(column), lattice_.Latitude(row)};
-  }
-  Position CentreDegrees(std::int64_t column, std::int64_t row) const {
-    return {halves_.Longitude(2 * column + 1), halves_.Latitude(2 * row + 1)};
+    return {grid_.Longitude(column), grid_.Latitude(row)};
   }
   Position* At(std::int64_t column, std::int64_t row) {
-    return &positions_[static_cast<std::size_t>((row - first_row_) * stride_ + (column - first_column_))];
+    return &positions_[static_cast<std::size_t>((row - window_.row) * window_.columns + (column - window_.column))];
   }
 
   // Part of a cell inside the tile's window, as ranges of columns and rows (end exclusive).
@@ -74,26 +85,26 @@ class TileNodes {
     bool empty() const { return west >= east || south >= north; }
   };
   Part Inside(const Cell& cell) const {
-    return {std::max(cell.column, first_column_), std::max(cell.row, first_row_),
-            std::min(cell.column + cell.size, first_column_ + stride_),
-            std::min(cell.row + cell.size, first_row_ + stride_)};
+    return {std::max(cell.column, window_.column), std::max(cell.row, window_.row),
+            std::min(cell.column + cell.size, window_.column + window_.columns),
+            std::min(cell.row + cell.size, window_.row + window_.rows)};
   }
 
   void FillExactly(std::int64_t column, std::int64_t row, std::int64_t columns, std::int64_t rows) {
     for (std::int64_t r = row; r < row + rows; ++r) {
-      for (std::int64_t c = column; c < column + columns; ++c)
-        *At(c, r) = centres_ ? CentreDegrees(c, r) : Degrees(c, r);
+      for (std::int64_t c = column; c < column + columns; ++c) *At(c, r) = Degrees(c, r);
       georeference_.ToPixels({At(column, r), static_cast<std::size_t>(columns)});
     }
   }
 
+  bool Touches(const Cell& cell) const {
+    const auto [south, north] = std::minmax({grid_.Latitude(cell.row), grid_.Latitude(cell.row + cell.size)});
+    return footprint_.Touches(grid_.Longitude(cell.column), south, cell.size * grid_.StepDegrees(), north - south);
+  }
+
   void Fill(const Cell& cell) {
     const Part part = Inside(cell);
-    const double extent = cell.size * lattice_.StepDegrees();
-    if (part.empty() ||
-        !footprint_.Touches(lattice_.Longitude(cell.column), lattice_.Latitude(cell.row), extent, extent)) {
-      return;
-    }
+    if (part.empty() || !Touches(cell)) return;
     if (cell.size <= 2) {
       FillExactly(part.west, part.south, part.east - part.west, part.north - part.south);
     } else if (!Interpolate(cell, part)) {
@@ -116,9 +127,9 @@ class TileNodes {
     known[10] = Degrees(cell.column + half, cell.row + quarter);
     georeference_.ToPixels(known);
     if (std::ranges::any_of(known, [](const Position& p) { return std::isnan(p.x); })) return false;
-    const auto at = [&](std::int64_t column, std::int64_t row, double shift) {
-      const auto x = Weights(static_cast<double>(column - cell.column) + shift, cell.size);
-      const auto y = Weights(static_cast<double>(row - cell.row) + shift, cell.size);
+    const auto at = [&](std::int64_t column, std::int64_t row) {
+      const auto x = Weights(static_cast<double>(column - cell.column), cell.size);
+      const auto y = Weights(static_cast<double>(row - cell.row), cell.size);
       Position sum;
       for (std::size_t j = 0; j < 3; ++j) {
         for (std::size_t i = 0; i < 3; ++i) {
@@ -131,46 +142,53 @@ class TileNodes {
     const auto close = [&](const Position& a, const Position& b) {
       return std::abs(a.x - b.x) <= tolerance_ && std::abs(a.y - b.y) <= tolerance_;
     };
-    if (!close(at(cell.column + quarter, cell.row + half, 0), known[9]) ||
-        !close(at(cell.column + half, cell.row + quarter, 0), known[10])) {
+    if (!close(at(cell.column + quarter, cell.row + half), known[9]) ||
+        !close(at(cell.column + half, cell.row + quarter), known[10])) {
       return false;
     }
-    const double shift = centres_ ? 0.5 : 0;
     for (std::int64_t row = part.south; row < part.north; ++row) {
-      for (std::int64_t column = part.west; column < part.east; ++column) *At(column, row) = at(column, row, shift);
+      for (std::int64_t column = part.west; column < part.east; ++column) *At(column, row) = at(column, row);
     }
     return true;
   }
 
   void FillPoleRows() {
-    for (std::int64_t row = first_row_; row < first_row_ + stride_; ++row) {
-      if (row > 0 && row < lattice_.rows()) continue;
-      Position pole{0, lattice_.Latitude(row)};
+    for (std::int64_t row = window_.row; row < window_.row + window_.rows; ++row) {
+      if (!IsPoleRow(grid_, row)) continue;
+      Position pole{0, grid_.Latitude(row)};
       georeference_.ToPixels({&pole, 1});
-      std::fill_n(At(first_column_, row), stride_, pole);
+      std::fill_n(At(window_.column, row), window_.columns, pole);
     }
   }
 
   const Georeference& georeference_;
   const Footprint& footprint_;
-  const geo::Lattice lattice_, halves_;
-  const bool centres_;
-  const std::int64_t first_column_, first_row_;
-  const int stride_;
+  const Grid grid_;
+  const NodeWindow window_;
   const double tolerance_;
   std::vector<Position> positions_;
 };
 
 }  // namespace
 
+NodeWindow WindowOfTile(const geo::Lattice& lattice, const geo::TileKey& key) {
+  return {lattice.FirstColumn(key) - 1, lattice.FirstRow(key) - 1, lattice.cells + 3, lattice.cells + 3};
+}
+
 std::vector<Position> NodePositions(const Georeference& georeference, const Footprint& footprint,
-                                    const geo::Lattice& lattice, const geo::TileKey& key, double tolerance) {
-  return TileNodes(georeference, footprint, lattice, key, tolerance, /*halo=*/1).Compute();
+                                    const geo::Lattice& lattice, const NodeWindow& window, double tolerance) {
+  return GridNodes(georeference, footprint, lattice, window, tolerance).Compute();
+}
+
+std::vector<Position> NodePositions(const Georeference& georeference, const Footprint& footprint,
+                                    const geo::MercatorGrid& grid, const NodeWindow& window, double tolerance) {
+  return GridNodes(georeference, footprint, grid, window, tolerance).Compute();
 }
 
 std::vector<Position> CellCentrePositions(const Georeference& georeference, const Footprint& footprint,
                                           const geo::Lattice& lattice, const geo::TileKey& key, double tolerance) {
-  return TileNodes(georeference, footprint, lattice, key, tolerance, /*halo=*/0).Compute();
+  const NodeWindow window{lattice.FirstColumn(key), lattice.FirstRow(key), lattice.cells, lattice.cells};
+  return GridNodes(georeference, footprint, CellCentres(lattice), window, tolerance).Compute();
 }
 
 }  // namespace terrace::dem

@@ -66,7 +66,7 @@ Result<std::vector<std::uint8_t>> WaterRaster::Impl::Read(const geo::TileKey& ke
   const std::vector<Position> positions =
       CellCentrePositions(georeference, footprint, lattice, key, kPositionTolerance * factor);
   const GridAxis columns(layout.columns, factor, layout.wraps), rows(layout.height, factor, false);
-  std::vector<Cell> cells;
+  std::vector<GridCell> cells;
   std::vector<std::size_t> targets;  // pixel of each cell
   for (std::size_t i = 0; i < positions.size(); ++i) {
     if (!IsInside(positions[i])) continue;

@@ -153,6 +153,8 @@ server::ServerOptions OptionsOf(const config::Config& config) {
   options.worker_threads = config.worker_threads;
   options.queue_length = config.queue_length;
   options.cache_bytes = config.cache_bytes;
+  options.max_locations = config.max_locations;
+  options.max_mesh_samples = config.max_mesh_samples;
   options.max_connections = config.max_connections;
   options.cache_control = config.cache_control;
   options.header_timeout = config.header_timeout;

@@ -106,6 +106,8 @@ void Metrics::CountBuild(const TileRequest& request, const Result<TilePtr>& tile
     case RefinementUse::kReplayed:
       families_->replayed.Increment();
       break;
+    case RefinementUse::kNone:
+      break;
   }
   const StageTimes& times = (*tile)->times;
   families_->read.Observe(InSeconds(times.read));

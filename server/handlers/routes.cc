@@ -31,10 +31,13 @@ Response Ready(bool draining) {
 }  // namespace
 
 Routes::Routes(std::span<const DatasetView> datasets, TileService& tiles, StaticFiles viewer,
-               TileHandlerOptions options, State state)
+               TileHandlerOptions options, Heights heights, AreaMesher mesher, State state)
     : tiles_(datasets, tiles, options),
+      heights_(datasets, tiles, std::move(heights.read), options, heights.max_locations),
+      areas_(datasets, tiles, std::move(mesher), options),
       layers_(datasets, options.cache_control),
       tilesets_(datasets, options.cache_control),
+      tile_json_(datasets, options.cache_control),
       viewer_(std::move(viewer)),
       datasets_(Document::Make(DatasetsJson(datasets), "application/json")),
       index_(Document::Make(IndexHtml(datasets), "text/html; charset=utf-8")),
@@ -46,6 +49,10 @@ asio::awaitable<Response> Routes::Serve(Request request) const {
   Response response;
   if (route->kind == RouteKind::kTile) {
     response = co_await tiles_.Handle(*route, std::move(request));
+  } else if (route->kind == RouteKind::kHeights) {
+    response = co_await heights_.Handle(*route, std::move(request));
+  } else if (route->kind == RouteKind::kMesh) {
+    response = co_await areas_.Handle(*route, std::move(request));
   } else {
     response = ServeNow(*route, request);
   }
@@ -58,6 +65,7 @@ Response Routes::ServeNow(const Route& route, const Request& request) const {
   if (route.kind == RouteKind::kLayer) return layers_.Handle(route, request);
   if (route.kind == RouteKind::kTileset) return tilesets_.Handle(route, request);
   if (route.kind == RouteKind::kSubtree) return tilesets_.HandleSubtree(route, request);
+  if (route.kind == RouteKind::kTileJson) return tile_json_.Handle(route, request);
   if (const Result<void> none = RefuseParameters(route.query); !none) {
     return ClientErrorResponse(none.error(), request.id);
   }

@@ -6,11 +6,14 @@
 #include <string>
 
 #include "server/asio.h"
+#include "server/handlers/area_handler.h"
 #include "server/handlers/document.h"
+#include "server/handlers/heights_handler.h"
 #include "server/handlers/layer_handler.h"
 #include "server/handlers/metrics.h"
 #include "server/handlers/static_files.h"
 #include "server/handlers/tile_handler.h"
+#include "server/handlers/tile_json_handler.h"
 #include "server/handlers/tileset_handler.h"
 #include "server/http/request.h"
 #include "server/http/response.h"
@@ -26,12 +29,16 @@ class Routes {
     std::function<bool()> draining;
     std::function<std::string()> metrics_text;
   };
+  struct Heights {
+    PointReader read;
+    std::size_t max_locations = 0;
+  };
 
   // `datasets` and `tiles` must outlive this.
   Routes(std::span<const DatasetView> datasets, TileService& tiles, StaticFiles viewer, TileHandlerOptions options,
-         State state);
+         Heights heights, AreaMesher mesher, State state);
 
-  // Answers GET and HEAD.
+  // Answers GET, HEAD, and POST where TakesPost says so.
   asio::awaitable<Response> Serve(Request request) const;
 
  private:
@@ -39,8 +46,11 @@ class Routes {
   Response ServeViewer(const Route& route, const Request& request) const;
 
   const TileHandler tiles_;
+  const HeightsHandler heights_;
+  const AreaHandler areas_;
   const LayerHandler layers_;
   const TilesetHandler tilesets_;
+  const TileJsonHandler tile_json_;
   const StaticFiles viewer_;
   const Document datasets_;
   const Document index_;  // for `/` without a viewer

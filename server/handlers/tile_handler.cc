@@ -2,9 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <boost/asio/steady_timer.hpp>
-#include <boost/asio/this_coro.hpp>
-#include <boost/asio/use_awaitable.hpp>
 #include <charconv>
 #include <cmath>
 #include <iterator>
@@ -12,6 +9,7 @@
 #include <utility>
 
 #include "proto/media_type.h"
+#include "server/handlers/backend_failure.h"
 #include "server/http/http_error.h"
 #include "server/http/negotiate.h"
 
@@ -32,6 +30,7 @@ std::string_view Name(CacheStatus cache) {
 
 std::string_view ContentTypeOf(const TileRequest& tile) {
   if (tile.format == TileFormat::kGlb) return "model/gltf-binary";
+  if (tile.format == TileFormat::kHeightPng) return "image/png";
   return proto::QuantizedMeshContentType({tile.normals, tile.water_mask, tile.metadata});
 }
 
@@ -47,11 +46,7 @@ asio::awaitable<Response> TileHandler::Handle(Route route, Request request) cons
   const auto deadline = TileService::Clock::now() + options_.deadline;
   const Result<ServedTile> served = co_await tiles_.Get(key, deadline);
   if (served) co_return Reply(*served, *tile, request);
-  if (served.error().code == ErrorCode::kOverloaded) {
-    asio::steady_timer delay(co_await asio::this_coro::executor, options_.refusal_delay);
-    co_await delay.async_wait(asio::use_awaitable);
-  }
-  co_return BackendErrorResponse(served.error(), request.id);
+  co_return co_await BackendFailure(served.error(), request.id, options_.refusal_delay);
 }
 
 Response TileHandler::Reply(const ServedTile& served, const TileRequest& tile, const Request& request) const {
@@ -61,7 +56,7 @@ Response TileHandler::Reply(const ServedTile& served, const TileRequest& tile, c
   response.coding = tile.coding;
   response.etag = served.tile->etag;
   response.cache_control = options_.cache_control;
-  response.vary = true;
+  response.vary = tile.format != TileFormat::kHeightPng;  // which has one form
   response.headers.emplace_back("Terrain-Max-Error", FormatErrorUp(served.tile->max_error_m));
   response.headers.emplace_back("Server-Timing", FormatServerTiming(served.cache, served.tile->times));
   response.cache = Name(served.cache);

@@ -1,4 +1,4 @@
-// GET /{dataset}/{z}/{x}/{y}.terrain and .glb
+// GET /{dataset}/{z}/{x}/{y}.terrain, .glb and .png
 #pragma once
 
 #include <chrono>

@@ -15,6 +15,8 @@ std::string_view TitleOf(int status) {
       return "Not found";
     case 405:
       return "Method not allowed";
+    case 413:
+      return "Content too large";
     case 414:
       return "URI too long";
     case 431:
@@ -31,15 +33,15 @@ std::string_view FixedDetail(ErrorCode code) {
     case ErrorCode::kNotFound:
       return "no such tile";
     case ErrorCode::kUnavailable:
-      return "the tile's source cannot be read now";
+      return "the source cannot be read now";
     case ErrorCode::kOverloaded:
-      return "too many tiles are being built";
+      return "too much is being built";
     case ErrorCode::kCancelled:
-      return "the tile was not ready in time";
+      return "the answer was not ready in time";
     case ErrorCode::kInternal:
       break;
   }
-  return "the tile cannot be built now";
+  return "the answer cannot be built now";
 }
 
 // Seconds. A full queue drains quickly; a source that cannot be read usually waits for a person.

@@ -97,10 +97,32 @@ Result<std::uint32_t> FindDataset(std::string_view name, std::span<const Dataset
   return MakeError(ErrorCode::kNotFound, "no such dataset; /datasets lists them");
 }
 
+namespace {
+
+// PNG is compressed already: whatever the client accepts, it is sent as it is.
+Result<TileRequest> NegotiateHeightTile(const Route& route, std::uint32_t dataset, const DatasetView& view) {
+  const Result<HeightTileParameters> parameters = ParseHeightTileParameters(route.query);
+  if (!parameters) return tl::unexpected(parameters.error());
+  if (!IsHeightTileAvailable(view, route.key, parameters->size)) {
+    return MakeError(ErrorCode::kNotFound,
+                     "the dataset has no such tile; its tiles.json tells the bounds and levels of what it has");
+  }
+  TileRequest tile;
+  tile.dataset = dataset;
+  tile.key = route.key;
+  tile.format = route.format;
+  tile.height_encoding = parameters->encoding;
+  tile.height_size = parameters->size;
+  return tile;
+}
+
+}  // namespace
+
 Result<TileRequest> Negotiate(const Route& route, const Request& request, std::span<const DatasetView> datasets) {
   const Result<std::uint32_t> dataset = FindDataset(route.dataset, datasets);
   if (!dataset) return tl::unexpected(dataset.error());
   const DatasetView& view = datasets[*dataset];
+  if (route.format == TileFormat::kHeightPng) return NegotiateHeightTile(route, *dataset, view);
   const Result<TileParameters> parameters =
       ParseTileParameters(route.query, /*allow_at_least=*/true, /*allow_compression=*/route.format == TileFormat::kGlb);
   if (!parameters) return tl::unexpected(parameters.error());

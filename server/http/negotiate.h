@@ -16,7 +16,8 @@
 
 namespace terrace::server {
 
-// kNotFound: no such dataset, or the tile lies outside what the dataset has. kInvalidArgument: see ParseTileParameters.
+// kNotFound: no such dataset, or the tile lies outside what the dataset has. kInvalidArgument: see ParseTileParameters
+// and ParseHeightTileParameters.
 // Precondition: a kTile route.
 Result<TileRequest> Negotiate(const Route& route, const Request& request, std::span<const DatasetView> datasets);
 

@@ -140,6 +140,33 @@ Result<TileParameters> ParseTileParameters(std::string_view query, bool allow_at
   return parameters;
 }
 
+Result<HeightTileParameters> ParseHeightTileParameters(std::string_view query) {
+  const Result<QueryParameters> sent = ParseQuery(query);
+  if (!sent) return tl::unexpected(sent.error());
+  std::optional<proto::HeightEncoding> encoding;
+  std::optional<int> size;
+  for (const auto& [name, value] : *sent) {
+    if (name == "v") continue;
+    if (name == "encoding") {
+      if (encoding) return MakeError(ErrorCode::kInvalidArgument, "encoding is given more than once");
+      if (value == "mapbox") encoding = proto::HeightEncoding::kMapbox;
+      if (value == "terrarium") encoding = proto::HeightEncoding::kTerrarium;
+      if (!encoding) return MakeError(ErrorCode::kInvalidArgument, "encoding must be mapbox or terrarium");
+    } else if (name == "size") {
+      if (size) return MakeError(ErrorCode::kInvalidArgument, "size is given more than once");
+      if (value == "256") size = 256;
+      if (value == "512") size = 512;
+      if (!size) return MakeError(ErrorCode::kInvalidArgument, "size must be 256 or 512");
+    } else {
+      return MakeError(ErrorCode::kInvalidArgument, "unknown parameter; known are encoding, size");
+    }
+  }
+  HeightTileParameters parameters;
+  parameters.encoding = encoding.value_or(parameters.encoding);
+  parameters.size = size.value_or(parameters.size);
+  return parameters;
+}
+
 Result<void> RefuseParameters(std::string_view query) {
   const Result<QueryParameters> sent = ParseQuery(query);
   if (!sent) return tl::unexpected(sent.error());

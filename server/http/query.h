@@ -10,6 +10,7 @@
 #include "engine/core/result.h"
 #include "proto/glb_tile.h"
 #include "proto/texture.h"
+#include "server/tiles/tile_request.h"
 
 namespace terrace::server {
 
@@ -43,6 +44,14 @@ struct TileParameters {
 // value. kInvalidArgument, with a message for the client: an unknown or repeated parameter, error and fraction
 // together, atleast without error, or a value that is not what the parameter takes.
 Result<TileParameters> ParseTileParameters(std::string_view query, bool allow_at_least, bool allow_compression = false);
+
+struct HeightTileParameters {
+  proto::HeightEncoding encoding = proto::HeightEncoding::kMapbox;
+  int size = kHeightSizes[0];
+};
+
+// `encoding` and `size`, of height tiles and of the TileJSON that describes them. `v` may come any number of times.
+Result<HeightTileParameters> ParseHeightTileParameters(std::string_view query);
 
 // For URLs that take no parameters but `v`.
 Result<void> RefuseParameters(std::string_view query);

@@ -5,6 +5,8 @@
 #include <boost/beast/http/empty_body.hpp>
 #include <boost/beast/http/fields.hpp>
 #include <boost/beast/http/parser.hpp>
+#include <charconv>
+#include <optional>
 
 #include "server/asio.h"
 
@@ -36,6 +38,8 @@ Method ToMethod(http::verb verb) {
       return Method::kHead;
     case http::verb::options:
       return Method::kOptions;
+    case http::verb::post:
+      return Method::kPost;
     default:
       return Method::kOther;
   }
@@ -49,14 +53,28 @@ bool IsHostValue(std::string_view value) {
   });
 }
 
-// Null when the message ends with its head. Beast reads a GET with `Transfer-Encoding: gzip` as body-less and takes
-// what follows for another request; this is where that ends.
+// Decimal, no sign, no leading zero, at most 15 digits; 0 without the field.
+std::optional<std::size_t> PlainLength(const Fields& fields) {
+  constexpr std::size_t kMaxDigits = 15;
+  if (fields.count(http::field::content_length) == 0) return 0;
+  const std::string_view text = fields[http::field::content_length];
+  const bool plain = !text.empty() && text.size() <= kMaxDigits && (text == "0" || text[0] != '0') &&
+                     std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });
+  if (!plain) return std::nullopt;
+  std::size_t length = 0;
+  std::from_chars(text.data(), text.data() + text.size(), length);
+  return length;
+}
+
+// Null when the message ends with its head or, of a POST, so many bytes after it. Beast reads a GET with
+// `Transfer-Encoding: gzip` as body-less and takes what follows for another request; this is where that ends.
 const char* FramingProblem(const Fields& fields) {
   if (fields.count(http::field::transfer_encoding) > 0) return "Transfer-Encoding is not accepted";
   const auto lengths = fields.count(http::field::content_length);
   if (lengths > 1) return "more than one Content-Length";
-  if (lengths == 1 && fields[http::field::content_length] != "0") return "requests with a body are not accepted";
-  return nullptr;
+  if (lengths == 0 || fields[http::field::content_length] == "0") return nullptr;
+  if (ToMethod(fields.method()) != Method::kPost) return "requests with a body are not accepted";
+  return PlainLength(fields) ? nullptr : "malformed Content-Length";
 }
 
 const char* HostProblem(const Fields& fields) {
@@ -111,6 +129,11 @@ tl::expected<Request, BadRequest> ParseHead(std::string_view head) {
   request.accept = Joined(fields, http::field::accept);
   request.accept_encoding = Joined(fields, http::field::accept_encoding);
   request.if_none_match = Joined(fields, http::field::if_none_match);
+  request.content_type = std::string(fields[http::field::content_type]);
+  request.content_length = *PlainLength(fields);
+  request.expects_continue = boost::beast::iequals(fields[http::field::expect], "100-continue");
+  request.host = std::string(fields[http::field::host]);
+  request.forwarded_proto = std::string(fields["X-Forwarded-Proto"]);
   return request;
 }
 

@@ -1,7 +1,8 @@
-// One HTTP request without a body, and the only way to get one out of bytes from the network.
+// One HTTP request, and the only way to get its head out of bytes from the network.
 //
-// Stricter than RFC 9112 wherever two readers of the same bytes could disagree about where a message ends: terrace has
-// no endpoint that takes a body, so a message that announces one is refused before another byte is read.
+// Stricter than RFC 9112 wherever two readers of the same bytes could disagree about where a message ends: only a POST
+// may announce a body, by one Content-Length in plain decimals; any other message that announces one is refused before
+// another byte is read.
 #pragma once
 
 #include <cstddef>
@@ -14,7 +15,7 @@ namespace terrace::server {
 inline constexpr std::size_t kMaxHeadBytes = 16 * 1024;
 inline constexpr std::size_t kMaxTargetBytes = 8 * 1024;
 
-enum class Method { kGet, kHead, kOptions, kOther };
+enum class Method { kGet, kHead, kOptions, kPost, kOther };
 
 struct Request {
   Method method = Method::kGet;
@@ -25,7 +26,13 @@ struct Request {
   std::string accept;       // several fields joined with ", "
   std::string accept_encoding;
   std::string if_none_match;
-  std::string id;  // 16 hexadecimal digits, given by the server
+  std::string host;             // host and port: letters, digits and "-._~%!$&'()*+,;=:[]"; may be empty
+  std::string forwarded_proto;  // of a proxy before the server: "https", "http", or whatever else was sent
+  std::string content_type;
+  std::size_t content_length = 0;  // of a POST
+  bool expects_continue = false;   // the client waits for a 100 before it sends the body
+  std::string body;                // of a POST, once the session has read it
+  std::string id;                  // 16 hexadecimal digits, given by the server
 };
 
 // Why bytes are not a request. The connection is of no use afterwards: its framing cannot be trusted.
@@ -38,7 +45,7 @@ struct BadRequest {
 // `scanned` bytes were looked at by an earlier call with the same beginning.
 tl::expected<std::size_t, BadRequest> FindHeadEnd(std::string_view bytes, std::size_t scanned);
 
-// `head` ends with its empty line. Sets everything but `id`.
+// `head` ends with its empty line. Sets everything but `id` and `body`.
 tl::expected<Request, BadRequest> ParseHead(std::string_view head);
 
 }  // namespace terrace::server

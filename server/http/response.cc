@@ -15,7 +15,8 @@ namespace {
 
 constexpr std::string_view kCommonHeaders =
     "Access-Control-Allow-Origin: *\r\n"
-    "Access-Control-Expose-Headers: ETag, Terrain-Max-Error, Terrain-Certified-Error, Retry-After, Server-Timing\r\n"
+    "Access-Control-Expose-Headers: ETag, Terrain-Max-Error, Terrain-Certified-Error, Terrain-Origin, Retry-After, "
+    "Server-Timing\r\n"
     "Timing-Allow-Origin: *\r\n"
     "X-Content-Type-Options: nosniff\r\n";
 
@@ -33,6 +34,8 @@ std::string_view ReasonPhrase(int status) {
       return "Not Found";
     case 405:
       return "Method Not Allowed";
+    case 413:
+      return "Content Too Large";
     case 414:
       return "URI Too Long";
     case 431:

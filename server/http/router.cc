@@ -39,10 +39,15 @@ std::optional<std::int64_t> TileNumber(std::string_view text) {
   return number;
 }
 
+// Web Mercator has one root, TMS geodetic two side by side.
+bool IsInScheme(const geo::TileKey& key, TileFormat format) {
+  return geo::IsValid(key) && (format != TileFormat::kHeightPng || key.x < geo::TileRows(key.level));
+}
+
 // Cuts the extension of a tile URL off its last segment.
 std::optional<TileFormat> CutFormat(std::string_view& name) {
-  constexpr std::pair<std::string_view, TileFormat> kSuffixes[] = {{".terrain", TileFormat::kQuantizedMesh},
-                                                                   {".glb", TileFormat::kGlb}};
+  constexpr std::pair<std::string_view, TileFormat> kSuffixes[] = {
+      {".terrain", TileFormat::kQuantizedMesh}, {".glb", TileFormat::kGlb}, {".png", TileFormat::kHeightPng}};
   for (const auto& [suffix, format] : kSuffixes) {
     if (!name.ends_with(suffix)) continue;
     name.remove_suffix(suffix.size());
@@ -51,18 +56,20 @@ std::optional<TileFormat> CutFormat(std::string_view& name) {
   return std::nullopt;
 }
 
-std::optional<geo::TileKey> ParseTileKey(std::string_view z, std::string_view x, std::string_view y) {
+std::optional<geo::TileKey> ParseTileKey(std::string_view z, std::string_view x, std::string_view y,
+                                         TileFormat format) {
   const auto level = TileNumber(z), column = TileNumber(x), row = TileNumber(y);
   if (!level || !column || !row || *level > geo::kMaxLevel) return std::nullopt;
   const geo::TileKey key{static_cast<int>(*level), *column, *row};
-  return geo::IsValid(key) ? std::optional(key) : std::nullopt;
+  return IsInScheme(key, format) ? std::optional(key) : std::nullopt;
 }
 
 // "9-272-359": level, column and row of an implicit tree's root.
 std::optional<geo::TileKey> ParseRoot(std::string_view name) {
   const std::size_t first = name.find('-'), second = name.find('-', first + 1);
   if (first == std::string_view::npos || second == std::string_view::npos) return std::nullopt;
-  return ParseTileKey(name.substr(0, first), name.substr(first + 1, second - first - 1), name.substr(second + 1));
+  return ParseTileKey(name.substr(0, first), name.substr(first + 1, second - first - 1), name.substr(second + 1),
+                      TileFormat::kGlb);
 }
 
 // A content or a subtree of an implicit tree: 3dtiles/{root}/{level}/{x}/{y}.{glb|subtree}, counted from the root.
@@ -136,6 +143,12 @@ std::string_view ToString(RouteKind kind) {
       return "tileset";
     case RouteKind::kSubtree:
       return "subtree";
+    case RouteKind::kTileJson:
+      return "tilejson";
+    case RouteKind::kHeights:
+      return "heights";
+    case RouteKind::kMesh:
+      return "mesh";
     case RouteKind::kDatasets:
       return "datasets";
     case RouteKind::kViewer:
@@ -169,11 +182,17 @@ Result<Route> Match(std::string_view target) {
       route->kind = RouteKind::kTileset;
     } else if (segments->size() == 2 && (*segments)[1] == "layer.json") {
       route->kind = RouteKind::kLayer;
+    } else if (segments->size() == 2 && (*segments)[1] == "tiles.json") {
+      route->kind = RouteKind::kTileJson;
+    } else if (segments->size() == 2 && (*segments)[1] == "heights") {
+      route->kind = RouteKind::kHeights;
+    } else if (segments->size() == 2 && (*segments)[1] == "mesh") {
+      route->kind = RouteKind::kMesh;
     } else if (segments->size() == 4) {
-      std::string_view row = (*segments)[3];
-      const auto format = CutFormat(row);
-      const auto key = ParseTileKey((*segments)[1], (*segments)[2], row);
-      if (!format || !key) return NotFound();
+      std::string_view y = (*segments)[3];
+      const auto format = CutFormat(y);
+      const auto key = format ? ParseTileKey((*segments)[1], (*segments)[2], y, *format) : std::nullopt;
+      if (!key) return NotFound();
       route->kind = RouteKind::kTile;
       route->key = *key;
       route->format = *format;

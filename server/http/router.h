@@ -11,10 +11,13 @@
 namespace terrace::server {
 
 enum class RouteKind {
-  kTile,      // /{dataset}/{z}/{x}/{y}.terrain, .glb; /{dataset}/3dtiles/{root}/{level}/{x}/{y}.glb
+  kTile,      // /{dataset}/{z}/{x}/{y}.terrain, .glb, .png; /{dataset}/3dtiles/{root}/{level}/{x}/{y}.glb
   kLayer,     // /{dataset}/layer.json
   kTileset,   // /{dataset}/tileset.json
   kSubtree,   // /{dataset}/3dtiles/{root}/{level}/{x}/{y}.subtree
+  kTileJson,  // /{dataset}/tiles.json
+  kHeights,   // /{dataset}/heights
+  kMesh,      // /{dataset}/mesh
   kDatasets,  // /datasets
   kViewer,    // / and /viewer/...
   kLive,      // /livez
@@ -28,12 +31,15 @@ std::string_view ToString(RouteKind kind);
 struct Route {
   RouteKind kind = RouteKind::kViewer;
   std::string dataset;                             // where the URL begins with one: decoded
-  geo::TileKey key;                                // kTile, kSubtree: inside the tiling scheme
+  geo::TileKey key;                                // kTile, kSubtree: inside the tiling scheme of its format
   geo::TileKey root;                               // kSubtree: of the tree the URL counts in, an ancestor of `key`
   TileFormat format = TileFormat::kQuantizedMesh;  // kTile: by the extension
   std::string file;   // kViewer: relative to the viewer's folder, decoded: "index.html" for "/"
   std::string query;  // without '?', not decoded
 };
+
+// Whether it answers POST, and so takes a body.
+constexpr bool TakesPost(RouteKind kind) { return kind == RouteKind::kHeights; }
 
 // `target` in origin form ("/maui/0/0/0.terrain?error=5") or absolute form ("http://host/...").
 // kInvalidArgument: neither form, or malformed percent-encoding. kNotFound: no such URL; tile numbers that are not

@@ -15,6 +15,7 @@
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/this_coro.hpp>
 #include <boost/asio/use_awaitable.hpp>
+#include <boost/asio/write.hpp>
 #include <boost/beast/core/buffers_suffix.hpp>
 #include <boost/beast/core/error.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
@@ -26,6 +27,7 @@
 #include <variant>
 
 #include "server/http/http_error.h"
+#include "server/http/router.h"
 
 namespace terrace::server {
 namespace {
@@ -42,11 +44,26 @@ constexpr std::size_t kLingerBytes = std::size_t{64} << 20;
 // A request that takes longer than this is worth asking whether its client is still there.
 constexpr std::chrono::milliseconds kPatience{100};
 constexpr int kClientLeft = 499;
+constexpr std::string_view kNoSuchMethod = "only GET, HEAD and OPTIONS are answered here";
 
 std::string NextRequestId() {
   static const std::uint64_t start = std::uint64_t{std::random_device{}()} << 32;
   static std::atomic<std::uint64_t> count{0};
   return fmt::format("{:016x}", start + count.fetch_add(1, std::memory_order_relaxed));
+}
+
+constexpr std::string_view kContinue = "HTTP/1.1 100 Continue\r\n\r\n";
+
+bool TakesPost(const Request& request) {
+  const Result<Route> route = Match(request.target);
+  return route && TakesPost(route->kind);
+}
+
+// Asked before a body is read: nothing if it may come.
+std::optional<BadRequest> WhyNoBody(const Request& request, std::size_t max_body_bytes) {
+  if (!TakesPost(request)) return BadRequest{405, kNoSuchMethod};
+  if (request.content_length > max_body_bytes) return BadRequest{413, "the request body is too large"};
+  return std::nullopt;
 }
 
 // Nothing: the connection ended, or was idle for too long.
@@ -88,6 +105,8 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   asio::awaitable<void> ServeAll();
   asio::awaitable<HeadRead> ReadHead();
   bool TakeWhatArrived();
+  asio::awaitable<bool> ReadBody(Request& request);
+  asio::awaitable<void> Refuse(Request request, BadRequest why);
   asio::awaitable<bool> ServeOne(Request request);
   asio::awaitable<std::optional<Response>> AnswerWhileConnected(Request request);
   asio::awaitable<Response> Answer(Request request);
@@ -115,18 +134,52 @@ asio::awaitable<void> Session::ServeAll() {
       Request unparsed;
       unparsed.method_name = "-";
       unparsed.target = "-";
-      unparsed.id = NextRequestId();
-      const auto begun = Clock::now();
-      const Response response = ProblemResponse(head->error().status, head->error().detail, unparsed.id);
-      co_await Write(SerializeHead(response, 11, false), response.body);
-      Report(unparsed, response, response.body->size(), begun);
+      co_await Refuse(std::move(unparsed), head->error());
       break;
     }
-    const bool keep = co_await ServeOne(std::move(**head));
+    Request request = std::move(**head);
+    if (request.content_length > 0) {
+      if (const std::optional<BadRequest> why = WhyNoBody(request, context_->options.max_body_bytes)) {
+        co_await Refuse(std::move(request), *why);
+        break;
+      }
+      if (!co_await ReadBody(request)) break;
+    }
+    const bool keep = co_await ServeOne(std::move(request));
     ++served_;
     if (!keep) break;
   }
   co_await CloseGently();
+}
+
+// Answers, and the connection is to be closed: what follows cannot be trusted to be a request.
+asio::awaitable<void> Session::Refuse(Request request, BadRequest why) {
+  const auto begun = Clock::now();
+  request.id = NextRequestId();
+  const Response response = ProblemResponse(why.status, why.detail, request.id);
+  co_await Write(SerializeHead(response, request.version, false), response.body);
+  Report(request, response, response.body->size(), begun);
+}
+
+// False: the client left, or took too long. Memory is taken as bytes arrive, not as they are promised.
+asio::awaitable<bool> Session::ReadBody(Request& request) {
+  stream_.expires_after(context_->options.header_timeout);
+  error_code error;
+  if (request.expects_continue && buffer_.size() == 0) {
+    co_await asio::async_write(stream_, asio::buffer(kContinue), asio::redirect_error(asio::use_awaitable, error));
+    if (error) co_return false;
+  }
+  for (;;) {
+    const std::string_view here = Unread().substr(0, request.content_length - request.body.size());
+    request.body.append(here);
+    buffer_.consume(here.size());
+    if (request.body.size() == request.content_length) co_return true;
+    const std::size_t room = std::min(request.content_length - request.body.size(), kMaxHeadBytes);
+    const std::size_t got =
+        co_await stream_.async_read_some(buffer_.prepare(room), asio::redirect_error(asio::use_awaitable, error));
+    buffer_.commit(got);
+    if (error) co_return false;
+  }
 }
 
 asio::awaitable<HeadRead> Session::ReadHead() {
@@ -202,9 +255,9 @@ asio::awaitable<bool> Session::ServeOne(Request request) {
 asio::awaitable<std::optional<Response>> Session::AnswerWhileConnected(Request request) {
   using asio::experimental::awaitable_operators::operator||;
   if (request.method == Method::kOptions) co_return PreflightResponse();
-  if (request.method == Method::kOther) {
+  if (request.method == Method::kOther || (request.method == Method::kPost && !TakesPost(request))) {
     // What follows may be a body of any form: nothing after it can be trusted to be a request.
-    Response refused = ProblemResponse(405, "only GET, HEAD and OPTIONS are answered", request.id);
+    Response refused = ProblemResponse(405, kNoSuchMethod, request.id);
     refused.close = true;
     co_return refused;
   }

@@ -1,7 +1,7 @@
 // One connection: reads requests, has them answered in order, writes the replies.
 //
 // Everything of a session happens on its own strand. What a client can make it hold is bounded: one read buffer of
-// kMaxHeadBytes, one request, one reply.
+// kMaxHeadBytes, one request with a body of at most max_body_bytes, one reply.
 #pragma once
 
 #include <boost/asio/ip/tcp.hpp>
@@ -18,12 +18,14 @@
 namespace terrace::server {
 
 struct SessionOptions {
-  std::chrono::milliseconds header_timeout{5'000};  // from a request's first byte to its empty line
+  std::chrono::milliseconds header_timeout{5'000};  // from a request's first byte to its empty line; again for its body
   std::chrono::milliseconds idle_timeout{30'000};   // between a reply and the next request
   std::chrono::milliseconds write_timeout{20'000};  // without the client taking a single byte
+  std::size_t max_body_bytes = 0;                   // of a POST
 };
 
-// Answers GET and HEAD; the session leaves a HEAD's body away. Cancelled when the client leaves.
+// Answers GET, HEAD, and POST where TakesPost says so; the session leaves a HEAD's body away. Cancelled when the client
+// leaves.
 using Handler = std::function<asio::awaitable<Response>(Request)>;
 
 // Shared by all sessions, outlives them all. `connections` and what the functions refer to must outlive the sessions

@@ -30,12 +30,18 @@ struct DatasetView {
   bool has_water = false;                                   // tiles have a water mask
   std::optional<proto::TextureFormat> texture;  // of GLB tiles, for requests that name none; nothing: no imagery
   int metadata_levels = 0;                      // tiles of every so many levels tell what is below them; 0: none
+  int max_mercator_depth = 1;                   // the deepest geo::MercatorGrid that height tiles are cut from
 
   int max_level() const { return static_cast<int>(available.size()) - 1; }
 };
 
 // False as well for keys outside the tiling scheme.
 bool IsAvailable(const DatasetView& dataset, const geo::TileKey& key);
+
+// Web Mercator tiles of `size` pixels: levels 0 .. MaxHeightLevel, wherever they meet the dataset's bounds. False as
+// well for keys outside the scheme.
+bool IsHeightTileAvailable(const DatasetView& dataset, const geo::TileKey& key, int size);
+int MaxHeightLevel(const DatasetView& dataset, int size);
 
 // True for the first path segments that the server answers itself: datasets, viewer, livez, readyz, metrics. No dataset
 // may be named like one of them.

@@ -13,8 +13,8 @@ struct StageTimes {
   std::chrono::microseconds read{0}, refine{0}, encode{0}, compress{0};
 };
 
-// What a build found of its tile's refinement.
-enum class RefinementUse : std::uint8_t { kMade, kContinued, kReplayed };
+// What a build found of its tile's refinement; kNone where the format has no mesh.
+enum class RefinementUse : std::uint8_t { kMade, kContinued, kReplayed, kNone };
 
 struct EncodedTile {
   std::string bytes;       // the body in its content coding

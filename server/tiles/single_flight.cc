@@ -7,9 +7,17 @@
 #include <boost/asio/this_coro.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <optional>
+#include <string>
 #include <vector>
 
 namespace terrace::server {
+namespace {
+
+std::string NameOf(const CacheKey& key) {
+  return key.solo > 0 ? "work for one request" : "tile " + geo::ToString(key.request.key);
+}
+
+}  // namespace
 
 // A waiter is a timer that runs until the waiter's deadline and is cancelled when the flight lands.
 using Waiter = std::shared_ptr<asio::steady_timer>;
@@ -68,9 +76,7 @@ asio::awaitable<SingleFlight::Landing> SingleFlight::Join(CacheKey key, Build bu
   lock.lock();
   std::optional<Result<TilePtr>> outcome = flight->outcome;
   lock.unlock();
-  if (!outcome)
-    outcome = MakeError(ErrorCode::kCancelled, "tile {}: not ready before the request's deadline",
-                        geo::ToString(key.request.key));
+  if (!outcome) outcome = MakeError(ErrorCode::kCancelled, "{}: not ready before the request's deadline", NameOf(key));
   co_return Landing(std::move(*outcome), joined);
 }
 
@@ -86,7 +92,7 @@ Result<std::shared_ptr<SingleFlight::Flight>> SingleFlight::Board(const CacheKey
   auto flight = std::make_shared<Flight>(deadline);
   auto job = [this, key, flight, build = std::move(build)] { Fly(key, flight, build); };
   if (!pool_.TrySubmit(std::move(job))) {
-    return MakeError(ErrorCode::kOverloaded, "tile {}: the queue of builds is full", geo::ToString(key.request.key));
+    return MakeError(ErrorCode::kOverloaded, "{}: the queue of builds is full", NameOf(key));
   }
   flights_.emplace(key, flight);
   return flight;
@@ -94,8 +100,7 @@ Result<std::shared_ptr<SingleFlight::Flight>> SingleFlight::Board(const CacheKey
 
 // On a worker thread.
 void SingleFlight::Fly(const CacheKey& key, const std::shared_ptr<Flight>& flight, const Build& build) {
-  Result<TilePtr> outcome =
-      MakeError(ErrorCode::kCancelled, "tile {}: stopped before it began", geo::ToString(key.request.key));
+  Result<TilePtr> outcome = MakeError(ErrorCode::kCancelled, "{}: stopped before it began", NameOf(key));
   if (!flight->stop.stop_requested()) outcome = build(flight->stop.get_token());
 
   std::vector<Waiter> waiters;

@@ -30,6 +30,7 @@ class SingleFlight {
  public:
   using Clock = std::chrono::steady_clock;
   using Build = std::function<Result<TilePtr>(std::stop_token)>;
+  using Work = std::function<Result<EncodedTile>(std::stop_token)>;
 
   struct Landing {
     Landing() = default;

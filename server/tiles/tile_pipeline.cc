@@ -1,8 +1,5 @@
 #include "server/tiles/tile_pipeline.h"
 
-#include <fmt/format.h>
-#include <xxhash.h>
-
 #include <utility>
 
 #include "engine/geo/error_ladder.h"
@@ -11,6 +8,8 @@
 #include "proto/quantized_mesh.h"
 #include "proto/tile_normals.h"
 #include "server/tiles/glb_mesher.h"
+#include "server/tiles/height_tile.h"
+#include "server/tiles/strong_etag.h"
 #include "server/tiles/tile_extensions.h"
 #include "server/tiles/tile_mesher.h"
 #include "server/tiles/tile_texture.h"
@@ -22,11 +21,6 @@ using Clock = std::chrono::steady_clock;
 
 std::chrono::microseconds Since(Clock::time_point start) {
   return std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - start);
-}
-
-std::string StrongETag(std::string_view bytes) {
-  const XXH128_hash_t hash = XXH3_128bits(bytes.data(), bytes.size());
-  return fmt::format("\"{:016x}{:016x}\"", hash.high64, hash.low64);
 }
 
 }  // namespace
@@ -122,6 +116,7 @@ Result<void> TilePipeline::EncodeGlb(const TileRequest& request, const RefinedTi
 Result<EncodedTile> TilePipeline::Build(const TileRequest& request, std::stop_token stop) const {
   if (request.dataset >= datasets_.size()) return MakeError(ErrorCode::kNotFound, "no such dataset");
   const Dataset& dataset = datasets_[request.dataset];
+  if (request.format == TileFormat::kHeightPng) return BuildHeightTile(*dataset.source, request, stop);
   if (!dataset.source->IsAvailable(request.key)) {
     return MakeError(ErrorCode::kNotFound, "{}/{}: no such tile", dataset.name, geo::ToString(request.key));
   }

@@ -1,17 +1,22 @@
 // What one tile request asks for, in canonical form: everything that changes the bytes and nothing else.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 
 #include "engine/geo/tile_key.h"
 #include "proto/glb_tile.h"
+#include "proto/height_png.h"
 #include "proto/texture.h"
 
 namespace terrace::server {
 
-enum class TileFormat : std::uint8_t { kQuantizedMesh, kGlb };
+enum class TileFormat : std::uint8_t { kQuantizedMesh, kGlb, kHeightPng };
 enum class Coding : std::uint8_t { kIdentity, kGzip };
+
+// Pixels along an edge of a height tile; the first is the default.
+inline constexpr std::array<int, 2> kHeightSizes = {256, 512};
 
 struct TileRequest {
   std::uint32_t dataset = 0;  // index into the server's datasets
@@ -26,6 +31,9 @@ struct TileRequest {
   bool normals = false;
   bool water_mask = false;
   bool metadata = false;
+  // kHeightPng: `key` is a tile of Web Mercator's XYZ scheme, y from the NORTH, of height_size * height_size pixels.
+  proto::HeightEncoding height_encoding = proto::HeightEncoding::kMapbox;
+  int height_size = kHeightSizes[0];
 
   friend bool operator==(const TileRequest&, const TileRequest&) = default;
 };

@@ -2,18 +2,19 @@
 
 #include <exception>
 #include <memory>
+#include <string>
 #include <utility>
 
 namespace terrace::server {
 namespace {
 
-Result<TilePtr> RunBuilder(const TileBuilder& builder, const TileRequest& request, std::stop_token stop) {
+Result<TilePtr> RunWork(const SingleFlight::Work& work, const std::string& what, std::stop_token stop) {
   try {
-    Result<EncodedTile> built = builder(request, std::move(stop));
+    Result<EncodedTile> built = work(std::move(stop));
     if (!built) return tl::unexpected(std::move(built.error()));
     return std::make_shared<const EncodedTile>(std::move(*built));
   } catch (const std::exception& exception) {  // std::bad_alloc above all
-    return MakeError(ErrorCode::kUnavailable, "tile {}: {}", geo::ToString(request.key), exception.what());
+    return MakeError(ErrorCode::kUnavailable, "{}: {}", what, exception.what());
   }
 }
 
@@ -43,10 +44,21 @@ asio::awaitable<Result<ServedTile>> TileService::Get(CacheKey key, Clock::time_p
 Result<TilePtr> TileService::BuildAndKeep(const CacheKey& key, std::stop_token stop) {
   // Between the look into the cache and the start of this flight an earlier flight may have landed.
   if (TilePtr tile = cache_.Find(key)) return tile;
-  Result<TilePtr> tile = RunBuilder(builder_, key.request, std::move(stop));
+  const SingleFlight::Work work = [&](std::stop_token token) { return builder_(key.request, std::move(token)); };
+  Result<TilePtr> tile = RunWork(work, "tile " + geo::ToString(key.request.key), std::move(stop));
   if (tile) cache_.Insert(key, *tile);
   if (observer_) observer_(key.request, tile);
   return tile;
+}
+
+asio::awaitable<Result<TilePtr>> TileService::Run(SingleFlight::Work work, Clock::time_point deadline) {
+  CacheKey key;
+  key.solo = 1 + solos_.fetch_add(1, std::memory_order_relaxed);
+  SingleFlight::Build build = [work = std::move(work)](std::stop_token stop) {
+    return RunWork(work, "work for one request", std::move(stop));
+  };
+  SingleFlight::Landing landing = co_await flights_.Join(key, std::move(build), deadline);
+  co_return std::move(landing.tile);
 }
 
 void TileService::CancelBuilds() { flights_.Shutdown(); }

@@ -6,10 +6,14 @@
 #include <atomic>
 #include <chrono>
 #include <functional>
+#include <span>
 #include <stop_token>
+#include <vector>
 
 #include "engine/core/result.h"
+#include "engine/dem/dem_source.h"
 #include "server/asio.h"
+#include "server/tiles/area_mesh.h"
 #include "server/tiles/encoded_tile.h"
 #include "server/tiles/single_flight.h"
 #include "server/tiles/tile_cache.h"
@@ -20,6 +24,17 @@ namespace terrace::server {
 
 // Blocking; called on many threads at once. An exception counts as kUnavailable.
 using TileBuilder = std::function<Result<EncodedTile>(const TileRequest&, std::stop_token)>;
+
+// Heights of a dataset at points, NaN where it has none. Blocking; called on many threads at once.
+using PointReader = std::function<Result<std::vector<float>>(
+    std::uint32_t dataset, std::span<const dem::GeoPosition> points, std::stop_token)>;
+
+// Meshes of areas, by the dataset's index: `plan` refuses what is too large, at once and without reading; `build`
+// blocks. Both are called on many threads at once.
+struct AreaMesher {
+  std::function<Result<AreaPlan>(std::uint32_t dataset, const AreaRequest&)> plan;
+  std::function<Result<EncodedTile>(std::uint32_t dataset, const AreaPlan&, const AreaRequest&, std::stop_token)> build;
+};
 
 // Told about every build on the thread that ran it.
 using BuildObserver = std::function<void(const TileRequest&, const Result<TilePtr>&)>;
@@ -51,6 +66,10 @@ class TileService {
   // run on a strand. Only successes are kept.
   asio::awaitable<Result<ServedTile>> Get(CacheKey key, Clock::time_point deadline);
 
+  // Runs `work` on a worker for this caller alone: nothing is shared or kept. Errors and conditions as those of Get. An
+  // exception of `work` counts as kUnavailable.
+  asio::awaitable<Result<TilePtr>> Run(SingleFlight::Work work, Clock::time_point deadline);
+
   // Makes every Get that waits for a build fail soon, and every later one at once; the cache keeps answering.
   void CancelBuilds();
 
@@ -72,7 +91,7 @@ class TileService {
   TileCache cache_;
   WorkerPool pool_;
   SingleFlight flights_;
-  std::atomic<std::uint64_t> hits_{0}, misses_{0};
+  std::atomic<std::uint64_t> hits_{0}, misses_{0}, solos_{0};
 };
 
 }  // namespace terrace::server

@@ -27,7 +27,7 @@ TEST(ParseConfig, SetsWhatTheTextSaysAndNothingElse) {
                   "criterion": "data-dependent", "compact": true,
                   "glb_compression": "quantized", "draco_speed": 3, "draco_normal_bits": 10}],
     "viewer": false, "cache_control": "no-cache", "io_threads": 1, "worker_threads": 3, "queue_length": 10,
-    "cache_bytes": "1GiB", "refinement_cache_bytes": "10 MiB", "max_connections": 64, "request_deadline_s": 1.5, "header_timeout_s": 2,
+    "cache_bytes": "1GiB", "refinement_cache_bytes": "10 MiB", "max_connections": 64, "max_locations": 50, "max_mesh_samples": 5000, "request_deadline_s": 1.5, "header_timeout_s": 2,
     "idle_timeout_s": 3, "write_timeout_s": 4, "drain_timeout_s": 0, "log_level": "debug", "log_format": "json"})",
                                           "/data");
   ASSERT_TRUE(config);
@@ -53,6 +53,8 @@ TEST(ParseConfig, SetsWhatTheTextSaysAndNothingElse) {
   expected.cache_bytes = std::size_t{1} << 30;
   expected.refinement_cache_bytes = std::size_t{10} << 20;
   expected.max_connections = 64;
+  expected.max_locations = 50;
+  expected.max_mesh_samples = 5000;
   expected.request_deadline = std::chrono::milliseconds(1500);
   expected.header_timeout = std::chrono::milliseconds(2000);
   expected.idle_timeout = std::chrono::milliseconds(3000);

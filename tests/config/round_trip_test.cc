@@ -44,6 +44,8 @@ TEST(ToJson, ComesBackWithEveryOptionSet) {
   config.cache_bytes = std::size_t{1} << 40;
   config.refinement_cache_bytes = 12'345'678;
   config.max_connections = 7;
+  config.max_locations = 1'000'000;
+  config.max_mesh_samples = 4;
   config.request_deadline = std::chrono::milliseconds(100);
   config.header_timeout = std::chrono::milliseconds(1'234);
   config.idle_timeout = std::chrono::milliseconds(3'600'000);

@@ -138,6 +138,36 @@ TEST(Negotiate, ComesToFortyOneErrorsAtMost) {
   }
 }
 
+TEST(Negotiate, HeightTilesAreThoseThatMeetTheBounds) {
+  std::array<DatasetView, 1> datasets;
+  datasets[0].name = "maui";
+  datasets[0].west = 170;  // across the antimeridian
+  datasets[0].east = -160;
+  datasets[0].south = 10;
+  datasets[0].north = 20;
+  datasets[0].max_mercator_depth = 5;
+  const auto find = [&](const char* target) {
+    Request request;
+    request.accept_encoding = "gzip";
+    return Negotiate(*Match(target), request, datasets);
+  };
+  for (const char* there : {"/maui/0/0/0.png", "/maui/1/0/0.png", "/maui/1/1/0.png", "/maui/5/31/14.png",
+                            "/maui/5/1/15.png", "/maui/4/15/7.png?size=512"}) {
+    const Result<TileRequest> tile = find(there);
+    ASSERT_TRUE(tile) << there << tile.error().message;
+    EXPECT_EQ(tile->format, TileFormat::kHeightPng);
+    EXPECT_EQ(tile->coding, Coding::kIdentity) << "PNG is compressed already";
+  }
+  EXPECT_EQ(find("/maui/4/15/7.png?size=512")->height_size, 512);
+  for (const char* missing : {"/maui/1/0/1.png", "/maui/5/16/14.png", "/maui/5/31/20.png", "/maui/6/63/29.png",
+                              "/maui/5/31/14.png?size=512", "/nope/0/0/0.png"}) {
+    const Result<TileRequest> tile = find(missing);
+    ASSERT_FALSE(tile) << missing;
+    EXPECT_EQ(tile.error().code, ErrorCode::kNotFound) << missing;
+  }
+  EXPECT_EQ(find("/maui/0/0/0.png?size=3").error().code, ErrorCode::kInvalidArgument);
+}
+
 TEST(Negotiate, MakesACanonicalRequest) {
   std::array<DatasetView, 2> datasets;
   datasets[0].name = "etopo";

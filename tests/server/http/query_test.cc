@@ -110,6 +110,22 @@ TEST(Query, ReadsTheTextureOf3dTilesUrls) {
   EXPECT_FALSE(ParseTileParameters("texture=jpeg", true));
 }
 
+TEST(Query, ReadsWhatHeightTilesTake) {
+  const Result<HeightTileParameters> plain = ParseHeightTileParameters("v=1&v=2");
+  ASSERT_TRUE(plain);
+  EXPECT_EQ(plain->encoding, proto::HeightEncoding::kMapbox);
+  EXPECT_EQ(plain->size, 256);
+  const Result<HeightTileParameters> all = ParseHeightTileParameters("encoding=terrarium&size=512");
+  ASSERT_TRUE(all);
+  EXPECT_EQ(all->encoding, proto::HeightEncoding::kTerrarium);
+  EXPECT_EQ(all->size, 512);
+  for (const char* bad :
+       {"encoding=rgb", "encoding=", "encoding=Mapbox", "size=0", "size=1024", "size=256.0", "size=+256",
+        "size=256&size=256", "encoding=mapbox&encoding=mapbox", "error=5", "encoding=%0a"}) {
+    EXPECT_FALSE(ParseHeightTileParameters(bad)) << bad;
+  }
+}
+
 TEST(Query, RefusesParametersWhereThereAreNone) {
   EXPECT_TRUE(RefuseParameters(""));
   EXPECT_TRUE(RefuseParameters("v=1"));

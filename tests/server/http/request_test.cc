@@ -40,6 +40,25 @@ TEST(Request, AcceptsALengthOfZeroOnly) {
   EXPECT_FALSE(ParseHead(Get("Content-Length: 0\r\nContent-Length: 0\r\n")));
 }
 
+TEST(Request, APostMayAnnounceABody) {
+  const auto post = [](const std::string& fields) {
+    return ParseHead("POST /a HTTP/1.1\r\nHost: x\r\n" + fields + "\r\n");
+  };
+  const auto request = post("Content-Length: 12\r\nContent-Type: application/json\r\nExpect: 100-Continue\r\n");
+  ASSERT_TRUE(request) << request.error().detail;
+  EXPECT_EQ(request->method, Method::kPost);
+  EXPECT_EQ(request->content_length, 12u);
+  EXPECT_EQ(request->content_type, "application/json");
+  EXPECT_TRUE(request->expects_continue);
+  EXPECT_EQ(post("")->content_length, 0u);
+  EXPECT_FALSE(post("")->expects_continue);
+  for (const char* length : {"05", "00", "+5", "-5", "5 5", "5,5", "0x5", "5.0", "", "1234567890123456"}) {
+    EXPECT_FALSE(post("Content-Length: " + std::string(length) + "\r\n")) << length;
+  }
+  EXPECT_FALSE(post("Content-Length: 5\r\nContent-Length: 5\r\n"));
+  EXPECT_FALSE(post("Content-Length: 5\r\nTransfer-Encoding: chunked\r\n"));
+}
+
 TEST(Request, RefusesEveryTransferEncoding) {
   for (const char* coding : {"chunked", "gzip", "identity", "gzip, chunked", "xchunked", " chunked", "\tchunked", ""}) {
     EXPECT_FALSE(ParseHead(Get("Transfer-Encoding: " + std::string(coding) + "\r\n"))) << coding;

@@ -20,11 +20,12 @@ TEST(Response, CarriesCorsAndALength) {
   response.etag = "\"e\"";
   response.vary = true;
   const std::string head = SerializeHead(response, 11, false);
-  for (const char* line : {"\r\nContent-Length: 5\r\n", "\r\nContent-Encoding: gzip\r\n", "\r\nETag: \"e\"\r\n",
-                           "\r\nVary: Accept, Accept-Encoding\r\n", "\r\nAccess-Control-Allow-Origin: *\r\n",
-                           "\r\nAccess-Control-Expose-Headers: ETag, Terrain-Max-Error, Terrain-Certified-Error, "
-                           "Retry-After, Server-Timing\r\n",
-                           "\r\nTiming-Allow-Origin: *\r\n", "\r\nConnection: close\r\n", "\r\nDate: "}) {
+  for (const char* line :
+       {"\r\nContent-Length: 5\r\n", "\r\nContent-Encoding: gzip\r\n", "\r\nETag: \"e\"\r\n",
+        "\r\nVary: Accept, Accept-Encoding\r\n", "\r\nAccess-Control-Allow-Origin: *\r\n",
+        "\r\nAccess-Control-Expose-Headers: ETag, Terrain-Max-Error, Terrain-Certified-Error, Terrain-Origin, "
+        "Retry-After, Server-Timing\r\n",
+        "\r\nTiming-Allow-Origin: *\r\n", "\r\nConnection: close\r\n", "\r\nDate: "}) {
     EXPECT_NE(head.find(line), std::string::npos) << line;
   }
   EXPECT_TRUE(head.ends_with("\r\n\r\n"));

@@ -27,6 +27,10 @@ TEST(Router, FindsEveryUrl) {
       {"/maui/3dtiles/9-272-359/0/0/0.glb?error=5&atleast=1", RouteKind::kTile},
       {"/maui/0/1/0.terrain", RouteKind::kTile},
       {"/maui/0/1/0.glb", RouteKind::kTile},
+      {"/maui/0/0/0.png", RouteKind::kTile},
+      {"/maui/tiles.json", RouteKind::kTileJson},
+      {"/maui/heights?locations=1,2", RouteKind::kHeights},
+      {"/maui/mesh?bbox=0,0,1,1&error=5", RouteKind::kMesh},
       {"http://example.test/maui/0/1/0.terrain", RouteKind::kTile},
       {"http://example.test", RouteKind::kViewer},
       {"/a%20b/layer.json", RouteKind::kLayer},
@@ -49,6 +53,7 @@ TEST(Router, ReadsTheTileAndTheQuery) {
   ASSERT_TRUE(glb);
   EXPECT_EQ(glb->key, route->key);
   EXPECT_EQ(glb->format, TileFormat::kGlb);
+  EXPECT_EQ(Match("/maui/3/7/0.png")->format, TileFormat::kHeightPng);
   EXPECT_EQ(Match("/viewer/a/b.js")->file, "a/b.js");
   EXPECT_EQ(Match("/")->file, "index.html");
   EXPECT_EQ(Match("/viewer/")->file, "index.html");
@@ -76,7 +81,13 @@ TEST(Router, RefusesWhatIsNoUrl) {
       "/maui/0/0",
       "/maui/0/0/0",
       "/maui/0/0/0.terrain/",
-      "/maui/0/0/0.png",
+      "/maui/0/0/0.jpg",
+      "/maui/0/1/0.png",  // Web Mercator has one root
+      "/maui/1/0/2.png",
+      "/maui/1/2/0.png",
+      "/maui/25/0/0.png",
+      "/tiles.json",
+      "/maui/heights/",
       "/maui/0/0/.terrain",
       "/maui/0/0/.glb",
       "/maui/0/0/0.glb.terrain",

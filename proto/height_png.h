@@ -1,0 +1,25 @@
+// Heights as the colours of PNG images: the "raster-dem" tiles of MapLibre, Mapbox and deck.gl.
+//
+// PNG (ISO/IEC 15948) with 8 bits of red, green and blue, neither alpha nor colour profile: browsers hand the very
+// bytes on. Deterministic: filters are chosen by sums of integers, and the compressor is libdeflate.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+
+namespace terrace::proto {
+
+enum class HeightEncoding : std::uint8_t {
+  kMapbox,    // -10000 + (R * 65536 + G * 256 + B) * 0.1 metres
+  kTerrarium  // R * 256 + G + B / 256 - 32768 metres
+};
+
+// The nearest code of a height; what no code reaches is the first or the last one. Precondition: finite.
+std::uint32_t EncodeHeight(double metres, HeightEncoding encoding);
+double DecodeHeight(std::uint32_t code, HeightEncoding encoding);
+
+// `heights`: size * size, row by row from the north-western one, finite.
+std::string EncodeHeightPng(std::span<const float> heights, int size, HeightEncoding encoding);
+
+}  // namespace terrace::proto

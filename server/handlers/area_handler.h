@@ -1,0 +1,39 @@
+// GET /{dataset}/mesh
+#pragma once
+
+#include <span>
+#include <string_view>
+
+#include "engine/core/result.h"
+#include "server/asio.h"
+#include "server/handlers/tile_handler.h"
+#include "server/http/request.h"
+#include "server/http/response.h"
+#include "server/http/router.h"
+#include "server/tiles/area_mesh.h"
+#include "server/tiles/dataset_view.h"
+#include "server/tiles/tile_service.h"
+
+namespace terrace::server {
+
+class AreaHandler {
+ public:
+  // `datasets` and `tiles`, whose workers mesh the areas, must outlive this.
+  AreaHandler(std::span<const DatasetView> datasets, TileService& tiles, AreaMesher mesher, TileHandlerOptions options);
+
+  // Precondition: a kMesh route.
+  asio::awaitable<Response> Handle(Route route, Request request) const;
+
+ private:
+  const std::span<const DatasetView> datasets_;
+  TileService& tiles_;
+  const AreaMesher mesher_;
+  const TileHandlerOptions options_;
+};
+
+// `bbox=west,south,east,north` and `error=METRES`, both needed; `format=glb|obj|ply`,
+// `coordinates=enu|ecef|geographic`; `v` may come any number of times. west > east is a box across the antimeridian.
+// kInvalidArgument, with a message for the client.
+Result<AreaRequest> ParseAreaRequest(std::string_view query);
+
+}  // namespace terrace::server

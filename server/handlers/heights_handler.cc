@@ -1,0 +1,89 @@
+#include "server/handlers/heights_handler.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <iterator>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "proto/compress.h"
+#include "server/handlers/backend_failure.h"
+#include "server/http/http_error.h"
+#include "server/http/negotiate.h"
+
+namespace terrace::server {
+
+HeightsHandler::HeightsHandler(std::span<const DatasetView> datasets, TileService& tiles, PointReader reader,
+                               TileHandlerOptions options, std::size_t max_locations)
+    : datasets_(datasets),
+      tiles_(tiles),
+      reader_(std::move(reader)),
+      options_(std::move(options)),
+      max_locations_(max_locations) {}
+
+Result<HeightsQuery> HeightsHandler::Parse(const Route& route, const Request& request) const {
+  Result<QueryParameters> parameters = ParseQuery(route.query);
+  if (!parameters) return tl::unexpected(std::move(parameters).error());
+  if (request.method == Method::kPost) {
+    Result<QueryParameters> sent = ParseHeightsBody(request.content_type, request.body);
+    if (!sent) return tl::unexpected(std::move(sent).error());
+    std::move(sent->begin(), sent->end(), std::back_inserter(*parameters));
+  }
+  return ParseHeightsQuery(*parameters, max_locations_);
+}
+
+asio::awaitable<Response> HeightsHandler::Handle(Route route, Request request) const {
+  const Result<std::uint32_t> dataset = FindDataset(route.dataset, datasets_);
+  if (!dataset) co_return ClientErrorResponse(dataset.error(), request.id);
+  Result<HeightsQuery> parsed = Parse(route, request);
+  if (!parsed) co_return ClientErrorResponse(parsed.error(), request.id);
+
+  const Coding coding = NegotiateCoding(request.accept_encoding);
+  auto query = std::make_shared<const HeightsQuery>(*std::move(parsed));
+  SingleFlight::Work work = [this, index = *dataset, coding, query](std::stop_token stop) -> Result<EncodedTile> {
+    const Result<std::vector<float>> heights = reader_(index, query->points, std::move(stop));
+    if (!heights) return tl::unexpected(heights.error());
+    EncodedTile reply;
+    reply.bytes = HeightsJson(*query, *heights, datasets_[index].name);
+    if (coding == Coding::kGzip) reply.bytes = proto::Gzip(reply.bytes);
+    reply.etag = MakeEtag(reply.bytes, coding);
+    return reply;
+  };
+  const auto deadline = TileService::Clock::now() + options_.deadline;
+  const Result<TilePtr> reply = co_await tiles_.Run(std::move(work), deadline);
+  if (!reply) co_return co_await BackendFailure(reply.error(), request.id, options_.refusal_delay);
+
+  Response response;
+  response.content_type = "application/json";
+  response.body = Body(*reply, &(*reply)->bytes);
+  response.coding = coding;
+  response.vary = true;
+  response.cache_control = "no-store";
+  if (request.method == Method::kPost) co_return response;
+  response.etag = (*reply)->etag;
+  response.cache_control = options_.cache_control;
+  co_return Conditional(std::move(response), request);
+}
+
+std::string HeightsJson(const HeightsQuery& query, std::span<const float> heights, std::string_view dataset) {
+  const std::string name = nlohmann::json(dataset).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  std::string json = "{\"results\":[";
+  const auto out = std::back_inserter(json);
+  for (std::size_t i = 0; i < heights.size(); ++i) {
+    if (i > 0) json += ',';
+    json += "{\"elevation\":";
+    if (std::isnan(heights[i])) {
+      json += "null";
+    } else {
+      fmt::format_to(out, "{}", heights[i]);
+    }
+    fmt::format_to(out, ",\"location\":{{\"lat\":{},\"lng\":{}}}", query.points[i].latitude, query.points[i].longitude);
+    if (!query.distances_m.empty()) fmt::format_to(out, ",\"distance\":{}", query.distances_m[i]);
+    fmt::format_to(out, ",\"dataset\":{}}}", name);
+  }
+  return json + "],\"status\":\"OK\"}";
+}
+
+}  // namespace terrace::server

@@ -1,0 +1,43 @@
+// GET and POST /{dataset}/heights
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "server/asio.h"
+#include "server/handlers/heights_query.h"
+#include "server/handlers/tile_handler.h"
+#include "server/http/request.h"
+#include "server/http/response.h"
+#include "server/http/router.h"
+#include "server/tiles/dataset_view.h"
+#include "server/tiles/tile_service.h"
+
+namespace terrace::server {
+
+class HeightsHandler {
+ public:
+  // `datasets` and `tiles`, whose workers read the heights, must outlive this.
+  HeightsHandler(std::span<const DatasetView> datasets, TileService& tiles, PointReader reader,
+                 TileHandlerOptions options, std::size_t max_locations);
+
+  // Precondition: a kHeights route.
+  asio::awaitable<Response> Handle(Route route, Request request) const;
+
+ private:
+  Result<HeightsQuery> Parse(const Route& route, const Request& request) const;
+
+  const std::span<const DatasetView> datasets_;
+  TileService& tiles_;
+  const PointReader reader_;
+  const TileHandlerOptions options_;
+  const std::size_t max_locations_;
+};
+
+// {"results":[{"elevation","location":{"lat","lng"},"dataset"}],"status":"OK"}, as Open Topo Data replies; points of a
+// path have their "distance" as well. Metres; null where there is no height.
+std::string HeightsJson(const HeightsQuery& query, std::span<const float> heights, std::string_view dataset);
+
+}  // namespace terrace::server

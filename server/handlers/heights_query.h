@@ -1,0 +1,28 @@
+// What a request for heights asks for: points one by one, or along a path. Pure.
+#pragma once
+
+#include <cstddef>
+#include <string_view>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "engine/dem/dem_source.h"
+#include "server/http/query.h"
+
+namespace terrace::server {
+
+struct HeightsQuery {
+  std::vector<dem::GeoPosition> points;
+  std::vector<double> distances_m;  // of a path: one a point, from its beginning; else empty
+};
+
+// `locations=lat,lon|lat,lon`, or `path=lat,lon|lat,lon` with either `step=METRES` or `samples=N`; `v` may come any
+// number of times. kInvalidArgument, with a message for the client that names the item: anything else, numbers that are
+// not finite or no place on Earth, and more than `max_locations` points.
+Result<HeightsQuery> ParseHeightsQuery(const QueryParameters& parameters, std::size_t max_locations);
+
+// The parameters in a request's body, by its Content-Type: a JSON object of texts and numbers, or a form.
+// kInvalidArgument: neither of the two, or malformed.
+Result<QueryParameters> ParseHeightsBody(std::string_view content_type, std::string_view body);
+
+}  // namespace terrace::server

@@ -1,0 +1,58 @@
+#include "server/handlers/tile_json_handler.h"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "proto/tile_json.h"
+#include "server/handlers/datasets_handler.h"
+#include "server/handlers/document.h"
+#include "server/http/http_error.h"
+#include "server/http/negotiate.h"
+#include "server/http/query.h"
+
+namespace terrace::server {
+namespace {
+
+// Defaults are left away, so that a tile is cached under one URL.
+std::string TileQuery(const HeightTileParameters& parameters) {
+  std::string query;
+  const auto add = [&query](std::string text) { query += (query.empty() ? "?" : "&") + std::move(text); };
+  const HeightTileParameters defaults;
+  if (parameters.encoding != defaults.encoding) add(fmt::format("encoding={}", proto::ToString(parameters.encoding)));
+  if (parameters.size != defaults.size) add(fmt::format("size={}", parameters.size));
+  return query;
+}
+
+}  // namespace
+
+TileJsonHandler::TileJsonHandler(std::span<const DatasetView> datasets, std::string cache_control)
+    : datasets_(datasets), cache_control_(std::move(cache_control)) {}
+
+Response TileJsonHandler::Handle(const Route& route, const Request& request) const {
+  const Result<std::uint32_t> index = FindDataset(route.dataset, datasets_);
+  if (!index) return ClientErrorResponse(index.error(), request.id);
+  const Result<HeightTileParameters> parameters = ParseHeightTileParameters(route.query);
+  if (!parameters) return ClientErrorResponse(parameters.error(), request.id);
+  const DatasetView& dataset = datasets_[*index];
+  proto::TileJsonDescription tiles;
+  tiles.name = dataset.name;
+  tiles.attribution = dataset.attribution;
+  tiles.tile_template = fmt::format("{}/{}/{{z}}/{{x}}/{{y}}.png{}", OriginOf(request), PercentEncode(dataset.name),
+                                    TileQuery(*parameters));
+  tiles.max_zoom = MaxHeightLevel(dataset, parameters->size);
+  tiles.tile_size = parameters->size;
+  tiles.encoding = parameters->encoding;
+  tiles.west = dataset.west;
+  tiles.south = dataset.south;
+  tiles.east = dataset.east;
+  tiles.north = dataset.north;
+  return Serve(Document::Make(proto::EncodeTileJson(tiles), "application/json"), request, cache_control_);
+}
+
+std::string OriginOf(const Request& request) {
+  if (request.host.empty()) return {};
+  return fmt::format("{}://{}", request.forwarded_proto == "https" ? "https" : "http", request.host);
+}
+
+}  // namespace terrace::server

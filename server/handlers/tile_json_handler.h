@@ -1,0 +1,30 @@
+// GET /{dataset}/tiles.json
+#pragma once
+
+#include <span>
+#include <string>
+
+#include "server/http/request.h"
+#include "server/http/response.h"
+#include "server/http/router.h"
+#include "server/tiles/dataset_view.h"
+
+namespace terrace::server {
+
+class TileJsonHandler {
+ public:
+  // `datasets` must outlive this.
+  TileJsonHandler(std::span<const DatasetView> datasets, std::string cache_control);
+
+  // Precondition: a kTileJson route. `?encoding` and `?size` go into the tile template.
+  Response Handle(const Route& route, const Request& request) const;
+
+ private:
+  const std::span<const DatasetView> datasets_;
+  const std::string cache_control_;
+};
+
+// "http://host:port" as the client addressed this server or the proxy before it; empty without a Host.
+std::string OriginOf(const Request& request);
+
+}  // namespace terrace::server

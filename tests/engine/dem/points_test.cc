@@ -1,0 +1,107 @@
+// Heights at single points, as measured.
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <random>
+
+#include "tests/engine/dem/dem_fixture.h"
+
+namespace terrace::dem {
+namespace {
+
+RasterSpec Steps() {
+  RasterSpec spec{.width = 600, .height = 600, .geo_transform = {10, .01, 0, 20, 0, -.01}, .nodata = -9999};
+  spec.value = [](int col, int row) { return col == 300 && row == 300 ? -9999.0 : col + 100.0 * row; };
+  return spec;
+}
+
+// The position of a pixel coordinate in the raster above.
+GeoPosition At(double column, double row) { return {10 + column * .01, 20 - row * .01}; }
+
+TEST(Points, AreBilinearBetweenCentres) {
+  const TempDir dir;
+  const auto source = OpenOrFail(WriteRaster(dir, Steps()));
+  const std::vector<GeoPosition> points = {At(5.5, 7.5), At(6, 7.5), At(5.75, 8.25), At(0, 0), At(.5, 600)};
+  const auto heights = source->ReadPoints(points);
+  ASSERT_TRUE(heights);
+  EXPECT_NEAR((*heights)[0], 5 + 700, .01);
+  EXPECT_NEAR((*heights)[1], 5.5 + 700, .01);
+  EXPECT_NEAR((*heights)[2], 5.25 + 775, .01);
+  EXPECT_NEAR((*heights)[3], 0, .01);  // half a pixel beyond the outermost centres
+  EXPECT_NEAR((*heights)[4], 59'900, .1);
+}
+
+TEST(Points, AreNothingOutsideAndInVoids) {
+  const TempDir dir;
+  const auto source = OpenOrFail(WriteRaster(dir, Steps()), {.floor = 7});
+  const std::vector<GeoPosition> points = {At(-.01, 5),      At(5, 600.01),      {-120, 0},        {12, -90},
+                                           At(300.5, 300.5), At(300.01, 300.99), At(299.99, 300.5)};
+  const auto heights = source->ReadPoints(points);
+  ASSERT_TRUE(heights);
+  for (std::size_t i = 0; i < 6; ++i) EXPECT_TRUE(std::isnan((*heights)[i])) << i;
+  // Beside a void the valid samples alone count.
+  EXPECT_NEAR((*heights)[6], 299 + 30'000, .1);
+}
+
+TEST(Points, DoNotDependOnEachOtherOrTheirOrder) {
+  const TempDir dir;
+  const auto source = OpenOrFail(WriteRaster(dir, Steps()));
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> anywhere(-20, 620);
+  std::vector<GeoPosition> points(3000);
+  for (GeoPosition& point : points) point = At(anywhere(random), anywhere(random));
+  const auto together = source->ReadPoints(points);
+  std::vector<std::size_t> order(points.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::shuffle(order.begin(), order.end(), random);
+  std::vector<GeoPosition> shuffled;
+  for (const std::size_t i : order) shuffled.push_back(points[i]);
+  const auto apart = source->ReadPoints(shuffled);
+  ASSERT_TRUE(together && apart);
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const float a = (*together)[order[i]], b = (*apart)[i];
+    ASSERT_TRUE(a == b || (std::isnan(a) && std::isnan(b))) << order[i];
+  }
+  for (std::size_t i = 0; i < 40; ++i) {
+    const auto alone = source->ReadPoints({&points[i], 1});
+    ASSERT_TRUE(alone);
+    ASSERT_TRUE((*alone)[0] == (*together)[i] || std::isnan((*alone)[0])) << i;
+  }
+}
+
+TEST(Points, GoRoundTheEarth) {
+  const TempDir dir;
+  RasterSpec spec{.width = 360, .height = 180, .geo_transform = {0, 1, 0, 90, 0, -1}};
+  spec.value = [](int col, int) { return col < 180 ? col : 360.0 - col; };
+  const auto source = OpenOrFail(WriteRaster(dir, spec));
+  const std::vector<GeoPosition> points = {{0, 0}, {-.25, 0}, {180, 10}, {-180, 10}, {-179.75, -89.9}};
+  const auto heights = source->ReadPoints(points);
+  ASSERT_TRUE(heights);
+  EXPECT_NEAR((*heights)[0], .5, .001);  // between columns 359 and 0
+  EXPECT_NEAR((*heights)[1], .75, .001);
+  EXPECT_NEAR((*heights)[2], 179.5, .001);
+  EXPECT_EQ((*heights)[3], (*heights)[2]);
+  EXPECT_NEAR((*heights)[4], 179.75, .3);
+}
+
+TEST(Points, StopWhenAsked) {
+  const TempDir dir;
+  const auto source = OpenOrFail(WriteRaster(dir, Steps()));
+  std::stop_source stop;
+  stop.request_stop();
+  const std::vector<GeoPosition> points = {At(5, 5)};
+  const auto heights = source->ReadPoints(points, stop.get_token());
+  ASSERT_FALSE(heights);
+  EXPECT_EQ(heights.error().code, ErrorCode::kCancelled);
+}
+
+TEST(Points, AreNoneForNoPoints) {
+  const TempDir dir;
+  const auto source = OpenOrFail(WriteRaster(dir, Steps()));
+  const auto heights = source->ReadPoints({});
+  ASSERT_TRUE(heights);
+  EXPECT_TRUE(heights->empty());
+}
+
+}  // namespace
+}  // namespace terrace::dem

@@ -1,0 +1,140 @@
+#include "server/handlers/heights_query.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "server/handlers/heights_handler.h"
+
+namespace terrace::server {
+namespace {
+
+Result<HeightsQuery> Parse(const char* query, std::size_t max_locations = 100) {
+  return ParseHeightsQuery(*ParseQuery(query), max_locations);
+}
+
+std::string Refusal(const char* query, std::size_t max_locations = 100) {
+  const Result<HeightsQuery> parsed = Parse(query, max_locations);
+  EXPECT_FALSE(parsed) << query;
+  if (parsed) return {};
+  EXPECT_EQ(parsed.error().code, ErrorCode::kInvalidArgument) << query;
+  return parsed.error().message;
+}
+
+TEST(HeightsQuery, ReadsLatitudeBeforeLongitude) {
+  const Result<HeightsQuery> query = Parse("locations=46.5,8.25|-90,-180%7C1e1, 2.&v=7");
+  ASSERT_TRUE(query) << query.error().message;
+  ASSERT_EQ(query->points.size(), 3u);
+  EXPECT_EQ(query->points[0].latitude, 46.5);
+  EXPECT_EQ(query->points[0].longitude, 8.25);
+  EXPECT_EQ(query->points[1].latitude, -90);
+  EXPECT_EQ(query->points[1].longitude, -180);
+  EXPECT_EQ(query->points[2].latitude, 10);
+  EXPECT_TRUE(query->distances_m.empty());
+}
+
+TEST(HeightsQuery, NamesTheItemThatIsWrong) {
+  const struct {
+    const char* query;
+    const char* says;
+  } cases[] = {
+      {"locations=1,2|91,0", "item 2: the latitude"},
+      {"locations=1,2|-90.0001,0", "item 2: the latitude"},
+      {"locations=1,180.0001", "item 1: the longitude"},
+      {"locations=nan,0", "item 1: the latitude"},
+      {"locations=0,inf", "item 1: the longitude"},
+      {"locations=0,-infinity", "item 1: the longitude"},
+      {"locations=1e999,0", "item 1: the latitude"},
+      {"locations=0x1,0", "item 1: the latitude"},
+      {"locations=%2B1,0", "item 1: the latitude"},
+      {"locations=1,2,3", "item 1: the longitude"},
+      {"locations=1,", "item 1: the longitude"},
+      {"locations=1,2|", "item 2 is not"},
+      {"locations=|1,2", "item 1 is not"},
+      {"locations=1 2", "item 1 is not"},
+      {"locations=1.2.3,0", "item 1: the latitude"},
+      {"locations=", "locations is empty"},
+      {"locations=%20", "locations is empty"},
+      {"path=1,2|x,0&samples=2", "path: item 2: the latitude"},
+      {"path=1,2&samples=2", "at least two points"},
+      {"path=&samples=2", "path is empty"},
+      {"path=1,2|3,4", "either step"},
+      {"path=1,2|3,4&samples=2&step=2", "either step"},
+      {"path=1,2|3,4&samples=1", "samples must be"},
+      {"path=1,2|3,4&samples=-5", "samples must be"},
+      {"path=1,2|3,4&samples=2.5", "samples must be"},
+      {"path=1,2|3,4&samples=", "samples must be"},
+      {"path=1,2|3,4&samples=101", "more than 100 points"},
+      {"path=1,2|3,4&samples=99999999999999999999999", "more than 100 points"},
+      {"path=1,2|3,4&step=0", "step must be"},
+      {"path=1,2|3,4&step=-1", "step must be"},
+      {"path=1,2|3,4&step=nan", "step must be"},
+      {"path=1,2|3,4&step=1e-300", "more than 100 points"},
+      {"locations=1,2&step=5", "need path"},
+      {"locations=1,2&path=1,2|3,4&samples=2", "either locations or path"},
+      {"", "either locations or path"},
+      {"locations=1,2&locations=1,2", "locations is given more than once"},
+      {"locations=1,2&interpolation=cubic", "unknown parameter"},
+  };
+  for (const auto& c : cases) {
+    const std::string message = Refusal(c.query);
+    EXPECT_NE(message.find(c.says), std::string::npos) << c.query << ": " << message;
+  }
+}
+
+TEST(HeightsQuery, TakesAsManyAsItMayAndNoMore) {
+  EXPECT_TRUE(Parse("locations=1,2|1,2|1,2", 3));
+  EXPECT_NE(Refusal("locations=1,2|1,2|1,2|1,2", 3).find("more than 3 points"), std::string::npos);
+  EXPECT_TRUE(Parse("path=0,0|0,1&samples=3", 3));
+  EXPECT_TRUE(Parse("path=0,0|0,1&step=60000", 3));
+  EXPECT_NE(Refusal("path=0,0|0,1&step=50000", 3).find("in steps of 50000 m"), std::string::npos);
+}
+
+TEST(HeightsQuery, WalksAlongAPath) {
+  const Result<HeightsQuery> query = Parse("path=0,10|0,11&step=50000");
+  ASSERT_TRUE(query) << query.error().message;
+  ASSERT_EQ(query->points.size(), 4u);
+  EXPECT_EQ(query->distances_m, (std::vector<double>{0, 50'000, 100'000, 111'319.491}));
+  EXPECT_EQ(query->points.back().longitude, 11);
+}
+
+TEST(HeightsQuery, ReadsBodies) {
+  const auto json =
+      ParseHeightsBody("Application/JSON; charset=utf-8", R"({"path": "1,2|3,4", "step": 50.5, "samples": 3})");
+  ASSERT_TRUE(json);
+  EXPECT_EQ(*json, (QueryParameters{{"path", "1,2|3,4"}, {"samples", "3"}, {"step", "50.5"}}));
+  const auto form = ParseHeightsBody("application/x-www-form-urlencoded", "locations=1%2C2%7C3%2C+4&v=1");
+  ASSERT_TRUE(form);
+  EXPECT_EQ(*form, (QueryParameters{{"locations", "1,2|3, 4"}, {"v", "1"}}));
+}
+
+TEST(HeightsQuery, RefusesOtherBodies) {
+  for (const char* body :
+       {"", "{", "[]", "null", "\"1,2\"", R"({"locations": ["1,2"]})", R"({"locations": null})",
+        R"({"locations": {"a": 1}})", R"({"locations": true})", "{\"locations\": \"\xff\"}", "NaN"}) {
+    EXPECT_FALSE(ParseHeightsBody("application/json", body)) << body;
+  }
+  const std::string deep(200'000, '[');
+  EXPECT_FALSE(ParseHeightsBody("application/json", deep));
+  EXPECT_FALSE(ParseHeightsBody("application/x-www-form-urlencoded", "locations=%zz"));
+  for (const char* type :
+       {"", "text/plain", "application/xml", "multipart/form-data; boundary=x", "application/jsonx"}) {
+    EXPECT_FALSE(ParseHeightsBody(type, R"({"locations": "1,2"})")) << type;
+  }
+}
+
+TEST(HeightsJson, IsWhatOpenTopoDataSends) {
+  HeightsQuery query{{{8.5, 46.5}, {-170, 0}}, {}};
+  const std::vector<float> heights = {1473.25f, std::numeric_limits<float>::quiet_NaN()};
+  EXPECT_EQ(HeightsJson(query, heights, "alps"),
+            R"({"results":[{"elevation":1473.25,"location":{"lat":46.5,"lng":8.5},"dataset":"alps"},)"
+            R"({"elevation":null,"location":{"lat":0,"lng":-170},"dataset":"alps"}],"status":"OK"})");
+  query.distances_m = {0, 1234.5};
+  const auto json = nlohmann::json::parse(HeightsJson(query, heights, "\"q\""));
+  EXPECT_EQ(json["results"][1]["distance"], 1234.5);
+  EXPECT_EQ(json["results"][0]["dataset"], "\"q\"");
+}
+
+}  // namespace
+}  // namespace terrace::server

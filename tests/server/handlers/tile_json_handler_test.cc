@@ -1,0 +1,58 @@
+#include "server/handlers/tile_json_handler.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <nlohmann/json.hpp>
+#include <string>
+
+namespace terrace::server {
+namespace {
+
+class TileJsonHandlerTest : public testing::Test {
+ protected:
+  TileJsonHandlerTest() {
+    datasets_[0].name = "a b";
+    datasets_[0].max_mercator_depth = 12;
+  }
+  Response Get(const char* target, const char* host = "example.test:8080", const char* proto = "") {
+    Request request;
+    request.host = host;
+    request.forwarded_proto = proto;
+    return TileJsonHandler(datasets_, "max-age=1").Handle(*Match(target), request);
+  }
+  static nlohmann::json Parse(const Response& response) { return nlohmann::json::parse(*response.body); }
+
+  std::array<DatasetView, 1> datasets_;
+};
+
+TEST_F(TileJsonHandlerTest, NamesTilesAsTheClientCanAskForThem) {
+  const Response response = Get("/a%20b/tiles.json");
+  EXPECT_EQ(response.status, 200);
+  EXPECT_EQ(response.content_type, "application/json");
+  EXPECT_EQ(response.cache_control, "max-age=1");
+  EXPECT_EQ(Parse(response)["tiles"][0], "http://example.test:8080/a%20b/{z}/{x}/{y}.png");
+  EXPECT_EQ(Parse(response)["maxzoom"], 12);
+  EXPECT_EQ(Parse(Get("/a%20b/tiles.json", "", ""))["tiles"][0], "/a%20b/{z}/{x}/{y}.png");
+  EXPECT_EQ(Parse(Get("/a%20b/tiles.json", "h", "https"))["tiles"][0], "https://h/a%20b/{z}/{x}/{y}.png");
+  EXPECT_EQ(Parse(Get("/a%20b/tiles.json", "h", "javascript"))["tiles"][0], "http://h/a%20b/{z}/{x}/{y}.png");
+}
+
+TEST_F(TileJsonHandlerTest, WritesWishesIntoTheTemplate) {
+  const auto json = Parse(Get("/a%20b/tiles.json?size=512&encoding=terrarium&v=3"));
+  EXPECT_EQ(json["tiles"][0], "http://example.test:8080/a%20b/{z}/{x}/{y}.png?encoding=terrarium&size=512");
+  EXPECT_EQ(json["maxzoom"], 11);
+  EXPECT_EQ(json["tileSize"], 512);
+  EXPECT_EQ(json["encoding"], "terrarium");
+  EXPECT_EQ(Parse(Get("/a%20b/tiles.json?size=256&encoding=mapbox"))["tiles"][0],
+            "http://example.test:8080/a%20b/{z}/{x}/{y}.png");
+}
+
+TEST_F(TileJsonHandlerTest, RefusesWhatItCannotServe) {
+  EXPECT_EQ(Get("/nope/tiles.json").status, 404);
+  EXPECT_EQ(Get("/a%20b/tiles.json?size=1").status, 400);
+  EXPECT_EQ(Get("/a%20b/tiles.json?error=1").status, 400);
+}
+
+}  // namespace
+}  // namespace terrace::server

@@ -1,0 +1,206 @@
+// Heights over HTTP: bodies, deadlines, load; what the answer says is a function that the tests steer.
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "tests/server/server_fixture.h"
+
+namespace terrace::server {
+namespace {
+
+using namespace std::chrono_literals;
+
+std::string Post(const std::string& target, const std::string& body, const std::string& fields = "",
+                 const char* type = "application/json") {
+  return "POST " + target + " HTTP/1.1\r\nHost: x\r\nContent-Type: " + type +
+         "\r\nContent-Length: " + std::to_string(body.size()) + "\r\n" + fields + "\r\n" + body;
+}
+
+class HeightsTest : public ServerFixture {
+ protected:
+  // Heights are latitude + 1000 * longitude.
+  void StartHeights(ServerOptions options = {}) {
+    options.read_points = [this](std::uint32_t, std::span<const dem::GeoPosition> points,
+                                 std::stop_token stop) -> Result<std::vector<float>> {
+      ++reads_;
+      const auto until = std::chrono::steady_clock::now() + std::chrono::milliseconds(read_ms_);
+      while (std::chrono::steady_clock::now() < until) {
+        if (stop.stop_requested()) return stopped_ = true, MakeError(ErrorCode::kCancelled, "stopped");
+        std::this_thread::sleep_for(1ms);
+      }
+      std::vector<float> heights;
+      for (const auto& p : points) heights.push_back(static_cast<float>(p.latitude + 1000 * p.longitude));
+      return heights;
+    };
+    Start(std::move(options));
+  }
+
+  std::atomic<int> reads_{0}, read_ms_{0};
+  std::atomic<bool> stopped_{false};
+};
+
+double Elevation(const Reply& reply, std::size_t i) {
+  return nlohmann::json::parse(reply.body)["results"][i]["elevation"];
+}
+
+TEST_F(HeightsTest, AnswersGetAndHead) {
+  StartHeights();
+  const Reply reply = Fetch(port(), "/maui/heights?locations=5,7|6,8");
+  EXPECT_EQ(reply.status, 200);
+  EXPECT_EQ(reply.Field("content-type"), "application/json");
+  EXPECT_EQ(Elevation(reply, 0), 7005);
+  EXPECT_EQ(Elevation(reply, 1), 8006);
+  ASSERT_NE(reply.Field("etag"), "");
+  EXPECT_EQ(Fetch(port(), "/maui/heights?locations=5,7|6,8", "If-None-Match: " + reply.Field("etag") + "\r\n").status,
+            304);
+  EXPECT_EQ(Fetch(port(), "/nope/heights?locations=5,7").status, 404);
+  EXPECT_EQ(Fetch(port(), "/maui/heights?locations=5").status, 400);
+  EXPECT_EQ(Fetch(port(), "/maui/heights").status, 400);
+}
+
+TEST_F(HeightsTest, AnswersPostsOneAfterTheOther) {
+  StartHeights();
+  RawClient client(port());
+  // Two requests and a third of another kind in one piece, then one byte by byte.
+  const std::string json = Post("/maui/heights", R"({"locations": "5,7"})");
+  const std::string form = Post("/maui/heights", "locations=6%2C8", "", "application/x-www-form-urlencoded");
+  client.Send(json + form + Get("/livez"));
+  auto reply = client.Read();
+  ASSERT_TRUE(reply);
+  EXPECT_EQ(Elevation(*reply, 0), 7005);
+  EXPECT_EQ(reply->Field("cache-control"), "no-store");
+  reply = client.Read();
+  ASSERT_TRUE(reply);
+  EXPECT_EQ(Elevation(*reply, 0), 8006);
+  reply = client.Read();
+  ASSERT_TRUE(reply);
+  EXPECT_EQ(reply->body, "ok\n");
+  for (const char byte : json) client.Send({&byte, 1});
+  reply = client.Read();
+  ASSERT_TRUE(reply);
+  EXPECT_EQ(Elevation(*reply, 0), 7005);
+  client.Send(Post("/maui/heights", ""));
+  EXPECT_EQ(client.Read()->status, 400) << "an empty body asks for nothing";
+}
+
+TEST_F(HeightsTest, SaysThatTheBodyMayCome) {
+  StartHeights();
+  RawClient client(port());
+  const std::string body = R"({"locations": "5,7"})";
+  std::string head = Post("/maui/heights", body, "Expect: 100-continue\r\n");
+  head.resize(head.size() - body.size());
+  client.Send(head);
+  const auto interim = client.Read(/*head=*/true);
+  ASSERT_TRUE(interim);
+  EXPECT_EQ(interim->status, 100);
+  client.Send(body);
+  EXPECT_EQ(client.Read()->status, 200);
+}
+
+TEST_F(HeightsTest, RefusesBodiesThatAreTooLarge) {
+  ServerOptions options;
+  options.max_locations = 10;
+  StartHeights(options);
+  for (const char* length : {"4737", "100000000000", "999999999999999"}) {
+    RawClient client(port());
+    client.Send("POST /maui/heights HTTP/1.1\r\nHost: x\r\nContent-Length: " + std::string(length) + "\r\n\r\n");
+    const auto reply = client.Read();
+    ASSERT_TRUE(reply) << length;
+    EXPECT_EQ(reply->status, 413) << length;
+    EXPECT_EQ(reply->Field("connection"), "close");
+    EXPECT_TRUE(client.Ended());
+  }
+  const std::string just(4736 - 27, ' ');
+  RawClient client(port());
+  client.Send(Post("/maui/heights", "{\"locations\":" + just + "\"5,7\"}\n\n\n\n\n\n\n\n"));
+  EXPECT_EQ(client.Read()->status, 200);
+}
+
+TEST_F(HeightsTest, RefusesBodiesWhereverElse) {
+  StartHeights();
+  for (const char* length : {"00", "+1", "-1", "1,1", "1 1", "0x1", "1000000000000000000000", ""}) {
+    RawClient client(port());
+    client.Send("POST /maui/heights HTTP/1.1\r\nHost: x\r\nContent-Length: " + std::string(length) + "\r\n\r\nx" +
+                Get("/livez"));
+    EXPECT_EQ(client.Read()->status, 400) << length;
+    EXPECT_TRUE(client.Ended()) << length;
+  }
+  for (const std::string fields : {"Transfer-Encoding: chunked\r\n", "Content-Length: 5\r\n"}) {
+    RawClient client(port());
+    client.Send(Post("/maui/heights", "{}", fields) + Get("/livez"));
+    EXPECT_EQ(client.Read()->status, 400) << fields;
+    EXPECT_TRUE(client.Ended());
+  }
+  for (const char* target : {"/livez", "/maui/layer.json", "/nope", "/maui/0/0/0.terrain"}) {
+    RawClient client(port());
+    client.Send(Post(target, "{}") + Get("/livez"));
+    EXPECT_EQ(client.Read()->status, 405) << target;
+    EXPECT_TRUE(client.Ended());
+  }
+}
+
+TEST_F(HeightsTest, ClosesSlowBodies) {
+  ServerOptions options;
+  options.header_timeout = 300ms;
+  StartHeights(options);
+  const auto begun = std::chrono::steady_clock::now();
+  RawClient client(port());
+  client.Send("POST /maui/heights HTTP/1.1\r\nHost: x\r\nContent-Length: 1000\r\n\r\n");
+  bool open = true;
+  for (int i = 0; i < 100 && open; ++i) {
+    open = client.Send("G");
+    std::this_thread::sleep_for(20ms);
+  }
+  EXPECT_FALSE(open);
+  EXPECT_LT(std::chrono::steady_clock::now() - begun, 1500ms);
+  EXPECT_EQ(reads_, 0);
+}
+
+TEST_F(HeightsTest, GivesUpAtTheDeadlineAndStopsReading) {
+  ServerOptions options;
+  options.request_deadline = 200ms;
+  read_ms_ = 60'000;
+  StartHeights(options);
+  const Reply reply = Fetch(port(), "/maui/heights?locations=5,7");
+  EXPECT_EQ(reply.status, 503);
+  EXPECT_NE(reply.Field("retry-after"), "");
+  EXPECT_TRUE(Eventually([&] { return stopped_.load(); }));
+}
+
+TEST_F(HeightsTest, StopsReadingWhenTheClientLeaves) {
+  read_ms_ = 60'000;
+  StartHeights();
+  {
+    RawClient client(port());
+    client.Send(Get("/maui/heights?locations=5,7"));
+    ASSERT_TRUE(Eventually([&] { return reads_ == 1; }));
+    client.Reset();
+  }
+  EXPECT_TRUE(Eventually([&] { return stopped_.load(); }));
+}
+
+TEST_F(HeightsTest, RequestsAreNotJoinedButBounded) {
+  ServerOptions options;
+  options.worker_threads = 1;
+  options.queue_length = 1;
+  read_ms_ = 300;
+  StartHeights(options);
+  std::atomic<int> good{0}, refused{0};
+  std::vector<std::thread> clients;
+  for (int i = 0; i < 6; ++i) {
+    clients.emplace_back([&] { ++(Fetch(port(), "/maui/heights?locations=5,7").status == 200 ? good : refused); });
+  }
+  for (std::thread& client : clients) client.join();
+  EXPECT_EQ(good, reads_);
+  EXPECT_GE(good, 1);
+  EXPECT_GE(refused, 1);
+}
+
+TEST_F(HeightsTest, IsUnavailableWithoutAReader) {
+  Start();
+  EXPECT_EQ(Fetch(port(), "/maui/heights?locations=5,7").status, 503);
+}
+
+}  // namespace
+}  // namespace terrace::server
