@@ -1,10 +1,12 @@
 // terrace_tile_formats: what a tile costs in every format and coding, in CPU time of one core and in bytes. The whole
 // pipeline runs, over a block of tiles in the middle of a level: docs/formats/glb.md has the results.
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
+#include <filesystem>
 #include <iostream>
 #include <limits>
 #include <string>
@@ -69,56 +71,60 @@ std::vector<geo::TileKey> TilesOf(const dem::DemSource& source, const Arguments&
 
 struct Cost {
   double cold_s = std::numeric_limits<double>::infinity(), warm_s = cold_s;  // of a tile, the best run's mean
-  double bytes = 0, vertices = 0;                                            // of a tile
+  std::size_t tiles = 0, bytes = 0, vertices = 0;                            // of all tiles
 };
 
 // A build of all tiles without what they are made from, and one with it.
-Result<Cost> Measure(const Variant& variant, const Arguments& arguments) {
-  Cost cost;
-  for (int run = 0; run < arguments.runs; ++run) {
-    auto source = dem::DemSource::Open(arguments.dem);
-    if (!source) return tl::unexpected(source.error());
-    const std::vector<geo::TileKey> keys = TilesOf(**source, arguments);
-    if (keys.empty()) return MakeError(ErrorCode::kInvalidArgument, "no tiles inside level {}", arguments.level);
-    std::vector<server::Dataset> datasets(1);
-    datasets[0].source = *std::move(source);
-    datasets[0].glb.draco = variant.draco;
-    const server::TilePipeline pipeline(std::move(datasets), std::size_t{1} << 30);
-    const auto count = static_cast<double>(keys.size());
-    for (double* const best : {&cost.cold_s, &cost.warm_s}) {
-      cost.bytes = cost.vertices = 0;
-      const double start = ThreadSeconds();
-      for (const geo::TileKey& key : keys) {
-        server::TileRequest request;
-        request.key = key;
-        request.error_step = arguments.step;
-        request.format = variant.format;
-        request.compression = variant.compression;
-        request.coding = variant.coding;
-        request.normals = variant.format == TileFormat::kQuantizedMesh;
-        const Result<server::EncodedTile> tile = pipeline.Build(request, {});
-        if (!tile) return tl::unexpected(tile.error());
-        cost.bytes += static_cast<double>(tile->bytes.size()) / count;
-        cost.vertices += tile->vertices / count;
-      }
-      *best = std::min(*best, (ThreadSeconds() - start) / count);
+Result<void> Measure(const Variant& variant, const Arguments& arguments, Cost& cost) {
+  auto source = dem::DemSource::Open(arguments.dem);
+  if (!source) return tl::unexpected(source.error());
+  const std::vector<geo::TileKey> keys = TilesOf(**source, arguments);
+  if (keys.empty()) return MakeError(ErrorCode::kInvalidArgument, "no tiles inside level {}", arguments.level);
+  cost.tiles = keys.size();
+  std::vector<server::Dataset> datasets(1);
+  datasets[0].source = *std::move(source);
+  datasets[0].glb.draco = variant.draco;
+  const server::TilePipeline pipeline(std::move(datasets), std::size_t{1} << 30);
+  for (double* const best : {&cost.cold_s, &cost.warm_s}) {
+    cost.bytes = cost.vertices = 0;
+    const double start = ThreadSeconds();
+    for (const geo::TileKey& key : keys) {
+      server::TileRequest request;
+      request.key = key;
+      request.error_step = arguments.step;
+      request.format = variant.format;
+      request.compression = variant.compression;
+      request.coding = variant.coding;
+      request.normals = variant.format == TileFormat::kQuantizedMesh;
+      const Result<server::EncodedTile> tile = pipeline.Build(request, {});
+      if (!tile) return tl::unexpected(tile.error());
+      cost.bytes += tile->bytes.size();
+      cost.vertices += tile->vertices;
     }
+    *best = std::min(*best, (ThreadSeconds() - start) / static_cast<double>(keys.size()));
   }
-  return cost;
+  return {};
 }
 
+// All forms in turns, so that a busy moment of the machine falls on all of them.
 Result<void> Run(const Arguments& arguments) {
+  const std::vector<Variant> variants = Variants();
+  std::vector<Cost> costs(variants.size());
+  for (int run = 0; run < arguments.runs; ++run) {
+    for (std::size_t i = 0; i < variants.size(); ++i) {
+      if (const Result<void> done = Measure(variants[i], arguments, costs[i]); !done) return done;
+    }
+  }
   Table table("tile_formats",
-              fmt::format("Tiles of {}, level {}, ladder step {}", arguments.dem, arguments.level, arguments.step),
-              {"format", "bytes", "vertices", "cold, ms", "warm, ms", "warm, of the first"});
-  double baseline_s = 0;
-  for (const Variant& variant : Variants()) {
-    const Result<Cost> cost = Measure(variant, arguments);
-    if (!cost) return tl::unexpected(cost.error());
-    if (baseline_s == 0) baseline_s = cost->warm_s;
-    table.Add({variant.name, Count(static_cast<std::size_t>(cost->bytes)),
-               Count(static_cast<std::size_t>(cost->vertices)), Milliseconds(cost->cold_s), Milliseconds(cost->warm_s),
-               Ratio(cost->warm_s / baseline_s)});
+              fmt::format("{} tiles of {}, level {}, ladder step {}", costs[0].tiles,
+                          std::filesystem::path(arguments.dem).filename().string(), arguments.level, arguments.step),
+              {"format", "bytes in all", "bytes a tile", "vertices", "cold, ms", "cold, tiles/s", "warm, ms",
+               "warm, tiles/s", "warm, of the first"});
+  for (std::size_t i = 0; i < variants.size(); ++i) {
+    const Cost& cost = costs[i];
+    table.Add({variants[i].name, Count(cost.bytes), Count(cost.bytes / cost.tiles), Count(cost.vertices / cost.tiles),
+               Milliseconds(cost.cold_s), fmt::format("{:.0f}", 1 / cost.cold_s), Milliseconds(cost.warm_s),
+               fmt::format("{:.0f}", 1 / cost.warm_s), Ratio(cost.warm_s / costs[0].warm_s)});
   }
   table.Print(std::cout);
   return {};
@@ -137,6 +143,7 @@ int main(int argc, char** argv) {
   app.add_option("--tiles", arguments.tiles, "How many tiles, at most")->check(CLI::PositiveNumber);
   app.add_option("--runs", arguments.runs, "Runs; the fastest counts")->check(CLI::PositiveNumber);
   CLI11_PARSE(app, argc, argv);
+  spdlog::set_level(spdlog::level::err);  // a raster's warnings come once for each run
   const terrace::Result<void> done = terrace::bench::Run(arguments);
   if (done) return 0;
   std::fprintf(stderr, "terrace_tile_formats: %s\n", done.error().message.c_str());
