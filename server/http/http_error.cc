@@ -1,8 +1,10 @@
 #include "server/http/http_error.h"
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <nlohmann/json.hpp>
+#include <string>
 
 namespace terrace::server {
 namespace {
@@ -77,7 +79,15 @@ Response ProblemResponse(int status, std::string_view detail, std::string_view r
   response.content_type = "application/problem+json";
   response.body = std::make_shared<const std::string>(problem.dump());
   response.cache_control = "no-store";
-  if (status == 405) response.headers.emplace_back("Allow", "GET, HEAD, OPTIONS");
+  return response;
+}
+
+Response NoSuchMethodResponse(bool takes_post, std::string_view request_id) {
+  const std::string methods = MethodsOf(takes_post);
+  const std::string detail = fmt::format("only {} are answered here", methods);
+  Response response = ProblemResponse(405, detail, request_id);
+  response.headers.emplace_back("Allow", methods);
+  response.close = true;
   return response;
 }
 
