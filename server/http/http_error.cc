@@ -30,8 +30,6 @@ std::string_view TitleOf(int status) {
 
 std::string_view FixedDetail(ErrorCode code) {
   switch (code) {
-    case ErrorCode::kInvalidArgument:
-      return "the request cannot be understood";
     case ErrorCode::kNotFound:
       return "no such tile";
     case ErrorCode::kUnavailable:
@@ -40,6 +38,7 @@ std::string_view FixedDetail(ErrorCode code) {
       return "too much is being built";
     case ErrorCode::kCancelled:
       return "the answer was not ready in time";
+    case ErrorCode::kInvalidArgument:
     case ErrorCode::kInternal:
       break;
   }
@@ -99,8 +98,10 @@ Response BackendErrorResponse(const Error& error, std::string_view request_id) {
   // Refusals under load come by the thousand; the access log counts them.
   const auto level = error.code == ErrorCode::kOverloaded ? spdlog::level::debug : spdlog::level::warn;
   spdlog::log(level, "request {} failed ({}): {}", request_id, ToString(error.code), error.message);
-  const int status = StatusOf(error.code);
-  Response response = ProblemResponse(status, FixedDetail(error.code), request_id);
+  // The request has passed every check by now: what is wrong here is the server's.
+  const ErrorCode code = error.code == ErrorCode::kInvalidArgument ? ErrorCode::kInternal : error.code;
+  const int status = StatusOf(code);
+  Response response = ProblemResponse(status, FixedDetail(code), request_id);
   if (status == 503) response.headers.emplace_back("Retry-After", RetryAfter(error.code));
   return response;
 }
