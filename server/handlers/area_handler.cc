@@ -45,11 +45,13 @@ Result<void> SetBox(AreaRequest& area, std::string_view text) {
   }
   const auto [west, south, east, north] = numbers;
   if (south >= north) return MakeError(ErrorCode::kInvalidArgument, "bbox: south must be below north");
-  if (west == east) return MakeError(ErrorCode::kInvalidArgument, "bbox is empty: west and east are the same");
   area.west = west;
   area.south = south;
   area.east = east < west ? east + 360 : east;
   area.north = north;
+  if (area.west == area.east) {  // 180 and -180 are the same as well
+    return MakeError(ErrorCode::kInvalidArgument, "bbox is empty: west and east are the same");
+  }
   return {};
 }
 

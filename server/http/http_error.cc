@@ -1,8 +1,10 @@
 #include "server/http/http_error.h"
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <nlohmann/json.hpp>
+#include <string>
 
 namespace terrace::server {
 namespace {
@@ -28,8 +30,6 @@ std::string_view TitleOf(int status) {
 
 std::string_view FixedDetail(ErrorCode code) {
   switch (code) {
-    case ErrorCode::kInvalidArgument:
-      return "the request cannot be understood";
     case ErrorCode::kNotFound:
       return "no such tile";
     case ErrorCode::kUnavailable:
@@ -38,6 +38,7 @@ std::string_view FixedDetail(ErrorCode code) {
       return "too much is being built";
     case ErrorCode::kCancelled:
       return "the answer was not ready in time";
+    case ErrorCode::kInvalidArgument:
     case ErrorCode::kInternal:
       break;
   }
@@ -77,7 +78,15 @@ Response ProblemResponse(int status, std::string_view detail, std::string_view r
   response.content_type = "application/problem+json";
   response.body = std::make_shared<const std::string>(problem.dump());
   response.cache_control = "no-store";
-  if (status == 405) response.headers.emplace_back("Allow", "GET, HEAD, OPTIONS");
+  return response;
+}
+
+Response NoSuchMethodResponse(bool takes_post, std::string_view request_id) {
+  const std::string methods = MethodsOf(takes_post);
+  const std::string detail = fmt::format("only {} are answered here", methods);
+  Response response = ProblemResponse(405, detail, request_id);
+  response.headers.emplace_back("Allow", methods);
+  response.close = true;
   return response;
 }
 
@@ -89,8 +98,10 @@ Response BackendErrorResponse(const Error& error, std::string_view request_id) {
   // Refusals under load come by the thousand; the access log counts them.
   const auto level = error.code == ErrorCode::kOverloaded ? spdlog::level::debug : spdlog::level::warn;
   spdlog::log(level, "request {} failed ({}): {}", request_id, ToString(error.code), error.message);
-  const int status = StatusOf(error.code);
-  Response response = ProblemResponse(status, FixedDetail(error.code), request_id);
+  // The request has passed every check by now: what is wrong here is the server's.
+  const ErrorCode code = error.code == ErrorCode::kInvalidArgument ? ErrorCode::kInternal : error.code;
+  const int status = StatusOf(code);
+  Response response = ProblemResponse(status, FixedDetail(code), request_id);
   if (status == 503) response.headers.emplace_back("Retry-After", RetryAfter(error.code));
   return response;
 }

@@ -16,6 +16,9 @@ int StatusOf(ErrorCode code);
 // `detail` is sent as it is: text that the server wrote, never the path or the message of a library.
 Response ProblemResponse(int status, std::string_view detail, std::string_view request_id);
 
+// 405, naming the methods of a URL; what follows such a request may be a body of any form, so the connection closes.
+Response NoSuchMethodResponse(bool takes_post, std::string_view request_id);
+
 // For errors of Match and Negotiate, whose messages are written for clients.
 Response ClientErrorResponse(const Error& error, std::string_view request_id);
 

@@ -131,7 +131,9 @@ tl::expected<Request, BadRequest> ParseHead(std::string_view head) {
   request.if_none_match = Joined(fields, http::field::if_none_match);
   request.content_type = std::string(fields[http::field::content_type]);
   request.content_length = *PlainLength(fields);
-  request.expects_continue = boost::beast::iequals(fields[http::field::expect], "100-continue");
+  // RFC 9110, section 10.1.1: HTTP/1.0 knows no interim replies.
+  request.expects_continue =
+      fields.version() >= 11 && boost::beast::iequals(fields[http::field::expect], "100-continue");
   request.host = std::string(fields[http::field::host]);
   request.forwarded_proto = std::string(fields["X-Forwarded-Proto"]);
   return request;

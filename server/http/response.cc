@@ -81,12 +81,14 @@ std::string SerializeHead(const Response& response, unsigned version, bool keep_
   return head;
 }
 
-Response PreflightResponse() {
+std::string MethodsOf(bool takes_post) { return takes_post ? "GET, HEAD, OPTIONS, POST" : "GET, HEAD, OPTIONS"; }
+
+Response PreflightResponse(bool takes_post) {
   Response response;
   response.status = 204;
   response.route = "preflight";
-  response.headers.emplace_back("Allow", "GET, HEAD, OPTIONS");
-  response.headers.emplace_back("Access-Control-Allow-Methods", "GET, HEAD, OPTIONS");
+  response.headers.emplace_back("Allow", MethodsOf(takes_post));
+  response.headers.emplace_back("Access-Control-Allow-Methods", MethodsOf(takes_post));
   // "*" does not cover Authorization.
   response.headers.emplace_back("Access-Control-Allow-Headers", "*, Authorization");
   response.headers.emplace_back("Access-Control-Max-Age", "86400");

@@ -46,7 +46,10 @@ struct Response {
 std::string SerializeHead(const Response& response, unsigned version, bool keep_alive);
 
 // 204 to an OPTIONS request: what a browser asks before it sends a request with headers of its own.
-Response PreflightResponse();
+Response PreflightResponse(bool takes_post);
+
+// As the Allow header lists them.
+std::string MethodsOf(bool takes_post);
 
 // Turns a 200 into a 304 where the request's If-None-Match names its ETag.
 Response Conditional(Response response, const Request& request);

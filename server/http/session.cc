@@ -44,7 +44,6 @@ constexpr std::size_t kLingerBytes = std::size_t{64} << 20;
 // A request that takes longer than this is worth asking whether its client is still there.
 constexpr std::chrono::milliseconds kPatience{100};
 constexpr int kClientLeft = 499;
-constexpr std::string_view kNoSuchMethod = "only GET, HEAD and OPTIONS are answered here";
 
 std::string NextRequestId() {
   static const std::uint64_t start = std::uint64_t{std::random_device{}()} << 32;
@@ -60,9 +59,11 @@ bool TakesPost(const Request& request) {
 }
 
 // Asked before a body is read: nothing if it may come.
-std::optional<BadRequest> WhyNoBody(const Request& request, std::size_t max_body_bytes) {
-  if (!TakesPost(request)) return BadRequest{405, kNoSuchMethod};
-  if (request.content_length > max_body_bytes) return BadRequest{413, "the request body is too large"};
+std::optional<Response> WhyNoBody(const Request& request, std::size_t max_body_bytes) {
+  if (!TakesPost(request)) return NoSuchMethodResponse(false, request.id);
+  if (request.content_length > max_body_bytes) {
+    return ProblemResponse(413, "the request body is too large", request.id);
+  }
   return std::nullopt;
 }
 
@@ -106,7 +107,7 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   asio::awaitable<HeadRead> ReadHead();
   bool TakeWhatArrived();
   asio::awaitable<bool> ReadBody(Request& request);
-  asio::awaitable<void> Refuse(Request request, BadRequest why);
+  asio::awaitable<void> Refuse(Request request, Response response);
   asio::awaitable<bool> ServeOne(Request request);
   asio::awaitable<std::optional<Response>> AnswerWhileConnected(Request request);
   asio::awaitable<Response> Answer(Request request);
@@ -134,13 +135,16 @@ asio::awaitable<void> Session::ServeAll() {
       Request unparsed;
       unparsed.method_name = "-";
       unparsed.target = "-";
-      co_await Refuse(std::move(unparsed), head->error());
+      unparsed.id = NextRequestId();
+      Response refusal = ProblemResponse(head->error().status, head->error().detail, unparsed.id);
+      co_await Refuse(std::move(unparsed), std::move(refusal));
       break;
     }
     Request request = std::move(**head);
+    request.id = NextRequestId();
     if (request.content_length > 0) {
-      if (const std::optional<BadRequest> why = WhyNoBody(request, context_->options.max_body_bytes)) {
-        co_await Refuse(std::move(request), *why);
+      if (std::optional<Response> why = WhyNoBody(request, context_->options.max_body_bytes)) {
+        co_await Refuse(std::move(request), *std::move(why));
         break;
       }
       if (!co_await ReadBody(request)) break;
@@ -153,10 +157,8 @@ asio::awaitable<void> Session::ServeAll() {
 }
 
 // Answers, and the connection is to be closed: what follows cannot be trusted to be a request.
-asio::awaitable<void> Session::Refuse(Request request, BadRequest why) {
+asio::awaitable<void> Session::Refuse(Request request, Response response) {
   const auto begun = Clock::now();
-  request.id = NextRequestId();
-  const Response response = ProblemResponse(why.status, why.detail, request.id);
   co_await Write(SerializeHead(response, request.version, false), response.body);
   Report(request, response, response.body->size(), begun);
 }
@@ -234,7 +236,6 @@ bool Session::TakeWhatArrived() {
 // False: the connection is to be closed.
 asio::awaitable<bool> Session::ServeOne(Request request) {
   const auto begun = Clock::now();
-  request.id = NextRequestId();
   const std::optional<Response> response = co_await AnswerWhileConnected(request);
   if (!response) {
     Response nobody;
@@ -254,12 +255,10 @@ asio::awaitable<bool> Session::ServeOne(Request request) {
 // Nothing: the client is gone.
 asio::awaitable<std::optional<Response>> Session::AnswerWhileConnected(Request request) {
   using asio::experimental::awaitable_operators::operator||;
-  if (request.method == Method::kOptions) co_return PreflightResponse();
-  if (request.method == Method::kOther || (request.method == Method::kPost && !TakesPost(request))) {
-    // What follows may be a body of any form: nothing after it can be trusted to be a request.
-    Response refused = ProblemResponse(405, kNoSuchMethod, request.id);
-    refused.close = true;
-    co_return refused;
+  const bool takes_post = TakesPost(request);
+  if (request.method == Method::kOptions) co_return PreflightResponse(takes_post);
+  if (request.method == Method::kOther || (request.method == Method::kPost && !takes_post)) {
+    co_return NoSuchMethodResponse(takes_post, request.id);
   }
   std::variant<Response, std::monostate> first = co_await (Answer(std::move(request)) || ClientLeft());
   if (first.index() == 1) co_return std::nullopt;

@@ -14,6 +14,7 @@
 #include "engine/geo/error_ladder.h"
 #include "engine/tin/greedy.h"
 #include "engine/tin/height_field.h"
+#include "engine/tin/insert_samples.h"
 #include "engine/tin/mesh_error.h"
 #include "server/tiles/area_surface.h"
 #include "server/tiles/strong_etag.h"
@@ -22,6 +23,9 @@ namespace terrace::server {
 namespace {
 
 using Clock = std::chrono::steady_clock;
+
+// Flat triangles that are farther off than this are those that go half around the Earth and collapse into a line.
+constexpr double kMostSag_m = 1e6;
 
 std::chrono::microseconds Since(Clock::time_point start) {
   return std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - start);
@@ -51,14 +55,14 @@ dem::NodeWindow WindowAt(const geo::Lattice& lattice, const AreaRequest& area) {
   constexpr double kSlack = 1e-6;
   const auto first = [&](double degrees) { return static_cast<std::int64_t>(std::floor(degrees / step + kSlack)); };
   const auto last = [&](double degrees) { return static_cast<std::int64_t>(std::ceil(degrees / step - kSlack)); };
-  const std::int64_t west = first(area.west + 180), south = std::max<std::int64_t>(first(area.south + 90), 0);
-  const std::int64_t east = std::max(last(area.east + 180), west + 1);
+  const std::int64_t west = first(area.west + 180), east = std::max(last(area.east + 180), west + 1);
+  const std::int64_t south = std::clamp<std::int64_t>(first(area.south + 90), 0, lattice.rows() - 1);
   const std::int64_t north = std::clamp<std::int64_t>(last(area.north + 90), south + 1, lattice.rows());
   // Counts that an int does not hold are far above every limit.
   const auto count = [](std::int64_t from, std::int64_t to) {
     return static_cast<int>(std::min<std::int64_t>(to - from + 1, 1 << 30));
   };
-  return {west, std::min(south, north - 1), count(west, east), count(std::min(south, north - 1), north)};
+  return {west, south, count(west, east), count(south, north)};
 }
 
 double SamplesOf(const dem::NodeWindow& window) { return static_cast<double>(window.columns) * window.rows; }
@@ -116,18 +120,29 @@ PlacedMesh PlaceFlat(const tin::HeightField& field, const tin::TinMesh& mesh, co
   return placed;
 }
 
-PlacedMesh PlaceInSpace(const tin::HeightField& field, const tin::TinMesh& mesh, const AreaSurface& surface,
-                        const std::optional<Frame>& frame, const std::stop_token& stop) {
-  PlacedMesh placed;
-  std::vector<geo::Vec3> ecef;
-  for (const tin::SamplePosition p : mesh.vertices) {
-    const geo::Vec3 exact = surface.Ecef(p.x, p.y, field.VertexHeight(p.x, p.y));
-    const geo::Vec3 rounded = RoundPosition(frame ? frame->ToLocal(exact) : exact);
-    placed.vertices.push_back({rounded.x, rounded.y, rounded.z});
-    ecef.push_back(frame ? frame->ToEcef(rounded) : rounded);
+// The mesh was refined in longitude and latitude. In space its triangles lie beside where they were drawn, by the
+// curvature of the parallels: little, but at a cliff or next to a pole that can be more than the bound. Inserts what is
+// over it.
+PlacedMesh PlaceInSpace(const tin::HeightField& field, tin::TinMesh& mesh, const AreaSurface& surface,
+                        const std::optional<Frame>& frame, double bound_m, const std::stop_token& stop) {
+  constexpr int kMaxRounds = 16;          // as for tiles
+  constexpr double kRounding_m = 0x1p-8;  // what RoundPosition may take on a steep slope: no vertex mends that
+  for (int round = 1;; ++round) {
+    PlacedMesh placed;
+    std::vector<geo::Vec3> ecef;
+    for (const tin::SamplePosition p : mesh.vertices) {
+      const geo::Vec3 exact = surface.Ecef(p.x, p.y, field.VertexHeight(p.x, p.y));
+      const geo::Vec3 rounded = RoundPosition(frame ? frame->ToLocal(exact) : exact);
+      placed.vertices.push_back({rounded.x, rounded.y, rounded.z});
+      ecef.push_back(frame ? frame->ToEcef(rounded) : rounded);
+    }
+    const AreaSurface::Error error = surface.MeasureError(field, mesh, ecef, std::max(bound_m, kRounding_m), stop);
+    if (error.misses.empty() || round == kMaxRounds || stop.stop_requested()) {
+      placed.max_error_m = RoundPosition({error.max_m, 0, 0}).x;
+      return placed;
+    }
+    mesh = tin::InsertSamples(mesh, error.misses);
   }
-  placed.max_error_m = RoundPosition({surface.LargestError(field, mesh, ecef, stop), 0, 0}).x;
-  return placed;
 }
 
 }  // namespace
@@ -166,10 +181,12 @@ Result<EncodedTile> BuildAreaMesh(const dem::DemSource& source, const AreaPlan& 
   tin::GreedyOptions options;
   if (area.coordinates != AreaCoordinates::kGeographic) surface.AddCurvature(options);
   tin::GreedyTriangulation greedy(*field, std::move(options));
+  const double bound_m =
+      area.coordinates == AreaCoordinates::kGeographic ? area.error_m : std::min(area.error_m, kMostSag_m);
   tin::GreedyGoal goal;
-  goal.max_error = area.error_m;
+  goal.max_error = bound_m;
   if (!greedy.Run(goal, stop)) return cancelled();
-  const tin::TinMesh mesh = greedy.Mesh();
+  tin::TinMesh mesh = greedy.Mesh();
   encoded.times.refine = Since(start);
 
   start = Clock::now();
@@ -177,7 +194,7 @@ Result<EncodedTile> BuildAreaMesh(const dem::DemSource& source, const AreaPlan& 
   if (area.coordinates == AreaCoordinates::kEnu) frame = Frame::At(plan.centre);
   const PlacedMesh placed = area.coordinates == AreaCoordinates::kGeographic
                                 ? PlaceFlat(*field, mesh, surface, stop)
-                                : PlaceInSpace(*field, mesh, surface, frame, stop);
+                                : PlaceInSpace(*field, mesh, surface, frame, bound_m, stop);
   if (stop.stop_requested()) return cancelled();
   std::ostringstream out;
   if (auto written = proto::WriteMesh(out, area.format, placed.vertices, mesh.triangles); !written) {

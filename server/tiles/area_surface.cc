@@ -1,9 +1,12 @@
 #include "server/tiles/area_surface.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <iterator>
 #include <numeric>
+#include <optional>
 
 #include "engine/tin/triangle_rows.h"
 
@@ -18,6 +21,31 @@ constexpr std::size_t kStopPeriod = 1024;  // triangles
 geo::Vec3 Turned(geo::Vec3 at_zero, geo::Vec3 equatorial) {
   return {at_zero.x * equatorial.x, at_zero.x * equatorial.y, at_zero.z};
 }
+
+double DistanceToSegment(geo::Vec3 point, geo::Vec3 a, geo::Vec3 b) {
+  const geo::Vec3 along = b - a, to_point = point - a;
+  const double squared = geo::Dot(along, along);
+  const double share = squared > 0 ? std::clamp(geo::Dot(to_point, along) / squared, 0.0, 1.0) : 0;
+  return geo::Length(to_point - along * share);
+}
+
+// In space.
+class FlatTriangle {
+ public:
+  FlatTriangle(geo::Vec3 a, geo::Vec3 b, geo::Vec3 c) : a_(a), b_(b), c_(c), plane_(geo::Cross(b - a, c - a)) {}
+
+  // How far a point is from the plane, along `up`. At a pole, where meridians meet, a triangle can shrink to a line
+  // that no vertical meets: then how far the point is from that.
+  double Off(geo::Vec3 point, geo::Vec3 up) const {
+    const double off = std::abs(geo::Dot(a_ - point, plane_) / geo::Dot(up, plane_));
+    if (std::isfinite(off)) return off;
+    return std::min(
+        {DistanceToSegment(point, a_, b_), DistanceToSegment(point, b_, c_), DistanceToSegment(point, c_, a_)});
+  }
+
+ private:
+  const geo::Vec3 a_, b_, c_, plane_;
+};
 
 }  // namespace
 
@@ -70,24 +98,32 @@ void AreaSurface::AddCurvature(tin::GreedyOptions& options) const {
   }
 }
 
-double AreaSurface::LargestError(const tin::HeightField& field, const tin::TinMesh& mesh,
-                                 const std::vector<geo::Vec3>& ecef, const std::stop_token& stop) const {
-  double largest = 0;
+AreaSurface::Error AreaSurface::MeasureError(const tin::HeightField& field, const tin::TinMesh& mesh,
+                                             const std::vector<geo::Vec3>& ecef, double bound_m,
+                                             const std::stop_token& stop) const {
+  Error error;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     if (t % kStopPeriod == 0 && stop.stop_requested()) break;
     const auto& triangle = mesh.triangles[t];
-    const geo::Vec3 a = ecef[triangle[0]];
-    const geo::Vec3 plane = geo::Cross(ecef[triangle[1]] - a, ecef[triangle[2]] - a);
-    tin::ForEachRow({mesh.vertices[triangle[0]], mesh.vertices[triangle[1]], mesh.vertices[triangle[2]]},
-                    [&](int row, int first, int last) {
-                      for (int column = first; column <= last; ++column) {
-                        const geo::Vec3 sample = Ecef(column, row, field.At(column, row));
-                        const double off = geo::Dot(a - sample, plane) / geo::Dot(Up(column, row), plane);
-                        largest = std::max(largest, std::abs(off));
-                      }
-                    });
+    const FlatTriangle flat(ecef[triangle[0]], ecef[triangle[1]], ecef[triangle[2]]);
+    const std::array<tin::SamplePosition, 3> corners = {mesh.vertices[triangle[0]], mesh.vertices[triangle[1]],
+                                                        mesh.vertices[triangle[2]]};
+    std::optional<tin::SamplePosition> miss;
+    double worst = bound_m;
+    tin::ForEachRow(corners, [&](int row, int first, int last) {
+      for (int column = first; column <= last; ++column) {
+        const double off = flat.Off(Ecef(column, row, field.At(column, row)), Up(column, row));
+        error.max_m = std::max(error.max_m, off);
+        if (off <= worst || !IsInside(column, row)) continue;
+        const tin::SamplePosition sample{static_cast<std::uint16_t>(column), static_cast<std::uint16_t>(row)};
+        if (std::find(corners.begin(), corners.end(), sample) != corners.end()) continue;
+        worst = off;
+        miss = sample;
+      }
+    });
+    if (miss) error.misses.push_back(*miss);
   }
-  return largest;
+  return error;
 }
 
 geo::Vec3 RoundPosition(geo::Vec3 metres) {

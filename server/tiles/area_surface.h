@@ -27,13 +27,20 @@ class AreaSurface {
   // What the curved Earth takes from flat triangles, for the run that makes the mesh.
   void AddCurvature(tin::GreedyOptions& options) const;
 
-  // The largest vertical distance, metres, between the samples and the flat triangles with corners in `ecef`, the
-  // mesh's vertices. When `stop` is requested, what was measured until then.
-  double LargestError(const tin::HeightField& field, const tin::TinMesh& mesh, const std::vector<geo::Vec3>& ecef,
-                      const std::stop_token& stop) const;
+  struct Error {
+    double max_m = 0;
+    std::vector<tin::SamplePosition> misses;  // of each triangle the worst sample over the bound that can be inserted
+  };
+  // Vertical distances between the samples and the flat triangles with corners in `ecef`, the mesh's vertices. When
+  // `stop` is requested, what was measured until then.
+  Error MeasureError(const tin::HeightField& field, const tin::TinMesh& mesh, const std::vector<geo::Vec3>& ecef,
+                     double bound_m, const std::stop_token& stop) const;
 
  private:
   geo::Vec3 Up(int column, int row) const;
+  bool IsInside(int column, int row) const {  // not on the border
+    return column > 0 && row > 0 && column + 1 < window_.columns && row + 1 < window_.rows;
+  }
 
   const geo::Lattice lattice_;
   const dem::NodeWindow window_;

@@ -149,16 +149,36 @@ TEST_F(ServerTest, AnswersHeadWithoutABody) {
 
 TEST_F(ServerTest, AnswersPreflights) {
   Start();
-  for (const char* target : {"/maui/layer.json", "*", "/nothing"}) {
+  for (const std::string target : {"/maui/layer.json", "*", "/nothing", "/maui/heights"}) {
     RawClient client(port());
-    client.Send("OPTIONS " + std::string(target) +
+    client.Send("OPTIONS " + target +
                 " HTTP/1.1\r\nHost: x\r\nOrigin: http://a\r\nAccess-Control-Request-Headers: authorization\r\n\r\n");
     const auto reply = client.Read();
     ASSERT_TRUE(reply);
     EXPECT_EQ(reply->status, 204);
-    EXPECT_EQ(reply->Field("access-control-allow-methods"), "GET, HEAD, OPTIONS");
+    const std::string methods = target == "/maui/heights" ? "GET, HEAD, OPTIONS, POST" : "GET, HEAD, OPTIONS";
+    EXPECT_EQ(reply->Field("allow"), methods);
+    EXPECT_EQ(reply->Field("access-control-allow-methods"), methods);
     EXPECT_EQ(reply->Field("access-control-allow-headers"), "*, Authorization");
     EXPECT_EQ(reply->Field("access-control-max-age"), "86400");
+  }
+}
+
+TEST_F(ServerTest, SaysWhichMethodsAUrlTakes) {
+  Start();
+  for (const std::string method : {"PUT", "POST"}) {
+    for (const std::string target : {"/maui/heights", "/maui/layer.json"}) {
+      const bool takes_post = target == "/maui/heights";
+      if (takes_post && method == "POST") continue;
+      RawClient client(port());
+      client.Send(method + " " + target + " HTTP/1.1\r\nHost: x\r\n\r\n");
+      const auto reply = client.Read();
+      ASSERT_TRUE(reply);
+      EXPECT_EQ(reply->status, 405);
+      EXPECT_EQ(reply->Field("allow"), takes_post ? "GET, HEAD, OPTIONS, POST" : "GET, HEAD, OPTIONS");
+      EXPECT_NE(reply->body.find(reply->Field("allow")), std::string::npos) << "the text says so as well";
+      EXPECT_TRUE(client.Ended());
+    }
   }
 }
 

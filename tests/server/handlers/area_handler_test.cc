@@ -37,6 +37,7 @@ TEST(AreaRequest, SaysWhatIsWrong) {
       {"bbox=0,1,1,0&error=5", "south must be below north"},
       {"bbox=0,1,1,1&error=5", "south must be below north"},
       {"bbox=5,0,5,1&error=5", "empty"},
+      {"bbox=180,0,-180,1&error=5", "empty"},
       {"bbox=0,0,1,90.1&error=5", "north must be a number from -90 to 90"},
       {"bbox=0,-91,1,1&error=5", "south must be"},
       {"bbox=-181,0,1,1&error=5", "west must be"},

@@ -52,6 +52,9 @@ TEST(Request, APostMayAnnounceABody) {
   EXPECT_TRUE(request->expects_continue);
   EXPECT_EQ(post("")->content_length, 0u);
   EXPECT_FALSE(post("")->expects_continue);
+  const auto old = ParseHead("POST /a/heights HTTP/1.0\r\nContent-Length: 12\r\nExpect: 100-continue\r\n\r\n");
+  ASSERT_TRUE(old);
+  EXPECT_FALSE(old->expects_continue) << "HTTP/1.0 knows no interim replies";
   for (const char* length : {"05", "00", "+5", "-5", "5 5", "5,5", "0x5", "5.0", "", "1234567890123456"}) {
     EXPECT_FALSE(post("Content-Length: " + std::string(length) + "\r\n")) << length;
   }

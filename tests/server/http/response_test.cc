@@ -101,5 +101,12 @@ TEST(HttpError, KeepsTheDetailFromTheClient) {
   EXPECT_NE(SerializeHead(response, 11, true).find("\r\nRetry-After: 5\r\n"), std::string::npos);
 }
 
+// An image that is too large to cut is no fault of the client that asked for a tile of it.
+TEST(Response, FailuresBehindAreNeverTheClients) {
+  const Response response = BackendErrorResponse(Error{ErrorCode::kInvalidArgument, "too many pixels"}, "id8");
+  EXPECT_EQ(response.status, 503);
+  EXPECT_EQ(response.body->find("cannot be understood"), std::string::npos) << *response.body;
+}
+
 }  // namespace
 }  // namespace terrace::server

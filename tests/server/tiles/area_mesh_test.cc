@@ -160,6 +160,48 @@ TEST_F(AreaMeshTest, LargeTrianglesDoNotCutThroughTheEarth) {
   EXPECT_LT(Build(area).vertices, encoded.vertices);
 }
 
+// Triangles that go half around the Earth collapse into a line; one of them used to be measured as exact.
+TEST_F(AreaMeshTest, TheWholeEarthStaysRoundWhateverTheError) {
+  auto opened = dem::DemSource::Open(TERRACE_SOURCE_DIR "/config/samples/etopo5.tif");
+  ASSERT_TRUE(opened) << opened.error().message;
+  source_ = *std::move(opened);
+  for (const AreaCoordinates coordinates : {AreaCoordinates::kEcef, AreaCoordinates::kEnu}) {
+    const EncodedTile encoded = Build({-180, -90, 180, 90, 1e300, proto::MeshFileFormat::kObj, coordinates});
+    EXPECT_GT(encoded.max_error_m, 1e5) << "a few dozen triangles are no sphere, and are not said to be one";
+    EXPECT_LE(encoded.max_error_m, 1e6);
+    EXPECT_GT(encoded.vertices, 20u);
+  }
+}
+
+// Near a pole parallels are small circles: triangles in space lie beside where they are in longitude and latitude.
+TEST_F(AreaMeshTest, KeepsTheErrorUpToThePole) {
+  auto opened = dem::DemSource::Open(TERRACE_SOURCE_DIR "/config/samples/etopo5.tif");
+  ASSERT_TRUE(opened) << opened.error().message;
+  source_ = *std::move(opened);
+  for (const double error_m : {10.0, 50.0}) {
+    const EncodedTile encoded = Build({-20, 80, 20, 90, error_m, proto::MeshFileFormat::kObj, AreaCoordinates::kEcef});
+    EXPECT_LE(encoded.max_error_m, error_m + 0.01);
+  }
+}
+
+// Closer to the pole than a node's rounding: one row of cells, not less.
+TEST_F(AreaMeshTest, AreasAtThePoleHaveOneRowOfCells) {
+  auto opened = dem::DemSource::Open(TERRACE_SOURCE_DIR "/config/samples/etopo5.tif");
+  ASSERT_TRUE(opened) << opened.error().message;
+  source_ = *std::move(opened);
+  AreaRequest area{0, 89.99999999999, 1, 90, 100, proto::MeshFileFormat::kGlb, AreaCoordinates::kEnu};
+  const auto north = PlanArea(*source_, 0.5, area, kMany);
+  ASSERT_TRUE(north) << north.error().message;
+  EXPECT_EQ(north->window.row, source_->LatticeOf(north->level).rows() - 1);
+  EXPECT_EQ(north->window.rows, 2);
+  area.south = -90;
+  area.north = -89.99999999999;
+  const auto south = PlanArea(*source_, 0.5, area, kMany);
+  ASSERT_TRUE(south) << south.error().message;
+  EXPECT_EQ(south->window.row, 0);
+  EXPECT_EQ(south->window.rows, 2);
+}
+
 TEST_F(AreaMeshTest, CrossesTheAntimeridian) {
   auto opened = dem::DemSource::Open(TERRACE_SOURCE_DIR "/config/samples/etopo5.tif");
   ASSERT_TRUE(opened) << opened.error().message;
