@@ -22,7 +22,7 @@ std::int64_t Count(const std::vector<geo::TileRange>& ranges) {
 std::vector<geo::TileKey> ImplicitRoots(Availability available) {
   TERRACE_CHECK(!available.empty() && !available[0].empty());
   std::size_t level = available.size() - 1;
-  while (level > 0 && Count(available[level]) > kMaxImplicitRoots) --level;
+  while (level > kShallowestRoots && Count(available[level]) > kMaxImplicitRoots) --level;
   std::vector<geo::TileKey> roots;
   for (const geo::TileRange& range : available[level]) {
     for (std::int64_t y = range.start_y; y <= range.end_y; ++y) {

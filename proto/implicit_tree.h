@@ -19,8 +19,12 @@ using Availability = std::span<const std::vector<geo::TileRange>>;
 
 inline constexpr std::int64_t kMaxImplicitRoots = 4;
 
-// All tiles of the deepest level that has at most kMaxImplicitRoots of them; from west to east, then from south to
-// north. Level 0 never has more than its two, so there is always an answer. Precondition: level 0 is not empty.
+// Tiles of 45 degrees. Roots of a larger part of the Earth are of this level, 32 of them at most: descendants inherit
+// the skirts of a root, and loaders.gl cannot bound larger regions (docs/decisions/0009-implicit-roots.md).
+inline constexpr int kShallowestRoots = 2;
+
+// All tiles of the deepest level that has at most kMaxImplicitRoots of them, or of level kShallowestRoots, or of the
+// deepest level, if that comes first; from west to east, then from south to north. Precondition: level 0 is not empty.
 std::vector<geo::TileKey> ImplicitRoots(Availability available);
 
 // How a root is called in URLs: "9-272-359", level, column and row.

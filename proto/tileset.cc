@@ -68,7 +68,8 @@ geo::TileRange BlockOf(const std::vector<geo::TileKey>& roots) {
 }
 
 // About the middle of the block, as far as half its width and half its height along the ground, and its whole range of
-// heights, take one together.
+// heights, take one together. Or about the Earth's centre, if that is smaller: a kilometre off it towards the middle,
+// because at the centre itself clients have no direction that is up and no longitude and latitude.
 Json Sphere(const TilesetDescription& tileset, const geo::TileRange& block) {
   const double tile = std::ldexp(180, -tileset.roots.front().level);
   const double width = static_cast<double>(block.end_x + 1 - block.start_x) * tile;
@@ -78,15 +79,25 @@ Json Sphere(const TilesetDescription& tileset, const geo::TileRange& block) {
   const geo::Vec3 middle = geo::ToEcef(longitude, (south + north) / 2, tileset.min_height_m);
   constexpr double kLargestRadius = geo::kSemiMajorAxis * geo::kSemiMajorAxis / geo::kSemiMinorAxis;
   const double along = kLargestRadius * geo::ToRadians(width / 2 + (north - south) / 2);
-  return {{"sphere", {middle.x, middle.y, middle.z, along + tileset.max_height_m - tileset.min_height_m}}};
+  const double radius = along + tileset.max_height_m - tileset.min_height_m;
+  constexpr double kOff = 1000;
+  const double earth = geo::kSemiMajorAxis + tileset.max_height_m + kOff;
+  if (earth <= radius) {
+    const double scale = kOff / geo::Length(middle);
+    return {{"sphere", {middle.x * scale, middle.y * scale, middle.z * scale, earth + 1}}};  // a metre for rounding
+  }
+  return {{"sphere", {middle.x, middle.y, middle.z, radius}}};
 }
 
-// 3DTilesRendererJS reads a region whose west is greater than its east as lying on the other side of the Earth, and
-// CesiumJS none that goes beyond 180 degrees; a region all the way round would have clients frame the whole Earth.
+// 3DTilesRendererJS reads a region whose west is greater than its east as lying on the other side of the Earth,
+// CesiumJS none that goes beyond 180 degrees, and the box that loaders.gl makes of a region of hemispheres misses most
+// of it.
 Json BoundsOf(const TilesetDescription& tileset) {
+  const int level = tileset.roots.front().level;
   const geo::TileRange block = BlockOf(tileset.roots);
-  const bool crosses = block.end_x >= geo::TileColumns(tileset.roots.front().level);
-  return crosses ? Sphere(tileset, block) : Region(tileset, block);
+  const bool crosses = block.end_x >= geo::TileColumns(level);
+  const bool wide = level <= kShallowestRoots;
+  return crosses || wide ? Sphere(tileset, block) : Region(tileset, block);
 }
 
 Json Root(const TilesetDescription& tileset) {

@@ -22,10 +22,16 @@ Levels Above(const std::vector<geo::TileRange>& deepest, int max_level) {
   return levels;
 }
 
-TEST(ImplicitRoots, OfTheWholeGlobeAreBothTilesOfLevelZero) {
-  const Levels available = {{{0, 0, 1, 0}}, {{0, 0, 3, 1}}, {{0, 0, 7, 3}}};
+TEST(ImplicitRoots, OfTheWholeGlobeAreAllTilesOfLevelTwo) {
+  Levels available = {{{0, 0, 1, 0}}, {{0, 0, 3, 1}}, {{0, 0, 7, 3}}, {{0, 0, 15, 7}}};
+  const Keys roots = ImplicitRoots(available);
+  ASSERT_EQ(roots.size(), 32u);
+  EXPECT_EQ(roots.front(), (geo::TileKey{2, 0, 0}));
+  EXPECT_EQ(roots.back(), (geo::TileKey{2, 7, 3}));
+  available.resize(2);
+  EXPECT_EQ(ImplicitRoots(available).size(), 8u) << "no deeper than the data";
+  available.resize(1);
   EXPECT_EQ(ImplicitRoots(available), (Keys{{0, 0, 0}, {0, 1, 0}}));
-  EXPECT_EQ(ImplicitRoots(Levels{{{0, 0, 1, 0}}}), (Keys{{0, 0, 0}, {0, 1, 0}}));
 }
 
 TEST(ImplicitRoots, LieAsDeepAsFourTilesHoldTheData) {
