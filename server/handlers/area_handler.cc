@@ -152,7 +152,7 @@ asio::awaitable<Response> AreaHandler::Handle(Route route, Request request) cons
     return mesh;
   };
   const auto deadline = TileService::Clock::now() + options_.deadline;
-  const Result<TilePtr> mesh = co_await tiles_.Run(std::move(work), deadline);
+  const Result<TilePtr> mesh = co_await tiles_.Run(std::move(work), TileService::Length::kLong, deadline);
   if (!mesh) co_return co_await BackendFailure(mesh.error(), request.id, options_.refusal_delay);
 
   Response response;

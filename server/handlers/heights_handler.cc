@@ -52,7 +52,7 @@ asio::awaitable<Response> HeightsHandler::Handle(Route route, Request request) c
     return reply;
   };
   const auto deadline = TileService::Clock::now() + options_.deadline;
-  const Result<TilePtr> reply = co_await tiles_.Run(std::move(work), deadline);
+  const Result<TilePtr> reply = co_await tiles_.Run(std::move(work), TileService::Length::kShort, deadline);
   if (!reply) co_return co_await BackendFailure(reply.error(), request.id, options_.refusal_delay);
 
   Response response;

@@ -1,5 +1,6 @@
 #include "server/tiles/tile_service.h"
 
+#include <algorithm>
 #include <exception>
 #include <memory>
 #include <string>
@@ -51,10 +52,25 @@ Result<TilePtr> TileService::BuildAndKeep(const CacheKey& key, std::stop_token s
   return tile;
 }
 
-asio::awaitable<Result<TilePtr>> TileService::Run(SingleFlight::Work work, Clock::time_point deadline) {
+// Ends with the last copy: with the work, whether or not anybody still waits for it. Nothing where there are too many.
+std::shared_ptr<void> TileService::BeginLong() {
+  const unsigned most = std::max(pool_.threads(), 2U) - 1;
+  unsigned under_way = long_under_way_.load();
+  do {
+    if (under_way >= most) return nullptr;
+  } while (!long_under_way_.compare_exchange_weak(under_way, under_way + 1));
+  return {&long_under_way_, [](std::atomic<unsigned>* count) { count->fetch_sub(1); }};
+}
+
+asio::awaitable<Result<TilePtr>> TileService::Run(SingleFlight::Work work, Length length, Clock::time_point deadline) {
+  std::shared_ptr<void> turn;
+  if (length == Length::kLong) {
+    turn = BeginLong();
+    if (!turn) co_return MakeError(ErrorCode::kOverloaded, "as much long work is under way as may be");
+  }
   CacheKey key;
   key.solo = 1 + solos_.fetch_add(1, std::memory_order_relaxed);
-  SingleFlight::Build build = [work = std::move(work)](std::stop_token stop) {
+  SingleFlight::Build build = [work = std::move(work), turn = std::move(turn)](std::stop_token stop) {
     return RunWork(work, "work for one request", std::move(stop));
   };
   SingleFlight::Landing landing = co_await flights_.Join(key, std::move(build), deadline);

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <chrono>
 #include <functional>
+#include <memory>
 #include <span>
 #include <stop_token>
 #include <vector>
@@ -67,8 +68,10 @@ class TileService {
   asio::awaitable<Result<ServedTile>> Get(CacheKey key, Clock::time_point deadline);
 
   // Runs `work` on a worker for this caller alone: nothing is shared or kept. Errors and conditions as those of Get. An
-  // exception of `work` counts as kUnavailable.
-  asio::awaitable<Result<TilePtr>> Run(SingleFlight::Work work, Clock::time_point deadline);
+  // exception of `work` counts as kUnavailable. Long work is refused (kOverloaded) as soon as it has all workers but
+  // one, of several: tiles go on being served beside it.
+  enum class Length { kShort, kLong };
+  asio::awaitable<Result<TilePtr>> Run(SingleFlight::Work work, Length length, Clock::time_point deadline);
 
   // Makes every Get that waits for a build fail soon, and every later one at once; the cache keeps answering.
   void CancelBuilds();
@@ -85,6 +88,7 @@ class TileService {
 
  private:
   Result<TilePtr> BuildAndKeep(const CacheKey& key, std::stop_token stop);
+  std::shared_ptr<void> BeginLong();
 
   const TileBuilder builder_;
   const BuildObserver observer_;
@@ -92,6 +96,7 @@ class TileService {
   WorkerPool pool_;
   SingleFlight flights_;
   std::atomic<std::uint64_t> hits_{0}, misses_{0}, solos_{0};
+  std::atomic<unsigned> long_under_way_{0};
 };
 
 }  // namespace terrace::server

@@ -5,7 +5,9 @@
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/use_future.hpp>
+#include <future>
 #include <new>
+#include <thread>
 
 namespace terrace::server {
 namespace {
@@ -75,6 +77,39 @@ TEST(TileService, TellsTheObserverAboutEveryBuild) {
   ASSERT_FALSE(Get(service, key));
   EXPECT_EQ(good, 1);
   EXPECT_EQ(bad, 1);
+}
+
+Result<TilePtr> RunAlone(TileService& service, SingleFlight::Work work, TileService::Length length) {
+  asio::io_context io(1);
+  auto ran = asio::co_spawn(
+      io, service.Run(std::move(work), length, TileService::Clock::now() + std::chrono::seconds(10)), asio::use_future);
+  io.run();
+  return ran.get();
+}
+
+TEST(TileService, KeepsAWorkerForTilesBesideLongWork) {
+  TileServiceOptions options;
+  options.worker_threads = 2;
+  TileService service(options,
+                      [](const TileRequest&, std::stop_token) -> Result<EncodedTile> { return EncodedTile(); });
+  std::promise<void> begun, end;
+  const SingleFlight::Work work = [&](std::stop_token) -> Result<EncodedTile> {
+    begun.set_value();
+    end.get_future().wait();
+    return EncodedTile();
+  };
+  const SingleFlight::Work nothing = [](std::stop_token) -> Result<EncodedTile> { return EncodedTile(); };
+  auto first = std::async(std::launch::async, [&] { return RunAlone(service, work, TileService::Length::kLong); });
+  begun.get_future().wait();
+  const Result<TilePtr> second = RunAlone(service, nothing, TileService::Length::kLong);
+  ASSERT_FALSE(second);
+  EXPECT_EQ(second.error().code, ErrorCode::kOverloaded);
+  EXPECT_TRUE(Get(service));
+  EXPECT_TRUE(RunAlone(service, nothing, TileService::Length::kShort));
+  end.set_value();
+  EXPECT_TRUE(first.get());
+  // The first one's turn ends with its job, a moment after its answer.
+  while (!RunAlone(service, nothing, TileService::Length::kLong)) std::this_thread::yield();
 }
 
 }  // namespace
