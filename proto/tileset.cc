@@ -68,8 +68,7 @@ geo::TileRange BlockOf(const std::vector<geo::TileKey>& roots) {
 }
 
 // About the middle of the block, as far as half its width and half its height along the ground, and its whole range of
-// heights, take one together. Or about the Earth's centre, if that is smaller: a kilometre off it towards the middle,
-// because at the centre itself clients have no direction that is up and no longitude and latitude.
+// heights, take one together; but never farther than the other side of the Earth.
 Json Sphere(const TilesetDescription& tileset, const geo::TileRange& block) {
   const double tile = std::ldexp(180, -tileset.roots.front().level);
   const double width = static_cast<double>(block.end_x + 1 - block.start_x) * tile;
@@ -79,13 +78,8 @@ Json Sphere(const TilesetDescription& tileset, const geo::TileRange& block) {
   const geo::Vec3 middle = geo::ToEcef(longitude, (south + north) / 2, tileset.min_height_m);
   constexpr double kLargestRadius = geo::kSemiMajorAxis * geo::kSemiMajorAxis / geo::kSemiMinorAxis;
   const double along = kLargestRadius * geo::ToRadians(width / 2 + (north - south) / 2);
-  const double radius = along + tileset.max_height_m - tileset.min_height_m;
-  constexpr double kOff = 1000;
-  const double earth = geo::kSemiMajorAxis + tileset.max_height_m + kOff;
-  if (earth <= radius) {
-    const double scale = kOff / geo::Length(middle);
-    return {{"sphere", {middle.x * scale, middle.y * scale, middle.z * scale, earth + 1}}};  // a metre for rounding
-  }
+  const double across = geo::Length(middle) + geo::kSemiMajorAxis;
+  const double radius = std::min(along, across) + tileset.max_height_m - tileset.min_height_m;
   return {{"sphere", {middle.x, middle.y, middle.z, radius}}};
 }
 
