@@ -74,8 +74,9 @@ Codec<DatasetConfig> WaterCodec() { return {ReadWater, WriteWater, WaterToJson};
 
 Codec<DatasetConfig> ImageryCodec() {
   return {[](const Json& value, const Place& place, DatasetConfig& dataset) {
+            if (!value.is_object()) return place.Expected(R"({"image": "photo.tif"})", value);
             ReadObject(value, place, ImageryOptionTable(), dataset.imagery);
-            if (value.is_object() && !value.contains("image")) place.Fail("\"image\" is missing: the path of an image");
+            if (!value.contains("image")) place.Fail("\"image\" is missing: the path of an image");
           },
           [](const DatasetConfig& dataset) {
             return dataset.imagery.image.empty() ? Json() : WriteObject(dataset.imagery, ImageryOptionTable());

@@ -135,7 +135,7 @@ Codec<Target> Choice(Member Target::*member, std::vector<std::pair<Json, Member>
 
 // Text that `check` likes: it returns "must be ...", or nothing.
 template <typename Target>
-Codec<Target> Text(std::string Target::*member, std::function<std::string(const std::string&)> check) {
+Codec<Target> Text(std::string Target::*member, const std::function<std::string(const std::string&)>& check) {
   return {[=](const Json& value, const Place& place, Target& target) {
             if (!value.is_string()) return place.Expected("text", value);
             const std::string problem = check(value.get_ref<const std::string&>());

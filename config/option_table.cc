@@ -197,6 +197,7 @@ void ReadObject(const Json& object, const Place& place, const std::vector<Option
   if (!object.is_object())
     return place.Expected("an object with keys such as \"" + std::string(table.front().key) + "\"", object);
   std::vector<std::string_view> keys;
+  keys.reserve(table.size());
   for (const Option<Target>& option : table) keys.push_back(option.key);
   for (const auto& [key, value] : object.items()) {
     const auto found = std::find(keys.begin(), keys.end(), key);

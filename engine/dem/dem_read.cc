@@ -19,7 +19,8 @@ constexpr double kPositionTolerance = 1e-5;
 constexpr double kEdgeTolerance = 1e-6;
 
 GridWindow Grown(const GridWindow& window, int halo, const GridAxis& columns, const GridAxis& rows) {
-  GridWindow wide{window.column - halo, window.row - halo, window.columns + 2 * halo, window.rows + 2 * halo};
+  GridWindow wide{window.column - halo, window.row - halo, window.columns + std::int64_t{2} * halo,
+                  window.rows + std::int64_t{2} * halo};
   const auto clip = [](std::int64_t& start, std::int64_t& length, std::int64_t count) {
     const std::int64_t end = std::min(start + length, count);
     start = std::max<std::int64_t>(start, 0);

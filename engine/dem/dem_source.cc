@@ -165,8 +165,8 @@ geo::Lattice DemSource::LatticeOf(int level) const { return impl_->Plan(level).l
 std::uint64_t DemSource::fingerprint() const { return impl_->fingerprint; }
 
 const std::vector<geo::TileRange>& DemSource::Available(int level) const {
-  static const std::vector<geo::TileRange> kNone;
-  if (level < 0 || level > max_level()) return kNone;
+  static const std::vector<geo::TileRange> none;
+  if (level < 0 || level > max_level()) return none;
   return impl_->available[static_cast<std::size_t>(level)];
 }
 

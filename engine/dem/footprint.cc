@@ -11,6 +11,7 @@ constexpr int kPointsPerSide = 64;
 // Pixel positions around the raster's edge, each corner once.
 std::vector<Position> Outline(double width, double height) {
   std::vector<Position> outline;
+  outline.reserve(4 * kPointsPerSide);
   for (int i = 0; i < kPointsPerSide; ++i) outline.push_back({width * i / kPointsPerSide, 0});
   for (int i = 0; i < kPointsPerSide; ++i) outline.push_back({width, height * i / kPointsPerSide});
   for (int i = 0; i < kPointsPerSide; ++i) outline.push_back({width - width * i / kPointsPerSide, height});

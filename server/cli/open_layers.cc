@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <filesystem>
+#include <system_error>
 #include <utility>
 
 namespace terrace::cli {
@@ -12,7 +14,12 @@ Result<server::WaterRules> OpenWater(const config::WaterConfig& wanted, const de
   water.sea_level_m = wanted.sea_level;
   if (wanted.mask.empty()) return water;
   auto mask = dem::WaterRaster::Open(wanted.mask, bounds);
-  if (!mask) return MakeError(mask.error().code, "water mask {}", mask.error().message);
+  if (!mask) {
+    std::error_code unreadable;
+    const bool exists = std::filesystem::exists(wanted.mask, unreadable);
+    return MakeError(mask.error().code, "water mask {}{}", mask.error().message,
+                     exists ? "" : ", or for a sea level a number of metres");
+  }
   water.mask = *std::move(mask);
   return water;
 }

@@ -62,6 +62,9 @@ std::string DatasetsJson(std::span<const DatasetView> datasets) {
     entry["urls"]["layer"] = base + "/layer.json";
     entry["urls"]["tileset"] = base + "/tileset.json";
     entry["urls"]["tiles"] = base + "/{z}/{x}/{y}.terrain";
+    entry["urls"]["tiles_json"] = base + "/tiles.json";
+    entry["urls"]["heights"] = base + "/heights";
+    entry["urls"]["mesh"] = base + "/mesh";
     list.push_back(std::move(entry));
   }
   Json document;
@@ -73,12 +76,14 @@ std::string DatasetsJson(std::span<const DatasetView> datasets) {
 std::string IndexHtml(std::span<const DatasetView> datasets) {
   std::string items;
   for (const DatasetView& dataset : datasets) {
-    fmt::format_to(std::back_inserter(items), "<li><a href=\"/{}/layer.json\">{}</a></li>\n",
+    fmt::format_to(std::back_inserter(items),
+                   "<li>{1}: <a href=\"/{0}/layer.json\">layer.json</a>, "
+                   "<a href=\"/{0}/tileset.json\">tileset.json</a>, <a href=\"/{0}/tiles.json\">tiles.json</a></li>\n",
                    PercentEncode(dataset.name), EscapeHtml(dataset.name));
   }
   return fmt::format(
       "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>terrace</title></head>\n"
-      "<body><h1>terrace</h1>\n<p>Terrain for CesiumJS and other quantized-mesh clients. Datasets "
+      "<body><h1>terrace</h1>\n<p>Terrain as quantized-mesh, 3D Tiles and raster-dem. Datasets "
       "(<a href=\"/datasets\">as JSON</a>):</p>\n<ul>\n{}</ul>\n</body></html>\n",
       items);
 }

@@ -9,7 +9,7 @@
 namespace terrace::server {
 
 // {"datasets":[{"name","attribution","bounds":[w,s,e,n],"min_level","max_level","heights":{"min","max"},
-//   "urls":{"layer","tileset","tiles"}}]}
+//   "urls":{"layer","tileset","tiles","tiles_json","heights","mesh"}}]}
 // Degrees, west > east across the antimeridian; metres; URLs are absolute paths on this server.
 std::string DatasetsJson(std::span<const DatasetView> datasets);
 

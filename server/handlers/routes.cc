@@ -85,7 +85,7 @@ Response Routes::ServeNow(const Route& route, const Request& request) const {
 Response Routes::ServeViewer(const Route& route, const Request& request) const {
   if (const Document* file = viewer_.Find(route.file)) return terrace::server::Serve(*file, request, kRevalidate);
   if (viewer_.empty() && route.file == "index.html") return terrace::server::Serve(index_, request, kRevalidate);
-  return ProblemResponse(404, "no such URL", request.id);
+  return ProblemResponse(404, "no such URL; /datasets lists those of each dataset", request.id);
 }
 
 }  // namespace terrace::server

@@ -12,7 +12,9 @@
 namespace terrace::server {
 namespace {
 
-tl::unexpected<Error> NotFound() { return MakeError(ErrorCode::kNotFound, "no such URL"); }
+tl::unexpected<Error> NotFound() {
+  return MakeError(ErrorCode::kNotFound, "no such URL; /datasets lists those of each dataset");
+}
 
 // A path without scheme and authority, or nothing.
 std::optional<std::string_view> OriginForm(std::string_view target) {

@@ -89,6 +89,12 @@ TEST(ParseConfig, SuggestsTheNearestKeyAndListsAllWhenNoneIsNear) {
                           IsError("/datasets/0", "\"sources\" is missing")));
 }
 
+TEST(ParseConfig, ShowsTheFormOfLayers) {
+  EXPECT_THAT(ErrorsOf(R"({"datasets": [{"name": "a", "sources": ["a.tif"], "imagery": "a.tif", "water": true}]})"),
+              ElementsAre(IsError("/datasets/0/imagery", "must be {\"image\": \"photo.tif\"}, not \"a.tif\""),
+                          IsError("/datasets/0/water", "or {\"sea_level\": 0}, one of both, not true")));
+}
+
 TEST(ParseConfig, EscapesKeysInPathsAsJsonPointersDo) {
   EXPECT_THAT(ErrorsOf(R"({"a/b~c": 1})"), ElementsAre(IsError("/a~1b~0c", "unknown key")));
 }

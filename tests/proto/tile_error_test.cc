@@ -79,7 +79,8 @@ double LargestError(const LatticeView& lattice, const QuantizedTile& tile) {
 // Rounded positions leave the nodes, so that slivers lie between rows and edges pass nodes by a hair.
 TEST(TileError, FindsTheLargestErrorThatAnySampleHas) {
   for (const int cells : {32, 64}) {
-    for (unsigned seed = 0; seed < 6; ++seed) {
+    // The reference looks for every sample in every triangle: few of the large ones, which are slow under sanitizers.
+    for (unsigned seed = 0; seed < 6; seed += cells == 32 ? 1 : 5) {
       const Ground ground(cells, seed);
       const QuantizedTile tile = QuantizeTile(ground.view(), MeshOf(ground, 40 + 20 * seed), FineSteps());
       const TileError error = MeasureTileError(ground.view(), tile, 1e9, false);

@@ -68,6 +68,11 @@ class Usage(unittest.TestCase):
                 self.assertIn(f"terrace: dataset jacksboro: {layer} {far}: covers longitudes 10.0000 to 14.0000",
                               result.stderr)
 
+    def test_a_water_mask_that_is_no_file_may_be_meant_as_a_level(self):
+        result = run("serve", SOURCE_DIR / "config/samples/jacksboro.tif", "--water", "/nowhere/deep")
+        self.assertEqual((result.returncode, result.stdout), (1, ""))
+        self.assertIn("give the path of a raster file on this machine, or for a sea level a number of metres\n", result.stderr)
+
     def test_a_missing_raster_gives_code_1(self):
         for command in ("serve", "info"):
             result = run(command, "/nowhere/dem.tif")

@@ -32,14 +32,22 @@ TEST(DatasetsHandler, ListsWhatAClientNeeds) {
   EXPECT_EQ(dataset["max_level"], 2);
   EXPECT_EQ(dataset["heights"]["min"], -12.5);
   EXPECT_EQ(dataset["heights"]["max"], 1324);
-  EXPECT_EQ(dataset["urls"]["layer"], "/a%20%3Cb%3E/layer.json");
-  EXPECT_EQ(dataset["urls"]["tiles"], "/a%20%3Cb%3E/{z}/{x}/{y}.terrain");
+  const std::string base = "/a%20%3Cb%3E";
+  EXPECT_EQ(dataset["urls"], (nlohmann::json{{"layer", base + "/layer.json"},
+                                             {"tileset", base + "/tileset.json"},
+                                             {"tiles", base + "/{z}/{x}/{y}.terrain"},
+                                             {"tiles_json", base + "/tiles.json"},
+                                             {"heights", base + "/heights"},
+                                             {"mesh", base + "/mesh"}}));
 }
 
 TEST(DatasetsHandler, EscapesNamesInThePlainPage) {
   const std::string page = IndexHtml(Datasets());
   EXPECT_NE(page.find("a &lt;b&gt;"), std::string::npos);
   EXPECT_EQ(page.find("<b>"), std::string::npos);
+  for (const char* file : {"layer.json", "tileset.json", "tiles.json"}) {
+    EXPECT_NE(page.find(std::string("<a href=\"/a%20%3Cb%3E/") + file), std::string::npos) << file;
+  }
 }
 
 TEST(DatasetsHandler, KnowsTheReservedNames) {
