@@ -4,6 +4,7 @@
 #include <functional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "server/asio.h"
 #include "server/handlers/area_handler.h"
@@ -39,12 +40,14 @@ class Routes {
          Heights heights, AreaMesher mesher, State state);
 
   // Answers GET, HEAD, and POST where TakesPost says so.
-  asio::awaitable<Response> Serve(Request request) const;
+  asio::awaitable<Response> Serve(Route route, Request request) const;
 
  private:
   Response ServeNow(const Route& route, const Request& request) const;
   Response ServeViewer(const Route& route, const Request& request) const;
+  std::vector<DatasetView> SeenBy(const Request& request) const;
 
+  const std::span<const DatasetView> views_;
   const TileHandler tiles_;
   const HeightsHandler heights_;
   const AreaHandler areas_;
