@@ -2,8 +2,10 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "server/asio.h"
 #include "server/handlers/area_handler.h"
@@ -38,13 +40,19 @@ class Routes {
   Routes(std::span<const DatasetView> datasets, TileService& tiles, StaticFiles viewer, TileHandlerOptions options,
          Heights heights, AreaMesher mesher, State state);
 
+  // Answers what needs no waiting, which is most: all but tiles that must be built, heights and meshes. Nothing for
+  // those.
+  std::optional<Response> ServeAtOnce(const Route& route, const Request& request) const;
+
   // Answers GET, HEAD, and POST where TakesPost says so.
-  asio::awaitable<Response> Serve(Request request) const;
+  asio::awaitable<Response> Serve(Route route, Request request) const;
 
  private:
   Response ServeNow(const Route& route, const Request& request) const;
   Response ServeViewer(const Route& route, const Request& request) const;
+  std::vector<DatasetView> SeenBy(const Request& request) const;
 
+  const std::span<const DatasetView> views_;
   const TileHandler tiles_;
   const HeightsHandler heights_;
   const AreaHandler areas_;
