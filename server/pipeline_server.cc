@@ -24,6 +24,7 @@ DatasetView ViewOf(const Dataset& dataset) {
   view.north = info.bounds.north;
   view.min_height_m = info.heights.min;
   view.max_height_m = info.heights.max;
+  view.has_datum = dataset.source->has_datum();
   view.has_water = dataset.water.any();
   if (dataset.imagery.image) view.texture = dataset.imagery.texture;
   view.metadata_levels = dataset.metadata_levels;
@@ -38,9 +39,15 @@ Result<std::unique_ptr<Server>> Server::Start(std::shared_ptr<const TilePipeline
   std::vector<DatasetView> views;
   for (const Dataset& dataset : pipeline->datasets()) views.push_back(ViewOf(dataset));
   options.refinement_stats = [pipeline] { return pipeline->refinements(); };
+  options.source_stats = [pipeline] {
+    SourceStats stats;
+    stats.gdal = dem::CountGdalErrors();
+    for (const Dataset& dataset : pipeline->datasets()) stats.samples.push_back(dataset.source->CountSamples());
+    return stats;
+  };
   options.read_points = [pipeline](std::uint32_t dataset, std::span<const dem::GeoPosition> points,
-                                   std::stop_token stop) {
-    return pipeline->datasets()[dataset].source->ReadPoints(points, std::move(stop));
+                                   dem::HeightDatum datum, std::stop_token stop) {
+    return pipeline->datasets()[dataset].source->ReadPoints(points, datum, std::move(stop));
   };
   options.area_mesher.plan = [pipeline, most = options.max_mesh_samples](std::uint32_t index, const AreaRequest& area) {
     const Dataset& dataset = pipeline->datasets()[index];

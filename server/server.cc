@@ -170,11 +170,14 @@ class Server::Impl {
   ByteCacheStats RefinementStats() const {
     return options_.refinement_stats ? options_.refinement_stats() : ByteCacheStats{};
   }
+  SourceStats SourceNumbers() const { return options_.source_stats ? options_.source_stats() : SourceStats{}; }
 
   Routes::State RouteState() {
     Routes::State state;
     state.draining = [this] { return edge_->connections.draining(); };
-    state.metrics_text = [this] { return metrics_.Text(tiles_.stats(), RefinementStats(), edge_->stats()); };
+    state.metrics_text = [this] {
+      return metrics_.Text(tiles_.stats(), RefinementStats(), SourceNumbers(), edge_->stats());
+    };
     return state;
   }
 

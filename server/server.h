@@ -30,6 +30,7 @@ struct ServerOptions {
   std::size_t queue_length = 256;                      // builds that wait for a worker
   std::size_t cache_bytes = std::size_t{256} << 20;    // of finished tiles; 0: none
   std::function<ByteCacheStats()> refinement_stats;    // of what tiles are made from; may be empty
+  std::function<SourceStats()> source_stats;           // of what they are read from; may be empty
   PointReader read_points;                             // for heights; empty where there are none
   std::size_t max_locations = 10'000;                  // in one request for heights
   AreaMesher area_mesher;                              // empty where there are no meshes

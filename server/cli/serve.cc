@@ -15,6 +15,7 @@
 #include "config/config.h"
 #include "config/options.h"
 #include "config/parse.h"
+#include "engine/dem/source_policy.h"
 #include "server/cli/command.h"
 #include "server/cli/log.h"
 #include "server/cli/open_layers.h"
@@ -217,6 +218,12 @@ int Serve(const ServeArguments& arguments) {
     return kExitOk;
   }
   SetUpLog(config.log_level, config.log_format);
+  dem::SetGdalCache(config.gdal_cache_bytes);
+  if (const auto policy = dem::SetSourcePolicy({config.data_roots, config.allowed_prefixes, config.allowed_drivers});
+      !policy) {
+    std::fprintf(stderr, "terrace: %s\n", policy.error().message.c_str());
+    return kExitUsage;
+  }
   std::vector<server::Dataset> datasets;
   if (!OpenDatasets(config, datasets)) return kExitFailure;
   const std::size_t count = datasets.size();

@@ -44,6 +44,12 @@ asio::awaitable<Response> HeightsHandler::Handle(Route route, Request request) c
   if (!dataset) co_return ClientErrorResponse(dataset.error(), request.id);
   Result<HeightsQuery> parsed = Parse(route, request);
   if (!parsed) co_return ClientErrorResponse(parsed.error(), request.id);
+  if (parsed->datum == dem::HeightDatum::kOrthometric && !datasets_[*dataset].has_datum) {
+    const Error unknown{
+        ErrorCode::kInvalidArgument,
+        "datum: it is not known what this dataset's heights count from, so there are no orthometric ones"};
+    co_return ClientErrorResponse(unknown, request.id);
+  }
 
   const Coding coding = NegotiateCoding(request.accept_encoding);
   Response response;
@@ -59,7 +65,7 @@ asio::awaitable<Response> HeightsHandler::Handle(Route route, Request request) c
 
   auto query = std::make_shared<const HeightsQuery>(*std::move(parsed));
   SingleFlight::Work work = [this, index = *dataset, coding, query](std::stop_token stop) -> Result<EncodedTile> {
-    const Result<std::vector<float>> heights = reader_(index, query->points, std::move(stop));
+    const Result<std::vector<float>> heights = reader_(index, query->points, query->datum, std::move(stop));
     if (!heights) return tl::unexpected(heights.error());
     EncodedTile reply;
     reply.bytes = HeightsJson(*query, *heights, datasets_[index].name);
@@ -89,6 +95,7 @@ std::string HeightsJson(const HeightsQuery& query, std::span<const float> height
     if (!query.distances_m.empty()) fmt::format_to(out, ",\"distance\":{}", query.distances_m[i]);
     fmt::format_to(out, ",\"dataset\":{}}}", name);
   }
+  if (query.datum == dem::HeightDatum::kOrthometric) return json + "],\"datum\":\"orthometric\",\"status\":\"OK\"}";
   return json + "],\"status\":\"OK\"}";
 }
 

@@ -6,6 +6,7 @@
 #include <prometheus/registry.h>
 #include <prometheus/text_serializer.h>
 
+#include <algorithm>
 #include <chrono>
 #include <map>
 #include <mutex>
@@ -35,6 +36,25 @@ prometheus::MetricFamily Value(prometheus::MetricType type, const char* name, co
   family.help = help;
   family.type = type;
   family.metric.push_back(std::move(metric));
+  return family;
+}
+
+prometheus::MetricFamily Samples(const std::vector<std::string>& datasets,
+                                 const std::vector<dem::SampleCounts>& counts) {
+  prometheus::MetricFamily family;
+  family.name = "terrace_source_samples_total";
+  family.help = "Samples read for tiles: measured, small voids filled from their edges, and voids where others show";
+  family.type = prometheus::MetricType::Counter;
+  for (std::size_t i = 0; i < std::min(datasets.size(), counts.size()); ++i) {
+    const auto add = [&](const char* kind, std::uint64_t value) {
+      prometheus::ClientMetric& metric = family.metric.emplace_back();
+      metric.label = {{"dataset", datasets[i]}, {"kind", kind}};
+      metric.counter.value = static_cast<double>(value);
+    };
+    add("measured", counts[i].measured);
+    add("filled", counts[i].filled);
+    add("void", counts[i].voids);
+  }
   return family;
 }
 
@@ -143,7 +163,7 @@ void Metrics::CountBuild(const TileRequest& request, const Result<TilePtr>& tile
 }
 
 std::string Metrics::Text(const TileService::Stats& tiles, const ByteCacheStats& refinements,
-                          const EdgeStats& edge) const {
+                          const SourceStats& sources, const EdgeStats& edge) const {
   constexpr auto kCounter = prometheus::MetricType::Counter;
   constexpr auto kGauge = prometheus::MetricType::Gauge;
   std::vector<prometheus::MetricFamily> all = families_->registry.Collect();
@@ -166,6 +186,10 @@ std::string Metrics::Text(const TileService::Stats& tiles, const ByteCacheStats&
   add(kCounter, "terrace_http_transfers_refused_total", "Bodies that found no room", edge.transfers.refused);
   add(kCounter, "terrace_http_transfers_cut_total", "Replies cut off because others needed their room",
       edge.transfers.cut);
+  add(kCounter, "terrace_gdal_errors_total", "Failures that GDAL reported", sources.gdal.errors);
+  add(kCounter, "terrace_gdal_warnings_total", "Warnings that GDAL reported", sources.gdal.warnings);
+  add(kGauge, "terrace_gdal_cache_bytes", "Blocks of sources in GDAL's cache", sources.gdal.cache_bytes);
+  all.push_back(Samples(families_->dataset_names, sources.samples));
   return prometheus::TextSerializer().Serialize(all);
 }
 

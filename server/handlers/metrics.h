@@ -21,7 +21,8 @@ class Metrics {
   void CountBuild(const TileRequest& request, const Result<TilePtr>& tile);
 
   // Everything counted so far and the state given.
-  std::string Text(const TileService::Stats& tiles, const ByteCacheStats& refinements, const EdgeStats& edge) const;
+  std::string Text(const TileService::Stats& tiles, const ByteCacheStats& refinements, const SourceStats& sources,
+                   const EdgeStats& edge) const;
 
  private:
   struct Families;

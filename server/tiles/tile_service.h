@@ -29,7 +29,13 @@ using TileBuilder = std::function<Result<EncodedTile>(const TileRequest&, std::s
 
 // Heights of a dataset at points, NaN where it has none. Blocking; called on many threads at once.
 using PointReader = std::function<Result<std::vector<float>>(
-    std::uint32_t dataset, std::span<const dem::GeoPosition> points, std::stop_token)>;
+    std::uint32_t dataset, std::span<const dem::GeoPosition> points, dem::HeightDatum, std::stop_token)>;
+
+// What sources were read for so far, by the dataset's index.
+struct SourceStats {
+  std::vector<dem::SampleCounts> samples;
+  dem::GdalCounts gdal;
+};
 
 // Meshes of areas, by the dataset's index: `plan` refuses what is too large, at once and without reading; `build`
 // blocks. Both are called on many threads at once.
