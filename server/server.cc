@@ -67,14 +67,12 @@ TileServiceOptions ServiceOptions(const ServerOptions& options) {
 // before everything a session refers to.
 class Server::Impl {
  public:
-  Impl(std::vector<DatasetView> datasets, TileBuilder builder, StaticFiles viewer, ServerOptions options)
+  Impl(CatalogPtr catalog, StaticFiles viewer, ServerOptions options)
       : options_(std::move(options)),
-        datasets_(std::move(datasets)),
-        metrics_(datasets_),
-        tiles_(ServiceOptions(options_), std::move(builder), std::bind_front(&Metrics::CountBuild, &metrics_)),
+        viewer_(std::make_shared<const StaticFiles>(std::move(viewer))),
+        tiles_(ServiceOptions(options_), std::bind_front(&Metrics::CountBuild, &metrics_)),
         connections_(options_.max_connections),
-        routes_(datasets_, tiles_, std::move(viewer), HandlerOptions(), HeightsOptions(), options_.area_mesher,
-                RouteState()),
+        routes_(MakeRoutes(std::move(catalog), options_)),
         work_(io_.get_executor()),
         signals_(io_) {}
 
@@ -94,6 +92,16 @@ class Server::Impl {
     for (unsigned i = 0; i < count; ++i) io_threads_.emplace_back([this] { io_.run(); });
     stopper_ = std::thread([this] { StopWhenAsked(); });
     return {};
+  }
+
+  void Replace(CatalogPtr catalog, const ServerOptions& options) {
+    std::shared_ptr<const Routes> routes = MakeRoutes(catalog, options);
+    tiles_.SetCacheBytes(options.cache_bytes);
+    {
+      const std::lock_guard lock(routes_mutex_);
+      routes_.swap(routes);
+    }
+    tiles_.RetainTilesOf(*catalog);
   }
 
   std::uint16_t port() const { return listener_->port(); }
@@ -151,14 +159,24 @@ class Server::Impl {
     });
   }
 
-  TileHandlerOptions HandlerOptions() const {
+  std::shared_ptr<const Routes> MakeRoutes(CatalogPtr catalog, const ServerOptions& options) {
     TileHandlerOptions handler;
-    handler.cache_control = options_.cache_control;
-    handler.deadline = options_.request_deadline;
-    return handler;
+    handler.cache_control = options.cache_control;
+    handler.deadline = options.request_deadline;
+    return std::make_shared<const Routes>(std::move(catalog), tiles_, viewer_, std::move(handler),
+                                          options.max_locations, RouteState());
   }
 
-  Routes::Heights HeightsOptions() const { return {options_.read_points, options_.max_locations}; }
+  std::shared_ptr<const Routes> CurrentRoutes() const {
+    const std::lock_guard lock(routes_mutex_);
+    return routes_;
+  }
+
+  // The request's frame keeps what it is answered from.
+  static asio::awaitable<Response> Serve(Impl* self, Request request) {
+    const std::shared_ptr<const Routes> routes = self->CurrentRoutes();
+    co_return co_await routes->Serve(std::move(request));
+  }
 
   ByteCacheStats RefinementStats() const {
     return options_.refinement_stats ? options_.refinement_stats() : ByteCacheStats{};
@@ -177,7 +195,7 @@ class Server::Impl {
     context->options.idle_timeout = options_.idle_timeout;
     context->options.write_timeout = options_.write_timeout;
     context->options.max_body_bytes = kBodyBytes + kBytesPerLocation * options_.max_locations;
-    context->handler = std::bind_front(&Routes::Serve, &routes_);
+    context->handler = std::bind_front(&Impl::Serve, this);
     context->observer = [this](const ReplyRecord& record) {
       metrics_.CountReply(record);
       spdlog::info("{}", FormatAccessLine(record));
@@ -187,11 +205,12 @@ class Server::Impl {
   }
 
   const ServerOptions options_;
-  const std::vector<DatasetView> datasets_;
+  const std::shared_ptr<const StaticFiles> viewer_;
   Metrics metrics_;
   TileService tiles_;
   ConnectionSet connections_;
-  const Routes routes_;
+  mutable std::mutex routes_mutex_;
+  std::shared_ptr<const Routes> routes_;  // never null; guarded by routes_mutex_
   asio::io_context io_;
   asio::executor_work_guard<asio::io_context::executor_type> work_;
   asio::signal_set signals_;
@@ -209,14 +228,19 @@ class Server::Impl {
 Server::Server(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Server::~Server() = default;
 
-Result<std::unique_ptr<Server>> Server::Start(std::vector<DatasetView> datasets, TileBuilder builder,
-                                              ServerOptions options) {
-  if (const Result<void> named = CheckNames(datasets); !named) return tl::unexpected(named.error());
+Result<std::unique_ptr<Server>> Server::Start(CatalogPtr catalog, ServerOptions options) {
+  if (const Result<void> named = CheckNames(catalog->datasets); !named) return tl::unexpected(named.error());
   Result<StaticFiles> viewer = StaticFiles::Load(options.viewer_dir);
   if (!viewer) return tl::unexpected(viewer.error());
-  auto impl = std::make_unique<Impl>(std::move(datasets), std::move(builder), std::move(*viewer), std::move(options));
+  auto impl = std::make_unique<Impl>(std::move(catalog), std::move(*viewer), std::move(options));
   if (const Result<void> started = impl->Start(); !started) return tl::unexpected(started.error());
   return std::unique_ptr<Server>(new Server(std::move(impl)));
+}
+
+Result<void> Server::Replace(CatalogPtr catalog, const ServerOptions& options) {
+  if (const Result<void> named = CheckNames(catalog->datasets); !named) return tl::unexpected(named.error());
+  impl_->Replace(std::move(catalog), options);
+  return {};
 }
 
 std::uint16_t Server::port() const { return impl_->port(); }

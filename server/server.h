@@ -11,15 +11,12 @@
 #include <functional>
 #include <memory>
 #include <string>
-#include <vector>
 
 #include "engine/core/result.h"
-#include "server/tiles/dataset_view.h"
+#include "server/tiles/catalog.h"
 #include "server/tiles/tile_service.h"
 
 namespace terrace::server {
-
-class TilePipeline;
 
 struct ServerOptions {
   std::string host = "127.0.0.1";
@@ -29,10 +26,7 @@ struct ServerOptions {
   std::size_t queue_length = 256;                    // builds that wait for a worker
   std::size_t cache_bytes = std::size_t{256} << 20;  // of finished tiles; 0: none
   std::function<ByteCacheStats()> refinement_stats;  // of what tiles are made from; may be empty
-  PointReader read_points;                           // for heights; empty where there are none
   std::size_t max_locations = 10'000;                // in one request for heights
-  AreaMesher area_mesher;                            // empty where there are no meshes
-  std::size_t max_mesh_samples = 1'000'000;          // of one area
   std::size_t max_connections = 1024;
   std::string cache_control = "public, max-age=3600";  // of tiles and layer.json
   std::filesystem::path viewer_dir;                    // empty or missing: a plain page instead
@@ -46,14 +40,16 @@ struct ServerOptions {
 
 class Server {
  public:
-  // Listens when it returns. `builder` is called on worker threads; TileRequest::dataset is an index into `datasets`.
+  // Listens when it returns. The catalog's functions are called on worker threads.
   // kInvalidArgument: a dataset's name is reserved, empty or used twice. kUnavailable: the address cannot be listened
   // on, or the viewer cannot be read. Messages name the remedy.
-  static Result<std::unique_ptr<Server>> Start(std::vector<DatasetView> datasets, TileBuilder builder,
-                                               ServerOptions options);
+  static Result<std::unique_ptr<Server>> Start(CatalogPtr catalog, ServerOptions options);
 
-  // The same for the datasets of a pipeline.
-  static Result<std::unique_ptr<Server>> Start(std::shared_ptr<const TilePipeline> pipeline, ServerOptions options);
+  // Requests that come from now on are answered from `catalog`; those that have begun keep the one they began with.
+  // Cached tiles of datasets that stay in the same generation stay. Of `options`, cache_bytes, cache_control,
+  // request_deadline and max_locations are taken over. kInvalidArgument as above: nothing has changed then. From any
+  // thread, one at a time.
+  Result<void> Replace(CatalogPtr catalog, const ServerOptions& options);
 
   // Stops and waits.
   ~Server();

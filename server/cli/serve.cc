@@ -20,6 +20,7 @@
 #include "server/cli/open_layers.h"
 #include "server/cli/progress.h"
 #include "server/server.h"
+#include "server/tiles/pipeline_catalog.h"
 #include "server/tiles/tile_pipeline.h"
 
 namespace terrace::cli {
@@ -154,7 +155,6 @@ server::ServerOptions OptionsOf(const config::Config& config) {
   options.queue_length = config.queue_length;
   options.cache_bytes = config.cache_bytes;
   options.max_locations = config.max_locations;
-  options.max_mesh_samples = config.max_mesh_samples;
   options.max_connections = config.max_connections;
   options.cache_control = config.cache_control;
   options.header_timeout = config.header_timeout;
@@ -188,8 +188,11 @@ int Serve(const ServeArguments& arguments) {
   std::vector<server::Dataset> datasets;
   if (!OpenDatasets(config, datasets)) return kExitFailure;
   const std::size_t count = datasets.size();
-  auto pipeline = std::make_shared<const server::TilePipeline>(std::move(datasets), config.refinement_cache_bytes);
-  auto server = server::Server::Start(std::move(pipeline), OptionsOf(config));
+  auto refinements = std::make_shared<server::RefinementCache>(config.refinement_cache_bytes);
+  server::ServerOptions options = OptionsOf(config);
+  options.refinement_stats = [refinements] { return refinements->stats(); };
+  auto pipeline = std::make_shared<const server::TilePipeline>(std::move(datasets), refinements);
+  auto server = server::Server::Start(server::MakeCatalog(std::move(pipeline), config.max_mesh_samples), options);
   if (!server) {
     std::fprintf(stderr, "terrace: %s\n", server.error().message.c_str());
     return kExitFailure;

@@ -15,13 +15,9 @@
 
 namespace terrace::server {
 
-HeightsHandler::HeightsHandler(std::span<const DatasetView> datasets, TileService& tiles, PointReader reader,
-                               TileHandlerOptions options, std::size_t max_locations)
-    : datasets_(datasets),
-      tiles_(tiles),
-      reader_(std::move(reader)),
-      options_(std::move(options)),
-      max_locations_(max_locations) {}
+HeightsHandler::HeightsHandler(CatalogPtr catalog, TileService& tiles, TileHandlerOptions options,
+                               std::size_t max_locations)
+    : catalog_(std::move(catalog)), tiles_(tiles), options_(std::move(options)), max_locations_(max_locations) {}
 
 Result<HeightsQuery> HeightsHandler::Parse(const Route& route, const Request& request) const {
   Result<QueryParameters> parameters = ParseQuery(route.query);
@@ -35,18 +31,19 @@ Result<HeightsQuery> HeightsHandler::Parse(const Route& route, const Request& re
 }
 
 asio::awaitable<Response> HeightsHandler::Handle(Route route, Request request) const {
-  const Result<std::uint32_t> dataset = FindDataset(route.dataset, datasets_);
+  const Result<std::uint32_t> dataset = FindDataset(route.dataset, catalog_->datasets);
   if (!dataset) co_return ClientErrorResponse(dataset.error(), request.id);
   Result<HeightsQuery> parsed = Parse(route, request);
   if (!parsed) co_return ClientErrorResponse(parsed.error(), request.id);
 
   const Coding coding = NegotiateCoding(request.accept_encoding);
   auto query = std::make_shared<const HeightsQuery>(*std::move(parsed));
-  SingleFlight::Work work = [this, index = *dataset, coding, query](std::stop_token stop) -> Result<EncodedTile> {
-    const Result<std::vector<float>> heights = reader_(index, query->points, std::move(stop));
+  SingleFlight::Work work = [catalog = catalog_, index = *dataset, coding,
+                             query](std::stop_token stop) -> Result<EncodedTile> {
+    const Result<std::vector<float>> heights = catalog->read_points(index, query->points, std::move(stop));
     if (!heights) return tl::unexpected(heights.error());
     EncodedTile reply;
-    reply.bytes = HeightsJson(*query, *heights, datasets_[index].name);
+    reply.bytes = HeightsJson(*query, *heights, catalog->datasets[index].name);
     if (coding == Coding::kGzip) reply.bytes = proto::Gzip(reply.bytes);
     reply.etag = MakeEtag(reply.bytes, coding);
     return reply;

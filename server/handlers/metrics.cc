@@ -73,13 +73,9 @@ struct Metrics::Families {
   prometheus::Histogram& refine = stages.Add({{"stage", "refine"}}, Seconds());
   prometheus::Histogram& encode = stages.Add({{"stage", "encode"}}, Seconds());
   prometheus::Histogram& compress = stages.Add({{"stage", "compress"}}, Seconds());
-  std::vector<std::string> dataset_names;
 };
 
-Metrics::Metrics(std::span<const DatasetView> datasets) : families_(std::make_unique<Families>()) {
-  for (const DatasetView& dataset : datasets) families_->dataset_names.push_back(dataset.name);
-}
-
+Metrics::Metrics() : families_(std::make_unique<Families>()) {}
 Metrics::~Metrics() = default;
 
 void Metrics::CountReply(const ReplyRecord& record) {
@@ -88,10 +84,9 @@ void Metrics::CountReply(const ReplyRecord& record) {
   families_->durations.Add({{"route", route}}, Seconds()).Observe(InSeconds(record.duration));
 }
 
-void Metrics::CountBuild(const TileRequest& request, const Result<TilePtr>& tile) {
+void Metrics::CountBuild(const DatasetView& dataset, const Result<TilePtr>& tile) {
   const std::string_view result = tile ? "ok" : ToString(tile.error().code);
-  families_->builds.Add({{"dataset", families_->dataset_names.at(request.dataset)}, {"result", std::string(result)}})
-      .Increment();
+  families_->builds.Add({{"dataset", dataset.name}, {"result", std::string(result)}}).Increment();
   if (!tile) {
     if (tile.error().code == ErrorCode::kUnavailable) families_->source_errors.Increment();
     return;

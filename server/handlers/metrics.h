@@ -2,7 +2,6 @@
 #pragma once
 
 #include <memory>
-#include <span>
 #include <string>
 
 #include "server/http/access_log.h"
@@ -13,11 +12,11 @@ namespace terrace::server {
 
 class Metrics {
  public:
-  explicit Metrics(std::span<const DatasetView> datasets);
+  Metrics();
   ~Metrics();
 
   void CountReply(const ReplyRecord& record);
-  void CountBuild(const TileRequest& request, const Result<TilePtr>& tile);
+  void CountBuild(const DatasetView& dataset, const Result<TilePtr>& tile);
 
   // Everything counted so far and the state given.
   std::string Text(const TileService::Stats& tiles, const ByteCacheStats& refinements,

@@ -30,17 +30,18 @@ Response Ready(bool draining) {
 
 }  // namespace
 
-Routes::Routes(std::span<const DatasetView> datasets, TileService& tiles, StaticFiles viewer,
-               TileHandlerOptions options, Heights heights, AreaMesher mesher, State state)
-    : tiles_(datasets, tiles, options),
-      heights_(datasets, tiles, std::move(heights.read), options, heights.max_locations),
-      areas_(datasets, tiles, std::move(mesher), options),
-      layers_(datasets, options.cache_control),
-      tilesets_(datasets, options.cache_control),
-      tile_json_(datasets, options.cache_control),
+Routes::Routes(CatalogPtr catalog, TileService& tiles, std::shared_ptr<const StaticFiles> viewer,
+               TileHandlerOptions options, std::size_t max_locations, State state)
+    : catalog_(std::move(catalog)),
+      tiles_(catalog_, tiles, options),
+      heights_(catalog_, tiles, options, max_locations),
+      areas_(catalog_, tiles, options),
+      layers_(catalog_->datasets, options.cache_control),
+      tilesets_(catalog_->datasets, options.cache_control),
+      tile_json_(catalog_->datasets, options.cache_control),
       viewer_(std::move(viewer)),
-      datasets_(Document::Make(DatasetsJson(datasets), "application/json")),
-      index_(Document::Make(IndexHtml(datasets), "text/html; charset=utf-8")),
+      datasets_(Document::Make(DatasetsJson(catalog_->datasets), "application/json")),
+      index_(Document::Make(IndexHtml(catalog_->datasets), "text/html; charset=utf-8")),
       state_(std::move(state)) {}
 
 asio::awaitable<Response> Routes::Serve(Request request) const {
@@ -83,8 +84,8 @@ Response Routes::ServeNow(const Route& route, const Request& request) const {
 
 // Its pages keep their state in the query, so any query goes.
 Response Routes::ServeViewer(const Route& route, const Request& request) const {
-  if (const Document* file = viewer_.Find(route.file)) return terrace::server::Serve(*file, request, kRevalidate);
-  if (viewer_.empty() && route.file == "index.html") return terrace::server::Serve(index_, request, kRevalidate);
+  if (const Document* file = viewer_->Find(route.file)) return terrace::server::Serve(*file, request, kRevalidate);
+  if (viewer_->empty() && route.file == "index.html") return terrace::server::Serve(index_, request, kRevalidate);
   return ProblemResponse(404, "no such URL; /datasets lists those of each dataset", request.id);
 }
 

@@ -36,15 +36,14 @@ std::string_view ContentTypeOf(const TileRequest& tile) {
 
 }  // namespace
 
-TileHandler::TileHandler(std::span<const DatasetView> datasets, TileService& tiles, TileHandlerOptions options)
-    : datasets_(datasets), tiles_(tiles), options_(std::move(options)) {}
+TileHandler::TileHandler(CatalogPtr catalog, TileService& tiles, TileHandlerOptions options)
+    : catalog_(std::move(catalog)), tiles_(tiles), options_(std::move(options)) {}
 
 asio::awaitable<Response> TileHandler::Handle(Route route, Request request) const {
-  const Result<TileRequest> tile = Negotiate(route, request, datasets_);
+  const Result<TileRequest> tile = Negotiate(route, request, catalog_->datasets);
   if (!tile) co_return ClientErrorResponse(tile.error(), request.id);
-  const CacheKey key{*tile, datasets_[tile->dataset].generation};
   const auto deadline = TileService::Clock::now() + options_.deadline;
-  const Result<ServedTile> served = co_await tiles_.Get(key, deadline);
+  const Result<ServedTile> served = co_await tiles_.Get(catalog_, *tile, deadline);
   if (served) co_return Reply(*served, *tile, request);
   co_return co_await BackendFailure(served.error(), request.id, options_.refusal_delay);
 }

@@ -2,14 +2,13 @@
 #pragma once
 
 #include <chrono>
-#include <span>
 #include <string>
 
 #include "server/asio.h"
 #include "server/http/request.h"
 #include "server/http/response.h"
 #include "server/http/router.h"
-#include "server/tiles/dataset_view.h"
+#include "server/tiles/catalog.h"
 #include "server/tiles/tile_service.h"
 
 namespace terrace::server {
@@ -24,8 +23,8 @@ struct TileHandlerOptions {
 
 class TileHandler {
  public:
-  // `datasets` and `tiles` must outlive this.
-  TileHandler(std::span<const DatasetView> datasets, TileService& tiles, TileHandlerOptions options);
+  // `tiles` must outlive this.
+  TileHandler(CatalogPtr catalog, TileService& tiles, TileHandlerOptions options);
 
   // Precondition: a kTile route.
   asio::awaitable<Response> Handle(Route route, Request request) const;
@@ -33,7 +32,7 @@ class TileHandler {
  private:
   Response Reply(const ServedTile& served, const TileRequest& tile, const Request& request) const;
 
-  const std::span<const DatasetView> datasets_;
+  const CatalogPtr catalog_;
   TileService& tiles_;
   const TileHandlerOptions options_;
 };

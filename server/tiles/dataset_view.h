@@ -1,6 +1,6 @@
 // What the HTTP side knows of a dataset: its name, its extent and which tiles exist; never how tiles are made.
 //
-// Immutable after start, so any thread reads it without a lock. A dataset's index in the server's list is
+// Immutable as a part of a catalog, so any thread reads it without a lock. A dataset's index in the catalog's list is
 // TileRequest::dataset.
 #pragma once
 

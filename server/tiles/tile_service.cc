@@ -5,6 +5,7 @@
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 namespace terrace::server {
 namespace {
@@ -19,36 +20,47 @@ Result<TilePtr> RunWork(const SingleFlight::Work& work, const std::string& what,
   }
 }
 
+// The generation stands for the dataset, whose index may be another one in the next catalog.
+CacheKey KeyOf(const Catalog& catalog, TileRequest request) {
+  const std::uint64_t generation = catalog.datasets[request.dataset].generation;
+  request.dataset = 0;
+  return {request, generation};
+}
+
 }  // namespace
 
-TileService::TileService(TileServiceOptions options, TileBuilder builder, BuildObserver observer)
-    : builder_(std::move(builder)),
-      observer_(std::move(observer)),
+TileService::TileService(TileServiceOptions options, BuildObserver observer)
+    : observer_(std::move(observer)),
       cache_(options.cache_bytes),
       pool_(options.worker_threads, options.queue_length),
       flights_(pool_) {}
 
 TileService::~TileService() { Shutdown(); }
 
-asio::awaitable<Result<ServedTile>> TileService::Get(CacheKey key, Clock::time_point deadline) {
+asio::awaitable<Result<ServedTile>> TileService::Get(CatalogPtr catalog, TileRequest request,
+                                                     Clock::time_point deadline) {
+  const CacheKey key = KeyOf(*catalog, request);
   if (TilePtr tile = cache_.Find(key)) {
     hits_.fetch_add(1, std::memory_order_relaxed);
     co_return ServedTile(std::move(tile), CacheStatus::kHit);
   }
-  SingleFlight::Build build = [this, key](std::stop_token stop) { return BuildAndKeep(key, std::move(stop)); };
+  SingleFlight::Build build = [this, catalog = std::move(catalog), request, key](std::stop_token stop) {
+    return BuildAndKeep(*catalog, request, key, std::move(stop));
+  };
   SingleFlight::Landing landing = co_await flights_.Join(key, std::move(build), deadline);
   if (!landing.joined) misses_.fetch_add(1, std::memory_order_relaxed);
   if (!landing.tile) co_return tl::unexpected(std::move(landing.tile.error()));
   co_return ServedTile(std::move(*landing.tile), landing.joined ? CacheStatus::kJoined : CacheStatus::kMiss);
 }
 
-Result<TilePtr> TileService::BuildAndKeep(const CacheKey& key, std::stop_token stop) {
+Result<TilePtr> TileService::BuildAndKeep(const Catalog& catalog, const TileRequest& request, const CacheKey& key,
+                                          std::stop_token stop) {
   // Between the look into the cache and the start of this flight an earlier flight may have landed.
   if (TilePtr tile = cache_.Find(key)) return tile;
-  const SingleFlight::Work work = [&](std::stop_token token) { return builder_(key.request, std::move(token)); };
-  Result<TilePtr> tile = RunWork(work, "tile " + geo::ToString(key.request.key), std::move(stop));
+  const SingleFlight::Work work = [&](std::stop_token token) { return catalog.build(request, std::move(token)); };
+  Result<TilePtr> tile = RunWork(work, "tile " + geo::ToString(request.key), std::move(stop));
   if (tile) cache_.Insert(key, *tile);
-  if (observer_) observer_(key.request, tile);
+  if (observer_) observer_(catalog.datasets[request.dataset], tile);
   return tile;
 }
 
@@ -75,6 +87,12 @@ asio::awaitable<Result<TilePtr>> TileService::Run(SingleFlight::Work work, Lengt
   };
   SingleFlight::Landing landing = co_await flights_.Join(key, std::move(build), deadline);
   co_return std::move(landing.tile);
+}
+
+void TileService::RetainTilesOf(const Catalog& catalog) {
+  std::vector<std::uint64_t> generations;
+  for (const DatasetView& dataset : catalog.datasets) generations.push_back(dataset.generation);
+  cache_.Retain(generations);
 }
 
 void TileService::CancelBuilds() { flights_.Shutdown(); }

@@ -21,8 +21,8 @@ class HeightsTest : public ServerFixture {
  protected:
   // Heights are latitude + 1000 * longitude.
   void StartHeights(ServerOptions options = {}) {
-    options.read_points = [this](std::uint32_t, std::span<const dem::GeoPosition> points,
-                                 std::stop_token stop) -> Result<std::vector<float>> {
+    read_points_ = [this](std::uint32_t, std::span<const dem::GeoPosition> points,
+                          std::stop_token stop) -> Result<std::vector<float>> {
       ++reads_;
       const auto until = std::chrono::steady_clock::now() + std::chrono::milliseconds(read_ms_);
       while (std::chrono::steady_clock::now() < until) {

@@ -331,7 +331,7 @@ TEST_F(ServerTest, SaysWhatToDoAboutATakenPort) {
   Start();
   ServerOptions options;
   options.port = port();
-  const auto second = Server::Start({}, builder_, options);
+  const auto second = Server::Start(std::make_shared<const Catalog>(), options);
   ASSERT_FALSE(second);
   EXPECT_NE(second.error().message.find("127.0.0.1:" + std::to_string(port())), std::string::npos);
   EXPECT_NE(second.error().message.find("choose another port"), std::string::npos);
@@ -341,10 +341,10 @@ TEST_F(ServerTest, RefusesNamesThatItsUrlsNeed) {
   DatasetView dataset;
   for (const char* name : {"metrics", "viewer", "", "a/b"}) {
     dataset.name = name;
-    EXPECT_FALSE(Server::Start({dataset}, builder_, {})) << name;
+    EXPECT_FALSE(Server::Start(std::make_shared<const Catalog>(Catalog{{dataset}, builder_, {}, {}}), {})) << name;
   }
   dataset.name = "maui";
-  EXPECT_FALSE(Server::Start({dataset, dataset}, builder_, {}));
+  EXPECT_FALSE(Server::Start(std::make_shared<const Catalog>(Catalog{{dataset, dataset}, builder_, {}, {}}), {}));
 }
 
 }  // namespace

@@ -1,8 +1,6 @@
-// The server on top of the real tile pipeline; server.cc knows only views and a function.
-#include <utility>
+#include "server/tiles/pipeline_catalog.h"
 
-#include "server/server.h"
-#include "server/tiles/tile_pipeline.h"
+#include <utility>
 
 namespace terrace::server {
 namespace {
@@ -34,26 +32,25 @@ DatasetView ViewOf(const Dataset& dataset) {
 
 }  // namespace
 
-Result<std::unique_ptr<Server>> Server::Start(std::shared_ptr<const TilePipeline> pipeline, ServerOptions options) {
-  std::vector<DatasetView> views;
-  for (const Dataset& dataset : pipeline->datasets()) views.push_back(ViewOf(dataset));
-  options.refinement_stats = [pipeline] { return pipeline->refinements(); };
-  options.read_points = [pipeline](std::uint32_t dataset, std::span<const dem::GeoPosition> points,
-                                   std::stop_token stop) {
+CatalogPtr MakeCatalog(std::shared_ptr<const TilePipeline> pipeline, std::size_t max_mesh_samples) {
+  auto catalog = std::make_shared<Catalog>();
+  for (const Dataset& dataset : pipeline->datasets()) catalog->datasets.push_back(ViewOf(dataset));
+  catalog->read_points = [pipeline](std::uint32_t dataset, std::span<const dem::GeoPosition> points,
+                                    std::stop_token stop) {
     return pipeline->datasets()[dataset].source->ReadPoints(points, std::move(stop));
   };
-  options.area_mesher.plan = [pipeline, most = options.max_mesh_samples](std::uint32_t index, const AreaRequest& area) {
+  catalog->area_mesher.plan = [pipeline, max_mesh_samples](std::uint32_t index, const AreaRequest& area) {
     const Dataset& dataset = pipeline->datasets()[index];
-    return PlanArea(*dataset.source, dataset.error_fraction, area, most);
+    return PlanArea(*dataset.source, dataset.error_fraction, area, max_mesh_samples);
   };
-  options.area_mesher.build = [pipeline](std::uint32_t index, const AreaPlan& plan, const AreaRequest& area,
-                                         std::stop_token stop) {
+  catalog->area_mesher.build = [pipeline](std::uint32_t index, const AreaPlan& plan, const AreaRequest& area,
+                                          std::stop_token stop) {
     return BuildAreaMesh(*pipeline->datasets()[index].source, plan, area, std::move(stop));
   };
-  TileBuilder builder = [pipeline = std::move(pipeline)](const TileRequest& request, std::stop_token stop) {
+  catalog->build = [pipeline = std::move(pipeline)](const TileRequest& request, std::stop_token stop) {
     return pipeline->Build(request, std::move(stop));
   };
-  return Start(std::move(views), std::move(builder), std::move(options));
+  return catalog;
 }
 
 }  // namespace terrace::server
