@@ -98,6 +98,8 @@ struct Config {
   std::chrono::milliseconds write_timeout{20'000};
   std::chrono::milliseconds drain_timeout{10'000};
 
+  bool watch = true;  // look for changes of sources and of the file that this came from
+
   LogLevel log_level = LogLevel::kInfo;
   LogFormat log_format = LogFormat::kText;
 

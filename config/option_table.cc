@@ -139,6 +139,8 @@ const std::vector<Option<Config>>& ServerOptionTable() {
        Seconds(&Config::write_timeout, 0.1, 3600)},
       {"drain_timeout_s", "SECONDS", "Time for open requests to finish when the server stops",
        Seconds(&Config::drain_timeout, 0, 3600)},
+      {"watch", "true|false", "Take over changes of sources and of the configuration file while serving",
+       Switch(&Config::watch)},
       {"log_level", "LEVEL", "The least important messages to log: debug, info, warn, error or off",
        Choice(&Config::log_level, {{"debug", LogLevel::kDebug},
                                    {"info", LogLevel::kInfo},

@@ -7,6 +7,9 @@
 #include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/signal_set.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/this_coro.hpp>
+#include <boost/asio/use_awaitable.hpp>
 #include <condition_variable>
 #include <csignal>
 #include <functional>
@@ -27,6 +30,9 @@ namespace {
 
 // For replies to requests whose builds were just cancelled, and again for sockets that were just aborted.
 constexpr std::chrono::milliseconds kLastWords{1'000};
+
+// How long a request waits for a source that was replaced, and how often it looks.
+constexpr std::chrono::milliseconds kReplaceTime{3'000}, kReplacePeriod{20};
 
 // A request for heights has a body of at most so many bytes, and so many for each location that it may name: two
 // numbers with all their digits, a form's three bytes for each separator.
@@ -86,7 +92,7 @@ class Server::Impl {
     Result<std::shared_ptr<Listener>> listener = Listener::Open(io_, options_.host, options_.port, Context());
     if (!listener) return tl::unexpected(listener.error());
     listener_ = std::move(*listener);
-    if (options_.stop_on_signals) WatchSignals();
+    WatchSignals();
     listener_->Start();
     const unsigned count = IoThreads(options_.io_threads);
     for (unsigned i = 0; i < count; ++i) io_threads_.emplace_back([this] { io_.run(); });
@@ -98,10 +104,15 @@ class Server::Impl {
     std::shared_ptr<const Routes> routes = MakeRoutes(catalog, options);
     tiles_.SetCacheBytes(options.cache_bytes);
     {
-      const std::lock_guard lock(routes_mutex_);
+      const std::lock_guard lock(state_mutex_);
       routes_.swap(routes);
     }
     tiles_.RetainTilesOf(*catalog);
+  }
+
+  void SetTroubles(std::map<std::string, std::string> troubles) {
+    const std::lock_guard lock(state_mutex_);
+    troubles_ = std::move(troubles);
   }
 
   std::uint16_t port() const { return listener_->port(); }
@@ -150,12 +161,24 @@ class Server::Impl {
   }
 
   void WatchSignals() {
-    signals_.add(SIGINT);
-    signals_.add(SIGTERM);
+    if (options_.stop_on_signals) {
+      signals_.add(SIGINT);
+      signals_.add(SIGTERM);
+    }
+    for (const auto& [signal, action] : options_.on_signal) signals_.add(signal);
+    WaitForSignal();
+  }
+
+  void WaitForSignal() {
     signals_.async_wait([this](const boost::system::error_code& error, int signal) {
       if (error) return;
-      spdlog::info("stopping: signal {}", signal);
-      RequestStop();
+      if (const auto known = options_.on_signal.find(signal); known != options_.on_signal.end()) {
+        known->second();
+      } else {
+        spdlog::info("stopping: signal {}", signal);
+        RequestStop();
+      }
+      WaitForSignal();
     });
   }
 
@@ -168,14 +191,32 @@ class Server::Impl {
   }
 
   std::shared_ptr<const Routes> CurrentRoutes() const {
-    const std::lock_guard lock(routes_mutex_);
+    const std::lock_guard lock(state_mutex_);
     return routes_;
   }
 
-  // The request's frame keeps what it is answered from.
+  std::map<std::string, std::string> Troubles() const {
+    const std::lock_guard lock(state_mutex_);
+    return troubles_;
+  }
+
+  // The request's frame keeps what it is answered from. Where that turns out to be gone, the next catalog answers.
   static asio::awaitable<Response> Serve(Impl* self, Request request) {
-    const std::shared_ptr<const Routes> routes = self->CurrentRoutes();
-    co_return co_await routes->Serve(std::move(request));
+    const auto give_up = std::chrono::steady_clock::now() + kReplaceTime;
+    for (;;) {
+      const std::shared_ptr<const Routes> routes = self->CurrentRoutes();
+      Request copy = request;
+      Response response = co_await routes->Serve(std::move(copy));
+      if (!response.source_changed || !self->options_.on_source_changed) co_return response;
+      self->options_.on_source_changed();
+      asio::steady_timer timer(co_await asio::this_coro::executor);
+      while (self->CurrentRoutes() == routes) {
+        const bool is_hopeless = self->connections_.draining() || self->Troubles().contains(response.dataset);
+        if (is_hopeless || std::chrono::steady_clock::now() >= give_up) co_return response;
+        timer.expires_after(kReplacePeriod);
+        co_await timer.async_wait(asio::use_awaitable);
+      }
+    }
   }
 
   ByteCacheStats RefinementStats() const {
@@ -185,6 +226,7 @@ class Server::Impl {
   Routes::State RouteState() {
     Routes::State state;
     state.draining = [this] { return connections_.draining(); };
+    state.troubles = [this] { return Troubles(); };
     state.metrics_text = [this] { return metrics_.Text(tiles_.stats(), RefinementStats(), connections_.size()); };
     return state;
   }
@@ -209,8 +251,9 @@ class Server::Impl {
   Metrics metrics_;
   TileService tiles_;
   ConnectionSet connections_;
-  mutable std::mutex routes_mutex_;
-  std::shared_ptr<const Routes> routes_;  // never null; guarded by routes_mutex_
+  mutable std::mutex state_mutex_;
+  std::shared_ptr<const Routes> routes_;         // never null; guarded by state_mutex_
+  std::map<std::string, std::string> troubles_;  // by dataset; guarded by state_mutex_
   asio::io_context io_;
   asio::executor_work_guard<asio::io_context::executor_type> work_;
   asio::signal_set signals_;
@@ -242,6 +285,8 @@ Result<void> Server::Replace(CatalogPtr catalog, const ServerOptions& options) {
   impl_->Replace(std::move(catalog), options);
   return {};
 }
+
+void Server::SetTroubles(std::map<std::string, std::string> troubles) { impl_->SetTroubles(std::move(troubles)); }
 
 std::uint16_t Server::port() const { return impl_->port(); }
 

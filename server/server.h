@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 
@@ -36,6 +37,11 @@ struct ServerOptions {
   std::chrono::milliseconds request_deadline{30'000};  // of a tile, waiting for its build included
   std::chrono::milliseconds drain_timeout{10'000};
   bool stop_on_signals = false;  // SIGINT and SIGTERM act like RequestStop
+  // Called on an io thread for each of these signals: must not block.
+  std::map<int, std::function<void()>> on_signal;
+  // Told that a source is not the one that was opened any more; on io threads, must not block. The request waits a
+  // moment for Replace then. Empty: nobody will open it anew, and nobody waits.
+  std::function<void()> on_source_changed;
 };
 
 class Server {
@@ -53,6 +59,9 @@ class Server {
 
   // Stops and waits.
   ~Server();
+
+  // What /readyz calls degraded: troubles by dataset, "" is the configuration. Nobody waits for a source in trouble.
+  void SetTroubles(std::map<std::string, std::string> troubles);
 
   std::uint16_t port() const;
   std::string url() const;  // "http://127.0.0.1:8080/"

@@ -18,7 +18,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 
 # core <- {geo, tin} <- {dem, proto} <- server, and core <- config <- server. In the server, asio.h stands below all and the
 # files of the folder itself, which put the rooms together, above all but the command line:
-# asio.h <- tiles <- http <- handlers <- server <- cli.
+# asio.h <- tiles <- http <- handlers <- server <- cli, and tiles <- reload <- cli.
 ENGINE = ["engine/core", "engine/geo", "engine/tin", "engine/dem", "proto", "config", "server/asio.h"]
 ROOMS = {
     "engine/core": [],
@@ -31,8 +31,9 @@ ROOMS = {
     "server/tiles": ENGINE,
     "server/http": ENGINE + ["server/tiles"],
     "server/handlers": ENGINE + ["server/tiles", "server/http"],
+    "server/reload": ENGINE + ["server/tiles"],
     "server": ENGINE + ["server/tiles", "server/http", "server/handlers"],
-    "server/cli": ENGINE + ["server/tiles", "server/http", "server/handlers", "server"],
+    "server/cli": ENGINE + ["server/tiles", "server/http", "server/handlers", "server/reload", "server"],
 }
 
 # Library: which headers are its own, and which files may name them (regular expressions on paths). The first match counts.

@@ -122,16 +122,19 @@ DemSource::~DemSource() = default;
 Result<std::unique_ptr<DemSource>> DemSource::Open(const std::string& path, const DemOptions& options) {
   if (auto checked = CheckOptions(options); !checked)
     return MakeError(checked.error().code, "{}: {}", path, checked.error().message);
+  const auto before = StampOf(path);
   auto dataset = OpenRaster(path);
   if (!dataset) return tl::unexpected(dataset.error());
+  auto files = StampedFiles::OfOpened(FilesOf(**dataset, path), before);
+  if (!files) return tl::unexpected(files.error());
   auto georeference = Georeference::Of(**dataset, path);
   if (!georeference) return tl::unexpected(georeference.error());
   const auto spacing = SourceSpacing::Of(*georeference, path);
   if (!spacing) return tl::unexpected(spacing.error());
 
-  auto impl = std::make_unique<Impl>(path, StampedFiles(FilesOf(**dataset, path)), *std::move(georeference));
+  auto impl = std::make_unique<Impl>(path, *std::move(files), *std::move(georeference));
   impl->layout = LayoutOf(**dataset, impl->georeference);
-  auto scan = ScanRaster(**dataset, impl->layout, options.progress);
+  auto scan = ScanRaster(**dataset, impl->layout, options.progress, options.stop);
   if (!scan) return MakeError(scan.error().code, "{}: {}", path, scan.error().message);
 
   impl->info = Describe(**dataset, path, impl->georeference, impl->layout);
@@ -163,6 +166,7 @@ const DemInfo& DemSource::info() const { return impl_->info; }
 int DemSource::max_level() const { return impl_->info.max_level; }
 geo::Lattice DemSource::LatticeOf(int level) const { return impl_->Plan(level).lattice; }
 std::uint64_t DemSource::fingerprint() const { return impl_->fingerprint; }
+StampedFiles DemSource::files() const { return impl_->handles.files(); }
 
 const std::vector<geo::TileRange>& DemSource::Available(int level) const {
   static const std::vector<geo::TileRange> none;

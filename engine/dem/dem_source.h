@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "engine/core/result.h"
+#include "engine/dem/file_stamp.h"
 #include "engine/geo/lattice.h"
 #include "engine/geo/tile_key.h"
 
@@ -29,6 +30,7 @@ struct DemOptions {
   int max_void_gap = 64;  // source samples: voids narrower than this along a row, column or diagonal are filled
   // Called now and then while Open scans the source, with the share done, 0..1. May be empty.
   std::function<void(double)> progress = {};
+  std::stop_token stop = {};  // Open gives up (kCancelled)
 };
 
 // Metres above the ellipsoid (or whatever the source counts from where no datum is stated).
@@ -112,7 +114,8 @@ class DemSource {
   // alone. Any valid key; tiles away from the source hold only the floor.
   HeightRange RangeBound(const geo::TileKey& key) const;
 
-  // Reads and resamples one tile. kUnavailable: the source cannot be read now. kCancelled: stopped.
+  // Reads and resamples one tile. kUnavailable: the source cannot be read now.
+  // kChanged: it is not the file that was opened any more. kCancelled: stopped.
   Result<TileHeights> Read(const geo::TileKey& key, std::stop_token stop = {}) const;
 
   // Heights at nodes of a level's lattice, row by row from the south-western one: the same bits as in its tiles. Any
@@ -131,6 +134,9 @@ class DemSource {
 
   // Identifies content and options: device, inode, size, mtime of the file and every option that changes heights.
   std::uint64_t fingerprint() const;
+
+  // What it is read from, as it was when it was opened.
+  StampedFiles files() const;
 
  private:
   class Impl;

@@ -9,10 +9,12 @@ namespace terrace::dem {
 
 Result<HandlePool::Handle> HandlePool::Borrow() {
   if (auto unchanged = CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
+  std::uint64_t epoch = 0;
   {
     const std::lock_guard lock(mutex_);
+    epoch = epoch_;
     if (!idle_.empty()) {
-      Handle handle(*this, std::move(idle_.back()));
+      Handle handle(*this, std::move(idle_.back()), epoch);
       idle_.pop_back();
       return handle;
     }
@@ -22,21 +24,24 @@ Result<HandlePool::Handle> HandlePool::Borrow() {
     return MakeError(ErrorCode::kUnavailable, "{}: cannot be opened any more ({}); restore the file", path_,
                      TakeGdalError());
   }
-  return Handle(*this, std::move(dataset));
+  // It may have been replaced between the look at it and the opening.
+  if (auto unchanged = CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
+  return Handle(*this, std::move(dataset), epoch);
 }
 
-Result<void> HandlePool::CheckUnchanged() const {
-  if (const auto changed = files_.FirstChanged()) {
-    return MakeError(ErrorCode::kUnavailable,
-                     "{}: {} was changed, replaced or removed since it was opened; load the dataset anew", path_,
-                     *changed == path_ ? "the file" : *changed);
+Result<void> HandlePool::CheckUnchanged() {
+  Result<void> unchanged = files_.CheckUnchanged(path_);
+  if (!unchanged) {
+    const std::lock_guard lock(mutex_);
+    ++epoch_;
+    idle_.clear();
   }
-  return {};
+  return unchanged;
 }
 
-void HandlePool::Return(GDALDatasetUniquePtr dataset) {
+void HandlePool::Return(GDALDatasetUniquePtr dataset, std::uint64_t epoch) {
   const std::lock_guard lock(mutex_);
-  idle_.push_back(std::move(dataset));
+  if (epoch == epoch_) idle_.push_back(std::move(dataset));
 }
 
 }  // namespace terrace::dem

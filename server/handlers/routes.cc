@@ -1,10 +1,14 @@
 #include "server/handlers/routes.h"
 
+#include <fmt/format.h>
+
+#include <map>
 #include <memory>
 #include <utility>
 
 #include "server/handlers/datasets_handler.h"
 #include "server/http/http_error.h"
+#include "server/http/negotiate.h"
 
 namespace terrace::server {
 namespace {
@@ -21,11 +25,21 @@ Response PlainText(int status, std::string_view content_type, std::string text) 
   return response;
 }
 
-Response Ready(bool draining) {
-  if (!draining) return PlainText(200, "text/plain; charset=utf-8", "ready\n");
-  Response response = PlainText(503, "text/plain; charset=utf-8", "draining\n");
-  response.headers.emplace_back("Retry-After", "5");
-  return response;
+// The first word is the state. A degraded server goes on answering, so it is not to be taken out of service. Reasons
+// name files: they are for the log.
+Response Ready(const Routes::State& state) {
+  if (state.draining()) {
+    Response response = PlainText(503, "text/plain; charset=utf-8", "draining\n");
+    response.headers.emplace_back("Retry-After", "5");
+    return response;
+  }
+  const std::map<std::string, std::string> troubles = state.troubles();
+  std::string text = troubles.empty() ? "ready\n" : "degraded\n";
+  for (const auto& [dataset, reason] : troubles) {
+    text += dataset.empty() ? "the configuration file is wrong, the last good one is in force\n"
+                            : fmt::format("dataset {}: its source cannot be opened as it is now\n", dataset);
+  }
+  return PlainText(200, "text/plain; charset=utf-8", std::move(text));
 }
 
 }  // namespace
@@ -58,6 +72,7 @@ asio::awaitable<Response> Routes::Serve(Request request) const {
     response = ServeNow(*route, request);
   }
   response.route = ToString(route->kind);
+  if (FindDataset(route->dataset, catalog_->datasets)) response.dataset = route->dataset;
   co_return response;
 }
 
@@ -74,7 +89,7 @@ Response Routes::ServeNow(const Route& route, const Request& request) const {
     case RouteKind::kDatasets:
       return terrace::server::Serve(datasets_, request, kRevalidate);
     case RouteKind::kReady:
-      return Ready(state_.draining());
+      return Ready(state_);
     case RouteKind::kMetrics:
       return PlainText(200, "text/plain; version=0.0.4; charset=utf-8", state_.metrics_text());
     default:

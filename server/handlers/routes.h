@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 
@@ -29,6 +30,7 @@ class Routes {
   // What the probes and /metrics ask.
   struct State {
     std::function<bool()> draining;
+    std::function<std::map<std::string, std::string>()> troubles;  // by dataset; "" is the configuration
     std::function<std::string()> metrics_text;
   };
 

@@ -85,8 +85,8 @@ TEST(Response, BecomesNotModifiedOnlyFromSuccess) {
 TEST(HttpError, NeverAnswersFiveHundred) {
   EXPECT_EQ(StatusOf(ErrorCode::kInvalidArgument), 400);
   EXPECT_EQ(StatusOf(ErrorCode::kNotFound), 404);
-  for (const ErrorCode code :
-       {ErrorCode::kUnavailable, ErrorCode::kOverloaded, ErrorCode::kCancelled, ErrorCode::kInternal}) {
+  for (const ErrorCode code : {ErrorCode::kUnavailable, ErrorCode::kChanged, ErrorCode::kOverloaded,
+                               ErrorCode::kCancelled, ErrorCode::kInternal}) {
     EXPECT_EQ(StatusOf(code), 503);
   }
 }
