@@ -24,6 +24,8 @@ enum class Criterion : std::uint8_t { kDelaunay, kDataDependent };
 enum class GlbCompression : std::uint8_t { kDraco, kNone, kQuantized, kMeshopt };
 enum class LogLevel : std::uint8_t { kDebug, kInfo, kWarn, kError, kOff };
 enum class LogFormat : std::uint8_t { kText, kJson };
+// Where and how requests are told of: server::AccessLogForm, which this room does not know.
+enum class AccessLog : std::uint8_t { kLog, kCombined, kJson, kOff };
 
 // Where the water of a dataset's water mask comes from: one of both, or neither.
 struct WaterConfig {
@@ -102,6 +104,8 @@ struct Config {
 
   LogLevel log_level = LogLevel::kInfo;
   LogFormat log_format = LogFormat::kText;
+  AccessLog access_log = AccessLog::kLog;
+  std::string access_log_file;  // of kCombined and kJson; empty: stderr
 
   friend bool operator==(const Config&, const Config&) = default;
 };

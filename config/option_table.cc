@@ -45,6 +45,17 @@ Codec<Config> Viewer() {
       SwitchToJson};
 }
 
+Codec<Config> AccessLogFile() {
+  return {[](const Json& value, const Place& place, Config& config) {
+            if (!value.is_string() || value.get_ref<const std::string&>().empty()) {
+              return place.Expected("the path of a file", value);
+            }
+            config.access_log_file = (place.directory() / value.get<std::string>()).string();
+          },
+          [](const Config& config) { return config.access_log_file.empty() ? Json() : Json(config.access_log_file); },
+          TextToJson};
+}
+
 Codec<DatasetConfig> Vertical() {
   Codec<DatasetConfig> codec = Choice(&DatasetConfig::vertical, {{"unknown", VerticalDatum::kUnknown}});
   codec.read = [read_word = codec.read](const Json& value, const Place& place, DatasetConfig& dataset) {
@@ -149,6 +160,13 @@ const std::vector<Option<Config>>& ServerOptionTable() {
                                    {"off", LogLevel::kOff}})},
       {"log_format", "FORMAT", "text for people, json for machines (one object a line); both on stderr",
        Choice(&Config::log_format, {{"text", LogFormat::kText}, {"json", LogFormat::kJson}})},
+      {"access_log", "FORM", "How requests are told of: log (lines of the log), combined, json or off",
+       Choice(&Config::access_log, {{"log", AccessLog::kLog},
+                                    {"combined", AccessLog::kCombined},
+                                    {"json", AccessLog::kJson},
+                                    {"off", AccessLog::kOff}})},
+      {"access_log_file", "FILE", "Where the access log goes if it is combined or json; by default stderr",
+       AccessLogFile()},
   };
   return table;
 }

@@ -4,8 +4,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <boost/asio/executor_work_guard.hpp>
-#include <boost/asio/io_context.hpp>
 #include <boost/asio/signal_set.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/this_coro.hpp>
@@ -22,6 +20,7 @@
 #include "server/handlers/routes.h"
 #include "server/handlers/static_files.h"
 #include "server/http/connection_set.h"
+#include "server/http/io_threads.h"
 #include "server/http/listener.h"
 #include "server/http/session.h"
 
@@ -55,7 +54,7 @@ Result<void> CheckNames(const std::vector<DatasetView>& datasets) {
   return {};
 }
 
-unsigned IoThreads(unsigned configured) {
+unsigned IoThreadCount(unsigned configured) {
   return configured > 0 ? configured : std::max(1u, std::thread::hardware_concurrency() / 4);
 }
 
@@ -69,18 +68,19 @@ TileServiceOptions ServiceOptions(const ServerOptions& options) {
 
 }  // namespace
 
-// Members are destroyed from the last to the first: the io_context, whose unfinished coroutines hold sessions, goes
+// Members are destroyed from the last to the first: the io_contexts, whose unfinished coroutines hold sessions, go
 // before everything a session refers to.
 class Server::Impl {
  public:
-  Impl(CatalogPtr catalog, StaticFiles viewer, ServerOptions options)
+  Impl(CatalogPtr catalog, StaticFiles viewer, AccessLog access_log, ServerOptions options)
       : options_(std::move(options)),
+        access_log_(std::move(access_log)),
         viewer_(std::make_shared<const StaticFiles>(std::move(viewer))),
         tiles_(ServiceOptions(options_), std::bind_front(&Metrics::CountBuild, &metrics_)),
         connections_(options_.max_connections),
         routes_(MakeRoutes(std::move(catalog), options_)),
-        work_(io_.get_executor()),
-        signals_(io_) {}
+        io_(IoThreadCount(options_.io_threads)),
+        signals_(io_.first()) {}
 
   ~Impl() {
     if (!stopper_.joinable()) return;  // never started
@@ -94,8 +94,7 @@ class Server::Impl {
     listener_ = std::move(*listener);
     WatchSignals();
     listener_->Start();
-    const unsigned count = IoThreads(options_.io_threads);
-    for (unsigned i = 0; i < count; ++i) io_threads_.emplace_back([this] { io_.run(); });
+    io_.Start();
     stopper_ = std::thread([this] { StopWhenAsked(); });
     return {};
   }
@@ -106,6 +105,7 @@ class Server::Impl {
     {
       const std::lock_guard lock(state_mutex_);
       routes_.swap(routes);
+      ++catalogs_;
     }
     tiles_.RetainTilesOf(*catalog);
   }
@@ -114,6 +114,8 @@ class Server::Impl {
     const std::lock_guard lock(state_mutex_);
     troubles_ = std::move(troubles);
   }
+
+  void ReopenAccessLog() { access_log_.Reopen(); }
 
   std::uint16_t port() const { return listener_->port(); }
   const std::string& host() const { return options_.host; }
@@ -136,6 +138,7 @@ class Server::Impl {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [this] { return stop_requested_; });
     lock.unlock();
+    if (options_.on_stop) options_.on_stop();
     const bool drained = Stop();
     lock.lock();
     drained_ = drained;
@@ -153,9 +156,7 @@ class Server::Impl {
       connections_.AbortAll();
       connections_.WaitUntilEmpty(kLastWords);
     }
-    work_.reset();
-    io_.stop();
-    for (std::thread& thread : io_threads_) thread.join();
+    io_.Stop();
     tiles_.Shutdown();
     return drained;
   }
@@ -200,6 +201,16 @@ class Server::Impl {
     return troubles_;
   }
 
+  Metrics::ServerState CurrentState() const {
+    Metrics::ServerState state;
+    state.connections = connections_.size();
+    const std::lock_guard lock(state_mutex_);
+    state.datasets = routes_->catalog().datasets.size();
+    state.troubles = troubles_.size();
+    state.catalogs = catalogs_;
+    return state;
+  }
+
   // The request's frame keeps what it is answered from. Where that turns out to be gone, the next catalog answers.
   static asio::awaitable<Response> Serve(Impl* self, Request request) {
     const auto give_up = std::chrono::steady_clock::now() + kReplaceTime;
@@ -227,7 +238,7 @@ class Server::Impl {
     Routes::State state;
     state.draining = [this] { return connections_.draining(); };
     state.troubles = [this] { return Troubles(); };
-    state.metrics_text = [this] { return metrics_.Text(tiles_.stats(), RefinementStats(), connections_.size()); };
+    state.metrics_text = [this] { return metrics_.Text(tiles_.stats(), RefinementStats(), CurrentState()); };
     return state;
   }
 
@@ -237,16 +248,18 @@ class Server::Impl {
     context->options.idle_timeout = options_.idle_timeout;
     context->options.write_timeout = options_.write_timeout;
     context->options.max_body_bytes = kBodyBytes + kBytesPerLocation * options_.max_locations;
+    context->quick_handler = [this](const Request& request) { return CurrentRoutes()->ServeAtOnce(request); };
     context->handler = std::bind_front(&Impl::Serve, this);
     context->observer = [this](const ReplyRecord& record) {
       metrics_.CountReply(record);
-      spdlog::info("{}", FormatAccessLine(record));
+      access_log_.Write(record);
     };
     context->connections = &connections_;
     return context;
   }
 
   const ServerOptions options_;
+  AccessLog access_log_;
   const std::shared_ptr<const StaticFiles> viewer_;
   Metrics metrics_;
   TileService tiles_;
@@ -254,11 +267,10 @@ class Server::Impl {
   mutable std::mutex state_mutex_;
   std::shared_ptr<const Routes> routes_;         // never null; guarded by state_mutex_
   std::map<std::string, std::string> troubles_;  // by dataset; guarded by state_mutex_
-  asio::io_context io_;
-  asio::executor_work_guard<asio::io_context::executor_type> work_;
+  std::uint64_t catalogs_ = 0;                   // that have replaced one another; guarded by state_mutex_
+  IoThreads io_;
   asio::signal_set signals_;
   std::shared_ptr<Listener> listener_;
-  std::vector<std::thread> io_threads_;
 
   std::mutex mutex_;
   std::condition_variable changed_;
@@ -275,7 +287,10 @@ Result<std::unique_ptr<Server>> Server::Start(CatalogPtr catalog, ServerOptions 
   if (const Result<void> named = CheckNames(catalog->datasets); !named) return tl::unexpected(named.error());
   Result<StaticFiles> viewer = StaticFiles::Load(options.viewer_dir);
   if (!viewer) return tl::unexpected(viewer.error());
-  auto impl = std::make_unique<Impl>(std::move(catalog), std::move(*viewer), std::move(options));
+  Result<AccessLog> access_log = AccessLog::Open(options.access_log, options.access_log_file);
+  if (!access_log) return tl::unexpected(access_log.error());
+  auto impl =
+      std::make_unique<Impl>(std::move(catalog), std::move(*viewer), std::move(*access_log), std::move(options));
   if (const Result<void> started = impl->Start(); !started) return tl::unexpected(started.error());
   return std::unique_ptr<Server>(new Server(std::move(impl)));
 }
@@ -285,6 +300,8 @@ Result<void> Server::Replace(CatalogPtr catalog, const ServerOptions& options) {
   impl_->Replace(std::move(catalog), options);
   return {};
 }
+
+void Server::ReopenAccessLog() { impl_->ReopenAccessLog(); }
 
 void Server::SetTroubles(std::map<std::string, std::string> troubles) { impl_->SetTroubles(std::move(troubles)); }
 

@@ -14,6 +14,7 @@
 #include <string>
 
 #include "engine/core/result.h"
+#include "server/http/access_log.h"
 #include "server/tiles/catalog.h"
 #include "server/tiles/tile_service.h"
 
@@ -30,7 +31,9 @@ struct ServerOptions {
   std::size_t max_locations = 10'000;                // in one request for heights
   std::size_t max_connections = 1024;
   std::string cache_control = "public, max-age=3600";  // of tiles and layer.json
-  std::filesystem::path viewer_dir;                    // empty or missing: a plain page instead
+  AccessLogForm access_log = AccessLogForm::kLog;
+  std::filesystem::path access_log_file;  // of some forms; empty: stderr
+  std::filesystem::path viewer_dir;       // empty or missing: a plain page instead
   std::chrono::milliseconds header_timeout{5'000};
   std::chrono::milliseconds idle_timeout{30'000};
   std::chrono::milliseconds write_timeout{20'000};
@@ -39,6 +42,7 @@ struct ServerOptions {
   bool stop_on_signals = false;  // SIGINT and SIGTERM act like RequestStop
   // Called on an io thread for each of these signals: must not block.
   std::map<int, std::function<void()>> on_signal;
+  std::function<void()> on_stop;  // called once, when stopping begins; may be empty
   // Told that a source is not the one that was opened any more; on io threads, must not block. The request waits a
   // moment for Replace then. Empty: nobody will open it anew, and nobody waits.
   std::function<void()> on_source_changed;
@@ -48,7 +52,8 @@ class Server {
  public:
   // Listens when it returns. The catalog's functions are called on worker threads.
   // kInvalidArgument: a dataset's name is reserved, empty or used twice. kUnavailable: the address cannot be listened
-  // on, or the viewer cannot be read. Messages name the remedy.
+  // on, the viewer cannot be read, or the access log
+  // cannot be written. Messages name the remedy.
   static Result<std::unique_ptr<Server>> Start(CatalogPtr catalog, ServerOptions options);
 
   // Requests that come from now on are answered from `catalog`; those that have begun keep the one they began with.
@@ -59,6 +64,9 @@ class Server {
 
   // Stops and waits.
   ~Server();
+
+  // After a rotation.
+  void ReopenAccessLog();
 
   // What /readyz calls degraded: troubles by dataset, "" is the configuration. Nobody waits for a source in trouble.
   void SetTroubles(std::map<std::string, std::string> troubles);

@@ -54,6 +54,7 @@ LIBRARIES = [
     Library("Beast", r"boost/beast.*", r"server/http/(listener|session|request)\.cc"),
     Library("Boost", r"boost/.*", r"server/"),
     Library("CLI11", r"CLI/.*", r"server/cli/"),
+    Library("systemd", r"systemd/.*", r"server/cli/.*\.cc"),
     Library("prometheus-cpp", r"prometheus/.*", r"server/.*\.cc"),
     # What a room promises not to know: threads and clocks, files, sockets.
     Library("threads", r"(thread|mutex|shared_mutex|condition_variable|semaphore|future)", r"(engine/dem|server)/"),

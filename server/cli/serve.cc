@@ -23,6 +23,7 @@
 #include "server/cli/log.h"
 #include "server/cli/open_layers.h"
 #include "server/cli/progress.h"
+#include "server/cli/service_manager.h"
 #include "server/reload/reloader.h"
 #include "server/server.h"
 #include "server/tiles/pipeline_catalog.h"
@@ -155,6 +156,20 @@ bool OpenDatasets(const config::Config& config, std::vector<server::Dataset>& da
   return all_open;
 }
 
+server::AccessLogForm AccessLogFormOf(config::AccessLog form) {
+  switch (form) {
+    case config::AccessLog::kCombined:
+      return server::AccessLogForm::kCombined;
+    case config::AccessLog::kJson:
+      return server::AccessLogForm::kJson;
+    case config::AccessLog::kOff:
+      return server::AccessLogForm::kOff;
+    case config::AccessLog::kLog:
+      break;
+  }
+  return server::AccessLogForm::kLog;
+}
+
 server::ServerOptions OptionsOf(const config::Config& config) {
   server::ServerOptions options;
   options.host = config.listen.host;
@@ -172,6 +187,8 @@ server::ServerOptions OptionsOf(const config::Config& config) {
   options.request_deadline = config.request_deadline;
   options.drain_timeout = config.drain_timeout;
   options.stop_on_signals = true;
+  options.access_log = AccessLogFormOf(config.access_log);
+  options.access_log_file = config.access_log_file;
   if (config.viewer.enabled) {
     options.viewer_dir = config.viewer.directory;
     if (options.viewer_dir.empty()) {
@@ -224,6 +241,10 @@ int Serve(const ServeArguments& arguments) {
     for (const server::Dataset& dataset : served) generations.push_back(dataset.generation);
     refinements->Retain(generations);
   };
+  hooks.reloaded = [&] {
+    server->ReopenAccessLog();
+    NotifyReady("at " + server->url());
+  };
   hooks.tell = [&](const std::map<std::string, std::string>& troubles) { server->SetTroubles(troubles); };
   server::Reloader reloader(config, datasets, std::move(hooks));
 
@@ -231,7 +252,13 @@ int Serve(const ServeArguments& arguments) {
   options.refinement_stats = [refinements] { return refinements->stats(); };
   options.on_source_changed = config.watch ? std::function<void()>([&reloader] { reloader.Look(); }) : nullptr;
   // Without a file the end of a terminal is what it always was.
-  if (!arguments.config_file.empty() || !config.watch) options.on_signal[SIGHUP] = [&reloader] { reloader.Reload(); };
+  if (!arguments.config_file.empty() || !config.watch) {
+    options.on_signal[SIGHUP] = [&reloader] {
+      NotifyReloading();
+      reloader.Reload();
+    };
+  }
+  options.on_stop = NotifyStopping;
   options.on_signal[SIGUSR1] = [] { SetLogLevel(config::LogLevel::kDebug); };
   options.on_signal[SIGUSR2] = [level] { SetLogLevel(*level); };
   auto started = server::Server::Start(catalog_of(datasets, config), options);
@@ -244,6 +271,7 @@ int Serve(const ServeArguments& arguments) {
   reloader.Start(config.watch);
   std::printf("terrace: serving %zu dataset%s at %s\n", count, count == 1 ? "" : "s", server->url().c_str());
   std::fflush(stdout);
+  NotifyReady(fmt::format("{} dataset{} at {}", count, count == 1 ? "" : "s", server->url()));
   const bool drained = server->Wait();
   reloader.Stop();
   return drained ? kExitOk : kExitFailure;

@@ -1,6 +1,8 @@
 // What /metrics tells, in Prometheus' text format. Thread-safe.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <string>
 
@@ -18,9 +20,12 @@ class Metrics {
   void CountReply(const ReplyRecord& record);
   void CountBuild(const DatasetView& dataset, const Result<TilePtr>& tile);
 
+  struct ServerState {
+    std::size_t connections = 0, datasets = 0, troubles = 0;
+    std::uint64_t catalogs = 0;  // that have replaced one another
+  };
   // Everything counted so far and the state given.
-  std::string Text(const TileService::Stats& tiles, const ByteCacheStats& refinements,
-                   std::size_t open_connections) const;
+  std::string Text(const TileService::Stats& tiles, const ByteCacheStats& refinements, const ServerState& state) const;
 
  private:
   struct Families;

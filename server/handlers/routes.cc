@@ -58,6 +58,16 @@ Routes::Routes(CatalogPtr catalog, TileService& tiles, std::shared_ptr<const Sta
       index_(Document::Make(IndexHtml(catalog_->datasets), "text/html; charset=utf-8")),
       state_(std::move(state)) {}
 
+std::optional<Response> Routes::ServeAtOnce(const Request& request) const {
+  const Result<Route> route = Match(request.target);
+  if (!route) return ClientErrorResponse(route.error(), request.id);
+  if (route->kind == RouteKind::kHeights || route->kind == RouteKind::kMesh) return std::nullopt;
+  std::optional<Response> response =
+      route->kind == RouteKind::kTile ? tiles_.HandleNow(*route, request) : ServeNow(*route, request);
+  if (response) Label(*response, *route);
+  return response;
+}
+
 asio::awaitable<Response> Routes::Serve(Request request) const {
   const Result<Route> route = Match(request.target);
   if (!route) co_return ClientErrorResponse(route.error(), request.id);
@@ -71,9 +81,14 @@ asio::awaitable<Response> Routes::Serve(Request request) const {
   } else {
     response = ServeNow(*route, request);
   }
-  response.route = ToString(route->kind);
-  if (FindDataset(route->dataset, catalog_->datasets)) response.dataset = route->dataset;
+  Label(response, *route);
   co_return response;
+}
+
+// Names that nobody serves must not become labels of the metrics.
+void Routes::Label(Response& response, const Route& route) const {
+  response.route = ToString(route.kind);
+  if (!route.dataset.empty() && FindDataset(route.dataset, catalog_->datasets)) response.dataset = route.dataset;
 }
 
 Response Routes::ServeNow(const Route& route, const Request& request) const {

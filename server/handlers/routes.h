@@ -5,6 +5,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "server/asio.h"
@@ -38,10 +39,17 @@ class Routes {
   Routes(CatalogPtr catalog, TileService& tiles, std::shared_ptr<const StaticFiles> viewer, TileHandlerOptions options,
          std::size_t max_locations, State state);
 
+  // Answers what needs no waiting, which is most: all but tiles that must be built, heights and meshes. Nothing for
+  // those.
+  std::optional<Response> ServeAtOnce(const Request& request) const;
+
   // Answers GET, HEAD, and POST where TakesPost says so. Whoever waits keeps this alive.
   asio::awaitable<Response> Serve(Request request) const;
 
+  const Catalog& catalog() const { return *catalog_; }
+
  private:
+  void Label(Response& response, const Route& route) const;
   Response ServeNow(const Route& route, const Request& request) const;
   Response ServeViewer(const Route& route, const Request& request) const;
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <optional>
 #include <string>
 
 #include "server/asio.h"
@@ -26,6 +27,9 @@ class TileHandler {
   // `tiles` must outlive this.
   TileHandler(CatalogPtr catalog, TileService& tiles, TileHandlerOptions options);
 
+  // What needs no build: refusals, and tiles in the cache. Nothing otherwise. Precondition: a kTile route.
+  std::optional<Response> HandleNow(const Route& route, const Request& request) const;
+
   // Precondition: a kTile route.
   asio::awaitable<Response> Handle(Route route, Request request) const;
 
@@ -40,7 +44,7 @@ class TileHandler {
 // Metres with six significant digits, never below `error_m`.
 std::string FormatErrorUp(double error_m);
 
-// "cache;desc=miss, read;dur=1.234, ...": milliseconds, the steps on a miss only.
+// "cache;desc=miss, queue;dur=0.021, read;dur=1.234, ...": milliseconds, the steps of the build that was waited for.
 std::string FormatServerTiming(CacheStatus cache, const StageTimes& times);
 
 }  // namespace terrace::server

@@ -129,6 +129,8 @@ tl::expected<Request, BadRequest> ParseHead(std::string_view head) {
   request.accept = Joined(fields, http::field::accept);
   request.accept_encoding = Joined(fields, http::field::accept_encoding);
   request.if_none_match = Joined(fields, http::field::if_none_match);
+  request.referer = std::string(fields[http::field::referer]);
+  request.user_agent = std::string(fields[http::field::user_agent]);
   request.content_type = std::string(fields[http::field::content_type]);
   request.content_length = *PlainLength(fields);
   // RFC 9110, section 10.1.1: HTTP/1.0 knows no interim replies.

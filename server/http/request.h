@@ -26,8 +26,9 @@ struct Request {
   std::string accept;       // several fields joined with ", "
   std::string accept_encoding;
   std::string if_none_match;
-  std::string host;             // host and port: letters, digits and "-._~%!$&'()*+,;=:[]"; may be empty
-  std::string forwarded_proto;  // of a proxy before the server: "https", "http", or whatever else was sent
+  std::string host;                 // host and port: letters, digits and "-._~%!$&'()*+,;=:[]"; may be empty
+  std::string forwarded_proto;      // of a proxy before the server: "https", "http", or whatever else was sent
+  std::string referer, user_agent;  // for the log
   std::string content_type;
   std::size_t content_length = 0;  // of a POST
   bool expects_continue = false;   // the client waits for a 100 before it sends the body

@@ -106,6 +106,7 @@ void Reloader::Run() {
     }
     if (StepOpenings()) Publish();
     TellTroubles();
+    if (reload && hooks_.reloaded) hooks_.reloaded();
     lock.lock();
   }
 }

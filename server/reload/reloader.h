@@ -30,6 +30,8 @@ class Reloader {
     DatasetOpener open;
     // Serve these from now on, under these options. On the reloader's thread.
     std::function<void(const std::vector<Dataset>&, const config::Config&)> publish;
+    // A Reload was looked after; what has to be opened is not open yet. On the reloader's thread; may be empty.
+    std::function<void()> reloaded = {};
     // What is wrong, by dataset; "" is the configuration. Called when it changes, on the reloader's thread.
     std::function<void(const std::map<std::string, std::string>&)> tell;
   };

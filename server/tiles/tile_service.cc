@@ -37,15 +37,20 @@ TileService::TileService(TileServiceOptions options, BuildObserver observer)
 
 TileService::~TileService() { Shutdown(); }
 
+std::optional<ServedTile> TileService::Find(const Catalog& catalog, const TileRequest& request) {
+  TilePtr tile = cache_.Find(KeyOf(catalog, request));
+  if (!tile) return std::nullopt;
+  hits_.fetch_add(1, std::memory_order_relaxed);
+  return ServedTile(std::move(tile), CacheStatus::kHit);
+}
+
 asio::awaitable<Result<ServedTile>> TileService::Get(CatalogPtr catalog, TileRequest request,
                                                      Clock::time_point deadline) {
+  if (std::optional<ServedTile> found = Find(*catalog, request)) co_return *std::move(found);
   const CacheKey key = KeyOf(*catalog, request);
-  if (TilePtr tile = cache_.Find(key)) {
-    hits_.fetch_add(1, std::memory_order_relaxed);
-    co_return ServedTile(std::move(tile), CacheStatus::kHit);
-  }
-  SingleFlight::Build build = [this, catalog = std::move(catalog), request, key](std::stop_token stop) {
-    return BuildAndKeep(*catalog, request, key, std::move(stop));
+  SingleFlight::Build build = [this, catalog = std::move(catalog), request, key,
+                               asked = Clock::now()](std::stop_token stop) {
+    return BuildAndKeep(*catalog, request, key, asked, std::move(stop));
   };
   SingleFlight::Landing landing = co_await flights_.Join(key, std::move(build), deadline);
   if (!landing.joined) misses_.fetch_add(1, std::memory_order_relaxed);
@@ -54,10 +59,15 @@ asio::awaitable<Result<ServedTile>> TileService::Get(CatalogPtr catalog, TileReq
 }
 
 Result<TilePtr> TileService::BuildAndKeep(const Catalog& catalog, const TileRequest& request, const CacheKey& key,
-                                          std::stop_token stop) {
+                                          Clock::time_point asked, std::stop_token stop) {
   // Between the look into the cache and the start of this flight an earlier flight may have landed.
   if (TilePtr tile = cache_.Find(key)) return tile;
-  const SingleFlight::Work work = [&](std::stop_token token) { return catalog.build(request, std::move(token)); };
+  const auto queued = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - asked);
+  const SingleFlight::Work work = [&](std::stop_token token) {
+    Result<EncodedTile> built = catalog.build(request, std::move(token));
+    if (built) built->times.queue = queued;
+    return built;
+  };
   Result<TilePtr> tile = RunWork(work, "tile " + geo::ToString(request.key), std::move(stop));
   if (tile) cache_.Insert(key, *tile);
   if (observer_) observer_(catalog.datasets[request.dataset], tile);

@@ -8,6 +8,7 @@
 #include <chrono>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <stop_token>
 
 #include "engine/core/result.h"
@@ -47,8 +48,12 @@ class TileService {
   explicit TileService(TileServiceOptions options, BuildObserver observer = nullptr);
   ~TileService();
 
+  // The tile if it is in the cache; counts as a hit then. From any thread.
+  std::optional<ServedTile> Find(const Catalog& catalog, const TileRequest& request);
+
   // Errors: those of the catalog's builder, and kOverloaded, kCancelled, kUnavailable of SingleFlight::Join. The
-  // coroutine has to run on a strand. Only successes are kept. Precondition: the request names one of the datasets.
+  // coroutine has to run on a single thread. Only successes are kept. Precondition: the request names one of the
+  // datasets.
   asio::awaitable<Result<ServedTile>> Get(CatalogPtr catalog, TileRequest request, Clock::time_point deadline);
 
   // Runs `work` on a worker for this caller alone: nothing is shared or kept. Errors and conditions as those of Get. An
@@ -76,7 +81,7 @@ class TileService {
 
  private:
   Result<TilePtr> BuildAndKeep(const Catalog& catalog, const TileRequest& request, const CacheKey& key,
-                               std::stop_token stop);
+                               Clock::time_point asked, std::stop_token stop);
   std::shared_ptr<void> BeginLong();
 
   const BuildObserver observer_;

@@ -16,6 +16,7 @@ import random
 import re
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
@@ -379,6 +380,39 @@ class Configuration(ReloadTest):
         (home / "one.tif").unlink()
         os.rename(self.folder / "two", home / "two.tif")
         self.assertTrue(eventually(lambda: server.json("/datasets")["datasets"][0]["bounds"] != before), server.log())
+
+    def test_the_access_log_follows_a_rotation(self):
+        log = self.folder / "access.log"
+        config = {"datasets": [self.dataset("a")], "access_log": "json", "access_log_file": "access.log"}
+        server = self.serve("--config", self.write_config(config))
+        server.get("/a/0/0/0.terrain?v=1")
+        self.assertTrue(eventually(lambda: log.exists() and log.read_text().count("\n") == 1))
+        line = json.loads(log.read_text())
+        self.assertEqual((line["target"], line["status"], line["dataset"], line["cache"]),
+                         ("/a/0/0/0.terrain?v=1", 200, "a", "miss"))
+        os.rename(log, self.folder / "access.log.1")
+        server.process.send_signal(signal.SIGHUP)
+        self.assertTrue(eventually(log.exists))
+        server.get("/a/0/0/0.terrain?v=2")
+        self.assertTrue(eventually(lambda: "v=2" in log.read_text()))
+        self.assertNotIn("v=2", (self.folder / "access.log.1").read_text())
+        self.assertNotIn("v=1", server.log())
+
+    def test_systemd_is_told(self):
+        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
+            manager.bind(str(self.folder / "notify"))
+            manager.settimeout(30)
+            os.environ["NOTIFY_SOCKET"] = str(self.folder / "notify")
+            try:
+                server = self.serve("--config", self.write_config({"datasets": [self.dataset("a")]}))
+            finally:
+                del os.environ["NOTIFY_SOCKET"]
+            self.assertRegex(manager.recv(4096).decode(), r"READY=1\nSTATUS=1 dataset at http://127")
+            server.process.send_signal(signal.SIGHUP)
+            self.assertRegex(manager.recv(4096).decode(), r"^RELOADING=1\nMONOTONIC_USEC=\d+$")
+            self.assertIn("READY=1", manager.recv(4096).decode())
+            self.assertEqual(server.stop(), 0)
+            self.assertIn("STOPPING=1", manager.recv(4096).decode())
 
     def test_the_log_level_changes_while_it_runs(self):
         config = {"datasets": [self.dataset("a")], "log_level": "warn"}
