@@ -81,7 +81,7 @@ std::string SerializeHead(const Response& response, unsigned version, bool keep_
   Put(head, "Date", Date());
   if (HasBody(response.status)) {
     if (!response.content_type.empty()) Put(head, "Content-Type", response.content_type);
-    if (response.coding == Coding::kGzip) Put(head, "Content-Encoding", "gzip");
+    if (response.coding != Coding::kIdentity) Put(head, "Content-Encoding", NameOf(response.coding));
     Put(head, "Content-Length", fmt::to_string(response.body ? response.body->size() : 0));
   }
   if (!response.etag.empty()) Put(head, "ETag", response.etag);
@@ -134,7 +134,8 @@ bool MatchesEtag(std::string_view if_none_match, std::string_view etag) {
 
 std::string MakeEtag(std::string_view bytes, Coding coding) {
   const XXH128_hash_t hash = XXH3_128bits(bytes.data(), bytes.size());
-  return fmt::format("\"{:016x}{:016x}{}\"", hash.high64, hash.low64, coding == Coding::kGzip ? "-gz" : "");
+  const std::string_view name = NameOf(coding);
+  return fmt::format("\"{:016x}{:016x}{}{}\"", hash.high64, hash.low64, name.empty() ? "" : "-", name);
 }
 
 }  // namespace terrace::server
