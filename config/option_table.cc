@@ -1,6 +1,7 @@
 #include "config/option_table.h"
 
 #include <algorithm>
+#include <filesystem>
 
 #include "config/layer_options.h"
 #include "config/nearest_name.h"
@@ -53,7 +54,7 @@ Codec<Config> AccessLogFile() {
             config.access_log_file = (place.directory() / value.get<std::string>()).string();
           },
           [](const Config& config) { return config.access_log_file.empty() ? Json() : Json(config.access_log_file); },
-          TextToJson};
+          [](const std::string& text) { return Json(text.empty() ? text : std::filesystem::absolute(text).string()); }};
 }
 
 Codec<DatasetConfig> Vertical() {

@@ -39,9 +39,11 @@ asio::awaitable<Response> HeightsHandler::Handle(Route route, Request request) c
   auto query = std::make_shared<const HeightsQuery>(*std::move(parsed));
   SingleFlight::Work work = [catalog = catalog_, index = *dataset, coding,
                              query](std::stop_token stop) -> Result<EncodedTile> {
+    const auto begun = TileService::Clock::now();
     const Result<std::vector<float>> heights = catalog->read_points(index, query->points, std::move(stop));
     if (!heights) return tl::unexpected(heights.error());
     EncodedTile reply;
+    reply.times.read = std::chrono::duration_cast<std::chrono::microseconds>(TileService::Clock::now() - begun);
     reply.bytes = HeightsJson(*query, *heights, catalog->datasets[index].name);
     reply.bytes = Compress(std::move(reply.bytes), coding);
     reply.etag = MakeEtag(reply.bytes, coding);
@@ -56,6 +58,7 @@ asio::awaitable<Response> HeightsHandler::Handle(Route route, Request request) c
   response.body = Body(*reply, &(*reply)->bytes);
   response.coding = coding;
   response.vary = true;
+  response.headers.emplace_back("Server-Timing", FormatServerTiming(CacheStatus::kMiss, (*reply)->times));
   response.cache_control = "no-store";
   if (request.method == Method::kPost) co_return response;
   response.etag = (*reply)->etag;

@@ -10,10 +10,15 @@
 namespace terrace::server {
 namespace {
 
-Result<TilePtr> RunWork(const SingleFlight::Work& work, const std::string& what, std::stop_token stop) {
+using Clock = TileService::Clock;
+
+Result<TilePtr> RunWork(const SingleFlight::Work& work, const std::string& what, Clock::time_point asked,
+                        std::stop_token stop) {
+  const auto queued = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - asked);
   try {
     Result<EncodedTile> built = work(std::move(stop));
     if (!built) return tl::unexpected(std::move(built.error()));
+    built->times.queue = queued;
     return std::make_shared<const EncodedTile>(std::move(*built));
   } catch (const std::exception& exception) {  // std::bad_alloc above all
     return MakeError(ErrorCode::kUnavailable, "{}: {}", what, exception.what());
@@ -62,13 +67,8 @@ Result<TilePtr> TileService::BuildAndKeep(const Catalog& catalog, const TileRequ
                                           Clock::time_point asked, std::stop_token stop) {
   // Between the look into the cache and the start of this flight an earlier flight may have landed.
   if (TilePtr tile = cache_.Find(key)) return tile;
-  const auto queued = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - asked);
-  const SingleFlight::Work work = [&](std::stop_token token) {
-    Result<EncodedTile> built = catalog.build(request, std::move(token));
-    if (built) built->times.queue = queued;
-    return built;
-  };
-  Result<TilePtr> tile = RunWork(work, "tile " + geo::ToString(request.key), std::move(stop));
+  const SingleFlight::Work work = [&](std::stop_token token) { return catalog.build(request, std::move(token)); };
+  Result<TilePtr> tile = RunWork(work, "tile " + geo::ToString(request.key), asked, std::move(stop));
   if (tile) cache_.Insert(key, *tile);
   if (observer_) observer_(catalog.datasets[request.dataset], tile);
   return tile;
@@ -92,8 +92,9 @@ asio::awaitable<Result<TilePtr>> TileService::Run(SingleFlight::Work work, Lengt
   }
   CacheKey key;
   key.solo = 1 + solos_.fetch_add(1, std::memory_order_relaxed);
-  SingleFlight::Build build = [work = std::move(work), turn = std::move(turn)](std::stop_token stop) {
-    return RunWork(work, "work for one request", std::move(stop));
+  SingleFlight::Build build = [work = std::move(work), turn = std::move(turn),
+                               asked = Clock::now()](std::stop_token stop) {
+    return RunWork(work, "work for one request", asked, std::move(stop));
   };
   SingleFlight::Landing landing = co_await flights_.Join(key, std::move(build), deadline);
   co_return std::move(landing.tile);

@@ -99,5 +99,13 @@ TEST(SetDatasetOption, TakesTheImageOfImageryAlone) {
   EXPECT_THAT(errors, ElementsAre(IsError("--imagery", "the path of an image")));
 }
 
+TEST(ChangedServerOptions, NamesWhatDiffers) {
+  Config a, b;
+  EXPECT_TRUE(ChangedServerOptions(a, b).empty());
+  b.cache_bytes = 7;
+  b.datasets.emplace_back().name = "new";
+  EXPECT_EQ(ChangedServerOptions(a, b), (std::vector<std::string>{"datasets", "cache_bytes"}));
+}
+
 }  // namespace
 }  // namespace terrace::config

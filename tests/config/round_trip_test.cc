@@ -53,11 +53,15 @@ TEST(ToJson, ComesBackWithEveryOptionSet) {
   config.drain_timeout = std::chrono::milliseconds(0);
   config.log_level = LogLevel::kOff;
   config.log_format = LogFormat::kJson;
+  config.access_log = AccessLog::kCombined;
+  config.access_log_file = "/var/log/terrace/access.log";
+  config.watch = false;
   ExpectComesBack(config);
 }
 
 TEST(ToJson, NamesEveryOption) {
   Config config;
+  config.access_log_file = "/var/log/terrace/access.log";
   DatasetConfig dataset = Dataset("a");
   dataset.finest_error = 1;
   dataset.floor = 0;

@@ -52,6 +52,7 @@ TEST_F(HeightsTest, AnswersGetAndHead) {
   EXPECT_EQ(Elevation(reply, 0), 7005);
   EXPECT_EQ(Elevation(reply, 1), 8006);
   ASSERT_NE(reply.Field("etag"), "");
+  EXPECT_TRUE(reply.Field("server-timing").starts_with("cache;desc=miss, queue;dur=")) << reply.Field("server-timing");
   EXPECT_EQ(Fetch(port(), "/maui/heights?locations=5,7|6,8", "If-None-Match: " + reply.Field("etag") + "\r\n").status,
             304);
   EXPECT_EQ(Fetch(port(), "/nope/heights?locations=5,7").status, 404);
