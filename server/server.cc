@@ -4,6 +4,8 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/detached.hpp>
 #include <boost/asio/signal_set.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/this_coro.hpp>
@@ -19,7 +21,7 @@
 #include "server/handlers/metrics.h"
 #include "server/handlers/routes.h"
 #include "server/handlers/static_files.h"
-#include "server/http/connection_set.h"
+#include "server/http/edge.h"
 #include "server/http/io_threads.h"
 #include "server/http/listener.h"
 #include "server/http/session.h"
@@ -58,6 +60,12 @@ unsigned IoThreadCount(unsigned configured) {
   return configured > 0 ? configured : std::max(1u, std::thread::hardware_concurrency() / 4);
 }
 
+// Sources that workers have open, and what opens files on the way: the log, GDAL's and PROJ's own.
+std::size_t DescriptorsForFiles(const ServerOptions& options) {
+  const unsigned workers = options.worker_threads > 0 ? options.worker_threads : std::thread::hardware_concurrency();
+  return 16 + 4 * std::size_t{workers};
+}
+
 TileServiceOptions ServiceOptions(const ServerOptions& options) {
   TileServiceOptions service;
   service.worker_threads = options.worker_threads;
@@ -72,12 +80,12 @@ TileServiceOptions ServiceOptions(const ServerOptions& options) {
 // before everything a session refers to.
 class Server::Impl {
  public:
-  Impl(CatalogPtr catalog, StaticFiles viewer, AccessLog access_log, ServerOptions options)
+  Impl(CatalogPtr catalog, StaticFiles viewer, AccessLog access_log, std::unique_ptr<Edge> edge, ServerOptions options)
       : options_(std::move(options)),
         access_log_(std::move(access_log)),
         viewer_(std::make_shared<const StaticFiles>(std::move(viewer))),
         tiles_(ServiceOptions(options_), std::bind_front(&Metrics::CountBuild, &metrics_)),
-        connections_(options_.max_connections),
+        edge_(std::move(edge)),
         routes_(MakeRoutes(std::move(catalog), options_)),
         io_(IoThreadCount(options_.io_threads)),
         signals_(io_.first()) {}
@@ -94,6 +102,7 @@ class Server::Impl {
     listener_ = std::move(*listener);
     WatchSignals();
     listener_->Start();
+    if (edge_->tls) asio::co_spawn(io_.first(), WatchCertificate(edge_->tls.get()), asio::detached);
     io_.Start();
     stopper_ = std::thread([this] { StopWhenAsked(); });
     return {};
@@ -119,6 +128,7 @@ class Server::Impl {
 
   std::uint16_t port() const { return listener_->port(); }
   const std::string& host() const { return options_.host; }
+  bool is_tls() const { return edge_->tls != nullptr; }
 
   void RequestStop() {
     const std::lock_guard lock(mutex_);
@@ -148,13 +158,13 @@ class Server::Impl {
 
   bool Stop() {
     listener_->Close();
-    connections_.Drain();
-    const bool drained = connections_.WaitUntilEmpty(options_.drain_timeout);
+    edge_->connections.Drain();
+    const bool drained = edge_->connections.WaitUntilEmpty(options_.drain_timeout);
     tiles_.CancelBuilds();
-    if (!drained && !connections_.WaitUntilEmpty(kLastWords)) {
-      spdlog::warn("{} connections are cut off: the drain timeout has passed", connections_.size());
-      connections_.AbortAll();
-      connections_.WaitUntilEmpty(kLastWords);
+    if (!drained && !edge_->connections.WaitUntilEmpty(kLastWords)) {
+      spdlog::warn("{} connections are cut off: the drain timeout has passed", edge_->connections.size());
+      edge_->connections.AbortAll();
+      edge_->connections.WaitUntilEmpty(kLastWords);
     }
     io_.Stop();
     tiles_.Shutdown();
@@ -203,7 +213,7 @@ class Server::Impl {
 
   Metrics::ServerState CurrentState() const {
     Metrics::ServerState state;
-    state.connections = connections_.size();
+    state.edge = edge_->stats();
     const std::lock_guard lock(state_mutex_);
     state.datasets = routes_->catalog().datasets.size();
     state.troubles = troubles_.size();
@@ -212,17 +222,17 @@ class Server::Impl {
   }
 
   // The request's frame keeps what it is answered from. Where that turns out to be gone, the next catalog answers.
-  static asio::awaitable<Response> Serve(Impl* self, Request request) {
+  static asio::awaitable<Response> Serve(Impl* self, Route route, Request request) {
     const auto give_up = std::chrono::steady_clock::now() + kReplaceTime;
     for (;;) {
       const std::shared_ptr<const Routes> routes = self->CurrentRoutes();
       Request copy = request;
-      Response response = co_await routes->Serve(std::move(copy));
+      Response response = co_await routes->Serve(route, std::move(copy));
       if (!response.source_changed || !self->options_.on_source_changed) co_return response;
       self->options_.on_source_changed();
       asio::steady_timer timer(co_await asio::this_coro::executor);
       while (self->CurrentRoutes() == routes) {
-        const bool is_hopeless = self->connections_.draining() || self->Troubles().contains(response.dataset);
+        const bool is_hopeless = self->edge_->connections.draining() || self->Troubles().contains(response.dataset);
         if (is_hopeless || std::chrono::steady_clock::now() >= give_up) co_return response;
         timer.expires_after(kReplacePeriod);
         co_await timer.async_wait(asio::use_awaitable);
@@ -236,7 +246,7 @@ class Server::Impl {
 
   Routes::State RouteState() {
     Routes::State state;
-    state.draining = [this] { return connections_.draining(); };
+    state.draining = [this] { return edge_->connections.draining(); };
     state.troubles = [this] { return Troubles(); };
     state.metrics_text = [this] { return metrics_.Text(tiles_.stats(), RefinementStats(), CurrentState()); };
     return state;
@@ -244,17 +254,23 @@ class Server::Impl {
 
   std::shared_ptr<const SessionContext> Context() {
     auto context = std::make_shared<SessionContext>();
-    context->options.header_timeout = options_.header_timeout;
-    context->options.idle_timeout = options_.idle_timeout;
+    context->options.read = {options_.header_timeout, options_.idle_timeout};
     context->options.write_timeout = options_.write_timeout;
+    context->options.min_rate = options_.min_read_rate;
     context->options.max_body_bytes = kBodyBytes + kBytesPerLocation * options_.max_locations;
-    context->quick_handler = [this](const Request& request) { return CurrentRoutes()->ServeAtOnce(request); };
+    context->quick_handler = [this](const Route& route, const Request& request) {
+      return CurrentRoutes()->ServeAtOnce(route, request);
+    };
     context->handler = std::bind_front(&Impl::Serve, this);
     context->observer = [this](const ReplyRecord& record) {
       metrics_.CountReply(record);
       access_log_.Write(record);
     };
-    context->connections = &connections_;
+    context->connections = &edge_->connections;
+    context->transfers = &edge_->transfers;
+    context->gate = &edge_->gate;
+    context->cors = edge_->cors;
+    context->tls = edge_->tls.get();
     return context;
   }
 
@@ -263,7 +279,7 @@ class Server::Impl {
   const std::shared_ptr<const StaticFiles> viewer_;
   Metrics metrics_;
   TileService tiles_;
-  ConnectionSet connections_;
+  const std::unique_ptr<Edge> edge_;
   mutable std::mutex state_mutex_;
   std::shared_ptr<const Routes> routes_;         // never null; guarded by state_mutex_
   std::map<std::string, std::string> troubles_;  // by dataset; guarded by state_mutex_
@@ -289,8 +305,10 @@ Result<std::unique_ptr<Server>> Server::Start(CatalogPtr catalog, ServerOptions 
   if (!viewer) return tl::unexpected(viewer.error());
   Result<AccessLog> access_log = AccessLog::Open(options.access_log, options.access_log_file);
   if (!access_log) return tl::unexpected(access_log.error());
-  auto impl =
-      std::make_unique<Impl>(std::move(catalog), std::move(*viewer), std::move(*access_log), std::move(options));
+  Result<std::unique_ptr<Edge>> edge = Edge::Open(options.edge, DescriptorsForFiles(options));
+  if (!edge) return tl::unexpected(edge.error());
+  auto impl = std::make_unique<Impl>(std::move(catalog), std::move(*viewer), std::move(*access_log), *std::move(edge),
+                                     std::move(options));
   if (const Result<void> started = impl->Start(); !started) return tl::unexpected(started.error());
   return std::unique_ptr<Server>(new Server(std::move(impl)));
 }
@@ -310,7 +328,7 @@ std::uint16_t Server::port() const { return impl_->port(); }
 std::string Server::url() const {
   const std::string& host = impl_->host();
   const bool bare_v6 = host.find(':') != std::string::npos && !host.starts_with('[');
-  return fmt::format("http://{}:{}/", bare_v6 ? "[" + host + "]" : host, port());
+  return fmt::format("{}://{}:{}/", impl_->is_tls() ? "https" : "http", bare_v6 ? "[" + host + "]" : host, port());
 }
 
 void Server::RequestStop() { impl_->RequestStop(); }

@@ -15,6 +15,7 @@
 
 #include "engine/core/result.h"
 #include "server/http/access_log.h"
+#include "server/http/edge_options.h"
 #include "server/tiles/catalog.h"
 #include "server/tiles/tile_service.h"
 
@@ -22,14 +23,14 @@ namespace terrace::server {
 
 struct ServerOptions {
   std::string host = "127.0.0.1";
-  std::uint16_t port = 8080;                         // 0: any that is free
-  unsigned io_threads = 0;                           // 0: a quarter of the processors, at least one
-  unsigned worker_threads = 0;                       // 0: as many as processors
-  std::size_t queue_length = 256;                    // builds that wait for a worker
-  std::size_t cache_bytes = std::size_t{256} << 20;  // of finished tiles; 0: none
-  std::function<ByteCacheStats()> refinement_stats;  // of what tiles are made from; may be empty
-  std::size_t max_locations = 10'000;                // in one request for heights
-  std::size_t max_connections = 1024;
+  std::uint16_t port = 8080;                           // 0: any that is free
+  unsigned io_threads = 0;                             // 0: a quarter of the processors, at least one
+  unsigned worker_threads = 0;                         // 0: as many as processors
+  std::size_t queue_length = 256;                      // builds that wait for a worker
+  std::size_t cache_bytes = std::size_t{256} << 20;    // of finished tiles; 0: none
+  std::function<ByteCacheStats()> refinement_stats;    // of what tiles are made from; may be empty
+  std::size_t max_locations = 10'000;                  // in one request for heights
+  EdgeOptions edge;                                    // limits of clients, tokens, proxies, TLS
   std::string cache_control = "public, max-age=3600";  // of tiles and layer.json
   AccessLogForm access_log = AccessLogForm::kLog;
   std::filesystem::path access_log_file;  // of some forms; empty: stderr
@@ -37,6 +38,7 @@ struct ServerOptions {
   std::chrono::milliseconds header_timeout{5'000};
   std::chrono::milliseconds idle_timeout{30'000};
   std::chrono::milliseconds write_timeout{20'000};
+  std::size_t min_read_rate = 4096;                    // bytes a second that a client has to take; 0: any
   std::chrono::milliseconds request_deadline{30'000};  // of a tile, waiting for its build included
   std::chrono::milliseconds drain_timeout{10'000};
   bool stop_on_signals = false;  // SIGINT and SIGTERM act like RequestStop
@@ -72,7 +74,7 @@ class Server {
   void SetTroubles(std::map<std::string, std::string> troubles);
 
   std::uint16_t port() const;
-  std::string url() const;  // "http://127.0.0.1:8080/"
+  std::string url() const;  // "http://127.0.0.1:8080/"; https with a certificate
 
   // Begins to stop and returns at once. From any thread, any number of times; not from a signal handler.
   void RequestStop();

@@ -183,7 +183,12 @@ std::string Metrics::Text(const TileService::Stats& tiles, const ByteCacheStats&
       tiles.joined);
   add(kGauge, "terrace_flights", "Builds under way or waiting", tiles.in_flight);
   add(kGauge, "terrace_queue_length", "Builds that wait for a worker", tiles.queued);
-  add(kGauge, "terrace_http_connections", "Open connections", state.connections);
+  add(kGauge, "terrace_http_connections", "Open connections", state.edge.connections);
+  add(kCounter, "terrace_http_connections_refused_total", "Connections turned away", state.edge.refused_connections);
+  add(kGauge, "terrace_http_transfer_bytes", "Bytes of bodies on their way", state.edge.transfers.held_bytes);
+  add(kCounter, "terrace_http_transfers_refused_total", "Bodies that found no room", state.edge.transfers.refused);
+  add(kCounter, "terrace_http_transfers_cut_total", "Replies cut off because others needed their room",
+      state.edge.transfers.cut);
   add(kGauge, "terrace_datasets", "Datasets served", state.datasets);
   add(kGauge, "terrace_degraded", "Troubles that /readyz tells of", state.troubles);
   add(kCounter, "terrace_catalogs_total", "How often what is served was replaced", state.catalogs);

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "server/http/access_log.h"
+#include "server/http/edge.h"
 #include "server/tiles/dataset_view.h"
 #include "server/tiles/tile_service.h"
 
@@ -21,7 +22,8 @@ class Metrics {
   void CountBuild(const DatasetView& dataset, const Result<TilePtr>& tile);
 
   struct ServerState {
-    std::size_t connections = 0, datasets = 0, troubles = 0;
+    EdgeStats edge;
+    std::size_t datasets = 0, troubles = 0;
     std::uint64_t catalogs = 0;  // that have replaced one another
   };
   // Everything counted so far and the state given.

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <iterator>
 #include <map>
 #include <memory>
 #include <utility>
@@ -42,6 +44,8 @@ Response Ready(const Routes::State& state) {
   return PlainText(200, "text/plain; charset=utf-8", std::move(text));
 }
 
+bool SeesAll(const Request& request) { return !request.grant || request.grant->sees_all; }
+
 }  // namespace
 
 Routes::Routes(CatalogPtr catalog, TileService& tiles, std::shared_ptr<const StaticFiles> viewer,
@@ -58,37 +62,35 @@ Routes::Routes(CatalogPtr catalog, TileService& tiles, std::shared_ptr<const Sta
       index_(Document::Make(IndexHtml(catalog_->datasets), "text/html; charset=utf-8")),
       state_(std::move(state)) {}
 
-std::optional<Response> Routes::ServeAtOnce(const Request& request) const {
-  const Result<Route> route = Match(request.target);
-  if (!route) return ClientErrorResponse(route.error(), request.id);
-  if (route->kind == RouteKind::kHeights || route->kind == RouteKind::kMesh) return std::nullopt;
+std::optional<Response> Routes::ServeAtOnce(const Route& route, const Request& request) const {
+  if (route.kind == RouteKind::kHeights || route.kind == RouteKind::kMesh) return std::nullopt;
   std::optional<Response> response =
-      route->kind == RouteKind::kTile ? tiles_.HandleNow(*route, request) : ServeNow(*route, request);
-  if (response) Label(*response, *route);
+      route.kind == RouteKind::kTile ? tiles_.HandleNow(route, request) : ServeNow(route, request);
+  if (response) Label(*response, route.kind, route.dataset);
   return response;
 }
 
-asio::awaitable<Response> Routes::Serve(Request request) const {
-  const Result<Route> route = Match(request.target);
-  if (!route) co_return ClientErrorResponse(route.error(), request.id);
+asio::awaitable<Response> Routes::Serve(Route route, Request request) const {
+  const RouteKind kind = route.kind;
+  const std::string dataset = route.dataset;
   Response response;
-  if (route->kind == RouteKind::kTile) {
-    response = co_await tiles_.Handle(*route, std::move(request));
-  } else if (route->kind == RouteKind::kHeights) {
-    response = co_await heights_.Handle(*route, std::move(request));
-  } else if (route->kind == RouteKind::kMesh) {
-    response = co_await areas_.Handle(*route, std::move(request));
+  if (kind == RouteKind::kTile) {
+    response = co_await tiles_.Handle(std::move(route), std::move(request));
+  } else if (kind == RouteKind::kHeights) {
+    response = co_await heights_.Handle(std::move(route), std::move(request));
+  } else if (kind == RouteKind::kMesh) {
+    response = co_await areas_.Handle(std::move(route), std::move(request));
   } else {
-    response = ServeNow(*route, request);
+    response = ServeNow(route, request);
   }
-  Label(response, *route);
+  Label(response, kind, dataset);
   co_return response;
 }
 
 // Names that nobody serves must not become labels of the metrics.
-void Routes::Label(Response& response, const Route& route) const {
-  response.route = ToString(route.kind);
-  if (!route.dataset.empty() && FindDataset(route.dataset, catalog_->datasets)) response.dataset = route.dataset;
+void Routes::Label(Response& response, RouteKind kind, const std::string& dataset) const {
+  response.route = ToString(kind);
+  if (!dataset.empty() && FindDataset(dataset, catalog_->datasets)) response.dataset = dataset;
 }
 
 Response Routes::ServeNow(const Route& route, const Request& request) const {
@@ -102,7 +104,9 @@ Response Routes::ServeNow(const Route& route, const Request& request) const {
   }
   switch (route.kind) {
     case RouteKind::kDatasets:
-      return terrace::server::Serve(datasets_, request, kRevalidate);
+      if (SeesAll(request)) return terrace::server::Serve(datasets_, request, kRevalidate);
+      return terrace::server::Serve(Document::Make(DatasetsJson(SeenBy(request)), "application/json"), request,
+                                    kRevalidate);
     case RouteKind::kReady:
       return Ready(state_);
     case RouteKind::kMetrics:
@@ -112,10 +116,23 @@ Response Routes::ServeNow(const Route& route, const Request& request) const {
   }
 }
 
+std::vector<DatasetView> Routes::SeenBy(const Request& request) const {
+  std::vector<DatasetView> seen;
+  std::copy_if(catalog_->datasets.begin(), catalog_->datasets.end(), std::back_inserter(seen),
+               [&](const DatasetView& view) { return request.grant->Sees(view.name); });
+  return seen;
+}
+
 // Its pages keep their state in the query, so any query goes.
 Response Routes::ServeViewer(const Route& route, const Request& request) const {
   if (const Document* file = viewer_->Find(route.file)) return terrace::server::Serve(*file, request, kRevalidate);
-  if (viewer_->empty() && route.file == "index.html") return terrace::server::Serve(index_, request, kRevalidate);
+  if (viewer_->empty() && route.file == "index.html") {
+    if (SeesAll(request)) return terrace::server::Serve(index_, request, kRevalidate);
+    Response index = terrace::server::Serve(Document::Make(IndexHtml(SeenBy(request)), "text/html; charset=utf-8"),
+                                            request, kRevalidate);
+    index.for_grant = true;
+    return index;
+  }
   return ProblemResponse(404, "no such URL; /datasets lists those of each dataset", request.id);
 }
 

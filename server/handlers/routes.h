@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "server/asio.h"
 #include "server/handlers/area_handler.h"
@@ -41,17 +42,18 @@ class Routes {
 
   // Answers what needs no waiting, which is most: all but tiles that must be built, heights and meshes. Nothing for
   // those.
-  std::optional<Response> ServeAtOnce(const Request& request) const;
+  std::optional<Response> ServeAtOnce(const Route& route, const Request& request) const;
 
   // Answers GET, HEAD, and POST where TakesPost says so. Whoever waits keeps this alive.
-  asio::awaitable<Response> Serve(Request request) const;
+  asio::awaitable<Response> Serve(Route route, Request request) const;
 
   const Catalog& catalog() const { return *catalog_; }
 
  private:
-  void Label(Response& response, const Route& route) const;
+  void Label(Response& response, RouteKind kind, const std::string& dataset) const;
   Response ServeNow(const Route& route, const Request& request) const;
   Response ServeViewer(const Route& route, const Request& request) const;
+  std::vector<DatasetView> SeenBy(const Request& request) const;
 
   const CatalogPtr catalog_;
   const TileHandler tiles_;

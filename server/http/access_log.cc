@@ -48,8 +48,10 @@ std::string Latin1(std::string_view text) {
   return utf8;
 }
 
-// Without the port: IPv6 addresses have colons of their own.
-std::string_view AddressOf(std::string_view peer) { return peer.substr(0, peer.rfind(':')); }
+// The peer without its port: IPv6 addresses have colons of their own.
+std::string_view ClientOf(const ReplyRecord& record) {
+  return record.client.empty() ? record.peer.substr(0, record.peer.rfind(':')) : record.client;
+}
 
 std::string_view ProtocolOf(const ReplyRecord& record) { return record.version == 10 ? "HTTP/1.0" : "HTTP/1.1"; }
 
@@ -61,13 +63,17 @@ int OpenToAppend(const std::filesystem::path& file) {
 }  // namespace
 
 std::string FormatAccessLine(const ReplyRecord& record) {
-  return fmt::format("{} \"{}\" {} {} B {:.3f} ms cache={} id={} peer={}", Escaped(record.method),
-                     Escaped(record.target), record.status, record.body_bytes,
-                     static_cast<double>(record.duration.count()) / 1000, record.cache, record.request_id, record.peer);
+  std::string line =
+      fmt::format("{} \"{}\" {} {} B {:.3f} ms cache={} id={} peer={}", Escaped(record.method), Escaped(record.target),
+                  record.status, record.body_bytes, static_cast<double>(record.duration.count()) / 1000, record.cache,
+                  record.request_id, record.peer);
+  if (!record.client.empty()) line.append(" client=").append(record.client);
+  if (!record.token_name.empty()) line.append(" token=").append(Escaped(record.token_name));
+  return line;
 }
 
 std::string FormatCombinedLine(const ReplyRecord& record, SystemClock::time_point now) {
-  return fmt::format("{} - - [{:%d/%b/%Y:%H:%M:%S} +0000] \"{} {} {}\" {} {} \"{}\" \"{}\"", AddressOf(record.peer),
+  return fmt::format("{} - - [{:%d/%b/%Y:%H:%M:%S} +0000] \"{} {} {}\" {} {} \"{}\" \"{}\"", ClientOf(record),
                      fmt::gmtime(SystemClock::to_time_t(now)), Escaped(record.method), Escaped(record.target),
                      ProtocolOf(record), record.status, record.body_bytes, EscapedOrDash(record.referer),
                      EscapedOrDash(record.user_agent));
@@ -77,7 +83,7 @@ std::string FormatJsonLine(const ReplyRecord& record, SystemClock::time_point no
   const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(now.time_since_epoch()).count() % 1000;
   nlohmann::ordered_json line;
   line["time"] = fmt::format("{:%Y-%m-%dT%H:%M:%S}.{:03}Z", fmt::gmtime(SystemClock::to_time_t(now)), ms);
-  line["client"] = Latin1(AddressOf(record.peer));
+  line["client"] = Latin1(ClientOf(record));
   line["method"] = Latin1(record.method);
   line["target"] = Latin1(record.target);
   line["protocol"] = ProtocolOf(record);
@@ -88,6 +94,7 @@ std::string FormatJsonLine(const ReplyRecord& record, SystemClock::time_point no
   line["dataset"] = record.dataset;
   line["cache"] = record.cache;
   line["request_id"] = record.request_id;
+  line["token"] = Latin1(record.token_name);
   line["referer"] = Latin1(record.referer);
   line["user_agent"] = Latin1(record.user_agent);
   return line.dump(-1, ' ', /*ensure_ascii=*/true);

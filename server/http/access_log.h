@@ -26,7 +26,9 @@ struct ReplyRecord {
   std::string_view dataset;               // one that exists, or empty
   std::string_view cache;                 // hit, miss, join or -
   std::string_view request_id;
-  std::string_view peer;  // address and port
+  std::string_view peer;        // address and port
+  std::string_view client;      // whom a trusted proxy speaks for; empty where the peer is the client
+  std::string_view token_name;  // empty: none
   std::string_view referer, user_agent;
 };
 
@@ -36,6 +38,7 @@ inline constexpr std::size_t kMaxLoggedTargetBytes = 512;
 // line is one line; what is longer than kMaxLoggedTargetBytes is cut.
 
 // GET "/maui/0/0/0.terrain" 200 4711 B 12.345 ms cache=miss id=0123456789abcdef peer=127.0.0.1:4242
+// and client= and token= where there are such.
 std::string FormatAccessLine(const ReplyRecord& record);
 
 // As Apache and nginx write it: client - - [21/Nov/2026:06:00:06 +0000] "GET / HTTP/1.1" 200 4711 "referer" "agent"

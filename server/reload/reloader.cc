@@ -38,6 +38,18 @@ void WarnOfRestart(const config::Config& now, const config::Config& next) {
   }
 }
 
+// Who may see a dataset is settled at the start. Until then a new one is seen by tokens alone where there are any.
+void WarnOfAccess(const std::vector<DatasetSlot>& slots, const config::Config& next) {
+  if (next.tokens.empty()) return;
+  for (const config::DatasetConfig& dataset : next.datasets) {
+    const auto known = std::find_if(slots.begin(), slots.end(),
+                                    [&](const DatasetSlot& slot) { return slot.wanted().name == dataset.name; });
+    const bool was_public = known != slots.end() && known->wanted().is_public;
+    if (dataset.is_public == was_public) continue;
+    spdlog::warn("configuration: \"public\" of dataset {} has changed, which takes a restart", dataset.name);
+  }
+}
+
 std::string TextOf(const std::vector<config::ConfigError>& errors) {
   std::string text;
   for (const config::ConfigError& error : errors) {
@@ -140,6 +152,7 @@ void Reloader::LookAtConfig(bool asked) {
 // Datasets that are described as before go on; the others go on with what they have until that is replaced.
 void Reloader::Apply(config::Config next) {
   WarnOfRestart(config_, next);
+  WarnOfAccess(slots_, next);
   std::vector<DatasetSlot> slots;
   for (const config::DatasetConfig& wanted : next.datasets) {
     const auto known = std::find_if(slots_.begin(), slots_.end(),
