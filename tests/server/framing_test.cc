@@ -1,11 +1,10 @@
 // Messages that two readers could cut differently, and messages that are too large, too slow or too many.
 #include <gtest/gtest.h>
-#include <unistd.h>
 
-#include <fstream>
 #include <thread>
 #include <vector>
 
+#include "tests/server/resident_memory.h"
 #include "tests/server/server_fixture.h"
 
 namespace terrace::server {
@@ -73,20 +72,6 @@ TEST_F(Framing, LimitsHeadAndTarget) {
   std::string many;
   for (int i = 0; i < 5'000; ++i) many += "A: b\r\n";
   ExpectOneAnswer(Get("/livez", many), 431);
-}
-
-// Sanitizers keep freed memory and shadow it: resident memory says nothing there.
-#if defined(__has_feature)
-constexpr bool kSanitized = __has_feature(address_sanitizer) || __has_feature(thread_sanitizer);
-#else
-constexpr bool kSanitized = false;
-#endif
-
-long ResidentKib() {
-  std::ifstream statm("/proc/self/statm");
-  long size = 0, resident = 0;
-  statm >> size >> resident;
-  return resident * (::sysconf(_SC_PAGESIZE) / 1024);
 }
 
 TEST_F(Framing, FortyMegabytesOfHeaderCostNothing) {

@@ -34,7 +34,9 @@ void ServerFixture::Start(ServerOptions options) {
   DatasetView maui;
   maui.name = "maui";
   maui.available = {{{0, 0, 1, 0}}, {{0, 0, 3, 1}}, {{0, 0, 7, 3}}, {{0, 0, 15, 7}}};
-  auto server = Server::Start({maui}, builder_, options);
+  std::vector<DatasetView> datasets = more_datasets_;
+  datasets.insert(datasets.begin(), maui);
+  auto server = Server::Start(datasets, builder_, options);
   ASSERT_TRUE(server) << server.error().message;
   server_ = std::move(*server);
 }
