@@ -48,6 +48,14 @@ Routes::Routes(std::span<const DatasetView> datasets, TileService& tiles, Static
       index_(Document::Make(IndexHtml(datasets), "text/html; charset=utf-8")),
       state_(std::move(state)) {}
 
+std::optional<Response> Routes::ServeAtOnce(const Route& route, const Request& request) const {
+  if (route.kind == RouteKind::kHeights || route.kind == RouteKind::kMesh) return std::nullopt;
+  std::optional<Response> response =
+      route.kind == RouteKind::kTile ? tiles_.HandleNow(route, request) : ServeNow(route, request);
+  if (response) response->route = ToString(route.kind);
+  return response;
+}
+
 asio::awaitable<Response> Routes::Serve(Route route, Request request) const {
   const RouteKind kind = route.kind;
   Response response;

@@ -1,6 +1,6 @@
 // Requests out of a stream's bytes: one head after the other, and the bodies of those that have one.
 //
-// For one strand. Holds one buffer of at most kMaxHeadBytes, and what has arrived of a body.
+// For one thread. Holds one buffer of at most kMaxHeadBytes, and what has arrived of a body.
 #pragma once
 
 #include <chrono>

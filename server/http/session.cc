@@ -75,9 +75,9 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
 
   static asio::awaitable<void> Run(std::shared_ptr<Session> self) { co_await self->ServeAll(); }
 
-  void CloseIfIdle() override { Post(&Session::CloseIfIdleOnStrand); }
-  void Drain() override { Post(&Session::DrainOnStrand); }
-  void Abort() override { Post(&Session::AbortOnStrand); }
+  void CloseIfIdle() override { Post(&Session::CloseIfIdleHere); }
+  void Drain() override { Post(&Session::DrainHere); }
+  void Abort() override { Post(&Session::AbortHere); }
 
  private:
   // A request on its way through the session, and what is to be told about it.
@@ -90,13 +90,13 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   void Post(void (Session::*step)()) {
     asio::dispatch(stream_.socket().get_executor(), [self = shared_from_this(), step] { ((*self).*step)(); });
   }
-  void CloseIfIdleOnStrand() {
+  void CloseIfIdleHere() {
     if (!reader_.waiting() || served_ == 0) return;
     hurried_ = true;
     reader_.Close();
   }
-  void DrainOnStrand() { reader_.Close(); }
-  void AbortOnStrand() {
+  void DrainHere() { reader_.Close(); }
+  void AbortHere() {
     reader_.Close();
     stream_.Reset();
   }
@@ -106,6 +106,7 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   asio::awaitable<void> RefuseMessage(BadRequest why, Exchange exchange);
   asio::awaitable<std::optional<Response>> Refuse(const Request& request, const Result<Route>& route,
                                                   const Caller& caller);
+  std::optional<Response> AnswerAtOnce(const Route& route, const Request& request);
   asio::awaitable<std::optional<Response>> AnswerWhileConnected(Route route, Request request);
   asio::awaitable<Response> Answer(Route route, Request request);
   asio::awaitable<bool> Reply(const Exchange& exchange, Response response);
@@ -179,8 +180,11 @@ asio::awaitable<bool> Session::ServeOne(Request request) {
     if (!read && read.error().status > 0) co_await RefuseMessage(read.error(), std::move(exchange));
     if (!read) co_return false;
   }
-  stream_.ExpiresNever();  // the handlers have deadlines of their own
-  response = co_await AnswerWhileConnected(*route, exchange.request);
+  response = AnswerAtOnce(*route, exchange.request);
+  if (!response) {
+    stream_.ExpiresNever();  // the handlers have deadlines of their own
+    response = co_await AnswerWhileConnected(*route, exchange.request);
+  }
   if (!response) {
     Response nobody;
     nobody.status = kClientLeft;
@@ -212,6 +216,16 @@ asio::awaitable<std::optional<Response>> Session::Refuse(const Request& request,
     co_return refusal;
   }
   co_return WhyNoBody(request, context_->options.max_body_bytes);
+}
+
+// Nothing: the answer has to be waited for. Most answers need not be, and then neither a timer nor a second coroutine
+// watches the client meanwhile.
+std::optional<Response> Session::AnswerAtOnce(const Route& route, const Request& request) {
+  try {
+    if (context_->quick_handler) return context_->quick_handler(route, request);
+  } catch (const std::exception&) {  // the handler will meet it again, and say so
+  }
+  return std::nullopt;
 }
 
 // Nothing: the client is gone.
@@ -266,8 +280,16 @@ asio::awaitable<bool> Session::Reply(const Exchange& exchange, Response response
 asio::awaitable<bool> Session::Write(std::string head, Body body) {
   BufferPair left = {asio::buffer(head), body ? asio::buffer(*body) : asio::const_buffer()};
   const SessionOptions& options = context_->options;
+  const auto take = [&left](std::size_t bytes) {
+    const std::size_t of_head = std::min(bytes, left[0].size());
+    left[0] += of_head;
+    left[1] += bytes - of_head;
+  };
+  // What the kernel takes at once needs no deadline. An error shows again when the rest is written.
+  std::size_t total = stream_.WriteReady(left).value_or(0);
+  take(total);
   const auto begun = Clock::now();
-  for (std::size_t total = 0; asio::buffer_size(left) > 0;) {
+  while (asio::buffer_size(left) > 0) {
     auto deadline = Clock::now() + options.write_timeout;
     if (options.min_rate > 0) {
       deadline = std::min(deadline,
@@ -280,9 +302,7 @@ asio::awaitable<bool> Session::Write(std::string head, Body body) {
       co_return false;
     }
     total += *sent;
-    const std::size_t of_head = std::min(*sent, left[0].size());
-    left[0] += of_head;
-    left[1] += *sent - of_head;
+    take(*sent);
   }
   co_return true;
 }

@@ -64,6 +64,7 @@ Stream::Stream(tcp::socket socket, std::shared_ptr<asio::ssl::context> tls)
     : state_(std::make_shared<State>(std::move(socket), std::move(tls))) {
   error_code ignored;
   state_->socket.set_option(tcp::no_delay(true), ignored);
+  state_->socket.non_blocking(true, ignored);
   state_->socket.set_option(NotSentLowWater(kUnsentBytes), ignored);
 }
 
@@ -131,6 +132,14 @@ Transfer Stream::ReadReady(asio::mutable_buffer buffer) {
   const std::size_t got = state_->socket.read_some(asio::buffer(buffer, available), error);
   if (error) return tl::unexpected(error);
   return got;
+}
+
+Transfer Stream::WriteReady(BufferPair buffers) {
+  if (state_->tls) return std::size_t{0};
+  error_code error;
+  const std::size_t sent = state_->socket.write_some(buffers, error);
+  if (error && error != asio::error::would_block) return tl::unexpected(error);
+  return sent;
 }
 
 void Stream::Cancel() {

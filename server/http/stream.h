@@ -1,6 +1,6 @@
 // The two ends of a connection's bytes: a socket, or TLS on top of one; with a deadline for whatever is under way.
 //
-// For one strand. Operations end in an error of the system or of TLS; end of file is one.
+// For one thread. Operations end in an error of the system or of TLS; end of file is one.
 #pragma once
 
 #include <array>
@@ -47,6 +47,9 @@ class Stream {
   asio::awaitable<Transfer> WriteSome(BufferPair buffers);
   // What is there already, without waiting; 0 bytes if nothing, and always for TLS.
   Transfer ReadReady(asio::mutable_buffer buffer);
+
+  // What can be sent without waiting; 0 bytes if nothing, and always for TLS.
+  Transfer WriteReady(BufferPair buffers);
 
   // Ends the operation under way.
   void Cancel();

@@ -42,6 +42,10 @@ class Server:
     def descriptors(self):
         return len(os.listdir(f"/proc/{self.pid}/fd"))
 
+    def sockets(self):
+        folder = pathlib.Path(f"/proc/{self.pid}/fd")
+        return sum(os.readlink(entry).startswith("socket:") for entry in folder.iterdir() if entry.is_symlink())
+
     def cpu_seconds(self):
         fields = pathlib.Path(f"/proc/{self.pid}/stat").read_text().rpartition(")")[2].split()
         return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
