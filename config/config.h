@@ -112,7 +112,7 @@ struct Config {
   std::size_t refinement_cache_bytes = std::size_t{128} << 20;  // 0: no cache
   std::size_t max_connections = 1024;
   std::size_t max_connections_per_client = 0;          // 0: as many as there may be in all
-  std::size_t transfer_bytes = std::size_t{48} << 20;  // of bodies on their way
+  std::size_t transfer_bytes = std::size_t{32} << 20;  // of bodies on their way
   double requests_per_second = 0;                      // of each client or token; 0: any
   double request_burst = 0;                            // 0: two seconds' worth
   std::size_t max_mesh_samples = 1'000'000;
