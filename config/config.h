@@ -74,6 +74,8 @@ struct DatasetConfig {
   std::optional<double> finest_error;  // metres; decides the deepest level
   std::optional<double> floor;         // metres; height outside the source and in large voids
   int max_void_gap = 64;               // source samples; narrower voids are filled
+  double feather = 0;                  // metres: how far from its edges a source gives way to the next
+  std::size_t max_open_sources = 64;   // files kept open between reads
   Criterion criterion = Criterion::kDelaunay;
   bool compact = false;  // tiles go through the drop pass
   GlbCompression glb_compression = GlbCompression::kDraco;

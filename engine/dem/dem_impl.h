@@ -33,6 +33,7 @@ class DemSource::Impl {
   std::vector<geo::Lattice> lattices;
   std::vector<std::vector<geo::TileRange>> available;
   float floor = 0;
+  bool has_feather = false;
   DemInfo info;
   std::uint64_t fingerprint = 0;
 };

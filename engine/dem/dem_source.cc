@@ -31,6 +31,11 @@ Result<void> CheckOptions(const DemOptions& options) {
   if (options.floor && !(std::abs(*options.floor) <= kMaxAbsHeight)) {
     return MakeError(ErrorCode::kInvalidArgument, "floor {} m: must be a height on Earth", *options.floor);
   }
+  constexpr double kWidestFeather = 1e6;
+  if (!(options.feather >= 0 && options.feather <= kWidestFeather)) {
+    return MakeError(ErrorCode::kInvalidArgument, "feather {} m: must be 0 (none) to {:.0f} m", options.feather,
+                     kWidestFeather);
+  }
   constexpr int kMaxGap = 4096;
   if (options.max_void_gap < 0 || options.max_void_gap > kMaxGap) {
     return MakeError(ErrorCode::kInvalidArgument, "void gap {}: must be 0 (fill nothing) to {} samples",
@@ -58,6 +63,7 @@ std::uint64_t FingerprintOf(const std::vector<Sheet>& sheets, const DemOptions& 
   writer.Put(options.finest_error.value_or(0));
   writer.Put(floor);
   writer.Put(options.max_void_gap);
+  if (options.feather > 0) writer.Put(options.feather);
   const std::string bytes = writer.Take();
   return XXH3_64bits(bytes.data(), bytes.size());
 }
@@ -70,12 +76,14 @@ Result<Rasters> OpenAll(std::vector<DemFile>& files, const DemOptions& options) 
     return MakeError(ErrorCode::kNotFound, "{}: no raster lies in its folder; name a folder of rasters or a raster",
                      first);
   }
+  const auto handles = std::make_shared<HandleLimit>(options.max_open_sources);
   Rasters rasters;
   for (std::size_t i = 0; i < files.size(); ++i) {
     const auto progress = [&](double share) {
       options.progress((static_cast<double>(i) + share) / static_cast<double>(files.size()));
     };
-    auto raster = RasterSource::Open(files[i].path, options.progress ? progress : std::function<void(double)>());
+    auto raster =
+        RasterSource::Open(files[i].path, options.progress ? progress : std::function<void(double)>(), handles);
     if (!raster) return tl::unexpected(raster.error());
     rasters.push_back(*std::move(raster));
   }
@@ -86,23 +94,24 @@ Result<Rasters> OpenAll(std::vector<DemFile>& files, const DemOptions& options) 
 long ResolutionStep(const RasterSource& raster) { return std::lround(std::log2(raster.spacing().finer) * 16); }
 
 // Of one rank: the sheets that they make, finer ones first, then by path.
-Result<void> AddSheets(Rasters rasters, int max_void_gap, std::vector<Sheet>& sheets) {
+Result<void> AddSheets(Rasters rasters, const SheetOptions& options, std::vector<Sheet>& sheets) {
   std::ranges::sort(rasters, {},
                     [](const auto& raster) { return std::pair(ResolutionStep(*raster), raster->info().path); });
   for (SheetPlan& plan : PlanSheets(rasters)) {
-    auto sheet = Sheet::Make(std::move(plan), max_void_gap);
+    auto sheet = Sheet::Make(std::move(plan), options);
     if (!sheet) return tl::unexpected(sheet.error());
     sheets.push_back(*std::move(sheet));
   }
   return {};
 }
 
-Result<std::vector<Sheet>> SheetsOf(const std::vector<DemFile>& files, const Rasters& rasters, int max_void_gap) {
+Result<std::vector<Sheet>> SheetsOf(const std::vector<DemFile>& files, const Rasters& rasters,
+                                    const SheetOptions& options) {
   std::map<int, Rasters> ranks;
   for (std::size_t i = 0; i < files.size(); ++i) ranks[files[i].rank].push_back(rasters[i]);
   std::vector<Sheet> sheets;
   for (auto& [rank, those] : ranks) {
-    if (auto added = AddSheets(std::move(those), max_void_gap, sheets); !added) return tl::unexpected(added.error());
+    if (auto added = AddSheets(std::move(those), options, sheets); !added) return tl::unexpected(added.error());
   }
   return sheets;
 }
@@ -176,11 +185,12 @@ Result<std::unique_ptr<DemSource>> DemSource::Open(std::vector<DemFile> files, c
     return MakeError(checked.error().code, "{}: {}", files.front().path, checked.error().message);
   const auto rasters = OpenAll(files, options);
   if (!rasters) return tl::unexpected(rasters.error());
-  auto sheets = SheetsOf(files, *rasters, options.max_void_gap);
+  auto sheets = SheetsOf(files, *rasters, {options.max_void_gap, options.feather});
   if (!sheets) return tl::unexpected(sheets.error());
 
   auto impl = std::make_unique<Impl>();
   impl->sheets = *std::move(sheets);
+  impl->has_feather = options.feather > 0;
   impl->index = IndexOf(impl->sheets);
   const auto finest = std::ranges::min_element(impl->sheets, {}, [](const Sheet& s) { return s.spacing().finer; });
   impl->lattices = PlanLattices(finest->spacing());
@@ -202,6 +212,8 @@ const std::vector<geo::TileRange>& DemSource::Available(int level) const {
   if (level < 0 || level > max_level()) return none;
   return impl_->available[static_cast<std::size_t>(level)];
 }
+
+const std::vector<std::vector<geo::TileRange>>& DemSource::Availability() const { return impl_->available; }
 
 bool DemSource::IsAvailable(const geo::TileKey& key) const {
   return geo::IsValid(key) &&

@@ -7,6 +7,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -29,6 +30,9 @@ struct DemOptions {
   std::optional<double> floor =
       {};                 // metres: height outside the sources and in large voids; default: lowest valid height
   int max_void_gap = 64;  // source samples: voids narrower than this along a row, column or diagonal are filled
+  // Metres, of a mosaic: so far from its edges and voids a source begins to give way to what lies below it. 0: at them.
+  double feather = 0;
+  std::size_t max_open_sources = 64;  // kept open between reads; what is in use comes on top, one a thread
   // Called now and then while Open scans the sources, with the share done, 0..1: files count alike. May be empty.
   std::function<void(double)> progress = {};
 };
@@ -126,6 +130,8 @@ class DemSource {
   // Blocks of tiles, without overlap, sorted by row and column, that hold every tile of the level which touches a
   // source that is worth the level, and every ancestor of a tile; at level 0 both roots (availability.h).
   const std::vector<geo::TileRange>& Available(int level) const;
+  // The same of all levels, from 0.
+  const std::vector<std::vector<geo::TileRange>>& Availability() const;
   bool IsAvailable(const geo::TileKey& key) const;
 
   // Heights no sample of the tile (halo not included) leaves: at least as wide as the truth, a function of the key

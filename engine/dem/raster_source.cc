@@ -61,7 +61,8 @@ void LogWhatMatters(GDALDataset& dataset, const RasterInfo& info, const Georefer
 }  // namespace
 
 Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path,
-                                                         const std::function<void(double)>& progress) {
+                                                         const std::function<void(double)>& progress,
+                                                         std::shared_ptr<HandleLimit> handles) {
   auto dataset = OpenRaster(path);
   if (!dataset) return tl::unexpected(dataset.error());
   auto georeference = Georeference::Of(**dataset, path);
@@ -70,7 +71,7 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
   if (!spacing) return tl::unexpected(spacing.error());
 
   std::unique_ptr<RasterSource> source(
-      new RasterSource(path, StampedFiles(FilesOf(**dataset, path)), *std::move(georeference)));
+      new RasterSource(path, StampedFiles(FilesOf(**dataset, path)), *std::move(georeference), std::move(handles)));
   source->layout_ = LayoutOf(**dataset, source->georeference_);
   auto scan = ScanRaster(**dataset, source->layout_, progress);
   if (!scan) return MakeError(scan.error().code, "{}: {}", path, scan.error().message);

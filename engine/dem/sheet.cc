@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "engine/dem/feather.h"
 #include "engine/dem/grid_cells.h"
 #include "engine/dem/node_positions.h"
 #include "engine/dem/void_fill.h"
@@ -65,12 +66,12 @@ Result<Georeference> GeoreferenceOf(const SheetPlan& plan) {
 
 float RoundHeight(double metres) { return static_cast<float>(std::nearbyint(metres * 1024) / 1024); }
 
-Result<Sheet> Sheet::Make(SheetPlan plan, int max_void_gap) {
+Result<Sheet> Sheet::Make(SheetPlan plan, const SheetOptions& options) {
   auto where = GeoreferenceOf(plan);
   if (!where) return tl::unexpected(where.error());
   Sheet sheet(*std::move(where));
   sheet.members_ = std::move(plan.members);
-  sheet.max_void_gap_ = max_void_gap;
+  sheet.options_ = options;
   sheet.width_ = plan.width;
   sheet.height_ = plan.height;
   sheet.wraps_ = sheet.georeference_.wrap_columns() > 0;
@@ -164,7 +165,7 @@ Result<void> Sheet::CheckUnread() const {
 Result<std::vector<float>> Sheet::ReadFilled(int factor, const GridWindow& window, const std::stop_token& stop) const {
   const auto is_void = [](float height) { return std::isnan(height); };
   auto core = ReadBlocks(factor, window, stop);
-  const int gap = max_void_gap_ / factor;
+  const int gap = options_.max_void_gap / factor;
   if (!core || gap < 2 || std::ranges::none_of(*core, is_void)) return core;
   const GridWindow wide = Grown(window, gap, Columns(factor), Rows(factor));
   auto around = ReadBlocks(factor, wide, stop);
@@ -172,23 +173,57 @@ Result<std::vector<float>> Sheet::ReadFilled(int factor, const GridWindow& windo
   return FillVoids(*around, wide, window, gap);
 }
 
+double Sheet::Feather(int factor) const {
+  // Of the coarser axis: what is read around a tile, and the time that weights take, stay bounded.
+  constexpr int kMostSamples = 256;
+  return std::min(options_.feather_m, kMostSamples * factor * std::min(spacing_.east, spacing_.north));
+}
+
+Result<std::vector<float>> Sheet::ReadWeights(int factor, const GridWindow& window, const std::stop_token& stop) const {
+  const double feather = Feather(factor), column_step = spacing_.east * factor, row_step = spacing_.north * factor;
+  const int halo = static_cast<int>(std::ceil(feather / std::min(column_step, row_step))) + 1;
+  const GridWindow wide = Grown(window, halo, Columns(factor), Rows(factor));
+  const auto pixel = [factor](std::int64_t block) { return static_cast<double>(block * factor); };
+  const bool ends = wide.rows < window.rows + 2 * halo || wide.columns < window.columns + 2 * halo;
+  if (!ends &&
+      !Ranges({pixel(wide.column), pixel(wide.row), pixel(wide.column + wide.columns), pixel(wide.row + wide.rows)})
+           .has_voids) {
+    return std::vector<float>();
+  }
+  const auto heights = ReadFilled(factor, wide, stop);
+  if (!heights) return heights;
+  return FeatherWeights(*heights, wide, window, column_step, row_step, feather);
+}
+
 Result<void> Sheet::FillAt(std::span<const Position> positions, int factor, std::span<float> heights,
-                           const std::stop_token& stop) const {
+                           const std::stop_token& stop, std::span<float> weights) const {
   Cells found = CellsAt(positions, heights, factor);
   if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "reading was stopped");
   if (found.cells.empty()) return CheckUnread();
   const GridWindow window = WindowOf(found.cells, Columns(factor), Rows(factor));
   const auto samples = ReadFilled(factor, window, stop);
   if (!samples) return tl::unexpected(samples.error());
+  std::vector<float> counts;
+  if (!weights.empty() && options_.feather_m > 0) {
+    auto read = ReadWeights(factor, window, stop);
+    if (!read) return tl::unexpected(read.error());
+    counts = *std::move(read);
+  }
   for (std::size_t i = 0; i < found.cells.size(); ++i) {
-    if (const auto height = Interpolate(*samples, window, found.cells[i]))
-      heights[found.nodes[i]] = RoundHeight(*height);
+    const auto height = Interpolate(*samples, window, found.cells[i]);
+    if (!height) continue;
+    heights[found.nodes[i]] = RoundHeight(*height);
+    if (weights.empty()) continue;
+    // Every sample has a weight, so this is plain bilinear. What counts nothing would still hide the floor.
+    constexpr double kLeast = 0x1p-10;
+    const double weight = counts.empty() ? 1 : Interpolate(counts, window, found.cells[i]).value_or(1);
+    weights[found.nodes[i]] = static_cast<float>(std::max(kLeast, std::nearbyint(weight * 1024) / 1024));
   }
   return {};
 }
 
 Result<void> Sheet::Fill(const geo::Lattice& lattice, const NodeWindow& window, std::span<float> heights,
-                         const std::stop_token& stop) const {
+                         const std::stop_token& stop, std::span<float> weights) const {
   const int factor = AveragingFactor(SamplesPerCell(lattice, spacing_));
   auto positions = NodePositions(georeference_, reach_, lattice, window, kPositionTolerance * factor);
   for (int row = 0; row < window.rows && georeference_.is_geographic_grid(); ++row) {
@@ -203,13 +238,14 @@ Result<void> Sheet::Fill(const geo::Lattice& lattice, const NodeWindow& window, 
           [](float height) { return std::isnan(height); }, *pole);
     }
   }
-  return FillAt(positions, factor, heights, stop);
+  return FillAt(positions, factor, heights, stop, weights);
 }
 
 Result<void> Sheet::Fill(const geo::MercatorGrid& grid, const NodeWindow& window, std::span<float> heights,
-                         const std::stop_token& stop) const {
+                         const std::stop_token& stop, std::span<float> weights) const {
   const int factor = MercatorFactor(grid.depth, spacing_);
-  return FillAt(NodePositions(georeference_, reach_, grid, window, kPositionTolerance * factor), factor, heights, stop);
+  return FillAt(NodePositions(georeference_, reach_, grid, window, kPositionTolerance * factor), factor, heights, stop,
+                weights);
 }
 
 }  // namespace terrace::dem

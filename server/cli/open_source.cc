@@ -33,6 +33,8 @@ Result<std::unique_ptr<dem::DemSource>> OpenSource(const config::DatasetConfig& 
   options.finest_error = wanted.finest_error;
   options.floor = wanted.floor;
   options.max_void_gap = wanted.max_void_gap;
+  options.feather = wanted.feather;
+  options.max_open_sources = wanted.max_open_sources;
   options.progress = progress;
   return dem::DemSource::Open(FilesOf(wanted.sources), options);
 }
