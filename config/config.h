@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "config/listen_address.h"
@@ -52,15 +53,31 @@ struct ImageryConfig {
   friend bool operator==(const ImageryConfig&, const ImageryConfig&) = default;
 };
 
+// One entry of a dataset's sources: a file, a glob or a folder. Its files are of equal rank.
+struct SourceConfig {
+  SourceConfig() = default;
+  // One file. Implicit: a path is a source.
+  SourceConfig(std::string file) : written(std::move(file)), files{written} {}  // NOLINT(google-explicit-constructor)
+  SourceConfig(const char* file) : SourceConfig(std::string(file)) {}           // NOLINT(google-explicit-constructor)
+
+  std::string written;             // path or pattern, absolute
+  std::vector<std::string> files;  // what it stands for
+  bool is_folder = false;          // what is no raster among them is left out
+
+  friend bool operator==(const SourceConfig&, const SourceConfig&) = default;
+};
+
 struct DatasetConfig {
-  std::string name;                  // the first part of its URLs: [A-Za-z0-9._-]{1,64}
-  std::vector<std::string> sources;  // files, after globs are expanded; exactly one for now
+  std::string name;                   // the first part of its URLs: [A-Za-z0-9._-]{1,64}
+  std::vector<SourceConfig> sources;  // the first that has a height at a place gives it
   VerticalDatum vertical = VerticalDatum::kUnknown;
   std::string attribution;
   double error_fraction = 0.5;         // default error of a level, as a share of the error that clients assume there
   std::optional<double> finest_error;  // metres; decides the deepest level
   std::optional<double> floor;         // metres; height outside the source and in large voids
   int max_void_gap = 64;               // source samples; narrower voids are filled
+  double feather = 0;                  // metres: how far from its edges a source gives way to the next
+  std::size_t max_open_sources = 64;   // files kept open between reads
   Criterion criterion = Criterion::kDelaunay;
   bool compact = false;  // tiles go through the drop pass
   GlbCompression glb_compression = GlbCompression::kDraco;

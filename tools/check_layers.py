@@ -55,6 +55,7 @@ LIBRARIES = [
     Library("spdlog", r"spdlog/.*", r"(engine/dem|server)/.*\.cc"),
     Library("Beast", r"boost/beast.*", r"server/http/request\.cc"),
     Library("OpenSSL", r"openssl/.*|boost/asio/ssl.*", r"server/http/.*\.cc"),
+    Library("Boost.Geometry", r"boost/geometry/.*", r"engine/dem/.*\.cc"),
     Library("Boost", r"boost/.*", r"server/"),
     Library("CLI11", r"CLI/.*", r"server/cli/"),
     Library("systemd", r"systemd/.*", r"server/cli/.*\.cc"),

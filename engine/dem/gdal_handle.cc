@@ -1,5 +1,8 @@
 #include "engine/dem/gdal_handle.h"
 
+#include <algorithm>
+#include <iterator>
+#include <limits>
 #include <utility>
 
 #include "engine/dem/gdal_runtime.h"
@@ -7,17 +10,45 @@
 
 namespace terrace::dem {
 
+GDALDatasetUniquePtr HandleLimit::Take(const HandlePool& pool) {
+  const std::lock_guard lock(mutex_);
+  const auto found = std::ranges::find(idle_, &pool, &Idle::pool);
+  if (found == idle_.end()) return nullptr;
+  GDALDatasetUniquePtr dataset = std::move(found->dataset);
+  idle_.erase(found);
+  return dataset;
+}
+
+void HandleLimit::Keep(const HandlePool& pool, GDALDatasetUniquePtr dataset) {
+  std::list<Idle> closed;  // outside the lock
+  const std::lock_guard lock(mutex_);
+  idle_.push_front({&pool, std::move(dataset)});
+  while (idle_.size() > most_idle_) closed.splice(closed.end(), idle_, std::prev(idle_.end()));
+}
+
+void HandleLimit::Forget(const HandlePool& pool) {
+  const std::lock_guard lock(mutex_);
+  std::erase_if(idle_, [&](const Idle& idle) { return idle.pool == &pool; });
+}
+
+std::size_t HandleLimit::idle() const {
+  const std::lock_guard lock(mutex_);
+  return idle_.size();
+}
+
+HandlePool::HandlePool(std::string path, StampedFiles files, std::shared_ptr<HandleLimit> limit)
+    : path_(std::move(path)),
+      files_(std::move(files)),
+      limit_(limit != nullptr ? std::move(limit)
+                              : std::make_shared<HandleLimit>(std::numeric_limits<std::size_t>::max())) {}
+
 Result<HandlePool::Handle> HandlePool::Borrow() {
   if (auto unchanged = CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
   std::uint64_t epoch = 0;
   {
     const std::lock_guard lock(mutex_);
     epoch = epoch_;
-    if (!idle_.empty()) {
-      Handle handle(*this, std::move(idle_.back()), epoch);
-      idle_.pop_back();
-      return handle;
-    }
+    if (GDALDatasetUniquePtr idle = limit_->Take(*this)) return Handle(*this, std::move(idle), epoch);
   }
   GDALDatasetUniquePtr dataset = ReopenRaster(path_);
   if (dataset == nullptr) {
@@ -34,14 +65,14 @@ Result<void> HandlePool::CheckUnchanged() {
   if (!unchanged) {
     const std::lock_guard lock(mutex_);
     ++epoch_;
-    idle_.clear();
+    limit_->Forget(*this);
   }
   return unchanged;
 }
 
 void HandlePool::Return(GDALDatasetUniquePtr dataset, std::uint64_t epoch) {
   const std::lock_guard lock(mutex_);
-  if (epoch == epoch_) idle_.push_back(std::move(dataset));
+  if (epoch == epoch_) limit_->Keep(*this, std::move(dataset));
 }
 
 }  // namespace terrace::dem

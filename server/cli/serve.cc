@@ -22,6 +22,7 @@
 #include "server/cli/command.h"
 #include "server/cli/log.h"
 #include "server/cli/open_layers.h"
+#include "server/cli/open_source.h"
 #include "server/cli/progress.h"
 #include "server/cli/service_manager.h"
 #include "server/reload/reloader.h"
@@ -48,6 +49,14 @@ int Report(const std::vector<config::ConfigError>& errors, const std::string& fi
   return kExitUsage;
 }
 
+// A folder keeps what looks like an extension, and a trailing slash changes nothing.
+std::string StemOf(const std::string& dem) {
+  std::error_code ignored;
+  const std::filesystem::path path = std::filesystem::absolute(dem).lexically_normal();
+  if (!std::filesystem::is_directory(path, ignored)) return path.stem().string();
+  return path.has_filename() ? path.filename().string() : path.parent_path().filename().string();
+}
+
 // The file's options, then the flags, then a dataset per DEM of the command line. Everything wrong is collected.
 config::Config MakeConfig(const ServeArguments& arguments, std::vector<config::ConfigError>& errors) {
   config::Config config;
@@ -70,8 +79,13 @@ config::Config MakeConfig(const ServeArguments& arguments, std::vector<config::C
   for (const auto& [key, text] : arguments.dataset_flags) config::SetDatasetOption(key, text, flags, errors);
   for (const std::string& dem : arguments.dems) {
     config::DatasetConfig& dataset = config.datasets.emplace_back(flags);
-    if (dataset.name.empty()) dataset.name = config::SanitizeDatasetName(std::filesystem::path(dem).stem().string());
-    dataset.sources = {std::filesystem::absolute(dem).string()};  // so that --print-config holds in any folder
+    if (dataset.name.empty()) dataset.name = config::SanitizeDatasetName(StemOf(dem));
+    // In full, so that --print-config holds in any folder.
+    Result<config::SourceConfig> source = config::SourceAt(std::filesystem::absolute(dem).string());
+    if (source)
+      dataset.sources = {*std::move(source)};
+    else
+      errors.push_back({dem, source.error().message});
   }
   const std::vector<config::ConfigError> duplicates = config::FindDuplicateNames(config.datasets);
   if (errors.empty()) errors = duplicates;
@@ -118,14 +132,7 @@ proto::GlbOptions GlbOptionsOf(const config::DatasetConfig& dataset) {
 
 Result<server::Dataset> OpenDataset(const config::DatasetConfig& wanted, const std::function<void(double)>& progress,
                                     std::stop_token stop) {
-  dem::DemOptions options;
-  options.error_fraction = wanted.error_fraction;
-  options.finest_error = wanted.finest_error;
-  options.floor = wanted.floor;
-  options.max_void_gap = wanted.max_void_gap;
-  options.progress = progress;
-  options.stop = std::move(stop);
-  auto source = dem::DemSource::Open(wanted.sources.front(), options);
+  auto source = OpenSource(wanted, progress, std::move(stop));
   if (!source) return tl::unexpected(source.error());
   server::Dataset dataset;
   dataset.name = wanted.name;
@@ -143,14 +150,14 @@ Result<server::Dataset> OpenDataset(const config::DatasetConfig& wanted, const s
 bool OpenDatasets(const config::Config& config, std::vector<server::Dataset>& datasets) {
   bool all_open = true;
   for (const config::DatasetConfig& wanted : config.datasets) {
-    Progress progress("reading " + wanted.sources.front());
+    Progress progress("reading " + NameOf(wanted.sources), FileCount(wanted.sources));
     Result<server::Dataset> dataset = OpenDataset(wanted, progress.Callback(), {});
     if (!dataset) {
       std::fprintf(stderr, "terrace: dataset %s: %s\n", wanted.name.c_str(), dataset.error().message.c_str());
       all_open = false;
       continue;
     }
-    spdlog::info("dataset {}: {}, levels 0 to {}", dataset->name, wanted.sources.front(), dataset->source->max_level());
+    spdlog::info("dataset {}: {}, levels 0 to {}", dataset->name, NameOf(wanted.sources), dataset->source->max_level());
     datasets.push_back(*std::move(dataset));
   }
   return all_open;
@@ -326,9 +333,10 @@ void AddServe(CLI::App& app, int& exit_code) {
       "Examples:\n"
       "  terrace serve alps.tif andes.tif\n"
       "  terrace serve --config terrace.json --listen 0.0.0.0:8080\n\n"
-      "Each DEM becomes a dataset named after its file. Flags override the config file. Prints one line with\n"
+      "Each DEM becomes a dataset named after its file; a folder of DEMs becomes one dataset. Flags override the "
+      "config file. Prints one line with\n"
       "the URL when it is ready; logs go to stderr; SIGTERM and SIGINT end it after open requests are answered.");
-  command->add_option("DEM", arguments->dems, "Rasters that GDAL can read, one dataset each");
+  command->add_option("DEM", arguments->dems, "Rasters that GDAL can read, or folders of them, one dataset each");
   command->add_option("--config", arguments->config_file, "Configuration in JSON (config/config.schema.json)")
       ->type_name("FILE");
   command->add_flag("--print-config", arguments->print_config, "Prints the configuration in force as JSON and ends");

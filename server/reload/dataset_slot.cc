@@ -30,7 +30,10 @@ dem::StampedFiles FilesOf(const Dataset& dataset) {
 
 // The files that the configuration names; what GDAL reads beside them is not known before they are open.
 std::vector<std::string> NamedFiles(const config::DatasetConfig& dataset) {
-  std::vector<std::string> files = dataset.sources;
+  std::vector<std::string> files;
+  for (const config::SourceConfig& source : dataset.sources) {
+    files.insert(files.end(), source.files.begin(), source.files.end());
+  }
   if (!dataset.water.mask.empty()) files.push_back(dataset.water.mask);
   if (!dataset.imagery.image.empty()) files.push_back(dataset.imagery.image);
   return files;
@@ -112,7 +115,7 @@ void DatasetSlot::OpenIfDue(const DatasetOpener& open) {
   if (is_opening() || (serving_ && !stale_since_)) return;
   if (Clock::now() < retry_at_ && StampsOf(NamedFiles(wanted_)) == tried_) return;
   if (!IsSettled()) return;
-  spdlog::info("dataset {}: opening {}", wanted_.name, wanted_.sources.front());
+  spdlog::info("dataset {}: opening {}", wanted_.name, wanted_.sources.front().written);
   tried_ = StampsOf(NamedFiles(wanted_));
   stop_opening_ = std::stop_source();
   opening_ = std::async(std::launch::async, OpenQuietly, open, wanted_, stop_opening_.get_token());
@@ -141,7 +144,7 @@ bool DatasetSlot::TakeOpened() {
   }
   const auto took = stale_since_ ? Clock::now() - *stale_since_ : Clock::duration(0);
   spdlog::info("dataset {}: {} is served now, generation {:016x}, {} after the change was seen", wanted_.name,
-               wanted_.sources.front(), opened->generation,
+               wanted_.sources.front().written, opened->generation,
                std::chrono::duration_cast<std::chrono::milliseconds>(took));
   serving_ = *std::move(opened);
   files_ = FilesOf(*serving_);

@@ -13,15 +13,14 @@ DatasetView ViewOf(const Dataset& dataset) {
   view.error_fraction = dataset.error_fraction;
   view.glb_compression = dataset.glb.compression;
   view.generation = dataset.generation;
-  for (int level = 0; level <= dataset.source->max_level(); ++level) {
-    view.available.push_back(dataset.source->Available(level));
-  }
+  view.available = dataset.source->Availability();
   view.west = info.bounds.west;
   view.south = info.bounds.south;
   view.east = info.bounds.east;
   view.north = info.bounds.north;
   view.min_height_m = info.heights.min;
   view.max_height_m = info.heights.max;
+  view.sources = info.sources.size();
   view.has_water = dataset.water.any();
   if (dataset.imagery.image) view.texture = dataset.imagery.texture;
   view.metadata_levels = dataset.metadata_levels;

@@ -28,9 +28,18 @@ TEST(ToJson, ComesBackAsTheDefaults) { ExpectComesBack(Config{}); }
 TEST(ToJson, ComesBackWithEveryOptionSet) {
   Config config;
   config.listen = {"2001:db8::1", 0};
-  DatasetConfig dataset{
-      "a", {"/data/a.tif"}, VerticalDatum::kUnknown, "© \"ét\\é\"", 0.1, 1e-3, -0.3, 7, Criterion::kDataDependent,
-      true};
+  DatasetConfig dataset{"a",
+                        {"/data/a.tif"},
+                        VerticalDatum::kUnknown,
+                        "© \"ét\\é\"",
+                        0.1,
+                        1e-3,
+                        -0.3,
+                        7,
+                        12.5,
+                        9,
+                        Criterion::kDataDependent,
+                        true};
   dataset.water.sea_level = -1.25;
   dataset.metadata_availability = 7;
   dataset.is_public = true;
