@@ -132,7 +132,8 @@ void DatasetSlot::Fail(const Error& error) {
 bool DatasetSlot::TakeOpened() {
   if (!is_opening() || opening_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return false;
   Result<Dataset> opened = opening_.get();
-  if (std::exchange(reopen_, false)) return false;
+  const bool is_unwanted = std::exchange(reopen_, false) || (!opened && opened.error().code == ErrorCode::kCancelled);
+  if (is_unwanted) return false;
   if (!opened) {
     // Replaced once more meanwhile: the next attempt is due at once.
     if (opened.error().code == ErrorCode::kChanged) {
