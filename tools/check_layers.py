@@ -203,7 +203,7 @@ class SelfTest(unittest.TestCase):
         self.assert_clean({
             "engine/dem/handle.h": "#include <gdal_priv.h>\n#include <mutex>\n",
             "engine/dem/source.cc": '#include "engine/dem/handle.h"\n#include <sys/stat.h>\n',
-            "server/http/session.cc": "#include <boost/beast/http.hpp>\n#include <boost/asio/awaitable.hpp>\n",
+            "server/http/request.cc": "#include <boost/beast/http.hpp>\n#include <boost/asio/awaitable.hpp>\n",
             "server/cli/main.cc": "#include <CLI/CLI.hpp>\n",
             "proto/compress.cc": "#include <libdeflate.h>\n#include <vector>\n",
             "engine/tin/scan.cc": "#include <hwy/highway.h>\n#include <stop_token>\n",

@@ -55,6 +55,7 @@ TEST_F(HeightsTest, AnswersGetAndHead) {
   EXPECT_TRUE(reply.Field("server-timing").starts_with("cache;desc=miss, queue;dur=")) << reply.Field("server-timing");
   EXPECT_EQ(Fetch(port(), "/maui/heights?locations=5,7|6,8", "If-None-Match: " + reply.Field("etag") + "\r\n").status,
             304);
+  EXPECT_EQ(reads_, 1) << "what the client has is not made again";
   EXPECT_EQ(Fetch(port(), "/nope/heights?locations=5,7").status, 404);
   EXPECT_EQ(Fetch(port(), "/maui/heights?locations=5").status, 400);
   EXPECT_EQ(Fetch(port(), "/maui/heights").status, 400);
