@@ -197,7 +197,7 @@ Result<void> ReadBack(const GridMesh& grid, const DracoOptions& options, DracoMe
 
 Result<DracoMesh> EncodeDraco(const GridMesh& grid, const DracoOptions& options) {
   TERRACE_CHECK(!grid.triangles.empty());
-  constexpr int kMaxBits = 23;  // FitsFloats leaves room for the origin's rounding
+  constexpr int kMaxBits = 24;  // FitsFloats leaves room for the origin's rounding
   const Quantization quantization = QuantizationOf(grid);
   if (quantization.bits > kMaxBits) return Failed("the grid is too fine for 32-bit floats");
   // Dividing by the range in floats gives 1 / step exactly: it is a power of two times 2^bits - 1, which a float holds.
