@@ -128,14 +128,14 @@ Box BoxOf(const std::vector<GridPoint>& points) {
 }  // namespace
 
 double GridStep(const geo::Lattice& lattice, double error_m, PositionWidth width) {
-  constexpr double kFinestStep_m = 0x1p-16;
+  constexpr double kFinestStepMetres = 0x1p-16;
   const double cell_m = geo::kSemiMajorAxis * geo::ToRadians(lattice.StepDegrees());
-  const double step_m = std::max(PowerOfTwoUpTo(std::min(error_m / 32, cell_m / 64)), kFinestStep_m);
+  const double step_m = std::max(PowerOfTwoUpTo(std::min(error_m / 32, cell_m / 64)), kFinestStepMetres);
   if (width == PositionWidth::k16Bits) return step_m;
   // Half the diagonal of a cube of 2^-7 m is 7 mm. A tile's side is at most 2^23 steps: FitsFloats.
-  constexpr double kBorderStep_m = 0x1p-7;
+  constexpr double kBorderStepMetres = 0x1p-7;
   const double side_m = cell_m * lattice.cells;
-  return std::min(step_m, PowerOfTwoUpTo(std::max(kBorderStep_m, side_m / 0x1p22)));
+  return std::min(step_m, PowerOfTwoUpTo(std::max(kBorderStepMetres, side_m / 0x1p22)));
 }
 
 std::vector<GridPoint> SnapVertices(const LatticeView& lattice, const tin::TinMesh& mesh, double step_m) {
