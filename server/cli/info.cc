@@ -129,7 +129,7 @@ int Info(const std::vector<std::string>& dems, bool json, bool mosaic) {
     const dem::DemInfo& info = (*source)->info();
     const bool is_one = info.sources.size() == 1;
     if (json)
-      all.push_back(is_one ? ToJson(info) : MosaicJson(name, info));
+      all.push_back(is_one ? ToJson(info) : nlohmann::json::parse(MosaicJson(name, info)));
     else
       is_one ? PrintText(info) : PrintMosaic(name, info);
   }

@@ -81,7 +81,7 @@ void PrintMosaic(const std::string& name, const dem::DemInfo& info) {
   for (const std::string& advice : AdviceFor(info)) line("note", advice);
 }
 
-nlohmann::json MosaicJson(const std::string& name, const dem::DemInfo& info) {
+std::string MosaicJson(const std::string& name, const dem::DemInfo& info) {
   nlohmann::json sources = nlohmann::json::array();
   for (const dem::RasterInfo& source : info.sources) {
     sources.push_back({{"path", source.path},
@@ -94,14 +94,15 @@ nlohmann::json MosaicJson(const std::string& name, const dem::DemInfo& info) {
                        {"void_samples", source.void_samples},
                        {"overviews", source.overview_factors}});
   }
-  return {{"path", name},
-          {"sources", std::move(sources)},
-          {"overlapped", CountOverlapped(info.sources)},
-          {"bounds", {info.bounds.west, info.bounds.south, info.bounds.east, info.bounds.north}},
-          {"heights", {{"min", info.heights.min}, {"max", info.heights.max}}},
-          {"floor", info.floor},
-          {"levels", {0, info.max_level}},
-          {"advice", AdviceFor(info)}};
+  const nlohmann::json mosaic = {{"path", name},
+                                 {"sources", std::move(sources)},
+                                 {"overlapped", CountOverlapped(info.sources)},
+                                 {"bounds", {info.bounds.west, info.bounds.south, info.bounds.east, info.bounds.north}},
+                                 {"heights", {{"min", info.heights.min}, {"max", info.heights.max}}},
+                                 {"floor", info.floor},
+                                 {"levels", {0, info.max_level}},
+                                 {"advice", AdviceFor(info)}};
+  return mosaic.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
 }  // namespace terrace::cli

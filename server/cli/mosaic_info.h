@@ -1,7 +1,6 @@
 // What `terrace info` tells of rasters that make one dataset.
 #pragma once
 
-#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 #include "engine/dem/dem_source.h"
@@ -9,6 +8,7 @@
 namespace terrace::cli {
 
 void PrintMosaic(const std::string& name, const dem::DemInfo& info);
-nlohmann::json MosaicJson(const std::string& name, const dem::DemInfo& info);
+// One JSON object, as text.
+std::string MosaicJson(const std::string& name, const dem::DemInfo& info);
 
 }  // namespace terrace::cli
