@@ -33,6 +33,8 @@ enum class GlbCompression : std::uint8_t { kDraco, kNone, kQuantized, kMeshopt }
 enum class ForwardedHeader : std::uint8_t { kXForwarded, kForwarded };
 enum class LogLevel : std::uint8_t { kDebug, kInfo, kWarn, kError, kOff };
 enum class LogFormat : std::uint8_t { kText, kJson };
+// Where and how requests are told of: server::AccessLogForm, which this room does not know.
+enum class AccessLog : std::uint8_t { kLog, kCombined, kJson, kOff };
 
 // Where the water of a dataset's water mask comes from: one of both, or neither.
 struct WaterConfig {
@@ -84,6 +86,8 @@ struct DatasetConfig {
   std::optional<double> finest_error;  // metres; decides the deepest level
   std::optional<double> floor;         // metres; height outside the source and in large voids
   int max_void_gap = 64;               // source samples; narrower voids are filled
+  double feather = 0;                  // metres: how far from its edges a source gives way to the next
+  std::size_t max_open_sources = 64;   // files kept open between reads
   Criterion criterion = Criterion::kDelaunay;
   bool compact = false;  // tiles go through the drop pass
   GlbCompression glb_compression = GlbCompression::kDraco;
@@ -136,7 +140,7 @@ struct Config {
   std::size_t gdal_cache_bytes = std::size_t{256} << 20;        // blocks of sources
   std::size_t max_connections = 1024;
   std::size_t max_connections_per_client = 0;          // 0: as many as there may be in all
-  std::size_t transfer_bytes = std::size_t{48} << 20;  // of bodies on their way
+  std::size_t transfer_bytes = std::size_t{32} << 20;  // of bodies on their way
   double requests_per_second = 0;                      // of each client or token; 0: any
   double request_burst = 0;                            // 0: two seconds' worth
   std::size_t max_mesh_samples = 1'000'000;
@@ -159,8 +163,12 @@ struct Config {
   std::vector<std::string> allowed_prefixes;  // of remote sources; none: no remote sources
   std::vector<std::string> allowed_drivers;   // GDAL's names of formats; none: the usual ones
 
+  bool watch = true;  // look for changes of sources and of the file that this came from
+
   LogLevel log_level = LogLevel::kInfo;
   LogFormat log_format = LogFormat::kText;
+  AccessLog access_log = AccessLog::kLog;
+  std::string access_log_file;  // of kCombined and kJson; empty: stderr
 
   friend bool operator==(const Config&, const Config&) = default;
 };

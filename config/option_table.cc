@@ -1,6 +1,7 @@
 #include "config/option_table.h"
 
 #include <algorithm>
+#include <filesystem>
 
 #include "config/edge_options.h"
 #include "config/layer_options.h"
@@ -44,6 +45,17 @@ Codec<Config> Viewer() {
         return config.viewer.directory.empty() ? Json(config.viewer.enabled) : Json(config.viewer.directory.string());
       },
       SwitchToJson};
+}
+
+Codec<Config> AccessLogFile() {
+  return {[](const Json& value, const Place& place, Config& config) {
+            if (!value.is_string() || value.get_ref<const std::string&>().empty()) {
+              return place.Expected("the path of a file", value);
+            }
+            config.access_log_file = (place.directory() / value.get<std::string>()).string();
+          },
+          [](const Config& config) { return config.access_log_file.empty() ? Json() : Json(config.access_log_file); },
+          [](const std::string& text) { return Json(text.empty() ? text : std::filesystem::absolute(text).string()); }};
 }
 
 Codec<Config> Datasets() {
@@ -127,6 +139,8 @@ const std::vector<Option<Config>>& ServerOptionTable() {
        TextList(&Config::allowed_prefixes, "a list of prefixes such as [\"/vsis3/bucket/\"]", false)},
       {"allowed_drivers", "NAME[,NAME]", "Formats that sources may have, by GDAL's short names",
        TextList(&Config::allowed_drivers, "a list of formats such as [\"GTiff\", \"VRT\"]", false)},
+      {"watch", "true|false", "Take over changes of sources and of the configuration file while serving",
+       Switch(&Config::watch)},
       {"log_level", "LEVEL", "The least important messages to log: debug, info, warn, error or off",
        Choice(&Config::log_level, {{"debug", LogLevel::kDebug},
                                    {"info", LogLevel::kInfo},
@@ -135,6 +149,13 @@ const std::vector<Option<Config>>& ServerOptionTable() {
                                    {"off", LogLevel::kOff}})},
       {"log_format", "FORMAT", "text for people, json for machines (one object a line); both on stderr",
        Choice(&Config::log_format, {{"text", LogFormat::kText}, {"json", LogFormat::kJson}})},
+      {"access_log", "FORM", "How requests are told of: log (lines of the log), combined, json or off",
+       Choice(&Config::access_log, {{"log", AccessLog::kLog},
+                                    {"combined", AccessLog::kCombined},
+                                    {"json", AccessLog::kJson},
+                                    {"off", AccessLog::kOff}})},
+      {"access_log_file", "FILE", "Where the access log goes if it is combined or json; by default stderr",
+       AccessLogFile()},
   };
   return table;
 }
@@ -161,6 +182,10 @@ const std::vector<Option<DatasetConfig>>& DatasetOptionTable() {
        Number(&DatasetConfig::floor, -kMostHeight, kMostHeight)},
       {"max_void_gap", "SAMPLES", "Voids narrower than this many source samples are filled from their edges",
        Integer(&DatasetConfig::max_void_gap, 0, 100'000)},
+      {"feather", "METRES", "Blend a source of a mosaic with what lies below it so far from its edges; 0: no blending",
+       Number(&DatasetConfig::feather, 0, 1'000'000)},
+      {"max_open_sources", "N", "Rasters of the dataset that are kept open between reads",
+       Integer(&DatasetConfig::max_open_sources, 1, 100'000)},
       {"criterion", "NAME", "How triangles are joined: delaunay, or data-dependent: smaller tiles, more time to build",
        Choice(&DatasetConfig::criterion,
               {{"delaunay", Criterion::kDelaunay}, {"data-dependent", Criterion::kDataDependent}})},

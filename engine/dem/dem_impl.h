@@ -35,6 +35,7 @@ class DemSource::Impl {
   std::vector<std::vector<geo::TileRange>> available;
   float floor = 0;                                       // above the ellipsoid
   std::shared_ptr<const Undulations> floor_undulations;  // all over the Earth, of the last sheet above a geoid; or null
+  bool has_feather = false;
   DemInfo info;
   std::uint64_t fingerprint = 0;
 };

@@ -13,12 +13,12 @@ namespace {
 bool IsVoid(float height) { return std::isnan(height); }
 
 Result<void> FillFrom(const Sheet& sheet, const geo::Lattice& lattice, const NodeWindow& window, Counting counting,
-                      std::span<float> heights, const std::stop_token& stop) {
-  return sheet.Fill(lattice, window, counting, heights, stop);
+                      std::span<float> heights, const std::stop_token& stop, std::span<float> weights) {
+  return sheet.Fill(lattice, window, counting, heights, stop, weights);
 }
 Result<void> FillFrom(const Sheet& sheet, const geo::MercatorGrid& grid, const NodeWindow& window, Counting,
-                      std::span<float> heights, const std::stop_token& stop) {
-  return sheet.Fill(grid, window, heights, stop);
+                      std::span<float> heights, const std::stop_token& stop, std::span<float> weights) {
+  return sheet.Fill(grid, window, heights, stop, weights);
 }
 
 // Around the nodes of a window. Their longitudes begin between -180 and 180, and go on eastwards.
@@ -47,17 +47,65 @@ BoxIndex IndexOf(const std::vector<Sheet>& sheets) {
   return BoxIndex(entries);
 }
 
+// Heights of sheets over each other. Without a feather a sheet's height is the last word; with one it counts by its
+// weight, and what lies below it has the rest. Where nothing lies below, the weight changes nothing: nothing is blended
+// with the floor.
+class Blend {
+ public:
+  explicit Blend(std::size_t nodes) : sums_(nodes), open_(nodes, 1) {}
+
+  // NaN where more is wanted.
+  std::vector<float> Wanted() const {
+    std::vector<float> heights(sums_.size(), 0);
+    for (std::size_t i = 0; i < heights.size(); ++i) {
+      if (open_[i] > 0) heights[i] = SampleRules::kVoid;
+    }
+    return heights;
+  }
+  void Add(const std::vector<float>& heights, const std::vector<float>& weights) {
+    for (std::size_t i = 0; i < heights.size(); ++i) {
+      if (open_[i] <= 0 || std::isnan(heights[i])) continue;
+      sums_[i] += open_[i] * weights[i] * heights[i];
+      open_[i] *= 1 - weights[i];
+    }
+  }
+  bool is_done() const {
+    return std::ranges::none_of(open_, [](double share) { return share > 0; });
+  }
+  std::vector<float> Heights() const {
+    std::vector<float> heights(sums_.size(), SampleRules::kVoid);
+    for (std::size_t i = 0; i < heights.size(); ++i) {
+      if (open_[i] < 1) heights[i] = RoundHeight(sums_[i] / (1 - open_[i]));
+    }
+    return heights;
+  }
+
+ private:
+  std::vector<double> sums_;
+  std::vector<double> open_;  // share that sheets further down have
+};
+
 template <typename Grid>
 Result<std::vector<float>> DemSource::Impl::ReadSheets(const Grid& grid, const NodeWindow& window, Counting counting,
                                                        const std::string& what, const std::stop_token& stop) const {
-  std::vector<float> heights(static_cast<std::size_t>(window.columns) * static_cast<std::size_t>(window.rows),
-                             SampleRules::kVoid);
-  for (const std::size_t i : SheetsAt(BoxOf(grid, window))) {
-    if (const auto filled = FillFrom(sheets[i], grid, window, counting, heights, stop); !filled) {
+  const std::size_t nodes = static_cast<std::size_t>(window.columns) * static_cast<std::size_t>(window.rows);
+  std::vector<float> heights(nodes, SampleRules::kVoid);
+  const std::vector<std::size_t> order = SheetsAt(BoxOf(grid, window));
+  const bool feathers = has_feather && order.size() > 1;
+  Blend blend(feathers ? nodes : 0);
+  for (const std::size_t i : order) {
+    std::vector<float> weights;
+    if (feathers) {
+      heights = blend.Wanted();
+      weights.assign(nodes, 1);
+    }
+    if (const auto filled = FillFrom(sheets[i], grid, window, counting, heights, stop, weights); !filled) {
       return MakeError(filled.error().code, "{}: {}", what, filled.error().message);
     }
-    if (std::ranges::none_of(heights, IsVoid)) break;
+    if (feathers) blend.Add(heights, weights);
+    if (feathers ? blend.is_done() : std::ranges::none_of(heights, IsVoid)) break;
   }
+  if (feathers) heights = blend.Heights();
   return heights;
 }
 

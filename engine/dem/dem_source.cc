@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 #include <utility>
 
 #include "engine/core/bytes.h"
@@ -30,6 +31,11 @@ Result<void> CheckOptions(const DemOptions& options) {
   }
   if (options.floor && !(std::abs(*options.floor) <= kMaxAbsHeight)) {
     return MakeError(ErrorCode::kInvalidArgument, "floor {} m: must be a height on Earth", *options.floor);
+  }
+  constexpr double kWidestFeather = 1e6;
+  if (!(options.feather >= 0 && options.feather <= kWidestFeather)) {
+    return MakeError(ErrorCode::kInvalidArgument, "feather {} m: must be 0 (none) to {:.0f} m", options.feather,
+                     kWidestFeather);
   }
   constexpr int kMaxGap = 4096;
   if (options.max_void_gap < 0 || options.max_void_gap > kMaxGap) {
@@ -62,7 +68,7 @@ std::uint64_t FingerprintOf(const std::vector<Sheet>& sheets, const DemOptions& 
       }
     }
     if (const auto& geoid = sheet.vertical().geoid) {
-      put(StampedFiles(geoid->grids()));
+      put(geoid->files());
       writer.PutBytes(geoid->pipeline());
     }
   }
@@ -70,6 +76,7 @@ std::uint64_t FingerprintOf(const std::vector<Sheet>& sheets, const DemOptions& 
   writer.Put(options.finest_error.value_or(0));
   writer.Put(floor);
   writer.Put(options.max_void_gap);
+  if (options.feather > 0) writer.Put(options.feather);
   const std::string bytes = writer.Take();
   return XXH3_64bits(bytes.data(), bytes.size());
 }
@@ -82,13 +89,15 @@ Result<Rasters> OpenAll(std::vector<DemFile>& files, const DemOptions& options) 
     return MakeError(ErrorCode::kNotFound, "{}: no raster lies in its folder; name a folder of rasters or a raster",
                      first);
   }
+  const auto handles = std::make_shared<HandleLimit>(options.max_open_sources);
   Rasters rasters;
   for (std::size_t i = 0; i < files.size(); ++i) {
     const auto progress = [&](double share) {
       options.progress((static_cast<double>(i) + share) / static_cast<double>(files.size()));
     };
-    auto raster = RasterSource::Open(files[i].path, files[i].options.value_or(options.source),
-                                     options.progress ? progress : std::function<void(double)>());
+    auto raster =
+        RasterSource::Open(files[i].path, files[i].options.value_or(options.source),
+                           options.progress ? progress : std::function<void(double)>(), handles, options.stop);
     if (!raster) return tl::unexpected(raster.error());
     rasters.push_back(*std::move(raster));
   }
@@ -99,23 +108,24 @@ Result<Rasters> OpenAll(std::vector<DemFile>& files, const DemOptions& options) 
 long ResolutionStep(const RasterSource& raster) { return std::lround(std::log2(raster.spacing().finer) * 16); }
 
 // Of one rank: the sheets that they make, finer ones first, then by path.
-Result<void> AddSheets(Rasters rasters, int max_void_gap, std::vector<Sheet>& sheets) {
+Result<void> AddSheets(Rasters rasters, const SheetOptions& options, std::vector<Sheet>& sheets) {
   std::ranges::sort(rasters, {},
                     [](const auto& raster) { return std::pair(ResolutionStep(*raster), raster->info().path); });
   for (SheetPlan& plan : PlanSheets(rasters)) {
-    auto sheet = Sheet::Make(std::move(plan), max_void_gap);
+    auto sheet = Sheet::Make(std::move(plan), options);
     if (!sheet) return tl::unexpected(sheet.error());
     sheets.push_back(*std::move(sheet));
   }
   return {};
 }
 
-Result<std::vector<Sheet>> SheetsOf(const std::vector<DemFile>& files, const Rasters& rasters, int max_void_gap) {
+Result<std::vector<Sheet>> SheetsOf(const std::vector<DemFile>& files, const Rasters& rasters,
+                                    const SheetOptions& options) {
   std::map<int, Rasters> ranks;
   for (std::size_t i = 0; i < files.size(); ++i) ranks[files[i].rank].push_back(rasters[i]);
   std::vector<Sheet> sheets;
   for (auto& [rank, those] : ranks) {
-    if (auto added = AddSheets(std::move(those), max_void_gap, sheets); !added) return tl::unexpected(added.error());
+    if (auto added = AddSheets(std::move(those), options, sheets); !added) return tl::unexpected(added.error());
   }
   return sheets;
 }
@@ -191,11 +201,12 @@ Result<std::unique_ptr<DemSource>> DemSource::Open(std::vector<DemFile> files, c
     return MakeError(checked.error().code, "{}: {}", files.front().path, checked.error().message);
   const auto rasters = OpenAll(files, options);
   if (!rasters) return tl::unexpected(rasters.error());
-  auto sheets = SheetsOf(files, *rasters, options.max_void_gap);
+  auto sheets = SheetsOf(files, *rasters, {options.max_void_gap, options.feather});
   if (!sheets) return tl::unexpected(sheets.error());
 
   auto impl = std::make_unique<Impl>();
   impl->sheets = *std::move(sheets);
+  impl->has_feather = options.feather > 0;
   impl->index = IndexOf(impl->sheets);
   const auto finest = std::ranges::min_element(impl->sheets, {}, [](const Sheet& s) { return s.spacing().finer; });
   impl->lattices = PlanLattices(finest->spacing());
@@ -217,11 +228,25 @@ int DemSource::max_level() const { return impl_->info.max_level; }
 geo::Lattice DemSource::LatticeOf(int level) const { return impl_->LatticeOf(level); }
 std::uint64_t DemSource::fingerprint() const { return impl_->fingerprint; }
 
+StampedFiles DemSource::files() const {
+  StampedFiles all;
+  std::set<const Geoid*> geoids;
+  for (const Sheet& sheet : impl_->sheets) {
+    for (const SheetMember& member : sheet.members()) all.Append(member.raster->files());
+    // Sheets mostly share one.
+    const auto& geoid = sheet.vertical().geoid;
+    if (geoid && geoids.insert(geoid.get()).second) all.Append(geoid->files());
+  }
+  return all;
+}
+
 const std::vector<geo::TileRange>& DemSource::Available(int level) const {
   static const std::vector<geo::TileRange> none;
   if (level < 0 || level > max_level()) return none;
   return impl_->available[static_cast<std::size_t>(level)];
 }
+
+const std::vector<std::vector<geo::TileRange>>& DemSource::Availability() const { return impl_->available; }
 
 bool DemSource::IsAvailable(const geo::TileKey& key) const {
   return geo::IsValid(key) &&

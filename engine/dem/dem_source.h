@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "engine/core/result.h"
+#include "engine/dem/file_stamp.h"
 #include "engine/geo/lattice.h"
 #include "engine/geo/tile_key.h"
 
@@ -48,8 +49,12 @@ struct DemOptions {
   std::optional<double> floor = {};  // metres above the ellipsoid, outside the source and in large voids; default: the
                                      // lowest height, at most
   int max_void_gap = 64;  // source samples: voids narrower than this along a row, column or diagonal are filled
+  // Metres, of a mosaic: so far from its edges and voids a source begins to give way to what lies below it. 0: at them.
+  double feather = 0;
+  std::size_t max_open_sources = 64;  // kept open between reads; what is in use comes on top, one a thread
   // Called now and then while Open scans the sources, with the share done, 0..1: files count alike. May be empty.
   std::function<void(double)> progress = {};
+  std::stop_token stop = {};  // Open gives up (kCancelled)
 };
 
 // One raster of a dataset.
@@ -167,13 +172,16 @@ class DemSource {
   // Blocks of tiles, without overlap, sorted by row and column, that hold every tile of the level which touches a
   // source that is worth the level, and every ancestor of a tile; at level 0 both roots (availability.h).
   const std::vector<geo::TileRange>& Available(int level) const;
+  // The same of all levels, from 0.
+  const std::vector<std::vector<geo::TileRange>>& Availability() const;
   bool IsAvailable(const geo::TileKey& key) const;
 
   // Heights no sample of the tile (halo not included) leaves: at least as wide as the truth, a function of the key
   // alone. Any valid key; tiles away from the source hold only the floor.
   HeightRange RangeBound(const geo::TileKey& key) const;
 
-  // Reads and resamples one tile. kUnavailable: the source cannot be read now. kCancelled: stopped.
+  // Reads and resamples one tile. kUnavailable: the source cannot be read now.
+  // kChanged: it is not the file that was opened any more. kCancelled: stopped.
   Result<TileHeights> Read(const geo::TileKey& key, std::stop_token stop = {}) const;
 
   // Heights of the same nodes as each source counts them: of those above the ellipsoid, and of unknown ones, the same.
@@ -206,6 +214,9 @@ class DemSource {
   // Identifies content and options: device, inode, size, mtime of all files in their order, and every option that
   // changes heights.
   std::uint64_t fingerprint() const;
+
+  // What it is read from, as it was when it was opened.
+  StampedFiles files() const;
 
  private:
   class Impl;

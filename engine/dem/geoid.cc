@@ -128,7 +128,8 @@ std::shared_ptr<const Geoid> Geoid::FindShared(const std::string& vertical_crs, 
   const std::lock_guard lock(mutex);
   if (made != nullptr) return shared.insert_or_assign(vertical_crs, std::move(made)).first->second;
   const auto found = shared.find(vertical_crs);
-  return found == shared.end() ? nullptr : found->second;
+  // A grid that was replaced is read anew.
+  return found == shared.end() || found->second->files_.FirstChanged() ? nullptr : found->second;
 }
 
 Result<std::shared_ptr<const Geoid>> Geoid::OfCrs(const std::string& vertical_crs, Position centre) {
@@ -158,7 +159,9 @@ Result<std::shared_ptr<const Geoid>> Geoid::OfCrs(const std::string& vertical_cr
     if (geoid->pipeline_.empty()) continue;
     const PJ_PROJ_INFO info = proj_pj_info(operation.get());
     geoid->description_ = info.description == nullptr ? geoid->pipeline_ : info.description;
-    for (const Grid& grid : grids) geoid->grids_.push_back(grid.file);
+    std::vector<std::string> files;
+    for (const Grid& grid : grids) files.push_back(grid.file);
+    geoid->files_ = StampedFiles(files);
     auto checked = Checked(geoid, centre);
     if (checked && count == 1) FindShared(vertical_crs, *checked);
     return checked;
@@ -180,7 +183,7 @@ Result<std::shared_ptr<const Geoid>> Geoid::OfGrid(const std::string& path, Posi
   const std::shared_ptr<Geoid> geoid(new Geoid);
   geoid->name_ = std::filesystem::path(path).filename().string();
   geoid->description_ = "undulations of " + path;
-  geoid->grids_ = {path};
+  geoid->files_ = StampedFiles({path});
   geoid->pipeline_ = fmt::format(
       "+proj=pipeline +step +proj=unitconvert +xy_in=deg +xy_out=rad +step +proj=vgridshift +grids=\"{}\" "
       "+multiplier=1 +step +proj=unitconvert +xy_in=rad +xy_out=deg",
@@ -193,7 +196,7 @@ Result<std::shared_ptr<const Geoid>> Geoid::Checked(std::shared_ptr<const Geoid>
   std::unique_ptr<Operation> operation = geoid->Borrow();
   if (operation == nullptr) {
     return MakeError(ErrorCode::kInvalidArgument, "{}: PROJ cannot read its grid ({}); check it with `gdalinfo {}`",
-                     geoid->name_, geoid->description_, geoid->grids_.empty() ? "" : geoid->grids_.front());
+                     geoid->name_, geoid->description_, geoid->files_.size() == 0 ? "" : geoid->files_.path(0));
   }
   const double base = operation->At(centre, 0), above = operation->At(centre, 1);
   if (std::isnan(base)) {

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "engine/core/result.h"
+#include "engine/dem/file_stamp.h"
 #include "engine/dem/projector.h"
 
 namespace terrace::dem {
@@ -54,8 +55,8 @@ class Geoid {
   const std::string& name() const { return name_; }                // "EGM96 height"
   const std::string& description() const { return description_; }  // of the operation, for people
   const std::string& pipeline() const { return pipeline_; }        // as PROJ runs it
-  // Files the operation reads, for fingerprints.
-  const std::vector<std::string>& grids() const { return grids_; }
+  // What the operation reads, as it was when it was set up.
+  const StampedFiles& files() const { return files_; }
 
  private:
   Geoid() = default;
@@ -65,7 +66,7 @@ class Geoid {
   void Return(std::unique_ptr<Operation> operation) const;
 
   std::string name_, description_, pipeline_;
-  std::vector<std::string> grids_;
+  StampedFiles files_;
   mutable std::mutex mutex_;
   mutable std::vector<std::unique_ptr<Operation>> idle_;  // guarded by mutex_
 };

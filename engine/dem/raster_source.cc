@@ -66,16 +66,16 @@ void LogVertical(const std::string& path, const VerticalDatum& vertical) {
 
 // The scan, or another one with the rules that its findings call for.
 Result<RasterScan> Rescan(GDALDataset& dataset, RasterScan scan, RasterLayout& layout, std::string& found,
-                          const std::function<void(double)>& progress) {
+                          const std::function<void(double)>& progress, const std::stop_token& stop) {
   if (!MayHideVoids(layout.rules, scan.lowest, scan.highest, scan.voids > 0, scan.zeros)) return scan;
-  const auto findings = FindVoids(HeightBand(dataset), layout.rules, scan.zeros);
+  const auto findings = FindVoids(HeightBand(dataset), layout.rules, scan.zeros, stop);
   if (!findings) return tl::unexpected(findings.error());
   if (!findings->any()) return scan;
   findings->AddTo(layout.rules);
   found = findings->text;
   // They were averaged from heights and marks.
   layout.overview_factors.clear();
-  return ScanRaster(dataset, layout, progress);
+  return ScanRaster(dataset, layout, progress, stop);
 }
 
 Position CentreOf(const Georeference& georeference) {
@@ -87,24 +87,31 @@ Position CentreOf(const Georeference& georeference) {
 }  // namespace
 
 Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path, const SourceOptions& options,
-                                                         const std::function<void(double)>& progress) {
+                                                         const std::function<void(double)>& progress,
+                                                         std::shared_ptr<HandleLimit> handles,
+                                                         const std::stop_token& stop) {
+  const auto before = StampOf(path);
   auto dataset = OpenRaster(path);
   if (!dataset) return tl::unexpected(dataset.error());
+  auto files = StampedFiles::OfOpened(FilesOf(**dataset, path), before);
+  if (!files) return tl::unexpected(files.error());
   auto georeference = Georeference::Of(**dataset, path);
   if (!georeference) return tl::unexpected(georeference.error());
   const auto spacing = SourceSpacing::Of(*georeference, path);
   if (!spacing) return tl::unexpected(spacing.error());
 
   std::unique_ptr<RasterSource> source(
-      new RasterSource(path, StampedFiles(FilesOf(**dataset, path)), *std::move(georeference)));
+      new RasterSource(path, *std::move(files), *std::move(georeference), std::move(handles)));
   source->layout_ = LayoutOf(**dataset, source->georeference_);
   std::string found_voids;
   auto vertical = ResolveVertical(options.vertical, source->georeference_, CentreOf(source->georeference_));
   if (!vertical) return MakeError(vertical.error().code, "{}: {}", path, vertical.error().message);
   source->vertical_ = *std::move(vertical);
   source->layout_.rules.marks = options.nodata;
-  auto scan = ScanRaster(**dataset, source->layout_, progress);
-  if (scan && options.find_voids) scan = Rescan(**dataset, *std::move(scan), source->layout_, found_voids, progress);
+  auto scan = ScanRaster(**dataset, source->layout_, progress, stop);
+  if (scan && options.find_voids) {
+    scan = Rescan(**dataset, *std::move(scan), source->layout_, found_voids, progress, stop);
+  }
   if (!scan) return MakeError(scan.error().code, "{}: {}", path, scan.error().message);
 
   source->footprint_ = Footprint::Of(source->georeference_);

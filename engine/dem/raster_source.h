@@ -26,8 +26,11 @@ namespace terrace::dem {
 class RasterSource {
  public:
   // Opens a raster, checks it, and scans it once for its heights. Errors name the file, what is wrong and the remedy.
+  // `handles` bounds what this and other rasters keep open; null: nothing does. kCancelled: stopped.
   static Result<std::unique_ptr<RasterSource>> Open(const std::string& path, const SourceOptions& options = {},
-                                                    const std::function<void(double)>& progress = {});
+                                                    const std::function<void(double)>& progress = {},
+                                                    std::shared_ptr<HandleLimit> handles = nullptr,
+                                                    const std::stop_token& stop = {});
 
   const RasterInfo& info() const { return info_; }
   const Georeference& georeference() const { return georeference_; }
@@ -48,8 +51,8 @@ class RasterSource {
   Result<void> CheckUnchanged() const { return handles_.CheckUnchanged(); }
 
  private:
-  RasterSource(std::string path, StampedFiles files, Georeference where)
-      : handles_(std::move(path), std::move(files)), georeference_(std::move(where)) {}
+  RasterSource(std::string path, StampedFiles files, Georeference where, std::shared_ptr<HandleLimit> handles)
+      : handles_(std::move(path), std::move(files), std::move(handles)), georeference_(std::move(where)) {}
 
   mutable HandlePool handles_;  // thread-safe
   const Georeference georeference_;

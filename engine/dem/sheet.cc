@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "engine/dem/feather.h"
 #include "engine/dem/grid_cells.h"
 #include "engine/dem/node_positions.h"
 #include "engine/dem/void_fill.h"
@@ -65,12 +66,12 @@ Result<Georeference> GeoreferenceOf(const SheetPlan& plan) {
 
 float RoundHeight(double metres) { return static_cast<float>(std::nearbyint(metres * 1024) / 1024); }
 
-Result<Sheet> Sheet::Make(SheetPlan plan, int max_void_gap) {
+Result<Sheet> Sheet::Make(SheetPlan plan, const SheetOptions& options) {
   auto where = GeoreferenceOf(plan);
   if (!where) return tl::unexpected(where.error());
   Sheet sheet(*std::move(where));
   sheet.members_ = std::move(plan.members);
-  sheet.max_void_gap_ = max_void_gap;
+  sheet.options_ = options;
   sheet.width_ = plan.width;
   sheet.height_ = plan.height;
   sheet.wraps_ = sheet.georeference_.wrap_columns() > 0;
@@ -170,7 +171,7 @@ Result<std::vector<float>> Sheet::ReadFilled(int factor, const GridWindow& windo
   if (!core) return core;
   const auto voids = static_cast<std::uint64_t>(std::ranges::count_if(*core, is_void));
   counts_->measured += core->size() - voids;
-  const int gap = max_void_gap_ / factor;
+  const int gap = options_.max_void_gap / factor;
   if (voids == 0 || gap < 2) {
     counts_->voids += voids;
     return core;
@@ -191,30 +192,59 @@ std::optional<float> Sheet::PoleHeight(int pole, Counting counting) const {
   return std::isnan(undulation) ? std::nullopt : std::optional(RoundHeight(*height + undulation));
 }
 
+double Sheet::Feather(int factor) const {
+  // Of the coarser axis: what is read around a tile, and the time that weights take, stay bounded.
+  constexpr int kMostSamples = 256;
+  return std::min(options_.feather_m, kMostSamples * factor * std::min(spacing_.east, spacing_.north));
+}
+
+Result<std::vector<float>> Sheet::ReadWeights(int factor, const GridWindow& window, const std::stop_token& stop) const {
+  const double feather = Feather(factor), column_step = spacing_.east * factor, row_step = spacing_.north * factor;
+  const int halo = static_cast<int>(std::ceil(feather / std::min(column_step, row_step))) + 1;
+  const GridWindow wide = Grown(window, halo, Columns(factor), Rows(factor));
+  const auto pixel = [factor](std::int64_t block) { return static_cast<double>(block * factor); };
+  const bool ends = wide.rows < window.rows + 2 * halo || wide.columns < window.columns + 2 * halo;
+  if (!ends &&
+      !Ranges({pixel(wide.column), pixel(wide.row), pixel(wide.column + wide.columns), pixel(wide.row + wide.rows)})
+           .has_voids) {
+    return std::vector<float>();
+  }
+  const auto heights = ReadFilled(factor, wide, stop);
+  if (!heights) return heights;
+  return FeatherWeights(*heights, wide, window, column_step, row_step, feather);
+}
+
 Result<void> Sheet::FillAt(std::span<const Position> positions, std::span<const double> undulations, int factor,
-                           std::span<float> heights, const std::stop_token& stop) const {
+                           std::span<float> heights, const std::stop_token& stop, std::span<float> weights) const {
   Cells found = CellsAt(positions, heights, factor);
   if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "reading was stopped");
   if (found.cells.empty()) return CheckUnread();
   const GridWindow window = WindowOf(found.cells, Columns(factor), Rows(factor));
   const auto samples = ReadFilled(factor, window, stop);
   if (!samples) return tl::unexpected(samples.error());
+  std::vector<float> counts;
+  if (!weights.empty() && options_.feather_m > 0) {
+    auto read = ReadWeights(factor, window, stop);
+    if (!read) return tl::unexpected(read.error());
+    counts = *std::move(read);
+  }
   for (std::size_t i = 0; i < found.cells.size(); ++i) {
     const std::size_t node = found.nodes[i];
     const auto height = Interpolate(*samples, window, found.cells[i]);
-    if (!height) continue;
     // Where the geoid is not known a height means nothing.
-    if (undulations.empty()) {
-      heights[node] = RoundHeight(*height);
-    } else if (!std::isnan(undulations[node])) {
-      heights[node] = RoundHeight(*height + undulations[node]);
-    }
+    if (!height || (!undulations.empty() && std::isnan(undulations[node]))) continue;
+    heights[node] = RoundHeight(undulations.empty() ? *height : *height + undulations[node]);
+    if (weights.empty()) continue;
+    // Every sample has a weight, so this is plain bilinear. What counts nothing would still hide the floor.
+    constexpr double kLeast = 0x1p-10;
+    const double weight = counts.empty() ? 1 : Interpolate(counts, window, found.cells[i]).value_or(1);
+    weights[node] = static_cast<float>(std::max(kLeast, std::nearbyint(weight * 1024) / 1024));
   }
   return {};
 }
 
 Result<void> Sheet::Fill(const geo::Lattice& lattice, const NodeWindow& window, Counting counting,
-                         std::span<float> heights, const std::stop_token& stop) const {
+                         std::span<float> heights, const std::stop_token& stop, std::span<float> weights) const {
   const int factor = AveragingFactor(SamplesPerCell(lattice, spacing_));
   auto positions = NodePositions(georeference_, reach_, lattice, window, kPositionTolerance * factor);
   for (int row = 0; row < window.rows && georeference_.is_geographic_grid(); ++row) {
@@ -231,16 +261,16 @@ Result<void> Sheet::Fill(const geo::Lattice& lattice, const NodeWindow& window, 
   }
   std::vector<double> undulations;
   if (undulations_ && counting == Counting::kEllipsoid) undulations = undulations_->At(lattice, window);
-  return FillAt(positions, undulations, factor, heights, stop);
+  return FillAt(positions, undulations, factor, heights, stop, weights);
 }
 
 Result<void> Sheet::Fill(const geo::MercatorGrid& grid, const NodeWindow& window, std::span<float> heights,
-                         const std::stop_token& stop) const {
+                         const std::stop_token& stop, std::span<float> weights) const {
   const int factor = MercatorFactor(grid.depth, spacing_);
   std::vector<double> undulations;
   if (undulations_) undulations = undulations_->At(grid, window);
   return FillAt(NodePositions(georeference_, reach_, grid, window, kPositionTolerance * factor), undulations, factor,
-                heights, stop);
+                heights, stop, weights);
 }
 
 }  // namespace terrace::dem

@@ -35,10 +35,15 @@ enum class Counting : std::uint8_t {
   kAsSource,  // what its samples count from
 };
 
+struct SheetOptions {
+  int max_void_gap = 0;  // samples: narrower voids are filled
+  double feather_m = 0;  // how far from its edges and voids a sheet begins to give way to what lies below; 0: at them
+};
+
 class Sheet {
  public:
   // Precondition: the plan has members.
-  static Result<Sheet> Make(SheetPlan plan, int max_void_gap);
+  static Result<Sheet> Make(SheetPlan plan, const SheetOptions& options);
 
   const std::vector<SheetMember>& members() const { return members_; }
   const SourceSpacing& spacing() const { return spacing_; }
@@ -56,10 +61,12 @@ class Sheet {
 
   // These replace the NaN among `heights`, one for each node of the window, by the sheet's heights there, as far as it
   // has some. A height is a function of the node alone. kUnavailable: a raster cannot be read now. kCancelled: stopped.
+  // `weights`, if it is not empty, has one for each node: those of the heights that are filled in become what they
+  // count beside what lies below, over 0 to 1.
   Result<void> Fill(const geo::Lattice& lattice, const NodeWindow& window, Counting counting, std::span<float> heights,
-                    const std::stop_token& stop) const;
+                    const std::stop_token& stop, std::span<float> weights = {}) const;
   Result<void> Fill(const geo::MercatorGrid& grid, const NodeWindow& window, std::span<float> heights,
-                    const std::stop_token& stop) const;
+                    const std::stop_token& stop, std::span<float> weights = {}) const;
 
   // The same at single points, as measured: nothing is averaged and nothing is filled.
   Result<void> FillPoints(std::span<const GeoPosition> points, HeightDatum datum, std::span<float> heights,
@@ -93,8 +100,12 @@ class Sheet {
   Result<std::vector<float>> ReadFilled(int factor, const GridWindow& window, const std::stop_token& stop) const;
   // `undulations`: of the same nodes, added to heights; empty: none are.
   Result<void> FillAt(std::span<const Position> positions, std::span<const double> undulations, int factor,
-                      std::span<float> heights, const std::stop_token& stop) const;
+                      std::span<float> heights, const std::stop_token& stop, std::span<float> weights) const;
   std::optional<float> PoleHeight(int pole, Counting counting) const;  // 0 south, 1 north
+  // What each sample of the window counts; empty: all count in full.
+  Result<std::vector<float>> ReadWeights(int factor, const GridWindow& window, const std::stop_token& stop) const;
+  // Metres: no more than a bounded number of samples.
+  double Feather(int factor) const;
   Result<void> CheckUnread() const;
 
   // Of the pixels in a box; what no member covers counts as void.
@@ -112,7 +123,7 @@ class Sheet {
   bool wraps_ = false;
   SourceSpacing spacing_;
   Footprint reach_;
-  int max_void_gap_ = 0;  // samples
+  SheetOptions options_;
   std::array<std::optional<float>, 2> pole_heights_;
 
   std::vector<SheetMember> members_;

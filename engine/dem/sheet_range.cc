@@ -122,18 +122,25 @@ SheetRange Sheet::RangeOf(const geo::Lattice& lattice, const geo::TileKey& key) 
     leaves = true;
   }
   BlockRange blocks;
+  bool blends = false;
   for (PixelBox& box : boxes) {
     leaves |= box.north < 0 || box.south > height_;
+    if (options_.feather_m > 0) {
+      PixelBox wide = box;
+      wide.Grow(Feather(factor) / spacing_.east + 2 * factor, Feather(factor) / spacing_.north + 2 * factor);
+      blends |= wide.north < 0 || wide.south > height_ || (!wraps_ && (wide.west < 0 || wide.east > width_)) ||
+                Ranges({wide.west, wide.north, wide.east, wide.south}).has_voids;
+    }
     // Bilinear interpolation reaches one and a half samples of the grid.
     box.Grow(1.5 * factor + 1, 1.5 * factor + 1);
     BlockRange here = Ranges({box.west, box.north, box.east, box.south});
     if (here.has_voids) {
-      box.Grow(max_void_gap_ + factor, max_void_gap_ + factor);
+      box.Grow(options_.max_void_gap + factor, options_.max_void_gap + factor);
       here.Add(Ranges({box.west, box.north, box.east, box.south}));
     }
     blocks.Add(here);
   }
-  range.shows_others = leaves || blocks.has_voids || (undulations_ && !undulations_->is_complete());
+  range.shows_others = leaves || blends || blocks.has_voids || (undulations_ && !undulations_->is_complete());
   if (undulations_ && blocks.min <= blocks.max) {
     const HeightRange shift =
         undulations_->RangeOf(lattice.Longitude(lattice.FirstColumn(key)), lattice.Latitude(south_row), extent, extent);

@@ -29,7 +29,8 @@ struct Evidence {
 
 class Looker {
  public:
-  Looker(GDALRasterBand& band, const SampleRules& rules) : band_(band), rules_(rules) {
+  Looker(GDALRasterBand& band, const SampleRules& rules, const std::stop_token& stop)
+      : band_(band), rules_(rules), stop_(stop) {
     for (std::size_t i = 0; i < kMarks.size(); ++i) heights_[i] = static_cast<float>(rules.Metres(kMarks[i]));
   }
 
@@ -42,7 +43,7 @@ class Looker {
         wide_ = std::min(col + kChunk + kReach, band_.GetXSize()) - left_;
         high_ = std::min(row + kChunk + kReach, band_.GetYSize()) - top_;
         samples_.resize(static_cast<std::size_t>(wide_) * static_cast<std::size_t>(high_));
-        auto read = ReadHeights(band_, rules_, left_, top_, wide_, high_, samples_.data(), {});
+        auto read = ReadHeights(band_, rules_, left_, top_, wide_, high_, samples_.data(), stop_);
         if (!read) return read;
         const int end_row = std::min(row + kChunk, band_.GetYSize()),
                   end_col = std::min(col + kChunk, band_.GetXSize());
@@ -92,6 +93,7 @@ class Looker {
 
   GDALRasterBand& band_;
   const SampleRules& rules_;
+  const std::stop_token stop_;
   std::array<float, kMarks.size()> heights_{};
   int left_ = 0, top_ = 0, wide_ = 0, high_ = 0;  // of the samples read
   std::vector<float> samples_;
@@ -142,13 +144,14 @@ bool MayHideVoids(const SampleRules& rules, double lowest, double highest, bool 
          (has_voids && lowest < kLowestLand);
 }
 
-Result<VoidFindings> FindVoids(GDALRasterBand& band, const SampleRules& rules, const ZeroEdges& zeros) {
+Result<VoidFindings> FindVoids(GDALRasterBand& band, const SampleRules& rules, const ZeroEdges& zeros,
+                               const std::stop_token& stop) {
   VoidFindings findings;
   const auto say = [&findings](const std::string& what) {
     findings.text += (findings.text.empty() ? "" : ", ") + what;
   };
   Evidence evidence;
-  Looker marks(band, rules);
+  Looker marks(band, rules, stop);
   auto read = marks.ForEachChunk([&](int c, int r) { marks.CountMarks(marks.At(c, r), evidence); });
   if (!read) return tl::unexpected(read.error());
   for (std::size_t i = 0; i < kMarks.size(); ++i) {
@@ -166,7 +169,7 @@ Result<VoidFindings> FindVoids(GDALRasterBand& band, const SampleRules& rules, c
   SampleRules found = rules;
   findings.AddTo(found);
   found.rim = 0;
-  Looker beyond(band, found);
+  Looker beyond(band, found, stop);
   read = beyond.ForEachChunk([&](int c, int r) {
     const float height = beyond.At(c, r);
     if (height < kLowestLand || height > kHighest) beyond.CountBeyond(c, r, evidence);

@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -49,6 +50,7 @@ bool MayHideVoids(const SampleRules& rules, double lowest, double highest, bool 
 // lower
 //   or higher. In a sea floor they lie elsewhere too; there the bound is -12,000 m. Then all voids grow by 2 samples.
 // - Zeros are voids where they are a collar; voids then grow by one sample.
-Result<VoidFindings> FindVoids(GDALRasterBand& band, const SampleRules& rules, const ZeroEdges& zeros);
+Result<VoidFindings> FindVoids(GDALRasterBand& band, const SampleRules& rules, const ZeroEdges& zeros,
+                               const std::stop_token& stop = {});
 
 }  // namespace terrace::dem

@@ -10,10 +10,14 @@
 #include <string>
 #include <vector>
 
+#include "config/config.h"
+#include "config/parse.h"
 #include "engine/dem/dem_source.h"
 #include "engine/dem/source_policy.h"
 #include "engine/geo/error_ladder.h"
 #include "server/cli/command.h"
+#include "server/cli/mosaic_info.h"
+#include "server/cli/open_source.h"
 #include "server/cli/progress.h"
 
 namespace terrace::cli {
@@ -102,24 +106,46 @@ nlohmann::json ToJson(const dem::DemInfo& dataset) {
           {"advice", AdviceFor(info, dataset.floor)}};
 }
 
-int Info(const std::vector<std::string>& dems, const std::string& vertical, bool json) {
-  spdlog::set_level(spdlog::level::err);  // what opening logs is printed below
-  int exit_code = dem::AllowVrts() ? kExitOk : kExitFailure;
-  nlohmann::json all = nlohmann::json::array();
-  for (const std::string& path : dems) {
-    Progress progress("reading " + path);
-    dem::DemOptions options;
-    options.source.vertical = vertical;
-    options.progress = progress.Callback();
-    const auto source = dem::DemSource::Open(path, options);
+// Each DEM is a dataset, or all of them are one.
+std::vector<std::vector<config::SourceConfig>> Datasets(const std::vector<std::string>& dems, bool mosaic,
+                                                        int& exit_code) {
+  std::vector<std::vector<config::SourceConfig>> datasets;
+  for (const std::string& dem : dems) {
+    Result<config::SourceConfig> source = config::SourceAt(dem);
     if (!source) {
       std::fprintf(stderr, "terrace: %s\n", source.error().message.c_str());
       exit_code = kExitFailure;
-    } else if (json) {
-      all.push_back(ToJson((*source)->info()));
+    } else if (mosaic && !datasets.empty()) {
+      datasets.front().push_back(*std::move(source));
     } else {
-      PrintText((*source)->info());
+      datasets.push_back({*std::move(source)});
     }
+  }
+  return datasets;
+}
+
+int Info(const std::vector<std::string>& dems, const std::string& vertical, bool json, bool mosaic) {
+  spdlog::set_level(spdlog::level::err);  // what opening logs is printed below
+  int exit_code = dem::AllowVrts() ? kExitOk : kExitFailure;
+  nlohmann::json all = nlohmann::json::array();
+  for (const auto& sources : Datasets(dems, mosaic, exit_code)) {
+    const std::string name = NameOf(sources);
+    Progress progress("reading " + name, FileCount(sources));
+    config::DatasetConfig dataset;
+    dataset.sources = sources;
+    dataset.vertical = vertical;
+    const auto source = OpenSource(dataset, progress.Callback());
+    if (!source) {
+      std::fprintf(stderr, "terrace: %s\n", source.error().message.c_str());
+      exit_code = kExitFailure;
+      continue;
+    }
+    const dem::DemInfo& info = (*source)->info();
+    const bool is_one = info.sources.size() == 1;
+    if (json)
+      all.push_back(is_one ? ToJson(info) : nlohmann::json::parse(MosaicJson(name, info)));
+    else
+      is_one ? PrintText(info) : PrintMosaic(name, info);
   }
   if (json) fmt::print("{}\n", all.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
   return exit_code;
@@ -130,22 +156,24 @@ int Info(const std::vector<std::string>& dems, const std::string& vertical, bool
 void AddInfo(CLI::App& app, int& exit_code) {
   auto dems = std::make_shared<std::vector<std::string>>();
   auto vertical = std::make_shared<std::string>("crs");
-  auto json = std::make_shared<bool>(false);
+  auto json = std::make_shared<bool>(false), mosaic = std::make_shared<bool>(false);
   CLI::App* command =
       app.add_subcommand("info", "Tells what rasters hold, the levels they can serve, and what to mend");
   command->footer(
       "Examples:\n"
       "  terrace info alps.tif andes.tif\n"
-      "  terrace info alps.tif --json\n\n"
+      "  terrace info alps.tif --json\n"
+      "  terrace info --mosaic lidar/ base.tif\n\n"
       "A raster that cannot be served is told on stderr with the reason and the remedy; the others are still shown.");
-  command->add_option("DEM", *dems, "Rasters that GDAL can read")->required();
+  command->add_option("DEM", *dems, "Rasters that GDAL can read, or folders of them")->required();
   command->add_flag("--json", *json, "One JSON array instead of text");
+  command->add_flag("--mosaic", *mosaic, "Takes all of them for one dataset, the first counting most");
   command
       ->add_option("--vertical", *vertical,
                    "What heights count from: crs (as the raster states), unknown, ellipsoid, egm96, egm2008, EPSG:N or "
                    "the path of a grid")
       ->type_name("DATUM");
-  command->callback([dems, vertical, json, &exit_code] { exit_code = Info(*dems, *vertical, *json); });
+  command->callback([dems, vertical, json, mosaic, &exit_code] { exit_code = Info(*dems, *vertical, *json, *mosaic); });
 }
 
 }  // namespace terrace::cli

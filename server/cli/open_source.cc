@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <utility>
+
 namespace terrace::cli {
 
 namespace {
@@ -42,13 +44,16 @@ std::string NameOf(const std::vector<config::SourceConfig>& sources) {
 }
 
 Result<std::unique_ptr<dem::DemSource>> OpenSource(const config::DatasetConfig& wanted,
-                                                   const std::function<void(double)>& progress) {
+                                                   const std::function<void(double)>& progress, std::stop_token stop) {
   dem::DemOptions options;
   options.error_fraction = wanted.error_fraction;
   options.finest_error = wanted.finest_error;
   options.floor = wanted.floor;
   options.max_void_gap = wanted.max_void_gap;
+  options.feather = wanted.feather;
+  options.max_open_sources = wanted.max_open_sources;
   options.progress = progress;
+  options.stop = std::move(stop);
   return dem::DemSource::Open(FilesOf(wanted), options);
 }
 

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <functional>
 #include <memory>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,7 @@ std::string NameOf(const std::vector<config::SourceConfig>& sources);
 
 // Opens and scans all of them. Errors name the file and the remedy.
 Result<std::unique_ptr<dem::DemSource>> OpenSource(const config::DatasetConfig& wanted,
-                                                   const std::function<void(double)>& progress);
+                                                   const std::function<void(double)>& progress,
+                                                   std::stop_token stop = {});
 
 }  // namespace terrace::cli

@@ -46,7 +46,7 @@ TEST(Geoid, Egm96EqualsCs2csAtNamedPlaces) {
     EXPECT_GT(std::abs(*expected), 1) << name << ": no conversion at all";
     EXPECT_NEAR((*geoid)->Undulation(degrees), *expected, 1e-4) << name;
     EXPECT_EQ((*geoid)->name(), "EGM96 height");
-    ASSERT_EQ((*geoid)->grids().size(), 1u);
+    ASSERT_EQ((*geoid)->files().size(), 1u);
   }
 }
 

@@ -1,8 +1,10 @@
 // Heights above geoids become ellipsoidal, everywhere alike: in tiles, at points, on Web Mercator, in bounds.
 #include "engine/dem/vertical_datum.h"
 
+#include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 
 #include "engine/dem/sample_rules.h"
 #include "engine/geo/mercator_grid.h"
@@ -176,6 +178,17 @@ TEST(VerticalDatum, OrthometricHeightsAreTheSourcesOwnOrAboveEgm96) {
   for (std::size_t i = 0; i < points.size(); ++i) {
     EXPECT_NEAR((*below)[i], (*plain)[i] - Egm96At({points[i].longitude, points[i].latitude}), .002);
   }
+}
+
+TEST(VerticalDatum, TheGridIsOneOfItsFiles) {
+  const TempDir dir;
+  const std::string path = WriteRaster(dir, Hills("EPSG:4326")), grid = dir.File("geoid.tif");
+  std::filesystem::copy_file((*Geoid::OfCrs("EPSG:5773", {0, 0}))->files().path(0), grid);
+  const auto source = OpenOrFail(path, With(grid));
+  ASSERT_NE(source, nullptr);
+  EXPECT_EQ(source->files().FirstChanged(), std::nullopt);
+  std::filesystem::last_write_time(grid, std::filesystem::file_time_type::clock::now() - std::chrono::hours(1));
+  EXPECT_EQ(source->files().FirstChanged(), grid);
 }
 
 TEST(VerticalDatum, RefusesWithTheFileAndTheWayOut) {
