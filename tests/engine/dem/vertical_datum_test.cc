@@ -182,8 +182,11 @@ TEST(VerticalDatum, OrthometricHeightsAreTheSourcesOwnOrAboveEgm96) {
 
 TEST(VerticalDatum, TheGridIsOneOfItsFiles) {
   const TempDir dir;
-  const std::string path = WriteRaster(dir, Hills("EPSG:4326")), grid = dir.File("geoid.tif");
-  std::filesystem::copy_file((*Geoid::OfCrs("EPSG:5773", {0, 0}))->files().path(0), grid);
+  const std::string path = WriteRaster(dir, Hills("EPSG:4326"));
+  const std::filesystem::path installed = (*Geoid::OfCrs("EPSG:5773", {0, 0}))->files().path(0);
+  // PROJ tells formats by the ending: .gtx or .tif, by what the machine has.
+  const std::string grid = dir.File("geoid" + installed.extension().string());
+  std::filesystem::copy_file(installed, grid);
   const auto source = OpenOrFail(path, With(grid));
   ASSERT_NE(source, nullptr);
   EXPECT_EQ(source->files().FirstChanged(), std::nullopt);
