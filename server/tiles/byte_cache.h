@@ -1,16 +1,26 @@
-// What was made last, as much as fits into a budget of bytes.
+// What is used most lately, as much as fits into a budget of bytes; a scan does not drive out what is asked for often.
 //
 // Thread-safe. The cache is cut into shards with a lock each; a key lives in the shard its hash names.
 //
+// A shard is a segmented LRU (Karedla, Love and Wherry, Computer 27(3), 1994): what is inserted is on probation, what is
+// found there becomes protected, and the least recently used on probation leaves first. So what is asked for once, as a
+// crawler asks, passes through a fifth of the shard, however much of it there is. What falls out of the protected part
+// is on probation again.
+//
 // Invariants of a shard, whenever its lock is free:
-//   1. Every entry is in the list once, most recently used first, and in the index once, pointing at its list node.
-//   2. `charged` is the sum of the entries' charges and at most the shard's budget.
+//   1. Every entry is in one segment once, most recently used first, and in the index once, pointing at its list node.
+//   2. The charge of a segment is the sum of its entries' charges. Both together are at most the shard's budget, and
+//      the protected one's is at most its share of that.
+//   3. The generation of every entry's key is one of those that are retained, once Retain was called.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
+#include <iterator>
 #include <list>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -20,9 +30,11 @@ namespace terrace::server {
 struct ByteCacheStats {
   std::size_t entries = 0;
   std::size_t bytes = 0;  // as charged
+  std::uint64_t hits = 0, misses = 0;  // where the owner counts them; the cache does not know what counts as a request
 };
 
-// BytesOf(value), found beside the type of the values, says what a value takes.
+// BytesOf(value), found beside the type of the values, says what a value takes. Key::generation says what an entry is
+// made from.
 template <typename Key, typename Hash, typename Value>
 class ByteCache {
  public:
@@ -34,49 +46,75 @@ class ByteCache {
   // 0 bytes: off, nothing is ever found. A value must fit into one shard; the largest are about 2 MB.
   explicit ByteCache(std::size_t capacity_bytes) {
     const std::size_t count = capacity_bytes >= kMinShardedBytes ? kShards : 1;
-    shard_budget_ = capacity_bytes / count;
     shards_.reserve(count);
-    for (std::size_t i = 0; i < count; ++i) shards_.push_back(std::make_unique<Shard>());
+    for (std::size_t i = 0; i < count; ++i) {
+      shards_.push_back(std::make_unique<Shard>());
+      shards_.back()->budget = capacity_bytes / count;
+    }
   }
 
-  // Null when it is not there. A value that is found becomes the most recently used one of its shard.
+  // Null when it is not there. A value that is found becomes protected, and the most recently used one of its shard.
   ValuePtr Find(const Key& key) {
     Shard& shard = ShardOf(key);
     const std::lock_guard lock(shard.mutex);
     const auto found = shard.index.find(key);
     if (found == shard.index.end()) return nullptr;
-    shard.entries.splice(shard.entries.begin(), shard.entries, found->second);
+    shard.Protect(found->second);
     return found->second->value;
   }
 
   // Replaces an entry with the same key. A value that is larger than a shard's budget is not kept.
   void Insert(const Key& key, ValuePtr value) {
     const std::size_t charge = BytesOf(*value) + kEntryOverheadBytes;
-    if (charge > shard_budget_) return;
     Shard& shard = ShardOf(key);
     std::list<Entry> evicted;  // freed after the lock: giving back a large body takes time
     const std::lock_guard lock(shard.mutex);
+    if (charge > shard.budget || !shard.Retains(key)) return;
+    bool was_protected = false;
     if (const auto found = shard.index.find(key); found != shard.index.end()) {
-      shard.charged -= found->second->charge;
-      evicted.splice(evicted.end(), shard.entries, found->second);
-      shard.index.erase(found);
+      was_protected = found->second->segment == &shard.protection;
+      shard.Remove(found->second, evicted);
     }
-    while (shard.charged + charge > shard_budget_) {
-      shard.charged -= shard.entries.back().charge;
-      shard.index.erase(shard.entries.back().key);
-      evicted.splice(evicted.end(), shard.entries, std::prev(shard.entries.end()));
+    shard.EvictTo(shard.budget - charge, evicted);
+    Segment& probation = shard.probation;
+    probation.entries.push_front(Entry{key, std::move(value), charge, &probation});
+    probation.charged += charge;
+    shard.index.emplace(key, probation.entries.begin());
+    if (was_protected) shard.Protect(probation.entries.begin());
+  }
+
+  // Entries of other generations leave, and are not taken from now on.
+  void Retain(const std::vector<std::uint64_t>& generations) {
+    for (const auto& shard : shards_) {
+      std::list<Entry> gone;
+      const std::lock_guard lock(shard->mutex);
+      shard->retained = generations;
+      for (Segment* segment : {&shard->probation, &shard->protection}) {
+        for (auto entry = segment->entries.begin(); entry != segment->entries.end();) {
+          const auto here = entry++;
+          if (!shard->Retains(here->key)) shard->Remove(here, gone);
+        }
+      }
     }
-    shard.entries.push_front(Entry{key, std::move(value), charge});
-    shard.index.emplace(key, shard.entries.begin());
-    shard.charged += charge;
+  }
+
+  // The number of shards stays: a cache that was made small goes on with one lock.
+  void SetCapacity(std::size_t capacity_bytes) {
+    for (const auto& shard : shards_) {
+      std::list<Entry> evicted;
+      const std::lock_guard lock(shard->mutex);
+      shard->budget = capacity_bytes / shards_.size();
+      shard->Demote();
+      shard->EvictTo(shard->budget, evicted);
+    }
   }
 
   ByteCacheStats stats() const {
     ByteCacheStats stats;
     for (const auto& shard : shards_) {
       const std::lock_guard lock(shard->mutex);
-      stats.entries += shard->entries.size();
-      stats.bytes += shard->charged;
+      stats.entries += shard->index.size();
+      stats.bytes += shard->charged();
     }
     return stats;
   }
@@ -86,16 +124,58 @@ class ByteCache {
   static constexpr std::size_t kMinShardedBytes = std::size_t{64} << 20;
   static constexpr std::size_t kShards = 16;
 
+  struct Segment;
   struct Entry {
     Key key;
     ValuePtr value;
     std::size_t charge = 0;
+    Segment* segment = nullptr;  // where it is
+  };
+  using Place = typename std::list<Entry>::iterator;
+  struct Segment {
+    std::list<Entry> entries;  // most recently used first
+    std::size_t charged = 0;
   };
   struct Shard {
     mutable std::mutex mutex;
-    std::list<Entry> entries;  // most recently used first
-    std::unordered_map<Key, typename std::list<Entry>::iterator, Hash> index;
-    std::size_t charged = 0;
+    Segment probation, protection;
+    std::unordered_map<Key, Place, Hash> index;
+    std::size_t budget = 0;
+    std::optional<std::vector<std::uint64_t>> retained;  // generations; nothing: all
+
+    std::size_t charged() const { return probation.charged + protection.charged; }
+    bool Retains(const Key& key) const {
+      return !retained || std::find(retained->begin(), retained->end(), key.generation) != retained->end();
+    }
+    // To the front of `to`; the entry's node stays.
+    void Move(Place entry, Segment& to) {
+      Segment& from = *entry->segment;
+      from.charged -= entry->charge;
+      to.charged += entry->charge;
+      to.entries.splice(to.entries.begin(), from.entries, entry);
+      entry->segment = &to;
+    }
+    void Protect(Place entry) {
+      Move(entry, protection);
+      Demote();
+    }
+    // Four fifths are protected: a larger part keeps more of what was found twice, and leaves what is new less time to
+    // be found again.
+    void Demote() {
+      while (protection.charged > budget / 5 * 4) Move(std::prev(protection.entries.end()), probation);
+    }
+    void Remove(Place entry, std::list<Entry>& to) {
+      Segment& from = *entry->segment;
+      from.charged -= entry->charge;
+      index.erase(entry->key);
+      to.splice(to.end(), from.entries, entry);
+    }
+    void EvictTo(std::size_t most, std::list<Entry>& evicted) {
+      while (charged() > most) {
+        Segment& from = probation.entries.empty() ? protection : probation;
+        Remove(std::prev(from.entries.end()), evicted);
+      }
+    }
   };
 
   Shard& ShardOf(const Key& key) {
@@ -103,7 +183,6 @@ class ByteCache {
     return *shards_[(Hash{}(key) >> 48) % shards_.size()];
   }
 
-  std::size_t shard_budget_ = 0;
   std::vector<std::unique_ptr<Shard>> shards_;
 };
 
