@@ -77,6 +77,15 @@ struct ViewerConfig {
   friend bool operator==(const ViewerConfig&, const ViewerConfig&) = default;
 };
 
+// Finished tiles and refinements on disk, where they outlive the server.
+struct DiskCacheConfig {
+  std::string directory;                                // empty: none
+  std::size_t tile_bytes = std::size_t{8} << 30;        // of files; 0: no tiles
+  std::size_t refinement_bytes = std::size_t{4} << 30;  // of files; 0: no refinements
+
+  friend bool operator==(const DiskCacheConfig&, const DiskCacheConfig&) = default;
+};
+
 struct Config {
   ListenAddress listen{"127.0.0.1", 8080};
   std::vector<DatasetConfig> datasets;
@@ -88,6 +97,7 @@ struct Config {
   std::size_t queue_length = 256;
   std::size_t cache_bytes = std::size_t{256} << 20;             // 0: no cache
   std::size_t refinement_cache_bytes = std::size_t{128} << 20;  // 0: no cache
+  DiskCacheConfig disk_cache;
   std::size_t max_connections = 1024;
   std::size_t max_mesh_samples = 1'000'000;
   std::size_t max_locations = 10'000;  // in one request for heights

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "config/disk_cache_option.h"
 #include "config/layer_options.h"
 #include "config/nearest_name.h"
 #include "config/source_paths.h"
@@ -124,6 +125,8 @@ const std::vector<Option<Config>>& ServerOptionTable() {
       {"refinement_cache_bytes", "BYTES",
        "Memory for what tiles are made from: other errors of a tile cost a fraction then; 0 is no cache",
        Bytes(&Config::refinement_cache_bytes, kMaxCacheBytes)},
+      {"disk_cache", "DIR", "Keep finished tiles and refinements in this directory, across restarts",
+       DiskCacheOption()},
       {"max_connections", "N", "Connections at a time; above it idle ones are closed and new ones wait",
        Integer(&Config::max_connections, 1, 1'000'000)},
       {"max_locations", "N", "Points that one request for heights may name",
@@ -224,8 +227,10 @@ Json WriteObject(const Target& source, const std::vector<Option<Target>>& table)
 template void ReadObject(const Json&, const Place&, const std::vector<Option<Config>>&, Config&);
 template void ReadObject(const Json&, const Place&, const std::vector<Option<DatasetConfig>>&, DatasetConfig&);
 template void ReadObject(const Json&, const Place&, const std::vector<Option<ImageryConfig>>&, ImageryConfig&);
+template void ReadObject(const Json&, const Place&, const std::vector<Option<DiskCacheConfig>>&, DiskCacheConfig&);
 template Json WriteObject(const Config&, const std::vector<Option<Config>>&);
 template Json WriteObject(const DatasetConfig&, const std::vector<Option<DatasetConfig>>&);
 template Json WriteObject(const ImageryConfig&, const std::vector<Option<ImageryConfig>>&);
+template Json WriteObject(const DiskCacheConfig&, const std::vector<Option<DiskCacheConfig>>&);
 
 }  // namespace terrace::config

@@ -48,6 +48,7 @@ LIBRARIES = [
     Library("libjpeg", r"jpeglib\.h", r"proto/.*\.cc"),
     Library("libwebp", r"webp/.*", r"proto/.*\.cc"),
     Library("meshoptimizer", r"meshoptimizer\.h", r"proto/.*\.cc"),
+    Library("RocksDB", r"rocksdb/.*", r"server/tiles/record_db\.cc"),
     Library("xxHash", r"xxhash\.h", r"(engine/dem|engine/tin|proto|server)/.*\.cc"),
     Library("spdlog", r"spdlog/.*", r"(engine/dem|server)/.*\.cc"),
     Library("Beast", r"boost/beast.*", r"server/http/(listener|session|request)\.cc"),

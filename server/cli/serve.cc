@@ -20,6 +20,7 @@
 #include "server/cli/open_layers.h"
 #include "server/cli/progress.h"
 #include "server/server.h"
+#include "server/tiles/disk_cache.h"
 #include "server/tiles/tile_pipeline.h"
 
 namespace terrace::cli {
@@ -176,6 +177,16 @@ server::ServerOptions OptionsOf(const config::Config& config) {
   return options;
 }
 
+// Null where there is to be none.
+Result<std::shared_ptr<server::DiskCache>> OpenDiskCache(const config::DiskCacheConfig& config) {
+  if (config.directory.empty()) return nullptr;
+  server::DiskCacheOptions options;
+  options.directory = config.directory;
+  options.tile_bytes = config.tile_bytes;
+  options.refinement_bytes = config.refinement_bytes;
+  return server::DiskCache::Open(options);
+}
+
 int Serve(const ServeArguments& arguments) {
   std::vector<config::ConfigError> errors;
   const config::Config config = MakeConfig(arguments, errors);
@@ -185,11 +196,20 @@ int Serve(const ServeArguments& arguments) {
     return kExitOk;
   }
   SetUpLog(config.log_level, config.log_format);
+  // First, so that a directory that cannot be used is known before sources are scanned.
+  Result<std::shared_ptr<server::DiskCache>> disk = OpenDiskCache(config.disk_cache);
+  if (!disk) {
+    std::fprintf(stderr, "terrace: %s\n", disk.error().message.c_str());
+    return kExitFailure;
+  }
   std::vector<server::Dataset> datasets;
   if (!OpenDatasets(config, datasets)) return kExitFailure;
   const std::size_t count = datasets.size();
-  auto pipeline = std::make_shared<const server::TilePipeline>(std::move(datasets), config.refinement_cache_bytes);
-  auto server = server::Server::Start(std::move(pipeline), OptionsOf(config));
+  auto pipeline =
+      std::make_shared<const server::TilePipeline>(std::move(datasets), config.refinement_cache_bytes, *disk);
+  server::ServerOptions options = OptionsOf(config);
+  options.disk_cache = *std::move(disk);
+  auto server = server::Server::Start(std::move(pipeline), std::move(options));
   if (!server) {
     std::fprintf(stderr, "terrace: %s\n", server.error().message.c_str());
     return kExitFailure;

@@ -41,6 +41,4 @@ struct RefinedTileKeyHash {
   }
 };
 
-using RefinementCache = ByteCache<RefinedTileKey, RefinedTileKeyHash, RefinedTile>;
-
 }  // namespace terrace::server

@@ -25,8 +25,9 @@ std::chrono::microseconds Since(Clock::time_point start) {
 
 }  // namespace
 
-TilePipeline::TilePipeline(std::vector<Dataset> datasets, std::size_t refinement_cache_bytes)
-    : datasets_(std::move(datasets)), refinements_(refinement_cache_bytes) {}
+TilePipeline::TilePipeline(std::vector<Dataset> datasets, std::size_t refinement_cache_bytes,
+                           std::shared_ptr<DiskCache> disk)
+    : datasets_(std::move(datasets)), refinements_(refinement_cache_bytes, std::move(disk)) {}
 
 // From the cache where it goes as far as is asked; else read or continued, and kept.
 Result<RefinedTilePtr> TilePipeline::Refine(std::uint32_t index, const geo::TileKey& key, double error_m,
@@ -64,7 +65,7 @@ Result<RefinedTilePtr> TilePipeline::Refine(std::uint32_t index, const geo::Tile
   encoded.times.refine = Since(start);
   // One that ended at the format's number of vertices holds no mesh to this error. Another build may have gone further
   // meanwhile.
-  const RefinedTilePtr other = refinements_.Find(cache_key);
+  const RefinedTilePtr other = refinements_.FindInMemory(cache_key);
   if (refined->refinement.vertex_count() <= proto::kMaxTileVertices && !(other && other->error_m <= error_m)) {
     refinements_.Insert(cache_key, refined);
   }

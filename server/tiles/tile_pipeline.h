@@ -15,7 +15,7 @@
 #include "proto/glb_tile.h"
 #include "proto/texture.h"
 #include "server/tiles/encoded_tile.h"
-#include "server/tiles/refined_tile.h"
+#include "server/tiles/refinement_cache.h"
 #include "server/tiles/tile_mesher.h"
 #include "server/tiles/tile_request.h"
 
@@ -55,11 +55,12 @@ struct Dataset {
 // Thread-safe: Build may run on any number of threads at once.
 //
 // What a tile is made from is kept between builds, as much as `refinement_cache_bytes` allows: another error, format or
-// coding of it costs a replay and an encoding. The bytes do not depend on it.
+// coding of it costs a replay and an encoding. `disk` holds more of it, and may be null. The bytes depend on neither.
 class TilePipeline {
  public:
   explicit TilePipeline(std::vector<Dataset> datasets,
-                        std::size_t refinement_cache_bytes = kDefaultRefinementCacheBytes);
+                        std::size_t refinement_cache_bytes = kDefaultRefinementCacheBytes,
+                        std::shared_ptr<DiskCache> disk = nullptr);
   static constexpr std::size_t kDefaultRefinementCacheBytes = std::size_t{128} << 20;
 
   const std::vector<Dataset>& datasets() const { return datasets_; }

@@ -43,6 +43,7 @@ TEST(ToJson, ComesBackWithEveryOptionSet) {
   config.queue_length = 1;
   config.cache_bytes = std::size_t{1} << 40;
   config.refinement_cache_bytes = 12'345'678;
+  config.disk_cache = {"/srv/cache", std::size_t{1} << 44, 0};
   config.max_connections = 7;
   config.max_locations = 1'000'000;
   config.max_mesh_samples = 4;
@@ -63,6 +64,7 @@ TEST(ToJson, NamesEveryOption) {
   dataset.floor = 0;
   dataset.water.sea_level = 0;
   dataset.imagery.image = "/data/photo.tif";
+  config.disk_cache.directory = "/srv/cache";
   config.datasets = {dataset};
   const Json json = Json::parse(ToJson(config));
   EXPECT_EQ(json.size(), ServerOptionTable().size());
