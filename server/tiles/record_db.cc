@@ -8,6 +8,7 @@
 #include <rocksdb/write_batch.h>
 
 #include <algorithm>
+#include <atomic>
 
 namespace terrace::server {
 namespace {
@@ -36,8 +37,9 @@ rocksdb::Options OptionsOf(const RecordDbOptions& options) {
   db.periodic_compaction_seconds = 0;
   db.write_buffer_size = FileBytes(options.capacity_bytes);
   db.max_write_buffer_number = 2;
-  // The log of the records in memory takes as much as they do, twice while they are written out.
-  db.compaction_options_fifo.max_table_files_size = options.capacity_bytes - 3 * db.write_buffer_size;
+  // Two buffers may be full, and their logs beside the file that is written of them; logs are allocated ahead. A file
+  // more is there until the oldest one is gone.
+  db.compaction_options_fifo.max_table_files_size = options.capacity_bytes - 6 * db.write_buffer_size;
   db.compression = options.compress ? rocksdb::kLZ4Compression : rocksdb::kNoCompression;
   db.max_open_files = 512;
   // A log that ends in the middle of a record, or has a damaged one, loses that record and not the store.
@@ -75,10 +77,15 @@ class RecordDb::Impl {
   }
 
   const std::unique_ptr<rocksdb::DB> db;
+  std::atomic<bool> failed{false};  // a write was
 };
 
 RecordDb::RecordDb(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
-RecordDb::~RecordDb() { static_cast<void>(impl_->db->SyncWAL()); }
+
+// After a failed write the log is beyond repair: RocksDB as Debian builds it aborts where it is touched again.
+RecordDb::~RecordDb() {
+  if (!impl_->failed) static_cast<void>(impl_->db->SyncWAL());
+}
 
 Result<std::unique_ptr<RecordDb>> RecordDb::Open(const RecordDbOptions& options, bool* discarded) {
   const rocksdb::Options db_options = OptionsOf(options);
@@ -111,7 +118,10 @@ Result<void> RecordDb::Write(std::span<const Change> changes) {
     if (!added.ok()) return Fail(added);
   }
   const rocksdb::Status status = impl_->db->Write(rocksdb::WriteOptions(), &batch);
-  if (!status.ok()) return Fail(status);
+  if (!status.ok()) {
+    impl_->failed = true;
+    return Fail(status);
+  }
   return {};
 }
 
