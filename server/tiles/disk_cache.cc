@@ -1,7 +1,9 @@
 #include "server/tiles/disk_cache.h"
 
 #include <fcntl.h>
+#include <spdlog/spdlog.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -16,7 +18,12 @@
 namespace terrace::server {
 namespace {
 
+constexpr const char *kTiles = "tiles", *kRefinements = "refinements";  // the stores' directories
+
 std::string SystemMessage() { return std::system_category().message(errno); }
+
+// False where the disk does not take it.
+bool SetSize(int file, off_t size) { return ftruncate(file, size) == 0; }
 
 // The lock goes with the process, however that ends.
 Result<int> LockDirectory(const std::filesystem::path& directory) {
@@ -72,11 +79,26 @@ Result<std::shared_ptr<DiskCache>> DiskCache::Open(const DiskCacheOptions& optio
   return std::shared_ptr<DiskCache>(new DiskCache(options, *lock));
 }
 
-// Tiles are compressed already, or refuse to be.
-DiskCache::DiskCache(const DiskCacheOptions& options, int lock)
-    : lock_(lock),
-      tiles_(OpenStore(options, options.tile_bytes, "tiles", false)),
-      refinements_(OpenStore(options, options.refinement_bytes, "refinements", true)) {}
+DiskCache::DiskCache(const DiskCacheOptions& options, int lock) : lock_(lock) { OpenStores(options); }
+
+// RocksDB as Debian builds it asserts, and so ends the process, on some damage to what it reads while it opens a store.
+// The lock file counts openings that have not come to their end: after two, what is there is thrown away.
+void DiskCache::OpenStores(const DiskCacheOptions& options) {
+  constexpr off_t kMostUnfinished = 2;
+  struct stat status {};
+  off_t unfinished = fstat(lock_, &status) == 0 ? status.st_size : 0;
+  if (unfinished >= kMostUnfinished) {
+    spdlog::warn("disk cache in {}: {} starts ended while it was opened; begun anew, check the disk",
+                 options.directory.string(), unfinished);
+    std::error_code ignored;  // then opening says what is wrong
+    for (const char* name : {kTiles, kRefinements}) std::filesystem::remove_all(options.directory / name, ignored);
+    unfinished = 0;
+  }
+  SetSize(lock_, unfinished + 1);
+  tiles_ = OpenStore(options, options.tile_bytes, kTiles, false);  // compressed already, or refuse to be
+  refinements_ = OpenStore(options, options.refinement_bytes, kRefinements, true);
+  SetSize(lock_, 0);
+}
 
 DiskCache::~DiskCache() {
   tiles_.reset();

@@ -48,6 +48,7 @@ class DiskCache {
 
  private:
   DiskCache(const DiskCacheOptions& options, int lock);
+  void OpenStores(const DiskCacheOptions& options);
 
   const int lock_;                                  // a file descriptor
   std::unique_ptr<DiskStore> tiles_, refinements_;  // null: none of these

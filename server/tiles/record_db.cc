@@ -41,7 +41,7 @@ rocksdb::Options OptionsOf(const RecordDbOptions& options) {
   // more is there until the oldest one is gone.
   db.compaction_options_fifo.max_table_files_size = options.capacity_bytes - 6 * db.write_buffer_size;
   db.compression = options.compress ? rocksdb::kLZ4Compression : rocksdb::kNoCompression;
-  db.max_open_files = 512;
+  db.max_open_files = -1;  // all are opened, and checked, at the start
   // A log that ends in the middle of a record, or has a damaged one, loses that record and not the store.
   db.wal_recovery_mode = rocksdb::WALRecoveryMode::kSkipAnyCorruptedRecords;
   db.avoid_flush_during_shutdown = true;  // the log has it

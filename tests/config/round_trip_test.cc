@@ -43,7 +43,7 @@ TEST(ToJson, ComesBackWithEveryOptionSet) {
   config.queue_length = 1;
   config.cache_bytes = std::size_t{1} << 40;
   config.refinement_cache_bytes = 12'345'678;
-  config.disk_cache = {"/srv/cache", std::size_t{1} << 44, 0};
+  config.disk_cache = {"/srv/cache", std::size_t{1} << 40, 0};
   config.max_connections = 7;
   config.max_locations = 1'000'000;
   config.max_mesh_samples = 4;
