@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "config/disk_cache_option.h"
+#include "config/edge_options.h"
 #include "config/layer_options.h"
 #include "config/nearest_name.h"
 #include "config/source_paths.h"
@@ -127,8 +128,23 @@ const std::vector<Option<Config>>& ServerOptionTable() {
        Bytes(&Config::refinement_cache_bytes, kMaxCacheBytes)},
       {"disk_cache", "DIR", "Keep finished tiles and refinements in this directory, across restarts",
        DiskCacheOption()},
-      {"max_connections", "N", "Connections at a time; above it idle ones are closed and new ones wait",
+      {"max_connections", "N", "Connections at a time; above it idle ones are closed and new ones turned away",
        Integer(&Config::max_connections, 1, 1'000'000)},
+      {"max_connections_per_client", "N", "Connections of one address at a time; 0 is no limit of its own",
+       Integer(&Config::max_connections_per_client, 0, 1'000'000)},
+      {"transfer_bytes", "BYTES", "Memory for replies that clients have not taken yet, and for request bodies",
+       Bytes(&Config::transfer_bytes, kMaxCacheBytes)},
+      {"requests_per_second", "N", "Requests of one address or token in the long run; more get 429; 0 is any number",
+       Number(&Config::requests_per_second, 0, 1'000'000)},
+      {"request_burst", "N", "Requests of one address or token at once; 0 is twice requests_per_second",
+       Number(&Config::request_burst, 0, 1'000'000)},
+      {"tokens", "", "Who may see which datasets; none: everybody sees all", TokensCodec()},
+      {"cors_origins", "LIST", "Web pages that may read replies, with commas between them; * is any", OriginsCodec()},
+      {"trusted_proxies", "LIST", "Proxies whose word on the client counts: addresses and ranges", ProxiesCodec()},
+      {"forwarded_header", "NAME", "What trusted proxies write: x-forwarded (-for, -proto, -host) or forwarded",
+       Choice(&Config::forwarded_header,
+              {{"x-forwarded", ForwardedHeader::kXForwarded}, {"forwarded", ForwardedHeader::kForwarded}})},
+      {"tls", "CERT,KEY", "PEM files for HTTPS; without them plain HTTP is spoken", TlsCodec()},
       {"max_locations", "N", "Points that one request for heights may name",
        Integer(&Config::max_locations, 1, 1'000'000)},
       {"max_mesh_samples", "N", "Height samples that one mesh of an area may be made from",
@@ -140,6 +156,8 @@ const std::vector<Option<Config>>& ServerOptionTable() {
       {"idle_timeout_s", "SECONDS", "Time an idle connection is kept open", Seconds(&Config::idle_timeout, 0.1, 3600)},
       {"write_timeout_s", "SECONDS", "Time for a client to take a response",
        Seconds(&Config::write_timeout, 0.1, 3600)},
+      {"min_read_rate", "BYTES", "Bytes a second that a client has to take of a long response; 0 is any",
+       Integer(&Config::min_read_rate, 0, 1'000'000'000)},
       {"drain_timeout_s", "SECONDS", "Time for open requests to finish when the server stops",
        Seconds(&Config::drain_timeout, 0, 3600)},
       {"log_level", "LEVEL", "The least important messages to log: debug, info, warn, error or off",
@@ -189,6 +207,7 @@ const std::vector<Option<DatasetConfig>>& DatasetOptionTable() {
        Integer(&DatasetConfig::draco_normal_bits, 4, 16)},
       {"water", "METRES|FILE", "Water masks: a sea level, or a raster that is not zero on water", WaterCodec()},
       {"imagery", "FILE", "An image that the textures of GLB tiles are cut from", ImageryCodec()},
+      {"public", "true|false", "Seen without a token, where there are tokens", Switch(&DatasetConfig::is_public)},
       {"metadata_availability", "LEVELS", "Tiles of every so many levels tell which tiles are below them; 0: none do",
        Integer(&DatasetConfig::metadata_availability, 0, 24)},
   };
@@ -228,9 +247,11 @@ template void ReadObject(const Json&, const Place&, const std::vector<Option<Con
 template void ReadObject(const Json&, const Place&, const std::vector<Option<DatasetConfig>>&, DatasetConfig&);
 template void ReadObject(const Json&, const Place&, const std::vector<Option<ImageryConfig>>&, ImageryConfig&);
 template void ReadObject(const Json&, const Place&, const std::vector<Option<DiskCacheConfig>>&, DiskCacheConfig&);
+template void ReadObject(const Json&, const Place&, const std::vector<Option<TokenConfig>>&, TokenConfig&);
 template Json WriteObject(const Config&, const std::vector<Option<Config>>&);
 template Json WriteObject(const DatasetConfig&, const std::vector<Option<DatasetConfig>>&);
 template Json WriteObject(const ImageryConfig&, const std::vector<Option<ImageryConfig>>&);
+template Json WriteObject(const TokenConfig&, const std::vector<Option<TokenConfig>>&);
 template Json WriteObject(const DiskCacheConfig&, const std::vector<Option<DiskCacheConfig>>&);
 
 }  // namespace terrace::config

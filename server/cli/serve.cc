@@ -146,6 +146,29 @@ bool OpenDatasets(const config::Config& config, std::vector<server::Dataset>& da
   return all_open;
 }
 
+server::EdgeOptions EdgeOf(const config::Config& config) {
+  server::EdgeOptions edge;
+  edge.max_connections = config.max_connections;
+  edge.max_connections_per_client = config.max_connections_per_client;
+  edge.requests_per_second = config.requests_per_second;
+  edge.request_burst = config.request_burst;
+  edge.transfer_bytes = config.transfer_bytes;
+  for (const config::TokenConfig& token : config.tokens) {
+    edge.tokens.push_back({token.name, token.token, token.sha256, token.datasets, token.requests_per_second});
+  }
+  for (const config::DatasetConfig& dataset : config.datasets) {
+    if (dataset.is_public) edge.public_datasets.push_back(dataset.name);
+  }
+  edge.cors_origins = config.cors_origins;
+  edge.trusted_proxies = config.trusted_proxies;
+  if (config.forwarded_header == config::ForwardedHeader::kForwarded) {
+    edge.forwarded_header = server::ForwardedHeader::kForwarded;
+  }
+  edge.tls_certificate = config.tls.certificate;
+  edge.tls_key = config.tls.key;
+  return edge;
+}
+
 server::ServerOptions OptionsOf(const config::Config& config) {
   server::ServerOptions options;
   options.host = config.listen.host;
@@ -156,11 +179,12 @@ server::ServerOptions OptionsOf(const config::Config& config) {
   options.cache_bytes = config.cache_bytes;
   options.max_locations = config.max_locations;
   options.max_mesh_samples = config.max_mesh_samples;
-  options.max_connections = config.max_connections;
+  options.edge = EdgeOf(config);
   options.cache_control = config.cache_control;
   options.header_timeout = config.header_timeout;
   options.idle_timeout = config.idle_timeout;
   options.write_timeout = config.write_timeout;
+  options.min_read_rate = config.min_read_rate;
   options.request_deadline = config.request_deadline;
   options.drain_timeout = config.drain_timeout;
   options.stop_on_signals = true;

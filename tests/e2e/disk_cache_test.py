@@ -312,6 +312,19 @@ class DiskCache(unittest.TestCase):
             server.stop()
         shutil.rmtree(self.directory)
 
+    def test_a_store_that_ended_two_starts_is_thrown_away(self):
+        some = self.paths[:50]
+        with Server(*self.flags()) as server:
+            crawl(server.port, some)
+            server.stop()
+        for unfinished, found in ((1, len(some)), (2, 0)):
+            (self.directory / "lock").write_bytes(b"." * unfinished)
+            with Server(*self.flags()) as server:
+                self.assertEqual(crawl(server.port, some)[1]["disk"], found, unfinished)
+                self.assertEqual((self.directory / "lock").stat().st_size, 0)
+                self.assertEqual("2 starts ended while it was opened" in server.text(), found == 0)
+                server.stop()
+
 
 if __name__ == "__main__":
     unittest.main()
