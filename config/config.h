@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "config/listen_address.h"
@@ -26,6 +27,8 @@ enum class GlbCompression : std::uint8_t { kDraco, kNone, kQuantized, kMeshopt }
 enum class ForwardedHeader : std::uint8_t { kXForwarded, kForwarded };
 enum class LogLevel : std::uint8_t { kDebug, kInfo, kWarn, kError, kOff };
 enum class LogFormat : std::uint8_t { kText, kJson };
+// Where and how requests are told of: server::AccessLogForm, which this room does not know.
+enum class AccessLog : std::uint8_t { kLog, kCombined, kJson, kOff };
 
 // Where the water of a dataset's water mask comes from: one of both, or neither.
 struct WaterConfig {
@@ -50,15 +53,31 @@ struct ImageryConfig {
   friend bool operator==(const ImageryConfig&, const ImageryConfig&) = default;
 };
 
+// One entry of a dataset's sources: a file, a glob or a folder. Its files are of equal rank.
+struct SourceConfig {
+  SourceConfig() = default;
+  // One file. Implicit: a path is a source.
+  SourceConfig(std::string file) : written(std::move(file)), files{written} {}  // NOLINT(google-explicit-constructor)
+  SourceConfig(const char* file) : SourceConfig(std::string(file)) {}           // NOLINT(google-explicit-constructor)
+
+  std::string written;             // path or pattern, absolute
+  std::vector<std::string> files;  // what it stands for
+  bool is_folder = false;          // what is no raster among them is left out
+
+  friend bool operator==(const SourceConfig&, const SourceConfig&) = default;
+};
+
 struct DatasetConfig {
-  std::string name;                  // the first part of its URLs: [A-Za-z0-9._-]{1,64}
-  std::vector<std::string> sources;  // files, after globs are expanded; exactly one for now
+  std::string name;                   // the first part of its URLs: [A-Za-z0-9._-]{1,64}
+  std::vector<SourceConfig> sources;  // the first that has a height at a place gives it
   VerticalDatum vertical = VerticalDatum::kUnknown;
   std::string attribution;
   double error_fraction = 0.5;         // default error of a level, as a share of the error that clients assume there
   std::optional<double> finest_error;  // metres; decides the deepest level
   std::optional<double> floor;         // metres; height outside the source and in large voids
   int max_void_gap = 64;               // source samples; narrower voids are filled
+  double feather = 0;                  // metres: how far from its edges a source gives way to the next
+  std::size_t max_open_sources = 64;   // files kept open between reads
   Criterion criterion = Criterion::kDelaunay;
   bool compact = false;  // tiles go through the drop pass
   GlbCompression glb_compression = GlbCompression::kDraco;
@@ -120,7 +139,7 @@ struct Config {
   DiskCacheConfig disk_cache;
   std::size_t max_connections = 1024;
   std::size_t max_connections_per_client = 0;          // 0: as many as there may be in all
-  std::size_t transfer_bytes = std::size_t{48} << 20;  // of bodies on their way
+  std::size_t transfer_bytes = std::size_t{32} << 20;  // of bodies on their way
   double requests_per_second = 0;                      // of each client or token; 0: any
   double request_burst = 0;                            // 0: two seconds' worth
   std::size_t max_mesh_samples = 1'000'000;
@@ -139,8 +158,12 @@ struct Config {
   std::size_t min_read_rate = 4096;  // bytes a second; 0: any
   std::chrono::milliseconds drain_timeout{10'000};
 
+  bool watch = true;  // look for changes of sources and of the file that this came from
+
   LogLevel log_level = LogLevel::kInfo;
   LogFormat log_format = LogFormat::kText;
+  AccessLog access_log = AccessLog::kLog;
+  std::string access_log_file;  // of kCombined and kJson; empty: stderr
 
   friend bool operator==(const Config&, const Config&) = default;
 };

@@ -1,6 +1,7 @@
 #include "config/option_table.h"
 
 #include <algorithm>
+#include <filesystem>
 
 #include "config/disk_cache_option.h"
 #include "config/edge_options.h"
@@ -47,6 +48,17 @@ Codec<Config> Viewer() {
       SwitchToJson};
 }
 
+Codec<Config> AccessLogFile() {
+  return {[](const Json& value, const Place& place, Config& config) {
+            if (!value.is_string() || value.get_ref<const std::string&>().empty()) {
+              return place.Expected("the path of a file", value);
+            }
+            config.access_log_file = (place.directory() / value.get<std::string>()).string();
+          },
+          [](const Config& config) { return config.access_log_file.empty() ? Json() : Json(config.access_log_file); },
+          [](const std::string& text) { return Json(text.empty() ? text : std::filesystem::absolute(text).string()); }};
+}
+
 Codec<DatasetConfig> Vertical() {
   Codec<DatasetConfig> codec = Choice(&DatasetConfig::vertical, {{"unknown", VerticalDatum::kUnknown}});
   codec.read = [read_word = codec.read](const Json& value, const Place& place, DatasetConfig& dataset) {
@@ -61,28 +73,26 @@ Codec<DatasetConfig> Vertical() {
 Codec<DatasetConfig> Sources() {
   return {[](const Json& value, const Place& place, DatasetConfig& dataset) {
             if (!value.is_array() || value.empty())
-              return place.Expected("a list of paths such as [\"dem.tif\"]", value);
-            bool complete = true;
+              return place.Expected("a list of paths such as [\"lidar/*.tif\", \"base.tif\"]", value);
             for (std::size_t i = 0; i < value.size(); ++i) {
-              const bool is_path = value[i].is_string() && !value[i].get_ref<const std::string&>().empty();
-              Result<std::vector<std::string>> files;
-              if (!is_path) {
-                place.At(i).Expected("a path or a glob", value[i]);
-              } else if (files = ExpandSource(value[i].get<std::string>(), place.directory()); !files) {
-                place.At(i).Fail(files.error().message +
+              if (!value[i].is_string() || value[i].get_ref<const std::string&>().empty()) {
+                place.At(i).Expected("a path, a glob or a folder", value[i]);
+                continue;
+              }
+              Result<SourceConfig> source = ExpandSource(value[i].get<std::string>(), place.directory());
+              if (source) {
+                dataset.sources.push_back(*std::move(source));
+              } else {
+                place.At(i).Fail(source.error().message +
                                  "; correct the path, which is relative to the folder of this file");
               }
-              complete = complete && is_path && files;
-              if (is_path && files) dataset.sources.insert(dataset.sources.end(), files->begin(), files->end());
-            }
-            if (complete && dataset.sources.size() > 1) {
-              place.Fail(
-                  fmt::format("gives {} files, but mosaics are not supported yet: name one raster, or make one of them "
-                              "with gdalbuildvrt and gdal_translate",
-                              dataset.sources.size()));
             }
           },
-          [](const DatasetConfig& dataset) { return Json(dataset.sources); }};
+          [](const DatasetConfig& dataset) {
+            Json list = Json::array();
+            for (const SourceConfig& source : dataset.sources) list.push_back(source.written);
+            return list;
+          }};
 }
 
 Codec<Config> Datasets() {
@@ -160,6 +170,8 @@ const std::vector<Option<Config>>& ServerOptionTable() {
        Integer(&Config::min_read_rate, 0, 1'000'000'000)},
       {"drain_timeout_s", "SECONDS", "Time for open requests to finish when the server stops",
        Seconds(&Config::drain_timeout, 0, 3600)},
+      {"watch", "true|false", "Take over changes of sources and of the configuration file while serving",
+       Switch(&Config::watch)},
       {"log_level", "LEVEL", "The least important messages to log: debug, info, warn, error or off",
        Choice(&Config::log_level, {{"debug", LogLevel::kDebug},
                                    {"info", LogLevel::kInfo},
@@ -168,6 +180,13 @@ const std::vector<Option<Config>>& ServerOptionTable() {
                                    {"off", LogLevel::kOff}})},
       {"log_format", "FORMAT", "text for people, json for machines (one object a line); both on stderr",
        Choice(&Config::log_format, {{"text", LogFormat::kText}, {"json", LogFormat::kJson}})},
+      {"access_log", "FORM", "How requests are told of: log (lines of the log), combined, json or off",
+       Choice(&Config::access_log, {{"log", AccessLog::kLog},
+                                    {"combined", AccessLog::kCombined},
+                                    {"json", AccessLog::kJson},
+                                    {"off", AccessLog::kOff}})},
+      {"access_log_file", "FILE", "Where the access log goes if it is combined or json; by default stderr",
+       AccessLogFile()},
   };
   return table;
 }
@@ -176,7 +195,8 @@ const std::vector<Option<DatasetConfig>>& DatasetOptionTable() {
   static const std::vector<Option<DatasetConfig>> table = {
       {"name", "NAME", "The dataset's name in URLs; by default that of the file",
        Text(&DatasetConfig::name, CheckDatasetName)},
-      {"sources", "", "Paths or globs of the rasters; exactly one raster for now", Sources()},
+      {"sources", "", "Files, globs and folders of rasters; the first that has a height at a place gives it",
+       Sources()},
       {"vertical", "DATUM", "What the heights count from; only unknown for now: heights are passed through",
        Vertical()},
       {"attribution", "TEXT", "Who to thank for the data; clients show it",
@@ -190,6 +210,10 @@ const std::vector<Option<DatasetConfig>>& DatasetOptionTable() {
        Number(&DatasetConfig::floor, -kMostHeight, kMostHeight)},
       {"max_void_gap", "SAMPLES", "Voids narrower than this many source samples are filled from their edges",
        Integer(&DatasetConfig::max_void_gap, 0, 100'000)},
+      {"feather", "METRES", "Blend a source of a mosaic with what lies below it so far from its edges; 0: no blending",
+       Number(&DatasetConfig::feather, 0, 1'000'000)},
+      {"max_open_sources", "N", "Rasters of the dataset that are kept open between reads",
+       Integer(&DatasetConfig::max_open_sources, 1, 100'000)},
       {"criterion", "NAME", "How triangles are joined: delaunay, or data-dependent: smaller tiles, more time to build",
        Choice(&DatasetConfig::criterion,
               {{"delaunay", Criterion::kDelaunay}, {"data-dependent", Criterion::kDataDependent}})},

@@ -1,124 +1,170 @@
-// From a tile key to heights: positions, window, voids, interpolation. Every step is a function of the global node, the
-// level and the source; the window decides only what is read, never what comes out.
+// Heights of a dataset: each node takes the first sheet that has one there, then the floor.
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "engine/core/check.h"
 #include "engine/dem/dem_impl.h"
-#include "engine/dem/grid_cells.h"
 #include "engine/dem/node_positions.h"
-#include "engine/dem/void_fill.h"
 
 namespace terrace::dem {
 namespace {
 
-// Interpolated positions are this close to exact ones, in samples of the grid they are read from: a slope of 45 degrees
-// at 30 m turns it into 0.3 mm.
-constexpr double kPositionTolerance = 1e-5;
-// Positions this close to the raster's edge, in pixels, are on it.
-constexpr double kEdgeTolerance = 1e-6;
-
-GridWindow Grown(const GridWindow& window, int halo, const GridAxis& columns, const GridAxis& rows) {
-  GridWindow wide{window.column - halo, window.row - halo, window.columns + std::int64_t{2} * halo,
-                  window.rows + std::int64_t{2} * halo};
-  const auto clip = [](std::int64_t& start, std::int64_t& length, std::int64_t count) {
-    const std::int64_t end = std::min(start + length, count);
-    start = std::max<std::int64_t>(start, 0);
-    length = end - start;
-  };
-  if (!columns.wraps()) clip(wide.column, wide.columns, columns.count());
-  clip(wide.row, wide.rows, rows.count());
-  return wide;
+// Around the nodes of a window. Their longitudes begin between -180 and 180, and go on eastwards.
+template <typename Grid>
+Box BoxOf(const Grid& grid, const NodeWindow& window) {
+  constexpr double kSlack = 1e-9;
+  const double west = grid.Longitude(window.column);
+  const auto [south, north] = std::minmax({grid.Latitude(window.row), grid.Latitude(window.row + window.rows - 1)});
+  return {west - kSlack, south - kSlack, west + (window.columns - 1) * grid.StepDegrees() + kSlack, north + kSlack};
 }
 
 }  // namespace
 
-float RoundHeight(double metres) { return static_cast<float>(std::nearbyint(metres * 1024) / 1024); }
-
-const LevelPlan& DemSource::Impl::Plan(int level) const {
-  TERRACE_CHECK(level >= 0 && level < static_cast<int>(levels.size()));
-  return levels[static_cast<std::size_t>(level)];
-}
-
-bool DemSource::Impl::IsInside(const Position& position) const {
-  const bool row = position.y >= -kEdgeTolerance && position.y <= layout.height + kEdgeTolerance;
-  return row && (layout.wraps || (position.x >= -kEdgeTolerance && position.x <= layout.width + kEdgeTolerance));
-}
-
-std::optional<float> DemSource::Impl::PoleHeight(const geo::Lattice& lattice, std::int64_t row) const {
-  if (!georeference.is_geographic_grid() || (row > 0 && row < lattice.rows())) return std::nullopt;
-  return pole_heights[row <= 0 ? 0 : 1].value_or(floor);
-}
-
-Result<std::vector<float>> DemSource::Impl::ReadFilled(GDALDataset& dataset, int factor, const GridWindow& window,
-                                                       const std::stop_token& stop) {
-  const auto is_void = [](float height) { return std::isnan(height); };
-  auto core = ReadGrid(dataset, layout, factor, window, stop);
-  const int gap = max_void_gap / factor;
-  if (!core || gap < 2 || std::ranges::none_of(*core, is_void)) return core;
-  const GridWindow wide =
-      Grown(window, gap, GridAxis(layout.columns, factor, layout.wraps), GridAxis(layout.height, factor, false));
-  auto around = ReadGrid(dataset, layout, factor, wide, stop);
-  if (!around || std::ranges::all_of(*around, is_void)) return core;
-  return FillVoids(*around, wide, window, gap);
-}
-
-// Heights under the rules of tiles: averaged by the factor, small voids filled, the floor elsewhere.
-Result<std::vector<float>> DemSource::Impl::ReadFloored(std::span<const Position> positions, int factor,
-                                                        const std::string& what, const std::stop_token& stop) {
-  std::vector<float> out(positions.size(), floor);
-  const GridAxis columns(layout.columns, factor, layout.wraps), rows(layout.height, factor, false);
-  std::vector<GridCell> cells;
-  std::vector<std::size_t> nodes;  // node of each cell
-  for (std::size_t i = 0; i < positions.size(); ++i) {
-    if (!IsInside(positions[i])) continue;
-    cells.push_back(CellAt(positions[i], columns, rows, layout.width, layout.height));
-    nodes.push_back(i);
-  }
-  if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "{}: reading {} was stopped", info.path, what);
-  // Files are looked at even where nothing must be read: a tile of floor must not outlive its source.
-  auto handle = handles.Borrow();
-  if (!handle) return tl::unexpected(handle.error());
-  if (cells.empty()) return out;
-  const GridWindow window = WindowOf(cells, columns, rows);
-  const auto heights = ReadFilled(**handle, factor, window, stop);
-  if (!heights) {
-    return MakeError(heights.error().code, "{}: {}: {}", info.path, what, heights.error().message);
-  }
-  if (auto unchanged = handles.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
-  for (std::size_t i = 0; i < cells.size(); ++i) {
-    if (const auto height = Interpolate(*heights, window, cells[i])) out[nodes[i]] = RoundHeight(*height);
-  }
-  return out;
-}
-
-Result<std::vector<float>> DemSource::Impl::ReadNodes(int level, const NodeWindow& window, const std::string& what,
-                                                      const std::stop_token& stop) {
-  const auto& [lattice, factor] = Plan(level);
-  const auto positions = NodePositions(georeference, footprint, lattice, window, kPositionTolerance * factor);
-  auto heights = ReadFloored(positions, factor, what, stop);
-  if (!heights) return heights;
-  for (int row = 0; row < window.rows; ++row) {
-    if (const auto pole = PoleHeight(lattice, window.row + row)) {
-      std::fill_n(heights->begin() + std::ptrdiff_t{row} * window.columns, window.columns, *pole);
+BoxIndex IndexOf(const std::vector<Sheet>& sheets) {
+  std::vector<BoxIndex::Entry> entries;
+  for (std::size_t i = 0; i < sheets.size(); ++i) {
+    const Footprint& reach = sheets[i].reach();
+    for (const int turn : {-360, 0, 360}) {
+      entries.push_back({{reach.west + turn, reach.south, reach.east + turn, reach.north}, i});
+    }
+    for (const std::size_t pole : {0, 1}) {  // its height counts on every meridian
+      const double latitude = pole == 0 ? -90 : 90;
+      if (sheets[i].pole_heights()[pole]) entries.push_back({{-540, latitude, 540, latitude}, i});
     }
   }
+  return BoxIndex(entries);
+}
+
+// Heights of sheets over each other. Without a feather a sheet's height is the last word; with one it counts by its
+// weight, and what lies below it has the rest. Where nothing lies below, the weight changes nothing: nothing is blended
+// with the floor.
+class Blend {
+ public:
+  explicit Blend(std::size_t nodes) : sums_(nodes), open_(nodes, 1) {}
+
+  // NaN where more is wanted.
+  std::vector<float> Wanted() const {
+    std::vector<float> heights(sums_.size(), 0);
+    for (std::size_t i = 0; i < heights.size(); ++i) {
+      if (open_[i] > 0) heights[i] = SampleRules::kVoid;
+    }
+    return heights;
+  }
+  void Add(const std::vector<float>& heights, const std::vector<float>& weights) {
+    for (std::size_t i = 0; i < heights.size(); ++i) {
+      if (open_[i] <= 0 || std::isnan(heights[i])) continue;
+      sums_[i] += open_[i] * weights[i] * heights[i];
+      open_[i] *= 1 - weights[i];
+    }
+  }
+  bool is_done() const {
+    return std::ranges::none_of(open_, [](double share) { return share > 0; });
+  }
+  std::vector<float> Heights() const {
+    std::vector<float> heights(sums_.size(), SampleRules::kVoid);
+    for (std::size_t i = 0; i < heights.size(); ++i) {
+      if (open_[i] < 1) heights[i] = RoundHeight(sums_[i] / (1 - open_[i]));
+    }
+    return heights;
+  }
+
+ private:
+  std::vector<double> sums_;
+  std::vector<double> open_;  // share that sheets further down have
+};
+
+template <typename Grid>
+Result<std::vector<float>> DemSource::Impl::ReadFloored(const Grid& grid, const NodeWindow& window,
+                                                        const std::string& what, const std::stop_token& stop) const {
+  const std::size_t nodes = static_cast<std::size_t>(window.columns) * static_cast<std::size_t>(window.rows);
+  std::vector<float> heights(nodes, SampleRules::kVoid);
+  const std::vector<std::size_t> order = SheetsAt(BoxOf(grid, window));
+  const bool feathers = has_feather && order.size() > 1;
+  Blend blend(feathers ? nodes : 0);
+  for (const std::size_t i : order) {
+    std::vector<float> weights;
+    if (feathers) {
+      heights = blend.Wanted();
+      weights.assign(nodes, 1);
+    }
+    if (const auto filled = sheets[i].Fill(grid, window, heights, stop, weights); !filled) {
+      return MakeError(filled.error().code, "{}: {}", what, filled.error().message);
+    }
+    if (feathers) blend.Add(heights, weights);
+    if (feathers ? blend.is_done() : std::ranges::none_of(heights, [](float h) { return std::isnan(h); })) break;
+  }
+  if (feathers) heights = blend.Heights();
+  std::ranges::replace_if(
+      heights, [](float height) { return std::isnan(height); }, floor);
   return heights;
 }
 
-Result<TileHeights> DemSource::Impl::Read(const geo::TileKey& key, const std::stop_token& stop) {
-  const geo::Lattice& lattice = Plan(key.level).lattice;
+std::vector<std::size_t> DemSource::Impl::SheetsAt(const Box& box) const {
+  // A tile of floor must not outlive a dataset's only source: it is looked at in any case.
+  return sheets.size() == 1 ? std::vector<std::size_t>{0} : index.Find(box);
+}
+
+const geo::Lattice& DemSource::Impl::LatticeOf(int level) const {
+  TERRACE_CHECK(level >= 0 && level < static_cast<int>(lattices.size()));
+  return lattices[static_cast<std::size_t>(level)];
+}
+
+Result<std::vector<float>> DemSource::Impl::ReadNodes(int level, const NodeWindow& window, const std::string& what,
+                                                      const std::stop_token& stop) const {
+  return ReadFloored(LatticeOf(level), window, what, stop);
+}
+
+Result<TileHeights> DemSource::Impl::Read(const geo::TileKey& key, const std::stop_token& stop) const {
+  const geo::Lattice& lattice = LatticeOf(key.level);
   auto heights = ReadNodes(key.level, WindowOfTile(lattice, key), "tile " + geo::ToString(key), stop);
   if (!heights) return tl::unexpected(std::move(heights).error());
   return TileHeights{lattice, lattice.cells + 3, *std::move(heights)};
 }
 
 Result<std::vector<float>> DemSource::Impl::ReadMercator(int depth, const NodeWindow& window,
-                                                         const std::stop_token& stop) {
-  const int factor = mercator_factors[static_cast<std::size_t>(depth)];
-  const auto positions =
-      NodePositions(georeference, footprint, geo::MercatorGrid{depth}, window, kPositionTolerance * factor);
-  return ReadFloored(positions, factor, fmt::format("Mercator pixels of depth {}", depth), stop);
+                                                         const std::stop_token& stop) const {
+  return ReadFloored(geo::MercatorGrid{depth}, window, fmt::format("Mercator pixels of depth {}", depth), stop);
+}
+
+Result<std::vector<float>> DemSource::Impl::ReadPoints(std::span<const GeoPosition> points,
+                                                       const std::stop_token& stop) const {
+  std::vector<float> heights(points.size(), SampleRules::kVoid);
+  std::map<std::size_t, std::vector<std::size_t>> wanted;  // points by the sheets that may have them
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const double x = std::remainder(points[i].longitude, 360), y = points[i].latitude;
+    for (const std::size_t sheet : SheetsAt({x, y, x, y})) wanted[sheet].push_back(i);
+  }
+  std::vector<GeoPosition> missing;
+  std::vector<float> found;
+  for (auto& [sheet, those] : wanted) {
+    std::erase_if(those, [&](std::size_t i) { return !std::isnan(heights[i]); });
+    missing.clear();
+    for (const std::size_t i : those) missing.push_back(points[i]);
+    found.assign(those.size(), SampleRules::kVoid);
+    if (const auto filled = sheets[sheet].FillPoints(missing, found, stop); !filled) {
+      return tl::unexpected(filled.error());
+    }
+    for (std::size_t k = 0; k < those.size(); ++k) heights[those[k]] = found[k];
+  }
+  return heights;
+}
+
+HeightRange DemSource::Impl::RangeBound(const geo::TileKey& key) const {
+  BlockRange blocks;
+  bool floor_shows = true;
+  const geo::Lattice& lattice = LatticeOf(key.level);
+  for (const std::size_t i : SheetsAt(BoxOf(lattice, WindowOfTile(lattice, key)))) {
+    const SheetRange range = sheets[i].RangeOf(lattice, key);
+    blocks.Add(range.blocks);
+    floor_shows = range.shows_others;
+    if (!floor_shows) break;  // whatever comes after it is hidden
+  }
+  if (blocks.min > blocks.max) return {floor, floor};
+  // Rounding to 2^-10 m stays within these.
+  HeightRange bound{std::floor(blocks.min * 1024.0) / 1024, std::ceil(blocks.max * 1024.0) / 1024};
+  if (floor_shows) bound = {std::min<double>(bound.min, floor), std::max<double>(bound.max, floor)};
+  return bound;
 }
 
 }  // namespace terrace::dem

@@ -1,17 +1,20 @@
 #include "engine/dem/dem_source.h"
 
-#include <spdlog/spdlog.h>
 #include <xxhash.h>
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <utility>
 
 #include "engine/core/bytes.h"
 #include "engine/core/check.h"
+#include "engine/dem/availability.h"
 #include "engine/dem/dem_impl.h"
-#include "engine/dem/gdal_runtime.h"
+#include "engine/dem/footprint.h"
+#include "engine/dem/level_plan.h"
 #include "engine/dem/raster_file.h"
-#include "engine/dem/raster_scan.h"
+#include "engine/dem/raster_source.h"
 
 namespace terrace::dem {
 namespace {
@@ -28,6 +31,11 @@ Result<void> CheckOptions(const DemOptions& options) {
   if (options.floor && !(std::abs(*options.floor) <= kMaxAbsHeight)) {
     return MakeError(ErrorCode::kInvalidArgument, "floor {} m: must be a height on Earth", *options.floor);
   }
+  constexpr double kWidestFeather = 1e6;
+  if (!(options.feather >= 0 && options.feather <= kWidestFeather)) {
+    return MakeError(ErrorCode::kInvalidArgument, "feather {} m: must be 0 (none) to {:.0f} m", options.feather,
+                     kWidestFeather);
+  }
   constexpr int kMaxGap = 4096;
   if (options.max_void_gap < 0 || options.max_void_gap > kMaxGap) {
     return MakeError(ErrorCode::kInvalidArgument, "void gap {}: must be 0 (fill nothing) to {} samples",
@@ -36,82 +44,130 @@ Result<void> CheckOptions(const DemOptions& options) {
   return {};
 }
 
-RasterLayout LayoutOf(GDALDataset& dataset, const Georeference& georeference) {
-  RasterLayout layout;
-  layout.width = georeference.width();
-  layout.height = georeference.height();
-  layout.wraps = georeference.wrap_columns() > 0;
-  layout.columns = layout.wraps ? georeference.wrap_columns() : layout.width;
-  layout.rules = SampleRules::Of(HeightBand(dataset), georeference.vertical_unit());
-  layout.overview_factors = OverviewFactors(HeightBand(dataset));
-  return layout;
-}
+using Rasters = std::vector<std::shared_ptr<const RasterSource>>;
 
-std::uint64_t FingerprintOf(const StampedFiles& files, const DemOptions& options, double floor) {
-  // Changes whenever the same file and options would give other heights than before.
+std::uint64_t FingerprintOf(const std::vector<Sheet>& sheets, const DemOptions& options, double floor) {
+  // Changes whenever the same files and options would give other heights than before.
   constexpr std::uint32_t kResamplingVersion = 1;
   ByteWriter writer;
   writer.Put(kResamplingVersion);
-  for (const FileStamp& stamp : files.stamps()) {
-    for (const std::uint64_t part : {stamp.device, stamp.inode, stamp.size, stamp.modified_ns}) writer.Put(part);
+  for (const Sheet& sheet : sheets) {
+    if (&sheet != &sheets.front()) writer.Put(std::uint32_t{0});  // which rasters make one sheet counts, too
+    for (const SheetMember& member : sheet.members()) {
+      for (const FileStamp& stamp : member.raster->files().stamps()) {
+        for (const std::uint64_t part : {stamp.device, stamp.inode, stamp.size, stamp.modified_ns}) writer.Put(part);
+      }
+    }
   }
   writer.Put(options.error_fraction);
   writer.Put(options.finest_error.value_or(0));
   writer.Put(floor);
   writer.Put(options.max_void_gap);
+  if (options.feather > 0) writer.Put(options.feather);
   const std::string bytes = writer.Take();
   return XXH3_64bits(bytes.data(), bytes.size());
 }
 
-// Heights at the poles of a geographic source whose first or last row holds them.
-std::array<std::optional<float>, 2> PoleHeights(const Georeference& georeference, const RasterScan& scan) {
-  std::array<std::optional<float>, 2> heights;
-  if (!georeference.is_geographic_grid()) return heights;
-  for (const int pole : {0, 1}) {
-    Position position{0, pole == 0 ? -90.0 : 90.0};
-    georeference.ToPixels({&position, 1});
-    constexpr double kEdgeTolerance = 1e-6;
-    if (!(position.y >= -kEdgeTolerance && position.y <= georeference.height() + kEdgeTolerance)) continue;
-    const auto& mean = scan.edge_row_means[position.y < georeference.height() / 2.0 ? 0 : 1];
-    if (mean) heights[static_cast<std::size_t>(pole)] = RoundHeight(*mean);
+// Those files of folders that are no rasters go away.
+Result<Rasters> OpenAll(std::vector<DemFile>& files, const DemOptions& options) {
+  const std::string first = files.front().path;
+  std::erase_if(files, [](const DemFile& file) { return file.may_be_other && !IsRaster(file.path); });
+  if (files.empty()) {
+    return MakeError(ErrorCode::kNotFound, "{}: no raster lies in its folder; name a folder of rasters or a raster",
+                     first);
   }
-  return heights;
+  const auto handles = std::make_shared<HandleLimit>(options.max_open_sources);
+  Rasters rasters;
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    const auto progress = [&](double share) {
+      options.progress((static_cast<double>(i) + share) / static_cast<double>(files.size()));
+    };
+    auto raster = RasterSource::Open(files[i].path, options.progress ? progress : std::function<void(double)>(),
+                                     handles, options.stop);
+    if (!raster) return tl::unexpected(raster.error());
+    rasters.push_back(*std::move(raster));
+  }
+  return rasters;
 }
 
-DemInfo Describe(GDALDataset& dataset, const std::string& path, const Georeference& georeference,
-                 const RasterLayout& layout) {
+// A sixteenth of an octave: tiles of one product differ by less, as meridians converge.
+long ResolutionStep(const RasterSource& raster) { return std::lround(std::log2(raster.spacing().finer) * 16); }
+
+// Of one rank: the sheets that they make, finer ones first, then by path.
+Result<void> AddSheets(Rasters rasters, const SheetOptions& options, std::vector<Sheet>& sheets) {
+  std::ranges::sort(rasters, {},
+                    [](const auto& raster) { return std::pair(ResolutionStep(*raster), raster->info().path); });
+  for (SheetPlan& plan : PlanSheets(rasters)) {
+    auto sheet = Sheet::Make(std::move(plan), options);
+    if (!sheet) return tl::unexpected(sheet.error());
+    sheets.push_back(*std::move(sheet));
+  }
+  return {};
+}
+
+Result<std::vector<Sheet>> SheetsOf(const std::vector<DemFile>& files, const Rasters& rasters,
+                                    const SheetOptions& options) {
+  std::map<int, Rasters> ranks;
+  for (std::size_t i = 0; i < files.size(); ++i) ranks[files[i].rank].push_back(rasters[i]);
+  std::vector<Sheet> sheets;
+  for (auto& [rank, those] : ranks) {
+    if (auto added = AddSheets(std::move(those), options, sheets); !added) return tl::unexpected(added.error());
+  }
+  return sheets;
+}
+
+// The smallest box that holds all footprints.
+GeoBounds BoundsOf(const Rasters& rasters) {
+  if (rasters.size() == 1) return rasters.front()->info().bounds;
+  std::vector<Footprint> boxes;
+  for (const auto& raster : rasters) boxes.push_back(raster->footprint());
+  std::ranges::sort(boxes, {}, &Footprint::west);
+  Footprint hull = boxes.front();
+  double covered = hull.east, gap = 0, gap_end = hull.west;  // the widest gap between longitudes ends at gap_end
+  for (const Footprint& box : boxes) {
+    hull.south = std::min(hull.south, box.south);
+    hull.north = std::max(hull.north, box.north);
+    if (box.west - covered > gap) {
+      gap = box.west - covered;
+      gap_end = box.west;
+    }
+    covered = std::max(covered, box.east);
+  }
+  const double last_gap = boxes.front().west + 360 - covered;
+  if (std::max(gap, last_gap) <= 0) return {-180, hull.south, 180, hull.north};
+  const double west = last_gap >= gap ? boxes.front().west : gap_end;
+  const double east = west + 360 - std::max(gap, last_gap);
+  return {west, hull.south, east > 180 ? east - 360 : east, hull.north};
+}
+
+DemInfo InfoOf(const std::vector<Sheet>& sheets, const Rasters& rasters, const DemOptions& options) {
   DemInfo info;
-  info.path = path;
-  info.driver = dataset.GetDriverName();
-  info.width = layout.width;
-  info.height = layout.height;
-  info.data_type = GDALGetDataTypeName(HeightBand(dataset).GetRasterDataType());
-  info.crs = georeference.crs();
-  info.vertical_datum = georeference.vertical_datum();
-  info.height_unit = layout.rules.unit;
-  info.pixel_width = georeference.pixel_width();
-  info.pixel_height = georeference.pixel_height();
-  info.pixel_unit = georeference.pixel_unit();
-  info.nodata = layout.rules.nodata;
-  info.overview_factors = layout.overview_factors;
-  info.transform = georeference.transform();
+  info.heights = rasters.front()->info().heights;
+  for (const auto& raster : rasters) {
+    info.heights.min = std::min(info.heights.min, raster->info().heights.min);
+    info.heights.max = std::max(info.heights.max, raster->info().heights.max);
+  }
+  info.bounds = BoundsOf(rasters);
+  info.floor = RoundHeight(options.floor.value_or(info.heights.min));
+  for (const Sheet& sheet : sheets) {
+    for (const SheetMember& member : sheet.members()) info.sources.push_back(member.raster->info());
+    info.max_mercator_depth = std::max(info.max_mercator_depth, DeepestMercator(sheet.spacing()));
+  }
   return info;
 }
 
-void LogWhatMatters(GDALDataset& dataset, const DemInfo& info, const Georeference& georeference,
-                    const RasterLayout& layout) {
-  if (dataset.GetRasterCount() > 1) {
-    spdlog::info("{}: has {} bands, heights are read from band 1", info.path, dataset.GetRasterCount());
+std::vector<Reach> ReachesOf(const std::vector<Sheet>& sheets, const DemOptions& options) {
+  const double finest =
+      std::ranges::min_element(sheets, {}, [](const Sheet& s) { return s.spacing().finer; })->spacing().finer;
+  std::vector<Reach> reaches;
+  for (const Sheet& sheet : sheets) {
+    // An error that the operator wishes for is for the finest source; it is worth as many levels more to the others.
+    const auto goal =
+        options.finest_error ? std::optional(*options.finest_error * (sheet.spacing().finer / finest)) : std::nullopt;
+    const int depth = DeepestLevel(sheet.spacing(), options.error_fraction, goal);
+    for (const SheetMember& member : sheet.members()) reaches.push_back({member.raster->footprint(), depth});
   }
-  if (!MetresPerUnit(layout.rules.unit)) {
-    spdlog::warn("{}: height unit \"{}\" is not known, heights are taken as metres", info.path, layout.rules.unit);
-  }
-  if (info.vertical_datum.empty()) {
-    spdlog::warn("{}: no vertical datum stated, heights pass through as given", info.path);
-  }
-  if (!info.transform.empty()) {
-    spdlog::info("{}: placed by PROJ operation \"{}\": {}", info.path, info.transform, georeference.pipeline());
-  }
+  return reaches;
 }
 
 }  // namespace
@@ -120,55 +176,52 @@ DemSource::DemSource(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 DemSource::~DemSource() = default;
 
 Result<std::unique_ptr<DemSource>> DemSource::Open(const std::string& path, const DemOptions& options) {
+  return Open(std::vector<DemFile>{{path}}, options);
+}
+
+Result<std::unique_ptr<DemSource>> DemSource::Open(std::vector<DemFile> files, const DemOptions& options) {
+  TERRACE_CHECK(!files.empty());
   if (auto checked = CheckOptions(options); !checked)
-    return MakeError(checked.error().code, "{}: {}", path, checked.error().message);
-  auto dataset = OpenRaster(path);
-  if (!dataset) return tl::unexpected(dataset.error());
-  auto georeference = Georeference::Of(**dataset, path);
-  if (!georeference) return tl::unexpected(georeference.error());
-  const auto spacing = SourceSpacing::Of(*georeference, path);
-  if (!spacing) return tl::unexpected(spacing.error());
+    return MakeError(checked.error().code, "{}: {}", files.front().path, checked.error().message);
+  const auto rasters = OpenAll(files, options);
+  if (!rasters) return tl::unexpected(rasters.error());
+  auto sheets = SheetsOf(files, *rasters, {options.max_void_gap, options.feather});
+  if (!sheets) return tl::unexpected(sheets.error());
 
-  auto impl = std::make_unique<Impl>(path, StampedFiles(FilesOf(**dataset, path)), *std::move(georeference));
-  impl->layout = LayoutOf(**dataset, impl->georeference);
-  auto scan = ScanRaster(**dataset, impl->layout, options.progress);
-  if (!scan) return MakeError(scan.error().code, "{}: {}", path, scan.error().message);
-
-  impl->info = Describe(**dataset, path, impl->georeference, impl->layout);
-  const Footprint footprint = Footprint::Of(impl->georeference);
-  impl->footprint = footprint.Padded();
-  impl->levels = PlanLevels(*spacing);
-  impl->mercator_factors = MercatorFactors(*spacing);
-  impl->info.max_mercator_depth = DeepestMercator(*spacing);
-  impl->info.max_level = DeepestLevel(*spacing, options.error_fraction, options.finest_error);
-  impl->available = TilesTouching(footprint, impl->info.max_level);
-  impl->table = std::move(scan->table);
-  impl->floor = RoundHeight(options.floor.value_or(scan->lowest));
-  impl->max_void_gap = options.max_void_gap;
-  impl->pole_heights = PoleHeights(impl->georeference, *scan);
-  impl->fingerprint = FingerprintOf(impl->handles.files(), options, impl->floor);
-
-  impl->info.spacing_m = spacing->finer;
-  impl->info.bounds = footprint.Bounds();
-  impl->info.heights = {scan->lowest, scan->highest};
-  impl->info.valid_samples = scan->valid;
-  impl->info.void_samples = scan->voids;
-  impl->info.floor = impl->floor;
-  LogWhatMatters(**dataset, impl->info, impl->georeference, impl->layout);
-  if (auto unchanged = impl->handles.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
+  auto impl = std::make_unique<Impl>();
+  impl->sheets = *std::move(sheets);
+  impl->has_feather = options.feather > 0;
+  impl->index = IndexOf(impl->sheets);
+  const auto finest = std::ranges::min_element(impl->sheets, {}, [](const Sheet& s) { return s.spacing().finer; });
+  impl->lattices = PlanLattices(finest->spacing());
+  impl->info = InfoOf(impl->sheets, *rasters, options);
+  impl->available = AvailableTiles(ReachesOf(impl->sheets, options));
+  impl->info.max_level = static_cast<int>(impl->available.size()) - 1;
+  impl->floor = static_cast<float>(impl->info.floor);
+  impl->fingerprint = FingerprintOf(impl->sheets, options, impl->floor);
   return std::unique_ptr<DemSource>(new DemSource(std::move(impl)));
 }
 
 const DemInfo& DemSource::info() const { return impl_->info; }
 int DemSource::max_level() const { return impl_->info.max_level; }
-geo::Lattice DemSource::LatticeOf(int level) const { return impl_->Plan(level).lattice; }
+geo::Lattice DemSource::LatticeOf(int level) const { return impl_->LatticeOf(level); }
 std::uint64_t DemSource::fingerprint() const { return impl_->fingerprint; }
+
+StampedFiles DemSource::files() const {
+  StampedFiles all;
+  for (const Sheet& sheet : impl_->sheets) {
+    for (const SheetMember& member : sheet.members()) all.Append(member.raster->files());
+  }
+  return all;
+}
 
 const std::vector<geo::TileRange>& DemSource::Available(int level) const {
   static const std::vector<geo::TileRange> none;
   if (level < 0 || level > max_level()) return none;
   return impl_->available[static_cast<std::size_t>(level)];
 }
+
+const std::vector<std::vector<geo::TileRange>>& DemSource::Availability() const { return impl_->available; }
 
 bool DemSource::IsAvailable(const geo::TileKey& key) const {
   return geo::IsValid(key) &&

@@ -1,10 +1,13 @@
-// A digital elevation model as terrace sees it: heights at lattice nodes, anywhere on the globe, at any level.
+// A digital elevation model as terrace sees it: heights at lattice nodes, anywhere on the globe, at any level. It is
+// made of one raster or of many: a node takes the first source, by rank and resolution, that has a height there, and
+// the floor where none has (docs/decisions/0010-mosaics.md).
 //
 // DemSource is immutable after Open and safe to use from many threads: every thread gets its own GDAL handle. GDAL's
 // types stay behind this header.
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -15,6 +18,7 @@
 #include <vector>
 
 #include "engine/core/result.h"
+#include "engine/dem/file_stamp.h"
 #include "engine/geo/lattice.h"
 #include "engine/geo/tile_key.h"
 
@@ -25,10 +29,23 @@ struct DemOptions {
   std::optional<double> finest_error =
       {};  // metres: the deepest level is the first whose default error is at most this
   std::optional<double> floor =
-      {};                 // metres: height outside the source and in large voids; default: lowest valid height
+      {};                 // metres: height outside the sources and in large voids; default: lowest valid height
   int max_void_gap = 64;  // source samples: voids narrower than this along a row, column or diagonal are filled
-  // Called now and then while Open scans the source, with the share done, 0..1. May be empty.
+  // Metres, of a mosaic: so far from its edges and voids a source begins to give way to what lies below it. 0: at them.
+  double feather = 0;
+  std::size_t max_open_sources = 64;  // kept open between reads; what is in use comes on top, one a thread
+  // Called now and then while Open scans the sources, with the share done, 0..1: files count alike. May be empty.
   std::function<void(double)> progress = {};
+  std::stop_token stop = {};  // Open gives up (kCancelled)
+};
+
+// One raster of a dataset.
+struct DemFile {
+  std::string path;
+  // Where several sources have a height the one of the lowest rank counts; of equal ranks the finer one, then the one
+  // whose path sorts first.
+  int rank = 0;
+  bool may_be_other = false;  // it stands in a folder: if it is no raster at all it is left out
 };
 
 // Metres above the ellipsoid (or whatever the source counts from where no datum is stated).
@@ -53,8 +70,8 @@ struct NodeWindow {
   int columns = 0, rows = 0;
 };
 
-// What `terrace info` prints and `/datasets` tells.
-struct DemInfo {
+// What `terrace info` prints of one raster.
+struct RasterInfo {
   std::string path;
   std::string driver;  // GDAL's short name: "GTiff"
   std::int64_t width = 0, height = 0;
@@ -71,6 +88,13 @@ struct DemInfo {
   std::optional<double> nodata;
   std::vector<int> overview_factors;
   std::string transform;  // the PROJ operation from EPSG:4326 to the source, for the log; empty: none needed
+};
+
+// What `terrace info` prints and `/datasets` tells of a dataset.
+struct DemInfo {
+  std::vector<RasterInfo> sources;  // sorted: the first that has a height at a place gives it
+  GeoBounds bounds;
+  HeightRange heights;  // of all valid samples
   double floor = 0;
   int max_level = 0;
   int max_mercator_depth = 1;
@@ -92,27 +116,32 @@ struct TileHeights {
 
 class DemSource {
  public:
-  // Opens a raster, checks it, and scans it once for its heights. Errors name the file, what is wrong and the remedy.
+  // Opens rasters, checks them, and scans each once for its heights. Errors name the file, what is wrong and the
+  // remedy.
+  static Result<std::unique_ptr<DemSource>> Open(std::vector<DemFile> files, const DemOptions& options = {});
   static Result<std::unique_ptr<DemSource>> Open(const std::string& path, const DemOptions& options = {});
   ~DemSource();
 
   const DemInfo& info() const;
 
-  // Levels 0 .. max_level are served: the deepest is the first whose default error is at most a tenth of the source's
-  // spacing, or at most `finest_error`.
+  // Levels 0 .. max_level are served: the deepest is the first whose default error is at most a tenth of the finest
+  // source's spacing, or at most `finest_error`.
   int max_level() const;
   geo::Lattice LatticeOf(int level) const;
 
-  // Blocks of tiles, without overlap, that hold every tile of the level which touches the source; at level 0 both
-  // roots.
+  // Blocks of tiles, without overlap, sorted by row and column, that hold every tile of the level which touches a
+  // source that is worth the level, and every ancestor of a tile; at level 0 both roots (availability.h).
   const std::vector<geo::TileRange>& Available(int level) const;
+  // The same of all levels, from 0.
+  const std::vector<std::vector<geo::TileRange>>& Availability() const;
   bool IsAvailable(const geo::TileKey& key) const;
 
   // Heights no sample of the tile (halo not included) leaves: at least as wide as the truth, a function of the key
   // alone. Any valid key; tiles away from the source hold only the floor.
   HeightRange RangeBound(const geo::TileKey& key) const;
 
-  // Reads and resamples one tile. kUnavailable: the source cannot be read now. kCancelled: stopped.
+  // Reads and resamples one tile. kUnavailable: the source cannot be read now.
+  // kChanged: it is not the file that was opened any more. kCancelled: stopped.
   Result<TileHeights> Read(const geo::TileKey& key, std::stop_token stop = {}) const;
 
   // Heights at nodes of a level's lattice, row by row from the south-western one: the same bits as in its tiles. Any
@@ -125,12 +154,16 @@ class DemSource {
   Result<std::vector<float>> ReadMercator(int depth, const NodeWindow& window, std::stop_token stop = {}) const;
 
   // Heights as measured: bilinear between the samples of the full resolution, in the order of `points`; NaN outside the
-  // source and where the sample whose pixel holds the point is void. Nothing is filled. A height does not depend on
-  // the other points. Precondition: finite longitudes, latitudes in -90 .. 90.
+  // sources and where the sample whose pixel holds the point is void in all of them. Nothing is filled. A height does
+  // not depend on the other points. Precondition: finite longitudes, latitudes in -90 .. 90.
   Result<std::vector<float>> ReadPoints(std::span<const GeoPosition> points, std::stop_token stop = {}) const;
 
-  // Identifies content and options: device, inode, size, mtime of the file and every option that changes heights.
+  // Identifies content and options: device, inode, size, mtime of all files in their order, and every option that
+  // changes heights.
   std::uint64_t fingerprint() const;
+
+  // What it is read from, as it was when it was opened.
+  StampedFiles files() const;
 
  private:
   class Impl;

@@ -15,14 +15,15 @@ struct Chunk {
 
 // Calls visit(chunk, heights) for every part of the band, from the north-west, by rows.
 template <typename Visit>
-Result<void> ForEachChunk(GDALRasterBand& band, const SampleRules& rules, const Visit& visit) {
+Result<void> ForEachChunk(GDALRasterBand& band, const SampleRules& rules, const std::stop_token& stop,
+                          const Visit& visit) {
   std::vector<float> heights;
   for (int row = 0; row < band.GetYSize(); row += kChunkRows) {
     for (int col = 0; col < band.GetXSize(); col += kChunkColumns) {
       const Chunk chunk{col, row, std::min(kChunkColumns, band.GetXSize() - col),
                         std::min(kChunkRows, band.GetYSize() - row)};
       heights.resize(static_cast<std::size_t>(chunk.cols) * static_cast<std::size_t>(chunk.rows));
-      if (auto read = ReadHeights(band, rules, chunk.col, chunk.row, chunk.cols, chunk.rows, heights.data(), {});
+      if (auto read = ReadHeights(band, rules, chunk.col, chunk.row, chunk.cols, chunk.rows, heights.data(), stop);
           !read) {
         return read;
       }
@@ -51,14 +52,14 @@ struct Mean {
 }  // namespace
 
 Result<RasterScan> ScanRaster(GDALDataset& dataset, const RasterLayout& layout,
-                              const std::function<void(double)>& progress) {
+                              const std::function<void(double)>& progress, const std::stop_token& stop) {
   GDALRasterBand& band = *dataset.GetRasterBand(1);
   RasterScan scan;
   scan.table = RangeTable(layout.width, layout.height);
   Mean first_row, last_row;
   const double samples = static_cast<double>(layout.width) * layout.height;
   double seen = 0;
-  auto read = ForEachChunk(band, layout.rules, [&](const Chunk& chunk, const std::vector<float>& heights) {
+  auto read = ForEachChunk(band, layout.rules, stop, [&](const Chunk& chunk, const std::vector<float>& heights) {
     scan.table.AddWindow(chunk.col, chunk.row, chunk.cols, chunk.rows, heights.data());
     scan.voids += static_cast<std::uint64_t>(std::ranges::count_if(heights, [](float h) { return std::isnan(h); }));
     const int used = std::clamp(layout.columns - chunk.col, 0, chunk.cols);
@@ -83,7 +84,7 @@ Result<RasterScan> ScanRaster(GDALDataset& dataset, const RasterLayout& layout,
   scan.edge_row_means = {first_row.value(), last_row.value()};
 
   for (const int factor : layout.overview_factors) {
-    read = ForEachChunk(*FindOverview(band, factor), layout.rules,
+    read = ForEachChunk(*FindOverview(band, factor), layout.rules, stop,
                         [&](const Chunk& chunk, const std::vector<float>& heights) {
                           scan.table.AddWindow(chunk.col, chunk.row, chunk.cols, chunk.rows, heights.data(), factor);
                         });

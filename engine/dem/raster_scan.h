@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <stop_token>
 
 #include "engine/core/result.h"
 #include "engine/dem/range_table.h"
@@ -19,8 +20,9 @@ struct RasterScan {
   std::array<std::optional<double>, 2> edge_row_means;  // of the first and the last row's valid samples
 };
 
-// kUnavailable: a part cannot be read. kInvalidArgument: nothing but voids. Errors do not name the file.
+// kUnavailable: a part cannot be read. kInvalidArgument: nothing but voids. kCancelled: stopped. Errors do not name the
+// file.
 Result<RasterScan> ScanRaster(GDALDataset& dataset, const RasterLayout& layout,
-                              const std::function<void(double)>& progress);
+                              const std::function<void(double)>& progress, const std::stop_token& stop = {});
 
 }  // namespace terrace::dem

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/dem/block_averages.h"
+
 namespace terrace::dem {
 namespace {
 
@@ -29,33 +31,6 @@ Result<Level> StartingLevel(GDALDataset& dataset, const RasterLayout& layout, in
   }
   return Level{band, factor / start, (layout.columns + start - 1) / start, (layout.height + start - 1) / start};
 }
-
-// Averages `rows` rows of blocks from strips of samples. Every block is summed row by row, whatever the window.
-class BlockAverages {
- public:
-  BlockAverages(std::int64_t blocks, int block)
-      : block_(block), sums_(static_cast<std::size_t>(blocks)), counts_(sums_.size()) {}
-
-  void AddRow(const float* samples, std::int64_t count) {
-    for (std::int64_t i = 0; i < count; ++i) {
-      if (std::isnan(samples[i])) continue;
-      sums_[static_cast<std::size_t>(i / block_)] += samples[i];
-      ++counts_[static_cast<std::size_t>(i / block_)];
-    }
-  }
-  void Take(float* out) {
-    for (std::size_t i = 0; i < sums_.size(); ++i) {
-      out[i] = counts_[i] == 0 ? SampleRules::kVoid : static_cast<float>(sums_[i] / static_cast<double>(counts_[i]));
-      sums_[i] = 0;
-      counts_[i] = 0;
-    }
-  }
-
- private:
-  int block_;
-  std::vector<double> sums_;
-  std::vector<std::int64_t> counts_;
-};
 
 // Blocks `column` .. `column + columns` without wrapping, all rows of the window, into columns of `out` that is
 // `stride` wide.

@@ -10,16 +10,19 @@
 #include <string>
 #include <vector>
 
+#include "config/parse.h"
 #include "engine/dem/dem_source.h"
 #include "engine/geo/error_ladder.h"
 #include "server/cli/command.h"
+#include "server/cli/mosaic_info.h"
+#include "server/cli/open_source.h"
 #include "server/cli/progress.h"
 
 namespace terrace::cli {
 namespace {
 
 // What a user should do about this raster; empty when nothing.
-std::vector<std::string> AdviceFor(const dem::DemInfo& info) {
+std::vector<std::string> AdviceFor(const dem::RasterInfo& info, double floor) {
   std::vector<std::string> advice;
   if (std::max(info.width, info.height) > 4096 && info.overview_factors.empty()) {
     advice.push_back(
@@ -33,7 +36,7 @@ std::vector<std::string> AdviceFor(const dem::DemInfo& info) {
   }
   if (info.void_samples > 0) {
     advice.push_back(
-        fmt::format("voids: small ones are filled from their edges, larger ones show the floor of {:g} m", info.floor));
+        fmt::format("voids: small ones are filled from their edges, larger ones show the floor of {:g} m", floor));
   }
   return advice;
 }
@@ -42,7 +45,8 @@ std::string Percent(std::uint64_t part, std::uint64_t whole) {
   return fmt::format("{:.2g} %", whole > 0 ? 100.0 * static_cast<double>(part) / static_cast<double>(whole) : 0.0);
 }
 
-void PrintText(const dem::DemInfo& info) {
+void PrintText(const dem::DemInfo& dataset) {
+  const dem::RasterInfo& info = dataset.sources.front();
   const auto line = [](const char* what, const std::string& value) { fmt::print("  {:<14}{}\n", what, value); };
   fmt::print("{}\n", info.path);
   line("raster", fmt::format("{} x {}, {}, {}", info.width, info.height, info.data_type, info.driver));
@@ -60,14 +64,15 @@ void PrintText(const dem::DemInfo& info) {
                                   Percent(info.void_samples, info.valid_samples + info.void_samples)));
   line("overviews",
        info.overview_factors.empty() ? "none" : fmt::format("1/{}", fmt::join(info.overview_factors, ", 1/")));
-  line("floor", fmt::format("{:g} m outside the raster and in large voids", info.floor));
-  line("levels", fmt::format("0 to {}, default error {:.3g} m at the deepest", info.max_level,
-                             geo::DefaultError(info.max_level)));
+  line("floor", fmt::format("{:g} m outside the raster and in large voids", dataset.floor));
+  line("levels", fmt::format("0 to {}, default error {:.3g} m at the deepest", dataset.max_level,
+                             geo::DefaultError(dataset.max_level)));
   if (!info.transform.empty()) line("transform", info.transform);
-  for (const std::string& advice : AdviceFor(info)) line("note", advice);
+  for (const std::string& advice : AdviceFor(info, dataset.floor)) line("note", advice);
 }
 
-nlohmann::json ToJson(const dem::DemInfo& info) {
+nlohmann::json ToJson(const dem::DemInfo& dataset) {
+  const dem::RasterInfo& info = dataset.sources.front();
   return {{"path", info.path},
           {"driver", info.driver},
           {"width", info.width},
@@ -82,29 +87,51 @@ nlohmann::json ToJson(const dem::DemInfo& info) {
           {"valid_samples", info.valid_samples},
           {"void_samples", info.void_samples},
           {"overviews", info.overview_factors},
-          {"floor", info.floor},
-          {"levels", {0, info.max_level}},
+          {"floor", dataset.floor},
+          {"levels", {0, dataset.max_level}},
           {"transform", info.transform},
-          {"advice", AdviceFor(info)}};
+          {"advice", AdviceFor(info, dataset.floor)}};
 }
 
-int Info(const std::vector<std::string>& dems, bool json) {
-  spdlog::set_level(spdlog::level::err);  // what opening logs is printed below
-  int exit_code = kExitOk;
-  nlohmann::json all = nlohmann::json::array();
-  for (const std::string& path : dems) {
-    Progress progress("reading " + path);
-    dem::DemOptions options;
-    options.progress = progress.Callback();
-    const auto source = dem::DemSource::Open(path, options);
+// Each DEM is a dataset, or all of them are one.
+std::vector<std::vector<config::SourceConfig>> Datasets(const std::vector<std::string>& dems, bool mosaic,
+                                                        int& exit_code) {
+  std::vector<std::vector<config::SourceConfig>> datasets;
+  for (const std::string& dem : dems) {
+    Result<config::SourceConfig> source = config::SourceAt(dem);
     if (!source) {
       std::fprintf(stderr, "terrace: %s\n", source.error().message.c_str());
       exit_code = kExitFailure;
-    } else if (json) {
-      all.push_back(ToJson((*source)->info()));
+    } else if (mosaic && !datasets.empty()) {
+      datasets.front().push_back(*std::move(source));
     } else {
-      PrintText((*source)->info());
+      datasets.push_back({*std::move(source)});
     }
+  }
+  return datasets;
+}
+
+int Info(const std::vector<std::string>& dems, bool json, bool mosaic) {
+  spdlog::set_level(spdlog::level::err);  // what opening logs is printed below
+  nlohmann::json all = nlohmann::json::array();
+  int exit_code = kExitOk;
+  for (const auto& sources : Datasets(dems, mosaic, exit_code)) {
+    const std::string name = NameOf(sources);
+    Progress progress("reading " + name, FileCount(sources));
+    dem::DemOptions options;
+    options.progress = progress.Callback();
+    const auto source = dem::DemSource::Open(FilesOf(sources), options);
+    if (!source) {
+      std::fprintf(stderr, "terrace: %s\n", source.error().message.c_str());
+      exit_code = kExitFailure;
+      continue;
+    }
+    const dem::DemInfo& info = (*source)->info();
+    const bool is_one = info.sources.size() == 1;
+    if (json)
+      all.push_back(is_one ? ToJson(info) : nlohmann::json::parse(MosaicJson(name, info)));
+    else
+      is_one ? PrintText(info) : PrintMosaic(name, info);
   }
   if (json) fmt::print("{}\n", all.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
   return exit_code;
@@ -114,17 +141,19 @@ int Info(const std::vector<std::string>& dems, bool json) {
 
 void AddInfo(CLI::App& app, int& exit_code) {
   auto dems = std::make_shared<std::vector<std::string>>();
-  auto json = std::make_shared<bool>(false);
+  auto json = std::make_shared<bool>(false), mosaic = std::make_shared<bool>(false);
   CLI::App* command =
       app.add_subcommand("info", "Tells what rasters hold, the levels they can serve, and what to mend");
   command->footer(
       "Examples:\n"
       "  terrace info alps.tif andes.tif\n"
-      "  terrace info alps.tif --json\n\n"
+      "  terrace info alps.tif --json\n"
+      "  terrace info --mosaic lidar/ base.tif\n\n"
       "A raster that cannot be served is told on stderr with the reason and the remedy; the others are still shown.");
-  command->add_option("DEM", *dems, "Rasters that GDAL can read")->required();
+  command->add_option("DEM", *dems, "Rasters that GDAL can read, or folders of them")->required();
   command->add_flag("--json", *json, "One JSON array instead of text");
-  command->callback([dems, json, &exit_code] { exit_code = Info(*dems, *json); });
+  command->add_flag("--mosaic", *mosaic, "Takes all of them for one dataset, the first counting most");
+  command->callback([dems, json, mosaic, &exit_code] { exit_code = Info(*dems, *json, *mosaic); });
 }
 
 }  // namespace terrace::cli

@@ -3,15 +3,33 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
+#include <string>
 #include <utility>
 
 namespace terrace::cli {
 
 using Clock = std::chrono::steady_clock;
 
-Progress::Progress(std::string what)
-    : what_(std::move(what)), terminal_(isatty(STDERR_FILENO) != 0), start_(Clock::now()), last_(start_) {}
+namespace {
+
+std::string Grouped(std::size_t number) {
+  std::string text = std::to_string(number);
+  for (auto at = static_cast<std::ptrdiff_t>(text.size()) - 3; at > 0; at -= 3) {
+    text.insert(static_cast<std::size_t>(at), ",");
+  }
+  return text;
+}
+
+}  // namespace
+
+Progress::Progress(std::string what, std::size_t count)
+    : what_(std::move(what)),
+      count_(count),
+      terminal_(isatty(STDERR_FILENO) != 0),
+      start_(Clock::now()),
+      last_(start_) {}
 
 Progress::~Progress() {
   if (shown_ && terminal_) std::fputs("\r\033[K", stderr);
@@ -22,8 +40,10 @@ void Progress::Update(double share) {
   const Clock::time_point now = Clock::now();
   const auto pause = std::chrono::milliseconds(!terminal_ ? 10'000 : shown_ ? 100 : 1'000);
   if (now - last_ < pause) return;
-  std::fprintf(stderr, terminal_ ? "\r\033[Kterrace: %s %.0f %%" : "terrace: %s %.0f %%\n", what_.c_str(),
-               share_ * 100);
+  const std::string done =
+      count_ > 1 ? Grouped(static_cast<std::size_t>(share_ * static_cast<double>(count_))) + " of " + Grouped(count_)
+                 : std::to_string(std::lround(share_ * 100)) + " %";
+  std::fprintf(stderr, terminal_ ? "\r\033[Kterrace: %s %s" : "terrace: %s %s\n", what_.c_str(), done.c_str());
   std::fflush(stderr);
   shown_ = true;
   last_ = now;

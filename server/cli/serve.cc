@@ -4,10 +4,14 @@
 #include <xxhash.h>
 
 #include <CLI/CLI.hpp>
+#include <atomic>
+#include <csignal>
 #include <cstdio>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
+#include <stop_token>
 #include <string>
 #include <utility>
 #include <vector>
@@ -18,9 +22,13 @@
 #include "server/cli/command.h"
 #include "server/cli/log.h"
 #include "server/cli/open_layers.h"
+#include "server/cli/open_source.h"
 #include "server/cli/progress.h"
+#include "server/cli/service_manager.h"
+#include "server/reload/reloader.h"
 #include "server/server.h"
 #include "server/tiles/disk_cache.h"
+#include "server/tiles/pipeline_catalog.h"
 #include "server/tiles/tile_pipeline.h"
 
 namespace terrace::cli {
@@ -40,6 +48,14 @@ int Report(const std::vector<config::ConfigError>& errors, const std::string& fi
     std::fprintf(stderr, "  %s%s%s\n", error.path.c_str(), error.path.empty() ? "" : ": ", error.message.c_str());
   }
   return kExitUsage;
+}
+
+// A folder keeps what looks like an extension, and a trailing slash changes nothing.
+std::string StemOf(const std::string& dem) {
+  std::error_code ignored;
+  const std::filesystem::path path = std::filesystem::absolute(dem).lexically_normal();
+  if (!std::filesystem::is_directory(path, ignored)) return path.stem().string();
+  return path.has_filename() ? path.filename().string() : path.parent_path().filename().string();
 }
 
 // The file's options, then the flags, then a dataset per DEM of the command line. Everything wrong is collected.
@@ -64,8 +80,13 @@ config::Config MakeConfig(const ServeArguments& arguments, std::vector<config::C
   for (const auto& [key, text] : arguments.dataset_flags) config::SetDatasetOption(key, text, flags, errors);
   for (const std::string& dem : arguments.dems) {
     config::DatasetConfig& dataset = config.datasets.emplace_back(flags);
-    if (dataset.name.empty()) dataset.name = config::SanitizeDatasetName(std::filesystem::path(dem).stem().string());
-    dataset.sources = {std::filesystem::absolute(dem).string()};  // so that --print-config holds in any folder
+    if (dataset.name.empty()) dataset.name = config::SanitizeDatasetName(StemOf(dem));
+    // In full, so that --print-config holds in any folder.
+    Result<config::SourceConfig> source = config::SourceAt(std::filesystem::absolute(dem).string());
+    if (source)
+      dataset.sources = {*std::move(source)};
+    else
+      errors.push_back({dem, source.error().message});
   }
   const std::vector<config::ConfigError> duplicates = config::FindDuplicateNames(config.datasets);
   if (errors.empty()) errors = duplicates;
@@ -110,40 +131,51 @@ proto::GlbOptions GlbOptionsOf(const config::DatasetConfig& dataset) {
   return options;
 }
 
+Result<server::Dataset> OpenDataset(const config::DatasetConfig& wanted, const std::function<void(double)>& progress,
+                                    std::stop_token stop) {
+  auto source = OpenSource(wanted, progress, std::move(stop));
+  if (!source) return tl::unexpected(source.error());
+  server::Dataset dataset;
+  dataset.name = wanted.name;
+  dataset.attribution = wanted.attribution;
+  dataset.error_fraction = wanted.error_fraction;
+  dataset.rules = {CriterionOf(wanted.criterion), wanted.compact};
+  dataset.glb = GlbOptionsOf(wanted);
+  dataset.source = *std::move(source);
+  if (const Result<void> layers = OpenLayers(wanted, dataset); !layers) return tl::unexpected(layers.error());
+  dataset.generation = GenerationOf(wanted, *dataset.source, LayersFingerprint(dataset));
+  return dataset;
+}
+
 // Opens every source; false if one could not be, after all of them had their message.
 bool OpenDatasets(const config::Config& config, std::vector<server::Dataset>& datasets) {
   bool all_open = true;
   for (const config::DatasetConfig& wanted : config.datasets) {
-    Progress progress("reading " + wanted.sources.front());
-    dem::DemOptions options;
-    options.error_fraction = wanted.error_fraction;
-    options.finest_error = wanted.finest_error;
-    options.floor = wanted.floor;
-    options.max_void_gap = wanted.max_void_gap;
-    options.progress = progress.Callback();
-    auto source = dem::DemSource::Open(wanted.sources.front(), options);
-    if (!source) {
-      std::fprintf(stderr, "terrace: dataset %s: %s\n", wanted.name.c_str(), source.error().message.c_str());
+    Progress progress("reading " + NameOf(wanted.sources), FileCount(wanted.sources));
+    Result<server::Dataset> dataset = OpenDataset(wanted, progress.Callback(), {});
+    if (!dataset) {
+      std::fprintf(stderr, "terrace: dataset %s: %s\n", wanted.name.c_str(), dataset.error().message.c_str());
       all_open = false;
       continue;
     }
-    server::Dataset dataset;
-    dataset.name = wanted.name;
-    dataset.attribution = wanted.attribution;
-    dataset.error_fraction = wanted.error_fraction;
-    dataset.rules = {CriterionOf(wanted.criterion), wanted.compact};
-    dataset.glb = GlbOptionsOf(wanted);
-    dataset.source = *std::move(source);
-    if (const Result<void> layers = OpenLayers(wanted, dataset); !layers) {
-      std::fprintf(stderr, "terrace: dataset %s: %s\n", wanted.name.c_str(), layers.error().message.c_str());
-      all_open = false;
-      continue;
-    }
-    dataset.generation = GenerationOf(wanted, *dataset.source, LayersFingerprint(dataset));
-    spdlog::info("dataset {}: {}, levels 0 to {}", dataset.name, wanted.sources.front(), dataset.source->max_level());
-    datasets.push_back(std::move(dataset));
+    spdlog::info("dataset {}: {}, levels 0 to {}", dataset->name, NameOf(wanted.sources), dataset->source->max_level());
+    datasets.push_back(*std::move(dataset));
   }
   return all_open;
+}
+
+server::AccessLogForm AccessLogFormOf(config::AccessLog form) {
+  switch (form) {
+    case config::AccessLog::kCombined:
+      return server::AccessLogForm::kCombined;
+    case config::AccessLog::kJson:
+      return server::AccessLogForm::kJson;
+    case config::AccessLog::kOff:
+      return server::AccessLogForm::kOff;
+    case config::AccessLog::kLog:
+      break;
+  }
+  return server::AccessLogForm::kLog;
 }
 
 server::EdgeOptions EdgeOf(const config::Config& config) {
@@ -178,7 +210,6 @@ server::ServerOptions OptionsOf(const config::Config& config) {
   options.queue_length = config.queue_length;
   options.cache_bytes = config.cache_bytes;
   options.max_locations = config.max_locations;
-  options.max_mesh_samples = config.max_mesh_samples;
   options.edge = EdgeOf(config);
   options.cache_control = config.cache_control;
   options.header_timeout = config.header_timeout;
@@ -188,6 +219,8 @@ server::ServerOptions OptionsOf(const config::Config& config) {
   options.request_deadline = config.request_deadline;
   options.drain_timeout = config.drain_timeout;
   options.stop_on_signals = true;
+  options.access_log = AccessLogFormOf(config.access_log);
+  options.access_log_file = config.access_log_file;
   if (config.viewer.enabled) {
     options.viewer_dir = config.viewer.directory;
     if (options.viewer_dir.empty()) {
@@ -229,18 +262,68 @@ int Serve(const ServeArguments& arguments) {
   std::vector<server::Dataset> datasets;
   if (!OpenDatasets(config, datasets)) return kExitFailure;
   const std::size_t count = datasets.size();
-  auto pipeline =
-      std::make_shared<const server::TilePipeline>(std::move(datasets), config.refinement_cache_bytes, *disk);
+
+  const auto refinements = std::make_shared<server::RefinementCache>(config.refinement_cache_bytes, *disk);
+  const auto catalog_of = [refinements](const std::vector<server::Dataset>& served, const config::Config& now) {
+    return server::MakeCatalog(std::make_shared<const server::TilePipeline>(served, refinements), now.max_mesh_samples);
+  };
+  const auto level = std::make_shared<std::atomic<config::LogLevel>>(config.log_level);  // the configured one
+  std::unique_ptr<server::Server> server;
+  server::Reloader::Hooks hooks;
+  hooks.load = [&arguments]() -> config::ConfigResult {
+    std::vector<config::ConfigError> wrong;
+    config::Config loaded = MakeConfig(arguments, wrong);
+    if (!wrong.empty()) return tl::unexpected(std::move(wrong));
+    return loaded;
+  };
+  hooks.open = [](const config::DatasetConfig& wanted, std::stop_token stop) {
+    return OpenDataset(wanted, {}, std::move(stop));
+  };
+  hooks.publish = [&](const std::vector<server::Dataset>& served, const config::Config& now) {
+    if (level->exchange(now.log_level) != now.log_level) SetLogLevel(now.log_level);
+    refinements->SetCapacity(now.refinement_cache_bytes);
+    if (const Result<void> replaced = server->Replace(catalog_of(served, now), OptionsOf(now)); !replaced) {
+      spdlog::error("the new configuration cannot be served: {}", replaced.error().message);
+    }
+    std::vector<std::uint64_t> generations;
+    for (const server::Dataset& dataset : served) generations.push_back(dataset.generation);
+    refinements->Retain(generations);
+  };
+  hooks.reloaded = [&] {
+    server->ReopenAccessLog();
+    NotifyReady("at " + server->url());
+  };
+  hooks.tell = [&](const std::map<std::string, std::string>& troubles) { server->SetTroubles(troubles); };
+  server::Reloader reloader(config, datasets, std::move(hooks));
+
   server::ServerOptions options = OptionsOf(config);
   options.disk_cache = *std::move(disk);
-  auto server = server::Server::Start(std::move(pipeline), std::move(options));
-  if (!server) {
-    std::fprintf(stderr, "terrace: %s\n", server.error().message.c_str());
+  options.refinement_stats = [refinements] { return refinements->stats(); };
+  options.on_source_changed = config.watch ? std::function<void()>([&reloader] { reloader.Look(); }) : nullptr;
+  // Without a file the end of a terminal is what it always was.
+  if (!arguments.config_file.empty() || !config.watch) {
+    options.on_signal[SIGHUP] = [&reloader] {
+      NotifyReloading();
+      reloader.Reload();
+    };
+  }
+  options.on_stop = NotifyStopping;
+  options.on_signal[SIGUSR1] = [] { SetLogLevel(config::LogLevel::kDebug); };
+  options.on_signal[SIGUSR2] = [level] { SetLogLevel(*level); };
+  auto started = server::Server::Start(catalog_of(datasets, config), options);
+  if (!started) {
+    std::fprintf(stderr, "terrace: %s\n", started.error().message.c_str());
     return kExitFailure;
   }
-  std::printf("terrace: serving %zu dataset%s at %s\n", count, count == 1 ? "" : "s", (*server)->url().c_str());
+  server = *std::move(started);
+  datasets.clear();  // what is replaced must not stay open
+  reloader.Start(config.watch);
+  std::printf("terrace: serving %zu dataset%s at %s\n", count, count == 1 ? "" : "s", server->url().c_str());
   std::fflush(stdout);
-  return (*server)->Wait() ? kExitOk : kExitFailure;
+  NotifyReady(fmt::format("{} dataset{} at {}", count, count == 1 ? "" : "s", server->url()));
+  const bool drained = server->Wait();
+  reloader.Stop();
+  return drained ? kExitOk : kExitFailure;
 }
 
 // Every option of the configuration is a flag; its text is kept until the file has been read, and checked then.
@@ -268,9 +351,10 @@ void AddServe(CLI::App& app, int& exit_code) {
       "Examples:\n"
       "  terrace serve alps.tif andes.tif\n"
       "  terrace serve --config terrace.json --listen 0.0.0.0:8080\n\n"
-      "Each DEM becomes a dataset named after its file. Flags override the config file. Prints one line with\n"
+      "Each DEM becomes a dataset named after its file; a folder of DEMs becomes one dataset. Flags override the "
+      "config file. Prints one line with\n"
       "the URL when it is ready; logs go to stderr; SIGTERM and SIGINT end it after open requests are answered.");
-  command->add_option("DEM", arguments->dems, "Rasters that GDAL can read, one dataset each");
+  command->add_option("DEM", arguments->dems, "Rasters that GDAL can read, or folders of them, one dataset each");
   command->add_option("--config", arguments->config_file, "Configuration in JSON (config/config.schema.json)")
       ->type_name("FILE");
   command->add_flag("--print-config", arguments->print_config, "Prints the configuration in force as JSON and ends");

@@ -19,14 +19,6 @@ Result<proto::WaterMask> WaterMaskOf(const WaterRules& water, const proto::Latti
   return mask;
 }
 
-std::string MetadataOf(const Dataset& dataset, const geo::TileKey& key) {
-  std::vector<std::vector<geo::TileRange>> available;
-  for (int level = 0; level <= dataset.source->max_level(); ++level) {
-    available.push_back(dataset.source->Available(level));
-  }
-  return proto::EncodeTileMetadata(key, available, dataset.metadata_levels);
-}
-
 }  // namespace
 
 Result<proto::QuantizedMeshOptions> AddExtensions(const Dataset& dataset, const TileRequest& request,
@@ -42,7 +34,9 @@ Result<proto::QuantizedMeshOptions> AddExtensions(const Dataset& dataset, const 
     if (!mask) return tl::unexpected(std::move(mask).error());
     tile.water_mask = *std::move(mask);
   }
-  if (options.metadata) tile.metadata = MetadataOf(dataset, request.key);
+  if (options.metadata) {
+    tile.metadata = proto::EncodeTileMetadata(request.key, dataset.source->Availability(), dataset.metadata_levels);
+  }
   return options;
 }
 

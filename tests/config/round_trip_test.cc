@@ -28,9 +28,18 @@ TEST(ToJson, ComesBackAsTheDefaults) { ExpectComesBack(Config{}); }
 TEST(ToJson, ComesBackWithEveryOptionSet) {
   Config config;
   config.listen = {"2001:db8::1", 0};
-  DatasetConfig dataset{
-      "a", {"/data/a.tif"}, VerticalDatum::kUnknown, "© \"ét\\é\"", 0.1, 1e-3, -0.3, 7, Criterion::kDataDependent,
-      true};
+  DatasetConfig dataset{"a",
+                        {"/data/a.tif"},
+                        VerticalDatum::kUnknown,
+                        "© \"ét\\é\"",
+                        0.1,
+                        1e-3,
+                        -0.3,
+                        7,
+                        12.5,
+                        9,
+                        Criterion::kDataDependent,
+                        true};
   dataset.water.sea_level = -1.25;
   dataset.metadata_availability = 7;
   dataset.is_public = true;
@@ -65,11 +74,15 @@ TEST(ToJson, ComesBackWithEveryOptionSet) {
   config.drain_timeout = std::chrono::milliseconds(0);
   config.log_level = LogLevel::kOff;
   config.log_format = LogFormat::kJson;
+  config.access_log = AccessLog::kCombined;
+  config.access_log_file = "/var/log/terrace/access.log";
+  config.watch = false;
   ExpectComesBack(config);
 }
 
 TEST(ToJson, NamesEveryOption) {
   Config config;
+  config.access_log_file = "/var/log/terrace/access.log";
   DatasetConfig dataset = Dataset("a");
   dataset.finest_error = 1;
   dataset.floor = 0;

@@ -1,0 +1,251 @@
+// From a window of nodes to heights: positions, window, voids, interpolation. Every step is a function of the global
+// node, the level and the sheet; the window decides only what is read, never what comes out.
+#include "engine/dem/sheet.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "engine/dem/feather.h"
+#include "engine/dem/grid_cells.h"
+#include "engine/dem/node_positions.h"
+#include "engine/dem/void_fill.h"
+#include "engine/geo/tile_cover.h"
+
+namespace terrace::dem {
+namespace {
+
+// Interpolated positions are this close to exact ones, in samples of the grid they are read from: a slope of 45 degrees
+// at 30 m turns it into 0.3 mm.
+constexpr double kPositionTolerance = 1e-5;
+// Positions this close to the raster's edge, in pixels, are on it.
+constexpr double kEdgeTolerance = 1e-6;
+
+GridWindow Grown(const GridWindow& window, int halo, const GridAxis& columns, const GridAxis& rows) {
+  GridWindow wide{window.column - halo, window.row - halo, window.columns + std::int64_t{2} * halo,
+                  window.rows + std::int64_t{2} * halo};
+  const auto clip = [](std::int64_t& start, std::int64_t& length, std::int64_t count) {
+    const std::int64_t end = std::min(start + length, count);
+    start = std::max<std::int64_t>(start, 0);
+    length = end - start;
+  };
+  if (!columns.wraps()) clip(wide.column, wide.columns, columns.count());
+  clip(wide.row, wide.rows, rows.count());
+  return wide;
+}
+
+// Pixels that the members have, columns of sheets that wrap counted from 0 to `turn`; without overlap.
+std::vector<geo::TileRange> CoverOf(const std::vector<SheetMember>& members, std::int64_t turn) {
+  std::vector<geo::TileRange> ranges;
+  for (const SheetMember& member : members) {
+    const geo::TileRange pixels = member.pixels();
+    ranges.push_back(pixels);
+    if (turn > 0 && pixels.end_x >= turn) {
+      ranges.push_back({0, pixels.start_y, std::min(pixels.end_x, 2 * turn - 1) - turn, pixels.end_y});
+    }
+  }
+  return geo::Disjoint(std::move(ranges));
+}
+
+Box BoxOf(const geo::TileRange& pixels) {
+  return {static_cast<double>(pixels.start_x), static_cast<double>(pixels.start_y),
+          static_cast<double>(pixels.end_x + 1), static_cast<double>(pixels.end_y + 1)};
+}
+
+Result<Georeference> GeoreferenceOf(const SheetPlan& plan) {
+  if (plan.members.size() == 1) return plan.members.front().raster->georeference();
+  // That of the member in the corner, if there is one, goes over as it is.
+  const auto corner =
+      std::ranges::find_if(plan.members, [](const SheetMember& m) { return m.column == 0 && m.row == 0; });
+  const SheetMember& member = corner != plan.members.end() ? *corner : plan.members.front();
+  return member.raster->georeference().Moved({-member.column, -member.row}, plan.width, plan.height,
+                                             member.raster->info().path);
+}
+
+}  // namespace
+
+float RoundHeight(double metres) { return static_cast<float>(std::nearbyint(metres * 1024) / 1024); }
+
+Result<Sheet> Sheet::Make(SheetPlan plan, const SheetOptions& options) {
+  auto where = GeoreferenceOf(plan);
+  if (!where) return tl::unexpected(where.error());
+  Sheet sheet(*std::move(where));
+  sheet.members_ = std::move(plan.members);
+  sheet.options_ = options;
+  sheet.width_ = plan.width;
+  sheet.height_ = plan.height;
+  sheet.wraps_ = sheet.georeference_.wrap_columns() > 0;
+  sheet.columns_ = sheet.wraps_ ? sheet.georeference_.wrap_columns() : plan.width;
+  const RasterSource& first = *sheet.members_.front().raster;
+  // Members far apart may have nothing of the Earth half way between them.
+  sheet.spacing_ = SourceSpacing::Of(sheet.georeference_, first.info().path).value_or(first.spacing());
+  sheet.reach_ = Footprint::Of(sheet.georeference_).Padded();
+  sheet.IndexMembers();
+  sheet.FindPoleHeights();
+  return sheet;
+}
+
+void Sheet::IndexMembers() {
+  const std::int64_t turn = wraps_ ? columns_ : 0;
+  alignment_ = 1 << 22;  // AveragingFactor's largest
+  std::vector<BoxIndex::Entry> entries, blocks;
+  for (std::size_t i = 0; i < members_.size(); ++i) {
+    const SheetMember& member = members_[i];
+    while (member.column % alignment_ != 0 || member.row % alignment_ != 0 || (turn > 0 && turn % alignment_ != 0)) {
+      alignment_ /= 2;
+    }
+    const Box box = BoxOf(member.pixels());
+    for (const std::int64_t shift : {std::int64_t{0}, -turn, turn}) {
+      const auto x = static_cast<double>(shift);
+      entries.push_back({{box.west + x, box.south, box.east + x, box.north}, i});
+      if (turn == 0) break;
+    }
+  }
+  cover_ = CoverOf(members_, turn);
+  for (std::size_t i = 0; i < cover_.size(); ++i) blocks.push_back({BoxOf(cover_[i]), i});
+  member_index_ = BoxIndex(entries);
+  cover_index_ = BoxIndex(blocks);
+}
+
+// The mean of the rows that lie at a pole, of members by their width.
+void Sheet::FindPoleHeights() {
+  if (!georeference_.is_geographic_grid()) return;
+  for (const int pole : {0, 1}) {
+    Position position{0, pole == 0 ? -90.0 : 90.0};
+    georeference_.ToPixels({&position, 1});
+    if (!(position.y >= -kEdgeTolerance && position.y <= height_ + kEdgeTolerance)) continue;
+    const bool first_row = position.y < height_ / 2.0;
+    double sum = 0, weights = 0;
+    for (const SheetMember& member : members_) {
+      const RasterLayout& layout = member.raster->layout();
+      if (first_row ? member.row != 0 : member.row + layout.height != height_) continue;
+      const auto& mean = member.raster->edge_row_means()[first_row ? 0 : 1];
+      if (!mean) continue;
+      const double weight = members_.size() == 1 ? 1 : layout.columns;
+      sum += weight * *mean;
+      weights += weight;
+    }
+    if (weights > 0) pole_heights_[static_cast<std::size_t>(pole)] = RoundHeight(sum / weights);
+  }
+}
+
+Sheet::Cells Sheet::CellsAt(std::span<const Position> positions, std::span<const float> heights, int factor) const {
+  Box hull{1e300, 1e300, -1e300, -1e300};
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    const auto [x, y] = positions[i];
+    if (std::isnan(x) || !std::isnan(heights[i])) continue;
+    hull = {std::min(hull.west, x), std::min(hull.south, y), std::max(hull.east, x), std::max(hull.north, y)};
+  }
+  Cells found;
+  if (hull.west > hull.east) return found;
+  const std::vector<std::size_t> blocks = cover_index_.Find({hull.west - kEdgeTolerance, hull.south - kEdgeTolerance,
+                                                             hull.east + kEdgeTolerance, hull.north + kEdgeTolerance});
+  const GridAxis columns = Columns(factor), rows = Rows(factor);
+  const auto is_inside = [&](const Position& p) {
+    return std::ranges::any_of(blocks, [&](std::size_t block) {
+      const Box box = BoxOf(cover_[block]);
+      return p.x >= box.west - kEdgeTolerance && p.x <= box.east + kEdgeTolerance &&
+             p.y >= box.south - kEdgeTolerance && p.y <= box.north + kEdgeTolerance;
+    });
+  };
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    if (!std::isnan(heights[i]) || !is_inside(positions[i])) continue;
+    found.cells.push_back(CellAt(positions[i], columns, rows, width_, height_));
+    found.nodes.push_back(i);
+  }
+  return found;
+}
+
+// Files are looked at even where nothing must be read: a tile of floor must not outlive its source. What lies between
+// many sources depends on none of them.
+Result<void> Sheet::CheckUnread() const {
+  return members_.size() == 1 ? members_.front().raster->CheckUnchanged() : Result<void>();
+}
+
+Result<std::vector<float>> Sheet::ReadFilled(int factor, const GridWindow& window, const std::stop_token& stop) const {
+  const auto is_void = [](float height) { return std::isnan(height); };
+  auto core = ReadBlocks(factor, window, stop);
+  const int gap = options_.max_void_gap / factor;
+  if (!core || gap < 2 || std::ranges::none_of(*core, is_void)) return core;
+  const GridWindow wide = Grown(window, gap, Columns(factor), Rows(factor));
+  auto around = ReadBlocks(factor, wide, stop);
+  if (!around || std::ranges::all_of(*around, is_void)) return core;
+  return FillVoids(*around, wide, window, gap);
+}
+
+double Sheet::Feather(int factor) const {
+  // Of the coarser axis: what is read around a tile, and the time that weights take, stay bounded.
+  constexpr int kMostSamples = 256;
+  return std::min(options_.feather_m, kMostSamples * factor * std::min(spacing_.east, spacing_.north));
+}
+
+Result<std::vector<float>> Sheet::ReadWeights(int factor, const GridWindow& window, const std::stop_token& stop) const {
+  const double feather = Feather(factor), column_step = spacing_.east * factor, row_step = spacing_.north * factor;
+  const int halo = static_cast<int>(std::ceil(feather / std::min(column_step, row_step))) + 1;
+  const GridWindow wide = Grown(window, halo, Columns(factor), Rows(factor));
+  const auto pixel = [factor](std::int64_t block) { return static_cast<double>(block * factor); };
+  const bool ends = wide.rows < window.rows + 2 * halo || wide.columns < window.columns + 2 * halo;
+  if (!ends &&
+      !Ranges({pixel(wide.column), pixel(wide.row), pixel(wide.column + wide.columns), pixel(wide.row + wide.rows)})
+           .has_voids) {
+    return std::vector<float>();
+  }
+  const auto heights = ReadFilled(factor, wide, stop);
+  if (!heights) return heights;
+  return FeatherWeights(*heights, wide, window, column_step, row_step, feather);
+}
+
+Result<void> Sheet::FillAt(std::span<const Position> positions, int factor, std::span<float> heights,
+                           const std::stop_token& stop, std::span<float> weights) const {
+  Cells found = CellsAt(positions, heights, factor);
+  if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "reading was stopped");
+  if (found.cells.empty()) return CheckUnread();
+  const GridWindow window = WindowOf(found.cells, Columns(factor), Rows(factor));
+  const auto samples = ReadFilled(factor, window, stop);
+  if (!samples) return tl::unexpected(samples.error());
+  std::vector<float> counts;
+  if (!weights.empty() && options_.feather_m > 0) {
+    auto read = ReadWeights(factor, window, stop);
+    if (!read) return tl::unexpected(read.error());
+    counts = *std::move(read);
+  }
+  for (std::size_t i = 0; i < found.cells.size(); ++i) {
+    const auto height = Interpolate(*samples, window, found.cells[i]);
+    if (!height) continue;
+    heights[found.nodes[i]] = RoundHeight(*height);
+    if (weights.empty()) continue;
+    // Every sample has a weight, so this is plain bilinear. What counts nothing would still hide the floor.
+    constexpr double kLeast = 0x1p-10;
+    const double weight = counts.empty() ? 1 : Interpolate(counts, window, found.cells[i]).value_or(1);
+    weights[found.nodes[i]] = static_cast<float>(std::max(kLeast, std::nearbyint(weight * 1024) / 1024));
+  }
+  return {};
+}
+
+Result<void> Sheet::Fill(const geo::Lattice& lattice, const NodeWindow& window, std::span<float> heights,
+                         const std::stop_token& stop, std::span<float> weights) const {
+  const int factor = AveragingFactor(SamplesPerCell(lattice, spacing_));
+  auto positions = NodePositions(georeference_, reach_, lattice, window, kPositionTolerance * factor);
+  for (int row = 0; row < window.rows && georeference_.is_geographic_grid(); ++row) {
+    const std::int64_t global = window.row + row;
+    if (global > 0 && global < lattice.rows()) continue;
+    // Where columns are meridians they meet in one value.
+    const auto first = static_cast<std::size_t>(row) * static_cast<std::size_t>(window.columns);
+    std::fill_n(positions.begin() + static_cast<std::ptrdiff_t>(first), window.columns, kNowhere);
+    if (const auto pole = pole_heights_[global <= 0 ? 0 : 1]) {
+      std::ranges::replace_if(
+          heights.subspan(first, static_cast<std::size_t>(window.columns)),
+          [](float height) { return std::isnan(height); }, *pole);
+    }
+  }
+  return FillAt(positions, factor, heights, stop, weights);
+}
+
+Result<void> Sheet::Fill(const geo::MercatorGrid& grid, const NodeWindow& window, std::span<float> heights,
+                         const std::stop_token& stop, std::span<float> weights) const {
+  const int factor = MercatorFactor(grid.depth, spacing_);
+  return FillAt(NodePositions(georeference_, reach_, grid, window, kPositionTolerance * factor), factor, heights, stop,
+                weights);
+}
+
+}  // namespace terrace::dem

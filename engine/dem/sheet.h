@@ -1,0 +1,116 @@
+// Rasters on one pixel grid, read as if they were one, at the nodes of any grid: positions, averaging, small voids,
+// interpolation. Where they have nothing, nothing is said: other sheets and the floor are the dataset's business.
+//
+// Averages are those of blocks of pixels counted from the sheet's north-western corner. Of rasters that overlap the
+// first has its say; where it is void, the next. Immutable and safe to use from many threads.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <optional>
+#include <span>
+#include <stop_token>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "engine/dem/box_index.h"
+#include "engine/dem/dem_source.h"
+#include "engine/dem/grid_cells.h"
+#include "engine/dem/sheet_members.h"
+#include "engine/geo/mercator_grid.h"
+
+namespace terrace::dem {
+
+// Heights that a tile can take from a sheet.
+struct SheetRange {
+  BlockRange blocks;         // min > max: none
+  bool shows_others = true;  // part of the tile may lie outside the sheet or in its voids
+};
+
+struct SheetOptions {
+  int max_void_gap = 0;  // samples: narrower voids are filled
+  double feather_m = 0;  // how far from its edges and voids a sheet begins to give way to what lies below; 0: at them
+};
+
+class Sheet {
+ public:
+  // Precondition: the plan has members.
+  static Result<Sheet> Make(SheetPlan plan, const SheetOptions& options);
+
+  const std::vector<SheetMember>& members() const { return members_; }
+  const SourceSpacing& spacing() const { return spacing_; }
+  // Padded: outside it there is nothing.
+  const Footprint& reach() const { return reach_; }
+  // South, north: heights at the poles, of sheets whose columns are meridians and that reach them.
+  const std::array<std::optional<float>, 2>& pole_heights() const { return pole_heights_; }
+
+  // These replace the NaN among `heights`, one for each node of the window, by the sheet's heights there, as far as it
+  // has some. A height is a function of the node alone. kUnavailable: a raster cannot be read now. kCancelled: stopped.
+  // `weights`, if it is not empty, has one for each node: those of the heights that are filled in become what they
+  // count beside what lies below, over 0 to 1.
+  Result<void> Fill(const geo::Lattice& lattice, const NodeWindow& window, std::span<float> heights,
+                    const std::stop_token& stop, std::span<float> weights = {}) const;
+  Result<void> Fill(const geo::MercatorGrid& grid, const NodeWindow& window, std::span<float> heights,
+                    const std::stop_token& stop, std::span<float> weights = {}) const;
+
+  // The same at single points, as measured: nothing is averaged and nothing is filled.
+  Result<void> FillPoints(std::span<const GeoPosition> points, std::span<float> heights,
+                          const std::stop_token& stop) const;
+
+  // At least the heights that Fill gives to nodes of the tile, its edges included.
+  SheetRange RangeOf(const geo::Lattice& lattice, const geo::TileKey& key) const;
+
+ private:
+  explicit Sheet(Georeference where) : georeference_(std::move(where)) {}
+
+  GridAxis Columns(int factor) const { return {columns_, factor, wraps_}; }
+  GridAxis Rows(int factor) const { return {height_, factor, false}; }
+  void IndexMembers();
+  void FindPoleHeights();
+
+  // A cell for each position inside the sheet whose height is NaN, and which it is.
+  struct Cells {
+    std::vector<GridCell> cells;
+    std::vector<std::size_t> nodes;
+  };
+  Cells CellsAt(std::span<const Position> positions, std::span<const float> heights, int factor) const;
+
+  // Averages of the valid samples of each block; NaN where there is none.
+  Result<std::vector<float>> ReadBlocks(int factor, const GridWindow& window, const std::stop_token& stop) const;
+  // Averages of `step` x `step` samples each, into rows of `out` that are `window.columns` wide. Precondition: every
+  // member begins at a block; the window does not wrap.
+  Result<void> Compose(int step, const GridWindow& window, std::span<float> out, const std::stop_token& stop) const;
+  Result<void> Average(int factor, const GridWindow& window, float* out, std::int64_t stride,
+                       const std::stop_token& stop) const;
+  Result<std::vector<float>> ReadFilled(int factor, const GridWindow& window, const std::stop_token& stop) const;
+  Result<void> FillAt(std::span<const Position> positions, int factor, std::span<float> heights,
+                      const std::stop_token& stop, std::span<float> weights) const;
+  // What each sample of the window counts; empty: all count in full.
+  Result<std::vector<float>> ReadWeights(int factor, const GridWindow& window, const std::stop_token& stop) const;
+  // Metres: no more than a bounded number of samples.
+  double Feather(int factor) const;
+  Result<void> CheckUnread() const;
+
+  // Of the pixels in a box; what no member covers counts as void.
+  BlockRange Ranges(const Box& pixels) const;
+
+  Georeference georeference_;
+  int width_ = 0, height_ = 0;
+  int columns_ = 0;  // of them in use: without the duplicates of a raster that goes all around the Earth
+  bool wraps_ = false;
+  SourceSpacing spacing_;
+  Footprint reach_;
+  SheetOptions options_;
+  std::array<std::optional<float>, 2> pole_heights_;
+
+  std::vector<SheetMember> members_;
+  BoxIndex member_index_;              // by pixels; of sheets that wrap also a turn before and after
+  std::vector<geo::TileRange> cover_;  // pixels that members have, without overlap
+  BoxIndex cover_index_;
+  int alignment_ = 1;  // the largest power of two at whose multiples all members begin
+};
+
+// Heights are multiples of 2^-10 m: libm's last bits, which differ between processors, end here.
+float RoundHeight(double metres);
+
+}  // namespace terrace::dem

@@ -1,0 +1,148 @@
+// The bound on what a tile can take from a sheet, from the block table alone.
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "engine/dem/sheet.h"
+#include "engine/geo/tile_cover.h"
+
+namespace terrace::dem {
+namespace {
+
+// Up to this level a tile is so large that its outline in the source's CRS cannot be told from a few positions.
+constexpr int kLastWholeLevel = 4;
+
+struct PixelBox {
+  double west, north, east, south;
+
+  void Grow(double x, double y) {
+    west -= x;
+    east += x;
+    north -= y;
+    south += y;
+  }
+};
+
+// Pixels of a tile in a geographic grid: the part found going east from its western edge, and what lies a turn before
+// it.
+std::vector<PixelBox> GeographicBoxes(const Georeference& georeference, const geo::Lattice& lattice,
+                                      const geo::TileKey& key) {
+  std::array<Position, 2> corners = {
+      {{lattice.Longitude(lattice.FirstColumn(key)), lattice.Latitude(lattice.FirstRow(key))},
+       {0, lattice.Latitude(lattice.FirstRow(key) + lattice.cells)}}};
+  georeference.ToPixels(corners);
+  const double columns = lattice.cells * lattice.StepDegrees() / 360 * georeference.period();
+  const double west = georeference.columns_run_east() ? corners[0].x : corners[0].x - columns;
+  const auto [north, south] = std::minmax(corners[0].y, corners[1].y);
+  std::vector<PixelBox> boxes;
+  for (int turn = -1; turn <= 1; ++turn) {
+    const double shifted = west + turn * georeference.period();
+    boxes.push_back({shifted, north, shifted + columns, south});
+  }
+  return boxes;
+}
+
+// A box around a tile's pixels in any CRS; nothing where it cannot be told.
+std::optional<PixelBox> ProjectedBox(const Georeference& georeference, const geo::Lattice& lattice,
+                                     const geo::TileKey& key) {
+  if (key.level <= kLastWholeLevel) return std::nullopt;
+  constexpr int kSteps = 4;
+  std::array<Position, (kSteps + 1) * (kSteps + 1)> nodes;
+  for (int i = 0; i < static_cast<int>(nodes.size()); ++i) {
+    nodes[static_cast<std::size_t>(i)] = {
+        lattice.Longitude(lattice.FirstColumn(key) + i % (kSteps + 1) * lattice.cells / kSteps),
+        lattice.Latitude(lattice.FirstRow(key) + i / (kSteps + 1) * lattice.cells / kSteps)};
+  }
+  georeference.ToPixels(nodes);
+  PixelBox box{nodes[0].x, nodes[0].y, nodes[0].x, nodes[0].y};
+  for (const Position& node : nodes) {
+    if (std::isnan(node.x)) return std::nullopt;
+    box.west = std::min(box.west, node.x);
+    box.east = std::max(box.east, node.x);
+    box.north = std::min(box.north, node.y);
+    box.south = std::max(box.south, node.y);
+  }
+  // Between nodes a quarter of the tile apart its edges bulge by less than an eighth of it, down from level 5.
+  box.Grow((box.east - box.west) / 8, (box.south - box.north) / 8);
+  return box;
+}
+
+}  // namespace
+
+BlockRange Sheet::Ranges(const Box& pixels) const {
+  if (members_.size() == 1) {
+    return members_.front().raster->ranges().Query(pixels.west, pixels.south, pixels.east, pixels.north);
+  }
+  BlockRange range;
+  const double turn = wraps_ ? columns_ : 0;
+  for (const std::size_t i : member_index_.Find(pixels)) {
+    for (const double shift : {0.0, -turn, turn}) {
+      const double x = static_cast<double>(members_[i].column) + shift, y = static_cast<double>(members_[i].row);
+      range.Add(
+          members_[i].raster->ranges().Query(pixels.west - x, pixels.south - y, pixels.east - x, pixels.north - y));
+      if (turn == 0) break;
+    }
+  }
+  const auto pixel = [](double position, int count) {
+    return static_cast<std::int64_t>(std::clamp(std::floor(position), 0.0, count - 1.0));
+  };
+  const geo::TileRange wanted{pixel(pixels.west, width_), pixel(pixels.south, height_), pixel(pixels.east, width_),
+                              pixel(pixels.north, height_)};
+  std::int64_t covered = 0;
+  for (const std::size_t i : cover_index_.Find(pixels)) covered += geo::Cells(geo::Common(cover_[i], wanted));
+  range.has_voids |= covered < geo::Cells(wanted);
+  return range;
+}
+
+SheetRange Sheet::RangeOf(const geo::Lattice& lattice, const geo::TileKey& key) const {
+  const double extent = lattice.cells * lattice.StepDegrees();
+  const std::int64_t south_row = lattice.FirstRow(key), north_row = south_row + lattice.cells;
+  SheetRange range;
+  bool leaves = false;
+  for (const std::int64_t row : {south_row, north_row}) {
+    if (row > 0 && row < lattice.rows()) continue;
+    const auto& pole = pole_heights_[row <= 0 ? 0 : 1];
+    if (pole) range.blocks.Add(*pole);
+    leaves |= georeference_.is_geographic_grid() && !pole;
+  }
+  if (!reach_.Touches(lattice.Longitude(lattice.FirstColumn(key)), lattice.Latitude(south_row), extent, extent)) {
+    return range;
+  }
+  const int factor = AveragingFactor(SamplesPerCell(lattice, spacing_));
+  std::vector<PixelBox> boxes;
+  if (georeference_.is_geographic_grid() && georeference_.is_affine()) {
+    boxes = GeographicBoxes(georeference_, lattice, key);
+    leaves |= !wraps_ &&
+              std::ranges::none_of(boxes, [&](const PixelBox& box) { return box.west >= 0 && box.east <= width_; });
+  } else if (const auto box = ProjectedBox(georeference_, lattice, key)) {
+    boxes = {*box};
+    leaves |= box->west < 0 || box->east > width_;
+  } else {
+    boxes = {{0, 0, static_cast<double>(width_), static_cast<double>(height_)}};
+    leaves = true;
+  }
+  BlockRange blocks;
+  bool blends = false;
+  for (PixelBox& box : boxes) {
+    leaves |= box.north < 0 || box.south > height_;
+    if (options_.feather_m > 0) {
+      PixelBox wide = box;
+      wide.Grow(Feather(factor) / spacing_.east + 2 * factor, Feather(factor) / spacing_.north + 2 * factor);
+      blends |= wide.north < 0 || wide.south > height_ || (!wraps_ && (wide.west < 0 || wide.east > width_)) ||
+                Ranges({wide.west, wide.north, wide.east, wide.south}).has_voids;
+    }
+    // Bilinear interpolation reaches one and a half samples of the grid.
+    box.Grow(1.5 * factor + 1, 1.5 * factor + 1);
+    BlockRange here = Ranges({box.west, box.north, box.east, box.south});
+    if (here.has_voids) {
+      box.Grow(options_.max_void_gap + factor, options_.max_void_gap + factor);
+      here.Add(Ranges({box.west, box.north, box.east, box.south}));
+    }
+    blocks.Add(here);
+  }
+  range.shows_others = leaves || blends || blocks.has_voids;
+  range.blocks.Add(blocks);
+  return range;
+}
+
+}  // namespace terrace::dem
