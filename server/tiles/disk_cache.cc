@@ -67,6 +67,7 @@ std::string StoreKey(const Key& key) {
 }  // namespace
 
 Result<std::shared_ptr<DiskCache>> DiskCache::Open(const DiskCacheOptions& options) {
+  EncoderVersion();  // taken before sources are opened, for which GDAL may load libraries
   std::error_code failed;
   std::filesystem::create_directories(options.directory, failed);
   if (failed) {
