@@ -17,8 +17,14 @@
 
 namespace terrace::config {
 
-// What the heights of a source count from. Further values come with the conversions that they need.
-enum class VerticalDatum : std::uint8_t { kUnknown };
+// Which samples of a source are voids, beside those that a mask hides.
+struct NodataConfig {
+  bool detect = true;               // undeclared marks are found as well as those that the file declares
+  std::vector<double> values = {};  // raw values that are voids, beside the declared one
+
+  friend bool operator==(const NodataConfig&, const NodataConfig&) = default;
+};
+
 // How the triangles of a tile are joined: tin::Criterion, which this room does not know.
 enum class Criterion : std::uint8_t { kDelaunay, kDataDependent };
 // How GLB tiles are compressed unless a request says: proto::GlbCompression, which this room does not know.
@@ -63,6 +69,9 @@ struct SourceConfig {
   std::string written;             // path or pattern, absolute
   std::vector<std::string> files;  // what it stands for
   bool is_folder = false;          // what is no raster among them is left out
+  // What it does not say itself its dataset does.
+  std::optional<std::string> vertical = {};
+  std::optional<NodataConfig> nodata = {};
 
   friend bool operator==(const SourceConfig&, const SourceConfig&) = default;
 };
@@ -70,7 +79,8 @@ struct SourceConfig {
 struct DatasetConfig {
   std::string name;                   // the first part of its URLs: [A-Za-z0-9._-]{1,64}
   std::vector<SourceConfig> sources;  // the first that has a height at a place gives it
-  VerticalDatum vertical = VerticalDatum::kUnknown;
+  std::string vertical = "crs";       // what heights count from: a word, "EPSG:5703", or the path of a grid
+  NodataConfig nodata;
   std::string attribution;
   double error_fraction = 0.5;         // default error of a level, as a share of the error that clients assume there
   std::optional<double> finest_error;  // metres; decides the deepest level
@@ -137,6 +147,7 @@ struct Config {
   std::size_t cache_bytes = std::size_t{256} << 20;             // 0: no cache
   std::size_t refinement_cache_bytes = std::size_t{128} << 20;  // 0: no cache
   DiskCacheConfig disk_cache;
+  std::size_t gdal_cache_bytes = std::size_t{256} << 20;        // blocks of sources
   std::size_t max_connections = 1024;
   std::size_t max_connections_per_client = 0;          // 0: as many as there may be in all
   std::size_t transfer_bytes = std::size_t{32} << 20;  // of bodies on their way
@@ -157,6 +168,10 @@ struct Config {
   std::chrono::milliseconds write_timeout{20'000};
   std::size_t min_read_rate = 4096;  // bytes a second; 0: any
   std::chrono::milliseconds drain_timeout{10'000};
+
+  std::vector<std::string> data_roots;        // folders that hold every source; none: any folder
+  std::vector<std::string> allowed_prefixes;  // of remote sources; none: no remote sources
+  std::vector<std::string> allowed_drivers;   // GDAL's names of formats; none: the usual ones
 
   bool watch = true;  // look for changes of sources and of the file that this came from
 

@@ -7,7 +7,7 @@
 #include "config/edge_options.h"
 #include "config/layer_options.h"
 #include "config/nearest_name.h"
-#include "config/source_paths.h"
+#include "config/source_options.h"
 
 namespace terrace::config {
 namespace {
@@ -59,42 +59,6 @@ Codec<Config> AccessLogFile() {
           [](const std::string& text) { return Json(text.empty() ? text : std::filesystem::absolute(text).string()); }};
 }
 
-Codec<DatasetConfig> Vertical() {
-  Codec<DatasetConfig> codec = Choice(&DatasetConfig::vertical, {{"unknown", VerticalDatum::kUnknown}});
-  codec.read = [read_word = codec.read](const Json& value, const Place& place, DatasetConfig& dataset) {
-    if (!value.is_string() || value == "unknown") return read_word(value, place, dataset);
-    place.Fail(Quote(value) +
-               " is not supported yet; write \"unknown\" (heights are passed through as they are) and "
-               "convert the source to ellipsoidal heights beforehand where that matters");
-  };
-  return codec;
-}
-
-Codec<DatasetConfig> Sources() {
-  return {[](const Json& value, const Place& place, DatasetConfig& dataset) {
-            if (!value.is_array() || value.empty())
-              return place.Expected("a list of paths such as [\"lidar/*.tif\", \"base.tif\"]", value);
-            for (std::size_t i = 0; i < value.size(); ++i) {
-              if (!value[i].is_string() || value[i].get_ref<const std::string&>().empty()) {
-                place.At(i).Expected("a path, a glob or a folder", value[i]);
-                continue;
-              }
-              Result<SourceConfig> source = ExpandSource(value[i].get<std::string>(), place.directory());
-              if (source) {
-                dataset.sources.push_back(*std::move(source));
-              } else {
-                place.At(i).Fail(source.error().message +
-                                 "; correct the path, which is relative to the folder of this file");
-              }
-            }
-          },
-          [](const DatasetConfig& dataset) {
-            Json list = Json::array();
-            for (const SourceConfig& source : dataset.sources) list.push_back(source.written);
-            return list;
-          }};
-}
-
 Codec<Config> Datasets() {
   return {[](const Json& value, const Place& place, Config& config) {
             if (!value.is_array()) return place.Expected("a list of datasets", value);
@@ -138,6 +102,8 @@ const std::vector<Option<Config>>& ServerOptionTable() {
        Bytes(&Config::refinement_cache_bytes, kMaxCacheBytes)},
       {"disk_cache", "DIR", "Keep finished tiles and refinements in this directory, across restarts",
        DiskCacheOption()},
+      {"gdal_cache_bytes", "BYTES", "Memory for blocks of the sources, as they are read",
+       Bytes(&Config::gdal_cache_bytes, kMaxCacheBytes)},
       {"max_connections", "N", "Connections at a time; above it idle ones are closed and new ones turned away",
        Integer(&Config::max_connections, 1, 1'000'000)},
       {"max_connections_per_client", "N", "Connections of one address at a time; 0 is no limit of its own",
@@ -170,6 +136,12 @@ const std::vector<Option<Config>>& ServerOptionTable() {
        Integer(&Config::min_read_rate, 0, 1'000'000'000)},
       {"drain_timeout_s", "SECONDS", "Time for open requests to finish when the server stops",
        Seconds(&Config::drain_timeout, 0, 3600)},
+      {"data_roots", "DIR[,DIR]", "Folders that hold every source; by default any folder may",
+       TextList(&Config::data_roots, "a list of folders", true)},
+      {"allowed_prefixes", "PREFIX[,PREFIX]", "Beginnings of remote sources, such as /vsis3/bucket/; by default none",
+       TextList(&Config::allowed_prefixes, "a list of prefixes such as [\"/vsis3/bucket/\"]", false)},
+      {"allowed_drivers", "NAME[,NAME]", "Formats that sources may have, by GDAL's short names",
+       TextList(&Config::allowed_drivers, "a list of formats such as [\"GTiff\", \"VRT\"]", false)},
       {"watch", "true|false", "Take over changes of sources and of the configuration file while serving",
        Switch(&Config::watch)},
       {"log_level", "LEVEL", "The least important messages to log: debug, info, warn, error or off",
@@ -196,9 +168,12 @@ const std::vector<Option<DatasetConfig>>& DatasetOptionTable() {
       {"name", "NAME", "The dataset's name in URLs; by default that of the file",
        Text(&DatasetConfig::name, CheckDatasetName)},
       {"sources", "", "Files, globs and folders of rasters; the first that has a height at a place gives it",
-       Sources()},
-      {"vertical", "DATUM", "What the heights count from; only unknown for now: heights are passed through",
-       Vertical()},
+       SourcesCodec()},
+      {"vertical", "DATUM",
+       "What the heights count from: crs (as the source states), unknown, ellipsoid, egm96, egm2008, EPSG:N or a grid",
+       VerticalCodec()},
+      {"nodata", "VALUE", "Voids: auto finds undeclared ones, declared trusts the source, a number is one more",
+       NodataCodec()},
       {"attribution", "TEXT", "Who to thank for the data; clients show it",
        Text(&DatasetConfig::attribution, CheckOneLine)},
       {"error_fraction", "SHARE", "Default error of a level as a share of the error that clients assume there",
@@ -271,10 +246,12 @@ template void ReadObject(const Json&, const Place&, const std::vector<Option<Con
 template void ReadObject(const Json&, const Place&, const std::vector<Option<DatasetConfig>>&, DatasetConfig&);
 template void ReadObject(const Json&, const Place&, const std::vector<Option<ImageryConfig>>&, ImageryConfig&);
 template void ReadObject(const Json&, const Place&, const std::vector<Option<DiskCacheConfig>>&, DiskCacheConfig&);
+template void ReadObject(const Json&, const Place&, const std::vector<Option<SourceConfig>>&, SourceConfig&);
 template void ReadObject(const Json&, const Place&, const std::vector<Option<TokenConfig>>&, TokenConfig&);
 template Json WriteObject(const Config&, const std::vector<Option<Config>>&);
 template Json WriteObject(const DatasetConfig&, const std::vector<Option<DatasetConfig>>&);
 template Json WriteObject(const ImageryConfig&, const std::vector<Option<ImageryConfig>>&);
+template Json WriteObject(const SourceConfig&, const std::vector<Option<SourceConfig>>&);
 template Json WriteObject(const TokenConfig&, const std::vector<Option<TokenConfig>>&);
 template Json WriteObject(const DiskCacheConfig&, const std::vector<Option<DiskCacheConfig>>&);
 

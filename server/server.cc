@@ -244,12 +244,18 @@ class Server::Impl {
   ByteCacheStats RefinementStats() const {
     return options_.refinement_stats ? options_.refinement_stats() : ByteCacheStats{};
   }
+  SourceStats SourceNumbers() const {
+    const std::shared_ptr<const Routes> routes = CurrentRoutes();
+    return routes->catalog().source_stats ? routes->catalog().source_stats() : SourceStats{};
+  }
 
   Routes::State RouteState() {
     Routes::State state;
     state.draining = [this] { return edge_->connections.draining(); };
     state.troubles = [this] { return Troubles(); };
-    state.metrics_text = [this] { return metrics_.Text(tiles_.stats(), RefinementStats(), CurrentState()); };
+    state.metrics_text = [this] {
+      return metrics_.Text(tiles_.stats(), RefinementStats(), SourceNumbers(), CurrentState());
+    };
     return state;
   }
 

@@ -15,7 +15,7 @@ build_packages=(
   libjpeg62-turbo-dev libwebp-dev librocksdb-dev libsystemd-dev
 )
 test_packages=(
-  libgtest-dev libgmock-dev libbenchmark-dev zlib1g-dev libpng-dev chromium python3-jsonschema strace wrk
+  libgtest-dev libgmock-dev libbenchmark-dev zlib1g-dev libpng-dev chromium python3-jsonschema strace wrk proj-bin
   clang-14 libclang-rt-14-dev llvm-14 clang-format-14
 )
 

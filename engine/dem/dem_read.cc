@@ -10,6 +10,17 @@
 namespace terrace::dem {
 namespace {
 
+bool IsVoid(float height) { return std::isnan(height); }
+
+Result<void> FillFrom(const Sheet& sheet, const geo::Lattice& lattice, const NodeWindow& window, Counting counting,
+                      std::span<float> heights, const std::stop_token& stop, std::span<float> weights) {
+  return sheet.Fill(lattice, window, counting, heights, stop, weights);
+}
+Result<void> FillFrom(const Sheet& sheet, const geo::MercatorGrid& grid, const NodeWindow& window, Counting,
+                      std::span<float> heights, const std::stop_token& stop, std::span<float> weights) {
+  return sheet.Fill(grid, window, heights, stop, weights);
+}
+
 // Around the nodes of a window. Their longitudes begin between -180 and 180, and go on eastwards.
 template <typename Grid>
 Box BoxOf(const Grid& grid, const NodeWindow& window) {
@@ -75,8 +86,8 @@ class Blend {
 };
 
 template <typename Grid>
-Result<std::vector<float>> DemSource::Impl::ReadFloored(const Grid& grid, const NodeWindow& window,
-                                                        const std::string& what, const std::stop_token& stop) const {
+Result<std::vector<float>> DemSource::Impl::ReadSheets(const Grid& grid, const NodeWindow& window, Counting counting,
+                                                       const std::string& what, const std::stop_token& stop) const {
   const std::size_t nodes = static_cast<std::size_t>(window.columns) * static_cast<std::size_t>(window.rows);
   std::vector<float> heights(nodes, SampleRules::kVoid);
   const std::vector<std::size_t> order = SheetsAt(BoxOf(grid, window));
@@ -88,15 +99,13 @@ Result<std::vector<float>> DemSource::Impl::ReadFloored(const Grid& grid, const 
       heights = blend.Wanted();
       weights.assign(nodes, 1);
     }
-    if (const auto filled = sheets[i].Fill(grid, window, heights, stop, weights); !filled) {
+    if (const auto filled = FillFrom(sheets[i], grid, window, counting, heights, stop, weights); !filled) {
       return MakeError(filled.error().code, "{}: {}", what, filled.error().message);
     }
     if (feathers) blend.Add(heights, weights);
-    if (feathers ? blend.is_done() : std::ranges::none_of(heights, [](float h) { return std::isnan(h); })) break;
+    if (feathers ? blend.is_done() : std::ranges::none_of(heights, IsVoid)) break;
   }
   if (feathers) heights = blend.Heights();
-  std::ranges::replace_if(
-      heights, [](float height) { return std::isnan(height); }, floor);
   return heights;
 }
 
@@ -110,24 +119,40 @@ const geo::Lattice& DemSource::Impl::LatticeOf(int level) const {
   return lattices[static_cast<std::size_t>(level)];
 }
 
-Result<std::vector<float>> DemSource::Impl::ReadNodes(int level, const NodeWindow& window, const std::string& what,
-                                                      const std::stop_token& stop) const {
-  return ReadFloored(LatticeOf(level), window, what, stop);
+Result<std::vector<float>> DemSource::Impl::ReadNodes(int level, const NodeWindow& window, Counting counting,
+                                                      const std::string& what, const std::stop_token& stop) const {
+  const geo::Lattice& lattice = LatticeOf(level);
+  auto heights = ReadSheets(lattice, window, counting, what, stop);
+  if (!heights || std::ranges::none_of(*heights, IsVoid)) return heights;
+  if (counting == Counting::kEllipsoid || floor_undulations == nullptr) {
+    std::ranges::replace_if(*heights, IsVoid, floor);
+    return heights;
+  }
+  const std::vector<double> undulations = floor_undulations->At(lattice, window);
+  for (std::size_t i = 0; i < heights->size(); ++i) {
+    if (!IsVoid((*heights)[i])) continue;
+    (*heights)[i] = std::isnan(undulations[i]) ? floor : RoundHeight(floor - undulations[i]);
+  }
+  return heights;
 }
 
-Result<TileHeights> DemSource::Impl::Read(const geo::TileKey& key, const std::stop_token& stop) const {
+Result<TileHeights> DemSource::Impl::Read(const geo::TileKey& key, Counting counting,
+                                          const std::stop_token& stop) const {
   const geo::Lattice& lattice = LatticeOf(key.level);
-  auto heights = ReadNodes(key.level, WindowOfTile(lattice, key), "tile " + geo::ToString(key), stop);
+  auto heights = ReadNodes(key.level, WindowOfTile(lattice, key), counting, "tile " + geo::ToString(key), stop);
   if (!heights) return tl::unexpected(std::move(heights).error());
   return TileHeights{lattice, lattice.cells + 3, *std::move(heights)};
 }
 
 Result<std::vector<float>> DemSource::Impl::ReadMercator(int depth, const NodeWindow& window,
                                                          const std::stop_token& stop) const {
-  return ReadFloored(geo::MercatorGrid{depth}, window, fmt::format("Mercator pixels of depth {}", depth), stop);
+  auto heights = ReadSheets(geo::MercatorGrid{depth}, window, Counting::kEllipsoid,
+                            fmt::format("Mercator pixels of depth {}", depth), stop);
+  if (heights) std::ranges::replace_if(*heights, IsVoid, floor);
+  return heights;
 }
 
-Result<std::vector<float>> DemSource::Impl::ReadPoints(std::span<const GeoPosition> points,
+Result<std::vector<float>> DemSource::Impl::ReadPoints(std::span<const GeoPosition> points, HeightDatum datum,
                                                        const std::stop_token& stop) const {
   std::vector<float> heights(points.size(), SampleRules::kVoid);
   std::map<std::size_t, std::vector<std::size_t>> wanted;  // points by the sheets that may have them
@@ -142,7 +167,7 @@ Result<std::vector<float>> DemSource::Impl::ReadPoints(std::span<const GeoPositi
     missing.clear();
     for (const std::size_t i : those) missing.push_back(points[i]);
     found.assign(those.size(), SampleRules::kVoid);
-    if (const auto filled = sheets[sheet].FillPoints(missing, found, stop); !filled) {
+    if (const auto filled = sheets[sheet].FillPoints(missing, datum, found, stop); !filled) {
       return tl::unexpected(filled.error());
     }
     for (std::size_t k = 0; k < those.size(); ++k) heights[those[k]] = found[k];

@@ -62,6 +62,8 @@ Result<RasterScan> ScanRaster(GDALDataset& dataset, const RasterLayout& layout,
   auto read = ForEachChunk(band, layout.rules, stop, [&](const Chunk& chunk, const std::vector<float>& heights) {
     scan.table.AddWindow(chunk.col, chunk.row, chunk.cols, chunk.rows, heights.data());
     scan.voids += static_cast<std::uint64_t>(std::ranges::count_if(heights, [](float h) { return std::isnan(h); }));
+    scan.zeros.Add(heights.data(), chunk.cols, chunk.rows, chunk.col == 0, chunk.row == 0,
+                   chunk.col + chunk.cols == layout.width, chunk.row + chunk.rows == layout.height);
     const int used = std::clamp(layout.columns - chunk.col, 0, chunk.cols);
     if (chunk.row == 0) first_row.Add(heights.data(), used);
     if (chunk.row + chunk.rows == layout.height) {

@@ -10,6 +10,7 @@
 #include "engine/core/result.h"
 #include "engine/dem/range_table.h"
 #include "engine/dem/sample_grid.h"
+#include "engine/dem/void_marks.h"
 
 namespace terrace::dem {
 
@@ -17,6 +18,7 @@ struct RasterScan {
   RangeTable table;               // overviews that are read count too: their resampling may overshoot the samples
   float lowest = 0, highest = 0;  // of the samples
   std::uint64_t valid = 0, voids = 0;
+  ZeroEdges zeros;
   std::array<std::optional<double>, 2> edge_row_means;  // of the first and the last row's valid samples
 };
 

@@ -50,17 +50,43 @@ void LogWhatMatters(GDALDataset& dataset, const RasterInfo& info, const Georefer
   if (!MetresPerUnit(layout.rules.unit)) {
     spdlog::warn("{}: height unit \"{}\" is not known, heights are taken as metres", info.path, layout.rules.unit);
   }
-  if (info.vertical_datum.empty()) {
-    spdlog::warn("{}: no vertical datum stated, heights pass through as given", info.path);
-  }
   if (!info.transform.empty()) {
     spdlog::info("{}: placed by PROJ operation \"{}\": {}", info.path, info.transform, georeference.pipeline());
   }
 }
 
+void LogVertical(const std::string& path, const VerticalDatum& vertical) {
+  if (!vertical.is_known()) {
+    spdlog::warn("{}: no vertical datum stated, heights pass through as given", path);
+  } else if (vertical.geoid) {
+    spdlog::info("{}: heights count from {}, made ellipsoidal by PROJ operation \"{}\": {}", path, vertical.name,
+                 vertical.geoid->description(), vertical.geoid->pipeline());
+  }
+}
+
+// The scan, or another one with the rules that its findings call for.
+Result<RasterScan> Rescan(GDALDataset& dataset, RasterScan scan, RasterLayout& layout, std::string& found,
+                          const std::function<void(double)>& progress, const std::stop_token& stop) {
+  if (!MayHideVoids(layout.rules, scan.lowest, scan.highest, scan.voids > 0, scan.zeros)) return scan;
+  const auto findings = FindVoids(HeightBand(dataset), layout.rules, scan.zeros, stop);
+  if (!findings) return tl::unexpected(findings.error());
+  if (!findings->any()) return scan;
+  findings->AddTo(layout.rules);
+  found = findings->text;
+  // They were averaged from heights and marks.
+  layout.overview_factors.clear();
+  return ScanRaster(dataset, layout, progress, stop);
+}
+
+Position CentreOf(const Georeference& georeference) {
+  Position centre{georeference.width() / 2.0, georeference.height() / 2.0};
+  georeference.ToDegrees({&centre, 1});
+  return centre;
+}
+
 }  // namespace
 
-Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path,
+Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path, const SourceOptions& options,
                                                          const std::function<void(double)>& progress,
                                                          std::shared_ptr<HandleLimit> handles,
                                                          const std::stop_token& stop) {
@@ -77,7 +103,15 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
   std::unique_ptr<RasterSource> source(
       new RasterSource(path, *std::move(files), *std::move(georeference), std::move(handles)));
   source->layout_ = LayoutOf(**dataset, source->georeference_);
+  std::string found_voids;
+  auto vertical = ResolveVertical(options.vertical, source->georeference_, CentreOf(source->georeference_));
+  if (!vertical) return MakeError(vertical.error().code, "{}: {}", path, vertical.error().message);
+  source->vertical_ = *std::move(vertical);
+  source->layout_.rules.marks = options.nodata;
   auto scan = ScanRaster(**dataset, source->layout_, progress, stop);
+  if (scan && options.find_voids) {
+    scan = Rescan(**dataset, *std::move(scan), source->layout_, found_voids, progress, stop);
+  }
   if (!scan) return MakeError(scan.error().code, "{}: {}", path, scan.error().message);
 
   source->footprint_ = Footprint::Of(source->georeference_);
@@ -85,12 +119,20 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
   source->ranges_ = std::move(scan->table);
   source->edge_row_means_ = scan->edge_row_means;
   source->info_ = Describe(**dataset, path, source->georeference_, source->layout_);
+  source->info_.found_voids = found_voids;
+  source->info_.counts_from = source->vertical_.name;
+  if (source->vertical_.geoid) source->info_.vertical_operation = source->vertical_.geoid->description();
   source->info_.spacing_m = spacing->finer;
   source->info_.bounds = source->footprint_.Bounds();
   source->info_.heights = {scan->lowest, scan->highest};
   source->info_.valid_samples = scan->valid;
   source->info_.void_samples = scan->voids;
   LogWhatMatters(**dataset, source->info_, source->georeference_, source->layout_);
+  LogVertical(path, source->vertical_);
+  if (!found_voids.empty()) {
+    spdlog::warn("{}: voids that it does not declare: {}; `nodata` of the configuration decides otherwise", path,
+                 found_voids);
+  }
   if (auto unchanged = source->CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
   return source;
 }

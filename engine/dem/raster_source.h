@@ -19,6 +19,7 @@
 #include "engine/dem/level_plan.h"
 #include "engine/dem/range_table.h"
 #include "engine/dem/sample_grid.h"
+#include "engine/dem/vertical_datum.h"
 
 namespace terrace::dem {
 
@@ -26,13 +27,15 @@ class RasterSource {
  public:
   // Opens a raster, checks it, and scans it once for its heights. Errors name the file, what is wrong and the remedy.
   // `handles` bounds what this and other rasters keep open; null: nothing does. kCancelled: stopped.
-  static Result<std::unique_ptr<RasterSource>> Open(const std::string& path,
+  static Result<std::unique_ptr<RasterSource>> Open(const std::string& path, const SourceOptions& options = {},
                                                     const std::function<void(double)>& progress = {},
                                                     std::shared_ptr<HandleLimit> handles = nullptr,
                                                     const std::stop_token& stop = {});
 
   const RasterInfo& info() const { return info_; }
   const Georeference& georeference() const { return georeference_; }
+  // What its samples count from; they are not converted here.
+  const VerticalDatum& vertical() const { return vertical_; }
   const RasterLayout& layout() const { return layout_; }
   const Footprint& footprint() const { return footprint_; }
   const SourceSpacing& spacing() const { return spacing_; }
@@ -53,6 +56,7 @@ class RasterSource {
 
   mutable HandlePool handles_;  // thread-safe
   const Georeference georeference_;
+  VerticalDatum vertical_;
   RasterLayout layout_;
   Footprint footprint_;
   SourceSpacing spacing_;

@@ -82,6 +82,9 @@ Result<Sheet> Sheet::Make(SheetPlan plan, const SheetOptions& options) {
   sheet.reach_ = Footprint::Of(sheet.georeference_).Padded();
   sheet.IndexMembers();
   sheet.FindPoleHeights();
+  if (const auto& geoid = sheet.vertical().geoid) {
+    sheet.undulations_ = std::make_shared<const Undulations>(geoid, sheet.reach_);
+  }
   return sheet;
 }
 
@@ -165,12 +168,28 @@ Result<void> Sheet::CheckUnread() const {
 Result<std::vector<float>> Sheet::ReadFilled(int factor, const GridWindow& window, const std::stop_token& stop) const {
   const auto is_void = [](float height) { return std::isnan(height); };
   auto core = ReadBlocks(factor, window, stop);
+  if (!core) return core;
+  const auto voids = static_cast<std::uint64_t>(std::ranges::count_if(*core, is_void));
+  counts_->measured += core->size() - voids;
   const int gap = options_.max_void_gap / factor;
-  if (!core || gap < 2 || std::ranges::none_of(*core, is_void)) return core;
+  if (voids == 0 || gap < 2) {
+    counts_->voids += voids;
+    return core;
+  }
   const GridWindow wide = Grown(window, gap, Columns(factor), Rows(factor));
   auto around = ReadBlocks(factor, wide, stop);
-  if (!around || std::ranges::all_of(*around, is_void)) return core;
-  return FillVoids(*around, wide, window, gap);
+  if (around && !std::ranges::all_of(*around, is_void)) core = FillVoids(*around, wide, window, gap);
+  const auto left = static_cast<std::uint64_t>(std::ranges::count_if(*core, is_void));
+  counts_->filled += voids - left;
+  counts_->voids += left;
+  return core;
+}
+
+std::optional<float> Sheet::PoleHeight(int pole, Counting counting) const {
+  const std::optional<float>& height = pole_heights_[static_cast<std::size_t>(pole)];
+  if (!height || !undulations_ || counting == Counting::kAsSource) return height;
+  const double undulation = undulations_->AtPole(pole);
+  return std::isnan(undulation) ? std::nullopt : std::optional(RoundHeight(*height + undulation));
 }
 
 double Sheet::Feather(int factor) const {
@@ -195,8 +214,8 @@ Result<std::vector<float>> Sheet::ReadWeights(int factor, const GridWindow& wind
   return FeatherWeights(*heights, wide, window, column_step, row_step, feather);
 }
 
-Result<void> Sheet::FillAt(std::span<const Position> positions, int factor, std::span<float> heights,
-                           const std::stop_token& stop, std::span<float> weights) const {
+Result<void> Sheet::FillAt(std::span<const Position> positions, std::span<const double> undulations, int factor,
+                           std::span<float> heights, const std::stop_token& stop, std::span<float> weights) const {
   Cells found = CellsAt(positions, heights, factor);
   if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "reading was stopped");
   if (found.cells.empty()) return CheckUnread();
@@ -210,20 +229,22 @@ Result<void> Sheet::FillAt(std::span<const Position> positions, int factor, std:
     counts = *std::move(read);
   }
   for (std::size_t i = 0; i < found.cells.size(); ++i) {
+    const std::size_t node = found.nodes[i];
     const auto height = Interpolate(*samples, window, found.cells[i]);
-    if (!height) continue;
-    heights[found.nodes[i]] = RoundHeight(*height);
+    // Where the geoid is not known a height means nothing.
+    if (!height || (!undulations.empty() && std::isnan(undulations[node]))) continue;
+    heights[node] = RoundHeight(undulations.empty() ? *height : *height + undulations[node]);
     if (weights.empty()) continue;
     // Every sample has a weight, so this is plain bilinear. What counts nothing would still hide the floor.
     constexpr double kLeast = 0x1p-10;
     const double weight = counts.empty() ? 1 : Interpolate(counts, window, found.cells[i]).value_or(1);
-    weights[found.nodes[i]] = static_cast<float>(std::max(kLeast, std::nearbyint(weight * 1024) / 1024));
+    weights[node] = static_cast<float>(std::max(kLeast, std::nearbyint(weight * 1024) / 1024));
   }
   return {};
 }
 
-Result<void> Sheet::Fill(const geo::Lattice& lattice, const NodeWindow& window, std::span<float> heights,
-                         const std::stop_token& stop, std::span<float> weights) const {
+Result<void> Sheet::Fill(const geo::Lattice& lattice, const NodeWindow& window, Counting counting,
+                         std::span<float> heights, const std::stop_token& stop, std::span<float> weights) const {
   const int factor = AveragingFactor(SamplesPerCell(lattice, spacing_));
   auto positions = NodePositions(georeference_, reach_, lattice, window, kPositionTolerance * factor);
   for (int row = 0; row < window.rows && georeference_.is_geographic_grid(); ++row) {
@@ -232,20 +253,24 @@ Result<void> Sheet::Fill(const geo::Lattice& lattice, const NodeWindow& window, 
     // Where columns are meridians they meet in one value.
     const auto first = static_cast<std::size_t>(row) * static_cast<std::size_t>(window.columns);
     std::fill_n(positions.begin() + static_cast<std::ptrdiff_t>(first), window.columns, kNowhere);
-    if (const auto pole = pole_heights_[global <= 0 ? 0 : 1]) {
+    if (const auto pole = PoleHeight(global <= 0 ? 0 : 1, counting)) {
       std::ranges::replace_if(
           heights.subspan(first, static_cast<std::size_t>(window.columns)),
           [](float height) { return std::isnan(height); }, *pole);
     }
   }
-  return FillAt(positions, factor, heights, stop, weights);
+  std::vector<double> undulations;
+  if (undulations_ && counting == Counting::kEllipsoid) undulations = undulations_->At(lattice, window);
+  return FillAt(positions, undulations, factor, heights, stop, weights);
 }
 
 Result<void> Sheet::Fill(const geo::MercatorGrid& grid, const NodeWindow& window, std::span<float> heights,
                          const std::stop_token& stop, std::span<float> weights) const {
   const int factor = MercatorFactor(grid.depth, spacing_);
-  return FillAt(NodePositions(georeference_, reach_, grid, window, kPositionTolerance * factor), factor, heights, stop,
-                weights);
+  std::vector<double> undulations;
+  if (undulations_) undulations = undulations_->At(grid, window);
+  return FillAt(NodePositions(georeference_, reach_, grid, window, kPositionTolerance * factor), undulations, factor,
+                heights, stop, weights);
 }
 
 }  // namespace terrace::dem

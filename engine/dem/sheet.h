@@ -6,6 +6,7 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <memory>
 #include <optional>
 #include <span>
@@ -17,6 +18,7 @@
 #include "engine/dem/dem_source.h"
 #include "engine/dem/grid_cells.h"
 #include "engine/dem/sheet_members.h"
+#include "engine/dem/undulations.h"
 #include "engine/geo/mercator_grid.h"
 
 namespace terrace::dem {
@@ -25,6 +27,12 @@ namespace terrace::dem {
 struct SheetRange {
   BlockRange blocks;         // min > max: none
   bool shows_others = true;  // part of the tile may lie outside the sheet or in its voids
+};
+
+// What the heights of a sheet are to count from.
+enum class Counting : std::uint8_t {
+  kEllipsoid,
+  kAsSource,  // what its samples count from
 };
 
 struct SheetOptions {
@@ -42,19 +50,26 @@ class Sheet {
   // Padded: outside it there is nothing.
   const Footprint& reach() const { return reach_; }
   // South, north: heights at the poles, of sheets whose columns are meridians and that reach them.
-  const std::array<std::optional<float>, 2>& pole_heights() const { return pole_heights_; }
+  const std::array<std::optional<float>, 2>& pole_heights() const { return pole_heights_; }  // as counted
+  // What its samples count from.
+  const VerticalDatum& vertical() const { return members_.front().raster->vertical(); }
+
+  SampleCounts CountSamples() const { return {counts_->measured, counts_->filled, counts_->voids}; }
+
+  // At least the ellipsoidal heights of all its samples.
+  HeightRange EllipsoidalRange() const;
 
   // These replace the NaN among `heights`, one for each node of the window, by the sheet's heights there, as far as it
   // has some. A height is a function of the node alone. kUnavailable: a raster cannot be read now. kCancelled: stopped.
   // `weights`, if it is not empty, has one for each node: those of the heights that are filled in become what they
   // count beside what lies below, over 0 to 1.
-  Result<void> Fill(const geo::Lattice& lattice, const NodeWindow& window, std::span<float> heights,
+  Result<void> Fill(const geo::Lattice& lattice, const NodeWindow& window, Counting counting, std::span<float> heights,
                     const std::stop_token& stop, std::span<float> weights = {}) const;
   Result<void> Fill(const geo::MercatorGrid& grid, const NodeWindow& window, std::span<float> heights,
                     const std::stop_token& stop, std::span<float> weights = {}) const;
 
   // The same at single points, as measured: nothing is averaged and nothing is filled.
-  Result<void> FillPoints(std::span<const GeoPosition> points, std::span<float> heights,
+  Result<void> FillPoints(std::span<const GeoPosition> points, HeightDatum datum, std::span<float> heights,
                           const std::stop_token& stop) const;
 
   // At least the heights that Fill gives to nodes of the tile, its edges included.
@@ -83,8 +98,10 @@ class Sheet {
   Result<void> Average(int factor, const GridWindow& window, float* out, std::int64_t stride,
                        const std::stop_token& stop) const;
   Result<std::vector<float>> ReadFilled(int factor, const GridWindow& window, const std::stop_token& stop) const;
-  Result<void> FillAt(std::span<const Position> positions, int factor, std::span<float> heights,
-                      const std::stop_token& stop, std::span<float> weights) const;
+  // `undulations`: of the same nodes, added to heights; empty: none are.
+  Result<void> FillAt(std::span<const Position> positions, std::span<const double> undulations, int factor,
+                      std::span<float> heights, const std::stop_token& stop, std::span<float> weights) const;
+  std::optional<float> PoleHeight(int pole, Counting counting) const;  // 0 south, 1 north
   // What each sample of the window counts; empty: all count in full.
   Result<std::vector<float>> ReadWeights(int factor, const GridWindow& window, const std::stop_token& stop) const;
   // Metres: no more than a bounded number of samples.
@@ -94,7 +111,13 @@ class Sheet {
   // Of the pixels in a box; what no member covers counts as void.
   BlockRange Ranges(const Box& pixels) const;
 
+  struct Counts {
+    std::atomic<std::uint64_t> measured{0}, filled{0}, voids{0};
+  };
+
   Georeference georeference_;
+  std::shared_ptr<const Undulations> undulations_;  // null: heights are ellipsoidal, or taken as such
+  std::shared_ptr<Counts> counts_ = std::make_shared<Counts>();
   int width_ = 0, height_ = 0;
   int columns_ = 0;  // of them in use: without the duplicates of a raster that goes all around the Earth
   bool wraps_ = false;

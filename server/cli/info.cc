@@ -10,8 +10,10 @@
 #include <string>
 #include <vector>
 
+#include "config/config.h"
 #include "config/parse.h"
 #include "engine/dem/dem_source.h"
+#include "engine/dem/source_policy.h"
 #include "engine/geo/error_ladder.h"
 #include "server/cli/command.h"
 #include "server/cli/mosaic_info.h"
@@ -28,11 +30,14 @@ std::vector<std::string> AdviceFor(const dem::RasterInfo& info, double floor) {
     advice.push_back(
         fmt::format("no overviews: shallow tiles read the whole raster; run 'gdaladdo -r average {}'", info.path));
   }
-  if (info.vertical_datum.empty()) {
+  if (info.counts_from.empty()) {
     advice.push_back(
         "no vertical datum stated: heights are taken as metres above the WGS 84 ellipsoid as they are; heights above "
-        "mean "
-        "sea level will be off by the geoid, up to 100 m");
+        "mean sea level will be off by the geoid, up to 100 m: say so with --vertical egm96, or another");
+  }
+  if (!info.found_voids.empty()) {
+    advice.push_back(
+        fmt::format("undeclared voids: {}; mend the file, or state `nodata` in the configuration", info.found_voids));
   }
   if (info.void_samples > 0) {
     advice.push_back(
@@ -57,7 +62,11 @@ void PrintText(const dem::DemInfo& dataset) {
                              info.bounds.south, info.bounds.east, info.bounds.north));
   line("heights", fmt::format("{:g} to {:g} m{}", info.heights.min, info.heights.max,
                               info.height_unit.empty() ? "" : ", unit " + info.height_unit));
-  line("datum", info.vertical_datum.empty() ? "not stated" : info.vertical_datum);
+  line("datum", info.counts_from.empty() ? "not stated" : info.counts_from);
+  if (!info.vertical_operation.empty()) {
+    line("converted", fmt::format("by {}: {:.2f} to {:.2f} m above the ellipsoid, or less", info.vertical_operation,
+                                  info.ellipsoidal.min, info.ellipsoidal.max));
+  }
   line("voids", info.void_samples == 0
                     ? "none"
                     : fmt::format("{} samples, {}", info.void_samples,
@@ -80,6 +89,10 @@ nlohmann::json ToJson(const dem::DemInfo& dataset) {
           {"data_type", info.data_type},
           {"crs", info.crs},
           {"vertical_datum", info.vertical_datum},
+          {"counts_from", info.counts_from},
+          {"vertical_operation", info.vertical_operation},
+          {"ellipsoidal_heights", {{"min", info.ellipsoidal.min}, {"max", info.ellipsoidal.max}}},
+          {"found_voids", info.found_voids},
           {"pixel", {{"width", info.pixel_width}, {"height", info.pixel_height}, {"unit", info.pixel_unit}}},
           {"spacing_m", info.spacing_m},
           {"bounds", {info.bounds.west, info.bounds.south, info.bounds.east, info.bounds.north}},
@@ -111,16 +124,17 @@ std::vector<std::vector<config::SourceConfig>> Datasets(const std::vector<std::s
   return datasets;
 }
 
-int Info(const std::vector<std::string>& dems, bool json, bool mosaic) {
+int Info(const std::vector<std::string>& dems, const std::string& vertical, bool json, bool mosaic) {
   spdlog::set_level(spdlog::level::err);  // what opening logs is printed below
+  int exit_code = dem::AllowVrts() ? kExitOk : kExitFailure;
   nlohmann::json all = nlohmann::json::array();
-  int exit_code = kExitOk;
   for (const auto& sources : Datasets(dems, mosaic, exit_code)) {
     const std::string name = NameOf(sources);
     Progress progress("reading " + name, FileCount(sources));
-    dem::DemOptions options;
-    options.progress = progress.Callback();
-    const auto source = dem::DemSource::Open(FilesOf(sources), options);
+    config::DatasetConfig dataset;
+    dataset.sources = sources;
+    dataset.vertical = vertical;
+    const auto source = OpenSource(dataset, progress.Callback());
     if (!source) {
       std::fprintf(stderr, "terrace: %s\n", source.error().message.c_str());
       exit_code = kExitFailure;
@@ -141,6 +155,7 @@ int Info(const std::vector<std::string>& dems, bool json, bool mosaic) {
 
 void AddInfo(CLI::App& app, int& exit_code) {
   auto dems = std::make_shared<std::vector<std::string>>();
+  auto vertical = std::make_shared<std::string>("crs");
   auto json = std::make_shared<bool>(false), mosaic = std::make_shared<bool>(false);
   CLI::App* command =
       app.add_subcommand("info", "Tells what rasters hold, the levels they can serve, and what to mend");
@@ -153,7 +168,12 @@ void AddInfo(CLI::App& app, int& exit_code) {
   command->add_option("DEM", *dems, "Rasters that GDAL can read, or folders of them")->required();
   command->add_flag("--json", *json, "One JSON array instead of text");
   command->add_flag("--mosaic", *mosaic, "Takes all of them for one dataset, the first counting most");
-  command->callback([dems, json, mosaic, &exit_code] { exit_code = Info(*dems, *json, *mosaic); });
+  command
+      ->add_option("--vertical", *vertical,
+                   "What heights count from: crs (as the raster states), unknown, ellipsoid, egm96, egm2008, EPSG:N or "
+                   "the path of a grid")
+      ->type_name("DATUM");
+  command->callback([dems, vertical, json, mosaic, &exit_code] { exit_code = Info(*dems, *vertical, *json, *mosaic); });
 }
 
 }  // namespace terrace::cli

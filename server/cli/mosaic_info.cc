@@ -35,7 +35,7 @@ std::vector<std::string> AdviceFor(const dem::DemInfo& info) {
   const auto count = [&](auto is_so) { return std::ranges::count_if(info.sources, is_so); };
   const auto large =
       count([](const dem::RasterInfo& s) { return std::max(s.width, s.height) > 4096 && s.overview_factors.empty(); });
-  const auto no_datum = count([](const dem::RasterInfo& s) { return s.vertical_datum.empty(); });
+  const auto no_datum = count([](const dem::RasterInfo& s) { return s.counts_from.empty(); });
   const auto voids = count([](const dem::RasterInfo& s) { return s.void_samples > 0; });
   std::vector<std::string> advice;
   if (large > 0) {
@@ -89,6 +89,8 @@ std::string MosaicJson(const std::string& name, const dem::DemInfo& info) {
                        {"height", source.height},
                        {"crs", source.crs},
                        {"vertical_datum", source.vertical_datum},
+                       {"counts_from", source.counts_from},
+                       {"vertical_operation", source.vertical_operation},
                        {"spacing_m", source.spacing_m},
                        {"bounds", {source.bounds.west, source.bounds.south, source.bounds.east, source.bounds.north}},
                        {"void_samples", source.void_samples},

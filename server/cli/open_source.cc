@@ -6,11 +6,26 @@
 
 namespace terrace::cli {
 
-std::vector<dem::DemFile> FilesOf(const std::vector<config::SourceConfig>& sources) {
+namespace {
+
+// What the dataset says and its source does not contradict.
+dem::SourceOptions OptionsOf(const config::DatasetConfig& dataset, const config::SourceConfig& source) {
+  const config::NodataConfig nodata = source.nodata.value_or(dataset.nodata);
+  dem::SourceOptions options;
+  options.vertical = source.vertical.value_or(dataset.vertical);
+  options.find_voids = nodata.detect;
+  options.nodata = nodata.values;
+  return options;
+}
+
+}  // namespace
+
+std::vector<dem::DemFile> FilesOf(const config::DatasetConfig& dataset) {
+  const std::vector<config::SourceConfig>& sources = dataset.sources;
   std::vector<dem::DemFile> files;
   for (std::size_t rank = 0; rank < sources.size(); ++rank) {
     for (const std::string& file : sources[rank].files) {
-      files.push_back({file, static_cast<int>(rank), sources[rank].is_folder});
+      files.push_back({file, static_cast<int>(rank), sources[rank].is_folder, OptionsOf(dataset, sources[rank])});
     }
   }
   return files;
@@ -39,7 +54,7 @@ Result<std::unique_ptr<dem::DemSource>> OpenSource(const config::DatasetConfig& 
   options.max_open_sources = wanted.max_open_sources;
   options.progress = progress;
   options.stop = std::move(stop);
-  return dem::DemSource::Open(FilesOf(wanted.sources), options);
+  return dem::DemSource::Open(FilesOf(wanted), options);
 }
 
 }  // namespace terrace::cli

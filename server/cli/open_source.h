@@ -15,7 +15,7 @@
 namespace terrace::cli {
 
 // All files of the sources, each entry one rank.
-std::vector<dem::DemFile> FilesOf(const std::vector<config::SourceConfig>& sources);
+std::vector<dem::DemFile> FilesOf(const config::DatasetConfig& dataset);
 std::size_t FileCount(const std::vector<config::SourceConfig>& sources);
 
 // For messages: "alps.tif", "alps.tif and 2 more sources".

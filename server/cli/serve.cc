@@ -19,6 +19,7 @@
 #include "config/config.h"
 #include "config/options.h"
 #include "config/parse.h"
+#include "engine/dem/source_policy.h"
 #include "server/cli/command.h"
 #include "server/cli/log.h"
 #include "server/cli/open_layers.h"
@@ -258,6 +259,12 @@ int Serve(const ServeArguments& arguments) {
   if (!disk) {
     std::fprintf(stderr, "terrace: %s\n", disk.error().message.c_str());
     return kExitFailure;
+  }
+  dem::SetGdalCache(config.gdal_cache_bytes);
+  if (const auto policy = dem::SetSourcePolicy({config.data_roots, config.allowed_prefixes, config.allowed_drivers});
+      !policy) {
+    std::fprintf(stderr, "terrace: %s\n", policy.error().message.c_str());
+    return kExitUsage;
   }
   std::vector<server::Dataset> datasets;
   if (!OpenDatasets(config, datasets)) return kExitFailure;

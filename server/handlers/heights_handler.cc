@@ -40,6 +40,12 @@ asio::awaitable<Response> HeightsHandler::Handle(Route route, Request request) c
   if (!dataset) co_return ClientErrorResponse(dataset.error(), request.id);
   Result<HeightsQuery> parsed = Parse(route, request);
   if (!parsed) co_return ClientErrorResponse(parsed.error(), request.id);
+  if (parsed->datum == dem::HeightDatum::kOrthometric && !catalog_->datasets[*dataset].has_datum) {
+    const Error unknown{
+        ErrorCode::kInvalidArgument,
+        "datum: it is not known what this dataset's heights count from, so there are no orthometric ones"};
+    co_return ClientErrorResponse(unknown, request.id);
+  }
 
   const Coding coding = NegotiateCoding(request.accept_encoding);
   Response response;
@@ -57,7 +63,8 @@ asio::awaitable<Response> HeightsHandler::Handle(Route route, Request request) c
   SingleFlight::Work work = [catalog = catalog_, index = *dataset, coding,
                              query](std::stop_token stop) -> Result<EncodedTile> {
     const auto begun = TileService::Clock::now();
-    const Result<std::vector<float>> heights = catalog->read_points(index, query->points, std::move(stop));
+    const Result<std::vector<float>> heights =
+        catalog->read_points(index, query->points, query->datum, std::move(stop));
     if (!heights) return tl::unexpected(heights.error());
     EncodedTile reply;
     reply.times.read = std::chrono::duration_cast<std::chrono::microseconds>(TileService::Clock::now() - begun);
@@ -89,6 +96,7 @@ std::string HeightsJson(const HeightsQuery& query, std::span<const float> height
     if (!query.distances_m.empty()) fmt::format_to(out, ",\"distance\":{}", query.distances_m[i]);
     fmt::format_to(out, ",\"dataset\":{}}}", name);
   }
+  if (query.datum == dem::HeightDatum::kOrthometric) return json + "],\"datum\":\"orthometric\",\"status\":\"OK\"}";
   return json + "],\"status\":\"OK\"}";
 }
 

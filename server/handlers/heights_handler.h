@@ -35,7 +35,7 @@ class HeightsHandler {
 };
 
 // {"results":[{"elevation","location":{"lat","lng"},"dataset"}],"status":"OK"}, as Open Topo Data replies; points of a
-// path have their "distance" as well. Metres; null where there is no height.
+// path have their "distance" as well. Metres; null where there is no height. Orthometric ones say so: "datum".
 std::string HeightsJson(const HeightsQuery& query, std::span<const float> heights, std::string_view dataset);
 
 }  // namespace terrace::server

@@ -6,6 +6,7 @@
 #include <prometheus/registry.h>
 #include <prometheus/text_serializer.h>
 
+#include <algorithm>
 #include <chrono>
 #include <map>
 #include <mutex>
@@ -97,6 +98,24 @@ void AddCaches(const TileService::Stats& tiles, const ByteCacheStats& refinement
             &DiskStoreStats::dropped);
   disk_tier(kGauge, "terrace_cache_on", "1 while a cache reads and writes, 0 while it is switched off",
             &DiskStoreStats::on);
+}
+
+prometheus::MetricFamily Samples(const std::vector<std::pair<std::string, dem::SampleCounts>>& datasets) {
+  prometheus::MetricFamily family;
+  family.name = "terrace_source_samples_total";
+  family.help = "Samples read for tiles: measured, small voids filled from their edges, and voids where others show";
+  family.type = prometheus::MetricType::Counter;
+  for (const auto& [dataset, counts] : datasets) {
+    const auto add = [&family, &name = dataset](const char* kind, std::uint64_t value) {
+      prometheus::ClientMetric& metric = family.metric.emplace_back();
+      metric.label = {{"dataset", name}, {"kind", kind}};
+      metric.counter.value = static_cast<double>(value);
+    };
+    add("measured", counts.measured);
+    add("filled", counts.filled);
+    add("void", counts.voids);
+  }
+  return family;
 }
 
 }  // namespace
@@ -214,7 +233,7 @@ void Metrics::CountBuild(const DatasetView& dataset, const Result<TilePtr>& tile
 }
 
 std::string Metrics::Text(const TileService::Stats& tiles, const ByteCacheStats& refinements,
-                          const ServerState& state) const {
+                          const SourceStats& sources, const ServerState& state) const {
   constexpr auto kCounter = prometheus::MetricType::Counter;
   constexpr auto kGauge = prometheus::MetricType::Gauge;
   std::vector<prometheus::MetricFamily> all = families_->registry.Collect();
@@ -235,6 +254,10 @@ std::string Metrics::Text(const TileService::Stats& tiles, const ByteCacheStats&
   add(kGauge, "terrace_datasets", "Datasets served", state.datasets);
   add(kGauge, "terrace_degraded", "Troubles that /readyz tells of", state.troubles);
   add(kCounter, "terrace_catalogs_total", "How often what is served was replaced", state.catalogs);
+  add(kCounter, "terrace_gdal_errors_total", "Failures that GDAL reported", sources.gdal.errors);
+  add(kCounter, "terrace_gdal_warnings_total", "Warnings that GDAL reported", sources.gdal.warnings);
+  add(kGauge, "terrace_gdal_cache_bytes", "Blocks of sources in GDAL's cache", sources.gdal.cache_bytes);
+  all.push_back(Samples(sources.samples));
   return prometheus::TextSerializer().Serialize(all);
 }
 

@@ -27,7 +27,8 @@ class Metrics {
     std::uint64_t catalogs = 0;  // that have replaced one another
   };
   // Everything counted so far and the state given.
-  std::string Text(const TileService::Stats& tiles, const ByteCacheStats& refinements, const ServerState& state) const;
+  std::string Text(const TileService::Stats& tiles, const ByteCacheStats& refinements, const SourceStats& sources,
+                   const ServerState& state) const;
 
  private:
   struct Families;

@@ -9,6 +9,8 @@
 #include <memory>
 #include <span>
 #include <stop_token>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "engine/core/result.h"
@@ -26,7 +28,13 @@ using TileBuilder = std::function<Result<EncodedTile>(const TileRequest&, std::s
 
 // Heights of a dataset at points, NaN where it has none. Blocking; called on many threads at once.
 using PointReader = std::function<Result<std::vector<float>>(
-    std::uint32_t dataset, std::span<const dem::GeoPosition> points, std::stop_token)>;
+    std::uint32_t dataset, std::span<const dem::GeoPosition> points, dem::HeightDatum, std::stop_token)>;
+
+// What sources were read for: GDAL's numbers since the start, those of datasets, by name, since they were opened.
+struct SourceStats {
+  std::vector<std::pair<std::string, dem::SampleCounts>> samples;
+  dem::GdalCounts gdal;
+};
 
 // Meshes of areas, by the dataset's index: `plan` refuses what is too large, at once and without reading; `build`
 // blocks. Both are called on many threads at once.
@@ -41,6 +49,7 @@ struct Catalog {
   TileBuilder build;
   PointReader read_points;
   AreaMesher area_mesher;
+  std::function<SourceStats()> source_stats = {};  // may be empty
 };
 
 using CatalogPtr = std::shared_ptr<const Catalog>;

@@ -28,6 +28,7 @@ struct DatasetView {
   double west = -180, south = -90, east = 180, north = 90;  // degrees; west > east: across the antimeridian
   double min_height_m = 0, max_height_m = 0;                // of the data
   double floor_m = 0;                                       // height where there is no data
+  bool has_datum = true;                                    // it is known what its heights count from
   std::size_t sources = 1;                                  // rasters that the heights come from
   bool has_water = false;                                   // tiles have a water mask
   std::optional<proto::TextureFormat> texture;  // of GLB tiles, for requests that name none; nothing: no imagery

@@ -20,6 +20,7 @@ DatasetView ViewOf(const Dataset& dataset) {
   view.north = info.bounds.north;
   view.min_height_m = info.heights.min;
   view.max_height_m = info.heights.max;
+  view.has_datum = dataset.source->has_datum();
   view.sources = info.sources.size();
   view.has_water = dataset.water.any();
   if (dataset.imagery.image) view.texture = dataset.imagery.texture;
@@ -35,8 +36,8 @@ CatalogPtr MakeCatalog(std::shared_ptr<const TilePipeline> pipeline, std::size_t
   auto catalog = std::make_shared<Catalog>();
   for (const Dataset& dataset : pipeline->datasets()) catalog->datasets.push_back(ViewOf(dataset));
   catalog->read_points = [pipeline](std::uint32_t dataset, std::span<const dem::GeoPosition> points,
-                                    std::stop_token stop) {
-    return pipeline->datasets()[dataset].source->ReadPoints(points, std::move(stop));
+                                    dem::HeightDatum datum, std::stop_token stop) {
+    return pipeline->datasets()[dataset].source->ReadPoints(points, datum, std::move(stop));
   };
   catalog->area_mesher.plan = [pipeline, max_mesh_samples](std::uint32_t index, const AreaRequest& area) {
     const Dataset& dataset = pipeline->datasets()[index];
@@ -45,6 +46,14 @@ CatalogPtr MakeCatalog(std::shared_ptr<const TilePipeline> pipeline, std::size_t
   catalog->area_mesher.build = [pipeline](std::uint32_t index, const AreaPlan& plan, const AreaRequest& area,
                                           std::stop_token stop) {
     return BuildAreaMesh(*pipeline->datasets()[index].source, plan, area, std::move(stop));
+  };
+  catalog->source_stats = [pipeline] {
+    SourceStats stats;
+    stats.gdal = dem::CountGdalErrors();
+    for (const Dataset& dataset : pipeline->datasets()) {
+      stats.samples.emplace_back(dataset.name, dataset.source->CountSamples());
+    }
+    return stats;
   };
   catalog->build = [pipeline = std::move(pipeline)](const TileRequest& request, std::stop_token stop) {
     return pipeline->Build(request, std::move(stop));

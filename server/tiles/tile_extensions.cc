@@ -11,10 +11,20 @@ namespace {
 
 static_assert(dem::WaterRaster::kSide == proto::kWaterMaskSide);
 
-Result<proto::WaterMask> WaterMaskOf(const WaterRules& water, const proto::LatticeView& lattice,
+// A sea level is in what the source's heights count from: they are read once more where tiles have others.
+Result<proto::WaterMask> SeaMaskOf(const Dataset& dataset, const proto::LatticeView& lattice,
+                                   const std::stop_token& stop) {
+  const double sea_level_m = *dataset.water.sea_level_m;
+  if (!dataset.source->converts()) return proto::Shortest(proto::SeaLevelMask(lattice, sea_level_m));
+  const Result<dem::TileHeights> counted = dataset.source->ReadAsCounted(lattice.key, stop);
+  if (!counted) return tl::unexpected(counted.error());
+  return proto::Shortest(proto::SeaLevelMask({lattice.key, counted->lattice, counted->heights}, sea_level_m));
+}
+
+Result<proto::WaterMask> WaterMaskOf(const Dataset& dataset, const proto::LatticeView& lattice,
                                      const std::stop_token& stop) {
-  if (water.sea_level_m) return proto::Shortest(proto::SeaLevelMask(lattice, *water.sea_level_m));
-  Result<proto::WaterMask> mask = water.mask->Read(lattice.key, stop);
+  if (dataset.water.sea_level_m) return SeaMaskOf(dataset, lattice, stop);
+  Result<proto::WaterMask> mask = dataset.water.mask->Read(lattice.key, stop);
   if (mask) *mask = proto::Shortest(*std::move(mask));
   return mask;
 }
@@ -30,7 +40,7 @@ Result<proto::QuantizedMeshOptions> AddExtensions(const Dataset& dataset, const 
   options.metadata = request.metadata &&
                      proto::CarriesMetadata(request.key.level, dataset.metadata_levels, dataset.source->max_level());
   if (options.water_mask) {
-    Result<proto::WaterMask> mask = WaterMaskOf(dataset.water, lattice, stop);
+    Result<proto::WaterMask> mask = WaterMaskOf(dataset, lattice, stop);
     if (!mask) return tl::unexpected(std::move(mask).error());
     tile.water_mask = *std::move(mask);
   }

@@ -30,7 +30,8 @@ TEST(ToJson, ComesBackWithEveryOptionSet) {
   config.listen = {"2001:db8::1", 0};
   DatasetConfig dataset{"a",
                         {"/data/a.tif"},
-                        VerticalDatum::kUnknown,
+                        "egm96",
+                        NodataConfig{false, {-9999, 0.5}},
                         "© \"ét\\é\"",
                         0.1,
                         1e-3,
@@ -40,6 +41,8 @@ TEST(ToJson, ComesBackWithEveryOptionSet) {
                         9,
                         Criterion::kDataDependent,
                         true};
+  dataset.sources.front().vertical = "EPSG:5703";
+  dataset.sources.front().nodata = NodataConfig{false, {}};
   dataset.water.sea_level = -1.25;
   dataset.metadata_availability = 7;
   dataset.is_public = true;
@@ -54,6 +57,10 @@ TEST(ToJson, ComesBackWithEveryOptionSet) {
   config.cache_bytes = std::size_t{1} << 40;
   config.refinement_cache_bytes = 12'345'678;
   config.disk_cache = {"/srv/cache", std::size_t{1} << 40, 0};
+  config.gdal_cache_bytes = 1'000'000;
+  config.data_roots = {"/data", "/srv/dems"};
+  config.allowed_prefixes = {"/vsis3/bucket/"};
+  config.allowed_drivers = {"GTiff", "VRT"};
   config.max_connections = 7;
   config.max_connections_per_client = 3;
   config.transfer_bytes = 5;
@@ -91,6 +98,9 @@ TEST(ToJson, NamesEveryOption) {
   config.disk_cache.directory = "/srv/cache";
   config.datasets = {dataset};
   config.tls = {"/etc/server.pem", "/etc/server.key"};
+  config.data_roots = {"/data"};
+  config.allowed_prefixes = {"/vsis3/bucket/"};
+  config.allowed_drivers = {"GTiff"};
   const Json json = Json::parse(ToJson(config));
   EXPECT_EQ(json.size(), ServerOptionTable().size());
   EXPECT_EQ(json.at("datasets").at(0).size(), DatasetOptionTable().size());

@@ -21,7 +21,7 @@ class HeightsTest : public ServerFixture {
  protected:
   // Heights are latitude + 1000 * longitude.
   void StartHeights(ServerOptions options = {}) {
-    read_points_ = [this](std::uint32_t, std::span<const dem::GeoPosition> points,
+    read_points_ = [this](std::uint32_t, std::span<const dem::GeoPosition> points, dem::HeightDatum datum,
                           std::stop_token stop) -> Result<std::vector<float>> {
       ++reads_;
       const auto until = std::chrono::steady_clock::now() + std::chrono::milliseconds(read_ms_);
@@ -30,7 +30,10 @@ class HeightsTest : public ServerFixture {
         std::this_thread::sleep_for(1ms);
       }
       std::vector<float> heights;
-      for (const auto& p : points) heights.push_back(static_cast<float>(p.latitude + 1000 * p.longitude));
+      const double undulation = datum == dem::HeightDatum::kOrthometric ? 50 : 0;
+      for (const auto& p : points) {
+        heights.push_back(static_cast<float>(p.latitude + 1000 * p.longitude - undulation));
+      }
       return heights;
     };
     Start(std::move(options));

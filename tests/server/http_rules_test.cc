@@ -202,7 +202,7 @@ std::vector<Rule> Conditions() {
 class HttpRules : public ServerFixture {
  protected:
   HttpRules() {
-    options_.read_points = [](std::uint32_t, std::span<const dem::GeoPosition> points, std::stop_token) {
+    read_points_ = [](std::uint32_t, std::span<const dem::GeoPosition> points, dem::HeightDatum, std::stop_token) {
       return Result<std::vector<float>>(std::vector<float>(points.size(), 1.0f));
     };
   }

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <span>
 
+#include "engine/dem/geoid.h"
 #include "engine/geo/mercator_grid.h"
 #include "tests/engine/dem/dem_fixture.h"
 
@@ -352,6 +353,42 @@ TEST(Mosaic, NeighboursShareTheirBordersAcrossSources) {
           ASSERT_EQ(std::bit_cast<std::uint32_t>(tile->At(n + i, j)), std::bit_cast<std::uint32_t>(right->At(i, j)))
               << geo::ToString(key);
         }
+      }
+    }
+  }
+}
+
+TEST(Mosaic, FeatherBlendsWhatIsConverted) {
+  const TempDir dir;
+  const std::string over = WriteRaster(dir, Flat(10, 50, 200, 0.01, 100), "over.tif");
+  const std::string base = WriteRaster(dir, Flat(0, 60, 30, 1, 300), "base.tif");
+  const DemOptions options{.feather = 20'000};
+  const auto raw = OpenAll({{over, 0}, {base, 1}}, options);
+  const auto mixed = OpenAll(
+      {{over, 0, false, SourceOptions{.vertical = "egm96"}}, {base, 1, false, SourceOptions{.vertical = "ellipsoid"}}},
+      options);
+  ASSERT_TRUE(raw && mixed);
+  EXPECT_TRUE(mixed->has_datum());
+  const int level = mixed->max_level();
+  int blended = 0;
+  for (double inside = -0.05; inside < 0.3; inside += 0.01) {
+    const double latitude = 50 - inside, before = NodeAt(*raw, level, 11, latitude);
+    const double share = (300 - before) / 200;
+    const double undulation = (*Geoid::OfCrs("EPSG:5773", {11, latitude}))->Undulation({11, latitude});
+    ASSERT_GT(undulation, 30);
+    // The node is the one nearest to the position.
+    EXPECT_NEAR(NodeAt(*mixed, level, 11, latitude), before + share * undulation, 0.05) << inside;
+    blended += share > 0.1 && share < 0.9;
+  }
+  EXPECT_GT(blended, 5);
+  for (const geo::TileKey& key : SomeTiles(*mixed, 8, 6)) {
+    const auto tile = mixed->Read(key);
+    ASSERT_TRUE(tile);
+    const HeightRange bound = mixed->RangeBound(key);
+    for (int j = 0; j <= tile->lattice.cells; ++j) {
+      for (int i = 0; i <= tile->lattice.cells; ++i) {
+        ASSERT_GE(tile->At(i, j), bound.min) << geo::ToString(key);
+        ASSERT_LE(tile->At(i, j), bound.max) << geo::ToString(key);
       }
     }
   }

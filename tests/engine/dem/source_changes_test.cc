@@ -1,6 +1,7 @@
 // A source that changed under the server gives an error, never a flat or a mixed tile.
 #include <fstream>
 
+#include "engine/dem/source_policy.h"
 #include "tests/engine/dem/dem_fixture.h"
 
 namespace terrace::dem {
@@ -49,11 +50,13 @@ TEST(SourceChanges, ChangedPartOfAMosaicIsTold) {
     <GeoTransform>0, 1, 0, 0, 0, -1</GeoTransform><VRTRasterBand dataType="Float32" band="1">
     <SimpleSource><SourceFilename relativeToVRT="1">part.tif</SourceFilename><SourceBand>1</SourceBand></SimpleSource>
     </VRTRasterBand></VRTDataset>)";
+  ASSERT_TRUE(SetSourcePolicy({.drivers = {"VRT", "GTiff"}}));
   const auto source = OpenOrFail(dir.File("dem.vrt"));
   ASSERT_NE(source, nullptr);
   ASSERT_TRUE(source->Read(kInside));
   std::filesystem::remove(part);
   const auto tile = source->Read(kInside);
+  ASSERT_TRUE(SetSourcePolicy({}));
   ASSERT_FALSE(tile);
   EXPECT_EQ(tile.error().code, ErrorCode::kChanged);
 }

@@ -60,7 +60,7 @@ class ReloaderTest : public testing::Test {
       return MakeError(ErrorCode::kCancelled, "stopped");
     }
     if (fails_) return MakeError(ErrorCode::kInvalidArgument, "no raster");
-    auto source = dem::DemSource::Open(wanted.sources.front(), {});
+    auto source = dem::DemSource::Open(wanted.sources.front().files.front(), {});
     if (!source) return tl::unexpected(source.error());
     Dataset dataset;
     dataset.name = wanted.name;
