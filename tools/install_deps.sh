@@ -17,7 +17,7 @@ build_packages=(
 )
 runtime_packages=(
   ca-certificates libgdal32 libproj25 libspdlog1.10 libfmt9 libprometheus-cpp-core1.0 libssl3 libdeflate0 libbrotli1 libzstd1
-  libxxhash0 libhwy1 libdraco7 libmeshoptimizer2d libjpeg62-turbo libwebp7 libsystemd0
+  libxxhash0 librocksdb7.8 libhwy1 libdraco7 libmeshoptimizer2d libjpeg62-turbo libwebp7 libsystemd0
 )
 test_packages=(
   libgtest-dev libgmock-dev libbenchmark-dev zlib1g-dev libpng-dev chromium python3-jsonschema strace wrk proj-bin

@@ -1,4 +1,5 @@
-// A configuration file of arbitrary bytes: refused with reasons that point into it, or read, written and read to the same.
+// A configuration file of arbitrary bytes: refused with reasons that point into it, or read, written and read to the
+// same.
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>

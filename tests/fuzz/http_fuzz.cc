@@ -1,5 +1,6 @@
-// The bytes of a connection, sent in three pieces: the server reads them as a plain second reader does, however they are
-// cut, and ends. That reader knows nothing but where messages end: two of them that disagree are a smuggled request.
+// The bytes of a connection, sent in three pieces: the server reads them as a plain second reader does, however they
+// are cut, and ends. That reader knows nothing but where messages end: two of them that disagree are a smuggled
+// request.
 #include <sys/socket.h>
 #include <unistd.h>
 

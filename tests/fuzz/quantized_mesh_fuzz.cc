@@ -1,5 +1,5 @@
-// The tests' decoder of quantized-mesh on arbitrary bytes: refused, or a mesh whose indices have vertices. The tests lean
-// on it, so it must neither read past the end nor take what is no tile.
+// The tests' decoder of quantized-mesh on arbitrary bytes: refused, or a mesh whose indices have vertices. The tests
+// lean on it, so it must neither read past the end nor take what is no tile.
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -14,8 +14,8 @@ namespace terrace::fuzz {
 namespace {
 
 const std::string& SoundTile() {
-  static const auto* const tile = new std::string(
-      proto::EncodeQuantizedMesh(proto::GridTile({3, 5, 4}, 3, 2, -20, 900, proto::Rugged()), {}));
+  static const auto* const tile =
+      new std::string(proto::EncodeQuantizedMesh(proto::GridTile({3, 5, 4}, 3, 2, -20, 900, proto::Rugged()), {}));
   return *tile;
 }
 
@@ -50,8 +50,8 @@ void Run(FuzzInput& input) {
   for (const auto& extension : tile->extensions) extensions += 5 + extension.bytes.size();
   // Every byte is accounted for: 92 of the header with its count, but for what aligns the indices.
   const std::size_t width = vertices > 65536 ? 4 : 2;
-  const std::size_t indices = 3 * tile->triangles.size() + tile->west.size() + tile->south.size() + tile->east.size() +
-                              tile->north.size();
+  const std::size_t indices =
+      3 * tile->triangles.size() + tile->west.size() + tile->south.size() + tile->east.size() + tile->north.size();
   const std::size_t known = 92 + 6 * vertices + 5 * 4 + width * indices + extensions;
   TERRACE_CHECK(known <= bytes.size() && bytes.size() < known + width);
 }

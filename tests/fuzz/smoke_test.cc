@@ -66,7 +66,8 @@ class Mutator {
         if (left > 0) *place ^= static_cast<std::uint8_t>(1u << Below(8));
         break;
       case 1: {
-        constexpr std::uint8_t kTelling[] = {0, 1, 0x7f, 0x80, 0xff, '\n', '\r', ' ', '%', '&', '/', '"', '9', '-', '.'};
+        constexpr std::uint8_t kTelling[] = {0,   1,   0x7f, 0x80, 0xff, '\n', '\r', ' ',
+                                             '%', '&', '/',  '"',  '9',  '-',  '.'};
         if (left > 0) *place = kTelling[Below(std::size(kTelling))];
         break;
       }
