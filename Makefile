@@ -37,12 +37,12 @@ coverage: test-deps  ## build with counters, run the tests, print which lines of
 
 reliability: test-deps  ## try on the real binary what docs/reliability.md promises about clients; a few minutes
 	cmake --preset release -DTERRACE_BUILD_TESTS=ON --log-level=WARNING
-	cmake --build build/release -j $(JOBS) --target terrace server_test
+	cmake --build build/release -j $(JOBS) --target terrace reliability_tests
 	@tests/reliability/run.py
 
 reliability-long: test-deps  ## the same, each row as often as the scorecard says
 	cmake --preset release -DTERRACE_BUILD_TESTS=ON --log-level=WARNING
-	cmake --build build/release -j $(JOBS) --target terrace server_test
+	cmake --build build/release -j $(JOBS) --target terrace reliability_tests
 	@tests/reliability/run.py --long
 
 bench: test-deps  ## build and run the benchmarks; JSON results in build/bench/results

@@ -101,6 +101,7 @@ TEST(FuzzTarget, KeepsItsPromisesOnRandomInputs) {
   const std::vector<Bytes> corpus = Corpus();
   Mutator mutator(corpus);
   for (int run = 0; run < TERRACE_FUZZ_RUNS; ++run) Try(mutator.Next());
+  RecordProperty("runs", TERRACE_FUZZ_RUNS);
 }
 
 }  // namespace
