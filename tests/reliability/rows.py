@@ -3,6 +3,7 @@ import itertools
 import json
 import math
 import os
+import pathlib
 import random
 import re
 import signal
@@ -395,6 +396,20 @@ def reset_one(server, target):
     connection.close()
 
 
+def end_to_end(binary, script, *names, long=False):
+    """Runs some of a script's tests: (all passed, what they printed with figures in it)."""
+    root = pathlib.Path(__file__).resolve().parents[2]
+    options = [part for name in names for part in ("-k", name)]
+    done = subprocess.run([sys.executable, root / "tests/e2e" / script, binary, root, *options], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+                          env=os.environ | ({"TERRACE_LONG_TESTS": "1"} if long else {}), check=False)
+    lines = [line.lstrip(".") for line in done.stderr.splitlines() if re.search(r": .*\d|seen after", line)]
+    return done.returncode == 0, "; ".join(lines) if done.returncode == 0 else done.stderr.strip().splitlines()[-1]
+
+
+def row_24(binary, _, long):
+    return end_to_end(binary, "disk_cache_test.py", "kill_9_under_load", long=long)
+
+
 def row_26(_, test_binary, __):
     kept, _, _, _ = tests(binary_of(test_binary, "tiles/server_tiles_test"), "Seal.*:TileRecord.RefusesEveryOtherLength")
     stores, count, _, _ = tests(binary_of(test_binary, "tiles/disk_store_test"), "DamagedStoreTest.*")
@@ -404,6 +419,14 @@ def row_26(_, test_binary, __):
 def row_27(_, test_binary, __):
     kept, count, _, failed = tests(binary_of(test_binary, "tiles/disk_store_test"), "FailingDiskTest.*")
     return kept, f"{count} tests: nth read and write fail, once and for good, until clean" + (f", failed: {failed}" if failed else "")
+
+
+def row_28(binary, _, long):
+    return end_to_end(binary, "disk_cache_test.py", "full_disk", long=long)
+
+
+def row_30(binary, _, long):
+    return end_to_end(binary, "reload_test.py", "no_answer_mixes", "seen_soon", long=long)
 
 
 def row_31(binary, _, __):
