@@ -114,15 +114,17 @@ void TryHeaders(const std::string& text) {
       {AddressRanges::Parse({"0.0.0.0/0", "::/0"}).value(), ForwardedHeader::kForwarded}};
   for (const Proxies& proxies : kProxies) {
     Request request;
-    request.forwarded = request.forwarded_for = request.forwarded_host = request.forwarded_proto = text;
+    RequestFields fields;
+    fields.forwarded = fields.forwarded_for = fields.forwarded_host = fields.forwarded_proto = text;
+    request.fields = SharedFields(fields);
     const auto client = ResolveClient(request, asio::ip::make_address("10.1.2.3"), proxies);
     TERRACE_CHECK(!ClientBlock(client).empty());
-    TERRACE_CHECK(IsHostValue(request.host));
+    TERRACE_CHECK(IsHostValue(request.fields->host));
     Request stranger = request;
-    stranger.host = "a";
+    stranger.fields.Set(&RequestFields::host, "a");
     const auto peer = asio::ip::make_address("2001:db8::1");
     if (proxies.header == ForwardedHeader::kXForwarded) {
-      TERRACE_CHECK(ResolveClient(stranger, peer, proxies) == peer && stranger.host == "a");
+      TERRACE_CHECK(ResolveClient(stranger, peer, proxies) == peer && stranger.fields->host == "a");
     }
   }
   (void)AddressRanges::Parse({text});

@@ -34,9 +34,13 @@ HEADERS = {
     "forwarded": 'for="[2001:db8::17]:4711";proto=https;host="a.example:8443", for=192.0.2.60;by=_x', "host": "maps.example:443, evil", "escaped": 'for="a\\"b\\\\";host=a;;host=b',
 }
 GET = b"GET /livez HTTP/1.1\r\nHost: a\r\n\r\n"
+SAME = b" HTTP/1.1\r\nHost: a\r\nAccept: */*\r\n\r\n"  # a header that is repeated
 HTTP = {
     "get": GET, "pipeline": GET * 3, "blank": b"\r\n\r\n" + GET, "http10": b"GET / HTTP/1.0\r\n\r\n", "alive10": b"GET / HTTP/1.0\r\nConnection: keep-alive\r\n\r\n" + GET,
-    "close": b"GET / HTTP/1.1\r\nHost: a\r\nConnection: close\r\n\r\n" + GET, "head": b"HEAD /datasets HTTP/1.1\r\nhost:a\r\nAccept: a\r\nAccept: b\r\nIf-None-Match: \"x\"\r\n\r\n",
+    "repeated": b"GET /a?token=x" + SAME + b"GET /b" + SAME + b"HEAD /c?d=%20" + SAME + b"GET /\x80" + SAME, "repeated-odd": b"GET /a" + SAME + b"GET  /b" + SAME,
+    "repeated-form": b"GET /a" + SAME + b"GET http://a/b" + SAME + b"OPTIONS *" + SAME, "repeated-mark": b"GET /a" + SAME + b"GET /\"<>^`{|}\\#" + SAME,
+    "repeated-close": b"GET /a HTTP/1.1\r\nHost: a\r\nConnection: close\r\n\r\n" * 2, "repeated-tail": b"GET /a" + SAME + b"GET /b HTTP/1.1\r\nX: y HTTP/1.1\r\nHost: a\r\nAccept: */*\r\n\r\n",
+    "repeated-post": b"GET /a" + SAME + b"POST /b" + SAME + b"GET /c HTTP/1.0" + SAME[9:], "close": b"GET / HTTP/1.1\r\nHost: a\r\nConnection: close\r\n\r\n" + GET, "head": b"HEAD /datasets HTTP/1.1\r\nhost:a\r\nAccept: a\r\nAccept: b\r\nIf-None-Match: \"x\"\r\n\r\n",
     "post": b"POST /earth/heights HTTP/1.1\r\nHost: a\r\nContent-Type: application/json\r\nContent-Length: 20\r\n\r\n{\"locations\": \"1,2\"}" + GET,
     "expect": b"POST /earth/heights HTTP/1.1\r\nHost: a\r\nExpect: 100-continue\r\nContent-Length: 3\r\n\r\nabc", "zero": b"POST / HTTP/1.1\r\nHost: a\r\nContent-Length: 0\r\n\r\n" + GET,
     "chunked": b"GET / HTTP/1.1\r\nHost: a\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n\r\n" + GET, "te-gzip": b"GET / HTTP/1.1\r\nHost: a\r\nTransfer-Encoding: gzip\r\n\r\n" + GET,
