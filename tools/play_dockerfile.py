@@ -1,7 +1,10 @@
 #!/usr/bin/env python3
 """Plays docker/Dockerfile where no container engine runs: each stage in a copy of a bare Debian root, by chroot.
 
-    sudo tools/play_dockerfile.py BASE FOLDER       BASE: a tar of the image that FROM names, or of a debootstrap root
+    sudo tools/play_dockerfile.py BASE FOLDER [--built PREFIX]
+                       BASE: a tar of the image that FROM names, or of a debootstrap root
+
+With --built the stage that compiles is left out: what it installs is taken from PREFIX (cmake --install build/release --prefix).
 
 Knows what the Dockerfile uses: FROM, WORKDIR, COPY, RUN, USER, ENTRYPOINT, CMD, HEALTHCHECK; others are an error. Leaves the
 last stage in FOLDER/final. Then starts ENTRYPOINT with CMD as USER, waits until HEALTHCHECK passes, fetches a tile, and ends it
@@ -70,15 +73,20 @@ def copy(source_root, root, workdir, rest):
             shutil.copy2(path, where)
 
 
-def play(base, folder):
+def play(base, folder, built):
     files = context()
-    stages, image = {}, {}
+    stages, image = ({"build": built} if built else {}), {}
+    skipped = False
     root, workdir = None, "/"
     for word, rest in instructions((ROOT / "docker/Dockerfile").read_text()):
+        name = rest.split()[2] if " AS " in rest.upper() else "final"
+        if word == "FROM":
+            skipped = name in stages
+        if skipped:
+            continue
         print(f"+ {word} {rest}", flush=True)
         begun = time.monotonic()
         if word == "FROM":
-            name = rest.split()[2] if " AS " in rest.upper() else "final"
             root, workdir, image = folder / name, "/", {}
             shutil.rmtree(root, ignore_errors=True)
             root.mkdir(parents=True)
@@ -92,6 +100,8 @@ def play(base, folder):
             if rest.startswith("--from="):
                 stage, _, rest = rest[len("--from="):].partition(" ")
                 source = stages[stage]
+                if built:  # holds what the stage would have below /opt/terrace
+                    rest = rest.replace("/opt/terrace", "/", 1)
             copy(source, root, workdir, rest)
         elif word == "RUN":
             subprocess.run(inside(root, ["/bin/sh", "-c", rest], workdir=workdir), check=True, stdin=subprocess.DEVNULL)
@@ -139,8 +149,10 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("base", type=pathlib.Path)
     parser.add_argument("folder", type=pathlib.Path)
+    parser.add_argument("--built", type=pathlib.Path)
     arguments = parser.parse_args()
-    smoke(*play(arguments.base.resolve(), arguments.folder.resolve()))
+    built = arguments.built and arguments.built.resolve()
+    smoke(*play(arguments.base.resolve(), arguments.folder.resolve(), built))
 
 
 if __name__ == "__main__":
