@@ -1,6 +1,5 @@
 #include "engine/dem/dem_source.h"
 
-#include <spdlog/spdlog.h>
 #include <xxhash.h>
 
 #include <algorithm>
@@ -9,9 +8,9 @@
 #include "engine/core/bytes.h"
 #include "engine/core/check.h"
 #include "engine/dem/dem_impl.h"
-#include "engine/dem/gdal_runtime.h"
-#include "engine/dem/raster_file.h"
-#include "engine/dem/raster_scan.h"
+#include "engine/dem/footprint.h"
+#include "engine/dem/level_plan.h"
+#include "engine/dem/raster_source.h"
 
 namespace terrace::dem {
 namespace {
@@ -36,17 +35,6 @@ Result<void> CheckOptions(const DemOptions& options) {
   return {};
 }
 
-RasterLayout LayoutOf(GDALDataset& dataset, const Georeference& georeference) {
-  RasterLayout layout;
-  layout.width = georeference.width();
-  layout.height = georeference.height();
-  layout.wraps = georeference.wrap_columns() > 0;
-  layout.columns = layout.wraps ? georeference.wrap_columns() : layout.width;
-  layout.rules = SampleRules::Of(HeightBand(dataset), georeference.vertical_unit());
-  layout.overview_factors = OverviewFactors(HeightBand(dataset));
-  return layout;
-}
-
 std::uint64_t FingerprintOf(const StampedFiles& files, const DemOptions& options, double floor) {
   // Changes whenever the same file and options would give other heights than before.
   constexpr std::uint32_t kResamplingVersion = 1;
@@ -63,57 +51,6 @@ std::uint64_t FingerprintOf(const StampedFiles& files, const DemOptions& options
   return XXH3_64bits(bytes.data(), bytes.size());
 }
 
-// Heights at the poles of a geographic source whose first or last row holds them.
-std::array<std::optional<float>, 2> PoleHeights(const Georeference& georeference, const RasterScan& scan) {
-  std::array<std::optional<float>, 2> heights;
-  if (!georeference.is_geographic_grid()) return heights;
-  for (const int pole : {0, 1}) {
-    Position position{0, pole == 0 ? -90.0 : 90.0};
-    georeference.ToPixels({&position, 1});
-    constexpr double kEdgeTolerance = 1e-6;
-    if (!(position.y >= -kEdgeTolerance && position.y <= georeference.height() + kEdgeTolerance)) continue;
-    const auto& mean = scan.edge_row_means[position.y < georeference.height() / 2.0 ? 0 : 1];
-    if (mean) heights[static_cast<std::size_t>(pole)] = RoundHeight(*mean);
-  }
-  return heights;
-}
-
-DemInfo Describe(GDALDataset& dataset, const std::string& path, const Georeference& georeference,
-                 const RasterLayout& layout) {
-  DemInfo info;
-  info.path = path;
-  info.driver = dataset.GetDriverName();
-  info.width = layout.width;
-  info.height = layout.height;
-  info.data_type = GDALGetDataTypeName(HeightBand(dataset).GetRasterDataType());
-  info.crs = georeference.crs();
-  info.vertical_datum = georeference.vertical_datum();
-  info.height_unit = layout.rules.unit;
-  info.pixel_width = georeference.pixel_width();
-  info.pixel_height = georeference.pixel_height();
-  info.pixel_unit = georeference.pixel_unit();
-  info.nodata = layout.rules.nodata;
-  info.overview_factors = layout.overview_factors;
-  info.transform = georeference.transform();
-  return info;
-}
-
-void LogWhatMatters(GDALDataset& dataset, const DemInfo& info, const Georeference& georeference,
-                    const RasterLayout& layout) {
-  if (dataset.GetRasterCount() > 1) {
-    spdlog::info("{}: has {} bands, heights are read from band 1", info.path, dataset.GetRasterCount());
-  }
-  if (!MetresPerUnit(layout.rules.unit)) {
-    spdlog::warn("{}: height unit \"{}\" is not known, heights are taken as metres", info.path, layout.rules.unit);
-  }
-  if (info.vertical_datum.empty()) {
-    spdlog::warn("{}: no vertical datum stated, heights pass through as given", info.path);
-  }
-  if (!info.transform.empty()) {
-    spdlog::info("{}: placed by PROJ operation \"{}\": {}", info.path, info.transform, georeference.pipeline());
-  }
-}
-
 }  // namespace
 
 DemSource::DemSource(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -122,46 +59,28 @@ DemSource::~DemSource() = default;
 Result<std::unique_ptr<DemSource>> DemSource::Open(const std::string& path, const DemOptions& options) {
   if (auto checked = CheckOptions(options); !checked)
     return MakeError(checked.error().code, "{}: {}", path, checked.error().message);
-  auto dataset = OpenRaster(path);
-  if (!dataset) return tl::unexpected(dataset.error());
-  auto georeference = Georeference::Of(**dataset, path);
-  if (!georeference) return tl::unexpected(georeference.error());
-  const auto spacing = SourceSpacing::Of(*georeference, path);
-  if (!spacing) return tl::unexpected(spacing.error());
+  auto opened = RasterSource::Open(path, options.progress);
+  if (!opened) return tl::unexpected(opened.error());
+  const std::shared_ptr<const RasterSource> raster = *std::move(opened);
 
-  auto impl = std::make_unique<Impl>(path, StampedFiles(FilesOf(**dataset, path)), *std::move(georeference));
-  impl->layout = LayoutOf(**dataset, impl->georeference);
-  auto scan = ScanRaster(**dataset, impl->layout, options.progress);
-  if (!scan) return MakeError(scan.error().code, "{}: {}", path, scan.error().message);
-
-  impl->info = Describe(**dataset, path, impl->georeference, impl->layout);
-  const Footprint footprint = Footprint::Of(impl->georeference);
-  impl->footprint = footprint.Padded();
-  impl->levels = PlanLevels(*spacing);
-  impl->mercator_factors = MercatorFactors(*spacing);
-  impl->info.max_mercator_depth = DeepestMercator(*spacing);
-  impl->info.max_level = DeepestLevel(*spacing, options.error_fraction, options.finest_error);
-  impl->available = TilesTouching(footprint, impl->info.max_level);
-  impl->table = std::move(scan->table);
-  impl->floor = RoundHeight(options.floor.value_or(scan->lowest));
-  impl->max_void_gap = options.max_void_gap;
-  impl->pole_heights = PoleHeights(impl->georeference, *scan);
-  impl->fingerprint = FingerprintOf(impl->handles.files(), options, impl->floor);
-
-  impl->info.spacing_m = spacing->finer;
-  impl->info.bounds = footprint.Bounds();
-  impl->info.heights = {scan->lowest, scan->highest};
-  impl->info.valid_samples = scan->valid;
-  impl->info.void_samples = scan->voids;
+  auto impl = std::make_unique<Impl>();
+  impl->sheets.emplace_back(raster, options.max_void_gap);
+  impl->lattices = PlanLattices(raster->spacing());
+  impl->info.sources = {raster->info()};
+  impl->info.bounds = raster->info().bounds;
+  impl->info.heights = raster->info().heights;
+  impl->info.max_mercator_depth = DeepestMercator(raster->spacing());
+  impl->info.max_level = DeepestLevel(raster->spacing(), options.error_fraction, options.finest_error);
+  impl->available = TilesTouching(raster->footprint(), impl->info.max_level);
+  impl->floor = RoundHeight(options.floor.value_or(impl->info.heights.min));
   impl->info.floor = impl->floor;
-  LogWhatMatters(**dataset, impl->info, impl->georeference, impl->layout);
-  if (auto unchanged = impl->handles.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
+  impl->fingerprint = FingerprintOf(raster->files(), options, impl->floor);
   return std::unique_ptr<DemSource>(new DemSource(std::move(impl)));
 }
 
 const DemInfo& DemSource::info() const { return impl_->info; }
 int DemSource::max_level() const { return impl_->info.max_level; }
-geo::Lattice DemSource::LatticeOf(int level) const { return impl_->Plan(level).lattice; }
+geo::Lattice DemSource::LatticeOf(int level) const { return impl_->LatticeOf(level); }
 std::uint64_t DemSource::fingerprint() const { return impl_->fingerprint; }
 
 const std::vector<geo::TileRange>& DemSource::Available(int level) const {

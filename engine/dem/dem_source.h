@@ -53,8 +53,8 @@ struct NodeWindow {
   int columns = 0, rows = 0;
 };
 
-// What `terrace info` prints and `/datasets` tells.
-struct DemInfo {
+// What `terrace info` prints of one raster.
+struct RasterInfo {
   std::string path;
   std::string driver;  // GDAL's short name: "GTiff"
   std::int64_t width = 0, height = 0;
@@ -71,6 +71,13 @@ struct DemInfo {
   std::optional<double> nodata;
   std::vector<int> overview_factors;
   std::string transform;  // the PROJ operation from EPSG:4326 to the source, for the log; empty: none needed
+};
+
+// What `terrace info` prints and `/datasets` tells of a dataset.
+struct DemInfo {
+  std::vector<RasterInfo> sources;  // the first that has a height at a place gives it
+  GeoBounds bounds;
+  HeightRange heights;  // of all valid samples
   double floor = 0;
   int max_level = 0;
   int max_mercator_depth = 1;

@@ -96,13 +96,10 @@ int AveragingFactor(double samples_per_cell) {
   return 1 << static_cast<int>(std::lround(std::clamp(std::log2(samples_per_cell), 0.0, kMost)));
 }
 
-std::vector<LevelPlan> PlanLevels(const SourceSpacing& spacing) {
-  std::vector<LevelPlan> levels;
-  for (int level = 0; level <= geo::kMaxLevel; ++level) {
-    const geo::Lattice lattice{level, CellsOf(level, spacing)};
-    levels.push_back({lattice, AveragingFactor(SamplesPerCell(lattice, spacing))});
-  }
-  return levels;
+std::vector<geo::Lattice> PlanLattices(const SourceSpacing& finest) {
+  std::vector<geo::Lattice> lattices;
+  for (int level = 0; level <= geo::kMaxLevel; ++level) lattices.push_back({level, CellsOf(level, finest)});
+  return lattices;
 }
 
 int DeepestMercator(const SourceSpacing& spacing) {
@@ -112,13 +109,9 @@ int DeepestMercator(const SourceSpacing& spacing) {
   return depth;
 }
 
-std::vector<int> MercatorFactors(const SourceSpacing& spacing) {
-  std::vector<int> factors;
-  for (int depth = 0; depth <= geo::kMaxLevel; ++depth) {
-    const double step = MercatorStep(depth, spacing);
-    factors.push_back(AveragingFactor(std::sqrt(step / spacing.east * (step / spacing.north))));
-  }
-  return factors;
+int MercatorFactor(int depth, const SourceSpacing& spacing) {
+  const double step = MercatorStep(depth, spacing);
+  return AveragingFactor(std::sqrt(step / spacing.east * (step / spacing.north)));
 }
 
 int DeepestLevel(const SourceSpacing& spacing, double error_fraction, std::optional<double> finest_error) {

@@ -22,25 +22,20 @@ struct SourceSpacing {
   static Result<SourceSpacing> Of(const Georeference& georeference, const std::string& path);
 };
 
-struct LevelPlan {
-  geo::Lattice lattice;
-  int factor = 1;  // samples of the source, per axis, averaged into one before interpolation; a power of two
-};
-
 // Samples of the source along the edge of a lattice cell, the geometric mean of both axes.
 double SamplesPerCell(const geo::Lattice& lattice, const SourceSpacing& spacing);
 
 // The nearest power of two, at least 1: how many samples per axis are averaged into one.
 int AveragingFactor(double samples_per_cell);
 
-// Plans of levels 0 .. geo::kMaxLevel.
-std::vector<LevelPlan> PlanLevels(const SourceSpacing& spacing);
+// Lattices of levels 0 .. geo::kMaxLevel for a dataset whose finest source is this one.
+std::vector<geo::Lattice> PlanLattices(const SourceSpacing& finest);
 
 // The first depth of Web Mercator's pixels that is at least as fine as the source at its centre, 1 .. geo::kMaxLevel.
 int DeepestMercator(const SourceSpacing& spacing);
 
-// Factors of Web Mercator's depths 0 .. geo::kMaxLevel.
-std::vector<int> MercatorFactors(const SourceSpacing& spacing);
+// The averaging factor of a depth of Web Mercator.
+int MercatorFactor(int depth, const SourceSpacing& spacing);
 
 // The first level whose default error is at most a tenth of the finer spacing, or at most `finest_error`.
 int DeepestLevel(const SourceSpacing& spacing, double error_fraction, std::optional<double> finest_error);

@@ -3,13 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 
 namespace terrace::dem {
 namespace {
 
 constexpr int kCellNodes = 32;  // grids have a multiple of it, so cells never cross the antimeridian or a pole
-constexpr double kNowhere = std::numeric_limits<double>::quiet_NaN();
 
 // A square of `size` x `size` nodes; it owns the nodes on its western and southern edges.
 struct Cell {
@@ -50,8 +48,7 @@ class GridNodes {
         grid_(grid),
         window_(window),
         tolerance_(tolerance),
-        positions_(static_cast<std::size_t>(window.columns) * static_cast<std::size_t>(window.rows),
-                   Position{kNowhere, kNowhere}) {}
+        positions_(static_cast<std::size_t>(window.columns) * static_cast<std::size_t>(window.rows), kNowhere) {}
 
   std::vector<Position> Compute() && {
     if (georeference_.is_affine()) {

@@ -1,6 +1,7 @@
 // Where the samples of a tile lie in the source, in pixels.
 #pragma once
 
+#include <limits>
 #include <vector>
 
 #include "engine/dem/dem_source.h"
@@ -11,6 +12,9 @@
 #include "engine/geo/tile_key.h"
 
 namespace terrace::dem {
+
+// Of nodes that have no place in a raster: NaN.
+inline constexpr Position kNowhere{std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::quiet_NaN()};
 
 // The window of a tile: its samples and one more on each side.
 NodeWindow WindowOfTile(const geo::Lattice& lattice, const geo::TileKey& key);

@@ -19,7 +19,7 @@ namespace terrace::cli {
 namespace {
 
 // What a user should do about this raster; empty when nothing.
-std::vector<std::string> AdviceFor(const dem::DemInfo& info) {
+std::vector<std::string> AdviceFor(const dem::RasterInfo& info, double floor) {
   std::vector<std::string> advice;
   if (std::max(info.width, info.height) > 4096 && info.overview_factors.empty()) {
     advice.push_back(
@@ -33,7 +33,7 @@ std::vector<std::string> AdviceFor(const dem::DemInfo& info) {
   }
   if (info.void_samples > 0) {
     advice.push_back(
-        fmt::format("voids: small ones are filled from their edges, larger ones show the floor of {:g} m", info.floor));
+        fmt::format("voids: small ones are filled from their edges, larger ones show the floor of {:g} m", floor));
   }
   return advice;
 }
@@ -42,7 +42,8 @@ std::string Percent(std::uint64_t part, std::uint64_t whole) {
   return fmt::format("{:.2g} %", whole > 0 ? 100.0 * static_cast<double>(part) / static_cast<double>(whole) : 0.0);
 }
 
-void PrintText(const dem::DemInfo& info) {
+void PrintText(const dem::DemInfo& dataset) {
+  const dem::RasterInfo& info = dataset.sources.front();
   const auto line = [](const char* what, const std::string& value) { fmt::print("  {:<14}{}\n", what, value); };
   fmt::print("{}\n", info.path);
   line("raster", fmt::format("{} x {}, {}, {}", info.width, info.height, info.data_type, info.driver));
@@ -60,14 +61,15 @@ void PrintText(const dem::DemInfo& info) {
                                   Percent(info.void_samples, info.valid_samples + info.void_samples)));
   line("overviews",
        info.overview_factors.empty() ? "none" : fmt::format("1/{}", fmt::join(info.overview_factors, ", 1/")));
-  line("floor", fmt::format("{:g} m outside the raster and in large voids", info.floor));
-  line("levels", fmt::format("0 to {}, default error {:.3g} m at the deepest", info.max_level,
-                             geo::DefaultError(info.max_level)));
+  line("floor", fmt::format("{:g} m outside the raster and in large voids", dataset.floor));
+  line("levels", fmt::format("0 to {}, default error {:.3g} m at the deepest", dataset.max_level,
+                             geo::DefaultError(dataset.max_level)));
   if (!info.transform.empty()) line("transform", info.transform);
-  for (const std::string& advice : AdviceFor(info)) line("note", advice);
+  for (const std::string& advice : AdviceFor(info, dataset.floor)) line("note", advice);
 }
 
-nlohmann::json ToJson(const dem::DemInfo& info) {
+nlohmann::json ToJson(const dem::DemInfo& dataset) {
+  const dem::RasterInfo& info = dataset.sources.front();
   return {{"path", info.path},
           {"driver", info.driver},
           {"width", info.width},
@@ -82,10 +84,10 @@ nlohmann::json ToJson(const dem::DemInfo& info) {
           {"valid_samples", info.valid_samples},
           {"void_samples", info.void_samples},
           {"overviews", info.overview_factors},
-          {"floor", info.floor},
-          {"levels", {0, info.max_level}},
+          {"floor", dataset.floor},
+          {"levels", {0, dataset.max_level}},
           {"transform", info.transform},
-          {"advice", AdviceFor(info)}};
+          {"advice", AdviceFor(info, dataset.floor)}};
 }
 
 int Info(const std::vector<std::string>& dems, bool json) {

@@ -20,7 +20,7 @@ TEST(DemSource, DepthFollowsTheSpacing) {
     TERRACE_REQUIRE_DATA(path, name);
     const auto source = OpenOrFail(path);
     ASSERT_NE(source, nullptr);
-    EXPECT_EQ(source->max_level(), depth) << name << ", spacing " << source->info().spacing_m;
+    EXPECT_EQ(source->max_level(), depth) << name << ", spacing " << source->info().sources[0].spacing_m;
   }
 }
 
@@ -46,7 +46,7 @@ TEST(DemSource, InfoTellsWhatTheFileSays) {
   TERRACE_REQUIRE_DATA(path, "bigtujunga_30m_utm11.tif");
   const auto source = OpenOrFail(path);
   ASSERT_NE(source, nullptr);
-  const DemInfo& info = source->info();
+  const RasterInfo& info = source->info().sources.at(0);
   EXPECT_EQ(info.driver, "GTiff");
   EXPECT_EQ(info.width, 1197);
   EXPECT_EQ(info.height, 643);
@@ -57,7 +57,7 @@ TEST(DemSource, InfoTellsWhatTheFileSays) {
   EXPECT_EQ(info.pixel_unit, "metre");
   EXPECT_EQ(info.heights.min, 315);
   EXPECT_EQ(info.heights.max, 2295);
-  EXPECT_EQ(info.floor, 315);
+  EXPECT_EQ(source->info().floor, 315);
   EXPECT_EQ(info.void_samples, 0u);
   EXPECT_EQ(info.valid_samples, 1197u * 643u);
   EXPECT_EQ(info.nodata, 32767);
@@ -72,8 +72,8 @@ TEST(DemSource, CompoundCrsStatesItsVerticalDatum) {
   const auto source =
       OpenOrFail(WriteRaster(dir, {.geo_transform = {500000, 30, 0, 5000000, 0, -30}, .crs = "EPSG:32611+5773"}));
   ASSERT_NE(source, nullptr);
-  EXPECT_EQ(source->info().vertical_datum, "EGM96 geoid");
-  EXPECT_NE(source->info().crs.find("UTM zone 11N"), std::string::npos);
+  EXPECT_EQ(source->info().sources[0].vertical_datum, "EGM96 geoid");
+  EXPECT_NE(source->info().sources[0].crs.find("UTM zone 11N"), std::string::npos);
 }
 
 TEST(DemSource, VoidsNeverAppearAsHeights) {
@@ -83,7 +83,7 @@ TEST(DemSource, VoidsNeverAppearAsHeights) {
     TERRACE_REQUIRE_DATA(path, name);
     const auto source = OpenOrFail(path);
     ASSERT_NE(source, nullptr);
-    ASSERT_GT(source->info().void_samples, 0u);
+    ASSERT_GT(source->info().sources[0].void_samples, 0u);
     const auto [low, high] = source->info().heights;
     for (int level = 0; level <= source->max_level(); ++level) {
       for (const geo::TileKey& key : SomeTiles(*source, level, 4)) {

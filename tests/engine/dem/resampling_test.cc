@@ -132,10 +132,10 @@ TEST(Resampling, UndeclaredVoidsAndUnitsAreUnderstood) {
     spec.value = [&](int col, int) { return col < 4 ? c.mark : c.value; };
     const auto source = OpenOrFail(WriteRaster(dir, spec, std::to_string(index++) + ".tif"));
     ASSERT_NE(source, nullptr);
-    EXPECT_EQ(source->info().void_samples, 64u);
+    EXPECT_EQ(source->info().sources[0].void_samples, 64u);
     EXPECT_NEAR(source->info().heights.min, c.height, 1e-4);
     EXPECT_NEAR(source->info().heights.max, c.height, 1e-4);
-    EXPECT_EQ(source->info().height_unit, c.unit);
+    EXPECT_EQ(source->info().sources[0].height_unit, c.unit);
   }
 }
 

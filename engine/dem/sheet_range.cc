@@ -1,9 +1,9 @@
-// The bound on a tile's heights, from the block table alone.
+// The bound on what a tile can take from a sheet, from the block table alone.
 #include <algorithm>
 #include <cmath>
 #include <optional>
 
-#include "engine/dem/dem_impl.h"
+#include "engine/dem/sheet.h"
 
 namespace terrace::dem {
 namespace {
@@ -68,54 +68,52 @@ std::optional<PixelBox> ProjectedBox(const Georeference& georeference, const geo
 
 }  // namespace
 
-HeightRange DemSource::Impl::RangeBound(const geo::TileKey& key) const {
-  const auto& [lattice, factor] = Plan(key.level);
+SheetRange Sheet::RangeOf(const geo::Lattice& lattice, const geo::TileKey& key) const {
   const double extent = lattice.cells * lattice.StepDegrees();
   const std::int64_t south_row = lattice.FirstRow(key), north_row = south_row + lattice.cells;
-  HeightRange range{floor, floor};
-  if (!footprint.Touches(lattice.Longitude(lattice.FirstColumn(key)), lattice.Latitude(south_row), extent, extent))
-    return range;
+  SheetRange range;
+  range.touches =
+      footprint_.Touches(lattice.Longitude(lattice.FirstColumn(key)), lattice.Latitude(south_row), extent, extent);
+  if (!range.touches) return range;
 
+  const Georeference& georeference = raster_->georeference();
+  const RasterLayout& layout = raster_->layout();
+  const int factor = AveragingFactor(SamplesPerCell(lattice, spacing()));
   std::vector<PixelBox> boxes;
-  bool floor_shows = false;
+  bool leaves = false;
   if (georeference.is_geographic_grid() && georeference.is_affine()) {
     boxes = GeographicBoxes(georeference, lattice, key);
-    floor_shows = !layout.wraps && std::ranges::none_of(boxes, [&](const PixelBox& box) {
+    leaves = !layout.wraps && std::ranges::none_of(boxes, [&](const PixelBox& box) {
       return box.west >= 0 && box.east <= layout.width;
     });
   } else if (const auto box = ProjectedBox(georeference, lattice, key)) {
     boxes = {*box};
-    floor_shows = box->west < 0 || box->east > layout.width;
+    leaves = box->west < 0 || box->east > layout.width;
   } else {
     boxes = {{0, 0, static_cast<double>(layout.width), static_cast<double>(layout.height)}};
-    floor_shows = true;
+    leaves = true;
   }
-  BlockRange blocks;
   for (PixelBox& box : boxes) {
-    floor_shows |= box.north < 0 || box.south > layout.height;
+    leaves |= box.north < 0 || box.south > layout.height;
     // Bilinear interpolation reaches one and a half samples of the grid.
     box.Grow(1.5 * factor + 1, 1.5 * factor + 1);
-    BlockRange here = table.Query(box.west, box.north, box.east, box.south);
+    BlockRange here = raster_->ranges().Query(box.west, box.north, box.east, box.south);
     if (here.has_voids) {
-      box.Grow(max_void_gap + factor, max_void_gap + factor);
-      here.Add(table.Query(box.west, box.north, box.east, box.south));
+      box.Grow(max_void_gap_ + factor, max_void_gap_ + factor);
+      here.Add(raster_->ranges().Query(box.west, box.north, box.east, box.south));
     }
-    blocks.Add(here);
+    range.blocks.Add(here);
   }
-  HeightRange bound = range;  // of blocks without a valid sample: the floor
-  if (blocks.min <= blocks.max) {
-    // Rounding to 2^-10 m stays within these.
-    bound = {std::floor(blocks.min * 1024.0) / 1024, std::ceil(blocks.max * 1024.0) / 1024};
-  }
-  const auto include = [&](double height) {
-    bound.min = std::min(bound.min, height);
-    bound.max = std::max(bound.max, height);
-  };
-  if (floor_shows || blocks.has_voids) include(floor);
+  range.shows_others = leaves || range.blocks.has_voids;
   for (const std::int64_t row : {south_row, north_row}) {
-    if (const auto pole = PoleHeight(lattice, row)) include(*pole);
+    if (row > 0 && row < lattice.rows()) continue;
+    if (const auto pole = PoleHeight(lattice, row)) {
+      range.blocks.Add(*pole);
+    } else if (georeference.is_geographic_grid()) {
+      range.shows_others = true;
+    }
   }
-  return bound;
+  return range;
 }
 
 }  // namespace terrace::dem

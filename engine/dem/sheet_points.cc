@@ -2,11 +2,10 @@
 // in: neighbours share a read, and no block is decoded twice because others were wanted in between.
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <tuple>
 
-#include "engine/dem/dem_impl.h"
 #include "engine/dem/grid_cells.h"
+#include "engine/dem/sheet.h"
 
 namespace terrace::dem {
 namespace {
@@ -24,29 +23,28 @@ struct PointCell {
 
 }  // namespace
 
-Result<std::vector<float>> DemSource::Impl::ReadPoints(std::span<const GeoPosition> points,
-                                                       const std::stop_token& stop) {
+Result<void> Sheet::FillPoints(std::span<const GeoPosition> points, std::span<float> heights,
+                               const std::stop_token& stop) const {
+  const RasterLayout& layout = raster_->layout();
   const GridAxis columns(layout.columns, 1, layout.wraps), rows(layout.height, 1, false);
   std::vector<PointCell> found;
   std::vector<Position> batch;
   for (std::size_t done = 0; done < points.size(); done += batch.size()) {
-    if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "{}: reading points was stopped", info.path);
+    if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "reading points was stopped");
     batch.clear();
     for (const GeoPosition& point : points.subspan(done, std::min(kBatch, points.size() - done))) {
       batch.push_back({point.longitude, point.latitude});
     }
-    georeference.ToPixels(batch);
+    raster_->georeference().ToPixels(batch);
     for (std::size_t i = 0; i < batch.size(); ++i) {
-      if (!IsInside(batch[i])) continue;
+      if (!std::isnan(heights[done + i]) || !IsInside(batch[i])) continue;
       const GridCell cell = CellAt(batch[i], columns, rows, layout.width, layout.height);
       found.push_back({done + i, (cell.column + kBlock) / kBlock, cell.row / kBlock, cell});
     }
   }
+  if (found.empty()) return raster_->CheckUnchanged();
   std::ranges::sort(found, {}, [](const PointCell& p) { return std::tuple(p.block_row, p.block_column, p.point); });
 
-  std::vector<float> heights(points.size(), SampleRules::kVoid);
-  auto handle = handles.Borrow();
-  if (!handle) return tl::unexpected(handle.error());
   std::vector<GridCell> cells;
   for (auto first = found.begin(); first != found.end();) {
     const auto end = std::find_if(first, found.end(), [&](const PointCell& p) {
@@ -55,15 +53,14 @@ Result<std::vector<float>> DemSource::Impl::ReadPoints(std::span<const GeoPositi
     cells.clear();
     for (auto p = first; p != end; ++p) cells.push_back(p->cell);
     const GridWindow window = WindowOf(cells, columns, rows);
-    const auto samples = ReadGrid(**handle, layout, 1, window, stop);
-    if (!samples) return MakeError(samples.error().code, "{}: points: {}", info.path, samples.error().message);
+    const auto samples = raster_->ReadBlocks(1, window, stop);
+    if (!samples) return tl::unexpected(samples.error());
     for (std::size_t i = 0; first != end; ++first, ++i) {
       if (!IsNearestValid(*samples, window, cells[i])) continue;
       if (const auto height = Interpolate(*samples, window, cells[i])) heights[first->point] = RoundHeight(*height);
     }
   }
-  if (auto unchanged = handles.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
-  return heights;
+  return {};
 }
 
 }  // namespace terrace::dem

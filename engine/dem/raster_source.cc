@@ -1,0 +1,104 @@
+#include "engine/dem/raster_source.h"
+
+#include <spdlog/spdlog.h>
+
+#include <utility>
+
+#include "engine/dem/gdal_runtime.h"
+#include "engine/dem/raster_file.h"
+#include "engine/dem/raster_scan.h"
+
+namespace terrace::dem {
+namespace {
+
+RasterLayout LayoutOf(GDALDataset& dataset, const Georeference& georeference) {
+  RasterLayout layout;
+  layout.width = georeference.width();
+  layout.height = georeference.height();
+  layout.wraps = georeference.wrap_columns() > 0;
+  layout.columns = layout.wraps ? georeference.wrap_columns() : layout.width;
+  layout.rules = SampleRules::Of(HeightBand(dataset), georeference.vertical_unit());
+  layout.overview_factors = OverviewFactors(HeightBand(dataset));
+  return layout;
+}
+
+RasterInfo Describe(GDALDataset& dataset, const std::string& path, const Georeference& georeference,
+                    const RasterLayout& layout) {
+  RasterInfo info;
+  info.path = path;
+  info.driver = dataset.GetDriverName();
+  info.width = layout.width;
+  info.height = layout.height;
+  info.data_type = GDALGetDataTypeName(HeightBand(dataset).GetRasterDataType());
+  info.crs = georeference.crs();
+  info.vertical_datum = georeference.vertical_datum();
+  info.height_unit = layout.rules.unit;
+  info.pixel_width = georeference.pixel_width();
+  info.pixel_height = georeference.pixel_height();
+  info.pixel_unit = georeference.pixel_unit();
+  info.nodata = layout.rules.nodata;
+  info.overview_factors = layout.overview_factors;
+  info.transform = georeference.transform();
+  return info;
+}
+
+void LogWhatMatters(GDALDataset& dataset, const RasterInfo& info, const Georeference& georeference,
+                    const RasterLayout& layout) {
+  if (dataset.GetRasterCount() > 1) {
+    spdlog::info("{}: has {} bands, heights are read from band 1", info.path, dataset.GetRasterCount());
+  }
+  if (!MetresPerUnit(layout.rules.unit)) {
+    spdlog::warn("{}: height unit \"{}\" is not known, heights are taken as metres", info.path, layout.rules.unit);
+  }
+  if (info.vertical_datum.empty()) {
+    spdlog::warn("{}: no vertical datum stated, heights pass through as given", info.path);
+  }
+  if (!info.transform.empty()) {
+    spdlog::info("{}: placed by PROJ operation \"{}\": {}", info.path, info.transform, georeference.pipeline());
+  }
+}
+
+}  // namespace
+
+Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path,
+                                                         const std::function<void(double)>& progress) {
+  auto dataset = OpenRaster(path);
+  if (!dataset) return tl::unexpected(dataset.error());
+  auto georeference = Georeference::Of(**dataset, path);
+  if (!georeference) return tl::unexpected(georeference.error());
+  const auto spacing = SourceSpacing::Of(*georeference, path);
+  if (!spacing) return tl::unexpected(spacing.error());
+
+  std::unique_ptr<RasterSource> source(
+      new RasterSource(path, StampedFiles(FilesOf(**dataset, path)), *std::move(georeference)));
+  source->layout_ = LayoutOf(**dataset, source->georeference_);
+  auto scan = ScanRaster(**dataset, source->layout_, progress);
+  if (!scan) return MakeError(scan.error().code, "{}: {}", path, scan.error().message);
+
+  source->footprint_ = Footprint::Of(source->georeference_);
+  source->spacing_ = *spacing;
+  source->ranges_ = std::move(scan->table);
+  source->edge_row_means_ = scan->edge_row_means;
+  source->info_ = Describe(**dataset, path, source->georeference_, source->layout_);
+  source->info_.spacing_m = spacing->finer;
+  source->info_.bounds = source->footprint_.Bounds();
+  source->info_.heights = {scan->lowest, scan->highest};
+  source->info_.valid_samples = scan->valid;
+  source->info_.void_samples = scan->voids;
+  LogWhatMatters(**dataset, source->info_, source->georeference_, source->layout_);
+  if (auto unchanged = source->CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
+  return source;
+}
+
+Result<std::vector<float>> RasterSource::ReadBlocks(int factor, const GridWindow& window,
+                                                    const std::stop_token& stop) const {
+  auto handle = handles_.Borrow();
+  if (!handle) return tl::unexpected(handle.error());
+  auto heights = ReadGrid(**handle, layout_, factor, window, stop);
+  if (!heights) return MakeError(heights.error().code, "{}: {}", info_.path, heights.error().message);
+  // Files may be overwritten while they are read.
+  if (auto unchanged = handles_.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
+  return heights;
+}
+
+}  // namespace terrace::dem

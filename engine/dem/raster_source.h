@@ -1,0 +1,61 @@
+// One raster file of a dataset: where it lies, how it is stored, what its heights range over, and its samples.
+//
+// Immutable after Open and safe to use from many threads. Knows nothing of levels, floors or other rasters.
+#pragma once
+
+#include <array>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "engine/dem/dem_source.h"
+#include "engine/dem/footprint.h"
+#include "engine/dem/gdal_handle.h"
+#include "engine/dem/georeference.h"
+#include "engine/dem/level_plan.h"
+#include "engine/dem/range_table.h"
+#include "engine/dem/sample_grid.h"
+
+namespace terrace::dem {
+
+class RasterSource {
+ public:
+  // Opens a raster, checks it, and scans it once for its heights. Errors name the file, what is wrong and the remedy.
+  static Result<std::unique_ptr<RasterSource>> Open(const std::string& path,
+                                                    const std::function<void(double)>& progress = {});
+
+  const RasterInfo& info() const { return info_; }
+  const Georeference& georeference() const { return georeference_; }
+  const RasterLayout& layout() const { return layout_; }
+  const Footprint& footprint() const { return footprint_; }
+  const SourceSpacing& spacing() const { return spacing_; }
+  const RangeTable& ranges() const { return ranges_; }
+  // Of the valid samples of the first and the last row.
+  const std::array<std::optional<double>, 2>& edge_row_means() const { return edge_row_means_; }
+  const StampedFiles& files() const { return handles_.files(); }
+
+  // ReadGrid of this raster. kUnavailable: a file of it is gone, was replaced or cannot be read. Errors name the file.
+  Result<std::vector<float>> ReadBlocks(int factor, const GridWindow& window, const std::stop_token& stop) const;
+
+  // Whether the files are still those that were opened.
+  Result<void> CheckUnchanged() const { return handles_.CheckUnchanged(); }
+
+ private:
+  RasterSource(std::string path, StampedFiles files, Georeference where)
+      : handles_(std::move(path), std::move(files)), georeference_(std::move(where)) {}
+
+  mutable HandlePool handles_;  // thread-safe
+  const Georeference georeference_;
+  RasterLayout layout_;
+  Footprint footprint_;
+  SourceSpacing spacing_;
+  RangeTable ranges_;
+  std::array<std::optional<double>, 2> edge_row_means_;
+  RasterInfo info_;
+};
+
+}  // namespace terrace::dem
