@@ -6,6 +6,7 @@
 #include "engine/core/check.h"
 #include "engine/dem/dem_impl.h"
 #include "engine/dem/node_positions.h"
+#include "engine/dem/source_gap.h"
 
 namespace terrace::dem {
 namespace {
@@ -39,9 +40,22 @@ Result<std::vector<float>> DemSource::Impl::ReadNodes(int level, const NodeWindo
 
 Result<TileHeights> DemSource::Impl::Read(const geo::TileKey& key, const std::stop_token& stop) const {
   const geo::Lattice& lattice = LatticeOf(key.level);
-  auto heights = ReadNodes(key.level, WindowOfTile(lattice, key), "tile " + geo::ToString(key), stop);
-  if (!heights) return tl::unexpected(std::move(heights).error());
-  return TileHeights{lattice, lattice.cells + 3, *std::move(heights)};
+  const NodeWindow window = WindowOfTile(lattice, key);
+  TileHeights tile{lattice, lattice.cells + 3, {}};
+  tile.heights.resize(static_cast<std::size_t>(window.columns) * static_cast<std::size_t>(window.rows),
+                      SampleRules::kVoid);
+  std::vector<SheetTrace> traces(sheets.size());
+  for (std::size_t i = 0; i < sheets.size(); ++i) {
+    if (const auto filled = sheets[i].Fill(lattice, window, tile.heights, stop, &traces[i]); !filled) {
+      return MakeError(filled.error().code, "tile {}: {}", geo::ToString(key), filled.error().message);
+    }
+  }
+  std::ranges::replace_if(
+      tile.heights, [](float height) { return std::isnan(height); }, floor);
+  SourceGap gap(lattice, window, tile.heights);
+  for (std::size_t i = 0; i < sheets.size(); ++i) gap.Add(sheets[i], traces[i]);
+  tile.source_gap_m = gap.bound();
+  return tile;
 }
 
 Result<std::vector<float>> DemSource::Impl::ReadMercator(int depth, const NodeWindow& window,

@@ -59,7 +59,7 @@ DemSource::~DemSource() = default;
 Result<std::unique_ptr<DemSource>> DemSource::Open(const std::string& path, const DemOptions& options) {
   if (auto checked = CheckOptions(options); !checked)
     return MakeError(checked.error().code, "{}: {}", path, checked.error().message);
-  auto opened = RasterSource::Open(path, options.progress);
+  auto opened = RasterSource::Open(path, options.cache_dir, options.progress);
   if (!opened) return tl::unexpected(opened.error());
   const std::shared_ptr<const RasterSource> raster = *std::move(opened);
 

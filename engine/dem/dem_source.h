@@ -27,6 +27,8 @@ struct DemOptions {
   std::optional<double> floor =
       {};                 // metres: height outside the source and in large voids; default: lowest valid height
   int max_void_gap = 64;  // source samples: voids narrower than this along a row, column or diagonal are filled
+  // A folder for what is learnt of sources once: docs/operations.md. Empty: nothing is kept.
+  std::string cache_dir = {};
   // Called now and then while Open scans the source, with the share done, 0..1. May be empty.
   std::function<void(double)> progress = {};
 };
@@ -89,6 +91,9 @@ struct TileHeights {
   geo::Lattice lattice;
   int stride = 0;              // cells + 3
   std::vector<float> heights;  // stride * stride
+  // Metres: no valid sample of a source, at its full resolution, lies farther from the surface that is bilinear between
+  // the tile's own samples. The halo does not count.
+  double source_gap_m = 0;
 
   // i, j in -1 .. cells + 1: columns from the west, rows from the SOUTH.
   float At(int i, int j) const {

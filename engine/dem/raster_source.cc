@@ -6,7 +6,6 @@
 
 #include "engine/dem/gdal_runtime.h"
 #include "engine/dem/raster_file.h"
-#include "engine/dem/raster_scan.h"
 
 namespace terrace::dem {
 namespace {
@@ -60,7 +59,7 @@ void LogWhatMatters(GDALDataset& dataset, const RasterInfo& info, const Georefer
 
 }  // namespace
 
-Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path,
+Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path, const std::string& cache_dir,
                                                          const std::function<void(double)>& progress) {
   auto dataset = OpenRaster(path);
   if (!dataset) return tl::unexpected(dataset.error());
@@ -72,19 +71,21 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
   std::unique_ptr<RasterSource> source(
       new RasterSource(path, StampedFiles(FilesOf(**dataset, path)), *std::move(georeference)));
   source->layout_ = LayoutOf(**dataset, source->georeference_);
-  auto scan = ScanRaster(**dataset, source->layout_, progress);
-  if (!scan) return MakeError(scan.error().code, "{}: {}", path, scan.error().message);
+  auto prepared = PrepareRaster(**dataset, source->layout_, path, source->files(), cache_dir, progress);
+  if (!prepared) return tl::unexpected(prepared.error());
+  source->survey_ = std::move(prepared->survey);
+  source->averages_ = std::move(prepared->averages);
+  source->preparation_ = prepared->preparation;
+  const RasterSurvey& survey = source->survey_;
 
   source->footprint_ = Footprint::Of(source->georeference_);
   source->spacing_ = *spacing;
-  source->ranges_ = std::move(scan->table);
-  source->edge_row_means_ = scan->edge_row_means;
   source->info_ = Describe(**dataset, path, source->georeference_, source->layout_);
   source->info_.spacing_m = spacing->finer;
   source->info_.bounds = source->footprint_.Bounds();
-  source->info_.heights = {scan->lowest, scan->highest};
-  source->info_.valid_samples = scan->valid;
-  source->info_.void_samples = scan->voids;
+  source->info_.heights = {survey.lowest, survey.highest};
+  source->info_.valid_samples = survey.valid;
+  source->info_.void_samples = survey.voids;
   LogWhatMatters(**dataset, source->info_, source->georeference_, source->layout_);
   if (auto unchanged = source->CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
   return source;
@@ -92,6 +93,20 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
 
 Result<std::vector<float>> RasterSource::ReadBlocks(int factor, const GridWindow& window,
                                                     const std::stop_token& stop) const {
+  // From memory and from the record only while the files are those that were prepared.
+  if (survey_.coarse.Has(factor)) {
+    if (auto unchanged = handles_.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
+    return survey_.coarse.Read(factor, window);
+  }
+  if (averages_ && RecordedAverages::Has(factor) && !averages_damaged_) {
+    if (auto unchanged = handles_.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
+    auto averages = averages_->Read(factor, window);
+    if (averages) return averages;
+    averages_damaged_ = true;
+    averages_->Discard();
+    spdlog::error("{}; {} is read at its full resolution instead, and prepared anew when it is next opened",
+                  averages.error().message, info_.path);
+  }
   auto handle = handles_.Borrow();
   if (!handle) return tl::unexpected(handle.error());
   auto heights = ReadGrid(**handle, layout_, factor, window, stop);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/dem/block_averages.h"
+
 namespace terrace::dem {
 namespace {
 
@@ -19,43 +21,13 @@ struct Level {
 
 Result<Level> StartingLevel(GDALDataset& dataset, const RasterLayout& layout, int factor) {
   GDALRasterBand* band = dataset.GetRasterBand(1);
-  int start = 1;
-  for (const int overview : layout.overview_factors) {
-    if (overview <= factor) start = overview;
-  }
+  const int start = StartingFactor(layout, factor);
   if (start > 1) band = FindOverview(*band, start);
   if (band == nullptr) {
     return MakeError(ErrorCode::kUnavailable, "its overview of factor {} is gone since it was opened", start);
   }
   return Level{band, factor / start, (layout.columns + start - 1) / start, (layout.height + start - 1) / start};
 }
-
-// Averages `rows` rows of blocks from strips of samples. Every block is summed row by row, whatever the window.
-class BlockAverages {
- public:
-  BlockAverages(std::int64_t blocks, int block)
-      : block_(block), sums_(static_cast<std::size_t>(blocks)), counts_(sums_.size()) {}
-
-  void AddRow(const float* samples, std::int64_t count) {
-    for (std::int64_t i = 0; i < count; ++i) {
-      if (std::isnan(samples[i])) continue;
-      sums_[static_cast<std::size_t>(i / block_)] += samples[i];
-      ++counts_[static_cast<std::size_t>(i / block_)];
-    }
-  }
-  void Take(float* out) {
-    for (std::size_t i = 0; i < sums_.size(); ++i) {
-      out[i] = counts_[i] == 0 ? SampleRules::kVoid : static_cast<float>(sums_[i] / static_cast<double>(counts_[i]));
-      sums_[i] = 0;
-      counts_[i] = 0;
-    }
-  }
-
- private:
-  int block_;
-  std::vector<double> sums_;
-  std::vector<std::int64_t> counts_;
-};
 
 // Blocks `column` .. `column + columns` without wrapping, all rows of the window, into columns of `out` that is
 // `stride` wide.
@@ -87,6 +59,14 @@ Result<void> ReadBlocks(const Level& level, const SampleRules& rules, const Grid
 }
 
 }  // namespace
+
+int StartingFactor(const RasterLayout& layout, int factor) {
+  int start = 1;
+  for (const int overview : layout.overview_factors) {
+    if (overview <= factor) start = overview;
+  }
+  return start;
+}
 
 double GridAxis::Center(std::int64_t index) const {
   const std::int64_t block = wraps_ ? FloorMod(index, count_) : index;

@@ -67,10 +67,12 @@ std::optional<float> Sheet::PoleHeight(const geo::Lattice& lattice, std::int64_t
   return row > 0 && row < lattice.rows() ? std::nullopt : pole_heights_[row <= 0 ? 0 : 1];
 }
 
-Result<std::vector<float>> Sheet::ReadFilled(int factor, const GridWindow& window, const std::stop_token& stop) const {
+Result<std::vector<float>> Sheet::ReadFilled(int factor, const GridWindow& window, const std::stop_token& stop,
+                                             SheetTrace* trace) const {
   const auto is_void = [](float height) { return std::isnan(height); };
   const RasterLayout& layout = raster_->layout();
   auto core = raster_->ReadBlocks(factor, window, stop);
+  if (core && trace != nullptr) trace->samples = *core;
   const int gap = max_void_gap_ / factor;
   if (!core || gap < 2 || std::ranges::none_of(*core, is_void)) return core;
   const GridWindow wide =
@@ -81,7 +83,7 @@ Result<std::vector<float>> Sheet::ReadFilled(int factor, const GridWindow& windo
 }
 
 Result<void> Sheet::FillAt(std::span<const Position> positions, int factor, std::span<float> heights,
-                           const std::stop_token& stop) const {
+                           const std::stop_token& stop, SheetTrace* trace) const {
   const RasterLayout& layout = raster_->layout();
   const GridAxis columns(layout.columns, factor, layout.wraps), rows(layout.height, factor, false);
   std::vector<GridCell> cells;
@@ -95,18 +97,30 @@ Result<void> Sheet::FillAt(std::span<const Position> positions, int factor, std:
   // Files are looked at even where nothing must be read: a tile of floor must not outlive its source.
   if (cells.empty()) return raster_->CheckUnchanged();
   const GridWindow window = WindowOf(cells, columns, rows);
-  const auto samples = ReadFilled(factor, window, stop);
+  const auto samples = ReadFilled(factor, window, stop, trace);
   if (!samples) return tl::unexpected(samples.error());
   for (std::size_t i = 0; i < cells.size(); ++i) {
-    if (const auto height = Interpolate(*samples, window, cells[i])) heights[nodes[i]] = RoundHeight(*height);
+    const auto height = Interpolate(*samples, window, cells[i]);
+    if (!height) continue;
+    heights[nodes[i]] = RoundHeight(*height);
+    if (trace != nullptr) trace->cell_of_node[nodes[i]] = static_cast<std::int32_t>(i);
+  }
+  if (trace != nullptr) {
+    trace->window = window;
+    trace->cells = std::move(cells);
   }
   return {};
 }
 
 Result<void> Sheet::Fill(const geo::Lattice& lattice, const NodeWindow& window, std::span<float> heights,
-                         const std::stop_token& stop) const {
+                         const std::stop_token& stop, SheetTrace* trace) const {
   const int factor = AveragingFactor(SamplesPerCell(lattice, spacing()));
   auto positions = NodePositions(raster_->georeference(), footprint_, lattice, window, kPositionTolerance * factor);
+  if (trace != nullptr) {
+    trace->positions = positions;
+    trace->cell_of_node.assign(positions.size(), -1);
+    trace->factor = factor;
+  }
   if (raster_->georeference().is_geographic_grid()) {
     for (int row = 0; row < window.rows; ++row) {
       const std::int64_t global = window.row + row;
@@ -120,14 +134,14 @@ Result<void> Sheet::Fill(const geo::Lattice& lattice, const NodeWindow& window, 
       }
     }
   }
-  return FillAt(positions, factor, heights, stop);
+  return FillAt(positions, factor, heights, stop, trace);
 }
 
 Result<void> Sheet::Fill(const geo::MercatorGrid& grid, const NodeWindow& window, std::span<float> heights,
                          const std::stop_token& stop) const {
   const int factor = MercatorFactor(grid.depth, spacing());
   return FillAt(NodePositions(raster_->georeference(), footprint_, grid, window, kPositionTolerance * factor), factor,
-                heights, stop);
+                heights, stop, nullptr);
 }
 
 }  // namespace terrace::dem
