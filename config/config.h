@@ -88,6 +88,7 @@ struct Config {
   std::size_t queue_length = 256;
   std::size_t cache_bytes = std::size_t{256} << 20;             // 0: no cache
   std::size_t refinement_cache_bytes = std::size_t{128} << 20;  // 0: no cache
+  std::string cache_dir;  // what is learnt of sources is kept there; empty: nowhere
   std::size_t max_connections = 1024;
   std::size_t max_mesh_samples = 1'000'000;
   std::size_t max_locations = 10'000;  // in one request for heights

@@ -289,13 +289,18 @@ class SheetGap {
       north = std::min(north, position.y), south = std::max(south, position.y);
     }
     if (!known) return Apart(nodes, sheet_.heights().min, sheet_.heights().max);
-    // Edges of cells bulge by far less.
-    const double x = (east - west) / 8 + 1, y = (south - north) / 8 + 1;
+    // Edges of cells bulge by far less. The samples are at the pixels' centres.
+    constexpr double kBulge = 1.0 / 32;
+    const double x = (east - west) * kBulge, y = (south - north) * kBulge;
+    const auto first = [](double at) { return std::ceil(at - 0.5); };
+    const auto last = [](double at) { return std::floor(at - 0.5); };
+    if (first(north - y) > last(south + y)) return 0;
     BlockRange range;
     for (const int turn : {-1, 0, 1}) {
       if (turn != 0 && !sheet_.wraps()) continue;
       const double shift = static_cast<double>(turn) * sheet_.columns();
-      range.Add(sheet_.Ranges(west - x + shift, north - y, east + x + shift, south + y));
+      if (first(west - x + shift) > last(east + x + shift)) continue;
+      range.Add(sheet_.Ranges(first(west - x + shift), first(north - y), last(east + x + shift), last(south + y)));
     }
     return range.min > range.max ? 0 : Apart(nodes, range.min, range.max);
   }

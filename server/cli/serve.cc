@@ -119,6 +119,7 @@ bool OpenDatasets(const config::Config& config, std::vector<server::Dataset>& da
     options.finest_error = wanted.finest_error;
     options.floor = wanted.floor;
     options.max_void_gap = wanted.max_void_gap;
+    options.cache_dir = config.cache_dir;
     options.progress = progress.Callback();
     auto source = dem::DemSource::Open(wanted.sources.front(), options);
     if (!source) {
