@@ -1,8 +1,12 @@
 #include "proto/compress.h"
 
+#include <brotli/encode.h>
 #include <libdeflate.h>
+#include <zstd.h>
 
+#include <cstdint>
 #include <memory>
+#include <new>
 
 #include "engine/core/check.h"
 
@@ -30,6 +34,26 @@ std::string CompressWith(Bound bound, Compress compress, std::string_view bytes,
 
 std::string Gzip(std::string_view bytes, int level) {
   return CompressWith(libdeflate_gzip_compress_bound, libdeflate_gzip_compress, bytes, level);
+}
+
+std::string Brotli(std::string_view bytes, int quality) {
+  std::size_t size = BrotliEncoderMaxCompressedSize(bytes.size());
+  TERRACE_CHECK(size > 0);  // zero only beyond 2^63
+  std::string out(size, '\0');
+  const auto done = BrotliEncoderCompress(quality, BROTLI_DEFAULT_WINDOW, BROTLI_MODE_GENERIC, bytes.size(),
+                                          reinterpret_cast<const std::uint8_t*>(bytes.data()), &size,
+                                          reinterpret_cast<std::uint8_t*>(out.data()));
+  if (done != BROTLI_TRUE) throw std::bad_alloc();  // the bound is never too small
+  out.resize(size);
+  return out;
+}
+
+std::string Zstd(std::string_view bytes, int level) {
+  std::string out(ZSTD_compressBound(bytes.size()), '\0');
+  const std::size_t size = ZSTD_compress(out.data(), out.size(), bytes.data(), bytes.size(), level);
+  if (ZSTD_isError(size) != 0) throw std::bad_alloc();  // the bound is never too small
+  out.resize(size);
+  return out;
 }
 
 std::string Zlib(std::string_view bytes, int level) {

@@ -4,8 +4,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <boost/asio/executor_work_guard.hpp>
-#include <boost/asio/io_context.hpp>
 #include <boost/asio/signal_set.hpp>
 #include <condition_variable>
 #include <csignal>
@@ -19,6 +17,7 @@
 #include "server/handlers/routes.h"
 #include "server/handlers/static_files.h"
 #include "server/http/connection_set.h"
+#include "server/http/io_threads.h"
 #include "server/http/listener.h"
 #include "server/http/session.h"
 
@@ -49,7 +48,7 @@ Result<void> CheckNames(const std::vector<DatasetView>& datasets) {
   return {};
 }
 
-unsigned IoThreads(unsigned configured) {
+unsigned IoThreadCount(unsigned configured) {
   return configured > 0 ? configured : std::max(1u, std::thread::hardware_concurrency() / 4);
 }
 
@@ -63,7 +62,7 @@ TileServiceOptions ServiceOptions(const ServerOptions& options) {
 
 }  // namespace
 
-// Members are destroyed from the last to the first: the io_context, whose unfinished coroutines hold sessions, goes
+// Members are destroyed from the last to the first: the io_contexts, whose unfinished coroutines hold sessions, go
 // before everything a session refers to.
 class Server::Impl {
  public:
@@ -75,8 +74,8 @@ class Server::Impl {
         connections_(options_.max_connections),
         routes_(datasets_, tiles_, std::move(viewer), HandlerOptions(), HeightsOptions(), options_.area_mesher,
                 RouteState()),
-        work_(io_.get_executor()),
-        signals_(io_) {}
+        io_(IoThreadCount(options_.io_threads)),
+        signals_(io_.first()) {}
 
   ~Impl() {
     if (!stopper_.joinable()) return;  // never started
@@ -90,8 +89,7 @@ class Server::Impl {
     listener_ = std::move(*listener);
     if (options_.stop_on_signals) WatchSignals();
     listener_->Start();
-    const unsigned count = IoThreads(options_.io_threads);
-    for (unsigned i = 0; i < count; ++i) io_threads_.emplace_back([this] { io_.run(); });
+    io_.Start();
     stopper_ = std::thread([this] { StopWhenAsked(); });
     return {};
   }
@@ -134,9 +132,7 @@ class Server::Impl {
       connections_.AbortAll();
       connections_.WaitUntilEmpty(kLastWords);
     }
-    work_.reset();
-    io_.stop();
-    for (std::thread& thread : io_threads_) thread.join();
+    io_.Stop();
     tiles_.Shutdown();
     return drained;
   }
@@ -177,10 +173,11 @@ class Server::Impl {
     context->options.idle_timeout = options_.idle_timeout;
     context->options.write_timeout = options_.write_timeout;
     context->options.max_body_bytes = kBodyBytes + kBytesPerLocation * options_.max_locations;
+    context->quick_handler = std::bind_front(&Routes::ServeAtOnce, &routes_);
     context->handler = std::bind_front(&Routes::Serve, &routes_);
     context->observer = [this](const ReplyRecord& record) {
       metrics_.CountReply(record);
-      spdlog::info("{}", FormatAccessLine(record));
+      if (spdlog::should_log(spdlog::level::info)) spdlog::info("{}", FormatAccessLine(record));
     };
     context->connections = &connections_;
     return context;
@@ -192,11 +189,9 @@ class Server::Impl {
   TileService tiles_;
   ConnectionSet connections_;
   const Routes routes_;
-  asio::io_context io_;
-  asio::executor_work_guard<asio::io_context::executor_type> work_;
+  IoThreads io_;
   asio::signal_set signals_;
   std::shared_ptr<Listener> listener_;
-  std::vector<std::thread> io_threads_;
 
   std::mutex mutex_;
   std::condition_variable changed_;

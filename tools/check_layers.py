@@ -44,6 +44,8 @@ LIBRARIES = [
     Library("GDAL", r"(gdal|cpl|ogr|vrt)\w*\.h|(proj|geodesic)\.h", r"engine/dem/"),
     Library("nlohmann_json", r"nlohmann/.*", r"(config/|proto/.*\.cc|server/.*\.cc)"),
     Library("libdeflate", r"libdeflate\.h", r"proto/.*\.cc"),
+    Library("brotli", r"brotli/.*", r"proto/.*\.cc"),
+    Library("zstd", r"zstd\.h", r"proto/.*\.cc"),
     Library("Draco", r"draco/.*", r"proto/.*\.cc"),
     Library("libjpeg", r"jpeglib\.h", r"proto/.*\.cc"),
     Library("libwebp", r"webp/.*", r"proto/.*\.cc"),

@@ -10,7 +10,6 @@
 #include <string>
 #include <utility>
 
-#include "proto/compress.h"
 #include "server/handlers/backend_failure.h"
 #include "server/http/http_error.h"
 #include "server/http/negotiate.h"
@@ -147,7 +146,7 @@ asio::awaitable<Response> AreaHandler::Handle(Route route, Request request) cons
                              coding](std::stop_token stop) -> Result<EncodedTile> {
     Result<EncodedTile> mesh = mesher_.build(index, plan, area, std::move(stop));
     if (!mesh || coding == Coding::kIdentity) return mesh;
-    mesh->bytes = proto::Gzip(mesh->bytes);
+    mesh->bytes = Compress(std::move(mesh->bytes), coding);
     mesh->etag = MakeEtag(mesh->bytes, coding);
     return mesh;
   };

@@ -8,7 +8,6 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "proto/compress.h"
 #include "server/handlers/backend_failure.h"
 #include "server/http/http_error.h"
 #include "server/http/negotiate.h"
@@ -47,7 +46,7 @@ asio::awaitable<Response> HeightsHandler::Handle(Route route, Request request) c
     if (!heights) return tl::unexpected(heights.error());
     EncodedTile reply;
     reply.bytes = HeightsJson(*query, *heights, datasets_[index].name);
-    if (coding == Coding::kGzip) reply.bytes = proto::Gzip(reply.bytes);
+    reply.bytes = Compress(std::move(reply.bytes), coding);
     reply.etag = MakeEtag(reply.bytes, coding);
     return reply;
   };

@@ -7,6 +7,9 @@
 #include <prometheus/text_serializer.h>
 
 #include <chrono>
+#include <map>
+#include <mutex>
+#include <shared_mutex>
 #include <string>
 #include <utility>
 #include <vector>
@@ -74,7 +77,30 @@ struct Metrics::Families {
   prometheus::Histogram& encode = stages.Add({{"stage", "encode"}}, Seconds());
   prometheus::Histogram& compress = stages.Add({{"stage", "compress"}}, Seconds());
   std::vector<std::string> dataset_names;
+
+  // What a reply counts in, found by its route, a literal, and its status: looking a family up takes as long as
+  // answering from the cache.
+  struct Reply {
+    prometheus::Counter& count;
+    prometheus::Histogram& duration;
+  };
+  const Reply& ReplyOf(std::string_view route, int status);
+
+  std::shared_mutex mutex;
+  std::map<std::pair<std::string_view, int>, Reply> replies;  // guarded by mutex
 };
+
+const Metrics::Families::Reply& Metrics::Families::ReplyOf(std::string_view route, int status) {
+  {
+    const std::shared_lock lock(mutex);
+    if (const auto found = replies.find({route, status}); found != replies.end()) return found->second;
+  }
+  const std::string name(route);
+  const Reply reply{requests.Add({{"route", name}, {"status", fmt::to_string(status)}}),
+                    durations.Add({{"route", name}}, Seconds())};
+  const std::unique_lock lock(mutex);
+  return replies.emplace(std::pair(route, status), reply).first->second;
+}
 
 Metrics::Metrics(std::span<const DatasetView> datasets) : families_(std::make_unique<Families>()) {
   for (const DatasetView& dataset : datasets) families_->dataset_names.push_back(dataset.name);
@@ -83,9 +109,9 @@ Metrics::Metrics(std::span<const DatasetView> datasets) : families_(std::make_un
 Metrics::~Metrics() = default;
 
 void Metrics::CountReply(const ReplyRecord& record) {
-  const std::string route(record.route);
-  families_->requests.Add({{"route", route}, {"status", fmt::to_string(record.status)}}).Increment();
-  families_->durations.Add({{"route", route}}, Seconds()).Observe(InSeconds(record.duration));
+  const Families::Reply& reply = families_->ReplyOf(record.route, record.status);
+  reply.count.Increment();
+  reply.duration.Observe(InSeconds(record.duration));
 }
 
 void Metrics::CountBuild(const TileRequest& request, const Result<TilePtr>& tile) {

@@ -43,6 +43,16 @@ Routes::Routes(std::span<const DatasetView> datasets, TileService& tiles, Static
       index_(Document::Make(IndexHtml(datasets), "text/html; charset=utf-8")),
       state_(std::move(state)) {}
 
+std::optional<Response> Routes::ServeAtOnce(const Request& request) const {
+  const Result<Route> route = Match(request.target);
+  if (!route) return ClientErrorResponse(route.error(), request.id);
+  if (route->kind == RouteKind::kHeights || route->kind == RouteKind::kMesh) return std::nullopt;
+  std::optional<Response> response =
+      route->kind == RouteKind::kTile ? tiles_.HandleNow(*route, request) : ServeNow(*route, request);
+  if (response) response->route = ToString(route->kind);
+  return response;
+}
+
 asio::awaitable<Response> Routes::Serve(Request request) const {
   const Result<Route> route = Match(request.target);
   if (!route) co_return ClientErrorResponse(route.error(), request.id);

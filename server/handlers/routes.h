@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -37,6 +38,10 @@ class Routes {
   // `datasets` and `tiles` must outlive this.
   Routes(std::span<const DatasetView> datasets, TileService& tiles, StaticFiles viewer, TileHandlerOptions options,
          Heights heights, AreaMesher mesher, State state);
+
+  // Answers what needs no waiting, which is most: all but tiles that must be built, heights and meshes. Nothing for
+  // those.
+  std::optional<Response> ServeAtOnce(const Request& request) const;
 
   // Answers GET, HEAD, and POST where TakesPost says so.
   asio::awaitable<Response> Serve(Request request) const;

@@ -39,6 +39,14 @@ std::string_view ContentTypeOf(const TileRequest& tile) {
 TileHandler::TileHandler(std::span<const DatasetView> datasets, TileService& tiles, TileHandlerOptions options)
     : datasets_(datasets), tiles_(tiles), options_(std::move(options)) {}
 
+std::optional<Response> TileHandler::HandleNow(const Route& route, const Request& request) const {
+  const Result<TileRequest> tile = Negotiate(route, request, datasets_);
+  if (!tile) return ClientErrorResponse(tile.error(), request.id);
+  const std::optional<ServedTile> found = tiles_.Find({*tile, datasets_[tile->dataset].generation});
+  if (!found) return std::nullopt;
+  return Reply(*found, *tile, request);
+}
+
 asio::awaitable<Response> TileHandler::Handle(Route route, Request request) const {
   const Result<TileRequest> tile = Negotiate(route, request, datasets_);
   if (!tile) co_return ClientErrorResponse(tile.error(), request.id);

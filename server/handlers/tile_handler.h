@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -26,6 +27,9 @@ class TileHandler {
  public:
   // `datasets` and `tiles` must outlive this.
   TileHandler(std::span<const DatasetView> datasets, TileService& tiles, TileHandlerOptions options);
+
+  // What needs no build: refusals, and tiles in the cache. Nothing otherwise. Precondition: a kTile route.
+  std::optional<Response> HandleNow(const Route& route, const Request& request) const;
 
   // Precondition: a kTile route.
   asio::awaitable<Response> Handle(Route route, Request request) const;

@@ -7,7 +7,6 @@
 #include <boost/asio/post.hpp>
 #include <boost/asio/redirect_error.hpp>
 #include <boost/asio/steady_timer.hpp>
-#include <boost/asio/strand.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <future>
 
@@ -44,12 +43,12 @@ const char* Remedy(const error_code& error) {
 
 }  // namespace
 
-Listener::Listener(asio::io_context& io, std::shared_ptr<const SessionContext> context)
-    : io_(io), context_(std::move(context)), acceptor_(asio::make_strand(io)) {}
+Listener::Listener(IoThreads& io, std::shared_ptr<const SessionContext> context)
+    : io_(io), context_(std::move(context)), acceptor_(io.first()) {}
 
-Result<std::shared_ptr<Listener>> Listener::Open(asio::io_context& io, const std::string& host, std::uint16_t port,
+Result<std::shared_ptr<Listener>> Listener::Open(IoThreads& io, const std::string& host, std::uint16_t port,
                                                  std::shared_ptr<const SessionContext> context) {
-  const Result<tcp::endpoint> endpoint = Resolve(io, host, port);
+  const Result<tcp::endpoint> endpoint = Resolve(io.first(), host, port);
   if (!endpoint) return tl::unexpected(endpoint.error());
   std::shared_ptr<Listener> listener(new Listener(io, std::move(context)));
   tcp::acceptor& acceptor = listener->acceptor_;
@@ -76,8 +75,8 @@ asio::awaitable<void> Listener::AcceptAll() {
   while (acceptor_.is_open()) {
     error_code error;
     if (!context_->connections->full()) {
-      const asio::any_io_executor strand = asio::make_strand(io_);
-      tcp::socket socket = co_await acceptor_.async_accept(strand, asio::redirect_error(asio::use_awaitable, error));
+      tcp::socket socket =
+          co_await acceptor_.async_accept(io_.Next(), asio::redirect_error(asio::use_awaitable, error));
       if (!error) {
         crowded = false;
         StartSession(std::move(socket), context_);
@@ -99,18 +98,18 @@ asio::awaitable<void> Listener::AcceptAll() {
 void Listener::Close() {
   std::promise<void> closed;
   asio::post(acceptor_.get_executor(), [this, &closed] {
-    CloseOnStrand();
+    CloseOnItsThread();
     closed.set_value();
   });
   closed.get_future().wait();
 }
 
-void Listener::CloseOnStrand() {
+void Listener::CloseOnItsThread() {
   error_code error;
   acceptor_.cancel(error);
   acceptor_.non_blocking(true, error);
   while (!error && !context_->connections->full()) {
-    tcp::socket socket(asio::make_strand(io_));
+    tcp::socket socket(io_.Next());
     acceptor_.accept(socket, error);
     if (!error) StartSession(std::move(socket), context_);
   }

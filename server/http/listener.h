@@ -4,7 +4,6 @@
 // kept alive to go. Running out of file descriptors is treated the same way.
 #pragma once
 
-#include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <cstdint>
 #include <memory>
@@ -12,6 +11,7 @@
 
 #include "engine/core/result.h"
 #include "server/asio.h"
+#include "server/http/io_threads.h"
 #include "server/http/session.h"
 
 namespace terrace::server {
@@ -19,7 +19,7 @@ namespace terrace::server {
 class Listener : public std::enable_shared_from_this<Listener> {
  public:
   // `host`: an address or a name. `port` 0: any that is free. Errors name the address and the remedy.
-  static Result<std::shared_ptr<Listener>> Open(asio::io_context& io, const std::string& host, std::uint16_t port,
+  static Result<std::shared_ptr<Listener>> Open(IoThreads& io, const std::string& host, std::uint16_t port,
                                                 std::shared_ptr<const SessionContext> context);
 
   std::uint16_t port() const { return port_; }
@@ -31,12 +31,12 @@ class Listener : public std::enable_shared_from_this<Listener> {
   void Close();
 
  private:
-  Listener(asio::io_context& io, std::shared_ptr<const SessionContext> context);
+  Listener(IoThreads& io, std::shared_ptr<const SessionContext> context);
   static asio::awaitable<void> Run(std::shared_ptr<Listener> self);
   asio::awaitable<void> AcceptAll();
-  void CloseOnStrand();
+  void CloseOnItsThread();
 
-  asio::io_context& io_;
+  IoThreads& io_;
   const std::shared_ptr<const SessionContext> context_;
   asio::ip::tcp::acceptor acceptor_;
   std::uint16_t port_ = 0;

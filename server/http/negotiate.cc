@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <limits>
+#include <map>
 #include <optional>
 
 #include "engine/geo/error_ladder.h"
@@ -31,6 +32,16 @@ std::string_view NextPiece(std::string_view& rest, std::string_view separators) 
   return piece;
 }
 
+// The coding of a name, or nothing of those nobody here speaks.
+std::optional<Coding> CodingOf(std::string_view name) {
+  if (EqualsIgnoringCase(name, "identity")) return Coding::kIdentity;
+  if (EqualsIgnoringCase(name, "x-gzip")) return Coding::kGzip;
+  for (const Coding coding : kCodings) {
+    if (EqualsIgnoringCase(name, NameOf(coding))) return coding;
+  }
+  return std::nullopt;
+}
+
 // A quality outside 0..1 or unreadable counts as 0: what a client says badly it does not get.
 double Quality(std::string_view parameters) {
   while (!parameters.empty()) {
@@ -45,30 +56,36 @@ double Quality(std::string_view parameters) {
 }
 
 // Draco ends in an entropy coder; meshopt leaves that to the transport.
-bool GzipHelps(const TileRequest& tile) {
+bool CompressionHelps(const TileRequest& tile) {
   return tile.format == TileFormat::kQuantizedMesh || tile.compression != proto::GlbCompression::kDraco;
 }
 
 }  // namespace
 
-Coding NegotiateCoding(std::string_view accept_encoding) {
-  std::optional<double> gzip, identity, any;
+Coding NegotiateCoding(std::string_view accept_encoding, std::span<const Coding> offered) {
+  std::map<Coding, double> named;
+  std::optional<double> any;
   while (!accept_encoding.empty()) {
     std::string_view item = NextPiece(accept_encoding, ",");
-    const std::string_view coding = NextPiece(item, ";");
+    const std::string_view name = NextPiece(item, ";");
     const double quality = Quality(item);
-    if (EqualsIgnoringCase(coding, "gzip") || EqualsIgnoringCase(coding, "x-gzip")) {
-      gzip = std::max(gzip.value_or(0), quality);
-    } else if (EqualsIgnoringCase(coding, "identity")) {
-      identity = quality;
-    } else if (coding == "*") {
+    if (name == "*") {
       any = quality;
+    } else if (const std::optional<Coding> coding = CodingOf(name)) {
+      const auto [entry, is_new] = named.emplace(*coding, quality);
+      if (!is_new) entry->second = std::max(entry->second, quality);
     }
   }
-  const double gzip_quality = gzip ? *gzip : any.value_or(0);
   // An identity that is not mentioned is acceptable, but only if nothing else is.
-  const double identity_quality = identity.value_or(0);
-  return gzip_quality > 0 && gzip_quality >= identity_quality ? Coding::kGzip : Coding::kIdentity;
+  Coding best = Coding::kIdentity;
+  double most = named.contains(Coding::kIdentity) ? named.at(Coding::kIdentity) : 0;
+  for (const Coding coding : offered) {
+    const double quality = named.contains(coding) ? named.at(coding) : any.value_or(0);
+    if (quality <= 0 || quality < most || (quality == most && best != Coding::kIdentity)) continue;
+    best = coding;
+    most = quality;
+  }
+  return best;
 }
 
 proto::TileExtensions WantedExtensions(std::string_view accept, const std::vector<std::string>& query_extensions) {
@@ -138,7 +155,7 @@ Result<TileRequest> Negotiate(const Route& route, const Request& request, std::s
     tile.compression = parameters->compression.value_or(view.glb_compression);
     if (view.texture) tile.texture = parameters->texture.value_or(*view.texture);
   }
-  if (GzipHelps(tile)) tile.coding = NegotiateCoding(request.accept_encoding);
+  if (CompressionHelps(tile)) tile.coding = NegotiateCoding(request.accept_encoding);
   if (route.format == TileFormat::kQuantizedMesh) {
     const proto::TileExtensions wanted = WantedExtensions(request.accept, parameters->extensions);
     tile.normals = wanted.octvertexnormals;

@@ -24,8 +24,9 @@ Result<TileRequest> Negotiate(const Route& route, const Request& request, std::s
 // The dataset's index, or kNotFound.
 Result<std::uint32_t> FindDataset(std::string_view name, std::span<const DatasetView> datasets);
 
-// gzip where the client takes it at least as gladly as identity. Without Accept-Encoding: identity.
-Coding NegotiateCoding(std::string_view accept_encoding);
+// Of `offered` the one that the client takes most gladly, if at least as gladly as identity; of several the first.
+// Without Accept-Encoding: identity.
+Coding NegotiateCoding(std::string_view accept_encoding, std::span<const Coding> offered = kCodings);
 
 // What `extensions=a-b` parameters anywhere in Accept, and the query's values, name together. Names nobody knows are
 // ignored. 3DTilesRendererJS hangs the parameter on application/octet-stream.

@@ -49,7 +49,18 @@ std::string_view ReasonPhrase(int status) {
 
 void Put(std::string& head, std::string_view name, std::string_view value) {
   TERRACE_CHECK(std::none_of(value.begin(), value.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }));
-  fmt::format_to(std::back_inserter(head), "{}: {}\r\n", name, value);
+  head.append(name).append(": ").append(value).append("\r\n");
+}
+
+// The Date header of now. Every thread keeps the text of its last second.
+const std::string& Date() {
+  thread_local std::time_t second = 0;
+  thread_local std::string text;
+  if (const std::time_t now = std::time(nullptr); now != second) {
+    second = now;
+    text = fmt::format("{:%a, %d %b %Y %H:%M:%S} GMT", fmt::gmtime(now));
+  }
+  return text;
 }
 
 bool HasBody(int status) { return status != 204 && status != 304; }
@@ -63,12 +74,14 @@ std::string_view Trim(std::string_view text) {
 }  // namespace
 
 std::string SerializeHead(const Response& response, unsigned version, bool keep_alive) {
-  std::string head = fmt::format("HTTP/1.{} {} {}\r\n", version % 10, response.status, ReasonPhrase(response.status));
+  std::string head;
   head.reserve(1024);
-  Put(head, "Date", fmt::format("{:%a, %d %b %Y %H:%M:%S} GMT", fmt::gmtime(std::time(nullptr))));
+  fmt::format_to(std::back_inserter(head), "HTTP/1.{} {} {}\r\n", version % 10, response.status,
+                 ReasonPhrase(response.status));
+  Put(head, "Date", Date());
   if (HasBody(response.status)) {
     if (!response.content_type.empty()) Put(head, "Content-Type", response.content_type);
-    if (response.coding == Coding::kGzip) Put(head, "Content-Encoding", "gzip");
+    if (response.coding != Coding::kIdentity) Put(head, "Content-Encoding", NameOf(response.coding));
     Put(head, "Content-Length", fmt::to_string(response.body ? response.body->size() : 0));
   }
   if (!response.etag.empty()) Put(head, "ETag", response.etag);
@@ -121,7 +134,8 @@ bool MatchesEtag(std::string_view if_none_match, std::string_view etag) {
 
 std::string MakeEtag(std::string_view bytes, Coding coding) {
   const XXH128_hash_t hash = XXH3_128bits(bytes.data(), bytes.size());
-  return fmt::format("\"{:016x}{:016x}{}\"", hash.high64, hash.low64, coding == Coding::kGzip ? "-gz" : "");
+  const std::string_view name = NameOf(coding);
+  return fmt::format("\"{:016x}{:016x}{}{}\"", hash.high64, hash.low64, name.empty() ? "" : "-", name);
 }
 
 }  // namespace terrace::server

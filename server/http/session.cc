@@ -78,27 +78,28 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
     const auto peer = stream_.socket().remote_endpoint(error);
     if (!error) peer_ = fmt::format("{}:{}", peer.address().to_string(), peer.port());
     stream_.socket().set_option(asio::ip::tcp::no_delay(true), error);
+    stream_.socket().non_blocking(true, error);
   }
   ~Session() override { context_->connections->Remove(this); }
 
   static asio::awaitable<void> Run(std::shared_ptr<Session> self) { co_await self->ServeAll(); }
 
-  void CloseIfIdle() override { Post(&Session::CloseIfIdleOnStrand); }
-  void Drain() override { Post(&Session::DrainOnStrand); }
-  void Abort() override { Post(&Session::AbortOnStrand); }
+  void CloseIfIdle() override { Post(&Session::CloseIfIdleHere); }
+  void Drain() override { Post(&Session::DrainHere); }
+  void Abort() override { Post(&Session::AbortHere); }
 
  private:
   void Post(void (Session::*step)()) {
     asio::dispatch(stream_.get_executor(), [self = shared_from_this(), step] { ((*self).*step)(); });
   }
-  void CloseIfIdleOnStrand() {
-    if (waiting_ && served_ > 0) DrainOnStrand();
+  void CloseIfIdleHere() {
+    if (waiting_ && served_ > 0) DrainHere();
   }
-  void DrainOnStrand() {
+  void DrainHere() {
     closing_ = true;
     if (waiting_) stream_.cancel();
   }
-  void AbortOnStrand() {
+  void AbortHere() {
     closing_ = true;
     stream_.close();
   }
@@ -109,6 +110,7 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   asio::awaitable<bool> ReadBody(Request& request);
   asio::awaitable<void> Refuse(Request request, Response response);
   asio::awaitable<bool> ServeOne(Request request);
+  std::optional<Response> AnswerAtOnce(const Request& request);
   asio::awaitable<std::optional<Response>> AnswerWhileConnected(Request request);
   asio::awaitable<Response> Answer(Request request);
   asio::awaitable<void> ClientLeft();
@@ -236,7 +238,8 @@ bool Session::TakeWhatArrived() {
 // False: the connection is to be closed.
 asio::awaitable<bool> Session::ServeOne(Request request) {
   const auto begun = Clock::now();
-  const std::optional<Response> response = co_await AnswerWhileConnected(request);
+  std::optional<Response> response = AnswerAtOnce(request);
+  if (!response) response = co_await AnswerWhileConnected(request);
   if (!response) {
     Response nobody;
     nobody.status = kClientLeft;
@@ -252,14 +255,25 @@ asio::awaitable<bool> Session::ServeOne(Request request) {
   co_return keep&& written;
 }
 
+// Nothing: the answer has to be waited for. Most answers need not be, and then neither a timer nor a second coroutine
+// watches the client meanwhile.
+std::optional<Response> Session::AnswerAtOnce(const Request& request) {
+  if (request.method == Method::kGet || request.method == Method::kHead) {
+    try {
+      if (context_->quick_handler) return context_->quick_handler(request);
+    } catch (const std::exception&) {  // the handler will meet it again, and say so
+    }
+    return std::nullopt;
+  }
+  const bool takes_post = TakesPost(request);
+  if (request.method == Method::kOptions) return PreflightResponse(takes_post);
+  if (request.method == Method::kPost && takes_post) return std::nullopt;
+  return NoSuchMethodResponse(takes_post, request.id);
+}
+
 // Nothing: the client is gone.
 asio::awaitable<std::optional<Response>> Session::AnswerWhileConnected(Request request) {
   using asio::experimental::awaitable_operators::operator||;
-  const bool takes_post = TakesPost(request);
-  if (request.method == Method::kOptions) co_return PreflightResponse(takes_post);
-  if (request.method == Method::kOther || (request.method == Method::kPost && !takes_post)) {
-    co_return NoSuchMethodResponse(takes_post, request.id);
-  }
   std::variant<Response, std::monostate> first = co_await (Answer(std::move(request)) || ClientLeft());
   if (first.index() == 1) co_return std::nullopt;
   co_return std::move(std::get<0>(first));
@@ -296,9 +310,11 @@ asio::awaitable<bool> Session::Write(std::string head, Body body) {
   const std::array<asio::const_buffer, 2> parts = {asio::buffer(head),
                                                    body ? asio::buffer(*body) : asio::const_buffer()};
   beast::buffers_suffix<std::array<asio::const_buffer, 2>> left(parts);
+  // What the kernel takes at once needs no timer. An error shows again when the rest is written.
+  error_code error;
+  left.consume(stream_.socket().write_some(left, error));
   while (asio::buffer_size(left) > 0) {
     stream_.expires_after(context_->options.write_timeout);
-    error_code error;
     const std::size_t sent = co_await stream_.async_write_some(left, asio::redirect_error(asio::use_awaitable, error));
     if (error) co_return false;
     left.consume(sent);

@@ -1,6 +1,6 @@
 // One connection: reads requests, has them answered in order, writes the replies.
 //
-// Everything of a session happens on its own strand. What a client can make it hold is bounded: one read buffer of
+// Everything of a session happens on one thread. What a client can make it hold is bounded: one read buffer of
 // kMaxHeadBytes, one request with a body of at most max_body_bytes, one reply.
 #pragma once
 
@@ -8,6 +8,7 @@
 #include <chrono>
 #include <functional>
 #include <memory>
+#include <optional>
 
 #include "server/asio.h"
 #include "server/http/access_log.h"
@@ -28,16 +29,20 @@ struct SessionOptions {
 // leaves.
 using Handler = std::function<asio::awaitable<Response>(Request)>;
 
+// The same for what can be answered without waiting; nothing for the rest, which the Handler is then asked.
+using QuickHandler = std::function<std::optional<Response>(const Request&)>;
+
 // Shared by all sessions, outlives them all. `connections` and what the functions refer to must outlive the sessions
 // too.
 struct SessionContext {
   SessionOptions options;
+  QuickHandler quick_handler;  // may be empty
   Handler handler;
   std::function<void(const ReplyRecord&)> observer;  // after every reply; called on any io thread
   ConnectionSet* connections = nullptr;
 };
 
-// Takes over an accepted socket whose executor is a strand.
+// Takes over an accepted socket, of an io_context that one thread runs.
 void StartSession(asio::ip::tcp::socket socket, std::shared_ptr<const SessionContext> context);
 
 }  // namespace terrace::server

@@ -110,7 +110,7 @@ void SingleFlight::Fly(const CacheKey& key, const std::shared_ptr<Flight>& fligh
     waiters = flight->waiters;
     Forget(key, flight);
   }
-  // A timer belongs to its coroutine's strand. The coroutine suspends in its wait before the strand runs anything else,
+  // A timer belongs to its coroutine's thread. The coroutine suspends in its wait before the thread runs anything else,
   // so the cancellation always meets a wait.
   for (Waiter& waiter : waiters) {
     const auto executor = waiter->get_executor();

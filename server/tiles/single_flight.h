@@ -7,7 +7,7 @@
 // A flight is told to stop when its last waiter leaves, at its deadline (that of the request that started it), or at
 // shutdown. A stopped flight takes no more passengers; the next request starts a new one.
 //
-// Thread-safe, with one condition: a coroutine that waits in Join runs on a strand (or on a single thread).
+// Thread-safe, with one condition: a coroutine that waits in Join runs on a single thread (or a strand).
 #pragma once
 
 #include <atomic>

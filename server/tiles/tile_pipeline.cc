@@ -4,7 +4,6 @@
 
 #include "engine/geo/error_ladder.h"
 #include "engine/tin/greedy.h"
-#include "proto/compress.h"
 #include "proto/quantized_mesh.h"
 #include "proto/tile_normals.h"
 #include "server/tiles/glb_mesher.h"
@@ -132,9 +131,9 @@ Result<EncodedTile> TilePipeline::Build(const TileRequest& request, std::stop_to
                                 : EncodeQuantizedMesh(request, **refined, error_m, encoded, stop);
   if (!done) return tl::unexpected(done.error());
 
-  if (request.coding == Coding::kGzip) {
+  if (request.coding != Coding::kIdentity) {
     const Clock::time_point start = Clock::now();
-    encoded.bytes = proto::Gzip(encoded.bytes);
+    encoded.bytes = Compress(std::move(encoded.bytes), request.coding);
     encoded.times.compress = Since(start);
   }
   encoded.etag = StrongETag(encoded.bytes);

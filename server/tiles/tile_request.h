@@ -9,11 +9,11 @@
 #include "proto/glb_tile.h"
 #include "proto/height_png.h"
 #include "proto/texture.h"
+#include "server/tiles/coding.h"
 
 namespace terrace::server {
 
 enum class TileFormat : std::uint8_t { kQuantizedMesh, kGlb, kHeightPng };
-enum class Coding : std::uint8_t { kIdentity, kGzip };
 
 // Pixels along an edge of a height tile; the first is the default.
 inline constexpr std::array<int, 2> kHeightSizes = {256, 512};

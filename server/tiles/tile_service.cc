@@ -30,11 +30,15 @@ TileService::TileService(TileServiceOptions options, TileBuilder builder, BuildO
 
 TileService::~TileService() { Shutdown(); }
 
+std::optional<ServedTile> TileService::Find(const CacheKey& key) {
+  TilePtr tile = cache_.Find(key);
+  if (!tile) return std::nullopt;
+  hits_.fetch_add(1, std::memory_order_relaxed);
+  return ServedTile(std::move(tile), CacheStatus::kHit);
+}
+
 asio::awaitable<Result<ServedTile>> TileService::Get(CacheKey key, Clock::time_point deadline) {
-  if (TilePtr tile = cache_.Find(key)) {
-    hits_.fetch_add(1, std::memory_order_relaxed);
-    co_return ServedTile(std::move(tile), CacheStatus::kHit);
-  }
+  if (std::optional<ServedTile> found = Find(key)) co_return *std::move(found);
   SingleFlight::Build build = [this, key](std::stop_token stop) { return BuildAndKeep(key, std::move(stop)); };
   SingleFlight::Landing landing = co_await flights_.Join(key, std::move(build), deadline);
   if (!landing.joined) misses_.fetch_add(1, std::memory_order_relaxed);

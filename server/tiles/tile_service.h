@@ -7,6 +7,7 @@
 #include <chrono>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <stop_token>
 #include <vector>
@@ -63,8 +64,11 @@ class TileService {
   TileService(TileServiceOptions options, TileBuilder builder, BuildObserver observer = nullptr);
   ~TileService();
 
+  // The tile if it is in the cache; counts as a hit then. From any thread.
+  std::optional<ServedTile> Find(const CacheKey& key);
+
   // Errors: those of the builder, and kOverloaded, kCancelled, kUnavailable of SingleFlight::Join. The coroutine has to
-  // run on a strand. Only successes are kept.
+  // run on a single thread. Only successes are kept.
   asio::awaitable<Result<ServedTile>> Get(CacheKey key, Clock::time_point deadline);
 
   // Runs `work` on a worker for this caller alone: nothing is shared or kept. Errors and conditions as those of Get. An

@@ -37,9 +37,12 @@ inline tin::TinMesh MeshInBlocks(const tin::HeightField& field, const tin::Greed
   return std::move(joiner).Take();
 }
 
+// Twice a turn, as peers do: the first time finds the caches as another process has left them.
 inline Contender Timed(Mesher mesher) {
   return [mesher = std::move(mesher)](const tin::HeightField& field, const tin::GreedyGoal& goal, Runs& runs) {
-    runs.seconds.push_back(SecondsOf([&] { runs.points = mesher(field, goal).vertices.size(); }));
+    for (int time = 0; time < 2; ++time) {
+      runs.seconds.push_back(SecondsOf([&] { runs.points = mesher(field, goal).vertices.size(); }));
+    }
   };
 }
 

@@ -1,8 +1,11 @@
 #include "proto/compress.h"
 
+#include <brotli/decode.h>
 #include <gtest/gtest.h>
 #include <zlib.h>
+#include <zstd.h>
 
+#include <cstdint>
 #include <string>
 
 namespace terrace::proto {
@@ -24,6 +27,25 @@ std::string Gunzip(const std::string& bytes, std::size_t size) {
   return out;
 }
 
+std::string Unbrotli(const std::string& bytes, std::size_t size) {
+  std::string out(size + 1, '\0');
+  std::size_t length = out.size();
+  EXPECT_EQ(BrotliDecoderDecompress(bytes.size(), reinterpret_cast<const std::uint8_t*>(bytes.data()), &length,
+                                    reinterpret_cast<std::uint8_t*>(out.data())),
+            BROTLI_DECODER_RESULT_SUCCESS);
+  out.resize(length);
+  return out;
+}
+
+std::string Unzstd(const std::string& bytes, std::size_t size) {
+  EXPECT_EQ(ZSTD_getFrameContentSize(bytes.data(), bytes.size()), size);
+  std::string out(size + 1, '\0');
+  const std::size_t length = ZSTD_decompress(out.data(), out.size(), bytes.data(), bytes.size());
+  EXPECT_FALSE(ZSTD_isError(length));
+  out.resize(length);
+  return out;
+}
+
 std::string Waves(std::size_t size) {
   std::string bytes;
   for (std::size_t i = 0; i < size; ++i) bytes.push_back(static_cast<char>((i * i / 7) % 61));
@@ -37,6 +59,20 @@ TEST(Gzip, ZlibReadsItBack) {
       EXPECT_EQ(Gunzip(Gzip(bytes, level), size), bytes) << size << " bytes at level " << level;
     }
   }
+}
+
+TEST(Brotli, ItsDecoderReadsItBack) {
+  for (std::size_t size : {0u, 1u, 100u, 70000u, 1000000u}) {
+    EXPECT_EQ(Unbrotli(Brotli(Waves(size)), size), Waves(size)) << size << " bytes";
+  }
+  EXPECT_LT(Brotli(Waves(50000)).size(), 10000u);
+}
+
+TEST(Zstd, ItsDecoderReadsItBack) {
+  for (std::size_t size : {0u, 1u, 100u, 70000u, 1000000u}) {
+    EXPECT_EQ(Unzstd(Zstd(Waves(size)), size), Waves(size)) << size << " bytes";
+  }
+  EXPECT_LT(Zstd(Waves(50000)).size(), 10000u);
 }
 
 TEST(Gzip, SameBytesInSameBytesOut) { EXPECT_EQ(Gzip(Waves(50000)), Gzip(Waves(50000))); }

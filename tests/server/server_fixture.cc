@@ -21,7 +21,7 @@ ServerFixture::ServerFixture() {
     EncodedTile tile;
     tile.bytes = BodyOf(request);
     tile.etag = fmt::format("\"{:x}\"", std::hash<std::string>{}(tile.bytes));
-    if (request.coding == Coding::kGzip) tile.bytes = proto::Gzip(tile.bytes);
+    tile.bytes = Compress(std::move(tile.bytes), request.coding);
     tile.max_error_m = 3.871234;
     return tile;
   };

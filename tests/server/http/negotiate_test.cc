@@ -19,13 +19,19 @@ TEST(Negotiate, ChoosesTheCodingByQuality) {
       {"gzip", Coding::kGzip},
       {"GZIP", Coding::kGzip},
       {"x-gzip", Coding::kGzip},
-      {"gzip, deflate, br, zstd", Coding::kGzip},
-      {"deflate, br", Coding::kIdentity},
+      {"gzip, deflate, br, zstd", Coding::kBrotli},
+      {"gzip, deflate, zstd", Coding::kGzip},
+      {"zstd", Coding::kZstd},
+      {"gzip, deflate", Coding::kGzip},
+      {"deflate, br", Coding::kBrotli},
+      {"gzip, br;q=0.9", Coding::kGzip},
+      {"br;q=0, *", Coding::kGzip},
+      {"BR;q=0.5, identity;q=0.6", Coding::kIdentity},
       {"identity", Coding::kIdentity},
-      {"*", Coding::kGzip},
+      {"*", Coding::kBrotli},
       {"*;q=0", Coding::kIdentity},
       {"gzip;q=0", Coding::kIdentity},
-      {"gzip;q=0.000, *", Coding::kIdentity},
+      {"gzip;q=0.000, *", Coding::kBrotli},
       {"gzip; q=0.5", Coding::kGzip},
       {"gzip;q=0.5, identity;q=0.9", Coding::kIdentity},
       {"identity;q=0.5, gzip;q=0.9", Coding::kGzip},
@@ -38,6 +44,12 @@ TEST(Negotiate, ChoosesTheCodingByQuality) {
       {"gzipped", Coding::kIdentity},
   };
   for (const auto& c : cases) EXPECT_EQ(NegotiateCoding(c.accept_encoding), c.coding) << c.accept_encoding;
+}
+
+TEST(Negotiate, ChoosesAmongWhatIsOffered) {
+  EXPECT_EQ(NegotiateCoding("gzip, br, zstd", kGzipOnly), Coding::kGzip);
+  EXPECT_EQ(NegotiateCoding("br, zstd", kGzipOnly), Coding::kIdentity);
+  EXPECT_EQ(NegotiateCoding("gzip, br", {}), Coding::kIdentity);
 }
 
 TEST(Negotiate, FindsExtensionsWhereverClientsAskForThem) {

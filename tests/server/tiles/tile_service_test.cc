@@ -7,6 +7,7 @@
 #include <boost/asio/use_future.hpp>
 #include <future>
 #include <new>
+#include <optional>
 #include <thread>
 
 namespace terrace::server {
@@ -28,6 +29,23 @@ TEST(TileService, BuildsOnceAndThenHits) {
   });
   EXPECT_EQ(Get(service)->cache, CacheStatus::kMiss);
   EXPECT_EQ(Get(service)->cache, CacheStatus::kHit);
+  EXPECT_EQ(builds, 1);
+  EXPECT_EQ(service.stats().hits, 1u);
+  EXPECT_EQ(service.stats().misses, 1u);
+}
+
+TEST(TileService, FindsWhatIsCachedAndBuildsNothing) {
+  std::atomic<int> builds{0};
+  TileService service({}, [&](const TileRequest&, std::stop_token) -> Result<EncodedTile> {
+    ++builds;
+    return EncodedTile();
+  });
+  EXPECT_FALSE(service.Find({}));
+  EXPECT_EQ(builds, 0);
+  ASSERT_TRUE(Get(service));
+  const std::optional<ServedTile> found = service.Find({});
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->cache, CacheStatus::kHit);
   EXPECT_EQ(builds, 1);
   EXPECT_EQ(service.stats().hits, 1u);
   EXPECT_EQ(service.stats().misses, 1u);

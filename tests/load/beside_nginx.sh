@@ -1,0 +1,79 @@
+#!/usr/bin/env bash
+# How quickly a cached tile leaves, beside nginx sending the same bytes from a file. Prints a Markdown table.
+#
+#   tests/load/beside_nginx.sh TERRACE TILE_URL [TURNS] [SECONDS] [CONNECTIONS]     default: 5 turns, 3 seconds, 64 connections
+#
+# TERRACE: the binary's process id, or a pattern that `pgrep -f` finds it by. TILE_URL: any tile of it; it is asked for with
+# Accept-Encoding: gzip. Start the server with one io thread and `log_level` warn: nginx runs one worker without a log.
+#
+# Both take turns. Requests a second are those of wrk; microseconds are the processor time of the serving process alone, which
+# stands other work on the machine better. Minimum and median of all turns; of requests a second the best and the median.
+set -euo pipefail
+export LC_ALL=C
+[[ $# -ge 2 && $# -le 5 ]] || { sed -n '2,/^set /{s/^# \{0,1\}//;/^set /!p}' "${BASH_SOURCE[0]}" >&2; exit 2; }
+pattern=$1 url=$2 turns=${3:-5} seconds=${4:-3} connections=${5:-64}
+for tool in nginx wrk curl; do
+  command -v "$tool" > /dev/null || { echo "beside_nginx.sh: $tool is not installed: apt-get install nginx-light wrk curl" >&2; exit 1; }
+done
+if [[ $pattern =~ ^[0-9]+$ ]]; then terrace=$pattern; else terrace=$(pgrep -f "$pattern" | head -n 1); fi
+[[ -n $terrace && -d /proc/$terrace ]] || { echo "beside_nginx.sh: no process matches '$pattern'" >&2; exit 1; }
+
+folder=$(mktemp -d)
+chmod 755 "$folder"
+trap 'kill "$(cat "$folder/pid" 2> /dev/null)" 2> /dev/null || true; rm -rf "$folder"' EXIT
+curl -fsS -H 'Accept-Encoding: gzip' -o "$folder/tile" "$url"
+port=$(python3 -c 'import socket; s = socket.socket(); s.bind(("127.0.0.1", 0)); print(s.getsockname()[1])')
+cat > "$folder/nginx.conf" <<CONF
+worker_processes 1; pid $folder/pid; error_log $folder/error.log;
+events { worker_connections 4096; }
+http {
+  access_log off; sendfile on; tcp_nopush on; tcp_nodelay on; keepalive_requests 1000000000; default_type application/octet-stream;
+  open_file_cache max=100; open_file_cache_valid 1h;
+  server { listen 127.0.0.1:$port; root $folder; }
+}
+CONF
+nginx -c "$folder/nginx.conf"
+sleep 0.5
+worker=$(pgrep -P "$(cat "$folder/pid")" | head -n 1)
+
+python3 - "$turns" "$seconds" "$connections" "$(stat -c %s "$folder/tile")" \
+  "terrace $terrace $url" "nginx $worker http://127.0.0.1:$port/tile" <<'PYTHON'
+import os, re, statistics, subprocess, sys
+
+turns, seconds, connections, size = (int(argument) for argument in sys.argv[1:5])
+tick = 1e6 / os.sysconf("SC_CLK_TCK")
+
+
+def processor_us(pid):
+    with open(f"/proc/{pid}/stat", encoding="ascii") as file:
+        fields = file.read().rsplit(")", 1)[1].split()
+    return (int(fields[11]) + int(fields[12])) * tick
+
+
+runs = {}
+for _ in range(turns):
+    for contender in sys.argv[5:]:
+        name, pid, url = contender.split()
+        before = processor_us(pid)
+        out = subprocess.run(["wrk", "-t1", f"-c{connections}", f"-d{seconds}s", "--latency", "-H", "Accept-Encoding: gzip", url],
+                             capture_output=True, text=True, check=True, stdin=subprocess.DEVNULL).stdout
+        used = processor_us(pid) - before
+        if "Non-2xx" in out or "Socket errors" in out:
+            sys.exit(f"beside_nginx.sh: {url} failed:\n{out}")
+        requests = int(re.search(r"(\d+) requests in", out)[1])
+        p99, unit = re.search(r"99%\s+([\d.]+)(us|ms|s)", out).groups()
+        runs.setdefault(name, []).append((float(re.search(r"Requests/sec:\s+([\d.]+)", out)[1]), used / requests,
+                                          float(p99) * {"us": 1e-3, "ms": 1, "s": 1e3}[unit]))
+
+print(f"{size:,} bytes, {connections} connections, {turns} turns of {seconds} s each\n")
+print("| | requests/s, best | median | p99 ms, least | median | us of processor a request, least | median |")
+print("|---|---|---|---|---|---|---|")
+for name, values in runs.items():
+    rate, used, p99 = zip(*values)
+    print(f"| {name} | {max(rate):,.0f} | {statistics.median(rate):,.0f} | {min(p99):.2f} | {statistics.median(p99):.2f} | "
+          f"{min(used):.1f} | {statistics.median(used):.1f} |")
+ours, theirs = runs["terrace"], runs["nginx"]
+print(f"| ratio | {max(r for r, _, _ in ours) / max(r for r, _, _ in theirs):.2f} | | "
+      f"{min(p for _, _, p in ours) / min(p for _, _, p in theirs):.2f} | | "
+      f"{min(u for _, u, _ in ours) / min(u for _, u, _ in theirs):.2f} | |")
+PYTHON
