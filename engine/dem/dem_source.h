@@ -72,7 +72,10 @@ struct RasterInfo {
   std::uint64_t valid_samples = 0, void_samples = 0;
   std::optional<double> nodata;
   std::vector<int> overview_factors;
-  std::string transform;  // the PROJ operation from EPSG:4326 to the source, for the log; empty: none needed
+  std::string transform;        // the PROJ operation from EPSG:4326 to the source, for the log; empty: none needed
+  bool needs_averages = false;  // large, and without overviews
+  bool prepared = false;        // it has averages in the cache folder
+  double seconds_to_open = 0;
 };
 
 // What `terrace info` prints and `/datasets` tells of a dataset.

@@ -2,6 +2,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include <chrono>
 #include <utility>
 
 #include "engine/dem/gdal_runtime.h"
@@ -61,6 +62,7 @@ void LogWhatMatters(GDALDataset& dataset, const RasterInfo& info, const Georefer
 
 Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path, const std::string& cache_dir,
                                                          const std::function<void(double)>& progress) {
+  const auto start = std::chrono::steady_clock::now();
   auto dataset = OpenRaster(path);
   if (!dataset) return tl::unexpected(dataset.error());
   auto georeference = Georeference::Of(**dataset, path);
@@ -81,6 +83,9 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
   source->footprint_ = Footprint::Of(source->georeference_);
   source->spacing_ = *spacing;
   source->info_ = Describe(**dataset, path, source->georeference_, source->layout_);
+  source->info_.needs_averages = NeedsAverages(source->layout_);
+  source->info_.prepared = source->averages_ != nullptr;
+  source->info_.seconds_to_open = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   source->info_.spacing_m = spacing->finer;
   source->info_.bounds = source->footprint_.Bounds();
   source->info_.heights = {survey.lowest, survey.highest};

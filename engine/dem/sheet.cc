@@ -96,7 +96,10 @@ Result<void> Sheet::FillAt(std::span<const Position> positions, int factor, std:
   if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "was stopped");
   // Files are looked at even where nothing must be read: a tile of floor must not outlive its source.
   if (cells.empty()) return raster_->CheckUnchanged();
-  const GridWindow window = WindowOf(cells, columns, rows);
+  GridWindow window = WindowOf(cells, columns, rows);
+  // Samples between the outermost nodes and the rim are wanted too.
+  constexpr int kRim = 3;
+  if (trace != nullptr) window = Grown(window, kRim, columns, rows);
   const auto samples = ReadFilled(factor, window, stop, trace);
   if (!samples) return tl::unexpected(samples.error());
   for (std::size_t i = 0; i < cells.size(); ++i) {

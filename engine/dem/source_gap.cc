@@ -174,6 +174,12 @@ class SheetGap {
     const GridWindow& window = trace_.window;
     east = std::min(east, window.column + window.columns - 1);
     south = std::min(south, window.row + window.rows - 1);
+    return BoxGap(nodes, west, north, east, south, has_voids);
+  }
+
+  // The same for averages in a box, ends included.
+  double BoxGap(const std::array<std::size_t, 4>& nodes, std::int64_t west, std::int64_t north, std::int64_t east,
+                std::int64_t south, bool& has_voids) const {
     double lowest = std::numeric_limits<double>::infinity(), highest = -lowest;
     for (std::int64_t row = north; row <= south; ++row) {
       for (std::int64_t column = west; column <= east; ++column) {
@@ -269,6 +275,33 @@ class SheetGap {
     return std::isfinite(sum);
   }
 
+  // Against the averages that samples in a box of pixels are near to; infinite where not all of them were read.
+  double NearGap(const std::array<std::size_t, 4>& nodes, double west, double north, double east, double south) const {
+    constexpr double kUnknown = std::numeric_limits<double>::infinity();
+    const GridAxis columns(sheet_.columns(), trace_.factor, sheet_.wraps()), rows(sheet_.rows(), trace_.factor, false);
+    const auto index = [&](double pixel) { return static_cast<std::int64_t>(std::floor(pixel / trace_.factor - 0.5)); };
+    std::int64_t left = index(west), right = index(east) + 1;
+    // The last average of an axis may stand for fewer pixels, and lie nearer: one more.
+    const std::int64_t top = std::clamp<std::int64_t>(index(north), 0, rows.count() - 1);
+    const std::int64_t bottom = std::clamp<std::int64_t>(index(south) + 2, 0, rows.count() - 1);
+    if (!sheet_.wraps()) {
+      left = std::clamp<std::int64_t>(left, 0, columns.count() - 1);
+      right = std::clamp<std::int64_t>(right + 1, 0, columns.count() - 1);
+    } else if (sheet_.columns() % trace_.factor != 0) {
+      return kUnknown;
+    }
+    const GridWindow& window = trace_.window;
+    if (top < window.row || bottom >= window.row + window.rows) return kUnknown;
+    for (const int turn : {0, -1, 1}) {
+      const std::int64_t shift = turn * columns.count();
+      if (turn != 0 && !sheet_.wraps()) continue;
+      if (left + shift < window.column || right + shift >= window.column + window.columns) continue;
+      bool has_voids = false;
+      return BoxGap(nodes, left + shift, top, right + shift, bottom, has_voids);
+    }
+    return kUnknown;
+  }
+
   // Against everything that the raster has around the cell, or anywhere where its place cannot be told.
   double RangeGap(const std::array<std::size_t, 4>& nodes, int j) const {
     double west = std::numeric_limits<double>::infinity(), east = -west, north = west, south = -west;
@@ -295,6 +328,7 @@ class SheetGap {
     const auto first = [](double at) { return std::ceil(at - 0.5); };
     const auto last = [](double at) { return std::floor(at - 0.5); };
     if (first(north - y) > last(south + y)) return 0;
+    if (const double gap = NearGap(nodes, west - x, north - y, east + x, south + y); std::isfinite(gap)) return gap;
     BlockRange range;
     for (const int turn : {-1, 0, 1}) {
       if (turn != 0 && !sheet_.wraps()) continue;

@@ -22,11 +22,15 @@ class Progress {
   std::function<void(double)> Callback();
 
  private:
+  // ", 12 s left"; empty while nothing can be said.
+  std::string TimeLeft(std::chrono::steady_clock::time_point now) const;
+
   const std::string what_;
   const bool terminal_;
   const std::chrono::steady_clock::time_point start_;
   std::chrono::steady_clock::time_point last_;
   double share_ = 0;  // never falls
+  double first_share_ = 0;
   bool shown_ = false;
 };
 

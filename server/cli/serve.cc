@@ -113,7 +113,7 @@ proto::GlbOptions GlbOptionsOf(const config::DatasetConfig& dataset) {
 bool OpenDatasets(const config::Config& config, std::vector<server::Dataset>& datasets) {
   bool all_open = true;
   for (const config::DatasetConfig& wanted : config.datasets) {
-    Progress progress("reading " + wanted.sources.front());
+    Progress progress((config.cache_dir.empty() ? "reading " : "preparing ") + wanted.sources.front() + ":");
     dem::DemOptions options;
     options.error_fraction = wanted.error_fraction;
     options.finest_error = wanted.finest_error;
