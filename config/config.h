@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "config/listen_address.h"
@@ -22,6 +23,8 @@ enum class VerticalDatum : std::uint8_t { kUnknown };
 enum class Criterion : std::uint8_t { kDelaunay, kDataDependent };
 // How GLB tiles are compressed unless a request says: proto::GlbCompression, which this room does not know.
 enum class GlbCompression : std::uint8_t { kDraco, kNone, kQuantized, kMeshopt };
+// Which header trusted proxies write.
+enum class ForwardedHeader : std::uint8_t { kXForwarded, kForwarded };
 enum class LogLevel : std::uint8_t { kDebug, kInfo, kWarn, kError, kOff };
 enum class LogFormat : std::uint8_t { kText, kJson };
 
@@ -48,9 +51,23 @@ struct ImageryConfig {
   friend bool operator==(const ImageryConfig&, const ImageryConfig&) = default;
 };
 
+// One entry of a dataset's sources: a file, a glob or a folder. Its files are of equal rank.
+struct SourceConfig {
+  SourceConfig() = default;
+  // One file. Implicit: a path is a source.
+  SourceConfig(std::string file) : written(std::move(file)), files{written} {}  // NOLINT(google-explicit-constructor)
+  SourceConfig(const char* file) : SourceConfig(std::string(file)) {}           // NOLINT(google-explicit-constructor)
+
+  std::string written;             // path or pattern, absolute
+  std::vector<std::string> files;  // what it stands for
+  bool is_folder = false;          // what is no raster among them is left out
+
+  friend bool operator==(const SourceConfig&, const SourceConfig&) = default;
+};
+
 struct DatasetConfig {
-  std::string name;                  // the first part of its URLs: [A-Za-z0-9._-]{1,64}
-  std::vector<std::string> sources;  // files, after globs are expanded; exactly one for now
+  std::string name;                   // the first part of its URLs: [A-Za-z0-9._-]{1,64}
+  std::vector<SourceConfig> sources;  // the first that has a height at a place gives it
   VerticalDatum vertical = VerticalDatum::kUnknown;
   std::string attribution;
   double error_fraction = 0.5;         // default error of a level, as a share of the error that clients assume there
@@ -64,6 +81,7 @@ struct DatasetConfig {
   int draco_normal_bits = 8;  // of each of the two coordinates of a normal
   WaterConfig water;
   ImageryConfig imagery;
+  bool is_public = false;         // seen without a token, where there are tokens
   int metadata_availability = 0;  // levels; tiles of every so many tell what is below them, 0: none
 
   friend bool operator==(const DatasetConfig&, const DatasetConfig&) = default;
@@ -75,6 +93,23 @@ struct ViewerConfig {
   std::filesystem::path directory;
 
   friend bool operator==(const ViewerConfig&, const ViewerConfig&) = default;
+};
+
+// What opens datasets to whoever shows it.
+struct TokenConfig {
+  std::string name;                   // in the log
+  std::string token, sha256;          // one of both: itself, or its hash in hexadecimal
+  std::vector<std::string> datasets;  // empty: all
+  double requests_per_second = 0;     // 0: as everybody
+
+  friend bool operator==(const TokenConfig&, const TokenConfig&) = default;
+};
+
+// PEM files; empty: plain HTTP.
+struct TlsConfig {
+  std::string certificate, key;
+
+  friend bool operator==(const TlsConfig&, const TlsConfig&) = default;
 };
 
 struct Config {
@@ -90,13 +125,24 @@ struct Config {
   std::size_t refinement_cache_bytes = std::size_t{128} << 20;  // 0: no cache
   std::string cache_dir;  // what is learnt of sources is kept there; empty: nowhere
   std::size_t max_connections = 1024;
+  std::size_t max_connections_per_client = 0;          // 0: as many as there may be in all
+  std::size_t transfer_bytes = std::size_t{48} << 20;  // of bodies on their way
+  double requests_per_second = 0;                      // of each client or token; 0: any
+  double request_burst = 0;                            // 0: two seconds' worth
   std::size_t max_mesh_samples = 1'000'000;
   std::size_t max_locations = 10'000;  // in one request for heights
+
+  std::vector<TokenConfig> tokens;  // none: everybody sees everything
+  std::vector<std::string> cors_origins = {"*"};
+  std::vector<std::string> trusted_proxies;  // addresses and ranges
+  ForwardedHeader forwarded_header = ForwardedHeader::kXForwarded;
+  TlsConfig tls;
 
   std::chrono::milliseconds request_deadline{30'000};
   std::chrono::milliseconds header_timeout{5'000};
   std::chrono::milliseconds idle_timeout{30'000};
   std::chrono::milliseconds write_timeout{20'000};
+  std::size_t min_read_rate = 4096;  // bytes a second; 0: any
   std::chrono::milliseconds drain_timeout{10'000};
 
   LogLevel log_level = LogLevel::kInfo;

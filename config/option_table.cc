@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "config/edge_options.h"
 #include "config/layer_options.h"
 #include "config/nearest_name.h"
 #include "config/source_paths.h"
@@ -68,28 +69,26 @@ Codec<DatasetConfig> Vertical() {
 Codec<DatasetConfig> Sources() {
   return {[](const Json& value, const Place& place, DatasetConfig& dataset) {
             if (!value.is_array() || value.empty())
-              return place.Expected("a list of paths such as [\"dem.tif\"]", value);
-            bool complete = true;
+              return place.Expected("a list of paths such as [\"lidar/*.tif\", \"base.tif\"]", value);
             for (std::size_t i = 0; i < value.size(); ++i) {
-              const bool is_path = value[i].is_string() && !value[i].get_ref<const std::string&>().empty();
-              Result<std::vector<std::string>> files;
-              if (!is_path) {
-                place.At(i).Expected("a path or a glob", value[i]);
-              } else if (files = ExpandSource(value[i].get<std::string>(), place.directory()); !files) {
-                place.At(i).Fail(files.error().message +
+              if (!value[i].is_string() || value[i].get_ref<const std::string&>().empty()) {
+                place.At(i).Expected("a path, a glob or a folder", value[i]);
+                continue;
+              }
+              Result<SourceConfig> source = ExpandSource(value[i].get<std::string>(), place.directory());
+              if (source) {
+                dataset.sources.push_back(*std::move(source));
+              } else {
+                place.At(i).Fail(source.error().message +
                                  "; correct the path, which is relative to the folder of this file");
               }
-              complete = complete && is_path && files;
-              if (is_path && files) dataset.sources.insert(dataset.sources.end(), files->begin(), files->end());
-            }
-            if (complete && dataset.sources.size() > 1) {
-              place.Fail(
-                  fmt::format("gives {} files, but mosaics are not supported yet: name one raster, or make one of them "
-                              "with gdalbuildvrt and gdal_translate",
-                              dataset.sources.size()));
             }
           },
-          [](const DatasetConfig& dataset) { return Json(dataset.sources); }};
+          [](const DatasetConfig& dataset) {
+            Json list = Json::array();
+            for (const SourceConfig& source : dataset.sources) list.push_back(source.written);
+            return list;
+          }};
 }
 
 Codec<Config> Datasets() {
@@ -135,8 +134,23 @@ const std::vector<Option<Config>>& ServerOptionTable() {
       {"refinement_cache_bytes", "BYTES",
        "Memory for what tiles are made from: other errors of a tile cost a fraction then; 0 is no cache",
        Bytes(&Config::refinement_cache_bytes, kMaxCacheBytes)},
-      {"max_connections", "N", "Connections at a time; above it idle ones are closed and new ones wait",
+      {"max_connections", "N", "Connections at a time; above it idle ones are closed and new ones turned away",
        Integer(&Config::max_connections, 1, 1'000'000)},
+      {"max_connections_per_client", "N", "Connections of one address at a time; 0 is no limit of its own",
+       Integer(&Config::max_connections_per_client, 0, 1'000'000)},
+      {"transfer_bytes", "BYTES", "Memory for replies that clients have not taken yet, and for request bodies",
+       Bytes(&Config::transfer_bytes, kMaxCacheBytes)},
+      {"requests_per_second", "N", "Requests of one address or token in the long run; more get 429; 0 is any number",
+       Number(&Config::requests_per_second, 0, 1'000'000)},
+      {"request_burst", "N", "Requests of one address or token at once; 0 is twice requests_per_second",
+       Number(&Config::request_burst, 0, 1'000'000)},
+      {"tokens", "", "Who may see which datasets; none: everybody sees all", TokensCodec()},
+      {"cors_origins", "LIST", "Web pages that may read replies, with commas between them; * is any", OriginsCodec()},
+      {"trusted_proxies", "LIST", "Proxies whose word on the client counts: addresses and ranges", ProxiesCodec()},
+      {"forwarded_header", "NAME", "What trusted proxies write: x-forwarded (-for, -proto, -host) or forwarded",
+       Choice(&Config::forwarded_header,
+              {{"x-forwarded", ForwardedHeader::kXForwarded}, {"forwarded", ForwardedHeader::kForwarded}})},
+      {"tls", "CERT,KEY", "PEM files for HTTPS; without them plain HTTP is spoken", TlsCodec()},
       {"max_locations", "N", "Points that one request for heights may name",
        Integer(&Config::max_locations, 1, 1'000'000)},
       {"max_mesh_samples", "N", "Height samples that one mesh of an area may be made from",
@@ -148,6 +162,8 @@ const std::vector<Option<Config>>& ServerOptionTable() {
       {"idle_timeout_s", "SECONDS", "Time an idle connection is kept open", Seconds(&Config::idle_timeout, 0.1, 3600)},
       {"write_timeout_s", "SECONDS", "Time for a client to take a response",
        Seconds(&Config::write_timeout, 0.1, 3600)},
+      {"min_read_rate", "BYTES", "Bytes a second that a client has to take of a long response; 0 is any",
+       Integer(&Config::min_read_rate, 0, 1'000'000'000)},
       {"drain_timeout_s", "SECONDS", "Time for open requests to finish when the server stops",
        Seconds(&Config::drain_timeout, 0, 3600)},
       {"log_level", "LEVEL", "The least important messages to log: debug, info, warn, error or off",
@@ -166,7 +182,8 @@ const std::vector<Option<DatasetConfig>>& DatasetOptionTable() {
   static const std::vector<Option<DatasetConfig>> table = {
       {"name", "NAME", "The dataset's name in URLs; by default that of the file",
        Text(&DatasetConfig::name, CheckDatasetName)},
-      {"sources", "", "Paths or globs of the rasters; exactly one raster for now", Sources()},
+      {"sources", "", "Files, globs and folders of rasters; the first that has a height at a place gives it",
+       Sources()},
       {"vertical", "DATUM", "What the heights count from; only unknown for now: heights are passed through",
        Vertical()},
       {"attribution", "TEXT", "Who to thank for the data; clients show it",
@@ -197,6 +214,7 @@ const std::vector<Option<DatasetConfig>>& DatasetOptionTable() {
        Integer(&DatasetConfig::draco_normal_bits, 4, 16)},
       {"water", "METRES|FILE", "Water masks: a sea level, or a raster that is not zero on water", WaterCodec()},
       {"imagery", "FILE", "An image that the textures of GLB tiles are cut from", ImageryCodec()},
+      {"public", "true|false", "Seen without a token, where there are tokens", Switch(&DatasetConfig::is_public)},
       {"metadata_availability", "LEVELS", "Tiles of every so many levels tell which tiles are below them; 0: none do",
        Integer(&DatasetConfig::metadata_availability, 0, 24)},
   };
@@ -235,8 +253,10 @@ Json WriteObject(const Target& source, const std::vector<Option<Target>>& table)
 template void ReadObject(const Json&, const Place&, const std::vector<Option<Config>>&, Config&);
 template void ReadObject(const Json&, const Place&, const std::vector<Option<DatasetConfig>>&, DatasetConfig&);
 template void ReadObject(const Json&, const Place&, const std::vector<Option<ImageryConfig>>&, ImageryConfig&);
+template void ReadObject(const Json&, const Place&, const std::vector<Option<TokenConfig>>&, TokenConfig&);
 template Json WriteObject(const Config&, const std::vector<Option<Config>>&);
 template Json WriteObject(const DatasetConfig&, const std::vector<Option<DatasetConfig>>&);
 template Json WriteObject(const ImageryConfig&, const std::vector<Option<ImageryConfig>>&);
+template Json WriteObject(const TokenConfig&, const std::vector<Option<TokenConfig>>&);
 
 }  // namespace terrace::config

@@ -33,7 +33,7 @@ void SetFromText(const std::vector<Option<Target>>& table, std::string_view key,
   TERRACE_CHECK(option != table.end() && option->codec.from_text != nullptr);
   std::vector<ConfigError> found;
   option->codec.read(option->codec.from_text(text), Place({}, "", found), target);
-  for (const ConfigError& error : found) errors.push_back({FlagOf(key), error.message});
+  for (const ConfigError& error : found) errors.push_back({FlagOf(key) + error.path, error.message});
 }
 
 }  // namespace

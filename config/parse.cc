@@ -7,6 +7,7 @@
 
 #include "config/json_text.h"
 #include "config/option_table.h"
+#include "config/source_paths.h"
 
 namespace terrace::config {
 namespace {
@@ -41,6 +42,11 @@ ConfigResult LoadConfig(const std::filesystem::path& file) {
   const std::string text{std::istreambuf_iterator<char>(stream), {}};
   if (stream.bad()) return Unreadable("cannot be read to its end");
   return ParseConfig(text, std::filesystem::absolute(file).parent_path());
+}
+
+Result<SourceConfig> SourceAt(const std::string& path) {
+  std::error_code ignored;
+  return std::filesystem::is_directory(path, ignored) ? ExpandSource(path, {}) : SourceConfig(path);
 }
 
 std::string ToJson(const Config& config) {

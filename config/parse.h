@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "config/config.h"
+#include "engine/core/result.h"
 
 namespace terrace::config {
 
@@ -22,5 +23,9 @@ ConfigResult LoadConfig(const std::filesystem::path& file);
 
 // All options as JSON with two spaces of indentation and a final newline. ParseConfig reads it back to an equal Config.
 std::string ToJson(const Config& config);
+
+// What a path of the command line stands for: a file or a folder, never a glob (the shell has expanded those).
+// kNotFound, kUnavailable: a folder without files, or one that cannot be read.
+Result<SourceConfig> SourceAt(const std::string& path);
 
 }  // namespace terrace::config

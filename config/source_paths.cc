@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <memory>
+#include <string_view>
+#include <system_error>
 
 namespace terrace::config {
 namespace {
@@ -19,13 +21,30 @@ std::string EscapeForGlob(const std::string& path) {
   return escaped;
 }
 
+Result<SourceConfig> FilesIn(const std::string& folder) {
+  SourceConfig source(folder);
+  source.is_folder = true;
+  source.files.clear();
+  std::error_code error;
+  for (std::filesystem::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
+    const std::string name = it->path().filename().string();
+    std::error_code ignored;
+    if (!name.starts_with('.') && it->is_regular_file(ignored)) source.files.push_back(it->path().string());
+  }
+  if (error) return MakeError(ErrorCode::kUnavailable, "the folder {} cannot be read", folder);
+  if (source.files.empty()) return MakeError(ErrorCode::kNotFound, "the folder {} holds no file", folder);
+  std::sort(source.files.begin(), source.files.end());
+  return source;
+}
+
 }  // namespace
 
-Result<std::vector<std::string>> ExpandSource(const std::string& written, const std::filesystem::path& directory) {
+Result<SourceConfig> ExpandSource(const std::string& written, const std::filesystem::path& directory) {
   const std::string path = (directory / written).string();
   std::error_code ignored;
+  if (std::filesystem::is_directory(path, ignored)) return FilesIn(path);
   if (written.find_first_of(kGlobCharacters) == std::string::npos || std::filesystem::exists(path, ignored)) {
-    return std::vector<std::string>{path};
+    return SourceConfig(path);
   }
   const std::filesystem::path pattern = std::filesystem::path(EscapeForGlob(directory.string())) / written;
   glob_t matches{};
@@ -34,9 +53,10 @@ Result<std::vector<std::string>> ExpandSource(const std::string& written, const 
   if (status == GLOB_NOMATCH) return MakeError(ErrorCode::kNotFound, "no file matches {}", path);
   if (status != 0)
     return MakeError(ErrorCode::kUnavailable, "a folder on the way to {} is missing or cannot be read", path);
-  std::vector<std::string> files(matches.gl_pathv, matches.gl_pathv + matches.gl_pathc);
-  std::sort(files.begin(), files.end());  // glob itself would sort by locale
-  return files;
+  SourceConfig source(pattern.string());
+  source.files.assign(matches.gl_pathv, matches.gl_pathv + matches.gl_pathc);
+  std::sort(source.files.begin(), source.files.end());  // glob itself would sort by locale
+  return source;
 }
 
 }  // namespace terrace::config

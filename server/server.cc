@@ -4,6 +4,8 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/detached.hpp>
 #include <boost/asio/signal_set.hpp>
 #include <condition_variable>
 #include <csignal>
@@ -16,7 +18,7 @@
 #include "server/handlers/metrics.h"
 #include "server/handlers/routes.h"
 #include "server/handlers/static_files.h"
-#include "server/http/connection_set.h"
+#include "server/http/edge.h"
 #include "server/http/io_threads.h"
 #include "server/http/listener.h"
 #include "server/http/session.h"
@@ -52,6 +54,12 @@ unsigned IoThreadCount(unsigned configured) {
   return configured > 0 ? configured : std::max(1u, std::thread::hardware_concurrency() / 4);
 }
 
+// Sources that workers have open, and what opens files on the way: the log, GDAL's and PROJ's own.
+std::size_t DescriptorsForFiles(const ServerOptions& options) {
+  const unsigned workers = options.worker_threads > 0 ? options.worker_threads : std::thread::hardware_concurrency();
+  return 16 + 4 * std::size_t{workers};
+}
+
 TileServiceOptions ServiceOptions(const ServerOptions& options) {
   TileServiceOptions service;
   service.worker_threads = options.worker_threads;
@@ -66,12 +74,13 @@ TileServiceOptions ServiceOptions(const ServerOptions& options) {
 // before everything a session refers to.
 class Server::Impl {
  public:
-  Impl(std::vector<DatasetView> datasets, TileBuilder builder, StaticFiles viewer, ServerOptions options)
+  Impl(std::vector<DatasetView> datasets, TileBuilder builder, StaticFiles viewer, std::unique_ptr<Edge> edge,
+       ServerOptions options)
       : options_(std::move(options)),
         datasets_(std::move(datasets)),
         metrics_(datasets_),
         tiles_(ServiceOptions(options_), std::move(builder), std::bind_front(&Metrics::CountBuild, &metrics_)),
-        connections_(options_.max_connections),
+        edge_(std::move(edge)),
         routes_(datasets_, tiles_, std::move(viewer), HandlerOptions(), HeightsOptions(), options_.area_mesher,
                 RouteState()),
         io_(IoThreadCount(options_.io_threads)),
@@ -89,6 +98,7 @@ class Server::Impl {
     listener_ = std::move(*listener);
     if (options_.stop_on_signals) WatchSignals();
     listener_->Start();
+    if (edge_->tls) asio::co_spawn(io_.first(), WatchCertificate(edge_->tls.get()), asio::detached);
     io_.Start();
     stopper_ = std::thread([this] { StopWhenAsked(); });
     return {};
@@ -96,6 +106,7 @@ class Server::Impl {
 
   std::uint16_t port() const { return listener_->port(); }
   const std::string& host() const { return options_.host; }
+  bool is_tls() const { return edge_->tls != nullptr; }
 
   void RequestStop() {
     const std::lock_guard lock(mutex_);
@@ -124,13 +135,13 @@ class Server::Impl {
 
   bool Stop() {
     listener_->Close();
-    connections_.Drain();
-    const bool drained = connections_.WaitUntilEmpty(options_.drain_timeout);
+    edge_->connections.Drain();
+    const bool drained = edge_->connections.WaitUntilEmpty(options_.drain_timeout);
     tiles_.CancelBuilds();
-    if (!drained && !connections_.WaitUntilEmpty(kLastWords)) {
-      spdlog::warn("{} connections are cut off: the drain timeout has passed", connections_.size());
-      connections_.AbortAll();
-      connections_.WaitUntilEmpty(kLastWords);
+    if (!drained && !edge_->connections.WaitUntilEmpty(kLastWords)) {
+      spdlog::warn("{} connections are cut off: the drain timeout has passed", edge_->connections.size());
+      edge_->connections.AbortAll();
+      edge_->connections.WaitUntilEmpty(kLastWords);
     }
     io_.Stop();
     tiles_.Shutdown();
@@ -162,16 +173,16 @@ class Server::Impl {
 
   Routes::State RouteState() {
     Routes::State state;
-    state.draining = [this] { return connections_.draining(); };
-    state.metrics_text = [this] { return metrics_.Text(tiles_.stats(), RefinementStats(), connections_.size()); };
+    state.draining = [this] { return edge_->connections.draining(); };
+    state.metrics_text = [this] { return metrics_.Text(tiles_.stats(), RefinementStats(), edge_->stats()); };
     return state;
   }
 
   std::shared_ptr<const SessionContext> Context() {
     auto context = std::make_shared<SessionContext>();
-    context->options.header_timeout = options_.header_timeout;
-    context->options.idle_timeout = options_.idle_timeout;
+    context->options.read = {options_.header_timeout, options_.idle_timeout};
     context->options.write_timeout = options_.write_timeout;
+    context->options.min_rate = options_.min_read_rate;
     context->options.max_body_bytes = kBodyBytes + kBytesPerLocation * options_.max_locations;
     context->quick_handler = std::bind_front(&Routes::ServeAtOnce, &routes_);
     context->handler = std::bind_front(&Routes::Serve, &routes_);
@@ -179,7 +190,11 @@ class Server::Impl {
       metrics_.CountReply(record);
       if (spdlog::should_log(spdlog::level::info)) spdlog::info("{}", FormatAccessLine(record));
     };
-    context->connections = &connections_;
+    context->connections = &edge_->connections;
+    context->transfers = &edge_->transfers;
+    context->gate = &edge_->gate;
+    context->cors = edge_->cors;
+    context->tls = edge_->tls.get();
     return context;
   }
 
@@ -187,7 +202,7 @@ class Server::Impl {
   const std::vector<DatasetView> datasets_;
   Metrics metrics_;
   TileService tiles_;
-  ConnectionSet connections_;
+  const std::unique_ptr<Edge> edge_;
   const Routes routes_;
   IoThreads io_;
   asio::signal_set signals_;
@@ -209,7 +224,10 @@ Result<std::unique_ptr<Server>> Server::Start(std::vector<DatasetView> datasets,
   if (const Result<void> named = CheckNames(datasets); !named) return tl::unexpected(named.error());
   Result<StaticFiles> viewer = StaticFiles::Load(options.viewer_dir);
   if (!viewer) return tl::unexpected(viewer.error());
-  auto impl = std::make_unique<Impl>(std::move(datasets), std::move(builder), std::move(*viewer), std::move(options));
+  Result<std::unique_ptr<Edge>> edge = Edge::Open(options.edge, DescriptorsForFiles(options));
+  if (!edge) return tl::unexpected(edge.error());
+  auto impl = std::make_unique<Impl>(std::move(datasets), std::move(builder), std::move(*viewer), *std::move(edge),
+                                     std::move(options));
   if (const Result<void> started = impl->Start(); !started) return tl::unexpected(started.error());
   return std::unique_ptr<Server>(new Server(std::move(impl)));
 }
@@ -219,7 +237,7 @@ std::uint16_t Server::port() const { return impl_->port(); }
 std::string Server::url() const {
   const std::string& host = impl_->host();
   const bool bare_v6 = host.find(':') != std::string::npos && !host.starts_with('[');
-  return fmt::format("http://{}:{}/", bare_v6 ? "[" + host + "]" : host, port());
+  return fmt::format("{}://{}:{}/", impl_->is_tls() ? "https" : "http", bare_v6 ? "[" + host + "]" : host, port());
 }
 
 void Server::RequestStop() { impl_->RequestStop(); }

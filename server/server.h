@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "engine/core/result.h"
+#include "server/http/edge_options.h"
 #include "server/tiles/dataset_view.h"
 #include "server/tiles/tile_service.h"
 
@@ -23,22 +24,23 @@ class TilePipeline;
 
 struct ServerOptions {
   std::string host = "127.0.0.1";
-  std::uint16_t port = 8080;                         // 0: any that is free
-  unsigned io_threads = 0;                           // 0: a quarter of the processors, at least one
-  unsigned worker_threads = 0;                       // 0: as many as processors
-  std::size_t queue_length = 256;                    // builds that wait for a worker
-  std::size_t cache_bytes = std::size_t{256} << 20;  // of finished tiles; 0: none
-  std::function<ByteCacheStats()> refinement_stats;  // of what tiles are made from; may be empty
-  PointReader read_points;                           // for heights; empty where there are none
-  std::size_t max_locations = 10'000;                // in one request for heights
-  AreaMesher area_mesher;                            // empty where there are no meshes
-  std::size_t max_mesh_samples = 1'000'000;          // of one area
-  std::size_t max_connections = 1024;
+  std::uint16_t port = 8080;                           // 0: any that is free
+  unsigned io_threads = 0;                             // 0: a quarter of the processors, at least one
+  unsigned worker_threads = 0;                         // 0: as many as processors
+  std::size_t queue_length = 256;                      // builds that wait for a worker
+  std::size_t cache_bytes = std::size_t{256} << 20;    // of finished tiles; 0: none
+  std::function<ByteCacheStats()> refinement_stats;    // of what tiles are made from; may be empty
+  PointReader read_points;                             // for heights; empty where there are none
+  std::size_t max_locations = 10'000;                  // in one request for heights
+  AreaMesher area_mesher;                              // empty where there are no meshes
+  std::size_t max_mesh_samples = 1'000'000;            // of one area
+  EdgeOptions edge;                                    // limits of clients, tokens, proxies, TLS
   std::string cache_control = "public, max-age=3600";  // of tiles and layer.json
   std::filesystem::path viewer_dir;                    // empty or missing: a plain page instead
   std::chrono::milliseconds header_timeout{5'000};
   std::chrono::milliseconds idle_timeout{30'000};
   std::chrono::milliseconds write_timeout{20'000};
+  std::size_t min_read_rate = 4096;                    // bytes a second that a client has to take; 0: any
   std::chrono::milliseconds request_deadline{30'000};  // of a tile, waiting for its build included
   std::chrono::milliseconds drain_timeout{10'000};
   bool stop_on_signals = false;  // SIGINT and SIGTERM act like RequestStop
@@ -59,7 +61,7 @@ class Server {
   ~Server();
 
   std::uint16_t port() const;
-  std::string url() const;  // "http://127.0.0.1:8080/"
+  std::string url() const;  // "http://127.0.0.1:8080/"; https with a certificate
 
   // Begins to stop and returns at once. From any thread, any number of times; not from a signal handler.
   void RequestStop();

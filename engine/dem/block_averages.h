@@ -1,4 +1,4 @@
-// Sums of blocks of samples, in the one order that decides an average's last bit.
+// Averages of blocks of samples, as the rows of the samples come in: in the one order that decides their last bits.
 #pragma once
 
 #include <cmath>
@@ -10,47 +10,42 @@
 namespace terrace::dem {
 
 struct BlockSum {
-  double sum = 0;
-  std::int64_t count = 0;  // of valid samples
+  double sum = 0, weight = 0;  // of valid samples
 
-  void Add(float sample) {
+  void Add(float sample, double times = 1) {
     if (std::isnan(sample)) return;
-    sum += sample;
-    ++count;
+    sum += times * sample;
+    weight += times;
   }
   void Add(const BlockSum& other) {
     sum += other.sum;
-    count += other.count;
+    weight += other.weight;
   }
-  float Mean() const { return count == 0 ? SampleRules::kVoid : static_cast<float>(sum / static_cast<double>(count)); }
+  float Mean() const { return weight == 0 ? SampleRules::kVoid : static_cast<float>(sum / weight); }
 };
 
-// Averages of a row of blocks of block x block samples, from rows of samples. A block is summed row by row; one of more
-// than kLargestPlain samples a side, by blocks of that size, each of them row by row: so large averages can be made
-// from parts of the raster that fit into memory (raster_survey.h), bit for bit.
+// Of a row of blocks of block x block samples. A block is summed row by row, whatever lies beside it; one of more than
+// kLargestPlain samples a side by blocks of that size, each of them row by row: so large averages can be made from
+// parts of a raster that fit into memory (raster_survey.h), bit for bit.
 class BlockAverages {
  public:
   static constexpr int kLargestPlain = 1024;
 
   BlockAverages(std::int64_t blocks, int block)
-      : block_(block),
-        parts_(block > kLargestPlain ? block / kLargestPlain : 1),
+      : parts_(block > kLargestPlain ? block / kLargestPlain : 1),
+        plain_(block / parts_),
         inner_(static_cast<std::size_t>(blocks * parts_)),
         outer_(parts_ > 1 ? static_cast<std::size_t>(blocks) : 0) {}
 
-  void AddRow(const float* samples, std::int64_t count) {
-    const std::int64_t plain = block_ / parts_;
-    std::size_t at = 0;
-    for (std::int64_t first = 0; first < count; first += plain, ++at) {
-      BlockSum sum = inner_[at];
-      const std::int64_t end = first + plain < count ? first + plain : count;
-      for (std::int64_t i = first; i < end; ++i) sum.Add(samples[i]);
-      inner_[at] = sum;
+  // Each sample counts `weight` times, the last of the row `last` times of that: it may stand for fewer pixels.
+  void AddRow(const float* samples, std::int64_t count, double weight = 1, double last = 1) {
+    for (std::int64_t i = 0; i < count; ++i) {
+      inner_[static_cast<std::size_t>(i / plain_)].Add(samples[i], i + 1 == count ? weight * last : weight);
     }
     if (parts_ > 1 && ++rows_ == kLargestPlain) Gather();
   }
 
-  // After a block's last row: its averages, and from the beginning.
+  // NaN for a block without a valid sample. The next row of blocks begins.
   void Take(float* out) {
     if (parts_ > 1 && rows_ > 0) Gather();
     for (BlockSum& sum : parts_ > 1 ? outer_ : inner_) {
@@ -68,7 +63,7 @@ class BlockAverages {
     rows_ = 0;
   }
 
-  int block_, parts_;
+  int parts_, plain_;
   int rows_ = 0;                 // in inner_, where it is gathered
   std::vector<BlockSum> inner_;  // of blocks, or of their parts
   std::vector<BlockSum> outer_;

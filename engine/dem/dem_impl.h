@@ -22,12 +22,23 @@ class DemSource::Impl {
 
   const geo::Lattice& LatticeOf(int level) const;  // 0 .. geo::kMaxLevel, also beyond the deepest level served
 
+  template <typename Grid>
+  Result<std::vector<float>> ReadFloored(const Grid& grid, const NodeWindow& window, const std::string& what,
+                                         const std::stop_token& stop) const;
+  // Those that can have heights there, in their order.
+  std::vector<std::size_t> SheetsAt(const Box& degrees) const;
+
   std::vector<Sheet> sheets;  // the first that has a height at a place gives it
+  BoxIndex index;             // of the sheets, by degrees (IndexOf)
   std::vector<geo::Lattice> lattices;
   std::vector<std::vector<geo::TileRange>> available;
   float floor = 0;
   DemInfo info;
   std::uint64_t fingerprint = 0;
 };
+
+// Sheets by the longitudes and latitudes where they can have heights; longitudes from -540 to 540, each turn of a sheet
+// that begins there.
+BoxIndex IndexOf(const std::vector<Sheet>& sheets);
 
 }  // namespace terrace::dem

@@ -4,12 +4,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <utility>
 
 #include "engine/core/bytes.h"
 #include "engine/core/check.h"
+#include "engine/dem/availability.h"
 #include "engine/dem/dem_impl.h"
 #include "engine/dem/footprint.h"
 #include "engine/dem/level_plan.h"
+#include "engine/dem/raster_file.h"
 #include "engine/dem/raster_source.h"
 
 namespace terrace::dem {
@@ -35,13 +39,20 @@ Result<void> CheckOptions(const DemOptions& options) {
   return {};
 }
 
-std::uint64_t FingerprintOf(const StampedFiles& files, const DemOptions& options, double floor) {
-  // Changes whenever the same file and options would give other heights than before.
+using Rasters = std::vector<std::shared_ptr<const RasterSource>>;
+
+std::uint64_t FingerprintOf(const std::vector<Sheet>& sheets, const DemOptions& options, double floor) {
+  // Changes whenever the same files and options would give other heights than before.
   constexpr std::uint32_t kResamplingVersion = 1;
   ByteWriter writer;
   writer.Put(kResamplingVersion);
-  for (const FileStamp& stamp : files.stamps()) {
-    for (const std::uint64_t part : {stamp.device, stamp.inode, stamp.size, stamp.modified_ns}) writer.Put(part);
+  for (const Sheet& sheet : sheets) {
+    if (&sheet != &sheets.front()) writer.Put(std::uint32_t{0});  // which rasters make one sheet counts, too
+    for (const SheetMember& member : sheet.members()) {
+      for (const FileStamp& stamp : member.raster->files().stamps()) {
+        for (const std::uint64_t part : {stamp.device, stamp.inode, stamp.size, stamp.modified_ns}) writer.Put(part);
+      }
+    }
   }
   writer.Put(options.error_fraction);
   writer.Put(options.finest_error.value_or(0));
@@ -51,30 +62,134 @@ std::uint64_t FingerprintOf(const StampedFiles& files, const DemOptions& options
   return XXH3_64bits(bytes.data(), bytes.size());
 }
 
+// Those files of folders that are no rasters go away.
+Result<Rasters> OpenAll(std::vector<DemFile>& files, const DemOptions& options) {
+  const std::string first = files.front().path;
+  std::erase_if(files, [](const DemFile& file) { return file.may_be_other && !IsRaster(file.path); });
+  if (files.empty()) {
+    return MakeError(ErrorCode::kNotFound, "{}: no raster lies in its folder; name a folder of rasters or a raster",
+                     first);
+  }
+  Rasters rasters;
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    const auto progress = [&](double share) {
+      options.progress((static_cast<double>(i) + share) / static_cast<double>(files.size()));
+    };
+    auto raster = RasterSource::Open(files[i].path, options.cache_dir,
+                                     options.progress ? progress : std::function<void(double)>());
+    if (!raster) return tl::unexpected(raster.error());
+    rasters.push_back(*std::move(raster));
+  }
+  return rasters;
+}
+
+// A sixteenth of an octave: tiles of one product differ by less, as meridians converge.
+long ResolutionStep(const RasterSource& raster) { return std::lround(std::log2(raster.spacing().finer) * 16); }
+
+// Of one rank: the sheets that they make, finer ones first, then by path.
+Result<void> AddSheets(Rasters rasters, int max_void_gap, std::vector<Sheet>& sheets) {
+  std::ranges::sort(rasters, {},
+                    [](const auto& raster) { return std::pair(ResolutionStep(*raster), raster->info().path); });
+  for (SheetPlan& plan : PlanSheets(rasters)) {
+    auto sheet = Sheet::Make(std::move(plan), max_void_gap);
+    if (!sheet) return tl::unexpected(sheet.error());
+    sheets.push_back(*std::move(sheet));
+  }
+  return {};
+}
+
+Result<std::vector<Sheet>> SheetsOf(const std::vector<DemFile>& files, const Rasters& rasters, int max_void_gap) {
+  std::map<int, Rasters> ranks;
+  for (std::size_t i = 0; i < files.size(); ++i) ranks[files[i].rank].push_back(rasters[i]);
+  std::vector<Sheet> sheets;
+  for (auto& [rank, those] : ranks) {
+    if (auto added = AddSheets(std::move(those), max_void_gap, sheets); !added) return tl::unexpected(added.error());
+  }
+  return sheets;
+}
+
+// The smallest box that holds all footprints.
+GeoBounds BoundsOf(const Rasters& rasters) {
+  if (rasters.size() == 1) return rasters.front()->info().bounds;
+  std::vector<Footprint> boxes;
+  for (const auto& raster : rasters) boxes.push_back(raster->footprint());
+  std::ranges::sort(boxes, {}, &Footprint::west);
+  Footprint hull = boxes.front();
+  double covered = hull.east, gap = 0, gap_end = hull.west;  // the widest gap between longitudes ends at gap_end
+  for (const Footprint& box : boxes) {
+    hull.south = std::min(hull.south, box.south);
+    hull.north = std::max(hull.north, box.north);
+    if (box.west - covered > gap) {
+      gap = box.west - covered;
+      gap_end = box.west;
+    }
+    covered = std::max(covered, box.east);
+  }
+  const double last_gap = boxes.front().west + 360 - covered;
+  if (std::max(gap, last_gap) <= 0) return {-180, hull.south, 180, hull.north};
+  const double west = last_gap >= gap ? boxes.front().west : gap_end;
+  const double east = west + 360 - std::max(gap, last_gap);
+  return {west, hull.south, east > 180 ? east - 360 : east, hull.north};
+}
+
+DemInfo InfoOf(const std::vector<Sheet>& sheets, const Rasters& rasters, const DemOptions& options) {
+  DemInfo info;
+  info.heights = rasters.front()->info().heights;
+  for (const auto& raster : rasters) {
+    info.heights.min = std::min(info.heights.min, raster->info().heights.min);
+    info.heights.max = std::max(info.heights.max, raster->info().heights.max);
+  }
+  info.bounds = BoundsOf(rasters);
+  info.floor = RoundHeight(options.floor.value_or(info.heights.min));
+  for (const Sheet& sheet : sheets) {
+    for (const SheetMember& member : sheet.members()) info.sources.push_back(member.raster->info());
+    info.max_mercator_depth = std::max(info.max_mercator_depth, DeepestMercator(sheet.spacing()));
+  }
+  return info;
+}
+
+std::vector<Reach> ReachesOf(const std::vector<Sheet>& sheets, const DemOptions& options) {
+  const double finest =
+      std::ranges::min_element(sheets, {}, [](const Sheet& s) { return s.spacing().finer; })->spacing().finer;
+  std::vector<Reach> reaches;
+  for (const Sheet& sheet : sheets) {
+    // An error that the operator wishes for is for the finest source; it is worth as many levels more to the others.
+    const auto goal =
+        options.finest_error ? std::optional(*options.finest_error * (sheet.spacing().finer / finest)) : std::nullopt;
+    const int depth = DeepestLevel(sheet.spacing(), options.error_fraction, goal);
+    for (const SheetMember& member : sheet.members()) reaches.push_back({member.raster->footprint(), depth});
+  }
+  return reaches;
+}
+
 }  // namespace
 
 DemSource::DemSource(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 DemSource::~DemSource() = default;
 
 Result<std::unique_ptr<DemSource>> DemSource::Open(const std::string& path, const DemOptions& options) {
+  return Open(std::vector<DemFile>{{path}}, options);
+}
+
+Result<std::unique_ptr<DemSource>> DemSource::Open(std::vector<DemFile> files, const DemOptions& options) {
+  TERRACE_CHECK(!files.empty());
   if (auto checked = CheckOptions(options); !checked)
-    return MakeError(checked.error().code, "{}: {}", path, checked.error().message);
-  auto opened = RasterSource::Open(path, options.cache_dir, options.progress);
-  if (!opened) return tl::unexpected(opened.error());
-  const std::shared_ptr<const RasterSource> raster = *std::move(opened);
+    return MakeError(checked.error().code, "{}: {}", files.front().path, checked.error().message);
+  const auto rasters = OpenAll(files, options);
+  if (!rasters) return tl::unexpected(rasters.error());
+  auto sheets = SheetsOf(files, *rasters, options.max_void_gap);
+  if (!sheets) return tl::unexpected(sheets.error());
 
   auto impl = std::make_unique<Impl>();
-  impl->sheets.emplace_back(raster, options.max_void_gap);
-  impl->lattices = PlanLattices(raster->spacing());
-  impl->info.sources = {raster->info()};
-  impl->info.bounds = raster->info().bounds;
-  impl->info.heights = raster->info().heights;
-  impl->info.max_mercator_depth = DeepestMercator(raster->spacing());
-  impl->info.max_level = DeepestLevel(raster->spacing(), options.error_fraction, options.finest_error);
-  impl->available = TilesTouching(raster->footprint(), impl->info.max_level);
-  impl->floor = RoundHeight(options.floor.value_or(impl->info.heights.min));
-  impl->info.floor = impl->floor;
-  impl->fingerprint = FingerprintOf(raster->files(), options, impl->floor);
+  impl->sheets = *std::move(sheets);
+  impl->index = IndexOf(impl->sheets);
+  const auto finest = std::ranges::min_element(impl->sheets, {}, [](const Sheet& s) { return s.spacing().finer; });
+  impl->lattices = PlanLattices(finest->spacing());
+  impl->info = InfoOf(impl->sheets, *rasters, options);
+  impl->available = AvailableTiles(ReachesOf(impl->sheets, options));
+  impl->info.max_level = static_cast<int>(impl->available.size()) - 1;
+  impl->floor = static_cast<float>(impl->info.floor);
+  impl->fingerprint = FingerprintOf(impl->sheets, options, impl->floor);
   return std::unique_ptr<DemSource>(new DemSource(std::move(impl)));
 }
 

@@ -1,4 +1,6 @@
-// A digital elevation model as terrace sees it: heights at lattice nodes, anywhere on the globe, at any level.
+// A digital elevation model as terrace sees it: heights at lattice nodes, anywhere on the globe, at any level. It is
+// made of one raster or of many: a node takes the first source, by rank and resolution, that has a height there, and
+// the floor where none has (docs/decisions/0010-mosaics.md).
 //
 // DemSource is immutable after Open and safe to use from many threads: every thread gets its own GDAL handle. GDAL's
 // types stay behind this header.
@@ -25,12 +27,21 @@ struct DemOptions {
   std::optional<double> finest_error =
       {};  // metres: the deepest level is the first whose default error is at most this
   std::optional<double> floor =
-      {};                 // metres: height outside the source and in large voids; default: lowest valid height
+      {};                 // metres: height outside the sources and in large voids; default: lowest valid height
   int max_void_gap = 64;  // source samples: voids narrower than this along a row, column or diagonal are filled
-  // A folder for what is learnt of sources once: docs/operations.md. Empty: nothing is kept.
+  // A folder for what is learnt of sources once (docs/configuration.md). Empty: nothing is kept.
   std::string cache_dir = {};
-  // Called now and then while Open scans the source, with the share done, 0..1. May be empty.
+  // Called now and then while Open scans the sources, with the share done, 0..1: files count alike. May be empty.
   std::function<void(double)> progress = {};
+};
+
+// One raster of a dataset.
+struct DemFile {
+  std::string path;
+  // Where several sources have a height the one of the lowest rank counts; of equal ranks the finer one, then the one
+  // whose path sorts first.
+  int rank = 0;
+  bool may_be_other = false;  // it stands in a folder: if it is no raster at all it is left out
 };
 
 // Metres above the ellipsoid (or whatever the source counts from where no datum is stated).
@@ -80,7 +91,7 @@ struct RasterInfo {
 
 // What `terrace info` prints and `/datasets` tells of a dataset.
 struct DemInfo {
-  std::vector<RasterInfo> sources;  // the first that has a height at a place gives it
+  std::vector<RasterInfo> sources;  // sorted: the first that has a height at a place gives it
   GeoBounds bounds;
   HeightRange heights;  // of all valid samples
   double floor = 0;
@@ -107,19 +118,21 @@ struct TileHeights {
 
 class DemSource {
  public:
-  // Opens a raster, checks it, and scans it once for its heights. Errors name the file, what is wrong and the remedy.
+  // Opens rasters, checks them, and scans each once for its heights. Errors name the file, what is wrong and the
+  // remedy.
+  static Result<std::unique_ptr<DemSource>> Open(std::vector<DemFile> files, const DemOptions& options = {});
   static Result<std::unique_ptr<DemSource>> Open(const std::string& path, const DemOptions& options = {});
   ~DemSource();
 
   const DemInfo& info() const;
 
-  // Levels 0 .. max_level are served: the deepest is the first whose default error is at most a tenth of the source's
-  // spacing, or at most `finest_error`.
+  // Levels 0 .. max_level are served: the deepest is the first whose default error is at most a tenth of the finest
+  // source's spacing, or at most `finest_error`.
   int max_level() const;
   geo::Lattice LatticeOf(int level) const;
 
-  // Blocks of tiles, without overlap, that hold every tile of the level which touches the source; at level 0 both
-  // roots.
+  // Blocks of tiles, without overlap, sorted by row and column, that hold every tile of the level which touches a
+  // source that is worth the level, and every ancestor of a tile; at level 0 both roots (availability.h).
   const std::vector<geo::TileRange>& Available(int level) const;
   bool IsAvailable(const geo::TileKey& key) const;
 
@@ -140,11 +153,12 @@ class DemSource {
   Result<std::vector<float>> ReadMercator(int depth, const NodeWindow& window, std::stop_token stop = {}) const;
 
   // Heights as measured: bilinear between the samples of the full resolution, in the order of `points`; NaN outside the
-  // source and where the sample whose pixel holds the point is void. Nothing is filled. A height does not depend on
-  // the other points. Precondition: finite longitudes, latitudes in -90 .. 90.
+  // sources and where the sample whose pixel holds the point is void in all of them. Nothing is filled. A height does
+  // not depend on the other points. Precondition: finite longitudes, latitudes in -90 .. 90.
   Result<std::vector<float>> ReadPoints(std::span<const GeoPosition> points, std::stop_token stop = {}) const;
 
-  // Identifies content and options: device, inode, size, mtime of the file and every option that changes heights.
+  // Identifies content and options: device, inode, size, mtime of all files in their order, and every option that
+  // changes heights.
   std::uint64_t fingerprint() const;
 
  private:

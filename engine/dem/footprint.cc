@@ -107,8 +107,8 @@ Result<void> CheckOverlap(const Footprint& footprint, const GeoBounds& around, c
                    around.north);
 }
 
-std::vector<std::vector<geo::TileRange>> TilesTouching(const Footprint& footprint, int max_level) {
-  const std::int64_t columns = geo::TileColumns(max_level), rows = geo::TileRows(max_level);
+std::vector<geo::TileRange> TilesTouching(const Footprint& footprint, int level) {
+  const std::int64_t columns = geo::TileColumns(level), rows = geo::TileRows(level);
   const double tile = 180.0 / static_cast<double>(rows);
   const auto first = [&](double degrees, std::int64_t count) {
     return std::clamp<std::int64_t>(static_cast<std::int64_t>(std::floor(degrees / tile)), 0, count - 1);
@@ -118,34 +118,11 @@ std::vector<std::vector<geo::TileRange>> TilesTouching(const Footprint& footprin
   };
   const std::int64_t south = first(footprint.south + 90, rows);
   const std::int64_t north = std::max(south, last(footprint.north + 90, rows));
-  std::vector<geo::TileRange> deepest;
   const std::int64_t west = first(footprint.west + 180, columns);
-  if (footprint.east > 180) {
-    const std::int64_t east = last(footprint.east - 180, columns);
-    if (east + 1 >= west) {
-      deepest = {{0, south, columns - 1, north}};
-    } else {
-      deepest = {{0, south, east, north}, {west, south, columns - 1, north}};
-    }
-  } else {
-    deepest = {{west, south, std::max(west, last(footprint.east + 180, columns)), north}};
-  }
-  // Coarser levels follow from the deepest, so that no rounding can lose an ancestor.
-  std::vector<std::vector<geo::TileRange>> levels(static_cast<std::size_t>(max_level) + 1);
-  for (int level = max_level; level > 0; --level) {
-    const int up = max_level - level;
-    auto& ranges = levels[static_cast<std::size_t>(level)];
-    for (const geo::TileRange& range : deepest) {
-      const geo::TileRange here{range.start_x >> up, range.start_y >> up, range.end_x >> up, range.end_y >> up};
-      if (!ranges.empty() && here.start_x <= ranges.back().end_x + 1) {
-        ranges.back().end_x = here.end_x;
-      } else {
-        ranges.push_back(here);
-      }
-    }
-  }
-  levels[0] = {{0, 0, 1, 0}};
-  return levels;
+  if (footprint.east <= 180) return {{west, south, std::max(west, last(footprint.east + 180, columns)), north}};
+  const std::int64_t east = last(footprint.east - 180, columns);
+  if (east + 1 >= west) return {{0, south, columns - 1, north}};
+  return {{0, south, east, north}, {west, south, columns - 1, north}};
 }
 
 }  // namespace terrace::dem

@@ -38,8 +38,7 @@ struct Footprint {
 // kInvalidArgument, with both boxes, where `path`, which covers `footprint`, lies nowhere in `around`.
 Result<void> CheckOverlap(const Footprint& footprint, const GeoBounds& around, const std::string& path);
 
-// Per level 0 .. max_level: blocks without overlap that hold every tile the footprint touches and every ancestor of
-// such a tile; at level 0 both roots.
-std::vector<std::vector<geo::TileRange>> TilesTouching(const Footprint& footprint, int max_level);
+// The tiles of a level that the footprint touches, as one block or two: a tile that shares but an edge is not touched.
+std::vector<geo::TileRange> TilesTouching(const Footprint& footprint, int level);
 
 }  // namespace terrace::dem

@@ -3,6 +3,7 @@
 #include <cpl_conv.h>
 #include <ogr_spatialref.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <vector>
@@ -74,13 +75,7 @@ Result<Georeference> Georeference::Of(GDALDataset& dataset, const std::string& p
         "-a_ullr west north east south in out`",
         path);
   }
-  if (GDALInvGeoTransform(self.to_crs_.data(), self.to_pixel_.data()) == 0) {
-    return MakeError(
-        ErrorCode::kInvalidArgument,
-        "{}: its georeference has no extent (pixel size {} x {}); set it with `gdal_translate -a_ullr west "
-        "north east south in out`",
-        path, self.to_crs_[1], self.to_crs_[5]);
-  }
+  if (auto affine = self.SetAffine(path); !affine) return tl::unexpected(affine.error());
   const OGRSpatialReference* srs = dataset.GetSpatialRef();
   if (srs == nullptr || srs->IsEmpty()) {
     return MakeError(ErrorCode::kInvalidArgument,
@@ -91,7 +86,49 @@ Result<Georeference> Georeference::Of(GDALDataset& dataset, const std::string& p
   return self;
 }
 
+Result<void> Georeference::SetAffine(const std::string& path) {
+  if (GDALInvGeoTransform(to_crs_.data(), to_pixel_.data()) != 0) return {};
+  return MakeError(ErrorCode::kInvalidArgument,
+                   "{}: its georeference has no extent (pixel size {} x {}); set it with `gdal_translate -a_ullr west "
+                   "north east south in out`",
+                   path, to_crs_[1], to_crs_[5]);
+}
+
+std::optional<PixelOffset> Georeference::OffsetOf(const Georeference& other) const {
+  // A hundredth of a pixel off is on the grid, as around the Earth (FindPeriod): corners are written with few digits.
+  constexpr double kTolerance = 0.01;
+  if (wkt_.empty() || wkt_ != other.wkt_) return std::nullopt;
+  const int side = std::max({width_, height_, other.width_, other.height_});
+  const double pixel = std::min(pixel_width(), pixel_height());
+  for (const std::size_t i : {1, 2, 4, 5}) {
+    if (std::abs(to_crs_[i] - other.to_crs_[i]) * side > kTolerance * pixel) return std::nullopt;
+  }
+  const Position corner = Apply(to_pixel_, {other.to_crs_[0], other.to_crs_[3]});
+  constexpr double kFarthest = 1LL << 40;
+  if (!(std::max(std::abs(corner.x), std::abs(corner.y)) < kFarthest)) return std::nullopt;
+  const double column = std::round(corner.x), row = std::round(corner.y);
+  if (std::abs(corner.x - column) > kTolerance || std::abs(corner.y - row) > kTolerance) return std::nullopt;
+  return PixelOffset{static_cast<std::int64_t>(column), static_cast<std::int64_t>(row)};
+}
+
+Result<Georeference> Georeference::Moved(const PixelOffset& first, int width, int height,
+                                         const std::string& name) const {
+  Georeference moved;
+  moved.width_ = width;
+  moved.height_ = height;
+  moved.to_crs_ = to_crs_;
+  const Position corner = Apply(to_crs_, {static_cast<double>(first.column), static_cast<double>(first.row)});
+  moved.to_crs_[0] = corner.x;
+  moved.to_crs_[3] = corner.y;
+  if (auto affine = moved.SetAffine(name); !affine) return tl::unexpected(affine.error());
+  OGRSpatialReference srs(wkt_.c_str());
+  srs.SetAxisMappingStrategy(OAMS_TRADITIONAL_GIS_ORDER);
+  if (auto crs = moved.ReadCrs(srs, name); !crs) return tl::unexpected(crs.error());
+  return moved;
+}
+
 Result<void> Georeference::ReadCrs(const OGRSpatialReference& srs, const std::string& path) {
+  wkt_ = Wkt(srs);
   crs_ = NameAndCode(srs);
   std::tie(vertical_datum_, vertical_unit_) = VerticalPart(srs);
   OGRSpatialReference horizontal(srs);

@@ -7,7 +7,9 @@
 #include <gdal_priv.h>
 
 #include <array>
+#include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -16,11 +18,23 @@
 
 namespace terrace::dem {
 
+// A pixel of another raster on the same grid, counted in the pixels of this one.
+struct PixelOffset {
+  std::int64_t column = 0, row = 0;
+};
+
 // Immutable and thread-safe.
 class Georeference {
  public:
   // Errors say what is missing and the command that adds it.
   static Result<Georeference> Of(GDALDataset& dataset, const std::string& path);
+
+  // Where the first pixel of `other` lies, if both have one CRS and their pixels lie on one grid; else nothing. Columns
+  // around the Earth are not wrapped.
+  std::optional<PixelOffset> OffsetOf(const Georeference& other) const;
+
+  // That of `width` x `height` pixels of the same grid from `first` on. `name` stands for them in errors.
+  Result<Georeference> Moved(const PixelOffset& first, int width, int height, const std::string& name) const;
 
   // Degrees to pixels, in place; NaN where the CRS has no such position. Longitudes of geographic sources are counted
   // modulo 360 degrees: the column is the one inside the raster if there is one.
@@ -53,6 +67,7 @@ class Georeference {
   std::string pipeline() const { return projector_ == nullptr ? "" : projector_->pipeline(); }
 
  private:
+  Result<void> SetAffine(const std::string& path);
   Result<void> ReadCrs(const OGRSpatialReference& srs, const std::string& path);
   void FindPeriod(const OGRSpatialReference& srs);
   double CanonicalColumn(double column) const;
@@ -65,6 +80,7 @@ class Georeference {
   double period_ = 0;
   int wrap_columns_ = 0;
   std::shared_ptr<const Projector> projector_;  // null: the CRS is WGS 84 longitude and latitude
+  std::string wkt_;                             // of the CRS as stated
   std::string crs_, vertical_datum_, vertical_unit_, pixel_unit_;
 };
 

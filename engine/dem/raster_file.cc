@@ -84,6 +84,14 @@ Result<void> CheckSizeToMesh(const std::string& path, int width, int height) {
                    path, width, height, kMostSamples, kMostPerSide);
 }
 
+bool IsRaster(const std::string& path) {
+  for (const char* sidecar : {".ovr", ".msk", ".aux"}) {
+    if (path.ends_with(sidecar)) return false;
+  }
+  InitGdal();
+  return GDALIdentifyDriverEx(path.c_str(), GDAL_OF_RASTER, nullptr, nullptr) != nullptr;
+}
+
 GDALDatasetUniquePtr ReopenRaster(const std::string& path, int overview) {
   InitGdal();
   ForgetGdalError();

@@ -15,6 +15,10 @@ namespace terrace::dem {
 // `overview`: the raster as the overview of that number has it; -1: in full.
 Result<GDALDatasetUniquePtr> OpenRaster(const std::string& path, int overview = -1);
 
+// Whether a driver takes the file for one of its own, by name and first bytes. Overviews and masks beside a raster are
+// none.
+bool IsRaster(const std::string& path);
+
 // The same without the checks, for further handles on a file that passed them; null when it cannot be opened.
 GDALDatasetUniquePtr ReopenRaster(const std::string& path, int overview = -1);
 

@@ -33,7 +33,7 @@ Result<void> ForEachStrip(GDALRasterBand& band, const SampleRules& rules, const 
 }
 
 std::optional<double> MeanOf(const BlockSum& sum) {
-  return sum.count == 0 ? std::nullopt : std::optional(sum.sum / static_cast<double>(sum.count));
+  return sum.weight == 0 ? std::nullopt : std::optional(sum.sum / sum.weight);
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "engine/dem/grid_cells.h"
 #include "engine/dem/node_positions.h"
 #include "engine/dem/void_fill.h"
+#include "engine/geo/tile_cover.h"
 
 namespace terrace::dem {
 namespace {
@@ -32,109 +33,190 @@ GridWindow Grown(const GridWindow& window, int halo, const GridAxis& columns, co
   return wide;
 }
 
-// Heights at the poles of a geographic raster whose first or last row holds them.
-std::array<std::optional<float>, 2> PoleHeights(const RasterSource& raster) {
-  std::array<std::optional<float>, 2> heights;
-  const Georeference& georeference = raster.georeference();
-  if (!georeference.is_geographic_grid()) return heights;
-  for (const int pole : {0, 1}) {
-    Position position{0, pole == 0 ? -90.0 : 90.0};
-    georeference.ToPixels({&position, 1});
-    if (!(position.y >= -kEdgeTolerance && position.y <= georeference.height() + kEdgeTolerance)) continue;
-    const auto& mean = raster.edge_row_means()[position.y < georeference.height() / 2.0 ? 0 : 1];
-    if (mean) heights[static_cast<std::size_t>(pole)] = RoundHeight(*mean);
+// Pixels that the members have, columns of sheets that wrap counted from 0 to `turn`; without overlap.
+std::vector<geo::TileRange> CoverOf(const std::vector<SheetMember>& members, std::int64_t turn) {
+  std::vector<geo::TileRange> ranges;
+  for (const SheetMember& member : members) {
+    const geo::TileRange pixels = member.pixels();
+    ranges.push_back(pixels);
+    if (turn > 0 && pixels.end_x >= turn) {
+      ranges.push_back({0, pixels.start_y, std::min(pixels.end_x, 2 * turn - 1) - turn, pixels.end_y});
+    }
   }
-  return heights;
+  return geo::Disjoint(std::move(ranges));
+}
+
+Box BoxOf(const geo::TileRange& pixels) {
+  return {static_cast<double>(pixels.start_x), static_cast<double>(pixels.start_y),
+          static_cast<double>(pixels.end_x + 1), static_cast<double>(pixels.end_y + 1)};
+}
+
+Result<Georeference> GeoreferenceOf(const SheetPlan& plan) {
+  if (plan.members.size() == 1) return plan.members.front().raster->georeference();
+  // That of the member in the corner, if there is one, goes over as it is.
+  const auto corner =
+      std::ranges::find_if(plan.members, [](const SheetMember& m) { return m.column == 0 && m.row == 0; });
+  const SheetMember& member = corner != plan.members.end() ? *corner : plan.members.front();
+  return member.raster->georeference().Moved({-member.column, -member.row}, plan.width, plan.height,
+                                             member.raster->info().path);
 }
 
 }  // namespace
 
 float RoundHeight(double metres) { return static_cast<float>(std::nearbyint(metres * 1024) / 1024); }
 
-Sheet::Sheet(std::shared_ptr<const RasterSource> raster, int max_void_gap)
-    : raster_(std::move(raster)),
-      footprint_(raster_->footprint().Padded()),
-      max_void_gap_(max_void_gap),
-      pole_heights_(PoleHeights(*raster_)) {}
-
-bool Sheet::IsInside(const Position& position) const {
-  const RasterLayout& layout = raster_->layout();
-  const bool row = position.y >= -kEdgeTolerance && position.y <= layout.height + kEdgeTolerance;
-  return row && (layout.wraps || (position.x >= -kEdgeTolerance && position.x <= layout.width + kEdgeTolerance));
+Result<Sheet> Sheet::Make(SheetPlan plan, int max_void_gap) {
+  auto where = GeoreferenceOf(plan);
+  if (!where) return tl::unexpected(where.error());
+  Sheet sheet(*std::move(where));
+  sheet.members_ = std::move(plan.members);
+  sheet.max_void_gap_ = max_void_gap;
+  sheet.width_ = plan.width;
+  sheet.height_ = plan.height;
+  sheet.wraps_ = sheet.georeference_.wrap_columns() > 0;
+  sheet.columns_ = sheet.wraps_ ? sheet.georeference_.wrap_columns() : plan.width;
+  const RasterSource& first = *sheet.members_.front().raster;
+  // Members far apart may have nothing of the Earth half way between them.
+  sheet.spacing_ = SourceSpacing::Of(sheet.georeference_, first.info().path).value_or(first.spacing());
+  sheet.reach_ = Footprint::Of(sheet.georeference_).Padded();
+  sheet.IndexMembers();
+  sheet.FindPoleHeights();
+  return sheet;
 }
 
-std::optional<float> Sheet::PoleHeight(const geo::Lattice& lattice, std::int64_t row) const {
-  return row > 0 && row < lattice.rows() ? std::nullopt : pole_heights_[row <= 0 ? 0 : 1];
+void Sheet::IndexMembers() {
+  const std::int64_t turn = wraps_ ? columns_ : 0;
+  alignment_ = 1 << 22;  // AveragingFactor's largest
+  std::vector<BoxIndex::Entry> entries, blocks;
+  for (std::size_t i = 0; i < members_.size(); ++i) {
+    const SheetMember& member = members_[i];
+    while (member.column % alignment_ != 0 || member.row % alignment_ != 0 || (turn > 0 && turn % alignment_ != 0)) {
+      alignment_ /= 2;
+    }
+    const Box box = BoxOf(member.pixels());
+    for (const std::int64_t shift : {std::int64_t{0}, -turn, turn}) {
+      const auto x = static_cast<double>(shift);
+      entries.push_back({{box.west + x, box.south, box.east + x, box.north}, i});
+      if (turn == 0) break;
+    }
+  }
+  cover_ = CoverOf(members_, turn);
+  for (std::size_t i = 0; i < cover_.size(); ++i) blocks.push_back({BoxOf(cover_[i]), i});
+  member_index_ = BoxIndex(entries);
+  cover_index_ = BoxIndex(blocks);
+}
+
+// The mean of the rows that lie at a pole, of members by their width.
+void Sheet::FindPoleHeights() {
+  if (!georeference_.is_geographic_grid()) return;
+  for (const int pole : {0, 1}) {
+    Position position{0, pole == 0 ? -90.0 : 90.0};
+    georeference_.ToPixels({&position, 1});
+    if (!(position.y >= -kEdgeTolerance && position.y <= height_ + kEdgeTolerance)) continue;
+    const bool first_row = position.y < height_ / 2.0;
+    double sum = 0, weights = 0;
+    for (const SheetMember& member : members_) {
+      const RasterLayout& layout = member.raster->layout();
+      if (first_row ? member.row != 0 : member.row + layout.height != height_) continue;
+      const auto& mean = member.raster->edge_row_means()[first_row ? 0 : 1];
+      if (!mean) continue;
+      const double weight = members_.size() == 1 ? 1 : layout.columns;
+      sum += weight * *mean;
+      weights += weight;
+    }
+    if (weights > 0) pole_heights_[static_cast<std::size_t>(pole)] = RoundHeight(sum / weights);
+  }
+}
+
+Sheet::Cells Sheet::CellsAt(std::span<const Position> positions, std::span<const float> heights, int factor) const {
+  Box hull{1e300, 1e300, -1e300, -1e300};
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    const auto [x, y] = positions[i];
+    if (std::isnan(x) || !std::isnan(heights[i])) continue;
+    hull = {std::min(hull.west, x), std::min(hull.south, y), std::max(hull.east, x), std::max(hull.north, y)};
+  }
+  Cells found;
+  if (hull.west > hull.east) return found;
+  const std::vector<std::size_t> blocks = cover_index_.Find({hull.west - kEdgeTolerance, hull.south - kEdgeTolerance,
+                                                             hull.east + kEdgeTolerance, hull.north + kEdgeTolerance});
+  const GridAxis columns = Columns(factor), rows = Rows(factor);
+  const auto is_inside = [&](const Position& p) {
+    return std::ranges::any_of(blocks, [&](std::size_t block) {
+      const Box box = BoxOf(cover_[block]);
+      return p.x >= box.west - kEdgeTolerance && p.x <= box.east + kEdgeTolerance &&
+             p.y >= box.south - kEdgeTolerance && p.y <= box.north + kEdgeTolerance;
+    });
+  };
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    if (!std::isnan(heights[i]) || !is_inside(positions[i])) continue;
+    found.cells.push_back(CellAt(positions[i], columns, rows, width_, height_));
+    found.nodes.push_back(i);
+  }
+  return found;
+}
+
+// Files are looked at even where nothing must be read: a tile of floor must not outlive its source. What lies between
+// many sources depends on none of them.
+Result<void> Sheet::CheckUnread() const {
+  return members_.size() == 1 ? members_.front().raster->CheckUnchanged() : Result<void>();
 }
 
 Result<std::vector<float>> Sheet::ReadFilled(int factor, const GridWindow& window, const std::stop_token& stop,
                                              SheetTrace* trace) const {
   const auto is_void = [](float height) { return std::isnan(height); };
-  const RasterLayout& layout = raster_->layout();
-  auto core = raster_->ReadBlocks(factor, window, stop);
+  auto core = ReadBlocks(factor, window, stop);
   if (core && trace != nullptr) trace->samples = *core;
   const int gap = max_void_gap_ / factor;
   if (!core || gap < 2 || std::ranges::none_of(*core, is_void)) return core;
-  const GridWindow wide =
-      Grown(window, gap, GridAxis(layout.columns, factor, layout.wraps), GridAxis(layout.height, factor, false));
-  auto around = raster_->ReadBlocks(factor, wide, stop);
+  const GridWindow wide = Grown(window, gap, Columns(factor), Rows(factor));
+  auto around = ReadBlocks(factor, wide, stop);
   if (!around || std::ranges::all_of(*around, is_void)) return core;
   return FillVoids(*around, wide, window, gap);
 }
 
 Result<void> Sheet::FillAt(std::span<const Position> positions, int factor, std::span<float> heights,
                            const std::stop_token& stop, SheetTrace* trace) const {
-  const RasterLayout& layout = raster_->layout();
-  const GridAxis columns(layout.columns, factor, layout.wraps), rows(layout.height, factor, false);
-  std::vector<GridCell> cells;
-  std::vector<std::size_t> nodes;  // node of each cell
-  for (std::size_t i = 0; i < positions.size(); ++i) {
-    if (!std::isnan(heights[i]) || !IsInside(positions[i])) continue;
-    cells.push_back(CellAt(positions[i], columns, rows, layout.width, layout.height));
-    nodes.push_back(i);
-  }
-  if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "was stopped");
-  // Files are looked at even where nothing must be read: a tile of floor must not outlive its source.
-  if (cells.empty()) return raster_->CheckUnchanged();
-  GridWindow window = WindowOf(cells, columns, rows);
+  Cells found = CellsAt(positions, heights, factor);
+  if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "reading was stopped");
+  if (found.cells.empty()) return CheckUnread();
+  GridWindow window = WindowOf(found.cells, Columns(factor), Rows(factor));
   // Samples between the outermost nodes and the rim are wanted too.
   constexpr int kRim = 3;
-  if (trace != nullptr) window = Grown(window, kRim, columns, rows);
+  if (trace != nullptr) window = Grown(window, kRim, Columns(factor), Rows(factor));
   const auto samples = ReadFilled(factor, window, stop, trace);
   if (!samples) return tl::unexpected(samples.error());
-  for (std::size_t i = 0; i < cells.size(); ++i) {
-    const auto height = Interpolate(*samples, window, cells[i]);
+  for (std::size_t i = 0; i < found.cells.size(); ++i) {
+    const auto height = Interpolate(*samples, window, found.cells[i]);
     if (!height) continue;
-    heights[nodes[i]] = RoundHeight(*height);
-    if (trace != nullptr) trace->cell_of_node[nodes[i]] = static_cast<std::int32_t>(i);
+    heights[found.nodes[i]] = RoundHeight(*height);
+    if (trace != nullptr) trace->cell_of_node[found.nodes[i]] = static_cast<std::int32_t>(i);
   }
   if (trace != nullptr) {
     trace->window = window;
-    trace->cells = std::move(cells);
+    trace->cells = std::move(found.cells);
   }
   return {};
 }
 
 Result<void> Sheet::Fill(const geo::Lattice& lattice, const NodeWindow& window, std::span<float> heights,
                          const std::stop_token& stop, SheetTrace* trace) const {
-  const int factor = AveragingFactor(SamplesPerCell(lattice, spacing()));
-  auto positions = NodePositions(raster_->georeference(), footprint_, lattice, window, kPositionTolerance * factor);
+  const int factor = AveragingFactor(SamplesPerCell(lattice, spacing_));
+  auto positions = NodePositions(georeference_, reach_, lattice, window, kPositionTolerance * factor);
   if (trace != nullptr) {
     trace->positions = positions;
     trace->cell_of_node.assign(positions.size(), -1);
     trace->factor = factor;
   }
-  if (raster_->georeference().is_geographic_grid()) {
-    for (int row = 0; row < window.rows; ++row) {
-      const std::int64_t global = window.row + row;
-      if (global > 0 && global < lattice.rows()) continue;
-      const auto first = std::ptrdiff_t{row} * window.columns;
-      std::fill_n(positions.begin() + first, window.columns, kNowhere);
-      if (const auto pole = PoleHeight(lattice, global)) {
-        std::ranges::replace_if(
-            heights.subspan(static_cast<std::size_t>(first), static_cast<std::size_t>(window.columns)),
-            [](float height) { return std::isnan(height); }, *pole);
-      }
+  for (int row = 0; row < window.rows && georeference_.is_geographic_grid(); ++row) {
+    const std::int64_t global = window.row + row;
+    if (global > 0 && global < lattice.rows()) continue;
+    // Where columns are meridians they meet in one value.
+    const auto first = static_cast<std::size_t>(row) * static_cast<std::size_t>(window.columns);
+    std::fill_n(positions.begin() + static_cast<std::ptrdiff_t>(first), window.columns, kNowhere);
+    if (const auto pole = pole_heights_[global <= 0 ? 0 : 1]) {
+      std::ranges::replace_if(
+          heights.subspan(first, static_cast<std::size_t>(window.columns)),
+          [](float height) { return std::isnan(height); }, *pole);
     }
   }
   return FillAt(positions, factor, heights, stop, trace);
@@ -142,9 +224,9 @@ Result<void> Sheet::Fill(const geo::Lattice& lattice, const NodeWindow& window, 
 
 Result<void> Sheet::Fill(const geo::MercatorGrid& grid, const NodeWindow& window, std::span<float> heights,
                          const std::stop_token& stop) const {
-  const int factor = MercatorFactor(grid.depth, spacing());
-  return FillAt(NodePositions(raster_->georeference(), footprint_, grid, window, kPositionTolerance * factor), factor,
-                heights, stop, nullptr);
+  const int factor = MercatorFactor(grid.depth, spacing_);
+  return FillAt(NodePositions(georeference_, reach_, grid, window, kPositionTolerance * factor), factor, heights, stop,
+                nullptr);
 }
 
 }  // namespace terrace::dem

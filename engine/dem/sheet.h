@@ -1,7 +1,8 @@
-// Heights of one raster at the nodes of any grid: positions, averaging, small voids, interpolation. Where it has
-// nothing, nothing is said: other sheets and the floor are the dataset's business.
+// Rasters on one pixel grid, read as if they were one, at the nodes of any grid: positions, averaging, small voids,
+// interpolation. Where they have nothing, nothing is said: other sheets and the floor are the dataset's business.
 //
-// Immutable and safe to use from many threads.
+// Averages are those of blocks of pixels counted from the sheet's north-western corner. Of rasters that overlap the
+// first has its say; where it is void, the next. Immutable and safe to use from many threads.
 #pragma once
 
 #include <array>
@@ -13,9 +14,10 @@
 #include <vector>
 
 #include "engine/core/result.h"
+#include "engine/dem/box_index.h"
 #include "engine/dem/dem_source.h"
 #include "engine/dem/grid_cells.h"
-#include "engine/dem/raster_source.h"
+#include "engine/dem/sheet_members.h"
 #include "engine/geo/mercator_grid.h"
 
 namespace terrace::dem {
@@ -24,7 +26,6 @@ namespace terrace::dem {
 struct SheetRange {
   BlockRange blocks;         // min > max: none
   bool shows_others = true;  // part of the tile may lie outside the sheet or in its voids
-  bool touches = false;
 };
 
 // What Fill saw of a window, for whoever wants to know how far its heights are from the samples.
@@ -39,30 +40,28 @@ struct SheetTrace {
 
 class Sheet {
  public:
-  Sheet(std::shared_ptr<const RasterSource> raster, int max_void_gap);
+  // Precondition: the plan has members.
+  static Result<Sheet> Make(SheetPlan plan, int max_void_gap);
 
-  const RasterSource& raster() const { return *raster_; }
-  const SourceSpacing& spacing() const { return raster_->spacing(); }
-  const Georeference& georeference() const { return raster_->georeference(); }
-  // Padded: outside it there is nothing.
-  const Footprint& reach() const { return footprint_; }
-  HeightRange heights() const { return raster_->info().heights; }  // of its samples
+  const std::vector<SheetMember>& members() const { return members_; }
+  // Those that meet a box of pixels; Box::south is its first row.
+  std::vector<std::size_t> MembersAt(const Box& pixels) const { return member_index_.Find(pixels); }
+  const Georeference& georeference() const { return georeference_; }
   // Of its pixels; columns without the duplicates of a sheet that goes all around the Earth.
-  int columns() const { return raster_->layout().columns; }
-  int rows() const { return raster_->layout().height; }
-  bool wraps() const { return raster_->layout().wraps; }
-
-  // At least the range of pixels in a box, clipped to the sheet.
-  BlockRange Ranges(double west, double north, double east, double south) const {
-    return raster_->ranges().Query(west, north, east, south);
-  }
-  // How far samples in a box of pixels are from the surface between averages (averaging_errors.h).
-  float AveragingError(int factor, double west, double north, double east, double south) const {
-    return raster_->averaging_errors().Largest(factor, west, north, east, south);
-  }
+  int columns() const { return columns_; }
+  int rows() const { return height_; }
+  bool wraps() const { return wraps_; }
+  // The largest power of two at whose multiples all members begin.
+  int alignment() const { return alignment_; }
+  const SourceSpacing& spacing() const { return spacing_; }
+  // Padded: outside it there is nothing.
+  const Footprint& reach() const { return reach_; }
+  // South, north: heights at the poles, of sheets whose columns are meridians and that reach them.
+  const std::array<std::optional<float>, 2>& pole_heights() const { return pole_heights_; }
 
   // These replace the NaN among `heights`, one for each node of the window, by the sheet's heights there, as far as it
   // has some. A height is a function of the node alone. kUnavailable: a raster cannot be read now. kCancelled: stopped.
+  // Also fills in `trace`, unless that is null.
   Result<void> Fill(const geo::Lattice& lattice, const NodeWindow& window, std::span<float> heights,
                     const std::stop_token& stop, SheetTrace* trace = nullptr) const;
   Result<void> Fill(const geo::MercatorGrid& grid, const NodeWindow& window, std::span<float> heights,
@@ -76,18 +75,50 @@ class Sheet {
   SheetRange RangeOf(const geo::Lattice& lattice, const geo::TileKey& key) const;
 
  private:
-  bool IsInside(const Position& position) const;
-  // Of a pole row, where columns are meridians: they meet there in one value.
-  std::optional<float> PoleHeight(const geo::Lattice& lattice, std::int64_t row) const;
+  explicit Sheet(Georeference where) : georeference_(std::move(where)) {}
+
+  GridAxis Columns(int factor) const { return {columns_, factor, wraps_}; }
+  GridAxis Rows(int factor) const { return {height_, factor, false}; }
+  void IndexMembers();
+  void FindPoleHeights();
+
+  // A cell for each position inside the sheet whose height is NaN, and which it is.
+  struct Cells {
+    std::vector<GridCell> cells;
+    std::vector<std::size_t> nodes;
+  };
+  Cells CellsAt(std::span<const Position> positions, std::span<const float> heights, int factor) const;
+
+  // Averages of the valid samples of each block; NaN where there is none.
+  Result<std::vector<float>> ReadBlocks(int factor, const GridWindow& window, const std::stop_token& stop) const;
+  // Averages of `step` x `step` samples each, into rows of `out` that are `window.columns` wide. Precondition: every
+  // member begins at a block; the window does not wrap.
+  Result<void> Compose(int step, const GridWindow& window, std::span<float> out, const std::stop_token& stop) const;
+  Result<void> Average(int factor, const GridWindow& window, float* out, std::int64_t stride,
+                       const std::stop_token& stop) const;
   Result<std::vector<float>> ReadFilled(int factor, const GridWindow& window, const std::stop_token& stop,
                                         SheetTrace* trace) const;
   Result<void> FillAt(std::span<const Position> positions, int factor, std::span<float> heights,
                       const std::stop_token& stop, SheetTrace* trace) const;
+  Result<void> CheckUnread() const;
 
-  std::shared_ptr<const RasterSource> raster_;
-  Footprint footprint_;                               // padded: outside it there is nothing
-  int max_void_gap_;                                  // samples
-  std::array<std::optional<float>, 2> pole_heights_;  // south, north: of geographic sheets that reach them
+  // Of the pixels in a box; what no member covers counts as void.
+  BlockRange Ranges(const Box& pixels) const;
+
+  Georeference georeference_;
+  int width_ = 0, height_ = 0;
+  int columns_ = 0;  // of them in use: without the duplicates of a raster that goes all around the Earth
+  bool wraps_ = false;
+  SourceSpacing spacing_;
+  Footprint reach_;
+  int max_void_gap_ = 0;  // samples
+  std::array<std::optional<float>, 2> pole_heights_;
+
+  std::vector<SheetMember> members_;
+  BoxIndex member_index_;              // by pixels; of sheets that wrap also a turn before and after
+  std::vector<geo::TileRange> cover_;  // pixels that members have, without overlap
+  BoxIndex cover_index_;
+  int alignment_ = 1;  // the largest power of two at whose multiples all members begin
 };
 
 // Heights are multiples of 2^-10 m: libm's last bits, which differ between processors, end here.

@@ -25,8 +25,7 @@ struct PointCell {
 
 Result<void> Sheet::FillPoints(std::span<const GeoPosition> points, std::span<float> heights,
                                const std::stop_token& stop) const {
-  const RasterLayout& layout = raster_->layout();
-  const GridAxis columns(layout.columns, 1, layout.wraps), rows(layout.height, 1, false);
+  const GridAxis columns = Columns(1), rows = Rows(1);
   std::vector<PointCell> found;
   std::vector<Position> batch;
   for (std::size_t done = 0; done < points.size(); done += batch.size()) {
@@ -35,14 +34,14 @@ Result<void> Sheet::FillPoints(std::span<const GeoPosition> points, std::span<fl
     for (const GeoPosition& point : points.subspan(done, std::min(kBatch, points.size() - done))) {
       batch.push_back({point.longitude, point.latitude});
     }
-    raster_->georeference().ToPixels(batch);
-    for (std::size_t i = 0; i < batch.size(); ++i) {
-      if (!std::isnan(heights[done + i]) || !IsInside(batch[i])) continue;
-      const GridCell cell = CellAt(batch[i], columns, rows, layout.width, layout.height);
-      found.push_back({done + i, (cell.column + kBlock) / kBlock, cell.row / kBlock, cell});
+    georeference_.ToPixels(batch);
+    const Cells here = CellsAt(batch, heights.subspan(done, batch.size()), 1);
+    for (std::size_t i = 0; i < here.cells.size(); ++i) {
+      const GridCell& cell = here.cells[i];
+      found.push_back({done + here.nodes[i], (cell.column + kBlock) / kBlock, cell.row / kBlock, cell});
     }
   }
-  if (found.empty()) return raster_->CheckUnchanged();
+  if (found.empty()) return CheckUnread();
   std::ranges::sort(found, {}, [](const PointCell& p) { return std::tuple(p.block_row, p.block_column, p.point); });
 
   std::vector<GridCell> cells;
@@ -53,7 +52,7 @@ Result<void> Sheet::FillPoints(std::span<const GeoPosition> points, std::span<fl
     cells.clear();
     for (auto p = first; p != end; ++p) cells.push_back(p->cell);
     const GridWindow window = WindowOf(cells, columns, rows);
-    const auto samples = raster_->ReadBlocks(1, window, stop);
+    const auto samples = ReadBlocks(1, window, stop);
     if (!samples) return tl::unexpected(samples.error());
     for (std::size_t i = 0; first != end; ++first, ++i) {
       if (!IsNearestValid(*samples, window, cells[i])) continue;

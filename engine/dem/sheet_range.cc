@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "engine/dem/sheet.h"
+#include "engine/geo/tile_cover.h"
 
 namespace terrace::dem {
 namespace {
@@ -68,51 +69,72 @@ std::optional<PixelBox> ProjectedBox(const Georeference& georeference, const geo
 
 }  // namespace
 
+BlockRange Sheet::Ranges(const Box& pixels) const {
+  if (members_.size() == 1) {
+    return members_.front().raster->ranges().Query(pixels.west, pixels.south, pixels.east, pixels.north);
+  }
+  BlockRange range;
+  const double turn = wraps_ ? columns_ : 0;
+  for (const std::size_t i : member_index_.Find(pixels)) {
+    for (const double shift : {0.0, -turn, turn}) {
+      const double x = static_cast<double>(members_[i].column) + shift, y = static_cast<double>(members_[i].row);
+      range.Add(
+          members_[i].raster->ranges().Query(pixels.west - x, pixels.south - y, pixels.east - x, pixels.north - y));
+      if (turn == 0) break;
+    }
+  }
+  const auto pixel = [](double position, int count) {
+    return static_cast<std::int64_t>(std::clamp(std::floor(position), 0.0, count - 1.0));
+  };
+  const geo::TileRange wanted{pixel(pixels.west, width_), pixel(pixels.south, height_), pixel(pixels.east, width_),
+                              pixel(pixels.north, height_)};
+  std::int64_t covered = 0;
+  for (const std::size_t i : cover_index_.Find(pixels)) covered += geo::Cells(geo::Common(cover_[i], wanted));
+  range.has_voids |= covered < geo::Cells(wanted);
+  return range;
+}
+
 SheetRange Sheet::RangeOf(const geo::Lattice& lattice, const geo::TileKey& key) const {
   const double extent = lattice.cells * lattice.StepDegrees();
   const std::int64_t south_row = lattice.FirstRow(key), north_row = south_row + lattice.cells;
   SheetRange range;
-  range.touches =
-      footprint_.Touches(lattice.Longitude(lattice.FirstColumn(key)), lattice.Latitude(south_row), extent, extent);
-  if (!range.touches) return range;
-
-  const Georeference& georeference = raster_->georeference();
-  const RasterLayout& layout = raster_->layout();
-  const int factor = AveragingFactor(SamplesPerCell(lattice, spacing()));
-  std::vector<PixelBox> boxes;
   bool leaves = false;
-  if (georeference.is_geographic_grid() && georeference.is_affine()) {
-    boxes = GeographicBoxes(georeference, lattice, key);
-    leaves = !layout.wraps && std::ranges::none_of(boxes, [&](const PixelBox& box) {
-      return box.west >= 0 && box.east <= layout.width;
-    });
-  } else if (const auto box = ProjectedBox(georeference, lattice, key)) {
-    boxes = {*box};
-    leaves = box->west < 0 || box->east > layout.width;
-  } else {
-    boxes = {{0, 0, static_cast<double>(layout.width), static_cast<double>(layout.height)}};
-    leaves = true;
-  }
-  for (PixelBox& box : boxes) {
-    leaves |= box.north < 0 || box.south > layout.height;
-    // Bilinear interpolation reaches one and a half samples of the grid.
-    box.Grow(1.5 * factor + 1, 1.5 * factor + 1);
-    BlockRange here = raster_->ranges().Query(box.west, box.north, box.east, box.south);
-    if (here.has_voids) {
-      box.Grow(max_void_gap_ + factor, max_void_gap_ + factor);
-      here.Add(raster_->ranges().Query(box.west, box.north, box.east, box.south));
-    }
-    range.blocks.Add(here);
-  }
-  range.shows_others = leaves || range.blocks.has_voids;
   for (const std::int64_t row : {south_row, north_row}) {
     if (row > 0 && row < lattice.rows()) continue;
-    if (const auto pole = PoleHeight(lattice, row)) {
-      range.blocks.Add(*pole);
-    } else if (georeference.is_geographic_grid()) {
-      range.shows_others = true;
-    }
+    const auto& pole = pole_heights_[row <= 0 ? 0 : 1];
+    if (pole) range.blocks.Add(*pole);
+    leaves |= georeference_.is_geographic_grid() && !pole;
   }
+  if (!reach_.Touches(lattice.Longitude(lattice.FirstColumn(key)), lattice.Latitude(south_row), extent, extent)) {
+    return range;
+  }
+  const int factor = AveragingFactor(SamplesPerCell(lattice, spacing_));
+  std::vector<PixelBox> boxes;
+  if (georeference_.is_geographic_grid() && georeference_.is_affine()) {
+    boxes = GeographicBoxes(georeference_, lattice, key);
+    leaves |= !wraps_ &&
+              std::ranges::none_of(boxes, [&](const PixelBox& box) { return box.west >= 0 && box.east <= width_; });
+  } else if (const auto box = ProjectedBox(georeference_, lattice, key)) {
+    boxes = {*box};
+    leaves |= box->west < 0 || box->east > width_;
+  } else {
+    boxes = {{0, 0, static_cast<double>(width_), static_cast<double>(height_)}};
+    leaves = true;
+  }
+  BlockRange blocks;
+  for (PixelBox& box : boxes) {
+    leaves |= box.north < 0 || box.south > height_;
+    // Bilinear interpolation reaches one and a half samples of the grid.
+    box.Grow(1.5 * factor + 1, 1.5 * factor + 1);
+    BlockRange here = Ranges({box.west, box.north, box.east, box.south});
+    if (here.has_voids) {
+      box.Grow(max_void_gap_ + factor, max_void_gap_ + factor);
+      here.Add(Ranges({box.west, box.north, box.east, box.south}));
+    }
+    blocks.Add(here);
+  }
+  range.shows_others = leaves || blocks.has_voids;
+  range.blocks.Add(blocks);
   return range;
 }
 

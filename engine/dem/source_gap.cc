@@ -52,6 +52,7 @@ class SheetGap {
         cells_(tile.lattice_.cells),
         stride_(static_cast<std::size_t>(tile.window_.columns)) {
     PlaceNodes();
+    FindMembers();
   }
 
   void Add() {
@@ -93,6 +94,72 @@ class SheetGap {
       x_[n] = x;
       y_[n] = y;
     }
+  }
+
+  // Rasters of the sheet around the tile.
+  void FindMembers() {
+    if (sheet_.members().size() == 1) {
+      near_ = {0};
+      return;
+    }
+    Box hull{1e300, 1e300, -1e300, -1e300};
+    bool known = !sheet_.wraps();
+    for (const Position& p : trace_.positions) {
+      known &= std::isfinite(p.x) && std::isfinite(p.y);
+      hull = {std::min(hull.west, p.x), std::min(hull.south, p.y), std::max(hull.east, p.x), std::max(hull.north, p.y)};
+    }
+    const double halo = 4.0 * trace_.factor;
+    if (!known) hull = {-1e300, -1e300, 1e300, 1e300};
+    near_ = sheet_.MembersAt({hull.west - halo, hull.south - halo, hull.east + halo, hull.north + halo});
+  }
+
+  // At least the range of pixels in a box, clipped to the sheet.
+  BlockRange Ranges(double west, double north, double east, double south) const {
+    BlockRange range;
+    for (const std::size_t i : near_) {
+      const SheetMember& member = sheet_.members()[i];
+      const auto x = static_cast<double>(member.column), y = static_cast<double>(member.row);
+      range.Add(member.raster->ranges().Query(west - x, north - y, east - x, south - y));
+    }
+    return range;
+  }
+
+  // How far samples in a box of pixels are from the surface between averages (averaging_errors.h), where that surface
+  // is one raster's own; infinite elsewhere.
+  float ErrorOfAverages(double west, double north, double east, double south) const {
+    const int factor = trace_.factor;
+    if (factor == 1) return 0;  // averages of one sample
+    if (sheet_.members().size() == 1) {
+      return sheet_.members().front().raster->averaging_errors().Largest(factor, west, north, east, south);
+    }
+    constexpr float kUnknown = std::numeric_limits<float>::infinity();
+    if (sheet_.alignment() < factor) return kUnknown;
+    const SheetMember* only = nullptr;
+    for (const std::size_t i : near_) {
+      const geo::TileRange pixels = sheet_.members()[i].pixels();
+      if (east < static_cast<double>(pixels.start_x) || west > static_cast<double>(pixels.end_x + 1) ||
+          south < static_cast<double>(pixels.start_y) || north > static_cast<double>(pixels.end_y + 1)) {
+        continue;
+      }
+      if (only != nullptr) return kUnknown;
+      only = &sheet_.members()[i];
+    }
+    if (only == nullptr) return 0;
+    const RasterLayout& layout = only->raster->layout();
+    const auto whole = [factor](int samples) { return static_cast<double>(samples / factor * factor); };
+    const auto x = static_cast<double>(only->column), y = static_cast<double>(only->row);
+    if (west < x || north < y || east > x + whole(layout.columns) || south > y + whole(layout.height)) return kUnknown;
+    return only->raster->averaging_errors().Largest(factor, west - x, north - y, east - x, south - y);
+  }
+
+  // Of all rasters.
+  HeightRange HeightsOf() const {
+    HeightRange heights = sheet_.members().front().raster->info().heights;
+    for (const SheetMember& member : sheet_.members()) {
+      heights.min = std::min(heights.min, member.raster->info().heights.min);
+      heights.max = std::max(heights.max, member.raster->info().heights.max);
+    }
+    return heights;
   }
 
   bool Touches(const CellBox& box) const {
@@ -151,9 +218,7 @@ class SheetGap {
   float AveragingError(double west, double north, double east, double south) const {
     const double factor = trace_.factor, turn = sheet_.columns();
     west *= factor, north *= factor, east = (east + 1) * factor, south = (south + 1) * factor;
-    const auto error = [&](double shift) {
-      return sheet_.AveragingError(trace_.factor, west + shift, north, east + shift, south);
-    };
+    const auto error = [&](double shift) { return ErrorOfAverages(west + shift, north, east + shift, south); };
     float largest = error(0);
     if (sheet_.wraps() && west < 0) largest = std::max(largest, error(turn));
     if (sheet_.wraps() && east > turn) largest = std::max(largest, error(-turn));
@@ -321,7 +386,10 @@ class SheetGap {
       west = std::min(west, position.x), east = std::max(east, position.x);
       north = std::min(north, position.y), south = std::max(south, position.y);
     }
-    if (!known) return Apart(nodes, sheet_.heights().min, sheet_.heights().max);
+    if (!known) {
+      const HeightRange heights = HeightsOf();
+      return Apart(nodes, heights.min, heights.max);
+    }
     // Edges of cells bulge by far less. The samples are at the pixels' centres.
     constexpr double kBulge = 1.0 / 32;
     const double x = (east - west) * kBulge, y = (south - north) * kBulge;
@@ -334,7 +402,7 @@ class SheetGap {
       if (turn != 0 && !sheet_.wraps()) continue;
       const double shift = static_cast<double>(turn) * sheet_.columns();
       if (first(west - x + shift) > last(east + x + shift)) continue;
-      range.Add(sheet_.Ranges(first(west - x + shift), first(north - y), last(east + x + shift), last(south + y)));
+      range.Add(Ranges(first(west - x + shift), first(north - y), last(east + x + shift), last(south + y)));
     }
     return range.min > range.max ? 0 : Apart(nodes, range.min, range.max);
   }
@@ -344,7 +412,8 @@ class SheetGap {
   const SheetTrace& trace_;
   const int cells_;
   const std::size_t stride_;
-  std::vector<double> x_, y_;  // by node, in samples of the grid; NaN away from its even part
+  std::vector<std::size_t> near_;  // members
+  std::vector<double> x_, y_;      // by node, in samples of the grid; NaN away from its even part
 };
 
 SourceGap::SourceGap(const geo::Lattice& lattice, const NodeWindow& window, std::span<const float> heights)
@@ -354,5 +423,9 @@ SourceGap::SourceGap(const geo::Lattice& lattice, const NodeWindow& window, std:
       covered_(static_cast<std::size_t>(lattice.cells) * static_cast<std::size_t>(lattice.cells)) {}
 
 void SourceGap::Add(const Sheet& sheet, const SheetTrace& trace) { SheetGap(*this, sheet, trace).Add(); }
+
+bool SourceGap::is_covered() const {
+  return std::ranges::all_of(covered_, [](std::uint8_t covered) { return covered != 0; });
+}
 
 }  // namespace terrace::dem

@@ -21,6 +21,9 @@ class SourceGap {
   // `trace`: what Sheet::Fill noted of this window.
   void Add(const Sheet& sheet, const SheetTrace& trace);
 
+  // No sample of a further sheet shows anywhere.
+  bool is_covered() const;
+
   // Metres; infinite only where a source's overviews hide samples of unknown height.
   double bound() const { return bound_ + kRounding; }
 

@@ -38,11 +38,11 @@ void GetFloats(ByteReader& reader, std::vector<float>& values) {
 
 void Put(ByteWriter& writer, const BlockSum& sum) {
   writer.Put(sum.sum);
-  writer.Put(sum.count);
+  writer.Put(sum.weight);
 }
 BlockSum GetSum(ByteReader& reader) {
   const auto sum = reader.Get<double>();
-  return {sum, reader.Get<std::int64_t>()};
+  return {sum, reader.Get<double>()};
 }
 
 }  // namespace

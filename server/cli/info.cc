@@ -105,7 +105,7 @@ int Info(const std::vector<std::string>& dems, const std::string& cache_dir, boo
   int exit_code = kExitOk;
   nlohmann::json all = nlohmann::json::array();
   for (const std::string& path : dems) {
-    Progress progress((cache_dir.empty() ? "reading " : "preparing ") + path + ":");
+    Progress progress((cache_dir.empty() ? "reading " : "preparing ") + path);
     dem::DemOptions options;
     options.cache_dir = cache_dir;
     options.progress = progress.Callback();

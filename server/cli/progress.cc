@@ -1,19 +1,35 @@
 #include "server/cli/progress.h"
 
-#include <fmt/format.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <string>
 #include <utility>
 
 namespace terrace::cli {
 
 using Clock = std::chrono::steady_clock;
 
-Progress::Progress(std::string what)
-    : what_(std::move(what)), terminal_(isatty(STDERR_FILENO) != 0), start_(Clock::now()), last_(start_) {}
+namespace {
+
+std::string Grouped(std::size_t number) {
+  std::string text = std::to_string(number);
+  for (auto at = static_cast<std::ptrdiff_t>(text.size()) - 3; at > 0; at -= 3) {
+    text.insert(static_cast<std::size_t>(at), ",");
+  }
+  return text;
+}
+
+}  // namespace
+
+Progress::Progress(std::string what, std::size_t count)
+    : what_(std::move(what)),
+      count_(count),
+      terminal_(isatty(STDERR_FILENO) != 0),
+      start_(Clock::now()),
+      last_(start_) {}
 
 Progress::~Progress() {
   if (shown_ && terminal_) std::fputs("\r\033[K", stderr);
@@ -25,9 +41,9 @@ std::string Progress::TimeLeft(Clock::time_point now) const {
   if (!(share_ > first_share_)) return {};
   const double left = seconds * (1 - share_) / (share_ - first_share_);
   if (left < 1) return {};
-  const double minutes = std::round(left / 60), hours = std::round(left / 3600);
-  if (left < 60) return fmt::format(", {:.0f} s left", left);
-  return minutes < 90 ? fmt::format(", {:.0f} min left", minutes) : fmt::format(", {:.0f} h left", hours);
+  if (left < 60) return ", " + std::to_string(std::lround(left)) + " s left";
+  if (left < 90 * 60) return ", " + std::to_string(std::lround(left / 60)) + " min left";
+  return ", " + std::to_string(std::lround(left / 3600)) + " h left";
 }
 
 void Progress::Update(double share) {
@@ -36,8 +52,11 @@ void Progress::Update(double share) {
   const Clock::time_point now = Clock::now();
   const auto pause = std::chrono::milliseconds(!terminal_ ? 10'000 : shown_ ? 100 : 1'000);
   if (now - last_ < pause) return;
-  std::fprintf(stderr, terminal_ ? "\r\033[Kterrace: %s %.0f %%%s" : "terrace: %s %.0f %%%s\n", what_.c_str(),
-               share_ * 100, TimeLeft(now).c_str());
+  const std::string done =
+      count_ > 1 ? Grouped(static_cast<std::size_t>(share_ * static_cast<double>(count_))) + " of " + Grouped(count_)
+                 : std::to_string(std::lround(share_ * 100)) + " %";
+  std::fprintf(stderr, terminal_ ? "\r\033[Kterrace: %s %s%s" : "terrace: %s %s%s\n", what_.c_str(), done.c_str(),
+               TimeLeft(now).c_str());
   std::fflush(stderr);
   shown_ = true;
   last_ = now;

@@ -2,16 +2,18 @@
 #pragma once
 
 #include <chrono>
+#include <cstddef>
 #include <functional>
 #include <string>
 
 namespace terrace::cli {
 
-// "terrace: reading alps.tif 42 %". On a terminal the line is rewritten in place, elsewhere a line comes every ten
-// seconds. Says nothing about work that is over within a second.
+// "terrace: reading alps.tif 42 %, 3 min left"; of many things "terrace: reading dems 1,234 of 5,000". On a terminal
+// the line is rewritten in place, elsewhere a line comes every ten seconds. Says nothing about work that is over within
+// a second.
 class Progress {
  public:
-  explicit Progress(std::string what);
+  explicit Progress(std::string what, std::size_t count = 1);
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
@@ -26,6 +28,7 @@ class Progress {
   std::string TimeLeft(std::chrono::steady_clock::time_point now) const;
 
   const std::string what_;
+  const std::size_t count_;
   const bool terminal_;
   const std::chrono::steady_clock::time_point start_;
   std::chrono::steady_clock::time_point last_;

@@ -18,6 +18,7 @@
 #include "server/cli/command.h"
 #include "server/cli/log.h"
 #include "server/cli/open_layers.h"
+#include "server/cli/open_source.h"
 #include "server/cli/progress.h"
 #include "server/server.h"
 #include "server/tiles/tile_pipeline.h"
@@ -39,6 +40,14 @@ int Report(const std::vector<config::ConfigError>& errors, const std::string& fi
     std::fprintf(stderr, "  %s%s%s\n", error.path.c_str(), error.path.empty() ? "" : ": ", error.message.c_str());
   }
   return kExitUsage;
+}
+
+// A folder keeps what looks like an extension, and a trailing slash changes nothing.
+std::string StemOf(const std::string& dem) {
+  std::error_code ignored;
+  const std::filesystem::path path = std::filesystem::absolute(dem).lexically_normal();
+  if (!std::filesystem::is_directory(path, ignored)) return path.stem().string();
+  return path.has_filename() ? path.filename().string() : path.parent_path().filename().string();
 }
 
 // The file's options, then the flags, then a dataset per DEM of the command line. Everything wrong is collected.
@@ -63,8 +72,13 @@ config::Config MakeConfig(const ServeArguments& arguments, std::vector<config::C
   for (const auto& [key, text] : arguments.dataset_flags) config::SetDatasetOption(key, text, flags, errors);
   for (const std::string& dem : arguments.dems) {
     config::DatasetConfig& dataset = config.datasets.emplace_back(flags);
-    if (dataset.name.empty()) dataset.name = config::SanitizeDatasetName(std::filesystem::path(dem).stem().string());
-    dataset.sources = {std::filesystem::absolute(dem).string()};  // so that --print-config holds in any folder
+    if (dataset.name.empty()) dataset.name = config::SanitizeDatasetName(StemOf(dem));
+    // In full, so that --print-config holds in any folder.
+    Result<config::SourceConfig> source = config::SourceAt(std::filesystem::absolute(dem).string());
+    if (source)
+      dataset.sources = {*std::move(source)};
+    else
+      errors.push_back({dem, source.error().message});
   }
   const std::vector<config::ConfigError> duplicates = config::FindDuplicateNames(config.datasets);
   if (errors.empty()) errors = duplicates;
@@ -113,15 +127,9 @@ proto::GlbOptions GlbOptionsOf(const config::DatasetConfig& dataset) {
 bool OpenDatasets(const config::Config& config, std::vector<server::Dataset>& datasets) {
   bool all_open = true;
   for (const config::DatasetConfig& wanted : config.datasets) {
-    Progress progress((config.cache_dir.empty() ? "reading " : "preparing ") + wanted.sources.front() + ":");
-    dem::DemOptions options;
-    options.error_fraction = wanted.error_fraction;
-    options.finest_error = wanted.finest_error;
-    options.floor = wanted.floor;
-    options.max_void_gap = wanted.max_void_gap;
-    options.cache_dir = config.cache_dir;
-    options.progress = progress.Callback();
-    auto source = dem::DemSource::Open(wanted.sources.front(), options);
+    Progress progress((config.cache_dir.empty() ? "reading " : "preparing ") + NameOf(wanted.sources),
+                      FileCount(wanted.sources));
+    auto source = OpenSource(wanted, config.cache_dir, progress.Callback());
     if (!source) {
       std::fprintf(stderr, "terrace: dataset %s: %s\n", wanted.name.c_str(), source.error().message.c_str());
       all_open = false;
@@ -140,10 +148,33 @@ bool OpenDatasets(const config::Config& config, std::vector<server::Dataset>& da
       continue;
     }
     dataset.generation = GenerationOf(wanted, *dataset.source, LayersFingerprint(dataset));
-    spdlog::info("dataset {}: {}, levels 0 to {}", dataset.name, wanted.sources.front(), dataset.source->max_level());
+    spdlog::info("dataset {}: {}, levels 0 to {}", dataset.name, NameOf(wanted.sources), dataset.source->max_level());
     datasets.push_back(std::move(dataset));
   }
   return all_open;
+}
+
+server::EdgeOptions EdgeOf(const config::Config& config) {
+  server::EdgeOptions edge;
+  edge.max_connections = config.max_connections;
+  edge.max_connections_per_client = config.max_connections_per_client;
+  edge.requests_per_second = config.requests_per_second;
+  edge.request_burst = config.request_burst;
+  edge.transfer_bytes = config.transfer_bytes;
+  for (const config::TokenConfig& token : config.tokens) {
+    edge.tokens.push_back({token.name, token.token, token.sha256, token.datasets, token.requests_per_second});
+  }
+  for (const config::DatasetConfig& dataset : config.datasets) {
+    if (dataset.is_public) edge.public_datasets.push_back(dataset.name);
+  }
+  edge.cors_origins = config.cors_origins;
+  edge.trusted_proxies = config.trusted_proxies;
+  if (config.forwarded_header == config::ForwardedHeader::kForwarded) {
+    edge.forwarded_header = server::ForwardedHeader::kForwarded;
+  }
+  edge.tls_certificate = config.tls.certificate;
+  edge.tls_key = config.tls.key;
+  return edge;
 }
 
 server::ServerOptions OptionsOf(const config::Config& config) {
@@ -156,11 +187,12 @@ server::ServerOptions OptionsOf(const config::Config& config) {
   options.cache_bytes = config.cache_bytes;
   options.max_locations = config.max_locations;
   options.max_mesh_samples = config.max_mesh_samples;
-  options.max_connections = config.max_connections;
+  options.edge = EdgeOf(config);
   options.cache_control = config.cache_control;
   options.header_timeout = config.header_timeout;
   options.idle_timeout = config.idle_timeout;
   options.write_timeout = config.write_timeout;
+  options.min_read_rate = config.min_read_rate;
   options.request_deadline = config.request_deadline;
   options.drain_timeout = config.drain_timeout;
   options.stop_on_signals = true;
@@ -225,9 +257,10 @@ void AddServe(CLI::App& app, int& exit_code) {
       "Examples:\n"
       "  terrace serve alps.tif andes.tif\n"
       "  terrace serve --config terrace.json --listen 0.0.0.0:8080\n\n"
-      "Each DEM becomes a dataset named after its file. Flags override the config file. Prints one line with\n"
+      "Each DEM becomes a dataset named after its file; a folder of DEMs becomes one dataset. Flags override the "
+      "config file. Prints one line with\n"
       "the URL when it is ready; logs go to stderr; SIGTERM and SIGINT end it after open requests are answered.");
-  command->add_option("DEM", arguments->dems, "Rasters that GDAL can read, one dataset each");
+  command->add_option("DEM", arguments->dems, "Rasters that GDAL can read, or folders of them, one dataset each");
   command->add_option("--config", arguments->config_file, "Configuration in JSON (config/config.schema.json)")
       ->type_name("FILE");
   command->add_flag("--print-config", arguments->print_config, "Prints the configuration in force as JSON and ends");

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <cstdint>
 #include <optional>
@@ -14,16 +13,11 @@
 #include "server/http/http_error.h"
 #include "server/http/negotiate.h"
 #include "server/http/query.h"
+#include "server/http/text.h"
+#include "server/tiles/strong_etag.h"
 
 namespace terrace::server {
 namespace {
-
-std::optional<double> Number(std::string_view text) {
-  double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
-  return value;
-}
 
 Result<void> SetBox(AreaRequest& area, std::string_view text) {
   constexpr std::array<const char*, 4> kNames = {"west", "south", "east", "north"};
@@ -34,7 +28,7 @@ Result<void> SetBox(AreaRequest& area, std::string_view text) {
     if (comma == std::string_view::npos) {
       return MakeError(ErrorCode::kInvalidArgument, "bbox must be west,south,east,north in degrees");
     }
-    const std::optional<double> number = Number(text.substr(0, comma));
+    const std::optional<double> number = FiniteNumber(text.substr(0, comma));
     const double most = i % 2 == 0 ? 180 : 90;
     if (!number || std::abs(*number) > most) {
       return MakeError(ErrorCode::kInvalidArgument, "bbox: {} must be a number from -{} to {}", kNames[i], most, most);
@@ -55,8 +49,8 @@ Result<void> SetBox(AreaRequest& area, std::string_view text) {
 }
 
 Result<void> SetError(AreaRequest& area, std::string_view text) {
-  const std::optional<double> error = Number(text);
-  if (!error || *error <= 0) return MakeError(ErrorCode::kInvalidArgument, "error must be a finite number above 0");
+  const std::optional<double> error = PositiveNumber(text);
+  if (!error) return MakeError(ErrorCode::kInvalidArgument, "error must be a finite number above 0");
   area.error_m = *error;
   return {};
 }
@@ -142,31 +136,31 @@ asio::awaitable<Response> AreaHandler::Handle(Route route, Request request) cons
   if (!plan) co_return ClientErrorResponse(plan.error(), request.id);
 
   const Coding coding = NegotiateCoding(request.accept_encoding);
+  Response response;
+  response.content_type = ContentTypeOf(area->format);
+  response.coding = coding;
+  response.etag = RequestETag("mesh", datasets_[*dataset], route.query, coding);
+  response.cache_control = options_.cache_control;
+  response.vary = true;
+  if (MatchesEtag(request.if_none_match, response.etag)) co_return Conditional(std::move(response), request);
+
   SingleFlight::Work work = [this, index = *dataset, area = *area, plan = *plan,
                              coding](std::stop_token stop) -> Result<EncodedTile> {
     Result<EncodedTile> mesh = mesher_.build(index, plan, area, std::move(stop));
     if (!mesh || coding == Coding::kIdentity) return mesh;
     mesh->bytes = Compress(std::move(mesh->bytes), coding);
-    mesh->etag = MakeEtag(mesh->bytes, coding);
     return mesh;
   };
   const auto deadline = TileService::Clock::now() + options_.deadline;
   const Result<TilePtr> mesh = co_await tiles_.Run(std::move(work), TileService::Length::kLong, deadline);
   if (!mesh) co_return co_await BackendFailure(mesh.error(), request.id, options_.refusal_delay);
-
-  Response response;
-  response.content_type = ContentTypeOf(area->format);
   response.body = Body(*mesh, &(*mesh)->bytes);
-  response.coding = coding;
-  response.etag = (*mesh)->etag;
-  response.cache_control = options_.cache_control;
-  response.vary = true;
   response.headers.emplace_back("Terrain-Max-Error", FormatErrorUp((*mesh)->max_error_m));
   if (area->coordinates == AreaCoordinates::kEnu) {
     response.headers.emplace_back("Terrain-Origin", FormatOrigin(plan->centre));
   }
   response.headers.emplace_back("Server-Timing", FormatServerTiming(CacheStatus::kMiss, (*mesh)->times));
-  co_return Conditional(std::move(response), request);
+  co_return response;
 }
 
 }  // namespace terrace::server

@@ -4,6 +4,7 @@
 
 #include "proto/compress.h"
 #include "server/http/negotiate.h"
+#include "server/tiles/strong_etag.h"
 
 namespace terrace::server {
 
@@ -11,8 +12,8 @@ Document Document::Make(std::string bytes, std::string_view content_type, std::o
   Document document;
   document.content_type = content_type;
   std::string compressed = gzipped ? std::move(*gzipped) : proto::Gzip(bytes);
-  document.identity_etag = MakeEtag(bytes, Coding::kIdentity);
-  document.gzip_etag = MakeEtag(bytes, Coding::kGzip);
+  document.identity_etag = StrongETag(bytes);
+  document.gzip_etag = StrongETag(compressed);
   if (compressed.size() < bytes.size()) document.gzip = std::make_shared<const std::string>(std::move(compressed));
   document.identity = std::make_shared<const std::string>(std::move(bytes));
   return document;

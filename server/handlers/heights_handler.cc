@@ -11,6 +11,7 @@
 #include "server/handlers/backend_failure.h"
 #include "server/http/http_error.h"
 #include "server/http/negotiate.h"
+#include "server/tiles/strong_etag.h"
 
 namespace terrace::server {
 
@@ -34,12 +35,28 @@ Result<HeightsQuery> HeightsHandler::Parse(const Route& route, const Request& re
 }
 
 asio::awaitable<Response> HeightsHandler::Handle(Route route, Request request) const {
+  const bool is_post = request.method == Method::kPost;
+  if (is_post && !IsHeightsBody(request.content_type)) {
+    co_return ProblemResponse(
+        415, "the body's Content-Type must be application/json or application/x-www-form-urlencoded", request.id);
+  }
   const Result<std::uint32_t> dataset = FindDataset(route.dataset, datasets_);
   if (!dataset) co_return ClientErrorResponse(dataset.error(), request.id);
   Result<HeightsQuery> parsed = Parse(route, request);
   if (!parsed) co_return ClientErrorResponse(parsed.error(), request.id);
 
   const Coding coding = NegotiateCoding(request.accept_encoding);
+  Response response;
+  response.content_type = "application/json";
+  response.coding = coding;
+  response.vary = true;
+  response.cache_control = "no-store";
+  if (!is_post) {
+    response.etag = RequestETag("heights", datasets_[*dataset], route.query, coding);
+    response.cache_control = options_.cache_control;
+    if (MatchesEtag(request.if_none_match, response.etag)) co_return Conditional(std::move(response), request);
+  }
+
   auto query = std::make_shared<const HeightsQuery>(*std::move(parsed));
   SingleFlight::Work work = [this, index = *dataset, coding, query](std::stop_token stop) -> Result<EncodedTile> {
     const Result<std::vector<float>> heights = reader_(index, query->points, std::move(stop));
@@ -47,23 +64,13 @@ asio::awaitable<Response> HeightsHandler::Handle(Route route, Request request) c
     EncodedTile reply;
     reply.bytes = HeightsJson(*query, *heights, datasets_[index].name);
     reply.bytes = Compress(std::move(reply.bytes), coding);
-    reply.etag = MakeEtag(reply.bytes, coding);
     return reply;
   };
   const auto deadline = TileService::Clock::now() + options_.deadline;
   const Result<TilePtr> reply = co_await tiles_.Run(std::move(work), TileService::Length::kShort, deadline);
   if (!reply) co_return co_await BackendFailure(reply.error(), request.id, options_.refusal_delay);
-
-  Response response;
-  response.content_type = "application/json";
   response.body = Body(*reply, &(*reply)->bytes);
-  response.coding = coding;
-  response.vary = true;
-  response.cache_control = "no-store";
-  if (request.method == Method::kPost) co_return response;
-  response.etag = (*reply)->etag;
-  response.cache_control = options_.cache_control;
-  co_return Conditional(std::move(response), request);
+  co_return response;
 }
 
 std::string HeightsJson(const HeightsQuery& query, std::span<const float> heights, std::string_view dataset) {

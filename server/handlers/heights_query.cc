@@ -5,27 +5,17 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 
 #include "engine/dem/geodesic_path.h"
+#include "server/http/text.h"
 
 namespace terrace::server {
 namespace {
 
-std::string_view Trim(std::string_view text) {
-  const std::size_t first = text.find_first_not_of(' ');
-  return first == std::string_view::npos ? "" : text.substr(first, text.find_last_not_of(' ') - first + 1);
-}
-
-// The whole text, finite.
-std::optional<double> Number(std::string_view text) {
-  text = Trim(text);
-  double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
-  return value;
-}
+std::optional<double> Number(std::string_view text) { return FiniteNumber(Trim(text, " ")); }
 
 // Items are named by their number: their text is the client's, and nothing of it comes back.
 Result<dem::GeoPosition> ParseLocation(std::string_view item, const char* name, std::size_t number) {
@@ -52,7 +42,7 @@ tl::unexpected<Error> TooMany(const char* what, std::size_t max_locations) {
 
 Result<std::vector<dem::GeoPosition>> ParseLocations(std::string_view text, const char* name,
                                                      std::size_t max_locations) {
-  if (Trim(text).empty()) return MakeError(ErrorCode::kInvalidArgument, "{} is empty", name);
+  if (Trim(text, " ").empty()) return MakeError(ErrorCode::kInvalidArgument, "{} is empty", name);
   const auto count = static_cast<std::size_t>(std::count(text.begin(), text.end(), '|')) + 1;
   if (count > max_locations) return TooMany(name, max_locations);
   std::vector<dem::GeoPosition> points;
@@ -125,6 +115,37 @@ Result<HeightsQuery> ParsePath(const Wishes& wishes, std::size_t max_locations) 
   return query;
 }
 
+bool HasMediaType(std::string_view content_type, std::string_view type) {
+  return EqualsIgnoringCase(Trim(content_type.substr(0, content_type.find(';'))), type);
+}
+
+bool IsForm(std::string_view content_type) { return HasMediaType(content_type, "application/x-www-form-urlencoded"); }
+bool IsJson(std::string_view content_type) { return HasMediaType(content_type, "application/json"); }
+
+// Two readers of a key that is given twice may take one or the other, and the library keeps the last.
+Result<QueryParameters> ParseJsonBody(std::string_view body) {
+  std::set<std::string> keys;
+  bool repeated = false;
+  const auto watch = [&](int depth, nlohmann::json::parse_event_t event, nlohmann::json& parsed) {
+    if (event == nlohmann::json::parse_event_t::key && depth == 1) {
+      repeated = !keys.insert(parsed.get<std::string>()).second || repeated;
+    }
+    return true;
+  };
+  const auto json = nlohmann::json::parse(body, watch, /*allow_exceptions=*/false);
+  if (!json.is_object()) return MakeError(ErrorCode::kInvalidArgument, "the body is not a JSON object");
+  if (repeated) return MakeError(ErrorCode::kInvalidArgument, "the body has a key more than once");
+  QueryParameters parameters;
+  for (const auto& [name, value] : json.items()) {
+    if (!value.is_string() && !value.is_number()) {
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "the body's values must be texts or numbers, such as {{\"locations\": \"46.5,8.1|46.6,8.2\"}}");
+    }
+    parameters.emplace_back(name, value.is_string() ? value.get<std::string>() : value.dump());
+  }
+  return parameters;
+}
+
 }  // namespace
 
 Result<HeightsQuery> ParseHeightsQuery(const QueryParameters& parameters, std::size_t max_locations) {
@@ -143,30 +164,13 @@ Result<HeightsQuery> ParseHeightsQuery(const QueryParameters& parameters, std::s
   return HeightsQuery{*std::move(points), {}};
 }
 
+bool IsHeightsBody(std::string_view content_type) { return IsForm(content_type) || IsJson(content_type); }
+
 Result<QueryParameters> ParseHeightsBody(std::string_view content_type, std::string_view body) {
-  std::string type(Trim(content_type.substr(0, content_type.find(';'))));
-  std::transform(type.begin(), type.end(), type.begin(),
-                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
-  if (type == "application/x-www-form-urlencoded") {
-    std::string form(body);
-    std::replace(form.begin(), form.end(), '+', ' ');
-    return ParseQuery(form);
-  }
-  if (type != "application/json") {
-    return MakeError(ErrorCode::kInvalidArgument,
-                     "the body's Content-Type must be application/json or application/x-www-form-urlencoded");
-  }
-  const auto json = nlohmann::json::parse(body, nullptr, /*allow_exceptions=*/false);
-  if (!json.is_object()) return MakeError(ErrorCode::kInvalidArgument, "the body is not a JSON object");
-  QueryParameters parameters;
-  for (const auto& [name, value] : json.items()) {
-    if (!value.is_string() && !value.is_number()) {
-      return MakeError(ErrorCode::kInvalidArgument,
-                       "the body's values must be texts or numbers, such as {{\"locations\": \"46.5,8.1|46.6,8.2\"}}");
-    }
-    parameters.emplace_back(name, value.is_string() ? value.get<std::string>() : value.dump());
-  }
-  return parameters;
+  if (!IsForm(content_type)) return ParseJsonBody(body);
+  std::string form(body);
+  std::replace(form.begin(), form.end(), '+', ' ');
+  return ParseQuery(form);
 }
 
 }  // namespace terrace::server

@@ -21,8 +21,11 @@ struct HeightsQuery {
 // not finite or no place on Earth, and more than `max_locations` points.
 Result<HeightsQuery> ParseHeightsQuery(const QueryParameters& parameters, std::size_t max_locations);
 
-// The parameters in a request's body, by its Content-Type: a JSON object of texts and numbers, or a form.
-// kInvalidArgument: neither of the two, or malformed.
+// Whether a body of this Content-Type is read at all: JSON or a form.
+bool IsHeightsBody(std::string_view content_type);
+
+// The parameters in a request's body, by its Content-Type: a JSON object of texts and numbers, or a form. Each at most
+// once. kInvalidArgument: malformed. Precondition: IsHeightsBody.
 Result<QueryParameters> ParseHeightsBody(std::string_view content_type, std::string_view body);
 
 }  // namespace terrace::server

@@ -143,7 +143,7 @@ void Metrics::CountBuild(const TileRequest& request, const Result<TilePtr>& tile
 }
 
 std::string Metrics::Text(const TileService::Stats& tiles, const ByteCacheStats& refinements,
-                          std::size_t open_connections) const {
+                          const EdgeStats& edge) const {
   constexpr auto kCounter = prometheus::MetricType::Counter;
   constexpr auto kGauge = prometheus::MetricType::Gauge;
   std::vector<prometheus::MetricFamily> all = families_->registry.Collect();
@@ -160,7 +160,12 @@ std::string Metrics::Text(const TileService::Stats& tiles, const ByteCacheStats&
   add(kGauge, "terrace_refinement_cache_bytes", "Bytes charged to the cache of refinements", refinements.bytes);
   add(kGauge, "terrace_flights", "Builds under way or waiting", tiles.in_flight);
   add(kGauge, "terrace_queue_length", "Builds that wait for a worker", tiles.queued);
-  add(kGauge, "terrace_http_connections", "Open connections", open_connections);
+  add(kGauge, "terrace_http_connections", "Open connections", edge.connections);
+  add(kCounter, "terrace_http_connections_refused_total", "Connections turned away", edge.refused_connections);
+  add(kGauge, "terrace_http_transfer_bytes", "Bytes of bodies on their way", edge.transfers.held_bytes);
+  add(kCounter, "terrace_http_transfers_refused_total", "Bodies that found no room", edge.transfers.refused);
+  add(kCounter, "terrace_http_transfers_cut_total", "Replies cut off because others needed their room",
+      edge.transfers.cut);
   return prometheus::TextSerializer().Serialize(all);
 }
 

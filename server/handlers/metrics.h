@@ -6,6 +6,7 @@
 #include <string>
 
 #include "server/http/access_log.h"
+#include "server/http/edge.h"
 #include "server/tiles/dataset_view.h"
 #include "server/tiles/tile_service.h"
 
@@ -20,8 +21,7 @@ class Metrics {
   void CountBuild(const TileRequest& request, const Result<TilePtr>& tile);
 
   // Everything counted so far and the state given.
-  std::string Text(const TileService::Stats& tiles, const ByteCacheStats& refinements,
-                   std::size_t open_connections) const;
+  std::string Text(const TileService::Stats& tiles, const ByteCacheStats& refinements, const EdgeStats& edge) const;
 
  private:
   struct Families;

@@ -1,5 +1,7 @@
 #include "server/handlers/routes.h"
 
+#include <algorithm>
+#include <iterator>
 #include <memory>
 #include <utility>
 
@@ -28,11 +30,14 @@ Response Ready(bool draining) {
   return response;
 }
 
+bool SeesAll(const Request& request) { return !request.grant || request.grant->sees_all; }
+
 }  // namespace
 
 Routes::Routes(std::span<const DatasetView> datasets, TileService& tiles, StaticFiles viewer,
                TileHandlerOptions options, Heights heights, AreaMesher mesher, State state)
-    : tiles_(datasets, tiles, options),
+    : views_(datasets),
+      tiles_(datasets, tiles, options),
       heights_(datasets, tiles, std::move(heights.read), options, heights.max_locations),
       areas_(datasets, tiles, std::move(mesher), options),
       layers_(datasets, options.cache_control),
@@ -43,30 +48,27 @@ Routes::Routes(std::span<const DatasetView> datasets, TileService& tiles, Static
       index_(Document::Make(IndexHtml(datasets), "text/html; charset=utf-8")),
       state_(std::move(state)) {}
 
-std::optional<Response> Routes::ServeAtOnce(const Request& request) const {
-  const Result<Route> route = Match(request.target);
-  if (!route) return ClientErrorResponse(route.error(), request.id);
-  if (route->kind == RouteKind::kHeights || route->kind == RouteKind::kMesh) return std::nullopt;
+std::optional<Response> Routes::ServeAtOnce(const Route& route, const Request& request) const {
+  if (route.kind == RouteKind::kHeights || route.kind == RouteKind::kMesh) return std::nullopt;
   std::optional<Response> response =
-      route->kind == RouteKind::kTile ? tiles_.HandleNow(*route, request) : ServeNow(*route, request);
-  if (response) response->route = ToString(route->kind);
+      route.kind == RouteKind::kTile ? tiles_.HandleNow(route, request) : ServeNow(route, request);
+  if (response) response->route = ToString(route.kind);
   return response;
 }
 
-asio::awaitable<Response> Routes::Serve(Request request) const {
-  const Result<Route> route = Match(request.target);
-  if (!route) co_return ClientErrorResponse(route.error(), request.id);
+asio::awaitable<Response> Routes::Serve(Route route, Request request) const {
+  const RouteKind kind = route.kind;
   Response response;
-  if (route->kind == RouteKind::kTile) {
-    response = co_await tiles_.Handle(*route, std::move(request));
-  } else if (route->kind == RouteKind::kHeights) {
-    response = co_await heights_.Handle(*route, std::move(request));
-  } else if (route->kind == RouteKind::kMesh) {
-    response = co_await areas_.Handle(*route, std::move(request));
+  if (kind == RouteKind::kTile) {
+    response = co_await tiles_.Handle(std::move(route), std::move(request));
+  } else if (kind == RouteKind::kHeights) {
+    response = co_await heights_.Handle(std::move(route), std::move(request));
+  } else if (kind == RouteKind::kMesh) {
+    response = co_await areas_.Handle(std::move(route), std::move(request));
   } else {
-    response = ServeNow(*route, request);
+    response = ServeNow(route, request);
   }
-  response.route = ToString(route->kind);
+  response.route = ToString(kind);
   co_return response;
 }
 
@@ -81,7 +83,9 @@ Response Routes::ServeNow(const Route& route, const Request& request) const {
   }
   switch (route.kind) {
     case RouteKind::kDatasets:
-      return terrace::server::Serve(datasets_, request, kRevalidate);
+      if (SeesAll(request)) return terrace::server::Serve(datasets_, request, kRevalidate);
+      return terrace::server::Serve(Document::Make(DatasetsJson(SeenBy(request)), "application/json"), request,
+                                    kRevalidate);
     case RouteKind::kReady:
       return Ready(state_.draining());
     case RouteKind::kMetrics:
@@ -91,10 +95,23 @@ Response Routes::ServeNow(const Route& route, const Request& request) const {
   }
 }
 
+std::vector<DatasetView> Routes::SeenBy(const Request& request) const {
+  std::vector<DatasetView> seen;
+  std::copy_if(views_.begin(), views_.end(), std::back_inserter(seen),
+               [&](const DatasetView& view) { return request.grant->Sees(view.name); });
+  return seen;
+}
+
 // Its pages keep their state in the query, so any query goes.
 Response Routes::ServeViewer(const Route& route, const Request& request) const {
   if (const Document* file = viewer_.Find(route.file)) return terrace::server::Serve(*file, request, kRevalidate);
-  if (viewer_.empty() && route.file == "index.html") return terrace::server::Serve(index_, request, kRevalidate);
+  if (viewer_.empty() && route.file == "index.html") {
+    if (SeesAll(request)) return terrace::server::Serve(index_, request, kRevalidate);
+    Response index = terrace::server::Serve(Document::Make(IndexHtml(SeenBy(request)), "text/html; charset=utf-8"),
+                                            request, kRevalidate);
+    index.for_grant = true;
+    return index;
+  }
   return ProblemResponse(404, "no such URL; /datasets lists those of each dataset", request.id);
 }
 

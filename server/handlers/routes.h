@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "server/asio.h"
 #include "server/handlers/area_handler.h"
@@ -41,15 +42,17 @@ class Routes {
 
   // Answers what needs no waiting, which is most: all but tiles that must be built, heights and meshes. Nothing for
   // those.
-  std::optional<Response> ServeAtOnce(const Request& request) const;
+  std::optional<Response> ServeAtOnce(const Route& route, const Request& request) const;
 
   // Answers GET, HEAD, and POST where TakesPost says so.
-  asio::awaitable<Response> Serve(Request request) const;
+  asio::awaitable<Response> Serve(Route route, Request request) const;
 
  private:
   Response ServeNow(const Route& route, const Request& request) const;
   Response ServeViewer(const Route& route, const Request& request) const;
+  std::vector<DatasetView> SeenBy(const Request& request) const;
 
+  const std::span<const DatasetView> views_;
   const TileHandler tiles_;
   const HeightsHandler heights_;
   const AreaHandler areas_;

@@ -47,12 +47,14 @@ Response TileJsonHandler::Handle(const Route& route, const Request& request) con
   tiles.south = dataset.south;
   tiles.east = dataset.east;
   tiles.north = dataset.north;
-  return Serve(Document::Make(proto::EncodeTileJson(tiles), "application/json"), request, cache_control_);
+  Response response = Serve(Document::Make(proto::EncodeTileJson(tiles), "application/json"), request, cache_control_);
+  response.vary_too = "Forwarded, X-Forwarded-Host, X-Forwarded-Proto";  // what a proxy may say of the origin
+  return response;
 }
 
 std::string OriginOf(const Request& request) {
   if (request.host.empty()) return {};
-  return fmt::format("{}://{}", request.forwarded_proto == "https" ? "https" : "http", request.host);
+  return fmt::format("{}://{}", request.is_https ? "https" : "http", request.host);
 }
 
 }  // namespace terrace::server

@@ -23,9 +23,13 @@ std::string Escaped(std::string_view text) {
 }  // namespace
 
 std::string FormatAccessLine(const ReplyRecord& record) {
-  return fmt::format("{} \"{}\" {} {} B {:.3f} ms cache={} id={} peer={}", Escaped(record.method),
-                     Escaped(record.target), record.status, record.body_bytes,
-                     static_cast<double>(record.duration.count()) / 1000, record.cache, record.request_id, record.peer);
+  std::string line =
+      fmt::format("{} \"{}\" {} {} B {:.3f} ms cache={} id={} peer={}", Escaped(record.method), Escaped(record.target),
+                  record.status, record.body_bytes, static_cast<double>(record.duration.count()) / 1000, record.cache,
+                  record.request_id, record.peer);
+  if (!record.client.empty()) line.append(" client=").append(record.client);
+  if (!record.token_name.empty()) line.append(" token=").append(Escaped(record.token_name));
+  return line;
 }
 
 }  // namespace terrace::server

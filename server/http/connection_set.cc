@@ -2,11 +2,13 @@
 
 namespace terrace::server {
 
-void ConnectionSet::Add(const std::shared_ptr<Connection>& connection) {
+void ConnectionSet::Add(const std::shared_ptr<Connection>& connection, const std::string& client) {
   bool draining = false;
   {
     const std::lock_guard lock(mutex_);
-    connections_.emplace(connection.get(), connection);
+    const bool counts = most_of_one_ > 0 && !client.empty();
+    connections_.emplace(connection.get(), Member{connection, counts ? client : std::string()});
+    if (counts) ++of_client_[client];
     draining = draining_;
   }
   if (draining) connection->Drain();
@@ -14,13 +16,24 @@ void ConnectionSet::Add(const std::shared_ptr<Connection>& connection) {
 
 void ConnectionSet::Remove(const Connection* connection) {
   const std::lock_guard lock(mutex_);
-  connections_.erase(connection);
+  const auto member = connections_.find(connection);
+  if (member == connections_.end()) return;
+  if (const auto count = of_client_.find(member->second.client); count != of_client_.end() && --count->second == 0) {
+    of_client_.erase(count);
+  }
+  connections_.erase(member);
   if (connections_.empty()) emptied_.notify_all();
 }
 
 std::size_t ConnectionSet::size() const {
   const std::lock_guard lock(mutex_);
   return connections_.size();
+}
+
+bool ConnectionSet::HasTooMany(const std::string& client) const {
+  const std::lock_guard lock(mutex_);
+  const auto count = of_client_.find(client);
+  return count != of_client_.end() && count->second >= most_of_one_;
 }
 
 bool ConnectionSet::draining() const {
@@ -33,8 +46,8 @@ std::vector<std::shared_ptr<Connection>> ConnectionSet::Snapshot() const {
   std::vector<std::shared_ptr<Connection>> connections;
   const std::lock_guard lock(mutex_);
   connections.reserve(connections_.size());
-  for (const auto& [pointer, weak] : connections_) {
-    if (auto connection = weak.lock()) connections.push_back(std::move(connection));
+  for (const auto& [pointer, member] : connections_) {
+    if (auto connection = member.connection.lock()) connections.push_back(std::move(connection));
   }
   return connections;
 }

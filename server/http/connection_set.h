@@ -3,11 +3,14 @@
 // Thread-safe. A connection is in the set from its construction to its destruction.
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <mutex>
+#include <string>
 #include <unordered_map>
 #include <vector>
 
@@ -27,14 +30,21 @@ class Connection {
 
 class ConnectionSet {
  public:
-  explicit ConnectionSet(std::size_t capacity) : capacity_(capacity) {}
+  // `most_of_one`: connections of one client at a time; 0: as many as there may be in all.
+  explicit ConnectionSet(std::size_t capacity, std::size_t most_of_one = 0)
+      : capacity_(capacity), most_of_one_(most_of_one) {}
 
-  // A connection that comes while the set drains is told so.
-  void Add(const std::shared_ptr<Connection>& connection);
+  // A connection that comes while the set drains is told so. `client` is whom it counts for; empty: nobody.
+  void Add(const std::shared_ptr<Connection>& connection, const std::string& client = "");
   void Remove(const Connection* connection);
 
   std::size_t size() const;
   bool full() const { return size() >= capacity_; }
+  bool HasTooMany(const std::string& client) const;
+
+  // Connections that were turned away.
+  void CountRefused() { refused_.fetch_add(1, std::memory_order_relaxed); }
+  std::uint64_t refused() const { return refused_.load(std::memory_order_relaxed); }
   bool draining() const;
 
   // Makes room: connections that are only kept alive are the first to go.
@@ -50,11 +60,18 @@ class ConnectionSet {
  private:
   std::vector<std::shared_ptr<Connection>> Snapshot() const;
 
-  const std::size_t capacity_;
+  struct Member {
+    std::weak_ptr<Connection> connection;
+    std::string client;
+  };
+
+  const std::size_t capacity_, most_of_one_;
   mutable std::mutex mutex_;
   std::condition_variable emptied_;
-  std::unordered_map<const Connection*, std::weak_ptr<Connection>> connections_;
+  std::unordered_map<const Connection*, Member> connections_;
+  std::unordered_map<std::string, std::size_t> of_client_;  // connections of each, where that is limited
   bool draining_ = false;
+  std::atomic<std::uint64_t> refused_{0};
 };
 
 }  // namespace terrace::server

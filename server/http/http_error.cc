@@ -13,14 +13,24 @@ std::string_view TitleOf(int status) {
   switch (status) {
     case 400:
       return "Bad request";
+    case 401:
+      return "Unauthorized";
+    case 403:
+      return "Forbidden";
     case 404:
       return "Not found";
     case 405:
       return "Method not allowed";
+    case 408:
+      return "Request timeout";
     case 413:
       return "Content too large";
     case 414:
       return "URI too long";
+    case 415:
+      return "Unsupported media type";
+    case 429:
+      return "Too many requests";
     case 431:
       return "Request header too large";
     default:

@@ -1,7 +1,9 @@
 #include "server/http/listener.h"
 
+#include <fcntl.h>
 #include <spdlog/spdlog.h>
 
+#include <array>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
 #include <boost/asio/post.hpp>
@@ -10,6 +12,8 @@
 #include <boost/asio/use_awaitable.hpp>
 #include <future>
 
+#include "server/http/http_error.h"
+
 namespace terrace::server {
 namespace {
 
@@ -17,6 +21,8 @@ using asio::ip::tcp;
 using boost::system::error_code;
 
 constexpr std::chrono::milliseconds kBackOff{10};
+constexpr std::chrono::milliseconds kMoment{100};
+constexpr int kShedAtOnce = 1000;
 
 Result<tcp::endpoint> Resolve(asio::io_context& io, const std::string& host, std::uint16_t port) {
   const bool bracketed = host.size() > 2 && host.front() == '[' && host.back() == ']';  // as IPv6 stands in URLs
@@ -39,6 +45,24 @@ const char* Remedy(const error_code& error) {
   if (error == asio::error::address_in_use) return "stop the process that uses it or choose another port";
   if (error == asio::error::access_denied) return "ports below 1024 need privileges; choose another port";
   return "choose an address of this machine";
+}
+
+void OpenSpare(const asio::any_io_executor& executor, std::optional<asio::posix::stream_descriptor>& spare) {
+  const int descriptor = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
+  if (descriptor >= 0) spare.emplace(executor, descriptor);
+}
+
+// Once until a connection was taken again.
+void Warn(bool& crowded, const std::string& why) {
+  if (!crowded) spdlog::warn("turning connections away for now: {}", why);
+  crowded = true;
+}
+
+Response RefusalOf(int status) {
+  Response response =
+      ProblemResponse(status, status == 429 ? "too many connections from this address" : "too many connections", "-");
+  response.headers.emplace_back("Retry-After", "1");
+  return response;
 }
 
 }  // namespace
@@ -70,29 +94,87 @@ void Listener::Start() { asio::co_spawn(acceptor_.get_executor(), Run(shared_fro
 asio::awaitable<void> Listener::Run(std::shared_ptr<Listener> self) { co_await self->AcceptAll(); }
 
 asio::awaitable<void> Listener::AcceptAll() {
-  asio::steady_timer timer(acceptor_.get_executor());
-  bool crowded = false;
+  OpenSpare(acceptor_.get_executor(), spare_);
   while (acceptor_.is_open()) {
     error_code error;
-    if (!context_->connections->full()) {
-      tcp::socket socket =
-          co_await acceptor_.async_accept(io_.Next(), asio::redirect_error(asio::use_awaitable, error));
-      if (!error) {
-        crowded = false;
-        StartSession(std::move(socket), context_);
-        continue;
-      }
-      if (error == asio::error::operation_aborted) break;
-      if (error == asio::error::connection_aborted) continue;
+    if (context_->connections->full()) {
+      co_await acceptor_.async_wait(tcp::acceptor::wait_read, asio::redirect_error(asio::use_awaitable, error));
+      if (error) break;
+      co_await MakeRoom();
+      if (context_->connections->full()) Shed();
+      continue;
     }
-    if (!crowded) {
-      spdlog::warn("accepting no connections for now: {}", error ? error.message() : "as many as configured are open");
+    tcp::socket socket = co_await acceptor_.async_accept(io_.Next(), asio::redirect_error(asio::use_awaitable, error));
+    if (error == asio::error::operation_aborted) break;
+    if (error == asio::error::connection_aborted) continue;
+    if (!error) {
+      Admit(std::move(socket));
+      continue;
     }
-    crowded = true;
-    context_->connections->CloseIdle();
-    timer.expires_after(kBackOff);
-    co_await timer.async_wait(asio::redirect_error(asio::use_awaitable, error));
+    // No descriptors, or no memory for one more.
+    Warn(crowded_, error.message());
+    co_await MakeRoom();
+    Shed();
   }
+}
+
+asio::awaitable<void> Listener::Pause(std::chrono::milliseconds time) {
+  asio::steady_timer timer(acceptor_.get_executor(), time);
+  error_code ignored;
+  co_await timer.async_wait(asio::redirect_error(asio::use_awaitable, ignored));
+}
+
+// Waits a moment for connections to end, beginning with those that are only kept alive.
+asio::awaitable<void> Listener::MakeRoom() {
+  const auto until = std::chrono::steady_clock::now() + kMoment;
+  context_->connections->CloseIdle();
+  do {
+    co_await Pause(kBackOff);
+  } while (context_->connections->full() && std::chrono::steady_clock::now() < until);
+}
+
+void Listener::Admit(tcp::socket socket) {
+  crowded_ = false;
+  error_code error;
+  const auto peer = socket.remote_endpoint(error);
+  if (error) return;  // gone already
+  const asio::ip::address address = Canonical(peer.address());
+  // A proxy speaks for many.
+  const std::string client = context_->gate->proxies().trusted.Contains(address) ? "" : ClientBlock(address);
+  if (context_->connections->HasTooMany(client)) return Refuse(socket, 429);
+  StartSession(std::move(socket), context_, client);
+}
+
+// Turns away those who wait, a bounded number of them.
+void Listener::Shed() {
+  error_code error;
+  spare_.reset();
+  acceptor_.non_blocking(true, error);
+  for (int i = 0; i < kShedAtOnce && !error; ++i) {
+    tcp::socket socket(io_.first());
+    acceptor_.accept(socket, error);
+    if (!error) Refuse(socket, 503);
+    if (error == asio::error::connection_aborted) error.clear();
+  }
+  OpenSpare(acceptor_.get_executor(), spare_);
+}
+
+// Says why, if that can be done without waiting, and closes.
+void Listener::Refuse(tcp::socket& socket, int status) {
+  context_->connections->CountRefused();
+  if (status == 503) Warn(crowded_, "as many connections as configured are open");
+  if (context_->tls) return;
+  error_code ignored;
+  socket.non_blocking(true, ignored);
+  const Response response = RefusalOf(status);
+  HeadOptions head;
+  head.cors = &context_->cors;
+  const std::string bytes = SerializeHead(response, head) + *response.body;
+  socket.send(asio::buffer(bytes), 0, ignored);
+  // Bytes left unread would make the kernel send a reset, which destroys what the client has not read yet.
+  std::array<char, 4096> request;
+  socket.receive(asio::buffer(request), 0, ignored);
+  socket.shutdown(tcp::socket::shutdown_send, ignored);
 }
 
 void Listener::Close() {
@@ -111,7 +193,7 @@ void Listener::CloseOnItsThread() {
   while (!error && !context_->connections->full()) {
     tcp::socket socket(io_.Next());
     acceptor_.accept(socket, error);
-    if (!error) StartSession(std::move(socket), context_);
+    if (!error) Admit(std::move(socket));
   }
   acceptor_.close(error);
 }

@@ -1,12 +1,16 @@
 // The listening socket: accepts connections while there is room for them.
 //
-// At the cap it stops accepting, so that further clients wait in the kernel's queue, and asks connections that are only
-// kept alive to go. Running out of file descriptors is treated the same way.
+// At the cap, connections that are only kept alive are asked to go. Clients for whom there is no room after a moment
+// are accepted, told 503 and closed: one that waits in the kernel's queue does not know whether to try elsewhere.
+// Running out of file descriptors is treated the same way, with one that is kept for that purpose.
 #pragma once
 
 #include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/posix/stream_descriptor.hpp>
+#include <chrono>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "engine/core/result.h"
@@ -34,12 +38,19 @@ class Listener : public std::enable_shared_from_this<Listener> {
   Listener(IoThreads& io, std::shared_ptr<const SessionContext> context);
   static asio::awaitable<void> Run(std::shared_ptr<Listener> self);
   asio::awaitable<void> AcceptAll();
+  asio::awaitable<void> Pause(std::chrono::milliseconds time);
+  asio::awaitable<void> MakeRoom();
+  void Admit(asio::ip::tcp::socket socket);
+  void Shed();
+  void Refuse(asio::ip::tcp::socket& socket, int status);
   void CloseOnItsThread();
 
   IoThreads& io_;
   const std::shared_ptr<const SessionContext> context_;
   asio::ip::tcp::acceptor acceptor_;
   std::uint16_t port_ = 0;
+  std::optional<asio::posix::stream_descriptor> spare_;  // given up for a moment when there are no descriptors left
+  bool crowded_ = false;
 };
 
 }  // namespace terrace::server

@@ -8,29 +8,12 @@
 
 #include "engine/geo/error_ladder.h"
 #include "proto/tile_metadata.h"
+#include "server/http/text.h"
 
 namespace terrace::server {
 namespace {
 
-char Lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
-
-bool EqualsIgnoringCase(std::string_view a, std::string_view b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](char x, char y) { return Lower(x) == Lower(y); });
-}
-
-std::string_view Trim(std::string_view text) {
-  const std::size_t first = text.find_first_not_of(" \t\"");
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(" \t\"") - first + 1);
-}
-
-// Cuts the piece before the next `separator` off `rest`, trimmed of blanks and quotes.
-std::string_view NextPiece(std::string_view& rest, std::string_view separators) {
-  const std::size_t end = std::min(rest.find_first_of(separators), rest.size());
-  const std::string_view piece = Trim(rest.substr(0, end));
-  rest.remove_prefix(std::min(end + 1, rest.size()));
-  return piece;
-}
+constexpr std::string_view kBlanksAndQuotes = " \t\"";
 
 // The coding of a name, or nothing of those nobody here speaks.
 std::optional<Coding> CodingOf(std::string_view name) {
@@ -45,7 +28,7 @@ std::optional<Coding> CodingOf(std::string_view name) {
 // A quality outside 0..1 or unreadable counts as 0: what a client says badly it does not get.
 double Quality(std::string_view parameters) {
   while (!parameters.empty()) {
-    const std::string_view parameter = NextPiece(parameters, ";");
+    const std::string_view parameter = NextPiece(parameters, ";", kBlanksAndQuotes);
     if (!parameter.starts_with("q=") && !parameter.starts_with("Q=")) continue;
     double quality = 0;
     const char* const last = parameter.data() + parameter.size();
@@ -66,8 +49,8 @@ Coding NegotiateCoding(std::string_view accept_encoding, std::span<const Coding>
   std::map<Coding, double> named;
   std::optional<double> any;
   while (!accept_encoding.empty()) {
-    std::string_view item = NextPiece(accept_encoding, ",");
-    const std::string_view name = NextPiece(item, ";");
+    std::string_view item = NextPiece(accept_encoding, ",", kBlanksAndQuotes);
+    const std::string_view name = NextPiece(item, ";", kBlanksAndQuotes);
     const double quality = Quality(item);
     if (name == "*") {
       any = quality;

@@ -1,27 +1,11 @@
 #include "server/http/query.h"
 
 #include <algorithm>
-#include <charconv>
-#include <cmath>
+
+#include "server/http/text.h"
 
 namespace terrace::server {
 namespace {
-
-int HexDigit(char c) {
-  if (c >= '0' && c <= '9') return c - '0';
-  if (c >= 'a' && c <= 'f') return c - 'a' + 10;
-  if (c >= 'A' && c <= 'F') return c - 'A' + 10;
-  return -1;
-}
-
-// Finite and above zero, the whole text. Numbers that overflow or underflow a double are refused by from_chars.
-std::optional<double> PositiveNumber(std::string_view text) {
-  double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
-  if (!std::isfinite(value) || value <= 0) return std::nullopt;
-  return value;
-}
 
 // A value that is there already may come again where `repeatable`, but no other.
 template <typename T>

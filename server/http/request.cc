@@ -5,10 +5,11 @@
 #include <boost/beast/http/empty_body.hpp>
 #include <boost/beast/http/fields.hpp>
 #include <boost/beast/http/parser.hpp>
-#include <charconv>
 #include <optional>
 
 #include "server/asio.h"
+#include "server/http/query.h"
+#include "server/http/text.h"
 
 namespace terrace::server {
 namespace {
@@ -20,7 +21,8 @@ tl::unexpected<BadRequest> Bad(int status, std::string_view detail) {
   return tl::unexpected<BadRequest>(BadRequest{status, detail});
 }
 
-std::string Joined(const Fields& fields, http::field name) {
+template <typename Name>
+std::string Joined(const Fields& fields, Name name) {
   std::string joined;
   const auto [begin, end] = fields.equal_range(name);
   for (auto field = begin; field != end; ++field) {
@@ -45,25 +47,10 @@ Method ToMethod(http::verb verb) {
   }
 }
 
-// RFC 3986: host and port. An empty value is what a client sends whose URI has no authority.
-bool IsHostValue(std::string_view value) {
-  return std::all_of(value.begin(), value.end(), [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-           std::string_view("-._~%!$&'()*+,;=:[]").find(c) != std::string_view::npos;
-  });
-}
-
-// Decimal, no sign, no leading zero, at most 15 digits; 0 without the field.
-std::optional<std::size_t> PlainLength(const Fields& fields) {
-  constexpr std::size_t kMaxDigits = 15;
+// 0 without the field.
+std::optional<std::int64_t> PlainLength(const Fields& fields) {
   if (fields.count(http::field::content_length) == 0) return 0;
-  const std::string_view text = fields[http::field::content_length];
-  const bool plain = !text.empty() && text.size() <= kMaxDigits && (text == "0" || text[0] != '0') &&
-                     std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });
-  if (!plain) return std::nullopt;
-  std::size_t length = 0;
-  std::from_chars(text.data(), text.data() + text.size(), length);
-  return length;
+  return PlainDecimal(fields[http::field::content_length], /*max_digits=*/15);
 }
 
 // Null when the message ends with its head or, of a POST, so many bytes after it. Beast reads a GET with
@@ -85,7 +72,48 @@ const char* HostProblem(const Fields& fields) {
   return nullptr;
 }
 
+// RFC 6750: the header, or the query.
+std::string TokenOf(const Fields& fields, std::string& target) {
+  constexpr std::string_view kScheme = "bearer ";
+  const std::optional<std::string> in_query = TakeToken(target);
+  const std::string_view authorization = fields[http::field::authorization];
+  if (EqualsIgnoringCase(authorization.substr(0, kScheme.size()), kScheme)) {
+    return std::string(Trim(authorization.substr(kScheme.size())));
+  }
+  return in_query.value_or("");
+}
+
 }  // namespace
+
+bool IsHostValue(std::string_view value) {
+  return std::all_of(value.begin(), value.end(), [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+           std::string_view("-._~%!$&'()*+,;=:[]").find(c) != std::string_view::npos;
+  });
+}
+
+std::optional<std::string> TakeToken(std::string& target) {
+  const std::size_t question = target.find('?');
+  if (question == std::string::npos) return std::nullopt;
+  std::string_view rest = std::string_view(target).substr(question + 1);
+  std::optional<std::string> token;
+  std::string kept;
+  while (!rest.empty()) {
+    const std::string_view piece = rest.substr(0, rest.find('&'));
+    rest.remove_prefix(std::min(rest.size(), piece.size() + 1));
+    const std::size_t equals = std::min(piece.find('='), piece.size());
+    if (PercentDecode(piece.substr(0, equals)) == "token") {
+      std::string value = PercentDecode(piece.substr(std::min(equals + 1, piece.size()))).value_or("");
+      token = !token || *token == value ? std::move(value) : std::string();
+    } else {
+      kept.append(kept.empty() ? 0 : 1, '&').append(piece);
+    }
+  }
+  if (!token) return std::nullopt;
+  target.resize(question);
+  if (!kept.empty()) target.append("?").append(kept);
+  return token;
+}
 
 tl::expected<std::size_t, BadRequest> FindHeadEnd(std::string_view bytes, std::size_t scanned) {
   const std::size_t from = std::max<std::size_t>(scanned, 3) - 3;  // the end may lie across two reads
@@ -126,16 +154,22 @@ tl::expected<Request, BadRequest> ParseHead(std::string_view head) {
   request.keep_alive = fields.keep_alive();
   request.method_name = std::string(fields.method_string());
   request.target = std::string(fields.target());
+  request.token = TokenOf(fields, request.target);
   request.accept = Joined(fields, http::field::accept);
   request.accept_encoding = Joined(fields, http::field::accept_encoding);
   request.if_none_match = Joined(fields, http::field::if_none_match);
   request.content_type = std::string(fields[http::field::content_type]);
-  request.content_length = *PlainLength(fields);
+  request.content_encoding = Joined(fields, http::field::content_encoding);
+  request.content_length = static_cast<std::size_t>(*PlainLength(fields));
   // RFC 9110, section 10.1.1: HTTP/1.0 knows no interim replies.
   request.expects_continue =
       fields.version() >= 11 && boost::beast::iequals(fields[http::field::expect], "100-continue");
   request.host = std::string(fields[http::field::host]);
-  request.forwarded_proto = std::string(fields["X-Forwarded-Proto"]);
+  request.origin = Joined(fields, http::field::origin);
+  request.forwarded = Joined(fields, http::field::forwarded);
+  request.forwarded_for = Joined(fields, "X-Forwarded-For");
+  request.forwarded_host = Joined(fields, "X-Forwarded-Host");
+  request.forwarded_proto = Joined(fields, "X-Forwarded-Proto");
   return request;
 }
 

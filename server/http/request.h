@@ -6,9 +6,12 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <tl/expected.hpp>
+
+#include "server/http/access.h"
 
 namespace terrace::server {
 
@@ -22,22 +25,31 @@ struct Request {
   unsigned version = 11;    // 10 or 11
   bool keep_alive = true;   // what the client wants
   std::string method_name;  // as sent, for the log
-  std::string target;       // as sent
-  std::string accept;       // several fields joined with ", "
+  std::string target;       // as sent, but for the token in its query
+  std::string token;        // of the Authorization header, else of the query; a secret: never logged, never a key
+  std::string accept;       // several fields joined with ", ", here and below
   std::string accept_encoding;
   std::string if_none_match;
-  std::string host;             // host and port: letters, digits and "-._~%!$&'()*+,;=:[]"; may be empty
-  std::string forwarded_proto;  // of a proxy before the server: "https", "http", or whatever else was sent
+  std::string host;  // host and port: letters, digits and "-._~%!$&'()*+,;=:[]"; may be empty
+  std::string origin;
+  // What a proxy before the server may have written, or the client: see ResolveClient.
+  std::string forwarded, forwarded_for, forwarded_host, forwarded_proto;
   std::string content_type;
+  std::string content_encoding;
   std::size_t content_length = 0;  // of a POST
   bool expects_continue = false;   // the client waits for a 100 before it sends the body
   std::string body;                // of a POST, once the session has read it
-  std::string id;                  // 16 hexadecimal digits, given by the server
+
+  // Given by the server.
+  std::string id;         // 16 hexadecimal digits
+  bool is_https = false;  // how the client speaks to this server, or to the proxy before it
+  GrantPtr grant;         // what the client may see; null: everything
+  bool has_bad_token = false;
 };
 
 // Why bytes are not a request. The connection is of no use afterwards: its framing cannot be trusted.
 struct BadRequest {
-  int status = 400;         // 400, 414 or 431
+  int status = 400;         // 400, 408, 414 or 431
   std::string_view detail;  // for the client; a literal
 };
 
@@ -45,7 +57,14 @@ struct BadRequest {
 // `scanned` bytes were looked at by an earlier call with the same beginning.
 tl::expected<std::size_t, BadRequest> FindHeadEnd(std::string_view bytes, std::size_t scanned);
 
-// `head` ends with its empty line. Sets everything but `id` and `body`.
+// `head` ends with its empty line. Sets everything but `body` and what is given by the server.
 tl::expected<Request, BadRequest> ParseHead(std::string_view head);
+
+// Whether it is a host and port after RFC 3986, or empty, which is what a client sends whose URI has no authority.
+bool IsHostValue(std::string_view value);
+
+// Cuts every `token` parameter out of the query of `target` and returns its value, decoded; nothing where there is
+// none. Clients append it on their own, as often as they follow a link; different values are none that fits.
+std::optional<std::string> TakeToken(std::string& target);
 
 }  // namespace terrace::server

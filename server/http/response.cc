@@ -2,23 +2,16 @@
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>
-#include <xxhash.h>
 
 #include <algorithm>
 #include <ctime>
 #include <iterator>
 
 #include "engine/core/check.h"
+#include "server/http/text.h"
 
 namespace terrace::server {
 namespace {
-
-constexpr std::string_view kCommonHeaders =
-    "Access-Control-Allow-Origin: *\r\n"
-    "Access-Control-Expose-Headers: ETag, Terrain-Max-Error, Terrain-Certified-Error, Terrain-Origin, Retry-After, "
-    "Server-Timing\r\n"
-    "Timing-Allow-Origin: *\r\n"
-    "X-Content-Type-Options: nosniff\r\n";
 
 std::string_view ReasonPhrase(int status) {
   switch (status) {
@@ -30,14 +23,24 @@ std::string_view ReasonPhrase(int status) {
       return "Not Modified";
     case 400:
       return "Bad Request";
+    case 401:
+      return "Unauthorized";
+    case 403:
+      return "Forbidden";
     case 404:
       return "Not Found";
     case 405:
       return "Method Not Allowed";
+    case 408:
+      return "Request Timeout";
     case 413:
       return "Content Too Large";
     case 414:
       return "URI Too Long";
+    case 415:
+      return "Unsupported Media Type";
+    case 429:
+      return "Too Many Requests";
     case 431:
       return "Request Header Fields Too Large";
     case 503:
@@ -65,18 +68,37 @@ const std::string& Date() {
 
 bool HasBody(int status) { return status != 204 && status != 304; }
 
-std::string_view Trim(std::string_view text) {
-  while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);
-  while (!text.empty() && (text.back() == ' ' || text.back() == '\t')) text.remove_suffix(1);
-  return text;
+std::string VaryOf(const Response& response, const CorsPolicy& cors) {
+  std::string vary;
+  const auto add = [&vary](std::string_view names) { vary.append(vary.empty() ? "" : ", ").append(names); };
+  if (response.vary) add("Accept, Accept-Encoding");
+  if (!response.vary_too.empty()) add(response.vary_too);
+  if (response.for_grant) add("Authorization");
+  if (cors.varies()) add("Origin");
+  return vary;
 }
 
 }  // namespace
 
-std::string SerializeHead(const Response& response, unsigned version, bool keep_alive) {
+std::string PrivateCacheControl(std::string_view configured) {
+  std::string directives;
+  while (!configured.empty()) {
+    const std::string_view directive = NextPiece(configured, ",");
+    if (EqualsIgnoringCase(directive, "public") || EqualsIgnoringCase(directive, "private") || directive.empty()) {
+      continue;
+    }
+    if (EqualsIgnoringCase(directive.substr(0, directive.find('=')), "s-maxage")) continue;
+    directives.append(", ").append(directive);
+  }
+  return "private" + directives;
+}
+
+std::string SerializeHead(const Response& response, const HeadOptions& options) {
+  static const CorsPolicy any_origin;
+  const CorsPolicy& cors = options.cors ? *options.cors : any_origin;
   std::string head;
   head.reserve(1024);
-  fmt::format_to(std::back_inserter(head), "HTTP/1.{} {} {}\r\n", version % 10, response.status,
+  fmt::format_to(std::back_inserter(head), "HTTP/1.{} {} {}\r\n", options.version % 10, response.status,
                  ReasonPhrase(response.status));
   Put(head, "Date", Date());
   if (HasBody(response.status)) {
@@ -85,11 +107,16 @@ std::string SerializeHead(const Response& response, unsigned version, bool keep_
     Put(head, "Content-Length", fmt::to_string(response.body ? response.body->size() : 0));
   }
   if (!response.etag.empty()) Put(head, "ETag", response.etag);
-  if (!response.cache_control.empty()) Put(head, "Cache-Control", response.cache_control);
-  if (response.vary) Put(head, "Vary", "Accept, Accept-Encoding");
+  if (response.for_grant && !response.cache_control.empty()) {
+    Put(head, "Cache-Control", PrivateCacheControl(response.cache_control));
+  } else if (!response.cache_control.empty()) {
+    Put(head, "Cache-Control", response.cache_control);
+  }
+  if (const std::string vary = VaryOf(response, cors); !vary.empty()) Put(head, "Vary", vary);
   for (const Response::Header& header : response.headers) Put(head, header.name, header.value);
-  head += kCommonHeaders;
-  Put(head, "Connection", keep_alive ? "keep-alive" : "close");
+  head += cors.HeadersFor(options.origin);
+  head += "X-Content-Type-Options: nosniff\r\n";
+  Put(head, "Connection", options.keep_alive ? "keep-alive" : "close");
   head += "\r\n";
   return head;
 }
@@ -130,12 +157,6 @@ bool MatchesEtag(std::string_view if_none_match, std::string_view etag) {
     while (rest.starts_with(',')) rest = Trim(rest.substr(1));
   }
   return false;
-}
-
-std::string MakeEtag(std::string_view bytes, Coding coding) {
-  const XXH128_hash_t hash = XXH3_128bits(bytes.data(), bytes.size());
-  const std::string_view name = NameOf(coding);
-  return fmt::format("\"{:016x}{:016x}{}{}\"", hash.high64, hash.low64, name.empty() ? "" : "-", name);
 }
 
 }  // namespace terrace::server

@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "server/http/cors.h"
 #include "server/http/request.h"
 #include "server/tiles/tile_request.h"
 
@@ -26,6 +27,8 @@ struct Response {
   std::string etag;           // with its quotes; may be empty
   std::string cache_control;  // may be empty
   bool vary = false;          // the reply depends on Accept and Accept-Encoding
+  std::string_view vary_too;  // a literal: further headers it depends on; may be empty
+  bool for_grant = false;     // another token, or none, would be answered otherwise
   bool close = false;         // end the connection after this reply
 
   struct Header {
@@ -41,9 +44,18 @@ struct Response {
   std::string_view cache = "-";
 };
 
-// The header values that every reply carries, so that any web page may read it: CORS and resource timing.
-// `version` is the request's: an HTTP/1.0 client that is told 1.1 waits for ever.
-std::string SerializeHead(const Response& response, unsigned version, bool keep_alive);
+// What a reply's head says beyond the response itself.
+struct HeadOptions {
+  unsigned version = 11;  // the request's: an HTTP/1.0 client that is told 1.1 waits for ever
+  bool keep_alive = false;
+  const CorsPolicy* cors = nullptr;  // null: any page may read the reply
+  std::string_view origin = {};      // the request's
+};
+
+std::string SerializeHead(const Response& response, const HeadOptions& options);
+
+// Cache-Control of a reply that depends on a token: as configured, but for the client alone.
+std::string PrivateCacheControl(std::string_view configured);
 
 // 204 to an OPTIONS request: what a browser asks before it sends a request with headers of its own.
 Response PreflightResponse(bool takes_post);
@@ -56,8 +68,5 @@ Response Conditional(Response response, const Request& request);
 
 // RFC 9110, section 13.1.2: a list of ETags, weakly compared, or "*".
 bool MatchesEtag(std::string_view if_none_match, std::string_view etag);
-
-// A strong ETag of bytes in one coding, with its quotes.
-std::string MakeEtag(std::string_view bytes, Coding coding);
 
 }  // namespace terrace::server

@@ -1,12 +1,12 @@
 #include "server/http/router.h"
 
 #include <algorithm>
-#include <charconv>
 #include <optional>
 #include <utility>
 #include <vector>
 
 #include "server/http/query.h"
+#include "server/http/text.h"
 #include "server/tiles/dataset_view.h"
 
 namespace terrace::server {
@@ -29,17 +29,8 @@ std::optional<std::string_view> OriginForm(std::string_view target) {
   return target;
 }
 
-// Plain decimal, no sign, no leading zero, at most 9 digits: one tile has one URL.
-std::optional<std::int64_t> TileNumber(std::string_view text) {
-  constexpr std::size_t kMaxDigits = 9;
-  if (text.empty() || text.size() > kMaxDigits || (text.size() > 1 && text[0] == '0') || text[0] == '-') {
-    return std::nullopt;
-  }
-  std::int64_t number = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
-  return number;
-}
+// One tile has one URL.
+std::optional<std::int64_t> TileNumber(std::string_view text) { return PlainDecimal(text, /*max_digits=*/9); }
 
 // Web Mercator has one root, TMS geodetic two side by side.
 bool IsInScheme(const geo::TileKey& key, TileFormat format) {

@@ -2,47 +2,35 @@
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
-#include <sys/socket.h>
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
 #include <boost/asio/dispatch.hpp>
 #include <boost/asio/experimental/awaitable_operators.hpp>
-#include <boost/asio/redirect_error.hpp>
 #include <boost/asio/steady_timer.hpp>
-#include <boost/asio/this_coro.hpp>
 #include <boost/asio/use_awaitable.hpp>
-#include <boost/asio/write.hpp>
-#include <boost/beast/core/buffers_suffix.hpp>
-#include <boost/beast/core/error.hpp>
-#include <boost/beast/core/flat_buffer.hpp>
-#include <boost/beast/core/tcp_stream.hpp>
-#include <cerrno>
 #include <exception>
 #include <optional>
 #include <random>
+#include <utility>
 #include <variant>
 
+#include "server/http/client_watch.h"
 #include "server/http/http_error.h"
-#include "server/http/router.h"
+#include "server/http/stream.h"
+#include "server/http/text.h"
 
 namespace terrace::server {
 namespace {
 
-namespace beast = boost::beast;
-using boost::system::error_code;
 using Clock = std::chrono::steady_clock;
 
-constexpr std::size_t kReadBytes = 4096;
 // How long, and for how much, a closed connection is read so that the last reply arrives: bytes left unread would make
 // the kernel send a reset, which destroys what the client has not read yet.
 constexpr std::chrono::milliseconds kLingerTime{500};
 constexpr std::size_t kLingerBytes = std::size_t{64} << 20;
-// A request that takes longer than this is worth asking whether its client is still there.
-constexpr std::chrono::milliseconds kPatience{100};
 constexpr int kClientLeft = 499;
 
 std::string NextRequestId() {
@@ -51,34 +39,36 @@ std::string NextRequestId() {
   return fmt::format("{:016x}", start + count.fetch_add(1, std::memory_order_relaxed));
 }
 
-constexpr std::string_view kContinue = "HTTP/1.1 100 Continue\r\n\r\n";
-
-bool TakesPost(const Request& request) {
-  const Result<Route> route = Match(request.target);
-  return route && TakesPost(route->kind);
+Response Overloaded(std::string_view detail, std::string_view request_id) {
+  Response response = ProblemResponse(503, detail, request_id);
+  response.headers.emplace_back("Retry-After", "1");
+  return response;
 }
 
 // Asked before a body is read: nothing if it may come.
 std::optional<Response> WhyNoBody(const Request& request, std::size_t max_body_bytes) {
-  if (!TakesPost(request)) return NoSuchMethodResponse(false, request.id);
   if (request.content_length > max_body_bytes) {
     return ProblemResponse(413, "the request body is too large", request.id);
+  }
+  if (!request.content_encoding.empty() && !EqualsIgnoringCase(request.content_encoding, "identity")) {
+    Response response = ProblemResponse(415, "bodies with a Content-Encoding are not read", request.id);
+    response.headers.emplace_back("Accept-Encoding", "identity");
+    return response;
   }
   return std::nullopt;
 }
 
-// Nothing: the connection ended, or was idle for too long.
-using HeadRead = std::optional<tl::expected<Request, BadRequest>>;
-
 class Session : public Connection, public std::enable_shared_from_this<Session> {
  public:
   Session(asio::ip::tcp::socket socket, std::shared_ptr<const SessionContext> context)
-      : context_(std::move(context)), stream_(std::move(socket)), buffer_(kMaxHeadBytes) {
-    error_code error;
+      : context_(std::move(context)),
+        stream_(std::move(socket), context_->tls ? context_->tls->Current() : nullptr),
+        reader_(stream_, context_->options.read) {
+    boost::system::error_code error;
     const auto peer = stream_.socket().remote_endpoint(error);
-    if (!error) peer_ = fmt::format("{}:{}", peer.address().to_string(), peer.port());
-    stream_.socket().set_option(asio::ip::tcp::no_delay(true), error);
-    stream_.socket().non_blocking(true, error);
+    if (error) return;
+    peer_ = Caller(Canonical(peer.address()));
+    peer_text_ = fmt::format("{}:{}", peer.address().to_string(), peer.port());
   }
   ~Session() override { context_->connections->Remove(this); }
 
@@ -89,274 +79,259 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   void Abort() override { Post(&Session::AbortHere); }
 
  private:
+  // A request on its way through the session, and what is to be told about it.
+  struct Exchange {
+    Request request;
+    Caller caller;
+    Clock::time_point begun = Clock::now();
+  };
+
   void Post(void (Session::*step)()) {
-    asio::dispatch(stream_.get_executor(), [self = shared_from_this(), step] { ((*self).*step)(); });
+    asio::dispatch(stream_.socket().get_executor(), [self = shared_from_this(), step] { ((*self).*step)(); });
   }
   void CloseIfIdleHere() {
-    if (waiting_ && served_ > 0) DrainHere();
+    if (!reader_.waiting() || served_ == 0) return;
+    hurried_ = true;
+    reader_.Close();
   }
-  void DrainHere() {
-    closing_ = true;
-    if (waiting_) stream_.cancel();
-  }
+  void DrainHere() { reader_.Close(); }
   void AbortHere() {
-    closing_ = true;
-    stream_.close();
+    reader_.Close();
+    stream_.Reset();
   }
 
   asio::awaitable<void> ServeAll();
-  asio::awaitable<HeadRead> ReadHead();
-  bool TakeWhatArrived();
-  asio::awaitable<bool> ReadBody(Request& request);
-  asio::awaitable<void> Refuse(Request request, Response response);
   asio::awaitable<bool> ServeOne(Request request);
-  std::optional<Response> AnswerAtOnce(const Request& request);
-  asio::awaitable<std::optional<Response>> AnswerWhileConnected(Request request);
-  asio::awaitable<Response> Answer(Request request);
-  asio::awaitable<void> ClientLeft();
+  asio::awaitable<void> RefuseMessage(BadRequest why, Exchange exchange);
+  asio::awaitable<std::optional<Response>> Refuse(const Request& request, const Result<Route>& route,
+                                                  const Caller& caller);
+  std::optional<Response> AnswerAtOnce(const Route& route, const Request& request);
+  asio::awaitable<std::optional<Response>> AnswerWhileConnected(Route route, Request request);
+  asio::awaitable<Response> Answer(Route route, Request request);
+  asio::awaitable<bool> Reply(const Exchange& exchange, Response response);
   asio::awaitable<bool> Write(std::string head, Body body);
   asio::awaitable<void> CloseGently();
-  void Report(const Request& request, const Response& response, std::size_t bytes, Clock::time_point begun) const;
-
-  std::string_view Unread() const { return {static_cast<const char*>(buffer_.data().data()), buffer_.size()}; }
+  void Report(const Exchange& exchange, const Response& response, std::size_t bytes) const;
 
   const std::shared_ptr<const SessionContext> context_;
-  beast::tcp_stream stream_;
-  beast::flat_buffer buffer_;  // what was read and not yet parsed: the next requests of a client that does not wait
-  std::string peer_ = "-";
+  Stream stream_;
+  RequestReader reader_;
+  Caller peer_;
+  std::string peer_text_ = "-";
   std::uint64_t served_ = 0;
-  bool waiting_ = false;  // for the first byte of a request
-  bool closing_ = false;  // after the request at hand
+  bool hurried_ = false;  // others wait for this connection's place
 };
 
 asio::awaitable<void> Session::ServeAll() {
-  for (;;) {
-    HeadRead head = co_await ReadHead();
+  stream_.ExpiresAfter(context_->options.read.message);
+  const Transfer secured = co_await stream_.Handshake();
+  if (!secured) {
+    stream_.Close();
+    co_return;
+  }
+  for (bool keep = true; keep;) {
+    RequestReader::Head head = co_await reader_.ReadHead();
     if (!head) break;
-    if (!*head) {
-      Request unparsed;
-      unparsed.method_name = "-";
-      unparsed.target = "-";
-      unparsed.id = NextRequestId();
-      Response refusal = ProblemResponse(head->error().status, head->error().detail, unparsed.id);
-      co_await Refuse(std::move(unparsed), std::move(refusal));
+    if (*head) {
+      keep = co_await ServeOne(**std::move(head));
+      ++served_;
+    } else {
+      Exchange exchange;
+      exchange.caller = peer_;
+      co_await RefuseMessage(head->error(), std::move(exchange));
       break;
     }
-    Request request = std::move(**head);
-    request.id = NextRequestId();
-    if (request.content_length > 0) {
-      if (std::optional<Response> why = WhyNoBody(request, context_->options.max_body_bytes)) {
-        co_await Refuse(std::move(request), *std::move(why));
-        break;
-      }
-      if (!co_await ReadBody(request)) break;
-    }
-    const bool keep = co_await ServeOne(std::move(request));
-    ++served_;
-    if (!keep) break;
   }
   co_await CloseGently();
 }
 
-// Answers, and the connection is to be closed: what follows cannot be trusted to be a request.
-asio::awaitable<void> Session::Refuse(Request request, Response response) {
-  const auto begun = Clock::now();
-  co_await Write(SerializeHead(response, request.version, false), response.body);
-  Report(request, response, response.body->size(), begun);
-}
-
-// False: the client left, or took too long. Memory is taken as bytes arrive, not as they are promised.
-asio::awaitable<bool> Session::ReadBody(Request& request) {
-  stream_.expires_after(context_->options.header_timeout);
-  error_code error;
-  if (request.expects_continue && buffer_.size() == 0) {
-    co_await asio::async_write(stream_, asio::buffer(kContinue), asio::redirect_error(asio::use_awaitable, error));
-    if (error) co_return false;
-  }
-  for (;;) {
-    const std::string_view here = Unread().substr(0, request.content_length - request.body.size());
-    request.body.append(here);
-    buffer_.consume(here.size());
-    if (request.body.size() == request.content_length) co_return true;
-    const std::size_t room = std::min(request.content_length - request.body.size(), kMaxHeadBytes);
-    const std::size_t got =
-        co_await stream_.async_read_some(buffer_.prepare(room), asio::redirect_error(asio::use_awaitable, error));
-    buffer_.commit(got);
-    if (error) co_return false;
-  }
-}
-
-asio::awaitable<HeadRead> Session::ReadHead() {
-  std::size_t scanned = 0;
-  bool begun = buffer_.size() > 0;
-  stream_.expires_after(begun || served_ == 0 ? context_->options.header_timeout : context_->options.idle_timeout);
-  for (;;) {
-    // RFC 9112, section 2.2: empty lines before a request are to be ignored.
-    while (Unread().starts_with("\r\n")) {
-      buffer_.consume(2);
-      scanned = 0;
-    }
-    if (buffer_.size() > 0) {
-      const auto end = FindHeadEnd(Unread(), scanned);
-      if (!end) co_return HeadRead(tl::unexpected(end.error()));
-      if (*end > 0) {
-        HeadRead parsed(ParseHead(Unread().substr(0, *end)));
-        buffer_.consume(*end);
-        co_return parsed;
-      }
-      scanned = buffer_.size();
-      if (!begun) stream_.expires_after(context_->options.header_timeout);
-      begun = true;
-    }
-    if (closing_ && !begun && !TakeWhatArrived()) co_return std::nullopt;
-    if (closing_ && buffer_.size() > scanned) continue;
-
-    const std::size_t room = std::min(kReadBytes, kMaxHeadBytes - buffer_.size());
-    waiting_ = !begun;
-    error_code error;
-    const std::size_t got =
-        co_await stream_.async_read_some(buffer_.prepare(room), asio::redirect_error(asio::use_awaitable, error));
-    waiting_ = false;
-    buffer_.commit(got);
-    // A drain cuts the wait short; a request may have arrived in that very moment.
-    if (error && !(closing_ && error == asio::error::operation_aborted && stream_.socket().is_open())) {
-      co_return std::nullopt;
-    }
-  }
-}
-
-// Reads what the kernel has, without waiting. False: there was nothing.
-bool Session::TakeWhatArrived() {
-  error_code error;
-  const std::size_t available = stream_.socket().available(error);
-  if (error || available == 0) return false;
-  const std::size_t room = std::min(available, kMaxHeadBytes - buffer_.size());
-  buffer_.commit(stream_.socket().read_some(buffer_.prepare(room), error));
-  return !error;
+// What follows cannot be trusted to be a request.
+asio::awaitable<void> Session::RefuseMessage(BadRequest why, Exchange exchange) {
+  if (exchange.request.id.empty()) exchange.request.id = NextRequestId();
+  Response response = ProblemResponse(why.status, why.detail, exchange.request.id);
+  response.close = true;
+  co_await Reply(exchange, std::move(response));
 }
 
 // False: the connection is to be closed.
 asio::awaitable<bool> Session::ServeOne(Request request) {
-  const auto begun = Clock::now();
-  std::optional<Response> response = AnswerAtOnce(request);
-  if (!response) response = co_await AnswerWhileConnected(request);
+  Exchange exchange;
+  request.id = NextRequestId();
+  request.is_https = stream_.is_tls();
+  exchange.caller = context_->gate->Identify(request, peer_);
+  exchange.request = std::move(request);
+  const Result<Route> route = Match(exchange.request.target);
+  std::optional<Response> response = co_await Refuse(exchange.request, route, exchange.caller);
+  if (response) {
+    // A body may follow that nobody will read.
+    response->close = response->close || exchange.request.content_length > 0;
+    co_return co_await Reply(exchange, *std::move(response));
+  }
+  std::optional<TransferBudget::Hold> incoming =
+      context_->transfers->TryHold(exchange.request.content_length, weak_from_this());
+  if (!incoming) {
+    response = Overloaded("too many request bodies are on their way", exchange.request.id);
+    response->close = true;
+    co_return co_await Reply(exchange, *std::move(response));
+  }
+  if (exchange.request.content_length > 0) {
+    const tl::expected<void, BadRequest> read = co_await reader_.ReadBody(exchange.request);
+    if (!read && read.error().status > 0) co_await RefuseMessage(read.error(), std::move(exchange));
+    if (!read) co_return false;
+  }
+  response = AnswerAtOnce(*route, exchange.request);
+  if (!response) response = co_await AnswerWhileConnected(*route, exchange.request);
   if (!response) {
     Response nobody;
     nobody.status = kClientLeft;
-    Report(request, nobody, 0, begun);
-    stream_.close();
+    Report(exchange, nobody, 0);
+    stream_.Close();
     co_return false;
   }
-  const bool keep = request.keep_alive && !response->close && !closing_;
-  const bool with_body = request.method != Method::kHead && response->body && response->status != 304;
-  const Body body = with_body ? response->body : nullptr;
-  const bool written = co_await Write(SerializeHead(*response, request.version, keep), body);
-  Report(request, *response, body ? body->size() : 0, begun);
-  co_return keep&& written;
+  context_->gate->Mark(*route, *response);
+  co_return co_await Reply(exchange, *std::move(response));
+}
+
+// What can be said without the request's body. Preflights come first: they carry no token.
+asio::awaitable<std::optional<Response>> Session::Refuse(const Request& request, const Result<Route>& route,
+                                                         const Caller& caller) {
+  const bool takes_post = route && TakesPost(route->kind);
+  if (request.method == Method::kOptions) co_return PreflightResponse(takes_post);
+  if (request.method == Method::kOther || (request.method == Method::kPost && !takes_post)) {
+    co_return NoSuchMethodResponse(takes_post, request.id);
+  }
+  if (!route) co_return ClientErrorResponse(route.error(), request.id);
+  std::optional<Response> refusal = context_->gate->Refuse(request, *route, caller);
+  if (refusal) {
+    refusal->route = ToString(route->kind);
+    if (refusal->status == 429) {
+      asio::steady_timer delay(stream_.socket().get_executor(), context_->options.refusal_delay);
+      co_await delay.async_wait(asio::use_awaitable);
+    }
+    co_return refusal;
+  }
+  co_return WhyNoBody(request, context_->options.max_body_bytes);
 }
 
 // Nothing: the answer has to be waited for. Most answers need not be, and then neither a timer nor a second coroutine
 // watches the client meanwhile.
-std::optional<Response> Session::AnswerAtOnce(const Request& request) {
-  if (request.method == Method::kGet || request.method == Method::kHead) {
-    try {
-      if (context_->quick_handler) return context_->quick_handler(request);
-    } catch (const std::exception&) {  // the handler will meet it again, and say so
-    }
-    return std::nullopt;
+std::optional<Response> Session::AnswerAtOnce(const Route& route, const Request& request) {
+  try {
+    if (context_->quick_handler) return context_->quick_handler(route, request);
+  } catch (const std::exception&) {  // the handler will meet it again, and say so
   }
-  const bool takes_post = TakesPost(request);
-  if (request.method == Method::kOptions) return PreflightResponse(takes_post);
-  if (request.method == Method::kPost && takes_post) return std::nullopt;
-  return NoSuchMethodResponse(takes_post, request.id);
+  return std::nullopt;
 }
 
 // Nothing: the client is gone.
-asio::awaitable<std::optional<Response>> Session::AnswerWhileConnected(Request request) {
+asio::awaitable<std::optional<Response>> Session::AnswerWhileConnected(Route route, Request request) {
   using asio::experimental::awaitable_operators::operator||;
-  std::variant<Response, std::monostate> first = co_await (Answer(std::move(request)) || ClientLeft());
+  std::variant<Response, std::monostate> first =
+      co_await (Answer(std::move(route), std::move(request)) || ClientLeft(stream_));
   if (first.index() == 1) co_return std::nullopt;
   co_return std::move(std::get<0>(first));
 }
 
 // Never throws, so that the race above always has a winner.
-asio::awaitable<Response> Session::Answer(Request request) {
+asio::awaitable<Response> Session::Answer(Route route, Request request) {
   const std::string id = request.id;
   Error error;
   try {
-    co_return co_await context_->handler(std::move(request));
+    co_return co_await context_->handler(std::move(route), std::move(request));
   } catch (const std::exception& exception) {
     error.message = exception.what();
   }
   co_return BackendErrorResponse(error, id);
 }
 
-// Returns when the client has closed or reset the connection. A client that closes only its own direction counts as
-// gone as well, once its request takes longer than kPatience: browsers abandon requests that way.
-asio::awaitable<void> Session::ClientLeft() {
-  asio::ip::tcp::socket& socket = stream_.socket();
-  asio::steady_timer patience(stream_.get_executor(), kPatience);
-  co_await patience.async_wait(asio::use_awaitable);
-  co_await socket.async_wait(asio::ip::tcp::socket::wait_read, asio::use_awaitable);
-  char byte;
-  const auto peeked = ::recv(socket.native_handle(), &byte, 1, MSG_PEEK | MSG_DONTWAIT);
-  if (peeked == 0 || (peeked < 0 && errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR)) co_return;
-  // The next request hides the end of the stream; a reset still shows.
-  co_await socket.async_wait(asio::ip::tcp::socket::wait_error, asio::use_awaitable);
+// False: the connection is to be closed.
+asio::awaitable<bool> Session::Reply(const Exchange& exchange, Response response) {
+  const Request& request = exchange.request;
+  const bool with_body = request.method != Method::kHead && response.status != 304;
+  std::optional<TransferBudget::Hold> room =
+      context_->transfers->TryHold(with_body ? response.body : nullptr, weak_from_this());
+  if (!room) {
+    const std::string_view route = response.route;
+    response = Overloaded("too many replies are on their way", request.id);
+    response.route = route;
+    room.emplace();
+  }
+  const Body body = with_body ? response.body : nullptr;
+  HeadOptions head;
+  head.version = request.version;
+  head.keep_alive = request.keep_alive && !response.close && !reader_.closing();
+  head.cors = &context_->cors;
+  head.origin = request.origin;
+  const bool written = co_await Write(SerializeHead(response, head), body);
+  Report(exchange, response, body ? body->size() : 0);
+  co_return head.keep_alive&& written;
 }
 
-// False: the client is gone or took nothing for too long.
+// False: the client is gone, took nothing for too long, or takes too little in the long run.
 asio::awaitable<bool> Session::Write(std::string head, Body body) {
-  const std::array<asio::const_buffer, 2> parts = {asio::buffer(head),
-                                                   body ? asio::buffer(*body) : asio::const_buffer()};
-  beast::buffers_suffix<std::array<asio::const_buffer, 2>> left(parts);
-  // What the kernel takes at once needs no timer. An error shows again when the rest is written.
-  error_code error;
-  left.consume(stream_.socket().write_some(left, error));
+  BufferPair left = {asio::buffer(head), body ? asio::buffer(*body) : asio::const_buffer()};
+  const SessionOptions& options = context_->options;
+  const auto take = [&left](std::size_t bytes) {
+    const std::size_t of_head = std::min(bytes, left[0].size());
+    left[0] += of_head;
+    left[1] += bytes - of_head;
+  };
+  // What the kernel takes at once needs no deadline. An error shows again when the rest is written.
+  std::size_t total = stream_.WriteReady(left).value_or(0);
+  take(total);
+  const auto begun = Clock::now();
   while (asio::buffer_size(left) > 0) {
-    stream_.expires_after(context_->options.write_timeout);
-    const std::size_t sent = co_await stream_.async_write_some(left, asio::redirect_error(asio::use_awaitable, error));
-    if (error) co_return false;
-    left.consume(sent);
+    auto deadline = Clock::now() + options.write_timeout;
+    if (options.min_rate > 0) {
+      deadline = std::min(deadline,
+                          begun + options.write_timeout + std::chrono::milliseconds(total * 1000 / options.min_rate));
+    }
+    stream_.ExpiresAt(deadline);
+    const Transfer sent = co_await stream_.WriteSome(left);
+    if (!sent) {
+      stream_.Reset();
+      co_return false;
+    }
+    total += *sent;
+    take(*sent);
   }
   co_return true;
 }
 
 asio::awaitable<void> Session::CloseGently() {
   if (!stream_.socket().is_open()) co_return;
-  error_code error;
-  stream_.socket().shutdown(asio::ip::tcp::socket::shutdown_send, error);
-  stream_.expires_after(kLingerTime);
-  for (std::size_t taken = 0; !error && taken < kLingerBytes;) {
-    buffer_.clear();
-    taken +=
-        co_await stream_.async_read_some(buffer_.prepare(kReadBytes), asio::redirect_error(asio::use_awaitable, error));
-  }
-  stream_.close();
+  if (hurried_) co_return stream_.Close();
+  stream_.ExpiresAfter(kLingerTime);
+  co_await stream_.FinishWriting();
+  co_await reader_.Discard(kLingerBytes);
+  stream_.Close();
 }
 
-void Session::Report(const Request& request, const Response& response, std::size_t bytes,
-                     Clock::time_point begun) const {
+void Session::Report(const Exchange& exchange, const Response& response, std::size_t bytes) const {
+  const Request& request = exchange.request;
   ReplyRecord record;
   record.method = request.method_name;
   record.target = request.target;
   record.status = response.status;
   record.body_bytes = bytes;
-  record.duration = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - begun);
+  record.duration = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - exchange.begun);
   record.route = response.route;
   record.cache = response.cache;
   record.request_id = request.id;
-  record.peer = peer_;
+  record.peer = peer_text_;
+  if (exchange.caller.address != peer_.address) record.client = exchange.caller.text;
+  if (request.grant) record.token_name = request.grant->name;
   context_->observer(record);
 }
 
 }  // namespace
 
-void StartSession(asio::ip::tcp::socket socket, std::shared_ptr<const SessionContext> context) {
+void StartSession(asio::ip::tcp::socket socket, std::shared_ptr<const SessionContext> context,
+                  const std::string& client) {
   const auto executor = socket.get_executor();
   ConnectionSet& connections = *context->connections;
   auto session = std::make_shared<Session>(std::move(socket), std::move(context));
-  connections.Add(session);
+  connections.Add(session, client);
   asio::co_spawn(executor, Session::Run(std::move(session)), asio::detached);
 }
 

@@ -10,4 +10,9 @@ std::string StrongETag(std::string_view bytes) {
   return fmt::format("\"{:016x}{:016x}\"", hash.high64, hash.low64);
 }
 
+std::string RequestETag(std::string_view kind, const DatasetView& dataset, std::string_view query, Coding coding) {
+  return StrongETag(
+      fmt::format("{} {} {:016x} {} {}", kind, dataset.name, dataset.generation, static_cast<int>(coding), query));
+}
+
 }  // namespace terrace::server

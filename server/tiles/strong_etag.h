@@ -1,12 +1,19 @@
-// The ETag of bytes that the server made.
+// ETags, the one place that makes them: strong, with their quotes, a hash of 128 bits.
 #pragma once
 
 #include <string>
 #include <string_view>
 
+#include "server/tiles/dataset_view.h"
+#include "server/tiles/tile_request.h"
+
 namespace terrace::server {
 
-// Strong, with its quotes: a hash of 128 bits.
+// Of bytes that the server made.
 std::string StrongETag(std::string_view bytes);
+
+// Of bytes that need not be made to know that a client has them: what `kind` of reply it is, the dataset's generation
+// and the request's text decide about them. Different texts of one wish have different ETags.
+std::string RequestETag(std::string_view kind, const DatasetView& dataset, std::string_view query, Coding coding);
 
 }  // namespace terrace::server

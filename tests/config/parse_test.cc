@@ -75,7 +75,7 @@ TEST(ParseConfig, ReportsAllErrorsTogetherInTheOrderOfTheText) {
       ElementsAre(IsError("/io_threads", "a whole number from 1 to 64, not 0"),
                   IsError("/datasets/0/sources", "a list of paths"), IsError("/datasets/0", "\"name\" is missing"),
                   IsError("/datasets/1/name", "1 to 64 letters, digits"),
-                  IsError("/datasets/1/sources/1", "a path or a glob, not 7"),
+                  IsError("/datasets/1/sources/1", "a path, a glob or a folder, not 7"),
                   IsError("/datasets/2", "an object with keys such as \"name\", not 3"),
                   IsError("/lissten", "did you mean \"listen\"?"),
                   IsError("/log_level", "\"debug\" or \"info\" or \"warn\" or \"error\" or \"off\", not \"loud\"")));
@@ -110,9 +110,12 @@ TEST(ParseConfig, RefusesAVerticalDatumItCannotConvert) {
               ElementsAre(IsError("/datasets/0/vertical", "\"egm96\" is not supported yet; write \"unknown\"")));
 }
 
-TEST(ParseConfig, RefusesASecondSource) {
-  EXPECT_THAT(ErrorsOf(R"({"datasets": [{"name": "a", "sources": ["a.tif", "b.tif"]}]})"),
-              ElementsAre(IsError("/datasets/0/sources", "gives 2 files, but mosaics are not supported yet")));
+TEST(ParseConfig, KeepsTheOrderOfSources) {
+  const ConfigResult config =
+      ParseConfig(R"({"datasets": [{"name": "a", "sources": ["b.tif", "/x/a.tif"]}]})", "/data");
+  ASSERT_TRUE(config);
+  const std::vector<SourceConfig> expected = {"/data/b.tif", "/x/a.tif"};
+  EXPECT_EQ(config->datasets.at(0).sources, expected);
 }
 
 TEST(ParseConfig, KeepsLineBreaksOutOfHeaders) {
@@ -136,7 +139,7 @@ TEST(LoadConfig, TakesPathsRelativeToTheFile) {
   std::ofstream(folder / "terrace.json") << R"({"datasets": [{"name": "a", "sources": ["a.tif"]}], "viewer": "page"})";
   const ConfigResult config = LoadConfig(folder / "terrace.json");
   ASSERT_TRUE(config);
-  EXPECT_EQ(config->datasets.at(0).sources.at(0), (folder / "a.tif").string());
+  EXPECT_EQ(config->datasets.at(0).sources.at(0).written, (folder / "a.tif").string());
   EXPECT_EQ(config->viewer.directory, folder / "page");
 }
 

@@ -33,6 +33,7 @@ TEST(ToJson, ComesBackWithEveryOptionSet) {
       true};
   dataset.water.sea_level = -1.25;
   dataset.metadata_availability = 7;
+  dataset.is_public = true;
   config.datasets = {dataset, Dataset("b")};
   config.datasets[1].water.mask = "/data/water.tif";
   config.datasets[1].imagery = {"/data/photo.tif", "© \"é\"", Texture::kWebp, 64, 99};
@@ -44,6 +45,16 @@ TEST(ToJson, ComesBackWithEveryOptionSet) {
   config.cache_bytes = std::size_t{1} << 40;
   config.refinement_cache_bytes = 12'345'678;
   config.max_connections = 7;
+  config.max_connections_per_client = 3;
+  config.transfer_bytes = 5;
+  config.requests_per_second = 0.25;
+  config.request_burst = 7;
+  config.tokens = {{"a", "0123456789abcdef", "", {"a", "b"}, 2.5}, {"b", "", std::string(64, 'f'), {}, 0}};
+  config.cors_origins = {"https://maps.example"};
+  config.trusted_proxies = {"10.0.0.0/8", "::1"};
+  config.forwarded_header = ForwardedHeader::kForwarded;
+  config.tls = {"/etc/server.pem", "/etc/server.key"};
+  config.min_read_rate = 0;
   config.max_locations = 1'000'000;
   config.max_mesh_samples = 4;
   config.request_deadline = std::chrono::milliseconds(100);
@@ -64,6 +75,7 @@ TEST(ToJson, NamesEveryOption) {
   dataset.water.sea_level = 0;
   dataset.imagery.image = "/data/photo.tif";
   config.datasets = {dataset};
+  config.tls = {"/etc/server.pem", "/etc/server.key"};
   const Json json = Json::parse(ToJson(config));
   EXPECT_EQ(json.size(), ServerOptionTable().size());
   EXPECT_EQ(json.at("datasets").at(0).size(), DatasetOptionTable().size());

@@ -155,17 +155,21 @@ TEST_F(Framing, ClosesReadersThatTakeNothing) {
 
 TEST_F(Framing, ServesAtTheCapAgainWhenAConnectionLeaves) {
   ServerOptions options;
-  options.max_connections = 3;
+  options.edge.max_connections = 3;
   options.header_timeout = 400ms;
   Start(options);
   std::vector<std::unique_ptr<RawClient>> hogs;
-  for (int i = 0; i < 10; ++i) hogs.push_back(std::make_unique<RawClient>(port()));
-  EXPECT_EQ(Fetch(port(), "/livez").status, 200) << "after the silent ones have timed out";
+  for (int i = 0; i < 3; ++i) hogs.push_back(std::make_unique<RawClient>(port()));
+  const Reply refused = Fetch(port(), "/livez");
+  EXPECT_EQ(refused.status, 503) << "told, not left waiting";
+  EXPECT_EQ(refused.Field("retry-after"), "1");
+  EXPECT_EQ(refused.Field("connection"), "close");
+  EXPECT_TRUE(Eventually([&] { return Fetch(port(), "/livez").status == 200; })) << "the silent ones have timed out";
 }
 
 TEST_F(Framing, GivesTheRoomOfIdleConnectionsToNewOnes) {
   ServerOptions options;
-  options.max_connections = 3;
+  options.edge.max_connections = 3;
   Start(options);
   std::vector<std::unique_ptr<RawClient>> idle;
   for (int i = 0; i < 3; ++i) {

@@ -120,8 +120,16 @@ TEST(HeightsQuery, RefusesOtherBodies) {
   EXPECT_FALSE(ParseHeightsBody("application/x-www-form-urlencoded", "locations=%zz"));
   for (const char* type :
        {"", "text/plain", "application/xml", "multipart/form-data; boundary=x", "application/jsonx"}) {
-    EXPECT_FALSE(ParseHeightsBody(type, R"({"locations": "1,2"})")) << type;
+    EXPECT_FALSE(IsHeightsBody(type)) << type;
   }
+  EXPECT_TRUE(IsHeightsBody("Application/JSON ; charset=utf-8"));
+}
+
+TEST(HeightsQuery, RefusesKeysThatAreGivenTwice) {
+  const auto twice = ParseHeightsBody("application/json", R"({"locations": "1,2", "locations": "3,4"})");
+  ASSERT_FALSE(twice);
+  EXPECT_NE(twice.error().message.find("more than once"), std::string::npos);
+  EXPECT_FALSE(ParseHeightsBody("application/json", "{\"locations\": \"1,2\", \"\\u006cocations\": \"3,4\"}"));
 }
 
 TEST(HeightsJson, IsWhatOpenTopoDataSends) {

@@ -15,10 +15,10 @@ class TileJsonHandlerTest : public testing::Test {
     datasets_[0].name = "a b";
     datasets_[0].max_mercator_depth = 12;
   }
-  Response Get(const char* target, const char* host = "example.test:8080", const char* proto = "") {
+  Response Get(const char* target, const char* host = "example.test:8080", bool is_https = false) {
     Request request;
     request.host = host;
-    request.forwarded_proto = proto;
+    request.is_https = is_https;
     return TileJsonHandler(datasets_, "max-age=1").Handle(*Match(target), request);
   }
   static nlohmann::json Parse(const Response& response) { return nlohmann::json::parse(*response.body); }
@@ -33,9 +33,9 @@ TEST_F(TileJsonHandlerTest, NamesTilesAsTheClientCanAskForThem) {
   EXPECT_EQ(response.cache_control, "max-age=1");
   EXPECT_EQ(Parse(response)["tiles"][0], "http://example.test:8080/a%20b/{z}/{x}/{y}.png");
   EXPECT_EQ(Parse(response)["maxzoom"], 12);
-  EXPECT_EQ(Parse(Get("/a%20b/tiles.json", "", ""))["tiles"][0], "/a%20b/{z}/{x}/{y}.png");
-  EXPECT_EQ(Parse(Get("/a%20b/tiles.json", "h", "https"))["tiles"][0], "https://h/a%20b/{z}/{x}/{y}.png");
-  EXPECT_EQ(Parse(Get("/a%20b/tiles.json", "h", "javascript"))["tiles"][0], "http://h/a%20b/{z}/{x}/{y}.png");
+  EXPECT_EQ(Parse(Get("/a%20b/tiles.json", ""))["tiles"][0], "/a%20b/{z}/{x}/{y}.png");
+  EXPECT_EQ(Parse(Get("/a%20b/tiles.json", "h", true))["tiles"][0], "https://h/a%20b/{z}/{x}/{y}.png");
+  EXPECT_EQ(response.vary_too, "Forwarded, X-Forwarded-Host, X-Forwarded-Proto");
 }
 
 TEST_F(TileJsonHandlerTest, WritesWishesIntoTheTemplate) {

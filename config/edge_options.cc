@@ -1,0 +1,188 @@
+#include "config/edge_options.h"
+
+#include <arpa/inet.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <filesystem>
+#include <string_view>
+
+#include "config/option_table.h"
+
+namespace terrace::config {
+namespace {
+
+constexpr std::size_t kMinTokenLength = 16, kMaxTokenLength = 256, kHashDigits = 64;
+constexpr double kMostRequests = 1e6;
+
+bool IsAlphanumeric(char c) { return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9'); }
+
+bool ConsistsOf(std::string_view text, std::string_view others) {
+  return std::all_of(text.begin(), text.end(),
+                     [&](char c) { return IsAlphanumeric(c) || others.find(c) != std::string_view::npos; });
+}
+
+// RFC 6750 lets a Bearer token have these characters.
+std::string CheckToken(const std::string& text) {
+  const bool fits = text.size() >= kMinTokenLength && text.size() <= kMaxTokenLength;
+  if (fits && ConsistsOf(text, "-._~+/=")) return {};
+  return fmt::format("must be {} to {} letters, digits or any of -._~+/=; openssl rand -hex 24 makes one",
+                     kMinTokenLength, kMaxTokenLength);
+}
+
+std::string CheckHash(const std::string& text) {
+  const bool is_hex = text.find_first_not_of("0123456789abcdefABCDEF") == std::string::npos;
+  return text.size() == kHashDigits && is_hex ? "" : "must be 64 hexadecimal digits, as sha256sum prints them";
+}
+
+std::string CheckTokenName(const std::string& text) {
+  const bool fits = !text.empty() && text.size() <= 64 && ConsistsOf(text, "-._");
+  return fits ? "" : "must be 1 to 64 letters, digits, '.', '_' or '-'; the log shows it instead of the token";
+}
+
+// The value goes into a response header as it is.
+std::string CheckOrigin(const std::string& text) {
+  if (text == "*") return {};
+  for (const std::string_view scheme : {"https://", "http://"}) {
+    if (!text.starts_with(scheme)) continue;
+    const std::string_view host = std::string_view(text).substr(scheme.size());
+    if (!host.empty() && host.size() <= 255 && ConsistsOf(host, "-.:[]")) return {};
+  }
+  return "must be \"*\" or what browsers send as Origin, such as \"https://maps.example\" or "
+         "\"http://localhost:3000\", "
+         "without a path";
+}
+
+std::string CheckRange(const std::string& text) {
+  const std::size_t slash = std::min(text.find('/'), text.size());
+  const std::string base = text.substr(0, slash);
+  std::array<unsigned char, 16> bytes{};
+  const bool is_v4 = ::inet_pton(AF_INET, base.c_str(), bytes.data()) == 1;
+  const bool is_v6 = !is_v4 && ::inet_pton(AF_INET6, base.c_str(), bytes.data()) == 1;
+  bool fits = is_v4 || is_v6;
+  if (slash < text.size()) {
+    const std::string_view digits = std::string_view(text).substr(slash + 1);
+    unsigned bits = 0;
+    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), bits);
+    const bool is_plain =
+        error == std::errc() && end == digits.data() + digits.size() && digits == std::to_string(bits);
+    fits = fits && is_plain && bits <= (is_v4 ? 32u : 128u);
+  }
+  return fits ? ""
+              : "must be an address or a range of addresses, such as \"127.0.0.1\", \"10.0.0.0/8\" or \"fd00::/8\"";
+}
+
+// "a,b", or a list as it stands in the file.
+Json ListToJson(const std::string& text) {
+  if (text.starts_with('[')) {
+    const Json parsed = Json::parse(text, nullptr, /*allow_exceptions=*/false);
+    if (parsed.is_array()) return parsed;
+  }
+  Json list = Json::array();
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t comma = std::min(text.find(',', at), text.size());
+    list.push_back(text.substr(at, comma - at));
+    at = comma + 1;
+  }
+  return list;
+}
+
+// Texts that `check` likes: it returns "must be ...", or nothing.
+template <typename Target>
+Codec<Target> List(std::vector<std::string> Target::*member, std::string (*check)(const std::string&),
+                   const char* example) {
+  return {[=](const Json& value, const Place& place, Target& target) {
+            if (!value.is_array()) return place.Expected(fmt::format("a list such as {}", example), value);
+            std::vector<std::string> texts;
+            for (std::size_t i = 0; i < value.size(); ++i) {
+              if (!value[i].is_string()) {
+                place.At(i).Expected("text", value[i]);
+                continue;
+              }
+              texts.push_back(value[i].template get<std::string>());
+              const std::string problem = check(texts.back());
+              if (!problem.empty()) place.At(i).Fail(Quote(value[i]) + " " + problem);
+            }
+            target.*member = std::move(texts);
+          },
+          [=](const Target& target) { return Json(target.*member); }, ListToJson};
+}
+
+const std::vector<Option<TokenConfig>>& TokenOptionTable() {
+  static const std::vector<Option<TokenConfig>> table = {
+      {"name", "NAME", "What the log calls it", Text(&TokenConfig::name, CheckTokenName)},
+      {"token", "TEXT", "The token", Text(&TokenConfig::token, CheckToken)},
+      {"sha256", "HEX", "Its hash, instead of the token", Text(&TokenConfig::sha256, CheckHash)},
+      {"datasets", "NAMES", "What it opens; all without", List(&TokenConfig::datasets, CheckDatasetName, "[\"maui\"]")},
+      {"requests_per_second", "N", "Its own rate", Number(&TokenConfig::requests_per_second, 0, kMostRequests)},
+  };
+  return table;
+}
+
+Json WriteToken(const TokenConfig& token) {
+  Json json = WriteObject(token, TokenOptionTable());
+  for (const char* key : {"token", "sha256"}) {
+    if (json[key] == "") json.erase(key);
+  }
+  return json;
+}
+
+void ReadTokens(const Json& value, const Place& place, Config& config) {
+  if (!value.is_array()) return place.Expected("a list of tokens", value);
+  for (std::size_t i = 0; i < value.size(); ++i) {
+    TokenConfig& token = config.tokens.emplace_back();
+    ReadObject(value[i], place.At(i), TokenOptionTable(), token);
+    if (!value[i].is_object()) continue;
+    if (!value[i].contains("name")) place.At(i).Fail("\"name\" is missing; every token needs one");
+    if (value[i].contains("token") == value[i].contains("sha256")) {
+      place.At(i).Fail("needs either \"token\" or \"sha256\", one of both");
+    }
+    const auto earlier = config.tokens.end() - 1;
+    if (std::any_of(config.tokens.begin(), earlier,
+                    [&](const TokenConfig& other) { return other.name == token.name; })) {
+      place.At(i).Fail(fmt::format("another token is called \"{}\" too; every token needs its own name", token.name));
+    }
+  }
+}
+
+Json TlsToJson(const std::string& text) {
+  const std::size_t comma = text.find(',');
+  if (comma == std::string::npos) return text;
+  const auto absolute = [](const std::string& path) { return std::filesystem::absolute(path).string(); };
+  return Json{{"certificate", absolute(text.substr(0, comma))}, {"key", absolute(text.substr(comma + 1))}};
+}
+
+void ReadTls(const Json& value, const Place& place, Config& config) {
+  const auto is_path = [&](const char* key) {
+    return value.contains(key) && value[key].is_string() && !value[key].get_ref<const std::string&>().empty();
+  };
+  if (!value.is_object() || value.size() != 2 || !is_path("certificate") || !is_path("key")) {
+    return place.Expected(R"({"certificate": "server.pem", "key": "server.key"}, the paths of two PEM files)", value);
+  }
+  config.tls = {(place.directory() / value["certificate"].get<std::string>()).string(),
+                (place.directory() / value["key"].get<std::string>()).string()};
+}
+
+Json WriteTls(const Config& config) {
+  if (config.tls.certificate.empty()) return {};
+  return Json{{"certificate", config.tls.certificate}, {"key", config.tls.key}};
+}
+
+}  // namespace
+
+Codec<Config> TokensCodec() {
+  return {ReadTokens, [](const Config& config) {
+            Json list = Json::array();
+            for (const TokenConfig& token : config.tokens) list.push_back(WriteToken(token));
+            return list;
+          }};
+}
+
+Codec<Config> TlsCodec() { return {ReadTls, WriteTls, TlsToJson}; }
+
+Codec<Config> OriginsCodec() { return List(&Config::cors_origins, CheckOrigin, R"(["https://maps.example"])"); }
+
+Codec<Config> ProxiesCodec() { return List(&Config::trusted_proxies, CheckRange, R"(["127.0.0.1", "10.0.0.0/8"])"); }
+
+}  // namespace terrace::config

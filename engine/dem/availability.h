@@ -1,0 +1,27 @@
+// Which tiles a dataset of many sources has: deep ones only where a fine source lies.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "engine/dem/footprint.h"
+#include "engine/geo/tile_key.h"
+
+namespace terrace::dem {
+
+// A source's place, not padded, and the deepest level that it is worth.
+struct Reach {
+  Footprint footprint;
+  int depth = 0;
+};
+
+// Per level 0 .. the deepest: blocks without overlap, sorted by row, then column, that hold
+// - every tile that a source touches which is worth this level;
+// - every ancestor of such a tile, and both roots;
+// - of the children of a tile that has any, all that touch a source at all: clients of 3D Tiles drop the parent for its
+//   children, and a missing one would be a hole.
+// A level of more blocks than its description may grow to is made of larger ones, with tiles outside all sources.
+// Precondition: not empty.
+std::vector<std::vector<geo::TileRange>> AvailableTiles(std::span<const Reach> sources);
+
+}  // namespace terrace::dem

@@ -1,0 +1,36 @@
+// Which of many boxes meet a given one.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+namespace terrace::dem {
+
+struct Box {
+  double west = 0, south = 0, east = 0, north = 0;
+};
+
+// An R-tree. Immutable and thread-safe; an empty index finds nothing.
+class BoxIndex {
+ public:
+  struct Entry {
+    Box box;
+    std::size_t value;
+  };
+
+  BoxIndex();
+  explicit BoxIndex(const std::vector<Entry>& entries);
+  BoxIndex(BoxIndex&&) noexcept;
+  BoxIndex& operator=(BoxIndex&&) noexcept;
+  ~BoxIndex();
+
+  // The values of the entries that meet the box, edges included; ascending, each once.
+  std::vector<std::size_t> Find(const Box& box) const;
+
+ private:
+  struct Tree;
+  std::unique_ptr<const Tree> tree_;
+};
+
+}  // namespace terrace::dem

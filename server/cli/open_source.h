@@ -1,0 +1,27 @@
+// The elevation of a dataset, as its configuration names it.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "config/config.h"
+#include "engine/core/result.h"
+#include "engine/dem/dem_source.h"
+
+namespace terrace::cli {
+
+// All files of the sources, each entry one rank.
+std::vector<dem::DemFile> FilesOf(const std::vector<config::SourceConfig>& sources);
+std::size_t FileCount(const std::vector<config::SourceConfig>& sources);
+
+// For messages: "alps.tif", "alps.tif and 2 more sources".
+std::string NameOf(const std::vector<config::SourceConfig>& sources);
+
+// Opens and scans all of them. Errors name the file and the remedy.
+Result<std::unique_ptr<dem::DemSource>> OpenSource(const config::DatasetConfig& wanted, const std::string& cache_dir,
+                                                   const std::function<void(double)>& progress);
+
+}  // namespace terrace::cli

@@ -1,0 +1,48 @@
+// Who may see which dataset: tokens, and datasets that need none.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <unordered_set>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "server/http/edge_options.h"
+
+namespace terrace::server {
+
+// What the bearer of a token may see. Immutable.
+struct Grant {
+  std::string name;  // empty: of those without a token
+  bool sees_all = false;
+  std::unordered_set<std::string> datasets;
+  double requests_per_second = 0;
+
+  bool Sees(const std::string& dataset) const { return sees_all || datasets.contains(dataset); }
+};
+using GrantPtr = std::shared_ptr<const Grant>;
+
+// Immutable. Tokens are kept and compared as hashes: how long a comparison takes tells nothing about a token.
+class AccessPolicy {
+ public:
+  // Without tokens everybody sees everything. With tokens, `public_datasets` are seen by everybody.
+  // kInvalidArgument: a hash that is none, or a token given twice.
+  static Result<AccessPolicy> Make(const std::vector<TokenOptions>& tokens,
+                                   const std::vector<std::string>& public_datasets);
+
+  bool has_tokens() const { return !grants_.empty(); }
+
+  // What is seen without a token.
+  const GrantPtr& anonymous() const { return anonymous_; }
+
+  // Null: nobody has such a token.
+  GrantPtr Find(std::string_view token) const;
+
+ private:
+  std::unordered_map<std::string, GrantPtr> grants_;  // by SHA-256
+  GrantPtr anonymous_;
+};
+
+}  // namespace terrace::server

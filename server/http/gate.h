@@ -1,0 +1,57 @@
+// What is decided about a request before anything is done for it: who asks, how often, and what they may see.
+//
+// Thread-safe.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "server/http/access.h"
+#include "server/http/client_address.h"
+#include "server/http/rate_limiter.h"
+#include "server/http/request.h"
+#include "server/http/response.h"
+#include "server/http/router.h"
+
+namespace terrace::server {
+
+// A client as it is logged and counted.
+struct Caller {
+  Caller() = default;
+  explicit Caller(const asio::ip::address& a) : address(a), text(a.to_string()), block(ClientBlock(a)) {}
+
+  asio::ip::address address;
+  std::string text = "-", block;
+};
+
+struct GateOptions {
+  Proxies proxies;
+  AccessPolicy access;
+  RateLimiter::Rate rate;  // of each token, and of each client without one
+};
+
+class Gate {
+ public:
+  explicit Gate(GateOptions options) : options_(std::move(options)) {}
+
+  // Who sent the request, behind the proxies; sets the request's scheme, host and grant. `peer`: the connection's other
+  // end.
+  Caller Identify(Request& request, const Caller& peer) const;
+
+  // 429, 401 or 403; nothing where the request may go on.
+  std::optional<Response> Refuse(const Request& request, const Route& route, const Caller& caller);
+
+  // Marks a reply that another token would not get.
+  void Mark(const Route& route, Response& response) const;
+
+  const Proxies& proxies() const { return options_.proxies; }
+
+ private:
+  std::optional<Response> RefuseForRate(const Request& request, const Caller& caller);
+  std::optional<Response> RefuseForAccess(const Request& request, const Route& route) const;
+
+  const GateOptions options_;
+  RateLimiter limiter_;
+};
+
+}  // namespace terrace::server

@@ -1,0 +1,106 @@
+#include "server/http/request_reader.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace terrace::server {
+namespace {
+
+constexpr std::size_t kReadBytes = 4096;
+constexpr std::string_view kContinue = "HTTP/1.1 100 Continue\r\n\r\n";
+
+BadRequest TooSlow() { return BadRequest{408, "the request did not arrive in time"}; }
+BadRequest Gone() { return BadRequest{0, ""}; }
+
+}  // namespace
+
+RequestReader::RequestReader(Stream& stream, ReadTimeouts timeouts) : stream_(stream), timeouts_(timeouts) {}
+
+void RequestReader::Close() {
+  closing_ = true;
+  if (waiting_) stream_.Cancel();
+}
+
+asio::awaitable<RequestReader::Head> RequestReader::ReadHead() {
+  std::size_t scanned = 0;
+  bool begun = !Unread().empty();
+  stream_.ExpiresAfter(begun || is_first_ ? timeouts_.message : timeouts_.idle);
+  is_first_ = false;
+  for (;;) {
+    // RFC 9112, section 2.2: empty lines before a request are to be ignored.
+    while (Unread().starts_with("\r\n")) {
+      Consume(2);
+      scanned = 0;
+    }
+    if (!Unread().empty()) {
+      const auto end = FindHeadEnd(Unread(), scanned);
+      if (!end) co_return Head(tl::unexpected(end.error()));
+      if (*end > 0) {
+        Head parsed(ParseHead(Unread().substr(0, *end)));
+        Consume(*end);
+        co_return parsed;
+      }
+      scanned = Unread().size();
+      if (!begun) stream_.ExpiresAfter(timeouts_.message);
+      begun = true;
+    }
+    if (closing_ && !begun && !FillWithWhatArrived()) co_return std::nullopt;
+    if (closing_ && Unread().size() > scanned) continue;
+
+    waiting_ = !begun;
+    const Transfer got = co_await Fill(std::min(kReadBytes, kMaxHeadBytes - Unread().size()));
+    waiting_ = false;
+    if (got) continue;
+    if (stream_.expired() && begun) co_return Head(tl::unexpected(TooSlow()));
+    // A drain cuts the wait short; a request may have arrived in that very moment.
+    const bool drained = closing_ && got.error() == asio::error::operation_aborted && stream_.socket().is_open();
+    if (!drained || stream_.expired()) co_return std::nullopt;
+  }
+}
+
+asio::awaitable<Transfer> RequestReader::Fill(std::size_t room) {
+  buffer_.erase(0, std::exchange(consumed_, 0));
+  const std::size_t end = buffer_.size();
+  buffer_.resize(end + room);
+  const Transfer got = co_await stream_.ReadSome(asio::buffer(buffer_.data() + end, room));
+  buffer_.resize(end + got.value_or(0));
+  co_return got;
+}
+
+// False: there was nothing.
+bool RequestReader::FillWithWhatArrived() {
+  buffer_.erase(0, std::exchange(consumed_, 0));
+  const std::size_t end = buffer_.size();
+  buffer_.resize(kMaxHeadBytes);
+  const Transfer got = stream_.ReadReady(asio::buffer(buffer_.data() + end, kMaxHeadBytes - end));
+  buffer_.resize(end + got.value_or(0));
+  return got.value_or(0) > 0;
+}
+
+asio::awaitable<tl::expected<void, BadRequest>> RequestReader::ReadBody(Request& request) {
+  stream_.ExpiresAfter(timeouts_.message);
+  if (request.expects_continue && Unread().empty()) {
+    const BufferPair interim = {asio::buffer(kContinue), asio::const_buffer()};
+    const Transfer sent = co_await stream_.WriteSome(interim);
+    if (!sent) co_return tl::unexpected(Gone());
+  }
+  for (;;) {
+    const std::string_view here = Unread().substr(0, request.content_length - request.body.size());
+    request.body.append(here);
+    Consume(here.size());
+    if (request.body.size() == request.content_length) co_return tl::expected<void, BadRequest>();
+    const Transfer got = co_await Fill(std::min(request.content_length - request.body.size(), kMaxHeadBytes));
+    if (!got) co_return tl::unexpected(stream_.expired() ? TooSlow() : Gone());
+  }
+}
+
+asio::awaitable<void> RequestReader::Discard(std::size_t most) {
+  for (std::size_t taken = 0; taken < most;) {
+    Consume(Unread().size());
+    const Transfer got = co_await Fill(kReadBytes);
+    if (!got) break;
+    taken += *got;
+  }
+}
+
+}  // namespace terrace::server

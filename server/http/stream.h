@@ -1,0 +1,66 @@
+// The two ends of a connection's bytes: a socket, or TLS on top of one; with a deadline for whatever is under way.
+//
+// For one thread. Operations end in an error of the system or of TLS; end of file is one.
+#pragma once
+
+#include <array>
+#include <boost/asio/buffer.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/system/error_code.hpp>
+#include <chrono>
+#include <cstddef>
+#include <memory>
+#include <tl/expected.hpp>
+
+#include "server/asio.h"
+
+namespace boost::asio::ssl {
+class context;
+}
+
+namespace terrace::server {
+
+using Transfer = tl::expected<std::size_t, boost::system::error_code>;  // bytes
+using BufferPair = std::array<asio::const_buffer, 2>;
+
+class Stream {
+ public:
+  // `tls` null: plain.
+  Stream(asio::ip::tcp::socket socket, std::shared_ptr<asio::ssl::context> tls);
+  ~Stream();
+  Stream(const Stream&) = delete;
+  Stream& operator=(const Stream&) = delete;
+
+  asio::ip::tcp::socket& socket();
+  bool is_tls() const;
+
+  // The operation under way when `time` has passed, and every one begun later, fails. Until the next call of this.
+  void ExpiresAfter(std::chrono::milliseconds time);
+  void ExpiresAt(std::chrono::steady_clock::time_point deadline);
+  bool expired() const;
+
+  // Of TLS; nothing to do for others.
+  asio::awaitable<Transfer> Handshake();
+  // At least one byte.
+  asio::awaitable<Transfer> ReadSome(asio::mutable_buffer buffer);
+  asio::awaitable<Transfer> WriteSome(BufferPair buffers);
+  // What is there already, without waiting; 0 bytes if nothing, and always for TLS.
+  Transfer ReadReady(asio::mutable_buffer buffer);
+
+  // What can be sent without waiting; 0 bytes if nothing, and always for TLS.
+  Transfer WriteReady(BufferPair buffers);
+
+  // Ends the operation under way.
+  void Cancel();
+  // Says that nothing more will be sent.
+  asio::awaitable<void> FinishWriting();
+  void Close();
+  // Closes, and the kernel forgets what the client has not taken yet.
+  void Reset();
+
+ private:
+  struct State;
+  const std::shared_ptr<State> state_;  // a deadline that passes in this moment may outlive the stream
+};
+
+}  // namespace terrace::server

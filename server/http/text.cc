@@ -1,0 +1,67 @@
+#include "server/http/text.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+namespace terrace::server {
+namespace {
+
+char LowerOf(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
+
+}  // namespace
+
+std::string_view Trim(std::string_view text, std::string_view blanks) {
+  const std::size_t first = text.find_first_not_of(blanks);
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(blanks) - first + 1);
+}
+
+std::string Lower(std::string_view text) {
+  std::string lower(text);
+  std::transform(lower.begin(), lower.end(), lower.begin(), LowerOf);
+  return lower;
+}
+
+bool EqualsIgnoringCase(std::string_view a, std::string_view b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](char x, char y) { return LowerOf(x) == LowerOf(y); });
+}
+
+std::string_view NextPiece(std::string_view& rest, std::string_view separators, std::string_view blanks) {
+  const std::size_t end = std::min(rest.find_first_of(separators), rest.size());
+  const std::string_view piece = Trim(rest.substr(0, end), blanks);
+  rest.remove_prefix(std::min(end + 1, rest.size()));
+  return piece;
+}
+
+int HexDigit(char c) {
+  if (c >= '0' && c <= '9') return c - '0';
+  if (c >= 'a' && c <= 'f') return c - 'a' + 10;
+  if (c >= 'A' && c <= 'F') return c - 'A' + 10;
+  return -1;
+}
+
+std::optional<double> FiniteNumber(std::string_view text) {
+  double value = 0;
+  const char* const last = text.data() + text.size();
+  const auto [end, error] = std::from_chars(text.data(), last, value);
+  if (error != std::errc() || end != last || !std::isfinite(value)) return std::nullopt;
+  return value;
+}
+
+std::optional<double> PositiveNumber(std::string_view text) {
+  const std::optional<double> value = FiniteNumber(text);
+  return value && *value > 0 ? value : std::nullopt;
+}
+
+std::optional<std::int64_t> PlainDecimal(std::string_view text, std::size_t max_digits) {
+  if (text.empty() || text.size() > max_digits || (text.size() > 1 && text[0] == '0')) return std::nullopt;
+  std::int64_t number = 0;
+  for (const char c : text) {
+    if (c < '0' || c > '9') return std::nullopt;
+    number = number * 10 + (c - '0');
+  }
+  return number;
+}
+
+}  // namespace terrace::server

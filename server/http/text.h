@@ -1,0 +1,30 @@
+// Small readings of text that requests are made of. ASCII throughout; none of them depends on a locale.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace terrace::server {
+
+// Without `blanks` at either end.
+std::string_view Trim(std::string_view text, std::string_view blanks = " \t");
+
+std::string Lower(std::string_view text);
+bool EqualsIgnoringCase(std::string_view a, std::string_view b);
+
+// Cuts the piece before the next of `separators` off `rest`, and that separator; trimmed of `blanks`.
+std::string_view NextPiece(std::string_view& rest, std::string_view separators, std::string_view blanks = " \t");
+
+// 0 to 15, or -1.
+int HexDigit(char c);
+
+// The whole text as a finite number; numbers that overflow or underflow a double are none.
+std::optional<double> FiniteNumber(std::string_view text);
+std::optional<double> PositiveNumber(std::string_view text);
+
+// Plain decimal: no sign, no leading zero, 1 to `max_digits` (at most 18) digits. One number has one text.
+std::optional<std::int64_t> PlainDecimal(std::string_view text, std::size_t max_digits);
+
+}  // namespace terrace::server

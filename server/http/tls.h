@@ -1,0 +1,43 @@
+// The server's certificate and the rules of TLS: 1.2 and 1.3, ciphers with forward secrecy, no renegotiation.
+//
+// Thread-safe. Connections keep the certificate that they began with.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "engine/core/result.h"
+#include "server/asio.h"
+
+namespace boost::asio::ssl {
+class context;
+}
+
+namespace terrace::server {
+
+class TlsContext {
+ public:
+  // PEM files; the certificate's may hold the chain above it. kInvalidArgument, kUnavailable: a file cannot be read, is
+  // no PEM, or the two do not belong together.
+  static Result<std::unique_ptr<TlsContext>> Open(std::filesystem::path certificate, std::filesystem::path key);
+
+  std::shared_ptr<asio::ssl::context> Current() const;
+
+  // Looks whether the files have changed, and takes the new certificate if they are sound. True: it did. On an error
+  // the old one stays; the same files are not tried again.
+  Result<bool> ReloadIfChanged();
+
+ private:
+  TlsContext(std::filesystem::path certificate, std::filesystem::path key)
+      : certificate_(std::move(certificate)), key_(std::move(key)) {}
+  std::string Stamp() const;
+
+  const std::filesystem::path certificate_, key_;
+  mutable std::mutex mutex_;
+  std::shared_ptr<asio::ssl::context> context_;
+  std::string stamp_;  // of the files as they were last tried
+};
+
+}  // namespace terrace::server

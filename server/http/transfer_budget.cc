@@ -1,0 +1,73 @@
+#include "server/http/transfer_budget.h"
+
+namespace terrace::server {
+
+std::optional<TransferBudget::Hold> TransferBudget::TryHold(Body body, const std::weak_ptr<Connection>& holder,
+                                                            Clock::time_point now) {
+  const std::size_t bytes = body ? body->size() : 0;
+  return Take(std::move(body), bytes, holder, now);
+}
+
+std::optional<TransferBudget::Hold> TransferBudget::TryHold(std::size_t bytes, const std::weak_ptr<Connection>& holder,
+                                                            Clock::time_point now) {
+  return Take(nullptr, bytes, holder, now);
+}
+
+std::optional<TransferBudget::Hold> TransferBudget::Take(Body body, std::size_t bytes,
+                                                         const std::weak_ptr<Connection>& holder,
+                                                         Clock::time_point now) {
+  if (bytes <= kFreeBytes) return Hold();
+  std::unique_lock lock(mutex_);
+  if (!charges_.contains(body.get()) && !MayTake(bytes)) {
+    ++refused_;
+    const std::vector<std::shared_ptr<Connection>> overdue = Overdue(now);
+    lock.unlock();
+    for (const auto& connection : overdue) connection->Abort();
+    return std::nullopt;
+  }
+  const auto time = kGrace + std::chrono::milliseconds(bytes * 1000 / kRate);
+  const auto entry = entries_.insert(entries_.end(), Entry{body.get(), now + time, holder});
+  if (!body) entry->charge = &*entry;
+  Charge& charge = charges_[entry->charge];
+  if (++charge.holders == 1) {
+    const bool fits = held_ + bytes <= capacity_;
+    charge.bytes = fits ? bytes : 0;
+    held_ += charge.bytes;
+    oversized_under_way_ = oversized_under_way_ || !fits;
+  }
+  return Hold(this, entry, std::move(body));
+}
+
+bool TransferBudget::MayTake(std::size_t bytes) const {
+  return held_ + bytes <= capacity_ || (bytes > capacity_ && !oversized_under_way_);
+}
+
+// Each is told once; its room comes back when its connection has ended.
+std::vector<std::shared_ptr<Connection>> TransferBudget::Overdue(Clock::time_point now) {
+  std::vector<std::shared_ptr<Connection>> overdue;
+  for (Entry& entry : entries_) {
+    if (now < entry.entitled_until) continue;
+    if (auto connection = entry.holder.lock()) overdue.push_back(std::move(connection));
+    entry.holder.reset();
+  }
+  cut_ += overdue.size();
+  return overdue;
+}
+
+void TransferBudget::Release(Entries::iterator entry) {
+  const std::lock_guard lock(mutex_);
+  const auto charge = charges_.find(entry->charge);
+  if (--charge->second.holders == 0) {
+    held_ -= charge->second.bytes;
+    if (charge->second.bytes == 0) oversized_under_way_ = false;
+    charges_.erase(charge);
+  }
+  entries_.erase(entry);
+}
+
+TransferBudget::Stats TransferBudget::stats() const {
+  const std::lock_guard lock(mutex_);
+  return {held_, refused_, cut_};
+}
+
+}  // namespace terrace::server

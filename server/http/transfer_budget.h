@@ -1,0 +1,101 @@
+// The memory of bodies on their way: replies that clients have not taken yet, and request bodies that are not complete.
+//
+// A body that many replies share counts once. Where there is no room for one more, it is refused, and replies that have
+// had more than their time (kGrace, and a second for each kRate bytes) are cut off, so that those who read slowly do
+// not keep others out for long. A single body that is larger than the whole budget may be under way beside it.
+//
+// Thread-safe.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <list>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "server/http/connection_set.h"
+#include "server/http/response.h"
+
+namespace terrace::server {
+
+class TransferBudget {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  // Bodies up to this size are not counted: the number of connections bounds them.
+  static constexpr std::size_t kFreeBytes = 16 * 1024;
+  static constexpr std::chrono::seconds kGrace{2};
+  static constexpr std::size_t kRate = std::size_t{1} << 20;
+
+  explicit TransferBudget(std::size_t capacity) : capacity_(capacity) {}
+
+  // Gives its room back when it ends.
+  class Hold;
+
+  // Room for a reply's body until the hold ends. Nothing: there is none, and the body must be let go. `holder` is who
+  // would be cut off.
+  std::optional<Hold> TryHold(Body body, const std::weak_ptr<Connection>& holder, Clock::time_point now = Clock::now());
+  // The same for `bytes` that nobody shares.
+  std::optional<Hold> TryHold(std::size_t bytes, const std::weak_ptr<Connection>& holder,
+                              Clock::time_point now = Clock::now());
+
+  struct Stats {
+    std::size_t held_bytes = 0;
+    std::uint64_t refused = 0, cut = 0;
+  };
+  Stats stats() const;
+
+ private:
+  struct Entry {
+    const void* charge;  // what it is counted under: the body, or the entry itself where nobody shares it
+    Clock::time_point entitled_until;
+    std::weak_ptr<Connection> holder;
+  };
+  using Entries = std::list<Entry>;
+  struct Charge {
+    std::size_t bytes = 0;  // 0: beside the budget
+    std::size_t holders = 0;
+  };
+
+  bool MayTake(std::size_t bytes) const;                                    // mutex_ is held
+  std::vector<std::shared_ptr<Connection>> Overdue(Clock::time_point now);  // mutex_ is held
+  std::optional<Hold> Take(Body body, std::size_t bytes, const std::weak_ptr<Connection>& holder,
+                           Clock::time_point now);
+  void Release(Entries::iterator entry);
+
+  const std::size_t capacity_;
+  mutable std::mutex mutex_;
+  Entries entries_;
+  std::unordered_map<const void*, Charge> charges_;
+  std::size_t held_ = 0;
+  bool oversized_under_way_ = false;
+  std::uint64_t refused_ = 0, cut_ = 0;
+};
+
+class TransferBudget::Hold {
+ public:
+  Hold() = default;  // of nothing
+  Hold(Hold&& other) noexcept
+      : budget_(std::exchange(other.budget_, nullptr)), entry_(other.entry_), body_(std::move(other.body_)) {}
+  Hold& operator=(Hold&&) = delete;
+  ~Hold() {
+    if (!budget_) return;
+    budget_->Release(entry_);
+  }
+
+ private:
+  friend class TransferBudget;
+  Hold(TransferBudget* budget, Entries::iterator entry, Body body)
+      : budget_(budget), entry_(entry), body_(std::move(body)) {}
+
+  TransferBudget* budget_ = nullptr;
+  Entries::iterator entry_;
+  Body body_;  // lives as long as it is counted
+};
+
+}  // namespace terrace::server

@@ -1,0 +1,377 @@
+// Several rasters as one dataset: priorities, joints, availability and bounds.
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <fstream>
+#include <span>
+
+#include "engine/geo/mercator_grid.h"
+#include "tests/engine/dem/dem_fixture.h"
+
+namespace terrace::dem {
+namespace {
+
+// Rough, and the same for a pixel of the whole whichever piece holds it.
+double Terrain(int column, int row) {
+  std::uint32_t hash = static_cast<std::uint32_t>(column) * 73856093u ^ static_cast<std::uint32_t>(row) * 19349663u;
+  hash = (hash ^ hash >> 13) * 0x5bd1e995u;
+  return 800 + 300 * std::sin(column * 0.05) * std::cos(row * 0.07) + (hash >> 16 & 1023) * 0.125;
+}
+
+struct Cut {
+  std::string name;
+  RasterSpec whole;
+  std::vector<int> columns, rows;  // where pieces begin; the first is 0
+  int shared = 0;                  // columns and rows that neighbours have in common
+};
+
+// The whole, and its pieces as files of one rank.
+std::vector<DemFile> WritePieces(const TempDir& dir, const Cut& cut) {
+  std::vector<DemFile> files;
+  const auto end = [](const std::vector<int>& starts, std::size_t i, int size, int shared) {
+    return i + 1 < starts.size() ? starts[i + 1] + shared : size;
+  };
+  for (std::size_t y = 0; y < cut.rows.size(); ++y) {
+    for (std::size_t x = 0; x < cut.columns.size(); ++x) {
+      const int column = cut.columns[x], row = cut.rows[y];
+      RasterSpec piece = cut.whole;
+      piece.width = end(cut.columns, x, cut.whole.width, cut.shared) - column;
+      piece.height = end(cut.rows, y, cut.whole.height, cut.shared) - row;
+      auto& to_crs = piece.geo_transform;
+      to_crs[0] += column * to_crs[1];
+      to_crs[3] += row * to_crs[5];
+      piece.value = [value = cut.whole.value, column, row](int c, int r) { return value(column + c, row + r); };
+      files.push_back({WriteRaster(dir, piece, cut.name + std::to_string(y) + std::to_string(x) + ".tif")});
+    }
+  }
+  return files;
+}
+
+std::unique_ptr<DemSource> OpenAll(const std::vector<DemFile>& files, const DemOptions& options = {}) {
+  auto source = DemSource::Open(files, options);
+  EXPECT_TRUE(source.has_value()) << source.error().message;
+  return source ? *std::move(source) : nullptr;
+}
+
+// One arc-second at 20 degrees north, node-registered as SRTM is: neighbours share a row or column.
+RasterSpec Seconds(int width, int height) {
+  RasterSpec spec;
+  spec.width = width;
+  spec.height = height;
+  spec.geo_transform = {-157 - 0.5 / 3600, 1.0 / 3600, 0, 21 + 0.5 / 3600, 0, -1.0 / 3600};
+  spec.value = Terrain;
+  return spec;
+}
+
+std::vector<Cut> Cuts() {
+  const auto holes = [](int c, int r) {  // small ones, one of them on the joint, and a large one
+    const bool small = (c - 300) * (c - 300) + (r - 200) * (r - 200) < 90 || (c * 7 + r * 13) % 101 == 0;
+    return small || (c > 320 && c < 520 && r > 30 && r < 150) ? -9999.0 : Terrain(c, r);
+  };
+  std::vector<Cut> cuts;
+  cuts.push_back({"nodes", Seconds(601, 481), {0, 304}, {0, 240}, 1});
+  cuts.push_back({"pixels", Seconds(600, 480), {0, 304}, {0, 240}, 0});
+  cuts.push_back({"odd", Seconds(600, 480), {0, 301}, {0, 239}, 0});
+  cuts.push_back({"holes", Seconds(601, 481), {0, 304}, {0, 192, 336}, 1});
+  cuts.back().whole.value = holes;
+  cuts.back().whole.nodata = -9999;
+  RasterSpec utm = Seconds(500, 400);
+  utm.geo_transform = {300000, 30, 0, 3800000, 0, -30};
+  utm.crs = "EPSG:32611";
+  cuts.push_back({"utm", utm, {0, 256}, {0, 128}, 0});
+  RasterSpec antimeridian = Seconds(600, 300);
+  antimeridian.geo_transform[0] = 180 - 304.5 / 3600;
+  cuts.push_back({"antimeridian", antimeridian, {0, 304}, {0, 160}, 0});
+  RasterSpec globe = Seconds(720, 361);
+  globe.geo_transform = {-180.25, 0.5, 0, 90.25, 0, -0.5};
+  cuts.push_back({"globe", globe, {0, 304}, {0, 176}, 0});
+  return cuts;
+}
+
+// Averages of blocks that no cut runs through are equal to the bit; where one does, sums are taken in another order,
+// and at voids block by block.
+void ExpectEqual(std::span<const float> whole, std::span<const float> pieces, bool exact, double tolerance,
+                 const std::string& what) {
+  ASSERT_EQ(whole.size(), pieces.size());
+  int different = 0;
+  double farthest = 0;
+  for (std::size_t i = 0; i < whole.size(); ++i) {
+    different += std::bit_cast<std::uint32_t>(whole[i]) != std::bit_cast<std::uint32_t>(pieces[i]);
+    farthest = std::max<double>(farthest, std::abs(whole[i] - pieces[i]));
+  }
+  EXPECT_LE(farthest, exact ? 0 : tolerance) << what;
+  EXPECT_TRUE(!exact || different == 0) << what;
+}
+
+TEST(Mosaic, PiecesOfARasterAreThatRaster) {
+  for (const Cut& cut : Cuts()) {
+    SCOPED_TRACE(cut.name);
+    const TempDir dir;
+    const auto whole = OpenOrFail(WriteRaster(dir, cut.whole, "whole.tif"));
+    const auto pieces = OpenAll(WritePieces(dir, cut));
+    ASSERT_TRUE(whole && pieces);
+    ASSERT_EQ(pieces->info().sources.size(), cut.columns.size() * cut.rows.size());
+    ASSERT_EQ(pieces->max_level(), whole->max_level());
+    const bool has_voids = cut.whole.nodata.has_value();
+    int exact_tiles = 0;
+    for (int level = 0; level <= whole->max_level(); ++level) {
+      EXPECT_EQ(pieces->Available(level), whole->Available(level)) << level;
+      ASSERT_EQ(pieces->LatticeOf(level).cells, whole->LatticeOf(level).cells);
+      // Finer than 16 samples a cell: the alignment of most cuts above.
+      const bool exact = cut.name == "odd" ? !has_voids : level >= whole->max_level() - 6;
+      for (const geo::TileKey& key : SomeTiles(*whole, level, 6)) {
+        const auto a = whole->Read(key), b = pieces->Read(key);
+        ASSERT_TRUE(a && b);
+        ExpectEqual(a->heights, b->heights, exact, has_voids ? 60 : 0.002, geo::ToString(key));
+        exact_tiles += exact;
+      }
+    }
+    EXPECT_GT(exact_tiles, 10);
+  }
+}
+
+TEST(Mosaic, PiecesGiveTheRastersPointsAndMercatorPixels) {
+  for (const Cut& cut : Cuts()) {
+    SCOPED_TRACE(cut.name);
+    const TempDir dir;
+    const auto whole = OpenOrFail(WriteRaster(dir, cut.whole, "whole.tif"));
+    const auto pieces = OpenAll(WritePieces(dir, cut));
+    ASSERT_TRUE(whole && pieces);
+    const GeoBounds& b = whole->info().bounds;
+    const double width = b.east > b.west ? b.east - b.west : b.east + 360 - b.west;
+    std::vector<GeoPosition> points;
+    for (int i = 0; i < 3000; ++i) {
+      points.push_back({b.west + width * (i % 61 - 2) / 56, b.south + (b.north - b.south) * (i / 61 - 2) / 46});
+      points.back().latitude = std::clamp(points.back().latitude, -90.0, 90.0);
+    }
+    const auto p = whole->ReadPoints(points), q = pieces->ReadPoints(points);
+    ASSERT_TRUE(p && q);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      ASSERT_EQ(std::bit_cast<std::uint32_t>((*p)[i]), std::bit_cast<std::uint32_t>((*q)[i]))
+          << points[i].longitude << " " << points[i].latitude;
+    }
+    const int depth = whole->info().max_mercator_depth;
+    ASSERT_EQ(pieces->info().max_mercator_depth, depth);
+    const geo::MercatorGrid grid{depth};
+    const double middle = b.west + width * 0.5;
+    const NodeWindow window{static_cast<std::int64_t>((middle + 180) / 360 * static_cast<double>(grid.columns())) - 100,
+                            grid.rows() / 2 - 1 -
+                                static_cast<std::int64_t>(std::asinh(std::tan((b.south + b.north) / 2 * M_PI / 180)) /
+                                                          (2 * M_PI) * static_cast<double>(grid.rows())) -
+                                100,
+                            200, 200};
+    const auto m = whole->ReadMercator(depth, window), n = pieces->ReadMercator(depth, window);
+    ASSERT_TRUE(m && n);
+    ExpectEqual(*m, *n, true, 0, "Mercator");
+  }
+}
+
+RasterSpec Flat(double west, double north, int side, double pixel, double height) {
+  RasterSpec spec;
+  spec.width = spec.height = side;
+  spec.geo_transform = {west, pixel, 0, north, 0, -pixel};
+  spec.value = [height](int, int) { return height; };
+  return spec;
+}
+
+float HeightAt(const DemSource& source, double longitude, double latitude) {
+  const GeoPosition point{longitude, latitude};
+  const auto height = source.ReadPoints({&point, 1});
+  EXPECT_TRUE(height);
+  return height ? height->front() : -1e9f;
+}
+
+// Height of the node nearest to a place, as tiles of the level have it.
+float NodeAt(const DemSource& source, int level, double longitude, double latitude) {
+  const geo::Lattice lattice = source.LatticeOf(level);
+  const NodeWindow window{std::llround((longitude + 180) / lattice.StepDegrees()),
+                          std::llround((latitude + 90) / lattice.StepDegrees()), 1, 1};
+  const auto heights = source.ReadNodes(level, window);
+  EXPECT_TRUE(heights);
+  return heights ? heights->front() : -1e9f;
+}
+
+TEST(Mosaic, FirstSourceWinsWhereItHasAHeight) {
+  const TempDir dir;
+  RasterSpec holed = Flat(10, 50, 200, 0.01, 100);
+  holed.nodata = -1;
+  holed.value = [](int c, int r) { return c >= 100 && r >= 100 ? -1.0 : 100.0; };
+  const std::string first = WriteRaster(dir, holed, "first.tif");
+  const std::string second = WriteRaster(dir, Flat(9, 51, 400, 0.01, 200), "second.tif");
+  const std::string base = WriteRaster(dir, Flat(0, 60, 30, 1, 300), "base.tif");
+  const auto source = OpenAll({{first, 0}, {second, 1}, {base, 2}});
+  ASSERT_NE(source, nullptr);
+  ASSERT_EQ(source->info().sources.size(), 3u);
+  EXPECT_EQ(source->info().sources[0].path, first);
+  struct Case {
+    double longitude, latitude;
+    float height;
+  };
+  for (const Case& c : {Case{10.5, 49.5, 100}, {11.5, 48.5, 200}, {9.5, 50.5, 200}, {20.5, 40.5, 300}}) {
+    EXPECT_EQ(HeightAt(*source, c.longitude, c.latitude), c.height) << c.longitude;
+    for (const int level : {6, 8, source->max_level()}) {
+      EXPECT_EQ(NodeAt(*source, level, c.longitude, c.latitude), c.height) << c.longitude << " level " << level;
+    }
+  }
+  EXPECT_TRUE(std::isnan(HeightAt(*source, 50, 0)));
+  EXPECT_EQ(NodeAt(*source, 6, 50, 0), 100);  // the floor: the lowest of all
+  EXPECT_EQ(source->info().bounds.west, 0);
+  EXPECT_EQ(source->info().bounds.north, 60);
+  EXPECT_EQ(source->info().heights.max, 300);
+
+  const auto reversed = OpenAll({{first, 2}, {second, 1}, {base, 0}});
+  EXPECT_EQ(HeightAt(*reversed, 10.5, 49.5), 300);
+  EXPECT_NE(reversed->fingerprint(), source->fingerprint());
+}
+
+TEST(Mosaic, OfOneRankTheFinerSourceWinsThenTheName) {
+  const TempDir dir;
+  const std::string coarse = WriteRaster(dir, Flat(0, 10, 10, 1, 1), "a.tif");
+  const std::string fine = WriteRaster(dir, Flat(3, 7, 40, 0.1, 2), "b.tif");
+  const std::string beside = WriteRaster(dir, Flat(3.05, 7, 40, 0.1, 3), "c.tif");  // half a pixel off: a sheet apart
+  const auto source = OpenAll({{coarse}, {beside}, {fine}});
+  EXPECT_EQ(HeightAt(*source, 5, 5), 2);
+  EXPECT_EQ(HeightAt(*source, 7.03, 5), 3);  // of `beside` alone
+  EXPECT_EQ(HeightAt(*source, 1, 1), 1);
+}
+
+TEST(Mosaic, OverlappingPiecesOfAGridFillEachOthersVoids) {
+  const TempDir dir;
+  RasterSpec a = Flat(0, 10, 20, 0.5, 10), b = Flat(5, 10, 20, 0.5, 20);
+  a.nodata = -1;
+  a.value = [](int c, int) { return c >= 15 ? -1.0 : 10.0; };
+  const auto source = OpenAll({{WriteRaster(dir, a, "a.tif")}, {WriteRaster(dir, b, "b.tif")}});
+  EXPECT_EQ(HeightAt(*source, 6.1, 5), 10);
+  EXPECT_EQ(HeightAt(*source, 9.1, 5), 20);
+}
+
+TEST(Mosaic, DeepTilesLieOnlyWhereAFineSourceDoes) {
+  const TempDir dir;
+  const std::string base = WriteRaster(dir, Flat(-180, 90, 90, 2, 5), "base.tif");  // half the Earth
+  const std::string fine = WriteRaster(dir, Flat(-99.99, 50, 100, 0.001, 50), "fine.tif");
+  const auto source = OpenAll({{fine, 0}, {base, 1}});
+  const auto alone = OpenOrFail(base);
+  const auto finest = OpenOrFail(fine);
+  ASSERT_TRUE(source && alone && finest);
+  ASSERT_EQ(source->max_level(), finest->max_level());
+  ASSERT_LT(alone->max_level() + 4, finest->max_level());
+  for (int level = 0; level <= source->max_level(); ++level) {
+    const auto& ranges = source->Available(level);
+    for (const geo::TileRange& range : finest->Available(level)) {
+      for (const auto& [x, y] : {std::pair(range.start_x, range.start_y), {range.end_x, range.end_y}}) {
+        EXPECT_TRUE(source->IsAvailable({level, x, y}));
+      }
+    }
+    std::int64_t tiles = 0;
+    for (const geo::TileRange& range : ranges) {
+      tiles += (range.end_x - range.start_x + 1) * (range.end_y - range.start_y + 1);
+      if (level == 0) continue;
+      for (std::int64_t y = range.start_y; y <= std::min(range.end_y, range.start_y + 40); ++y) {
+        for (std::int64_t x = range.start_x; x <= std::min(range.end_x, range.start_x + 40); ++x) {
+          EXPECT_TRUE(source->IsAvailable({level - 1, x / 2, y / 2}));
+          // Deeper than the base is worth whole families: a missing child would be a hole.
+          if (level <= alone->max_level()) continue;
+          for (const std::int64_t child : {0, 1, 2, 3}) {
+            EXPECT_TRUE(source->IsAvailable({level, x / 2 * 2 + child % 2, y / 2 * 2 + child / 2})) << level;
+          }
+        }
+      }
+    }
+    if (level > alone->max_level()) {
+      std::int64_t fine_tiles = 0;
+      for (const geo::TileRange& r : finest->Available(level)) {
+        fine_tiles += (r.end_x - r.start_x + 3) * (r.end_y - r.start_y + 3);
+      }
+      EXPECT_LE(tiles, fine_tiles) << level;
+    }
+  }
+  EXPECT_FALSE(source->IsAvailable({source->max_level(), 5, 5}));
+}
+
+TEST(Mosaic, DescriptionOfManyScatteredSourcesStaysSmall) {
+  const TempDir dir;
+  std::vector<DemFile> files;
+  for (int i = 0; i < 400; ++i) {
+    const double west = -170 + i % 20 * 17.03, north = 80 - i / 20 * 8.03;
+    files.push_back({WriteRaster(dir, Flat(west, north, 4, 0.0001, i), std::to_string(i) + ".tif")});
+  }
+  const auto source = OpenAll(files);
+  std::size_t blocks = 0;
+  for (int level = 0; level <= source->max_level(); ++level) blocks += source->Available(level).size();
+  EXPECT_GT(blocks, 400u * 5);
+  EXPECT_LT(blocks, 2000u * 20);
+  EXPECT_EQ(HeightAt(*source, -170 + 0.0002, 80 - 0.0002), 0);
+  EXPECT_EQ(HeightAt(*source, -170 + 17.03 + 0.0002, 80 - 8.03 - 0.0002), 21);
+}
+
+TEST(Mosaic, HeightsLieWithinTheBoundOfTheirTile) {
+  for (const Cut& cut : Cuts()) {
+    SCOPED_TRACE(cut.name);
+    const TempDir dir;
+    std::vector<DemFile> files = WritePieces(dir, cut);
+    files.pop_back();  // one corner shows what lies below
+    files.push_back({WriteRaster(dir, Flat(-180, 90, 18, 10, -500), "base.tif"), 1});
+    const auto source = OpenAll(files);
+    ASSERT_NE(source, nullptr);
+    for (int level = 0; level <= source->max_level(); ++level) {
+      for (const geo::TileKey& key : SomeTiles(*source, level, 5)) {
+        const auto tile = source->Read(key);
+        ASSERT_TRUE(tile);
+        const HeightRange bound = source->RangeBound(key);
+        for (int j = 0; j <= tile->lattice.cells; ++j) {
+          for (int i = 0; i <= tile->lattice.cells; ++i) {
+            ASSERT_GE(tile->At(i, j), bound.min) << geo::ToString(key);
+            ASSERT_LE(tile->At(i, j), bound.max) << geo::ToString(key);
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST(Mosaic, NeighboursShareTheirBordersAcrossSources) {
+  TERRACE_REQUIRE_DATA(base, "etopo5_global_10min.tif");
+  TERRACE_REQUIRE_DATA(west, "srtm1_N51E179_antimeridian_w.tif");
+  TERRACE_REQUIRE_DATA(east, "srtm1_N51W180_antimeridian_e.tif");
+  TERRACE_REQUIRE_DATA(hawaii, "antimeridian_hawaii_topobathy_5min.tif");
+  TERRACE_REQUIRE_DATA(antarctica, "pole_antarctica_bedmap_5km.tif");
+  TERRACE_REQUIRE_DATA(lidar, "lidar_slovenia_1m_nodata.tif");
+  const auto source = OpenAll({{west, 0}, {east, 0}, {lidar, 1}, {hawaii, 2}, {antarctica, 3}, {base, 4}});
+  ASSERT_NE(source, nullptr);
+  for (int level = 0; level <= source->max_level(); ++level) {
+    std::vector<geo::TileKey> keys = SomeTiles(*source, level, 3);
+    const geo::TileKey aleutians{level, geo::TileColumns(level) - 1, geo::TileRows(level) * 1415 / 1800};
+    if (source->IsAvailable(aleutians)) keys.push_back(aleutians);
+    for (const geo::TileKey& key : keys) {
+      const auto tile = source->Read(key), right = source->Read(geo::Neighbour(key, 1, 0));
+      ASSERT_TRUE(tile && right);
+      const int n = tile->lattice.cells;
+      for (int j = -1; j <= n + 1; ++j) {
+        for (int i = -1; i <= 1; ++i) {
+          ASSERT_EQ(std::bit_cast<std::uint32_t>(tile->At(n + i, j)), std::bit_cast<std::uint32_t>(right->At(i, j)))
+              << geo::ToString(key);
+        }
+      }
+    }
+  }
+}
+
+TEST(Mosaic, FilesOfAFolderThatAreNoRastersAreLeftOut) {
+  const TempDir dir;
+  const std::string raster = WriteRaster(dir, Flat(0, 10, 10, 1, 1), "a.tif");
+  std::ofstream(dir.File("readme.txt")) << "no raster\n";
+  std::ofstream(dir.File("broken.tif")) << "II*";
+  const auto source = DemSource::Open({{raster, 0, true}, {dir.File("readme.txt"), 0, true}});
+  ASSERT_TRUE(source) << source.error().message;
+  EXPECT_EQ((*source)->info().sources.size(), 1u);
+  const auto named = DemSource::Open({{raster, 0, false}, {dir.File("readme.txt"), 0, false}});
+  ASSERT_FALSE(named);
+  EXPECT_NE(named.error().message.find("readme.txt"), std::string::npos);
+  const auto none = DemSource::Open({{dir.File("readme.txt"), 0, true}});
+  ASSERT_FALSE(none);
+  EXPECT_EQ(none.error().code, ErrorCode::kNotFound);
+}
+
+}  // namespace
+}  // namespace terrace::dem
