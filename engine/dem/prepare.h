@@ -14,8 +14,8 @@
 
 namespace terrace::dem {
 
-// Rasters with more samples than this and no overviews get averages in the cache folder: one of 4096 x 4096 is read
-// whole in a third of a second, the largest that a first tile may cost.
+// Rasters with more samples than this and no overviews get averages in the cache folder: the first shallow tile of any
+// other reads at most as many.
 inline constexpr std::int64_t kMostSamplesWithoutAverages = std::int64_t{4096} * 4096;
 
 // How a survey came about.
