@@ -10,7 +10,7 @@ SOURCES = git ls-files '*.h' '*.cc'
 TERRACE = build/release/server/cli/terrace
 
 .DEFAULT_GOAL := help
-.PHONY: help deps test-deps build run test bench paper format lint clean
+.PHONY: help deps test-deps build run test reliability reliability-long bench paper format lint clean
 
 help:  ## list these targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -31,6 +31,16 @@ run: build  ## build, then serve the sample data (LISTEN=HOST:PORT, CONFIG=FILE)
 
 test: test-deps  ## build and run every test, then the unit tests under ASan + UBSan and TSan
 	@tools/run_tests.py --jobs $(JOBS)
+
+reliability: test-deps  ## try on the real binary what docs/reliability.md promises about clients; a few minutes
+	cmake --preset release -DTERRACE_BUILD_TESTS=ON --log-level=WARNING
+	cmake --build build/release -j $(JOBS) --target terrace server_test
+	@tests/reliability/run.py
+
+reliability-long: test-deps  ## the same, each row as often as the scorecard says
+	cmake --preset release -DTERRACE_BUILD_TESTS=ON --log-level=WARNING
+	cmake --build build/release -j $(JOBS) --target terrace server_test
+	@tests/reliability/run.py --long
 
 bench: test-deps  ## build and run the benchmarks; JSON results in build/bench/results
 	@tools/run_benchmarks.sh $(JOBS) $(BENCH)

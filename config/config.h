@@ -17,8 +17,14 @@
 
 namespace terrace::config {
 
-// What the heights of a source count from. Further values come with the conversions that they need.
-enum class VerticalDatum : std::uint8_t { kUnknown };
+// Which samples of a source are voids, beside those that a mask hides.
+struct NodataConfig {
+  bool detect = true;               // undeclared marks are found as well as those that the file declares
+  std::vector<double> values = {};  // raw values that are voids, beside the declared one
+
+  friend bool operator==(const NodataConfig&, const NodataConfig&) = default;
+};
+
 // How the triangles of a tile are joined: tin::Criterion, which this room does not know.
 enum class Criterion : std::uint8_t { kDelaunay, kDataDependent };
 // How GLB tiles are compressed unless a request says: proto::GlbCompression, which this room does not know.
@@ -27,6 +33,8 @@ enum class GlbCompression : std::uint8_t { kDraco, kNone, kQuantized, kMeshopt }
 enum class ForwardedHeader : std::uint8_t { kXForwarded, kForwarded };
 enum class LogLevel : std::uint8_t { kDebug, kInfo, kWarn, kError, kOff };
 enum class LogFormat : std::uint8_t { kText, kJson };
+// Where and how requests are told of: server::AccessLogForm, which this room does not know.
+enum class AccessLog : std::uint8_t { kLog, kCombined, kJson, kOff };
 
 // Where the water of a dataset's water mask comes from: one of both, or neither.
 struct WaterConfig {
@@ -61,6 +69,9 @@ struct SourceConfig {
   std::string written;             // path or pattern, absolute
   std::vector<std::string> files;  // what it stands for
   bool is_folder = false;          // what is no raster among them is left out
+  // What it does not say itself its dataset does.
+  std::optional<std::string> vertical = {};
+  std::optional<NodataConfig> nodata = {};
 
   friend bool operator==(const SourceConfig&, const SourceConfig&) = default;
 };
@@ -68,12 +79,15 @@ struct SourceConfig {
 struct DatasetConfig {
   std::string name;                   // the first part of its URLs: [A-Za-z0-9._-]{1,64}
   std::vector<SourceConfig> sources;  // the first that has a height at a place gives it
-  VerticalDatum vertical = VerticalDatum::kUnknown;
+  std::string vertical = "crs";       // what heights count from: a word, "EPSG:5703", or the path of a grid
+  NodataConfig nodata;
   std::string attribution;
   double error_fraction = 0.5;         // default error of a level, as a share of the error that clients assume there
   std::optional<double> finest_error;  // metres; decides the deepest level
   std::optional<double> floor;         // metres; height outside the source and in large voids
   int max_void_gap = 64;               // source samples; narrower voids are filled
+  double feather = 0;                  // metres: how far from its edges a source gives way to the next
+  std::size_t max_open_sources = 64;   // files kept open between reads
   Criterion criterion = Criterion::kDelaunay;
   bool compact = false;  // tiles go through the drop pass
   GlbCompression glb_compression = GlbCompression::kDraco;
@@ -123,10 +137,11 @@ struct Config {
   std::size_t queue_length = 256;
   std::size_t cache_bytes = std::size_t{256} << 20;             // 0: no cache
   std::size_t refinement_cache_bytes = std::size_t{128} << 20;  // 0: no cache
-  std::string cache_dir;  // what is learnt of sources is kept there; empty: nowhere
+  std::string cache_dir = {};                             // what is learnt of sources is kept there; empty: nowhere
+  std::size_t gdal_cache_bytes = std::size_t{256} << 20;  // blocks of sources
   std::size_t max_connections = 1024;
   std::size_t max_connections_per_client = 0;          // 0: as many as there may be in all
-  std::size_t transfer_bytes = std::size_t{48} << 20;  // of bodies on their way
+  std::size_t transfer_bytes = std::size_t{32} << 20;  // of bodies on their way
   double requests_per_second = 0;                      // of each client or token; 0: any
   double request_burst = 0;                            // 0: two seconds' worth
   std::size_t max_mesh_samples = 1'000'000;
@@ -145,8 +160,16 @@ struct Config {
   std::size_t min_read_rate = 4096;  // bytes a second; 0: any
   std::chrono::milliseconds drain_timeout{10'000};
 
+  std::vector<std::string> data_roots;        // folders that hold every source; none: any folder
+  std::vector<std::string> allowed_prefixes;  // of remote sources; none: no remote sources
+  std::vector<std::string> allowed_drivers;   // GDAL's names of formats; none: the usual ones
+
+  bool watch = true;  // look for changes of sources and of the file that this came from
+
   LogLevel log_level = LogLevel::kInfo;
   LogFormat log_format = LogFormat::kText;
+  AccessLog access_log = AccessLog::kLog;
+  std::string access_log_file;  // of kCombined and kJson; empty: stderr
 
   friend bool operator==(const Config&, const Config&) = default;
 };

@@ -1,11 +1,12 @@
 #include "config/option_table.h"
 
 #include <algorithm>
+#include <filesystem>
 
 #include "config/edge_options.h"
 #include "config/layer_options.h"
 #include "config/nearest_name.h"
-#include "config/source_paths.h"
+#include "config/source_options.h"
 
 namespace terrace::config {
 namespace {
@@ -55,40 +56,15 @@ Codec<Config> CacheDir() {
           [](const Config& config) { return Json(config.cache_dir); }, TextToJson};
 }
 
-Codec<DatasetConfig> Vertical() {
-  Codec<DatasetConfig> codec = Choice(&DatasetConfig::vertical, {{"unknown", VerticalDatum::kUnknown}});
-  codec.read = [read_word = codec.read](const Json& value, const Place& place, DatasetConfig& dataset) {
-    if (!value.is_string() || value == "unknown") return read_word(value, place, dataset);
-    place.Fail(Quote(value) +
-               " is not supported yet; write \"unknown\" (heights are passed through as they are) and "
-               "convert the source to ellipsoidal heights beforehand where that matters");
-  };
-  return codec;
-}
-
-Codec<DatasetConfig> Sources() {
-  return {[](const Json& value, const Place& place, DatasetConfig& dataset) {
-            if (!value.is_array() || value.empty())
-              return place.Expected("a list of paths such as [\"lidar/*.tif\", \"base.tif\"]", value);
-            for (std::size_t i = 0; i < value.size(); ++i) {
-              if (!value[i].is_string() || value[i].get_ref<const std::string&>().empty()) {
-                place.At(i).Expected("a path, a glob or a folder", value[i]);
-                continue;
-              }
-              Result<SourceConfig> source = ExpandSource(value[i].get<std::string>(), place.directory());
-              if (source) {
-                dataset.sources.push_back(*std::move(source));
-              } else {
-                place.At(i).Fail(source.error().message +
-                                 "; correct the path, which is relative to the folder of this file");
-              }
+Codec<Config> AccessLogFile() {
+  return {[](const Json& value, const Place& place, Config& config) {
+            if (!value.is_string() || value.get_ref<const std::string&>().empty()) {
+              return place.Expected("the path of a file", value);
             }
+            config.access_log_file = (place.directory() / value.get<std::string>()).string();
           },
-          [](const DatasetConfig& dataset) {
-            Json list = Json::array();
-            for (const SourceConfig& source : dataset.sources) list.push_back(source.written);
-            return list;
-          }};
+          [](const Config& config) { return config.access_log_file.empty() ? Json() : Json(config.access_log_file); },
+          [](const std::string& text) { return Json(text.empty() ? text : std::filesystem::absolute(text).string()); }};
 }
 
 Codec<Config> Datasets() {
@@ -134,6 +110,8 @@ const std::vector<Option<Config>>& ServerOptionTable() {
       {"refinement_cache_bytes", "BYTES",
        "Memory for what tiles are made from: other errors of a tile cost a fraction then; 0 is no cache",
        Bytes(&Config::refinement_cache_bytes, kMaxCacheBytes)},
+      {"gdal_cache_bytes", "BYTES", "Memory for blocks of the sources, as they are read",
+       Bytes(&Config::gdal_cache_bytes, kMaxCacheBytes)},
       {"max_connections", "N", "Connections at a time; above it idle ones are closed and new ones turned away",
        Integer(&Config::max_connections, 1, 1'000'000)},
       {"max_connections_per_client", "N", "Connections of one address at a time; 0 is no limit of its own",
@@ -166,6 +144,14 @@ const std::vector<Option<Config>>& ServerOptionTable() {
        Integer(&Config::min_read_rate, 0, 1'000'000'000)},
       {"drain_timeout_s", "SECONDS", "Time for open requests to finish when the server stops",
        Seconds(&Config::drain_timeout, 0, 3600)},
+      {"data_roots", "DIR[,DIR]", "Folders that hold every source; by default any folder may",
+       TextList(&Config::data_roots, "a list of folders", true)},
+      {"allowed_prefixes", "PREFIX[,PREFIX]", "Beginnings of remote sources, such as /vsis3/bucket/; by default none",
+       TextList(&Config::allowed_prefixes, "a list of prefixes such as [\"/vsis3/bucket/\"]", false)},
+      {"allowed_drivers", "NAME[,NAME]", "Formats that sources may have, by GDAL's short names",
+       TextList(&Config::allowed_drivers, "a list of formats such as [\"GTiff\", \"VRT\"]", false)},
+      {"watch", "true|false", "Take over changes of sources and of the configuration file while serving",
+       Switch(&Config::watch)},
       {"log_level", "LEVEL", "The least important messages to log: debug, info, warn, error or off",
        Choice(&Config::log_level, {{"debug", LogLevel::kDebug},
                                    {"info", LogLevel::kInfo},
@@ -174,6 +160,13 @@ const std::vector<Option<Config>>& ServerOptionTable() {
                                    {"off", LogLevel::kOff}})},
       {"log_format", "FORMAT", "text for people, json for machines (one object a line); both on stderr",
        Choice(&Config::log_format, {{"text", LogFormat::kText}, {"json", LogFormat::kJson}})},
+      {"access_log", "FORM", "How requests are told of: log (lines of the log), combined, json or off",
+       Choice(&Config::access_log, {{"log", AccessLog::kLog},
+                                    {"combined", AccessLog::kCombined},
+                                    {"json", AccessLog::kJson},
+                                    {"off", AccessLog::kOff}})},
+      {"access_log_file", "FILE", "Where the access log goes if it is combined or json; by default stderr",
+       AccessLogFile()},
   };
   return table;
 }
@@ -183,9 +176,12 @@ const std::vector<Option<DatasetConfig>>& DatasetOptionTable() {
       {"name", "NAME", "The dataset's name in URLs; by default that of the file",
        Text(&DatasetConfig::name, CheckDatasetName)},
       {"sources", "", "Files, globs and folders of rasters; the first that has a height at a place gives it",
-       Sources()},
-      {"vertical", "DATUM", "What the heights count from; only unknown for now: heights are passed through",
-       Vertical()},
+       SourcesCodec()},
+      {"vertical", "DATUM",
+       "What the heights count from: crs (as the source states), unknown, ellipsoid, egm96, egm2008, EPSG:N or a grid",
+       VerticalCodec()},
+      {"nodata", "VALUE", "Voids: auto finds undeclared ones, declared trusts the source, a number is one more",
+       NodataCodec()},
       {"attribution", "TEXT", "Who to thank for the data; clients show it",
        Text(&DatasetConfig::attribution, CheckOneLine)},
       {"error_fraction", "SHARE", "Default error of a level as a share of the error that clients assume there",
@@ -197,6 +193,10 @@ const std::vector<Option<DatasetConfig>>& DatasetOptionTable() {
        Number(&DatasetConfig::floor, -kMostHeight, kMostHeight)},
       {"max_void_gap", "SAMPLES", "Voids narrower than this many source samples are filled from their edges",
        Integer(&DatasetConfig::max_void_gap, 0, 100'000)},
+      {"feather", "METRES", "Blend a source of a mosaic with what lies below it so far from its edges; 0: no blending",
+       Number(&DatasetConfig::feather, 0, 1'000'000)},
+      {"max_open_sources", "N", "Rasters of the dataset that are kept open between reads",
+       Integer(&DatasetConfig::max_open_sources, 1, 100'000)},
       {"criterion", "NAME", "How triangles are joined: delaunay, or data-dependent: smaller tiles, more time to build",
        Choice(&DatasetConfig::criterion,
               {{"delaunay", Criterion::kDelaunay}, {"data-dependent", Criterion::kDataDependent}})},
@@ -253,10 +253,12 @@ Json WriteObject(const Target& source, const std::vector<Option<Target>>& table)
 template void ReadObject(const Json&, const Place&, const std::vector<Option<Config>>&, Config&);
 template void ReadObject(const Json&, const Place&, const std::vector<Option<DatasetConfig>>&, DatasetConfig&);
 template void ReadObject(const Json&, const Place&, const std::vector<Option<ImageryConfig>>&, ImageryConfig&);
+template void ReadObject(const Json&, const Place&, const std::vector<Option<SourceConfig>>&, SourceConfig&);
 template void ReadObject(const Json&, const Place&, const std::vector<Option<TokenConfig>>&, TokenConfig&);
 template Json WriteObject(const Config&, const std::vector<Option<Config>>&);
 template Json WriteObject(const DatasetConfig&, const std::vector<Option<DatasetConfig>>&);
 template Json WriteObject(const ImageryConfig&, const std::vector<Option<ImageryConfig>>&);
+template Json WriteObject(const SourceConfig&, const std::vector<Option<SourceConfig>>&);
 template Json WriteObject(const TokenConfig&, const std::vector<Option<TokenConfig>>&);
 
 }  // namespace terrace::config

@@ -33,7 +33,7 @@ void SetFromText(const std::vector<Option<Target>>& table, std::string_view key,
   TERRACE_CHECK(option != table.end() && option->codec.from_text != nullptr);
   std::vector<ConfigError> found;
   option->codec.read(option->codec.from_text(text), Place({}, "", found), target);
-  for (const ConfigError& error : found) errors.push_back({FlagOf(key) + error.path, error.message});
+  for (const ConfigError& error : found) errors.push_back({FlagOf(key), error.message});
 }
 
 }  // namespace
@@ -42,6 +42,14 @@ std::string OptionInfo::Flag() const { return FlagOf(key); }
 
 std::vector<OptionInfo> ServerOptions() { return Infos(ServerOptionTable()); }
 std::vector<OptionInfo> DatasetOptions() { return Infos(DatasetOptionTable()); }
+
+std::vector<std::string> ChangedServerOptions(const Config& a, const Config& b) {
+  std::vector<std::string> keys;
+  for (const Option<Config>& option : ServerOptionTable()) {
+    if (option.codec.write(a) != option.codec.write(b)) keys.emplace_back(option.key);
+  }
+  return keys;
+}
 
 void SetServerOption(std::string_view key, const std::string& text, Config& config, std::vector<ConfigError>& errors) {
   SetFromText(ServerOptionTable(), key, text, config, errors);

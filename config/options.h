@@ -24,6 +24,9 @@ struct OptionInfo {
 std::vector<OptionInfo> ServerOptions();
 std::vector<OptionInfo> DatasetOptions();
 
+// The keys of the options at the top of the file whose values differ.
+std::vector<std::string> ChangedServerOptions(const Config& a, const Config& b);
+
 // Sets the option `key` from the text of its flag. What is wrong is appended to `errors`, with the flag as its path.
 // Precondition: the option exists and has a flag.
 void SetServerOption(std::string_view key, const std::string& text, Config& config, std::vector<ConfigError>& errors);

@@ -28,7 +28,7 @@ struct Quantization {
 // origin is on whole metres, and the range at least 16 m, where floats are more than 10^-6 apart. Neither moves a grid
 // point; the range costs bits that are always 0.
 Quantization QuantizationOf(const GridMesh& mesh) {
-  constexpr double kMinRange_m = 16;
+  constexpr double kMinRangeMetres = 16;
   const auto whole = static_cast<std::int32_t>(std::max(1.0, 1 / mesh.step_m));
   Position min = mesh.positions.front(), max = min;
   for (const Position& p : mesh.positions) {
@@ -38,7 +38,7 @@ Quantization QuantizationOf(const GridMesh& mesh) {
     }
   }
   Quantization quantization;
-  auto longest = static_cast<std::uint32_t>(std::ceil(kMinRange_m / mesh.step_m));
+  auto longest = static_cast<std::uint32_t>(std::ceil(kMinRangeMetres / mesh.step_m));
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const std::int32_t above = ((min[axis] % whole) + whole) % whole;
     quantization.origin[axis] = min[axis] - above;
@@ -197,7 +197,7 @@ Result<void> ReadBack(const GridMesh& grid, const DracoOptions& options, DracoMe
 
 Result<DracoMesh> EncodeDraco(const GridMesh& grid, const DracoOptions& options) {
   TERRACE_CHECK(!grid.triangles.empty());
-  constexpr int kMaxBits = 23;  // FitsFloats leaves room for the origin's rounding
+  constexpr int kMaxBits = 24;  // FitsFloats leaves room for the origin's rounding
   const Quantization quantization = QuantizationOf(grid);
   if (quantization.bits > kMaxBits) return Failed("the grid is too fine for 32-bit floats");
   // Dividing by the range in floats gives 1 / step exactly: it is a power of two times 2^bits - 1, which a float holds.

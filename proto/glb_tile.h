@@ -12,7 +12,7 @@
 
 namespace terrace::proto {
 
-// All of them decode to the same positions, bit for bit.
+// All of them decode to the positions of the GridMesh, bit for bit.
 enum class GlbCompression : std::uint8_t {
   kDraco,      // KHR_draco_mesh_compression
   kNone,       // 32-bit floats
@@ -20,6 +20,12 @@ enum class GlbCompression : std::uint8_t {
                // more
   kMeshopt,    // EXT_meshopt_compression of what kQuantized holds
 };
+
+// The positions that suit the form: GridStep.
+constexpr PositionWidth WidthOf(GlbCompression compression) {
+  const bool narrow = compression == GlbCompression::kQuantized || compression == GlbCompression::kMeshopt;
+  return narrow ? PositionWidth::k16Bits : PositionWidth::kFloat;
+}
 
 // A picture of the tile: an image file, whose edges are the tile's.
 struct GlbTexture {

@@ -127,10 +127,15 @@ Box BoxOf(const std::vector<GridPoint>& points) {
 
 }  // namespace
 
-double GridStep(const geo::Lattice& lattice, double error_m) {
-  constexpr double kFinestStep_m = 0x1p-16;
+double GridStep(const geo::Lattice& lattice, double error_m, PositionWidth width) {
+  constexpr double kFinestStepMetres = 0x1p-16;
   const double cell_m = geo::kSemiMajorAxis * geo::ToRadians(lattice.StepDegrees());
-  return std::max(PowerOfTwoUpTo(std::min(error_m / 32, cell_m / 64)), kFinestStep_m);
+  const double step_m = std::max(PowerOfTwoUpTo(std::min(error_m / 32, cell_m / 64)), kFinestStepMetres);
+  if (width == PositionWidth::k16Bits) return step_m;
+  // Half the diagonal of a cube of 2^-7 m is 7 mm. A tile's side is at most 2^23 steps: FitsFloats.
+  constexpr double kBorderStepMetres = 0x1p-7;
+  const double side_m = cell_m * lattice.cells;
+  return std::min(step_m, PowerOfTwoUpTo(std::max(kBorderStepMetres, side_m / 0x1p22)));
 }
 
 std::vector<GridPoint> SnapVertices(const LatticeView& lattice, const tin::TinMesh& mesh, double step_m) {
@@ -142,7 +147,7 @@ std::vector<GridPoint> SnapVertices(const LatticeView& lattice, const tin::TinMe
 }
 
 bool FitsFloats(const std::vector<GridPoint>& points, double step_m, double skirt_depth_m) {
-  constexpr double kMaxSteps = 0x1p22;
+  constexpr double kMaxSteps = 0x1p23;
   const Box box = BoxOf(points);
   const double feet = skirt_depth_m / step_m + 2;
   for (std::size_t axis = 0; axis < 3; ++axis) {

@@ -1,8 +1,9 @@
 // The triangles of a GLB tile with all positions on one grid of Earth-centred coordinates, skirts included.
 //
-// Every position is a whole number of steps from the Earth's centre, and the step is a power of two that level, error
-// and lattice decide: neighbours of one level and one error that share a lattice node share its position bit for bit,
-// whatever their tiles' origins, and a client that decodes origin + step * integer in floats decodes it exactly.
+// Every position is a whole number of steps from the Earth's centre, and the step is a power of two that level, error,
+// lattice and width of the numbers decide: neighbours of one level and one error that share a lattice node share its
+// position bit for bit, whatever their tiles' origins, and a client that decodes origin + step * integer in floats
+// decodes it exactly.
 //
 // Pure functions; thread-safe.
 #pragma once
@@ -17,11 +18,18 @@
 
 namespace terrace::proto {
 
+// What a client is given a position in.
+enum class PositionWidth : std::uint8_t { k16Bits, kFloat };
+
 // Metres, a power of two: at most a 32nd of the error, so that rounding takes at most 3 % of it on level ground, and at
 // most a 64th of a lattice cell's height, so that few triangles turn over; but never below 2^-16 m, which matters to
 // errors below half a millimetre. At the default error of a level a tile then spans less than 2^16 steps; at the
-// finest, less than 2^22.
-double GridStep(const geo::Lattice& lattice, double error_m);
+// finest, less than 2^23.
+//
+// Floats have room for more. With them the step is also at most 2^-7 m, so that no vertex of a tile's edge is a
+// centimetre off the meridian or parallel where the tile ends: a client may tell by position which edge a vertex is on.
+// From level 8 up a tile is too wide for that, and the step is the least that fits, 2^-6 m there and 1 m at level 2.
+double GridStep(const geo::Lattice& lattice, double error_m, PositionWidth width);
 
 // Whole steps along the axes of ECEF.
 using GridPoint = std::array<std::int64_t, 3>;
@@ -32,7 +40,7 @@ using GridPoint = std::array<std::int64_t, 3>;
 std::vector<GridPoint> SnapVertices(const LatticeView& lattice, const tin::TinMesh& mesh, double step_m);
 
 // Whether decoders that compute in 32-bit floats find every point, and the feet of skirts of this depth: the tile spans
-// less than 2^22 steps, two bits less than a float has, since Draco adds a half on the way. False where a cliff is
+// less than 2^23 steps, a bit less than a float has, since Draco adds a half on the way. False where a cliff is
 // higher than a deep and fine tile can say: hundreds of metres within a few. Then the tile takes a step twice as
 // coarse, until it fits, and its edges are off by up to half of that step.
 bool FitsFloats(const std::vector<GridPoint>& points, double step_m, double skirt_depth_m);

@@ -7,6 +7,9 @@
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
 #include <boost/asio/signal_set.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/this_coro.hpp>
+#include <boost/asio/use_awaitable.hpp>
 #include <condition_variable>
 #include <csignal>
 #include <functional>
@@ -28,6 +31,9 @@ namespace {
 
 // For replies to requests whose builds were just cancelled, and again for sockets that were just aborted.
 constexpr std::chrono::milliseconds kLastWords{1'000};
+
+// How long a request waits for a source that was replaced, and how often it looks.
+constexpr std::chrono::milliseconds kReplaceTime{3'000}, kReplacePeriod{20};
 
 // A request for heights has a body of at most so many bytes, and so many for each location that it may name: two
 // numbers with all their digits, a form's three bytes for each separator.
@@ -74,15 +80,13 @@ TileServiceOptions ServiceOptions(const ServerOptions& options) {
 // before everything a session refers to.
 class Server::Impl {
  public:
-  Impl(std::vector<DatasetView> datasets, TileBuilder builder, StaticFiles viewer, std::unique_ptr<Edge> edge,
-       ServerOptions options)
+  Impl(CatalogPtr catalog, StaticFiles viewer, AccessLog access_log, std::unique_ptr<Edge> edge, ServerOptions options)
       : options_(std::move(options)),
-        datasets_(std::move(datasets)),
-        metrics_(datasets_),
-        tiles_(ServiceOptions(options_), std::move(builder), std::bind_front(&Metrics::CountBuild, &metrics_)),
+        access_log_(std::move(access_log)),
+        viewer_(std::make_shared<const StaticFiles>(std::move(viewer))),
+        tiles_(ServiceOptions(options_), std::bind_front(&Metrics::CountBuild, &metrics_)),
         edge_(std::move(edge)),
-        routes_(datasets_, tiles_, std::move(viewer), HandlerOptions(), HeightsOptions(), options_.area_mesher,
-                RouteState()),
+        routes_(MakeRoutes(std::move(catalog), options_)),
         io_(IoThreadCount(options_.io_threads)),
         signals_(io_.first()) {}
 
@@ -96,13 +100,31 @@ class Server::Impl {
     Result<std::shared_ptr<Listener>> listener = Listener::Open(io_, options_.host, options_.port, Context());
     if (!listener) return tl::unexpected(listener.error());
     listener_ = std::move(*listener);
-    if (options_.stop_on_signals) WatchSignals();
+    WatchSignals();
     listener_->Start();
     if (edge_->tls) asio::co_spawn(io_.first(), WatchCertificate(edge_->tls.get()), asio::detached);
     io_.Start();
     stopper_ = std::thread([this] { StopWhenAsked(); });
     return {};
   }
+
+  void Replace(CatalogPtr catalog, const ServerOptions& options) {
+    std::shared_ptr<const Routes> routes = MakeRoutes(catalog, options);
+    tiles_.SetCacheBytes(options.cache_bytes);
+    {
+      const std::lock_guard lock(state_mutex_);
+      routes_.swap(routes);
+      ++catalogs_;
+    }
+    tiles_.RetainTilesOf(*catalog);
+  }
+
+  void SetTroubles(std::map<std::string, std::string> troubles) {
+    const std::lock_guard lock(state_mutex_);
+    troubles_ = std::move(troubles);
+  }
+
+  void ReopenAccessLog() { access_log_.Reopen(); }
 
   std::uint16_t port() const { return listener_->port(); }
   const std::string& host() const { return options_.host; }
@@ -126,6 +148,7 @@ class Server::Impl {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [this] { return stop_requested_; });
     lock.unlock();
+    if (options_.on_stop) options_.on_stop();
     const bool drained = Stop();
     lock.lock();
     drained_ = drained;
@@ -149,32 +172,89 @@ class Server::Impl {
   }
 
   void WatchSignals() {
-    signals_.add(SIGINT);
-    signals_.add(SIGTERM);
+    if (options_.stop_on_signals) {
+      signals_.add(SIGINT);
+      signals_.add(SIGTERM);
+    }
+    for (const auto& [signal, action] : options_.on_signal) signals_.add(signal);
+    WaitForSignal();
+  }
+
+  void WaitForSignal() {
     signals_.async_wait([this](const boost::system::error_code& error, int signal) {
       if (error) return;
-      spdlog::info("stopping: signal {}", signal);
-      RequestStop();
+      if (const auto known = options_.on_signal.find(signal); known != options_.on_signal.end()) {
+        known->second();
+      } else {
+        spdlog::info("stopping: signal {}", signal);
+        RequestStop();
+      }
+      WaitForSignal();
     });
   }
 
-  TileHandlerOptions HandlerOptions() const {
+  std::shared_ptr<const Routes> MakeRoutes(CatalogPtr catalog, const ServerOptions& options) {
     TileHandlerOptions handler;
-    handler.cache_control = options_.cache_control;
-    handler.deadline = options_.request_deadline;
-    return handler;
+    handler.cache_control = options.cache_control;
+    handler.deadline = options.request_deadline;
+    return std::make_shared<const Routes>(std::move(catalog), tiles_, viewer_, std::move(handler),
+                                          options.max_locations, RouteState());
   }
 
-  Routes::Heights HeightsOptions() const { return {options_.read_points, options_.max_locations}; }
+  std::shared_ptr<const Routes> CurrentRoutes() const {
+    const std::lock_guard lock(state_mutex_);
+    return routes_;
+  }
+
+  std::map<std::string, std::string> Troubles() const {
+    const std::lock_guard lock(state_mutex_);
+    return troubles_;
+  }
+
+  Metrics::ServerState CurrentState() const {
+    Metrics::ServerState state;
+    state.edge = edge_->stats();
+    const std::lock_guard lock(state_mutex_);
+    state.datasets = routes_->catalog().datasets.size();
+    state.troubles = troubles_.size();
+    state.catalogs = catalogs_;
+    return state;
+  }
+
+  // The request's frame keeps what it is answered from. Where that turns out to be gone, the next catalog answers.
+  static asio::awaitable<Response> Serve(Impl* self, Route route, Request request) {
+    const auto give_up = std::chrono::steady_clock::now() + kReplaceTime;
+    for (;;) {
+      const std::shared_ptr<const Routes> routes = self->CurrentRoutes();
+      Request copy = request;
+      Response response = co_await routes->Serve(route, std::move(copy));
+      if (!response.source_changed || !self->options_.on_source_changed) co_return response;
+      self->options_.on_source_changed();
+      asio::steady_timer timer(co_await asio::this_coro::executor);
+      while (self->CurrentRoutes() == routes) {
+        const bool is_hopeless = self->edge_->connections.draining() || self->Troubles().contains(response.dataset);
+        if (is_hopeless || std::chrono::steady_clock::now() >= give_up) co_return response;
+        timer.expires_after(kReplacePeriod);
+        co_await timer.async_wait(asio::use_awaitable);
+      }
+    }
+  }
 
   ByteCacheStats RefinementStats() const {
     return options_.refinement_stats ? options_.refinement_stats() : ByteCacheStats{};
+  }
+  SourceStats SourceNumbers() const {
+    const std::shared_ptr<const Routes> routes = CurrentRoutes();
+    return routes->catalog().source_stats ? routes->catalog().source_stats() : SourceStats{};
   }
 
   Routes::State RouteState() {
     Routes::State state;
     state.draining = [this] { return edge_->connections.draining(); };
-    state.metrics_text = [this] { return metrics_.Text(tiles_.stats(), RefinementStats(), edge_->stats()); };
+    state.troubles = [this] { return Troubles(); };
+    state.metrics_text = [this] {
+      return metrics_.Text(tiles_.stats(), RefinementStats(), SourceNumbers(), CurrentState());
+    };
     return state;
   }
 
@@ -184,11 +264,13 @@ class Server::Impl {
     context->options.write_timeout = options_.write_timeout;
     context->options.min_rate = options_.min_read_rate;
     context->options.max_body_bytes = kBodyBytes + kBytesPerLocation * options_.max_locations;
-    context->quick_handler = std::bind_front(&Routes::ServeAtOnce, &routes_);
-    context->handler = std::bind_front(&Routes::Serve, &routes_);
+    context->quick_handler = [this](const Route& route, const Request& request) {
+      return CurrentRoutes()->ServeAtOnce(route, request);
+    };
+    context->handler = std::bind_front(&Impl::Serve, this);
     context->observer = [this](const ReplyRecord& record) {
       metrics_.CountReply(record);
-      if (spdlog::should_log(spdlog::level::info)) spdlog::info("{}", FormatAccessLine(record));
+      access_log_.Write(record);
     };
     context->connections = &edge_->connections;
     context->transfers = &edge_->transfers;
@@ -199,11 +281,15 @@ class Server::Impl {
   }
 
   const ServerOptions options_;
-  const std::vector<DatasetView> datasets_;
+  AccessLog access_log_;
+  const std::shared_ptr<const StaticFiles> viewer_;
   Metrics metrics_;
   TileService tiles_;
   const std::unique_ptr<Edge> edge_;
-  const Routes routes_;
+  mutable std::mutex state_mutex_;
+  std::shared_ptr<const Routes> routes_;         // never null; guarded by state_mutex_
+  std::map<std::string, std::string> troubles_;  // by dataset; guarded by state_mutex_
+  std::uint64_t catalogs_ = 0;                   // that have replaced one another; guarded by state_mutex_
   IoThreads io_;
   asio::signal_set signals_;
   std::shared_ptr<Listener> listener_;
@@ -219,18 +305,29 @@ class Server::Impl {
 Server::Server(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Server::~Server() = default;
 
-Result<std::unique_ptr<Server>> Server::Start(std::vector<DatasetView> datasets, TileBuilder builder,
-                                              ServerOptions options) {
-  if (const Result<void> named = CheckNames(datasets); !named) return tl::unexpected(named.error());
+Result<std::unique_ptr<Server>> Server::Start(CatalogPtr catalog, ServerOptions options) {
+  if (const Result<void> named = CheckNames(catalog->datasets); !named) return tl::unexpected(named.error());
   Result<StaticFiles> viewer = StaticFiles::Load(options.viewer_dir);
   if (!viewer) return tl::unexpected(viewer.error());
+  Result<AccessLog> access_log = AccessLog::Open(options.access_log, options.access_log_file);
+  if (!access_log) return tl::unexpected(access_log.error());
   Result<std::unique_ptr<Edge>> edge = Edge::Open(options.edge, DescriptorsForFiles(options));
   if (!edge) return tl::unexpected(edge.error());
-  auto impl = std::make_unique<Impl>(std::move(datasets), std::move(builder), std::move(*viewer), *std::move(edge),
+  auto impl = std::make_unique<Impl>(std::move(catalog), std::move(*viewer), std::move(*access_log), *std::move(edge),
                                      std::move(options));
   if (const Result<void> started = impl->Start(); !started) return tl::unexpected(started.error());
   return std::unique_ptr<Server>(new Server(std::move(impl)));
 }
+
+Result<void> Server::Replace(CatalogPtr catalog, const ServerOptions& options) {
+  if (const Result<void> named = CheckNames(catalog->datasets); !named) return tl::unexpected(named.error());
+  impl_->Replace(std::move(catalog), options);
+  return {};
+}
+
+void Server::ReopenAccessLog() { impl_->ReopenAccessLog(); }
+
+void Server::SetTroubles(std::map<std::string, std::string> troubles) { impl_->SetTroubles(std::move(troubles)); }
 
 std::uint16_t Server::port() const { return impl_->port(); }
 

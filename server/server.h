@@ -9,18 +9,17 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
-#include <vector>
 
 #include "engine/core/result.h"
+#include "server/http/access_log.h"
 #include "server/http/edge_options.h"
-#include "server/tiles/dataset_view.h"
+#include "server/tiles/catalog.h"
 #include "server/tiles/tile_service.h"
 
 namespace terrace::server {
-
-class TilePipeline;
 
 struct ServerOptions {
   std::string host = "127.0.0.1";
@@ -30,13 +29,12 @@ struct ServerOptions {
   std::size_t queue_length = 256;                      // builds that wait for a worker
   std::size_t cache_bytes = std::size_t{256} << 20;    // of finished tiles; 0: none
   std::function<ByteCacheStats()> refinement_stats;    // of what tiles are made from; may be empty
-  PointReader read_points;                             // for heights; empty where there are none
   std::size_t max_locations = 10'000;                  // in one request for heights
-  AreaMesher area_mesher;                              // empty where there are no meshes
-  std::size_t max_mesh_samples = 1'000'000;            // of one area
   EdgeOptions edge;                                    // limits of clients, tokens, proxies, TLS
   std::string cache_control = "public, max-age=3600";  // of tiles and layer.json
-  std::filesystem::path viewer_dir;                    // empty or missing: a plain page instead
+  AccessLogForm access_log = AccessLogForm::kLog;
+  std::filesystem::path access_log_file;  // of some forms; empty: stderr
+  std::filesystem::path viewer_dir;       // empty or missing: a plain page instead
   std::chrono::milliseconds header_timeout{5'000};
   std::chrono::milliseconds idle_timeout{30'000};
   std::chrono::milliseconds write_timeout{20'000};
@@ -44,21 +42,36 @@ struct ServerOptions {
   std::chrono::milliseconds request_deadline{30'000};  // of a tile, waiting for its build included
   std::chrono::milliseconds drain_timeout{10'000};
   bool stop_on_signals = false;  // SIGINT and SIGTERM act like RequestStop
+  // Called on an io thread for each of these signals: must not block.
+  std::map<int, std::function<void()>> on_signal;
+  std::function<void()> on_stop;  // called once, when stopping begins; may be empty
+  // Told that a source is not the one that was opened any more; on io threads, must not block. The request waits a
+  // moment for Replace then. Empty: nobody will open it anew, and nobody waits.
+  std::function<void()> on_source_changed;
 };
 
 class Server {
  public:
-  // Listens when it returns. `builder` is called on worker threads; TileRequest::dataset is an index into `datasets`.
+  // Listens when it returns. The catalog's functions are called on worker threads.
   // kInvalidArgument: a dataset's name is reserved, empty or used twice. kUnavailable: the address cannot be listened
-  // on, or the viewer cannot be read. Messages name the remedy.
-  static Result<std::unique_ptr<Server>> Start(std::vector<DatasetView> datasets, TileBuilder builder,
-                                               ServerOptions options);
+  // on, the viewer cannot be read, or the access log
+  // cannot be written. Messages name the remedy.
+  static Result<std::unique_ptr<Server>> Start(CatalogPtr catalog, ServerOptions options);
 
-  // The same for the datasets of a pipeline.
-  static Result<std::unique_ptr<Server>> Start(std::shared_ptr<const TilePipeline> pipeline, ServerOptions options);
+  // Requests that come from now on are answered from `catalog`; those that have begun keep the one they began with.
+  // Cached tiles of datasets that stay in the same generation stay. Of `options`, cache_bytes, cache_control,
+  // request_deadline and max_locations are taken over. kInvalidArgument as above: nothing has changed then. From any
+  // thread, one at a time.
+  Result<void> Replace(CatalogPtr catalog, const ServerOptions& options);
 
   // Stops and waits.
   ~Server();
+
+  // After a rotation.
+  void ReopenAccessLog();
+
+  // What /readyz calls degraded: troubles by dataset, "" is the configuration. Nobody waits for a source in trouble.
+  void SetTroubles(std::map<std::string, std::string> troubles);
 
   std::uint16_t port() const;
   std::string url() const;  // "http://127.0.0.1:8080/"; https with a certificate

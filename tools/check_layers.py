@@ -18,7 +18,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 
 # core <- {geo, tin} <- {dem, proto} <- server, and core <- config <- server. In the server, asio.h stands below all and the
 # files of the folder itself, which put the rooms together, above all but the command line:
-# asio.h <- tiles <- http <- handlers <- server <- cli.
+# asio.h <- tiles <- http <- handlers <- server <- cli, and tiles <- reload <- cli.
 ENGINE = ["engine/core", "engine/geo", "engine/tin", "engine/dem", "proto", "config", "server/asio.h"]
 ROOMS = {
     "engine/core": [],
@@ -31,8 +31,9 @@ ROOMS = {
     "server/tiles": ENGINE,
     "server/http": ENGINE + ["server/tiles"],
     "server/handlers": ENGINE + ["server/tiles", "server/http"],
+    "server/reload": ENGINE + ["server/tiles"],
     "server": ENGINE + ["server/tiles", "server/http", "server/handlers"],
-    "server/cli": ENGINE + ["server/tiles", "server/http", "server/handlers", "server"],
+    "server/cli": ENGINE + ["server/tiles", "server/http", "server/handlers", "server/reload", "server"],
 }
 
 # Library: which headers are its own, and which files may name them (regular expressions on paths). The first match counts.
@@ -54,8 +55,10 @@ LIBRARIES = [
     Library("spdlog", r"spdlog/.*", r"(engine/dem|server)/.*\.cc"),
     Library("Beast", r"boost/beast.*", r"server/http/request\.cc"),
     Library("OpenSSL", r"openssl/.*|boost/asio/ssl.*", r"server/http/.*\.cc"),
+    Library("Boost.Geometry", r"boost/geometry/.*", r"engine/dem/.*\.cc"),
     Library("Boost", r"boost/.*", r"server/"),
     Library("CLI11", r"CLI/.*", r"server/cli/"),
+    Library("systemd", r"systemd/.*", r"server/cli/.*\.cc"),
     Library("prometheus-cpp", r"prometheus/.*", r"server/.*\.cc"),
     # What a room promises not to know: threads and clocks, files, sockets.
     Library("threads", r"(thread|mutex|shared_mutex|condition_variable|semaphore|future)", r"(engine/dem|server)/"),
@@ -200,7 +203,7 @@ class SelfTest(unittest.TestCase):
         self.assert_clean({
             "engine/dem/handle.h": "#include <gdal_priv.h>\n#include <mutex>\n",
             "engine/dem/source.cc": '#include "engine/dem/handle.h"\n#include <sys/stat.h>\n',
-            "server/http/session.cc": "#include <boost/beast/http.hpp>\n#include <boost/asio/awaitable.hpp>\n",
+            "server/http/request.cc": "#include <boost/beast/http.hpp>\n#include <boost/asio/awaitable.hpp>\n",
             "server/cli/main.cc": "#include <CLI/CLI.hpp>\n",
             "proto/compress.cc": "#include <libdeflate.h>\n#include <vector>\n",
             "engine/tin/scan.cc": "#include <hwy/highway.h>\n#include <stop_token>\n",

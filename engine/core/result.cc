@@ -10,6 +10,8 @@ std::string_view ToString(ErrorCode code) {
       return "not_found";
     case ErrorCode::kUnavailable:
       return "unavailable";
+    case ErrorCode::kChanged:
+      return "changed";
     case ErrorCode::kOverloaded:
       return "overloaded";
     case ErrorCode::kCancelled:

@@ -18,6 +18,7 @@ enum class ErrorCode {
   kInvalidArgument,  // the caller asked for something that has no meaning
   kNotFound,         // it does not exist
   kUnavailable,      // a source or a resource does not answer now; asking again later may work
+  kChanged,          // a source is not the one that was opened any more; whoever opens it anew gets an answer
   kOverloaded,       // a bounded queue is full
   kCancelled,        // nobody waits for the answer any more, or the time is up
   kInternal,         // a library failed in a way nobody foresaw

@@ -57,7 +57,8 @@ std::vector<Ranges> AvailableTiles(std::span<const Reach> sources) {
     wanted = Merged(std::move(wanted), worth[static_cast<std::size_t>(level)]);
     here = Up(wanted, up);
     if (level < deepest) here = Merged(std::move(here), Up(levels[static_cast<std::size_t>(level) + 1], 1));
-    here = Merged(std::move(here), geo::Intersection(Down(Up(here, 1), 1), Up(all, up)));
+    const Ranges families = geo::Intersection(Down(Up(here, 1), 1), Up(all, up));
+    here = Merged(std::move(here), families);
     for (int coarser = 1; here.size() > kMostBlocks && coarser <= level; ++coarser) {
       here = geo::Disjoint(Down(Up(here, coarser), coarser));
     }

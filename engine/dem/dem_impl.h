@@ -12,19 +12,23 @@ namespace terrace::dem {
 
 class DemSource::Impl {
  public:
-  // `what` is read, for messages.
-  Result<std::vector<float>> ReadNodes(int level, const NodeWindow& window, const std::string& what,
-                                       const std::stop_token& stop) const;
-  Result<TileHeights> Read(const geo::TileKey& key, const std::stop_token& stop) const;
+  // `what` is read, for messages. `traces`, unless it is null, gets those of the sheets that were read, in their order.
+  Result<std::vector<float>> ReadNodes(int level, const NodeWindow& window, Counting counting, const std::string& what,
+                                       const std::stop_token& stop, std::vector<SheetTrace>* traces = nullptr) const;
+  Result<TileHeights> Read(const geo::TileKey& key, Counting counting, const std::stop_token& stop) const;
   Result<std::vector<float>> ReadMercator(int depth, const NodeWindow& window, const std::stop_token& stop) const;
-  Result<std::vector<float>> ReadPoints(std::span<const GeoPosition> points, const std::stop_token& stop) const;
+  Result<std::vector<float>> ReadPoints(std::span<const GeoPosition> points, HeightDatum datum,
+                                        const std::stop_token& stop) const;
   HeightRange RangeBound(const geo::TileKey& key) const;
 
   const geo::Lattice& LatticeOf(int level) const;  // 0 .. geo::kMaxLevel, also beyond the deepest level served
 
   template <typename Grid>
-  Result<std::vector<float>> ReadFloored(const Grid& grid, const NodeWindow& window, const std::string& what,
-                                         const std::stop_token& stop) const;
+  Result<std::vector<float>> ReadSheets(const Grid& grid, const NodeWindow& window, Counting counting,
+                                        const std::string& what, const std::stop_token& stop,
+                                        std::vector<SheetTrace>* traces) const;
+  Result<double> GapOf(const TileHeights& tile, const NodeWindow& window, const std::vector<SheetTrace>& traces,
+                       const std::stop_token& stop) const;
   // Those that can have heights there, in their order.
   std::vector<std::size_t> SheetsAt(const Box& degrees) const;
 
@@ -32,7 +36,9 @@ class DemSource::Impl {
   BoxIndex index;             // of the sheets, by degrees (IndexOf)
   std::vector<geo::Lattice> lattices;
   std::vector<std::vector<geo::TileRange>> available;
-  float floor = 0;
+  float floor = 0;                                       // above the ellipsoid
+  std::shared_ptr<const Undulations> floor_undulations;  // all over the Earth, of the last sheet above a geoid; or null
+  bool has_feather = false;
   DemInfo info;
   std::uint64_t fingerprint = 0;
 };

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 #include <utility>
 
 #include "engine/core/bytes.h"
@@ -31,6 +32,11 @@ Result<void> CheckOptions(const DemOptions& options) {
   if (options.floor && !(std::abs(*options.floor) <= kMaxAbsHeight)) {
     return MakeError(ErrorCode::kInvalidArgument, "floor {} m: must be a height on Earth", *options.floor);
   }
+  constexpr double kWidestFeather = 1e6;
+  if (!(options.feather >= 0 && options.feather <= kWidestFeather)) {
+    return MakeError(ErrorCode::kInvalidArgument, "feather {} m: must be 0 (none) to {:.0f} m", options.feather,
+                     kWidestFeather);
+  }
   constexpr int kMaxGap = 4096;
   if (options.max_void_gap < 0 || options.max_void_gap > kMaxGap) {
     return MakeError(ErrorCode::kInvalidArgument, "void gap {}: must be 0 (fill nothing) to {} samples",
@@ -46,18 +52,31 @@ std::uint64_t FingerprintOf(const std::vector<Sheet>& sheets, const DemOptions& 
   constexpr std::uint32_t kResamplingVersion = 1;
   ByteWriter writer;
   writer.Put(kResamplingVersion);
+  const auto put = [&writer](const StampedFiles& files) {
+    for (const FileStamp& stamp : files.stamps()) {
+      for (const std::uint64_t part : {stamp.device, stamp.inode, stamp.size, stamp.modified_ns}) writer.Put(part);
+    }
+  };
   for (const Sheet& sheet : sheets) {
     if (&sheet != &sheets.front()) writer.Put(std::uint32_t{0});  // which rasters make one sheet counts, too
     for (const SheetMember& member : sheet.members()) {
-      for (const FileStamp& stamp : member.raster->files().stamps()) {
-        for (const std::uint64_t part : {stamp.device, stamp.inode, stamp.size, stamp.modified_ns}) writer.Put(part);
+      put(member.raster->files());
+      // What was found or stated of voids decides heights as well.
+      if (const SampleRules& rules = member.raster->layout().rules; !rules.marks.empty() || rules.rim > 0) {
+        for (const double mark : rules.marks) writer.Put(mark);
+        for (const double bound : {rules.lowest, rules.highest, double(rules.rim)}) writer.Put(bound);
       }
+    }
+    if (const auto& geoid = sheet.vertical().geoid) {
+      put(geoid->files());
+      writer.PutBytes(geoid->pipeline());
     }
   }
   writer.Put(options.error_fraction);
   writer.Put(options.finest_error.value_or(0));
   writer.Put(floor);
   writer.Put(options.max_void_gap);
+  if (options.feather > 0) writer.Put(options.feather);
   const std::string bytes = writer.Take();
   return XXH3_64bits(bytes.data(), bytes.size());
 }
@@ -70,13 +89,15 @@ Result<Rasters> OpenAll(std::vector<DemFile>& files, const DemOptions& options) 
     return MakeError(ErrorCode::kNotFound, "{}: no raster lies in its folder; name a folder of rasters or a raster",
                      first);
   }
+  const auto handles = std::make_shared<HandleLimit>(options.max_open_sources);
   Rasters rasters;
   for (std::size_t i = 0; i < files.size(); ++i) {
     const auto progress = [&](double share) {
       options.progress((static_cast<double>(i) + share) / static_cast<double>(files.size()));
     };
-    auto raster = RasterSource::Open(files[i].path, options.cache_dir,
-                                     options.progress ? progress : std::function<void(double)>());
+    auto raster =
+        RasterSource::Open(files[i].path, files[i].options.value_or(options.source), options.cache_dir,
+                           options.progress ? progress : std::function<void(double)>(), handles, options.stop);
     if (!raster) return tl::unexpected(raster.error());
     rasters.push_back(*std::move(raster));
   }
@@ -87,23 +108,24 @@ Result<Rasters> OpenAll(std::vector<DemFile>& files, const DemOptions& options) 
 long ResolutionStep(const RasterSource& raster) { return std::lround(std::log2(raster.spacing().finer) * 16); }
 
 // Of one rank: the sheets that they make, finer ones first, then by path.
-Result<void> AddSheets(Rasters rasters, int max_void_gap, std::vector<Sheet>& sheets) {
+Result<void> AddSheets(Rasters rasters, const SheetOptions& options, std::vector<Sheet>& sheets) {
   std::ranges::sort(rasters, {},
                     [](const auto& raster) { return std::pair(ResolutionStep(*raster), raster->info().path); });
   for (SheetPlan& plan : PlanSheets(rasters)) {
-    auto sheet = Sheet::Make(std::move(plan), max_void_gap);
+    auto sheet = Sheet::Make(std::move(plan), options);
     if (!sheet) return tl::unexpected(sheet.error());
     sheets.push_back(*std::move(sheet));
   }
   return {};
 }
 
-Result<std::vector<Sheet>> SheetsOf(const std::vector<DemFile>& files, const Rasters& rasters, int max_void_gap) {
+Result<std::vector<Sheet>> SheetsOf(const std::vector<DemFile>& files, const Rasters& rasters,
+                                    const SheetOptions& options) {
   std::map<int, Rasters> ranks;
   for (std::size_t i = 0; i < files.size(); ++i) ranks[files[i].rank].push_back(rasters[i]);
   std::vector<Sheet> sheets;
   for (auto& [rank, those] : ranks) {
-    if (auto added = AddSheets(std::move(those), max_void_gap, sheets); !added) return tl::unexpected(added.error());
+    if (auto added = AddSheets(std::move(those), options, sheets); !added) return tl::unexpected(added.error());
   }
   return sheets;
 }
@@ -134,17 +156,19 @@ GeoBounds BoundsOf(const Rasters& rasters) {
 
 DemInfo InfoOf(const std::vector<Sheet>& sheets, const Rasters& rasters, const DemOptions& options) {
   DemInfo info;
-  info.heights = rasters.front()->info().heights;
-  for (const auto& raster : rasters) {
-    info.heights.min = std::min(info.heights.min, raster->info().heights.min);
-    info.heights.max = std::max(info.heights.max, raster->info().heights.max);
-  }
+  info.heights = sheets.front().EllipsoidalRange();
   info.bounds = BoundsOf(rasters);
-  info.floor = RoundHeight(options.floor.value_or(info.heights.min));
   for (const Sheet& sheet : sheets) {
-    for (const SheetMember& member : sheet.members()) info.sources.push_back(member.raster->info());
+    const HeightRange ellipsoidal = sheet.EllipsoidalRange();
+    info.heights.min = std::min(info.heights.min, ellipsoidal.min);
+    info.heights.max = std::max(info.heights.max, ellipsoidal.max);
+    for (const SheetMember& member : sheet.members()) {
+      info.sources.push_back(member.raster->info());
+      info.sources.back().ellipsoidal = ellipsoidal;
+    }
     info.max_mercator_depth = std::max(info.max_mercator_depth, DeepestMercator(sheet.spacing()));
   }
+  info.floor = RoundHeight(options.floor.value_or(info.heights.min));
   return info;
 }
 
@@ -177,11 +201,12 @@ Result<std::unique_ptr<DemSource>> DemSource::Open(std::vector<DemFile> files, c
     return MakeError(checked.error().code, "{}: {}", files.front().path, checked.error().message);
   const auto rasters = OpenAll(files, options);
   if (!rasters) return tl::unexpected(rasters.error());
-  auto sheets = SheetsOf(files, *rasters, options.max_void_gap);
+  auto sheets = SheetsOf(files, *rasters, {options.max_void_gap, options.feather});
   if (!sheets) return tl::unexpected(sheets.error());
 
   auto impl = std::make_unique<Impl>();
   impl->sheets = *std::move(sheets);
+  impl->has_feather = options.feather > 0;
   impl->index = IndexOf(impl->sheets);
   const auto finest = std::ranges::min_element(impl->sheets, {}, [](const Sheet& s) { return s.spacing().finer; });
   impl->lattices = PlanLattices(finest->spacing());
@@ -189,6 +214,11 @@ Result<std::unique_ptr<DemSource>> DemSource::Open(std::vector<DemFile> files, c
   impl->available = AvailableTiles(ReachesOf(impl->sheets, options));
   impl->info.max_level = static_cast<int>(impl->available.size()) - 1;
   impl->floor = static_cast<float>(impl->info.floor);
+  for (const Sheet& sheet : impl->sheets) {
+    if (const auto& geoid = sheet.vertical().geoid) {
+      impl->floor_undulations = std::make_shared<const Undulations>(geoid, Footprint{});
+    }
+  }
   impl->fingerprint = FingerprintOf(impl->sheets, options, impl->floor);
   return std::unique_ptr<DemSource>(new DemSource(std::move(impl)));
 }
@@ -198,11 +228,25 @@ int DemSource::max_level() const { return impl_->info.max_level; }
 geo::Lattice DemSource::LatticeOf(int level) const { return impl_->LatticeOf(level); }
 std::uint64_t DemSource::fingerprint() const { return impl_->fingerprint; }
 
+StampedFiles DemSource::files() const {
+  StampedFiles all;
+  std::set<const Geoid*> geoids;
+  for (const Sheet& sheet : impl_->sheets) {
+    for (const SheetMember& member : sheet.members()) all.Append(member.raster->files());
+    // Sheets mostly share one.
+    const auto& geoid = sheet.vertical().geoid;
+    if (geoid && geoids.insert(geoid.get()).second) all.Append(geoid->files());
+  }
+  return all;
+}
+
 const std::vector<geo::TileRange>& DemSource::Available(int level) const {
   static const std::vector<geo::TileRange> none;
   if (level < 0 || level > max_level()) return none;
   return impl_->available[static_cast<std::size_t>(level)];
 }
+
+const std::vector<std::vector<geo::TileRange>>& DemSource::Availability() const { return impl_->available; }
 
 bool DemSource::IsAvailable(const geo::TileKey& key) const {
   return geo::IsValid(key) &&
@@ -216,13 +260,35 @@ HeightRange DemSource::RangeBound(const geo::TileKey& key) const {
 
 Result<TileHeights> DemSource::Read(const geo::TileKey& key, std::stop_token stop) const {
   TERRACE_CHECK(geo::IsValid(key));
-  return impl_->Read(key, stop);
+  return impl_->Read(key, Counting::kEllipsoid, stop);
 }
+
+Result<TileHeights> DemSource::ReadAsCounted(const geo::TileKey& key, std::stop_token stop) const {
+  TERRACE_CHECK(geo::IsValid(key));
+  return impl_->Read(key, Counting::kAsSource, stop);
+}
+
+SampleCounts DemSource::CountSamples() const {
+  SampleCounts sum;
+  for (const Sheet& sheet : impl_->sheets) {
+    const SampleCounts counts = sheet.CountSamples();
+    sum.measured += counts.measured;
+    sum.filled += counts.filled;
+    sum.voids += counts.voids;
+  }
+  return sum;
+}
+
+bool DemSource::has_datum() const {
+  return std::ranges::none_of(impl_->info.sources, [](const RasterInfo& raster) { return raster.counts_from.empty(); });
+}
+
+bool DemSource::converts() const { return impl_->floor_undulations != nullptr; }
 
 Result<std::vector<float>> DemSource::ReadNodes(int level, const NodeWindow& window, std::stop_token stop) const {
   TERRACE_CHECK(level >= 0 && level <= geo::kMaxLevel && window.columns > 0 && window.rows > 0);
   TERRACE_CHECK(window.row >= 0 && window.row + window.rows - 1 <= LatticeOf(level).rows());
-  return impl_->ReadNodes(level, window, fmt::format("an area of level {}", level), stop);
+  return impl_->ReadNodes(level, window, Counting::kEllipsoid, fmt::format("an area of level {}", level), stop);
 }
 
 Result<std::vector<float>> DemSource::ReadMercator(int depth, const NodeWindow& window, std::stop_token stop) const {
@@ -231,8 +297,9 @@ Result<std::vector<float>> DemSource::ReadMercator(int depth, const NodeWindow& 
   return impl_->ReadMercator(depth, window, stop);
 }
 
-Result<std::vector<float>> DemSource::ReadPoints(std::span<const GeoPosition> points, std::stop_token stop) const {
-  return impl_->ReadPoints(points, stop);
+Result<std::vector<float>> DemSource::ReadPoints(std::span<const GeoPosition> points, HeightDatum datum,
+                                                 std::stop_token stop) const {
+  return impl_->ReadPoints(points, datum, stop);
 }
 
 }  // namespace terrace::dem

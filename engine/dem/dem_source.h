@@ -7,8 +7,10 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -17,22 +19,45 @@
 #include <vector>
 
 #include "engine/core/result.h"
+#include "engine/dem/file_stamp.h"
 #include "engine/geo/lattice.h"
 #include "engine/geo/tile_key.h"
 
 namespace terrace::dem {
 
+// How the samples of a source are to be understood.
+struct SourceOptions {
+  // What its heights count from: "crs" (what its reference system states), "unknown", "ellipsoid", "egm96", "egm2008",
+  // a vertical reference system ("EPSG:5703"), or the path of a grid of undulations.
+  std::string vertical = "crs";
+  bool find_voids = true;           // undeclared marks are looked for (void_marks.h)
+  std::vector<double> nodata = {};  // raw values that are voids, beside the declared one
+
+  friend bool operator==(const SourceOptions&, const SourceOptions&) = default;
+};
+
+// What heights are to count from.
+enum class HeightDatum : std::uint8_t {
+  kEllipsoid,    // that of WGS 84, as in tiles
+  kOrthometric,  // the geoid that the source counts from; EGM96 where it counts from the ellipsoid
+};
+
 struct DemOptions {
+  SourceOptions source = {};    // of files that have none of their own
   double error_fraction = 0.5;  // default error of a level, as a share of the clients' level error
   std::optional<double> finest_error =
-      {};  // metres: the deepest level is the first whose default error is at most this
-  std::optional<double> floor =
-      {};                 // metres: height outside the sources and in large voids; default: lowest valid height
+      {};                            // metres: the deepest level is the first whose default error is at most this
+  std::optional<double> floor = {};  // metres above the ellipsoid, outside the source and in large voids; default: the
+                                     // lowest height, at most
   int max_void_gap = 64;  // source samples: voids narrower than this along a row, column or diagonal are filled
   // A folder for what is learnt of sources once (docs/configuration.md). Empty: nothing is kept.
   std::string cache_dir = {};
+  // Metres, of a mosaic: so far from its edges and voids a source begins to give way to what lies below it. 0: at them.
+  double feather = 0;
+  std::size_t max_open_sources = 64;  // kept open between reads; what is in use comes on top, one a thread
   // Called now and then while Open scans the sources, with the share done, 0..1: files count alike. May be empty.
   std::function<void(double)> progress = {};
+  std::stop_token stop = {};  // Open gives up (kCancelled)
 };
 
 // One raster of a dataset.
@@ -41,7 +66,8 @@ struct DemFile {
   // Where several sources have a height the one of the lowest rank counts; of equal ranks the finer one, then the one
   // whose path sorts first.
   int rank = 0;
-  bool may_be_other = false;  // it stands in a folder: if it is no raster at all it is left out
+  bool may_be_other = false;                  // it stands in a folder: if it is no raster at all it is left out
+  std::optional<SourceOptions> options = {};  // of this file; else those of DemOptions
 };
 
 // Metres above the ellipsoid (or whatever the source counts from where no datum is stated).
@@ -74,14 +100,18 @@ struct RasterInfo {
   std::string data_type;                     // "Int16"
   std::string crs;                           // name and code: "WGS 84 / UTM zone 11N (EPSG:32611)"
   std::string vertical_datum;                // as stated by the CRS; empty: not stated
+  std::string counts_from;                   // what heights are taken to count from; empty: not known
+  std::string vertical_operation;            // the PROJ operation that makes them ellipsoidal; empty: none needed
   std::string height_unit;                   // as stated by the band; empty: metres assumed
   double pixel_width = 0, pixel_height = 0;  // in units of the CRS
   std::string pixel_unit;                    // "degree", "metre"
   double spacing_m = 0;                      // finer ground axis at the centre, true metres
   GeoBounds bounds;                          // of the pixels' area
-  HeightRange heights;                       // of all valid samples
+  HeightRange heights;                       // of all valid samples, as the source counts them
+  HeightRange ellipsoidal;                   // at least as wide as they are once converted
   std::uint64_t valid_samples = 0, void_samples = 0;
   std::optional<double> nodata;
+  std::string found_voids;  // what find_voids found, for people; empty: nothing
   std::vector<int> overview_factors;
   std::string transform;        // the PROJ operation from EPSG:4326 to the source, for the log; empty: none needed
   bool needs_averages = false;  // large, and without overviews
@@ -93,10 +123,17 @@ struct RasterInfo {
 struct DemInfo {
   std::vector<RasterInfo> sources;  // sorted: the first that has a height at a place gives it
   GeoBounds bounds;
-  HeightRange heights;  // of all valid samples
+  HeightRange heights;  // above the ellipsoid, at least as wide as those of all valid samples
   double floor = 0;
   int max_level = 0;
   int max_mercator_depth = 1;
+};
+
+// Samples read for tiles, at the resolution they were read at.
+struct SampleCounts {
+  std::uint64_t measured = 0;
+  std::uint64_t filled = 0;  // small voids, from their edges
+  std::uint64_t voids = 0;   // other sources or the floor show there
 };
 
 // Height samples of a tile with one more sample on each side, row by row from the south-western halo sample. Every
@@ -105,9 +142,10 @@ struct TileHeights {
   geo::Lattice lattice;
   int stride = 0;              // cells + 3
   std::vector<float> heights;  // stride * stride
-  // Metres: no valid sample of a source, at its full resolution, lies farther from the surface that is bilinear between
-  // the tile's own samples. The halo does not count.
-  double source_gap_m = 0;
+  // Metres, of Read alone: no valid sample of a source, at its full resolution and above the ellipsoid, lies farther
+  // from the surface that is bilinear between the tile's own samples; nor does what sources are blended to, where a
+  // feather blends them. The halo does not count.
+  double source_gap_m = std::numeric_limits<double>::infinity();
 
   // i, j in -1 .. cells + 1: columns from the west, rows from the SOUTH.
   float At(int i, int j) const {
@@ -115,6 +153,16 @@ struct TileHeights {
                    static_cast<std::size_t>(i + 1)];
   }
 };
+
+// Of GDAL, since the start, in all threads; for metrics.
+struct GdalCounts {
+  std::uint64_t errors = 0, warnings = 0;
+  std::uint64_t cache_bytes = 0;  // of blocks, now
+};
+GdalCounts CountGdalErrors();
+
+// How much memory blocks of rasters may take, in all threads together.
+void SetGdalCache(std::size_t bytes);
 
 class DemSource {
  public:
@@ -134,14 +182,21 @@ class DemSource {
   // Blocks of tiles, without overlap, sorted by row and column, that hold every tile of the level which touches a
   // source that is worth the level, and every ancestor of a tile; at level 0 both roots (availability.h).
   const std::vector<geo::TileRange>& Available(int level) const;
+  // The same of all levels, from 0.
+  const std::vector<std::vector<geo::TileRange>>& Availability() const;
   bool IsAvailable(const geo::TileKey& key) const;
 
   // Heights no sample of the tile (halo not included) leaves: at least as wide as the truth, a function of the key
   // alone. Any valid key; tiles away from the source hold only the floor.
   HeightRange RangeBound(const geo::TileKey& key) const;
 
-  // Reads and resamples one tile. kUnavailable: the source cannot be read now. kCancelled: stopped.
+  // Reads and resamples one tile. kUnavailable: the source cannot be read now.
+  // kChanged: it is not the file that was opened any more. kCancelled: stopped.
   Result<TileHeights> Read(const geo::TileKey& key, std::stop_token stop = {}) const;
+
+  // Heights of the same nodes as each source counts them: of those above the ellipsoid, and of unknown ones, the same.
+  // For comparisons with a sea level; the floor counts as the last source that is above a geoid does.
+  Result<TileHeights> ReadAsCounted(const geo::TileKey& key, std::stop_token stop = {}) const;
 
   // Heights at nodes of a level's lattice, row by row from the south-western one: the same bits as in its tiles. Any
   // level up to geo::kMaxLevel; columns count modulo 360 degrees; rows lie within the lattice.
@@ -155,11 +210,23 @@ class DemSource {
   // Heights as measured: bilinear between the samples of the full resolution, in the order of `points`; NaN outside the
   // sources and where the sample whose pixel holds the point is void in all of them. Nothing is filled. A height does
   // not depend on the other points. Precondition: finite longitudes, latitudes in -90 .. 90.
-  Result<std::vector<float>> ReadPoints(std::span<const GeoPosition> points, std::stop_token stop = {}) const;
+  Result<std::vector<float>> ReadPoints(std::span<const GeoPosition> points,
+                                        HeightDatum datum = HeightDatum::kEllipsoid, std::stop_token stop = {}) const;
+
+  // Whether it is known what every source counts from: else there are no orthometric heights.
+  bool has_datum() const;
+  // Whether a source counts from a geoid: ReadAsCounted differs from Read.
+  bool converts() const;
+
+  // Since it was opened, in all threads; for metrics.
+  SampleCounts CountSamples() const;
 
   // Identifies content and options: device, inode, size, mtime of all files in their order, and every option that
   // changes heights.
   std::uint64_t fingerprint() const;
+
+  // What it is read from, as it was when it was opened.
+  StampedFiles files() const;
 
  private:
   class Impl;

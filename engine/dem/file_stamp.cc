@@ -3,6 +3,8 @@
 #include <sys/stat.h>
 #include <xxhash.h>
 
+#include <utility>
+
 #include "engine/core/bytes.h"
 
 namespace terrace::dem {
@@ -17,6 +19,11 @@ std::optional<FileStamp> StampOf(const std::string& path) {
                        static_cast<std::uint64_t>(status.st_mtim.tv_nsec)};
 }
 
+Error ChangedError(const std::string& path) {
+  return {ErrorCode::kChanged,
+          fmt::format("{} was changed, replaced or removed since it was opened; load the dataset anew", path)};
+}
+
 StampedFiles::StampedFiles(const std::vector<std::string>& paths) {
   for (const std::string& path : paths) {
     if (const auto stamp = StampOf(path)) {
@@ -26,9 +33,29 @@ StampedFiles::StampedFiles(const std::vector<std::string>& paths) {
   }
 }
 
+Result<StampedFiles> StampedFiles::OfOpened(const std::vector<std::string>& paths,
+                                            const std::optional<FileStamp>& before) {
+  StampedFiles files(paths);
+  if (StampOf(paths.front()) != before) return tl::unexpected(ChangedError(paths.front()));
+  return files;
+}
+
+Result<void> StampedFiles::CheckUnchanged(const std::string& path) const {
+  const auto changed = FirstChanged();
+  if (!changed) return {};
+  Error error = ChangedError(*changed);
+  if (*changed != path) error.message = path + ": " + error.message;
+  return tl::unexpected(std::move(error));
+}
+
+void StampedFiles::Append(const StampedFiles& more) {
+  paths_.insert(paths_.end(), more.paths_.begin(), more.paths_.end());
+  stamps_.insert(stamps_.end(), more.stamps_.begin(), more.stamps_.end());
+}
+
 std::optional<std::string> StampedFiles::FirstChanged() const {
   for (std::size_t i = 0; i < paths_.size(); ++i) {
-    if (StampOf(paths_[i]) != stamps_[i]) return paths_[i];
+    if (HasChanged(i)) return paths_[i];
   }
   return std::nullopt;
 }

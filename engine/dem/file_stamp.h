@@ -1,10 +1,13 @@
 // What tells one state of a file from another: device, inode, size and modification time.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
+
+#include "engine/core/result.h"
 
 namespace terrace::dem {
 
@@ -17,16 +20,32 @@ struct FileStamp {
 // Nothing when there is no regular file of that name.
 std::optional<FileStamp> StampOf(const std::string& path);
 
+// Of `path`, for people: it is not the file that was opened.
+Error ChangedError(const std::string& path);
+
 // The files a raster is made of (the file itself, overviews and masks beside it, the parts of a mosaic) as they were
-// when it was opened. Immutable.
+// when it was opened.
 class StampedFiles {
  public:
   StampedFiles() = default;
   // Names that are no regular files (members of an archive) are left out: their archive is stamped.
   explicit StampedFiles(const std::vector<std::string>& paths);
 
+  // For files that have just been opened. kChanged: the first of them is not what it was before that (`before`), so
+  // that nobody knows which of both was opened.
+  static Result<StampedFiles> OfOpened(const std::vector<std::string>& paths, const std::optional<FileStamp>& before);
+
   // The first file that has changed or gone since; nothing when all are as they were.
   std::optional<std::string> FirstChanged() const;
+
+  // kChanged: FirstChanged finds one. `path`: of the raster, for the message.
+  Result<void> CheckUnchanged(const std::string& path) const;
+
+  // File by file, for those who look at many of them.
+  std::size_t size() const { return paths_.size(); }
+  bool HasChanged(std::size_t i) const { return StampOf(paths_[i]) != stamps_[i]; }
+  const std::string& path(std::size_t i) const { return paths_[i]; }
+  void Append(const StampedFiles& more);
 
   const std::vector<FileStamp>& stamps() const { return stamps_; }
 

@@ -5,20 +5,30 @@
 #include <gdal.h>
 #include <ogr_srs_api.h>
 
-#include <algorithm>
+#include <atomic>
 #include <mutex>
 #include <utility>
+
+#include "engine/core/check.h"
+#include "engine/dem/dem_source.h"
+#include "engine/dem/driver_list.h"
+#include "engine/dem/network_guard.h"
 
 namespace terrace::dem {
 namespace {
 
-constexpr GIntBig kBlockCacheBytes = GIntBig{256} << 20;
+constexpr GIntBig kBlockCacheBytes = GIntBig{256} << 20;  // unless SetGdalCache says otherwise
+
+std::atomic<std::uint64_t> errors{0}, warnings{0};
 
 thread_local std::string last_error;
 
 // GDAL's own handler goes silent after 1,000 messages and prints before that; ours keeps the last one, for our Errors.
 void CPL_STDCALL KeepLastError(CPLErr severity, CPLErrorNum, const char* message) {
-  if (severity >= CE_Failure) last_error = message;
+  if (severity == CE_Warning) ++warnings;
+  if (severity < CE_Failure) return;
+  ++errors;
+  last_error = message;
 }
 
 void InitOnce() {
@@ -26,10 +36,14 @@ void InitOnce() {
   CPLSetConfigOption("GDAL_VRT_ENABLE_PYTHON", "NO");
   CPLSetConfigOption("GDAL_DRIVER_PATH", "disable");
   OSRSetPROJEnableNetwork(0);
-  if (CPLGetConfigOption("GDAL_CACHEMAX", nullptr) == nullptr) {
-    GDALSetCacheMax64(std::min(GDALGetCacheMax64(), kBlockCacheBytes));
-  }
+  GDALSetCacheMax64(kBlockCacheBytes);
+  // Settings come from terrace's configuration; GDAL would read its own files otherwise.
+  CPLSetConfigOption("GDAL_CONFIG_FILE", "/dev/null");
   GDALAllRegister();
+  // Unless the configuration says more: SetSourcePolicy.
+  const Result<void> used = UseDrivers(DefaultDrivers());
+  TERRACE_CHECK(used.has_value());
+  GuardNetwork({});
 }
 
 }  // namespace
@@ -38,6 +52,13 @@ void InitGdal() {
   static std::once_flag once;
   std::call_once(once, InitOnce);
 }
+
+void SetGdalCache(std::size_t bytes) {
+  InitGdal();
+  GDALSetCacheMax64(static_cast<GIntBig>(bytes));
+}
+
+GdalCounts CountGdalErrors() { return {errors, warnings, static_cast<std::uint64_t>(GDALGetCacheUsed64())}; }
 
 std::string TakeGdalError() {
   return last_error.empty() ? std::string("no further detail") : std::exchange(last_error, {});

@@ -131,6 +131,7 @@ Result<void> Georeference::ReadCrs(const OGRSpatialReference& srs, const std::st
   wkt_ = Wkt(srs);
   crs_ = NameAndCode(srs);
   std::tie(vertical_datum_, vertical_unit_) = VerticalPart(srs);
+  if (srs.IsCompound() != 0) vertical_crs_ = Wkt(srs);
   OGRSpatialReference horizontal(srs);
   if (horizontal.IsCompound() != 0) horizontal.StripVertical();
   if (horizontal.GetAxesCount() == 3) horizontal.DemoteTo2D(nullptr);

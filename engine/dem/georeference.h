@@ -59,6 +59,8 @@ class Georeference {
 
   const std::string& crs() const { return crs_; }
   const std::string& vertical_datum() const { return vertical_datum_; }
+  // The compound reference system with the heights' own, WKT; empty where heights are ellipsoidal or nothing is stated.
+  const std::string& vertical_crs() const { return vertical_crs_; }
   const std::string& vertical_unit() const { return vertical_unit_; }
   const std::string& pixel_unit() const { return pixel_unit_; }
   double pixel_width() const;
@@ -81,7 +83,7 @@ class Georeference {
   int wrap_columns_ = 0;
   std::shared_ptr<const Projector> projector_;  // null: the CRS is WGS 84 longitude and latitude
   std::string wkt_;                             // of the CRS as stated
-  std::string crs_, vertical_datum_, vertical_unit_, pixel_unit_;
+  std::string crs_, vertical_datum_, vertical_unit_, vertical_crs_, pixel_unit_;
 };
 
 }  // namespace terrace::dem

@@ -9,7 +9,7 @@
 
 namespace terrace::dem {
 
-ImagePool::ImagePool(ImageFile image) : path_(image.path()), files_(FilesOf(image.dataset(), image.path())) {
+ImagePool::ImagePool(ImageFile image, StampedFiles files) : path_(image.path()), files_(std::move(files)) {
   GDALRasterBand& band = *image.dataset().GetRasterBand(1);
   sizes_.push_back({});
   for (const int factor : OverviewFactors(band)) {
@@ -35,31 +35,35 @@ int ImagePool::MostAveraged() const { return sizes_.back().factor * ImageBins::k
 Result<ImagePool::Handle> ImagePool::Borrow(int factor) {
   std::size_t size = 0;
   while (size + 1 < sizes_.size() && sizes_[size + 1].factor <= factor) ++size;
+  std::uint64_t epoch = 0;
   {
     const std::lock_guard lock(mutex_);
+    epoch = epoch_;
     if (std::vector<ImageFile>& idle = idle_[size]; !idle.empty()) {
-      Handle handle(*this, size, std::move(idle.back()));
+      Handle handle(*this, size, std::move(idle.back()), epoch);
       idle.pop_back();
       return handle;
     }
   }
   auto image = ImageFile::Open(path_, sizes_[size].overview);
   if (!image) return MakeError(ErrorCode::kUnavailable, "{}", image.error().message);
-  return Handle(*this, size, *std::move(image));
+  if (auto unchanged = CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
+  return Handle(*this, size, *std::move(image), epoch);
 }
 
-Result<void> ImagePool::CheckUnchanged() const {
-  if (const auto changed = files_.FirstChanged()) {
-    return MakeError(ErrorCode::kUnavailable,
-                     "{}: {} was changed, replaced or removed since it was opened; load the dataset anew", path_,
-                     *changed == path_ ? "the file" : *changed);
+Result<void> ImagePool::CheckUnchanged() {
+  Result<void> unchanged = files_.CheckUnchanged(path_);
+  if (!unchanged) {
+    const std::lock_guard lock(mutex_);
+    ++epoch_;
+    for (std::vector<ImageFile>& idle : idle_) idle.clear();
   }
-  return {};
+  return unchanged;
 }
 
-void ImagePool::Return(std::size_t size, ImageFile image) {
+void ImagePool::Return(std::size_t size, ImageFile image, std::uint64_t epoch) {
   const std::lock_guard lock(mutex_);
-  idle_[size].push_back(std::move(image));
+  if (epoch == epoch_) idle_[size].push_back(std::move(image));
 }
 
 }  // namespace terrace::dem

@@ -83,15 +83,18 @@ Imagery::Imagery(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Imagery::~Imagery() = default;
 
 Result<std::unique_ptr<Imagery>> Imagery::Open(const std::string& path, const GeoBounds& around) {
+  const auto before = StampOf(path);
   auto image = ImageFile::Open(path);
   if (!image) return tl::unexpected(image.error());
+  auto files = StampedFiles::OfOpened(FilesOf(image->dataset(), path), before);
+  if (!files) return tl::unexpected(files.error());
   auto georeference = Georeference::Of(image->dataset(), path);
   if (!georeference) return tl::unexpected(georeference.error());
   const auto spacing = SourceSpacing::Of(*georeference, path);
   if (!spacing) return tl::unexpected(spacing.error());
   const Footprint footprint = Footprint::Of(*georeference);
   if (auto touches = CheckOverlap(footprint, around, path); !touches) return tl::unexpected(touches.error());
-  auto impl = std::make_unique<Impl>(ImagePool(*std::move(image)), *std::move(georeference));
+  auto impl = std::make_unique<Impl>(ImagePool(*std::move(image), *std::move(files)), *std::move(georeference));
   impl->spacing = *spacing;
   impl->footprint = footprint.Padded();
   return std::unique_ptr<Imagery>(new Imagery(std::move(impl)));
@@ -110,6 +113,7 @@ Result<std::optional<TilePicture>> Imagery::Read(const geo::TileKey& key, int si
   return impl_->Read(key, side, stop);
 }
 
-std::uint64_t Imagery::fingerprint() const { return impl_->pool.fingerprint(); }
+std::uint64_t Imagery::fingerprint() const { return impl_->pool.files().fingerprint(); }
+const StampedFiles& Imagery::files() const { return impl_->pool.files(); }
 
 }  // namespace terrace::dem

@@ -13,6 +13,7 @@
 
 #include "engine/core/result.h"
 #include "engine/dem/dem_source.h"
+#include "engine/dem/file_stamp.h"
 #include "engine/geo/tile_key.h"
 
 namespace terrace::dem {
@@ -47,6 +48,9 @@ class Imagery {
 
   // Identifies the content: device, inode, size and mtime of its files.
   std::uint64_t fingerprint() const;
+
+  // What it is read from, as it was when it was opened.
+  const StampedFiles& files() const;
 
  private:
   class Impl;

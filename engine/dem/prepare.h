@@ -5,7 +5,9 @@
 
 #include <functional>
 #include <memory>
+#include <stop_token>
 #include <string>
+#include <vector>
 
 #include "engine/core/result.h"
 #include "engine/dem/file_stamp.h"
@@ -14,9 +16,12 @@
 
 namespace terrace::dem {
 
-// Rasters with more samples than this and no overviews get averages in the cache folder: the first shallow tile of any
-// other reads at most as many.
-inline constexpr std::int64_t kMostSamplesWithoutAverages = std::int64_t{4096} * 4096;
+struct PrepareOptions {
+  std::string cache_dir;  // empty: none
+  bool find_voids = true;
+  std::function<void(double)> progress = {};  // of each pass, 0..1
+  std::stop_token stop = {};
+};
 
 // How a survey came about.
 struct Preparation {
@@ -27,20 +32,20 @@ struct Preparation {
 };
 
 struct PreparedRaster {
+  VoidFindings findings;  // undeclared voids; the survey is one without them
   RasterSurvey survey;
   std::shared_ptr<const RecordedAverages> averages;  // null: there are none
   Preparation preparation;
 };
 
-bool NeedsAverages(const RasterLayout& layout);
-
-// `cache_dir`: empty for none. A folder that cannot be written to costs a warning, never the dataset. Errors name the
-// file.
+// `layout`: as the raster and its owner state it. A folder that cannot be written to costs a warning, never the
+// dataset. Errors name the file. kCancelled: stopped; what was done by then is kept.
 Result<PreparedRaster> PrepareRaster(GDALDataset& dataset, const RasterLayout& layout, const std::string& path,
-                                     const StampedFiles& files, const std::string& cache_dir,
-                                     const std::function<void(double)>& progress);
+                                     const StampedFiles& files, const PrepareOptions& options);
 
-// The record of a raster: named after its file and a hash of its whole path.
-std::string RecordPath(const std::string& cache_dir, const std::string& path);
+// The record of a raster: named after its file and a hash of its whole path and of what its owner says of its voids, as
+// two datasets may have one file and think differently of it.
+std::string RecordPath(const std::string& cache_dir, const std::string& path, const std::vector<double>& marks = {},
+                       bool find_voids = true);
 
 }  // namespace terrace::dem

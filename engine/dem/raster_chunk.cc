@@ -51,6 +51,9 @@ Chunk WithHalo(const Chunk& chunk, const RasterLayout& layout) {
 }
 
 void CountSamples(const Samples& samples, const Chunk& chunk, const RasterLayout& layout, ChunkSurvey& survey) {
+  survey.zeros.Add(samples.Row(chunk.row) + (chunk.col - samples.box.col), samples.box.cols, chunk.cols, chunk.rows,
+                   chunk.col == 0, chunk.row == 0, chunk.col + chunk.cols == layout.width,
+                   chunk.row + chunk.rows == layout.height);
   const int columns = DivideUp(chunk.cols, RangeTable::kBlock);
   for (int r = 0; r < chunk.rows; ++r) {
     const float* row = samples.Row(chunk.row + r) + (chunk.col - samples.box.col);
@@ -105,11 +108,11 @@ GridWindow AveragesAround(const Chunk& chunk, const RasterLayout& layout, int fa
 
 // From the samples where no overview comes before them, else as everybody reads them.
 Result<Averages> AverageAround(GDALDataset& dataset, const RasterLayout& layout, const Samples& samples,
-                               const Chunk& chunk, int factor) {
+                               const Chunk& chunk, int factor, const std::stop_token& stop) {
   Averages averages{AveragesAround(chunk, layout, factor), {}};
   const GridWindow& window = averages.window;
   if (StartingFactor(layout, factor) > 1) {
-    auto read = ReadGrid(dataset, layout, factor, window, {});
+    auto read = ReadGrid(dataset, layout, factor, window, stop);
     if (!read) return tl::unexpected(read.error());
     averages.heights = *std::move(read);
     return averages;
@@ -129,7 +132,7 @@ Result<Averages> AverageAround(GDALDataset& dataset, const RasterLayout& layout,
       continue;
     }
     // Around the Earth.
-    auto read = ReadGrid(dataset, layout, factor, {column, window.row, 1, window.rows}, {});
+    auto read = ReadGrid(dataset, layout, factor, {column, window.row, 1, window.rows}, stop);
     if (!read) return tl::unexpected(read.error());
     for (std::int64_t r = 0; r < window.rows; ++r) {
       averages.heights[static_cast<std::size_t>(r * window.columns + c)] = (*read)[static_cast<std::size_t>(r)];
@@ -220,13 +223,13 @@ class RowErrors {
 };
 
 Result<void> CompareAverages(GDALDataset& dataset, const RasterLayout& layout, const Samples& samples,
-                             const Chunk& chunk, ChunkSurvey& survey) {
+                             const Chunk& chunk, const std::stop_token& stop, ChunkSurvey& survey) {
   if (chunk.col >= layout.columns) return {};
   survey.averages.clear();
   Result<void> result;
   ForEachFactor(layout, 2, kLargestDirect, [&](int factor) {
     if (!result) return;
-    const auto averages = AverageAround(dataset, layout, samples, chunk, factor);
+    const auto averages = AverageAround(dataset, layout, samples, chunk, factor, stop);
     if (!averages) {
       result = tl::unexpected(averages.error());
       return;
@@ -282,7 +285,7 @@ std::size_t AveragesIn(const Chunk& chunk, const RasterLayout& layout, int facto
 }
 
 Result<ChunkSurvey> SurveyChunk(GDALDataset& dataset, const RasterLayout& layout, const Chunk& chunk,
-                                std::int64_t& read) {
+                                std::int64_t& read, const std::stop_token& stop) {
   GDALRasterBand& band = *dataset.GetRasterBand(1);
   ChunkSurvey survey = VoidSurvey(chunk, layout);
   if (!MayHaveSamples(band, layout, chunk)) return survey;
@@ -290,14 +293,14 @@ Result<ChunkSurvey> SurveyChunk(GDALDataset& dataset, const RasterLayout& layout
   Samples samples{WithHalo(chunk, layout), {}};
   const Chunk& box = samples.box;
   samples.heights.resize(static_cast<std::size_t>(box.cols) * static_cast<std::size_t>(box.rows));
-  if (auto done = ReadHeights(band, layout.rules, box.col, box.row, box.cols, box.rows, samples.heights.data(), {});
+  if (auto done = ReadHeights(band, layout.rules, box.col, box.row, box.cols, box.rows, samples.heights.data(), stop);
       !done) {
     return tl::unexpected(done.error());
   }
   for (BlockRange& range : survey.ranges) range = {};
   CountSamples(samples, chunk, layout, survey);
   if (survey.is_void()) return VoidSurvey(chunk, layout);
-  if (auto compared = CompareAverages(dataset, layout, samples, chunk, survey); !compared) {
+  if (auto compared = CompareAverages(dataset, layout, samples, chunk, stop, survey); !compared) {
     return tl::unexpected(compared.error());
   }
   Chunk used = chunk;

@@ -1,18 +1,20 @@
 // A raster part by part: what is learnt from one part of 1024 x 1024 samples, on its own.
 //
 // What a part says depends on the raster alone, never on which parts were looked at before: they can be kept, and a
-// survey that was interrupted goes on behind the last one (survey_file.h).
+// survey that was interrupted goes on behind the last one (survey_record.h).
 #pragma once
 
 #include <gdal_priv.h>
 
 #include <cstdint>
+#include <stop_token>
 #include <vector>
 
 #include "engine/core/result.h"
 #include "engine/dem/block_averages.h"
 #include "engine/dem/range_table.h"
 #include "engine/dem/sample_grid.h"
+#include "engine/dem/void_marks.h"
 
 namespace terrace::dem {
 
@@ -41,7 +43,8 @@ class ChunkGrid {
 inline constexpr int kLargestDirect = 64;
 
 struct ChunkSurvey {
-  std::int64_t valid = 0;          // samples
+  std::int64_t valid = 0;  // samples
+  ZeroEdges zeros;
   BlockSum first_row, last_row;    // the part of the raster's outermost rows that lies here
   std::vector<BlockRange> ranges;  // of its RangeTable blocks, by rows
   // By factor 2, 4, .. kLargestDirect, as far as the raster has them:
@@ -58,9 +61,9 @@ ChunkSurvey VoidSurvey(const Chunk& chunk, const RasterLayout& layout);
 // How many averages of that factor a part that is not void has; 0 where an overview gives them.
 std::size_t AveragesIn(const Chunk& chunk, const RasterLayout& layout, int factor);
 
-// kUnavailable: it cannot be read. `read` counts the parts whose samples were read: those that the file does not store
-// are known to be void without.
+// kUnavailable: it cannot be read. kCancelled: stopped. `read` counts the parts whose samples were read: those that the
+// file does not store are known to be void without.
 Result<ChunkSurvey> SurveyChunk(GDALDataset& dataset, const RasterLayout& layout, const Chunk& chunk,
-                                std::int64_t& read);
+                                std::int64_t& read, const std::stop_token& stop = {});
 
 }  // namespace terrace::dem

@@ -1,14 +1,10 @@
 #include "engine/dem/raster_file.h"
 
-#include <sys/stat.h>
-
 #include <algorithm>
-#include <cerrno>
 #include <cstdint>
-#include <system_error>
 
-#include "engine/dem/file_stamp.h"
 #include "engine/dem/gdal_runtime.h"
+#include "engine/dem/source_policy.h"
 
 namespace terrace::dem {
 namespace {
@@ -17,20 +13,29 @@ namespace {
 constexpr int kMaxSide = 1 << 22;
 constexpr std::int64_t kMaxSamples = std::int64_t{1} << 36;
 // GDAL decodes whole storage blocks, whatever its cache is allowed: a small file can claim a block of gigabytes.
-constexpr std::int64_t kMaxBlockBytes = std::int64_t{256} << 20;
+constexpr std::int64_t kMaxBlockBytes = std::int64_t{128} << 20;
+constexpr int kMostBands = 4096;  // hyperspectral images have hundreds
 
 constexpr unsigned kOpenFlags = GDAL_OF_RASTER | GDAL_OF_READONLY | GDAL_OF_VERBOSE_ERROR;
 
-Result<void> CheckFile(const std::string& path) {
-  struct stat status {};
-  if (::stat(path.c_str(), &status) != 0) {
-    return MakeError(ErrorCode::kNotFound, "{}: {}; give the path of a raster file on this machine", path,
-                     std::generic_category().message(errno));
-  }
-  if (!S_ISREG(status.st_mode)) {
-    return MakeError(ErrorCode::kInvalidArgument, "{}: not a regular file; give the path of one raster file", path);
-  }
-  return {};
+// What one read of a band decodes at least: a block, with those of the bands it is stored with.
+std::int64_t BytesPerBlock(GDALDataset& dataset, GDALRasterBand& band) {
+  int width = 0, height = 0;
+  band.GetBlockSize(&width, &height);
+  const char* const interleave = dataset.GetMetadataItem("INTERLEAVE", "IMAGE_STRUCTURE");
+  const std::int64_t together = interleave != nullptr && EQUAL(interleave, "PIXEL") ? dataset.GetRasterCount() : 1;
+  return std::int64_t{width} * height * GDALGetDataTypeSizeBytes(band.GetRasterDataType()) * together;
+}
+
+Result<void> CheckBlocks(GDALDataset& dataset, GDALRasterBand& band, const std::string& path) {
+  const std::int64_t bytes = BytesPerBlock(dataset, band);
+  if (bytes <= kMaxBlockBytes) return {};
+  int width = 0, height = 0;
+  band.GetBlockSize(&width, &height);
+  return MakeError(ErrorCode::kInvalidArgument,
+                   "{}: stored in blocks of {} x {} samples ({} MiB each), too large to read tiles from; rewrite it "
+                   "with `gdal_translate -b 1 -co TILED=YES -co COMPRESS=DEFLATE in out.tif`",
+                   path, width, height, bytes >> 20);
 }
 
 Result<void> CheckShape(GDALDataset& dataset, const std::string& path) {
@@ -58,15 +63,21 @@ Result<void> CheckShape(GDALDataset& dataset, const std::string& path) {
                      "-srcwin or coarsen it with `gdalwarp -tr`",
                      path, width, height, kMaxSide, kMaxSamples);
   }
-  int block_width = 0, block_height = 0;
-  band.GetBlockSize(&block_width, &block_height);
-  const std::int64_t block_bytes =
-      std::int64_t{block_width} * block_height * GDALGetDataTypeSizeBytes(band.GetRasterDataType());
-  if (block_bytes > kMaxBlockBytes) {
+  if (dataset.GetRasterCount() > kMostBands) {
     return MakeError(ErrorCode::kInvalidArgument,
-                     "{}: stored in blocks of {} x {} samples ({} MiB each), too large to read tiles from; rewrite it "
-                     "with `gdal_translate -co TILED=YES -co COMPRESS=DEFLATE in out.tif`",
-                     path, block_width, block_height, block_bytes >> 20);
+                     "{}: has {} bands; take the one with heights out with "
+                     "`gdal_translate -b 1 in out.tif`",
+                     path, dataset.GetRasterCount());
+  }
+  if (auto blocks = CheckBlocks(dataset, band, path); !blocks) return blocks;
+  if (auto links = CheckLinks(dataset, path); !links) return links;
+  if ((band.GetMaskFlags() & GMF_PER_DATASET) != 0) {
+    if (auto blocks = CheckBlocks(dataset, *band.GetMaskBand(), path); !blocks) return blocks;
+  }
+  for (int i = 0; i < band.GetOverviewCount(); ++i) {
+    GDALRasterBand* const overview = band.GetOverview(i);
+    if (overview == nullptr) continue;
+    if (auto blocks = CheckBlocks(dataset, *overview, path); !blocks) return blocks;
   }
   return {};
 }
@@ -89,6 +100,7 @@ bool IsRaster(const std::string& path) {
     if (path.ends_with(sidecar)) return false;
   }
   InitGdal();
+  if (!CheckPlainFile(path)) return true;  // opening it says why not
   return GDALIdentifyDriverEx(path.c_str(), GDAL_OF_RASTER, nullptr, nullptr) != nullptr;
 }
 
@@ -101,7 +113,8 @@ GDALDatasetUniquePtr ReopenRaster(const std::string& path, int overview) {
 }
 
 Result<GDALDatasetUniquePtr> OpenRaster(const std::string& path, int overview) {
-  if (auto file = CheckFile(path); !file) return tl::unexpected(file.error());
+  InitGdal();
+  if (auto name = CheckSourceName(path); !name) return tl::unexpected(name.error());
   GDALDatasetUniquePtr dataset = ReopenRaster(path, overview);
   if (dataset == nullptr) {
     return MakeError(ErrorCode::kInvalidArgument,

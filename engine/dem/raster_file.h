@@ -10,8 +10,8 @@
 
 namespace terrace::dem {
 
-// Opens `path` read-only. Refuses, with the remedy: what is no regular file, no raster, has no band, complex samples,
-// sides or storage blocks of an absurd size. The name stands for a file and nothing else: no inline XML, no URL.
+// Opens `path` read-only. Refuses, with the remedy: what the source policy does not allow, no raster, has no band,
+// complex samples, sides, bands or storage blocks of an absurd size.
 // `overview`: the raster as the overview of that number has it; -1: in full.
 Result<GDALDatasetUniquePtr> OpenRaster(const std::string& path, int overview = -1);
 

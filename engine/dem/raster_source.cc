@@ -50,35 +50,60 @@ void LogWhatMatters(GDALDataset& dataset, const RasterInfo& info, const Georefer
   if (!MetresPerUnit(layout.rules.unit)) {
     spdlog::warn("{}: height unit \"{}\" is not known, heights are taken as metres", info.path, layout.rules.unit);
   }
-  if (info.vertical_datum.empty()) {
-    spdlog::warn("{}: no vertical datum stated, heights pass through as given", info.path);
-  }
   if (!info.transform.empty()) {
     spdlog::info("{}: placed by PROJ operation \"{}\": {}", info.path, info.transform, georeference.pipeline());
   }
 }
 
+void LogVertical(const std::string& path, const VerticalDatum& vertical) {
+  if (!vertical.is_known()) {
+    spdlog::warn("{}: no vertical datum stated, heights pass through as given", path);
+  } else if (vertical.geoid) {
+    spdlog::info("{}: heights count from {}, made ellipsoidal by PROJ operation \"{}\": {}", path, vertical.name,
+                 vertical.geoid->description(), vertical.geoid->pipeline());
+  }
+}
+
+Position CentreOf(const Georeference& georeference) {
+  Position centre{georeference.width() / 2.0, georeference.height() / 2.0};
+  georeference.ToDegrees({&centre, 1});
+  return centre;
+}
+
 }  // namespace
 
-Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path, const std::string& cache_dir,
-                                                         const std::function<void(double)>& progress) {
+Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path, const SourceOptions& options,
+                                                         const std::string& cache_dir,
+                                                         const std::function<void(double)>& progress,
+                                                         std::shared_ptr<HandleLimit> handles,
+                                                         const std::stop_token& stop) {
   const auto start = std::chrono::steady_clock::now();
+  const auto before = StampOf(path);
   auto dataset = OpenRaster(path);
   if (!dataset) return tl::unexpected(dataset.error());
+  auto files = StampedFiles::OfOpened(FilesOf(**dataset, path), before);
+  if (!files) return tl::unexpected(files.error());
   auto georeference = Georeference::Of(**dataset, path);
   if (!georeference) return tl::unexpected(georeference.error());
   const auto spacing = SourceSpacing::Of(*georeference, path);
   if (!spacing) return tl::unexpected(spacing.error());
 
   std::unique_ptr<RasterSource> source(
-      new RasterSource(path, StampedFiles(FilesOf(**dataset, path)), *std::move(georeference)));
+      new RasterSource(path, *std::move(files), *std::move(georeference), std::move(handles)));
   source->layout_ = LayoutOf(**dataset, source->georeference_);
-  auto prepared = PrepareRaster(**dataset, source->layout_, path, source->files(), cache_dir, progress);
+  auto vertical = ResolveVertical(options.vertical, source->georeference_, CentreOf(source->georeference_));
+  if (!vertical) return MakeError(vertical.error().code, "{}: {}", path, vertical.error().message);
+  source->vertical_ = *std::move(vertical);
+  source->layout_.rules.marks = options.nodata;
+  auto prepared =
+      PrepareRaster(**dataset, source->layout_, path, source->files(), {cache_dir, options.find_voids, progress, stop});
   if (!prepared) return tl::unexpected(prepared.error());
+  source->layout_ = WithFindings(std::move(source->layout_), prepared->findings);
   source->survey_ = std::move(prepared->survey);
   source->averages_ = std::move(prepared->averages);
   source->preparation_ = prepared->preparation;
   const RasterSurvey& survey = source->survey_;
+  const std::string& found_voids = prepared->findings.text;
 
   source->footprint_ = Footprint::Of(source->georeference_);
   source->spacing_ = *spacing;
@@ -86,12 +111,20 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
   source->info_.needs_averages = NeedsAverages(source->layout_);
   source->info_.prepared = source->averages_ != nullptr;
   source->info_.seconds_to_open = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  source->info_.found_voids = found_voids;
+  source->info_.counts_from = source->vertical_.name;
+  if (source->vertical_.geoid) source->info_.vertical_operation = source->vertical_.geoid->description();
   source->info_.spacing_m = spacing->finer;
   source->info_.bounds = source->footprint_.Bounds();
   source->info_.heights = {survey.lowest, survey.highest};
   source->info_.valid_samples = survey.valid;
   source->info_.void_samples = survey.voids;
   LogWhatMatters(**dataset, source->info_, source->georeference_, source->layout_);
+  LogVertical(path, source->vertical_);
+  if (!found_voids.empty()) {
+    spdlog::warn("{}: voids that it does not declare: {}; `nodata` of the configuration decides otherwise", path,
+                 found_voids);
+  }
   if (auto unchanged = source->CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
   return source;
 }

@@ -21,18 +21,25 @@
 #include "engine/dem/prepare.h"
 #include "engine/dem/raster_survey.h"
 #include "engine/dem/sample_grid.h"
+#include "engine/dem/vertical_datum.h"
 
 namespace terrace::dem {
 
 class RasterSource {
  public:
   // Opens a raster, checks it, and scans it once for its heights. Errors name the file, what is wrong and the remedy.
-  // What is learnt is kept in `cache_dir`, or taken from there; empty for none.
-  static Result<std::unique_ptr<RasterSource>> Open(const std::string& path, const std::string& cache_dir = {},
-                                                    const std::function<void(double)>& progress = {});
+  // What is learnt is kept in `cache_dir`, or taken from there; empty for none. `handles` bounds what this and other
+  // rasters keep open; null: nothing does. kCancelled: stopped.
+  static Result<std::unique_ptr<RasterSource>> Open(const std::string& path, const SourceOptions& options = {},
+                                                    const std::string& cache_dir = {},
+                                                    const std::function<void(double)>& progress = {},
+                                                    std::shared_ptr<HandleLimit> handles = nullptr,
+                                                    const std::stop_token& stop = {});
 
   const RasterInfo& info() const { return info_; }
   const Georeference& georeference() const { return georeference_; }
+  // What its samples count from; they are not converted here.
+  const VerticalDatum& vertical() const { return vertical_; }
   const RasterLayout& layout() const { return layout_; }
   const Footprint& footprint() const { return footprint_; }
   const SourceSpacing& spacing() const { return spacing_; }
@@ -53,11 +60,12 @@ class RasterSource {
   Result<void> CheckUnchanged() const { return handles_.CheckUnchanged(); }
 
  private:
-  RasterSource(std::string path, StampedFiles files, Georeference where)
-      : handles_(std::move(path), std::move(files)), georeference_(std::move(where)) {}
+  RasterSource(std::string path, StampedFiles files, Georeference where, std::shared_ptr<HandleLimit> handles)
+      : handles_(std::move(path), std::move(files), std::move(handles)), georeference_(std::move(where)) {}
 
   mutable HandlePool handles_;  // thread-safe
   const Georeference georeference_;
+  VerticalDatum vertical_;
   RasterLayout layout_;
   Footprint footprint_;
   SourceSpacing spacing_;

@@ -16,14 +16,15 @@ constexpr int DivideUp(int a, int b) { return (a + b - 1) / b; }
 
 // Calls visit(box, heights) for every part of the band, from the north-west, by rows.
 template <typename Visit>
-Result<void> ForEachStrip(GDALRasterBand& band, const SampleRules& rules, const Visit& visit) {
+Result<void> ForEachStrip(GDALRasterBand& band, const SampleRules& rules, const std::stop_token& stop,
+                          const Visit& visit) {
   std::vector<float> heights;
   for (int row = 0; row < band.GetYSize(); row += kStripRows) {
     for (int col = 0; col < band.GetXSize(); col += kStripColumns) {
       const Chunk box{col, row, std::min(kStripColumns, band.GetXSize() - col),
                       std::min(kStripRows, band.GetYSize() - row)};
       heights.resize(static_cast<std::size_t>(box.cols) * static_cast<std::size_t>(box.rows));
-      if (auto read = ReadHeights(band, rules, box.col, box.row, box.cols, box.rows, heights.data(), {}); !read) {
+      if (auto read = ReadHeights(band, rules, box.col, box.row, box.cols, box.rows, heights.data(), stop); !read) {
         return read;
       }
       visit(box, heights);
@@ -81,6 +82,7 @@ void SurveyAssembler::Add(const Chunk& chunk, const ChunkSurvey& part) {
   survey_.table.AddBlocks(chunk.col / RangeTable::kBlock, chunk.row / RangeTable::kBlock,
                           DivideUp(chunk.cols, RangeTable::kBlock), part.ranges);
   survey_.valid += static_cast<std::uint64_t>(part.valid);
+  survey_.zeros.Add(part.zeros);
   first_row_.Add(part.first_row);
   last_row_.Add(part.last_row);
   for (std::size_t k = 0; k < part.errors.size(); ++k) {
@@ -120,7 +122,7 @@ void SurveyAssembler::AddSums(const Chunk& chunk, const ChunkSurvey& part) {
   }
 }
 
-Result<void> SurveyAssembler::FinishCoarse(GDALDataset& dataset) {
+Result<void> SurveyAssembler::FinishCoarse(GDALDataset& dataset, const std::stop_token& stop) {
   CoarseAverages& coarse = survey_.coarse;
   if (!coarse.grids.empty()) {
     // Sums of parts, by rows: BlockAverages' order.
@@ -145,7 +147,7 @@ Result<void> SurveyAssembler::FinishCoarse(GDALDataset& dataset) {
   CoarseAverages overviews = CoarseAverages::ShapedFor(layout_);
   int factor = kLargestDirect;
   for (CoarseAverages::Grid& grid : overviews.grids) {
-    auto heights = ReadGrid(dataset, layout_, factor, {0, 0, grid.columns, grid.rows}, {});
+    auto heights = ReadGrid(dataset, layout_, factor, {0, 0, grid.columns, grid.rows}, stop);
     if (!heights) return tl::unexpected(heights.error());
     grid.heights = *std::move(heights);
     factor *= 2;
@@ -154,13 +156,13 @@ Result<void> SurveyAssembler::FinishCoarse(GDALDataset& dataset) {
   return {};
 }
 
-Result<void> SurveyAssembler::AddOverviews(GDALDataset& dataset) {
+Result<void> SurveyAssembler::AddOverviews(GDALDataset& dataset, const std::stop_token& stop) {
   for (const int factor : layout_.overview_factors) {
     GDALRasterBand* overview = FindOverview(*dataset.GetRasterBand(1), factor);
     if (overview == nullptr) {
       return MakeError(ErrorCode::kUnavailable, "its overview of factor {} is gone since it was opened", factor);
     }
-    auto read = ForEachStrip(*overview, layout_.rules, [&](const Chunk& box, const std::vector<float>& heights) {
+    auto read = ForEachStrip(*overview, layout_.rules, stop, [&](const Chunk& box, const std::vector<float>& heights) {
       survey_.table.AddWindow(box.col, box.row, box.cols, box.rows, heights.data(), factor);
     });
     if (!read) return read;
@@ -168,7 +170,7 @@ Result<void> SurveyAssembler::AddOverviews(GDALDataset& dataset) {
   return {};
 }
 
-Result<RasterSurvey> SurveyAssembler::Finish(GDALDataset& dataset) {
+Result<RasterSurvey> SurveyAssembler::Finish(GDALDataset& dataset, const std::stop_token& stop) {
   survey_.voids =
       static_cast<std::uint64_t>(layout_.width) * static_cast<std::uint64_t>(layout_.height) - survey_.valid;
   if (survey_.valid == 0) {
@@ -180,24 +182,10 @@ Result<RasterSurvey> SurveyAssembler::Finish(GDALDataset& dataset) {
   survey_.lowest = samples.min;
   survey_.highest = samples.max;
   survey_.edge_row_means = {MeanOf(first_row_), MeanOf(last_row_)};
-  if (auto coarse = FinishCoarse(dataset); !coarse) return tl::unexpected(coarse.error());
-  if (auto overviews = AddOverviews(dataset); !overviews) return tl::unexpected(overviews.error());
+  if (auto coarse = FinishCoarse(dataset, stop); !coarse) return tl::unexpected(coarse.error());
+  if (auto overviews = AddOverviews(dataset, stop); !overviews) return tl::unexpected(overviews.error());
   survey_.table.Finish();
   return std::move(survey_);
-}
-
-Result<RasterSurvey> SurveyRaster(GDALDataset& dataset, const RasterLayout& layout,
-                                  const std::function<void(double)>& progress) {
-  const ChunkGrid chunks(layout.width, layout.height);
-  SurveyAssembler assembler(layout);
-  std::int64_t read = 0;
-  for (int i = 0; i < chunks.count(); ++i) {
-    const auto part = SurveyChunk(dataset, layout, chunks.At(i), read);
-    if (!part) return tl::unexpected(part.error());
-    assembler.Add(chunks.At(i), *part);
-    if (progress) progress((i + 1.0) / chunks.count());
-  }
-  return assembler.Finish(dataset);
 }
 
 }  // namespace terrace::dem

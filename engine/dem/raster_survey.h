@@ -6,8 +6,8 @@
 
 #include <array>
 #include <cstdint>
-#include <functional>
 #include <optional>
+#include <stop_token>
 #include <vector>
 
 #include "engine/core/result.h"
@@ -15,6 +15,7 @@
 #include "engine/dem/range_table.h"
 #include "engine/dem/raster_chunk.h"
 #include "engine/dem/sample_grid.h"
+#include "engine/dem/void_marks.h"
 
 namespace terrace::dem {
 
@@ -41,6 +42,7 @@ struct RasterSurvey {
   RangeTable table;               // overviews that are read count too: their resampling may overshoot the samples
   float lowest = 0, highest = 0;  // of the samples
   std::uint64_t valid = 0, voids = 0;
+  ZeroEdges zeros;
   std::array<std::optional<double>, 2> edge_row_means;  // of the first and the last row's valid samples
   AveragingErrors errors;
   CoarseAverages coarse;
@@ -54,22 +56,18 @@ class SurveyAssembler {
   void Add(const Chunk& chunk, const ChunkSurvey& part);
 
   // Reads overviews where the raster has some. kUnavailable: they cannot be read. kInvalidArgument: nothing but voids.
-  // Errors do not name the file.
-  Result<RasterSurvey> Finish(GDALDataset& dataset);
+  // kCancelled: stopped. Errors do not name the file.
+  Result<RasterSurvey> Finish(GDALDataset& dataset, const std::stop_token& stop);
 
  private:
   void AddSums(const Chunk& chunk, const ChunkSurvey& part);
-  Result<void> FinishCoarse(GDALDataset& dataset);
-  Result<void> AddOverviews(GDALDataset& dataset);
+  Result<void> FinishCoarse(GDALDataset& dataset, const std::stop_token& stop);
+  Result<void> AddOverviews(GDALDataset& dataset, const std::stop_token& stop);
 
   const RasterLayout layout_;
   RasterSurvey survey_;
   BlockSum first_row_, last_row_;
   std::vector<BlockSum> largest_sums_;  // of factor ChunkGrid::kSide
 };
-
-// All in memory. Errors do not name the file.
-Result<RasterSurvey> SurveyRaster(GDALDataset& dataset, const RasterLayout& layout,
-                                  const std::function<void(double)>& progress);
 
 }  // namespace terrace::dem

@@ -88,7 +88,9 @@ SampleRules SampleRules::Of(GDALRasterBand& band, const std::string& crs_unit) {
   return rules;
 }
 
-Result<void> ReadHeights(GDALRasterBand& band, const SampleRules& rules, int col, int row, int cols, int rows,
+namespace {
+
+Result<void> ReadSamples(GDALRasterBand& band, const SampleRules& rules, int col, int row, int cols, int rows,
                          float* out, const std::stop_token& stop) {
   const int rows_at_once = std::clamp(kSamplesPerRead / cols, 1, rows);
   std::vector<double> raw(static_cast<std::size_t>(cols) * static_cast<std::size_t>(rows_at_once));
@@ -112,6 +114,39 @@ Result<void> ReadHeights(GDALRasterBand& band, const SampleRules& rules, int col
       out[i] = rules.has_mask && mask[i] == 0 ? rules.Hidden() : rules.ToHeight(raw[i]);
     }
     out += samples;
+  }
+  return {};
+}
+
+// Of `count` values `stride` apart: those at most `reach` from a void become voids.
+void WidenVoids(float* first, int count, std::ptrdiff_t stride, int reach, std::vector<char>& near) {
+  near.assign(static_cast<std::size_t>(count), 0);
+  for (int i = 0; i < count; ++i) {
+    if (!std::isnan(first[i * stride])) continue;
+    std::fill(near.begin() + std::max(i - reach, 0), near.begin() + std::min(i + reach + 1, count), 1);
+  }
+  for (int i = 0; i < count; ++i) {
+    if (near[static_cast<std::size_t>(i)] != 0) first[i * stride] = SampleRules::kVoid;
+  }
+}
+
+}  // namespace
+
+Result<void> ReadHeights(GDALRasterBand& band, const SampleRules& rules, int col, int row, int cols, int rows,
+                         float* out, const std::stop_token& stop) {
+  if (rules.rim == 0) return ReadSamples(band, rules, col, row, cols, rows, out, stop);
+  // As far around as voids reach: a sample is a void or none whatever the window.
+  const int left = std::max(col - rules.rim, 0), top = std::max(row - rules.rim, 0);
+  const int wide = std::min(col + cols + rules.rim, band.GetXSize()) - left;
+  const int high = std::min(row + rows + rules.rim, band.GetYSize()) - top;
+  std::vector<float> around(static_cast<std::size_t>(wide) * static_cast<std::size_t>(high));
+  if (auto read = ReadSamples(band, rules, left, top, wide, high, around.data(), stop); !read) return read;
+  std::vector<char> near;
+  for (int r = 0; r < high; ++r) WidenVoids(&around[static_cast<std::size_t>(r) * wide], wide, 1, rules.rim, near);
+  for (int c = 0; c < wide; ++c) WidenVoids(&around[static_cast<std::size_t>(c)], high, wide, rules.rim, near);
+  for (int r = 0; r < rows; ++r) {
+    const auto first = around.begin() + std::ptrdiff_t{row - top + r} * wide + (col - left);
+    std::copy(first, first + cols, out + std::ptrdiff_t{r} * cols);
   }
   return {};
 }

@@ -3,10 +3,12 @@
 
 #include <gdal_priv.h>
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 #include <stop_token>
 #include <string>
+#include <vector>
 
 #include "engine/core/result.h"
 
@@ -18,9 +20,14 @@ inline constexpr double kMaxAbsHeight = 99998.0;
 struct SampleRules {
   std::optional<double> nodata;   // in raw values
   bool compare_as_float = false;  // nodata of Float32 bands may be stated with more digits than the samples have
-  bool has_mask = false;          // a mask band says which samples are valid
-  bool is_indicator = false;      // samples become 1 where they are there and not zero, else 0
-  double scale = 1, offset = 0;   // raw * scale + offset is in the band's unit
+  std::vector<double> marks;      // further raw values that are voids: stated by the owner, or found
+  double lowest = -kMaxAbsHeight, highest = kMaxAbsHeight;  // metres; heights beyond are voids
+  // Samples this near to a void, in either axis, are voids too: the edges of voids were mixed with their marks. Only at
+  // full resolution.
+  int rim = 0;
+  bool has_mask = false;         // a mask band says which samples are valid
+  bool is_indicator = false;     // samples become 1 where they are there and not zero, else 0
+  double scale = 1, offset = 0;  // raw * scale + offset is in the band's unit
   double metres_per_unit = 1;
   std::string unit;  // as stated; empty: none
 
@@ -28,16 +35,22 @@ struct SampleRules {
   static SampleRules Of(GDALRasterBand& band, const std::string& crs_unit);
 
   bool IsNodata(double raw) const {
-    return nodata && (raw == *nodata || (compare_as_float && static_cast<float>(raw) == static_cast<float>(*nodata)));
+    if (nodata && IsSame(raw, *nodata)) return true;
+    return !marks.empty() && std::ranges::any_of(marks, [&](double mark) { return IsSame(raw, mark); });
+  }
+  bool IsSame(double raw, double value) const {
+    return raw == value || (compare_as_float && static_cast<float>(raw) == static_cast<float>(value));
   }
 
   // Metres, or NaN for a void; of an indicator 0 or 1.
   float ToHeight(double raw) const {
     if (is_indicator) return raw != 0 && !std::isnan(raw) && !IsNodata(raw) ? 1.0f : 0.0f;
     if (IsNodata(raw)) return kVoid;
-    const double height = (raw * scale + offset) * metres_per_unit;
-    return height >= -kMaxAbsHeight && height <= kMaxAbsHeight ? static_cast<float>(height) : kVoid;
+    const double height = Metres(raw);
+    return height >= lowest && height <= highest ? static_cast<float>(height) : kVoid;
   }
+
+  double Metres(double raw) const { return (raw * scale + offset) * metres_per_unit; }
 
   // What a sample that a mask band hides becomes.
   float Hidden() const { return is_indicator ? 0.0f : kVoid; }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "engine/dem/feather.h"
 #include "engine/dem/grid_cells.h"
 #include "engine/dem/node_positions.h"
 #include "engine/dem/void_fill.h"
@@ -65,12 +66,12 @@ Result<Georeference> GeoreferenceOf(const SheetPlan& plan) {
 
 float RoundHeight(double metres) { return static_cast<float>(std::nearbyint(metres * 1024) / 1024); }
 
-Result<Sheet> Sheet::Make(SheetPlan plan, int max_void_gap) {
+Result<Sheet> Sheet::Make(SheetPlan plan, const SheetOptions& options) {
   auto where = GeoreferenceOf(plan);
   if (!where) return tl::unexpected(where.error());
   Sheet sheet(*std::move(where));
   sheet.members_ = std::move(plan.members);
-  sheet.max_void_gap_ = max_void_gap;
+  sheet.options_ = options;
   sheet.width_ = plan.width;
   sheet.height_ = plan.height;
   sheet.wraps_ = sheet.georeference_.wrap_columns() > 0;
@@ -81,6 +82,9 @@ Result<Sheet> Sheet::Make(SheetPlan plan, int max_void_gap) {
   sheet.reach_ = Footprint::Of(sheet.georeference_).Padded();
   sheet.IndexMembers();
   sheet.FindPoleHeights();
+  if (const auto& geoid = sheet.vertical().geoid) {
+    sheet.undulations_ = std::make_shared<const Undulations>(geoid, sheet.reach_);
+  }
   return sheet;
 }
 
@@ -165,17 +169,56 @@ Result<std::vector<float>> Sheet::ReadFilled(int factor, const GridWindow& windo
                                              SheetTrace* trace) const {
   const auto is_void = [](float height) { return std::isnan(height); };
   auto core = ReadBlocks(factor, window, stop);
-  if (core && trace != nullptr) trace->samples = *core;
-  const int gap = max_void_gap_ / factor;
-  if (!core || gap < 2 || std::ranges::none_of(*core, is_void)) return core;
+  if (!core) return core;
+  if (trace != nullptr) trace->samples = *core;
+  const auto voids = static_cast<std::uint64_t>(std::ranges::count_if(*core, is_void));
+  counts_->measured += core->size() - voids;
+  const int gap = options_.max_void_gap / factor;
+  if (voids == 0 || gap < 2) {
+    counts_->voids += voids;
+    return core;
+  }
   const GridWindow wide = Grown(window, gap, Columns(factor), Rows(factor));
   auto around = ReadBlocks(factor, wide, stop);
-  if (!around || std::ranges::all_of(*around, is_void)) return core;
-  return FillVoids(*around, wide, window, gap);
+  if (around && !std::ranges::all_of(*around, is_void)) core = FillVoids(*around, wide, window, gap);
+  const auto left = static_cast<std::uint64_t>(std::ranges::count_if(*core, is_void));
+  counts_->filled += voids - left;
+  counts_->voids += left;
+  return core;
 }
 
-Result<void> Sheet::FillAt(std::span<const Position> positions, int factor, std::span<float> heights,
-                           const std::stop_token& stop, SheetTrace* trace) const {
+std::optional<float> Sheet::PoleHeight(int pole, Counting counting) const {
+  const std::optional<float>& height = pole_heights_[static_cast<std::size_t>(pole)];
+  if (!height || !undulations_ || counting == Counting::kAsSource) return height;
+  const double undulation = undulations_->AtPole(pole);
+  return std::isnan(undulation) ? std::nullopt : std::optional(RoundHeight(*height + undulation));
+}
+
+double Sheet::Feather(int factor) const {
+  // Of the coarser axis: what is read around a tile, and the time that weights take, stay bounded.
+  constexpr int kMostSamples = 256;
+  return std::min(options_.feather_m, kMostSamples * factor * std::min(spacing_.east, spacing_.north));
+}
+
+Result<std::vector<float>> Sheet::ReadWeights(int factor, const GridWindow& window, const std::stop_token& stop) const {
+  const double feather = Feather(factor), column_step = spacing_.east * factor, row_step = spacing_.north * factor;
+  const int halo = static_cast<int>(std::ceil(feather / std::min(column_step, row_step))) + 1;
+  const GridWindow wide = Grown(window, halo, Columns(factor), Rows(factor));
+  const auto pixel = [factor](std::int64_t block) { return static_cast<double>(block * factor); };
+  const bool ends = wide.rows < window.rows + 2 * halo || wide.columns < window.columns + 2 * halo;
+  if (!ends &&
+      !Ranges({pixel(wide.column), pixel(wide.row), pixel(wide.column + wide.columns), pixel(wide.row + wide.rows)})
+           .has_voids) {
+    return std::vector<float>();
+  }
+  const auto heights = ReadFilled(factor, wide, stop);
+  if (!heights) return heights;
+  return FeatherWeights(*heights, wide, window, column_step, row_step, feather);
+}
+
+Result<void> Sheet::FillAt(std::span<const Position> positions, std::span<const double> undulations, int factor,
+                           std::span<float> heights, const std::stop_token& stop, std::span<float> weights,
+                           SheetTrace* trace) const {
   Cells found = CellsAt(positions, heights, factor);
   if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "reading was stopped");
   if (found.cells.empty()) return CheckUnread();
@@ -185,11 +228,27 @@ Result<void> Sheet::FillAt(std::span<const Position> positions, int factor, std:
   if (trace != nullptr) window = Grown(window, kRim, Columns(factor), Rows(factor));
   const auto samples = ReadFilled(factor, window, stop, trace);
   if (!samples) return tl::unexpected(samples.error());
+  std::vector<float> counts;
+  if (!weights.empty() && options_.feather_m > 0) {
+    auto read = ReadWeights(factor, window, stop);
+    if (!read) return tl::unexpected(read.error());
+    counts = *std::move(read);
+  }
   for (std::size_t i = 0; i < found.cells.size(); ++i) {
+    const std::size_t node = found.nodes[i];
     const auto height = Interpolate(*samples, window, found.cells[i]);
-    if (!height) continue;
-    heights[found.nodes[i]] = RoundHeight(*height);
-    if (trace != nullptr) trace->cell_of_node[found.nodes[i]] = static_cast<std::int32_t>(i);
+    // Where the geoid is not known a height means nothing.
+    if (!height || (!undulations.empty() && std::isnan(undulations[node]))) continue;
+    heights[node] = RoundHeight(undulations.empty() ? *height : *height + undulations[node]);
+    if (trace != nullptr) {
+      trace->cell_of_node[node] = static_cast<std::int32_t>(i);
+      trace->heights[node] = heights[node];
+    }
+    if (weights.empty()) continue;
+    // Every sample has a weight, so this is plain bilinear. What counts nothing would still hide the floor.
+    constexpr double kLeast = 0x1p-10;
+    const double weight = counts.empty() ? 1 : Interpolate(counts, window, found.cells[i]).value_or(1);
+    weights[node] = static_cast<float>(std::max(kLeast, std::nearbyint(weight * 1024) / 1024));
   }
   if (trace != nullptr) {
     trace->window = window;
@@ -198,13 +257,15 @@ Result<void> Sheet::FillAt(std::span<const Position> positions, int factor, std:
   return {};
 }
 
-Result<void> Sheet::Fill(const geo::Lattice& lattice, const NodeWindow& window, std::span<float> heights,
-                         const std::stop_token& stop, SheetTrace* trace) const {
+Result<void> Sheet::Fill(const geo::Lattice& lattice, const NodeWindow& window, Counting counting,
+                         std::span<float> heights, const std::stop_token& stop, std::span<float> weights,
+                         SheetTrace* trace) const {
   const int factor = AveragingFactor(SamplesPerCell(lattice, spacing_));
   auto positions = NodePositions(georeference_, reach_, lattice, window, kPositionTolerance * factor);
   if (trace != nullptr) {
     trace->positions = positions;
     trace->cell_of_node.assign(positions.size(), -1);
+    trace->heights.assign(positions.size(), SampleRules::kVoid);
     trace->factor = factor;
   }
   for (int row = 0; row < window.rows && georeference_.is_geographic_grid(); ++row) {
@@ -213,20 +274,25 @@ Result<void> Sheet::Fill(const geo::Lattice& lattice, const NodeWindow& window, 
     // Where columns are meridians they meet in one value.
     const auto first = static_cast<std::size_t>(row) * static_cast<std::size_t>(window.columns);
     std::fill_n(positions.begin() + static_cast<std::ptrdiff_t>(first), window.columns, kNowhere);
-    if (const auto pole = pole_heights_[global <= 0 ? 0 : 1]) {
+    if (const auto pole = PoleHeight(global <= 0 ? 0 : 1, counting)) {
       std::ranges::replace_if(
           heights.subspan(first, static_cast<std::size_t>(window.columns)),
           [](float height) { return std::isnan(height); }, *pole);
     }
   }
-  return FillAt(positions, factor, heights, stop, trace);
+  std::vector<double> undulations;
+  if (undulations_ && counting == Counting::kEllipsoid) undulations = undulations_->At(lattice, window);
+  if (trace != nullptr) trace->undulations = undulations;
+  return FillAt(positions, undulations, factor, heights, stop, weights, trace);
 }
 
 Result<void> Sheet::Fill(const geo::MercatorGrid& grid, const NodeWindow& window, std::span<float> heights,
-                         const std::stop_token& stop) const {
+                         const std::stop_token& stop, std::span<float> weights) const {
   const int factor = MercatorFactor(grid.depth, spacing_);
-  return FillAt(NodePositions(georeference_, reach_, grid, window, kPositionTolerance * factor), factor, heights, stop,
-                nullptr);
+  std::vector<double> undulations;
+  if (undulations_) undulations = undulations_->At(grid, window);
+  return FillAt(NodePositions(georeference_, reach_, grid, window, kPositionTolerance * factor), undulations, factor,
+                heights, stop, weights);
 }
 
 }  // namespace terrace::dem

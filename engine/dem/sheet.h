@@ -6,6 +6,7 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -18,6 +19,7 @@
 #include "engine/dem/dem_source.h"
 #include "engine/dem/grid_cells.h"
 #include "engine/dem/sheet_members.h"
+#include "engine/dem/undulations.h"
 #include "engine/geo/mercator_grid.h"
 
 namespace terrace::dem {
@@ -31,17 +33,30 @@ struct SheetRange {
 // What Fill saw of a window, for whoever wants to know how far its heights are from the samples.
 struct SheetTrace {
   std::vector<Position> positions;         // by node, in pixels; NaN where there is none
-  std::vector<std::int32_t> cell_of_node;  // in `cells`; -1: the node's height is not interpolated from this sheet
+  std::vector<std::int32_t> cell_of_node;  // in `cells`; -1: the sheet has no interpolated height for the node
+  std::vector<float> heights;              // by node: the sheet's own, whatever it counts; NaN where it has none
+  std::vector<double> undulations;         // by node, part of the heights; empty where they count as the samples do
   std::vector<GridCell> cells;
   GridWindow window;
   std::vector<float> samples;  // of the window, averages by the factor, before voids were filled
   int factor = 1;
 };
 
+// What the heights of a sheet are to count from.
+enum class Counting : std::uint8_t {
+  kEllipsoid,
+  kAsSource,  // what its samples count from
+};
+
+struct SheetOptions {
+  int max_void_gap = 0;  // samples: narrower voids are filled
+  double feather_m = 0;  // how far from its edges and voids a sheet begins to give way to what lies below; 0: at them
+};
+
 class Sheet {
  public:
   // Precondition: the plan has members.
-  static Result<Sheet> Make(SheetPlan plan, int max_void_gap);
+  static Result<Sheet> Make(SheetPlan plan, const SheetOptions& options);
 
   const std::vector<SheetMember>& members() const { return members_; }
   // Those that meet a box of pixels; Box::south is its first row.
@@ -57,19 +72,36 @@ class Sheet {
   // Padded: outside it there is nothing.
   const Footprint& reach() const { return reach_; }
   // South, north: heights at the poles, of sheets whose columns are meridians and that reach them.
-  const std::array<std::optional<float>, 2>& pole_heights() const { return pole_heights_; }
+  const std::array<std::optional<float>, 2>& pole_heights() const { return pole_heights_; }  // as counted
+  // What its samples count from.
+  const VerticalDatum& vertical() const { return members_.front().raster->vertical(); }
+  const Undulations* undulations() const { return undulations_.get(); }  // null: none are added
+  const SheetOptions& options() const { return options_; }
+
+  SampleCounts CountSamples() const { return {counts_->measured, counts_->filled, counts_->voids}; }
+
+  // At least the ellipsoidal heights of all its samples.
+  HeightRange EllipsoidalRange() const;
 
   // These replace the NaN among `heights`, one for each node of the window, by the sheet's heights there, as far as it
   // has some. A height is a function of the node alone. kUnavailable: a raster cannot be read now. kCancelled: stopped.
-  // Also fills in `trace`, unless that is null.
-  Result<void> Fill(const geo::Lattice& lattice, const NodeWindow& window, std::span<float> heights,
-                    const std::stop_token& stop, SheetTrace* trace = nullptr) const;
+  // `weights`, if it is not empty, has one for each node: those of the heights that are filled in become what they
+  // count beside what lies below, over 0 to 1. `trace` is filled in, unless it is null.
+  Result<void> Fill(const geo::Lattice& lattice, const NodeWindow& window, Counting counting, std::span<float> heights,
+                    const std::stop_token& stop, std::span<float> weights = {}, SheetTrace* trace = nullptr) const;
   Result<void> Fill(const geo::MercatorGrid& grid, const NodeWindow& window, std::span<float> heights,
-                    const std::stop_token& stop) const;
+                    const std::stop_token& stop, std::span<float> weights = {}) const;
 
   // The same at single points, as measured: nothing is averaged and nothing is filled.
-  Result<void> FillPoints(std::span<const GeoPosition> points, std::span<float> heights,
+  Result<void> FillPoints(std::span<const GeoPosition> points, HeightDatum datum, std::span<float> heights,
                           const std::stop_token& stop) const;
+
+  // Whether its samples in a box of pixels may count less than in full when they are averaged by this factor or a
+  // smaller one: an edge or a void is as near as the feather is wide.
+  bool GivesWay(const Box& pixels, int factor) const;
+
+  // Of the pixels in a box; what no member covers counts as void.
+  BlockRange Ranges(const Box& pixels) const;
 
   // At least the heights that Fill gives to nodes of the tile, its edges included.
   SheetRange RangeOf(const geo::Lattice& lattice, const geo::TileKey& key) const;
@@ -97,21 +129,31 @@ class Sheet {
   Result<void> Average(int factor, const GridWindow& window, float* out, std::int64_t stride,
                        const std::stop_token& stop) const;
   Result<std::vector<float>> ReadFilled(int factor, const GridWindow& window, const std::stop_token& stop,
-                                        SheetTrace* trace) const;
-  Result<void> FillAt(std::span<const Position> positions, int factor, std::span<float> heights,
-                      const std::stop_token& stop, SheetTrace* trace) const;
+                                        SheetTrace* trace = nullptr) const;
+  // `undulations`: of the same nodes, added to heights; empty: none are.
+  Result<void> FillAt(std::span<const Position> positions, std::span<const double> undulations, int factor,
+                      std::span<float> heights, const std::stop_token& stop, std::span<float> weights,
+                      SheetTrace* trace = nullptr) const;
+  std::optional<float> PoleHeight(int pole, Counting counting) const;  // 0 south, 1 north
+  // What each sample of the window counts; empty: all count in full.
+  Result<std::vector<float>> ReadWeights(int factor, const GridWindow& window, const std::stop_token& stop) const;
+  // Metres: no more than a bounded number of samples.
+  double Feather(int factor) const;
   Result<void> CheckUnread() const;
 
-  // Of the pixels in a box; what no member covers counts as void.
-  BlockRange Ranges(const Box& pixels) const;
+  struct Counts {
+    std::atomic<std::uint64_t> measured{0}, filled{0}, voids{0};
+  };
 
   Georeference georeference_;
+  std::shared_ptr<const Undulations> undulations_;  // null: heights are ellipsoidal, or taken as such
+  std::shared_ptr<Counts> counts_ = std::make_shared<Counts>();
   int width_ = 0, height_ = 0;
   int columns_ = 0;  // of them in use: without the duplicates of a raster that goes all around the Earth
   bool wraps_ = false;
   SourceSpacing spacing_;
   Footprint reach_;
-  int max_void_gap_ = 0;  // samples
+  SheetOptions options_;
   std::array<std::optional<float>, 2> pole_heights_;
 
   std::vector<SheetMember> members_;

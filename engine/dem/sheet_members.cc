@@ -22,7 +22,9 @@ std::vector<Grid> GridsOf(const std::vector<std::shared_ptr<const RasterSource>>
   for (std::size_t i = 0; i < rasters.size(); ++i) {
     const Georeference& where = rasters[i]->georeference();
     std::optional<PixelOffset> offset;
+    const VerticalDatum& vertical = rasters[i]->vertical();
     const auto fits = [&](const Grid& grid) {
+      if (!vertical.IsSame(grid.members.front().raster->vertical())) return false;
       offset = grid.first->OffsetOf(where);
       return offset.has_value();
     };

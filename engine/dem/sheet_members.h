@@ -1,7 +1,7 @@
 // Which rasters make one sheet: those whose pixels lie on one grid and touch each other.
 //
-// Tiles of one product are cut from one grid. Read as one raster they have no joints: averages, bridges over voids and
-// interpolation go across, and a row or column that neighbours share counts once.
+// Tiles of one product are cut from one grid, and count from one datum. Read as one raster they have no joints:
+// averages, bridges over voids and interpolation go across, and a row or column that neighbours share counts once.
 #pragma once
 
 #include <cstdint>

@@ -21,10 +21,41 @@ struct PointCell {
   GridCell cell;
 };
 
+// From what a source counts from to what is asked for.
+class Conversion {
+ public:
+  static Result<Conversion> For(const VerticalDatum& source, HeightDatum wanted) {
+    Conversion conversion;
+    if (wanted == HeightDatum::kEllipsoid && source.geoid) {
+      conversion.geoid_ = source.geoid;
+      conversion.sign_ = 1;
+    } else if (wanted == HeightDatum::kOrthometric && source.is_known() && !source.geoid) {
+      auto egm96 = Geoid::OfCrs("EPSG:5773", {0, 0});
+      if (!egm96) return tl::unexpected(egm96.error());
+      conversion.geoid_ = *std::move(egm96);
+      conversion.sign_ = -1;
+    }
+    if (conversion.geoid_) conversion.reader_ = std::make_unique<Geoid::Reader>(*conversion.geoid_);
+    return conversion;
+  }
+
+  // NaN where the geoid is not known.
+  double Of(double height, const GeoPosition& point) const {
+    return reader_ ? height + sign_ * reader_->At({point.longitude, point.latitude}) : height;
+  }
+
+ private:
+  std::shared_ptr<const Geoid> geoid_;  // null: none needed
+  std::unique_ptr<Geoid::Reader> reader_;
+  double sign_ = 0;
+};
+
 }  // namespace
 
-Result<void> Sheet::FillPoints(std::span<const GeoPosition> points, std::span<float> heights,
+Result<void> Sheet::FillPoints(std::span<const GeoPosition> points, HeightDatum datum, std::span<float> heights,
                                const std::stop_token& stop) const {
+  const auto converted = Conversion::For(vertical(), datum);
+  if (!converted) return tl::unexpected(converted.error());
   const GridAxis columns = Columns(1), rows = Rows(1);
   std::vector<PointCell> found;
   std::vector<Position> batch;
@@ -56,7 +87,8 @@ Result<void> Sheet::FillPoints(std::span<const GeoPosition> points, std::span<fl
     if (!samples) return tl::unexpected(samples.error());
     for (std::size_t i = 0; first != end; ++first, ++i) {
       if (!IsNearestValid(*samples, window, cells[i])) continue;
-      if (const auto height = Interpolate(*samples, window, cells[i])) heights[first->point] = RoundHeight(*height);
+      const auto height = Interpolate(*samples, window, cells[i]);
+      if (height) heights[first->point] = RoundHeight(converted->Of(*height, points[first->point]));
     }
   }
   return {};

@@ -94,6 +94,13 @@ BlockRange Sheet::Ranges(const Box& pixels) const {
   return range;
 }
 
+bool Sheet::GivesWay(const Box& pixels, int factor) const {
+  PixelBox wide{pixels.west, pixels.south, pixels.east, pixels.north};
+  wide.Grow(Feather(factor) / spacing_.east + 2 * factor, Feather(factor) / spacing_.north + 2 * factor);
+  return wide.north < 0 || wide.south > height_ || (!wraps_ && (wide.west < 0 || wide.east > width_)) ||
+         Ranges({wide.west, wide.north, wide.east, wide.south}).has_voids;
+}
+
 SheetRange Sheet::RangeOf(const geo::Lattice& lattice, const geo::TileKey& key) const {
   const double extent = lattice.cells * lattice.StepDegrees();
   const std::int64_t south_row = lattice.FirstRow(key), north_row = south_row + lattice.cells;
@@ -101,7 +108,7 @@ SheetRange Sheet::RangeOf(const geo::Lattice& lattice, const geo::TileKey& key) 
   bool leaves = false;
   for (const std::int64_t row : {south_row, north_row}) {
     if (row > 0 && row < lattice.rows()) continue;
-    const auto& pole = pole_heights_[row <= 0 ? 0 : 1];
+    const auto pole = PoleHeight(row <= 0 ? 0 : 1, Counting::kEllipsoid);
     if (pole) range.blocks.Add(*pole);
     leaves |= georeference_.is_geographic_grid() && !pole;
   }
@@ -122,20 +129,60 @@ SheetRange Sheet::RangeOf(const geo::Lattice& lattice, const geo::TileKey& key) 
     leaves = true;
   }
   BlockRange blocks;
+  bool blends = false;
   for (PixelBox& box : boxes) {
     leaves |= box.north < 0 || box.south > height_;
+    if (options_.feather_m > 0) {
+      blends |= GivesWay({box.west, box.north, box.east, box.south}, factor);
+    }
     // Bilinear interpolation reaches one and a half samples of the grid.
     box.Grow(1.5 * factor + 1, 1.5 * factor + 1);
     BlockRange here = Ranges({box.west, box.north, box.east, box.south});
     if (here.has_voids) {
-      box.Grow(max_void_gap_ + factor, max_void_gap_ + factor);
+      box.Grow(options_.max_void_gap + factor, options_.max_void_gap + factor);
       here.Add(Ranges({box.west, box.north, box.east, box.south}));
     }
     blocks.Add(here);
   }
-  range.shows_others = leaves || blocks.has_voids;
+  range.shows_others = leaves || blends || blocks.has_voids || (undulations_ && !undulations_->is_complete());
+  if (undulations_ && blocks.min <= blocks.max) {
+    const HeightRange shift =
+        undulations_->RangeOf(lattice.Longitude(lattice.FirstColumn(key)), lattice.Latitude(south_row), extent, extent);
+    // Sums are rounded to float.
+    constexpr double kRounding = 0.01;
+    blocks.min = static_cast<float>(blocks.min + shift.min - kRounding);
+    blocks.max = static_cast<float>(blocks.max + shift.max + kRounding);
+  }
   range.blocks.Add(blocks);
   return range;
+}
+
+HeightRange Sheet::EllipsoidalRange() const {
+  HeightRange counted = members_.front().raster->info().heights;
+  for (const SheetMember& member : members_) {
+    counted.min = std::min(counted.min, member.raster->info().heights.min);
+    counted.max = std::max(counted.max, member.raster->info().heights.max);
+  }
+  if (!undulations_) return counted;
+  // Tile by tile: the geoid's range over a large sheet says little about any place in it.
+  constexpr std::int64_t kMostTiles = 1024;
+  constexpr int kDeepest = 12;
+  const auto count = [&](int level) {
+    std::int64_t sum = 0;
+    for (const geo::TileRange& range : TilesTouching(reach_, level)) sum += geo::Cells(range);
+    return sum;
+  };
+  int level = 0;
+  while (level < kDeepest && count(level + 1) <= kMostTiles) ++level;
+  BlockRange blocks;
+  for (const geo::TileRange& range : TilesTouching(reach_, level)) {
+    for (std::int64_t y = range.start_y; y <= range.end_y; ++y) {
+      for (std::int64_t x = range.start_x; x <= range.end_x; ++x) {
+        blocks.Add(RangeOf(geo::Lattice{level, 64}, {level, x, y}).blocks);
+      }
+    }
+  }
+  return blocks.min <= blocks.max ? HeightRange{blocks.min, blocks.max} : counted;
 }
 
 }  // namespace terrace::dem

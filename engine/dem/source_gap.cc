@@ -17,6 +17,25 @@ struct CellBox {
   int west = 0, south = 0, east = 0, north = 0;
 };
 
+// A cell of the tile by its column and row, with its nodes: the south-western, south-eastern, north-western,
+// north-eastern one.
+struct TileCell {
+  int i, j;
+  std::array<std::size_t, 4> nodes;
+
+  CellBox box() const { return {i, j, i + 1, j + 1}; }
+};
+
+// Columns and rows of pixels, between which a function's values lie.
+struct PixelBounds {
+  double west = std::numeric_limits<double>::infinity(), east = -west, north = west, south = -west;
+
+  void Add(double x, double y) {
+    west = std::min(west, x), east = std::max(east, x);
+    north = std::min(north, y), south = std::max(south, y);
+  }
+};
+
 // How much a surface between samples can bend, from the samples of a box: largest differences.
 struct Bends {
   double x = 0, y = 0, xx = 0, yy = 0, xy = 0;
@@ -53,6 +72,11 @@ class SheetGap {
         stride_(static_cast<std::size_t>(tile.window_.columns)) {
     PlaceNodes();
     FindMembers();
+    heights_ = sheet.members().front().raster->info().heights;
+    for (const SheetMember& member : sheet.members()) {
+      heights_.min = std::min(heights_.min, member.raster->info().heights.min);
+      heights_.max = std::max(heights_.max, member.raster->info().heights.max);
+    }
   }
 
   void Add() {
@@ -132,8 +156,8 @@ class SheetGap {
     if (sheet_.members().size() == 1) {
       return sheet_.members().front().raster->averaging_errors().Largest(factor, west, north, east, south);
     }
-    constexpr float kUnknown = std::numeric_limits<float>::infinity();
-    if (sheet_.alignment() < factor) return kUnknown;
+    constexpr float kNotTold = std::numeric_limits<float>::infinity();
+    if (sheet_.alignment() < factor) return kNotTold;
     const SheetMember* only = nullptr;
     for (const std::size_t i : near_) {
       const geo::TileRange pixels = sheet_.members()[i].pixels();
@@ -141,38 +165,64 @@ class SheetGap {
           south < static_cast<double>(pixels.start_y) || north > static_cast<double>(pixels.end_y + 1)) {
         continue;
       }
-      if (only != nullptr) return kUnknown;
+      if (only != nullptr) return kNotTold;
       only = &sheet_.members()[i];
     }
     if (only == nullptr) return 0;
     const RasterLayout& layout = only->raster->layout();
     const auto whole = [factor](int samples) { return static_cast<double>(samples / factor * factor); };
     const auto x = static_cast<double>(only->column), y = static_cast<double>(only->row);
-    if (west < x || north < y || east > x + whole(layout.columns) || south > y + whole(layout.height)) return kUnknown;
+    if (west < x || north < y || east > x + whole(layout.columns) || south > y + whole(layout.height)) return kNotTold;
     return only->raster->averaging_errors().Largest(factor, west - x, north - y, east - x, south - y);
   }
 
-  // Of all rasters.
-  HeightRange HeightsOf() const {
-    HeightRange heights = sheet_.members().front().raster->info().heights;
-    for (const SheetMember& member : sheet_.members()) {
-      heights.min = std::min(heights.min, member.raster->info().heights.min);
-      heights.max = std::max(heights.max, member.raster->info().heights.max);
-    }
-    return heights;
-  }
+  double West(const CellBox& box) const { return tile_.lattice_.Longitude(tile_.window_.column + 1 + box.west); }
+  double South(const CellBox& box) const { return tile_.lattice_.Latitude(tile_.window_.row + 1 + box.south); }
+  double Width(const CellBox& box) const { return tile_.lattice_.StepDegrees() * (box.east - box.west); }
+  double Height(const CellBox& box) const { return tile_.lattice_.StepDegrees() * (box.north - box.south); }
 
   bool Touches(const CellBox& box) const {
-    const double step = tile_.lattice_.StepDegrees();
-    return sheet_.reach().Touches(tile_.lattice_.Longitude(tile_.window_.column + 1 + box.west),
-                                  tile_.lattice_.Latitude(tile_.window_.row + 1 + box.south),
-                                  step * (box.east - box.west), step * (box.north - box.south));
+    return sheet_.reach().Touches(West(box), South(box), Width(box), Height(box));
+  }
+
+  // Of the nodes of a box, in averages; infinite where one of them is away from the even part.
+  PixelBounds BoundsOf(const CellBox& box) const {
+    PixelBounds bounds;
+    for (int j = box.south; j <= box.north; ++j) {
+      for (int i = box.west; i <= box.east; ++i) {
+        const std::size_t n = NodeOf(i, j);
+        if (std::isnan(x_[n])) return {};
+        bounds.Add(x_[n], y_[n]);
+      }
+    }
+    return bounds;
+  }
+
+  // Where sheets are blended every sheet that may count is judged on its own: what they are blended to lies between
+  // them. Heights that were filled in count as well.
+  bool GivesWay(const CellBox& box) const {
+    if (!tile_.blends_) return false;
+    const PixelBounds at = BoundsOf(box);
+    const double factor = trace_.factor;
+    return !(at.west <= at.east) ||
+           sheet_.GivesWay({at.west * factor, at.north * factor, (at.east + 1) * factor, (at.south + 1) * factor},
+                           trace_.factor);
+  }
+  bool MayHaveVoids(const CellBox& box) const {
+    const PixelBounds at = BoundsOf(box);
+    const double factor = trace_.factor;
+    return !(at.west <= at.east) || sheet_
+                                        .Ranges({(at.west - 1) * factor, (at.north - 1) * factor,
+                                                 (at.east + 2) * factor, (at.south + 2) * factor})
+                                        .has_voids;
   }
 
   void AddGroup(const CellBox& box) {
     if (!Touches(box)) return;
-    if (const double gap = SmoothGap(box); std::isfinite(gap)) {
+    const bool gives_way = GivesWay(box), has_voids = gives_way && MayHaveVoids(box);
+    if (const double gap = has_voids ? kUnknown : SmoothGap(box); std::isfinite(gap)) {
       Raise(gap);
+      if (gives_way) return;
       for (int j = box.south; j < box.north; ++j) {
         std::fill_n(tile_.covered_.begin() + static_cast<std::ptrdiff_t>(CellIndex(box.west, j)), box.east - box.west,
                     1);
@@ -181,37 +231,113 @@ class SheetGap {
     }
     for (int j = box.south; j < box.north; ++j) {
       for (int i = box.west; i < box.east; ++i) {
-        if (tile_.covered_[CellIndex(i, j)] == 0) AddCell(i, j);
+        if (tile_.covered_[CellIndex(i, j)] == 0) AddCell(i, j, gives_way);
       }
     }
   }
 
-  void AddCell(int i, int j) {
-    const CellBox box{i, j, i + 1, j + 1};
+  void AddCell(int i, int j, bool gives_way) {
     const std::size_t n = NodeOf(i, j);
-    const std::array<std::size_t, 4> nodes = {n, n + 1, n + stride_, n + stride_ + 1};
-    if (std::ranges::any_of(nodes, [&](std::size_t node) { return trace_.cell_of_node[node] < 0; })) {
-      if (Touches(box)) Raise(RangeGap(nodes, j));
+    const TileCell cell{i, j, {n, n + 1, n + stride_, n + stride_ + 1}};
+    if (std::ranges::any_of(cell.nodes, [&](std::size_t node) { return trace_.cell_of_node[node] < 0; })) {
+      if (Touches(cell.box())) Raise(RangeGap(cell, gives_way));
       return;
     }
     bool has_voids = false;
-    double gap = SampleGap(nodes, has_voids);
+    double gap = SampleGap(cell, has_voids);
+    if (gives_way && (has_voids || MayHaveVoids(cell.box()))) return Raise(RangeGap(cell, true));
     if (!has_voids) {
-      tile_.covered_[CellIndex(i, j)] = 1;
-      if (const double smooth = SmoothGap(box); smooth < gap) gap = smooth;
+      if (!gives_way) tile_.covered_[CellIndex(i, j)] = 1;
+      if (const double smooth = SmoothGap(cell.box()); smooth < gap) gap = smooth;
     }
-    Raise(std::isfinite(gap) ? gap : RangeGap(nodes, j));
+    Raise(std::isfinite(gap) ? gap : RangeGap(cell, gives_way));
   }
 
   void Raise(double gap) { tile_.bound_ = std::max(tile_.bound_, gap); }
 
-  // Between the heights served at a cell's nodes and heights within these bounds.
-  double Apart(const std::array<std::size_t, 4>& nodes, double lowest, double highest) const {
-    double gap = 0;
-    for (const std::size_t node : nodes) {
-      gap = std::max({gap, highest - double{tile_.heights_[node]}, double{tile_.heights_[node]} - lowest});
+  // Between the heights served at a cell's nodes and the sheet's heights within these bounds, which count as its
+  // samples do.
+  double Apart(const TileCell& cell, double lowest, double highest) const {
+    double gap = 0, geoid_gap = 0;
+    std::array<double, 4> geoid{};
+    if (sheet_.undulations() != nullptr) {
+      geoid_gap = GeoidGap(cell.box());
+      if (std::isfinite(geoid_gap)) {
+        for (std::size_t k = 0; k < 4; ++k) geoid[k] = trace_.undulations[cell.nodes[k]];
+      } else {  // not known at all of the nodes
+        const HeightRange range = GeoidRange(cell.box());
+        lowest += range.min, highest += range.max;
+        geoid_gap = 0;
+      }
     }
-    return gap;
+    for (std::size_t k = 0; k < 4; ++k) {
+      const double height = double{tile_.heights_[cell.nodes[k]]} - geoid[k];
+      gap = std::max({gap, highest - height, height - lowest});
+    }
+    return gap + geoid_gap;
+  }
+
+  HeightRange GeoidRange(const CellBox& box) const {
+    return sheet_.undulations()->RangeOf(West(box), South(box), Width(box), Height(box));
+  }
+
+  // How far the geoid is from the surface that is bilinear between its undulations at nodes; 0 where none are added,
+  // infinite where they are not known.
+  //
+  // A geoid is bilinear on a grid of its own. Where that is coarser than the lattice, a step between nodes crosses one
+  // of its lines at most. There the chord is off by at most a quarter of the step times the change of slope, and the
+  // larger second difference at the ends of the step is at least half of that product: half a second difference for
+  // each axis. The whole is taken, as the change of slope varies along the line.
+  double GeoidGap(const CellBox& box) const {
+    if (sheet_.undulations() == nullptr) return 0;
+    // The finest grids in use have cells of half a minute.
+    constexpr double kFinestGeoid = 1.0 / 120;
+    if (tile_.lattice_.StepDegrees() > kFinestGeoid / 2) return CoarseGeoidGap(box);
+    const auto at = [&](int i, int j) { return trace_.undulations[NodeOf(i, j)]; };
+    double xx = 0, yy = 0, xy = 0, sum = 0;
+    for (int j = box.south; j <= box.north; ++j) {
+      for (int i = box.west; i <= box.east; ++i) {
+        const double here = at(i, j), east = at(i + 1, j), north = at(i, j + 1);
+        const double along = std::abs(east - here - (here - at(i - 1, j)));
+        const double across = std::abs(north - here - (here - at(i, j - 1)));
+        sum += along + across;
+        xx = std::max(xx, along);
+        yy = std::max(yy, across);
+        if (i < box.east && j < box.north) xy = std::max(xy, std::abs(at(i + 1, j + 1) - north - (east - here)));
+      }
+    }
+    if (!std::isfinite(sum)) return kUnknown;
+    return 2 * Undulations::kTolerance + xx + yy + xy;
+  }
+
+  // By bounds on the geoid around each cell.
+  double CoarseGeoidGap(const CellBox& box) const {
+    double gap = 0;
+    for (int j = box.south; j < box.north; ++j) {
+      for (int i = box.west; i < box.east; ++i) {
+        const std::size_t n = NodeOf(i, j);
+        const HeightRange range = GeoidRange({i, j, i + 1, j + 1});
+        for (const std::size_t node : {n, n + 1, n + stride_, n + stride_ + 1}) {
+          const double geoid = trace_.undulations[node];
+          if (std::isnan(geoid)) return kUnknown;
+          gap = std::max({gap, range.max - geoid, geoid - range.min});
+        }
+      }
+    }
+    return gap + Undulations::kTolerance;
+  }
+
+  // Between the heights served and the sheet's own, at the nodes of a box.
+  double LargestBlend(const CellBox& box) const {
+    if (!tile_.blends_) return 0;
+    float largest = 0;
+    for (int j = box.south; j <= box.north; ++j) {
+      for (int i = box.west; i <= box.east; ++i) {
+        const std::size_t n = NodeOf(i, j);
+        largest = std::max(largest, std::abs(tile_.heights_[n] - trace_.heights[n]));
+      }
+    }
+    return largest;
   }
 
   // Of averages by column and row of the grid, ends included.
@@ -226,26 +352,26 @@ class SheetGap {
   }
 
   // The surface is between the samples around the cell, and the samples that those average within their error of it.
-  double SampleGap(const std::array<std::size_t, 4>& nodes, bool& has_voids) const {
+  double SampleGap(const TileCell& cell, bool& has_voids) const {
     std::int64_t west = std::numeric_limits<std::int64_t>::max(), east = std::numeric_limits<std::int64_t>::min();
     std::int64_t north = west, south = east;
-    for (const std::size_t node : nodes) {
-      const GridCell& cell = trace_.cells[static_cast<std::size_t>(trace_.cell_of_node[node])];
-      west = std::min(west, cell.column);
-      east = std::max(east, cell.column + 1);
-      north = std::min(north, cell.row);
-      south = std::max(south, cell.row + 1);
+    for (const std::size_t node : cell.nodes) {
+      const GridCell& at = trace_.cells[static_cast<std::size_t>(trace_.cell_of_node[node])];
+      west = std::min(west, at.column);
+      east = std::max(east, at.column + 1);
+      north = std::min(north, at.row);
+      south = std::max(south, at.row + 1);
     }
     const GridWindow& window = trace_.window;
     east = std::min(east, window.column + window.columns - 1);
     south = std::min(south, window.row + window.rows - 1);
-    return BoxGap(nodes, west, north, east, south, has_voids);
+    return BoxGap(cell, west, north, east, south, has_voids);
   }
 
   // The same for averages in a box, ends included.
-  double BoxGap(const std::array<std::size_t, 4>& nodes, std::int64_t west, std::int64_t north, std::int64_t east,
-                std::int64_t south, bool& has_voids) const {
-    double lowest = std::numeric_limits<double>::infinity(), highest = -lowest;
+  double BoxGap(const TileCell& cell, std::int64_t west, std::int64_t north, std::int64_t east, std::int64_t south,
+                bool& has_voids) const {
+    double lowest = kUnknown, highest = -lowest;
     for (std::int64_t row = north; row <= south; ++row) {
       for (std::int64_t column = west; column <= east; ++column) {
         const float sample = SampleAt(column, row);
@@ -257,8 +383,8 @@ class SheetGap {
     }
     const float averaging = AveragingError(static_cast<double>(west), static_cast<double>(north),
                                            static_cast<double>(east), static_cast<double>(south));
-    if (lowest > highest) return averaging > 0 ? std::numeric_limits<double>::infinity() : 0;
-    return Apart(nodes, lowest, highest) + averaging;
+    if (lowest > highest) return averaging > 0 ? kUnknown : 0;
+    return Apart(cell, lowest, highest) + averaging;
   }
 
   float SampleAt(std::int64_t column, std::int64_t row) const {
@@ -270,7 +396,7 @@ class SheetGap {
   // where the box is no such place.
   double SmoothGap(const CellBox& box) const {
     Steps steps;
-    double west = std::numeric_limits<double>::infinity(), east = -west, north = west, south = -west;
+    PixelBounds at;
     double finite = 0;  // becomes NaN with any position
     const auto raise = [](double& largest, double value) { largest = std::max(largest, std::abs(value)); };
     for (int j = box.south; j <= box.north; ++j) {
@@ -288,8 +414,7 @@ class SheetGap {
         raise(steps.north_y, j < box.north ? north_y : 0);
         steps.bend_x = std::max({steps.bend_x, std::abs(east_x - west_x), std::abs(north_x - south_x)});
         steps.bend_y = std::max({steps.bend_y, std::abs(east_y - west_y), std::abs(north_y - south_y)});
-        west = std::min(west, x), east = std::max(east, x);
-        north = std::min(north, y), south = std::max(south, y);
+        at.Add(x, y);
       }
     }
     if (!std::isfinite(finite)) return std::numeric_limits<double>::quiet_NaN();
@@ -299,13 +424,14 @@ class SheetGap {
     steps.bend_x = steps.bend_x * kOffChord + kPosition;
     steps.bend_y = steps.bend_y * kOffChord + kPosition;
     Bends bends;
-    const auto left = static_cast<std::int64_t>(std::floor(west)),
-               right = static_cast<std::int64_t>(std::floor(east)) + 1;
-    const auto top = static_cast<std::int64_t>(std::floor(north)),
-               bottom = static_cast<std::int64_t>(std::floor(south)) + 1;
+    const auto left = static_cast<std::int64_t>(std::floor(at.west)),
+               right = static_cast<std::int64_t>(std::floor(at.east)) + 1;
+    const auto top = static_cast<std::int64_t>(std::floor(at.north)),
+               bottom = static_cast<std::int64_t>(std::floor(at.south)) + 1;
     if (!MeasureBends(left, top, right, bottom, bends)) return std::numeric_limits<double>::quiet_NaN();
-    return LargestGap(bends, steps) + AveragingError(static_cast<double>(left), static_cast<double>(top),
-                                                     static_cast<double>(right), static_cast<double>(bottom));
+    return LargestGap(bends, steps) + GeoidGap(box) + LargestBlend(box) +
+           AveragingError(static_cast<double>(left), static_cast<double>(top), static_cast<double>(right),
+                          static_cast<double>(bottom));
   }
 
   // Of samples left .. right, top .. bottom, which surround the box; false where one of them is void.
@@ -341,8 +467,7 @@ class SheetGap {
   }
 
   // Against the averages that samples in a box of pixels are near to; infinite where not all of them were read.
-  double NearGap(const std::array<std::size_t, 4>& nodes, double west, double north, double east, double south) const {
-    constexpr double kUnknown = std::numeric_limits<double>::infinity();
+  double NearGap(const TileCell& cell, double west, double north, double east, double south) const {
     const GridAxis columns(sheet_.columns(), trace_.factor, sheet_.wraps()), rows(sheet_.rows(), trace_.factor, false);
     const auto index = [&](double pixel) { return static_cast<std::int64_t>(std::floor(pixel / trace_.factor - 0.5)); };
     std::int64_t left = index(west), right = index(east) + 1;
@@ -362,20 +487,22 @@ class SheetGap {
       if (turn != 0 && !sheet_.wraps()) continue;
       if (left + shift < window.column || right + shift >= window.column + window.columns) continue;
       bool has_voids = false;
-      return BoxGap(nodes, left + shift, top, right + shift, bottom, has_voids);
+      return BoxGap(cell, left + shift, top, right + shift, bottom, has_voids);
     }
     return kUnknown;
   }
 
-  // Against everything that the raster has around the cell, or anywhere where its place cannot be told.
-  double RangeGap(const std::array<std::size_t, 4>& nodes, int j) const {
-    double west = std::numeric_limits<double>::infinity(), east = -west, north = west, south = -west;
+  // Against everything that the raster has around the cell, or anywhere where its place cannot be told. `fills`: what
+  // is filled in there counts too.
+  double RangeGap(const TileCell& cell, bool fills) const {
+    const auto& nodes = cell.nodes;
+    PixelBounds at;
     bool known = true;
     for (std::size_t k = 0; k < nodes.size(); ++k) {
       Position position = trace_.positions[nodes[k]];
       if (sheet_.georeference().is_geographic_grid()) {
         // All of a pole's nodes have one position: their columns are those of the row beside it.
-        const std::int64_t row = tile_.window_.row + 1 + j + (k < 2 ? 0 : 1);
+        const std::int64_t row = tile_.window_.row + 1 + cell.j + (k < 2 ? 0 : 1);
         if (row == 0 || row == tile_.lattice_.rows()) {
           position.x = trace_.positions[nodes[k] + (k < 2 ? stride_ : 0) - (k < 2 ? 0 : stride_)].x;
         }
@@ -383,28 +510,28 @@ class SheetGap {
         position.x += turn * std::round((sheet_.columns() / 2.0 - position.x) / turn);
       }
       known &= std::isfinite(position.x) && std::isfinite(position.y);
-      west = std::min(west, position.x), east = std::max(east, position.x);
-      north = std::min(north, position.y), south = std::max(south, position.y);
+      at.Add(position.x, position.y);
     }
-    if (!known) {
-      const HeightRange heights = HeightsOf();
-      return Apart(nodes, heights.min, heights.max);
-    }
+    if (!known) return Apart(cell, heights_.min, heights_.max);
     // Edges of cells bulge by far less. The samples are at the pixels' centres.
     constexpr double kBulge = 1.0 / 32;
-    const double x = (east - west) * kBulge, y = (south - north) * kBulge;
-    const auto first = [](double at) { return std::ceil(at - 0.5); };
-    const auto last = [](double at) { return std::floor(at - 0.5); };
-    if (first(north - y) > last(south + y)) return 0;
-    if (const double gap = NearGap(nodes, west - x, north - y, east + x, south + y); std::isfinite(gap)) return gap;
+    const double halo = fills ? sheet_.options().max_void_gap + trace_.factor : 0;
+    const double x = (at.east - at.west) * kBulge + halo, y = (at.south - at.north) * kBulge + halo;
+    const double west = at.west - x, north = at.north - y, east = at.east + x, south = at.south + y;
+    const auto first = [](double pixel) { return std::ceil(pixel - 0.5); };
+    const auto last = [](double pixel) { return std::floor(pixel - 0.5); };
+    if (first(north) > last(south)) return 0;
+    if (!fills) {
+      if (const double gap = NearGap(cell, west, north, east, south); std::isfinite(gap)) return gap;
+    }
     BlockRange range;
     for (const int turn : {-1, 0, 1}) {
       if (turn != 0 && !sheet_.wraps()) continue;
       const double shift = static_cast<double>(turn) * sheet_.columns();
-      if (first(west - x + shift) > last(east + x + shift)) continue;
-      range.Add(Ranges(first(west - x + shift), first(north - y), last(east + x + shift), last(south + y)));
+      if (first(west + shift) > last(east + shift)) continue;
+      range.Add(Ranges(first(west + shift), first(north), last(east + shift), last(south)));
     }
-    return range.min > range.max ? 0 : Apart(nodes, range.min, range.max);
+    return range.min > range.max ? 0 : Apart(cell, range.min, range.max);
   }
 
   SourceGap& tile_;
@@ -412,14 +539,18 @@ class SheetGap {
   const SheetTrace& trace_;
   const int cells_;
   const std::size_t stride_;
+  static constexpr double kUnknown = std::numeric_limits<double>::infinity();
+
   std::vector<std::size_t> near_;  // members
+  HeightRange heights_;            // of all of them
   std::vector<double> x_, y_;      // by node, in samples of the grid; NaN away from its even part
 };
 
-SourceGap::SourceGap(const geo::Lattice& lattice, const NodeWindow& window, std::span<const float> heights)
+SourceGap::SourceGap(const geo::Lattice& lattice, const NodeWindow& window, std::span<const float> heights, bool blends)
     : lattice_(lattice),
       window_(window),
       heights_(heights),
+      blends_(blends),
       covered_(static_cast<std::size_t>(lattice.cells) * static_cast<std::size_t>(lattice.cells)) {}
 
 void SourceGap::Add(const Sheet& sheet, const SheetTrace& trace) { SheetGap(*this, sheet, trace).Add(); }

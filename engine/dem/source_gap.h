@@ -15,10 +15,11 @@ namespace terrace::dem {
 // Measures one tile: one Add for each sheet, in their order.
 class SourceGap {
  public:
-  // `window` and `heights`: the tile's samples and one more on each side, as they are served.
-  SourceGap(const geo::Lattice& lattice, const NodeWindow& window, std::span<const float> heights);
+  // `window` and `heights`: the tile's samples and one more on each side, as they are served. `blends`: sheets are
+  // blended where one gives way to the next.
+  SourceGap(const geo::Lattice& lattice, const NodeWindow& window, std::span<const float> heights, bool blends);
 
-  // `trace`: what Sheet::Fill noted of this window.
+  // `trace`: what Sheet::Fill noted of this window, for heights above the ellipsoid.
   void Add(const Sheet& sheet, const SheetTrace& trace);
 
   // No sample of a further sheet shows anywhere.
@@ -28,12 +29,13 @@ class SourceGap {
   double bound() const { return bound_ + kRounding; }
 
  private:
-  // Of heights at nodes, to 2^-10 m, with room for the arithmetic.
+  // Of heights at nodes and of what they are blended from, to 2^-10 m, with room for the arithmetic.
   static constexpr double kRounding = 0x1p-10;
 
   const geo::Lattice lattice_;
   const NodeWindow window_;
   const std::span<const float> heights_;
+  const bool blends_;
   // By cell: no sample of a later sheet shows in it.
   std::vector<std::uint8_t> covered_;
   double bound_ = 0;

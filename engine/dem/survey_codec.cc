@@ -40,6 +40,17 @@ void Put(ByteWriter& writer, const BlockSum& sum) {
   writer.Put(sum.sum);
   writer.Put(sum.weight);
 }
+void Put(ByteWriter& writer, const ZeroEdges& zeros) {
+  for (const std::int64_t count : {zeros.high, zeros.low, zeros.zeros, zeros.at_border}) writer.Put(count);
+}
+ZeroEdges GetZeros(ByteReader& reader) {
+  ZeroEdges zeros;
+  for (std::int64_t* count : {&zeros.high, &zeros.low, &zeros.zeros, &zeros.at_border}) {
+    *count = reader.Get<std::int64_t>();
+  }
+  return zeros;
+}
+
 BlockSum GetSum(ByteReader& reader) {
   const auto sum = reader.Get<double>();
   return {sum, reader.Get<double>()};
@@ -50,6 +61,7 @@ BlockSum GetSum(ByteReader& reader) {
 std::string EncodePart(const ChunkSurvey& part) {
   ByteWriter writer;
   writer.Put(part.valid);
+  Put(writer, part.zeros);
   Put(writer, part.first_row);
   Put(writer, part.last_row);
   PutRanges(writer, part.ranges);
@@ -71,6 +83,7 @@ std::optional<ChunkSurvey> DecodePart(std::string_view bytes, const Chunk& chunk
     part.sums[k].resize(AveragesIn(chunk, layout, kLargestDirect << (k + 1)));
   }
   part.valid = reader.Get<std::int64_t>();
+  part.zeros = GetZeros(reader);
   part.first_row = GetSum(reader);
   part.last_row = GetSum(reader);
   GetRanges(reader, part.ranges);
@@ -89,6 +102,7 @@ std::string EncodeSurvey(const RasterSurvey& survey) {
   writer.Put(survey.highest);
   writer.Put(survey.valid);
   writer.Put(survey.voids);
+  Put(writer, survey.zeros);
   for (const auto& mean : survey.edge_row_means) {
     writer.Put<std::uint8_t>(mean ? 1 : 0);
     writer.Put(mean.value_or(0));
@@ -107,6 +121,7 @@ std::optional<RasterSurvey> DecodeSurvey(std::string_view bytes, const RasterLay
   survey.highest = reader.Get<float>();
   survey.valid = reader.Get<std::uint64_t>();
   survey.voids = reader.Get<std::uint64_t>();
+  survey.zeros = GetZeros(reader);
   for (auto& mean : survey.edge_row_means) {
     const bool has = reader.Get<std::uint8_t>() != 0;
     const auto value = reader.Get<double>();
@@ -125,6 +140,33 @@ std::optional<RasterSurvey> DecodeSurvey(std::string_view bytes, const RasterLay
   }
   if (!reader.ok() || reader.remaining() > 0) return std::nullopt;
   return survey;
+}
+
+std::string EncodeFindings(const VoidFindings& findings) {
+  if (!findings.any()) return {};
+  ByteWriter writer;
+  writer.Put(static_cast<std::uint32_t>(findings.marks.size()));
+  for (const double mark : findings.marks) writer.Put(mark);
+  writer.Put(findings.lowest);
+  writer.Put(findings.highest);
+  writer.Put<std::int32_t>(findings.rim);
+  writer.PutBytes(findings.text);
+  return writer.Take();
+}
+
+std::optional<VoidFindings> DecodeFindings(std::string_view bytes) {
+  VoidFindings findings;
+  if (bytes.empty()) return findings;
+  ByteReader reader(bytes);
+  const auto marks = reader.Get<std::uint32_t>();
+  if (marks > bytes.size() / sizeof(double)) return std::nullopt;
+  for (std::uint32_t i = 0; i < marks; ++i) findings.marks.push_back(reader.Get<double>());
+  findings.lowest = reader.Get<double>();
+  findings.highest = reader.Get<double>();
+  findings.rim = reader.Get<std::int32_t>();
+  findings.text = reader.GetBytes(reader.remaining());
+  if (!reader.ok() || !findings.any()) return std::nullopt;
+  return findings;
 }
 
 }  // namespace terrace::dem

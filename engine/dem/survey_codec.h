@@ -18,4 +18,8 @@ std::optional<ChunkSurvey> DecodePart(std::string_view bytes, const Chunk& chunk
 std::string EncodeSurvey(const RasterSurvey& survey);
 std::optional<RasterSurvey> DecodeSurvey(std::string_view bytes, const RasterLayout& layout);
 
+// Empty where nothing was found.
+std::string EncodeFindings(const VoidFindings& findings);
+std::optional<VoidFindings> DecodeFindings(std::string_view bytes);
+
 }  // namespace terrace::dem

@@ -28,7 +28,8 @@ constexpr std::uint32_t kRecordVersion = 1;
 constexpr std::uint64_t kHeaderMagic = 0x31'59'56'52'55'53'52'54;  // "TRSURVY1"
 constexpr std::uint64_t kFooterMagic = 0x44'4e'45'59'56'52'55'53;  // "SURVYEND"
 constexpr std::uint32_t kPartMagic = 0x54'52'41'50;                // "PART"
-constexpr std::size_t kHeaderBytes = 40, kPartHeaderBytes = 32, kFooterBytes = 24;
+constexpr std::size_t kHeaderBytes = 36, kPartHeaderBytes = 32, kFooterBytes = 24;
+constexpr std::uint64_t kMostHeaderBytes = 1 << 16;  // findings are a few numbers and a line of text
 
 constexpr int DivideUp(int a, int b) { return (a + b - 1) / b; }
 
@@ -36,13 +37,16 @@ std::uint64_t HashOf(std::string_view bytes) { return XXH3_64bits(bytes.data(), 
 std::string ErrorText() { return std::generic_category().message(errno); }
 
 std::string HeaderOf(const RecordShape& shape) {
+  const std::string findings = EncodeFindings(shape.findings);
   ByteWriter writer;
   writer.Put(kHeaderMagic);
   writer.Put(kRecordVersion);
-  writer.Put<std::uint32_t>(shape.keeps_averages ? 1 : 0);
+  writer.Put<std::uint32_t>(shape.keeps_averages() ? 1 : 0);
   writer.Put(shape.key);
   writer.Put<std::uint32_t>(ChunkGrid::kSide);
   writer.Put<std::uint32_t>(kLargestDirect);
+  writer.Put(static_cast<std::uint32_t>(findings.size()));
+  writer.PutBytes(findings);
   std::string bytes = writer.Take();
   ByteWriter sum;
   sum.Put(HashOf(bytes));
@@ -91,6 +95,30 @@ AveragesPlace PlaceOf(const Chunk& chunk, const RasterLayout& layout, int factor
     if (f == factor) return place;
     place.offset += sizeof(std::uint64_t) + place.bytes();
   }
+}
+
+// Whether a file begins with the header of a record, and whether that is the wanted one; then `shape` gets its
+// findings.
+enum class HeaderState { kDamaged, kOther, kSame };
+HeaderState ReadHeader(int file, RecordShape& shape, std::uint64_t& bytes) {
+  const std::uint64_t size = SizeOf(file);
+  const auto front = ReadAt(file, 0, kHeaderBytes, size);
+  if (!front) return HeaderState::kDamaged;
+  ByteReader reader(std::string_view(*front).substr(kHeaderBytes - sizeof(std::uint32_t)));
+  bytes = kHeaderBytes + std::uint64_t{reader.Get<std::uint32_t>()} + sizeof(std::uint64_t);
+  const auto header = bytes > kMostHeaderBytes ? std::nullopt : ReadAt(file, 0, bytes, size);
+  if (!header || ByteReader(*header).Get<std::uint64_t>() != kHeaderMagic) return HeaderState::kDamaged;
+  const std::string_view checked = std::string_view(*header).substr(0, bytes - sizeof(std::uint64_t));
+  if (HashOf(checked) != ByteReader(std::string_view(*header).substr(checked.size())).Get<std::uint64_t>()) {
+    return HeaderState::kDamaged;
+  }
+  auto findings = DecodeFindings(checked.substr(kHeaderBytes));
+  if (!findings) return HeaderState::kOther;
+  RecordShape found = shape;
+  found.findings = *std::move(findings);
+  if (HeaderOf(found) != *header) return HeaderState::kOther;
+  shape = std::move(found);
+  return HeaderState::kSame;
 }
 
 struct PartHeader {
@@ -152,12 +180,23 @@ OpenFile::~OpenFile() {
   if (descriptor_ >= 0) ::close(descriptor_);
 }
 
-RecordedAverages::RecordedAverages(OpenFile file, std::string path, const RecordShape& shape,
+bool NeedsAverages(const RasterLayout& layout) {
+  return layout.overview_factors.empty() && std::int64_t{layout.width} * layout.height > kMostSamplesWithoutAverages;
+}
+
+RasterLayout WithFindings(RasterLayout layout, const VoidFindings& findings) {
+  findings.AddTo(layout.rules);
+  // They were averaged from heights and marks.
+  if (findings.any()) layout.overview_factors.clear();
+  return layout;
+}
+
+RecordedAverages::RecordedAverages(OpenFile file, std::string path, RasterLayout layout,
                                    std::vector<std::uint64_t> offsets)
     : file_(std::move(file)),
       path_(std::move(path)),
-      layout_(shape.layout),
-      chunks_(shape.layout.width, shape.layout.height),
+      layout_(std::move(layout)),
+      chunks_(layout_.width, layout_.height),
       offsets_(std::move(offsets)) {}
 
 // The window does not wrap here: columns of the part lie at `window.column` + multiples of the grid's width.
@@ -211,7 +250,7 @@ void RecordedAverages::Discard() const {
   if (IsSameFile(file_.get(), path_)) ::unlink(path_.c_str());
 }
 
-std::optional<FinishedRecord> LoadRecord(const std::string& path, const RecordShape& shape) {
+std::optional<FinishedRecord> LoadRecord(const std::string& path, const RecordShape& wanted) {
   OpenFile file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
   if (!file.is_open()) return std::nullopt;
   const std::uint64_t size = SizeOf(file.get());
@@ -219,17 +258,18 @@ std::optional<FinishedRecord> LoadRecord(const std::string& path, const RecordSh
     spdlog::warn("{}: {} does not fit its checksum, or was cut; the source is prepared anew", path, what);
     return std::nullopt;
   };
-  const auto header = ReadAt(file.get(), 0, kHeaderBytes, size);
-  if (!header) return damaged("its header");
-  if (*header != HeaderOf(shape)) {
-    if (ByteReader(*header).Get<std::uint64_t>() != kHeaderMagic ||
-        HashOf(std::string_view(*header).substr(0, kHeaderBytes - 8)) !=
-            ByteReader(std::string_view(*header).substr(kHeaderBytes - 8)).Get<std::uint64_t>()) {
+  RecordShape shape = wanted;
+  std::uint64_t header_bytes = 0;
+  switch (ReadHeader(file.get(), shape, header_bytes)) {
+    case HeaderState::kDamaged:
       return damaged("its header");
-    }
-    spdlog::info("{}: was made from another state of the source, or by another version", path);
-    return std::nullopt;
+    case HeaderState::kOther:
+      spdlog::info("{}: was made from another state of the source, or by another version", path);
+      return std::nullopt;
+    case HeaderState::kSame:
+      break;
   }
+  const RasterLayout layout = shape.EffectiveLayout();
   if (size < kFooterBytes) return damaged("its end");
   const auto footer = ReadAt(file.get(), size - kFooterBytes, kFooterBytes, size);
   if (!footer) return damaged("its end");
@@ -240,23 +280,26 @@ std::optional<FinishedRecord> LoadRecord(const std::string& path, const RecordSh
   if (!tail || HashOf(*tail) != checksum) return damaged("its survey");
 
   ByteReader whole(*tail);
-  std::vector<std::uint64_t> offsets(
-      static_cast<std::size_t>(ChunkGrid(shape.layout.width, shape.layout.height).count()));
+  std::vector<std::uint64_t> offsets(static_cast<std::size_t>(ChunkGrid(layout.width, layout.height).count()));
   for (std::uint64_t& at : offsets) at = whole.Get<std::uint64_t>();
-  auto survey = DecodeSurvey(whole.GetBytes(whole.remaining()), shape.layout);
+  auto survey = DecodeSurvey(whole.GetBytes(whole.remaining()), layout);
   if (!survey) return damaged("its survey");
-  FinishedRecord record{*std::move(survey), nullptr};
-  if (shape.keeps_averages) {
-    record.averages = std::make_shared<const RecordedAverages>(std::move(file), path, shape, std::move(offsets));
+  FinishedRecord record{std::move(shape.findings), *std::move(survey), nullptr};
+  if (NeedsAverages(layout)) {
+    record.averages = std::make_shared<const RecordedAverages>(std::move(file), path, layout, std::move(offsets));
   }
   return record;
 }
 
 RecordWriter::RecordWriter(OpenFile file, std::string path, const RecordShape& shape)
-    : file_(std::move(file)), path_(std::move(path)), shape_(shape), chunks_(shape.layout.width, shape.layout.height) {}
+    : file_(std::move(file)),
+      path_(std::move(path)),
+      shape_(shape),
+      layout_(shape.EffectiveLayout()),
+      chunks_(layout_.width, layout_.height) {}
 
 Result<std::optional<RecordWriter>> RecordWriter::Open(const std::string& path, const RecordShape& shape,
-                                                       const std::function<void(const ChunkSurvey&)>& keep) {
+                                                       const std::stop_token& stop) {
   const std::string partial = path + ".partial";
   for (bool waiting = false;;) {
     OpenFile file(::open(partial.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644));
@@ -265,7 +308,8 @@ Result<std::optional<RecordWriter>> RecordWriter::Open(const std::string& path, 
       if (errno != EWOULDBLOCK) {
         return MakeError(ErrorCode::kUnavailable, "{}: cannot be locked: {}", partial, ErrorText());
       }
-      if (!std::exchange(waiting, true)) spdlog::info("{}: another process makes it; waiting for that", path);
+      if (!std::exchange(waiting, true)) spdlog::info("{}: somebody else makes it; waiting for that", path);
+      if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "{}: waiting for it was stopped", path);
       std::this_thread::sleep_for(std::chrono::milliseconds(100));
       continue;
     }
@@ -276,24 +320,37 @@ Result<std::optional<RecordWriter>> RecordWriter::Open(const std::string& path, 
       return std::nullopt;
     }
     RecordWriter writer(std::move(file), path, shape);
-    if (auto begun = writer.Begin(keep); !begun) return tl::unexpected(begun.error());
+    if (auto begun = writer.Begin(); !begun) return tl::unexpected(begun.error());
     return std::optional(std::move(writer));
   }
 }
 
-Result<void> RecordWriter::Begin(const std::function<void(const ChunkSurvey&)>& keep) {
-  const std::string header = HeaderOf(shape_);
-  if (ReadAt(file_.get(), 0, kHeaderBytes, SizeOf(file_.get())) == header) {
-    end_ = kHeaderBytes;
-    Resume(keep);
-    if (::ftruncate(file_.get(), static_cast<off_t>(end_)) == 0) return {};
-  } else if (::ftruncate(file_.get(), 0) == 0) {
-    return Write(header);
-  }
+Result<void> RecordWriter::Begin() {
+  if (ReadHeader(file_.get(), shape_, end_) != HeaderState::kSame) return Restart(shape_.findings);
+  layout_ = shape_.EffectiveLayout();
+  return {};
+}
+
+Result<void> RecordWriter::Restart(const VoidFindings& findings) {
+  shape_.findings = findings;
+  layout_ = shape_.EffectiveLayout();
+  offsets_.clear();
+  end_ = 0;
+  if (auto cut = Cut(); !cut) return cut;
+  return Write(HeaderOf(shape_));
+}
+
+Result<void> RecordWriter::Cut() {
+  if (::ftruncate(file_.get(), static_cast<off_t>(end_)) == 0) return {};
   return MakeError(ErrorCode::kUnavailable, "{}.partial: cannot be cut: {}", path_, ErrorText());
 }
 
-void RecordWriter::Resume(const std::function<void(const ChunkSurvey&)>& keep) {
+Result<void> RecordWriter::Resume(const std::function<void(const ChunkSurvey&)>& keep) {
+  KeepWholeParts(keep);
+  return Cut();
+}
+
+void RecordWriter::KeepWholeParts(const std::function<void(const ChunkSurvey&)>& keep) {
   const std::uint64_t size = SizeOf(file_.get());
   while (static_cast<int>(offsets_.size()) < chunks_.count()) {
     const auto head = ReadAt(file_.get(), end_, kPartHeaderBytes, size);
@@ -307,7 +364,7 @@ void RecordWriter::Resume(const std::function<void(const ChunkSurvey&)>& keep) {
     }
     const Chunk chunk = chunks_.At(static_cast<int>(offsets_.size()));
     const std::optional<ChunkSurvey> part =
-        survey->empty() ? VoidSurvey(chunk, shape_.layout) : DecodePart(*survey, chunk, shape_.layout);
+        survey->empty() ? VoidSurvey(chunk, layout_) : DecodePart(*survey, chunk, layout_);
     if (!part) return;
     keep(*part);
     offsets_.push_back(header.averages_bytes > 0 ? averages : 0);
@@ -332,7 +389,7 @@ Result<void> RecordWriter::Write(std::string_view bytes) {
 
 Result<void> RecordWriter::Add(const ChunkSurvey& part) {
   const std::uint64_t begin = end_;
-  const std::string bytes = EncodeRecordPart(static_cast<std::uint32_t>(offsets_.size()), part, shape_.keeps_averages);
+  const std::string bytes = EncodeRecordPart(static_cast<std::uint32_t>(offsets_.size()), part, NeedsAverages(layout_));
   if (auto written = Write(bytes); !written) return written;
   const PartHeader header = PartHeader::Of(bytes);
   offsets_.push_back(header.averages_bytes > 0 ? begin + kPartHeaderBytes + header.survey_bytes : 0);

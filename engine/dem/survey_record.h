@@ -9,6 +9,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -36,16 +37,29 @@ class OpenFile {
   int descriptor_;
 };
 
+// Rasters with more samples than this and no overviews get averages in the cache folder: the first shallow tile of any
+// other reads at most as many.
+inline constexpr std::int64_t kMostSamplesWithoutAverages = std::int64_t{4096} * 4096;
+bool NeedsAverages(const RasterLayout& layout);
+
+// How a raster is read once its undeclared voids are known.
+RasterLayout WithFindings(RasterLayout layout, const VoidFindings& findings);
+
+// What a record is of.
 struct RecordShape {
-  RasterLayout layout;
-  std::uint64_t key = 0;        // of everything a survey depends on
-  bool keeps_averages = false;  // also those of factors below kLargestDirect
+  RasterLayout layout;    // its samples' rules without undeclared voids
+  std::uint64_t key = 0;  // of everything a survey depends on and the raster or its owner states
+  VoidFindings findings;  // undeclared voids, which the record itself knows
+
+  RasterLayout EffectiveLayout() const { return WithFindings(layout, findings); }
+  // Also averages of factors below kLargestDirect.
+  bool keeps_averages() const { return NeedsAverages(EffectiveLayout()); }
 };
 
 // Averages of factors 2 .. kLargestDirect / 2 in a finished record. Thread-safe.
 class RecordedAverages {
  public:
-  RecordedAverages(OpenFile file, std::string path, const RecordShape& shape, std::vector<std::uint64_t> offsets);
+  RecordedAverages(OpenFile file, std::string path, RasterLayout layout, std::vector<std::uint64_t> offsets);
 
   static bool Has(int factor) { return factor > 1 && factor < kLargestDirect; }
   // What ReadGrid gives. kUnavailable: the record is damaged. Precondition: Has(factor).
@@ -69,21 +83,31 @@ class RecordedAverages {
 };
 
 struct FinishedRecord {
+  VoidFindings findings;
   RasterSurvey survey;
   std::shared_ptr<const RecordedAverages> averages;  // null where they are not kept
 };
 
-// Nothing where there is no such file, or one of other samples; a damaged one is reported in the log first.
+// Nothing where there is no such file, or one of other samples; a damaged one is reported in the log first. Whatever
+// the shape's findings are, the record's own count.
 std::optional<FinishedRecord> LoadRecord(const std::string& path, const RecordShape& shape);
 
 // A record that is being made, under `path`.partial. One process at a time has it.
 class RecordWriter {
  public:
-  // Waits while another process makes the record; nothing when that one has finished it. kUnavailable: the folder
-  // cannot be written to.
-  // `keep` is called for every part that an interrupted run left, from the first on.
+  // Waits while somebody else makes the record; nothing when that one has finished it. kUnavailable: the folder cannot
+  // be written to. kCancelled: stopped.
   static Result<std::optional<RecordWriter>> Open(const std::string& path, const RecordShape& shape,
-                                                  const std::function<void(const ChunkSurvey&)>& keep);
+                                                  const std::stop_token& stop);
+
+  // With the findings of an interrupted run.
+  const RecordShape& shape() const { return shape_; }
+
+  // Calls `keep` for every part that an interrupted run left, from the first on. Once, before the first Add.
+  Result<void> Resume(const std::function<void(const ChunkSurvey&)>& keep);
+
+  // Throws all parts away: they were made without these findings.
+  Result<void> Restart(const VoidFindings& findings);
 
   // The next part. kUnavailable: it cannot be written; the file is removed then, and nothing more is written.
   Result<void> Add(const ChunkSurvey& part);
@@ -93,13 +117,15 @@ class RecordWriter {
 
  private:
   RecordWriter(OpenFile file, std::string path, const RecordShape& shape);
-  Result<void> Begin(const std::function<void(const ChunkSurvey&)>& keep);
-  void Resume(const std::function<void(const ChunkSurvey&)>& keep);
+  Result<void> Begin();
+  void KeepWholeParts(const std::function<void(const ChunkSurvey&)>& keep);
+  Result<void> Cut();
   Result<void> Write(std::string_view bytes);
 
   OpenFile file_;
   std::string path_;
   RecordShape shape_;
+  RasterLayout layout_;  // the effective one
   ChunkGrid chunks_;
   std::uint64_t end_ = 0;
   std::vector<std::uint64_t> offsets_;

@@ -96,8 +96,11 @@ WaterRaster::WaterRaster(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 WaterRaster::~WaterRaster() = default;
 
 Result<std::unique_ptr<WaterRaster>> WaterRaster::Open(const std::string& path, const GeoBounds& around) {
+  const auto before = StampOf(path);
   auto dataset = OpenRaster(path);
   if (!dataset) return tl::unexpected(dataset.error());
+  auto files = StampedFiles::OfOpened(FilesOf(**dataset, path), before);
+  if (!files) return tl::unexpected(files.error());
   auto georeference = Georeference::Of(**dataset, path);
   if (!georeference) return tl::unexpected(georeference.error());
   const auto spacing = SourceSpacing::Of(*georeference, path);
@@ -105,7 +108,7 @@ Result<std::unique_ptr<WaterRaster>> WaterRaster::Open(const std::string& path, 
   const Footprint footprint = Footprint::Of(*georeference);
   if (auto touches = CheckOverlap(footprint, around, path); !touches) return tl::unexpected(touches.error());
 
-  auto impl = std::make_unique<Impl>(path, StampedFiles(FilesOf(**dataset, path)), *std::move(georeference));
+  auto impl = std::make_unique<Impl>(path, *std::move(files), *std::move(georeference));
   impl->spacing = *spacing;
   impl->layout = LayoutOf(**dataset, impl->georeference);
   impl->footprint = footprint.Padded();
@@ -119,5 +122,6 @@ Result<std::vector<std::uint8_t>> WaterRaster::Read(const geo::TileKey& key, std
 }
 
 std::uint64_t WaterRaster::fingerprint() const { return impl_->handles.files().fingerprint(); }
+const StampedFiles& WaterRaster::files() const { return impl_->handles.files(); }
 
 }  // namespace terrace::dem

@@ -11,6 +11,7 @@
 
 #include "engine/core/result.h"
 #include "engine/dem/dem_source.h"
+#include "engine/dem/file_stamp.h"
 #include "engine/geo/tile_key.h"
 
 namespace terrace::dem {
@@ -37,6 +38,9 @@ class WaterRaster {
 
   // Identifies the content: device, inode, size and mtime of its files.
   std::uint64_t fingerprint() const;
+
+  // What it is read from, as it was when it was opened.
+  const StampedFiles& files() const;
 
  private:
   class Impl;

@@ -11,9 +11,14 @@
 #include <string>
 #include <vector>
 
+#include "config/config.h"
+#include "config/parse.h"
 #include "engine/dem/dem_source.h"
+#include "engine/dem/source_policy.h"
 #include "engine/geo/error_ladder.h"
 #include "server/cli/command.h"
+#include "server/cli/mosaic_info.h"
+#include "server/cli/open_source.h"
 #include "server/cli/progress.h"
 
 namespace terrace::cli {
@@ -35,11 +40,14 @@ std::string NoOverviewsAdvice(const dem::RasterInfo& info) {
 std::vector<std::string> AdviceFor(const dem::RasterInfo& info, double floor) {
   std::vector<std::string> advice;
   if (info.needs_averages) advice.push_back(NoOverviewsAdvice(info));
-  if (info.vertical_datum.empty()) {
+  if (info.counts_from.empty()) {
     advice.push_back(
         "no vertical datum stated: heights are taken as metres above the WGS 84 ellipsoid as they are; heights above "
-        "mean "
-        "sea level will be off by the geoid, up to 100 m");
+        "mean sea level will be off by the geoid, up to 100 m: say so with --vertical egm96, or another");
+  }
+  if (!info.found_voids.empty()) {
+    advice.push_back(
+        fmt::format("undeclared voids: {}; mend the file, or state `nodata` in the configuration", info.found_voids));
   }
   if (info.void_samples > 0) {
     advice.push_back(
@@ -64,7 +72,11 @@ void PrintText(const dem::DemInfo& dataset) {
                              info.bounds.south, info.bounds.east, info.bounds.north));
   line("heights", fmt::format("{:g} to {:g} m{}", info.heights.min, info.heights.max,
                               info.height_unit.empty() ? "" : ", unit " + info.height_unit));
-  line("datum", info.vertical_datum.empty() ? "not stated" : info.vertical_datum);
+  line("datum", info.counts_from.empty() ? "not stated" : info.counts_from);
+  if (!info.vertical_operation.empty()) {
+    line("converted", fmt::format("by {}: {:.2f} to {:.2f} m above the ellipsoid, or less", info.vertical_operation,
+                                  info.ellipsoidal.min, info.ellipsoidal.max));
+  }
   line("voids", info.void_samples == 0
                     ? "none"
                     : fmt::format("{} samples, {}", info.void_samples,
@@ -87,6 +99,10 @@ nlohmann::json ToJson(const dem::DemInfo& dataset) {
           {"data_type", info.data_type},
           {"crs", info.crs},
           {"vertical_datum", info.vertical_datum},
+          {"counts_from", info.counts_from},
+          {"vertical_operation", info.vertical_operation},
+          {"ellipsoidal_heights", {{"min", info.ellipsoidal.min}, {"max", info.ellipsoidal.max}}},
+          {"found_voids", info.found_voids},
           {"pixel", {{"width", info.pixel_width}, {"height", info.pixel_height}, {"unit", info.pixel_unit}}},
           {"spacing_m", info.spacing_m},
           {"bounds", {info.bounds.west, info.bounds.south, info.bounds.east, info.bounds.north}},
@@ -100,24 +116,47 @@ nlohmann::json ToJson(const dem::DemInfo& dataset) {
           {"advice", AdviceFor(info, dataset.floor)}};
 }
 
-int Info(const std::vector<std::string>& dems, const std::string& cache_dir, bool json) {
-  spdlog::set_level(spdlog::level::err);  // what opening logs is printed below
-  int exit_code = kExitOk;
-  nlohmann::json all = nlohmann::json::array();
-  for (const std::string& path : dems) {
-    Progress progress((cache_dir.empty() ? "reading " : "preparing ") + path);
-    dem::DemOptions options;
-    options.cache_dir = cache_dir;
-    options.progress = progress.Callback();
-    const auto source = dem::DemSource::Open(path, options);
+// Each DEM is a dataset, or all of them are one.
+std::vector<std::vector<config::SourceConfig>> Datasets(const std::vector<std::string>& dems, bool mosaic,
+                                                        int& exit_code) {
+  std::vector<std::vector<config::SourceConfig>> datasets;
+  for (const std::string& dem : dems) {
+    Result<config::SourceConfig> source = config::SourceAt(dem);
     if (!source) {
       std::fprintf(stderr, "terrace: %s\n", source.error().message.c_str());
       exit_code = kExitFailure;
-    } else if (json) {
-      all.push_back(ToJson((*source)->info()));
+    } else if (mosaic && !datasets.empty()) {
+      datasets.front().push_back(*std::move(source));
     } else {
-      PrintText((*source)->info());
+      datasets.push_back({*std::move(source)});
     }
+  }
+  return datasets;
+}
+
+int Info(const std::vector<std::string>& dems, const std::string& vertical, const std::string& cache_dir, bool json,
+         bool mosaic) {
+  spdlog::set_level(spdlog::level::err);  // what opening logs is printed below
+  int exit_code = dem::AllowVrts() ? kExitOk : kExitFailure;
+  nlohmann::json all = nlohmann::json::array();
+  for (const auto& sources : Datasets(dems, mosaic, exit_code)) {
+    const std::string name = NameOf(sources);
+    Progress progress((cache_dir.empty() ? "reading " : "preparing ") + name, FileCount(sources));
+    config::DatasetConfig dataset;
+    dataset.sources = sources;
+    dataset.vertical = vertical;
+    const auto source = OpenSource(dataset, cache_dir, progress.Callback());
+    if (!source) {
+      std::fprintf(stderr, "terrace: %s\n", source.error().message.c_str());
+      exit_code = kExitFailure;
+      continue;
+    }
+    const dem::DemInfo& info = (*source)->info();
+    const bool is_one = info.sources.size() == 1;
+    if (json)
+      all.push_back(is_one ? ToJson(info) : nlohmann::json::parse(MosaicJson(name, info)));
+    else
+      is_one ? PrintText(info) : PrintMosaic(name, info);
   }
   if (json) fmt::print("{}\n", all.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
   return exit_code;
@@ -127,20 +166,29 @@ int Info(const std::vector<std::string>& dems, const std::string& cache_dir, boo
 
 void AddInfo(CLI::App& app, int& exit_code) {
   auto dems = std::make_shared<std::vector<std::string>>();
-  auto json = std::make_shared<bool>(false);
-  auto cache_dir = std::make_shared<std::string>();
+  auto vertical = std::make_shared<std::string>("crs"), cache_dir = std::make_shared<std::string>();
+  auto json = std::make_shared<bool>(false), mosaic = std::make_shared<bool>(false);
   CLI::App* command =
       app.add_subcommand("info", "Tells what rasters hold, the levels they can serve, and what to mend");
   command->footer(
       "Examples:\n"
       "  terrace info alps.tif andes.tif\n"
-      "  terrace info alps.tif --json\n\n"
+      "  terrace info alps.tif --json\n"
+      "  terrace info --mosaic lidar/ base.tif\n\n"
       "A raster that cannot be served is told on stderr with the reason and the remedy; the others are still shown.");
-  command->add_option("DEM", *dems, "Rasters that GDAL can read")->required();
+  command->add_option("DEM", *dems, "Rasters that GDAL can read, or folders of them")->required();
   command->add_flag("--json", *json, "One JSON array instead of text");
+  command->add_flag("--mosaic", *mosaic, "Takes all of them for one dataset, the first counting most");
+  command
+      ->add_option("--vertical", *vertical,
+                   "What heights count from: crs (as the raster states), unknown, ellipsoid, egm96, egm2008, EPSG:N or "
+                   "the path of a grid")
+      ->type_name("DATUM");
   command->add_option("--cache-dir", *cache_dir, "Keeps what is learnt in this folder, for 'terrace serve --cache-dir'")
       ->type_name("DIR");
-  command->callback([dems, json, cache_dir, &exit_code] { exit_code = Info(*dems, *cache_dir, *json); });
+  command->callback([dems, vertical, cache_dir, json, mosaic, &exit_code] {
+    exit_code = Info(*dems, *vertical, *cache_dir, *json, *mosaic);
+  });
 }
 
 }  // namespace terrace::cli

@@ -41,6 +41,11 @@ spdlog::level::level_enum LevelOf(config::LogLevel level) {
 
 }  // namespace
 
+void SetLogLevel(config::LogLevel level) {
+  spdlog::default_logger_raw()->set_level(LevelOf(level));
+  spdlog::log(LevelOf(level), "log level: {}", spdlog::level::to_string_view(LevelOf(level)));
+}
+
 void SetUpLog(config::LogLevel level, config::LogFormat format) {
   auto logger = spdlog::stderr_color_mt("terrace");
   logger->set_level(LevelOf(level));

@@ -5,6 +5,9 @@
 
 namespace terrace::cli {
 
+// From any thread, while others log. Says so.
+void SetLogLevel(config::LogLevel level);
+
 void SetUpLog(config::LogLevel level, config::LogFormat format);
 
 }  // namespace terrace::cli

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "config/nearest_name.h"
+#include "engine/dem/source_policy.h"
 #include "server/cli/command.h"
 
 namespace terrace::cli {
@@ -88,6 +89,8 @@ int Run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   try {
+    // Before there are threads.
+    terrace::dem::ClearGdalEnvironment();
     return terrace::cli::Run(argc, argv);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "terrace: %s\n", error.what());

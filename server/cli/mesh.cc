@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "engine/dem/dem_source.h"
+#include "engine/dem/source_policy.h"
 #include "engine/tin/drop_pass.h"
 #include "engine/tin/field_cut.h"
 #include "engine/tin/greedy.h"
@@ -160,6 +161,7 @@ CLI::Validator OneOf(const std::vector<std::string>& words) {
 int Mesh(const MeshArguments& arguments) {
   spdlog::set_level(spdlog::level::err);
   if (const std::string complaint = Complain(arguments); !complaint.empty()) return Fail(complaint, kExitUsage);
+  if (const auto allowed = dem::AllowVrts(); !allowed) return Fail(allowed.error().message, kExitFailure);
   if (arguments.color.IsUsed()) {
     tin::ExtendedGoal goal;
     if (arguments.max_error >= 0) goal.max_error = arguments.max_error;

@@ -2,13 +2,30 @@
 
 #include <fmt/format.h>
 
+#include <utility>
+
 namespace terrace::cli {
 
-std::vector<dem::DemFile> FilesOf(const std::vector<config::SourceConfig>& sources) {
+namespace {
+
+// What the dataset says and its source does not contradict.
+dem::SourceOptions OptionsOf(const config::DatasetConfig& dataset, const config::SourceConfig& source) {
+  const config::NodataConfig nodata = source.nodata.value_or(dataset.nodata);
+  dem::SourceOptions options;
+  options.vertical = source.vertical.value_or(dataset.vertical);
+  options.find_voids = nodata.detect;
+  options.nodata = nodata.values;
+  return options;
+}
+
+}  // namespace
+
+std::vector<dem::DemFile> FilesOf(const config::DatasetConfig& dataset) {
+  const std::vector<config::SourceConfig>& sources = dataset.sources;
   std::vector<dem::DemFile> files;
   for (std::size_t rank = 0; rank < sources.size(); ++rank) {
     for (const std::string& file : sources[rank].files) {
-      files.push_back({file, static_cast<int>(rank), sources[rank].is_folder});
+      files.push_back({file, static_cast<int>(rank), sources[rank].is_folder, OptionsOf(dataset, sources[rank])});
     }
   }
   return files;
@@ -27,15 +44,18 @@ std::string NameOf(const std::vector<config::SourceConfig>& sources) {
 }
 
 Result<std::unique_ptr<dem::DemSource>> OpenSource(const config::DatasetConfig& wanted, const std::string& cache_dir,
-                                                   const std::function<void(double)>& progress) {
+                                                   const std::function<void(double)>& progress, std::stop_token stop) {
   dem::DemOptions options;
   options.error_fraction = wanted.error_fraction;
   options.finest_error = wanted.finest_error;
   options.floor = wanted.floor;
   options.max_void_gap = wanted.max_void_gap;
   options.cache_dir = cache_dir;
+  options.feather = wanted.feather;
+  options.max_open_sources = wanted.max_open_sources;
   options.progress = progress;
-  return dem::DemSource::Open(FilesOf(wanted.sources), options);
+  options.stop = std::move(stop);
+  return dem::DemSource::Open(FilesOf(wanted), options);
 }
 
 }  // namespace terrace::cli

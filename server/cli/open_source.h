@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <functional>
 #include <memory>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -14,14 +15,16 @@
 namespace terrace::cli {
 
 // All files of the sources, each entry one rank.
-std::vector<dem::DemFile> FilesOf(const std::vector<config::SourceConfig>& sources);
+std::vector<dem::DemFile> FilesOf(const config::DatasetConfig& dataset);
 std::size_t FileCount(const std::vector<config::SourceConfig>& sources);
 
 // For messages: "alps.tif", "alps.tif and 2 more sources".
 std::string NameOf(const std::vector<config::SourceConfig>& sources);
 
-// Opens and scans all of them. Errors name the file and the remedy.
+// Opens and scans all of them; what is learnt is kept in `cache_dir`, if it is not empty. Errors name the file and the
+// remedy.
 Result<std::unique_ptr<dem::DemSource>> OpenSource(const config::DatasetConfig& wanted, const std::string& cache_dir,
-                                                   const std::function<void(double)>& progress);
+                                                   const std::function<void(double)>& progress,
+                                                   std::stop_token stop = {});
 
 }  // namespace terrace::cli

@@ -4,10 +4,14 @@
 #include <xxhash.h>
 
 #include <CLI/CLI.hpp>
+#include <atomic>
+#include <csignal>
 #include <cstdio>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
+#include <stop_token>
 #include <string>
 #include <utility>
 #include <vector>
@@ -15,12 +19,16 @@
 #include "config/config.h"
 #include "config/options.h"
 #include "config/parse.h"
+#include "engine/dem/source_policy.h"
 #include "server/cli/command.h"
 #include "server/cli/log.h"
 #include "server/cli/open_layers.h"
 #include "server/cli/open_source.h"
 #include "server/cli/progress.h"
+#include "server/cli/service_manager.h"
+#include "server/reload/reloader.h"
 #include "server/server.h"
+#include "server/tiles/pipeline_catalog.h"
 #include "server/tiles/tile_pipeline.h"
 
 namespace terrace::cli {
@@ -123,35 +131,52 @@ proto::GlbOptions GlbOptionsOf(const config::DatasetConfig& dataset) {
   return options;
 }
 
+Result<server::Dataset> OpenDataset(const config::DatasetConfig& wanted, const std::string& cache_dir,
+                                    const std::function<void(double)>& progress, std::stop_token stop) {
+  auto source = OpenSource(wanted, cache_dir, progress, std::move(stop));
+  if (!source) return tl::unexpected(source.error());
+  server::Dataset dataset;
+  dataset.name = wanted.name;
+  dataset.attribution = wanted.attribution;
+  dataset.error_fraction = wanted.error_fraction;
+  dataset.rules = {CriterionOf(wanted.criterion), wanted.compact};
+  dataset.glb = GlbOptionsOf(wanted);
+  dataset.source = *std::move(source);
+  if (const Result<void> layers = OpenLayers(wanted, dataset); !layers) return tl::unexpected(layers.error());
+  dataset.generation = GenerationOf(wanted, *dataset.source, LayersFingerprint(dataset));
+  return dataset;
+}
+
 // Opens every source; false if one could not be, after all of them had their message.
 bool OpenDatasets(const config::Config& config, std::vector<server::Dataset>& datasets) {
   bool all_open = true;
   for (const config::DatasetConfig& wanted : config.datasets) {
     Progress progress((config.cache_dir.empty() ? "reading " : "preparing ") + NameOf(wanted.sources),
                       FileCount(wanted.sources));
-    auto source = OpenSource(wanted, config.cache_dir, progress.Callback());
-    if (!source) {
-      std::fprintf(stderr, "terrace: dataset %s: %s\n", wanted.name.c_str(), source.error().message.c_str());
+    Result<server::Dataset> dataset = OpenDataset(wanted, config.cache_dir, progress.Callback(), {});
+    if (!dataset) {
+      std::fprintf(stderr, "terrace: dataset %s: %s\n", wanted.name.c_str(), dataset.error().message.c_str());
       all_open = false;
       continue;
     }
-    server::Dataset dataset;
-    dataset.name = wanted.name;
-    dataset.attribution = wanted.attribution;
-    dataset.error_fraction = wanted.error_fraction;
-    dataset.rules = {CriterionOf(wanted.criterion), wanted.compact};
-    dataset.glb = GlbOptionsOf(wanted);
-    dataset.source = *std::move(source);
-    if (const Result<void> layers = OpenLayers(wanted, dataset); !layers) {
-      std::fprintf(stderr, "terrace: dataset %s: %s\n", wanted.name.c_str(), layers.error().message.c_str());
-      all_open = false;
-      continue;
-    }
-    dataset.generation = GenerationOf(wanted, *dataset.source, LayersFingerprint(dataset));
-    spdlog::info("dataset {}: {}, levels 0 to {}", dataset.name, NameOf(wanted.sources), dataset.source->max_level());
-    datasets.push_back(std::move(dataset));
+    spdlog::info("dataset {}: {}, levels 0 to {}", dataset->name, NameOf(wanted.sources), dataset->source->max_level());
+    datasets.push_back(*std::move(dataset));
   }
   return all_open;
+}
+
+server::AccessLogForm AccessLogFormOf(config::AccessLog form) {
+  switch (form) {
+    case config::AccessLog::kCombined:
+      return server::AccessLogForm::kCombined;
+    case config::AccessLog::kJson:
+      return server::AccessLogForm::kJson;
+    case config::AccessLog::kOff:
+      return server::AccessLogForm::kOff;
+    case config::AccessLog::kLog:
+      break;
+  }
+  return server::AccessLogForm::kLog;
 }
 
 server::EdgeOptions EdgeOf(const config::Config& config) {
@@ -186,7 +211,6 @@ server::ServerOptions OptionsOf(const config::Config& config) {
   options.queue_length = config.queue_length;
   options.cache_bytes = config.cache_bytes;
   options.max_locations = config.max_locations;
-  options.max_mesh_samples = config.max_mesh_samples;
   options.edge = EdgeOf(config);
   options.cache_control = config.cache_control;
   options.header_timeout = config.header_timeout;
@@ -196,6 +220,8 @@ server::ServerOptions OptionsOf(const config::Config& config) {
   options.request_deadline = config.request_deadline;
   options.drain_timeout = config.drain_timeout;
   options.stop_on_signals = true;
+  options.access_log = AccessLogFormOf(config.access_log);
+  options.access_log_file = config.access_log_file;
   if (config.viewer.enabled) {
     options.viewer_dir = config.viewer.directory;
     if (options.viewer_dir.empty()) {
@@ -218,18 +244,76 @@ int Serve(const ServeArguments& arguments) {
     return kExitOk;
   }
   SetUpLog(config.log_level, config.log_format);
+  dem::SetGdalCache(config.gdal_cache_bytes);
+  if (const auto policy = dem::SetSourcePolicy({config.data_roots, config.allowed_prefixes, config.allowed_drivers});
+      !policy) {
+    std::fprintf(stderr, "terrace: %s\n", policy.error().message.c_str());
+    return kExitUsage;
+  }
   std::vector<server::Dataset> datasets;
   if (!OpenDatasets(config, datasets)) return kExitFailure;
   const std::size_t count = datasets.size();
-  auto pipeline = std::make_shared<const server::TilePipeline>(std::move(datasets), config.refinement_cache_bytes);
-  auto server = server::Server::Start(std::move(pipeline), OptionsOf(config));
-  if (!server) {
-    std::fprintf(stderr, "terrace: %s\n", server.error().message.c_str());
+
+  const auto refinements = std::make_shared<server::RefinementCache>(config.refinement_cache_bytes);
+  const auto catalog_of = [refinements](const std::vector<server::Dataset>& served, const config::Config& now) {
+    return server::MakeCatalog(std::make_shared<const server::TilePipeline>(served, refinements), now.max_mesh_samples);
+  };
+  const auto level = std::make_shared<std::atomic<config::LogLevel>>(config.log_level);  // the configured one
+  std::unique_ptr<server::Server> server;
+  server::Reloader::Hooks hooks;
+  hooks.load = [&arguments]() -> config::ConfigResult {
+    std::vector<config::ConfigError> wrong;
+    config::Config loaded = MakeConfig(arguments, wrong);
+    if (!wrong.empty()) return tl::unexpected(std::move(wrong));
+    return loaded;
+  };
+  hooks.open = [cache_dir = config.cache_dir](const config::DatasetConfig& wanted, std::stop_token stop) {
+    return OpenDataset(wanted, cache_dir, {}, std::move(stop));
+  };
+  hooks.publish = [&](const std::vector<server::Dataset>& served, const config::Config& now) {
+    if (level->exchange(now.log_level) != now.log_level) SetLogLevel(now.log_level);
+    refinements->SetCapacity(now.refinement_cache_bytes);
+    if (const Result<void> replaced = server->Replace(catalog_of(served, now), OptionsOf(now)); !replaced) {
+      spdlog::error("the new configuration cannot be served: {}", replaced.error().message);
+    }
+    std::vector<std::uint64_t> generations;
+    for (const server::Dataset& dataset : served) generations.push_back(dataset.generation);
+    refinements->Retain(generations);
+  };
+  hooks.reloaded = [&] {
+    server->ReopenAccessLog();
+    NotifyReady("at " + server->url());
+  };
+  hooks.tell = [&](const std::map<std::string, std::string>& troubles) { server->SetTroubles(troubles); };
+  server::Reloader reloader(config, datasets, std::move(hooks));
+
+  server::ServerOptions options = OptionsOf(config);
+  options.refinement_stats = [refinements] { return refinements->stats(); };
+  options.on_source_changed = config.watch ? std::function<void()>([&reloader] { reloader.Look(); }) : nullptr;
+  // Without a file the end of a terminal is what it always was.
+  if (!arguments.config_file.empty() || !config.watch) {
+    options.on_signal[SIGHUP] = [&reloader] {
+      NotifyReloading();
+      reloader.Reload();
+    };
+  }
+  options.on_stop = NotifyStopping;
+  options.on_signal[SIGUSR1] = [] { SetLogLevel(config::LogLevel::kDebug); };
+  options.on_signal[SIGUSR2] = [level] { SetLogLevel(*level); };
+  auto started = server::Server::Start(catalog_of(datasets, config), options);
+  if (!started) {
+    std::fprintf(stderr, "terrace: %s\n", started.error().message.c_str());
     return kExitFailure;
   }
-  std::printf("terrace: serving %zu dataset%s at %s\n", count, count == 1 ? "" : "s", (*server)->url().c_str());
+  server = *std::move(started);
+  datasets.clear();  // what is replaced must not stay open
+  reloader.Start(config.watch);
+  std::printf("terrace: serving %zu dataset%s at %s\n", count, count == 1 ? "" : "s", server->url().c_str());
   std::fflush(stdout);
-  return (*server)->Wait() ? kExitOk : kExitFailure;
+  NotifyReady(fmt::format("{} dataset{} at {}", count, count == 1 ? "" : "s", server->url()));
+  const bool drained = server->Wait();
+  reloader.Stop();
+  return drained ? kExitOk : kExitFailure;
 }
 
 // Every option of the configuration is a flag; its text is kept until the file has been read, and checked then.

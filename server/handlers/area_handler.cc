@@ -123,30 +123,29 @@ Result<AreaRequest> ParseAreaRequest(std::string_view query) {
   return area;
 }
 
-AreaHandler::AreaHandler(std::span<const DatasetView> datasets, TileService& tiles, AreaMesher mesher,
-                         TileHandlerOptions options)
-    : datasets_(datasets), tiles_(tiles), mesher_(std::move(mesher)), options_(std::move(options)) {}
+AreaHandler::AreaHandler(CatalogPtr catalog, TileService& tiles, TileHandlerOptions options)
+    : catalog_(std::move(catalog)), tiles_(tiles), options_(std::move(options)) {}
 
 asio::awaitable<Response> AreaHandler::Handle(Route route, Request request) const {
-  const Result<std::uint32_t> dataset = FindDataset(route.dataset, datasets_);
+  const Result<std::uint32_t> dataset = FindDataset(route.dataset, catalog_->datasets);
   if (!dataset) co_return ClientErrorResponse(dataset.error(), request.id);
   const Result<AreaRequest> area = ParseAreaRequest(route.query);
   if (!area) co_return ClientErrorResponse(area.error(), request.id);
-  const Result<AreaPlan> plan = mesher_.plan(*dataset, *area);
+  const Result<AreaPlan> plan = catalog_->area_mesher.plan(*dataset, *area);
   if (!plan) co_return ClientErrorResponse(plan.error(), request.id);
 
   const Coding coding = NegotiateCoding(request.accept_encoding);
   Response response;
   response.content_type = ContentTypeOf(area->format);
   response.coding = coding;
-  response.etag = RequestETag("mesh", datasets_[*dataset], route.query, coding);
+  response.etag = RequestETag("mesh", catalog_->datasets[*dataset], route.query, coding);
   response.cache_control = options_.cache_control;
   response.vary = true;
   if (MatchesEtag(request.if_none_match, response.etag)) co_return Conditional(std::move(response), request);
 
-  SingleFlight::Work work = [this, index = *dataset, area = *area, plan = *plan,
+  SingleFlight::Work work = [catalog = catalog_, index = *dataset, area = *area, plan = *plan,
                              coding](std::stop_token stop) -> Result<EncodedTile> {
-    Result<EncodedTile> mesh = mesher_.build(index, plan, area, std::move(stop));
+    Result<EncodedTile> mesh = catalog->area_mesher.build(index, plan, area, std::move(stop));
     if (!mesh || coding == Coding::kIdentity) return mesh;
     mesh->bytes = Compress(std::move(mesh->bytes), coding);
     return mesh;

@@ -1,7 +1,6 @@
 // GET /{dataset}/mesh
 #pragma once
 
-#include <span>
 #include <string_view>
 
 #include "engine/core/result.h"
@@ -11,23 +10,22 @@
 #include "server/http/response.h"
 #include "server/http/router.h"
 #include "server/tiles/area_mesh.h"
-#include "server/tiles/dataset_view.h"
+#include "server/tiles/catalog.h"
 #include "server/tiles/tile_service.h"
 
 namespace terrace::server {
 
 class AreaHandler {
  public:
-  // `datasets` and `tiles`, whose workers mesh the areas, must outlive this.
-  AreaHandler(std::span<const DatasetView> datasets, TileService& tiles, AreaMesher mesher, TileHandlerOptions options);
+  // `tiles`, whose workers mesh the areas, must outlive this.
+  AreaHandler(CatalogPtr catalog, TileService& tiles, TileHandlerOptions options);
 
   // Precondition: a kMesh route.
   asio::awaitable<Response> Handle(Route route, Request request) const;
 
  private:
-  const std::span<const DatasetView> datasets_;
+  const CatalogPtr catalog_;
   TileService& tiles_;
-  const AreaMesher mesher_;
   const TileHandlerOptions options_;
 };
 

@@ -55,6 +55,7 @@ std::string DatasetsJson(std::span<const DatasetView> datasets) {
     entry["name"] = dataset.name;
     entry["attribution"] = dataset.attribution;
     entry["bounds"] = {dataset.west, dataset.south, dataset.east, dataset.north};
+    entry["sources"] = dataset.sources;
     entry["min_level"] = 0;
     entry["max_level"] = dataset.max_level();
     entry["heights"]["min"] = dataset.min_height_m;

@@ -15,13 +15,9 @@
 
 namespace terrace::server {
 
-HeightsHandler::HeightsHandler(std::span<const DatasetView> datasets, TileService& tiles, PointReader reader,
-                               TileHandlerOptions options, std::size_t max_locations)
-    : datasets_(datasets),
-      tiles_(tiles),
-      reader_(std::move(reader)),
-      options_(std::move(options)),
-      max_locations_(max_locations) {}
+HeightsHandler::HeightsHandler(CatalogPtr catalog, TileService& tiles, TileHandlerOptions options,
+                               std::size_t max_locations)
+    : catalog_(std::move(catalog)), tiles_(tiles), options_(std::move(options)), max_locations_(max_locations) {}
 
 Result<HeightsQuery> HeightsHandler::Parse(const Route& route, const Request& request) const {
   Result<QueryParameters> parameters = ParseQuery(route.query);
@@ -40,10 +36,16 @@ asio::awaitable<Response> HeightsHandler::Handle(Route route, Request request) c
     co_return ProblemResponse(
         415, "the body's Content-Type must be application/json or application/x-www-form-urlencoded", request.id);
   }
-  const Result<std::uint32_t> dataset = FindDataset(route.dataset, datasets_);
+  const Result<std::uint32_t> dataset = FindDataset(route.dataset, catalog_->datasets);
   if (!dataset) co_return ClientErrorResponse(dataset.error(), request.id);
   Result<HeightsQuery> parsed = Parse(route, request);
   if (!parsed) co_return ClientErrorResponse(parsed.error(), request.id);
+  if (parsed->datum == dem::HeightDatum::kOrthometric && !catalog_->datasets[*dataset].has_datum) {
+    const Error unknown{
+        ErrorCode::kInvalidArgument,
+        "datum: it is not known what this dataset's heights count from, so there are no orthometric ones"};
+    co_return ClientErrorResponse(unknown, request.id);
+  }
 
   const Coding coding = NegotiateCoding(request.accept_encoding);
   Response response;
@@ -52,17 +54,21 @@ asio::awaitable<Response> HeightsHandler::Handle(Route route, Request request) c
   response.vary = true;
   response.cache_control = "no-store";
   if (!is_post) {
-    response.etag = RequestETag("heights", datasets_[*dataset], route.query, coding);
+    response.etag = RequestETag("heights", catalog_->datasets[*dataset], route.query, coding);
     response.cache_control = options_.cache_control;
     if (MatchesEtag(request.if_none_match, response.etag)) co_return Conditional(std::move(response), request);
   }
 
   auto query = std::make_shared<const HeightsQuery>(*std::move(parsed));
-  SingleFlight::Work work = [this, index = *dataset, coding, query](std::stop_token stop) -> Result<EncodedTile> {
-    const Result<std::vector<float>> heights = reader_(index, query->points, std::move(stop));
+  SingleFlight::Work work = [catalog = catalog_, index = *dataset, coding,
+                             query](std::stop_token stop) -> Result<EncodedTile> {
+    const auto begun = TileService::Clock::now();
+    const Result<std::vector<float>> heights =
+        catalog->read_points(index, query->points, query->datum, std::move(stop));
     if (!heights) return tl::unexpected(heights.error());
     EncodedTile reply;
-    reply.bytes = HeightsJson(*query, *heights, datasets_[index].name);
+    reply.times.read = std::chrono::duration_cast<std::chrono::microseconds>(TileService::Clock::now() - begun);
+    reply.bytes = HeightsJson(*query, *heights, catalog->datasets[index].name);
     reply.bytes = Compress(std::move(reply.bytes), coding);
     return reply;
   };
@@ -70,6 +76,7 @@ asio::awaitable<Response> HeightsHandler::Handle(Route route, Request request) c
   const Result<TilePtr> reply = co_await tiles_.Run(std::move(work), TileService::Length::kShort, deadline);
   if (!reply) co_return co_await BackendFailure(reply.error(), request.id, options_.refusal_delay);
   response.body = Body(*reply, &(*reply)->bytes);
+  response.headers.emplace_back("Server-Timing", FormatServerTiming(CacheStatus::kMiss, (*reply)->times));
   co_return response;
 }
 
@@ -89,6 +96,7 @@ std::string HeightsJson(const HeightsQuery& query, std::span<const float> height
     if (!query.distances_m.empty()) fmt::format_to(out, ",\"distance\":{}", query.distances_m[i]);
     fmt::format_to(out, ",\"dataset\":{}}}", name);
   }
+  if (query.datum == dem::HeightDatum::kOrthometric) return json + "],\"datum\":\"orthometric\",\"status\":\"OK\"}";
   return json + "],\"status\":\"OK\"}";
 }
 

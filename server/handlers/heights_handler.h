@@ -12,16 +12,15 @@
 #include "server/http/request.h"
 #include "server/http/response.h"
 #include "server/http/router.h"
-#include "server/tiles/dataset_view.h"
+#include "server/tiles/catalog.h"
 #include "server/tiles/tile_service.h"
 
 namespace terrace::server {
 
 class HeightsHandler {
  public:
-  // `datasets` and `tiles`, whose workers read the heights, must outlive this.
-  HeightsHandler(std::span<const DatasetView> datasets, TileService& tiles, PointReader reader,
-                 TileHandlerOptions options, std::size_t max_locations);
+  // `tiles`, whose workers read the heights, must outlive this.
+  HeightsHandler(CatalogPtr catalog, TileService& tiles, TileHandlerOptions options, std::size_t max_locations);
 
   // Precondition: a kHeights route.
   asio::awaitable<Response> Handle(Route route, Request request) const;
@@ -29,15 +28,14 @@ class HeightsHandler {
  private:
   Result<HeightsQuery> Parse(const Route& route, const Request& request) const;
 
-  const std::span<const DatasetView> datasets_;
+  const CatalogPtr catalog_;
   TileService& tiles_;
-  const PointReader reader_;
   const TileHandlerOptions options_;
   const std::size_t max_locations_;
 };
 
 // {"results":[{"elevation","location":{"lat","lng"},"dataset"}],"status":"OK"}, as Open Topo Data replies; points of a
-// path have their "distance" as well. Metres; null where there is no height.
+// path have their "distance" as well. Metres; null where there is no height. Orthometric ones say so: "datum".
 std::string HeightsJson(const HeightsQuery& query, std::span<const float> heights, std::string_view dataset);
 
 }  // namespace terrace::server

@@ -59,18 +59,18 @@ Result<std::vector<dem::GeoPosition>> ParseLocations(std::string_view text, cons
 
 // Each parameter at most once.
 struct Wishes {
-  std::optional<std::string> locations, path, step, samples;
+  std::optional<std::string> locations, path, step, samples, datum;
 
   Result<void> Set(const std::string& name, const std::string& value) {
-    std::optional<std::string>* const known[] = {&locations, &path, &step, &samples};
-    constexpr const char* kNames[] = {"locations", "path", "step", "samples"};
+    std::optional<std::string>* const known[] = {&locations, &path, &step, &samples, &datum};
+    constexpr const char* kNames[] = {"locations", "path", "step", "samples", "datum"};
     for (std::size_t i = 0; i < std::size(kNames); ++i) {
       if (name != kNames[i]) continue;
       if (*known[i]) return MakeError(ErrorCode::kInvalidArgument, "{} is given more than once", kNames[i]);
       *known[i] = value;
       return {};
     }
-    return MakeError(ErrorCode::kInvalidArgument, "unknown parameter; known are locations, path, step, samples");
+    return MakeError(ErrorCode::kInvalidArgument, "unknown parameter; known are locations, path, step, samples, datum");
   }
 };
 
@@ -148,12 +148,9 @@ Result<QueryParameters> ParseJsonBody(std::string_view body) {
 
 }  // namespace
 
-Result<HeightsQuery> ParseHeightsQuery(const QueryParameters& parameters, std::size_t max_locations) {
-  Wishes wishes;
-  for (const auto& [name, value] : parameters) {
-    if (name == "v") continue;
-    if (const Result<void> set = wishes.Set(name, value); !set) return tl::unexpected(set.error());
-  }
+namespace {
+
+Result<HeightsQuery> ParsePoints(const Wishes& wishes, std::size_t max_locations) {
   if (wishes.locations.has_value() == wishes.path.has_value()) {
     return MakeError(ErrorCode::kInvalidArgument, "either locations or path is needed: latitude,longitude|...");
   }
@@ -161,7 +158,26 @@ Result<HeightsQuery> ParseHeightsQuery(const QueryParameters& parameters, std::s
   if (wishes.step || wishes.samples) return MakeError(ErrorCode::kInvalidArgument, "step and samples need path");
   Result<std::vector<dem::GeoPosition>> points = ParseLocations(*wishes.locations, "locations", max_locations);
   if (!points) return tl::unexpected(std::move(points).error());
-  return HeightsQuery{*std::move(points), {}};
+  HeightsQuery query;
+  query.points = *std::move(points);
+  return query;
+}
+
+}  // namespace
+
+Result<HeightsQuery> ParseHeightsQuery(const QueryParameters& parameters, std::size_t max_locations) {
+  Wishes wishes;
+  for (const auto& [name, value] : parameters) {
+    if (name == "v") continue;
+    if (const Result<void> set = wishes.Set(name, value); !set) return tl::unexpected(set.error());
+  }
+  Result<HeightsQuery> query = ParsePoints(wishes, max_locations);
+  if (!query || !wishes.datum || *wishes.datum == "ellipsoid") return query;
+  if (*wishes.datum != "orthometric") {
+    return MakeError(ErrorCode::kInvalidArgument, "datum must be ellipsoid or orthometric");
+  }
+  query->datum = dem::HeightDatum::kOrthometric;
+  return query;
 }
 
 bool IsHeightsBody(std::string_view content_type) { return IsForm(content_type) || IsJson(content_type); }

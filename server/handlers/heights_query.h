@@ -14,11 +14,13 @@ namespace terrace::server {
 struct HeightsQuery {
   std::vector<dem::GeoPosition> points;
   std::vector<double> distances_m;  // of a path: one a point, from its beginning; else empty
+  dem::HeightDatum datum = dem::HeightDatum::kEllipsoid;
 };
 
-// `locations=lat,lon|lat,lon`, or `path=lat,lon|lat,lon` with either `step=METRES` or `samples=N`; `v` may come any
-// number of times. kInvalidArgument, with a message for the client that names the item: anything else, numbers that are
-// not finite or no place on Earth, and more than `max_locations` points.
+// `locations=lat,lon|lat,lon`, or `path=lat,lon|lat,lon` with either `step=METRES` or `samples=N`; with
+// either, `datum=ellipsoid` or `datum=orthometric`; `v` may come any number of times. kInvalidArgument, with a message
+// for the client that names the item: anything else, numbers that are not finite or no place on Earth, and more than
+// `max_locations` points.
 Result<HeightsQuery> ParseHeightsQuery(const QueryParameters& parameters, std::size_t max_locations);
 
 // Whether a body of this Content-Type is read at all: JSON or a form.

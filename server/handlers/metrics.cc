@@ -6,11 +6,14 @@
 #include <prometheus/registry.h>
 #include <prometheus/text_serializer.h>
 
+#include <algorithm>
 #include <chrono>
 #include <map>
 #include <mutex>
 #include <shared_mutex>
 #include <string>
+#include <string_view>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -38,13 +41,31 @@ prometheus::MetricFamily Value(prometheus::MetricType type, const char* name, co
   return family;
 }
 
+prometheus::MetricFamily Samples(const std::vector<std::pair<std::string, dem::SampleCounts>>& datasets) {
+  prometheus::MetricFamily family;
+  family.name = "terrace_source_samples_total";
+  family.help = "Samples read for tiles: measured, small voids filled from their edges, and voids where others show";
+  family.type = prometheus::MetricType::Counter;
+  for (const auto& [dataset, counts] : datasets) {
+    const auto add = [&family, &name = dataset](const char* kind, std::uint64_t value) {
+      prometheus::ClientMetric& metric = family.metric.emplace_back();
+      metric.label = {{"dataset", name}, {"kind", kind}};
+      metric.counter.value = static_cast<double>(value);
+    };
+    add("measured", counts.measured);
+    add("filled", counts.filled);
+    add("void", counts.voids);
+  }
+  return family;
+}
+
 }  // namespace
 
 struct Metrics::Families {
   prometheus::Registry registry;
   prometheus::Family<prometheus::Counter>& requests = prometheus::BuildCounter()
                                                           .Name("terrace_http_requests_total")
-                                                          .Help("Replies by route and status")
+                                                          .Help("Replies by route, dataset and status")
                                                           .Register(registry);
   prometheus::Family<prometheus::Histogram>& durations =
       prometheus::BuildHistogram()
@@ -55,10 +76,11 @@ struct Metrics::Families {
                                                         .Name("terrace_tile_builds_total")
                                                         .Help("Tiles built, by dataset and result")
                                                         .Register(registry);
-  prometheus::Family<prometheus::Histogram>& stages = prometheus::BuildHistogram()
-                                                          .Name("terrace_tile_build_stage_seconds")
-                                                          .Help("Time of each step of a build")
-                                                          .Register(registry);
+  prometheus::Family<prometheus::Histogram>& stages =
+      prometheus::BuildHistogram()
+          .Name("terrace_tile_build_stage_seconds")
+          .Help("Time of each step of a build, waiting for a worker included")
+          .Register(registry);
   prometheus::Family<prometheus::Counter>& refinements =
       prometheus::BuildCounter()
           .Name("terrace_refinements_total")
@@ -72,52 +94,57 @@ struct Metrics::Families {
                                            .Help("Builds that failed because a source could not be read")
                                            .Register(registry)
                                            .Add({});
-  prometheus::Histogram& read = stages.Add({{"stage", "read"}}, Seconds());
-  prometheus::Histogram& refine = stages.Add({{"stage", "refine"}}, Seconds());
-  prometheus::Histogram& encode = stages.Add({{"stage", "encode"}}, Seconds());
-  prometheus::Histogram& compress = stages.Add({{"stage", "compress"}}, Seconds());
-  std::vector<std::string> dataset_names;
-
-  // What a reply counts in, found by its route, a literal, and its status: looking a family up takes as long as
-  // answering from the cache.
+  // What a reply counts in, found by its labels: looking a family up takes as long as answering from the cache. Route
+  // and cache are literals, and the dataset is one that exists.
   struct Reply {
     prometheus::Counter& count;
     prometheus::Histogram& duration;
   };
-  const Reply& ReplyOf(std::string_view route, int status);
+  using ReplyLabels = std::tuple<std::string_view, int, std::string_view, std::string_view>;
+  struct OwnedLabels {
+    std::string route, cache, dataset;
+    int status;
+    ReplyLabels View() const { return {route, status, cache, dataset}; }
+  };
+  struct ByLabels {
+    using is_transparent = void;
+    bool operator()(const OwnedLabels& a, const OwnedLabels& b) const { return a.View() < b.View(); }
+    bool operator()(const OwnedLabels& a, const ReplyLabels& b) const { return a.View() < b; }
+    bool operator()(const ReplyLabels& a, const OwnedLabels& b) const { return a < b.View(); }
+  };
+  const Reply& ReplyOf(const ReplyRecord& record);
 
   std::shared_mutex mutex;
-  std::map<std::pair<std::string_view, int>, Reply> replies;  // guarded by mutex
+  std::map<OwnedLabels, Reply, ByLabels> replies;  // guarded by mutex
 };
 
-const Metrics::Families::Reply& Metrics::Families::ReplyOf(std::string_view route, int status) {
+const Metrics::Families::Reply& Metrics::Families::ReplyOf(const ReplyRecord& record) {
   {
     const std::shared_lock lock(mutex);
-    if (const auto found = replies.find({route, status}); found != replies.end()) return found->second;
+    const ReplyLabels labels{record.route, record.status, record.cache, record.dataset};
+    if (const auto found = replies.find(labels); found != replies.end()) return found->second;
   }
-  const std::string name(route);
-  const Reply reply{requests.Add({{"route", name}, {"status", fmt::to_string(status)}}),
-                    durations.Add({{"route", name}}, Seconds())};
+  OwnedLabels labels{std::string(record.route), std::string(record.cache), std::string(record.dataset), record.status};
+  const std::string status = fmt::to_string(record.status);
+  const Reply reply{
+      requests.Add({{"route", labels.route}, {"dataset", labels.dataset}, {"status", status}}),
+      durations.Add({{"route", labels.route}, {"dataset", labels.dataset}, {"cache", labels.cache}}, Seconds())};
   const std::unique_lock lock(mutex);
-  return replies.emplace(std::pair(route, status), reply).first->second;
+  return replies.emplace(std::move(labels), reply).first->second;
 }
 
-Metrics::Metrics(std::span<const DatasetView> datasets) : families_(std::make_unique<Families>()) {
-  for (const DatasetView& dataset : datasets) families_->dataset_names.push_back(dataset.name);
-}
-
+Metrics::Metrics() : families_(std::make_unique<Families>()) {}
 Metrics::~Metrics() = default;
 
 void Metrics::CountReply(const ReplyRecord& record) {
-  const Families::Reply& reply = families_->ReplyOf(record.route, record.status);
+  const Families::Reply& reply = families_->ReplyOf(record);
   reply.count.Increment();
   reply.duration.Observe(InSeconds(record.duration));
 }
 
-void Metrics::CountBuild(const TileRequest& request, const Result<TilePtr>& tile) {
+void Metrics::CountBuild(const DatasetView& dataset, const Result<TilePtr>& tile) {
   const std::string_view result = tile ? "ok" : ToString(tile.error().code);
-  families_->builds.Add({{"dataset", families_->dataset_names.at(request.dataset)}, {"result", std::string(result)}})
-      .Increment();
+  families_->builds.Add({{"dataset", dataset.name}, {"result", std::string(result)}}).Increment();
   if (!tile) {
     if (tile.error().code == ErrorCode::kUnavailable) families_->source_errors.Increment();
     return;
@@ -136,36 +163,58 @@ void Metrics::CountBuild(const TileRequest& request, const Result<TilePtr>& tile
       break;
   }
   const StageTimes& times = (*tile)->times;
-  families_->read.Observe(InSeconds(times.read));
-  families_->refine.Observe(InSeconds(times.refine));
-  families_->encode.Observe(InSeconds(times.encode));
-  families_->compress.Observe(InSeconds(times.compress));
+  const std::pair<const char*, std::chrono::microseconds> stages[] = {{"queue", times.queue},
+                                                                      {"read", times.read},
+                                                                      {"refine", times.refine},
+                                                                      {"encode", times.encode},
+                                                                      {"compress", times.compress}};
+  for (const auto& [stage, time] : stages) {
+    families_->stages.Add({{"dataset", dataset.name}, {"stage", stage}}, Seconds()).Observe(InSeconds(time));
+  }
 }
 
 std::string Metrics::Text(const TileService::Stats& tiles, const ByteCacheStats& refinements,
-                          const EdgeStats& edge) const {
+                          const SourceStats& sources, const ServerState& state) const {
   constexpr auto kCounter = prometheus::MetricType::Counter;
   constexpr auto kGauge = prometheus::MetricType::Gauge;
   std::vector<prometheus::MetricFamily> all = families_->registry.Collect();
   const auto add = [&all](prometheus::MetricType type, const char* name, const char* help, auto value) {
     all.push_back(Value(type, name, help, static_cast<double>(value)));
   };
-  add(kCounter, "terrace_cache_hits_total", "Tiles served from the cache", tiles.hits);
-  add(kCounter, "terrace_cache_misses_total", "Tile requests that started a build or were refused one", tiles.misses);
+  const auto add_tiers = [&all](prometheus::MetricType type, const char* name, const char* help, double of_tiles,
+                                double of_refinements) {
+    prometheus::MetricFamily family = Value(type, name, help, of_tiles);
+    family.metric.push_back(Value(type, name, help, of_refinements).metric.front());
+    family.metric[0].label = {{"tier", "tiles"}};
+    family.metric[1].label = {{"tier", "refinements"}};
+    all.push_back(std::move(family));
+  };
+  add_tiers(kCounter, "terrace_cache_hits_total", "Tiles served from the cache; builds that found a refinement",
+            static_cast<double>(tiles.hits), families_->continued.Value() + families_->replayed.Value());
+  add_tiers(kCounter, "terrace_cache_misses_total",
+            "Tile requests that started a build or were refused one; builds that found no refinement",
+            static_cast<double>(tiles.misses), families_->made.Value());
+  add_tiers(kGauge, "terrace_cache_entries", "Entries in the cache", static_cast<double>(tiles.cache.entries),
+            static_cast<double>(refinements.entries));
+  add_tiers(kGauge, "terrace_cache_bytes", "Bytes charged to the cache", static_cast<double>(tiles.cache.bytes),
+            static_cast<double>(refinements.bytes));
   add(kCounter, "terrace_flights_joined_total", "Tile requests that waited for a build already under way",
       tiles.joined);
-  add(kGauge, "terrace_cache_entries", "Tiles in the cache", tiles.cache.entries);
-  add(kGauge, "terrace_cache_bytes", "Bytes charged to the cache", tiles.cache.bytes);
-  add(kGauge, "terrace_refinement_cache_entries", "Refinements of tiles in the cache", refinements.entries);
-  add(kGauge, "terrace_refinement_cache_bytes", "Bytes charged to the cache of refinements", refinements.bytes);
   add(kGauge, "terrace_flights", "Builds under way or waiting", tiles.in_flight);
   add(kGauge, "terrace_queue_length", "Builds that wait for a worker", tiles.queued);
-  add(kGauge, "terrace_http_connections", "Open connections", edge.connections);
-  add(kCounter, "terrace_http_connections_refused_total", "Connections turned away", edge.refused_connections);
-  add(kGauge, "terrace_http_transfer_bytes", "Bytes of bodies on their way", edge.transfers.held_bytes);
-  add(kCounter, "terrace_http_transfers_refused_total", "Bodies that found no room", edge.transfers.refused);
+  add(kGauge, "terrace_http_connections", "Open connections", state.edge.connections);
+  add(kCounter, "terrace_http_connections_refused_total", "Connections turned away", state.edge.refused_connections);
+  add(kGauge, "terrace_http_transfer_bytes", "Bytes of bodies on their way", state.edge.transfers.held_bytes);
+  add(kCounter, "terrace_http_transfers_refused_total", "Bodies that found no room", state.edge.transfers.refused);
   add(kCounter, "terrace_http_transfers_cut_total", "Replies cut off because others needed their room",
-      edge.transfers.cut);
+      state.edge.transfers.cut);
+  add(kGauge, "terrace_datasets", "Datasets served", state.datasets);
+  add(kGauge, "terrace_degraded", "Troubles that /readyz tells of", state.troubles);
+  add(kCounter, "terrace_catalogs_total", "How often what is served was replaced", state.catalogs);
+  add(kCounter, "terrace_gdal_errors_total", "Failures that GDAL reported", sources.gdal.errors);
+  add(kCounter, "terrace_gdal_warnings_total", "Warnings that GDAL reported", sources.gdal.warnings);
+  add(kGauge, "terrace_gdal_cache_bytes", "Blocks of sources in GDAL's cache", sources.gdal.cache_bytes);
+  all.push_back(Samples(sources.samples));
   return prometheus::TextSerializer().Serialize(all);
 }
 

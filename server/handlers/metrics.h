@@ -1,8 +1,9 @@
 // What /metrics tells, in Prometheus' text format. Thread-safe.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <memory>
-#include <span>
 #include <string>
 
 #include "server/http/access_log.h"
@@ -14,14 +15,20 @@ namespace terrace::server {
 
 class Metrics {
  public:
-  explicit Metrics(std::span<const DatasetView> datasets);
+  Metrics();
   ~Metrics();
 
   void CountReply(const ReplyRecord& record);
-  void CountBuild(const TileRequest& request, const Result<TilePtr>& tile);
+  void CountBuild(const DatasetView& dataset, const Result<TilePtr>& tile);
 
+  struct ServerState {
+    EdgeStats edge;
+    std::size_t datasets = 0, troubles = 0;
+    std::uint64_t catalogs = 0;  // that have replaced one another
+  };
   // Everything counted so far and the state given.
-  std::string Text(const TileService::Stats& tiles, const ByteCacheStats& refinements, const EdgeStats& edge) const;
+  std::string Text(const TileService::Stats& tiles, const ByteCacheStats& refinements, const SourceStats& sources,
+                   const ServerState& state) const;
 
  private:
   struct Families;

@@ -1,12 +1,16 @@
 #include "server/handlers/routes.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <iterator>
+#include <map>
 #include <memory>
 #include <utility>
 
 #include "server/handlers/datasets_handler.h"
 #include "server/http/http_error.h"
+#include "server/http/negotiate.h"
 
 namespace terrace::server {
 namespace {
@@ -23,41 +27,52 @@ Response PlainText(int status, std::string_view content_type, std::string text) 
   return response;
 }
 
-Response Ready(bool draining) {
-  if (!draining) return PlainText(200, "text/plain; charset=utf-8", "ready\n");
-  Response response = PlainText(503, "text/plain; charset=utf-8", "draining\n");
-  response.headers.emplace_back("Retry-After", "5");
-  return response;
+// The first word is the state. A degraded server goes on answering, so it is not to be taken out of service. Reasons
+// name files: they are for the log.
+Response Ready(const Routes::State& state) {
+  if (state.draining()) {
+    Response response = PlainText(503, "text/plain; charset=utf-8", "draining\n");
+    response.headers.emplace_back("Retry-After", "5");
+    return response;
+  }
+  const std::map<std::string, std::string> troubles = state.troubles();
+  std::string text = troubles.empty() ? "ready\n" : "degraded\n";
+  for (const auto& [dataset, reason] : troubles) {
+    text += dataset.empty() ? "the configuration file is wrong, the last good one is in force\n"
+                            : fmt::format("dataset {}: its source cannot be opened as it is now\n", dataset);
+  }
+  return PlainText(200, "text/plain; charset=utf-8", std::move(text));
 }
 
 bool SeesAll(const Request& request) { return !request.grant || request.grant->sees_all; }
 
 }  // namespace
 
-Routes::Routes(std::span<const DatasetView> datasets, TileService& tiles, StaticFiles viewer,
-               TileHandlerOptions options, Heights heights, AreaMesher mesher, State state)
-    : views_(datasets),
-      tiles_(datasets, tiles, options),
-      heights_(datasets, tiles, std::move(heights.read), options, heights.max_locations),
-      areas_(datasets, tiles, std::move(mesher), options),
-      layers_(datasets, options.cache_control),
-      tilesets_(datasets, options.cache_control),
-      tile_json_(datasets, options.cache_control),
+Routes::Routes(CatalogPtr catalog, TileService& tiles, std::shared_ptr<const StaticFiles> viewer,
+               TileHandlerOptions options, std::size_t max_locations, State state)
+    : catalog_(std::move(catalog)),
+      tiles_(catalog_, tiles, options),
+      heights_(catalog_, tiles, options, max_locations),
+      areas_(catalog_, tiles, options),
+      layers_(catalog_->datasets, options.cache_control),
+      tilesets_(catalog_->datasets, options.cache_control),
+      tile_json_(catalog_->datasets, options.cache_control),
       viewer_(std::move(viewer)),
-      datasets_(Document::Make(DatasetsJson(datasets), "application/json")),
-      index_(Document::Make(IndexHtml(datasets), "text/html; charset=utf-8")),
+      datasets_(Document::Make(DatasetsJson(catalog_->datasets), "application/json")),
+      index_(Document::Make(IndexHtml(catalog_->datasets), "text/html; charset=utf-8")),
       state_(std::move(state)) {}
 
 std::optional<Response> Routes::ServeAtOnce(const Route& route, const Request& request) const {
   if (route.kind == RouteKind::kHeights || route.kind == RouteKind::kMesh) return std::nullopt;
   std::optional<Response> response =
       route.kind == RouteKind::kTile ? tiles_.HandleNow(route, request) : ServeNow(route, request);
-  if (response) response->route = ToString(route.kind);
+  if (response) Label(*response, route.kind, route.dataset);
   return response;
 }
 
 asio::awaitable<Response> Routes::Serve(Route route, Request request) const {
   const RouteKind kind = route.kind;
+  const std::string dataset = route.dataset;
   Response response;
   if (kind == RouteKind::kTile) {
     response = co_await tiles_.Handle(std::move(route), std::move(request));
@@ -68,8 +83,14 @@ asio::awaitable<Response> Routes::Serve(Route route, Request request) const {
   } else {
     response = ServeNow(route, request);
   }
-  response.route = ToString(kind);
+  Label(response, kind, dataset);
   co_return response;
+}
+
+// Names that nobody serves must not become labels of the metrics.
+void Routes::Label(Response& response, RouteKind kind, const std::string& dataset) const {
+  response.route = ToString(kind);
+  if (!dataset.empty() && FindDataset(dataset, catalog_->datasets)) response.dataset = dataset;
 }
 
 Response Routes::ServeNow(const Route& route, const Request& request) const {
@@ -87,7 +108,7 @@ Response Routes::ServeNow(const Route& route, const Request& request) const {
       return terrace::server::Serve(Document::Make(DatasetsJson(SeenBy(request)), "application/json"), request,
                                     kRevalidate);
     case RouteKind::kReady:
-      return Ready(state_.draining());
+      return Ready(state_);
     case RouteKind::kMetrics:
       return PlainText(200, "text/plain; version=0.0.4; charset=utf-8", state_.metrics_text());
     default:
@@ -97,15 +118,15 @@ Response Routes::ServeNow(const Route& route, const Request& request) const {
 
 std::vector<DatasetView> Routes::SeenBy(const Request& request) const {
   std::vector<DatasetView> seen;
-  std::copy_if(views_.begin(), views_.end(), std::back_inserter(seen),
+  std::copy_if(catalog_->datasets.begin(), catalog_->datasets.end(), std::back_inserter(seen),
                [&](const DatasetView& view) { return request.grant->Sees(view.name); });
   return seen;
 }
 
 // Its pages keep their state in the query, so any query goes.
 Response Routes::ServeViewer(const Route& route, const Request& request) const {
-  if (const Document* file = viewer_.Find(route.file)) return terrace::server::Serve(*file, request, kRevalidate);
-  if (viewer_.empty() && route.file == "index.html") {
+  if (const Document* file = viewer_->Find(route.file)) return terrace::server::Serve(*file, request, kRevalidate);
+  if (viewer_->empty() && route.file == "index.html") {
     if (SeesAll(request)) return terrace::server::Serve(index_, request, kRevalidate);
     Response index = terrace::server::Serve(Document::Make(IndexHtml(SeenBy(request)), "text/html; charset=utf-8"),
                                             request, kRevalidate);

@@ -1,9 +1,11 @@
 // Every URL and who answers it.
 #pragma once
 
+#include <cstddef>
 #include <functional>
+#include <map>
+#include <memory>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -20,46 +22,47 @@
 #include "server/http/request.h"
 #include "server/http/response.h"
 #include "server/http/router.h"
+#include "server/tiles/catalog.h"
 
 namespace terrace::server {
 
-// Thread-safe: immutable after construction.
+// Answers from one catalog. Thread-safe: immutable after construction.
 class Routes {
  public:
   // What the probes and /metrics ask.
   struct State {
     std::function<bool()> draining;
+    std::function<std::map<std::string, std::string>()> troubles;  // by dataset; "" is the configuration
     std::function<std::string()> metrics_text;
   };
-  struct Heights {
-    PointReader read;
-    std::size_t max_locations = 0;
-  };
 
-  // `datasets` and `tiles` must outlive this.
-  Routes(std::span<const DatasetView> datasets, TileService& tiles, StaticFiles viewer, TileHandlerOptions options,
-         Heights heights, AreaMesher mesher, State state);
+  // `tiles` must outlive this. `max_locations`: of one request for heights.
+  Routes(CatalogPtr catalog, TileService& tiles, std::shared_ptr<const StaticFiles> viewer, TileHandlerOptions options,
+         std::size_t max_locations, State state);
 
   // Answers what needs no waiting, which is most: all but tiles that must be built, heights and meshes. Nothing for
   // those.
   std::optional<Response> ServeAtOnce(const Route& route, const Request& request) const;
 
-  // Answers GET, HEAD, and POST where TakesPost says so.
+  // Answers GET, HEAD, and POST where TakesPost says so. Whoever waits keeps this alive.
   asio::awaitable<Response> Serve(Route route, Request request) const;
 
+  const Catalog& catalog() const { return *catalog_; }
+
  private:
+  void Label(Response& response, RouteKind kind, const std::string& dataset) const;
   Response ServeNow(const Route& route, const Request& request) const;
   Response ServeViewer(const Route& route, const Request& request) const;
   std::vector<DatasetView> SeenBy(const Request& request) const;
 
-  const std::span<const DatasetView> views_;
+  const CatalogPtr catalog_;
   const TileHandler tiles_;
   const HeightsHandler heights_;
   const AreaHandler areas_;
   const LayerHandler layers_;
   const TilesetHandler tilesets_;
   const TileJsonHandler tile_json_;
-  const StaticFiles viewer_;
+  const std::shared_ptr<const StaticFiles> viewer_;
   const Document datasets_;
   const Document index_;  // for `/` without a viewer
   const State state_;

@@ -36,23 +36,22 @@ std::string_view ContentTypeOf(const TileRequest& tile) {
 
 }  // namespace
 
-TileHandler::TileHandler(std::span<const DatasetView> datasets, TileService& tiles, TileHandlerOptions options)
-    : datasets_(datasets), tiles_(tiles), options_(std::move(options)) {}
+TileHandler::TileHandler(CatalogPtr catalog, TileService& tiles, TileHandlerOptions options)
+    : catalog_(std::move(catalog)), tiles_(tiles), options_(std::move(options)) {}
 
 std::optional<Response> TileHandler::HandleNow(const Route& route, const Request& request) const {
-  const Result<TileRequest> tile = Negotiate(route, request, datasets_);
+  const Result<TileRequest> tile = Negotiate(route, request, catalog_->datasets);
   if (!tile) return ClientErrorResponse(tile.error(), request.id);
-  const std::optional<ServedTile> found = tiles_.Find({*tile, datasets_[tile->dataset].generation});
+  const std::optional<ServedTile> found = tiles_.Find(*catalog_, *tile);
   if (!found) return std::nullopt;
   return Reply(*found, *tile, request);
 }
 
 asio::awaitable<Response> TileHandler::Handle(Route route, Request request) const {
-  const Result<TileRequest> tile = Negotiate(route, request, datasets_);
+  const Result<TileRequest> tile = Negotiate(route, request, catalog_->datasets);
   if (!tile) co_return ClientErrorResponse(tile.error(), request.id);
-  const CacheKey key{*tile, datasets_[tile->dataset].generation};
   const auto deadline = TileService::Clock::now() + options_.deadline;
-  const Result<ServedTile> served = co_await tiles_.Get(key, deadline);
+  const Result<ServedTile> served = co_await tiles_.Get(catalog_, *tile, deadline);
   if (served) co_return Reply(*served, *tile, request);
   co_return co_await BackendFailure(served.error(), request.id, options_.refusal_delay);
 }
@@ -86,9 +85,12 @@ std::string FormatErrorUp(double error_m) {
 
 std::string FormatServerTiming(CacheStatus cache, const StageTimes& times) {
   std::string text = fmt::format("cache;desc={}", Name(cache));
-  if (cache != CacheStatus::kMiss) return text;
-  const std::pair<const char*, std::chrono::microseconds> steps[] = {
-      {"read", times.read}, {"refine", times.refine}, {"encode", times.encode}, {"compress", times.compress}};
+  if (cache == CacheStatus::kHit) return text;
+  const std::pair<const char*, std::chrono::microseconds> steps[] = {{"queue", times.queue},
+                                                                     {"read", times.read},
+                                                                     {"refine", times.refine},
+                                                                     {"encode", times.encode},
+                                                                     {"compress", times.compress}};
   for (const auto& [name, time] : steps) {
     fmt::format_to(std::back_inserter(text), ", {};dur={:.3f}", name, static_cast<double>(time.count()) / 1000);
   }

@@ -3,14 +3,13 @@
 
 #include <chrono>
 #include <optional>
-#include <span>
 #include <string>
 
 #include "server/asio.h"
 #include "server/http/request.h"
 #include "server/http/response.h"
 #include "server/http/router.h"
-#include "server/tiles/dataset_view.h"
+#include "server/tiles/catalog.h"
 #include "server/tiles/tile_service.h"
 
 namespace terrace::server {
@@ -25,8 +24,8 @@ struct TileHandlerOptions {
 
 class TileHandler {
  public:
-  // `datasets` and `tiles` must outlive this.
-  TileHandler(std::span<const DatasetView> datasets, TileService& tiles, TileHandlerOptions options);
+  // `tiles` must outlive this.
+  TileHandler(CatalogPtr catalog, TileService& tiles, TileHandlerOptions options);
 
   // What needs no build: refusals, and tiles in the cache. Nothing otherwise. Precondition: a kTile route.
   std::optional<Response> HandleNow(const Route& route, const Request& request) const;
@@ -37,7 +36,7 @@ class TileHandler {
  private:
   Response Reply(const ServedTile& served, const TileRequest& tile, const Request& request) const;
 
-  const std::span<const DatasetView> datasets_;
+  const CatalogPtr catalog_;
   TileService& tiles_;
   const TileHandlerOptions options_;
 };
@@ -45,7 +44,7 @@ class TileHandler {
 // Metres with six significant digits, never below `error_m`.
 std::string FormatErrorUp(double error_m);
 
-// "cache;desc=miss, read;dur=1.234, ...": milliseconds, the steps on a miss only.
+// "cache;desc=miss, queue;dur=0.021, read;dur=1.234, ...": milliseconds, the steps of the build that was waited for.
 std::string FormatServerTiming(CacheStatus cache, const StageTimes& times);
 
 }  // namespace terrace::server

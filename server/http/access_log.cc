@@ -1,16 +1,27 @@
 #include "server/http/access_log.h"
 
+#include <fcntl.h>
+#include <fmt/chrono.h>
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
+#include <unistd.h>
 
+#include <cerrno>
 #include <iterator>
+#include <nlohmann/json.hpp>
+#include <system_error>
+#include <utility>
 
 namespace terrace::server {
 namespace {
 
-std::string Escaped(std::string_view text) {
+using SystemClock = std::chrono::system_clock;
+
+// Blanks as well where `blanks` says so: they separate fields of a line.
+std::string Escaped(std::string_view text, bool blanks = true) {
   std::string escaped;
   for (const char c : text.substr(0, kMaxLoggedTargetBytes)) {
-    if (c > 0x20 && c < 0x7f && c != '"' && c != '\\') {
+    if (c > (blanks ? 0x20 : 0x1f) && c < 0x7f && c != '"' && c != '\\') {
       escaped += c;
     } else {
       fmt::format_to(std::back_inserter(escaped), "\\x{:02x}", static_cast<unsigned char>(c));
@@ -18,6 +29,35 @@ std::string Escaped(std::string_view text) {
   }
   if (text.size() > kMaxLoggedTargetBytes) escaped += "...";
   return escaped;
+}
+
+std::string EscapedOrDash(std::string_view text) { return text.empty() ? "-" : Escaped(text, /*blanks=*/false); }
+
+// Bytes above ASCII as the characters of Latin-1: JSON knows no bytes.
+std::string Latin1(std::string_view text) {
+  std::string utf8;
+  for (const char c : text.substr(0, kMaxLoggedTargetBytes)) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte < 0x80) {
+      utf8 += c;
+    } else {
+      utf8 += static_cast<char>(0xc0 | byte >> 6);
+      utf8 += static_cast<char>(0x80 | (byte & 0x3f));
+    }
+  }
+  return utf8;
+}
+
+// The peer without its port: IPv6 addresses have colons of their own.
+std::string_view ClientOf(const ReplyRecord& record) {
+  return record.client.empty() ? record.peer.substr(0, record.peer.rfind(':')) : record.client;
+}
+
+std::string_view ProtocolOf(const ReplyRecord& record) { return record.version == 10 ? "HTTP/1.0" : "HTTP/1.1"; }
+
+// -1: errno tells why not.
+int OpenToAppend(const std::filesystem::path& file) {
+  return ::open(file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0640);
 }
 
 }  // namespace
@@ -30,6 +70,81 @@ std::string FormatAccessLine(const ReplyRecord& record) {
   if (!record.client.empty()) line.append(" client=").append(record.client);
   if (!record.token_name.empty()) line.append(" token=").append(Escaped(record.token_name));
   return line;
+}
+
+std::string FormatCombinedLine(const ReplyRecord& record, SystemClock::time_point now) {
+  return fmt::format("{} - - [{:%d/%b/%Y:%H:%M:%S} +0000] \"{} {} {}\" {} {} \"{}\" \"{}\"", ClientOf(record),
+                     fmt::gmtime(SystemClock::to_time_t(now)), Escaped(record.method), Escaped(record.target),
+                     ProtocolOf(record), record.status, record.body_bytes, EscapedOrDash(record.referer),
+                     EscapedOrDash(record.user_agent));
+}
+
+std::string FormatJsonLine(const ReplyRecord& record, SystemClock::time_point now) {
+  const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(now.time_since_epoch()).count() % 1000;
+  nlohmann::ordered_json line;
+  line["time"] = fmt::format("{:%Y-%m-%dT%H:%M:%S}.{:03}Z", fmt::gmtime(SystemClock::to_time_t(now)), ms);
+  line["client"] = Latin1(ClientOf(record));
+  line["method"] = Latin1(record.method);
+  line["target"] = Latin1(record.target);
+  line["protocol"] = ProtocolOf(record);
+  line["status"] = record.status;
+  line["bytes"] = record.body_bytes;
+  line["seconds"] = static_cast<double>(record.duration.count()) / 1e6;
+  line["route"] = record.route;
+  line["dataset"] = record.dataset;
+  line["cache"] = record.cache;
+  line["request_id"] = record.request_id;
+  line["token"] = Latin1(record.token_name);
+  line["referer"] = Latin1(record.referer);
+  line["user_agent"] = Latin1(record.user_agent);
+  return line.dump(-1, ' ', /*ensure_ascii=*/true);
+}
+
+AccessLog::AccessLog(AccessLogForm form, std::filesystem::path file, int descriptor)
+    : form_(form), file_(std::move(file)), descriptor_(descriptor) {}
+
+AccessLog::AccessLog(AccessLog&& other) noexcept
+    : form_(other.form_), file_(other.file_), descriptor_(std::exchange(other.descriptor_, -1)) {}
+
+AccessLog::~AccessLog() {
+  if (!file_.empty() && descriptor_ >= 0) ::close(descriptor_);
+}
+
+Result<AccessLog> AccessLog::Open(AccessLogForm form, std::filesystem::path file) {
+  if (form == AccessLogForm::kLog || form == AccessLogForm::kOff || file.empty()) {
+    return AccessLog(form, {}, STDERR_FILENO);
+  }
+  const int descriptor = OpenToAppend(file);
+  if (descriptor < 0) {
+    return MakeError(ErrorCode::kUnavailable, "access log {}: {}; give a file in a folder that the server may write to",
+                     file.string(), std::generic_category().message(errno));
+  }
+  return AccessLog(form, std::move(file), descriptor);
+}
+
+void AccessLog::Write(const ReplyRecord& record) {
+  if (form_ == AccessLogForm::kOff) return;
+  if (form_ == AccessLogForm::kLog) {
+    if (spdlog::should_log(spdlog::level::info)) spdlog::info("{}", FormatAccessLine(record));
+    return;
+  }
+  const auto now = SystemClock::now();
+  const std::string line =
+      (form_ == AccessLogForm::kJson ? FormatJsonLine(record, now) : FormatCombinedLine(record, now)) + '\n';
+  const std::lock_guard lock(mutex_);
+  // In one piece, as others may append to the file. On a full disk a request goes untold rather than unanswered.
+  [[maybe_unused]] const ssize_t written = ::write(descriptor_, line.data(), line.size());
+}
+
+void AccessLog::Reopen() {
+  if (file_.empty()) return;
+  const int descriptor = OpenToAppend(file_);
+  if (descriptor < 0) {
+    spdlog::error("access log {}: cannot be opened anew: {}", file_.string(), std::generic_category().message(errno));
+    return;
+  }
+  const std::lock_guard lock(mutex_);
+  ::close(std::exchange(descriptor_, descriptor));
 }
 
 }  // namespace terrace::server

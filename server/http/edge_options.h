@@ -24,7 +24,7 @@ struct EdgeOptions {
   std::size_t max_connections_per_client = 0;  // 0: as many as there may be in all
   double requests_per_second = 0;              // of each token, and of each client without one; 0: any
   double request_burst = 0;                    // requests at once; 0: two seconds' worth
-  std::size_t transfer_bytes = std::size_t{48} << 20;
+  std::size_t transfer_bytes = std::size_t{32} << 20;
   std::vector<TokenOptions> tokens;
   std::vector<std::string> public_datasets;  // seen without a token
   std::vector<std::string> cors_origins = {"*"};

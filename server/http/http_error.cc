@@ -44,6 +44,8 @@ std::string_view FixedDetail(ErrorCode code) {
       return "no such tile";
     case ErrorCode::kUnavailable:
       return "the source cannot be read now";
+    case ErrorCode::kChanged:
+      return "the source is being replaced";
     case ErrorCode::kOverloaded:
       return "too much is being built";
     case ErrorCode::kCancelled:
@@ -55,8 +57,11 @@ std::string_view FixedDetail(ErrorCode code) {
   return "the answer cannot be built now";
 }
 
-// Seconds. A full queue drains quickly; a source that cannot be read usually waits for a person.
-const char* RetryAfter(ErrorCode code) { return code == ErrorCode::kOverloaded ? "1" : "5"; }
+// Seconds. A full queue drains quickly, and a source that was replaced is opened anew; one that cannot be read usually
+// waits for a person.
+const char* RetryAfter(ErrorCode code) {
+  return code == ErrorCode::kOverloaded || code == ErrorCode::kChanged ? "1" : "5";
+}
 
 }  // namespace
 
@@ -67,6 +72,7 @@ int StatusOf(ErrorCode code) {
     case ErrorCode::kNotFound:
       return 404;
     case ErrorCode::kUnavailable:
+    case ErrorCode::kChanged:
     case ErrorCode::kOverloaded:
     case ErrorCode::kCancelled:
     case ErrorCode::kInternal:
@@ -105,14 +111,17 @@ Response ClientErrorResponse(const Error& error, std::string_view request_id) {
 }
 
 Response BackendErrorResponse(const Error& error, std::string_view request_id) {
-  // Refusals under load come by the thousand; the access log counts them.
-  const auto level = error.code == ErrorCode::kOverloaded ? spdlog::level::debug : spdlog::level::warn;
+  // Refusals under load come by the thousand, and so do requests for a dataset whose source was replaced: the access
+  // log counts them.
+  const bool is_usual = error.code == ErrorCode::kOverloaded || error.code == ErrorCode::kChanged;
+  const auto level = is_usual ? spdlog::level::debug : spdlog::level::warn;
   spdlog::log(level, "request {} failed ({}): {}", request_id, ToString(error.code), error.message);
   // The request has passed every check by now: what is wrong here is the server's.
   const ErrorCode code = error.code == ErrorCode::kInvalidArgument ? ErrorCode::kInternal : error.code;
   const int status = StatusOf(code);
   Response response = ProblemResponse(status, FixedDetail(code), request_id);
   if (status == 503) response.headers.emplace_back("Retry-After", RetryAfter(error.code));
+  response.source_changed = code == ErrorCode::kChanged;
   return response;
 }
 

@@ -104,7 +104,8 @@ std::optional<std::string> TakeToken(std::string& target) {
     const std::size_t equals = std::min(piece.find('='), piece.size());
     if (PercentDecode(piece.substr(0, equals)) == "token") {
       std::string value = PercentDecode(piece.substr(std::min(equals + 1, piece.size()))).value_or("");
-      token = !token || *token == value ? std::move(value) : std::string();
+      // No token has a blank in it.
+      token = !token || *token == value ? std::move(value) : *token + " " + value;
     } else {
       kept.append(kept.empty() ? 0 : 1, '&').append(piece);
     }
@@ -158,6 +159,9 @@ tl::expected<Request, BadRequest> ParseHead(std::string_view head) {
   request.accept = Joined(fields, http::field::accept);
   request.accept_encoding = Joined(fields, http::field::accept_encoding);
   request.if_none_match = Joined(fields, http::field::if_none_match);
+  const auto referer = fields[http::field::referer];
+  request.referer = std::string(referer.substr(0, referer.find('?')));
+  request.user_agent = std::string(fields[http::field::user_agent]);
   request.content_type = std::string(fields[http::field::content_type]);
   request.content_encoding = Joined(fields, http::field::content_encoding);
   request.content_length = static_cast<std::size_t>(*PlainLength(fields));

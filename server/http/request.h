@@ -34,6 +34,7 @@ struct Request {
   std::string origin;
   // What a proxy before the server may have written, or the client: see ResolveClient.
   std::string forwarded, forwarded_for, forwarded_host, forwarded_proto;
+  std::string referer, user_agent;  // for the log; the referer without its query, which may hold a token
   std::string content_type;
   std::string content_encoding;
   std::size_t content_length = 0;  // of a POST

@@ -39,9 +39,12 @@ struct Response {
   };
   std::vector<Header> headers;
 
+  bool source_changed = false;  // why it is a 503: whoever opens the source anew can answer
+
   // For the log and the metrics.
   std::string_view route = "none";
   std::string_view cache = "-";
+  std::string dataset;  // the one that was asked about, if it exists
 };
 
 // What a reply's head says beyond the response itself.

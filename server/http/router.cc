@@ -19,7 +19,7 @@ tl::unexpected<Error> NotFound() {
 // A path without scheme and authority, or nothing.
 std::optional<std::string_view> OriginForm(std::string_view target) {
   for (const std::string_view scheme : {"http://", "https://"}) {
-    if (!target.starts_with(scheme)) continue;
+    if (!EqualsIgnoringCase(target.substr(0, scheme.size()), scheme)) continue;
     target.remove_prefix(scheme.size());
     const std::size_t path = target.find_first_of("/?");
     if (path == std::string_view::npos) return "/";

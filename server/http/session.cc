@@ -11,6 +11,7 @@
 #include <boost/asio/experimental/awaitable_operators.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/use_awaitable.hpp>
+#include <boost/system/system_error.hpp>
 #include <exception>
 #include <optional>
 #include <random>
@@ -180,7 +181,10 @@ asio::awaitable<bool> Session::ServeOne(Request request) {
     if (!read) co_return false;
   }
   response = AnswerAtOnce(*route, exchange.request);
-  if (!response) response = co_await AnswerWhileConnected(*route, exchange.request);
+  if (!response) {
+    stream_.ExpiresNever();  // the handlers have deadlines of their own
+    response = co_await AnswerWhileConnected(*route, exchange.request);
+  }
   if (!response) {
     Response nobody;
     nobody.status = kClientLeft;
@@ -205,6 +209,7 @@ asio::awaitable<std::optional<Response>> Session::Refuse(const Request& request,
   if (refusal) {
     refusal->route = ToString(route->kind);
     if (refusal->status == 429) {
+      stream_.ExpiresNever();
       asio::steady_timer delay(stream_.socket().get_executor(), context_->options.refusal_delay);
       co_await delay.async_wait(asio::use_awaitable);
     }
@@ -238,6 +243,10 @@ asio::awaitable<Response> Session::Answer(Route route, Request request) {
   Error error;
   try {
     co_return co_await context_->handler(std::move(route), std::move(request));
+  } catch (const boost::system::system_error& exception) {
+    // The client has left, which nobody needs to be told.
+    if (exception.code() == asio::error::operation_aborted) co_return ProblemResponse(503, "cancelled", id);
+    error.message = exception.what();
   } catch (const std::exception& exception) {
     error.message = exception.what();
   }
@@ -316,7 +325,11 @@ void Session::Report(const Exchange& exchange, const Response& response, std::si
   record.body_bytes = bytes;
   record.duration = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - exchange.begun);
   record.route = response.route;
+  record.dataset = response.dataset;
   record.cache = response.cache;
+  record.version = request.version;
+  record.referer = request.referer;
+  record.user_agent = request.user_agent;
   record.request_id = request.id;
   record.peer = peer_text_;
   if (exchange.caller.address != peer_.address) record.client = exchange.caller.text;

@@ -44,6 +44,7 @@ struct Stream::State : std::enable_shared_from_this<State> {
 
   void Look() {
     if (!socket.is_open()) return;
+    if (deadline == Clock::time_point::max()) return;
     if (Clock::now() < deadline) return Watch();
     expired = true;
     error_code ignored;
@@ -78,6 +79,11 @@ void Stream::ExpiresAt(Clock::time_point deadline) {
   state_->deadline = deadline;
   state_->expired = false;
   state_->Watch();
+}
+
+void Stream::ExpiresNever() {
+  state_->deadline = Clock::time_point::max();
+  state_->expired = false;
 }
 
 bool Stream::expired() const { return state_->expired; }

@@ -37,6 +37,7 @@ class Stream {
   // The operation under way when `time` has passed, and every one begun later, fails. Until the next call of this.
   void ExpiresAfter(std::chrono::milliseconds time);
   void ExpiresAt(std::chrono::steady_clock::time_point deadline);
+  void ExpiresNever();
   bool expired() const;
 
   // Of TLS; nothing to do for others.

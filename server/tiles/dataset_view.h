@@ -1,9 +1,10 @@
 // What the HTTP side knows of a dataset: its name, its extent and which tiles exist; never how tiles are made.
 //
-// Immutable after start, so any thread reads it without a lock. A dataset's index in the server's list is
+// Immutable as a part of a catalog, so any thread reads it without a lock. A dataset's index in the catalog's list is
 // TileRequest::dataset.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -27,6 +28,8 @@ struct DatasetView {
   double west = -180, south = -90, east = 180, north = 90;  // degrees; west > east: across the antimeridian
   double min_height_m = 0, max_height_m = 0;                // of the data
   double floor_m = 0;                                       // height where there is no data
+  bool has_datum = true;                                    // it is known what its heights count from
+  std::size_t sources = 1;                                  // rasters that the heights come from
   bool has_water = false;                                   // tiles have a water mask
   std::optional<proto::TextureFormat> texture;  // of GLB tiles, for requests that name none; nothing: no imagery
   int metadata_levels = 0;                      // tiles of every so many levels tell what is below them; 0: none

@@ -11,6 +11,7 @@ namespace terrace::server {
 
 // Where the time of a build went. Zero where a step did not run.
 struct StageTimes {
+  std::chrono::microseconds queue{0};  // before a worker took it up
   std::chrono::microseconds read{0}, refine{0}, encode{0}, compress{0};
 };
 

@@ -26,6 +26,6 @@ struct MeshedGlb {
 // kCancelled: stopped.
 Result<MeshedGlb> MeshGlb(const dem::DemSource& source, const proto::LatticeView& lattice,
                           const tin::Refinement& refinement, const MeshRules& rules, double wanted_error_m,
-                          const std::stop_token& stop);
+                          proto::PositionWidth width, const std::stop_token& stop);
 
 }  // namespace terrace::server

@@ -25,8 +25,7 @@ inline std::size_t BytesOf(const RefinedTile& tile) {
 using RefinedTilePtr = std::shared_ptr<const RefinedTile>;
 
 struct RefinedTileKey {
-  std::uint32_t dataset = 0;     // index into the server's datasets
-  std::uint64_t generation = 0;  // of the dataset
+  std::uint64_t generation = 0;  // of the dataset, which it stands for
   geo::TileKey key;
 
   friend bool operator==(const RefinedTileKey&, const RefinedTileKey&) = default;
@@ -35,7 +34,6 @@ struct RefinedTileKey {
 struct RefinedTileKeyHash {
   std::size_t operator()(const RefinedTileKey& key) const noexcept {
     TileRequest request;
-    request.dataset = key.dataset;
     request.key = key.key;
     return TileRequestHash{}(request) ^ static_cast<std::size_t>(key.generation);
   }

@@ -9,9 +9,10 @@
 
 namespace terrace::server {
 
-// A request, and the generation of the dataset it is about: a replaced source never meets tiles of the old one.
+// A request, and the generation of the dataset it is about: a replaced source never meets tiles of the old one. The
+// generation names the dataset, so that the key holds while other datasets come and go.
 struct CacheKey {
-  TileRequest request;
+  TileRequest request;  // its `dataset` is 0
   std::uint64_t generation = 0;
   std::uint64_t solo = 0;  // unless 0: work for one request alone, which nobody else may join and nothing keeps
 

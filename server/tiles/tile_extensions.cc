@@ -11,20 +11,22 @@ namespace {
 
 static_assert(dem::WaterRaster::kSide == proto::kWaterMaskSide);
 
-Result<proto::WaterMask> WaterMaskOf(const WaterRules& water, const proto::LatticeView& lattice,
-                                     const std::stop_token& stop) {
-  if (water.sea_level_m) return proto::Shortest(proto::SeaLevelMask(lattice, *water.sea_level_m));
-  Result<proto::WaterMask> mask = water.mask->Read(lattice.key, stop);
-  if (mask) *mask = proto::Shortest(*std::move(mask));
-  return mask;
+// A sea level is in what the source's heights count from: they are read once more where tiles have others.
+Result<proto::WaterMask> SeaMaskOf(const Dataset& dataset, const proto::LatticeView& lattice,
+                                   const std::stop_token& stop) {
+  const double sea_level_m = *dataset.water.sea_level_m;
+  if (!dataset.source->converts()) return proto::Shortest(proto::SeaLevelMask(lattice, sea_level_m));
+  const Result<dem::TileHeights> counted = dataset.source->ReadAsCounted(lattice.key, stop);
+  if (!counted) return tl::unexpected(counted.error());
+  return proto::Shortest(proto::SeaLevelMask({lattice.key, counted->lattice, counted->heights}, sea_level_m));
 }
 
-std::string MetadataOf(const Dataset& dataset, const geo::TileKey& key) {
-  std::vector<std::vector<geo::TileRange>> available;
-  for (int level = 0; level <= dataset.source->max_level(); ++level) {
-    available.push_back(dataset.source->Available(level));
-  }
-  return proto::EncodeTileMetadata(key, available, dataset.metadata_levels);
+Result<proto::WaterMask> WaterMaskOf(const Dataset& dataset, const proto::LatticeView& lattice,
+                                     const std::stop_token& stop) {
+  if (dataset.water.sea_level_m) return SeaMaskOf(dataset, lattice, stop);
+  Result<proto::WaterMask> mask = dataset.water.mask->Read(lattice.key, stop);
+  if (mask) *mask = proto::Shortest(*std::move(mask));
+  return mask;
 }
 
 }  // namespace
@@ -38,11 +40,13 @@ Result<proto::QuantizedMeshOptions> AddExtensions(const Dataset& dataset, const 
   options.metadata = request.metadata &&
                      proto::CarriesMetadata(request.key.level, dataset.metadata_levels, dataset.source->max_level());
   if (options.water_mask) {
-    Result<proto::WaterMask> mask = WaterMaskOf(dataset.water, lattice, stop);
+    Result<proto::WaterMask> mask = WaterMaskOf(dataset, lattice, stop);
     if (!mask) return tl::unexpected(std::move(mask).error());
     tile.water_mask = *std::move(mask);
   }
-  if (options.metadata) tile.metadata = MetadataOf(dataset, request.key);
+  if (options.metadata) {
+    tile.metadata = proto::EncodeTileMetadata(request.key, dataset.source->Availability(), dataset.metadata_levels);
+  }
   return options;
 }
 

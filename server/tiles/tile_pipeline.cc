@@ -25,14 +25,16 @@ std::chrono::microseconds Since(Clock::time_point start) {
 }  // namespace
 
 TilePipeline::TilePipeline(std::vector<Dataset> datasets, std::size_t refinement_cache_bytes)
-    : datasets_(std::move(datasets)), refinements_(refinement_cache_bytes) {}
+    : TilePipeline(std::move(datasets), std::make_shared<RefinementCache>(refinement_cache_bytes)) {}
+
+TilePipeline::TilePipeline(std::vector<Dataset> datasets, std::shared_ptr<RefinementCache> refinements)
+    : datasets_(std::move(datasets)), refinements_(std::move(refinements)) {}
 
 // From the cache where it goes as far as is asked; else read or continued, and kept.
-Result<RefinedTilePtr> TilePipeline::Refine(std::uint32_t index, const geo::TileKey& key, double error_m,
+Result<RefinedTilePtr> TilePipeline::Refine(const Dataset& dataset, const geo::TileKey& key, double error_m,
                                             EncodedTile& encoded, const std::stop_token& stop) const {
-  const Dataset& dataset = datasets_[index];
-  const RefinedTileKey cache_key{index, dataset.generation, key};
-  const RefinedTilePtr known = refinements_.Find(cache_key);
+  const RefinedTileKey cache_key{dataset.generation, key};
+  const RefinedTilePtr known = refinements_->Find(cache_key);
   if (known) encoded.refinement = RefinementUse::kContinued;
   if (known && known->error_m <= error_m) {
     encoded.refinement = RefinementUse::kReplayed;
@@ -63,9 +65,9 @@ Result<RefinedTilePtr> TilePipeline::Refine(std::uint32_t index, const geo::Tile
   encoded.times.refine = Since(start);
   // One that ended at the format's number of vertices holds no mesh to this error. Another build may have gone further
   // meanwhile.
-  const RefinedTilePtr other = refinements_.Find(cache_key);
+  const RefinedTilePtr other = refinements_->Find(cache_key);
   if (refined->refinement.vertex_count() <= proto::kMaxTileVertices && !(other && other->error_m <= error_m)) {
-    refinements_.Insert(cache_key, refined);
+    refinements_->Insert(cache_key, refined);
   }
   return RefinedTilePtr(std::move(refined));
 }
@@ -95,7 +97,8 @@ Result<void> TilePipeline::EncodeGlb(const TileRequest& request, const RefinedTi
   const Dataset& dataset = datasets_[request.dataset];
   const Clock::time_point start = Clock::now();
   const proto::LatticeView lattice{request.key, refined.heights.lattice, refined.heights.heights};
-  const Result<MeshedGlb> meshed = MeshGlb(*dataset.source, lattice, refined.refinement, dataset.rules, error_m, stop);
+  const Result<MeshedGlb> meshed = MeshGlb(*dataset.source, lattice, refined.refinement, dataset.rules, error_m,
+                                           proto::WidthOf(request.compression), stop);
   if (!meshed) return tl::unexpected(meshed.error());
   proto::GlbOptions options = dataset.glb;
   options.compression = request.compression;
@@ -123,7 +126,7 @@ Result<EncodedTile> TilePipeline::Build(const TileRequest& request, std::stop_to
   }
   const double error_m = geo::LadderError(request.key.level, request.error_step, dataset.error_fraction);
   EncodedTile encoded;
-  const Result<RefinedTilePtr> refined = Refine(request.dataset, request.key, error_m, encoded, stop);
+  const Result<RefinedTilePtr> refined = Refine(dataset, request.key, error_m, encoded, stop);
   if (!refined) return tl::unexpected(refined.error());
 
   const Result<void> done = request.format == TileFormat::kGlb

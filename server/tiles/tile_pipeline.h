@@ -23,7 +23,7 @@ namespace terrace::server {
 
 // Where a dataset's water comes from: one of both, or neither, and it has none.
 struct WaterRules {
-  std::unique_ptr<dem::WaterRaster> mask;
+  std::shared_ptr<const dem::WaterRaster> mask;
   std::optional<double> sea_level_m;  // in what the source's heights count from
 
   bool any() const { return mask != nullptr || sea_level_m.has_value(); }
@@ -31,21 +31,22 @@ struct WaterRules {
 
 // What textures of GLB tiles are cut from.
 struct ImageryRules {
-  std::unique_ptr<dem::Imagery> image;                         // null: none
+  std::shared_ptr<const dem::Imagery> image;                   // null: none
   proto::TextureFormat texture = proto::TextureFormat::kJpeg;  // what requests get that name none
   int side = 512;                                              // pixels along a tile's edge, at most
   int quality = 80;                                            // of EncodePicture
   std::string attribution;
 };
 
-// One served dataset: a name, a source and what its users should read.
+// One served dataset: a name, a source and what its users should read. Copies share what they read from, which is
+// immutable: a dataset that has not changed goes on in the next catalog.
 struct Dataset {
   std::string name;
   std::string attribution;
   double error_fraction = 0.5;
   MeshRules rules;
   proto::GlbOptions glb;  // compression: what GLB requests get that name none
-  std::unique_ptr<dem::DemSource> source;
+  std::shared_ptr<const dem::DemSource> source;
   WaterRules water;
   ImageryRules imagery;
   int metadata_levels = 0;       // tiles of every so many levels tell what is below them; 0: none
@@ -60,6 +61,8 @@ class TilePipeline {
  public:
   explicit TilePipeline(std::vector<Dataset> datasets,
                         std::size_t refinement_cache_bytes = kDefaultRefinementCacheBytes);
+  // The same with a cache that others share: one that outlives the catalog.
+  TilePipeline(std::vector<Dataset> datasets, std::shared_ptr<RefinementCache> refinements);
   static constexpr std::size_t kDefaultRefinementCacheBytes = std::size_t{128} << 20;
 
   const std::vector<Dataset>& datasets() const { return datasets_; }
@@ -69,10 +72,10 @@ class TilePipeline {
   // kCancelled: `stop` was requested.
   Result<EncodedTile> Build(const TileRequest& request, std::stop_token stop) const;
 
-  ByteCacheStats refinements() const { return refinements_.stats(); }
+  ByteCacheStats refinements() const { return refinements_->stats(); }
 
  private:
-  Result<RefinedTilePtr> Refine(std::uint32_t index, const geo::TileKey& key, double error_m, EncodedTile& encoded,
+  Result<RefinedTilePtr> Refine(const Dataset& dataset, const geo::TileKey& key, double error_m, EncodedTile& encoded,
                                 const std::stop_token& stop) const;
 
   Result<void> EncodeQuantizedMesh(const TileRequest& request, const RefinedTile& refined, double error_m,
@@ -80,8 +83,8 @@ class TilePipeline {
   Result<void> EncodeGlb(const TileRequest& request, const RefinedTile& refined, double error_m, EncodedTile& encoded,
                          const std::stop_token& stop) const;
 
-  std::vector<Dataset> datasets_;
-  mutable RefinementCache refinements_;
+  const std::vector<Dataset> datasets_;
+  const std::shared_ptr<RefinementCache> refinements_;
 };
 
 }  // namespace terrace::server

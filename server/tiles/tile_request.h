@@ -19,7 +19,7 @@ enum class TileFormat : std::uint8_t { kQuantizedMesh, kGlb, kHeightPng };
 inline constexpr std::array<int, 2> kHeightSizes = {256, 512};
 
 struct TileRequest {
-  std::uint32_t dataset = 0;  // index into the server's datasets
+  std::uint32_t dataset = 0;  // index into the catalog's datasets
   geo::TileKey key;
   int error_step = 0;  // on the ladder of the key's level (engine/geo/error_ladder.h)
   TileFormat format = TileFormat::kQuantizedMesh;

@@ -5,54 +5,72 @@
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 namespace terrace::server {
 namespace {
 
-Result<TilePtr> RunWork(const SingleFlight::Work& work, const std::string& what, std::stop_token stop) {
+using Clock = TileService::Clock;
+
+Result<TilePtr> RunWork(const SingleFlight::Work& work, const std::string& what, Clock::time_point asked,
+                        std::stop_token stop) {
+  const auto queued = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - asked);
   try {
     Result<EncodedTile> built = work(std::move(stop));
     if (!built) return tl::unexpected(std::move(built.error()));
+    built->times.queue = queued;
     return std::make_shared<const EncodedTile>(std::move(*built));
   } catch (const std::exception& exception) {  // std::bad_alloc above all
     return MakeError(ErrorCode::kUnavailable, "{}: {}", what, exception.what());
   }
 }
 
+// The generation stands for the dataset, whose index may be another one in the next catalog.
+CacheKey KeyOf(const Catalog& catalog, TileRequest request) {
+  const std::uint64_t generation = catalog.datasets[request.dataset].generation;
+  request.dataset = 0;
+  return {request, generation};
+}
+
 }  // namespace
 
-TileService::TileService(TileServiceOptions options, TileBuilder builder, BuildObserver observer)
-    : builder_(std::move(builder)),
-      observer_(std::move(observer)),
+TileService::TileService(TileServiceOptions options, BuildObserver observer)
+    : observer_(std::move(observer)),
       cache_(options.cache_bytes),
       pool_(options.worker_threads, options.queue_length),
       flights_(pool_) {}
 
 TileService::~TileService() { Shutdown(); }
 
-std::optional<ServedTile> TileService::Find(const CacheKey& key) {
-  TilePtr tile = cache_.Find(key);
+std::optional<ServedTile> TileService::Find(const Catalog& catalog, const TileRequest& request) {
+  TilePtr tile = cache_.Find(KeyOf(catalog, request));
   if (!tile) return std::nullopt;
   hits_.fetch_add(1, std::memory_order_relaxed);
   return ServedTile(std::move(tile), CacheStatus::kHit);
 }
 
-asio::awaitable<Result<ServedTile>> TileService::Get(CacheKey key, Clock::time_point deadline) {
-  if (std::optional<ServedTile> found = Find(key)) co_return *std::move(found);
-  SingleFlight::Build build = [this, key](std::stop_token stop) { return BuildAndKeep(key, std::move(stop)); };
+asio::awaitable<Result<ServedTile>> TileService::Get(CatalogPtr catalog, TileRequest request,
+                                                     Clock::time_point deadline) {
+  if (std::optional<ServedTile> found = Find(*catalog, request)) co_return *std::move(found);
+  const CacheKey key = KeyOf(*catalog, request);
+  SingleFlight::Build build = [this, catalog = std::move(catalog), request, key,
+                               asked = Clock::now()](std::stop_token stop) {
+    return BuildAndKeep(*catalog, request, key, asked, std::move(stop));
+  };
   SingleFlight::Landing landing = co_await flights_.Join(key, std::move(build), deadline);
   if (!landing.joined) misses_.fetch_add(1, std::memory_order_relaxed);
   if (!landing.tile) co_return tl::unexpected(std::move(landing.tile.error()));
   co_return ServedTile(std::move(*landing.tile), landing.joined ? CacheStatus::kJoined : CacheStatus::kMiss);
 }
 
-Result<TilePtr> TileService::BuildAndKeep(const CacheKey& key, std::stop_token stop) {
+Result<TilePtr> TileService::BuildAndKeep(const Catalog& catalog, const TileRequest& request, const CacheKey& key,
+                                          Clock::time_point asked, std::stop_token stop) {
   // Between the look into the cache and the start of this flight an earlier flight may have landed.
   if (TilePtr tile = cache_.Find(key)) return tile;
-  const SingleFlight::Work work = [&](std::stop_token token) { return builder_(key.request, std::move(token)); };
-  Result<TilePtr> tile = RunWork(work, "tile " + geo::ToString(key.request.key), std::move(stop));
+  const SingleFlight::Work work = [&](std::stop_token token) { return catalog.build(request, std::move(token)); };
+  Result<TilePtr> tile = RunWork(work, "tile " + geo::ToString(request.key), asked, std::move(stop));
   if (tile) cache_.Insert(key, *tile);
-  if (observer_) observer_(key.request, tile);
+  if (observer_) observer_(catalog.datasets[request.dataset], tile);
   return tile;
 }
 
@@ -74,11 +92,18 @@ asio::awaitable<Result<TilePtr>> TileService::Run(SingleFlight::Work work, Lengt
   }
   CacheKey key;
   key.solo = 1 + solos_.fetch_add(1, std::memory_order_relaxed);
-  SingleFlight::Build build = [work = std::move(work), turn = std::move(turn)](std::stop_token stop) {
-    return RunWork(work, "work for one request", std::move(stop));
+  SingleFlight::Build build = [work = std::move(work), turn = std::move(turn),
+                               asked = Clock::now()](std::stop_token stop) {
+    return RunWork(work, "work for one request", asked, std::move(stop));
   };
   SingleFlight::Landing landing = co_await flights_.Join(key, std::move(build), deadline);
   co_return std::move(landing.tile);
+}
+
+void TileService::RetainTilesOf(const Catalog& catalog) {
+  std::vector<std::uint64_t> generations;
+  for (const DatasetView& dataset : catalog.datasets) generations.push_back(dataset.generation);
+  cache_.Retain(generations);
 }
 
 void TileService::CancelBuilds() { flights_.Shutdown(); }

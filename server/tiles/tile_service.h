@@ -1,6 +1,7 @@
 // Tiles for requests: from the cache, from a flight that is under way, or from a new build on the worker pool.
 //
-// Thread-safe. How a tile is built is a function, so that this room knows neither elevation models nor codecs.
+// Thread-safe. How a tile is built is the catalog's business: this class knows neither elevation models nor codecs.
+// Tiles outlive the catalog they came from: the next one finds those of datasets that it has in the same generation.
 #pragma once
 
 #include <atomic>
@@ -8,14 +9,11 @@
 #include <functional>
 #include <memory>
 #include <optional>
-#include <span>
 #include <stop_token>
-#include <vector>
 
 #include "engine/core/result.h"
-#include "engine/dem/dem_source.h"
 #include "server/asio.h"
-#include "server/tiles/area_mesh.h"
+#include "server/tiles/catalog.h"
 #include "server/tiles/encoded_tile.h"
 #include "server/tiles/single_flight.h"
 #include "server/tiles/tile_cache.h"
@@ -24,22 +22,8 @@
 
 namespace terrace::server {
 
-// Blocking; called on many threads at once. An exception counts as kUnavailable.
-using TileBuilder = std::function<Result<EncodedTile>(const TileRequest&, std::stop_token)>;
-
-// Heights of a dataset at points, NaN where it has none. Blocking; called on many threads at once.
-using PointReader = std::function<Result<std::vector<float>>(
-    std::uint32_t dataset, std::span<const dem::GeoPosition> points, std::stop_token)>;
-
-// Meshes of areas, by the dataset's index: `plan` refuses what is too large, at once and without reading; `build`
-// blocks. Both are called on many threads at once.
-struct AreaMesher {
-  std::function<Result<AreaPlan>(std::uint32_t dataset, const AreaRequest&)> plan;
-  std::function<Result<EncodedTile>(std::uint32_t dataset, const AreaPlan&, const AreaRequest&, std::stop_token)> build;
-};
-
 // Told about every build on the thread that ran it.
-using BuildObserver = std::function<void(const TileRequest&, const Result<TilePtr>&)>;
+using BuildObserver = std::function<void(const DatasetView&, const Result<TilePtr>&)>;
 
 struct TileServiceOptions {
   unsigned worker_threads = 0;                       // 0: as many as the machine has processors
@@ -61,21 +45,26 @@ class TileService {
  public:
   using Clock = SingleFlight::Clock;
 
-  TileService(TileServiceOptions options, TileBuilder builder, BuildObserver observer = nullptr);
+  explicit TileService(TileServiceOptions options, BuildObserver observer = nullptr);
   ~TileService();
 
   // The tile if it is in the cache; counts as a hit then. From any thread.
-  std::optional<ServedTile> Find(const CacheKey& key);
+  std::optional<ServedTile> Find(const Catalog& catalog, const TileRequest& request);
 
-  // Errors: those of the builder, and kOverloaded, kCancelled, kUnavailable of SingleFlight::Join. The coroutine has to
-  // run on a single thread. Only successes are kept.
-  asio::awaitable<Result<ServedTile>> Get(CacheKey key, Clock::time_point deadline);
+  // Errors: those of the catalog's builder, and kOverloaded, kCancelled, kUnavailable of SingleFlight::Join. The
+  // coroutine has to run on a single thread. Only successes are kept. Precondition: the request names one of the
+  // datasets.
+  asio::awaitable<Result<ServedTile>> Get(CatalogPtr catalog, TileRequest request, Clock::time_point deadline);
 
   // Runs `work` on a worker for this caller alone: nothing is shared or kept. Errors and conditions as those of Get. An
   // exception of `work` counts as kUnavailable. Long work is refused (kOverloaded) as soon as it has all workers but
   // one, of several: tiles go on being served beside it.
   enum class Length { kShort, kLong };
   asio::awaitable<Result<TilePtr>> Run(SingleFlight::Work work, Length length, Clock::time_point deadline);
+
+  // Tiles of datasets that are not in `catalog` leave the cache, and builds of them that land later stay out of it.
+  void RetainTilesOf(const Catalog& catalog);
+  void SetCacheBytes(std::size_t capacity) { cache_.SetCapacity(capacity); }
 
   // Makes every Get that waits for a build fail soon, and every later one at once; the cache keeps answering.
   void CancelBuilds();
@@ -91,10 +80,10 @@ class TileService {
   Stats stats() const;
 
  private:
-  Result<TilePtr> BuildAndKeep(const CacheKey& key, std::stop_token stop);
+  Result<TilePtr> BuildAndKeep(const Catalog& catalog, const TileRequest& request, const CacheKey& key,
+                               Clock::time_point asked, std::stop_token stop);
   std::shared_ptr<void> BeginLong();
 
-  const TileBuilder builder_;
   const BuildObserver observer_;
   TileCache cache_;
   WorkerPool pool_;

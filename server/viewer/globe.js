@@ -84,9 +84,17 @@ export class Globe {
   // 3D Tiles from this URL to the right of the splitter; without one, terrain everywhere.
   async compare(url) {
     this.material.uniforms.split = url ? 1 : 0;
+    this.#hideAir();
     if (url) await this.tiles3d.show(url, this.onError);
     else this.tiles3d.hide();
     this.scene.requestRender();
+  }
+
+  // The air is white where no ground is in front of it: through wires, and where terrain has made room for 3D Tiles that
+  // are still on their way.
+  #hideAir() {
+    const { wire, split } = this.material.uniforms;
+    this.scene.skyAtmosphere.show = wire === 0 && split === 0;
   }
 
   get split() {
@@ -160,8 +168,8 @@ export class Globe {
   set wireframe(on) {
     this.scene.globe._surface.tileProvider._debug.wireframe = on;
     this.scene.globe.showSkirts = !on;
-    this.scene.skyAtmosphere.show = !on;  // it would shine through the mesh
     this.material.uniforms.wire = on ? 1 : 0;
+    this.#hideAir();
     this.scene.requestRender();
   }
 

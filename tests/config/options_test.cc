@@ -43,7 +43,7 @@ TEST(SetServerOption, TakesListsWithCommas) {
   EXPECT_THAT(Set("cors_origins", "", config), IsEmpty());
   EXPECT_THAT(config.cors_origins, IsEmpty());
   EXPECT_THAT(Set("trusted_proxies", "[::1],10.0.0.0/8", config),
-              ElementsAre(IsError("--trusted-proxies/0", "\"[::1]\" must be an address")));
+              ElementsAre(IsError("--trusted-proxies", "\"[::1]\" must be an address")));
   EXPECT_THAT(Set("trusted_proxies", "::1,10.0.0.0/8", config), IsEmpty());
   EXPECT_THAT(Set("tls", "/a.pem,/b.key", config), IsEmpty());
   EXPECT_EQ(config.tls, (TlsConfig{"/a.pem", "/b.key"}));
@@ -110,6 +110,14 @@ TEST(SetDatasetOption, TakesTheImageOfImageryAlone) {
   EXPECT_EQ(dataset.imagery, expected);
   SetDatasetOption("imagery", "", dataset, errors);
   EXPECT_THAT(errors, ElementsAre(IsError("--imagery", "the path of an image")));
+}
+
+TEST(ChangedServerOptions, NamesWhatDiffers) {
+  Config a, b;
+  EXPECT_TRUE(ChangedServerOptions(a, b).empty());
+  b.cache_bytes = 7;
+  b.datasets.emplace_back().name = "new";
+  EXPECT_EQ(ChangedServerOptions(a, b), (std::vector<std::string>{"datasets", "cache_bytes"}));
 }
 
 }  // namespace

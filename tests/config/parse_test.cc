@@ -106,8 +106,11 @@ TEST(ParseConfig, RefusesTwoDatasetsOfOneName) {
 }
 
 TEST(ParseConfig, RefusesAVerticalDatumItCannotConvert) {
-  EXPECT_THAT(ErrorsOf(R"({"datasets": [{"name": "a", "sources": ["a.tif"], "vertical": "egm96"}]})"),
-              ElementsAre(IsError("/datasets/0/vertical", "\"egm96\" is not supported yet; write \"unknown\"")));
+  EXPECT_THAT(ErrorsOf(R"({"datasets": [{"name": "a", "sources": ["a.tif"], "vertical": "egm69"}]})"),
+              ElementsAre(IsError("/datasets/0/vertical", "the path of a grid (.gtx, .tif), not \"egm69\"")));
+  EXPECT_THAT(ErrorsOf(R"({"datasets": [{"name": "a", "sources": [{"vertical": "egm96", "nodata": "none"}]}]})"),
+              ElementsAre(IsError("/datasets/0/sources/0/nodata", "\"auto\", \"declared\", a number"),
+                          IsError("/datasets/0/sources/0", "\"path\" is missing")));
 }
 
 TEST(ParseConfig, KeepsTheOrderOfSources) {

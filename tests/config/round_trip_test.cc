@@ -28,9 +28,21 @@ TEST(ToJson, ComesBackAsTheDefaults) { ExpectComesBack(Config{}); }
 TEST(ToJson, ComesBackWithEveryOptionSet) {
   Config config;
   config.listen = {"2001:db8::1", 0};
-  DatasetConfig dataset{
-      "a", {"/data/a.tif"}, VerticalDatum::kUnknown, "© \"ét\\é\"", 0.1, 1e-3, -0.3, 7, Criterion::kDataDependent,
-      true};
+  DatasetConfig dataset{"a",
+                        {"/data/a.tif"},
+                        "egm96",
+                        NodataConfig{false, {-9999, 0.5}},
+                        "© \"ét\\é\"",
+                        0.1,
+                        1e-3,
+                        -0.3,
+                        7,
+                        12.5,
+                        9,
+                        Criterion::kDataDependent,
+                        true};
+  dataset.sources.front().vertical = "EPSG:5703";
+  dataset.sources.front().nodata = NodataConfig{false, {}};
   dataset.water.sea_level = -1.25;
   dataset.metadata_availability = 7;
   dataset.is_public = true;
@@ -44,6 +56,10 @@ TEST(ToJson, ComesBackWithEveryOptionSet) {
   config.queue_length = 1;
   config.cache_bytes = std::size_t{1} << 40;
   config.refinement_cache_bytes = 12'345'678;
+  config.gdal_cache_bytes = 1'000'000;
+  config.data_roots = {"/data", "/srv/dems"};
+  config.allowed_prefixes = {"/vsis3/bucket/"};
+  config.allowed_drivers = {"GTiff", "VRT"};
   config.max_connections = 7;
   config.max_connections_per_client = 3;
   config.transfer_bytes = 5;
@@ -64,11 +80,15 @@ TEST(ToJson, ComesBackWithEveryOptionSet) {
   config.drain_timeout = std::chrono::milliseconds(0);
   config.log_level = LogLevel::kOff;
   config.log_format = LogFormat::kJson;
+  config.access_log = AccessLog::kCombined;
+  config.access_log_file = "/var/log/terrace/access.log";
+  config.watch = false;
   ExpectComesBack(config);
 }
 
 TEST(ToJson, NamesEveryOption) {
   Config config;
+  config.access_log_file = "/var/log/terrace/access.log";
   DatasetConfig dataset = Dataset("a");
   dataset.finest_error = 1;
   dataset.floor = 0;
@@ -76,6 +96,9 @@ TEST(ToJson, NamesEveryOption) {
   dataset.imagery.image = "/data/photo.tif";
   config.datasets = {dataset};
   config.tls = {"/etc/server.pem", "/etc/server.key"};
+  config.data_roots = {"/data"};
+  config.allowed_prefixes = {"/vsis3/bucket/"};
+  config.allowed_drivers = {"GTiff"};
   const Json json = Json::parse(ToJson(config));
   EXPECT_EQ(json.size(), ServerOptionTable().size());
   EXPECT_EQ(json.at("datasets").at(0).size(), DatasetOptionTable().size());

@@ -92,14 +92,14 @@ describe('GLB tiles', () => {
   before(async () => { server = await serve('--config', path.join(samples, 'samples.json')); });
   after(async () => assert.deepEqual(await server.stop(), { code: 0, signal: null }));
 
-  it('are valid, and decode to the same triangles in every form', async () => {
+  it('are valid, and decode to the same triangles in every form of one width', async () => {
     for (const [dataset, levels] of [['jacksboro', [0, 5, 9, 11, 13]], ['earth', [0, 1, 3, 5]]]) {
       const layer = await json(`${server.url}/${dataset}/layer.json`);
       for (const level of levels) {
         const { startX, startY, endX, endY } = layer.available[level][0];
         const tiles = new Set([`${startX}/${startY}`, `${(startX + endX) >> 1}/${(startY + endY) >> 1}`, `${endX}/${endY}`]);
         for (const tile of tiles) {
-          let expected;
+          const expected = {};  // of floats and of 16 bits
           for (const form of forms) {
             const url = `${server.url}/${dataset}/${level}/${tile}.glb?compression=${form}`;
             const reply = await request(url, { headers: { 'Accept-Encoding': 'gzip' } });
@@ -110,9 +110,9 @@ describe('GLB tiles', () => {
             const { issues } = await validator.validateBytes(new Uint8Array(bytes));
             const serious = issues.messages.filter(({ severity }) => severity < 2);
             assert.deepEqual(serious, [], url);
-            const { triangles } = decode(bytes);
-            expected ??= triangles;
-            assert.deepEqual(triangles, expected, url);
+            const { triangles } = decode(bytes), width = ['draco', 'none'].includes(form) ? 'float' : 'short';
+            expected[width] ??= triangles;
+            assert.deepEqual(triangles, expected[width], url);
           }
         }
       }

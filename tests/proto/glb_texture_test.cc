@@ -22,7 +22,8 @@ constexpr geo::TileKey kKey{9, 533, 388};
 GridMesh Tile(const geo::TileKey& key, int cells) {
   const GlobalGround ground(key, cells, Scattered(1000));
   const tin::TinMesh mesh = RegularMesh(cells, 4);
-  const double error = geo::LadderError(key.level, 0), step = GridStep(ground.lattice, error);
+  const double error = geo::LadderError(key.level, 0);
+  const double step = GridStep(ground.lattice, error, PositionWidth::k16Bits);
   const std::vector<GridPoint> points = SnapVertices(ground.view(), mesh, step);
   return MakeGridMesh(ground.view(), mesh, points, VertexNormals(ground.view(), mesh, GridPositions(points, step)),
                       step, SkirtDepth(key.level, error));

@@ -23,11 +23,12 @@ namespace {
 constexpr GlbCompression kAll[] = {GlbCompression::kDraco, GlbCompression::kNone, GlbCompression::kQuantized,
                                    GlbCompression::kMeshopt};
 
-GridMesh Tile(const geo::TileKey& key, int cells, int stride, int ladder = 0, double relief = 1000) {
+GridMesh Tile(const geo::TileKey& key, int cells, int stride, int ladder = 0, double relief = 1000,
+              PositionWidth width = PositionWidth::kFloat) {
   const GlobalGround ground(key, cells, Scattered(relief));
   const tin::TinMesh mesh = RegularMesh(cells, stride);
   const double error = geo::LadderError(key.level, ladder), depth = SkirtDepth(key.level, error);
-  double step = GridStep(ground.lattice, error);
+  double step = GridStep(ground.lattice, error, width);
   std::vector<GridPoint> points = SnapVertices(ground.view(), mesh, step);
   while (!FitsFloats(points, step, depth)) points = SnapVertices(ground.view(), mesh, step *= 2);
   return MakeGridMesh(ground.view(), mesh, points, VertexNormals(ground.view(), mesh, GridPositions(points, step)),
@@ -87,8 +88,8 @@ TEST(GlbTile, DecodesToTheGridInEveryForm) {
   for (const geo::TileKey key : {geo::TileKey{0, 0, 0}, geo::TileKey{1, 3, 1}, geo::TileKey{5, 0, 31},
                                  geo::TileKey{9, 533, 388}, geo::TileKey{13, 8548, 6199}, geo::TileKey{24, 7, 9}}) {
     for (const int ladder : {-16, 0, 13}) {
-      const GridMesh mesh = Tile(key, 32, 2, ladder);
       for (const GlbCompression compression : kAll) {
+        const GridMesh mesh = Tile(key, 32, 2, ladder, 1000, WidthOf(compression));
         SCOPED_TRACE(testing::Message() << geo::ToString(key) << " ladder " << ladder << " compression "
                                         << static_cast<int>(compression));
         ExpectTile(mesh, Encode(mesh, compression), 1);
@@ -151,11 +152,19 @@ TEST(GlbTile, SaysWhatClientsNeed) {
   const std::vector<double> turn(matrix.begin(), matrix.begin() + 12);
   EXPECT_EQ(turn, (std::vector<double>{1, 0, 0, 0, 0, 0, -1, 0, 0, 1, 0, 0}));
   EXPECT_GT(std::hypot(matrix[12], matrix[13], matrix[14]), 6.3e6);
-  EXPECT_EQ(json(GlbCompression::kQuantized).at("nodes").at(0).at("matrix").at(0), mesh.step_m);
+}
+
+TEST(GlbTile, ScalesSixteenBitPositionsByTheMatrix) {
+  const GridMesh mesh = Tile({9, 533, 388}, 32, 4, 0, 1000, PositionWidth::k16Bits);
+  for (const GlbCompression compression : {GlbCompression::kQuantized, GlbCompression::kMeshopt}) {
+    const nlohmann::json glb = DecodeGlb(Encode(mesh, compression).bytes)->json;
+    EXPECT_EQ(glb.at("nodes").at(0).at("matrix").at(0), mesh.step_m);
+  }
 }
 
 TEST(GlbTile, TakesFloatsWhereSixteenBitsAreTooFew) {
-  const GridMesh narrow = Tile({9, 533, 388}, 64, 4, 0), wide = Tile({9, 533, 388}, 64, 4, 20);
+  const GridMesh narrow = Tile({9, 533, 388}, 64, 4, 0, 1000, PositionWidth::k16Bits),
+                 wide = Tile({9, 533, 388}, 64, 4, 20, 1000, PositionWidth::k16Bits);
   for (const GlbCompression compression : {GlbCompression::kQuantized, GlbCompression::kMeshopt}) {
     const auto component = [&](const GridMesh& mesh) {
       return DecodeGlb(Encode(mesh, compression).bytes)->json.at("accessors").at(0).at("componentType");
@@ -168,7 +177,7 @@ TEST(GlbTile, TakesFloatsWhereSixteenBitsAreTooFew) {
 // A kilometre of cliff on a tile of a metre: the grid gives way, the coders do not fail.
 TEST(GlbTile, SurvivesCliffsBeyondTheGrid) {
   const GridMesh mesh = Tile({24, 7, 9}, 32, 2, geo::kFinestStep, 4000);
-  EXPECT_GT(mesh.step_m, GridStep({24, 32}, geo::LadderError(24, geo::kFinestStep)));
+  EXPECT_GT(mesh.step_m, GridStep({24, 32}, geo::LadderError(24, geo::kFinestStep), PositionWidth::kFloat));
   for (const GlbCompression compression : kAll) ExpectTile(mesh, Encode(mesh, compression), 1);
 }
 

@@ -14,21 +14,37 @@
 namespace terrace::proto {
 namespace {
 
+double TileSide(int level) { return geo::kSemiMajorAxis * geo::ToRadians(180) / std::exp2(level); }
+
 TEST(GridStep, IsAPowerOfTwoWithinItsShareOfTheError) {
   for (int level = 0; level <= geo::kMaxLevel; ++level) {
     for (int step = geo::kCoarsestStep; step <= geo::kFinestStep; ++step) {
       for (const int cells : {32, 256}) {
-        const double error = geo::LadderError(level, step), grid = GridStep({level, cells}, error);
-        EXPECT_EQ(grid, std::exp2(std::round(std::log2(grid))));
-        EXPECT_LE(grid, std::max(error / 32, std::exp2(-16)));
-        // The longest side of a tile is its diagonal.
-        const double side = geo::kSemiMajorAxis * geo::ToRadians(180) / std::exp2(level);
-        EXPECT_LT(std::sqrt(2.0) * side, std::exp2(22) * grid);
+        const double error = geo::LadderError(level, step), side = TileSide(level);
+        for (const PositionWidth width : {PositionWidth::k16Bits, PositionWidth::kFloat}) {
+          const double grid = GridStep({level, cells}, error, width);
+          EXPECT_EQ(grid, std::exp2(std::round(std::log2(grid))));
+          EXPECT_LE(grid, std::max(error / 32, std::exp2(-16)));
+          // The longest side of a tile is its diagonal, and the Earth's is less than twice its axis.
+          EXPECT_LT(std::min(std::sqrt(2.0) * side, 2.0 * geo::kSemiMajorAxis), std::exp2(23) * grid);
+        }
       }
     }
-    const double side = geo::kSemiMajorAxis * geo::ToRadians(180) / std::exp2(level);
-    EXPECT_LT(std::sqrt(2.0) * side, 65535 * GridStep({level, 256}, geo::LadderError(level, 0)));
+    EXPECT_LT(std::sqrt(2.0) * TileSide(level),
+              65535 * GridStep({level, 256}, geo::LadderError(level, 0), PositionWidth::k16Bits));
   }
+}
+
+// Half of a cube's diagonal is the farthest that rounding moves a point.
+TEST(GridStep, KeepsFloatsWithinACentimetreOfTheBorder) {
+  for (int level = 9; level <= geo::kMaxLevel; ++level) {
+    for (int step = geo::kCoarsestStep; step <= geo::kFinestStep; ++step) {
+      const double grid = GridStep({level, 256}, geo::LadderError(level, step), PositionWidth::kFloat);
+      EXPECT_LT(std::sqrt(3.0) / 2 * grid, 0.01) << level;
+    }
+  }
+  EXPECT_EQ(GridStep({8, 256}, geo::LadderError(8, 0), PositionWidth::kFloat), 1.0 / 64);
+  EXPECT_EQ(GridStep({2, 256}, geo::LadderError(2, 0), PositionWidth::kFloat), 1);
 }
 
 // Tiles that meet: inside, across the two roots, across the antimeridian, beside the poles.
@@ -73,7 +89,7 @@ TEST(SnapVertices, GivesNeighboursTheSamePoints) {
     for (const Meeting& meeting : Meetings()) {
       const GlobalGround a(meeting.a, cells, Scattered(3000)), b(meeting.b, cells, Scattered(3000));
       for (const int ladder : {geo::kCoarsestStep, -5, 0, 7, geo::kFinestStep}) {
-        const double step = GridStep(a.lattice, geo::LadderError(meeting.a.level, ladder));
+        const double step = GridStep(a.lattice, geo::LadderError(meeting.a.level, ladder), PositionWidth::k16Bits);
         const std::vector<GridPoint> edge = EdgePoints(a, mesh, step, meeting.east, cells);
         EXPECT_EQ(edge.size(), static_cast<std::size_t>(cells) + 1);
         EXPECT_EQ(edge, EdgePoints(b, mesh, step, meeting.east, 0))
@@ -173,7 +189,8 @@ TEST(MakeGridMesh, IsClosedAtThePoles) {
     for (const std::int64_t y : {std::int64_t{0}, geo::TileRows(level) - 1}) {
       const GlobalGround ground({level, 1, y}, 32, Scattered(2000));
       const tin::TinMesh mesh = RegularMesh(32, 1);
-      const GridMesh grid = Meshed(ground, mesh, GridStep(ground.lattice, geo::LadderError(level, 0)), 50'000);
+      const GridMesh grid =
+          Meshed(ground, mesh, GridStep(ground.lattice, geo::LadderError(level, 0), PositionWidth::kFloat), 50'000);
       EXPECT_LT(grid.triangles.size(), mesh.triangles.size() + 2 * 128);
       for (const auto& [a, b, c] : grid.triangles) {
         EXPECT_NE(grid.positions[a], grid.positions[b]);

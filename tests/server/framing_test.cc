@@ -1,11 +1,10 @@
 // Messages that two readers could cut differently, and messages that are too large, too slow or too many.
 #include <gtest/gtest.h>
-#include <unistd.h>
 
-#include <fstream>
 #include <thread>
 #include <vector>
 
+#include "tests/server/resident_memory.h"
 #include "tests/server/server_fixture.h"
 
 namespace terrace::server {
@@ -46,11 +45,30 @@ TEST_F(Framing, AmbiguousMessagesGetOneAnswer) {
   fields.push_back("Content-Length : 44\r\n");
   fields.push_back("Content-Length: 44\n");
   fields.push_back("Host: other\r\n");
+  int cases = 0;
   for (const std::string& field : fields) {
     for (const char* method : {"GET", "HEAD", "OPTIONS"}) {
       ExpectOneAnswer(std::string(method) + " /livez HTTP/1.1\r\nHost: x\r\n" + field + "\r\n", 400);
+      ++cases;
     }
   }
+  // The one URL that takes a body. Each of these has a reading by which the next request is a part of the body.
+  for (const char* field :
+       {"Transfer-Encoding: chunked\r\n", "Transfer-Encoding: chunked\r\nContent-Length: 5\r\n",
+        "Content-Length: 5\r\nTransfer-Encoding: chunked\r\n", "Transfer-Encoding: gzip\r\nContent-Length: 5\r\n",
+        "Transfer-Encoding : chunked\r\n",
+        "Transfer-Encoding:\x0b"
+        "chunked\r\n",
+        "A: b\nTransfer-Encoding: chunked\r\n", "A: b\rTransfer-Encoding: chunked\r\n",
+        "A: b\r\n Transfer-Encoding: chunked\r\n", "\x01Transfer-Encoding: chunked\r\n",
+        "Content-Length: 5\r\nContent-Length: 6\r\n", "Content-Length: 5, 5\r\n", "Content-Length: +5\r\n",
+        "Content-Length: 0x5\r\n", "Content-Length: 05\r\n", "Content-Length: 5 \x0b\r\n", "Content-Length: -5\r\n",
+        "Content-Length: 18446744073709551621\r\n"}) {
+    ExpectOneAnswer("POST /maui/heights HTTP/1.1\r\nHost: x\r\n" + std::string(field) + "\r\n0\r\n\r\n", 400);
+    ++cases;
+  }
+  EXPECT_GE(cases, 60);
+  RecordProperty("cases", cases);
   ExpectOneAnswer("GET /livez HTTP/1.1\r\n\r\n", 400);
   ExpectOneAnswer("GET /livez HTTP/1.0\r\nConnection: keep-alive\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n\r\n", 400);
   ExpectOneAnswer("GET /livez HTTP/2.0\r\nHost: x\r\n\r\n", 400);
@@ -73,20 +91,6 @@ TEST_F(Framing, LimitsHeadAndTarget) {
   std::string many;
   for (int i = 0; i < 5'000; ++i) many += "A: b\r\n";
   ExpectOneAnswer(Get("/livez", many), 431);
-}
-
-// Sanitizers keep freed memory and shadow it: resident memory says nothing there.
-#if defined(__has_feature)
-constexpr bool kSanitized = __has_feature(address_sanitizer) || __has_feature(thread_sanitizer);
-#else
-constexpr bool kSanitized = false;
-#endif
-
-long ResidentKib() {
-  std::ifstream statm("/proc/self/statm");
-  long size = 0, resident = 0;
-  statm >> size >> resident;
-  return resident * (::sysconf(_SC_PAGESIZE) / 1024);
 }
 
 TEST_F(Framing, FortyMegabytesOfHeaderCostNothing) {

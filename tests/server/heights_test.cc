@@ -21,8 +21,8 @@ class HeightsTest : public ServerFixture {
  protected:
   // Heights are latitude + 1000 * longitude.
   void StartHeights(ServerOptions options = {}) {
-    options.read_points = [this](std::uint32_t, std::span<const dem::GeoPosition> points,
-                                 std::stop_token stop) -> Result<std::vector<float>> {
+    read_points_ = [this](std::uint32_t, std::span<const dem::GeoPosition> points, dem::HeightDatum datum,
+                          std::stop_token stop) -> Result<std::vector<float>> {
       ++reads_;
       const auto until = std::chrono::steady_clock::now() + std::chrono::milliseconds(read_ms_);
       while (std::chrono::steady_clock::now() < until) {
@@ -30,7 +30,10 @@ class HeightsTest : public ServerFixture {
         std::this_thread::sleep_for(1ms);
       }
       std::vector<float> heights;
-      for (const auto& p : points) heights.push_back(static_cast<float>(p.latitude + 1000 * p.longitude));
+      const double undulation = datum == dem::HeightDatum::kOrthometric ? 50 : 0;
+      for (const auto& p : points) {
+        heights.push_back(static_cast<float>(p.latitude + 1000 * p.longitude - undulation));
+      }
       return heights;
     };
     Start(std::move(options));
@@ -52,8 +55,10 @@ TEST_F(HeightsTest, AnswersGetAndHead) {
   EXPECT_EQ(Elevation(reply, 0), 7005);
   EXPECT_EQ(Elevation(reply, 1), 8006);
   ASSERT_NE(reply.Field("etag"), "");
+  EXPECT_TRUE(reply.Field("server-timing").starts_with("cache;desc=miss, queue;dur=")) << reply.Field("server-timing");
   EXPECT_EQ(Fetch(port(), "/maui/heights?locations=5,7|6,8", "If-None-Match: " + reply.Field("etag") + "\r\n").status,
             304);
+  EXPECT_EQ(reads_, 1) << "what the client has is not made again";
   EXPECT_EQ(Fetch(port(), "/nope/heights?locations=5,7").status, 404);
   EXPECT_EQ(Fetch(port(), "/maui/heights?locations=5").status, 400);
   EXPECT_EQ(Fetch(port(), "/maui/heights").status, 400);

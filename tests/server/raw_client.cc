@@ -92,6 +92,12 @@ bool RawClient::Ended() {
   return unread_.empty() && ::recv(socket_, &byte, 1, 0) == 0;
 }
 
+std::size_t RawClient::TakeSome(std::size_t most) {
+  std::string bytes(most, 0);
+  const auto got = ::recv(socket_, bytes.data(), most, 0);
+  return got > 0 ? static_cast<std::size_t>(got) : 0;
+}
+
 void RawClient::CloseOwnDirection() { ::shutdown(socket_, SHUT_WR); }
 
 void RawClient::Reset() {

@@ -36,6 +36,9 @@ class RawClient {
   // True when the server closes within ten seconds without sending anything more.
   bool Ended();
 
+  // As many bytes as are there, at most `most`; 0 when the connection has ended.
+  std::size_t TakeSome(std::size_t most);
+
   void CloseOwnDirection();
   void Reset();  // the kernel tells the server at once
 

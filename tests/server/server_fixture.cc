@@ -34,7 +34,10 @@ void ServerFixture::Start(ServerOptions options) {
   DatasetView maui;
   maui.name = "maui";
   maui.available = {{{0, 0, 1, 0}}, {{0, 0, 3, 1}}, {{0, 0, 7, 3}}, {{0, 0, 15, 7}}};
-  auto server = Server::Start({maui}, builder_, options);
+  std::vector<DatasetView> datasets = more_datasets_;
+  datasets.insert(datasets.begin(), maui);
+  auto catalog = std::make_shared<const Catalog>(Catalog{std::move(datasets), builder_, read_points_, {}});
+  auto server = Server::Start(std::move(catalog), options);
   ASSERT_TRUE(server) << server.error().message;
   server_ = std::move(*server);
 }

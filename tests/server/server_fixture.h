@@ -8,6 +8,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <vector>
 
 #include "server/server.h"
 #include "tests/server/raw_client.h"
@@ -25,9 +26,11 @@ class ServerFixture : public testing::Test {
   // What the default builder makes of a request: readable, and different wherever the request differs.
   static std::string BodyOf(const TileRequest& request);
 
+  PointReader read_points_;     // default: none
   TileBuilder builder_;         // default: counts and returns BodyOf, compressed when asked for
   std::atomic<int> builds_{0};  // by the default builder
   std::atomic<int> build_ms_{0};
+  std::vector<DatasetView> more_datasets_;  // beside "maui"
   std::unique_ptr<Server> server_;
 };
 

@@ -33,7 +33,7 @@ TEST_F(ServerTest, ServesATileWithEverythingClientsRead) {
   EXPECT_EQ(reply.Field("access-control-allow-origin"), "*");
   EXPECT_EQ(reply.Field("timing-allow-origin"), "*");
   EXPECT_NE(reply.Field("access-control-expose-headers").find("Terrain-Max-Error"), std::string::npos);
-  EXPECT_TRUE(reply.Field("server-timing").starts_with("cache;desc=miss, read;dur="));
+  EXPECT_TRUE(reply.Field("server-timing").starts_with("cache;desc=miss, queue;dur="));
   EXPECT_FALSE(reply.Field("etag").empty());
   EXPECT_EQ(Fetch(port(), "/maui/1/2/1.terrain").Field("server-timing"), "cache;desc=hit");
 }
@@ -196,12 +196,14 @@ TEST_F(ServerTest, ServesProbesMetricsDatasetsAndAPage) {
   const auto reply = client.Read();
   ASSERT_TRUE(reply);
   const std::string& metrics = reply->body;
-  for (const char* line : {"terrace_http_requests_total{route=\"tile\",status=\"200\"} 2",
-                           "terrace_tile_builds_total{dataset=\"maui\",result=\"ok\"} 1", "terrace_cache_hits_total 1",
-                           "terrace_cache_misses_total 1", "terrace_cache_entries 1", "terrace_http_connections ",
-                           "terrace_http_request_duration_seconds_bucket{route=\"tile\"",
-                           "terrace_tile_build_stage_seconds_count{stage=\"refine\"} 1", "terrace_queue_length 0",
-                           "terrace_source_read_errors_total 0", "terrace_flights_joined_total 0"}) {
+  for (const char* line :
+       {"terrace_http_requests_total{dataset=\"maui\",route=\"tile\",status=\"200\"} 2",
+        "terrace_tile_builds_total{dataset=\"maui\",result=\"ok\"} 1", "terrace_cache_hits_total{tier=\"tiles\"} 1",
+        "terrace_cache_misses_total{tier=\"tiles\"} 1", "terrace_cache_entries{tier=\"tiles\"} 1", "terrace_datasets 1",
+        "terrace_degraded 0", "terrace_http_connections ",
+        "terrace_http_request_duration_seconds_bucket{cache=\"hit\",dataset=\"maui\",route=\"tile\"",
+        "terrace_tile_build_stage_seconds_count{dataset=\"maui\",stage=\"refine\"} 1", "terrace_queue_length 0",
+        "terrace_source_read_errors_total 0", "terrace_flights_joined_total 0"}) {
     EXPECT_NE(metrics.find(line), std::string::npos) << line << "\n" << metrics;
   }
 }
@@ -331,7 +333,7 @@ TEST_F(ServerTest, SaysWhatToDoAboutATakenPort) {
   Start();
   ServerOptions options;
   options.port = port();
-  const auto second = Server::Start({}, builder_, options);
+  const auto second = Server::Start(std::make_shared<const Catalog>(), options);
   ASSERT_FALSE(second);
   EXPECT_NE(second.error().message.find("127.0.0.1:" + std::to_string(port())), std::string::npos);
   EXPECT_NE(second.error().message.find("choose another port"), std::string::npos);
@@ -341,10 +343,10 @@ TEST_F(ServerTest, RefusesNamesThatItsUrlsNeed) {
   DatasetView dataset;
   for (const char* name : {"metrics", "viewer", "", "a/b"}) {
     dataset.name = name;
-    EXPECT_FALSE(Server::Start({dataset}, builder_, {})) << name;
+    EXPECT_FALSE(Server::Start(std::make_shared<const Catalog>(Catalog{{dataset}, builder_, {}, {}}), {})) << name;
   }
   dataset.name = "maui";
-  EXPECT_FALSE(Server::Start({dataset, dataset}, builder_, {}));
+  EXPECT_FALSE(Server::Start(std::make_shared<const Catalog>(Catalog{{dataset, dataset}, builder_, {}, {}}), {}));
 }
 
 }  // namespace

@@ -25,11 +25,12 @@ TEST(Result, HoldsAValueOrAnError) {
 
 TEST(ErrorCode, HasItsOwnName) {
   std::set<std::string> names;
-  for (const ErrorCode code : {ErrorCode::kInvalidArgument, ErrorCode::kNotFound, ErrorCode::kUnavailable,
-                               ErrorCode::kOverloaded, ErrorCode::kCancelled, ErrorCode::kInternal}) {
+  for (const ErrorCode code :
+       {ErrorCode::kInvalidArgument, ErrorCode::kNotFound, ErrorCode::kUnavailable, ErrorCode::kChanged,
+        ErrorCode::kOverloaded, ErrorCode::kCancelled, ErrorCode::kInternal}) {
     names.emplace(ToString(code));
   }
-  EXPECT_EQ(names.size(), 6u);
+  EXPECT_EQ(names.size(), 7u);
   EXPECT_TRUE(names.contains("not_found"));
 }
 

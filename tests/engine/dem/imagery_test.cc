@@ -222,7 +222,7 @@ TEST(Imagery, SaysWhenItsFileChanged) {
   const auto imagery = OpenImage(path);
   const std::uint64_t before = imagery->fingerprint();
   std::filesystem::resize_file(path, 1000);
-  EXPECT_EQ(imagery->Read(kTile, 256).error().code, ErrorCode::kUnavailable);
+  EXPECT_EQ(imagery->Read(kTile, 256).error().code, ErrorCode::kChanged);
   WriteImage(dir, TileSpec(2));
   EXPECT_NE(OpenImage(path)->fingerprint(), before);
 }

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <span>
 
+#include "engine/dem/geoid.h"
 #include "engine/geo/mercator_grid.h"
 #include "tests/engine/dem/dem_fixture.h"
 
@@ -355,6 +356,110 @@ TEST(Mosaic, NeighboursShareTheirBordersAcrossSources) {
       }
     }
   }
+}
+
+TEST(Mosaic, FeatherBlendsWhatIsConverted) {
+  const TempDir dir;
+  const std::string over = WriteRaster(dir, Flat(10, 50, 200, 0.01, 100), "over.tif");
+  const std::string base = WriteRaster(dir, Flat(0, 60, 30, 1, 300), "base.tif");
+  const DemOptions options{.feather = 20'000};
+  const auto raw = OpenAll({{over, 0}, {base, 1}}, options);
+  const auto mixed = OpenAll(
+      {{over, 0, false, SourceOptions{.vertical = "egm96"}}, {base, 1, false, SourceOptions{.vertical = "ellipsoid"}}},
+      options);
+  ASSERT_TRUE(raw && mixed);
+  EXPECT_TRUE(mixed->has_datum());
+  const int level = mixed->max_level();
+  int blended = 0;
+  for (double inside = -0.05; inside < 0.3; inside += 0.01) {
+    const double latitude = 50 - inside, before = NodeAt(*raw, level, 11, latitude);
+    const double share = (300 - before) / 200;
+    const double undulation = (*Geoid::OfCrs("EPSG:5773", {11, latitude}))->Undulation({11, latitude});
+    ASSERT_GT(undulation, 30);
+    // The node is the one nearest to the position.
+    EXPECT_NEAR(NodeAt(*mixed, level, 11, latitude), before + share * undulation, 0.05) << inside;
+    blended += share > 0.1 && share < 0.9;
+  }
+  EXPECT_GT(blended, 5);
+  for (const geo::TileKey& key : SomeTiles(*mixed, 8, 6)) {
+    const auto tile = mixed->Read(key);
+    ASSERT_TRUE(tile);
+    const HeightRange bound = mixed->RangeBound(key);
+    for (int j = 0; j <= tile->lattice.cells; ++j) {
+      for (int i = 0; i <= tile->lattice.cells; ++i) {
+        ASSERT_GE(tile->At(i, j), bound.min) << geo::ToString(key);
+        ASSERT_LE(tile->At(i, j), bound.max) << geo::ToString(key);
+      }
+    }
+  }
+}
+
+TEST(Mosaic, FeatherLeadsFromOneSourceToTheNext) {
+  const TempDir dir;
+  RasterSpec upper = Flat(10, 50, 200, 0.01, 100);  // a void of 20 samples a side in its middle
+  upper.nodata = -1;
+  upper.value = [](int c, int r) { return c >= 90 && c < 110 && r >= 90 && r < 110 ? -1.0 : 100.0; };
+  const std::string over = WriteRaster(dir, upper, "over.tif");
+  const std::string base = WriteRaster(dir, Flat(0, 60, 30, 1, 300), "base.tif");
+  DemOptions options;
+  options.max_void_gap = 0;
+  const auto hard = OpenAll({{over, 0}, {base, 1}}, options);
+  options.feather = 20'000;
+  const auto soft = OpenAll({{over, 0}, {base, 1}}, options), alone = OpenAll({{over, 0}}, options);
+  ASSERT_TRUE(hard && soft && alone);
+  EXPECT_NE(hard->fingerprint(), soft->fingerprint());
+  const int level = soft->max_level();
+  double before = 300;
+  for (double inside = 0.01; inside < 0.5; inside += 0.01) {  // towards the middle of the northern half
+    const double height = NodeAt(*soft, level, 11, 50 - inside);
+    EXPECT_LE(height, before + 0.01) << inside;
+    EXPECT_LT(before - height, 30) << inside;  // 200 m over 18 samples, not all at once
+    const double metres = inside * 111'200;
+    EXPECT_NEAR(height, metres > 21'500 ? 100 : 300 - 200 * std::min(1.0, metres / 20'000), 25) << inside;
+    before = height;
+  }
+  EXPECT_EQ(NodeAt(*soft, level, 11, 49.6), 100);
+  EXPECT_EQ(NodeAt(*soft, level, 11, 50.2), 300);
+  EXPECT_NEAR(NodeAt(*soft, level, 11, 49), 300, 1);  // in the void
+  EXPECT_GT(NodeAt(*soft, level, 11.13, 49), 220);    // 3 samples from its rim
+  EXPECT_EQ(NodeAt(*hard, level, 11.13, 49), 100);
+  EXPECT_EQ(NodeAt(*alone, level, 11, 49.97), 100);  // nothing is blended with the floor
+  for (int z = 3; z <= level; ++z) {
+    for (const geo::TileKey& key : SomeTiles(*soft, z, 4)) {
+      const auto tile = soft->Read(key), east = soft->Read(geo::Neighbour(key, 1, 0));
+      ASSERT_TRUE(tile && east);
+      const HeightRange bound = soft->RangeBound(key);
+      for (int j = 0; j <= tile->lattice.cells; ++j) {
+        ASSERT_EQ(tile->At(tile->lattice.cells, j), east->At(0, j)) << geo::ToString(key);
+        for (int i = 0; i <= tile->lattice.cells; ++i) {
+          ASSERT_GE(tile->At(i, j), bound.min) << geo::ToString(key);
+          ASSERT_LE(tile->At(i, j), bound.max) << geo::ToString(key);
+        }
+      }
+    }
+  }
+}
+
+TEST(Mosaic, KeepsFewFilesOpen) {
+  const TempDir dir;
+  std::vector<DemFile> files;
+  for (int i = 0; i < 60; ++i) {
+    files.push_back({WriteRaster(dir, Flat(i % 10 * 4, 40 - i / 10 * 4, 8, 0.5, i), std::to_string(i) + ".tif")});
+  }
+  DemOptions options;
+  options.max_open_sources = 5;
+  const auto source = OpenAll(files, options);
+  ASSERT_NE(source, nullptr);
+  for (int round = 0; round < 2; ++round) {
+    for (const geo::TileKey& key : SomeTiles(*source, source->max_level(), 60)) ASSERT_TRUE(source->Read(key));
+  }
+  std::size_t open = 0;
+  for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) {
+    std::error_code gone;
+    open += std::filesystem::read_symlink(entry, gone).string().starts_with(dir.path().string());
+  }
+  EXPECT_LE(open, 5u);
+  EXPECT_GT(open, 0u);
 }
 
 TEST(Mosaic, FilesOfAFolderThatAreNoRastersAreLeftOut) {

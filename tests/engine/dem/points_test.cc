@@ -90,7 +90,7 @@ TEST(Points, StopWhenAsked) {
   std::stop_source stop;
   stop.request_stop();
   const std::vector<GeoPosition> points = {At(5, 5)};
-  const auto heights = source->ReadPoints(points, stop.get_token());
+  const auto heights = source->ReadPoints(points, HeightDatum::kEllipsoid, stop.get_token());
   ASSERT_FALSE(heights);
   EXPECT_EQ(heights.error().code, ErrorCode::kCancelled);
 }

@@ -55,7 +55,7 @@ std::string WriteLargeRaster(const TempDir& dir, const std::string& name = "larg
 }
 
 std::unique_ptr<RasterSource> OpenRecorded(const std::string& path, const std::string& cache_dir) {
-  auto source = RasterSource::Open(path, cache_dir);
+  auto source = RasterSource::Open(path, {}, cache_dir);
   EXPECT_TRUE(source.has_value()) << source.error().message;
   return source ? *std::move(source) : nullptr;
 }
@@ -180,7 +180,7 @@ TEST(Prepare, ErrorsOfAveragesHoldForEverySample) {
 bool KilledAfter(const std::string& path, const std::string& cache, double share) {
   const pid_t child = ::fork();
   if (child == 0) {
-    (void)RasterSource::Open(path, cache, [share](double done) {
+    (void)RasterSource::Open(path, {}, cache, [share](double done) {
       if (done >= share) ::raise(SIGKILL);
     });
     ::_exit(0);
@@ -228,7 +228,7 @@ TEST(Prepare, TwoProcessesShareOneRecord) {
   for (pid_t& child : children) {
     child = ::fork();
     if (child == 0) {
-      const auto source = RasterSource::Open(path, cache);
+      const auto source = RasterSource::Open(path, {}, cache);
       ::_exit(source && (*source)->ReadBlocks(8, {300, 200, 100, 100}, {}) ? 0 : 1);
     }
   }
@@ -312,6 +312,103 @@ TEST(Prepare, AFolderThatCannotBeWrittenToCostsNothingButTheRecord) {
   const auto source = OpenRecorded(path, dir.File("file") + "/cache");
   ASSERT_NE(source, nullptr);
   EXPECT_FALSE(source->preparation().from_record);
+}
+
+// Several parts, overviews that are worth nothing, and marks that it does not declare.
+std::string WriteMarkedRaster(const TempDir& dir, const std::string& name = "marked.tif") {
+  RasterSpec spec;
+  spec.width = spec.height = 2100;
+  spec.geo_transform = {8, .001, 0, 47, 0, -.001};
+  spec.nodata = -1;
+  spec.overviews = {4, 16};
+  spec.value = [](int col, int row) { return col % 300 == 100 && row % 300 == 50 ? -32768 : Terrain(col, row); };
+  return WriteRaster(dir, spec, name);
+}
+
+void ExpectMarksAreVoids(const RasterSource& source) {
+  EXPECT_NE(source.info().found_voids, "");
+  EXPECT_EQ(source.info().void_samples, 49u);
+  EXPECT_GT(source.info().heights.min, 0);
+  EXPECT_TRUE(source.layout().overview_factors.empty()) << "they were averaged from marks";
+}
+
+TEST(Prepare, FoundVoidsArePartOfTheRecord) {
+  const TempDir dir;
+  const std::string path = WriteMarkedRaster(dir), cache = dir.File("cache");
+  const auto plain = OpenRecorded(path, {}), made = OpenRecorded(path, cache), loaded = OpenRecorded(path, cache);
+  EXPECT_FALSE(made->preparation().from_record);
+  EXPECT_TRUE(loaded->preparation().from_record);
+  EXPECT_EQ(loaded->preparation().parts_read, 0);
+  for (const auto& source : {plain.get(), made.get(), loaded.get()}) {
+    ExpectMarksAreVoids(*source);
+    EXPECT_EQ(source->info().found_voids, plain->info().found_voids);
+    EXPECT_EQ(source->info().heights.min, plain->info().heights.min);
+    ExpectSameAverages(path, *source);
+  }
+}
+
+TEST(Prepare, ARecordIsNotUsedForOtherRules) {
+  const TempDir dir;
+  const std::string path = WriteMarkedRaster(dir), cache = dir.File("cache");
+  OpenRecorded(path, cache);
+  const auto with = [&](SourceOptions options) {
+    auto source = RasterSource::Open(path, options, cache);
+    EXPECT_TRUE(source.has_value());
+    return *std::move(source);
+  };
+  const SourceOptions trusted{.find_voids = false}, stated{.find_voids = false, .nodata = {-32768}};
+  EXPECT_FALSE(with(trusted)->preparation().from_record);
+  EXPECT_EQ(with(trusted)->info().void_samples, 0u);
+  EXPECT_EQ(with(trusted)->info().heights.min, -32768);
+  EXPECT_FALSE(with(stated)->preparation().from_record);
+  EXPECT_EQ(with(stated)->info().void_samples, 49u);
+  for (const SourceOptions& options : {trusted, stated, SourceOptions{}}) {
+    EXPECT_TRUE(with(options)->preparation().from_record) << "each way of reading a file has its record";
+  }
+}
+
+TEST(Prepare, GoesOnInTheSecondPass) {
+  const TempDir dir;
+  const std::string path = WriteMarkedRaster(dir), cache = dir.File("cache");
+  const pid_t child = ::fork();
+  if (child == 0) {
+    double last = 0;
+    int passes = 1;
+    (void)RasterSource::Open(path, {}, cache, [&](double done) {
+      if (done < last) ++passes;
+      last = done;
+      if (passes == 2 && done > .5) ::raise(SIGKILL);
+    });
+    ::_exit(0);
+  }
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  ASSERT_TRUE(WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL);
+  const auto source = OpenRecorded(path, cache);
+  EXPECT_EQ(source->preparation().parts, 9);
+  EXPECT_EQ(source->preparation().parts_kept, 5);
+  EXPECT_EQ(source->preparation().parts_read, 4) << "the first pass is over, and its findings are kept";
+  ExpectMarksAreVoids(*source);
+  ExpectSameAverages(path, *source);
+}
+
+TEST(Prepare, StopsWhenToldAndGoesOnNextTime) {
+  const TempDir dir;
+  const std::string path = WriteLargeRaster(dir), cache = dir.File("cache");
+  std::stop_source stop;
+  const auto stopped = RasterSource::Open(
+      path, {}, cache,
+      [&](double done) {
+        if (done >= .3) stop.request_stop();
+      },
+      nullptr, stop.get_token());
+  ASSERT_FALSE(stopped.has_value());
+  EXPECT_EQ(stopped.error().code, ErrorCode::kCancelled);
+  const auto source = OpenRecorded(path, cache);
+  EXPECT_FALSE(source->preparation().from_record);
+  EXPECT_GE(source->preparation().parts_kept, 11);
+  EXPECT_LT(source->preparation().parts_kept, 35);
+  ExpectSameAverages(path, *source);
 }
 
 }  // namespace

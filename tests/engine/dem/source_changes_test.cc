@@ -1,6 +1,7 @@
 // A source that changed under the server gives an error, never a flat or a mixed tile.
 #include <fstream>
 
+#include "engine/dem/source_policy.h"
 #include "tests/engine/dem/dem_fixture.h"
 
 namespace terrace::dem {
@@ -8,54 +9,104 @@ namespace {
 
 constexpr geo::TileKey kInside{5, 34, 13};
 
-void ExpectUnavailable(const DemSource& source) {
+void ExpectChanged(const DemSource& source) {
   const auto tile = source.Read(kInside);
   ASSERT_FALSE(tile);
-  EXPECT_EQ(tile.error().code, ErrorCode::kUnavailable);
+  EXPECT_EQ(tile.error().code, ErrorCode::kChanged);
   EXPECT_NE(tile.error().message.find("dem.tif"), std::string::npos);
 }
 
-TEST(SourceChanges, RemovedFileIsUnavailable) {
+TEST(SourceChanges, RemovedFileIsTold) {
   const TempDir dir;
   const std::string path = WriteRaster(dir, {});
   const auto source = OpenOrFail(path);
   ASSERT_TRUE(source->Read(kInside));
   std::filesystem::remove(path);
-  ExpectUnavailable(*source);
+  ExpectChanged(*source);
 }
 
-TEST(SourceChanges, ReplacedFileIsUnavailable) {
+TEST(SourceChanges, ReplacedFileIsTold) {
   const TempDir dir;
   const std::string path = WriteRaster(dir, {});
   const auto source = OpenOrFail(path);
   ASSERT_TRUE(source->Read(kInside));
   std::filesystem::rename(WriteRaster(dir, {.value = [](int, int) { return 5.0; }}, "new.tif"), path);
-  ExpectUnavailable(*source);
+  ExpectChanged(*source);
 }
 
-TEST(SourceChanges, OverwrittenFileIsUnavailableAndStaysSo) {
+TEST(SourceChanges, OverwrittenFileIsToldAndStaysSo) {
   const TempDir dir;
   const std::string path = WriteRaster(dir, {});
   const auto source = OpenOrFail(path);
   std::ofstream(path, std::ios::app) << "x";
-  ExpectUnavailable(*source);
-  ExpectUnavailable(*source);
+  ExpectChanged(*source);
+  ExpectChanged(*source);
 }
 
-TEST(SourceChanges, ChangedPartOfAMosaicIsUnavailable) {
+TEST(SourceChanges, ChangedPartOfAMosaicIsTold) {
   const TempDir dir;
   const std::string part = WriteRaster(dir, {}, "part.tif");
   std::ofstream(dir.File("dem.vrt")) << R"(<VRTDataset rasterXSize="16" rasterYSize="16"><SRS>EPSG:4326</SRS>
     <GeoTransform>0, 1, 0, 0, 0, -1</GeoTransform><VRTRasterBand dataType="Float32" band="1">
     <SimpleSource><SourceFilename relativeToVRT="1">part.tif</SourceFilename><SourceBand>1</SourceBand></SimpleSource>
     </VRTRasterBand></VRTDataset>)";
+  ASSERT_TRUE(SetSourcePolicy({.drivers = {"VRT", "GTiff"}}));
   const auto source = OpenOrFail(dir.File("dem.vrt"));
   ASSERT_NE(source, nullptr);
   ASSERT_TRUE(source->Read(kInside));
   std::filesystem::remove(part);
   const auto tile = source->Read(kInside);
+  ASSERT_TRUE(SetSourcePolicy({}));
   ASSERT_FALSE(tile);
-  EXPECT_EQ(tile.error().code, ErrorCode::kUnavailable);
+  EXPECT_EQ(tile.error().code, ErrorCode::kChanged);
+}
+
+// Whoever holds a handle on the new file when the old one comes back must not read from it.
+TEST(SourceChanges, TheFileMayComeBack) {
+  const TempDir dir;
+  const std::string path = WriteRaster(dir, {});
+  const auto source = OpenOrFail(path);
+  const auto before = source->Read(kInside);
+  ASSERT_TRUE(before);
+  std::filesystem::rename(path, dir.File("old.tif"));
+  std::filesystem::rename(WriteRaster(dir, {.value = [](int, int) { return 5.0; }}, "new.tif"), path);
+  ExpectChanged(*source);
+  std::filesystem::rename(dir.File("old.tif"), path);
+  const auto after = source->Read(kInside);
+  ASSERT_TRUE(after);
+  EXPECT_EQ(after->heights, before->heights);
+}
+
+TEST(SourceChanges, WhatWasReplacedWhileItWasOpenedIsToldApart) {
+  const TempDir dir;
+  const std::string path = WriteRaster(dir, {});
+  const auto before = StampOf(path);
+  EXPECT_TRUE(StampedFiles::OfOpened({path}, before));
+  std::ofstream(path, std::ios::app) << "x";
+  const auto files = StampedFiles::OfOpened({path}, before);
+  ASSERT_FALSE(files);
+  EXPECT_EQ(files.error().code, ErrorCode::kChanged);
+}
+
+TEST(SourceChanges, ListsTheFilesThatMatter) {
+  const TempDir dir;
+  const auto source = OpenOrFail(WriteRaster(dir, {}));
+  const StampedFiles files = source->files();
+  ASSERT_EQ(files.size(), 1u);
+  EXPECT_FALSE(files.HasChanged(0));
+  std::filesystem::remove(files.path(0));
+  EXPECT_TRUE(files.HasChanged(0));
+}
+
+TEST(SourceChanges, OpeningCanBeStopped) {
+  const TempDir dir;
+  std::stop_source stop;
+  stop.request_stop();
+  DemOptions options;
+  options.stop = stop.get_token();
+  const auto source = DemSource::Open(WriteRaster(dir, {}), options);
+  ASSERT_FALSE(source);
+  EXPECT_EQ(source.error().code, ErrorCode::kCancelled);
 }
 
 }  // namespace

@@ -174,7 +174,7 @@ TEST(WaterRaster, SaysWhenItsFileChanged) {
   const auto mask = OpenMask(path);
   const std::uint64_t before = mask->fingerprint();
   std::filesystem::resize_file(path, 100);
-  EXPECT_EQ(mask->Read(kTile).error().code, ErrorCode::kUnavailable);
+  EXPECT_EQ(mask->Read(kTile).error().code, ErrorCode::kChanged);
   WriteRaster(dir, TileSpec(2));
   EXPECT_NE(OpenMask(path)->fingerprint(), before);
 }

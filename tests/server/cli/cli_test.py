@@ -107,6 +107,17 @@ class Config(unittest.TestCase):
         self.assertEqual((config["listen"], config["io_threads"]), ("127.0.0.1:2", 3))
         self.assertEqual([dataset["name"] for dataset in config["datasets"]], ["a", "b"])
 
+    def test_a_folder_is_one_dataset_of_its_name(self):
+        folder = self.folder / "dems.v2"
+        folder.mkdir()
+        for name in ("b.tif", "a.tif"):
+            (folder / name).write_bytes(b"")
+        printed = run("serve", f"{folder}/", "--print-config")
+        (dataset,) = json.loads(printed.stdout)["datasets"]
+        self.assertEqual((dataset["name"], dataset["sources"]), ("dems.v2", [f"{folder}/"]))
+        again = run("serve", "--config", self.write(printed.stdout), "--print-config")
+        self.assertEqual((again.returncode, again.stdout), (0, printed.stdout), again.stderr)
+
     def test_defaults_are_printed_without_anything_to_serve(self):
         printed = run("serve", "--print-config")
         self.assertEqual((printed.returncode, json.loads(printed.stdout)["datasets"]), (0, []), printed.stderr)

@@ -215,6 +215,36 @@ class Info(unittest.TestCase):
         self.assertEqual(len(json.loads(result.stdout)), 1)
 
 
+class InfoOfMosaics(InFolder):
+    WGS84 = ('GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]],PRIMEM["Greenwich",0],'
+             'UNIT["degree",0.0174532925199433]]')
+
+    def place(self, name, west, cell, void=False):
+        heights = [[-9999 if void and x > 20 else round(h, 2) for x, h in enumerate(row)] for row in BUMPS]
+        self.write(name + ".prj", self.WGS84)
+        return self.write(name + ".asc",
+                          grid(heights, f"xllcorner {west}\nyllcorner 20\ncellsize {cell}\nNODATA_value -9999"))
+
+    def test_a_folder_is_one_dataset(self):
+        self.place("b", 10.4, 0.01)
+        self.place("a", 10, 0.01, void=True)
+        self.place("coarse", 9, 0.1)
+        self.write("readme.txt", "not a raster")
+        result = run("info", self.folder)
+        self.assertEqual((result.returncode, result.stderr), (0, ""))
+        for part in (f"{self.folder}\n", "3, in the order in which they count", "1 sources lie in part under one",
+                     "west 9,", "east 13,", "1 sources have voids"):
+            self.assertIn(part, result.stdout)
+        self.assertLess(result.stdout.index("a.asc"), result.stdout.index("b.asc"))
+        self.assertLess(result.stdout.index("b.asc"), result.stdout.index("coarse.asc"))
+
+    def test_the_order_of_the_command_line_counts(self):
+        fine, coarse = self.place("fine", 10, 0.01), self.place("coarse", 9, 0.1)
+        (info,) = json.loads(run("info", "--mosaic", "--json", coarse, fine).stdout)
+        self.assertEqual([source["path"] for source in info["sources"]], [str(coarse), str(fine)])
+        self.assertEqual(len(json.loads(run("info", "--json", coarse, fine).stdout)), 2)
+
+
 class BadRasters(InFolder):
     def test_are_refused_with_the_reason(self):
         empty = self.write("empty.tif", b"")

@@ -28,6 +28,7 @@ TEST(DatasetsHandler, ListsWhatAClientNeeds) {
   const auto& dataset = list["datasets"][0];
   EXPECT_EQ(dataset["name"], "a <b>");
   EXPECT_EQ(dataset["bounds"], nlohmann::json::parse("[177.0, -20.0, -178.0, -15.0]"));
+  EXPECT_EQ(dataset["sources"], 1);
   EXPECT_EQ(dataset["min_level"], 0);
   EXPECT_EQ(dataset["max_level"], 2);
   EXPECT_EQ(dataset["heights"]["min"], -12.5);

@@ -34,6 +34,14 @@ TEST(HeightsQuery, ReadsLatitudeBeforeLongitude) {
   EXPECT_TRUE(query->distances_m.empty());
 }
 
+TEST(HeightsQuery, CountsFromTheEllipsoidUnlessToldOtherwise) {
+  const auto datum = [](const char* query) { return ParseHeightsQuery(*ParseQuery(query), 100)->datum; };
+  EXPECT_EQ(datum("locations=1,2"), dem::HeightDatum::kEllipsoid);
+  EXPECT_EQ(datum("locations=1,2&datum=ellipsoid"), dem::HeightDatum::kEllipsoid);
+  EXPECT_EQ(datum("locations=1,2&datum=orthometric"), dem::HeightDatum::kOrthometric);
+  EXPECT_EQ(datum("path=1,2|3,4&samples=3&datum=orthometric"), dem::HeightDatum::kOrthometric);
+}
+
 TEST(HeightsQuery, NamesTheItemThatIsWrong) {
   const struct {
     const char* query;
@@ -76,6 +84,9 @@ TEST(HeightsQuery, NamesTheItemThatIsWrong) {
       {"", "either locations or path"},
       {"locations=1,2&locations=1,2", "locations is given more than once"},
       {"locations=1,2&interpolation=cubic", "unknown parameter"},
+      {"locations=1,2&datum=egm96", "datum must be ellipsoid or orthometric"},
+      {"locations=1,2&datum=", "datum must be"},
+      {"locations=1,2&datum=ellipsoid&datum=ellipsoid", "datum is given more than once"},
   };
   for (const auto& c : cases) {
     const std::string message = Refusal(c.query);

@@ -29,14 +29,15 @@ TEST(TileHandler, NeverPrintsLessThanTheError) {
   }
 }
 
-TEST(TileHandler, TimesTheStepsOfAMissOnly) {
+TEST(TileHandler, TimesTheStepsOfABuild) {
   StageTimes times;
+  times.queue = std::chrono::microseconds(3);
   times.read = std::chrono::microseconds(1500);
   times.refine = std::chrono::microseconds(20);
   EXPECT_EQ(FormatServerTiming(CacheStatus::kMiss, times),
-            "cache;desc=miss, read;dur=1.500, refine;dur=0.020, encode;dur=0.000, compress;dur=0.000");
+            "cache;desc=miss, queue;dur=0.003, read;dur=1.500, refine;dur=0.020, encode;dur=0.000, compress;dur=0.000");
   EXPECT_EQ(FormatServerTiming(CacheStatus::kHit, times), "cache;desc=hit");
-  EXPECT_EQ(FormatServerTiming(CacheStatus::kJoined, times), "cache;desc=join");
+  EXPECT_TRUE(FormatServerTiming(CacheStatus::kJoined, times).starts_with("cache;desc=join, queue;dur=0.003, read;"));
 }
 
 }  // namespace

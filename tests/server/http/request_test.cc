@@ -102,6 +102,32 @@ TEST(Request, RefusesAmbiguousHeads) {
   }
 }
 
+TEST(Request, TakesTheTokenOutOfTheTarget) {
+  const struct {
+    const char *sent, *kept, *token;
+  } cases[] = {
+      {"/a?token=s", "/a", "s"},
+      {"/a?token=s&error=5", "/a?error=5", "s"},
+      {"/a?error=5&token=s", "/a?error=5", "s"},
+      {"/a?error=5&token=s&v=1&token=s", "/a?error=5&v=1", "s"},
+      {"/a?%74ok%65n=s%2Fx", "/a", "s/x"},
+      {"/a?token", "/a", ""},
+      {"/a?tokens=s", "/a?tokens=s", ""},
+      {"/a?error=%zz&x=token", "/a?error=%zz&x=token", ""},
+      {"/token=s", "/token=s", ""},
+      {"/a?token=s&token=t", "/a", "s t"},  // fits nobody
+  };
+  for (const auto& c : cases) {
+    const auto request = ParseHead("GET " + std::string(c.sent) + " HTTP/1.1\r\nHost: x\r\n\r\n");
+    ASSERT_TRUE(request) << c.sent;
+    EXPECT_EQ(request->target, c.kept);
+    EXPECT_EQ(request->token, c.token) << c.sent;
+  }
+  EXPECT_EQ(ParseHead(Get("Authorization: bearer  s \r\n"))->token, "s");
+  EXPECT_EQ(ParseHead(Get("Authorization: Basic abc\r\n"))->token, "");
+  EXPECT_EQ(ParseHead("GET /?token=q HTTP/1.1\r\nHost: x\r\nAuthorization: Bearer h\r\n\r\n")->token, "h");
+}
+
 TEST(Request, RefusesNulBytes) {
   using std::string_view_literals::operator""sv;
   EXPECT_FALSE(ParseHead("GET / HTTP/1.1\r\nHost: x\r\nA: b\0c\r\n\r\n"sv));

@@ -63,6 +63,18 @@ TEST(Response, MatchesEtagsAsListsWeakAndStar) {
   for (const auto& c : cases) EXPECT_EQ(MatchesEtag(c.if_none_match, "\"a\""), c.matches) << c.if_none_match;
 }
 
+TEST(Response, IsForItsReaderAloneWhereATokenDecides) {
+  Response response;
+  response.cache_control = "public, max-age=3600, s-maxage=9";
+  response.vary = true;
+  response.for_grant = true;
+  const std::string head = SerializeHead(response, {});
+  EXPECT_NE(head.find("\r\nCache-Control: private, max-age=3600\r\n"), std::string::npos) << head;
+  EXPECT_NE(head.find("\r\nVary: Accept, Accept-Encoding, Authorization\r\n"), std::string::npos) << head;
+  EXPECT_EQ(PrivateCacheControl("no-cache"), "private, no-cache");
+  EXPECT_EQ(PrivateCacheControl("private"), "private");
+}
+
 TEST(Response, BecomesNotModifiedOnlyFromSuccess) {
   Request request;
   request.if_none_match = "*";
@@ -79,8 +91,8 @@ TEST(Response, BecomesNotModifiedOnlyFromSuccess) {
 TEST(HttpError, NeverAnswersFiveHundred) {
   EXPECT_EQ(StatusOf(ErrorCode::kInvalidArgument), 400);
   EXPECT_EQ(StatusOf(ErrorCode::kNotFound), 404);
-  for (const ErrorCode code :
-       {ErrorCode::kUnavailable, ErrorCode::kOverloaded, ErrorCode::kCancelled, ErrorCode::kInternal}) {
+  for (const ErrorCode code : {ErrorCode::kUnavailable, ErrorCode::kChanged, ErrorCode::kOverloaded,
+                               ErrorCode::kCancelled, ErrorCode::kInternal}) {
     EXPECT_EQ(StatusOf(code), 503);
   }
 }

@@ -100,6 +100,34 @@ TEST(TileCache, SeparatesEverythingThatChangesBytes) {
   }
 }
 
+TEST(TileCache, RetainsTheGenerationsItIsToldOf) {
+  TileCache cache(100 * kCharge);
+  for (std::uint64_t generation = 1; generation <= 3; ++generation) cache.Insert(Key(1, generation), Tile());
+  cache.Retain({1, 3});
+  EXPECT_NE(cache.Find(Key(1, 1)), nullptr);
+  EXPECT_EQ(cache.Find(Key(1, 2)), nullptr);
+  EXPECT_NE(cache.Find(Key(1, 3)), nullptr);
+  cache.Insert(Key(1, 2), Tile());
+  EXPECT_EQ(cache.Find(Key(1, 2)), nullptr) << "a build that lands late";
+  EXPECT_EQ(cache.stats().bytes, 2 * kCharge);
+  cache.Retain({2});
+  cache.Insert(Key(1, 2), Tile());
+  EXPECT_NE(cache.Find(Key(1, 2)), nullptr) << "back again";
+  EXPECT_EQ(cache.stats().entries, 1u);
+}
+
+TEST(TileCache, GivesBackWhatASmallerBudgetCannotHold) {
+  TileCache cache(4 * kCharge);
+  for (int x = 1; x <= 4; ++x) cache.Insert(Key(x), Tile());
+  cache.SetCapacity(2 * kCharge);
+  EXPECT_EQ(cache.stats().bytes, 2 * kCharge);
+  EXPECT_EQ(cache.Find(Key(2)), nullptr);
+  EXPECT_NE(cache.Find(Key(4)), nullptr);
+  cache.SetCapacity(3 * kCharge);
+  cache.Insert(Key(5), Tile());
+  EXPECT_EQ(cache.stats().entries, 3u);
+}
+
 TEST(TileCache, StaysInBudgetUnderManyThreads) {
   constexpr std::size_t kCapacity = std::size_t{64} << 20;  // large enough for shards
   TileCache cache(kCapacity);

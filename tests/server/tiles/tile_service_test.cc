@@ -13,22 +13,34 @@
 namespace terrace::server {
 namespace {
 
-Result<ServedTile> Get(TileService& service, CacheKey key = {}) {
+// One dataset of generation 1.
+std::shared_ptr<Catalog> CatalogOf(TileBuilder builder) {
+  auto catalog = std::make_shared<Catalog>();
+  catalog->datasets.resize(1);
+  catalog->datasets[0].generation = 1;
+  catalog->build = std::move(builder);
+  return catalog;
+}
+
+Result<EncodedTile> BuildEmpty(const TileRequest&, std::stop_token) { return EncodedTile(); }
+
+Result<ServedTile> Get(TileService& service, CatalogPtr catalog, TileRequest request = {}) {
   asio::io_context io(1);
-  auto got =
-      asio::co_spawn(io, service.Get(key, TileService::Clock::now() + std::chrono::seconds(10)), asio::use_future);
+  const auto deadline = TileService::Clock::now() + std::chrono::seconds(10);
+  auto got = asio::co_spawn(io, service.Get(std::move(catalog), request, deadline), asio::use_future);
   io.run();
   return got.get();
 }
 
 TEST(TileService, BuildsOnceAndThenHits) {
   std::atomic<int> builds{0};
-  TileService service({}, [&](const TileRequest&, std::stop_token) -> Result<EncodedTile> {
+  TileService service({});
+  const CatalogPtr catalog = CatalogOf([&](const TileRequest&, std::stop_token) -> Result<EncodedTile> {
     ++builds;
     return EncodedTile();
   });
-  EXPECT_EQ(Get(service)->cache, CacheStatus::kMiss);
-  EXPECT_EQ(Get(service)->cache, CacheStatus::kHit);
+  EXPECT_EQ(Get(service, catalog)->cache, CacheStatus::kMiss);
+  EXPECT_EQ(Get(service, catalog)->cache, CacheStatus::kHit);
   EXPECT_EQ(builds, 1);
   EXPECT_EQ(service.stats().hits, 1u);
   EXPECT_EQ(service.stats().misses, 1u);
@@ -36,14 +48,15 @@ TEST(TileService, BuildsOnceAndThenHits) {
 
 TEST(TileService, FindsWhatIsCachedAndBuildsNothing) {
   std::atomic<int> builds{0};
-  TileService service({}, [&](const TileRequest&, std::stop_token) -> Result<EncodedTile> {
+  TileService service({});
+  const CatalogPtr catalog = CatalogOf([&](const TileRequest&, std::stop_token) -> Result<EncodedTile> {
     ++builds;
     return EncodedTile();
   });
-  EXPECT_FALSE(service.Find({}));
+  EXPECT_FALSE(service.Find(*catalog, {}));
   EXPECT_EQ(builds, 0);
-  ASSERT_TRUE(Get(service));
-  const std::optional<ServedTile> found = service.Find({});
+  ASSERT_TRUE(Get(service, catalog));
+  const std::optional<ServedTile> found = service.Find(*catalog, {});
   ASSERT_TRUE(found);
   EXPECT_EQ(found->cache, CacheStatus::kHit);
   EXPECT_EQ(builds, 1);
@@ -53,46 +66,71 @@ TEST(TileService, FindsWhatIsCachedAndBuildsNothing) {
 
 TEST(TileService, KeepsNoFailure) {
   std::atomic<int> builds{0};
-  TileService service({}, [&](const TileRequest&, std::stop_token) -> Result<EncodedTile> {
+  TileService service({});
+  const CatalogPtr catalog = CatalogOf([&](const TileRequest&, std::stop_token) -> Result<EncodedTile> {
     if (++builds == 1) return MakeError(ErrorCode::kUnavailable, "gone");
     return EncodedTile();
   });
-  EXPECT_EQ(Get(service).error().code, ErrorCode::kUnavailable);
-  EXPECT_TRUE(Get(service));
+  EXPECT_EQ(Get(service, catalog).error().code, ErrorCode::kUnavailable);
+  EXPECT_TRUE(Get(service, catalog));
 }
 
 TEST(TileService, TurnsExceptionsIntoUnavailable) {
-  TileService service({}, [](const TileRequest&, std::stop_token) -> Result<EncodedTile> { throw std::bad_alloc(); });
-  EXPECT_EQ(Get(service).error().code, ErrorCode::kUnavailable);
+  TileService service({});
+  const CatalogPtr catalog =
+      CatalogOf([](const TileRequest&, std::stop_token) -> Result<EncodedTile> { throw std::bad_alloc(); });
+  EXPECT_EQ(Get(service, catalog).error().code, ErrorCode::kUnavailable);
+}
+
+TEST(TileService, FindsTilesOfAGenerationInLaterCatalogs) {
+  TileService service({});
+  const auto first = CatalogOf(BuildEmpty);
+  ASSERT_TRUE(Get(service, first));
+  const auto shifted = CatalogOf(BuildEmpty);
+  shifted->datasets.insert(shifted->datasets.begin(), DatasetView());
+  shifted->datasets[0].generation = 7;
+  TileRequest request;
+  EXPECT_EQ(Get(service, shifted, request)->cache, CacheStatus::kMiss) << "another dataset has the index now";
+  request.dataset = 1;
+  EXPECT_EQ(Get(service, shifted, request)->cache, CacheStatus::kHit);
 }
 
 TEST(TileService, BuildsAgainForAnotherGeneration) {
-  std::atomic<int> builds{0};
-  TileService service({}, [&](const TileRequest&, std::stop_token) -> Result<EncodedTile> {
-    ++builds;
-    return EncodedTile();
-  });
-  CacheKey key;
-  ASSERT_TRUE(Get(service, key));
-  key.generation = 2;
-  ASSERT_TRUE(Get(service, key));
-  EXPECT_EQ(builds, 2);
+  TileService service({});
+  ASSERT_TRUE(Get(service, CatalogOf(BuildEmpty)));
+  const auto changed = CatalogOf(BuildEmpty);
+  changed->datasets[0].generation = 2;
+  EXPECT_EQ(Get(service, changed)->cache, CacheStatus::kMiss);
+}
+
+TEST(TileService, ForgetsGenerationsThatAreGone) {
+  TileService service({});
+  const auto old = CatalogOf(BuildEmpty), next = CatalogOf(BuildEmpty);
+  next->datasets[0].generation = 2;
+  ASSERT_TRUE(Get(service, old));
+  ASSERT_TRUE(Get(service, next));
+  service.RetainTilesOf(*next);
+  EXPECT_EQ(service.stats().cache.entries, 1u);
+  EXPECT_EQ(Get(service, next)->cache, CacheStatus::kHit);
+  EXPECT_EQ(Get(service, old)->cache, CacheStatus::kMiss) << "still answered";
+  EXPECT_EQ(service.stats().cache.entries, 1u) << "but not kept";
 }
 
 TEST(TileService, TellsTheObserverAboutEveryBuild) {
   std::atomic<int> good{0}, bad{0};
-  TileService service(
-      {},
-      [](const TileRequest& request, std::stop_token) -> Result<EncodedTile> {
-        if (request.dataset == 1) return MakeError(ErrorCode::kInternal, "no");
-        return EncodedTile();
-      },
-      [&](const TileRequest&, const Result<TilePtr>& tile) { ++(tile ? good : bad); });
-  CacheKey key;
-  ASSERT_TRUE(Get(service, key));
-  ASSERT_TRUE(Get(service, key));
-  key.request.dataset = 1;
-  ASSERT_FALSE(Get(service, key));
+  TileService service({}, [&](const DatasetView& dataset, const Result<TilePtr>& tile) {
+    EXPECT_EQ(dataset.generation, 1u);
+    ++(tile ? good : bad);
+  });
+  const CatalogPtr catalog = CatalogOf([](const TileRequest& request, std::stop_token) -> Result<EncodedTile> {
+    if (request.key.x == 1) return MakeError(ErrorCode::kInternal, "no");
+    return EncodedTile();
+  });
+  TileRequest request;
+  ASSERT_TRUE(Get(service, catalog, request));
+  ASSERT_TRUE(Get(service, catalog, request));
+  request.key.x = 1;
+  ASSERT_FALSE(Get(service, catalog, request));
   EXPECT_EQ(good, 1);
   EXPECT_EQ(bad, 1);
 }
@@ -108,8 +146,7 @@ Result<TilePtr> RunAlone(TileService& service, SingleFlight::Work work, TileServ
 TEST(TileService, KeepsAWorkerForTilesBesideLongWork) {
   TileServiceOptions options;
   options.worker_threads = 2;
-  TileService service(options,
-                      [](const TileRequest&, std::stop_token) -> Result<EncodedTile> { return EncodedTile(); });
+  TileService service(options);
   std::promise<void> begun, end;
   const SingleFlight::Work work = [&](std::stop_token) -> Result<EncodedTile> {
     begun.set_value();
@@ -122,7 +159,7 @@ TEST(TileService, KeepsAWorkerForTilesBesideLongWork) {
   const Result<TilePtr> second = RunAlone(service, nothing, TileService::Length::kLong);
   ASSERT_FALSE(second);
   EXPECT_EQ(second.error().code, ErrorCode::kOverloaded);
-  EXPECT_TRUE(Get(service));
+  EXPECT_TRUE(Get(service, CatalogOf(BuildEmpty)));
   EXPECT_TRUE(RunAlone(service, nothing, TileService::Length::kShort));
   end.set_value();
   EXPECT_TRUE(first.get());

@@ -1,0 +1,67 @@
+#include "engine/dem/driver_list.h"
+
+#include <gdal_priv.h>
+
+#include <algorithm>
+#include <mutex>
+#include <string_view>
+
+namespace terrace::dem {
+namespace {
+
+// GDAL keeps rasters it works on in this one. Its names begin with "MEM:::", which are never files.
+constexpr std::string_view kOwnUse = "MEM";
+
+// Taken out of GDAL's list, which then never frees them; nor does anybody else.
+std::vector<GDALDriver*>& Retired() {
+  static auto& drivers = *new std::vector<GDALDriver*>;
+  return drivers;
+}
+
+Result<void> CheckNames(const std::vector<std::string>& names) {
+  for (const std::string& name : names) {
+    const bool retired = std::ranges::any_of(Retired(), [&](GDALDriver* d) { return name == d->GetDescription(); });
+    if (retired || GetGDALDriverManager()->GetDriverByName(name.c_str()) != nullptr) continue;
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "\"{}\" is no format of GDAL's here; `gdalinfo --formats` lists their short names", name);
+  }
+  return {};
+}
+
+}  // namespace
+
+const std::vector<std::string>& DefaultDrivers() {
+  // Those of them that this GDAL was built with.
+  static const std::vector<std::string> drivers = [] {
+    std::vector<std::string> names;
+    for (const char* name :
+         {"GTiff", "SRTMHGT", "DTED", "USGSDEM", "AAIGrid", "AIG", "GRASSASCIIGrid", "EHdr", "ENVI",       "HFA",
+          "ERS",   "SAGA",    "GSAG", "GSBG",    "GS7BG",   "XYZ", "ZMap",           "RST",  "BT",         "Terragen",
+          "HF2",   "SIGDEM",  "ACE2", "netCDF",  "PNM",     "PNG", "JPEG",           "WEBP", "JP2OpenJPEG"}) {
+      if (GetGDALDriverManager()->GetDriverByName(name) != nullptr) names.emplace_back(name);
+    }
+    return names;
+  }();
+  return drivers;
+}
+
+Result<void> UseDrivers(const std::vector<std::string>& names) {
+  static std::mutex mutex;
+  const std::lock_guard lock(mutex);
+  if (auto known = CheckNames(names); !known) return known;
+  GDALDriverManager& manager = *GetGDALDriverManager();
+  for (GDALDriver* driver : Retired()) {
+    if (manager.GetDriverByName(driver->GetDescription()) == nullptr) manager.RegisterDriver(driver);
+  }
+  Retired().clear();
+  for (int i = manager.GetDriverCount() - 1; i >= 0; --i) {
+    GDALDriver* driver = manager.GetDriver(i);
+    const std::string_view name = driver->GetDescription();
+    if (name == kOwnUse || std::ranges::find(names, name) != names.end()) continue;
+    manager.DeregisterDriver(driver);
+    Retired().push_back(driver);
+  }
+  return {};
+}
+
+}  // namespace terrace::dem

@@ -1,0 +1,19 @@
+// The formats that GDAL reads in this process.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "engine/core/result.h"
+
+namespace terrace::dem {
+
+// The formats of elevation models and pictures that stand for themselves: none that fetches, runs or links others.
+const std::vector<std::string>& DefaultDrivers();
+
+// Leaves GDAL with these drivers, by their short names: files inside files find no others either. May be called again
+// with others; meanwhile no source should be opened. kInvalidArgument: one that GDAL does not have; nothing changes
+// then. Precondition: GDAL's drivers are registered.
+Result<void> UseDrivers(const std::vector<std::string>& names);
+
+}  // namespace terrace::dem

@@ -1,0 +1,248 @@
+#include "engine/dem/geoid.h"
+
+#include <proj.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <map>
+#include <new>
+#include <system_error>
+
+namespace terrace::dem {
+namespace {
+
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+
+struct Destroy {
+  void operator()(PJ_CONTEXT* context) const { proj_context_destroy(context); }
+  void operator()(PJ* object) const { proj_destroy(object); }
+  void operator()(PJ_OBJ_LIST* list) const { proj_list_destroy(list); }
+  void operator()(PJ_OPERATION_FACTORY_CONTEXT* factory) const { proj_operation_factory_context_destroy(factory); }
+};
+using ContextPtr = std::unique_ptr<PJ_CONTEXT, Destroy>;
+using ObjectPtr = std::unique_ptr<PJ, Destroy>;
+using ListPtr = std::unique_ptr<PJ_OBJ_LIST, Destroy>;
+using FactoryPtr = std::unique_ptr<PJ_OPERATION_FACTORY_CONTEXT, Destroy>;
+
+ContextPtr MakeContext() {
+  ContextPtr context(proj_context_create());
+  proj_log_level(context.get(), PJ_LOG_NONE);
+  proj_context_set_enable_network(context.get(), 0);
+  return context;
+}
+
+// The vertical part of a reference system; null: it has none.
+ObjectPtr VerticalPart(PJ_CONTEXT* context, const std::string& text) {
+  ObjectPtr crs(proj_create(context, text.c_str()));
+  if (crs != nullptr && proj_get_type(crs.get()) == PJ_TYPE_COMPOUND_CRS) {
+    crs.reset(proj_crs_get_sub_crs(context, crs.get(), 1));
+  }
+  if (crs != nullptr && proj_get_type(crs.get()) == PJ_TYPE_BOUND_CRS) {
+    crs.reset(proj_get_source_crs(context, crs.get()));
+  }
+  return crs != nullptr && proj_get_type(crs.get()) == PJ_TYPE_VERTICAL_CRS ? std::move(crs) : nullptr;
+}
+
+std::string Wkt(PJ_CONTEXT* context, const PJ* crs) {
+  const char* text = crs == nullptr ? nullptr : proj_as_wkt(context, crs, PJ_WKT2_2019, nullptr);
+  return text == nullptr ? "" : text;
+}
+
+// Operations from heights of that system, at WGS 84 positions, to ellipsoidal heights: the best first, without those
+// that only pretend (ballpark).
+ListPtr OperationsFrom(PJ_CONTEXT* context, const PJ* vertical) {
+  const ObjectPtr wgs84(proj_create(context, "EPSG:4326")), ellipsoidal(proj_create(context, "EPSG:4979"));
+  const std::string text =
+      fmt::format("COMPOUNDCRS[\"heights\",{},{}]", Wkt(context, wgs84.get()), Wkt(context, vertical));
+  const ObjectPtr compound(proj_create(context, text.c_str()));
+  const FactoryPtr factory(proj_create_operation_factory_context(context, nullptr));
+  if (compound == nullptr || ellipsoidal == nullptr || factory == nullptr) return nullptr;
+  proj_operation_factory_context_set_allow_ballpark_transformations(context, factory.get(), 0);
+  proj_operation_factory_context_set_spatial_criterion(context, factory.get(),
+                                                       PROJ_SPATIAL_CRITERION_PARTIAL_INTERSECTION);
+  proj_operation_factory_context_set_grid_availability_use(context, factory.get(), PROJ_GRID_AVAILABILITY_IGNORED);
+  return ListPtr(proj_create_operations(context, compound.get(), ellipsoidal.get(), factory.get()));
+}
+
+bool CoversCentre(PJ_CONTEXT* context, const PJ* operation, Position centre) {
+  double west = 0, south = 0, east = 0, north = 0;
+  if (proj_get_area_of_use(context, operation, &west, &south, &east, &north, nullptr) == 0 || west < -180) return true;
+  const bool between = west <= east ? centre.x >= west && centre.x <= east : centre.x >= west || centre.x <= east;
+  return between && centre.y >= south && centre.y <= north;
+}
+
+struct Grid {
+  std::string name, file, url;
+};
+
+std::vector<Grid> GridsOf(PJ_CONTEXT* context, const PJ* operation) {
+  std::vector<Grid> grids;
+  const int count = proj_coordoperation_get_grid_used_count(context, operation);
+  for (int i = 0; i < count; ++i) {
+    const char *name = nullptr, *file = nullptr, *url = nullptr;
+    proj_coordoperation_get_grid_used(context, operation, i, &name, &file, nullptr, &url, nullptr, nullptr, nullptr);
+    const auto text = [](const char* value) { return std::string(value == nullptr ? "" : value); };
+    grids.push_back({text(name), text(file), text(url)});
+  }
+  return grids;
+}
+
+std::string HowToGet(const Grid& grid) {
+  const std::string from = grid.url.empty() ? "from https://cdn.proj.org" : grid.url;
+  return fmt::format(
+      "its grid {} is not installed: get {} and put it into a folder of PROJ's (/usr/share/proj, or one "
+      "that PROJ_DATA names)",
+      grid.name, from);
+}
+
+std::string PipelineOf(PJ_CONTEXT* context, const PJ* operation) {
+  // Longitude first, in degrees.
+  const ObjectPtr ordered(proj_normalize_for_visualization(context, operation));
+  const char* text = ordered == nullptr ? nullptr : proj_as_proj_string(context, ordered.get(), PJ_PROJ_5, nullptr);
+  return text == nullptr ? "" : text;
+}
+
+}  // namespace
+
+struct Geoid::Operation {
+  ContextPtr context;  // outlives the operation made in it
+  ObjectPtr operation;
+
+  double At(Position degrees, double height) const {
+    // A turn on or back is the same place: all longitudes enter the arithmetic in the same form.
+    const double longitude = degrees.x - 360 * std::floor((degrees.x + 180) / 360);
+    const PJ_COORD result = proj_trans(operation.get(), PJ_FWD, proj_coord(longitude, degrees.y, height, HUGE_VAL));
+    return std::isfinite(result.xyz.z) ? result.xyz.z : kUnknown;
+  }
+};
+
+Geoid::~Geoid() = default;
+
+// Most height systems have one operation for the whole Earth: thousands of sources share it, and looking it up takes
+// PROJ some 20 ms. Failures are not kept: the missing grid may be there the next time.
+std::shared_ptr<const Geoid> Geoid::FindShared(const std::string& vertical_crs, std::shared_ptr<const Geoid> made) {
+  static std::mutex mutex;
+  static std::map<std::string, std::shared_ptr<const Geoid>> shared;
+  const std::lock_guard lock(mutex);
+  if (made != nullptr) return shared.insert_or_assign(vertical_crs, std::move(made)).first->second;
+  const auto found = shared.find(vertical_crs);
+  // A grid that was replaced is read anew.
+  return found == shared.end() || found->second->files_.FirstChanged() ? nullptr : found->second;
+}
+
+Result<std::shared_ptr<const Geoid>> Geoid::OfCrs(const std::string& vertical_crs, Position centre) {
+  if (auto known = FindShared(vertical_crs, nullptr)) return Checked(std::move(known), centre);
+  const ContextPtr context = MakeContext();
+  const ObjectPtr vertical = VerticalPart(context.get(), vertical_crs);
+  if (vertical == nullptr) {
+    return MakeError(ErrorCode::kInvalidArgument, "\"{}\" is no vertical reference system that PROJ knows",
+                     vertical_crs);
+  }
+  const char* name = proj_get_name(vertical.get());
+  const std::shared_ptr<Geoid> geoid(new Geoid);
+  geoid->name_ = name == nullptr ? "unnamed" : name;
+  const ListPtr operations = OperationsFrom(context.get(), vertical.get());
+  const int count = operations == nullptr ? 0 : proj_list_get_count(operations.get());
+  std::string missing;  // of the best operation that cannot run
+  for (int i = 0; i < count; ++i) {
+    const ObjectPtr operation(proj_list_get(context.get(), operations.get(), i));
+    if (!CoversCentre(context.get(), operation.get(), centre)) continue;
+    const std::vector<Grid> grids = GridsOf(context.get(), operation.get());
+    const auto absent = std::ranges::find_if(grids, [](const Grid& grid) { return grid.file.empty(); });
+    if (absent != grids.end()) {
+      if (missing.empty()) missing = HowToGet(*absent);
+      continue;
+    }
+    geoid->pipeline_ = PipelineOf(context.get(), operation.get());
+    if (geoid->pipeline_.empty()) continue;
+    const PJ_PROJ_INFO info = proj_pj_info(operation.get());
+    geoid->description_ = info.description == nullptr ? geoid->pipeline_ : info.description;
+    std::vector<std::string> files;
+    for (const Grid& grid : grids) files.push_back(grid.file);
+    geoid->files_ = StampedFiles(files);
+    auto checked = Checked(geoid, centre);
+    if (checked && count == 1) FindShared(vertical_crs, *checked);
+    return checked;
+  }
+  return MakeError(ErrorCode::kInvalidArgument, "{} cannot be converted to ellipsoidal heights: {}", geoid->name_,
+                   missing.empty() ? "PROJ knows no way from there to WGS 84 at the centre of the source" : missing);
+}
+
+Result<std::shared_ptr<const Geoid>> Geoid::OfGrid(const std::string& path, Position centre) {
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(path, ignored)) {
+    return MakeError(ErrorCode::kNotFound, "geoid grid {} is no file that can be read", path);
+  }
+  if (path.find_first_of(",\"\\") != std::string::npos) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "geoid grid {}: commas, quotes and backslashes in its name mean something else to PROJ; rename it",
+                     path);
+  }
+  const std::shared_ptr<Geoid> geoid(new Geoid);
+  geoid->name_ = std::filesystem::path(path).filename().string();
+  geoid->description_ = "undulations of " + path;
+  geoid->files_ = StampedFiles({path});
+  geoid->pipeline_ = fmt::format(
+      "+proj=pipeline +step +proj=unitconvert +xy_in=deg +xy_out=rad +step +proj=vgridshift +grids=\"{}\" "
+      "+multiplier=1 +step +proj=unitconvert +xy_in=rad +xy_out=deg",
+      std::filesystem::absolute(path, ignored).string());
+  return Checked(geoid, centre);
+}
+
+// What cannot be evaluated, and what counts downwards, is found here and not in a tile.
+Result<std::shared_ptr<const Geoid>> Geoid::Checked(std::shared_ptr<const Geoid> geoid, Position centre) {
+  std::unique_ptr<Operation> operation = geoid->Borrow();
+  if (operation == nullptr) {
+    return MakeError(ErrorCode::kInvalidArgument, "{}: PROJ cannot read its grid ({}); check it with `gdalinfo {}`",
+                     geoid->name_, geoid->description_, geoid->files_.size() == 0 ? "" : geoid->files_.path(0));
+  }
+  const double base = operation->At(centre, 0), above = operation->At(centre, 1);
+  if (std::isnan(base)) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{} is not known at the centre of the source, {:.6g} degrees east and {:.6g} north", geoid->name_,
+                     centre.x, centre.y);
+  }
+  if (above < base) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{} counts downwards; make heights of the depths, for instance with `gdal_calc.py --calc=-A`",
+                     geoid->name_);
+  }
+  geoid->Return(std::move(operation));
+  return geoid;
+}
+
+std::unique_ptr<Geoid::Operation> Geoid::Borrow() const {
+  {
+    const std::lock_guard lock(mutex_);
+    if (!idle_.empty()) {
+      std::unique_ptr<Operation> operation = std::move(idle_.back());
+      idle_.pop_back();
+      return operation;
+    }
+  }
+  auto operation = std::make_unique<Operation>();
+  operation->context = MakeContext();
+  operation->operation.reset(proj_create(operation->context.get(), pipeline_.c_str()));
+  return operation->operation == nullptr ? nullptr : std::move(operation);
+}
+
+void Geoid::Return(std::unique_ptr<Operation> operation) const {
+  const std::lock_guard lock(mutex_);
+  idle_.push_back(std::move(operation));
+}
+
+Geoid::Reader::Reader(const Geoid& geoid) : geoid_(geoid), operation_(geoid.Borrow()) {
+  // It was set up once; what is missing now is memory or descriptors, and the caller's read fails.
+  if (operation_ == nullptr) throw std::bad_alloc();
+}
+
+Geoid::Reader::~Reader() {
+  proj_errno_reset(operation_->operation.get());
+  geoid_.Return(std::move(operation_));
+}
+
+double Geoid::Reader::At(Position degrees) const { return operation_->At(degrees, 0); }
+
+}  // namespace terrace::dem

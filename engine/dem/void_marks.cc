@@ -1,0 +1,201 @@
+#include "engine/dem/void_marks.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace terrace::dem {
+namespace {
+
+constexpr std::array<double, 5> kMarks = {-32768, -32767, -9999, 9999, 32767};
+constexpr double kAloneWithin = 1'000;  // metres
+// The shore of the Dead Sea is at -433 m, the summit of Mount Everest at 8,849 m, the deepest sea floor at -10,935 m.
+constexpr double kLowestLand = -500, kHighest = 9'000, kDeepest = -12'000;
+constexpr int kReach = 3;  // samples: kernels of resampling reach 2, rounded up for oblique ones
+constexpr int kMixedRim = 2, kCollarRim = 1;
+constexpr double kCollarStep = 100;  // metres
+constexpr int kChunk = 1024;         // samples along a side
+
+// What the second look at a raster counts.
+struct Evidence {
+  std::array<std::int64_t, kMarks.size()> at_mark{}, near_mark{};
+  // Heights beyond a bound, and how many of them have no void nearby.
+  std::int64_t below_land = 0, below_land_alone = 0;
+  std::int64_t below_sea = 0, below_sea_alone = 0;
+  std::int64_t above = 0, above_alone = 0;
+};
+
+class Looker {
+ public:
+  Looker(GDALRasterBand& band, const SampleRules& rules, const std::stop_token& stop)
+      : band_(band), rules_(rules), stop_(stop) {
+    for (std::size_t i = 0; i < kMarks.size(); ++i) heights_[i] = static_cast<float>(rules.Metres(kMarks[i]));
+  }
+
+  template <typename Visit>
+  Result<void> ForEachChunk(const Visit& visit) {
+    for (int row = 0; row < band_.GetYSize(); row += kChunk) {
+      for (int col = 0; col < band_.GetXSize(); col += kChunk) {
+        left_ = std::max(col - kReach, 0);
+        top_ = std::max(row - kReach, 0);
+        wide_ = std::min(col + kChunk + kReach, band_.GetXSize()) - left_;
+        high_ = std::min(row + kChunk + kReach, band_.GetYSize()) - top_;
+        samples_.resize(static_cast<std::size_t>(wide_) * static_cast<std::size_t>(high_));
+        auto read = ReadHeights(band_, rules_, left_, top_, wide_, high_, samples_.data(), stop_);
+        if (!read) return read;
+        const int end_row = std::min(row + kChunk, band_.GetYSize()),
+                  end_col = std::min(col + kChunk, band_.GetXSize());
+        for (int r = row - top_; r < end_row - top_; ++r) {
+          for (int c = col - left_; c < end_col - left_; ++c) visit(c, r);
+        }
+      }
+    }
+    return {};
+  }
+
+  float At(int c, int r) const {
+    return samples_[static_cast<std::size_t>(r) * static_cast<std::size_t>(wide_) + static_cast<std::size_t>(c)];
+  }
+
+  void CountMarks(float height, Evidence& evidence) const {
+    for (std::size_t i = 0; i < kMarks.size(); ++i) {
+      if (height == heights_[i]) {
+        ++evidence.at_mark[i];
+      } else if (std::abs(height - heights_[i]) <= kAloneWithin) {
+        ++evidence.near_mark[i];
+      }
+    }
+  }
+
+  void CountBeyond(int c, int r, Evidence& evidence) const {
+    const float height = At(c, r);
+    const auto count = [&](bool beyond, std::int64_t& all, std::int64_t& alone) {
+      if (!beyond) return;
+      ++all;
+      if (!IsNearVoid(c, r)) ++alone;
+    };
+    count(height < kLowestLand, evidence.below_land, evidence.below_land_alone);
+    count(height < kDeepest, evidence.below_sea, evidence.below_sea_alone);
+    count(height > kHighest, evidence.above, evidence.above_alone);
+  }
+
+ private:
+  bool IsNearVoid(int c, int r) const {
+    for (int y = std::max(r - kReach, 0); y <= std::min(r + kReach, high_ - 1); ++y) {
+      for (int x = std::max(c - kReach, 0); x <= std::min(c + kReach, wide_ - 1); ++x) {
+        if (std::isnan(At(x, y))) return true;
+      }
+    }
+    return false;
+  }
+
+  GDALRasterBand& band_;
+  const SampleRules& rules_;
+  const std::stop_token stop_;
+  std::array<float, kMarks.size()> heights_{};
+  int left_ = 0, top_ = 0, wide_ = 0, high_ = 0;  // of the samples read
+  std::vector<float> samples_;
+};
+
+}  // namespace
+
+void ZeroEdges::Add(const float* heights, std::ptrdiff_t stride, int cols, int rows, bool left, bool top, bool right,
+                    bool bottom) {
+  const auto pair = [this](float a, float b) {
+    if ((a == 0) == (b == 0)) return;
+    const float other = std::abs(a + b);
+    if (other > kCollarStep) {
+      ++high;
+    } else if (other > 0) {  // not of NaN
+      ++low;
+    }
+  };
+  for (int r = 0; r < rows; ++r) {
+    const float* const row = heights + r * stride;
+    for (int c = 0; c < cols; ++c) {
+      if (c + 1 < cols) pair(row[c], row[c + 1]);
+      if (r + 1 < rows) pair(row[c], row[c + stride]);
+    }
+    zeros += std::count(row, row + cols, 0.0f);
+    at_border += (left && row[0] == 0) + (right && row[cols - 1] == 0);
+    if ((top && r == 0) || (bottom && r + 1 == rows)) at_border += std::count(row, row + cols, 0.0f);
+  }
+}
+
+void ZeroEdges::Add(const ZeroEdges& other) {
+  high += other.high;
+  low += other.low;
+  zeros += other.zeros;
+  at_border += other.at_border;
+}
+
+bool ZeroEdges::IsCollar() const {
+  constexpr std::int64_t kFewest = 16, kExceptions = 50;  // one in 50
+  const bool is_strewn = high * 4 > zeros && at_border * 4 < zeros;
+  return at_border >= kFewest && high >= kFewest && low * kExceptions <= high && !is_strewn;
+}
+
+void VoidFindings::AddTo(SampleRules& rules) const {
+  rules.marks.insert(rules.marks.end(), marks.begin(), marks.end());
+  rules.lowest = std::max(rules.lowest, lowest);
+  rules.highest = std::min(rules.highest, highest);
+  rules.rim = std::max(rules.rim, rim);
+}
+
+bool MayHideVoids(const SampleRules& rules, double lowest, double highest, bool has_voids, const ZeroEdges& zeros) {
+  const auto is_mark = [&](double height) {
+    return std::ranges::any_of(kMarks, [&](double mark) { return static_cast<float>(rules.Metres(mark)) == height; });
+  };
+  return zeros.IsCollar() || is_mark(lowest) || is_mark(highest) || lowest < kDeepest || highest > kHighest ||
+         (has_voids && lowest < kLowestLand);
+}
+
+Result<VoidFindings> FindVoids(GDALRasterBand& band, const SampleRules& rules, const ZeroEdges& zeros,
+                               const std::stop_token& stop) {
+  VoidFindings findings;
+  const auto say = [&findings](const std::string& what) {
+    findings.text += (findings.text.empty() ? "" : ", ") + what;
+  };
+  Evidence evidence;
+  Looker marks(band, rules, stop);
+  auto read = marks.ForEachChunk([&](int c, int r) { marks.CountMarks(marks.At(c, r), evidence); });
+  if (!read) return tl::unexpected(read.error());
+  for (std::size_t i = 0; i < kMarks.size(); ++i) {
+    if (evidence.at_mark[i] == 0 || evidence.near_mark[i] * 4 > evidence.at_mark[i]) continue;
+    findings.marks.push_back(kMarks[i]);
+    say(fmt::format("{} samples of {:g}", evidence.at_mark[i], kMarks[i]));
+  }
+  if (zeros.IsCollar()) {
+    findings.marks.push_back((0 / rules.metres_per_unit - rules.offset) / rules.scale);
+    findings.rim = kCollarRim;
+    say("a collar of zeros");
+  }
+
+  // What lies beside these voids, and beside the declared ones.
+  SampleRules found = rules;
+  findings.AddTo(found);
+  found.rim = 0;
+  Looker beyond(band, found, stop);
+  read = beyond.ForEachChunk([&](int c, int r) {
+    const float height = beyond.At(c, r);
+    if (height < kLowestLand || height > kHighest) beyond.CountBeyond(c, r, evidence);
+  });
+  if (!read) return tl::unexpected(read.error());
+  if (evidence.below_land > 0 && evidence.below_land_alone == 0) {
+    findings.lowest = kLowestLand;
+    say(fmt::format("{} samples below {:g} m at their edges", evidence.below_land, kLowestLand));
+  } else if (evidence.below_sea > 0 && evidence.below_sea_alone == 0) {
+    findings.lowest = kDeepest;
+    say(fmt::format("{} samples below {:g} m at their edges", evidence.below_sea, kDeepest));
+  }
+  if (evidence.above > 0 && evidence.above_alone == 0) {
+    findings.highest = kHighest;
+    say(fmt::format("{} samples above {:g} m at their edges", evidence.above, kHighest));
+  }
+  if (findings.lowest > -kMaxAbsHeight || findings.highest < kMaxAbsHeight) findings.rim = kMixedRim;
+  return findings;
+}
+
+}  // namespace terrace::dem

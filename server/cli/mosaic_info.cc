@@ -1,0 +1,110 @@
+#include "server/cli/mosaic_info.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "engine/geo/error_ladder.h"
+
+namespace terrace::cli {
+namespace {
+
+bool Overlap(const dem::GeoBounds& a, const dem::GeoBounds& b) {
+  if (a.south >= b.north || b.south >= a.north) return false;
+  const auto width = [](const dem::GeoBounds& box) {
+    return box.west > box.east ? box.east + 360 - box.west : box.east - box.west;
+  };
+  const double offset = b.west - a.west - 360 * std::floor((b.west - a.west) / 360);  // 0 <= offset < 360
+  return offset < width(a) || offset + width(b) > 360;
+}
+
+// Sources that lie, in part at least, under one that comes before them.
+std::size_t CountOverlapped(const std::vector<dem::RasterInfo>& sources) {
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    count += std::any_of(sources.begin(), sources.begin() + static_cast<std::ptrdiff_t>(i),
+                         [&](const dem::RasterInfo& upper) { return Overlap(upper.bounds, sources[i].bounds); });
+  }
+  return count;
+}
+
+std::vector<std::string> AdviceFor(const dem::DemInfo& info) {
+  const auto count = [&](auto is_so) { return std::ranges::count_if(info.sources, is_so); };
+  const auto large =
+      count([](const dem::RasterInfo& s) { return std::max(s.width, s.height) > 4096 && s.overview_factors.empty(); });
+  const auto no_datum = count([](const dem::RasterInfo& s) { return s.counts_from.empty(); });
+  const auto voids = count([](const dem::RasterInfo& s) { return s.void_samples > 0; });
+  std::vector<std::string> advice;
+  if (large > 0) {
+    advice.push_back(fmt::format(
+        "{} large sources have no overviews: shallow tiles read all of them; run 'gdaladdo -r average' on each",
+        large));
+  }
+  if (no_datum > 0) {
+    advice.push_back(
+        fmt::format("{} of {} sources state no vertical datum: heights are taken as metres above the WGS 84 ellipsoid "
+                    "as they are; where datums differ there are steps between sources",
+                    no_datum, info.sources.size()));
+  }
+  if (voids > 0) {
+    advice.push_back(fmt::format(
+        "{} sources have voids: small ones are filled from their edges, larger ones show the next source, then the "
+        "floor of {:g} m",
+        voids, info.floor));
+  }
+  return advice;
+}
+
+}  // namespace
+
+void PrintMosaic(const std::string& name, const dem::DemInfo& info) {
+  const auto line = [](const char* what, const std::string& value) { fmt::print("  {:<14}{}\n", what, value); };
+  fmt::print("{}\n", name);
+  line("sources", fmt::format("{}, in the order in which they count", info.sources.size()));
+  constexpr std::size_t kMostListed = 40;
+  for (std::size_t i = 0; i < std::min(info.sources.size(), kMostListed); ++i) {
+    const dem::RasterInfo& source = info.sources[i];
+    line("", fmt::format("{}: {} x {}, {:.3g} m, {}", source.path, source.width, source.height, source.spacing_m,
+                         source.crs));
+  }
+  if (info.sources.size() > kMostListed) line("", fmt::format("and {} more", info.sources.size() - kMostListed));
+  line("overlaps", fmt::format("{} sources lie in part under one before them", CountOverlapped(info.sources)));
+  line("bounds", fmt::format("west {:.6g}, south {:.6g}, east {:.6g}, north {:.6g}", info.bounds.west,
+                             info.bounds.south, info.bounds.east, info.bounds.north));
+  line("heights", fmt::format("{:g} to {:g} m", info.heights.min, info.heights.max));
+  line("floor", fmt::format("{:g} m where no source has a height", info.floor));
+  line("levels", fmt::format("0 to {}, default error {:.3g} m at the deepest, which lies where the finest source does",
+                             info.max_level, geo::DefaultError(info.max_level)));
+  for (const std::string& advice : AdviceFor(info)) line("note", advice);
+}
+
+std::string MosaicJson(const std::string& name, const dem::DemInfo& info) {
+  nlohmann::json sources = nlohmann::json::array();
+  for (const dem::RasterInfo& source : info.sources) {
+    sources.push_back({{"path", source.path},
+                       {"width", source.width},
+                       {"height", source.height},
+                       {"crs", source.crs},
+                       {"vertical_datum", source.vertical_datum},
+                       {"counts_from", source.counts_from},
+                       {"vertical_operation", source.vertical_operation},
+                       {"spacing_m", source.spacing_m},
+                       {"bounds", {source.bounds.west, source.bounds.south, source.bounds.east, source.bounds.north}},
+                       {"void_samples", source.void_samples},
+                       {"overviews", source.overview_factors}});
+  }
+  const nlohmann::json mosaic = {{"path", name},
+                                 {"sources", std::move(sources)},
+                                 {"overlapped", CountOverlapped(info.sources)},
+                                 {"bounds", {info.bounds.west, info.bounds.south, info.bounds.east, info.bounds.north}},
+                                 {"heights", {{"min", info.heights.min}, {"max", info.heights.max}}},
+                                 {"floor", info.floor},
+                                 {"levels", {0, info.max_level}},
+                                 {"advice", AdviceFor(info)}};
+  return mosaic.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+}  // namespace terrace::cli

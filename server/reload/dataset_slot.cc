@@ -1,0 +1,160 @@
+#include "server/reload/dataset_slot.h"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <utility>
+
+namespace terrace::server {
+namespace {
+
+// A file that was written to later than this ago may not be complete.
+constexpr std::chrono::nanoseconds kSettleTime = std::chrono::seconds(1);
+// Between attempts at files that stay as they are; doubled each time.
+constexpr std::chrono::seconds kFirstRetry{1}, kLastRetry{60};
+// What takes longer than this to be replaced is a trouble to tell of.
+constexpr std::chrono::seconds kPatience{10};
+// Tiles come first: opening a large source takes a processor for a while.
+constexpr int kNiceness = 10;
+
+dem::StampedFiles FilesOf(const Dataset& dataset) {
+  dem::StampedFiles files = dataset.source->files();
+  if (dataset.water.mask) files.Append(dataset.water.mask->files());
+  if (dataset.imagery.image) files.Append(dataset.imagery.image->files());
+  return files;
+}
+
+// The files that the configuration names; what GDAL reads beside them is not known before they are open.
+std::vector<std::string> NamedFiles(const config::DatasetConfig& dataset) {
+  std::vector<std::string> files;
+  for (const config::SourceConfig& source : dataset.sources) {
+    files.insert(files.end(), source.files.begin(), source.files.end());
+  }
+  if (!dataset.water.mask.empty()) files.push_back(dataset.water.mask);
+  if (!dataset.imagery.image.empty()) files.push_back(dataset.imagery.image);
+  return files;
+}
+
+std::vector<std::optional<dem::FileStamp>> StampsOf(const std::vector<std::string>& files) {
+  std::vector<std::optional<dem::FileStamp>> stamps;
+  for (const std::string& file : files) stamps.push_back(dem::StampOf(file));
+  return stamps;
+}
+
+Result<Dataset> OpenQuietly(const DatasetOpener& open, const config::DatasetConfig& wanted, std::stop_token stop) {
+  ::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kNiceness);  // on Linux, of this thread alone
+  try {
+    return open(wanted, std::move(stop));
+  } catch (const std::exception& exception) {
+    return MakeError(ErrorCode::kInternal, "{}", exception.what());
+  }
+}
+
+}  // namespace
+
+DatasetSlot::DatasetSlot(config::DatasetConfig wanted, Dataset serving)
+    : wanted_(std::move(wanted)), serving_(std::move(serving)), files_(FilesOf(*serving_)) {}
+
+DatasetSlot::~DatasetSlot() { stop_opening_.request_stop(); }
+
+std::string DatasetSlot::Trouble() const {
+  if (!problem_.empty()) return problem_;
+  if (stale_since_ && Clock::now() - *stale_since_ > kPatience) return "its source changes and is not complete yet";
+  return {};
+}
+
+void DatasetSlot::MarkStale() {
+  if (!stale_since_) stale_since_ = Clock::now();
+}
+
+void DatasetSlot::Want(config::DatasetConfig wanted) {
+  wanted_ = std::move(wanted);
+  MarkStale();
+  reopen_ = is_opening();
+  if (reopen_) stop_opening_.request_stop();
+  tried_.clear();
+  retry_at_ = {};
+}
+
+std::size_t DatasetSlot::LookAtFiles(std::size_t most) {
+  if (!serving_ || stale_since_) return 0;
+  const std::size_t count = std::min(most, files_.size());
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t file = next_file_;
+    next_file_ = (next_file_ + 1) % files_.size();
+    if (!files_.HasChanged(file)) continue;
+    spdlog::info("dataset {}: {} has changed", wanted_.name, files_.path(file));
+    MarkStale();
+    return i + 1;
+  }
+  return count;
+}
+
+// True as well for a time in the future, which tells nothing.
+bool DatasetSlot::IsSettled() {
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  for (const std::string& file : NamedFiles(wanted_)) {
+    const auto stamp = dem::StampOf(file);
+    if (!stamp) continue;
+    const auto age = now - std::chrono::nanoseconds(stamp->modified_ns);
+    if (age < std::chrono::nanoseconds(0) || age >= kSettleTime) continue;
+    if (!std::exchange(said_unsettled_, true)) {
+      spdlog::info("dataset {}: {} was written to a moment ago, waiting until it is complete", wanted_.name, file);
+    }
+    return false;
+  }
+  said_unsettled_ = false;
+  return true;
+}
+
+void DatasetSlot::OpenIfDue(const DatasetOpener& open) {
+  if (is_opening() || (serving_ && !stale_since_)) return;
+  if (Clock::now() < retry_at_ && StampsOf(NamedFiles(wanted_)) == tried_) return;
+  if (!IsSettled()) return;
+  spdlog::info("dataset {}: opening {}", wanted_.name, wanted_.sources.front().written);
+  tried_ = StampsOf(NamedFiles(wanted_));
+  stop_opening_ = std::stop_source();
+  opening_ = std::async(std::launch::async, OpenQuietly, open, wanted_, stop_opening_.get_token());
+}
+
+void DatasetSlot::Fail(const Error& error) {
+  retry_delay_ = std::clamp<Clock::duration>(2 * retry_delay_, kFirstRetry, kLastRetry);
+  retry_at_ = Clock::now() + retry_delay_;
+  if (std::exchange(problem_, error.message) == error.message) return;
+  spdlog::warn("dataset {}: cannot be opened, {}; trying again: {}", wanted_.name,
+               serving_ ? "tiles that are cached are still served" : "it is not served yet", error.message);
+}
+
+bool DatasetSlot::TakeOpened() {
+  if (!is_opening() || opening_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return false;
+  Result<Dataset> opened = opening_.get();
+  const bool is_unwanted = std::exchange(reopen_, false) || (!opened && opened.error().code == ErrorCode::kCancelled);
+  if (is_unwanted) return false;
+  if (!opened) {
+    // Replaced once more meanwhile: the next attempt is due at once.
+    if (opened.error().code == ErrorCode::kChanged) {
+      tried_.clear();
+    } else {
+      Fail(opened.error());
+    }
+    return false;
+  }
+  const auto took = stale_since_ ? Clock::now() - *stale_since_ : Clock::duration(0);
+  spdlog::info("dataset {}: {} is served now, generation {:016x}, {} after the change was seen", wanted_.name,
+               wanted_.sources.front().written, opened->generation,
+               std::chrono::duration_cast<std::chrono::milliseconds>(took));
+  serving_ = *std::move(opened);
+  files_ = FilesOf(*serving_);
+  next_file_ = 0;
+  stale_since_.reset();
+  problem_.clear();
+  retry_at_ = {};
+  retry_delay_ = {};
+  return true;
+}
+
+}  // namespace terrace::server

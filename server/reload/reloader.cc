@@ -1,0 +1,220 @@
+#include "server/reload/reloader.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <string_view>
+#include <utility>
+
+#include "config/options.h"
+
+namespace terrace::server {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr std::chrono::milliseconds kPeriod{1'000};
+// While something is under way.
+constexpr std::chrono::milliseconds kBusyPeriod{100};
+// A configuration counts when it is found the same after this time: it may have been met half written.
+constexpr std::chrono::milliseconds kConfigSettleTime{300};
+// At least so long between looks, however often they are asked for.
+constexpr std::chrono::milliseconds kLeastPause{50};
+// Each takes a processor for a while, and some handles.
+constexpr std::ptrdiff_t kMostOpenings = 2;
+
+// What is taken over from a new configuration without a restart.
+constexpr std::array<std::string_view, 7> kLiveOptions = {
+    "datasets",         "cache_bytes", "refinement_cache_bytes", "cache_control", "request_deadline_s",
+    "max_mesh_samples", "log_level"};
+
+void WarnOfRestart(const config::Config& now, const config::Config& next) {
+  for (const std::string& key : config::ChangedServerOptions(now, next)) {
+    if (std::find(kLiveOptions.begin(), kLiveOptions.end(), key) != kLiveOptions.end()) continue;
+    spdlog::warn("configuration: {} has changed, which takes a restart; until then the old value holds", key);
+  }
+}
+
+// Who may see a dataset is settled at the start. Until then a new one is seen by tokens alone where there are any.
+void WarnOfAccess(const std::vector<DatasetSlot>& slots, const config::Config& next) {
+  if (next.tokens.empty()) return;
+  for (const config::DatasetConfig& dataset : next.datasets) {
+    const auto known = std::find_if(slots.begin(), slots.end(),
+                                    [&](const DatasetSlot& slot) { return slot.wanted().name == dataset.name; });
+    const bool was_public = known != slots.end() && known->wanted().is_public;
+    if (dataset.is_public == was_public) continue;
+    spdlog::warn("configuration: \"public\" of dataset {} has changed, which takes a restart", dataset.name);
+  }
+}
+
+std::string TextOf(const std::vector<config::ConfigError>& errors) {
+  std::string text;
+  for (const config::ConfigError& error : errors) {
+    text +=
+        fmt::format("{}{}{}{}", text.empty() ? "" : "; ", error.path, error.path.empty() ? "" : ": ", error.message);
+  }
+  return text;
+}
+
+}  // namespace
+
+Reloader::Reloader(config::Config config, std::vector<Dataset> datasets, Hooks hooks)
+    : hooks_(std::move(hooks)), config_(std::move(config)), seen_(config_) {
+  for (std::size_t i = 0; i < datasets.size(); ++i) slots_.emplace_back(config_.datasets[i], std::move(datasets[i]));
+}
+
+Reloader::~Reloader() { Stop(); }
+
+void Reloader::Start(bool watch) {
+  watch_ = watch;
+  thread_ = std::thread([this] { Run(); });
+}
+
+void Reloader::Stop() {
+  {
+    const std::lock_guard lock(mutex_);
+    stop_ = true;
+  }
+  wake_.notify_all();
+  if (thread_.joinable()) thread_.join();
+}
+
+void Reloader::Look() {
+  const std::lock_guard lock(mutex_);
+  look_ = true;
+  wake_.notify_all();
+}
+
+void Reloader::Reload() {
+  const std::lock_guard lock(mutex_);
+  reload_ = true;
+  wake_.notify_all();
+}
+
+void Reloader::Run() {
+  Clock::time_point next_look = Clock::now() + kPeriod, next_config = next_look;
+  std::unique_lock lock(mutex_);
+  while (!wake_.wait_for(lock, kLeastPause, [this] { return stop_; })) {
+    const auto is_due = [this] { return look_ || reload_ || stop_; };
+    if (IsBusy() || watch_) {
+      wake_.wait_for(lock, IsBusy() ? kBusyPeriod : kPeriod, is_due);
+    } else {
+      wake_.wait(lock, is_due);
+    }
+    if (stop_) return;
+    const bool reload = std::exchange(reload_, false), look = std::exchange(look_, false) || reload;
+    lock.unlock();
+    const Clock::time_point now = Clock::now();
+    if (reload || (watch_ && now >= next_config)) {
+      LookAtConfig(reload);
+      next_config = now + (config_settles_ ? kConfigSettleTime : kPeriod);
+    }
+    if (look || (watch_ && now >= next_look)) {
+      LookAtFiles();
+      next_look = now + kPeriod;
+    }
+    if (StepOpenings()) Publish();
+    TellTroubles();
+    if (reload && hooks_.reloaded) hooks_.reloaded();
+    lock.lock();
+  }
+}
+
+bool Reloader::IsBusy() const {
+  return config_settles_ || !leaving_.empty() || std::any_of(slots_.begin(), slots_.end(), [](const DatasetSlot& slot) {
+           return slot.is_opening() || !slot.is_current();
+         });
+}
+
+void Reloader::LookAtConfig(bool asked) {
+  config::ConfigResult next = hooks_.load();
+  config_settles_ = !asked && next != seen_;
+  seen_ = next;
+  if (config_settles_) return;
+  if (!next) {
+    std::string problem = TextOf(next.error());
+    if (!asked && problem == config_problem_) return;
+    spdlog::error("the new configuration is wrong, the old one stays: {}", problem);
+    config_problem_ = std::move(problem);
+    return;
+  }
+  config_problem_.clear();
+  if (*next != config_) {
+    Apply(*std::move(next));
+  } else if (asked) {
+    spdlog::info("the configuration is as it was");
+  }
+}
+
+// Datasets that are described as before go on; the others go on with what they have until that is replaced.
+void Reloader::Apply(config::Config next) {
+  WarnOfRestart(config_, next);
+  WarnOfAccess(slots_, next);
+  std::vector<DatasetSlot> slots;
+  for (const config::DatasetConfig& wanted : next.datasets) {
+    const auto known = std::find_if(slots_.begin(), slots_.end(),
+                                    [&](const DatasetSlot& slot) { return slot.wanted().name == wanted.name; });
+    if (known == slots_.end()) {
+      slots.emplace_back(wanted);
+      continue;
+    }
+    if (known->wanted() != wanted) known->Want(wanted);
+    slots.push_back(std::move(*known));
+    slots_.erase(known);
+  }
+  for (DatasetSlot& slot : slots_) {
+    spdlog::info("dataset {}: is not served any more", slot.wanted().name);
+    slot.StopOpening();
+    if (slot.is_opening()) leaving_.push_back(std::move(slot));
+  }
+  slots_ = std::move(slots);
+  next_slot_ = 0;
+  config_ = std::move(next);
+  spdlog::info("the new configuration is in force");
+  Publish();
+}
+
+void Reloader::LookAtFiles() {
+  std::size_t left = kMostLooks;
+  for (std::size_t i = 0; i < slots_.size() && left > 0; ++i) {
+    next_slot_ %= slots_.size();
+    left -= slots_[next_slot_++].LookAtFiles(left);
+  }
+}
+
+// True: there is something new to publish.
+bool Reloader::StepOpenings() {
+  std::erase_if(leaving_, [](DatasetSlot& slot) { return slot.TakeOpened() || !slot.is_opening(); });
+  bool is_new = false;
+  for (DatasetSlot& slot : slots_) is_new = slot.TakeOpened() || is_new;
+  for (DatasetSlot& slot : slots_) {
+    const auto openings = std::count_if(slots_.begin(), slots_.end(), [](const auto& s) { return s.is_opening(); });
+    if (openings < kMostOpenings) slot.OpenIfDue(hooks_.open);
+  }
+  return is_new;
+}
+
+void Reloader::Publish() {
+  std::vector<Dataset> datasets;
+  for (const DatasetSlot& slot : slots_) {
+    if (slot.serving()) datasets.push_back(*slot.serving());
+  }
+  hooks_.publish(datasets, config_);
+}
+
+void Reloader::TellTroubles() {
+  std::map<std::string, std::string> troubles;
+  if (!config_problem_.empty()) troubles.emplace("", config_problem_);
+  for (const DatasetSlot& slot : slots_) {
+    if (std::string trouble = slot.Trouble(); !trouble.empty())
+      troubles.emplace(slot.wanted().name, std::move(trouble));
+  }
+  if (troubles == told_) return;
+  told_ = std::move(troubles);
+  hooks_.tell(told_);
+}
+
+}  // namespace terrace::server

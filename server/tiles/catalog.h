@@ -1,0 +1,57 @@
+// Everything that is served at one moment: the datasets, and how answers about them are made.
+//
+// Immutable. A request works with the catalog it began with, to its end, and so does the build it starts: what replaces
+// a catalog meanwhile is never mixed into an answer.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <stop_token>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "engine/dem/dem_source.h"
+#include "server/tiles/area_mesh.h"
+#include "server/tiles/dataset_view.h"
+#include "server/tiles/encoded_tile.h"
+#include "server/tiles/tile_request.h"
+
+namespace terrace::server {
+
+// Blocking; called on many threads at once. An exception counts as kUnavailable. TileRequest::dataset is an index into
+// the catalog's datasets.
+using TileBuilder = std::function<Result<EncodedTile>(const TileRequest&, std::stop_token)>;
+
+// Heights of a dataset at points, NaN where it has none. Blocking; called on many threads at once.
+using PointReader = std::function<Result<std::vector<float>>(
+    std::uint32_t dataset, std::span<const dem::GeoPosition> points, dem::HeightDatum, std::stop_token)>;
+
+// What sources were read for: GDAL's numbers since the start, those of datasets, by name, since they were opened.
+struct SourceStats {
+  std::vector<std::pair<std::string, dem::SampleCounts>> samples;
+  dem::GdalCounts gdal;
+};
+
+// Meshes of areas, by the dataset's index: `plan` refuses what is too large, at once and without reading; `build`
+// blocks. Both are called on many threads at once.
+struct AreaMesher {
+  std::function<Result<AreaPlan>(std::uint32_t dataset, const AreaRequest&)> plan;
+  std::function<Result<EncodedTile>(std::uint32_t dataset, const AreaPlan&, const AreaRequest&, std::stop_token)> build;
+};
+
+// The functions keep alive what they need.
+struct Catalog {
+  std::vector<DatasetView> datasets;
+  TileBuilder build;
+  PointReader read_points;
+  AreaMesher area_mesher;
+  std::function<SourceStats()> source_stats = {};  // may be empty
+};
+
+using CatalogPtr = std::shared_ptr<const Catalog>;
+
+}  // namespace terrace::server

@@ -1,0 +1,15 @@
+// A catalog on top of the real tile pipeline.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+
+#include "server/tiles/catalog.h"
+#include "server/tiles/tile_pipeline.h"
+
+namespace terrace::server {
+
+// `max_mesh_samples`: of one mesh of an area.
+CatalogPtr MakeCatalog(std::shared_ptr<const TilePipeline> pipeline, std::size_t max_mesh_samples);
+
+}  // namespace terrace::server

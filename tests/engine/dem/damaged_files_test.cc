@@ -1,0 +1,121 @@
+// Files that were cut, flipped and overwritten are refused or read, each in a process of its own: none crashes, hangs
+// or takes memory without bound.
+#include <gdal_priv.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <random>
+#include <sstream>
+
+#include "tests/engine/dem/dem_fixture.h"
+
+namespace terrace::dem {
+namespace {
+
+constexpr int kFiles = 500;
+constexpr unsigned kSeconds = 20;  // the target is 5 on an idle machine
+constexpr long kMostKib = 512 << 10;
+
+std::string ReadFile(const std::string& path) {
+  std::ostringstream text;
+  text << std::ifstream(path, std::ios::binary).rdbuf();
+  return text.str();
+}
+
+std::string Damaged(std::string bytes, std::mt19937& random) {
+  const auto below = [&](std::size_t bound) {
+    return std::uniform_int_distribution<std::size_t>(0, bound - 1)(random);
+  };
+  const std::size_t head = std::min<std::size_t>(bytes.size(), 600);
+  switch (below(4)) {
+    case 0:
+      bytes.resize(below(bytes.size()));
+      break;
+    case 1:  // numbers in the header become large
+      for (int i = 0; i < 3; ++i) bytes[below(head)] = static_cast<char>(0xff);
+      break;
+    case 2:
+      for (std::size_t i = 0, flips = 1 + below(20); i < flips; ++i) {
+        bytes[below(below(2) == 0 ? head : bytes.size())] ^= static_cast<char>(1 << below(8));
+      }
+      break;
+    default:
+      for (std::size_t at = below(bytes.size()), end = std::min(at + 64, bytes.size()); at < end; ++at) {
+        bytes[at] = static_cast<char>(below(256));
+      }
+  }
+  return bytes;
+}
+
+// Never returns.
+void OpenAndRead(const std::string& path) {
+  ::alarm(kSeconds);
+  const auto source = DemSource::Open(path);
+  if (source) {
+    for (const int level : {0, (*source)->max_level() / 2, (*source)->max_level()}) {
+      for (const geo::TileKey& key : SomeTiles(**source, level, 2)) static_cast<void>((*source)->Read(key));
+    }
+  }
+  ::_exit(0);
+}
+
+TEST(DamagedFiles, CrashHangAndSwellNothing) {
+  const TempDir dir;
+  RasterSpec spec{
+      .width = 60, .height = 50, .type = "Int16", .geo_transform = {8, .001, 0, 47, 0, -.001}, .nodata = -7};
+  spec.value = [](int col, int row) { return 300 + col * 7 % 90 + row; };
+  std::vector<std::pair<std::string, std::string>> seeds = {{"plain.tif", ReadFile(WriteRaster(dir, spec))}};
+  const GDALDatasetUniquePtr plain(GDALDataset::Open(dir.File("dem.tif").c_str()));
+  ASSERT_NE(plain, nullptr);
+  const char* const tiled[] = {"TILED=YES",        "BLOCKXSIZE=16", "BLOCKYSIZE=16",
+                               "COMPRESS=DEFLATE", "PREDICTOR=2",   nullptr};
+  const struct {
+    const char *driver, *name;
+    const char* const* options;
+  } kForms[] = {{"GTiff", "tiled.tif", tiled}, {"AAIGrid", "text.asc", nullptr}, {"PNG", "picture.png", nullptr}};
+  for (const auto& form : kForms) {
+    GDALDriver* const driver = GetGDALDriverManager()->GetDriverByName(form.driver);
+    ASSERT_NE(driver, nullptr) << form.driver;
+    driver
+        ->CreateCopy(dir.File(form.name).c_str(), plain.get(), FALSE, const_cast<char**>(form.options), nullptr,
+                     nullptr)
+        ->ReleaseRef();
+    seeds.emplace_back(form.name, ReadFile(dir.File(form.name)));
+    ASSERT_FALSE(seeds.back().second.empty()) << form.driver;
+  }
+  std::mt19937 random(20);
+  int opened_badly = 0;
+  for (int i = 0; i < kFiles; ++i) {
+    const auto& [name, bytes] = seeds[static_cast<std::size_t>(i) % seeds.size()];
+    const std::string path = dir.File("damaged_" + name);
+    std::ofstream(path, std::ios::binary) << Damaged(bytes, random);
+    const pid_t child = ::fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) OpenAndRead(path);
+    int status = 0;
+    rusage used{};
+    ASSERT_EQ(::wait4(child, &status, 0, &used), child);
+    const bool fine = WIFEXITED(status) && WEXITSTATUS(status) == 0 && used.ru_maxrss < kMostKib;
+    EXPECT_TRUE(fine) << "file " << i << " from " << name << ": status " << status << ", " << used.ru_maxrss << " KiB";
+    opened_badly += !fine;
+    ASSERT_LT(opened_badly, 5) << "enough seen";
+  }
+}
+
+TEST(DamagedFiles, BlocksCountWithTheBandsTheyAreStoredWith) {
+  const TempDir dir;
+  GDALAllRegister();
+  GDALDriver* const driver = GetGDALDriverManager()->GetDriverByName("GTiff");
+  const char* const options[] = {"SPARSE_OK=TRUE",  "TILED=YES",        "BLOCKXSIZE=1024",
+                                 "BLOCKYSIZE=1024", "INTERLEAVE=PIXEL", nullptr};
+  GDALDatasetUniquePtr(
+      driver->Create(dir.File("bands.tif").c_str(), 1024, 1024, 60, GDT_Float32, const_cast<char**>(options)));
+  const auto refused = DemSource::Open(dir.File("bands.tif"));
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().message.find("too large to read tiles from"), std::string::npos) << refused.error().message;
+}
+
+}  // namespace
+}  // namespace terrace::dem

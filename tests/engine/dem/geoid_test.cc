@@ -1,0 +1,143 @@
+#include "engine/dem/geoid.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "tests/engine/dem/dem_fixture.h"
+
+namespace terrace::dem {
+namespace {
+
+struct Place {
+  const char* name;
+  Position degrees;
+};
+constexpr Place kPlaces[] = {
+    {"Aconcagua", {-70.0112, -32.6532}},   {"Gotthard", {8.5667, 46.5592}}, {"Haleakala", {-156.2533, 20.7097}},
+    {"Mount Everest", {86.925, 27.9881}},  {"Male", {73.5093, 4.1755}},     {"Reykjavik", {-21.8174, 64.1265}},
+    {"Suva", {178.4419, -18.1416}},        {"Amchitka", {179.0, 51.5}},     {"South Pole", {0, -90}},
+    {"Port Moresby", {147.1803, -9.4438}},
+};
+
+// The height of the geoid there as PROJ's own program tells it.
+std::optional<double> Cs2cs(const std::string& from, Position place) {
+  const std::string command = fmt::format("echo '{:.10f} {:.10f} 0' | PROJ_NETWORK=OFF cs2cs -f %.6f {} EPSG:4979 2>&1",
+                                          place.y, place.x, from);
+  FILE* pipe = ::popen(command.c_str(), "r");
+  if (pipe == nullptr) return std::nullopt;
+  double latitude = 0, longitude = 0, height = 0;
+  const int found = std::fscanf(pipe, "%lf %lf %lf", &latitude, &longitude, &height);
+  ::pclose(pipe);
+  return found == 3 ? std::optional(height) : std::nullopt;
+}
+
+TEST(Geoid, Egm96EqualsCs2csAtNamedPlaces) {
+  for (const auto& [name, degrees] : kPlaces) {
+    const auto geoid = Geoid::OfCrs("EPSG:5773", degrees);
+    ASSERT_TRUE(geoid) << geoid.error().message;
+    const auto expected = Cs2cs("EPSG:4326+5773", degrees);
+    ASSERT_TRUE(expected) << "cs2cs of the package proj-bin does not run";
+    EXPECT_GT(std::abs(*expected), 1) << name << ": no conversion at all";
+    EXPECT_NEAR((*geoid)->Undulation(degrees), *expected, 1e-4) << name;
+    EXPECT_EQ((*geoid)->name(), "EGM96 height");
+    ASSERT_EQ((*geoid)->files().size(), 1u);
+  }
+}
+
+TEST(Geoid, IsTheSameATurnApart) {
+  const auto geoid = Geoid::OfCrs("EPSG:5773", {0, 0});
+  ASSERT_TRUE(geoid);
+  for (const double longitude : {-180.0, -179.875, 12.3125, 179.5}) {
+    EXPECT_EQ((*geoid)->Undulation({longitude, 51.0625}), (*geoid)->Undulation({longitude + 360, 51.0625}));
+  }
+  EXPECT_EQ((*geoid)->Undulation({180, 7}), (*geoid)->Undulation({-180, 7}));
+}
+
+TEST(Geoid, TakesTheVerticalPartOfACompoundCrs) {
+  const auto geoid = Geoid::OfCrs("EPSG:4326+5773", {8, 46});
+  ASSERT_TRUE(geoid) << geoid.error().message;
+  EXPECT_NEAR((*geoid)->Undulation({8.5667, 46.5592}), *Cs2cs("EPSG:4326+5773", {8.5667, 46.5592}), 1e-4);
+}
+
+TEST(Geoid, SaysWhichGridIsMissingAndWhereToGetIt) {
+  const auto geoid = Geoid::OfCrs("EPSG:3855", {8, 46});
+  if (geoid) GTEST_SKIP() << "SKIPPED: the grid of EGM2008 is installed here";
+  EXPECT_NE(geoid.error().message.find("us_nga_egm08_25.tif is not installed: get https://cdn.proj.org/"),
+            std::string::npos)
+      << geoid.error().message;
+  EXPECT_NE(geoid.error().message.find("PROJ_DATA"), std::string::npos) << geoid.error().message;
+}
+
+TEST(Geoid, RefusesWhatIsNoHeightSystem) {
+  EXPECT_NE(Geoid::OfCrs("EPSG:4326", {0, 0}).error().message.find("no vertical reference system"), std::string::npos);
+  EXPECT_NE(Geoid::OfCrs("EPSG:123456", {0, 0}).error().message.find("no vertical reference system"),
+            std::string::npos);
+  EXPECT_FALSE(Geoid::OfCrs("EPSG:5705", {40, 50})) << "Baltic heights: PROJ knows no way";
+}
+
+// NTv2's vertical cousin: a header of the south-western corner, steps, rows and columns, then floats, all big-endian.
+std::string WriteGtx(const TempDir& dir, const std::string& name, float (*value)(int column, int row)) {
+  constexpr int kRows = 21, kColumns = 31;  // of a tenth of a degree, from 7 E 45 N
+  std::string bytes;
+  const auto put = [&bytes](const auto number) {
+    const char* raw = reinterpret_cast<const char*>(&number);
+    for (std::size_t i = sizeof number; i > 0; --i) bytes += raw[i - 1];
+  };
+  put(45.0);
+  put(7.0);
+  put(0.1);
+  put(0.1);
+  put(std::int32_t{kRows});
+  put(std::int32_t{kColumns});
+  for (int row = 0; row < kRows; ++row) {
+    for (int column = 0; column < kColumns; ++column) put(value(column, row));
+  }
+  std::ofstream(dir.File(name), std::ios::binary) << bytes;
+  return dir.File(name);
+}
+
+TEST(Geoid, ReadsAGridFile) {
+  const TempDir dir;
+  const std::string path =
+      WriteGtx(dir, "my own.gtx", [](int column, int row) { return static_cast<float>(40 + column + 2 * row); });
+  const auto geoid = Geoid::OfGrid(path, {8, 46});
+  ASSERT_TRUE(geoid) << geoid.error().message;
+  EXPECT_NEAR((*geoid)->Undulation({8, 46}), 40 + 10 + 20, 1e-6);
+  EXPECT_NEAR((*geoid)->Undulation({8.05, 46.05}), 40 + 10.5 + 21, 1e-6);
+  EXPECT_TRUE(std::isnan((*geoid)->Undulation({20, 46})));
+}
+
+TEST(Geoid, RefusesGridFilesWithTheReason) {
+  const TempDir dir;
+  const std::string path = WriteGtx(dir, "grid.gtx", [](int, int) { return 1.0f; });
+  EXPECT_NE(Geoid::OfGrid(path, {20, 46}).error().message.find("not known at the centre"), std::string::npos);
+  EXPECT_NE(Geoid::OfGrid(dir.File("none.gtx"), {8, 46}).error().message.find("is no file"), std::string::npos);
+  std::ofstream(dir.File("text.gtx")) << "This is no grid.";
+  EXPECT_NE(Geoid::OfGrid(dir.File("text.gtx"), {8, 46}).error().message.find("cannot read"), std::string::npos);
+  std::ofstream(dir.File("a,b.gtx")) << "x";
+  EXPECT_NE(Geoid::OfGrid(dir.File("a,b.gtx"), {8, 46}).error().message.find("rename"), std::string::npos);
+}
+
+TEST(Geoid, IsTheSameFromManyThreads) {
+  const auto geoid = Geoid::OfCrs("EPSG:5773", {0, 0});
+  ASSERT_TRUE(geoid);
+  const double expected = (*geoid)->Undulation({-70.0112, -32.6532});
+  std::vector<std::jthread> threads;
+  std::atomic<int> wrong = 0;
+  for (int t = 0; t < 4; ++t) {
+    threads.emplace_back([&] {
+      for (int i = 0; i < 200; ++i) wrong += (*geoid)->Undulation({-70.0112, -32.6532}) != expected;
+    });
+  }
+  threads.clear();
+  EXPECT_EQ(wrong, 0);
+}
+
+}  // namespace
+}  // namespace terrace::dem

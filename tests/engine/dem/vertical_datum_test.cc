@@ -1,0 +1,213 @@
+// Heights above geoids become ellipsoidal, everywhere alike: in tiles, at points, on Web Mercator, in bounds.
+#include "engine/dem/vertical_datum.h"
+
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+
+#include "engine/dem/sample_rules.h"
+#include "engine/geo/mercator_grid.h"
+#include "tests/engine/dem/dem_fixture.h"
+
+namespace terrace::dem {
+namespace {
+
+double Egm96At(Position degrees) { return (*Geoid::OfCrs("EPSG:5773", degrees))->Undulation(degrees); }
+
+RasterSpec Hills(const std::string& crs) {
+  RasterSpec spec{.width = 121, .height = 121, .geo_transform = {-71, 1.0 / 120, 0, -32, 0, -1.0 / 120}, .crs = crs};
+  spec.value = [](int col, int row) { return 1000 + 300 * std::sin(col / 7.0) + 5.0 * row; };
+  return spec;
+}
+
+DemOptions With(const std::string& vertical) { return {.source = {.vertical = vertical}}; }
+
+std::vector<GeoPosition> SomePoints() {
+  std::vector<GeoPosition> points;
+  for (int i = 0; i < 40; ++i) points.push_back({-70.95 + i * .0223, -32.05 - i * .0217});
+  return points;
+}
+
+void ExpectShifted(const DemSource& raw, const DemSource& converted) {
+  const auto points = SomePoints();
+  const auto before = raw.ReadPoints(points), after = converted.ReadPoints(points);
+  ASSERT_TRUE(before && after);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const double undulation = Egm96At({points[i].longitude, points[i].latitude});
+    ASSERT_GT(undulation, 10);
+    EXPECT_NEAR((*after)[i], (*before)[i] + undulation, .002) << i;
+  }
+}
+
+TEST(VerticalDatum, ConvertsWhatTheConfigurationSays) {
+  const TempDir dir;
+  const std::string path = WriteRaster(dir, Hills("EPSG:4326"));
+  const auto raw = OpenOrFail(path), converted = OpenOrFail(path, With("egm96"));
+  ASSERT_TRUE(raw && converted);
+  ExpectShifted(*raw, *converted);
+  EXPECT_FALSE(raw->has_datum());
+  EXPECT_TRUE(converted->has_datum());
+  EXPECT_EQ(converted->info().sources.front().counts_from, "EGM96 height");
+  EXPECT_FALSE(converted->info().sources.front().vertical_operation.empty());
+  EXPECT_NE(raw->fingerprint(), converted->fingerprint());
+}
+
+TEST(VerticalDatum, ConvertsWhatTheReferenceSystemStates) {
+  const TempDir dir;
+  const std::string path = WriteRaster(dir, Hills("EPSG:4326+5773"));
+  const auto stated = OpenOrFail(path), ignored = OpenOrFail(path, With("unknown")),
+             denied = OpenOrFail(path, With("ellipsoid"));
+  ASSERT_TRUE(stated && ignored && denied);
+  ExpectShifted(*ignored, *stated);
+  EXPECT_FALSE(ignored->has_datum());
+  EXPECT_TRUE(denied->has_datum());
+  EXPECT_EQ(*denied->ReadPoints(SomePoints()), *ignored->ReadPoints(SomePoints()));
+}
+
+TEST(VerticalDatum, EllipsoidalReferenceSystemsPass) {
+  const TempDir dir;
+  const auto source = OpenOrFail(WriteRaster(dir, Hills("EPSG:4979")));
+  ASSERT_NE(source, nullptr);
+  EXPECT_TRUE(source->has_datum());
+  EXPECT_FALSE(source->converts());
+  EXPECT_EQ(source->info().sources.front().counts_from, "ellipsoid");
+}
+
+TEST(VerticalDatum, TilesBoundsAndMercatorPixelsAreConvertedAlike) {
+  const TempDir dir;
+  const std::string path = WriteRaster(dir, Hills("EPSG:4326"));
+  const DemOptions floored{.source = {.vertical = "egm96"}, .floor = 0};
+  const auto raw = OpenOrFail(path, {.floor = 0}), converted = OpenOrFail(path, floored);
+  ASSERT_TRUE(raw && converted);
+  int inside = 0;
+  for (int level = 0; level <= raw->max_level(); ++level) {
+    for (const geo::TileKey& key : SomeTiles(*raw, level, 6)) {
+      const auto before = raw->Read(key), after = converted->Read(key), counted = converted->ReadAsCounted(key);
+      ASSERT_TRUE(before && after && counted);
+      const geo::Lattice& lattice = before->lattice;
+      const HeightRange bound = converted->RangeBound(key);
+      EXPECT_LT(bound.max - bound.min, 2000);
+      for (int j = 0; j <= lattice.cells; j += 5) {
+        for (int i = 0; i <= lattice.cells; i += 5) {
+          EXPECT_GE(after->At(i, j), bound.min);
+          EXPECT_LE(after->At(i, j), bound.max);
+          if (before->At(i, j) == 0) {
+            EXPECT_EQ(after->At(i, j), 0) << "the floor is above the ellipsoid";
+            continue;
+          }
+          const Position node{lattice.Longitude(lattice.FirstColumn(key) + i),
+                              lattice.Latitude(lattice.FirstRow(key) + j)};
+          ASSERT_NEAR(after->At(i, j), before->At(i, j) + Egm96At(node), .004) << geo::ToString(key);
+          EXPECT_EQ(counted->At(i, j), before->At(i, j));
+          ++inside;
+        }
+      }
+    }
+  }
+  EXPECT_GT(inside, 1000);
+  const geo::MercatorGrid grid{12};
+  const NodeWindow window{static_cast<std::int64_t>((180 - 70.6) / 360 * static_cast<double>(grid.columns())),
+                          grid.rows() * 595 / 1000, 64, 64};
+  const auto before = raw->ReadMercator(12, window), after = converted->ReadMercator(12, window);
+  ASSERT_TRUE(before && after);
+  for (int i = 0; i < 64 * 64; i += 17) {
+    if ((*before)[i] == 0) continue;
+    const Position node{grid.Longitude(window.column + i % 64), grid.Latitude(window.row + i / 64)};
+    EXPECT_NEAR((*after)[i], (*before)[i] + Egm96At(node), .004);
+  }
+}
+
+TEST(VerticalDatum, NeighboursAgreeOnTheirEdge) {
+  const TempDir dir;
+  const auto source = OpenOrFail(WriteRaster(dir, Hills("EPSG:4326")), With("egm96"));
+  ASSERT_NE(source, nullptr);
+  for (const int level : {5, 8, 10}) {
+    for (const geo::TileKey& key : SomeTiles(*source, level, 5)) {
+      const auto here = source->Read(key), east = source->Read(geo::Neighbour(key, 1, 0));
+      ASSERT_TRUE(here && east);
+      for (int j = 0; j <= here->lattice.cells; ++j) {
+        ASSERT_EQ(here->At(here->lattice.cells, j), east->At(0, j)) << geo::ToString(key);
+        ASSERT_EQ(here->At(here->lattice.cells + 1, j), east->At(1, j)) << geo::ToString(key);
+      }
+    }
+  }
+}
+
+TEST(VerticalDatum, TheDefaultFloorLiesBelowEveryHeight) {
+  TERRACE_REQUIRE_DATA(path, "srtm3_S33W071_andes.tif");
+  const auto source = OpenOrFail(path, With("egm96"));
+  ASSERT_NE(source, nullptr);
+  const RasterInfo& raster = source->info().sources.front();
+  EXPECT_EQ(raster.heights.min, 250);
+  EXPECT_LE(source->info().floor, 250 + 40);
+  EXPECT_GT(source->info().floor, 250 + 5) << "a bound of the whole Earth";
+  EXPECT_GT(source->info().heights.max, raster.heights.max + 20);
+  EXPECT_LT(source->info().heights.max, raster.heights.max + 60);
+}
+
+TEST(VerticalDatum, PoleRowsAreOneValueWithTheGeoidOfThePole) {
+  RasterSpec spec{.width = 360, .height = 180, .geo_transform = {-180, 1, 0, 90, 0, -1}};
+  spec.value = [](int, int) { return 100.0; };
+  const TempDir dir;
+  const auto source = OpenOrFail(WriteRaster(dir, spec), With("egm96"));
+  ASSERT_NE(source, nullptr);
+  for (const geo::TileKey& key : {geo::TileKey{2, 1, 3}, geo::TileKey{2, 6, 3}}) {
+    const auto tile = source->Read(key);
+    ASSERT_TRUE(tile);
+    for (int i = 0; i <= tile->lattice.cells; ++i) {
+      ASSERT_EQ(tile->At(i, tile->lattice.cells), tile->At(0, tile->lattice.cells));
+    }
+    EXPECT_NEAR(tile->At(0, tile->lattice.cells), 100 + Egm96At({0, 90}), .002);
+    EXPECT_GE(tile->At(0, tile->lattice.cells), source->RangeBound(key).min);
+    EXPECT_LE(tile->At(0, tile->lattice.cells), source->RangeBound(key).max);
+  }
+}
+
+TEST(VerticalDatum, OrthometricHeightsAreTheSourcesOwnOrAboveEgm96) {
+  const TempDir dir;
+  const std::string path = WriteRaster(dir, Hills("EPSG:4326"));
+  const auto raw = OpenOrFail(path), geoid = OpenOrFail(path, With("egm96")),
+             ellipsoid = OpenOrFail(path, With("ellipsoid"));
+  ASSERT_TRUE(raw && geoid && ellipsoid);
+  const auto points = SomePoints();
+  const auto plain = raw->ReadPoints(points);
+  EXPECT_EQ(*geoid->ReadPoints(points, HeightDatum::kOrthometric), *plain);
+  const auto below = ellipsoid->ReadPoints(points, HeightDatum::kOrthometric);
+  ASSERT_TRUE(below);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    EXPECT_NEAR((*below)[i], (*plain)[i] - Egm96At({points[i].longitude, points[i].latitude}), .002);
+  }
+}
+
+TEST(VerticalDatum, TheGridIsOneOfItsFiles) {
+  const TempDir dir;
+  const std::string path = WriteRaster(dir, Hills("EPSG:4326"));
+  const std::filesystem::path installed = (*Geoid::OfCrs("EPSG:5773", {0, 0}))->files().path(0);
+  // PROJ tells formats by the ending: .gtx or .tif, by what the machine has.
+  const std::string grid = dir.File("geoid" + installed.extension().string());
+  std::filesystem::copy_file(installed, grid);
+  const auto source = OpenOrFail(path, With(grid));
+  ASSERT_NE(source, nullptr);
+  EXPECT_EQ(source->files().FirstChanged(), std::nullopt);
+  std::filesystem::last_write_time(grid, std::filesystem::file_time_type::clock::now() - std::chrono::hours(1));
+  EXPECT_EQ(source->files().FirstChanged(), grid);
+}
+
+TEST(VerticalDatum, RefusesWithTheFileAndTheWayOut) {
+  const TempDir dir;
+  const std::string path = WriteRaster(dir, Hills("EPSG:4326"));
+  if (!Geoid::OfCrs("EPSG:3855", {0, 0})) {
+    const auto refused = DemSource::Open(path, With("egm2008"));
+    ASSERT_FALSE(refused);
+    for (const std::string part : {path, std::string("us_nga_egm08_25.tif"), std::string("cdn.proj.org")}) {
+      EXPECT_NE(refused.error().message.find(part), std::string::npos) << refused.error().message;
+    }
+  }
+  const auto missing = DemSource::Open(path, With(dir.File("none.gtx")));
+  ASSERT_FALSE(missing);
+  EXPECT_NE(missing.error().message.find("none.gtx is no file"), std::string::npos) << missing.error().message;
+}
+
+}  // namespace
+}  // namespace terrace::dem

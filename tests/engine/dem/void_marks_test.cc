@@ -1,0 +1,189 @@
+// Voids that files do not declare. What is drawn here is drawn twice: with the damage, and as terrain that only looks
+// like it.
+#include "engine/dem/void_marks.h"
+
+#include <gdal_priv.h>
+
+#include <cmath>
+
+#include "tests/engine/dem/dem_fixture.h"
+
+namespace terrace::dem {
+namespace {
+
+double Land(int col, int row) { return 1200 + 200 * std::sin(col / 17.0) * std::cos(row / 13.0); }
+
+RasterSpec Drawn(std::function<double(int, int)> value) {
+  return {
+      .width = 200, .height = 200, .geo_transform = {8, .01, 0, 47, 0, -.01}, .nodata = -1, .value = std::move(value)};
+}
+
+const RasterInfo& InfoOf(const DemSource& source) { return source.info().sources.front(); }
+
+// No height of any tile that touches the source lies beyond what is said.
+void ExpectHeightsWithin(const DemSource& source, double lowest, double highest) {
+  for (int level = 0; level <= source.max_level(); ++level) {
+    for (const geo::TileKey& key : SomeTiles(source, level, 12)) {
+      const auto tile = source.Read(key);
+      ASSERT_TRUE(tile) << tile.error().message;
+      for (const float height : tile->heights) {
+        ASSERT_GE(height, lowest) << geo::ToString(key);
+        ASSERT_LE(height, highest) << geo::ToString(key);
+      }
+    }
+  }
+}
+
+TEST(VoidMarks, UndeclaredSpikesAreVoids) {
+  for (const double mark : {-32768.0, -32767.0, -9999.0, 32767.0, 9999.0}) {
+    const TempDir dir;
+    const auto source = OpenOrFail(WriteRaster(
+        dir, Drawn([mark](int col, int row) { return col == 100 && row % 60 == 30 ? mark : Land(col, row); })));
+    ASSERT_NE(source, nullptr);
+    EXPECT_EQ(InfoOf(*source).void_samples, 3u) << mark;
+    EXPECT_NE(InfoOf(*source).found_voids.find("3 samples of"), std::string::npos) << InfoOf(*source).found_voids;
+    EXPECT_GE(InfoOf(*source).heights.min, 1000) << mark;
+    EXPECT_LE(InfoOf(*source).heights.max, 1400) << mark;
+    ExpectHeightsWithin(*source, 1000, 1400);
+  }
+}
+
+TEST(VoidMarks, CanBeSwitchedOffAndStated) {
+  const TempDir dir;
+  const std::string path =
+      WriteRaster(dir, Drawn([](int col, int row) { return col == 100 && row == 30 ? -9999 : Land(col, row); }));
+  const auto trusted = OpenOrFail(path, {.source = {.vertical = "unknown", .find_voids = false}});
+  const auto stated = OpenOrFail(path, {.source = {.vertical = "unknown", .find_voids = false, .nodata = {-9999, 5}}});
+  ASSERT_TRUE(trusted && stated);
+  EXPECT_EQ(InfoOf(*trusted).void_samples, 0u);
+  EXPECT_EQ(InfoOf(*trusted).heights.min, -9999);
+  EXPECT_EQ(InfoOf(*stated).void_samples, 1u);
+  EXPECT_EQ(InfoOf(*stated).found_voids, "");
+}
+
+TEST(VoidMarks, ATrenchIsNoVoid) {
+  // A sea floor that passes through -9,999 m and holds declared voids.
+  const TempDir dir;
+  auto spec = Drawn([](int col, int row) {
+    if (col > 150 && row > 150) return -1.0;
+    return std::round(-5000 - 5500 * std::exp(-(col - 100.0) * (col - 100.0) / 400)) - row % 3;
+  });
+  spec.value = [value = spec.value](int col, int row) { return col == 100 && row == 10 ? -9999 : value(col, row); };
+  const auto source = OpenOrFail(WriteRaster(dir, spec));
+  ASSERT_NE(source, nullptr);
+  EXPECT_EQ(InfoOf(*source).found_voids, "");
+  EXPECT_EQ(InfoOf(*source).void_samples, 49u * 49u);
+  EXPECT_LE(InfoOf(*source).heights.min, -10'500);
+}
+
+TEST(VoidMarks, HighAndDeepRealTerrainStays) {
+  TERRACE_REQUIRE_DATA(earth, "etopo5_global_10min.tif");
+  TERRACE_REQUIRE_DATA(antarctica, "pole_antarctica_bedmap_5km.tif");
+  TERRACE_REQUIRE_DATA(hawaii, "antimeridian_hawaii_topobathy_5min.tif");
+  for (const std::string& path : {earth, antarctica, hawaii}) {
+    const auto source = OpenOrFail(path);
+    ASSERT_NE(source, nullptr);
+    EXPECT_EQ(InfoOf(*source).found_voids, "") << path;
+  }
+}
+
+TEST(VoidMarks, NoRealRasterIsAccused) {
+  int seen = 0;
+  for (const std::string& name : RealRasters()) {
+    const auto path = TestDataFile(name);
+    if (!path) continue;
+    const auto source = OpenOrFail(*path);
+    ASSERT_NE(source, nullptr);
+    EXPECT_EQ(InfoOf(*source).found_voids, "") << name;
+    ++seen;
+  }
+  if (seen == 0) GTEST_SKIP() << "SKIPPED, test data missing; set TERRACE_TEST_DATA";
+}
+
+// What resampling with a kernel leaves at the edge of a void: values between its mark and the ground.
+double Mixed(int col, int row) {
+  const double distance = std::hypot(col - 100, row - 100) - 30;
+  if (distance <= 0) return -1;
+  const double share = std::max(0.0, 1 - distance / 2);
+  return share * -32768 + (1 - share) * Land(col, row);
+}
+
+TEST(VoidMarks, EdgesMixedWithAMarkAreVoids) {
+  const TempDir dir;
+  const auto source = OpenOrFail(WriteRaster(dir, Drawn(Mixed)));
+  ASSERT_NE(source, nullptr);
+  EXPECT_NE(InfoOf(*source).found_voids, "");
+  EXPECT_GE(InfoOf(*source).heights.min, 999) << InfoOf(*source).found_voids;
+  ExpectHeightsWithin(*source, 999, 1401);
+}
+
+TEST(VoidMarks, AWindowShowsTheSameVoidsAsTheWhole) {
+  const TempDir dir;
+  const std::string path = WriteRaster(dir, Drawn(Mixed));
+  const GDALDatasetUniquePtr dataset(GDALDataset::Open(path.c_str()));
+  GDALRasterBand& band = *dataset->GetRasterBand(1);
+  SampleRules rules = SampleRules::Of(band, "");
+  rules.lowest = -500;
+  rules.rim = 2;
+  std::vector<float> whole(200 * 200), part(37 * 23);
+  ASSERT_TRUE(ReadHeights(band, rules, 0, 0, 200, 200, whole.data(), {}));
+  for (const auto& [col, row] : {std::pair(60, 80), std::pair(0, 0), std::pair(120, 110), std::pair(163, 177)}) {
+    ASSERT_TRUE(ReadHeights(band, rules, col, row, 37, 23, part.data(), {}));
+    for (int i = 0; i < 37 * 23; ++i) {
+      const float expected = whole[static_cast<std::size_t>((row + i / 37) * 200 + col + i % 37)];
+      ASSERT_TRUE(part[i] == expected || (std::isnan(part[i]) && std::isnan(expected))) << col << ' ' << i;
+    }
+  }
+}
+
+// A rotated square of data in a frame of zeros, as a reprojection without a nodata value leaves it.
+double Framed(int col, int row) { return std::abs(col - 100) + std::abs(row - 100) > 90 ? 0 : Land(col, row); }
+
+TEST(VoidMarks, ACollarOfZerosIsVoid) {
+  const TempDir dir;
+  const auto source = OpenOrFail(WriteRaster(dir, Drawn(Framed)));
+  ASSERT_NE(source, nullptr);
+  EXPECT_NE(InfoOf(*source).found_voids.find("collar"), std::string::npos) << InfoOf(*source).found_voids;
+  EXPECT_GE(InfoOf(*source).heights.min, 999);
+  ExpectHeightsWithin(*source, 999, 1401);
+}
+
+TEST(VoidMarks, ASeaIsNoCollar) {
+  // Cliffs of 300 m along half of the coast, beaches along the rest; an island in a sea at exactly 0 m.
+  const TempDir dir;
+  const auto source = OpenOrFail(WriteRaster(dir, Drawn([](int col, int row) {
+                                               const double inland = 80 - std::hypot(col - 100, row - 100);
+                                               if (inland <= 0) return 0.0;
+                                               return std::round(col < 100 ? 300 + inland : 1 + inland * 5);
+                                             })));
+  ASSERT_NE(source, nullptr);
+  EXPECT_EQ(InfoOf(*source).found_voids, "");
+  EXPECT_EQ(InfoOf(*source).void_samples, 0u);
+}
+
+TEST(VoidMarks, AnUndeclaredVoidOfARealRasterIsServedLikeADeclaredOne) {
+  TERRACE_REQUIRE_DATA(path, "srtm3_N46E008_swiss_alps.tif");
+  const TempDir dir;
+  // The same samples; the file declares another value.
+  const GDALDatasetUniquePtr original(GDALDataset::Open(path.c_str()));
+  GDALDriver* const driver = GetGDALDriverManager()->GetDriverByName("GTiff");
+  {
+    const GDALDatasetUniquePtr copy(
+        driver->CreateCopy(dir.File("alps.tif").c_str(), original.get(), FALSE, nullptr, nullptr, nullptr));
+    copy->GetRasterBand(1)->SetNoDataValue(-9999);
+  }
+  const auto declared = OpenOrFail(path), found = OpenOrFail(dir.File("alps.tif"));
+  ASSERT_TRUE(declared && found);
+  EXPECT_GT(InfoOf(*declared).void_samples, 100'000u);
+  EXPECT_EQ(InfoOf(*found).void_samples, InfoOf(*declared).void_samples);
+  for (const int level : {6, 10, 12}) {
+    for (const geo::TileKey& key : SomeTiles(*declared, level, 6)) {
+      const auto a = declared->Read(key), b = found->Read(key);
+      ASSERT_TRUE(a && b);
+      ASSERT_EQ(a->heights, b->heights) << geo::ToString(key);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace terrace::dem

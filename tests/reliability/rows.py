@@ -1,0 +1,356 @@
+"""The rows of docs/reliability.md that a client can try on the real binary. Each returns (kept, figures)."""
+import itertools
+import json
+import math
+import os
+import re
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+
+from server import Server, fetch, get, percentile, read_reply, wait_until
+
+HOT = "/earth/0/0/0.terrain"
+
+
+def tests(binary, pattern):
+    """Runs GoogleTest's tests: (all passed and there were some, what they recorded)."""
+    with tempfile.NamedTemporaryFile(suffix=".json") as report:
+        subprocess.run([str(binary), f"--gtest_filter={pattern}", f"--gtest_output=json:{report.name}"], stdout=subprocess.DEVNULL,
+                       stderr=subprocess.DEVNULL, timeout=300, check=False)
+        suites = json.load(open(report.name, encoding="utf-8"))
+    cases = [case for suite in suites["testsuites"] for case in suite["testsuite"]]
+    recorded = {key: int(value) for case in cases for key, value in case.items() if isinstance(value, str) and value.isdigit()}
+    failed = [case["name"] for case in cases if case.get("failures")]
+    return bool(cases) and not failed, len(cases), recorded, failed
+
+
+def row_8(_, test_binary, __):
+    kept, _, recorded, failed = tests(test_binary, "HttpRules.*")
+    return kept, f"{recorded.get('cases', 0)} cases" + (f", failed: {failed}" if failed else ", all kept")
+
+
+def row_9(_, test_binary, __):
+    kept, _, recorded, failed = tests(test_binary, "Framing.Ambiguous*")
+    return kept, f"{recorded.get('cases', 0)} messages, {'none' if kept else 'some'} got two answers"
+
+
+def row_10(binary, _, __):
+    piece = b"b" * (1 << 20)
+    beginnings = {
+        "header": b"GET /livez HTTP/1.1\r\nHost: x\r\nA: ",
+        "trailer": b"POST /earth/heights HTTP/1.1\r\nHost: x\r\nTransfer-Encoding: chunked\r\n\r\n0\r\nA: ",
+        "chunk extension": b"POST /earth/heights HTTP/1.1\r\nHost: x\r\nTransfer-Encoding: chunked\r\n\r\n5;a=",
+    }
+    statuses, growth = {}, 0
+    with Server(binary) as server:
+        fetch(server, HOT)
+        for name, beginning in beginnings.items():
+            before = server.resident_kib()
+            with server.connect() as connection:
+                try:
+                    connection.sendall(beginning)
+                    for _ in range(40):
+                        connection.sendall(piece)
+                except OSError:
+                    pass
+                reply = None
+                try:
+                    reply = read_reply(connection)
+                except OSError:
+                    pass
+                statuses[name] = reply[0] if reply else "closed"
+            growth = max(growth, server.resident_kib() - before)
+    return set(statuses.values()) <= {400, 431} and growth <= 1024, f"{statuses}, RSS +{growth} KiB"
+
+
+def latencies(server, count):
+    times = []
+    with server.connect() as connection:
+        for _ in range(count):
+            begun = time.perf_counter()
+            connection.sendall(get(HOT))
+            assert read_reply(connection)[0] == 200
+            times.append((time.perf_counter() - begun) * 1000)
+    return times
+
+
+# A process of its own: opens 1,000 connections, sends a byte of a header on each once a second, evenly spread, and
+# prints how many were still open when the time was over and how old the oldest became.
+SLOW_SENDERS = """
+import select, socket, sys, time
+opened, sockets, poll, oldest = {}, {}, select.epoll(), 0
+for _ in range(1000):
+    connection = socket.create_connection(("127.0.0.1", int(sys.argv[1])))
+    connection.sendall(b"GET / HTTP/1.1\\r\\nA: ")
+    opened[connection.fileno()], sockets[connection.fileno()] = time.monotonic(), connection
+    poll.register(connection, select.EPOLLRDHUP)
+print("ready", flush=True)
+begun = time.monotonic()
+while sockets and time.monotonic() - begun < 15:
+    for number in list(sockets):
+        for closed, _ in poll.poll(0.001):
+            oldest = max(oldest, time.monotonic() - opened[closed])
+            poll.unregister(closed)
+            sockets.pop(closed).close()
+        try:
+            if number in sockets:
+                sockets[number].send(b"b")
+        except OSError:
+            pass
+print(len(sockets), oldest)
+"""
+
+
+def row_11(binary, _, __):
+    with Server(binary, "--max-connections", "2000") as server:
+        latencies(server, 500)
+        alone = percentile(latencies(server, 10_000), 0.99)
+        senders = subprocess.Popen([sys.executable, "-c", SLOW_SENDERS, str(server.port)], stdout=subprocess.PIPE, text=True)
+        senders.stdout.readline()
+        among = []
+        while senders.poll() is None and len(among) < 10_000:
+            among += latencies(server, 500)
+        left, seconds = senders.communicate()[0].split()
+        p99 = percentile(among, 0.99)
+    return left == "0" and float(seconds) <= 7 and p99 <= 2 * alone, \
+        f"{left} of 1000 left, closed after {float(seconds):.1f} s; p99 of others {p99:.2f} ms, {p99 / alone:.1f}x"
+
+
+def row_12(_, test_binary, __):
+    kept, _, recorded, _ = tests(test_binary, "Limits.FiveHundredSlowReaders*")
+    return kept, f"RSS +{recorded.get('resident_kib', -1) * 1024 / 1e6:.0f} MB"
+
+
+def row_13(binary, _, __):
+    cap, flood = 100, 10_000
+    with Server(binary, "--max-connections", str(cap)) as server:
+        idle = server.descriptors()
+        clients, most = [], 0
+        for i in range(cap + flood):
+            client = socket.socket()
+            client.setblocking(False)
+            client.connect_ex(("127.0.0.1", server.port))
+            clients.append(client)
+            if i % 500 == 0:
+                most = max(most, server.descriptors() - idle)
+        most = max(most, server.descriptors() - idle)
+        for client in clients:
+            client.close()
+        normal = wait_until(lambda: ok(server), 10)
+    with Server(binary, open_files=24) as server:
+        clients = []
+        for _ in range(60):
+            clients.append(server.connect())
+        cpu = server.cpu_seconds()
+        time.sleep(2)
+        cpu = server.cpu_seconds() - cpu
+        for client in clients:
+            client.close()
+        few = wait_until(lambda: ok(server) and fetch(server, "/jacksboro/9/272/359.terrain")[0] == 200, 10)
+    kept = most <= cap + 5 and normal is not None and normal <= 1 and few is not None and few <= 1 and cpu < 1
+    return kept, f"{most} at most of {cap}, normal after {seconds_of(normal)}; with 24 descriptors {cpu / 2:.0%} CPU, normal after {seconds_of(few)}"
+
+
+def ok(server):
+    try:
+        reply = fetch(server, "/livez", timeout=2)
+    except OSError:
+        return False
+    return bool(reply) and reply[0] == 200
+
+
+def seconds_of(value):
+    return "never" if value is None else f"{value:.2f} s"
+
+
+NAUGHTY = ["..", "%2e%2e", "%00", "etc", "-1", "00", "1e3", "99999999999999999999", "0x1", "' OR 1=1", "%s%n", "\u202e", "NaN", "{z}", "",
+           "../../../etc/passwd", "%2fetc%2fpasswd", "a" * 300, "+1", "1.0", "vsicurl", "%5c..%5c"]
+NUMBERS = ["0", "-1", "1e400", "nan", "inf", "", "1,5", "0x10", "--1", "1 2", "%31e", "1e-400", "\u0661"]
+
+
+def abuse():
+    from urllib.parse import quote
+    for a, b in itertools.product(NAUGHTY, NAUGHTY[:8]):
+        yield f"/earth/{quote(a, safe='%/')}/{quote(b, safe='%/')}/0.terrain"
+        yield f"/earth/0/0/{quote(a, safe='%/')}.glb?error={quote(b, safe='%')}"
+    for a in NAUGHTY:
+        yield f"/{quote(a, safe='%/')}/layer.json" if a not in ("", "..") else "/nope/layer.json"
+        yield f"/viewer/{quote(a, safe='%/')}/x"
+    for number in NUMBERS:
+        for name in ("error", "fraction"):
+            yield f"/earth/0/0/0.terrain?{name}={quote(number, safe='%')}"
+        yield f"/earth/0/0/0.png?size={quote(number, safe='%')}"
+        yield f"/earth/mesh?bbox=0,0,{quote(number, safe='%')},1&error=1000000&x=1"
+
+
+def row_14(binary, _, __):
+    times, statuses = [], {}
+    with Server(binary) as server, server.connect() as connection:
+        for target in abuse():
+            best = math.inf  # of five: what other processes take is not the server's
+            for _ in range(5):
+                begun = time.perf_counter()
+                connection.sendall(get(target))
+                reply = read_reply(connection)
+                best = min(best, (time.perf_counter() - begun) * 1000)
+            times.append(best)
+            statuses[reply[0]] = statuses.get(reply[0], 0) + 1
+    opened = set()
+    with tempfile.NamedTemporaryFile("r") as trace:
+        with Server(binary, prefix=("strace", "-f", "-qq", "-o", trace.name, "-e", "trace=open,openat,creat")) as server:
+            mark = len(trace.read())
+            with server.connect() as connection:
+                for target in abuse():
+                    connection.sendall(get(target))
+                    read_reply(connection)
+            time.sleep(0.2)
+            trace.seek(mark)
+            during = trace.read()
+        opened = set(re.findall(r'open(?:at)?\([^"]*"([^"]+)"', during)) - {"/dev/null"}
+    p99 = percentile(times, 0.99)
+    return set(statuses) <= {400, 404, 414} and p99 <= 2 and not opened, \
+        f"{len(times)} requests, {statuses}, p99 {p99:.2f} ms, {len(opened)} files opened {sorted(opened)[:3] if opened else ''}"
+
+
+def row_19(_, test_binary, __):
+    kept, _, _, _ = tests(test_binary, "ServerTest.TwoHundredClients*")
+    return kept, "one build for 200 clients" if kept else "more than one build, or an error"
+
+
+def row_20(_, test_binary, __):
+    kept, count, _, failed = tests(test_binary, "AbandonedBuild.*:ServerTest.SurvivesASource*:ServerTest.SurvivesABuilder*:SingleFlight*")
+    return kept, f"{count} tests" + (f", failed: {failed}" if failed else "")
+
+
+def tiles():
+    """Distinct tiles of about equal work, over and over at other errors of the ladder."""
+    for step in range(4, 41):
+        for y, x in itertools.product(range(2871, 2877), range(2176, 2182)):
+            yield f"/jacksboro/12/{x}/{y}.terrain?fraction={0.5 * 2 ** ((16 - step) / 4):.6f}"
+
+
+def load(server, connections, seconds, targets):
+    """Closed loop: [(status, has Retry-After)], each client on with the next target at once."""
+    lock, results, end = threading.Lock(), [], time.monotonic() + seconds
+
+    def run():
+        with server.connect(60) as connection:
+            while time.monotonic() < end:
+                with lock:
+                    target = next(targets)
+                connection.sendall(get(target))
+                reply = read_reply(connection)
+                results.append((reply[0], "retry-after" in reply[1], time.monotonic() <= end + 0.2))
+
+    threads = [threading.Thread(target=run) for _ in range(connections)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    return results
+
+
+# A process of its own: asks for a cached tile 50 times a second, and prints the 99th percentile of the milliseconds.
+HOT_ASKER = """
+import socket, sys, time
+port, target, seconds = int(sys.argv[1]), sys.argv[2], float(sys.argv[3])
+times, end = [], time.monotonic() + seconds
+with socket.create_connection(("127.0.0.1", port)) as connection:
+    while time.monotonic() < end:
+        begun = time.perf_counter()
+        connection.sendall(f"GET {target} HTTP/1.1\\r\\nHost: x\\r\\n\\r\\n".encode())
+        head, _, body = connection.recv(65536).partition(b"\\r\\n\\r\\n")
+        length = int(head.lower().partition(b"content-length: ")[2].split()[0])
+        while len(body) < length:
+            body += connection.recv(65536)
+        if head.startswith(b"HTTP/1.1 200"):
+            times.append((time.perf_counter() - begun) * 1000)
+        time.sleep(0.02)
+print(sorted(times)[int(len(times) * 0.99)])
+"""
+
+
+def row_21(binary, _, __):
+    flags = ("--cache-bytes", "4MiB", "--refinement-cache-bytes", "0", "--worker-threads", "1", "--queue-length", "8")
+    seconds = 8
+    targets = itertools.cycle(list(tiles()))
+    with Server(binary, *flags) as server:
+        load(server, 2, 2, targets)
+        capacity = sum(status == 200 for status, _, _ in load(server, 2, seconds, targets)) / seconds
+        asker = subprocess.Popen([sys.executable, "-c", HOT_ASKER, str(server.port), HOT, str(seconds)], stdout=subprocess.PIPE, text=True)
+        results = load(server, 90, seconds, targets)
+        p99 = float(asker.communicate()[0])
+        goodput = sum(status == 200 and in_time for status, _, in_time in results) / seconds
+        normal = wait_until(lambda: fetch(server, "/jacksboro/9/272/359.terrain")[0] == 200, 10)
+    others = {status for status, told, _ in results if status != 200 and not (status == 503 and told)}
+    kept = goodput >= 0.85 * capacity and not others and p99 <= 20 and normal is not None and normal <= 2
+    return kept, f"goodput {goodput / capacity:.0%} of {capacity:.0f}/s, {sum(s == 503 for s, _, _ in results)} x 503, " \
+                 f"cached p99 {p99:.1f} ms, normal after {seconds_of(normal)}" + (f", also {others}" if others else "")
+
+
+def row_23(binary, _, __):
+    count = 10_000
+    with Server(binary, "--worker-threads", "1", "--cache-bytes", "4MiB", "--refinement-cache-bytes", "4MiB") as server:
+        targets = itertools.cycle(list(tiles()))
+        for _ in range(200):
+            assert fetch(server, next(targets))[0] == 200
+        for _ in range(1000):
+            reset_one(server, next(targets))
+        before, idle = server.resident_kib(), server.sockets()
+        for _ in range(count):
+            reset_one(server, next(targets))
+        back = wait_until(lambda: server.sockets() <= idle, 10)
+        growth = server.resident_kib() / before - 1
+        alive = fetch(server, HOT)[0] == 200
+    return back is not None and back <= 2 and growth <= 0.05 and alive, \
+        f"{count} resets, descriptors back after {seconds_of(back)}, RSS {growth:+.1%}"
+
+
+def reset_one(server, target):
+    connection = server.connect()
+    connection.sendall(get(target))
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    connection.close()
+
+
+def row_32(binary, _, long):
+    drains = 100 if long else 10
+    slowest, cut, codes = 0, 0, set()
+    for _ in range(drains):
+        with Server(binary, "--cache-bytes", "0") as server:
+            broken, stop = [], threading.Event()
+
+            def run():
+                targets = itertools.cycle(list(tiles()))
+                try:
+                    with server.connect() as connection:
+                        while not stop.is_set():
+                            connection.sendall(get(next(targets)))
+                            pending = connection.recv(65536)
+                            if not pending:
+                                return  # closed between two replies
+                            if read_reply(connection, pending) is None:
+                                broken.append(1)
+                                return
+                except OSError:
+                    pass
+
+            threads = [threading.Thread(target=run) for _ in range(8)]
+            for thread in threads:
+                thread.start()
+            time.sleep(0.5)
+            begun = time.monotonic()
+            os.kill(server.pid, signal.SIGTERM)
+            codes.add(server.process.wait(30))
+            slowest = max(slowest, time.monotonic() - begun)
+            stop.set()
+            for thread in threads:
+                thread.join()
+            cut += len(broken)
+    return codes == {0} and cut == 0 and slowest <= 10, f"{drains} drains, exit codes {codes}, {cut} truncated, slowest {slowest:.1f} s"

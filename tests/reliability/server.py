@@ -1,0 +1,101 @@
+"""The real binary on a free port, what the system tells about its process, and sockets that speak to it."""
+import os
+import pathlib
+import re
+import resource
+import signal
+import socket
+import subprocess
+import time
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+CONFIG = ROOT / "config/samples/samples.json"
+
+
+class Server:
+    """with Server(binary, "--max-connections", "100") as server: ..."""
+
+    def __init__(self, binary, *flags, prefix=(), open_files=None):
+        def limit():
+            if open_files:
+                resource.setrlimit(resource.RLIMIT_NOFILE, (open_files, open_files))
+
+        command = [*prefix, str(binary), "serve", "--config", str(CONFIG), "--listen", "127.0.0.1:0", "--log-level", "warn", *flags]
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, preexec_fn=limit, text=True)
+        line = self.process.stdout.readline()
+        self.port = int(re.search(r":(\d+)/", line)[1])
+        children = pathlib.Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children").read_text().split()
+        self.pid = int(children[0]) if prefix else self.process.pid
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        if self.process.poll() is None:
+            os.kill(self.pid, signal.SIGTERM)
+            self.process.wait(30)
+        self.process.stdout.close()
+
+    def resident_kib(self):
+        return int(re.search(r"VmRSS:\s+(\d+)", pathlib.Path(f"/proc/{self.pid}/status").read_text())[1])
+
+    def descriptors(self):
+        return len(os.listdir(f"/proc/{self.pid}/fd"))
+
+    def sockets(self):
+        folder = pathlib.Path(f"/proc/{self.pid}/fd")
+        return sum(os.readlink(entry).startswith("socket:") for entry in folder.iterdir() if entry.is_symlink())
+
+    def cpu_seconds(self):
+        fields = pathlib.Path(f"/proc/{self.pid}/stat").read_text().rpartition(")")[2].split()
+        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+    def connect(self, timeout=10):
+        return socket.create_connection(("127.0.0.1", self.port), timeout)
+
+
+def get(target, fields=""):
+    return f"GET {target} HTTP/1.1\r\nHost: x\r\n{fields}\r\n".encode()
+
+
+def read_reply(connection, pending=b""):
+    """(status, fields, body, rest), or None where the connection ended before a whole reply; OSError as it comes."""
+    while b"\r\n\r\n" not in pending:
+        piece = connection.recv(65536)
+        if not piece:
+            return None
+        pending += piece
+    head, _, body = pending.partition(b"\r\n\r\n")
+    lines = head.decode("latin-1").split("\r\n")
+    fields = {name.lower(): value.strip() for name, _, value in (line.partition(":") for line in lines[1:])}
+    status = int(lines[0].split()[1])
+    length = 0 if status in (204, 304) else int(fields.get("content-length", 0))
+    while len(body) < length:
+        piece = connection.recv(65536)
+        if not piece:
+            return None
+        body += piece
+    return status, fields, body[:length], body[length:]
+
+
+def fetch(server, target, fields="", timeout=10):
+    """One request on a connection of its own: (status, fields, body), or None."""
+    with server.connect(timeout) as connection:
+        connection.sendall(get(target, fields + "Connection: close\r\n"))
+        reply = read_reply(connection)
+        return reply and reply[:3]
+
+
+def percentile(values, share):
+    ordered = sorted(values)
+    return ordered[min(int(len(ordered) * share), len(ordered) - 1)]
+
+
+def wait_until(condition, seconds):
+    """How long it took, or None."""
+    begun = time.monotonic()
+    while time.monotonic() - begun < seconds:
+        if condition():
+            return time.monotonic() - begun
+        time.sleep(0.02)
+    return None

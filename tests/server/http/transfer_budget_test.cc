@@ -1,0 +1,86 @@
+#include "server/http/transfer_budget.h"
+
+#include <gtest/gtest.h>
+
+namespace terrace::server {
+namespace {
+
+using namespace std::chrono_literals;
+
+struct FakeConnection : Connection {
+  void CloseIfIdle() override {}
+  void Drain() override {}
+  void Abort() override { ++aborts; }
+  int aborts = 0;
+};
+
+Body BodyOf(std::size_t bytes) { return std::make_shared<const std::string>(bytes, 'x'); }
+
+constexpr std::size_t kMb = 1'000'000;
+
+class TransferBudgetTest : public testing::Test {
+ protected:
+  TransferBudget budget_{3 * kMb};
+  std::shared_ptr<FakeConnection> connection_ = std::make_shared<FakeConnection>();
+  TransferBudget::Clock::time_point now_{};
+};
+
+TEST_F(TransferBudgetTest, GivesRoomBack) {
+  {
+    const auto first = budget_.TryHold(BodyOf(2 * kMb), connection_, now_);
+    ASSERT_TRUE(first);
+    EXPECT_EQ(budget_.stats().held_bytes, 2 * kMb);
+    EXPECT_FALSE(budget_.TryHold(BodyOf(2 * kMb), connection_, now_));
+    EXPECT_TRUE(budget_.TryHold(BodyOf(kMb), connection_, now_));
+    EXPECT_EQ(budget_.stats().held_bytes, 2 * kMb);
+  }
+  EXPECT_EQ(budget_.stats().held_bytes, 0u);
+  EXPECT_EQ(budget_.stats().refused, 1u);
+}
+
+TEST_F(TransferBudgetTest, CountsASharedBodyOnce) {
+  const Body body = BodyOf(2 * kMb);
+  auto first = budget_.TryHold(body, connection_, now_);
+  auto second = budget_.TryHold(body, connection_, now_);
+  ASSERT_TRUE(first && second);
+  EXPECT_EQ(budget_.stats().held_bytes, 2 * kMb);
+  first.reset();
+  EXPECT_EQ(budget_.stats().held_bytes, 2 * kMb) << "the second still has it";
+  second.reset();
+  EXPECT_EQ(budget_.stats().held_bytes, 0u);
+}
+
+TEST_F(TransferBudgetTest, LeavesSmallBodiesAlone) {
+  std::vector<TransferBudget::Hold> holds;
+  for (int i = 0; i < 1000; ++i)
+    holds.push_back(*budget_.TryHold(BodyOf(TransferBudget::kFreeBytes), connection_, now_));
+  EXPECT_EQ(budget_.stats().held_bytes, 0u);
+  EXPECT_TRUE(budget_.TryHold(nullptr, connection_, now_));
+}
+
+TEST_F(TransferBudgetTest, LetsOneOversizedBodyPass) {
+  auto large = budget_.TryHold(BodyOf(10 * kMb), connection_, now_);
+  ASSERT_TRUE(large);
+  EXPECT_FALSE(budget_.TryHold(BodyOf(10 * kMb), connection_, now_));
+  EXPECT_TRUE(budget_.TryHold(BodyOf(3 * kMb), connection_, now_)) << "beside it";
+  large.reset();
+  EXPECT_TRUE(budget_.TryHold(BodyOf(10 * kMb), connection_, now_));
+}
+
+TEST_F(TransferBudgetTest, CutsWhoHasHadTheirTimeWhereOthersNeedTheRoom) {
+  const auto quick = std::make_shared<FakeConnection>();
+  const auto slow = budget_.TryHold(BodyOf(2 * kMb), connection_, now_);
+  now_ += 3s;
+  const auto recent = budget_.TryHold(std::size_t{kMb}, quick, now_);
+  EXPECT_FALSE(budget_.TryHold(BodyOf(2 * kMb), quick, now_));
+  EXPECT_EQ(connection_->aborts, 0) << "two seconds, and one for each MiB";
+  now_ += 1s;
+  EXPECT_FALSE(budget_.TryHold(BodyOf(2 * kMb), quick, now_));
+  EXPECT_FALSE(budget_.TryHold(BodyOf(2 * kMb), quick, now_));
+  EXPECT_EQ(connection_->aborts, 1) << "told once";
+  EXPECT_EQ(quick->aborts, 0);
+  EXPECT_EQ(budget_.stats().cut, 1u);
+}
+
+}  // namespace
+}  // namespace terrace::server

@@ -1,0 +1,298 @@
+// What one client may take: transfers, rates, connections, datasets.
+#include <gtest/gtest.h>
+
+#include <thread>
+#include <vector>
+
+#include "tests/server/resident_memory.h"
+#include "tests/server/server_fixture.h"
+
+namespace terrace::server {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr const char* kAll = "all-datasets-token";
+constexpr const char* kOahu = "oahu-only-token-1";
+
+class Limits : public ServerFixture {
+ protected:
+  // Tiles of a megabyte, each its own.
+  void MakeTilesLarge(std::size_t bytes = std::size_t{1} << 20) {
+    builder_ = [bytes](const TileRequest& request, std::stop_token) -> Result<EncodedTile> {
+      EncodedTile tile;
+      tile.bytes.assign(bytes, static_cast<char>('a' + request.key.x % 26));
+      tile.etag = "\"" + geo::ToString(request.key) + "\"";
+      return tile;
+    };
+  }
+  static std::string Tile(int i) {
+    return "/maui/3/" + std::to_string(i % 16) + "/" + std::to_string(i / 16 % 8) +
+           ".terrain?fraction=" + std::to_string(0.05 * (1 << (i / 128)));
+  }
+  std::string Metric(const std::string& name) {
+    const std::string text = "\n" + Fetch(port(), "/metrics").body;
+    const std::size_t at = text.find("\n" + name + " ");
+    return at == std::string::npos ? ""
+                                   : text.substr(at + name.size() + 2, text.find('\n', at + 1) - at - name.size() - 2);
+  }
+};
+
+// Row 12 of docs/reliability.md.
+TEST_F(Limits, FiveHundredSlowReadersHoldABoundedPart) {
+  MakeTilesLarge();
+  ServerOptions options;
+  options.cache_bytes = 0;
+  options.edge.max_connections = 2000;
+  Start(options);
+  Fetch(port(), "/livez");
+  const long before = ResidentKib();
+  std::vector<std::unique_ptr<RawClient>> readers;
+  for (int i = 0; i < 500; ++i) {
+    readers.push_back(std::make_unique<RawClient>(port(), 4096));
+    readers.back()->Send(Get(Tile(i)));
+  }
+  ASSERT_TRUE(Eventually([&] { return Metric("terrace_http_transfers_refused_total") != "0"; }));
+  std::this_thread::sleep_for(1s);
+  const long grown = ResidentKib() - before;
+  RecordProperty("resident_kib", static_cast<int>(grown));
+  if (!kSanitized) {
+    EXPECT_LT(grown, 64'000'000 / 1024);
+  }
+  // They have had their time: whoever comes now is served.
+  EXPECT_TRUE(Eventually([&] { return Fetch(port(), "/maui/0/0/0.terrain").status == 200; }));
+}
+
+TEST_F(Limits, ManyReadersOfOneTileCountOnce) {
+  MakeTilesLarge();
+  ServerOptions options;
+  options.edge.transfer_bytes = std::size_t{2} << 20;
+  Start(options);
+  std::vector<std::unique_ptr<RawClient>> readers;
+  for (int i = 0; i < 50; ++i) {
+    readers.push_back(std::make_unique<RawClient>(port(), 4096));
+    readers.back()->Send(Get("/maui/0/0/0.terrain"));
+  }
+  EXPECT_TRUE(Eventually([&] { return Metric("terrace_http_transfer_bytes") == "1048576"; }));
+  EXPECT_EQ(Metric("terrace_http_transfers_refused_total"), "0");
+  for (auto& reader : readers) EXPECT_EQ(reader->Read()->body.size(), std::size_t{1} << 20);
+  EXPECT_TRUE(Eventually([&] { return Metric("terrace_http_transfer_bytes") == "0"; }));
+}
+
+TEST_F(Limits, RefusesARequestBodyThatFindsNoRoom) {
+  MakeTilesLarge();
+  ServerOptions options;
+  options.edge.transfer_bytes = std::size_t{1} << 20;
+  Start(options);
+  RawClient reader(port(), 4096), poster(port());
+  reader.Send(Get("/maui/0/0/0.terrain"));
+  ASSERT_TRUE(Eventually([&] { return Metric("terrace_http_transfer_bytes") == "1048576"; }));
+  poster.Send("POST /maui/heights HTTP/1.1\r\nHost: x\r\nContent-Length: 100000\r\n\r\n");
+  const auto reply = poster.Read();
+  ASSERT_TRUE(reply);
+  EXPECT_EQ(reply->status, 503);
+  EXPECT_EQ(reply->Field("retry-after"), "1");
+  EXPECT_TRUE(poster.Ended());
+}
+
+TEST_F(Limits, CutsReadersThatTakeTooLittleInTheLongRun) {
+  MakeTilesLarge(std::size_t{8} << 20);
+  ServerOptions options;
+  options.write_timeout = 300ms;
+  options.min_read_rate = 100'000'000;
+  Start(options);
+  RawClient reader(port(), 4096);
+  reader.Send(Get("/maui/0/0/0.terrain"));
+  const auto begun = std::chrono::steady_clock::now();
+  EXPECT_TRUE(Eventually([&] { return reader.TakeSome(1000) == 0; })) << "each byte comes in time, but not enough";
+  EXPECT_LT(std::chrono::steady_clock::now() - begun, 8s);
+}
+
+TEST_F(Limits, TellsSlowSendersOfBodies) {
+  ServerOptions options;
+  options.header_timeout = 200ms;
+  Start(options);
+  RawClient client(port());
+  client.Send(
+      "POST /maui/heights HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\nContent-Length: 20\r\n\r\n{");
+  const auto reply = client.Read();
+  ASSERT_TRUE(reply);
+  EXPECT_EQ(reply->status, 408);
+  EXPECT_EQ(reply->Field("connection"), "close");
+  EXPECT_TRUE(client.Ended());
+  RawClient head(port());
+  head.Send("GET /livez HTTP/1.1\r\nHo");
+  ASSERT_EQ(head.Read()->status, 408);
+  EXPECT_TRUE(head.Ended());
+}
+
+TEST_F(Limits, SlowsDownWhoAsksTooOften) {
+  ServerOptions options;
+  options.edge.requests_per_second = 1;
+  options.edge.request_burst = 5;
+  Start(options);
+  RawClient client(port());
+  for (int i = 0; i < 6; ++i) client.Send(Get("/maui/layer.json"));
+  for (int i = 0; i < 5; ++i) EXPECT_EQ(client.Read()->status, 200);
+  const auto refused = client.Read();
+  ASSERT_TRUE(refused);
+  EXPECT_EQ(refused->status, 429);
+  EXPECT_EQ(refused->Field("retry-after"), "1");
+  EXPECT_EQ(refused->Field("content-type"), "application/problem+json");
+  EXPECT_EQ(Fetch(port(), "/maui/layer.json").status, 429) << "another connection is the same client";
+  EXPECT_EQ(Fetch(port(), "/livez").status, 200) << "probes do not count";
+  EXPECT_TRUE(Eventually([&] { return Fetch(port(), "/maui/layer.json").status == 200; }));
+}
+
+TEST_F(Limits, CountsTheClientsBehindAProxyEachByItself) {
+  ServerOptions options;
+  options.edge.requests_per_second = 0.001;
+  options.edge.request_burst = 1;
+  options.edge.trusted_proxies = {"127.0.0.0/8"};
+  Start(options);
+  const auto from = [&](const std::string& client) {
+    return Fetch(port(), "/maui/layer.json", "X-Forwarded-For: " + client + "\r\n").status;
+  };
+  EXPECT_EQ(from("192.0.2.1"), 200);
+  EXPECT_EQ(from("192.0.2.1"), 429);
+  EXPECT_EQ(from("192.0.2.2"), 200);
+  EXPECT_EQ(from("198.51.100.9, 192.0.2.2"), 429) << "what the client itself put there does not count";
+  EXPECT_EQ(from("2001:db8::1"), 200);
+  EXPECT_EQ(from("2001:db8::2"), 429) << "one network";
+}
+
+TEST_F(Limits, RefusesTooManyConnectionsOfOneClient) {
+  ServerOptions options;
+  options.edge.max_connections_per_client = 2;
+  Start(options);
+  RawClient first(port());
+  auto second = std::make_unique<RawClient>(port());
+  for (RawClient* client : {&first, second.get()}) {
+    client->Send(Get("/livez"));
+    ASSERT_EQ(client->Read()->status, 200);
+  }
+  const Reply refused = Fetch(port(), "/livez");
+  EXPECT_EQ(refused.status, 429);
+  EXPECT_EQ(refused.Field("connection"), "close");
+  second.reset();
+  EXPECT_TRUE(Eventually([&] { return Fetch(port(), "/livez").status == 200; }));
+}
+
+TEST_F(Limits, ShowsDatasetsToWhomTheyBelong) {
+  DatasetView oahu, open;
+  oahu.name = "oahu";
+  open.name = "open";
+  oahu.available = open.available = {{{0, 0, 1, 0}}};
+  more_datasets_ = {oahu, open};
+  ServerOptions options;
+  options.edge.tokens = {{"everybody", kAll, "", {}, 0}, {"oahu-team", kOahu, "", {"oahu"}, 0}};
+  options.edge.public_datasets = {"open"};
+  Start(options);
+  const auto bearer = [](const std::string& token) { return "Authorization: Bearer " + token + "\r\n"; };
+  const struct {
+    const char* target;
+    int anonymous, oahu, all;
+  } cases[] = {
+      {"/maui/layer.json", 401, 403, 200}, {"/maui/0/0/0.terrain", 401, 403, 200},
+      {"/oahu/layer.json", 401, 200, 200}, {"/oahu/0/0/0.glb", 401, 200, 200},
+      {"/open/layer.json", 200, 200, 200}, {"/open/0/0/0.terrain", 200, 200, 200},
+      {"/nope/layer.json", 401, 403, 404}, {"/metrics", 401, 403, 200},
+      {"/datasets", 200, 200, 200},        {"/", 200, 200, 200},
+      {"/livez", 200, 200, 200},           {"/maui/tileset.json", 401, 403, 200},
+      {"/maui/tiles.json", 401, 403, 200}, {"/maui/heights?locations=1,2", 401, 403, 503},
+  };
+  for (const auto& c : cases) {
+    const std::string target = c.target;
+    EXPECT_EQ(Fetch(port(), target).status, c.anonymous) << target;
+    EXPECT_EQ(Fetch(port(), target, bearer(kOahu)).status, c.oahu) << target;
+    EXPECT_EQ(Fetch(port(), target, bearer(kAll)).status, c.all) << target;
+    const std::string in_query = target + (target.find('?') == std::string::npos ? "?" : "&") + "token=" + kOahu;
+    EXPECT_EQ(Fetch(port(), in_query).status, c.oahu) << target;
+    EXPECT_EQ(Fetch(port(), in_query, bearer(kAll)).status, c.all) << "the header counts: " << target;
+  }
+  EXPECT_EQ(Fetch(port(), "/open/layer.json", bearer("no-such-token-0001")).status, 401);
+  EXPECT_EQ(Fetch(port(), "/open/layer.json?token=" + std::string(kAll) + "&token=" + kOahu).status, 401) << "which?";
+  EXPECT_EQ(Fetch(port(), "/oahu/0/0/0.terrain?token=" + std::string(kOahu) + "&error=5&token=" + kOahu).status, 200);
+
+  EXPECT_EQ(Fetch(port(), "/datasets").body.find("maui"), std::string::npos);
+  EXPECT_EQ(Fetch(port(), "/").body.find("maui"), std::string::npos);
+  EXPECT_NE(Fetch(port(), "/datasets").body.find("open"), std::string::npos);
+  EXPECT_NE(Fetch(port(), "/datasets", bearer(kOahu)).body.find("oahu"), std::string::npos);
+
+  const Reply denied = Fetch(port(), "/maui/layer.json");
+  EXPECT_TRUE(denied.Field("www-authenticate").starts_with("Bearer")) << denied.Field("www-authenticate");
+  EXPECT_EQ(denied.Field("content-type"), "application/problem+json");
+  EXPECT_EQ(denied.Field("access-control-allow-origin"), "*");
+  const Reply granted = Fetch(port(), "/maui/layer.json", bearer(kAll));
+  EXPECT_EQ(granted.Field("cache-control"), "private, max-age=3600");
+  EXPECT_EQ(granted.Field("vary"), "Accept, Accept-Encoding, Authorization");
+  EXPECT_EQ(Fetch(port(), "/open/layer.json", bearer(kAll)).Field("cache-control"), "public, max-age=3600");
+
+  RawClient browser(port());
+  browser.Send("OPTIONS /maui/layer.json HTTP/1.1\r\nHost: x\r\nOrigin: http://a\r\n\r\n");
+  EXPECT_EQ(browser.Read()->status, 204) << "preflights carry no token";
+}
+
+TEST_F(Limits, ATokenChangesNoTile) {
+  ServerOptions options;
+  options.edge.tokens = {{"a", kAll, "", {}, 0}, {"b", kOahu, "", {"maui"}, 0}};
+  Start(options);
+  const Reply one = Fetch(port(), "/maui/0/0/0.terrain?token=" + std::string(kAll));
+  const Reply other = Fetch(port(), "/maui/0/0/0.terrain?token=" + std::string(kOahu));
+  EXPECT_EQ(one.status, 200);
+  EXPECT_EQ(one.body, other.body);
+  EXPECT_EQ(one.Field("etag"), other.Field("etag"));
+  EXPECT_EQ(builds_, 1) << "one tile for both";
+}
+
+TEST_F(Limits, TokensAreIgnoredWhereThereAreNone) {
+  Start();
+  EXPECT_EQ(Fetch(port(), "/maui/0/0/0.terrain?token=anything&error=5").status, 200);
+  EXPECT_EQ(Fetch(port(), "/maui/layer.json?%74oken=").Field("cache-control"), "public, max-age=3600");
+}
+
+TEST_F(Limits, LetsTheConfiguredPagesReadReplies) {
+  ServerOptions options;
+  options.edge.cors_origins = {"https://maps.example", "http://localhost:3000"};
+  Start(options);
+  const Reply known = Fetch(port(), "/maui/layer.json", "Origin: https://maps.example\r\n");
+  EXPECT_EQ(known.Field("access-control-allow-origin"), "https://maps.example");
+  EXPECT_EQ(known.Field("timing-allow-origin"), "https://maps.example");
+  EXPECT_EQ(known.Field("vary"), "Accept, Accept-Encoding, Origin");
+  for (const char* origin : {"", "Origin: https://evil.example\r\n", "Origin: null\r\n"}) {
+    const Reply reply = Fetch(port(), "/livez", origin);
+    EXPECT_EQ(reply.status, 200);
+    EXPECT_FALSE(reply.fields.contains("access-control-allow-origin")) << origin;
+    EXPECT_EQ(reply.Field("vary"), "Origin") << "another page would be answered otherwise";
+  }
+}
+
+TEST_F(Limits, BelievesTrustedProxiesAlone) {
+  const std::string said = "X-Forwarded-Proto: https\r\nX-Forwarded-Host: maps.example\r\n";
+  Start();
+  EXPECT_NE(Fetch(port(), "/maui/tiles.json", said).body.find("\"http://localhost/maui/"), std::string::npos);
+  server_.reset();
+  ServerOptions options;
+  options.edge.trusted_proxies = {"127.0.0.1"};
+  Start(options);
+  const Reply reply = Fetch(port(), "/maui/tiles.json", said);
+  EXPECT_NE(reply.body.find("\"https://maps.example/maui/"), std::string::npos) << reply.body;
+  EXPECT_NE(reply.Field("vary").find("X-Forwarded-Host, X-Forwarded-Proto"), std::string::npos);
+}
+
+TEST_F(Limits, RefusesOptionsThatMakeNoSense) {
+  ServerOptions options;
+  options.edge.trusted_proxies = {"proxy.example"};
+  EXPECT_FALSE(Server::Start(std::make_shared<const Catalog>(), options));
+  options = {};
+  options.edge.tokens = {{"a", kAll, "", {}, 0}, {"b", kAll, "", {}, 0}};
+  EXPECT_FALSE(Server::Start(std::make_shared<const Catalog>(), options)) << "one token with two names";
+  options = {};
+  options.edge.tls_certificate = options.edge.tls_key = "/nowhere.pem";
+  const auto server = Server::Start(std::make_shared<const Catalog>(), options);
+  ASSERT_FALSE(server);
+  EXPECT_NE(server.error().message.find("/nowhere.pem"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace terrace::server

@@ -1,0 +1,230 @@
+// The reloader with a configuration and an opener that the tests steer; sources are copies of a sample.
+#include "server/reload/reloader.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <filesystem>
+#include <functional>
+#include <thread>
+#include <utility>
+
+namespace terrace::server {
+namespace {
+
+using namespace std::chrono_literals;
+namespace fs = std::filesystem;
+
+bool Eventually(const std::function<bool()>& done) {
+  for (int i = 0; i < 2000; ++i) {
+    if (done()) return true;
+    std::this_thread::sleep_for(5ms);
+  }
+  return false;
+}
+
+class ReloaderTest : public testing::Test {
+ protected:
+  ReloaderTest() {
+    folder_ = fs::path(testing::TempDir()) / ("reloader_" + std::to_string(::getpid()));
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+    config_.datasets = {MakeConfig("a")};
+  }
+  ~ReloaderTest() override {
+    reloader_.reset();
+    fs::remove_all(folder_);
+  }
+
+  config::DatasetConfig MakeConfig(const std::string& name) {
+    config::DatasetConfig dataset;
+    dataset.name = name;
+    dataset.sources = {(folder_ / (name + ".tif")).string()};
+    Put(name);
+    return dataset;
+  }
+
+  // A new file under the source's name, written long ago.
+  void Put(const std::string& name) {
+    const fs::path beside = folder_ / "new";
+    fs::copy_file(fs::path(TERRACE_SOURCE_DIR) / "config/samples/jacksboro.tif", beside);
+    fs::last_write_time(beside, fs::file_time_type::clock::now() - 1h);
+    fs::rename(beside, folder_ / (name + ".tif"));
+  }
+
+  Result<Dataset> Open(const config::DatasetConfig& wanted, const std::stop_token& stop) {
+    ++openings_;
+    if (blocks_) {
+      while (!stop.stop_requested()) std::this_thread::sleep_for(1ms);
+      return MakeError(ErrorCode::kCancelled, "stopped");
+    }
+    if (fails_) return MakeError(ErrorCode::kInvalidArgument, "no raster");
+    auto source = dem::DemSource::Open(wanted.sources.front().files.front(), {});
+    if (!source) return tl::unexpected(source.error());
+    Dataset dataset;
+    dataset.name = wanted.name;
+    dataset.source = *std::move(source);
+    dataset.generation = dataset.source->fingerprint();
+    return dataset;
+  }
+
+  void Start() {
+    std::vector<Dataset> datasets;
+    for (const config::DatasetConfig& wanted : config_.datasets) datasets.push_back(*Open(wanted, {}));
+    openings_ = 0;
+    Reloader::Hooks hooks;
+    hooks.load = [this] {
+      const std::lock_guard lock(mutex_);
+      return next_;
+    };
+    hooks.open = [this](const config::DatasetConfig& wanted, const std::stop_token& stop) {
+      return Open(wanted, stop);
+    };
+    hooks.publish = [this](const std::vector<Dataset>& served, const config::Config&) {
+      const std::lock_guard lock(mutex_);
+      served_.clear();
+      for (const Dataset& dataset : served) served_.emplace_back(dataset.name, dataset.generation);
+    };
+    hooks.tell = [this](const std::map<std::string, std::string>& troubles) {
+      const std::lock_guard lock(mutex_);
+      troubles_ = troubles;
+    };
+    for (const Dataset& dataset : datasets) served_.emplace_back(dataset.name, dataset.generation);
+    next_ = config_;
+    reloader_ = std::make_unique<Reloader>(config_, std::move(datasets), std::move(hooks));
+    reloader_->Start(/*watch=*/true);
+  }
+
+  void Load(config::ConfigResult next) {
+    {
+      const std::lock_guard lock(mutex_);
+      next_ = std::move(next);
+    }
+    reloader_->Reload();
+  }
+  std::vector<std::pair<std::string, std::uint64_t>> Served() {
+    const std::lock_guard lock(mutex_);
+    return served_;
+  }
+  std::map<std::string, std::string> Troubles() {
+    const std::lock_guard lock(mutex_);
+    return troubles_;
+  }
+
+  fs::path folder_;
+  config::Config config_;
+  std::atomic<int> openings_{0};
+  std::atomic<bool> blocks_{false}, fails_{false};
+  std::mutex mutex_;
+  config::ConfigResult next_;                                  // guarded by mutex_, as the rest
+  std::vector<std::pair<std::string, std::uint64_t>> served_;  // name and generation
+  std::map<std::string, std::string> troubles_;
+  std::unique_ptr<Reloader> reloader_;
+};
+
+TEST_F(ReloaderTest, OpensWhatChangedAndNothingElse) {
+  config_.datasets.push_back(MakeConfig("b"));
+  Start();
+  const auto before = Served();
+  Put("b");
+  reloader_->Look();
+  ASSERT_TRUE(Eventually([&] { return Served() != before; }));
+  EXPECT_EQ(Served()[0], before[0]);
+  EXPECT_NE(Served()[1].second, before[1].second);
+  EXPECT_EQ(openings_, 1);
+}
+
+TEST_F(ReloaderTest, KeepsUnchangedDatasetsWhateverTheirPlace) {
+  config_.datasets.push_back(MakeConfig("b"));
+  Start();
+  const auto before = Served();
+  config::Config next = config_;
+  std::swap(next.datasets[0], next.datasets[1]);
+  Load(next);
+  ASSERT_TRUE(Eventually([&] { return Served() != before; }));
+  EXPECT_EQ(Served()[0], before[1]);
+  EXPECT_EQ(Served()[1], before[0]);
+  EXPECT_EQ(openings_, 0);
+}
+
+TEST_F(ReloaderTest, TellsTroublesAndMendsThem) {
+  Start();
+  const auto before = Served();
+  fails_ = true;
+  Put("a");
+  reloader_->Look();
+  ASSERT_TRUE(Eventually([&] { return Troubles().contains("a"); }));
+  EXPECT_EQ(Served(), before) << "what there is stays";
+  fails_ = false;
+  Put("a");
+  ASSERT_TRUE(Eventually([&] { return Troubles().empty(); }));
+  EXPECT_NE(Served(), before);
+}
+
+TEST_F(ReloaderTest, AWrongConfigurationIsATroubleAndNothingElse) {
+  Start();
+  const auto before = Served();
+  Load(tl::unexpected(std::vector<config::ConfigError>{{"/listen", "is wrong"}, {"/viewer", "too"}}));
+  ASSERT_TRUE(Eventually([&] { return Troubles().contains(""); }));
+  EXPECT_EQ(Troubles()[""], "/listen: is wrong; /viewer: too");
+  EXPECT_EQ(Served(), before);
+  Load(config_);
+  EXPECT_TRUE(Eventually([&] { return Troubles().empty(); }));
+}
+
+TEST_F(ReloaderTest, WatchesTheConfigurationWithoutBeingAsked) {
+  Start();
+  config::Config next = config_;
+  next.datasets.push_back(MakeConfig("b"));
+  {
+    const std::lock_guard lock(mutex_);
+    next_ = next;
+  }
+  EXPECT_TRUE(Eventually([&] { return Served().size() == 2; }));
+}
+
+TEST_F(ReloaderTest, ADatasetThatGoesWhileItIsOpenedIsForgotten) {
+  Start();
+  blocks_ = true;
+  config::Config next = config_;
+  next.datasets.push_back(MakeConfig("b"));
+  Load(next);
+  ASSERT_TRUE(Eventually([&] { return openings_ == 1; }));
+  blocks_ = false;
+  next.datasets.back().name = "c";
+  Load(next);
+  ASSERT_TRUE(Eventually([&] { return Served().size() == 2; }));
+  EXPECT_EQ(Served()[1].first, "c");
+}
+
+TEST_F(ReloaderTest, StoppingStopsAnOpening) {
+  Start();
+  blocks_ = true;
+  Put("a");
+  reloader_->Look();
+  ASSERT_TRUE(Eventually([&] { return openings_ == 1; }));
+  reloader_.reset();  // or this would never return
+}
+
+TEST_F(ReloaderTest, WaitsForAFileThatIsBeingWritten) {
+  Start();
+  const auto before = Served();
+  Put("a");
+  auto last = std::chrono::steady_clock::now();
+  bool is_busy = false;  // the machine, so that the file looks complete
+  for (int i = 0; i < 30 && !is_busy; ++i) {
+    fs::last_write_time(folder_ / "a.tif", fs::file_time_type::clock::now());
+    reloader_->Look();
+    std::this_thread::sleep_for(50ms);
+    const auto now = std::chrono::steady_clock::now();
+    is_busy = now - std::exchange(last, now) > 500ms;
+  }
+  if (!is_busy) {
+    EXPECT_EQ(openings_, 0);
+  }
+  EXPECT_TRUE(Eventually([&] { return Served() != before; }));
+}
+
+}  // namespace
+}  // namespace terrace::server

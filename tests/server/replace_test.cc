@@ -1,0 +1,144 @@
+// What is served is replaced while clients ask.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <thread>
+
+#include "tests/server/server_fixture.h"
+
+namespace terrace::server {
+namespace {
+
+using namespace std::chrono_literals;
+
+// One dataset, "maui", whose tiles are their generation's text.
+CatalogPtr CatalogOf(std::uint64_t generation, TileBuilder builder, const char* name = "maui") {
+  auto catalog = std::make_shared<Catalog>();
+  catalog->datasets.resize(1);
+  catalog->datasets[0].name = name;
+  catalog->datasets[0].generation = generation;
+  catalog->datasets[0].available = {{{0, 0, 1, 0}}};
+  catalog->build = std::move(builder);
+  return catalog;
+}
+
+TileBuilder Says(std::string text) {
+  return [text](const TileRequest&, std::stop_token) -> Result<EncodedTile> {
+    EncodedTile tile;
+    tile.bytes = text;
+    return tile;
+  };
+}
+
+TileBuilder FindsItsSourceChanged() {
+  return [](const TileRequest&, std::stop_token) -> Result<EncodedTile> {
+    return MakeError(ErrorCode::kChanged, "/secret/maui.tif was changed");
+  };
+}
+
+class Replace : public testing::Test {
+ protected:
+  void Start(CatalogPtr catalog) {
+    options_.port = 0;
+    options_.io_threads = 2;
+    auto server = Server::Start(std::move(catalog), options_);
+    ASSERT_TRUE(server) << server.error().message;
+    server_ = std::move(*server);
+  }
+  Reply Tile(const char* target = "/maui/0/0/0.terrain") { return Fetch(server_->port(), target); }
+
+  ServerOptions options_;
+  std::unique_ptr<Server> server_;
+};
+
+TEST_F(Replace, AnswersFromTheNextCatalog) {
+  Start(CatalogOf(1, Says("old")));
+  EXPECT_EQ(Tile().body, "old");
+  ASSERT_TRUE(server_->Replace(CatalogOf(2, Says("new")), options_));
+  EXPECT_EQ(Tile().body, "new");
+  ASSERT_TRUE(server_->Replace(CatalogOf(2, Says("new"), "oahu"), options_));
+  EXPECT_EQ(Tile().status, 404);
+  EXPECT_EQ(Tile("/oahu/0/0/0.terrain").body, "new");
+  EXPECT_EQ(Tile("/oahu/0/0/0.terrain").Field("server-timing"), "cache;desc=hit");
+  const Reply metrics = Fetch(server_->port(), "/metrics");
+  EXPECT_NE(metrics.body.find("terrace_catalogs_total 2"), std::string::npos);
+}
+
+TEST_F(Replace, KeepsRequestsWithTheCatalogTheyBeganWith) {
+  std::atomic<bool> begun{false}, go_on{false};
+  Start(CatalogOf(1, [&](const TileRequest&, std::stop_token) -> Result<EncodedTile> {
+    begun = true;
+    while (!go_on) std::this_thread::sleep_for(1ms);
+    EncodedTile tile;
+    tile.bytes = "old";
+    return tile;
+  }));
+  RawClient early(server_->port());
+  early.Send(Get("/maui/0/0/0.terrain"));
+  ASSERT_TRUE(Eventually([&] { return begun.load(); }));
+  ASSERT_TRUE(server_->Replace(CatalogOf(2, Says("new")), options_));
+  EXPECT_EQ(Tile().body, "new");
+  go_on = true;
+  const auto reply = early.Read();
+  ASSERT_TRUE(reply);
+  EXPECT_EQ(reply->body, "old");
+  EXPECT_EQ(Tile().body, "new") << "what landed late is not kept";
+}
+
+TEST_F(Replace, RefusesACatalogThatCannotBeServed) {
+  Start(CatalogOf(1, Says("old")));
+  EXPECT_FALSE(server_->Replace(CatalogOf(2, Says("new"), "metrics"), options_));
+  EXPECT_EQ(Tile().body, "old");
+}
+
+TEST_F(Replace, WaitsForTheNextCatalogWhereTheSourceHasChanged) {
+  std::atomic<int> told{0};
+  options_.on_source_changed = [&] { ++told; };
+  Start(CatalogOf(1, FindsItsSourceChanged()));
+  std::thread reopening([&] {
+    EXPECT_TRUE(Eventually([&] { return told > 0; }));
+    EXPECT_TRUE(server_->Replace(CatalogOf(2, Says("new")), options_));
+  });
+  EXPECT_EQ(Tile().body, "new");
+  reopening.join();
+}
+
+TEST_F(Replace, DoesNotWaitWhereNobodyOpensItAnew) {
+  Start(CatalogOf(1, FindsItsSourceChanged()));
+  const Reply reply = Tile();
+  EXPECT_EQ(reply.status, 503);
+  EXPECT_EQ(reply.Field("retry-after"), "1");
+  EXPECT_EQ(reply.body.find("secret"), std::string::npos);
+}
+
+TEST_F(Replace, DoesNotWaitForADatasetInTrouble) {
+  std::atomic<int> told{0};
+  options_.on_source_changed = [&] { ++told; };
+  Start(CatalogOf(1, FindsItsSourceChanged()));
+  EXPECT_EQ(Fetch(server_->port(), "/readyz").body, "ready\n");
+  server_->SetTroubles({{"maui", "/secret/maui.tif is gone"}});
+  std::thread reopening([&] {  // whoever waited would meet this
+    EXPECT_TRUE(Eventually([&] { return told > 0; }));
+    std::this_thread::sleep_for(1500ms);
+    EXPECT_TRUE(server_->Replace(CatalogOf(2, Says("new")), options_));
+  });
+  EXPECT_EQ(Tile().status, 503);
+  reopening.join();
+  EXPECT_EQ(told, 1) << "it may be mended meanwhile";
+  const Reply ready = Fetch(server_->port(), "/readyz");
+  EXPECT_EQ(ready.status, 200);
+  EXPECT_EQ(ready.body, "degraded\ndataset maui: its source cannot be opened as it is now\n");
+}
+
+TEST_F(Replace, TakesOverTheOptionsThatMayChange) {
+  Start(CatalogOf(1, Says("old")));
+  EXPECT_EQ(Tile().Field("cache-control"), "public, max-age=3600");
+  options_.cache_control = "no-cache";
+  options_.cache_bytes = 0;
+  ASSERT_TRUE(server_->Replace(CatalogOf(1, Says("old")), options_));
+  EXPECT_EQ(Tile().Field("cache-control"), "no-cache");
+  EXPECT_TRUE(Tile().Field("server-timing").starts_with("cache;desc=miss")) << "the cache is off now";
+}
+
+}  // namespace
+}  // namespace terrace::server

@@ -1,0 +1,127 @@
+// HTTPS: what is spoken, what is refused, and certificates that change.
+#include <gtest/gtest.h>
+#include <openssl/ssl.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <filesystem>
+#include <fstream>
+#include <thread>
+
+#include "tests/server/server_fixture.h"
+#include "tests/server/tls_client.h"
+
+namespace terrace::server {
+namespace {
+
+using namespace std::chrono_literals;
+
+const std::string kAsk = "GET /livez HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n";
+
+class Tls : public ServerFixture {
+ protected:
+  Tls() {
+    std::filesystem::create_directories(directory_);
+    WriteCertificate("first.example", certificate_, key_);
+  }
+  ~Tls() override {
+    server_.reset();
+    std::filesystem::remove_all(directory_);
+  }
+  void StartTls(ServerOptions options = {}) {
+    options.edge.tls_certificate = certificate_;
+    options.edge.tls_key = key_;
+    Start(options);
+  }
+
+  const std::string directory_ = testing::TempDir() + "terrace_tls_" + std::to_string(::getpid());
+  const std::string certificate_ = directory_ + "/server.pem", key_ = directory_ + "/server.key";
+};
+
+TEST_F(Tls, ServesTheSameReplies) {
+  StartTls();
+  EXPECT_TRUE(server_->url().starts_with("https://"));
+  const TlsReply reply = FetchTls(port(), kAsk);
+  ASSERT_TRUE(reply.secured);
+  EXPECT_EQ(reply.version, "TLSv1.3");
+  EXPECT_EQ(reply.protocol, "http/1.1");
+  EXPECT_EQ(reply.subject, "first.example");
+  EXPECT_TRUE(reply.bytes.starts_with("HTTP/1.1 200 OK\r\n")) << reply.bytes;
+  EXPECT_TRUE(reply.bytes.ends_with("\r\n\r\nok\n")) << reply.bytes;
+  const std::string tiles = FetchTls(port(), "GET /maui/tiles.json HTTP/1.0\r\nHost: h\r\n\r\n").bytes;
+  EXPECT_NE(tiles.find("\"https://h/maui/"), std::string::npos) << tiles;
+}
+
+TEST_F(Tls, SendsLongRepliesWhole) {
+  builder_ = [](const TileRequest&, std::stop_token) -> Result<EncodedTile> {
+    EncodedTile tile;
+    for (int i = 0; i < 1'000'000; ++i) tile.bytes += std::to_string(i);
+    return tile;
+  };
+  StartTls();
+  const TlsReply reply = FetchTls(port(), "GET /maui/0/0/0.terrain HTTP/1.0\r\n\r\n");
+  const std::size_t body = reply.bytes.find("\r\n\r\n") + 4;
+  ASSERT_EQ(reply.bytes.size() - body, 5'888'890u);
+  EXPECT_TRUE(reply.bytes.ends_with("999998999999"));
+}
+
+TEST_F(Tls, RefusesWhatIsOld) {
+  StartTls();
+  EXPECT_EQ(FetchTls(port(), kAsk, TLS1_2_VERSION).version, "TLSv1.2");
+  EXPECT_FALSE(FetchTls(port(), kAsk, TLS1_1_VERSION).secured);
+  EXPECT_FALSE(FetchTls(port(), kAsk, TLS1_2_VERSION, "AES128-SHA:AES256-GCM-SHA384").secured) << "no forward secrecy";
+  EXPECT_FALSE(FetchTls(port(), kAsk, TLS1_2_VERSION, "ECDHE-ECDSA-AES128-SHA").secured) << "CBC";
+}
+
+TEST_F(Tls, ClosesWhoDoesNotSpeakIt) {
+  ServerOptions options;
+  options.header_timeout = 300ms;
+  StartTls(options);
+  RawClient plain(port());
+  plain.Send(Get("/livez"));
+  const auto reply = plain.Read();
+  EXPECT_TRUE(!reply || reply->status == -1) << "at most an alert";
+  RawClient silent(port());
+  EXPECT_TRUE(silent.Ended());
+}
+
+TEST_F(Tls, StopsBuildsOfClientsThatLeave) {
+  std::atomic<bool> begun{false}, stopped{false};
+  builder_ = [&](const TileRequest&, std::stop_token stop) -> Result<EncodedTile> {
+    begun = true;
+    stopped = Eventually([&] { return stop.stop_requested(); });
+    return MakeError(ErrorCode::kCancelled, "stopped");
+  };
+  StartTls();
+  LeaveTls(port(), "GET /maui/0/0/0.terrain HTTP/1.1\r\nHost: x\r\n\r\n",
+           [&] { Eventually([&] { return begun.load(); }); });
+  EXPECT_TRUE(Eventually([&] { return stopped.load(); }));
+  server_.reset();
+}
+
+TEST_F(Tls, TakesANewCertificateAndKeepsTheOldWhereTheNewIsWrong) {
+  StartTls();
+  ASSERT_EQ(FetchTls(port(), kAsk).subject, "first.example");
+  std::ofstream(certificate_) << "nonsense";
+  std::this_thread::sleep_for(3s);
+  EXPECT_EQ(FetchTls(port(), kAsk).subject, "first.example");
+  WriteCertificate("second.example", certificate_, key_);
+  EXPECT_TRUE(Eventually([&] { return FetchTls(port(), kAsk).subject == "second.example"; }));
+}
+
+TEST_F(Tls, SaysWhichFileIsWrong) {
+  WriteCertificate("other.example", directory_ + "/other.pem", directory_ + "/other.key");
+  ServerOptions options;
+  options.edge.tls_certificate = certificate_;
+  options.edge.tls_key = directory_ + "/other.key";
+  const auto mismatched = Server::Start(std::make_shared<const Catalog>(), options);
+  ASSERT_FALSE(mismatched);
+  EXPECT_NE(mismatched.error().message.find("other.key"), std::string::npos) << mismatched.error().message;
+  options.edge.tls_certificate = key_;
+  const auto swapped = Server::Start(std::make_shared<const Catalog>(), options);
+  ASSERT_FALSE(swapped);
+  EXPECT_NE(swapped.error().message.find("server.key"), std::string::npos) << swapped.error().message;
+}
+
+}  // namespace
+}  // namespace terrace::server
