@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "config/disk_cache_option.h"
 #include "config/edge_options.h"
 #include "config/layer_options.h"
 #include "config/nearest_name.h"
@@ -110,6 +111,8 @@ const std::vector<Option<Config>>& ServerOptionTable() {
       {"refinement_cache_bytes", "BYTES",
        "Memory for what tiles are made from: other errors of a tile cost a fraction then; 0 is no cache",
        Bytes(&Config::refinement_cache_bytes, kMaxCacheBytes)},
+      {"disk_cache", "DIR", "Keep finished tiles and refinements in this directory, across restarts",
+       DiskCacheOption()},
       {"gdal_cache_bytes", "BYTES", "Memory for blocks of the sources, as they are read",
        Bytes(&Config::gdal_cache_bytes, kMaxCacheBytes)},
       {"max_connections", "N", "Connections at a time; above it idle ones are closed and new ones turned away",
@@ -253,6 +256,7 @@ Json WriteObject(const Target& source, const std::vector<Option<Target>>& table)
 template void ReadObject(const Json&, const Place&, const std::vector<Option<Config>>&, Config&);
 template void ReadObject(const Json&, const Place&, const std::vector<Option<DatasetConfig>>&, DatasetConfig&);
 template void ReadObject(const Json&, const Place&, const std::vector<Option<ImageryConfig>>&, ImageryConfig&);
+template void ReadObject(const Json&, const Place&, const std::vector<Option<DiskCacheConfig>>&, DiskCacheConfig&);
 template void ReadObject(const Json&, const Place&, const std::vector<Option<SourceConfig>>&, SourceConfig&);
 template void ReadObject(const Json&, const Place&, const std::vector<Option<TokenConfig>>&, TokenConfig&);
 template Json WriteObject(const Config&, const std::vector<Option<Config>>&);
@@ -260,5 +264,6 @@ template Json WriteObject(const DatasetConfig&, const std::vector<Option<Dataset
 template Json WriteObject(const ImageryConfig&, const std::vector<Option<ImageryConfig>>&);
 template Json WriteObject(const SourceConfig&, const std::vector<Option<SourceConfig>>&);
 template Json WriteObject(const TokenConfig&, const std::vector<Option<TokenConfig>>&);
+template Json WriteObject(const DiskCacheConfig&, const std::vector<Option<DiskCacheConfig>>&);
 
 }  // namespace terrace::config

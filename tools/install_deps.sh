@@ -12,7 +12,7 @@ build_packages=(
   g++ cmake ninja-build make git pkg-config ccache ca-certificates gzip python3
   libgdal-dev libproj-dev gdal-bin nlohmann-json3-dev libspdlog-dev libfmt-dev libexpected-dev libcli11-dev prometheus-cpp-dev
   libssl-dev libdeflate-dev libbrotli-dev libzstd-dev libxxhash-dev libhwy-dev libdraco-dev libmeshoptimizer-dev
-  libjpeg62-turbo-dev libwebp-dev libsystemd-dev
+  libjpeg62-turbo-dev libwebp-dev librocksdb-dev libsystemd-dev
 )
 test_packages=(
   libgtest-dev libgmock-dev libbenchmark-dev zlib1g-dev libpng-dev chromium python3-jsonschema strace wrk proj-bin

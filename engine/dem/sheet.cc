@@ -228,11 +228,16 @@ Result<void> Sheet::FillAt(std::span<const Position> positions, std::span<const 
   if (trace != nullptr) window = Grown(window, kRim, Columns(factor), Rows(factor));
   const auto samples = ReadFilled(factor, window, stop, trace);
   if (!samples) return tl::unexpected(samples.error());
+  if (trace != nullptr && !weights.empty() && factor == 1) {
+    trace->samples = *samples;
+    trace->includes_filled = true;
+  }
   std::vector<float> counts;
   if (!weights.empty() && options_.feather_m > 0) {
     auto read = ReadWeights(factor, window, stop);
     if (!read) return tl::unexpected(read.error());
     counts = *std::move(read);
+    if (trace != nullptr && trace->includes_filled) trace->weights = counts;
   }
   for (std::size_t i = 0; i < found.cells.size(); ++i) {
     const std::size_t node = found.nodes[i];

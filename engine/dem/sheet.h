@@ -38,7 +38,10 @@ struct SheetTrace {
   std::vector<double> undulations;         // by node, part of the heights; empty where they count as the samples do
   std::vector<GridCell> cells;
   GridWindow window;
-  std::vector<float> samples;  // of the window, averages by the factor, before voids were filled
+  // Of the window, averages by the factor, before voids were filled; after that where `includes_filled`.
+  std::vector<float> samples;
+  bool includes_filled = false;  // where sheets are blended at the full resolution what is filled in has its share
+  std::vector<float> weights;    // then, of the samples; empty: all count in full
   int factor = 1;
 };
 

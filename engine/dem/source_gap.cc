@@ -204,11 +204,33 @@ class SheetGap {
     if (!tile_.blends_) return false;
     const PixelBounds at = BoundsOf(box);
     const double factor = trace_.factor;
-    return !(at.west <= at.east) ||
-           sheet_.GivesWay({at.west * factor, at.north * factor, (at.east + 1) * factor, (at.south + 1) * factor},
+    if (!(at.west <= at.east)) return true;
+    if (trace_.includes_filled && CountInFull(at)) return false;
+    return sheet_.GivesWay({at.west * factor, at.north * factor, (at.east + 1) * factor, (at.south + 1) * factor},
                            trace_.factor);
   }
-  bool MayHaveVoids(const CellBox& box) const {
+  // All samples around a box. Weights are rounded to 2^-10.
+  bool CountInFull(const PixelBounds& at) const {
+    if (trace_.weights.empty()) return true;
+    const GridWindow& window = trace_.window;
+    const auto west = static_cast<std::int64_t>(std::floor(at.west)) - 1;
+    const auto east = static_cast<std::int64_t>(std::floor(at.east)) + 2;
+    const auto north = static_cast<std::int64_t>(std::floor(at.north)) - 1;
+    const auto south = static_cast<std::int64_t>(std::floor(at.south)) + 2;
+    if (west < window.column || east >= window.column + window.columns || north < window.row ||
+        south >= window.row + window.rows) {
+      return false;
+    }
+    for (std::int64_t row = north; row <= south; ++row) {
+      const auto first = trace_.weights.begin() + (row - window.row) * window.columns + (west - window.column);
+      if (std::any_of(first, first + (east - west + 1), [](float weight) { return weight < 1; })) return false;
+    }
+    return true;
+  }
+
+  // Whether something may be filled in there that the trace does not have.
+  bool MayBeFilled(const CellBox& box) const {
+    if (trace_.includes_filled) return false;
     const PixelBounds at = BoundsOf(box);
     const double factor = trace_.factor;
     return !(at.west <= at.east) || sheet_
@@ -219,8 +241,8 @@ class SheetGap {
 
   void AddGroup(const CellBox& box) {
     if (!Touches(box)) return;
-    const bool gives_way = GivesWay(box), has_voids = gives_way && MayHaveVoids(box);
-    if (const double gap = has_voids ? kUnknown : SmoothGap(box); std::isfinite(gap)) {
+    const bool gives_way = GivesWay(box), is_filled = gives_way && MayBeFilled(box);
+    if (const double gap = is_filled ? kUnknown : SmoothGap(box); std::isfinite(gap)) {
       Raise(gap);
       if (gives_way) return;
       for (int j = box.south; j < box.north; ++j) {
@@ -231,26 +253,27 @@ class SheetGap {
     }
     for (int j = box.south; j < box.north; ++j) {
       for (int i = box.west; i < box.east; ++i) {
-        if (tile_.covered_[CellIndex(i, j)] == 0) AddCell(i, j, gives_way);
+        if (tile_.covered_[CellIndex(i, j)] == 0) AddCell(i, j, gives_way && GivesWay({i, j, i + 1, j + 1}));
       }
     }
   }
 
   void AddCell(int i, int j, bool gives_way) {
     const std::size_t n = NodeOf(i, j);
+    const bool fills = gives_way && !trace_.includes_filled;
     const TileCell cell{i, j, {n, n + 1, n + stride_, n + stride_ + 1}};
     if (std::ranges::any_of(cell.nodes, [&](std::size_t node) { return trace_.cell_of_node[node] < 0; })) {
-      if (Touches(cell.box())) Raise(RangeGap(cell, gives_way));
+      if (Touches(cell.box())) Raise(RangeGap(cell, fills));
       return;
     }
     bool has_voids = false;
     double gap = SampleGap(cell, has_voids);
-    if (gives_way && (has_voids || MayHaveVoids(cell.box()))) return Raise(RangeGap(cell, true));
+    if (fills && (has_voids || MayBeFilled(cell.box()))) return Raise(RangeGap(cell, true));
     if (!has_voids) {
       if (!gives_way) tile_.covered_[CellIndex(i, j)] = 1;
       if (const double smooth = SmoothGap(cell.box()); smooth < gap) gap = smooth;
     }
-    Raise(std::isfinite(gap) ? gap : RangeGap(cell, gives_way));
+    Raise(std::isfinite(gap) ? gap : RangeGap(cell, fills));
   }
 
   void Raise(double gap) { tile_.bound_ = std::max(tile_.bound_, gap); }

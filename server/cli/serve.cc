@@ -28,6 +28,7 @@
 #include "server/cli/service_manager.h"
 #include "server/reload/reloader.h"
 #include "server/server.h"
+#include "server/tiles/disk_cache.h"
 #include "server/tiles/pipeline_catalog.h"
 #include "server/tiles/tile_pipeline.h"
 
@@ -235,6 +236,16 @@ server::ServerOptions OptionsOf(const config::Config& config) {
   return options;
 }
 
+// Null where there is to be none.
+Result<std::shared_ptr<server::DiskCache>> OpenDiskCache(const config::DiskCacheConfig& config) {
+  if (config.directory.empty()) return nullptr;
+  server::DiskCacheOptions options;
+  options.directory = config.directory;
+  options.tile_bytes = config.tile_bytes;
+  options.refinement_bytes = config.refinement_bytes;
+  return server::DiskCache::Open(options);
+}
+
 int Serve(const ServeArguments& arguments) {
   std::vector<config::ConfigError> errors;
   const config::Config config = MakeConfig(arguments, errors);
@@ -244,6 +255,12 @@ int Serve(const ServeArguments& arguments) {
     return kExitOk;
   }
   SetUpLog(config.log_level, config.log_format);
+  // First, so that a directory that cannot be used is known before sources are scanned.
+  Result<std::shared_ptr<server::DiskCache>> disk = OpenDiskCache(config.disk_cache);
+  if (!disk) {
+    std::fprintf(stderr, "terrace: %s\n", disk.error().message.c_str());
+    return kExitFailure;
+  }
   dem::SetGdalCache(config.gdal_cache_bytes);
   if (const auto policy = dem::SetSourcePolicy({config.data_roots, config.allowed_prefixes, config.allowed_drivers});
       !policy) {
@@ -254,7 +271,7 @@ int Serve(const ServeArguments& arguments) {
   if (!OpenDatasets(config, datasets)) return kExitFailure;
   const std::size_t count = datasets.size();
 
-  const auto refinements = std::make_shared<server::RefinementCache>(config.refinement_cache_bytes);
+  const auto refinements = std::make_shared<server::RefinementCache>(config.refinement_cache_bytes, *disk);
   const auto catalog_of = [refinements](const std::vector<server::Dataset>& served, const config::Config& now) {
     return server::MakeCatalog(std::make_shared<const server::TilePipeline>(served, refinements), now.max_mesh_samples);
   };
@@ -288,6 +305,7 @@ int Serve(const ServeArguments& arguments) {
   server::Reloader reloader(config, datasets, std::move(hooks));
 
   server::ServerOptions options = OptionsOf(config);
+  options.disk_cache = *std::move(disk);
   options.refinement_stats = [refinements] { return refinements->stats(); };
   options.on_source_changed = config.watch ? std::function<void()>([&reloader] { reloader.Look(); }) : nullptr;
   // Without a file the end of a terminal is what it always was.

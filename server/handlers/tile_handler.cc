@@ -20,6 +20,8 @@ std::string_view Name(CacheStatus cache) {
   switch (cache) {
     case CacheStatus::kHit:
       return "hit";
+    case CacheStatus::kDisk:
+      return "disk";
     case CacheStatus::kMiss:
       return "miss";
     case CacheStatus::kJoined:

@@ -29,6 +29,7 @@ struct EncodedTile {
   std::uint32_t triangles = 0;
   StageTimes times;  // of the build that made it
   RefinementUse refinement = RefinementUse::kMade;
+  bool from_disk = false;  // read from the disk tier, not built
 };
 
 inline std::size_t BytesOf(const EncodedTile& tile) { return tile.bytes.size(); }

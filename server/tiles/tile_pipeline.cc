@@ -65,7 +65,7 @@ Result<RefinedTilePtr> TilePipeline::Refine(const Dataset& dataset, const geo::T
   encoded.times.refine = Since(start);
   // One that ended at the format's number of vertices holds no mesh to this error. Another build may have gone further
   // meanwhile.
-  const RefinedTilePtr other = refinements_->Find(cache_key);
+  const RefinedTilePtr other = refinements_->FindInMemory(cache_key);
   if (refined->refinement.vertex_count() <= proto::kMaxTileVertices && !(other && other->error_m <= error_m)) {
     refinements_->Insert(cache_key, refined);
   }

@@ -93,7 +93,7 @@ TEST(Negotiate, GivesNoExtensionThatTheTileHasNot) {
   datasets[1].metadata_levels = 2;
   for (DatasetView& dataset : datasets) dataset.available = {{{0, 0, 1, 0}}, {{0, 0, 3, 1}}, {{0, 0, 7, 3}}};
   Request request;
-  request.accept = "a/b;extensions=octvertexnormals-watermask-metadata";
+  request.fields.Set(&RequestFields::accept, "a/b;extensions=octvertexnormals-watermask-metadata");
   const auto extensions = [&](const char* target) {
     const TileRequest tile = *Negotiate(*Match(target), request, datasets);
     return proto::TileExtensions{tile.normals, tile.water_mask, tile.metadata};
@@ -102,7 +102,7 @@ TEST(Negotiate, GivesNoExtensionThatTheTileHasNot) {
   EXPECT_EQ(extensions("/wet/0/0/0.terrain"), (proto::TileExtensions{true, true, true}));
   EXPECT_EQ(extensions("/wet/1/0/0.terrain"), (proto::TileExtensions{true, true, false})) << "between two levels";
   EXPECT_EQ(extensions("/wet/2/0/0.terrain"), (proto::TileExtensions{true, true, false})) << "nothing is below";
-  request.accept.clear();
+  request.fields.Set(&RequestFields::accept, "");
   EXPECT_EQ(extensions("/wet/0/0/0.terrain"), proto::TileExtensions{});
 }
 
@@ -160,7 +160,7 @@ TEST(Negotiate, HeightTilesAreThoseThatMeetTheBounds) {
   datasets[0].max_mercator_depth = 5;
   const auto find = [&](const char* target) {
     Request request;
-    request.accept_encoding = "gzip";
+    request.fields.Set(&RequestFields::accept_encoding, "gzip");
     return Negotiate(*Match(target), request, datasets);
   };
   for (const char* there : {"/maui/0/0/0.png", "/maui/1/0/0.png", "/maui/1/1/0.png", "/maui/5/31/14.png",
@@ -186,8 +186,8 @@ TEST(Negotiate, MakesACanonicalRequest) {
   datasets[1].name = "maui";
   datasets[1].available = {{{0, 0, 1, 0}}, {{0, 0, 1, 1}}};
   Request request;
-  request.accept_encoding = "gzip";
-  request.accept = "a/b;extensions=octvertexnormals";
+  request.fields.Set(&RequestFields::accept_encoding, "gzip");
+  request.fields.Set(&RequestFields::accept, "a/b;extensions=octvertexnormals");
   const auto negotiate = [&](const char* target) { return Negotiate(*Match(target), request, datasets); };
 
   const Result<TileRequest> tile = negotiate("/maui/1/1/0.terrain?v=3&error=100");
@@ -212,8 +212,8 @@ TEST(Negotiate, GlbTilesAreCanonicalToo) {
   view.glb_compression = proto::GlbCompression::kMeshopt;
   const std::vector<DatasetView> datasets = {view};
   Request request;
-  request.accept_encoding = "gzip";
-  request.accept = "a/b;extensions=octvertexnormals";
+  request.fields.Set(&RequestFields::accept_encoding, "gzip");
+  request.fields.Set(&RequestFields::accept, "a/b;extensions=octvertexnormals");
   const auto negotiate = [&](const char* target) { return Negotiate(*Match(target), request, datasets); };
 
   const Result<TileRequest> tile = negotiate("/maui/0/1/0.glb?extensions=octvertexnormals-metadata");
