@@ -1,5 +1,6 @@
 #include "server/tiles/tile_record.h"
 
+#include <bit>
 #include <utility>
 
 #include "engine/core/bytes.h"
@@ -65,6 +66,8 @@ std::string SerializeTile(const EncodedTile& tile) {
   ByteWriter writer;
   writer.Reserve(tile.bytes.size() + tile.etag.size() + 32);
   writer.Put(tile.max_error_m);
+  writer.Put<std::uint8_t>(tile.certified_error_m ? 1 : 0);
+  writer.Put(tile.certified_error_m.value_or(0));
   writer.Put(tile.vertices);
   writer.Put(tile.triangles);
   PutText(writer, tile.etag);
@@ -76,6 +79,12 @@ Result<EncodedTile> ParseTile(std::string_view bytes) {
   ByteReader reader(bytes);
   EncodedTile tile;
   tile.max_error_m = reader.Get<double>();
+  const auto is_certified = reader.Get<std::uint8_t>();
+  const auto certified_error_m = reader.Get<double>();
+  // One tile has one record.
+  if (is_certified > 1 || (is_certified == 0 && std::bit_cast<std::uint64_t>(certified_error_m) != 0))
+    return NotARecord();
+  if (is_certified == 1) tile.certified_error_m = certified_error_m;
   tile.vertices = reader.Get<std::uint32_t>();
   tile.triangles = reader.Get<std::uint32_t>();
   tile.etag = GetText(reader);
@@ -92,6 +101,7 @@ std::string SerializeRefinedTile(const RefinedTile& tile) {
   writer.Put(static_cast<std::int32_t>(heights.lattice.level));
   writer.Put(static_cast<std::int32_t>(heights.lattice.cells));
   writer.Put(static_cast<std::int32_t>(heights.stride));
+  writer.Put(heights.source_gap_m);
   PutText(writer, {reinterpret_cast<const char*>(heights.heights.data()), heights.heights.size() * sizeof(float)});
   PutText(writer, tile.refinement.Serialize());
   return writer.Take();
@@ -104,6 +114,7 @@ Result<RefinedTile> ParseRefinedTile(std::string_view bytes) {
   heights.lattice.level = reader.Get<std::int32_t>();
   heights.lattice.cells = reader.Get<std::int32_t>();
   heights.stride = reader.Get<std::int32_t>();
+  heights.source_gap_m = reader.Get<double>();
   const std::string_view raw = GetText(reader);
   const std::string_view record = GetText(reader);
   if (!reader.ok() || reader.remaining() > 0) return NotARecord();

@@ -16,6 +16,7 @@ EncodedTile Tile() {
   tile.bytes = std::string("a\0b", 3) + std::string(100, 'x');
   tile.etag = "\"0123\"";
   tile.max_error_m = 3.25;
+  tile.certified_error_m = 9.5;
   tile.vertices = 7;
   tile.triangles = 9;
   return tile;
@@ -26,6 +27,7 @@ RefinedTile Refined() {
   dem::TileHeights heights;
   heights.lattice = {5, kCells};
   heights.stride = kCells + 3;
+  heights.source_gap_m = 1.5;
   for (int i = 0; i < (kCells + 3) * (kCells + 3); ++i) heights.heights.push_back(static_cast<float>(i * i % 37));
   std::vector<float> inside;
   for (int j = 0; j <= kCells; ++j) {
@@ -49,6 +51,7 @@ TEST(TileRecord, KeepsTiles) {
   EXPECT_EQ(again->bytes, tile.bytes);
   EXPECT_EQ(again->etag, tile.etag);
   EXPECT_EQ(again->max_error_m, tile.max_error_m);
+  EXPECT_EQ(again->certified_error_m, tile.certified_error_m);
   EXPECT_EQ(again->vertices, tile.vertices);
   EXPECT_EQ(again->triangles, tile.triangles);
 }
@@ -62,6 +65,7 @@ TEST(TileRecord, KeepsRefinements) {
   EXPECT_EQ(again->heights.lattice.level, 5);
   EXPECT_EQ(again->heights.lattice.cells, tile.heights.lattice.cells);
   EXPECT_EQ(again->heights.stride, tile.heights.stride);
+  EXPECT_EQ(again->heights.source_gap_m, tile.heights.source_gap_m);
   EXPECT_EQ(again->heights.heights, tile.heights.heights);
   EXPECT_EQ(again->refinement, tile.refinement);
 }
