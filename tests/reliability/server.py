@@ -24,8 +24,9 @@ class Server:
         self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, preexec_fn=limit, text=True)
         line = self.process.stdout.readline()
         self.port = int(re.search(r":(\d+)/", line)[1])
-        children = pathlib.Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children").read_text().split()
-        self.pid = int(children[0]) if prefix else self.process.pid
+        self.pid = self.process.pid
+        while prefix and (children := pathlib.Path(f"/proc/{self.pid}/task/{self.pid}/children").read_text().split()):
+            self.pid = int(children[0])  # what the prefix starts may start another
 
     def __enter__(self):
         return self
