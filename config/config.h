@@ -147,7 +147,8 @@ struct Config {
   std::size_t cache_bytes = std::size_t{256} << 20;             // 0: no cache
   std::size_t refinement_cache_bytes = std::size_t{128} << 20;  // 0: no cache
   DiskCacheConfig disk_cache;
-  std::size_t gdal_cache_bytes = std::size_t{256} << 20;        // blocks of sources
+  std::string cache_dir = {};                             // what is learnt of sources is kept there; empty: nowhere
+  std::size_t gdal_cache_bytes = std::size_t{256} << 20;  // blocks of sources
   std::size_t max_connections = 1024;
   std::size_t max_connections_per_client = 0;          // 0: as many as there may be in all
   std::size_t transfer_bytes = std::size_t{32} << 20;  // of bodies on their way

@@ -48,6 +48,15 @@ Codec<Config> Viewer() {
       SwitchToJson};
 }
 
+Codec<Config> CacheDir() {
+  return {[](const Json& value, const Place& place, Config& config) {
+            if (!value.is_string()) return place.Expected("the path of a folder", value);
+            const auto& path = value.get_ref<const std::string&>();
+            config.cache_dir = path.empty() ? path : (place.directory() / path).string();
+          },
+          [](const Config& config) { return Json(config.cache_dir); }, TextToJson};
+}
+
 Codec<Config> AccessLogFile() {
   return {[](const Json& value, const Place& place, Config& config) {
             if (!value.is_string() || value.get_ref<const std::string&>().empty()) {
@@ -93,6 +102,8 @@ const std::vector<Option<Config>>& ServerOptionTable() {
       {"io_threads", "N", "Threads that talk to clients", Integer(&Config::io_threads, 1, 64)},
       {"worker_threads", "N", "Threads that build tiles; 0 is one per processor",
        Integer(&Config::worker_threads, 0, 1024)},
+      {"cache_dir", "DIR", "Folder for what is learnt of sources once: a second start needs no scan; empty is none",
+       CacheDir()},
       {"queue_length", "N", "Builds that may wait for a worker; more get 503 with Retry-After",
        Integer(&Config::queue_length, 1, 1'000'000)},
       {"cache_bytes", "BYTES", "Memory for finished tiles, such as 512MB or 1GiB; 0 is no cache",

@@ -132,9 +132,9 @@ proto::GlbOptions GlbOptionsOf(const config::DatasetConfig& dataset) {
   return options;
 }
 
-Result<server::Dataset> OpenDataset(const config::DatasetConfig& wanted, const std::function<void(double)>& progress,
-                                    std::stop_token stop) {
-  auto source = OpenSource(wanted, progress, std::move(stop));
+Result<server::Dataset> OpenDataset(const config::DatasetConfig& wanted, const std::string& cache_dir,
+                                    const std::function<void(double)>& progress, std::stop_token stop) {
+  auto source = OpenSource(wanted, cache_dir, progress, std::move(stop));
   if (!source) return tl::unexpected(source.error());
   server::Dataset dataset;
   dataset.name = wanted.name;
@@ -152,8 +152,9 @@ Result<server::Dataset> OpenDataset(const config::DatasetConfig& wanted, const s
 bool OpenDatasets(const config::Config& config, std::vector<server::Dataset>& datasets) {
   bool all_open = true;
   for (const config::DatasetConfig& wanted : config.datasets) {
-    Progress progress("reading " + NameOf(wanted.sources), FileCount(wanted.sources));
-    Result<server::Dataset> dataset = OpenDataset(wanted, progress.Callback(), {});
+    Progress progress((config.cache_dir.empty() ? "reading " : "preparing ") + NameOf(wanted.sources),
+                      FileCount(wanted.sources));
+    Result<server::Dataset> dataset = OpenDataset(wanted, config.cache_dir, progress.Callback(), {});
     if (!dataset) {
       std::fprintf(stderr, "terrace: dataset %s: %s\n", wanted.name.c_str(), dataset.error().message.c_str());
       all_open = false;
@@ -283,8 +284,8 @@ int Serve(const ServeArguments& arguments) {
     if (!wrong.empty()) return tl::unexpected(std::move(wrong));
     return loaded;
   };
-  hooks.open = [](const config::DatasetConfig& wanted, std::stop_token stop) {
-    return OpenDataset(wanted, {}, std::move(stop));
+  hooks.open = [cache_dir = config.cache_dir](const config::DatasetConfig& wanted, std::stop_token stop) {
+    return OpenDataset(wanted, cache_dir, {}, std::move(stop));
   };
   hooks.publish = [&](const std::vector<server::Dataset>& served, const config::Config& now) {
     if (level->exchange(now.log_level) != now.log_level) SetLogLevel(now.log_level);

@@ -65,6 +65,8 @@ std::string SerializeTile(const EncodedTile& tile) {
   ByteWriter writer;
   writer.Reserve(tile.bytes.size() + tile.etag.size() + 32);
   writer.Put(tile.max_error_m);
+  writer.Put(static_cast<std::uint8_t>(tile.certified_error_m.has_value()));
+  writer.Put(tile.certified_error_m.value_or(0));
   writer.Put(tile.vertices);
   writer.Put(tile.triangles);
   PutText(writer, tile.etag);
@@ -76,6 +78,9 @@ Result<EncodedTile> ParseTile(std::string_view bytes) {
   ByteReader reader(bytes);
   EncodedTile tile;
   tile.max_error_m = reader.Get<double>();
+  const bool is_certified = reader.Get<std::uint8_t>() != 0;
+  const auto certified_error_m = reader.Get<double>();
+  if (is_certified) tile.certified_error_m = certified_error_m;
   tile.vertices = reader.Get<std::uint32_t>();
   tile.triangles = reader.Get<std::uint32_t>();
   tile.etag = GetText(reader);
@@ -92,6 +97,7 @@ std::string SerializeRefinedTile(const RefinedTile& tile) {
   writer.Put(static_cast<std::int32_t>(heights.lattice.level));
   writer.Put(static_cast<std::int32_t>(heights.lattice.cells));
   writer.Put(static_cast<std::int32_t>(heights.stride));
+  writer.Put(heights.source_gap_m);
   PutText(writer, {reinterpret_cast<const char*>(heights.heights.data()), heights.heights.size() * sizeof(float)});
   PutText(writer, tile.refinement.Serialize());
   return writer.Take();
@@ -104,6 +110,7 @@ Result<RefinedTile> ParseRefinedTile(std::string_view bytes) {
   heights.lattice.level = reader.Get<std::int32_t>();
   heights.lattice.cells = reader.Get<std::int32_t>();
   heights.stride = reader.Get<std::int32_t>();
+  heights.source_gap_m = reader.Get<double>();
   const std::string_view raw = GetText(reader);
   const std::string_view record = GetText(reader);
   if (!reader.ok() || reader.remaining() > 0) return NotARecord();

@@ -26,6 +26,7 @@ RefinedTile Refined() {
   dem::TileHeights heights;
   heights.lattice = {5, kCells};
   heights.stride = kCells + 3;
+  heights.source_gap_m = 1.5;
   for (int i = 0; i < (kCells + 3) * (kCells + 3); ++i) heights.heights.push_back(static_cast<float>(i * i % 37));
   std::vector<float> inside;
   for (int j = 0; j <= kCells; ++j) {
@@ -43,14 +44,18 @@ RefinedTile Refined() {
 }
 
 TEST(TileRecord, KeepsTiles) {
-  const EncodedTile tile = Tile();
-  const auto again = ParseTile(SerializeTile(tile));
-  ASSERT_TRUE(again);
-  EXPECT_EQ(again->bytes, tile.bytes);
-  EXPECT_EQ(again->etag, tile.etag);
-  EXPECT_EQ(again->max_error_m, tile.max_error_m);
-  EXPECT_EQ(again->vertices, tile.vertices);
-  EXPECT_EQ(again->triangles, tile.triangles);
+  EncodedTile tile = Tile();
+  for (const std::optional<double> certified : {std::optional<double>(), std::optional(7.25)}) {
+    tile.certified_error_m = certified;
+    const auto again = ParseTile(SerializeTile(tile));
+    ASSERT_TRUE(again);
+    EXPECT_EQ(again->bytes, tile.bytes);
+    EXPECT_EQ(again->etag, tile.etag);
+    EXPECT_EQ(again->max_error_m, tile.max_error_m);
+    EXPECT_EQ(again->certified_error_m, tile.certified_error_m);
+    EXPECT_EQ(again->vertices, tile.vertices);
+    EXPECT_EQ(again->triangles, tile.triangles);
+  }
 }
 
 TEST(TileRecord, KeepsRefinements) {
@@ -63,6 +68,7 @@ TEST(TileRecord, KeepsRefinements) {
   EXPECT_EQ(again->heights.lattice.cells, tile.heights.lattice.cells);
   EXPECT_EQ(again->heights.stride, tile.heights.stride);
   EXPECT_EQ(again->heights.heights, tile.heights.heights);
+  EXPECT_EQ(again->heights.source_gap_m, tile.heights.source_gap_m);
   EXPECT_EQ(again->refinement, tile.refinement);
 }
 
