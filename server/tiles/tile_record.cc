@@ -65,7 +65,7 @@ std::string SerializeTile(const EncodedTile& tile) {
   ByteWriter writer;
   writer.Reserve(tile.bytes.size() + tile.etag.size() + 32);
   writer.Put(tile.max_error_m);
-  writer.Put<std::uint8_t>(tile.certified_error_m ? 1 : 0);
+  writer.Put(static_cast<std::uint8_t>(tile.certified_error_m.has_value()));
   writer.Put(tile.certified_error_m.value_or(0));
   writer.Put(tile.vertices);
   writer.Put(tile.triangles);
