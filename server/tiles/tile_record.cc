@@ -1,5 +1,6 @@
 #include "server/tiles/tile_record.h"
 
+#include <bit>
 #include <utility>
 
 #include "engine/core/bytes.h"
@@ -65,7 +66,7 @@ std::string SerializeTile(const EncodedTile& tile) {
   ByteWriter writer;
   writer.Reserve(tile.bytes.size() + tile.etag.size() + 32);
   writer.Put(tile.max_error_m);
-  writer.Put(static_cast<std::uint8_t>(tile.certified_error_m.has_value()));
+  writer.Put<std::uint8_t>(tile.certified_error_m ? 1 : 0);
   writer.Put(tile.certified_error_m.value_or(0));
   writer.Put(tile.vertices);
   writer.Put(tile.triangles);
@@ -78,9 +79,12 @@ Result<EncodedTile> ParseTile(std::string_view bytes) {
   ByteReader reader(bytes);
   EncodedTile tile;
   tile.max_error_m = reader.Get<double>();
-  const bool is_certified = reader.Get<std::uint8_t>() != 0;
+  const auto is_certified = reader.Get<std::uint8_t>();
   const auto certified_error_m = reader.Get<double>();
-  if (is_certified) tile.certified_error_m = certified_error_m;
+  // One tile has one record.
+  if (is_certified > 1 || (is_certified == 0 && std::bit_cast<std::uint64_t>(certified_error_m) != 0))
+    return NotARecord();
+  if (is_certified == 1) tile.certified_error_m = certified_error_m;
   tile.vertices = reader.Get<std::uint32_t>();
   tile.triangles = reader.Get<std::uint32_t>();
   tile.etag = GetText(reader);

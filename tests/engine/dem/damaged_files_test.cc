@@ -107,6 +107,7 @@ TEST(DamagedFiles, CrashHangAndSwellNothing) {
     opened_badly += !fine;
     ASSERT_LT(opened_badly, 5) << "enough seen";
   }
+  RecordProperty("files", kFiles);
 }
 
 TEST(DamagedFiles, BlocksCountWithTheBandsTheyAreStoredWith) {
