@@ -17,6 +17,16 @@ std::int64_t Count(const std::vector<geo::TileRange>& ranges) {
                          });
 }
 
+// The tiles `k` levels below `top` that are in `range`, numbered from top's south-western corner; may be empty.
+geo::TileRange PartUnder(const geo::TileRange& range, const geo::TileKey& top, int k) {
+  const std::int64_t last = (std::int64_t{1} << k) - 1;
+  const geo::TileKey corner = TileUnder(top, k, 0, 0);
+  return {std::max<std::int64_t>(range.start_x - corner.x, 0), std::max<std::int64_t>(range.start_y - corner.y, 0),
+          std::min(range.end_x - corner.x, last), std::min(range.end_y - corner.y, last)};
+}
+
+bool IsEmpty(const geo::TileRange& range) { return range.start_x > range.end_x || range.start_y > range.end_y; }
+
 }  // namespace
 
 std::vector<geo::TileKey> ImplicitRoots(Availability available) {
@@ -34,6 +44,22 @@ std::vector<geo::TileKey> ImplicitRoots(Availability available) {
   return roots;
 }
 
+int LevelsUnder(Availability available, const geo::TileKey& root) {
+  for (int level = static_cast<int>(available.size()) - 1; level >= root.level; --level) {
+    const int k = level - root.level;
+    const auto& ranges = available[static_cast<std::size_t>(level)];
+    const auto is_under = [&](const geo::TileRange& range) { return !IsEmpty(PartUnder(range, root, k)); };
+    if (std::ranges::any_of(ranges, is_under)) return k + 1;
+  }
+  TERRACE_CHECK(false);
+  return 0;
+}
+
+int SubtreeLevels(int levels) {
+  const int stacked = (levels + kTallestSubtree - 1) / kTallestSubtree;
+  return (levels + stacked - 1) / stacked;
+}
+
 std::string RootName(const geo::TileKey& root) { return fmt::format("{}-{}-{}", root.level, root.x, root.y); }
 
 std::vector<std::vector<geo::TileRange>> BlocksBelow(Availability available, const geo::TileKey& top, int depth) {
@@ -41,13 +67,9 @@ std::vector<std::vector<geo::TileRange>> BlocksBelow(Availability available, con
   for (std::size_t k = 0; k < blocks.size(); ++k) {
     const std::size_t level = static_cast<std::size_t>(top.level) + k;
     if (level >= available.size()) break;
-    const std::int64_t last = (std::int64_t{1} << k) - 1;
-    const geo::TileKey corner = TileUnder(top, static_cast<int>(k), 0, 0);
     for (const geo::TileRange& range : available[level]) {
-      const geo::TileRange here{std::max<std::int64_t>(range.start_x - corner.x, 0),
-                                std::max<std::int64_t>(range.start_y - corner.y, 0),
-                                std::min(range.end_x - corner.x, last), std::min(range.end_y - corner.y, last)};
-      if (here.start_x <= here.end_x && here.start_y <= here.end_y) blocks[k].push_back(here);
+      const geo::TileRange here = PartUnder(range, top, static_cast<int>(k));
+      if (!IsEmpty(here)) blocks[k].push_back(here);
     }
   }
   return blocks;

@@ -27,6 +27,19 @@ inline constexpr int kShallowestRoots = 2;
 // deepest level, if that comes first; from west to east, then from south to north. Precondition: level 0 is not empty.
 std::vector<geo::TileKey> ImplicitRoots(Availability available);
 
+// Levels from the root down to the deepest available tile under it, the root counted: of a mosaic, trees over its fine
+// sources are deeper than others. Precondition: the root is available.
+int LevelsUnder(Availability available, const geo::TileKey& root);
+
+// More would cost CesiumJS frames: it makes an object for each of the 5,461 tiles of a full subtree as soon as the file
+// is there.
+inline constexpr int kTallestSubtree = 7;
+
+// Levels of each .subtree of a tree of `levels` levels: as few subtrees one above the other as can be, of equal height.
+// A low last one is what must not be: loaders.gl fetches all subtrees of a tree one after the other before it draws,
+// and those that begin at the tree's last level are as many as its tiles.
+int SubtreeLevels(int levels);
+
 // How a root is called in URLs: "9-272-359", level, column and row.
 std::string RootName(const geo::TileKey& root);
 

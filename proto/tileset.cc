@@ -1,5 +1,7 @@
 #include "proto/tileset.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <iterator>
@@ -21,7 +23,7 @@ using Json = nlohmann::ordered_json;
 constexpr double kNothingDrawn = 1e7;
 
 Json Region(const TilesetDescription& tileset, const geo::TileRange& block) {
-  const double tile = std::ldexp(180, -tileset.roots.front().level);
+  const double tile = std::ldexp(180, -tileset.roots.front().tile.level);
   const auto edge = [&](std::int64_t number, double first) {
     return geo::ToRadians(first + static_cast<double>(number) * tile);
   };
@@ -30,7 +32,9 @@ Json Region(const TilesetDescription& tileset, const geo::TileRange& block) {
             edge(block.end_y + 1, -90), tileset.min_height_m, tileset.max_height_m}}};
 }
 
-Json ImplicitRoot(const TilesetDescription& tileset, const geo::TileKey& root) {
+Json ImplicitRoot(const TilesetDescription& tileset, const TreeRoot& tree) {
+  const geo::TileKey& root = tree.tile;
+  const int subtree_levels = SubtreeLevels(tree.levels);
   const std::string tile = "3dtiles/" + RootName(root) + "/{level}/{x}/{y}";
   Json json;
   json["boundingVolume"] = Region(tileset, {root.x, root.y, root.x, root.y});
@@ -39,22 +43,22 @@ Json ImplicitRoot(const TilesetDescription& tileset, const geo::TileKey& root) {
   json["content"]["uri"] = tile + ".glb" + (tileset.content_query.empty() ? "" : "?" + tileset.content_query);
   Json& tiling = json["implicitTiling"];
   tiling["subdivisionScheme"] = "QUADTREE";
-  tiling["availableLevels"] = tileset.levels;
-  tiling["subtreeLevels"] = tileset.subtree_levels;
-  tiling["subtrees"]["uri"] = tile + ".subtree";
+  tiling["availableLevels"] = tree.levels;
+  tiling["subtreeLevels"] = subtree_levels;
+  tiling["subtrees"]["uri"] = fmt::format("{}.{}.subtree", tile, subtree_levels);
   return json;
 }
 
 // Columns counted eastwards from the far side of the widest gap between roots: `end_x` may lie beyond the level's last
 // column, across the antimeridian.
-geo::TileRange BlockOf(const std::vector<geo::TileKey>& roots) {
-  const std::int64_t columns = geo::TileColumns(roots.front().level);
+geo::TileRange BlockOf(const std::vector<TreeRoot>& roots) {
+  const std::int64_t columns = geo::TileColumns(roots.front().tile.level);
   std::set<std::int64_t> used;
-  geo::TileRange block{0, roots.front().y, 0, roots.front().y};
-  for (const geo::TileKey& root : roots) {
-    used.insert(root.x);
-    block.start_y = std::min(block.start_y, root.y);
-    block.end_y = std::max(block.end_y, root.y);
+  geo::TileRange block{0, roots.front().tile.y, 0, roots.front().tile.y};
+  for (const TreeRoot& root : roots) {
+    used.insert(root.tile.x);
+    block.start_y = std::min(block.start_y, root.tile.y);
+    block.end_y = std::max(block.end_y, root.tile.y);
   }
   std::int64_t widest = *used.begin() + columns - *used.rbegin();  // from the last root around to the first
   block.start_x = *used.begin();
@@ -70,7 +74,7 @@ geo::TileRange BlockOf(const std::vector<geo::TileKey>& roots) {
 // About the middle of the block, as far as half its width and half its height along the ground, and its whole range of
 // heights, take one together; but never farther than the other side of the Earth.
 Json Sphere(const TilesetDescription& tileset, const geo::TileRange& block) {
-  const double tile = std::ldexp(180, -tileset.roots.front().level);
+  const double tile = std::ldexp(180, -tileset.roots.front().tile.level);
   const double width = static_cast<double>(block.end_x + 1 - block.start_x) * tile;
   const double south = -90 + static_cast<double>(block.start_y) * tile;
   const double north = -90 + static_cast<double>(block.end_y + 1) * tile;
@@ -87,7 +91,7 @@ Json Sphere(const TilesetDescription& tileset, const geo::TileRange& block) {
 // CesiumJS none that goes beyond 180 degrees, and the box that loaders.gl makes of a region of hemispheres misses most
 // of it.
 Json BoundsOf(const TilesetDescription& tileset) {
-  const int level = tileset.roots.front().level;
+  const int level = tileset.roots.front().tile.level;
   const geo::TileRange block = BlockOf(tileset.roots);
   const bool crosses = block.end_x >= geo::TileColumns(level);
   const bool wide = level <= kShallowestRoots;
@@ -101,7 +105,7 @@ Json Root(const TilesetDescription& tileset) {
   json["geometricError"] = kNothingDrawn;
   json["refine"] = "REPLACE";
   json["children"] = Json::array();
-  for (const geo::TileKey& root : tileset.roots) json["children"].push_back(ImplicitRoot(tileset, root));
+  for (const TreeRoot& root : tileset.roots) json["children"].push_back(ImplicitRoot(tileset, root));
   return json;
 }
 

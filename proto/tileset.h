@@ -9,11 +9,14 @@
 
 namespace terrace::proto {
 
+struct TreeRoot {
+  geo::TileKey tile;
+  int levels = 1;  // of the tree, its root counted (LevelsUnder)
+};
+
 struct TilesetDescription {
   std::string attribution;
-  std::vector<geo::TileKey> roots;  // of one level (ImplicitRoots)
-  int levels = 1;                   // of each tree, its root counted
-  int subtree_levels = 1;           // levels of a .subtree
+  std::vector<TreeRoot> roots;  // tiles of one level (ImplicitRoots)
   // Metres above the ellipsoid that no vertex of any tile leaves, feet of skirts included: clients hand the range of
   // the root down to all its descendants.
   double min_height_m = 0, max_height_m = 0;
@@ -25,7 +28,8 @@ struct TilesetDescription {
 // same tiles (cesium-native turns layer.json into 3D Tiles by the same factor).
 double GeometricError(int level);
 
-// UTF-8 JSON. Templates are relative to the tileset: 3dtiles/{RootName}/{level}/{x}/{y}.glb and .subtree. Several
+// UTF-8 JSON. Templates are relative to the tileset: 3dtiles/{RootName}/{level}/{x}/{y}.glb and
+// .{SubtreeLevels}.subtree, so that a tileset.json kept from a day when the tree had other levels stays good. Several
 // roots become children of a tile without content.
 std::string EncodeTileset(const TilesetDescription& tileset);
 

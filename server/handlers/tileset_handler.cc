@@ -14,16 +14,6 @@
 namespace terrace::server {
 namespace {
 
-// Of a .subtree: 1,365 tiles at most. CesiumJS makes an object for each of them as soon as the file is there, so more
-// would cost frames, and fewer would cost one more round trip on the way down to level 13.
-constexpr int kSubtreeLevels = 6;
-
-int LevelsUnder(const DatasetView& dataset, int root_level) { return dataset.max_level() - root_level + 1; }
-
-int SubtreeLevels(const DatasetView& dataset, int root_level) {
-  return std::min(kSubtreeLevels, LevelsUnder(dataset, root_level));
-}
-
 // What the content templates carry for a request. The values of `compression` and `texture` have been checked.
 std::string ContentQuery(const ErrorWish& wish, std::string_view query) {
   std::string content = TileQuery(wish);
@@ -39,10 +29,10 @@ Document MakeTileset(const DatasetView& dataset, ErrorWish wish, std::string con
   wish.at_least = wish.error_m.has_value();  // as TileQuery writes it into the templates
   proto::TilesetDescription tileset;
   tileset.attribution = dataset.attribution;
-  tileset.roots = proto::ImplicitRoots(dataset.available);
-  const int level = tileset.roots.front().level;
-  tileset.levels = LevelsUnder(dataset, level);
-  tileset.subtree_levels = SubtreeLevels(dataset, level);
+  for (const geo::TileKey& root : proto::ImplicitRoots(dataset.available)) {
+    tileset.roots.push_back({root, proto::LevelsUnder(dataset.available, root)});
+  }
+  const int level = tileset.roots.front().tile.level;
   // The roots have the largest error, and with it the deepest skirts and the coarsest rounding of heights.
   const double error_m =
       geo::LadderError(level, ErrorStep(wish, level, dataset.error_fraction), dataset.error_fraction);
@@ -80,12 +70,11 @@ Response TilesetHandler::HandleSubtree(const Route& route, const Request& reques
       ParseTileParameters(route.query, /*allow_at_least=*/true, /*allow_compression=*/true);
   if (!parameters) return ClientErrorResponse(parameters.error(), request.id);
   const DatasetView& dataset = datasets_[*index];
-  if (!IsAvailable(dataset, route.key) ||
-      (route.key.level - route.root.level) % SubtreeLevels(dataset, route.root.level) != 0) {
+  if (!IsAvailable(dataset, route.key) || (route.key.level - route.root.level) % route.subtree_levels != 0) {
     return ProblemResponse(404, "the dataset has no such subtree; its tileset.json says where they begin", request.id);
   }
   proto::Subtree subtree;
-  subtree.levels = SubtreeLevels(dataset, route.root.level);
+  subtree.levels = route.subtree_levels;
   subtree.tiles = proto::BlocksBelow(dataset.available, route.key, subtree.levels);
   return Serve(Document::Make(proto::EncodeSubtree(subtree), "application/octet-stream"), request, cache_control_);
 }

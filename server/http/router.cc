@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "proto/implicit_tree.h"
 #include "server/http/query.h"
 #include "server/http/text.h"
 #include "server/tiles/dataset_view.h"
@@ -65,14 +66,26 @@ std::optional<geo::TileKey> ParseRoot(std::string_view name) {
                       TileFormat::kGlb);
 }
 
-// A content or a subtree of an implicit tree: 3dtiles/{root}/{level}/{x}/{y}.{glb|subtree}, counted from the root.
+// Cuts ".7.subtree" off the last segment of a subtree's URL, and gives the 7; nothing where it is not there.
+std::optional<int> CutSubtreeLevels(std::string_view& row) {
+  constexpr std::string_view kSuffix = ".subtree";
+  if (!row.ends_with(kSuffix)) return std::nullopt;
+  const std::string_view rest = row.substr(0, row.size() - kSuffix.size());
+  const std::size_t dot = rest.find('.');
+  if (dot == std::string_view::npos) return std::nullopt;
+  const auto levels = TileNumber(rest.substr(dot + 1));
+  if (!levels || *levels < 1 || *levels > proto::kTallestSubtree) return std::nullopt;
+  row = rest.substr(0, dot);
+  return static_cast<int>(*levels);
+}
+
+// A content or a subtree of an implicit tree: 3dtiles/{root}/{level}/{x}/{y}.glb or .{levels}.subtree, counted from the
+// root.
 std::optional<Route> MatchImplicit(const std::vector<std::string>& segments) {
-  constexpr std::string_view kSubtreeSuffix = ".subtree";
   if (segments.size() != 6 || segments[1] != "3dtiles") return std::nullopt;
   std::string_view row = segments[5];
-  const bool is_subtree = row.ends_with(kSubtreeSuffix);
-  if (is_subtree) row.remove_suffix(kSubtreeSuffix.size());
-  if (!is_subtree && CutFormat(row) != TileFormat::kGlb) return std::nullopt;
+  const std::optional<int> subtree_levels = CutSubtreeLevels(row);
+  if (!subtree_levels && CutFormat(row) != TileFormat::kGlb) return std::nullopt;
   const auto root = ParseRoot(segments[2]);
   const auto level = TileNumber(segments[3]), x = TileNumber(segments[4]), y = TileNumber(row);
   if (!root || !level || !x || !y || root->level + *level > geo::kMaxLevel) return std::nullopt;
@@ -81,7 +94,8 @@ std::optional<Route> MatchImplicit(const std::vector<std::string>& segments) {
   Route route;
   route.root = *root;
   route.key = {root->level + static_cast<int>(*level), root->x * side + *x, root->y * side + *y};
-  route.kind = is_subtree ? RouteKind::kSubtree : RouteKind::kTile;
+  route.kind = subtree_levels ? RouteKind::kSubtree : RouteKind::kTile;
+  route.subtree_levels = subtree_levels.value_or(0);
   route.format = TileFormat::kGlb;
   return route;
 }

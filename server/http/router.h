@@ -14,7 +14,7 @@ enum class RouteKind {
   kTile,      // /{dataset}/{z}/{x}/{y}.terrain, .glb, .png; /{dataset}/3dtiles/{root}/{level}/{x}/{y}.glb
   kLayer,     // /{dataset}/layer.json
   kTileset,   // /{dataset}/tileset.json
-  kSubtree,   // /{dataset}/3dtiles/{root}/{level}/{x}/{y}.subtree
+  kSubtree,   // /{dataset}/3dtiles/{root}/{level}/{x}/{y}.{levels}.subtree
   kTileJson,  // /{dataset}/tiles.json
   kHeights,   // /{dataset}/heights
   kMesh,      // /{dataset}/mesh
@@ -33,6 +33,7 @@ struct Route {
   std::string dataset;                             // where the URL begins with one: decoded
   geo::TileKey key;                                // kTile, kSubtree: inside the tiling scheme of its format
   geo::TileKey root;                               // kSubtree: of the tree the URL counts in, an ancestor of `key`
+  int subtree_levels = 0;                          // kSubtree: 1 .. proto::kTallestSubtree
   TileFormat format = TileFormat::kQuantizedMesh;  // kTile: by the extension
   std::string file;   // kViewer: relative to the viewer's folder, decoded: "index.html" for "/"
   std::string query;  // without '?', not decoded

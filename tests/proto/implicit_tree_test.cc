@@ -48,6 +48,31 @@ TEST(ImplicitRoots, AcrossLongitudeZeroAndTheAntimeridianStayDeep) {
   EXPECT_EQ(ImplicitRoots(Above({{0, 300, 3, 303}, {1020, 300, 1023, 303}}, 9)), (Keys{{7, 0, 75}, {7, 255, 75}}));
 }
 
+TEST(LevelsUnder, ReachAsDeepAsTheTreesOwnTiles) {
+  // Four levels of the globe, and nine over one tile of level 2.
+  Levels available = Above({{100, 60, 103, 63}}, 8);
+  available[1] = {{0, 0, 3, 1}};
+  available[2] = {{0, 0, 7, 3}};
+  available[3].push_back({0, 0, 15, 7});
+  EXPECT_EQ(LevelsUnder(available, {2, 1, 0}), 7);
+  EXPECT_EQ(LevelsUnder(available, {2, 0, 0}), 2);
+  EXPECT_EQ(LevelsUnder(available, {8, 100, 60}), 1);
+}
+
+// loaders.gl asks for every subtree of a tree before it draws: 13 levels in subtrees of 6 end in one for each deepest
+// tile, 24,633 of them for an island.
+TEST(SubtreeLevels, AreEqualSoThatTheLastSubtreesAreFew) {
+  for (int levels = 1; levels <= geo::kMaxLevel + 1; ++levels) {
+    const int each = SubtreeLevels(levels), stacked = (levels + each - 1) / each;
+    EXPECT_LE(each, kTallestSubtree) << levels;
+    EXPECT_EQ(stacked, (levels + kTallestSubtree - 1) / kTallestSubtree) << levels << ": no more one above another";
+    EXPECT_GE(levels - (stacked - 1) * each, each - stacked + 1) << levels << ": the last is hardly lower";
+  }
+  EXPECT_EQ(SubtreeLevels(6), 6);
+  EXPECT_EQ(SubtreeLevels(8), 4);
+  EXPECT_EQ(SubtreeLevels(13), 7);
+}
+
 TEST(ImplicitRoots, AreNamedByLevelColumnAndRow) { EXPECT_EQ(RootName({9, 272, 359}), "9-272-359"); }
 
 TEST(TileUnder, CountsFromTheRootsSouthWesternCorner) {

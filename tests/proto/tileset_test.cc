@@ -17,9 +17,7 @@ using Json = nlohmann::json;
 TilesetDescription Maui() {
   TilesetDescription tileset;
   tileset.attribution = "© a <survey> & \"Co\"";
-  tileset.roots = {{7, 16, 78}};
-  tileset.levels = 8;
-  tileset.subtree_levels = 6;
+  tileset.roots = {{{7, 16, 78}, 8}};
   tileset.min_height_m = -1500;
   tileset.max_height_m = 3055.5;
   return tileset;
@@ -33,7 +31,7 @@ TEST(Tileset, OneRootIsTheImplicitRootItself) {
   EXPECT_EQ(root.at("refine"), "REPLACE");
   EXPECT_EQ(root.at("content").at("uri"), "3dtiles/7-16-78/{level}/{x}/{y}.glb");
   EXPECT_EQ(root.at("implicitTiling"), Json::parse(R"({"subdivisionScheme":"QUADTREE","availableLevels":8,
-      "subtreeLevels":6,"subtrees":{"uri":"3dtiles/7-16-78/{level}/{x}/{y}.subtree"}})"));
+      "subtreeLevels":4,"subtrees":{"uri":"3dtiles/7-16-78/{level}/{x}/{y}.4.subtree"}})"));
   for (const char* forbidden : {"children", "metadata", "transform"}) EXPECT_FALSE(root.contains(forbidden));
   EXPECT_FALSE(root.at("content").contains("boundingVolume"));
 }
@@ -52,7 +50,7 @@ TEST(Tileset, RegionIsTheRootTileInRadians) {
 
 TEST(Tileset, SeveralRootsAreChildrenWithoutContentAbove) {
   TilesetDescription tileset = Maui();
-  tileset.roots = {{3, 7, 4}, {3, 8, 4}};
+  tileset.roots = {{{3, 7, 4}, 3}, {{3, 8, 4}, 12}};
   const Json json = Json::parse(EncodeTileset(tileset));
   const Json& root = json.at("root");
   EXPECT_FALSE(root.contains("content") || root.contains("implicitTiling"));
@@ -60,6 +58,8 @@ TEST(Tileset, SeveralRootsAreChildrenWithoutContentAbove) {
   const Json &west = root.at("children")[0].at("boundingVolume").at("region"),
              &east = root.at("children")[1].at("boundingVolume").at("region");
   EXPECT_EQ(west[2], east[0]) << "the same bits: no seam at longitude 0";
+  EXPECT_EQ(root.at("children")[0].at("implicitTiling").at("availableLevels"), 3);
+  EXPECT_EQ(root.at("children")[1].at("implicitTiling").at("availableLevels"), 12);
   EXPECT_EQ(root.at("boundingVolume").at("region")[0], west[0]);
   EXPECT_EQ(root.at("boundingVolume").at("region")[2], east[2]);
 }
@@ -71,7 +71,8 @@ TEST(Tileset, RootsAcrossTheAntimeridianLieInASphere) {
                             {{7, 254, 110}, {7, 1, 110}, {7, 0, 110}, {7, 255, 110}},
                             {{7, 3, 20}, {7, 250, 21}},
                             {{1, 0, 0}, {1, 3, 0}}}) {
-    tileset.roots = roots;
+    tileset.roots.clear();
+    for (const geo::TileKey& tile : roots) tileset.roots.push_back({tile, 1});
     const Json json = Json::parse(EncodeTileset(tileset));
     const Json& bounds = json.at("root").at("boundingVolume");
     ASSERT_FALSE(bounds.contains("region"));
@@ -100,7 +101,7 @@ TEST(Tileset, RootsOfTheGlobeLieInASphere) {
   TilesetDescription tileset = Maui();
   tileset.roots.clear();
   for (std::int64_t y = 0; y < 4; ++y) {
-    for (std::int64_t x = 0; x < 8; ++x) tileset.roots.push_back({2, x, y});
+    for (std::int64_t x = 0; x < 8; ++x) tileset.roots.push_back({{2, x, y}, 4});
   }
   const Json json = Json::parse(EncodeTileset(tileset));
   const Json& root = json.at("root");
@@ -120,7 +121,7 @@ TEST(Tileset, GeometricErrorsFallFromTheTopAndFitTerrainClients) {
   EXPECT_DOUBLE_EQ(GeometricError(9), 8 * geo::LevelError(9));
   for (int level = 0; level < geo::kMaxLevel; ++level) EXPECT_EQ(GeometricError(level + 1), GeometricError(level) / 2);
   TilesetDescription tileset = Maui();
-  tileset.roots = {{0, 0, 0}, {0, 1, 0}};
+  tileset.roots = {{{0, 0, 0}, 4}, {{0, 1, 0}, 4}};
   const Json json = Json::parse(EncodeTileset(tileset));
   const double top = json.at("geometricError"), root = json.at("root").at("geometricError"),
                implicit = json.at("root").at("children")[0].at("geometricError");
@@ -137,7 +138,7 @@ TEST(Tileset, QueryGoesToTheContentsAlone) {
   const Json json = Json::parse(EncodeTileset(tileset));
   const Json& root = json.at("root");
   EXPECT_EQ(root.at("content").at("uri"), "3dtiles/7-16-78/{level}/{x}/{y}.glb?error=5&atleast=1&compression=none");
-  EXPECT_EQ(root.at("implicitTiling").at("subtrees").at("uri"), "3dtiles/7-16-78/{level}/{x}/{y}.subtree");
+  EXPECT_EQ(root.at("implicitTiling").at("subtrees").at("uri"), "3dtiles/7-16-78/{level}/{x}/{y}.4.subtree");
 }
 
 TEST(Tileset, CreditIsWhereCesiumLooksAndNoMarkup) {

@@ -13,7 +13,7 @@ ROOT = HERE.parents[2]
 
 URLS = {
     "tile": "/earth/9/272/359.terrain", "error": "/earth/9/272/359.terrain?error=5&v=1.1.0", "glb": "/earth/0/1/0.glb?compression=meshopt&texture=webp",
-    "implicit": "/earth/3dtiles/9-272-359/2/3/1.glb?error=5&atleast=1", "subtree": "/earth/3dtiles/0-1-0/4/15/15.subtree",
+    "implicit": "/earth/3dtiles/9-272-359/2/3/1.glb?error=5&atleast=1", "subtree": "/earth/3dtiles/0-1-0/4/15/15.6.subtree",
     "png": "/earth/3/7/2.png?encoding=terrarium&size=512", "layer": "/earth/layer.json?fraction=0.25&extensions=octvertexnormals-watermask-metadata",
     "tileset": "/earth/tileset.json?error=2&error=2", "tilejson": "/earth/tiles.json?size=256", "datasets": "/datasets?v=1",
     "heights": "/earth/heights?locations=46.5,8.1%7C-90,180&datum=orthometric", "path": "/earth/heights?path=0,0|0,1&step=100000",

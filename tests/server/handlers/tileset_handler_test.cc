@@ -85,7 +85,7 @@ TEST_F(TilesetHandlerTest, WritesWishesIntoTheContentTemplates) {
 
 TEST_F(TilesetHandlerTest, SubtreesHoldExactlyTheTilesOfTheDataset) {
   for (const char* const root : {"7-16-32", "7-17-32"}) {
-    const Response response = Get(std::string("/maui/3dtiles/") + root + "/0/0/0.subtree");
+    const Response response = Get(std::string("/maui/3dtiles/") + root + "/0/0/0.6.subtree");
     ASSERT_EQ(response.status, 200);
     EXPECT_EQ(response.cache_control, "max-age=1");
     const Result<proto::ReadSubtree> read = proto::ParseSubtree(*response.body, 6);
@@ -99,8 +99,8 @@ TEST_F(TilesetHandlerTest, SubtreesHoldExactlyTheTilesOfTheDataset) {
 
 TEST_F(TilesetHandlerTest, SubtreesGoOnWhereTheFirstOnesEnd) {
   // From the globe's root: levels 0..5, 6..11 and 12.
-  EXPECT_EQ(Get("/maui/3dtiles/0-0-0/0/0/0.subtree").status, 200);
-  const Response deepest = Get("/maui/3dtiles/0-0-0/12/512/1024.subtree");
+  EXPECT_EQ(Get("/maui/3dtiles/0-0-0/0/0/0.6.subtree").status, 200);
+  const Response deepest = Get("/maui/3dtiles/0-0-0/12/512/1024.6.subtree");
   ASSERT_EQ(deepest.status, 200);
   const Result<proto::ReadSubtree> read = proto::ParseSubtree(*deepest.body, 6);
   ASSERT_TRUE(read) << read.error().message;
@@ -108,19 +108,19 @@ TEST_F(TilesetHandlerTest, SubtreesGoOnWhereTheFirstOnesEnd) {
 }
 
 TEST_F(TilesetHandlerTest, IsNotThereWhereNoSubtreeBegins) {
-  for (const char* const target : {"/maui/3dtiles/7-18-32/0/0/0.subtree",  // a root without tiles
-                                   "/maui/3dtiles/7-16-32/1/0/0.subtree",  // within the first subtree
-                                   "/maui/3dtiles/7-16-32/6/0/0.subtree",  // below the deepest level
-                                   "/maui/3dtiles/0-0-0/6/0/0.subtree",    // outside the data
-                                   "/oahu/3dtiles/7-16-32/0/0/0.subtree", "/oahu/tileset.json"}) {
+  for (const char* const target : {"/maui/3dtiles/7-18-32/0/0/0.6.subtree",  // a root without tiles
+                                   "/maui/3dtiles/7-16-32/1/0/0.6.subtree",  // within the first subtree
+                                   "/maui/3dtiles/7-16-32/6/0/0.6.subtree",  // below the deepest level
+                                   "/maui/3dtiles/0-0-0/6/0/0.6.subtree",    // outside the data
+                                   "/oahu/3dtiles/7-16-32/0/0/0.6.subtree", "/oahu/tileset.json"}) {
     EXPECT_EQ(Get(target).status, 404) << target;
   }
 }
 
 TEST_F(TilesetHandlerTest, TakesTheTilesetsParametersOnSubtreesToo) {
-  const Response plain = Get("/maui/3dtiles/7-16-32/0/0/0.subtree");
-  EXPECT_EQ(*Get("/maui/3dtiles/7-16-32/0/0/0.subtree?error=5&compression=none&v=1").body, *plain.body);
-  EXPECT_EQ(Get("/maui/3dtiles/7-16-32/0/0/0.subtree?colour=red").status, 400);
+  const Response plain = Get("/maui/3dtiles/7-16-32/0/0/0.6.subtree");
+  EXPECT_EQ(*Get("/maui/3dtiles/7-16-32/0/0/0.6.subtree?error=5&compression=none&v=1").body, *plain.body);
+  EXPECT_EQ(Get("/maui/3dtiles/7-16-32/0/0/0.6.subtree?colour=red").status, 400);
 }
 
 TEST_F(TilesetHandlerTest, RefusesBadWishes) {
@@ -131,7 +131,7 @@ TEST_F(TilesetHandlerTest, RefusesBadWishes) {
 }
 
 TEST_F(TilesetHandlerTest, CompressesOnRequest) {
-  for (const char* const target : {"/maui/tileset.json", "/maui/3dtiles/7-16-32/0/0/0.subtree"}) {
+  for (const char* const target : {"/maui/tileset.json", "/maui/3dtiles/7-16-32/0/0/0.6.subtree"}) {
     const Response plain = Get(target), gzip = Get(target, "gzip");
     EXPECT_EQ(gzip.coding, Coding::kGzip) << target;
     EXPECT_NE(gzip.etag, plain.etag) << target;

@@ -23,7 +23,7 @@ TEST(Router, FindsEveryUrl) {
       {"/maui/layer.json", RouteKind::kLayer},
       {"/maui/layer.json?error=5", RouteKind::kLayer},
       {"/maui/tileset.json?error=5", RouteKind::kTileset},
-      {"/maui/3dtiles/9-272-359/0/0/0.subtree", RouteKind::kSubtree},
+      {"/maui/3dtiles/9-272-359/0/0/0.6.subtree", RouteKind::kSubtree},
       {"/maui/3dtiles/9-272-359/0/0/0.glb?error=5&atleast=1", RouteKind::kTile},
       {"/maui/0/1/0.terrain", RouteKind::kTile},
       {"/maui/0/1/0.glb", RouteKind::kTile},
@@ -65,10 +65,11 @@ TEST(Router, CountsImplicitTilesFromTheGlobesRoots) {
   EXPECT_EQ(content->dataset, "maui");
   EXPECT_EQ(content->format, TileFormat::kGlb);
   EXPECT_EQ(content->key, (geo::TileKey{12, 272 * 8 + 5, 359 * 8 + 2}));
-  const Result<Route> subtree = Match("/maui/3dtiles/0-1-0/6/63/0.subtree");
+  const Result<Route> subtree = Match("/maui/3dtiles/0-1-0/6/63/0.6.subtree");
   ASSERT_TRUE(subtree);
   EXPECT_EQ(subtree->root, (geo::TileKey{0, 1, 0}));
   EXPECT_EQ(subtree->key, (geo::TileKey{6, 64 + 63, 0}));
+  EXPECT_EQ(subtree->subtree_levels, 6);
 }
 
 TEST(Router, RefusesWhatIsNoUrl) {
@@ -95,20 +96,25 @@ TEST(Router, RefusesWhatIsNoUrl) {
       // No root, no place under it, or below the deepest level.
       "/maui/3dtiles/9-272-359/0/0/0.terrain",
       "/maui/3dtiles/9-272-359/0/0/0",
-      "/maui/3dtiles/9-272-359/0/0/.subtree",
-      "/maui/3dtiles/9-272-359/0/0/0.subtree.glb",
-      "/maui/3dtiles/9-272/0/0/0.subtree",
-      "/maui/3dtiles/9-272-359-0/0/0/0.subtree",
-      "/maui/3dtiles/9-272--359/0/0/0.subtree",
-      "/maui/3dtiles/09-272-359/0/0/0.subtree",
-      "/maui/3dtiles/0-2-0/0/0/0.subtree",
-      "/maui/3dtiles/9-272-359/0/1/0.subtree",
+      "/maui/3dtiles/9-272-359/0/0/.6.subtree",
+      "/maui/3dtiles/9-272-359/0/0/0.6.subtree.glb",
+      "/maui/3dtiles/9-272/0/0/0.6.subtree",
+      "/maui/3dtiles/9-272-359-0/0/0/0.6.subtree",
+      "/maui/3dtiles/9-272--359/0/0/0.6.subtree",
+      "/maui/3dtiles/09-272-359/0/0/0.6.subtree",
+      "/maui/3dtiles/0-2-0/0/0/0.6.subtree",
+      "/maui/3dtiles/9-272-359/0/1/0.6.subtree",
       "/maui/3dtiles/9-272-359/2/0/4.glb",
-      "/maui/3dtiles/9-272-359/16/0/0.subtree",
-      "/maui/3dtiles/9-272-359/999999999/0/0.subtree",
-      "/maui/3dtiles/9-272-359/00/0/0.subtree",
+      "/maui/3dtiles/9-272-359/16/0/0.6.subtree",
+      "/maui/3dtiles/9-272-359/999999999/0/0.6.subtree",
+      "/maui/3dtiles/9-272-359/00/0/0.6.subtree",
       "/maui/3dtiles/9-272-359/0/0",
-      "/maui/3dtile/9-272-359/0/0/0.subtree",
+      "/maui/3dtile/9-272-359/0/0/0.6.subtree",
+      "/maui/3dtiles/9-272-359/0/0/0.subtree",
+      "/maui/3dtiles/9-272-359/0/0/0.0.subtree",
+      "/maui/3dtiles/9-272-359/0/0/0.8.subtree",
+      "/maui/3dtiles/9-272-359/0/0/0.06.subtree",
+      "/maui/3dtiles/9-272-359/0/0/0.6.6.subtree",
       "/viewer2/tileset.json/",
       "/metrics/tileset.json",
       "/datasets/",
