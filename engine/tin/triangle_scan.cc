@@ -23,7 +23,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 // Everything is evaluated in one of two precisions. Single is as good as double for most triangles: all heights are
 // multiples of a quantum (OpenSamples::quantum), so all numbers that the formula adds and multiplies are, and every
 // multiple up to 2^24 times the quantum is a float. Where that may be exceeded, it is double.
-using DoublesTag = hn::ScalableTag<double>;
+using DoublesTag = hn::CappedTag<double, 16>;
 using FloatsTag = hn::CappedTag<float, 16>;
 constexpr DoublesTag kDoubles;
 constexpr FloatsTag kFloats;
@@ -41,9 +41,16 @@ template <typename Tag, typename Value>
 HWY_INLINE hn::Vec<Tag> All(Tag tag, Value value) {
   return hn::Set(tag, static_cast<hn::TFromD<Tag>>(value));
 }
+
+// The numbers of the lanes, from memory: hn::Iota counts them anew each time, in a loop.
+template <typename T>
+struct LaneNumbers {
+  HWY_ALIGN static constexpr T kValues[16] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+};
 template <typename Tag>
 HWY_INLINE hn::Vec<Tag> From(Tag tag, int first) {
-  return hn::Add(All(tag, first), hn::Iota(tag, 0));
+  static_assert(hn::MaxLanes(Tag()) <= 16);
+  return hn::Add(All(tag, first), hn::Load(tag, LaneNumbers<hn::TFromD<Tag>>::kValues));
 }
 
 // One triangle, seen from its last corner p.
