@@ -256,7 +256,7 @@ HWY_INLINE Found ScanSpans(const OpenSamples& samples, const ScannedTriangle& t)
   const int lanes = LanesOf<Tag>(), last_row = t.py + t.north, width = samples.width();
   const auto lanes_on = All(tag, lanes);
   const auto indices_on = All(indices, lanes);
-  Found furthest, ends;  // apart, since what is furthest so far is waited for
+  Found furthest, also, ends;  // apart, since what is furthest so far is waited for
   Columns firsts, lasts;
   for (int block = t.py + t.south; block <= last_row; block += kRows) {
     const int rows = std::min(kRows, last_row - block + 1);
@@ -278,16 +278,19 @@ HWY_INLINE Found ScanSpans(const OpenSamples& samples, const ScannedTriangle& t)
       auto x = From(tag, first - t.px);
       auto index = From(indices, row * width + first);
       int left = last - first + 1;
-      for (; left >= lanes; left -= lanes) {
-        furthest.Visit(Numerator(HeightsAt(tag, from), pz, d, hn::Add(hn::Mul(a, x), b_y)), index);
+      const auto visit = [&](Found& found) HWY_ATTR {
+        found.Visit(Numerator(HeightsAt(tag, from), pz, d, hn::Add(hn::Mul(a, x), b_y)), index);
         from += lanes;
         x = hn::Add(x, lanes_on);
         index = hn::Add(index, indices_on);
-      }
+      };
+      for (; left >= 2 * lanes; left -= 2 * lanes) visit(furthest), visit(also);
+      if (left >= lanes) visit(also);
       const auto inside = hn::RebindMask(tag, hn::Lt(index, end));
       ends.Visit(Numerator(HeightsAt(tag, from), pz, d, hn::Add(hn::Mul(a, x), b_y)), index, inside);
     }
   }
+  furthest.Merge(also);
   furthest.Merge(ends);
   return furthest;
 }
