@@ -141,8 +141,9 @@ void CandidateQueue::Insert(std::uint32_t slot) {
   if (run_.size() - run_begin_ > 4 * wanted_) Shorten();
 }
 
-// Lets go of the hindmost half. Equal errors go or stay together: the threshold tells them apart from others only. Where
-// heights are whole metres, the hindmost half may well be equal throughout: that must not take a look at each of them.
+// Lets go of the hindmost half. Equal errors go or stay together: the threshold tells them apart from others only.
+// Where heights are whole metres, the hindmost half may well be equal throughout: that must not take a look at each of
+// them.
 void CandidateQueue::Shorten() {
   const auto error_of = [](const Entry& entry) { return static_cast<std::uint32_t>(entry.order >> 32); };
   const std::uint32_t least = error_of(run_[run_begin_ + 2 * wanted_ - 1]);

@@ -14,7 +14,8 @@ HWY_BEFORE_NAMESPACE();
 namespace terrace::tin {
 namespace HWY_NAMESPACE {
 
-// Voids count as multiples. Numbers from 2^30 steps on are none: their conversion to integers may be undefined.
+// Voids count as multiples: of NaN alone it is not true that it equals itself. Numbers from 2^30 steps on are none:
+// their conversion to integers may be undefined.
 bool AreMultiples(const float* heights, std::size_t count, float quantum) {
   namespace hn = hwy::HWY_NAMESPACE;
   const hn::CappedTag<float, 16> floats;
@@ -25,7 +26,7 @@ bool AreMultiples(const float* heights, std::size_t count, float quantum) {
     const auto steps = hn::Mul(height, steps_a_metre);
     const auto fits = hn::Lt(hn::Abs(steps), limit);
     const auto whole = hn::ConvertTo(floats, hn::ConvertTo(ints, hn::IfThenElseZero(fits, steps)));
-    return hn::Or(hn::And(fits, hn::Eq(whole, steps)), hn::Ne(steps, steps));
+    return hn::Or(hn::And(fits, hn::Eq(whole, steps)), hn::Not(hn::Eq(steps, steps)));
   };
   std::size_t i = 0;
   for (; i + lanes <= count; i += lanes) {

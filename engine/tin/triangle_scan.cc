@@ -126,8 +126,8 @@ class FurthestTwo {
     Visit(numerator, index, hn::Ge(numerator, hn::Zero(kFloats)));
   }
   HWY_INLINE void Merge(const FurthestTwo& other) {
-    runner_up_ = hn::Max(hn::Max(runner_up_, other.runner_up_),
-                         hn::Min(furthest_.numerators(), other.furthest_.numerators()));
+    runner_up_ =
+        hn::Max(hn::Max(runner_up_, other.runner_up_), hn::Min(furthest_.numerators(), other.furthest_.numerators()));
     furthest_.Merge(other.furthest_);
   }
 
@@ -318,7 +318,7 @@ constexpr int kMostBoxVectors = 2;
 template <typename Found>
 HWY_INLINE Found ScanWide(const OpenSamples& samples, const ScannedTriangle& t) {
   return t.east - t.west < kMostBoxVectors * LanesOf<typename Found::Tag>() ? ScanBox<Found>(samples, t)
-                                                                          : ScanSpans<Found>(samples, t);
+                                                                            : ScanSpans<Found>(samples, t);
 }
 
 PlaneMisfit ScanExactly(const OpenSamples& samples, const ScannedTriangle& t) {
@@ -487,8 +487,7 @@ HWY_INLINE BlockFind ScanBlock(const OpenSamples& samples, const Star& star, con
     of_p = hn::Add(of_p, step_p);
   }
   BlockFind find{hn::GetLane(hn::MaxOfLanes(kFloats, most)), 0};
-  const Floats least =
-      All(kFloats, LeastInDoubt(find.most, planes.largest[i], planes.magnitude[i], most_exact));
+  const Floats least = All(kFloats, LeastInDoubt(find.most, planes.largest[i], planes.magnitude[i], most_exact));
 #pragma GCC unroll 8
   for (int k = 0; k < kVectors; ++k) {
     find.found |= std::uint64_t{BitsOf(hn::Ge(numerators[k], least))} << (k * kLanes);
@@ -539,7 +538,8 @@ PlaneMisfit ScanDoubtfully(const OpenSamples& samples, const ScannedTriangle& t,
   hn::Store(two.furthest().indices(), kInts, indices);
   double most = -1;
   std::uint32_t best = kNoSample;
-  for (std::uint32_t bits = BitsOf(hn::Ge(two.furthest().numerators(), All(kFloats, least))); bits != 0; bits &= bits - 1) {
+  for (std::uint32_t bits = BitsOf(hn::Ge(two.furthest().numerators(), All(kFloats, least))); bits != 0;
+       bits &= bits - 1) {
     const std::int32_t index = indices[std::countr_zero(bits)];
     const auto sample = static_cast<std::uint32_t>(index);
     const double numerator = NumeratorAt(samples, t, index % samples.width() - t.px, index / samples.width() - t.py);

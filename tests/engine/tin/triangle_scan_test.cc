@@ -117,6 +117,29 @@ TEST(TriangleScan, EqualsTheFormulaOnEveryTargetBitForBit) {
   }
 }
 
+// Slopes of a fraction of a metre: all samples but a few lie on the triangles' planes, up to the rounding of floats, so
+// that single precision takes many of them for the furthest. And heights that overflow it.
+TEST(TriangleScan, TellsApartWhatSinglePrecisionDoesNot) {
+  Random random(5);
+  for (int i = 0; i < 200; ++i) {
+    const int side = i % 2 == 0 ? 9 : 70;
+    const float height = i % 7 == 0 ? 1e36F : 1000.1F;
+    const int bumps = random.Below(4);
+    const HeightField field = MakeField(side, side, [&](int x, int y) {
+      const bool is_bump = bumps > 0 && (x * 31 + y * 17 + i) % (side * bumps) == 0;
+      return height * (1 + 0.37e-3F * static_cast<float>(x) + 0.11e-3F * static_cast<float>(y)) *
+             (is_bump ? 1.0000002F : 1.0F);
+    });
+    OpenSamples samples(field);
+    const SamplePosition p = RandomSample(random, field), u = RandomSample(random, field),
+                         v = RandomSample(random, field);
+    if (Orientation(p, u, v) <= 0) continue;
+    for (const SamplePosition corner : {p, u, v}) samples.Close(corner);
+    ExpectReference(field, samples, *TestStar(field, p, {u, v}));
+    if (HasFatalFailure()) return;
+  }
+}
+
 TEST(OpenSamples, FindsTheQuantumOfTheHeights) {
   const auto quantum_of = [](float unit, float odd) {
     return OpenSamples(MakeField(9, 7, [&](int x, int y) { return x == 4 && y == 3 ? odd : unit * (x * 7 - y); }))
