@@ -10,10 +10,10 @@ SOURCES = git ls-files '*.h' '*.cc'
 TERRACE = build/release/server/cli/terrace
 
 .DEFAULT_GOAL := help
-.PHONY: help deps test-deps build run test reliability reliability-long bench paper format lint clean
+.PHONY: help deps test-deps build run test coverage reliability reliability-long bench paper format lint clean
 
 help:  ## list these targets
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-16s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 deps:  ## install what building needs (Debian 12; root or sudo)
 	@tools/install_deps.sh
@@ -32,14 +32,17 @@ run: build  ## build, then serve the sample data (LISTEN=HOST:PORT, CONFIG=FILE)
 test: test-deps  ## build and run every test, then the unit tests under ASan + UBSan and TSan
 	@tools/run_tests.py --jobs $(JOBS)
 
+coverage: test-deps  ## build with counters, run the tests, print which lines of each room they run
+	@tools/run_coverage.py --missed --jobs $(JOBS)
+
 reliability: test-deps  ## try on the real binary what docs/reliability.md promises about clients; a few minutes
 	cmake --preset release -DTERRACE_BUILD_TESTS=ON --log-level=WARNING
-	cmake --build build/release -j $(JOBS) --target terrace server_test
+	cmake --build build/release -j $(JOBS) --target terrace reliability_tests
 	@tests/reliability/run.py
 
 reliability-long: test-deps  ## the same, each row as often as the scorecard says
 	cmake --preset release -DTERRACE_BUILD_TESTS=ON --log-level=WARNING
-	cmake --build build/release -j $(JOBS) --target terrace server_test
+	cmake --build build/release -j $(JOBS) --target terrace reliability_tests
 	@tests/reliability/run.py --long
 
 bench: test-deps  ## build and run the benchmarks; JSON results in build/bench/results

@@ -109,6 +109,15 @@ struct ViewerConfig {
   friend bool operator==(const ViewerConfig&, const ViewerConfig&) = default;
 };
 
+// Finished tiles and refinements on disk, where they outlive the server.
+struct DiskCacheConfig {
+  std::string directory;                                // empty: none
+  std::size_t tile_bytes = std::size_t{8} << 30;        // of files; 0: no tiles
+  std::size_t refinement_bytes = std::size_t{4} << 30;  // of files; 0: no refinements
+
+  friend bool operator==(const DiskCacheConfig&, const DiskCacheConfig&) = default;
+};
+
 // What opens datasets to whoever shows it.
 struct TokenConfig {
   std::string name;                   // in the log
@@ -137,7 +146,9 @@ struct Config {
   std::size_t queue_length = 256;
   std::size_t cache_bytes = std::size_t{256} << 20;             // 0: no cache
   std::size_t refinement_cache_bytes = std::size_t{128} << 20;  // 0: no cache
-  std::size_t gdal_cache_bytes = std::size_t{256} << 20;        // blocks of sources
+  DiskCacheConfig disk_cache;
+  std::string cache_dir = {};                             // what is learnt of sources is kept there; empty: nowhere
+  std::size_t gdal_cache_bytes = std::size_t{256} << 20;  // blocks of sources
   std::size_t max_connections = 1024;
   std::size_t max_connections_per_client = 0;          // 0: as many as there may be in all
   std::size_t transfer_bytes = std::size_t{32} << 20;  // of bodies on their way

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "config/disk_cache_option.h"
 #include "config/edge_options.h"
 #include "config/layer_options.h"
 #include "config/nearest_name.h"
@@ -45,6 +46,15 @@ Codec<Config> Viewer() {
         return config.viewer.directory.empty() ? Json(config.viewer.enabled) : Json(config.viewer.directory.string());
       },
       SwitchToJson};
+}
+
+Codec<Config> CacheDir() {
+  return {[](const Json& value, const Place& place, Config& config) {
+            if (!value.is_string()) return place.Expected("the path of a folder", value);
+            const auto& path = value.get_ref<const std::string&>();
+            config.cache_dir = path.empty() ? path : (place.directory() / path).string();
+          },
+          [](const Config& config) { return Json(config.cache_dir); }, TextToJson};
 }
 
 Codec<Config> AccessLogFile() {
@@ -92,6 +102,8 @@ const std::vector<Option<Config>>& ServerOptionTable() {
       {"io_threads", "N", "Threads that talk to clients", Integer(&Config::io_threads, 1, 64)},
       {"worker_threads", "N", "Threads that build tiles; 0 is one per processor",
        Integer(&Config::worker_threads, 0, 1024)},
+      {"cache_dir", "DIR", "Folder for what is learnt of sources once: a second start needs no scan; empty is none",
+       CacheDir()},
       {"queue_length", "N", "Builds that may wait for a worker; more get 503 with Retry-After",
        Integer(&Config::queue_length, 1, 1'000'000)},
       {"cache_bytes", "BYTES", "Memory for finished tiles, such as 512MB or 1GiB; 0 is no cache",
@@ -99,6 +111,8 @@ const std::vector<Option<Config>>& ServerOptionTable() {
       {"refinement_cache_bytes", "BYTES",
        "Memory for what tiles are made from: other errors of a tile cost a fraction then; 0 is no cache",
        Bytes(&Config::refinement_cache_bytes, kMaxCacheBytes)},
+      {"disk_cache", "DIR", "Keep finished tiles and refinements in this directory, across restarts",
+       DiskCacheOption()},
       {"gdal_cache_bytes", "BYTES", "Memory for blocks of the sources, as they are read",
        Bytes(&Config::gdal_cache_bytes, kMaxCacheBytes)},
       {"max_connections", "N", "Connections at a time; above it idle ones are closed and new ones turned away",
@@ -242,6 +256,7 @@ Json WriteObject(const Target& source, const std::vector<Option<Target>>& table)
 template void ReadObject(const Json&, const Place&, const std::vector<Option<Config>>&, Config&);
 template void ReadObject(const Json&, const Place&, const std::vector<Option<DatasetConfig>>&, DatasetConfig&);
 template void ReadObject(const Json&, const Place&, const std::vector<Option<ImageryConfig>>&, ImageryConfig&);
+template void ReadObject(const Json&, const Place&, const std::vector<Option<DiskCacheConfig>>&, DiskCacheConfig&);
 template void ReadObject(const Json&, const Place&, const std::vector<Option<SourceConfig>>&, SourceConfig&);
 template void ReadObject(const Json&, const Place&, const std::vector<Option<TokenConfig>>&, TokenConfig&);
 template Json WriteObject(const Config&, const std::vector<Option<Config>>&);
@@ -249,5 +264,6 @@ template Json WriteObject(const DatasetConfig&, const std::vector<Option<Dataset
 template Json WriteObject(const ImageryConfig&, const std::vector<Option<ImageryConfig>>&);
 template Json WriteObject(const SourceConfig&, const std::vector<Option<SourceConfig>>&);
 template Json WriteObject(const TokenConfig&, const std::vector<Option<TokenConfig>>&);
+template Json WriteObject(const DiskCacheConfig&, const std::vector<Option<DiskCacheConfig>>&);
 
 }  // namespace terrace::config

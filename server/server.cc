@@ -71,6 +71,7 @@ TileServiceOptions ServiceOptions(const ServerOptions& options) {
   service.worker_threads = options.worker_threads;
   service.queue_length = options.queue_length;
   service.cache_bytes = options.cache_bytes;
+  service.disk = options.disk_cache;
   return service;
 }
 

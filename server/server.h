@@ -28,6 +28,7 @@ struct ServerOptions {
   unsigned worker_threads = 0;                         // 0: as many as processors
   std::size_t queue_length = 256;                      // builds that wait for a worker
   std::size_t cache_bytes = std::size_t{256} << 20;    // of finished tiles; 0: none
+  std::shared_ptr<DiskCache> disk_cache;               // of finished tiles, below memory; may be null
   std::function<ByteCacheStats()> refinement_stats;    // of what tiles are made from; may be empty
   std::size_t max_locations = 10'000;                  // in one request for heights
   EdgeOptions edge;                                    // limits of clients, tokens, proxies, TLS

@@ -51,6 +51,7 @@ LIBRARIES = [
     Library("libjpeg", r"jpeglib\.h", r"proto/.*\.cc"),
     Library("libwebp", r"webp/.*", r"proto/.*\.cc"),
     Library("meshoptimizer", r"meshoptimizer\.h", r"proto/.*\.cc"),
+    Library("RocksDB", r"rocksdb/.*", r"server/tiles/record_db\.cc"),
     Library("xxHash", r"xxhash\.h", r"(engine/dem|engine/tin|proto|server)/.*\.cc"),
     Library("spdlog", r"spdlog/.*", r"(engine/dem|server)/.*\.cc"),
     Library("Beast", r"boost/beast.*", r"server/http/request\.cc"),
@@ -64,7 +65,7 @@ LIBRARIES = [
     Library("threads", r"(thread|mutex|shared_mutex|condition_variable|semaphore|future)", r"(engine/dem|server)/"),
     Library("clocks", r"(chrono|ctime)", r"(config|server|engine/dem)/"),
     Library("files", r"(filesystem|fstream)", r"(config/|engine/dem/|server/|proto/mesh_file)"),
-    Library("the operating system", r"(unistd|fcntl|glob|signal|dirent|pthread)\.h|(sys|arpa|netinet|linux)/.*",
+    Library("the operating system", r"(unistd|fcntl|glob|signal|dirent|pthread|elf|link)\.h|(sys|arpa|netinet|linux)/.*",
             r"(config|engine/dem|server)/.*\.cc"),
     Library("the standard library", r"[a-z_0-9]+|(stdint|immintrin)\.h", r"."),
 ]

@@ -4,6 +4,7 @@
 #
 #   tools/install_deps.sh            what building and running need
 #   tools/install_deps.sh --test     and what the tests, benchmarks, formatting and load tests need
+#   tools/install_deps.sh --runtime  nothing but what a binary needs that was built elsewhere (docker/Dockerfile)
 set -euo pipefail
 export LC_ALL=C DEBIAN_FRONTEND=noninteractive
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
@@ -12,21 +13,26 @@ build_packages=(
   g++ cmake ninja-build make git pkg-config ccache ca-certificates gzip python3
   libgdal-dev libproj-dev gdal-bin nlohmann-json3-dev libspdlog-dev libfmt-dev libexpected-dev libcli11-dev prometheus-cpp-dev
   libssl-dev libdeflate-dev libbrotli-dev libzstd-dev libxxhash-dev libhwy-dev libdraco-dev libmeshoptimizer-dev
-  libjpeg62-turbo-dev libwebp-dev libsystemd-dev
+  libjpeg62-turbo-dev libwebp-dev librocksdb-dev libsystemd-dev
+)
+runtime_packages=(
+  ca-certificates libgdal32 libproj25 libspdlog1.10 libfmt9 libprometheus-cpp-core1.0 libssl3 libdeflate0 libbrotli1 libzstd1
+  libxxhash0 librocksdb7.8 libhwy1 libdraco7 libmeshoptimizer2d libjpeg62-turbo libwebp7 libsystemd0
 )
 test_packages=(
   libgtest-dev libgmock-dev libbenchmark-dev zlib1g-dev libpng-dev chromium python3-jsonschema strace wrk proj-bin
-  clang-14 libclang-rt-14-dev llvm-14 clang-format-14
+  clang-14 libclang-rt-14-dev llvm-14 clang-format-14 nginx-light curl openssl faketime
 )
 
 die() { echo "install_deps: $*" >&2; exit 1; }
 
-with_tests=false
+with_tests=false runtime_only=false
 case "${1:-}" in
   "") ;;
   --test) with_tests=true ;;
+  --runtime) runtime_only=true ;;
   -h | --help) sed -n '2,/^set /{s/^# \{0,1\}//;/^set /!p}' "${BASH_SOURCE[0]}"; exit 0 ;;
-  *) echo "install_deps: unknown option '$1'; it takes --test or nothing" >&2; exit 2 ;;
+  *) echo "install_deps: unknown option '$1'; it takes --test, --runtime or nothing" >&2; exit 2 ;;
 esac
 
 as_root() {
@@ -49,14 +55,18 @@ is_installed() { [[ $(dpkg-query -W -f='${db:Status-Status}' "$1" 2> /dev/null) 
 install_packages() {
   local wanted=("${build_packages[@]}") missing=() package
   $with_tests && wanted+=("${test_packages[@]}")
+  $runtime_only && wanted=("${runtime_packages[@]}")
   # Node from another source serves as well as Debian's, and would be removed by it.
-  if ! command -v node > /dev/null || ! command -v npm > /dev/null; then wanted+=(nodejs npm); fi
+  if $runtime_only; then :
+  elif ! command -v node > /dev/null || ! command -v npm > /dev/null; then wanted+=(nodejs npm); fi
   for package in "${wanted[@]}"; do is_installed "$package" || missing+=("$package"); done
   if [[ ${#missing[@]} -eq 0 ]]; then return; fi
   command -v apt-get > /dev/null || die "apt-get not found; on other systems install the counterparts of: ${missing[*]}"
   refresh_package_lists
   echo "install_deps: apt-get install ${missing[*]}"
   as_root apt-get -qq install -y --no-install-recommends "${missing[@]}"
+  # The tests start one of their own; nobody asked for a web server on port 80.
+  if [[ " ${missing[*]} " == *" nginx-light "* && -d /run/systemd/system ]]; then as_root systemctl disable --quiet --now nginx || true; fi
 }
 
 # Boost 1.81 or later. Debian 12 has 1.81, but its -dev package conflicts with the 1.74 that libgdal-dev depends on: unpack
@@ -93,6 +103,7 @@ install_node_modules() {
 }
 
 install_packages
+if $runtime_only; then exit 0; fi
 install_boost
 install_node_modules server/viewer
 if $with_tests; then install_node_modules tests/e2e; fi

@@ -1,4 +1,4 @@
-// Averages of blocks of samples, as the rows of the samples come in.
+// Averages of blocks of samples, as the rows of the samples come in: in the one order that decides their last bits.
 #pragma once
 
 #include <cmath>
@@ -9,33 +9,64 @@
 
 namespace terrace::dem {
 
-// Of a row of blocks, each `block` samples wide. Every block is summed row by row, whatever lies beside it.
+struct BlockSum {
+  double sum = 0, weight = 0;  // of valid samples
+
+  void Add(float sample, double times = 1) {
+    if (std::isnan(sample)) return;
+    sum += times * sample;
+    weight += times;
+  }
+  void Add(const BlockSum& other) {
+    sum += other.sum;
+    weight += other.weight;
+  }
+  float Mean() const { return weight == 0 ? SampleRules::kVoid : static_cast<float>(sum / weight); }
+};
+
+// Of a row of blocks of block x block samples. A block is summed row by row, whatever lies beside it; one of more than
+// kLargestPlain samples a side by blocks of that size, each of them row by row: so large averages can be made from
+// parts of a raster that fit into memory (raster_survey.h), bit for bit.
 class BlockAverages {
  public:
+  static constexpr int kLargestPlain = 1024;
+
   BlockAverages(std::int64_t blocks, int block)
-      : block_(block), sums_(static_cast<std::size_t>(blocks)), weights_(sums_.size()) {}
+      : parts_(block > kLargestPlain ? block / kLargestPlain : 1),
+        plain_(block / parts_),
+        inner_(static_cast<std::size_t>(blocks * parts_)),
+        outer_(parts_ > 1 ? static_cast<std::size_t>(blocks) : 0) {}
 
   // Each sample counts `weight` times, the last of the row `last` times of that: it may stand for fewer pixels.
   void AddRow(const float* samples, std::int64_t count, double weight = 1, double last = 1) {
     for (std::int64_t i = 0; i < count; ++i) {
-      if (std::isnan(samples[i])) continue;
-      const double here = i + 1 == count ? weight * last : weight;
-      sums_[static_cast<std::size_t>(i / block_)] += here * samples[i];
-      weights_[static_cast<std::size_t>(i / block_)] += here;
+      inner_[static_cast<std::size_t>(i / plain_)].Add(samples[i], i + 1 == count ? weight * last : weight);
     }
+    if (parts_ > 1 && ++rows_ == kLargestPlain) Gather();
   }
+
   // NaN for a block without a valid sample. The next row of blocks begins.
   void Take(float* out) {
-    for (std::size_t i = 0; i < sums_.size(); ++i) {
-      out[i] = weights_[i] == 0 ? SampleRules::kVoid : static_cast<float>(sums_[i] / weights_[i]);
-      sums_[i] = 0;
-      weights_[i] = 0;
+    if (parts_ > 1 && rows_ > 0) Gather();
+    for (BlockSum& sum : parts_ > 1 ? outer_ : inner_) {
+      *out++ = sum.Mean();
+      sum = {};
     }
   }
 
  private:
-  int block_;
-  std::vector<double> sums_, weights_;
+  void Gather() {
+    for (std::size_t i = 0; i < inner_.size(); ++i) {
+      outer_[i / static_cast<std::size_t>(parts_)].Add(inner_[i]);
+      inner_[i] = {};
+    }
+    rows_ = 0;
+  }
+
+  int parts_, plain_;
+  int rows_ = 0;                 // in inner_, where it is gathered
+  std::vector<BlockSum> inner_;  // of blocks, or of their parts
+  std::vector<BlockSum> outer_;
 };
 
 }  // namespace terrace::dem

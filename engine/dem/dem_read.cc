@@ -6,6 +6,7 @@
 #include "engine/core/check.h"
 #include "engine/dem/dem_impl.h"
 #include "engine/dem/node_positions.h"
+#include "engine/dem/source_gap.h"
 
 namespace terrace::dem {
 namespace {
@@ -13,11 +14,12 @@ namespace {
 bool IsVoid(float height) { return std::isnan(height); }
 
 Result<void> FillFrom(const Sheet& sheet, const geo::Lattice& lattice, const NodeWindow& window, Counting counting,
-                      std::span<float> heights, const std::stop_token& stop, std::span<float> weights) {
-  return sheet.Fill(lattice, window, counting, heights, stop, weights);
+                      std::span<float> heights, const std::stop_token& stop, std::span<float> weights,
+                      SheetTrace* trace) {
+  return sheet.Fill(lattice, window, counting, heights, stop, weights, trace);
 }
 Result<void> FillFrom(const Sheet& sheet, const geo::MercatorGrid& grid, const NodeWindow& window, Counting,
-                      std::span<float> heights, const std::stop_token& stop, std::span<float> weights) {
+                      std::span<float> heights, const std::stop_token& stop, std::span<float> weights, SheetTrace*) {
   return sheet.Fill(grid, window, heights, stop, weights);
 }
 
@@ -87,7 +89,8 @@ class Blend {
 
 template <typename Grid>
 Result<std::vector<float>> DemSource::Impl::ReadSheets(const Grid& grid, const NodeWindow& window, Counting counting,
-                                                       const std::string& what, const std::stop_token& stop) const {
+                                                       const std::string& what, const std::stop_token& stop,
+                                                       std::vector<SheetTrace>* traces) const {
   const std::size_t nodes = static_cast<std::size_t>(window.columns) * static_cast<std::size_t>(window.rows);
   std::vector<float> heights(nodes, SampleRules::kVoid);
   const std::vector<std::size_t> order = SheetsAt(BoxOf(grid, window));
@@ -99,7 +102,8 @@ Result<std::vector<float>> DemSource::Impl::ReadSheets(const Grid& grid, const N
       heights = blend.Wanted();
       weights.assign(nodes, 1);
     }
-    if (const auto filled = FillFrom(sheets[i], grid, window, counting, heights, stop, weights); !filled) {
+    SheetTrace* const trace = traces != nullptr ? &traces->emplace_back() : nullptr;
+    if (const auto filled = FillFrom(sheets[i], grid, window, counting, heights, stop, weights, trace); !filled) {
       return MakeError(filled.error().code, "{}: {}", what, filled.error().message);
     }
     if (feathers) blend.Add(heights, weights);
@@ -120,9 +124,10 @@ const geo::Lattice& DemSource::Impl::LatticeOf(int level) const {
 }
 
 Result<std::vector<float>> DemSource::Impl::ReadNodes(int level, const NodeWindow& window, Counting counting,
-                                                      const std::string& what, const std::stop_token& stop) const {
+                                                      const std::string& what, const std::stop_token& stop,
+                                                      std::vector<SheetTrace>* traces) const {
   const geo::Lattice& lattice = LatticeOf(level);
-  auto heights = ReadSheets(lattice, window, counting, what, stop);
+  auto heights = ReadSheets(lattice, window, counting, what, stop, traces);
   if (!heights || std::ranges::none_of(*heights, IsVoid)) return heights;
   if (counting == Counting::kEllipsoid || floor_undulations == nullptr) {
     std::ranges::replace_if(*heights, IsVoid, floor);
@@ -139,15 +144,42 @@ Result<std::vector<float>> DemSource::Impl::ReadNodes(int level, const NodeWindo
 Result<TileHeights> DemSource::Impl::Read(const geo::TileKey& key, Counting counting,
                                           const std::stop_token& stop) const {
   const geo::Lattice& lattice = LatticeOf(key.level);
-  auto heights = ReadNodes(key.level, WindowOfTile(lattice, key), counting, "tile " + geo::ToString(key), stop);
+  const NodeWindow window = WindowOfTile(lattice, key);
+  const std::string what = "tile " + geo::ToString(key);
+  const bool is_certified = counting == Counting::kEllipsoid;
+  std::vector<SheetTrace> traces;
+  auto heights = ReadNodes(key.level, window, counting, what, stop, is_certified ? &traces : nullptr);
   if (!heights) return tl::unexpected(std::move(heights).error());
-  return TileHeights{lattice, lattice.cells + 3, *std::move(heights)};
+  TileHeights tile{lattice, lattice.cells + 3, *std::move(heights)};
+  if (!is_certified) return tile;
+  const auto gap = GapOf(tile, window, traces, stop);
+  if (!gap) return MakeError(gap.error().code, "{}: {}", what, gap.error().message);
+  tile.source_gap_m = *gap;
+  return tile;
+}
+
+// `traces`: of the sheets that were read for the heights, the first of the tile's.
+Result<double> DemSource::Impl::GapOf(const TileHeights& tile, const NodeWindow& window,
+                                      const std::vector<SheetTrace>& traces, const std::stop_token& stop) const {
+  const std::vector<std::size_t> order = SheetsAt(BoxOf(tile.lattice, window));
+  SourceGap gap(tile.lattice, window, tile.heights, has_feather && order.size() > 1);
+  for (std::size_t k = 0; k < traces.size(); ++k) gap.Add(sheets[order[k]], traces[k]);
+  // All nodes have their height; samples of further sheets may still show between them.
+  std::vector<float> none_wanted = tile.heights;
+  for (std::size_t k = traces.size(); k < order.size() && !gap.is_covered(); ++k) {
+    const Sheet& sheet = sheets[order[k]];
+    SheetTrace trace;
+    const auto filled = sheet.Fill(tile.lattice, window, Counting::kEllipsoid, none_wanted, stop, {}, &trace);
+    if (!filled) return tl::unexpected(filled.error());
+    gap.Add(sheet, trace);
+  }
+  return gap.bound();
 }
 
 Result<std::vector<float>> DemSource::Impl::ReadMercator(int depth, const NodeWindow& window,
                                                          const std::stop_token& stop) const {
   auto heights = ReadSheets(geo::MercatorGrid{depth}, window, Counting::kEllipsoid,
-                            fmt::format("Mercator pixels of depth {}", depth), stop);
+                            fmt::format("Mercator pixels of depth {}", depth), stop, nullptr);
   if (heights) std::ranges::replace_if(*heights, IsVoid, floor);
   return heights;
 }

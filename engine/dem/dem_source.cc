@@ -96,7 +96,7 @@ Result<Rasters> OpenAll(std::vector<DemFile>& files, const DemOptions& options) 
       options.progress((static_cast<double>(i) + share) / static_cast<double>(files.size()));
     };
     auto raster =
-        RasterSource::Open(files[i].path, files[i].options.value_or(options.source),
+        RasterSource::Open(files[i].path, files[i].options.value_or(options.source), options.cache_dir,
                            options.progress ? progress : std::function<void(double)>(), handles, options.stop);
     if (!raster) return tl::unexpected(raster.error());
     rasters.push_back(*std::move(raster));

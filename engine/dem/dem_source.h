@@ -10,6 +10,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -49,6 +50,8 @@ struct DemOptions {
   std::optional<double> floor = {};  // metres above the ellipsoid, outside the source and in large voids; default: the
                                      // lowest height, at most
   int max_void_gap = 64;  // source samples: voids narrower than this along a row, column or diagonal are filled
+  // A folder for what is learnt of sources once (docs/configuration.md). Empty: nothing is kept.
+  std::string cache_dir = {};
   // Metres, of a mosaic: so far from its edges and voids a source begins to give way to what lies below it. 0: at them.
   double feather = 0;
   std::size_t max_open_sources = 64;  // kept open between reads; what is in use comes on top, one a thread
@@ -110,7 +113,10 @@ struct RasterInfo {
   std::optional<double> nodata;
   std::string found_voids;  // what find_voids found, for people; empty: nothing
   std::vector<int> overview_factors;
-  std::string transform;  // the PROJ operation from EPSG:4326 to the source, for the log; empty: none needed
+  std::string transform;        // the PROJ operation from EPSG:4326 to the source, for the log; empty: none needed
+  bool needs_averages = false;  // large, and without overviews
+  bool prepared = false;        // it has averages in the cache folder
+  double seconds_to_open = 0;
 };
 
 // What `terrace info` prints and `/datasets` tells of a dataset.
@@ -136,6 +142,10 @@ struct TileHeights {
   geo::Lattice lattice;
   int stride = 0;              // cells + 3
   std::vector<float> heights;  // stride * stride
+  // Metres, of Read alone: no valid sample of a source, at its full resolution and above the ellipsoid, lies farther
+  // from the surface that is bilinear between the tile's own samples; nor does what sources are blended to, where a
+  // feather blends them. The halo does not count.
+  double source_gap_m = std::numeric_limits<double>::infinity();
 
   // i, j in -1 .. cells + 1: columns from the west, rows from the SOUTH.
   float At(int i, int j) const {

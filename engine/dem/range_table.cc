@@ -47,6 +47,23 @@ void RangeTable::AddWindow(int col, int row, int cols, int rows, const float* he
   }
 }
 
+void RangeTable::AddBlocks(int block_column, int block_row, int columns, const std::vector<BlockRange>& ranges) {
+  Level& finest = levels_.front();
+  for (std::size_t i = 0; i < ranges.size(); ++i) {
+    const int column = block_column + static_cast<int>(i) % columns, row = block_row + static_cast<int>(i) / columns;
+    finest
+        .blocks[static_cast<std::size_t>(row) * static_cast<std::size_t>(finest.columns) +
+                static_cast<std::size_t>(column)]
+        .Add(ranges[i]);
+  }
+}
+
+BlockRange RangeTable::OfFinest() const {
+  BlockRange range;
+  for (const BlockRange& block : levels_.front().blocks) range.Add(block);
+  return range;
+}
+
 void RangeTable::Finish() {
   while (levels_.back().blocks.size() > 1) {
     const Level& fine = levels_.back();

@@ -28,6 +28,13 @@ class RangeTable {
   // factor).
   void AddWindow(int col, int row, int cols, int rows, const float* heights, int pixel_step = 1);
 
+  // Adds ranges of finest blocks, `columns` wide, from this block on.
+  void AddBlocks(int block_column, int block_row, int columns, const std::vector<BlockRange>& ranges);
+
+  // Of all finest blocks so far.
+  BlockRange OfFinest() const;
+  const std::vector<BlockRange>& finest() const { return levels_.front().blocks; }
+
   // Makes the coarser levels. Call once after the last AddWindow and before the first Query.
   void Finish();
 

@@ -2,11 +2,11 @@
 
 #include <spdlog/spdlog.h>
 
+#include <chrono>
 #include <utility>
 
 #include "engine/dem/gdal_runtime.h"
 #include "engine/dem/raster_file.h"
-#include "engine/dem/raster_scan.h"
 
 namespace terrace::dem {
 namespace {
@@ -64,20 +64,6 @@ void LogVertical(const std::string& path, const VerticalDatum& vertical) {
   }
 }
 
-// The scan, or another one with the rules that its findings call for.
-Result<RasterScan> Rescan(GDALDataset& dataset, RasterScan scan, RasterLayout& layout, std::string& found,
-                          const std::function<void(double)>& progress, const std::stop_token& stop) {
-  if (!MayHideVoids(layout.rules, scan.lowest, scan.highest, scan.voids > 0, scan.zeros)) return scan;
-  const auto findings = FindVoids(HeightBand(dataset), layout.rules, scan.zeros, stop);
-  if (!findings) return tl::unexpected(findings.error());
-  if (!findings->any()) return scan;
-  findings->AddTo(layout.rules);
-  found = findings->text;
-  // They were averaged from heights and marks.
-  layout.overview_factors.clear();
-  return ScanRaster(dataset, layout, progress, stop);
-}
-
 Position CentreOf(const Georeference& georeference) {
   Position centre{georeference.width() / 2.0, georeference.height() / 2.0};
   georeference.ToDegrees({&centre, 1});
@@ -87,9 +73,11 @@ Position CentreOf(const Georeference& georeference) {
 }  // namespace
 
 Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path, const SourceOptions& options,
+                                                         const std::string& cache_dir,
                                                          const std::function<void(double)>& progress,
                                                          std::shared_ptr<HandleLimit> handles,
                                                          const std::stop_token& stop) {
+  const auto start = std::chrono::steady_clock::now();
   const auto before = StampOf(path);
   auto dataset = OpenRaster(path);
   if (!dataset) return tl::unexpected(dataset.error());
@@ -103,30 +91,34 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
   std::unique_ptr<RasterSource> source(
       new RasterSource(path, *std::move(files), *std::move(georeference), std::move(handles)));
   source->layout_ = LayoutOf(**dataset, source->georeference_);
-  std::string found_voids;
   auto vertical = ResolveVertical(options.vertical, source->georeference_, CentreOf(source->georeference_));
   if (!vertical) return MakeError(vertical.error().code, "{}: {}", path, vertical.error().message);
   source->vertical_ = *std::move(vertical);
   source->layout_.rules.marks = options.nodata;
-  auto scan = ScanRaster(**dataset, source->layout_, progress, stop);
-  if (scan && options.find_voids) {
-    scan = Rescan(**dataset, *std::move(scan), source->layout_, found_voids, progress, stop);
-  }
-  if (!scan) return MakeError(scan.error().code, "{}: {}", path, scan.error().message);
+  auto prepared =
+      PrepareRaster(**dataset, source->layout_, path, source->files(), {cache_dir, options.find_voids, progress, stop});
+  if (!prepared) return tl::unexpected(prepared.error());
+  source->layout_ = WithFindings(std::move(source->layout_), prepared->findings);
+  source->survey_ = std::move(prepared->survey);
+  source->averages_ = std::move(prepared->averages);
+  source->preparation_ = prepared->preparation;
+  const RasterSurvey& survey = source->survey_;
+  const std::string& found_voids = prepared->findings.text;
 
   source->footprint_ = Footprint::Of(source->georeference_);
   source->spacing_ = *spacing;
-  source->ranges_ = std::move(scan->table);
-  source->edge_row_means_ = scan->edge_row_means;
   source->info_ = Describe(**dataset, path, source->georeference_, source->layout_);
+  source->info_.needs_averages = NeedsAverages(source->layout_);
+  source->info_.prepared = source->averages_ != nullptr;
+  source->info_.seconds_to_open = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   source->info_.found_voids = found_voids;
   source->info_.counts_from = source->vertical_.name;
   if (source->vertical_.geoid) source->info_.vertical_operation = source->vertical_.geoid->description();
   source->info_.spacing_m = spacing->finer;
   source->info_.bounds = source->footprint_.Bounds();
-  source->info_.heights = {scan->lowest, scan->highest};
-  source->info_.valid_samples = scan->valid;
-  source->info_.void_samples = scan->voids;
+  source->info_.heights = {survey.lowest, survey.highest};
+  source->info_.valid_samples = survey.valid;
+  source->info_.void_samples = survey.voids;
   LogWhatMatters(**dataset, source->info_, source->georeference_, source->layout_);
   LogVertical(path, source->vertical_);
   if (!found_voids.empty()) {
@@ -139,6 +131,20 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
 
 Result<std::vector<float>> RasterSource::ReadBlocks(int factor, const GridWindow& window,
                                                     const std::stop_token& stop) const {
+  // From memory and from the record only while the files are those that were prepared.
+  if (survey_.coarse.Has(factor)) {
+    if (auto unchanged = handles_.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
+    return survey_.coarse.Read(factor, window);
+  }
+  if (averages_ && RecordedAverages::Has(factor) && !averages_damaged_) {
+    if (auto unchanged = handles_.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
+    auto averages = averages_->Read(factor, window);
+    if (averages) return averages;
+    averages_damaged_ = true;
+    averages_->Discard();
+    spdlog::error("{}; {} is read at its full resolution instead, and prepared anew when it is next opened",
+                  averages.error().message, info_.path);
+  }
   auto handle = handles_.Borrow();
   if (!handle) return tl::unexpected(handle.error());
   auto heights = ReadGrid(**handle, layout_, factor, window, stop);

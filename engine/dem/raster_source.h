@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -17,7 +18,8 @@
 #include "engine/dem/gdal_handle.h"
 #include "engine/dem/georeference.h"
 #include "engine/dem/level_plan.h"
-#include "engine/dem/range_table.h"
+#include "engine/dem/prepare.h"
+#include "engine/dem/raster_survey.h"
 #include "engine/dem/sample_grid.h"
 #include "engine/dem/vertical_datum.h"
 
@@ -26,8 +28,10 @@ namespace terrace::dem {
 class RasterSource {
  public:
   // Opens a raster, checks it, and scans it once for its heights. Errors name the file, what is wrong and the remedy.
-  // `handles` bounds what this and other rasters keep open; null: nothing does. kCancelled: stopped.
+  // What is learnt is kept in `cache_dir`, or taken from there; empty for none. `handles` bounds what this and other
+  // rasters keep open; null: nothing does. kCancelled: stopped.
   static Result<std::unique_ptr<RasterSource>> Open(const std::string& path, const SourceOptions& options = {},
+                                                    const std::string& cache_dir = {},
                                                     const std::function<void(double)>& progress = {},
                                                     std::shared_ptr<HandleLimit> handles = nullptr,
                                                     const std::stop_token& stop = {});
@@ -39,12 +43,17 @@ class RasterSource {
   const RasterLayout& layout() const { return layout_; }
   const Footprint& footprint() const { return footprint_; }
   const SourceSpacing& spacing() const { return spacing_; }
-  const RangeTable& ranges() const { return ranges_; }
+  const RangeTable& ranges() const { return survey_.table; }
+  const AveragingErrors& averaging_errors() const { return survey_.errors; }
   // Of the valid samples of the first and the last row.
-  const std::array<std::optional<double>, 2>& edge_row_means() const { return edge_row_means_; }
+  const std::array<std::optional<double>, 2>& edge_row_means() const { return survey_.edge_row_means; }
   const StampedFiles& files() const { return handles_.files(); }
 
-  // ReadGrid of this raster. kUnavailable: a file of it is gone, was replaced or cannot be read. Errors name the file.
+  // How opening went.
+  const Preparation& preparation() const { return preparation_; }
+
+  // ReadGrid of this raster, from what was prepared where it can be. kUnavailable: a file of it is gone, was replaced
+  // or cannot be read. Errors name the file.
   Result<std::vector<float>> ReadBlocks(int factor, const GridWindow& window, const std::stop_token& stop) const;
 
   // Whether the files are still those that were opened.
@@ -60,8 +69,10 @@ class RasterSource {
   RasterLayout layout_;
   Footprint footprint_;
   SourceSpacing spacing_;
-  RangeTable ranges_;
-  std::array<std::optional<double>, 2> edge_row_means_;
+  RasterSurvey survey_;
+  std::shared_ptr<const RecordedAverages> averages_;  // null: none
+  mutable std::atomic<bool> averages_damaged_{false};
+  Preparation preparation_;
   RasterInfo info_;
 };
 

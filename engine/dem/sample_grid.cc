@@ -21,10 +21,7 @@ struct Level {
 
 Result<Level> StartingLevel(GDALDataset& dataset, const RasterLayout& layout, int factor) {
   GDALRasterBand* band = dataset.GetRasterBand(1);
-  int start = 1;
-  for (const int overview : layout.overview_factors) {
-    if (overview <= factor) start = overview;
-  }
+  const int start = StartingFactor(layout, factor);
   if (start > 1) band = FindOverview(*band, start);
   if (band == nullptr) {
     return MakeError(ErrorCode::kUnavailable, "its overview of factor {} is gone since it was opened", start);
@@ -62,6 +59,14 @@ Result<void> ReadBlocks(const Level& level, const SampleRules& rules, const Grid
 }
 
 }  // namespace
+
+int StartingFactor(const RasterLayout& layout, int factor) {
+  int start = 1;
+  for (const int overview : layout.overview_factors) {
+    if (overview <= factor) start = overview;
+  }
+  return start;
+}
 
 double GridAxis::Center(std::int64_t index) const {
   const std::int64_t block = wraps_ ? FloorMod(index, count_) : index;

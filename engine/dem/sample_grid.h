@@ -54,6 +54,9 @@ struct GridWindow {
 Result<std::vector<float>> ReadGrid(GDALDataset& dataset, const RasterLayout& layout, int factor,
                                     const GridWindow& window, const std::stop_token& stop);
 
+// The factor of the overview that ReadGrid starts from; 1: the samples themselves.
+int StartingFactor(const RasterLayout& layout, int factor);
+
 // The overview of that factor; null when there is none (any more).
 GDALRasterBand* FindOverview(GDALRasterBand& band, int factor);
 

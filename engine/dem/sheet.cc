@@ -165,10 +165,12 @@ Result<void> Sheet::CheckUnread() const {
   return members_.size() == 1 ? members_.front().raster->CheckUnchanged() : Result<void>();
 }
 
-Result<std::vector<float>> Sheet::ReadFilled(int factor, const GridWindow& window, const std::stop_token& stop) const {
+Result<std::vector<float>> Sheet::ReadFilled(int factor, const GridWindow& window, const std::stop_token& stop,
+                                             SheetTrace* trace) const {
   const auto is_void = [](float height) { return std::isnan(height); };
   auto core = ReadBlocks(factor, window, stop);
   if (!core) return core;
+  if (trace != nullptr) trace->samples = *core;
   const auto voids = static_cast<std::uint64_t>(std::ranges::count_if(*core, is_void));
   counts_->measured += core->size() - voids;
   const int gap = options_.max_void_gap / factor;
@@ -215,18 +217,27 @@ Result<std::vector<float>> Sheet::ReadWeights(int factor, const GridWindow& wind
 }
 
 Result<void> Sheet::FillAt(std::span<const Position> positions, std::span<const double> undulations, int factor,
-                           std::span<float> heights, const std::stop_token& stop, std::span<float> weights) const {
+                           std::span<float> heights, const std::stop_token& stop, std::span<float> weights,
+                           SheetTrace* trace) const {
   Cells found = CellsAt(positions, heights, factor);
   if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "reading was stopped");
   if (found.cells.empty()) return CheckUnread();
-  const GridWindow window = WindowOf(found.cells, Columns(factor), Rows(factor));
-  const auto samples = ReadFilled(factor, window, stop);
+  GridWindow window = WindowOf(found.cells, Columns(factor), Rows(factor));
+  // Samples between the outermost nodes and the rim are wanted too.
+  constexpr int kRim = 3;
+  if (trace != nullptr) window = Grown(window, kRim, Columns(factor), Rows(factor));
+  const auto samples = ReadFilled(factor, window, stop, trace);
   if (!samples) return tl::unexpected(samples.error());
+  if (trace != nullptr && !weights.empty() && factor == 1) {
+    trace->samples = *samples;
+    trace->includes_filled = true;
+  }
   std::vector<float> counts;
   if (!weights.empty() && options_.feather_m > 0) {
     auto read = ReadWeights(factor, window, stop);
     if (!read) return tl::unexpected(read.error());
     counts = *std::move(read);
+    if (trace != nullptr && trace->includes_filled) trace->weights = counts;
   }
   for (std::size_t i = 0; i < found.cells.size(); ++i) {
     const std::size_t node = found.nodes[i];
@@ -234,19 +245,34 @@ Result<void> Sheet::FillAt(std::span<const Position> positions, std::span<const 
     // Where the geoid is not known a height means nothing.
     if (!height || (!undulations.empty() && std::isnan(undulations[node]))) continue;
     heights[node] = RoundHeight(undulations.empty() ? *height : *height + undulations[node]);
+    if (trace != nullptr) {
+      trace->cell_of_node[node] = static_cast<std::int32_t>(i);
+      trace->heights[node] = heights[node];
+    }
     if (weights.empty()) continue;
     // Every sample has a weight, so this is plain bilinear. What counts nothing would still hide the floor.
     constexpr double kLeast = 0x1p-10;
     const double weight = counts.empty() ? 1 : Interpolate(counts, window, found.cells[i]).value_or(1);
     weights[node] = static_cast<float>(std::max(kLeast, std::nearbyint(weight * 1024) / 1024));
   }
+  if (trace != nullptr) {
+    trace->window = window;
+    trace->cells = std::move(found.cells);
+  }
   return {};
 }
 
 Result<void> Sheet::Fill(const geo::Lattice& lattice, const NodeWindow& window, Counting counting,
-                         std::span<float> heights, const std::stop_token& stop, std::span<float> weights) const {
+                         std::span<float> heights, const std::stop_token& stop, std::span<float> weights,
+                         SheetTrace* trace) const {
   const int factor = AveragingFactor(SamplesPerCell(lattice, spacing_));
   auto positions = NodePositions(georeference_, reach_, lattice, window, kPositionTolerance * factor);
+  if (trace != nullptr) {
+    trace->positions = positions;
+    trace->cell_of_node.assign(positions.size(), -1);
+    trace->heights.assign(positions.size(), SampleRules::kVoid);
+    trace->factor = factor;
+  }
   for (int row = 0; row < window.rows && georeference_.is_geographic_grid(); ++row) {
     const std::int64_t global = window.row + row;
     if (global > 0 && global < lattice.rows()) continue;
@@ -261,7 +287,8 @@ Result<void> Sheet::Fill(const geo::Lattice& lattice, const NodeWindow& window, 
   }
   std::vector<double> undulations;
   if (undulations_ && counting == Counting::kEllipsoid) undulations = undulations_->At(lattice, window);
-  return FillAt(positions, undulations, factor, heights, stop, weights);
+  if (trace != nullptr) trace->undulations = undulations;
+  return FillAt(positions, undulations, factor, heights, stop, weights, trace);
 }
 
 Result<void> Sheet::Fill(const geo::MercatorGrid& grid, const NodeWindow& window, std::span<float> heights,

@@ -7,6 +7,7 @@
 
 #include <array>
 #include <atomic>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <span>
@@ -29,6 +30,21 @@ struct SheetRange {
   bool shows_others = true;  // part of the tile may lie outside the sheet or in its voids
 };
 
+// What Fill saw of a window, for whoever wants to know how far its heights are from the samples.
+struct SheetTrace {
+  std::vector<Position> positions;         // by node, in pixels; NaN where there is none
+  std::vector<std::int32_t> cell_of_node;  // in `cells`; -1: the sheet has no interpolated height for the node
+  std::vector<float> heights;              // by node: the sheet's own, whatever it counts; NaN where it has none
+  std::vector<double> undulations;         // by node, part of the heights; empty where they count as the samples do
+  std::vector<GridCell> cells;
+  GridWindow window;
+  // Of the window, averages by the factor, before voids were filled; after that where `includes_filled`.
+  std::vector<float> samples;
+  bool includes_filled = false;  // where sheets are blended at the full resolution what is filled in has its share
+  std::vector<float> weights;    // then, of the samples; empty: all count in full
+  int factor = 1;
+};
+
 // What the heights of a sheet are to count from.
 enum class Counting : std::uint8_t {
   kEllipsoid,
@@ -46,6 +62,15 @@ class Sheet {
   static Result<Sheet> Make(SheetPlan plan, const SheetOptions& options);
 
   const std::vector<SheetMember>& members() const { return members_; }
+  // Those that meet a box of pixels; Box::south is its first row.
+  std::vector<std::size_t> MembersAt(const Box& pixels) const { return member_index_.Find(pixels); }
+  const Georeference& georeference() const { return georeference_; }
+  // Of its pixels; columns without the duplicates of a sheet that goes all around the Earth.
+  int columns() const { return columns_; }
+  int rows() const { return height_; }
+  bool wraps() const { return wraps_; }
+  // The largest power of two at whose multiples all members begin.
+  int alignment() const { return alignment_; }
   const SourceSpacing& spacing() const { return spacing_; }
   // Padded: outside it there is nothing.
   const Footprint& reach() const { return reach_; }
@@ -53,6 +78,8 @@ class Sheet {
   const std::array<std::optional<float>, 2>& pole_heights() const { return pole_heights_; }  // as counted
   // What its samples count from.
   const VerticalDatum& vertical() const { return members_.front().raster->vertical(); }
+  const Undulations* undulations() const { return undulations_.get(); }  // null: none are added
+  const SheetOptions& options() const { return options_; }
 
   SampleCounts CountSamples() const { return {counts_->measured, counts_->filled, counts_->voids}; }
 
@@ -62,15 +89,22 @@ class Sheet {
   // These replace the NaN among `heights`, one for each node of the window, by the sheet's heights there, as far as it
   // has some. A height is a function of the node alone. kUnavailable: a raster cannot be read now. kCancelled: stopped.
   // `weights`, if it is not empty, has one for each node: those of the heights that are filled in become what they
-  // count beside what lies below, over 0 to 1.
+  // count beside what lies below, over 0 to 1. `trace` is filled in, unless it is null.
   Result<void> Fill(const geo::Lattice& lattice, const NodeWindow& window, Counting counting, std::span<float> heights,
-                    const std::stop_token& stop, std::span<float> weights = {}) const;
+                    const std::stop_token& stop, std::span<float> weights = {}, SheetTrace* trace = nullptr) const;
   Result<void> Fill(const geo::MercatorGrid& grid, const NodeWindow& window, std::span<float> heights,
                     const std::stop_token& stop, std::span<float> weights = {}) const;
 
   // The same at single points, as measured: nothing is averaged and nothing is filled.
   Result<void> FillPoints(std::span<const GeoPosition> points, HeightDatum datum, std::span<float> heights,
                           const std::stop_token& stop) const;
+
+  // Whether its samples in a box of pixels may count less than in full when they are averaged by this factor or a
+  // smaller one: an edge or a void is as near as the feather is wide.
+  bool GivesWay(const Box& pixels, int factor) const;
+
+  // Of the pixels in a box; what no member covers counts as void.
+  BlockRange Ranges(const Box& pixels) const;
 
   // At least the heights that Fill gives to nodes of the tile, its edges included.
   SheetRange RangeOf(const geo::Lattice& lattice, const geo::TileKey& key) const;
@@ -97,19 +131,18 @@ class Sheet {
   Result<void> Compose(int step, const GridWindow& window, std::span<float> out, const std::stop_token& stop) const;
   Result<void> Average(int factor, const GridWindow& window, float* out, std::int64_t stride,
                        const std::stop_token& stop) const;
-  Result<std::vector<float>> ReadFilled(int factor, const GridWindow& window, const std::stop_token& stop) const;
+  Result<std::vector<float>> ReadFilled(int factor, const GridWindow& window, const std::stop_token& stop,
+                                        SheetTrace* trace = nullptr) const;
   // `undulations`: of the same nodes, added to heights; empty: none are.
   Result<void> FillAt(std::span<const Position> positions, std::span<const double> undulations, int factor,
-                      std::span<float> heights, const std::stop_token& stop, std::span<float> weights) const;
+                      std::span<float> heights, const std::stop_token& stop, std::span<float> weights,
+                      SheetTrace* trace = nullptr) const;
   std::optional<float> PoleHeight(int pole, Counting counting) const;  // 0 south, 1 north
   // What each sample of the window counts; empty: all count in full.
   Result<std::vector<float>> ReadWeights(int factor, const GridWindow& window, const std::stop_token& stop) const;
   // Metres: no more than a bounded number of samples.
   double Feather(int factor) const;
   Result<void> CheckUnread() const;
-
-  // Of the pixels in a box; what no member covers counts as void.
-  BlockRange Ranges(const Box& pixels) const;
 
   struct Counts {
     std::atomic<std::uint64_t> measured{0}, filled{0}, voids{0};

@@ -94,6 +94,13 @@ BlockRange Sheet::Ranges(const Box& pixels) const {
   return range;
 }
 
+bool Sheet::GivesWay(const Box& pixels, int factor) const {
+  PixelBox wide{pixels.west, pixels.south, pixels.east, pixels.north};
+  wide.Grow(Feather(factor) / spacing_.east + 2 * factor, Feather(factor) / spacing_.north + 2 * factor);
+  return wide.north < 0 || wide.south > height_ || (!wraps_ && (wide.west < 0 || wide.east > width_)) ||
+         Ranges({wide.west, wide.north, wide.east, wide.south}).has_voids;
+}
+
 SheetRange Sheet::RangeOf(const geo::Lattice& lattice, const geo::TileKey& key) const {
   const double extent = lattice.cells * lattice.StepDegrees();
   const std::int64_t south_row = lattice.FirstRow(key), north_row = south_row + lattice.cells;
@@ -126,10 +133,7 @@ SheetRange Sheet::RangeOf(const geo::Lattice& lattice, const geo::TileKey& key) 
   for (PixelBox& box : boxes) {
     leaves |= box.north < 0 || box.south > height_;
     if (options_.feather_m > 0) {
-      PixelBox wide = box;
-      wide.Grow(Feather(factor) / spacing_.east + 2 * factor, Feather(factor) / spacing_.north + 2 * factor);
-      blends |= wide.north < 0 || wide.south > height_ || (!wraps_ && (wide.west < 0 || wide.east > width_)) ||
-                Ranges({wide.west, wide.north, wide.east, wide.south}).has_voids;
+      blends |= GivesWay({box.west, box.north, box.east, box.south}, factor);
     }
     // Bilinear interpolation reaches one and a half samples of the grid.
     box.Grow(1.5 * factor + 1, 1.5 * factor + 1);

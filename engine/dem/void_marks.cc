@@ -101,7 +101,8 @@ class Looker {
 
 }  // namespace
 
-void ZeroEdges::Add(const float* heights, int cols, int rows, bool left, bool top, bool right, bool bottom) {
+void ZeroEdges::Add(const float* heights, std::ptrdiff_t stride, int cols, int rows, bool left, bool top, bool right,
+                    bool bottom) {
   const auto pair = [this](float a, float b) {
     if ((a == 0) == (b == 0)) return;
     const float other = std::abs(a + b);
@@ -112,15 +113,22 @@ void ZeroEdges::Add(const float* heights, int cols, int rows, bool left, bool to
     }
   };
   for (int r = 0; r < rows; ++r) {
-    const float* const row = heights + std::ptrdiff_t{r} * cols;
+    const float* const row = heights + r * stride;
     for (int c = 0; c < cols; ++c) {
       if (c + 1 < cols) pair(row[c], row[c + 1]);
-      if (r + 1 < rows) pair(row[c], row[c + cols]);
+      if (r + 1 < rows) pair(row[c], row[c + stride]);
     }
     zeros += std::count(row, row + cols, 0.0f);
     at_border += (left && row[0] == 0) + (right && row[cols - 1] == 0);
     if ((top && r == 0) || (bottom && r + 1 == rows)) at_border += std::count(row, row + cols, 0.0f);
   }
+}
+
+void ZeroEdges::Add(const ZeroEdges& other) {
+  high += other.high;
+  low += other.low;
+  zeros += other.zeros;
+  at_border += other.at_border;
 }
 
 bool ZeroEdges::IsCollar() const {

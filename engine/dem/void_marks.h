@@ -21,7 +21,10 @@ struct ZeroEdges {
   std::int64_t zeros = 0, at_border = 0;  // all, and those in the outermost rows and columns
 
   // Heights of a part of the raster whose outermost samples lie on its border or not.
-  void Add(const float* heights, int cols, int rows, bool left, bool top, bool right, bool bottom);
+  // `stride` values lie from one row to the next.
+  void Add(const float* heights, std::ptrdiff_t stride, int cols, int rows, bool left, bool top, bool right,
+           bool bottom);
+  void Add(const ZeroEdges& other);
 
   // Zeros that reach the border, beside nearly all of which the ground is more than 100 m off: no sea looks so. They
   // lie in areas or along the border; those strewn over the raster are something else.
@@ -44,11 +47,10 @@ bool MayHideVoids(const SampleRules& rules, double lowest, double highest, bool 
 // Reads the whole band once more.
 //
 // - A mark is one of the values in use (-32768, -32767, -9999, 9999, 32767) that stands alone: samples within 1,000 m
-// of
-//   it are at most a quarter as many as it has itself.
+//   of it are at most a quarter as many as it has itself.
 // - Heights below -500 m or above 9,000 m are mixtures if each of them lies within 3 samples of a void: no land is
-// lower
-//   or higher. In a sea floor they lie elsewhere too; there the bound is -12,000 m. Then all voids grow by 2 samples.
+//   lower or higher. In a sea floor they lie elsewhere too; there the bound is -12,000 m. Then all voids grow by 2
+//   samples.
 // - Zeros are voids where they are a collar; voids then grow by one sample.
 Result<VoidFindings> FindVoids(GDALRasterBand& band, const SampleRules& rules, const ZeroEdges& zeros,
                                const std::stop_token& stop = {});

@@ -43,13 +43,14 @@ std::string NameOf(const std::vector<config::SourceConfig>& sources) {
                      sources.size() == 2 ? "" : "s");
 }
 
-Result<std::unique_ptr<dem::DemSource>> OpenSource(const config::DatasetConfig& wanted,
+Result<std::unique_ptr<dem::DemSource>> OpenSource(const config::DatasetConfig& wanted, const std::string& cache_dir,
                                                    const std::function<void(double)>& progress, std::stop_token stop) {
   dem::DemOptions options;
   options.error_fraction = wanted.error_fraction;
   options.finest_error = wanted.finest_error;
   options.floor = wanted.floor;
   options.max_void_gap = wanted.max_void_gap;
+  options.cache_dir = cache_dir;
   options.feather = wanted.feather;
   options.max_open_sources = wanted.max_open_sources;
   options.progress = progress;

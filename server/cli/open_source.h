@@ -21,8 +21,9 @@ std::size_t FileCount(const std::vector<config::SourceConfig>& sources);
 // For messages: "alps.tif", "alps.tif and 2 more sources".
 std::string NameOf(const std::vector<config::SourceConfig>& sources);
 
-// Opens and scans all of them. Errors name the file and the remedy.
-Result<std::unique_ptr<dem::DemSource>> OpenSource(const config::DatasetConfig& wanted,
+// Opens and scans all of them; what is learnt is kept in `cache_dir`, if it is not empty. Errors name the file and the
+// remedy.
+Result<std::unique_ptr<dem::DemSource>> OpenSource(const config::DatasetConfig& wanted, const std::string& cache_dir,
                                                    const std::function<void(double)>& progress,
                                                    std::stop_token stop = {});
 

@@ -28,6 +28,7 @@
 #include "server/cli/service_manager.h"
 #include "server/reload/reloader.h"
 #include "server/server.h"
+#include "server/tiles/disk_cache.h"
 #include "server/tiles/pipeline_catalog.h"
 #include "server/tiles/tile_pipeline.h"
 
@@ -131,9 +132,9 @@ proto::GlbOptions GlbOptionsOf(const config::DatasetConfig& dataset) {
   return options;
 }
 
-Result<server::Dataset> OpenDataset(const config::DatasetConfig& wanted, const std::function<void(double)>& progress,
-                                    std::stop_token stop) {
-  auto source = OpenSource(wanted, progress, std::move(stop));
+Result<server::Dataset> OpenDataset(const config::DatasetConfig& wanted, const std::string& cache_dir,
+                                    const std::function<void(double)>& progress, std::stop_token stop) {
+  auto source = OpenSource(wanted, cache_dir, progress, std::move(stop));
   if (!source) return tl::unexpected(source.error());
   server::Dataset dataset;
   dataset.name = wanted.name;
@@ -151,8 +152,9 @@ Result<server::Dataset> OpenDataset(const config::DatasetConfig& wanted, const s
 bool OpenDatasets(const config::Config& config, std::vector<server::Dataset>& datasets) {
   bool all_open = true;
   for (const config::DatasetConfig& wanted : config.datasets) {
-    Progress progress("reading " + NameOf(wanted.sources), FileCount(wanted.sources));
-    Result<server::Dataset> dataset = OpenDataset(wanted, progress.Callback(), {});
+    Progress progress((config.cache_dir.empty() ? "reading " : "preparing ") + NameOf(wanted.sources),
+                      FileCount(wanted.sources));
+    Result<server::Dataset> dataset = OpenDataset(wanted, config.cache_dir, progress.Callback(), {});
     if (!dataset) {
       std::fprintf(stderr, "terrace: dataset %s: %s\n", wanted.name.c_str(), dataset.error().message.c_str());
       all_open = false;
@@ -234,6 +236,16 @@ server::ServerOptions OptionsOf(const config::Config& config) {
   return options;
 }
 
+// Null where there is to be none.
+Result<std::shared_ptr<server::DiskCache>> OpenDiskCache(const config::DiskCacheConfig& config) {
+  if (config.directory.empty()) return nullptr;
+  server::DiskCacheOptions options;
+  options.directory = config.directory;
+  options.tile_bytes = config.tile_bytes;
+  options.refinement_bytes = config.refinement_bytes;
+  return server::DiskCache::Open(options);
+}
+
 int Serve(const ServeArguments& arguments) {
   std::vector<config::ConfigError> errors;
   const config::Config config = MakeConfig(arguments, errors);
@@ -243,6 +255,12 @@ int Serve(const ServeArguments& arguments) {
     return kExitOk;
   }
   SetUpLog(config.log_level, config.log_format);
+  // First, so that a directory that cannot be used is known before sources are scanned.
+  Result<std::shared_ptr<server::DiskCache>> disk = OpenDiskCache(config.disk_cache);
+  if (!disk) {
+    std::fprintf(stderr, "terrace: %s\n", disk.error().message.c_str());
+    return kExitFailure;
+  }
   dem::SetGdalCache(config.gdal_cache_bytes);
   if (const auto policy = dem::SetSourcePolicy({config.data_roots, config.allowed_prefixes, config.allowed_drivers});
       !policy) {
@@ -253,7 +271,7 @@ int Serve(const ServeArguments& arguments) {
   if (!OpenDatasets(config, datasets)) return kExitFailure;
   const std::size_t count = datasets.size();
 
-  const auto refinements = std::make_shared<server::RefinementCache>(config.refinement_cache_bytes);
+  const auto refinements = std::make_shared<server::RefinementCache>(config.refinement_cache_bytes, *disk);
   const auto catalog_of = [refinements](const std::vector<server::Dataset>& served, const config::Config& now) {
     return server::MakeCatalog(std::make_shared<const server::TilePipeline>(served, refinements), now.max_mesh_samples);
   };
@@ -266,8 +284,8 @@ int Serve(const ServeArguments& arguments) {
     if (!wrong.empty()) return tl::unexpected(std::move(wrong));
     return loaded;
   };
-  hooks.open = [](const config::DatasetConfig& wanted, std::stop_token stop) {
-    return OpenDataset(wanted, {}, std::move(stop));
+  hooks.open = [cache_dir = config.cache_dir](const config::DatasetConfig& wanted, std::stop_token stop) {
+    return OpenDataset(wanted, cache_dir, {}, std::move(stop));
   };
   hooks.publish = [&](const std::vector<server::Dataset>& served, const config::Config& now) {
     if (level->exchange(now.log_level) != now.log_level) SetLogLevel(now.log_level);
@@ -287,6 +305,7 @@ int Serve(const ServeArguments& arguments) {
   server::Reloader reloader(config, datasets, std::move(hooks));
 
   server::ServerOptions options = OptionsOf(config);
+  options.disk_cache = *std::move(disk);
   options.refinement_stats = [refinements] { return refinements->stats(); };
   options.on_source_changed = config.watch ? std::function<void()>([&reloader] { reloader.Look(); }) : nullptr;
   // Without a file the end of a terminal is what it always was.

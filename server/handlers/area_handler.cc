@@ -134,14 +134,14 @@ asio::awaitable<Response> AreaHandler::Handle(Route route, Request request) cons
   const Result<AreaPlan> plan = catalog_->area_mesher.plan(*dataset, *area);
   if (!plan) co_return ClientErrorResponse(plan.error(), request.id);
 
-  const Coding coding = NegotiateCoding(request.accept_encoding);
+  const Coding coding = NegotiateCoding(request.fields->accept_encoding);
   Response response;
   response.content_type = ContentTypeOf(area->format);
   response.coding = coding;
   response.etag = RequestETag("mesh", catalog_->datasets[*dataset], route.query, coding);
   response.cache_control = options_.cache_control;
   response.vary = true;
-  if (MatchesEtag(request.if_none_match, response.etag)) co_return Conditional(std::move(response), request);
+  if (MatchesEtag(request.fields->if_none_match, response.etag)) co_return Conditional(std::move(response), request);
 
   SingleFlight::Work work = [catalog = catalog_, index = *dataset, area = *area, plan = *plan,
                              coding](std::stop_token stop) -> Result<EncodedTile> {

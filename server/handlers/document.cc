@@ -20,7 +20,7 @@ Document Document::Make(std::string bytes, std::string_view content_type, std::o
 }
 
 Response Serve(const Document& document, const Request& request, std::string_view cache_control) {
-  const bool gzip = document.gzip && NegotiateCoding(request.accept_encoding, kGzipOnly) == Coding::kGzip;
+  const bool gzip = document.gzip && NegotiateCoding(request.fields->accept_encoding, kGzipOnly) == Coding::kGzip;
   Response response;
   response.content_type = document.content_type;
   response.coding = gzip ? Coding::kGzip : Coding::kIdentity;

@@ -23,7 +23,7 @@ Result<HeightsQuery> HeightsHandler::Parse(const Route& route, const Request& re
   Result<QueryParameters> parameters = ParseQuery(route.query);
   if (!parameters) return tl::unexpected(std::move(parameters).error());
   if (request.method == Method::kPost) {
-    Result<QueryParameters> sent = ParseHeightsBody(request.content_type, request.body);
+    Result<QueryParameters> sent = ParseHeightsBody(request.fields->content_type, request.body);
     if (!sent) return tl::unexpected(std::move(sent).error());
     std::move(sent->begin(), sent->end(), std::back_inserter(*parameters));
   }
@@ -32,7 +32,7 @@ Result<HeightsQuery> HeightsHandler::Parse(const Route& route, const Request& re
 
 asio::awaitable<Response> HeightsHandler::Handle(Route route, Request request) const {
   const bool is_post = request.method == Method::kPost;
-  if (is_post && !IsHeightsBody(request.content_type)) {
+  if (is_post && !IsHeightsBody(request.fields->content_type)) {
     co_return ProblemResponse(
         415, "the body's Content-Type must be application/json or application/x-www-form-urlencoded", request.id);
   }
@@ -47,7 +47,7 @@ asio::awaitable<Response> HeightsHandler::Handle(Route route, Request request) c
     co_return ClientErrorResponse(unknown, request.id);
   }
 
-  const Coding coding = NegotiateCoding(request.accept_encoding);
+  const Coding coding = NegotiateCoding(request.fields->accept_encoding);
   Response response;
   response.content_type = "application/json";
   response.coding = coding;
@@ -56,7 +56,7 @@ asio::awaitable<Response> HeightsHandler::Handle(Route route, Request request) c
   if (!is_post) {
     response.etag = RequestETag("heights", catalog_->datasets[*dataset], route.query, coding);
     response.cache_control = options_.cache_control;
-    if (MatchesEtag(request.if_none_match, response.etag)) co_return Conditional(std::move(response), request);
+    if (MatchesEtag(request.fields->if_none_match, response.etag)) co_return Conditional(std::move(response), request);
   }
 
   auto query = std::make_shared<const HeightsQuery>(*std::move(parsed));

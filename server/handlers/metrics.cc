@@ -41,6 +41,65 @@ prometheus::MetricFamily Value(prometheus::MetricType type, const char* name, co
   return family;
 }
 
+// One family by tier and kind, a value for each cache that there is.
+class CacheFamily {
+ public:
+  CacheFamily(prometheus::MetricType type, const char* name, const char* help) {
+    family_.name = name;
+    family_.help = help;
+    family_.type = type;
+  }
+  CacheFamily& Add(const char* tier, const char* kind, std::uint64_t value) {
+    prometheus::ClientMetric metric;
+    metric.label = {{"tier", tier}, {"kind", kind}};
+    (family_.type == prometheus::MetricType::Counter ? metric.counter.value : metric.gauge.value) =
+        static_cast<double>(value);
+    family_.metric.push_back(std::move(metric));
+    return *this;
+  }
+  prometheus::MetricFamily Take() { return std::move(family_); }
+
+ private:
+  prometheus::MetricFamily family_;
+};
+
+void AddCaches(const TileService::Stats& tiles, const ByteCacheStats& refinements,
+               std::vector<prometheus::MetricFamily>& all) {
+  constexpr auto kCounter = prometheus::MetricType::Counter;
+  constexpr auto kGauge = prometheus::MetricType::Gauge;
+  const auto both_tiers = [&](prometheus::MetricType type, const char* name, const char* help, auto memory, auto disk) {
+    CacheFamily family(type, name, help);
+    family.Add("memory", "tiles", tiles.cache.*memory).Add("memory", "refinements", refinements.*memory);
+    if (tiles.disk) {
+      family.Add("disk", "tiles", tiles.disk->tiles.*disk).Add("disk", "refinements", tiles.disk->refinements.*disk);
+    }
+    all.push_back(family.Take());
+  };
+  both_tiers(kCounter, "terrace_cache_hits_total", "Found in a cache", &ByteCacheStats::hits, &DiskStoreStats::hits);
+  both_tiers(kCounter, "terrace_cache_misses_total", "Looked for in a cache and not found", &ByteCacheStats::misses,
+             &DiskStoreStats::misses);
+  both_tiers(kGauge, "terrace_cache_entries", "Entries of a cache; on disk about", &ByteCacheStats::entries,
+             &DiskStoreStats::entries);
+  both_tiers(kGauge, "terrace_cache_bytes", "Bytes charged to a cache; on disk those of its files",
+             &ByteCacheStats::bytes, &DiskStoreStats::bytes);
+  if (!tiles.disk) return;
+  const auto disk_tier = [&](prometheus::MetricType type, const char* name, const char* help, auto member) {
+    all.push_back(CacheFamily(type, name, help)
+                      .Add("disk", "tiles", tiles.disk->tiles.*member)
+                      .Add("disk", "refinements", tiles.disk->refinements.*member)
+                      .Take());
+  };
+  disk_tier(kCounter, "terrace_cache_errors_total", "Reads and writes of a cache that the disk failed",
+            &DiskStoreStats::errors);
+  disk_tier(kCounter, "terrace_cache_damaged_total", "Records that did not check out and were erased",
+            &DiskStoreStats::damaged);
+  disk_tier(kCounter, "terrace_cache_written_total", "Values written", &DiskStoreStats::written);
+  disk_tier(kCounter, "terrace_cache_dropped_total", "Values not written, as the disk failed or was behind",
+            &DiskStoreStats::dropped);
+  disk_tier(kGauge, "terrace_cache_on", "1 while a cache reads and writes, 0 while it is switched off",
+            &DiskStoreStats::on);
+}
+
 prometheus::MetricFamily Samples(const std::vector<std::pair<std::string, dem::SampleCounts>>& datasets) {
   prometheus::MetricFamily family;
   family.name = "terrace_source_samples_total";
@@ -181,23 +240,7 @@ std::string Metrics::Text(const TileService::Stats& tiles, const ByteCacheStats&
   const auto add = [&all](prometheus::MetricType type, const char* name, const char* help, auto value) {
     all.push_back(Value(type, name, help, static_cast<double>(value)));
   };
-  const auto add_tiers = [&all](prometheus::MetricType type, const char* name, const char* help, double of_tiles,
-                                double of_refinements) {
-    prometheus::MetricFamily family = Value(type, name, help, of_tiles);
-    family.metric.push_back(Value(type, name, help, of_refinements).metric.front());
-    family.metric[0].label = {{"tier", "tiles"}};
-    family.metric[1].label = {{"tier", "refinements"}};
-    all.push_back(std::move(family));
-  };
-  add_tiers(kCounter, "terrace_cache_hits_total", "Tiles served from the cache; builds that found a refinement",
-            static_cast<double>(tiles.hits), families_->continued.Value() + families_->replayed.Value());
-  add_tiers(kCounter, "terrace_cache_misses_total",
-            "Tile requests that started a build or were refused one; builds that found no refinement",
-            static_cast<double>(tiles.misses), families_->made.Value());
-  add_tiers(kGauge, "terrace_cache_entries", "Entries in the cache", static_cast<double>(tiles.cache.entries),
-            static_cast<double>(refinements.entries));
-  add_tiers(kGauge, "terrace_cache_bytes", "Bytes charged to the cache", static_cast<double>(tiles.cache.bytes),
-            static_cast<double>(refinements.bytes));
+  AddCaches(tiles, refinements, all);
   add(kCounter, "terrace_flights_joined_total", "Tile requests that waited for a build already under way",
       tiles.joined);
   add(kGauge, "terrace_flights", "Builds under way or waiting", tiles.in_flight);

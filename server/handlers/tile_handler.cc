@@ -20,6 +20,8 @@ std::string_view Name(CacheStatus cache) {
   switch (cache) {
     case CacheStatus::kHit:
       return "hit";
+    case CacheStatus::kDisk:
+      return "disk";
     case CacheStatus::kMiss:
       return "miss";
     case CacheStatus::kJoined:
@@ -65,6 +67,9 @@ Response TileHandler::Reply(const ServedTile& served, const TileRequest& tile, c
   response.cache_control = options_.cache_control;
   response.vary = tile.format != TileFormat::kHeightPng;  // which has one form
   response.headers.emplace_back("Terrain-Max-Error", FormatErrorUp(served.tile->max_error_m));
+  if (const auto certified = served.tile->certified_error_m; certified && std::isfinite(*certified)) {
+    response.headers.emplace_back("Terrain-Certified-Error", FormatErrorUp(*certified));
+  }
   response.headers.emplace_back("Server-Timing", FormatServerTiming(served.cache, served.tile->times));
   response.cache = Name(served.cache);
   return Conditional(std::move(response), request);

@@ -53,8 +53,8 @@ Response TileJsonHandler::Handle(const Route& route, const Request& request) con
 }
 
 std::string OriginOf(const Request& request) {
-  if (request.host.empty()) return {};
-  return fmt::format("{}://{}", request.is_https ? "https" : "http", request.host);
+  if (request.fields->host.empty()) return {};
+  return fmt::format("{}://{}", request.is_https ? "https" : "http", request.fields->host);
 }
 
 }  // namespace terrace::server

@@ -71,13 +71,13 @@ Hop ParseForwarded(std::string_view element) {
 std::vector<Hop> HopsOf(const Request& request, ForwardedHeader header) {
   std::vector<Hop> hops;
   if (header == ForwardedHeader::kForwarded) {
-    for (const std::string_view element : Pieces(request.forwarded)) hops.push_back(ParseForwarded(element));
+    for (const std::string_view element : Pieces(request.fields->forwarded)) hops.push_back(ParseForwarded(element));
     return hops;
   }
-  for (const std::string_view node : Pieces(request.forwarded_for)) hops.push_back({node, {}, {}});
+  for (const std::string_view node : Pieces(request.fields->forwarded_for)) hops.push_back({node, {}, {}});
   if (hops.empty()) hops.emplace_back();
-  hops.back().host = LastPiece(request.forwarded_host);
-  hops.back().scheme = LastPiece(request.forwarded_proto);
+  hops.back().host = LastPiece(request.fields->forwarded_host);
+  hops.back().scheme = LastPiece(request.fields->forwarded_proto);
   return hops;
 }
 
@@ -125,10 +125,13 @@ bool AddressRanges::Contains(const address& any) const {
 address ResolveClient(Request& request, const address& peer, const Proxies& proxies) {
   address client = Canonical(peer);
   if (proxies.trusted.empty() || !proxies.trusted.Contains(client)) return client;
+  const SharedFields said = request.fields;  // what the hops point into
   const std::vector<Hop> hops = HopsOf(request, proxies.header);
   if (hops.empty()) return client;
   // The nearest proxy's word about what it was asked for.
-  if (IsHostValue(hops.back().host) && !hops.back().host.empty()) request.host = std::string(hops.back().host);
+  if (IsHostValue(hops.back().host) && !hops.back().host.empty()) {
+    request.fields.Set(&RequestFields::host, std::string(hops.back().host));
+  }
   request.is_https = hops.back().scheme.empty() ? request.is_https : EqualsIgnoringCase(hops.back().scheme, "https");
   for (auto hop = hops.rbegin(); hop != hops.rend() && proxies.trusted.Contains(client); ++hop) {
     const std::optional<address> node = ParseNode(hop->node);

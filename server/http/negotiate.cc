@@ -138,9 +138,9 @@ Result<TileRequest> Negotiate(const Route& route, const Request& request, std::s
     tile.compression = parameters->compression.value_or(view.glb_compression);
     if (view.texture) tile.texture = parameters->texture.value_or(*view.texture);
   }
-  if (CompressionHelps(tile)) tile.coding = NegotiateCoding(request.accept_encoding);
+  if (CompressionHelps(tile)) tile.coding = NegotiateCoding(request.fields->accept_encoding);
   if (route.format == TileFormat::kQuantizedMesh) {
-    const proto::TileExtensions wanted = WantedExtensions(request.accept, parameters->extensions);
+    const proto::TileExtensions wanted = WantedExtensions(request.fields->accept, parameters->extensions);
     tile.normals = wanted.octvertexnormals;
     tile.water_mask = wanted.watermask && view.has_water;
     tile.metadata = wanted.metadata && proto::CarriesMetadata(route.key.level, view.metadata_levels, view.max_level());

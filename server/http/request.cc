@@ -6,6 +6,7 @@
 #include <boost/beast/http/fields.hpp>
 #include <boost/beast/http/parser.hpp>
 #include <optional>
+#include <utility>
 
 #include "server/asio.h"
 #include "server/http/query.h"
@@ -72,18 +73,101 @@ const char* HostProblem(const Fields& fields) {
   return nullptr;
 }
 
-// RFC 6750: the header, or the query.
-std::string TokenOf(const Fields& fields, std::string& target) {
+// RFC 6750.
+std::optional<std::string> BearerOf(const Fields& fields) {
   constexpr std::string_view kScheme = "bearer ";
-  const std::optional<std::string> in_query = TakeToken(target);
   const std::string_view authorization = fields[http::field::authorization];
-  if (EqualsIgnoringCase(authorization.substr(0, kScheme.size()), kScheme)) {
-    return std::string(Trim(authorization.substr(kScheme.size())));
+  if (!EqualsIgnoringCase(authorization.substr(0, kScheme.size()), kScheme)) return std::nullopt;
+  return std::string(Trim(authorization.substr(kScheme.size())));
+}
+
+RequestFields FieldsOf(const Fields& sent) {
+  RequestFields fields;
+  fields.accept = Joined(sent, http::field::accept);
+  fields.accept_encoding = Joined(sent, http::field::accept_encoding);
+  fields.if_none_match = Joined(sent, http::field::if_none_match);
+  fields.host = std::string(sent[http::field::host]);
+  fields.origin = Joined(sent, http::field::origin);
+  fields.forwarded = Joined(sent, http::field::forwarded);
+  fields.forwarded_for = Joined(sent, "X-Forwarded-For");
+  fields.forwarded_host = Joined(sent, "X-Forwarded-Host");
+  fields.forwarded_proto = Joined(sent, "X-Forwarded-Proto");
+  const auto referer = sent[http::field::referer];
+  fields.referer = std::string(referer.substr(0, referer.find('?')));
+  fields.user_agent = std::string(sent[http::field::user_agent]);
+  fields.bearer = BearerOf(sent);
+  fields.content_type = std::string(sent[http::field::content_type]);
+  fields.content_encoding = Joined(sent, http::field::content_encoding);
+  return fields;
+}
+
+// What follows from the first line and the fields; the header's token counts before the one in the query.
+void SetTarget(Request& request, std::string_view target) {
+  request.target = std::string(target);
+  std::optional<std::string> in_query = TakeToken(request.target);
+  request.token = request.fields->bearer ? *request.fields->bearer : std::move(in_query).value_or("");
+}
+
+// Lines that no two readers understand differently; any other goes through the whole parser.
+struct PlainLine {
+  Method method;
+  std::string_view name, target;
+  std::size_t size;  // with its CR LF
+};
+
+std::optional<PlainLine> ReadPlainLine(std::string_view head) {
+  constexpr std::string_view kVersion = " HTTP/1.1";
+  const std::size_t size = head.find("\r\n");
+  if (size == std::string_view::npos) return std::nullopt;
+  std::string_view line = head.substr(0, size);
+  const bool is_get = line.starts_with("GET ");
+  if (!is_get && !line.starts_with("HEAD ")) return std::nullopt;
+  if (!line.ends_with(kVersion)) return std::nullopt;
+  const std::string_view name = line.substr(0, is_get ? 3 : 4);
+  if (line.size() <= name.size() + 1 + kVersion.size()) return std::nullopt;
+  const std::string_view target = line.substr(name.size() + 1, line.size() - name.size() - 1 - kVersion.size());
+  if (target.size() > kMaxTargetBytes || target[0] != '/') return std::nullopt;
+  if (!std::all_of(target.begin(), target.end(), [](char c) { return c > 0x20 && c < 0x7f; })) return std::nullopt;
+  return PlainLine{is_get ? Method::kGet : Method::kHead, name, target, size + 2};
+}
+
+// Nothing: the header is another one than the last.
+std::optional<Request> Repeated(std::string_view head, const HeadMemo& memo) {
+  if (memo.bytes.empty() || !head.ends_with(memo.bytes)) return std::nullopt;
+  const std::optional<PlainLine> line = ReadPlainLine(head);
+  if (!line || line->size + memo.bytes.size() != head.size()) return std::nullopt;
+  Request request;
+  request.method = line->method;
+  request.method_name = std::string(line->name);
+  request.keep_alive = memo.keep_alive;
+  request.fields = memo.fields;
+  SetTarget(request, line->target);
+  return request;
+}
+
+void Remember(std::string_view head, const Request& request, HeadMemo& memo) {
+  const std::optional<PlainLine> line = ReadPlainLine(head);
+  if (!line || request.content_length > 0 || request.expects_continue) {
+    memo.bytes.clear();
+    return;
   }
-  return in_query.value_or("");
+  memo.bytes = head.substr(line->size);
+  memo.keep_alive = request.keep_alive;
+  memo.fields = request.fields;
 }
 
 }  // namespace
+
+SharedFields::SharedFields() {
+  static const auto none = std::make_shared<const RequestFields>();
+  fields_ = none;
+}
+
+void SharedFields::Set(std::string RequestFields::*field, std::string value) {
+  auto own = std::make_shared<RequestFields>(*fields_);
+  (*own).*field = std::move(value);
+  fields_ = std::move(own);
+}
 
 bool IsHostValue(std::string_view value) {
   return std::all_of(value.begin(), value.end(), [](char c) {
@@ -96,6 +180,7 @@ std::optional<std::string> TakeToken(std::string& target) {
   const std::size_t question = target.find('?');
   if (question == std::string::npos) return std::nullopt;
   std::string_view rest = std::string_view(target).substr(question + 1);
+  if (rest.find("token") == std::string_view::npos && rest.find('%') == std::string_view::npos) return std::nullopt;
   std::optional<std::string> token;
   std::string kept;
   while (!rest.empty()) {
@@ -132,7 +217,10 @@ tl::expected<std::size_t, BadRequest> FindHeadEnd(std::string_view bytes, std::s
   return end == std::string_view::npos ? 0 : end + 4;
 }
 
-tl::expected<Request, BadRequest> ParseHead(std::string_view head) {
+tl::expected<Request, BadRequest> ParseHead(std::string_view head, HeadMemo* memo) {
+  if (memo != nullptr) {
+    if (std::optional<Request> request = Repeated(head, *memo)) return *std::move(request);
+  }
   // Beast unfolds continued lines; another reader may see a field there.
   if (head.find("\r\n ") != std::string_view::npos || head.find("\r\n\t") != std::string_view::npos) {
     return Bad(400, "folded header lines are not accepted");
@@ -154,26 +242,13 @@ tl::expected<Request, BadRequest> ParseHead(std::string_view head) {
   request.version = fields.version();
   request.keep_alive = fields.keep_alive();
   request.method_name = std::string(fields.method_string());
-  request.target = std::string(fields.target());
-  request.token = TokenOf(fields, request.target);
-  request.accept = Joined(fields, http::field::accept);
-  request.accept_encoding = Joined(fields, http::field::accept_encoding);
-  request.if_none_match = Joined(fields, http::field::if_none_match);
-  const auto referer = fields[http::field::referer];
-  request.referer = std::string(referer.substr(0, referer.find('?')));
-  request.user_agent = std::string(fields[http::field::user_agent]);
-  request.content_type = std::string(fields[http::field::content_type]);
-  request.content_encoding = Joined(fields, http::field::content_encoding);
+  request.fields = SharedFields(FieldsOf(fields));
+  SetTarget(request, fields.target());
   request.content_length = static_cast<std::size_t>(*PlainLength(fields));
   // RFC 9110, section 10.1.1: HTTP/1.0 knows no interim replies.
   request.expects_continue =
       fields.version() >= 11 && boost::beast::iequals(fields[http::field::expect], "100-continue");
-  request.host = std::string(fields[http::field::host]);
-  request.origin = Joined(fields, http::field::origin);
-  request.forwarded = Joined(fields, http::field::forwarded);
-  request.forwarded_for = Joined(fields, "X-Forwarded-For");
-  request.forwarded_host = Joined(fields, "X-Forwarded-Host");
-  request.forwarded_proto = Joined(fields, "X-Forwarded-Proto");
+  if (memo != nullptr) Remember(head, request, *memo);
   return request;
 }
 

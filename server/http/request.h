@@ -6,10 +6,12 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <tl/expected.hpp>
+#include <utility>
 
 #include "server/http/access.h"
 
@@ -20,6 +22,38 @@ inline constexpr std::size_t kMaxTargetBytes = 8 * 1024;
 
 enum class Method { kGet, kHead, kOptions, kPost, kOther };
 
+// What the header of a request says, but for its framing.
+struct RequestFields {
+  std::string accept;  // several fields joined with ", ", here and below
+  std::string accept_encoding;
+  std::string if_none_match;
+  std::string host;  // host and port: letters, digits and "-._~%!$&'()*+,;=:[]"; may be empty
+  std::string origin;
+  // What a proxy before the server may have written, or the client: see ResolveClient.
+  std::string forwarded, forwarded_for, forwarded_host, forwarded_proto;
+  std::string referer, user_agent;    // for the log; the referer without its query, which may hold a token
+  std::optional<std::string> bearer;  // of the Authorization header; a secret
+  std::string content_type;
+  std::string content_encoding;
+
+  friend bool operator==(const RequestFields&, const RequestFields&) = default;
+};
+
+// Shared by the requests of a connection that say the same, as nearly all do.
+class SharedFields {
+ public:
+  SharedFields();  // empty ones
+  explicit SharedFields(RequestFields fields) : fields_(std::make_shared<const RequestFields>(std::move(fields))) {}
+
+  const RequestFields& operator*() const { return *fields_; }
+  const RequestFields* operator->() const { return fields_.get(); }
+  // The others keep theirs.
+  void Set(std::string RequestFields::*field, std::string value);
+
+ private:
+  std::shared_ptr<const RequestFields> fields_;  // never null
+};
+
 struct Request {
   Method method = Method::kGet;
   unsigned version = 11;    // 10 or 11
@@ -27,16 +61,7 @@ struct Request {
   std::string method_name;  // as sent, for the log
   std::string target;       // as sent, but for the token in its query
   std::string token;        // of the Authorization header, else of the query; a secret: never logged, never a key
-  std::string accept;       // several fields joined with ", ", here and below
-  std::string accept_encoding;
-  std::string if_none_match;
-  std::string host;  // host and port: letters, digits and "-._~%!$&'()*+,;=:[]"; may be empty
-  std::string origin;
-  // What a proxy before the server may have written, or the client: see ResolveClient.
-  std::string forwarded, forwarded_for, forwarded_host, forwarded_proto;
-  std::string referer, user_agent;  // for the log; the referer without its query, which may hold a token
-  std::string content_type;
-  std::string content_encoding;
+  SharedFields fields;
   std::size_t content_length = 0;  // of a POST
   bool expects_continue = false;   // the client waits for a 100 before it sends the body
   std::string body;                // of a POST, once the session has read it
@@ -58,8 +83,17 @@ struct BadRequest {
 // `scanned` bytes were looked at by an earlier call with the same beginning.
 tl::expected<std::size_t, BadRequest> FindHeadEnd(std::string_view bytes, std::size_t scanned);
 
-// `head` ends with its empty line. Sets everything but `body` and what is given by the server.
-tl::expected<Request, BadRequest> ParseHead(std::string_view head);
+// The header of a connection's last request without a body, byte by byte: the next one that repeats it needs no parsing
+// but of its first line.
+struct HeadMemo {
+  std::string bytes;  // all behind the first line; empty: nothing to repeat
+  bool keep_alive = true;
+  SharedFields fields;
+};
+
+// `head` ends with its empty line. Sets everything but `body` and what is given by the server. The result does not
+// depend on `memo`, which may be null.
+tl::expected<Request, BadRequest> ParseHead(std::string_view head, HeadMemo* memo = nullptr);
 
 // Whether it is a host and port after RFC 3986, or empty, which is what a client sends whose URI has no authority.
 bool IsHostValue(std::string_view value);

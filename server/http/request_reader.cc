@@ -36,7 +36,7 @@ asio::awaitable<RequestReader::Head> RequestReader::ReadHead() {
       const auto end = FindHeadEnd(Unread(), scanned);
       if (!end) co_return Head(tl::unexpected(end.error()));
       if (*end > 0) {
-        Head parsed(ParseHead(Unread().substr(0, *end)));
+        Head parsed(ParseHead(Unread().substr(0, *end), &memo_));
         Consume(*end);
         co_return parsed;
       }

@@ -51,6 +51,7 @@ class RequestReader {
   const ReadTimeouts timeouts_;
   std::string buffer_;  // what was read; beyond `consumed_`, the next requests of a client that does not wait
   std::size_t consumed_ = 0;
+  HeadMemo memo_;
   bool is_first_ = true;
   bool waiting_ = false;
   bool closing_ = false;

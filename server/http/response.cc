@@ -137,7 +137,7 @@ Response PreflightResponse(bool takes_post) {
 
 Response Conditional(Response response, const Request& request) {
   if (response.status != 200 || response.etag.empty()) return response;
-  if (!MatchesEtag(request.if_none_match, response.etag)) return response;
+  if (!MatchesEtag(request.fields->if_none_match, response.etag)) return response;
   response.status = 304;
   response.body = nullptr;
   return response;

@@ -37,7 +37,10 @@ constexpr int kClientLeft = 499;
 std::string NextRequestId() {
   static const std::uint64_t start = std::uint64_t{std::random_device{}()} << 32;
   static std::atomic<std::uint64_t> count{0};
-  return fmt::format("{:016x}", start + count.fetch_add(1, std::memory_order_relaxed));
+  std::uint64_t number = start + count.fetch_add(1, std::memory_order_relaxed);
+  std::string id(16, '0');
+  for (auto digit = id.rbegin(); digit != id.rend(); ++digit, number >>= 4) *digit = "0123456789abcdef"[number & 15];
+  return id;
 }
 
 Response Overloaded(std::string_view detail, std::string_view request_id) {
@@ -51,7 +54,7 @@ std::optional<Response> WhyNoBody(const Request& request, std::size_t max_body_b
   if (request.content_length > max_body_bytes) {
     return ProblemResponse(413, "the request body is too large", request.id);
   }
-  if (!request.content_encoding.empty() && !EqualsIgnoringCase(request.content_encoding, "identity")) {
+  if (!request.fields->content_encoding.empty() && !EqualsIgnoringCase(request.fields->content_encoding, "identity")) {
     Response response = ProblemResponse(415, "bodies with a Content-Encoding are not read", request.id);
     response.headers.emplace_back("Accept-Encoding", "identity");
     return response;
@@ -270,7 +273,7 @@ asio::awaitable<bool> Session::Reply(const Exchange& exchange, Response response
   head.version = request.version;
   head.keep_alive = request.keep_alive && !response.close && !reader_.closing();
   head.cors = &context_->cors;
-  head.origin = request.origin;
+  head.origin = request.fields->origin;
   const bool written = co_await Write(SerializeHead(response, head), body);
   Report(exchange, response, body ? body->size() : 0);
   co_return head.keep_alive&& written;
@@ -328,8 +331,8 @@ void Session::Report(const Exchange& exchange, const Response& response, std::si
   record.dataset = response.dataset;
   record.cache = response.cache;
   record.version = request.version;
-  record.referer = request.referer;
-  record.user_agent = request.user_agent;
+  record.referer = request.fields->referer;
+  record.user_agent = request.fields->user_agent;
   record.request_id = request.id;
   record.peer = peer_text_;
   if (exchange.caller.address != peer_.address) record.client = exchange.caller.text;

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 
 namespace terrace::server {
@@ -21,10 +22,14 @@ struct EncodedTile {
   std::string bytes;       // the body in its content coding
   std::string etag;        // strong, with the quotes
   double max_error_m = 0;  // measured on the encoded integers: the Terrain-Max-Error header
+  // Metres, at least the distance from every sample of the sources: the Terrain-Certified-Error header. Nothing where
+  // the format has no surface.
+  std::optional<double> certified_error_m = {};
   std::uint32_t vertices = 0;
   std::uint32_t triangles = 0;
   StageTimes times;  // of the build that made it
   RefinementUse refinement = RefinementUse::kMade;
+  bool from_disk = false;  // read from the disk tier, not built
 };
 
 inline std::size_t BytesOf(const EncodedTile& tile) { return tile.bytes.size(); }

@@ -1,5 +1,6 @@
 #include "server/tiles/glb_mesher.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 #include <vector>
@@ -7,6 +8,7 @@
 #include "engine/tin/insert_samples.h"
 #include "proto/quantized_mesh.h"
 #include "proto/skirt.h"
+#include "proto/surface_error.h"
 #include "proto/tile_error.h"
 #include "proto/tile_normals.h"
 
@@ -50,6 +52,7 @@ Result<MeshedGlb> MeshGlb(const dem::DemSource& source, const proto::LatticeView
     meshed.max_error_m = error.max_m;
     if (error.misses.empty() || round == kMaxRounds ||
         mesh.vertices.size() + error.misses.size() > proto::kMaxTileVertices) {
+      meshed.surface_error_m = std::max(error.max_m, proto::MeasureFlatEdgeError(lattice, mesh, positions));
       meshed.mesh =
           proto::MakeGridMesh(lattice, mesh, points, RoundedNormals(proto::VertexNormals(lattice, mesh, positions)),
                               step_m, proto::SkirtDepth(lattice.key.level, wanted_error_m));

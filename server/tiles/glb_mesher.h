@@ -16,6 +16,7 @@ namespace terrace::server {
 struct MeshedGlb {
   proto::GridMesh mesh;                  // with normals and skirts
   double max_error_m = 0;                // of the flat triangles, measured on the grid points
+  double surface_error_m = 0;            // the same everywhere, not at the lattice's samples alone
   std::chrono::microseconds replayed{};  // time until the mesh stood
 };
 

@@ -39,6 +39,4 @@ struct RefinedTileKeyHash {
   }
 };
 
-using RefinementCache = ByteCache<RefinedTileKey, RefinedTileKeyHash, RefinedTile>;
-
 }  // namespace terrace::server

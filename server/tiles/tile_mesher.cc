@@ -12,6 +12,7 @@
 #include "engine/tin/drop_pass.h"
 #include "engine/tin/insert_samples.h"
 #include "proto/edge_steps.h"
+#include "proto/surface_error.h"
 #include "proto/tile_error.h"
 #include "proto/tile_mesh.h"
 #include "server/tiles/refine_plan.h"
@@ -51,6 +52,7 @@ Result<MeshedTile> Finish(tin::TinMesh mesh, const proto::LatticeView& lattice, 
     measured.max_error_m = error.max_m;
     if (error.misses.empty() || round == kMaxRounds ||
         mesh.vertices.size() + error.misses.size() > proto::kMaxTileVertices) {
+      measured.surface_error_m = std::max(error.max_m, proto::MeasureEdgeError(lattice, measured.tile, curved));
       measured.mesh = std::move(mesh);
       return measured;
     }

@@ -25,6 +25,7 @@ struct MeshedTile {
   tin::TinMesh mesh;
   proto::QuantizedTile tile;
   double max_error_m = 0;                // measured on the encoded integers
+  double surface_error_m = 0;            // the same everywhere, not at the lattice's samples alone
   std::chrono::microseconds replayed{};  // time until the mesh stood; quantizing and measuring came after it
 };
 

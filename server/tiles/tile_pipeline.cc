@@ -65,7 +65,7 @@ Result<RefinedTilePtr> TilePipeline::Refine(const Dataset& dataset, const geo::T
   encoded.times.refine = Since(start);
   // One that ended at the format's number of vertices holds no mesh to this error. Another build may have gone further
   // meanwhile.
-  const RefinedTilePtr other = refinements_->Find(cache_key);
+  const RefinedTilePtr other = refinements_->FindInMemory(cache_key);
   if (refined->refinement.vertex_count() <= proto::kMaxTileVertices && !(other && other->error_m <= error_m)) {
     refinements_->Insert(cache_key, refined);
   }
@@ -86,6 +86,7 @@ Result<void> TilePipeline::EncodeQuantizedMesh(const TileRequest& request, const
   encoded.times.refine += measured->replayed;
   encoded.times.encode = Since(start) - measured->replayed;
   encoded.max_error_m = measured->max_error_m;
+  encoded.certified_error_m = measured->surface_error_m + refined.heights.source_gap_m;
   encoded.vertices = static_cast<std::uint32_t>(measured->tile.u.size());
   encoded.triangles = static_cast<std::uint32_t>(measured->tile.triangles.size());
   return {};
@@ -110,6 +111,7 @@ Result<void> TilePipeline::EncodeGlb(const TileRequest& request, const RefinedTi
   encoded.times.refine += meshed->replayed;
   encoded.times.encode = Since(start) - meshed->replayed;
   encoded.max_error_m = meshed->max_error_m;
+  encoded.certified_error_m = meshed->surface_error_m + refined.heights.source_gap_m;
   encoded.vertices = glb->vertices;
   encoded.triangles = glb->triangles;
   return {};

@@ -15,7 +15,7 @@
 #include "proto/glb_tile.h"
 #include "proto/texture.h"
 #include "server/tiles/encoded_tile.h"
-#include "server/tiles/refined_tile.h"
+#include "server/tiles/refinement_cache.h"
 #include "server/tiles/tile_mesher.h"
 #include "server/tiles/tile_request.h"
 

@@ -37,6 +37,7 @@ CacheKey KeyOf(const Catalog& catalog, TileRequest request) {
 TileService::TileService(TileServiceOptions options, BuildObserver observer)
     : observer_(std::move(observer)),
       cache_(options.cache_bytes),
+      disk_(std::move(options.disk)),
       pool_(options.worker_threads, options.queue_length),
       flights_(pool_) {}
 
@@ -60,16 +61,24 @@ asio::awaitable<Result<ServedTile>> TileService::Get(CatalogPtr catalog, TileReq
   SingleFlight::Landing landing = co_await flights_.Join(key, std::move(build), deadline);
   if (!landing.joined) misses_.fetch_add(1, std::memory_order_relaxed);
   if (!landing.tile) co_return tl::unexpected(std::move(landing.tile.error()));
-  co_return ServedTile(std::move(*landing.tile), landing.joined ? CacheStatus::kJoined : CacheStatus::kMiss);
+  const CacheStatus found = (*landing.tile)->from_disk ? CacheStatus::kDisk : CacheStatus::kMiss;
+  co_return ServedTile(std::move(*landing.tile), landing.joined ? CacheStatus::kJoined : found);
 }
 
 Result<TilePtr> TileService::BuildAndKeep(const Catalog& catalog, const TileRequest& request, const CacheKey& key,
                                           Clock::time_point asked, std::stop_token stop) {
   // Between the look into the cache and the start of this flight an earlier flight may have landed.
   if (TilePtr tile = cache_.Find(key)) return tile;
+  if (TilePtr tile = disk_ ? disk_->FindTile(key) : nullptr) {
+    cache_.Insert(key, tile);
+    return tile;
+  }
   const SingleFlight::Work work = [&](std::stop_token token) { return catalog.build(request, std::move(token)); };
   Result<TilePtr> tile = RunWork(work, "tile " + geo::ToString(request.key), asked, std::move(stop));
-  if (tile) cache_.Insert(key, *tile);
+  if (tile) {
+    cache_.Insert(key, *tile);
+    if (disk_) disk_->KeepTile(key, *tile);
+  }
   if (observer_) observer_(catalog.datasets[request.dataset], tile);
   return tile;
 }
@@ -121,6 +130,9 @@ TileService::Stats TileService::stats() const {
   stats.queued = pool_.queued();
   stats.in_flight = flights_.in_flight();
   stats.cache = cache_.stats();
+  stats.cache.hits = stats.hits;
+  stats.cache.misses = stats.misses;
+  if (disk_) stats.disk = disk_->stats();
   return stats;
 }
 

@@ -1,4 +1,5 @@
-// Tiles for requests: from the cache, from a flight that is under way, or from a new build on the worker pool.
+// Tiles for requests: from memory, from a flight that is under way, or on the worker pool from disk or from a new
+// build.
 //
 // Thread-safe. How a tile is built is the catalog's business: this class knows neither elevation models nor codecs.
 // Tiles outlive the catalog they came from: the next one finds those of datasets that it has in the same generation.
@@ -14,6 +15,7 @@
 #include "engine/core/result.h"
 #include "server/asio.h"
 #include "server/tiles/catalog.h"
+#include "server/tiles/disk_cache.h"
 #include "server/tiles/encoded_tile.h"
 #include "server/tiles/single_flight.h"
 #include "server/tiles/tile_cache.h"
@@ -29,9 +31,10 @@ struct TileServiceOptions {
   unsigned worker_threads = 0;                       // 0: as many as the machine has processors
   std::size_t queue_length = 256;                    // builds that wait for a worker; one more is refused
   std::size_t cache_bytes = std::size_t{256} << 20;  // 0: no cache
+  std::shared_ptr<DiskCache> disk;                   // null: none
 };
 
-enum class CacheStatus { kHit, kMiss, kJoined };
+enum class CacheStatus { kHit, kDisk, kMiss, kJoined };
 
 struct ServedTile {
   ServedTile() = default;
@@ -76,6 +79,7 @@ class TileService {
     std::uint64_t hits = 0, misses = 0, joined = 0;
     std::size_t queued = 0, in_flight = 0;
     ByteCacheStats cache;
+    std::optional<DiskCacheStats> disk;  // nothing: there is none
   };
   Stats stats() const;
 
@@ -86,6 +90,7 @@ class TileService {
 
   const BuildObserver observer_;
   TileCache cache_;
+  const std::shared_ptr<DiskCache> disk_;
   WorkerPool pool_;
   SingleFlight flights_;
   std::atomic<std::uint64_t> hits_{0}, misses_{0}, solos_{0};

@@ -56,6 +56,7 @@ TEST(ToJson, ComesBackWithEveryOptionSet) {
   config.queue_length = 1;
   config.cache_bytes = std::size_t{1} << 40;
   config.refinement_cache_bytes = 12'345'678;
+  config.disk_cache = {"/srv/cache", std::size_t{1} << 40, 0};
   config.gdal_cache_bytes = 1'000'000;
   config.data_roots = {"/data", "/srv/dems"};
   config.allowed_prefixes = {"/vsis3/bucket/"};
@@ -94,6 +95,7 @@ TEST(ToJson, NamesEveryOption) {
   dataset.floor = 0;
   dataset.water.sea_level = 0;
   dataset.imagery.image = "/data/photo.tif";
+  config.disk_cache.directory = "/srv/cache";
   config.datasets = {dataset};
   config.tls = {"/etc/server.pem", "/etc/server.key"};
   config.data_roots = {"/data"};

@@ -5,6 +5,7 @@
 #
 # cold: every tile of the walk once. Start the server afresh, or it has built some already; the column "built" tells.
 # warm: the walk as it is, popular tiles more often, by wrk, for SECONDS.
+# WALK_OPTIONS="--flight" and others go to walk.py. PID=... of the server adds its processor time a request.
 # Client and server share a machine unless you separate them.
 set -euo pipefail
 export LC_ALL=C
@@ -18,8 +19,17 @@ command -v wrk > /dev/null || { echo "run.sh: wrk is not installed; tools/instal
 WALK=$(mktemp)
 export WALK
 trap 'rm -f "$WALK"' EXIT
-"$here/walk.py" "$dataset" > "$WALK"
+read -ra walk_options <<< "${WALK_OPTIONS:-}"
+"$here/walk.py" "$dataset" "${walk_options[@]}" > "$WALK"
 echo "$(wc -l < "$WALK") requests for $(sort -u "$WALK" | wc -l) tiles, $connections connections, $seconds s" >&2
+
+# Milliseconds of processor time that the server has used; 0 if its process is not known.
+used_ms() {
+  if [[ -z ${PID:-} ]]; then echo 0; return; fi
+  python3 -c 'import os, sys
+fields = open(f"/proc/{sys.argv[1]}/stat").read().rsplit(")", 1)[1].split()
+print((int(fields[11]) + int(fields[12])) * 1000 // os.sysconf("SC_CLK_TCK"))' "$PID"
+}
 
 builds() {
   python3 - "$dataset" <<'PYTHON'
@@ -30,21 +40,22 @@ print(int(sum(float(line.split()[-1]) for line in lines if line.startswith("terr
 PYTHON
 }
 
-row() {  # NAME JSON TILES_BUILT
+row() {  # NAME JSON TILES_BUILT CPU_MS
   python3 - "$@" <<'PYTHON'
 import json, sys
-name, figures, built = sys.argv[1], json.loads(sys.argv[2]), int(sys.argv[3])
+name, figures, built, used_ms = sys.argv[1], json.loads(sys.argv[2]), int(sys.argv[3]), int(sys.argv[4])
 seconds, requests = figures["seconds"], max(figures["requests"], 1)
 print(f"| {name} | {figures['requests']:,} | {built:,} | {figures['requests'] / seconds:,.0f} | {figures['p50_ms']:.2f} | "
-      f"{figures['p99_ms']:.2f} | {figures['bytes'] / seconds / 1e6:.1f} | {figures['bytes'] / requests / 1e3:.1f} | {figures['errors']} |")
+      f"{figures['p99_ms']:.2f} | {figures['bytes'] / seconds / 1e6:.1f} | {figures['bytes'] / requests / 1e3:.1f} | {used_ms / requests:.3f} | {figures['errors']} |")
 PYTHON
 }
 
-echo "| cache | requests | built | requests/s | p50 ms | p99 ms | MB/s | KB each | errors |"
-echo "|---|---|---|---|---|---|---|---|---|"
-before=$(builds)
+echo "| cache | requests | built | requests/s | p50 ms | p99 ms | MB/s | KB each | CPU ms each | errors |"
+echo "|---|---|---|---|---|---|---|---|---|---|"
+before=$(builds) used=$(used_ms)
 figures=$("$here/once.py" "$dataset" "$WALK" "$connections")
 after=$(builds)
-row cold "$figures" $((after - before))
+row cold "$figures" $((after - before)) $(($(used_ms) - used))
+used=$(used_ms)
 figures=$(wrk -t 2 -c "$connections" -d "$seconds" --timeout 30s -s "$here/replay.lua" "$dataset" < /dev/null | grep '^{')
-row warm "$figures" $(($(builds) - after))
+row warm "$figures" $(($(builds) - after)) $(($(used_ms) - used))

@@ -3,6 +3,8 @@ import itertools
 import json
 import math
 import os
+import pathlib
+import random
 import re
 import signal
 import socket
@@ -13,7 +15,7 @@ import tempfile
 import threading
 import time
 
-from server import Server, fetch, get, percentile, read_reply, wait_until
+from server import MemoryGroup, Server, fetch, get, percentile, read_reply, wait_until
 
 HOT = "/earth/0/0/0.terrain"
 
@@ -28,6 +30,37 @@ def tests(binary, pattern):
     recorded = {key: int(value) for case in cases for key, value in case.items() if isinstance(value, str) and value.isdigit()}
     failed = [case["name"] for case in cases if case.get("failures")]
     return bool(cases) and not failed, len(cases), recorded, failed
+
+
+def binary_of(test_binary, path):
+    """Of another test in the same build: "http/server_http_test" beside server_test."""
+    return (test_binary.parent / path).resolve()
+
+
+def fuzzed(test_binary, *names):
+    """Runs fuzz targets' smoke tests, which replay the corpus and try so many inputs made from it."""
+    kept, runs = True, []
+    for name in names:
+        passed, _, recorded, _ = tests(binary_of(test_binary, f"../fuzz/{name}_fuzz_smoke_test"), "*")
+        kept = kept and passed
+        runs.append(f"{recorded.get('runs', 0):,} x {name}")
+    return kept, ", ".join(runs) + (": 0 crashes" if kept else ": FAILED")
+
+
+def row_1(_, test_binary, __):
+    return fuzzed(test_binary, "url")
+
+
+def row_2(_, test_binary, __):
+    return fuzzed(test_binary, "http", "heights")
+
+
+def row_3(_, test_binary, __):
+    return fuzzed(test_binary, "record", "config")
+
+
+def row_4(_, test_binary, __):
+    return fuzzed(test_binary, "greedy", "refinement", "quantized_mesh")
 
 
 def row_8(_, test_binary, __):
@@ -218,6 +251,45 @@ def row_14(binary, _, __):
         f"{len(times)} requests, {statuses}, p99 {p99:.2f} ms, {len(opened)} files opened {sorted(opened)[:3] if opened else ''}"
 
 
+def row_15(binary, _, __):
+    keys = [(z, x, y) for z in (5, 8, 11, 13) for x, y in itertools.islice(tiles_of("jacksboro", z), 4)]
+    costs, largest = {}, 0
+    with Server(binary, "--cache-bytes", "0", "--refinement-cache-bytes", "0", "--worker-threads", "1") as server:
+        for query in ("", "?error=1e-300", "", "?error=1e-300"):
+            before = server.cpu_seconds()
+            for z, x, y in keys * 4:
+                for extension in ("terrain", "glb"):
+                    reply = fetch(server, f"/jacksboro/{z}/{x}/{y}.{extension}{query}")
+                    assert reply[0] == 200, reply[0]
+                    largest = max(largest, len(reply[2]))
+            costs[query] = min(costs.get(query, math.inf), server.cpu_seconds() - before)
+    ratio = costs["?error=1e-300"] / costs[""]
+    return ratio <= 20 and largest <= 2_000_000, f"{ratio:.1f}x the processor time of default builds, {largest / 1e6:.2f} MB at most"
+
+
+def tiles_of(dataset, level):
+    """Column and row of the tiles around the middle of the sample data of 36.3 N, 84.25 W."""
+    assert dataset == "jacksboro"
+    width = 180 / 2 ** level
+    x, y = int((180 - 84.25) / width), int((90 + 36.3) / width)
+    return ((x + dx, y + dy) for dx, dy in ((0, 0), (1, 0), (0, 1), (1, 1)) if level > 9 or (dx, dy) == (0, 0))
+
+
+def row_16(_, test_binary, __):
+    kept, _, recorded, _ = tests(binary_of(test_binary, "http/server_http_test"), "Negotiate.ComesToFortyOneErrorsAtMost")
+    return kept, f"{recorded.get('wishes', 0):,} errors come to {recorded.get('steps', 0)} a tile and format"
+
+
+def row_17(_, test_binary, __):
+    kept, count, recorded, failed = tests(binary_of(test_binary, "../engine/dem/dem_test"), "SourcePolicyTest.*")
+    return kept, f"{recorded.get('names', 0)} names refused, nothing fetched, {count} tests" + (f", failed: {failed}" if failed else "")
+
+
+def row_18(_, test_binary, __):
+    kept, _, recorded, _ = tests(binary_of(test_binary, "../engine/dem/dem_test"), "DamagedFiles.*")
+    return kept, f"{recorded.get('files', 0)} files, each in a process of its own: " + ("0 crashes, hangs or over 512 MB" if kept else "FAILED")
+
+
 def row_19(_, test_binary, __):
     kept, _, _, _ = tests(test_binary, "ServerTest.TwoHundredClients*")
     return kept, "one build for 200 clients" if kept else "more than one build, or an error"
@@ -294,12 +366,18 @@ def row_21(binary, _, __):
                  f"cached p99 {p99:.1f} ms, normal after {seconds_of(normal)}" + (f", also {others}" if others else "")
 
 
+def row_22(_, test_binary, __):
+    kept, _, _, _ = tests(binary_of(test_binary, "tiles/server_tiles_test"), "TileCache.KeepsTheHotSetThroughAScan")
+    return kept, "the hot set keeps 95 % of its hits" if kept else "it does not"
+
+
 def row_23(binary, _, __):
     count = 10_000
     with Server(binary, "--worker-threads", "1", "--cache-bytes", "4MiB", "--refinement-cache-bytes", "4MiB") as server:
         targets = itertools.cycle(list(tiles()))
-        for _ in range(200):
-            assert fetch(server, next(targets))[0] == 200
+        # Each tile once: what the largest build takes for itself stays with its thread, and is no leak.
+        for target in tiles():
+            assert fetch(server, target)[0] == 200
         for _ in range(1000):
             reset_one(server, next(targets))
         before, idle = server.resident_kib(), server.sockets()
@@ -317,6 +395,51 @@ def reset_one(server, target):
     connection.sendall(get(target))
     connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
     connection.close()
+
+
+def end_to_end(binary, script, *names, long=False):
+    """Runs some of a script's tests: (all passed, what they printed with figures in it)."""
+    root = pathlib.Path(__file__).resolve().parents[2]
+    options = [part for name in names for part in ("-k", name)]
+    done = subprocess.run([sys.executable, root / "tests/e2e" / script, binary, root, *options], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+                          env=os.environ | ({"TERRACE_LONG_TESTS": "1"} if long else {}), check=False)
+    lines = [line.lstrip(".") for line in done.stderr.splitlines() if re.search(r": .*\d|seen after", line)]
+    return done.returncode == 0, "; ".join(lines) if done.returncode == 0 else done.stderr.strip().splitlines()[-1]
+
+
+def row_24(binary, _, long):
+    return end_to_end(binary, "disk_cache_test.py", "kill_9_under_load", long=long)
+
+
+def row_26(_, test_binary, __):
+    kept, _, _, _ = tests(binary_of(test_binary, "tiles/server_tiles_test"), "Seal.*:TileRecord.RefusesEveryOtherLength")
+    stores, count, _, _ = tests(binary_of(test_binary, "tiles/disk_store_test"), "DamagedStoreTest.*")
+    return kept and stores, "every bit and every length of a record detected; " + (f"{count} tests of damaged files of the store" if stores else "FAILED")
+
+
+def row_27(_, test_binary, __):
+    kept, count, _, failed = tests(binary_of(test_binary, "tiles/disk_store_test"), "FailingDiskTest.*")
+    return kept, f"{count} tests: nth read and write fail, once and for good, until clean" + (f", failed: {failed}" if failed else "")
+
+
+def row_28(binary, _, long):
+    return end_to_end(binary, "disk_cache_test.py", "full_disk", long=long)
+
+
+def row_30(binary, _, long):
+    return end_to_end(binary, "reload_test.py", "no_answer_mixes", "seen_soon", long=long)
+
+
+def row_31(binary, _, __):
+    statuses, bodies = {}, set()
+    for clock in (None, "+10y", "-10y", "+0 x5"):
+        prefix = () if clock is None else ("faketime", "-f", clock)
+        with Server(binary, "--cache-bytes", "0", prefix=prefix) as server:
+            for target in (HOT, "/jacksboro/9/272/359.terrain", "/earth/layer.json", "/readyz") * 10:
+                reply = fetch(server, target)
+                statuses[reply[0]] = statuses.get(reply[0], 0) + 1
+                bodies.add((target, reply[2]))
+    return set(statuses) == {200} and len(bodies) == 4, f"clocks 10 years off either way, 5x fast: {statuses}, {len(bodies)} different bodies of 4 URLs"
 
 
 def row_32(binary, _, long):
@@ -354,3 +477,64 @@ def row_32(binary, _, long):
                 thread.join()
             cut += len(broken)
     return codes == {0} and cut == 0 and slowest <= 10, f"{drains} drains, exit codes {codes}, {cut} truncated, slowest {slowest:.1f} s"
+
+
+SOAK = ["/earth/layer.json", "/earth/tileset.json", "/datasets", "/readyz", "/metrics", "/earth/heights?locations=46.5,8.1%7C-90,180", "/nowhere/0/0/0.terrain",
+        "/earth/0/9/0.terrain", "/earth/0/0/0.terrain?error=x", "/jacksboro/mesh?bbox=-84.3,36.2,-84.2,36.3&error=20", "/earth/3/5/2.png", "/viewer/nothing"]
+
+
+def soak_targets(seed):
+    random_ = random.Random(seed)
+    while True:
+        draw = random_.random()
+        if draw < 0.1:
+            yield random_.choice(SOAK)
+        elif draw < 0.5:  # hot
+            yield f"/earth/4/{random_.randrange(6)}/{random_.randrange(6)}.terrain"
+        else:
+            z, x, y = 12, 2176 + random_.randrange(6), 2871 + random_.randrange(6)
+            if random_.random() < 0.5:
+                z, x, y = 5, random_.randrange(64), random_.randrange(32)
+            name = "jacksboro" if z == 12 else "earth"
+            yield f"/{name}/{z}/{x}/{y}.{random_.choice(['terrain', 'glb'])}?fraction={2 ** random_.randrange(-4, 4)}"
+
+
+def row_33(binary, _, long):
+    seconds, megabyte = (600 if long else 90), 1 << 20
+    caches = {"--cache-bytes": 16, "--refinement-cache-bytes": 32, "--gdal-cache-bytes": 32, "--transfer-bytes": 32}
+    bound = sum(caches.values()) + 128
+    flags = [part for flag, size in caches.items() for part in (flag, f"{size}MiB")]
+    statuses, sizes, end, group = {}, [], time.monotonic() + seconds, MemoryGroup(512 * megabyte)
+
+    def ask(seed):
+        while time.monotonic() < end:
+            with server.connect(60) as connection:  # some of them are reset in mid-reply
+                for count, target in enumerate(itertools.islice(targets[seed], 200)):
+                    connection.sendall(get(target, "Accept-Encoding: gzip\r\n" if count % 2 else ""))
+                    if count == 199 and seed % 2:
+                        connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+                        break
+                    status, fields = read_reply(connection)[:2]
+                    if status == 503 and "/mesh?" in target and "retry-after" in fields:
+                        status = "503 of a mesh while another is made"  # all workers but one may make some
+                    statuses[status] = statuses.get(status, 0) + 1
+                    if time.monotonic() > end:
+                        break
+                    time.sleep(0.02)
+
+    with group, Server(binary, *flags, prefix=group.prefix) as server:
+        targets = [soak_targets(seed) for seed in range(6)]
+        threads = [threading.Thread(target=ask, args=(seed,)) for seed in range(6)]
+        for thread in threads:
+            thread.start()
+        while time.monotonic() < end:
+            sizes.append(server.resident_kib() / 1024)
+            time.sleep(1)
+        for thread in threads:
+            thread.join()
+    fifth = len(sizes) // 5
+    middle, last = (sorted(part)[len(part) // 2] for part in (sizes[2 * fifth:3 * fifth], sizes[-fifth:]))
+    # A short run, or one on a busy machine, does not fill the caches, and so grows.
+    kept = max(sizes) <= bound and (not long or last - middle <= 1) and set(statuses) <= {200, 400, 404, "503 of a mesh while another is made"}
+    return kept, f"{seconds} s, {sum(statuses.values()):,} requests {statuses}, {group.words}: RSS {max(sizes):.0f} MB at most (bound {bound}), " \
+                 f"{middle:.1f} MB in the middle, {last:.1f} MB at the end"

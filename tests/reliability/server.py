@@ -24,8 +24,9 @@ class Server:
         self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, preexec_fn=limit, text=True)
         line = self.process.stdout.readline()
         self.port = int(re.search(r":(\d+)/", line)[1])
-        children = pathlib.Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children").read_text().split()
-        self.pid = int(children[0]) if prefix else self.process.pid
+        self.pid = self.process.pid
+        while prefix and (children := pathlib.Path(f"/proc/{self.pid}/task/{self.pid}/children").read_text().split()):
+            self.pid = int(children[0])  # what the prefix starts may start another
 
     def __enter__(self):
         return self
@@ -52,6 +53,29 @@ class Server:
 
     def connect(self, timeout=10):
         return socket.create_connection(("127.0.0.1", self.port), timeout)
+
+
+class MemoryGroup:
+    """A cgroup with so many bytes, where the system lets one be made; `prefix` starts a command in it."""
+
+    def __init__(self, limit):
+        one = pathlib.Path("/sys/fs/cgroup/memory")  # version 1, else 2
+        self.folder = (one if one.is_dir() else one.parent) / f"terrace-{os.getpid()}"
+        self.prefix, self.words = (), "in no cgroup (none could be made)"
+        try:
+            self.folder.mkdir()
+            (self.folder / ("memory.limit_in_bytes" if one.is_dir() else "memory.max")).write_text(str(limit))
+        except OSError:
+            return
+        self.prefix = ("sh", "-c", f'echo $$ > {self.folder}/cgroup.procs && "$@" & wait', "sh")
+        self.words = f"in a cgroup of {limit >> 20} MB"
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        if self.folder.is_dir():
+            self.folder.rmdir()
 
 
 def get(target, fields=""):

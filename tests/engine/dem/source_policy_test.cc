@@ -206,6 +206,7 @@ TEST_F(SourcePolicyTest, RefusesNamesThatAreMoreThanFiles) {
       (root_ / "wmts.xml").string(),
   };
   EXPECT_GE(names.size(), 40u);
+  RecordProperty("names", static_cast<int>(names.size()));
   const OpenWatch watch(outside_);
   for (const std::string& name : names) {
     const auto opened = OpenRaster(name);

@@ -20,7 +20,7 @@ class LayerHandlerTest : public testing::Test {
   }
   Response Get(const char* target, const char* accept_encoding = "") {
     Request request;
-    request.accept_encoding = accept_encoding;
+    request.fields.Set(&RequestFields::accept_encoding, accept_encoding);
     return handler_->Handle(*Match(target), request);
   }
 

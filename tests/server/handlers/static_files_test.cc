@@ -41,7 +41,7 @@ TEST_F(StaticFilesTest, ServesTheCompressedSiblingToThoseWhoTakeIt) {
   ASSERT_TRUE(files);
   Request request;
   EXPECT_EQ(Serve(*files->Find("a.js"), request, "").body->size(), 100u);
-  request.accept_encoding = "gzip";
+  request.fields.Set(&RequestFields::accept_encoding, "gzip");
   const Response gzip = Serve(*files->Find("a.js"), request, "");
   EXPECT_EQ(*gzip.body, "compressed");
   EXPECT_EQ(gzip.coding, Coding::kGzip);

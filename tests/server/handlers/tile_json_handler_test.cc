@@ -17,7 +17,7 @@ class TileJsonHandlerTest : public testing::Test {
   }
   Response Get(const char* target, const char* host = "example.test:8080", bool is_https = false) {
     Request request;
-    request.host = host;
+    request.fields.Set(&RequestFields::host, host);
     request.is_https = is_https;
     return TileJsonHandler(datasets_, "max-age=1").Handle(*Match(target), request);
   }

@@ -36,7 +36,7 @@ class TilesetHandlerTest : public testing::Test {
     const Result<Route> route = Match(target);
     EXPECT_TRUE(route) << target;
     Request request;
-    request.accept_encoding = accept_encoding;
+    request.fields.Set(&RequestFields::accept_encoding, accept_encoding);
     return route->kind == RouteKind::kTileset ? handler_->Handle(*route, request)
                                               : handler_->HandleSubtree(*route, request);
   }

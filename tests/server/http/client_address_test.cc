@@ -61,41 +61,42 @@ TEST(ResolveClient, IsTheLastThatIsNoProxy) {
   };
   for (const auto& c : cases) {
     Request request;
-    request.forwarded_for = c.forwarded_for;
-    request.forwarded = "for=203.0.113.99";
+    request.fields.Set(&RequestFields::forwarded_for, c.forwarded_for);
+    request.fields.Set(&RequestFields::forwarded, "for=203.0.113.99");
     EXPECT_EQ(ResolveClient(request, At(c.peer), proxies), At(c.client)) << c.peer << " " << c.forwarded_for;
   }
 }
 
 TEST(ResolveClient, TakesSchemeAndHostFromTheNearestProxy) {
   Request request;
-  request.host = "inside";
-  request.forwarded_proto = "http, https";
-  request.forwarded_host = "evil.example, maps.example:8443";
+  request.fields.Set(&RequestFields::host, "inside");
+  request.fields.Set(&RequestFields::forwarded_proto, "http, https");
+  request.fields.Set(&RequestFields::forwarded_host, "evil.example, maps.example:8443");
   Request untouched = request;
   ResolveClient(untouched, At("192.0.2.9"), Trusting({"10.0.0.0/8"}));
-  EXPECT_EQ(untouched.host, "inside");
+  EXPECT_EQ(untouched.fields->host, "inside");
   EXPECT_FALSE(untouched.is_https);
   ResolveClient(request, At("10.0.0.1"), Trusting({"10.0.0.0/8"}));
-  EXPECT_EQ(request.host, "maps.example:8443");
+  EXPECT_EQ(request.fields->host, "maps.example:8443");
   EXPECT_TRUE(request.is_https);
-  request.forwarded_host = "a b/c";
+  request.fields.Set(&RequestFields::forwarded_host, "a b/c");
   ResolveClient(request, At("10.0.0.1"), Trusting({"10.0.0.0/8"}));
-  EXPECT_EQ(request.host, "maps.example:8443") << "what is no host stays away";
+  EXPECT_EQ(request.fields->host, "maps.example:8443") << "what is no host stays away";
 }
 
 TEST(ResolveClient, ReadsForwardedWhereThatIsWhatProxiesWrite) {
   const Proxies proxies = Trusting({"10.0.0.0/8"}, ForwardedHeader::kForwarded);
   Request request;
-  request.forwarded_for = "203.0.113.99";
-  request.forwarded =
-      R"(For=8.8.8.8, for="[2001:db8::7]:4711";Proto=HTTPS;host="maps.example", for=10.0.0.2;proto=https;host=maps.example)";
+  request.fields.Set(&RequestFields::forwarded_for, "203.0.113.99");
+  request.fields.Set(
+      &RequestFields::forwarded,
+      R"(For=8.8.8.8, for="[2001:db8::7]:4711";Proto=HTTPS;host="maps.example", for=10.0.0.2;proto=https;host=maps.example)");
   EXPECT_EQ(ResolveClient(request, At("10.0.0.1"), proxies), At("2001:db8::7"));
-  EXPECT_EQ(request.host, "maps.example");
+  EXPECT_EQ(request.fields->host, "maps.example");
   EXPECT_TRUE(request.is_https);
   for (const char* odd : {"", ";", "for", "for=_hidden", ",,,", "for=\"", "=;=,="}) {
     Request other;
-    other.forwarded = odd;
+    other.fields.Set(&RequestFields::forwarded, odd);
     EXPECT_EQ(ResolveClient(other, At("10.0.0.1"), proxies), At("10.0.0.1")) << odd;
   }
 }

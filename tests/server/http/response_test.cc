@@ -77,7 +77,7 @@ TEST(Response, IsForItsReaderAloneWhereATokenDecides) {
 
 TEST(Response, BecomesNotModifiedOnlyFromSuccess) {
   Request request;
-  request.if_none_match = "*";
+  request.fields.Set(&RequestFields::if_none_match, "*");
   Response good;
   good.etag = "\"a\"";
   good.body = std::make_shared<const std::string>("x");

@@ -103,6 +103,7 @@ TEST(TileCache, SeparatesEverythingThatChangesBytes) {
 TEST(TileCache, RetainsTheGenerationsItIsToldOf) {
   TileCache cache(100 * kCharge);
   for (std::uint64_t generation = 1; generation <= 3; ++generation) cache.Insert(Key(1, generation), Tile());
+  ASSERT_NE(cache.Find(Key(1, 2)), nullptr);
   cache.Retain({1, 3});
   EXPECT_NE(cache.Find(Key(1, 1)), nullptr);
   EXPECT_EQ(cache.Find(Key(1, 2)), nullptr);
@@ -126,6 +127,69 @@ TEST(TileCache, GivesBackWhatASmallerBudgetCannotHold) {
   cache.SetCapacity(3 * kCharge);
   cache.Insert(Key(5), Tile());
   EXPECT_EQ(cache.stats().entries, 3u);
+  cache.SetCapacity(0);
+  EXPECT_EQ(cache.stats().bytes, 0u);
+}
+
+// Row 22 of docs/reliability.md: a crawler asks for ten times the cache, once each, while clients go on asking for what
+// fills 60 % of it. The least recently used list that this replaced kept less than a fifth of the hits.
+TEST(TileCache, KeepsTheHotSetThroughAScan) {
+  constexpr int kTiles = 1000, kHot = 600, kScan = 10 * kTiles;
+  TileCache cache(kTiles * kCharge);
+  for (int round = 0; round < 2; ++round) {
+    for (int x = 0; x < kHot; ++x) {
+      if (!cache.Find(Key(x))) cache.Insert(Key(x), Tile());
+    }
+  }
+  int hits = 0, asked = 0;
+  for (int scanned = 0; scanned < kScan; ++scanned) {
+    const CacheKey key = Key(kTiles + scanned);
+    EXPECT_EQ(cache.Find(key), nullptr);
+    cache.Insert(key, Tile());
+    if (scanned % 10 != 0) continue;  // the crawler is ten times as fast
+    const CacheKey hot = Key(asked++ * 7 % kHot);
+    if (cache.Find(hot)) {
+      ++hits;
+    } else {
+      cache.Insert(hot, Tile());
+    }
+  }
+  EXPECT_GE(hits, asked * 95 / 100) << "of " << asked;
+  EXPECT_EQ(cache.stats().entries, static_cast<std::size_t>(kTiles));
+}
+
+// The hot set moves: what is asked for now gets in, what was hot long ago goes.
+TEST(TileCache, FollowsTheHotSet) {
+  constexpr int kTiles = 100;
+  TileCache cache(kTiles * kCharge);
+  const auto ask = [&](int x) {
+    const bool found = cache.Find(Key(x)) != nullptr;
+    if (!found) cache.Insert(Key(x), Tile());
+    return found;
+  };
+  for (int i = 0; i < 5 * kTiles; ++i) ask(i % kTiles);
+  int hits = 0;
+  for (int round = 0; round < 10; ++round) {
+    hits = 0;
+    for (int x = 0; x < 60; ++x) hits += ask(1000 + x) ? 1 : 0;
+    for (int x = 0; x < 60; ++x) hits += ask(1000 + x) ? 1 : 0;
+  }
+  EXPECT_EQ(hits, 120);
+  for (int x = 0; x < 50; ++x) ask(2000 + x);
+  int old = 0;
+  for (int x = 0; x < kTiles; ++x) old += cache.Find(Key(x)) != nullptr ? 1 : 0;
+  EXPECT_LT(old, 40);
+}
+
+TEST(TileCache, WhatIsReplacedStaysProtected) {
+  TileCache cache(5 * kCharge);
+  cache.Insert(Key(1), Tile('a'));
+  ASSERT_NE(cache.Find(Key(1)), nullptr);
+  cache.Insert(Key(1), Tile('b'));
+  for (int x = 2; x < 20; ++x) cache.Insert(Key(x), Tile());
+  const TilePtr found = cache.Find(Key(1));
+  ASSERT_NE(found, nullptr);
+  EXPECT_EQ(found->bytes[0], 'b');
 }
 
 TEST(TileCache, StaysInBudgetUnderManyThreads) {

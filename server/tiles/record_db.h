@@ -1,0 +1,65 @@
+// A bounded file store of records by key: RocksDB, behind the few calls that a cache makes of it.
+//
+// When the records take more than the capacity, the ones written first go, a file of them at a time. What was written
+// survives the process at once; a power cut may take what was written last. Thread-safe. RocksDB's types stay
+// behind this header.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "engine/core/result.h"
+
+namespace rocksdb {
+class Env;
+}
+
+namespace terrace::server {
+
+struct RecordDbOptions {
+  std::filesystem::path directory;  // made if it is missing; its parent exists
+  std::size_t capacity_bytes = 0;   // of its files, kMinCapacity at least
+  bool compress = false;            // LZ4
+  rocksdb::Env* env = nullptr;      // what stands for the disk, in tests; null: the disk. Outlives the store
+};
+
+class RecordDb {
+ public:
+  static constexpr std::size_t kMinCapacity = std::size_t{16} << 20;
+
+  // A store that is too damaged to be opened is emptied, and `*discarded` says so. kUnavailable: the disk does not
+  // answer, or the store is open already.
+  static Result<std::unique_ptr<RecordDb>> Open(const RecordDbOptions& options, bool* discarded);
+  // Closes quickly: nothing is rewritten.
+  ~RecordDb();
+
+  // Nothing if there is no such record. kInvalidArgument: it is damaged. kUnavailable: the disk does not answer.
+  Result<std::optional<std::string>> Get(std::string_view key) const;
+
+  struct Change {
+    std::string key;
+    std::optional<std::string> value;  // nothing: erased
+  };
+  // All or none of them. kUnavailable: the disk does not answer, or is full.
+  Result<void> Write(std::span<const Change> changes);
+
+  // About.
+  std::size_t bytes() const;
+  std::size_t entries() const;
+
+  // Whether a file of 1 MiB can be written beside the store's.
+  static Result<void> CheckWritable(const RecordDbOptions& options);
+
+ private:
+  class Impl;
+  explicit RecordDb(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace terrace::server

@@ -1,0 +1,191 @@
+// The bytes of a connection, sent in three pieces: the server reads them as a plain second reader does, however they
+// are cut, and ends. That reader knows nothing but where messages end: two of them that disagree are a smuggled
+// request.
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/detached.hpp>
+#include <boost/asio/io_context.hpp>
+#include <cerrno>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "engine/core/check.h"
+#include "server/http/request_reader.h"
+#include "server/http/text.h"
+#include "tests/fuzz/fuzz_input.h"
+
+namespace terrace::fuzz {
+namespace {
+
+using namespace server;
+using asio::ip::tcp;
+
+constexpr std::size_t kMostBytes = 48 * 1024;  // what a pair of sockets holds unread
+constexpr std::size_t kMostBody = 16 * 1024;
+
+struct Seen {
+  std::vector<Request> requests;
+  int refused = 0;  // status; 0: the client ended
+  bool done = false;
+};
+
+// As a session reads, without replies.
+asio::awaitable<void> ReadAll(RequestReader& reader, Seen& seen) {
+  for (bool more = true; more;) {
+    RequestReader::Head head = co_await reader.ReadHead();
+    if (!head) break;
+    if (!*head) {
+      seen.refused = head->error().status;
+      break;
+    }
+    Request& request = head->value();
+    if (request.content_length > kMostBody) {
+      seen.refused = 413;
+      break;
+    }
+    if (request.content_length > 0) {
+      const auto body = co_await reader.ReadBody(request);
+      if (!body) {
+        seen.refused = body.error().status;
+        break;
+      }
+    }
+    more = request.keep_alive;
+    seen.requests.push_back(std::move(request));
+  }
+  seen.done = true;
+}
+
+void Poll(asio::io_context& io) {
+  io.restart();
+  while (io.poll() > 0) {
+  }
+}
+
+void Send(int socket, std::string_view bytes) {
+  TERRACE_CHECK(bytes.empty() || ::send(socket, bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT) > 0 ||
+                errno == EPIPE);
+}
+
+Seen Converse(const std::array<std::string_view, 3>& pieces) {
+  int ends[2];
+  TERRACE_CHECK(::socketpair(AF_UNIX, SOCK_STREAM, 0, ends) == 0);
+  Seen seen;
+  {
+    asio::io_context io(1);
+    tcp::socket socket(io);
+    socket.assign(tcp::v4(), ends[0]);  // only what works on either sort of socket is done with it
+    Stream stream(std::move(socket), nullptr);
+    RequestReader reader(stream, {});
+    asio::co_spawn(io, ReadAll(reader, seen), asio::detached);
+    for (const std::string_view piece : pieces) {
+      Poll(io);
+      if (!seen.done) Send(ends[1], piece);
+    }
+    ::shutdown(ends[1], SHUT_WR);
+    Poll(io);
+    TERRACE_CHECK(seen.done);  // the client has ended: there is nothing to wait for
+    stream.Close();
+    Poll(io);
+  }
+  ::close(ends[1]);
+  return seen;
+}
+
+// Where the message ends whose head begins `bytes`, by RFC 9112 and the rule that only a POST has a body. The head is
+// one that the server took, so it has an end.
+std::size_t EndOfMessage(std::string_view bytes, const Request& request) {
+  const std::size_t end = bytes.find("\r\n\r\n");
+  TERRACE_CHECK(end != std::string_view::npos);
+  std::string_view head = bytes.substr(0, end + 2);
+  std::size_t length = 0;
+  int lengths = 0;
+  const std::string_view first = head.substr(0, head.find("\r\n"));
+  TERRACE_CHECK(first.starts_with(request.method_name + " "));
+  TERRACE_CHECK(first.ends_with(request.version == 11 ? " HTTP/1.1" : " HTTP/1.0"));
+  for (head.remove_prefix(first.size() + 2); !head.empty();) {
+    const std::string_view line = head.substr(0, head.find("\r\n"));
+    head.remove_prefix(line.size() + 2);
+    TERRACE_CHECK(line.find_first_of(std::string_view("\r\n\0", 3)) == std::string_view::npos);
+    TERRACE_CHECK(!line.starts_with(' ') && !line.starts_with('\t'));
+    const std::size_t colon = line.find(':');
+    TERRACE_CHECK(colon != std::string_view::npos && colon > 0);
+    const std::string_view name = line.substr(0, colon);
+    TERRACE_CHECK(Trim(name) == name);  // "Content-Length : 5" is a field to some
+    TERRACE_CHECK(!EqualsIgnoringCase(name, "transfer-encoding"));
+    if (!EqualsIgnoringCase(name, "content-length")) continue;
+    ++lengths;
+    const std::string_view value = Trim(line.substr(colon + 1));
+    TERRACE_CHECK(!value.empty() && value.find_first_not_of("0123456789") == std::string_view::npos);
+    length = std::stoul(std::string(value));
+  }
+  TERRACE_CHECK(lengths <= 1);
+  TERRACE_CHECK(length == request.content_length && length == request.body.size());
+  TERRACE_CHECK(length == 0 || request.method == Method::kPost);
+  return end + 4 + length;
+}
+
+// A connection remembers the header of its last request: what is read does not depend on that.
+void ExpectAsAlone(std::string_view head, const Request& request) {
+  const auto alone = ParseHead(head);
+  TERRACE_CHECK(alone.has_value());
+  TERRACE_CHECK(alone->method == request.method && alone->method_name == request.method_name);
+  TERRACE_CHECK(alone->version == request.version && alone->keep_alive == request.keep_alive);
+  TERRACE_CHECK(alone->target == request.target && alone->token == request.token);
+  TERRACE_CHECK(alone->content_length == request.content_length && alone->expects_continue == request.expects_continue);
+  TERRACE_CHECK(*alone->fields == *request.fields);
+}
+
+void ExpectOneReading(std::string_view bytes, const Seen& seen) {
+  for (const Request& request : seen.requests) {
+    while (bytes.starts_with("\r\n")) bytes.remove_prefix(2);
+    const std::size_t end = EndOfMessage(bytes, request);
+    ExpectAsAlone(bytes.substr(0, end - request.body.size()), request);
+    TERRACE_CHECK(end <= bytes.size());
+    TERRACE_CHECK(request.body == bytes.substr(end - request.body.size(), request.body.size()));
+    bytes.remove_prefix(end);
+    for (const unsigned char c : request.target) TERRACE_CHECK(c > 0x20 && c != 0x7f);
+    TERRACE_CHECK(request.target.size() <= kMaxTargetBytes);
+    TERRACE_CHECK(IsHostValue(request.fields->host));
+  }
+}
+
+void ExpectSame(const Seen& a, const Seen& b) {
+  TERRACE_CHECK(a.requests.size() == b.requests.size());
+  // Of a head with two faults the one that is seen first is told, which depends on the cut.
+  TERRACE_CHECK((a.refused != 0) == (b.refused != 0));
+  for (std::size_t i = 0; i < a.requests.size(); ++i) {
+    const Request &x = a.requests[i], &y = b.requests[i];
+    TERRACE_CHECK(x.method_name == y.method_name && x.target == y.target && x.body == y.body && *x.fields == *y.fields);
+  }
+}
+
+void Run(FuzzInput& input) {
+  std::size_t first = input.Take<std::uint16_t>(), second = input.Take<std::uint16_t>();
+  const std::string_view bytes = input.rest().substr(0, kMostBytes);
+  first = std::min(first, bytes.size());
+  second = std::min(second, bytes.size() - first);
+  const Seen whole = Converse({bytes, {}, {}});
+  ExpectOneReading(bytes, whole);
+  TERRACE_CHECK(whole.refused == 0 || whole.refused == 400 || whole.refused == 413 || whole.refused == 414 ||
+                whole.refused == 431);
+  const Seen cut = Converse({bytes.substr(0, first), bytes.substr(first, second), bytes.substr(first + second)});
+  ExpectSame(whole, cut);
+}
+
+}  // namespace
+}  // namespace terrace::fuzz
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  terrace::fuzz::FuzzInput input(data, size);
+  terrace::fuzz::Run(input);
+  return 0;
+}

@@ -1,0 +1,149 @@
+// Everything that reads a request's target and the headers that choose a reply, on arbitrary text.
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "engine/core/check.h"
+#include "engine/geo/error_ladder.h"
+#include "server/handlers/heights_query.h"
+#include "server/http/client_address.h"
+#include "server/http/negotiate.h"
+#include "server/http/query.h"
+#include "server/http/response.h"
+#include "server/http/router.h"
+#include "tests/fuzz/fuzz_input.h"
+
+namespace terrace::fuzz {
+namespace {
+
+using namespace server;
+
+constexpr int kDeepest = 12;
+
+// A dataset of the whole Earth, with everything a request may ask for.
+const std::vector<DatasetView>& Datasets() {
+  static const auto* const datasets = [] {
+    DatasetView view;
+    view.name = "earth";
+    view.has_water = true;
+    view.texture = proto::TextureFormat::kJpeg;
+    view.max_mercator_depth = kDeepest;
+    for (int level = 0; level <= kDeepest; ++level) {
+      view.available.push_back({{0, 0, geo::TileColumns(level) - 1, geo::TileRows(level) - 1}});
+    }
+    return new std::vector<DatasetView>{view};
+  }();
+  return *datasets;
+}
+
+void ExpectClientError(const Error& error) {
+  TERRACE_CHECK(error.code == ErrorCode::kInvalidArgument || error.code == ErrorCode::kNotFound);
+}
+
+void ExpectInLadder(const ErrorWish& wish) {
+  TERRACE_CHECK(!wish.error_m || (std::isfinite(*wish.error_m) && *wish.error_m > 0));
+  TERRACE_CHECK(!wish.fraction || (std::isfinite(*wish.fraction) && *wish.fraction > 0));
+  for (const int level : {0, 7, geo::kMaxLevel}) {
+    const int step = ErrorStep(wish, level, geo::kDefaultErrorFraction);
+    TERRACE_CHECK(step >= geo::kCoarsestStep && step <= geo::kFinestStep);
+  }
+}
+
+void TryQuery(std::string_view query) {
+  for (const bool at_least : {false, true}) {
+    for (const bool compression : {false, true}) {
+      const auto tile = ParseTileParameters(query, at_least, compression);
+      if (tile) ExpectInLadder(tile->wish);
+      if (!tile) ExpectClientError(tile.error());
+    }
+  }
+  const auto height = ParseHeightTileParameters(query);
+  TERRACE_CHECK(!height || height->size == 256 || height->size == 512);
+  if (const auto none = RefuseParameters(query); !none) ExpectClientError(none.error());
+  const auto parameters = ParseQuery(query);
+  if (!parameters) return ExpectClientError(parameters.error());
+  for (const auto& [name, value] : *parameters) {
+    for (const unsigned char c : name + value) TERRACE_CHECK(c != 0 || query.find('\0') != std::string_view::npos);
+  }
+  constexpr std::size_t kMostPoints = 50;
+  const auto heights = ParseHeightsQuery(*parameters, kMostPoints);
+  if (!heights) return ExpectClientError(heights.error());
+  TERRACE_CHECK(!heights->points.empty() && heights->points.size() <= kMostPoints);
+  for (const dem::GeoPosition& point : heights->points) {
+    TERRACE_CHECK(std::abs(point.longitude) <= 180 && std::abs(point.latitude) <= 90);
+  }
+}
+
+// One tile has one URL: what was understood, written again, is what was asked for.
+void ExpectOneUrl(const Route& route) {
+  constexpr std::string_view kSuffixes[] = {".terrain", ".glb", ".png"};
+  const std::string written =
+      "/earth/" + geo::ToString(route.key) + std::string(kSuffixes[static_cast<std::size_t>(route.format)]);
+  const auto again = Match(written);
+  TERRACE_CHECK(again && again->key == route.key && again->format == route.format);
+}
+
+void TryTarget(std::string target) {
+  (void)TakeToken(target);
+  TERRACE_CHECK(!TakeToken(target));  // none is left for the log
+  const auto route = Match(target);
+  if (!route) return ExpectClientError(route.error());
+  TryQuery(route->query);
+  if (route->kind == RouteKind::kTile || route->kind == RouteKind::kSubtree) {
+    TERRACE_CHECK(geo::IsValid(route->key) && geo::IsValid(route->root));
+  }
+  if (route->kind != RouteKind::kTile) return;
+  ExpectOneUrl(*route);
+  const auto wanted = Negotiate(*route, Request(), Datasets());
+  if (!wanted) return ExpectClientError(wanted.error());
+  TERRACE_CHECK(wanted->dataset == 0 && wanted->key == route->key && wanted->format == route->format);
+  TERRACE_CHECK(wanted->error_step >= geo::kCoarsestStep && wanted->error_step <= geo::kFinestStep);
+  TERRACE_CHECK(wanted->key.level <= kDeepest + 1);
+}
+
+void TryHeaders(const std::string& text) {
+  const Coding coding = NegotiateCoding(text);
+  TERRACE_CHECK(coding == Coding::kIdentity || text.find_first_of("zZbB*") != std::string::npos);  // gzip, zstd, br
+  (void)WantedExtensions(text, {text});
+  (void)MatchesEtag(text, "\"0123456789abcdef\"");
+  static const Proxies kProxies[] = {
+      {AddressRanges::Parse({"10.0.0.0/8", "::1", "fd00::/8"}).value(), ForwardedHeader::kXForwarded},
+      {AddressRanges::Parse({"0.0.0.0/0", "::/0"}).value(), ForwardedHeader::kForwarded}};
+  for (const Proxies& proxies : kProxies) {
+    Request request;
+    RequestFields fields;
+    fields.forwarded = fields.forwarded_for = fields.forwarded_host = fields.forwarded_proto = text;
+    request.fields = SharedFields(fields);
+    const auto client = ResolveClient(request, asio::ip::make_address("10.1.2.3"), proxies);
+    TERRACE_CHECK(!ClientBlock(client).empty());
+    TERRACE_CHECK(IsHostValue(request.fields->host));
+    Request stranger = request;
+    stranger.fields.Set(&RequestFields::host, "a");
+    const auto peer = asio::ip::make_address("2001:db8::1");
+    if (proxies.header == ForwardedHeader::kXForwarded) {
+      TERRACE_CHECK(ResolveClient(stranger, peer, proxies) == peer && stranger.fields->host == "a");
+    }
+  }
+  (void)AddressRanges::Parse({text});
+}
+
+}  // namespace
+}  // namespace terrace::fuzz
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace terrace::fuzz;
+  FuzzInput input(data, size);
+  const char sort = input.Take<char>();
+  const std::string text(input.rest());
+  if (sort == '?') {
+    TryQuery(text);
+  } else if (sort == ':') {
+    TryHeaders(text);
+  } else {
+    TryTarget(sort + text);
+  }
+  return 0;
+}

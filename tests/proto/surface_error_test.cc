@@ -1,0 +1,160 @@
+#include "proto/surface_error.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "engine/tin/greedy.h"
+#include "engine/tin/height_field.h"
+#include "proto/tile_error.h"
+#include "proto/tile_geometry.h"
+#include "proto/tile_mesh.h"
+
+namespace terrace::proto {
+namespace {
+
+struct Ground {
+  geo::TileKey key;
+  geo::Lattice lattice;
+  std::vector<float> heights;
+
+  Ground(geo::TileKey tile, int cells, double relief, unsigned seed) : key{tile}, lattice{tile.level, cells} {
+    std::mt19937 random(seed);
+    for (int k = 0; k < (cells + 3) * (cells + 3); ++k) {
+      heights.push_back(static_cast<float>(relief * static_cast<double>(random() % 4096) / 4096));
+    }
+  }
+  LatticeView view() const { return {key, lattice, heights}; }
+};
+
+tin::TinMesh MeshOf(const Ground& ground, int points) {
+  const int side = ground.lattice.cells + 1;
+  std::vector<float> inside;
+  for (int j = 0; j < side; ++j) {
+    for (int i = 0; i < side; ++i) inside.push_back(ground.view().At(i, j));
+  }
+  const auto field = tin::HeightField::Make(side, side, inside);
+  tin::GreedyTriangulation triangulation(*field);
+  triangulation.Run({.max_points = static_cast<std::size_t>(points)});
+  return triangulation.Mesh();
+}
+
+// Bilinear between the four samples around a place.
+double LatticeHeight(const LatticeView& lattice, double x, double y) {
+  const int i = std::min(static_cast<int>(x), lattice.cells() - 1),
+            j = std::min(static_cast<int>(y), lattice.cells() - 1);
+  x -= i, y -= j;
+  return (1 - x) * (1 - y) * lattice.At(i, j) + x * (1 - y) * lattice.At(i + 1, j) +
+         (1 - x) * y * lattice.At(i, j + 1) + x * y * lattice.At(i + 1, j + 1);
+}
+
+struct Largest {
+  double planar = 0, drawn = 0;
+};
+
+// Many places of every triangle, and its rim, against the lattice surface.
+Largest Sampled(const LatticeView& lattice, const std::vector<std::array<double, 2>>& places,
+                const std::vector<double>& heights, const std::vector<geo::Vec3>& ecef,
+                const std::vector<std::array<std::uint32_t, 3>>& triangles) {
+  constexpr int kSteps = 24;
+  Largest largest;
+  for (const auto& t : triangles) {
+    for (int a = 0; a <= kSteps; ++a) {
+      for (int b = 0; a + b <= kSteps; ++b) {
+        const double u = double(a) / kSteps, v = double(b) / kSteps, w = 1 - u - v;
+        const double x = u * places[t[0]][0] + v * places[t[1]][0] + w * places[t[2]][0];
+        const double y = u * places[t[0]][1] + v * places[t[1]][1] + w * places[t[2]][1];
+        const double ground = LatticeHeight(lattice, x, y);
+        if (!heights.empty()) {
+          const double height = u * heights[t[0]] + v * heights[t[1]] + w * heights[t[2]];
+          largest.planar = std::max(largest.planar, std::abs(height - ground));
+        }
+        const geo::Vec3 point = ecef[t[0]] * u + ecef[t[1]] * v + ecef[t[2]] * w;
+        const double step = lattice.lattice.StepDegrees();
+        const double longitude = lattice.Longitude(0) + x * step, latitude = lattice.Latitude(0) + y * step;
+        const geo::Vec3 up = geo::SurfaceNormal(longitude, latitude);
+        const double drawn = geo::Dot(point - geo::ToEcef(longitude, latitude, 0), up);
+        largest.drawn = std::max(largest.drawn, std::abs(drawn - ground));
+      }
+    }
+  }
+  return largest;
+}
+
+constexpr EdgeSteps kFineSteps{{0x1p-6, 0x1p-6, 0x1p-6, 0x1p-6}, {0x1p-6, 0x1p-6, 0x1p-6, 0x1p-6}};
+
+Largest SampledTile(const LatticeView& lattice, const QuantizedTile& tile) {
+  std::vector<std::array<double, 2>> places;
+  std::vector<double> heights;
+  for (std::size_t k = 0; k < tile.u.size(); ++k) {
+    places.push_back(
+        {double(tile.u[k]) * lattice.cells() / kQuantizedMax, double(tile.v[k]) * lattice.cells() / kQuantizedMax});
+    heights.push_back(HeightAt(tile, tile.h[k]));
+  }
+  return Sampled(lattice, places, heights, DecodePositions(tile), tile.triangles);
+}
+
+// Where the surface is a saddle inside a cell, the worst place of an edge is neither a sample nor a crossing.
+TEST(SurfaceError, IsReachedAndNeverPassedAtAnyPlaceOfTheTile) {
+  for (unsigned seed = 1; seed <= 12; ++seed) {
+    const Ground ground({12, 3000, 2000}, 32, 300, seed);
+    const tin::TinMesh mesh = MeshOf(ground, 4 + static_cast<int>(seed) * 20);
+    const QuantizedTile tile = QuantizeTile(ground.view(), mesh, kFineSteps);
+    const double at_samples = MeasureTileError(ground.view(), tile, 1e9, false).max_m;
+    const double measured = std::max(at_samples, MeasureEdgeError(ground.view(), tile, false));
+    const Largest sampled = SampledTile(ground.view(), tile);
+    EXPECT_GE(measured, sampled.planar);
+    EXPECT_GE(measured, sampled.drawn) << "the sagitta counts where nothing curved is measured";
+    EXPECT_LE(measured, sampled.planar * 1.06 + 0.5) << seed;
+  }
+}
+
+TEST(SurfaceError, HoldsBetweenSamplesOnNoiseThatSamplesCannotShow) {
+  // All samples on the mesh but those of one cell's diagonal: what is measured lies between samples.
+  Ground ground({12, 3000, 2000}, 32, 0, 1);
+  const auto set = [&](int i, int j, float height) {
+    ground.heights[static_cast<std::size_t>(j + 1) * 35 + static_cast<std::size_t>(i + 1)] = height;
+  };
+  set(10, 10, 100);
+  set(11, 11, 100);
+  tin::TinMesh mesh = MeshOf(ground, 200);
+  const QuantizedTile tile = QuantizeTile(ground.view(), mesh, kFineSteps);
+  ASSERT_LT(MeasureTileError(ground.view(), tile, 1e9, false).max_m, 1);
+  EXPECT_GE(MeasureEdgeError(ground.view(), tile, false), SampledTile(ground.view(), tile).planar);
+}
+
+TEST(SurfaceError, BoundsFlatTrianglesFromTheWholeEarthToAStreet) {
+  for (int level = 0; level <= 14; level += 2) {
+    for (const double latitude : {-90.0, -40.0, 0.0, 75.0}) {
+      const std::int64_t row = std::clamp<std::int64_t>(
+          static_cast<std::int64_t>((latitude + 90) / 180 * static_cast<double>(geo::TileRows(level))), 0,
+          geo::TileRows(level) - 1);
+      const Ground ground({level, geo::TileColumns(level) / 3, row}, 64, 20000.0 / (1 << level), 7);
+      const tin::TinMesh mesh = MeshOf(ground, 600);
+      const QuantizedTile tile = QuantizeTile(ground.view(), mesh, kFineSteps);
+      const double at_samples = MeasureTileError(ground.view(), tile, 1e9, true).max_m;
+      const double measured = std::max(at_samples, MeasureEdgeError(ground.view(), tile, true));
+      const Largest sampled = SampledTile(ground.view(), tile);
+      EXPECT_GE(measured, std::max(sampled.drawn, sampled.planar)) << level << " " << latitude;
+      // What is added for the bending between samples shrinks with the square of the cells.
+      const double cell = 180.0 / 64 / (1 << level) * 111320;
+      EXPECT_LE(measured, std::max(sampled.drawn, sampled.planar) * 1.2 + 2 * cell * cell / 6.3e6 + 0.5) << level;
+
+      std::vector<std::array<double, 2>> places;
+      std::vector<geo::Vec3> positions;
+      for (const tin::SamplePosition p : mesh.vertices) {
+        places.push_back({double(p.x), double(p.y)});
+        positions.push_back(
+            geo::ToEcef(ground.view().Longitude(p.x), ground.view().Latitude(p.y), ground.view().At(p.x, p.y)));
+      }
+      const double flat = std::max(MeasureFlatError(ground.view(), mesh, positions, 1e9).max_m,
+                                   MeasureFlatEdgeError(ground.view(), mesh, positions));
+      EXPECT_GE(flat, Sampled(ground.view(), places, {}, positions, mesh.triangles).drawn) << level << " " << latitude;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace terrace::proto

@@ -1,0 +1,159 @@
+#!/usr/bin/env python3
+"""Plays docker/Dockerfile where no container engine runs: each stage in a copy of a bare Debian root, by chroot.
+
+    sudo tools/play_dockerfile.py BASE FOLDER [--built PREFIX]
+                       BASE: a tar of the image that FROM names, or of a debootstrap root
+
+With --built the stage that compiles is left out: what it installs is taken from PREFIX (cmake --install build/release --prefix).
+
+Knows what the Dockerfile uses: FROM, WORKDIR, COPY, RUN, USER, ENTRYPOINT, CMD, HEALTHCHECK; others are an error. Leaves the
+last stage in FOLDER/final. Then starts ENTRYPOINT with CMD as USER, waits until HEALTHCHECK passes, fetches a tile, and ends it
+with SIGTERM, which must give exit code 0. Port 8080 must be free. Needs root; the network is the machine's.
+"""
+import argparse
+import fnmatch
+import json
+import os
+import pathlib
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.request
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+PATH = "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin"
+
+
+def instructions(text):
+    text = re.sub(r"^\s*#.*\n", "", text, flags=re.MULTILINE).replace("\\\n", " ")
+    for line in filter(str.strip, text.splitlines()):
+        word, _, rest = line.strip().partition(" ")
+        yield word.upper(), rest.strip()
+
+
+def context():
+    """What COPY may see: the files of the repository that .dockerignore leaves, copied."""
+    ignored = [line for line in (ROOT / ".dockerignore").read_text().splitlines() if line]
+    names = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True).stdout.split("\0")
+    folder = pathlib.Path(tempfile.mkdtemp(prefix="context-"))
+    for name in filter(None, names):
+        parts = name.split("/")
+        if any(fnmatch.fnmatch("/".join(parts[:count]), pattern) for pattern in ignored for count in range(1, len(parts) + 1)):
+            continue
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy2(ROOT / name, folder / name)
+    return folder
+
+
+def inside(root, command, user=None, workdir="/"):
+    """The command line of a process in `root`, with mounts and processes of its own that end with it."""
+    mounts = "mount --make-rprivate / && mount -t proc proc {0}/proc && mount --rbind /dev {0}/dev && "
+    drop = f"--userspec={user} " if user else ""
+    enter = "exec env -i PATH={1} HOME=/tmp chroot {2}{0} /bin/sh -c 'cd \"$0\" && exec \"$@\"' {3} \"$@\""
+    script = (mounts + enter).format(root, PATH, drop, workdir)
+    return ["unshare", "--mount", "--pid", "--fork", "--kill-child", "bash", "-c", script, "bash", *command]
+
+
+def copy(source_root, root, workdir, rest):
+    *sources, target = rest.split()
+    base = pathlib.Path(workdir) / target  # an absolute target stays
+    destination = pathlib.Path(str(root) + str(base))
+    into_folder = target.endswith("/") or len(sources) > 1 or target == "."
+    for source in sources:
+        path = source_root / source.lstrip("/")
+        if path.is_dir():
+            shutil.copytree(path, destination, symlinks=True, dirs_exist_ok=True)
+        else:
+            where = destination / path.name if into_folder else destination
+            where.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(path, where)
+
+
+def play(base, folder, built):
+    files = context()
+    stages, image = ({"build": built} if built else {}), {}
+    skipped = False
+    root, workdir = None, "/"
+    for word, rest in instructions((ROOT / "docker/Dockerfile").read_text()):
+        name = rest.split()[2] if " AS " in rest.upper() else "final"
+        if word == "FROM":
+            skipped = name in stages
+        if skipped:
+            continue
+        print(f"+ {word} {rest}", flush=True)
+        begun = time.monotonic()
+        if word == "FROM":
+            root, workdir, image = folder / name, "/", {}
+            shutil.rmtree(root, ignore_errors=True)
+            root.mkdir(parents=True)
+            subprocess.run(["tar", "-C", root, "-xf", base], check=True)
+            stages[name] = root
+        elif word == "WORKDIR":
+            workdir = rest
+            pathlib.Path(str(root) + rest).mkdir(parents=True, exist_ok=True)
+        elif word == "COPY":
+            source = files
+            if rest.startswith("--from="):
+                stage, _, rest = rest[len("--from="):].partition(" ")
+                source = stages[stage]
+                if built:  # holds what the stage would have below /opt/terrace
+                    rest = rest.replace("/opt/terrace", "/", 1)
+            copy(source, root, workdir, rest)
+        elif word == "RUN":
+            subprocess.run(inside(root, ["/bin/sh", "-c", rest], workdir=workdir), check=True, stdin=subprocess.DEVNULL)
+            print(f"  {time.monotonic() - begun:.0f} s", flush=True)
+        elif word in ("USER", "ENTRYPOINT", "CMD", "HEALTHCHECK", "EXPOSE", "STOPSIGNAL"):
+            image[word] = rest
+        else:
+            sys.exit(f"play_dockerfile: {word} is not known")
+    shutil.rmtree(files)
+    return root, image
+
+
+def smoke(root, image):
+    command = json.loads(image["ENTRYPOINT"]) + json.loads(image["CMD"])
+    health = json.loads(re.search(r"CMD (\[.*\])", image["HEALTHCHECK"])[1])
+    server = subprocess.Popen(inside(root, command, image["USER"]), stdin=subprocess.DEVNULL)
+    try:
+        for _ in range(60):
+            if subprocess.run(inside(root, health, image["USER"])).returncode == 0:
+                break
+            if server.poll() is not None:
+                sys.exit(f"play_dockerfile: the server ended with {server.returncode}")
+            time.sleep(1)
+        else:
+            sys.exit("play_dockerfile: HEALTHCHECK never passed")
+        with urllib.request.urlopen("http://127.0.0.1:8080/jacksboro/9/272/359.terrain", timeout=30) as reply:
+            print(f"a tile: {reply.status}, {len(reply.read())} bytes")
+        with urllib.request.urlopen("http://127.0.0.1:8080/", timeout=30) as reply:
+            assert b"cesium" in reply.read().lower(), "the page is not the viewer"
+        children = subprocess.run(["pgrep", "-P", str(server.pid)], stdout=subprocess.PIPE, text=True, check=True).stdout.split()
+        user = os.stat(f"/proc/{children[0]}").st_uid
+        assert user == int(image["USER"]), f"runs as {user}"
+        os.kill(int(children[0]), signal.SIGTERM)
+        code = server.wait(40)
+        assert code == 0, f"ended with {code}"
+        assert subprocess.run(inside(root, health, image["USER"]), stderr=subprocess.DEVNULL).returncode != 0, "HEALTHCHECK passes without a server"
+    finally:
+        if server.poll() is None:
+            server.kill()
+    size = subprocess.run(["du", "-sxm", root], stdout=subprocess.PIPE, text=True, check=True).stdout.split()[0]
+    print(f"runs as {image['USER']}, healthy, ends with 0; {size} MB in all")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("base", type=pathlib.Path)
+    parser.add_argument("folder", type=pathlib.Path)
+    parser.add_argument("--built", type=pathlib.Path)
+    arguments = parser.parse_args()
+    built = arguments.built and arguments.built.resolve()
+    smoke(*play(arguments.base.resolve(), arguments.folder.resolve(), built))
+
+
+if __name__ == "__main__":
+    main()
