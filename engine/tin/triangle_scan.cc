@@ -438,9 +438,9 @@ struct StarPlanes {
 constexpr float kDoubt = 0x1p-20F;
 
 // The smallest numerator that may be the largest one in double, once the largest in single precision is known. Where
-// that is exact, no other.
+// that is exact, no other. Never negative, however large the heights: what is below zero is no sample of the triangle.
 HWY_INLINE float LeastInDoubt(float most, float largest, float magnitude, float most_exact) {
-  const float least = most - kDoubt * (most + magnitude);
+  const float least = std::max(most - kDoubt * (most + magnitude), 0.0F);
   return most + largest < most_exact ? most : least;
 }
 
