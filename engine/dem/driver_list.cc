@@ -50,10 +50,12 @@ Result<void> UseDrivers(const std::vector<std::string>& names) {
   const std::lock_guard lock(mutex);
   if (auto known = CheckNames(names); !known) return known;
   GDALDriverManager& manager = *GetGDALDriverManager();
-  for (GDALDriver* driver : Retired()) {
-    if (manager.GetDriverByName(driver->GetDescription()) == nullptr) manager.RegisterDriver(driver);
-  }
-  Retired().clear();
+  // Whoever registers all drivers anew makes others of the same names; the old ones wait on.
+  std::erase_if(Retired(), [&manager](GDALDriver* driver) {
+    if (manager.GetDriverByName(driver->GetDescription()) != nullptr) return false;
+    manager.RegisterDriver(driver);
+    return true;
+  });
   for (int i = manager.GetDriverCount() - 1; i >= 0; --i) {
     GDALDriver* driver = manager.GetDriver(i);
     const std::string_view name = driver->GetDescription();

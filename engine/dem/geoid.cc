@@ -1,7 +1,5 @@
 #include "engine/dem/geoid.h"
 
-#include <proj.h>
-
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -10,32 +8,16 @@
 #include <new>
 #include <system_error>
 
+#include "engine/dem/proj_handle.h"
+
 namespace terrace::dem {
 namespace {
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
-struct Destroy {
-  void operator()(PJ_CONTEXT* context) const { proj_context_destroy(context); }
-  void operator()(PJ* object) const { proj_destroy(object); }
-  void operator()(PJ_OBJ_LIST* list) const { proj_list_destroy(list); }
-  void operator()(PJ_OPERATION_FACTORY_CONTEXT* factory) const { proj_operation_factory_context_destroy(factory); }
-};
-using ContextPtr = std::unique_ptr<PJ_CONTEXT, Destroy>;
-using ObjectPtr = std::unique_ptr<PJ, Destroy>;
-using ListPtr = std::unique_ptr<PJ_OBJ_LIST, Destroy>;
-using FactoryPtr = std::unique_ptr<PJ_OPERATION_FACTORY_CONTEXT, Destroy>;
-
-ContextPtr MakeContext() {
-  ContextPtr context(proj_context_create());
-  proj_log_level(context.get(), PJ_LOG_NONE);
-  proj_context_set_enable_network(context.get(), 0);
-  return context;
-}
-
 // The vertical part of a reference system; null: it has none.
-ObjectPtr VerticalPart(PJ_CONTEXT* context, const std::string& text) {
-  ObjectPtr crs(proj_create(context, text.c_str()));
+ProjObjectPtr VerticalPart(PJ_CONTEXT* context, const std::string& text) {
+  ProjObjectPtr crs(proj_create(context, text.c_str()));
   if (crs != nullptr && proj_get_type(crs.get()) == PJ_TYPE_COMPOUND_CRS) {
     crs.reset(proj_crs_get_sub_crs(context, crs.get(), 1));
   }
@@ -52,18 +34,18 @@ std::string Wkt(PJ_CONTEXT* context, const PJ* crs) {
 
 // Operations from heights of that system, at WGS 84 positions, to ellipsoidal heights: the best first, without those
 // that only pretend (ballpark).
-ListPtr OperationsFrom(PJ_CONTEXT* context, const PJ* vertical) {
-  const ObjectPtr wgs84(proj_create(context, "EPSG:4326")), ellipsoidal(proj_create(context, "EPSG:4979"));
+ProjListPtr OperationsFrom(PJ_CONTEXT* context, const PJ* vertical) {
+  const ProjObjectPtr wgs84(proj_create(context, "EPSG:4326")), ellipsoidal(proj_create(context, "EPSG:4979"));
   const std::string text =
       fmt::format("COMPOUNDCRS[\"heights\",{},{}]", Wkt(context, wgs84.get()), Wkt(context, vertical));
-  const ObjectPtr compound(proj_create(context, text.c_str()));
-  const FactoryPtr factory(proj_create_operation_factory_context(context, nullptr));
+  const ProjObjectPtr compound(proj_create(context, text.c_str()));
+  const ProjFactoryPtr factory(proj_create_operation_factory_context(context, nullptr));
   if (compound == nullptr || ellipsoidal == nullptr || factory == nullptr) return nullptr;
   proj_operation_factory_context_set_allow_ballpark_transformations(context, factory.get(), 0);
   proj_operation_factory_context_set_spatial_criterion(context, factory.get(),
                                                        PROJ_SPATIAL_CRITERION_PARTIAL_INTERSECTION);
   proj_operation_factory_context_set_grid_availability_use(context, factory.get(), PROJ_GRID_AVAILABILITY_IGNORED);
-  return ListPtr(proj_create_operations(context, compound.get(), ellipsoidal.get(), factory.get()));
+  return ProjListPtr(proj_create_operations(context, compound.get(), ellipsoidal.get(), factory.get()));
 }
 
 bool CoversCentre(PJ_CONTEXT* context, const PJ* operation, Position centre) {
@@ -99,26 +81,21 @@ std::string HowToGet(const Grid& grid) {
 
 std::string PipelineOf(PJ_CONTEXT* context, const PJ* operation) {
   // Longitude first, in degrees.
-  const ObjectPtr ordered(proj_normalize_for_visualization(context, operation));
+  const ProjObjectPtr ordered(proj_normalize_for_visualization(context, operation));
   const char* text = ordered == nullptr ? nullptr : proj_as_proj_string(context, ordered.get(), PJ_PROJ_5, nullptr);
   return text == nullptr ? "" : text;
 }
 
+// Metres above the ellipsoid of what lies `height` above the geoid.
+double HeightAt(const ProjOperation& operation, Position degrees, double height) {
+  // A turn on or back is the same place: all longitudes enter the arithmetic in the same form.
+  const double longitude = degrees.x - 360 * std::floor((degrees.x + 180) / 360);
+  const PJ_COORD result =
+      proj_trans(operation.operation.get(), PJ_FWD, proj_coord(longitude, degrees.y, height, HUGE_VAL));
+  return std::isfinite(result.xyz.z) ? result.xyz.z : kUnknown;
+}
+
 }  // namespace
-
-struct Geoid::Operation {
-  ContextPtr context;  // outlives the operation made in it
-  ObjectPtr operation;
-
-  double At(Position degrees, double height) const {
-    // A turn on or back is the same place: all longitudes enter the arithmetic in the same form.
-    const double longitude = degrees.x - 360 * std::floor((degrees.x + 180) / 360);
-    const PJ_COORD result = proj_trans(operation.get(), PJ_FWD, proj_coord(longitude, degrees.y, height, HUGE_VAL));
-    return std::isfinite(result.xyz.z) ? result.xyz.z : kUnknown;
-  }
-};
-
-Geoid::~Geoid() = default;
 
 // Most height systems have one operation for the whole Earth: thousands of sources share it, and looking it up takes
 // PROJ some 20 ms. Failures are not kept: the missing grid may be there the next time.
@@ -134,8 +111,8 @@ std::shared_ptr<const Geoid> Geoid::FindShared(const std::string& vertical_crs, 
 
 Result<std::shared_ptr<const Geoid>> Geoid::OfCrs(const std::string& vertical_crs, Position centre) {
   if (auto known = FindShared(vertical_crs, nullptr)) return Checked(std::move(known), centre);
-  const ContextPtr context = MakeContext();
-  const ObjectPtr vertical = VerticalPart(context.get(), vertical_crs);
+  const ProjContextPtr context = MakeProjContext();
+  const ProjObjectPtr vertical = VerticalPart(context.get(), vertical_crs);
   if (vertical == nullptr) {
     return MakeError(ErrorCode::kInvalidArgument, "\"{}\" is no vertical reference system that PROJ knows",
                      vertical_crs);
@@ -143,11 +120,11 @@ Result<std::shared_ptr<const Geoid>> Geoid::OfCrs(const std::string& vertical_cr
   const char* name = proj_get_name(vertical.get());
   const std::shared_ptr<Geoid> geoid(new Geoid);
   geoid->name_ = name == nullptr ? "unnamed" : name;
-  const ListPtr operations = OperationsFrom(context.get(), vertical.get());
+  const ProjListPtr operations = OperationsFrom(context.get(), vertical.get());
   const int count = operations == nullptr ? 0 : proj_list_get_count(operations.get());
   std::string missing;  // of the best operation that cannot run
   for (int i = 0; i < count; ++i) {
-    const ObjectPtr operation(proj_list_get(context.get(), operations.get(), i));
+    const ProjObjectPtr operation(proj_list_get(context.get(), operations.get(), i));
     if (!CoversCentre(context.get(), operation.get(), centre)) continue;
     const std::vector<Grid> grids = GridsOf(context.get(), operation.get());
     const auto absent = std::ranges::find_if(grids, [](const Grid& grid) { return grid.file.empty(); });
@@ -155,10 +132,10 @@ Result<std::shared_ptr<const Geoid>> Geoid::OfCrs(const std::string& vertical_cr
       if (missing.empty()) missing = HowToGet(*absent);
       continue;
     }
-    geoid->pipeline_ = PipelineOf(context.get(), operation.get());
-    if (geoid->pipeline_.empty()) continue;
+    geoid->operations_.set_pipeline(PipelineOf(context.get(), operation.get()));
+    if (geoid->pipeline().empty()) continue;
     const PJ_PROJ_INFO info = proj_pj_info(operation.get());
-    geoid->description_ = info.description == nullptr ? geoid->pipeline_ : info.description;
+    geoid->description_ = info.description == nullptr ? geoid->pipeline() : info.description;
     std::vector<std::string> files;
     for (const Grid& grid : grids) files.push_back(grid.file);
     geoid->files_ = StampedFiles(files);
@@ -184,21 +161,21 @@ Result<std::shared_ptr<const Geoid>> Geoid::OfGrid(const std::string& path, Posi
   geoid->name_ = std::filesystem::path(path).filename().string();
   geoid->description_ = "undulations of " + path;
   geoid->files_ = StampedFiles({path});
-  geoid->pipeline_ = fmt::format(
-      "+proj=pipeline +step +proj=unitconvert +xy_in=deg +xy_out=rad +step +proj=vgridshift +grids=\"{}\" "
-      "+multiplier=1 +step +proj=unitconvert +xy_in=rad +xy_out=deg",
-      std::filesystem::absolute(path, ignored).string());
+  geoid->operations_.set_pipeline(
+      fmt::format("+proj=pipeline +step +proj=unitconvert +xy_in=deg +xy_out=rad +step +proj=vgridshift +grids=\"{}\" "
+                  "+multiplier=1 +step +proj=unitconvert +xy_in=rad +xy_out=deg",
+                  std::filesystem::absolute(path, ignored).string()));
   return Checked(geoid, centre);
 }
 
 // What cannot be evaluated, and what counts downwards, is found here and not in a tile.
 Result<std::shared_ptr<const Geoid>> Geoid::Checked(std::shared_ptr<const Geoid> geoid, Position centre) {
-  std::unique_ptr<Operation> operation = geoid->Borrow();
+  std::unique_ptr<ProjOperation> operation = geoid->operations_.Borrow();
   if (operation == nullptr) {
     return MakeError(ErrorCode::kInvalidArgument, "{}: PROJ cannot read its grid ({}); check it with `gdalinfo {}`",
                      geoid->name_, geoid->description_, geoid->files_.size() == 0 ? "" : geoid->files_.path(0));
   }
-  const double base = operation->At(centre, 0), above = operation->At(centre, 1);
+  const double base = HeightAt(*operation, centre, 0), above = HeightAt(*operation, centre, 1);
   if (std::isnan(base)) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "{} is not known at the centre of the source, {:.6g} degrees east and {:.6g} north", geoid->name_,
@@ -209,40 +186,17 @@ Result<std::shared_ptr<const Geoid>> Geoid::Checked(std::shared_ptr<const Geoid>
                      "{} counts downwards; make heights of the depths, for instance with `gdal_calc.py --calc=-A`",
                      geoid->name_);
   }
-  geoid->Return(std::move(operation));
+  geoid->operations_.Return(std::move(operation));
   return geoid;
 }
 
-std::unique_ptr<Geoid::Operation> Geoid::Borrow() const {
-  {
-    const std::lock_guard lock(mutex_);
-    if (!idle_.empty()) {
-      std::unique_ptr<Operation> operation = std::move(idle_.back());
-      idle_.pop_back();
-      return operation;
-    }
-  }
-  auto operation = std::make_unique<Operation>();
-  operation->context = MakeContext();
-  operation->operation.reset(proj_create(operation->context.get(), pipeline_.c_str()));
-  return operation->operation == nullptr ? nullptr : std::move(operation);
-}
-
-void Geoid::Return(std::unique_ptr<Operation> operation) const {
-  const std::lock_guard lock(mutex_);
-  idle_.push_back(std::move(operation));
-}
-
-Geoid::Reader::Reader(const Geoid& geoid) : geoid_(geoid), operation_(geoid.Borrow()) {
+Geoid::Reader::Reader(const Geoid& geoid) : geoid_(geoid), operation_(geoid.operations_.Borrow()) {
   // It was set up once; what is missing now is memory or descriptors, and the caller's read fails.
   if (operation_ == nullptr) throw std::bad_alloc();
 }
 
-Geoid::Reader::~Reader() {
-  proj_errno_reset(operation_->operation.get());
-  geoid_.Return(std::move(operation_));
-}
+Geoid::Reader::~Reader() { geoid_.operations_.Return(std::move(operation_)); }
 
-double Geoid::Reader::At(Position degrees) const { return operation_->At(degrees, 0); }
+double Geoid::Reader::At(Position degrees) const { return HeightAt(*operation_, degrees, 0); }
 
 }  // namespace terrace::dem

@@ -13,6 +13,7 @@
 
 #include "engine/core/result.h"
 #include "engine/dem/file_stamp.h"
+#include "engine/dem/operation_pool.h"
 #include "engine/dem/projector.h"
 
 namespace terrace::dem {
@@ -28,16 +29,10 @@ class Geoid {
   // A file of undulations above the WGS 84 ellipsoid that PROJ reads: .gtx, or GeoTIFF as on cdn.proj.org.
   static Result<std::shared_ptr<const Geoid>> OfGrid(const std::string& path, Position centre);
 
-  ~Geoid();
-
   // Metres above the ellipsoid at positions in degrees, longitude first; NaN where the geoid is not known. A value is a
   // function of its position alone, the same at longitudes a full turn apart.
   double Undulation(Position degrees) const { return Reader(*this).At(degrees); }
 
- private:
-  struct Operation;
-
- public:
   // Evaluates for one thread; holds a context of PROJ meanwhile.
   class Reader {
    public:
@@ -49,12 +44,12 @@ class Geoid {
 
    private:
     const Geoid& geoid_;
-    std::unique_ptr<Operation> operation_;
+    std::unique_ptr<ProjOperation> operation_;
   };
 
-  const std::string& name() const { return name_; }                // "EGM96 height"
-  const std::string& description() const { return description_; }  // of the operation, for people
-  const std::string& pipeline() const { return pipeline_; }        // as PROJ runs it
+  const std::string& name() const { return name_; }                       // "EGM96 height"
+  const std::string& description() const { return description_; }         // of the operation, for people
+  const std::string& pipeline() const { return operations_.pipeline(); }  // as PROJ runs it
   // What the operation reads, as it was when it was set up.
   const StampedFiles& files() const { return files_; }
 
@@ -62,13 +57,10 @@ class Geoid {
   Geoid() = default;
   static Result<std::shared_ptr<const Geoid>> Checked(std::shared_ptr<const Geoid> geoid, Position centre);
   static std::shared_ptr<const Geoid> FindShared(const std::string& vertical_crs, std::shared_ptr<const Geoid> made);
-  std::unique_ptr<Operation> Borrow() const;
-  void Return(std::unique_ptr<Operation> operation) const;
 
-  std::string name_, description_, pipeline_;
+  std::string name_, description_;
   StampedFiles files_;
-  mutable std::mutex mutex_;
-  mutable std::vector<std::unique_ptr<Operation>> idle_;  // guarded by mutex_
+  OperationPool operations_;
 };
 
 }  // namespace terrace::dem

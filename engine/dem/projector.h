@@ -6,15 +6,11 @@
 #pragma once
 
 #include <memory>
-#include <mutex>
 #include <span>
 #include <string>
-#include <vector>
 
 #include "engine/core/result.h"
-
-struct pj_ctx;
-struct PJconsts;
+#include "engine/dem/operation_pool.h"
 
 namespace terrace::dem {
 
@@ -28,26 +24,21 @@ class Projector {
   // Longitude and latitude (WGS 84, degrees) to the horizontal CRS `wkt`, in the order easting, northing.
   // `centre` is a position in that CRS where the chosen operation must be at its best.
   static Result<std::shared_ptr<const Projector>> Make(const std::string& wkt, Position centre);
-  ~Projector();
 
   // Transforms in place. Positions outside the operation's domain become NaN.
   void Forward(std::span<Position> positions) const;  // degrees -> CRS
   void Inverse(std::span<Position> positions) const;  // CRS -> degrees
 
-  bool is_identity() const { return pipeline_ == "proj=noop"; }
-  const std::string& pipeline() const { return pipeline_; }        // as PROJ runs it
-  const std::string& description() const { return description_; }  // for people
+  bool is_identity() const { return pipeline() == "proj=noop"; }
+  const std::string& pipeline() const { return operations_.pipeline(); }  // as PROJ runs it
+  const std::string& description() const { return description_; }         // for people
 
  private:
-  struct Operation;
   Projector() = default;
-  std::unique_ptr<Operation> Borrow() const;
-  void Return(std::unique_ptr<Operation> operation) const;
   void Transform(std::span<Position> positions, bool forward) const;
 
-  std::string pipeline_, description_;
-  mutable std::mutex mutex_;
-  mutable std::vector<std::unique_ptr<Operation>> idle_;  // guarded by mutex_
+  std::string description_;
+  OperationPool operations_;
 };
 
 }  // namespace terrace::dem

@@ -1,0 +1,30 @@
+// PROJ's objects, freed with their owners. For sources that include PROJ: everybody else sees operation_pool.h.
+#pragma once
+
+#include <proj.h>
+
+#include <memory>
+
+namespace terrace::dem {
+
+struct ProjDestroy {
+  void operator()(PJ_CONTEXT* context) const { proj_context_destroy(context); }
+  void operator()(PJ* object) const { proj_destroy(object); }
+  void operator()(PJ_OBJ_LIST* list) const { proj_list_destroy(list); }
+  void operator()(PJ_OPERATION_FACTORY_CONTEXT* factory) const { proj_operation_factory_context_destroy(factory); }
+};
+using ProjContextPtr = std::unique_ptr<PJ_CONTEXT, ProjDestroy>;
+using ProjObjectPtr = std::unique_ptr<PJ, ProjDestroy>;
+using ProjListPtr = std::unique_ptr<PJ_OBJ_LIST, ProjDestroy>;
+using ProjFactoryPtr = std::unique_ptr<PJ_OPERATION_FACTORY_CONTEXT, ProjDestroy>;
+
+// Silent, and without the network: what an operation gives must not depend on it.
+ProjContextPtr MakeProjContext();
+
+// For one thread at a time.
+struct ProjOperation {
+  ProjContextPtr context;  // outlives the operation made in it
+  ProjObjectPtr operation;
+};
+
+}  // namespace terrace::dem
