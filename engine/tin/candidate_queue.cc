@@ -63,6 +63,7 @@ HWY_EXPORT(Sweep);
 
 constexpr std::size_t kBlock = 64;    // slots: two vectors of the widest there are
 constexpr std::size_t kSwept = 4096;  // slots swept in one go
+constexpr std::size_t kAhead = 8;     // entries: their slots are fetched so early
 
 }  // namespace
 
@@ -72,6 +73,11 @@ std::uint32_t CandidateQueue::Winner() {
   do {
     for (; run_begin_ < run_.size(); ++run_begin_) {
       const Entry& entry = run_[run_begin_];
+      if (run_begin_ + kAhead < run_.size()) {
+        const std::uint32_t ahead = run_[run_begin_ + kAhead].slot;
+        __builtin_prefetch(&errors_[ahead]);
+        __builtin_prefetch(&samples_[ahead]);
+      }
       if (OrderOf(entry.slot) == entry.order) return entry.slot;
     }
   } while (Refill());
@@ -136,13 +142,16 @@ void CandidateQueue::Insert(std::uint32_t slot) {
 }
 
 // Lets go of the hindmost half. Equal errors go or stay together: the threshold tells them apart from others only.
+// Where heights are whole metres, the hindmost half may well be equal throughout: that must not take a look at each of
+// them.
 void CandidateQueue::Shorten() {
   const auto error_of = [](const Entry& entry) { return static_cast<std::uint32_t>(entry.order >> 32); };
-  std::size_t end = run_begin_ + 2 * wanted_;
-  while (end < run_.size() && error_of(run_[end]) == error_of(run_[end - 1])) ++end;
-  if (end == run_.size()) return;
-  run_.resize(end);
-  threshold_ = std::bit_cast<float>(error_of(run_[end - 1]));
+  const std::uint32_t least = error_of(run_[run_begin_ + 2 * wanted_ - 1]);
+  if (error_of(run_.back()) == least) return;
+  const auto end = std::partition_point(run_.begin() + static_cast<std::ptrdiff_t>(run_begin_), run_.end(),
+                                        [&](const Entry& entry) { return error_of(entry) >= least; });
+  run_.erase(end, run_.end());
+  threshold_ = std::bit_cast<float>(least);
 }
 
 void CandidateQueue::Grow(std::size_t slots) {

@@ -11,6 +11,8 @@
 // by their samples.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -28,11 +30,30 @@ class CandidateQueue {
 
   // Slots that were never set hold no candidate.
   void Set(std::uint32_t slot, const Candidate& candidate) {
-    if (slot >= errors_.size()) Grow(slot + std::size_t{1});
-    const float error = RoundUp(candidate.error);
-    errors_[slot] = error;
-    samples_[slot] = candidate.sample;
-    if (error >= threshold_) Insert(slot);
+    Reserve(slot + std::size_t{1});
+    if (Put(slot, candidate)) Insert(slot);
+  }
+  // The same for many slots, each of them once: Set(slots[i], candidate(i)).
+  template <typename CandidateOf>
+  void SetAll(const std::uint32_t* slots, std::size_t count, CandidateOf&& candidate) {
+    std::uint32_t most = 0;
+    for (std::size_t i = 0; i < count; ++i) most = std::max(most, slots[i]);
+    Reserve(most + std::size_t{1});
+    // Which of them belong into the run is collected without a branch, for it cannot be foretold.
+    std::array<std::uint32_t, 64> foremost;
+    for (std::size_t first = 0; first < count; first += foremost.size()) {
+      std::size_t found = 0;
+      for (std::size_t i = first; i < std::min(count, first + foremost.size()); ++i) {
+        foremost[found] = slots[i];
+        found += Put(slots[i], candidate(i)) ? 1 : 0;
+      }
+      for (std::size_t i = 0; i < found; ++i) {
+        if (errors_[foremost[i]] >= threshold_) Insert(foremost[i]);  // an insertion may have raised the threshold
+      }
+    }
+  }
+  void Reserve(std::size_t slots) {
+    if (slots > errors_.size()) Grow(slots);
   }
 
   // The slot whose candidate precedes all others; kNoSlot when there is no candidate at all.
@@ -58,6 +79,13 @@ class CandidateQueue {
     std::uint64_t order;  // non-negative floats compare like their bits: those, then the complement of the sample
     std::uint32_t slot;
   };
+  // Whether the slot belongs into the run.
+  bool Put(std::uint32_t slot, const Candidate& candidate) {
+    const float error = RoundUp(candidate.error);
+    errors_[slot] = error;
+    samples_[slot] = candidate.sample;
+    return error >= threshold_;
+  }
   void Grow(std::size_t slots);
   void Insert(std::uint32_t slot);
   bool Refill();

@@ -238,9 +238,13 @@ void GreedyTriangulation::Impl::ScanStarOf(const Star& star) {
   if (misfits_.size() < star.count) misfits_.resize(star.ring.capacity());
   data_dependent_ ? data_dependent_->Scan(star, misfits_.data()) : scan_star_(open_, star, misfits_.data());
   const bool is_plain = sagitta_.is_flat() && !star.has_border;
-  for (std::size_t i = 0; i < star.count; ++i) {
-    candidates_.Set(star.triangles[i], is_plain ? Candidate{std::max(misfits_[i].distance, 0.0), misfits_[i].sample}
-                                                : CandidateOf(star, i));
+  const std::uint32_t* const slots = star.triangles.data();
+  if (is_plain) {
+    candidates_.SetAll(slots, star.count, [misfits = misfits_.data()](std::size_t i) {
+      return Candidate{std::max(misfits[i].distance, 0.0), misfits[i].sample};
+    });
+  } else {
+    candidates_.SetAll(slots, star.count, [&](std::size_t i) { return CandidateOf(star, i); });
   }
 }
 

@@ -5,31 +5,56 @@
 #include <cmath>
 #include <cstdint>
 
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "engine/tin/open_samples.cc"
+#include <hwy/foreach_target.h>  // includes this file once for each set of instructions
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace terrace::tin {
+namespace HWY_NAMESPACE {
+
+// Voids count as multiples: of NaN alone it is not true that it equals itself. Numbers from 2^30 steps on are none:
+// their conversion to integers may be undefined.
+bool AreMultiples(const float* heights, std::size_t count, float quantum) {
+  namespace hn = hwy::HWY_NAMESPACE;
+  const hn::CappedTag<float, 16> floats;
+  const hn::RebindToSigned<decltype(floats)> ints;
+  const std::size_t lanes = hn::Lanes(floats);
+  const auto steps_a_metre = hn::Set(floats, 1 / quantum), limit = hn::Set(floats, 0x1p30F);
+  const auto is_multiple = [&](auto height) HWY_ATTR {
+    const auto steps = hn::Mul(height, steps_a_metre);
+    const auto fits = hn::Lt(hn::Abs(steps), limit);
+    const auto whole = hn::ConvertTo(floats, hn::ConvertTo(ints, hn::IfThenElseZero(fits, steps)));
+    return hn::Or(hn::And(fits, hn::Eq(whole, steps)), hn::Not(hn::Eq(steps, steps)));
+  };
+  std::size_t i = 0;
+  for (; i + lanes <= count; i += lanes) {
+    if (!hn::AllTrue(floats, is_multiple(hn::LoadU(floats, heights + i)))) return false;
+  }
+  for (; i < count; ++i) {
+    if (!hn::AllTrue(floats, is_multiple(hn::Set(floats, heights[i])))) return false;
+  }
+  return true;
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace terrace::tin
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
 namespace terrace::tin {
 namespace {
+
+HWY_EXPORT(AreMultiples);
 
 // Whole metres, the server's own rounding, and what 32-bit surveys of low ground come in.
 constexpr std::array<float, 3> kQuanta = {1, 0x1p-10F, 0x1p-14F};
 
-bool AreMultiples(const float* begin, const float* end, float quantum) {
-  const float steps_a_metre = 1 / quantum;
-  bool are = true;
-  for (const float* height = begin; height < end; ++height) {
-    const float steps = *height * steps_a_metre;
-    // A void is none; the conversion is undefined from 2^31 on.
-    if (std::abs(steps) < 0x1p30F)
-      are &= static_cast<float>(static_cast<std::int32_t>(steps)) == steps;
-    else
-      are &= std::isnan(steps);
-  }
-  return are;
-}
-
 float QuantumOf(const HeightField& field) {
+  const auto count = static_cast<std::size_t>(field.width()) * static_cast<std::size_t>(field.height());
   for (const float quantum : kQuanta) {
-    int y = 0;
-    while (y < field.height() && AreMultiples(field.Row(y), field.Row(y) + field.width(), quantum)) ++y;
-    if (y == field.height()) return quantum;
+    if (HWY_DYNAMIC_DISPATCH(AreMultiples)(field.Row(0), count, quantum)) return quantum;
   }
   return 0;
 }
@@ -48,3 +73,4 @@ OpenSamples::OpenSamples(const HeightField& field)
 }
 
 }  // namespace terrace::tin
+#endif

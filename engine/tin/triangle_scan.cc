@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <type_traits>
@@ -22,7 +23,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 // Everything is evaluated in one of two precisions. Single is as good as double for most triangles: all heights are
 // multiples of a quantum (OpenSamples::quantum), so all numbers that the formula adds and multiplies are, and every
 // multiple up to 2^24 times the quantum is a float. Where that may be exceeded, it is double.
-using DoublesTag = hn::ScalableTag<double>;
+using DoublesTag = hn::CappedTag<double, 16>;
 using FloatsTag = hn::CappedTag<float, 16>;
 constexpr DoublesTag kDoubles;
 constexpr FloatsTag kFloats;
@@ -40,9 +41,16 @@ template <typename Tag, typename Value>
 HWY_INLINE hn::Vec<Tag> All(Tag tag, Value value) {
   return hn::Set(tag, static_cast<hn::TFromD<Tag>>(value));
 }
+
+// The numbers of the lanes, from memory: hn::Iota counts them anew each time, in a loop.
+template <typename T>
+struct LaneNumbers {
+  HWY_ALIGN static constexpr T kValues[16] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+};
 template <typename Tag>
 HWY_INLINE hn::Vec<Tag> From(Tag tag, int first) {
-  return hn::Add(All(tag, first), hn::Iota(tag, 0));
+  static_assert(hn::MaxLanes(Tag()) <= 16);
+  return hn::Add(All(tag, first), hn::Load(tag, LaneNumbers<hn::TFromD<Tag>>::kValues));
 }
 
 // One triangle, seen from its last corner p.
@@ -56,9 +64,10 @@ struct ScannedTriangle {
 
 // The furthest sample so far, lane by lane. Each lane meets its samples in row-major order, so that ">" keeps the
 // first; no comparison with NaN holds.
-template <typename Tag>
+template <typename TagOfNumerators>
 class Furthest {
  public:
+  using Tag = TagOfNumerators;
   using Index = hn::Vec<IndexTag<Tag>>;
 
   HWY_INLINE Furthest() : numerator_(All(kTag, -1)), index_(hn::Zero(kIndices)) {}
@@ -74,6 +83,8 @@ class Furthest {
     Keep(hn::Or(hn::Gt(other.numerator_, numerator_), tied), other.numerator_, other.index_);
   }
 
+  HWY_INLINE hn::Vec<Tag> numerators() const { return numerator_; }
+  HWY_INLINE Index indices() const { return index_; }
   HWY_INLINE hn::TFromD<Tag> numerator() const { return hn::GetLane(hn::MaxOfLanes(kTag, numerator_)); }
 
   // Precondition: some sample was visited.
@@ -97,6 +108,38 @@ class Furthest {
   Index index_;             // row-major
 };
 
+// The same where single precision leaves doubts: also how close to a lane's furthest sample another one of it comes.
+class FurthestTwo {
+ public:
+  using Tag = FloatsTag;
+  using Index = Furthest<FloatsTag>::Index;
+
+  HWY_INLINE FurthestTwo() : runner_up_(All(kFloats, -1)) {}
+
+  HWY_INLINE void Visit(Floats numerator, Index index, hn::Mask<FloatsTag> inside) {
+    const auto counts = hn::And(inside, hn::Ge(numerator, hn::Zero(kFloats)));
+    const Floats counted = hn::IfThenElse(counts, numerator, All(kFloats, -1));
+    runner_up_ = hn::Max(runner_up_, hn::Min(counted, furthest_.numerators()));
+    furthest_.Visit(counted, index);
+  }
+  HWY_INLINE void Visit(Floats numerator, Index index) {
+    Visit(numerator, index, hn::Ge(numerator, hn::Zero(kFloats)));
+  }
+  HWY_INLINE void Merge(const FurthestTwo& other) {
+    runner_up_ =
+        hn::Max(hn::Max(runner_up_, other.runner_up_), hn::Min(furthest_.numerators(), other.furthest_.numerators()));
+    furthest_.Merge(other.furthest_);
+  }
+
+  HWY_INLINE float numerator() const { return furthest_.numerator(); }
+  HWY_INLINE float runner_up() const { return hn::GetLane(hn::MaxOfLanes(kFloats, runner_up_)); }
+  HWY_INLINE const Furthest<FloatsTag>& furthest() const { return furthest_; }
+
+ private:
+  Furthest<FloatsTag> furthest_;
+  Floats runner_up_;
+};
+
 HWY_INLINE Floats HeightsAt(FloatsTag tag, const float* from) { return hn::LoadU(tag, from); }
 HWY_INLINE hn::Vec<DoublesTag> HeightsAt(DoublesTag tag, const float* from) {
   return hn::PromoteTo(tag, hn::LoadU(hn::Rebind<float, DoublesTag>(), from));
@@ -108,14 +151,15 @@ template <typename Tag>
 class Barycentric {
  public:
   HWY_INLINE Barycentric(const ScannedTriangle& t, hn::Vec<Tag> x, hn::Vec<Tag> y)
-      : step_u_(All(kTag, t.vx)),
-        step_v_(All(kTag, t.ux)),
+      : step_u_(All(kTag, 2 * t.vx)),
+        step_v_(All(kTag, 2 * t.ux)),
         step_p_(hn::Sub(step_u_, step_v_)),
-        of_u_(hn::Sub(hn::Mul(All(kTag, t.vy), x), hn::Mul(step_u_, y))),
-        of_v_(hn::Sub(hn::Mul(step_v_, y), hn::Mul(All(kTag, t.uy), x))),
+        of_u_(hn::Sub(hn::Mul(All(kTag, t.vy), x), hn::Mul(All(kTag, t.vx), y))),
+        of_v_(hn::Sub(hn::Mul(All(kTag, t.ux), y), hn::Mul(All(kTag, t.uy), x))),
         of_p_(hn::Sub(All(kTag, t.d), hn::Add(of_u_, of_v_))) {}
 
   HWY_INLINE hn::Mask<Tag> IsInside() const { return hn::Ge(hn::Min(hn::Min(of_u_, of_v_), of_p_), hn::Zero(kTag)); }
+  // Two rows on.
   HWY_INLINE void Step() {
     of_u_ = hn::Sub(of_u_, step_u_);
     of_v_ = hn::Add(of_v_, step_v_);
@@ -135,35 +179,44 @@ HWY_INLINE V Numerator(V heights, V pz, V d, V plane) {
   return hn::Abs(hn::Sub(hn::Mul(d, hn::Sub(heights, pz)), plane));
 }
 
-// Every sample of some columns of the bounding box, masked: no spans, no divisions, no branches but the loop.
-template <typename Tag>
-HWY_INLINE Furthest<Tag> ScanColumns(Tag tag, const OpenSamples& samples, const ScannedTriangle& t, int column) {
+// Every sample of some columns of the bounding box, masked: no spans, no divisions, no branches but the loop. Two rows
+// at a time, each for itself, since what is furthest so far is waited for. The row above the last one may be looked at:
+// it is outside.
+template <typename Found>
+HWY_INLINE Found ScanColumns(const OpenSamples& samples, const ScannedTriangle& t, int column) {
+  using Tag = typename Found::Tag;
+  constexpr Tag tag;
   constexpr IndexTag<Tag> indices;
-  const auto d = All(tag, t.d), pz = All(tag, t.pz), b = All(tag, t.b), one = All(tag, 1);
+  const auto d = All(tag, t.d), pz = All(tag, t.pz), b = All(tag, t.b), one = All(tag, 1), two = All(tag, 2);
   const auto x = From(tag, column), a_x = hn::Mul(All(tag, t.a), x);
-  auto y = All(tag, t.south);
-  Barycentric<Tag> barycentric(t, x, y);
+  auto y = All(tag, t.south), above = hn::Add(y, one);
+  Barycentric<Tag> even(t, x, y), odd(t, x, above);
   const int width = samples.width(), first_row = t.py + t.south;
   const float* from = samples.Row(first_row) + t.px + column;
   const auto next_row = All(indices, width);
   auto index = From(indices, first_row * width + t.px + column);
-  Furthest<Tag> furthest;
-  for (int j = t.south; j <= t.north; ++j) {
-    const auto numerator = Numerator(HeightsAt(tag, from), pz, d, hn::Add(a_x, hn::Mul(b, y)));
-    furthest.Visit(numerator, index, barycentric.IsInside());
-    from += width;
+  Found furthest, also;
+  for (int j = t.south; j <= t.north; j += 2) {
+    furthest.Visit(Numerator(HeightsAt(tag, from), pz, d, hn::Add(a_x, hn::Mul(b, y))), index, even.IsInside());
     index = hn::Add(index, next_row);
-    y = hn::Add(y, one);
-    barycentric.Step();
+    also.Visit(Numerator(HeightsAt(tag, from + width), pz, d, hn::Add(a_x, hn::Mul(b, above))), index, odd.IsInside());
+    index = hn::Add(index, next_row);
+    from += 2 * width;
+    y = hn::Add(y, two);
+    above = hn::Add(above, two);
+    even.Step();
+    odd.Step();
   }
+  furthest.Merge(also);
   return furthest;
 }
 
-template <typename Tag>
-HWY_INLINE Furthest<Tag> ScanBox(Tag tag, const OpenSamples& samples, const ScannedTriangle& t) {
-  Furthest<Tag> furthest = ScanColumns(tag, samples, t, t.west);
-  for (int column = t.west + LanesOf<Tag>(); column <= t.east; column += LanesOf<Tag>()) {
-    furthest.Merge(ScanColumns(tag, samples, t, column));
+template <typename Found>
+HWY_INLINE Found ScanBox(const OpenSamples& samples, const ScannedTriangle& t) {
+  const int lanes = LanesOf<typename Found::Tag>();
+  Found furthest = ScanColumns<Found>(samples, t, t.west);
+  for (int column = t.west + lanes; column <= t.east; column += lanes) {
+    furthest.Merge(ScanColumns<Found>(samples, t, column));
   }
   return furthest;
 }
@@ -189,19 +242,21 @@ HWY_INLINE void Cross(int x0, int y0, int x1, int y1, bool round_up, int first_r
 }
 
 // Row by row, exact spans.
-template <typename Tag>
-HWY_INLINE Furthest<Tag> ScanSpans(Tag tag, const OpenSamples& samples, const ScannedTriangle& t) {
+template <typename Found>
+HWY_INLINE Found ScanSpans(const OpenSamples& samples, const ScannedTriangle& t) {
+  using Tag = typename Found::Tag;
+  constexpr Tag tag;
   std::array<int, 4> xs = {t.px, t.px + static_cast<int>(t.ux), t.px + static_cast<int>(t.vx), t.px};
   std::array<int, 4> ys = {t.py, t.py + static_cast<int>(t.uy), t.py + static_cast<int>(t.vy), t.py};
   const auto turn = [](std::array<int, 4>& values) { values = {values[1], values[2], values[3], values[1]}; };
   while (ys[0] > t.py + t.south) turn(xs), turn(ys);
 
   constexpr IndexTag<Tag> indices;
-  const auto d = All(tag, t.d), a = All(tag, t.a), b = All(tag, t.b), pz = All(tag, t.pz);
+  const auto d = All(tag, t.d), a = All(tag, t.a), b = All(tag, t.b), pz = All(tag, t.pz), one = All(tag, 1);
   const int lanes = LanesOf<Tag>(), last_row = t.py + t.north, width = samples.width();
   const auto lanes_on = All(tag, lanes);
   const auto indices_on = All(indices, lanes);
-  Furthest<Tag> furthest;
+  Found furthest, also, ends;  // apart, since what is furthest so far is waited for
   Columns firsts, lasts;
   for (int block = t.py + t.south; block <= last_row; block += kRows) {
     const int rows = std::min(kRows, last_row - block + 1);
@@ -213,25 +268,30 @@ HWY_INLINE Furthest<Tag> ScanSpans(Tag tag, const OpenSamples& samples, const Sc
     for (std::size_t i = 3; i-- > 0;) {
       if (ys[i] > ys[i + 1]) Cross(xs[i + 1], ys[i + 1], xs[i], ys[i], true, block, rows, firsts);
     }
+    auto y = All(tag, block - t.py);
     for (int j = 0; j < rows; ++j) {
-      const int first = firsts[static_cast<std::size_t>(j)], last = lasts[static_cast<std::size_t>(j)], y = block + j;
-      const float* from = samples.Row(y) + first;
-      const auto b_y = hn::Mul(b, All(tag, y - t.py));
-      const auto end = All(indices, y * width + last + 1);
+      const int first = firsts[static_cast<std::size_t>(j)], last = lasts[static_cast<std::size_t>(j)], row = block + j;
+      const float* from = samples.Row(row) + first;
+      const auto b_y = hn::Mul(b, y);
+      const auto end = All(indices, row * width + last + 1);
+      y = hn::Add(y, one);
       auto x = From(tag, first - t.px);
-      auto index = From(indices, y * width + first);
+      auto index = From(indices, row * width + first);
       int left = last - first + 1;
-      for (; left >= lanes; left -= lanes) {
-        furthest.Visit(Numerator(HeightsAt(tag, from), pz, d, hn::Add(hn::Mul(a, x), b_y)), index);
+      const auto visit = [&](Found& found) HWY_ATTR {
+        found.Visit(Numerator(HeightsAt(tag, from), pz, d, hn::Add(hn::Mul(a, x), b_y)), index);
         from += lanes;
         x = hn::Add(x, lanes_on);
         index = hn::Add(index, indices_on);
-      }
-      if (left <= 0) continue;
+      };
+      for (; left >= 2 * lanes; left -= 2 * lanes) visit(furthest), visit(also);
+      if (left >= lanes) visit(also);
       const auto inside = hn::RebindMask(tag, hn::Lt(index, end));
-      furthest.Visit(Numerator(HeightsAt(tag, from), pz, d, hn::Add(hn::Mul(a, x), b_y)), index, inside);
+      ends.Visit(Numerator(HeightsAt(tag, from), pz, d, hn::Add(hn::Mul(a, x), b_y)), index, inside);
     }
   }
+  furthest.Merge(also);
+  furthest.Merge(ends);
   return furthest;
 }
 
@@ -255,14 +315,14 @@ HWY_INLINE ScannedTriangle TriangleOf(const Star& star, std::size_t i) {
 // Up to so many vectors of columns the box is quicker than its spans.
 constexpr int kMostBoxVectors = 2;
 
-template <typename Tag>
-HWY_INLINE Furthest<Tag> ScanWide(Tag tag, const OpenSamples& samples, const ScannedTriangle& t) {
-  return t.east - t.west < kMostBoxVectors * LanesOf<Tag>() ? ScanBox(tag, samples, t) : ScanSpans(tag, samples, t);
+template <typename Found>
+HWY_INLINE Found ScanWide(const OpenSamples& samples, const ScannedTriangle& t) {
+  return t.east - t.west < kMostBoxVectors * LanesOf<typename Found::Tag>() ? ScanBox<Found>(samples, t)
+                                                                            : ScanSpans<Found>(samples, t);
 }
 
-PlaneMisfit ScanExactly(const OpenSamples& samples, const Star& star, std::size_t i) {
-  const ScannedTriangle t = TriangleOf(star, i);
-  const Furthest<DoublesTag> furthest = ScanWide(kDoubles, samples, t);
+PlaneMisfit ScanExactly(const OpenSamples& samples, const ScannedTriangle& t) {
+  const auto furthest = ScanWide<Furthest<DoublesTag>>(samples, t);
   if (furthest.numerator() < 0) return {};
   return {furthest.numerator() / t.d, furthest.sample()};
 }
@@ -301,7 +361,18 @@ HWY_INLINE Floats RowsFrom(const float* from, int stride) {
   }
 }
 
-// What the triangles of a star need, for as many of them at once as there are lanes.
+HWY_INLINE std::uint32_t BitsOf(hn::Mask<FloatsTag> mask) {
+  std::uint16_t bits = 0;
+  hn::StoreMaskBits(kFloats, mask, reinterpret_cast<std::uint8_t*>(&bits));
+  return bits;
+}
+
+// Doubled areas, and what barycentric coordinates are computed from, stay below 2^24.
+constexpr int kMostExtent = 2048;
+// Beyond it single precision may overflow.
+constexpr float kMostMagnitude = 0x1p100F;
+
+// The triangles of a star, as many at once as there are lanes, in single precision.
 struct StarPlanes {
   static constexpr std::size_t kMost = hn::MaxLanes(kFloats);
 
@@ -314,11 +385,12 @@ struct StarPlanes {
     const Floats u_z = hn::Sub(hn::LoadU(kFloats, heights), pz), v_z = hn::Sub(hn::LoadU(kFloats, heights + 1), pz);
     const Floats of_ux = hn::ConvertTo(kFloats, u_x), of_uy = hn::ConvertTo(kFloats, u_y);
     const Floats of_vx = hn::ConvertTo(kFloats, v_x), of_vy = hn::ConvertTo(kFloats, v_y);
+    const Floats of_d = hn::Sub(hn::Mul(of_ux, of_vy), hn::Mul(of_uy, of_vx));
     hn::Store(of_ux, kFloats, ux);
     hn::Store(of_uy, kFloats, uy);
     hn::Store(of_vx, kFloats, vx);
     hn::Store(of_vy, kFloats, vy);
-    hn::Store(hn::Sub(hn::Mul(of_ux, of_vy), hn::Mul(of_uy, of_vx)), kFloats, d);
+    hn::Store(of_d, kFloats, d);
     const Floats vy_uz = hn::Mul(of_vy, u_z), uy_vz = hn::Mul(of_uy, v_z);
     const Floats ux_vz = hn::Mul(of_ux, v_z), vx_uz = hn::Mul(of_vx, u_z);
     const Floats of_a = hn::Sub(vy_uz, uy_vz), of_b = hn::Sub(ux_vz, vx_uz);
@@ -326,36 +398,64 @@ struct StarPlanes {
     hn::Store(of_b, kFloats, b);
     const auto low_x = hn::Min(hn::Min(u_x, v_x), none), high_x = hn::Max(hn::Max(u_x, v_x), none);
     const auto low_y = hn::Min(hn::Min(u_y, v_y), none), high_y = hn::Max(hn::Max(u_y, v_y), none);
+    const auto wide = hn::Sub(high_x, low_x), high = hn::Sub(high_y, low_y), extent = hn::Max(wide, high);
     hn::Store(low_x, kInts, west);
     hn::Store(low_y, kInts, south);
-    hn::Store(hn::Max(hn::Sub(high_x, low_x), hn::Sub(high_y, low_y)), kInts, extent);
+    hn::Store(wide, kInts, width);
+    hn::Store(high, kInts, height);
     // No column or row of the triangle is further from p than its box is wide or high.
-    const Floats across = hn::ConvertTo(kFloats, hn::Sub(high_x, low_x)),
-                 up = hn::ConvertTo(kFloats, hn::Sub(high_y, low_y));
-    const Floats products = hn::Add(hn::Max(hn::Abs(vy_uz), hn::Abs(uy_vz)), hn::Max(hn::Abs(ux_vz), hn::Abs(vx_uz)));
+    const Floats across = hn::ConvertTo(kFloats, wide), up = hn::ConvertTo(kFloats, high);
+    const Floats of_x = hn::Add(hn::Abs(vy_uz), hn::Abs(uy_vz)), of_y = hn::Add(hn::Abs(ux_vz), hn::Abs(vx_uz));
     const Floats most_plane = hn::Add(hn::Mul(hn::Abs(of_a), across), hn::Mul(hn::Abs(of_b), up));
-    hn::Store(hn::Add(products, most_plane), kFloats, largest);
+    const Floats of_magnitude = hn::Add(hn::Mul(of_x, across), hn::Mul(of_y, up));
+    hn::Store(hn::Add(hn::Add(of_x, of_y), most_plane), kFloats, largest);
+    hn::Store(of_magnitude, kFloats, magnitude);
+
+    const auto has_samples = hn::Ne(of_d, All(kFloats, 1));  // Pick's theorem: with 1, none but its corners
+    const auto is_tame = hn::And(hn::Lt(of_magnitude, All(kFloats, kMostMagnitude)),
+                                 hn::RebindMask(kFloats, hn::Lt(extent, All(kInts, kMostExtent + 1))));
+    const auto is_small = hn::RebindMask(kFloats, hn::Lt(extent, All(kInts, 4)));
+    const auto is_medium = hn::RebindMask(kFloats, hn::Lt(extent, All(kInts, kLargeSide)));
+    const std::uint32_t lanes = BitsOf(has_samples), tame = lanes & BitsOf(is_tame);
+    small = tame & BitsOf(is_small);
+    medium = tame & BitsOf(is_medium) & ~small;
+    wild = lanes & ~tame;
+    large = tame & ~small & ~medium;
   }
 
   HWY_ALIGN float ux[kMost], uy[kMost], vx[kMost], vy[kMost], d[kMost], a[kMost], b[kMost];
-  HWY_ALIGN float largest[kMost];                                   // no product or sum of the planes' is larger
-  HWY_ALIGN std::int32_t west[kMost], south[kMost], extent[kMost];  // bounding box: its first sample, its larger side
+  HWY_ALIGN float largest[kMost];    // no product or sum of the planes' is larger
+  HWY_ALIGN float magnitude[kMost];  // what rounding errors are relative to
+  HWY_ALIGN std::int32_t west[kMost], south[kMost], width[kMost], height[kMost];  // bounding box
+  std::uint32_t small, medium, large, wild;                                       // sets of lanes
 };
 
-// Doubled areas, and what barycentric coordinates are computed from, stay below 2^24.
-constexpr int kMostExtent = 2048;
+// Single precision against double. With u = 2^-24 and the numerator N = |D (h - z_p) - (A x + B y)|, two roundings are
+// relative to D (h - z_p), which is at most N + magnitude; four to A x and B y, five with their sum; one to N: all in
+// all 3 u N + 7 u magnitude, and double's own errors are nothing beside that. A sample that is the furthest in double
+// therefore is within 2^-20 (N + magnitude) of the furthest in single precision. Nothing underflows: every factor but
+// one is an integer.
+constexpr float kDoubt = 0x1p-20F;
 
-struct QuickMisfit {
-  float numerator = -1;
-  std::uint32_t sample = kNoSample;
+// The smallest numerator that may be the largest one in double, once the largest in single precision is known. Where
+// that is exact, no other. Never negative, however large the heights: what is below zero is no sample of the triangle.
+HWY_INLINE float LeastInDoubt(float most, float largest, float magnitude, float most_exact) {
+  const float least = std::max(most - kDoubt * (most + magnitude), 0.0F);
+  return most + largest < most_exact ? most : least;
+}
+
+// One block, from (west, south) relative to p: the largest numerator, negative if there is no sample, and which samples
+// are as large as that or may be, row by row. No branch: which triangle lies where in its block cannot be foretold.
+struct BlockFind {
+  float most;
+  std::uint64_t found;
 };
-
-// One block, from (west, south) relative to p. No branch: which triangle lies where in its block cannot be foretold.
 template <int kSide>
-HWY_INLINE QuickMisfit ScanBlock(const OpenSamples& samples, const Star& star, const StarPlanes& planes, std::size_t i,
-                                 int west, int south) {
+HWY_INLINE BlockFind ScanBlock(const OpenSamples& samples, const Star& star, const StarPlanes& planes, std::size_t i,
+                               float most_exact) {
   constexpr int kLanes = static_cast<int>(hn::MaxLanes(kFloats)), kRowsAtOnce = kLanes / kSide;
   constexpr int kVectors = kSide * kSide / kLanes;
+  const int west = planes.west[i], south = planes.south[i];
   const Floats columns = hn::Load(kFloats, kSide == 4 ? kColumnsBy4 : kColumnsBy8);
   const Floats rows = hn::Load(kFloats, kSide == 4 ? kRowsBy4 : kRowsBy8);
   const Floats x = hn::Add(All(kFloats, west), columns);
@@ -370,53 +470,126 @@ HWY_INLINE QuickMisfit ScanBlock(const OpenSamples& samples, const Star& star, c
   const Floats step_u = hn::Mul(vx, at_once), step_v = hn::Mul(ux, at_once), step_p = hn::Sub(step_u, step_v);
 
   const Floats none = All(kFloats, -1), zero = hn::Zero(kFloats);
-  const int width = samples.width();
+  const int stride = samples.width();
   const float* const from = samples.Row(star.y + south) + star.x + west;
-  HWY_ALIGN float numerators[kSide * kSide];
+  Floats numerators[kVectors];
   Floats most = none;
 #pragma GCC unroll 8
   for (int k = 0; k < kVectors; ++k) {
-    const Floats heights = RowsFrom<kSide>(from + k * kRowsAtOnce * width, width);
-    const Floats numerator = hn::Abs(hn::Sub(hn::Mul(d, hn::Sub(heights, pz)), hn::Add(a_x, hn::Mul(b, y))));
+    const Floats heights = RowsFrom<kSide>(from + k * kRowsAtOnce * stride, stride);
+    const Floats numerator = Numerator(heights, pz, d, hn::Add(a_x, hn::Mul(b, y)));
     const auto inside = hn::Ge(hn::Min(hn::Min(of_u, of_v), of_p), zero);
-    const Floats counted = hn::IfThenElse(hn::And(inside, hn::Ge(numerator, zero)), numerator, none);
-    hn::Store(counted, kFloats, numerators + k * kLanes);
-    most = hn::Max(most, counted);
+    numerators[k] = hn::IfThenElse(hn::And(inside, hn::Ge(numerator, zero)), numerator, none);
+    most = hn::Max(most, numerators[k]);
     y = hn::Add(y, at_once);
     of_u = hn::Sub(of_u, step_u);
     of_v = hn::Add(of_v, step_v);
     of_p = hn::Add(of_p, step_p);
   }
-  most = hn::MaxOfLanes(kFloats, most);
-  std::uint64_t found = 0;
+  BlockFind find{hn::GetLane(hn::MaxOfLanes(kFloats, most)), 0};
+  const Floats least = All(kFloats, LeastInDoubt(find.most, planes.largest[i], planes.magnitude[i], most_exact));
 #pragma GCC unroll 8
   for (int k = 0; k < kVectors; ++k) {
-    std::uint16_t bits = 0;
-    hn::StoreMaskBits(kFloats, hn::Eq(hn::Load(kFloats, numerators + k * kLanes), most),
-                      reinterpret_cast<std::uint8_t*>(&bits));
-    found |= std::uint64_t{bits} << (k * kLanes);
+    find.found |= std::uint64_t{BitsOf(hn::Ge(numerators[k], least))} << (k * kLanes);
   }
-  const int first = std::countr_zero(found);
-  const int sample = (star.y + south + first / kSide) * width + star.x + west + first % kSide;
-  return {hn::GetLane(most), static_cast<std::uint32_t>(sample)};
+  return find;
 }
 
-HWY_INLINE QuickMisfit ScanInFloats(const OpenSamples& samples, const Star& star, const StarPlanes& planes,
-                                    std::size_t i, std::size_t first) {
-  const int extent = planes.extent[i];
-  if (extent < 4) return ScanBlock<4>(samples, star, planes, i, planes.west[i], planes.south[i]);
-  if (extent < kLargeSide) return ScanBlock<kLargeSide>(samples, star, planes, i, planes.west[i], planes.south[i]);
-  const Furthest<FloatsTag> furthest = ScanWide(kFloats, samples, TriangleOf(star, first + i));
-  return {furthest.numerator(), furthest.sample()};
+// A sample's numerator in double, as the header has it.
+HWY_INLINE double NumeratorAt(const OpenSamples& samples, const ScannedTriangle& t, int x, int y) {
+  const double height = static_cast<double>(samples.Row(t.py + y)[t.px + x]);
+  return std::abs(t.d * (height - t.pz) - (t.a * x + t.b * y));
 }
 
-HWY_INLINE PlaneMisfit ScanQuickly(const OpenSamples& samples, const Star& star, const StarPlanes& planes,
-                                   std::size_t i, std::size_t first, float most_exact) {
-  if (planes.d[i] == 1) return {};  // Pick's theorem: no sample but its corners
-  const QuickMisfit quick = ScanInFloats(samples, star, planes, i, first);
-  if (quick.numerator < 0) return {};
-  if (!(quick.numerator + planes.largest[i] < most_exact)) return ScanExactly(samples, star, first + i);
-  return {static_cast<double>(quick.numerator) / static_cast<double>(planes.d[i]), quick.sample};
+// What ScanBlock found: most often a single sample.
+template <int kSide>
+HWY_INLINE PlaneMisfit MisfitOf(const OpenSamples& samples, const Star& star, const StarPlanes& planes, std::size_t i,
+                                std::size_t first, const BlockFind& find, float most_exact) {
+  if (find.most < 0) return {};
+  const int west = planes.west[i], south = planes.south[i];
+  const int base = (star.y + south) * samples.width() + star.x + west;
+  const auto sample = [&](int k) { return static_cast<std::uint32_t>(base + k / kSide * samples.width() + k % kSide); };
+  if (find.most + planes.largest[i] < most_exact) {
+    return {static_cast<double>(find.most) / static_cast<double>(planes.d[i]), sample(std::countr_zero(find.found))};
+  }
+  if (!(find.most < kMostMagnitude)) return ScanExactly(samples, TriangleOf(star, first + i));
+  const ScannedTriangle t = TriangleOf(star, first + i);
+  double most = -1;
+  int best = 0;
+  for (std::uint64_t found = find.found; found != 0; found &= found - 1) {
+    const int k = std::countr_zero(found);
+    const double numerator = NumeratorAt(samples, t, west + k % kSide, south + k / kSide);
+    if (!(numerator > most)) continue;
+    most = numerator;
+    best = k;
+  }
+  return {most / t.d, sample(best)};
+}
+
+// A larger triangle where single precision is not exact: no lane may hold two samples that are in doubt.
+PlaneMisfit ScanDoubtfully(const OpenSamples& samples, const ScannedTriangle& t, float largest, float magnitude,
+                           float most_exact) {
+  const auto two = ScanWide<FurthestTwo>(samples, t);
+  const float single = two.numerator();
+  if (single < 0) return {};
+  const float least = LeastInDoubt(single, largest, magnitude, most_exact);
+  if (!(single < kMostMagnitude) || two.runner_up() >= least) return ScanExactly(samples, t);
+  HWY_ALIGN std::int32_t indices[hn::MaxLanes(kFloats)];
+  hn::Store(two.furthest().indices(), kInts, indices);
+  double most = -1;
+  std::uint32_t best = kNoSample;
+  for (std::uint32_t bits = BitsOf(hn::Ge(two.furthest().numerators(), All(kFloats, least))); bits != 0;
+       bits &= bits - 1) {
+    const std::int32_t index = indices[std::countr_zero(bits)];
+    const auto sample = static_cast<std::uint32_t>(index);
+    const double numerator = NumeratorAt(samples, t, index % samples.width() - t.px, index / samples.width() - t.py);
+    if (numerator < most || (numerator == most && sample > best)) continue;
+    most = numerator;
+    best = sample;
+  }
+  return {most / t.d, best};
+}
+
+HWY_INLINE PlaneMisfit ScanLarge(const OpenSamples& samples, const Star& star, const StarPlanes& planes, std::size_t i,
+                                 std::size_t first, float most_exact) {
+  const ScannedTriangle t = TriangleOf(star, first + i);
+  if (planes.largest[i] < most_exact) {
+    const auto furthest = ScanWide<Furthest<FloatsTag>>(samples, t);
+    if (furthest.numerator() < 0) return {};
+    if (furthest.numerator() + planes.largest[i] < most_exact) {
+      return {static_cast<double>(furthest.numerator()) / t.d, furthest.sample()};
+    }
+  }
+  return ScanDoubtfully(samples, t, planes.largest[i], planes.magnitude[i], most_exact);
+}
+
+// Class by class, not triangle by triangle: what a triangle takes cannot be foretold.
+HWY_INLINE void ScanTogether(const OpenSamples& samples, const Star& star, const StarPlanes& planes, std::size_t first,
+                             std::uint32_t lanes, float most_exact, PlaneMisfit* misfits) {
+  BlockFind finds[StarPlanes::kMost];
+  const auto lane = [](std::uint32_t bits) { return static_cast<std::size_t>(std::countr_zero(bits)); };
+  const std::uint32_t small = planes.small & lanes, medium = planes.medium & lanes;
+  for (std::uint32_t bits = small; bits != 0; bits &= bits - 1) {
+    finds[lane(bits)] = ScanBlock<4>(samples, star, planes, lane(bits), most_exact);
+  }
+  if constexpr (kLargeSide == 8) {
+    for (std::uint32_t bits = medium; bits != 0; bits &= bits - 1) {
+      finds[lane(bits)] = ScanBlock<8>(samples, star, planes, lane(bits), most_exact);
+    }
+  }
+  for (std::uint32_t bits = lanes; bits != 0; bits &= bits - 1) misfits[lane(bits)] = {};
+  for (std::uint32_t bits = small; bits != 0; bits &= bits - 1) {
+    misfits[lane(bits)] = MisfitOf<4>(samples, star, planes, lane(bits), first, finds[lane(bits)], most_exact);
+  }
+  for (std::uint32_t bits = medium; bits != 0; bits &= bits - 1) {
+    misfits[lane(bits)] = MisfitOf<kLargeSide>(samples, star, planes, lane(bits), first, finds[lane(bits)], most_exact);
+  }
+  for (std::uint32_t bits = planes.large & lanes; bits != 0; bits &= bits - 1) {
+    misfits[lane(bits)] = ScanLarge(samples, star, planes, lane(bits), first, most_exact);
+  }
+  for (std::uint32_t bits = planes.wild & lanes; bits != 0; bits &= bits - 1) {
+    misfits[lane(bits)] = ScanExactly(samples, TriangleOf(star, first + lane(bits)));
+  }
 }
 
 #endif
@@ -425,7 +598,7 @@ HWY_INLINE PlaneMisfit ScanQuickly(const OpenSamples& samples, const Star& star,
 
 void ScanStar(const OpenSamples& samples, const Star& star, PlaneMisfit* misfits) {
 #if HWY_TARGET == HWY_SCALAR
-  for (std::size_t i = 0; i < star.count; ++i) misfits[i] = ScanExactly(samples, star, i);
+  for (std::size_t i = 0; i < star.count; ++i) misfits[i] = ScanExactly(samples, TriangleOf(star, i));
 #else
   StarPlanes planes;
   const std::size_t lanes = hn::Lanes(kFloats);
@@ -433,11 +606,7 @@ void ScanStar(const OpenSamples& samples, const Star& star, PlaneMisfit* misfits
   for (std::size_t first = 0; first < star.count; first += lanes) {
     planes.Work(star, first);
     const std::size_t count = std::min(lanes, star.count - first);
-    for (std::size_t i = 0; i < count; ++i) {
-      misfits[first + i] = planes.extent[i] <= kMostExtent && planes.largest[i] < most_exact
-                               ? ScanQuickly(samples, star, planes, i, first, most_exact)
-                               : ScanExactly(samples, star, first + i);
-    }
+    ScanTogether(samples, star, planes, first, (1U << count) - 1, most_exact, misfits + first);
   }
 #endif
 }

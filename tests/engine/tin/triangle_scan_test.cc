@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <hwy/targets.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -81,15 +82,16 @@ std::vector<std::int64_t> Targets() {
 }
 
 void ExpectReference(const HeightField& field, const OpenSamples& samples, const Star& star) {
+  std::vector<PlaneMisfit> expected;
+  for (std::size_t i = 0; i < star.count; ++i) expected.push_back(Reference(samples, field.height(), star, i));
   for (const std::int64_t target : Targets()) {
     hwy::SetSupportedTargetsForTest(target);
     hwy::GetChosenTarget().DeInit();  // chosen anew
     std::vector<PlaneMisfit> misfits(star.count);
     BestStarScan()(samples, star, misfits.data());
     for (std::size_t i = 0; i < star.count; ++i) {
-      const PlaneMisfit expected = Reference(samples, field.height(), star, i);
-      ASSERT_EQ(misfits[i].distance, expected.distance) << hwy::TargetName(target);
-      ASSERT_EQ(misfits[i].sample, expected.sample) << hwy::TargetName(target);
+      ASSERT_EQ(misfits[i].distance, expected[i].distance) << hwy::TargetName(target);
+      ASSERT_EQ(misfits[i].sample, expected[i].sample) << hwy::TargetName(target);
     }
   }
   hwy::SetSupportedTargetsForTest(0);
@@ -117,9 +119,127 @@ TEST(TriangleScan, EqualsTheFormulaOnEveryTargetBitForBit) {
   }
 }
 
+// Slopes of a fraction of a metre: all samples but a few lie on the triangles' planes, up to the rounding of floats, so
+// that single precision takes many of them for the furthest. And heights that overflow it.
+TEST(TriangleScan, TellsApartWhatSinglePrecisionDoesNot) {
+  Random random(5);
+  for (int i = 0; i < 200; ++i) {
+    const int side = i % 2 == 0 ? 9 : 70;
+    const float height = i % 7 == 0 ? 1e36F : 1000.1F;
+    const int bumps = random.Below(4);
+    const HeightField field = MakeField(side, side, [&](int x, int y) {
+      const bool is_bump = bumps > 0 && (x * 31 + y * 17 + i) % (side * bumps) == 0;
+      return height * (1 + 0.37e-3F * static_cast<float>(x) + 0.11e-3F * static_cast<float>(y)) *
+             (is_bump ? 1.0000002F : 1.0F);
+    });
+    OpenSamples samples(field);
+    const SamplePosition p = RandomSample(random, field), u = RandomSample(random, field),
+                         v = RandomSample(random, field);
+    if (Orientation(p, u, v) <= 0) continue;
+    for (const SamplePosition corner : {p, u, v}) samples.Close(corner);
+    ExpectReference(field, samples, *TestStar(field, p, {u, v}));
+    if (HasFatalFailure()) return;
+  }
+}
+
+// All around a centre: the outline of a rectangle with most of its samples left out, so that triangles of all sizes
+// share a star. Corners are closed, as vertices are.
+TestStar RectangularStar(const HeightField& field, OpenSamples& samples, Random& random) {
+  const int x = 1 + random.Below(field.width() - 2), y = 1 + random.Below(field.height() - 2);
+  const int most = 1 + random.Below(random.Below(2) == 0 ? 8 : std::max(field.width(), field.height()));
+  const int west = std::max(x - most, 0), east = std::min(x + most, field.width() - 1);
+  const int south = std::max(y - most, 0), north = std::min(y + most, field.height() - 1);
+  const int kept = 1 + random.Below(3 + most / 4);  // one of so many
+  std::vector<SamplePosition> ring;
+  const auto put = [&](int at_x, int at_y, bool is_corner) {
+    if (!is_corner && random.Below(kept) != 0) return;
+    ring.push_back({static_cast<std::uint16_t>(at_x), static_cast<std::uint16_t>(at_y)});
+  };
+  for (int i = west; i < east; ++i) put(i, south, i == west);
+  for (int i = south; i < north; ++i) put(east, i, i == south);
+  for (int i = east; i > west; --i) put(i, north, i == east);
+  for (int i = north; i > south; --i) put(west, i, i == north);
+  ring.push_back(ring.front());
+  const SamplePosition centre = {static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)};
+  samples.Close(centre);
+  for (const SamplePosition corner : ring) samples.Close(corner);
+  return {field, centre, ring};
+}
+
+// Noise, spikes on a plain of zeros, spikes on a slope, steps, and magnitudes that differ within one field; of either
+// sign, with voids here and there.
+HeightField ExtremeField(int width, int height, int kind, float scale, Random& random) {
+  const int voids = kind % 3 == 0 ? 2 : 0;  // of 16
+  return MakeField(width, height, [&](int x, int y) {
+    const float unit = static_cast<float>(2 * random.Unit() - 1);
+    const bool is_spike = random.Below(12) == 0;
+    if (random.Below(16) < voids && x != 1 && y != 1) return std::numeric_limits<float>::quiet_NaN();
+    switch (kind % 5) {
+      case 0:
+        return scale * unit;
+      case 1:
+        return is_spike ? scale * unit : 0.0F;
+      case 2:
+        return is_spike ? scale * unit : scale * (0x1p-12F * static_cast<float>(x) - 0x1p-13F * static_cast<float>(y));
+      case 3:
+        return scale * static_cast<float>(random.Below(4) - 2) * 0.5F;
+      default:
+        return std::ldexp(scale, -random.Below(60)) * unit;
+    }
+  });
+}
+
+// What rounding leaves in doubt is relative to the corners' heights, not to the samples' distances: at 1e30 it is far
+// more than all of those that lie flat between two corners. Beyond 1e30 floats overflow, and denormals have few digits.
+TEST(TriangleScan, EqualsTheFormulaWhateverTheMagnitude) {
+  constexpr float kLargest = std::numeric_limits<float>::max();
+  constexpr float kDenormal = std::numeric_limits<float>::denorm_min();
+  constexpr std::array kScales = {
+      1.0F,     1e8F,   1e20F,     0x1p80F, 0x1p96F, 1e30F,     1e34F,         1e38F,
+      kLargest, 1e-30F, 0x1p-125F, 1e-38F,  1e-42F,  kDenormal, 9 * kDenormal, 0x1p-149F * 0x1p22F};
+  Random random(7);
+  for (int i = 0; i < 1200; ++i) {
+    const float scale = kScales[static_cast<std::size_t>(random.Below(kScales.size()))];
+    const int side = 3 + random.Below(i % 4 == 0 ? 80 : 12);
+    // Once in a while too wide for single precision to tell what is inside.
+    const int width = i % 200 == 0 ? 2100 + random.Below(90) : side + random.Below(side);
+    const HeightField field = ExtremeField(width, i % 200 == 0 ? 5 : side + random.Below(side), i, scale, random);
+    OpenSamples samples(field);
+    for (int k = random.Below(3) * random.Below(side * side / 4); k > 0; --k) {
+      samples.Close(RandomSample(random, field));
+    }
+    const TestStar star = RectangularStar(field, samples, random);
+    ExpectReference(field, samples, *star);
+    ASSERT_FALSE(HasFatalFailure()) << "field " << i << ", scale " << scale;
+  }
+}
+
+// The plane rises to a spike from two zeros; the sample on the edge between those lies on it. Its distance is 0, and
+// what rounding leaves in doubt is 2^-20 of the spike: below what marks a sample outside.
+TEST(TriangleScan, TakesNoSampleFromOutsideWhereDoubtsAreLarge) {
+  for (const int reach : {2, 6, 40}) {
+    const HeightField field = MakeField(2 * reach + 5, reach + 4, [&](int x, int y) {
+      return x == reach && y == 1 + reach ? 1e25F : y == 1 || x % 2 == 0 ? 0.0F : 0.1F;
+    });
+    OpenSamples samples(field);
+    const auto at = [](int x, int y) {
+      return SamplePosition{static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)};
+    };
+    const SamplePosition p = at(1, 1), u = at(1 + reach, 1), spike = at(reach, 1 + reach);
+    for (int y = 2; y < 1 + reach; ++y) {
+      for (int x = 1; x < 1 + reach; ++x) samples.Close(at(x, y));
+    }
+    for (const SamplePosition corner : {p, u, spike}) samples.Close(corner);
+    ExpectReference(field, samples, *TestStar(field, p, {u, spike}));
+    if (HasFatalFailure()) return;
+  }
+}
+
 TEST(OpenSamples, FindsTheQuantumOfTheHeights) {
   const auto quantum_of = [](float unit, float odd) {
-    return OpenSamples(MakeField(9, 7, [&](int x, int y) { return x == 4 && y == 3 ? odd : unit * (x * 7 - y); }))
+    return OpenSamples(
+               MakeField(9, 7,
+                         [&](int x, int y) { return x == 4 && y == 3 ? odd : unit * static_cast<float>(x * 7 - y); }))
         .quantum();
   };
   EXPECT_EQ(quantum_of(1, 5), 1);
