@@ -1,8 +1,10 @@
 // Averages of blocks of samples, as the rows of the samples come in: in the one order that decides their last bits.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "engine/dem/sample_rules.h"
@@ -24,6 +26,13 @@ struct BlockSum {
   float Mean() const { return weight == 0 ? SampleRules::kVoid : static_cast<float>(sum / weight); }
 };
 
+// Blocks of a single sample: the averages are the samples, with one zero, `columns` to a row.
+inline void CopyRows(std::span<const float> samples, std::int64_t columns, float* out, std::int64_t stride) {
+  for (; !samples.empty(); samples = samples.subspan(static_cast<std::size_t>(columns)), out += stride) {
+    for (std::int64_t i = 0; i < columns; ++i) out[i] = samples[static_cast<std::size_t>(i)] + 0.0f;
+  }
+}
+
 // Of a row of blocks of block x block samples. A block is summed row by row, whatever lies beside it; one of more than
 // kLargestPlain samples a side by blocks of that size, each of them row by row: so large averages can be made from
 // parts of a raster that fit into memory (raster_survey.h), bit for bit.
@@ -39,8 +48,12 @@ class BlockAverages {
 
   // Each sample counts `weight` times, the last of the row `last` times of that: it may stand for fewer pixels.
   void AddRow(const float* samples, std::int64_t count, double weight = 1, double last = 1) {
-    for (std::int64_t i = 0; i < count; ++i) {
-      inner_[static_cast<std::size_t>(i / plain_)].Add(samples[i], i + 1 == count ? weight * last : weight);
+    BlockSum* block = inner_.data();
+    for (std::int64_t first = 0; first < count; first += plain_, ++block) {
+      const std::int64_t end = std::min<std::int64_t>(first + plain_, count);
+      BlockSum sum = *block;
+      for (std::int64_t i = first; i < end; ++i) sum.Add(samples[i], i + 1 == count ? weight * last : weight);
+      *block = sum;
     }
     if (parts_ > 1 && ++rows_ == kLargestPlain) Gather();
   }

@@ -13,11 +13,16 @@ float SampleAt(const std::vector<float>& heights, const GridWindow& window, std:
 
 }  // namespace
 
-GridCell CellAt(const Position& position, const GridAxis& columns, const GridAxis& rows, int width, int height) {
-  const double x = columns.wraps() ? position.x : std::clamp(position.x, 0.0, static_cast<double>(width));
-  const GridAxis::Place column = columns.Locate(x);
-  const GridAxis::Place row = rows.Locate(std::clamp(position.y, 0.0, static_cast<double>(height)));
-  return {column.index, row.index, column.weight, row.weight};
+GridCell CellFinder::At(const Position& position, std::size_t index) {
+  Found& column = above_[index % above_.size()];
+  if (column.position != position.x) {
+    const double x = columns_.wraps() ? position.x : std::clamp(position.x, 0.0, static_cast<double>(width_));
+    column = {position.x, columns_.Locate(x)};
+  }
+  if (row_.position != position.y) {
+    row_ = {position.y, rows_.Locate(std::clamp(position.y, 0.0, static_cast<double>(height_)))};
+  }
+  return {column.place.index, row_.place.index, column.place.weight, row_.place.weight};
 }
 
 GridWindow WindowOf(std::span<GridCell> cells, const GridAxis& columns, const GridAxis& rows) {
@@ -41,6 +46,17 @@ GridWindow WindowOf(std::span<GridCell> cells, const GridAxis& columns, const Gr
 
 std::optional<double> Interpolate(const std::vector<float>& heights, const GridWindow& window, const GridCell& cell) {
   double sum = 0, weights = 0;
+  if (cell.x > 0 && cell.y > 0 && cell.x < 1 && cell.y < 1) {
+    // Four samples that count, as nearly everywhere. In the order of what follows: the same bits.
+    const float* const north =
+        &heights[static_cast<std::size_t>((cell.row - window.row) * window.columns + cell.column - window.column)];
+    const float* const south = north + window.columns;
+    const double nw = (1 - cell.x) * (1 - cell.y), ne = cell.x * (1 - cell.y);
+    const double sw = (1 - cell.x) * cell.y, se = cell.x * cell.y;
+    sum = sum + nw * north[0] + ne * north[1] + sw * south[0] + se * south[1];
+    if (!std::isnan(sum) && nw > 0 && ne > 0 && sw > 0 && se > 0) return sum / (nw + ne + sw + se);
+    sum = 0;
+  }
   const auto add = [&](std::int64_t dx, std::int64_t dy, double weight) {
     if (weight <= 0) return;
     const float height = SampleAt(heights, window, cell.column + dx, cell.row + dy);

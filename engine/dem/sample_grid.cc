@@ -39,8 +39,9 @@ Result<void> ReadBlocks(const Level& level, const SampleRules& rules, const Grid
   const std::int64_t rows = std::min<std::int64_t>(level.rows - top, window.rows * level.block);
   // In sample rows: a row of blocks can be the whole raster.
   const std::int64_t strip = std::max<std::int64_t>(1, kSamplesPerStrip / count);
+  const bool is_plain = level.block == 1 && count == window.columns;
   std::vector<float> samples;
-  BlockAverages averages(window.columns, level.block);
+  BlockAverages averages(is_plain ? 0 : window.columns, level.block);
   for (std::int64_t done = 0; done < rows; done += strip) {
     const std::int64_t here = std::min(strip, rows - done);
     samples.resize(static_cast<std::size_t>(count * here));
@@ -48,6 +49,10 @@ Result<void> ReadBlocks(const Level& level, const SampleRules& rules, const Grid
                                 static_cast<int>(count), static_cast<int>(here), samples.data(), stop);
         !read) {
       return read;
+    }
+    if (is_plain) {
+      CopyRows(samples, count, out + done * stride, stride);
+      continue;
     }
     for (std::int64_t r = 0; r < here; ++r) {
       averages.AddRow(samples.data() + r * count, count);
@@ -69,15 +74,21 @@ int StartingFactor(const RasterLayout& layout, int factor) {
 }
 
 double GridAxis::Center(std::int64_t index) const {
-  const std::int64_t block = wraps_ ? FloorMod(index, count_) : index;
+  std::int64_t block = index, turns = 0;
+  if (wraps_ && (index < 0 || index >= count_)) {
+    block = FloorMod(index, count_);
+    turns = (index - block) / count_;  // exact
+  }
   const std::int64_t begin = block * factor_;
   const std::int64_t end = std::min<std::int64_t>(begin + factor_, samples_);
-  const std::int64_t turns = (index - block) / count_;  // exact
   return static_cast<double>(begin + end) / 2 + static_cast<double>(turns * samples_);
 }
 
 GridAxis::Place GridAxis::Locate(double position) const {
-  auto index = static_cast<std::int64_t>(std::floor(position / factor_ - 0.5));
+  // floor, without a call: processors without SSE 4.1 have no instruction for it.
+  const double place = position / factor_ - 0.5;
+  auto index = static_cast<std::int64_t>(place);
+  if (static_cast<double>(index) > place) --index;
   // The last block's centre may lie nearer than a factor.
   if ((wraps_ || index + 1 < count_) && position >= Center(index + 1)) ++index;
   if (!wraps_) {

@@ -90,6 +90,23 @@ SampleRules SampleRules::Of(GDALRasterBand& band, const std::string& crs_unit) {
 
 namespace {
 
+// One mark of voids at most and nothing else to look out for: what most bands are.
+bool IsPlain(const SampleRules& rules) { return !rules.has_mask && !rules.is_indicator && rules.marks.empty(); }
+
+// As ToHeight, without its questions.
+void ToPlainHeights(const SampleRules& rules, const std::vector<double>& raw, std::size_t count, float* out) {
+  double mark = rules.nodata.value_or(std::numeric_limits<double>::quiet_NaN());  // equal to nothing
+  // Samples of Float32 bands are float32 numbers: equal as such are those that equal the rounded mark.
+  if (rules.compare_as_float) mark = static_cast<float>(mark);
+  const double scale = rules.scale, offset = rules.offset, unit = rules.metres_per_unit;
+  const double lowest = rules.lowest, highest = rules.highest;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double height = (raw[i] * scale + offset) * unit;
+    const bool is_valid = (raw[i] != mark) & (height >= lowest) & (height <= highest);
+    out[i] = is_valid ? static_cast<float>(height) : SampleRules::kVoid;
+  }
+}
+
 Result<void> ReadSamples(GDALRasterBand& band, const SampleRules& rules, int col, int row, int cols, int rows,
                          float* out, const std::stop_token& stop) {
   const int rows_at_once = std::clamp(kSamplesPerRead / cols, 1, rows);
@@ -110,8 +127,12 @@ Result<void> ReadSamples(GDALRasterBand& band, const SampleRules& rules, int col
                        TakeGdalError());
     }
     const std::size_t samples = static_cast<std::size_t>(cols) * static_cast<std::size_t>(count);
-    for (std::size_t i = 0; i < samples; ++i) {
-      out[i] = rules.has_mask && mask[i] == 0 ? rules.Hidden() : rules.ToHeight(raw[i]);
+    if (IsPlain(rules)) {
+      ToPlainHeights(rules, raw, samples, out);
+    } else {
+      for (std::size_t i = 0; i < samples; ++i) {
+        out[i] = rules.has_mask && mask[i] == 0 ? rules.Hidden() : rules.ToHeight(raw[i]);
+      }
     }
     out += samples;
   }

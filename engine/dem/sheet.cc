@@ -132,7 +132,8 @@ void Sheet::FindPoleHeights() {
   }
 }
 
-Sheet::Cells Sheet::CellsAt(std::span<const Position> positions, std::span<const float> heights, int factor) const {
+Sheet::Cells Sheet::CellsAt(std::span<const Position> positions, std::size_t stride, std::span<const float> heights,
+                            int factor) const {
   Box hull{1e300, 1e300, -1e300, -1e300};
   for (std::size_t i = 0; i < positions.size(); ++i) {
     const auto [x, y] = positions[i];
@@ -143,17 +144,23 @@ Sheet::Cells Sheet::CellsAt(std::span<const Position> positions, std::span<const
   if (hull.west > hull.east) return found;
   const std::vector<std::size_t> blocks = cover_index_.Find({hull.west - kEdgeTolerance, hull.south - kEdgeTolerance,
                                                              hull.east + kEdgeTolerance, hull.north + kEdgeTolerance});
-  const GridAxis columns = Columns(factor), rows = Rows(factor);
+  CellFinder finder(Columns(factor), Rows(factor), width_, height_, stride);
+  std::vector<Box> boxes;
+  for (const std::size_t block : blocks) {
+    const Box box = BoxOf(cover_[block]);
+    boxes.push_back(
+        {box.west - kEdgeTolerance, box.south - kEdgeTolerance, box.east + kEdgeTolerance, box.north + kEdgeTolerance});
+  }
   const auto is_inside = [&](const Position& p) {
-    return std::ranges::any_of(blocks, [&](std::size_t block) {
-      const Box box = BoxOf(cover_[block]);
-      return p.x >= box.west - kEdgeTolerance && p.x <= box.east + kEdgeTolerance &&
-             p.y >= box.south - kEdgeTolerance && p.y <= box.north + kEdgeTolerance;
+    return std::ranges::any_of(boxes, [&](const Box& box) {
+      return p.x >= box.west && p.x <= box.east && p.y >= box.south && p.y <= box.north;
     });
   };
+  found.cells.reserve(positions.size());
+  found.nodes.reserve(positions.size());
   for (std::size_t i = 0; i < positions.size(); ++i) {
     if (!std::isnan(heights[i]) || !is_inside(positions[i])) continue;
-    found.cells.push_back(CellAt(positions[i], columns, rows, width_, height_));
+    found.cells.push_back(finder.At(positions[i], i));
     found.nodes.push_back(i);
   }
   return found;
@@ -216,10 +223,10 @@ Result<std::vector<float>> Sheet::ReadWeights(int factor, const GridWindow& wind
   return FeatherWeights(*heights, wide, window, column_step, row_step, feather);
 }
 
-Result<void> Sheet::FillAt(std::span<const Position> positions, std::span<const double> undulations, int factor,
-                           std::span<float> heights, const std::stop_token& stop, std::span<float> weights,
+Result<void> Sheet::FillAt(std::span<const Position> positions, std::size_t stride, std::span<const double> undulations,
+                           int factor, std::span<float> heights, const std::stop_token& stop, std::span<float> weights,
                            SheetTrace* trace) const {
-  Cells found = CellsAt(positions, heights, factor);
+  Cells found = CellsAt(positions, stride, heights, factor);
   if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "reading was stopped");
   if (found.cells.empty()) return CheckUnread();
   GridWindow window = WindowOf(found.cells, Columns(factor), Rows(factor));
@@ -288,7 +295,8 @@ Result<void> Sheet::Fill(const geo::Lattice& lattice, const NodeWindow& window, 
   std::vector<double> undulations;
   if (undulations_ && counting == Counting::kEllipsoid) undulations = undulations_->At(lattice, window);
   if (trace != nullptr) trace->undulations = undulations;
-  return FillAt(positions, undulations, factor, heights, stop, weights, trace);
+  return FillAt(positions, static_cast<std::size_t>(window.columns), undulations, factor, heights, stop, weights,
+                trace);
 }
 
 Result<void> Sheet::Fill(const geo::MercatorGrid& grid, const NodeWindow& window, std::span<float> heights,
@@ -296,8 +304,8 @@ Result<void> Sheet::Fill(const geo::MercatorGrid& grid, const NodeWindow& window
   const int factor = MercatorFactor(grid.depth, spacing_);
   std::vector<double> undulations;
   if (undulations_) undulations = undulations_->At(grid, window);
-  return FillAt(NodePositions(georeference_, reach_, grid, window, kPositionTolerance * factor), undulations, factor,
-                heights, stop, weights);
+  return FillAt(NodePositions(georeference_, reach_, grid, window, kPositionTolerance * factor),
+                static_cast<std::size_t>(window.columns), undulations, factor, heights, stop, weights);
 }
 
 }  // namespace terrace::dem

@@ -122,7 +122,8 @@ class Sheet {
     std::vector<GridCell> cells;
     std::vector<std::size_t> nodes;
   };
-  Cells CellsAt(std::span<const Position> positions, std::span<const float> heights, int factor) const;
+  Cells CellsAt(std::span<const Position> positions, std::size_t stride, std::span<const float> heights,
+                int factor) const;
 
   // Averages of the valid samples of each block; NaN where there is none.
   Result<std::vector<float>> ReadBlocks(int factor, const GridWindow& window, const std::stop_token& stop) const;
@@ -134,8 +135,8 @@ class Sheet {
   Result<std::vector<float>> ReadFilled(int factor, const GridWindow& window, const std::stop_token& stop,
                                         SheetTrace* trace = nullptr) const;
   // `undulations`: of the same nodes, added to heights; empty: none are.
-  Result<void> FillAt(std::span<const Position> positions, std::span<const double> undulations, int factor,
-                      std::span<float> heights, const std::stop_token& stop, std::span<float> weights,
+  Result<void> FillAt(std::span<const Position> positions, std::size_t stride, std::span<const double> undulations,
+                      int factor, std::span<float> heights, const std::stop_token& stop, std::span<float> weights,
                       SheetTrace* trace = nullptr) const;
   std::optional<float> PoleHeight(int pole, Counting counting) const;  // 0 south, 1 north
   // What each sample of the window counts; empty: all count in full.

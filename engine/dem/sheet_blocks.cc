@@ -110,12 +110,17 @@ Result<void> Sheet::Average(int factor, const GridWindow& window, float* out, st
   const std::int64_t columns = std::min(Columns(step).count() - first, window.columns * block);
   const std::int64_t rows = std::min(Rows(step).count() - top, window.rows * block);
   const std::int64_t strip = std::max<std::int64_t>(1, kSamplesPerStrip / columns);
+  const bool is_plain = block == 1 && columns == window.columns;
   std::vector<float> samples;
-  BlockAverages averages(window.columns, block);
+  BlockAverages averages(is_plain ? 0 : window.columns, block);
   for (std::int64_t done = 0; done < rows; done += strip) {
     const std::int64_t here = std::min(strip, rows - done);
     samples.resize(static_cast<std::size_t>(columns * here));
     if (auto read = Compose(step, {first, top + done, columns, here}, samples, stop); !read) return read;
+    if (is_plain) {
+      CopyRows(samples, columns, out + done * stride, stride);
+      continue;
+    }
     for (std::int64_t r = 0; r < here; ++r) {
       const std::int64_t at = done + r;
       averages.AddRow(samples.data() + r * columns, columns, ShareOf(top + at, step, height_),

@@ -66,7 +66,7 @@ Result<void> Sheet::FillPoints(std::span<const GeoPosition> points, HeightDatum 
       batch.push_back({point.longitude, point.latitude});
     }
     georeference_.ToPixels(batch);
-    const Cells here = CellsAt(batch, heights.subspan(done, batch.size()), 1);
+    const Cells here = CellsAt(batch, 1, heights.subspan(done, batch.size()), 1);
     for (std::size_t i = 0; i < here.cells.size(); ++i) {
       const GridCell& cell = here.cells[i];
       found.push_back({done + here.nodes[i], (cell.column + kBlock) / kBlock, cell.row / kBlock, cell});

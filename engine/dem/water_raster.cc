@@ -66,11 +66,12 @@ Result<std::vector<std::uint8_t>> WaterRaster::Impl::Read(const geo::TileKey& ke
   const std::vector<Position> positions =
       CellCentrePositions(georeference, footprint, lattice, key, kPositionTolerance * factor);
   const GridAxis columns(layout.columns, factor, layout.wraps), rows(layout.height, factor, false);
+  CellFinder finder(columns, rows, layout.width, layout.height, kSide);
   std::vector<GridCell> cells;
   std::vector<std::size_t> targets;  // pixel of each cell
   for (std::size_t i = 0; i < positions.size(); ++i) {
     if (!IsInside(positions[i])) continue;
-    cells.push_back(CellAt(positions[i], columns, rows, layout.width, layout.height));
+    cells.push_back(finder.At(positions[i], i));
     const std::size_t row_from_south = i / kSide;
     targets.push_back((kSide - 1 - row_from_south) * kSide + i % kSide);
   }
