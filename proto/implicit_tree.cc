@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <numeric>
+#include <set>
+#include <utility>
 
 #include "engine/core/check.h"
 
@@ -15,6 +17,29 @@ std::int64_t Count(const std::vector<geo::TileRange>& ranges) {
                          [](std::int64_t sum, const geo::TileRange& range) {
                            return sum + (range.end_x - range.start_x + 1) * (range.end_y - range.start_y + 1);
                          });
+}
+
+std::vector<geo::TileKey> TilesOf(Availability available, int level) {
+  std::vector<geo::TileKey> tiles;
+  for (const geo::TileRange& range : available[static_cast<std::size_t>(level)]) {
+    for (std::int64_t y = range.start_y; y <= range.end_y; ++y) {
+      for (std::int64_t x = range.start_x; x <= range.end_x; ++x) tiles.push_back({level, x, y});
+    }
+  }
+  return tiles;
+}
+
+// Whether they are few, and nothing lies beside them: a survey in a mosaic with the globe is not all of it.
+bool CanBeRoots(Availability available, int level) {
+  if (Count(available[static_cast<std::size_t>(level)]) > kMaxImplicitRoots) return false;
+  const std::vector<geo::TileKey> tiles = TilesOf(available, level);
+  for (int up = 1; level - up >= kShallowestRoots; ++up) {
+    std::set<std::pair<std::int64_t, std::int64_t>> ancestors;
+    for (const geo::TileKey& tile : tiles) ancestors.emplace(tile.x >> up, tile.y >> up);
+    const auto count = static_cast<std::int64_t>(ancestors.size());
+    if (Count(available[static_cast<std::size_t>(level - up)]) > count) return false;
+  }
+  return true;
 }
 
 // The tiles `k` levels below `top` that are in `range`, numbered from top's south-western corner; may be empty.
@@ -31,14 +56,9 @@ bool IsEmpty(const geo::TileRange& range) { return range.start_x > range.end_x |
 
 std::vector<geo::TileKey> ImplicitRoots(Availability available) {
   TERRACE_CHECK(!available.empty() && !available[0].empty());
-  std::size_t level = available.size() - 1;
-  while (level > kShallowestRoots && Count(available[level]) > kMaxImplicitRoots) --level;
-  std::vector<geo::TileKey> roots;
-  for (const geo::TileRange& range : available[level]) {
-    for (std::int64_t y = range.start_y; y <= range.end_y; ++y) {
-      for (std::int64_t x = range.start_x; x <= range.end_x; ++x) roots.push_back({static_cast<int>(level), x, y});
-    }
-  }
+  auto level = static_cast<int>(available.size()) - 1;
+  while (level > kShallowestRoots && !CanBeRoots(available, level)) --level;
+  std::vector<geo::TileKey> roots = TilesOf(available, level);
   std::sort(roots.begin(), roots.end(),
             [](const geo::TileKey& a, const geo::TileKey& b) { return a.y != b.y ? a.y < b.y : a.x < b.x; });
   return roots;
@@ -53,6 +73,25 @@ int LevelsUnder(Availability available, const geo::TileKey& root) {
   }
   TERRACE_CHECK(false);
   return 0;
+}
+
+std::vector<TreeRoot> ImplicitTrees(Availability available) {
+  std::vector<TreeRoot> trees;
+  for (const geo::TileKey& tile : ImplicitRoots(available)) {
+    TreeRoot& tree = trees.emplace_back(TreeRoot{tile, LevelsUnder(available, tile)});
+    const bool is_beside_pole = tile.y == 0 || tile.y + 1 == geo::TileRows(tile.level);
+    if (tile.level != kShallowestRoots || !is_beside_pole) continue;
+    const std::vector<std::vector<geo::TileRange>> blocks = BlocksBelow(available, tile, 1);
+    for (const geo::TileRange& block : blocks[1]) {
+      for (std::int64_t y = block.start_y; y <= block.end_y; ++y) {
+        for (std::int64_t x = block.start_x; x <= block.end_x; ++x) {
+          const geo::TileKey child = TileUnder(tile, 1, x, y);
+          tree.below.push_back({child, LevelsUnder(available, child)});
+        }
+      }
+    }
+  }
+  return trees;
 }
 
 int SubtreeLevels(int levels) {

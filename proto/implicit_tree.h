@@ -23,8 +23,9 @@ inline constexpr std::int64_t kMaxImplicitRoots = 4;
 // the skirts of a root, and loaders.gl cannot bound larger regions (docs/decisions/0009-implicit-roots.md).
 inline constexpr int kShallowestRoots = 2;
 
-// All tiles of the deepest level that has at most kMaxImplicitRoots of them, or of level kShallowestRoots, or of the
-// deepest level, if that comes first; from west to east, then from south to north. Precondition: level 0 is not empty.
+// All tiles of the deepest level that has at most kMaxImplicitRoots of them and under which everything lies, or of
+// level kShallowestRoots, or of the deepest level, if that comes first; from west to east, then from south to north.
+// Precondition: level 0 is not empty.
 std::vector<geo::TileKey> ImplicitRoots(Availability available);
 
 // Levels from the root down to the deepest available tile under it, the root counted: of a mosaic, trees over its fine
@@ -39,6 +40,17 @@ inline constexpr int kTallestSubtree = 7;
 // A low last one is what must not be: loaders.gl fetches all subtrees of a tree one after the other before it draws,
 // and those that begin at the tree's last level are as many as its tiles.
 int SubtreeLevels(int levels);
+
+struct TreeRoot {
+  geo::TileKey tile;
+  int levels = 1;  // of the tree, its root counted
+  // Not empty: no tree is rooted at `tile`, which is a tile of its own, but at each of these below it.
+  std::vector<TreeRoot> below = {};
+};
+
+// ImplicitRoots with what is below them. Trees beside the poles are rooted a level deeper: of a region whose corner is
+// a pole loaders.gl makes a box without width, and deck.gl then draws nothing of Europe from near.
+std::vector<TreeRoot> ImplicitTrees(Availability available);
 
 // How a root is called in URLs: "9-272-359", level, column and row.
 std::string RootName(const geo::TileKey& root);

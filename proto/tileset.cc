@@ -22,8 +22,8 @@ using Json = nlohmann::ordered_json;
 // less, so it must be large enough for any distance from which the Earth is looked at.
 constexpr double kNothingDrawn = 1e7;
 
-Json Region(const TilesetDescription& tileset, const geo::TileRange& block) {
-  const double tile = std::ldexp(180, -tileset.roots.front().tile.level);
+Json Region(const TilesetDescription& tileset, int level, const geo::TileRange& block) {
+  const double tile = std::ldexp(180, -level);
   const auto edge = [&](std::int64_t number, double first) {
     return geo::ToRadians(first + static_cast<double>(number) * tile);
   };
@@ -32,20 +32,28 @@ Json Region(const TilesetDescription& tileset, const geo::TileRange& block) {
             edge(block.end_y + 1, -90), tileset.min_height_m, tileset.max_height_m}}};
 }
 
+// `place`: which tile or tiles of the tree the content is of.
+Json Tile(const TilesetDescription& tileset, const geo::TileKey& root, const char* place) {
+  Json json;
+  json["boundingVolume"] = nullptr;  // the first, to be set by the caller
+  json["geometricError"] = GeometricError(root.level);
+  json["refine"] = "REPLACE";
+  const std::string& query = tileset.content_query;
+  json["content"]["uri"] = fmt::format("3dtiles/{}/{}.glb{}{}", RootName(root), place, query.empty() ? "" : "?", query);
+  return json;
+}
+
 Json ImplicitRoot(const TilesetDescription& tileset, const TreeRoot& tree) {
   const geo::TileKey& root = tree.tile;
   const int subtree_levels = SubtreeLevels(tree.levels);
-  const std::string tile = "3dtiles/" + RootName(root) + "/{level}/{x}/{y}";
-  Json json;
-  json["boundingVolume"] = Region(tileset, {root.x, root.y, root.x, root.y});
-  json["geometricError"] = GeometricError(root.level);
-  json["refine"] = "REPLACE";
-  json["content"]["uri"] = tile + ".glb" + (tileset.content_query.empty() ? "" : "?" + tileset.content_query);
+  Json json = Tile(tileset, root, "{level}/{x}/{y}");
+  json["boundingVolume"] = Region(tileset, root.level, {root.x, root.y, root.x, root.y});
   Json& tiling = json["implicitTiling"];
   tiling["subdivisionScheme"] = "QUADTREE";
   tiling["availableLevels"] = tree.levels;
   tiling["subtreeLevels"] = subtree_levels;
-  tiling["subtrees"]["uri"] = fmt::format("{}.{}.subtree", tile, subtree_levels);
+  tiling["subtrees"]["uri"] =
+      fmt::format("3dtiles/{}/{{level}}/{{x}}/{{y}}.{}.subtree", RootName(root), subtree_levels);
   return json;
 }
 
@@ -87,6 +95,21 @@ Json Sphere(const TilesetDescription& tileset, const geo::TileRange& block) {
   return {{"sphere", {middle.x, middle.y, middle.z, radius}}};
 }
 
+// About the middle of a tile of 45 degrees beside a pole, as far as the corners away from it: they are the farthest.
+Json TileSphere(const TilesetDescription& tileset, const geo::TileKey& key) {
+  const double tile = std::ldexp(180, -key.level);
+  const auto point = [&](double columns, double rows, double height) {
+    return geo::ToEcef(-180 + tile * (static_cast<double>(key.x) + columns),
+                       -90 + tile * (static_cast<double>(key.y) + rows), height);
+  };
+  const geo::Vec3 middle = point(.5, .5, 0);
+  double radius = 0;
+  for (const double height : {tileset.min_height_m, tileset.max_height_m}) {
+    for (const double row : {0, 1}) radius = std::max(radius, geo::Length(point(0, row, height) - middle));
+  }
+  return {{"sphere", {middle.x, middle.y, middle.z, radius}}};
+}
+
 // 3DTilesRendererJS reads a region whose west is greater than its east as lying on the other side of the Earth,
 // CesiumJS none that goes beyond 180 degrees, and the box that loaders.gl makes of a region of hemispheres misses most
 // of it.
@@ -95,17 +118,26 @@ Json BoundsOf(const TilesetDescription& tileset) {
   const geo::TileRange block = BlockOf(tileset.roots);
   const bool crosses = block.end_x >= geo::TileColumns(level);
   const bool wide = level <= kShallowestRoots;
-  return crosses || wide ? Sphere(tileset, block) : Region(tileset, block);
+  return crosses || wide ? Sphere(tileset, block) : Region(tileset, level, block);
+}
+
+Json TreeOrTile(const TilesetDescription& tileset, const TreeRoot& tree) {
+  if (tree.below.empty()) return ImplicitRoot(tileset, tree);
+  Json json = Tile(tileset, tree.tile, "0/0/0");
+  json["boundingVolume"] = TileSphere(tileset, tree.tile);
+  json["children"] = Json::array();
+  for (const TreeRoot& root : tree.below) json["children"].push_back(ImplicitRoot(tileset, root));
+  return json;
 }
 
 Json Root(const TilesetDescription& tileset) {
-  if (tileset.roots.size() == 1) return ImplicitRoot(tileset, tileset.roots[0]);
+  if (tileset.roots.size() == 1) return TreeOrTile(tileset, tileset.roots[0]);
   Json json;
   json["boundingVolume"] = BoundsOf(tileset);
   json["geometricError"] = kNothingDrawn;
   json["refine"] = "REPLACE";
   json["children"] = Json::array();
-  for (const TreeRoot& root : tileset.roots) json["children"].push_back(ImplicitRoot(tileset, root));
+  for (const TreeRoot& root : tileset.roots) json["children"].push_back(TreeOrTile(tileset, root));
   return json;
 }
 

@@ -5,18 +5,13 @@
 #include <string>
 #include <vector>
 
-#include "engine/geo/tile_key.h"
+#include "proto/implicit_tree.h"
 
 namespace terrace::proto {
 
-struct TreeRoot {
-  geo::TileKey tile;
-  int levels = 1;  // of the tree, its root counted (LevelsUnder)
-};
-
 struct TilesetDescription {
   std::string attribution;
-  std::vector<TreeRoot> roots;  // tiles of one level (ImplicitRoots)
+  std::vector<TreeRoot> roots;  // tiles of one level (ImplicitTrees)
   // Metres above the ellipsoid that no vertex of any tile leaves, feet of skirts included: clients hand the range of
   // the root down to all its descendants.
   double min_height_m = 0, max_height_m = 0;

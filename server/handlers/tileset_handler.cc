@@ -29,9 +29,7 @@ Document MakeTileset(const DatasetView& dataset, ErrorWish wish, std::string con
   wish.at_least = wish.error_m.has_value();  // as TileQuery writes it into the templates
   proto::TilesetDescription tileset;
   tileset.attribution = dataset.attribution;
-  for (const geo::TileKey& root : proto::ImplicitRoots(dataset.available)) {
-    tileset.roots.push_back({root, proto::LevelsUnder(dataset.available, root)});
-  }
+  tileset.roots = proto::ImplicitTrees(dataset.available);
   const int level = tileset.roots.front().tile.level;
   // The roots have the largest error, and with it the deepest skirts and the coarsest rounding of heights.
   const double error_m =

@@ -56,7 +56,10 @@ async function tilesOf(root, base) {
   return tiles;
 }
 
-const rootsOf = ({ root }) => (root.implicitTiling ? [root] : root.children);
+// The implicit roots, and the contents of the tiles above them.
+const implicitRoots = (tile) => (tile.implicitTiling ? [tile] : tile.children.flatMap(implicitRoots));
+const contentsAbove = (tile) => (tile.implicitTiling ? [] : [...(tile.content ? [tile.content.uri] : []), ...tile.children.flatMap(contentsAbove)]);
+const rootsOf = ({ root }) => implicitRoots(root);
 
 for (const dataset of ['jacksboro', 'earth']) {
   describe(`the 3D Tiles of ${dataset}`, () => {
@@ -79,17 +82,23 @@ for (const dataset of ['jacksboro', 'earth']) {
 
     it('hold exactly the tiles that layer.json lists from their roots down', async () => {
       const roots = rootsOf(tileset);
-      const top = Number(/3dtiles\/(\d+)-/.exec(roots[0].content.uri)[1]);
+      const above = contentsAbove(tileset.root).map((uri) => /3dtiles\/(\d+-\d+-\d+)\/0\/0\/0\.glb$/.exec(uri)[1].replaceAll('-', '/'));
+      const top = Math.min(...roots.map(({ content }) => Number(/3dtiles\/(\d+)-/.exec(content.uri)[1])), ...above.map((key) => Number(key.split('/')[0])));
       const listed = layer.available.flatMap((ranges, z) => (z < top ? [] : ranges.flatMap((r) => {
         const keys = [];
         for (let x = r.startX; x <= r.endX; x++) for (let y = r.startY; y <= r.endY; y++) keys.push(`${z}/${x}/${y}`);
         return keys;
       })));
-      const found = (await Promise.all(roots.map((root) => tilesOf(root, base)))).flat().map(({ key }) => key);
+      const found = (await Promise.all(roots.map((root) => tilesOf(root, base)))).flat().map(({ key }) => key).concat(above);
       assert.deepEqual(found.sort(), listed.sort());
     });
 
     it('serve what they promise', async () => {
+      for (const uri of contentsAbove(tileset.root)) {
+        const glb = await request(new URL(uri, base));
+        assert.equal(glb.status, 200, uri);
+        assert.equal(glb.body.toString('latin1', 0, 4), 'glTF');
+      }
       for (const root of rootsOf(tileset)) {
         const tiles = await tilesOf(root, base);
         const last = tiles.reduce((deepest, tile) => (tile.place[0] > deepest.place[0] ? tile : deepest));

@@ -59,6 +59,33 @@ TEST(LevelsUnder, ReachAsDeepAsTheTreesOwnTiles) {
   EXPECT_EQ(LevelsUnder(available, {8, 100, 60}), 1);
 }
 
+TEST(ImplicitRoots, HoldTheGlobeUnderASmallSurvey) {
+  Levels available = Above({{1000, 700, 1001, 701}}, 9);
+  available[1] = {{0, 0, 3, 1}};
+  available[2] = {{0, 0, 7, 3}};
+  available[3] = {{0, 0, 15, 7}};
+  EXPECT_EQ(ImplicitRoots(available).size(), 32u);
+}
+
+TEST(ImplicitTrees, BesideThePolesAreRootedALevelDeeper) {
+  Levels available = Above({{140, 110, 145, 113}}, 7);  // about 18 degrees east, 67 to 72 north
+  available[1] = {{0, 0, 3, 1}};
+  available[2] = {{0, 0, 7, 3}};
+  available[3] = {{0, 0, 15, 7}};
+  const std::vector<TreeRoot> trees = ImplicitTrees(available);
+  ASSERT_EQ(trees.size(), 32u);
+  for (const TreeRoot& tree : trees) {
+    ASSERT_EQ(tree.below.size(), tree.tile.y == 0 || tree.tile.y == 3 ? 4u : 0u) << geo::ToString(tree.tile);
+    for (const TreeRoot& root : tree.below) {
+      EXPECT_EQ((geo::TileKey{2, root.tile.x / 2, root.tile.y / 2}), tree.tile);
+      EXPECT_EQ(root.levels, LevelsUnder(available, root.tile));
+    }
+  }
+  available.resize(3);
+  for (const TreeRoot& tree : ImplicitTrees(available)) EXPECT_TRUE(tree.below.empty()) << "nothing below";
+  EXPECT_TRUE(ImplicitTrees(Above({{33, 0, 36, 0}}, 13)).front().below.empty()) << "small roots are left alone";
+}
+
 // loaders.gl asks for every subtree of a tree before it draws: 13 levels in subtrees of 6 end in one for each deepest
 // tile, 24,633 of them for an island.
 TEST(SubtreeLevels, AreEqualSoThatTheLastSubtreesAreFew) {

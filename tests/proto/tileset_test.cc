@@ -116,6 +116,36 @@ TEST(Tileset, RootsOfTheGlobeLieInASphere) {
   EXPECT_EQ(root.at("children").back().at("boundingVolume").at("region")[2], std::numbers::pi);
 }
 
+// loaders.gl makes of a region with a corner at a pole a box without width.
+TEST(Tileset, TilesBesideThePolesAreBoundedBySpheres) {
+  TilesetDescription tileset = Maui();
+  tileset.content_query = "error=5";
+  const geo::TileKey key{2, 4, 3};  // Europe
+  tileset.roots = {{key, 9, {{{3, 8, 6}, 8}, {{3, 9, 7}, 2}}}};
+  const Json root = Json::parse(EncodeTileset(tileset)).at("root");
+  EXPECT_EQ(root.at("content").at("uri"), "3dtiles/2-4-3/0/0/0.glb?error=5");
+  EXPECT_EQ(root.at("geometricError"), GeometricError(2));
+  EXPECT_FALSE(root.contains("implicitTiling"));
+  ASSERT_EQ(root.at("children").size(), 2u);
+  const Json& child = root.at("children")[0];
+  EXPECT_EQ(child.at("content").at("uri"), "3dtiles/3-8-6/{level}/{x}/{y}.glb?error=5");
+  EXPECT_EQ(child.at("geometricError"), GeometricError(3));
+  EXPECT_EQ(child.at("implicitTiling").at("availableLevels"), 8);
+  EXPECT_EQ(child.at("boundingVolume").at("region")[1], std::numbers::pi / 4);
+
+  const Json& sphere = root.at("boundingVolume").at("sphere");
+  const geo::Vec3 middle{sphere[0], sphere[1], sphere[2]};
+  double farthest = 0;
+  for (int i = 0; i <= 32; ++i) {
+    for (int j = 0; j <= 32; ++j) {
+      for (const double height : {tileset.min_height_m, tileset.max_height_m}) {
+        farthest = std::max(farthest, geo::Length(geo::ToEcef(45 * i / 32.0, 45 + 45 * j / 32.0, height) - middle));
+      }
+    }
+  }
+  EXPECT_NEAR(farthest, sphere[3], 1e-3);
+}
+
 TEST(Tileset, GeometricErrorsFallFromTheTopAndFitTerrainClients) {
   // 16 pixels of it are 2 pixels of the level error that terrain clients assume.
   EXPECT_DOUBLE_EQ(GeometricError(9), 8 * geo::LevelError(9));
