@@ -15,6 +15,7 @@
 #include "server/http/query.h"
 #include "server/http/text.h"
 #include "server/tiles/strong_etag.h"
+#include "server/tiles/tile_head.h"
 
 namespace terrace::server {
 namespace {
