@@ -46,7 +46,7 @@ asio::awaitable<Response> TileHandler::Handle(Route route, Request request) cons
   const auto deadline = TileService::Clock::now() + options_.deadline;
   const Result<ServedTile> served = co_await tiles_.Get(catalog_, *tile, deadline);
   if (served) co_return Reply(*served, *tile, request);
-  co_return co_await BackendFailure(served.error(), request.id, options_.refusal_delay);
+  co_return co_await BackendFailure(served.error(), std::string(request.id), options_.refusal_delay);
 }
 
 Response TileHandler::Reply(const ServedTile& served, const TileRequest& tile, const Request& request) const {
@@ -54,7 +54,11 @@ Response TileHandler::Reply(const ServedTile& served, const TileRequest& tile, c
   response.lines = std::shared_ptr<const HeadLines>(served.tile, &served.tile->head);
   response.cache_control = options_.cache_control;
   response.vary = tile.format != TileFormat::kHeightPng;  // which has one form
-  response.headers.emplace_back("Server-Timing", FormatServerTiming(served.cache, served.tile->times));
+  if (served.cache == CacheStatus::kHit) {
+    response.more_lines = "Server-Timing: cache;desc=hit\r\n";
+  } else {
+    response.headers.emplace_back("Server-Timing", FormatServerTiming(served.cache, served.tile->times));
+  }
   response.cache = Name(served.cache);
   if (MatchesEtag(request.fields->if_none_match, served.tile->etag)) {
     response.status = 304;
@@ -65,8 +69,8 @@ Response TileHandler::Reply(const ServedTile& served, const TileRequest& tile, c
 }
 
 std::string FormatServerTiming(CacheStatus cache, const StageTimes& times) {
-  if (cache == CacheStatus::kHit) return "cache;desc=hit";
   std::string text = fmt::format("cache;desc={}", Name(cache));
+  if (cache == CacheStatus::kHit) return text;
   const std::pair<const char*, std::chrono::microseconds> steps[] = {{"queue", times.queue},
                                                                      {"read", times.read},
                                                                      {"refine", times.refine},

@@ -28,7 +28,7 @@ std::optional<Coding> CodingOf(std::string_view name) {
 // A quality outside 0..1 or unreadable counts as 0: what a client says badly it does not get.
 double Quality(std::string_view parameters) {
   while (!parameters.empty()) {
-    const std::string_view parameter = NextPiece(parameters, ";", kBlanksAndQuotes);
+    const std::string_view parameter = NextPiece(parameters, ';', kBlanksAndQuotes);
     if (!parameter.starts_with("q=") && !parameter.starts_with("Q=")) continue;
     double quality = 0;
     const char* const last = parameter.data() + parameter.size();
@@ -50,8 +50,8 @@ Coding NegotiateCoding(std::string_view accept_encoding, std::span<const Coding>
   std::array<std::optional<double>, kKnown> named;  // qualities, by coding
   std::optional<double> any;
   while (!accept_encoding.empty()) {
-    std::string_view item = NextPiece(accept_encoding, ",", kBlanksAndQuotes);
-    const std::string_view name = NextPiece(item, ";", kBlanksAndQuotes);
+    std::string_view item = NextPiece(accept_encoding, ',', kBlanksAndQuotes);
+    const std::string_view name = NextPiece(item, ';', kBlanksAndQuotes);
     const double quality = Quality(item);
     if (name == "*") {
       any = quality;

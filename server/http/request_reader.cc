@@ -32,6 +32,10 @@ asio::awaitable<RequestReader::Head> RequestReader::ReadHead(Request& request, S
       Consume(2);
       scanned = 0;
     }
+    if (const std::size_t size = TakeRepeated(Unread(), memo_, request)) {
+      Consume(size);
+      co_return Head(std::in_place);
+    }
     if (!Unread().empty()) {
       const auto end = FindHeadEnd(Unread(), scanned);
       if (!end) co_return Head(tl::unexpected(end.error()));
@@ -50,7 +54,8 @@ asio::awaitable<RequestReader::Head> RequestReader::ReadHead(Request& request, S
     if (closing_ && Unread().size() > scanned) continue;
 
     waiting_ = !begun;
-    const Transfer got = co_await Fill(std::min(kReadBytes, kMaxHeadBytes - Unread().size()));
+    const Transfer got = co_await stream_.ReadSome(Room(std::min(kReadBytes, kMaxHeadBytes - Unread().size())));
+    end_ += got.value_or(0);
     waiting_ = false;
     if (got) continue;
     if (stream_.expired() && begun) co_return Head(tl::unexpected(TooSlow()));

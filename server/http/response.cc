@@ -112,7 +112,7 @@ void PutVary(std::string& head, const Response& response, const CorsPolicy& cors
 std::string PrivateCacheControl(std::string_view configured) {
   std::string directives;
   while (!configured.empty()) {
-    const std::string_view directive = NextPiece(configured, ",");
+    const std::string_view directive = NextPiece(configured, ',');
     if (EqualsIgnoringCase(directive, "public") || EqualsIgnoringCase(directive, "private") || directive.empty()) {
       continue;
     }
@@ -132,6 +132,7 @@ std::string SerializeHead(const Response& response, const HeadOptions& options) 
   PutContent(head, response);
   PutCacheControl(head, response);
   PutVary(head, response, cors);
+  head += response.more_lines;
   for (const Response::Header& header : response.headers) Put(head, header.name, header.value);
   head += cors.HeadersFor(options.origin);
   head += "X-Content-Type-Options: nosniff\r\n";

@@ -42,6 +42,7 @@ struct Response {
 
   // Lines that were made beforehand, in place of content_type, coding and etag; null: none.
   std::shared_ptr<const HeadLines> lines;
+  std::string_view more_lines;  // a literal: further ones, each with its CR LF
 
   bool source_changed = false;  // why it is a 503: whoever opens the source anew can answer
 

@@ -19,6 +19,7 @@ tl::unexpected<Error> NotFound() {
 
 // A path without scheme and authority, or nothing.
 std::optional<std::string_view> OriginForm(std::string_view target) {
+  if (target.starts_with('/')) return target;
   for (const std::string_view scheme : {"http://", "https://"}) {
     if (!EqualsIgnoringCase(target.substr(0, scheme.size()), scheme)) continue;
     target.remove_prefix(scheme.size());
@@ -26,8 +27,7 @@ std::optional<std::string_view> OriginForm(std::string_view target) {
     if (path == std::string_view::npos) return "/";
     return target[path] == '/' ? target.substr(path) : std::optional<std::string_view>();
   }
-  if (!target.starts_with('/')) return std::nullopt;
-  return target;
+  return std::nullopt;
 }
 
 // One tile has one URL.
@@ -119,13 +119,13 @@ std::optional<Route> MatchImplicit(const Segments& segments) {
 }
 
 std::optional<Route> MatchFixed(const Segments& segments) {
+  if (segments.size() > 1 && segments[0] != "viewer") return std::nullopt;
   Route route;
-  if (segments[0] == "viewer" && segments.size() > 1) {
+  if (segments.size() > 1) {
     for (std::size_t i = 1; i < segments.size(); ++i) route.file.append(i > 1 ? "/" : "").append(segments[i]);
     if (route.file.empty()) route.file = "index.html";
     return route;
   }
-  if (segments.size() > 1) return std::nullopt;
   if (segments[0].empty()) {
     route.file = "index.html";
     return route;

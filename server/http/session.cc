@@ -4,7 +4,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <atomic>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
 #include <boost/asio/dispatch.hpp>
@@ -14,7 +13,6 @@
 #include <boost/system/system_error.hpp>
 #include <exception>
 #include <optional>
-#include <random>
 #include <utility>
 #include <variant>
 
@@ -33,15 +31,6 @@ using Clock = std::chrono::steady_clock;
 constexpr std::chrono::milliseconds kLingerTime{500};
 constexpr std::size_t kLingerBytes = std::size_t{64} << 20;
 constexpr int kClientLeft = 499;
-
-std::string NextRequestId() {
-  static const std::uint64_t start = std::uint64_t{std::random_device{}()} << 32;
-  static std::atomic<std::uint64_t> count{0};
-  std::uint64_t number = start + count.fetch_add(1, std::memory_order_relaxed);
-  std::string id(16, '0');
-  for (auto digit = id.rbegin(); digit != id.rend(); ++digit, number >>= 4) *digit = "0123456789abcdef"[number & 15];
-  return id;
-}
 
 Response Overloaded(std::string_view detail, std::string_view request_id) {
   Response response = ProblemResponse(503, detail, request_id);
@@ -117,7 +106,7 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   asio::awaitable<bool> ServeLater(Route route);
   std::optional<Response> Refuse(const Result<Route>& route) const;
   asio::awaitable<void> HoldBack();
-  std::optional<Response> AnswerAtOnce(const Route& route) const;
+  std::optional<Response> AnswerAtOnce(const Result<Route>& route) const;
   asio::awaitable<std::optional<Response>> AnswerWhileConnected(Route route, Request request);
   asio::awaitable<Response> Answer(Route route, Request request);
   asio::awaitable<bool> Reply(Response& response);
@@ -145,7 +134,6 @@ asio::awaitable<void> Session::ServeAll() {
   }
   replied_ = Clock::now();
   for (bool keep = true; keep;) {
-    exchange_ = Exchange();
     const RequestReader::Head head = co_await reader_.ReadHead(exchange_.request, replied_);
     if (!head) break;
     exchange_.begun = Clock::now();
@@ -153,6 +141,7 @@ asio::awaitable<void> Session::ServeAll() {
       keep = co_await ServeOne();
       ++served_;
     } else {
+      exchange_.request = Request();  // not the last one
       exchange_.caller = peer_;
       co_await RefuseMessage(head->error());
       break;
@@ -163,7 +152,7 @@ asio::awaitable<void> Session::ServeAll() {
 
 // What follows cannot be trusted to be a request.
 asio::awaitable<void> Session::RefuseMessage(BadRequest why) {
-  if (exchange_.request.id.empty()) exchange_.request.id = NextRequestId();
+  if (exchange_.request.id.empty()) exchange_.request.id = RequestId::Next();
   Response response = ProblemResponse(why.status, why.detail, exchange_.request.id);
   response.close = true;
   co_await Reply(response);
@@ -172,20 +161,14 @@ asio::awaitable<void> Session::RefuseMessage(BadRequest why) {
 // False: the connection is to be closed.
 asio::awaitable<bool> Session::ServeOne() {
   Request& request = exchange_.request;
-  request.id = NextRequestId();
+  request.id = RequestId::Next();
   request.is_https = stream_.is_tls();
   exchange_.caller = context_->gate->Identify(request, peer_);
   const Result<Route> route = Match(request.target);
-  if (std::optional<Response> refusal = Refuse(route)) {
-    if (refusal->status == 429) co_await HoldBack();
-    // A body may follow that nobody will read.
-    refusal->close = refusal->close || request.content_length > 0;
-    co_return co_await Reply(*refusal);
-  }
-  if (request.content_length == 0) {
-    if (std::optional<Response> response = AnswerAtOnce(*route)) co_return co_await Reply(*response);
-  }
-  co_return co_await ServeLater(*route);
+  std::optional<Response> response = AnswerAtOnce(route);
+  if (!response) co_return co_await ServeLater(*route);
+  if (response->status == 429) co_await HoldBack();
+  co_return co_await Reply(*response);
 }
 
 // What has to be waited for: the request's body, and the answer.
@@ -213,7 +196,9 @@ asio::awaitable<bool> Session::ServeLater(Route route) {
     co_return false;
   }
   context_->gate->Mark(route, *response);
-  co_return co_await Reply(*response);
+  const bool keep = co_await Reply(*response);
+  request.body = std::string();  // nothing of it is held while the connection waits
+  co_return keep;
 }
 
 // What can be said without the request's body. Preflights come first: they carry no token.
@@ -239,14 +224,21 @@ asio::awaitable<void> Session::HoldBack() {
 
 // Nothing: the answer has to be waited for. Most answers need not be, and then neither a timer nor a second coroutine
 // watches the client meanwhile.
-std::optional<Response> Session::AnswerAtOnce(const Route& route) const {
-  std::optional<Response> response;
+std::optional<Response> Session::AnswerAtOnce(const Result<Route>& route) const {
+  const Request& request = exchange_.request;
+  std::optional<Response> response = Refuse(route);
+  if (response) {
+    // A body may follow that nobody will read.
+    response->close = response->close || request.content_length > 0;
+    return response;
+  }
+  if (request.content_length > 0 || !context_->quick_handler) return response;
   try {
-    if (context_->quick_handler) response = context_->quick_handler(route, exchange_.request);
+    response = context_->quick_handler(*route, request);
   } catch (const std::exception&) {  // the handler will meet it again, and say so
     return std::nullopt;
   }
-  if (response) context_->gate->Mark(route, *response);
+  if (response) context_->gate->Mark(*route, *response);
   return response;
 }
 
@@ -261,7 +253,7 @@ asio::awaitable<std::optional<Response>> Session::AnswerWhileConnected(Route rou
 
 // Never throws, so that the race above always has a winner.
 asio::awaitable<Response> Session::Answer(Route route, Request request) {
-  const std::string id = request.id;
+  const RequestId id = request.id;
   Error error;
   try {
     co_return co_await context_->handler(std::move(route), std::move(request));
