@@ -15,6 +15,7 @@
 #include "server/http/query.h"
 #include "server/http/text.h"
 #include "server/tiles/strong_etag.h"
+#include "server/tiles/tile_head.h"
 
 namespace terrace::server {
 namespace {
@@ -152,7 +153,7 @@ asio::awaitable<Response> AreaHandler::Handle(Route route, Request request) cons
   };
   const auto deadline = TileService::Clock::now() + options_.deadline;
   const Result<TilePtr> mesh = co_await tiles_.Run(std::move(work), TileService::Length::kLong, deadline);
-  if (!mesh) co_return co_await BackendFailure(mesh.error(), request.id, options_.refusal_delay);
+  if (!mesh) co_return co_await BackendFailure(mesh.error(), std::string(request.id), options_.refusal_delay);
   response.body = Body(*mesh, &(*mesh)->bytes);
   response.headers.emplace_back("Terrain-Max-Error", FormatErrorUp((*mesh)->max_error_m));
   if (area->coordinates == AreaCoordinates::kEnu) {

@@ -74,7 +74,7 @@ asio::awaitable<Response> HeightsHandler::Handle(Route route, Request request) c
   };
   const auto deadline = TileService::Clock::now() + options_.deadline;
   const Result<TilePtr> reply = co_await tiles_.Run(std::move(work), TileService::Length::kShort, deadline);
-  if (!reply) co_return co_await BackendFailure(reply.error(), request.id, options_.refusal_delay);
+  if (!reply) co_return co_await BackendFailure(reply.error(), std::string(request.id), options_.refusal_delay);
   response.body = Body(*reply, &(*reply)->bytes);
   response.headers.emplace_back("Server-Timing", FormatServerTiming(CacheStatus::kMiss, (*reply)->times));
   co_return response;

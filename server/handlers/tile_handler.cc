@@ -2,13 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
-#include <cmath>
 #include <iterator>
 #include <memory>
 #include <utility>
 
-#include "proto/media_type.h"
 #include "server/handlers/backend_failure.h"
 #include "server/http/http_error.h"
 #include "server/http/negotiate.h"
@@ -30,12 +27,6 @@ std::string_view Name(CacheStatus cache) {
   return "join";
 }
 
-std::string_view ContentTypeOf(const TileRequest& tile) {
-  if (tile.format == TileFormat::kGlb) return "model/gltf-binary";
-  if (tile.format == TileFormat::kHeightPng) return "image/png";
-  return proto::QuantizedMeshContentType({tile.normals, tile.water_mask, tile.metadata});
-}
-
 }  // namespace
 
 TileHandler::TileHandler(CatalogPtr catalog, TileService& tiles, TileHandlerOptions options)
@@ -55,34 +46,26 @@ asio::awaitable<Response> TileHandler::Handle(Route route, Request request) cons
   const auto deadline = TileService::Clock::now() + options_.deadline;
   const Result<ServedTile> served = co_await tiles_.Get(catalog_, *tile, deadline);
   if (served) co_return Reply(*served, *tile, request);
-  co_return co_await BackendFailure(served.error(), request.id, options_.refusal_delay);
+  co_return co_await BackendFailure(served.error(), std::string(request.id), options_.refusal_delay);
 }
 
 Response TileHandler::Reply(const ServedTile& served, const TileRequest& tile, const Request& request) const {
   Response response;
-  response.content_type = ContentTypeOf(tile);
-  response.body = Body(served.tile, &served.tile->bytes);
-  response.coding = tile.coding;
-  response.etag = served.tile->etag;
+  response.lines = std::shared_ptr<const HeadLines>(served.tile, &served.tile->head);
   response.cache_control = options_.cache_control;
   response.vary = tile.format != TileFormat::kHeightPng;  // which has one form
-  response.headers.emplace_back("Terrain-Max-Error", FormatErrorUp(served.tile->max_error_m));
-  if (const auto certified = served.tile->certified_error_m; certified && std::isfinite(*certified)) {
-    response.headers.emplace_back("Terrain-Certified-Error", FormatErrorUp(*certified));
+  if (served.cache == CacheStatus::kHit) {
+    response.more_lines = "Server-Timing: cache;desc=hit\r\n";
+  } else {
+    response.headers.emplace_back("Server-Timing", FormatServerTiming(served.cache, served.tile->times));
   }
-  response.headers.emplace_back("Server-Timing", FormatServerTiming(served.cache, served.tile->times));
   response.cache = Name(served.cache);
-  return Conditional(std::move(response), request);
-}
-
-std::string FormatErrorUp(double error_m) {
-  std::string text = fmt::format("{:.6g}", error_m);
-  double printed = 0;
-  std::from_chars(text.data(), text.data() + text.size(), printed);
-  if (printed >= error_m) return text;
-  // Rounding went down by less than half a unit of the last digit: one unit more rounds to the next number up.
-  const double unit = std::pow(10.0, std::floor(std::log10(error_m)) - 5);
-  return fmt::format("{:.6g}", error_m + unit);
+  if (MatchesEtag(request.fields->if_none_match, served.tile->etag)) {
+    response.status = 304;
+  } else {
+    response.body = Body(served.tile, &served.tile->bytes);
+  }
+  return response;
 }
 
 std::string FormatServerTiming(CacheStatus cache, const StageTimes& times) {

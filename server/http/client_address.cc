@@ -44,7 +44,7 @@ struct Hop {
 
 std::vector<std::string_view> Pieces(std::string_view list) {
   std::vector<std::string_view> pieces;
-  while (!list.empty()) pieces.push_back(NextPiece(list, ","));
+  while (!list.empty()) pieces.push_back(NextPiece(list, ','));
   return pieces;
 }
 
@@ -57,7 +57,7 @@ std::string_view LastPiece(std::string_view list) {
 Hop ParseForwarded(std::string_view element) {
   Hop hop;
   while (!element.empty()) {
-    const std::string_view pair = NextPiece(element, ";");
+    const std::string_view pair = NextPiece(element, ';');
     const std::size_t equals = pair.find('=');
     if (equals == std::string_view::npos) continue;
     const std::string_view name = Trim(pair.substr(0, equals)), value = Trim(pair.substr(equals + 1), " \t\"");

@@ -1,9 +1,9 @@
 #include "server/http/negotiate.h"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <limits>
-#include <map>
 #include <optional>
 
 #include "engine/geo/error_ladder.h"
@@ -28,7 +28,7 @@ std::optional<Coding> CodingOf(std::string_view name) {
 // A quality outside 0..1 or unreadable counts as 0: what a client says badly it does not get.
 double Quality(std::string_view parameters) {
   while (!parameters.empty()) {
-    const std::string_view parameter = NextPiece(parameters, ";", kBlanksAndQuotes);
+    const std::string_view parameter = NextPiece(parameters, ';', kBlanksAndQuotes);
     if (!parameter.starts_with("q=") && !parameter.starts_with("Q=")) continue;
     double quality = 0;
     const char* const last = parameter.data() + parameter.size();
@@ -46,24 +46,25 @@ bool CompressionHelps(const TileRequest& tile) {
 }  // namespace
 
 Coding NegotiateCoding(std::string_view accept_encoding, std::span<const Coding> offered) {
-  std::map<Coding, double> named;
+  constexpr std::size_t kKnown = 1 + kCodings.size();
+  std::array<std::optional<double>, kKnown> named;  // qualities, by coding
   std::optional<double> any;
   while (!accept_encoding.empty()) {
-    std::string_view item = NextPiece(accept_encoding, ",", kBlanksAndQuotes);
-    const std::string_view name = NextPiece(item, ";", kBlanksAndQuotes);
+    std::string_view item = NextPiece(accept_encoding, ',', kBlanksAndQuotes);
+    const std::string_view name = NextPiece(item, ';', kBlanksAndQuotes);
     const double quality = Quality(item);
     if (name == "*") {
       any = quality;
     } else if (const std::optional<Coding> coding = CodingOf(name)) {
-      const auto [entry, is_new] = named.emplace(*coding, quality);
-      if (!is_new) entry->second = std::max(entry->second, quality);
+      std::optional<double>& known = named[static_cast<std::size_t>(*coding)];
+      known = std::max(known.value_or(0), quality);
     }
   }
   // An identity that is not mentioned is acceptable, but only if nothing else is.
   Coding best = Coding::kIdentity;
-  double most = named.contains(Coding::kIdentity) ? named.at(Coding::kIdentity) : 0;
+  double most = named[static_cast<std::size_t>(Coding::kIdentity)].value_or(0);
   for (const Coding coding : offered) {
-    const double quality = named.contains(coding) ? named.at(coding) : any.value_or(0);
+    const double quality = named[static_cast<std::size_t>(coding)].value_or(any.value_or(0));
     if (quality <= 0 || quality < most || (quality == most && best != Coding::kIdentity)) continue;
     best = coding;
     most = quality;

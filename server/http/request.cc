@@ -1,11 +1,14 @@
 #include "server/http/request.h"
 
 #include <algorithm>
+#include <atomic>
 #include <boost/asio/buffer.hpp>
 #include <boost/beast/http/empty_body.hpp>
 #include <boost/beast/http/fields.hpp>
 #include <boost/beast/http/parser.hpp>
+#include <cstdint>
 #include <optional>
+#include <random>
 #include <utility>
 
 #include "server/asio.h"
@@ -131,20 +134,6 @@ std::optional<PlainLine> ReadPlainLine(std::string_view head) {
   return PlainLine{is_get ? Method::kGet : Method::kHead, name, target, size + 2};
 }
 
-// Nothing: the header is another one than the last.
-std::optional<Request> Repeated(std::string_view head, const HeadMemo& memo) {
-  if (memo.bytes.empty() || !head.ends_with(memo.bytes)) return std::nullopt;
-  const std::optional<PlainLine> line = ReadPlainLine(head);
-  if (!line || line->size + memo.bytes.size() != head.size()) return std::nullopt;
-  Request request;
-  request.method = line->method;
-  request.method_name = std::string(line->name);
-  request.keep_alive = memo.keep_alive;
-  request.fields = memo.fields;
-  SetTarget(request, line->target);
-  return request;
-}
-
 void Remember(std::string_view head, const Request& request, HeadMemo& memo) {
   const std::optional<PlainLine> line = ReadPlainLine(head);
   if (!line || request.content_length > 0 || request.expects_continue) {
@@ -157,6 +146,18 @@ void Remember(std::string_view head, const Request& request, HeadMemo& memo) {
 }
 
 }  // namespace
+
+RequestId RequestId::Next() {
+  static const std::uint64_t start = std::uint64_t{std::random_device{}()} << 32;
+  static std::atomic<std::uint64_t> count{0};
+  std::uint64_t number = start + count.fetch_add(1, std::memory_order_relaxed);
+  RequestId id;
+  id.size_ = id.digits_.size();
+  for (auto digit = id.digits_.rbegin(); digit != id.digits_.rend(); ++digit, number >>= 4) {
+    *digit = "0123456789abcdef"[number & 15];
+  }
+  return id;
+}
 
 SharedFields::SharedFields() {
   static const auto none = std::make_shared<const RequestFields>();
@@ -217,10 +218,21 @@ tl::expected<std::size_t, BadRequest> FindHeadEnd(std::string_view bytes, std::s
   return end == std::string_view::npos ? 0 : end + 4;
 }
 
+std::size_t TakeRepeated(std::string_view bytes, const HeadMemo& memo, Request& request) {
+  if (memo.bytes.empty()) return 0;
+  const std::optional<PlainLine> line = ReadPlainLine(bytes);
+  if (!line || !bytes.substr(line->size).starts_with(memo.bytes)) return 0;
+  if (line->size + memo.bytes.size() > kMaxHeadBytes) return 0;
+  request = Request();
+  request.method = line->method;
+  request.method_name = line->name;
+  request.keep_alive = memo.keep_alive;
+  request.fields = memo.fields;
+  SetTarget(request, line->target);
+  return line->size + memo.bytes.size();
+}
+
 tl::expected<Request, BadRequest> ParseHead(std::string_view head, HeadMemo* memo) {
-  if (memo != nullptr) {
-    if (std::optional<Request> request = Repeated(head, *memo)) return *std::move(request);
-  }
   // Beast unfolds continued lines; another reader may see a field there.
   if (head.find("\r\n ") != std::string_view::npos || head.find("\r\n\t") != std::string_view::npos) {
     return Bad(400, "folded header lines are not accepted");

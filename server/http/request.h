@@ -5,6 +5,7 @@
 // another byte is read.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <memory>
 #include <optional>
@@ -54,6 +55,20 @@ class SharedFields {
   std::shared_ptr<const RequestFields> fields_;  // never null
 };
 
+// Sixteen hexadecimal digits that name a request in the log and in what its client is told; empty until it is given.
+class RequestId {
+ public:
+  RequestId() = default;
+  static RequestId Next();  // another one at every call, of every process
+
+  operator std::string_view() const { return {digits_.data(), size_}; }  // NOLINT(google-explicit-constructor)
+  bool empty() const { return size_ == 0; }
+
+ private:
+  std::array<char, 16> digits_{};
+  std::size_t size_ = 0;
+};
+
 struct Request {
   Method method = Method::kGet;
   unsigned version = 11;    // 10 or 11
@@ -67,7 +82,7 @@ struct Request {
   std::string body;                // of a POST, once the session has read it
 
   // Given by the server.
-  std::string id;         // 16 hexadecimal digits
+  RequestId id;
   bool is_https = false;  // how the client speaks to this server, or to the proxy before it
   GrantPtr grant;         // what the client may see; null: everything
   bool has_bad_token = false;
@@ -91,9 +106,13 @@ struct HeadMemo {
   SharedFields fields;
 };
 
-// `head` ends with its empty line. Sets everything but `body` and what is given by the server. The result does not
-// depend on `memo`, which may be null.
+// `head` ends with its empty line. Sets everything but `body` and what is given by the server. What of it the next
+// request may repeat is left in `memo`, which may be null.
 tl::expected<Request, BadRequest> ParseHead(std::string_view head, HeadMemo* memo = nullptr);
+
+// Where `bytes` begin with a whole head that repeats `memo`: its size, and the request that ParseHead would make of it.
+// 0: FindHeadEnd and ParseHead have to look.
+std::size_t TakeRepeated(std::string_view bytes, const HeadMemo& memo, Request& request);
 
 // Whether it is a host and port after RFC 3986, or empty, which is what a client sends whose URI has no authority.
 bool IsHostValue(std::string_view value);

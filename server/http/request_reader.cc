@@ -21,10 +21,10 @@ void RequestReader::Close() {
   if (waiting_) stream_.Cancel();
 }
 
-asio::awaitable<RequestReader::Head> RequestReader::ReadHead() {
+asio::awaitable<RequestReader::Head> RequestReader::ReadHead(Request& request, Stream::Clock::time_point now) {
   std::size_t scanned = 0;
   bool begun = !Unread().empty();
-  stream_.ExpiresAfter(begun || is_first_ ? timeouts_.message : timeouts_.idle);
+  stream_.ExpiresAt(now + (begun || is_first_ ? timeouts_.message : timeouts_.idle));
   is_first_ = false;
   for (;;) {
     // RFC 9112, section 2.2: empty lines before a request are to be ignored.
@@ -32,13 +32,19 @@ asio::awaitable<RequestReader::Head> RequestReader::ReadHead() {
       Consume(2);
       scanned = 0;
     }
+    if (const std::size_t size = TakeRepeated(Unread(), memo_, request)) {
+      Consume(size);
+      co_return Head(std::in_place);
+    }
     if (!Unread().empty()) {
       const auto end = FindHeadEnd(Unread(), scanned);
       if (!end) co_return Head(tl::unexpected(end.error()));
       if (*end > 0) {
-        Head parsed(ParseHead(Unread().substr(0, *end), &memo_));
+        tl::expected<Request, BadRequest> parsed = ParseHead(Unread().substr(0, *end), &memo_);
         Consume(*end);
-        co_return parsed;
+        if (!parsed) co_return Head(tl::unexpected(parsed.error()));
+        request = *std::move(parsed);
+        co_return Head(std::in_place);
       }
       scanned = Unread().size();
       if (!begun) stream_.ExpiresAfter(timeouts_.message);
@@ -48,7 +54,8 @@ asio::awaitable<RequestReader::Head> RequestReader::ReadHead() {
     if (closing_ && Unread().size() > scanned) continue;
 
     waiting_ = !begun;
-    const Transfer got = co_await Fill(std::min(kReadBytes, kMaxHeadBytes - Unread().size()));
+    const Transfer got = co_await stream_.ReadSome(Room(std::min(kReadBytes, kMaxHeadBytes - Unread().size())));
+    end_ += got.value_or(0);
     waiting_ = false;
     if (got) continue;
     if (stream_.expired() && begun) co_return Head(tl::unexpected(TooSlow()));
@@ -58,23 +65,25 @@ asio::awaitable<RequestReader::Head> RequestReader::ReadHead() {
   }
 }
 
+// For so many bytes behind the unread ones.
+asio::mutable_buffer RequestReader::Room(std::size_t bytes) {
+  std::copy(buffer_.begin() + begin_, buffer_.begin() + end_, buffer_.begin());
+  end_ -= std::exchange(begin_, 0);
+  if (buffer_.size() < end_ + bytes) buffer_.resize(end_ + bytes);
+  return asio::buffer(buffer_.data() + end_, bytes);
+}
+
 asio::awaitable<Transfer> RequestReader::Fill(std::size_t room) {
-  buffer_.erase(0, std::exchange(consumed_, 0));
-  const std::size_t end = buffer_.size();
-  buffer_.resize(end + room);
-  const Transfer got = co_await stream_.ReadSome(asio::buffer(buffer_.data() + end, room));
-  buffer_.resize(end + got.value_or(0));
+  const Transfer got = co_await stream_.ReadSome(Room(room));
+  end_ += got.value_or(0);
   co_return got;
 }
 
 // False: there was nothing.
 bool RequestReader::FillWithWhatArrived() {
-  buffer_.erase(0, std::exchange(consumed_, 0));
-  const std::size_t end = buffer_.size();
-  buffer_.resize(kMaxHeadBytes);
-  const Transfer got = stream_.ReadReady(asio::buffer(buffer_.data() + end, kMaxHeadBytes - end));
-  buffer_.resize(end + got.value_or(0));
-  return got.value_or(0) > 0;
+  const std::size_t got = stream_.ReadReady(Room(kMaxHeadBytes - Unread().size())).value_or(0);
+  end_ += got;
+  return got > 0;
 }
 
 asio::awaitable<tl::expected<void, BadRequest>> RequestReader::ReadBody(Request& request) {

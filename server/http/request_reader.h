@@ -25,9 +25,10 @@ class RequestReader {
  public:
   RequestReader(Stream& stream, ReadTimeouts timeouts);
 
-  // Nothing: the connection ended, was idle for too long, or is closing and no request has begun.
-  using Head = std::optional<tl::expected<Request, BadRequest>>;
-  asio::awaitable<Head> ReadHead();
+  // Nothing: the connection ended, was idle for too long, or is closing and no request has begun. `now`: the present,
+  // or shortly before.
+  using Head = std::optional<tl::expected<void, BadRequest>>;
+  asio::awaitable<Head> ReadHead(Request& request, Stream::Clock::time_point now);
 
   // Reads as many bytes as the request promises; memory is taken as they arrive. What went wrong: `status` 0 says that
   // the client left.
@@ -42,15 +43,17 @@ class RequestReader {
   asio::awaitable<void> Discard(std::size_t most);
 
  private:
-  std::string_view Unread() const { return std::string_view(buffer_).substr(consumed_); }
-  void Consume(std::size_t bytes) { consumed_ += bytes; }
+  std::string_view Unread() const { return std::string_view(buffer_).substr(begin_, end_ - begin_); }
+  void Consume(std::size_t bytes) { begin_ += bytes; }
+  asio::mutable_buffer Room(std::size_t bytes);
   asio::awaitable<Transfer> Fill(std::size_t room);
   bool FillWithWhatArrived();
 
   Stream& stream_;
   const ReadTimeouts timeouts_;
-  std::string buffer_;  // what was read; beyond `consumed_`, the next requests of a client that does not wait
-  std::size_t consumed_ = 0;
+  std::string buffer_;  // grows, and is not cleared: filling it with zeros takes as long as parsing
+  std::size_t begin_ = 0,
+              end_ = 0;  // of what was read and not consumed: the next requests of a client that does not wait
   HeadMemo memo_;
   bool is_first_ = true;
   bool waiting_ = false;

@@ -5,7 +5,7 @@
 
 #include <algorithm>
 #include <ctime>
-#include <iterator>
+#include <utility>
 
 #include "engine/core/check.h"
 #include "server/http/text.h"
@@ -55,27 +55,56 @@ void Put(std::string& head, std::string_view name, std::string_view value) {
   head.append(name).append(": ").append(value).append("\r\n");
 }
 
-// The Date header of now. Every thread keeps the text of its last second.
-const std::string& Date() {
+void PutStatus(std::string& head, unsigned version, int status) {
+  head.append(version == 10 ? "HTTP/1.0 " : "HTTP/1.1 ").append(fmt::format_int(status).c_str());
+  head.append(" ").append(ReasonPhrase(status)).append("\r\n");
+}
+
+// The Date header of now. Every thread keeps the line of its last second.
+void PutDate(std::string& head) {
   thread_local std::time_t second = 0;
-  thread_local std::string text;
+  thread_local std::string line;
   if (const std::time_t now = std::time(nullptr); now != second) {
     second = now;
-    text = fmt::format("{:%a, %d %b %Y %H:%M:%S} GMT", fmt::gmtime(now));
+    line = fmt::format("Date: {:%a, %d %b %Y %H:%M:%S} GMT\r\n", fmt::gmtime(now));
   }
-  return text;
+  head += line;
 }
 
 bool HasBody(int status) { return status != 204 && status != 304; }
 
-std::string VaryOf(const Response& response, const CorsPolicy& cors) {
-  std::string vary;
-  const auto add = [&vary](std::string_view names) { vary.append(vary.empty() ? "" : ", ").append(names); };
+// What the reply says of its body.
+void PutContent(std::string& head, const Response& response) {
+  if (response.lines) {
+    const HeadLines& lines = *response.lines;
+    head += std::string_view(lines.text).substr(HasBody(response.status) ? 0 : lines.of_body);
+    return;
+  }
+  if (HasBody(response.status)) {
+    if (!response.content_type.empty()) Put(head, "Content-Type", response.content_type);
+    if (response.coding != Coding::kIdentity) Put(head, "Content-Encoding", NameOf(response.coding));
+    Put(head, "Content-Length", fmt::format_int(response.body ? response.body->size() : 0).c_str());
+  }
+  if (!response.etag.empty()) Put(head, "ETag", response.etag);
+}
+
+void PutCacheControl(std::string& head, const Response& response) {
+  if (response.cache_control.empty()) return;
+  if (response.for_grant) {
+    Put(head, "Cache-Control", PrivateCacheControl(response.cache_control));
+  } else {
+    Put(head, "Cache-Control", response.cache_control);
+  }
+}
+
+void PutVary(std::string& head, const Response& response, const CorsPolicy& cors) {
+  std::string_view before = "Vary: ";
+  const auto add = [&](std::string_view names) { head.append(std::exchange(before, ", ")).append(names); };
   if (response.vary) add("Accept, Accept-Encoding");
   if (!response.vary_too.empty()) add(response.vary_too);
   if (response.for_grant) add("Authorization");
   if (cors.varies()) add("Origin");
-  return vary;
+  if (before == ", ") head += "\r\n";
 }
 
 }  // namespace
@@ -83,7 +112,7 @@ std::string VaryOf(const Response& response, const CorsPolicy& cors) {
 std::string PrivateCacheControl(std::string_view configured) {
   std::string directives;
   while (!configured.empty()) {
-    const std::string_view directive = NextPiece(configured, ",");
+    const std::string_view directive = NextPiece(configured, ',');
     if (EqualsIgnoringCase(directive, "public") || EqualsIgnoringCase(directive, "private") || directive.empty()) {
       continue;
     }
@@ -98,26 +127,16 @@ std::string SerializeHead(const Response& response, const HeadOptions& options) 
   const CorsPolicy& cors = options.cors ? *options.cors : any_origin;
   std::string head;
   head.reserve(1024);
-  fmt::format_to(std::back_inserter(head), "HTTP/1.{} {} {}\r\n", options.version % 10, response.status,
-                 ReasonPhrase(response.status));
-  Put(head, "Date", Date());
-  if (HasBody(response.status)) {
-    if (!response.content_type.empty()) Put(head, "Content-Type", response.content_type);
-    if (response.coding != Coding::kIdentity) Put(head, "Content-Encoding", NameOf(response.coding));
-    Put(head, "Content-Length", fmt::to_string(response.body ? response.body->size() : 0));
-  }
-  if (!response.etag.empty()) Put(head, "ETag", response.etag);
-  if (response.for_grant && !response.cache_control.empty()) {
-    Put(head, "Cache-Control", PrivateCacheControl(response.cache_control));
-  } else if (!response.cache_control.empty()) {
-    Put(head, "Cache-Control", response.cache_control);
-  }
-  if (const std::string vary = VaryOf(response, cors); !vary.empty()) Put(head, "Vary", vary);
+  PutStatus(head, options.version, response.status);
+  PutDate(head);
+  PutContent(head, response);
+  PutCacheControl(head, response);
+  PutVary(head, response, cors);
+  head += response.more_lines;
   for (const Response::Header& header : response.headers) Put(head, header.name, header.value);
   head += cors.HeadersFor(options.origin);
   head += "X-Content-Type-Options: nosniff\r\n";
-  Put(head, "Connection", options.keep_alive ? "keep-alive" : "close");
-  head += "\r\n";
+  head += options.keep_alive ? "Connection: keep-alive\r\n\r\n" : "Connection: close\r\n\r\n";
   return head;
 }
 

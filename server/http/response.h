@@ -12,6 +12,7 @@
 
 #include "server/http/cors.h"
 #include "server/http/request.h"
+#include "server/tiles/encoded_tile.h"
 #include "server/tiles/tile_request.h"
 
 namespace terrace::server {
@@ -38,6 +39,10 @@ struct Response {
     std::string value;
   };
   std::vector<Header> headers;
+
+  // Lines that were made beforehand, in place of content_type, coding and etag; null: none.
+  std::shared_ptr<const HeadLines> lines;
+  std::string_view more_lines;  // a literal: further ones, each with its CR LF
 
   bool source_changed = false;  // why it is a 503: whoever opens the source anew can answer
 

@@ -1,6 +1,7 @@
 #include "server/http/router.h"
 
 #include <algorithm>
+#include <forward_list>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -19,6 +20,7 @@ tl::unexpected<Error> NotFound() {
 
 // A path without scheme and authority, or nothing.
 std::optional<std::string_view> OriginForm(std::string_view target) {
+  if (target.starts_with('/')) return target;
   for (const std::string_view scheme : {"http://", "https://"}) {
     if (!EqualsIgnoringCase(target.substr(0, scheme.size()), scheme)) continue;
     target.remove_prefix(scheme.size());
@@ -26,8 +28,7 @@ std::optional<std::string_view> OriginForm(std::string_view target) {
     if (path == std::string_view::npos) return "/";
     return target[path] == '/' ? target.substr(path) : std::optional<std::string_view>();
   }
-  if (!target.starts_with('/')) return std::nullopt;
-  return target;
+  return std::nullopt;
 }
 
 // One tile has one URL.
@@ -79,9 +80,40 @@ std::optional<int> CutSubtreeLevels(std::string_view& row) {
   return static_cast<int>(*levels);
 }
 
+// The decoded segments of a path; an encoded '/' does not separate.
+class Segments {
+ public:
+  // Nothing: malformed percent-encoding. `path` has to outlive the segments.
+  static std::optional<Segments> Of(std::string_view path) {
+    Segments segments;
+    segments.pieces_.reserve(kUsual);
+    for (std::size_t at = 0; at != std::string_view::npos;) {
+      const std::size_t next = path.find('/', at + 1);
+      std::string_view piece = path.substr(at + 1, next == std::string_view::npos ? next : next - at - 1);
+      if (piece.find('%') != std::string_view::npos) {
+        std::optional<std::string> decoded = PercentDecode(piece);
+        if (!decoded) return std::nullopt;
+        piece = segments.decoded_.emplace_front(*std::move(decoded));
+      }
+      segments.pieces_.push_back(piece);
+      at = next;
+    }
+    return segments;
+  }
+
+  std::size_t size() const { return pieces_.size(); }
+  std::string_view operator[](std::size_t i) const { return pieces_[i]; }
+
+ private:
+  static constexpr std::size_t kUsual = 6;  // the longest of the fixed forms
+
+  std::vector<std::string_view> pieces_;
+  std::forward_list<std::string> decoded_;  // of pieces that had to be; their places do not change
+};
+
 // A content or a subtree of an implicit tree: 3dtiles/{root}/{level}/{x}/{y}.glb or .{levels}.subtree, counted from the
 // root.
-std::optional<Route> MatchImplicit(const std::vector<std::string>& segments) {
+std::optional<Route> MatchImplicit(const Segments& segments) {
   if (segments.size() != 6 || segments[1] != "3dtiles") return std::nullopt;
   std::string_view row = segments[5];
   const std::optional<int> subtree_levels = CutSubtreeLevels(row);
@@ -100,28 +132,14 @@ std::optional<Route> MatchImplicit(const std::vector<std::string>& segments) {
   return route;
 }
 
-// The decoded segments of a path; an encoded '/' does not separate.
-std::optional<std::vector<std::string>> Segments(std::string_view path) {
-  std::vector<std::string> segments;
-  for (std::size_t at = 0; at != std::string_view::npos;) {
-    const std::size_t next = path.find('/', at + 1);
-    std::optional<std::string> segment =
-        PercentDecode(path.substr(at + 1, next == std::string_view::npos ? next : next - at - 1));
-    if (!segment) return std::nullopt;
-    segments.push_back(std::move(*segment));
-    at = next;
-  }
-  return segments;
-}
-
-std::optional<Route> MatchFixed(const std::vector<std::string>& segments) {
+std::optional<Route> MatchFixed(const Segments& segments) {
+  if (segments.size() > 1 && segments[0] != "viewer") return std::nullopt;
   Route route;
-  if (segments[0] == "viewer" && segments.size() > 1) {
-    for (std::size_t i = 1; i < segments.size(); ++i) route.file += (i > 1 ? "/" : "") + segments[i];
+  if (segments.size() > 1) {
+    for (std::size_t i = 1; i < segments.size(); ++i) route.file.append(i > 1 ? "/" : "").append(segments[i]);
     if (route.file.empty()) route.file = "index.html";
     return route;
   }
-  if (segments.size() > 1) return std::nullopt;
   if (segments[0].empty()) {
     route.file = "index.html";
     return route;
@@ -176,7 +194,7 @@ Result<Route> Match(std::string_view target) {
     return MakeError(ErrorCode::kInvalidArgument, "malformed request target");
   }
   const std::size_t question = std::min(origin->find('?'), origin->size());
-  const std::optional<std::vector<std::string>> segments = Segments(origin->substr(0, question));
+  const std::optional<Segments> segments = Segments::Of(origin->substr(0, question));
   if (!segments) return MakeError(ErrorCode::kInvalidArgument, "malformed percent-encoding in the path");
 
   std::optional<Route> route = MatchFixed(*segments);

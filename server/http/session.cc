@@ -4,7 +4,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <atomic>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
 #include <boost/asio/dispatch.hpp>
@@ -14,7 +13,6 @@
 #include <boost/system/system_error.hpp>
 #include <exception>
 #include <optional>
-#include <random>
 #include <utility>
 #include <variant>
 
@@ -34,15 +32,6 @@ constexpr std::chrono::milliseconds kLingerTime{500};
 constexpr std::size_t kLingerBytes = std::size_t{64} << 20;
 constexpr int kClientLeft = 499;
 
-std::string NextRequestId() {
-  static const std::uint64_t start = std::uint64_t{std::random_device{}()} << 32;
-  static std::atomic<std::uint64_t> count{0};
-  std::uint64_t number = start + count.fetch_add(1, std::memory_order_relaxed);
-  std::string id(16, '0');
-  for (auto digit = id.rbegin(); digit != id.rend(); ++digit, number >>= 4) *digit = "0123456789abcdef"[number & 15];
-  return id;
-}
-
 Response Overloaded(std::string_view detail, std::string_view request_id) {
   Response response = ProblemResponse(503, detail, request_id);
   response.headers.emplace_back("Retry-After", "1");
@@ -60,6 +49,13 @@ std::optional<Response> WhyNoBody(const Request& request, std::size_t max_body_b
     return response;
   }
   return std::nullopt;
+}
+
+// Off the front.
+void Skip(std::size_t bytes, BufferPair& buffers) {
+  const std::size_t of_head = std::min(bytes, buffers[0].size());
+  buffers[0] += of_head;
+  buffers[1] += bytes - of_head;
 }
 
 class Session : public Connection, public std::enable_shared_from_this<Session> {
@@ -83,11 +79,11 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   void Abort() override { Post(&Session::AbortHere); }
 
  private:
-  // A request on its way through the session, and what is to be told about it.
+  // The request that the session is at, and what is to be told about it.
   struct Exchange {
     Request request;
     Caller caller;
-    Clock::time_point begun = Clock::now();
+    Clock::time_point begun;  // at the end of its head
   };
 
   void Post(void (Session::*step)()) {
@@ -105,23 +101,26 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   }
 
   asio::awaitable<void> ServeAll();
-  asio::awaitable<bool> ServeOne(Request request);
-  asio::awaitable<void> RefuseMessage(BadRequest why, Exchange exchange);
-  asio::awaitable<std::optional<Response>> Refuse(const Request& request, const Result<Route>& route,
-                                                  const Caller& caller);
-  std::optional<Response> AnswerAtOnce(const Route& route, const Request& request);
+  asio::awaitable<bool> ServeOne();
+  asio::awaitable<void> RefuseMessage(BadRequest why);
+  asio::awaitable<bool> ServeLater(Route route);
+  std::optional<Response> Refuse(const Result<Route>& route) const;
+  asio::awaitable<void> HoldBack();
+  std::optional<Response> AnswerAtOnce(const Result<Route>& route) const;
   asio::awaitable<std::optional<Response>> AnswerWhileConnected(Route route, Request request);
   asio::awaitable<Response> Answer(Route route, Request request);
-  asio::awaitable<bool> Reply(const Exchange& exchange, Response response);
-  asio::awaitable<bool> Write(std::string head, Body body);
+  asio::awaitable<bool> Reply(Response& response);
+  asio::awaitable<bool> WriteRest(BufferPair left, std::size_t total);
   asio::awaitable<void> CloseGently();
-  void Report(const Exchange& exchange, const Response& response, std::size_t bytes) const;
+  void Report(const Response& response, std::size_t bytes);
 
   const std::shared_ptr<const SessionContext> context_;
   Stream stream_;
   RequestReader reader_;
   Caller peer_;
   std::string peer_text_ = "-";
+  Exchange exchange_;
+  Clock::time_point replied_;  // when the last reply was told about: the present, once the next request is waited for
   std::uint64_t served_ = 0;
   bool hurried_ = false;  // others wait for this connection's place
 };
@@ -133,16 +132,18 @@ asio::awaitable<void> Session::ServeAll() {
     stream_.Close();
     co_return;
   }
+  replied_ = Clock::now();
   for (bool keep = true; keep;) {
-    RequestReader::Head head = co_await reader_.ReadHead();
+    const RequestReader::Head head = co_await reader_.ReadHead(exchange_.request, replied_);
     if (!head) break;
+    exchange_.begun = Clock::now();
     if (*head) {
-      keep = co_await ServeOne(**std::move(head));
+      keep = co_await ServeOne();
       ++served_;
     } else {
-      Exchange exchange;
-      exchange.caller = peer_;
-      co_await RefuseMessage(head->error(), std::move(exchange));
+      exchange_.request = Request();  // not the last one
+      exchange_.caller = peer_;
+      co_await RefuseMessage(head->error());
       break;
     }
   }
@@ -150,85 +151,95 @@ asio::awaitable<void> Session::ServeAll() {
 }
 
 // What follows cannot be trusted to be a request.
-asio::awaitable<void> Session::RefuseMessage(BadRequest why, Exchange exchange) {
-  if (exchange.request.id.empty()) exchange.request.id = NextRequestId();
-  Response response = ProblemResponse(why.status, why.detail, exchange.request.id);
+asio::awaitable<void> Session::RefuseMessage(BadRequest why) {
+  if (exchange_.request.id.empty()) exchange_.request.id = RequestId::Next();
+  Response response = ProblemResponse(why.status, why.detail, exchange_.request.id);
   response.close = true;
-  co_await Reply(exchange, std::move(response));
+  co_await Reply(response);
 }
 
 // False: the connection is to be closed.
-asio::awaitable<bool> Session::ServeOne(Request request) {
-  Exchange exchange;
-  request.id = NextRequestId();
+asio::awaitable<bool> Session::ServeOne() {
+  Request& request = exchange_.request;
+  request.id = RequestId::Next();
   request.is_https = stream_.is_tls();
-  exchange.caller = context_->gate->Identify(request, peer_);
-  exchange.request = std::move(request);
-  const Result<Route> route = Match(exchange.request.target);
-  std::optional<Response> response = co_await Refuse(exchange.request, route, exchange.caller);
-  if (response) {
-    // A body may follow that nobody will read.
-    response->close = response->close || exchange.request.content_length > 0;
-    co_return co_await Reply(exchange, *std::move(response));
-  }
+  exchange_.caller = context_->gate->Identify(request, peer_);
+  const Result<Route> route = Match(request.target);
+  std::optional<Response> response = AnswerAtOnce(route);
+  if (!response) co_return co_await ServeLater(*route);
+  if (response->status == 429) co_await HoldBack();
+  co_return co_await Reply(*response);
+}
+
+// What has to be waited for: the request's body, and the answer.
+asio::awaitable<bool> Session::ServeLater(Route route) {
+  Request& request = exchange_.request;
   std::optional<TransferBudget::Hold> incoming =
-      context_->transfers->TryHold(exchange.request.content_length, weak_from_this());
+      context_->transfers->TryHold(request.content_length, weak_from_this(), exchange_.begun);
   if (!incoming) {
-    response = Overloaded("too many request bodies are on their way", exchange.request.id);
-    response->close = true;
-    co_return co_await Reply(exchange, *std::move(response));
+    Response response = Overloaded("too many request bodies are on their way", request.id);
+    response.close = true;
+    co_return co_await Reply(response);
   }
-  if (exchange.request.content_length > 0) {
-    const tl::expected<void, BadRequest> read = co_await reader_.ReadBody(exchange.request);
-    if (!read && read.error().status > 0) co_await RefuseMessage(read.error(), std::move(exchange));
+  if (request.content_length > 0) {
+    const tl::expected<void, BadRequest> read = co_await reader_.ReadBody(request);
+    if (!read && read.error().status > 0) co_await RefuseMessage(read.error());
     if (!read) co_return false;
   }
-  response = AnswerAtOnce(*route, exchange.request);
-  if (!response) {
-    stream_.ExpiresNever();  // the handlers have deadlines of their own
-    response = co_await AnswerWhileConnected(*route, exchange.request);
-  }
+  stream_.ExpiresNever();  // the handlers have deadlines of their own
+  std::optional<Response> response = co_await AnswerWhileConnected(route, request);
   if (!response) {
     Response nobody;
     nobody.status = kClientLeft;
-    Report(exchange, nobody, 0);
+    Report(nobody, 0);
     stream_.Close();
     co_return false;
   }
-  context_->gate->Mark(*route, *response);
-  co_return co_await Reply(exchange, *std::move(response));
+  context_->gate->Mark(route, *response);
+  const bool keep = co_await Reply(*response);
+  request.body = std::string();  // nothing of it is held while the connection waits
+  co_return keep;
 }
 
 // What can be said without the request's body. Preflights come first: they carry no token.
-asio::awaitable<std::optional<Response>> Session::Refuse(const Request& request, const Result<Route>& route,
-                                                         const Caller& caller) {
+std::optional<Response> Session::Refuse(const Result<Route>& route) const {
+  const Request& request = exchange_.request;
   const bool takes_post = route && TakesPost(route->kind);
-  if (request.method == Method::kOptions) co_return PreflightResponse(takes_post);
+  if (request.method == Method::kOptions) return PreflightResponse(takes_post);
   if (request.method == Method::kOther || (request.method == Method::kPost && !takes_post)) {
-    co_return NoSuchMethodResponse(takes_post, request.id);
+    return NoSuchMethodResponse(takes_post, request.id);
   }
-  if (!route) co_return ClientErrorResponse(route.error(), request.id);
-  std::optional<Response> refusal = context_->gate->Refuse(request, *route, caller);
-  if (refusal) {
-    refusal->route = ToString(route->kind);
-    if (refusal->status == 429) {
-      stream_.ExpiresNever();
-      asio::steady_timer delay(stream_.socket().get_executor(), context_->options.refusal_delay);
-      co_await delay.async_wait(asio::use_awaitable);
-    }
-    co_return refusal;
-  }
-  co_return WhyNoBody(request, context_->options.max_body_bytes);
+  if (!route) return ClientErrorResponse(route.error(), request.id);
+  std::optional<Response> refusal = context_->gate->Refuse(request, *route, exchange_.caller);
+  if (!refusal) return WhyNoBody(request, context_->options.max_body_bytes);
+  refusal->route = ToString(route->kind);
+  return refusal;
+}
+
+asio::awaitable<void> Session::HoldBack() {
+  stream_.ExpiresNever();
+  asio::steady_timer delay(stream_.socket().get_executor(), context_->options.refusal_delay);
+  co_await delay.async_wait(asio::use_awaitable);
 }
 
 // Nothing: the answer has to be waited for. Most answers need not be, and then neither a timer nor a second coroutine
 // watches the client meanwhile.
-std::optional<Response> Session::AnswerAtOnce(const Route& route, const Request& request) {
-  try {
-    if (context_->quick_handler) return context_->quick_handler(route, request);
-  } catch (const std::exception&) {  // the handler will meet it again, and say so
+std::optional<Response> Session::AnswerAtOnce(const Result<Route>& route) const {
+  const Request& request = exchange_.request;
+  std::optional<Response> response = Refuse(route);
+  if (response) {
+    // A body may follow that nobody will read.
+    response->close = response->close || request.content_length > 0;
+    return response;
   }
-  return std::nullopt;
+  if (request.content_length > 0 || !context_->quick_handler) return response;
+  try {
+    response = context_->quick_handler(*route, request);
+  } catch (const std::exception&) {  // the handler will meet it again, and say so
+    return std::nullopt;
+  }
+  if (response) context_->gate->Mark(*route, *response);
+  return response;
 }
 
 // Nothing: the client is gone.
@@ -242,7 +253,7 @@ asio::awaitable<std::optional<Response>> Session::AnswerWhileConnected(Route rou
 
 // Never throws, so that the race above always has a winner.
 asio::awaitable<Response> Session::Answer(Route route, Request request) {
-  const std::string id = request.id;
+  const RequestId id = request.id;
   Error error;
   try {
     co_return co_await context_->handler(std::move(route), std::move(request));
@@ -256,41 +267,39 @@ asio::awaitable<Response> Session::Answer(Route route, Request request) {
   co_return BackendErrorResponse(error, id);
 }
 
-// False: the connection is to be closed.
-asio::awaitable<bool> Session::Reply(const Exchange& exchange, Response response) {
-  const Request& request = exchange.request;
+// False: the connection is to be closed. `response` has to live as long.
+asio::awaitable<bool> Session::Reply(Response& response) {
+  const Request& request = exchange_.request;
   const bool with_body = request.method != Method::kHead && response.status != 304;
   std::optional<TransferBudget::Hold> room =
-      context_->transfers->TryHold(with_body ? response.body : nullptr, weak_from_this());
+      context_->transfers->TryHold(with_body ? response.body : nullptr, weak_from_this(), Clock::now());
   if (!room) {
     const std::string_view route = response.route;
     response = Overloaded("too many replies are on their way", request.id);
     response.route = route;
     room.emplace();
   }
-  const Body body = with_body ? response.body : nullptr;
-  HeadOptions head;
-  head.version = request.version;
-  head.keep_alive = request.keep_alive && !response.close && !reader_.closing();
-  head.cors = &context_->cors;
-  head.origin = request.fields->origin;
-  const bool written = co_await Write(SerializeHead(response, head), body);
-  Report(exchange, response, body ? body->size() : 0);
-  co_return head.keep_alive&& written;
+  HeadOptions options;
+  options.version = request.version;
+  options.keep_alive = request.keep_alive && !response.close && !reader_.closing();
+  options.cors = &context_->cors;
+  options.origin = request.fields->origin;
+  const std::string head = SerializeHead(response, options);
+  const std::size_t body_bytes = with_body && response.body ? response.body->size() : 0;
+
+  BufferPair left = {asio::buffer(head), body_bytes > 0 ? asio::buffer(*response.body) : asio::const_buffer()};
+  // What the kernel takes at once needs no deadline. An error shows again when the rest is written.
+  const std::size_t taken = stream_.WriteReady(left).value_or(0);
+  Skip(taken, left);
+  const bool written = asio::buffer_size(left) == 0 || co_await WriteRest(left, taken);
+  Report(response, body_bytes);
+  co_return options.keep_alive&& written;
 }
 
-// False: the client is gone, took nothing for too long, or takes too little in the long run.
-asio::awaitable<bool> Session::Write(std::string head, Body body) {
-  BufferPair left = {asio::buffer(head), body ? asio::buffer(*body) : asio::const_buffer()};
+// False: the client is gone, took nothing for too long, or takes too little in the long run. `total`: bytes of the
+// reply that were written before.
+asio::awaitable<bool> Session::WriteRest(BufferPair left, std::size_t total) {
   const SessionOptions& options = context_->options;
-  const auto take = [&left](std::size_t bytes) {
-    const std::size_t of_head = std::min(bytes, left[0].size());
-    left[0] += of_head;
-    left[1] += bytes - of_head;
-  };
-  // What the kernel takes at once needs no deadline. An error shows again when the rest is written.
-  std::size_t total = stream_.WriteReady(left).value_or(0);
-  take(total);
   const auto begun = Clock::now();
   while (asio::buffer_size(left) > 0) {
     auto deadline = Clock::now() + options.write_timeout;
@@ -305,7 +314,7 @@ asio::awaitable<bool> Session::Write(std::string head, Body body) {
       co_return false;
     }
     total += *sent;
-    take(*sent);
+    Skip(*sent, left);
   }
   co_return true;
 }
@@ -319,14 +328,16 @@ asio::awaitable<void> Session::CloseGently() {
   stream_.Close();
 }
 
-void Session::Report(const Exchange& exchange, const Response& response, std::size_t bytes) const {
+void Session::Report(const Response& response, std::size_t bytes) {
+  const Exchange& exchange = exchange_;
   const Request& request = exchange.request;
+  replied_ = Clock::now();
   ReplyRecord record;
   record.method = request.method_name;
   record.target = request.target;
   record.status = response.status;
   record.body_bytes = bytes;
-  record.duration = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - exchange.begun);
+  record.duration = std::chrono::duration_cast<std::chrono::microseconds>(replied_ - exchange.begun);
   record.route = response.route;
   record.dataset = response.dataset;
   record.cache = response.cache;

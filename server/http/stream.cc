@@ -14,7 +14,7 @@ namespace {
 
 using asio::ip::tcp;
 using boost::system::error_code;
-using Clock = std::chrono::steady_clock;
+using Clock = Stream::Clock;
 using NotSentLowWater = asio::detail::socket_option::integer<IPPROTO_TCP, TCP_NOTSENT_LOWAT>;
 
 // Bytes of a reply that the kernel takes before the client does. The kernel's own bound grows to megabytes, for each of

@@ -25,6 +25,8 @@ using BufferPair = std::array<asio::const_buffer, 2>;
 
 class Stream {
  public:
+  using Clock = std::chrono::steady_clock;
+
   // `tls` null: plain.
   Stream(asio::ip::tcp::socket socket, std::shared_ptr<asio::ssl::context> tls);
   ~Stream();
@@ -36,7 +38,7 @@ class Stream {
 
   // The operation under way when `time` has passed, and every one begun later, fails. Until the next call of this.
   void ExpiresAfter(std::chrono::milliseconds time);
-  void ExpiresAt(std::chrono::steady_clock::time_point deadline);
+  void ExpiresAt(Clock::time_point deadline);
   void ExpiresNever();
   bool expired() const;
 

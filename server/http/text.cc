@@ -27,8 +27,8 @@ bool EqualsIgnoringCase(std::string_view a, std::string_view b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](char x, char y) { return LowerOf(x) == LowerOf(y); });
 }
 
-std::string_view NextPiece(std::string_view& rest, std::string_view separators, std::string_view blanks) {
-  const std::size_t end = std::min(rest.find_first_of(separators), rest.size());
+std::string_view NextPiece(std::string_view& rest, char separator, std::string_view blanks) {
+  const std::size_t end = std::min(rest.find(separator), rest.size());
   const std::string_view piece = Trim(rest.substr(0, end), blanks);
   rest.remove_prefix(std::min(end + 1, rest.size()));
   return piece;

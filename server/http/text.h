@@ -14,8 +14,8 @@ std::string_view Trim(std::string_view text, std::string_view blanks = " \t");
 std::string Lower(std::string_view text);
 bool EqualsIgnoringCase(std::string_view a, std::string_view b);
 
-// Cuts the piece before the next of `separators` off `rest`, and that separator; trimmed of `blanks`.
-std::string_view NextPiece(std::string_view& rest, std::string_view separators, std::string_view blanks = " \t");
+// Cuts the piece before the next `separator` off `rest`, and that separator; trimmed of `blanks`.
+std::string_view NextPiece(std::string_view& rest, char separator, std::string_view blanks = " \t");
 
 // 0 to 15, or -1.
 int HexDigit(char c);

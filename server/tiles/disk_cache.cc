@@ -107,18 +107,18 @@ DiskCache::~DiskCache() {
   close(lock_);
 }
 
-TilePtr DiskCache::FindTile(const CacheKey& key) {
-  if (!tiles_) return nullptr;
+std::optional<EncodedTile> DiskCache::FindTile(const CacheKey& key) {
+  if (!tiles_) return std::nullopt;
   const std::string store_key = StoreKey(key);
   const std::optional<std::string> bytes = tiles_->Find(store_key);
-  if (!bytes) return nullptr;
+  if (!bytes) return std::nullopt;
   Result<EncodedTile> tile = ParseTile(*bytes);
   if (!tile) {
     tiles_->Forget(store_key);
-    return nullptr;
+    return std::nullopt;
   }
   tile->from_disk = true;
-  return std::make_shared<const EncodedTile>(*std::move(tile));
+  return *std::move(tile);
 }
 
 RefinedTilePtr DiskCache::FindRefinement(const RefinedTileKey& key) {

@@ -7,6 +7,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 
 #include "engine/core/result.h"
 #include "server/tiles/disk_store.h"
@@ -33,8 +34,8 @@ class DiskCache {
   static Result<std::shared_ptr<DiskCache>> Open(const DiskCacheOptions& options);
   ~DiskCache();
 
-  // Null when it is not there.
-  TilePtr FindTile(const CacheKey& key);
+  // Nothing when it is not there.
+  std::optional<EncodedTile> FindTile(const CacheKey& key);
   RefinedTilePtr FindRefinement(const RefinedTileKey& key);
 
   // Return at once. Later values for a key replace earlier ones.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -18,6 +19,13 @@ struct StageTimes {
 // What a build found of its tile's refinement; kNone where the format has no mesh.
 enum class RefinementUse : std::uint8_t { kMade, kContinued, kReplayed, kNone };
 
+// Lines of a reply's head, each with its CR LF, that depend on the body alone: neither on who asks nor on the
+// configuration.
+struct HeadLines {
+  std::string text;
+  std::size_t of_body = 0;  // so many bytes at its front describe the body: a reply without one leaves them away
+};
+
 struct EncodedTile {
   std::string bytes;       // the body in its content coding
   std::string etag;        // strong, with the quotes
@@ -30,9 +38,10 @@ struct EncodedTile {
   StageTimes times;  // of the build that made it
   RefinementUse refinement = RefinementUse::kMade;
   bool from_disk = false;  // read from the disk tier, not built
+  HeadLines head;          // see MakeTileHead
 };
 
-inline std::size_t BytesOf(const EncodedTile& tile) { return tile.bytes.size(); }
+inline std::size_t BytesOf(const EncodedTile& tile) { return tile.bytes.size() + tile.head.text.size(); }
 
 using TilePtr = std::shared_ptr<const EncodedTile>;
 

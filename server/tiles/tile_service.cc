@@ -7,22 +7,29 @@
 #include <utility>
 #include <vector>
 
+#include "server/tiles/tile_head.h"
+
 namespace terrace::server {
 namespace {
 
 using Clock = TileService::Clock;
 
-Result<TilePtr> RunWork(const SingleFlight::Work& work, const std::string& what, Clock::time_point asked,
-                        std::stop_token stop) {
+Result<EncodedTile> RunWork(const SingleFlight::Work& work, const std::string& what, Clock::time_point asked,
+                            std::stop_token stop) {
   const auto queued = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - asked);
   try {
     Result<EncodedTile> built = work(std::move(stop));
-    if (!built) return tl::unexpected(std::move(built.error()));
-    built->times.queue = queued;
-    return std::make_shared<const EncodedTile>(std::move(*built));
+    if (built) built->times.queue = queued;
+    return built;
   } catch (const std::exception& exception) {  // std::bad_alloc above all
     return MakeError(ErrorCode::kUnavailable, "{}: {}", what, exception.what());
   }
+}
+
+// What is cached and sent.
+TilePtr Finish(const TileRequest& request, EncodedTile tile) {
+  tile.head = MakeTileHead(request, tile);
+  return std::make_shared<const EncodedTile>(std::move(tile));
 }
 
 // The generation stands for the dataset, whose index may be another one in the next catalog.
@@ -69,15 +76,20 @@ Result<TilePtr> TileService::BuildAndKeep(const Catalog& catalog, const TileRequ
                                           Clock::time_point asked, std::stop_token stop) {
   // Between the look into the cache and the start of this flight an earlier flight may have landed.
   if (TilePtr tile = cache_.Find(key)) return tile;
-  if (TilePtr tile = disk_ ? disk_->FindTile(key) : nullptr) {
+  if (std::optional<EncodedTile> kept = disk_ ? disk_->FindTile(key) : std::nullopt) {
+    TilePtr tile = Finish(request, *std::move(kept));
     cache_.Insert(key, tile);
     return tile;
   }
   const SingleFlight::Work work = [&](std::stop_token token) { return catalog.build(request, std::move(token)); };
-  Result<TilePtr> tile = RunWork(work, "tile " + geo::ToString(request.key), asked, std::move(stop));
-  if (tile) {
+  Result<EncodedTile> built = RunWork(work, "tile " + geo::ToString(request.key), asked, std::move(stop));
+  Result<TilePtr> tile;
+  if (built) {
+    tile = Finish(request, *std::move(built));
     cache_.Insert(key, *tile);
     if (disk_) disk_->KeepTile(key, *tile);
+  } else {
+    tile = tl::unexpected(std::move(built.error()));
   }
   if (observer_) observer_(catalog.datasets[request.dataset], tile);
   return tile;
@@ -102,8 +114,10 @@ asio::awaitable<Result<TilePtr>> TileService::Run(SingleFlight::Work work, Lengt
   CacheKey key;
   key.solo = 1 + solos_.fetch_add(1, std::memory_order_relaxed);
   SingleFlight::Build build = [work = std::move(work), turn = std::move(turn),
-                               asked = Clock::now()](std::stop_token stop) {
-    return RunWork(work, "work for one request", asked, std::move(stop));
+                               asked = Clock::now()](std::stop_token stop) -> Result<TilePtr> {
+    Result<EncodedTile> made = RunWork(work, "work for one request", asked, std::move(stop));
+    if (!made) return tl::unexpected(std::move(made.error()));
+    return std::make_shared<const EncodedTile>(*std::move(made));
   };
   SingleFlight::Landing landing = co_await flights_.Join(key, std::move(build), deadline);
   co_return std::move(landing.tile);

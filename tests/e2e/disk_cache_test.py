@@ -1,7 +1,7 @@
 """The disk cache under the built binary: disk_cache_test.py BINARY SOURCE_DIR.
 
-Warm restarts, kill -9 under load, a full disk, another program, another server. Every body is compared with one that a server
-without a disk cache made. With TERRACE_LONG_TESTS=1 there are a hundred kills, and the disk is full for a minute.
+Warm restarts, kill -9 under load, power cuts, a full disk, another program, another server. Every body is compared with one that a server
+without a disk cache made. With TERRACE_LONG_TESTS=1 there are a hundred kills and power cuts, and the disk is full for a minute.
 """
 import collections
 import hashlib
@@ -12,6 +12,7 @@ import pathlib
 import random
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -138,6 +139,7 @@ class DiskCache(unittest.TestCase):
         with Server(*self.flags()) as server:
             digests, tiers, _ = crawl(server.port, self.paths)
             self.assertEqual(digests, self.oracle)
+            print(f"after a restart: {len(digests)} tiles, {dict(tiers)}", file=sys.stderr)
             self.assertGreaterEqual(tiers["disk"], 0.95 * len(self.paths), tiers)
             self.assertEqual(server.metric("terrace_cache_hits_total", "disk", "tiles"), tiers["disk"])
             self.assertEqual(server.metric("terrace_cache_damaged_total", "disk", "tiles"), 0)
@@ -196,6 +198,49 @@ class DiskCache(unittest.TestCase):
         self.assertEqual(wrong, [])
         self.assertGreater(tiers["cache;desc=disk"], 0, tiers)
         self.assertGreater(tiers["cache;desc=miss"], 0, tiers)
+
+    def test_a_power_cut_leaves_nothing_wrong(self):
+        """What the file system has written of its own accord is all that is left: the image below it, copied at a moment."""
+        folder = pathlib.Path(self.scratch.name)
+        image, cut, disk, after = folder / "image", folder / "cut", folder / "disk", folder / "after"
+        with open(image, "wb") as file:
+            file.truncate(192 << 20)
+        subprocess.run(["mkfs.ext4", "-q", image], check=True)
+        self.mount(image, disk)
+        wrong, tiers, recovered = [], collections.Counter(), collections.Counter()
+        cuts = 100 if LONG else 4
+        for number in range(cuts):
+            with Server("--disk-cache", disk / "cache", "--cache-bytes", 0, "--refinement-cache-bytes", 0) as server:
+                stop = threading.Event()
+                threads = [threading.Thread(target=self.load, args=(server.port, stop, wrong, tiers)) for _ in range(3)]
+                for thread in threads:
+                    thread.start()
+                time.sleep(random.Random(number).uniform(0.3, 2.5))
+                server.process.send_signal(signal.SIGSTOP)
+                shutil.copyfile(image, cut)
+                server.kill()
+                stop.set()
+                for thread in threads:
+                    thread.join()
+            self.mount(cut, after)
+            some = random.Random(number).sample(self.paths, 150)
+            with Server("--disk-cache", after / "cache") as server:
+                digests, found, failed = crawl(server.port, some)
+                recovered += found
+                wrong += failed + [path for path in some if digests[path] != self.oracle[path]]
+            subprocess.run(["umount", after], check=True)
+        print(f"{cuts} power cuts: {sum(tiers.values())} answers before and {sum(recovered.values())} after {dict(recovered)}, {len(wrong)} wrong",
+              file=sys.stderr)
+        self.assertEqual(wrong, [])
+        self.assertGreater(recovered["disk"], 0, recovered)
+
+    def mount(self, image, folder):
+        folder.mkdir(exist_ok=True)
+        # ext4 writes what is old every second, so that cuts meet states in between.
+        mounted = subprocess.run(["mount", "-o", "loop,commit=1", image, folder], capture_output=True, text=True)
+        if mounted.returncode != 0:
+            self.skipTest(f"no image can be mounted: {mounted.stderr.strip()}")
+        self.addCleanup(subprocess.run, ["umount", "-l", folder], capture_output=True)
 
     def test_a_killed_server_has_lost_nothing_that_was_written(self):
         some = self.paths[:200]

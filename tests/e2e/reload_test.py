@@ -250,6 +250,30 @@ class Source(ReloadTest):
         self.assertGreater(load.replies, 10 * SWAPS)
         self.assertLess(load.refused_for, 20)
 
+    def test_no_answer_is_wrong_while_files_are_overwritten_and_deleted(self):
+        """As no operator should: the bytes of a file that is served change under the server."""
+        server = self.serve(self.path, "--name", "hills", "--log-level", "warn")
+        load = Load(server, self.targets, self.judge)
+        chance, rounds = random.Random(2), 60 if SWAPS > 100 else 8
+        contents = [model.read_bytes() for model in self.here]
+        for turn in range(1, rounds + 1):
+            if turn % 4 == 0:
+                self.path.unlink()
+                time.sleep(chance.choice((0.1, 0.6)))
+                replace(self.path, self.here[turn % 2])
+            elif turn % 4 == 1:  # another file takes the place of the link before its bytes change
+                shutil.copyfile(self.here[turn % 2], self.path.with_suffix(".new"))
+                os.rename(self.path.with_suffix(".new"), self.path)
+            else:
+                with open(self.path, "r+b") as file:
+                    file.write(contents[turn % 2])
+            time.sleep(chance.choice((0.1, 0.5, 1.0)))
+        self.assertTrue(eventually(lambda: self.is_all_of(server, rounds % 2), 20), server.log()[-2000:])
+        load.stop()
+        print(f"{rounds} times overwritten or deleted: {load.replies} replies, {load.refused} of them 503, at most {load.refused_for:.2f} s long; "
+              f"{len(load.faults)} faults {load.faults[:3]}", file=sys.stderr)
+        self.assertEqual(load.faults, [])
+
     def test_a_new_file_is_seen_soon(self):
         server = self.serve(self.path, "--name", "hills")
         slowest = 0

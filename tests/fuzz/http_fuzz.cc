@@ -40,13 +40,13 @@ struct Seen {
 // As a session reads, without replies.
 asio::awaitable<void> ReadAll(RequestReader& reader, Seen& seen) {
   for (bool more = true; more;) {
-    RequestReader::Head head = co_await reader.ReadHead();
+    Request request;
+    const RequestReader::Head head = co_await reader.ReadHead(request, Stream::Clock::now());
     if (!head) break;
     if (!*head) {
       seen.refused = head->error().status;
       break;
     }
-    Request& request = head->value();
     if (request.content_length > kMostBody) {
       seen.refused = 413;
       break;

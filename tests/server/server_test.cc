@@ -250,6 +250,34 @@ TEST_F(ServerTest, SurvivesABuilderThatThrows) {
   EXPECT_EQ(Fetch(port(), "/livez").status, 200);
 }
 
+TEST_F(ServerTest, TellsEveryWaiterThatTheBuildFailed) {
+  std::latch all_wait(1);
+  builder_ = [&](const TileRequest&, std::stop_token) -> Result<EncodedTile> {
+    ++builds_;
+    all_wait.wait();
+    return MakeError(ErrorCode::kUnavailable, "I/O error");
+  };
+  Start();
+  std::vector<std::unique_ptr<RawClient>> clients;
+  for (int i = 0; i < 100; ++i) {
+    clients.push_back(std::make_unique<RawClient>(port()));
+    clients.back()->Send(Get("/maui/0/0/0.terrain"));
+  }
+  const auto joined = [&] { return Fetch(port(), "/metrics").body.find("terrace_flights_joined_total 99\n"); };
+  EXPECT_TRUE(Eventually([&] { return joined() != std::string::npos; }));
+  const auto failed = std::chrono::steady_clock::now();
+  all_wait.count_down();
+  for (auto& client : clients) {
+    const auto reply = client->Read();
+    ASSERT_TRUE(reply);
+    EXPECT_EQ(reply->status, 503);
+  }
+  EXPECT_EQ(builds_, 1);
+  const auto slowest = std::chrono::steady_clock::now() - failed;
+  RecordProperty("slowest_ms",
+                 static_cast<int>(std::chrono::duration_cast<std::chrono::milliseconds>(slowest).count()));
+}
+
 TEST_F(ServerTest, RefusesWhatItsQueueCannotHold) {
   build_ms_ = 500;
   ServerOptions options;

@@ -40,6 +40,16 @@ TEST(Response, HasNoBodyHeadersWithoutABody) {
   EXPECT_EQ(head.find("\r\nContent-"), std::string::npos) << head;
 }
 
+TEST(Response, SendsLinesThatWereMadeBeforehand) {
+  Response response;
+  response.lines = std::make_shared<const HeadLines>(HeadLines{"Content-Length: 5\r\nETag: \"e\"\r\n", 19});
+  EXPECT_NE(SerializeHead(response, {}).find("\r\nContent-Length: 5\r\nETag: \"e\"\r\n"), std::string::npos);
+  response.status = 304;
+  const std::string head = SerializeHead(response, {});
+  EXPECT_EQ(head.find("Content-Length"), std::string::npos) << head;
+  EXPECT_NE(head.find("\r\nETag: \"e\"\r\n"), std::string::npos) << head;
+}
+
 TEST(Response, MatchesEtagsAsListsWeakAndStar) {
   const struct {
     const char* if_none_match;

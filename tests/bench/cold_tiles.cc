@@ -1,0 +1,107 @@
+// terrace_cold_tiles: how many tiles a second the pipeline makes on so many threads, without HTTP, caches or queues.
+// tests/load/cold_storm.py holds a server's figure against it.
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cstdio>
+#include <fstream>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "config/parse.h"
+#include "server/cli/open_source.h"
+#include "server/tiles/tile_pipeline.h"
+
+namespace terrace::bench {
+namespace {
+
+struct Arguments {
+  std::string config, dataset, tiles;
+  unsigned threads = std::max(std::thread::hardware_concurrency(), 1u);
+};
+
+// One a line: "/maui/12/252/2520.terrain".
+Result<std::vector<geo::TileKey>> ReadKeys(const std::string& file) {
+  std::ifstream lines(file);
+  std::vector<geo::TileKey> keys;
+  for (std::string line; std::getline(lines, line);) {
+    geo::TileKey key;
+    long long x = 0, y = 0;
+    if (std::sscanf(line.c_str(), "/%*[^/]/%d/%lld/%lld.terrain", &key.level, &x, &y) != 3) {
+      return MakeError(ErrorCode::kInvalidArgument, "{}: \"{}\" is no tile such as /maui/12/252/2520.terrain", file,
+                       line);
+    }
+    key.x = x;
+    key.y = y;
+    keys.push_back(key);
+  }
+  return keys;
+}
+
+Result<std::vector<server::Dataset>> Open(const Arguments& arguments) {
+  const config::ConfigResult config = config::LoadConfig(arguments.config);
+  if (!config) return MakeError(ErrorCode::kInvalidArgument, "{}: {}", arguments.config, config.error()[0].message);
+  for (const config::DatasetConfig& wanted : config->datasets) {
+    if (wanted.name != arguments.dataset) continue;
+    auto source = cli::OpenSource(wanted, config->cache_dir, {});
+    if (!source) return tl::unexpected(source.error());
+    std::vector<server::Dataset> datasets(1);
+    datasets[0].name = wanted.name;
+    datasets[0].error_fraction = wanted.error_fraction;
+    datasets[0].source = *std::move(source);
+    return datasets;
+  }
+  return MakeError(ErrorCode::kInvalidArgument, "{} has no dataset {}", arguments.config, arguments.dataset);
+}
+
+Result<void> Run(const Arguments& arguments) {
+  const Result<std::vector<geo::TileKey>> keys = ReadKeys(arguments.tiles);
+  if (!keys) return tl::unexpected(keys.error());
+  Result<std::vector<server::Dataset>> datasets = Open(arguments);
+  if (!datasets) return tl::unexpected(datasets.error());
+  const server::TilePipeline pipeline(*std::move(datasets));
+
+  std::atomic<std::size_t> next{0}, bytes{0}, failed{0};
+  const auto work = [&] {
+    for (std::size_t i = next++; i < keys->size(); i = next++) {
+      server::TileRequest request;
+      request.key = (*keys)[i];
+      request.coding = server::Coding::kGzip;
+      const Result<server::EncodedTile> tile = pipeline.Build(request, {});
+      if (!tile) ++failed;
+      if (tile) bytes += tile->bytes.size();
+    }
+  };
+  const auto begun = std::chrono::steady_clock::now();
+  std::vector<std::jthread> threads;
+  for (unsigned i = 0; i < arguments.threads; ++i) threads.emplace_back(work);
+  threads.clear();  // joins
+  const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begun;
+  fmt::print("{{\"tiles\": {}, \"bytes\": {}, \"errors\": {}, \"seconds\": {:.3f}}}\n", keys->size(), bytes.load(),
+             failed.load(), seconds.count());
+  return {};
+}
+
+}  // namespace
+}  // namespace terrace::bench
+
+int main(int argc, char** argv) {
+  terrace::bench::Arguments arguments;
+  CLI::App app("Builds tiles of a dataset as its server would, each once, and prints one line of JSON");
+  app.add_option("config", arguments.config, "A server's configuration")->required()->check(CLI::ExistingFile);
+  app.add_option("dataset", arguments.dataset, "The name of one of its datasets")->required();
+  app.add_option("tiles", arguments.tiles, "A file of paths, one a line")->required()->check(CLI::ExistingFile);
+  app.add_option("--threads", arguments.threads, "As many builds at a time")->check(CLI::PositiveNumber);
+  CLI11_PARSE(app, argc, argv);
+  spdlog::set_level(spdlog::level::err);
+  const terrace::Result<void> done = terrace::bench::Run(arguments);
+  if (done) return 0;
+  std::fprintf(stderr, "terrace_cold_tiles: %s\n", done.error().message.c_str());
+  return 1;
+}

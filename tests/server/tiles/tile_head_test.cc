@@ -1,0 +1,82 @@
+#include "server/tiles/tile_head.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+#include <random>
+
+namespace terrace::server {
+namespace {
+
+EncodedTile Tile() {
+  EncodedTile tile;
+  tile.bytes = "12345";
+  tile.etag = "\"e\"";
+  tile.max_error_m = 3.87;
+  return tile;
+}
+
+TEST(TileHead, SaysWhatTheTileIs) {
+  TileRequest request;
+  request.format = TileFormat::kGlb;
+  request.coding = Coding::kGzip;
+  EncodedTile tile = Tile();
+  tile.certified_error_m = 9.5;
+  EXPECT_EQ(MakeTileHead(request, tile).text,
+            "Content-Type: model/gltf-binary\r\nContent-Encoding: gzip\r\nContent-Length: 5\r\n"
+            "ETag: \"e\"\r\nTerrain-Max-Error: 3.87\r\nTerrain-Certified-Error: 9.5\r\n");
+}
+
+TEST(TileHead, NamesTheFormatWithItsExtensions) {
+  TileRequest request;
+  request.normals = true;
+  EXPECT_TRUE(MakeTileHead(request, Tile())
+                  .text.starts_with("Content-Type: application/vnd.quantized-mesh;extensions=octvertexnormals\r\n"))
+      << MakeTileHead(request, Tile()).text;
+  request.format = TileFormat::kHeightPng;
+  EXPECT_TRUE(MakeTileHead(request, Tile()).text.starts_with("Content-Type: image/png\r\nContent-Length: 5\r\n"));
+}
+
+TEST(TileHead, PutsWhatDescribesTheBodyFirst) {
+  const HeadLines head = MakeTileHead({}, Tile());
+  EXPECT_EQ(head.text.substr(head.of_body), "ETag: \"e\"\r\nTerrain-Max-Error: 3.87\r\n");
+}
+
+// A tile has such an error where a source's own is not known.
+TEST(TileHead, LeavesAnErrorWithoutBoundUnsaid) {
+  EncodedTile tile = Tile();
+  tile.certified_error_m = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(MakeTileHead({}, tile).text.find("Certified"), std::string::npos);
+}
+
+TEST(TileHead, CountsAmongATilesBytes) {
+  EncodedTile tile = Tile();
+  EXPECT_EQ(BytesOf(tile), 5u);
+  tile.head = MakeTileHead({}, tile);
+  EXPECT_EQ(BytesOf(tile), 5u + tile.head.text.size());
+}
+
+TEST(TileHead, PrintsErrorsRoundedUp) {
+  EXPECT_EQ(FormatErrorUp(0), "0");
+  EXPECT_EQ(FormatErrorUp(3.87), "3.87");
+  EXPECT_EQ(FormatErrorUp(3.871234), "3.87124");
+  EXPECT_EQ(FormatErrorUp(3.8712399), "3.87124");
+  EXPECT_EQ(FormatErrorUp(999999.4), "1e+06");
+  EXPECT_EQ(FormatErrorUp(38533.671), "38533.7");
+}
+
+TEST(TileHead, NeverPrintsLessThanTheError) {
+  std::mt19937_64 random(1);
+  std::uniform_real_distribution<double> exponent(-12, 12);
+  for (int i = 0; i < 20'000; ++i) {
+    const double error_m = std::pow(10, exponent(random));
+    const double printed = std::strtod(FormatErrorUp(error_m).c_str(), nullptr);
+    EXPECT_GE(printed, error_m);
+    EXPECT_LE(printed, error_m * (1 + 1.001e-5));
+  }
+}
+
+}  // namespace
+}  // namespace terrace::server
