@@ -91,6 +91,17 @@ void Triangulation::PrefetchAround(TriangleId t) const {
   }
 }
 
+void Triangulation::PrefetchBeyond(TriangleId t) const {
+  for (HalfEdgeId edge = 4 * t; edge < 4 * t + 3; ++edge) {
+    const HalfEdgeId back = twin(edge);
+    if (back == kNone) continue;
+    __builtin_prefetch(&vertices_[corner(Previous(back))]);
+    const HalfEdgeId a = twin(Next(back)), b = twin(Previous(back));
+    if (a != kNone) Prefetch(a / 4);
+    if (b != kNone) Prefetch(b / 4);
+  }
+}
+
 // Lets the ring begin after the edge that holds the centre.
 void Triangulation::OpenRing(std::size_t edges, std::size_t gap) {
   const auto first = static_cast<std::ptrdiff_t>(gap + 1), count = static_cast<std::ptrdiff_t>(edges);

@@ -65,11 +65,13 @@ class Triangulation {
 
   bool IsCorner(SamplePosition point, TriangleId triangle) const;
 
-  // Bring a triangle that will be inserted into closer to the processor, and what an insertion into it reads first.
+  // Bring closer to the processor: a triangle that will be inserted into, what an insertion into it reads first, and
+  // what it reads next. Each reads what the one before it has brought.
   void Prefetch(TriangleId t) const {
     __builtin_prefetch(is_wide_ ? static_cast<const void*>(&wide_.slots[t]) : &narrow_.slots[t]);
   }
   void PrefetchAround(TriangleId t) const;
+  void PrefetchBeyond(TriangleId t) const;
 
   TinMesh Mesh() const;
 
