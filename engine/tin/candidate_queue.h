@@ -33,12 +33,9 @@ class CandidateQueue {
     Reserve(slot + std::size_t{1});
     if (Put(slot, candidate)) Insert(slot);
   }
-  // The same for many slots, each of them once: Set(slots[i], candidate(i)).
+  // The same for many slots, each of them once: Set(slots[i], candidate(i)). Precondition: there is room for them all.
   template <typename CandidateOf>
   void SetAll(const std::uint32_t* slots, std::size_t count, CandidateOf&& candidate) {
-    std::uint32_t most = 0;
-    for (std::size_t i = 0; i < count; ++i) most = std::max(most, slots[i]);
-    Reserve(most + std::size_t{1});
     // Which of them belong into the run is collected without a branch, for it cannot be foretold.
     std::array<std::uint32_t, 64> foremost;
     for (std::size_t first = 0; first < count; first += foremost.size()) {
@@ -52,6 +49,7 @@ class CandidateQueue {
       }
     }
   }
+  // Room for slots below this one.
   void Reserve(std::size_t slots) {
     if (slots > errors_.size()) Grow(slots);
   }

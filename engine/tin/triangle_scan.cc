@@ -390,8 +390,9 @@ HWY_INLINE ScannedTriangle TriangleOf(const Star& star, std::size_t i) {
   t.d = t.ux * t.vy - t.uy * t.vx;
   t.a = t.vy * uz - t.uy * vz;
   t.b = t.ux * vz - t.vx * uz;
-  t.west = std::min({ux, vx, 0}), t.east = std::max({ux, vx, 0});
-  t.south = std::min({uy, vy, 0}), t.north = std::max({uy, vy, 0});
+  // Two by two: of a list they are found with branches.
+  t.west = std::min(std::min(ux, vx), 0), t.east = std::max(std::max(ux, vx), 0);
+  t.south = std::min(std::min(uy, vy), 0), t.north = std::max(std::max(uy, vy), 0);
   return t;
 }
 
