@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "engine/tin/candidate.h"
+#include "engine/tin/spare_blocks.h"
 
 namespace terrace::tin {
 
@@ -93,11 +94,11 @@ class CandidateQueue {
     return std::uint64_t{std::bit_cast<std::uint32_t>(errors_[slot])} << 32 | ~samples_[slot];
   }
 
-  std::vector<float> errors_;           // by slot; 0: no candidate
-  std::vector<std::uint32_t> samples_;  // by slot
-  float threshold_;                     // every current candidate at or above it is in the run
-  double step_ = 0.9;                   // the next threshold as a fraction of the largest error
-  std::vector<Entry> run_;              // foremost first, from run_begin_ on
+  LargeArray<float> errors_;           // by slot; 0: no candidate
+  LargeArray<std::uint32_t> samples_;  // by slot
+  float threshold_;                    // every current candidate at or above it is in the run
+  double step_ = 0.9;                  // the next threshold as a fraction of the largest error
+  std::vector<Entry> run_;             // foremost first, from run_begin_ on
   std::size_t run_begin_ = 0;
   std::size_t wanted_ = kLeastWanted;  // entries between two sweeps
   std::size_t entered_ = 0;            // since the last one

@@ -22,8 +22,9 @@ Triangulation::Triangulation(const HeightField& field)
     : Triangulation({VertexAt(field, 0, 0), VertexAt(field, field.width() - 1, 0),
                      VertexAt(field, field.width() - 1, field.height() - 1), VertexAt(field, 0, field.height() - 1)}) {}
 
-Triangulation::Triangulation(std::vector<Vertex> vertices, const std::vector<std::array<std::uint32_t, 3>>& triangles)
-    : vertices_(std::move(vertices)), is_wide_(vertices_.size() > NarrowTriangles::kMostVertices) {
+Triangulation::Triangulation(const std::vector<Vertex>& vertices,
+                             const std::vector<std::array<std::uint32_t, 3>>& triangles)
+    : vertices_(vertices.begin(), vertices.end()), is_wide_(vertices_.size() > NarrowTriangles::kMostVertices) {
   is_wide_ ? Join(wide_, triangles) : Join(narrow_, triangles);
   Grow();
 }

@@ -47,7 +47,7 @@ class Triangulation {
   explicit Triangulation(const HeightField& field);
 
   // Triangles in the order given. Precondition: they cover a rectangle once, counter-clockwise.
-  Triangulation(std::vector<Vertex> vertices, const std::vector<std::array<std::uint32_t, 3>>& triangles);
+  Triangulation(const std::vector<Vertex>& vertices, const std::vector<std::array<std::uint32_t, 3>>& triangles);
 
   // Inserts a vertex into `triangle`, which must contain the point inside or on an edge; it must not be a vertex yet.
   // `absorbs(u, v, w, back)` says whether the triangle (v, u, w) is removed as well: it lies beyond the outline's edge
@@ -122,8 +122,8 @@ class Triangulation {
   void Widen();
   void Grow();
 
-  std::vector<Vertex> vertices_;  // by id
-  NarrowTriangles narrow_;        // by slot, until there are too many vertices
+  LargeArray<Vertex> vertices_;  // by id
+  NarrowTriangles narrow_;       // by slot, until there are too many vertices
   WideTriangles wide_;
   bool is_wide_ = false;
 
