@@ -19,6 +19,8 @@ namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
+constexpr std::size_t kMostLanes = 16;
+
 }  // namespace
 
 // `count` is a multiple of kBlock: the arrays are padded with zeros.
@@ -33,19 +35,21 @@ float Largest(const float* errors, std::size_t count) {
   return hn::GetLane(hn::MaxOfLanes(floats, hn::Max(most, also)));
 }
 
-// Writes the indices of errors at or above the threshold, ascending, and one value beyond; returns how many.
+// Writes the indices of errors at or above the threshold, ascending, and up to a vector beyond; returns how many.
+// Without a branch: a few of a hundred errors are, anywhere.
 std::size_t Sweep(const float* errors, std::size_t count, float threshold, std::uint32_t* found) {
-  const hn::ScalableTag<float> floats;
+  const hn::CappedTag<float, kMostLanes> floats;
+  const hn::RebindToUnsigned<decltype(floats)> slots;
   const std::size_t lanes = hn::Lanes(floats);
   const auto least = hn::Set(floats, threshold);
+  const auto next = hn::Set(slots, static_cast<std::uint32_t>(lanes));
+  auto slot = hn::Iota(slots, 0);
   std::size_t n = 0;
-  for (std::size_t i = 0; i < count; i += 2 * lanes) {
-    const auto low = hn::LoadU(floats, errors + i), high = hn::LoadU(floats, errors + i + lanes);
-    if (hn::AllFalse(floats, hn::Ge(hn::Max(low, high), least))) continue;
-    for (std::size_t k = i; k < i + 2 * lanes; ++k) {
-      found[n] = static_cast<std::uint32_t>(k);
-      n += errors[k] >= threshold ? 1 : 0;
-    }
+  for (std::size_t i = 0; i < count; i += lanes) {
+    const auto is_foremost = hn::RebindMask(slots, hn::Ge(hn::LoadU(floats, errors + i), least));
+    hn::StoreU(hn::Compress(slot, is_foremost), slots, found + n);
+    n += hn::CountTrue(slots, is_foremost);
+    slot = hn::Add(slot, next);
   }
   return n;
 }
@@ -63,6 +67,7 @@ HWY_EXPORT(Sweep);
 
 constexpr std::size_t kBlock = 64;    // slots: two vectors of the widest there are
 constexpr std::size_t kSwept = 4096;  // slots swept in one go
+constexpr std::size_t kBeyond = 16;   // what a sweep writes beyond what it found
 constexpr std::size_t kAhead = 8;     // entries: their slots are fetched so early
 
 }  // namespace
@@ -105,7 +110,7 @@ bool CandidateQueue::SweepFrom(float most) {
   if (!(most > 0) || std::isinf(most)) return false;
   threshold_ = std::max(static_cast<float>(most * step_), std::numeric_limits<float>::denorm_min());
   std::vector<hwy::uint128_t> foremost;
-  std::array<std::uint32_t, kSwept + 1> found;
+  std::array<std::uint32_t, kSwept + kBeyond> found;
   for (std::size_t first = 0; first < errors_.size(); first += kSwept) {
     const std::size_t slots = std::min(kSwept, errors_.size() - first);
     const std::size_t count = HWY_DYNAMIC_DISPATCH(Sweep)(errors_.data() + first, slots, threshold_, found.data());

@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "engine/tin/candidate.h"
+#include "engine/tin/spare_blocks.h"
 
 namespace terrace::tin {
 
@@ -33,12 +34,9 @@ class CandidateQueue {
     Reserve(slot + std::size_t{1});
     if (Put(slot, candidate)) Insert(slot);
   }
-  // The same for many slots, each of them once: Set(slots[i], candidate(i)).
+  // The same for many slots, each of them once: Set(slots[i], candidate(i)). Precondition: there is room for them all.
   template <typename CandidateOf>
   void SetAll(const std::uint32_t* slots, std::size_t count, CandidateOf&& candidate) {
-    std::uint32_t most = 0;
-    for (std::size_t i = 0; i < count; ++i) most = std::max(most, slots[i]);
-    Reserve(most + std::size_t{1});
     // Which of them belong into the run is collected without a branch, for it cannot be foretold.
     std::array<std::uint32_t, 64> foremost;
     for (std::size_t first = 0; first < count; first += foremost.size()) {
@@ -52,6 +50,7 @@ class CandidateQueue {
       }
     }
   }
+  // Room for slots below this one.
   void Reserve(std::size_t slots) {
     if (slots > errors_.size()) Grow(slots);
   }
@@ -95,11 +94,11 @@ class CandidateQueue {
     return std::uint64_t{std::bit_cast<std::uint32_t>(errors_[slot])} << 32 | ~samples_[slot];
   }
 
-  std::vector<float> errors_;           // by slot; 0: no candidate
-  std::vector<std::uint32_t> samples_;  // by slot
-  float threshold_;                     // every current candidate at or above it is in the run
-  double step_ = 0.9;                   // the next threshold as a fraction of the largest error
-  std::vector<Entry> run_;              // foremost first, from run_begin_ on
+  LargeArray<float> errors_;           // by slot; 0: no candidate
+  LargeArray<std::uint32_t> samples_;  // by slot
+  float threshold_;                    // every current candidate at or above it is in the run
+  double step_ = 0.9;                  // the next threshold as a fraction of the largest error
+  std::vector<Entry> run_;             // foremost first, from run_begin_ on
   std::size_t run_begin_ = 0;
   std::size_t wanted_ = kLeastWanted;  // entries between two sweeps
   std::size_t entered_ = 0;            // since the last one

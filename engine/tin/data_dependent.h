@@ -27,6 +27,7 @@
 #include "engine/tin/open_samples.h"
 #include "engine/tin/quadrilateral.h"
 #include "engine/tin/sagitta.h"
+#include "engine/tin/spare_blocks.h"
 #include "engine/tin/star.h"
 #include "engine/tin/triangle_scan.h"
 #include "engine/tin/triangulation.h"
@@ -90,7 +91,7 @@ class DataDependentCriterion {
   DataDependentOptions options_;
   StarScan scan_star_ = BestStarScan();
 
-  std::vector<KnownFit> known_;  // by slot
+  LargeArray<KnownFit> known_;  // by slot
 
   // Of the insertion at work.
   Triangulation::Vertex vertex_;

@@ -63,6 +63,7 @@ class GreedyTriangulation::Impl {
   };
   std::optional<Insertion> NextInsertion(const GreedyGoal& goal);
   std::optional<Insertion> NextSeed(const GreedyGoal& goal);
+  void PrefetchUpcoming() const;
   bool IsMet(const GreedyGoal& goal);
   void Insert(const Insertion& insertion);
   const Star& Insert(const Triangulation::Vertex& vertex, TriangleId triangle);
@@ -164,12 +165,23 @@ std::optional<GreedyTriangulation::Impl::Insertion> GreedyTriangulation::Impl::N
   ScanAwaiting();
   const TriangleId worst = candidates_.Winner();
   if (worst == CandidateQueue::kNoSlot) return std::nullopt;
-  // What is inserted next lies anywhere: fetched while this one is at work.
-  if (const TriangleId t = candidates_.Upcoming(3); t != CandidateQueue::kNoSlot) triangulation_.Prefetch(t);
-  if (const TriangleId t = candidates_.Upcoming(1); t != CandidateQueue::kNoSlot) triangulation_.PrefetchAround(t);
+  PrefetchUpcoming();
   const float error = candidates_.error(worst);
   if (static_cast<double>(error) <= goal.max_error) return std::nullopt;
   return Insertion{PositionOf(candidates_.sample(worst), field_->width()), worst, error, false};
+}
+
+// What is inserted next lies anywhere: fetched while this one is at work. In three steps, each of which reads what the
+// one before it has fetched; in two as long as most of the triangles are in the second cache anyhow.
+void GreedyTriangulation::Impl::PrefetchUpcoming() const {
+  constexpr std::size_t kFewTriangles = std::size_t{1} << 14;
+  const auto upcoming = [this](std::size_t ahead, auto&& prefetch) {
+    if (const TriangleId t = candidates_.Upcoming(ahead); t != CandidateQueue::kNoSlot) prefetch(t);
+  };
+  const std::size_t late = triangulation_.triangle_count() > kFewTriangles ? 2 : 0;
+  upcoming(3 + late, [this](TriangleId t) { triangulation_.Prefetch(t); });
+  upcoming(1 + late, [this](TriangleId t) { triangulation_.PrefetchAround(t); });
+  if (late > 0) upcoming(1, [this](TriangleId t) { triangulation_.PrefetchBeyond(t); });
 }
 
 std::optional<GreedyTriangulation::Impl::Insertion> GreedyTriangulation::Impl::NextSeed(const GreedyGoal& goal) {
@@ -237,6 +249,7 @@ Triangulation::Vertex GreedyTriangulation::Impl::VertexOf(SamplePosition sample)
 void GreedyTriangulation::Impl::ScanStarOf(const Star& star) {
   if (misfits_.size() < star.count) misfits_.resize(star.ring.capacity());
   data_dependent_ ? data_dependent_->Scan(star, misfits_.data()) : scan_star_(open_, star, misfits_.data());
+  candidates_.Reserve(triangulation_.triangle_count());
   const bool is_plain = sagitta_.is_flat() && !star.has_border;
   const std::uint32_t* const slots = star.triangles.data();
   if (is_plain) {

@@ -3,9 +3,9 @@
 
 #include <cstddef>
 #include <limits>
-#include <vector>
 
 #include "engine/tin/height_field.h"
+#include "engine/tin/spare_blocks.h"
 #include "engine/tin/tin_mesh.h"
 
 namespace terrace::tin {
@@ -36,7 +36,7 @@ class OpenSamples {
  private:
   int width_;
   std::size_t stride_;
-  std::vector<float> heights_;
+  LargeArray<float> heights_;
   float quantum_;
 };
 

@@ -16,7 +16,6 @@ struct RingVertex {
   VertexId id = 0;
   std::int32_t dx = 0, dy = 0;  // vertex minus centre
   float height = 0;             // metres
-  std::int64_t squared = 0;     // dx^2 + dy^2
 };
 
 // A ring of vertices in parallel arrays, for vectors to load: each has kPadding values more than may be used.
@@ -27,9 +26,7 @@ class Ring {
   std::size_t capacity() const { return ids.size() - kPadding; }
   void Grow(std::size_t capacity);
 
-  RingVertex operator[](std::size_t i) const {
-    return {ids[i], dx[i], dy[i], heights[i], std::int64_t{dx[i]} * dx[i] + std::int64_t{dy[i]} * dy[i]};
-  }
+  RingVertex operator[](std::size_t i) const { return {ids[i], dx[i], dy[i], heights[i]}; }
   void Repeat(std::size_t from, std::size_t to) {
     ids[to] = ids[from];
     dx[to] = dx[from];

@@ -62,6 +62,22 @@ struct ScannedTriangle {
   int west, east, south, north;  // bounding box
 };
 
+// The larger or the smaller one; b where one is NaN.
+HWY_INLINE Floats MaxOrSecond(Floats a, Floats b) {
+#if HWY_ARCH_X86
+  return hn::Max(a, b);  // the instruction does just that
+#else
+  return hn::IfThenElse(hn::Gt(a, b), a, b);
+#endif
+}
+HWY_INLINE Floats MinOrSecond(Floats a, Floats b) {
+#if HWY_ARCH_X86
+  return hn::Min(a, b);
+#else
+  return hn::IfThenElse(hn::Lt(a, b), a, b);
+#endif
+}
+
 // The furthest sample so far, lane by lane. Each lane meets its samples in row-major order, so that ">" keeps the
 // first; no comparison with NaN holds.
 template <typename TagOfNumerators>
@@ -75,7 +91,15 @@ class Furthest {
   HWY_INLINE void Visit(hn::Vec<Tag> numerator, Index index, hn::Mask<Tag> inside) {
     Keep(hn::And(inside, hn::Gt(numerator, numerator_)), numerator, index);
   }
-  HWY_INLINE void Visit(hn::Vec<Tag> numerator, Index index) { Keep(hn::Gt(numerator, numerator_), numerator, index); }
+  HWY_INLINE void Visit(hn::Vec<Tag> numerator, Index index) {
+    const auto is_further = hn::Gt(numerator, numerator_);
+    if constexpr (std::is_same_v<Tag, FloatsTag>) {
+      numerator_ = MaxOrSecond(numerator, numerator_);  // the next sample waits for this one, and not for the mask
+    } else {
+      numerator_ = hn::IfThenElse(is_further, numerator, numerator_);
+    }
+    index_ = hn::IfThenElse(hn::RebindMask(kIndices, is_further), index, index_);
+  }
 
   // Of samples that were visited apart.
   HWY_INLINE void Merge(const Furthest& other) {
@@ -117,13 +141,11 @@ class FurthestTwo {
   HWY_INLINE FurthestTwo() : runner_up_(All(kFloats, -1)) {}
 
   HWY_INLINE void Visit(Floats numerator, Index index, hn::Mask<FloatsTag> inside) {
-    const auto counts = hn::And(inside, hn::Ge(numerator, hn::Zero(kFloats)));
-    const Floats counted = hn::IfThenElse(counts, numerator, All(kFloats, -1));
-    runner_up_ = hn::Max(runner_up_, hn::Min(counted, furthest_.numerators()));
-    furthest_.Visit(counted, index);
+    Visit(hn::IfThenElse(inside, numerator, All(kFloats, -1)), index);
   }
   HWY_INLINE void Visit(Floats numerator, Index index) {
-    Visit(numerator, index, hn::Ge(numerator, hn::Zero(kFloats)));
+    runner_up_ = MaxOrSecond(MinOrSecond(furthest_.numerators(), numerator), runner_up_);
+    furthest_.Visit(numerator, index);
   }
   HWY_INLINE void Merge(const FurthestTwo& other) {
     runner_up_ =
@@ -147,18 +169,21 @@ HWY_INLINE hn::Vec<DoublesTag> HeightsAt(DoublesTag tag, const float* from) {
 
 // Barycentric coordinates times D of samples relative to p: integers, exact, also when stepped from row to row. Inside
 // and on the edges none is negative.
-template <typename Tag>
 class Barycentric {
  public:
-  HWY_INLINE Barycentric(const ScannedTriangle& t, hn::Vec<Tag> x, hn::Vec<Tag> y)
-      : step_u_(All(kTag, 2 * t.vx)),
-        step_v_(All(kTag, 2 * t.ux)),
-        step_p_(hn::Sub(step_u_, step_v_)),
-        of_u_(hn::Sub(hn::Mul(All(kTag, t.vy), x), hn::Mul(All(kTag, t.vx), y))),
-        of_v_(hn::Sub(hn::Mul(All(kTag, t.ux), y), hn::Mul(All(kTag, t.uy), x))),
-        of_p_(hn::Sub(All(kTag, t.d), hn::Add(of_u_, of_v_))) {}
+  using Doubles = hn::Vec<DoublesTag>;
 
-  HWY_INLINE hn::Mask<Tag> IsInside() const { return hn::Ge(hn::Min(hn::Min(of_u_, of_v_), of_p_), hn::Zero(kTag)); }
+  HWY_INLINE Barycentric(const ScannedTriangle& t, Doubles x, Doubles y)
+      : step_u_(All(kDoubles, 2 * t.vx)),
+        step_v_(All(kDoubles, 2 * t.ux)),
+        step_p_(hn::Sub(step_u_, step_v_)),
+        of_u_(hn::Sub(hn::Mul(All(kDoubles, t.vy), x), hn::Mul(All(kDoubles, t.vx), y))),
+        of_v_(hn::Sub(hn::Mul(All(kDoubles, t.ux), y), hn::Mul(All(kDoubles, t.uy), x))),
+        of_p_(hn::Sub(All(kDoubles, t.d), hn::Add(of_u_, of_v_))) {}
+
+  HWY_INLINE hn::Mask<DoublesTag> IsInside() const {
+    return hn::Ge(hn::Min(hn::Min(of_u_, of_v_), of_p_), hn::Zero(kDoubles));
+  }
   // Two rows on.
   HWY_INLINE void Step() {
     of_u_ = hn::Sub(of_u_, step_u_);
@@ -167,10 +192,8 @@ class Barycentric {
   }
 
  private:
-  static constexpr Tag kTag{};
-
-  hn::Vec<Tag> step_u_, step_v_, step_p_;
-  hn::Vec<Tag> of_u_, of_v_, of_p_;
+  Doubles step_u_, step_v_, step_p_;
+  Doubles of_u_, of_v_, of_p_;
 };
 
 // D times the distance of a vector of samples.
@@ -179,23 +202,67 @@ HWY_INLINE V Numerator(V heights, V pz, V d, V plane) {
   return hn::Abs(hn::Sub(hn::Mul(d, hn::Sub(heights, pz)), plane));
 }
 
-// Every sample of some columns of the bounding box, masked: no spans, no divisions, no branches but the loop. Two rows
-// at a time, each for itself, since what is furthest so far is waited for. The row above the last one may be looked at:
-// it is outside.
+// The same in single precision, fused where there are such operations: what is exact is exact either way, and where
+// there are doubts they become smaller.
+HWY_INLINE Floats Numerator(Floats heights, Floats pz, Floats d, Floats a_x, Floats b, Floats y) {
+  return hn::Abs(hn::MulSub(d, hn::Sub(heights, pz), hn::MulAdd(b, y, a_x)));
+}
+
+// All bits where one of the barycentric coordinates has a sign: NaN, which no comparison holds for. A zero with a sign
+// comes only from products of zeros that have one: beyond p on the line of an edge along x or y, outside as well.
+HWY_INLINE Floats NaNWhereNegative(Floats a, Floats b, Floats c) {
+  const IndexTag<FloatsTag> ints;
+  return hn::BitCast(kFloats, hn::ShiftRight<31>(hn::BitCast(ints, hn::Or3(a, b, c))));
+}
+
+// Every sample of some columns of the bounding box, in single precision: no spans, no divisions, no branches but the
+// loop. Barycentric coordinates are integers, whose signs make what is outside NaN.
 template <typename Found>
-HWY_INLINE Found ScanColumns(const OpenSamples& samples, const ScannedTriangle& t, int column) {
-  using Tag = typename Found::Tag;
-  constexpr Tag tag;
-  constexpr IndexTag<Tag> indices;
+HWY_INLINE Found ScanColumnsInSingle(const OpenSamples& samples, const ScannedTriangle& t, int column) {
+  constexpr IndexTag<FloatsTag> ints;
+  const Floats d = All(kFloats, t.d), pz = All(kFloats, t.pz), b = All(kFloats, t.b), one = All(kFloats, 1);
+  const Floats a_x = hn::Mul(All(kFloats, t.a), From(kFloats, column));
+  Floats y = All(kFloats, t.south);
+  const int ux = static_cast<int>(t.ux), uy = static_cast<int>(t.uy), vx = static_cast<int>(t.vx),
+            vy = static_cast<int>(t.vy);
+  const auto x = From(ints, column);
+  auto of_u = hn::Sub(hn::Mul(All(ints, vy), x), All(ints, vx * t.south));
+  auto of_v = hn::Sub(All(ints, ux * t.south), hn::Mul(All(ints, uy), x));
+  auto of_p = hn::Sub(All(ints, ux * vy - uy * vx), hn::Add(of_u, of_v));
+  const auto step_u = All(ints, vx), step_v = All(ints, ux), step_p = All(ints, vx - ux);
+  const int width = samples.width(), first_row = t.py + t.south;
+  const float* from = samples.Row(first_row) + t.px + column;
+  auto index = From(ints, first_row * width + t.px + column);
+  const auto next_row = All(ints, width);
+  Found furthest;
+  for (int j = t.south; j <= t.north; ++j) {
+    const Floats numerator = Numerator(hn::LoadU(kFloats, from), pz, d, a_x, b, y);
+    const auto outside = hn::ShiftRight<31>(hn::Or3(of_u, of_v, of_p));
+    furthest.Visit(hn::Or(numerator, hn::BitCast(kFloats, outside)), index);
+    from += width;
+    y = hn::Add(y, one);
+    index = hn::Add(index, next_row);
+    of_u = hn::Sub(of_u, step_u);
+    of_v = hn::Add(of_v, step_v);
+    of_p = hn::Add(of_p, step_p);
+  }
+  return furthest;
+}
+
+// The same in double, two rows at a time, each for itself, since what is furthest so far is waited for. The row above
+// the last one may be looked at: it is outside.
+HWY_INLINE Furthest<DoublesTag> ScanColumnsInDouble(const OpenSamples& samples, const ScannedTriangle& t, int column) {
+  constexpr DoublesTag tag;
+  constexpr IndexTag<DoublesTag> indices;
   const auto d = All(tag, t.d), pz = All(tag, t.pz), b = All(tag, t.b), one = All(tag, 1), two = All(tag, 2);
   const auto x = From(tag, column), a_x = hn::Mul(All(tag, t.a), x);
   auto y = All(tag, t.south), above = hn::Add(y, one);
-  Barycentric<Tag> even(t, x, y), odd(t, x, above);
+  Barycentric even(t, x, y), odd(t, x, above);
   const int width = samples.width(), first_row = t.py + t.south;
   const float* from = samples.Row(first_row) + t.px + column;
   const auto next_row = All(indices, width);
   auto index = From(indices, first_row * width + t.px + column);
-  Found furthest, also;
+  Furthest<DoublesTag> furthest, also;
   for (int j = t.south; j <= t.north; j += 2) {
     furthest.Visit(Numerator(HeightsAt(tag, from), pz, d, hn::Add(a_x, hn::Mul(b, y))), index, even.IsInside());
     index = hn::Add(index, next_row);
@@ -209,6 +276,15 @@ HWY_INLINE Found ScanColumns(const OpenSamples& samples, const ScannedTriangle& 
   }
   furthest.Merge(also);
   return furthest;
+}
+
+template <typename Found>
+HWY_INLINE Found ScanColumns(const OpenSamples& samples, const ScannedTriangle& t, int column) {
+  if constexpr (std::is_same_v<typename Found::Tag, FloatsTag>) {
+    return ScanColumnsInSingle<Found>(samples, t, column);
+  } else {
+    return ScanColumnsInDouble(samples, t, column);
+  }
 }
 
 template <typename Found>
@@ -278,8 +354,15 @@ HWY_INLINE Found ScanSpans(const OpenSamples& samples, const ScannedTriangle& t)
       auto x = From(tag, first - t.px);
       auto index = From(indices, row * width + first);
       int left = last - first + 1;
+      const auto numerator = [&]() HWY_ATTR {
+        if constexpr (std::is_same_v<Tag, FloatsTag>) {
+          return hn::Abs(hn::MulSub(d, hn::Sub(HeightsAt(tag, from), pz), hn::MulAdd(a, x, b_y)));
+        } else {
+          return Numerator(HeightsAt(tag, from), pz, d, hn::Add(hn::Mul(a, x), b_y));
+        }
+      };
       const auto visit = [&](Found& found) HWY_ATTR {
-        found.Visit(Numerator(HeightsAt(tag, from), pz, d, hn::Add(hn::Mul(a, x), b_y)), index);
+        found.Visit(numerator(), index);
         from += lanes;
         x = hn::Add(x, lanes_on);
         index = hn::Add(index, indices_on);
@@ -287,7 +370,7 @@ HWY_INLINE Found ScanSpans(const OpenSamples& samples, const ScannedTriangle& t)
       for (; left >= 2 * lanes; left -= 2 * lanes) visit(furthest), visit(also);
       if (left >= lanes) visit(also);
       const auto inside = hn::RebindMask(tag, hn::Lt(index, end));
-      ends.Visit(Numerator(HeightsAt(tag, from), pz, d, hn::Add(hn::Mul(a, x), b_y)), index, inside);
+      ends.Visit(numerator(), index, inside);
     }
   }
   furthest.Merge(also);
@@ -307,8 +390,9 @@ HWY_INLINE ScannedTriangle TriangleOf(const Star& star, std::size_t i) {
   t.d = t.ux * t.vy - t.uy * t.vx;
   t.a = t.vy * uz - t.uy * vz;
   t.b = t.ux * vz - t.vx * uz;
-  t.west = std::min({ux, vx, 0}), t.east = std::max({ux, vx, 0});
-  t.south = std::min({uy, vy, 0}), t.north = std::max({uy, vy, 0});
+  // Two by two: of a list they are found with branches.
+  t.west = std::min(std::min(ux, vx), 0), t.east = std::max(std::max(ux, vx), 0);
+  t.south = std::min(std::min(uy, vy), 0), t.north = std::max(std::max(uy, vy), 0);
   return t;
 }
 
@@ -456,10 +540,8 @@ HWY_INLINE BlockFind ScanBlock(const OpenSamples& samples, const Star& star, con
   constexpr int kLanes = static_cast<int>(hn::MaxLanes(kFloats)), kRowsAtOnce = kLanes / kSide;
   constexpr int kVectors = kSide * kSide / kLanes;
   const int west = planes.west[i], south = planes.south[i];
-  const Floats columns = hn::Load(kFloats, kSide == 4 ? kColumnsBy4 : kColumnsBy8);
-  const Floats rows = hn::Load(kFloats, kSide == 4 ? kRowsBy4 : kRowsBy8);
-  const Floats x = hn::Add(All(kFloats, west), columns);
-  Floats y = hn::Add(All(kFloats, south), rows);
+  const Floats x = hn::Add(All(kFloats, west), hn::Load(kFloats, kSide == 4 ? kColumnsBy4 : kColumnsBy8));
+  Floats y = hn::Add(All(kFloats, south), hn::Load(kFloats, kSide == 4 ? kRowsBy4 : kRowsBy8));
   const Floats ux = All(kFloats, planes.ux[i]), uy = All(kFloats, planes.uy[i]), vx = All(kFloats, planes.vx[i]),
                vy = All(kFloats, planes.vy[i]);
   const Floats d = All(kFloats, planes.d[i]), b = All(kFloats, planes.b[i]), pz = All(kFloats, star.height);
@@ -469,18 +551,15 @@ HWY_INLINE BlockFind ScanBlock(const OpenSamples& samples, const Star& star, con
   const Floats at_once = All(kFloats, kRowsAtOnce);
   const Floats step_u = hn::Mul(vx, at_once), step_v = hn::Mul(ux, at_once), step_p = hn::Sub(step_u, step_v);
 
-  const Floats none = All(kFloats, -1), zero = hn::Zero(kFloats);
   const int stride = samples.width();
   const float* const from = samples.Row(star.y + south) + star.x + west;
   Floats numerators[kVectors];
-  Floats most = none;
+  Floats most = All(kFloats, -1);
 #pragma GCC unroll 8
   for (int k = 0; k < kVectors; ++k) {
     const Floats heights = RowsFrom<kSide>(from + k * kRowsAtOnce * stride, stride);
-    const Floats numerator = Numerator(heights, pz, d, hn::Add(a_x, hn::Mul(b, y)));
-    const auto inside = hn::Ge(hn::Min(hn::Min(of_u, of_v), of_p), zero);
-    numerators[k] = hn::IfThenElse(hn::And(inside, hn::Ge(numerator, zero)), numerator, none);
-    most = hn::Max(most, numerators[k]);
+    numerators[k] = hn::Or(Numerator(heights, pz, d, a_x, b, y), NaNWhereNegative(of_u, of_v, of_p));
+    most = MaxOrSecond(numerators[k], most);
     y = hn::Add(y, at_once);
     of_u = hn::Sub(of_u, step_u);
     of_v = hn::Add(of_v, step_v);

@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "engine/tin/spare_blocks.h"
 #include "engine/tin/star.h"
 
 namespace terrace::tin {
@@ -39,7 +40,7 @@ class NarrowTriangles {
     }
   };
 
-  std::vector<Triangle> slots;
+  LargeArray<Triangle> slots;
 
  private:
   static constexpr unsigned kTwinBits = 21;
@@ -60,7 +61,7 @@ class WideTriangles {
     }
   };
 
-  std::vector<Triangle> slots;
+  LargeArray<Triangle> slots;
 };
 
 }  // namespace terrace::tin

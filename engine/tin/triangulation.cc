@@ -22,8 +22,9 @@ Triangulation::Triangulation(const HeightField& field)
     : Triangulation({VertexAt(field, 0, 0), VertexAt(field, field.width() - 1, 0),
                      VertexAt(field, field.width() - 1, field.height() - 1), VertexAt(field, 0, field.height() - 1)}) {}
 
-Triangulation::Triangulation(std::vector<Vertex> vertices, const std::vector<std::array<std::uint32_t, 3>>& triangles)
-    : vertices_(std::move(vertices)), is_wide_(vertices_.size() > NarrowTriangles::kMostVertices) {
+Triangulation::Triangulation(const std::vector<Vertex>& vertices,
+                             const std::vector<std::array<std::uint32_t, 3>>& triangles)
+    : vertices_(vertices.begin(), vertices.end()), is_wide_(vertices_.size() > NarrowTriangles::kMostVertices) {
   is_wide_ ? Join(wide_, triangles) : Join(narrow_, triangles);
   Grow();
 }
@@ -88,6 +89,17 @@ void Triangulation::PrefetchAround(TriangleId t) const {
   for (HalfEdgeId edge = 4 * t; edge < 4 * t + 3; ++edge) {
     __builtin_prefetch(&vertices_[corner(edge)]);
     if (twin(edge) != kNone) Prefetch(twin(edge) / 4);
+  }
+}
+
+void Triangulation::PrefetchBeyond(TriangleId t) const {
+  for (HalfEdgeId edge = 4 * t; edge < 4 * t + 3; ++edge) {
+    const HalfEdgeId back = twin(edge);
+    if (back == kNone) continue;
+    __builtin_prefetch(&vertices_[corner(Previous(back))]);
+    const HalfEdgeId a = twin(Next(back)), b = twin(Previous(back));
+    if (a != kNone) Prefetch(a / 4);
+    if (b != kNone) Prefetch(b / 4);
   }
 }
 

@@ -47,7 +47,7 @@ class Triangulation {
   explicit Triangulation(const HeightField& field);
 
   // Triangles in the order given. Precondition: they cover a rectangle once, counter-clockwise.
-  Triangulation(std::vector<Vertex> vertices, const std::vector<std::array<std::uint32_t, 3>>& triangles);
+  Triangulation(const std::vector<Vertex>& vertices, const std::vector<std::array<std::uint32_t, 3>>& triangles);
 
   // Inserts a vertex into `triangle`, which must contain the point inside or on an edge; it must not be a vertex yet.
   // `absorbs(u, v, w, back)` says whether the triangle (v, u, w) is removed as well: it lies beyond the outline's edge
@@ -65,11 +65,13 @@ class Triangulation {
 
   bool IsCorner(SamplePosition point, TriangleId triangle) const;
 
-  // Bring a triangle that will be inserted into closer to the processor, and what an insertion into it reads first.
+  // Bring closer to the processor: a triangle that will be inserted into, what an insertion into it reads first, and
+  // what it reads next. Each reads what the one before it has brought.
   void Prefetch(TriangleId t) const {
     __builtin_prefetch(is_wide_ ? static_cast<const void*>(&wide_.slots[t]) : &narrow_.slots[t]);
   }
   void PrefetchAround(TriangleId t) const;
+  void PrefetchBeyond(TriangleId t) const;
 
   TinMesh Mesh() const;
 
@@ -106,7 +108,7 @@ class Triangulation {
   static RingVertex Relative(const Vertex* vertices, VertexId id, SamplePosition point) {
     const Vertex& vertex = vertices[id];
     const std::int32_t dx = vertex.position.x - point.x, dy = vertex.position.y - point.y;
-    return {id, dx, dy, vertex.height, std::int64_t{dx} * dx + std::int64_t{dy} * dy};
+    return {id, dx, dy, vertex.height};
   }
   template <typename Triangles, typename Absorbs>
   void Replace(Triangles& triangles, SamplePosition point, TriangleId triangle, Absorbs&& absorbs);
@@ -120,8 +122,8 @@ class Triangulation {
   void Widen();
   void Grow();
 
-  std::vector<Vertex> vertices_;  // by id
-  NarrowTriangles narrow_;        // by slot, until there are too many vertices
+  LargeArray<Vertex> vertices_;  // by id
+  NarrowTriangles narrow_;       // by slot, until there are too many vertices
   WideTriangles wide_;
   bool is_wide_ = false;
 
@@ -133,10 +135,18 @@ constexpr std::int64_t Cross(const RingVertex& a, const RingVertex& b) {
   return static_cast<std::int64_t>(a.dx) * b.dy - static_cast<std::int64_t>(a.dy) * b.dx;
 }
 
-// Whether the point that u, v and w are relative to lies strictly inside the circle through v, u and w, which turn
-// counter-clockwise: the in-circle test of predicates.h with its widths, the point as d.
+// Whether the point p that u, v and w are relative to lies strictly inside the circle through v, u and w, which turn
+// counter-clockwise: the in-circle test of predicates.h, its sum taken apart in another way. With the angles at p and
+// at w over the chord (u, v), the point is inside when they are more than a half turn together: when the sine of their
+// sum, times four lengths, is negative. Two of the four factors do not wait for w.
+//
+// Width: differences of coordinates are below S = 2^15, so each factor is below 2 S^2 = 2^31 in magnitude, by 2^17 or
+// so, and the sum of two products below 2^63.
 constexpr bool IsInsideCircle(const RingVertex& v, const RingVertex& u, const RingVertex& w) {
-  return v.squared * Cross(u, w) + u.squared * Cross(w, v) + w.squared * Cross(v, u) > 0;
+  const std::int32_t ax = u.dx - w.dx, ay = u.dy - w.dy, bx = v.dx - w.dx, by = v.dy - w.dy;
+  const std::int32_t sine_at_p = u.dx * v.dy - u.dy * v.dx, cosine_at_p = u.dx * v.dx + u.dy * v.dy;
+  const std::int32_t sine_at_w = bx * ay - by * ax, cosine_at_w = ax * bx + ay * by;
+  return std::int64_t{sine_at_p} * cosine_at_w + std::int64_t{cosine_at_p} * sine_at_w < 0;
 }
 
 // Whether w lies strictly between u and v as seen from the point that they are relative to.

@@ -1,6 +1,7 @@
 #include <array>
 #include <optional>
 
+#include "engine/tin/spare_blocks.h"
 #include "tests/bench/heap_peak.h"
 #include "tests/bench/rasters.h"
 #include "tests/bench/targets.h"
@@ -15,6 +16,7 @@ struct Peak {
 };
 
 Peak MeshingPeak(const tin::HeightField& field, const tin::GreedyGoal& goal) {
+  tin::ReleaseSpareBlocks();
   const std::size_t before = HeapBytes();
   ResetHeapPeak();
   Peak peak;

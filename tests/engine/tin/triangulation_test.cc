@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <set>
 #include <vector>
 
@@ -75,6 +76,34 @@ TEST(Triangulation, IsDelaunayAfterEveryInsertionOfEverySample) {
       ASSERT_TRUE(IsDelaunay(triangulation.Mesh()));
     }
   }
+}
+
+TEST(Triangulation, JudgesCirclesAsThePredicateDoesInTheLargestField) {
+  Random random(5);
+  constexpr std::uint16_t kLast = HeightField::kMaxSide - 1;
+  const auto coordinate = [&]() -> std::uint16_t {
+    switch (random.Below(4)) {
+      case 0:
+        return 0;
+      case 1:
+        return kLast;
+      case 2:
+        return static_cast<std::uint16_t>(random.Below(4));
+      default:
+        return static_cast<std::uint16_t>(random.Below(HeightField::kMaxSide));
+    }
+  };
+  int inside = 0;
+  for (int i = 0; i < 100000; ++i) {
+    std::array<SamplePosition, 4> at;
+    for (SamplePosition& position : at) position = {coordinate(), coordinate()};
+    const auto [v, u, w, p] = at;
+    const auto seen = [p = p](SamplePosition q) { return RingVertex{0, q.x - p.x, q.y - p.y, 0}; };
+    const bool is_inside = InCircle(v, u, w, p) > 0;
+    ASSERT_EQ(IsInsideCircle(seen(v), seen(u), seen(w)), is_inside) << i;
+    inside += is_inside ? 1 : 0;
+  }
+  EXPECT_GT(inside, 10000);
 }
 
 TEST(Triangulation, ReturnsExactlyTheTrianglesAroundTheNewVertex) {

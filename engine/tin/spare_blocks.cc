@@ -1,0 +1,90 @@
+#include "engine/tin/spare_blocks.h"
+
+#include <array>
+#include <cstring>
+
+namespace terrace::tin {
+namespace {
+
+// A block's size stands in the line before it.
+constexpr std::size_t kLine = 64;
+constexpr std::size_t kMostBlocks = 16;
+
+std::size_t SizeOf(const void* block) {
+  std::size_t size = 0;
+  std::memcpy(&size, static_cast<const std::byte*>(block) - kLine, sizeof size);
+  return size;
+}
+
+void* NewBlock(std::size_t bytes) {
+  auto* const line = static_cast<std::byte*>(::operator new (bytes + kLine, std::align_val_t{kLine}));
+  std::memcpy(line, &bytes, sizeof bytes);
+  return line + kLine;
+}
+
+void DeleteBlock(void* block) noexcept {
+  ::operator delete (static_cast<std::byte*>(block) - kLine, std::align_val_t{kLine});
+}
+
+// Whether this thread's store is no more: what outlives it frees its arrays itself.
+thread_local bool is_closed = false;
+
+// Oldest first.
+class Store {
+ public:
+  ~Store() {
+    Clear();
+    is_closed = true;
+  }
+
+  // The smallest block that is large enough and not twice as large; nullptr if there is none.
+  void* Take(std::size_t bytes) {
+    std::size_t best = count_;
+    for (std::size_t i = 0; i < count_; ++i) {
+      const std::size_t size = SizeOf(blocks_[i]);
+      if (size >= bytes && size / 2 <= bytes && (best == count_ || size < SizeOf(blocks_[best]))) best = i;
+    }
+    return best == count_ ? nullptr : Remove(best);
+  }
+  void Put(void* block) noexcept {
+    const std::size_t size = SizeOf(block);
+    if (size > kMostSpareBytes) return DeleteBlock(block);
+    while (count_ == kMostBlocks || bytes_ + size > kMostSpareBytes) DeleteBlock(Remove(0));
+    blocks_[count_++] = block;
+    bytes_ += size;
+  }
+  void Clear() noexcept {
+    while (count_ > 0) DeleteBlock(Remove(count_ - 1));
+  }
+  std::size_t bytes() const { return bytes_; }
+
+ private:
+  void* Remove(std::size_t i) noexcept {
+    void* const block = blocks_[i];
+    bytes_ -= SizeOf(block);
+    for (--count_; i < count_; ++i) blocks_[i] = blocks_[i + 1];
+    return block;
+  }
+
+  std::array<void*, kMostBlocks> blocks_{};
+  std::size_t count_ = 0, bytes_ = 0;
+};
+
+thread_local Store store;
+
+}  // namespace
+
+void* TakeBlock(std::size_t bytes) {
+  void* const spare = is_closed ? nullptr : store.Take(bytes);
+  return spare != nullptr ? spare : NewBlock(bytes);
+}
+
+void GiveBlock(void* block) noexcept { is_closed ? DeleteBlock(block) : store.Put(block); }
+
+std::size_t SpareBytes() { return is_closed ? 0 : store.bytes(); }
+
+void ReleaseSpareBlocks() {
+  if (!is_closed) store.Clear();
+}
+
+}  // namespace terrace::tin
