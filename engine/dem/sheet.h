@@ -99,6 +99,12 @@ class Sheet {
   Result<void> FillPoints(std::span<const GeoPosition> points, HeightDatum datum, std::span<float> heights,
                           const std::stop_token& stop) const;
 
+  // As measured, NaN for voids, row by row from the north. Columns outside the sheet are a turn on, of sheets that
+  // wrap.
+  Result<std::vector<float>> ReadSamples(const GridWindow& window, const std::stop_token& stop) const {
+    return ReadBlocks(1, window, stop);
+  }
+
   // Whether its samples in a box of pixels may count less than in full when they are averaged by this factor or a
   // smaller one: an edge or a void is as near as the feather is wide.
   bool GivesWay(const Box& pixels, int factor) const;

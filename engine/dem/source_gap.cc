@@ -34,6 +34,7 @@ struct PixelBounds {
     west = std::min(west, x), east = std::max(east, x);
     north = std::min(north, y), south = std::max(south, y);
   }
+  void Grow(double x, double y) { west -= x, east += x, north -= y, south += y; }
 };
 
 // How much a surface between samples can bend, from the samples of a box: largest differences.
@@ -59,6 +60,69 @@ double LargestGap(const Bends& bends, const Steps& steps) {
          steps.bend_y * bends.y;
 }
 
+// The surface that is bilinear between the heights at a cell's nodes, by places in the raster.
+class CellSurface {
+ public:
+  // `corners`: the nodes' places in pixels, known to that slack. `is_separable`: columns are meridians and rows are
+  // parallels, evenly spaced.
+  CellSurface(const std::array<Position, 4>& corners, bool is_separable, double position_slack)
+      : origin_(corners[0]),
+        east_{corners[1].x - origin_.x, corners[1].y - origin_.y},
+        north_{corners[2].x - origin_.x, corners[2].y - origin_.y},
+        twist_{corners[3].x - corners[1].x - north_.x, corners[3].y - corners[1].y - north_.y} {
+    // Lines between nodes stray from straight ones by far less than that part of the cell.
+    constexpr double kBulge = 1.0 / 32;
+    const double bulge = is_separable ? 0 : kBulge;
+    const auto extent = [](double east, double north, double twist) {
+      return std::abs(east) + std::abs(north) + std::abs(twist);
+    };
+    slack_x_ = bulge * extent(east_.x, north_.x, twist_.x) + position_slack;
+    slack_y_ = bulge * extent(east_.y, north_.y, twist_.y) + position_slack;
+  }
+
+  void SetHeight(std::size_t corner, double height) { heights_[corner] = height; }
+  void Widen(double gap) { widened_ += gap; }
+
+  // How far a sample at a place is from the surface, at most; 0 where the place is outside the cell.
+  double Apart(const Position& at, double sample) const {
+    double u = 0.5, v = 0.5, u_slack = kInfinity, v_slack = kInfinity;
+    constexpr int kSteps = 4;
+    for (int step = 0; step < kSteps; ++step) {
+      const double right_x = at.x - origin_.x - u * east_.x - v * north_.x - u * v * twist_.x;
+      const double right_y = at.y - origin_.y - u * east_.y - v * north_.y - u * v * twist_.y;
+      const double ux = east_.x + v * twist_.x, uy = east_.y + v * twist_.y;
+      const double vx = north_.x + u * twist_.x, vy = north_.y + u * twist_.y;
+      const double scale = 1 / std::abs(ux * vy - uy * vx);
+      const double sign = ux * vy - uy * vx < 0 ? -scale : scale;
+      u += (right_x * vy - right_y * vx) * sign;
+      v += (ux * right_y - uy * right_x) * sign;
+      // What is left after this step is far below what the last one moved.
+      const double x = slack_x_ + (step + 1 < kSteps ? 0 : std::abs(right_x));
+      const double y = slack_y_ + (step + 1 < kSteps ? 0 : std::abs(right_y));
+      u_slack = (std::abs(vy) * x + std::abs(vx) * y) * scale;
+      v_slack = (std::abs(uy) * x + std::abs(ux) * y) * scale;
+    }
+    const auto [lowest, highest] = std::minmax_element(heights_.begin(), heights_.end());
+    const double anywhere = std::max(*highest - sample, sample - *lowest) + widened_;
+    if (!(u_slack < 1 && v_slack < 1)) return anywhere;  // also where it did not converge
+    if (u < -u_slack || u > 1 + u_slack || v < -v_slack || v > 1 + v_slack) return 0;
+    const double south = heights_[0] + u * (heights_[1] - heights_[0]);
+    const double north = heights_[2] + u * (heights_[3] - heights_[2]);
+    const double along = std::max(std::abs(heights_[1] - heights_[0]), std::abs(heights_[3] - heights_[2]));
+    const double across = std::max(std::abs(heights_[2] - heights_[0]), std::abs(heights_[3] - heights_[1]));
+    // Outside the cell by no more than the slack the slopes are the cell's, but for the twist: twice is enough.
+    const double here = std::abs(south + v * (north - south) - sample) + 2 * (u_slack * along + v_slack * across);
+    return std::min(anywhere, here + widened_);
+  }
+
+ private:
+  static constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  Position origin_, east_, north_, twist_;
+  double slack_x_ = 0, slack_y_ = 0;
+  std::array<double, 4> heights_{};
+  double widened_ = 0;
+};
+
 }  // namespace
 
 // One sheet's part.
@@ -79,12 +143,13 @@ class SheetGap {
     }
   }
 
-  void Add() {
+  Result<void> Add(const std::stop_token& stop) {
     for (int south = 0; south < cells_; south += kGroup) {
       for (int west = 0; west < cells_; west += kGroup) {
         AddGroup({west, south, std::min(west + kGroup, cells_), std::min(south + kGroup, cells_)});
       }
     }
+    return ReadLoose(stop);
   }
 
  private:
@@ -251,6 +316,7 @@ class SheetGap {
       }
       return;
     }
+    loose_.emplace_back();
     for (int j = box.south; j < box.north; ++j) {
       for (int i = box.west; i < box.east; ++i) {
         if (tile_.covered_[CellIndex(i, j)] == 0) AddCell(i, j, gives_way && GivesWay({i, j, i + 1, j + 1}));
@@ -263,20 +329,39 @@ class SheetGap {
     const bool fills = gives_way && !trace_.includes_filled;
     const TileCell cell{i, j, {n, n + 1, n + stride_, n + stride_ + 1}};
     if (std::ranges::any_of(cell.nodes, [&](std::size_t node) { return trace_.cell_of_node[node] < 0; })) {
-      if (Touches(cell.box())) Raise(RangeGap(cell, fills));
+      if (Touches(cell.box())) Raise(RangeGap(cell, gives_way, fills));
       return;
     }
     bool has_voids = false;
     double gap = SampleGap(cell, has_voids);
-    if (fills && (has_voids || MayBeFilled(cell.box()))) return Raise(RangeGap(cell, true));
+    if (fills && (has_voids || MayBeFilled(cell.box()))) return Raise(RangeGap(cell, gives_way, true));
+    double smooth = kUnknown;
     if (!has_voids) {
       if (!gives_way) tile_.covered_[CellIndex(i, j)] = 1;
-      if (const double smooth = SmoothGap(cell.box()); smooth < gap) gap = smooth;
+      smooth = SmoothGap(cell.box());
+      if (smooth < gap) gap = smooth;
     }
-    Raise(std::isfinite(gap) ? gap : RangeGap(cell, fills));
+    if (!std::isfinite(smooth) && gap > tile_.bound_) gap = RangeGap(cell, gives_way, fills, gap);
+    Raise(gap);
   }
 
   void Raise(double gap) { tile_.bound_ = std::max(tile_.bound_, gap); }
+
+  // The heights served in a cell, as the sheet's samples count.
+  CellSurface SurfaceOf(const TileCell& cell, const std::array<Position, 4>& corners) const {
+    const bool is_separable = sheet_.georeference().is_geographic_grid() && sheet_.georeference().is_affine();
+    constexpr double kPosition = 4e-5;  // of averages: NodePositions is exact to a hundred-thousandth
+    CellSurface surface(corners, is_separable, kPosition * trace_.factor);
+    const double geoid_gap = GeoidGap(cell.box());
+    const HeightRange range = std::isfinite(geoid_gap) ? HeightRange{0, 0} : GeoidRange(cell.box());
+    for (std::size_t k = 0; k < 4; ++k) {
+      const bool is_known = sheet_.undulations() != nullptr && std::isfinite(geoid_gap);
+      const double geoid = is_known ? trace_.undulations[cell.nodes[k]] : (range.min + range.max) / 2;
+      surface.SetHeight(k, double{tile_.heights_[cell.nodes[k]]} - geoid);
+    }
+    surface.Widen(std::isfinite(geoid_gap) ? geoid_gap : (range.max - range.min) / 2);
+    return surface;
+  }
 
   // Between the heights served at a cell's nodes and the sheet's heights within these bounds, which count as its
   // samples do.
@@ -515,46 +600,156 @@ class SheetGap {
     return kUnknown;
   }
 
-  // Against everything that the raster has around the cell, or anywhere where its place cannot be told. `fills`: what
-  // is filled in there counts too.
-  double RangeGap(const TileCell& cell, bool fills) const {
-    const auto& nodes = cell.nodes;
-    PixelBounds at;
-    bool known = true;
-    for (std::size_t k = 0; k < nodes.size(); ++k) {
-      Position position = trace_.positions[nodes[k]];
+  // Where the cell's nodes are, in pixels; false where that cannot be told.
+  bool Place(const TileCell& cell, std::array<Position, 4>& corners) const {
+    for (std::size_t k = 0; k < 4; ++k) {
+      corners[k] = trace_.positions[cell.nodes[k]];
       if (sheet_.georeference().is_geographic_grid()) {
         // All of a pole's nodes have one position: their columns are those of the row beside it.
         const std::int64_t row = tile_.window_.row + 1 + cell.j + (k < 2 ? 0 : 1);
         if (row == 0 || row == tile_.lattice_.rows()) {
-          position.x = trace_.positions[nodes[k] + (k < 2 ? stride_ : 0) - (k < 2 ? 0 : stride_)].x;
+          corners[k].x = trace_.positions[cell.nodes[k] + (k < 2 ? stride_ : 0) - (k < 2 ? 0 : stride_)].x;
         }
-        const double turn = sheet_.georeference().period();
-        position.x += turn * std::round((sheet_.columns() / 2.0 - position.x) / turn);
+        const double turn = sheet_.georeference().period(), near = k == 0 ? sheet_.columns() / 2.0 : corners[0].x;
+        corners[k].x += turn * std::round((near - corners[k].x) / turn);
       }
-      known &= std::isfinite(position.x) && std::isfinite(position.y);
-      at.Add(position.x, position.y);
+      if (!std::isfinite(corners[k].x) || !std::isfinite(corners[k].y)) return false;
     }
-    if (!known) return Apart(cell, heights_.min, heights_.max);
+    return true;
+  }
+
+  // Columns and rows of samples in a box of pixels, ends included, a turn on or not.
+  struct Centres {
+    std::int64_t west, north, east, south;
+    bool empty() const { return west > east || north > south; }
+  };
+  static Centres CentresIn(const PixelBounds& box, double shift) {
+    const auto first = [](double pixel) { return static_cast<std::int64_t>(std::ceil(pixel - 0.5)); };
+    const auto last = [](double pixel) { return static_cast<std::int64_t>(std::floor(pixel - 0.5)); };
+    return {first(box.west + shift), first(box.north), last(box.east + shift), last(box.south)};
+  }
+
+  // What the sheet has in a cell that is no part of its even grid: the least of several bounds, `known` among them; 0
+  // for one that is among the loose ones now. `gives_way`: the sheet is blended there, and its height between samples
+  // counts as they do. `fills`: what is filled in counts too.
+  double RangeGap(const TileCell& cell, bool gives_way, bool fills, double known = kUnknown) {
+    std::array<Position, 4> corners;
+    if (!Place(cell, corners)) return std::min(known, Apart(cell, heights_.min, heights_.max));
+    PixelBounds box;
+    for (const Position& corner : corners) box.Add(corner.x, corner.y);
     // Edges of cells bulge by far less. The samples are at the pixels' centres.
     constexpr double kBulge = 1.0 / 32;
-    const double halo = fills ? sheet_.options().max_void_gap + trace_.factor : 0;
-    const double x = (at.east - at.west) * kBulge + halo, y = (at.south - at.north) * kBulge + halo;
-    const double west = at.west - x, north = at.north - y, east = at.east + x, south = at.south + y;
-    const auto first = [](double pixel) { return std::ceil(pixel - 0.5); };
-    const auto last = [](double pixel) { return std::floor(pixel - 0.5); };
-    if (first(north) > last(south)) return 0;
-    if (!fills) {
-      if (const double gap = NearGap(cell, west, north, east, south); std::isfinite(gap)) return gap;
-    }
+    double halo = gives_way ? 1 : 0;
+    if (fills) halo += sheet_.options().max_void_gap + trace_.factor;
+    box.Grow((box.east - box.west) * kBulge + halo, (box.south - box.north) * kBulge + halo);
+    std::array<Centres, 3> turns;  // none, back, on
+    bool is_empty = true;
     BlockRange range;
-    for (const int turn : {-1, 0, 1}) {
-      if (turn != 0 && !sheet_.wraps()) continue;
-      const double shift = static_cast<double>(turn) * sheet_.columns();
-      if (first(west + shift) > last(east + shift)) continue;
-      range.Add(Ranges(first(west + shift), first(north), last(east + shift), last(south)));
+    for (const int turn : {0, -1, 1}) {
+      Centres& centres = turns[static_cast<std::size_t>((turn + 3) % 3)];
+      centres = CentresIn(box, turn * static_cast<double>(sheet_.columns()));
+      if ((turn != 0 && !sheet_.wraps()) || centres.empty()) continue;
+      is_empty = false;
+      range.Add(Ranges(static_cast<double>(centres.west), static_cast<double>(centres.north),
+                       static_cast<double>(centres.east), static_cast<double>(centres.south)));
     }
-    return range.min > range.max ? 0 : Apart(cell, range.min, range.max);
+    if (is_empty || range.min > range.max) return 0;
+    double gap = std::min(known, Apart(cell, range.min, range.max));
+    if (fills) return gap;
+    gap = std::min(gap, NearGap(cell, box.west, box.north, box.east, box.south));
+    if (gives_way) return gap;
+    if (IsWorthReading(gap)) {
+      loose_.back().cells.push_back({cell, corners, turns[0], gap});
+      loose_.back().gap = std::max(loose_.back().gap, gap);
+      return 0;
+    }
+    if (trace_.factor > 1) return gap;
+    for (const int turn : {0, -1, 1}) {
+      if (turn != 0 && !sheet_.wraps()) continue;
+      gap = std::min(gap, CentreGap(cell, corners, turns[0], trace_.window, trace_.samples,
+                                    turn * std::int64_t{sheet_.columns()}));
+    }
+    return gap;
+  }
+
+  // Against the samples in the cell themselves; infinite where not all of them are in the window. `turn`: how many
+  // columns on the window's samples are.
+  double CentreGap(const TileCell& cell, const std::array<Position, 4>& corners, const Centres& within,
+                   const GridWindow& window, const std::vector<float>& samples, std::int64_t turn) const {
+    const Centres in = Clipped(within);
+    if (in.empty()) return 0;
+    if (in.west + turn < window.column || in.east + turn >= window.column + window.columns || in.north < window.row ||
+        in.south >= window.row + window.rows) {
+      return kUnknown;
+    }
+    const CellSurface surface = SurfaceOf(cell, corners);
+    double gap = 0;
+    for (std::int64_t row = in.north; row <= in.south; ++row) {
+      const float* const line = samples.data() + (row - window.row) * window.columns + (turn - window.column);
+      for (std::int64_t column = in.west; column <= in.east; ++column) {
+        const double sample = line[column];
+        if (std::isnan(sample)) continue;
+        gap = std::max(gap, surface.Apart({static_cast<double>(column) + 0.5, static_cast<double>(row) + 0.5}, sample));
+      }
+    }
+    return gap;
+  }
+  Centres Clipped(Centres centres) const {
+    if (!sheet_.wraps()) {
+      centres.west = std::max<std::int64_t>(centres.west, 0);
+      centres.east = std::min<std::int64_t>(centres.east, sheet_.columns() - 1);
+    }
+    centres.north = std::max<std::int64_t>(centres.north, 0);
+    centres.south = std::min<std::int64_t>(centres.south, sheet_.rows() - 1);
+    return centres;
+  }
+
+  // A cell whose bound, told from averages and tables, may be improved by reading its samples.
+  struct LooseCell {
+    TileCell cell;
+    std::array<Position, 4> corners;
+    Centres centres;
+    double gap = 0;
+  };
+  // Of a group of cells: their samples are read together.
+  struct LooseGroup {
+    std::vector<LooseCell> cells;
+    double gap = 0;
+  };
+
+  bool IsWorthReading(double gap) const {
+    return trace_.factor > 1 && trace_.factor <= kMostRead && gap > tile_.bound_;
+  }
+
+  // Reads groups in the order of their bounds, until all others are below what is known anyway.
+  Result<void> ReadLoose(const std::stop_token& stop) {
+    std::ranges::stable_sort(loose_, std::ranges::greater(), &LooseGroup::gap);
+    std::int64_t left = kMostSamples;
+    for (const LooseGroup& group : loose_) {
+      if (group.gap <= tile_.bound_) return {};
+      Centres all{std::numeric_limits<std::int64_t>::max(), std::numeric_limits<std::int64_t>::max(),
+                  std::numeric_limits<std::int64_t>::min(), std::numeric_limits<std::int64_t>::min()};
+      for (const LooseCell& loose : group.cells) {
+        const Centres in = Clipped(loose.centres);
+        if (in.empty() || loose.gap <= tile_.bound_) continue;
+        all = {std::min(all.west, in.west), std::min(all.north, in.north), std::max(all.east, in.east),
+               std::max(all.south, in.south)};
+      }
+      if (all.empty()) continue;
+      const GridWindow window{all.west, all.north, all.east - all.west + 1, all.south - all.north + 1};
+      if (window.columns > left || window.rows > left || window.columns * window.rows > left) {
+        Raise(group.gap);
+        return {};
+      }
+      left -= window.columns * window.rows;
+      const auto samples = sheet_.ReadSamples(window, stop);
+      if (!samples) return tl::unexpected(samples.error());
+      for (const LooseCell& loose : group.cells) {
+        if (loose.gap <= tile_.bound_) continue;
+        Raise(std::min(loose.gap, CentreGap(loose.cell, loose.corners, loose.centres, window, *samples, 0)));
+      }
+    }
+    return {};
   }
 
   SourceGap& tile_;
@@ -564,6 +759,12 @@ class SheetGap {
   const std::size_t stride_;
   static constexpr double kUnknown = std::numeric_limits<double>::infinity();
 
+  // Averages of more samples are judged by tables, which are as fine. Of one tile no more samples are read than its own
+  // heights may take.
+  static constexpr int kMostRead = 16;
+  static constexpr std::int64_t kMostSamples = std::int64_t{1} << 20;
+
+  std::vector<LooseGroup> loose_;
   std::vector<std::size_t> near_;  // members
   HeightRange heights_;            // of all of them
   std::vector<double> x_, y_;      // by node, in samples of the grid; NaN away from its even part
@@ -576,7 +777,9 @@ SourceGap::SourceGap(const geo::Lattice& lattice, const NodeWindow& window, std:
       blends_(blends),
       covered_(static_cast<std::size_t>(lattice.cells) * static_cast<std::size_t>(lattice.cells)) {}
 
-void SourceGap::Add(const Sheet& sheet, const SheetTrace& trace) { SheetGap(*this, sheet, trace).Add(); }
+Result<void> SourceGap::Add(const Sheet& sheet, const SheetTrace& trace, const std::stop_token& stop) {
+  return SheetGap(*this, sheet, trace).Add(stop);
+}
 
 bool SourceGap::is_covered() const {
   return std::ranges::all_of(covered_, [](std::uint8_t covered) { return covered != 0; });
