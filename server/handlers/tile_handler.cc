@@ -2,12 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
 #include <cmath>
 #include <iterator>
 #include <memory>
 #include <utility>
 
+#include "proto/error_text.h"
 #include "proto/media_type.h"
 #include "server/handlers/backend_failure.h"
 #include "server/http/http_error.h"
@@ -66,23 +66,13 @@ Response TileHandler::Reply(const ServedTile& served, const TileRequest& tile, c
   response.etag = served.tile->etag;
   response.cache_control = options_.cache_control;
   response.vary = tile.format != TileFormat::kHeightPng;  // which has one form
-  response.headers.emplace_back("Terrain-Max-Error", FormatErrorUp(served.tile->max_error_m));
+  response.headers.emplace_back("Terrain-Max-Error", proto::FormatErrorUp(served.tile->max_error_m));
   if (const auto certified = served.tile->certified_error_m; certified && std::isfinite(*certified)) {
-    response.headers.emplace_back("Terrain-Certified-Error", FormatErrorUp(*certified));
+    response.headers.emplace_back("Terrain-Certified-Error", proto::FormatErrorUp(*certified));
   }
   response.headers.emplace_back("Server-Timing", FormatServerTiming(served.cache, served.tile->times));
   response.cache = Name(served.cache);
   return Conditional(std::move(response), request);
-}
-
-std::string FormatErrorUp(double error_m) {
-  std::string text = fmt::format("{:.6g}", error_m);
-  double printed = 0;
-  std::from_chars(text.data(), text.data() + text.size(), printed);
-  if (printed >= error_m) return text;
-  // Rounding went down by less than half a unit of the last digit: one unit more rounds to the next number up.
-  const double unit = std::pow(10.0, std::floor(std::log10(error_m)) - 5);
-  return fmt::format("{:.6g}", error_m + unit);
 }
 
 std::string FormatServerTiming(CacheStatus cache, const StageTimes& times) {

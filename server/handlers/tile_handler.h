@@ -41,9 +41,6 @@ class TileHandler {
   const TileHandlerOptions options_;
 };
 
-// Metres with six significant digits, never below `error_m`.
-std::string FormatErrorUp(double error_m);
-
 // "cache;desc=miss, queue;dur=0.021, read;dur=1.234, ...": milliseconds, the steps of the build that was waited for.
 std::string FormatServerTiming(CacheStatus cache, const StageTimes& times);
 
