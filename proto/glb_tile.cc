@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 #include <utility>
 #include <vector>
 
 #include "engine/core/bytes.h"
 #include "engine/core/check.h"
+#include "proto/error_text.h"
 #include "proto/gltf.h"
 #include "proto/meshopt.h"
 
@@ -188,6 +190,13 @@ GltfMesh Describe(const GlbOptions& options) {
   gltf.material.emplace();
   if (!options.texture) gltf.material->color = kGroundColor;
   if (options.texture) gltf.copyright = options.copyright;
+  const auto add = [&gltf](std::string_view name, const std::optional<double>& error_m) {
+    if (error_m && std::isfinite(*error_m)) {
+      gltf.scene_extras.emplace_back(name, std::strtod(FormatErrorUp(*error_m).c_str(), nullptr));
+    }
+  };
+  add("maxError", options.max_error_m);
+  add("certifiedError", options.certified_error_m);
   return gltf;
 }
 

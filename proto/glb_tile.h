@@ -36,9 +36,11 @@ struct GlbTexture {
 struct GlbOptions {
   GlbCompression compression = GlbCompression::kDraco;
   DracoOptions draco;
-  std::string generator = "terrace";  // asset.generator
-  std::optional<GlbTexture> texture;  // none: the ground is plain grey
-  std::string copyright;              // asset.copyright, of the texture
+  std::string generator = "terrace";       // asset.generator
+  std::optional<GlbTexture> texture = {};  // none: the ground is plain grey
+  std::string copyright = {};              // asset.copyright, of the texture
+  // Metres, of the tile at its finest reading: extras of the scene, each where it is known and finite.
+  std::optional<double> max_error_m = {}, certified_error_m = {};
 };
 
 struct GlbTile {

@@ -101,12 +101,13 @@ std::string GltfJson(const GltfMesh& mesh) {
   }
   json["scene"] = 0;
   json["scenes"] = Json::array({{{"nodes", {0}}}});
+  for (const auto& [name, value] : mesh.scene_extras) json["scenes"][0]["extras"]["terrain"][std::string(name)] = value;
   json["nodes"] = Json::array({{{"mesh", 0}, {"matrix", mesh.matrix}}});
   json["meshes"] = Json::array({{{"primitives", Json::array({PrimitiveJson(mesh)})}}});
   if (mesh.material) {
     Json& pbr = json["materials"][0]["pbrMetallicRoughness"];
     if (mesh.material->color != GltfMaterial{}.color) pbr["baseColorFactor"] = mesh.material->color;
-      if (mesh.texture) pbr["baseColorTexture"] = {{"index", 0}};
+    if (mesh.texture) pbr["baseColorTexture"] = {{"index", 0}};
     pbr["metallicFactor"] = 0;
     pbr["roughnessFactor"] = 1;
   }

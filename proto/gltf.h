@@ -70,6 +70,7 @@ struct GltfMesh {
   std::optional<GltfMaterial> material;  // without one, glTF's default applies, which is a metal
   std::optional<GltfTexture> texture;
   std::string_view copyright;  // empty: none
+  std::vector<std::pair<std::string_view, double>> scene_extras;
   std::size_t buffer_bytes = 0;
 };
 

@@ -14,6 +14,9 @@ namespace {
 // The smallest radius of curvature there is: a meridian's at the equator.
 constexpr double kSmallestRadius = geo::kSemiMinorAxis * geo::kSemiMinorAxis / geo::kSemiMajorAxis;
 
+// Ground up to 100 km from the ellipsoid turns by that much more of a step than the ellipsoid does.
+constexpr double kHeights = 1.02;
+
 // Lattice columns and rows, from the tile's south-western sample.
 struct Place {
   double x = 0, y = 0;
@@ -40,12 +43,17 @@ class Ground {
            surface;
   }
 
-  // Metres, at most.
-  double WidestDiagonal() const {
+  // Metres along a row and along a column, at most.
+  Place WidestStep() const {
     double widest = 0;
     for (const geo::Vec3& up : rows_) widest = std::max(widest, up.x);
     constexpr double kLargestRadius = geo::kSemiMajorAxis * geo::kSemiMajorAxis / geo::kSemiMinorAxis;
-    return std::hypot(widest, 1.0) * step_ * kLargestRadius;
+    return {widest * step_ * kLargestRadius, step_ * kLargestRadius};
+  }
+  // Metres, at most.
+  double WidestDiagonal() const {
+    const Place step = WidestStep();
+    return std::hypot(step.x, step.y);
   }
   double step_radians() const { return step_; }
 
@@ -180,6 +188,27 @@ double WidestSpan(const EdgeMeter& meter, const std::vector<Place>& places,
   return widest * step;
 }
 
+// Metres: the largest of the smallest circles around triangles, about the middle of the longest edge or through all
+// vertices. `step`: of a lattice step of either axis, at most.
+double WidestCircle(const std::vector<Place>& places, const std::vector<std::array<std::uint32_t, 3>>& triangles,
+                    const Place& step) {
+  double widest = 0;  // squared
+  for (const auto& triangle : triangles) {
+    std::array<double, 3> sides{};  // squared
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Place &a = places[triangle[k]], &b = places[triangle[(k + 1) % 3]];
+      const double x = (a.x - b.x) * step.x, y = (a.y - b.y) * step.y;
+      sides[k] = x * x + y * y;
+    }
+    const auto [a, b, c] = sides;
+    const double longest = std::max({a, b, c});
+    const double area = 2 * (a * b + b * c + c * a) - (a * a + b * b + c * c);  // its square, times 16
+    const bool is_obtuse = 2 * longest >= a + b + c;
+    widest = std::max(widest, is_obtuse || area <= 0 ? longest / 4 : std::min(longest / 3, a * b * c / area));
+  }
+  return std::sqrt(widest);
+}
+
 // Measured at the ends of pieces, where the edge's point in space is the chord's. Between them, and on the triangles
 // between edges, the height of a chord strays from a linear one by at most what the last lines add.
 double CurvedError(const EdgeMeter& meter, const Ground& ground, const std::vector<Place>& places,
@@ -196,7 +225,6 @@ double CurvedError(const EdgeMeter& meter, const Ground& ground, const std::vect
     });
   });
   const double diagonal = ground.WidestDiagonal(), span = WidestSpan(meter, places, triangles, ground.step_radians());
-  constexpr double kHeights = 1.02;  // ground up to 100 km from the ellipsoid
   return largest + kHeights * (0.75 * diagonal * diagonal / kSmallestRadius + span * span / 8 * diagonal);
 }
 
@@ -215,9 +243,9 @@ double MeasureEdgeError(const LatticeView& lattice, const QuantizedTile& tile, b
   const double planar = PlanarError(meter, places, heights, tile.triangles);
   if (curved) return std::max(planar, CurvedError(meter, ground, places, DecodePositions(tile), tile.triangles));
   // A function whose second derivatives are at most M strays from its linear interpolation on a triangle by at most
-  // M r^2 / 2, r the radius of a circle around it, at most its longest edge over the root of 3.
-  const double longest = WidestSpan(meter, places, tile.triangles, ground.step_radians()) * geo::kSemiMajorAxis;
-  return planar + longest * longest / (6 * kSmallestRadius);
+  // M r^2 / 2, r the radius of a circle around it.
+  const double radius = WidestCircle(places, tile.triangles, ground.WidestStep());
+  return planar + kHeights * radius * radius / (2 * kSmallestRadius);
 }
 
 double MeasureFlatEdgeError(const LatticeView& lattice, const tin::TinMesh& mesh,

@@ -163,7 +163,9 @@ Result<double> DemSource::Impl::GapOf(const TileHeights& tile, const NodeWindow&
                                       const std::vector<SheetTrace>& traces, const std::stop_token& stop) const {
   const std::vector<std::size_t> order = SheetsAt(BoxOf(tile.lattice, window));
   SourceGap gap(tile.lattice, window, tile.heights, has_feather && order.size() > 1);
-  for (std::size_t k = 0; k < traces.size(); ++k) gap.Add(sheets[order[k]], traces[k]);
+  for (std::size_t k = 0; k < traces.size(); ++k) {
+    if (const auto added = gap.Add(sheets[order[k]], traces[k], stop); !added) return tl::unexpected(added.error());
+  }
   // All nodes have their height; samples of further sheets may still show between them.
   std::vector<float> none_wanted = tile.heights;
   for (std::size_t k = traces.size(); k < order.size() && !gap.is_covered(); ++k) {
@@ -171,7 +173,7 @@ Result<double> DemSource::Impl::GapOf(const TileHeights& tile, const NodeWindow&
     SheetTrace trace;
     const auto filled = sheet.Fill(tile.lattice, window, Counting::kEllipsoid, none_wanted, stop, {}, &trace);
     if (!filled) return tl::unexpected(filled.error());
-    gap.Add(sheet, trace);
+    if (const auto added = gap.Add(sheet, trace, stop); !added) return tl::unexpected(added.error());
   }
   return gap.bound();
 }

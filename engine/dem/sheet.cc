@@ -226,7 +226,12 @@ Result<std::vector<float>> Sheet::ReadWeights(int factor, const GridWindow& wind
 Result<void> Sheet::FillAt(std::span<const Position> positions, std::size_t stride, std::span<const double> undulations,
                            int factor, std::span<float> heights, const std::stop_token& stop, std::span<float> weights,
                            SheetTrace* trace) const {
-  Cells found = CellsAt(positions, stride, heights, factor);
+  Cells found = CellsAt(positions, stride, heights, factor), others;
+  if (trace != nullptr && !weights.empty()) {
+    std::vector<float> known(heights.size(), 0);
+    for (std::size_t i = 0; i < known.size(); ++i) known[i] = std::isnan(heights[i]) ? 0 : SampleRules::kVoid;
+    others = CellsAt(positions, stride, known, factor);
+  }
   if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "reading was stopped");
   if (found.cells.empty()) return CheckUnread();
   GridWindow window = WindowOf(found.cells, Columns(factor), Rows(factor));
@@ -265,8 +270,31 @@ Result<void> Sheet::FillAt(std::span<const Position> positions, std::size_t stri
   if (trace != nullptr) {
     trace->window = window;
     trace->cells = std::move(found.cells);
+    TraceOthers(others, *samples, undulations, *trace);
   }
   return {};
+}
+
+// Nodes whose height others gave, as far as what was read tells the sheet's own.
+void Sheet::TraceOthers(const Cells& others, const std::vector<float>& samples, std::span<const double> undulations,
+                        SheetTrace& trace) const {
+  const GridWindow& window = trace.window;
+  const std::int64_t turn = wraps_ ? Columns(trace.factor).count() : 0;
+  for (std::size_t i = 0; i < others.cells.size(); ++i) {
+    GridCell cell = others.cells[i];
+    const std::size_t node = others.nodes[i];
+    if (cell.column < window.column) cell.column += turn;
+    if (cell.column + 1 >= window.column + window.columns) cell.column -= turn;
+    if (cell.column < window.column || cell.column + 1 >= window.column + window.columns || cell.row < window.row ||
+        cell.row + 1 >= window.row + window.rows) {
+      continue;
+    }
+    const auto height = Interpolate(samples, window, cell);
+    if (!height || (!undulations.empty() && std::isnan(undulations[node]))) continue;
+    trace.cell_of_node[node] = static_cast<std::int32_t>(trace.cells.size());
+    trace.heights[node] = RoundHeight(undulations.empty() ? *height : *height + undulations[node]);
+    trace.cells.push_back(cell);
+  }
 }
 
 Result<void> Sheet::Fill(const geo::Lattice& lattice, const NodeWindow& window, Counting counting,

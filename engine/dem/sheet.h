@@ -32,10 +32,12 @@ struct SheetRange {
 
 // What Fill saw of a window, for whoever wants to know how far its heights are from the samples.
 struct SheetTrace {
-  std::vector<Position> positions;         // by node, in pixels; NaN where there is none
-  std::vector<std::int32_t> cell_of_node;  // in `cells`; -1: the sheet has no interpolated height for the node
-  std::vector<float> heights;              // by node: the sheet's own, whatever it counts; NaN where it has none
-  std::vector<double> undulations;         // by node, part of the heights; empty where they count as the samples do
+  std::vector<Position> positions;  // by node, in pixels; NaN where there is none
+  // In `cells`; -1: the sheet has no interpolated height for the node. Where sheets are blended, nodes that others fill
+  // have theirs too, as far as what was read tells it.
+  std::vector<std::int32_t> cell_of_node;
+  std::vector<float> heights;       // by node: the sheet's own, whatever it counts; NaN where it has none
+  std::vector<double> undulations;  // by node, part of the heights; empty where they count as the samples do
   std::vector<GridCell> cells;
   GridWindow window;
   // Of the window, averages by the factor, before voids were filled; after that where `includes_filled`.
@@ -99,6 +101,12 @@ class Sheet {
   Result<void> FillPoints(std::span<const GeoPosition> points, HeightDatum datum, std::span<float> heights,
                           const std::stop_token& stop) const;
 
+  // As measured, NaN for voids, row by row from the north. Columns outside the sheet are a turn on, of sheets that
+  // wrap.
+  Result<std::vector<float>> ReadSamples(const GridWindow& window, const std::stop_token& stop) const {
+    return ReadBlocks(1, window, stop);
+  }
+
   // Whether its samples in a box of pixels may count less than in full when they are averaged by this factor or a
   // smaller one: an edge or a void is as near as the feather is wide.
   bool GivesWay(const Box& pixels, int factor) const;
@@ -138,6 +146,8 @@ class Sheet {
   Result<void> FillAt(std::span<const Position> positions, std::size_t stride, std::span<const double> undulations,
                       int factor, std::span<float> heights, const std::stop_token& stop, std::span<float> weights,
                       SheetTrace* trace = nullptr) const;
+  void TraceOthers(const Cells& others, const std::vector<float>& samples, std::span<const double> undulations,
+                   SheetTrace& trace) const;
   std::optional<float> PoleHeight(int pole, Counting counting) const;  // 0 south, 1 north
   // What each sample of the window counts; empty: all count in full.
   Result<std::vector<float>> ReadWeights(int factor, const GridWindow& window, const std::stop_token& stop) const;

@@ -4,8 +4,10 @@
 
 #include <cstdint>
 #include <span>
+#include <stop_token>
 #include <vector>
 
+#include "engine/core/result.h"
 #include "engine/dem/dem_source.h"
 #include "engine/dem/sheet.h"
 #include "engine/geo/lattice.h"
@@ -19,8 +21,9 @@ class SourceGap {
   // blended where one gives way to the next.
   SourceGap(const geo::Lattice& lattice, const NodeWindow& window, std::span<const float> heights, bool blends);
 
-  // `trace`: what Sheet::Fill noted of this window, for heights above the ellipsoid.
-  void Add(const Sheet& sheet, const SheetTrace& trace);
+  // `trace`: what Sheet::Fill noted of this window, for heights above the ellipsoid. Samples may be read where nothing
+  // else tells enough. kUnavailable: a raster cannot be read now. kCancelled: stopped.
+  Result<void> Add(const Sheet& sheet, const SheetTrace& trace, const std::stop_token& stop);
 
   // No sample of a further sheet shows anywhere.
   bool is_covered() const;

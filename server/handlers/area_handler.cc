@@ -9,6 +9,7 @@
 #include <string>
 #include <utility>
 
+#include "proto/error_text.h"
 #include "server/handlers/backend_failure.h"
 #include "server/http/http_error.h"
 #include "server/http/negotiate.h"
@@ -155,7 +156,7 @@ asio::awaitable<Response> AreaHandler::Handle(Route route, Request request) cons
   const Result<TilePtr> mesh = co_await tiles_.Run(std::move(work), TileService::Length::kLong, deadline);
   if (!mesh) co_return co_await BackendFailure(mesh.error(), std::string(request.id), options_.refusal_delay);
   response.body = Body(*mesh, &(*mesh)->bytes);
-  response.headers.emplace_back("Terrain-Max-Error", FormatErrorUp((*mesh)->max_error_m));
+  response.headers.emplace_back("Terrain-Max-Error", proto::FormatErrorUp((*mesh)->max_error_m));
   if (area->coordinates == AreaCoordinates::kEnu) {
     response.headers.emplace_back("Terrain-Origin", FormatOrigin(plan->centre));
   }

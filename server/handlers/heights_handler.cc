@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "proto/error_text.h"
 #include "server/handlers/backend_failure.h"
 #include "server/http/http_error.h"
 #include "server/http/negotiate.h"
@@ -59,20 +60,28 @@ asio::awaitable<Response> HeightsHandler::Handle(Route route, Request request) c
     if (MatchesEtag(request.fields->if_none_match, response.etag)) co_return Conditional(std::move(response), request);
   }
 
+  const auto deadline = TileService::Clock::now() + options_.deadline;
+  std::shared_ptr<const CertifiedPoints> certified;
+  if (parsed->certify_level) {
+    Result<CertifiedPoints> points = TilesOf(catalog_->datasets[*dataset], parsed->points, *parsed->certify_level);
+    if (!points) co_return ClientErrorResponse(points.error(), request.id);
+    Result<CertifiedPoints> known = co_await Certify(*dataset, *std::move(points), deadline);
+    if (!known) co_return co_await BackendFailure(known.error(), std::string(request.id), options_.refusal_delay);
+    certified = std::make_shared<const CertifiedPoints>(*std::move(known));
+  }
   auto query = std::make_shared<const HeightsQuery>(*std::move(parsed));
-  SingleFlight::Work work = [catalog = catalog_, index = *dataset, coding,
-                             query](std::stop_token stop) -> Result<EncodedTile> {
+  SingleFlight::Work work = [catalog = catalog_, index = *dataset, coding, query,
+                             certified](std::stop_token stop) -> Result<EncodedTile> {
     const auto begun = TileService::Clock::now();
     const Result<std::vector<float>> heights =
         catalog->read_points(index, query->points, query->datum, std::move(stop));
     if (!heights) return tl::unexpected(heights.error());
     EncodedTile reply;
     reply.times.read = std::chrono::duration_cast<std::chrono::microseconds>(TileService::Clock::now() - begun);
-    reply.bytes = HeightsJson(*query, *heights, catalog->datasets[index].name);
+    reply.bytes = HeightsJson(*query, *heights, catalog->datasets[index].name, certified.get());
     reply.bytes = Compress(std::move(reply.bytes), coding);
     return reply;
   };
-  const auto deadline = TileService::Clock::now() + options_.deadline;
   const Result<TilePtr> reply = co_await tiles_.Run(std::move(work), TileService::Length::kShort, deadline);
   if (!reply) co_return co_await BackendFailure(reply.error(), std::string(request.id), options_.refusal_delay);
   response.body = Body(*reply, &(*reply)->bytes);
@@ -80,7 +89,21 @@ asio::awaitable<Response> HeightsHandler::Handle(Route route, Request request) c
   co_return response;
 }
 
-std::string HeightsJson(const HeightsQuery& query, std::span<const float> heights, std::string_view dataset) {
+asio::awaitable<Result<CertifiedPoints>> HeightsHandler::Certify(std::uint32_t dataset, CertifiedPoints points,
+                                                                 TileService::Clock::time_point deadline) const {
+  for (std::size_t i = 0; i < points.tiles.size(); ++i) {
+    TileRequest tile;
+    tile.dataset = dataset;
+    tile.key = points.tiles[i];
+    const Result<ServedTile> served = co_await tiles_.Get(catalog_, tile, deadline);
+    if (!served) co_return tl::unexpected(served.error());
+    points.errors_m[i] = served->tile->certified_error_m;
+  }
+  co_return points;
+}
+
+std::string HeightsJson(const HeightsQuery& query, std::span<const float> heights, std::string_view dataset,
+                        const CertifiedPoints* certified) {
   const std::string name = nlohmann::json(dataset).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
   std::string json = "{\"results\":[";
   const auto out = std::back_inserter(json);
@@ -94,6 +117,13 @@ std::string HeightsJson(const HeightsQuery& query, std::span<const float> height
     }
     fmt::format_to(out, ",\"location\":{{\"lat\":{},\"lng\":{}}}", query.points[i].latitude, query.points[i].longitude);
     if (!query.distances_m.empty()) fmt::format_to(out, ",\"distance\":{}", query.distances_m[i]);
+    if (certified != nullptr && !std::isnan(heights[i])) {
+      const std::size_t tile = certified->tile_of_point[i];
+      const std::optional<double>& error_m = certified->errors_m[tile];
+      const bool is_bounded = error_m && std::isfinite(*error_m);
+      fmt::format_to(out, ",\"certified_error\":{},\"tile\":\"{}\"",
+                     is_bounded ? proto::FormatErrorUp(*error_m) : "null", geo::ToString(certified->tiles[tile]));
+    }
     fmt::format_to(out, ",\"dataset\":{}}}", name);
   }
   if (query.datum == dem::HeightDatum::kOrthometric) return json + "],\"datum\":\"orthometric\",\"status\":\"OK\"}";

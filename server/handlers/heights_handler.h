@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "server/asio.h"
+#include "server/handlers/certified_points.h"
 #include "server/handlers/heights_query.h"
 #include "server/handlers/tile_handler.h"
 #include "server/http/request.h"
@@ -26,6 +27,9 @@ class HeightsHandler {
   asio::awaitable<Response> Handle(Route route, Request request) const;
 
  private:
+  // Fills in the errors of tiles, one after the other, from the cache or by building them.
+  asio::awaitable<Result<CertifiedPoints>> Certify(std::uint32_t dataset, CertifiedPoints points,
+                                                   TileService::Clock::time_point deadline) const;
   Result<HeightsQuery> Parse(const Route& route, const Request& request) const;
 
   const CatalogPtr catalog_;
@@ -36,6 +40,8 @@ class HeightsHandler {
 
 // {"results":[{"elevation","location":{"lat","lng"},"dataset"}],"status":"OK"}, as Open Topo Data replies; points of a
 // path have their "distance" as well. Metres; null where there is no height. Orthometric ones say so: "datum".
-std::string HeightsJson(const HeightsQuery& query, std::span<const float> heights, std::string_view dataset);
+// `certified`, unless it is null: "certified_error" and "tile" of each point that has a height.
+std::string HeightsJson(const HeightsQuery& query, std::span<const float> heights, std::string_view dataset,
+                        const CertifiedPoints* certified = nullptr);
 
 }  // namespace terrace::server

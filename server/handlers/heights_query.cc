@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "engine/dem/geodesic_path.h"
+#include "engine/geo/tile_key.h"
 #include "server/http/text.h"
 
 namespace terrace::server {
@@ -59,18 +60,19 @@ Result<std::vector<dem::GeoPosition>> ParseLocations(std::string_view text, cons
 
 // Each parameter at most once.
 struct Wishes {
-  std::optional<std::string> locations, path, step, samples, datum;
+  std::optional<std::string> locations, path, step, samples, datum, certify;
 
   Result<void> Set(const std::string& name, const std::string& value) {
-    std::optional<std::string>* const known[] = {&locations, &path, &step, &samples, &datum};
-    constexpr const char* kNames[] = {"locations", "path", "step", "samples", "datum"};
+    std::optional<std::string>* const known[] = {&locations, &path, &step, &samples, &datum, &certify};
+    constexpr const char* kNames[] = {"locations", "path", "step", "samples", "datum", "certify"};
     for (std::size_t i = 0; i < std::size(kNames); ++i) {
       if (name != kNames[i]) continue;
       if (*known[i]) return MakeError(ErrorCode::kInvalidArgument, "{} is given more than once", kNames[i]);
       *known[i] = value;
       return {};
     }
-    return MakeError(ErrorCode::kInvalidArgument, "unknown parameter; known are locations, path, step, samples, datum");
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "unknown parameter; known are locations, path, step, samples, datum, certify");
   }
 };
 
@@ -163,6 +165,16 @@ Result<HeightsQuery> ParsePoints(const Wishes& wishes, std::size_t max_locations
   return query;
 }
 
+Result<int> ParseCertifyLevel(std::string_view text) {
+  if (text == "deepest") return geo::kMaxLevel;
+  int level = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), level);
+  if (text.empty() || end != text.data() + text.size() || error != std::errc() || level < 0 || level > geo::kMaxLevel) {
+    return MakeError(ErrorCode::kInvalidArgument, "certify must be deepest, or a level from 0 to {}", geo::kMaxLevel);
+  }
+  return level;
+}
+
 }  // namespace
 
 Result<HeightsQuery> ParseHeightsQuery(const QueryParameters& parameters, std::size_t max_locations) {
@@ -172,6 +184,11 @@ Result<HeightsQuery> ParseHeightsQuery(const QueryParameters& parameters, std::s
     if (const Result<void> set = wishes.Set(name, value); !set) return tl::unexpected(set.error());
   }
   Result<HeightsQuery> query = ParsePoints(wishes, max_locations);
+  if (query && wishes.certify) {
+    const Result<int> level = ParseCertifyLevel(*wishes.certify);
+    if (!level) return tl::unexpected(level.error());
+    query->certify_level = *level;
+  }
   if (!query || !wishes.datum || *wishes.datum == "ellipsoid") return query;
   if (*wishes.datum != "orthometric") {
     return MakeError(ErrorCode::kInvalidArgument, "datum must be ellipsoid or orthometric");

@@ -2,11 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
 #include <cmath>
 #include <iterator>
 #include <string_view>
 
+#include "proto/error_text.h"
 #include "proto/media_type.h"
 
 namespace terrace::server {
@@ -30,22 +30,12 @@ HeadLines MakeTileHead(const TileRequest& request, const EncodedTile& tile) {
   put("Content-Length", tile.bytes.size());
   head.of_body = head.text.size();
   if (!tile.etag.empty()) put("ETag", tile.etag);
-  put("Terrain-Max-Error", FormatErrorUp(tile.max_error_m));
+  put("Terrain-Max-Error", proto::FormatErrorUp(tile.max_error_m));
   if (tile.certified_error_m && std::isfinite(*tile.certified_error_m)) {
-    put("Terrain-Certified-Error", FormatErrorUp(*tile.certified_error_m));
+    put("Terrain-Certified-Error", proto::FormatErrorUp(*tile.certified_error_m));
   }
   head.text.shrink_to_fit();
   return head;
-}
-
-std::string FormatErrorUp(double error_m) {
-  std::string text = fmt::format("{:.6g}", error_m);
-  double printed = 0;
-  std::from_chars(text.data(), text.data() + text.size(), printed);
-  if (printed >= error_m) return text;
-  // Rounding went down by less than half a unit of the last digit: one unit more rounds to the next number up.
-  const double unit = std::pow(10.0, std::floor(std::log10(error_m)) - 5);
-  return fmt::format("{:.6g}", error_m + unit);
 }
 
 }  // namespace terrace::server

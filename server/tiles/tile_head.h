@@ -12,7 +12,4 @@ namespace terrace::server {
 // what answers `request`.
 HeadLines MakeTileHead(const TileRequest& request, const EncodedTile& tile);
 
-// Metres with six significant digits, never below `error_m`.
-std::string FormatErrorUp(double error_m);
-
 }  // namespace terrace::server

@@ -102,6 +102,8 @@ Result<void> TilePipeline::EncodeGlb(const TileRequest& request, const RefinedTi
   if (!meshed) return tl::unexpected(meshed.error());
   proto::GlbOptions options = dataset.glb;
   options.compression = request.compression;
+  options.max_error_m = meshed->max_error_m;
+  options.certified_error_m = meshed->surface_error_m + refined.heights.source_gap_m;
   if (const Result<void> added = AddTexture(dataset.imagery, request, options, stop); !added) {
     return tl::unexpected(added.error());
   }
@@ -111,7 +113,7 @@ Result<void> TilePipeline::EncodeGlb(const TileRequest& request, const RefinedTi
   encoded.times.refine += meshed->replayed;
   encoded.times.encode = Since(start) - meshed->replayed;
   encoded.max_error_m = meshed->max_error_m;
-  encoded.certified_error_m = meshed->surface_error_m + refined.heights.source_gap_m;
+  encoded.certified_error_m = options.certified_error_m;
   encoded.vertices = glb->vertices;
   encoded.triangles = glb->triangles;
   return {};

@@ -32,6 +32,12 @@ function cs2cs(latitude, longitude) {
   return Number(done.stdout.trim().split(/\s+/)[2]);
 }
 
+function tool(program, words) {
+  const done = spawnSync(program, words, { encoding: 'utf8' });
+  assert.equal(done.status, 0, `${program} of the package gdal-bin: ${done.stderr}`);
+  return done.stdout;
+}
+
 const folder = fs.mkdtempSync(path.join(os.tmpdir(), 'terrace_datum_'));
 const write = (name, text) => {
   fs.writeFileSync(path.join(folder, name), text);
@@ -69,6 +75,23 @@ describe('vertical datums', () => {
       assert.ok(Math.abs(converted[i] - plain[i] - undulation) < 0.02, `${name}: ${converted[i]}, ${plain[i]}, ${undulation}`);
     });
     assert.deepEqual(single, converted);
+  });
+
+  it('serves each sample that GDAL tells, plus the undulation of cs2cs', async (test) => {
+    const info = JSON.parse(tool('gdalinfo', ['-json', dem]));
+    const [west, width, , north, , height] = info.geoTransform;
+    for (const [name, [latitude, longitude]] of Object.entries(places)) {
+      // The sample whose pixel has the place; the last row at the pole.
+      const column = Math.floor((longitude - west) / width) % info.size[0];
+      const row = Math.min(Math.floor((latitude - north) / height), info.size[1] - 1);
+      const sample = Number(tool('gdallocationinfo', ['-valonly', dem, `${column}`, `${row}`]));
+      const at = [Math.max(north + (row + 0.5) * height, -90), west + (column + 0.5) * width];
+      const undulation = cs2cs(...at);
+      const reply = await json(`${server.url}/egm96/heights?locations=${at.join(',')}`);
+      const served = reply.results[0].elevation;
+      test.diagnostic(`${name}: sample ${sample} m + undulation ${undulation.toFixed(3)} m, served ${served} m`);
+      assert.ok(Math.abs(served - sample - undulation) < 0.02, `${name}: ${served}, ${sample}, ${undulation}`);
+    }
   });
 
   it('tells orthometric heights where the datum is known', async () => {

@@ -5,10 +5,13 @@
 #include <cmath>
 #include <cstdint>
 #include <functional>
+#include <random>
 #include <utility>
 #include <vector>
 
 #include "engine/geo/lattice.h"
+#include "engine/tin/greedy.h"
+#include "engine/tin/height_field.h"
 #include "engine/tin/tin_mesh.h"
 #include "proto/lattice_view.h"
 
@@ -35,6 +38,33 @@ struct GlobalGround {
   }
   LatticeView view() const { return {key, lattice, heights}; }
 };
+
+// Heights between 0 and `relief`, without any order: the same for the same seed.
+struct RandomGround {
+  geo::TileKey key;
+  geo::Lattice lattice;
+  std::vector<float> heights;
+
+  RandomGround(geo::TileKey tile, int cells, double relief, unsigned seed) : key{tile}, lattice{tile.level, cells} {
+    std::mt19937 random(seed);
+    for (int k = 0; k < (cells + 3) * (cells + 3); ++k) {
+      heights.push_back(static_cast<float>(relief * static_cast<double>(random() % 4096) / 4096));
+    }
+  }
+  LatticeView view() const { return {key, lattice, heights}; }
+};
+
+inline tin::TinMesh GreedyMesh(const LatticeView& lattice, const tin::GreedyGoal& goal) {
+  const int side = lattice.cells() + 1;
+  std::vector<float> inside;
+  for (int j = 0; j < side; ++j) {
+    for (int i = 0; i < side; ++i) inside.push_back(lattice.At(i, j));
+  }
+  const auto field = tin::HeightField::Make(side, side, inside);
+  tin::GreedyTriangulation triangulation(*field);
+  triangulation.Run(goal);
+  return triangulation.Mesh();
+}
 
 // Scattered heights between 0 and `relief`, the same in every run.
 inline GlobalHeight Scattered(double relief) {

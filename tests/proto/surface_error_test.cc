@@ -4,42 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <random>
 
-#include "engine/tin/greedy.h"
-#include "engine/tin/height_field.h"
 #include "proto/tile_error.h"
 #include "proto/tile_geometry.h"
 #include "proto/tile_mesh.h"
+#include "tests/proto/ground.h"
 
 namespace terrace::proto {
 namespace {
-
-struct Ground {
-  geo::TileKey key;
-  geo::Lattice lattice;
-  std::vector<float> heights;
-
-  Ground(geo::TileKey tile, int cells, double relief, unsigned seed) : key{tile}, lattice{tile.level, cells} {
-    std::mt19937 random(seed);
-    for (int k = 0; k < (cells + 3) * (cells + 3); ++k) {
-      heights.push_back(static_cast<float>(relief * static_cast<double>(random() % 4096) / 4096));
-    }
-  }
-  LatticeView view() const { return {key, lattice, heights}; }
-};
-
-tin::TinMesh MeshOf(const Ground& ground, int points) {
-  const int side = ground.lattice.cells + 1;
-  std::vector<float> inside;
-  for (int j = 0; j < side; ++j) {
-    for (int i = 0; i < side; ++i) inside.push_back(ground.view().At(i, j));
-  }
-  const auto field = tin::HeightField::Make(side, side, inside);
-  tin::GreedyTriangulation triangulation(*field);
-  triangulation.Run({.max_points = static_cast<std::size_t>(points)});
-  return triangulation.Mesh();
-}
 
 // Bilinear between the four samples around a place.
 double LatticeHeight(const LatticeView& lattice, double x, double y) {
@@ -99,8 +71,8 @@ Largest SampledTile(const LatticeView& lattice, const QuantizedTile& tile) {
 // Where the surface is a saddle inside a cell, the worst place of an edge is neither a sample nor a crossing.
 TEST(SurfaceError, IsReachedAndNeverPassedAtAnyPlaceOfTheTile) {
   for (unsigned seed = 1; seed <= 12; ++seed) {
-    const Ground ground({12, 3000, 2000}, 32, 300, seed);
-    const tin::TinMesh mesh = MeshOf(ground, 4 + static_cast<int>(seed) * 20);
+    const RandomGround ground({12, 3000, 2000}, 32, 300, seed);
+    const tin::TinMesh mesh = GreedyMesh(ground.view(), {.max_points = 4 + seed * 20});
     const QuantizedTile tile = QuantizeTile(ground.view(), mesh, kFineSteps);
     const double at_samples = MeasureTileError(ground.view(), tile, 1e9, false).max_m;
     const double measured = std::max(at_samples, MeasureEdgeError(ground.view(), tile, false));
@@ -113,13 +85,13 @@ TEST(SurfaceError, IsReachedAndNeverPassedAtAnyPlaceOfTheTile) {
 
 TEST(SurfaceError, HoldsBetweenSamplesOnNoiseThatSamplesCannotShow) {
   // All samples on the mesh but those of one cell's diagonal: what is measured lies between samples.
-  Ground ground({12, 3000, 2000}, 32, 0, 1);
+  RandomGround ground({12, 3000, 2000}, 32, 0, 1);
   const auto set = [&](int i, int j, float height) {
     ground.heights[static_cast<std::size_t>(j + 1) * 35 + static_cast<std::size_t>(i + 1)] = height;
   };
   set(10, 10, 100);
   set(11, 11, 100);
-  tin::TinMesh mesh = MeshOf(ground, 200);
+  tin::TinMesh mesh = GreedyMesh(ground.view(), {.max_points = 200});
   const QuantizedTile tile = QuantizeTile(ground.view(), mesh, kFineSteps);
   ASSERT_LT(MeasureTileError(ground.view(), tile, 1e9, false).max_m, 1);
   EXPECT_GE(MeasureEdgeError(ground.view(), tile, false), SampledTile(ground.view(), tile).planar);
@@ -131,8 +103,8 @@ TEST(SurfaceError, BoundsFlatTrianglesFromTheWholeEarthToAStreet) {
       const std::int64_t row = std::clamp<std::int64_t>(
           static_cast<std::int64_t>((latitude + 90) / 180 * static_cast<double>(geo::TileRows(level))), 0,
           geo::TileRows(level) - 1);
-      const Ground ground({level, geo::TileColumns(level) / 3, row}, 64, 20000.0 / (1 << level), 7);
-      const tin::TinMesh mesh = MeshOf(ground, 600);
+      const RandomGround ground({level, geo::TileColumns(level) / 3, row}, 64, 20000.0 / (1 << level), 7);
+      const tin::TinMesh mesh = GreedyMesh(ground.view(), {.max_points = 600});
       const QuantizedTile tile = QuantizeTile(ground.view(), mesh, kFineSteps);
       const double at_samples = MeasureTileError(ground.view(), tile, 1e9, true).max_m;
       const double measured = std::max(at_samples, MeasureEdgeError(ground.view(), tile, true));

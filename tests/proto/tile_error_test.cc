@@ -5,40 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <random>
 
-#include "engine/tin/greedy.h"
-#include "engine/tin/height_field.h"
 #include "proto/tile_mesh.h"
+#include "tests/proto/ground.h"
 
 namespace terrace::proto {
 namespace {
-
-struct Ground {
-  geo::TileKey key;
-  geo::Lattice lattice;
-  std::vector<float> heights;
-
-  Ground(int cells, unsigned seed) : key{9, 300, 400}, lattice{9, cells} {
-    std::mt19937 random(seed);
-    for (int k = 0; k < (cells + 3) * (cells + 3); ++k) {
-      heights.push_back(static_cast<float>(random() % 4096) / 16);
-    }
-  }
-  LatticeView view() const { return {key, lattice, heights}; }
-};
-
-tin::TinMesh MeshOf(const Ground& ground, double max_error) {
-  const int side = ground.lattice.cells + 1;
-  std::vector<float> inside;
-  for (int j = 0; j < side; ++j) {
-    for (int i = 0; i < side; ++i) inside.push_back(ground.view().At(i, j));
-  }
-  const auto field = tin::HeightField::Make(side, side, inside);
-  tin::GreedyTriangulation triangulation(*field);
-  triangulation.Run({.max_error = max_error});
-  return triangulation.Mesh();
-}
 
 EdgeSteps FineSteps() { return {{0x1p-6, 0x1p-6, 0x1p-6, 0x1p-6}, {0x1p-6, 0x1p-6, 0x1p-6, 0x1p-6}}; }
 
@@ -81,8 +53,9 @@ TEST(TileError, FindsTheLargestErrorThatAnySampleHas) {
   for (const int cells : {32, 64}) {
     // The reference looks for every sample in every triangle: few of the large ones, which are slow under sanitizers.
     for (unsigned seed = 0; seed < 6; seed += cells == 32 ? 1 : 5) {
-      const Ground ground(cells, seed);
-      const QuantizedTile tile = QuantizeTile(ground.view(), MeshOf(ground, 40 + 20 * seed), FineSteps());
+      const RandomGround ground({9, 300, 400}, cells, 256, seed);
+      const QuantizedTile tile =
+          QuantizeTile(ground.view(), GreedyMesh(ground.view(), {.max_error = 40.0 + 20 * seed}), FineSteps());
       const TileError error = MeasureTileError(ground.view(), tile, 1e9, false);
       EXPECT_NEAR(error.max_m, LargestError(ground.view(), tile), 1e-6) << cells << ' ' << seed;
       EXPECT_TRUE(error.misses.empty());
@@ -91,8 +64,8 @@ TEST(TileError, FindsTheLargestErrorThatAnySampleHas) {
 }
 
 TEST(TileError, ListsForEachTriangleASampleThatMissesTheBound) {
-  const Ground ground(64, 9);
-  const QuantizedTile tile = QuantizeTile(ground.view(), MeshOf(ground, 120), FineSteps());
+  const RandomGround ground({9, 300, 400}, 64, 256, 9);
+  const QuantizedTile tile = QuantizeTile(ground.view(), GreedyMesh(ground.view(), {.max_error = 120}), FineSteps());
   const TileError error = MeasureTileError(ground.view(), tile, 60, false);
   ASSERT_FALSE(error.misses.empty());
   EXPECT_LE(error.misses.size(), tile.triangles.size());

@@ -200,7 +200,7 @@ TEST(VerticalDatum, RefusesWithTheFileAndTheWayOut) {
   if (!Geoid::OfCrs("EPSG:3855", {0, 0})) {
     const auto refused = DemSource::Open(path, With("egm2008"));
     ASSERT_FALSE(refused);
-    for (const std::string part : {path, std::string("us_nga_egm08_25.tif"), std::string("cdn.proj.org")}) {
+    for (const std::string& part : {path, std::string("us_nga_egm08_25.tif"), std::string("cdn.proj.org")}) {
       EXPECT_NE(refused.error().message.find(part), std::string::npos) << refused.error().message;
     }
   }

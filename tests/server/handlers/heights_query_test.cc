@@ -42,6 +42,14 @@ TEST(HeightsQuery, CountsFromTheEllipsoidUnlessToldOtherwise) {
   EXPECT_EQ(datum("path=1,2|3,4&samples=3&datum=orthometric"), dem::HeightDatum::kOrthometric);
 }
 
+TEST(HeightsQuery, CertifiesDownToALevel) {
+  const auto level = [](const char* query) { return ParseHeightsQuery(*ParseQuery(query), 100)->certify_level; };
+  EXPECT_EQ(level("locations=1,2"), std::nullopt);
+  EXPECT_EQ(level("locations=1,2&certify=0"), 0);
+  EXPECT_EQ(level("locations=1,2&certify=12&datum=orthometric"), 12);
+  EXPECT_EQ(level("path=1,2|3,4&samples=3&certify=deepest"), geo::kMaxLevel);
+}
+
 TEST(HeightsQuery, NamesTheItemThatIsWrong) {
   const struct {
     const char* query;
@@ -86,6 +94,11 @@ TEST(HeightsQuery, NamesTheItemThatIsWrong) {
       {"locations=1,2&interpolation=cubic", "unknown parameter"},
       {"locations=1,2&datum=egm96", "datum must be ellipsoid or orthometric"},
       {"locations=1,2&datum=", "datum must be"},
+      {"locations=1,2&certify=", "certify must be deepest"},
+      {"locations=1,2&certify=-1", "certify must be deepest"},
+      {"locations=1,2&certify=25", "a level from 0 to 24"},
+      {"locations=1,2&certify=3x", "certify must be deepest"},
+      {"locations=1,2&certify=1&certify=1", "certify is given more than once"},
       {"locations=1,2&datum=ellipsoid&datum=ellipsoid", "datum is given more than once"},
   };
   for (const auto& c : cases) {
@@ -153,6 +166,48 @@ TEST(HeightsJson, IsWhatOpenTopoDataSends) {
   const auto json = nlohmann::json::parse(HeightsJson(query, heights, "\"q\""));
   EXPECT_EQ(json["results"][1]["distance"], 1234.5);
   EXPECT_EQ(json["results"][0]["dataset"], "\"q\"");
+}
+
+TEST(HeightsJson, SaysWhichTileIsHowFarOff) {
+  const HeightsQuery query{{{8.5, 46.5}, {-170, 0}, {8.6, 46.5}}, {}};
+  const std::vector<float> heights = {1473.25f, std::numeric_limits<float>::quiet_NaN(), 1500};
+  CertifiedPoints certified;
+  certified.tiles = {{12, 4289, 3105}, {0, 0, 0}, {12, 4291, 3105}};
+  certified.tile_of_point = {0, 1, 2};
+  certified.errors_m = {12.3456781, 7, std::nullopt};
+  EXPECT_EQ(
+      HeightsJson(query, heights, "alps", &certified),
+      R"({"results":[{"elevation":1473.25,"location":{"lat":46.5,"lng":8.5},"certified_error":12.3457,"tile":"12/4289/3105","dataset":"alps"},)"
+      R"({"elevation":null,"location":{"lat":0,"lng":-170},"dataset":"alps"},)"
+      R"({"elevation":1500,"location":{"lat":46.5,"lng":8.6},"certified_error":null,"tile":"12/4291/3105","dataset":"alps"}],"status":"OK"})");
+}
+
+TEST(CertifiedPoints, LieInTheDeepestTilesThereAre) {
+  DatasetView dataset;
+  dataset.available = {{{0, 0, 1, 0}}, {{2, 1, 2, 1}}};  // 0..90 east, 0..90 north at level 1
+  const std::vector<dem::GeoPosition> points = {{45, 45}, {100, 45}, {0, 0}, {-0.001, 0}, {180, 90}, {-180, -90}};
+  const auto deepest = TilesOf(dataset, points, geo::kMaxLevel);
+  ASSERT_TRUE(deepest);
+  const std::vector<geo::TileKey> tiles = {{1, 2, 1}, {0, 1, 0}, {0, 0, 0}};
+  EXPECT_EQ(deepest->tiles, tiles);
+  EXPECT_EQ(deepest->tile_of_point, (std::vector<std::size_t>{0, 1, 0, 2, 2, 2}));
+  EXPECT_EQ(deepest->errors_m.size(), 3u);
+  EXPECT_EQ(TilesOf(dataset, points, 0)->tiles, (std::vector<geo::TileKey>{{0, 1, 0}, {0, 0, 0}}));
+}
+
+TEST(CertifiedPoints, AreRefusedInTooManyTiles) {
+  DatasetView dataset;
+  for (int level = 0; level <= 6; ++level) {
+    dataset.available.push_back({{0, 0, geo::TileColumns(level) - 1, geo::TileRows(level) - 1}});
+  }
+  std::vector<dem::GeoPosition> points;
+  for (std::size_t i = 0; i <= kMostCertifiedTiles; ++i) points.push_back({static_cast<double>(i) * 2.8125 - 179, 1});
+  const auto refused = TilesOf(dataset, points, 6);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_TRUE(TilesOf(dataset, points, 5));
+  points.pop_back();
+  EXPECT_TRUE(TilesOf(dataset, points, 6));
 }
 
 }  // namespace

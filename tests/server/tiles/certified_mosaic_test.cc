@@ -124,13 +124,13 @@ TEST(CertifiedMosaic, RealTilesOverACoarseBase) {
     }
   }
   dem::DemOptions options;
-  ExpectCertified("four tiles over a base", OpenMosaic(files, options), samples, 5);
+  ExpectCertified("four tiles over a base", OpenMosaic(files, options), samples, 3);
   options.source.vertical = "egm96";
   const auto geoid = dem::Geoid::OfCrs("EPSG:5773", {-157, 21});
   ASSERT_TRUE(geoid.has_value());
   const dem::Geoid::Reader reader(**geoid);
   for (Sample& sample : samples) sample.height += reader.At({sample.longitude, sample.latitude});
-  ExpectCertified("the same above EGM96", OpenMosaic(files, options), samples, 5);
+  ExpectCertified("the same above EGM96", OpenMosaic(files, options), samples, 3);
 }
 
 // Samples of all rasters lie at nodes of level 12, those of the base at every 16th.
@@ -214,7 +214,8 @@ TEST(CertifiedMosaic, WhatAFeatherBlends) {
       ASSERT_NE(dataset.source, nullptr);
       const std::vector<Sample> samples = rasters.Truth(*dataset.source);
       const std::string what = fmt::format("feather {:.0f} m, {}", feather, vertical);
-      ExpectCertified(what.c_str(), std::move(dataset), samples, 5);
+      // Half of these tiles lie in the widest feather, where each raster is judged on its own.
+      ExpectCertified(what.c_str(), std::move(dataset), samples, feather < 1000 ? 3 : 3.5);
     }
   }
 }

@@ -192,6 +192,23 @@ TEST(GlbPipeline, DrawsTheTerrainWithinTheStatedError) {
   }
 }
 
+TEST(GlbPipeline, CarriesItsErrorsAsTheHeadersStateThem) {
+  for (const GlbCompression compression : {GlbCompression::kDraco, GlbCompression::kMeshopt}) {
+    for (const int level : {0, 5, 11}) {
+      const EncodedTile tile = Build(GlbRequest(1, MiddleTile(1, level), 0, compression));
+      const auto glb = proto::DecodeGlb(tile.bytes);
+      ASSERT_TRUE(glb && tile.certified_error_m);
+      const nlohmann::json& terrain = glb->json["scenes"][0]["extras"]["terrain"];
+      const double most = terrain["maxError"], certified = terrain["certifiedError"];
+      EXPECT_GE(most, tile.max_error_m);
+      EXPECT_LE(most, tile.max_error_m * (1 + 1.001e-5));
+      EXPECT_GE(certified, *tile.certified_error_m);
+      EXPECT_LE(certified, *tile.certified_error_m * (1 + 1.001e-5));
+      EXPECT_GE(certified, most);
+    }
+  }
+}
+
 TEST(GlbPipeline, FormatsShareOneRefinement) {
   std::vector<Dataset> datasets;
   datasets.push_back(OpenSample("jacksboro"));
