@@ -12,6 +12,7 @@ import dataclasses
 import json
 import os
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
@@ -65,12 +66,13 @@ def run(command, **kwargs):
 
 
 def sanitizer_tests(build):
-    """Names of the tests that are executables of the build (terrace_test gives both one name) and not labelled `slow`."""
+    """Test -> executable of the build, of the tests not labelled `slow`. terrace_test gives both one name; shards have a number."""
     listing = subprocess.run(["ctest", "--test-dir", str(build), "--show-only=json-v1", "-LE", "^slow$"], cwd=ROOT, check=True,
                              stdout=subprocess.PIPE, stdin=subprocess.DEVNULL)
     targets = subprocess.run(["ninja", "-C", str(build), "-t", "targets", "all"], check=True, stdout=subprocess.PIPE, text=True)
     known = {line.partition(":")[0] for line in targets.stdout.splitlines()}
-    return sorted({test["name"] for test in json.loads(listing.stdout)["tests"]} & known)
+    programs = {test["name"]: re.sub(r"_\d+$", "", test["name"]) for test in json.loads(listing.stdout)["tests"]}
+    return {name: program for name, program in programs.items() if program in known}
 
 
 def count(report):
@@ -111,8 +113,8 @@ def run_suite(suite, jobs):
         tests = sanitizer_tests(build)
         if not tests:
             return Outcome(broken=[f"{suite.name}: no tests found"])
-        build_command += tests
-        ctest = address_space_prefix() + ctest + ["-R", f"^({'|'.join(tests)})$"]
+        build_command += sorted(set(tests.values()))
+        ctest = address_space_prefix() + ctest + ["-R", f"^({'|'.join(sorted(tests))})$"]
     if run(build_command) != 0:
         outcome.broken.append(f"{suite.name}: build")
     run(ctest, env=os.environ | suite.environment)

@@ -1,5 +1,5 @@
-// terrace_cold_tiles: how many tiles a second the pipeline makes on so many threads, without HTTP, caches or queues.
-// tests/load/cold_storm.py holds a server's figure against it.
+// terrace_cold_tiles: how many tiles a second the pipeline makes on so many threads, without HTTP, caches or queues,
+// and how long a tile's stages take. tests/load/cold_storm.py holds a server's figure against it.
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cstdint>
 #include <cstdio>
 #include <fstream>
 #include <string>
@@ -68,6 +69,7 @@ Result<void> Run(const Arguments& arguments) {
   const server::TilePipeline pipeline(*std::move(datasets));
 
   std::atomic<std::size_t> next{0}, bytes{0}, failed{0};
+  std::atomic<std::int64_t> read{0}, refine{0}, encode{0}, compress{0};  // microseconds
   const auto work = [&] {
     for (std::size_t i = next++; i < keys->size(); i = next++) {
       server::TileRequest request;
@@ -75,7 +77,12 @@ Result<void> Run(const Arguments& arguments) {
       request.coding = server::Coding::kGzip;
       const Result<server::EncodedTile> tile = pipeline.Build(request, {});
       if (!tile) ++failed;
-      if (tile) bytes += tile->bytes.size();
+      if (!tile) continue;
+      bytes += tile->bytes.size();
+      read += tile->times.read.count();
+      refine += tile->times.refine.count();
+      encode += tile->times.encode.count();
+      compress += tile->times.compress.count();
     }
   };
   const auto begun = std::chrono::steady_clock::now();
@@ -83,8 +90,14 @@ Result<void> Run(const Arguments& arguments) {
   for (unsigned i = 0; i < arguments.threads; ++i) threads.emplace_back(work);
   threads.clear();  // joins
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begun;
-  fmt::print("{{\"tiles\": {}, \"bytes\": {}, \"errors\": {}, \"seconds\": {:.3f}}}\n", keys->size(), bytes.load(),
-             failed.load(), seconds.count());
+  const auto each = [&](const std::atomic<std::int64_t>& stage) {
+    return static_cast<double>(stage) / 1000 / static_cast<double>(std::max<std::size_t>(keys->size() - failed, 1));
+  };
+  fmt::print(
+      "{{\"tiles\": {}, \"bytes\": {}, \"errors\": {}, \"seconds\": {:.3f}, "
+      "\"read_ms\": {:.3f}, \"refine_ms\": {:.3f}, \"encode_ms\": {:.3f}, \"compress_ms\": {:.3f}}}\n",
+      keys->size(), bytes.load(), failed.load(), seconds.count(), each(read), each(refine), each(encode),
+      each(compress));
   return {};
 }
 

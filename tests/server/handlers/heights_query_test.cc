@@ -157,7 +157,8 @@ TEST(HeightsQuery, RefusesKeysThatAreGivenTwice) {
 }
 
 TEST(HeightsJson, IsWhatOpenTopoDataSends) {
-  HeightsQuery query{{{8.5, 46.5}, {-170, 0}}, {}};
+  HeightsQuery query;
+  query.points = {{8.5, 46.5}, {-170, 0}};
   const std::vector<float> heights = {1473.25f, std::numeric_limits<float>::quiet_NaN()};
   EXPECT_EQ(HeightsJson(query, heights, "alps"),
             R"({"results":[{"elevation":1473.25,"location":{"lat":46.5,"lng":8.5},"dataset":"alps"},)"
@@ -169,7 +170,8 @@ TEST(HeightsJson, IsWhatOpenTopoDataSends) {
 }
 
 TEST(HeightsJson, SaysWhichTileIsHowFarOff) {
-  const HeightsQuery query{{{8.5, 46.5}, {-170, 0}, {8.6, 46.5}}, {}};
+  HeightsQuery query;
+  query.points = {{8.5, 46.5}, {-170, 0}, {8.6, 46.5}};
   const std::vector<float> heights = {1473.25f, std::numeric_limits<float>::quiet_NaN(), 1500};
   CertifiedPoints certified;
   certified.tiles = {{12, 4289, 3105}, {0, 0, 0}, {12, 4291, 3105}};
