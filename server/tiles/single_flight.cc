@@ -132,11 +132,8 @@ void SingleFlight::Fly(const CacheKey& key, const std::shared_ptr<Flight>& fligh
     waiters.swap(flight->waiters);
     Forget(key, flight);
   }
-  // The coroutine suspends in its wait before the thread runs anything else,
-  // so the cancellation always meets a wait.
-  for (Waiter& waiter : waiters) {
-    Wake(waiter);
-  }
+  // The coroutine suspends in its wait before its thread runs anything else, so the cancellation always meets a wait.
+  for (const Waiter& waiter : waiters) Wake(waiter);
 }
 
 void SingleFlight::Forget(const CacheKey& key, const std::shared_ptr<Flight>& flight) {
