@@ -10,6 +10,7 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 namespace terrace::server {
@@ -34,11 +35,13 @@ Result<TilePtr> Outcome(const CacheKey& key, const SingleFlight::Build& build, s
 // A waiter is a timer that runs until the waiter's deadline and is cancelled when the flight lands.
 using Waiter = std::shared_ptr<asio::steady_timer>;
 
-// On the waiter's own thread, to which a timer belongs.
-void Wake(const Waiter& waiter) {
-  for (;;) {
+// On the waiter's own thread, to which a timer belongs: nothing of it may be left here once it is posted there.
+void Wake(Waiter waiter) {
+  const auto executor = waiter->get_executor();
+  const std::weak_ptr<asio::steady_timer> timer = std::exchange(waiter, nullptr);
+  while (Waiter here = timer.lock()) {
     try {
-      return asio::post(waiter->get_executor(), [waiter] { waiter->cancel(); });
+      return asio::post(executor, [waiter = std::move(here)] { waiter->cancel(); });
     } catch (const std::exception&) {  // no memory; without waking it would wait to its deadline
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }
@@ -133,7 +136,7 @@ void SingleFlight::Fly(const CacheKey& key, const std::shared_ptr<Flight>& fligh
     Forget(key, flight);
   }
   // The coroutine suspends in its wait before its thread runs anything else, so the cancellation always meets a wait.
-  for (const Waiter& waiter : waiters) Wake(waiter);
+  for (Waiter& waiter : waiters) Wake(std::move(waiter));
 }
 
 void SingleFlight::Forget(const CacheKey& key, const std::shared_ptr<Flight>& flight) {
