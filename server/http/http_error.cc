@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
-#include <nlohmann/json.hpp>
+#include <iterator>
 #include <string>
 
 namespace terrace::server {
@@ -63,6 +63,23 @@ const char* RetryAfter(ErrorCode code) {
   return code == ErrorCode::kOverloaded || code == ErrorCode::kChanged ? "1" : "5";
 }
 
+// For a string in JSON. Not by a library of JSON: the one used elsewhere asserts where it finds no memory, and that is
+// one of the things to be told.
+std::string Escaped(std::string_view text) {
+  std::string escaped;
+  for (const char c : text) {
+    if (c == '"' || c == '\\') {
+      escaped += '\\';
+      escaped += c;
+    } else if (static_cast<unsigned char>(c) < 0x20) {
+      fmt::format_to(std::back_inserter(escaped), "\\u{:04x}", static_cast<unsigned char>(c));
+    } else {
+      escaped += c;
+    }
+  }
+  return escaped;
+}
+
 }  // namespace
 
 int StatusOf(ErrorCode code) {
@@ -82,17 +99,12 @@ int StatusOf(ErrorCode code) {
 }
 
 Response ProblemResponse(int status, std::string_view detail, std::string_view request_id) {
-  nlohmann::ordered_json problem;
-  problem["type"] = "about:blank";
-  problem["title"] = TitleOf(status);
-  problem["status"] = status;
-  problem["detail"] = detail;
-  problem["request_id"] = request_id;
-
   Response response;
   response.status = status;
   response.content_type = "application/problem+json";
-  response.body = std::make_shared<const std::string>(problem.dump());
+  response.body = std::make_shared<const std::string>(
+      fmt::format(R"({{"type":"about:blank","title":"{}","status":{},"detail":"{}","request_id":"{}"}})",
+                  TitleOf(status), status, Escaped(detail), request_id));
   response.cache_control = "no-store";
   return response;
 }

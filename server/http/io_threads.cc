@@ -1,8 +1,29 @@
 #include "server/http/io_threads.h"
 
+#include <spdlog/spdlog.h>
+
+#include <exception>
+
 #include "engine/core/check.h"
 
 namespace terrace::server {
+
+namespace {
+
+// What throws here is what a handler could not catch: there was no memory to go on. It has ended one thing; the others
+// go on.
+void RunAll(asio::io_context& io) {
+  for (;;) {
+    try {
+      io.run();
+      return;
+    } catch (const std::exception& exception) {
+      spdlog::error("an I/O thread goes on after: {}", exception.what());
+    }
+  }
+}
+
+}  // namespace
 
 IoThreads::IoThreads(unsigned count) {
   TERRACE_CHECK(count > 0);
@@ -10,7 +31,7 @@ IoThreads::IoThreads(unsigned count) {
 }
 
 void IoThreads::Start() {
-  for (const auto& thread : threads_) thread->thread = std::thread([&io = thread->io] { io.run(); });
+  for (const auto& thread : threads_) thread->thread = std::thread([&io = thread->io] { RunAll(io); });
 }
 
 void IoThreads::Stop() {

@@ -10,6 +10,7 @@
 #include <boost/asio/redirect_error.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/use_awaitable.hpp>
+#include <exception>
 #include <future>
 
 #include "server/http/http_error.h"
@@ -91,7 +92,30 @@ Result<std::shared_ptr<Listener>> Listener::Open(IoThreads& io, const std::strin
 
 void Listener::Start() { asio::co_spawn(acceptor_.get_executor(), Run(shared_from_this()), asio::detached); }
 
-asio::awaitable<void> Listener::Run(std::shared_ptr<Listener> self) { co_await self->AcceptAll(); }
+// Ends with the coroutine that accepts. Where there was no memory for one connection, the coroutine ends by an
+// exception, or by being destroyed; others will find some.
+class Listener::GoOn {
+ public:
+  explicit GoOn(std::shared_ptr<Listener> listener) : listener_(std::move(listener)) {}
+  GoOn(const GoOn&) = delete;
+  GoOn& operator=(const GoOn&) = delete;
+  ~GoOn() {
+    if (!listener_->acceptor_.is_open()) return;
+    try {
+      asio::post(listener_->acceptor_.get_executor(), [listener = listener_] { listener->Start(); });
+    } catch (const std::exception& exception) {
+      spdlog::critical("no connections are accepted any more: {}", exception.what());
+    }
+  }
+
+ private:
+  const std::shared_ptr<Listener> listener_;
+};
+
+asio::awaitable<void> Listener::Run(std::shared_ptr<Listener> self) {
+  const GoOn go_on(self);
+  co_await self->AcceptAll();
+}
 
 asio::awaitable<void> Listener::AcceptAll() {
   OpenSpare(acceptor_.get_executor(), spare_);

@@ -36,6 +36,8 @@ class Listener : public std::enable_shared_from_this<Listener> {
 
  private:
   Listener(IoThreads& io, std::shared_ptr<const SessionContext> context);
+  class GoOn;
+
   static asio::awaitable<void> Run(std::shared_ptr<Listener> self);
   asio::awaitable<void> AcceptAll();
   asio::awaitable<void> Pause(std::chrono::milliseconds time);

@@ -6,8 +6,11 @@
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/this_coro.hpp>
 #include <boost/asio/use_awaitable.hpp>
+#include <exception>
 #include <optional>
 #include <string>
+#include <thread>
+#include <utility>
 #include <vector>
 
 namespace terrace::server {
@@ -19,8 +22,31 @@ std::string NameOf(const CacheKey& key) {
 
 }  // namespace
 
+// Never throws: on a worker's thread that would be the end of the program.
+Result<TilePtr> Outcome(const CacheKey& key, const SingleFlight::Build& build, std::stop_token stop) {
+  try {
+    if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "{}: stopped before it began", NameOf(key));
+    return build(std::move(stop));
+  } catch (const std::exception&) {
+    return tl::unexpected(Error{ErrorCode::kUnavailable, "no memory"});  // for a longer message neither
+  }
+}
+
 // A waiter is a timer that runs until the waiter's deadline and is cancelled when the flight lands.
 using Waiter = std::shared_ptr<asio::steady_timer>;
+
+// On the waiter's own thread, to which a timer belongs: nothing of it may be left here once it is posted there.
+void Wake(Waiter waiter) {
+  const auto executor = waiter->get_executor();
+  const std::weak_ptr<asio::steady_timer> timer = std::exchange(waiter, nullptr);
+  while (Waiter here = timer.lock()) {
+    try {
+      return asio::post(executor, [waiter = std::move(here)] { waiter->cancel(); });
+    } catch (const std::exception&) {  // no memory; without waking it would wait to its deadline
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+  }
+}
 
 // Everything but `stop` is guarded by SingleFlight::mutex_.
 struct SingleFlight::Flight {
@@ -100,22 +126,17 @@ Result<std::shared_ptr<SingleFlight::Flight>> SingleFlight::Board(const CacheKey
 
 // On a worker thread.
 void SingleFlight::Fly(const CacheKey& key, const std::shared_ptr<Flight>& flight, const Build& build) {
-  Result<TilePtr> outcome = MakeError(ErrorCode::kCancelled, "{}: stopped before it began", NameOf(key));
-  if (!flight->stop.stop_requested()) outcome = build(flight->stop.get_token());
+  Result<TilePtr> outcome = Outcome(key, build, flight->stop.get_token());
 
   std::vector<Waiter> waiters;
   {
     const std::lock_guard lock(mutex_);
     flight->outcome = std::move(outcome);
-    waiters = flight->waiters;
+    waiters.swap(flight->waiters);
     Forget(key, flight);
   }
-  // A timer belongs to its coroutine's thread. The coroutine suspends in its wait before the thread runs anything else,
-  // so the cancellation always meets a wait.
-  for (Waiter& waiter : waiters) {
-    const auto executor = waiter->get_executor();
-    asio::post(executor, [waiter = std::move(waiter)] { waiter->cancel(); });
-  }
+  // The coroutine suspends in its wait before its thread runs anything else, so the cancellation always meets a wait.
+  for (Waiter& waiter : waiters) Wake(std::move(waiter));
 }
 
 void SingleFlight::Forget(const CacheKey& key, const std::shared_ptr<Flight>& flight) {

@@ -45,7 +45,8 @@ class SingleFlight {
   SingleFlight(const SingleFlight&) = delete;
   SingleFlight& operator=(const SingleFlight&) = delete;
 
-  // Waits for the flight of `key`, which runs `build` if it has to be started. `build` must not throw.
+  // Waits for the flight of `key`, which runs `build` if it has to be started. An exception of `build` counts as
+  // kUnavailable.
   // kOverloaded: the pool's queue is full. kCancelled: `deadline` or the flight's own passed, or the awaiting coroutine
   // was cancelled. kUnavailable: shutting down. Otherwise whatever `build` returned.
   asio::awaitable<Landing> Join(CacheKey key, Build build, Clock::time_point deadline);

@@ -562,3 +562,9 @@ def row_33(binary, _, long):
     kept = max(sizes) <= bound and (not long or last - middle <= 1) and set(statuses) <= {200, 400, 404, "503 of a mesh while another is made"}
     return kept, f"{seconds} s, {sum(statuses.values()):,} requests {statuses}, {group.words}: RSS {max(sizes):.0f} MB at most (bound {bound}), " \
                  f"{middle:.1f} MB in the middle, {last:.1f} MB at the end"
+
+
+def row_34(_, test_binary, __):
+    kept, count, recorded, failed = tests(binary_of(test_binary, "allocation_test"), "*")
+    return kept, f"{count} requests, each with every allocation on its way failing once: 503, an answer all the same or the end of the connection, " \
+                 "and the next request is answered" + (f"; failed: {failed}" if failed else "")

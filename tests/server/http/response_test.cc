@@ -107,6 +107,12 @@ TEST(HttpError, NeverAnswersFiveHundred) {
   }
 }
 
+TEST(HttpError, WritesAProblemAsJson) {
+  EXPECT_EQ(
+      *ProblemResponse(404, "no \"such\" \\ thing\n", "id7").body,
+      R"({"type":"about:blank","title":"Not found","status":404,"detail":"no \"such\" \\ thing\u000a","request_id":"id7"})");
+}
+
 TEST(HttpError, KeepsTheDetailFromTheClient) {
   const Response response = BackendErrorResponse(Error{ErrorCode::kUnavailable, "/secret/maui.tif: gone"}, "id7");
   EXPECT_EQ(response.status, 503);
