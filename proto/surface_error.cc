@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <utility>
+#include <limits>
 
 #include "proto/tile_geometry.h"
 
@@ -75,19 +75,24 @@ class Ground {
   std::vector<geo::Vec3> columns_, rows_;  // normals on the equator, on the zero meridian
 };
 
-// A piece of an edge within one lattice cell: the lattice surface on it is a quadratic, the edge's own height is
-// linear.
+// A piece of an edge within one lattice cell: the lattice surface on it is a quadratic.
 struct Piece {
   double begin = 0, end = 0;  // of the edge, 0 .. 1
   double bend = 0;            // the quadratic's leading coefficient along the whole edge
+  double end_sample = 0;      // of the lattice surface at the end
 };
 
-// The larger of `known` and the largest |value| of the quadratic with these values at the ends of the piece.
-double LargestOn(const Piece& piece, double first, double last, double known) {
+// Whether LargestOn may be more than `known`: a quadratic leaves the line between its ends by a quarter of its bend.
+inline bool IsLarger(double length, double edge_bend, double first, double last, double known) {
+  return std::max(std::abs(first), std::abs(last)) + std::abs(edge_bend) * length * length / 4 > known;
+}
+
+// The larger of `known` and the largest |value| of the quadratic with these values at the ends of a piece of that
+// length. `edge_bend`: its leading coefficient along the whole edge.
+double LargestOn(double length, double edge_bend, double first, double last, double known) {
   const double ends = std::max({std::abs(first), std::abs(last), known});
-  const double length = piece.end - piece.begin, bend = piece.bend * length * length;
-  // It leaves the line between its ends by a quarter of the bend at most.
-  if (bend == 0 || std::max(std::abs(first), std::abs(last)) + std::abs(bend) / 4 <= ends) return ends;
+  const double bend = edge_bend * length * length;
+  if (bend == 0) return ends;
   // first + (last - first) s + bend s (s - 1)
   const double s = 0.5 - (last - first) / (2 * bend);
   if (!(s > 0 && s < 1)) return ends;
@@ -98,20 +103,23 @@ class EdgeMeter {
  public:
   explicit EdgeMeter(const LatticeView& lattice) : lattice_(lattice), cells_(lattice.cells()) {}
 
-  // Every place where the edge a - b leaves a cell, in order, and its ends: visit(piece, from, to).
+  // Every piece of the edge a - b between places where it leaves a cell, in order: visit(piece).
   template <typename Visit>
   void ForEachPiece(Place a, Place b, const Visit& visit) const {
-    crossings_.clear();
-    AddCrossings(a.x, b.x);
-    const auto middle = static_cast<std::ptrdiff_t>(crossings_.size());
-    AddCrossings(a.y, b.y);
-    std::inplace_merge(crossings_.begin(), crossings_.begin() + middle, crossings_.end());
-    crossings_.push_back(1);
-    double begin = 0;
-    for (const double end : crossings_) {
+    Lines columns(a.x, b.x), rows(a.y, b.y);
+    const double turn = (b.x - a.x) * (b.y - a.y);
+    for (double begin = 0; begin < 1;) {
+      const double end = std::min({columns.at, rows.at, 1.0});
+      if (columns.at <= end) columns.Next();
+      if (rows.at <= end) rows.Next();
       if (!(end > begin)) continue;
-      const Place centre = Between(a, b, (begin + end) / 2);
-      visit(Piece{begin, end, Twist(CellOf(centre.x), CellOf(centre.y)) * (b.x - a.x) * (b.y - a.y)});
+      const Place centre = Between(a, b, (begin + end) / 2), last = Between(a, b, end);
+      const int i = CellOf(centre.x), j = CellOf(centre.y);
+      const double south_west = lattice_.At(i, j), along = lattice_.At(i + 1, j) - south_west;
+      const double across = lattice_.At(i, j + 1) - south_west;
+      const double twist = lattice_.At(i + 1, j + 1) - south_west - along - across;
+      const double x = last.x - i, y = last.y - j;
+      visit(Piece{begin, end, twist * turn, south_west + x * along + y * (across + x * twist)});
       begin = end;
     }
   }
@@ -131,23 +139,22 @@ class EdgeMeter {
  private:
   int CellOf(double at) const { return std::clamp(static_cast<int>(at), 0, cells_ - 1); }
 
-  double Twist(int i, int j) const {
-    return double{lattice_.At(i, j)} - lattice_.At(i + 1, j) - lattice_.At(i, j + 1) + lattice_.At(i + 1, j + 1);
-  }
-
-  void AddCrossings(double from, double to) const {
-    if (from == to) return;
-    const double inverse = 1 / (to - from);
-    if (from < to) {
-      for (double line = std::floor(from) + 1; line < to; ++line) crossings_.push_back((line - from) * inverse);
-    } else {
-      for (double line = std::ceil(from) - 1; line > to; --line) crossings_.push_back((line - from) * inverse);
+  // Where an edge crosses the lattice's lines of one direction, as parts of the edge; infinity after the last.
+  struct Lines {
+    Lines(double from, double to)
+        : first(from), last(to), inverse(1 / (to - from)), line(from < to ? std::floor(from) : std::ceil(from)) {
+      Next();
     }
-  }
+    void Next() {
+      line += first < last ? 1 : -1;
+      const bool is_there = first < last ? line < last : line > last;
+      at = is_there && first != last ? (line - first) * inverse : std::numeric_limits<double>::infinity();
+    }
+    double first, last, inverse, line, at = 0;
+  };
 
   const LatticeView& lattice_;
   const int cells_;
-  mutable std::vector<double> crossings_;
 };
 
 // Every edge once: those inside the tile belong to two triangles with opposite directions.
@@ -160,22 +167,6 @@ void ForEachEdge(const std::vector<std::array<std::uint32_t, 3>>& triangles, con
       if (a < b || meter.IsRim(places[a], places[b])) visit(a, b);
     }
   }
-}
-
-double PlanarError(const EdgeMeter& meter, const std::vector<Place>& places, const std::vector<double>& heights,
-                   const std::vector<std::array<std::uint32_t, 3>>& triangles) {
-  double largest = 0;
-  ForEachEdge(triangles, places, meter, [&](std::uint32_t a, std::uint32_t b) {
-    double before = heights[a] - meter.SampleAt(places[a]);
-    meter.ForEachPiece(places[a], places[b], [&](const Piece& piece) {
-      const double at_end =
-          heights[a] + piece.end * (heights[b] - heights[a]) - meter.SampleAt(Between(places[a], places[b], piece.end));
-      // The surface is subtracted, and so is its bend.
-      largest = LargestOn({piece.begin, piece.end, -piece.bend}, before, at_end, largest);
-      before = at_end;
-    });
-  });
-  return largest;
 }
 
 // How far edges span, by the sum of their degrees in longitude and latitude: radians.
@@ -209,23 +200,96 @@ double WidestCircle(const std::vector<Place>& places, const std::vector<std::arr
   return std::sqrt(widest);
 }
 
-// Measured at the ends of pieces, where the edge's point in space is the chord's. Between them, and on the triangles
-// between edges, the height of a chord strays from a linear one by at most what the last lines add.
-double CurvedError(const EdgeMeter& meter, const Ground& ground, const std::vector<Place>& places,
-                   const std::vector<geo::Vec3>& ecef, const std::vector<std::array<std::uint32_t, 3>>& triangles) {
-  double largest = 0;
+// The flat triangles, by their heights above the ellipsoid along edges.
+class Drawn {
+ public:
+  Drawn(const Ground& ground, const std::vector<Place>& places, const std::vector<geo::Vec3>& ecef)
+      : ground_(ground), places_(places), ecef_(ecef) {
+    heights_.reserve(ecef.size());
+    for (std::size_t k = 0; k < ecef.size(); ++k) heights_.push_back(ground.HeightOf(ecef[k], places[k]));
+  }
+
+  // The height along an edge between its ends: a quadratic with that leading coefficient, but for `slack`.
+  struct Edge {
+    double first = 0, last = 0, bend = 0, slack = 0;
+    bool is_quadratic = true;  // else it is to be told at every place
+
+    double At(double t) const { return first + t * (last - first) + bend * t * (t - 1); }
+  };
+
+  // The height above the ellipsoid at a part t of the edge is n(t) P(t) - s(t): n the normal there, P the chord's
+  // point, s how far the tangential plane is from the centre. Components of n are sums of sines of (longitude +-
+  // latitude), so their k-th derivatives are at most w^k, w the edge's span in radians of both together. The third
+  // derivative of the height is at most 3 |n''| |P'| + |n'''| |P| + |s'''| < 7.2 a w^3 + 5.3 w^2 |difference of
+  // heights|. A quadratic through both ends and the middle is off by 0.0081 of it.
+  Edge EdgeOf(std::uint32_t a, std::uint32_t b) const {
+    const double span =
+        (std::abs(places_[a].x - places_[b].x) + std::abs(places_[a].y - places_[b].y)) * ground_.step_radians();
+    Edge edge{heights_[a], heights_[b]};
+    constexpr double kWide = 0.01;  // the slack is up to 0.4 m below
+    edge.is_quadratic = span < kWide;
+    if (!edge.is_quadratic) return edge;
+    const double middle = HeightOn(a, b, 0.5);
+    edge.bend = 2 * (edge.first + edge.last) - 4 * middle;
+    edge.slack = 0.0081 * span * span * (7.2 * geo::kSemiMajorAxis * span + 5.3 * std::abs(edge.last - edge.first));
+    return edge;
+  }
+
+  double HeightOn(std::uint32_t a, std::uint32_t b, double t) const {
+    return ground_.HeightOf(ecef_[a] + (ecef_[b] - ecef_[a]) * t, Between(places_[a], places_[b], t));
+  }
+
+ private:
+  const Ground& ground_;
+  const std::vector<Place>& places_;
+  const std::vector<geo::Vec3>& ecef_;
+  std::vector<double> heights_;  // by vertex
+};
+
+// The largest differences along edges from the lattice surface.
+struct Largest {
+  double planar = 0, drawn = 0;
+};
+
+// `heights`: by vertex, of the reading in longitude and latitude; empty: it is not measured. `drawn`: null, or the flat
+// triangles, whose heights between the ends of pieces are for the caller to bound where edges are no quadratics.
+Largest MeasureEdges(const EdgeMeter& meter, const std::vector<Place>& places, const std::vector<double>& heights,
+                     const Drawn* drawn, const std::vector<std::array<std::uint32_t, 3>>& triangles) {
+  Largest largest;
   ForEachEdge(triangles, places, meter, [&](std::uint32_t a, std::uint32_t b) {
-    const geo::Vec3 along = ecef[b] - ecef[a];
-    double before = ground.HeightOf(ecef[a], places[a]) - meter.SampleAt(places[a]);
+    const double sample = meter.SampleAt(places[a]);
+    const double first = heights.empty() ? 0 : heights[a], rise = heights.empty() ? 0 : heights[b] - heights[a];
+    const Drawn::Edge edge = drawn != nullptr ? drawn->EdgeOf(a, b) : Drawn::Edge{};
+    double planar = first - sample, flat = edge.first - sample, most = largest.drawn - edge.slack;
     meter.ForEachPiece(places[a], places[b], [&](const Piece& piece) {
-      const Place end = Between(places[a], places[b], piece.end);
-      const double at_end = ground.HeightOf(ecef[a] + along * piece.end, end) - meter.SampleAt(end);
-      largest = LargestOn({piece.begin, piece.end, -piece.bend}, before, at_end, largest);
-      before = at_end;
+      // The surface is subtracted, and so is its bend.
+      const double length = piece.end - piece.begin;
+      if (!heights.empty()) {
+        const double at_end = first + piece.end * rise - piece.end_sample;
+        if (IsLarger(length, -piece.bend, planar, at_end, largest.planar)) {
+          largest.planar = LargestOn(length, -piece.bend, planar, at_end, largest.planar);
+        }
+        planar = at_end;
+      }
+      if (drawn != nullptr) {
+        const double height = edge.is_quadratic ? edge.At(piece.end) : drawn->HeightOn(a, b, piece.end);
+        const double at_end = height - piece.end_sample;
+        const double bend = edge.bend - piece.bend;
+        if (IsLarger(length, bend, flat, at_end, most)) most = LargestOn(length, bend, flat, at_end, most);
+        flat = at_end;
+      }
     });
+    largest.drawn = std::max(largest.drawn, most + edge.slack);
   });
+  return largest;
+}
+
+// Between the ends of pieces, and on the triangles between edges, the height of a chord strays from a linear one by at
+// most this.
+double Stray(const EdgeMeter& meter, const Ground& ground, const std::vector<Place>& places,
+             const std::vector<std::array<std::uint32_t, 3>>& triangles) {
   const double diagonal = ground.WidestDiagonal(), span = WidestSpan(meter, places, triangles, ground.step_radians());
-  return largest + kHeights * (0.75 * diagonal * diagonal / kSmallestRadius + span * span / 8 * diagonal);
+  return kHeights * (0.75 * diagonal * diagonal / kSmallestRadius + span * span / 8 * diagonal);
 }
 
 }  // namespace
@@ -240,8 +304,13 @@ double MeasureEdgeError(const LatticeView& lattice, const QuantizedTile& tile, b
     places.push_back({tile.u[k] * scale, tile.v[k] * scale});
     heights.push_back(HeightAt(tile, tile.h[k]));
   }
-  const double planar = PlanarError(meter, places, heights, tile.triangles);
-  if (curved) return std::max(planar, CurvedError(meter, ground, places, DecodePositions(tile), tile.triangles));
+  if (curved) {
+    const std::vector<geo::Vec3> ecef = DecodePositions(tile);
+    const Drawn drawn(ground, places, ecef);
+    const Largest largest = MeasureEdges(meter, places, heights, &drawn, tile.triangles);
+    return std::max(largest.planar, largest.drawn + Stray(meter, ground, places, tile.triangles));
+  }
+  const double planar = MeasureEdges(meter, places, heights, nullptr, tile.triangles).planar;
   // A function whose second derivatives are at most M strays from its linear interpolation on a triangle by at most
   // M r^2 / 2, r the radius of a circle around it.
   const double radius = WidestCircle(places, tile.triangles, ground.WidestStep());
@@ -254,7 +323,11 @@ double MeasureFlatEdgeError(const LatticeView& lattice, const tin::TinMesh& mesh
   for (const tin::SamplePosition p : mesh.vertices) {
     places.push_back({static_cast<double>(p.x), static_cast<double>(p.y)});
   }
-  return CurvedError(EdgeMeter(lattice), Ground(lattice), places, positions, mesh.triangles);
+  const EdgeMeter meter(lattice);
+  const Ground ground(lattice);
+  const Drawn drawn(ground, places, positions);
+  const double edges = MeasureEdges(meter, places, {}, &drawn, mesh.triangles).drawn;
+  return edges + Stray(meter, ground, places, mesh.triangles);
 }
 
 }  // namespace terrace::proto

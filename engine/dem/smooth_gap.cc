@@ -1,8 +1,10 @@
 #include "engine/dem/smooth_gap.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 namespace terrace::dem {
 namespace {
@@ -10,6 +12,39 @@ namespace {
 // A function that is linear between samples one apart, with second differences of at most 1, strays from its chord over
 // `length` samples by at most this: at most one kink on less than a sample; (length^2 + 1) / 8 with more.
 double ChordGap(double length) { return length < 1 ? length / 4 : (length * length + 1) / 8; }
+
+// Several running values instead of one: no step waits for the one before it, and the compiler puts them side by side.
+class Lanes {
+ public:
+  // The largest |value(i)| for i in 0 .. count - 1; NaN is left out.
+  template <typename Value>
+  void Raise(std::size_t count, const Value& value) {
+    ForEach(count, [&](std::size_t lane, std::size_t i) {
+      const float size = std::abs(value(i));
+      lanes_[lane] = size > lanes_[lane] ? size : lanes_[lane];
+    });
+  }
+  template <typename Value>
+  void Add(std::size_t count, const Value& value) {
+    ForEach(count, [&](std::size_t lane, std::size_t i) { lanes_[lane] += value(i); });
+  }
+  float Largest() const { return *std::ranges::max_element(lanes_); }
+  float Sum() const { return std::accumulate(lanes_.begin(), lanes_.end(), 0.0f); }
+
+ private:
+  static constexpr std::size_t kLanes = 8;
+
+  template <typename Step>
+  static void ForEach(std::size_t count, const Step& step) {
+    std::size_t i = 0;
+    for (; i + kLanes <= count; i += kLanes) {
+      for (std::size_t lane = 0; lane < kLanes; ++lane) step(lane, i + lane);
+    }
+    for (; i < count; ++i) step(i % kLanes, i);
+  }
+
+  std::array<float, kLanes> lanes_{};
+};
 
 }  // namespace
 
@@ -130,29 +165,25 @@ bool SmoothGap::Measure(std::int64_t left, std::int64_t top, std::int64_t right,
   bottom = std::min(bottom, window.row + window.rows - 1);
   const auto columns = static_cast<std::size_t>(right - left + 1);
   const auto stride = static_cast<std::size_t>(window.columns);
-  float x = 0, y = 0, xx = 0, yy = 0, xy = 0, sum = 0;
+  Lanes x, y, xx, yy, xy, sum;
   for (std::int64_t row = top; row <= bottom; ++row) {
     const float* here = trace_.samples.data() + (row - window.row) * window.columns + (left - window.column);
-    for (std::size_t c = 0; c < columns; ++c) sum += here[c];
-    for (std::size_t c = 0; c + 1 < columns; ++c) x = std::max(x, std::abs(here[c + 1] - here[c]));
-    for (std::size_t c = 1; c + 1 < columns; ++c) {
-      xx = std::max(xx, std::abs(here[c + 1] - here[c] - (here[c] - here[c - 1])));
+    sum.Add(columns, [&](std::size_t c) { return here[c]; });
+    x.Raise(columns - 1, [&](std::size_t c) { return here[c + 1] - here[c]; });
+    if (columns > 2) {
+      xx.Raise(columns - 2, [&](std::size_t c) { return here[c + 2] - here[c + 1] - (here[c + 1] - here[c]); });
     }
     if (row == bottom) break;
     const float* below = here + stride;
-    for (std::size_t c = 0; c < columns; ++c) y = std::max(y, std::abs(below[c] - here[c]));
-    for (std::size_t c = 0; c + 1 < columns; ++c) {
-      xy = std::max(xy, std::abs(here[c + 1] - here[c] - (below[c + 1] - below[c])));
-    }
+    y.Raise(columns, [&](std::size_t c) { return below[c] - here[c]; });
+    xy.Raise(columns - 1, [&](std::size_t c) { return here[c + 1] - here[c] - (below[c + 1] - below[c]); });
     if (row == top) continue;
     const float* above = here - stride;
-    for (std::size_t c = 0; c < columns; ++c) {
-      yy = std::max(yy, std::abs(below[c] - here[c] - (here[c] - above[c])));
-    }
+    yy.Raise(columns, [&](std::size_t c) { return below[c] - here[c] - (here[c] - above[c]); });
   }
   constexpr double kUp = 1 + 1e-6;  // of differences of floats
-  bends = {x * kUp, y * kUp, xx * kUp, yy * kUp, xy * kUp};
-  return std::isfinite(sum);
+  bends = {x.Largest() * kUp, y.Largest() * kUp, xx.Largest() * kUp, yy.Largest() * kUp, xy.Largest() * kUp};
+  return std::isfinite(sum.Sum());
 }
 
 }  // namespace terrace::dem
