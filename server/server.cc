@@ -34,6 +34,9 @@ constexpr std::chrono::milliseconds kLastWords{1'000};
 
 // How long a request waits for a source that was replaced, and how often it looks.
 constexpr std::chrono::milliseconds kReplaceTime{3'000}, kReplacePeriod{20};
+// A source that is replaced again while it is opened cannot be opened for a moment; one that still cannot after this
+// time waits for a person.
+constexpr std::chrono::milliseconds kPassingTrouble{1'500};
 
 // A request for heights has a body of at most so many bytes, and so many for each location that it may name: two
 // numbers with all their digits, a form's three bytes for each separator.
@@ -122,6 +125,9 @@ class Server::Impl {
 
   void SetTroubles(std::map<std::string, std::string> troubles) {
     const std::lock_guard lock(state_mutex_);
+    const auto now = std::chrono::steady_clock::now();
+    std::erase_if(trouble_since_, [&](const auto& known) { return !troubles.contains(known.first); });
+    for (const auto& [dataset, trouble] : troubles) trouble_since_.try_emplace(dataset, now);
     troubles_ = std::move(troubles);
   }
 
@@ -207,6 +213,12 @@ class Server::Impl {
     return routes_;
   }
 
+  bool HasLastingTrouble(const std::string& dataset) const {
+    const std::lock_guard lock(state_mutex_);
+    const auto since = trouble_since_.find(dataset);
+    return since != trouble_since_.end() && std::chrono::steady_clock::now() - since->second >= kPassingTrouble;
+  }
+
   std::map<std::string, std::string> Troubles() const {
     const std::lock_guard lock(state_mutex_);
     return troubles_;
@@ -233,7 +245,7 @@ class Server::Impl {
       self->options_.on_source_changed();
       asio::steady_timer timer(co_await asio::this_coro::executor);
       while (self->CurrentRoutes() == routes) {
-        const bool is_hopeless = self->edge_->connections.draining() || self->Troubles().contains(response.dataset);
+        const bool is_hopeless = self->edge_->connections.draining() || self->HasLastingTrouble(response.dataset);
         if (is_hopeless || std::chrono::steady_clock::now() >= give_up) co_return response;
         timer.expires_after(kReplacePeriod);
         co_await timer.async_wait(asio::use_awaitable);
@@ -290,7 +302,9 @@ class Server::Impl {
   mutable std::mutex state_mutex_;
   std::shared_ptr<const Routes> routes_;         // never null; guarded by state_mutex_
   std::map<std::string, std::string> troubles_;  // by dataset; guarded by state_mutex_
-  std::uint64_t catalogs_ = 0;                   // that have replaced one another; guarded by state_mutex_
+  std::map<std::string, std::chrono::steady_clock::time_point>
+      trouble_since_;           // of the same datasets; guarded likewise
+  std::uint64_t catalogs_ = 0;  // that have replaced one another; guarded by state_mutex_
   IoThreads io_;
   asio::signal_set signals_;
   std::shared_ptr<Listener> listener_;

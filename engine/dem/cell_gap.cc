@@ -146,12 +146,12 @@ std::optional<std::array<Position, 4>> CellGap::CornersOf(const TileCell& cell) 
   return corners;
 }
 
-// Of sheets that nearly go around the Earth: a box may meet their last columns and, a turn on, the first ones.
+// Of sheets that nearly go around the Earth: a box may meet their last columns, or a turn on the first ones, or both.
 bool CellGap::IsOnBothEnds(const PixelBounds& box) const {
   const double turn = sheet_.georeference().period(), columns = sheet_.columns();
   if (sheet_.wraps() || !(turn > 0)) return false;
   const auto meets = [&](double shift) { return box.east + shift >= 0 && box.west + shift <= columns; };
-  return (meets(0) ? 1 : 0) + (meets(turn) ? 1 : 0) + (meets(-turn) ? 1 : 0) > 1;
+  return meets(turn) || meets(-turn);
 }
 
 double CellGap::OfSurroundings(const TileCell& cell, bool gives_way, bool fills, std::optional<Place>& place) const {

@@ -1,17 +1,22 @@
 #include "engine/dem/dem_source.h"
 
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
 #include <xxhash.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <map>
 #include <set>
+#include <string_view>
 #include <utility>
 
 #include "engine/core/bytes.h"
 #include "engine/core/check.h"
 #include "engine/dem/availability.h"
 #include "engine/dem/dem_impl.h"
+#include "engine/dem/driver_list.h"
 #include "engine/dem/footprint.h"
 #include "engine/dem/level_plan.h"
 #include "engine/dem/raster_file.h"
@@ -81,10 +86,44 @@ std::uint64_t FingerprintOf(const std::vector<Sheet>& sheets, const DemOptions& 
   return XXH3_64bits(bytes.data(), bytes.size());
 }
 
+// Names that rasters have: a file of such a name that is none is damaged rather than something else.
+bool LooksLikeRaster(const std::string& path) {
+  constexpr std::string_view kEndings[] = {".tif", ".tiff", ".hgt", ".hgt.zip", ".hgt.gz", ".dt0", ".dt1",
+                                           ".dt2", ".dem",  ".asc", ".img",     ".bil",    ".flt", ".nc"};
+  std::string name = path;
+  std::ranges::transform(name, name.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return std::ranges::any_of(kEndings, [&](std::string_view ending) { return name.ends_with(ending); });
+}
+
 // Those files of folders that are no rasters go away.
+void LeaveOutOthers(std::vector<DemFile>& files) {
+  std::vector<std::string> missed, others;
+  std::erase_if(files, [&](const DemFile& file) {
+    if (!file.may_be_other || IsRaster(file.path)) return false;
+    const auto format = LeftOutDriverOf(file.path);
+    if (format) {
+      missed.push_back(fmt::format("{} ({} is not among the allowed_drivers)", file.path, *format));
+    } else if (LooksLikeRaster(file.path)) {
+      missed.push_back(file.path + " (no raster, whatever its name says: is it whole?)");
+    } else {
+      others.push_back(file.path);
+    }
+    return true;
+  });
+  static constexpr std::size_t kMostNamed = 5;
+  const auto tell = [](spdlog::level::level_enum level, const std::vector<std::string>& names) {
+    if (names.empty()) return;
+    const auto end = names.begin() + static_cast<std::ptrdiff_t>(std::min(names.size(), kMostNamed));
+    spdlog::log(level, "left out of a folder: {}{}", fmt::join(names.begin(), end, ", "),
+                names.size() > kMostNamed ? fmt::format(" and {} more", names.size() - kMostNamed) : "");
+  };
+  tell(spdlog::level::warn, missed);
+  tell(spdlog::level::debug, others);
+}
+
 Result<Rasters> OpenAll(std::vector<DemFile>& files, const DemOptions& options) {
   const std::string first = files.front().path;
-  std::erase_if(files, [](const DemFile& file) { return file.may_be_other && !IsRaster(file.path); });
+  LeaveOutOthers(files);
   if (files.empty()) {
     return MakeError(ErrorCode::kNotFound, "{}: no raster lies in its folder; name a folder of rasters or a raster",
                      first);

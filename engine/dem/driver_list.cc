@@ -18,6 +18,11 @@ std::vector<GDALDriver*>& Retired() {
   return drivers;
 }
 
+std::mutex& RetiredMutex() {
+  static auto& mutex = *new std::mutex;
+  return mutex;
+}
+
 Result<void> CheckNames(const std::vector<std::string>& names) {
   for (const std::string& name : names) {
     const bool retired = std::ranges::any_of(Retired(), [&](GDALDriver* d) { return name == d->GetDescription(); });
@@ -46,8 +51,7 @@ const std::vector<std::string>& DefaultDrivers() {
 }
 
 Result<void> UseDrivers(const std::vector<std::string>& names) {
-  static std::mutex mutex;
-  const std::lock_guard lock(mutex);
+  const std::lock_guard lock(RetiredMutex());
   if (auto known = CheckNames(names); !known) return known;
   GDALDriverManager& manager = *GetGDALDriverManager();
   // Whoever registers all drivers anew makes others of the same names; the old ones wait on.
@@ -64,6 +68,16 @@ Result<void> UseDrivers(const std::vector<std::string>& names) {
     Retired().push_back(driver);
   }
   return {};
+}
+
+std::optional<std::string> LeftOutDriverOf(const std::string& path) {
+  const std::lock_guard lock(RetiredMutex());
+  GDALOpenInfo file(path.c_str(), GA_ReadOnly);
+  for (GDALDriver* const driver : Retired()) {
+    const bool is_raster = driver->GetMetadataItem(GDAL_DCAP_RASTER) != nullptr;
+    if (is_raster && driver->pfnIdentify != nullptr && driver->pfnIdentify(&file) > 0) return driver->GetDescription();
+  }
+  return std::nullopt;
 }
 
 }  // namespace terrace::dem

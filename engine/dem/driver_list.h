@@ -1,6 +1,7 @@
 // The formats that GDAL reads in this process.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,5 +16,9 @@ const std::vector<std::string>& DefaultDrivers();
 // with others; meanwhile no source should be opened. kInvalidArgument: one that GDAL does not have; nothing changes
 // then. Precondition: GDAL's drivers are registered.
 Result<void> UseDrivers(const std::vector<std::string>& names);
+
+// The format of a raster that UseDrivers left out, by GDAL's short name: what it would have been taken for. Looks at
+// its name and first bytes.
+std::optional<std::string> LeftOutDriverOf(const std::string& path);
 
 }  // namespace terrace::dem

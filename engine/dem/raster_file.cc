@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 
+#include "engine/dem/driver_list.h"
 #include "engine/dem/gdal_runtime.h"
 #include "engine/dem/source_policy.h"
 
@@ -117,9 +118,17 @@ Result<GDALDatasetUniquePtr> OpenRaster(const std::string& path, int overview) {
   if (auto name = CheckSourceName(path); !name) return tl::unexpected(name.error());
   GDALDatasetUniquePtr dataset = ReopenRaster(path, overview);
   if (dataset == nullptr) {
+    std::string problem = TakeGdalError();
+    if (const auto format = LeftOutDriverOf(path)) {
+      return MakeError(
+          ErrorCode::kInvalidArgument,
+          "{}: its format, {}, is not among the allowed_drivers; add \"{}\" to them, or convert the file with "
+          "`gdal_translate in out.tif`",
+          path, *format, *format);
+    }
     return MakeError(ErrorCode::kInvalidArgument,
                      "{}: cannot be opened as a raster ({}); check the file with `gdalinfo {}` and its permissions",
-                     path, TakeGdalError(), path);
+                     path, problem, path);
   }
   if (auto shape = CheckShape(*dataset, path); !shape) return tl::unexpected(shape.error());
   return dataset;

@@ -51,7 +51,7 @@ void LogWhatMatters(GDALDataset& dataset, const RasterInfo& info, const Georefer
     spdlog::warn("{}: height unit \"{}\" is not known, heights are taken as metres", info.path, layout.rules.unit);
   }
   if (!info.transform.empty()) {
-    spdlog::info("{}: placed by PROJ operation \"{}\": {}", info.path, info.transform, georeference.pipeline());
+    spdlog::debug("{}: placed by PROJ operation \"{}\": {}", info.path, info.transform, georeference.pipeline());
   }
 }
 
@@ -59,8 +59,9 @@ void LogVertical(const std::string& path, const VerticalDatum& vertical) {
   if (!vertical.is_known()) {
     spdlog::warn("{}: no vertical datum stated, heights pass through as given", path);
   } else if (vertical.geoid) {
-    spdlog::info("{}: heights count from {}, made ellipsoidal by PROJ operation \"{}\": {}", path, vertical.name,
-                 vertical.geoid->description(), vertical.geoid->pipeline());
+    spdlog::info("{}: heights count from {}, made ellipsoidal by PROJ operation \"{}\"", path, vertical.name,
+                 vertical.geoid->description());
+    spdlog::debug("{}: {}", path, vertical.geoid->pipeline());
   }
 }
 

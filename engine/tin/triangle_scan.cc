@@ -495,9 +495,10 @@ struct StarPlanes {
     hn::Store(hn::Add(hn::Add(of_x, of_y), most_plane), kFloats, largest);
     hn::Store(of_magnitude, kFloats, magnitude);
 
-    const auto has_samples = hn::Ne(of_d, All(kFloats, 1));  // Pick's theorem: with 1, none but its corners
-    const auto is_tame = hn::And(hn::Lt(of_magnitude, All(kFloats, kMostMagnitude)),
-                                 hn::RebindMask(kFloats, hn::Lt(extent, All(kInts, kMostExtent + 1))));
+    const auto is_exact = hn::RebindMask(kFloats, hn::Lt(extent, All(kInts, kMostExtent + 1)));  // as of_d is
+    // Pick's theorem: with 1, none but its corners.
+    const auto has_samples = hn::Or(hn::Ne(of_d, All(kFloats, 1)), hn::Not(is_exact));
+    const auto is_tame = hn::And(hn::Lt(of_magnitude, All(kFloats, kMostMagnitude)), is_exact);
     const auto is_small = hn::RebindMask(kFloats, hn::Lt(extent, All(kInts, 4)));
     const auto is_medium = hn::RebindMask(kFloats, hn::Lt(extent, All(kInts, kLargeSide)));
     const std::uint32_t lanes = BitsOf(has_samples), tame = lanes & BitsOf(is_tame);

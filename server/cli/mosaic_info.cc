@@ -46,7 +46,8 @@ std::vector<std::string> AdviceFor(const dem::DemInfo& info) {
   if (no_datum > 0) {
     advice.push_back(
         fmt::format("{} of {} sources state no vertical datum: heights are taken as metres above the WGS 84 ellipsoid "
-                    "as they are; where datums differ there are steps between sources",
+                    "as they are; where datums differ there are steps between sources; state what they count from with "
+                    "--vertical egm96, or \"vertical\" of each source in the configuration",
                     no_datum, info.sources.size()));
   }
   if (voids > 0) {

@@ -55,17 +55,21 @@ asio::awaitable<Response> HeightsHandler::Handle(Route route, Request request) c
   response.vary = true;
   response.cache_control = "no-store";
   if (!is_post) {
-    response.etag = RequestETag("heights", catalog_->datasets[*dataset], route.query, coding);
     response.cache_control = options_.cache_control;
+    // Certified errors are the program's, not only the data's.
+    if (!parsed->certify_level) {
+      response.etag = RequestETag("heights", catalog_->datasets[*dataset], route.query, coding);
+    }
     if (MatchesEtag(request.fields->if_none_match, response.etag)) co_return Conditional(std::move(response), request);
   }
 
   const auto deadline = TileService::Clock::now() + options_.deadline;
   std::shared_ptr<const CertifiedPoints> certified;
   if (parsed->certify_level) {
-    Result<CertifiedPoints> points = TilesOf(catalog_->datasets[*dataset], parsed->points, *parsed->certify_level);
-    if (!points) co_return ClientErrorResponse(points.error(), request.id);
-    Result<CertifiedPoints> known = co_await Certify(*dataset, *std::move(points), deadline);
+    Result<CertifiedPoints> known = co_await Certify(*dataset, *parsed, deadline);
+    if (!known && known.error().code == ErrorCode::kInvalidArgument) {
+      co_return ClientErrorResponse(known.error(), request.id);
+    }
     if (!known) co_return co_await BackendFailure(known.error(), std::string(request.id), options_.refusal_delay);
     certified = std::make_shared<const CertifiedPoints>(*std::move(known));
   }
@@ -89,12 +93,25 @@ asio::awaitable<Response> HeightsHandler::Handle(Route route, Request request) c
   co_return response;
 }
 
-asio::awaitable<Result<CertifiedPoints>> HeightsHandler::Certify(std::uint32_t dataset, CertifiedPoints points,
+asio::awaitable<Result<CertifiedPoints>> HeightsHandler::Certify(std::uint32_t dataset, const HeightsQuery& query,
                                                                  TileService::Clock::time_point deadline) const {
+  // On a worker: of a mosaic with thousands of blocks it takes time to find the tiles of thousands of points.
+  auto found = std::make_shared<CertifiedPoints>();
+  SingleFlight::Work find = [catalog = catalog_, dataset, wanted = query.points, level = *query.certify_level,
+                             found](const std::stop_token&) -> Result<EncodedTile> {
+    Result<CertifiedPoints> tiles = TilesOf(catalog->datasets[dataset], wanted, level);
+    if (!tiles) return tl::unexpected(tiles.error());
+    *found = *std::move(tiles);
+    return EncodedTile();
+  };
+  const Result<TilePtr> done = co_await tiles_.Run(std::move(find), TileService::Length::kShort, deadline);
+  if (!done) co_return tl::unexpected(done.error());
+  CertifiedPoints points = std::move(*found);
   for (std::size_t i = 0; i < points.tiles.size(); ++i) {
     TileRequest tile;
     tile.dataset = dataset;
     tile.key = points.tiles[i];
+    tile.coding = Coding::kGzip;  // the form that a cache most probably has
     const Result<ServedTile> served = co_await tiles_.Get(catalog_, tile, deadline);
     if (!served) co_return tl::unexpected(served.error());
     points.errors_m[i] = served->tile->certified_error_m;

@@ -10,8 +10,10 @@
 #include <boost/asio/redirect_error.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/use_awaitable.hpp>
+#include <chrono>
 #include <exception>
 #include <future>
+#include <thread>
 
 #include "server/http/http_error.h"
 
@@ -101,14 +103,29 @@ class Listener::GoOn {
   GoOn& operator=(const GoOn&) = delete;
   ~GoOn() {
     if (!listener_->acceptor_.is_open()) return;
-    try {
-      asio::post(listener_->acceptor_.get_executor(), [listener = listener_] { listener->Start(); });
-    } catch (const std::exception& exception) {
-      spdlog::critical("no connections are accepted any more: {}", exception.what());
-    }
+    UntilThereIsMemory(
+        [&] { asio::post(listener_->acceptor_.get_executor(), [listener = listener_] { Again(*listener); }); });
   }
 
  private:
+  static void Again(Listener& listener) {
+    UntilThereIsMemory([&] {
+      if (listener.acceptor_.is_open()) listener.Start();
+    });
+  }
+
+  // Nothing else can be done meanwhile, and without this nobody would ever be let in again.
+  template <typename Action>
+  static void UntilThereIsMemory(Action action) {
+    for (;;) {
+      try {
+        return action();
+      } catch (const std::exception&) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+      }
+    }
+  }
+
   const std::shared_ptr<Listener> listener_;
 };
 

@@ -87,7 +87,8 @@ std::size_t DatasetSlot::LookAtFiles(std::size_t most) {
     const std::size_t file = next_file_;
     next_file_ = (next_file_ + 1) % files_.size();
     if (!files_.HasChanged(file)) continue;
-    spdlog::info("dataset {}: {} has changed", wanted_.name, files_.path(file));
+    spdlog::info("dataset {}: {} {}", wanted_.name, files_.path(file),
+                 dem::StampOf(files_.path(file)) ? "has changed" : "is gone");
     MarkStale();
     return i + 1;
   }

@@ -31,9 +31,12 @@ constexpr std::array<std::string_view, 7> kLiveOptions = {
     "datasets",         "cache_bytes", "refinement_cache_bytes", "cache_control", "request_deadline_s",
     "max_mesh_samples", "log_level"};
 
-void WarnOfRestart(const config::Config& now, const config::Config& next) {
+// `started`: what the server runs with.
+void WarnOfRestart(const config::Config& started, const config::Config& now, const config::Config& next) {
+  const std::vector<std::string> differ = config::ChangedServerOptions(started, next);
   for (const std::string& key : config::ChangedServerOptions(now, next)) {
-    if (std::find(kLiveOptions.begin(), kLiveOptions.end(), key) != kLiveOptions.end()) continue;
+    if (std::ranges::find(kLiveOptions, key) != kLiveOptions.end()) continue;
+    if (std::ranges::find(differ, key) == differ.end()) continue;  // back to what it was at the start
     spdlog::warn("configuration: {} has changed, which takes a restart; until then the old value holds", key);
   }
 }
@@ -50,6 +53,14 @@ void WarnOfAccess(const std::vector<DatasetSlot>& slots, const config::Config& n
   }
 }
 
+// Without the files that folders and globs stand for.
+config::Config AsWritten(config::Config config) {
+  for (config::DatasetConfig& dataset : config.datasets) {
+    for (config::SourceConfig& source : dataset.sources) source.files.clear();
+  }
+  return config;
+}
+
 std::string TextOf(const std::vector<config::ConfigError>& errors) {
   std::string text;
   for (const config::ConfigError& error : errors) {
@@ -62,7 +73,7 @@ std::string TextOf(const std::vector<config::ConfigError>& errors) {
 }  // namespace
 
 Reloader::Reloader(config::Config config, std::vector<Dataset> datasets, Hooks hooks)
-    : hooks_(std::move(hooks)), config_(std::move(config)), seen_(config_) {
+    : hooks_(std::move(hooks)), config_(std::move(config)), started_(config_), seen_(config_) {
   for (std::size_t i = 0; i < datasets.size(); ++i) slots_.emplace_back(config_.datasets[i], std::move(datasets[i]));
 }
 
@@ -151,7 +162,8 @@ void Reloader::LookAtConfig(bool asked) {
 
 // Datasets that are described as before go on; the others go on with what they have until that is replaced.
 void Reloader::Apply(config::Config next) {
-  WarnOfRestart(config_, next);
+  WarnOfRestart(started_, config_, next);
+  const bool is_rewritten = AsWritten(config_) != AsWritten(next);
   WarnOfAccess(slots_, next);
   std::vector<DatasetSlot> slots;
   for (const config::DatasetConfig& wanted : next.datasets) {
@@ -173,7 +185,8 @@ void Reloader::Apply(config::Config next) {
   slots_ = std::move(slots);
   next_slot_ = 0;
   config_ = std::move(next);
-  spdlog::info("the new configuration is in force");
+  spdlog::info(is_rewritten ? "the new configuration is in force"
+                            : "folders or globs of the configuration hold other files than before");
   Publish();
 }
 

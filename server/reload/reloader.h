@@ -63,6 +63,7 @@ class Reloader {
   const Hooks hooks_;
   bool watch_ = false;
   config::Config config_;
+  const config::Config started_;      // what takes a restart is still as it says
   std::vector<DatasetSlot> slots_;    // one a dataset, in the configuration's order
   std::vector<DatasetSlot> leaving_;  // not wanted any more, but still opening
   std::size_t next_slot_ = 0;         // whose files to look at

@@ -20,8 +20,6 @@ std::string NameOf(const CacheKey& key) {
   return key.solo > 0 ? "work for one request" : "tile " + geo::ToString(key.request.key);
 }
 
-}  // namespace
-
 // Never throws: on a worker's thread that would be the end of the program.
 Result<TilePtr> Outcome(const CacheKey& key, const SingleFlight::Build& build, std::stop_token stop) {
   try {
@@ -47,6 +45,8 @@ void Wake(Waiter waiter) {
     }
   }
 }
+
+}  // namespace
 
 // Everything but `stop` is guarded by SingleFlight::mutex_.
 struct SingleFlight::Flight {

@@ -12,6 +12,7 @@
 #include <iterator>
 #include <memory>
 #include <string>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -70,8 +71,12 @@ class DiskStoreTest : public testing::Test {
   }
   std::size_t DirectoryBytes() const {
     std::size_t bytes = 0;
-    for (const auto& file : fs::recursive_directory_iterator(scratch_.path())) {
-      if (file.is_regular_file()) bytes += file.file_size();
+    std::error_code error;  // the store takes files away meanwhile
+    for (auto file = fs::recursive_directory_iterator(scratch_.path(), error);
+         !error && file != fs::recursive_directory_iterator(); file.increment(error)) {
+      std::error_code gone;
+      const std::uintmax_t size = file->is_regular_file(gone) ? file->file_size(gone) : 0;
+      if (!gone) bytes += size;
     }
     return bytes;
   }
