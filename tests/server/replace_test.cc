@@ -111,12 +111,29 @@ TEST_F(Replace, DoesNotWaitWhereNobodyOpensItAnew) {
   EXPECT_EQ(reply.body.find("secret"), std::string::npos);
 }
 
+// A source that is replaced again while it is being opened.
+TEST_F(Replace, WaitsOutATroubleThatPasses) {
+  std::atomic<int> told{0};
+  options_.on_source_changed = [&] { ++told; };
+  Start(CatalogOf(1, FindsItsSourceChanged()));
+  server_->SetTroubles({{"maui", "/secret/maui.tif has changed while it was opened"}});
+  std::thread reopening([&] {
+    EXPECT_TRUE(Eventually([&] { return told > 0; }));
+    std::this_thread::sleep_for(100ms);
+    EXPECT_TRUE(server_->Replace(CatalogOf(2, Says("new")), options_));
+  });
+  EXPECT_EQ(Tile().body, "new");
+  reopening.join();
+}
+
 TEST_F(Replace, DoesNotWaitForADatasetInTrouble) {
   std::atomic<int> told{0};
   options_.on_source_changed = [&] { ++told; };
   Start(CatalogOf(1, FindsItsSourceChanged()));
   EXPECT_EQ(Fetch(server_->port(), "/readyz").body, "ready\n");
   server_->SetTroubles({{"maui", "/secret/maui.tif is gone"}});
+  std::this_thread::sleep_for(1600ms);  // it does not pass
+  server_->SetTroubles({{"maui", "/secret/maui.tif is still gone"}});
   std::thread reopening([&] {  // whoever waited would meet this
     EXPECT_TRUE(Eventually([&] { return told > 0; }));
     std::this_thread::sleep_for(1500ms);
