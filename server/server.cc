@@ -302,8 +302,8 @@ class Server::Impl {
   mutable std::mutex state_mutex_;
   std::shared_ptr<const Routes> routes_;         // never null; guarded by state_mutex_
   std::map<std::string, std::string> troubles_;  // by dataset; guarded by state_mutex_
-  std::map<std::string, std::chrono::steady_clock::time_point>
-      trouble_since_;           // of the same datasets; guarded likewise
+  // Since when, of the same datasets; guarded likewise.
+  std::map<std::string, std::chrono::steady_clock::time_point> trouble_since_;
   std::uint64_t catalogs_ = 0;  // that have replaced one another; guarded by state_mutex_
   IoThreads io_;
   asio::signal_set signals_;

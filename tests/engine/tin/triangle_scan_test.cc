@@ -98,6 +98,15 @@ void ExpectReference(const HeightField& field, const OpenSamples& samples, const
   hwy::GetChosenTarget().DeInit();
 }
 
+// One triangle with corners at random, unless they have the wrong order.
+void ExpectReferenceAtRandom(Random& random, const HeightField& field, OpenSamples& samples) {
+  const SamplePosition p = RandomSample(random, field), u = RandomSample(random, field),
+                       v = RandomSample(random, field);
+  if (Orientation(p, u, v) <= 0) return;
+  for (const SamplePosition corner : {p, u, v}) samples.Close(corner);
+  ExpectReference(field, samples, *TestStar(field, p, {u, v}));
+}
+
 TEST(TriangleScan, EqualsTheFormulaOnEveryTargetBitForBit) {
   Random random(3);
   for (int i = 0; i < 3000; ++i) {
@@ -110,11 +119,7 @@ TEST(TriangleScan, EqualsTheFormulaOnEveryTargetBitForBit) {
                                            : RoundedField(width, height, i, seed);
     OpenSamples samples(field);
     for (int k = random.Below(width * height / 4); k > 0; --k) samples.Close(RandomSample(random, field));
-    const SamplePosition p = RandomSample(random, field), u = RandomSample(random, field),
-                         v = RandomSample(random, field);
-    if (Orientation(p, u, v) <= 0) continue;
-    for (const SamplePosition corner : {p, u, v}) samples.Close(corner);
-    ExpectReference(field, samples, *TestStar(field, p, {u, v}));
+    ExpectReferenceAtRandom(random, field, samples);
     if (HasFatalFailure()) return;
   }
 }
@@ -133,11 +138,7 @@ TEST(TriangleScan, TellsApartWhatSinglePrecisionDoesNot) {
              (is_bump ? 1.0000002F : 1.0F);
     });
     OpenSamples samples(field);
-    const SamplePosition p = RandomSample(random, field), u = RandomSample(random, field),
-                         v = RandomSample(random, field);
-    if (Orientation(p, u, v) <= 0) continue;
-    for (const SamplePosition corner : {p, u, v}) samples.Close(corner);
-    ExpectReference(field, samples, *TestStar(field, p, {u, v}));
+    ExpectReferenceAtRandom(random, field, samples);
     if (HasFatalFailure()) return;
   }
 }
