@@ -15,7 +15,8 @@ import tempfile
 import threading
 import time
 
-from server import MemoryGroup, Server, fetch, get, percentile, read_reply, wait_until
+import soak
+from server import Server, fetch, get, percentile, read_reply, wait_until
 
 HOT = "/earth/0/0/0.terrain"
 
@@ -505,65 +506,11 @@ def row_32(binary, _, long):
     return codes == {0} and cut == 0 and slowest <= 10, f"{drains} drains, exit codes {codes}, {cut} truncated, slowest {slowest:.1f} s"
 
 
-SOAK = ["/earth/layer.json", "/earth/tileset.json", "/datasets", "/readyz", "/metrics", "/earth/heights?locations=46.5,8.1%7C-90,180", "/nowhere/0/0/0.terrain",
-        "/earth/0/9/0.terrain", "/earth/0/0/0.terrain?error=x", "/jacksboro/mesh?bbox=-84.3,36.2,-84.2,36.3&error=20", "/earth/3/5/2.png", "/viewer/nothing"]
-
-
-def soak_targets(seed):
-    random_ = random.Random(seed)
-    while True:
-        draw = random_.random()
-        if draw < 0.1:
-            yield random_.choice(SOAK)
-        elif draw < 0.5:  # hot
-            yield f"/earth/4/{random_.randrange(6)}/{random_.randrange(6)}.terrain"
-        else:
-            z, x, y = 12, 2176 + random_.randrange(6), 2871 + random_.randrange(6)
-            if random_.random() < 0.5:
-                z, x, y = 5, random_.randrange(64), random_.randrange(32)
-            name = "jacksboro" if z == 12 else "earth"
-            yield f"/{name}/{z}/{x}/{y}.{random_.choice(['terrain', 'glb'])}?fraction={2 ** random_.randrange(-4, 4)}"
-
-
 def row_33(binary, _, long):
-    seconds, megabyte = (600 if long else 90), 1 << 20
-    caches = {"--cache-bytes": 16, "--refinement-cache-bytes": 32, "--gdal-cache-bytes": 32, "--transfer-bytes": 32}
-    bound = sum(caches.values()) + 128
-    flags = [part for flag, size in caches.items() for part in (flag, f"{size}MiB")]
-    statuses, sizes, end, group = {}, [], time.monotonic() + seconds, MemoryGroup(512 * megabyte)
-
-    def ask(seed):
-        while time.monotonic() < end:
-            with server.connect(60) as connection:  # some of them are reset in mid-reply
-                for count, target in enumerate(itertools.islice(targets[seed], 200)):
-                    connection.sendall(get(target, "Accept-Encoding: gzip\r\n" if count % 2 else ""))
-                    if count == 199 and seed % 2:
-                        connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
-                        break
-                    status, fields = read_reply(connection)[:2]
-                    if status == 503 and "/mesh?" in target and "retry-after" in fields:
-                        status = "503 of a mesh while another is made"  # all workers but one may make some
-                    statuses[status] = statuses.get(status, 0) + 1
-                    if time.monotonic() > end:
-                        break
-                    time.sleep(0.02)
-
-    with group, Server(binary, *flags, prefix=group.prefix) as server:
-        targets = [soak_targets(seed) for seed in range(6)]
-        threads = [threading.Thread(target=ask, args=(seed,)) for seed in range(6)]
-        for thread in threads:
-            thread.start()
-        while time.monotonic() < end:
-            sizes.append(server.resident_kib() / 1024)
-            time.sleep(1)
-        for thread in threads:
-            thread.join()
-    fifth = len(sizes) // 5
-    middle, last = (sorted(part)[len(part) // 2] for part in (sizes[2 * fifth:3 * fifth], sizes[-fifth:]))
+    seconds = 600 if long else 90
+    samples, tally, words = soak.soak(binary, seconds)
     # A short run, or one on a busy machine, does not fill the caches, and so grows.
-    kept = max(sizes) <= bound and (not long or last - middle <= 1) and set(statuses) <= {200, 400, 404, "503 of a mesh while another is made"}
-    return kept, f"{seconds} s, {sum(statuses.values()):,} requests {statuses}, {group.words}: RSS {max(sizes):.0f} MB at most (bound {bound}), " \
-                 f"{middle:.1f} MB in the middle, {last:.1f} MB at the end"
+    return soak.kept(samples, tally, 1 if long else math.inf), soak.told(seconds, samples, tally, words)
 
 
 def row_34(_, test_binary, __):

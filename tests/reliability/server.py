@@ -67,8 +67,18 @@ class MemoryGroup:
             (self.folder / ("memory.limit_in_bytes" if one.is_dir() else "memory.max")).write_text(str(limit))
         except OSError:
             return
-        self.prefix = ("sh", "-c", f'echo $$ > {self.folder}/cgroup.procs && "$@" & wait', "sh")
+        self.prefix = ("sh", "-c", f'echo $$ > {self.folder}/cgroup.procs && exec "$@"', "sh")
         self.words = f"in a cgroup of {limit >> 20} MB"
+
+    def usage_mb(self):
+        """What the group holds in MB: all of it, memory of processes, pages of files. Nothing where there is no group."""
+        if not self.prefix:
+            return {}
+        one = (self.folder / "memory.usage_in_bytes").exists()
+        used = (self.folder / ("memory.usage_in_bytes" if one else "memory.current")).read_text()
+        parts = dict(line.split() for line in (self.folder / "memory.stat").read_text().splitlines())
+        sizes = {"used": used, "anonymous": parts["total_rss" if one else "anon"], "file": parts["total_cache" if one else "file"]}
+        return {name: round(int(size) / 2**20, 2) for name, size in sizes.items()}
 
     def __enter__(self):
         return self
