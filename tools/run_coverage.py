@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
 """Which lines of each room the tests run: builds with clang's counters, runs ctest, and prints a table.
 
-    tools/run_coverage.py [--jobs N] [--missed] [--no-run] [CTEST_OPTION ...]
+    tools/run_coverage.py [--jobs N] [--missed] [--keep] [--no-run] [CTEST_OPTION ...]
 
---missed lists the files with the most lines that never run as well. --no-run counts what earlier runs have left in
-build/coverage/profiles. Tests that kill the server leave no counts of it. Exit status 1 if a room is below 90 %.
+--missed names the lines that never run, of every file with five of them or more. --keep adds to the counts of earlier runs in
+build/coverage/profiles, --no-run takes them alone. Tests that kill the server leave no counts of it, nor do those that run out of
+their time. Exit status 1 if a room is below 90 %.
 """
 import argparse
 import collections
@@ -28,27 +29,55 @@ def run(command, **kwargs):
     return subprocess.run(command, cwd=ROOT, stdin=subprocess.DEVNULL, **kwargs)
 
 
-def run_tests(jobs, options):
+def run_tests(jobs, keep, options):
     run(["cmake", "--preset", "coverage", "-DTERRACE_BUILD_TESTS=ON", "--log-level=WARNING"], check=True)
     run(["ninja", "-C", BUILD, "-j", str(jobs)], check=True)
-    shutil.rmtree(PROFILES, ignore_errors=True)
-    PROFILES.mkdir()
+    if not keep:
+        shutil.rmtree(PROFILES, ignore_errors=True)
+    PROFILES.mkdir(exist_ok=True)
     # A file for each binary, which its processes add to.
     environment = os.environ | {"LLVM_PROFILE_FILE": f"{PROFILES}/%4m.profraw"}
     run(["ctest", "--test-dir", BUILD, "-j", str(jobs), "--output-on-failure", *options], env=environment)
 
 
-def summaries():
-    """File -> llvm-cov's summary of it."""
+def export(*options):
+    """What llvm-cov writes about all binaries of the build."""
     merged = BUILD / "all.profdata"
     run(["llvm-profdata-14", "merge", "-sparse", "-o", merged, *sorted(PROFILES.glob("*.profraw"))], check=True)
     binaries = [path for path in sorted(BUILD.rglob("*"))
                 if path.is_file() and os.access(path, os.X_OK) and path.suffix == "" and "CMakeFiles" not in path.parts]
     objects = [part for path in binaries[1:] for part in ("-object", str(path))]
-    export = run(["llvm-cov-14", "export", "-summary-only", f"-instr-profile={merged}", binaries[0], *objects,
-                  f"-ignore-filename-regex=({BUILD}|{ROOT}/tests|/usr|{ROOT}/.deps)"], check=True, stdout=subprocess.PIPE)
-    files = json.loads(export.stdout)["data"][0]["files"]
+    return run(["llvm-cov-14", "export", *options, f"-instr-profile={merged}", binaries[0], *objects,
+                f"-ignore-filename-regex=({BUILD}|{ROOT}/tests|/usr|{ROOT}/.deps)"], check=True, stdout=subprocess.PIPE).stdout
+
+
+def summaries():
+    """File -> llvm-cov's summary of it."""
+    files = json.loads(export("-summary-only"))["data"][0]["files"]
     return {os.path.relpath(file["filename"], ROOT): file["summary"] for file in files}
+
+
+def missed_lines():
+    """File -> the numbers of its lines that never run."""
+    missed, name = collections.defaultdict(list), None
+    for line in export("-format=lcov").decode().splitlines():
+        key, _, value = line.partition(":")
+        if key == "SF":
+            name = os.path.relpath(value, ROOT)
+        elif key == "DA" and value.endswith(",0"):
+            missed[name].append(int(value.partition(",")[0]))
+    return missed
+
+
+def ranges(numbers):
+    """"3-5, 9" of 3, 4, 5, 9."""
+    found = []
+    for number in sorted(numbers):
+        if found and found[-1][1] == number - 1:
+            found[-1][1] = number
+        else:
+            found.append([number, number])
+    return ", ".join(f"{first}-{last}" if last > first else str(first) for first, last in found)
 
 
 def room_of(name):
@@ -59,10 +88,11 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--missed", action="store_true")
+    parser.add_argument("--keep", action="store_true")
     parser.add_argument("--no-run", action="store_true")
     arguments, options = parser.parse_known_args()
     if not arguments.no_run:
-        run_tests(arguments.jobs, options)
+        run_tests(arguments.jobs, arguments.keep, options)
     rooms, missed = collections.defaultdict(lambda: [0, 0, 0, 0]), []
     for name, summary in summaries().items():
         room = room_of(name)
@@ -80,9 +110,11 @@ def main():
         low = low or share < WANTED
         print(f"| `{room}` | {lines:,} | {share:.1f} %{'' if share >= WANTED else ' (low)'} | {100 * taken / max(branches, 1):.1f} % |")
     if arguments.missed:
-        print("\n| file | lines that never run | run |\n|---|---|---|")
-        for count, percent, name in sorted(missed, reverse=True)[:25]:
-            print(f"| `{name}` | {count} | {percent:.1f} % |")
+        print("\n| file | run | lines that never run |\n|---|---|---|")
+        numbers = missed_lines()
+        for count, percent, name in sorted(missed, reverse=True):
+            if count >= 5:
+                print(f"| `{name}` | {percent:.1f} % | {count}: {ranges(numbers[name])} |")
     return 1 if low else 0
 
 

@@ -26,6 +26,7 @@
 #include "server/cli/open_source.h"
 #include "server/cli/progress.h"
 #include "server/cli/service_manager.h"
+#include "server/memory_trimmer.h"
 #include "server/reload/reloader.h"
 #include "server/server.h"
 #include "server/tiles/disk_cache.h"
@@ -329,6 +330,7 @@ int Serve(const ServeArguments& arguments) {
   std::printf("terrace: serving %zu dataset%s at %s\n", count, count == 1 ? "" : "s", server->url().c_str());
   std::fflush(stdout);
   NotifyReady(fmt::format("{} dataset{} at {}", count, count == 1 ? "" : "s", server->url()));
+  const server::MemoryTrimmer trimmer;
   const bool drained = server->Wait();
   reloader.Stop();
   return drained ? kExitOk : kExitFailure;
