@@ -136,7 +136,10 @@ std::string SerializeHead(const Response& response, const HeadOptions& options) 
   for (const Response::Header& header : response.headers) Put(head, header.name, header.value);
   head += cors.HeadersFor(options.origin);
   head += "X-Content-Type-Options: nosniff\r\n";
-  head += options.keep_alive ? "Connection: keep-alive\r\n\r\n" : "Connection: close\r\n\r\n";
+  // RFC 9112, section 9.3: since HTTP/1.1 a connection stays open unless somebody says otherwise.
+  if (!options.keep_alive) head += "Connection: close\r\n";
+  if (options.keep_alive && options.version == 10) head += "Connection: keep-alive\r\n";
+  head += "\r\n";
   return head;
 }
 

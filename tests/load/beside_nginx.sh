@@ -3,8 +3,9 @@
 #
 #   tests/load/beside_nginx.sh TERRACE TILE_URL [TURNS] [SECONDS] [CONNECTIONS]     default: 5 turns, 3 seconds, 64 connections
 #
-# TERRACE: the binary's process id, or a pattern that `pgrep -f` finds it by. TILE_URL: any tile of it; it is asked for with
-# Accept-Encoding: gzip. Start the server with one io thread and `log_level` warn: nginx runs one worker without a log.
+# TERRACE: the binary's process id, or a pattern that `pgrep -f` finds it by. TILE_URL: any tile of it, asked for with
+# Accept-Encoding: gzip; with TILES=FILE, paths a line, these tiles in turn in the place of one that is in every processor's cache.
+# Start the server with one io thread and `log_level` warn: nginx runs one worker without a log.
 #
 # Both take turns. Requests a second are those of wrk; microseconds are the processor time of the serving process alone, which
 # stands other work on the machine better. Minimum and median of all turns; of requests a second the best and the median.
@@ -21,14 +22,32 @@ if [[ $pattern =~ ^[0-9]+$ ]]; then terrace=$pattern; else terrace=$(pgrep -f "$
 folder=$(mktemp -d)
 chmod 755 "$folder"
 trap 'kill "$(cat "$folder/pid" 2> /dev/null)" 2> /dev/null || true; rm -rf "$folder"' EXIT
-curl -fsS -H 'Accept-Encoding: gzip' -o "$folder/tile" "$url"
+if [[ -n ${TILES:-} ]]; then mapfile -t paths < "$TILES"; else paths=("/${url#*://*/}"); fi
+origin=$(sed -E 's#^([a-z]+://[^/]+).*#\1#' <<< "$url")
+for i in "${!paths[@]}"; do
+  printf 'url = "%s%s"\noutput = "%s/tile%d"\n' "$origin" "${paths[i]}" "$folder" "$i"
+done > "$folder/curl"
+curl -fsS --no-progress-meter -H 'Accept-Encoding: gzip' --config "$folder/curl"
+# wrk asks both servers in the same way: requests made beforehand, in turn.
+cat > "$folder/turns.lua" <<'LUA'
+local requests, turn = {}, 0
+function init(arguments)
+  for path in io.lines(arguments[1]) do requests[#requests + 1] = wrk.format("GET", path) end
+end
+function request()
+  turn = turn % #requests + 1
+  return requests[turn]
+end
+LUA
+printf '%s\n' "${paths[@]}" > "$folder/terrace.txt"
+for i in "${!paths[@]}"; do echo "/tile$i"; done > "$folder/nginx.txt"
 port=$(python3 -c 'import socket; s = socket.socket(); s.bind(("127.0.0.1", 0)); print(s.getsockname()[1])')
 cat > "$folder/nginx.conf" <<CONF
 worker_processes 1; pid $folder/pid; error_log $folder/error.log;
 events { worker_connections 4096; }
 http {
   access_log off; sendfile on; tcp_nopush on; tcp_nodelay on; keepalive_requests 1000000000; default_type application/octet-stream;
-  open_file_cache max=100; open_file_cache_valid 1h;
+  open_file_cache max=10000; open_file_cache_valid 1h;
   server { listen 127.0.0.1:$port; root $folder; }
 }
 CONF
@@ -43,12 +62,14 @@ if [[ $(nproc) -gt 1 ]] && command -v taskset > /dev/null; then
   wrk=(taskset -c 1 wrk)
 fi
 
-python3 - "${wrk[*]}" "$turns" "$seconds" "$connections" "$(stat -c %s "$folder/tile")" \
-  "terrace $terrace $url" "nginx $worker http://127.0.0.1:$port/tile" <<'PYTHON'
-import os, re, statistics, subprocess, sys
+python3 - "${wrk[*]}" "$turns" "$seconds" "$connections" "$folder" \
+  "terrace $terrace $origin" "nginx $worker http://127.0.0.1:$port" <<'PYTHON'
+import os, pathlib, re, statistics, subprocess, sys
 
 wrk = sys.argv[1].split()
-turns, seconds, connections, size = (int(argument) for argument in sys.argv[2:6])
+turns, seconds, connections = (int(argument) for argument in sys.argv[2:5])
+folder = pathlib.Path(sys.argv[5])
+sizes = [file.stat().st_size for file in folder.glob("tile*")]
 tick = 1e6 / os.sysconf("SC_CLK_TCK")
 
 
@@ -63,7 +84,8 @@ for _ in range(turns):
     for contender in sys.argv[6:]:
         name, pid, url = contender.split()
         before = processor_us(pid)
-        out = subprocess.run([*wrk, "-t1", f"-c{connections}", f"-d{seconds}s", "--latency", "-H", "Accept-Encoding: gzip", url],
+        out = subprocess.run([*wrk, "-t1", f"-c{connections}", f"-d{seconds}s", "--latency", "-H", "Accept-Encoding: gzip",
+                              "-s", folder / "turns.lua", url, folder / f"{name}.txt"],
                              capture_output=True, text=True, check=True, stdin=subprocess.DEVNULL).stdout
         used = processor_us(pid) - before
         if "Non-2xx" in out or "Socket errors" in out:
@@ -73,7 +95,7 @@ for _ in range(turns):
         runs.setdefault(name, []).append((float(re.search(r"Requests/sec:\s+([\d.]+)", out)[1]), used / requests,
                                           float(p99) * {"us": 1e-3, "ms": 1, "s": 1e3}[unit]))
 
-print(f"{size:,} bytes, {connections} connections, {turns} turns of {seconds} s each\n")
+print(f"{len(sizes)} tiles of {statistics.mean(sizes):,.0f} bytes, {connections} connections, {turns} turns of {seconds} s each\n")
 print("| | requests/s, best | median | p99 ms, least | median | us of processor a request, least | median |")
 print("|---|---|---|---|---|---|---|")
 for name, values in runs.items():

@@ -48,21 +48,26 @@ def run_pipeline(arguments, walk):
     return json.loads(out) | {"cpu": children_seconds() - before}
 
 
+def processor_seconds(pid):
+    fields = pathlib.Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
 def run_server(arguments, walk):
     flags = [part for flag, size in CACHES.items() for part in (flag, f"{size}MiB")]
-    before = children_seconds()
     server = subprocess.Popen([arguments.build / "server/cli/terrace", "serve", "--config", arguments.config, "--listen", "127.0.0.1:0",
                                "--log-level", "warn", "--access-log", "off", *flags], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
     try:
         url = re.search(r"http://\S+", server.stdout.readline())[0]
         client = subprocess.run([HERE / "once.py", url, walk, str(arguments.connections)], check=True, stdout=subprocess.PIPE, text=True)
+        own = processor_seconds(server.pid)
         peak = int(re.search(r"VmHWM:\s+(\d+)", pathlib.Path(f"/proc/{server.pid}/status").read_text())[1]) / 1024
     finally:
         server.terminate()
         server.wait(30)
         server.stdout.close()
     figures = json.loads(client.stdout)
-    return figures | {"tiles": figures["requests"], "peak": peak, "cpu": children_seconds() - before}
+    return figures | {"tiles": figures["requests"], "peak": peak, "cpu": own}
 
 
 def main():

@@ -10,6 +10,15 @@ namespace {
 TEST(Response, SpeaksTheVersionOfTheRequest) {
   EXPECT_TRUE(SerializeHead(Response(), {.version = 10, .keep_alive = true}).starts_with("HTTP/1.0 200 OK\r\n"));
   EXPECT_TRUE(SerializeHead(Response(), {.keep_alive = true}).starts_with("HTTP/1.1 200 OK\r\n"));
+  const auto connection = [](unsigned version, bool keep_alive) {
+    const std::string head = SerializeHead(Response(), {.version = version, .keep_alive = keep_alive});
+    const std::size_t at = head.find("\r\nConnection: ");
+    return at == std::string::npos ? "" : head.substr(at + 14, head.find("\r\n", at + 2) - at - 14);
+  };
+  EXPECT_EQ(connection(10, true), "keep-alive");
+  EXPECT_EQ(connection(11, true), "") << "it is what HTTP/1.1 means";
+  EXPECT_EQ(connection(10, false), "close");
+  EXPECT_EQ(connection(11, false), "close");
 }
 
 TEST(Response, CarriesCorsAndALength) {
