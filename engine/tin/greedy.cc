@@ -116,7 +116,8 @@ GreedyTriangulation::Impl::Impl(const HeightField& field, GreedyOptions options)
       sagitta_(options_.curvature, field.height()),
       seeds_(field, options_.seeds),
       open_(field),
-      triangulation_(field) {
+      triangulation_(field),
+      candidates_(2 * Triangulation::LikelyVertices(field)) {
   CheckOptions(options_);
   for (const Side side : {Side::kSouth, Side::kEast, Side::kNorth, Side::kWest}) {
     const bool along_x = side == Side::kSouth || side == Side::kNorth;
