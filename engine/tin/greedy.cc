@@ -127,7 +127,7 @@ GreedyTriangulation::Impl::Impl(const HeightField& field, GreedyOptions options)
   if (options_.criterion == Criterion::kDataDependent) {
     data_dependent_.emplace(field, open_, sagitta_, triangulation_, options_.data_dependent);
   }
-  if (options_.record) recorder_.emplace();
+  if (options_.record) recorder_.emplace(Triangulation::LikelyVertices(field));
   AwaitScan(0);
   AwaitScan(1);
 }
