@@ -90,7 +90,10 @@ constexpr std::size_t kAhead = 8;     // entries: their slots are fetched so ear
 
 }  // namespace
 
-CandidateQueue::CandidateQueue() : threshold_(std::numeric_limits<float>::infinity()) {}
+CandidateQueue::CandidateQueue(std::size_t likely_slots) : threshold_(std::numeric_limits<float>::infinity()) {
+  errors_.reserve(likely_slots);
+  samples_.reserve(likely_slots);
+}
 
 std::uint32_t CandidateQueue::Winner() {
   do {
@@ -179,8 +182,8 @@ void CandidateQueue::Shorten() {
 
 void CandidateQueue::Grow(std::size_t slots) {
   const std::size_t padded = (slots + kBlock - 1) / kBlock * kBlock;
-  errors_.resize(padded, 0.0F);
-  samples_.resize(padded, kNoSample);
+  errors_.GrowTo(padded, 0.0F);
+  samples_.GrowTo(padded, kNoSample);
 }
 
 }  // namespace terrace::tin

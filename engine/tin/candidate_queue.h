@@ -27,7 +27,7 @@ class CandidateQueue {
  public:
   static constexpr std::uint32_t kNoSlot = 0xFFFFFFFF;
 
-  CandidateQueue();
+  explicit CandidateQueue(std::size_t likely_slots = 0);
 
   // Slots that were never set hold no candidate.
   void Set(std::uint32_t slot, const Candidate& candidate) {

@@ -249,7 +249,7 @@ void DataDependentCriterion::ScanUnknown(const Star& star, PlaneMisfit* misfits)
 }
 
 void DataDependentCriterion::CoverSlots() {
-  if (known_.size() < triangulation_->triangle_count()) known_.resize(triangulation_->triangle_count());
+  if (known_.size() < triangulation_->triangle_count()) known_.GrowTo(triangulation_->triangle_count(), {});
 }
 
 }  // namespace terrace::tin

@@ -18,12 +18,15 @@ constexpr int kSmallestBlockCells = 256;
 // inside the blocks than a denser border has of its own: the best weight lies between 1.3 and 2.
 constexpr BorderOptions kSharedBorder{.weight = 1.5};
 
-// A cut is good while the vertices on its borders are below this share of those estimated for all blocks.
-constexpr double kMostSharedVertices = 0.06;
+// A cut is good while the vertices on its borders are below this share of those estimated for the whole field.
+constexpr double kMostSharedVertices = 0.05;
 
-// And while so many are estimated for a block: with fewer, where the first of them lie changes the count by more than
-// the borders add, and the whole field is meshed in little time.
-constexpr double kFewestBlockVertices = 100;
+// No cut is good where fewer are estimated, a third of what it will be: there, where the first of them lie changes the
+// count by more than the borders add, and the whole field is meshed in little time.
+constexpr double kFewestVertices = 4000;
+
+// Nor where heights and triangles of the whole field take less: they fit the processor's second cache, or nearly.
+constexpr double kFewestBytes = 2 << 20, kBytesOfSample = 4, kBytesOfEstimatedVertex = 48;
 
 // Where blocks begin along a side of so many samples, and its last sample.
 std::vector<int> CutSide(int samples, int block_cells) {
@@ -52,13 +55,18 @@ double CountBorderVertices(const HeightField& field, Corner from, Corner to, dou
   return count;
 }
 
-// Whether blocks have few enough vertices on the borders between them, relative to an estimate for their insides: as
-// many as in a grid whose lines have as many as the block's borders. A surface needs 1.5 to 5 times that, the more the
-// coarser.
-bool IsGood(const FieldCut& cut, const HeightField& field, double max_error_m) {
+struct VertexEstimate {
+  double shared = 0;     // on the borders between blocks, exactly
+  double in_blocks = 0;  // borders included
+};
+
+// Blocks count as grids whose lines have as many vertices as the block's borders. A surface needs 1.5 to 3 times that
+// if the blocks are small, the more the coarser; with larger ones, which may be land in a corner only, the estimate is
+// good for nothing.
+VertexEstimate EstimateVertices(const FieldCut& cut, const HeightField& field, double max_error_m) {
   const auto corner = [&](int x, int y) -> Corner { return {x, y, static_cast<double>(field.VertexHeight(x, y))}; };
   const auto count = [&](const Corner& a, const Corner& b) { return CountBorderVertices(field, a, b, max_error_m); };
-  double shared = 0, in_blocks = 0;
+  VertexEstimate estimate;
   std::vector<double> far_by_column(cut.blocks_along_x());  // far border (y) of the block below
   double far_before = 0;                                    // far border (x) of the block before
   for (std::size_t i = 0; i < cut.size(); ++i) {
@@ -68,13 +76,17 @@ bool IsGood(const FieldCut& cut, const HeightField& field, double max_error_m) {
     double& below = far_by_column[i % far_by_column.size()];
     const double near_x = x > 0 ? far_before : count(a, d), far_x = count(b, c);
     const double near_y = y > 0 ? below : count(a, b), far_y = count(d, c);
-    shared += (x > 0 ? near_x : 0) + (y > 0 ? near_y : 0);
-    in_blocks += (near_x + far_x) / 2 * ((near_y + far_y) / 2);
+    estimate.shared += (x > 0 ? near_x : 0) + (y > 0 ? near_y : 0);
+    estimate.in_blocks += (near_x + far_x) / 2 * ((near_y + far_y) / 2);
     far_before = far_x;
     below = far_y;
   }
-  return shared <= kMostSharedVertices * in_blocks &&
-         in_blocks >= kFewestBlockVertices * static_cast<double>(cut.size());
+  return estimate;
+}
+
+bool IsWorthACut(const HeightField& field, double vertices) {
+  const double samples = static_cast<double>(field.width()) * static_cast<double>(field.height());
+  return vertices >= kFewestVertices && kBytesOfSample * samples + kBytesOfEstimatedVertex * vertices >= kFewestBytes;
 }
 
 // The samples of a block as a field of its own. Its corners are vertices of the joined mesh and need the height that
@@ -112,10 +124,17 @@ FieldCut::FieldCut(int width, int height, int block_cells) {
 }
 
 FieldCut FieldCut::For(const HeightField& field, double max_error_m) {
-  for (int cells = kSmallestBlockCells;; cells *= 2) {
-    FieldCut cut(field.width(), field.height(), cells);
-    if (cut.size() == 1 || IsGood(cut, field, max_error_m)) return cut;
+  int cells = kSmallestBlockCells;
+  FieldCut cut(field.width(), field.height(), cells);
+  VertexEstimate estimate = EstimateVertices(cut, field, max_error_m);
+  const double vertices = estimate.in_blocks;
+  if (!IsWorthACut(field, vertices)) return {field.width(), field.height(), HeightField::kMaxSide};
+  while (estimate.shared > kMostSharedVertices * vertices) {  // ends at the latest when nothing is shared
+    cells *= 2;
+    cut = FieldCut(field.width(), field.height(), cells);
+    estimate = EstimateVertices(cut, field, max_error_m);
   }
+  return cut;
 }
 
 FieldBlock FieldCut::block(std::size_t i) const {

@@ -116,7 +116,8 @@ GreedyTriangulation::Impl::Impl(const HeightField& field, GreedyOptions options)
       sagitta_(options_.curvature, field.height()),
       seeds_(field, options_.seeds),
       open_(field),
-      triangulation_(field) {
+      triangulation_(field),
+      candidates_(2 * Triangulation::LikelyVertices(field)) {
   CheckOptions(options_);
   for (const Side side : {Side::kSouth, Side::kEast, Side::kNorth, Side::kWest}) {
     const bool along_x = side == Side::kSouth || side == Side::kNorth;
@@ -126,7 +127,7 @@ GreedyTriangulation::Impl::Impl(const HeightField& field, GreedyOptions options)
   if (options_.criterion == Criterion::kDataDependent) {
     data_dependent_.emplace(field, open_, sagitta_, triangulation_, options_.data_dependent);
   }
-  if (options_.record) recorder_.emplace();
+  if (options_.record) recorder_.emplace(Triangulation::LikelyVertices(field));
   AwaitScan(0);
   AwaitScan(1);
 }

@@ -1,35 +1,100 @@
 #include "engine/tin/insertion_recorder.h"
 
 #include <algorithm>
+#include <limits>
 
 namespace terrace::tin {
+namespace {
 
-InsertionRecorder::InsertionRecorder(const Refinement& refinement)
-    : inserted_(refinement.inserted()), errors_before_(refinement.errors_before()), record_(refinement.WideRecord()) {
-  for (std::uint32_t made = 0; made < record_.removed.size(); ++made) {
-    if (record_.removed[made] == Record::kNever) made_in_slot_.push_back(made);
+using Wide = InsertionRecord<std::uint32_t>;
+
+// Six triangles an insertion, a ring of as many, four slots.
+constexpr std::size_t kLikelyWords = 11;
+
+// Where the smallest of them is, without a branch that cannot be foretold.
+std::size_t SmallestOf(const std::uint32_t* values, std::size_t count) {
+  std::uint64_t smallest = std::numeric_limits<std::uint64_t>::max();
+  for (std::size_t i = 0; i < count; ++i) smallest = std::min(smallest, std::uint64_t{values[i]} << 32 | i);
+  return static_cast<std::uint32_t>(smallest);
+}
+
+}  // namespace
+
+InsertionRecorder::InsertionRecorder(std::size_t likely_insertions) : made_in_slot_{0, 1} {
+  begun_.removed.assign(2, Wide::kNever);
+  made_ = begun_.removed.size();
+  inserted_.reserve(likely_insertions);
+  errors_before_.reserve(likely_insertions);
+  log_.reserve(kLikelyWords * likely_insertions);
+}
+
+InsertionRecorder::InsertionRecorder(const Refinement& refinement) : begun_(refinement.WideRecord()) {
+  inserted_.Append(refinement.inserted());
+  errors_before_.Append(refinement.errors_before());
+  for (std::uint32_t made = 0; made < begun_.removed.size(); ++made) {
+    if (begun_.removed[made] == Wide::kNever) made_in_slot_.push_back(made);
   }
+  made_ = begun_.removed.size();
+  corners_ = begun_.rings.size();
+  for (const std::uint32_t size : begun_.sizes) most_made_ = std::max<std::size_t>(most_made_, size & ~Wide::kOpen);
 }
 
 void InsertionRecorder::Append(SamplePosition inserted, float error_before, const Star& star) {
-  const auto insertion = static_cast<std::uint32_t>(inserted_.size());
   inserted_.push_back(inserted);
   errors_before_.push_back(error_before);
-  for (std::size_t i = 0; i < star.removed_count; ++i) record_.removed[made_in_slot_[star.removed[i]]] = insertion;
-  const auto count = static_cast<std::uint32_t>(star.count);
-  record_.sizes.push_back(star.is_closed ? count : count | Record::kOpen);
-  // A closed ring may begin anywhere. Its smallest id comes first, so that the record is a function of the insertions.
-  const auto first = star.ring.ids.begin(), last = first + count + (star.is_closed ? 0 : 1);
-  const auto begin = star.is_closed ? std::min_element(first, last) : first;
-  record_.rings.insert(record_.rings.end(), begin, last);
-  record_.rings.insert(record_.rings.end(), first, begin);
-  made_in_slot_.resize(made_in_slot_.size() + count - star.removed_count);
-  std::size_t triangle = static_cast<std::size_t>(begin - first);
-  for (std::size_t i = 0; i < count; ++i) {
-    made_in_slot_[star.triangles[triangle]] = static_cast<std::uint32_t>(record_.removed.size());
-    record_.removed.push_back(Record::kNever);
-    triangle = triangle + 1 < count ? triangle + 1 : 0;
+  most_made_ = std::max(most_made_, star.count);
+  const std::size_t corners = star.count + (star.is_closed ? 0 : 1), words = 1 + corners + star.removed_count;
+  made_ += star.count;
+  corners_ += corners;
+  log_.GrowBy(words);
+  Word* word = log_.end() - words;
+  *word++ = static_cast<Word>(star.count) | (star.is_closed ? 0 : Wide::kOpen);
+  word = std::copy_n(star.ring.ids.data(), corners, word);
+  std::copy_n(star.removed.data(), star.removed_count, word);
+}
+
+Refinement InsertionRecorder::Make(int width, int height) const {
+  const bool is_narrow = Refinement::IsNarrow(4 + inserted_.size(), most_made_);
+  return {width,
+          height,
+          {inserted_.begin(), inserted_.end()},
+          {errors_before_.begin(), errors_before_.end()},
+          is_narrow ? Refinement::Record(Finish<std::uint16_t>()) : Refinement::Record(Finish<std::uint32_t>())};
+}
+
+template <typename Index>
+InsertionRecord<Index> InsertionRecorder::Finish() const {
+  using Record = InsertionRecord<Index>;
+  auto record = ConvertTo<Index>(begun_);
+  std::size_t insertion = record.sizes.size(), made = record.removed.size(), corners = record.rings.size();
+  record.sizes.resize(inserted_.size());
+  record.rings.resize(corners_);
+  record.removed.resize(made_, Record::kNever);
+  std::vector<std::uint32_t> made_in_slot = made_in_slot_;
+  std::size_t slots = made_in_slot.size();
+  made_in_slot.resize(slots + 2 * (inserted_.size() - insertion));
+  for (const Word* word = log_.begin(); word != log_.end(); ++insertion) {
+    const bool is_open = (*word & Wide::kOpen) != 0;
+    const std::size_t count = *word++ & ~Wide::kOpen, removed = count - (is_open ? 1 : 2);
+    record.sizes[insertion] = static_cast<Index>(is_open ? count | Record::kOpen : count);
+    const Word *const ring = word, *const ring_end = ring + count + (is_open ? 1 : 0);
+    // A closed ring may begin anywhere. Its smallest id comes first, so that the record is a function of the
+    // insertions.
+    const std::size_t turn = is_open ? 0 : SmallestOf(ring, count);
+    const auto next = std::copy(ring + turn, ring_end, record.rings.begin() + static_cast<std::ptrdiff_t>(corners));
+    std::copy(ring, ring + turn, next);
+    corners += static_cast<std::size_t>(ring_end - ring);
+    word = ring_end;
+    for (std::size_t i = 0; i < removed; ++i) record.removed[made_in_slot[word[i]]] = static_cast<Index>(insertion);
+    // Triangle i of the star is the one `turn` before it in the record.
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::size_t slot = i < removed ? word[i] : slots++;
+      made_in_slot[slot] = static_cast<std::uint32_t>(made + i + (i >= turn ? 0 : count) - turn);
+    }
+    made += count;
+    word += removed;
   }
+  return record;
 }
 
 }  // namespace terrace::tin

@@ -1,17 +1,24 @@
 // Writes down a run of insertions as it goes: what a Refinement is made of.
+//
+// While the run goes on, all that is written is a log, from one end to the other. Which triangle was removed by which
+// insertion is found out when a refinement is asked for: that jumps about, and beside the run it would push the mesh
+// out of the cache.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
 #include "engine/tin/refinement.h"
+#include "engine/tin/spare_blocks.h"
 #include "engine/tin/star.h"
 
 namespace terrace::tin {
 
 class InsertionRecorder {
  public:
-  InsertionRecorder() : made_in_slot_{0, 1} { record_.removed.assign(2, Record::kNever); }
+  // Room is made for so many insertions. There may be more.
+  explicit InsertionRecorder(std::size_t likely_insertions);
 
   // Goes on with a refinement whose mesh is in the triangulation, its triangles in the order of MeshOf.
   explicit InsertionRecorder(const Refinement& refinement);
@@ -19,15 +26,27 @@ class InsertionRecorder {
   // The star is that of sample `inserted`, whose insertion mended `error_before`.
   void Append(SamplePosition inserted, float error_before, const Star& star);
 
-  Refinement Make(int width, int height) const { return {width, height, inserted_, errors_before_, record_}; }
+  Refinement Make(int width, int height) const;
 
  private:
-  using Record = InsertionRecord<std::uint32_t>;
+  using Word = std::uint32_t;
 
-  std::vector<SamplePosition> inserted_;
-  std::vector<float> errors_before_;
-  Record record_;
-  std::vector<std::uint32_t> made_in_slot_;  // by slot: which triangle of the record is there now
+  template <typename Index>
+  InsertionRecord<Index> Finish() const;
+
+  LargeArray<SamplePosition> inserted_;
+  LargeArray<float> errors_before_;
+
+  // Before the log begins: the record, and by slot which of its triangles is there.
+  InsertionRecord<std::uint32_t> begun_;
+  std::vector<std::uint32_t> made_in_slot_;
+
+  // By insertion: triangles made, with InsertionRecord::kOpen; the ring of vertices; the slots of the triangles
+  // removed, two fewer than made, one fewer in an open star. The first triangles made are in these slots, the others in
+  // new ones.
+  LargeArray<Word> log_;
+  std::size_t made_ = 0, most_made_ = 0;  // triangles, in all and by one insertion
+  std::size_t corners_ = 0;               // of all rings
 };
 
 }  // namespace terrace::tin

@@ -65,7 +65,7 @@ OpenSamples::OpenSamples(const HeightField& field)
     : width_(field.width()), stride_(static_cast<std::size_t>(field.width())), quantum_(QuantumOf(field)) {
   const float none = std::numeric_limits<float>::quiet_NaN();
   const auto rows = static_cast<std::size_t>(field.height());
-  heights_.assign(stride_ * (rows + kPaddingRows) + kPadding, none);
+  heights_.GrowTo(stride_ * (rows + kPaddingRows) + kPadding, none);
   for (std::size_t y = 1; y + 1 < rows; ++y) {
     const float* row = field.Row(static_cast<int>(y));
     std::copy(row + 1, row + stride_ - 1, heights_.begin() + static_cast<std::ptrdiff_t>(y * stride_ + 1));

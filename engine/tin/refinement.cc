@@ -18,34 +18,6 @@ namespace {
 using Wide = InsertionRecord<std::uint32_t>;
 using Narrow = InsertionRecord<std::uint16_t>;
 
-template <typename To, typename From>
-std::vector<To> Convert(const std::vector<From>& values, From special, To as) {
-  std::vector<To> converted(values.size());
-  std::transform(values.begin(), values.end(), converted.begin(),
-                 [=](From value) { return value == special ? as : static_cast<To>(value); });
-  return converted;
-}
-
-template <typename To, typename From>
-InsertionRecord<To> ConvertRecord(const InsertionRecord<From>& record) {
-  InsertionRecord<To> converted;
-  converted.sizes.reserve(record.sizes.size());
-  for (const From size : record.sizes) {
-    const bool is_open = (size & InsertionRecord<From>::kOpen) != 0;
-    const auto triangles = static_cast<To>(size & static_cast<From>(~InsertionRecord<From>::kOpen));
-    converted.sizes.push_back(is_open ? static_cast<To>(triangles | InsertionRecord<To>::kOpen) : triangles);
-  }
-  converted.rings.assign(record.rings.begin(), record.rings.end());
-  converted.removed = Convert<To, From>(record.removed, InsertionRecord<From>::kNever, InsertionRecord<To>::kNever);
-  return converted;
-}
-
-bool FitsNarrow(std::size_t vertices, const Wide& record) {
-  if (vertices >= Narrow::kNever) return false;
-  return std::all_of(record.sizes.begin(), record.sizes.end(),
-                     [](std::uint32_t size) { return (size & ~Wide::kOpen) < Narrow::kOpen; });
-}
-
 // One compare and one conditional step for each triangle ever made: what is gone is overwritten by what follows.
 template <typename Index>
 void CollectTriangles(const InsertionRecord<Index>& record, std::size_t insertions,
@@ -124,15 +96,19 @@ bool IsSoundRecord(const InsertionRecord<Index>& record, std::size_t insertions)
 
 }  // namespace
 
+bool Refinement::IsNarrow(std::size_t vertices, std::size_t most_triangles_made) {
+  return vertices < Narrow::kNever && most_triangles_made < Narrow::kOpen;
+}
+
 Refinement::Refinement(int width, int height, std::vector<SamplePosition> inserted, std::vector<float> errors_before,
-                       InsertionRecord<std::uint32_t> record)
-    : width_(width), height_(height), inserted_(std::move(inserted)), errors_before_(std::move(errors_before)) {
-  TERRACE_CHECK(inserted_.size() == errors_before_.size() && inserted_.size() == record.sizes.size());
-  if (FitsNarrow(vertex_count(), record)) {
-    record_ = ConvertRecord<std::uint16_t>(record);
-  } else {
-    record_ = std::move(record);
-  }
+                       Record record)
+    : width_(width),
+      height_(height),
+      inserted_(std::move(inserted)),
+      errors_before_(std::move(errors_before)),
+      record_(std::move(record)) {
+  const std::size_t recorded = std::visit([](const auto& of) { return of.sizes.size(); }, record_);
+  TERRACE_CHECK(inserted_.size() == errors_before_.size() && inserted_.size() == recorded);
 }
 
 std::size_t Refinement::PointsAt(double max_error) const {
@@ -165,7 +141,7 @@ std::size_t Refinement::bytes() const {
 }
 
 InsertionRecord<std::uint32_t> Refinement::WideRecord() const {
-  return std::visit([](const auto& record) { return ConvertRecord<std::uint32_t>(record); }, record_);
+  return std::visit([](const auto& record) { return ConvertTo<std::uint32_t>(record); }, record_);
 }
 
 // The form: kMagic, width, height, bytes of an index, then five arrays, each with its length in front, then the hash of

@@ -17,28 +17,21 @@
 #include <vector>
 
 #include "engine/core/result.h"
+#include "engine/tin/insertion_record.h"
 #include "engine/tin/tin_mesh.h"
 
 namespace terrace::tin {
 
-// Index: a vertex, an insertion or the size of a ring.
-template <typename Index>
-struct InsertionRecord {
-  static constexpr Index kNever = static_cast<Index>(-1);
-  static constexpr Index kOpen = static_cast<Index>(Index{1} << (8 * sizeof(Index) - 1));
-
-  std::vector<Index> sizes;    // by insertion: triangles made; with kOpen: the ring is open and has one vertex more
-  std::vector<Index> rings;    // the rings, one after the other; vertex 4 + i is that of insertion i
-  std::vector<Index> removed;  // by triangle, the first two those of the field's corners: the insertion that removed it
-
-  friend bool operator==(const InsertionRecord&, const InsertionRecord&) = default;
-};
-
 class Refinement {
  public:
+  using Record = std::variant<InsertionRecord<std::uint16_t>, InsertionRecord<std::uint32_t>>;
+
+  // Whether the record has indices of 16 bits, half of the memory: it has them wherever they suffice.
+  static bool IsNarrow(std::size_t vertices, std::size_t most_triangles_made);
+
   // `errors_before` and the record have one entry an insertion.
   Refinement(int width, int height, std::vector<SamplePosition> inserted, std::vector<float> errors_before,
-             InsertionRecord<std::uint32_t> record);
+             Record record);
 
   int width() const { return width_; }
   int height() const { return height_; }
@@ -75,8 +68,7 @@ class Refinement {
   int width_ = 0, height_ = 0;
   std::vector<SamplePosition> inserted_;
   std::vector<float> errors_before_;
-  // 16 bits where they suffice: half of the memory.
-  std::variant<InsertionRecord<std::uint16_t>, InsertionRecord<std::uint32_t>> record_;
+  Record record_;
 };
 
 }  // namespace terrace::tin

@@ -1,13 +1,23 @@
 #include "engine/tin/spare_blocks.h"
 
+#include <sys/mman.h>
+
 #include <array>
 #include <cstring>
+
+#if defined(__SANITIZE_ADDRESS__)
+#include <sanitizer/asan_interface.h>
+#else
+#define ASAN_POISON_MEMORY_REGION(address, bytes)
+#define ASAN_UNPOISON_MEMORY_REGION(address, bytes)
+#endif
 
 namespace terrace::tin {
 namespace {
 
-// A block's size stands in the line before it.
+// A block's size stands in the line before it; the line after it is nobody's.
 constexpr std::size_t kLine = 64;
+constexpr std::size_t kPage = 4096;
 constexpr std::size_t kMostBlocks = 16;
 
 std::size_t SizeOf(const void* block) {
@@ -16,14 +26,34 @@ std::size_t SizeOf(const void* block) {
   return size;
 }
 
-void* NewBlock(std::size_t bytes) {
-  auto* const line = static_cast<std::byte*>(::operator new (bytes + kLine, std::align_val_t{kLine}));
+std::size_t MappedFor(std::size_t bytes) { return (bytes + 2 * kLine + kPage - 1) / kPage * kPage; }
+
+// Of a mapping, new or moved.
+void* BlockIn(void* mapping, std::size_t bytes) {
+  if (mapping == MAP_FAILED) throw std::bad_alloc();
+  auto* const line = static_cast<std::byte*>(mapping);
   std::memcpy(line, &bytes, sizeof bytes);
+  ASAN_POISON_MEMORY_REGION(line + kLine + bytes, MappedFor(bytes) - kLine - bytes);
   return line + kLine;
 }
 
+void* NewBlock(std::size_t bytes) {
+  constexpr int kFlags = MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE;
+  return BlockIn(::mmap(nullptr, MappedFor(bytes), PROT_READ | PROT_WRITE, kFlags, -1, 0), bytes);
+}
+
+void* MoveBlock(void* block, std::size_t bytes) {
+  const std::size_t mapped = MappedFor(SizeOf(block));
+  void* const mapping = static_cast<std::byte*>(block) - kLine;
+  ASAN_UNPOISON_MEMORY_REGION(mapping, mapped);
+  return BlockIn(::mremap(mapping, mapped, MappedFor(bytes), MREMAP_MAYMOVE), bytes);
+}
+
 void DeleteBlock(void* block) noexcept {
-  ::operator delete (static_cast<std::byte*>(block) - kLine, std::align_val_t{kLine});
+  const std::size_t mapped = MappedFor(SizeOf(block));
+  void* const mapping = static_cast<std::byte*>(block) - kLine;
+  ASAN_UNPOISON_MEMORY_REGION(mapping, mapped);
+  ::munmap(mapping, mapped);
 }
 
 // Whether this thread's store is no more: what outlives it frees its arrays itself.
@@ -77,6 +107,14 @@ thread_local Store store;
 void* TakeBlock(std::size_t bytes) {
   void* const spare = is_closed ? nullptr : store.Take(bytes);
   return spare != nullptr ? spare : NewBlock(bytes);
+}
+
+void* GrowBlock(void* block, std::size_t used, std::size_t bytes) {
+  void* const spare = is_closed ? nullptr : store.Take(bytes);
+  if (spare == nullptr) return MoveBlock(block, bytes);
+  std::memcpy(spare, block, used);
+  GiveBlock(block);
+  return spare;
 }
 
 void GiveBlock(void* block) noexcept { is_closed ? DeleteBlock(block) : store.Put(block); }

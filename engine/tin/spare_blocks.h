@@ -1,52 +1,104 @@
-// Memory for the large arrays of a run, kept by the thread for its next one: pages that the system hands out anew, and
-// clears, cost a small run more than its queue does.
+// Memory for the large arrays of a run: it grows without being copied, takes no more than what was written to, and is
+// kept by the thread for its next run. Pages that the system hands out anew, and clears, cost a small run more than its
+// queue does.
 //
-// Blocks may be given back by another thread than the one that took them, which then keeps them.
+// Blocks come from the system (mmap), so that room which is never used is an address and no memory. They may be given
+// back by another thread than the one that took them, which then keeps them.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
+#include <initializer_list>
 #include <limits>
 #include <new>
-#include <vector>
+#include <type_traits>
+#include <utility>
 
 namespace terrace::tin {
 
-// What a thread keeps at most.
+// What a thread keeps at most, by size.
 inline constexpr std::size_t kMostSpareBytes = std::size_t{8} << 20;
 
 // A block of at least so many bytes, aligned to a cache line; throws std::bad_alloc.
 void* TakeBlock(std::size_t bytes);
+// One with the first `used` bytes of `block`, which is given back or becomes that block.
+void* GrowBlock(void* block, std::size_t used, std::size_t bytes);
 void GiveBlock(void* block) noexcept;
 
 // What this thread keeps, and an end to it: to measure what a run takes.
 std::size_t SpareBytes();
 void ReleaseSpareBlocks();
 
-// Arrays below kLeastBytes are not worth keeping.
+// An array of plain values in such a block. Room to reserve is cheap, so reserve for the largest likely size: runs of
+// fields of one size then find the blocks of the run before.
 template <typename T>
-class SpareBlockAllocator {
+class LargeArray {
+  static_assert(std::is_trivially_copyable_v<T> && std::is_trivially_destructible_v<T>);
+
  public:
-  using value_type = T;
-
-  SpareBlockAllocator() = default;
-  template <typename U>
-  SpareBlockAllocator(const SpareBlockAllocator<U>&) {}  // NOLINT: allocators convert
-
-  T* allocate(std::size_t count) {
-    if (count > std::numeric_limits<std::size_t>::max() / 2 / sizeof(T)) throw std::bad_array_new_length();
-    return static_cast<T*>(IsSmall(count) ? ::operator new(count * sizeof(T)) : TakeBlock(count * sizeof(T)));
+  LargeArray() = default;
+  LargeArray(LargeArray&& other) noexcept { Swap(other); }
+  LargeArray& operator=(LargeArray&& other) noexcept {
+    LargeArray(std::move(other)).Swap(*this);
+    return *this;
   }
-  void deallocate(T* array, std::size_t count) noexcept {
-    IsSmall(count) ? ::operator delete(array) : GiveBlock(array);
+  ~LargeArray() {
+    if (values_ != nullptr) GiveBlock(values_);
   }
-  friend bool operator==(SpareBlockAllocator, SpareBlockAllocator) { return true; }
+
+  T* data() { return values_; }
+  const T* data() const { return values_; }
+  std::size_t size() const { return size_; }
+  bool empty() const { return size_ == 0; }
+  T* begin() { return values_; }
+  T* end() { return values_ + size_; }
+  const T* begin() const { return values_; }
+  const T* end() const { return values_ + size_; }
+  T& operator[](std::size_t i) { return values_[i]; }
+  const T& operator[](std::size_t i) const { return values_[i]; }
+
+  void reserve(std::size_t capacity) {
+    if (capacity <= capacity_) return;
+    capacity = std::max(capacity, kLeastBytes / sizeof(T));
+    if (capacity > std::numeric_limits<std::size_t>::max() / 2 / sizeof(T)) throw std::bad_array_new_length();
+    values_ = static_cast<T*>(values_ == nullptr ? TakeBlock(capacity * sizeof(T))
+                                                 : GrowBlock(values_, size_ * sizeof(T), capacity * sizeof(T)));
+    capacity_ = capacity;
+  }
+  // Values that are added are whatever the memory held.
+  void GrowBy(std::size_t count) {
+    if (count > capacity_ - size_) [[unlikely]]
+      reserve(std::max(size_ + count, 2 * capacity_));
+    size_ += count;
+  }
+  // The same for a size that is not smaller than the present one, with a value for those added.
+  void GrowTo(std::size_t size, const T& value) {
+    const std::size_t before = size_;
+    GrowBy(size - before);
+    std::fill(values_ + before, values_ + size, value);
+  }
+  void push_back(const T& value) {
+    const T copy = value;  // it may be one of the array's own
+    GrowBy(1);
+    values_[size_ - 1] = copy;
+  }
+  template <typename Values>
+  void Append(const Values& values) {
+    reserve(size_ + values.size());
+    for (const auto& value : values) push_back(value);
+  }
 
  private:
   static constexpr std::size_t kLeastBytes = std::size_t{16} << 10;
-  static bool IsSmall(std::size_t count) { return count * sizeof(T) < kLeastBytes; }
-};
 
-template <typename T>
-using LargeArray = std::vector<T, SpareBlockAllocator<T>>;
+  void Swap(LargeArray& other) noexcept {
+    std::swap(values_, other.values_);
+    std::swap(size_, other.size_);
+    std::swap(capacity_, other.capacity_);
+  }
+
+  T* values_ = nullptr;
+  std::size_t size_ = 0, capacity_ = 0;
+};
 
 }  // namespace terrace::tin

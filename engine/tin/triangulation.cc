@@ -8,23 +8,34 @@ Triangulation::Vertex Triangulation::VertexAt(const HeightField& field, int x, i
   return {{static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)}, field.VertexHeight(x, y)};
 }
 
-Triangulation::Triangulation(const std::array<Vertex, 4>& corners) : vertices_(corners.begin(), corners.end()) {
+Triangulation::Triangulation(const std::array<Vertex, 4>& corners) {
   //  3-----2
   //  | 1 / |
   //  | /  0|
   //  0-----1
   using Triangle = NarrowTriangles::Triangle;
-  narrow_.slots = {Triangle::Of(0, 1, 2, kNone, kNone, 6), Triangle::Of(2, 3, 0, kNone, kNone, 2)};
+  vertices_.Append(corners);
+  narrow_.slots.push_back(Triangle::Of(0, 1, 2, kNone, kNone, 6));
+  narrow_.slots.push_back(Triangle::Of(2, 3, 0, kNone, kNone, 2));
   Grow();
 }
 
 Triangulation::Triangulation(const HeightField& field)
     : Triangulation({VertexAt(field, 0, 0), VertexAt(field, field.width() - 1, 0),
-                     VertexAt(field, field.width() - 1, field.height() - 1), VertexAt(field, 0, field.height() - 1)}) {}
+                     VertexAt(field, field.width() - 1, field.height() - 1), VertexAt(field, 0, field.height() - 1)}) {
+  vertices_.reserve(LikelyVertices(field));
+  narrow_.slots.reserve(2 * LikelyVertices(field));
+}
+
+std::size_t Triangulation::LikelyVertices(const HeightField& field) {
+  const std::size_t samples = static_cast<std::size_t>(field.width()) * static_cast<std::size_t>(field.height());
+  return std::min(samples, NarrowTriangles::kMostVertices);
+}
 
 Triangulation::Triangulation(const std::vector<Vertex>& vertices,
                              const std::vector<std::array<std::uint32_t, 3>>& triangles)
-    : vertices_(vertices.begin(), vertices.end()), is_wide_(vertices_.size() > NarrowTriangles::kMostVertices) {
+    : is_wide_(vertices.size() > NarrowTriangles::kMostVertices) {
+  vertices_.Append(vertices);
   is_wide_ ? Join(wide_, triangles) : Join(narrow_, triangles);
   Grow();
 }

@@ -40,6 +40,9 @@ class Triangulation {
   };
   static Vertex VertexAt(const HeightField& field, int x, int y);
 
+  // Room to be made for a mesh of the field: for all of its samples if it is a tile. There may be more.
+  static std::size_t LikelyVertices(const HeightField& field);
+
   // Two triangles over a rectangle. `corners` are vertices 0 to 3, counter-clockwise from its smallest x and y.
   explicit Triangulation(const std::array<Vertex, 4>& corners);
 
@@ -258,7 +261,7 @@ void Triangulation::FillCavity(Triangles& triangles, std::size_t edges, std::siz
   for (std::size_t i = star_.removed_count; i < edges; ++i) {
     made[i] = appended + static_cast<TriangleId>(i - star_.removed_count);
   }
-  triangles.slots.resize(appended + edges - star_.removed_count);
+  triangles.slots.GrowBy(edges - star_.removed_count);
 
   auto* const slots = triangles.slots.data();
   const VertexId* const ids = star_.ring.ids.data();

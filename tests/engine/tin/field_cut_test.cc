@@ -171,6 +171,23 @@ TEST(FieldCut, CutsFinelyOnlyWhereBordersCostLittle) {
   EXPECT_EQ(FieldCut::For(plane, 0).size(), 1u);
 }
 
+TEST(FieldCut, LeavesSmallFieldsAndSmallMeshesWhole) {
+  const HeightField small = HillField(500, 300, 12), large = HillField(900, 700, 12);
+  EXPECT_EQ(FieldCut::For(large, 8).size(), 12u);
+  EXPECT_EQ(FieldCut::For(small, 8).size(), 1u);  // as many vertices a sample, but all fits the cache
+  EXPECT_EQ(FieldCut::For(large, 100).size(), 1u);
+}
+
+// Sea is not a reason for larger blocks.
+TEST(FieldCut, CutsAnIslandAsFinelyAsTheLandAlone) {
+  const HeightField land = HillField(700, 700, 13);
+  const HeightField island = MakeField(2800, 2800, [&](int x, int y) {
+    return x >= 700 && x < 1400 && y >= 700 && y < 1400 ? land.At(x - 700, y - 700) : 0.0F;
+  });
+  EXPECT_EQ(FieldCut::For(land, 6).size(), 9u);
+  EXPECT_EQ(FieldCut::For(island, 6).size(), 121u);
+}
+
 TEST(FieldCut, StopsWhenAsked) {
   const HeightField field = HillField(70, 40, 11);
   std::stop_source source;

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "engine/tin/greedy.h"
@@ -58,6 +59,47 @@ TEST_F(SpareBlocks, GivesABlockToTheThreadThatGivesItBack) {
   EXPECT_EQ(SpareBytes(), 0u);
   GiveBlock(block);
   EXPECT_EQ(SpareBytes(), kBytes);
+}
+
+TEST_F(SpareBlocks, GrowsABlockThatKeepsItsContents) {
+  auto* block = static_cast<std::uint8_t*>(TakeBlock(kBytes));
+  for (std::size_t i = 0; i < kBytes; ++i) block[i] = static_cast<std::uint8_t>(i * 7);
+  const auto is_kept = [&] {
+    for (std::size_t i = 0; i < kBytes; ++i) {
+      if (block[i] != static_cast<std::uint8_t>(i * 7)) return false;
+    }
+    return true;
+  };
+  block = static_cast<std::uint8_t*>(GrowBlock(block, kBytes, 40 * kBytes));  // moved by the system
+  EXPECT_TRUE(is_kept());
+  EXPECT_EQ(reinterpret_cast<std::uintptr_t>(block) % 64, 0u);
+  block[40 * kBytes - 1] = 1;
+  void* const spare = TakeBlock(50 * kBytes);
+  GiveBlock(spare);
+  block = static_cast<std::uint8_t*>(GrowBlock(block, kBytes, 45 * kBytes));  // copied into the one that is there
+  EXPECT_EQ(block, spare);
+  EXPECT_TRUE(is_kept());
+  EXPECT_EQ(SpareBytes(), 40 * kBytes);
+  GiveBlock(block);
+}
+
+TEST_F(SpareBlocks, HoldLargeArrays) {
+  LargeArray<std::uint32_t> array;
+  EXPECT_TRUE(array.empty());
+  for (std::uint32_t i = 0; i < 200000; ++i) array.push_back(i == 0 ? 0 : array[i - 1] + 1);
+  array.push_back(array[17]);  // its own, while it may move
+  array.GrowTo(300000, 5);
+  EXPECT_EQ(array.size(), 300000u);
+  for (std::uint32_t i = 0; i < 200000; ++i) ASSERT_EQ(array[i], i);
+  EXPECT_EQ(array[200000], 17u);
+  for (std::uint32_t i = 200001; i < 300000; ++i) ASSERT_EQ(array[i], 5u);
+  LargeArray<std::uint32_t> moved(std::move(array));
+  EXPECT_EQ(moved.size(), 300000u);
+  array = std::move(moved);
+  EXPECT_EQ(array[299999], 5u);
+  const std::size_t before = SpareBytes();
+  array = {};
+  EXPECT_GT(SpareBytes(), before);
 }
 
 // Whatever the run before left in them.

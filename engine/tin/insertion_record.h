@@ -1,0 +1,41 @@
+// What is recorded of a run of insertions (refinement.h).
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <vector>
+
+namespace terrace::tin {
+
+// Index: a vertex, an insertion or the size of a ring.
+template <typename Index>
+struct InsertionRecord {
+  static constexpr Index kNever = static_cast<Index>(-1);
+  static constexpr Index kOpen = static_cast<Index>(Index{1} << (8 * sizeof(Index) - 1));
+
+  std::vector<Index> sizes;    // by insertion: triangles made; with kOpen: the ring is open and has one vertex more
+  std::vector<Index> rings;    // the rings, one after the other; vertex 4 + i is that of insertion i
+  std::vector<Index> removed;  // by triangle, the first two those of the field's corners: the insertion that removed it
+
+  friend bool operator==(const InsertionRecord&, const InsertionRecord&) = default;
+};
+
+// The same record with other indices, which must suffice.
+template <typename To, typename From>
+InsertionRecord<To> ConvertTo(const InsertionRecord<From>& record) {
+  using Source = InsertionRecord<From>;
+  using Target = InsertionRecord<To>;
+  Target converted;
+  converted.sizes.reserve(record.sizes.size());
+  for (const From size : record.sizes) {
+    const auto triangles = static_cast<To>(size & static_cast<From>(~Source::kOpen));
+    converted.sizes.push_back((size & Source::kOpen) != 0 ? static_cast<To>(triangles | Target::kOpen) : triangles);
+  }
+  converted.rings.assign(record.rings.begin(), record.rings.end());
+  converted.removed.resize(record.removed.size());
+  std::transform(record.removed.begin(), record.removed.end(), converted.removed.begin(),
+                 [](From by) { return by == Source::kNever ? Target::kNever : static_cast<To>(by); });
+  return converted;
+}
+
+}  // namespace terrace::tin
