@@ -8,6 +8,7 @@ import random
 import re
 import signal
 import socket
+import statistics
 import struct
 import subprocess
 import sys
@@ -291,9 +292,46 @@ def row_18(_, test_binary, __):
     return kept, f"{recorded.get('files', 0)} files, each in a process of its own: " + ("0 crashes, hangs or over 512 MB" if kept else "FAILED")
 
 
-def row_19(_, test_binary, __):
+# A process of its own: 200 connections ask for one tile at the same time. Prints the milliseconds until the first reply and until
+# the last was read whole, and how many were 200.
+CROWD = """
+import select, socket, sys, time
+port, target = int(sys.argv[1]), sys.argv[2]
+waiting, poll = {}, select.epoll()
+for _ in range(200):
+    connection = socket.create_connection(("127.0.0.1", port))
+    waiting[connection.fileno()] = [connection, b""]
+    poll.register(connection, select.EPOLLIN)
+begun = time.perf_counter()
+for connection, _ in waiting.values():
+    connection.sendall(f"GET {target} HTTP/1.1\\r\\nHost: x\\r\\n\\r\\n".encode())
+times, good = [], 0
+while waiting:
+    for number, _ in poll.poll(10) or sys.exit("no reply in 10 s"):
+        entry = waiting[number]
+        entry[1] += entry[0].recv(1 << 20)
+        head, end, body = entry[1].partition(b"\\r\\n\\r\\n")
+        if end and len(body) == int(head.lower().partition(b"content-length: ")[2].split()[0]):
+            times.append((time.perf_counter() - begun) * 1000)
+            good += head.startswith(b"HTTP/1.1 200")
+            poll.unregister(number)
+            waiting.pop(number)[0].close()
+print(times[0], times[-1], good)
+"""
+
+
+def row_19(binary, test_binary, _):
     kept, _, _, _ = tests(test_binary, "ServerTest.TwoHundredClients*")
-    return kept, "one build for 200 clients" if kept else "more than one build, or an error"
+    spreads, good, builds = [], 0, 0
+    with Server(binary, "--worker-threads", "1") as server:
+        for x in range(2176, 2181):
+            out = subprocess.run([sys.executable, "-c", CROWD, str(server.port), f"/jacksboro/12/{x}/2873.terrain"],
+                                 stdout=subprocess.PIPE, text=True, check=True).stdout.split()
+            spreads.append(float(out[1]) - float(out[0]))
+            good += int(out[2])
+        builds = int(re.search(rb'terrace_refinements_total{use="made"} (\d+)', fetch(server, "/metrics")[2])[1])
+    kept = kept and good == 1000 and builds == 5 and statistics.median(spreads) <= 50
+    return kept, f"200 clients for each of 5 cold tiles: {builds} builds, {good} good replies, the last {min(spreads):.0f} to {max(spreads):.0f} ms after the first"
 
 
 def row_20(_, test_binary, __):
