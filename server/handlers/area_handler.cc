@@ -153,7 +153,8 @@ asio::awaitable<Response> AreaHandler::Handle(Route route, Request request) cons
     return mesh;
   };
   const auto deadline = TileService::Clock::now() + options_.deadline;
-  const Result<TilePtr> mesh = co_await tiles_.Run(std::move(work), TileService::Length::kLong, deadline);
+  const Result<TilePtr> mesh =
+      co_await tiles_.Run(std::move(work), TileService::Length::kLong, deadline, request.client);
   if (!mesh) co_return co_await BackendFailure(mesh.error(), std::string(request.id), options_.refusal_delay);
   response.body = Body(*mesh, &(*mesh)->bytes);
   response.headers.emplace_back("Terrain-Max-Error", proto::FormatErrorUp((*mesh)->max_error_m));

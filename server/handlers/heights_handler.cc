@@ -66,7 +66,7 @@ asio::awaitable<Response> HeightsHandler::Handle(Route route, Request request) c
   const auto deadline = TileService::Clock::now() + options_.deadline;
   std::shared_ptr<const CertifiedPoints> certified;
   if (parsed->certify_level) {
-    Result<CertifiedPoints> known = co_await Certify(*dataset, *parsed, deadline);
+    Result<CertifiedPoints> known = co_await Certify(*dataset, *parsed, deadline, request.client);
     if (!known && known.error().code == ErrorCode::kInvalidArgument) {
       co_return ClientErrorResponse(known.error(), request.id);
     }
@@ -86,7 +86,8 @@ asio::awaitable<Response> HeightsHandler::Handle(Route route, Request request) c
     reply.bytes = Compress(std::move(reply.bytes), coding);
     return reply;
   };
-  const Result<TilePtr> reply = co_await tiles_.Run(std::move(work), TileService::Length::kShort, deadline);
+  const Result<TilePtr> reply =
+      co_await tiles_.Run(std::move(work), TileService::Length::kShort, deadline, request.client);
   if (!reply) co_return co_await BackendFailure(reply.error(), std::string(request.id), options_.refusal_delay);
   response.body = Body(*reply, &(*reply)->bytes);
   response.headers.emplace_back("Server-Timing", FormatServerTiming(CacheStatus::kMiss, (*reply)->times));
@@ -94,7 +95,8 @@ asio::awaitable<Response> HeightsHandler::Handle(Route route, Request request) c
 }
 
 asio::awaitable<Result<CertifiedPoints>> HeightsHandler::Certify(std::uint32_t dataset, const HeightsQuery& query,
-                                                                 TileService::Clock::time_point deadline) const {
+                                                                 TileService::Clock::time_point deadline,
+                                                                 std::uint64_t client) const {
   // On a worker: of a mosaic with thousands of blocks it takes time to find the tiles of thousands of points.
   auto found = std::make_shared<CertifiedPoints>();
   SingleFlight::Work find = [catalog = catalog_, dataset, wanted = query.points, level = *query.certify_level,
@@ -104,7 +106,7 @@ asio::awaitable<Result<CertifiedPoints>> HeightsHandler::Certify(std::uint32_t d
     *found = *std::move(tiles);
     return EncodedTile();
   };
-  const Result<TilePtr> done = co_await tiles_.Run(std::move(find), TileService::Length::kShort, deadline);
+  const Result<TilePtr> done = co_await tiles_.Run(std::move(find), TileService::Length::kShort, deadline, client);
   if (!done) co_return tl::unexpected(done.error());
   CertifiedPoints points = std::move(*found);
   for (std::size_t i = 0; i < points.tiles.size(); ++i) {
@@ -112,7 +114,7 @@ asio::awaitable<Result<CertifiedPoints>> HeightsHandler::Certify(std::uint32_t d
     tile.dataset = dataset;
     tile.key = points.tiles[i];
     tile.coding = Coding::kGzip;  // the form that a cache most probably has
-    const Result<ServedTile> served = co_await tiles_.Get(catalog_, tile, deadline);
+    const Result<ServedTile> served = co_await tiles_.Get(catalog_, tile, deadline, client);
     if (!served) co_return tl::unexpected(served.error());
     points.errors_m[i] = served->tile->certified_error_m;
   }

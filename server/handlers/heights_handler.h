@@ -29,7 +29,7 @@ class HeightsHandler {
  private:
   // Fills in the errors of tiles, one after the other, from the cache or by building them.
   asio::awaitable<Result<CertifiedPoints>> Certify(std::uint32_t dataset, const HeightsQuery& query,
-                                                   TileService::Clock::time_point deadline) const;
+                                                   TileService::Clock::time_point deadline, std::uint64_t client) const;
   Result<HeightsQuery> Parse(const Route& route, const Request& request) const;
 
   const CatalogPtr catalog_;

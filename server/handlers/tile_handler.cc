@@ -44,7 +44,7 @@ asio::awaitable<Response> TileHandler::Handle(Route route, Request request) cons
   const Result<TileRequest> tile = Negotiate(route, request, catalog_->datasets);
   if (!tile) co_return ClientErrorResponse(tile.error(), request.id);
   const auto deadline = TileService::Clock::now() + options_.deadline;
-  const Result<ServedTile> served = co_await tiles_.Get(catalog_, *tile, deadline);
+  const Result<ServedTile> served = co_await tiles_.Get(catalog_, *tile, deadline, request.client);
   if (served) co_return Reply(*served, *tile, request);
   co_return co_await BackendFailure(served.error(), std::string(request.id), options_.refusal_delay);
 }

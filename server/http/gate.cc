@@ -20,6 +20,8 @@ bool NeedsGrant(const Route& route, const Grant& grant) {
   return route.kind == RouteKind::kMetrics ? !grant.sees_all : !grant.Sees(route.dataset);
 }
 
+bool HasName(const Request& request) { return request.grant && !request.grant->name.empty(); }
+
 Response Unauthorized(bool has_token, std::string_view request_id) {
   Response response = ProblemResponse(
       401,
@@ -49,17 +51,19 @@ std::optional<Response> Gate::Refuse(const Request& request, const Route& route,
   return RefuseForAccess(request, route);
 }
 
+std::string Gate::Who(const Request& request, const Caller& caller) {
+  return HasName(request) ? "/" + request.grant->name : caller.block;  // no address begins with a slash
+}
+
 std::optional<Response> Gate::RefuseForRate(const Request& request, const Caller& caller) {
-  const bool has_name = request.grant && !request.grant->name.empty();
+  const bool has_name = HasName(request);
   RateLimiter::Rate rate = options_.rate;
   if (has_name && request.grant->requests_per_second > 0) {
     rate.per_second = request.grant->requests_per_second;
     rate.burst = std::max(rate.burst, 2 * rate.per_second);
   }
   if (rate.per_second <= 0) return std::nullopt;
-  // No address begins with a slash.
-  const std::string who = has_name ? "/" + request.grant->name : caller.block;
-  const auto wait = limiter_.Refuse(who, rate, RateLimiter::Clock::now());
+  const auto wait = limiter_.Refuse(Who(request, caller), rate, RateLimiter::Clock::now());
   if (!wait) return std::nullopt;
   Response response = ProblemResponse(429, "too many requests", request.id);
   response.headers.emplace_back("Retry-After", fmt::to_string(std::max<std::int64_t>((wait->count() + 999) / 1000, 1)));

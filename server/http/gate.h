@@ -38,6 +38,10 @@ class Gate {
   // end.
   Caller Identify(Request& request, const Caller& peer) const;
 
+  // What counts as one client, among those who share the server: a token's name behind a slash, or the block of the
+  // address.
+  static std::string Who(const Request& request, const Caller& caller);
+
   // 429, 401 or 403; nothing where the request may go on.
   std::optional<Response> Refuse(const Request& request, const Route& route, const Caller& caller);
 

@@ -86,6 +86,7 @@ struct Request {
   bool is_https = false;  // how the client speaks to this server, or to the proxy before it
   GrantPtr grant;         // what the client may see; null: everything
   bool has_bad_token = false;
+  std::uint64_t client = 0;  // who takes turns with others: a hash of what Gate::Who says
 };
 
 // Why bytes are not a request. The connection is of no use afterwards: its framing cannot be trusted.

@@ -187,6 +187,7 @@ asio::awaitable<bool> Session::ServeLater(Route route) {
     if (!read) co_return false;
   }
   stream_.ExpiresNever();  // the handlers have deadlines of their own
+  request.client = std::hash<std::string>{}(Gate::Who(request, exchange_.caller)) | 1;  // 0 is nobody
   std::optional<Response> response = co_await AnswerWhileConnected(route, request);
   if (!response) {
     Response nobody;

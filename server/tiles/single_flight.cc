@@ -82,12 +82,13 @@ class SingleFlight::Seat {
   const Waiter waiter_;
 };
 
-asio::awaitable<SingleFlight::Landing> SingleFlight::Join(CacheKey key, Build build, Clock::time_point deadline) {
+asio::awaitable<SingleFlight::Landing> SingleFlight::Join(CacheKey key, Build build, Clock::time_point deadline,
+                                                          JobOrder order) {
   const auto executor = co_await asio::this_coro::executor;
   const auto waiter = std::make_shared<asio::steady_timer>(executor);
   std::unique_lock lock(mutex_);
   bool joined = false;
-  const Result<std::shared_ptr<Flight>> boarded = Board(key, std::move(build), deadline, &joined);
+  const Result<std::shared_ptr<Flight>> boarded = Board(key, std::move(build), deadline, order, &joined);
   if (!boarded) co_return Landing(tl::unexpected(boarded.error()), joined);
   const std::shared_ptr<Flight> flight = *boarded;
   flight->waiters.push_back(waiter);
@@ -108,7 +109,8 @@ asio::awaitable<SingleFlight::Landing> SingleFlight::Join(CacheKey key, Build bu
 
 // Finds the flight of `key` or starts one. mutex_ is held, so that nobody can board a flight the pool refused.
 Result<std::shared_ptr<SingleFlight::Flight>> SingleFlight::Board(const CacheKey& key, Build build,
-                                                                  Clock::time_point deadline, bool* joined) {
+                                                                  Clock::time_point deadline, JobOrder order,
+                                                                  bool* joined) {
   if (shut_down_) return MakeError(ErrorCode::kUnavailable, "the server is shutting down");
   if (const auto found = flights_.find(key); found != flights_.end()) {
     *joined = true;
@@ -117,7 +119,7 @@ Result<std::shared_ptr<SingleFlight::Flight>> SingleFlight::Board(const CacheKey
   }
   auto flight = std::make_shared<Flight>(deadline);
   auto job = [this, key, flight, build = std::move(build)] { Fly(key, flight, build); };
-  if (!pool_.TrySubmit(std::move(job))) {
+  if (!pool_.TrySubmit(std::move(job), order)) {
     return MakeError(ErrorCode::kOverloaded, "{}: the queue of builds is full", NameOf(key));
   }
   flights_.emplace(key, flight);

@@ -45,11 +45,10 @@ class SingleFlight {
   SingleFlight(const SingleFlight&) = delete;
   SingleFlight& operator=(const SingleFlight&) = delete;
 
-  // Waits for the flight of `key`, which runs `build` if it has to be started. An exception of `build` counts as
-  // kUnavailable.
-  // kOverloaded: the pool's queue is full. kCancelled: `deadline` or the flight's own passed, or the awaiting coroutine
-  // was cancelled. kUnavailable: shutting down. Otherwise whatever `build` returned.
-  asio::awaitable<Landing> Join(CacheKey key, Build build, Clock::time_point deadline);
+  // Waits for the flight of `key`, which runs `build` in its `order` if it has to be started. An exception of `build`
+  // counts as kUnavailable. kOverloaded: the pool's queue is full. kCancelled: `deadline` or the flight's own passed,
+  // or the awaiting coroutine was cancelled. kUnavailable: shutting down. Otherwise whatever `build` returned.
+  asio::awaitable<Landing> Join(CacheKey key, Build build, Clock::time_point deadline, JobOrder order = {});
 
   // Stops every flight and starts no more.
   void Shutdown();
@@ -61,7 +60,8 @@ class SingleFlight {
   struct Flight;
   class Seat;
 
-  Result<std::shared_ptr<Flight>> Board(const CacheKey& key, Build build, Clock::time_point deadline, bool* joined);
+  Result<std::shared_ptr<Flight>> Board(const CacheKey& key, Build build, Clock::time_point deadline, JobOrder order,
+                                        bool* joined);
   void Fly(const CacheKey& key, const std::shared_ptr<Flight>& flight, const Build& build);
   void Forget(const CacheKey& key, const std::shared_ptr<Flight>& flight);  // mutex_ is held
 

@@ -14,6 +14,8 @@ namespace {
 
 using Clock = TileService::Clock;
 
+constexpr int kAfterTiles = 100;  // deeper than any
+
 Result<EncodedTile> RunWork(const SingleFlight::Work& work, const std::string& what, Clock::time_point asked,
                             std::stop_token stop) {
   const auto queued = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - asked);
@@ -58,14 +60,14 @@ std::optional<ServedTile> TileService::Find(const Catalog& catalog, const TileRe
 }
 
 asio::awaitable<Result<ServedTile>> TileService::Get(CatalogPtr catalog, TileRequest request,
-                                                     Clock::time_point deadline) {
+                                                     Clock::time_point deadline, std::uint64_t client) {
   if (std::optional<ServedTile> found = Find(*catalog, request)) co_return *std::move(found);
   const CacheKey key = KeyOf(*catalog, request);
   SingleFlight::Build build = [this, catalog = std::move(catalog), request, key,
                                asked = Clock::now()](std::stop_token stop) {
     return BuildAndKeep(*catalog, request, key, asked, std::move(stop));
   };
-  SingleFlight::Landing landing = co_await flights_.Join(key, std::move(build), deadline);
+  SingleFlight::Landing landing = co_await flights_.Join(key, std::move(build), deadline, {client, request.key.level});
   if (!landing.joined) misses_.fetch_add(1, std::memory_order_relaxed);
   if (!landing.tile) co_return tl::unexpected(std::move(landing.tile.error()));
   const CacheStatus found = (*landing.tile)->from_disk ? CacheStatus::kDisk : CacheStatus::kMiss;
@@ -105,7 +107,8 @@ std::shared_ptr<void> TileService::BeginLong() {
   return {&long_under_way_, [](std::atomic<unsigned>* count) { count->fetch_sub(1); }};
 }
 
-asio::awaitable<Result<TilePtr>> TileService::Run(SingleFlight::Work work, Length length, Clock::time_point deadline) {
+asio::awaitable<Result<TilePtr>> TileService::Run(SingleFlight::Work work, Length length, Clock::time_point deadline,
+                                                  std::uint64_t client) {
   std::shared_ptr<void> turn;
   if (length == Length::kLong) {
     turn = BeginLong();
@@ -119,7 +122,8 @@ asio::awaitable<Result<TilePtr>> TileService::Run(SingleFlight::Work work, Lengt
     if (!made) return tl::unexpected(std::move(made.error()));
     return std::make_shared<const EncodedTile>(*std::move(made));
   };
-  SingleFlight::Landing landing = co_await flights_.Join(key, std::move(build), deadline);
+  SingleFlight::Landing landing =
+      co_await flights_.Join(key, std::move(build), deadline, {client, length == Length::kLong ? kAfterTiles : 0});
   co_return std::move(landing.tile);
 }
 

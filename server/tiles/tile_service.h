@@ -55,15 +55,17 @@ class TileService {
   std::optional<ServedTile> Find(const Catalog& catalog, const TileRequest& request);
 
   // Errors: those of the catalog's builder, and kOverloaded, kCancelled, kUnavailable of SingleFlight::Join. The
-  // coroutine has to run on a single thread. Only successes are kept. Precondition: the request names one of the
-  // datasets.
-  asio::awaitable<Result<ServedTile>> Get(CatalogPtr catalog, TileRequest request, Clock::time_point deadline);
+  // coroutine has to run on a single thread. Only successes are kept. `client`: whose turn it takes (JobOrder).
+  // Precondition: the request names one of the datasets.
+  asio::awaitable<Result<ServedTile>> Get(CatalogPtr catalog, TileRequest request, Clock::time_point deadline,
+                                          std::uint64_t client = 0);
 
   // Runs `work` on a worker for this caller alone: nothing is shared or kept. Errors and conditions as those of Get. An
   // exception of `work` counts as kUnavailable. Long work is refused (kOverloaded) as soon as it has all workers but
   // one, of several: tiles go on being served beside it.
   enum class Length { kShort, kLong };
-  asio::awaitable<Result<TilePtr>> Run(SingleFlight::Work work, Length length, Clock::time_point deadline);
+  asio::awaitable<Result<TilePtr>> Run(SingleFlight::Work work, Length length, Clock::time_point deadline,
+                                       std::uint64_t client = 0);
 
   // Tiles of datasets that are not in `catalog` leave the cache, and builds of them that land later stay out of it.
   void RetainTilesOf(const Catalog& catalog);

@@ -1,18 +1,28 @@
 // The threads that compute and read files, behind a queue of bounded length.
 //
-// Thread-safe. A job that was taken is run, also during shutdown; a job that finds the queue full is refused, so that
-// the time a request waits is bounded by configuration and not by load.
+// Clients take turns, however many jobs one of them has waiting, and of a client's own jobs the most urgent is next. No
+// client fills the queue: it may have twice as many jobs waiting as there are places left (dynamic thresholds:
+// Choudhury and Hahne, IEEE/ACM Transactions on Networking 6(2), 1998), so that there is one for whoever comes next.
+//
+// Thread-safe. A job that was taken is run, also during shutdown; a job that finds no place is refused, so that the
+// time a request waits is bounded by configuration and not by load.
 #pragma once
 
 #include <condition_variable>
 #include <cstddef>
-#include <deque>
+#include <cstdint>
 #include <functional>
+#include <map>
 #include <mutex>
 #include <thread>
 #include <vector>
 
 namespace terrace::server {
+
+struct JobOrder {
+  std::uint64_t client = 0;  // whose turn it takes; 0: nobody's in particular, which may fill the queue
+  int level = 0;             // of the client's jobs the lowest goes first: a shallow tile covers what others refine
+};
 
 class WorkerPool {
  public:
@@ -22,8 +32,8 @@ class WorkerPool {
   WorkerPool(const WorkerPool&) = delete;
   WorkerPool& operator=(const WorkerPool&) = delete;
 
-  // False: the queue is full or the pool is shut down, and `job` will not run. Jobs must not throw.
-  [[nodiscard]] bool TrySubmit(std::function<void()> job);
+  // False: there is no place in the queue or the pool is shut down, and `job` will not run. Jobs must not throw.
+  [[nodiscard]] bool TrySubmit(std::function<void()> job, JobOrder order = {});
 
   // Takes no more jobs, runs those it has and joins the threads. May be called twice; not from a job.
   void Shutdown();
@@ -32,14 +42,20 @@ class WorkerPool {
   unsigned threads() const { return thread_count_; }
 
  private:
+  using Job = std::function<void()>;
+
   void Run();
+  bool HasPlace(std::uint64_t client) const;  // mutex_ is held, as for the next one
+  Job TakeNext();
 
   const unsigned thread_count_;
   const std::size_t queue_length_;
   mutable std::mutex mutex_;
   std::condition_variable wake_;
-  std::deque<std::function<void()>> queue_;
-  unsigned idle_ = 0;  // threads without a job
+  std::map<std::uint64_t, std::multimap<int, Job>> queue_;  // client -> level -> jobs, oldest first; none is empty
+  std::size_t queued_ = 0;                                  // jobs in queue_
+  std::uint64_t last_client_ = 0;                           // whose job was taken last
+  unsigned idle_ = 0;                                       // threads without a job
   bool shut_down_ = false;
   std::vector<std::thread> threads_;
 };

@@ -5,6 +5,9 @@
 #include <atomic>
 #include <future>
 #include <latch>
+#include <string>
+#include <utility>
+#include <vector>
 
 namespace terrace::server {
 namespace {
@@ -51,6 +54,58 @@ TEST(WorkerPool, RunsWhatItTookAndTakesNothingAfterShutdown) {
 }
 
 TEST(WorkerPool, HasAThreadForEveryProcessorByDefault) { EXPECT_GE(WorkerPool(0, 1).threads(), 1u); }
+
+// A pool of one thread that is busy until `open`; what waits behind it is in the queue.
+struct BusyPool {
+  explicit BusyPool(std::size_t queue_length) : pool(1, queue_length) {
+    std::promise<void> begun;
+    EXPECT_TRUE(pool.TrySubmit([&begun, open = open.get_future().share()] {
+      begun.set_value();
+      open.wait();
+    }));
+    begun.get_future().wait();
+  }
+  // `name` is written to `order` when its turn comes.
+  bool Submit(const std::string& name, JobOrder job_order) {
+    return pool.TrySubmit([this, name] { order.push_back(name); }, job_order);
+  }
+  ~BusyPool() { Open(); }
+  std::vector<std::string> Run() {
+    Open();
+    pool.Shutdown();
+    return order;
+  }
+  void Open() {
+    if (!std::exchange(is_open, true)) open.set_value();
+  }
+
+  std::promise<void> open;
+  bool is_open = false;
+  std::vector<std::string> order;
+  WorkerPool pool;  // ends before what its jobs write to
+};
+
+TEST(WorkerPool, ClientsTakeTurnsAndShallowTilesGoFirst) {
+  BusyPool busy(100);
+  for (const int level : {9, 5, 9, 2}) ASSERT_TRUE(busy.Submit("a" + std::to_string(level), {1, level}));
+  for (const int level : {7, 3}) ASSERT_TRUE(busy.Submit("b" + std::to_string(level), {2, level}));
+  ASSERT_TRUE(busy.Submit("c", {3, 20}));
+  EXPECT_EQ(busy.pool.queued(), 7u);
+  EXPECT_EQ(busy.Run(), (std::vector<std::string>{"a2", "b3", "c", "a5", "b7", "a9", "a9"}));
+}
+
+TEST(WorkerPool, OneClientLeavesPlacesForOthers) {
+  BusyPool busy(90);
+  int first = 0, second = 0, third = 0;
+  while (busy.Submit("1", {1, 0})) ++first;
+  while (busy.Submit("2", {2, 0})) ++second;
+  while (busy.Submit("3", {3, 0})) ++third;
+  EXPECT_EQ(first, 61) << "the last one found sixty waiting, and thirty places";
+  EXPECT_EQ(second, 20);
+  EXPECT_EQ(third, 7);
+  const std::vector<std::string> order = busy.Run();
+  EXPECT_EQ(std::vector<std::string>(order.begin(), order.begin() + 3), (std::vector<std::string>{"1", "2", "3"}));
+}
 
 }  // namespace
 }  // namespace terrace::server
