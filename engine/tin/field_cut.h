@@ -35,8 +35,8 @@ class FieldCut {
   FieldCut(int width, int height, int block_cells);
 
   // The smallest blocks, from about 257 samples a side up, with few enough vertices on their borders for a mesh to
-  // max_error_m; the whole field as one block where no cut has, where the mesh will be small, and where heights and mesh
-  // fit the processor's cache as they are. Reads the samples along the cuts only.
+  // max_error_m; the whole field as one block where no cut has, where the mesh will be small, and where heights and
+  // mesh fit the processor's cache as they are. Reads the samples along the cuts only.
   static FieldCut For(const HeightField& field, double max_error_m);
 
   // Blocks lie row by row, along x first.
