@@ -18,7 +18,7 @@ class MemoryTrimmer {
  public:
   // Trims once in every period in which the process has computed anything worth it. Does nothing where the C library
   // has no way to.
-  explicit MemoryTrimmer(std::chrono::milliseconds period = std::chrono::seconds(10));
+  explicit MemoryTrimmer(std::chrono::milliseconds period = std::chrono::seconds(3));
   ~MemoryTrimmer();
   MemoryTrimmer(const MemoryTrimmer&) = delete;
   MemoryTrimmer& operator=(const MemoryTrimmer&) = delete;

@@ -47,14 +47,19 @@ def export(*options):
     binaries = [path for path in sorted(BUILD.rglob("*"))
                 if path.is_file() and os.access(path, os.X_OK) and path.suffix == "" and "CMakeFiles" not in path.parts]
     objects = [part for path in binaries[1:] for part in ("-object", str(path))]
-    return run(["llvm-cov-14", "export", *options, f"-instr-profile={merged}", binaries[0], *objects,
-                f"-ignore-filename-regex=({BUILD}|{ROOT}/tests|/usr|{ROOT}/.deps)"], check=True, stdout=subprocess.PIPE).stdout
+    return run(["llvm-cov-14", "export", *options, f"-instr-profile={merged}", binaries[0], *objects], check=True,
+               stdout=subprocess.PIPE).stdout
+
+
+def name_of(path):
+    """Below the root: ccache may have made it build/coverage/../../config/config.h."""
+    return os.path.relpath(path, ROOT)
 
 
 def summaries():
     """File -> llvm-cov's summary of it."""
     files = json.loads(export("-summary-only"))["data"][0]["files"]
-    return {os.path.relpath(file["filename"], ROOT): file["summary"] for file in files}
+    return {name_of(file["filename"]): file["summary"] for file in files}
 
 
 def missed_lines():
@@ -63,7 +68,7 @@ def missed_lines():
     for line in export("-format=lcov").decode().splitlines():
         key, _, value = line.partition(":")
         if key == "SF":
-            name = os.path.relpath(value, ROOT)
+            name = name_of(value)
         elif key == "DA" and value.endswith(",0"):
             missed[name].append(int(value.partition(",")[0]))
     return missed

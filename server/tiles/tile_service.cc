@@ -97,19 +97,37 @@ Result<TilePtr> TileService::BuildAndKeep(const Catalog& catalog, const TileRequ
   return tile;
 }
 
-// Ends with the last copy: with the work, whether or not anybody still waits for it. Nothing where there are too many.
-std::shared_ptr<void> TileService::BeginLong() {
+// One of those that may do long work at once. Ends once: when it is told to, or else, of work that never ran, with the
+// last copy of it.
+class TileService::LongTurn {
+ public:
+  explicit LongTurn(std::atomic<unsigned>& under_way) : under_way_(under_way) {}
+  ~LongTurn() { End(); }
+  LongTurn(const LongTurn&) = delete;
+  LongTurn& operator=(const LongTurn&) = delete;
+
+  void End() {
+    if (!ended_.exchange(true)) under_way_.fetch_sub(1);
+  }
+
+ private:
+  std::atomic<unsigned>& under_way_;
+  std::atomic<bool> ended_{false};
+};
+
+// Nothing where there are too many.
+std::shared_ptr<TileService::LongTurn> TileService::BeginLong() {
   const unsigned most = std::max(pool_.threads(), 2U) - 1;
   unsigned under_way = long_under_way_.load();
   do {
     if (under_way >= most) return nullptr;
   } while (!long_under_way_.compare_exchange_weak(under_way, under_way + 1));
-  return {&long_under_way_, [](std::atomic<unsigned>* count) { count->fetch_sub(1); }};
+  return std::make_shared<LongTurn>(long_under_way_);
 }
 
 asio::awaitable<Result<TilePtr>> TileService::Run(SingleFlight::Work work, Length length, Clock::time_point deadline,
                                                   std::uint64_t client) {
-  std::shared_ptr<void> turn;
+  std::shared_ptr<LongTurn> turn;
   if (length == Length::kLong) {
     turn = BeginLong();
     if (!turn) co_return MakeError(ErrorCode::kOverloaded, "as much long work is under way as may be");
@@ -119,6 +137,8 @@ asio::awaitable<Result<TilePtr>> TileService::Run(SingleFlight::Work work, Lengt
   SingleFlight::Build build = [work = std::move(work), turn = std::move(turn),
                                asked = Clock::now()](std::stop_token stop) -> Result<TilePtr> {
     Result<EncodedTile> made = RunWork(work, "work for one request", asked, std::move(stop));
+    // Before the client can have its answer: its next request finds the place free.
+    if (turn) turn->End();
     if (!made) return tl::unexpected(std::move(made.error()));
     return std::make_shared<const EncodedTile>(*std::move(made));
   };

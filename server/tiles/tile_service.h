@@ -88,7 +88,8 @@ class TileService {
  private:
   Result<TilePtr> BuildAndKeep(const Catalog& catalog, const TileRequest& request, const CacheKey& key,
                                Clock::time_point asked, std::stop_token stop);
-  std::shared_ptr<void> BeginLong();
+  class LongTurn;
+  std::shared_ptr<LongTurn> BeginLong();
 
   const BuildObserver observer_;
   TileCache cache_;

@@ -123,12 +123,38 @@ class Client:
         return Ask(kind, message, frozenset({status}), closes=closes)
 
 
+class Pauses:
+    """When all of this was stopped from outside (a debugger, a suspended machine): what waited meanwhile says nothing."""
+
+    def __init__(self, end):
+        self.last, self.seconds = 0.0, 0.0  # when the last one ended; all together
+        self.thread = threading.Thread(target=self.watch, args=(end,))
+        self.thread.start()
+
+    def watch(self, end):
+        seen = time.monotonic()
+        while seen < end:
+            time.sleep(0.2)
+            now = time.monotonic()
+            if now - seen > 5:
+                self.last, self.seconds = now, self.seconds + now - seen
+            seen = now
+
+    def since(self, moment):
+        time.sleep(0.5)  # so that the watch has looked
+        return self.last >= moment
+
+
 class Tally:
-    def __init__(self):
+    def __init__(self, end):
+        self.pauses = Pauses(end)
         self.lock, self.statuses, self.unexpected, self.aborted = threading.Lock(), collections.Counter(), collections.Counter(), 0
         self.kinds = collections.defaultdict(collections.Counter)
 
-    def count(self, asked, outcome):
+    def count(self, asked, outcome, begun):
+        if outcome not in asked.expected and self.pauses.since(begun):
+            outcome = f"{outcome} as all was stopped"
+            asked = dataclasses.replace(asked, expected=frozenset({outcome}))
         with self.lock:
             self.statuses[outcome] += 1
             self.kinds[asked.kind][outcome] += 1
@@ -142,7 +168,7 @@ def converse(server, client, tally, leaves, end):
         for _ in range(200):
             if time.monotonic() > end:
                 return
-            asked = client.draw()
+            asked, begun = client.draw(), time.monotonic()
             connection.sendall(asked.message)
             if leaves and client.random.random() < 0.03:
                 connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
@@ -152,13 +178,13 @@ def converse(server, client, tally, leaves, end):
             try:
                 reply = read_reply(connection)
             except OSError as error:
-                tally.count(asked, type(error).__name__)
+                tally.count(asked, type(error).__name__, begun)
                 return
             if reply is None:
-                tally.count(asked, "closed without a reply")
+                tally.count(asked, "closed without a reply", begun)
                 return
             status, fields = reply[:2]
-            tally.count(asked, f"{status} + Retry-After" if status == 503 and "retry-after" in fields else status)
+            tally.count(asked, f"{status} + Retry-After" if status == 503 and "retry-after" in fields else status, begun)
             if asked.kind == "tile with its ETag" and status == 200:
                 client.etags[asked.message.split()[1].decode()] = fields["etag"]
             if asked.closes:
@@ -170,10 +196,11 @@ def soak(binary, seconds, clients=6, period=None):
     """(samples, tally, words about the cgroup): a sample is seconds since the start, then MB."""
     period = period or min(5, seconds / 60)
     flags = [part for flag, size in CACHES.items() for part in (flag, f"{size}MiB")]
-    samples, tally, group = [], Tally(), MemoryGroup(CGROUP_BYTES)
+    samples, group = [], MemoryGroup(CGROUP_BYTES)
     with group, Server(binary, *flags, prefix=group.prefix) as server:
         begun = time.monotonic()
         end = begun + seconds
+        tally = Tally(end)
 
         def run(seed):
             client = Client(seed)
@@ -207,7 +234,8 @@ def told(seconds, samples, tally, words):
     group = f", group at most {max(sample['used'] for sample in samples):.0f} MB" if "used" in samples[0] else ""
     statuses = ", ".join(f"{count:,} x {status}" for status, count in sorted(tally.statuses.items(), key=lambda item: -item[1]))
     wrong = f"; UNEXPECTED {dict(tally.unexpected.most_common(5))}" if tally.unexpected else ", 0 unexpected"
-    return f"{seconds} s, {sum(tally.statuses.values()):,} requests ({statuses}{wrong}), {tally.aborted} left in mid-reply, {words}: RSS {most:.0f} MB at " \
+    paused = f" ({tally.pauses.seconds:.0f} s of them stopped from outside)" if tally.pauses.seconds else ""
+    return f"{seconds} s{paused}, {sum(tally.statuses.values()):,} requests ({statuses}{wrong}), {tally.aborted} left in mid-reply, {words}: RSS {most:.0f} MB at " \
            f"most (bound {BOUND_MB}), {middle:.1f} MB in the middle, {last:.1f} MB at the end{group}"
 
 

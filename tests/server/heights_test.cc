@@ -40,7 +40,7 @@ class HeightsTest : public ServerFixture {
   }
 
   std::atomic<int> reads_{0}, read_ms_{0};
-  std::atomic<bool> stopped_{false};
+  std::atomic<bool> stopped_{false}, certified_fails_{false};
 };
 
 double Elevation(const Reply& reply, std::size_t i) {
@@ -62,6 +62,46 @@ TEST_F(HeightsTest, AnswersGetAndHead) {
   EXPECT_EQ(Fetch(port(), "/nope/heights?locations=5,7").status, 404);
   EXPECT_EQ(Fetch(port(), "/maui/heights?locations=5").status, 400);
   EXPECT_EQ(Fetch(port(), "/maui/heights").status, 400);
+}
+
+TEST_F(HeightsTest, CertifiesByTheTilesOfThePoints) {
+  builder_ = [this](const TileRequest& request, std::stop_token) -> Result<EncodedTile> {
+    ++builds_;
+    if (certified_fails_) return MakeError(ErrorCode::kUnavailable, "the disk is gone");
+    EncodedTile tile;
+    tile.bytes = "tile";
+    if (request.key.x > 0) tile.certified_error_m = 10.0 * request.key.level + request.key.x;
+    return tile;
+  };
+  StartHeights();
+  const auto results = [this](const char* level) {
+    const Reply reply = Fetch(port(), std::string("/maui/heights?locations=5,7|6,8|5,-170&certify=") + level);
+    EXPECT_EQ(reply.status, 200) << reply.body;
+    EXPECT_EQ(reply.Field("etag"), "") << "what is certified is not known before it is made";
+    return nlohmann::json::parse(reply.body)["results"];
+  };
+  const auto shallow = results("1");
+  EXPECT_EQ(shallow[0]["tile"], "1/2/1");
+  EXPECT_EQ(shallow[0]["certified_error"], 12);
+  EXPECT_EQ(shallow[1]["tile"], "1/2/1");
+  EXPECT_EQ(shallow[2]["tile"], "1/0/1");
+  EXPECT_TRUE(shallow[2]["certified_error"].is_null()) << "no bound is known";
+  EXPECT_EQ(builds_, 2) << "two points share a tile";
+  EXPECT_EQ(results("deepest")[0]["tile"], "3/8/4");
+  certified_fails_ = true;
+  EXPECT_EQ(Fetch(port(), "/maui/heights?locations=5,100&certify=3").status, 503);
+}
+
+TEST_F(HeightsTest, CertifiesNoMoreTilesThanItSays) {
+  more_datasets_.emplace_back();
+  more_datasets_.back().name = "deep";
+  for (int level = 0; level <= 8; ++level)
+    more_datasets_.back().available.push_back({{0, 0, (2 << level) - 1, (1 << level) - 1}});
+  StartHeights();
+  const Reply reply = Fetch(port(), "/deep/heights?path=0,-80|0,80&samples=400&certify=8");
+  EXPECT_EQ(reply.status, 400);
+  EXPECT_NE(reply.body.find("the most this server certifies at once"), std::string::npos) << reply.body;
+  EXPECT_EQ(builds_, 0);
 }
 
 TEST_F(HeightsTest, AnswersPostsOneAfterTheOther) {

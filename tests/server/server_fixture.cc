@@ -36,7 +36,7 @@ void ServerFixture::Start(ServerOptions options) {
   maui.available = {{{0, 0, 1, 0}}, {{0, 0, 3, 1}}, {{0, 0, 7, 3}}, {{0, 0, 15, 7}}};
   std::vector<DatasetView> datasets = more_datasets_;
   datasets.insert(datasets.begin(), maui);
-  auto catalog = std::make_shared<const Catalog>(Catalog{std::move(datasets), builder_, read_points_, {}});
+  auto catalog = std::make_shared<const Catalog>(Catalog{std::move(datasets), builder_, read_points_, area_mesher_});
   auto server = Server::Start(std::move(catalog), options);
   ASSERT_TRUE(server) << server.error().message;
   server_ = std::move(*server);

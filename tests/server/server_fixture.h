@@ -27,6 +27,7 @@ class ServerFixture : public testing::Test {
   static std::string BodyOf(const TileRequest& request);
 
   PointReader read_points_;     // default: none
+  AreaMesher area_mesher_;      // default: none
   TileBuilder builder_;         // default: counts and returns BodyOf, compressed when asked for
   std::atomic<int> builds_{0};  // by the default builder
   std::atomic<int> build_ms_{0};

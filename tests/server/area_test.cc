@@ -1,0 +1,129 @@
+// Meshes of areas over HTTP: headers, refusals, load; what is planned and built is a function that the tests steer.
+#include <gtest/gtest.h>
+
+#include <thread>
+
+#include "proto/compress.h"
+#include "tests/server/server_fixture.h"
+
+namespace terrace::server {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr const char* kArea = "/maui/mesh?bbox=-157,20,-156,21&error=5";
+
+class AreaTest : public ServerFixture {
+ protected:
+  // Plans every area but those of less than a metre, and builds what tells its own error.
+  void StartAreas(ServerOptions options = {}) {
+    area_mesher_.plan = [](std::uint32_t, const AreaRequest& area) -> Result<AreaPlan> {
+      if (area.error_m < 1) return MakeError(ErrorCode::kInvalidArgument, "ask for 1 m or more");
+      AreaPlan plan;
+      plan.centre = {(area.west + area.east) / 2, (area.south + area.north) / 2};
+      return plan;
+    };
+    area_mesher_.build = [this](std::uint32_t, const AreaPlan&, const AreaRequest& area,
+                                std::stop_token stop) -> Result<EncodedTile> {
+      ++builds_;
+      while (held_ && !stop.stop_requested()) std::this_thread::sleep_for(1ms);
+      if (fails_) return MakeError(ErrorCode::kUnavailable, "the disk is gone");
+      EncodedTile mesh;
+      mesh.bytes = std::string(3000, 'v');
+      mesh.max_error_m = area.error_m - 0.5;
+      return mesh;
+    };
+    Start(std::move(options));
+  }
+
+  std::atomic<bool> held_{false}, fails_{false};
+};
+
+TEST_F(AreaTest, TellsItsErrorAndOrigin) {
+  StartAreas();
+  const Reply reply = Fetch(port(), kArea);
+  EXPECT_EQ(reply.status, 200);
+  EXPECT_EQ(reply.body, std::string(3000, 'v'));
+  EXPECT_EQ(reply.Field("content-type"), "model/gltf-binary");
+  EXPECT_EQ(reply.Field("terrain-max-error"), "4.5");
+  EXPECT_EQ(reply.Field("terrain-origin"), "20.5,-156.5,0");
+  EXPECT_TRUE(reply.Field("server-timing").starts_with("cache;desc=miss, ")) << reply.Field("server-timing");
+}
+
+TEST_F(AreaTest, TypesAreThoseOfFormats) {
+  StartAreas();
+  EXPECT_EQ(Fetch(port(), std::string(kArea) + "&format=obj").Field("content-type"), "model/obj");
+  const Reply ply = Fetch(port(), std::string(kArea) + "&format=ply&coordinates=ecef");
+  EXPECT_EQ(ply.Field("content-type"), "application/octet-stream");
+  EXPECT_EQ(ply.Field("terrain-origin"), "") << "ECEF counts from the Earth's centre";
+}
+
+TEST_F(AreaTest, OriginsBeyondTheAntimeridianAreLongitudesAgain) {
+  StartAreas();
+  const Reply reply = Fetch(port(), "/maui/mesh?bbox=179,-1,-177,1&error=5");
+  EXPECT_EQ(reply.Field("terrain-origin"), "0,-179,0");
+}
+
+TEST_F(AreaTest, CompressesForThoseWhoTakeIt) {
+  StartAreas();
+  const Reply reply = Fetch(port(), kArea, "Accept-Encoding: gzip\r\n");
+  EXPECT_EQ(reply.Field("content-encoding"), "gzip");
+  EXPECT_EQ(reply.body, Compress(std::string(3000, 'v'), Coding::kGzip));
+}
+
+TEST_F(AreaTest, WhatTheClientHasIsNotMadeAgain) {
+  StartAreas();
+  const std::string etag = Fetch(port(), kArea).Field("etag");
+  ASSERT_NE(etag, "");
+  EXPECT_EQ(Fetch(port(), kArea, "If-None-Match: " + etag + "\r\n").status, 304);
+  EXPECT_EQ(builds_, 1);
+}
+
+TEST_F(AreaTest, RefusesBeforeBuilding) {
+  StartAreas();
+  EXPECT_EQ(Fetch(port(), "/nope/mesh?bbox=0,0,1,1&error=5").status, 404);
+  EXPECT_EQ(Fetch(port(), "/maui/mesh?bbox=0,0,1&error=5").status, 400);
+  const Reply reply = Fetch(port(), "/maui/mesh?bbox=0,0,1,1&error=0.1");
+  EXPECT_EQ(reply.status, 400);
+  EXPECT_NE(reply.body.find("ask for 1 m or more"), std::string::npos) << reply.body;
+  EXPECT_EQ(builds_, 0);
+}
+
+TEST_F(AreaTest, AFailureIsTriedAgain) {
+  StartAreas();
+  fails_ = true;
+  const Reply reply = Fetch(port(), kArea);
+  EXPECT_EQ(reply.status, 503);
+  EXPECT_NE(reply.Field("retry-after"), "");
+  EXPECT_EQ(reply.body.find("disk"), std::string::npos) << "the log tells why, not the reply";
+  fails_ = false;
+  EXPECT_EQ(Fetch(port(), kArea).status, 200);
+}
+
+TEST_F(AreaTest, WhoHasItsAnswerMayAskAgainAtOnce) {
+  StartAreas();
+  RawClient client(port());
+  for (int i = 0; i < 500; ++i) {
+    client.Send(Get(kArea));
+    const auto reply = client.Read();
+    ASSERT_TRUE(reply);
+    ASSERT_EQ(reply->status, 200) << i;
+  }
+}
+
+TEST_F(AreaTest, LeavesAWorkerForTiles) {
+  StartAreas();  // two workers
+  held_ = true;
+  RawClient first(port());
+  first.Send(Get(kArea));
+  ASSERT_TRUE(Eventually([this] { return builds_ == 1; }));
+  const Reply second = Fetch(port(), kArea);
+  EXPECT_EQ(second.status, 503);
+  EXPECT_EQ(second.Field("retry-after"), "1");
+  EXPECT_EQ(Fetch(port(), "/maui/0/0/0.terrain").status, 200);
+  held_ = false;
+  EXPECT_EQ(first.Read()->status, 200);
+}
+
+}  // namespace
+}  // namespace terrace::server

@@ -1,0 +1,125 @@
+"""What options of `terrace serve` do to replies and logs: serve_options_test.py BINARY SOURCE_DIR."""
+import contextlib
+import json
+import pathlib
+import re
+import signal
+import struct
+import subprocess
+import sys
+import tempfile
+import unittest
+import urllib.request
+
+BINARY = pathlib.Path(sys.argv.pop(1)).resolve()
+SOURCE_DIR = pathlib.Path(sys.argv.pop(1)).resolve()
+DEM = SOURCE_DIR / "config/samples/jacksboro.tif"
+TILE = "9/272/359"
+
+
+@contextlib.contextmanager
+def serving(config, log):
+    """The URL of a server with this configuration; afterwards it has ended well, and `log` holds its lines."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = pathlib.Path(folder, "terrace.json")
+        path.write_text(json.dumps(config))
+        process = subprocess.Popen([BINARY, "serve", "--config", path, "--listen", "127.0.0.1:0"], stdout=subprocess.PIPE,
+                                   stderr=subprocess.PIPE, text=True)
+        try:
+            first = process.stdout.readline()
+            found = re.search(r"http://\S+/", first)
+            if found is None:
+                raise AssertionError(process.communicate()[1])
+            yield found[0], process
+        finally:
+            process.terminate()
+            log += process.communicate(timeout=60)[1].splitlines()
+    if process.returncode != 0:
+        raise AssertionError(f"ended with {process.returncode}")
+
+
+def gltf(body):
+    length = struct.unpack_from("<I", body, 12)[0]
+    return json.loads(body[20:20 + length])
+
+
+def photograph(folder):
+    """Three bands of 64 x 64 pixels over the whole of the DEM."""
+    path = pathlib.Path(folder, "photo.img")
+    path.write_bytes(bytes(x * y % 251 for band in range(3) for y in range(64) for x in range(64)))
+    path.with_suffix(".hdr").write_text(
+        "ENVI\nsamples = 64\nlines = 64\nbands = 3\ndata type = 1\ninterleave = bsq\nbyte order = 0\n"
+        "map info = {Geographic Lat/Lon, 1, 1, -84.5, 36.5, 0.01, 0.01, WGS-84}\n")
+    return str(path)
+
+
+class Glb(unittest.TestCase):
+    def test_is_compressed_and_textured_as_the_dataset_says(self):
+        used = {"draco": "KHR_draco_mesh_compression", "quantized": "KHR_mesh_quantization", "meshopt": "EXT_meshopt_compression"}
+        with tempfile.TemporaryDirectory() as folder:
+            imagery = {"image": photograph(folder), "size": 64}
+            datasets = [{"name": form, "sources": [str(DEM)], "glb_compression": form} for form in ("draco", "none", "quantized", "meshopt")]
+            datasets += [{"name": texture, "sources": [str(DEM)], "glb_compression": "none", "imagery": imagery | {"texture": texture}}
+                         for texture in ("jpeg", "webp")]
+            with serving({"datasets": datasets, "log_level": "off"}, log := []) as (url, _):
+                for dataset in datasets:
+                    with self.subTest(dataset=dataset["name"]), urllib.request.urlopen(f"{url}{dataset['name']}/{TILE}.glb", timeout=60) as reply:
+                        model = gltf(reply.read())
+                        compression = used.get(dataset["glb_compression"])
+                        for extension in used.values():
+                            # meshopt's integers are those of KHR_mesh_quantization
+                            if compression != used["meshopt"] or extension != used["quantized"]:
+                                self.assertEqual(extension in model.get("extensionsUsed", []), extension == compression)
+                        images = [image["mimeType"] for image in model.get("images", [])]
+                        self.assertEqual(images, [f"image/{dataset['name']}"] if "imagery" in dataset else [])
+        self.assertEqual(log, [], "of the level `off`")
+
+
+class Log(unittest.TestCase):
+    def test_is_json_on_request(self):
+        config = {"datasets": [{"name": "maui", "sources": [str(DEM)]}], "log_format": "json", "log_level": "info"}
+        with serving(config, log := []) as (url, _):
+            with urllib.request.urlopen(f"{url}livez", timeout=60) as reply:
+                reply.read()
+        lines = [json.loads(line) for line in log]
+        self.assertTrue(any("/livez" in line["message"] for line in lines), log)
+        for line in lines:
+            self.assertEqual(set(line), {"time", "level", "message"})
+
+    def test_levels_hold_back_what_is_below(self):
+        for level, told in (("error", False), ("warn", True)):  # that no vertical datum is stated is a warning
+            with serving({"datasets": [{"name": "maui", "sources": [str(DEM)]}], "log_level": level}, log := []):
+                pass
+            self.assertEqual(any("vertical datum" in line for line in log), told, log)
+
+    def test_a_signal_makes_it_talk_and_another_ends_that(self):
+        with serving({"datasets": [{"name": "maui", "sources": [str(DEM)]}], "log_level": "error"}, log := []) as (url, process):
+            for number, level in ((signal.SIGUSR1, "debug"), (signal.SIGUSR2, "error")):
+                process.send_signal(number)
+                while f"log level: {level}" not in (line := process.stderr.readline()):
+                    self.assertNotEqual(line, "", "the log has ended")
+
+
+class AccessLog(unittest.TestCase):
+    def lines(self, form):
+        with serving({"datasets": [{"name": "maui", "sources": [str(DEM)]}], "access_log": form, "log_level": "error"}, log := []) as (url, _):
+            with urllib.request.urlopen(f"{url}livez", timeout=60) as reply:
+                reply.read()
+        return [line for line in log if "/livez" in line]
+
+    def test_has_the_form_that_was_asked_for(self):
+        self.assertRegex(self.lines("combined")[0], r'^127\.0\.0\.1 - - \[.+\] "GET /livez HTTP/1\.1" 200 \d+ ')
+        self.assertEqual(json.loads(self.lines("json")[0])["target"], "/livez")
+        self.assertEqual(self.lines("off"), [])
+
+
+class Info(unittest.TestCase):
+    def test_goes_on_after_a_name_that_is_none(self):
+        done = subprocess.run([BINARY, "info", "", DEM], capture_output=True, text=True, timeout=60)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("terrace: ", done.stderr)
+        self.assertIn(str(DEM), done.stdout)
+
+
+if __name__ == "__main__":
+    unittest.main()
