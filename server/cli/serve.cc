@@ -248,6 +248,7 @@ Result<std::shared_ptr<server::DiskCache>> OpenDiskCache(const config::DiskCache
 }
 
 int Serve(const ServeArguments& arguments) {
+  std::signal(SIGPIPE, SIG_IGN);  // whoever reads the log may go away; the server stays
   std::vector<config::ConfigError> errors;
   const config::Config config = MakeConfig(arguments, errors);
   if (!errors.empty()) return Report(errors, arguments.config_file);

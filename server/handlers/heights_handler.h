@@ -30,7 +30,9 @@ class HeightsHandler {
   // Fills in the errors of tiles, one after the other, from the cache or by building them.
   asio::awaitable<Result<CertifiedPoints>> Certify(std::uint32_t dataset, const HeightsQuery& query,
                                                    TileService::Clock::time_point deadline, std::uint64_t client) const;
-  Result<HeightsQuery> Parse(const Route& route, const Request& request) const;
+  // On a worker, unless it is certain to be quick.
+  asio::awaitable<Result<HeightsQuery>> ParseAside(const Route& route, const Request& request,
+                                                   TileService::Clock::time_point deadline) const;
 
   const CatalogPtr catalog_;
   TileService& tiles_;

@@ -27,9 +27,11 @@ Response PlainText(int status, std::string_view content_type, std::string text) 
   return response;
 }
 
+bool SeesAll(const Request& request) { return !request.grant || request.grant->sees_all; }
+
 // The first word is the state. A degraded server goes on answering, so it is not to be taken out of service. Reasons
-// name files: they are for the log.
-Response Ready(const Routes::State& state) {
+// name files: they are for the log. Datasets are named to those who may see them all.
+Response Ready(const Routes::State& state, bool sees_all) {
   if (state.draining()) {
     Response response = PlainText(503, "text/plain; charset=utf-8", "draining\n");
     response.headers.emplace_back("Retry-After", "5");
@@ -38,13 +40,12 @@ Response Ready(const Routes::State& state) {
   const std::map<std::string, std::string> troubles = state.troubles();
   std::string text = troubles.empty() ? "ready\n" : "degraded\n";
   for (const auto& [dataset, reason] : troubles) {
-    text += dataset.empty() ? "the configuration file is wrong, the last good one is in force\n"
-                            : fmt::format("dataset {}: its source cannot be opened as it is now\n", dataset);
+    text += dataset.empty()
+                ? "the configuration file is wrong, the last good one is in force\n"
+                : fmt::format("dataset{}: its source cannot be opened as it is now\n", sees_all ? " " + dataset : "");
   }
   return PlainText(200, "text/plain; charset=utf-8", std::move(text));
 }
-
-bool SeesAll(const Request& request) { return !request.grant || request.grant->sees_all; }
 
 }  // namespace
 
@@ -108,7 +109,7 @@ Response Routes::ServeNow(const Route& route, const Request& request) const {
       return terrace::server::Serve(Document::Make(DatasetsJson(SeenBy(request)), "application/json"), request,
                                     kRevalidate);
     case RouteKind::kReady:
-      return Ready(state_);
+      return Ready(state_, SeesAll(request));
     case RouteKind::kMetrics:
       return PlainText(200, "text/plain; version=0.0.4; charset=utf-8", state_.metrics_text());
     default:
@@ -127,10 +128,11 @@ std::vector<DatasetView> Routes::SeenBy(const Request& request) const {
 Response Routes::ServeViewer(const Route& route, const Request& request) const {
   if (const Document* file = viewer_->Find(route.file)) return terrace::server::Serve(*file, request, kRevalidate);
   if (viewer_->empty() && route.file == "index.html") {
-    if (SeesAll(request)) return terrace::server::Serve(index_, request, kRevalidate);
-    Response index = terrace::server::Serve(Document::Make(IndexHtml(SeenBy(request)), "text/html; charset=utf-8"),
+    Response index = SeesAll(request) ? terrace::server::Serve(index_, request, kRevalidate)
+                                      : terrace::server::Serve(
+                                            Document::Make(IndexHtml(SeenBy(request)), "text/html; charset=utf-8"),
                                             request, kRevalidate);
-    index.for_grant = true;
+    index.for_grant = request.grant != nullptr;
     return index;
   }
   return ProblemResponse(404, "no such URL; /datasets lists those of each dataset", request.id);

@@ -44,33 +44,28 @@ Caller Gate::Identify(Request& request, const Caller& peer) const {
   return client == peer.address ? peer : Caller(client);
 }
 
-std::optional<Response> Gate::Refuse(const Request& request, const Route& route, const Caller& caller) {
-  if (!IsProbe(route.kind)) {
-    if (std::optional<Response> response = RefuseForRate(request, caller)) return response;
-  }
-  return RefuseForAccess(request, route);
-}
-
 std::string Gate::Who(const Request& request, const Caller& caller) {
   return HasName(request) ? "/" + request.grant->name : caller.block;  // no address begins with a slash
 }
 
-std::optional<Response> Gate::RefuseForRate(const Request& request, const Caller& caller) {
+std::optional<Response> Gate::RefuseForRate(const Request& request, const Result<Route>& route, const Caller& caller) {
+  if (route && IsProbe(route->kind)) return std::nullopt;
   const bool has_name = HasName(request);
   RateLimiter::Rate rate = options_.rate;
   if (has_name && request.grant->requests_per_second > 0) {
     rate.per_second = request.grant->requests_per_second;
-    rate.burst = std::max(rate.burst, 2 * rate.per_second);
+    rate.burst = 2 * rate.per_second;
   }
   if (rate.per_second <= 0) return std::nullopt;
   const auto wait = limiter_.Refuse(Who(request, caller), rate, RateLimiter::Clock::now());
   if (!wait) return std::nullopt;
   Response response = ProblemResponse(429, "too many requests", request.id);
   response.headers.emplace_back("Retry-After", fmt::to_string(std::max<std::int64_t>((wait->count() + 999) / 1000, 1)));
+  if (route) response.route = ToString(route->kind);
   return response;
 }
 
-std::optional<Response> Gate::RefuseForAccess(const Request& request, const Route& route) const {
+std::optional<Response> Gate::Refuse(const Request& request, const Route& route) const {
   if (!options_.access.has_tokens() || !ShowsDatasets(route.kind)) return std::nullopt;
   if (request.has_bad_token) return Unauthorized(true, request.id);
   if (!NeedsGrant(route, *request.grant)) return std::nullopt;

@@ -42,8 +42,11 @@ class Gate {
   // address.
   static std::string Who(const Request& request, const Caller& caller);
 
-  // 429, 401 or 403; nothing where the request may go on.
-  std::optional<Response> Refuse(const Request& request, const Route& route, const Caller& caller);
+  // 429; nothing where the request may go on. All but probes count, those to URLs that do not exist among them.
+  std::optional<Response> RefuseForRate(const Request& request, const Result<Route>& route, const Caller& caller);
+
+  // 401 or 403; nothing where the request may go on.
+  std::optional<Response> Refuse(const Request& request, const Route& route) const;
 
   // Marks a reply that another token would not get.
   void Mark(const Route& route, Response& response) const;
@@ -51,9 +54,6 @@ class Gate {
   const Proxies& proxies() const { return options_.proxies; }
 
  private:
-  std::optional<Response> RefuseForRate(const Request& request, const Caller& caller);
-  std::optional<Response> RefuseForAccess(const Request& request, const Route& route) const;
-
   const GateOptions options_;
   RateLimiter limiter_;
 };

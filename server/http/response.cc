@@ -166,6 +166,7 @@ Response Conditional(Response response, const Request& request) {
 }
 
 bool MatchesEtag(std::string_view if_none_match, std::string_view etag) {
+  if (etag.empty()) return false;  // not even "*": there is nothing that the client could have
   std::string_view rest = Trim(if_none_match);
   if (rest == "*") return true;
   while (!rest.empty()) {

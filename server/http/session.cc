@@ -68,7 +68,7 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
     const auto peer = stream_.socket().remote_endpoint(error);
     if (error) return;
     peer_ = Caller(Canonical(peer.address()));
-    peer_text_ = fmt::format("{}:{}", peer.address().to_string(), peer.port());
+    peer_text_ = fmt::format("{}:{}", peer_.text, peer.port());
   }
   ~Session() override { context_->connections->Remove(this); }
 
@@ -179,12 +179,14 @@ asio::awaitable<bool> Session::ServeLater(Route route) {
   if (!incoming) {
     Response response = Overloaded("too many request bodies are on their way", request.id);
     response.close = true;
+    co_await HoldBack();
     co_return co_await Reply(response);
   }
   if (request.content_length > 0) {
     const tl::expected<void, BadRequest> read = co_await reader_.ReadBody(request);
     if (!read && read.error().status > 0) co_await RefuseMessage(read.error());
     if (!read) co_return false;
+    incoming->Settle();  // it is the server's turn
   }
   stream_.ExpiresNever();  // the handlers have deadlines of their own
   request.client = std::hash<std::string>{}(Gate::Who(request, exchange_.caller)) | 1;  // 0 is nobody
@@ -202,16 +204,17 @@ asio::awaitable<bool> Session::ServeLater(Route route) {
   co_return keep;
 }
 
-// What can be said without the request's body. Preflights come first: they carry no token.
+// What can be said without the request's body. Preflights come before access: they carry no token.
 std::optional<Response> Session::Refuse(const Result<Route>& route) const {
   const Request& request = exchange_.request;
   const bool takes_post = route && TakesPost(route->kind);
+  if (std::optional<Response> refusal = context_->gate->RefuseForRate(request, route, exchange_.caller)) return refusal;
   if (request.method == Method::kOptions) return PreflightResponse(takes_post);
   if (request.method == Method::kOther || (request.method == Method::kPost && !takes_post)) {
     return NoSuchMethodResponse(takes_post, request.id);
   }
   if (!route) return ClientErrorResponse(route.error(), request.id);
-  std::optional<Response> refusal = context_->gate->Refuse(request, *route, exchange_.caller);
+  std::optional<Response> refusal = context_->gate->Refuse(request, *route);
   if (!refusal) return WhyNoBody(request, context_->options.max_body_bytes);
   refusal->route = ToString(route->kind);
   return refusal;
@@ -276,6 +279,7 @@ asio::awaitable<bool> Session::Reply(Response& response) {
       context_->transfers->TryHold(with_body ? response.body : nullptr, weak_from_this(), Clock::now());
   if (!room) {
     const std::string_view route = response.route;
+    co_await HoldBack();
     response = Overloaded("too many replies are on their way", request.id);
     response.route = route;
     room.emplace();

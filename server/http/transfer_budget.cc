@@ -1,6 +1,11 @@
 #include "server/http/transfer_budget.h"
 
 namespace terrace::server {
+namespace {
+
+constexpr std::size_t kUploadShare = 4;  // a quarter of the budget is for request bodies
+
+}  // namespace
 
 std::optional<TransferBudget::Hold> TransferBudget::TryHold(Body body, const std::weak_ptr<Connection>& holder,
                                                             Clock::time_point now) {
@@ -18,7 +23,7 @@ std::optional<TransferBudget::Hold> TransferBudget::Take(Body body, std::size_t 
                                                          Clock::time_point now) {
   if (bytes <= kFreeBytes) return Hold();
   std::unique_lock lock(mutex_);
-  if (!charges_.contains(body.get()) && !MayTake(bytes)) {
+  if (!charges_.contains(body.get()) && !MayTake(bytes, /*is_upload=*/!body)) {
     ++refused_;
     const std::vector<std::shared_ptr<Connection>> overdue = Overdue(now);
     lock.unlock();
@@ -33,12 +38,15 @@ std::optional<TransferBudget::Hold> TransferBudget::Take(Body body, std::size_t 
     const bool fits = held_ + bytes <= capacity_;
     charge.bytes = fits ? bytes : 0;
     held_ += charge.bytes;
+    charge.is_upload = !body;
+    if (charge.is_upload) uploads_held_ += charge.bytes;
     oversized_under_way_ = oversized_under_way_ || !fits;
   }
   return Hold(this, entry, std::move(body));
 }
 
-bool TransferBudget::MayTake(std::size_t bytes) const {
+bool TransferBudget::MayTake(std::size_t bytes, bool is_upload) const {
+  if (is_upload && uploads_held_ > 0 && uploads_held_ + bytes > capacity_ / kUploadShare) return false;
   return held_ + bytes <= capacity_ || (bytes > capacity_ && !oversized_under_way_);
 }
 
@@ -59,10 +67,16 @@ void TransferBudget::Release(Entries::iterator entry) {
   const auto charge = charges_.find(entry->charge);
   if (--charge->second.holders == 0) {
     held_ -= charge->second.bytes;
+    if (charge->second.is_upload) uploads_held_ -= charge->second.bytes;
     if (charge->second.bytes == 0) oversized_under_way_ = false;
     charges_.erase(charge);
   }
   entries_.erase(entry);
+}
+
+void TransferBudget::Settle(Entries::iterator entry) {
+  const std::lock_guard lock(mutex_);
+  entry->holder.reset();
 }
 
 TransferBudget::Stats TransferBudget::stats() const {

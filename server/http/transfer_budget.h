@@ -1,4 +1,5 @@
-// The memory of bodies on their way: replies that clients have not taken yet, and request bodies that are not complete.
+// The memory of bodies on their way: replies that clients have not taken yet, and bodies of requests that are not
+// answered. Request bodies get a quarter of it: whoever announces uploads must not keep others from their replies.
 //
 // A body that many replies share counts once. Where there is no room for one more, it is refused, and replies that have
 // had more than their time (kGrace, and a second for each kRate bytes) are cut off, so that those who read slowly do
@@ -40,7 +41,7 @@ class TransferBudget {
   // Room for a reply's body until the hold ends. Nothing: there is none, and the body must be let go. `holder` is who
   // would be cut off.
   std::optional<Hold> TryHold(Body body, const std::weak_ptr<Connection>& holder, Clock::time_point now = Clock::now());
-  // The same for `bytes` that nobody shares.
+  // The same for `bytes` of a request's body, which nobody shares.
   std::optional<Hold> TryHold(std::size_t bytes, const std::weak_ptr<Connection>& holder,
                               Clock::time_point now = Clock::now());
 
@@ -60,19 +61,22 @@ class TransferBudget {
   struct Charge {
     std::size_t bytes = 0;  // 0: beside the budget
     std::size_t holders = 0;
+    bool is_upload = false;
   };
 
-  bool MayTake(std::size_t bytes) const;                                    // mutex_ is held
+  bool MayTake(std::size_t bytes, bool is_upload) const;                    // mutex_ is held
   std::vector<std::shared_ptr<Connection>> Overdue(Clock::time_point now);  // mutex_ is held
   std::optional<Hold> Take(Body body, std::size_t bytes, const std::weak_ptr<Connection>& holder,
                            Clock::time_point now);
   void Release(Entries::iterator entry);
+  void Settle(Entries::iterator entry);
 
   const std::size_t capacity_;
   mutable std::mutex mutex_;
   Entries entries_;
   std::unordered_map<const void*, Charge> charges_;
   std::size_t held_ = 0;
+  std::size_t uploads_held_ = 0;  // of these, request bodies
   bool oversized_under_way_ = false;
   std::uint64_t refused_ = 0, cut_ = 0;
 };
@@ -86,6 +90,11 @@ class TransferBudget::Hold {
   ~Hold() {
     if (!budget_) return;
     budget_->Release(entry_);
+  }
+
+  // What is held is complete, and counts until the end, but its holder is no longer cut off for it.
+  void Settle() {
+    if (budget_) budget_->Settle(entry_);
   }
 
  private:

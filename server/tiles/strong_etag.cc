@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <xxhash.h>
 
+#include "server/tiles/encoder_version.h"
+
 namespace terrace::server {
 
 std::string StrongETag(std::string_view bytes) {
@@ -11,8 +13,8 @@ std::string StrongETag(std::string_view bytes) {
 }
 
 std::string RequestETag(std::string_view kind, const DatasetView& dataset, std::string_view query, Coding coding) {
-  return StrongETag(
-      fmt::format("{} {} {:016x} {} {}", kind, dataset.name, dataset.generation, static_cast<int>(coding), query));
+  return StrongETag(fmt::format("{} {} {:016x} {:016x} {} {}", kind, dataset.name, dataset.generation, EncoderVersion(),
+                                static_cast<int>(coding), query));
 }
 
 }  // namespace terrace::server

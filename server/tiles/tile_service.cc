@@ -14,7 +14,7 @@ namespace {
 
 using Clock = TileService::Clock;
 
-constexpr int kAfterTiles = 100;  // deeper than any
+constexpr int kAfterTiles = 40;  // deeper than any
 
 Result<EncodedTile> RunWork(const SingleFlight::Work& work, const std::string& what, Clock::time_point asked,
                             std::stop_token stop) {

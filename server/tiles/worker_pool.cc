@@ -9,6 +9,9 @@ namespace {
 // Jobs of a client that may wait for each place that is left: a single one gets two thirds of the queue.
 constexpr std::size_t kShare = 2;
 
+// A job goes before one of the next deeper level that has waited for this long.
+constexpr std::chrono::milliseconds kAgeOfLevel{100};
+
 }  // namespace
 
 WorkerPool::WorkerPool(unsigned threads, std::size_t queue_length)
@@ -25,7 +28,7 @@ bool WorkerPool::TrySubmit(std::function<void()> job, JobOrder order) {
   {
     const std::lock_guard lock(mutex_);
     if (shut_down_ || !HasPlace(order.client)) return false;
-    queue_[order.client].emplace(order.level, std::move(job));
+    queue_[order.client].emplace(std::chrono::steady_clock::now() + order.level * kAgeOfLevel, std::move(job));
     ++queued_;
   }
   wake_.notify_one();

@@ -1,6 +1,6 @@
 // The threads that compute and read files, behind a queue of bounded length.
 //
-// Clients take turns, however many jobs one of them has waiting, and of a client's own jobs the most urgent is next. No
+// Clients take turns, however many jobs one of them has waiting, and a client's own jobs go by their level and age. No
 // client fills the queue: it may have twice as many jobs waiting as there are places left (dynamic thresholds:
 // Choudhury and Hahne, IEEE/ACM Transactions on Networking 6(2), 1998), so that there is one for whoever comes next.
 //
@@ -8,6 +8,7 @@
 // time a request waits is bounded by configuration and not by load.
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <cstddef>
 #include <cstdint>
@@ -21,7 +22,8 @@ namespace terrace::server {
 
 struct JobOrder {
   std::uint64_t client = 0;  // whose turn it takes; 0: nobody's in particular, which may fill the queue
-  int level = 0;             // of the client's jobs the lowest goes first: a shallow tile covers what others refine
+  int level = 0;             // of the client's jobs a lower one goes first, if it comes soon after: shallow tiles
+                             // cover what deep ones refine, but must not keep them waiting for ever
 };
 
 class WorkerPool {
@@ -52,10 +54,11 @@ class WorkerPool {
   const std::size_t queue_length_;
   mutable std::mutex mutex_;
   std::condition_variable wake_;
-  std::map<std::uint64_t, std::multimap<int, Job>> queue_;  // client -> level -> jobs, oldest first; none is empty
-  std::size_t queued_ = 0;                                  // jobs in queue_
-  std::uint64_t last_client_ = 0;                           // whose job was taken last
-  unsigned idle_ = 0;                                       // threads without a job
+  // Client -> when its jobs would have come if a level were an age -> jobs, oldest first; none is empty.
+  std::map<std::uint64_t, std::multimap<std::chrono::steady_clock::time_point, Job>> queue_;
+  std::size_t queued_ = 0;         // jobs in queue_
+  std::uint64_t last_client_ = 0;  // whose job was taken last
+  unsigned idle_ = 0;              // threads without a job
   bool shut_down_ = false;
   std::vector<std::thread> threads_;
 };

@@ -146,6 +146,44 @@ TEST_F(Limits, SlowsDownWhoAsksTooOften) {
   EXPECT_TRUE(Eventually([&] { return Fetch(port(), "/maui/layer.json").status == 200; }));
 }
 
+TEST_F(Limits, SlowsDownWhateverIsAsked) {
+  ServerOptions options;
+  options.edge.requests_per_second = 0.001;
+  options.edge.request_burst = 3;
+  Start(options);
+  RawClient client(port());
+  client.Send("OPTIONS /maui/layer.json HTTP/1.1\r\nHost: x\r\n\r\n");
+  client.Send("DELETE /maui/layer.json HTTP/1.1\r\nHost: x\r\n\r\n");
+  client.Send(Get("/nope"));
+  for (const int status : {204, 405, 404}) EXPECT_EQ(client.Read()->status, status);
+  for (const std::string& sent : {std::string("OPTIONS / HTTP/1.1\r\nHost: x\r\n\r\n"), Get("/nope"), Get("/datasets")}) {
+    client.Send(sent);
+    EXPECT_EQ(client.Read()->status, 429) << sent;
+  }
+}
+
+TEST_F(Limits, ATokensOwnRateHasABurstOfItsOwn) {
+  ServerOptions options;
+  options.edge.requests_per_second = 1000;
+  options.edge.tokens = {{"slow", kAll, "", {}, 2}};
+  Start(options);
+  const std::string bearer = std::string("Authorization: Bearer ") + kAll + "\r\n";
+  int good = 0;
+  for (int i = 0; i < 10; ++i) good += Fetch(port(), "/maui/layer.json", bearer).status == 200;
+  EXPECT_GE(good, 4);
+  EXPECT_LT(good, 10) << "the burst is twice the token's two a second";
+}
+
+TEST_F(Limits, NamesDatasetsInTroubleToThoseWhoMaySeeThem) {
+  ServerOptions options;
+  options.edge.tokens = {{"everybody", kAll, "", {}, 0}};
+  Start(options);
+  server_->SetTroubles({{"maui", "/secret/maui.tif is gone"}});
+  EXPECT_EQ(Fetch(port(), "/readyz").body, "degraded\ndataset: its source cannot be opened as it is now\n");
+  EXPECT_EQ(Fetch(port(), "/readyz", std::string("Authorization: Bearer ") + kAll + "\r\n").body,
+            "degraded\ndataset maui: its source cannot be opened as it is now\n");
+}
+
 TEST_F(Limits, CountsTheClientsBehindAProxyEachByItself) {
   ServerOptions options;
   options.edge.requests_per_second = 0.001;

@@ -50,6 +50,25 @@ TEST_F(TransferBudgetTest, CountsASharedBodyOnce) {
   EXPECT_EQ(budget_.stats().held_bytes, 0u);
 }
 
+TEST_F(TransferBudgetTest, RequestBodiesDoNotKeepRepliesOut) {
+  std::vector<TransferBudget::Hold> uploads;
+  while (auto upload = budget_.TryHold(kMb / 10, connection_, now_)) uploads.push_back(*std::move(upload));
+  EXPECT_EQ(uploads.size(), 7u) << "a quarter of the room";
+  EXPECT_TRUE(budget_.TryHold(BodyOf(2 * kMb), connection_, now_));
+  uploads.clear();
+  EXPECT_TRUE(budget_.TryHold(2 * kMb, connection_, now_)) << "a single one may be larger";
+}
+
+TEST_F(TransferBudgetTest, WhoWaitsForAnAnswerIsNotCutOff) {
+  auto upload = budget_.TryHold(kMb / 2, connection_, now_);
+  auto unread = budget_.TryHold(BodyOf(2 * kMb), connection_, now_);
+  ASSERT_TRUE(upload && unread);
+  upload->Settle();
+  EXPECT_FALSE(budget_.TryHold(BodyOf(2 * kMb), connection_, now_ + 60s));
+  EXPECT_EQ(connection_->aborts, 1) << "for the reply alone";
+  EXPECT_EQ(budget_.stats().held_bytes, 2 * kMb + kMb / 2) << "it counts all the same";
+}
+
 TEST_F(TransferBudgetTest, LeavesSmallBodiesAlone) {
   std::vector<TransferBudget::Hold> holds;
   for (int i = 0; i < 1000; ++i)

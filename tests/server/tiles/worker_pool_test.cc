@@ -3,9 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <chrono>
 #include <future>
 #include <latch>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -92,6 +94,14 @@ TEST(WorkerPool, ClientsTakeTurnsAndShallowTilesGoFirst) {
   ASSERT_TRUE(busy.Submit("c", {3, 20}));
   EXPECT_EQ(busy.pool.queued(), 7u);
   EXPECT_EQ(busy.Run(), (std::vector<std::string>{"a2", "b3", "c", "a5", "b7", "a9", "a9"}));
+}
+
+TEST(WorkerPool, ADeepTileThatHasWaitedGoesBeforeShallowOnesThatCome) {
+  BusyPool busy(100);
+  ASSERT_TRUE(busy.Submit("deep", {1, 2}));
+  std::this_thread::sleep_for(std::chrono::milliseconds(250));  // two levels are 200 ms
+  ASSERT_TRUE(busy.Submit("shallow", {1, 0}));
+  EXPECT_EQ(busy.Run(), (std::vector<std::string>{"deep", "shallow"}));
 }
 
 TEST(WorkerPool, OneClientLeavesPlacesForOthers) {
