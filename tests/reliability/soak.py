@@ -205,7 +205,12 @@ def soak(binary, seconds, clients=6, period=None):
         def run(seed):
             client = Client(seed)
             while time.monotonic() < end:
-                converse(server, client, tally, seed % 2 == 1, end)
+                try:
+                    converse(server, client, tally, seed % 2 == 1, end)
+                except OSError as error:  # no connection, or one that was closed before a request had gone
+                    with tally.lock:
+                        tally.unexpected[f"{type(error).__name__} of a connection"] += 1
+                    time.sleep(0.1)
 
         threads = [threading.Thread(target=run, args=(seed,)) for seed in range(clients)]
         for thread in threads:

@@ -53,6 +53,21 @@ def photograph(folder):
     return str(path)
 
 
+class Log(unittest.TestCase):
+    def test_outlives_whoever_reads_it(self):
+        process = subprocess.Popen([BINARY, "serve", DEM, "--listen", "127.0.0.1:0", "--access-log", "log"], stdout=subprocess.PIPE,
+                                   stderr=subprocess.PIPE, text=True)
+        try:
+            url = re.search(r"http://\S+/", process.stdout.readline())[0]
+            process.stderr.close()
+            for _ in range(3):
+                self.assertEqual(urllib.request.urlopen(url + "livez", timeout=10).status, 200)
+        finally:
+            process.terminate()
+            process.stdout.close()
+        self.assertEqual(process.wait(30), 0)
+
+
 class Glb(unittest.TestCase):
     def test_is_compressed_and_textured_as_the_dataset_says(self):
         used = {"draco": "KHR_draco_mesh_compression", "quantized": "KHR_mesh_quantization", "meshopt": "EXT_meshopt_compression"}
