@@ -25,7 +25,7 @@ std::optional<TransferBudget::Hold> TransferBudget::Take(Body body, std::size_t 
   std::unique_lock lock(mutex_);
   if (!charges_.contains(body.get()) && !MayTake(bytes, /*is_upload=*/!body)) {
     ++refused_;
-    const std::vector<std::shared_ptr<Connection>> overdue = Overdue(now);
+    const std::vector<std::shared_ptr<Connection>> overdue = Overdue(now, /*only_uploads=*/!body);
     lock.unlock();
     for (const auto& connection : overdue) connection->Abort();
     return std::nullopt;
@@ -51,10 +51,11 @@ bool TransferBudget::MayTake(std::size_t bytes, bool is_upload) const {
 }
 
 // Each is told once; its room comes back when its connection has ended.
-std::vector<std::shared_ptr<Connection>> TransferBudget::Overdue(Clock::time_point now) {
+std::vector<std::shared_ptr<Connection>> TransferBudget::Overdue(Clock::time_point now, bool only_uploads) {
   std::vector<std::shared_ptr<Connection>> overdue;
   for (Entry& entry : entries_) {
     if (now < entry.entitled_until) continue;
+    if (only_uploads && !charges_.at(entry.charge).is_upload) continue;
     if (auto connection = entry.holder.lock()) overdue.push_back(std::move(connection));
     entry.holder.reset();
   }

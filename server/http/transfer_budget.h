@@ -64,8 +64,9 @@ class TransferBudget {
     bool is_upload = false;
   };
 
-  bool MayTake(std::size_t bytes, bool is_upload) const;                    // mutex_ is held
-  std::vector<std::shared_ptr<Connection>> Overdue(Clock::time_point now);  // mutex_ is held
+  bool MayTake(std::size_t bytes, bool is_upload) const;  // mutex_ is held
+  // mutex_ is held. Uploads make room for uploads alone: replies have none to give them.
+  std::vector<std::shared_ptr<Connection>> Overdue(Clock::time_point now, bool only_uploads);
   std::optional<Hold> Take(Body body, std::size_t bytes, const std::weak_ptr<Connection>& holder,
                            Clock::time_point now);
   void Release(Entries::iterator entry);

@@ -59,6 +59,16 @@ TEST_F(TransferBudgetTest, RequestBodiesDoNotKeepRepliesOut) {
   EXPECT_TRUE(budget_.TryHold(2 * kMb, connection_, now_)) << "a single one may be larger";
 }
 
+TEST_F(TransferBudgetTest, UploadsCutOffUploadsAlone) {
+  const auto uploader = std::make_shared<FakeConnection>();
+  auto unread = budget_.TryHold(BodyOf(2 * kMb), connection_, now_);
+  auto upload = budget_.TryHold(kMb / 2, uploader, now_);
+  ASSERT_TRUE(unread && upload);
+  EXPECT_FALSE(budget_.TryHold(kMb / 2, uploader, now_ + 60s));
+  EXPECT_EQ(connection_->aborts, 0);
+  EXPECT_EQ(uploader->aborts, 1);
+}
+
 TEST_F(TransferBudgetTest, WhoWaitsForAnAnswerIsNotCutOff) {
   auto upload = budget_.TryHold(kMb / 2, connection_, now_);
   auto unread = budget_.TryHold(BodyOf(2 * kMb), connection_, now_);
