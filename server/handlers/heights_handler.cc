@@ -42,9 +42,9 @@ HeightsHandler::HeightsHandler(CatalogPtr catalog, TileService& tiles, TileHandl
 
 asio::awaitable<Result<HeightsQuery>> HeightsHandler::ParseAside(const Route& route, const Request& request,
                                                                  TileService::Clock::time_point deadline) const {
-  const bool has_path =
-      route.query.find("path") != std::string::npos;  // two corners may have thousands of points between them
-  if (request.method != Method::kPost && route.query.size() <= kQuickQuery && !has_path) {
+  // Two corners of a path may have thousands of points between them, and a percent sign may hide its name.
+  const bool may_be_path = route.query.find("path") != std::string::npos || route.query.find('%') != std::string::npos;
+  if (request.method != Method::kPost && route.query.size() <= kQuickQuery && !may_be_path) {
     co_return Parse(route.query, {}, {}, max_locations_);
   }
   const auto parsed = std::make_shared<Result<HeightsQuery>>();
