@@ -11,6 +11,12 @@
 #if __has_feature(address_sanitizer)  // clang
 #define TERRACE_HAS_ASAN
 #endif
+#if __has_feature(thread_sanitizer)
+#define TERRACE_HAS_TSAN
+#endif
+#endif
+#ifdef __SANITIZE_THREAD__
+#define TERRACE_HAS_TSAN
 #endif
 #ifdef TERRACE_HAS_ASAN
 #include <sanitizer/asan_interface.h>
@@ -49,18 +55,26 @@ void* NewBlock(std::size_t bytes) {
   return BlockIn(::mmap(nullptr, MappedFor(bytes), PROT_READ | PROT_WRITE, kFlags, -1, 0), bytes);
 }
 
-void* MoveBlock(void* block, std::size_t bytes) {
-  const std::size_t mapped = MappedFor(SizeOf(block));
-  void* const mapping = static_cast<std::byte*>(block) - kLine;
-  ASAN_UNPOISON_MEMORY_REGION(mapping, mapped);
-  return BlockIn(::mremap(mapping, mapped, MappedFor(bytes), MREMAP_MAYMOVE), bytes);
-}
-
 void DeleteBlock(void* block) noexcept {
   const std::size_t mapped = MappedFor(SizeOf(block));
   void* const mapping = static_cast<std::byte*>(block) - kLine;
   ASAN_UNPOISON_MEMORY_REGION(mapping, mapped);
   ::munmap(mapping, mapped);
+}
+
+void* MoveBlock(void* block, std::size_t bytes) {
+#ifdef TERRACE_HAS_TSAN
+  // It sees mmap and munmap, but not that mremap leaves addresses to the next thread that asks.
+  void* const moved = NewBlock(bytes);
+  std::memcpy(moved, block, SizeOf(block));
+  DeleteBlock(block);
+  return moved;
+#else
+  const std::size_t mapped = MappedFor(SizeOf(block));
+  void* const mapping = static_cast<std::byte*>(block) - kLine;
+  ASAN_UNPOISON_MEMORY_REGION(mapping, mapped);
+  return BlockIn(::mremap(mapping, mapped, MappedFor(bytes), MREMAP_MAYMOVE), bytes);
+#endif
 }
 
 // Whether this thread's store is no more: what outlives it frees its arrays itself.

@@ -97,10 +97,11 @@ std::size_t DatasetSlot::LookAtFiles(std::size_t most) {
 
 // True as well for a time in the future, which tells nothing.
 bool DatasetSlot::IsSettled() {
-  const auto now = std::chrono::system_clock::now().time_since_epoch();
   for (const std::string& file : NamedFiles(wanted_)) {
     const auto stamp = dem::StampOf(file);
     if (!stamp) continue;
+    // After the stamp: a file written to in between would have a time in the future.
+    const auto now = std::chrono::system_clock::now().time_since_epoch();
     const auto age = now - std::chrono::nanoseconds(stamp->modified_ns);
     if (age < std::chrono::nanoseconds(0) || age >= kSettleTime) continue;
     if (!std::exchange(said_unsettled_, true)) {

@@ -1,9 +1,11 @@
 #include "config/parse.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
+#include <string>
 
 #include "tests/config/errors.h"
 
@@ -137,13 +139,15 @@ TEST(ParseConfig, RefusesATextThatIsNotAnObject) {
 }
 
 TEST(LoadConfig, TakesPathsRelativeToTheFile) {
-  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "load_config";
+  const std::filesystem::path folder =
+      std::filesystem::path(testing::TempDir()) / ("load_config_" + std::to_string(::getpid()));
   std::filesystem::create_directories(folder);
   std::ofstream(folder / "terrace.json") << R"({"datasets": [{"name": "a", "sources": ["a.tif"]}], "viewer": "page"})";
   const ConfigResult config = LoadConfig(folder / "terrace.json");
   ASSERT_TRUE(config);
   EXPECT_EQ(config->datasets.at(0).sources.at(0).written, (folder / "a.tif").string());
   EXPECT_EQ(config->viewer.directory, folder / "page");
+  std::filesystem::remove_all(folder);
 }
 
 TEST(LoadConfig, SaysWhyAFileCannotBeRead) {

@@ -1,8 +1,10 @@
 #include "config/source_paths.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <fstream>
+#include <string>
 
 #include "tests/config/errors.h"
 
@@ -15,7 +17,7 @@ using testing::ElementsAre;
 class SourcePaths : public testing::Test {
  protected:
   // The folder's own name looks like a glob: only what the user wrote is one.
-  SourcePaths() : folder_(fs::path(testing::TempDir()) / "sources [a*]") {
+  SourcePaths() : folder_(fs::path(testing::TempDir()) / ("sources [a*] " + std::to_string(::getpid()))) {
     fs::remove_all(folder_);
     for (const char* name : {"b.tif", "a.tif", "Z.tif", "n.txt", "tile[1].tif", "deep/c.tif"}) {
       fs::create_directories((folder_ / name).parent_path());

@@ -1,12 +1,14 @@
 #include "server/http/access_log.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
+#include <string>
 
 namespace terrace::server {
 namespace {
@@ -78,7 +80,8 @@ std::string TextOf(const std::filesystem::path& file) {
 }
 
 TEST(AccessLog, AppendsToItsFileAndFollowsARotation) {
-  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "access_log_test";
+  const std::filesystem::path folder =
+      std::filesystem::path(testing::TempDir()) / ("access_log_" + std::to_string(::getpid()));
   std::filesystem::remove_all(folder);
   std::filesystem::create_directories(folder);
   auto log = AccessLog::Open(AccessLogForm::kCombined, folder / "access.log");

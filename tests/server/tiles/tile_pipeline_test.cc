@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <filesystem>
 #include <fstream>
 #include <iomanip>
 #include <memory>
@@ -14,6 +15,7 @@
 
 #include "engine/geo/error_ladder.h"
 #include "tests/server/tiles/fetched_tile.h"
+#include "tests/server/tiles/scratch_directory.h"
 
 namespace terrace::server {
 namespace {
@@ -157,10 +159,10 @@ TEST(TilePipeline, GivesTheSameBytesFromScratchFromReplayAndContinued) {
 }
 
 // A raster of level 5's own lattice: cliffs in tile 32/16, flat ground east of it.
-std::unique_ptr<dem::DemSource> OpenCliffs() {
+std::unique_ptr<dem::DemSource> OpenCliffs(const std::filesystem::path& folder) {
   constexpr double kStep = 5.625 / 256;
   constexpr int kColumns = 516, kRows = 260;
-  const std::string path = testing::TempDir() + "/cliffs.img";
+  const std::string path = folder / "cliffs.img";
   std::vector<float> heights;
   std::uint32_t state = 1;
   for (int j = 0; j < kRows; ++j) {
@@ -172,7 +174,7 @@ std::unique_ptr<dem::DemSource> OpenCliffs() {
   std::ofstream(path, std::ios::binary)
       .write(reinterpret_cast<const char*>(heights.data()),
              static_cast<std::streamsize>(heights.size() * sizeof(float)));
-  std::ofstream(testing::TempDir() + "/cliffs.hdr")
+  std::ofstream(folder / "cliffs.hdr")
       << "ENVI\nsamples = " << kColumns << "\nlines = " << kRows
       << "\nbands = 1\ndata type = 4\ninterleave = bsq\nbyte order = 0\nmap info = {Geographic Lat/Lon, 1, 1, "
       << std::setprecision(17) << -1.5 * kStep << ", " << 5.625 + 1.5 * kStep << ", " << kStep << ", " << kStep
@@ -184,8 +186,9 @@ std::unique_ptr<dem::DemSource> OpenCliffs() {
 
 // The seeds on an edge are those of the error that was asked for, however coarse the inside has to be.
 TEST(TilePipeline, MatchesEdgesOfTilesThatTheFormatCannotHold) {
+  const ScratchDirectory scratch;
   std::vector<Dataset> datasets(1);
-  datasets[0].source = OpenCliffs();
+  datasets[0].source = OpenCliffs(scratch.path());
   ASSERT_NE(datasets[0].source, nullptr);
   const TilePipeline pipeline(std::move(datasets));
   TileRequest request;

@@ -11,6 +11,7 @@
 
 #include "tests/proto/glb_decoder.h"
 #include "tests/server/tiles/fetched_tile.h"
+#include "tests/server/tiles/scratch_directory.h"
 
 namespace terrace::server {
 namespace {
@@ -18,7 +19,8 @@ namespace {
 // The Earth from 80 W to 80 E, a degree a pixel: red in the west, green in the east.
 std::string WriteHalves() {
   GDALAllRegister();
-  const std::string path = testing::TempDir() + "/tile_texture_halves.tif";
+  static const ScratchDirectory scratch;
+  const std::string path = scratch.path() / "halves.tif";
   GDALDatasetUniquePtr dataset(
       GetGDALDriverManager()->GetDriverByName("GTiff")->Create(path.c_str(), 160, 180, 3, GDT_Byte, nullptr));
   double transform[] = {-80, 1, 0, 90, 0, -1};
