@@ -320,6 +320,20 @@ class Server::Impl {
 Server::Server(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Server::~Server() = default;
 
+Result<void> Server::TryFiles(const ServerOptions& options) {
+  if (const auto viewer = StaticFiles::Load(options.viewer_dir); !viewer) return tl::unexpected(viewer.error());
+  if (const auto log = AccessLog::Open(options.access_log, options.access_log_file); !log) {
+    return tl::unexpected(log.error());
+  }
+  const auto edge = Edge::Open(options.edge, DescriptorsForFiles(options));
+  if (!edge) return tl::unexpected(edge.error());
+  return {};
+}
+
+Result<void> Server::TryAddress(const ServerOptions& options) {
+  return Listener::TryAddress(options.host, options.port);
+}
+
 Result<std::unique_ptr<Server>> Server::Start(CatalogPtr catalog, ServerOptions options) {
   if (const Result<void> named = CheckNames(catalog->datasets); !named) return tl::unexpected(named.error());
   Result<StaticFiles> viewer = StaticFiles::Load(options.viewer_dir);

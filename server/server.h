@@ -59,6 +59,12 @@ class Server {
   // cannot be written. Messages name the remedy.
   static Result<std::unique_ptr<Server>> Start(CatalogPtr catalog, ServerOptions options);
 
+  // What a start needs besides its datasets: the viewer, the access log and keys of TLS can be read or written.
+  // Opening datasets may take long, and whoever waits for that wants to know before.
+  static Result<void> TryFiles(const ServerOptions& options);
+  // And the address is free.
+  static Result<void> TryAddress(const ServerOptions& options);
+
   // Requests that come from now on are answered from `catalog`; those that have begun keep the one they began with.
   // Cached tiles of datasets that stay in the same generation stay. Of `options`, cache_bytes, cache_control,
   // request_deadline and max_locations are taken over. kInvalidArgument as above: nothing has changed then. From any

@@ -1,7 +1,10 @@
 #include "server/cli/open_source.h"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
+#include <cerrno>
+#include <system_error>
 #include <utility>
 
 namespace terrace::cli {
@@ -41,6 +44,22 @@ std::string NameOf(const std::vector<config::SourceConfig>& sources) {
   if (sources.size() == 1) return sources.front().written;
   return fmt::format("{} and {} more source{}", sources.front().written, sources.size() - 1,
                      sources.size() == 2 ? "" : "s");
+}
+
+Result<void> TryReading(const config::DatasetConfig& dataset) {
+  const auto read = [&](const std::string& path, const char* remedy) -> Result<void> {
+    // Other names are GDAL's to resolve.
+    if (!path.starts_with('/') || path.starts_with("/vsi") || ::access(path.c_str(), R_OK) == 0) return {};
+    return MakeError(ErrorCode::kNotFound, "dataset {}: {}: {}; give the path of a raster file on this machine{}",
+                     dataset.name, path, std::generic_category().message(errno), remedy);
+  };
+  for (const config::SourceConfig& source : dataset.sources) {
+    for (const std::string& file : source.files) {
+      if (Result<void> readable = read(file, ""); !readable) return readable;
+    }
+  }
+  if (Result<void> readable = read(dataset.imagery.image, ""); !readable) return readable;
+  return read(dataset.water.mask, ", or for a sea level a number of metres");
 }
 
 Result<std::unique_ptr<dem::DemSource>> OpenSource(const config::DatasetConfig& wanted, const std::string& cache_dir,

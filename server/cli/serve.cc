@@ -39,7 +39,7 @@ namespace {
 struct ServeArguments {
   std::vector<std::string> dems;
   std::string config_file;
-  bool print_config = false;
+  bool print_config = false, check_config = false;
   std::map<std::string, std::string> server_flags, dataset_flags;  // by option key
 };
 
@@ -247,6 +247,29 @@ Result<std::shared_ptr<server::DiskCache>> OpenDiskCache(const config::DiskCache
   return server::DiskCache::Open(options);
 }
 
+// Everything that keeps the server from starting and can be told before sources are opened; true if there is nothing.
+bool CanStart(const config::Config& config, bool is_running) {
+  std::vector<Error> errors;
+  const auto note = [&](const Result<void>& result) {
+    if (!result) errors.push_back(result.error());
+  };
+  const server::ServerOptions options = OptionsOf(config);
+  note(server::Server::TryFiles(options));
+  if (!is_running) note(server::Server::TryAddress(options));
+  for (const config::DatasetConfig& dataset : config.datasets) note(TryReading(dataset));
+  for (const Error& error : errors) std::fprintf(stderr, "terrace: %s\n", error.message.c_str());
+  return errors.empty();
+}
+
+int CheckConfig(const ServeArguments& arguments, const config::Config& config) {
+  if (!CanStart(config, /*is_running=*/true)) return kExitFailure;
+  const std::size_t count = config.datasets.size();
+  fmt::print(
+      "terrace: the configuration{}{} is fine: {} dataset{}; rasters were not opened, 'terrace info' does that\n",
+      arguments.config_file.empty() ? "" : " ", arguments.config_file, count, count == 1 ? "" : "s");
+  return kExitOk;
+}
+
 int Serve(const ServeArguments& arguments) {
   std::signal(SIGPIPE, SIG_IGN);  // whoever reads the log may go away; the server stays
   std::vector<config::ConfigError> errors;
@@ -257,6 +280,7 @@ int Serve(const ServeArguments& arguments) {
     return kExitOk;
   }
   SetUpLog(config.log_level, config.log_format);
+  if (arguments.check_config) return CheckConfig(arguments, config);
   // First, so that a directory that cannot be used is known before sources are scanned.
   Result<std::shared_ptr<server::DiskCache>> disk = OpenDiskCache(config.disk_cache);
   if (!disk) {
@@ -269,6 +293,7 @@ int Serve(const ServeArguments& arguments) {
     std::fprintf(stderr, "terrace: %s\n", policy.error().message.c_str());
     return kExitUsage;
   }
+  if (!CanStart(config, /*is_running=*/false)) return kExitFailure;  // opening may take long
   std::vector<server::Dataset> datasets;
   if (!OpenDatasets(config, datasets)) return kExitFailure;
   const std::size_t count = datasets.size();
@@ -369,6 +394,8 @@ void AddServe(CLI::App& app, int& exit_code) {
   command->add_option("--config", arguments->config_file, "Configuration in JSON (config/config.schema.json)")
       ->type_name("FILE");
   command->add_flag("--print-config", arguments->print_config, "Prints the configuration in force as JSON and ends");
+  command->add_flag("--check-config", arguments->check_config,
+                    "Says whether the server could start, without opening rasters or listening, and ends");
   AddFlags(*command, config::ServerOptions(), "Server", arguments->server_flags);
   AddFlags(*command, config::DatasetOptions(), "Datasets of the command line", arguments->dataset_flags);
   command->callback([arguments, &exit_code] { exit_code = Serve(*arguments); });

@@ -50,6 +50,11 @@ const char* Remedy(const error_code& error) {
   return "choose an address of this machine";
 }
 
+tl::unexpected<Error> ListenError(const std::string& host, std::uint16_t port, const error_code& error) {
+  return MakeError(ErrorCode::kUnavailable, "cannot listen on {}:{}: {}; {}", host, port, error.message(),
+                   Remedy(error));
+}
+
 void OpenSpare(const asio::any_io_executor& executor, std::optional<asio::posix::stream_descriptor>& spare) {
   const int descriptor = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
   if (descriptor >= 0) spare.emplace(executor, descriptor);
@@ -68,6 +73,17 @@ Response RefusalOf(int status) {
   return response;
 }
 
+Result<void> Bind(tcp::acceptor& acceptor, asio::io_context& io, const std::string& host, std::uint16_t port) {
+  const Result<tcp::endpoint> endpoint = Resolve(io, host, port);
+  if (!endpoint) return tl::unexpected(endpoint.error());
+  error_code error;
+  acceptor.open(endpoint->protocol(), error);
+  if (!error) acceptor.set_option(tcp::acceptor::reuse_address(true), error);
+  if (!error) acceptor.bind(*endpoint, error);
+  if (error) return ListenError(host, port, error);
+  return {};
+}
+
 }  // namespace
 
 Listener::Listener(IoThreads& io, std::shared_ptr<const SessionContext> context)
@@ -75,21 +91,20 @@ Listener::Listener(IoThreads& io, std::shared_ptr<const SessionContext> context)
 
 Result<std::shared_ptr<Listener>> Listener::Open(IoThreads& io, const std::string& host, std::uint16_t port,
                                                  std::shared_ptr<const SessionContext> context) {
-  const Result<tcp::endpoint> endpoint = Resolve(io.first(), host, port);
-  if (!endpoint) return tl::unexpected(endpoint.error());
   std::shared_ptr<Listener> listener(new Listener(io, std::move(context)));
   tcp::acceptor& acceptor = listener->acceptor_;
+  if (const Result<void> bound = Bind(acceptor, io.first(), host, port); !bound) return tl::unexpected(bound.error());
   error_code error;
-  acceptor.open(endpoint->protocol(), error);
-  if (!error) acceptor.set_option(tcp::acceptor::reuse_address(true), error);
-  if (!error) acceptor.bind(*endpoint, error);
-  if (!error) acceptor.listen(tcp::acceptor::max_listen_connections, error);
-  if (error) {
-    return MakeError(ErrorCode::kUnavailable, "cannot listen on {}:{}: {}; {}", host, port, error.message(),
-                     Remedy(error));
-  }
+  acceptor.listen(tcp::acceptor::max_listen_connections, error);
+  if (error) return ListenError(host, port, error);
   listener->port_ = acceptor.local_endpoint().port();
   return listener;
+}
+
+Result<void> Listener::TryAddress(const std::string& host, std::uint16_t port) {
+  asio::io_context io;
+  tcp::acceptor acceptor(io);
+  return Bind(acceptor, io, host, port);
 }
 
 void Listener::Start() { asio::co_spawn(acceptor_.get_executor(), Run(shared_from_this()), asio::detached); }

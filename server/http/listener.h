@@ -26,6 +26,9 @@ class Listener : public std::enable_shared_from_this<Listener> {
   static Result<std::shared_ptr<Listener>> Open(IoThreads& io, const std::string& host, std::uint16_t port,
                                                 std::shared_ptr<const SessionContext> context);
 
+  // Whether Open could have the address now. It is not listened on meanwhile: nobody can connect.
+  static Result<void> TryAddress(const std::string& host, std::uint16_t port);
+
   std::uint16_t port() const { return port_; }
 
   // Begins to accept. Call once.

@@ -2,6 +2,7 @@
 import json
 import pathlib
 import re
+import socket
 import subprocess
 import sys
 import tempfile
@@ -100,6 +101,27 @@ class Config(unittest.TestCase):
             self.assertEqual(printed.returncode, 0, printed.stderr)
             again = run("serve", "--config", self.write(printed.stdout), "--print-config")
             self.assertEqual((again.returncode, again.stdout), (0, printed.stdout), again.stderr)
+
+    def test_a_start_fails_before_rasters_are_opened(self):
+        dem = SOURCE_DIR / "config/samples/jacksboro.tif"
+        config = json.dumps({"access_log": "json", "access_log_file": str(self.folder / "no/access.log"),
+                             "datasets": [{"name": "a", "sources": [str(dem)]}, {"name": "b", "sources": ["b.tif"]}]})
+        with socket.create_server(("127.0.0.1", 0)) as other:
+            address = f"127.0.0.1:{other.getsockname()[1]}"
+            start = run("serve", "--config", self.write(config), "--listen", address)
+            self.assertEqual((start.returncode, start.stdout), (1, ""))
+            for part in ("no/access.log", f"cannot listen on {address}", f"dataset b: {self.folder}/b.tif: No such file"):
+                self.assertIn(part, start.stderr)
+            self.assertNotIn("jacksboro", start.stderr)
+            # The address is the running server's.
+            check = run("serve", "--config", self.write(config), "--listen", address, "--check-config")
+            self.assertEqual((check.returncode, check.stdout), (1, ""))
+            self.assertNotIn("cannot listen", check.stderr)
+            self.assertIn("dataset b", check.stderr)
+            good = run("serve", dem, "--listen", address, "--check-config")
+            self.assertEqual((good.returncode, good.stderr), (0, ""))
+            self.assertIn("the configuration is fine: 1 dataset;", good.stdout)
+        self.assertEqual(run("serve", dem, "--check-config", "--cache-bytes", "much").returncode, 2)
 
     def test_flags_override_the_file(self):
         file = self.write('{"listen": "127.0.0.1:1", "io_threads": 3, "datasets": [{"name": "a", "sources": ["a.tif"]}]}')
