@@ -175,6 +175,7 @@ class Server::Impl {
     }
     io_.Stop();
     tiles_.Shutdown();
+    if (drained) spdlog::info("stopped: every request was answered");
     return drained;
   }
 

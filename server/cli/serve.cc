@@ -94,7 +94,9 @@ config::Config MakeConfig(const ServeArguments& arguments, std::vector<config::C
   if (errors.empty()) errors = duplicates;
   if (errors.empty() && config.datasets.empty() && !arguments.print_config) {
     errors.push_back(
-        {"", "there is nothing to serve; name a DEM ('terrace serve dem.tif') or a config file (--config)"});
+        {"", arguments.config_file.empty()
+                 ? "there is nothing to serve; name a DEM ('terrace serve dem.tif') or a config file (--config)"
+                 : "there is nothing to serve; it needs an entry in \"datasets\""});
   }
   return config;
 }

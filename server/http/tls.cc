@@ -1,11 +1,13 @@
 #include "server/http/tls.h"
 
 #include <fmt/format.h>
+#include <openssl/err.h>
 #include <openssl/ssl.h>
+#include <openssl/x509err.h>
 #include <sys/stat.h>
 
 #include <boost/asio/ssl/context.hpp>
-#include <exception>
+#include <boost/system/system_error.hpp>
 
 namespace terrace::server {
 namespace {
@@ -30,6 +32,10 @@ int ChooseProtocol(SSL*, const unsigned char** out, unsigned char* out_size, con
 
 Result<std::shared_ptr<ssl::context>> Load(const std::filesystem::path& certificate, const std::filesystem::path& key) {
   const std::filesystem::path* file = &certificate;
+  const auto mismatch = [&] {
+    return MakeError(ErrorCode::kInvalidArgument, "{}: is not the key of the certificate in {}", key.string(),
+                     certificate.string());
+  };
   try {
     auto context = std::make_shared<ssl::context>(ssl::context::tls_server);
     SSL_CTX* const native = context->native_handle();
@@ -41,16 +47,16 @@ Result<std::shared_ptr<ssl::context>> Load(const std::filesystem::path& certific
     ::SSL_CTX_set_alpn_select_cb(native, ChooseProtocol, nullptr);
     context->use_certificate_chain_file(certificate.string());
     file = &key;
-    context->use_private_key_file(key.string(), ssl::context::pem);
-    if (::SSL_CTX_check_private_key(native) != 1) {
-      return MakeError(ErrorCode::kInvalidArgument, "{}: is not the key of the certificate in {}", key.string(),
-                       certificate.string());
-    }
+    context->use_private_key_file(key.string(), ssl::context::pem);  // throws where another key of its kind is due
+    if (::SSL_CTX_check_private_key(native) != 1) return mismatch();
     return context;
-  } catch (const std::exception& exception) {
+  } catch (const boost::system::system_error& error) {
+    if (ERR_GET_REASON(static_cast<unsigned long>(error.code().value())) == X509_R_KEY_VALUES_MISMATCH) {
+      return mismatch();
+    }
     return MakeError(ErrorCode::kInvalidArgument,
                      "{}: cannot be used for TLS ({}); it must be a readable PEM file, the key without a passphrase",
-                     file->string(), exception.what());
+                     file->string(), error.code().message());
   }
 }
 
