@@ -103,6 +103,7 @@ struct RasterInfo {
   std::string counts_from;                   // what heights are taken to count from; empty: not known
   std::string vertical_operation;            // the PROJ operation that makes them ellipsoidal; empty: none needed
   std::string height_unit;                   // as stated by the band; empty: metres assumed
+  bool knows_height_unit = true;             // else heights are taken as metres
   double pixel_width = 0, pixel_height = 0;  // in units of the CRS
   std::string pixel_unit;                    // "degree", "metre"
   double spacing_m = 0;                      // finer ground axis at the centre, true metres

@@ -4,6 +4,7 @@
 #include <ogr_spatialref.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <vector>
@@ -151,6 +152,14 @@ Result<void> Georeference::ReadCrs(const OGRSpatialReference& srs, const std::st
   pixel_unit_ = unit == nullptr ? "" : unit;
   if (IsWgs84Degrees(horizontal)) return {};
 
+  constexpr double kSmallestEarth = 6.3e6, kLargestEarth = 6.4e6;  // metres
+  if (const double radius = horizontal.GetSemiMajor(); radius < kSmallestEarth || radius > kLargestEarth) {
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "{}: its coordinate reference system \"{}\" is of a body with a radius of {:.0f} km; only the Earth is "
+        "served",
+        path, crs_, radius / 1000);
+  }
   const Position centre = Apply(to_crs_, {width_ / 2.0, height_ / 2.0});
   auto projector = Projector::Make(Wkt(horizontal), centre);
   if (!projector) {
@@ -160,7 +169,38 @@ Result<void> Georeference::ReadCrs(const OGRSpatialReference& srs, const std::st
         crs_, projector.error().message);
   }
   if (!(*projector)->is_identity()) projector_ = *std::move(projector);
+  if (projector_ != nullptr && full_circle_ == 0) FindTurn();
   return {};
+}
+
+// A cylindrical projection whose eastings go on beyond the antimeridian: they come back a whole turn less. Looked at
+// are the outermost pixels' centres, which a raster of the whole Earth has on this side of it.
+void Georeference::FindTurn() {
+  const double pixel_size = std::max(pixel_width(), pixel_height());
+  for (const double column : {0.5, width_ - 0.5}) {
+    const Position there = Apply(to_crs_, {column, 0.5});
+    std::array<Position, 1> back = {there};
+    projector_->Inverse(back);
+    projector_->Forward(back);
+    const double turn = back[0].x - there.x;
+    if (!(std::abs(turn) > pixel_size) || !(std::abs(back[0].y - there.y) < 1e-3 * pixel_size)) continue;
+    // The same in other rows: outside its outline, a projection that is not cylindrical has a turn for each of them.
+    std::array<Position, 6> pairs;
+    for (std::size_t k = 0; k < 3; ++k) {
+      pairs[2 * k] = Apply(to_crs_, {column, height_ * (0.3 * static_cast<double>(k) + 0.1)});
+      pairs[2 * k + 1] = {pairs[2 * k].x + turn, pairs[2 * k].y};
+    }
+    projector_->Inverse(pairs);
+    bool is_turn = true;
+    for (std::size_t k = 0; k < 6; k += 2) {
+      is_turn = is_turn && std::abs(std::remainder(pairs[k].x - pairs[k + 1].x, 360)) < 1e-6 &&
+                std::abs(pairs[k].y - pairs[k + 1].y) < 1e-6;  // false of NaN
+    }
+    if (!is_turn) continue;
+    full_circle_ = std::abs(turn);
+    centre_longitude_ = Apply(to_crs_, {width_ / 2.0, height_ / 2.0}).x;
+    return;
+  }
 }
 
 void Georeference::FindPeriod(const OGRSpatialReference& srs) {
@@ -182,7 +222,7 @@ void Georeference::ToPixels(std::span<Position> positions) const {
   if (projector_ != nullptr) projector_->Forward(positions);
   for (Position& position : positions) {
     if (full_circle_ > 0 && period_ == 0) {
-      // A rotated grid has no columns to wrap: its longitudes are those nearest to its centre.
+      // A rotated or projected grid has no columns to wrap: its longitudes are those nearest to its centre.
       position.x -= full_circle_ * std::round((position.x - centre_longitude_) / full_circle_);
     }
     position = Apply(to_pixel_, position);

@@ -72,13 +72,15 @@ class Georeference {
   Result<void> SetAffine(const std::string& path);
   Result<void> ReadCrs(const OGRSpatialReference& srs, const std::string& path);
   void FindPeriod(const OGRSpatialReference& srs);
+  void FindTurn();
   double CanonicalColumn(double column) const;
 
   int width_ = 0, height_ = 0;
   std::array<double, 6> to_crs_{};    // pixels -> CRS, GDAL's order
   std::array<double, 6> to_pixel_{};  // CRS -> pixels
-  double full_circle_ = 0;            // 360 degrees in units of a geographic CRS; else 0
-  double centre_longitude_ = 0;       // in the same units
+  // 360 degrees in units of the CRS, if it is geographic or goes on beyond the antimeridian; else 0.
+  double full_circle_ = 0;
+  double centre_longitude_ = 0;  // in the same units
   double period_ = 0;
   int wrap_columns_ = 0;
   std::shared_ptr<const Projector> projector_;  // null: the CRS is WGS 84 longitude and latitude

@@ -131,8 +131,9 @@ class Preparer {
   // The survey, or another one under the rules that it calls for.
   Result<RasterSurvey> WithoutFoundVoids(RasterSurvey survey) {
     const SampleRules& rules = shape_.layout.rules;
-    if (!MayHideVoids(rules, survey.lowest, survey.highest, survey.voids > 0, survey.zeros)) return survey;
-    auto findings = FindVoids(*dataset_.GetRasterBand(1), rules, survey.zeros, options_.stop);
+    const bool has_collar = survey.zeros.IsCollar(shape_.layout.width, shape_.layout.height);
+    if (!MayHideVoids(rules, survey.lowest, survey.highest, survey.voids > 0, has_collar)) return survey;
+    auto findings = FindVoids(*dataset_.GetRasterBand(1), rules, has_collar, options_.stop);
     if (!findings) return tl::unexpected(findings.error());
     if (!findings->any()) return survey;
     shape_.findings = *std::move(findings);

@@ -51,9 +51,8 @@ Chunk WithHalo(const Chunk& chunk, const RasterLayout& layout) {
 }
 
 void CountSamples(const Samples& samples, const Chunk& chunk, const RasterLayout& layout, ChunkSurvey& survey) {
-  survey.zeros.Add(samples.Row(chunk.row) + (chunk.col - samples.box.col), samples.box.cols, chunk.cols, chunk.rows,
-                   chunk.col == 0, chunk.row == 0, chunk.col + chunk.cols == layout.width,
-                   chunk.row + chunk.rows == layout.height);
+  survey.zeros.Add(samples.Row(chunk.row) + (chunk.col - samples.box.col), samples.box.cols, chunk, layout.width,
+                   layout.height);
   const int columns = DivideUp(chunk.cols, RangeTable::kBlock);
   for (int r = 0; r < chunk.rows; ++r) {
     const float* row = samples.Row(chunk.row + r) + (chunk.col - samples.box.col);

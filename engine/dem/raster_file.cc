@@ -97,9 +97,11 @@ Result<void> CheckSizeToMesh(const std::string& path, int width, int height) {
 }
 
 bool IsRaster(const std::string& path) {
-  for (const char* sidecar : {".ovr", ".msk", ".aux"}) {
-    if (path.ends_with(sidecar)) return false;
+  // GDAL's driver for ESRI's .hdr takes whatever lies beside one for the raster.
+  for (const char* sidecar : {"ovr", "msk", "aux", "rrd", "hdr", "prj", "qpj", "stx", "clr", "blw", "tfw", "wld"}) {
+    if (EQUAL(CPLGetExtension(path.c_str()), sidecar)) return false;
   }
+  if (path.ends_with(".aux.xml")) return false;
   InitGdal();
   if (!CheckPlainFile(path)) return true;  // opening it says why not
   return GDALIdentifyDriverEx(path.c_str(), GDAL_OF_RASTER, nullptr, nullptr) != nullptr;

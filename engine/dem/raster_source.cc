@@ -33,6 +33,7 @@ RasterInfo Describe(GDALDataset& dataset, const std::string& path, const Georefe
   info.crs = georeference.crs();
   info.vertical_datum = georeference.vertical_datum();
   info.height_unit = layout.rules.unit;
+  info.knows_height_unit = MetresPerUnit(layout.rules.unit).has_value();
   info.pixel_width = georeference.pixel_width();
   info.pixel_height = georeference.pixel_height();
   info.pixel_unit = georeference.pixel_unit();
@@ -47,7 +48,7 @@ void LogWhatMatters(GDALDataset& dataset, const RasterInfo& info, const Georefer
   if (dataset.GetRasterCount() > 1) {
     spdlog::info("{}: has {} bands, heights are read from band 1", info.path, dataset.GetRasterCount());
   }
-  if (!MetresPerUnit(layout.rules.unit)) {
+  if (!info.knows_height_unit) {
     spdlog::warn("{}: height unit \"{}\" is not known, heights are taken as metres", info.path, layout.rules.unit);
   }
   if (!info.transform.empty()) {

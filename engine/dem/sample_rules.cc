@@ -47,7 +47,7 @@ std::optional<double> MetresPerUnit(const std::string& unit) {
       name += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   }
   constexpr double kFoot = 0.3048, kSurveyFoot = 1200.0 / 3937.0;
-  constexpr std::array<std::pair<std::string_view, double>, 20> kUnits = {{
+  constexpr std::array<std::pair<std::string_view, double>, 31> kUnits = {{
       {"", 1},
       {"m", 1},
       {"metre", 1},
@@ -68,6 +68,17 @@ std::optional<double> MetresPerUnit(const std::string& unit) {
       {"ftus", kSurveyFoot},
       {"usft", kSurveyFoot},
       {"ussurveyfeet", kSurveyFoot},
+      {"footus", kSurveyFoot},
+      {"surveyfoot", kSurveyFoot},
+      {"yard", 3 * kFoot},
+      {"fathom", 6 * kFoot},
+      {"dm", .1},
+      {"decimeter", .1},
+      {"centimeter", .01},
+      {"millimetre", .001},
+      {"millimeter", .001},
+      {"kilometre", 1000},
+      {"kilometer", 1000},
   }};
   for (const auto& [known, metres] : kUnits) {
     if (known == name) return metres;

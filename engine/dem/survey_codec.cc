@@ -42,12 +42,18 @@ void Put(ByteWriter& writer, const BlockSum& sum) {
 }
 void Put(ByteWriter& writer, const ZeroEdges& zeros) {
   for (const std::int64_t count : {zeros.high, zeros.low, zeros.zeros, zeros.at_border}) writer.Put(count);
+  for (const std::int32_t side : {zeros.west, zeros.east, zeros.north, zeros.south}) writer.Put(side);
+  writer.Put(zeros.lowest);
+  writer.Put(zeros.highest);
 }
 ZeroEdges GetZeros(ByteReader& reader) {
   ZeroEdges zeros;
   for (std::int64_t* count : {&zeros.high, &zeros.low, &zeros.zeros, &zeros.at_border}) {
     *count = reader.Get<std::int64_t>();
   }
+  for (std::int32_t* side : {&zeros.west, &zeros.east, &zeros.north, &zeros.south}) *side = reader.Get<std::int32_t>();
+  zeros.lowest = reader.Get<float>();
+  zeros.highest = reader.Get<float>();
   return zeros;
 }
 

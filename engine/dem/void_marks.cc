@@ -6,10 +6,12 @@
 #include <array>
 #include <cmath>
 
+#include "engine/dem/raster_chunk.h"
+
 namespace terrace::dem {
 namespace {
 
-constexpr std::array<double, 5> kMarks = {-32768, -32767, -9999, 9999, 32767};
+constexpr std::array<double, 6> kMarks = {-32768, -32767, -9999, 9999, 32767, 65535};
 constexpr double kAloneWithin = 1'000;  // metres
 // The shore of the Dead Sea is at -433 m, the summit of Mount Everest at 8,849 m, the deepest sea floor at -10,935 m.
 constexpr double kLowestLand = -500, kHighest = 9'000, kDeepest = -12'000;
@@ -25,6 +27,8 @@ struct Evidence {
   std::int64_t below_land = 0, below_land_alone = 0;
   std::int64_t below_sea = 0, below_sea_alone = 0;
   std::int64_t above = 0, above_alone = 0;
+  // Of all others: what a mixture is mixed of.
+  std::int64_t land = 0, sea = 0;
 };
 
 class Looker {
@@ -71,6 +75,8 @@ class Looker {
 
   void CountBeyond(int c, int r, Evidence& evidence) const {
     const float height = At(c, r);
+    if (height >= kLowestLand && height <= kHighest) ++evidence.land;
+    if (height >= kDeepest && height < kLowestLand) ++evidence.sea;
     const auto count = [&](bool beyond, std::int64_t& all, std::int64_t& alone) {
       if (!beyond) return;
       ++all;
@@ -101,8 +107,10 @@ class Looker {
 
 }  // namespace
 
-void ZeroEdges::Add(const float* heights, std::ptrdiff_t stride, int cols, int rows, bool left, bool top, bool right,
-                    bool bottom) {
+void ZeroEdges::Add(const float* heights, std::ptrdiff_t stride, const Chunk& part, int raster_width,
+                    int raster_height) {
+  const int cols = part.cols, rows = part.rows;
+  const bool left = part.col == 0, right = part.col + cols == raster_width;
   const auto pair = [this](float a, float b) {
     if ((a == 0) == (b == 0)) return;
     const float other = std::abs(a + b);
@@ -120,7 +128,17 @@ void ZeroEdges::Add(const float* heights, std::ptrdiff_t stride, int cols, int r
     }
     zeros += std::count(row, row + cols, 0.0f);
     at_border += (left && row[0] == 0) + (right && row[cols - 1] == 0);
-    if ((top && r == 0) || (bottom && r + 1 == rows)) at_border += std::count(row, row + cols, 0.0f);
+    const int raster_row = part.row + r;
+    if (raster_row == 0 || raster_row + 1 == raster_height) at_border += std::count(row, row + cols, 0.0f);
+    for (int c = 0; c < cols; ++c) {
+      if (row[c] == 0 || std::isnan(row[c])) continue;
+      west = std::min(west, part.col + c);
+      east = std::max(east, part.col + c);
+      north = std::min(north, raster_row);
+      south = std::max(south, raster_row);
+      lowest = std::min(lowest, row[c]);
+      highest = std::max(highest, row[c]);
+    }
   }
 }
 
@@ -129,10 +147,21 @@ void ZeroEdges::Add(const ZeroEdges& other) {
   low += other.low;
   zeros += other.zeros;
   at_border += other.at_border;
+  west = std::min(west, other.west);
+  east = std::max(east, other.east);
+  north = std::min(north, other.north);
+  south = std::max(south, other.south);
+  lowest = std::min(lowest, other.lowest);
+  highest = std::max(highest, other.highest);
 }
 
-bool ZeroEdges::IsCollar() const {
+bool ZeroEdges::IsCollar(int raster_width, int raster_height) const {
   constexpr std::int64_t kFewest = 16, kExceptions = 50;  // one in 50
+  constexpr int kNearly = 16;                             // a sixteenth of a side
+  const int margin_x = raster_width / kNearly, margin_y = raster_height / kNearly;
+  const bool reaches_all_sides = west <= margin_x && east >= raster_width - 1 - margin_x && north <= margin_y &&
+                                 south >= raster_height - 1 - margin_y;
+  if (!reaches_all_sides || !(lowest < highest)) return false;
   const bool is_strewn = high * 4 > zeros && at_border * 4 < zeros;
   return at_border >= kFewest && high >= kFewest && low * kExceptions <= high && !is_strewn;
 }
@@ -144,15 +173,15 @@ void VoidFindings::AddTo(SampleRules& rules) const {
   rules.rim = std::max(rules.rim, rim);
 }
 
-bool MayHideVoids(const SampleRules& rules, double lowest, double highest, bool has_voids, const ZeroEdges& zeros) {
+bool MayHideVoids(const SampleRules& rules, double lowest, double highest, bool has_voids, bool has_collar) {
   const auto is_mark = [&](double height) {
     return std::ranges::any_of(kMarks, [&](double mark) { return static_cast<float>(rules.Metres(mark)) == height; });
   };
-  return zeros.IsCollar() || is_mark(lowest) || is_mark(highest) || lowest < kDeepest || highest > kHighest ||
+  return has_collar || is_mark(lowest) || is_mark(highest) || lowest < kDeepest || highest > kHighest ||
          (has_voids && lowest < kLowestLand);
 }
 
-Result<VoidFindings> FindVoids(GDALRasterBand& band, const SampleRules& rules, const ZeroEdges& zeros,
+Result<VoidFindings> FindVoids(GDALRasterBand& band, const SampleRules& rules, bool has_collar,
                                const std::stop_token& stop) {
   VoidFindings findings;
   const auto say = [&findings](const std::string& what) {
@@ -167,7 +196,7 @@ Result<VoidFindings> FindVoids(GDALRasterBand& band, const SampleRules& rules, c
     findings.marks.push_back(kMarks[i]);
     say(fmt::format("{} samples of {:g}", evidence.at_mark[i], kMarks[i]));
   }
-  if (zeros.IsCollar()) {
+  if (has_collar) {
     findings.marks.push_back((0 / rules.metres_per_unit - rules.offset) / rules.scale);
     findings.rim = kCollarRim;
     say("a collar of zeros");
@@ -178,19 +207,17 @@ Result<VoidFindings> FindVoids(GDALRasterBand& band, const SampleRules& rules, c
   findings.AddTo(found);
   found.rim = 0;
   Looker beyond(band, found, stop);
-  read = beyond.ForEachChunk([&](int c, int r) {
-    const float height = beyond.At(c, r);
-    if (height < kLowestLand || height > kHighest) beyond.CountBeyond(c, r, evidence);
-  });
+  read = beyond.ForEachChunk([&](int c, int r) { beyond.CountBeyond(c, r, evidence); });
   if (!read) return tl::unexpected(read.error());
-  if (evidence.below_land > 0 && evidence.below_land_alone == 0) {
+  if (evidence.below_land > 0 && evidence.below_land_alone == 0 && evidence.below_land <= evidence.land) {
     findings.lowest = kLowestLand;
     say(fmt::format("{} samples below {:g} m at their edges", evidence.below_land, kLowestLand));
-  } else if (evidence.below_sea > 0 && evidence.below_sea_alone == 0) {
+  } else if (evidence.below_sea > 0 && evidence.below_sea_alone == 0 &&
+             evidence.below_sea <= evidence.land + evidence.sea) {
     findings.lowest = kDeepest;
     say(fmt::format("{} samples below {:g} m at their edges", evidence.below_sea, kDeepest));
   }
-  if (evidence.above > 0 && evidence.above_alone == 0) {
+  if (evidence.above > 0 && evidence.above_alone == 0 && evidence.above <= evidence.land + evidence.sea) {
     findings.highest = kHighest;
     say(fmt::format("{} samples above {:g} m at their edges", evidence.above, kHighest));
   }

@@ -45,6 +45,12 @@ std::vector<std::string> AdviceFor(const dem::RasterInfo& info, double floor) {
         "no vertical datum stated: heights are taken as metres above the WGS 84 ellipsoid as they are; heights above "
         "mean sea level will be off by the geoid, up to 100 m: say so with --vertical egm96, or another");
   }
+  if (!info.knows_height_unit) {
+    advice.push_back(
+        fmt::format("height unit \"{}\" is not known, heights are taken as metres: state metres a unit with "
+                    "`gdal_translate -a_scale FACTOR in out`",
+                    info.height_unit));
+  }
   if (!info.found_voids.empty()) {
     advice.push_back(
         fmt::format("undeclared voids: {}; mend the file, or state `nodata` in the configuration", info.found_voids));

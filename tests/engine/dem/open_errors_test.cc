@@ -3,6 +3,7 @@
 
 #include <fstream>
 
+#include "engine/dem/raster_file.h"
 #include "tests/engine/dem/dem_fixture.h"
 
 namespace terrace::dem {
@@ -41,6 +42,22 @@ TEST(OpenErrors, OfferGeoreferencing) {
   ExpectRefused(WriteRaster(dir, {.geo_transform = {7, .1, 0, 47, 0, -.1}, .crs = ""}),
                 {"no coordinate reference system", "gdal_translate -a_srs EPSG:XXXX in out"});
   ExpectRefused(WriteRaster(dir, {.crs = "LOCAL_CS[\"site grid\",UNIT[\"metre\",1]]"}), {"not tied to the Earth"});
+}
+
+TEST(OpenErrors, AreNotAboutSidecarsOfAFolder) {
+  const TempDir dir;
+  std::ofstream(dir.File("dem.bil"), std::ios::binary) << std::string(16 * 16 * 2, 'a');
+  std::ofstream(dir.File("dem.hdr")) << "NROWS 16\nNCOLS 16\nNBITS 16\nULXMAP 8\nULYMAP 47\nXDIM 0.1\nYDIM 0.1\n";
+  std::ofstream(dir.File("dem.prj")) << "Projection GEOGRAPHIC\nDatum WGS84\nUnits DD\n" << std::string(1000, ' ');
+  EXPECT_TRUE(IsRaster(dir.File("dem.bil")));
+  EXPECT_FALSE(IsRaster(dir.File("dem.hdr")));
+  EXPECT_FALSE(IsRaster(dir.File("dem.prj")));
+}
+
+TEST(OpenErrors, NameAnotherBody) {
+  const TempDir dir;
+  ExpectRefused(WriteRaster(dir, {.crs = "+proj=longlat +R=3396190 +no_defs"}),
+                {"radius of 3396 km", "only the Earth"});
 }
 
 TEST(OpenErrors, NameUnusableSamples) {

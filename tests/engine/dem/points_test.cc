@@ -3,6 +3,7 @@
 #include <cmath>
 #include <numeric>
 #include <random>
+#include <string>
 
 #include "tests/engine/dem/dem_fixture.h"
 
@@ -82,6 +83,39 @@ TEST(Points, GoRoundTheEarth) {
   EXPECT_NEAR((*heights)[2], 179.5, .001);
   EXPECT_EQ((*heights)[3], (*heights)[2]);
   EXPECT_NEAR((*heights)[4], 179.75, .3);
+}
+
+// Eastings that go on beyond the antimeridian, or from the prime meridian all around.
+TEST(Points, OfACylindricalProjectionLieOnBothSidesOfTheAntimeridian) {
+  constexpr double kHalfTurn = 20'037'508.342789244;  // of EPSG:3857, metres
+  const TempDir dir;
+  const auto column_of = [](double longitude) { return longitude / 180 * kHalfTurn; };
+  struct Case {
+    const char* crs;
+    double west, east;  // degrees
+  };
+  for (const Case& c : {Case{"EPSG:3857", 178, 182},
+                        {"EPSG:3857", -182, -178},
+                        {"EPSG:3857", 0, 360},
+                        {"EPSG:4087", 0, 360},
+                        {"EPSG:3857", -180, 180}}) {
+    SCOPED_TRACE(std::string(c.crs) + " from " + std::to_string(c.west));
+    const double pixel = (column_of(c.east) - column_of(c.west)) / 200;
+    RasterSpec spec{.width = 200,
+                    .height = 100,
+                    .geo_transform = {column_of(c.west), pixel, 0, 50 * pixel, 0, -pixel},
+                    .crs = c.crs};
+    spec.value = [](int col, int) { return 10.0 * col; };
+    const auto source = OpenOrFail(WriteRaster(dir, spec));
+    ASSERT_NE(source, nullptr);
+    for (const int col : {0, 20, 99, 150, 199}) {
+      const double longitude = c.west + (c.east - c.west) * (col + 0.5) / 200;
+      const std::vector<GeoPosition> points = {{std::remainder(longitude, 360), 0}};
+      const auto heights = source->ReadPoints(points);
+      ASSERT_TRUE(heights);
+      EXPECT_NEAR((*heights)[0], 10.0 * col, .01) << col;
+    }
+  }
 }
 
 TEST(Points, StopWhenAsked) {

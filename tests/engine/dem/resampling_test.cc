@@ -124,6 +124,8 @@ TEST(Resampling, UndeclaredVoidsAndUnitsAreUnderstood) {
                                    {"Float64", "ft", std::nan(""), std::nan(""), 100, 30.48},
                                    {"Float32", "", -3.4028234663852886e38, -3.4028234663852886e38, 10, 10},
                                    {"Int32", "US survey foot", -99999, -99999, 3937, 1200},
+                                   {"Int32", "Foot_US", -99999, -99999, 3937, 1200},
+                                   {"Int32", "fathom", -99999, -99999, 1000, 1828.8},
                                    {"Byte", "m", 255, 255, 7, 7}};
   int index = 0;
   for (const Case& c : cases) {

@@ -5,6 +5,8 @@
 #include <gdal_priv.h>
 
 #include <cmath>
+#include <functional>
+#include <vector>
 
 #include "tests/engine/dem/dem_fixture.h"
 
@@ -35,7 +37,7 @@ void ExpectHeightsWithin(const DemSource& source, double lowest, double highest)
 }
 
 TEST(VoidMarks, UndeclaredSpikesAreVoids) {
-  for (const double mark : {-32768.0, -32767.0, -9999.0, 32767.0, 9999.0}) {
+  for (const double mark : {-32768.0, -32767.0, -9999.0, 32767.0, 9999.0, 65535.0}) {
     const TempDir dir;
     const auto source = OpenOrFail(WriteRaster(
         dir, Drawn([mark](int col, int row) { return col == 100 && row % 60 == 30 ? mark : Land(col, row); })));
@@ -159,6 +161,36 @@ TEST(VoidMarks, ASeaIsNoCollar) {
   ASSERT_NE(source, nullptr);
   EXPECT_EQ(InfoOf(*source).found_voids, "");
   EXPECT_EQ(InfoOf(*source).void_samples, 0u);
+}
+
+TEST(VoidMarks, FlatGroundAtZeroBelowACliffStays) {
+  const std::vector<std::function<double(int, int)>> grounds = {
+      [](int col, int) { return col < 100 ? 0.0 : 9000.0; },                                           // one step
+      [](int col, int row) { return col > 80 && col < 120 && row > 90 && row < 99 ? 500.0 : 0.0; },    // a block
+      [](int col, int row) { return col % 25 == 12 && row % 25 == 12 ? 500.0 : 0.0; },                 // spikes
+      [](int col, int row) { return (col / 20 + row / 20) % 2 == 0 ? 1000.0 : 0.0; },                  // a checkerboard
+      [](int col, int row) { return col < 60 ? 0.0 : Land(col, row); },                                // an escarpment
+      [](int col, int row) { return std::hypot(col - 100, row - 100) < 70 ? Land(col, row) : 0.0; }};  // an island
+  for (std::size_t i = 0; i < grounds.size(); ++i) {
+    SCOPED_TRACE(i);
+    const TempDir dir;
+    const auto source = OpenOrFail(WriteRaster(dir, Drawn(grounds[i])));
+    ASSERT_NE(source, nullptr);
+    EXPECT_EQ(InfoOf(*source).found_voids, "");
+    EXPECT_EQ(InfoOf(*source).void_samples, 0u);
+    EXPECT_EQ(InfoOf(*source).heights.min, 0);
+  }
+}
+
+TEST(VoidMarks, NarrowBathymetryStays) {
+  // Tracks of a ship: every depth lies beside a void.
+  const TempDir dir;
+  const auto source =
+      OpenOrFail(WriteRaster(dir, Drawn([](int col, int row) { return row % 40 < 5 ? -4000.0 + col : -1.0; })));
+  ASSERT_NE(source, nullptr);
+  EXPECT_EQ(InfoOf(*source).found_voids, "");
+  EXPECT_EQ(InfoOf(*source).valid_samples, 5u * 5u * 200u);
+  EXPECT_EQ(InfoOf(*source).heights.min, -4000);
 }
 
 TEST(VoidMarks, AnUndeclaredVoidOfARealRasterIsServedLikeADeclaredOne) {
