@@ -38,6 +38,23 @@ std::optional<double> NodataOf(GDALRasterBand& band) {
   return std::nullopt;
 }
 
+// The band that says which samples are valid: GDAL's mask, or alpha of a type that it does not take for one. Null: all
+// are.
+GDALRasterBand* MaskOf(GDALRasterBand& band) {
+  if ((band.GetMaskFlags() & GMF_PER_DATASET) != 0) return band.GetMaskBand();
+  GDALDataset* const dataset = band.GetDataset();
+  for (int i = 1; dataset != nullptr && i <= dataset->GetRasterCount(); ++i) {
+    GDALRasterBand* const other = dataset->GetRasterBand(i);
+    if (other != &band && other->GetColorInterpretation() == GCI_AlphaBand) return other;
+  }
+  return nullptr;
+}
+
+bool IsSignedByte(GDALRasterBand& band) {
+  const char* const type = band.GetMetadataItem("PIXELTYPE", "IMAGE_STRUCTURE");
+  return band.GetRasterDataType() == GDT_Byte && type != nullptr && EQUAL(type, "SIGNEDBYTE");
+}
+
 }  // namespace
 
 std::optional<double> MetresPerUnit(const std::string& unit) {
@@ -90,7 +107,8 @@ SampleRules SampleRules::Of(GDALRasterBand& band, const std::string& crs_unit) {
   SampleRules rules;
   rules.nodata = NodataOf(band);
   rules.compare_as_float = band.GetRasterDataType() == GDT_Float32;
-  rules.has_mask = (band.GetMaskFlags() & GMF_PER_DATASET) != 0;
+  rules.has_mask = MaskOf(band) != nullptr;
+  rules.is_signed_byte = IsSignedByte(band);
   rules.scale = band.GetScale();
   rules.offset = band.GetOffset();
   rules.unit = band.GetUnitType();
@@ -130,14 +148,19 @@ Result<void> ReadSamples(GDALRasterBand& band, const SampleRules& rules, int col
     CPLErr status =
         band.RasterIO(GF_Read, col, row + done, cols, count, raw.data(), cols, count, GDT_Float64, 0, 0, nullptr);
     if (status == CE_None && rules.has_mask) {
-      status = band.GetMaskBand()->RasterIO(GF_Read, col, row + done, cols, count, mask.data(), cols, count, GDT_Byte,
-                                            0, 0, nullptr);
+      GDALRasterBand* const valid = MaskOf(band);
+      status = valid == nullptr ? CE_Failure
+                                : valid->RasterIO(GF_Read, col, row + done, cols, count, mask.data(), cols, count,
+                                                  GDT_Byte, 0, 0, nullptr);
     }
     if (status != CE_None) {
       return MakeError(ErrorCode::kUnavailable, "rows {}..{} cannot be read ({})", row + done, row + done + count - 1,
                        TakeGdalError());
     }
     const std::size_t samples = static_cast<std::size_t>(cols) * static_cast<std::size_t>(count);
+    if (rules.is_signed_byte) {
+      for (std::size_t i = 0; i < samples; ++i) raw[i] -= raw[i] > 127 ? 256 : 0;
+    }
     if (IsPlain(rules)) {
       ToPlainHeights(rules, raw, samples, out);
     } else {

@@ -26,6 +26,7 @@ struct SampleRules {
   // full resolution.
   int rim = 0;
   bool has_mask = false;         // a mask band says which samples are valid
+  bool is_signed_byte = false;   // bytes above 127 are negative: GDAL before 3.7 leaves that to its users
   bool is_indicator = false;     // samples become 1 where they are there and not zero, else 0
   double scale = 1, offset = 0;  // raw * scale + offset is in the band's unit
   double metres_per_unit = 1;

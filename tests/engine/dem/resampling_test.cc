@@ -1,5 +1,10 @@
 // Sampling on drawn rasters, where the right answer is known.
+#include <gdal_priv.h>
+#include <ogr_spatialref.h>
+
+#include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "tests/engine/dem/dem_fixture.h"
 
@@ -109,6 +114,46 @@ TEST(Resampling, SmallVoidsAreBridgedAndLargeOnesFallToTheFloor) {
   };
   EXPECT_NEAR(at(11, 19), 100 * 11 - 30 * 19, .5);
   EXPECT_EQ(at(12.8, 17.2), -9);
+}
+
+// As gdalwarp -dstalpha and -co PIXELTYPE=SIGNEDBYTE leave them.
+TEST(Resampling, AlphaOfAnyTypeAndSignedBytesAreUnderstood) {
+  GDALAllRegister();
+  const auto write = [](const std::string& path, GDALDataType type, int bands, const char* pixel_type) {
+    const char* const options[] = {"ALPHA=YES", pixel_type, nullptr};
+    GDALDatasetUniquePtr dataset(GetGDALDriverManager()->GetDriverByName("GTiff")->Create(
+        path.c_str(), 16, 16, bands, type, const_cast<char**>(bands > 1 ? options : options + 1)));
+    double transform[] = {8, 1, 0, 47, 0, -1};
+    dataset->SetGeoTransform(transform);
+    OGRSpatialReference srs;
+    srs.SetWellKnownGeogCS("WGS84");
+    dataset->SetSpatialRef(&srs);
+    for (int band = 1; band <= bands; ++band) {
+      for (int row = 0; row < 16; ++row) {
+        std::vector<double> line(16, band == 1 ? (pixel_type ? 231 : 25) : 255);
+        std::fill_n(line.begin(), bands > 1 ? 4 : 0, 0);
+        ASSERT_EQ(dataset->GetRasterBand(band)->RasterIO(GF_Write, 0, row, 16, 1, line.data(), 16, 1, GDT_Float64, 0, 0,
+                                                         nullptr),
+                  CE_None);
+      }
+    }
+    if (bands > 1) dataset->GetRasterBand(bands)->SetColorInterpretation(GCI_AlphaBand);
+  };
+  const TempDir dir;
+  int index = 0;
+  for (const GDALDataType type : {GDT_Byte, GDT_Int16, GDT_Float32}) {
+    SCOPED_TRACE(index);
+    const std::string path = dir.File(std::to_string(index++) + ".tif");
+    write(path, type, 2, nullptr);
+    const auto source = OpenOrFail(path);
+    ASSERT_NE(source, nullptr);
+    EXPECT_EQ(source->info().sources[0].void_samples, 64u);
+    EXPECT_EQ(source->info().heights.min, 25);
+  }
+  write(dir.File("signed.tif"), GDT_Byte, 1, "PIXELTYPE=SIGNEDBYTE");
+  const auto source = OpenOrFail(dir.File("signed.tif"));
+  ASSERT_NE(source, nullptr);
+  EXPECT_EQ(source->info().heights.min, -25);
 }
 
 TEST(Resampling, UndeclaredVoidsAndUnitsAreUnderstood) {
