@@ -130,12 +130,17 @@ void ZeroEdges::Add(const float* heights, std::ptrdiff_t stride, const Chunk& pa
     at_border += (left && row[0] == 0) + (right && row[cols - 1] == 0);
     const int raster_row = part.row + r;
     if (raster_row == 0 || raster_row + 1 == raster_height) at_border += std::count(row, row + cols, 0.0f);
-    for (int c = 0; c < cols; ++c) {
-      if (row[c] == 0 || std::isnan(row[c])) continue;
-      west = std::min(west, part.col + c);
-      east = std::max(east, part.col + c);
-      north = std::min(north, raster_row);
-      south = std::max(south, raster_row);
+    const auto is_ground = [](float height) { return height != 0 && !std::isnan(height); };
+    const auto first = std::find_if(row, row + cols, is_ground) - row;
+    if (first == cols) continue;
+    auto last = std::ptrdiff_t{cols} - 1;
+    while (!is_ground(row[last])) --last;
+    west = std::min(west, part.col + static_cast<std::int32_t>(first));
+    east = std::max(east, part.col + static_cast<std::int32_t>(last));
+    north = std::min(north, raster_row);
+    south = std::max(south, raster_row);
+    for (auto c = first; c <= last && !(lowest < highest); ++c) {
+      if (!is_ground(row[c])) continue;
       lowest = std::min(lowest, row[c]);
       highest = std::max(highest, row[c]);
     }

@@ -22,7 +22,8 @@ struct Chunk;  // raster_chunk.h
 struct ZeroEdges {
   std::int64_t high = 0, low = 0;         // pairs of neighbours, one zero and one farther from it than 100 m, or nearer
   std::int64_t zeros = 0, at_border = 0;  // all, and those in the outermost rows and columns
-  // The samples that are no zeros: the first and last columns and rows they lie in, and their range.
+  // The ground, samples that are no zeros: the first and last columns and rows it lies in, and two of its heights that
+  // differ, if there are.
   std::int32_t west = std::numeric_limits<std::int32_t>::max(), east = -1, north = west, south = -1;
   float lowest = std::numeric_limits<float>::infinity(), highest = -lowest;
 
@@ -54,8 +55,7 @@ bool MayHideVoids(const SampleRules& rules, double lowest, double highest, bool 
 // Reads the whole band once more.
 //
 // - A mark is one of the values in use (-32768, -32767, -9999, 9999, 32767, 65535) that stands alone: samples within
-// 1,000 m
-//   of it are at most a quarter as many as it has itself.
+//   1,000 m of it are at most a quarter as many as it has itself.
 // - Heights below -500 m or above 9,000 m are mixtures if each of them lies within 3 samples of a void: no land is
 //   lower or higher, and heights between the bounds are as many at least. In a sea floor they lie elsewhere too; there
 //   the bound is -12,000 m. Then all voids grow by 2 samples.
