@@ -70,7 +70,7 @@ TEST_F(HeightsTest, CertifiesByTheTilesOfThePoints) {
     if (certified_fails_) return MakeError(ErrorCode::kUnavailable, "the disk is gone");
     EncodedTile tile;
     tile.bytes = "tile";
-    if (request.key.x > 0) tile.certified_error_m = 10.0 * request.key.level + request.key.x;
+    if (request.key.x > 0) tile.certified_error_m = 10.0 * request.key.level + static_cast<double>(request.key.x);
     return tile;
   };
   StartHeights();
