@@ -142,6 +142,8 @@ Result<void> Georeference::ReadCrs(const OGRSpatialReference& srs, const std::st
                      "`gdal_translate -a_srs EPSG:XXXX in out`",
                      path, crs_);
   }
+  const Position centre = Apply(to_crs_, {width_ / 2.0, height_ / 2.0});
+  centre_x_ = centre.x;
   const char* unit = nullptr;
   if (horizontal.IsGeographic() != 0) {
     horizontal.GetAngularUnits(&unit);
@@ -160,7 +162,6 @@ Result<void> Georeference::ReadCrs(const OGRSpatialReference& srs, const std::st
         "served",
         path, crs_, radius / 1000);
   }
-  const Position centre = Apply(to_crs_, {width_ / 2.0, height_ / 2.0});
   auto projector = Projector::Make(Wkt(horizontal), centre);
   if (!projector) {
     return MakeError(
@@ -198,14 +199,12 @@ void Georeference::FindTurn() {
     }
     if (!is_turn) continue;
     full_circle_ = std::abs(turn);
-    centre_longitude_ = Apply(to_crs_, {width_ / 2.0, height_ / 2.0}).x;
     return;
   }
 }
 
 void Georeference::FindPeriod(const OGRSpatialReference& srs) {
   full_circle_ = 2 * std::numbers::pi / srs.GetAngularUnits(static_cast<const char**>(nullptr));
-  centre_longitude_ = Apply(to_crs_, {width_ / 2.0, height_ / 2.0}).x;
   if (to_crs_[2] != 0 || to_crs_[4] != 0) return;
   period_ = std::abs(full_circle_ / to_crs_[1]);
   const double whole = std::round(period_);
@@ -223,7 +222,7 @@ void Georeference::ToPixels(std::span<Position> positions) const {
   for (Position& position : positions) {
     if (full_circle_ > 0 && period_ == 0) {
       // A rotated or projected grid has no columns to wrap: its longitudes are those nearest to its centre.
-      position.x -= full_circle_ * std::round((position.x - centre_longitude_) / full_circle_);
+      position.x -= full_circle_ * std::round((position.x - centre_x_) / full_circle_);
     }
     position = Apply(to_pixel_, position);
     if (period_ > 0) position.x = CanonicalColumn(position.x);

@@ -80,7 +80,7 @@ class Georeference {
   std::array<double, 6> to_pixel_{};  // CRS -> pixels
   // 360 degrees in units of the CRS, if it is geographic or goes on beyond the antimeridian; else 0.
   double full_circle_ = 0;
-  double centre_longitude_ = 0;  // in the same units
+  double centre_x_ = 0;  // of the raster, in the same units
   double period_ = 0;
   int wrap_columns_ = 0;
   std::shared_ptr<const Projector> projector_;  // null: the CRS is WGS 84 longitude and latitude

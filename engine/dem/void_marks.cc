@@ -130,20 +130,24 @@ void ZeroEdges::Add(const float* heights, std::ptrdiff_t stride, const Chunk& pa
     at_border += (left && row[0] == 0) + (right && row[cols - 1] == 0);
     const int raster_row = part.row + r;
     if (raster_row == 0 || raster_row + 1 == raster_height) at_border += std::count(row, row + cols, 0.0f);
-    const auto is_ground = [](float height) { return height != 0 && !std::isnan(height); };
-    const auto first = std::find_if(row, row + cols, is_ground) - row;
-    if (first == cols) continue;
-    auto last = std::ptrdiff_t{cols} - 1;
-    while (!is_ground(row[last])) --last;
-    west = std::min(west, part.col + static_cast<std::int32_t>(first));
-    east = std::max(east, part.col + static_cast<std::int32_t>(last));
-    north = std::min(north, raster_row);
-    south = std::max(south, raster_row);
-    for (auto c = first; c <= last && !(lowest < highest); ++c) {
-      if (!is_ground(row[c])) continue;
-      lowest = std::min(lowest, row[c]);
-      highest = std::max(highest, row[c]);
-    }
+    AddGround(row, cols, part.col, raster_row);
+  }
+}
+
+void ZeroEdges::AddGround(const float* heights, int cols, int raster_col, int raster_row) {
+  const auto is_ground = [](float height) { return height != 0 && !std::isnan(height); };
+  const auto first = static_cast<std::int32_t>(std::find_if(heights, heights + cols, is_ground) - heights);
+  if (first == cols) return;
+  std::int32_t last = cols - 1;
+  while (!is_ground(heights[last])) --last;
+  west = std::min(west, raster_col + first);
+  east = std::max(east, raster_col + last);
+  north = std::min(north, raster_row);
+  south = std::max(south, raster_row);
+  for (std::int32_t c = first; c <= last && !(lowest < highest); ++c) {
+    if (!is_ground(heights[c])) continue;
+    lowest = std::min(lowest, heights[c]);
+    highest = std::max(highest, heights[c]);
   }
 }
 

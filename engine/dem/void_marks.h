@@ -36,6 +36,10 @@ struct ZeroEdges {
   // surround is no single height, and reaches to all four sides of the raster or nearly: a raster is no larger than its
   // data. A block or an island with cliffs on flat ground at 0 m does not.
   bool IsCollar(int raster_width, int raster_height) const;
+
+ private:
+  // Of one row, which begins at that column.
+  void AddGround(const float* heights, int cols, int raster_col, int raster_row);
 };
 
 struct VoidFindings {
