@@ -14,9 +14,10 @@ HWY_BEFORE_NAMESPACE();
 namespace terrace::tin {
 namespace HWY_NAMESPACE {
 
-// Voids count as multiples: of NaN alone it is not true that it equals itself. Numbers from 2^30 steps on are none:
-// their conversion to integers may be undefined.
-bool AreMultiples(const float* heights, std::size_t count, float quantum) {
+// Copies heights as long as they are multiples of the quantum; returns how many are copied. Voids count as multiples:
+// of NaN alone it is not true that it equals itself. Numbers from 2^30 steps on are none: their conversion to integers
+// may be undefined.
+std::size_t CopyMultiples(const float* from, std::size_t count, float quantum, float* to) {
   namespace hn = hwy::HWY_NAMESPACE;
   const hn::CappedTag<float, 16> floats;
   const hn::RebindToSigned<decltype(floats)> ints;
@@ -30,12 +31,15 @@ bool AreMultiples(const float* heights, std::size_t count, float quantum) {
   };
   std::size_t i = 0;
   for (; i + lanes <= count; i += lanes) {
-    if (!hn::AllTrue(floats, is_multiple(hn::LoadU(floats, heights + i)))) return false;
+    const auto heights = hn::LoadU(floats, from + i);
+    if (!hn::AllTrue(floats, is_multiple(heights))) return i;
+    hn::StoreU(heights, floats, to + i);
   }
   for (; i < count; ++i) {
-    if (!hn::AllTrue(floats, is_multiple(hn::Set(floats, heights[i])))) return false;
+    if (!hn::AllTrue(floats, is_multiple(hn::Set(floats, from[i])))) return i;
+    to[i] = from[i];
   }
-  return true;
+  return i;
 }
 
 }  // namespace HWY_NAMESPACE
@@ -46,30 +50,43 @@ HWY_AFTER_NAMESPACE();
 namespace terrace::tin {
 namespace {
 
-HWY_EXPORT(AreMultiples);
+HWY_EXPORT(CopyMultiples);
 
 // Whole metres, the server's own rounding, and what 32-bit surveys of low ground come in.
 constexpr std::array<float, 3> kQuanta = {1, 0x1p-10F, 0x1p-14F};
 
-float QuantumOf(const HeightField& field) {
-  const auto count = static_cast<std::size_t>(field.width()) * static_cast<std::size_t>(field.height());
-  for (const float quantum : kQuanta) {
-    if (HWY_DYNAMIC_DISPATCH(AreMultiples)(field.Row(0), count, quantum)) return quantum;
-  }
-  return 0;
+// Rows a page apart, as those of 1024 samples would be, put a column into one set of the first cache, which has room
+// for a dozen lines: a triangle of more rows would push out its own. An odd number of cache lines spreads them. Rows of
+// tiles are shorter, and better without gaps.
+std::size_t StrideFor(int width) {
+  constexpr std::size_t kSamplesOfLine = 16, kShortRow = 512;
+  const auto samples = static_cast<std::size_t>(width);
+  if (samples < kShortRow) return samples;
+  return ((samples + kSamplesOfLine - 1) / kSamplesOfLine | 1) * kSamplesOfLine;
 }
 
 }  // namespace
 
-OpenSamples::OpenSamples(const HeightField& field)
-    : width_(field.width()), stride_(static_cast<std::size_t>(field.width())), quantum_(QuantumOf(field)) {
+OpenSamples::OpenSamples(const HeightField& field) : width_(field.width()), stride_(StrideFor(field.width())) {
   const float none = std::numeric_limits<float>::quiet_NaN();
-  const auto rows = static_cast<std::size_t>(field.height());
-  heights_.GrowTo(stride_ * (rows + kPaddingRows) + kPadding, none);
-  for (std::size_t y = 1; y + 1 < rows; ++y) {
-    const float* row = field.Row(static_cast<int>(y));
-    std::copy(row + 1, row + stride_ - 1, heights_.begin() + static_cast<std::ptrdiff_t>(y * stride_ + 1));
+  const auto width = static_cast<std::size_t>(width_), rows = static_cast<std::size_t>(field.height());
+  heights_.GrowBy(stride_ * (rows + kPaddingRows) + kPadding);
+  // Multiples of a quantum are multiples of all that come after it.
+  const auto* quantum = kQuanta.begin();
+  for (std::size_t y = 0; y < rows; ++y) {
+    const float* const from = field.Row(static_cast<int>(y));
+    float* const row = heights_.begin() + y * stride_;
+    std::size_t copied = 0;
+    while (quantum != kQuanta.end() && copied < width) {
+      copied += HWY_DYNAMIC_DISPATCH(CopyMultiples)(from + copied, width - copied, *quantum, row + copied);
+      if (copied < width) ++quantum;
+    }
+    std::copy(from + copied, from + width, row + copied);
+    row[0] = none;
+    std::fill(row + (y == 0 || y + 1 == rows ? 1 : width - 1), row + stride_, none);
   }
+  std::fill(heights_.begin() + rows * stride_, heights_.end(), none);
+  if (quantum != kQuanta.end()) quantum_ = *quantum;
 }
 
 }  // namespace terrace::tin

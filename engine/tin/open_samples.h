@@ -31,13 +31,16 @@ class OpenSamples {
   float quantum() const { return quantum_; }
 
   int width() const { return width_; }
+
+  // Samples from one row to the next.
+  int stride() const { return static_cast<int>(stride_); }
   const float* Row(int y) const { return heights_.data() + static_cast<std::size_t>(y) * stride_; }
 
  private:
   int width_;
   std::size_t stride_;
   LargeArray<float> heights_;
-  float quantum_;
+  float quantum_ = 0;
 };
 
 }  // namespace terrace::tin

@@ -53,14 +53,21 @@ HWY_INLINE hn::Vec<Tag> From(Tag tag, int first) {
   return hn::Add(All(tag, first), hn::Load(tag, LaneNumbers<hn::TFromD<Tag>>::kValues));
 }
 
-// One triangle, seen from its last corner p.
-struct ScannedTriangle {
+// One triangle, seen from its last corner p; its plane in one of the precisions.
+template <typename Number>
+struct TrianglePlane {
   int px, py;
-  double pz;
-  double ux, uy, vx, vy;
-  double d, a, b;                // D, A and B of the header
+  int ux, uy, vx, vy;
   int west, east, south, north;  // bounding box
+  Number pz;
+  Number d, a, b;  // D, A and B of the header
 };
+using ExactPlane = TrianglePlane<double>;
+using SinglePlane = TrianglePlane<float>;
+
+// The precision of samples that are visited.
+template <typename Found>
+using PlaneFor = TrianglePlane<hn::TFromD<typename Found::Tag>>;
 
 // The larger or the smaller one; b where one is NaN.
 HWY_INLINE Floats MaxOrSecond(Floats a, Floats b) {
@@ -162,7 +169,6 @@ class FurthestTwo {
   Floats runner_up_;
 };
 
-HWY_INLINE Floats HeightsAt(FloatsTag tag, const float* from) { return hn::LoadU(tag, from); }
 HWY_INLINE hn::Vec<DoublesTag> HeightsAt(DoublesTag tag, const float* from) {
   return hn::PromoteTo(tag, hn::LoadU(hn::Rebind<float, DoublesTag>(), from));
 }
@@ -173,7 +179,7 @@ class Barycentric {
  public:
   using Doubles = hn::Vec<DoublesTag>;
 
-  HWY_INLINE Barycentric(const ScannedTriangle& t, Doubles x, Doubles y)
+  HWY_INLINE Barycentric(const ExactPlane& t, Doubles x, Doubles y)
       : step_u_(All(kDoubles, 2 * t.vx)),
         step_v_(All(kDoubles, 2 * t.ux)),
         step_p_(hn::Sub(step_u_, step_v_)),
@@ -202,10 +208,11 @@ HWY_INLINE V Numerator(V heights, V pz, V d, V plane) {
   return hn::Abs(hn::Sub(hn::Mul(d, hn::Sub(heights, pz)), plane));
 }
 
-// The same in single precision, fused where there are such operations: what is exact is exact either way, and where
-// there are doubts they become smaller.
-HWY_INLINE Floats Numerator(Floats heights, Floats pz, Floats d, Floats a_x, Floats b, Floats y) {
-  return hn::Abs(hn::MulSub(d, hn::Sub(heights, pz), hn::MulAdd(b, y, a_x)));
+// The same in single precision, whose sign does not matter and whose load is part of the subtraction that way round.
+// Fused where there are such operations: what is exact is exact either way, and where there are doubts they become
+// smaller.
+HWY_INLINE Floats NumeratorFrom(const float* heights, Floats pz, Floats d, Floats plane) {
+  return hn::Abs(hn::MulAdd(d, hn::Sub(pz, hn::LoadU(kFloats, heights)), plane));
 }
 
 // All bits where one of the barycentric coordinates has a sign: NaN, which no comparison holds for. A zero with a sign
@@ -218,29 +225,35 @@ HWY_INLINE Floats NaNWhereNegative(Floats a, Floats b, Floats c) {
 // Every sample of some columns of the bounding box, in single precision: no spans, no divisions, no branches but the
 // loop. Barycentric coordinates are integers, whose signs make what is outside NaN.
 template <typename Found>
-HWY_INLINE Found ScanColumnsInSingle(const OpenSamples& samples, const ScannedTriangle& t, int column) {
+HWY_INLINE Found ScanColumnsInSingle(const OpenSamples& samples, const SinglePlane& t, int column) {
   constexpr IndexTag<FloatsTag> ints;
   const Floats d = All(kFloats, t.d), pz = All(kFloats, t.pz), b = All(kFloats, t.b), one = All(kFloats, 1);
   const Floats a_x = hn::Mul(All(kFloats, t.a), From(kFloats, column));
   Floats y = All(kFloats, t.south);
-  const int ux = static_cast<int>(t.ux), uy = static_cast<int>(t.uy), vx = static_cast<int>(t.vx),
-            vy = static_cast<int>(t.vy);
   const auto x = From(ints, column);
-  auto of_u = hn::Sub(hn::Mul(All(ints, vy), x), All(ints, vx * t.south));
-  auto of_v = hn::Sub(All(ints, ux * t.south), hn::Mul(All(ints, uy), x));
-  auto of_p = hn::Sub(All(ints, ux * vy - uy * vx), hn::Add(of_u, of_v));
-  const auto step_u = All(ints, vx), step_v = All(ints, ux), step_p = All(ints, vx - ux);
-  const int width = samples.width(), first_row = t.py + t.south;
+  auto of_u = hn::Sub(hn::Mul(All(ints, t.vy), x), All(ints, t.vx * t.south));
+  auto of_v = hn::Sub(All(ints, t.ux * t.south), hn::Mul(All(ints, t.uy), x));
+  auto of_p = hn::Sub(All(ints, t.ux * t.vy - t.uy * t.vx), hn::Add(of_u, of_v));
+  const auto step_u = All(ints, t.vx), step_v = All(ints, t.ux), step_p = All(ints, t.vx - t.ux);
+  const int width = samples.width(), stride = samples.stride(), first_row = t.py + t.south;
   const float* from = samples.Row(first_row) + t.px + column;
   auto index = From(ints, first_row * width + t.px + column);
   const auto next_row = All(ints, width);
+  // Stepped where sums are exact anyhow.
+  constexpr bool kIsExact = std::is_same_v<Found, Furthest<FloatsTag>>;
+  Floats plane = hn::MulAdd(b, y, a_x);
   Found furthest;
   for (int j = t.south; j <= t.north; ++j) {
-    const Floats numerator = Numerator(hn::LoadU(kFloats, from), pz, d, a_x, b, y);
+    const Floats numerator = NumeratorFrom(from, pz, d, plane);
     const auto outside = hn::ShiftRight<31>(hn::Or3(of_u, of_v, of_p));
     furthest.Visit(hn::Or(numerator, hn::BitCast(kFloats, outside)), index);
-    from += width;
-    y = hn::Add(y, one);
+    from += stride;
+    if constexpr (kIsExact) {
+      plane = hn::Add(plane, b);
+    } else {
+      y = hn::Add(y, one);
+      plane = hn::MulAdd(b, y, a_x);
+    }
     index = hn::Add(index, next_row);
     of_u = hn::Sub(of_u, step_u);
     of_v = hn::Add(of_v, step_v);
@@ -251,14 +264,14 @@ HWY_INLINE Found ScanColumnsInSingle(const OpenSamples& samples, const ScannedTr
 
 // The same in double, two rows at a time, each for itself, since what is furthest so far is waited for. The row above
 // the last one may be looked at: it is outside.
-HWY_INLINE Furthest<DoublesTag> ScanColumnsInDouble(const OpenSamples& samples, const ScannedTriangle& t, int column) {
+HWY_INLINE Furthest<DoublesTag> ScanColumnsInDouble(const OpenSamples& samples, const ExactPlane& t, int column) {
   constexpr DoublesTag tag;
   constexpr IndexTag<DoublesTag> indices;
   const auto d = All(tag, t.d), pz = All(tag, t.pz), b = All(tag, t.b), one = All(tag, 1), two = All(tag, 2);
   const auto x = From(tag, column), a_x = hn::Mul(All(tag, t.a), x);
   auto y = All(tag, t.south), above = hn::Add(y, one);
   Barycentric even(t, x, y), odd(t, x, above);
-  const int width = samples.width(), first_row = t.py + t.south;
+  const int width = samples.width(), stride = samples.stride(), first_row = t.py + t.south;
   const float* from = samples.Row(first_row) + t.px + column;
   const auto next_row = All(indices, width);
   auto index = From(indices, first_row * width + t.px + column);
@@ -266,9 +279,9 @@ HWY_INLINE Furthest<DoublesTag> ScanColumnsInDouble(const OpenSamples& samples, 
   for (int j = t.south; j <= t.north; j += 2) {
     furthest.Visit(Numerator(HeightsAt(tag, from), pz, d, hn::Add(a_x, hn::Mul(b, y))), index, even.IsInside());
     index = hn::Add(index, next_row);
-    also.Visit(Numerator(HeightsAt(tag, from + width), pz, d, hn::Add(a_x, hn::Mul(b, above))), index, odd.IsInside());
+    also.Visit(Numerator(HeightsAt(tag, from + stride), pz, d, hn::Add(a_x, hn::Mul(b, above))), index, odd.IsInside());
     index = hn::Add(index, next_row);
-    from += 2 * width;
+    from += 2 * stride;
     y = hn::Add(y, two);
     above = hn::Add(above, two);
     even.Step();
@@ -279,7 +292,7 @@ HWY_INLINE Furthest<DoublesTag> ScanColumnsInDouble(const OpenSamples& samples, 
 }
 
 template <typename Found>
-HWY_INLINE Found ScanColumns(const OpenSamples& samples, const ScannedTriangle& t, int column) {
+HWY_INLINE Found ScanColumns(const OpenSamples& samples, const PlaneFor<Found>& t, int column) {
   if constexpr (std::is_same_v<typename Found::Tag, FloatsTag>) {
     return ScanColumnsInSingle<Found>(samples, t, column);
   } else {
@@ -288,7 +301,7 @@ HWY_INLINE Found ScanColumns(const OpenSamples& samples, const ScannedTriangle& 
 }
 
 template <typename Found>
-HWY_INLINE Found ScanBox(const OpenSamples& samples, const ScannedTriangle& t) {
+HWY_INLINE Found ScanBox(const OpenSamples& samples, const PlaneFor<Found>& t) {
   const int lanes = LanesOf<typename Found::Tag>();
   Found furthest = ScanColumns<Found>(samples, t, t.west);
   for (int column = t.west + lanes; column <= t.east; column += lanes) {
@@ -301,49 +314,96 @@ HWY_INLINE Found ScanBox(const OpenSamples& samples, const ScannedTriangle& t) {
 constexpr int kRows = 64;
 using Columns = std::array<std::int32_t, kRows + 16>;
 
-// Where the edge from (x0, y0) to (x1, y1), y0 < y1, crosses the rows: x = n / dy with integers n = x0 dy + (y - y0)
-// dx, rounded down, or up when dy - 1 is added to n. Exact with one multiplication: 0 <= n < 2^31 and dy < 2^15, so n *
-// (1 / dy) is off by less than 2^-20 / dy, and a quotient that is no integer lies at least 1 / dy > 2^-15 below the
-// next one: adding 2^-17 lifts an integer that was rounded down above itself, and lifts nothing else over an integer.
-HWY_INLINE void Cross(int x0, int y0, int x1, int y1, bool round_up, int first_row, int rows, Columns& columns) {
-  const hn::Rebind<std::int32_t, DoublesTag> ints;
-  const int dy = y1 - y0;
-  const int from = std::max(y0, first_row), to = std::min(y1, first_row + rows - 1);
-  const auto inverse = All(kDoubles, 1.0 / dy), lift = All(kDoubles, 0x1p-17), slope = All(kDoubles, x1 - x0);
-  const auto n0 = All(kDoubles, static_cast<double>(x0) * dy + (round_up ? dy - 1 : 0));
-  for (int y = from; y <= to; y += LanesOf<DoublesTag>()) {
-    const auto n = hn::Add(n0, hn::Mul(From(kDoubles, y - y0), slope));
-    hn::StoreU(hn::DemoteTo(ints, hn::Add(hn::Mul(n, inverse), lift)), ints, columns.data() + (y - first_row));
+// The exact spans of a triangle. Relative to p, an edge crosses row y at x = n / dy with an integer n = x0 dy + (y -
+// y0) dx, rounded up on the west side, down on the east. In single precision, where extents are at most 2^11, n is at
+// most 2^23 and so exact; the float nearest to a quotient of at most 2^11 is less than 2^-12 from it, and a quotient
+// that is no integer is at least 2^-11 from the next one. In double the same holds of extents up to 2^16. An outline is
+// convex: of two lines on a side the nearer one counts, and neither needs to end.
+template <typename Tag>
+class SpanFinder {
+ public:
+  using Number = hn::TFromD<Tag>;
+
+  HWY_INLINE explicit SpanFinder(const TrianglePlane<Number>& t) : px_(t.px) {
+    const Number xs[4] = {0, static_cast<Number>(t.ux), static_cast<Number>(t.vx), 0};
+    const Number ys[4] = {0, static_cast<Number>(t.uy), static_cast<Number>(t.vy), 0};
+    std::size_t easts = 0, wests = 0;
+    for (std::size_t i = 0; i < 3; ++i) {
+      // Counter-clockwise: up on the east side, down on the west. Which edge is which cannot be foretold.
+      const Number dx = xs[i + 1] - xs[i], dy = ys[i + 1] - ys[i], n = xs[i] * dy - ys[i] * dx;
+      east_[easts] = {dx, dy, n};
+      west_[wests] = {-dx, -dy, -n};
+      easts += dy > 0 ? 1 : 0;
+      wests += dy < 0 ? 1 : 0;
+    }
+    east_[easts] = east_[0];
+    west_[wests] = west_[0];
+  }
+
+  // Of some rows from `first_row` on, relative to p; columns are those of the field.
+  HWY_INLINE void Find(int first_row, int rows, Columns& firsts, Columns& lasts) const {
+    constexpr Tag tag;
+    constexpr hn::Rebind<std::int32_t, Tag> ints;
+    const auto p = All(ints, px_);
+    for (int j = 0; j < rows; j += LanesOf<Tag>()) {
+      const auto y = From(tag, first_row + j);
+      const auto first = hn::Max(hn::Ceil(At(west_[0], y)), hn::Ceil(At(west_[1], y)));
+      const auto last = hn::Min(hn::Floor(At(east_[0], y)), hn::Floor(At(east_[1], y)));
+      hn::StoreU(hn::Add(p, ToInts(first)), ints, firsts.data() + j);
+      hn::StoreU(hn::Add(p, ToInts(last)), ints, lasts.data() + j);
+    }
+  }
+
+ private:
+  struct Line {
+    Number dx, dy, n;
+  };
+  static HWY_INLINE hn::Vec<Tag> At(const Line& line, hn::Vec<Tag> y) {
+    constexpr Tag tag;
+    return hn::Div(hn::MulAdd(y, All(tag, line.dx), All(tag, line.n)), All(tag, line.dy));
+  }
+  static HWY_INLINE auto ToInts(hn::Vec<Tag> x) {
+    constexpr hn::Rebind<std::int32_t, Tag> ints;
+    if constexpr (sizeof(Number) == sizeof(float)) {
+      return hn::ConvertTo(ints, x);
+    } else {
+      return hn::DemoteTo(ints, x);
+    }
+  }
+
+  int px_;
+  Line east_[4], west_[4];
+};
+
+// Fused in single precision only.
+template <typename Found, typename V>
+HWY_INLINE V MulAddFor(V a, V b, V c) {
+  if constexpr (std::is_same_v<typename Found::Tag, FloatsTag>) {
+    return hn::MulAdd(a, b, c);
+  } else {
+    return hn::Add(hn::Mul(a, b), c);
   }
 }
 
 // Row by row, exact spans.
 template <typename Found>
-HWY_INLINE Found ScanSpans(const OpenSamples& samples, const ScannedTriangle& t) {
+HWY_INLINE Found ScanSpans(const OpenSamples& samples, const PlaneFor<Found>& t) {
   using Tag = typename Found::Tag;
   constexpr Tag tag;
-  std::array<int, 4> xs = {t.px, t.px + static_cast<int>(t.ux), t.px + static_cast<int>(t.vx), t.px};
-  std::array<int, 4> ys = {t.py, t.py + static_cast<int>(t.uy), t.py + static_cast<int>(t.vy), t.py};
-  const auto turn = [](std::array<int, 4>& values) { values = {values[1], values[2], values[3], values[1]}; };
-  while (ys[0] > t.py + t.south) turn(xs), turn(ys);
-
   constexpr IndexTag<Tag> indices;
   const auto d = All(tag, t.d), a = All(tag, t.a), b = All(tag, t.b), pz = All(tag, t.pz), one = All(tag, 1);
   const int lanes = LanesOf<Tag>(), last_row = t.py + t.north, width = samples.width();
-  const auto lanes_on = All(tag, lanes);
+  const auto lanes_on = All(tag, lanes), none = All(tag, -1);
+  // Stepped where sums are exact anyhow.
+  constexpr bool kIsExact = std::is_same_v<Found, Furthest<FloatsTag>>;
+  [[maybe_unused]] const auto a_on = hn::Mul(a, lanes_on);
   const auto indices_on = All(indices, lanes);
   Found furthest, also, ends;  // apart, since what is furthest so far is waited for
   Columns firsts, lasts;
+  const SpanFinder<Tag> finder(t);
   for (int block = t.py + t.south; block <= last_row; block += kRows) {
     const int rows = std::min(kRows, last_row - block + 1);
-    // Counter-clockwise from the lowest corner: first up with the triangle on the west side, then down. Both sides from
-    // the bottom, since whole vectors spill into the rows above. Where two edges meet, both give the corner's column.
-    for (std::size_t i = 0; i < 3; ++i) {
-      if (ys[i] < ys[i + 1]) Cross(xs[i], ys[i], xs[i + 1], ys[i + 1], false, block, rows, lasts);
-    }
-    for (std::size_t i = 3; i-- > 0;) {
-      if (ys[i] > ys[i + 1]) Cross(xs[i + 1], ys[i + 1], xs[i], ys[i], true, block, rows, firsts);
-    }
+    finder.Find(block - t.py, rows, firsts, lasts);
     auto y = All(tag, block - t.py);
     for (int j = 0; j < rows; ++j) {
       const int first = firsts[static_cast<std::size_t>(j)], last = lasts[static_cast<std::size_t>(j)], row = block + j;
@@ -352,25 +412,31 @@ HWY_INLINE Found ScanSpans(const OpenSamples& samples, const ScannedTriangle& t)
       const auto end = All(indices, row * width + last + 1);
       y = hn::Add(y, one);
       auto x = From(tag, first - t.px);
+      auto plane = MulAddFor<Found>(a, x, b_y);
       auto index = From(indices, row * width + first);
       int left = last - first + 1;
       const auto numerator = [&]() HWY_ATTR {
         if constexpr (std::is_same_v<Tag, FloatsTag>) {
-          return hn::Abs(hn::MulSub(d, hn::Sub(HeightsAt(tag, from), pz), hn::MulAdd(a, x, b_y)));
+          return NumeratorFrom(from, pz, d, plane);
         } else {
-          return Numerator(HeightsAt(tag, from), pz, d, hn::Add(hn::Mul(a, x), b_y));
+          return Numerator(HeightsAt(tag, from), pz, d, plane);
         }
       };
       const auto visit = [&](Found& found) HWY_ATTR {
         found.Visit(numerator(), index);
         from += lanes;
-        x = hn::Add(x, lanes_on);
         index = hn::Add(index, indices_on);
+        if constexpr (kIsExact) {
+          plane = hn::Add(plane, a_on);
+        } else {
+          x = hn::Add(x, lanes_on);
+          plane = MulAddFor<Found>(a, x, b_y);
+        }
       };
       for (; left >= 2 * lanes; left -= 2 * lanes) visit(furthest), visit(also);
       if (left >= lanes) visit(also);
       const auto inside = hn::RebindMask(tag, hn::Lt(index, end));
-      ends.Visit(numerator(), index, inside);
+      ends.Visit(hn::IfThenElse(inside, numerator(), none), index);
     }
   }
   furthest.Merge(also);
@@ -378,34 +444,34 @@ HWY_INLINE Found ScanSpans(const OpenSamples& samples, const ScannedTriangle& t)
   return furthest;
 }
 
-// ScannedTriangle's numbers from the ring, one by one.
-HWY_INLINE ScannedTriangle TriangleOf(const Star& star, std::size_t i) {
-  const int ux = star.ring.dx[i], uy = star.ring.dy[i], vx = star.ring.dx[i + 1], vy = star.ring.dy[i + 1];
-  const double pz = static_cast<double>(star.height);
-  const double uz = static_cast<double>(star.ring.heights[i]) - pz;
-  const double vz = static_cast<double>(star.ring.heights[i + 1]) - pz;
-  ScannedTriangle t;
-  t.px = star.x, t.py = star.y, t.pz = pz;
-  t.ux = ux, t.uy = uy, t.vx = vx, t.vy = vy;
-  t.d = t.ux * t.vy - t.uy * t.vx;
-  t.a = t.vy * uz - t.uy * vz;
-  t.b = t.ux * vz - t.vx * uz;
+// In double: from the ring, one by one.
+HWY_INLINE ExactPlane ExactPlaneOf(const Star& star, std::size_t i) {
+  ExactPlane t;
+  t.px = star.x, t.py = star.y;
+  t.ux = star.ring.dx[i], t.uy = star.ring.dy[i], t.vx = star.ring.dx[i + 1], t.vy = star.ring.dy[i + 1];
   // Two by two: of a list they are found with branches.
-  t.west = std::min(std::min(ux, vx), 0), t.east = std::max(std::max(ux, vx), 0);
-  t.south = std::min(std::min(uy, vy), 0), t.north = std::max(std::max(uy, vy), 0);
+  t.west = std::min(std::min(t.ux, t.vx), 0), t.east = std::max(std::max(t.ux, t.vx), 0);
+  t.south = std::min(std::min(t.uy, t.vy), 0), t.north = std::max(std::max(t.uy, t.vy), 0);
+  t.pz = static_cast<double>(star.height);
+  const double ux = t.ux, uy = t.uy, vx = t.vx, vy = t.vy;
+  const double uz = static_cast<double>(star.ring.heights[i]) - t.pz;
+  const double vz = static_cast<double>(star.ring.heights[i + 1]) - t.pz;
+  t.d = ux * vy - uy * vx;
+  t.a = vy * uz - uy * vz;
+  t.b = ux * vz - vx * uz;
   return t;
 }
 
 // Up to so many vectors of columns the box is quicker than its spans.
-constexpr int kMostBoxVectors = 2;
+constexpr int kMostBoxVectors = 3;
 
 template <typename Found>
-HWY_INLINE Found ScanWide(const OpenSamples& samples, const ScannedTriangle& t) {
+HWY_INLINE Found ScanWide(const OpenSamples& samples, const PlaneFor<Found>& t) {
   return t.east - t.west < kMostBoxVectors * LanesOf<typename Found::Tag>() ? ScanBox<Found>(samples, t)
                                                                             : ScanSpans<Found>(samples, t);
 }
 
-PlaneMisfit ScanExactly(const OpenSamples& samples, const ScannedTriangle& t) {
+PlaneMisfit ScanExactly(const OpenSamples& samples, const ExactPlane& t) {
   const auto furthest = ScanWide<Furthest<DoublesTag>>(samples, t);
   if (furthest.numerator() < 0) return {};
   return {furthest.numerator() / t.d, furthest.sample()};
@@ -465,6 +531,8 @@ struct StarPlanes {
     const float* heights = star.ring.heights.data() + first;
     const auto u_x = hn::LoadU(kInts, dx), v_x = hn::LoadU(kInts, dx + 1), none = hn::Zero(kInts);
     const auto u_y = hn::LoadU(kInts, dy), v_y = hn::LoadU(kInts, dy + 1);
+    const auto low_x = hn::Min(hn::Min(u_x, v_x), none), high_x = hn::Max(hn::Max(u_x, v_x), none);
+    const auto low_y = hn::Min(hn::Min(u_y, v_y), none), high_y = hn::Max(hn::Max(u_y, v_y), none);
     const Floats pz = All(kFloats, star.height);
     const Floats u_z = hn::Sub(hn::LoadU(kFloats, heights), pz), v_z = hn::Sub(hn::LoadU(kFloats, heights + 1), pz);
     const Floats of_ux = hn::ConvertTo(kFloats, u_x), of_uy = hn::ConvertTo(kFloats, u_y);
@@ -475,13 +543,15 @@ struct StarPlanes {
     hn::Store(of_vx, kFloats, vx);
     hn::Store(of_vy, kFloats, vy);
     hn::Store(of_d, kFloats, d);
+    const Floats of_west = hn::ConvertTo(kFloats, low_x), of_south = hn::ConvertTo(kFloats, low_y);
+    hn::Store(hn::Sub(hn::Mul(of_vy, of_west), hn::Mul(of_vx, of_south)), kFloats, u);
+    hn::Store(hn::Sub(hn::Mul(of_ux, of_south), hn::Mul(of_uy, of_west)), kFloats, v);
     const Floats vy_uz = hn::Mul(of_vy, u_z), uy_vz = hn::Mul(of_uy, v_z);
     const Floats ux_vz = hn::Mul(of_ux, v_z), vx_uz = hn::Mul(of_vx, u_z);
     const Floats of_a = hn::Sub(vy_uz, uy_vz), of_b = hn::Sub(ux_vz, vx_uz);
     hn::Store(of_a, kFloats, a);
     hn::Store(of_b, kFloats, b);
-    const auto low_x = hn::Min(hn::Min(u_x, v_x), none), high_x = hn::Max(hn::Max(u_x, v_x), none);
-    const auto low_y = hn::Min(hn::Min(u_y, v_y), none), high_y = hn::Max(hn::Max(u_y, v_y), none);
+    hn::Store(hn::Add(hn::Mul(of_a, of_west), hn::Mul(of_b, of_south)), kFloats, plane);
     const auto wide = hn::Sub(high_x, low_x), high = hn::Sub(high_y, low_y), extent = hn::Max(wide, high);
     hn::Store(low_x, kInts, west);
     hn::Store(low_y, kInts, south);
@@ -509,8 +579,9 @@ struct StarPlanes {
   }
 
   HWY_ALIGN float ux[kMost], uy[kMost], vx[kMost], vy[kMost], d[kMost], a[kMost], b[kMost];
-  HWY_ALIGN float largest[kMost];    // no product or sum of the planes' is larger
-  HWY_ALIGN float magnitude[kMost];  // what rounding errors are relative to
+  HWY_ALIGN float u[kMost], v[kMost], plane[kMost];  // at the south-west corner of the box: barycentric, and A x + B y
+  HWY_ALIGN float largest[kMost];                    // no product or sum of the planes' is larger
+  HWY_ALIGN float magnitude[kMost];                  // what rounding errors are relative to
   HWY_ALIGN std::int32_t west[kMost], south[kMost], width[kMost], height[kMost];  // bounding box
   std::uint32_t small, medium, large, wild;                                       // sets of lanes
 };
@@ -540,28 +611,29 @@ HWY_INLINE BlockFind ScanBlock(const OpenSamples& samples, const Star& star, con
                                float most_exact) {
   constexpr int kLanes = static_cast<int>(hn::MaxLanes(kFloats)), kRowsAtOnce = kLanes / kSide;
   constexpr int kVectors = kSide * kSide / kLanes;
-  const int west = planes.west[i], south = planes.south[i];
-  const Floats x = hn::Add(All(kFloats, west), hn::Load(kFloats, kSide == 4 ? kColumnsBy4 : kColumnsBy8));
-  Floats y = hn::Add(All(kFloats, south), hn::Load(kFloats, kSide == 4 ? kRowsBy4 : kRowsBy8));
-  const Floats ux = All(kFloats, planes.ux[i]), uy = All(kFloats, planes.uy[i]), vx = All(kFloats, planes.vx[i]),
-               vy = All(kFloats, planes.vy[i]);
-  const Floats d = All(kFloats, planes.d[i]), b = All(kFloats, planes.b[i]), pz = All(kFloats, star.height);
-  const Floats a_x = hn::Mul(All(kFloats, planes.a[i]), x);
-  Floats of_u = hn::Sub(hn::Mul(vy, x), hn::Mul(vx, y)), of_v = hn::Sub(hn::Mul(ux, y), hn::Mul(uy, x));
+  const Floats x = hn::Load(kFloats, kSide == 4 ? kColumnsBy4 : kColumnsBy8);
+  const Floats y = hn::Load(kFloats, kSide == 4 ? kRowsBy4 : kRowsBy8);
+  const Floats ux = All(kFloats, planes.ux[i]), vx = All(kFloats, planes.vx[i]), d = All(kFloats, planes.d[i]);
+  const Floats b = All(kFloats, planes.b[i]), pz = All(kFloats, star.height);
+  Floats of_u = hn::NegMulAdd(vx, y, hn::MulAdd(All(kFloats, planes.vy[i]), x, All(kFloats, planes.u[i])));
+  Floats of_v = hn::NegMulAdd(All(kFloats, planes.uy[i]), x, hn::MulAdd(ux, y, All(kFloats, planes.v[i])));
   Floats of_p = hn::Sub(d, hn::Add(of_u, of_v));
+  Floats plane = hn::MulAdd(b, y, hn::MulAdd(All(kFloats, planes.a[i]), x, All(kFloats, planes.plane[i])));
   const Floats at_once = All(kFloats, kRowsAtOnce);
   const Floats step_u = hn::Mul(vx, at_once), step_v = hn::Mul(ux, at_once), step_p = hn::Sub(step_u, step_v);
+  const Floats step_plane = hn::Mul(b, at_once);
 
-  const int stride = samples.width();
-  const float* const from = samples.Row(star.y + south) + star.x + west;
+  const int stride = samples.stride();
+  const float* const from = samples.Row(star.y + planes.south[i]) + star.x + planes.west[i];
   Floats numerators[kVectors];
   Floats most = All(kFloats, -1);
 #pragma GCC unroll 8
   for (int k = 0; k < kVectors; ++k) {
     const Floats heights = RowsFrom<kSide>(from + k * kRowsAtOnce * stride, stride);
-    numerators[k] = hn::Or(Numerator(heights, pz, d, a_x, b, y), NaNWhereNegative(of_u, of_v, of_p));
+    const Floats numerator = hn::Abs(hn::MulSub(d, hn::Sub(heights, pz), plane));
+    numerators[k] = hn::Or(numerator, NaNWhereNegative(of_u, of_v, of_p));
     most = MaxOrSecond(numerators[k], most);
-    y = hn::Add(y, at_once);
+    plane = hn::Add(plane, step_plane);
     of_u = hn::Sub(of_u, step_u);
     of_v = hn::Add(of_v, step_v);
     of_p = hn::Add(of_p, step_p);
@@ -576,7 +648,7 @@ HWY_INLINE BlockFind ScanBlock(const OpenSamples& samples, const Star& star, con
 }
 
 // A sample's numerator in double, as the header has it.
-HWY_INLINE double NumeratorAt(const OpenSamples& samples, const ScannedTriangle& t, int x, int y) {
+HWY_INLINE double NumeratorAt(const OpenSamples& samples, const ExactPlane& t, int x, int y) {
   const double height = static_cast<double>(samples.Row(t.py + y)[t.px + x]);
   return std::abs(t.d * (height - t.pz) - (t.a * x + t.b * y));
 }
@@ -592,8 +664,8 @@ HWY_INLINE PlaneMisfit MisfitOf(const OpenSamples& samples, const Star& star, co
   if (find.most + planes.largest[i] < most_exact) {
     return {static_cast<double>(find.most) / static_cast<double>(planes.d[i]), sample(std::countr_zero(find.found))};
   }
-  if (!(find.most < kMostMagnitude)) return ScanExactly(samples, TriangleOf(star, first + i));
-  const ScannedTriangle t = TriangleOf(star, first + i);
+  if (!(find.most < kMostMagnitude)) return ScanExactly(samples, ExactPlaneOf(star, first + i));
+  const ExactPlane t = ExactPlaneOf(star, first + i);
   double most = -1;
   int best = 0;
   for (std::uint64_t found = find.found; found != 0; found &= found - 1) {
@@ -606,13 +678,27 @@ HWY_INLINE PlaneMisfit MisfitOf(const OpenSamples& samples, const Star& star, co
   return {most / t.d, sample(best)};
 }
 
+// In single precision: what StarPlanes::Work found.
+HWY_INLINE SinglePlane SinglePlaneOf(const Star& star, const StarPlanes& planes, std::size_t i, std::size_t first) {
+  const std::int32_t *dx = star.ring.dx.data() + first + i, *dy = star.ring.dy.data() + first + i;
+  const int west = planes.west[i], south = planes.south[i];
+  return {star.x,      star.y,
+          dx[0],       dy[0],
+          dx[1],       dy[1],
+          west,        west + planes.width[i],
+          south,       south + planes.height[i],
+          star.height, planes.d[i],
+          planes.a[i], planes.b[i]};
+}
+
 // A larger triangle where single precision is not exact: no lane may hold two samples that are in doubt.
-PlaneMisfit ScanDoubtfully(const OpenSamples& samples, const ScannedTriangle& t, float largest, float magnitude,
-                           float most_exact) {
-  const auto two = ScanWide<FurthestTwo>(samples, t);
+PlaneMisfit ScanDoubtfully(const OpenSamples& samples, const Star& star, const StarPlanes& planes, std::size_t i,
+                           std::size_t first, float most_exact) {
+  const auto two = ScanWide<FurthestTwo>(samples, SinglePlaneOf(star, planes, i, first));
   const float single = two.numerator();
   if (single < 0) return {};
-  const float least = LeastInDoubt(single, largest, magnitude, most_exact);
+  const ExactPlane t = ExactPlaneOf(star, first + i);
+  const float least = LeastInDoubt(single, planes.largest[i], planes.magnitude[i], most_exact);
   if (!(single < kMostMagnitude) || two.runner_up() >= least) return ScanExactly(samples, t);
   HWY_ALIGN std::int32_t indices[hn::MaxLanes(kFloats)];
   hn::Store(two.furthest().indices(), kInts, indices);
@@ -632,15 +718,15 @@ PlaneMisfit ScanDoubtfully(const OpenSamples& samples, const ScannedTriangle& t,
 
 HWY_INLINE PlaneMisfit ScanLarge(const OpenSamples& samples, const Star& star, const StarPlanes& planes, std::size_t i,
                                  std::size_t first, float most_exact) {
-  const ScannedTriangle t = TriangleOf(star, first + i);
   if (planes.largest[i] < most_exact) {
-    const auto furthest = ScanWide<Furthest<FloatsTag>>(samples, t);
-    if (furthest.numerator() < 0) return {};
-    if (furthest.numerator() + planes.largest[i] < most_exact) {
-      return {static_cast<double>(furthest.numerator()) / t.d, furthest.sample()};
+    const auto furthest = ScanWide<Furthest<FloatsTag>>(samples, SinglePlaneOf(star, planes, i, first));
+    const float numerator = furthest.numerator();
+    if (numerator < 0) return {};
+    if (numerator + planes.largest[i] < most_exact) {
+      return {static_cast<double>(numerator) / static_cast<double>(planes.d[i]), furthest.sample()};
     }
   }
-  return ScanDoubtfully(samples, t, planes.largest[i], planes.magnitude[i], most_exact);
+  return ScanDoubtfully(samples, star, planes, i, first, most_exact);
 }
 
 // Class by class, not triangle by triangle: what a triangle takes cannot be foretold.
@@ -668,7 +754,7 @@ HWY_INLINE void ScanTogether(const OpenSamples& samples, const Star& star, const
     misfits[lane(bits)] = ScanLarge(samples, star, planes, lane(bits), first, most_exact);
   }
   for (std::uint32_t bits = planes.wild & lanes; bits != 0; bits &= bits - 1) {
-    misfits[lane(bits)] = ScanExactly(samples, TriangleOf(star, first + lane(bits)));
+    misfits[lane(bits)] = ScanExactly(samples, ExactPlaneOf(star, first + lane(bits)));
   }
 }
 
@@ -678,7 +764,7 @@ HWY_INLINE void ScanTogether(const OpenSamples& samples, const Star& star, const
 
 void ScanStar(const OpenSamples& samples, const Star& star, PlaneMisfit* misfits) {
 #if HWY_TARGET == HWY_SCALAR
-  for (std::size_t i = 0; i < star.count; ++i) misfits[i] = ScanExactly(samples, TriangleOf(star, i));
+  for (std::size_t i = 0; i < star.count; ++i) misfits[i] = ScanExactly(samples, ExactPlaneOf(star, i));
 #else
   StarPlanes planes;
   const std::size_t lanes = hn::Lanes(kFloats);

@@ -236,6 +236,79 @@ TEST(TriangleScan, TakesNoSampleFromOutsideWhereDoubtsAreLarge) {
   }
 }
 
+// Columns of a row of a triangle, by its exact barycentric coordinates; none if the first is beyond the last.
+std::array<int, 2> SpanOf(const std::array<SamplePosition, 3>& corners, int row) {
+  std::array<int, 2> span = {std::numeric_limits<int>::max(), -1};
+  const int west = std::min({corners[0].x, corners[1].x, corners[2].x});
+  const int east = std::max({corners[0].x, corners[1].x, corners[2].x});
+  for (int column = west; column <= east; ++column) {
+    const SamplePosition at{static_cast<std::uint16_t>(column), static_cast<std::uint16_t>(row)};
+    if (Orientation(corners[0], corners[1], at) < 0 || Orientation(corners[1], corners[2], at) < 0 ||
+        Orientation(corners[2], corners[0], at) < 0) {
+      continue;
+    }
+    span = {std::min(span[0], column), column};
+  }
+  return span;
+}
+
+// Everything is void but the ends of one row's span, which are to be found, and the samples beyond them, further off,
+// which are not. In fields whose rows lie further apart than they are long.
+TEST(TriangleScan, SeesTheEndsOfLongSpansAndNothingBeyond) {
+  Random random(11);
+  int tried = 0;
+  for (int i = 0; i < 120; ++i) {
+    const bool is_large = i % 12 == 0;
+    const int width = is_large ? 2050 : 513 + random.Below(200), height = is_large ? 40 : 60 + random.Below(300);
+    const auto inside = [&] {
+      return SamplePosition{static_cast<std::uint16_t>(1 + random.Below(width - 2)),
+                            static_cast<std::uint16_t>(1 + random.Below(height - 2))};
+    };
+    std::array<SamplePosition, 3> corners = {inside(), inside(), inside()};
+    if (is_large) corners[1].x = 1, corners[2].x = static_cast<std::uint16_t>(width - 2);
+    if (i % 3 == 0) corners[2].y = static_cast<std::uint16_t>(std::min(corners[1].y + 1, height - 2));  // thin
+    if (Orientation(corners[0], corners[1], corners[2]) < 0) std::swap(corners[1], corners[2]);
+    if (Orientation(corners[0], corners[1], corners[2]) == 0) continue;
+    const int row = corners[static_cast<std::size_t>(random.Below(3))].y + random.Below(9) - 4;
+    if (row < 1 || row > height - 2) continue;
+    const auto [first, last] = SpanOf(corners, row);
+    const float base = i % 2 == 0 ? 0 : 0.37F;  // exact in single precision or not
+    const HeightField field = MakeField(width, height, [&, first = first, last = last](int x, int y) {
+      for (const SamplePosition corner : corners) {
+        if (x == corner.x && y == corner.y) return base;
+      }
+      if (y != row) return std::numeric_limits<float>::quiet_NaN();
+      if (first > last) return base + 9;
+      return x == first ? base + 1 : x == last ? base + 2 : x == first - 1 || x == last + 1 ? base + 9 : base;
+    });
+    OpenSamples samples(field);
+    for (const SamplePosition corner : corners) samples.Close(corner);
+    ExpectReference(field, samples, *TestStar(field, corners[0], {corners[1], corners[2]}));
+    ASSERT_FALSE(HasFatalFailure()) << "triangle " << i;
+    ++tried;
+  }
+  EXPECT_GT(tried, 60);
+}
+
+TEST(OpenSamples, AreTheFieldWithoutItsBorder) {
+  // Widths of short rows, of rows that are padded, and of a whole number of cache lines; heights that are multiples of
+  // one quantum up to some sample and of another one from there on.
+  for (const int width : {2, 3, 17, 511, 512, 513, 1024, 1040}) {
+    const HeightField field = MakeField(width, 5, [&](int x, int y) {
+      const int i = y * width + x;
+      return static_cast<float>(i) + (i < width ? 0 : i < 2 * width + width / 2 ? 0.5F : 0.1F);
+    });
+    const OpenSamples samples(field);
+    for (std::uint16_t y = 0; y < 5; ++y) {
+      for (std::uint16_t x = 0; x < width; ++x) {
+        const bool is_border = x == 0 || y == 0 || x + 1 == width || y + 1 == 5;
+        const float open = samples.At({x, y});
+        ASSERT_TRUE(is_border ? std::isnan(open) : open == field.At(x, y)) << x << ' ' << y << " of " << width;
+      }
+    }
+  }
+}
+
 TEST(OpenSamples, FindsTheQuantumOfTheHeights) {
   const auto quantum_of = [](float unit, float odd) {
     return OpenSamples(
