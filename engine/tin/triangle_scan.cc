@@ -318,7 +318,8 @@ using Columns = std::array<std::int32_t, kRows + 16>;
 // y0) dx, rounded up on the west side, down on the east. In single precision, where extents are at most 2^11, n is at
 // most 2^23 and so exact; the float nearest to a quotient of at most 2^11 is less than 2^-12 from it, and a quotient
 // that is no integer is at least 2^-11 from the next one. In double the same holds of extents up to 2^16. An outline is
-// convex: of two lines on a side the nearer one counts, and neither needs to end.
+// convex: of two lines on a side the nearer one counts, and neither needs to end. Where one goes on beyond its edge its
+// quotient may be larger and rounded, but it stays the further one.
 template <typename Tag>
 class SpanFinder {
  public:
@@ -593,10 +594,14 @@ struct StarPlanes {
 // one is an integer.
 constexpr float kDoubt = 0x1p-20F;
 
+// In blocks a plane begins at the box's corner, goes on to the lane, and steps from there, up to seven times: 3 u N and
+// less than 24 u magnitude, fused or not. Two samples that are compared may be off in opposite ways.
+constexpr float kDoubtInBlocks = 0x1p-18F;
+
 // The smallest numerator that may be the largest one in double, once the largest in single precision is known. Where
 // that is exact, no other. Never negative, however large the heights: what is below zero is no sample of the triangle.
-HWY_INLINE float LeastInDoubt(float most, float largest, float magnitude, float most_exact) {
-  const float least = std::max(most - kDoubt * (most + magnitude), 0.0F);
+HWY_INLINE float LeastInDoubt(float most, float largest, float magnitude, float most_exact, float doubt) {
+  const float least = std::max(most - doubt * (most + magnitude), 0.0F);
   return most + largest < most_exact ? most : least;
 }
 
@@ -639,7 +644,8 @@ HWY_INLINE BlockFind ScanBlock(const OpenSamples& samples, const Star& star, con
     of_p = hn::Add(of_p, step_p);
   }
   BlockFind find{hn::GetLane(hn::MaxOfLanes(kFloats, most)), 0};
-  const Floats least = All(kFloats, LeastInDoubt(find.most, planes.largest[i], planes.magnitude[i], most_exact));
+  const Floats least =
+      All(kFloats, LeastInDoubt(find.most, planes.largest[i], planes.magnitude[i], most_exact, kDoubtInBlocks));
 #pragma GCC unroll 8
   for (int k = 0; k < kVectors; ++k) {
     find.found |= std::uint64_t{BitsOf(hn::Ge(numerators[k], least))} << (k * kLanes);
@@ -698,7 +704,7 @@ PlaneMisfit ScanDoubtfully(const OpenSamples& samples, const Star& star, const S
   const float single = two.numerator();
   if (single < 0) return {};
   const ExactPlane t = ExactPlaneOf(star, first + i);
-  const float least = LeastInDoubt(single, planes.largest[i], planes.magnitude[i], most_exact);
+  const float least = LeastInDoubt(single, planes.largest[i], planes.magnitude[i], most_exact, kDoubt);
   if (!(single < kMostMagnitude) || two.runner_up() >= least) return ScanExactly(samples, t);
   HWY_ALIGN std::int32_t indices[hn::MaxLanes(kFloats)];
   hn::Store(two.furthest().indices(), kInts, indices);

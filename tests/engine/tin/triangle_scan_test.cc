@@ -143,6 +143,36 @@ TEST(TriangleScan, TellsApartWhatSinglePrecisionDoesNot) {
   }
 }
 
+// Planes whose steps round in opposite ways at two samples that are almost equally far: found by a search for the most
+// that a block's single precision can be off. With a doubt of 2^-20 in blocks the wrong sample of the first one wins
+// where vectors have eight lanes.
+TEST(TriangleScan, TellsApartWhatStepsOfPlanesBlur) {
+  struct Case {
+    float pz, uz, vz, at_39, at_38;
+  };
+  constexpr std::array kCases = {
+      Case{0x1.8dc9e8p-2F, -0x1.d17ffep-17F, 0x1.8dcca8p-2F, 0x1.c683acp-5F, 0x1.c688d4p-5F},
+      Case{-0x1.0d56cp-13F, 0x1.97c29ep-7F, 0x1.14aefep-21F, 0x1.5ce6ccp-7F, 0x1.5d8466p-7F},
+      Case{-0x1.8a8d3p-5F, 0x1.7f319ep+0F, 0x1.2e8b8p-12F, 0x1.46af3cp+0F, 0x1.4877e6p+0F},
+  };
+  for (const Case& heights : kCases) {
+    for (int k = -40; k <= 40; ++k) {
+      const auto varied = [k](float height) { return height * (1 + static_cast<float>(k) * 0x1p-23F); };
+      const HeightField field = MakeField(12, 12, [&](int x, int y) {
+        if (x == 9 && y == 9) return heights.pz;
+        if (x == 2 && y == 9) return heights.uz;
+        if (x == 9 && y == 2) return heights.vz;
+        if (x == 3 && y == 9) return varied(heights.at_39);
+        return x == 3 && y == 8 ? heights.at_38 : std::numeric_limits<float>::quiet_NaN();
+      });
+      OpenSamples samples(field);
+      for (const SamplePosition corner : {SamplePosition{9, 9}, {2, 9}, {9, 2}}) samples.Close(corner);
+      ExpectReference(field, samples, *TestStar(field, {9, 9}, {{2, 9}, {9, 2}}));
+      ASSERT_FALSE(HasFatalFailure()) << k;
+    }
+  }
+}
+
 // All around a centre: the outline of a rectangle with most of its samples left out, so that triangles of all sizes
 // share a star. Corners are closed, as vertices are.
 TestStar RectangularStar(const HeightField& field, OpenSamples& samples, Random& random) {
