@@ -139,6 +139,10 @@ class Furthest {
   Index index_;             // row-major
 };
 
+// Whether sums are exact where it is used: planes may be stepped then.
+template <typename Found>
+inline constexpr bool kIsExact = std::is_same_v<Found, Furthest<FloatsTag>>;
+
 // The same where single precision leaves doubts: also how close to a lane's furthest sample another one of it comes.
 class FurthestTwo {
  public:
@@ -215,8 +219,8 @@ HWY_INLINE Floats NumeratorFrom(const float* heights, Floats pz, Floats d, Float
   return hn::Abs(hn::MulAdd(d, hn::Sub(pz, hn::LoadU(kFloats, heights)), plane));
 }
 
-// All bits where one of the barycentric coordinates has a sign: NaN, which no comparison holds for. A zero with a sign
-// comes only from products of zeros that have one: beyond p on the line of an edge along x or y, outside as well.
+// All bits where one of the barycentric coordinates has a sign: NaN, which no comparison holds for. No zero has one: on
+// the way from the corner of a box that holds the triangle, two zeros with a sign never meet.
 HWY_INLINE Floats NaNWhereNegative(Floats a, Floats b, Floats c) {
   const IndexTag<FloatsTag> ints;
   return hn::BitCast(kFloats, hn::ShiftRight<31>(hn::BitCast(ints, hn::Or3(a, b, c))));
@@ -239,8 +243,6 @@ HWY_INLINE Found ScanColumnsInSingle(const OpenSamples& samples, const SinglePla
   const float* from = samples.Row(first_row) + t.px + column;
   auto index = From(ints, first_row * width + t.px + column);
   const auto next_row = All(ints, width);
-  // Stepped where sums are exact anyhow.
-  constexpr bool kIsExact = std::is_same_v<Found, Furthest<FloatsTag>>;
   Floats plane = hn::MulAdd(b, y, a_x);
   Found furthest;
   for (int j = t.south; j <= t.north; ++j) {
@@ -248,7 +250,7 @@ HWY_INLINE Found ScanColumnsInSingle(const OpenSamples& samples, const SinglePla
     const auto outside = hn::ShiftRight<31>(hn::Or3(of_u, of_v, of_p));
     furthest.Visit(hn::Or(numerator, hn::BitCast(kFloats, outside)), index);
     from += stride;
-    if constexpr (kIsExact) {
+    if constexpr (kIsExact<Found>) {
       plane = hn::Add(plane, b);
     } else {
       y = hn::Add(y, one);
@@ -395,8 +397,6 @@ HWY_INLINE Found ScanSpans(const OpenSamples& samples, const PlaneFor<Found>& t)
   const auto d = All(tag, t.d), a = All(tag, t.a), b = All(tag, t.b), pz = All(tag, t.pz), one = All(tag, 1);
   const int lanes = LanesOf<Tag>(), last_row = t.py + t.north, width = samples.width();
   const auto lanes_on = All(tag, lanes), none = All(tag, -1);
-  // Stepped where sums are exact anyhow.
-  constexpr bool kIsExact = std::is_same_v<Found, Furthest<FloatsTag>>;
   [[maybe_unused]] const auto a_on = hn::Mul(a, lanes_on);
   const auto indices_on = All(indices, lanes);
   Found furthest, also, ends;  // apart, since what is furthest so far is waited for
@@ -427,7 +427,7 @@ HWY_INLINE Found ScanSpans(const OpenSamples& samples, const PlaneFor<Found>& t)
         found.Visit(numerator(), index);
         from += lanes;
         index = hn::Add(index, indices_on);
-        if constexpr (kIsExact) {
+        if constexpr (kIsExact<Found>) {
           plane = hn::Add(plane, a_on);
         } else {
           x = hn::Add(x, lanes_on);
@@ -688,13 +688,20 @@ HWY_INLINE PlaneMisfit MisfitOf(const OpenSamples& samples, const Star& star, co
 HWY_INLINE SinglePlane SinglePlaneOf(const Star& star, const StarPlanes& planes, std::size_t i, std::size_t first) {
   const std::int32_t *dx = star.ring.dx.data() + first + i, *dy = star.ring.dy.data() + first + i;
   const int west = planes.west[i], south = planes.south[i];
-  return {star.x,      star.y,
-          dx[0],       dy[0],
-          dx[1],       dy[1],
-          west,        west + planes.width[i],
-          south,       south + planes.height[i],
-          star.height, planes.d[i],
-          planes.a[i], planes.b[i]};
+  return {.px = star.x,
+          .py = star.y,
+          .ux = dx[0],
+          .uy = dy[0],
+          .vx = dx[1],
+          .vy = dy[1],
+          .west = west,
+          .east = west + planes.width[i],
+          .south = south,
+          .north = south + planes.height[i],
+          .pz = star.height,
+          .d = planes.d[i],
+          .a = planes.a[i],
+          .b = planes.b[i]};
 }
 
 // A larger triangle where single precision is not exact: no lane may hold two samples that are in doubt.
