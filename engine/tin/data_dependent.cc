@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 #include "engine/core/check.h"
@@ -25,15 +26,6 @@ bool IsBorderEdge(const HeightField& field, SamplePosition a, SamplePosition b) 
          (a.y == b.y && (a.y == 0 || a.y == field.height() - 1));
 }
 
-// A star of `count` triangles around p whose ring is yet to be put.
-void Prepare(Star& star, const Triangulation::Vertex& p, std::size_t count) {
-  star.x = p.position.x;
-  star.y = p.position.y;
-  star.height = p.height;
-  star.count = count;
-  if (star.ring.capacity() < count + 1) star.ring.Grow(2 * (count + 1));
-}
-
 // How far a sample is from the triangle (u, v, p), in the form of the scan: equal bit for bit. x and y are relative to
 // p.
 double DistanceFrom(const RingVertex& u, const RingVertex& v, float p_height, int x, int y, float height) {
@@ -46,53 +38,68 @@ double DistanceFrom(const RingVertex& u, const RingVertex& v, float p_height, in
 }  // namespace
 
 DataDependentCriterion::DataDependentCriterion(const HeightField& field, const OpenSamples& open,
-                                               const Sagitta& sagitta, const Triangulation& triangulation,
+                                               const Sagitta& sagitta, Triangulation& triangulation,
                                                DataDependentOptions options)
     : field_(&field), open_(&open), sagitta_(&sagitta), triangulation_(&triangulation), options_(options) {
   TERRACE_CHECK(options_.qthresh >= 0 && options_.qthresh <= 1);
 }
 
-// The triangle's own three edges are the first to be suspect, and most of them stay: fitted together.
-void DataDependentCriterion::Begin(const Triangulation::Vertex& vertex, TriangleId triangle) {
+const Star& DataDependentCriterion::Insert(const Triangulation::Vertex& vertex, TriangleId triangle) {
   vertex_ = vertex;
+  Begin(triangle);
+  const Star& star = triangulation_->Insert(
+      vertex, triangle, [this](const RingVertex& u, const RingVertex& v, const RingVertex& w, HalfEdgeId back) {
+        return Absorbs(u, v, w, back);
+      });
+  End(star);
+  return star;
+}
+
+// The edges of the triangle are the first to be suspect, and most of them stay: fitted together. Where the vertex lies
+// on one of them, those of the triangle beyond take its place.
+void DataDependentCriterion::Begin(TriangleId triangle) {
   pending_.clear();
   kept_.clear();
   if (!UsesMaxima()) return;
   CoverSlots();
+  std::array<RingVertex, kMostFirstEdges + 1> ring;
+  std::size_t edges = 0;
   for (HalfEdgeId edge = 4 * triangle; edge < 4 * triangle + 3; ++edge) {
     const HalfEdgeId back = triangulation_->twin(edge);
     if (back != kNoEdge) __builtin_prefetch(&known_[back / 4]);
+    const RingVertex u = triangulation_->Seen(triangulation_->corner(edge), vertex_.position);
+    const RingVertex v = triangulation_->Seen(triangulation_->corner(Triangulation::Next(edge)), vertex_.position);
+    ring[edges++] = u;
+    if (Cross(u, v) > 0) continue;
+    if (back == kNoEdge) return;  // on the border
+    ring[edges++] = triangulation_->Seen(triangulation_->corner(Triangulation::Previous(back)), vertex_.position);
   }
-  const auto [a, b, c] = triangulation_->triangle(triangle);
-  const std::array<RingVertex, 4> ring = {
-      triangulation_->Seen(a, vertex.position), triangulation_->Seen(b, vertex.position),
-      triangulation_->Seen(c, vertex.position), triangulation_->Seen(a, vertex.position)};
-  for (std::size_t i = 0; i < 3; ++i) {
-    if (Cross(ring[i], ring[i + 1]) == 0) return;  // on an edge: no triangle there
-  }
-  const std::array<Fit, 3> fits = FitsAround<3>(vertex, ring);
-  for (std::size_t i = 3; i-- > 0;) pending_.push_back({ring[i].id, ring[i + 1].id, fits[i]});
+  ring[edges] = ring[0];
+  std::array<Fit, kMostFirstEdges> fits;
+  FitAround(vertex_, ring.data(), edges, fits.data());
+  pending_.assign(std::make_reverse_iterator(fits.begin() + edges), fits.rend());
 }
 
 bool DataDependentCriterion::Absorbs(const RingVertex& u, const RingVertex& v, const RingVertex& w, HalfEdgeId back) {
   if (Cross(u, v) == 0) return true;
-  Fit uv = TakePending(u.id, v.id), uw, wv;
+  Fit uv = TakePending(u.id), uw, wv;
   const bool absorbs = Sees(u, v, w) && IsBetterAlongPw({u, v, w, vertex_.height}, back / 4, uv, uw, wv);
   if (absorbs) {
-    if (wv.error != kUnknown) pending_.push_back({w.id, v.id, wv});
-    if (uw.error != kUnknown) pending_.push_back({u.id, w.id, uw});
+    if (wv.error != kUnknown) pending_.push_back(wv);
+    if (uw.error != kUnknown) pending_.push_back(uw);
   } else if (uv.error != kUnknown) {
-    kept_.push_back({u.id, v.id, uv});
+    kept_.push_back(uv);
   }
   return absorbs;
 }
 
-// The outline is walked in order, like a stack: what lies above the edge asked for was on the border and stays.
-DataDependentCriterion::Fit DataDependentCriterion::TakePending(VertexId u, VertexId v) {
+// The outline is walked in order, like a stack, and leaves each vertex once: what lies above the edge asked for was on
+// the border and stays.
+DataDependentCriterion::Fit DataDependentCriterion::TakePending(VertexId u) {
   while (!pending_.empty()) {
-    const Spanned top = pending_.back();
+    const Fit top = pending_.back();
     pending_.pop_back();
-    if (top.u == u && top.v == v) return top.fit;
+    if (top.u == u) return top;
     kept_.push_back(top);
   }
   return {};
@@ -103,7 +110,9 @@ bool DataDependentCriterion::IsBetterAlongPw(const Quadrilateral& q, TriangleId 
   const ShapeQuality quality = ShapeQualityOf(q);
   const bool is_shaped_better = quality.pw > quality.uv;
   const auto fit_new = [&] {
-    const std::array<Fit, 2> fits = FitsAround<2>(vertex_, {q.u, q.w, q.v});
+    std::array<Fit, 2> fits;
+    const std::array<RingVertex, 3> ring = {q.u, q.w, q.v};
+    FitAround(vertex_, ring.data(), 2, fits.data());
     uw = fits[0];
     wv = fits[1];
   };
@@ -114,7 +123,7 @@ bool DataDependentCriterion::IsBetterAlongPw(const Quadrilateral& q, TriangleId 
   if (options_.measure == FitMeasure::kNormals) return BendsLessAlongPw(q);
 
   const KnownFit known = FitBeyond(beyond);
-  if (uv.error == kUnknown) uv = FitsAround<1>(vertex_, {q.u, q.v})[0];
+  if (uv.error == kUnknown) FitAround(vertex_, std::array{q.u, q.v}.data(), 1, &uv);
   const double error = Combine(uv.error, known.error);
   if (error == 0) return false;
   const auto wins = [&](double of_uw, double of_wv) {
@@ -124,9 +133,7 @@ bool DataDependentCriterion::IsBetterAlongPw(const Quadrilateral& q, TriangleId 
   if (UsesMaxima()) {
     double least_uw = 0, least_wv = 0;
     if (known.worst != kNoSample) RaiseLeastErrors(q, known.worst, known.worst_height, least_uw, least_wv);
-    if (const std::uint32_t worst = uv.misfit.sample; worst != kNoSample) {
-      RaiseLeastErrors(q, worst, open_->At(PositionOf(worst, field_->width())), least_uw, least_wv);
-    }
+    if (uv.worst != kNoSample) RaiseLeastErrors(q, uv.worst, open_->At(uv.worst), least_uw, least_wv);
     if (!wins(least_uw, least_wv)) return false;
   }
   fit_new();
@@ -145,8 +152,7 @@ void DataDependentCriterion::RaiseLeastErrors(const Quadrilateral& q, std::uint3
 }
 
 DataDependentCriterion::KnownFit DataDependentCriterion::Remembered(const Fit& fit) const {
-  const std::uint32_t worst = fit.misfit.sample;
-  return {fit.error, worst, worst == kNoSample ? 0 : open_->At(PositionOf(worst, field_->width()))};
+  return {fit.error, fit.worst, fit.worst == kNoSample ? 0 : open_->At(fit.worst)};
 }
 
 // From the triangle's last corner, as when it was made: rounding is that of the scan of its star.
@@ -155,94 +161,117 @@ DataDependentCriterion::KnownFit DataDependentCriterion::FitBeyond(TriangleId t)
   if (known_[t].error == kUnknown) {
     const auto [a, b, c] = triangulation_->triangle(t);
     const Triangulation::Vertex p{triangulation_->position(c), triangulation_->height(c)};
-    const Fit fit = FitsAround<1>(p, {triangulation_->Seen(a, p.position), triangulation_->Seen(b, p.position)})[0];
+    Fit fit;
+    FitAround(p, std::array{triangulation_->Seen(a, p.position), triangulation_->Seen(b, p.position)}.data(), 1, &fit);
     known_[t] = Remembered(fit);
   }
   return known_[t];
 }
 
-template <std::size_t kCount>
-std::array<DataDependentCriterion::Fit, kCount> DataDependentCriterion::FitsAround(
-    const Triangulation::Vertex& p, const std::array<RingVertex, kCount + 1>& ring) {
-  std::array<Fit, kCount> fits;
+// Of the triangles between p and the vertices of a ring, one after the other.
+void DataDependentCriterion::FitAround(const Triangulation::Vertex& p, const RingVertex* ring, std::size_t count,
+                                       Fit* fits) {
   if (!UsesMaxima()) {
-    for (std::size_t i = 0; i < kCount; ++i) {
+    for (std::size_t i = 0; i < count; ++i) {
       const RingVertex &u = ring[i], &v = ring[i + 1];
+      fits[i].u = u.id;
       fits[i].error = SquaredDistances(
           *field_, {CornerAt(PositionAround(p.position, u), u.height),
                     CornerAt(PositionAround(p.position, v), v.height), CornerAt(p.position, p.height)});
     }
-    return fits;
+    return;
   }
-  std::array<PlaneMisfit, kCount> misfits;
-  Prepare(scratch_, p, kCount);
-  for (std::size_t i = 0; i <= kCount; ++i) scratch_.ring.Put(i, ring[i]);
+  std::array<PlaneMisfit, kMostFirstEdges> misfits;
+  scratch_.x = p.position.x;
+  scratch_.y = p.position.y;
+  scratch_.height = p.height;
+  scratch_.count = count;
+  if (scratch_.ring.capacity() <= kMostFirstEdges) scratch_.ring.Grow(kMostFirstEdges + 1);
+  for (std::size_t i = 0; i <= count; ++i) scratch_.ring.Put(i, ring[i]);
   scan_star_(*open_, scratch_, misfits.data());
-  for (std::size_t i = 0; i < kCount; ++i) fits[i] = {ErrorOf(misfits[i], p, ring[i], ring[i + 1]), misfits[i]};
-  return fits;
+  for (std::size_t i = 0; i < count; ++i) {
+    fits[i] = FitOf(misfits[i], p.position, p.height, ring[i], ring[i + 1]);
+  }
 }
 
-// With the triangle's border samples, by their plain distances: a weight would favour one cut over the other only for
+bool DataDependentCriterion::IsOnBorder(SamplePosition sample) const {
+  const auto is_inside = [](int at, int size) {
+    return static_cast<unsigned>(at - 1) < static_cast<unsigned>(size - 2);
+  };
+  return !(is_inside(sample.x, field_->width()) & is_inside(sample.y, field_->height()));
+}
+
+DataDependentCriterion::Fit DataDependentCriterion::FitOf(const PlaneMisfit& misfit, SamplePosition p, float p_height,
+                                                          const RingVertex& u, const RingVertex& v) const {
+  const SamplePosition at_u = PositionAround(p, u), at_v = PositionAround(p, v);
+  double error = std::max(misfit.distance, 0.0);
+  if (IsOnBorder(at_u) + IsOnBorder(at_v) + IsOnBorder(p) > 1)
+    error = std::max(error, WorstOnBorders(p, p_height, u, v));
+  if (!sagitta_->is_flat()) error += sagitta_->Bound(at_u, at_v, p);
+  return {error, misfit.distance, misfit.sample, u.id};
+}
+
+// Of the triangle's border samples, by their plain distances: a weight would favour one cut over the other only for
 // being at the border, and what is decided here is not the bound.
-double DataDependentCriterion::ErrorOf(const PlaneMisfit& misfit, const Triangulation::Vertex& p, const RingVertex& u,
-                                       const RingVertex& v) const {
-  const SamplePosition at_u = PositionAround(p.position, u), at_v = PositionAround(p.position, v);
-  double distance = std::max(misfit.distance, 0.0);
+double DataDependentCriterion::WorstOnBorders(SamplePosition p, float p_height, const RingVertex& u,
+                                              const RingVertex& v) const {
+  double worst = 0;
   const auto raise = [&](SamplePosition a, float a_height, SamplePosition b, float b_height) {
     if (!IsBorderEdge(*field_, a, b)) return;
-    distance = std::max(
-        distance, WorstBorderSample(*field_, CornerAt(a, a_height), CornerAt(b, b_height), BorderOptions{}).error);
+    worst = std::max(worst,
+                     WorstBorderSample(*field_, CornerAt(a, a_height), CornerAt(b, b_height), BorderOptions{}).error);
   };
+  const SamplePosition at_u = PositionAround(p, u), at_v = PositionAround(p, v);
   raise(at_u, u.height, at_v, v.height);
-  if (p.position.x == 0 || p.position.y == 0 || p.position.x == field_->width() - 1 ||
-      p.position.y == field_->height() - 1) {
-    raise(at_v, v.height, p.position, p.height);
-    raise(p.position, p.height, at_u, u.height);
-  }
-  return sagitta_->is_flat() ? distance : distance + sagitta_->Bound(at_u, at_v, p.position);
+  raise(at_v, v.height, p, p_height);
+  raise(p, p_height, at_u, u.height);
+  return worst;
 }
 
+// Brings what is kept into the order of the star, which is that of the outline, or on the border the outline turned.
 void DataDependentCriterion::End(const Star& star) {
   kept_.insert(kept_.end(), pending_.rbegin(), pending_.rend());
   CoverSlots();
   centre_ = star.centre;
-  fits_.assign(star.count, {});
-  // Both are in the order of the outline. A ring that has been turned, on the border, may leave some out.
-  auto next = kept_.begin();
+  std::swap(kept_, pending_);
+  kept_.assign(star.count, {});
+  auto next = pending_.begin();
   for (std::size_t i = 0; i < star.count; ++i) {
-    if (next != kept_.end() && next->u == star.ring.ids[i] && next->v == star.ring.ids[i + 1]) fits_[i] = (next++)->fit;
-    known_[star.triangles[i]] = Remembered(fits_[i]);
+    if (next != pending_.end() && next->u == star.ring.ids[i]) kept_[i] = *next++;
+    known_[star.triangles[i]] = Remembered(kept_[i]);
   }
 }
 
 void DataDependentCriterion::Scan(const Star& star, PlaneMisfit* misfits) {
   if (!UsesMaxima()) return scan_star_(*open_, star, misfits);
-  if (star.centre == centre_ && star.count == fits_.size()) {
+  if (star.centre == centre_ && star.count == kept_.size()) {
     ScanUnknown(star, misfits);
   } else {
     scan_star_(*open_, star, misfits);
   }
   CoverSlots();
-  const Triangulation::Vertex p{{static_cast<std::uint16_t>(star.x), static_cast<std::uint16_t>(star.y)}, star.height};
+  const SamplePosition p{static_cast<std::uint16_t>(star.x), static_cast<std::uint16_t>(star.y)};
   for (std::size_t i = 0; i < star.count; ++i) {
     KnownFit& known = known_[star.triangles[i]];
-    if (known.error == kUnknown) {
-      known = Remembered({ErrorOf(misfits[i], p, star.ring[i], star.ring[i + 1]), misfits[i]});
-    }
+    if (known.error == kUnknown) known = Remembered(FitOf(misfits[i], p, star.height, star.ring[i], star.ring[i + 1]));
   }
 }
 
 // Runs of neighbours are scanned together.
 void DataDependentCriterion::ScanUnknown(const Star& star, PlaneMisfit* misfits) {
   for (std::size_t i = 0; i < star.count;) {
-    if (fits_[i].error != kUnknown) {
-      misfits[i] = fits_[i].misfit;
+    if (kept_[i].error != kUnknown) {
+      misfits[i] = {kept_[i].distance, kept_[i].worst};
       ++i;
       continue;
     }
     const std::size_t first = i;
-    while (i < star.count && fits_[i].error == kUnknown) ++i;
-    Prepare(scratch_, vertex_, i - first);
+    while (i < star.count && kept_[i].error == kUnknown) ++i;
+    scratch_.x = star.x;
+    scratch_.y = star.y;
+    scratch_.height = star.height;
+    scratch_.count = i - first;
+    if (scratch_.ring.capacity() < i - first + 1) scratch_.ring.Grow(2 * (i - first + 1));
     for (std::size_t k = first; k <= i; ++k) scratch_.ring.Put(k - first, star.ring[k]);
     scan_star_(*open_, scratch_, misfits + first);
   }

@@ -17,7 +17,6 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -36,58 +35,57 @@ namespace terrace::tin {
 
 class DataDependentCriterion {
  public:
-  // What it looks at belongs to the run and must outlive this object.
+  // What it works on belongs to the run and must outlive this object.
   DataDependentCriterion(const HeightField& field, const OpenSamples& open, const Sagitta& sagitta,
-                         const Triangulation& triangulation, DataDependentOptions options);
+                         Triangulation& triangulation, DataDependentOptions options);
 
-  // One insertion: Begin, then Triangulation::Insert of the same vertex into the same triangle with Absorbs, then End
-  // with the star. The vertex is no open sample any more.
-  void Begin(const Triangulation::Vertex& vertex, TriangleId triangle);
-  bool Absorbs(const RingVertex& u, const RingVertex& v, const RingVertex& w, HalfEdgeId back);
-  void End(const Star& star);
+  // Triangulation::Insert by this criterion. The vertex is no open sample any more.
+  const Star& Insert(const Triangulation::Vertex& vertex, TriangleId triangle);
 
   // What a StarScan finds, for the star of the last insertion or a triangle as a star of its own.
   void Scan(const Star& star, PlaneMisfit* misfits);
 
  private:
   static constexpr double kUnknown = -1;
+  static constexpr std::size_t kMostFirstEdges = 4;
 
-  // How well a triangle fits.
+  // How well the triangle from u to the next vertex of an outline, with its last corner at p, fits.
   struct Fit {
     double error = kUnknown;  // by the measure
-    PlaneMisfit misfit;       // if the error is known and the measure is one of maxima
+    double distance = -1;     // of the open sample that is furthest off, as PlaneMisfit has it; with maxima only
+    std::uint32_t worst = kNoSample;
+    VertexId u = 0;
   };
-  // What is remembered of it, by slot.
+  // What is remembered of a triangle, by slot.
   struct KnownFit {
     double error = kUnknown;
     std::uint32_t worst = kNoSample;  // the open sample that is furthest off
     float worst_height = 0;           // beside it: a test need not fetch it from the field
   };
-  // The triangle (u, v, p), p being inserted.
-  struct Spanned {
-    VertexId u, v;
-    Fit fit;
-  };
 
   bool UsesMaxima() const { return options_.measure == FitMeasure::kSumMax || options_.measure == FitMeasure::kMaxMax; }
   double Combine(double a, double b) const { return options_.measure == FitMeasure::kMaxMax ? std::max(a, b) : a + b; }
 
-  Fit TakePending(VertexId u, VertexId v);
+  void Begin(TriangleId triangle);
+  bool Absorbs(const RingVertex& u, const RingVertex& v, const RingVertex& w, HalfEdgeId back);
+  void End(const Star& star);
+  Fit TakePending(VertexId u);
   bool IsBetterAlongPw(const Quadrilateral& q, TriangleId beyond, Fit& uv, Fit& uw, Fit& wv);
   void RaiseLeastErrors(const Quadrilateral& q, std::uint32_t sample, float height, double& uw, double& wv) const;
   KnownFit FitBeyond(TriangleId t);
   KnownFit Remembered(const Fit& fit) const;
-  template <std::size_t kCount>
-  std::array<Fit, kCount> FitsAround(const Triangulation::Vertex& p, const std::array<RingVertex, kCount + 1>& ring);
-  double ErrorOf(const PlaneMisfit& misfit, const Triangulation::Vertex& p, const RingVertex& u,
-                 const RingVertex& v) const;
+  void FitAround(const Triangulation::Vertex& p, const RingVertex* ring, std::size_t count, Fit* fits);
+  Fit FitOf(const PlaneMisfit& misfit, SamplePosition p, float p_height, const RingVertex& u,
+            const RingVertex& v) const;
+  double WorstOnBorders(SamplePosition p, float p_height, const RingVertex& u, const RingVertex& v) const;
+  bool IsOnBorder(SamplePosition sample) const;
   void CoverSlots();
   void ScanUnknown(const Star& star, PlaneMisfit* misfits);
 
   const HeightField* field_;
   const OpenSamples* open_;
   const Sagitta* sagitta_;
-  const Triangulation* triangulation_;
+  Triangulation* triangulation_;
   DataDependentOptions options_;
   StarScan scan_star_ = BestStarScan();
 
@@ -95,10 +93,9 @@ class DataDependentCriterion {
 
   // Of the insertion at work.
   Triangulation::Vertex vertex_;
-  std::vector<Spanned> pending_;  // stack: spanned triangles whose edge has not been looked across yet
-  std::vector<Spanned> kept_;     // in the order of the outline
-  std::vector<Fit> fits_;         // by triangle of its star
-  VertexId centre_ = 0;           // whose star fits_ is about
+  std::vector<Fit> pending_;  // stack: of edges that have not been looked across yet
+  std::vector<Fit> kept_;     // in the order of the outline; after it, by triangle of the star
+  VertexId centre_ = 0;       // of that star
   Star scratch_;
 };
 

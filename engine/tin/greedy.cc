@@ -221,14 +221,7 @@ void GreedyTriangulation::Impl::Insert(const Insertion& insertion) {
 }
 
 const Star& GreedyTriangulation::Impl::Insert(const Triangulation::Vertex& vertex, TriangleId triangle) {
-  if (!data_dependent_) return triangulation_.InsertDelaunay(vertex, triangle);
-  data_dependent_->Begin(vertex, triangle);
-  const Star& star = triangulation_.Insert(
-      vertex, triangle, [this](const RingVertex& u, const RingVertex& v, const RingVertex& w, HalfEdgeId back) {
-        return data_dependent_->Absorbs(u, v, w, back);
-      });
-  data_dependent_->End(star);
-  return star;
+  return data_dependent_ ? data_dependent_->Insert(vertex, triangle) : triangulation_.InsertDelaunay(vertex, triangle);
 }
 
 double GreedyTriangulation::Impl::CurrentError() {

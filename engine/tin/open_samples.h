@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 
 #include "engine/tin/height_field.h"
@@ -25,6 +26,12 @@ class OpenSamples {
 
   // NaN where not open.
   float At(SamplePosition sample) const { return heights_[sample.y * stride_ + sample.x]; }
+
+  // The same of a sample by its row-major index.
+  float At(std::uint32_t sample) const {
+    const auto width = static_cast<std::uint32_t>(width_);
+    return stride_ == width ? heights_[sample] : heights_[sample / width * stride_ + sample % width];
+  }
 
   // A power of two that all heights of the field are multiples of, metres; 0 if none is known. Sums and products by
   // integers are exact in single precision as long as they stay below 2^24 of it.

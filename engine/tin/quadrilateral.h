@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 #include "engine/tin/star.h"
 #include "engine/tin/triangulation.h"
@@ -30,21 +31,33 @@ struct ShapeQuality {
   double pw = 0;
 };
 
-// Without branches, which nothing could foretell.
-constexpr int Extent(int a, int b, int c) { return std::max(std::max(a, b), c) - std::min(std::min(a, b), c); }
-
-constexpr double BoxDiameter(const RingVertex& a, const RingVertex& b, const RingVertex& c) {
-  return std::max(Extent(a.dx, b.dx, c.dx), Extent(a.dy, b.dy, c.dy));
+// Diameters of (u, w, p), (w, v, p), (u, v, p) and (v, u, w), all at once: offsets fit 16 bits, as fields are smaller
+// than 2^15 samples a side. One by one, some of the many comparisons would be branches that nothing could foretell.
+using Shorts = std::int16_t __attribute__((vector_size(16)));
+using Ints = std::int32_t __attribute__((vector_size(16)));
+inline Ints BoxDiameters(const RingVertex& u_vertex, const RingVertex& v_vertex, const RingVertex& w_vertex) {
+  const auto pair = [](const RingVertex& vertex) {
+    return static_cast<std::int32_t>(static_cast<std::uint32_t>(vertex.dy) << 16 |
+                                     (static_cast<std::uint32_t>(vertex.dx) & 0xFFFF));
+  };
+  const std::int32_t u = pair(u_vertex), v = pair(v_vertex), w = pair(w_vertex);
+  const auto a = reinterpret_cast<Shorts>(Ints{u, w, u, v}), b = reinterpret_cast<Shorts>(Ints{w, v, v, u}),
+             c = reinterpret_cast<Shorts>(Ints{0, 0, 0, w});
+  const auto larger = [](Shorts x, Shorts y) { return x > y ? x : y; };
+  const auto smaller = [](Shorts x, Shorts y) { return x < y ? x : y; };
+  const auto extents = reinterpret_cast<Ints>(larger(larger(a, b), c) - smaller(smaller(a, b), c));
+  const auto of_y = reinterpret_cast<Shorts>(extents >> 16);
+  return reinterpret_cast<Ints>(larger(reinterpret_cast<Shorts>(extents), of_y)) & 0xFFFF;
 }
 
-constexpr ShapeQuality ShapeQualityOf(const Quadrilateral& q) {
-  const RingVertex p;
-  const auto uvp = static_cast<double>(Cross(q.u, q.v)), uwp = static_cast<double>(Cross(q.u, q.w)),
-             wvp = static_cast<double>(Cross(q.w, q.v));
-  const double vuw = uwp + wvp - uvp;  // exact
+inline ShapeQuality ShapeQualityOf(const Quadrilateral& q) {
+  const std::int64_t uvp = Cross(q.u, q.v), uwp = Cross(q.u, q.w), wvp = Cross(q.w, q.v), vuw = uwp + wvp - uvp;
+  const Ints diameters = BoxDiameters(q.u, q.v, q.w);
   // Instead of a division by the one, a multiplication by the other.
-  return {uvp * vuw * (BoxDiameter(q.u, q.w, p) * BoxDiameter(q.w, q.v, p)),
-          uwp * wvp * (BoxDiameter(q.u, q.v, p) * BoxDiameter(q.v, q.u, q.w))};
+  const std::int64_t of_pw = std::int64_t{diameters[0]} * diameters[1];
+  const std::int64_t of_uv = std::int64_t{diameters[2]} * diameters[3];
+  return {static_cast<double>(uvp) * static_cast<double>(vuw) * static_cast<double>(of_pw),
+          static_cast<double>(uwp) * static_cast<double>(wvp) * static_cast<double>(of_uv)};
 }
 
 // The upward normal (x, y, 1) of the plane through three vertices, in metres per sample.
