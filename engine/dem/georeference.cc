@@ -47,6 +47,17 @@ std::string Wkt(const OGRSpatialReference& srs) {
   return wkt;
 }
 
+// Of a CRS with three axes, which tells how many metres it is, but not its name.
+std::string UnitOfHeightAxis(const OGRSpatialReference& srs) {
+  constexpr double kFoot = 0.3048, kSurveyFoot = 1200.0 / 3937.0, kTolerance = 1e-9;  // the two feet are 6e-7 apart
+  double metres = 1;
+  srs.GetAxis(nullptr, 2, nullptr, &metres);
+  if (std::abs(metres - 1) < kTolerance) return "metre";
+  if (std::abs(metres - kFoot) < kTolerance) return "foot";
+  if (std::abs(metres - kSurveyFoot) < kTolerance) return "US survey foot";
+  return fmt::format("{} m a unit", metres);  // known to no table: a warning says so
+}
+
 // Name and unit of what heights count from, as far as the CRS says.
 std::pair<std::string, std::string> VerticalPart(const OGRSpatialReference& srs) {
   if (srs.IsCompound() != 0) {
@@ -54,7 +65,7 @@ std::pair<std::string, std::string> VerticalPart(const OGRSpatialReference& srs)
     const char* unit = srs.GetAttrValue("COMPD_CS|VERT_CS|UNIT");
     return {name == nullptr ? "unnamed" : name, unit == nullptr ? "" : unit};
   }
-  if (srs.GetAxesCount() == 3) return {"ellipsoid", ""};
+  if (srs.GetAxesCount() == 3) return {"ellipsoid", UnitOfHeightAxis(srs)};
   return {};
 }
 

@@ -74,6 +74,12 @@ struct FreeXml {
   void operator()(CPLXMLNode* node) const { CPLDestroyXMLNode(node); }
 };
 
+// Both without links and dots.
+bool IsInside(const fs::path& file, const fs::path& folder) {
+  const auto [in_file, in_folder] = std::ranges::mismatch(file, folder);
+  return in_folder == folder.end();
+}
+
 class Checker {
  public:
   explicit Checker(fs::path top) : top_(std::move(top)) {}
@@ -122,15 +128,14 @@ class Checker {
     std::error_code error;
     const fs::path real = fs::canonical(part, error);
     if (error) return fail(fmt::format("{}: is no file on this machine", part.string()));
-    const std::string inside = fs::relative(real, fs::canonical(top_, error), error).string();
-    if (!HasDataRoots() && (error || inside.starts_with(".."))) {
+    if (!HasDataRoots() && !IsInside(real, top_)) {
       return fail(fmt::format("{}: lies outside of the VRT's folder; name that folder in data_roots", part.string()));
     }
     if (auto plain = CheckPlainFile(part.string()); !plain) return fail(plain.error().message);
     return LooksLikeVrt(real) ? Check(real, depth + 1) : Result<void>();
   }
 
-  const fs::path top_;  // the folder of the outermost VRT
+  const fs::path top_;  // the folder of the outermost VRT, canonical
 };
 
 }  // namespace
@@ -143,6 +148,12 @@ bool LooksLikeVrt(const std::string& path) {
   return head.find("<VRTDataset") != std::string::npos || fs::path(path).extension() == ".vrt";
 }
 
-Result<void> CheckVrt(const std::string& path) { return Checker(fs::path(path).parent_path()).Check(path, 0); }
+Result<void> CheckVrt(const std::string& path) {
+  std::error_code error;
+  // Made absolute first: a bare file name has no folder of its own.
+  const fs::path folder = fs::canonical(fs::absolute(path, error).parent_path(), error);
+  if (error) return MakeError(ErrorCode::kInvalidArgument, "{}: {}", path, error.message());
+  return Checker(folder).Check(path, 0);
+}
 
 }  // namespace terrace::dem

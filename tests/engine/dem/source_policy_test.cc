@@ -316,9 +316,15 @@ TEST_F(SourcePolicyTest, WithoutRootsAVrtStaysInItsFolder) {
   Write(root_ / "mosaic.vrt", Vrt(Part("dem.tif", true)));
   EXPECT_TRUE(OpenRaster((root_ / "mosaic.vrt").string()));
   Write(root_ / "out.vrt", Vrt(Part((outside_ / "secret.tif").string())));
-  const auto refused = OpenRaster((root_ / "out.vrt").string());
-  ASSERT_FALSE(refused);
-  EXPECT_NE(refused.error().message.find("name that folder in data_roots"), std::string::npos);
+  const fs::path started_in = fs::current_path();
+  fs::current_path(root_);  // a bare name has a folder too
+  EXPECT_TRUE(OpenRaster("mosaic.vrt"));
+  for (const std::string& name : {(root_ / "out.vrt").string(), std::string("out.vrt"), std::string("./out.vrt")}) {
+    const auto refused = OpenRaster(name);
+    ASSERT_FALSE(refused) << name;
+    EXPECT_NE(refused.error().message.find("name that folder in data_roots"), std::string::npos);
+  }
+  fs::current_path(started_in);
 }
 
 TEST_F(SourcePolicyTest, OverviewsBesideAndElsewhereAreHeldToTheRoots) {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <fstream>
 
 #include "engine/dem/sample_rules.h"
 #include "engine/geo/mercator_grid.h"
@@ -72,6 +73,27 @@ TEST(VerticalDatum, EllipsoidalReferenceSystemsPass) {
   EXPECT_TRUE(source->has_datum());
   EXPECT_FALSE(source->converts());
   EXPECT_EQ(source->info().sources.front().counts_from, "ellipsoid");
+}
+
+// The unit of a compound CRS has a name; that of a third axis is only so long, and its feet are feet all the same.
+TEST(VerticalDatum, AThirdAxisInFeetIsConverted) {
+  constexpr const char* kInFeet =
+      R"(GEOGCRS["in feet",DATUM["World Geodetic System 1984",ELLIPSOID["WGS 84",6378137,298.257223563]],)"
+      R"(CS[ellipsoidal,3],AXIS["latitude",north,ANGLEUNIT["degree",0.0174532925199433]],)"
+      R"(AXIS["longitude",east,ANGLEUNIT["degree",0.0174532925199433]],)"
+      R"(AXIS["height",up,LENGTHUNIT["foot",0.3048]]])";
+  const TempDir dir;
+  const auto metres = OpenOrFail(WriteRaster(dir, Hills("EPSG:4979")));
+  const std::string path = WriteRaster(dir, Hills("EPSG:4979"), "feet.tif");
+  std::ofstream(path + ".aux.xml") << "<PAMDataset><SRS dataAxisToSRSAxisMapping=\"2,1,3\">" << kInFeet
+                                   << "</SRS></PAMDataset>";  // GeoTIFF cannot say it
+  const auto feet = OpenOrFail(path);
+  ASSERT_TRUE(feet && metres);
+  EXPECT_EQ(feet->info().sources.front().height_unit, "foot");
+  EXPECT_EQ(feet->info().sources.front().counts_from, "ellipsoid");
+  const auto of_feet = feet->ReadPoints(SomePoints()), of_metres = metres->ReadPoints(SomePoints());
+  ASSERT_TRUE(of_feet && of_metres);
+  for (std::size_t i = 0; i < of_feet->size(); ++i) EXPECT_NEAR((*of_feet)[i], (*of_metres)[i] * .3048, .002) << i;
 }
 
 TEST(VerticalDatum, TilesBoundsAndMercatorPixelsAreConvertedAlike) {
