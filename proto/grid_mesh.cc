@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "engine/core/check.h"
+#include "proto/lattice_angles.h"
 #include "proto/vertex_order.h"
 
 namespace terrace::proto {
@@ -23,37 +24,24 @@ GridPoint Snap(geo::Vec3 ecef, double per_metre) {
   return {whole(ecef.x), whole(ecef.y), whole(ecef.z)};
 }
 
-// Longitudes and latitudes need a sine and a cosine each; a tile has thousands of vertices but only a few hundred
-// columns and rows.
 class NodePlacer {
  public:
-  explicit NodePlacer(const LatticeView& lattice) : lattice_(lattice) {
-    const auto side = static_cast<std::size_t>(lattice.cells()) + 1;
-    meridians_.resize(side);
-    parallels_.resize(side);
-    for (int k = 0; k <= lattice.cells(); ++k) {
-      const auto at = static_cast<std::size_t>(k);
-      meridians_[at] = geo::SurfaceNormal(lattice.Longitude(k), 0);
-      parallels_[at].up = geo::SurfaceNormal(0, lattice.Latitude(k));
-      parallels_[at].base = geo::ToEcef(0, lattice.Latitude(k), 0);
-    }
+  explicit NodePlacer(const LatticeView& lattice) : lattice_(lattice), angles_(lattice) {
+    for (const geo::SinCos& row : angles_.rows) bases_.push_back(geo::ToEcef({}, row, 0));
   }
 
   geo::Vec3 Place(tin::SamplePosition node, double below_m) const {
-    const geo::Vec3& meridian = meridians_[node.x];
-    const Parallel& parallel = parallels_[node.y];
+    const geo::SinCos &longitude = angles_.columns[node.x], &latitude = angles_.rows[node.y];
+    const geo::Vec3& base = bases_[node.y];
     const double height = static_cast<double>(lattice_.At(node.x, node.y)) - below_m;
-    const double from_axis = parallel.base.x + parallel.up.x * height;
-    return {from_axis * meridian.x, from_axis * meridian.y, parallel.base.z + parallel.up.z * height};
+    const double from_axis = base.x + latitude.cos * height;
+    return {from_axis * longitude.cos, from_axis * longitude.sin, base.z + latitude.sin * height};
   }
 
  private:
-  struct Parallel {
-    geo::Vec3 up, base;  // at longitude 0
-  };
   const LatticeView& lattice_;
-  std::vector<geo::Vec3> meridians_;
-  std::vector<Parallel> parallels_;
+  const LatticeAngles angles_;
+  std::vector<geo::Vec3> bases_;  // by row: on the ellipsoid at longitude 0
 };
 
 // The border vertices counter-clockwise from the south-western corner, each once.

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "proto/lattice_angles.h"
 #include "proto/tile_geometry.h"
 
 namespace terrace::proto {
@@ -28,25 +29,20 @@ Place Between(Place a, Place b, double t) { return {a.x + t * (b.x - a.x), a.y +
 // end at the fifth power of half a cell, which is below 3e-9 for the widest cells there are.
 class Ground {
  public:
-  explicit Ground(const LatticeView& lattice) : step_(geo::ToRadians(lattice.lattice.StepDegrees())) {
-    for (int i = 0; i <= lattice.cells(); ++i) columns_.push_back(geo::SurfaceNormal(lattice.Longitude(i), 0));
-    for (int j = 0; j <= lattice.cells(); ++j) rows_.push_back(geo::SurfaceNormal(0, lattice.Latitude(j)));
-  }
+  explicit Ground(const LatticeView& lattice)
+      : step_(geo::ToRadians(lattice.lattice.StepDegrees())), angles_(lattice) {}
 
   // Metres above the ellipsoid of a point near the place, along the normal there.
   double HeightOf(const geo::Vec3& point, Place place) const {
-    const Angle longitude = Turn(columns_, place.x, [](const geo::Vec3& up) { return Angle{up.x, up.y}; });
-    const Angle latitude = Turn(rows_, place.y, [](const geo::Vec3& up) { return Angle{up.x, up.z}; });
-    const double surface =
-        geo::kSemiMajorAxis * std::sqrt(1 - geo::kEccentricitySquared * latitude.sine * latitude.sine);
-    return latitude.cosine * (point.x * longitude.cosine + point.y * longitude.sine) + point.z * latitude.sine -
-           surface;
+    const geo::SinCos longitude = Turn(angles_.columns, place.x), latitude = Turn(angles_.rows, place.y);
+    const double surface = geo::kSemiMajorAxis * std::sqrt(1 - geo::kEccentricitySquared * latitude.sin * latitude.sin);
+    return latitude.cos * (point.x * longitude.cos + point.y * longitude.sin) + point.z * latitude.sin - surface;
   }
 
   // Metres along a row and along a column, at most.
   Place WidestStep() const {
     double widest = 0;
-    for (const geo::Vec3& up : rows_) widest = std::max(widest, up.x);
+    for (const geo::SinCos& row : angles_.rows) widest = std::max(widest, row.cos);
     constexpr double kLargestRadius = geo::kSemiMajorAxis * geo::kSemiMajorAxis / geo::kSemiMinorAxis;
     return {widest * step_ * kLargestRadius, step_ * kLargestRadius};
   }
@@ -58,21 +54,16 @@ class Ground {
   double step_radians() const { return step_; }
 
  private:
-  struct Angle {
-    double cosine = 1, sine = 0;
-  };
-
-  template <typename Read>
-  Angle Turn(const std::vector<geo::Vec3>& nodes, double at, const Read& read) const {
+  geo::SinCos Turn(const std::vector<geo::SinCos>& nodes, double at) const {
     const auto nearest = static_cast<std::size_t>(std::lround(at));
     const double a = (at - static_cast<double>(nearest)) * step_, a2 = a * a;
     const double cosine = 1 - a2 / 2 * (1 - a2 / 12), sine = a * (1 - a2 / 6 * (1 - a2 / 20));
-    const Angle node = read(nodes[nearest]);
-    return {node.cosine * cosine - node.sine * sine, node.sine * cosine + node.cosine * sine};
+    const geo::SinCos node = nodes[nearest];
+    return {node.sin * cosine + node.cos * sine, node.cos * cosine - node.sin * sine};
   }
 
   double step_;
-  std::vector<geo::Vec3> columns_, rows_;  // normals on the equator, on the zero meridian
+  LatticeAngles angles_;
 };
 
 // A piece of an edge within one lattice cell: the lattice surface on it is a quadratic.

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "engine/geo/ellipsoid.h"
+#include "proto/lattice_angles.h"
 #include "proto/tile_geometry.h"
 
 namespace terrace::proto {
@@ -94,12 +95,12 @@ class Meter {
   std::int64_t NodeOf(std::int64_t coordinate) const { return (coordinate + unit_ / 2) / unit_; }
 
   void PrepareCurved() {
-    for (int i = 0; i <= cells_; ++i) column_up_.push_back(geo::SurfaceNormal(lattice_.Longitude(i), 0));
-    for (int j = 0; j <= cells_; ++j) {
-      const double latitude = lattice_.Latitude(j);
-      const geo::Vec3 up = geo::SurfaceNormal(0, latitude);
+    const LatticeAngles angles(lattice_);
+    for (const geo::SinCos& column : angles.columns) column_up_.push_back(geo::SurfaceNormal(column, {}));
+    for (const geo::SinCos& row : angles.rows) {
+      const geo::Vec3 up = geo::SurfaceNormal({}, row);
       row_up_.push_back(up);
-      row_base_.push_back(geo::Dot(geo::ToEcef(0, latitude, 0), up));
+      row_base_.push_back(geo::Dot(geo::ToEcef({}, row, 0), up));
     }
   }
 

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "engine/core/check.h"
 
@@ -63,6 +64,28 @@ double FarthestFrom(geo::Vec3 center, const std::vector<geo::Vec3>& positions) {
   return std::sqrt(squared);
 }
 
+// Sines and cosines at the coordinates that are asked for, each worked out once: thousands of vertices share a few
+// hundred.
+template <typename Degrees>
+class Angles {
+ public:
+  explicit Angles(Degrees degrees) : degrees_(std::move(degrees)), index_(kQuantizedMax + 1) {}
+
+  geo::SinCos At(std::uint16_t coordinate) {
+    std::uint16_t& index = index_[coordinate];
+    if (index == 0) {
+      known_.push_back(geo::RoundedSinCos(degrees_(coordinate)));
+      index = static_cast<std::uint16_t>(known_.size());
+    }
+    return known_[index - std::size_t{1}];
+  }
+
+ private:
+  const Degrees degrees_;
+  std::vector<std::uint16_t> index_;  // into those known, from 1 on; 0: not known yet
+  std::vector<geo::SinCos> known_;
+};
+
 geo::Vec3 Scaled(geo::Vec3 p, double shrink) {
   return {p.x / (geo::kSemiMajorAxis - shrink), p.y / (geo::kSemiMajorAxis - shrink),
           p.z / (geo::kSemiMinorAxis - shrink)};
@@ -100,9 +123,10 @@ double HeightAt(const QuantizedTile& tile, std::uint16_t h) {
 std::vector<geo::Vec3> DecodePositions(const QuantizedTile& tile) {
   std::vector<geo::Vec3> positions;
   positions.reserve(tile.u.size());
+  Angles longitudes([&](std::uint16_t u) { return LongitudeAt(tile.key, u); });
+  Angles latitudes([&](std::uint16_t v) { return LatitudeAt(tile.key, v); });
   for (std::size_t i = 0; i < tile.u.size(); ++i) {
-    positions.push_back(
-        geo::ToEcef(LongitudeAt(tile.key, tile.u[i]), LatitudeAt(tile.key, tile.v[i]), HeightAt(tile, tile.h[i])));
+    positions.push_back(geo::ToEcef(longitudes.At(tile.u[i]), latitudes.At(tile.v[i]), HeightAt(tile, tile.h[i])));
   }
   return positions;
 }

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "engine/geo/ellipsoid.h"
+#include "proto/lattice_angles.h"
 #include "proto/oct_normal.h"
 #include "proto/tile_geometry.h"
 
@@ -18,28 +19,26 @@ constexpr double kLowestUp = 0.035;
 // 13 degrees.
 constexpr double kCosWidestTurn = 0.97437006478523525, kSinWidestTurn = 0.22495105434386500;
 
-// East, north and up of a node, from the normals of its meridian and its parallel.
+// East, north and up of a node.
 struct LocalFrame {
   geo::Vec3 east, north, up;
 };
 
-LocalFrame FrameOf(double longitude, double latitude) {
-  const geo::Vec3 meridian = geo::SurfaceNormal(longitude, 0);  // (cos lon, sin lon, 0)
-  const geo::Vec3 parallel = geo::SurfaceNormal(0, latitude);   // (cos lat, 0, sin lat)
-  return {{-meridian.y, meridian.x, 0},
-          {-parallel.z * meridian.x, -parallel.z * meridian.y, parallel.x},
-          {parallel.x * meridian.x, parallel.x * meridian.y, parallel.z}};
+LocalFrame FrameOf(geo::SinCos longitude, geo::SinCos latitude) {
+  return {{-longitude.sin, longitude.cos, 0},
+          {-latitude.sin * longitude.cos, -latitude.sin * longitude.sin, latitude.cos},
+          {latitude.cos * longitude.cos, latitude.cos * longitude.sin, latitude.sin}};
 }
 
-geo::Vec3 LatticeNormal(const LatticeView& lattice, const LocalFrame& frame, tin::SamplePosition p) {
+geo::Vec3 LatticeNormal(const LatticeView& lattice, const LocalFrame& frame, geo::SinCos row, tin::SamplePosition p) {
   const double latitude = lattice.Latitude(p.y), step = lattice.lattice.StepDegrees();
   if (latitude <= -90 || latitude >= 90) return frame.up;
   const double rise_east =
       static_cast<double>(lattice.At(p.x + 1, p.y)) - static_cast<double>(lattice.At(p.x - 1, p.y));
   const double rise_north =
       static_cast<double>(lattice.At(p.x, p.y + 1)) - static_cast<double>(lattice.At(p.x, p.y - 1));
-  const double east = rise_east / (2 * step * geo::MetresPerDegreeEast(latitude));
-  const double north = rise_north / (2 * step * geo::MetresPerDegreeNorth(latitude));
+  const double east = rise_east / (2 * step * geo::MetresPerDegreeEast(row));
+  const double north = rise_north / (2 * step * geo::MetresPerDegreeNorth(row));
   const double tamed = kSteepestSlope / std::max(std::hypot(east, north), kSteepestSlope);
   return geo::Normalized(frame.up - frame.east * (east * tamed) - frame.north * (north * tamed));
 }
@@ -70,10 +69,11 @@ std::vector<geo::Vec3> VertexNormals(const LatticeView& lattice, const tin::TinM
   const std::vector<geo::Vec3> of_mesh = AreaWeightedNormals(mesh.triangles, positions);
   std::vector<geo::Vec3> normals;
   normals.reserve(mesh.vertices.size());
+  const LatticeAngles angles(lattice);
   for (std::size_t k = 0; k < mesh.vertices.size(); ++k) {
     const tin::SamplePosition p = mesh.vertices[k];
-    const LocalFrame frame = FrameOf(lattice.Longitude(p.x), lattice.Latitude(p.y));
-    geo::Vec3 normal = LatticeNormal(lattice, frame, p);
+    const LocalFrame frame = FrameOf(angles.columns[p.x], angles.rows[p.y]);
+    geo::Vec3 normal = LatticeNormal(lattice, frame, angles.rows[p.y], p);
     if (p.x > 0 && p.y > 0 && p.x < lattice.cells() && p.y < lattice.cells()) {
       const geo::Vec3 turned = TurnTowards(normal, geo::Normalized(of_mesh[k]));
       if (geo::Dot(turned, frame.up) > kLowestUp) normal = turned;

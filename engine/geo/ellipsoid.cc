@@ -3,12 +3,12 @@
 namespace terrace::geo {
 namespace {
 
-struct SinCos {
-  double sin, cos;
-};
+double PrimeVerticalRadiusFromSine(double sine) {
+  return kSemiMajorAxis / std::sqrt(1 - kEccentricitySquared * sine * sine);
+}
 
-// Exact at multiples of 90 degrees, and rounded to 2^-44 elsewhere (0.4 micrometres on the ground): libm's last bit
-// differs between processors, and tiles must not.
+}  // namespace
+
 SinCos RoundedSinCos(double degrees) {
   if (degrees == 0) return {0, 1};
   if (degrees == 90 || degrees == -90) return {degrees / 90, 0};
@@ -18,24 +18,22 @@ SinCos RoundedSinCos(double degrees) {
   return {std::nearbyint(std::sin(radians) * kGrid) / kGrid, std::nearbyint(std::cos(radians) * kGrid) / kGrid};
 }
 
-double PrimeVerticalRadiusFromSine(double sine) {
-  return kSemiMajorAxis / std::sqrt(1 - kEccentricitySquared * sine * sine);
-}
-
-}  // namespace
-
 Vec3 Normalized(Vec3 a) {
   const double length = Length(a);
   return length > 0 ? a * (1 / length) : a;
 }
 
 Vec3 SurfaceNormal(double longitude_deg, double latitude_deg) {
-  const SinCos lon = RoundedSinCos(longitude_deg), lat = RoundedSinCos(latitude_deg);
-  return {lat.cos * lon.cos, lat.cos * lon.sin, lat.sin};
+  return SurfaceNormal(RoundedSinCos(longitude_deg), RoundedSinCos(latitude_deg));
 }
 
+Vec3 SurfaceNormal(SinCos lon, SinCos lat) { return {lat.cos * lon.cos, lat.cos * lon.sin, lat.sin}; }
+
 Vec3 ToEcef(double longitude_deg, double latitude_deg, double height_m) {
-  const SinCos lon = RoundedSinCos(longitude_deg), lat = RoundedSinCos(latitude_deg);
+  return ToEcef(RoundedSinCos(longitude_deg), RoundedSinCos(latitude_deg), height_m);
+}
+
+Vec3 ToEcef(SinCos lon, SinCos lat, double height_m) {
   const double radius = PrimeVerticalRadiusFromSine(lat.sin);
   const double from_axis = (radius + height_m) * lat.cos;
   return {from_axis * lon.cos, from_axis * lon.sin, (radius * (1 - kEccentricitySquared) + height_m) * lat.sin};
@@ -43,12 +41,16 @@ Vec3 ToEcef(double longitude_deg, double latitude_deg, double height_m) {
 
 double PrimeVerticalRadius(double latitude_deg) { return PrimeVerticalRadiusFromSine(RoundedSinCos(latitude_deg).sin); }
 
-double MetresPerDegreeEast(double latitude_deg) {
-  return ToRadians(1) * PrimeVerticalRadius(latitude_deg) * RoundedSinCos(latitude_deg).cos;
+double MetresPerDegreeEast(double latitude_deg) { return MetresPerDegreeEast(RoundedSinCos(latitude_deg)); }
+
+double MetresPerDegreeEast(SinCos latitude) {
+  return ToRadians(1) * PrimeVerticalRadiusFromSine(latitude.sin) * latitude.cos;
 }
 
-double MetresPerDegreeNorth(double latitude_deg) {
-  const double radius = PrimeVerticalRadius(latitude_deg);
+double MetresPerDegreeNorth(double latitude_deg) { return MetresPerDegreeNorth(RoundedSinCos(latitude_deg)); }
+
+double MetresPerDegreeNorth(SinCos latitude) {
+  const double radius = PrimeVerticalRadiusFromSine(latitude.sin);
   // M = N^3 (1 - e^2) / a^2, the meridian's radius of curvature.
   return ToRadians(1) * radius * radius * radius * (1 - kEccentricitySquared) / (kSemiMajorAxis * kSemiMajorAxis);
 }
