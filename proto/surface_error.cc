@@ -55,7 +55,7 @@ class Ground {
 
  private:
   geo::SinCos Turn(const std::vector<geo::SinCos>& nodes, double at) const {
-    const auto nearest = static_cast<std::size_t>(std::lround(at));
+    const auto nearest = static_cast<std::size_t>(at + 0.5);
     const double a = (at - static_cast<double>(nearest)) * step_, a2 = a * a;
     const double cosine = 1 - a2 / 2 * (1 - a2 / 12), sine = a * (1 - a2 / 6 * (1 - a2 / 20));
     const geo::SinCos node = nodes[nearest];

@@ -17,6 +17,8 @@ namespace {
 // tile; u * cells and i * 32767 stay below 2^23, products of two below 2^46. Of a mesh on the lattice: its cells.
 struct Point {
   std::int64_t x = 0, y = 0;
+
+  friend bool operator==(const Point&, const Point&) = default;
 };
 
 constexpr std::int64_t CeilDiv(std::int64_t a, std::int64_t b) { return a >= 0 ? (a + b - 1) / b : -(-a / b); }
@@ -64,30 +66,54 @@ struct Surface {
   std::vector<Point> points;    // by vertex
   std::vector<double> heights;  // by vertex, metres: the reading in longitude and latitude
   std::vector<geo::Vec3> ecef;  // by vertex: the flat triangles
-  const std::vector<std::array<std::uint32_t, 3>>& triangles;
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+
+  bool is_planar() const { return !heights.empty(); }
+  bool is_curved() const { return !ecef.empty(); }
 };
 
-class Meter {
- public:
-  Meter(const LatticeView& lattice, Surface surface, double bound_m)
-      : lattice_(lattice),
-        surface_(std::move(surface)),
-        cells_(lattice.cells()),
-        unit_(surface_.unit),
-        bound_(bound_m),
-        planar_(!surface_.heights.empty()),
-        curved_(!surface_.ecef.empty()) {
-    is_vertex_.resize(static_cast<std::size_t>(cells_ + 1) * static_cast<std::size_t>(cells_ + 1));
-    for (const Point& p : surface_.points) is_vertex_[NodeIndex(NodeOf(p.x), NodeOf(p.y))] = true;
-    if (curved_) PrepareCurved();
-  }
+// Whether a triangle lies in the same place in both.
+bool IsSame(const Surface& a, const Surface& b, std::size_t t) {
+  if (t >= a.triangles.size() || t >= b.triangles.size() || a.triangles[t] != b.triangles[t]) return false;
+  return std::ranges::all_of(a.triangles[t], [&](std::uint32_t k) {
+    return a.points[k] == b.points[k] && (!a.is_planar() || a.heights[k] == b.heights[k]) &&
+           (!a.is_curved() || a.ecef[k] == b.ecef[k]);
+  });
+}
 
-  TileError Measure() {
-    for (const auto& triangle : surface_.triangles) MeasureTriangle(triangle);
-    return std::move(result_);
+}  // namespace
+
+class TileMeter::Impl {
+ public:
+  Impl(const LatticeView& lattice, double bound_m) : lattice_(lattice), cells_(lattice.cells()), bound_(bound_m) {}
+
+  int cells() const { return cells_; }
+
+  TileError Measure(Surface surface) {
+    const Surface before = std::exchange(surface_, std::move(surface));
+    const bool is_alike = before.unit == surface_.unit && before.is_planar() == surface_.is_planar() &&
+                          before.is_curved() == surface_.is_curved();
+    unit_ = surface_.unit;
+    planar_ = surface_.is_planar();
+    curved_ = surface_.is_curved();
+    is_vertex_.assign(static_cast<std::size_t>(cells_ + 1) * static_cast<std::size_t>(cells_ + 1), false);
+    for (const Point& p : surface_.points) is_vertex_[NodeIndex(NodeOf(p.x), NodeOf(p.y))] = true;
+    if (curved_ && row_up_.empty()) PrepareCurved();
+    TileError result;
+    errors_.resize(surface_.triangles.size(), kUnknown);
+    for (std::size_t t = 0; t < surface_.triangles.size(); ++t) {
+      const std::size_t misses = result.misses.size();
+      double& error = errors_[t];
+      if (!is_alike || error == kUnknown || !IsSame(before, surface_, t)) error = MeasureTriangle(t, result.misses);
+      result.max_m = std::max(result.max_m, error);
+      if (result.misses.size() > misses) error = kUnknown;  // the miss is to be told again
+    }
+    return result;
   }
 
  private:
+  static constexpr double kUnknown = -1;
+
   std::size_t NodeIndex(std::int64_t i, std::int64_t j) const {
     return static_cast<std::size_t>(j) * static_cast<std::size_t>(cells_ + 1) + static_cast<std::size_t>(i);
   }
@@ -113,11 +139,12 @@ class Meter {
   }
 
   // Rows and, in a row, columns of nodes inside the triangle or on its rim, in integers.
-  void MeasureTriangle(const std::array<std::uint32_t, 3>& triangle) {
+  double MeasureTriangle(std::size_t t, std::vector<tin::SamplePosition>& misses) const {
+    const std::array<std::uint32_t, 3>& triangle = surface_.triangles[t];
     std::array<Point, 3> p;
     for (std::size_t k = 0; k < 3; ++k) p[k] = surface_.points[triangle[k]];
     const std::int64_t area = (p[1].x - p[0].x) * (p[2].y - p[0].y) - (p[1].y - p[0].y) * (p[2].x - p[0].x);
-    if (area <= 0) return;
+    if (area <= 0) return 0;
     const double twice_area = static_cast<double>(area);
     Linear plane;
     if (planar_) plane = Through(p, twice_area, [&](std::size_t k) { return surface_.heights[triangle[k]]; });
@@ -130,7 +157,7 @@ class Meter {
     const auto [low, high] = std::minmax({p[0].y, p[1].y, p[2].y});
     const std::array<EdgeRows, 3> edges = {EdgeRows(p[0], p[1], unit_), EdgeRows(p[1], p[2], unit_),
                                            EdgeRows(p[2], p[0], unit_)};
-    double worst_miss = bound_;
+    double largest = 0, worst_miss = bound_;
     tin::SamplePosition miss;
     bool missed = false;
     for (std::int64_t j = CeilDiv(low, unit_); j * unit_ <= high; ++j) {
@@ -140,7 +167,7 @@ class Meter {
       for (std::int64_t i = first; i <= last; ++i) {
         const double dx = static_cast<double>(i * unit_ - p[0].x), dy = static_cast<double>(y - p[0].y);
         const double error = ErrorAt(plane, chord, static_cast<int>(i), static_cast<int>(j), dx, dy);
-        result_.max_m = std::max(result_.max_m, error);
+        largest = std::max(largest, error);
         if (error > worst_miss && CanMend(i, j)) {
           worst_miss = error;
           miss = {static_cast<std::uint16_t>(i), static_cast<std::uint16_t>(j)};
@@ -148,7 +175,8 @@ class Meter {
         }
       }
     }
-    if (missed) result_.misses.push_back(miss);
+    if (missed) misses.push_back(miss);
+    return largest;
   }
 
   double ErrorAt(const Linear& plane, const std::array<Linear, 3>& chord, int i, int j, double dx, double dy) const {
@@ -166,39 +194,51 @@ class Meter {
     return i > 0 && j > 0 && i < cells_ && j < cells_ && !is_vertex_[NodeIndex(i, j)];
   }
 
-  const LatticeView& lattice_;
-  const Surface surface_;
+  const LatticeView lattice_;
   const int cells_;
-  const std::int64_t unit_;
   const double bound_;
-  const bool planar_, curved_;
+
+  // Of the mesh that is measured.
+  Surface surface_;
+  std::int64_t unit_ = 1;
+  bool planar_ = false, curved_ = false;
   std::vector<bool> is_vertex_;  // by node
+  std::vector<double> errors_;   // by triangle; kUnknown: it is to be measured in any case
+
   std::vector<geo::Vec3> column_up_, row_up_;
   std::vector<double> row_base_;  // by row: the ellipsoid's surface along its normal there
-  TileError result_;
 };
 
-}  // namespace
+TileMeter::TileMeter(const LatticeView& lattice, double bound_m) : impl_(std::make_unique<Impl>(lattice, bound_m)) {}
+TileMeter::~TileMeter() = default;
 
-TileError MeasureTileError(const LatticeView& lattice, const QuantizedTile& tile, double bound_m, bool curved) {
+TileError TileMeter::Measure(const QuantizedTile& tile, bool curved) {
   Surface surface{kQuantizedMax, {}, {}, {}, tile.triangles};
   surface.points.reserve(tile.u.size());
   surface.heights.reserve(tile.u.size());
-  const std::int64_t cells = lattice.cells();
+  const std::int64_t cells = impl_->cells();
   for (std::size_t k = 0; k < tile.u.size(); ++k) {
     surface.points.push_back({tile.u[k] * cells, tile.v[k] * cells});
     surface.heights.push_back(HeightAt(tile, tile.h[k]));
   }
   if (curved) surface.ecef = DecodePositions(tile);
-  return Meter(lattice, std::move(surface), bound_m).Measure();
+  return impl_->Measure(std::move(surface));
+}
+
+TileError TileMeter::MeasureFlat(const tin::TinMesh& mesh, const std::vector<geo::Vec3>& positions) {
+  Surface surface{1, {}, {}, positions, mesh.triangles};
+  surface.points.reserve(mesh.vertices.size());
+  for (const tin::SamplePosition p : mesh.vertices) surface.points.push_back({p.x, p.y});
+  return impl_->Measure(std::move(surface));
+}
+
+TileError MeasureTileError(const LatticeView& lattice, const QuantizedTile& tile, double bound_m, bool curved) {
+  return TileMeter(lattice, bound_m).Measure(tile, curved);
 }
 
 TileError MeasureFlatError(const LatticeView& lattice, const tin::TinMesh& mesh,
                            const std::vector<geo::Vec3>& positions, double bound_m) {
-  Surface surface{1, {}, {}, positions, mesh.triangles};
-  surface.points.reserve(mesh.vertices.size());
-  for (const tin::SamplePosition p : mesh.vertices) surface.points.push_back({p.x, p.y});
-  return Meter(lattice, std::move(surface), bound_m).Measure();
+  return TileMeter(lattice, bound_m).MeasureFlat(mesh, positions);
 }
 
 bool AllCounterClockwise(const QuantizedTile& tile) {

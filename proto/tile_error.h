@@ -1,6 +1,7 @@
 // How far an encoded tile is off, measured on the integers that clients will decode.
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "engine/geo/ellipsoid.h"
@@ -15,6 +16,21 @@ struct TileError {
   // For each triangle that misses the bound, its worst sample that an insertion can mend: inside the tile, no vertex
   // yet.
   std::vector<tin::SamplePosition> misses;
+};
+
+// Measures a tile's mesh again and again while samples are inserted into it: triangles that are what they were the time
+// before are not looked at again. What each function measures is said below, of the one for a single time.
+class TileMeter {
+ public:
+  TileMeter(const LatticeView& lattice, double bound_m);
+  ~TileMeter();
+
+  TileError Measure(const QuantizedTile& tile, bool curved);
+  TileError MeasureFlat(const tin::TinMesh& mesh, const std::vector<geo::Vec3>& positions);
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
 };
 
 // Measures at every lattice sample the height interpolated in longitude and latitude, which is what clients sample, and

@@ -39,7 +39,10 @@ geo::Vec3 LatticeNormal(const LatticeView& lattice, const LocalFrame& frame, geo
       static_cast<double>(lattice.At(p.x, p.y + 1)) - static_cast<double>(lattice.At(p.x, p.y - 1));
   const double east = rise_east / (2 * step * geo::MetresPerDegreeEast(row));
   const double north = rise_north / (2 * step * geo::MetresPerDegreeNorth(row));
-  const double tamed = kSteepestSlope / std::max(std::hypot(east, north), kSteepestSlope);
+  // hypot minds overflow, and takes its time for it.
+  constexpr double kSurelyTame = 0.99 * kSteepestSlope;
+  const bool is_tame = east * east + north * north < kSurelyTame * kSurelyTame;
+  const double tamed = is_tame ? 1 : kSteepestSlope / std::max(std::hypot(east, north), kSteepestSlope);
   return geo::Normalized(frame.up - frame.east * (east * tamed) - frame.north * (north * tamed));
 }
 

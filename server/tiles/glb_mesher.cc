@@ -43,12 +43,13 @@ Result<MeshedGlb> MeshGlb(const dem::DemSource& source, const proto::LatticeView
   tin::TinMesh& mesh = started->mesh;
   double step_m = proto::GridStep(lattice.lattice, wanted_error_m, width);
   const double depth_m = proto::SkirtDepth(lattice.key.level, wanted_error_m);
+  proto::TileMeter meter(lattice, started->error_m);
   for (int round = 1;; ++round) {
     if (stop.stop_requested()) return Cancelled();
     std::vector<proto::GridPoint> points = proto::SnapVertices(lattice, mesh, step_m);
     while (!proto::FitsFloats(points, step_m, depth_m)) points = proto::SnapVertices(lattice, mesh, step_m *= 2);
     const std::vector<geo::Vec3> positions = proto::GridPositions(points, step_m);
-    const proto::TileError error = proto::MeasureFlatError(lattice, mesh, positions, started->error_m);
+    const proto::TileError error = meter.MeasureFlat(mesh, positions);
     meshed.max_error_m = error.max_m;
     if (error.misses.empty() || round == kMaxRounds ||
         mesh.vertices.size() + error.misses.size() > proto::kMaxTileVertices) {

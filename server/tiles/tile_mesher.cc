@@ -44,11 +44,12 @@ proto::EdgeSteps EdgeStepsOf(const dem::DemSource& source, const geo::TileKey& k
 Result<MeshedTile> Finish(tin::TinMesh mesh, const proto::LatticeView& lattice, const proto::EdgeSteps& steps,
                           double error_m, bool curved, const std::stop_token& stop) {
   constexpr int kMaxRounds = 16;  // two are usual; a cliff may keep a sample out of reach for ever
+  proto::TileMeter meter(lattice, error_m);
   for (int round = 1;; ++round) {
     if (stop.stop_requested()) return Cancelled();
     MeshedTile measured;
     measured.tile = proto::QuantizeTile(lattice, mesh, steps);
-    const proto::TileError error = proto::MeasureTileError(lattice, measured.tile, error_m, curved);
+    const proto::TileError error = meter.Measure(measured.tile, curved);
     measured.max_error_m = error.max_m;
     if (error.misses.empty() || round == kMaxRounds ||
         mesh.vertices.size() + error.misses.size() > proto::kMaxTileVertices) {

@@ -26,7 +26,7 @@ using server::Coding;
 using server::TileFormat;
 
 struct Arguments {
-  std::string dem;
+  std::string dem, form;
   int level = 0, step = 0, tiles = 24, runs = 3;
 };
 
@@ -108,7 +108,10 @@ Result<void> Measure(const Variant& variant, const Arguments& arguments, Cost& c
 
 // All forms in turns, so that a busy moment of the machine falls on all of them.
 Result<void> Run(const Arguments& arguments) {
-  const std::vector<Variant> variants = Variants();
+  std::vector<Variant> variants = Variants();
+  std::erase_if(variants,
+                [&](const Variant& variant) { return variant.name.find(arguments.form) == std::string::npos; });
+  if (variants.empty()) return MakeError(ErrorCode::kInvalidArgument, "no form is called \"{}\"", arguments.form);
   std::vector<Cost> costs(variants.size());
   for (int run = 0; run < arguments.runs; ++run) {
     for (std::size_t i = 0; i < variants.size(); ++i) {
@@ -141,6 +144,7 @@ int main(int argc, char** argv) {
   app.add_option("--step", arguments.step, "Ladder step of the error, from -16 (coarse) to 24")
       ->check(CLI::Range(-16, 24));
   app.add_option("--tiles", arguments.tiles, "How many tiles, at most")->check(CLI::PositiveNumber);
+  app.add_option("--form", arguments.form, "Only forms with this in their name");
   app.add_option("--runs", arguments.runs, "Runs; the fastest counts")->check(CLI::PositiveNumber);
   CLI11_PARSE(app, argc, argv);
   spdlog::set_level(spdlog::level::err);  // a raster's warnings come once for each run

@@ -5,7 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <vector>
 
+#include "engine/tin/insert_samples.h"
+#include "proto/grid_mesh.h"
 #include "proto/tile_mesh.h"
 #include "tests/proto/ground.h"
 
@@ -72,6 +75,56 @@ TEST(TileError, ListsForEachTriangleASampleThatMissesTheBound) {
   for (const tin::SamplePosition miss : error.misses) {
     EXPECT_TRUE(miss.x > 0 && miss.y > 0 && miss.x < 64 && miss.y < 64);
   }
+}
+
+void ExpectEqual(const TileError& a, const TileError& b) {
+  EXPECT_EQ(a.max_m, b.max_m);
+  ASSERT_EQ(a.misses.size(), b.misses.size());
+  for (std::size_t i = 0; i < a.misses.size(); ++i) {
+    EXPECT_TRUE(a.misses[i].x == b.misses[i].x && a.misses[i].y == b.misses[i].y) << i;
+  }
+}
+
+// Round by round: what is inserted moves the tile's lowest and highest vertex, and with them all heights, in some
+// rounds and not in others. Then another reading, a mesh of other triangles, and the same one twice.
+TEST(TileMeter, MeasuresAsIfItWereTheFirstTime) {
+  for (const bool curved : {false, true}) {
+    const RandomGround ground({9, 300, 400}, 64, 256, 9);
+    TileMeter meter(ground.view(), 60);
+    tin::TinMesh mesh = GreedyMesh(ground.view(), {.max_error = 150});
+    QuantizedTile tile;
+    int rounds = 0;
+    for (bool misses = true; misses; ++rounds) {
+      ASSERT_LT(rounds, 100);
+      tile = QuantizeTile(ground.view(), mesh, FineSteps());
+      const TileError error = meter.Measure(tile, curved);
+      ExpectEqual(error, MeasureTileError(ground.view(), tile, 60, curved));
+      misses = !error.misses.empty();
+      if (misses) mesh = tin::InsertSamples(mesh, {error.misses.data(), 1 + error.misses.size() / 3});
+    }
+    EXPECT_GT(rounds, 5);
+    const QuantizedTile other = QuantizeTile(ground.view(), GreedyMesh(ground.view(), {.max_error = 100}), FineSteps());
+    for (const QuantizedTile& next : {tile, other, other, tile}) {
+      for (const bool reading : {curved, !curved, !curved}) {
+        ExpectEqual(meter.Measure(next, reading), MeasureTileError(ground.view(), next, 60, reading));
+      }
+    }
+  }
+}
+
+TEST(TileMeter, MeasuresFlatTrianglesAsIfItWereTheFirstTime) {
+  const RandomGround ground({9, 300, 400}, 64, 256, 4);
+  TileMeter meter(ground.view(), 60);
+  tin::TinMesh mesh = GreedyMesh(ground.view(), {.max_error = 150});
+  std::size_t misses = 1;
+  for (const double step : {1.0 / 16, 1.0 / 16, 1.0 / 16, 1.0 / 16, 8.0, 8.0, 1.0 / 64}) {
+    const std::vector<geo::Vec3> positions = GridPositions(SnapVertices(ground.view(), mesh, step), step);
+    const TileError error = meter.MeasureFlat(mesh, positions);
+    ExpectEqual(error, MeasureFlatError(ground.view(), mesh, positions, 60));
+    misses = error.misses.size();
+    mesh = tin::InsertSamples(mesh, {error.misses.data(), misses / 3});
+  }
+  EXPECT_GT(misses, 0u) << "nothing was left to be told again";
 }
 
 }  // namespace
