@@ -104,6 +104,7 @@ struct RasterInfo {
   std::string vertical_operation;            // the PROJ operation that makes them ellipsoidal; empty: none needed
   std::string height_unit;                   // as stated by the band; empty: metres assumed
   bool knows_height_unit = true;             // else heights are taken as metres
+  std::string picture_part;                  // what of a picture the band says it is, "red"; empty: of none
   double pixel_width = 0, pixel_height = 0;  // in units of the CRS
   std::string pixel_unit;                    // "degree", "metre"
   double spacing_m = 0;                      // finer ground axis at the centre, true metres

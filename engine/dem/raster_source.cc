@@ -22,6 +22,13 @@ RasterLayout LayoutOf(GDALDataset& dataset, const Georeference& georeference) {
   return layout;
 }
 
+// A grey band may well be heights, colours and indices into a palette are none.
+std::string PicturePartOf(GDALRasterBand& band) {
+  const GDALColorInterp part = band.GetColorInterpretation();
+  const bool is_picture = part != GCI_Undefined && part != GCI_GrayIndex && part != GCI_AlphaBand;
+  return is_picture ? GDALGetColorInterpretationName(part) : "";
+}
+
 RasterInfo Describe(GDALDataset& dataset, const std::string& path, const Georeference& georeference,
                     const RasterLayout& layout) {
   RasterInfo info;
@@ -34,6 +41,7 @@ RasterInfo Describe(GDALDataset& dataset, const std::string& path, const Georefe
   info.vertical_datum = georeference.vertical_datum();
   info.height_unit = layout.rules.unit;
   info.knows_height_unit = MetresPerUnit(layout.rules.unit).has_value();
+  info.picture_part = PicturePartOf(HeightBand(dataset));
   info.pixel_width = georeference.pixel_width();
   info.pixel_height = georeference.pixel_height();
   info.pixel_unit = georeference.pixel_unit();
@@ -50,6 +58,10 @@ void LogWhatMatters(GDALDataset& dataset, const RasterInfo& info, const Georefer
   }
   if (!info.knows_height_unit) {
     spdlog::warn("{}: height unit \"{}\" is not known, heights are taken as metres", info.path, layout.rules.unit);
+  }
+  if (!info.picture_part.empty()) {
+    spdlog::warn("{}: is a picture (its band 1 is \"{}\"), whose values are taken for heights", info.path,
+                 info.picture_part);
   }
   if (!info.transform.empty()) {
     spdlog::debug("{}: placed by PROJ operation \"{}\": {}", info.path, info.transform, georeference.pipeline());

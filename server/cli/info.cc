@@ -51,6 +51,12 @@ std::vector<std::string> AdviceFor(const dem::RasterInfo& info, double floor) {
                     "`gdal_translate -a_scale FACTOR in out`",
                     info.height_unit));
   }
+  if (!info.picture_part.empty()) {
+    advice.push_back(fmt::format(
+        "band 1 says that it is the \"{}\" of a picture: its values are taken for heights, which they hardly "
+        "are; serve the elevation model that belongs to it",
+        info.picture_part));
+  }
   if (!info.found_voids.empty()) {
     advice.push_back(
         fmt::format("undeclared voids: {}; mend the file, or state `nodata` in the configuration", info.found_voids));
