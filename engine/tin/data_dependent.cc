@@ -69,9 +69,11 @@ void DataDependentCriterion::Begin(TriangleId triangle) {
     if (back != kNoEdge) __builtin_prefetch(&known_[back / 4]);
     const RingVertex u = triangulation_->Seen(triangulation_->corner(edge), vertex_.position);
     const RingVertex v = triangulation_->Seen(triangulation_->corner(Triangulation::Next(edge)), vertex_.position);
+    TERRACE_CHECK(edges < kMostFirstEdges);
     ring[edges++] = u;
     if (Cross(u, v) > 0) continue;
-    if (back == kNoEdge) return;  // on the border
+    TERRACE_CHECK(edges < kMostFirstEdges);  // on two edges: a corner
+    if (back == kNoEdge) return;             // on the border
     ring[edges++] = triangulation_->Seen(triangulation_->corner(Triangulation::Previous(back)), vertex_.position);
   }
   ring[edges] = ring[0];
@@ -85,16 +87,20 @@ bool DataDependentCriterion::Absorbs(const RingVertex& u, const RingVertex& v, c
   Fit uv = TakePending(u.id), uw, wv;
   const bool absorbs = Sees(u, v, w) && IsBetterAlongPw({u, v, w, vertex_.height}, back / 4, uv, uw, wv);
   if (absorbs) {
-    if (wv.error != kUnknown) pending_.push_back(wv);
-    if (uw.error != kUnknown) pending_.push_back(uw);
+    // Known or not: whatever is asked for next has its place.
+    wv.u = w.id;
+    uw.u = u.id;
+    pending_.push_back(wv);
+    pending_.push_back(uw);
   } else if (uv.error != kUnknown) {
     kept_.push_back(uv);
   }
   return absorbs;
 }
 
-// The outline is walked in order, like a stack, and leaves each vertex once: what lies above the edge asked for was on
-// the border and stays.
+// The outline is walked in order, like a stack, and each of its edges that may be asked for has an entry, but for the
+// first ones of an insertion. So what lies above the edge asked for was on the border and stays, and an outline leaves
+// each vertex once: entries are told apart by that one.
 DataDependentCriterion::Fit DataDependentCriterion::TakePending(VertexId u) {
   while (!pending_.empty()) {
     const Fit top = pending_.back();
@@ -198,7 +204,7 @@ bool DataDependentCriterion::IsOnBorder(SamplePosition sample) const {
   const auto is_inside = [](int at, int size) {
     return static_cast<unsigned>(at - 1) < static_cast<unsigned>(size - 2);
   };
-  return !(is_inside(sample.x, field_->width()) & is_inside(sample.y, field_->height()));
+  return !(is_inside(sample.x, field_->width()) && is_inside(sample.y, field_->height()));
 }
 
 DataDependentCriterion::Fit DataDependentCriterion::FitOf(const PlaneMisfit& misfit, SamplePosition p, float p_height,
@@ -228,7 +234,8 @@ double DataDependentCriterion::WorstOnBorders(SamplePosition p, float p_height, 
   return worst;
 }
 
-// Brings what is kept into the order of the star, which is that of the outline, or on the border the outline turned.
+// Brings what is kept into the order of the star: that of the outline. For a vertex on the border the star's order is
+// the outline's turned around; what was kept before the gap then finds no place and is scanned again.
 void DataDependentCriterion::End(const Star& star) {
   kept_.insert(kept_.end(), pending_.rbegin(), pending_.rend());
   CoverSlots();

@@ -31,28 +31,29 @@ struct ShapeQuality {
   double pw = 0;
 };
 
-// Diameters of (u, w, p), (w, v, p), (u, v, p) and (v, u, w), all at once: offsets fit 16 bits, as fields are smaller
-// than 2^15 samples a side. One by one, some of the many comparisons would be branches that nothing could foretell.
-using Shorts = std::int16_t __attribute__((vector_size(16)));
-using Ints = std::int32_t __attribute__((vector_size(16)));
-inline Ints BoxDiameters(const RingVertex& u_vertex, const RingVertex& v_vertex, const RingVertex& w_vertex) {
+// Diameters of (u, w, p), (w, v, p), (u, v, p) and (v, u, w), all at once: coordinates stay below 2^15, so that offsets
+// and extents fit 16 bits. One by one, some of the many comparisons would be branches that nothing could foretell.
+using ShortVector = std::int16_t __attribute__((vector_size(16)));
+using IntVector = std::int32_t __attribute__((vector_size(16)));
+inline IntVector BoxDiameters(const RingVertex& u_vertex, const RingVertex& v_vertex, const RingVertex& w_vertex) {
   const auto pair = [](const RingVertex& vertex) {
     return static_cast<std::int32_t>(static_cast<std::uint32_t>(vertex.dy) << 16 |
                                      (static_cast<std::uint32_t>(vertex.dx) & 0xFFFF));
   };
   const std::int32_t u = pair(u_vertex), v = pair(v_vertex), w = pair(w_vertex);
-  const auto a = reinterpret_cast<Shorts>(Ints{u, w, u, v}), b = reinterpret_cast<Shorts>(Ints{w, v, v, u}),
-             c = reinterpret_cast<Shorts>(Ints{0, 0, 0, w});
-  const auto larger = [](Shorts x, Shorts y) { return x > y ? x : y; };
-  const auto smaller = [](Shorts x, Shorts y) { return x < y ? x : y; };
-  const auto extents = reinterpret_cast<Ints>(larger(larger(a, b), c) - smaller(smaller(a, b), c));
-  const auto of_y = reinterpret_cast<Shorts>(extents >> 16);
-  return reinterpret_cast<Ints>(larger(reinterpret_cast<Shorts>(extents), of_y)) & 0xFFFF;
+  const auto a = reinterpret_cast<ShortVector>(IntVector{u, w, u, v}),
+             b = reinterpret_cast<ShortVector>(IntVector{w, v, v, u}),
+             c = reinterpret_cast<ShortVector>(IntVector{0, 0, 0, w});
+  const auto larger = [](ShortVector x, ShortVector y) { return x > y ? x : y; };
+  const auto smaller = [](ShortVector x, ShortVector y) { return x < y ? x : y; };
+  const auto extents = reinterpret_cast<IntVector>(larger(larger(a, b), c) - smaller(smaller(a, b), c));
+  const auto of_y = reinterpret_cast<ShortVector>(extents >> 16);
+  return reinterpret_cast<IntVector>(larger(reinterpret_cast<ShortVector>(extents), of_y)) & 0xFFFF;
 }
 
 inline ShapeQuality ShapeQualityOf(const Quadrilateral& q) {
   const std::int64_t uvp = Cross(q.u, q.v), uwp = Cross(q.u, q.w), wvp = Cross(q.w, q.v), vuw = uwp + wvp - uvp;
-  const Ints diameters = BoxDiameters(q.u, q.v, q.w);
+  const IntVector diameters = BoxDiameters(q.u, q.v, q.w);
   // Instead of a division by the one, a multiplication by the other.
   const std::int64_t of_pw = std::int64_t{diameters[0]} * diameters[1];
   const std::int64_t of_uv = std::int64_t{diameters[2]} * diameters[3];

@@ -188,6 +188,21 @@ TEST(DataDependent, ChoosesAsTheFullTestOfEveryQuadrilateral) {
   }
 }
 
+// Between 0 and 1 cuts are decided by shape and by fit in turns, and what is known of a triangle must not be taken for
+// what is known of the one in its place.
+TEST(DataDependent, ChoosesAsTheFullTestWhereShapeAndFitTakeTurns) {
+  for (std::uint64_t seed = 0; seed < 60; ++seed) {
+    Random random(seed);
+    const int width = 8 + random.Below(20), height = 8 + random.Below(20);
+    const HeightField field = seed % 2 == 0 ? StepField(width, height, 3, seed) : HillField(width, height, seed);
+    const FitMeasure measure = seed % 3 == 0 ? kMeasures[seed / 3 % 4] : FitMeasure::kSumSquares;
+    const double qthresh = seed % 5 == 0 ? 0.8 : 0.3;
+    ASSERT_TRUE(AreEqual(MeshAt(field, {0.5}, DataDependent(measure, qthresh)),
+                         NaiveDataDependent(field, {measure, qthresh}).Run(0.5)))
+        << seed << ", measure " << static_cast<int>(measure) << ", " << qthresh;
+  }
+}
+
 TEST(DataDependent, KeepsTheBoundAtEverySampleByEveryMeasure) {
   const HeightField fields[] = {HillField(65, 65, 1), NoiseField(40, 33, 2), StepField(30, 30, 50, 3),
                                 FieldWithVoids(40, 40, 4)};
