@@ -115,9 +115,10 @@ struct RasterInfo {
   std::optional<double> nodata;
   std::string found_voids;  // what find_voids found, for people; empty: nothing
   std::vector<int> overview_factors;
-  std::string transform;        // the PROJ operation from EPSG:4326 to the source, for the log; empty: none needed
-  bool needs_averages = false;  // large, and without overviews
-  bool prepared = false;        // it has averages in the cache folder
+  std::string overviews_unused;  // why those that it has are not, with a way out; empty: they are, or there are none
+  std::string transform;         // the PROJ operation from EPSG:4326 to the source, for the log; empty: none needed
+  bool needs_averages = false;   // large, and without overviews
+  bool prepared = false;         // it has averages in the cache folder
   double seconds_to_open = 0;
 };
 

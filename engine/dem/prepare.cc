@@ -33,6 +33,7 @@ std::uint64_t KeyOf(const RasterLayout& layout, bool find_voids, const std::stri
   writer.Put(static_cast<std::uint32_t>(rules.marks.size()));
   for (const double mark : rules.marks) writer.Put(mark);
   for (const int factor : layout.overview_factors) writer.Put(factor);
+  writer.Put(layout.coast_step_m);
   const std::string bytes = writer.Take();
   return XXH3_64bits(bytes.data(), bytes.size());
 }

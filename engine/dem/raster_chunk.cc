@@ -52,7 +52,7 @@ Chunk WithHalo(const Chunk& chunk, const RasterLayout& layout) {
 
 void CountSamples(const Samples& samples, const Chunk& chunk, const RasterLayout& layout, ChunkSurvey& survey) {
   survey.zeros.Add(samples.Row(chunk.row) + (chunk.col - samples.box.col), samples.box.cols, chunk, layout.width,
-                   layout.height);
+                   layout.height, layout.coast_step_m);
   const int columns = DivideUp(chunk.cols, RangeTable::kBlock);
   for (int r = 0; r < chunk.rows; ++r) {
     const float* row = samples.Row(chunk.row + r) + (chunk.col - samples.box.col);

@@ -22,6 +22,40 @@ RasterLayout LayoutOf(GDALDataset& dataset, const Georeference& georeference) {
   return layout;
 }
 
+// Leaves the overviews that can be used in the layout; why the others cannot, empty if there are none.
+std::string DropMisleadingOverviews(GDALDataset& dataset, RasterLayout& layout) {
+  if (HeightBand(dataset).GetOverviewCount() == 0) return {};
+  if (layout.overview_factors.empty()) {
+    return "their sides are not those of the raster by 2, 4, 8 .., rounded up (COGs have others where sides are odd); "
+           "`gdal_translate in out` without them and `gdaladdo -r average out` make such ones";
+  }
+  std::string why = WhyOverviewsMislead(dataset, layout.rules);
+  if (!why.empty()) layout.overview_factors.clear();
+  return why;
+}
+
+// The same, once all samples were looked at.
+std::string DropOverviewsBy(const RasterSurvey& survey, GDALRasterBand& band, RasterLayout& layout) {
+  if (layout.overview_factors.empty()) return {};
+  int is_declared = 0;
+  band.GetNoDataValue(&is_declared);
+  const BlockRange all = survey.table.Whole();
+  std::string why;
+  if (layout.rules.has_mask && (all.min < survey.lowest || all.max > survey.highest)) {
+    why =
+        "they have heights that the raster has not, as if they were made without its mask; copy it with "
+        "`gdal_translate "
+        "--config GDAL_TIFF_INTERNAL_MASK YES in out` and make the copy's overviews";
+  } else if (layout.rules.nodata && is_declared == 0 && survey.voids > 0) {
+    why =
+        "they were made of voids too, which are not declared; declare them in a copy with `gdal_translate -a_nodata "
+        "-32768 "
+        "in out` and make its overviews";
+  }
+  if (!why.empty()) layout.overview_factors.clear();
+  return why;
+}
+
 // A grey band may well be heights, colours and indices into a palette are none.
 std::string PicturePartOf(GDALRasterBand& band) {
   const GDALColorInterp part = band.GetColorInterpretation();
@@ -58,6 +92,9 @@ void LogWhatMatters(GDALDataset& dataset, const RasterInfo& info, const Georefer
   }
   if (!info.knows_height_unit) {
     spdlog::warn("{}: height unit \"{}\" is not known, heights are taken as metres", info.path, layout.rules.unit);
+  }
+  if (!info.overviews_unused.empty()) {
+    spdlog::warn("{}: its overviews are not used: {}", info.path, info.overviews_unused);
   }
   if (!info.picture_part.empty()) {
     spdlog::warn("{}: is a picture (its band 1 is \"{}\"), whose values are taken for heights", info.path,
@@ -105,12 +142,21 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
   std::unique_ptr<RasterSource> source(
       new RasterSource(path, *std::move(files), *std::move(georeference), std::move(handles)));
   source->layout_ = LayoutOf(**dataset, source->georeference_);
+  source->layout_.coast_step_m = ZeroEdges::CoastStep(spacing->finer);
   auto vertical = ResolveVertical(options.vertical, source->georeference_, CentreOf(source->georeference_));
   if (!vertical) return MakeError(vertical.error().code, "{}: {}", path, vertical.error().message);
   source->vertical_ = *std::move(vertical);
   source->layout_.rules.marks = options.nodata;
-  auto prepared =
-      PrepareRaster(**dataset, source->layout_, path, source->files(), {cache_dir, options.find_voids, progress, stop});
+  std::string overviews_unused = DropMisleadingOverviews(**dataset, source->layout_);
+  const PrepareOptions prepare{cache_dir, options.find_voids, progress, stop};
+  auto prepared = PrepareRaster(**dataset, source->layout_, path, source->files(), prepare);
+  if (prepared && !prepared->findings.any()) {
+    const std::string why = DropOverviewsBy(prepared->survey, HeightBand(**dataset), source->layout_);
+    if (!why.empty()) {
+      overviews_unused = why;
+      prepared = PrepareRaster(**dataset, source->layout_, path, source->files(), prepare);
+    }
+  }
   if (!prepared) return tl::unexpected(prepared.error());
   source->layout_ = WithFindings(std::move(source->layout_), prepared->findings);
   source->survey_ = std::move(prepared->survey);
@@ -122,6 +168,7 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
   source->footprint_ = Footprint::Of(source->georeference_);
   source->spacing_ = *spacing;
   source->info_ = Describe(**dataset, path, source->georeference_, source->layout_);
+  source->info_.overviews_unused = std::move(overviews_unused);
   source->info_.needs_averages = NeedsAverages(source->layout_);
   source->info_.prepared = source->averages_ != nullptr;
   source->info_.seconds_to_open = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

@@ -19,6 +19,7 @@ struct RasterLayout {
   bool wraps = false;         // column `columns` is column 0 again
   SampleRules rules;
   std::vector<int> overview_factors;  // powers of two, ascending; overviews of other factors are left alone
+  double coast_step_m = 100;          // ZeroEdges::CoastStep
 };
 
 // One axis of the averaged grid. Positions are in source pixels.

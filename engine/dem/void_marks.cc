@@ -17,8 +17,7 @@ constexpr double kAloneWithin = 1'000;  // metres
 constexpr double kLowestLand = -500, kHighest = 9'000, kDeepest = -12'000;
 constexpr int kReach = 3;  // samples: kernels of resampling reach 2, rounded up for oblique ones
 constexpr int kMixedRim = 2, kCollarRim = 1;
-constexpr double kCollarStep = 100;  // metres
-constexpr int kChunk = 1024;         // samples along a side
+constexpr int kChunk = 1024;  // samples along a side
 
 // What the second look at a raster counts.
 struct Evidence {
@@ -107,14 +106,14 @@ class Looker {
 
 }  // namespace
 
-void ZeroEdges::Add(const float* heights, std::ptrdiff_t stride, const Chunk& part, int raster_width,
-                    int raster_height) {
+void ZeroEdges::Add(const float* heights, std::ptrdiff_t stride, const Chunk& part, int raster_width, int raster_height,
+                    double step_m) {
   const int cols = part.cols, rows = part.rows;
   const bool left = part.col == 0, right = part.col + cols == raster_width;
-  const auto pair = [this](float a, float b) {
+  const auto pair = [this, step = static_cast<float>(step_m)](float a, float b) {
     if ((a == 0) == (b == 0)) return;
     const float other = std::abs(a + b);
-    if (other > kCollarStep) {
+    if (other > step) {
       ++high;
     } else if (other > 0) {  // not of NaN
       ++low;

@@ -4,6 +4,7 @@
 // Real terrain must not be lost: every rule looks at the whole raster, and one sample that speaks against it is enough.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <functional>
 #include <limits>
@@ -20,21 +21,26 @@ struct Chunk;  // raster_chunk.h
 
 // How the zeros of a raster meet other heights, counted while it is scanned.
 struct ZeroEdges {
-  std::int64_t high = 0, low = 0;         // pairs of neighbours, one zero and one farther from it than 100 m, or nearer
+  std::int64_t high = 0, low = 0;  // pairs of neighbours, one zero and one farther from it than a step, or nearer
   std::int64_t zeros = 0, at_border = 0;  // all, and those in the outermost rows and columns
   // The ground, samples that are no zeros: the first and last columns and rows it lies in, and two of its heights that
   // differ, if there are.
   std::int32_t west = std::numeric_limits<std::int32_t>::max(), east = -1, north = west, south = -1;
   float lowest = std::numeric_limits<float>::infinity(), highest = -lowest;
 
+  // Metres from a coast's last sea to its first land, at most: 100, and where samples lie far apart, a slope of one in
+  // ten.
+  static double CoastStep(double spacing_m) { return std::max(100.0, spacing_m / 10); }
+
   // Heights of a part of a raster of that size; `stride` values lie from one row to the next.
-  void Add(const float* heights, std::ptrdiff_t stride, const Chunk& part, int raster_width, int raster_height);
+  void Add(const float* heights, std::ptrdiff_t stride, const Chunk& part, int raster_width, int raster_height,
+           double step_m);
   void Add(const ZeroEdges& other);
 
-  // Zeros that reach the border of a raster of that size, beside nearly all of which the ground is more than 100 m off:
-  // no sea looks so. They lie in areas or along the border; those strewn over the raster are something else. What they
-  // surround is no single height, and reaches to all four sides of the raster or nearly: a raster is no larger than its
-  // data. A block or an island with cliffs on flat ground at 0 m does not.
+  // Zeros that reach the border of a raster of that size, beside nearly all of which the ground is more than a step
+  // off: no sea looks so. They lie in areas or along the border; those strewn over the raster are something else. What
+  // they surround is no single height, and reaches to all four sides of the raster or nearly: a raster is no larger
+  // than its data. A block or an island with cliffs on flat ground at 0 m does not.
   bool IsCollar(int raster_width, int raster_height) const;
 
  private:

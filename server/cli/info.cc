@@ -29,6 +29,13 @@ constexpr double kAveragesBytesPerSample = 4.0 / 3;
 
 std::string NoOverviewsAdvice(const dem::RasterInfo& info) {
   if (info.prepared) return "no overviews: their place is taken by averages in the cache folder";
+  if (!info.overviews_unused.empty()) {
+    return fmt::format(
+        "overviews not used: {}; or serve with a cache_dir: averages are then prepared there once, about {:.0f} MB in "
+        "about {:.0f} s",
+        info.overviews_unused, std::ceil(static_cast<double>(info.valid_samples) * kAveragesBytesPerSample / 1e6),
+        std::ceil(info.seconds_to_open));
+  }
   return fmt::format(
       "no overviews: shallow tiles read the whole raster; run 'gdaladdo -r average {}', or serve with a cache_dir: its "
       "averages are then prepared there once, about {:.0f} MB in about {:.0f} s",
@@ -39,7 +46,11 @@ std::string NoOverviewsAdvice(const dem::RasterInfo& info) {
 // What a user should do about this raster; empty when nothing.
 std::vector<std::string> AdviceFor(const dem::RasterInfo& info, double floor) {
   std::vector<std::string> advice;
-  if (info.needs_averages) advice.push_back(NoOverviewsAdvice(info));
+  if (info.needs_averages) {
+    advice.push_back(NoOverviewsAdvice(info));
+  } else if (!info.overviews_unused.empty()) {
+    advice.push_back("overviews not used: " + info.overviews_unused);
+  }
   if (info.counts_from.empty()) {
     advice.push_back(
         "no vertical datum stated: heights are taken as metres above the WGS 84 ellipsoid as they are; heights above "

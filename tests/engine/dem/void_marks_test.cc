@@ -2,9 +2,11 @@
 // like it.
 #include "engine/dem/void_marks.h"
 
+#include <cpl_conv.h>
 #include <gdal_priv.h>
 
 #include <cmath>
+#include <cstdint>
 #include <functional>
 #include <vector>
 
@@ -163,6 +165,20 @@ TEST(VoidMarks, ASeaIsNoCollar) {
   EXPECT_EQ(InfoOf(*source).void_samples, 0u);
 }
 
+// Samples ten minutes apart: beside the sea the next one lies hundreds of metres up, at every coast of a steep country.
+TEST(VoidMarks, ASeaOfACoarseRasterIsNoCollar) {
+  const TempDir dir;
+  RasterSpec spec = Drawn([](int col, int row) {
+    const double inland = 95 - std::abs(col - 100) - 0.5 * std::abs(row - 100) + 20 * std::sin(col + row / 3.0);
+    return inland <= 0 && row > 3 ? 0 : std::round(250 + 20 * std::abs(inland));
+  });
+  spec.geo_transform = {-80, 1.0 / 6, 0, 10, 0, -1.0 / 6};
+  const auto source = OpenOrFail(WriteRaster(dir, spec));
+  ASSERT_NE(source, nullptr);
+  EXPECT_EQ(InfoOf(*source).found_voids, "");
+  EXPECT_EQ(InfoOf(*source).void_samples, 0u);
+}
+
 TEST(VoidMarks, FlatGroundAtZeroBelowACliffStays) {
   const std::vector<std::function<double(int, int)>> grounds = {
       [](int col, int) { return col < 100 ? 0.0 : 9000.0; },                                           // one step
@@ -215,6 +231,90 @@ TEST(VoidMarks, AnUndeclaredVoidOfARealRasterIsServedLikeADeclaredOne) {
       ASSERT_EQ(a->heights, b->heights) << geo::ToString(key);
     }
   }
+}
+
+// Overviews that were made of voids too.
+
+RasterSpec WithOverviews(double mark, const std::string& type = "Float32") {
+  RasterSpec spec = Drawn(
+      [mark](int col, int row) { return std::hypot(col - 100, row - 100) < 60 ? std::round(Land(col, row)) : mark; });
+  spec.type = type;
+  spec.nodata.reset();
+  spec.overviews = {2, 4, 8};
+  return spec;
+}
+
+void ExpectUnused(const std::string& path, const SourceOptions& options, const std::string& why) {
+  const auto source = OpenOrFail(path, {.source = options, .floor = 1000});
+  ASSERT_NE(source, nullptr);
+  EXPECT_NE(InfoOf(*source).overviews_unused.find(why), std::string::npos) << InfoOf(*source).overviews_unused;
+  EXPECT_TRUE(InfoOf(*source).overview_factors.empty());
+  ExpectHeightsWithin(*source, 1000, 1400);
+}
+
+TEST(Overviews, OfSamplesThatTheConfigurationCallsVoidsAreNotUsed) {
+  const TempDir dir;
+  const std::string path = WriteRaster(dir, WithOverviews(500));
+  ExpectUnused(path, {.vertical = "unknown", .nodata = {500}}, "`nodata` of the configuration");
+  const auto trusted = OpenOrFail(path, {.source = {.vertical = "unknown"}});
+  ASSERT_NE(trusted, nullptr);
+  EXPECT_EQ(InfoOf(*trusted).overview_factors, (std::vector<int>{2, 4, 8}));
+  EXPECT_EQ(InfoOf(*trusted).overviews_unused, "");
+
+  RasterSpec declared = WithOverviews(500);
+  declared.nodata = 500;  // what is stated twice is declared
+  const auto both =
+      OpenOrFail(WriteRaster(dir, declared, "declared.tif"), {.source = {.vertical = "unknown", .nodata = {500}}});
+  ASSERT_NE(both, nullptr);
+  EXPECT_EQ(InfoOf(*both).overviews_unused, "");
+}
+
+TEST(Overviews, OfUndeclaredVoidsAreNotUsed) {
+  const TempDir dir;
+  ExpectUnused(WriteRaster(dir, WithOverviews(-32768, "Int16")), {.vertical = "unknown"}, "not declared");
+  RasterSpec whole = WithOverviews(1100, "Int16");  // without a void nothing has to be declared
+  const auto source = OpenOrFail(WriteRaster(dir, whole, "whole.tif"), {.source = {.vertical = "unknown"}});
+  ASSERT_NE(source, nullptr);
+  EXPECT_EQ(InfoOf(*source).overview_factors, (std::vector<int>{2, 4, 8}));
+}
+
+// Hides everything outside of the circle with GDAL's mask, in the file or beside it, before or after overviews are
+// made.
+std::string WriteMasked(const TempDir& dir, bool inside, bool overviews_first) {
+  RasterSpec spec = WithOverviews(0);
+  if (!overviews_first) spec.overviews.clear();
+  const std::string path = WriteRaster(dir, spec, inside ? "inside.tif" : "beside.tif");
+  CPLSetConfigOption("GDAL_TIFF_INTERNAL_MASK", inside ? "YES" : "NO");
+  {
+    const GDALDatasetUniquePtr dataset(GDALDataset::Open(path.c_str(), GDAL_OF_RASTER | GDAL_OF_UPDATE));
+    EXPECT_EQ(dataset->CreateMaskBand(GMF_PER_DATASET), CE_None);
+    for (int row = 0; row < spec.height; ++row) {
+      std::vector<std::uint8_t> line;
+      for (int col = 0; col < spec.width; ++col) line.push_back(spec.value(col, row) > 0 ? 255 : 0);
+      EXPECT_EQ(dataset->GetRasterBand(1)->GetMaskBand()->RasterIO(GF_Write, 0, row, spec.width, 1, line.data(),
+                                                                   spec.width, 1, GDT_Byte, 0, 0, nullptr),
+                CE_None);
+    }
+  }
+  if (!overviews_first) {
+    const GDALDatasetUniquePtr dataset(GDALDataset::Open(path.c_str(), GDAL_OF_RASTER | GDAL_OF_UPDATE));
+    const std::vector<int> factors = {2, 4, 8};
+    EXPECT_EQ(dataset->BuildOverviews("AVERAGE", 3, factors.data(), 0, nullptr, GDALDummyProgress, nullptr), CE_None);
+  }
+  CPLSetConfigOption("GDAL_TIFF_INTERNAL_MASK", nullptr);
+  return path;
+}
+
+TEST(Overviews, WithoutTheMaskOfTheRasterAreNotUsed) {
+  const TempDir dir;
+  ExpectUnused(WriteMasked(dir, false, false), {.vertical = "unknown"}, "the mask in a file of its own");
+  const TempDir other;
+  ExpectUnused(WriteMasked(other, true, true), {.vertical = "unknown"}, "heights that the raster has not");
+  const TempDir third;
+  const auto source = OpenOrFail(WriteMasked(third, true, false), {.source = {.vertical = "unknown"}, .floor = 1000});
+  ASSERT_NE(source, nullptr);
+  EXPECT_EQ(InfoOf(*source).overview_factors, (std::vector<int>{2, 4, 8}));
+  ExpectHeightsWithin(*source, 1000, 1400);
 }
 
 }  // namespace
