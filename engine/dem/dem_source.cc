@@ -125,8 +125,9 @@ Result<Rasters> OpenAll(std::vector<DemFile>& files, const DemOptions& options) 
   const std::string first = files.front().path;
   LeaveOutOthers(files);
   if (files.empty()) {
-    return MakeError(ErrorCode::kNotFound, "{}: no raster lies in its folder; name a folder of rasters or a raster",
-                     first);
+    return MakeError(
+        ErrorCode::kNotFound,
+        "{} and its like: none of the files in this folder is a raster; name a folder of rasters or a raster", first);
   }
   const auto handles = std::make_shared<HandleLimit>(options.max_open_sources);
   Rasters rasters;

@@ -220,7 +220,9 @@ void Georeference::FindPeriod(const OGRSpatialReference& srs) {
   period_ = std::abs(full_circle_ / to_crs_[1]);
   const double whole = std::round(period_);
   // A pixel size of 0.008333333333 is meant to be 1/120: a hundredth of a pixel around the Earth is no gap.
-  if (std::abs(period_ - whole) < 0.01 && width_ >= whole) wrap_columns_ = static_cast<int>(whole);
+  if (!(std::abs(period_ - whole) < 0.01 && width_ >= whole)) return;
+  wrap_columns_ = static_cast<int>(whole);
+  period_ = whole;  // and no place is between the last column and the first
 }
 
 double Georeference::CanonicalColumn(double column) const {

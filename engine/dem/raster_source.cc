@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <chrono>
+#include <cmath>
 #include <utility>
 
 #include "engine/dem/gdal_runtime.h"
@@ -142,6 +143,13 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
   std::unique_ptr<RasterSource> source(
       new RasterSource(path, *std::move(files), *std::move(georeference), std::move(handles)));
   source->layout_ = LayoutOf(**dataset, source->georeference_);
+  if (const double scale = source->layout_.rules.scale; !std::isfinite(scale) || scale == 0) {
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "{}: states a scale of {}, by which no sample has a height; correct it with `gdal_translate -a_scale "
+        "1 -a_offset 0 in out`",
+        path, scale);
+  }
   source->layout_.coast_step_m = ZeroEdges::CoastStep(spacing->finer);
   auto vertical = ResolveVertical(options.vertical, source->georeference_, CentreOf(source->georeference_));
   if (!vertical) return MakeError(vertical.error().code, "{}: {}", path, vertical.error().message);

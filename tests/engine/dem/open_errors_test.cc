@@ -2,6 +2,7 @@
 #include <gdal_priv.h>
 
 #include <fstream>
+#include <limits>
 
 #include "engine/dem/raster_file.h"
 #include "tests/engine/dem/dem_fixture.h"
@@ -65,6 +66,13 @@ TEST(OpenErrors, NameUnusableSamples) {
   ExpectRefused(WriteRaster(dir, {.type = "CFloat32"}), {"complex", "gdal_translate -ot Float32"});
   ExpectRefused(WriteRaster(dir, {.nodata = 0}), {"only voids", "gdal_translate -a_nodata"});
   ExpectRefused(WriteRaster(dir, {.width = 1}), {"1 x 16"});
+}
+
+TEST(OpenErrors, NameAScaleThatLeavesNoHeight) {
+  const TempDir dir;
+  for (const double scale : {0.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+    ExpectRefused(WriteRaster(dir, {.scale = scale, .offset = 100}), {"scale of", "gdal_translate -a_scale"});
+  }
 }
 
 TEST(OpenErrors, RefuseBombsBeforeReading) {

@@ -85,6 +85,22 @@ TEST(Points, GoRoundTheEarth) {
   EXPECT_NEAR((*heights)[4], 179.75, .3);
 }
 
+// Corners are written with few digits: what is left between the last column and the first is no gap.
+TEST(Points, LieNowhereBetweenTheEndsOfAGlobalRaster) {
+  const TempDir dir;
+  RasterSpec spec{.width = 360, .height = 180, .geo_transform = {-180, 359.9985 / 360, 0, 90, 0, -1}};
+  spec.value = [](int col, int) { return col < 180 ? col : 359 - col; };
+  const auto source = OpenOrFail(WriteRaster(dir, spec));
+  ASSERT_NE(source, nullptr);
+  std::vector<GeoPosition> points;
+  for (const double longitude : {179.9, 179.998, 179.9987, 179.999, 180.0, -180.0, -179.9995, -179.99}) {
+    points.push_back({longitude, 10});
+  }
+  const auto heights = source->ReadPoints(points);
+  ASSERT_TRUE(heights);
+  for (std::size_t i = 0; i < points.size(); ++i) EXPECT_NEAR((*heights)[i], 0, .01) << points[i].longitude;
+}
+
 // Eastings that go on beyond the antimeridian, or from the prime meridian all around.
 TEST(Points, OfACylindricalProjectionLieOnBothSidesOfTheAntimeridian) {
   constexpr double kHalfTurn = 20'037'508.342789244;  // of EPSG:3857, metres
