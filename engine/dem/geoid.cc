@@ -72,7 +72,7 @@ std::vector<Grid> GridsOf(PJ_CONTEXT* context, const PJ* operation) {
 }
 
 std::string HowToGet(const Grid& grid) {
-  const std::string from = grid.url.empty() ? "from https://cdn.proj.org" : grid.url;
+  const std::string from = grid.url.empty() ? "it from https://cdn.proj.org" : grid.url;
   return fmt::format(
       "its grid {} is not installed: get {} and put it into a folder of PROJ's (/usr/share/proj, or one "
       "that PROJ_DATA names)",
