@@ -156,5 +156,19 @@ TEST(DemSource, LeavesNoFilesBesideTheSource) {
   EXPECT_EQ(std::distance(begin(files), end(files)), 1);
 }
 
+// What holds colours is served all the same, but said to.
+TEST(DemSource, TellsPicturesFromHeights) {
+  TERRACE_REQUIRE_DATA(photo, "ortho_pair_rgb_2m.tif");
+  TERRACE_REQUIRE_DATA(palette, "bluemarble_1920x960.tif");
+  TERRACE_REQUIRE_DATA(bytes, "ortho_pair_dtm_2m_byte.tif");
+  const auto part_of = [](const std::string& path) {
+    const auto source = OpenOrFail(path);
+    return source == nullptr ? "" : source->info().sources.front().picture_part;
+  };
+  EXPECT_EQ(part_of(photo), "Red");
+  EXPECT_EQ(part_of(palette), "Palette");
+  EXPECT_EQ(part_of(bytes), "");
+}
+
 }  // namespace
 }  // namespace terrace::dem
