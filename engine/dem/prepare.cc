@@ -50,7 +50,8 @@ class Preparer {
         shape_{layout, KeyOf(layout, options.find_voids, path, files), {}},
         chunks_(layout.width, layout.height) {
     if (!options.cache_dir.empty()) {
-      record_ = RecordPath(options.cache_dir, path, layout.rules.marks, options.find_voids);
+      record_ =
+          RecordPath(options.cache_dir, path, layout.rules.marks, options.find_voids, !layout.overview_factors.empty());
     }
     prepared_.preparation.parts = chunks_.count();
   }
@@ -165,7 +166,7 @@ class Preparer {
 }  // namespace
 
 std::string RecordPath(const std::string& cache_dir, const std::string& path, const std::vector<double>& marks,
-                       bool find_voids) {
+                       bool find_voids, bool has_overviews) {
   std::error_code unresolved;
   std::filesystem::path whole = std::filesystem::weakly_canonical(path, unresolved);
   if (unresolved) whole = path;
@@ -173,6 +174,7 @@ std::string RecordPath(const std::string& cache_dir, const std::string& path, co
   writer.PutBytes(whole.string());
   for (const double mark : marks) writer.Put(mark);
   if (!find_voids) writer.Put<std::uint8_t>(0);
+  if (has_overviews) writer.Put<std::uint8_t>(1);
   const std::string bytes = writer.Take();
   return (std::filesystem::path(cache_dir) /
           fmt::format("{}-{:016x}.survey", whole.filename().string(), XXH3_64bits(bytes.data(), bytes.size())))

@@ -43,9 +43,10 @@ struct PreparedRaster {
 Result<PreparedRaster> PrepareRaster(GDALDataset& dataset, const RasterLayout& layout, const std::string& path,
                                      const StampedFiles& files, const PrepareOptions& options);
 
-// The record of a raster: named after its file and a hash of its whole path and of what its owner says of its voids, as
-// two datasets may have one file and think differently of it.
+// The record of a raster: named after its file and a hash of its whole path, of what its owner says of its voids, as
+// two datasets may have one file and think differently of it, and of whether overviews are used: where they turn out to
+// be made of voids it takes two records, one to know that and one without them, and both are found again.
 std::string RecordPath(const std::string& cache_dir, const std::string& path, const std::vector<double>& marks = {},
-                       bool find_voids = true);
+                       bool find_voids = true, bool has_overviews = false);
 
 }  // namespace terrace::dem

@@ -9,8 +9,10 @@
 #include <algorithm>
 #include <cmath>
 #include <csignal>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <map>
 #include <random>
 
 #include "engine/dem/grid_cells.h"
@@ -241,6 +243,31 @@ TEST(Prepare, TwoProcessesShareOneRecord) {
   EXPECT_TRUE(source->preparation().from_record);
   ExpectSameAverages(path, *source);
   EXPECT_FALSE(std::filesystem::exists(RecordPath(cache, path) + ".partial"));
+}
+
+TEST(Prepare, RastersWhoseOverviewsMisleadAreLookedAtOnce) {
+  const TempDir dir;
+  RasterSpec spec{.width = 300, .height = 200, .type = "Int16", .geo_transform = {8, .01, 0, 47, 0, -.01}};
+  spec.overviews = {2, 4};
+  spec.value = [](int col, int row) { return col < 100 && row < 90 ? -32768 : 500 + col; };  // not declared
+  const std::string path = WriteRaster(dir, spec), cache = dir.File("cache");
+  using Times = std::map<std::string, std::filesystem::file_time_type>;
+  const auto times = [&] {
+    Times times;
+    for (const auto& entry : std::filesystem::directory_iterator(cache)) {
+      times[entry.path().filename()] = entry.last_write_time();
+    }
+    return times;
+  };
+  const auto source = OpenRecorded(path, cache);
+  EXPECT_FALSE(source->info().overviews_unused.empty());
+  const Times made = times();
+  EXPECT_EQ(made.size(), 2u);
+  const auto again = OpenRecorded(path, cache);
+  EXPECT_TRUE(again->preparation().from_record);
+  EXPECT_EQ(again->info().overviews_unused, source->info().overviews_unused);
+  EXPECT_EQ(times(), made);
+  ExpectSameAverages(path, *again);
 }
 
 TEST(Prepare, NeverBelievesADamagedRecord) {
