@@ -118,7 +118,7 @@ void AddFactor(const RasterLayout& layout, const CoarseAverages& coarse, int fac
         for (int x = block(xs[i].position, differences.columns); x <= block(xs[i + 1].position, differences.columns);
              ++x) {
           float& known = differences.errors[static_cast<std::size_t>(y * differences.columns + x)];
-          known = std::max(known, std::nextafter(static_cast<float>(error), std::numeric_limits<float>::max()));
+          known = std::max(known, std::nextafter(static_cast<float>(error), std::numeric_limits<float>::infinity()));
         }
       }
     }

@@ -224,8 +224,8 @@ class DemSource {
   // Since it was opened, in all threads; for metrics.
   SampleCounts CountSamples() const;
 
-  // Identifies content and options: device, inode, size, mtime of all files in their order, and every option that
-  // changes heights.
+  // Identifies content and options: device, inode, size, mtime and ctime of all files in their order, and every option
+  // that changes heights.
   std::uint64_t fingerprint() const;
 
   // What it is read from, as it was when it was opened.

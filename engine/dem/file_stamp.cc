@@ -12,11 +12,12 @@ namespace terrace::dem {
 std::optional<FileStamp> StampOf(const std::string& path) {
   struct stat status {};
   if (::stat(path.c_str(), &status) != 0 || !S_ISREG(status.st_mode)) return std::nullopt;
-  constexpr std::uint64_t kNanoseconds = 1'000'000'000;
+  const auto nanoseconds = [](const timespec& time) {
+    return static_cast<std::uint64_t>(time.tv_sec) * 1'000'000'000 + static_cast<std::uint64_t>(time.tv_nsec);
+  };
   return FileStamp{static_cast<std::uint64_t>(status.st_dev), static_cast<std::uint64_t>(status.st_ino),
-                   static_cast<std::uint64_t>(status.st_size),
-                   static_cast<std::uint64_t>(status.st_mtim.tv_sec) * kNanoseconds +
-                       static_cast<std::uint64_t>(status.st_mtim.tv_nsec)};
+                   static_cast<std::uint64_t>(status.st_size), nanoseconds(status.st_mtim),
+                   nanoseconds(status.st_ctim)};
 }
 
 Error ChangedError(const std::string& path) {
@@ -63,7 +64,10 @@ std::optional<std::string> StampedFiles::FirstChanged() const {
 std::uint64_t StampedFiles::fingerprint() const {
   ByteWriter writer;
   for (const FileStamp& stamp : stamps_) {
-    for (const std::uint64_t part : {stamp.device, stamp.inode, stamp.size, stamp.modified_ns}) writer.Put(part);
+    for (const std::uint64_t part :
+         {stamp.device, stamp.inode, stamp.size, stamp.modified_ns, stamp.status_changed_ns}) {
+      writer.Put(part);
+    }
   }
   const std::string bytes = writer.Take();
   return XXH3_64bits(bytes.data(), bytes.size());

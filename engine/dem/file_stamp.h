@@ -13,8 +13,13 @@ namespace terrace::dem {
 
 struct FileStamp {
   std::uint64_t device = 0, inode = 0, size = 0, modified_ns = 0;
+  // When any of it changed last, which nobody can set back. It tells apart what is kept for the next start. Files in
+  // use are not compared by it: a change of their permissions would be one.
+  std::uint64_t status_changed_ns = 0;
 
-  friend bool operator==(const FileStamp&, const FileStamp&) = default;
+  friend bool operator==(const FileStamp& a, const FileStamp& b) {
+    return a.device == b.device && a.inode == b.inode && a.size == b.size && a.modified_ns == b.modified_ns;
+  }
 };
 
 // Nothing when there is no regular file of that name.

@@ -220,13 +220,13 @@ void Georeference::FindPeriod(const OGRSpatialReference& srs) {
   period_ = std::abs(full_circle_ / to_crs_[1]);
   const double whole = std::round(period_);
   // A pixel size of 0.008333333333 is meant to be 1/120: a hundredth of a pixel around the Earth is no gap.
-  if (!(std::abs(period_ - whole) < 0.01 && width_ >= whole)) return;
-  wrap_columns_ = static_cast<int>(whole);
-  period_ = whole;  // and no place is between the last column and the first
+  if (std::abs(period_ - whole) < 0.01 && width_ >= whole) wrap_columns_ = static_cast<int>(whole);
 }
 
 double Georeference::CanonicalColumn(double column) const {
   const double wrapped = column - period_ * std::floor(column / period_);
+  // No place is between the last column and the first.
+  if (wrap_columns_ > 0 && wrapped >= wrap_columns_) return wrapped - wrap_columns_;
   return wrapped > period_ - kEdgeTolerance ? wrapped - period_ : wrapped;
 }
 

@@ -213,7 +213,10 @@ class RowErrors {
     return Up(worst);
   }
 
-  static float Up(double error) { return std::nextafter(static_cast<float>(error), std::numeric_limits<float>::max()); }
+  // Infinity, where no bound is known, stays infinity.
+  static float Up(double error) {
+    return std::nextafter(static_cast<float>(error), std::numeric_limits<float>::infinity());
+  }
 
   const Averages& averages_;
   const GridAxis rows_;

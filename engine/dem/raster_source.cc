@@ -41,12 +41,16 @@ std::string DropOverviewsBy(const RasterSurvey& survey, GDALRasterBand& band, Ra
   int is_declared = 0;
   band.GetNoDataValue(&is_declared);
   const BlockRange all = survey.table.Whole();
+  // Cubic and Lanczos kernels go beyond the heights they are given, by less than this.
+  const double overshoot = 0.02 * (static_cast<double>(survey.highest) - static_cast<double>(survey.lowest));
   std::string why;
-  if (layout.rules.has_mask && (all.min < survey.lowest || all.max > survey.highest)) {
-    why =
-        "they have heights that the raster has not, as if they were made without its mask; copy it with "
-        "`gdal_translate "
-        "--config GDAL_TIFF_INTERNAL_MASK YES in out` and make the copy's overviews";
+  if (layout.rules.has_mask) {
+    if (all.min < survey.lowest - overshoot || all.max > survey.highest + overshoot) {
+      why =
+          "they have heights that the raster has not, as if they were made without its mask; copy it with "
+          "`gdal_translate "
+          "--config GDAL_TIFF_INTERNAL_MASK YES in out` and make the copy's overviews";
+    }
   } else if (layout.rules.nodata && is_declared == 0 && survey.voids > 0) {
     why =
         "they were made of voids too, which are not declared; declare them in a copy with `gdal_translate -a_nodata "

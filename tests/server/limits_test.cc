@@ -54,12 +54,17 @@ TEST_F(Limits, FiveHundredSlowReadersHoldABoundedPart) {
     readers.back()->Send(Get(Tile(i)));
   }
   ASSERT_TRUE(Eventually([&] { return Metric("terrace_http_transfers_refused_total") != "0"; }));
-  std::this_thread::sleep_for(1s);
-  malloc_trim(0);  // what is held counts, not how many tiles were being made at the worst moment
-  const long grown = ResidentKib() - before;
+  // What is held counts, not what tiles need while they are made: on a busy machine the last ones take a while.
+  constexpr long kMost = 64'000'000 / 1024;
+  long grown = kMost;
+  for (int look = 0; look < 4 && grown >= kMost; ++look) {
+    std::this_thread::sleep_for(1s);
+    malloc_trim(0);
+    grown = ResidentKib() - before;
+  }
   RecordProperty("resident_kib", static_cast<int>(grown));
   if (!kSanitized) {
-    EXPECT_LT(grown, 64'000'000 / 1024);
+    EXPECT_LT(grown, kMost);
   }
   // They have had their time: whoever comes now is served.
   EXPECT_TRUE(Eventually([&] { return Fetch(port(), "/maui/0/0/0.terrain").status == 200; }));

@@ -99,6 +99,13 @@ TEST(Points, LieNowhereBetweenTheEndsOfAGlobalRaster) {
   const auto heights = source->ReadPoints(points);
   ASSERT_TRUE(heights);
   for (std::size_t i = 0; i < points.size(); ++i) EXPECT_NEAR((*heights)[i], 0, .01) << points[i].longitude;
+
+  spec.value = [](int col, int) { return col < 180 ? col : 1000 + col; };  // a slope through the seam
+  const auto slope = OpenOrFail(WriteRaster(dir, spec, "slope.tif"));
+  ASSERT_NE(slope, nullptr);
+  const auto on_slope = slope->ReadPoints(points);
+  ASSERT_TRUE(on_slope);
+  EXPECT_EQ((*on_slope)[4], (*on_slope)[5]) << "180 and -180 degrees";
 }
 
 // Eastings that go on beyond the antimeridian, or from the prime meridian all around.

@@ -1,5 +1,8 @@
 // A source that changed under the server gives an error, never a flat or a mixed tile.
+#include <chrono>
+#include <filesystem>
 #include <fstream>
+#include <thread>
 
 #include "engine/dem/source_policy.h"
 #include "tests/engine/dem/dem_fixture.h"
@@ -41,6 +44,30 @@ TEST(SourceChanges, OverwrittenFileIsToldAndStaysSo) {
   std::ofstream(path, std::ios::app) << "x";
   ExpectChanged(*source);
   ExpectChanged(*source);
+}
+
+// By its size and its time, which a copy may keep, it is the same file. What was learnt of it must not be believed.
+TEST(SourceChanges, OneOverwrittenInPlaceWithItsTimesKeptIsAnother) {
+  const TempDir dir;
+  const std::string path = WriteRaster(dir, {}),
+                    other = WriteRaster(dir, {.value = [](int, int) { return 5.0; }}, "other.tif");
+  ASSERT_EQ(std::filesystem::file_size(path), std::filesystem::file_size(other));
+  const auto time = std::filesystem::last_write_time(path);
+  const std::string cache = dir.File("cache");
+  const DemOptions options{.cache_dir = cache};
+  const auto before = OpenOrFail(path, options);
+  ASSERT_NE(before, nullptr);
+  std::this_thread::sleep_for(std::chrono::milliseconds(20));  // clocks of file systems tick every 4 ms or so
+  {
+    std::ifstream from(other, std::ios::binary);
+    std::fstream to(path, std::ios::binary | std::ios::in | std::ios::out);
+    to << from.rdbuf();
+  }
+  std::filesystem::last_write_time(path, time);
+  const auto after = OpenOrFail(path, options);
+  ASSERT_NE(after, nullptr);
+  EXPECT_NE(after->fingerprint(), before->fingerprint());
+  EXPECT_EQ(after->info().sources.front().heights.min, 5);
 }
 
 TEST(SourceChanges, ChangedPartOfAMosaicIsTold) {

@@ -280,8 +280,9 @@ TEST(Overviews, OfUndeclaredVoidsAreNotUsed) {
 
 // Hides everything outside of the circle with GDAL's mask, in the file or beside it, before or after overviews are
 // made.
-std::string WriteMasked(const TempDir& dir, bool inside, bool overviews_first) {
-  RasterSpec spec = WithOverviews(0);
+std::string WriteMasked(const TempDir& dir, bool inside, bool overviews_first, const std::string& type = "Float32",
+                        const char* resampling = "AVERAGE") {
+  RasterSpec spec = WithOverviews(0, type);
   if (!overviews_first) spec.overviews.clear();
   const std::string path = WriteRaster(dir, spec, inside ? "inside.tif" : "beside.tif");
   CPLSetConfigOption("GDAL_TIFF_INTERNAL_MASK", inside ? "YES" : "NO");
@@ -299,7 +300,7 @@ std::string WriteMasked(const TempDir& dir, bool inside, bool overviews_first) {
   if (!overviews_first) {
     const GDALDatasetUniquePtr dataset(GDALDataset::Open(path.c_str(), GDAL_OF_RASTER | GDAL_OF_UPDATE));
     const std::vector<int> factors = {2, 4, 8};
-    EXPECT_EQ(dataset->BuildOverviews("AVERAGE", 3, factors.data(), 0, nullptr, GDALDummyProgress, nullptr), CE_None);
+    EXPECT_EQ(dataset->BuildOverviews(resampling, 3, factors.data(), 0, nullptr, GDALDummyProgress, nullptr), CE_None);
   }
   CPLSetConfigOption("GDAL_TIFF_INTERNAL_MASK", nullptr);
   return path;
@@ -310,11 +311,23 @@ TEST(Overviews, WithoutTheMaskOfTheRasterAreNotUsed) {
   ExpectUnused(WriteMasked(dir, false, false), {.vertical = "unknown"}, "the mask in a file of its own");
   const TempDir other;
   ExpectUnused(WriteMasked(other, true, true), {.vertical = "unknown"}, "heights that the raster has not");
-  const TempDir third;
-  const auto source = OpenOrFail(WriteMasked(third, true, false), {.source = {.vertical = "unknown"}, .floor = 1000});
-  ASSERT_NE(source, nullptr);
-  EXPECT_EQ(InfoOf(*source).overview_factors, (std::vector<int>{2, 4, 8}));
-  ExpectHeightsWithin(*source, 1000, 1400);
+}
+
+// Int16 has a mark of voids whether it is declared or not, and a cubic kernel goes a little beyond the heights it is
+// given.
+TEST(Overviews, WithTheMaskOfTheRasterAreUsed) {
+  for (const std::string type : {"Float32", "Int16", "UInt16"}) {
+    for (const char* resampling : {"AVERAGE", "CUBIC", "NEAREST"}) {
+      SCOPED_TRACE(type + ' ' + resampling);
+      const TempDir dir;
+      const auto source = OpenOrFail(WriteMasked(dir, true, false, type, resampling),
+                                     {.source = {.vertical = "unknown"}, .floor = 1000});
+      ASSERT_NE(source, nullptr);
+      EXPECT_EQ(InfoOf(*source).overview_factors, (std::vector<int>{2, 4, 8}));
+      EXPECT_EQ(InfoOf(*source).overviews_unused, "");
+      ExpectHeightsWithin(*source, 990, 1410);
+    }
+  }
 }
 
 }  // namespace
