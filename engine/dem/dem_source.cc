@@ -131,15 +131,23 @@ Result<Rasters> OpenAll(std::vector<DemFile>& files, const DemOptions& options) 
   }
   const auto handles = std::make_shared<HandleLimit>(options.max_open_sources);
   Rasters rasters;
-  for (std::size_t i = 0; i < files.size(); ++i) {
+  for (std::size_t i = 0; i < files.size();) {
     const auto progress = [&](double share) {
       options.progress((static_cast<double>(i) + share) / static_cast<double>(files.size()));
     };
     auto raster =
         RasterSource::Open(files[i].path, files[i].options.value_or(options.source), options.cache_dir,
                            options.progress ? progress : std::function<void(double)>(), handles, options.stop);
+    // Surveys that were cut into files have some without a height.
+    const bool is_nothing = !raster && raster.error().code == ErrorCode::kNotFound;
+    if (is_nothing && files[i].may_be_other && files.size() > 1) {
+      spdlog::warn("left out of a folder: {}", raster.error().message);
+      files.erase(files.begin() + static_cast<std::ptrdiff_t>(i));
+      continue;
+    }
     if (!raster) return tl::unexpected(raster.error());
     rasters.push_back(*std::move(raster));
+    ++i;
   }
   return rasters;
 }

@@ -174,7 +174,7 @@ Result<RasterSurvey> SurveyAssembler::Finish(GDALDataset& dataset, const std::st
   survey_.voids =
       static_cast<std::uint64_t>(layout_.width) * static_cast<std::uint64_t>(layout_.height) - survey_.valid;
   if (survey_.valid == 0) {
-    return MakeError(ErrorCode::kInvalidArgument,
+    return MakeError(ErrorCode::kNotFound,
                      "has no valid sample, only voids; check its nodata value with gdalinfo and "
                      "correct it with `gdal_translate -a_nodata VALUE in out`");
   }

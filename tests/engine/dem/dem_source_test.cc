@@ -156,6 +156,23 @@ TEST(DemSource, LeavesNoFilesBesideTheSource) {
   EXPECT_EQ(std::distance(begin(files), end(files)), 1);
 }
 
+TEST(DemSource, LeavesFilesWithoutAHeightOutOfAFolder) {
+  const TempDir dir;
+  RasterSpec empty{.nodata = -1};
+  empty.value = [](int, int) { return -1.0; };
+  const std::string good = WriteRaster(dir, {}, "good.tif"), none = WriteRaster(dir, empty, "none.tif");
+  const auto source = DemSource::Open({{none, 0, true}, {good, 0, true}, {none, 0, true}});
+  ASSERT_TRUE(source) << source.error().message;
+  ASSERT_EQ((*source)->info().sources.size(), 1u);
+  EXPECT_EQ((*source)->info().sources.front().path, good);
+  for (const bool in_folder : {false, true}) {  // named, or all that there is
+    const auto alone = DemSource::Open({{none, 0, in_folder}});
+    ASSERT_FALSE(alone);
+    EXPECT_NE(alone.error().message.find("none.tif: has no valid sample"), std::string::npos);
+  }
+  EXPECT_FALSE(DemSource::Open({{good, 0, false}, {none, 1, false}}));
+}
+
 // What holds colours is served all the same, but said to.
 TEST(DemSource, TellsPicturesFromHeights) {
   TERRACE_REQUIRE_DATA(photo, "ortho_pair_rgb_2m.tif");
