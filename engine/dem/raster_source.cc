@@ -48,14 +48,12 @@ std::string DropOverviewsBy(const RasterSurvey& survey, GDALRasterBand& band, Ra
     if (all.min < survey.lowest - overshoot || all.max > survey.highest + overshoot) {
       why =
           "they have heights that the raster has not, as if they were made without its mask; copy it with "
-          "`gdal_translate "
-          "--config GDAL_TIFF_INTERNAL_MASK YES in out` and make the copy's overviews";
+          "`gdal_translate --config GDAL_TIFF_INTERNAL_MASK YES in out` and make the copy's overviews";
     }
   } else if (layout.rules.nodata && is_declared == 0 && survey.voids > 0) {
     why =
-        "they were made of voids too, which are not declared; declare them in a copy with `gdal_translate -a_nodata "
-        "-32768 "
-        "in out` and make its overviews";
+        "they were made of voids too, which are not declared; declare them in a copy with "
+        "`gdal_translate -a_nodata -32768 in out` and make its overviews";
   }
   if (!why.empty()) layout.overview_factors.clear();
   return why;

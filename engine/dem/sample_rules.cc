@@ -130,9 +130,8 @@ std::string WhyOverviewsMislead(GDALDataset& dataset, const SampleRules& rules) 
   constexpr const char* kOwnMask =
       "; copy it with `gdal_translate --config GDAL_TIFF_INTERNAL_MASK YES in out` and make the copy's overviews";
   if ((band.GetMaskFlags() & GMF_PER_DATASET) == 0) {
-    return "they were made without regard to an alpha band of this type, which GDAL takes for no mask; make an alpha "
-           "band "
-           "of bytes of it and the overviews anew";
+    return "they were made without regard to an alpha band of this type, which GDAL takes for no mask; make it one of "
+           "bytes, and the overviews anew";
   }
   char** const files = dataset.GetFileList();
   const bool is_external = std::any_of(files, files + CSLCount(files),
