@@ -51,12 +51,12 @@ Result<HandlePool::Handle> HandlePool::Borrow() {
     if (GDALDatasetUniquePtr idle = limit_->Take(*this)) return Handle(*this, std::move(idle), epoch);
   }
   GDALDatasetUniquePtr dataset = ReopenRaster(path_);
-  if (dataset == nullptr) {
-    return MakeError(ErrorCode::kUnavailable, "{}: cannot be opened any more ({}); restore the file", path_,
-                     TakeGdalError());
-  }
-  // It may have been replaced between the look at it and the opening.
+  const std::string why = dataset == nullptr ? TakeGdalError() : "";
+  // It may have been replaced or removed between the look at it and the opening, which may have failed for that.
   if (auto unchanged = CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
+  if (dataset == nullptr) {
+    return MakeError(ErrorCode::kUnavailable, "{}: cannot be opened any more ({}); restore the file", path_, why);
+  }
   return Handle(*this, std::move(dataset), epoch);
 }
 

@@ -46,8 +46,8 @@ Result<ImagePool::Handle> ImagePool::Borrow(int factor) {
     }
   }
   auto image = ImageFile::Open(path_, sizes_[size].overview);
-  if (!image) return MakeError(ErrorCode::kUnavailable, "{}", image.error().message);
   if (auto unchanged = CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
+  if (!image) return MakeError(ErrorCode::kUnavailable, "{}", image.error().message);
   return Handle(*this, size, *std::move(image), epoch);
 }
 

@@ -219,9 +219,9 @@ Result<std::vector<float>> RasterSource::ReadBlocks(int factor, const GridWindow
   auto handle = handles_.Borrow();
   if (!handle) return tl::unexpected(handle.error());
   auto heights = ReadGrid(**handle, layout_, factor, window, stop);
-  if (!heights) return MakeError(heights.error().code, "{}: {}", info_.path, heights.error().message);
-  // Files may be overwritten while they are read.
+  // Files may be overwritten while they are read: what was read is nothing then, and so is why it could not be.
   if (auto unchanged = handles_.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
+  if (!heights) return MakeError(heights.error().code, "{}: {}", info_.path, heights.error().message);
   return heights;
 }
 

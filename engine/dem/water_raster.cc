@@ -81,10 +81,10 @@ Result<std::vector<std::uint8_t>> WaterRaster::Impl::Read(const geo::TileKey& ke
   if (cells.empty()) return pixels;
   const GridWindow window = WindowOf(cells, columns, rows);
   const auto shares = ReadGrid(**handle, layout, factor, window, stop);
+  if (auto unchanged = handles.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
   if (!shares) {
     return MakeError(shares.error().code, "{}: tile {}: {}", path, geo::ToString(key), shares.error().message);
   }
-  if (auto unchanged = handles.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
   for (std::size_t i = 0; i < cells.size(); ++i) {
     const double share = Interpolate(*shares, window, cells[i]).value_or(0);
     const double sharp = std::clamp(0.5 + (share - 0.5) * sharpness, 0.0, 1.0);
