@@ -93,7 +93,6 @@ class TileMeter::Impl {
     const Surface before = std::exchange(surface_, std::move(surface));
     const bool is_alike = before.unit == surface_.unit && before.is_planar() == surface_.is_planar() &&
                           before.is_curved() == surface_.is_curved();
-    unit_ = surface_.unit;
     planar_ = surface_.is_planar();
     curved_ = surface_.is_curved();
     is_vertex_.assign(static_cast<std::size_t>(cells_ + 1) * static_cast<std::size_t>(cells_ + 1), false);
@@ -118,7 +117,7 @@ class TileMeter::Impl {
     return static_cast<std::size_t>(j) * static_cast<std::size_t>(cells_ + 1) + static_cast<std::size_t>(i);
   }
   // The lattice node whose rounded position this is.
-  std::int64_t NodeOf(std::int64_t coordinate) const { return (coordinate + unit_ / 2) / unit_; }
+  std::int64_t NodeOf(std::int64_t coordinate) const { return (coordinate + surface_.unit / 2) / surface_.unit; }
 
   void PrepareCurved() {
     const LatticeAngles angles(lattice_);
@@ -141,6 +140,7 @@ class TileMeter::Impl {
   // Rows and, in a row, columns of nodes inside the triangle or on its rim, in integers.
   double MeasureTriangle(std::size_t t, std::vector<tin::SamplePosition>& misses) const {
     const std::array<std::uint32_t, 3>& triangle = surface_.triangles[t];
+    const std::int64_t unit = surface_.unit;
     std::array<Point, 3> p;
     for (std::size_t k = 0; k < 3; ++k) p[k] = surface_.points[triangle[k]];
     const std::int64_t area = (p[1].x - p[0].x) * (p[2].y - p[0].y) - (p[1].y - p[0].y) * (p[2].x - p[0].x);
@@ -155,17 +155,17 @@ class TileMeter::Impl {
       chord[2] = Through(p, twice_area, [&](std::size_t k) { return surface_.ecef[triangle[k]].z; });
     }
     const auto [low, high] = std::minmax({p[0].y, p[1].y, p[2].y});
-    const std::array<EdgeRows, 3> edges = {EdgeRows(p[0], p[1], unit_), EdgeRows(p[1], p[2], unit_),
-                                           EdgeRows(p[2], p[0], unit_)};
+    const std::array<EdgeRows, 3> edges = {EdgeRows(p[0], p[1], unit), EdgeRows(p[1], p[2], unit),
+                                           EdgeRows(p[2], p[0], unit)};
     double largest = 0, worst_miss = bound_;
     tin::SamplePosition miss;
     bool missed = false;
-    for (std::int64_t j = CeilDiv(low, unit_); j * unit_ <= high; ++j) {
-      const std::int64_t y = j * unit_;
+    for (std::int64_t j = CeilDiv(low, unit); j * unit <= high; ++j) {
+      const std::int64_t y = j * unit;
       std::int64_t first = 0, last = cells_;
       for (const EdgeRows& edge : edges) edge.Clip(y, first, last);
       for (std::int64_t i = first; i <= last; ++i) {
-        const double dx = static_cast<double>(i * unit_ - p[0].x), dy = static_cast<double>(y - p[0].y);
+        const double dx = static_cast<double>(i * unit - p[0].x), dy = static_cast<double>(y - p[0].y);
         const double error = ErrorAt(plane, chord, static_cast<int>(i), static_cast<int>(j), dx, dy);
         largest = std::max(largest, error);
         if (error > worst_miss && CanMend(i, j)) {
@@ -200,7 +200,6 @@ class TileMeter::Impl {
 
   // Of the mesh that is measured.
   Surface surface_;
-  std::int64_t unit_ = 1;
   bool planar_ = false, curved_ = false;
   std::vector<bool> is_vertex_;  // by node
   std::vector<double> errors_;   // by triangle; kUnknown: it is to be measured in any case

@@ -1,4 +1,4 @@
-// What tells one state of a file from another: device, inode, size and modification time.
+// What tells one state of a file from another: device, inode, size, times of modification and of change of status.
 #pragma once
 
 #include <cstddef>

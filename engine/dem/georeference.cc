@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "engine/dem/gdal_runtime.h"
+#include "engine/dem/sample_rules.h"
 
 namespace terrace::dem {
 namespace {
@@ -49,12 +50,12 @@ std::string Wkt(const OGRSpatialReference& srs) {
 
 // Of a CRS with three axes, which tells how many metres it is, but not its name.
 std::string UnitOfHeightAxis(const OGRSpatialReference& srs) {
-  constexpr double kFoot = 0.3048, kSurveyFoot = 1200.0 / 3937.0, kTolerance = 1e-9;  // the two feet are 6e-7 apart
+  constexpr double kTolerance = 1e-9;  // the two feet are 6e-7 apart
   double metres = 1;
   srs.GetAxis(nullptr, 2, nullptr, &metres);
-  if (std::abs(metres - 1) < kTolerance) return "metre";
-  if (std::abs(metres - kFoot) < kTolerance) return "foot";
-  if (std::abs(metres - kSurveyFoot) < kTolerance) return "US survey foot";
+  for (const char* name : {"metre", "foot", "US survey foot"}) {
+    if (std::abs(metres - *MetresPerUnit(name)) < kTolerance) return name;
+  }
   return fmt::format("{} m a unit", metres);  // known to no table: a warning says so
 }
 

@@ -46,7 +46,7 @@ class Imagery {
   // Preconditions: a valid key; side as above. kUnavailable: the image cannot be read now. kCancelled: stopped.
   Result<std::optional<TilePicture>> Read(const geo::TileKey& key, int side, std::stop_token stop = {}) const;
 
-  // Identifies the content: device, inode, size and mtime of its files.
+  // Identifies the content: device, inode, size, mtime and ctime of its files.
   std::uint64_t fingerprint() const;
 
   // What it is read from, as it was when it was opened.

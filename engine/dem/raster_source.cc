@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "engine/dem/gdal_runtime.h"
+#include "engine/dem/overview_trust.h"
 #include "engine/dem/raster_file.h"
 
 namespace terrace::dem {
@@ -21,42 +22,6 @@ RasterLayout LayoutOf(GDALDataset& dataset, const Georeference& georeference) {
   layout.rules = SampleRules::Of(HeightBand(dataset), georeference.vertical_unit());
   layout.overview_factors = OverviewFactors(HeightBand(dataset));
   return layout;
-}
-
-// Leaves the overviews that can be used in the layout; why the others cannot, empty if there are none.
-std::string DropMisleadingOverviews(GDALDataset& dataset, RasterLayout& layout) {
-  if (HeightBand(dataset).GetOverviewCount() == 0) return {};
-  if (layout.overview_factors.empty()) {
-    return "their sides are not those of the raster by 2, 4, 8 .., rounded up (COGs have others where sides are odd); "
-           "`gdal_translate in out` without them and `gdaladdo -r average out` make such ones";
-  }
-  std::string why = WhyOverviewsMislead(dataset, layout.rules);
-  if (!why.empty()) layout.overview_factors.clear();
-  return why;
-}
-
-// The same, once all samples were looked at.
-std::string DropOverviewsBy(const RasterSurvey& survey, GDALRasterBand& band, RasterLayout& layout) {
-  if (layout.overview_factors.empty()) return {};
-  int is_declared = 0;
-  band.GetNoDataValue(&is_declared);
-  const BlockRange all = survey.table.Whole();
-  // Cubic and Lanczos kernels go beyond the heights they are given, by less than this.
-  const double overshoot = 0.02 * (static_cast<double>(survey.highest) - static_cast<double>(survey.lowest));
-  std::string why;
-  if (layout.rules.has_mask) {
-    if (all.min < survey.lowest - overshoot || all.max > survey.highest + overshoot) {
-      why =
-          "they have heights that the raster has not, as if they were made without its mask; copy it with "
-          "`gdal_translate --config GDAL_TIFF_INTERNAL_MASK YES in out` and make the copy's overviews";
-    }
-  } else if (layout.rules.nodata && is_declared == 0 && survey.voids > 0) {
-    why =
-        "they were made of voids too, which are not declared; declare them in a copy with "
-        "`gdal_translate -a_nodata -32768 in out` and make its overviews";
-  }
-  if (!why.empty()) layout.overview_factors.clear();
-  return why;
 }
 
 // A grey band may well be heights, colours and indices into a palette are none.
@@ -161,7 +126,7 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
   const PrepareOptions prepare{cache_dir, options.find_voids, progress, stop};
   auto prepared = PrepareRaster(**dataset, source->layout_, path, source->files(), prepare);
   if (prepared && !prepared->findings.any()) {
-    const std::string why = DropOverviewsBy(prepared->survey, HeightBand(**dataset), source->layout_);
+    const std::string why = DropMisleadingOverviews(**dataset, prepared->survey, source->layout_);
     if (!why.empty()) {
       overviews_unused = why;
       prepared = PrepareRaster(**dataset, source->layout_, path, source->files(), prepare);

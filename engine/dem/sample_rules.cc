@@ -1,7 +1,5 @@
 #include "engine/dem/sample_rules.h"
 
-#include <cpl_string.h>
-
 #include <algorithm>
 #include <array>
 #include <cctype>
@@ -117,36 +115,6 @@ SampleRules SampleRules::Of(GDALRasterBand& band, const std::string& crs_unit) {
   if (rules.unit.empty()) rules.unit = crs_unit;
   rules.metres_per_unit = MetresPerUnit(rules.unit).value_or(1);
   return rules;
-}
-
-std::string WhyOverviewsMislead(GDALDataset& dataset, const SampleRules& rules) {
-  GDALRasterBand& band = *dataset.GetRasterBand(1);
-  const auto is_declared = [&](double mark) { return rules.nodata && rules.IsSame(mark, *rules.nodata); };
-  if (!std::ranges::all_of(rules.marks, is_declared)) {
-    return "they were made of samples too that `nodata` of the configuration calls voids; declare them in a copy with "
-           "`gdal_translate -a_nodata VALUE in out` and make its overviews";
-  }
-  if (!rules.has_mask) return {};
-  constexpr const char* kOwnMask =
-      "; copy it with `gdal_translate --config GDAL_TIFF_INTERNAL_MASK YES in out` and make the copy's overviews";
-  if ((band.GetMaskFlags() & GMF_PER_DATASET) == 0) {
-    return "they were made without regard to an alpha band of this type, which GDAL takes for no mask; make it one of "
-           "bytes, and the overviews anew";
-  }
-  char** const files = dataset.GetFileList();
-  const bool is_external = std::any_of(files, files + CSLCount(files),
-                                       [](const char* file) { return std::string_view(file).ends_with(".msk"); });
-  CSLDestroy(files);
-  if (is_external) return std::string("they were made without regard to the mask in a file of its own") + kOwnMask;
-  for (int i = 0; i < band.GetOverviewCount(); ++i) {
-    GDALRasterBand* const overview = band.GetOverview(i);
-    if (overview == nullptr) continue;
-    GDALRasterBand* const mask = overview->GetMaskBand();
-    const bool has_mask = (overview->GetMaskFlags() & GMF_PER_DATASET) != 0 && mask != nullptr &&
-                          mask->GetXSize() == overview->GetXSize() && mask->GetYSize() == overview->GetYSize();
-    if (!has_mask) return std::string("they have no masks, as the raster has") + kOwnMask;
-  }
-  return {};
 }
 
 namespace {

@@ -59,10 +59,6 @@ struct SampleRules {
   static constexpr float kVoid = __builtin_nanf("");
 };
 
-// Why the raster's overviews may be mixed with what is no height, with a way out; empty: they are averages of valid
-// samples alone, as far as GDAL that made them knew.
-std::string WhyOverviewsMislead(GDALDataset& dataset, const SampleRules& rules);
-
 // Metres per unit of a stated unit name; nothing when the name is unknown.
 std::optional<double> MetresPerUnit(const std::string& unit);
 

@@ -36,7 +36,7 @@ class WaterRaster {
   // Any valid key. kUnavailable: the raster cannot be read now. kCancelled: stopped.
   Result<std::vector<std::uint8_t>> Read(const geo::TileKey& key, std::stop_token stop = {}) const;
 
-  // Identifies the content: device, inode, size and mtime of its files.
+  // Identifies the content: device, inode, size, mtime and ctime of its files.
   std::uint64_t fingerprint() const;
 
   // What it is read from, as it was when it was opened.

@@ -62,19 +62,20 @@ void DataDependentCriterion::Begin(TriangleId triangle) {
   kept_.clear();
   if (!UsesMaxima()) return;
   CoverSlots();
+  const auto seen = [&](VertexId corner) { return triangulation_->Seen(corner, vertex_.position); };
+  const auto [a, b, c] = triangulation_->triangle(triangle);
+  const std::array<RingVertex, 4> corners = {seen(a), seen(b), seen(c), seen(a)};
   std::array<RingVertex, kMostFirstEdges + 1> ring;
   std::size_t edges = 0;
-  for (HalfEdgeId edge = 4 * triangle; edge < 4 * triangle + 3; ++edge) {
-    const HalfEdgeId back = triangulation_->twin(edge);
+  for (std::uint32_t i = 0; i < 3; ++i) {
+    const HalfEdgeId back = triangulation_->twin(4 * triangle + i);
     if (back != kNoEdge) __builtin_prefetch(&known_[back / 4]);
-    const RingVertex u = triangulation_->Seen(triangulation_->corner(edge), vertex_.position);
-    const RingVertex v = triangulation_->Seen(triangulation_->corner(Triangulation::Next(edge)), vertex_.position);
     TERRACE_CHECK(edges < kMostFirstEdges);
-    ring[edges++] = u;
-    if (Cross(u, v) > 0) continue;
+    ring[edges++] = corners[i];
+    if (Cross(corners[i], corners[i + 1]) > 0) continue;
     TERRACE_CHECK(edges < kMostFirstEdges);  // on two edges: a corner
     if (back == kNoEdge) return;             // on the border
-    ring[edges++] = triangulation_->Seen(triangulation_->corner(Triangulation::Previous(back)), vertex_.position);
+    ring[edges++] = seen(triangulation_->corner(Triangulation::Previous(back)));
   }
   ring[edges] = ring[0];
   std::array<Fit, kMostFirstEdges> fits;
@@ -188,11 +189,7 @@ void DataDependentCriterion::FitAround(const Triangulation::Vertex& p, const Rin
     return;
   }
   std::array<PlaneMisfit, kMostFirstEdges> misfits;
-  scratch_.x = p.position.x;
-  scratch_.y = p.position.y;
-  scratch_.height = p.height;
-  scratch_.count = count;
-  if (scratch_.ring.capacity() <= kMostFirstEdges) scratch_.ring.Grow(kMostFirstEdges + 1);
+  PrepareScratch(p, count);
   for (std::size_t i = 0; i <= count; ++i) scratch_.ring.Put(i, ring[i]);
   scan_star_(*open_, scratch_, misfits.data());
   for (std::size_t i = 0; i < count; ++i) {
@@ -274,14 +271,19 @@ void DataDependentCriterion::ScanUnknown(const Star& star, PlaneMisfit* misfits)
     }
     const std::size_t first = i;
     while (i < star.count && kept_[i].error == kUnknown) ++i;
-    scratch_.x = star.x;
-    scratch_.y = star.y;
-    scratch_.height = star.height;
-    scratch_.count = i - first;
-    if (scratch_.ring.capacity() < i - first + 1) scratch_.ring.Grow(2 * (i - first + 1));
+    PrepareScratch(vertex_, i - first);
     for (std::size_t k = first; k <= i; ++k) scratch_.ring.Put(k - first, star.ring[k]);
     scan_star_(*open_, scratch_, misfits + first);
   }
+}
+
+// A star of `count` triangles around p whose ring is yet to be put.
+void DataDependentCriterion::PrepareScratch(const Triangulation::Vertex& p, std::size_t count) {
+  scratch_.x = p.position.x;
+  scratch_.y = p.position.y;
+  scratch_.height = p.height;
+  scratch_.count = count;
+  if (scratch_.ring.capacity() < count + 1) scratch_.ring.Grow(2 * (count + 1));
 }
 
 void DataDependentCriterion::CoverSlots() {

@@ -79,6 +79,7 @@ class DataDependentCriterion {
             const RingVertex& v) const;
   double WorstOnBorders(SamplePosition p, float p_height, const RingVertex& u, const RingVertex& v) const;
   bool IsOnBorder(SamplePosition sample) const;
+  void PrepareScratch(const Triangulation::Vertex& p, std::size_t count);
   void CoverSlots();
   void ScanUnknown(const Star& star, PlaneMisfit* misfits);
 
