@@ -17,6 +17,10 @@ Result<RasterHeights> ReadRaster(const std::string& path, const std::function<vo
   raster.georeferenced = (*dataset)->GetGeoTransform(raster.geo_transform.data()) == CE_None;
   GDALRasterBand& band = HeightBand(**dataset);
   const SampleRules rules = SampleRules::Of(band, "");
+  // With room for a mesher to lay rows further apart (tin::HeightField) without a second copy of all.
+  constexpr std::size_t kRoomOfRow = 32;
+  raster.heights.reserve((static_cast<std::size_t>(raster.width) + kRoomOfRow) *
+                         static_cast<std::size_t>(raster.height));
   raster.heights.resize(static_cast<std::size_t>(raster.width) * static_cast<std::size_t>(raster.height));
   for (int row = 0; row < raster.height; row += kRowsAtOnce) {
     const int rows = std::min(kRowsAtOnce, raster.height - row);

@@ -37,10 +37,9 @@ double DistanceFrom(const RingVertex& u, const RingVertex& v, float p_height, in
 
 }  // namespace
 
-DataDependentCriterion::DataDependentCriterion(const HeightField& field, const OpenSamples& open,
-                                               const Sagitta& sagitta, Triangulation& triangulation,
-                                               DataDependentOptions options)
-    : field_(&field), open_(&open), sagitta_(&sagitta), triangulation_(&triangulation), options_(options) {
+DataDependentCriterion::DataDependentCriterion(const HeightField& field, const Sagitta& sagitta,
+                                               Triangulation& triangulation, DataDependentOptions options)
+    : field_(&field), sagitta_(&sagitta), triangulation_(&triangulation), options_(options) {
   TERRACE_CHECK(options_.qthresh >= 0 && options_.qthresh <= 1);
 }
 
@@ -140,14 +139,14 @@ bool DataDependentCriterion::IsBetterAlongPw(const Quadrilateral& q, TriangleId 
   if (UsesMaxima()) {
     double least_uw = 0, least_wv = 0;
     if (known.worst != kNoSample) RaiseLeastErrors(q, known.worst, known.worst_height, least_uw, least_wv);
-    if (uv.worst != kNoSample) RaiseLeastErrors(q, uv.worst, open_->At(uv.worst), least_uw, least_wv);
+    if (uv.worst != kNoSample) RaiseLeastErrors(q, uv.worst, field_->At(uv.worst), least_uw, least_wv);
     if (!wins(least_uw, least_wv)) return false;
   }
   fit_new();
   return wins(uw.error, wv.error);
 }
 
-// An open sample of the quadrilateral is in one of the new triangles: that one is off by no less than there. Rounding
+// A sample of the quadrilateral is in one of the new triangles: that one is off by no less than there. Rounding
 // does not matter, since maxima and sums of what is not negative are monotonic as computed.
 void DataDependentCriterion::RaiseLeastErrors(const Quadrilateral& q, std::uint32_t sample, float height, double& uw,
                                               double& wv) const {
@@ -159,7 +158,7 @@ void DataDependentCriterion::RaiseLeastErrors(const Quadrilateral& q, std::uint3
 }
 
 DataDependentCriterion::KnownFit DataDependentCriterion::Remembered(const Fit& fit) const {
-  return {fit.error, fit.worst, fit.worst == kNoSample ? 0 : open_->At(fit.worst)};
+  return {fit.error, fit.worst, fit.worst == kNoSample ? 0 : field_->At(fit.worst)};
 }
 
 // From the triangle's last corner, as when it was made: rounding is that of the scan of its star.
@@ -191,7 +190,7 @@ void DataDependentCriterion::FitAround(const Triangulation::Vertex& p, const Rin
   std::array<PlaneMisfit, kMostFirstEdges> misfits;
   PrepareScratch(p, count);
   for (std::size_t i = 0; i <= count; ++i) scratch_.ring.Put(i, ring[i]);
-  scan_star_(*open_, scratch_, misfits.data());
+  scan_star_(*field_, scratch_, misfits.data());
   for (std::size_t i = 0; i < count; ++i) {
     fits[i] = FitOf(misfits[i], p.position, p.height, ring[i], ring[i + 1]);
   }
@@ -247,11 +246,11 @@ void DataDependentCriterion::End(const Star& star) {
 }
 
 void DataDependentCriterion::Scan(const Star& star, PlaneMisfit* misfits) {
-  if (!UsesMaxima()) return scan_star_(*open_, star, misfits);
+  if (!UsesMaxima()) return scan_star_(*field_, star, misfits);
   if (star.centre == centre_ && star.count == kept_.size()) {
     ScanUnknown(star, misfits);
   } else {
-    scan_star_(*open_, star, misfits);
+    scan_star_(*field_, star, misfits);
   }
   CoverSlots();
   const SamplePosition p{static_cast<std::uint16_t>(star.x), static_cast<std::uint16_t>(star.y)};
@@ -273,7 +272,7 @@ void DataDependentCriterion::ScanUnknown(const Star& star, PlaneMisfit* misfits)
     while (i < star.count && kept_[i].error == kUnknown) ++i;
     PrepareScratch(vertex_, i - first);
     for (std::size_t k = first; k <= i; ++k) scratch_.ring.Put(k - first, star.ring[k]);
-    scan_star_(*open_, scratch_, misfits + first);
+    scan_star_(*field_, scratch_, misfits + first);
   }
 }
 
@@ -283,6 +282,7 @@ void DataDependentCriterion::PrepareScratch(const Triangulation::Vertex& p, std:
   scratch_.y = p.position.y;
   scratch_.height = p.height;
   scratch_.count = count;
+  scratch_.has_border = true;  // or not: it is looked for
   if (scratch_.ring.capacity() < count + 1) scratch_.ring.Grow(2 * (count + 1));
 }
 

@@ -23,7 +23,6 @@
 
 #include "engine/tin/greedy.h"
 #include "engine/tin/height_field.h"
-#include "engine/tin/open_samples.h"
 #include "engine/tin/quadrilateral.h"
 #include "engine/tin/sagitta.h"
 #include "engine/tin/spare_blocks.h"
@@ -36,10 +35,10 @@ namespace terrace::tin {
 class DataDependentCriterion {
  public:
   // What it works on belongs to the run and must outlive this object.
-  DataDependentCriterion(const HeightField& field, const OpenSamples& open, const Sagitta& sagitta,
-                         Triangulation& triangulation, DataDependentOptions options);
+  DataDependentCriterion(const HeightField& field, const Sagitta& sagitta, Triangulation& triangulation,
+                         DataDependentOptions options);
 
-  // Triangulation::Insert by this criterion. The vertex is no open sample any more.
+  // Triangulation::Insert by this criterion.
   const Star& Insert(const Triangulation::Vertex& vertex, TriangleId triangle);
 
   // What a StarScan finds, for the star of the last insertion or a triangle as a star of its own.
@@ -52,14 +51,14 @@ class DataDependentCriterion {
   // How well the triangle from u to the next vertex of an outline, with its last corner at p, fits.
   struct Fit {
     double error = kUnknown;  // by the measure
-    double distance = -1;     // of the open sample that is furthest off, as PlaneMisfit has it; with maxima only
+    double distance = -1;     // of the sample that is furthest off, as PlaneMisfit has it; with maxima only
     std::uint32_t worst = kNoSample;
     VertexId u = 0;
   };
   // What is remembered of a triangle, by slot.
   struct KnownFit {
     double error = kUnknown;
-    std::uint32_t worst = kNoSample;  // the open sample that is furthest off
+    std::uint32_t worst = kNoSample;  // the sample that is furthest off
     float worst_height = 0;           // beside it: a test need not fetch it from the field
   };
 
@@ -84,7 +83,6 @@ class DataDependentCriterion {
   void ScanUnknown(const Star& star, PlaneMisfit* misfits);
 
   const HeightField* field_;
-  const OpenSamples* open_;
   const Sagitta* sagitta_;
   Triangulation* triangulation_;
   DataDependentOptions options_;

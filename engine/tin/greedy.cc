@@ -10,7 +10,6 @@
 #include "engine/tin/candidate_queue.h"
 #include "engine/tin/data_dependent.h"
 #include "engine/tin/insertion_recorder.h"
-#include "engine/tin/open_samples.h"
 #include "engine/tin/sagitta.h"
 #include "engine/tin/seed_cursor.h"
 #include "engine/tin/squared_distances.h"
@@ -83,7 +82,6 @@ class GreedyTriangulation::Impl {
   GreedyOptions options_;
   Sagitta sagitta_;
   SeedCursor seeds_;
-  OpenSamples open_;
   Triangulation triangulation_;
   TriangleId last_changed_ = 0;  // where walks start
   CandidateQueue candidates_;    // by triangle
@@ -115,7 +113,6 @@ GreedyTriangulation::Impl::Impl(const HeightField& field, GreedyOptions options)
       options_(std::move(options)),
       sagitta_(options_.curvature, field.height()),
       seeds_(field, options_.seeds),
-      open_(field),
       triangulation_(field),
       candidates_(2 * Triangulation::LikelyVertices(field)) {
   CheckOptions(options_);
@@ -125,7 +122,7 @@ GreedyTriangulation::Impl::Impl(const HeightField& field, GreedyOptions options)
         static_cast<std::size_t>(along_x ? field.width() : field.height()));
   }
   if (options_.criterion == Criterion::kDataDependent) {
-    data_dependent_.emplace(field, open_, sagitta_, triangulation_, options_.data_dependent);
+    data_dependent_.emplace(field, sagitta_, triangulation_, options_.data_dependent);
   }
   if (options_.record) recorder_.emplace(Triangulation::LikelyVertices(field));
   AwaitScan(0);
@@ -140,7 +137,6 @@ GreedyTriangulation::Impl::Impl(const HeightField& field, GreedyOptions options,
   vertices.reserve(mesh.vertices.size());
   for (const SamplePosition sample : mesh.vertices) {
     vertices.push_back(VertexOf(sample));
-    open_.Close(sample);
   }
   triangulation_ = Triangulation(std::move(vertices), mesh.triangles);
   // The seeds start again: a grid that is in the mesh was due above the error that was met, so it is due at once, and
@@ -209,7 +205,6 @@ bool GreedyTriangulation::Impl::IsMet(const GreedyGoal& goal) {
 
 void GreedyTriangulation::Impl::Insert(const Insertion& insertion) {
   const Triangulation::Vertex vertex = VertexOf(insertion.sample);
-  open_.Close(insertion.sample);
   const Star& star = Insert(vertex, insertion.triangle);
   if (recorder_) recorder_->Append(insertion.sample, insertion.error_before, star);
   last_changed_ = star.triangles[0];
@@ -236,13 +231,12 @@ Refinement GreedyTriangulation::Impl::MakeRefinement() const {
 }
 
 Triangulation::Vertex GreedyTriangulation::Impl::VertexOf(SamplePosition sample) const {
-  const float open = open_.At(sample);
-  return {sample, std::isnan(open) ? field_->VertexHeight(sample.x, sample.y) : open};
+  return Triangulation::VertexAt(*field_, sample.x, sample.y);
 }
 
 void GreedyTriangulation::Impl::ScanStarOf(const Star& star) {
   if (misfits_.size() < star.count) misfits_.resize(star.ring.capacity());
-  data_dependent_ ? data_dependent_->Scan(star, misfits_.data()) : scan_star_(open_, star, misfits_.data());
+  data_dependent_ ? data_dependent_->Scan(star, misfits_.data()) : scan_star_(*field_, star, misfits_.data());
   candidates_.Reserve(triangulation_.triangle_count());
   const bool is_plain = sagitta_.is_flat() && !star.has_border;
   const std::uint32_t* const slots = star.triangles.data();

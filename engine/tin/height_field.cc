@@ -1,12 +1,31 @@
 #include "engine/tin/height_field.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
 #include <utility>
 
+#include "engine/tin/quantum.h"
+
 namespace terrace::tin {
+namespace {
+
+// Rows a page apart, or nearly, put a column into one set of the first cache, which has room for a dozen lines: a
+// triangle of more rows would push out its own samples. An odd number of cache lines spreads them. Rows of tiles are
+// shorter, and lie without gaps.
+std::size_t StrideFor(int width) {
+  constexpr std::size_t kSamplesOfLine = 16, kShortRow = 512, kSets = 64, kMostRowsOfSet = 4;
+  const auto samples = static_cast<std::size_t>(width);
+  if (samples < kShortRow) return samples;
+  std::array<std::size_t, kSets> rows_of_set{};
+  for (std::size_t y = 0; y < kSets; ++y) ++rows_of_set[y * samples / kSamplesOfLine % kSets];
+  if (*std::max_element(rows_of_set.begin(), rows_of_set.end()) <= kMostRowsOfSet) return samples;
+  return ((samples + kSamplesOfLine - 1) / kSamplesOfLine | 1) * kSamplesOfLine;
+}
+
+}  // namespace
 
 Result<HeightField> HeightField::Make(int width, int height, std::vector<float> heights) {
   if (width < 2 || height < 2 || width > kMaxSide || height > kMaxSide) {
@@ -36,9 +55,12 @@ HeightField::HeightField(int width, int height, std::vector<float> heights, bool
     : width_(width),
       height_(height),
       has_voids_(has_voids),
+      quantum_(QuantumOf(heights.data(), heights.size())),
+      stride_(StrideFor(width)),
       heights_(std::move(heights)),
       patches_along_x_((width - 1) / kPatchSide + 1),
       patches_along_y_((height - 1) / kPatchSide + 1) {
+  LayOut();
   if (!has_voids_) return;
   const auto along_x = static_cast<std::size_t>(patches_along_x_);
   has_height_.resize(along_x * static_cast<std::size_t>(patches_along_y_));
@@ -51,6 +73,24 @@ HeightField::HeightField(int width, int height, std::vector<float> heights, bool
       has_height_[patch] = std::any_of(begin, end, [](float value) { return !std::isnan(value); });
     }
   }
+}
+
+// From rows without gaps to rows that are `stride_` apart, and what may be read beyond the last.
+void HeightField::LayOut() {
+  constexpr std::size_t kSamplesOfVector = 16, kRowsOfBlock = 8;
+  const float none = std::numeric_limits<float>::quiet_NaN();
+  const auto width = static_cast<std::size_t>(width_), rows = static_cast<std::size_t>(height_);
+  const bool is_tiny = width < kSamplesOfVector || rows < kRowsOfBlock;
+  const std::size_t size = stride_ * rows + (is_tiny ? stride_ * kRowsOfBlock + kSamplesOfVector : 0);
+  if (size > heights_.size()) heights_.resize(size, none);
+  if (stride_ == width) return;
+  for (std::size_t y = rows; y-- > 1;) {
+    float* const from = heights_.data() + y * width;
+    float* const to = heights_.data() + y * stride_;
+    std::copy_backward(from, from + width, to + width);
+    std::fill(to + width, to + stride_, none);
+  }
+  std::fill(heights_.data() + width, heights_.data() + stride_, none);
 }
 
 float HeightField::VertexHeight(int x, int y) const {

@@ -18,8 +18,9 @@ class HeightField {
   // Coordinates stay below 2^15, which keeps the in-circle predicate inside 64 bits (predicates.h).
   static constexpr int kMaxSide = 1 << 15;
 
-  // `heights` has width * height values in metres, row by row. NaN, infinities and whatever the caller turned into NaN
-  // are voids: they count in no error and lend their value to no vertex. Refuses fields smaller than 2 x 2, larger than
+  // `heights` has width * height values in metres, row by row; with a capacity of 32 more a row they are never copied.
+  // NaN, infinities and whatever the caller turned into NaN are voids: they count in no error and lend their value to
+  // no vertex. Refuses fields smaller than 2 x 2, larger than
   // kMaxSide a side, with a wrong number of values, or without a single valid sample.
   static Result<HeightField> Make(int width, int height, std::vector<float> heights);
 
@@ -28,12 +29,21 @@ class HeightField {
   bool has_voids() const { return has_voids_; }
 
   // NaN at a void.
-  float At(int x, int y) const {
-    return heights_[static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x)];
+  float At(int x, int y) const { return Row(y)[x]; }
+  // The same by row-major index.
+  float At(std::uint32_t sample) const {
+    const auto width = static_cast<std::uint32_t>(width_);
+    return stride_ == width ? heights_[sample] : heights_[sample / width * stride_ + sample % width];
   }
-  const float* Row(int y) const {
-    return heights_.data() + static_cast<std::size_t>(y) * static_cast<std::size_t>(width_);
-  }
+  const float* Row(int y) const { return heights_.data() + static_cast<std::size_t>(y) * stride_; }
+
+  // Samples from one row to the next. Scans load whole vectors: 16 samples may be read from any sample that is not in
+  // the first or last row, and from fields below 16 x 8 eight rows more than there are. What lies beyond is any value.
+  int stride() const { return static_cast<int>(stride_); }
+
+  // A power of two that all heights are multiples of, metres; 0 if none is known. Sums of heights, and products by
+  // integers, are exact in single precision as long as they stay below 2^24 of it.
+  float quantum() const { return quantum_; }
 
   // The height a vertex at (x, y) gets: the sample, or where that is void (only corners and seeds can be) the height of
   // the nearest valid sample, ties to the smaller row, then column.
@@ -50,12 +60,15 @@ class HeightField {
 
   HeightField(int width, int height, std::vector<float> heights, bool has_voids);
 
+  void LayOut();
   void SearchPatch(int column, int row, int x, int y, Nearest& nearest) const;
 
   int width_ = 0;
   int height_ = 0;
   bool has_voids_ = false;
-  std::vector<float> heights_;
+  float quantum_ = 0;
+  std::size_t stride_ = 0;
+  std::vector<float> heights_;  // NaN between rows
   int patches_along_x_ = 0, patches_along_y_ = 0;
   std::vector<bool> has_height_;  // by patch, row by row; empty where there are no voids
 };

@@ -140,6 +140,8 @@ void* GrowBlock(void* block, std::size_t used, std::size_t bytes) {
 
 void GiveBlock(void* block) noexcept { is_closed ? DeleteBlock(block) : store.Put(block); }
 
+void ReleaseBlock(void* block) noexcept { DeleteBlock(block); }
+
 std::size_t SpareBytes() { return is_closed ? 0 : store.bytes(); }
 
 void ReleaseSpareBlocks() {

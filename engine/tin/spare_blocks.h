@@ -24,6 +24,8 @@ void* TakeBlock(std::size_t bytes);
 // One with the first `used` bytes of `block`, which is given back or becomes that block.
 void* GrowBlock(void* block, std::size_t used, std::size_t bytes);
 void GiveBlock(void* block) noexcept;
+// The same, but nobody keeps it: the system has its memory at once.
+void ReleaseBlock(void* block) noexcept;
 
 // What this thread keeps, and an end to it: to measure what a run takes.
 std::size_t SpareBytes();
@@ -76,6 +78,13 @@ class LargeArray {
     const std::size_t before = size_;
     GrowBy(size - before);
     std::fill(values_ + before, values_ + size, value);
+  }
+  // Empties the array, whose memory goes back to the system and not to the thread: for one that a large run has
+  // outgrown.
+  void Release() {
+    if (values_ != nullptr) ReleaseBlock(values_);
+    values_ = nullptr;
+    size_ = capacity_ = 0;
   }
   void push_back(const T& value) {
     const T copy = value;  // it may be one of the array's own

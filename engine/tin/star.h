@@ -53,7 +53,7 @@ struct Star {
   std::int32_t x = 0, y = 0;  // of the centre
   float height = 0;           // of the centre, metres
   bool is_closed = true;
-  bool has_border = false;  // some triangle has an edge on the border
+  bool has_border = false;  // some triangle may have an edge on the border
   std::size_t count = 0;
   Ring ring;
   std::vector<TriangleId> triangles;  // `count` of them are valid

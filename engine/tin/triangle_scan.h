@@ -1,8 +1,9 @@
 // The worst sample of each triangle of a star: the inner loop of greedy insertion.
 //
-// A triangle's samples are the open ones (open_samples.h) in its inside and on its edges. With p the triangle's last
-// corner, u and v the others relative to it, D twice its area, A = v_y dz_u - u_y dz_v and B = u_x dz_v - v_x dz_u, the
-// distance of a sample is
+// A triangle's samples are those in its inside and on its edges that may still become vertices: neither its corners,
+// besides which a triangle has no vertices, nor voids, nor the field's border, which is judged by a rule of its own
+// (border.h). With p the triangle's last corner, u and v the others relative to it, D twice its area,
+// A = v_y dz_u - u_y dz_v and B = u_x dz_v - v_x dz_u, the distance of a sample is
 //   |D (h - z_p) - (A (x - x_p) + B (y - y_p))| / D
 // in double in exactly this form, never stepped, without fused operations, or in single precision where that is known
 // to give the same numbers. The result is the same on every processor, bit for bit, whatever vectors it has; Highway
@@ -14,7 +15,7 @@
 #include <cstdint>
 
 #include "engine/tin/candidate.h"
-#include "engine/tin/open_samples.h"
+#include "engine/tin/height_field.h"
 #include "engine/tin/star.h"
 
 namespace terrace::tin {
@@ -24,8 +25,9 @@ struct PlaneMisfit {
   std::uint32_t sample = kNoSample;  // row-major index; the smallest of equally distant samples
 };
 
-// misfits[i] is that of triangle i of the star.
-using StarScan = void (*)(const OpenSamples& samples, const Star& star, PlaneMisfit* misfits);
+// misfits[i] is that of triangle i of the star. Precondition: vertices have the heights of the field, or any where that
+// is void.
+using StarScan = void (*)(const HeightField& field, const Star& star, PlaneMisfit* misfits);
 
 // The scan for this processor.
 StarScan BestStarScan();

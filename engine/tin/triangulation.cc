@@ -92,7 +92,7 @@ void Triangulation::Widen() {
   for (const NarrowTriangles::Triangle& t : narrow_.slots) {
     wide_.slots.push_back({{t.corner(0), t.corner(1), t.corner(2)}, {t.twin(0), t.twin(1), t.twin(2)}});
   }
-  narrow_.slots = {};
+  narrow_.slots.Release();
   is_wide_ = true;
 }
 

@@ -72,7 +72,7 @@ testing::AssertionResult AreEqual(const TinMesh& a, const TinMesh& b) {
 class NaiveDataDependent {
  public:
   NaiveDataDependent(const HeightField& field, DataDependentOptions options)
-      : field_(field), options_(options), open_(field), triangulation_(field) {}
+      : field_(field), options_(options), triangulation_(field) {}
 
   TinMesh Run(double max_error) {
     for (;;) {
@@ -80,7 +80,7 @@ class NaiveDataDependent {
       TriangleId at = 0;
       for (TriangleId t = 0; t < triangulation_.triangle_count(); ++t) {
         const auto [a, b, c] = triangulation_.triangle(t);
-        Candidate candidate = WorstOpen(At(a), At(b), At(c));
+        Candidate candidate = WorstInside(At(a), At(b), At(c));
         if (const Candidate border = WorstBorder(At(a), At(b), At(c)); Precedes(border, candidate)) candidate = border;
         candidate.error = static_cast<double>(CandidateQueue::RoundUp(candidate.error));
         if (Precedes(candidate, worst)) {
@@ -99,7 +99,7 @@ class NaiveDataDependent {
     return {p.x, p.y, static_cast<double>(triangulation_.height(vertex))};
   }
 
-  Candidate WorstOpen(const Corner& a, const Corner& b, const Corner& c) const {
+  Candidate WorstInside(const Corner& a, const Corner& b, const Corner& c) const {
     const double ux = a.x - c.x, uy = a.y - c.y, vx = b.x - c.x, vy = b.y - c.y;
     const double d = ux * vy - uy * vx;
     const double per_x = vy * (a.z - c.z) - uy * (b.z - c.z), per_y = ux * (b.z - c.z) - vx * (a.z - c.z);
@@ -110,8 +110,10 @@ class NaiveDataDependent {
         const double px = x - c.x, py = y - c.y;
         const double of_a = px * vy - py * vx, of_b = ux * py - uy * px;
         if (of_a < 0 || of_b < 0 || d - of_a - of_b < 0) continue;
-        const auto height =
-            static_cast<double>(open_.At({static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)}));
+        const bool is_border = x == 0 || y == 0 || x + 1 == field_.width() || y + 1 == field_.height();
+        const bool is_corner = of_a == d || of_b == d || (of_a == 0 && of_b == 0);
+        if (is_border || is_corner) continue;
+        const auto height = static_cast<double>(field_.At(x, y));
         const double numerator = std::abs(d * (height - c.z) - (per_x * px + per_y * py));
         if (!(numerator > furthest)) continue;
         furthest = numerator;
@@ -134,7 +136,7 @@ class NaiveDataDependent {
 
   double Error(const Corner& a, const Corner& b, const Corner& c) const {
     if (options_.measure == FitMeasure::kSumSquares) return SquaredDistances(field_, {a, b, c});
-    return std::max(WorstOpen(a, b, c).error, WorstBorder(a, b, c).error);
+    return std::max(WorstInside(a, b, c).error, WorstBorder(a, b, c).error);
   }
 
   bool Swaps(const Quadrilateral& q, const Corner& p, TriangleId beyond) const {
@@ -155,7 +157,6 @@ class NaiveDataDependent {
 
   void Insert(std::uint32_t sample, TriangleId triangle) {
     const SamplePosition at = PositionOf(sample, field_.width());
-    open_.Close(at);
     const float height = field_.At(at.x, at.y);
     const Corner p{at.x, at.y, static_cast<double>(height)};
     triangulation_.Insert({at, height}, triangle,
@@ -166,7 +167,6 @@ class NaiveDataDependent {
 
   const HeightField& field_;
   DataDependentOptions options_;
-  OpenSamples open_;
   Triangulation triangulation_;
 };
 

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -35,6 +37,47 @@ TEST(HeightField, TakesInfinitiesForVoids) {
   EXPECT_EQ(field->At(0, 0), 1);
   EXPECT_TRUE(std::isnan(field->At(1, 0)) && std::isnan(field->At(0, 1)) && std::isnan(field->At(1, 1)));
   EXPECT_FALSE(NoiseField(2, 2, 1).has_voids());
+}
+
+// Widths of short rows, of rows that lie further apart than they are long, and of others; the smallest, too.
+TEST(HeightField, HasItsRowsWhereverTheyLie) {
+  constexpr int kRows = 9;
+  for (const int width : {2, 3, 17, 511, 512, 513, 1024, 1025, 1040, 1201, 1280, 2047}) {
+    for (const std::size_t room : {0, 32}) {
+      std::vector<float> heights;
+      heights.reserve(kRows * (static_cast<std::size_t>(width) + room));
+      for (int i = 0; i < kRows * width; ++i) heights.push_back(static_cast<float>(i));
+      const float* const data = heights.data();
+      const Result<HeightField> field = HeightField::Make(width, kRows, std::move(heights));
+      ASSERT_TRUE(field);
+      // 64 rows must not share a few of a cache's 64 sets of lines.
+      std::set<int> sets;
+      for (int y = 0; y < 64; ++y) sets.insert(y * field->stride() / 16 % 64);
+      EXPECT_TRUE(width < 512 || sets.size() > 16) << width;
+      EXPECT_TRUE(room == 0 || width < 512 || field->Row(0) == data) << "copied at " << width;
+      for (int y = 0; y < kRows; ++y) {
+        for (int x = 0; x < width; ++x) {
+          const int sample = y * width + x;
+          ASSERT_EQ(field->At(x, y), static_cast<float>(sample)) << width;
+          ASSERT_EQ(field->At(static_cast<std::uint32_t>(sample)), static_cast<float>(sample)) << width;
+        }
+      }
+    }
+  }
+}
+
+TEST(HeightField, FindsTheQuantumOfItsHeights) {
+  const auto quantum_of = [](float unit, float odd) {
+    return MakeField(9, 7, [&](int x, int y) { return x == 4 && y == 3 ? odd : unit * static_cast<float>(x * 7 - y); })
+        .quantum();
+  };
+  EXPECT_EQ(quantum_of(1, 5), 1);
+  EXPECT_EQ(quantum_of(1, kVoid), 1);
+  EXPECT_EQ(quantum_of(1, 0.5F), 0x1p-10F);
+  EXPECT_EQ(quantum_of(0x1p-10F, 8848), 0x1p-10F);
+  EXPECT_EQ(quantum_of(0x1p-14F, 1), 0x1p-14F);
+  EXPECT_EQ(quantum_of(1, 0.1F), 0);
+  EXPECT_EQ(quantum_of(1, 1e30F), 0);
 }
 
 TEST(HeightField, LendsAVoidVertexTheNearestHeight) {

@@ -83,6 +83,17 @@ TEST_F(SpareBlocks, GrowsABlockThatKeepsItsContents) {
   GiveBlock(block);
 }
 
+TEST_F(SpareBlocks, AreNotKeptWhenReleased) {
+  LargeArray<int> array;
+  array.GrowTo(100'000, 7);
+  array.Release();
+  EXPECT_EQ(SpareBytes(), 0u);
+  EXPECT_TRUE(array.empty());
+  array.GrowTo(3, 8);
+  EXPECT_EQ(array[2], 8);
+  LargeArray<int>().Release();
+}
+
 TEST_F(SpareBlocks, HoldLargeArrays) {
   LargeArray<std::uint32_t> array;
   EXPECT_TRUE(array.empty());
