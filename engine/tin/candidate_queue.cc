@@ -46,11 +46,15 @@ std::size_t Sweep(const float* errors, std::size_t count, float threshold, std::
   const auto next = hn::Set(slots, static_cast<std::uint32_t>(lanes));
   auto slot = hn::Iota(slots, 0);
   std::size_t n = 0;
-  for (std::size_t i = 0; i < count; i += lanes) {
+  const auto find = [&](std::size_t i) HWY_ATTR {
     const auto is_foremost = hn::RebindMask(slots, hn::Ge(hn::LoadU(floats, errors + i), least));
     hn::StoreU(hn::Compress(slot, is_foremost), slots, found + n);
     n += hn::CountTrue(slots, is_foremost);
     slot = hn::Add(slot, next);
+  };
+  for (std::size_t i = 0; i < count; i += 2 * lanes) {
+    find(i);
+    find(i + lanes);
   }
   return n;
 }
@@ -87,6 +91,8 @@ constexpr std::size_t kBlock = 64;    // slots: two vectors of the widest there 
 constexpr std::size_t kSwept = 4096;  // slots swept in one go
 constexpr std::size_t kBeyond = 16;   // what a sweep writes beyond what it found
 constexpr std::size_t kAhead = 8;     // entries: their slots are fetched so early
+constexpr std::ptrdiff_t kNear = 8;   // entries looked at one by one
+constexpr std::size_t kRoom = 32;     // entries that fit before those that a sweep found
 
 }  // namespace
 
@@ -142,26 +148,27 @@ bool CandidateQueue::SweepFrom(float most) {
   }
   if (foremost.empty()) return false;
   hwy::Sorter()(foremost.data(), foremost.size(), hwy::SortDescending());
+  run_.resize(kRoom);
+  run_begin_ = kRoom;
   for (const hwy::uint128_t& entry : foremost) run_.push_back({entry.hi, static_cast<std::uint32_t>(entry.lo)});
-  entered_ = run_.size();
+  entered_ = foremost.size();
   return true;
 }
 
 void CandidateQueue::Insert(std::uint32_t slot) {
   const Entry entry{OrderOf(slot), slot};
-  // Behind all that precede it, found without a branch.
-  std::size_t first = run_begin_, length = run_.size() - run_begin_;
-  while (length > 0) {
-    const std::size_t half = (length + 1) / 2;
-    first += run_[first + half - 1].order > entry.order ? half : 0;
-    length -= half;
-  }
-  if (run_begin_ > 0 && first - run_begin_ < run_.size() - first) {
-    std::copy(run_.begin() + run_begin_, run_.begin() + first, run_.begin() + run_begin_ - 1);
+  const auto precedes = [&](const Entry& other) { return other.order > entry.order; };
+  // Two in three come before all others, nine in ten before all but a few.
+  const auto front = run_.begin() + static_cast<std::ptrdiff_t>(run_begin_);
+  const auto near = front + std::min<std::ptrdiff_t>(run_.end() - front, kNear);
+  auto place = std::find_if_not(front, near, precedes);
+  if (place == near) place = std::partition_point(near, run_.end(), precedes);
+  if (run_begin_ > 0 && place - front < run_.end() - place) {
+    std::copy(front, place, front - 1);
     --run_begin_;
-    run_[first - 1] = entry;
+    *(place - 1) = entry;
   } else {
-    run_.insert(run_.begin() + first, entry);
+    run_.insert(place, entry);
   }
   ++entered_;
   if (run_.size() - run_begin_ > 4 * wanted_) Shorten();

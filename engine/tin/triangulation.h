@@ -221,7 +221,7 @@ void Triangulation::Replace(Triangles& triangles, SamplePosition point, Triangle
         prefetch(across_wv);
         stack[pending - 1].back = across_wv;
         stack[pending].back = across_uw;
-        stack[pending].end = w;
+        stack[pending].end = {w.id, w.dx, w.dy, w.height};  // as a whole it is put together in memory, absorbed or not
         ++pending;
         continue;
       }
