@@ -24,8 +24,6 @@ namespace terrace::tin {
 namespace HWY_NAMESPACE {
 namespace {
 
-constexpr hn::RebindToSigned<FloatsTag> kInts;
-
 // Blocks of kSide x kSide samples, a few rows to a vector.
 constexpr int kMostLanes = 16;
 HWY_ALIGN constexpr float kColumnsBy4[kMostLanes] = {0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3};
@@ -154,8 +152,6 @@ struct StarPlanes {
   std::uint32_t small, medium, large, wild;            // sets of lanes
 
  private:
-  using Ints = hn::Vec<decltype(kInts)>;
-
   // Samples on an edge that lies on the field's border shall be outside.
   HWY_INLINE void LeaveBorderOut(const HeightField& field, const Star& star, Ints u_x, Ints u_y, Ints v_x, Ints v_y) {
     const auto is_along = [](Ints a, Ints b, int at, int size) HWY_ATTR {

@@ -39,8 +39,13 @@ Result<HeightField> HeightField::Make(int width, int height, std::vector<float> 
                      height, samples, heights.size());
   }
   std::size_t voids = 0;
+  float lowest = std::numeric_limits<float>::max(), highest = -lowest;
   for (float& value : heights) {
-    if (std::isfinite(value)) continue;
+    if (std::isfinite(value)) {
+      lowest = std::min(lowest, value);
+      highest = std::max(highest, value);
+      continue;
+    }
     value = std::numeric_limits<float>::quiet_NaN();
     ++voids;
   }
@@ -48,10 +53,11 @@ Result<HeightField> HeightField::Make(int width, int height, std::vector<float> 
     return MakeError(ErrorCode::kInvalidArgument,
                      "all {} x {} samples of the height field are void: at least one needs a height", width, height);
   }
-  return HeightField(width, height, std::move(heights), voids > 0);
+  return HeightField(width, height, std::move(heights), voids > 0,
+                     static_cast<double>(highest) - static_cast<double>(lowest));
 }
 
-HeightField::HeightField(int width, int height, std::vector<float> heights, bool has_voids)
+HeightField::HeightField(int width, int height, std::vector<float> heights, bool has_voids, double relief_m)
     : width_(width),
       height_(height),
       has_voids_(has_voids),
@@ -60,6 +66,12 @@ HeightField::HeightField(int width, int height, std::vector<float> heights, bool
       heights_(std::move(heights)),
       patches_along_x_((width - 1) / kPatchSide + 1),
       patches_along_y_((height - 1) / kPatchSide + 1) {
+  constexpr double kMostQuanta = 0x1p22, kMostNumerator = 0x1p31 - 1;
+  const double relief = relief_m / static_cast<double>(quantum_);
+  // Whole metres are exact in single precision up to triangles so large that few are, and it is quicker.
+  if (quantum_ > 0 && quantum_ < 1 && !has_voids_ && relief < kMostQuanta) {
+    most_area_in_integers_ = static_cast<float>(std::floor(kMostNumerator / std::max(relief, 0x1p8)));
+  }
   LayOut();
   if (!has_voids_) return;
   const auto along_x = static_cast<std::size_t>(patches_along_x_);

@@ -45,6 +45,11 @@ class HeightField {
   // integers, are exact in single precision as long as they stay below 2^24 of it.
   float quantum() const { return quantum_; }
 
+  // Doubled areas of triangles up to this one, times how far a sample inside is from the plane of three samples, are
+  // below 2^31 quanta, and differences of heights below 2^22: scans may count in integers. 0 if they may not, or need
+  // not.
+  float most_area_in_integers() const { return most_area_in_integers_; }
+
   // The height a vertex at (x, y) gets: the sample, or where that is void (only corners and seeds can be) the height of
   // the nearest valid sample, ties to the smaller row, then column.
   float VertexHeight(int x, int y) const;
@@ -58,7 +63,7 @@ class HeightField {
     int x, y;
   };
 
-  HeightField(int width, int height, std::vector<float> heights, bool has_voids);
+  HeightField(int width, int height, std::vector<float> heights, bool has_voids, double relief_m);
 
   void LayOut();
   void SearchPatch(int column, int row, int x, int y, Nearest& nearest) const;
@@ -67,6 +72,7 @@ class HeightField {
   int height_ = 0;
   bool has_voids_ = false;
   float quantum_ = 0;
+  float most_area_in_integers_ = 0;
   std::size_t stride_ = 0;
   std::vector<float> heights_;  // NaN between rows
   int patches_along_x_ = 0, patches_along_y_ = 0;

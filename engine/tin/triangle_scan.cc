@@ -32,6 +32,28 @@ HWY_INLINE double NumeratorAt(const HeightField& field, const ExactPlane& t, int
 // the magnitude.
 HWY_INLINE bool MayBeACorner(float most, float magnitude, float doubt) { return !(most > 4 * doubt * magnitude); }
 
+// The same where single precision is not exact.
+template <int kSide>
+HWY_NOINLINE PlaneMisfit MisfitInDoubt(const HeightField& field, const Star& star, const StarPlanes& planes,
+                                       std::size_t i, std::size_t first, const BlockFind& find) {
+  const int west = planes.west[i], south = planes.south[i];
+  const ExactPlane t = ExactPlaneOf(field, star, first + i);
+  if (!(find.most < kMostMagnitude) || MayBeACorner(find.most, planes.magnitude[i], kDoubtInBlocks)) {
+    return ScanExactly(field, t);
+  }
+  double most = -1;
+  int best = 0;
+  for (std::uint64_t found = find.found; found != 0; found &= found - 1) {
+    const int k = std::countr_zero(found);
+    const double numerator = NumeratorAt(field, t, west + k % kSide, south + k / kSide);
+    if (!(numerator > most)) continue;
+    most = numerator;
+    best = k;
+  }
+  const int row = star.y + south + best / kSide, column = star.x + west + best % kSide;
+  return {most / t.d, static_cast<std::uint32_t>(row * field.width() + column)};
+}
+
 // What ScanBlock found: most often a single sample.
 template <int kSide>
 HWY_INLINE PlaneMisfit MisfitOf(const HeightField& field, const Star& star, const StarPlanes& planes, std::size_t i,
@@ -51,20 +73,7 @@ HWY_INLINE PlaneMisfit MisfitOf(const HeightField& field, const Star& star, cons
     const std::uint64_t found = find.found & ~(bit(0, 0) | bit(dx[0], dy[0]) | bit(dx[1], dy[1]));
     return found == 0 ? PlaneMisfit{} : PlaneMisfit{0, sample(std::countr_zero(found))};
   }
-  const ExactPlane t = ExactPlaneOf(field, star, first + i);
-  if (!(find.most < kMostMagnitude) || MayBeACorner(find.most, planes.magnitude[i], kDoubtInBlocks)) {
-    return ScanExactly(field, t);
-  }
-  double most = -1;
-  int best = 0;
-  for (std::uint64_t found = find.found; found != 0; found &= found - 1) {
-    const int k = std::countr_zero(found);
-    const double numerator = NumeratorAt(field, t, west + k % kSide, south + k / kSide);
-    if (!(numerator > most)) continue;
-    most = numerator;
-    best = k;
-  }
-  return {most / t.d, sample(best)};
+  return MisfitInDoubt<kSide>(field, star, planes, i, first, find);
 }
 
 // In single precision: what StarPlanes::Work found.
@@ -91,14 +100,18 @@ HWY_INLINE SinglePlane SinglePlaneOf(const HeightField& field, const Star& star,
 }
 
 // Where all samples lie on the triangle's plane: the first of them.
-PlaneMisfit OnPlane(const HeightField& field, const Star& star, std::size_t i) {
+HWY_NOINLINE PlaneMisfit OnPlane(const HeightField& field, const Star& star, std::size_t i) {
   const std::uint32_t sample = FirstSample(field, star, i);
   return sample == kNoSample ? PlaneMisfit{} : PlaneMisfit{0, sample};
 }
 
+HWY_NOINLINE PlaneMisfit ScanWild(const HeightField& field, const Star& star, std::size_t i) {
+  return ScanExactly(field, ExactPlaneOf(field, star, i));
+}
+
 // A larger triangle where single precision is not exact: no lane may hold two samples that are in doubt.
-PlaneMisfit ScanDoubtfully(const HeightField& field, const Star& star, const StarPlanes& planes, std::size_t i,
-                           std::size_t first, float most_exact) {
+HWY_NOINLINE PlaneMisfit ScanDoubtfully(const HeightField& field, const Star& star, const StarPlanes& planes,
+                                        std::size_t i, std::size_t first, float most_exact) {
   const auto two = ScanWide<FurthestTwo>(field, SinglePlaneOf(field, star, planes, i, first));
   const float single = two.numerator();
   if (single < 0) return {};
@@ -124,8 +137,47 @@ PlaneMisfit ScanDoubtfully(const HeightField& field, const Star& star, const Sta
   return {most / t.d, best};
 }
 
+// In integers.
+HWY_INLINE IntegerPlane IntegerPlaneOf(const HeightField& field, const Star& star, const StarPlanes& planes,
+                                       std::size_t i, std::size_t first) {
+  const std::int32_t *dx = star.ring.dx.data() + first + i, *dy = star.ring.dy.data() + first + i;
+  const float* const heights = star.ring.heights.data() + first + i;
+  const int west = planes.west[i], south = planes.south[i];
+  const float quantum = field.quantum(), quanta_a_metre = 1 / quantum;
+  const auto quanta = [&](float height) {
+    return static_cast<std::uint32_t>(static_cast<std::int32_t>((height - star.height) * quanta_a_metre));
+  };
+  const auto ux = static_cast<std::uint32_t>(dx[0]), uy = static_cast<std::uint32_t>(dy[0]);
+  const auto vx = static_cast<std::uint32_t>(dx[1]), vy = static_cast<std::uint32_t>(dy[1]);
+  const std::uint32_t uz = quanta(heights[0]), vz = quanta(heights[1]), d = ux * vy - uy * vx;
+  IntegerPlane t;
+  t.px = star.x, t.py = star.y;
+  t.ux = dx[0], t.uy = dy[0], t.vx = dx[1], t.vy = dy[1];
+  t.west = west, t.east = west + planes.width[i], t.south = south, t.north = south + planes.height[i];
+  t.z = star.height;
+  t.lift = quantum * 0x1.8p23F;
+  t.pz = static_cast<std::int32_t>(d * std::bit_cast<std::uint32_t>(t.lift));
+  t.d = static_cast<std::int32_t>(d);
+  t.a = static_cast<std::int32_t>(vy * uz - uy * vz);
+  t.b = static_cast<std::int32_t>(ux * vz - vx * uz);
+  LeaveBorderOut(field, t);
+  return t;
+}
+
+// A larger triangle where integers hold all numerators: exact, and no lane is in doubt.
+HWY_NOINLINE PlaneMisfit ScanInIntegers(const HeightField& field, const Star& star, const StarPlanes& planes,
+                                        std::size_t i, std::size_t first) {
+  const auto furthest = ScanWide<Furthest<IntsTag>>(field, IntegerPlaneOf(field, star, planes, i, first));
+  const std::int32_t numerator = furthest.numerator();
+  if (numerator < 0) return {};
+  if (numerator == 0) return OnPlane(field, star, first + i);
+  return {static_cast<double>(numerator) * static_cast<double>(field.quantum()) / static_cast<double>(planes.d[i]),
+          furthest.sample()};
+}
+
 HWY_INLINE PlaneMisfit ScanLarge(const HeightField& field, const Star& star, const StarPlanes& planes, std::size_t i,
                                  std::size_t first, float most_exact) {
+  if (planes.d[i] <= field.most_area_in_integers()) return ScanInIntegers(field, star, planes, i, first);
   if (planes.largest[i] < most_exact) {
     const auto furthest = ScanWide<Furthest<FloatsTag>>(field, SinglePlaneOf(field, star, planes, i, first));
     const float numerator = furthest.numerator();
@@ -163,7 +215,7 @@ HWY_INLINE void ScanTogether(const HeightField& field, const Star& star, const S
     misfits[lane(bits)] = ScanLarge(field, star, planes, lane(bits), first, most_exact);
   }
   for (std::uint32_t bits = planes.wild & lanes; bits != 0; bits &= bits - 1) {
-    misfits[lane(bits)] = ScanExactly(field, ExactPlaneOf(field, star, first + lane(bits)));
+    misfits[lane(bits)] = ScanWild(field, star, first + lane(bits));
   }
 }
 

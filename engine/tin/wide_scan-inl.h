@@ -27,7 +27,8 @@ namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Everything is evaluated in one of two precisions. Single is as good as double for most triangles: all heights are
+// Everything is evaluated in double, in single precision or in integers, whichever is quickest and gives the same.
+// Single is as good as double for most triangles: all heights are
 // multiples of a quantum (HeightField::quantum), so all numbers that the formula adds and multiplies are, and every
 // multiple up to 2^24 times the quantum is a float. Where that may be exceeded, it is double.
 using DoublesTag = hn::CappedTag<double, 16>;
@@ -39,6 +40,9 @@ using Floats = hn::Vec<FloatsTag>;
 // Row-major indices: in doubles beside doubles, in integers beside floats, which cannot hold them.
 template <typename Tag>
 using IndexTag = std::conditional_t<std::is_same_v<hn::TFromD<Tag>, float>, hn::RebindToSigned<Tag>, Tag>;
+using IntsTag = IndexTag<FloatsTag>;
+using Ints = hn::Vec<IntsTag>;
+constexpr IntsTag kInts;
 
 template <typename Tag>
 HWY_INLINE int LanesOf() {
@@ -72,9 +76,17 @@ struct TrianglePlane {
 using ExactPlane = TrianglePlane<double>;
 using SinglePlane = TrianglePlane<float>;
 
-// The precision of samples that are visited.
+// In quanta (HeightField::quantum), modulo 2^32: numerators are right if they are below 2^31, whatever became of the
+// products and sums on the way there. A height h less p's, plus `lift`, is a float whose last 23 bits count quanta; as
+// an integer, those of all of its bits that are beyond p's are the difference.
+struct IntegerPlane : TrianglePlane<std::int32_t> {  // pz: D times p's bits
+  float z, lift;
+};
+
+// The numbers of samples that are visited.
 template <typename Found>
-using PlaneFor = TrianglePlane<hn::TFromD<typename Found::Tag>>;
+using PlaneFor = std::conditional_t<std::is_same_v<hn::TFromD<typename Found::Tag>, std::int32_t>, IntegerPlane,
+                                    TrianglePlane<hn::TFromD<typename Found::Tag>>>;
 
 // The larger or the smaller one; b where one is NaN.
 HWY_INLINE Floats MaxOrSecond(Floats a, Floats b) {
@@ -109,6 +121,8 @@ class Furthest {
     const auto is_further = hn::Gt(numerator, numerator_);
     if constexpr (std::is_same_v<Tag, FloatsTag>) {
       numerator_ = MaxOrSecond(numerator, numerator_);  // the next sample waits for this one, and not for the mask
+    } else if constexpr (std::is_same_v<Tag, IntsTag>) {
+      numerator_ = hn::Max(numerator, numerator_);
     } else {
       numerator_ = hn::IfThenElse(is_further, numerator, numerator_);
     }
@@ -146,9 +160,11 @@ class Furthest {
   Index index_;             // row-major
 };
 
+template <typename Found>
+inline constexpr bool kIsInteger = std::is_same_v<Found, Furthest<IntsTag>>;
 // Whether sums are exact where it is used: planes may be stepped then.
 template <typename Found>
-inline constexpr bool kIsExact = std::is_same_v<Found, Furthest<FloatsTag>>;
+inline constexpr bool kIsExact = std::is_same_v<Found, Furthest<FloatsTag>> || kIsInteger<Found>;
 
 // The same where single precision leaves doubts: also how close to a lane's furthest sample another one of it comes.
 class FurthestTwo {
@@ -236,36 +252,80 @@ HWY_INLINE hn::Vec<Tag> UpToColumn(Tag tag, int last, hn::Vec<Tag> columns, hn::
   return hn::IfThenElse(hn::Le(columns, All(tag, last)), All(tag, number), All(tag, none));
 }
 
-// Every sample of some columns of the bounding box, in single precision: no spans, no divisions, no branches but the
-// loop. Barycentric coordinates are integers, whose signs make what is outside NaN.
+// And in integers.
+HWY_INLINE Ints NumeratorFrom(const float* heights, Floats z, Floats lift, Ints d, Ints plane) {
+  const Floats lifted = hn::Add(hn::Sub(hn::LoadU(kFloats, heights), z), lift);
+  return hn::Abs(hn::Sub(hn::Mul(hn::BitCast(kInts, lifted), d), plane));
+}
+
+// The numerators of some columns, from the first row of the box on. NaN beyond its last column, or negative.
 template <typename Found>
-HWY_INLINE Found ScanColumnsInSingle(const HeightField& field, const SinglePlane& t, int column) {
-  constexpr IndexTag<FloatsTag> ints;
-  const Floats d = All(kFloats, t.d), b = All(kFloats, t.b), one = All(kFloats, 1), columns = From(kFloats, column);
-  const Floats a_x = hn::Mul(All(kFloats, t.a), columns), pz = UpToColumn(kFloats, t.east, columns, t.pz);
-  Floats y = All(kFloats, t.south);
-  const auto x = From(ints, column);
-  auto of_u = hn::Sub(hn::Mul(All(ints, t.vy), x), All(ints, t.vx * t.south));
-  auto of_v = hn::Sub(All(ints, t.ux * t.south), hn::Mul(All(ints, t.uy), x));
-  auto of_p = hn::Sub(All(ints, t.ux * t.vy - t.uy * t.vx), hn::Add(of_u, of_v));
-  const auto step_u = All(ints, t.vx), step_v = All(ints, t.ux), step_p = All(ints, t.vx - t.ux);
+class ColumnsOfPlane {
+ public:
+  HWY_INLINE ColumnsOfPlane(const SinglePlane& t, int column)
+      : d_(All(kFloats, t.d)),
+        b_(All(kFloats, t.b)),
+        pz_(UpToColumn(kFloats, t.east, From(kFloats, column), t.pz)),
+        a_x_(hn::Mul(All(kFloats, t.a), From(kFloats, column))),
+        y_(All(kFloats, t.south)),
+        plane_(hn::MulAdd(b_, y_, a_x_)) {}
+
+  HWY_INLINE Floats Numerators(const float* heights) const { return NumeratorFrom(heights, pz_, d_, plane_); }
+  HWY_INLINE void Step() {
+    if constexpr (kIsExact<Found>) {
+      plane_ = hn::Add(plane_, b_);
+    } else {
+      y_ = hn::Add(y_, All(kFloats, 1));
+      plane_ = hn::MulAdd(b_, y_, a_x_);
+    }
+  }
+
+ private:
+  Floats d_, b_, pz_, a_x_, y_, plane_;
+};
+template <>
+class ColumnsOfPlane<Furthest<IntsTag>> {
+ public:
+  HWY_INLINE ColumnsOfPlane(const IntegerPlane& t, int column)
+      : z_(All(kFloats, t.z)),
+        lift_(All(kFloats, t.lift)),
+        d_(All(kInts, t.d)),
+        b_(All(kInts, t.b)),
+        beyond_(hn::VecFromMask(kInts, hn::Gt(From(kInts, column), All(kInts, t.east)))),
+        plane_(hn::Add(hn::Add(All(kInts, t.pz), hn::Mul(b_, All(kInts, t.south))),
+                       hn::Mul(All(kInts, t.a), From(kInts, column)))) {}
+
+  HWY_INLINE Ints Numerators(const float* heights) const {
+    return hn::Or(NumeratorFrom(heights, z_, lift_, d_, plane_), beyond_);
+  }
+  HWY_INLINE void Step() { plane_ = hn::Add(plane_, b_); }
+
+ private:
+  Floats z_, lift_;
+  Ints d_, b_, beyond_, plane_;
+};
+
+// Every sample of some columns of the bounding box, in single precision or integers: no spans, no divisions, no
+// branches but the loop. Barycentric coordinates are integers, whose signs make what is outside NaN, or negative.
+template <typename Found>
+HWY_INLINE Found ScanColumnsInSingle(const HeightField& field, const PlaneFor<Found>& t, int column) {
+  constexpr typename Found::Tag tag;
+  const auto x = From(kInts, column);
+  auto of_u = hn::Sub(hn::Mul(All(kInts, t.vy), x), All(kInts, t.vx * t.south));
+  auto of_v = hn::Sub(All(kInts, t.ux * t.south), hn::Mul(All(kInts, t.uy), x));
+  auto of_p = hn::Sub(All(kInts, t.ux * t.vy - t.uy * t.vx), hn::Add(of_u, of_v));
+  const auto step_u = All(kInts, t.vx), step_v = All(kInts, t.ux), step_p = All(kInts, t.vx - t.ux);
   const int width = field.width(), stride = field.stride(), first_row = t.py + t.south;
   const float* from = field.Row(first_row) + t.px + column;
-  auto index = From(ints, first_row * width + t.px + column);
-  const auto next_row = All(ints, width);
-  Floats plane = hn::MulAdd(b, y, a_x);
+  auto index = From(kInts, first_row * width + t.px + column);
+  const auto next_row = All(kInts, width);
+  ColumnsOfPlane<Found> plane(t, column);
   Found furthest;
   for (int j = t.south; j <= t.north; ++j) {
-    const Floats numerator = NumeratorFrom(from, pz, d, plane);
     const auto outside = hn::ShiftRight<31>(hn::Or3(of_u, of_v, of_p));
-    furthest.Visit(hn::Or(numerator, hn::BitCast(kFloats, outside)), index);
+    furthest.Visit(hn::Or(plane.Numerators(from), hn::BitCast(tag, outside)), index);
     from += stride;
-    if constexpr (kIsExact<Found>) {
-      plane = hn::Add(plane, b);
-    } else {
-      y = hn::Add(y, one);
-      plane = hn::MulAdd(b, y, a_x);
-    }
+    plane.Step();
     index = hn::Add(index, next_row);
     of_u = hn::Sub(of_u, step_u);
     of_v = hn::Add(of_v, step_v);
@@ -308,10 +368,10 @@ HWY_INLINE Furthest<DoublesTag> ScanColumnsInDouble(const HeightField& field, co
 
 template <typename Found>
 HWY_INLINE Found ScanColumns(const HeightField& field, const PlaneFor<Found>& t, int column) {
-  if constexpr (std::is_same_v<typename Found::Tag, FloatsTag>) {
-    return ScanColumnsInSingle<Found>(field, t, column);
-  } else {
+  if constexpr (std::is_same_v<typename Found::Tag, DoublesTag>) {
     return ScanColumnsInDouble(field, t, column);
+  } else {
+    return ScanColumnsInSingle<Found>(field, t, column);
   }
 }
 
@@ -340,8 +400,8 @@ class SpanFinder {
  public:
   using Number = hn::TFromD<Tag>;
 
-  HWY_INLINE explicit SpanFinder(const TrianglePlane<Number>& t)
-      : px_(t.px), first_(t.px + t.west), last_(t.px + t.east) {
+  template <typename Plane>
+  HWY_INLINE explicit SpanFinder(const Plane& t) : px_(t.px), first_(t.px + t.west), last_(t.px + t.east) {
     const Number xs[4] = {0, static_cast<Number>(t.ux), static_cast<Number>(t.vx), 0};
     const Number ys[4] = {0, static_cast<Number>(t.uy), static_cast<Number>(t.vy), 0};
     std::size_t easts = 0, wests = 0;
@@ -417,7 +477,7 @@ HWY_INLINE Found ScanSpans(const HeightField& field, const PlaneFor<Found>& t) {
   const auto indices_on = All(indices, lanes);
   Found furthest, also, ends;  // apart, since what is furthest so far is waited for
   Columns firsts, lasts;
-  const SpanFinder<Tag> finder(t);
+  const SpanFinder<std::conditional_t<kIsInteger<Found>, FloatsTag, Tag>> finder(t);
   for (int block = t.py + t.south; block <= last_row; block += kRows) {
     const int rows = std::min(kRows, last_row - block + 1);
     finder.Find(block - t.py, rows, firsts, lasts);
@@ -425,7 +485,8 @@ HWY_INLINE Found ScanSpans(const HeightField& field, const PlaneFor<Found>& t) {
     for (int j = 0; j < rows; ++j) {
       const int first = firsts[static_cast<std::size_t>(j)], last = lasts[static_cast<std::size_t>(j)], row = block + j;
       const float* from = field.Row(row) + first;
-      const auto b_y = hn::Mul(b, y);
+      auto b_y = hn::Mul(b, y);
+      if constexpr (kIsInteger<Found>) b_y = hn::Add(b_y, pz);
       const auto end = All(indices, row * width + last + 1);
       y = hn::Add(y, one);
       auto x = From(tag, first - t.px);
@@ -435,6 +496,8 @@ HWY_INLINE Found ScanSpans(const HeightField& field, const PlaneFor<Found>& t) {
       const auto numerator = [&]() HWY_ATTR {
         if constexpr (std::is_same_v<Tag, FloatsTag>) {
           return NumeratorFrom(from, pz, d, plane);
+        } else if constexpr (kIsInteger<Found>) {
+          return NumeratorFrom(from, All(kFloats, t.z), All(kFloats, t.lift), d, plane);
         } else {
           const auto is_corner = hn::Or(hn::Or(hn::Eq(index, at_p), hn::Eq(index, at_u)), hn::Eq(index, at_v));
           return hn::IfThenElse(is_corner, none, Numerator(HeightsAt(tag, from), pz, d, plane));
@@ -496,7 +559,7 @@ HWY_INLINE Found ScanWide(const HeightField& field, const PlaneFor<Found>& t) {
                                                                             : ScanSpans<Found>(field, t);
 }
 
-PlaneMisfit ScanExactly(const HeightField& field, const ExactPlane& t) {
+HWY_NOINLINE PlaneMisfit ScanExactly(const HeightField& field, const ExactPlane& t) {
   const auto furthest = ScanWide<Furthest<DoublesTag>>(field, t);
   if (furthest.numerator() < 0) return {};
   return {furthest.numerator() / t.d, furthest.sample()};

@@ -130,7 +130,7 @@ void ExpectReferenceAtRandom(Random& random, const HeightField& field) {
 
 TEST(TriangleScan, EqualsTheFormulaOnEveryTargetBitForBit) {
   Random random(3);
-  for (int i = 0; i < 3000; ++i) {
+  for (int i = 0; i < 6000; ++i) {
     // From boxes of a few samples to spans of several vectors, with ties and without.
     const int side = 3 + random.Below(i % 3 == 0 ? 80 : 12);
     const int width = side + random.Below(side), height = side + random.Below(side);
@@ -138,9 +138,33 @@ TEST(TriangleScan, EqualsTheFormulaOnEveryTargetBitForBit) {
     const HeightField field = i % 2 == 0   ? StepField(width, height, 3, seed)
                               : i % 4 == 1 ? NoiseField(width, height, seed)
                                            : RoundedField(width, height, i, seed);
-    ExpectReferenceAtRandom(random, WithVoids(field, random.Below(width * height / 4), random));
+    const int voids = i % 8 < 4 ? random.Below(width * height / 4) : 0;  // where there are any, integers are not used
+    ExpectReferenceAtRandom(random, WithVoids(field, voids, random));
     if (HasFatalFailure()) return;
   }
+}
+
+// Triangles from well below to well beyond those whose numerators 32 bits hold.
+TEST(TriangleScan, CountsInIntegersWhereTheyHoldAllNumerators) {
+  Random random(17);
+  int held = 0, not_held = 0;
+  for (int i = 0; i < 900; ++i) {
+    const double relief = std::ldexp(1.0, 14 + i % 9);  // quanta
+    const HeightField field = MakeField(90, 80, [&](int x, int y) {
+      const double quanta = x + y == 0 ? 1 : random.Below(4) == 0 ? relief - 1 : std::floor(random.Unit() * 9);
+      return static_cast<float>(quanta * 0x1p-10);
+    });
+    ASSERT_EQ(field.quantum(), 0x1p-10F);
+    const SamplePosition p = RandomSample(random, field), u = RandomSample(random, field),
+                         v = RandomSample(random, field);
+    if (Orientation(p, u, v) <= 0) continue;
+    (static_cast<double>(Orientation(p, u, v)) <= static_cast<double>(field.most_area_in_integers()) ? held
+                                                                                                     : not_held)++;
+    ExpectReference(field, *TestStar(field, p, {u, v}));
+    ASSERT_FALSE(HasFatalFailure()) << "relief " << relief;
+  }
+  EXPECT_GT(held, 100);
+  EXPECT_GT(not_held, 40);
 }
 
 // Slopes of a fraction of a metre: all samples but a few lie on the triangles' planes, up to the rounding of floats, so
