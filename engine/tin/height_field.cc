@@ -105,10 +105,7 @@ void HeightField::LayOut() {
   std::fill(heights_.data() + width, heights_.data() + stride_, none);
 }
 
-float HeightField::VertexHeight(int x, int y) const {
-  const float own = At(x, y);
-  if (!std::isnan(own)) return own;
-
+float HeightField::NearestHeight(int x, int y) const {
   // Rings of growing Chebyshev distance r, in patches: every sample on ring r is at least (r - 1) kPatchSide + 1 away.
   // What was found nearer than that cannot be beaten any more; what is just as far can still be tied.
   Nearest nearest{std::numeric_limits<std::int64_t>::max(), 0, 0};

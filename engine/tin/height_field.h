@@ -5,6 +5,7 @@
 // caller's business: tiles put row 0 in the SOUTH, rasters read from files put it in the NORTH.
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -52,7 +53,10 @@ class HeightField {
 
   // The height a vertex at (x, y) gets: the sample, or where that is void (only corners and seeds can be) the height of
   // the nearest valid sample, ties to the smaller row, then column.
-  float VertexHeight(int x, int y) const;
+  float VertexHeight(int x, int y) const {
+    const float own = At(x, y);
+    return std::isnan(own) ? NearestHeight(x, y) : own;
+  }
 
  private:
   // Squares of 64 x 64 samples, so that the search for a valid one crosses wide voids in large steps.
@@ -66,6 +70,7 @@ class HeightField {
   HeightField(int width, int height, std::vector<float> heights, bool has_voids, double relief_m);
 
   void LayOut();
+  float NearestHeight(int x, int y) const;
   void SearchPatch(int column, int row, int x, int y, Nearest& nearest) const;
 
   int width_ = 0;

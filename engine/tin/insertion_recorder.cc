@@ -50,7 +50,7 @@ void InsertionRecorder::Append(SamplePosition inserted, float error_before, cons
   Word* word = log_.end() - words;
   *word++ = static_cast<Word>(star.count) | (star.is_closed ? 0 : Wide::kOpen);
   word = std::copy_n(star.ring.ids.data(), corners, word);
-  std::copy_n(star.removed.data(), star.removed_count, word);
+  std::copy_n(star.triangles.data(), star.removed_count, word);
 }
 
 Refinement InsertionRecorder::Make(int width, int height) const {

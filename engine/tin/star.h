@@ -58,8 +58,7 @@ struct Star {
   Ring ring;
   std::vector<TriangleId> triangles;  // `count` of them are valid
   std::vector<HalfEdgeId> outside;    // by triangle: the twin of the ring's edge
-  std::vector<TriangleId> removed;    // whose place the triangles took; the first slots of `triangles`
-  std::size_t removed_count = 0;
+  std::size_t removed_count = 0;      // the first slots of `triangles` are those of triangles that were removed
 };
 
 inline void Ring::Grow(std::size_t capacity) {

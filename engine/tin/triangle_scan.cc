@@ -193,23 +193,17 @@ HWY_INLINE PlaneMisfit ScanLarge(const HeightField& field, const Star& star, con
 // Class by class, not triangle by triangle: what a triangle takes cannot be foretold.
 HWY_INLINE void ScanTogether(const HeightField& field, const Star& star, const StarPlanes& planes, std::size_t first,
                              std::uint32_t lanes, float most_exact, PlaneMisfit* misfits) {
-  BlockFind finds[StarPlanes::kMost];
   const auto lane = [](std::uint32_t bits) { return static_cast<std::size_t>(std::countr_zero(bits)); };
-  const std::uint32_t small = planes.small & lanes, medium = planes.medium & lanes;
-  for (std::uint32_t bits = small; bits != 0; bits &= bits - 1) {
-    finds[lane(bits)] = ScanBlock<4>(field, star, planes, lane(bits), most_exact);
-  }
-  if constexpr (kLargeSide == 8) {
-    for (std::uint32_t bits = medium; bits != 0; bits &= bits - 1) {
-      finds[lane(bits)] = ScanBlock<8>(field, star, planes, lane(bits), most_exact);
-    }
-  }
   for (std::uint32_t bits = lanes; bits != 0; bits &= bits - 1) misfits[lane(bits)] = {};
-  for (std::uint32_t bits = small; bits != 0; bits &= bits - 1) {
-    misfits[lane(bits)] = MisfitOf<4>(field, star, planes, lane(bits), first, finds[lane(bits)], most_exact);
+  for (std::uint32_t bits = planes.small & lanes; bits != 0; bits &= bits - 1) {
+    const std::size_t i = lane(bits);
+    const BlockFind find = ScanBlock<4>(field, star, planes, i, most_exact);
+    misfits[i] = MisfitOf<4>(field, star, planes, i, first, find, most_exact);
   }
-  for (std::uint32_t bits = medium; bits != 0; bits &= bits - 1) {
-    misfits[lane(bits)] = MisfitOf<kLargeSide>(field, star, planes, lane(bits), first, finds[lane(bits)], most_exact);
+  for (std::uint32_t bits = planes.medium & lanes; bits != 0; bits &= bits - 1) {
+    const std::size_t i = lane(bits);
+    const BlockFind find = ScanBlock<kLargeSide>(field, star, planes, i, most_exact);
+    misfits[i] = MisfitOf<kLargeSide>(field, star, planes, i, first, find, most_exact);
   }
   for (std::uint32_t bits = planes.large & lanes; bits != 0; bits &= bits - 1) {
     misfits[lane(bits)] = ScanLarge(field, star, planes, lane(bits), first, most_exact);

@@ -84,7 +84,6 @@ void Triangulation::Grow() {
   star_.ring.Grow(capacity);
   star_.triangles.resize(capacity);
   star_.outside.resize(capacity);
-  star_.removed.resize(capacity);
 }
 
 void Triangulation::Widen() {

@@ -198,7 +198,7 @@ void Triangulation::Replace(Triangles& triangles, SamplePosition point, Triangle
 
   star_.is_closed = true;
   star_.has_border = false;
-  TriangleId* removed_slots = star_.removed.data();
+  TriangleId* removed_slots = star_.triangles.data();
   removed_slots[0] = triangle;
   std::size_t removed = 1, edges = 0, gap = 0, pending = 3;
   while (pending > 0) {
@@ -212,7 +212,7 @@ void Triangulation::Replace(Triangles& triangles, SamplePosition point, Triangle
         if (edges + pending + 3 > capacity) {
           Grow();
           stack = pending_.data();
-          removed_slots = star_.removed.data();
+          removed_slots = star_.triangles.data();
           capacity = pending_.size();
         }
         removed_slots[removed++] = back / 4;
@@ -255,7 +255,6 @@ void Triangulation::FillCavity(Triangles& triangles, std::size_t edges, std::siz
   }
   star_.count = edges;
   TriangleId* const made = star_.triangles.data();
-  std::copy_n(star_.removed.begin(), star_.removed_count, made);
   const auto appended = static_cast<TriangleId>(triangles.slots.size());
   TERRACE_CHECK(appended < kNone / 4 - 2);
   for (std::size_t i = star_.removed_count; i < edges; ++i) {
