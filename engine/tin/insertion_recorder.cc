@@ -1,6 +1,7 @@
 #include "engine/tin/insertion_recorder.h"
 
 #include <algorithm>
+#include <cstring>
 #include <limits>
 
 namespace terrace::tin {
@@ -10,6 +11,15 @@ using Wide = InsertionRecord<std::uint32_t>;
 
 // Six triangles an insertion, a ring of as many, four slots.
 constexpr std::size_t kLikelyWords = 11;
+
+// What is copied in one go: all of what most insertions have.
+constexpr std::size_t kFew = 8;
+static_assert(kFew <= Ring::kPadding);
+
+// Most often a single step: std::copy would be a call that has to find out how little there is.
+void CopyFew(const std::uint32_t* from, std::size_t count, std::uint32_t* to) {
+  for (std::size_t i = 0; i < count; i += kFew) std::memcpy(to + i, from + i, kFew * sizeof *to);
+}
 
 // Where the smallest of them is, without a branch that cannot be foretold.
 std::size_t SmallestOf(const std::uint32_t* values, std::size_t count) {
@@ -46,11 +56,12 @@ void InsertionRecorder::Append(SamplePosition inserted, float error_before, cons
   const std::size_t corners = star.count + (star.is_closed ? 0 : 1), words = 1 + corners + star.removed_count;
   made_ += star.count;
   corners_ += corners;
+  if (log_.capacity() - log_.size() < words + kFew) log_.reserve(2 * (log_.capacity() + words + kFew));
   log_.GrowBy(words);
   Word* word = log_.end() - words;
   *word++ = static_cast<Word>(star.count) | (star.is_closed ? 0 : Wide::kOpen);
-  word = std::copy_n(star.ring.ids.data(), corners, word);
-  std::copy_n(star.triangles.data(), star.removed_count, word);
+  CopyFew(star.ring.ids.data(), corners, word);
+  CopyFew(star.triangles.data(), star.removed_count, word + corners);
 }
 
 Refinement InsertionRecorder::Make(int width, int height) const {

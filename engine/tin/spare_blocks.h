@@ -51,6 +51,7 @@ class LargeArray {
   T* data() { return values_; }
   const T* data() const { return values_; }
   std::size_t size() const { return size_; }
+  std::size_t capacity() const { return capacity_; }
   bool empty() const { return size_ == 0; }
   T* begin() { return values_; }
   T* end() { return values_ + size_; }

@@ -56,7 +56,7 @@ struct Star {
   bool has_border = false;  // some triangle may have an edge on the border
   std::size_t count = 0;
   Ring ring;
-  std::vector<TriangleId> triangles;  // `count` of them are valid
+  std::vector<TriangleId> triangles;  // `count` of them are valid; those of an insertion are padded as a ring is
   std::vector<HalfEdgeId> outside;    // by triangle: the twin of the ring's edge
   std::size_t removed_count = 0;      // the first slots of `triangles` are those of triangles that were removed
 };

@@ -82,7 +82,7 @@ void Triangulation::Grow() {
   const std::size_t capacity = 2 * pending_.size() + 64;
   pending_.resize(capacity);
   star_.ring.Grow(capacity);
-  star_.triangles.resize(capacity);
+  star_.triangles.resize(capacity + Ring::kPadding);
   star_.outside.resize(capacity);
 }
 
