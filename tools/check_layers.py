@@ -41,7 +41,7 @@ Library = collections.namedtuple("Library", "name headers files")
 LIBRARIES = [
     Library("expected", r"tl/.*", r"."),
     Library("fmt", r"fmt/.*", r"."),
-    Library("Highway", r"hwy/.*", r"engine/tin/.*\.cc"),
+    Library("Highway", r"hwy/.*", r"engine/tin/.*(\.cc|-inl\.h)"),
     Library("GDAL", r"(gdal|cpl|ogr|vrt)\w*\.h|(proj|geodesic)\.h", r"engine/dem/"),
     Library("nlohmann_json", r"nlohmann/.*", r"(config/|proto/.*\.cc|server/.*\.cc)"),
     Library("libdeflate", r"libdeflate\.h", r"proto/.*\.cc"),
@@ -208,7 +208,8 @@ class SelfTest(unittest.TestCase):
             "server/http/request.cc": "#include <boost/beast/http.hpp>\n#include <boost/asio/awaitable.hpp>\n",
             "server/cli/main.cc": "#include <CLI/CLI.hpp>\n",
             "proto/compress.cc": "#include <libdeflate.h>\n#include <vector>\n",
-            "engine/tin/scan.cc": "#include <hwy/highway.h>\n#include <stop_token>\n",
+            "engine/tin/scan-inl.h": "#include <hwy/highway.h>\n",
+            "engine/tin/scan.cc": '#include <hwy/highway.h>\n#include <stop_token>\n#include "engine/tin/scan-inl.h"\n',
         })
 
     def test_library_shown_through_another_header(self):

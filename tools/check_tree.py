@@ -46,7 +46,10 @@ def findings(name, text):
         for pattern, message in RULES:
             if match := pattern.search(line):
                 yield f"{name}:{number}: '{match[0].strip()}' {message}"
-    if name.endswith(".h") and "#pragma once" not in text:
+    if name.endswith("-inl.h"):  # included once for each set of instructions
+        if "HWY_TARGET_TOGGLE" not in text:
+            yield f"{name}:1: a header of instruction sets without the guard of HWY_TARGET_TOGGLE"
+    elif name.endswith(".h") and "#pragma once" not in text:
         yield f"{name}:1: a header without #pragma once"
     if text and not text.endswith("\n"):
         yield f"{name}: does not end in a line feed"
@@ -59,11 +62,13 @@ class SelfTest(unittest.TestCase):
             with self.subTest(text=text):
                 self.assertEqual(len(list(findings("a.cc", text))), 1)
         self.assertEqual(len(list(findings("a.h", "int a;\n"))), 1)
+        self.assertEqual(len(list(findings("a-inl.h", "#pragma once\n"))), 1)
 
     def test_no_findings(self):
         for text in ("", "framework/roots/a\n", "https://example.org/home/page\n", "a / work / b\n", "#pragma once\n", "$HOME/root/x\n"):
             with self.subTest(text=text):
                 self.assertEqual(list(findings("a.h" if "pragma" in text else "a.cc", text)), [])
+        self.assertEqual(list(findings("a-inl.h", "#if defined(A) == defined(HWY_TARGET_TOGGLE)\n")), [])
 
 
 def main():
