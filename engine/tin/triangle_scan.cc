@@ -32,7 +32,7 @@ HWY_INLINE double NumeratorAt(const HeightField& field, const ExactPlane& t, int
 // the magnitude.
 HWY_INLINE bool MayBeACorner(float most, float magnitude, float doubt) { return !(most > 4 * doubt * magnitude); }
 
-// The same where single precision is not exact.
+// What ScanBlock found where single precision is not exact.
 template <int kSide>
 HWY_NOINLINE PlaneMisfit MisfitInDoubt(const HeightField& field, const Star& star, const StarPlanes& planes,
                                        std::size_t i, std::size_t first, const BlockFind& find) {
