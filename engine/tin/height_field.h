@@ -19,10 +19,10 @@ class HeightField {
   // Coordinates stay below 2^15, which keeps the in-circle predicate inside 64 bits (predicates.h).
   static constexpr int kMaxSide = 1 << 15;
 
-  // `heights` has width * height values in metres, row by row; with a capacity of 32 more a row they are not copied, unless
-  // there are fewer than 8 rows. NaN, infinities and whatever the caller turned into NaN are voids: they count in no error and lend their value to
-  // no vertex. Refuses fields smaller than 2 x 2, larger than
-  // kMaxSide a side, with a wrong number of values, or without a single valid sample.
+  // `heights` has width * height values in metres, row by row; with a capacity of 32 more a row they are not copied,
+  // unless there are fewer than 8 rows. NaN, infinities and whatever the caller turned into NaN are voids: they count
+  // in no error and lend their value to no vertex. Refuses fields smaller than 2 x 2, larger than kMaxSide a side, with
+  // a wrong number of values, or without a single valid sample.
   static Result<HeightField> Make(int width, int height, std::vector<float> heights);
 
   int width() const { return width_; }

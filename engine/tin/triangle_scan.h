@@ -6,8 +6,8 @@
 // A = v_y dz_u - u_y dz_v and B = u_x dz_v - v_x dz_u, the distance of a sample is
 //   |D (h - z_p) - (A (x - x_p) + B (y - y_p))| / D
 // in double in exactly this form, never stepped, without fused operations, or in single precision or integers where
-// those are known to give the same numbers. The result is the same on every processor, bit for bit, whatever vectors it has; Highway
-// picks the widest at run time. Floats as heights stay far from overflow (2^128 * 2^32).
+// those are known to give the same numbers. The result is the same on every processor, bit for bit, whatever vectors it
+// has; Highway picks the widest at run time. Floats as heights stay far from overflow (2^128 * 2^32).
 //
 // Safe to call from many threads at once.
 #pragma once
