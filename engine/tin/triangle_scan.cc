@@ -76,26 +76,23 @@ HWY_INLINE PlaneMisfit MisfitOf(const HeightField& field, const Star& star, cons
   return MisfitInDoubt<kSide>(field, star, planes, i, first, find);
 }
 
+HWY_INLINE void SetBox(const HeightField& field, const Star& star, const StarPlanes& planes, std::size_t i,
+                       std::size_t first, TriangleBox& t) {
+  const std::int32_t *dx = star.ring.dx.data() + first + i, *dy = star.ring.dy.data() + first + i;
+  t.px = star.x, t.py = star.y;
+  t.ux = dx[0], t.uy = dy[0], t.vx = dx[1], t.vy = dy[1];
+  t.west = planes.west[i], t.east = t.west + planes.width[i];
+  t.south = planes.south[i], t.north = t.south + planes.height[i];
+  LeaveBorderOut(field, t);
+}
+
 // In single precision: what StarPlanes::Work found.
 HWY_INLINE SinglePlane SinglePlaneOf(const HeightField& field, const Star& star, const StarPlanes& planes,
                                      std::size_t i, std::size_t first) {
-  const std::int32_t *dx = star.ring.dx.data() + first + i, *dy = star.ring.dy.data() + first + i;
-  const int west = planes.west[i], south = planes.south[i];
-  SinglePlane t{.px = star.x,
-                .py = star.y,
-                .ux = dx[0],
-                .uy = dy[0],
-                .vx = dx[1],
-                .vy = dy[1],
-                .west = west,
-                .east = west + planes.width[i],
-                .south = south,
-                .north = south + planes.height[i],
-                .pz = star.height,
-                .d = planes.d[i],
-                .a = planes.a[i],
-                .b = planes.b[i]};
-  LeaveBorderOut(field, t);
+  SinglePlane t;
+  SetBox(field, star, planes, i, first, t);
+  t.pz = star.height;
+  t.d = planes.d[i], t.a = planes.a[i], t.b = planes.b[i];
   return t;
 }
 
@@ -115,9 +112,9 @@ HWY_NOINLINE PlaneMisfit ScanDoubtfully(const HeightField& field, const Star& st
   const auto two = ScanWide<FurthestTwo>(field, SinglePlaneOf(field, star, planes, i, first));
   const float single = two.numerator();
   if (single < 0) return {};
+  if (single == 0 && planes.magnitude[i] == 0) return OnPlane(field, star, first + i);
   const ExactPlane t = ExactPlaneOf(field, star, first + i);
   const float least = LeastInDoubt(single, planes.largest[i], planes.magnitude[i], most_exact, kDoubt);
-  if (single == 0 && planes.magnitude[i] == 0) return OnPlane(field, star, first + i);
   if (!(single < kMostMagnitude) || MayBeACorner(single, planes.magnitude[i], kDoubt) || two.runner_up() >= least) {
     return ScanExactly(field, t);
   }
@@ -140,27 +137,22 @@ HWY_NOINLINE PlaneMisfit ScanDoubtfully(const HeightField& field, const Star& st
 // In integers.
 HWY_INLINE IntegerPlane IntegerPlaneOf(const HeightField& field, const Star& star, const StarPlanes& planes,
                                        std::size_t i, std::size_t first) {
-  const std::int32_t *dx = star.ring.dx.data() + first + i, *dy = star.ring.dy.data() + first + i;
   const float* const heights = star.ring.heights.data() + first + i;
-  const int west = planes.west[i], south = planes.south[i];
+  IntegerPlane t;
+  SetBox(field, star, planes, i, first, t);
   const float quantum = field.quantum(), quanta_a_metre = 1 / quantum;
   const auto quanta = [&](float height) {
     return static_cast<std::uint32_t>(static_cast<std::int32_t>((height - star.height) * quanta_a_metre));
   };
-  const auto ux = static_cast<std::uint32_t>(dx[0]), uy = static_cast<std::uint32_t>(dy[0]);
-  const auto vx = static_cast<std::uint32_t>(dx[1]), vy = static_cast<std::uint32_t>(dy[1]);
+  const auto ux = static_cast<std::uint32_t>(t.ux), uy = static_cast<std::uint32_t>(t.uy);
+  const auto vx = static_cast<std::uint32_t>(t.vx), vy = static_cast<std::uint32_t>(t.vy);
   const std::uint32_t uz = quanta(heights[0]), vz = quanta(heights[1]), d = ux * vy - uy * vx;
-  IntegerPlane t;
-  t.px = star.x, t.py = star.y;
-  t.ux = dx[0], t.uy = dy[0], t.vx = dx[1], t.vy = dy[1];
-  t.west = west, t.east = west + planes.width[i], t.south = south, t.north = south + planes.height[i];
   t.z = star.height;
   t.lift = quantum * 0x1.8p23F;
   t.pz = static_cast<std::int32_t>(d * std::bit_cast<std::uint32_t>(t.lift));
   t.d = static_cast<std::int32_t>(d);
   t.a = static_cast<std::int32_t>(vy * uz - uy * vz);
   t.b = static_cast<std::int32_t>(ux * vz - vx * uz);
-  LeaveBorderOut(field, t);
   return t;
 }
 

@@ -254,7 +254,7 @@ void Triangulation::FillCavity(Triangles& triangles, std::size_t edges, std::siz
     OpenRing(edges--, gap);
   }
   star_.count = edges;
-  TriangleId* const made = star_.triangles.data();
+  TriangleId* const made = star_.triangles.data();  // those of what was removed come first, and are there
   const auto appended = static_cast<TriangleId>(triangles.slots.size());
   TERRACE_CHECK(appended < kNone / 4 - 2);
   for (std::size_t i = star_.removed_count; i < edges; ++i) {

@@ -10,13 +10,14 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
-#include <array>
-#include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <type_traits>
 
+#include "engine/tin/furthest-inl.h"
 #include "engine/tin/height_field.h"
+#include "engine/tin/span_finder-inl.h"
 #include "engine/tin/star.h"
 #include "engine/tin/triangle_scan.h"
 
@@ -25,51 +26,9 @@ namespace terrace::tin {
 namespace HWY_NAMESPACE {
 namespace {
 
-namespace hn = hwy::HWY_NAMESPACE;
-
-// Everything is evaluated in double, in single precision or in integers, whichever is quickest and gives the same.
-// Single is as good as double for most triangles: all heights are
-// multiples of a quantum (HeightField::quantum), so all numbers that the formula adds and multiplies are, and every
-// multiple up to 2^24 times the quantum is a float. Where that may be exceeded, it is double.
-using DoublesTag = hn::CappedTag<double, 16>;
-using FloatsTag = hn::CappedTag<float, 16>;
-constexpr DoublesTag kDoubles;
-constexpr FloatsTag kFloats;
-using Floats = hn::Vec<FloatsTag>;
-
-// Row-major indices: in doubles beside doubles, in integers beside floats, which cannot hold them.
-template <typename Tag>
-using IndexTag = std::conditional_t<std::is_same_v<hn::TFromD<Tag>, float>, hn::RebindToSigned<Tag>, Tag>;
-using IntsTag = IndexTag<FloatsTag>;
-using Ints = hn::Vec<IntsTag>;
-constexpr IntsTag kInts;
-
-template <typename Tag>
-HWY_INLINE int LanesOf() {
-  return static_cast<int>(hn::Lanes(Tag()));
-}
-template <typename Tag, typename Value>
-HWY_INLINE hn::Vec<Tag> All(Tag tag, Value value) {
-  return hn::Set(tag, static_cast<hn::TFromD<Tag>>(value));
-}
-
-// The numbers of the lanes, from memory: hn::Iota counts them anew each time, in a loop.
-template <typename T>
-struct LaneNumbers {
-  HWY_ALIGN static constexpr T kValues[16] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
-};
-template <typename Tag>
-HWY_INLINE hn::Vec<Tag> From(Tag tag, int first) {
-  static_assert(hn::MaxLanes(Tag()) <= 16);
-  return hn::Add(All(tag, first), hn::Load(tag, LaneNumbers<hn::TFromD<Tag>>::kValues));
-}
-
-// One triangle, seen from its last corner p; its plane in one of the precisions.
+// One triangle, its plane in one of the precisions.
 template <typename Number>
-struct TrianglePlane {
-  int px, py;
-  int ux, uy, vx, vy;
-  int west, east, south, north;  // bounding box without the field's border
+struct TrianglePlane : TriangleBox {
   Number pz;
   Number d, a, b;  // D, A and B of the header
 };
@@ -87,114 +46,6 @@ struct IntegerPlane : TrianglePlane<std::int32_t> {  // pz: D times p's bits
 template <typename Found>
 using PlaneFor = std::conditional_t<std::is_same_v<hn::TFromD<typename Found::Tag>, std::int32_t>, IntegerPlane,
                                     TrianglePlane<hn::TFromD<typename Found::Tag>>>;
-
-// The larger or the smaller one; b where one is NaN.
-HWY_INLINE Floats MaxOrSecond(Floats a, Floats b) {
-#if HWY_ARCH_X86
-  return hn::Max(a, b);  // the instruction does just that
-#else
-  return hn::IfThenElse(hn::Gt(a, b), a, b);
-#endif
-}
-HWY_INLINE Floats MinOrSecond(Floats a, Floats b) {
-#if HWY_ARCH_X86
-  return hn::Min(a, b);
-#else
-  return hn::IfThenElse(hn::Lt(a, b), a, b);
-#endif
-}
-
-// The furthest sample so far, lane by lane. Each lane meets its samples in row-major order, so that ">" keeps the
-// first; no comparison with NaN holds.
-template <typename TagOfNumerators>
-class Furthest {
- public:
-  using Tag = TagOfNumerators;
-  using Index = hn::Vec<IndexTag<Tag>>;
-
-  HWY_INLINE Furthest() : numerator_(All(kTag, -1)), index_(hn::Zero(kIndices)) {}
-
-  HWY_INLINE void Visit(hn::Vec<Tag> numerator, Index index, hn::Mask<Tag> inside) {
-    Keep(hn::And(inside, hn::Gt(numerator, numerator_)), numerator, index);
-  }
-  HWY_INLINE void Visit(hn::Vec<Tag> numerator, Index index) {
-    const auto is_further = hn::Gt(numerator, numerator_);
-    if constexpr (std::is_same_v<Tag, FloatsTag>) {
-      numerator_ = MaxOrSecond(numerator, numerator_);  // the next sample waits for this one, and not for the mask
-    } else if constexpr (std::is_same_v<Tag, IntsTag>) {
-      numerator_ = hn::Max(numerator, numerator_);
-    } else {
-      numerator_ = hn::IfThenElse(is_further, numerator, numerator_);
-    }
-    index_ = hn::IfThenElse(hn::RebindMask(kIndices, is_further), index, index_);
-  }
-
-  // Of samples that were visited apart.
-  HWY_INLINE void Merge(const Furthest& other) {
-    const auto tied = hn::And(hn::Eq(other.numerator_, numerator_), hn::RebindMask(kTag, hn::Lt(other.index_, index_)));
-    Keep(hn::Or(hn::Gt(other.numerator_, numerator_), tied), other.numerator_, other.index_);
-  }
-
-  HWY_INLINE hn::Vec<Tag> numerators() const { return numerator_; }
-  HWY_INLINE Index indices() const { return index_; }
-  HWY_INLINE hn::TFromD<Tag> numerator() const { return hn::GetLane(hn::MaxOfLanes(kTag, numerator_)); }
-
-  // Precondition: some sample was visited.
-  HWY_INLINE std::uint32_t sample() const {
-    const auto foremost = hn::RebindMask(kIndices, hn::Eq(numerator_, hn::MaxOfLanes(kTag, numerator_)));
-    const Index none = All(kIndices, std::numeric_limits<std::int32_t>::max());
-    const auto first = hn::GetLane(hn::MinOfLanes(kIndices, hn::IfThenElse(foremost, index_, none)));
-    return static_cast<std::uint32_t>(static_cast<std::int64_t>(first));
-  }
-
- private:
-  static constexpr Tag kTag{};
-  static constexpr IndexTag<Tag> kIndices{};
-
-  HWY_INLINE void Keep(hn::Mask<Tag> which, hn::Vec<Tag> numerator, Index index) {
-    numerator_ = hn::IfThenElse(which, numerator, numerator_);
-    index_ = hn::IfThenElse(hn::RebindMask(kIndices, which), index, index_);
-  }
-
-  hn::Vec<Tag> numerator_;  // D times the distance
-  Index index_;             // row-major
-};
-
-template <typename Found>
-inline constexpr bool kIsInteger = std::is_same_v<Found, Furthest<IntsTag>>;
-// Whether sums are exact where it is used: planes may be stepped then.
-template <typename Found>
-inline constexpr bool kIsExact = std::is_same_v<Found, Furthest<FloatsTag>> || kIsInteger<Found>;
-
-// The same where single precision leaves doubts: also how close to a lane's furthest sample another one of it comes.
-class FurthestTwo {
- public:
-  using Tag = FloatsTag;
-  using Index = Furthest<FloatsTag>::Index;
-
-  HWY_INLINE FurthestTwo() : runner_up_(All(kFloats, -1)) {}
-
-  HWY_INLINE void Visit(Floats numerator, Index index, hn::Mask<FloatsTag> inside) {
-    Visit(hn::IfThenElse(inside, numerator, All(kFloats, -1)), index);
-  }
-  HWY_INLINE void Visit(Floats numerator, Index index) {
-    runner_up_ = MaxOrSecond(MinOrSecond(furthest_.numerators(), numerator), runner_up_);
-    furthest_.Visit(numerator, index);
-  }
-  HWY_INLINE void Merge(const FurthestTwo& other) {
-    runner_up_ =
-        hn::Max(hn::Max(runner_up_, other.runner_up_), hn::Min(furthest_.numerators(), other.furthest_.numerators()));
-    furthest_.Merge(other.furthest_);
-  }
-
-  HWY_INLINE float numerator() const { return furthest_.numerator(); }
-  HWY_INLINE float runner_up() const { return hn::GetLane(hn::MaxOfLanes(kFloats, runner_up_)); }
-  HWY_INLINE const Furthest<FloatsTag>& furthest() const { return furthest_; }
-
- private:
-  Furthest<FloatsTag> furthest_;
-  Floats runner_up_;
-};
 
 HWY_INLINE hn::Vec<DoublesTag> HeightsAt(DoublesTag tag, const float* from) {
   return hn::PromoteTo(tag, hn::LoadU(hn::Rebind<float, DoublesTag>(), from));
@@ -244,18 +95,18 @@ HWY_INLINE Floats NumeratorFrom(const float* heights, Floats pz, Floats d, Float
   return hn::Abs(hn::MulAdd(d, hn::Sub(pz, hn::LoadU(kFloats, heights)), plane));
 }
 
+// And in integers.
+HWY_INLINE Ints NumeratorFrom(const float* heights, Floats z, Floats lift, Ints d, Ints plane) {
+  const Floats lifted = hn::Add(hn::Sub(hn::LoadU(kFloats, heights), z), lift);
+  return hn::Abs(hn::Sub(hn::Mul(hn::BitCast(kInts, lifted), d), plane));
+}
+
 // A number for the columns of a box up to its last one, and NaN, which no comparison holds for, beyond: a triangle may
 // reach on to the field's border.
 template <typename Tag>
 HWY_INLINE hn::Vec<Tag> UpToColumn(Tag tag, int last, hn::Vec<Tag> columns, hn::TFromD<Tag> number) {
   const hn::TFromD<Tag> none = std::numeric_limits<hn::TFromD<Tag>>::quiet_NaN();
   return hn::IfThenElse(hn::Le(columns, All(tag, last)), All(tag, number), All(tag, none));
-}
-
-// And in integers.
-HWY_INLINE Ints NumeratorFrom(const float* heights, Floats z, Floats lift, Ints d, Ints plane) {
-  const Floats lifted = hn::Add(hn::Sub(hn::LoadU(kFloats, heights), z), lift);
-  return hn::Abs(hn::Sub(hn::Mul(hn::BitCast(kInts, lifted), d), plane));
 }
 
 // The numerators of some columns, from the first row of the box on. NaN beyond its last column, or negative.
@@ -308,7 +159,7 @@ class ColumnsOfPlane<Furthest<IntsTag>> {
 // Every sample of some columns of the bounding box, in single precision or integers: no spans, no divisions, no
 // branches but the loop. Barycentric coordinates are integers, whose signs make what is outside NaN, or negative.
 template <typename Found>
-HWY_INLINE Found ScanColumnsInSingle(const HeightField& field, const PlaneFor<Found>& t, int column) {
+HWY_INLINE Found ScanColumnsIn32Bits(const HeightField& field, const PlaneFor<Found>& t, int column) {
   constexpr typename Found::Tag tag;
   const auto x = From(kInts, column);
   auto of_u = hn::Sub(hn::Mul(All(kInts, t.vy), x), All(kInts, t.vx * t.south));
@@ -371,7 +222,7 @@ HWY_INLINE Found ScanColumns(const HeightField& field, const PlaneFor<Found>& t,
   if constexpr (std::is_same_v<typename Found::Tag, DoublesTag>) {
     return ScanColumnsInDouble(field, t, column);
   } else {
-    return ScanColumnsInSingle<Found>(field, t, column);
+    return ScanColumnsIn32Bits<Found>(field, t, column);
   }
 }
 
@@ -384,73 +235,6 @@ HWY_INLINE Found ScanBox(const HeightField& field, const PlaneFor<Found>& t) {
   }
   return furthest;
 }
-
-// First or last columns of up to kRows rows, and what whole vectors spill.
-constexpr int kRows = 64;
-using Columns = std::array<std::int32_t, kRows + 16>;
-
-// The exact spans of a triangle. Relative to p, an edge crosses row y at x = n / dy with an integer n = x0 dy + (y -
-// y0) dx, rounded up on the west side, down on the east. In single precision, where extents are at most 2^11, n is at
-// most 2^23 and so exact; the float nearest to a quotient of at most 2^11 is less than 2^-12 from it, and a quotient
-// that is no integer is at least 2^-11 from the next one. In double the same holds of extents up to 2^16. An outline is
-// convex: of two lines on a side the nearer one counts, and neither needs to end. Where one goes on beyond its edge its
-// quotient may be larger and rounded, but it stays the further one.
-template <typename Tag>
-class SpanFinder {
- public:
-  using Number = hn::TFromD<Tag>;
-
-  template <typename Plane>
-  HWY_INLINE explicit SpanFinder(const Plane& t) : px_(t.px), first_(t.px + t.west), last_(t.px + t.east) {
-    const Number xs[4] = {0, static_cast<Number>(t.ux), static_cast<Number>(t.vx), 0};
-    const Number ys[4] = {0, static_cast<Number>(t.uy), static_cast<Number>(t.vy), 0};
-    std::size_t easts = 0, wests = 0;
-    for (std::size_t i = 0; i < 3; ++i) {
-      // Counter-clockwise: up on the east side, down on the west. Which edge is which cannot be foretold.
-      const Number dx = xs[i + 1] - xs[i], dy = ys[i + 1] - ys[i], n = xs[i] * dy - ys[i] * dx;
-      east_[easts] = {dx, dy, n};
-      west_[wests] = {-dx, -dy, -n};
-      easts += dy > 0 ? 1 : 0;
-      wests += dy < 0 ? 1 : 0;
-    }
-    east_[easts] = east_[0];
-    west_[wests] = west_[0];
-  }
-
-  // Of some rows from `first_row` on, relative to p; columns are those of the field, without its border.
-  HWY_INLINE void Find(int first_row, int rows, Columns& firsts, Columns& lasts) const {
-    constexpr Tag tag;
-    constexpr hn::Rebind<std::int32_t, Tag> ints;
-    const auto p = All(ints, px_), least = All(ints, first_), most = All(ints, last_);
-    for (int j = 0; j < rows; j += LanesOf<Tag>()) {
-      const auto y = From(tag, first_row + j);
-      const auto first = hn::Max(hn::Ceil(At(west_[0], y)), hn::Ceil(At(west_[1], y)));
-      const auto last = hn::Min(hn::Floor(At(east_[0], y)), hn::Floor(At(east_[1], y)));
-      hn::StoreU(hn::Max(hn::Add(p, ToInts(first)), least), ints, firsts.data() + j);
-      hn::StoreU(hn::Min(hn::Add(p, ToInts(last)), most), ints, lasts.data() + j);
-    }
-  }
-
- private:
-  struct Line {
-    Number dx, dy, n;
-  };
-  static HWY_INLINE hn::Vec<Tag> At(const Line& line, hn::Vec<Tag> y) {
-    constexpr Tag tag;
-    return hn::Div(hn::MulAdd(y, All(tag, line.dx), All(tag, line.n)), All(tag, line.dy));
-  }
-  static HWY_INLINE auto ToInts(hn::Vec<Tag> x) {
-    constexpr hn::Rebind<std::int32_t, Tag> ints;
-    if constexpr (sizeof(Number) == sizeof(float)) {
-      return hn::ConvertTo(ints, x);
-    } else {
-      return hn::DemoteTo(ints, x);
-    }
-  }
-
-  int px_, first_, last_;
-  Line east_[4], west_[4];
-};
 
 // Fused in single precision only.
 template <typename Found, typename V>
@@ -525,8 +309,7 @@ HWY_INLINE Found ScanSpans(const HeightField& field, const PlaneFor<Found>& t) {
   return furthest;
 }
 
-template <typename Number>
-HWY_INLINE void LeaveBorderOut(const HeightField& field, TrianglePlane<Number>& t) {
+HWY_INLINE void LeaveBorderOut(const HeightField& field, TriangleBox& t) {
   t.west = std::max(t.west, 1 - t.px), t.east = std::min(t.east, field.width() - 2 - t.px);
   t.south = std::max(t.south, 1 - t.py), t.north = std::min(t.north, field.height() - 2 - t.py);
 }

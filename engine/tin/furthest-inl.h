@@ -1,0 +1,173 @@
+// The furthest sample of those that a scan visits, in vectors of doubles, floats or integers. Compiled once for each
+// set of instructions; part of triangle_scan.cc.
+#if defined(TERRACE_ENGINE_TIN_FURTHEST_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef TERRACE_ENGINE_TIN_FURTHEST_INL_H_
+#undef TERRACE_ENGINE_TIN_FURTHEST_INL_H_
+#else
+#define TERRACE_ENGINE_TIN_FURTHEST_INL_H_
+#endif
+
+#include <hwy/highway.h>
+
+#include <cstdint>
+#include <limits>
+#include <type_traits>
+
+HWY_BEFORE_NAMESPACE();
+namespace terrace::tin {
+namespace HWY_NAMESPACE {
+namespace {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+// Everything is evaluated in double, in single precision or in integers, whichever is quickest and gives the same.
+// Single is as good as double for most triangles: all heights are multiples of a quantum (HeightField::quantum), so all
+// numbers that the formula adds and multiplies are, and every multiple up to 2^24 times the quantum is a float. Where
+// that may be exceeded, it is double, or integers.
+using DoublesTag = hn::CappedTag<double, 16>;
+using FloatsTag = hn::CappedTag<float, 16>;
+constexpr DoublesTag kDoubles;
+constexpr FloatsTag kFloats;
+using Floats = hn::Vec<FloatsTag>;
+
+// Row-major indices: in doubles beside doubles, in integers beside floats, which cannot hold them.
+template <typename Tag>
+using IndexTag = std::conditional_t<std::is_same_v<hn::TFromD<Tag>, float>, hn::RebindToSigned<Tag>, Tag>;
+using IntsTag = IndexTag<FloatsTag>;
+using Ints = hn::Vec<IntsTag>;
+constexpr IntsTag kInts;
+
+template <typename Tag>
+HWY_INLINE int LanesOf() {
+  return static_cast<int>(hn::Lanes(Tag()));
+}
+template <typename Tag, typename Value>
+HWY_INLINE hn::Vec<Tag> All(Tag tag, Value value) {
+  return hn::Set(tag, static_cast<hn::TFromD<Tag>>(value));
+}
+
+// The numbers of the lanes, from memory: hn::Iota counts them anew each time, in a loop.
+template <typename T>
+struct LaneNumbers {
+  HWY_ALIGN static constexpr T kValues[16] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+};
+template <typename Tag>
+HWY_INLINE hn::Vec<Tag> From(Tag tag, int first) {
+  static_assert(hn::MaxLanes(Tag()) <= 16);
+  return hn::Add(All(tag, first), hn::Load(tag, LaneNumbers<hn::TFromD<Tag>>::kValues));
+}
+
+// The larger or the smaller one; b where one is NaN.
+HWY_INLINE Floats MaxOrSecond(Floats a, Floats b) {
+#if HWY_ARCH_X86
+  return hn::Max(a, b);  // the instruction does just that
+#else
+  return hn::IfThenElse(hn::Gt(a, b), a, b);
+#endif
+}
+HWY_INLINE Floats MinOrSecond(Floats a, Floats b) {
+#if HWY_ARCH_X86
+  return hn::Min(a, b);
+#else
+  return hn::IfThenElse(hn::Lt(a, b), a, b);
+#endif
+}
+
+// The furthest sample so far, lane by lane. Each lane meets its samples in row-major order, so that ">" keeps the
+// first; no comparison with NaN holds.
+template <typename TagOfNumerators>
+class Furthest {
+ public:
+  using Tag = TagOfNumerators;
+  using Index = hn::Vec<IndexTag<Tag>>;
+
+  HWY_INLINE Furthest() : numerator_(All(kTag, -1)), index_(hn::Zero(kIndices)) {}
+
+  HWY_INLINE void Visit(hn::Vec<Tag> numerator, Index index, hn::Mask<Tag> inside) {
+    Keep(hn::And(inside, hn::Gt(numerator, numerator_)), numerator, index);
+  }
+  HWY_INLINE void Visit(hn::Vec<Tag> numerator, Index index) {
+    const auto is_further = hn::Gt(numerator, numerator_);
+    if constexpr (std::is_same_v<Tag, FloatsTag>) {
+      numerator_ = MaxOrSecond(numerator, numerator_);  // the next sample waits for this one, and not for the mask
+    } else if constexpr (std::is_same_v<Tag, IntsTag>) {
+      numerator_ = hn::Max(numerator, numerator_);
+    } else {
+      numerator_ = hn::IfThenElse(is_further, numerator, numerator_);
+    }
+    index_ = hn::IfThenElse(hn::RebindMask(kIndices, is_further), index, index_);
+  }
+
+  // Of samples that were visited apart.
+  HWY_INLINE void Merge(const Furthest& other) {
+    const auto tied = hn::And(hn::Eq(other.numerator_, numerator_), hn::RebindMask(kTag, hn::Lt(other.index_, index_)));
+    Keep(hn::Or(hn::Gt(other.numerator_, numerator_), tied), other.numerator_, other.index_);
+  }
+
+  HWY_INLINE hn::Vec<Tag> numerators() const { return numerator_; }
+  HWY_INLINE Index indices() const { return index_; }
+  HWY_INLINE hn::TFromD<Tag> numerator() const { return hn::GetLane(hn::MaxOfLanes(kTag, numerator_)); }
+
+  // Precondition: some sample was visited.
+  HWY_INLINE std::uint32_t sample() const {
+    const auto foremost = hn::RebindMask(kIndices, hn::Eq(numerator_, hn::MaxOfLanes(kTag, numerator_)));
+    const Index none = All(kIndices, std::numeric_limits<std::int32_t>::max());
+    const auto first = hn::GetLane(hn::MinOfLanes(kIndices, hn::IfThenElse(foremost, index_, none)));
+    return static_cast<std::uint32_t>(static_cast<std::int64_t>(first));
+  }
+
+ private:
+  static constexpr Tag kTag{};
+  static constexpr IndexTag<Tag> kIndices{};
+
+  HWY_INLINE void Keep(hn::Mask<Tag> which, hn::Vec<Tag> numerator, Index index) {
+    numerator_ = hn::IfThenElse(which, numerator, numerator_);
+    index_ = hn::IfThenElse(hn::RebindMask(kIndices, which), index, index_);
+  }
+
+  hn::Vec<Tag> numerator_;  // D times the distance
+  Index index_;             // row-major
+};
+
+// The same where single precision leaves doubts: also how close to a lane's furthest sample another one of it comes.
+class FurthestTwo {
+ public:
+  using Tag = FloatsTag;
+  using Index = Furthest<FloatsTag>::Index;
+
+  HWY_INLINE FurthestTwo() : runner_up_(All(kFloats, -1)) {}
+
+  HWY_INLINE void Visit(Floats numerator, Index index, hn::Mask<FloatsTag> inside) {
+    Visit(hn::IfThenElse(inside, numerator, All(kFloats, -1)), index);
+  }
+  HWY_INLINE void Visit(Floats numerator, Index index) {
+    runner_up_ = MaxOrSecond(MinOrSecond(furthest_.numerators(), numerator), runner_up_);
+    furthest_.Visit(numerator, index);
+  }
+  HWY_INLINE void Merge(const FurthestTwo& other) {
+    runner_up_ =
+        hn::Max(hn::Max(runner_up_, other.runner_up_), hn::Min(furthest_.numerators(), other.furthest_.numerators()));
+    furthest_.Merge(other.furthest_);
+  }
+
+  HWY_INLINE float numerator() const { return furthest_.numerator(); }
+  HWY_INLINE float runner_up() const { return hn::GetLane(hn::MaxOfLanes(kFloats, runner_up_)); }
+  HWY_INLINE const Furthest<FloatsTag>& furthest() const { return furthest_; }
+
+ private:
+  Furthest<FloatsTag> furthest_;
+  Floats runner_up_;
+};
+
+template <typename Found>
+inline constexpr bool kIsInteger = std::is_same_v<Found, Furthest<IntsTag>>;
+// Whether sums are exact where it is used: planes may be stepped then.
+template <typename Found>
+inline constexpr bool kIsExact = std::is_same_v<Found, Furthest<FloatsTag>> || kIsInteger<Found>;
+
+}  // namespace
+}  // namespace HWY_NAMESPACE
+}  // namespace terrace::tin
+HWY_AFTER_NAMESPACE();
+
+#endif  // per-target include guard
