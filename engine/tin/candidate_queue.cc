@@ -120,7 +120,7 @@ bool CandidateQueue::Refill() {
   if (entered_ > 2 * wanted_) step_ = std::sqrt(step_);
   if (entered_ < wanted_ / 2) step_ = std::max(step_ * step_, 0.25);
   // A sweep costs a cycle for every 16 slots or so, an entry one for every few that it is put before.
-  wanted_ = std::max(kLeastWanted, static_cast<std::size_t>(4 * std::sqrt(static_cast<double>(errors_.size()))));
+  wanted_ = std::max(kLeastWanted, static_cast<std::size_t>(3 * std::sqrt(static_cast<double>(errors_.size()))));
   entered_ = 0;
   // What is left lies below the threshold, most often just below.
   if (SweepFrom(threshold_)) return true;

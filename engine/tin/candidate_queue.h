@@ -72,7 +72,7 @@ class CandidateQueue {
   }
 
  private:
-  static constexpr std::size_t kLeastWanted = 128;
+  static constexpr std::size_t kLeastWanted = 48;
 
   struct Entry {
     std::uint64_t order;  // non-negative floats compare like their bits: those, then the complement of the sample
