@@ -158,8 +158,10 @@ bool GreedyTriangulation::Impl::Run(const GreedyGoal& goal, const std::stop_toke
 // seeds are due at the larger of the current and the wanted error, and not only when a sample is to be inserted.
 std::optional<GreedyTriangulation::Impl::Insertion> GreedyTriangulation::Impl::NextInsertion(const GreedyGoal& goal) {
   if (IsMet(goal)) return std::nullopt;
-  if (const auto seed = NextSeed(goal)) return seed;
-  ScanAwaiting();
+  if (seeds_.HasGrid()) {
+    if (const auto seed = NextSeed(goal)) return seed;
+  }
+  if (!awaiting_scan_.empty()) ScanAwaiting();
   const TriangleId worst = candidates_.Winner();
   if (worst == CandidateQueue::kNoSlot) return std::nullopt;
   PrefetchUpcoming();

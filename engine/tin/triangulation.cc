@@ -95,22 +95,35 @@ void Triangulation::Widen() {
   is_wide_ = true;
 }
 
+template <typename Triangles>
+[[gnu::always_inline]] inline void Triangulation::PrefetchAround(const Triangles& triangles, TriangleId t) const {
+  const auto* const slots = triangles.slots.data();
+  const auto triangle = slots[t];
+#pragma GCC unroll 3
+  for (unsigned i = 0; i < 3; ++i) {
+    __builtin_prefetch(&vertices_[triangle.corner(i)]);
+    if (const HalfEdgeId back = triangle.twin(i); back != kNone) __builtin_prefetch(&slots[back / 4]);
+  }
+}
+
 void Triangulation::PrefetchAround(TriangleId t) const {
-  for (HalfEdgeId edge = 4 * t; edge < 4 * t + 3; ++edge) {
-    __builtin_prefetch(&vertices_[corner(edge)]);
-    if (twin(edge) != kNone) Prefetch(twin(edge) / 4);
+  is_wide_ ? PrefetchAround(wide_, t) : PrefetchAround(narrow_, t);
+}
+
+template <typename Triangles>
+[[gnu::always_inline]] inline void Triangulation::PrefetchBeyond(const Triangles& triangles, TriangleId t) const {
+  const auto* const slots = triangles.slots.data();
+  const auto triangle = slots[t];
+#pragma GCC unroll 3
+  for (unsigned i = 0; i < 3; ++i) {
+    const HalfEdgeId back = triangle.twin(i);
+    if (back == kNone) continue;
+    __builtin_prefetch(&vertices_[slots[back / 4].corner(PreviousCorner(back % 4))]);
   }
 }
 
 void Triangulation::PrefetchBeyond(TriangleId t) const {
-  for (HalfEdgeId edge = 4 * t; edge < 4 * t + 3; ++edge) {
-    const HalfEdgeId back = twin(edge);
-    if (back == kNone) continue;
-    __builtin_prefetch(&vertices_[corner(Previous(back))]);
-    const HalfEdgeId a = twin(Next(back)), b = twin(Previous(back));
-    if (a != kNone) Prefetch(a / 4);
-    if (b != kNone) Prefetch(b / 4);
-  }
+  is_wide_ ? PrefetchBeyond(wide_, t) : PrefetchBeyond(narrow_, t);
 }
 
 // Lets the ring begin after the edge that holds the centre.

@@ -119,6 +119,10 @@ class Triangulation {
   void FillCavity(Triangles& triangles, std::size_t edges, std::size_t gap);
   void OpenRing(std::size_t edges, std::size_t gap);
   template <typename Triangles>
+  void PrefetchAround(const Triangles& triangles, TriangleId t) const;
+  template <typename Triangles>
+  void PrefetchBeyond(const Triangles& triangles, TriangleId t) const;
+  template <typename Triangles>
   void Join(Triangles& triangles, const std::vector<std::array<std::uint32_t, 3>>& corners);
   // The first edge of a triangle that has the point on its other side; none when the triangle contains it.
   std::optional<HalfEdgeId> EdgeTowards(SamplePosition point, TriangleId t) const;
