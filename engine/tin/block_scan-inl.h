@@ -68,7 +68,7 @@ constexpr float kMostMagnitude = 0x1p100F;
 // All bits where one of the barycentric coordinates has a sign: NaN, which no comparison holds for. None is zero, as
 // they lie halfway between integers.
 HWY_INLINE Floats NaNWhereNegative(Floats a, Floats b, Floats c) {
-  const IndexTag<FloatsTag> ints;
+  const NumberTag<FloatsTag> ints;
   return hn::BitCast(kFloats, hn::ShiftRight<31>(hn::BitCast(ints, hn::Or3(a, b, c))));
 }
 

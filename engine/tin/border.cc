@@ -21,12 +21,7 @@ struct BorderEdge {
 
   double HeightAt(int k) const { return static_cast<double>(along_x ? field.At(k, across) : field.At(across, k)); }
   double ChordAt(int k) const { return (h_a * (b - k) + h_b * (k - a)) / (b - a); }
-  std::uint32_t SampleAt(int k) const {
-    return along_x ? static_cast<std::uint32_t>(across) * static_cast<std::uint32_t>(field.width()) +
-                         static_cast<std::uint32_t>(k)
-                   : static_cast<std::uint32_t>(k) * static_cast<std::uint32_t>(field.width()) +
-                         static_cast<std::uint32_t>(across);
-  }
+  std::uint32_t SampleAt(int k) const { return along_x ? SampleNumber(k, across) : SampleNumber(across, k); }
 
   const HeightField& field;
   bool along_x = false;
@@ -53,7 +48,7 @@ Candidate WorstBorderSample(const HeightField& field, const Corner& a, const Cor
   for (int k = edge.a + 1; k < edge.b; ++k) {
     const double sagitta = options.sagitta_m * (k - edge.a) * (edge.b - k);
     const double error = BorderError(std::abs(edge.ChordAt(k) - edge.HeightAt(k)) + sagitta, options);
-    if (error > worst.error) worst = {error, edge.SampleAt(k)};  // false for voids; the index grows with k
+    if (error > worst.error) worst = {error, edge.SampleAt(k)};  // false for voids; the number grows with k
   }
   return worst;
 }

@@ -10,9 +10,9 @@ inline constexpr std::uint32_t kNoSample = 0xFFFFFFFF;
 // The default is "none": every real candidate comes before it.
 struct Candidate {
   double error = 0;                  // metres, weighted; > 0 unless there is none
-  std::uint32_t sample = kNoSample;  // row-major index
+  std::uint32_t sample = kNoSample;  // its number (SampleNumber)
 
-  // The total order of insertions: larger error first, then smaller index.
+  // The total order of insertions: larger error first, then smaller number.
   friend constexpr bool Precedes(const Candidate& a, const Candidate& b) {
     return a.error > b.error || (a.error == b.error && a.sample < b.sample);
   }

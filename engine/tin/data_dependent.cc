@@ -139,7 +139,7 @@ bool DataDependentCriterion::IsBetterAlongPw(const Quadrilateral& q, TriangleId 
   if (UsesMaxima()) {
     double least_uw = 0, least_wv = 0;
     if (known.worst != kNoSample) RaiseLeastErrors(q, known.worst, known.worst_height, least_uw, least_wv);
-    if (uv.worst != kNoSample) RaiseLeastErrors(q, uv.worst, field_->At(uv.worst), least_uw, least_wv);
+    if (uv.worst != kNoSample) RaiseLeastErrors(q, uv.worst, field_->At(PositionOf(uv.worst)), least_uw, least_wv);
     if (!wins(least_uw, least_wv)) return false;
   }
   fit_new();
@@ -150,7 +150,7 @@ bool DataDependentCriterion::IsBetterAlongPw(const Quadrilateral& q, TriangleId 
 // does not matter, since maxima and sums of what is not negative are monotonic as computed.
 void DataDependentCriterion::RaiseLeastErrors(const Quadrilateral& q, std::uint32_t sample, float height, double& uw,
                                               double& wv) const {
-  const SamplePosition position = PositionOf(sample, field_->width());
+  const SamplePosition position = PositionOf(sample);
   const int x = position.x - vertex_.position.x, y = position.y - vertex_.position.y;
   const std::int64_t side = Cross(q.w, RingVertex{0, x, y, height});
   if (side <= 0) uw = std::max(uw, DistanceFrom(q.u, q.w, vertex_.height, x, y, height));
@@ -158,7 +158,7 @@ void DataDependentCriterion::RaiseLeastErrors(const Quadrilateral& q, std::uint3
 }
 
 DataDependentCriterion::KnownFit DataDependentCriterion::Remembered(const Fit& fit) const {
-  return {fit.error, fit.worst, fit.worst == kNoSample ? 0 : field_->At(fit.worst)};
+  return {fit.error, fit.worst, fit.worst == kNoSample ? 0 : field_->At(PositionOf(fit.worst))};
 }
 
 // From the triangle's last corner, as when it was made: rounding is that of the scan of its star.

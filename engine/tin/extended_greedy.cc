@@ -107,7 +107,7 @@ double ExtendedGreedy::CurrentError() {
 }
 
 void ExtendedGreedy::Insert(TriangleId triangle) {
-  const SamplePosition sample = PositionOf(candidates_.sample(triangle), field_->width());
+  const SamplePosition sample = PositionOf(candidates_.sample(triangle));
   colors_.push_back(ColorOfVertex(sample, triangle));
   const Star& star = triangulation_.InsertDelaunay({sample, field_->heights().At(sample.x, sample.y)}, triangle);
   for (std::size_t i = 0; i < star.count; ++i) Scan(star.triangles[i]);

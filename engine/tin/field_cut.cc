@@ -43,9 +43,8 @@ double CountBorderVertices(const HeightField& field, Corner from, Corner to, dou
   while (!ends.empty()) {
     const Candidate worst = WorstBorderSample(field, from, ends.back(), kSharedBorder);
     if (worst.error > max_error_m) {
-      const auto width = static_cast<std::uint32_t>(field.width());
-      const int x = static_cast<int>(worst.sample % width), y = static_cast<int>(worst.sample / width);
-      ends.push_back({x, y, static_cast<double>(field.At(x, y))});
+      const SamplePosition at = PositionOf(worst.sample);
+      ends.push_back({at.x, at.y, static_cast<double>(field.At(at.x, at.y))});
       continue;
     }
     ++count;

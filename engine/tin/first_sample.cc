@@ -17,7 +17,7 @@ std::uint32_t FirstSample(const HeightField& field, const Star& star, std::size_
     if (found != kNoSample) return;
     const float* const row = field.Row(y);
     while (first <= last && std::isnan(row[first])) ++first;
-    if (first <= last) found = static_cast<std::uint32_t>(y * field.width() + first);
+    if (first <= last) found = SampleNumber(first, y);
   });
   return found;
 }

@@ -9,7 +9,7 @@
 
 namespace terrace::tin {
 
-// Row-major index of the first sample of the star's triangle i that a scan looks at (triangle_scan.h); kNoSample if
+// Number of the first sample of the star's triangle i that a scan looks at (triangle_scan.h); kNoSample if
 // there is none.
 std::uint32_t FirstSample(const HeightField& field, const Star& star, std::size_t i);
 

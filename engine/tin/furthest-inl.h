@@ -30,10 +30,10 @@ constexpr DoublesTag kDoubles;
 constexpr FloatsTag kFloats;
 using Floats = hn::Vec<FloatsTag>;
 
-// Row-major indices: in doubles beside doubles, in integers beside floats, which cannot hold them.
+// Numbers of samples (SampleNumber): in doubles beside doubles, in integers beside floats, which cannot hold them.
 template <typename Tag>
-using IndexTag = std::conditional_t<std::is_same_v<hn::TFromD<Tag>, float>, hn::RebindToSigned<Tag>, Tag>;
-using IntsTag = IndexTag<FloatsTag>;
+using NumberTag = std::conditional_t<std::is_same_v<hn::TFromD<Tag>, float>, hn::RebindToSigned<Tag>, Tag>;
+using IntsTag = NumberTag<FloatsTag>;
 using Ints = hn::Vec<IntsTag>;
 constexpr IntsTag kInts;
 
@@ -51,8 +51,8 @@ template <typename T>
 struct LaneNumbers {
   HWY_ALIGN static constexpr T kValues[16] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
 };
-template <typename Tag>
-HWY_INLINE hn::Vec<Tag> From(Tag tag, int first) {
+template <typename Tag, typename Value>
+HWY_INLINE hn::Vec<Tag> From(Tag tag, Value first) {
   static_assert(hn::MaxLanes(Tag()) <= 16);
   return hn::Add(All(tag, first), hn::Load(tag, LaneNumbers<hn::TFromD<Tag>>::kValues));
 }
@@ -79,14 +79,14 @@ template <typename TagOfNumerators>
 class Furthest {
  public:
   using Tag = TagOfNumerators;
-  using Index = hn::Vec<IndexTag<Tag>>;
+  using Numbers = hn::Vec<NumberTag<Tag>>;
 
-  HWY_INLINE Furthest() : numerator_(All(kTag, -1)), index_(hn::Zero(kIndices)) {}
+  HWY_INLINE Furthest() : numerator_(All(kTag, -1)), number_(hn::Zero(kNumbers)) {}
 
-  HWY_INLINE void Visit(hn::Vec<Tag> numerator, Index index, hn::Mask<Tag> inside) {
-    Keep(hn::And(inside, hn::Gt(numerator, numerator_)), numerator, index);
+  HWY_INLINE void Visit(hn::Vec<Tag> numerator, Numbers number, hn::Mask<Tag> inside) {
+    Keep(hn::And(inside, hn::Gt(numerator, numerator_)), numerator, number);
   }
-  HWY_INLINE void Visit(hn::Vec<Tag> numerator, Index index) {
+  HWY_INLINE void Visit(hn::Vec<Tag> numerator, Numbers number) {
     const auto is_further = hn::Gt(numerator, numerator_);
     if constexpr (std::is_same_v<Tag, FloatsTag>) {
       numerator_ = MaxOrSecond(numerator, numerator_);  // the next sample waits for this one, and not for the mask
@@ -95,54 +95,55 @@ class Furthest {
     } else {
       numerator_ = hn::IfThenElse(is_further, numerator, numerator_);
     }
-    index_ = hn::IfThenElse(hn::RebindMask(kIndices, is_further), index, index_);
+    number_ = hn::IfThenElse(hn::RebindMask(kNumbers, is_further), number, number_);
   }
 
   // Of samples that were visited apart.
   HWY_INLINE void Merge(const Furthest& other) {
-    const auto tied = hn::And(hn::Eq(other.numerator_, numerator_), hn::RebindMask(kTag, hn::Lt(other.index_, index_)));
-    Keep(hn::Or(hn::Gt(other.numerator_, numerator_), tied), other.numerator_, other.index_);
+    const auto tied =
+        hn::And(hn::Eq(other.numerator_, numerator_), hn::RebindMask(kTag, hn::Lt(other.number_, number_)));
+    Keep(hn::Or(hn::Gt(other.numerator_, numerator_), tied), other.numerator_, other.number_);
   }
 
   HWY_INLINE hn::Vec<Tag> numerators() const { return numerator_; }
-  HWY_INLINE Index indices() const { return index_; }
+  HWY_INLINE Numbers numbers() const { return number_; }
   HWY_INLINE hn::TFromD<Tag> numerator() const { return hn::GetLane(hn::MaxOfLanes(kTag, numerator_)); }
 
   // Precondition: some sample was visited.
   HWY_INLINE std::uint32_t sample() const {
-    const auto foremost = hn::RebindMask(kIndices, hn::Eq(numerator_, hn::MaxOfLanes(kTag, numerator_)));
-    const Index none = All(kIndices, std::numeric_limits<std::int32_t>::max());
-    const auto first = hn::GetLane(hn::MinOfLanes(kIndices, hn::IfThenElse(foremost, index_, none)));
+    const auto foremost = hn::RebindMask(kNumbers, hn::Eq(numerator_, hn::MaxOfLanes(kTag, numerator_)));
+    const Numbers none = All(kNumbers, std::numeric_limits<std::int32_t>::max());
+    const auto first = hn::GetLane(hn::MinOfLanes(kNumbers, hn::IfThenElse(foremost, number_, none)));
     return static_cast<std::uint32_t>(static_cast<std::int64_t>(first));
   }
 
  private:
   static constexpr Tag kTag{};
-  static constexpr IndexTag<Tag> kIndices{};
+  static constexpr NumberTag<Tag> kNumbers{};
 
-  HWY_INLINE void Keep(hn::Mask<Tag> which, hn::Vec<Tag> numerator, Index index) {
+  HWY_INLINE void Keep(hn::Mask<Tag> which, hn::Vec<Tag> numerator, Numbers number) {
     numerator_ = hn::IfThenElse(which, numerator, numerator_);
-    index_ = hn::IfThenElse(hn::RebindMask(kIndices, which), index, index_);
+    number_ = hn::IfThenElse(hn::RebindMask(kNumbers, which), number, number_);
   }
 
   hn::Vec<Tag> numerator_;  // D times the distance
-  Index index_;             // row-major
+  Numbers number_;
 };
 
 // The same where single precision leaves doubts: also how close to a lane's furthest sample another one of it comes.
 class FurthestTwo {
  public:
   using Tag = FloatsTag;
-  using Index = Furthest<FloatsTag>::Index;
+  using Numbers = Furthest<FloatsTag>::Numbers;
 
   HWY_INLINE FurthestTwo() : runner_up_(All(kFloats, -1)) {}
 
-  HWY_INLINE void Visit(Floats numerator, Index index, hn::Mask<FloatsTag> inside) {
-    Visit(hn::IfThenElse(inside, numerator, All(kFloats, -1)), index);
+  HWY_INLINE void Visit(Floats numerator, Numbers number, hn::Mask<FloatsTag> inside) {
+    Visit(hn::IfThenElse(inside, numerator, All(kFloats, -1)), number);
   }
-  HWY_INLINE void Visit(Floats numerator, Index index) {
+  HWY_INLINE void Visit(Floats numerator, Numbers number) {
     runner_up_ = MaxOrSecond(MinOrSecond(furthest_.numerators(), numerator), runner_up_);
-    furthest_.Visit(numerator, index);
+    furthest_.Visit(numerator, number);
   }
   HWY_INLINE void Merge(const FurthestTwo& other) {
     runner_up_ =

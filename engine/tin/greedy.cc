@@ -167,7 +167,7 @@ std::optional<GreedyTriangulation::Impl::Insertion> GreedyTriangulation::Impl::N
   PrefetchUpcoming();
   const float error = candidates_.error(worst);
   if (static_cast<double>(error) <= goal.max_error) return std::nullopt;
-  return Insertion{PositionOf(candidates_.sample(worst), field_->width()), worst, error, false};
+  return Insertion{PositionOf(candidates_.sample(worst)), worst, error, false};
 }
 
 // What is inserted next lies anywhere: fetched while this one is at work. In three steps, each of which reads what the

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "engine/core/result.h"
+#include "engine/tin/tin_mesh.h"
 
 namespace terrace::tin {
 
@@ -31,11 +32,7 @@ class HeightField {
 
   // NaN at a void.
   float At(int x, int y) const { return Row(y)[x]; }
-  // The same by row-major index.
-  float At(std::uint32_t sample) const {
-    const auto width = static_cast<std::uint32_t>(width_);
-    return stride_ == width ? heights_[sample] : heights_[sample / width * stride_ + sample % width];
-  }
+  float At(SamplePosition sample) const { return At(sample.x, sample.y); }
   const float* Row(int y) const { return heights_.data() + static_cast<std::size_t>(y) * stride_; }
 
   // Samples from one row to the next. Scans load whole vectors: 16 samples may be read from any sample that is not in

@@ -14,10 +14,12 @@ struct SamplePosition {
   friend bool operator==(SamplePosition, SamplePosition) = default;
 };
 
-// Of a row-major index in a field of `width` columns.
-constexpr SamplePosition PositionOf(std::uint32_t index, int width) {
-  const auto columns = static_cast<std::uint32_t>(width);
-  return {static_cast<std::uint16_t>(index % columns), static_cast<std::uint16_t>(index / columns)};
+// A sample's number: ordered by rows like a row-major index, but its position is known without a division.
+constexpr std::uint32_t SampleNumber(int x, int y) {
+  return static_cast<std::uint32_t>(y) << 16 | static_cast<std::uint32_t>(x);
+}
+constexpr SamplePosition PositionOf(std::uint32_t number) {
+  return {static_cast<std::uint16_t>(number), static_cast<std::uint16_t>(number >> 16)};
 }
 
 struct TinMesh {

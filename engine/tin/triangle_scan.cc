@@ -51,7 +51,7 @@ HWY_NOINLINE PlaneMisfit MisfitInDoubt(const HeightField& field, const Star& sta
     best = k;
   }
   const int row = star.y + south + best / kSide, column = star.x + west + best % kSide;
-  return {most / t.d, static_cast<std::uint32_t>(row * field.width() + column)};
+  return {most / t.d, SampleNumber(column, row)};
 }
 
 // What ScanBlock found: most often a single sample.
@@ -60,8 +60,8 @@ HWY_INLINE PlaneMisfit MisfitOf(const HeightField& field, const Star& star, cons
                                 std::size_t first, const BlockFind& find, float most_exact) {
   if (find.most < 0) return {};
   const int west = planes.west[i], south = planes.south[i];
-  const int base = (star.y + south) * field.width() + star.x + west;
-  const auto sample = [&](int k) { return static_cast<std::uint32_t>(base + k / kSide * field.width() + k % kSide); };
+  const std::uint32_t base = SampleNumber(star.x + west, star.y + south);
+  const auto sample = [&](int k) { return base + SampleNumber(k % kSide, k / kSide); };
   const bool is_exact = find.most + planes.largest[i] < most_exact;
   if (is_exact || (find.most == 0 && planes.magnitude[i] == 0)) {
     if (find.most > 0) {
@@ -118,15 +118,15 @@ HWY_NOINLINE PlaneMisfit ScanDoubtfully(const HeightField& field, const Star& st
   if (!(single < kMostMagnitude) || MayBeACorner(single, planes.magnitude[i], kDoubt) || two.runner_up() >= least) {
     return ScanExactly(field, t);
   }
-  HWY_ALIGN std::int32_t indices[hn::MaxLanes(kFloats)];
-  hn::Store(two.furthest().indices(), kInts, indices);
+  HWY_ALIGN std::int32_t samples[hn::MaxLanes(kFloats)];
+  hn::Store(two.furthest().numbers(), kInts, samples);
   double most = -1;
   std::uint32_t best = kNoSample;
   for (std::uint32_t bits = BitsOf(hn::Ge(two.furthest().numerators(), All(kFloats, least))); bits != 0;
        bits &= bits - 1) {
-    const std::int32_t index = indices[std::countr_zero(bits)];
-    const auto sample = static_cast<std::uint32_t>(index);
-    const double numerator = NumeratorAt(field, t, index % field.width() - t.px, index / field.width() - t.py);
+    const auto sample = static_cast<std::uint32_t>(samples[std::countr_zero(bits)]);
+    const SamplePosition at = PositionOf(sample);
+    const double numerator = NumeratorAt(field, t, at.x - t.px, at.y - t.py);
     if (numerator < most || (numerator == most && sample > best)) continue;
     most = numerator;
     best = sample;

@@ -22,7 +22,7 @@ namespace terrace::tin {
 
 struct PlaneMisfit {
   double distance = -1;              // vertical, metres; negative: the triangle has no samples
-  std::uint32_t sample = kNoSample;  // row-major index; the smallest of equally distant samples
+  std::uint32_t sample = kNoSample;  // its number; the smallest of equally distant samples
 };
 
 // misfits[i] is that of triangle i of the star. Precondition: vertices have the heights of the field, or any where that

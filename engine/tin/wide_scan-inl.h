@@ -166,18 +166,18 @@ HWY_INLINE Found ScanColumnsIn32Bits(const HeightField& field, const PlaneFor<Fo
   auto of_v = hn::Sub(All(kInts, t.ux * t.south), hn::Mul(All(kInts, t.uy), x));
   auto of_p = hn::Sub(All(kInts, t.ux * t.vy - t.uy * t.vx), hn::Add(of_u, of_v));
   const auto step_u = All(kInts, t.vx), step_v = All(kInts, t.ux), step_p = All(kInts, t.vx - t.ux);
-  const int width = field.width(), stride = field.stride(), first_row = t.py + t.south;
+  const int stride = field.stride(), first_row = t.py + t.south;
   const float* from = field.Row(first_row) + t.px + column;
-  auto index = From(kInts, first_row * width + t.px + column);
-  const auto next_row = All(kInts, width);
+  auto number = From(kInts, SampleNumber(t.px + column, first_row));
+  const auto next_row = All(kInts, SampleNumber(0, 1));
   ColumnsOfPlane<Found> plane(t, column);
   Found furthest;
   for (int j = t.south; j <= t.north; ++j) {
     const auto outside = hn::ShiftRight<31>(hn::Or3(of_u, of_v, of_p));
-    furthest.Visit(hn::Or(plane.Numerators(from), hn::BitCast(tag, outside)), index);
+    furthest.Visit(hn::Or(plane.Numerators(from), hn::BitCast(tag, outside)), number);
     from += stride;
     plane.Step();
-    index = hn::Add(index, next_row);
+    number = hn::Add(number, next_row);
     of_u = hn::Sub(of_u, step_u);
     of_v = hn::Add(of_v, step_v);
     of_p = hn::Add(of_p, step_p);
@@ -189,24 +189,24 @@ HWY_INLINE Found ScanColumnsIn32Bits(const HeightField& field, const PlaneFor<Fo
 // for. After an odd number of rows the last one is looked at again.
 HWY_INLINE Furthest<DoublesTag> ScanColumnsInDouble(const HeightField& field, const ExactPlane& t, int column) {
   constexpr DoublesTag tag;
-  constexpr IndexTag<DoublesTag> indices;
+  constexpr NumberTag<DoublesTag> numbers;
   const auto d = All(tag, t.d), b = All(tag, t.b), one = All(tag, 1), two = All(tag, 2), last = All(tag, t.north);
   const auto x = From(tag, column), a_x = hn::Mul(All(tag, t.a), x), pz = UpToColumn(tag, t.east, x, t.pz);
   auto y = All(tag, t.south), above = hn::Add(y, one);
   Barycentric even(t, x, y), odd(t, x, above);
-  const int width = field.width(), stride = field.stride(), first_row = t.py + t.south;
+  const int stride = field.stride(), first_row = t.py + t.south;
   const float* from = field.Row(first_row) + t.px + column;
-  const auto next_row = All(indices, width);
-  auto index = From(indices, first_row * width + t.px + column);
+  const auto next_row = All(numbers, SampleNumber(0, 1));
+  auto number = From(numbers, SampleNumber(t.px + column, first_row));
   Furthest<DoublesTag> furthest, also;
   for (int j = t.south; j <= t.north; j += 2) {
     const float* const from_above = j < t.north ? from + stride : from;
-    furthest.Visit(Numerator(HeightsAt(tag, from), pz, d, hn::Add(a_x, hn::Mul(b, y))), index,
+    furthest.Visit(Numerator(HeightsAt(tag, from), pz, d, hn::Add(a_x, hn::Mul(b, y))), number,
                    even.IsInsideAndNoCorner());
-    index = hn::Add(index, next_row);
-    also.Visit(Numerator(HeightsAt(tag, from_above), pz, d, hn::Add(a_x, hn::Mul(b, above))), index,
+    number = hn::Add(number, next_row);
+    also.Visit(Numerator(HeightsAt(tag, from_above), pz, d, hn::Add(a_x, hn::Mul(b, above))), number,
                hn::And(odd.IsInsideAndNoCorner(), hn::Le(above, last)));
-    index = hn::Add(index, next_row);
+    number = hn::Add(number, next_row);
     from += 2 * stride;
     y = hn::Add(y, two);
     above = hn::Add(above, two);
@@ -251,14 +251,14 @@ template <typename Found>
 HWY_INLINE Found ScanSpans(const HeightField& field, const PlaneFor<Found>& t) {
   using Tag = typename Found::Tag;
   constexpr Tag tag;
-  constexpr IndexTag<Tag> indices;
+  constexpr NumberTag<Tag> numbers;
   const auto d = All(tag, t.d), a = All(tag, t.a), b = All(tag, t.b), pz = All(tag, t.pz), one = All(tag, 1);
-  const int lanes = LanesOf<Tag>(), last_row = t.py + t.north, width = field.width();
+  const int lanes = LanesOf<Tag>(), last_row = t.py + t.north;
   const auto lanes_on = All(tag, lanes), none = All(tag, -1);
-  const auto corner = [&](int x, int y) HWY_ATTR { return All(indices, (t.py + y) * width + t.px + x); };
+  const auto corner = [&](int x, int y) HWY_ATTR { return All(numbers, SampleNumber(t.px + x, t.py + y)); };
   [[maybe_unused]] const auto at_p = corner(0, 0), at_u = corner(t.ux, t.uy), at_v = corner(t.vx, t.vy);
   [[maybe_unused]] const auto a_on = hn::Mul(a, lanes_on);
-  const auto indices_on = All(indices, lanes);
+  const auto numbers_on = All(numbers, lanes);
   Found furthest, also, ends;  // apart, since what is furthest so far is waited for
   Columns firsts, lasts;
   const SpanFinder<std::conditional_t<kIsInteger<Found>, FloatsTag, Tag>> finder(t);
@@ -271,11 +271,11 @@ HWY_INLINE Found ScanSpans(const HeightField& field, const PlaneFor<Found>& t) {
       const float* from = field.Row(row) + first;
       auto b_y = hn::Mul(b, y);
       if constexpr (kIsInteger<Found>) b_y = hn::Add(b_y, pz);
-      const auto end = All(indices, row * width + last + 1);
+      const auto end = All(numbers, SampleNumber(last + 1, row));
       y = hn::Add(y, one);
       auto x = From(tag, first - t.px);
       auto plane = MulAddFor<Found>(a, x, b_y);
-      auto index = From(indices, row * width + first);
+      auto number = From(numbers, SampleNumber(first, row));
       int left = last - first + 1;
       const auto numerator = [&]() HWY_ATTR {
         if constexpr (std::is_same_v<Tag, FloatsTag>) {
@@ -283,14 +283,14 @@ HWY_INLINE Found ScanSpans(const HeightField& field, const PlaneFor<Found>& t) {
         } else if constexpr (kIsInteger<Found>) {
           return NumeratorFrom(from, All(kFloats, t.z), All(kFloats, t.lift), d, plane);
         } else {
-          const auto is_corner = hn::Or(hn::Or(hn::Eq(index, at_p), hn::Eq(index, at_u)), hn::Eq(index, at_v));
+          const auto is_corner = hn::Or(hn::Or(hn::Eq(number, at_p), hn::Eq(number, at_u)), hn::Eq(number, at_v));
           return hn::IfThenElse(is_corner, none, Numerator(HeightsAt(tag, from), pz, d, plane));
         }
       };
       const auto visit = [&](Found& found) HWY_ATTR {
-        found.Visit(numerator(), index);
+        found.Visit(numerator(), number);
         from += lanes;
-        index = hn::Add(index, indices_on);
+        number = hn::Add(number, numbers_on);
         if constexpr (kIsExact<Found>) {
           plane = hn::Add(plane, a_on);
         } else {
@@ -300,8 +300,8 @@ HWY_INLINE Found ScanSpans(const HeightField& field, const PlaneFor<Found>& t) {
       };
       for (; left >= 2 * lanes; left -= 2 * lanes) visit(furthest), visit(also);
       if (left >= lanes) visit(also);
-      const auto inside = hn::RebindMask(tag, hn::Lt(index, end));
-      ends.Visit(hn::IfThenElse(inside, numerator(), none), index);
+      const auto inside = hn::RebindMask(tag, hn::Lt(number, end));
+      ends.Visit(hn::IfThenElse(inside, numerator(), none), number);
     }
   }
   furthest.Merge(also);

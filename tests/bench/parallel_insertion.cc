@@ -47,7 +47,7 @@ std::size_t ParallelInsertion::Pass(double threshold, std::size_t max_points) {
 
 // False if the sample is a vertex already: the triangles on both sides of an edge may have chosen the same.
 bool ParallelInsertion::Insert(const Candidate& candidate) {
-  const tin::SamplePosition point = tin::PositionOf(candidate.sample, field_.width());
+  const tin::SamplePosition point = tin::PositionOf(candidate.sample);
   const TriangleId start = changed_.empty() ? 0 : changed_.back();
   const TriangleId triangle = triangulation_.Locate(point, start);
   if (triangulation_.IsCorner(point, triangle)) return false;
@@ -71,8 +71,7 @@ Candidate ParallelInsertion::WorstOf(TriangleId t) const {
   for (unsigned i = 0; i < 3; ++i) corners[i] = triangulation_.position(triangulation_.triangle(t)[i]);
   Candidate worst;
   ForEachSample(field_, corners, [&](tin::SamplePosition p, double height) {
-    const Candidate candidate{std::abs(height - static_cast<double>(field_.At(p.x, p.y))),
-                              static_cast<std::uint32_t>(p.y * field_.width() + p.x)};
+    const Candidate candidate{std::abs(height - static_cast<double>(field_.At(p.x, p.y))), tin::SampleNumber(p.x, p.y)};
     const bool is_corner = std::find(corners.begin(), corners.end(), p) != corners.end();
     if (!is_corner && candidate.error > 0 && Precedes(candidate, worst)) worst = candidate;  // false for NaN
   });

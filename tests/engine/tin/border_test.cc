@@ -45,7 +45,7 @@ std::vector<int> SplitChord(const HeightField& field, int a, int b, double thres
   const Corner low{0, a, static_cast<double>(field.At(0, a))}, high{0, b, static_cast<double>(field.At(0, b))};
   const Candidate worst = WorstBorderSample(field, low, high, options);
   if (worst.error <= threshold) return {a, b};
-  const int k = static_cast<int>(worst.sample) / field.width();
+  const int k = PositionOf(worst.sample).y;
   std::vector<int> left = SplitChord(field, a, k, threshold, options);
   const std::vector<int> right = SplitChord(field, k, b, threshold, options);
   left.insert(left.end(), right.begin() + 1, right.end());

@@ -117,7 +117,7 @@ class NaiveDataDependent {
         const double numerator = std::abs(d * (height - c.z) - (per_x * px + per_y * py));
         if (!(numerator > furthest)) continue;
         furthest = numerator;
-        sample = static_cast<std::uint32_t>(y * field_.width() + x);
+        sample = SampleNumber(x, y);
       }
     }
     return {std::max(furthest, 0.0) / d, sample};
@@ -156,7 +156,7 @@ class NaiveDataDependent {
   }
 
   void Insert(std::uint32_t sample, TriangleId triangle) {
-    const SamplePosition at = PositionOf(sample, field_.width());
+    const SamplePosition at = PositionOf(sample);
     const float height = field_.At(at.x, at.y);
     const Corner p{at.x, at.y, static_cast<double>(height)};
     triangulation_.Insert({at, height}, triangle,

@@ -53,7 +53,7 @@ class NaivePass {
     }
     const bool on_border = x == 0 || y == 0 || x == field_.width() - 1 || y == field_.height() - 1;
     const double error = on_border ? BorderErrorOf(corners, p) : PlaneErrorOf(corners, p);
-    const Candidate candidate{error, static_cast<std::uint32_t>(y * field_.width() + x)};
+    const Candidate candidate{error, SampleNumber(x, y)};
     if (error > 0 && Precedes(candidate, worst_)) worst_ = candidate;  // false for NaN
   }
 
@@ -97,7 +97,7 @@ TinMesh NaiveGreedy(const HeightField& field, const std::array<BorderOptions, 4>
   while (triangulation.vertex_count() < goal.max_points) {
     const Pick worst = NaivePass(field, borders, triangulation).WorstOfAll();
     if (worst.candidate.error <= goal.max_error) break;
-    const SamplePosition sample = PositionOf(worst.candidate.sample, field.width());
+    const SamplePosition sample = PositionOf(worst.candidate.sample);
     triangulation.InsertDelaunay(Triangulation::VertexAt(field, sample.x, sample.y), worst.triangle);
   }
   return triangulation.Mesh();

@@ -63,7 +63,7 @@ PlaneMisfit Reference(const HeightField& field, const Star& star, std::size_t i)
       const double numerator = std::abs(d * (static_cast<double>(field.At(column, row)) - pz) - (a * x + b * y));
       if (!(numerator > most)) continue;
       most = numerator;
-      worst = {numerator / d, static_cast<std::uint32_t>(row * field.width() + column)};
+      worst = {numerator / d, SampleNumber(column, row)};
     }
   }
   return worst;
@@ -381,7 +381,7 @@ TEST(TriangleScan, SkipsVoidsAndTheBorder) {
   PlaneMisfit worst;
   BestStarScan()(field, *TestStar(field, {4, 4}, {{0, 0}, {4, 0}}), &worst);
   EXPECT_EQ(worst.distance, 7);
-  EXPECT_EQ(worst.sample, 8u);
+  EXPECT_EQ(worst.sample, SampleNumber(3, 1));
 }
 
 // Corners lie on the plane, but for the rounding of floats, and the border wherever it likes. All else is void, or one
