@@ -2,7 +2,8 @@
 // the processor's second cache makes them wait.
 //
 // Two forms with the same calls. Narrow, while all vertex ids are below 2^16: 16 bytes a triangle,
-//   corners: 3 x 16 bits of the first word; twins: 3 x 21 bits of the second (half-edge 4t + i, all ones: none).
+//   corners: 4 x 16 bits of the first word, the last one first as well, so that the corner across from half-edge i is
+//   the i-th; twins: 3 x 21 bits of the second (half-edge 4t + i, all ones: none).
 // A triangulation of 2^16 vertices has fewer than 2^17 triangles, whose half-edges take 19 bits. Wide: 24 bytes.
 #pragma once
 
@@ -18,6 +19,10 @@ namespace terrace::tin {
 
 inline constexpr std::uint32_t kNoEdge = 0xFFFFFFFF;
 
+// 0 -> 1 -> 2 -> 0 from tables of two bits each: a comparison would be a branch that cannot be foretold.
+constexpr unsigned NextCorner(unsigned i) { return (0b001001U >> (2 * i)) & 3; }
+constexpr unsigned PreviousCorner(unsigned i) { return (0b010010U >> (2 * i)) & 3; }
+
 class NarrowTriangles {
  public:
   static constexpr std::size_t kMostVertices = std::size_t{1} << 16;
@@ -26,18 +31,34 @@ class NarrowTriangles {
     std::uint64_t corners = 0;
     std::uint64_t twins = 0;
 
-    VertexId corner(unsigned i) const { return static_cast<std::uint16_t>(corners >> (16 * i)); }
-    HalfEdgeId twin(unsigned i) const {
-      const std::uint64_t twin = (twins >> (kTwinBits * i)) & kTwinMask;
-      return twin == kTwinMask ? kNoEdge : static_cast<HalfEdgeId>(twin);
-    }
+    VertexId corner(unsigned i) const { return opposite(i + 1); }
+    VertexId opposite(unsigned i) const { return static_cast<std::uint16_t>(corners >> (16 * i)); }
+    HalfEdgeId twin(unsigned i) const { return TwinAt(kTwinBits * i); }
+    HalfEdgeId next_twin(unsigned i) const { return TwinAt(Byte(kNextShifts, i)); }
+    HalfEdgeId previous_twin(unsigned i) const { return TwinAt(Byte(kPreviousShifts, i)); }
     void set_twin(unsigned i, HalfEdgeId twin) {
       twins = (twins & ~(kTwinMask << (kTwinBits * i))) | ((twin & kTwinMask) << (kTwinBits * i));
     }
-    static Triangle Of(VertexId a, VertexId b, VertexId c, HalfEdgeId ab, HalfEdgeId bc, HalfEdgeId ca) {
-      return {a | std::uint64_t{b} << 16 | std::uint64_t{c} << 32,
-              (ab & kTwinMask) | (bc & kTwinMask) << kTwinBits | (ca & kTwinMask) << (2 * kTwinBits)};
+    // The same for a twin that is an edge.
+    void JoinTwin(unsigned i, HalfEdgeId twin) {
+      const unsigned shift = kTwinBits * i;
+      twins = (twins & ~(kTwinMask << shift)) | std::uint64_t{twin} << shift;
     }
+    static Triangle Of(VertexId a, VertexId b, VertexId c, HalfEdgeId ab, HalfEdgeId bc, HalfEdgeId ca) {
+      return InStar(a, b, c, ab, bc & kTwinMask, ca & kTwinMask);
+    }
+    // The same where only ab may be none.
+    static Triangle InStar(VertexId a, VertexId b, VertexId c, HalfEdgeId ab, std::uint64_t bc, std::uint64_t ca) {
+      return {c | std::uint64_t{a} << 16 | std::uint64_t{b} << 32 | std::uint64_t{c} << 48,
+              (ab & kTwinMask) | bc << kTwinBits | ca << (2 * kTwinBits)};
+    }
+
+   private:
+    HalfEdgeId TwinAt(unsigned shift) const {
+      const std::uint64_t twin = (twins >> shift) & kTwinMask;
+      return twin == kTwinMask ? kNoEdge : static_cast<HalfEdgeId>(twin);
+    }
+    static unsigned Byte(unsigned bytes, unsigned i) { return (bytes >> (8 * i)) & 63; }
   };
 
   LargeArray<Triangle> slots;
@@ -45,6 +66,8 @@ class NarrowTriangles {
  private:
   static constexpr unsigned kTwinBits = 21;
   static constexpr std::uint64_t kTwinMask = (std::uint64_t{1} << kTwinBits) - 1;
+  static constexpr unsigned kNextShifts = kTwinBits | (2 * kTwinBits) << 8;  // by half-edge, a byte each
+  static constexpr unsigned kPreviousShifts = 2 * kTwinBits | kTwinBits << 16;
 };
 
 class WideTriangles {
@@ -54,10 +77,17 @@ class WideTriangles {
     std::array<HalfEdgeId, 3> twins;
 
     VertexId corner(unsigned i) const { return corners[i]; }
+    VertexId opposite(unsigned i) const { return corners[PreviousCorner(i)]; }
     HalfEdgeId twin(unsigned i) const { return twins[i]; }
+    HalfEdgeId next_twin(unsigned i) const { return twins[NextCorner(i)]; }
+    HalfEdgeId previous_twin(unsigned i) const { return twins[PreviousCorner(i)]; }
     void set_twin(unsigned i, HalfEdgeId twin) { twins[i] = twin; }
+    void JoinTwin(unsigned i, HalfEdgeId twin) { twins[i] = twin; }
     static Triangle Of(VertexId a, VertexId b, VertexId c, HalfEdgeId ab, HalfEdgeId bc, HalfEdgeId ca) {
       return {{a, b, c}, {ab, bc, ca}};
+    }
+    static Triangle InStar(VertexId a, VertexId b, VertexId c, HalfEdgeId ab, HalfEdgeId bc, HalfEdgeId ca) {
+      return Of(a, b, c, ab, bc, ca);
     }
   };
 

@@ -118,7 +118,7 @@ template <typename Triangles>
   for (unsigned i = 0; i < 3; ++i) {
     const HalfEdgeId back = triangle.twin(i);
     if (back == kNone) continue;
-    __builtin_prefetch(&vertices_[slots[back / 4].corner(PreviousCorner(back % 4))]);
+    __builtin_prefetch(&vertices_[slots[back / 4].opposite(back % 4)]);
   }
 }
 

@@ -95,11 +95,8 @@ class Triangulation {
     return is_wide_ ? wide_.slots[edge / 4].twin(edge % 4) : narrow_.slots[edge / 4].twin(edge % 4);
   }
 
-  // 0 -> 1 -> 2 -> 0 from tables of two bits each: a comparison would be a branch that cannot be foretold.
   static constexpr HalfEdgeId Next(HalfEdgeId edge) { return (edge & ~HalfEdgeId{3}) + NextCorner(edge % 4); }
   static constexpr HalfEdgeId Previous(HalfEdgeId edge) { return (edge & ~HalfEdgeId{3}) + PreviousCorner(edge % 4); }
-  static constexpr unsigned NextCorner(unsigned i) { return (0b001001U >> (2 * i)) & 3; }
-  static constexpr unsigned PreviousCorner(unsigned i) { return (0b010010U >> (2 * i)) & 3; }
 
  private:
   // An edge of the outline that has not been looked across yet; it starts where the one before it ends.
@@ -135,7 +132,7 @@ class Triangulation {
   bool is_wide_ = false;
 
   Star star_;                         // of the last insertion
-  std::vector<PendingEdge> pending_;  // stack
+  std::vector<PendingEdge> pending_;  // stack, from 1 on
 };
 
 constexpr std::int64_t Cross(const RingVertex& a, const RingVertex& b) {
@@ -183,63 +180,63 @@ template <typename Triangles, typename Absorbs>
 void Triangulation::Replace(Triangles& triangles, SamplePosition point, TriangleId triangle, Absorbs&& absorbs) {
   const auto* const slots = triangles.slots.data();
   const Vertex* const vertices = vertices_.data();
-  PendingEdge* stack = pending_.data();
+  PendingEdge* const stack = pending_.data();
   std::size_t capacity = pending_.size();
   const auto prefetch = [=](HalfEdgeId across) {
     if (across != kNone) __builtin_prefetch(&slots[across / 4]);
   };
   const auto first = slots[triangle];
   RingVertex u = Relative(vertices, first.corner(0), point);
-  stack[2] = {first.twin(0), Relative(vertices, first.corner(1), point)};
-  stack[1] = {first.twin(1), Relative(vertices, first.corner(2), point)};
-  stack[0] = {first.twin(2), u};
-  const std::int64_t sides[3] = {Cross(u, stack[2].end), Cross(stack[2].end, stack[1].end), Cross(stack[1].end, u)};
+  stack[3] = {first.twin(0), Relative(vertices, first.corner(1), point)};
+  stack[2] = {first.twin(1), Relative(vertices, first.corner(2), point)};
+  stack[1] = {first.twin(2), u};
+  const std::int64_t sides[3] = {Cross(u, stack[3].end), Cross(stack[3].end, stack[2].end), Cross(stack[2].end, u)};
   // Inside or on one edge; on two edges it would be a corner.
   TERRACE_CHECK(sides[0] >= 0 && sides[1] >= 0 && sides[2] >= 0);
   TERRACE_CHECK((sides[0] == 0) + (sides[1] == 0) + (sides[2] == 0) <= 1);
   // The walk waits for triangles from all over the memory: the three that it certainly visits together.
-  for (std::size_t i = 0; i < 3; ++i) prefetch(stack[i].back);
+  for (std::size_t i = 1; i <= 3; ++i) prefetch(stack[i].back);
 
   star_.is_closed = true;
   star_.has_border = false;
   TriangleId* removed_slots = star_.triangles.data();
   removed_slots[0] = triangle;
-  std::size_t removed = 1, edges = 0, gap = 0, pending = 3;
-  while (pending > 0) {
-    const PendingEdge& edge = stack[pending - 1];
-    const HalfEdgeId back = edge.back;
+  std::size_t removed = 1, edges = 0, gap = 0;
+  for (PendingEdge *bottom = stack, *top = stack + 3; top > bottom;) {
+    const HalfEdgeId back = top->back;
     if (back != kNone) {
       const auto& beyond = slots[back / 4];
-      const unsigned next = NextCorner(back % 4), previous = PreviousCorner(back % 4);
-      const RingVertex w = Relative(vertices, beyond.corner(previous), point);
-      if (absorbs(u, edge.end, w, back)) {
-        if (edges + pending + 3 > capacity) {
+      const RingVertex w = Relative(vertices, beyond.opposite(back % 4), point);
+      if (absorbs(u, top->end, w, back)) {
+        if (removed + 5 > capacity) {  // edges found and pending are two more than triangles removed
+          const auto pending = top - bottom;
           Grow();
-          stack = pending_.data();
+          bottom = pending_.data();
+          top = bottom + pending;
           removed_slots = star_.triangles.data();
           capacity = pending_.size();
         }
         removed_slots[removed++] = back / 4;
-        const HalfEdgeId across_uw = beyond.twin(next), across_wv = beyond.twin(previous);
+        const HalfEdgeId across_uw = beyond.next_twin(back % 4), across_wv = beyond.previous_twin(back % 4);
         prefetch(across_uw);
         prefetch(across_wv);
-        stack[pending - 1].back = across_wv;
-        stack[pending].back = across_uw;
-        stack[pending].end = {w.id, w.dx, w.dy, w.height};  // as a whole it is put together in memory, absorbed or not
-        ++pending;
+        top->back = across_wv;
+        ++top;
+        top->back = across_uw;
+        top->end = {w.id, w.dx, w.dy, w.height};  // as a whole it is put together in memory, absorbed or not
         continue;
       }
     } else {
       star_.has_border = true;
-      if (Cross(u, edge.end) == 0) {
+      if (Cross(u, top->end) == 0) {
         star_.is_closed = false;
         gap = edges;
       }
     }
     star_.ring.Put(edges, u);
     star_.outside[edges++] = back;
-    u = edge.end;
-    --pending;
+    u = top->end;
+    --top;
   }
   star_.removed_count = removed;
   FillCavity(triangles, edges, gap);
@@ -266,17 +263,23 @@ void Triangulation::FillCavity(Triangles& triangles, std::size_t edges, std::siz
   }
   triangles.slots.GrowBy(edges - star_.removed_count);
 
+  made[edges] = made[0];  // what follows the last one
+
   auto* const slots = triangles.slots.data();
   const VertexId* const ids = star_.ring.ids.data();
   const HalfEdgeId* const outsides = star_.outside.data();
-  TriangleId before = made[edges - 1];
+  const VertexId centre = star_.centre;
+  VertexId u = ids[0];
+  TriangleId before = made[edges - 1], t = made[0];
   for (std::size_t i = 0; i < edges; ++i) {
-    const TriangleId t = made[i], after = made[i + 1 < edges ? i + 1 : 0];
+    const TriangleId after = made[i + 1];
+    const VertexId v = ids[i + 1];
     const HalfEdgeId outside = outsides[i];
-    slots[t] = std::remove_reference_t<decltype(slots[t])>::Of(ids[i], ids[i + 1], star_.centre, outside, 4 * after + 2,
-                                                               4 * before + 1);
-    if (outside != kNone) slots[outside / 4].set_twin(outside % 4, 4 * t);
+    slots[t] = Triangles::Triangle::InStar(u, v, centre, outside, 4 * after + 2, 4 * before + 1);
+    if (outside != kNone) slots[outside / 4].JoinTwin(outside % 4, 4 * t);
     before = t;
+    t = after;
+    u = v;
   }
   if (star_.is_closed) return;
   slots[made[edges - 1]].set_twin(1, kNone);
