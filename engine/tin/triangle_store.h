@@ -1,9 +1,10 @@
 // The triangles of a triangulation, by slot, as small as they go: insertions jump about in them, and what does not fit
 // the processor's second cache makes them wait.
 //
-// Two forms with the same calls. Narrow, while all vertex ids are below 2^16: 16 bytes a triangle,
+// Two forms with the same calls, each with its own half-edge for none. Narrow, while all vertex ids are below 2^16: 16
+// bytes a triangle,
 //   corners: 4 x 16 bits of the first word, the last one first as well, so that the corner across from half-edge i is
-//   the i-th; twins: 3 x 21 bits of the second (half-edge 4t + i, all ones: none).
+//   the i-th; twins: 3 x 21 bits of the second (half-edge 4t + i).
 // A triangulation of 2^16 vertices has fewer than 2^17 triangles, whose half-edges take 19 bits. Wide: 24 bytes.
 #pragma once
 
@@ -26,6 +27,8 @@ constexpr unsigned PreviousCorner(unsigned i) { return (0b010010U >> (2 * i)) & 
 class NarrowTriangles {
  public:
   static constexpr std::size_t kMostVertices = std::size_t{1} << 16;
+  static constexpr unsigned kTwinBits = 21;
+  static constexpr HalfEdgeId kNone = (HalfEdgeId{1} << kTwinBits) - 1;
 
   struct Triangle {
     std::uint64_t corners = 0;
@@ -37,41 +40,30 @@ class NarrowTriangles {
     HalfEdgeId next_twin(unsigned i) const { return TwinAt(Byte(kNextShifts, i)); }
     HalfEdgeId previous_twin(unsigned i) const { return TwinAt(Byte(kPreviousShifts, i)); }
     void set_twin(unsigned i, HalfEdgeId twin) {
-      twins = (twins & ~(kTwinMask << (kTwinBits * i))) | ((twin & kTwinMask) << (kTwinBits * i));
-    }
-    // The same for a twin that is an edge.
-    void JoinTwin(unsigned i, HalfEdgeId twin) {
       const unsigned shift = kTwinBits * i;
-      twins = (twins & ~(kTwinMask << shift)) | std::uint64_t{twin} << shift;
+      twins = (twins & ~(std::uint64_t{kNone} << shift)) | std::uint64_t{twin} << shift;
     }
     static Triangle Of(VertexId a, VertexId b, VertexId c, HalfEdgeId ab, HalfEdgeId bc, HalfEdgeId ca) {
-      return InStar(a, b, c, ab, bc & kTwinMask, ca & kTwinMask);
-    }
-    // The same where only ab may be none.
-    static Triangle InStar(VertexId a, VertexId b, VertexId c, HalfEdgeId ab, std::uint64_t bc, std::uint64_t ca) {
       return {c | std::uint64_t{a} << 16 | std::uint64_t{b} << 32 | std::uint64_t{c} << 48,
-              (ab & kTwinMask) | bc << kTwinBits | ca << (2 * kTwinBits)};
+              ab | std::uint64_t{bc} << kTwinBits | std::uint64_t{ca} << (2 * kTwinBits)};
     }
 
    private:
-    HalfEdgeId TwinAt(unsigned shift) const {
-      const std::uint64_t twin = (twins >> shift) & kTwinMask;
-      return twin == kTwinMask ? kNoEdge : static_cast<HalfEdgeId>(twin);
-    }
+    HalfEdgeId TwinAt(unsigned shift) const { return static_cast<HalfEdgeId>(twins >> shift) & kNone; }
     static unsigned Byte(unsigned bytes, unsigned i) { return (bytes >> (8 * i)) & 63; }
   };
 
   LargeArray<Triangle> slots;
 
  private:
-  static constexpr unsigned kTwinBits = 21;
-  static constexpr std::uint64_t kTwinMask = (std::uint64_t{1} << kTwinBits) - 1;
   static constexpr unsigned kNextShifts = kTwinBits | (2 * kTwinBits) << 8;  // by half-edge, a byte each
   static constexpr unsigned kPreviousShifts = 2 * kTwinBits | kTwinBits << 16;
 };
 
 class WideTriangles {
  public:
+  static constexpr HalfEdgeId kNone = kNoEdge;
+
   struct Triangle {
     std::array<VertexId, 3> corners;
     std::array<HalfEdgeId, 3> twins;
@@ -82,12 +74,8 @@ class WideTriangles {
     HalfEdgeId next_twin(unsigned i) const { return twins[NextCorner(i)]; }
     HalfEdgeId previous_twin(unsigned i) const { return twins[PreviousCorner(i)]; }
     void set_twin(unsigned i, HalfEdgeId twin) { twins[i] = twin; }
-    void JoinTwin(unsigned i, HalfEdgeId twin) { twins[i] = twin; }
     static Triangle Of(VertexId a, VertexId b, VertexId c, HalfEdgeId ab, HalfEdgeId bc, HalfEdgeId ca) {
       return {{a, b, c}, {ab, bc, ca}};
-    }
-    static Triangle InStar(VertexId a, VertexId b, VertexId c, HalfEdgeId ab, HalfEdgeId bc, HalfEdgeId ca) {
-      return Of(a, b, c, ab, bc, ca);
     }
   };
 

@@ -15,8 +15,8 @@ Triangulation::Triangulation(const std::array<Vertex, 4>& corners) {
   //  0-----1
   using Triangle = NarrowTriangles::Triangle;
   vertices_.Append(corners);
-  narrow_.slots.push_back(Triangle::Of(0, 1, 2, kNone, kNone, 6));
-  narrow_.slots.push_back(Triangle::Of(2, 3, 0, kNone, kNone, 2));
+  narrow_.slots.push_back(Triangle::Of(0, 1, 2, NarrowTriangles::kNone, NarrowTriangles::kNone, 6));
+  narrow_.slots.push_back(Triangle::Of(2, 3, 0, NarrowTriangles::kNone, NarrowTriangles::kNone, 2));
   Grow();
 }
 
@@ -46,7 +46,7 @@ void Triangulation::Join(Triangles& triangles, const std::vector<std::array<std:
   std::vector<std::uint32_t> first(vertices_.size() + 1, 0);
   triangles.slots.reserve(corners.size());
   for (const auto& [a, b, c] : corners) {
-    triangles.slots.push_back(Triangles::Triangle::Of(a, b, c, kNone, kNone, kNone));
+    triangles.slots.push_back(Triangles::Triangle::Of(a, b, c, Triangles::kNone, Triangles::kNone, Triangles::kNone));
     for (const VertexId corner : {a, b, c}) ++first[corner + 1];
   }
   for (std::size_t vertex = 0; vertex < vertices_.size(); ++vertex) first[vertex + 1] += first[vertex];
@@ -57,7 +57,7 @@ void Triangulation::Join(Triangles& triangles, const std::vector<std::array<std:
   }
   for (TriangleId t = 0; t < corners.size(); ++t) {
     for (unsigned i = 0; i < 3; ++i) {
-      if (triangles.slots[t].twin(i) != kNone) continue;
+      if (triangles.slots[t].twin(i) != Triangles::kNone) continue;
       const VertexId a = corners[t][i], b = corners[t][(i + 1) % 3];
       for (std::uint32_t k = b == 0 ? 0 : first[b - 1]; k < first[b]; ++k) {
         const HalfEdgeId back = leaving[k];
@@ -88,8 +88,9 @@ void Triangulation::Grow() {
 
 void Triangulation::Widen() {
   wide_.slots.reserve(2 * narrow_.slots.size());
-  for (const NarrowTriangles::Triangle& t : narrow_.slots) {
-    wide_.slots.push_back({{t.corner(0), t.corner(1), t.corner(2)}, {t.twin(0), t.twin(1), t.twin(2)}});
+  for (TriangleId t = 0; t < narrow_.slots.size(); ++t) {
+    wide_.slots.push_back(
+        {{corner(4 * t), corner(4 * t + 1), corner(4 * t + 2)}, {twin(4 * t), twin(4 * t + 1), twin(4 * t + 2)}});
   }
   narrow_.slots.Release();
   is_wide_ = true;
@@ -102,7 +103,7 @@ template <typename Triangles>
 #pragma GCC unroll 3
   for (unsigned i = 0; i < 3; ++i) {
     __builtin_prefetch(&vertices_[triangle.corner(i)]);
-    if (const HalfEdgeId back = triangle.twin(i); back != kNone) __builtin_prefetch(&slots[back / 4]);
+    if (const HalfEdgeId back = triangle.twin(i); back != Triangles::kNone) __builtin_prefetch(&slots[back / 4]);
   }
 }
 
@@ -117,7 +118,7 @@ template <typename Triangles>
 #pragma GCC unroll 3
   for (unsigned i = 0; i < 3; ++i) {
     const HalfEdgeId back = triangle.twin(i);
-    if (back == kNone) continue;
+    if (back == Triangles::kNone) continue;
     __builtin_prefetch(&vertices_[slots[back / 4].opposite(back % 4)]);
   }
 }

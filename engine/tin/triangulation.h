@@ -91,9 +91,7 @@ class Triangulation {
   VertexId corner(HalfEdgeId edge) const {
     return is_wide_ ? wide_.slots[edge / 4].corner(edge % 4) : narrow_.slots[edge / 4].corner(edge % 4);
   }
-  HalfEdgeId twin(HalfEdgeId edge) const {
-    return is_wide_ ? wide_.slots[edge / 4].twin(edge % 4) : narrow_.slots[edge / 4].twin(edge % 4);
-  }
+  HalfEdgeId twin(HalfEdgeId edge) const { return is_wide_ ? TwinIn(wide_, edge) : TwinIn(narrow_, edge); }
 
   static constexpr HalfEdgeId Next(HalfEdgeId edge) { return (edge & ~HalfEdgeId{3}) + NextCorner(edge % 4); }
   static constexpr HalfEdgeId Previous(HalfEdgeId edge) { return (edge & ~HalfEdgeId{3}) + PreviousCorner(edge % 4); }
@@ -115,6 +113,11 @@ class Triangulation {
   template <typename Triangles>
   void FillCavity(Triangles& triangles, std::size_t edges, std::size_t gap);
   void OpenRing(std::size_t edges, std::size_t gap);
+  template <typename Triangles>
+  static HalfEdgeId TwinIn(const Triangles& triangles, HalfEdgeId edge) {
+    const HalfEdgeId twin = triangles.slots[edge / 4].twin(edge % 4);
+    return twin == Triangles::kNone ? kNone : twin;
+  }
   template <typename Triangles>
   void PrefetchAround(const Triangles& triangles, TriangleId t) const;
   template <typename Triangles>
@@ -182,8 +185,9 @@ void Triangulation::Replace(Triangles& triangles, SamplePosition point, Triangle
   const Vertex* const vertices = vertices_.data();
   PendingEdge* const stack = pending_.data();
   std::size_t capacity = pending_.size();
-  const auto prefetch = [=](HalfEdgeId across) {
-    if (across != kNone) __builtin_prefetch(&slots[across / 4]);
+  // Of an edge on the border it is some address, which does no harm.
+  const auto prefetch = [address = reinterpret_cast<std::uintptr_t>(slots)](HalfEdgeId across) {
+    __builtin_prefetch(reinterpret_cast<const void*>(address + sizeof(slots[0]) * (across / 4)));
   };
   const auto first = slots[triangle];
   RingVertex u = Relative(vertices, first.corner(0), point);
@@ -204,7 +208,7 @@ void Triangulation::Replace(Triangles& triangles, SamplePosition point, Triangle
   std::size_t removed = 1, edges = 0, gap = 0;
   for (PendingEdge *bottom = stack, *top = stack + 3; top > bottom;) {
     const HalfEdgeId back = top->back;
-    if (back != kNone) {
+    if (back != Triangles::kNone) {
       const auto& beyond = slots[back / 4];
       const RingVertex w = Relative(vertices, beyond.opposite(back % 4), point);
       if (absorbs(u, top->end, w, back)) {
@@ -267,7 +271,7 @@ void Triangulation::FillCavity(Triangles& triangles, std::size_t edges, std::siz
 
   auto* const slots = triangles.slots.data();
   const VertexId* const ids = star_.ring.ids.data();
-  const HalfEdgeId* const outsides = star_.outside.data();
+  HalfEdgeId* const outsides = star_.outside.data();
   const VertexId centre = star_.centre;
   VertexId u = ids[0];
   TriangleId before = made[edges - 1], t = made[0];
@@ -275,15 +279,19 @@ void Triangulation::FillCavity(Triangles& triangles, std::size_t edges, std::siz
     const TriangleId after = made[i + 1];
     const VertexId v = ids[i + 1];
     const HalfEdgeId outside = outsides[i];
-    slots[t] = Triangles::Triangle::InStar(u, v, centre, outside, 4 * after + 2, 4 * before + 1);
-    if (outside != kNone) slots[outside / 4].JoinTwin(outside % 4, 4 * t);
+    slots[t] = Triangles::Triangle::Of(u, v, centre, outside, 4 * after + 2, 4 * before + 1);
+    if (outside != Triangles::kNone) {
+      slots[outside / 4].set_twin(outside % 4, 4 * t);
+    } else {
+      outsides[i] = kNone;
+    }
     before = t;
     t = after;
     u = v;
   }
   if (star_.is_closed) return;
-  slots[made[edges - 1]].set_twin(1, kNone);
-  slots[made[0]].set_twin(2, kNone);
+  slots[made[edges - 1]].set_twin(1, Triangles::kNone);
+  slots[made[0]].set_twin(2, Triangles::kNone);
 }
 
 }  // namespace terrace::tin
