@@ -64,6 +64,7 @@ class GreedyTriangulation::Impl {
   std::optional<Insertion> NextSeed(const GreedyGoal& goal);
   void PrefetchUpcoming() const;
   bool IsMet(const GreedyGoal& goal);
+  bool IsRmsMet(const GreedyGoal& goal);
   void Insert(const Insertion& insertion);
   const Star& Insert(const Triangulation::Vertex& vertex, TriangleId triangle);
 
@@ -194,8 +195,10 @@ std::optional<GreedyTriangulation::Impl::Insertion> GreedyTriangulation::Impl::N
 }
 
 bool GreedyTriangulation::Impl::IsMet(const GreedyGoal& goal) {
-  if (vertex_count() >= goal.max_points) return true;
-  if (!(goal.rms_error > 0)) return false;
+  return vertex_count() >= goal.max_points || (goal.rms_error > 0 && IsRmsMet(goal));
+}
+
+bool GreedyTriangulation::Impl::IsRmsMet(const GreedyGoal& goal) {
   if (!squares_) {
     squares_.emplace();
     valid_samples_ = CountValid(*field_);

@@ -4,10 +4,6 @@
 
 namespace terrace::tin {
 
-Triangulation::Vertex Triangulation::VertexAt(const HeightField& field, int x, int y) {
-  return {{static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)}, field.VertexHeight(x, y)};
-}
-
 Triangulation::Triangulation(const std::array<Vertex, 4>& corners) {
   //  3-----2
   //  | 1 / |
@@ -140,10 +136,15 @@ void Triangulation::OpenRing(std::size_t edges, std::size_t gap) {
 
 TinMesh Triangulation::Mesh() const {
   TinMesh mesh;
-  mesh.vertices.reserve(vertices_.size());
-  for (const Vertex& vertex : vertices_) mesh.vertices.push_back(vertex.position);
-  mesh.triangles.reserve(triangle_count());
-  for (TriangleId t = 0; t < triangle_count(); ++t) mesh.triangles.push_back(triangle(t));
+  mesh.vertices.resize(vertices_.size());
+  std::transform(vertices_.begin(), vertices_.end(), mesh.vertices.begin(), [](const Vertex& v) { return v.position; });
+  mesh.triangles.resize(triangle_count());
+  const auto copy = [&](const auto& slots) {
+    std::transform(slots.begin(), slots.end(), mesh.triangles.begin(), [](const auto& t) {
+      return std::array<VertexId, 3>{t.corner(0), t.corner(1), t.corner(2)};
+    });
+  };
+  is_wide_ ? copy(wide_.slots) : copy(narrow_.slots);
   return mesh;
 }
 

@@ -38,7 +38,9 @@ class Triangulation {
     SamplePosition position;
     float height = 0;  // metres
   };
-  static Vertex VertexAt(const HeightField& field, int x, int y);
+  static Vertex VertexAt(const HeightField& field, int x, int y) {
+    return {{static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)}, field.VertexHeight(x, y)};
+  }
 
   // Room to be made for a mesh of the field: for all of its samples if it is a tile. There may be more.
   static std::size_t LikelyVertices(const HeightField& field);
