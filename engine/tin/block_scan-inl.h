@@ -228,9 +228,10 @@ HWY_INLINE BlockFind ScanBlock(const HeightField& field, const Star& star, const
     of_v = hn::Add(of_v, step_v);
     of_p = hn::Add(of_p, step_p);
   }
-  BlockFind find{hn::GetLane(hn::MaxOfLanes(kFloats, most)), 0};
-  const Floats least =
-      All(kFloats, LeastInDoubt(find.most, planes.largest[i], planes.magnitude[i], most_exact, kDoubtInBlocks));
+  Floats least = hn::MaxOfLanes(kFloats, most);
+  BlockFind find{hn::GetLane(least), 0};
+  if (!(find.most + planes.largest[i] < most_exact)) [[unlikely]]
+    least = All(kFloats, LeastInDoubt(find.most, planes.largest[i], planes.magnitude[i], most_exact, kDoubtInBlocks));
 #pragma GCC unroll 8
   for (int k = 0; k < kVectors; ++k) {
     find.found |= std::uint64_t{BitsOf(hn::Ge(numerators[k], least))} << (k * kLanes);
