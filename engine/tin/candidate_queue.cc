@@ -163,6 +163,7 @@ void CandidateQueue::Insert(std::uint32_t slot) {
   const auto near = front + std::min<std::ptrdiff_t>(run_.end() - front, kNear);
   auto place = std::find_if_not(front, near, precedes);
   if (place == near) place = std::partition_point(near, run_.end(), precedes);
+  while (place != run_.end() && place->order == entry.order && place->slot > entry.slot) ++place;
   if (run_begin_ > 0 && place - front < run_.end() - place) {
     std::copy(front, place, front - 1);
     --run_begin_;

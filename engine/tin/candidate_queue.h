@@ -4,8 +4,8 @@
 // threshold, in a short sorted array, the run. One sweep over all errors finds and sorts them; what comes to the
 // threshold later is put where it belongs. What stays below costs one store, and an entry whose slot has changed since
 // is dropped when its turn comes. When none is left, the next sweep lowers the threshold; when there are too many, the
-// threshold rises. No back pointers from the slots, and the order is exact: larger error first, then smaller index of
-// the sample.
+// threshold rises. No back pointers from the slots, and the order is exact: larger error first, then smaller number of
+// the sample, then, where a sample on an edge is the worst of both of its triangles, the larger slot.
 //
 // Errors are kept as floats, rounded up: the largest is never understated, and errors that differ by less are ordered
 // by their samples.

@@ -59,8 +59,8 @@ const Star& DataDependentCriterion::Insert(const Triangulation::Vertex& vertex, 
 void DataDependentCriterion::Begin(TriangleId triangle) {
   pending_.clear();
   kept_.clear();
-  if (!UsesMaxima()) return;
   CoverSlots();
+  if (!UsesMaxima()) return;
   const auto seen = [&](VertexId corner) { return triangulation_->Seen(corner, vertex_.position); };
   const auto [a, b, c] = triangulation_->triangle(triangle);
   const std::array<RingVertex, 4> corners = {seen(a), seen(b), seen(c), seen(a)};
@@ -163,7 +163,6 @@ DataDependentCriterion::KnownFit DataDependentCriterion::Remembered(const Fit& f
 
 // From the triangle's last corner, as when it was made: rounding is that of the scan of its star.
 DataDependentCriterion::KnownFit DataDependentCriterion::FitBeyond(TriangleId t) {
-  CoverSlots();
   if (known_[t].error == kUnknown) {
     const auto [a, b, c] = triangulation_->triangle(t);
     const Triangulation::Vertex p{triangulation_->position(c), triangulation_->height(c)};
@@ -191,23 +190,29 @@ void DataDependentCriterion::FitAround(const Triangulation::Vertex& p, const Rin
   PrepareScratch(p, count);
   for (std::size_t i = 0; i <= count; ++i) scratch_.ring.Put(i, ring[i]);
   scan_star_(*field_, scratch_, misfits.data());
+  const bool is_inside = IsInside(p.position.x, p.position.y);
+  bool is_before_inside = IsInside(p.position.x + ring[0].dx, p.position.y + ring[0].dy);
   for (std::size_t i = 0; i < count; ++i) {
-    fits[i] = FitOf(misfits[i], p.position, p.height, ring[i], ring[i + 1]);
+    const bool is_after_inside = IsInside(p.position.x + ring[i + 1].dx, p.position.y + ring[i + 1].dy);
+    const bool may_have_border = is_inside + is_before_inside + is_after_inside < 2;
+    is_before_inside = is_after_inside;
+    fits[i] = {std::max(misfits[i].distance, 0.0), misfits[i].distance, misfits[i].sample, ring[i].id};
+    if (may_have_border || !sagitta_->is_flat()) [[unlikely]]
+      fits[i] = FitOf(misfits[i], p.position, p.height, ring[i], ring[i + 1]);
   }
 }
 
-bool DataDependentCriterion::IsOnBorder(SamplePosition sample) const {
-  const auto is_inside = [](int at, int size) {
-    return static_cast<unsigned>(at - 1) < static_cast<unsigned>(size - 2);
-  };
-  return !(is_inside(sample.x, field_->width()) && is_inside(sample.y, field_->height()));
+// Whether a sample is not on the field's border.
+bool DataDependentCriterion::IsInside(int x, int y) const {
+  return static_cast<unsigned>(x - 1) < static_cast<unsigned>(field_->width() - 2) &&
+         static_cast<unsigned>(y - 1) < static_cast<unsigned>(field_->height() - 2);
 }
 
 DataDependentCriterion::Fit DataDependentCriterion::FitOf(const PlaneMisfit& misfit, SamplePosition p, float p_height,
                                                           const RingVertex& u, const RingVertex& v) const {
   const SamplePosition at_u = PositionAround(p, u), at_v = PositionAround(p, v);
   double error = std::max(misfit.distance, 0.0);
-  if (IsOnBorder(at_u) + IsOnBorder(at_v) + IsOnBorder(p) > 1)
+  if (IsInside(at_u.x, at_u.y) + IsInside(at_v.x, at_v.y) + IsInside(p.x, p.y) < 2)
     error = std::max(error, WorstOnBorders(p, p_height, u, v));
   if (!sagitta_->is_flat()) error += sagitta_->Bound(at_u, at_v, p);
   return {error, misfit.distance, misfit.sample, u.id};

@@ -77,7 +77,7 @@ class DataDependentCriterion {
   Fit FitOf(const PlaneMisfit& misfit, SamplePosition p, float p_height, const RingVertex& u,
             const RingVertex& v) const;
   double WorstOnBorders(SamplePosition p, float p_height, const RingVertex& u, const RingVertex& v) const;
-  bool IsOnBorder(SamplePosition sample) const;
+  bool IsInside(int x, int y) const;
   void PrepareScratch(const Triangulation::Vertex& p, std::size_t count);
   void CoverSlots();
   void ScanUnknown(const Star& star, PlaneMisfit* misfits);

@@ -14,15 +14,17 @@ namespace {
 struct Expected {
   float error = 0;
   std::uint32_t sample = kNoSample;
+  std::size_t slot = 0;
 };
 
-// The foremost of all, by looking at all.
+// The foremost of all, by looking at all: of equal ones the last.
 Expected Foremost(const std::vector<Candidate>& candidates) {
   Expected best;
-  for (const Candidate& candidate : candidates) {
+  for (std::size_t slot = 0; slot < candidates.size(); ++slot) {
+    const Candidate& candidate = candidates[slot];
     const float error = CandidateQueue::RoundUp(candidate.error);
-    if (error > best.error || (error == best.error && error > 0 && candidate.sample < best.sample)) {
-      best = {error, candidate.sample};
+    if (error > best.error || (error == best.error && error > 0 && candidate.sample <= best.sample)) {
+      best = {error, candidate.sample, slot};
     }
   }
   return best;
@@ -35,8 +37,7 @@ testing::AssertionResult Agrees(CandidateQueue& queue, const std::vector<Candida
     if (expected.error == 0) return testing::AssertionSuccess();
     return testing::AssertionFailure() << "no winner instead of " << expected.error;
   }
-  if (queue.error(winner) == expected.error && queue.sample(winner) == expected.sample &&
-      candidates[winner].sample == expected.sample) {
+  if (queue.error(winner) == expected.error && queue.sample(winner) == expected.sample && winner == expected.slot) {
     return testing::AssertionSuccess();
   }
   return testing::AssertionFailure() << "slot " << winner << " with " << queue.error(winner) << " instead of "
