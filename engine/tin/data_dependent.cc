@@ -152,7 +152,7 @@ void DataDependentCriterion::RaiseLeastErrors(const Quadrilateral& q, std::uint3
                                               double& wv) const {
   const SamplePosition position = PositionOf(sample);
   const int x = position.x - vertex_.position.x, y = position.y - vertex_.position.y;
-  const std::int64_t side = Cross(q.w, RingVertex{0, x, y, height});
+  const std::int32_t side = Cross(q.w, RingVertex{0, x, y, height});
   if (side <= 0) uw = std::max(uw, DistanceFrom(q.u, q.w, vertex_.height, x, y, height));
   if (side >= 0) wv = std::max(wv, DistanceFrom(q.w, q.v, vertex_.height, x, y, height));
 }

@@ -52,7 +52,8 @@ inline IntVector BoxDiameters(const RingVertex& u_vertex, const RingVertex& v_ve
 }
 
 inline ShapeQuality ShapeQualityOf(const Quadrilateral& q) {
-  const std::int64_t uvp = Cross(q.u, q.v), uwp = Cross(q.u, q.w), wvp = Cross(q.w, q.v), vuw = uwp + wvp - uvp;
+  const std::int32_t uvp = Cross(q.u, q.v), uwp = Cross(q.u, q.w), wvp = Cross(q.w, q.v);
+  const std::int64_t vuw = std::int64_t{uwp} + wvp - uvp;
   const IntVector diameters = BoxDiameters(q.u, q.v, q.w);
   // Instead of a division by the one, a multiplication by the other.
   const std::int64_t of_pw = std::int64_t{diameters[0]} * diameters[1];

@@ -140,9 +140,8 @@ class Triangulation {
   std::vector<PendingEdge> pending_;  // stack, from 1 on
 };
 
-constexpr std::int64_t Cross(const RingVertex& a, const RingVertex& b) {
-  return static_cast<std::int64_t>(a.dx) * b.dy - static_cast<std::int64_t>(a.dy) * b.dx;
-}
+// Twice the area of (p, a, b). Width: two products below 2^30 (IsInsideCircle).
+constexpr std::int32_t Cross(const RingVertex& a, const RingVertex& b) { return a.dx * b.dy - a.dy * b.dx; }
 
 // Whether the point p that u, v and w are relative to lies strictly inside the circle through v, u and w, which turn
 // counter-clockwise: the in-circle test of predicates.h, its sum taken apart in another way. With the angles at p and
@@ -196,7 +195,7 @@ void Triangulation::Replace(Triangles& triangles, SamplePosition point, Triangle
   stack[3] = {first.twin(0), Relative(vertices, first.corner(1), point)};
   stack[2] = {first.twin(1), Relative(vertices, first.corner(2), point)};
   stack[1] = {first.twin(2), u};
-  const std::int64_t sides[3] = {Cross(u, stack[3].end), Cross(stack[3].end, stack[2].end), Cross(stack[2].end, u)};
+  const std::int32_t sides[3] = {Cross(u, stack[3].end), Cross(stack[3].end, stack[2].end), Cross(stack[2].end, u)};
   // Inside or on one edge; on two edges it would be a corner.
   TERRACE_CHECK(sides[0] >= 0 && sides[1] >= 0 && sides[2] >= 0);
   TERRACE_CHECK((sides[0] == 0) + (sides[1] == 0) + (sides[2] == 0) <= 1);
