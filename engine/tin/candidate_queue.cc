@@ -136,23 +136,53 @@ bool CandidateQueue::SweepFrom(float most) {
   run_begin_ = 0;
   if (!(most > 0) || std::isinf(most)) return false;
   threshold_ = std::max(static_cast<float>(most * step_), std::numeric_limits<float>::denorm_min());
-  std::vector<hwy::uint128_t> foremost;
+  swept_.clear();
   std::array<std::uint32_t, kSwept + kBeyond> found;
   for (std::size_t first = 0; first < errors_.size(); first += kSwept) {
     const std::size_t slots = std::min(kSwept, errors_.size() - first);
     const std::size_t count = HWY_DYNAMIC_DISPATCH(Sweep)(errors_.data() + first, slots, threshold_, found.data());
-    for (std::size_t i = 0; i < count; ++i) {
-      const std::uint32_t slot = static_cast<std::uint32_t>(first) + found[i];
-      foremost.push_back({slot, OrderOf(slot)});
-    }
+    for (std::size_t i = 0; i < count; ++i) swept_.push_back(static_cast<std::uint32_t>(first) + found[i]);
   }
-  if (foremost.empty()) return false;
-  hwy::Sorter()(foremost.data(), foremost.size(), hwy::SortDescending());
+  if (swept_.empty()) return false;
   run_.resize(kRoom);
   run_begin_ = kRoom;
-  for (const hwy::uint128_t& entry : foremost) run_.push_back({entry.hi, static_cast<std::uint32_t>(entry.lo)});
-  entered_ = foremost.size();
+  SortSwept();
+  entered_ = swept_.size();
   return true;
+}
+
+// Appends what was swept to the run. Errors that are close to each other, samples of a tile and places among the swept
+// slots, which ascend, fit one word together, and words are sorted in half the time of pairs.
+void CandidateQueue::SortSwept() {
+  const std::uint32_t least = std::bit_cast<std::uint32_t>(threshold_);
+  std::uint32_t beyond = 0, samples = 0;
+  for (const std::uint32_t slot : swept_) {
+    beyond |= std::bit_cast<std::uint32_t>(errors_[slot]) - least;
+    samples |= samples_[slot];
+  }
+  const auto place_bits = static_cast<unsigned>(std::bit_width(swept_.size() - 1));
+  const auto sample_bits = static_cast<unsigned>(std::bit_width(samples)), bits = place_bits + sample_bits;
+  if (bits + static_cast<unsigned>(std::bit_width(beyond)) > 64) return SortPairs();
+  const std::uint64_t place_mask = (std::uint64_t{1} << place_bits) - 1;
+  const std::uint64_t sample_mask = (std::uint64_t{1} << sample_bits) - 1;
+  words_.resize(swept_.size());
+  for (std::size_t i = 0; i < swept_.size(); ++i) {
+    const std::uint64_t error = std::bit_cast<std::uint32_t>(errors_[swept_[i]]) - least;
+    words_[i] = error << bits | (~std::uint64_t{samples_[swept_[i]]} & sample_mask) << place_bits | i;
+  }
+  hwy::Sorter()(words_.data(), words_.size(), hwy::SortDescending());
+  for (const std::uint64_t word : words_) {
+    const std::uint64_t sample = ~(word >> place_bits) & sample_mask;
+    run_.push_back({(least + (word >> bits)) << 32 | (sample ^ 0xFFFFFFFF), swept_[word & place_mask]});
+  }
+}
+
+void CandidateQueue::SortPairs() {
+  std::vector<hwy::uint128_t> pairs;
+  pairs.reserve(swept_.size());
+  for (const std::uint32_t slot : swept_) pairs.push_back({slot, OrderOf(slot)});
+  hwy::Sorter()(pairs.data(), pairs.size(), hwy::SortDescending());
+  for (const hwy::uint128_t& pair : pairs) run_.push_back({pair.hi, static_cast<std::uint32_t>(pair.lo)});
 }
 
 void CandidateQueue::Insert(std::uint32_t slot) {

@@ -89,6 +89,8 @@ class CandidateQueue {
   void Insert(std::uint32_t slot);
   bool Refill();
   bool SweepFrom(float most);
+  void SortSwept();
+  void SortPairs();
   void Shorten();
   std::uint64_t OrderOf(std::uint32_t slot) const {
     return std::uint64_t{std::bit_cast<std::uint32_t>(errors_[slot])} << 32 | ~samples_[slot];
@@ -100,6 +102,8 @@ class CandidateQueue {
   double step_ = 0.9;                  // the next threshold as a fraction of the largest error
   std::vector<Entry> run_;             // foremost first, from run_begin_ on
   std::size_t run_begin_ = 0;
+  std::vector<std::uint32_t> swept_;   // slots that the last sweep found, ascending
+  std::vector<std::uint64_t> words_;   // of SortSwept
   std::size_t wanted_ = kLeastWanted;  // entries between two sweeps
   std::size_t entered_ = 0;            // since the last one
 };

@@ -72,7 +72,7 @@ TEST(CandidateQueue, AgreesWithALinearSearch) {
 TEST(CandidateQueue, EmptiesInOrder) {
   Random random(2);
   CandidateQueue queue;
-  for (std::uint32_t slot = 0; slot < 5000; ++slot) queue.Set(slot, {random.Unit() * 100, slot + 1});
+  for (std::uint32_t slot = 0; slot < 20000; ++slot) queue.Set(slot, {random.Unit() * 100, slot + 1});
   float before = std::numeric_limits<float>::infinity();
   std::size_t count = 0;
   for (std::uint32_t slot = queue.Winner(); slot != CandidateQueue::kNoSlot; slot = queue.Winner()) {
@@ -109,6 +109,28 @@ TEST(CandidateQueue, OrdersTheSmallestAndTheLargestErrors) {
   EXPECT_EQ(queue.Winner(), 2u);
   queue.Set(2, {});
   EXPECT_GT(queue.error(queue.Winner()), 0);
+}
+
+// Samples of a tile, of which a sweep's entries fit a word each, and of the largest fields, of which they do not.
+TEST(CandidateQueue, SortsWhatASweepFinds) {
+  for (const int most_y : {256, 0x7FFF}) {
+    Random random(5);
+    CandidateQueue queue;
+    std::vector<Candidate> candidates;
+    for (std::uint32_t slot = 0; slot < 20000; ++slot) {
+      const bool is_tie = slot % 7 == 6;
+      candidates.push_back(
+          is_tie ? candidates.back()
+                 : Candidate{1.8 + 0.15 * random.Unit(), SampleNumber(random.Below(257), random.Below(most_y))});
+      queue.Set(slot, candidates.back());
+    }
+    for (std::size_t left = candidates.size(); left > 19500; --left) {
+      ASSERT_TRUE(Agrees(queue, candidates)) << left << " of " << most_y;
+      const std::uint32_t winner = queue.Winner();
+      candidates[winner] = {};
+      queue.Set(winner, {});
+    }
+  }
 }
 
 TEST(CandidateQueue, RoundsUp) {
