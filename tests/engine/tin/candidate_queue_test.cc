@@ -72,7 +72,7 @@ TEST(CandidateQueue, AgreesWithALinearSearch) {
 TEST(CandidateQueue, EmptiesInOrder) {
   Random random(2);
   CandidateQueue queue;
-  for (std::uint32_t slot = 0; slot < 20000; ++slot) queue.Set(slot, {random.Unit() * 100, slot + 1});
+  for (std::uint32_t slot = 0; slot < 5000; ++slot) queue.Set(slot, {random.Unit() * 100, slot + 1});
   float before = std::numeric_limits<float>::infinity();
   std::size_t count = 0;
   for (std::uint32_t slot = queue.Winner(); slot != CandidateQueue::kNoSlot; slot = queue.Winner()) {
