@@ -191,7 +191,8 @@ HWY_INLINE float LeastInDoubt(float most, float largest, float magnitude, float 
 }
 
 // One block, from (west, south) relative to p: the largest numerator, negative if there is no sample, and which samples
-// are as large as that or may be, row by row. No branch: which triangle lies where in its block cannot be foretold.
+// are as large as that or may be, row by row. No branch, as which triangle lies where in its block cannot be foretold,
+// but for doubts, which come in runs or are rare.
 struct BlockFind {
   float most;
   std::uint64_t found;

@@ -152,7 +152,7 @@ bool CandidateQueue::SweepFrom(float most) {
 }
 
 // Appends what was swept to the run. Errors that are close to each other, samples of a tile and places among the swept
-// slots, which ascend, fit one word together, and words are sorted in half the time of pairs.
+// slots, which ascend, fit one word together, and twice as many words as pairs fit a vector.
 void CandidateQueue::SortSwept() {
   const std::uint32_t least = std::bit_cast<std::uint32_t>(threshold_);
   std::uint32_t beyond = 0, samples = 0;

@@ -137,10 +137,8 @@ void ExtendedGreedy::Scan(TriangleId t) {
     const ColorSample* colors = field_->ColorRow(y);
     for (int x = first; x <= last; ++x) {
       const double error = planes.Error(*field_, x - corners[2].x, y - corners[2].y, heights[x], colors[x]);
-      if (!(error > worst.error))
-        continue;  // also at a void; rows and columns ascend, so that the first of equals stays
-      worst = {error, static_cast<std::uint32_t>(y) * static_cast<std::uint32_t>(field_->width()) +
-                          static_cast<std::uint32_t>(x)};
+      if (!(error > worst.error)) continue;  // also at a void; numbers ascend, so that the first of equals stays
+      worst = {error, SampleNumber(x, y)};
     }
   });
   candidates_.Set(t, worst);

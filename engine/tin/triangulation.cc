@@ -92,6 +92,7 @@ void Triangulation::Widen() {
   is_wide_ = true;
 }
 
+// Inline by order: to g++ a function that only prefetches has no effect, and calls of it are left out.
 template <typename Triangles>
 [[gnu::always_inline]] inline void Triangulation::PrefetchAround(const Triangles& triangles, TriangleId t) const {
   const auto* const slots = triangles.slots.data();

@@ -217,7 +217,7 @@ void AddMesh(CLI::App& app, int& exit_code) {
       "Errors are measured over every valid sample by a separate pass. Triangles are counter-clockwise in the\n"
       "file's own x and y.");
   command->add_option("DEM", arguments->dem, "A raster that GDAL can read; a georeference is not needed")->required();
-  command->add_option("--out", arguments->out, "The file to write; its extension is the format")
+  command->add_option("-o,--out", arguments->out, "The file to write; its extension is the format")
       ->type_name("FILE")
       ->required();
   command->add_option("--max-error", arguments->max_error, "No sample is further off than this")
@@ -241,7 +241,7 @@ void AddMesh(CLI::App& app, int& exit_code) {
   command
       ->add_option("--criterion", arguments->criterion,
                    "How triangles are joined: delaunay, or data-dependent: fewer vertices for the same error, thinner "
-                   "triangles, about twice the time")
+                   "triangles, about three times the time to mesh")
       ->check(OneOf({"delaunay", kDataDependent}))
       ->type_name("NAME")
       ->capture_default_str();

@@ -160,7 +160,7 @@ class Mesh(InFolder):
         vertices, _ = read_obj(self.mesh(dem, "a.obj", "--max-error", 0)[1])
         self.assertEqual((max(v[0] for v in vertices), max(v[1] for v in vertices)), (29, 19))
         self.assert_refused(2, ["no georeference", "--coordinates pixel"],
-                            "mesh", dem, "--out", self.folder / "b.obj", "--points", 4, "--coordinates", "crs")
+                            "mesh", dem, "-o", self.folder / "b.obj", "--points", 4, "--coordinates", "crs")
 
     def test_a_failure_leaves_no_file_and_keeps_the_old_one(self):
         broken = self.write("broken.tif", b"II*\0 this is no raster")
