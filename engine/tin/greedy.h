@@ -3,7 +3,7 @@
 // Garland and Heckbert, "Fast Triangular Approximation of Terrains and Height Fields" (1997), section 3.3, algorithm
 // III: every triangle keeps its worst sample as a candidate, a queue yields the worst of all, and only the triangles
 // that an insertion changed are scanned again. The result is a function of the field and the options alone: predicates
-// are exact, and equal errors are ordered by the row-major index of the sample.
+// are exact, and equal errors are ordered by their samples, row by row.
 //
 // Not thread-safe; different objects are independent.
 #pragma once

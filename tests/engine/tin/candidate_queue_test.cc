@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <vector>
@@ -69,6 +70,31 @@ TEST(CandidateQueue, AgreesWithALinearSearch) {
 }
 
 // As greedy insertion uses it: the winner is replaced by smaller ones, until nothing is left.
+// As the star of an insertion does, here of up to 80 triangles: many ties, and sweeps in words and in pairs.
+TEST(CandidateQueue, TakesManyAtOnce) {
+  for (const int most_y : {9, 0x7FFF}) {
+    Random random(7);
+    CandidateQueue queue;
+    std::vector<Candidate> candidates;
+    for (int round = 0; round < 3000; ++round) {
+      const auto first = static_cast<std::uint32_t>(random.Below(static_cast<int>(candidates.size()) + 1));
+      const auto count = static_cast<std::uint32_t>(1 + random.Below(random.Below(20) == 0 ? 80 : 8));
+      candidates.resize(std::max<std::size_t>(candidates.size(), first + count));
+      std::vector<std::uint32_t> slots;
+      for (std::uint32_t slot = first + count; slot-- > first;) {
+        slots.push_back(slot);
+        candidates[slot] = {1 + (3000 - round) / 300 + random.Below(4) * 0.5,
+                            SampleNumber(random.Below(9), random.Below(most_y))};
+      }
+      queue.Reserve(candidates.size());
+      queue.SetAll(slots.data(), slots.size(), [&](std::size_t i) {
+        return Candidate{candidates[slots[i]].error, candidates[slots[i]].sample};
+      });
+      ASSERT_TRUE(Agrees(queue, candidates)) << "round " << round << " of " << most_y;
+    }
+  }
+}
+
 TEST(CandidateQueue, EmptiesInOrder) {
   Random random(2);
   CandidateQueue queue;
