@@ -4,7 +4,7 @@
 // g and b, and its candidate is the sample with the largest combined error (extended_field.h). The triangulation is
 // Delaunay. Every valid sample counts by this one formula, those on the border included: two fields with a border in
 // common need not choose the same vertices on it. The result is a function of the field alone; equal errors are ordered
-// by the row-major index of the sample.
+// by their samples, row by row.
 //
 // Not thread-safe; different objects are independent.
 #pragma once

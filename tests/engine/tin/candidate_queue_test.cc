@@ -69,8 +69,7 @@ TEST(CandidateQueue, AgreesWithALinearSearch) {
   }
 }
 
-// As greedy insertion uses it: the winner is replaced by smaller ones, until nothing is left.
-// As the star of an insertion does, here of up to 80 triangles: many ties, and sweeps in words and in pairs.
+// As the star of an insertion does, here of up to 80 triangles, with many ties or few.
 TEST(CandidateQueue, TakesManyAtOnce) {
   for (const int most_y : {9, 0x7FFF}) {
     Random random(7);
@@ -95,6 +94,7 @@ TEST(CandidateQueue, TakesManyAtOnce) {
   }
 }
 
+// As greedy insertion uses it: the winner is replaced by smaller ones, until nothing is left.
 TEST(CandidateQueue, EmptiesInOrder) {
   Random random(2);
   CandidateQueue queue;

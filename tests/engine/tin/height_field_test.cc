@@ -57,7 +57,9 @@ TEST(HeightField, HasItsRowsWhereverTheyLie) {
       EXPECT_TRUE(room == 0 || width < 512 || field->Row(0) == data) << "copied at " << width;
       for (int y = 0; y < kRows; ++y) {
         for (int x = 0; x < width; ++x) {
-          ASSERT_EQ(field->At(x, y), static_cast<float>(y * width + x)) << width;
+          const auto sample = static_cast<float>(y * width + x);
+          ASSERT_EQ(field->At(x, y), sample) << width;
+          ASSERT_EQ(field->At(PositionOf(SampleNumber(x, y))), sample) << width;
         }
       }
     }
