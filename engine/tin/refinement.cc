@@ -11,38 +11,13 @@
 
 #include "engine/core/bytes.h"
 #include "engine/core/check.h"
+#include "engine/tin/standing_triangles.h"
 
 namespace terrace::tin {
 namespace {
 
 using Wide = InsertionRecord<std::uint32_t>;
 using Narrow = InsertionRecord<std::uint16_t>;
-
-// One compare and one conditional step for each triangle ever made: what is gone is overwritten by what follows.
-template <typename Index>
-void CollectTriangles(const InsertionRecord<Index>& record, std::size_t insertions,
-                      std::vector<std::array<std::uint32_t, 3>>& triangles) {
-  // A triangulation of v vertices has fewer than 2 v triangles; one more takes what is overwritten last.
-  triangles.resize(2 * (insertions + 4) + 1);
-  auto* out = triangles.data();
-  const Index* removed = record.removed.data();
-  const auto emit = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
-    *out = {a, b, c};
-    out += *removed++ >= insertions ? 1 : 0;
-  };
-  emit(0, 1, 2);
-  emit(2, 3, 0);
-  const Index* ring = record.rings.data();
-  for (std::size_t i = 0; i < insertions; ++i) {
-    const bool is_open = (record.sizes[i] & InsertionRecord<Index>::kOpen) != 0;
-    const std::size_t count = record.sizes[i] & static_cast<Index>(~InsertionRecord<Index>::kOpen);
-    const auto centre = static_cast<std::uint32_t>(4 + i);
-    for (std::size_t k = 0; k + 1 < count; ++k) emit(ring[k], ring[k + 1], centre);
-    emit(ring[count - 1], is_open ? ring[count] : ring[0], centre);
-    ring += count + (is_open ? 1 : 0);
-  }
-  triangles.resize(static_cast<std::size_t>(out - triangles.data()));
-}
 
 constexpr std::string_view kMagic = "terrace refinement 1\n";
 constexpr std::uint32_t kMostSide = 1U << 16;  // of SamplePosition
@@ -125,7 +100,7 @@ TinMesh Refinement::MeshOf(std::size_t points) const {
   mesh.vertices = {{0, 0}, {east, 0}, {east, north}, {0, north}};
   mesh.vertices.insert(mesh.vertices.end(), inserted_.begin(),
                        inserted_.begin() + static_cast<std::ptrdiff_t>(points - 4));
-  std::visit([&](const auto& record) { CollectTriangles(record, points - 4, mesh.triangles); }, record_);
+  mesh.triangles = std::visit([=](const auto& record) { return StandingTriangles(record, points - 4); }, record_);
   return mesh;
 }
 

@@ -1,7 +1,6 @@
 #include "engine/tin/triangle_scan.h"
 
 #include <gtest/gtest.h>
-#include <hwy/targets.h>
 
 #include <algorithm>
 #include <array>
@@ -11,6 +10,7 @@
 
 #include "engine/tin/height_field.h"
 #include "engine/tin/predicates.h"
+#include "tests/engine/tin/instruction_sets.h"
 #include "tests/engine/tin/test_fields.h"
 
 namespace terrace::tin {
@@ -96,28 +96,17 @@ HeightField RoundedField(int width, int height, int kind, std::uint64_t seed) {
                    [&](int, int) { return static_cast<float>(std::floor(random.Unit() * most / quantum)) * quantum; });
 }
 
-// Every set of instructions that this processor has and that was compiled.
-std::vector<std::int64_t> Targets() {
-  std::vector<std::int64_t> targets;
-  for (const std::int64_t supported : hwy::SupportedAndGeneratedTargets()) targets.push_back(supported);
-  return targets;
-}
-
 void ExpectReference(const HeightField& field, const Star& star) {
   std::vector<PlaneMisfit> expected;
   for (std::size_t i = 0; i < star.count; ++i) expected.push_back(Reference(field, star, i));
-  for (const std::int64_t target : Targets()) {
-    hwy::SetSupportedTargetsForTest(target);
-    hwy::GetChosenTarget().DeInit();  // chosen anew
+  ForEachInstructionSet([&] {
     std::vector<PlaneMisfit> misfits(star.count);
     BestStarScan()(field, star, misfits.data());
     for (std::size_t i = 0; i < star.count; ++i) {
-      ASSERT_EQ(misfits[i].distance, expected[i].distance) << hwy::TargetName(target);
-      ASSERT_EQ(misfits[i].sample, expected[i].sample) << hwy::TargetName(target);
+      ASSERT_EQ(misfits[i].distance, expected[i].distance);
+      ASSERT_EQ(misfits[i].sample, expected[i].sample);
     }
-  }
-  hwy::SetSupportedTargetsForTest(0);
-  hwy::GetChosenTarget().DeInit();
+  });
 }
 
 // One triangle with corners at random, unless they have the wrong order.
@@ -424,8 +413,10 @@ TEST(TriangleScan, TellsWhenThereIsNothingToScan) {
 
 TEST(TriangleScan, HasSeveralTargetsToCompare) {
   // On x86 the baseline and what the processor has; elsewhere at least the one.
-  EXPECT_GE(Targets().size(), 1u);
-  RecordProperty("targets", static_cast<int>(Targets().size()));
+  int sets = 0;
+  ForEachInstructionSet([&] { ++sets; });
+  EXPECT_GE(sets, 1);
+  RecordProperty("targets", sets);
 }
 
 }  // namespace
