@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <iterator>
 #include <utility>
 
 #include "engine/core/check.h"
@@ -41,171 +40,202 @@ DataDependentCriterion::DataDependentCriterion(const HeightField& field, const S
                                                Triangulation& triangulation, DataDependentOptions options)
     : field_(&field), sagitta_(&sagitta), triangulation_(&triangulation), options_(options) {
   TERRACE_CHECK(options_.qthresh >= 0 && options_.qthresh <= 1);
+  scratch_.ring.Grow(kMostFitted + 1);
 }
 
 const Star& DataDependentCriterion::Insert(const Triangulation::Vertex& vertex, TriangleId triangle) {
   vertex_ = vertex;
   Begin(triangle);
   const Star& star = triangulation_->Insert(
-      vertex, triangle, [this](const RingVertex& u, const RingVertex& v, const RingVertex& w, HalfEdgeId back) {
-        return Absorbs(u, v, w, back);
-      });
+      vertex, triangle,
+      [this](const RingVertex& u, const RingVertex& v, const RingVertex& w, HalfEdgeId back, WalkPlace place) {
+        return Absorbs(u, v, w, back, place);
+      },
+      [this](WalkPlace place) { Keep(place); });
   End(star);
   return star;
 }
 
 // The edges of the triangle are the first to be suspect, and most of them stay: fitted together. Where the vertex lies
-// on one of them, those of the triangle beyond take its place.
+// on one of them, as is frequent, those of the triangle beyond take its place.
 void DataDependentCriterion::Begin(TriangleId triangle) {
-  pending_.clear();
-  kept_.clear();
+  fit_count_ = 1;
   CoverSlots();
+  std::fill_n(pending_.begin() + 1, 3, kUnknownFit);
+  split_.fill(kUnknownFit);
   if (!UsesMaxima()) return;
   const auto seen = [&](VertexId corner) { return triangulation_->Seen(corner, vertex_.position); };
   const auto [a, b, c] = triangulation_->triangle(triangle);
-  const std::array<RingVertex, 4> corners = {seen(a), seen(b), seen(c), seen(a)};
-  std::array<RingVertex, kMostFirstEdges + 1> ring;
-  std::size_t edges = 0;
+  const std::array<RingVertex, 3> corners = {seen(a), seen(b), seen(c)};
+  std::array<HalfEdgeId, 3> backs;
+  std::size_t split = 3;
   for (std::uint32_t i = 0; i < 3; ++i) {
-    const HalfEdgeId back = triangulation_->twin(4 * triangle + i);
-    if (back != kNoEdge) __builtin_prefetch(&known_[back / 4]);
-    TERRACE_CHECK(edges < kMostFirstEdges);
-    ring[edges++] = corners[i];
-    if (Cross(corners[i], corners[i + 1]) > 0) continue;
-    TERRACE_CHECK(edges < kMostFirstEdges);  // on two edges: a corner
-    if (back == kNoEdge) return;             // on the border
-    ring[edges++] = seen(triangulation_->corner(Triangulation::Previous(back)));
+    backs[i] = triangulation_->twin(4 * triangle + i);
+    // Of an edge on the border it is some address, which does no harm.
+    const auto known = reinterpret_cast<std::uintptr_t>(known_.data());
+    __builtin_prefetch(reinterpret_cast<const void*>(known + sizeof(KnownFit) * (backs[i] / 4)));
+    split = Cross(corners[i], corners[(i + 1) % 3]) == 0 ? i : split;
   }
-  ring[edges] = ring[0];
-  std::array<Fit, kMostFirstEdges> fits;
-  FitAround(vertex_, ring.data(), edges, fits.data());
-  pending_.assign(std::make_reverse_iterator(fits.begin() + edges), fits.rend());
+  // Edge i comes i-th, and the walk's stack has it in the place 3 - i.
+  if (split == 3) {
+    const FitId fits = FitAround<4>(vertex_, {corners[0], corners[1], corners[2], corners[0]});
+    for (std::uint32_t i = 0; i < 3; ++i) pending_[3 - i] = fits + i;
+    return;
+  }
+  const std::size_t next = (split + 1) % 3, last = (split + 2) % 3;
+  FitId fits = 0;
+  if (backs[split] == kNoEdge) {
+    fits = FitAround<3>(vertex_, {corners[next], corners[last], corners[split]});
+  } else {
+    const RingVertex beyond = seen(triangulation_->corner(Triangulation::Previous(backs[split])));
+    fits = FitAround<5>(vertex_, {corners[split], beyond, corners[next], corners[last], corners[split]});
+    split_ = {fits, fits + 1};
+    fits += 2;
+  }
+  pending_[3 - next] = fits;
+  pending_[3 - last] = fits + 1;
 }
 
-bool DataDependentCriterion::Absorbs(const RingVertex& u, const RingVertex& v, const RingVertex& w, HalfEdgeId back) {
-  if (Cross(u, v) == 0) return true;
-  Fit uv = TakePending(u.id), uw, wv;
-  const bool absorbs = Sees(u, v, w) && IsBetterAlongPw({u, v, w, vertex_.height}, back / 4, uv, uw, wv);
-  if (absorbs) {
-    // Known or not: whatever is asked for next has its place.
-    wv.u = w.id;
-    uw.u = u.id;
-    pending_.push_back(wv);
-    pending_.push_back(uw);
-  } else if (uv.error != kUnknown) {
-    kept_.push_back(uv);
+bool DataDependentCriterion::Absorbs(const RingVertex& u, const RingVertex& v, const RingVertex& w, HalfEdgeId back,
+                                     WalkPlace place) {
+  if (place.pending + 1 >= pending_.size()) [[unlikely]]
+    pending_.resize(2 * pending_.size());
+  // w-v takes the place of u-v, and u-w, which is asked about next, the one after it.
+  FitId& uv = pending_[place.pending];
+  FitId& uw = pending_[place.pending + 1];
+  if (Cross(u, v) == 0) [[unlikely]] {
+    uw = split_[0];
+    uv = split_[1];
+    return true;
   }
-  return absorbs;
+  FitId halves = kUnknownFit;
+  if (!Sees(u, v, w) || !IsBetterAlongPw({u, v, w, vertex_.height}, back / 4, uv, halves)) return false;
+  uw = halves;
+  uv = halves == kUnknownFit ? kUnknownFit : halves + 1;
+  return true;
 }
 
-// The outline is walked in order, like a stack, and each of its edges that may be asked for has an entry, but for the
-// first ones of an insertion. So what lies above the edge asked for was on the border and stays, and an outline leaves
-// each vertex once: entries are told apart by that one.
-DataDependentCriterion::Fit DataDependentCriterion::TakePending(VertexId u) {
-  while (!pending_.empty()) {
-    const Fit top = pending_.back();
-    pending_.pop_back();
-    if (top.u == u) return top;
-    kept_.push_back(top);
-  }
-  return {};
+void DataDependentCriterion::Keep(WalkPlace place) {
+  if (place.kept >= kept_.size()) [[unlikely]]
+    kept_.resize(2 * kept_.size());
+  kept_[place.kept] = pending_[place.pending];
 }
 
 // Sets the fits that it had to find out. Equal fits, frequent where heights are whole metres: the better shape.
-bool DataDependentCriterion::IsBetterAlongPw(const Quadrilateral& q, TriangleId beyond, Fit& uv, Fit& uw, Fit& wv) {
+bool DataDependentCriterion::IsBetterAlongPw(const Quadrilateral& q, TriangleId beyond, FitId& uv, FitId& halves) {
   const ShapeQuality quality = ShapeQualityOf(q);
   const bool is_shaped_better = quality.pw > quality.uv;
-  const auto fit_new = [&] {
-    std::array<Fit, 2> fits;
-    const std::array<RingVertex, 3> ring = {q.u, q.w, q.v};
-    FitAround(vertex_, ring.data(), 2, fits.data());
-    uw = fits[0];
-    wv = fits[1];
-  };
-  if (std::min(quality.uv, quality.pw) <= options_.qthresh * std::max(quality.uv, quality.pw)) {
-    if (is_shaped_better && UsesMaxima()) fit_new();  // most of them stay: fitted together
+  const auto fit_halves = [&] { halves = FitAround<3>(vertex_, {q.u, q.w, q.v}); };
+  // The smaller one is at most so much of the larger one, without asking which is which.
+  if ((quality.uv <= options_.qthresh * quality.pw) | (quality.pw <= options_.qthresh * quality.uv)) {
+    if (is_shaped_better && UsesMaxima()) fit_halves();  // most of them stay: fitted together
     return is_shaped_better;
   }
   if (options_.measure == FitMeasure::kNormals) return BendsLessAlongPw(q);
 
   const KnownFit known = FitBeyond(beyond);
-  if (uv.error == kUnknown) FitAround(vertex_, std::array{q.u, q.v}.data(), 1, &uv);
-  const double error = Combine(uv.error, known.error);
+  if (uv == kUnknownFit) uv = FitAround<2>(vertex_, {q.u, q.v});
+  const double error = Combine(fits_[uv].error, known.error);
   if (error == 0) return false;
   const auto wins = [&](double of_uw, double of_wv) {
     const double other = Combine(of_uw, of_wv);
-    return is_shaped_better ? other <= error : other < error;
+    return (other < error) | ((other == error) & is_shaped_better);
   };
   if (UsesMaxima()) {
-    double least_uw = 0, least_wv = 0;
-    if (known.worst != kNoSample) RaiseLeastErrors(q, known.worst, known.worst_height, least_uw, least_wv);
-    if (uv.worst != kNoSample) RaiseLeastErrors(q, uv.worst, field_->At(PositionOf(uv.worst)), least_uw, least_wv);
-    if (!wins(least_uw, least_wv)) return false;
+    std::array<double, 2> least{};
+    if (known.worst != kNoSample) RaiseLeastErrors(q, known.worst, known.worst_height, least);
+    const std::uint32_t worst = fits_[uv].worst;
+    if (worst != kNoSample) RaiseLeastErrors(q, worst, field_->At(PositionOf(worst)), least);
+    if (!wins(least[0], least[1])) return false;
   }
-  fit_new();
-  return wins(uw.error, wv.error);
+  fit_halves();
+  return wins(fits_[halves].error, fits_[halves + 1].error);
 }
 
-// A sample of the quadrilateral is in one of the new triangles: that one is off by no less than there. Rounding
-// does not matter, since maxima and sums of what is not negative are monotonic as computed.
-void DataDependentCriterion::RaiseLeastErrors(const Quadrilateral& q, std::uint32_t sample, float height, double& uw,
-                                              double& wv) const {
+// A sample of the quadrilateral is in one of the new triangles, (u, w, p) and (w, v, p): that one is off by no less
+// than there. Rounding does not matter, since maxima and sums of what is not negative are monotonic as computed.
+void DataDependentCriterion::RaiseLeastErrors(const Quadrilateral& q, std::uint32_t sample, float height,
+                                              std::array<double, 2>& least) const {
   const SamplePosition position = PositionOf(sample);
   const int x = position.x - vertex_.position.x, y = position.y - vertex_.position.y;
+  const std::array<const RingVertex*, 3> ring = {&q.u, &q.w, &q.v};
+  const auto raise = [&](std::size_t i) {
+    least[i] = std::max(least[i], DistanceFrom(*ring[i], *ring[i + 1], vertex_.height, x, y, height));
+  };
+  // Which one cannot be foretold.
   const std::int32_t side = Cross(q.w, RingVertex{0, x, y, height});
-  if (side <= 0) uw = std::max(uw, DistanceFrom(q.u, q.w, vertex_.height, x, y, height));
-  if (side >= 0) wv = std::max(wv, DistanceFrom(q.w, q.v, vertex_.height, x, y, height));
+  raise(side > 0 ? 1 : 0);
+  if (side == 0) [[unlikely]]
+    raise(1);
 }
 
 DataDependentCriterion::KnownFit DataDependentCriterion::Remembered(const Fit& fit) const {
-  return {fit.error, fit.worst, fit.worst == kNoSample ? 0 : field_->At(PositionOf(fit.worst))};
+  // The height of none is never asked for. Not a branch: whether there is one cannot be foretold.
+  const std::uint32_t sample = fit.worst & -static_cast<std::uint32_t>(fit.worst != kNoSample);
+  return {fit.error, fit.worst, field_->At(PositionOf(sample))};
 }
 
 // From the triangle's last corner, as when it was made: rounding is that of the scan of its star.
 DataDependentCriterion::KnownFit DataDependentCriterion::FitBeyond(TriangleId t) {
-  if (known_[t].error == kUnknown) {
+  if (known_[t].error == kUnknown) [[unlikely]] {
     const auto [a, b, c] = triangulation_->triangle(t);
     const Triangulation::Vertex p{triangulation_->position(c), triangulation_->height(c)};
-    Fit fit;
-    FitAround(p, std::array{triangulation_->Seen(a, p.position), triangulation_->Seen(b, p.position)}.data(), 1, &fit);
-    known_[t] = Remembered(fit);
+    const auto seen = [&](VertexId corner) { return triangulation_->Seen(corner, p.position); };
+    known_[t] = Remembered(fits_[FitAround<2>(p, {seen(a), seen(b)})]);
   }
   return known_[t];
 }
 
-// Of the triangles between p and the vertices of a ring, one after the other.
-void DataDependentCriterion::FitAround(const Triangulation::Vertex& p, const RingVertex* ring, std::size_t count,
-                                       Fit* fits) {
+// Of the triangles between p and the vertices of a ring, one after the other. How many there are is known where it is
+// called.
+template <std::size_t kVertices>
+DataDependentCriterion::FitId DataDependentCriterion::FitAround(const Triangulation::Vertex& p,
+                                                                const std::array<RingVertex, kVertices>& ring) {
+  constexpr std::size_t kTriangles = kVertices - 1;
+  static_assert(kTriangles <= kMostFitted);
+  const FitId first = fit_count_;
+  fit_count_ += kTriangles;
+  if (fits_.size() < fit_count_) [[unlikely]]
+    fits_.resize(2 * fit_count_);
+  Fit* const fits = fits_.data() + first;
   if (!UsesMaxima()) {
-    for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t i = 0; i < kTriangles; ++i) {
       const RingVertex &u = ring[i], &v = ring[i + 1];
-      fits[i].u = u.id;
       fits[i].error = SquaredDistances(
           *field_, {CornerAt(PositionAround(p.position, u), u.height),
                     CornerAt(PositionAround(p.position, v), v.height), CornerAt(p.position, p.height)});
     }
-    return;
+    return first;
   }
-  std::array<PlaneMisfit, kMostFirstEdges> misfits;
-  PrepareScratch(p, count);
-  for (std::size_t i = 0; i <= count; ++i) scratch_.ring.Put(i, ring[i]);
+  scratch_.x = p.position.x;
+  scratch_.y = p.position.y;
+  scratch_.height = p.height;
+  scratch_.count = kTriangles;
+  int inside = IsInside(p.position.x, p.position.y);
+  for (std::size_t i = 0; i < kVertices; ++i) {
+    scratch_.ring.Put(i, ring[i]);
+    inside += IsInside(p.position.x + ring[i].dx, p.position.y + ring[i].dy);
+  }
+  scratch_.has_border = inside < static_cast<int>(kVertices);  // two vertices less, or one of a triangle alone
+  std::array<PlaneMisfit, kTriangles> misfits;
   scan_star_(*field_, scratch_, misfits.data());
-  const bool is_inside = IsInside(p.position.x, p.position.y);
-  bool is_before_inside = IsInside(p.position.x + ring[0].dx, p.position.y + ring[0].dy);
-  for (std::size_t i = 0; i < count; ++i) {
-    const bool is_after_inside = IsInside(p.position.x + ring[i + 1].dx, p.position.y + ring[i + 1].dy);
-    const bool may_have_border = is_inside + is_before_inside + is_after_inside < 2;
-    is_before_inside = is_after_inside;
-    fits[i] = {std::max(misfits[i].distance, 0.0), misfits[i].distance, misfits[i].sample, ring[i].id};
-    if (may_have_border || !sagitta_->is_flat()) [[unlikely]]
+  if (scratch_.has_border || !sagitta_->is_flat()) [[unlikely]] {
+    for (std::size_t i = 0; i < kTriangles; ++i) {
       fits[i] = FitOf(misfits[i], p.position, p.height, ring[i], ring[i + 1]);
+    }
+    return first;
   }
+  for (std::size_t i = 0; i < kTriangles; ++i) {
+    fits[i] = {misfits[i].distance > 0 ? misfits[i].distance : 0, misfits[i].distance, misfits[i].sample};
+  }
+  return first;
 }
 
 // Whether a sample is not on the field's border.
 bool DataDependentCriterion::IsInside(int x, int y) const {
-  return static_cast<unsigned>(x - 1) < static_cast<unsigned>(field_->width() - 2) &&
-         static_cast<unsigned>(y - 1) < static_cast<unsigned>(field_->height() - 2);
+  const bool is_column_inside = static_cast<unsigned>(x - 1) < static_cast<unsigned>(field_->width() - 2);
+  const bool is_row_inside = static_cast<unsigned>(y - 1) < static_cast<unsigned>(field_->height() - 2);
+  return is_column_inside & is_row_inside;
 }
 
 DataDependentCriterion::Fit DataDependentCriterion::FitOf(const PlaneMisfit& misfit, SamplePosition p, float p_height,
@@ -215,7 +245,7 @@ DataDependentCriterion::Fit DataDependentCriterion::FitOf(const PlaneMisfit& mis
   if (IsInside(at_u.x, at_u.y) + IsInside(at_v.x, at_v.y) + IsInside(p.x, p.y) < 2)
     error = std::max(error, WorstOnBorders(p, p_height, u, v));
   if (!sagitta_->is_flat()) error += sagitta_->Bound(at_u, at_v, p);
-  return {error, misfit.distance, misfit.sample, u.id};
+  return {error, misfit.distance, misfit.sample};
 }
 
 // Of the triangle's border samples, by their plain distances: a weight would favour one cut over the other only for
@@ -235,60 +265,41 @@ double DataDependentCriterion::WorstOnBorders(SamplePosition p, float p_height, 
   return worst;
 }
 
-// Brings what is kept into the order of the star: that of the outline. For a vertex on the border the star's order is
-// the outline's turned around; what was kept before the gap then finds no place and is scanned again.
+// What was found out on the way is what a scan of the star would find.
 void DataDependentCriterion::End(const Star& star) {
-  kept_.insert(kept_.end(), pending_.rbegin(), pending_.rend());
+  const std::size_t outline = star.count + (star.is_closed ? 0 : 1);
   CoverSlots();
+  MakeRoom(star);
   centre_ = star.centre;
-  std::swap(kept_, pending_);
-  kept_.assign(star.count, {});
-  auto next = pending_.begin();
+  count_ = star.count;
   for (std::size_t i = 0; i < star.count; ++i) {
-    if (next != pending_.end() && next->u == star.ring.ids[i]) kept_[i] = *next++;
-    known_[star.triangles[i]] = Remembered(kept_[i]);
+    std::size_t edge = i;
+    if (!star.is_closed) [[unlikely]]
+      edge = (star.gap + 1 + i) % outline;
+    if (kept_[edge] == kUnknownFit && UsesMaxima()) [[unlikely]]
+      kept_[edge] = FitAround<2>(vertex_, {star.ring[i], star.ring[i + 1]});
+    const Fit& fit = fits_[kept_[edge]];
+    known_[star.triangles[i]] = Remembered(fit);
+    misfits_[i] = {fit.distance, fit.worst};
   }
 }
 
-void DataDependentCriterion::Scan(const Star& star, PlaneMisfit* misfits) {
-  if (!UsesMaxima()) return scan_star_(*field_, star, misfits);
-  if (star.centre == centre_ && star.count == kept_.size()) {
-    ScanUnknown(star, misfits);
-  } else {
-    scan_star_(*field_, star, misfits);
-  }
+const PlaneMisfit* DataDependentCriterion::Scan(const Star& star) {
+  if (UsesMaxima() && star.centre == centre_ && star.count == count_) return misfits_.data();
+  MakeRoom(star);
+  scan_star_(*field_, star, misfits_.data());
+  count_ = 0;
+  if (!UsesMaxima()) return misfits_.data();
   CoverSlots();
   const SamplePosition p{static_cast<std::uint16_t>(star.x), static_cast<std::uint16_t>(star.y)};
   for (std::size_t i = 0; i < star.count; ++i) {
-    KnownFit& known = known_[star.triangles[i]];
-    if (known.error == kUnknown) known = Remembered(FitOf(misfits[i], p, star.height, star.ring[i], star.ring[i + 1]));
+    known_[star.triangles[i]] = Remembered(FitOf(misfits_[i], p, star.height, star.ring[i], star.ring[i + 1]));
   }
+  return misfits_.data();
 }
 
-// Runs of neighbours are scanned together.
-void DataDependentCriterion::ScanUnknown(const Star& star, PlaneMisfit* misfits) {
-  for (std::size_t i = 0; i < star.count;) {
-    if (kept_[i].error != kUnknown) {
-      misfits[i] = {kept_[i].distance, kept_[i].worst};
-      ++i;
-      continue;
-    }
-    const std::size_t first = i;
-    while (i < star.count && kept_[i].error == kUnknown) ++i;
-    PrepareScratch(vertex_, i - first);
-    for (std::size_t k = first; k <= i; ++k) scratch_.ring.Put(k - first, star.ring[k]);
-    scan_star_(*field_, scratch_, misfits + first);
-  }
-}
-
-// A star of `count` triangles around p whose ring is yet to be put.
-void DataDependentCriterion::PrepareScratch(const Triangulation::Vertex& p, std::size_t count) {
-  scratch_.x = p.position.x;
-  scratch_.y = p.position.y;
-  scratch_.height = p.height;
-  scratch_.count = count;
-  scratch_.has_border = true;  // or not: it is looked for
-  if (scratch_.ring.capacity() < count + 1) scratch_.ring.Grow(2 * (count + 1));
+void DataDependentCriterion::MakeRoom(const Star& star) {
+  if (misfits_.size() < star.count) misfits_.resize(star.ring.capacity());
 }
 
 void DataDependentCriterion::CoverSlots() {

@@ -17,6 +17,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -41,20 +42,24 @@ class DataDependentCriterion {
   // Triangulation::Insert by this criterion.
   const Star& Insert(const Triangulation::Vertex& vertex, TriangleId triangle);
 
-  // What a StarScan finds, for the star of the last insertion or a triangle as a star of its own.
-  void Scan(const Star& star, PlaneMisfit* misfits);
+  // What a StarScan finds, for the star of the last insertion or a triangle as a star of its own. Valid until the next
+  // call of anything.
+  const PlaneMisfit* Scan(const Star& star);
 
  private:
   static constexpr double kUnknown = -1;
-  static constexpr std::size_t kMostFirstEdges = 4;
+  static constexpr std::size_t kLikelyEdges = 64;  // of an outline
+  static constexpr std::size_t kMostFitted = 4;    // triangles at once
 
-  // How well the triangle from u to the next vertex of an outline, with its last corner at p, fits.
+  // How well a triangle fits that has its last corner at p.
   struct Fit {
     double error = kUnknown;  // by the measure
     double distance = -1;     // of the sample that is furthest off, as PlaneMisfit has it; with maxima only
     std::uint32_t worst = kNoSample;
-    VertexId u = 0;
   };
+  using FitId = std::uint32_t;
+  static constexpr FitId kUnknownFit = 0;
+
   // What is remembered of a triangle, by slot.
   struct KnownFit {
     double error = kUnknown;
@@ -66,21 +71,21 @@ class DataDependentCriterion {
   double Combine(double a, double b) const { return options_.measure == FitMeasure::kMaxMax ? std::max(a, b) : a + b; }
 
   void Begin(TriangleId triangle);
-  bool Absorbs(const RingVertex& u, const RingVertex& v, const RingVertex& w, HalfEdgeId back);
+  bool Absorbs(const RingVertex& u, const RingVertex& v, const RingVertex& w, HalfEdgeId back, WalkPlace place);
+  void Keep(WalkPlace place);
   void End(const Star& star);
-  Fit TakePending(VertexId u);
-  bool IsBetterAlongPw(const Quadrilateral& q, TriangleId beyond, Fit& uv, Fit& uw, Fit& wv);
-  void RaiseLeastErrors(const Quadrilateral& q, std::uint32_t sample, float height, double& uw, double& wv) const;
+  bool IsBetterAlongPw(const Quadrilateral& q, TriangleId beyond, FitId& uv, FitId& halves);
+  void RaiseLeastErrors(const Quadrilateral& q, std::uint32_t sample, float height, std::array<double, 2>& least) const;
   KnownFit FitBeyond(TriangleId t);
   KnownFit Remembered(const Fit& fit) const;
-  void FitAround(const Triangulation::Vertex& p, const RingVertex* ring, std::size_t count, Fit* fits);
+  template <std::size_t kVertices>
+  FitId FitAround(const Triangulation::Vertex& p, const std::array<RingVertex, kVertices>& ring);
   Fit FitOf(const PlaneMisfit& misfit, SamplePosition p, float p_height, const RingVertex& u,
             const RingVertex& v) const;
   double WorstOnBorders(SamplePosition p, float p_height, const RingVertex& u, const RingVertex& v) const;
   bool IsInside(int x, int y) const;
-  void PrepareScratch(const Triangulation::Vertex& p, std::size_t count);
+  void MakeRoom(const Star& star);
   void CoverSlots();
-  void ScanUnknown(const Star& star, PlaneMisfit* misfits);
 
   const HeightField* field_;
   const Sagitta* sagitta_;
@@ -92,9 +97,16 @@ class DataDependentCriterion {
 
   // Of the insertion at work.
   Triangulation::Vertex vertex_;
-  std::vector<Fit> pending_;  // stack: of edges that have not been looked across yet
-  std::vector<Fit> kept_;     // in the order of the outline; after it, by triangle of the star
-  VertexId centre_ = 0;       // of that star
+  std::vector<Fit> fits_ = std::vector<Fit>(4 * kLikelyEdges);  // the first one is unknown
+  std::uint32_t fit_count_ = 1;
+  std::vector<FitId> pending_ = std::vector<FitId>(kLikelyEdges);  // by WalkPlace::pending, from 1 on
+  std::array<FitId, 2> split_;                                     // beyond the edge that the vertex lies on
+  std::vector<FitId> kept_ = pending_;                             // by edge of the outline
+
+  // Of the last star.
+  VertexId centre_ = 0;
+  std::size_t count_ = 0;
+  std::vector<PlaneMisfit> misfits_;
   Star scratch_;
 };
 

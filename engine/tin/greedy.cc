@@ -77,10 +77,11 @@ class GreedyTriangulation::Impl {
   const Star& Insert(const Triangulation::Vertex& vertex, TriangleId triangle);
 
   Triangulation::Vertex VertexOf(SamplePosition sample) const;
+  const PlaneMisfit* ScanOf(const Star& star);
   void ScanStarOf(const Star& star);
   void AwaitScan(TriangleId t);
   void ScanAwaiting();
-  Candidate CandidateOf(const Star& star, std::size_t i);
+  Candidate CandidateOf(const Star& star, std::size_t i, const PlaneMisfit& misfit);
   Candidate WorstOnBorderOf(TriangleId t);
   Candidate WorstOnBorder(VertexId from, VertexId to);
   double SquaresOf(TriangleId t) const;
@@ -247,18 +248,24 @@ Triangulation::Vertex GreedyTriangulation::Impl::VertexOf(SamplePosition sample)
   return Triangulation::VertexAt(*field_, sample.x, sample.y);
 }
 
-void GreedyTriangulation::Impl::ScanStarOf(const Star& star) {
+const PlaneMisfit* GreedyTriangulation::Impl::ScanOf(const Star& star) {
+  if (data_dependent_) return data_dependent_->Scan(star);
   if (misfits_.size() < star.count) misfits_.resize(star.ring.capacity());
-  data_dependent_ ? data_dependent_->Scan(star, misfits_.data()) : scan_star_(*field_, star, misfits_.data());
+  scan_star_(*field_, star, misfits_.data());
+  return misfits_.data();
+}
+
+void GreedyTriangulation::Impl::ScanStarOf(const Star& star) {
+  const PlaneMisfit* const misfits = ScanOf(star);
   candidates_.Reserve(triangulation_.triangle_count());
   const bool is_plain = sagitta_.is_flat() && !star.has_border;
   const std::uint32_t* const slots = star.triangles.data();
   if (is_plain) {
-    candidates_.SetAll(slots, star.count, [misfits = misfits_.data()](std::size_t i) {
+    candidates_.SetAll(slots, star.count, [misfits](std::size_t i) {
       return Candidate{NoneIsZero(misfits[i].distance), misfits[i].sample};
     });
   } else {
-    candidates_.SetAll(slots, star.count, [&](std::size_t i) { return CandidateOf(star, i); });
+    candidates_.SetAll(slots, star.count, [&](std::size_t i) { return CandidateOf(star, i, misfits[i]); });
   }
 }
 
@@ -301,13 +308,13 @@ void GreedyTriangulation::Impl::MakeStar(TriangleId t, Star& star) const {
   star.ring.Put(1, triangulation_.Seen(v, centre));
 }
 
-Candidate GreedyTriangulation::Impl::CandidateOf(const Star& star, std::size_t i) {
+Candidate GreedyTriangulation::Impl::CandidateOf(const Star& star, std::size_t i, const PlaneMisfit& misfit) {
   Candidate worst;
-  if (misfits_[i].sample != kNoSample) {
+  if (misfit.sample != kNoSample) {
     const double sagitta =
         sagitta_.Bound(triangulation_.position(star.ring.ids[i]), triangulation_.position(star.ring.ids[i + 1]),
                        {static_cast<std::uint16_t>(star.x), static_cast<std::uint16_t>(star.y)});
-    worst = {misfits_[i].distance + sagitta, misfits_[i].sample};
+    worst = {misfit.distance + sagitta, misfit.sample};
   }
   if (star.has_border) {
     const Candidate on_border = WorstOnBorderOf(star.triangles[i]);

@@ -69,9 +69,10 @@ void Triangulation::Join(Triangles& triangles, const std::vector<std::array<std:
 // The in-circle test says yes where the point lies on the edge, which is inside the circle, and no where w is not seen:
 // a circle without vertices ends beyond the edge where the edge's own ends do.
 const Star& Triangulation::InsertDelaunay(const Vertex& vertex, TriangleId triangle) {
-  return Insert(vertex, triangle, [](const RingVertex& u, const RingVertex& v, const RingVertex& w, HalfEdgeId) {
-    return IsInsideCircle(v, u, w);
-  });
+  return Insert(vertex, triangle,
+                [](const RingVertex& u, const RingVertex& v, const RingVertex& w, HalfEdgeId, WalkPlace) {
+                  return IsInsideCircle(v, u, w);
+                });
 }
 
 void Triangulation::Grow() {
@@ -125,8 +126,8 @@ void Triangulation::PrefetchBeyond(TriangleId t) const {
 }
 
 // Lets the ring begin after the edge that holds the centre.
-void Triangulation::OpenRing(std::size_t edges, std::size_t gap) {
-  const auto first = static_cast<std::ptrdiff_t>(gap + 1), count = static_cast<std::ptrdiff_t>(edges);
+void Triangulation::OpenRing(std::size_t edges) {
+  const auto first = static_cast<std::ptrdiff_t>(star_.gap + 1), count = static_cast<std::ptrdiff_t>(edges);
   const auto turn = [=](auto& values) { std::rotate(values.begin(), values.begin() + first, values.begin() + count); };
   turn(star_.ring.ids);
   turn(star_.ring.dx);

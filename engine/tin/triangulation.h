@@ -30,6 +30,12 @@
 
 namespace terrace::tin {
 
+// Where an insertion's walk around the outline has come to.
+struct WalkPlace {
+  std::size_t pending;  // edges that have not been looked across yet, this one among them
+  std::size_t kept;     // edges that stay, which come before it
+};
+
 class Triangulation {
  public:
   static constexpr std::uint32_t kNone = kNoEdge;
@@ -55,12 +61,16 @@ class Triangulation {
   Triangulation(const std::vector<Vertex>& vertices, const std::vector<std::array<std::uint32_t, 3>>& triangles);
 
   // Inserts a vertex into `triangle`, which must contain the point inside or on an edge; it must not be a vertex yet.
-  // `absorbs(u, v, w, back)` says whether the triangle (v, u, w) is removed as well: it lies beyond the outline's edge
-  // from u to v, and `back` is that edge seen from there. It must say yes where the point lies on the edge, and only
-  // where w lies strictly between u and v as seen from the point (Sees).
-  // The star is valid until the next insertion.
+  // `absorbs(u, v, w, back, place)` says whether the triangle (v, u, w) is removed as well: it lies beyond the
+  // outline's edge from u to v, and `back` is that edge seen from there. It must say yes where the point lies on the
+  // edge, and only where w lies strictly between u and v as seen from the point (Sees). `keeps(place)` is told of every
+  // edge that stays, those on the border too, which are not asked about. The star is valid until the next insertion.
+  template <typename Absorbs, typename Keeps>
+  const Star& Insert(const Vertex& vertex, TriangleId triangle, Absorbs&& absorbs, Keeps&& keeps);
   template <typename Absorbs>
-  const Star& Insert(const Vertex& vertex, TriangleId triangle, Absorbs&& absorbs);
+  const Star& Insert(const Vertex& vertex, TriangleId triangle, Absorbs&& absorbs) {
+    return Insert(vertex, triangle, absorbs, [](WalkPlace) {});
+  }
 
   const Star& InsertDelaunay(const Vertex& vertex, TriangleId triangle);
 
@@ -110,11 +120,11 @@ class Triangulation {
     const std::int32_t dx = vertex.position.x - point.x, dy = vertex.position.y - point.y;
     return {id, dx, dy, vertex.height};
   }
-  template <typename Triangles, typename Absorbs>
-  void Replace(Triangles& triangles, SamplePosition point, TriangleId triangle, Absorbs&& absorbs);
+  template <typename Triangles, typename Absorbs, typename Keeps>
+  void Replace(Triangles& triangles, SamplePosition point, TriangleId triangle, Absorbs&& absorbs, Keeps&& keeps);
   template <typename Triangles>
-  void FillCavity(Triangles& triangles, std::size_t edges, std::size_t gap);
-  void OpenRing(std::size_t edges, std::size_t gap);
+  void FillCavity(Triangles& triangles, std::size_t edges);
+  void OpenRing(std::size_t edges);
   template <typename Triangles>
   static HalfEdgeId TwinIn(const Triangles& triangles, HalfEdgeId edge) {
     const HalfEdgeId twin = triangles.slots[edge / 4].twin(edge % 4);
@@ -159,18 +169,20 @@ constexpr bool IsInsideCircle(const RingVertex& v, const RingVertex& u, const Ri
 
 // Whether w lies strictly between u and v as seen from the point that they are relative to.
 constexpr bool Sees(const RingVertex& u, const RingVertex& v, const RingVertex& w) {
-  return Cross(u, w) > 0 && Cross(w, v) > 0;
+  const bool is_beyond_u = Cross(u, w) > 0, is_before_v = Cross(w, v) > 0;
+  return is_beyond_u & is_before_v;
 }
 
-template <typename Absorbs>
-const Star& Triangulation::Insert(const Vertex& vertex, TriangleId triangle, Absorbs&& absorbs) {
+template <typename Absorbs, typename Keeps>
+const Star& Triangulation::Insert(const Vertex& vertex, TriangleId triangle, Absorbs&& absorbs, Keeps&& keeps) {
   star_.centre = static_cast<VertexId>(vertices_.size());
   star_.x = vertex.position.x;
   star_.y = vertex.position.y;
   star_.height = vertex.height;
   vertices_.push_back(vertex);
   if (!is_wide_ && vertices_.size() > NarrowTriangles::kMostVertices) Widen();
-  is_wide_ ? Replace(wide_, vertex.position, triangle, absorbs) : Replace(narrow_, vertex.position, triangle, absorbs);
+  is_wide_ ? Replace(wide_, vertex.position, triangle, absorbs, keeps)
+           : Replace(narrow_, vertex.position, triangle, absorbs, keeps);
   return star_;
 }
 
@@ -180,8 +192,9 @@ const Star& Triangulation::Insert(const Vertex& vertex, TriangleId triangle, Abs
 //     u-----v     ->      u     v
 //        .                   .
 //        p                   p
-template <typename Triangles, typename Absorbs>
-void Triangulation::Replace(Triangles& triangles, SamplePosition point, TriangleId triangle, Absorbs&& absorbs) {
+template <typename Triangles, typename Absorbs, typename Keeps>
+void Triangulation::Replace(Triangles& triangles, SamplePosition point, TriangleId triangle, Absorbs&& absorbs,
+                            Keeps&& keeps) {
   const auto* const slots = triangles.slots.data();
   const Vertex* const vertices = vertices_.data();
   PendingEdge* const stack = pending_.data();
@@ -206,13 +219,14 @@ void Triangulation::Replace(Triangles& triangles, SamplePosition point, Triangle
   star_.has_border = false;
   TriangleId* removed_slots = star_.triangles.data();
   removed_slots[0] = triangle;
-  std::size_t removed = 1, edges = 0, gap = 0;
+  std::size_t removed = 1, edges = 0;
   for (PendingEdge *bottom = stack, *top = stack + 3; top > bottom;) {
     const HalfEdgeId back = top->back;
+    const WalkPlace place{static_cast<std::size_t>(top - bottom), edges};
     if (back != Triangles::kNone) {
       const auto& beyond = slots[back / 4];
       const RingVertex w = Relative(vertices, beyond.opposite(back % 4), point);
-      if (absorbs(u, top->end, w, back)) {
+      if (absorbs(u, top->end, w, back, place)) {
         if (removed + 5 > capacity) {  // edges found and pending are two more than triangles removed
           const auto pending = top - bottom;
           Grow();
@@ -235,16 +249,17 @@ void Triangulation::Replace(Triangles& triangles, SamplePosition point, Triangle
       star_.has_border = true;
       if (Cross(u, top->end) == 0) {
         star_.is_closed = false;
-        gap = edges;
+        star_.gap = edges;
       }
     }
+    keeps(place);
     star_.ring.Put(edges, u);
     star_.outside[edges++] = back;
     u = top->end;
     --top;
   }
   star_.removed_count = removed;
-  FillCavity(triangles, edges, gap);
+  FillCavity(triangles, edges);
 }
 
 //      u3---u2                u3---u2
@@ -253,11 +268,11 @@ void Triangulation::Replace(Triangles& triangles, SamplePosition point, Triangle
 //     \       /              \ / \ t0/            triangle.
 //      u5---u0                u5---u0
 template <typename Triangles>
-void Triangulation::FillCavity(Triangles& triangles, std::size_t edges, std::size_t gap) {
+void Triangulation::FillCavity(Triangles& triangles, std::size_t edges) {
   if (star_.is_closed) {
     star_.ring.Repeat(0, edges);
   } else {
-    OpenRing(edges--, gap);
+    OpenRing(edges--);
   }
   star_.count = edges;
   TriangleId* const made = star_.triangles.data();  // those of what was removed come first, and are there
