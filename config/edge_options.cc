@@ -143,6 +143,12 @@ void ReadTokens(const Json& value, const Place& place, Config& config) {
                     [&](const TokenConfig& other) { return other.name == token.name; })) {
       place.At(i).Fail(fmt::format("another token is called \"{}\" too; every token needs its own name", token.name));
     }
+    const auto is_same = [&](const TokenConfig& other) {
+      return token.token.empty() ? !token.sha256.empty() && other.sha256 == token.sha256 : other.token == token.token;
+    };
+    if (std::any_of(config.tokens.begin(), earlier, is_same)) {
+      place.At(i).Fail("another token is the same; make a new one, or give the other one more datasets");
+    }
   }
 }
 

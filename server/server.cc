@@ -321,14 +321,15 @@ class Server::Impl {
 Server::Server(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Server::~Server() = default;
 
-Result<void> Server::TryFiles(const ServerOptions& options) {
-  if (const auto viewer = StaticFiles::Load(options.viewer_dir); !viewer) return tl::unexpected(viewer.error());
-  if (const auto log = AccessLog::Open(options.access_log, options.access_log_file); !log) {
-    return tl::unexpected(log.error());
-  }
-  const auto edge = Edge::Open(options.edge, DescriptorsForFiles(options));
-  if (!edge) return tl::unexpected(edge.error());
-  return {};
+std::vector<Error> Server::TryFiles(const ServerOptions& options) {
+  std::vector<Error> errors;
+  const auto note = [&](const auto& opened) {
+    if (!opened) errors.push_back(opened.error());
+  };
+  note(StaticFiles::Load(options.viewer_dir));
+  note(AccessLog::Open(options.access_log, options.access_log_file));
+  note(Edge::Open(options.edge, DescriptorsForFiles(options)));
+  return errors;
 }
 
 Result<void> Server::TryAddress(const ServerOptions& options) {

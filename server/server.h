@@ -60,8 +60,8 @@ class Server {
   static Result<std::unique_ptr<Server>> Start(CatalogPtr catalog, ServerOptions options);
 
   // What a start needs besides its datasets: the viewer, the access log and keys of TLS can be read or written.
-  // Opening datasets may take long, and whoever waits for that wants to know before.
-  static Result<void> TryFiles(const ServerOptions& options);
+  // Opening datasets may take long, and whoever waits for that wants to know before: all that is wrong.
+  static std::vector<Error> TryFiles(const ServerOptions& options);
   // And the address is free.
   static Result<void> TryAddress(const ServerOptions& options);
 

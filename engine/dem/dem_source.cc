@@ -8,6 +8,7 @@
 #include <cctype>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <set>
 #include <string_view>
 #include <utility>
@@ -131,6 +132,7 @@ Result<Rasters> OpenAll(std::vector<DemFile>& files, const DemOptions& options) 
   }
   const auto handles = std::make_shared<HandleLimit>(options.max_open_sources);
   Rasters rasters;
+  std::optional<Error> fault;  // the first
   for (std::size_t i = 0; i < files.size();) {
     const auto progress = [&](double share) {
       options.progress((static_cast<double>(i) + share) / static_cast<double>(files.size()));
@@ -145,10 +147,16 @@ Result<Rasters> OpenAll(std::vector<DemFile>& files, const DemOptions& options) 
       files.erase(files.begin() + static_cast<std::ptrdiff_t>(i));
       continue;
     }
-    if (!raster) return tl::unexpected(raster.error());
-    rasters.push_back(*std::move(raster));
+    if (raster) {
+      rasters.push_back(*std::move(raster));
+    } else {
+      if (!options.fault || options.stop.stop_requested()) return tl::unexpected(raster.error());
+      options.fault(raster.error());
+      if (!fault) fault = raster.error();
+    }
     ++i;
   }
+  if (fault) return tl::unexpected(*std::move(fault));
   return rasters;
 }
 

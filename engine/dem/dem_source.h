@@ -58,6 +58,9 @@ struct DemOptions {
   // Called now and then while Open scans the sources, with the share done, 0..1: files count alike. May be empty.
   std::function<void(double)> progress = {};
   std::stop_token stop = {};  // Open gives up (kCancelled)
+  // Told of every file that cannot be opened, after which Open looks at the others too before it fails. Empty: it fails
+  // at the first.
+  std::function<void(const Error&)> fault = {};
 };
 
 // One raster of a dataset.
@@ -110,6 +113,7 @@ struct RasterInfo {
   double spacing_m = 0;                      // finer ground axis at the centre, true metres
   GeoBounds bounds;                          // of the pixels' area
   HeightRange heights;                       // of all valid samples, as the source counts them
+  std::string heights_doubted;               // why they are hardly metres, with a way out; empty: they may be
   HeightRange ellipsoidal;                   // at least as wide as they are once converted
   std::uint64_t valid_samples = 0, void_samples = 0;
   std::optional<double> nodata;

@@ -72,11 +72,12 @@ std::vector<Grid> GridsOf(PJ_CONTEXT* context, const PJ* operation) {
 }
 
 std::string HowToGet(const Grid& grid) {
-  const std::string from = grid.url.empty() ? "it from https://cdn.proj.org" : grid.url;
+  // The name is EPSG's then, and no file by that name would be found.
+  if (grid.url.empty()) return fmt::format("its grid {} is none that PROJ has a file for", grid.name);
   return fmt::format(
       "its grid {} is not installed: get {} and put it into a folder of PROJ's (/usr/share/proj, or one "
       "that PROJ_DATA names)",
-      grid.name, from);
+      grid.name, grid.url);
 }
 
 std::string PipelineOf(PJ_CONTEXT* context, const PJ* operation) {

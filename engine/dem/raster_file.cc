@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <cstdlib>
+#include <filesystem>
+#include <system_error>
 
 #include "engine/dem/driver_list.h"
 #include "engine/dem/gdal_runtime.h"
@@ -83,6 +86,39 @@ Result<void> CheckShape(GDALDataset& dataset, const std::string& path) {
   return {};
 }
 
+// A GeoTIFF's directory says where each of its blocks lies. A file that was cut short, by a copy that broke off, opens
+// all the same, and would fail in the tiles of what is not there.
+Result<void> CheckComplete(GDALDataset& dataset, const std::string& path) {
+  if (!EQUAL(dataset.GetDriverName(), "GTiff") || IsRemote(path)) return {};
+  std::error_code unknown;
+  const std::uint64_t size = std::filesystem::file_size(path, unknown);
+  if (unknown) return {};
+  const char* const interleave = dataset.GetMetadataItem("INTERLEAVE", "IMAGE_STRUCTURE");
+  const bool is_by_pixel = interleave != nullptr && EQUAL(interleave, "PIXEL");
+  constexpr std::int64_t kMostBlocks = std::int64_t{1} << 20;  // about a second
+  std::uint64_t end = 0;
+  for (int number = 1; number <= (is_by_pixel ? 1 : dataset.GetRasterCount()); ++number) {
+    GDALRasterBand& band = *dataset.GetRasterBand(number);
+    int block_width = 0, block_height = 0;
+    band.GetBlockSize(&block_width, &block_height);
+    const int columns = (band.GetXSize() - 1) / block_width + 1, rows = (band.GetYSize() - 1) / block_height + 1;
+    if (std::int64_t{columns} * rows > kMostBlocks) return {};  // reading them says the same, later
+    for (int row = 0; row < rows; ++row) {
+      for (int column = 0; column < columns; ++column) {
+        const auto of_block = [&](const char* what) -> std::uint64_t {
+          const char* const text = band.GetMetadataItem(fmt::format("{}_{}_{}", what, column, row).c_str(), "TIFF");
+          return text == nullptr ? 0 : std::strtoull(text, nullptr, 10);
+        };
+        end = std::max(end, of_block("BLOCK_OFFSET") + of_block("BLOCK_SIZE"));
+      }
+    }
+  }
+  if (end <= size) return {};
+  return MakeError(ErrorCode::kUnavailable,
+                   "{}: is cut short: it has {} bytes, and its last samples lie up to byte {}; copy it again", path,
+                   size, end);
+}
+
 }  // namespace
 
 Result<void> CheckSizeToMesh(const std::string& path, int width, int height) {
@@ -133,6 +169,7 @@ Result<GDALDatasetUniquePtr> OpenRaster(const std::string& path, int overview) {
                      path, problem, path);
   }
   if (auto shape = CheckShape(*dataset, path); !shape) return tl::unexpected(shape.error());
+  if (auto complete = CheckComplete(*dataset, path); !complete) return tl::unexpected(complete.error());
   return dataset;
 }
 

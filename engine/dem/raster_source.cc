@@ -1,5 +1,6 @@
 #include "engine/dem/raster_source.h"
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <chrono>
@@ -53,6 +54,17 @@ RasterInfo Describe(GDALDataset& dataset, const std::string& path, const Georefe
   return info;
 }
 
+// Of heights in metres that no land or sea floor has, such as those of centimetres whose unit is not stated.
+std::string DoubtsOf(const HeightRange& heights) {
+  constexpr double kHighest = 9000, kDeepest = -11500;
+  if (heights.max <= kHighest && heights.min >= kDeepest) return "";
+  return fmt::format(
+      "heights from {:g} to {:g} m are hardly metres (Earth has -10,935 to 8,849), and those beyond {:g} count as "
+      "voids: "
+      "state the metres a unit has with `gdal_translate -a_scale FACTOR in out`, 0.01 for centimetres",
+      heights.min, heights.max, kMaxAbsHeight);
+}
+
 void LogWhatMatters(GDALDataset& dataset, const RasterInfo& info, const Georeference& georeference,
                     const RasterLayout& layout) {
   if (dataset.GetRasterCount() > 1) {
@@ -61,6 +73,7 @@ void LogWhatMatters(GDALDataset& dataset, const RasterInfo& info, const Georefer
   if (!info.knows_height_unit) {
     spdlog::warn("{}: height unit \"{}\" is not known, heights are taken as metres", info.path, layout.rules.unit);
   }
+  if (!info.heights_doubted.empty()) spdlog::warn("{}: {}", info.path, info.heights_doubted);
   if (!info.overviews_unused.empty()) {
     spdlog::warn("{}: its overviews are not used: {}", info.path, info.overviews_unused);
   }
@@ -153,6 +166,7 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
   source->info_.spacing_m = spacing->finer;
   source->info_.bounds = source->footprint_.Bounds();
   source->info_.heights = {survey.lowest, survey.highest};
+  source->info_.heights_doubted = DoubtsOf(source->info_.heights);
   source->info_.valid_samples = survey.valid;
   source->info_.void_samples = survey.voids;
   LogWhatMatters(**dataset, source->info_, source->georeference_, source->layout_);

@@ -174,9 +174,12 @@ Result<RasterSurvey> SurveyAssembler::Finish(GDALDataset& dataset, const std::st
   survey_.voids =
       static_cast<std::uint64_t>(layout_.width) * static_cast<std::uint64_t>(layout_.height) - survey_.valid;
   if (survey_.valid == 0) {
-    return MakeError(ErrorCode::kNotFound,
-                     "has no valid sample, only voids; check its nodata value with gdalinfo and "
-                     "correct it with `gdal_translate -a_nodata VALUE in out`");
+    return MakeError(
+        ErrorCode::kNotFound,
+        "has no valid sample, only voids; check its nodata value with gdalinfo and correct it with "
+        "`gdal_translate -a_nodata VALUE in out`; heights beyond {:g} m are voids too: those in another unit "
+        "need `-a_scale FACTOR`, the metres of one",
+        kMaxAbsHeight);
   }
   const BlockRange samples = survey_.table.OfFinest();
   survey_.lowest = samples.min;

@@ -10,9 +10,9 @@ namespace terrace::dem {
 namespace {
 
 constexpr const char* kWayOut =
-    "; or let `vertical` say what the heights count from (\"ellipsoid\", \"egm96\", \"unknown\" to pass them through, "
-    "or a "
-    "grid of undulations)";
+    "; or let `vertical` say what the heights count from (\"ellipsoid\", \"egm96\", \"egm2008\", \"unknown\" to pass "
+    "them "
+    "through, or a grid of undulations)";
 
 Result<VerticalDatum> Above(Result<std::shared_ptr<const Geoid>> geoid) {
   if (!geoid) return MakeError(geoid.error().code, "{}{}", geoid.error().message, kWayOut);

@@ -17,9 +17,11 @@
 #include "engine/dem/source_policy.h"
 #include "engine/geo/error_ladder.h"
 #include "server/cli/command.h"
+#include "server/cli/fail.h"
 #include "server/cli/mosaic_info.h"
 #include "server/cli/open_source.h"
 #include "server/cli/progress.h"
+#include "server/cli/try_folder.h"
 
 namespace terrace::cli {
 namespace {
@@ -61,6 +63,12 @@ std::vector<std::string> AdviceFor(const dem::RasterInfo& info, double floor) {
         fmt::format("height unit \"{}\" is not known, heights are taken as metres: state metres a unit with "
                     "`gdal_translate -a_scale FACTOR in out`",
                     info.height_unit));
+  }
+  if (!info.heights_doubted.empty()) advice.push_back(info.heights_doubted);
+  if (info.driver == "VRT") {
+    advice.push_back(
+        "a VRT, which names other files: 'terrace serve' takes it where allowed_drivers of its configuration lists "
+        "\"VRT\"");
   }
   if (!info.picture_part.empty()) {
     advice.push_back(fmt::format(
@@ -161,6 +169,12 @@ int Info(const std::vector<std::string>& dems, const std::string& vertical, cons
          bool mosaic) {
   spdlog::set_level(spdlog::level::err);  // what opening logs is printed below
   int exit_code = dem::AllowVrts() ? kExitOk : kExitFailure;
+  if (!cache_dir.empty()) {
+    if (const auto folder = TryFolder(cache_dir); !folder) {
+      exit_code =
+          Fail(fmt::format("--cache-dir: {}; nothing that is learnt is kept", folder.error().message), kExitFailure);
+    }
+  }
   nlohmann::json all = nlohmann::json::array();
   for (const auto& sources : Datasets(dems, mosaic, exit_code)) {
     const std::string name = NameOf(sources);
@@ -168,10 +182,12 @@ int Info(const std::vector<std::string>& dems, const std::string& vertical, cons
     config::DatasetConfig dataset;
     dataset.sources = sources;
     dataset.vertical = vertical;
-    const auto source = OpenSource(dataset, cache_dir, progress.Callback());
+    std::vector<Error> faults;  // of files, all of them
+    const auto source = OpenSource(dataset, cache_dir, progress.Callback(), {},
+                                   [&faults](const Error& fault) { faults.push_back(fault); });
     if (!source) {
-      std::fprintf(stderr, "terrace: %s\n", source.error().message.c_str());
-      exit_code = kExitFailure;
+      if (faults.empty()) faults.push_back(source.error());
+      for (const Error& fault : faults) exit_code = Fail(fault.message, kExitFailure);
       continue;
     }
     const dem::DemInfo& info = (*source)->info();

@@ -117,9 +117,10 @@ void Print(const MeshArguments& arguments, const tin::HeightField& field, const 
            const tin::MeshError& error, const MeshSeconds& seconds) {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
+  const std::size_t voids = VoidsOf(field, error.samples);
   if (arguments.json) {
     const nlohmann::ordered_json statistics = {
-        {"input", {{"path", arguments.dem}, {"width", field.width()}, {"height", field.height()}}},
+        {"input", {{"path", arguments.dem}, {"width", field.width()}, {"height", field.height()}, {"voids", voids}}},
         {"criterion", arguments.criterion},
         {"compact", arguments.compact},
         {"points", mesh.vertices.size()},
@@ -132,10 +133,10 @@ void Print(const MeshArguments& arguments, const tin::HeightField& field, const 
     return;
   }
   fmt::print(
-      "{}: {} vertices, {} triangles of {} samples; largest error {:.4g} m, RMS {:.4g} m; read {:.2f} s, mesh {:.2f} "
+      "{}: {} vertices, {} triangles of {} samples{}; largest error {:.4g} m, RMS {:.4g} m; read {:.2f} s, mesh {:.2f} "
       "s, write {:.2f} s\n",
-      arguments.out, mesh.vertices.size(), mesh.triangles.size(), error.samples, error.max, error.rms, seconds.read,
-      seconds.triangulate, seconds.write);
+      arguments.out, mesh.vertices.size(), mesh.triangles.size(), error.samples, TextOfVoids(voids), error.max,
+      error.rms, seconds.read, seconds.triangulate, seconds.write);
 }
 
 // Checks of arguments; what they say is read after the name of the option. Their own descriptions stay out of the help.
@@ -168,7 +169,7 @@ int Mesh(const MeshArguments& arguments) {
     if (arguments.points > 0) goal.max_points = arguments.points;
     return MeshColored({arguments.dem, arguments.out, arguments.coordinates, goal, arguments.color, arguments.json});
   }
-  Result<MeshOutput> output = MeshOutput::Open(arguments.out);
+  Result<MeshOutput> output = MeshOutput::Open(arguments.out, {arguments.dem});
   if (!output) {
     const bool is_usage = output.error().code == ErrorCode::kInvalidArgument;
     return Fail(output.error().message, is_usage ? kExitUsage : kExitFailure);
@@ -214,8 +215,8 @@ void AddMesh(CLI::App& app, int& exit_code) {
       "  terrace mesh alps.tif --out alps.glb --points 50000 --json\n"
       "  terrace mesh alps.tif --out alps.glb --max-error 10 --color photo.tif\n"
       "  terrace mesh photo.png --image --out photo.glb --points 4000\n\n"
-      "Errors are measured over every valid sample by a separate pass. Triangles are counter-clockwise in the\n"
-      "file's own x and y.");
+      "Errors are measured over every valid sample by a separate pass. Voids count for none, and triangles go on\n"
+      "across them: how many there are is told. Triangles are counter-clockwise in the file's own x and y.");
   command->add_option("DEM", arguments->dem, "A raster that GDAL can read; a georeference is not needed")->required();
   command->add_option("-o,--out", arguments->out, "The file to write; its extension is the format")
       ->type_name("FILE")

@@ -89,7 +89,11 @@ nlohmann::ordered_json Statistics(const ColoredMeshArguments& arguments, const t
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
   const bool is_image = arguments.color.is_image;
-  return {{"input", {{"path", arguments.raster}, {"width", field.width()}, {"height", field.height()}}},
+  return {{"input",
+           {{"path", arguments.raster},
+            {"width", field.width()},
+            {"height", field.height()},
+            {"voids", VoidsOf(field.heights(), error.height.samples)}}},
           {"criterion", "delaunay"},
           {"points", mesh.tin.vertices.size()},
           {"triangles", mesh.tin.triangles.size()},
@@ -112,8 +116,9 @@ void Print(const ColoredMeshArguments& arguments, const tin::ExtendedField& fiel
                            .dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
     return;
   }
-  fmt::print("{}: {} vertices, {} triangles of {} samples; ", arguments.out, mesh.tin.vertices.size(),
-             mesh.tin.triangles.size(), error.height.samples);
+  fmt::print("{}: {} vertices, {} triangles of {} samples{}; ", arguments.out, mesh.tin.vertices.size(),
+             mesh.tin.triangles.size(), error.height.samples,
+             TextOfVoids(VoidsOf(field.heights(), error.height.samples)));
   if (arguments.color.is_image) {
     fmt::print("largest error {:.4g} of the range of colours, RMS {:.4g}", error.max_combined, error.color_rms);
   } else {
@@ -126,7 +131,9 @@ void Print(const ColoredMeshArguments& arguments, const tin::ExtendedField& fiel
 }  // namespace
 
 int MeshColored(const ColoredMeshArguments& arguments) {
-  Result<MeshOutput> output = MeshOutput::Open(arguments.out);
+  std::vector<std::string> inputs = {arguments.raster};
+  if (!arguments.color.is_image) inputs.push_back(arguments.color.image);
+  Result<MeshOutput> output = MeshOutput::Open(arguments.out, inputs);
   if (!output) {
     const bool is_usage = output.error().code == ErrorCode::kInvalidArgument;
     return Fail(output.error().message, is_usage ? kExitUsage : kExitFailure);

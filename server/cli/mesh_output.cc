@@ -1,8 +1,19 @@
 #include "server/cli/mesh_output.h"
 
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <system_error>
+
 namespace terrace::cli {
 
-Result<MeshOutput> MeshOutput::Open(const std::string& path) {
+Result<MeshOutput> MeshOutput::Open(const std::string& path, const std::vector<std::string>& inputs) {
+  for (const std::string& input : inputs) {
+    std::error_code ignored;
+    if (!std::filesystem::equivalent(path, input, ignored)) continue;
+    return MakeError(ErrorCode::kInvalidArgument, "--out: {} is the file that is read; give the mesh another name",
+                     path);
+  }
   const auto format = proto::MeshFileFormatOf(path);
   if (!format) return tl::unexpected(format.error());
   Result<OutputFile> file = OutputFile::Open(path);
@@ -15,6 +26,10 @@ Result<void> MeshOutput::Write(const std::vector<proto::MeshVertex>& vertices,
                                const std::vector<proto::VertexColor>& colors) {
   Result<void> written = proto::WriteMesh(file_.stream(), format_, vertices, triangles, colors);
   return written ? file_.Commit() : written;
+}
+
+std::string TextOfVoids(std::size_t voids) {
+  return voids == 0 ? "" : fmt::format(" and across {} void{}", voids, voids == 1 ? "" : "s");
 }
 
 }  // namespace terrace::cli

@@ -1,4 +1,4 @@
-// What the kinds of `terrace mesh` have in common: the file they write and the times they tell.
+// What the kinds of `terrace mesh` have in common: the file they write, and what they tell of it.
 #pragma once
 
 #include <array>
@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "engine/core/result.h"
+#include "engine/tin/height_field.h"
 #include "proto/mesh_file.h"
 #include "server/cli/output_file.h"
 
@@ -16,8 +17,9 @@ namespace terrace::cli {
 
 class MeshOutput {
  public:
-  // Before the work: a folder that is missing costs no time. kInvalidArgument: no such format.
-  static Result<MeshOutput> Open(const std::string& path);
+  // Before the work: a folder that is missing costs no time. kInvalidArgument: no such format, or one of the files that
+  // are read.
+  static Result<MeshOutput> Open(const std::string& path, const std::vector<std::string>& inputs);
 
   // The whole file. `colors` is empty or by vertex.
   Result<void> Write(const std::vector<proto::MeshVertex>& vertices,
@@ -34,6 +36,12 @@ class MeshOutput {
 struct MeshSeconds {
   double read = 0, triangulate = 0, write = 0;
 };
+
+// Samples without a height, of which `measured` have one.
+inline std::size_t VoidsOf(const tin::HeightField& field, std::size_t measured) {
+  return static_cast<std::size_t>(field.width()) * static_cast<std::size_t>(field.height()) - measured;
+}
+std::string TextOfVoids(std::size_t voids);  // empty where there are none
 
 inline double SecondsSince(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

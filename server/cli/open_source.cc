@@ -7,6 +7,8 @@
 #include <system_error>
 #include <utility>
 
+#include "engine/dem/source_policy.h"
+
 namespace terrace::cli {
 
 namespace {
@@ -48,10 +50,14 @@ std::string NameOf(const std::vector<config::SourceConfig>& sources) {
 
 Result<void> TryReading(const config::DatasetConfig& dataset) {
   const auto read = [&](const std::string& path, const char* remedy) -> Result<void> {
-    // Other names are GDAL's to resolve.
-    if (!path.starts_with('/') || path.starts_with("/vsi") || ::access(path.c_str(), R_OK) == 0) return {};
-    return MakeError(ErrorCode::kNotFound, "dataset {}: {}: {}; give the path of a raster file on this machine{}",
-                     dataset.name, path, std::generic_category().message(errno), remedy);
+    if (path.empty()) return {};
+    if (path.starts_with('/') && !path.starts_with("/vsi") && ::access(path.c_str(), R_OK) != 0) {
+      return MakeError(ErrorCode::kNotFound, "dataset {}: {}: {}; give the path of a raster file on this machine{}",
+                       dataset.name, path, std::generic_category().message(errno), remedy);
+    }
+    const Result<void> allowed = dem::CheckSourceName(path);
+    if (allowed) return {};
+    return MakeError(allowed.error().code, "dataset {}: {}", dataset.name, allowed.error().message);
   };
   for (const config::SourceConfig& source : dataset.sources) {
     for (const std::string& file : source.files) {
@@ -63,7 +69,8 @@ Result<void> TryReading(const config::DatasetConfig& dataset) {
 }
 
 Result<std::unique_ptr<dem::DemSource>> OpenSource(const config::DatasetConfig& wanted, const std::string& cache_dir,
-                                                   const std::function<void(double)>& progress, std::stop_token stop) {
+                                                   const std::function<void(double)>& progress, std::stop_token stop,
+                                                   std::function<void(const Error&)> fault) {
   dem::DemOptions options;
   options.error_fraction = wanted.error_fraction;
   options.finest_error = wanted.finest_error;
@@ -74,6 +81,7 @@ Result<std::unique_ptr<dem::DemSource>> OpenSource(const config::DatasetConfig& 
   options.max_open_sources = wanted.max_open_sources;
   options.progress = progress;
   options.stop = std::move(stop);
+  options.fault = std::move(fault);
   return dem::DemSource::Open(FilesOf(wanted), options);
 }
 

@@ -4,32 +4,42 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <filesystem>
 #include <system_error>
 #include <utility>
 
 namespace terrace::cli {
 
-OutputFile::OutputFile(std::string path, std::string unfinished)
-    : path_(std::move(path)), unfinished_(std::move(unfinished)), stream_(unfinished_, std::ios::binary) {}
+namespace fs = std::filesystem;
 
-OutputFile::OutputFile(OutputFile&& other) noexcept
-    : path_(std::move(other.path_)),
-      unfinished_(std::exchange(other.unfinished_, {})),
-      stream_(std::move(other.stream_)) {}
+namespace {
 
-OutputFile::~OutputFile() {
-  if (unfinished_.empty()) return;
-  std::error_code ignored;
-  std::filesystem::remove(unfinished_, ignored);
+fs::path TargetOf(const fs::path& path) {
+  std::error_code failed;
+  if (!fs::is_symlink(path, failed)) return path;
+  fs::path target = fs::canonical(path, failed);
+  if (!failed) return target;
+  target = fs::read_symlink(path, failed);  // to a file that is yet to be
+  return failed ? path : path.parent_path() / target;
 }
+
+}  // namespace
+
+OutputFile::OutputFile(std::string path, fs::path target)
+    : path_(std::move(path)),
+      target_(std::move(target)),
+      unfinished_(std::make_unique<UnfinishedFile>(fmt::format("{}.{}.part", target_.string(), getpid()))),
+      stream_(unfinished_->path(), std::ios::binary) {}
 
 Result<OutputFile> OutputFile::Open(const std::string& path) {
   std::error_code ignored;
-  if (std::filesystem::is_directory(path, ignored)) {
+  if (fs::is_directory(path, ignored)) {
     return MakeError(ErrorCode::kUnavailable, "{} is a folder; name a file in it", path);
   }
-  OutputFile file(path, fmt::format("{}.{}.part", path, getpid()));
+  if (fs::exists(path, ignored) && ::access(path.c_str(), W_OK) != 0) {
+    return MakeError(ErrorCode::kUnavailable, "cannot write {}: {}; remove it, or give another name", path,
+                     std::generic_category().message(errno));
+  }
+  OutputFile file(path, TargetOf(path));
   if (!file.stream_) {
     return MakeError(ErrorCode::kUnavailable, "cannot write {}: {}; choose a folder that exists and is writable", path,
                      std::generic_category().message(errno));
@@ -41,9 +51,10 @@ Result<void> OutputFile::Commit() {
   stream_.close();
   if (!stream_) return MakeError(ErrorCode::kUnavailable, "writing {} failed; is the disk full?", path_);
   std::error_code error;
-  std::filesystem::rename(unfinished_, path_, error);
+  const fs::perms permissions = fs::status(target_, error).permissions();
+  if (!error && permissions != fs::perms::unknown) fs::permissions(unfinished_->path(), permissions, error);
+  fs::rename(unfinished_->path(), target_, error);
   if (error) return MakeError(ErrorCode::kUnavailable, "cannot replace {}: {}", path_, error.message());
-  unfinished_.clear();
   return {};
 }
 

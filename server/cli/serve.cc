@@ -26,6 +26,7 @@
 #include "server/cli/open_source.h"
 #include "server/cli/progress.h"
 #include "server/cli/service_manager.h"
+#include "server/cli/try_folder.h"
 #include "server/memory_trimmer.h"
 #include "server/reload/reloader.h"
 #include "server/server.h"
@@ -249,22 +250,39 @@ Result<std::shared_ptr<server::DiskCache>> OpenDiskCache(const config::DiskCache
   return server::DiskCache::Open(options);
 }
 
-// Everything that keeps the server from starting and can be told before sources are opened; true if there is nothing.
-bool CanStart(const config::Config& config, bool is_running) {
-  std::vector<Error> errors;
+// Everything that keeps the server from starting and can be told before sources are opened; kExitOk if there is
+// nothing. The policy of sources is in force then.
+int TryStart(const config::Config& config, bool is_running) {
+  const server::ServerOptions options = OptionsOf(config);
+  std::vector<Error> errors = server::Server::TryFiles(options);
   const auto note = [&](const Result<void>& result) {
     if (!result) errors.push_back(result.error());
   };
-  const server::ServerOptions options = OptionsOf(config);
-  note(server::Server::TryFiles(options));
+  std::error_code ignored;
+  if (const auto& viewer = config.viewer.directory;
+      !viewer.empty() && !std::filesystem::is_directory(viewer, ignored)) {
+    note(MakeError(ErrorCode::kNotFound, "viewer {}: is no folder; name one with a web page, or true or false",
+                   viewer.string()));
+  }
+  if (!config.disk_cache.directory.empty()) {
+    if (const auto folder = TryFolder(config.disk_cache.directory); !folder) {
+      note(MakeError(folder.error().code, "disk_cache: {}", folder.error().message));
+    }
+  }
   if (!is_running) note(server::Server::TryAddress(options));
-  for (const config::DatasetConfig& dataset : config.datasets) note(TryReading(dataset));
+  const Result<void> policy =
+      dem::SetSourcePolicy({config.data_roots, config.allowed_prefixes, config.allowed_drivers});
+  note(policy);
+  if (policy) {
+    for (const config::DatasetConfig& dataset : config.datasets) note(TryReading(dataset));
+  }
   for (const Error& error : errors) std::fprintf(stderr, "terrace: %s\n", error.message.c_str());
-  return errors.empty();
+  if (!policy) return kExitUsage;
+  return errors.empty() ? kExitOk : kExitFailure;
 }
 
 int CheckConfig(const ServeArguments& arguments, const config::Config& config) {
-  if (!CanStart(config, /*is_running=*/true)) return kExitFailure;
+  if (const int exit_code = TryStart(config, /*is_running=*/true); exit_code != kExitOk) return exit_code;
   const std::size_t count = config.datasets.size();
   fmt::print(
       "terrace: the configuration{}{} is fine: {} dataset{}; rasters were not opened, 'terrace info' does that\n",
@@ -283,19 +301,14 @@ int Serve(const ServeArguments& arguments) {
   }
   SetUpLog(config.log_level, config.log_format);
   if (arguments.check_config) return CheckConfig(arguments, config);
-  // First, so that a directory that cannot be used is known before sources are scanned.
+  if (const int exit_code = TryStart(config, /*is_running=*/false); exit_code != kExitOk) return exit_code;
+  // Before sources are opened, which may take long.
   Result<std::shared_ptr<server::DiskCache>> disk = OpenDiskCache(config.disk_cache);
   if (!disk) {
     std::fprintf(stderr, "terrace: %s\n", disk.error().message.c_str());
     return kExitFailure;
   }
   dem::SetGdalCache(config.gdal_cache_bytes);
-  if (const auto policy = dem::SetSourcePolicy({config.data_roots, config.allowed_prefixes, config.allowed_drivers});
-      !policy) {
-    std::fprintf(stderr, "terrace: %s\n", policy.error().message.c_str());
-    return kExitUsage;
-  }
-  if (!CanStart(config, /*is_running=*/false)) return kExitFailure;  // opening may take long
   std::vector<server::Dataset> datasets;
   if (!OpenDatasets(config, datasets)) return kExitFailure;
   const std::size_t count = datasets.size();

@@ -29,11 +29,14 @@ bool SetSize(int file, off_t size) { return ftruncate(file, size) == 0; }
 Result<int> LockDirectory(const std::filesystem::path& directory) {
   const std::filesystem::path path = directory / "lock";
   int file = open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
-  if (file < 0) file = open(path.c_str(), O_RDONLY | O_CLOEXEC);  // a disk that has become read-only
   if (file < 0) {
-    return MakeError(ErrorCode::kInvalidArgument,
-                     "disk_cache: {} cannot be written: {}; name a directory that the server may write to",
-                     path.string(), SystemMessage());
+    const std::string why = SystemMessage();
+    file = open(path.c_str(), O_RDONLY | O_CLOEXEC);  // a disk that has become read-only
+    if (file < 0) {
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "disk_cache: {} cannot be written: {}; name a directory that the server may write to",
+                       path.string(), why);
+    }
   }
   if (flock(file, LOCK_EX | LOCK_NB) != 0) {
     const bool is_used = errno == EWOULDBLOCK;

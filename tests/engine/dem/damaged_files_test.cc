@@ -9,6 +9,7 @@
 #include <random>
 #include <sstream>
 
+#include "engine/dem/water_raster.h"
 #include "tests/engine/dem/dem_fixture.h"
 
 namespace terrace::dem {
@@ -108,6 +109,27 @@ TEST(DamagedFiles, CrashHangAndSwellNothing) {
     ASSERT_LT(opened_badly, 5) << "enough seen";
   }
   RecordProperty("files", kFiles);
+}
+
+// Before a sample is read: a tile far from where the file ends would not tell.
+TEST(DamagedFiles, AGeoTiffThatIsCutShortIsToldWhenItIsOpened) {
+  const TempDir dir;
+  RasterSpec spec{.width = 300, .height = 200, .geo_transform = {8, .001, 0, 47, 0, -.001}};
+  spec.value = [](int col, int row) { return col % 90 + row; };
+  const std::string path = WriteRaster(dir, spec), bytes = ReadFile(path);
+  const GeoBounds around = (*DemSource::Open(path))->info().bounds;
+  ASSERT_TRUE(WaterRaster::Open(path, around));
+  for (const std::size_t lost : {bytes.size() / 2, std::size_t{1}}) {
+    std::ofstream(path, std::ios::binary) << bytes.substr(0, bytes.size() - lost);
+    const auto source = DemSource::Open(path);
+    const auto mask = WaterRaster::Open(path, around);
+    ASSERT_FALSE(source);
+    ASSERT_FALSE(mask);
+    for (const Error& error : {source.error(), mask.error()}) {
+      EXPECT_EQ(error.code, ErrorCode::kUnavailable);
+      EXPECT_NE(error.message.find("is cut short"), std::string::npos) << error.message;
+    }
+  }
 }
 
 TEST(DamagedFiles, BlocksCountWithTheBandsTheyAreStoredWith) {

@@ -51,6 +51,12 @@ class Usage(unittest.TestCase):
                                          (["mesh", "--max-eror", "5"], "option --max-eror", "--max-error")):
             self.assertIn(f"terrace: unknown {word}; did you mean {nearest}?\n", run(*arguments).stderr, arguments)
 
+    def test_stdout_that_takes_nothing_is_a_failure(self):
+        with open("/dev/full", "w", encoding="utf-8") as full:
+            result = subprocess.run([BINARY, "serve", "--print-config"], stdout=full, stderr=subprocess.PIPE, timeout=60)
+        self.assertEqual(result.returncode, 1)
+        self.assertIn(b"stdout cannot be written", result.stderr)
+
     def test_no_arguments_give_code_2_and_the_help(self):
         result = run()
         self.assertEqual(result.returncode, 2)
@@ -122,6 +128,34 @@ class Config(unittest.TestCase):
             self.assertEqual((good.returncode, good.stderr), (0, ""))
             self.assertIn("the configuration is fine: 1 dataset;", good.stdout)
         self.assertEqual(run("serve", dem, "--check-config", "--cache-bytes", "much").returncode, 2)
+
+    def test_a_check_fails_where_a_start_would(self):
+        dem = str(SOURCE_DIR / "config/samples/jacksboro.tif")
+        (self.folder / "file").write_bytes(b"")
+        (self.folder / "empty").mkdir()
+        for code, options, words in ((1, {"data_roots": ["empty"]}, ["dataset a", "outside of the data roots"]),
+                                     (2, {"data_roots": ["nowhere"]}, ["nowhere", "no folder"]),
+                                     (2, {"allowed_drivers": ["Foo"]}, ["Foo", "no format"]),
+                                     (2, {"allowed_prefixes": ["http://x"]}, ["http://x", "/vsi"]),
+                                     (1, {"disk_cache": {"directory": "file"}}, ["disk_cache", "Not a directory"]),
+                                     (1, {"viewer": "nowhere"}, ["viewer", "nowhere", "no folder"]),
+                                     (1, {"viewer": "nowhere", "access_log": "json", "access_log_file": "no/x.log",
+                                          "tls": {"certificate": "a", "key": "b"}}, ["viewer", "no/x.log", "TLS"])):
+            file = self.write(json.dumps({"datasets": [{"name": "a", "sources": [dem]}], **options}))
+            for arguments in (["--check-config"], ["--listen", "127.0.0.1:0"]):
+                result = run("serve", "--config", file, *arguments)
+                self.assertEqual((result.returncode, result.stdout), (code, ""), (options, result.stderr))
+                for word in words:
+                    self.assertIn(word, result.stderr)
+        fine = self.write(json.dumps({"datasets": [{"name": "a", "sources": [dem]}], "disk_cache": {"directory": "x/y"}}))
+        self.assertEqual(run("serve", "--config", fine, "--check-config").returncode, 0)
+        self.assertFalse((self.folder / "x").exists())
+
+    def test_equal_tokens_are_refused_with_their_place(self):
+        tokens = [{"name": name, "token": "a-token-of-some-length"} for name in ("one", "two")]
+        result = run("serve", "--config", self.write(json.dumps({"tokens": tokens})), "--print-config")
+        self.assertEqual(result.returncode, 2)
+        self.assertIn("/tokens/1: another token is the same", result.stderr)
 
     def test_flags_override_the_file(self):
         file = self.write('{"listen": "127.0.0.1:1", "io_threads": 3, "datasets": [{"name": "a", "sources": ["a.tif"]}]}')

@@ -1,11 +1,14 @@
 """terrace mesh and terrace info, and what all commands say about bad rasters: mesh_info_test.py BINARY SOURCE_DIR."""
+import html
 import json
 import math
 import pathlib
+import signal
 import struct
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 
 BINARY = pathlib.Path(sys.argv.pop(1)).resolve()
@@ -116,7 +119,7 @@ class Mesh(InFolder):
         self.assertLessEqual(self.mesh(SAMPLE, "a.ply", "--rms", 4)[0]["rms_error"], 4)
         statistics, _ = self.mesh(SAMPLE, "a.ply", "--max-error", 10)
         self.assertLessEqual(statistics["max_error"], 10)
-        self.assertEqual(statistics["input"], {"path": str(SAMPLE), "width": 403, "height": 344})
+        self.assertEqual(statistics["input"], {"path": str(SAMPLE), "width": 403, "height": 344, "voids": 0})
         self.assertEqual(statistics["criterion"], "delaunay")
         self.assertEqual(set(statistics["seconds"]), {"read", "triangulate", "write"})
         self.assertGreater(statistics["peak_rss_bytes"], 1 << 20)
@@ -168,6 +171,46 @@ class Mesh(InFolder):
         self.assert_refused(1, ["broken.tif"], "mesh", broken, "--out", out, "--points", 4)
         self.assertEqual((out.read_text(), self.files()), ("kept", ["a.obj", "broken.tif"]))
 
+    def test_an_interrupted_run_leaves_nothing(self):
+        heights = [[x * y % 1000 for x in range(1500)] for y in range(1500)]  # takes far longer than the signal
+        dem = self.write("large.asc", grid(heights, PLACE))
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            process = subprocess.Popen([BINARY, "mesh", dem, "--out", self.folder / "a.obj", "--max-error", "0"],
+                                       preexec_fn=lambda: signal.signal(number, signal.SIG_DFL))
+            until = time.monotonic() + 60
+            while not any(name.endswith(".part") for name in self.files()) and time.monotonic() < until:
+                time.sleep(0.01)
+            process.send_signal(number)
+            self.assertEqual(process.wait(timeout=60), -number)
+            self.assertEqual(self.files(), ["large.asc"])
+
+    def test_never_writes_over_what_it_reads(self):
+        dem = self.write("dem.obj", grid(BUMPS, PLACE))
+        self.assert_refused(2, ["dem.obj", "is the file that is read"], "mesh", dem, "-o", dem, "--points", 4)
+        image = self.write("photo.ply", b"P6\n40 30\n255\n" + bytes(3600))
+        self.assert_refused(2, ["photo.ply", "is the file that is read"],
+                            "mesh", dem, "--color", image, "-o", image, "--points", 4)
+        self.assertEqual(dem.read_text(), grid(BUMPS, PLACE))
+
+    def test_keeps_links_and_permissions(self):
+        dem = self.write("dem.asc", grid(BUMPS, PLACE))
+        (self.folder / "link.obj").symlink_to("real.obj")
+        for mode in (None, 0o640):  # a file that is yet to be, and one that is there
+            if mode:
+                (self.folder / "real.obj").chmod(mode)
+            self.mesh(dem, "link.obj", "--points", 9)
+            self.assertTrue((self.folder / "link.obj").is_symlink())
+            self.assertEqual(len(read_obj(self.folder / "real.obj")[0]), 9)
+        self.assertEqual((self.folder / "real.obj").stat().st_mode & 0o777, 0o640)
+
+    def test_tells_of_voids(self):
+        heights = [[-9999 if x < 10 else h for x, h in enumerate(row)] for row in BUMPS]
+        dem = self.write("dem.asc", grid(heights, PLACE))
+        result = run("mesh", dem, "-o", self.folder / "a.obj", "--points", 9)
+        self.assertIn("of 900 samples and across 300 voids;", result.stdout)
+        result = run("mesh", dem, "-o", self.folder / "a.obj", "--points", 9, "--json")
+        self.assertEqual(json.loads(result.stdout)["input"]["voids"], 300)
+
     def test_says_what_is_wrong_with_its_arguments(self):
         out = self.folder / "a.obj"
         for words, arguments in ((["exactly one goal"], ["--out", out]),
@@ -208,6 +251,13 @@ class Info(unittest.TestCase):
         self.assertLess(info["heights"]["min"], info["heights"]["max"])
         self.assertTrue(info["advice"])
 
+    def test_says_when_the_cache_folder_cannot_keep_anything(self):
+        with tempfile.NamedTemporaryFile() as file:
+            result = run("info", "--cache-dir", file.name, SAMPLE)
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("--cache-dir: ", result.stderr)
+        self.assertIn("403 x 344", result.stdout)
+
     def test_shows_the_others_when_one_fails(self):
         result = run("info", "/nowhere.tif", SAMPLE, "--json")
         self.assertEqual(result.returncode, 1)
@@ -237,6 +287,27 @@ class InfoOfMosaics(InFolder):
             self.assertIn(part, result.stdout)
         self.assertLess(result.stdout.index("a.asc"), result.stdout.index("b.asc"))
         self.assertLess(result.stdout.index("b.asc"), result.stdout.index("coarse.asc"))
+
+    def test_tells_all_that_is_wrong_in_a_folder(self):
+        self.place("a", 10, 0.01)
+        for name in ("b.asc", "c.asc"):
+            self.write(name, grid(BUMPS, PLACE))  # without a reference system
+        self.assert_refused(1, ["b.asc: states no", "c.asc: states no"], "info", self.folder)
+
+    def test_doubts_heights_that_are_hardly_metres(self):
+        self.write("cm.prj", self.WGS84)
+        place = "xllcorner 10\nyllcorner 20\ncellsize 0.01"
+        dem = self.write("cm.asc", grid([[100 * h + 90000 for h in row] for row in BUMPS], place))
+        (info,) = json.loads(run("info", "--json", dem).stdout)
+        self.assertTrue(any("hardly metres" in advice for advice in info["advice"]), info["advice"])
+
+    def test_says_what_a_vrt_needs_to_be_served(self):
+        self.place("a", 10, 0.01)
+        vrt = self.write("a.vrt", f"""<VRTDataset rasterXSize="40" rasterYSize="30"><SRS>{html.escape(self.WGS84)}</SRS>
+            <GeoTransform>10, 0.01, 0, 20.3, 0, -0.01</GeoTransform><VRTRasterBand dataType="Float32" band="1"><SimpleSource>
+            <SourceFilename relativeToVRT="1">a.asc</SourceFilename><SourceBand>1</SourceBand></SimpleSource>
+            </VRTRasterBand></VRTDataset>""")
+        self.assertIn('allowed_drivers of its configuration lists "VRT"', run("info", vrt).stdout)
 
     def test_the_order_of_the_command_line_counts(self):
         fine, coarse = self.place("fine", 10, 0.01), self.place("coarse", 9, 0.1)

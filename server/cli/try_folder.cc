@@ -1,0 +1,24 @@
+#include "server/cli/try_folder.h"
+
+#include <unistd.h>
+
+#include <cerrno>
+#include <system_error>
+
+namespace terrace::cli {
+
+Result<void> TryFolder(const std::filesystem::path& folder) {
+  std::error_code failed;
+  const std::filesystem::path wanted = std::filesystem::absolute(folder, failed);
+  std::filesystem::path existing = wanted;
+  while (existing.has_relative_path() && ::access(existing.c_str(), F_OK) != 0 && errno == ENOENT) {
+    existing = existing.parent_path();
+  }
+  errno = ENOTDIR;
+  if (std::filesystem::is_directory(existing, failed) && ::access(existing.c_str(), W_OK | X_OK) == 0) return {};
+  const std::string in_the_way = existing == wanted ? "used" : "made: " + existing.string();
+  return MakeError(ErrorCode::kUnavailable, "{} cannot be {}: {}; name a directory that may be written to",
+                   folder.string(), in_the_way, std::generic_category().message(errno));
+}
+
+}  // namespace terrace::cli
