@@ -30,15 +30,34 @@ LocalFrame FrameOf(geo::SinCos longitude, geo::SinCos latitude) {
           {latitude.cos * longitude.cos, latitude.cos * longitude.sin, latitude.sin}};
 }
 
-geo::Vec3 LatticeNormal(const LatticeView& lattice, const LocalFrame& frame, geo::SinCos row, tin::SamplePosition p) {
+// A central difference at most kWidestTurn from van Leer's limited one, which is level where one of two steps is: at
+// the foot and at the head of a cliff one step wide. `before` and `after`: the slopes of the two steps.
+double Limited(double central, double before, double after) {
+  constexpr double kTangent = kSinWidestTurn / kCosWidestTurn;
+  const double limited = before * after > 0 ? 2 / (1 / before + 1 / after) : 0, turned = limited * kTangent;
+  if (turned < 1) central = std::min(central, (limited + kTangent) / (1 - turned));
+  if (turned > -1) central = std::max(central, (limited - kTangent) / (1 + turned));
+  return central;
+}
+
+geo::Vec3 LatticeNormal(const LatticeView& lattice, const LocalFrame& frame, geo::SinCos row, tin::SamplePosition p,
+                        bool is_on_edge) {
   const double latitude = lattice.Latitude(p.y), step = lattice.lattice.StepDegrees();
   if (latitude <= -90 || latitude >= 90) return frame.up;
   const double rise_east =
       static_cast<double>(lattice.At(p.x + 1, p.y)) - static_cast<double>(lattice.At(p.x - 1, p.y));
   const double rise_north =
       static_cast<double>(lattice.At(p.x, p.y + 1)) - static_cast<double>(lattice.At(p.x, p.y - 1));
-  const double east = rise_east / (2 * step * geo::MetresPerDegreeEast(row));
-  const double north = rise_north / (2 * step * geo::MetresPerDegreeNorth(row));
+  const double across_east = 2 * step * geo::MetresPerDegreeEast(row);
+  const double across_north = 2 * step * geo::MetresPerDegreeNorth(row);
+  double east = rise_east / across_east, north = rise_north / across_north;
+  if (is_on_edge) {
+    const double height = static_cast<double>(lattice.At(p.x, p.y));
+    const double from_west = 2 * (height - static_cast<double>(lattice.At(p.x - 1, p.y))) / across_east;
+    const double from_south = 2 * (height - static_cast<double>(lattice.At(p.x, p.y - 1))) / across_north;
+    east = Limited(east, from_west, 2 * east - from_west);
+    north = Limited(north, from_south, 2 * north - from_south);
+  }
   // hypot minds overflow, and takes its time for it.
   constexpr double kSurelyTame = 0.99 * kSteepestSlope;
   const bool is_tame = east * east + north * north < kSurelyTame * kSurelyTame;
@@ -76,8 +95,9 @@ std::vector<geo::Vec3> VertexNormals(const LatticeView& lattice, const tin::TinM
   for (std::size_t k = 0; k < mesh.vertices.size(); ++k) {
     const tin::SamplePosition p = mesh.vertices[k];
     const LocalFrame frame = FrameOf(angles.columns[p.x], angles.rows[p.y]);
-    geo::Vec3 normal = LatticeNormal(lattice, frame, angles.rows[p.y], p);
-    if (p.x > 0 && p.y > 0 && p.x < lattice.cells() && p.y < lattice.cells()) {
+    const bool is_on_edge = p.x == 0 || p.y == 0 || p.x == lattice.cells() || p.y == lattice.cells();
+    geo::Vec3 normal = LatticeNormal(lattice, frame, angles.rows[p.y], p, is_on_edge);
+    if (!is_on_edge) {
       const geo::Vec3 turned = TurnTowards(normal, geo::Normalized(of_mesh[k]));
       if (geo::Dot(turned, frame.up) > kLowestUp) normal = turned;
     }

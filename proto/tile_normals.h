@@ -14,10 +14,11 @@ namespace terrace::proto {
 
 // Unit normals in ECEF, one per vertex of `mesh`, whose vertices the wire puts at `positions` (ECEF).
 //
-// On the edges the gradient of the heights, by central differences over one lattice step on each side: a function of
-// the global node and so equal in every tile that shares it; on a pole the ellipsoid's normal. Inside the same, but
-// turned to within 13 degrees of the mesh's own area-weighted normal: where the mesh drops relief that the lattice has,
-// and at cliffs, light must still fit the triangles that it falls on.
+// On the edges the gradient of the heights, by central differences over one lattice step on each side, each within 13
+// degrees of the limited difference (van Leer, "Towards the ultimate conservative difference scheme. II", 1974): a
+// function of the global node and so equal in every tile that shares it; on a pole the ellipsoid's normal. Inside the
+// plain gradient, turned to within 13 degrees of the mesh's own area-weighted normal: where the mesh drops relief that
+// the lattice has, and at cliffs, light must still fit the triangles that it falls on.
 std::vector<geo::Vec3> VertexNormals(const LatticeView& lattice, const tin::TinMesh& mesh,
                                      const std::vector<geo::Vec3>& positions);
 

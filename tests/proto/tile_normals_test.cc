@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 
@@ -92,6 +93,24 @@ TEST(TileNormals, StayNearTheMeshInside) {
   const geo::Vec3 up = geo::SurfaceNormal(ground.view().Longitude(16), ground.view().Latitude(16));
   EXPECT_LT(DegreesBetween(normals[4], up), 14.5);
   EXPECT_GT(DegreesBetween(normals[4], up), 11);
+}
+
+// One step wide, across a corner: whichever way it falls, level ground at its head and foot is lit as such. A slope of
+// two steps is one.
+TEST(TileNormals, OnEdgesACliffIsNoSlope) {
+  const geo::TileKey key{13, 8192, 4096};
+  constexpr double kCliff = 3000;
+  for (const bool is_along_x : {true, false}) {
+    for (const int end : {-1, 0, 1, 2}) {  // where it is level again
+      const Ground ground(key, [&](int i, int j) { return (is_along_x ? i : j) < end ? kCliff : 0; });
+      const auto normals = NormalsOf(ground, Fan(16, 16));
+      const geo::Vec3 up = geo::SurfaceNormal(ground.view().Longitude(0), ground.view().Latitude(0));
+      EXPECT_LT(DegreesBetween(normals[0], up), 14.5) << is_along_x << ' ' << end;
+    }
+    const Ground slope(key, [&](int i, int j) { return -kCliff * std::clamp(is_along_x ? i : j, -1, 1); });
+    const geo::Vec3 up = geo::SurfaceNormal(slope.view().Longitude(0), slope.view().Latitude(0));
+    EXPECT_GT(DegreesBetween(NormalsOf(slope, Fan(16, 16))[0], up), 80);
+  }
 }
 
 TEST(TileNormals, AreTheEllipsoidsAtThePole) {
