@@ -11,7 +11,10 @@ Result<void> TryFolder(const std::filesystem::path& folder) {
   std::error_code failed;
   const std::filesystem::path wanted = std::filesystem::absolute(folder, failed);
   std::filesystem::path existing = wanted;
-  while (existing.has_relative_path() && ::access(existing.c_str(), F_OK) != 0 && errno == ENOENT) {
+  const auto is_missing = [](const std::filesystem::path& path) {
+    return ::access(path.c_str(), F_OK) != 0 && (errno == ENOENT || errno == ENOTDIR);
+  };
+  while (existing.has_relative_path() && is_missing(existing)) {
     existing = existing.parent_path();
   }
   errno = ENOTDIR;

@@ -339,8 +339,8 @@ class DiskCache(unittest.TestCase):
     def test_what_is_no_directory_is_refused(self):
         file = pathlib.Path(self.scratch.name) / "file"
         file.write_text("")
-        self.assertIn(f"terrace: disk_cache: {file}/cache cannot be made: ", self.refused(file / "cache"))
-        self.assertIn(f"terrace: disk_cache: {file} cannot be made: ", self.refused(file))
+        self.assertIn(f"terrace: disk_cache: {file}/cache cannot be made: {file}: Not a", self.refused(file / "cache"))
+        self.assertIn(f"terrace: disk_cache: {file} cannot be used: Not a directory", self.refused(file))
 
     def test_a_damaged_store_is_begun_anew(self):
         some = self.paths[:50]
