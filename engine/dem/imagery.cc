@@ -86,6 +86,10 @@ Result<std::unique_ptr<Imagery>> Imagery::Open(const std::string& path, const Ge
   const auto before = StampOf(path);
   auto image = ImageFile::Open(path);
   if (!image) return tl::unexpected(image.error());
+  constexpr int kMostBands = 4;  // red, green, blue and alpha
+  if (auto complete = CheckComplete(image->dataset(), path, kMostBands); !complete) {
+    return tl::unexpected(complete.error());
+  }
   auto files = StampedFiles::OfOpened(FilesOf(image->dataset(), path), before);
   if (!files) return tl::unexpected(files.error());
   auto georeference = Georeference::Of(image->dataset(), path);

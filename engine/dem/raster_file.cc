@@ -86,38 +86,58 @@ Result<void> CheckShape(GDALDataset& dataset, const std::string& path) {
   return {};
 }
 
-// A GeoTIFF's directory says where each of its blocks lies. A file that was cut short, by a copy that broke off, opens
-// all the same, and would fail in the tiles of what is not there.
-Result<void> CheckComplete(GDALDataset& dataset, const std::string& path) {
-  if (!EQUAL(dataset.GetDriverName(), "GTiff") || IsRemote(path)) return {};
-  std::error_code unknown;
-  const std::uint64_t size = std::filesystem::file_size(path, unknown);
-  if (unknown) return {};
-  const char* const interleave = dataset.GetMetadataItem("INTERLEAVE", "IMAGE_STRUCTURE");
-  const bool is_by_pixel = interleave != nullptr && EQUAL(interleave, "PIXEL");
-  constexpr std::int64_t kMostBlocks = std::int64_t{1} << 20;  // about a second
-  std::uint64_t end = 0;
-  for (int number = 1; number <= (is_by_pixel ? 1 : dataset.GetRasterCount()); ++number) {
-    GDALRasterBand& band = *dataset.GetRasterBand(number);
-    int block_width = 0, block_height = 0;
-    band.GetBlockSize(&block_width, &block_height);
-    const int columns = (band.GetXSize() - 1) / block_width + 1, rows = (band.GetYSize() - 1) / block_height + 1;
-    if (std::int64_t{columns} * rows > kMostBlocks) return {};  // reading them says the same, later
+// Where the blocks of a GeoTIFF's bands end, at least, as its directory says.
+class BlockEnds {
+ public:
+  explicit BlockEnds(GDALDataset& dataset) {
+    const auto structure = [&dataset](const char* item) { return dataset.GetMetadataItem(item, "IMAGE_STRUCTURE"); };
+    is_compressed_ = structure("COMPRESSION") != nullptr;
+    const char* const interleave = structure("INTERLEAVE");
+    bands_of_block_ = interleave != nullptr && EQUAL(interleave, "PIXEL") ? dataset.GetRasterCount() : 1;
+  }
+
+  std::uint64_t last() const { return last_; }
+
+  void Add(GDALRasterBand& band) {
+    int width = 0, height = 0;
+    band.GetBlockSize(&width, &height);
+    const int columns = (band.GetXSize() - 1) / width + 1, rows = (band.GetYSize() - 1) / height + 1;
     for (int row = 0; row < rows; ++row) {
-      for (int column = 0; column < columns; ++column) {
-        const auto of_block = [&](const char* what) -> std::uint64_t {
-          const char* const text = band.GetMetadataItem(fmt::format("{}_{}_{}", what, column, row).c_str(), "TIFF");
-          return text == nullptr ? 0 : std::strtoull(text, nullptr, 10);
-        };
-        end = std::max(end, of_block("BLOCK_OFFSET") + of_block("BLOCK_SIZE"));
+      for (int column = 0; column < columns && looked_at_ < kMostBlocks; ++column, ++looked_at_) {
+        const std::uint64_t offset = Tell(band, "BLOCK_OFFSET", column, row);
+        if (offset == 0) continue;  // it has none: zeros
+        std::uint64_t bytes = Tell(band, "BLOCK_SIZE", column, row);
+        // The last strip may state those of a whole one, and is read by the rows that it has; a tile is read whole.
+        const int strip_rows = std::min(height, band.GetYSize() - row * height);
+        if (!is_compressed_)
+          bytes = std::min(bytes, BytesOf(band, width, width == band.GetXSize() ? strip_rows : height));
+        last_ = std::max(last_, offset + bytes);
       }
     }
   }
-  if (end <= size) return {};
-  return MakeError(ErrorCode::kUnavailable,
-                   "{}: is cut short: it has {} bytes, and its last samples lie up to byte {}; copy it again", path,
-                   size, end);
-}
+
+ private:
+  static constexpr std::int64_t kMostBlocks = std::int64_t{1} << 20;  // half a second
+
+  static std::uint64_t Tell(GDALRasterBand& band, const char* what, int column, int row) {
+    const char* const text = band.GetMetadataItem(fmt::format("{}_{}_{}", what, column, row).c_str(), "TIFF");
+    return text == nullptr ? 0 : std::strtoull(text, nullptr, 10);
+  }
+
+  // At least: bits of samples below a byte are not counted.
+  std::uint64_t BytesOf(GDALRasterBand& band, int width, int rows) const {
+    const char* const bits = band.GetMetadataItem("NBITS", "IMAGE_STRUCTURE");
+    if (bits != nullptr) return 1;
+    const auto sample = static_cast<std::uint64_t>(GDALGetDataTypeSizeBytes(band.GetRasterDataType()));
+    return sample * static_cast<std::uint64_t>(bands_of_block_) * static_cast<std::uint64_t>(width) *
+           static_cast<std::uint64_t>(rows);
+  }
+
+  bool is_compressed_ = false;
+  int bands_of_block_ = 1;
+  std::int64_t looked_at_ = 0;
+  std::uint64_t last_ = 0;
+};
 
 }  // namespace
 
@@ -169,8 +189,29 @@ Result<GDALDatasetUniquePtr> OpenRaster(const std::string& path, int overview) {
                      path, problem, path);
   }
   if (auto shape = CheckShape(*dataset, path); !shape) return tl::unexpected(shape.error());
-  if (auto complete = CheckComplete(*dataset, path); !complete) return tl::unexpected(complete.error());
   return dataset;
+}
+
+Result<void> CheckComplete(GDALDataset& dataset, const std::string& path, int bands) {
+  if (!EQUAL(dataset.GetDriverName(), "GTiff") || IsRemote(path)) return {};
+  std::error_code unknown;
+  const std::uint64_t size = std::filesystem::file_size(path, unknown);
+  if (unknown) return {};
+  const bool has_own_overviews = !std::filesystem::exists(path + ".ovr", unknown);
+  const bool has_own_mask = !std::filesystem::exists(path + ".msk", unknown);
+  BlockEnds ends(dataset);
+  for (int number = 1; number <= std::min(bands, dataset.GetRasterCount()); ++number) {
+    GDALRasterBand& band = *dataset.GetRasterBand(number);
+    ends.Add(band);
+    for (int i = 0; has_own_overviews && i < band.GetOverviewCount(); ++i) {
+      if (GDALRasterBand* const overview = band.GetOverview(i)) ends.Add(*overview);
+    }
+    if (has_own_mask && (band.GetMaskFlags() & GMF_PER_DATASET) != 0) ends.Add(*band.GetMaskBand());
+  }
+  if (ends.last() <= size) return {};
+  return MakeError(ErrorCode::kUnavailable,
+                   "{}: is cut short: it has {} bytes, and its last samples lie up to byte {}; copy it again", path,
+                   size, ends.last());
 }
 
 std::vector<std::string> FilesOf(GDALDataset& dataset, const std::string& path) {

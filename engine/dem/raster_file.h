@@ -22,6 +22,11 @@ bool IsRaster(const std::string& path);
 // The same without the checks, for further handles on a file that passed them; null when it cannot be opened.
 GDALDatasetUniquePtr ReopenRaster(const std::string& path, int overview = -1);
 
+// Refuses (kUnavailable) a GeoTIFF that ends before the samples, overviews or mask of its first bands do: one that a
+// copy left unfinished opens all the same, and would fail in the tiles of what is not there. Remote files are not
+// looked at.
+Result<void> CheckComplete(GDALDataset& dataset, const std::string& path, int bands = 1);
+
 // The file, and those that GDAL reads with it: overviews, masks, the parts of a mosaic.
 std::vector<std::string> FilesOf(GDALDataset& dataset, const std::string& path);
 

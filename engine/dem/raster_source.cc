@@ -112,6 +112,9 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
   const auto start = std::chrono::steady_clock::now();
   const auto before = StampOf(path);
   auto dataset = OpenRaster(path);
+  if (dataset) {
+    if (auto complete = CheckComplete(**dataset, path); !complete) return tl::unexpected(complete.error());
+  }
   if (!dataset) return tl::unexpected(dataset.error());
   auto files = StampedFiles::OfOpened(FilesOf(**dataset, path), before);
   if (!files) return tl::unexpected(files.error());

@@ -100,6 +100,7 @@ Result<std::unique_ptr<WaterRaster>> WaterRaster::Open(const std::string& path, 
   const auto before = StampOf(path);
   auto dataset = OpenRaster(path);
   if (!dataset) return tl::unexpected(dataset.error());
+  if (auto complete = CheckComplete(**dataset, path); !complete) return tl::unexpected(complete.error());
   auto files = StampedFiles::OfOpened(FilesOf(**dataset, path), before);
   if (!files) return tl::unexpected(files.error());
   auto georeference = Georeference::Of(**dataset, path);

@@ -121,7 +121,8 @@ void DataDependentCriterion::Keep(WalkPlace place) {
   kept_[place.kept] = pending_[place.pending];
 }
 
-// Sets the fits that it had to find out. Equal fits, frequent where heights are whole metres: the better shape.
+// Sets the fits that it had to find out; that of u-v is known before with maxima. Equal fits, frequent where heights
+// are whole metres: the better shape.
 bool DataDependentCriterion::IsBetterAlongPw(const Quadrilateral& q, TriangleId beyond, FitId& uv, FitId& halves) {
   const ShapeQuality quality = ShapeQualityOf(q);
   const bool is_shaped_better = quality.pw > quality.uv;
@@ -276,8 +277,7 @@ void DataDependentCriterion::End(const Star& star) {
     std::size_t edge = i;
     if (!star.is_closed) [[unlikely]]
       edge = (star.gap + 1 + i) % outline;
-    if (kept_[edge] == kUnknownFit && UsesMaxima()) [[unlikely]]
-      kept_[edge] = FitAround<2>(vertex_, {star.ring[i], star.ring[i + 1]});
+    TERRACE_CHECK(kept_[edge] != kUnknownFit || !UsesMaxima());  // all that an edge can come from is fitted
     const Fit& fit = fits_[kept_[edge]];
     known_[star.triangles[i]] = Remembered(fit);
     misfits_[i] = {fit.distance, fit.worst};

@@ -55,8 +55,8 @@ struct Star {
   bool is_closed = true;
   bool has_border = false;  // some triangle may have an edge on the border
   std::size_t count = 0;
-  std::size_t gap =
-      0;  // of an open one: the edge of the walk's outline that holds the centre; the ring begins after it
+  // Of an open one: the edge of the walk's outline that holds the centre. The ring begins after it.
+  std::size_t gap = 0;
   Ring ring;
   std::vector<TriangleId> triangles;  // `count` of them are valid; those of an insertion are padded as a ring is
   std::vector<HalfEdgeId> outside;    // by triangle: the twin of the ring's edge

@@ -171,8 +171,8 @@ int Info(const std::vector<std::string>& dems, const std::string& vertical, cons
   int exit_code = dem::AllowVrts() ? kExitOk : kExitFailure;
   if (!cache_dir.empty()) {
     if (const auto folder = TryFolder(cache_dir); !folder) {
-      exit_code =
-          Fail(fmt::format("--cache-dir: {}; nothing that is learnt is kept", folder.error().message), kExitFailure);
+      std::fprintf(stderr, "terrace: --cache-dir: %s; what is learnt anew is not kept\n",
+                   folder.error().message.c_str());
     }
   }
   nlohmann::json all = nlohmann::json::array();
@@ -226,7 +226,7 @@ void AddInfo(CLI::App& app, int& exit_code) {
   command->add_option("--cache-dir", *cache_dir, "Keeps what is learnt in this folder, for 'terrace serve --cache-dir'")
       ->type_name("DIR");
   command->callback([dems, vertical, cache_dir, json, mosaic, &exit_code] {
-    exit_code = Info(*dems, *vertical, *cache_dir, *json, *mosaic);
+    exit_code = FinishOutput(Info(*dems, *vertical, *cache_dir, *json, *mosaic));
   });
 }
 

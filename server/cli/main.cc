@@ -91,11 +91,7 @@ int main(int argc, char** argv) {
   try {
     // Before there are threads.
     terrace::dem::ClearGdalEnvironment();
-    const int exit_code = terrace::cli::Run(argc, argv);
-    // What is asked for on stdout is not there before it has been taken.
-    if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return exit_code;
-    std::perror("terrace: stdout cannot be written");
-    return exit_code == terrace::cli::kExitOk ? terrace::cli::kExitFailure : exit_code;
+    return terrace::cli::Run(argc, argv);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "terrace: %s\n", error.what());
     return terrace::cli::kExitFailure;

@@ -264,7 +264,7 @@ void AddMesh(CLI::App& app, int& exit_code) {
                     "Drops vertices that the bound does not need; with --max-error only");
   AddColorOptions(*command, arguments->color);
   command->add_flag("--json", arguments->json, "Statistics as JSON on stdout");
-  command->callback([arguments, &exit_code] { exit_code = Mesh(*arguments); });
+  command->callback([arguments, &exit_code] { exit_code = FinishOutput(Mesh(*arguments)); });
 }
 
 }  // namespace terrace::cli

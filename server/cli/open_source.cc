@@ -50,14 +50,10 @@ std::string NameOf(const std::vector<config::SourceConfig>& sources) {
 
 Result<void> TryReading(const config::DatasetConfig& dataset) {
   const auto read = [&](const std::string& path, const char* remedy) -> Result<void> {
-    if (path.empty()) return {};
-    if (path.starts_with('/') && !path.starts_with("/vsi") && ::access(path.c_str(), R_OK) != 0) {
-      return MakeError(ErrorCode::kNotFound, "dataset {}: {}: {}; give the path of a raster file on this machine{}",
-                       dataset.name, path, std::generic_category().message(errno), remedy);
-    }
-    const Result<void> allowed = dem::CheckSourceName(path);
-    if (allowed) return {};
-    return MakeError(allowed.error().code, "dataset {}: {}", dataset.name, allowed.error().message);
+    // Other names are GDAL's to resolve.
+    if (!path.starts_with('/') || path.starts_with("/vsi") || ::access(path.c_str(), R_OK) == 0) return {};
+    return MakeError(ErrorCode::kNotFound, "dataset {}: {}: {}; give the path of a raster file on this machine{}",
+                     dataset.name, path, std::generic_category().message(errno), remedy);
   };
   for (const config::SourceConfig& source : dataset.sources) {
     for (const std::string& file : source.files) {
@@ -66,6 +62,25 @@ Result<void> TryReading(const config::DatasetConfig& dataset) {
   }
   if (Result<void> readable = read(dataset.imagery.image, ""); !readable) return readable;
   return read(dataset.water.mask, ", or for a sea level a number of metres");
+}
+
+Result<void> TryPolicy(const config::DatasetConfig& dataset) {
+  const auto checked = [&](const Result<void>& allowed) -> Result<void> {
+    if (allowed) return {};
+    return MakeError(allowed.error().code, "dataset {}: {}", dataset.name, allowed.error().message);
+  };
+  for (const config::SourceConfig& source : dataset.sources) {
+    for (const std::string& file : source.files) {
+      // What a folder has besides rasters is left out when it is opened, whatever it is.
+      const Result<void> allowed = source.is_folder ? dem::CheckPlainFile(file) : dem::CheckSourceName(file);
+      if (!allowed) return checked(allowed);
+    }
+  }
+  for (const std::string* layer : {&dataset.imagery.image, &dataset.water.mask}) {
+    if (layer->empty()) continue;
+    if (const Result<void> allowed = dem::CheckSourceName(*layer); !allowed) return checked(allowed);
+  }
+  return {};
 }
 
 Result<std::unique_ptr<dem::DemSource>> OpenSource(const config::DatasetConfig& wanted, const std::string& cache_dir,

@@ -21,9 +21,11 @@ std::size_t FileCount(const std::vector<config::SourceConfig>& sources);
 // For messages: "alps.tif", "alps.tif and 2 more sources".
 std::string NameOf(const std::vector<config::SourceConfig>& sources);
 
-// Whether the dataset's files on this machine are there and may be read, by this process and by the policy of sources
-// (dem::SetSourcePolicy), told without opening them: masks and images as well. The error names the first that may not.
+// Whether the dataset's files on this machine are there and may be read, told without opening them: masks and images
+// as well. The error names the first that may not.
 Result<void> TryReading(const config::DatasetConfig& dataset);
+// The same by the policy of sources (dem::SetSourcePolicy) that is in force.
+Result<void> TryPolicy(const config::DatasetConfig& dataset);
 
 // Opens and scans all of them; what is learnt is kept in `cache_dir`, if it is not empty. Errors name the file and the
 // remedy. `fault`: dem::DemOptions.

@@ -18,8 +18,12 @@ fs::path TargetOf(const fs::path& path) {
   if (!fs::is_symlink(path, failed)) return path;
   fs::path target = fs::canonical(path, failed);
   if (!failed) return target;
-  target = fs::read_symlink(path, failed);  // to a file that is yet to be
-  return failed ? path : path.parent_path() / target;
+  target = path;  // which leads to a file that is yet to be
+  constexpr int kMostLinks = 40;
+  for (int links = 0; links < kMostLinks && fs::is_symlink(target, failed); ++links) {
+    target = target.parent_path() / fs::read_symlink(target, failed);
+  }
+  return target;
 }
 
 }  // namespace
@@ -44,6 +48,9 @@ Result<OutputFile> OutputFile::Open(const std::string& path) {
     return MakeError(ErrorCode::kUnavailable, "cannot write {}: {}; choose a folder that exists and is writable", path,
                      std::generic_category().message(errno));
   }
+  // At once: nobody shall read meanwhile what was not theirs to read.
+  const fs::perms permissions = fs::status(file.target_, ignored).permissions();
+  if (permissions != fs::perms::unknown) fs::permissions(file.unfinished_->path(), permissions, ignored);
   return file;
 }
 
@@ -51,8 +58,6 @@ Result<void> OutputFile::Commit() {
   stream_.close();
   if (!stream_) return MakeError(ErrorCode::kUnavailable, "writing {} failed; is the disk full?", path_);
   std::error_code error;
-  const fs::perms permissions = fs::status(target_, error).permissions();
-  if (!error && permissions != fs::perms::unknown) fs::permissions(unfinished_->path(), permissions, error);
   fs::rename(unfinished_->path(), target_, error);
   if (error) return MakeError(ErrorCode::kUnavailable, "cannot replace {}: {}", path_, error.message());
   return {};

@@ -18,8 +18,7 @@ class OutputFile {
   // to, or the file is there and may not be written.
   static Result<OutputFile> Open(const std::string& path);
 
-  // Without Commit nothing is left, and what was at `path` before is still there; an interrupted process leaves nothing
-  // either.
+  // Without Commit nothing is left, and what was at `path` before is still there (UnfinishedFile).
   std::ostream& stream() { return stream_; }
 
   // Replaces what is at `path`, whose permissions stay. kUnavailable: what was written did not all reach the disk.

@@ -21,6 +21,7 @@
 #include "config/parse.h"
 #include "engine/dem/source_policy.h"
 #include "server/cli/command.h"
+#include "server/cli/fail.h"
 #include "server/cli/log.h"
 #include "server/cli/open_layers.h"
 #include "server/cli/open_source.h"
@@ -31,6 +32,7 @@
 #include "server/reload/reloader.h"
 #include "server/server.h"
 #include "server/tiles/disk_cache.h"
+#include "server/tiles/encoder_version.h"
 #include "server/tiles/pipeline_catalog.h"
 #include "server/tiles/tile_pipeline.h"
 
@@ -264,8 +266,10 @@ int TryStart(const config::Config& config, bool is_running) {
     note(MakeError(ErrorCode::kNotFound, "viewer {}: is no folder; name one with a web page, or true or false",
                    viewer.string()));
   }
-  if (!config.disk_cache.directory.empty()) {
-    if (const auto folder = TryFolder(config.disk_cache.directory); !folder) {
+  // One that is there is opened even where its disk has become read-only: a cache is no reason not to start.
+  const std::filesystem::path cache = config.disk_cache.directory;
+  if (!cache.empty() && !std::filesystem::exists(cache / "lock", ignored)) {
+    if (const auto folder = TryFolder(cache); !folder) {
       note(MakeError(folder.error().code, "disk_cache: {}", folder.error().message));
     }
   }
@@ -273,8 +277,9 @@ int TryStart(const config::Config& config, bool is_running) {
   const Result<void> policy =
       dem::SetSourcePolicy({config.data_roots, config.allowed_prefixes, config.allowed_drivers});
   note(policy);
-  if (policy) {
-    for (const config::DatasetConfig& dataset : config.datasets) note(TryReading(dataset));
+  for (const config::DatasetConfig& dataset : config.datasets) {
+    const Result<void> readable = TryReading(dataset);
+    note(readable && policy ? TryPolicy(dataset) : readable);
   }
   for (const Error& error : errors) std::fprintf(stderr, "terrace: %s\n", error.message.c_str());
   if (!policy) return kExitUsage;
@@ -287,7 +292,7 @@ int CheckConfig(const ServeArguments& arguments, const config::Config& config) {
   fmt::print(
       "terrace: the configuration{}{} is fine: {} dataset{}; rasters were not opened, 'terrace info' does that\n",
       arguments.config_file.empty() ? "" : " ", arguments.config_file, count, count == 1 ? "" : "s");
-  return kExitOk;
+  return FinishOutput(kExitOk);
 }
 
 int Serve(const ServeArguments& arguments) {
@@ -297,10 +302,11 @@ int Serve(const ServeArguments& arguments) {
   if (!errors.empty()) return Report(errors, arguments.config_file);
   if (arguments.print_config) {
     std::fputs(config::ToJson(config).c_str(), stdout);
-    return kExitOk;
+    return FinishOutput(kExitOk);
   }
   SetUpLog(config.log_level, config.log_format);
   if (arguments.check_config) return CheckConfig(arguments, config);
+  server::EncoderVersion();  // of the libraries there are, before GDAL or the system's resolver loads others
   if (const int exit_code = TryStart(config, /*is_running=*/false); exit_code != kExitOk) return exit_code;
   // Before sources are opened, which may take long.
   Result<std::shared_ptr<server::DiskCache>> disk = OpenDiskCache(config.disk_cache);

@@ -11,8 +11,9 @@ Result<void> TryFolder(const std::filesystem::path& folder) {
   std::error_code failed;
   const std::filesystem::path wanted = std::filesystem::absolute(folder, failed);
   std::filesystem::path existing = wanted;
-  const auto is_missing = [](const std::filesystem::path& path) {
-    return ::access(path.c_str(), F_OK) != 0 && (errno == ENOENT || errno == ENOTDIR);
+  // A link to nowhere is there: no folder can be made of its name.
+  const auto is_missing = [&failed](const std::filesystem::path& path) {
+    return std::filesystem::symlink_status(path, failed).type() == std::filesystem::file_type::not_found;
   };
   while (existing.has_relative_path() && is_missing(existing)) {
     existing = existing.parent_path();

@@ -6,7 +6,7 @@
 namespace terrace::cli {
 
 // One at a time. The file goes with this object, and where SIGINT, SIGTERM or SIGHUP ends the process, which they then
-// do as ever; those that are ignored stay ignored.
+// do as ever; those that are ignored stay ignored. Whatever else ends a process leaves it.
 class UnfinishedFile {
  public:
   explicit UnfinishedFile(std::string path);

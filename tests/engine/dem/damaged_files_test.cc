@@ -5,6 +5,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <filesystem>
 #include <fstream>
 #include <random>
 #include <sstream>
@@ -109,6 +110,63 @@ TEST(DamagedFiles, CrashHangAndSwellNothing) {
     ASSERT_LT(opened_badly, 5) << "enough seen";
   }
   RecordProperty("files", kFiles);
+}
+
+// Its overviews and its mask, which lie at the end of the file, as much as its samples.
+TEST(DamagedFiles, WhatBelongsToAGeoTiffMayBeCutToo) {
+  const TempDir dir;
+  RasterSpec spec{.width = 600, .height = 400, .type = "Byte", .geo_transform = {8, .001, 0, 47, 0, -.001}};
+  spec.value = [](int col, int row) { return (col * 7 + row) % 200; };
+  const std::string plain = WriteRaster(dir, spec);
+  const GeoBounds around = (*DemSource::Open(plain))->info().bounds;
+  const auto copy = [&](const std::string& name, bool has_mask) {
+    const std::string path = dir.File(name);
+    std::filesystem::copy_file(plain, path);
+    CPLSetConfigOption("GDAL_TIFF_INTERNAL_MASK", "YES");
+    const GDALDatasetUniquePtr dataset(GDALDataset::Open(path.c_str(), GDAL_OF_RASTER | GDAL_OF_UPDATE));
+    int factor = 2;
+    const auto done = has_mask ? dataset->CreateMaskBand(GMF_PER_DATASET)
+                               : dataset->BuildOverviews("AVERAGE", 1, &factor, 0, nullptr, nullptr, nullptr);
+    EXPECT_EQ(done, CE_None);
+    if (has_mask) {
+      EXPECT_EQ(dataset->GetRasterBand(1)->GetMaskBand()->Fill(255), CE_None);
+    }
+    CPLSetConfigOption("GDAL_TIFF_INTERNAL_MASK", nullptr);
+    return path;
+  };
+  for (const std::string& path : {copy("overviews.tif", false), copy("mask.tif", true)}) {
+    const auto whole = WaterRaster::Open(path, around);
+    ASSERT_TRUE(whole) << whole.error().message;
+    const std::string bytes = ReadFile(path);
+    std::ofstream(path, std::ios::binary) << bytes.substr(0, bytes.size() - 40);
+    const auto mask = WaterRaster::Open(path, around);
+    ASSERT_FALSE(mask) << path;
+    EXPECT_NE(mask.error().message.find("is cut short"), std::string::npos) << mask.error().message;
+  }
+}
+
+// Libraries read the last strip of samples that are not compressed by the rows that it has, whatever size it states.
+TEST(DamagedFiles, AStripMayStateMoreThanItHas) {
+  const TempDir dir;
+  RasterSpec spec{.width = 600, .height = 200, .type = "Int16", .geo_transform = {8, .001, 0, 47, 0, -.001}};
+  spec.value = [](int col, int row) { return col + row; };
+  const std::string path = WriteRaster(dir, spec);
+  const GDALDatasetUniquePtr plain(GDALDataset::Open(path.c_str()));
+  const char* const options[] = {"BLOCKYSIZE=64", nullptr};
+  GDALDriver* const driver = GetGDALDriverManager()->GetDriverByName("GTiff");
+  const std::string strips = dir.File("strips.tif");
+  driver->CreateCopy(strips.c_str(), plain.get(), FALSE, const_cast<char**>(options), nullptr, nullptr)->ReleaseRef();
+  std::string bytes = ReadFile(strips);
+  // StripByteCounts of 64 rows three times, then of the 8 that are left.
+  const std::uint32_t of_whole = 64 * 600 * 2, of_last = 8 * 600 * 2;
+  const std::uint32_t counts[] = {of_whole, of_whole, of_whole, of_last};
+  const std::size_t at = bytes.find(std::string(reinterpret_cast<const char*>(counts), sizeof counts));
+  ASSERT_NE(at, std::string::npos);
+  bytes.replace(at + 12, 4, reinterpret_cast<const char*>(&of_whole), 4);
+  std::ofstream(strips, std::ios::binary) << bytes;
+  const auto source = DemSource::Open(strips);
+  ASSERT_TRUE(source) << source.error().message;
+  EXPECT_EQ((*source)->info().heights.max, 798);
 }
 
 // Before a sample is read: a tile far from where the file ends would not tell.

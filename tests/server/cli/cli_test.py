@@ -147,7 +147,11 @@ class Config(unittest.TestCase):
                 self.assertEqual((result.returncode, result.stdout), (code, ""), (options, result.stderr))
                 for word in words:
                     self.assertIn(word, result.stderr)
-        fine = self.write(json.dumps({"datasets": [{"name": "a", "sources": [dem]}], "disk_cache": {"directory": "x/y"}}))
+        # What a folder has besides rasters is none of the datasets' files.
+        (self.folder / "dems").mkdir()
+        (self.folder / "dems/a.tif").symlink_to(dem)
+        (self.folder / "dems/index.vrt").write_text("<VRTDataset>", encoding="utf-8")
+        fine = self.write(json.dumps({"datasets": [{"name": "a", "sources": ["dems"]}], "disk_cache": {"directory": "x/y"}}))
         self.assertEqual(run("serve", "--config", fine, "--check-config").returncode, 0)
         self.assertFalse((self.folder / "x").exists())
 

@@ -194,7 +194,8 @@ class Mesh(InFolder):
 
     def test_keeps_links_and_permissions(self):
         dem = self.write("dem.asc", grid(BUMPS, PLACE))
-        (self.folder / "link.obj").symlink_to("real.obj")
+        (self.folder / "link.obj").symlink_to("between.obj")
+        (self.folder / "between.obj").symlink_to("real.obj")
         for mode in (None, 0o640):  # a file that is yet to be, and one that is there
             if mode:
                 (self.folder / "real.obj").chmod(mode)
@@ -254,7 +255,7 @@ class Info(unittest.TestCase):
     def test_says_when_the_cache_folder_cannot_keep_anything(self):
         with tempfile.NamedTemporaryFile() as file:
             result = run("info", "--cache-dir", file.name, SAMPLE)
-        self.assertEqual(result.returncode, 1)
+        self.assertEqual(result.returncode, 0)
         self.assertIn("--cache-dir: ", result.stderr)
         self.assertIn("403 x 344", result.stdout)
 
