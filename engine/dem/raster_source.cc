@@ -60,8 +60,7 @@ std::string DoubtsOf(const HeightRange& heights) {
   if (heights.max <= kHighest && heights.min >= kDeepest) return "";
   return fmt::format(
       "heights from {:g} to {:g} m are hardly metres (Earth has -10,935 to 8,849), and those beyond {:g} count as "
-      "voids: "
-      "state the metres a unit has with `gdal_translate -a_scale FACTOR in out`, 0.01 for centimetres",
+      "voids: state the metres a unit has with `gdal_translate -a_scale FACTOR in out`, 0.01 for centimetres",
       heights.min, heights.max, kMaxAbsHeight);
 }
 
@@ -112,10 +111,8 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
   const auto start = std::chrono::steady_clock::now();
   const auto before = StampOf(path);
   auto dataset = OpenRaster(path);
-  if (dataset) {
-    if (auto complete = CheckComplete(**dataset, path); !complete) return tl::unexpected(complete.error());
-  }
   if (!dataset) return tl::unexpected(dataset.error());
+  if (auto complete = CheckComplete(**dataset, path); !complete) return tl::unexpected(complete.error());
   auto files = StampedFiles::OfOpened(FilesOf(**dataset, path), before);
   if (!files) return tl::unexpected(files.error());
   auto georeference = Georeference::Of(**dataset, path);

@@ -11,8 +11,7 @@ namespace {
 
 constexpr const char* kWayOut =
     "; or let `vertical` say what the heights count from (\"ellipsoid\", \"egm96\", \"egm2008\", \"unknown\" to pass "
-    "them "
-    "through, or a grid of undulations)";
+    "them through, or a grid of undulations)";
 
 Result<VerticalDatum> Above(Result<std::shared_ptr<const Geoid>> geoid) {
   if (!geoid) return MakeError(geoid.error().code, "{}{}", geoid.error().message, kWayOut);

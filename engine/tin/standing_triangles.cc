@@ -95,25 +95,24 @@ HWY_EXPORT(CollectNarrow);
 HWY_EXPORT(CollectWide);
 
 // A triangulation of v vertices has fewer than 2 v triangles; more take what is written beyond the last.
-std::size_t RoomFor(std::size_t insertions) {
+template <typename Record, typename Collect>
+std::vector<std::array<std::uint32_t, 3>> Collected(const Record& record, std::size_t insertions, Collect&& collect) {
   constexpr std::size_t kMostLanes = 8;
-  return 2 * (insertions + 4) + kMostLanes;
+  std::vector<std::array<std::uint32_t, 3>> triangles(2 * (insertions + 4) + kMostLanes);
+  triangles.resize(collect(record, insertions, triangles.data()));
+  return triangles;
 }
 
 }  // namespace
 
 std::vector<std::array<std::uint32_t, 3>> StandingTriangles(const InsertionRecord<std::uint16_t>& record,
                                                             std::size_t insertions) {
-  std::vector<std::array<std::uint32_t, 3>> triangles(RoomFor(insertions));
-  triangles.resize(HWY_DYNAMIC_DISPATCH(CollectNarrow)(record, insertions, triangles.data()));
-  return triangles;
+  return Collected(record, insertions, HWY_DYNAMIC_DISPATCH(CollectNarrow));
 }
 
 std::vector<std::array<std::uint32_t, 3>> StandingTriangles(const InsertionRecord<std::uint32_t>& record,
                                                             std::size_t insertions) {
-  std::vector<std::array<std::uint32_t, 3>> triangles(RoomFor(insertions));
-  triangles.resize(HWY_DYNAMIC_DISPATCH(CollectWide)(record, insertions, triangles.data()));
-  return triangles;
+  return Collected(record, insertions, HWY_DYNAMIC_DISPATCH(CollectWide));
 }
 
 }  // namespace terrace::tin
