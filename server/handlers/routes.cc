@@ -18,9 +18,11 @@ namespace {
 // Files of the viewer change with the server: clients ask again, and usually hear 304.
 constexpr std::string_view kRevalidate = "no-cache";
 
-Response PlainText(int status, std::string_view content_type, std::string text) {
+// What whoever operates the server asks it.
+Response StateResponse(int status, std::string_view content_type, std::string text) {
   Response response;
   response.status = status;
+  response.is_vital = true;
   response.content_type = content_type;
   response.body = std::make_shared<const std::string>(std::move(text));
   response.cache_control = "no-store";
@@ -33,7 +35,7 @@ bool SeesAll(const Request& request) { return !request.grant || request.grant->s
 // name files: they are for the log. Datasets are named to those who may see them all.
 Response Ready(const Routes::State& state, bool sees_all) {
   if (state.draining()) {
-    Response response = PlainText(503, "text/plain; charset=utf-8", "draining\n");
+    Response response = StateResponse(503, "text/plain; charset=utf-8", "draining\n");
     response.headers.emplace_back("Retry-After", "5");
     return response;
   }
@@ -44,7 +46,7 @@ Response Ready(const Routes::State& state, bool sees_all) {
                 ? "the configuration file is wrong, the last good one is in force\n"
                 : fmt::format("dataset{}: its source cannot be opened as it is now\n", sees_all ? " " + dataset : "");
   }
-  return PlainText(200, "text/plain; charset=utf-8", std::move(text));
+  return StateResponse(200, "text/plain; charset=utf-8", std::move(text));
 }
 
 }  // namespace
@@ -111,9 +113,9 @@ Response Routes::ServeNow(const Route& route, const Request& request) const {
     case RouteKind::kReady:
       return Ready(state_, SeesAll(request));
     case RouteKind::kMetrics:
-      return PlainText(200, "text/plain; version=0.0.4; charset=utf-8", state_.metrics_text());
+      return StateResponse(200, "text/plain; version=0.0.4; charset=utf-8", state_.metrics_text());
     default:
-      return PlainText(200, "text/plain; charset=utf-8", "ok\n");
+      return StateResponse(200, "text/plain; charset=utf-8", "ok\n");
   }
 }
 

@@ -31,6 +31,7 @@ struct Response {
   std::string_view vary_too;  // a literal: further headers it depends on; may be empty
   bool for_grant = false;     // another token, or none, would be answered otherwise
   bool close = false;         // end the connection after this reply
+  bool is_vital = false;      // tells how the server is: goes out where other replies find no room
 
   struct Header {
     Header(std::string_view n, std::string v) : name(n), value(std::move(v)) {}

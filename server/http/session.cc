@@ -275,8 +275,9 @@ asio::awaitable<Response> Session::Answer(Route route, Request request) {
 asio::awaitable<bool> Session::Reply(Response& response) {
   const Request& request = exchange_.request;
   const bool with_body = request.method != Method::kHead && response.status != 304;
+  const auto kind = response.is_vital ? TransferBudget::Kind::kVitalReply : TransferBudget::Kind::kReply;
   std::optional<TransferBudget::Hold> room =
-      context_->transfers->TryHold(with_body ? response.body : nullptr, weak_from_this(), Clock::now());
+      context_->transfers->TryHold(with_body ? response.body : nullptr, weak_from_this(), Clock::now(), kind);
   if (!room) {
     const std::string_view route = response.route;
     co_await HoldBack();

@@ -8,24 +8,24 @@ constexpr std::size_t kUploadShare = 4;  // a quarter of the budget is for reque
 }  // namespace
 
 std::optional<TransferBudget::Hold> TransferBudget::TryHold(Body body, const std::weak_ptr<Connection>& holder,
-                                                            Clock::time_point now) {
+                                                            Clock::time_point now, Kind kind) {
   const std::size_t bytes = body ? body->size() : 0;
-  return Take(std::move(body), bytes, holder, now);
+  return Take(std::move(body), bytes, holder, now, kind);
 }
 
 std::optional<TransferBudget::Hold> TransferBudget::TryHold(std::size_t bytes, const std::weak_ptr<Connection>& holder,
                                                             Clock::time_point now) {
-  return Take(nullptr, bytes, holder, now);
+  return Take(nullptr, bytes, holder, now, Kind::kUpload);
 }
 
 std::optional<TransferBudget::Hold> TransferBudget::Take(Body body, std::size_t bytes,
                                                          const std::weak_ptr<Connection>& holder,
-                                                         Clock::time_point now) {
+                                                         Clock::time_point now, Kind kind) {
   if (bytes <= kFreeBytes) return Hold();
   std::unique_lock lock(mutex_);
-  if (!charges_.contains(body.get()) && !MayTake(bytes, /*is_upload=*/!body)) {
+  if (!charges_.contains(body.get()) && !MayTake(bytes, kind)) {
     ++refused_;
-    const std::vector<std::shared_ptr<Connection>> overdue = Overdue(now, /*only_uploads=*/!body);
+    const std::vector<std::shared_ptr<Connection>> overdue = Overdue(now, /*only_uploads=*/kind == Kind::kUpload);
     lock.unlock();
     for (const auto& connection : overdue) connection->Abort();
     return std::nullopt;
@@ -35,19 +35,23 @@ std::optional<TransferBudget::Hold> TransferBudget::Take(Body body, std::size_t 
   if (!body) entry->charge = &*entry;
   Charge& charge = charges_[entry->charge];
   if (++charge.holders == 1) {
-    const bool fits = held_ + bytes <= capacity_;
+    const bool fits = Fits(bytes, kind);
     charge.bytes = fits ? bytes : 0;
     held_ += charge.bytes;
-    charge.is_upload = !body;
+    charge.is_upload = kind == Kind::kUpload;
     if (charge.is_upload) uploads_held_ += charge.bytes;
     oversized_under_way_ = oversized_under_way_ || !fits;
   }
   return Hold(this, entry, std::move(body));
 }
 
-bool TransferBudget::MayTake(std::size_t bytes, bool is_upload) const {
-  if (is_upload && uploads_held_ > 0 && uploads_held_ + bytes > capacity_ / kUploadShare) return false;
-  return held_ + bytes <= capacity_ || (bytes > capacity_ && !oversized_under_way_);
+bool TransferBudget::Fits(std::size_t bytes, Kind kind) const {
+  return held_ + bytes <= capacity_ + (kind == Kind::kVitalReply ? kReserve : 0);
+}
+
+bool TransferBudget::MayTake(std::size_t bytes, Kind kind) const {
+  if (kind == Kind::kUpload && uploads_held_ > 0 && uploads_held_ + bytes > capacity_ / kUploadShare) return false;
+  return Fits(bytes, kind) || (bytes > capacity_ && !oversized_under_way_);
 }
 
 // Each is told once; its room comes back when its connection has ended.

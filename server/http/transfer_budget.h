@@ -3,7 +3,8 @@
 //
 // A body that many replies share counts once. Where there is no room for one more, it is refused, and replies that have
 // had more than their time (kGrace, and a second for each kRate bytes) are cut off, so that those who read slowly do
-// not keep others out for long. A single body that is larger than the whole budget may be under way beside it.
+// not keep others out for long. A single body that is larger than the whole budget may be under way beside it. What tells
+// operators how the server is may go beyond the budget by kReserve: it is wanted most when there is no room.
 //
 // Thread-safe.
 #pragma once
@@ -32,15 +33,19 @@ class TransferBudget {
   static constexpr std::size_t kFreeBytes = 16 * 1024;
   static constexpr std::chrono::seconds kGrace{2};
   static constexpr std::size_t kRate = std::size_t{1} << 20;
+  static constexpr std::size_t kReserve = std::size_t{1} << 20;
 
   explicit TransferBudget(std::size_t capacity) : capacity_(capacity) {}
 
   // Gives its room back when it ends.
   class Hold;
 
+  enum class Kind : std::uint8_t { kReply, kVitalReply, kUpload };
+
   // Room for a reply's body until the hold ends. Nothing: there is none, and the body must be let go. `holder` is who
   // would be cut off.
-  std::optional<Hold> TryHold(Body body, const std::weak_ptr<Connection>& holder, Clock::time_point now = Clock::now());
+  std::optional<Hold> TryHold(Body body, const std::weak_ptr<Connection>& holder, Clock::time_point now = Clock::now(),
+                              Kind kind = Kind::kReply);
   // The same for `bytes` of a request's body, which nobody shares.
   std::optional<Hold> TryHold(std::size_t bytes, const std::weak_ptr<Connection>& holder,
                               Clock::time_point now = Clock::now());
@@ -64,11 +69,12 @@ class TransferBudget {
     bool is_upload = false;
   };
 
-  bool MayTake(std::size_t bytes, bool is_upload) const;  // mutex_ is held
+  bool Fits(std::size_t bytes, Kind kind) const;     // mutex_ is held
+  bool MayTake(std::size_t bytes, Kind kind) const;  // mutex_ is held
   // mutex_ is held. Uploads make room for uploads alone: replies have none to give them.
   std::vector<std::shared_ptr<Connection>> Overdue(Clock::time_point now, bool only_uploads);
   std::optional<Hold> Take(Body body, std::size_t bytes, const std::weak_ptr<Connection>& holder,
-                           Clock::time_point now);
+                           Clock::time_point now, Kind kind);
   void Release(Entries::iterator entry);
   void Settle(Entries::iterator entry);
 

@@ -87,6 +87,20 @@ TEST_F(TransferBudgetTest, LeavesSmallBodiesAlone) {
   EXPECT_TRUE(budget_.TryHold(nullptr, connection_, now_));
 }
 
+TEST_F(TransferBudgetTest, KeepsAReserveForVitalReplies) {
+  const auto vital = TransferBudget::Kind::kVitalReply;
+  const auto unread = budget_.TryHold(BodyOf(3 * kMb), connection_, now_);
+  ASSERT_TRUE(unread);
+  EXPECT_FALSE(budget_.TryHold(BodyOf(kMb / 10), connection_, now_));
+  std::vector<TransferBudget::Hold> holds;
+  while (auto hold = budget_.TryHold(BodyOf(kMb / 10), connection_, now_, vital)) holds.push_back(*std::move(hold));
+  EXPECT_EQ(holds.size(), TransferBudget::kReserve / (kMb / 10)) << "and not without end";
+  EXPECT_FALSE(budget_.TryHold(BodyOf(kMb / 10), connection_, now_ + 60s, vital));
+  EXPECT_GT(connection_->aborts, 0) << "whoever does not read makes room";
+  holds.clear();
+  EXPECT_EQ(budget_.stats().held_bytes, 3 * kMb);
+}
+
 TEST_F(TransferBudgetTest, LetsOneOversizedBodyPass) {
   auto large = budget_.TryHold(BodyOf(10 * kMb), connection_, now_);
   ASSERT_TRUE(large);
