@@ -19,8 +19,8 @@ std::optional<TransferBudget::Hold> TransferBudget::TryHold(std::size_t bytes, c
 }
 
 std::optional<TransferBudget::Hold> TransferBudget::Take(Body body, std::size_t bytes,
-                                                         const std::weak_ptr<Connection>& holder,
-                                                         Clock::time_point now, Kind kind) {
+                                                         const std::weak_ptr<Connection>& holder, Clock::time_point now,
+                                                         Kind kind) {
   if (bytes <= kFreeBytes) return Hold();
   std::unique_lock lock(mutex_);
   if (!charges_.contains(body.get()) && !MayTake(bytes, kind)) {

@@ -3,8 +3,8 @@
 //
 // A body that many replies share counts once. Where there is no room for one more, it is refused, and replies that have
 // had more than their time (kGrace, and a second for each kRate bytes) are cut off, so that those who read slowly do
-// not keep others out for long. A single body that is larger than the whole budget may be under way beside it. What tells
-// operators how the server is may go beyond the budget by kReserve: it is wanted most when there is no room.
+// not keep others out for long. A single body that is larger than the whole budget may be under way beside it. What
+// tells operators how the server is may go beyond the budget by kReserve: it is wanted most when there is no room.
 //
 // Thread-safe.
 #pragma once
@@ -73,8 +73,8 @@ class TransferBudget {
   bool MayTake(std::size_t bytes, Kind kind) const;  // mutex_ is held
   // mutex_ is held. Uploads make room for uploads alone: replies have none to give them.
   std::vector<std::shared_ptr<Connection>> Overdue(Clock::time_point now, bool only_uploads);
-  std::optional<Hold> Take(Body body, std::size_t bytes, const std::weak_ptr<Connection>& holder,
-                           Clock::time_point now, Kind kind);
+  std::optional<Hold> Take(Body body, std::size_t bytes, const std::weak_ptr<Connection>& holder, Clock::time_point now,
+                           Kind kind);
   void Release(Entries::iterator entry);
   void Settle(Entries::iterator entry);
 
