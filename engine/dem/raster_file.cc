@@ -214,6 +214,12 @@ Result<void> CheckComplete(GDALDataset& dataset, const std::string& path, int ba
                    size, ends.last());
 }
 
+std::string PicturePartOf(GDALRasterBand& band) {
+  const GDALColorInterp part = band.GetColorInterpretation();
+  const bool is_picture = part != GCI_Undefined && part != GCI_GrayIndex && part != GCI_AlphaBand;
+  return is_picture ? GDALGetColorInterpretationName(part) : "";
+}
+
 std::vector<std::string> FilesOf(GDALDataset& dataset, const std::string& path) {
   std::vector<std::string> files = {path};
   char** list = dataset.GetFileList();

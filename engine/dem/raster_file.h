@@ -33,6 +33,10 @@ std::vector<std::string> FilesOf(GDALDataset& dataset, const std::string& path);
 // Refuses what is too large to mesh in one piece.
 Result<void> CheckSizeToMesh(const std::string& path, int width, int height);
 
+// What of a picture a band is, as GDAL calls it; empty where it may be heights, as a grey one well may. Indices into a
+// palette may not.
+std::string PicturePartOf(GDALRasterBand& band);
+
 // Band 1: the heights. Precondition: the dataset came from OpenRaster or ReopenRaster.
 inline GDALRasterBand& HeightBand(GDALDataset& dataset) { return *dataset.GetRasterBand(1); }
 

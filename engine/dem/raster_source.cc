@@ -25,13 +25,6 @@ RasterLayout LayoutOf(GDALDataset& dataset, const Georeference& georeference) {
   return layout;
 }
 
-// A grey band may well be heights, colours and indices into a palette are none.
-std::string PicturePartOf(GDALRasterBand& band) {
-  const GDALColorInterp part = band.GetColorInterpretation();
-  const bool is_picture = part != GCI_Undefined && part != GCI_GrayIndex && part != GCI_AlphaBand;
-  return is_picture ? GDALGetColorInterpretationName(part) : "";
-}
-
 RasterInfo Describe(GDALDataset& dataset, const std::string& path, const Georeference& georeference,
                     const RasterLayout& layout) {
   RasterInfo info;

@@ -27,6 +27,7 @@
 #include "server/cli/fail.h"
 #include "server/cli/mesh_blocks.h"
 #include "server/cli/mesh_color.h"
+#include "server/cli/mesh_input.h"
 #include "server/cli/mesh_output.h"
 #include "server/cli/mesh_placement.h"
 #include "server/cli/progress.h"
@@ -42,7 +43,7 @@ constexpr const char* kDataDependent = "data-dependent";
 const std::vector<std::string> kMeasures = {"sum-max", "sum-squares", "max-max", "normals"};
 
 struct MeshArguments {
-  std::string dem, out, criterion = "delaunay", measure, coordinates;
+  std::string dem, nodata = "auto", out, criterion = "delaunay", measure, coordinates;
   double max_error = -1, rms = -1, qthresh = -1;
   std::size_t points = 0;
   int threads = 1;
@@ -58,6 +59,8 @@ std::string Complain(const MeshArguments& arguments) {
     return "--measure and --qthresh belong to --criterion data-dependent";
   if (arguments.compact && arguments.max_error < 0)
     return "--compact drops what an error bound does not need; give that bound with --max-error METRES";
+  if (arguments.color.is_image && arguments.nodata != "auto")
+    return "--nodata is about heights; leave it out with --image";
   if (arguments.color.IsUsed() && arguments.rms >= 0)
     return "--rms is a goal for heights alone; with colours use --max-error or --points";
   if (arguments.color.IsUsed() && arguments.compact)
@@ -167,7 +170,8 @@ int Mesh(const MeshArguments& arguments) {
     tin::ExtendedGoal goal;
     if (arguments.max_error >= 0) goal.max_error = arguments.max_error;
     if (arguments.points > 0) goal.max_points = arguments.points;
-    return MeshColored({arguments.dem, arguments.out, arguments.coordinates, goal, arguments.color, arguments.json});
+    return MeshColored(
+        {arguments.dem, arguments.nodata, arguments.out, arguments.coordinates, goal, arguments.color, arguments.json});
   }
   Result<MeshOutput> output = MeshOutput::Open(arguments.out, {arguments.dem});
   if (!output) {
@@ -179,9 +183,10 @@ int Mesh(const MeshArguments& arguments) {
   Clock::time_point start = Clock::now();
   Result<dem::RasterHeights> raster = [&] {
     Progress progress("reading " + arguments.dem);
-    return dem::ReadRaster(arguments.dem, progress.Callback());
+    return dem::ReadRaster(arguments.dem, ReadOptionsOf(arguments.nodata, progress.Callback()));
   }();
   if (!raster) return Fail(raster.error().message, kExitFailure);
+  WarnOf(arguments.dem, *raster);
   const auto placement =
       PlacementOf(arguments.dem, raster->georeferenced, raster->geo_transform, arguments.coordinates);
   if (!placement) return Fail(placement.error().message, kExitUsage);
@@ -233,6 +238,7 @@ void AddMesh(CLI::App& app, int& exit_code) {
       ->type_name("METRES")
       ->check(Metres())
       ->group("Goal, exactly one of");
+  AddNodataOption(*command, arguments->nodata);
   command
       ->add_option("--coordinates", arguments->coordinates,
                    "pixel: x = column, y = row (from the top), z = height; crs: pixel centres in the raster's CRS "

@@ -5,6 +5,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstdint>
 #include <nlohmann/json.hpp>
@@ -18,6 +19,7 @@
 #include "proto/mesh_file.h"
 #include "server/cli/command.h"
 #include "server/cli/fail.h"
+#include "server/cli/mesh_input.h"
 #include "server/cli/mesh_output.h"
 #include "server/cli/mesh_placement.h"
 #include "server/cli/progress.h"
@@ -29,42 +31,48 @@ using Clock = std::chrono::steady_clock;
 
 struct Source {
   tin::ExtendedField field;
-  Placement placement;
+  bool georeferenced = false;
+  std::array<double, 6> geo_transform{};
 };
 
 Result<Source> MakeSource(const std::string& path, tin::HeightField heights, std::vector<dem::ColorSample> colors,
-                          double weight, Placement placement) {
+                          double weight, bool georeferenced, const std::array<double, 6>& geo_transform) {
   auto field = tin::ExtendedField::Make(std::move(heights), std::move(colors), weight);
   if (!field) return MakeError(field.error().code, "{}: {}", path, field.error().message);
-  return Source{*std::move(field), std::move(placement)};
+  return Source{*std::move(field), georeferenced, geo_transform};
 }
 
 Result<Source> ReadDem(const ColoredMeshArguments& arguments) {
   Progress progress("reading " + arguments.raster + " and " + arguments.color.image);
-  auto raster = dem::ReadRaster(arguments.raster, [&](double share) { progress.Update(share / 2); });
+  auto raster = dem::ReadRaster(arguments.raster,
+                                ReadOptionsOf(arguments.nodata, [&](double share) { progress.Update(share / 2); }));
   if (!raster) return tl::unexpected(raster.error());
-  auto placement = PlacementOf(arguments.raster, raster->georeferenced, raster->geo_transform, arguments.coordinates);
-  if (!placement) return tl::unexpected(placement.error());
   auto colors = dem::ReadColors(arguments.color.image, arguments.raster, *raster,
                                 [&](double share) { progress.Update(0.5 + share / 2); });
   if (!colors) return tl::unexpected(colors.error());
   auto heights = tin::HeightField::Make(raster->width, raster->height, std::move(raster->heights));
   if (!heights) return MakeError(heights.error().code, "{}: {}", arguments.raster, heights.error().message);
+  WarnOf(arguments.raster, *raster);
   return MakeSource(arguments.color.image, *std::move(heights), *std::move(colors), arguments.color.weight,
-                    *std::move(placement));
+                    raster->georeferenced, raster->geo_transform);
 }
 
-// A flat field, upright: y counts from the lowest row of pixels, unless the image has a place of its own.
+// A flat field.
 Result<Source> ReadPicture(const ColoredMeshArguments& arguments) {
   Progress progress("reading " + arguments.raster);
   auto image = dem::ReadImage(arguments.raster, progress.Callback());
   if (!image) return tl::unexpected(image.error());
-  auto placement = PlacementOf(arguments.raster, image->georeferenced, image->geo_transform, arguments.coordinates);
-  if (!placement) return tl::unexpected(placement.error());
-  if (!*placement && arguments.coordinates.empty()) *placement = {{-0.5, 1, 0, image->height - 0.5, 0, -1}};
   auto heights = tin::HeightField::Make(image->width, image->height, std::vector<float>(image->colors.size(), 0.0F));
   if (!heights) return MakeError(heights.error().code, "{}: {}", arguments.raster, heights.error().message);
-  return MakeSource(arguments.raster, *std::move(heights), std::move(image->colors), 1, *std::move(placement));
+  return MakeSource(arguments.raster, *std::move(heights), std::move(image->colors), 1, image->georeferenced,
+                    image->geo_transform);
+}
+
+// An image without a place of its own is upright: y counts from the lowest row of pixels.
+Result<Placement> PlacementFor(const ColoredMeshArguments& arguments, const Source& source) {
+  auto placement = PlacementOf(arguments.raster, source.georeferenced, source.geo_transform, arguments.coordinates);
+  if (!placement || *placement || !arguments.color.is_image || !arguments.coordinates.empty()) return placement;
+  return Placement({-0.5, 1, 0, source.field.heights().height() - 0.5, 0, -1});
 }
 
 // In steps, so that progress can be shown: the error falls about as 1 / vertices.
@@ -143,6 +151,8 @@ int MeshColored(const ColoredMeshArguments& arguments) {
   Clock::time_point start = Clock::now();
   const Result<Source> source = arguments.color.is_image ? ReadPicture(arguments) : ReadDem(arguments);
   if (!source) return Fail(source.error().message, kExitFailure);
+  const Result<Placement> placement = PlacementFor(arguments, *source);
+  if (!placement) return Fail(placement.error().message, kExitUsage);
   seconds.read = SecondsSince(start);
 
   start = Clock::now();
@@ -150,8 +160,8 @@ int MeshColored(const ColoredMeshArguments& arguments) {
   seconds.triangulate = SecondsSince(start);
 
   start = Clock::now();
-  const Result<void> written = output->Write(VerticesOf(mesh.tin, source->field.heights(), source->placement),
-                                             TrianglesOf(mesh.tin, source->placement), mesh.colors);
+  const Result<void> written = output->Write(VerticesOf(mesh.tin, source->field.heights(), *placement),
+                                             TrianglesOf(mesh.tin, *placement), mesh.colors);
   if (!written) return Fail(written.error().message, kExitFailure);
   seconds.write = SecondsSince(start);
   Print(arguments, source->field, mesh, tin::MeasureExtendedError(source->field, mesh), seconds);

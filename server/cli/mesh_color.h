@@ -23,7 +23,7 @@ struct ColorArguments {
 void AddColorOptions(CLI::App& command, ColorArguments& arguments);
 
 struct ColoredMeshArguments {
-  std::string raster, out, coordinates;  // as given; `coordinates` empty: by the raster
+  std::string raster, nodata, out, coordinates;  // as given; `coordinates` empty: by the raster
   tin::ExtendedGoal goal;
   ColorArguments color;
   bool json = false;

@@ -16,7 +16,7 @@ TEST(ReadRaster, KeepsTheFilesOrderAndMarksVoids) {
                                              .nodata = 12,
                                              .value = [](int col, int row) { return col + 10 * row; }});
   double done = 0;
-  const auto raster = ReadRaster(path, [&](double share) { done = share; });
+  const auto raster = ReadRaster(path, {.progress = [&](double share) { done = share; }});
   ASSERT_TRUE(raster) << raster.error().message;
   EXPECT_EQ(raster->width, 5);
   EXPECT_EQ(raster->height, 3);

@@ -1,0 +1,24 @@
+// What the kinds of `terrace mesh` that read heights have in common: which samples are voids, and what is told of them.
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "engine/dem/dem_source.h"
+
+namespace CLI {
+class App;
+}
+
+namespace terrace::cli {
+
+// Adds --nodata to the command; `nodata` is its text.
+void AddNodataOption(CLI::App& command, std::string& nodata);
+
+// Precondition: the option took the text.
+dem::ReadOptions ReadOptionsOf(const std::string& nodata, std::function<void(double)> progress);
+
+// On stderr, what a mesh of the raster may surprise by.
+void WarnOf(const std::string& path, const dem::RasterHeights& raster);
+
+}  // namespace terrace::cli
