@@ -12,21 +12,44 @@
 namespace terrace::cli {
 namespace {
 
-bool Overlap(const dem::GeoBounds& a, const dem::GeoBounds& b) {
-  if (a.south >= b.north || b.south >= a.north) return false;
-  const auto width = [](const dem::GeoBounds& box) {
-    return box.west > box.east ? box.east + 360 - box.west : box.east - box.west;
-  };
-  const double offset = b.west - a.west - 360 * std::floor((b.west - a.west) / 360);  // 0 <= offset < 360
-  return offset < width(a) || offset + width(b) > 360;
+double Width(const dem::GeoBounds& box) {
+  return box.west > box.east ? box.east + 360 - box.west : box.east - box.west;
 }
 
+// Degrees from one west edge eastwards to another one, 0 <= offset < 360.
+double Offset(const dem::GeoBounds& from, const dem::GeoBounds& to) {
+  return to.west - from.west - 360 * std::floor((to.west - from.west) / 360);
+}
+
+bool Overlap(const dem::GeoBounds& a, const dem::GeoBounds& b) {
+  if (a.south >= b.north || b.south >= a.north) return false;
+  return Offset(a, b) < Width(a) || Offset(a, b) + Width(b) > 360;
+}
+
+bool Covers(const dem::GeoBounds& outer, const dem::GeoBounds& inner) {
+  if (inner.south < outer.south || inner.north > outer.north) return false;
+  return Width(outer) >= 360 || Offset(outer, inner) + Width(inner) <= Width(outer);
+}
+
+std::string Sources(std::ptrdiff_t count) { return fmt::format("{} source{}", count, count == 1 ? "" : "s"); }
+
 // Sources that lie, in part at least, under one that comes before them.
-std::size_t CountOverlapped(const std::vector<dem::RasterInfo>& sources) {
-  std::size_t count = 0;
+std::ptrdiff_t CountOverlapped(const std::vector<dem::RasterInfo>& sources) {
+  std::ptrdiff_t count = 0;
   for (std::size_t i = 0; i < sources.size(); ++i) {
     count += std::any_of(sources.begin(), sources.begin() + static_cast<std::ptrdiff_t>(i),
                          [&](const dem::RasterInfo& upper) { return Overlap(upper.bounds, sources[i].bounds); });
+  }
+  return count;
+}
+
+// Sources under a coarser one that lies over all of them.
+std::ptrdiff_t CountHidden(const std::vector<dem::RasterInfo>& sources) {
+  std::ptrdiff_t count = 0;
+  for (auto lower = sources.begin(); lower != sources.end(); ++lower) {
+    count += std::any_of(sources.begin(), lower, [&](const dem::RasterInfo& upper) {
+      return upper.spacing_m > lower->spacing_m && Covers(upper.bounds, lower->bounds);
+    });
   }
   return count;
 }
@@ -38,10 +61,15 @@ std::vector<std::string> AdviceFor(const dem::DemInfo& info) {
   const auto no_datum = count([](const dem::RasterInfo& s) { return s.counts_from.empty(); });
   const auto voids = count([](const dem::RasterInfo& s) { return s.void_samples > 0; });
   std::vector<std::string> advice;
+  if (const std::ptrdiff_t hidden = CountHidden(info.sources); hidden > 0) {
+    advice.push_back(fmt::format(
+        "{} {} wholly under a coarser one that comes first, and {} in its voids alone: name the finer ones first",
+        Sources(hidden), hidden == 1 ? "lies" : "lie", hidden == 1 ? "shows" : "show"));
+  }
   if (large > 0) {
     advice.push_back(fmt::format(
-        "{} large sources have no overviews: shallow tiles read all of them; run 'gdaladdo -r average' on each",
-        large));
+        "large and without overviews: {}, all of which shallow tiles read; run 'gdaladdo -r average' on each",
+        Sources(large)));
   }
   if (no_datum > 0) {
     advice.push_back(
@@ -52,9 +80,9 @@ std::vector<std::string> AdviceFor(const dem::DemInfo& info) {
   }
   if (voids > 0) {
     advice.push_back(fmt::format(
-        "{} sources have voids: small ones are filled from their edges, larger ones show the next source, then the "
+        "with voids: {}; small ones are filled from their edges, larger ones show the next source, then the "
         "floor of {:g} m",
-        voids, info.floor));
+        Sources(voids), info.floor));
   }
   return advice;
 }
@@ -72,7 +100,7 @@ void PrintMosaic(const std::string& name, const dem::DemInfo& info) {
                          source.crs));
   }
   if (info.sources.size() > kMostListed) line("", fmt::format("and {} more", info.sources.size() - kMostListed));
-  line("overlaps", fmt::format("{} sources lie in part under one before them", CountOverlapped(info.sources)));
+  line("overlaps", fmt::format("under one before them, in part at least: {}", Sources(CountOverlapped(info.sources))));
   line("bounds", fmt::format("west {:.6g}, south {:.6g}, east {:.6g}, north {:.6g}", info.bounds.west,
                              info.bounds.south, info.bounds.east, info.bounds.north));
   line("heights", fmt::format("{:g} to {:g} m", info.heights.min, info.heights.max));

@@ -132,7 +132,8 @@ export class Globe {
     const { longitude, latitude, width, height } = boxOf(dataset.bounds);
     const narrow = Math.max(1, 0.8 * this.scene.canvas.clientHeight / this.scene.canvas.clientWidth);
     if (isGlobal(dataset)) {
-      const [eastward, northward] = width > 350 ? kWorldMiddle : [longitude, latitude];
+      const eastward = width > 350 ? kWorldMiddle[0] : longitude;
+      const northward = width > 350 && height > 100 ? kWorldMiddle[1] : latitude;  // not of what lies around a pole
       const destination = Cartesian3.fromDegrees(eastward, northward, kGlobalDistance * narrow);
       return seconds > 0 ? camera.flyTo({ destination, duration: seconds }) : camera.setView({ destination });
     }

@@ -204,6 +204,21 @@ class Mesh(InFolder):
             self.assertEqual(len(read_obj(self.folder / "real.obj")[0]), 9)
         self.assertEqual((self.folder / "real.obj").stat().st_mode & 0o777, 0o640)
 
+    def test_finds_undeclared_voids(self):
+        heights = [[500 + x for x in range(30)] for _ in range(30)]
+        heights[3][:20] = [-9999] * 20
+        dem = self.write("dem.asc", grid(heights, "xllcorner 100\nyllcorner 200\ncellsize 2"))
+        out = self.folder / "dem.obj"
+        found = run("mesh", dem, "-o", out, "--max-error", 1)
+        self.assertIn("undeclared voids, which are no samples: 20 samples of -9999; --nodata declared", found.stderr)
+        self.assertIn("and across 20 voids;", found.stdout)
+        self.assertGreaterEqual(min(z for _, _, z in read_obj(out)[0]), 500)
+        for nodata, least in (("declared", -9999), ("500", -9999), ("-9999", 500)):
+            told = run("mesh", dem, "-o", out, "--max-error", 1, "--nodata", nodata)
+            self.assertEqual((told.returncode, told.stderr), (0, ""))
+            self.assertAlmostEqual(min(z for _, _, z in read_obj(out)[0]), least, delta=1)
+        self.assertEqual(run("mesh", dem, "-o", out, "--max-error", 1, "--nodata", "none").returncode, 2)
+
     def test_tells_of_voids(self):
         heights = [[-9999 if x < 10 else h for x, h in enumerate(row)] for row in BUMPS]
         dem = self.write("dem.asc", grid(heights, PLACE))
@@ -276,6 +291,12 @@ class InfoOfMosaics(InFolder):
         return self.write(name + ".asc",
                           grid(heights, f"xllcorner {west}\nyllcorner 20\ncellsize {cell}\nNODATA_value -9999"))
 
+    def test_a_coarse_source_before_a_fine_one_is_told(self):
+        fine, coarse = self.place("fine", 10, 0.01), self.place("coarse", 9, 0.1)
+        told = "1 source lies wholly under a coarser one that comes first, and shows in its voids alone"
+        self.assertIn(told, run("info", "--mosaic", coarse, fine).stdout)
+        self.assertNotIn("wholly", run("info", "--mosaic", fine, coarse).stdout)
+
     def test_a_folder_is_one_dataset(self):
         self.place("b", 10.4, 0.01)
         self.place("a", 10, 0.01, void=True)
@@ -283,8 +304,8 @@ class InfoOfMosaics(InFolder):
         self.write("readme.txt", "not a raster")
         result = run("info", self.folder)
         self.assertEqual((result.returncode, result.stderr), (0, ""))
-        for part in (f"{self.folder}\n", "3, in the order in which they count", "1 sources lie in part under one",
-                     "west 9,", "east 13,", "1 sources have voids"):
+        for part in (f"{self.folder}\n", "3, in the order in which they count",
+                     "under one before them, in part at least: 1 source\n", "west 9,", "east 13,", "with voids: 1 source; small ones"):
             self.assertIn(part, result.stdout)
         self.assertLess(result.stdout.index("a.asc"), result.stdout.index("b.asc"))
         self.assertLess(result.stdout.index("b.asc"), result.stdout.index("coarse.asc"))
