@@ -32,14 +32,15 @@ Json Region(const TilesetDescription& tileset, int level, const geo::TileRange& 
             edge(block.end_y + 1, -90), tileset.min_height_m, tileset.max_height_m}}};
 }
 
+std::string Query(const std::string& parameters) { return parameters.empty() ? "" : "?" + parameters; }
+
 // `place`: which tile or tiles of the tree the content is of.
 Json Tile(const TilesetDescription& tileset, const geo::TileKey& root, const char* place) {
   Json json;
   json["boundingVolume"] = nullptr;  // the first, to be set by the caller
   json["geometricError"] = GeometricError(root.level);
   json["refine"] = "REPLACE";
-  const std::string& query = tileset.content_query;
-  json["content"]["uri"] = fmt::format("3dtiles/{}/{}.glb{}{}", RootName(root), place, query.empty() ? "" : "?", query);
+  json["content"]["uri"] = fmt::format("3dtiles/{}/{}.glb{}", RootName(root), place, Query(tileset.content_query));
   return json;
 }
 
@@ -52,8 +53,8 @@ Json ImplicitRoot(const TilesetDescription& tileset, const TreeRoot& tree) {
   tiling["subdivisionScheme"] = "QUADTREE";
   tiling["availableLevels"] = tree.levels;
   tiling["subtreeLevels"] = subtree_levels;
-  tiling["subtrees"]["uri"] =
-      fmt::format("3dtiles/{}/{{level}}/{{x}}/{{y}}.{}.subtree", RootName(root), subtree_levels);
+  tiling["subtrees"]["uri"] = fmt::format("3dtiles/{}/{{level}}/{{x}}/{{y}}.{}.subtree{}", RootName(root),
+                                          subtree_levels, Query(tileset.subtree_query));
   return json;
 }
 

@@ -15,6 +15,7 @@ struct TilesetDescription {
   // Metres above the ellipsoid that no vertex of any tile leaves, feet of skirts included: clients hand the range of
   // the root down to all its descendants.
   double min_height_m = 0, max_height_m = 0;
+  std::string subtree_query;  // appended to the subtree template, likewise; may be empty
   std::string content_query;  // appended to the content templates, without '?': "error=5&atleast=1"; may be empty
 };
 

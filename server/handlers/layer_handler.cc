@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "proto/layer_json.h"
+#include "server/handlers/datasets_handler.h"
 #include "server/http/http_error.h"
 #include "server/http/negotiate.h"
 
@@ -42,6 +43,11 @@ std::string TileQuery(const ErrorWish& wish) {
   return {};
 }
 
+std::string WithToken(std::string query, const Request& request) {
+  if (!request.token_in_query || !request.grant || request.grant->name.empty()) return query;
+  return query + (query.empty() ? "" : "&") + "token=" + PercentEncode(request.token);
+}
+
 LayerHandler::LayerHandler(std::span<const DatasetView> datasets, std::string cache_control)
     : datasets_(datasets), cache_control_(std::move(cache_control)) {
   for (const DatasetView& dataset : datasets_) plain_.push_back(MakeLayer(dataset, ""));
@@ -52,7 +58,7 @@ Response LayerHandler::Handle(const Route& route, const Request& request) const 
   if (!dataset) return ClientErrorResponse(dataset.error(), request.id);
   const Result<TileParameters> parameters = ParseTileParameters(route.query, /*allow_at_least=*/false);
   if (!parameters) return ClientErrorResponse(parameters.error(), request.id);
-  std::string tile_query = TileQuery(parameters->wish);
+  std::string tile_query = WithToken(TileQuery(parameters->wish), request);
   if (tile_query.empty()) return Serve(plain_[*dataset], request, cache_control_);
   return Serve(MakeLayer(datasets_[*dataset], std::move(tile_query)), request, cache_control_);
 }

@@ -30,4 +30,8 @@ class LayerHandler {
 // shortest form, and without '+', which CesiumJS would turn into a space.
 std::string TileQuery(const ErrorWish& wish);
 
+// The query of a template, with the request's token where that came in a query: clients that send it so send templates
+// as they are.
+std::string WithToken(std::string query, const Request& request);
+
 }  // namespace terrace::server

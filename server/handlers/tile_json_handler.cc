@@ -7,6 +7,7 @@
 #include "proto/tile_json.h"
 #include "server/handlers/datasets_handler.h"
 #include "server/handlers/document.h"
+#include "server/handlers/layer_handler.h"
 #include "server/http/http_error.h"
 #include "server/http/negotiate.h"
 #include "server/http/query.h"
@@ -15,9 +16,9 @@ namespace terrace::server {
 namespace {
 
 // Defaults are left away, so that a tile is cached under one URL.
-std::string TileQuery(const HeightTileParameters& parameters) {
+std::string HeightTileQuery(const HeightTileParameters& parameters) {
   std::string query;
-  const auto add = [&query](std::string text) { query += (query.empty() ? "?" : "&") + std::move(text); };
+  const auto add = [&query](std::string text) { query += (query.empty() ? "" : "&") + std::move(text); };
   const HeightTileParameters defaults;
   if (parameters.encoding != defaults.encoding) add(fmt::format("encoding={}", proto::ToString(parameters.encoding)));
   if (parameters.size != defaults.size) add(fmt::format("size={}", parameters.size));
@@ -38,8 +39,9 @@ Response TileJsonHandler::Handle(const Route& route, const Request& request) con
   proto::TileJsonDescription tiles;
   tiles.name = dataset.name;
   tiles.attribution = dataset.attribution;
-  tiles.tile_template = fmt::format("{}/{}/{{z}}/{{x}}/{{y}}.png{}", OriginOf(request), PercentEncode(dataset.name),
-                                    TileQuery(*parameters));
+  const std::string query = WithToken(HeightTileQuery(*parameters), request);
+  tiles.tile_template = fmt::format("{}/{}/{{z}}/{{x}}/{{y}}.png{}{}", OriginOf(request), PercentEncode(dataset.name),
+                                    query.empty() ? "" : "?", query);
   tiles.max_zoom = MaxHeightLevel(dataset, parameters->size);
   tiles.tile_size = parameters->size;
   tiles.encoding = parameters->encoding;

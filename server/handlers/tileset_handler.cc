@@ -25,7 +25,7 @@ std::string ContentQuery(const ErrorWish& wish, std::string_view query) {
   return content;
 }
 
-Document MakeTileset(const DatasetView& dataset, ErrorWish wish, std::string content_query) {
+Document MakeTileset(const DatasetView& dataset, ErrorWish wish, std::string content_query, std::string subtree_query) {
   wish.at_least = wish.error_m.has_value();  // as TileQuery writes it into the templates
   proto::TilesetDescription tileset;
   tileset.attribution = dataset.attribution;
@@ -39,6 +39,7 @@ Document MakeTileset(const DatasetView& dataset, ErrorWish wish, std::string con
       std::min(dataset.min_height_m, dataset.floor_m) - proto::SkirtDepth(level, error_m) - rounding_m;
   tileset.max_height_m = std::max(dataset.max_height_m, dataset.floor_m) + rounding_m;
   tileset.content_query = std::move(content_query);
+  tileset.subtree_query = std::move(subtree_query);
   return Document::Make(proto::EncodeTileset(tileset), "application/json");
 }
 
@@ -46,7 +47,7 @@ Document MakeTileset(const DatasetView& dataset, ErrorWish wish, std::string con
 
 TilesetHandler::TilesetHandler(std::span<const DatasetView> datasets, std::string cache_control)
     : datasets_(datasets), cache_control_(std::move(cache_control)) {
-  for (const DatasetView& dataset : datasets_) plain_.push_back(MakeTileset(dataset, {}, ""));
+  for (const DatasetView& dataset : datasets_) plain_.push_back(MakeTileset(dataset, {}, "", ""));
 }
 
 Response TilesetHandler::Handle(const Route& route, const Request& request) const {
@@ -55,9 +56,10 @@ Response TilesetHandler::Handle(const Route& route, const Request& request) cons
   const Result<TileParameters> parameters =
       ParseTileParameters(route.query, /*allow_at_least=*/false, /*allow_compression=*/true);
   if (!parameters) return ClientErrorResponse(parameters.error(), request.id);
-  std::string content_query = ContentQuery(parameters->wish, route.query);
+  std::string content_query = WithToken(ContentQuery(parameters->wish, route.query), request);
   if (content_query.empty()) return Serve(plain_[*dataset], request, cache_control_);
-  return Serve(MakeTileset(datasets_[*dataset], parameters->wish, std::move(content_query)), request, cache_control_);
+  return Serve(MakeTileset(datasets_[*dataset], parameters->wish, std::move(content_query), WithToken("", request)),
+               request, cache_control_);
 }
 
 Response TilesetHandler::HandleSubtree(const Route& route, const Request& request) const {

@@ -76,6 +76,7 @@ struct Request {
   std::string method_name;  // as sent, for the log
   std::string target;       // as sent, but for the token in its query
   std::string token;        // of the Authorization header, else of the query; a secret: never logged, never a key
+  bool token_in_query = false;
   SharedFields fields;
   std::size_t content_length = 0;  // of a POST
   bool expects_continue = false;   // the client waits for a 100 before it sends the body
