@@ -175,7 +175,12 @@ class Server::Impl {
     }
     io_.Stop();
     tiles_.Shutdown();
-    if (drained) spdlog::info("stopped: every request was answered");
+    if (drained) {
+      spdlog::info("stopped: every request was answered");
+    } else {
+      spdlog::warn("stopped: some requests were not answered within the drain timeout of {} s",
+                   std::chrono::duration<double>(options_.drain_timeout).count());
+    }
     return drained;
   }
 

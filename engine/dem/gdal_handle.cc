@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <iterator>
 #include <limits>
+#include <new>
 #include <utility>
 
 #include "engine/dem/gdal_runtime.h"
@@ -72,7 +73,12 @@ Result<void> HandlePool::CheckUnchanged() {
 
 void HandlePool::Return(GDALDatasetUniquePtr dataset, std::uint64_t epoch) {
   const std::lock_guard lock(mutex_);
-  if (epoch == epoch_) limit_->Keep(*this, std::move(dataset));
+  if (epoch != epoch_) return;
+  try {
+    limit_->Keep(*this, std::move(dataset));
+  } catch (const std::bad_alloc&) {
+    // It is closed, and opened anew when it is wanted.
+  }
 }
 
 }  // namespace terrace::dem

@@ -1,4 +1,7 @@
 // terrace: one binary, one subcommand per job.
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
@@ -88,6 +91,12 @@ int Run(int argc, char** argv) {
 }  // namespace terrace::cli
 
 int main(int argc, char** argv) {
+  // Where a standard stream is closed, the next file that is opened would be one, and get what is meant for it.
+  while (true) {
+    const int opened = ::open("/dev/null", O_RDWR);
+    if (opened > STDERR_FILENO) ::close(opened);
+    if (opened < 0 || opened > STDERR_FILENO) break;
+  }
   try {
     // Before there are threads.
     terrace::dem::ClearGdalEnvironment();

@@ -63,6 +63,11 @@ std::string StemOf(const std::string& dem) {
   return path.has_filename() ? path.filename().string() : path.parent_path().filename().string();
 }
 
+bool IsRegularFile(const std::string& path) {
+  std::error_code ignored;
+  return std::filesystem::is_regular_file(path, ignored);
+}
+
 // The file's options, then the flags, then a dataset per DEM of the command line. Everything wrong is collected.
 config::Config MakeConfig(const ServeArguments& arguments, std::vector<config::ConfigError>& errors) {
   config::Config config;
@@ -297,6 +302,7 @@ int CheckConfig(const ServeArguments& arguments, const config::Config& config) {
 
 int Serve(const ServeArguments& arguments) {
   std::signal(SIGPIPE, SIG_IGN);  // whoever reads the log may go away; the server stays
+  std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow fails to be written, as on a full disk
   std::vector<config::ConfigError> errors;
   const config::Config config = MakeConfig(arguments, errors);
   if (!errors.empty()) return Report(errors, arguments.config_file);
@@ -317,7 +323,7 @@ int Serve(const ServeArguments& arguments) {
   dem::SetGdalCache(config.gdal_cache_bytes);
   std::vector<server::Dataset> datasets;
   if (!OpenDatasets(config, datasets)) return kExitFailure;
-  const std::size_t count = datasets.size();
+  std::atomic<std::size_t> count = datasets.size();
 
   const auto refinements = std::make_shared<server::RefinementCache>(config.refinement_cache_bytes, *disk);
   const auto catalog_of = [refinements](const std::vector<server::Dataset>& served, const config::Config& now) {
@@ -325,8 +331,16 @@ int Serve(const ServeArguments& arguments) {
   };
   const auto level = std::make_shared<std::atomic<config::LogLevel>>(config.log_level);  // the configured one
   std::unique_ptr<server::Server> server;
+  const auto served_text = [&] {
+    return fmt::format("{} dataset{} at {}", count.load(), count == 1 ? "" : "s", server->url());
+  };
   server::Reloader::Hooks hooks;
-  hooks.load = [&arguments]() -> config::ConfigResult {
+  const bool is_read_once = !arguments.config_file.empty() && !IsRegularFile(arguments.config_file);  // a pipe
+  hooks.load = [&arguments, config, is_read_once]() -> config::ConfigResult {
+    if (is_read_once) return config;
+    if (!arguments.config_file.empty() && !IsRegularFile(arguments.config_file)) {
+      return tl::unexpected(std::vector<config::ConfigError>{{"", "is no regular file any more"}});
+    }
     std::vector<config::ConfigError> wrong;
     config::Config loaded = MakeConfig(arguments, wrong);
     if (!wrong.empty()) return tl::unexpected(std::move(wrong));
@@ -341,13 +355,14 @@ int Serve(const ServeArguments& arguments) {
     if (const Result<void> replaced = server->Replace(catalog_of(served, now), OptionsOf(now)); !replaced) {
       spdlog::error("the new configuration cannot be served: {}", replaced.error().message);
     }
+    count = served.size();
     std::vector<std::uint64_t> generations;
     for (const server::Dataset& dataset : served) generations.push_back(dataset.generation);
     refinements->Retain(generations);
   };
   hooks.reloaded = [&] {
     server->ReopenAccessLog();
-    NotifyReady("at " + server->url());
+    NotifyReady(served_text());
   };
   hooks.tell = [&](const std::map<std::string, std::string>& troubles) { server->SetTroubles(troubles); };
   server::Reloader reloader(config, datasets, std::move(hooks));
@@ -374,9 +389,9 @@ int Serve(const ServeArguments& arguments) {
   server = *std::move(started);
   datasets.clear();  // what is replaced must not stay open
   reloader.Start(config.watch);
-  std::printf("terrace: serving %zu dataset%s at %s\n", count, count == 1 ? "" : "s", server->url().c_str());
+  fmt::print("terrace: serving {}\n", served_text());
   std::fflush(stdout);
-  NotifyReady(fmt::format("{} dataset{} at {}", count, count == 1 ? "" : "s", server->url()));
+  NotifyReady(served_text());
   const server::MemoryTrimmer trimmer;
   const bool drained = server->Wait();
   reloader.Stop();

@@ -57,7 +57,8 @@ std::string_view ProtocolOf(const ReplyRecord& record) { return record.version =
 
 // -1: errno tells why not.
 int OpenToAppend(const std::filesystem::path& file) {
-  return ::open(file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0640);
+  // A pipe without a reader is refused, and one whose reader stalls misses lines: nothing waits for it.
+  return ::open(file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC | O_NONBLOCK, 0640);
 }
 
 }  // namespace

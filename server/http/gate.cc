@@ -48,6 +48,10 @@ std::string Gate::Who(const Request& request, const Caller& caller) {
   return HasName(request) ? "/" + request.grant->name : caller.block;  // no address begins with a slash
 }
 
+std::uint64_t Gate::NumberOf(const Request& request, const Caller& caller) {
+  return std::hash<std::string>{}(Who(request, caller)) | 1;
+}
+
 std::optional<Response> Gate::RefuseForRate(const Request& request, const Result<Route>& route, const Caller& caller) {
   if (route && IsProbe(route->kind)) return std::nullopt;
   const bool has_name = HasName(request);

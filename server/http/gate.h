@@ -41,6 +41,7 @@ class Gate {
   // What counts as one client, among those who share the server: a token's name behind a slash, or the block of the
   // address.
   static std::string Who(const Request& request, const Caller& caller);
+  static std::uint64_t NumberOf(const Request& request, const Caller& caller);  // the same in short; never 0
 
   // 429; nothing where the request may go on. All but probes count, those to URLs that do not exist among them.
   std::optional<Response> RefuseForRate(const Request& request, const Result<Route>& route, const Caller& caller);

@@ -45,11 +45,11 @@ Result<void> SetTexture(std::optional<proto::TextureFormat>& to, std::string_vie
   return MakeError(ErrorCode::kInvalidArgument, "texture must be jpeg, webp or none");
 }
 
-Result<void> CheckTogether(const ErrorWish& wish, bool at_least_given) {
+Result<void> CheckTogether(const ErrorWish& wish) {
   if (wish.error_m && wish.fraction) {
     return MakeError(ErrorCode::kInvalidArgument, "error and fraction exclude each other");
   }
-  if (at_least_given && !wish.error_m) return MakeError(ErrorCode::kInvalidArgument, "atleast needs error");
+  if (wish.at_least && !wish.error_m) return MakeError(ErrorCode::kInvalidArgument, "atleast needs error");
   return {};
 }
 
@@ -120,7 +120,7 @@ Result<TileParameters> ParseTileParameters(std::string_view query, bool allow_at
     }
     if (!set) return tl::unexpected(set.error());
   }
-  if (const Result<void> fits = CheckTogether(wish, at_least_given); !fits) return tl::unexpected(fits.error());
+  if (const Result<void> fits = CheckTogether(wish); !fits) return tl::unexpected(fits.error());
   return parameters;
 }
 

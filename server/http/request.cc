@@ -76,6 +76,16 @@ const char* HostProblem(const Fields& fields) {
   return nullptr;
 }
 
+// Of a target in absolute form.
+std::optional<std::string_view> AuthorityOf(std::string_view target) {
+  for (const std::string_view scheme : {"http://", "https://"}) {
+    if (!EqualsIgnoringCase(target.substr(0, scheme.size()), scheme)) continue;
+    target.remove_prefix(scheme.size());
+    return target.substr(0, target.find_first_of("/?#"));
+  }
+  return std::nullopt;
+}
+
 // RFC 6750.
 std::optional<std::string> BearerOf(const Fields& fields) {
   constexpr std::string_view kScheme = "bearer ";
@@ -108,6 +118,7 @@ RequestFields FieldsOf(const Fields& sent) {
 void SetTarget(Request& request, std::string_view target) {
   request.target = std::string(target);
   std::optional<std::string> in_query = TakeToken(request.target);
+  request.token_in_query = !request.fields->bearer && in_query.has_value();
   request.token = request.fields->bearer ? *request.fields->bearer : std::move(in_query).value_or("");
 }
 
@@ -254,7 +265,15 @@ tl::expected<Request, BadRequest> ParseHead(std::string_view head, HeadMemo* mem
   request.version = fields.version();
   request.keep_alive = fields.keep_alive();
   request.method_name = std::string(fields.method_string());
-  request.fields = SharedFields(FieldsOf(fields));
+  RequestFields said = FieldsOf(fields);
+  // RFC 9112, section 3.2.2: whatever Host says.
+  const std::optional<std::string_view> authority = AuthorityOf(fields.target());
+  if (authority) {
+    if (authority->empty() || !IsHostValue(*authority)) return Bad(400, "malformed host in the request target");
+    said.host = std::string(*authority);
+    memo = nullptr;  // other targets have another host
+  }
+  request.fields = SharedFields(std::move(said));
   SetTarget(request, fields.target());
   request.content_length = static_cast<std::size_t>(*PlainLength(fields));
   // RFC 9110, section 10.1.1: HTTP/1.0 knows no interim replies.

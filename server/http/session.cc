@@ -174,8 +174,9 @@ asio::awaitable<bool> Session::ServeOne() {
 // What has to be waited for: the request's body, and the answer.
 asio::awaitable<bool> Session::ServeLater(Route route) {
   Request& request = exchange_.request;
+  request.client = Gate::NumberOf(request, exchange_.caller);
   std::optional<TransferBudget::Hold> incoming =
-      context_->transfers->TryHold(request.content_length, weak_from_this(), exchange_.begun);
+      context_->transfers->TryHold(request.content_length, weak_from_this(), exchange_.begun, request.client);
   if (!incoming) {
     Response response = Overloaded("too many request bodies are on their way", request.id);
     response.close = true;
@@ -189,7 +190,6 @@ asio::awaitable<bool> Session::ServeLater(Route route) {
     incoming->Settle();  // it is the server's turn
   }
   stream_.ExpiresNever();  // the handlers have deadlines of their own
-  request.client = std::hash<std::string>{}(Gate::Who(request, exchange_.caller)) | 1;  // 0 is nobody
   std::optional<Response> response = co_await AnswerWhileConnected(route, request);
   if (!response) {
     Response nobody;
@@ -277,7 +277,8 @@ asio::awaitable<bool> Session::Reply(Response& response) {
   const bool with_body = request.method != Method::kHead && response.status != 304;
   const auto kind = response.is_vital ? TransferBudget::Kind::kVitalReply : TransferBudget::Kind::kReply;
   std::optional<TransferBudget::Hold> room =
-      context_->transfers->TryHold(with_body ? response.body : nullptr, weak_from_this(), Clock::now(), kind);
+      context_->transfers->TryHold(with_body ? response.body : nullptr, weak_from_this(), Clock::now(), kind,
+                                   Gate::NumberOf(request, exchange_.caller));
   if (!room) {
     const std::string_view route = response.route;
     co_await HoldBack();

@@ -1,5 +1,7 @@
 #include "server/http/transfer_budget.h"
 
+#include <algorithm>
+
 namespace terrace::server {
 namespace {
 
@@ -8,22 +10,22 @@ constexpr std::size_t kUploadShare = 4;  // a quarter of the budget is for reque
 }  // namespace
 
 std::optional<TransferBudget::Hold> TransferBudget::TryHold(Body body, const std::weak_ptr<Connection>& holder,
-                                                            Clock::time_point now, Kind kind) {
+                                                            Clock::time_point now, Kind kind, std::uint64_t client) {
   const std::size_t bytes = body ? body->size() : 0;
-  return Take(std::move(body), bytes, holder, now, kind);
+  return Take(std::move(body), bytes, holder, now, kind, client);
 }
 
 std::optional<TransferBudget::Hold> TransferBudget::TryHold(std::size_t bytes, const std::weak_ptr<Connection>& holder,
-                                                            Clock::time_point now) {
-  return Take(nullptr, bytes, holder, now, Kind::kUpload);
+                                                            Clock::time_point now, std::uint64_t client) {
+  return Take(nullptr, bytes, holder, now, Kind::kUpload, client);
 }
 
 std::optional<TransferBudget::Hold> TransferBudget::Take(Body body, std::size_t bytes,
                                                          const std::weak_ptr<Connection>& holder, Clock::time_point now,
-                                                         Kind kind) {
+                                                         Kind kind, std::uint64_t client) {
   if (bytes <= kFreeBytes) return Hold();
   std::unique_lock lock(mutex_);
-  if (!charges_.contains(body.get()) && !MayTake(bytes, kind)) {
+  if (!charges_.contains(body.get()) && !MayTake(bytes, kind, client)) {
     ++refused_;
     const std::vector<std::shared_ptr<Connection>> overdue = Overdue(now, /*only_uploads=*/kind == Kind::kUpload);
     lock.unlock();
@@ -38,6 +40,8 @@ std::optional<TransferBudget::Hold> TransferBudget::Take(Body body, std::size_t 
     const bool fits = Fits(bytes, kind);
     charge.bytes = fits ? bytes : 0;
     held_ += charge.bytes;
+    charge.client = client;
+    if (client != 0 && charge.bytes > 0) held_by_[client] += charge.bytes;
     charge.is_upload = kind == Kind::kUpload;
     if (charge.is_upload) uploads_held_ += charge.bytes;
     oversized_under_way_ = oversized_under_way_ || !fits;
@@ -49,7 +53,10 @@ bool TransferBudget::Fits(std::size_t bytes, Kind kind) const {
   return held_ + bytes <= capacity_ + (kind == Kind::kVitalReply ? kReserve : 0);
 }
 
-bool TransferBudget::MayTake(std::size_t bytes, Kind kind) const {
+bool TransferBudget::MayTake(std::size_t bytes, Kind kind, std::uint64_t client) const {
+  const auto own = held_by_.find(client);
+  const std::size_t free = capacity_ - std::min(held_, capacity_);
+  if (kind != Kind::kVitalReply && own != held_by_.end() && own->second > kShare * free) return false;
   if (kind == Kind::kUpload && uploads_held_ > 0 && uploads_held_ + bytes > capacity_ / kUploadShare) return false;
   return Fits(bytes, kind) || (bytes > capacity_ && !oversized_under_way_);
 }
@@ -72,6 +79,10 @@ void TransferBudget::Release(Entries::iterator entry) {
   const auto charge = charges_.find(entry->charge);
   if (--charge->second.holders == 0) {
     held_ -= charge->second.bytes;
+    if (const auto own = held_by_.find(charge->second.client); own != held_by_.end()) {
+      own->second -= charge->second.bytes;
+      if (own->second == 0) held_by_.erase(own);
+    }
     if (charge->second.is_upload) uploads_held_ -= charge->second.bytes;
     if (charge->second.bytes == 0) oversized_under_way_ = false;
     charges_.erase(charge);

@@ -3,8 +3,9 @@
 //
 // A body that many replies share counts once. Where there is no room for one more, it is refused, and replies that have
 // had more than their time (kGrace, and a second for each kRate bytes) are cut off, so that those who read slowly do
-// not keep others out for long. A single body that is larger than the whole budget may be under way beside it. What
-// tells operators how the server is may go beyond the budget by kReserve: it is wanted most when there is no room.
+// not keep others out for long. One client gets two thirds of the room at most. A single body that is larger than the
+// whole budget may be under way beside it. What tells operators how the server is may go beyond the budget by kReserve:
+// it is wanted most when there is no room.
 //
 // Thread-safe.
 #pragma once
@@ -34,6 +35,7 @@ class TransferBudget {
   static constexpr std::chrono::seconds kGrace{2};
   static constexpr std::size_t kRate = std::size_t{1} << 20;
   static constexpr std::size_t kReserve = std::size_t{1} << 20;
+  static constexpr std::size_t kShare = 2;  // a client's, of what is free: room is left for the next one
 
   explicit TransferBudget(std::size_t capacity) : capacity_(capacity) {}
 
@@ -43,12 +45,12 @@ class TransferBudget {
   enum class Kind : std::uint8_t { kReply, kVitalReply, kUpload };
 
   // Room for a reply's body until the hold ends. Nothing: there is none, and the body must be let go. `holder` is who
-  // would be cut off.
+  // would be cut off, `client` whose share it counts against; 0: nobody's.
   std::optional<Hold> TryHold(Body body, const std::weak_ptr<Connection>& holder, Clock::time_point now = Clock::now(),
-                              Kind kind = Kind::kReply);
+                              Kind kind = Kind::kReply, std::uint64_t client = 0);
   // The same for `bytes` of a request's body, which nobody shares.
   std::optional<Hold> TryHold(std::size_t bytes, const std::weak_ptr<Connection>& holder,
-                              Clock::time_point now = Clock::now());
+                              Clock::time_point now = Clock::now(), std::uint64_t client = 0);
 
   struct Stats {
     std::size_t held_bytes = 0;
@@ -67,14 +69,15 @@ class TransferBudget {
     std::size_t bytes = 0;  // 0: beside the budget
     std::size_t holders = 0;
     bool is_upload = false;
+    std::uint64_t client = 0;  // who asked first
   };
 
-  bool Fits(std::size_t bytes, Kind kind) const;     // mutex_ is held
-  bool MayTake(std::size_t bytes, Kind kind) const;  // mutex_ is held
+  bool Fits(std::size_t bytes, Kind kind) const;                           // mutex_ is held
+  bool MayTake(std::size_t bytes, Kind kind, std::uint64_t client) const;  // mutex_ is held
   // mutex_ is held. Uploads make room for uploads alone: replies have none to give them.
   std::vector<std::shared_ptr<Connection>> Overdue(Clock::time_point now, bool only_uploads);
   std::optional<Hold> Take(Body body, std::size_t bytes, const std::weak_ptr<Connection>& holder, Clock::time_point now,
-                           Kind kind);
+                           Kind kind, std::uint64_t client);
   void Release(Entries::iterator entry);
   void Settle(Entries::iterator entry);
 
@@ -82,6 +85,7 @@ class TransferBudget {
   mutable std::mutex mutex_;
   Entries entries_;
   std::unordered_map<const void*, Charge> charges_;
+  std::unordered_map<std::uint64_t, std::size_t> held_by_;  // client; those that hold anything
   std::size_t held_ = 0;
   std::size_t uploads_held_ = 0;  // of these, request bodies
   bool oversized_under_way_ = false;

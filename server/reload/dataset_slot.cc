@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <system_error>
 #include <utility>
 
 namespace terrace::server {
@@ -120,7 +121,11 @@ void DatasetSlot::OpenIfDue(const DatasetOpener& open) {
   spdlog::info("dataset {}: opening {}", wanted_.name, wanted_.sources.front().written);
   tried_ = StampsOf(NamedFiles(wanted_));
   stop_opening_ = std::stop_source();
-  opening_ = std::async(std::launch::async, OpenQuietly, open, wanted_, stop_opening_.get_token());
+  try {
+    opening_ = std::async(std::launch::async, OpenQuietly, open, wanted_, stop_opening_.get_token());
+  } catch (const std::system_error& error) {
+    Fail({ErrorCode::kUnavailable, fmt::format("no thread to open it on: {}", error.code().message())});
+  }
 }
 
 void DatasetSlot::Fail(const Error& error) {

@@ -128,7 +128,7 @@ class Proxied(unittest.TestCase):
 
     def test_plain_http_is_sent_to_https(self):
         reply = self.get("/earth/layer.json?error=5", port=self.http_port, scheme="http")
-        self.assertEqual((reply.status, reply.fields["location"]), (308, "https://localhost/earth/layer.json?error=5"))
+        self.assertEqual((reply.status, reply.fields["location"]), (308, f"https://localhost:{self.port}/earth/layer.json?error=5"))
 
     def test_tiles_are_cached(self):
         target = "/earth/4/8/10.terrain"

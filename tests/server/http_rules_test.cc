@@ -43,6 +43,8 @@ std::vector<Rule> RequestLines() {
       {"schemes have no case", Head("GET HTTP://x/livez HTTP/1.1"), {200}},
       {"absolute form without a path", Head("GET http://x HTTP/1.1"), {200}},
       {"absolute form whose host is another than Host's", Head("GET http://y/livez HTTP/1.1"), {200}},
+      {"absolute form without a host", Head("GET http:///livez HTTP/1.1"), {400}, kCloses},
+      {"absolute form with a user", Head("GET http://me@x/livez HTTP/1.1"), {400}, kCloses},
       {"other schemes", Head("GET ftp://x/livez HTTP/1.1"), {400}},
       {"asterisk form of OPTIONS", Head("OPTIONS * HTTP/1.1"), {204}},
       {"asterisk form of others", Head("GET * HTTP/1.1"), {400}},

@@ -283,6 +283,26 @@ TEST_F(Limits, ShowsDatasetsToWhomTheyBelong) {
   EXPECT_EQ(browser.Read()->status, 204) << "preflights carry no token";
 }
 
+TEST_F(Limits, ATokenInTheQueryGoesIntoTemplates) {
+  ServerOptions options;
+  options.edge.tokens = {{"a", kAll, "", {}, 0}};
+  Start(options);
+  const std::string token = std::string("token=") + kAll;
+  const auto contains = [](const Reply& reply, const std::string& text) {
+    return reply.body.find(text) != std::string::npos;
+  };
+  EXPECT_TRUE(contains(Fetch(port(), "/maui/layer.json?" + token), "{y}.terrain?v={version}&" + token));
+  const Reply tileset = Fetch(port(), "/maui/tileset.json?error=5&" + token);
+  EXPECT_TRUE(contains(tileset, ".glb?error=5&atleast=1&" + token));
+  EXPECT_TRUE(contains(tileset, ".subtree?" + token));
+  EXPECT_TRUE(contains(Fetch(port(), "/maui/tiles.json?" + token), "{y}.png?" + token));
+  EXPECT_TRUE(contains(Fetch(port(), "/maui/tiles.json?encoding=mapbox&" + token), "{y}.png?encoding=mapbox&" + token));
+  const std::string bearer = std::string("Authorization: Bearer ") + kAll + "\r\n";
+  for (const char* target : {"/maui/layer.json", "/maui/tileset.json", "/maui/tiles.json"}) {
+    EXPECT_FALSE(contains(Fetch(port(), target, bearer), "token=")) << target;
+  }
+}
+
 TEST_F(Limits, ATokenChangesNoTile) {
   ServerOptions options;
   options.edge.tokens = {{"a", kAll, "", {}, 0}, {"b", kOahu, "", {"maui"}, 0}};
@@ -297,6 +317,7 @@ TEST_F(Limits, ATokenChangesNoTile) {
 
 TEST_F(Limits, TokensAreIgnoredWhereThereAreNone) {
   Start();
+  EXPECT_EQ(Fetch(port(), "/maui/layer.json?token=anything").body.find("anything"), std::string::npos);
   EXPECT_EQ(Fetch(port(), "/maui/0/0/0.terrain?token=anything&error=5").status, 200);
   EXPECT_EQ(Fetch(port(), "/maui/layer.json?%74oken=").Field("cache-control"), "public, max-age=3600");
 }
@@ -328,6 +349,22 @@ TEST_F(Limits, BelievesTrustedProxiesAlone) {
   const Reply reply = Fetch(port(), "/maui/tiles.json", said);
   EXPECT_NE(reply.body.find("\"https://maps.example/maui/"), std::string::npos) << reply.body;
   EXPECT_NE(reply.Field("vary").find("X-Forwarded-Host, X-Forwarded-Proto"), std::string::npos);
+}
+
+TEST_F(Limits, TheHostOfATargetCountsBeforeHost) {
+  Start();
+  RawClient client(port());
+  const auto ask = [&](const std::string& target) {
+    client.Send("GET " + target + " HTTP/1.1\r\nHost: there.example\r\n\r\n");
+    const auto reply = client.Read();
+    return reply ? reply->body : "";
+  };
+  const auto told = [](const std::string& body, const char* host) {
+    return body.find("\"http://" + std::string(host) + "/maui/") != std::string::npos;
+  };
+  EXPECT_TRUE(told(ask("http://here.example:8080/maui/tiles.json"), "here.example:8080"));
+  EXPECT_TRUE(told(ask("/maui/tiles.json"), "there.example")) << "the same lines, another host";
+  EXPECT_TRUE(told(ask("http://here.example/maui/tiles.json"), "here.example"));
 }
 
 TEST_F(Limits, RefusesOptionsThatMakeNoSense) {

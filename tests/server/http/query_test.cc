@@ -13,7 +13,7 @@ TEST(Query, DecodesPairsInOrder) {
 
 TEST(Query, TakesGoodTileParameters) {
   for (const char* query : {"", "v=1", "v=1.0.0&v=2", "extensions=a-b&extensions=c", "error=5", "error=5&atleast=1",
-                            "error=5&atleast=0", "error=0.001", "error=1e3", "error=1e-300", "error=%35",
+                            "error=5&atleast=0", "atleast=0", "error=0.001", "error=1e3", "error=1e-300", "error=%35",
                             "fraction=0.5", "fraction=1e300", "&error=5&", "error=5&v=1&extensions=octvertexnormals"}) {
     EXPECT_TRUE(ParseTileParameters(query, true)) << query;
   }

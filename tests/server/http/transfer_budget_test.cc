@@ -101,6 +101,22 @@ TEST_F(TransferBudgetTest, KeepsAReserveForVitalReplies) {
   EXPECT_EQ(budget_.stats().held_bytes, 3 * kMb);
 }
 
+TEST_F(TransferBudgetTest, OneClientLeavesRoomForOthers) {
+  constexpr std::uint64_t kGreedy = 1, kOther = 3;
+  std::vector<TransferBudget::Hold> holds;
+  const auto takes = [&](std::uint64_t client) {
+    auto hold = budget_.TryHold(BodyOf(kMb / 10), connection_, now_, TransferBudget::Kind::kReply, client);
+    if (hold) holds.push_back(*std::move(hold));
+    return hold.has_value();
+  };
+  while (takes(kGreedy)) continue;
+  EXPECT_EQ(holds.size(), 21u) << "two thirds of 30, and the one that passes them";
+  for (int i = 0; i < 5; ++i) EXPECT_TRUE(takes(kOther));
+  EXPECT_FALSE(takes(kGreedy));
+  holds.clear();
+  EXPECT_TRUE(takes(kGreedy)) << "what was given back counts no more";
+}
+
 TEST_F(TransferBudgetTest, LetsOneOversizedBodyPass) {
   auto large = budget_.TryHold(BodyOf(10 * kMb), connection_, now_);
   ASSERT_TRUE(large);
