@@ -253,11 +253,11 @@ TEST(Prepare, RastersWhoseOverviewsMisleadAreLookedAtOnce) {
   const std::string path = WriteRaster(dir, spec), cache = dir.File("cache");
   using Times = std::map<std::string, std::filesystem::file_time_type>;
   const auto times = [&] {
-    Times times;
+    Times written;
     for (const auto& entry : std::filesystem::directory_iterator(cache)) {
-      times[entry.path().filename()] = entry.last_write_time();
+      written[entry.path().filename()] = entry.last_write_time();
     }
-    return times;
+    return written;
   };
   const auto source = OpenRecorded(path, cache);
   EXPECT_FALSE(source->info().overviews_unused.empty());
