@@ -204,6 +204,14 @@ class Mesh(InFolder):
             self.assertEqual(len(read_obj(self.folder / "real.obj")[0]), 9)
         self.assertEqual((self.folder / "real.obj").stat().st_mode & 0o777, 0o640)
 
+    def test_what_is_told_never_gets_into_a_file(self):
+        whole, closed = self.folder / "whole.obj", self.folder / "closed.obj"
+        run("mesh", SAMPLE, "-o", whole, "--max-error", 20)
+        with_streams_closed = ["sh", "-c", 'exec "$0" "$@" <&- >&- 2>&-', str(BINARY)]
+        done = subprocess.run([*with_streams_closed, "mesh", SAMPLE, "-o", closed, "--max-error", "20"], timeout=120)
+        self.assertEqual(done.returncode, 0)
+        self.assertEqual(closed.read_bytes(), whole.read_bytes())
+
     def test_finds_undeclared_voids(self):
         heights = [[500 + x for x in range(30)] for _ in range(30)]
         heights[3][:20] = [-9999] * 20
