@@ -296,7 +296,8 @@ TEST_F(Limits, ATokenInTheQueryGoesIntoTemplates) {
   EXPECT_TRUE(contains(tileset, ".glb?error=5&atleast=1&" + token));
   EXPECT_TRUE(contains(tileset, ".subtree?" + token));
   EXPECT_TRUE(contains(Fetch(port(), "/maui/tiles.json?" + token), "{y}.png?" + token));
-  EXPECT_TRUE(contains(Fetch(port(), "/maui/tiles.json?encoding=mapbox&" + token), "{y}.png?encoding=mapbox&" + token));
+  EXPECT_TRUE(
+      contains(Fetch(port(), "/maui/tiles.json?encoding=terrarium&" + token), "{y}.png?encoding=terrarium&" + token));
   const std::string bearer = std::string("Authorization: Bearer ") + kAll + "\r\n";
   for (const char* target : {"/maui/layer.json", "/maui/tileset.json", "/maui/tiles.json"}) {
     EXPECT_FALSE(contains(Fetch(port(), target, bearer), "token=")) << target;
