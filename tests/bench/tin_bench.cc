@@ -11,6 +11,11 @@ namespace terrace::bench {
 namespace {
 
 int Measure(const Options& options, const std::string& json_path) {
+  std::ofstream out;
+  if (!json_path.empty()) {
+    out.open(json_path);  // before all the work
+    if (!out) Die(json_path + ": cannot be written");
+  }
   Environment environment(options);
   nlohmann::ordered_json tables = nlohmann::ordered_json::array();
   const nlohmann::ordered_json context = MachineContext();  // first: later the load would be our own
@@ -24,7 +29,6 @@ int Measure(const Options& options, const std::string& json_path) {
   }
   if (tables.empty()) Die("no case left: look at --filter and TERRACE_TEST_DATA");
   if (json_path.empty()) return 0;
-  std::ofstream out(json_path);
   out << nlohmann::ordered_json{{"context", context},
                                 {"options",
                                  {{"runs", options.runs},
