@@ -49,7 +49,7 @@ std::string Gate::Who(const Request& request, const Caller& caller) {
 }
 
 std::uint64_t Gate::NumberOf(const Request& request, const Caller& caller) {
-  return std::hash<std::string>{}(Who(request, caller)) | 1;
+  return HasName(request) ? std::hash<std::string>{}(Who(request, caller)) | 1 : caller.number;
 }
 
 std::optional<Response> Gate::RefuseForRate(const Request& request, const Result<Route>& route, const Caller& caller) {

@@ -3,6 +3,8 @@
 // Thread-safe.
 #pragma once
 
+#include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -18,10 +20,12 @@ namespace terrace::server {
 // A client as it is logged and counted.
 struct Caller {
   Caller() = default;
-  explicit Caller(const asio::ip::address& a) : address(a), text(a.to_string()), block(ClientBlock(a)) {}
+  explicit Caller(const asio::ip::address& a)
+      : address(a), text(a.to_string()), block(ClientBlock(a)), number(std::hash<std::string>{}(block) | 1) {}
 
   asio::ip::address address;
   std::string text = "-", block;
+  std::uint64_t number = 1;  // of the block; never 0
 };
 
 struct GateOptions {
@@ -41,7 +45,8 @@ class Gate {
   // What counts as one client, among those who share the server: a token's name behind a slash, or the block of the
   // address.
   static std::string Who(const Request& request, const Caller& caller);
-  static std::uint64_t NumberOf(const Request& request, const Caller& caller);  // the same in short; never 0
+  // The same in short; never 0.
+  static std::uint64_t NumberOf(const Request& request, const Caller& caller);
 
   // 429; nothing where the request may go on. All but probes count, those to URLs that do not exist among them.
   std::optional<Response> RefuseForRate(const Request& request, const Result<Route>& route, const Caller& caller);
