@@ -43,15 +43,16 @@ Result<Source> MakeSource(const std::string& path, tin::HeightField heights, std
 }
 
 Result<Source> ReadDem(const ColoredMeshArguments& arguments) {
-  Progress progress("reading " + arguments.raster + " and " + arguments.color.image);
+  std::optional<Progress> progress(std::in_place, "reading " + arguments.raster + " and " + arguments.color.image);
   auto raster = dem::ReadRaster(arguments.raster,
-                                ReadOptionsOf(arguments.nodata, [&](double share) { progress.Update(share / 2); }));
+                                ReadOptionsOf(arguments.nodata, [&](double share) { progress->Update(share / 2); }));
   if (!raster) return tl::unexpected(raster.error());
   auto colors = dem::ReadColors(arguments.color.image, arguments.raster, *raster,
-                                [&](double share) { progress.Update(0.5 + share / 2); });
+                                [&](double share) { progress->Update(0.5 + share / 2); });
   if (!colors) return tl::unexpected(colors.error());
   auto heights = tin::HeightField::Make(raster->width, raster->height, std::move(raster->heights));
   if (!heights) return MakeError(heights.error().code, "{}: {}", arguments.raster, heights.error().message);
+  progress.reset();
   WarnOf(arguments.raster, *raster);
   return MakeSource(arguments.color.image, *std::move(heights), *std::move(colors), arguments.color.weight,
                     raster->georeferenced, raster->geo_transform);

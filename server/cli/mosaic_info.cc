@@ -63,7 +63,8 @@ std::vector<std::string> AdviceFor(const dem::DemInfo& info) {
   std::vector<std::string> advice;
   if (const std::ptrdiff_t hidden = CountHidden(info.sources); hidden > 0) {
     advice.push_back(fmt::format(
-        "{} {} wholly under a coarser one that comes first, and {} in its voids alone: name the finer ones first",
+        "{} {} within the bounds of a coarser one that comes first, and {} where that has voids alone: name finer ones "
+        "first",
         Sources(hidden), hidden == 1 ? "lies" : "lie", hidden == 1 ? "shows" : "show"));
   }
   if (large > 0) {

@@ -63,9 +63,11 @@ std::string StemOf(const std::string& dem) {
   return path.has_filename() ? path.filename().string() : path.parent_path().filename().string();
 }
 
-bool IsRegularFile(const std::string& path) {
+// Something that can be read once, or without end.
+bool IsPipe(const std::string& path) {
   std::error_code ignored;
-  return std::filesystem::is_regular_file(path, ignored);
+  const std::filesystem::file_status status = std::filesystem::status(path, ignored);
+  return std::filesystem::exists(status) && std::filesystem::is_other(status);
 }
 
 // The file's options, then the flags, then a dataset per DEM of the command line. Everything wrong is collected.
@@ -304,6 +306,7 @@ int Serve(const ServeArguments& arguments) {
   std::signal(SIGPIPE, SIG_IGN);  // whoever reads the log may go away; the server stays
   std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow fails to be written, as on a full disk
   std::vector<config::ConfigError> errors;
+  const bool is_read_once = IsPipe(arguments.config_file);
   const config::Config config = MakeConfig(arguments, errors);
   if (!errors.empty()) return Report(errors, arguments.config_file);
   if (arguments.print_config) {
@@ -335,11 +338,10 @@ int Serve(const ServeArguments& arguments) {
     return fmt::format("{} dataset{} at {}", count.load(), count == 1 ? "" : "s", server->url());
   };
   server::Reloader::Hooks hooks;
-  const bool is_read_once = !arguments.config_file.empty() && !IsRegularFile(arguments.config_file);  // a pipe
   hooks.load = [&arguments, config, is_read_once]() -> config::ConfigResult {
     if (is_read_once) return config;
-    if (!arguments.config_file.empty() && !IsRegularFile(arguments.config_file)) {
-      return tl::unexpected(std::vector<config::ConfigError>{{"", "is no regular file any more"}});
+    if (IsPipe(arguments.config_file)) {
+      return tl::unexpected(std::vector<config::ConfigError>{{"", "has become a pipe or device; make it a file"}});
     }
     std::vector<config::ConfigError> wrong;
     config::Config loaded = MakeConfig(arguments, wrong);
@@ -354,8 +356,9 @@ int Serve(const ServeArguments& arguments) {
     refinements->SetCapacity(now.refinement_cache_bytes);
     if (const Result<void> replaced = server->Replace(catalog_of(served, now), OptionsOf(now)); !replaced) {
       spdlog::error("the new configuration cannot be served: {}", replaced.error().message);
+    } else {
+      count = served.size();
     }
-    count = served.size();
     std::vector<std::uint64_t> generations;
     for (const server::Dataset& dataset : served) generations.push_back(dataset.generation);
     refinements->Retain(generations);

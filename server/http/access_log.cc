@@ -117,6 +117,10 @@ Result<AccessLog> AccessLog::Open(AccessLogForm form, std::filesystem::path file
   }
   const int descriptor = OpenToAppend(file);
   if (descriptor < 0) {
+    if (errno == ENXIO) {
+      return MakeError(ErrorCode::kUnavailable, "access log {}: is a pipe that nobody reads; start its reader first",
+                       file.string());
+    }
     return MakeError(ErrorCode::kUnavailable, "access log {}: {}; give a file in a folder that the server may write to",
                      file.string(), std::generic_category().message(errno));
   }
@@ -130,11 +134,14 @@ void AccessLog::Write(const ReplyRecord& record) {
     return;
   }
   const auto now = SystemClock::now();
-  const std::string line =
+  std::string line =
       (form_ == AccessLogForm::kJson ? FormatJsonLine(record, now) : FormatCombinedLine(record, now)) + '\n';
   const std::lock_guard lock(mutex_);
-  // In one piece, as others may append to the file. On a full disk a request goes untold rather than unanswered.
-  [[maybe_unused]] const ssize_t written = ::write(descriptor_, line.data(), line.size());
+  // In one piece, as others may append to the file. On a full disk, or where a pipe's reader stalls, a request goes
+  // untold rather than unanswered, and a line that was cut is ended before the next one.
+  if (is_cut_) line.insert(0, 1, '\n');
+  const ssize_t written = ::write(descriptor_, line.data(), line.size());
+  if (written > 0) is_cut_ = static_cast<std::size_t>(written) < line.size();
 }
 
 void AccessLog::Reopen() {
@@ -146,6 +153,7 @@ void AccessLog::Reopen() {
   }
   const std::lock_guard lock(mutex_);
   ::close(std::exchange(descriptor_, descriptor));
+  is_cut_ = false;
 }
 
 }  // namespace terrace::server

@@ -70,7 +70,8 @@ class AccessLog {
   const AccessLogForm form_;
   const std::filesystem::path file_;
   std::mutex mutex_;
-  int descriptor_;  // guarded by mutex_
+  int descriptor_;       // guarded by mutex_
+  bool is_cut_ = false;  // the last line was; likewise
 };
 
 }  // namespace terrace::server

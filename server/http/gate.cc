@@ -78,9 +78,12 @@ std::optional<Response> Gate::Refuse(const Request& request, const Route& route)
   return ProblemResponse(403, "this token is for other datasets", request.id);
 }
 
-void Gate::Mark(const Route& route, Response& response) const {
+void Gate::Mark(const Request& request, const Route& route, Response& response) const {
   if (!options_.access.has_tokens() || !ShowsDatasets(route.kind)) return;
-  response.for_grant = route.kind == RouteKind::kDatasets || NeedsGrant(route, *options_.access.anonymous());
+  const bool has_templates = route.kind == RouteKind::kLayer || route.kind == RouteKind::kTileset ||
+                             route.kind == RouteKind::kTileJson;  // which have the token of the query
+  response.for_grant = route.kind == RouteKind::kDatasets || (has_templates && request.token_in_query) ||
+                       NeedsGrant(route, *options_.access.anonymous());
 }
 
 }  // namespace terrace::server

@@ -55,7 +55,7 @@ class Gate {
   std::optional<Response> Refuse(const Request& request, const Route& route) const;
 
   // Marks a reply that another token would not get.
-  void Mark(const Route& route, Response& response) const;
+  void Mark(const Request& request, const Route& route, Response& response) const;
 
   const Proxies& proxies() const { return options_.proxies; }
 

@@ -176,7 +176,7 @@ asio::awaitable<bool> Session::ServeLater(Route route) {
   Request& request = exchange_.request;
   request.client = Gate::NumberOf(request, exchange_.caller);
   std::optional<TransferBudget::Hold> incoming =
-      context_->transfers->TryHold(request.content_length, weak_from_this(), exchange_.begun, request.client);
+      context_->transfers->TryHold(request.content_length, weak_from_this(), exchange_.begun);
   if (!incoming) {
     Response response = Overloaded("too many request bodies are on their way", request.id);
     response.close = true;
@@ -198,7 +198,7 @@ asio::awaitable<bool> Session::ServeLater(Route route) {
     stream_.Close();
     co_return false;
   }
-  context_->gate->Mark(route, *response);
+  context_->gate->Mark(request, route, *response);
   const bool keep = co_await Reply(*response);
   request.body = std::string();  // nothing of it is held while the connection waits
   co_return keep;
@@ -242,7 +242,7 @@ std::optional<Response> Session::AnswerAtOnce(const Result<Route>& route) const 
   } catch (const std::exception&) {  // the handler will meet it again, and say so
     return std::nullopt;
   }
-  if (response) context_->gate->Mark(*route, *response);
+  if (response) context_->gate->Mark(request, *route, *response);
   return response;
 }
 
@@ -281,10 +281,12 @@ asio::awaitable<bool> Session::Reply(Response& response) {
                                    Gate::NumberOf(request, exchange_.caller));
   if (!room) {
     const std::string_view route = response.route;
-    co_await HoldBack();
-    response = Overloaded("too many replies are on their way", request.id);
+    const std::string dataset = std::move(response.dataset);
+    response = Overloaded("too many replies are on their way", request.id);  // at once: there is no room for the body
     response.route = route;
+    response.dataset = dataset;
     room.emplace();
+    co_await HoldBack();
   }
   HeadOptions options;
   options.version = request.version;

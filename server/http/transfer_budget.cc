@@ -16,8 +16,8 @@ std::optional<TransferBudget::Hold> TransferBudget::TryHold(Body body, const std
 }
 
 std::optional<TransferBudget::Hold> TransferBudget::TryHold(std::size_t bytes, const std::weak_ptr<Connection>& holder,
-                                                            Clock::time_point now, std::uint64_t client) {
-  return Take(nullptr, bytes, holder, now, Kind::kUpload, client);
+                                                            Clock::time_point now) {
+  return Take(nullptr, bytes, holder, now, Kind::kUpload, 0);  // uploads have a bound of their own
 }
 
 std::optional<TransferBudget::Hold> TransferBudget::Take(Body body, std::size_t bytes,
@@ -25,7 +25,9 @@ std::optional<TransferBudget::Hold> TransferBudget::Take(Body body, std::size_t 
                                                          Kind kind, std::uint64_t client) {
   if (bytes <= kFreeBytes) return Hold();
   std::unique_lock lock(mutex_);
-  if (!charges_.contains(body.get()) && !MayTake(bytes, kind, client)) {
+  const bool is_shared = charges_.contains(body.get());
+  const bool is_beyond = !is_shared && kind == Kind::kVitalReply && !MayTake(bytes, kind, client);
+  if (is_beyond ? reserve_held_ + bytes > kReserve : !is_shared && !MayTake(bytes, kind, client)) {
     ++refused_;
     const std::vector<std::shared_ptr<Connection>> overdue = Overdue(now, /*only_uploads=*/kind == Kind::kUpload);
     lock.unlock();
@@ -33,32 +35,34 @@ std::optional<TransferBudget::Hold> TransferBudget::Take(Body body, std::size_t 
     return std::nullopt;
   }
   const auto time = kGrace + std::chrono::milliseconds(bytes * 1000 / kRate);
-  const auto entry = entries_.insert(entries_.end(), Entry{body.get(), now + time, holder});
-  if (!body) entry->charge = &*entry;
-  Charge& charge = charges_[entry->charge];
+  // What may fail for want of memory comes first.
+  Entries made;
+  made.push_back({body.get(), now + time, holder, client});
+  if (!body) made.front().charge = &made.front();
+  Share& own = shares_[client];
+  Charge& charge = charges_[made.front().charge];
+  const auto entry = made.begin();
+  entries_.splice(entries_.end(), made);
+  ++own.holds;
   if (++charge.holders == 1) {
-    const bool fits = Fits(bytes, kind);
-    charge.bytes = fits ? bytes : 0;
-    held_ += charge.bytes;
     charge.client = client;
-    if (client != 0 && charge.bytes > 0) held_by_[client] += charge.bytes;
     charge.is_upload = kind == Kind::kUpload;
+    charge.is_beyond = is_beyond;
+    charge.bytes = is_beyond || held_ + bytes <= capacity_ ? bytes : 0;
+    oversized_under_way_ = oversized_under_way_ || charge.bytes == 0;
+    (is_beyond ? reserve_held_ : held_) += charge.bytes;
     if (charge.is_upload) uploads_held_ += charge.bytes;
-    oversized_under_way_ = oversized_under_way_ || !fits;
+    own.bytes += charge.bytes;
   }
   return Hold(this, entry, std::move(body));
 }
 
-bool TransferBudget::Fits(std::size_t bytes, Kind kind) const {
-  return held_ + bytes <= capacity_ + (kind == Kind::kVitalReply ? kReserve : 0);
-}
-
 bool TransferBudget::MayTake(std::size_t bytes, Kind kind, std::uint64_t client) const {
-  const auto own = held_by_.find(client);
-  const std::size_t free = capacity_ - std::min(held_, capacity_);
-  if (kind != Kind::kVitalReply && own != held_by_.end() && own->second > kShare * free) return false;
   if (kind == Kind::kUpload && uploads_held_ > 0 && uploads_held_ + bytes > capacity_ / kUploadShare) return false;
-  return Fits(bytes, kind) || (bytes > capacity_ && !oversized_under_way_);
+  if (held_ + bytes > capacity_) return bytes > capacity_ && !oversized_under_way_;
+  const auto own = shares_.find(client);
+  if (client == 0 || own == shares_.end() || own->second.bytes == 0) return true;
+  return own->second.bytes + bytes <= kShare * (capacity_ - held_ - bytes);
 }
 
 // Each is told once; its room comes back when its connection has ended.
@@ -76,18 +80,24 @@ std::vector<std::shared_ptr<Connection>> TransferBudget::Overdue(Clock::time_poi
 
 void TransferBudget::Release(Entries::iterator entry) {
   const std::lock_guard lock(mutex_);
-  const auto charge = charges_.find(entry->charge);
-  if (--charge->second.holders == 0) {
-    held_ -= charge->second.bytes;
-    if (const auto own = held_by_.find(charge->second.client); own != held_by_.end()) {
-      own->second -= charge->second.bytes;
-      if (own->second == 0) held_by_.erase(own);
-    }
-    if (charge->second.is_upload) uploads_held_ -= charge->second.bytes;
-    if (charge->second.bytes == 0) oversized_under_way_ = false;
-    charges_.erase(charge);
-  }
+  const auto found = charges_.find(entry->charge);
+  Charge& charge = found->second;
+  const auto own = shares_.find(entry->client);
   entries_.erase(entry);
+  if (--charge.holders == 0) {
+    (charge.is_beyond ? reserve_held_ : held_) -= charge.bytes;
+    if (charge.is_upload) uploads_held_ -= charge.bytes;
+    if (charge.bytes == 0) oversized_under_way_ = false;
+    shares_.at(charge.client).bytes -= charge.bytes;
+    charges_.erase(found);
+  } else if (charge.client == own->first) {
+    // From now on it counts against one of those who still read it.
+    const auto heir = std::ranges::find_if(entries_, [&](const Entry& other) { return other.charge == found->first; });
+    own->second.bytes -= charge.bytes;
+    charge.client = heir->client;
+    shares_.at(charge.client).bytes += charge.bytes;
+  }
+  if (--own->second.holds == 0) shares_.erase(own);
 }
 
 void TransferBudget::Settle(Entries::iterator entry) {

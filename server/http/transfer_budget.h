@@ -3,9 +3,9 @@
 //
 // A body that many replies share counts once. Where there is no room for one more, it is refused, and replies that have
 // had more than their time (kGrace, and a second for each kRate bytes) are cut off, so that those who read slowly do
-// not keep others out for long. One client gets two thirds of the room at most. A single body that is larger than the
-// whole budget may be under way beside it. What tells operators how the server is may go beyond the budget by kReserve:
-// it is wanted most when there is no room.
+// not keep others out for long. One client gets two thirds of the room at most, or one reply. A single body that is
+// larger than the whole budget may be under way beside it. What tells operators how the server is may go beyond the
+// budget by kReserve: it is wanted most when there is no room.
 //
 // Thread-safe.
 #pragma once
@@ -50,7 +50,7 @@ class TransferBudget {
                               Kind kind = Kind::kReply, std::uint64_t client = 0);
   // The same for `bytes` of a request's body, which nobody shares.
   std::optional<Hold> TryHold(std::size_t bytes, const std::weak_ptr<Connection>& holder,
-                              Clock::time_point now = Clock::now(), std::uint64_t client = 0);
+                              Clock::time_point now = Clock::now());
 
   struct Stats {
     std::size_t held_bytes = 0;
@@ -63,16 +63,17 @@ class TransferBudget {
     const void* charge;  // what it is counted under: the body, or the entry itself where nobody shares it
     Clock::time_point entitled_until;
     std::weak_ptr<Connection> holder;
+    std::uint64_t client = 0;
   };
   using Entries = std::list<Entry>;
   struct Charge {
     std::size_t bytes = 0;  // 0: beside the budget
     std::size_t holders = 0;
     bool is_upload = false;
-    std::uint64_t client = 0;  // who asked first
+    bool is_beyond = false;    // in the reserve
+    std::uint64_t client = 0;  // one of the holders'
   };
 
-  bool Fits(std::size_t bytes, Kind kind) const;                           // mutex_ is held
   bool MayTake(std::size_t bytes, Kind kind, std::uint64_t client) const;  // mutex_ is held
   // mutex_ is held. Uploads make room for uploads alone: replies have none to give them.
   std::vector<std::shared_ptr<Connection>> Overdue(Clock::time_point now, bool only_uploads);
@@ -85,7 +86,11 @@ class TransferBudget {
   mutable std::mutex mutex_;
   Entries entries_;
   std::unordered_map<const void*, Charge> charges_;
-  std::unordered_map<std::uint64_t, std::size_t> held_by_;  // client; those that hold anything
+  struct Share {
+    std::size_t bytes = 0, holds = 0;
+  };
+  std::unordered_map<std::uint64_t, Share> shares_;  // by client; those that hold anything
+  std::size_t reserve_held_ = 0;                     // beside held_
   std::size_t held_ = 0;
   std::size_t uploads_held_ = 0;  // of these, request bodies
   bool oversized_under_way_ = false;

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <exception>
 #include <string_view>
 #include <utility>
 
@@ -107,7 +106,7 @@ void Reloader::Reload() {
 }
 
 void Reloader::Run() {
-  next_look_ = next_config_ = Clock::now() + kPeriod;
+  Clock::time_point next_look = Clock::now() + kPeriod, next_config = next_look;
   std::unique_lock lock(mutex_);
   while (!wake_.wait_for(lock, kLeastPause, [this] { return stop_; })) {
     const auto is_due = [this] { return look_ || reload_ || stop_; };
@@ -119,28 +118,20 @@ void Reloader::Run() {
     if (stop_) return;
     const bool reload = std::exchange(reload_, false), look = std::exchange(look_, false) || reload;
     lock.unlock();
-    try {
-      Step(reload, look);
-    } catch (const std::exception& error) {  // no memory, as a rule: what is served stays, and the next step tries anew
-      spdlog::error("sources and configuration were not looked at: {}", error.what());
+    const Clock::time_point now = Clock::now();
+    if (reload || (watch_ && now >= next_config)) {
+      LookAtConfig(reload);
+      next_config = now + (config_settles_ ? kConfigSettleTime : kPeriod);
     }
+    if (look || (watch_ && now >= next_look)) {
+      LookAtFiles();
+      next_look = now + kPeriod;
+    }
+    if (StepOpenings()) Publish();
+    TellTroubles();
+    if (reload && hooks_.reloaded) hooks_.reloaded();
     lock.lock();
   }
-}
-
-void Reloader::Step(bool reload, bool look) {
-  const Clock::time_point now = Clock::now();
-  if (reload || (watch_ && now >= next_config_)) {
-    LookAtConfig(reload);
-    next_config_ = now + (config_settles_ ? kConfigSettleTime : kPeriod);
-  }
-  if (look || (watch_ && now >= next_look_)) {
-    LookAtFiles();
-    next_look_ = now + kPeriod;
-  }
-  if (StepOpenings()) Publish();
-  TellTroubles();
-  if (reload && hooks_.reloaded) hooks_.reloaded();
 }
 
 bool Reloader::IsBusy() const {

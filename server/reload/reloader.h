@@ -5,7 +5,6 @@
 // published when it is complete; a configuration that is wrong changes nothing. Everything is told in the log.
 #pragma once
 
-#include <chrono>
 #include <condition_variable>
 #include <functional>
 #include <map>
@@ -53,7 +52,6 @@ class Reloader {
 
  private:
   void Run();
-  void Step(bool reload, bool look);
   void LookAtFiles();
   void LookAtConfig(bool asked);
   void Apply(config::Config next);
@@ -64,7 +62,6 @@ class Reloader {
 
   const Hooks hooks_;
   bool watch_ = false;
-  std::chrono::steady_clock::time_point next_look_, next_config_;
   config::Config config_;
   const config::Config started_;      // what takes a restart is still as it says
   std::vector<DatasetSlot> slots_;    // one a dataset, in the configuration's order

@@ -110,11 +110,32 @@ TEST_F(TransferBudgetTest, OneClientLeavesRoomForOthers) {
     return hold.has_value();
   };
   while (takes(kGreedy)) continue;
-  EXPECT_EQ(holds.size(), 21u) << "two thirds of 30, and the one that passes them";
+  EXPECT_EQ(holds.size(), 20u) << "two thirds of 30";
   for (int i = 0; i < 5; ++i) EXPECT_TRUE(takes(kOther));
   EXPECT_FALSE(takes(kGreedy));
   holds.clear();
   EXPECT_TRUE(takes(kGreedy)) << "what was given back counts no more";
+}
+
+TEST_F(TransferBudgetTest, ASharedBodyCountsAgainstThoseWhoReadIt) {
+  const auto reply = TransferBudget::Kind::kReply;
+  const Body shared = BodyOf(kMb);
+  auto first = budget_.TryHold(shared, connection_, now_, reply, 1);
+  auto second = budget_.TryHold(shared, connection_, now_, reply, 3);
+  ASSERT_TRUE(first && second);
+  EXPECT_FALSE(budget_.TryHold(BodyOf(2 * kMb), connection_, now_, reply, 1)) << "it has its share";
+  first.reset();
+  EXPECT_FALSE(budget_.TryHold(BodyOf(2 * kMb), connection_, now_, reply, 3)) << "now it is the other one's";
+  EXPECT_TRUE(budget_.TryHold(BodyOf(2 * kMb), connection_, now_, reply, 1));
+  second.reset();
+  EXPECT_EQ(budget_.stats().held_bytes, 0u);
+  EXPECT_TRUE(budget_.TryHold(BodyOf(3 * kMb), connection_, now_, reply, 3)) << "one reply may take all";
+}
+
+TEST_F(TransferBudgetTest, UploadsDoNotCountAgainstTheirOwnReplies) {
+  auto upload = budget_.TryHold(2 * kMb, connection_, now_);
+  ASSERT_TRUE(upload);
+  EXPECT_TRUE(budget_.TryHold(BodyOf(kMb), connection_, now_, TransferBudget::Kind::kReply, 1));
 }
 
 TEST_F(TransferBudgetTest, LetsOneOversizedBodyPass) {
