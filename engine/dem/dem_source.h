@@ -241,13 +241,14 @@ class DemSource {
   std::unique_ptr<Impl> impl_;
 };
 
-// A raster's samples as they lie in the file, for `terrace mesh`: row 0 in the north, voids NaN, no georeference
-// needed.
 struct ReadOptions {
   bool find_voids = true;           // undeclared marks are looked for (void_marks.h)
   std::vector<double> nodata = {};  // further raw values that are voids
   std::function<void(double)> progress = {};
 };
+
+// A raster's samples as they lie in the file, for `terrace mesh`: row 0 in the north, voids NaN, no georeference
+// needed.
 struct RasterHeights {
   int width = 0, height = 0;
   std::vector<float> heights;

@@ -214,9 +214,8 @@ void AddInfo(CLI::App& app, int& exit_code) {
       "  terrace info alps.tif andes.tif\n"
       "  terrace info alps.tif --json\n"
       "  terrace info --mosaic lidar/ base.tif\n\n"
-      "A raster that cannot be served is told on stderr with the reason and the remedy; the others are still shown, "
-      "but for\n"
-      "those of the same folder or mosaic: with it none of them can be served.");
+      "A raster that cannot be served is told on stderr with the reason and the remedy; the others are\n"
+      "still shown, but for those of the same folder or mosaic: with it none of them can be served.");
   command->add_option("DEM", *dems, "Rasters that GDAL can read, or folders of them")->required();
   command->add_flag("--json", *json, "One JSON array instead of text");
   command->add_flag("--mosaic", *mosaic, "Takes all of them for one dataset, the first counting most");

@@ -66,8 +66,7 @@ std::string StemOf(const std::string& dem) {
 // Something that can be read once, or without end.
 bool IsPipe(const std::string& path) {
   std::error_code ignored;
-  const std::filesystem::file_status status = std::filesystem::status(path, ignored);
-  return std::filesystem::exists(status) && std::filesystem::is_other(status);
+  return std::filesystem::is_other(path, ignored);
 }
 
 // The file's options, then the flags, then a dataset per DEM of the command line. Everything wrong is collected.
@@ -335,7 +334,8 @@ int Serve(const ServeArguments& arguments) {
   const auto level = std::make_shared<std::atomic<config::LogLevel>>(config.log_level);  // the configured one
   std::unique_ptr<server::Server> server;
   const auto served_text = [&] {
-    return fmt::format("{} dataset{} at {}", count.load(), count == 1 ? "" : "s", server->url());
+    const std::size_t datasets_served = count;
+    return fmt::format("{} dataset{} at {}", datasets_served, datasets_served == 1 ? "" : "s", server->url());
   };
   server::Reloader::Hooks hooks;
   hooks.load = [&arguments, config, is_read_once]() -> config::ConfigResult {

@@ -76,16 +76,6 @@ const char* HostProblem(const Fields& fields) {
   return nullptr;
 }
 
-// Of a target in absolute form.
-std::optional<std::string_view> AuthorityOf(std::string_view target) {
-  for (const std::string_view scheme : {"http://", "https://"}) {
-    if (!EqualsIgnoringCase(target.substr(0, scheme.size()), scheme)) continue;
-    target.remove_prefix(scheme.size());
-    return target.substr(0, target.find_first_of("/?#"));
-  }
-  return std::nullopt;
-}
-
 // RFC 6750.
 std::optional<std::string> BearerOf(const Fields& fields) {
   constexpr std::string_view kScheme = "bearer ";
@@ -266,12 +256,10 @@ tl::expected<Request, BadRequest> ParseHead(std::string_view head, HeadMemo* mem
   request.keep_alive = fields.keep_alive();
   request.method_name = std::string(fields.method_string());
   RequestFields said = FieldsOf(fields);
-  // RFC 9112, section 3.2.2: whatever Host says.
-  const std::optional<std::string_view> authority = AuthorityOf(fields.target());
-  if (authority) {
-    if (authority->empty() || !IsHostValue(*authority)) return Bad(400, "malformed host in the request target");
-    said.host = std::string(*authority);
-    memo = nullptr;  // other targets have another host
+  // RFC 9112, section 3.2.2: whatever Host says. Remember takes no such target.
+  if (const std::optional<std::string_view> rest = AfterScheme(fields.target())) {
+    said.host = std::string(rest->substr(0, rest->find_first_of("/?#")));
+    if (said.host.empty() || !IsHostValue(said.host)) return Bad(400, "malformed host in the request target");
   }
   request.fields = SharedFields(std::move(said));
   SetTarget(request, fields.target());

@@ -21,14 +21,11 @@ tl::unexpected<Error> NotFound() {
 // A path without scheme and authority, or nothing.
 std::optional<std::string_view> OriginForm(std::string_view target) {
   if (target.starts_with('/')) return target;
-  for (const std::string_view scheme : {"http://", "https://"}) {
-    if (!EqualsIgnoringCase(target.substr(0, scheme.size()), scheme)) continue;
-    target.remove_prefix(scheme.size());
-    const std::size_t path = target.find_first_of("/?");
-    if (path == std::string_view::npos) return "/";
-    return target[path] == '/' ? target.substr(path) : std::optional<std::string_view>();
-  }
-  return std::nullopt;
+  const std::optional<std::string_view> rest = AfterScheme(target);
+  if (!rest) return std::nullopt;
+  const std::size_t path = rest->find_first_of("/?");
+  if (path == std::string_view::npos) return "/";
+  return (*rest)[path] == '/' ? rest->substr(path) : std::optional<std::string_view>();
 }
 
 // One tile has one URL.

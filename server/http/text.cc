@@ -27,6 +27,13 @@ bool EqualsIgnoringCase(std::string_view a, std::string_view b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](char x, char y) { return LowerOf(x) == LowerOf(y); });
 }
 
+std::optional<std::string_view> AfterScheme(std::string_view text) {
+  for (const std::string_view scheme : {"http://", "https://"}) {
+    if (EqualsIgnoringCase(text.substr(0, scheme.size()), scheme)) return text.substr(scheme.size());
+  }
+  return std::nullopt;
+}
+
 std::string_view NextPiece(std::string_view& rest, char separator, std::string_view blanks) {
   const std::size_t end = std::min(rest.find(separator), rest.size());
   const std::string_view piece = Trim(rest.substr(0, end), blanks);

@@ -14,6 +14,9 @@ std::string_view Trim(std::string_view text, std::string_view blanks = " \t");
 std::string Lower(std::string_view text);
 bool EqualsIgnoringCase(std::string_view a, std::string_view b);
 
+// What follows "http://" or "https://", in any case; nothing where the text begins with neither.
+std::optional<std::string_view> AfterScheme(std::string_view text);
+
 // Cuts the piece before the next `separator` off `rest`, and that separator; trimmed of `blanks`.
 std::string_view NextPiece(std::string_view& rest, char separator, std::string_view blanks = " \t");
 

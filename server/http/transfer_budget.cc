@@ -25,9 +25,9 @@ std::optional<TransferBudget::Hold> TransferBudget::Take(Body body, std::size_t 
                                                          Kind kind, std::uint64_t client) {
   if (bytes <= kFreeBytes) return Hold();
   std::unique_lock lock(mutex_);
-  const bool is_shared = charges_.contains(body.get());
-  const bool is_beyond = !is_shared && kind == Kind::kVitalReply && !MayTake(bytes, kind, client);
-  if (is_beyond ? reserve_held_ + bytes > kReserve : !is_shared && !MayTake(bytes, kind, client)) {
+  const bool fits = charges_.contains(body.get()) || MayTake(bytes, kind, client);
+  const bool is_beyond = !fits && kind == Kind::kVitalReply && reserve_held_ + bytes <= kReserve;
+  if (!fits && !is_beyond) {
     ++refused_;
     const std::vector<std::shared_ptr<Connection>> overdue = Overdue(now, /*only_uploads=*/kind == Kind::kUpload);
     lock.unlock();

@@ -73,6 +73,9 @@ class TransferBudget {
     bool is_beyond = false;    // in the reserve
     std::uint64_t client = 0;  // one of the holders'
   };
+  struct Share {  // of a client
+    std::size_t bytes = 0, holds = 0;
+  };
 
   bool MayTake(std::size_t bytes, Kind kind, std::uint64_t client) const;  // mutex_ is held
   // mutex_ is held. Uploads make room for uploads alone: replies have none to give them.
@@ -86,9 +89,6 @@ class TransferBudget {
   mutable std::mutex mutex_;
   Entries entries_;
   std::unordered_map<const void*, Charge> charges_;
-  struct Share {
-    std::size_t bytes = 0, holds = 0;
-  };
   std::unordered_map<std::uint64_t, Share> shares_;  // by client; those that hold anything
   std::size_t reserve_held_ = 0;                     // beside held_
   std::size_t held_ = 0;
