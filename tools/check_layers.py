@@ -66,7 +66,7 @@ LIBRARIES = [
     Library("clocks", r"(chrono|ctime)", r"(config|server|engine/dem)/"),
     Library("files", r"(filesystem|fstream)", r"(config/|engine/dem/|server/|proto/mesh_file)"),
     Library("memory from the system", r"sys/mman\.h|sanitizer/asan_interface\.h", r"(engine/tin/spare_blocks|server/.*)\.cc"),
-    Library("the operating system", r"(unistd|malloc|fcntl|glob|signal|dirent|pthread|elf|link)\.h|(sys|arpa|netinet|linux)/.*",
+    Library("the operating system", r"(unistd|malloc|fcntl|poll|glob|signal|dirent|pthread|elf|link)\.h|(sys|arpa|netinet|linux)/.*",
             r"(config|engine/dem|server)/.*\.cc"),
     Library("the standard library", r"[a-z_0-9]+|(stdint|immintrin)\.h", r"."),
 ]

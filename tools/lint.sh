@@ -7,6 +7,7 @@ step() { echo "lint: $1"; shift; "$@" || status=1; }
 
 step "order of the rooms" tools/check_layers.py
 step "leftovers" tools/check_tree.py
+step "Python" bash -c "git ls-files '*.py' | xargs pyflakes3"
 step "formatting (make format mends it)" bash -c "git ls-files '*.h' '*.cc' | xargs clang-format-14 --dry-run -Werror"
 if [[ -f build/release/compile_commands.json ]]; then
   step "self-contained headers" cmake --build build/release --target self_contained_headers

@@ -57,7 +57,7 @@ std::string_view ProtocolOf(const ReplyRecord& record) { return record.version =
 
 // -1: errno tells why not.
 int OpenToAppend(const std::filesystem::path& file) {
-  // A pipe without a reader is refused, and one whose reader stalls misses lines: nothing waits for it.
+  // A pipe without a reader is refused, not waited for.
   return ::open(file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC | O_NONBLOCK, 0640);
 }
 
@@ -102,10 +102,16 @@ std::string FormatJsonLine(const ReplyRecord& record, SystemClock::time_point no
 }
 
 AccessLog::AccessLog(AccessLogForm form, std::filesystem::path file, int descriptor)
-    : form_(form), file_(std::move(file)), descriptor_(descriptor) {}
+    : form_(form),
+      file_(std::move(file)),
+      descriptor_(descriptor),
+      writer_(file_.empty() ? nullptr : std::make_unique<LineWriter>(descriptor)) {}
 
 AccessLog::AccessLog(AccessLog&& other) noexcept
-    : form_(other.form_), file_(other.file_), descriptor_(std::exchange(other.descriptor_, -1)) {}
+    : form_(other.form_),
+      file_(other.file_),
+      descriptor_(std::exchange(other.descriptor_, -1)),
+      writer_(std::move(other.writer_)) {}
 
 AccessLog::~AccessLog() {
   if (!file_.empty() && descriptor_ >= 0) ::close(descriptor_);
@@ -134,14 +140,16 @@ void AccessLog::Write(const ReplyRecord& record) {
     return;
   }
   const auto now = SystemClock::now();
-  std::string line =
+  const std::string line =
       (form_ == AccessLogForm::kJson ? FormatJsonLine(record, now) : FormatCombinedLine(record, now)) + '\n';
-  const std::lock_guard lock(mutex_);
-  // In one piece, as others may append to the file. On a full disk, or where a pipe's reader stalls, a request goes
-  // untold rather than unanswered, and a line that was cut is ended before the next one.
-  if (is_cut_) line.insert(0, 1, '\n');
-  const ssize_t written = ::write(descriptor_, line.data(), line.size());
-  if (written > 0) is_cut_ = static_cast<std::size_t>(written) < line.size();
+  std::uint64_t missed = 0;
+  {
+    const std::lock_guard lock(mutex_);
+    LineWriter& writer = writer_ ? *writer_ : LineWriter::Stderr();
+    if (!writer.Write(line) || !writer_) return;  // what is missing of stderr is told with the log
+    missed = writer.TakeMissed();
+  }
+  if (missed > 0) spdlog::warn("access log {}: {} lines before the last one are missing", file_.string(), missed);
 }
 
 void AccessLog::Reopen() {
@@ -153,7 +161,7 @@ void AccessLog::Reopen() {
   }
   const std::lock_guard lock(mutex_);
   ::close(std::exchange(descriptor_, descriptor));
-  is_cut_ = false;
+  writer_ = std::make_unique<LineWriter>(descriptor);
 }
 
 }  // namespace terrace::server

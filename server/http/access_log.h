@@ -5,11 +5,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <mutex>
 #include <string>
 #include <string_view>
 
 #include "engine/core/result.h"
+#include "server/http/line_writer.h"
 
 namespace terrace::server {
 
@@ -70,8 +72,8 @@ class AccessLog {
   const AccessLogForm form_;
   const std::filesystem::path file_;
   std::mutex mutex_;
-  int descriptor_;       // guarded by mutex_
-  bool is_cut_ = false;  // the last line was; likewise
+  int descriptor_;                      // guarded by mutex_
+  std::unique_ptr<LineWriter> writer_;  // to the file; likewise
 };
 
 }  // namespace terrace::server

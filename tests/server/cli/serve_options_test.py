@@ -1,6 +1,7 @@
 """What options of `terrace serve` do to replies and logs: serve_options_test.py BINARY SOURCE_DIR."""
 import contextlib
 import json
+import os
 import pathlib
 import re
 import signal
@@ -53,21 +54,6 @@ def photograph(folder):
     return str(path)
 
 
-class Log(unittest.TestCase):
-    def test_outlives_whoever_reads_it(self):
-        process = subprocess.Popen([BINARY, "serve", DEM, "--listen", "127.0.0.1:0", "--access-log", "log"], stdout=subprocess.PIPE,
-                                   stderr=subprocess.PIPE, text=True)
-        try:
-            url = re.search(r"http://\S+/", process.stdout.readline())[0]
-            process.stderr.close()
-            for _ in range(3):
-                self.assertEqual(urllib.request.urlopen(url + "livez", timeout=10).status, 200)
-        finally:
-            process.terminate()
-            process.stdout.close()
-        self.assertEqual(process.wait(30), 0)
-
-
 class Glb(unittest.TestCase):
     def test_is_compressed_and_textured_as_the_dataset_says(self):
         used = {"draco": "KHR_draco_mesh_compression", "quantized": "KHR_mesh_quantization", "meshopt": "EXT_meshopt_compression"}
@@ -91,6 +77,53 @@ class Glb(unittest.TestCase):
 
 
 class Log(unittest.TestCase):
+    def test_outlives_whoever_reads_it(self):
+        process = subprocess.Popen([BINARY, "serve", DEM, "--listen", "127.0.0.1:0", "--access-log", "log"], stdout=subprocess.PIPE,
+                                   stderr=subprocess.PIPE, text=True)
+        try:
+            url = re.search(r"http://\S+/", process.stdout.readline())[0]
+            process.stderr.close()
+            for _ in range(3):
+                self.assertEqual(urllib.request.urlopen(url + "livez", timeout=10).status, 200)
+        finally:
+            process.terminate()
+            process.stdout.close()
+        self.assertEqual(process.wait(30), 0)
+
+    def test_stops_nothing_when_its_reader_stalls(self):
+        asked = 1500  # lines of more than 100 bytes, twice what a pipe holds
+        process = subprocess.Popen([BINARY, "serve", DEM, "--listen", "127.0.0.1:0", "--access-log", "log"], stdout=subprocess.PIPE,
+                                   stderr=subprocess.PIPE, text=True)
+        try:
+            url = re.search(r"http://\S+/", process.stdout.readline())[0]
+            for _ in range(asked):
+                self.assertEqual(urllib.request.urlopen(url + "livez", timeout=30).status, 200)
+            while "/livez" not in process.stderr.readline():  # somebody reads again
+                pass
+            os.set_blocking(process.stderr.fileno(), False)
+            while process.stderr.buffer.read():
+                pass
+            os.set_blocking(process.stderr.fileno(), True)
+            urllib.request.urlopen(url + "livez", timeout=30)
+        finally:
+            process.terminate()
+            log = process.communicate(timeout=30)[1]
+        self.assertEqual(process.returncode, 0)
+        missing = int(re.search(r"(\d+) lines before the last one are missing", log)[1])
+        self.assertLess(missing, asked)
+        self.assertGreater(missing, 0)
+
+    def test_keeps_no_server_from_ending(self):
+        process = subprocess.Popen([BINARY, "serve", DEM, "--listen", "127.0.0.1:0", "--access-log", "combined"], stdout=subprocess.PIPE,
+                                   stderr=subprocess.PIPE, text=True)
+        url = re.search(r"http://\S+/", process.stdout.readline())[0]
+        for _ in range(1500):
+            self.assertEqual(urllib.request.urlopen(url + "livez", timeout=30).status, 200)
+        process.terminate()
+        self.assertEqual(process.wait(30), 0)
+        process.stdout.close()
+        process.stderr.close()
+
     def test_is_json_on_request(self):
         config = {"datasets": [{"name": "maui", "sources": [str(DEM)]}], "log_format": "json", "log_level": "info"}
         with serving(config, log := []) as (url, _):
@@ -108,7 +141,7 @@ class Log(unittest.TestCase):
             self.assertEqual(any("vertical datum" in line for line in log), told, log)
 
     def test_a_signal_makes_it_talk_and_another_ends_that(self):
-        with serving({"datasets": [{"name": "maui", "sources": [str(DEM)]}], "log_level": "error"}, log := []) as (url, process):
+        with serving({"datasets": [{"name": "maui", "sources": [str(DEM)]}], "log_level": "error"}, []) as (url, process):
             for number, level in ((signal.SIGUSR1, "debug"), (signal.SIGUSR2, "error")):
                 process.send_signal(number)
                 while f"log level: {level}" not in (line := process.stderr.readline()):
