@@ -58,15 +58,10 @@ std::uint64_t FingerprintOf(const std::vector<Sheet>& sheets, const DemOptions& 
   constexpr std::uint32_t kResamplingVersion = 1;
   ByteWriter writer;
   writer.Put(kResamplingVersion);
-  const auto put = [&writer](const StampedFiles& files) {
-    for (const FileStamp& stamp : files.stamps()) {
-      for (const std::uint64_t part : {stamp.device, stamp.inode, stamp.size, stamp.modified_ns}) writer.Put(part);
-    }
-  };
   for (const Sheet& sheet : sheets) {
     if (&sheet != &sheets.front()) writer.Put(std::uint32_t{0});  // which rasters make one sheet counts, too
     for (const SheetMember& member : sheet.members()) {
-      put(member.raster->files());
+      writer.Put(FingerprintOf(member.raster->files(), member.raster->georeference()));
       // What was found or stated of voids decides heights as well.
       if (const SampleRules& rules = member.raster->layout().rules; !rules.marks.empty() || rules.rim > 0) {
         for (const double mark : rules.marks) writer.Put(mark);
@@ -74,7 +69,7 @@ std::uint64_t FingerprintOf(const std::vector<Sheet>& sheets, const DemOptions& 
       }
     }
     if (const auto& geoid = sheet.vertical().geoid) {
-      put(geoid->files());
+      writer.Put(geoid->files().fingerprint());
       writer.PutBytes(geoid->pipeline());
     }
   }

@@ -1,13 +1,42 @@
 #include "engine/dem/file_stamp.h"
 
+#include <cpl_string.h>
+#include <cpl_vsi.h>
 #include <sys/stat.h>
 #include <xxhash.h>
 
+#include <random>
 #include <utility>
 
 #include "engine/core/bytes.h"
 
 namespace terrace::dem {
+namespace {
+
+std::uint64_t Hash(const std::string& bytes) { return XXH3_64bits(bytes.data(), bytes.size()); }
+
+std::uint64_t NumberOfThisStart() {
+  static const std::uint64_t number = std::random_device()() * 0x9E3779B97F4A7C15;
+  return number;
+}
+
+// Of a name for GDAL's own file systems.
+std::uint64_t OtherFingerprint(const std::string& path) {
+  VSIStatBufL status{};
+  const bool is_known = VSIStatExL(path.c_str(), &status, VSI_STAT_EXISTS_FLAG | VSI_STAT_SIZE_FLAG) == 0;
+  char** const headers = VSIGetFileMetadata(path.c_str(), "HEADERS", nullptr);
+  const char* const version = CSLFetchNameValue(headers, "ETag");
+  ByteWriter writer;
+  writer.PutBytes(path);
+  writer.Put(static_cast<std::uint64_t>(is_known ? status.st_size : 0));
+  writer.Put(static_cast<std::uint64_t>(is_known ? status.st_mtime : 0));
+  writer.PutBytes(version == nullptr ? "" : version);
+  if (!is_known || (status.st_mtime == 0 && version == nullptr)) writer.Put(NumberOfThisStart());
+  CSLDestroy(headers);
+  return Hash(writer.Take());
+}
+
+}  // namespace
 
 std::optional<FileStamp> StampOf(const std::string& path) {
   struct stat status {};
@@ -30,6 +59,8 @@ StampedFiles::StampedFiles(const std::vector<std::string>& paths) {
     if (const auto stamp = StampOf(path)) {
       paths_.push_back(path);
       stamps_.push_back(*stamp);
+    } else if (path.starts_with("/vsi")) {
+      others_.push_back(OtherFingerprint(path));
     }
   }
 }
@@ -52,6 +83,7 @@ Result<void> StampedFiles::CheckUnchanged(const std::string& path) const {
 void StampedFiles::Append(const StampedFiles& more) {
   paths_.insert(paths_.end(), more.paths_.begin(), more.paths_.end());
   stamps_.insert(stamps_.end(), more.stamps_.begin(), more.stamps_.end());
+  others_.insert(others_.end(), more.others_.begin(), more.others_.end());
 }
 
 std::optional<std::string> StampedFiles::FirstChanged() const {
@@ -69,8 +101,8 @@ std::uint64_t StampedFiles::fingerprint() const {
       writer.Put(part);
     }
   }
-  const std::string bytes = writer.Take();
-  return XXH3_64bits(bytes.data(), bytes.size());
+  for (const std::uint64_t other : others_) writer.Put(other);
+  return Hash(writer.Take());
 }
 
 }  // namespace terrace::dem

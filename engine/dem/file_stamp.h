@@ -33,7 +33,9 @@ Error ChangedError(const std::string& path);
 class StampedFiles {
  public:
   StampedFiles() = default;
-  // Names that are no regular files (members of an archive) are left out: their archive is stamped.
+  // What is no regular file cannot be watched. Of a remote one and of a member of an archive the fingerprint tells
+  // size, time and what its server calls its version; where none of these says more than a name, it is another one at
+  // each start.
   explicit StampedFiles(const std::vector<std::string>& paths);
 
   // For files that have just been opened. kChanged: the first of them is not what it was before that (`before`), so
@@ -52,14 +54,13 @@ class StampedFiles {
   const std::string& path(std::size_t i) const { return paths_[i]; }
   void Append(const StampedFiles& more);
 
-  const std::vector<FileStamp>& stamps() const { return stamps_; }
-
-  // A hash of the stamps.
+  // A hash of what all of them were.
   std::uint64_t fingerprint() const;
 
  private:
   std::vector<std::string> paths_;
   std::vector<FileStamp> stamps_;
+  std::vector<std::uint64_t> others_;  // fingerprints of what cannot be watched
 };
 
 }  // namespace terrace::dem

@@ -8,6 +8,7 @@
 #include <new>
 #include <system_error>
 
+#include "engine/dem/proj_grids.h"
 #include "engine/dem/proj_handle.h"
 
 namespace terrace::dem {
@@ -55,23 +56,7 @@ bool CoversCentre(PJ_CONTEXT* context, const PJ* operation, Position centre) {
   return between && centre.y >= south && centre.y <= north;
 }
 
-struct Grid {
-  std::string name, file, url;
-};
-
-std::vector<Grid> GridsOf(PJ_CONTEXT* context, const PJ* operation) {
-  std::vector<Grid> grids;
-  const int count = proj_coordoperation_get_grid_used_count(context, operation);
-  for (int i = 0; i < count; ++i) {
-    const char *name = nullptr, *file = nullptr, *url = nullptr;
-    proj_coordoperation_get_grid_used(context, operation, i, &name, &file, nullptr, &url, nullptr, nullptr, nullptr);
-    const auto text = [](const char* value) { return std::string(value == nullptr ? "" : value); };
-    grids.push_back({text(name), text(file), text(url)});
-  }
-  return grids;
-}
-
-std::string HowToGet(const Grid& grid) {
+std::string HowToGet(const ProjGrid& grid) {
   // The name is EPSG's then, and no file by that name would be found.
   if (grid.url.empty()) return fmt::format("its grid {} is none that PROJ has a file for", grid.name);
   return fmt::format(
@@ -127,8 +112,8 @@ Result<std::shared_ptr<const Geoid>> Geoid::OfCrs(const std::string& vertical_cr
   for (int i = 0; i < count; ++i) {
     const ProjObjectPtr operation(proj_list_get(context.get(), operations.get(), i));
     if (!CoversCentre(context.get(), operation.get(), centre)) continue;
-    const std::vector<Grid> grids = GridsOf(context.get(), operation.get());
-    const auto absent = std::ranges::find_if(grids, [](const Grid& grid) { return grid.file.empty(); });
+    const std::vector<ProjGrid> grids = GridsOf(context.get(), operation.get());
+    const auto absent = std::ranges::find_if(grids, [](const ProjGrid& grid) { return grid.file.empty(); });
     if (absent != grids.end()) {
       if (missing.empty()) missing = HowToGet(*absent);
       continue;
@@ -138,7 +123,7 @@ Result<std::shared_ptr<const Geoid>> Geoid::OfCrs(const std::string& vertical_cr
     const PJ_PROJ_INFO info = proj_pj_info(operation.get());
     geoid->description_ = info.description == nullptr ? geoid->pipeline() : info.description;
     std::vector<std::string> files;
-    for (const Grid& grid : grids) files.push_back(grid.file);
+    for (const ProjGrid& grid : grids) files.push_back(grid.file);
     geoid->files_ = StampedFiles(files);
     auto checked = Checked(geoid, centre);
     if (checked && count == 1) FindShared(vertical_crs, *checked);

@@ -2,6 +2,7 @@
 
 #include <cpl_conv.h>
 #include <ogr_spatialref.h>
+#include <xxhash.h>
 
 #include <algorithm>
 #include <array>
@@ -9,6 +10,7 @@
 #include <numbers>
 #include <vector>
 
+#include "engine/core/bytes.h"
 #include "engine/dem/gdal_runtime.h"
 #include "engine/dem/sample_rules.h"
 
@@ -250,5 +252,16 @@ void Georeference::ToDegrees(std::span<Position> positions) const {
 
 double Georeference::pixel_width() const { return std::hypot(to_crs_[1], to_crs_[4]); }
 double Georeference::pixel_height() const { return std::hypot(to_crs_[2], to_crs_[5]); }
+
+std::uint64_t FingerprintOf(const StampedFiles& files, const Georeference& where) {
+  ByteWriter writer;
+  writer.Put(files.fingerprint());
+  if (const Projector* const projector = where.projector()) {
+    writer.PutBytes(projector->pipeline());
+    writer.Put(projector->grids().fingerprint());
+  }
+  const std::string bytes = writer.Take();
+  return XXH3_64bits(bytes.data(), bytes.size());
+}
 
 }  // namespace terrace::dem

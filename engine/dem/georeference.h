@@ -14,6 +14,7 @@
 #include <string>
 
 #include "engine/core/result.h"
+#include "engine/dem/file_stamp.h"
 #include "engine/dem/projector.h"
 
 namespace terrace::dem {
@@ -65,6 +66,7 @@ class Georeference {
   const std::string& pixel_unit() const { return pixel_unit_; }
   double pixel_width() const;
   double pixel_height() const;
+  const Projector* projector() const { return projector_.get(); }  // null where is_affine()
   std::string transform() const { return projector_ == nullptr ? "" : projector_->description(); }
   std::string pipeline() const { return projector_ == nullptr ? "" : projector_->pipeline(); }
 
@@ -87,5 +89,9 @@ class Georeference {
   std::string wkt_;                             // of the CRS as stated
   std::string crs_, vertical_datum_, vertical_unit_, vertical_crs_, pixel_unit_;
 };
+
+// Identifies what is in the files of a raster and where it lies: which operation of PROJ places it, and by which grids,
+// depends on what is installed.
+std::uint64_t FingerprintOf(const StampedFiles& files, const Georeference& where);
 
 }  // namespace terrace::dem

@@ -117,7 +117,7 @@ Result<std::optional<TilePicture>> Imagery::Read(const geo::TileKey& key, int si
   return impl_->Read(key, side, stop);
 }
 
-std::uint64_t Imagery::fingerprint() const { return impl_->pool.files().fingerprint(); }
+std::uint64_t Imagery::fingerprint() const { return FingerprintOf(impl_->pool.files(), impl_->georeference); }
 const StampedFiles& Imagery::files() const { return impl_->pool.files(); }
 
 }  // namespace terrace::dem

@@ -3,7 +3,9 @@
 #include <cmath>
 #include <limits>
 #include <new>
+#include <vector>
 
+#include "engine/dem/proj_grids.h"
 #include "engine/dem/proj_handle.h"
 
 namespace terrace::dem {
@@ -39,6 +41,9 @@ Result<std::shared_ptr<const Projector>> Projector::Make(const std::string& wkt,
   projector->operations_.set_pipeline(*pipeline == '+' ? pipeline + 1 : pipeline);
   const PJ_PROJ_INFO info = proj_pj_info(operation.get());
   projector->description_ = info.description == nullptr ? projector->pipeline() : info.description;
+  std::vector<std::string> files;
+  for (const ProjGrid& grid : GridsOf(context.get(), operation.get())) files.push_back(grid.file);
+  projector->grids_ = StampedFiles(files);
   std::unique_ptr<ProjOperation> first = projector->operations_.Borrow();
   if (first == nullptr) {
     return MakeError(ErrorCode::kInvalidArgument, "the transformation from WGS 84 cannot be set up: {}",

@@ -10,6 +10,7 @@
 #include <string>
 
 #include "engine/core/result.h"
+#include "engine/dem/file_stamp.h"
 #include "engine/dem/operation_pool.h"
 
 namespace terrace::dem {
@@ -31,6 +32,7 @@ class Projector {
 
   bool is_identity() const { return pipeline() == "proj=noop"; }
   const std::string& pipeline() const { return operations_.pipeline(); }  // as PROJ runs it
+  const StampedFiles& grids() const { return grids_; }                    // the files that it reads
   const std::string& description() const { return description_; }         // for people
 
  private:
@@ -38,6 +40,7 @@ class Projector {
   void Transform(std::span<Position> positions, bool forward) const;
 
   std::string description_;
+  StampedFiles grids_;
   OperationPool operations_;
 };
 

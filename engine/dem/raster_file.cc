@@ -4,11 +4,14 @@
 #include <cstdint>
 #include <cstdlib>
 #include <filesystem>
+#include <set>
 #include <system_error>
+#include <utility>
 
 #include "engine/dem/driver_list.h"
 #include "engine/dem/gdal_runtime.h"
 #include "engine/dem/source_policy.h"
+#include "engine/dem/vrt_check.h"
 
 namespace terrace::dem {
 namespace {
@@ -174,6 +177,7 @@ GDALDatasetUniquePtr ReopenRaster(const std::string& path, int overview) {
 Result<GDALDatasetUniquePtr> OpenRaster(const std::string& path, int overview) {
   InitGdal();
   if (auto name = CheckSourceName(path); !name) return tl::unexpected(name.error());
+  if (IsRemote(path)) VSICurlPartialClearCache(path.c_str());  // as it is now, not as it once was
   GDALDatasetUniquePtr dataset = ReopenRaster(path, overview);
   if (dataset == nullptr) {
     std::string problem = TakeGdalError();
@@ -227,6 +231,13 @@ std::vector<std::string> FilesOf(GDALDataset& dataset, const std::string& path) 
     if (path != *name) files.emplace_back(*name);
   }
   CSLDestroy(list);
+  if (IsRemote(path) || !LooksLikeVrt(path)) return files;
+  std::set<std::string> known(files.begin(), files.end());
+  for (const std::string& part : PartsOfVrt(path)) {
+    for (const char* beside : {"", ".ovr", ".msk", ".aux.xml"}) {
+      if (std::string name = part + beside; known.insert(name).second) files.push_back(std::move(name));
+    }
+  }
   return files;
 }
 

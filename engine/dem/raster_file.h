@@ -27,7 +27,7 @@ GDALDatasetUniquePtr ReopenRaster(const std::string& path, int overview = -1);
 // looked at.
 Result<void> CheckComplete(GDALDataset& dataset, const std::string& path, int bands = 1);
 
-// The file, and those that GDAL reads with it: overviews, masks, the parts of a mosaic.
+// The file, and those that GDAL reads with it: overviews, masks, the parts of a mosaic with theirs. Some may not exist.
 std::vector<std::string> FilesOf(GDALDataset& dataset, const std::string& path);
 
 // Refuses what is too large to mesh in one piece.

@@ -80,6 +80,11 @@ bool IsInside(const fs::path& file, const fs::path& folder) {
   return in_folder == folder.end();
 }
 
+// Made absolute first: a bare file name has no folder of its own.
+fs::path FolderOf(const std::string& path, std::error_code& error) {
+  return fs::canonical(fs::absolute(path, error).parent_path(), error);
+}
+
 class Checker {
  public:
   explicit Checker(fs::path top) : top_(std::move(top)) {}
@@ -93,6 +98,8 @@ class Checker {
     if (tree == nullptr) return MakeError(ErrorCode::kInvalidArgument, "{}: is no valid VRT", vrt.string());
     return CheckNodes(tree.get(), vrt, depth);
   }
+
+  std::vector<std::string> TakeParts() { return std::move(parts_); }
 
  private:
   Result<void> CheckNodes(const CPLXMLNode* node, const fs::path& vrt, int depth) {
@@ -124,6 +131,7 @@ class Checker {
     const auto fail = [&](const std::string& why) {
       return MakeError(ErrorCode::kInvalidArgument, "{}: a part of it: {}", vrt.string(), why);
     };
+    parts_.push_back(part.string());
     if (IsRemote(part.string())) return {};
     std::error_code error;
     const fs::path real = fs::canonical(part, error);
@@ -136,6 +144,7 @@ class Checker {
   }
 
   const fs::path top_;  // the folder of the outermost VRT, canonical
+  std::vector<std::string> parts_;
 };
 
 }  // namespace
@@ -150,10 +159,16 @@ bool LooksLikeVrt(const std::string& path) {
 
 Result<void> CheckVrt(const std::string& path) {
   std::error_code error;
-  // Made absolute first: a bare file name has no folder of its own.
-  const fs::path folder = fs::canonical(fs::absolute(path, error).parent_path(), error);
+  const fs::path folder = FolderOf(path, error);
   if (error) return MakeError(ErrorCode::kInvalidArgument, "{}: {}", path, error.message());
   return Checker(folder).Check(path, 0);
+}
+
+std::vector<std::string> PartsOfVrt(const std::string& path) {
+  std::error_code error;
+  Checker checker(FolderOf(path, error));
+  static_cast<void>(checker.Check(path, 0));
+  return checker.TakeParts();
 }
 
 }  // namespace terrace::dem

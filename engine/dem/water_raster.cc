@@ -123,7 +123,7 @@ Result<std::vector<std::uint8_t>> WaterRaster::Read(const geo::TileKey& key, std
   return impl_->Read(key, stop);
 }
 
-std::uint64_t WaterRaster::fingerprint() const { return impl_->handles.files().fingerprint(); }
+std::uint64_t WaterRaster::fingerprint() const { return FingerprintOf(impl_->handles.files(), impl_->georeference); }
 const StampedFiles& WaterRaster::files() const { return impl_->handles.files(); }
 
 }  // namespace terrace::dem

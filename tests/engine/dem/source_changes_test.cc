@@ -1,4 +1,6 @@
 // A source that changed under the server gives an error, never a flat or a mixed tile.
+#include <cpl_vsi.h>
+
 #include <chrono>
 #include <filesystem>
 #include <fstream>
@@ -50,7 +52,8 @@ TEST(SourceChanges, OverwrittenFileIsToldAndStaysSo) {
 TEST(SourceChanges, OneOverwrittenInPlaceWithItsTimesKeptIsAnother) {
   const TempDir dir;
   const std::string path = WriteRaster(dir, {}),
-                    other = WriteRaster(dir, {.value = [](int, int) { return 5.0; }}, "other.tif");
+                    other = WriteRaster(dir, {.value = [](int x, int y) { return x == 8 && y == 8 ? 5.0 : 0.0; }},
+                                        "other.tif");  // as low as the first
   ASSERT_EQ(std::filesystem::file_size(path), std::filesystem::file_size(other));
   const auto time = std::filesystem::last_write_time(path);
   const std::string cache = dir.File("cache");
@@ -67,7 +70,7 @@ TEST(SourceChanges, OneOverwrittenInPlaceWithItsTimesKeptIsAnother) {
   const auto after = OpenOrFail(path, options);
   ASSERT_NE(after, nullptr);
   EXPECT_NE(after->fingerprint(), before->fingerprint());
-  EXPECT_EQ(after->info().sources.front().heights.min, 5);
+  EXPECT_EQ(after->info().sources.front().heights.max, 5);
 }
 
 TEST(SourceChanges, ChangedPartOfAMosaicIsTold) {
@@ -86,6 +89,58 @@ TEST(SourceChanges, ChangedPartOfAMosaicIsTold) {
   ASSERT_TRUE(SetSourcePolicy({}));
   ASSERT_FALSE(tile);
   EXPECT_EQ(tile.error().code, ErrorCode::kChanged);
+}
+
+// GDAL lists the parts of the outermost VRT alone.
+TEST(SourceChanges, ChangedPartOfAMosaicInAMosaicIsTold) {
+  const TempDir dir;
+  WriteRaster(dir, {}, "part.tif");
+  const auto vrt_of = [&](const std::string& name, const std::string& part) {
+    std::ofstream(dir.File(name)) << R"(<VRTDataset rasterXSize="16" rasterYSize="16"><SRS>EPSG:4326</SRS>
+      <GeoTransform>0, 1, 0, 0, 0, -1</GeoTransform><VRTRasterBand dataType="Float32" band="1">
+      <SimpleSource><SourceFilename relativeToVRT="1">)"
+                                  << part << R"(</SourceFilename><SourceBand>1</SourceBand></SimpleSource>
+      </VRTRasterBand></VRTDataset>)";
+  };
+  vrt_of("inner.vrt", "part.tif");
+  vrt_of("dem.vrt", "inner.vrt");
+  std::ofstream(dir.File("part.tif.msk")) << "none, but it is there";
+  ASSERT_TRUE(SetSourcePolicy({.drivers = {"VRT", "GTiff"}}));
+  const auto source = OpenOrFail(dir.File("dem.vrt"));
+  ASSERT_NE(source, nullptr);
+  EXPECT_EQ(source->files().size(), 4U);
+  ASSERT_TRUE(source->Read(kInside));
+  const std::uint64_t before = source->fingerprint();
+  std::filesystem::rename(WriteRaster(dir, {}, "new.tif"), dir.File("part.tif"));
+  const auto tile = source->Read(kInside);
+  const auto again = OpenOrFail(dir.File("dem.vrt"));
+  ASSERT_TRUE(SetSourcePolicy({}));
+  ASSERT_FALSE(tile);
+  EXPECT_EQ(tile.error().code, ErrorCode::kChanged);
+  ASSERT_NE(again, nullptr);
+  EXPECT_NE(again->fingerprint(), before);
+}
+
+// Files of GDAL's own file systems are told apart by name, size and time.
+TEST(SourceChanges, FilesElsewhereAreToldApart) {
+  const auto put = [](const char* name, std::size_t size) {
+    VSILFILE* const file = VSIFOpenL(name, "wb");
+    ASSERT_NE(file, nullptr);
+    const std::string bytes(size, 'x');
+    EXPECT_EQ(VSIFWriteL(bytes.data(), 1, size, file), size);
+    EXPECT_EQ(VSIFCloseL(file), 0);
+  };
+  const auto fingerprint = [](const char* name) { return StampedFiles({name}).fingerprint(); };
+  put("/vsimem/a.tif", 10);
+  put("/vsimem/b.tif", 10);
+  const std::uint64_t first = fingerprint("/vsimem/a.tif");
+  EXPECT_EQ(fingerprint("/vsimem/a.tif"), first);
+  EXPECT_NE(fingerprint("/vsimem/b.tif"), first);
+  EXPECT_EQ(StampedFiles({"/vsimem/a.tif"}).size(), 0U) << "none that can be watched";
+  put("/vsimem/a.tif", 11);
+  EXPECT_NE(fingerprint("/vsimem/a.tif"), first);
+  VSIUnlink("/vsimem/a.tif");
+  VSIUnlink("/vsimem/b.tif");
 }
 
 // Whoever holds a handle on the new file when the old one comes back must not read from it.
