@@ -82,11 +82,18 @@ geo::TileRange BlockOf(const std::vector<TreeRoot>& roots) {
 
 // About the middle of the block, as far as half its width and half its height along the ground, and its whole range of
 // heights, take one together; but never farther than the other side of the Earth.
+// A block all around a pole has its middle there.
 Json Sphere(const TilesetDescription& tileset, const geo::TileRange& block) {
   const double tile = std::ldexp(180, -tileset.roots.front().tile.level);
   const double width = static_cast<double>(block.end_x + 1 - block.start_x) * tile;
   const double south = -90 + static_cast<double>(block.start_y) * tile;
   const double north = -90 + static_cast<double>(block.end_y + 1) * tile;
+  if (const double pole = north == 90 ? 90 : -90; width == 360 && (south == -90) != (north == 90)) {
+    const geo::Vec3 middle = geo::ToEcef(0, pole, tileset.min_height_m);
+    const geo::Vec3 rim = geo::ToEcef(0, pole > 0 ? south : north, tileset.max_height_m);
+    const double relief = tileset.max_height_m - tileset.min_height_m;
+    return {{"sphere", {middle.x, middle.y, middle.z, geo::Length(rim - middle) + relief}}};
+  }
   const double longitude = -180 + static_cast<double>(block.start_x) * tile + width / 2;
   const geo::Vec3 middle = geo::ToEcef(longitude, (south + north) / 2, tileset.min_height_m);
   constexpr double kLargestRadius = geo::kSemiMajorAxis * geo::kSemiMajorAxis / geo::kSemiMinorAxis;

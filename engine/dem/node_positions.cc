@@ -15,10 +15,22 @@ struct Cell {
   int size;
 };
 
-// Quadratic Lagrange weights on nodes -1, 0, 1.
-std::array<double, 3> Weights(double step, int size) {
-  const double t = 2 * step / size - 1;
-  return {t * (t - 1) / 2, 1 - t * t, t * (t + 1) / 2};
+// Cells are interpolated from kKnots x kKnots of their positions, the outermost on their edges.
+constexpr int kKnots = 5;
+constexpr int kLeastCell = 2 * (kKnots - 1);  // smaller ones have hardly more nodes than that
+
+// Lagrange's weights of the knots, `step` nodes from a cell's edge.
+std::array<double, kKnots> Weights(double step, int size) {
+  const double t = step * (kKnots - 1) / size;
+  std::array<double, kKnots> weights;
+  for (int i = 0; i < kKnots; ++i) {
+    double weight = 1;
+    for (int k = 0; k < kKnots; ++k) {
+      if (k != i) weight *= (t - k) / (i - k);
+    }
+    weights[static_cast<std::size_t>(i)] = weight;
+  }
+  return weights;
 }
 
 // Centres of a lattice's cells, each counted as the node at its south-western corner.
@@ -102,7 +114,7 @@ class GridNodes {
   void Fill(const Cell& cell) {
     const Part part = Inside(cell);
     if (part.empty() || !Touches(cell)) return;
-    if (cell.size <= 2) {
+    if (cell.size < kLeastCell) {
       FillExactly(part.west, part.south, part.east - part.west, part.north - part.south);
     } else if (!Interpolate(cell, part)) {
       const int half = cell.size / 2;
@@ -114,37 +126,55 @@ class GridNodes {
   }
 
   bool Interpolate(const Cell& cell, const Part& part) {
-    // Nine nodes to interpolate from; two where the error of a cubic in one of the axes is near its largest.
-    const int half = cell.size / 2, quarter = cell.size / 4;
-    std::array<Position, 11> known;
-    for (int i = 0; i < 9; ++i) {
-      known[static_cast<std::size_t>(i)] = Degrees(cell.column + i % 3 * half, cell.row + i / 3 * half);
+    // The knots, and four nodes where a term of one degree more in one of the axes is near its largest.
+    constexpr std::size_t kTried = 4;
+    const int spacing = cell.size / (kKnots - 1), half = cell.size / 2, near = cell.size / 8;
+    const std::array<std::array<int, 2>, kTried> tried = {
+        {{near, half}, {half, near}, {cell.size - near, half}, {half, cell.size - near}}};
+    std::array<Position, kKnots * kKnots + kTried> known;
+    for (int i = 0; i < kKnots * kKnots; ++i) {
+      known[static_cast<std::size_t>(i)] = Degrees(cell.column + i % kKnots * spacing, cell.row + i / kKnots * spacing);
     }
-    known[9] = Degrees(cell.column + quarter, cell.row + half);
-    known[10] = Degrees(cell.column + half, cell.row + quarter);
+    for (std::size_t i = 0; i < kTried; ++i) {
+      known[kKnots * kKnots + i] = Degrees(cell.column + tried[i][0], cell.row + tried[i][1]);
+    }
     georeference_.ToPixels(known);
     if (std::ranges::any_of(known, [](const Position& p) { return std::isnan(p.x); })) return false;
-    const auto at = [&](std::int64_t column, std::int64_t row) {
-      const auto x = Weights(static_cast<double>(column - cell.column), cell.size);
+    // The knots' columns at one row; then any node of that row.
+    const auto row_at = [&](std::int64_t row) {
       const auto y = Weights(static_cast<double>(row - cell.row), cell.size);
-      Position sum;
-      for (std::size_t j = 0; j < 3; ++j) {
-        for (std::size_t i = 0; i < 3; ++i) {
-          sum.x += x[i] * y[j] * known[3 * j + i].x;
-          sum.y += x[i] * y[j] * known[3 * j + i].y;
+      std::array<Position, kKnots> sums;
+      for (std::size_t i = 0; i < kKnots; ++i) {
+        for (std::size_t j = 0; j < kKnots; ++j) {
+          sums[i].x += y[j] * known[kKnots * j + i].x;
+          sums[i].y += y[j] * known[kKnots * j + i].y;
         }
+      }
+      return sums;
+    };
+    const auto at = [](const std::array<Position, kKnots>& sums, const std::array<double, kKnots>& x) {
+      Position sum;
+      for (std::size_t i = 0; i < kKnots; ++i) {
+        sum.x += x[i] * sums[i].x;
+        sum.y += x[i] * sums[i].y;
       }
       return sum;
     };
-    const auto close = [&](const Position& a, const Position& b) {
-      return std::abs(a.x - b.x) <= tolerance_ && std::abs(a.y - b.y) <= tolerance_;
-    };
-    if (!close(at(cell.column + quarter, cell.row + half), known[9]) ||
-        !close(at(cell.column + half, cell.row + quarter), known[10])) {
-      return false;
+    for (std::size_t i = 0; i < kTried; ++i) {
+      const Position tried_at = at(row_at(cell.row + tried[i][1]), Weights(tried[i][0], cell.size));
+      const Position& exact = known[kKnots * kKnots + i];
+      if (!(std::abs(tried_at.x - exact.x) <= tolerance_ && std::abs(tried_at.y - exact.y) <= tolerance_)) return false;
+    }
+    std::array<std::array<double, kKnots>, kCellNodes> weights;
+    for (std::int64_t column = part.west; column < part.east; ++column) {
+      weights[static_cast<std::size_t>(column - cell.column)] =
+          Weights(static_cast<double>(column - cell.column), cell.size);
     }
     for (std::int64_t row = part.south; row < part.north; ++row) {
-      for (std::int64_t column = part.west; column < part.east; ++column) *At(column, row) = at(column, row);
+      const auto sums = row_at(row);
+      for (std::int64_t column = part.west; column < part.east; ++column) {
+        *At(column, row) = at(sums, weights[static_cast<std::size_t>(column - cell.column)]);
+      }
     }
     return true;
   }

@@ -23,8 +23,8 @@ NodeWindow WindowOfTile(const geo::Lattice& lattice, const geo::TileKey& key);
 // `footprint`. A position is a function of the global node alone: whichever window asks gets the same bits. All nodes
 // of a pole row share one position.
 //
-// Exact for sources in WGS 84 degrees. Others are transformed at the nodes of global cells of 32 x 32 nodes and
-// interpolated biquadratically within `tolerance` pixels; cells where that does not hold are divided.
+// Exact for sources in WGS 84 degrees. Others are transformed at 5 x 5 nodes of global cells of 32 x 32 nodes and
+// interpolated with the fourth degree within `tolerance` pixels; cells where that does not hold are divided.
 std::vector<Position> NodePositions(const Georeference& georeference, const Footprint& footprint,
                                     const geo::Lattice& lattice, const NodeWindow& window, double tolerance);
 

@@ -24,9 +24,8 @@ Document MakeLayer(const DatasetView& dataset, std::string tile_query) {
   layer.attribution = dataset.attribution;
   layer.available = dataset.available;
   // layer.json has no way to cross the antimeridian.
-  const bool crosses = dataset.west > dataset.east;
-  layer.west = crosses ? -180 : dataset.west;
-  layer.east = crosses ? 180 : dataset.east;
+  layer.west = dataset.west;
+  layer.east = dataset.east;
   layer.south = dataset.south;
   layer.north = dataset.north;
   layer.water_mask = dataset.has_water;

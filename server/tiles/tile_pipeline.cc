@@ -1,5 +1,6 @@
 #include "server/tiles/tile_pipeline.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "engine/geo/error_ladder.h"
@@ -20,6 +21,12 @@ using Clock = std::chrono::steady_clock;
 
 std::chrono::microseconds Since(Clock::time_point start) {
   return std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - start);
+}
+
+// What a tile's mesh is held to, so that it keeps `error_m` to the ground: heights at nodes are rounded to 2^-10 m.
+double MeshError(double error_m) {
+  constexpr double kRounding = 0x1p-11 + 0x1p-14;  // and what positions are rounded by, as slopes mostly are
+  return std::max(error_m - kRounding, error_m / 2);
 }
 
 }  // namespace
@@ -126,7 +133,7 @@ Result<EncodedTile> TilePipeline::Build(const TileRequest& request, std::stop_to
   if (!dataset.source->IsAvailable(request.key)) {
     return MakeError(ErrorCode::kNotFound, "{}/{}: no such tile", dataset.name, geo::ToString(request.key));
   }
-  const double error_m = geo::LadderError(request.key.level, request.error_step, dataset.error_fraction);
+  const double error_m = MeshError(geo::LadderError(request.key.level, request.error_step, dataset.error_fraction));
   EncodedTile encoded;
   const Result<RefinedTilePtr> refined = Refine(dataset, request.key, error_m, encoded, stop);
   if (!refined) return tl::unexpected(refined.error());

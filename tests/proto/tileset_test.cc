@@ -117,6 +117,30 @@ TEST(Tileset, RootsOfTheGlobeLieInASphere) {
 }
 
 // loaders.gl makes of a region with a corner at a pole a box without width.
+// Clients look at the middle of the sphere: of a map of the Arctic that is the pole.
+TEST(Tileset, RootsAllAroundAPoleLieInASphereAboutIt) {
+  for (const std::int64_t y : {0, 3}) {
+    TilesetDescription tileset = Maui();
+    tileset.roots.clear();
+    for (std::int64_t x = 0; x < 8; ++x) tileset.roots.push_back({{2, x, y}, 5});
+    const Json json = Json::parse(EncodeTileset(tileset));
+    const Json& sphere = json.at("root").at("boundingVolume").at("sphere");
+    const geo::Vec3 middle{sphere[0], sphere[1], sphere[2]};
+    EXPECT_NEAR(middle.x, 0, 1e-6);
+    EXPECT_NEAR(middle.y, 0, 1e-6);
+    EXPECT_EQ(middle.z > 0, y == 3);
+    const double inner = y == 3 ? 45 : -45, outer = y == 3 ? 90 : -90;
+    for (const double latitude : {inner, outer}) {
+      for (const double height : {tileset.min_height_m, tileset.max_height_m}) {
+        for (const double longitude : {-180.0, -45.0, 0.0, 100.0}) {
+          EXPECT_LE(geo::Length(geo::ToEcef(longitude, latitude, height) - middle), sphere[3].get<double>());
+        }
+      }
+    }
+    EXPECT_LE(sphere[3], 5.2e6) << "not the whole Earth";
+  }
+}
+
 TEST(Tileset, TilesBesideThePolesAreBoundedBySpheres) {
   TilesetDescription tileset = Maui();
   tileset.content_query = "error=5";
