@@ -106,6 +106,17 @@ std::vector<geo::Vec3> VertexNormals(const LatticeView& lattice, const tin::TinM
   return normals;
 }
 
+std::size_t CountMisfits(const tin::TinMesh& mesh, const std::vector<geo::Vec3>& positions,
+                         const std::vector<geo::Vec3>& normals) {
+  constexpr double kCosWidest = 0.97236992039767667;
+  const std::vector<geo::Vec3> of_mesh = AreaWeightedNormals(mesh.triangles, positions);
+  std::size_t misfits = 0;
+  for (std::size_t k = 0; k < normals.size(); ++k) {
+    misfits += geo::Dot(normals[k], of_mesh[k]) < kCosWidest * geo::Length(of_mesh[k]) ? 1 : 0;
+  }
+  return misfits;
+}
+
 std::vector<std::array<std::uint8_t, 2>> TileNormals(const LatticeView& lattice, const tin::TinMesh& mesh,
                                                      const QuantizedTile& tile) {
   std::vector<std::array<std::uint8_t, 2>> encoded;

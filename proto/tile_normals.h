@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -22,7 +23,12 @@ namespace terrace::proto {
 std::vector<geo::Vec3> VertexNormals(const LatticeView& lattice, const tin::TinMesh& mesh,
                                      const std::vector<geo::Vec3>& positions);
 
-// The same oct-encoded, for the mesh that `tile` was quantized from.
+// How many of these normals are more than 13.5 degrees from the area-weighted normals of the triangles around their
+// vertices.
+std::size_t CountMisfits(const tin::TinMesh& mesh, const std::vector<geo::Vec3>& positions,
+                         const std::vector<geo::Vec3>& normals);
+
+// VertexNormals oct-encoded, for the mesh that `tile` was quantized from.
 std::vector<std::array<std::uint8_t, 2>> TileNormals(const LatticeView& lattice, const tin::TinMesh& mesh,
                                                      const QuantizedTile& tile);
 

@@ -15,6 +15,7 @@
 #include "proto/surface_error.h"
 #include "proto/tile_error.h"
 #include "proto/tile_mesh.h"
+#include "server/tiles/inner_vertices.h"
 #include "server/tiles/refine_plan.h"
 
 namespace terrace::server {
@@ -132,7 +133,7 @@ Result<StartedMesh> StartMesh(const dem::DemSource& source, const proto::Lattice
     mesh = Compact(FieldOf(lattice), *mesh, PlanOf(source, lattice, rules.criterion), error_m, stop);
   }
   if (!mesh) return tl::unexpected(std::move(mesh).error());
-  return StartedMesh{*std::move(mesh), error_m};
+  return StartedMesh{WithInnerVertices(lattice, *std::move(mesh)), error_m};
 }
 
 Result<MeshedTile> MeshTile(const dem::DemSource& source, const proto::LatticeView& lattice,
