@@ -1,7 +1,5 @@
 #include "config/disk_cache_option.h"
 
-#include <filesystem>
-
 #include "config/option_table.h"
 
 namespace terrace::config {
@@ -15,7 +13,7 @@ Codec<DiskCacheConfig> Directory() {
             if (!value.is_string() || value.get_ref<const std::string&>().empty()) {
               return place.Expected("the path of a directory", value);
             }
-            cache.directory = (place.directory() / value.get<std::string>()).string();
+            cache.directory = place.Resolve(value.get<std::string>());
           },
           [](const DiskCacheConfig& cache) { return Json(cache.directory); }, TextToJson};
 }
@@ -54,8 +52,7 @@ Codec<Config> DiskCacheOption() {
                                                        : WriteObject(config.disk_cache, DiskCacheOptionTable());
           },
           [](const std::string& text) {
-            // So that --print-config holds in any folder; nothing stays nothing.
-            return Json{{"directory", text.empty() ? text : std::filesystem::absolute(text).string()}};
+            return Json{{"directory", text}};
           }};
 }
 

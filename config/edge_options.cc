@@ -155,8 +155,7 @@ void ReadTokens(const Json& value, const Place& place, Config& config) {
 Json TlsToJson(const std::string& text) {
   const std::size_t comma = text.find(',');
   if (comma == std::string::npos) return text;
-  const auto absolute = [](const std::string& path) { return std::filesystem::absolute(path).string(); };
-  return Json{{"certificate", absolute(text.substr(0, comma))}, {"key", absolute(text.substr(comma + 1))}};
+  return Json{{"certificate", text.substr(0, comma)}, {"key", text.substr(comma + 1)}};
 }
 
 void ReadTls(const Json& value, const Place& place, Config& config) {
@@ -166,8 +165,7 @@ void ReadTls(const Json& value, const Place& place, Config& config) {
   if (!value.is_object() || value.size() != 2 || !is_path("certificate") || !is_path("key")) {
     return place.Expected(R"({"certificate": "server.pem", "key": "server.key"}, the paths of two PEM files)", value);
   }
-  config.tls = {(place.directory() / value["certificate"].get<std::string>()).string(),
-                (place.directory() / value["key"].get<std::string>()).string()};
+  config.tls = {place.Resolve(value["certificate"].get<std::string>()), place.Resolve(value["key"].get<std::string>())};
 }
 
 Json WriteTls(const Config& config) {

@@ -1,21 +1,17 @@
 #include "config/layer_options.h"
 
 #include <cmath>
-#include <filesystem>
 
 #include "config/option_table.h"
 
 namespace terrace::config {
 namespace {
 
-// Of a path on the command line, so that --print-config holds in any folder; nothing stays nothing.
-std::string Absolute(const std::string& path) { return path.empty() ? path : std::filesystem::absolute(path).string(); }
-
 // As a flag: a number is a sea level, everything else the path of a mask.
 Json WaterToJson(const std::string& text) {
   Json number = NumberToJson(text);
   if (number.is_number()) return Json{{"sea_level", std::move(number)}};
-  return Json{{"mask", Absolute(text)}};
+  return Json{{"mask", text}};
 }
 
 void ReadWater(const Json& value, const Place& place, DatasetConfig& dataset) {
@@ -36,7 +32,7 @@ void ReadWater(const Json& value, const Place& place, DatasetConfig& dataset) {
   if (!mask.is_string() || mask.get_ref<const std::string&>().empty()) {
     return place.At("mask").Expected("the path of a raster", mask);
   }
-  dataset.water = {(place.directory() / mask.get<std::string>()).string(), std::nullopt};
+  dataset.water = {place.Resolve(mask.get<std::string>()), std::nullopt};
 }
 
 Json WriteWater(const DatasetConfig& dataset) {
@@ -49,7 +45,7 @@ Codec<ImageryConfig> ImageryImage() {
             if (!value.is_string() || value.get_ref<const std::string&>().empty()) {
               return place.Expected("the path of an image", value);
             }
-            imagery.image = (place.directory() / value.get<std::string>()).string();
+            imagery.image = place.Resolve(value.get<std::string>());
           },
           [](const ImageryConfig& imagery) { return Json(imagery.image); }, TextToJson};
 }
@@ -82,7 +78,7 @@ Codec<DatasetConfig> ImageryCodec() {
             return dataset.imagery.image.empty() ? Json() : WriteObject(dataset.imagery, ImageryOptionTable());
           },
           [](const std::string& text) {
-            return Json{{"image", Absolute(text)}};
+            return Json{{"image", text}};
           }};
 }
 

@@ -1,7 +1,6 @@
 #include "config/option_table.h"
 
 #include <algorithm>
-#include <filesystem>
 
 #include "config/disk_cache_option.h"
 #include "config/edge_options.h"
@@ -37,7 +36,7 @@ Codec<Config> Viewer() {
         if (value.is_boolean()) {
           config.viewer = {value.get<bool>(), {}};
         } else if (value.is_string() && !value.get_ref<const std::string&>().empty()) {
-          config.viewer = {true, place.directory() / value.get<std::string>()};
+          config.viewer = {true, place.Resolve(value.get<std::string>())};
         } else {
           place.Expected("the folder of a viewer, true (the viewer that comes with terrace) or false (none)", value);
         }
@@ -52,7 +51,7 @@ Codec<Config> CacheDir() {
   return {[](const Json& value, const Place& place, Config& config) {
             if (!value.is_string()) return place.Expected("the path of a folder", value);
             const auto& path = value.get_ref<const std::string&>();
-            config.cache_dir = path.empty() ? path : (place.directory() / path).string();
+            config.cache_dir = path.empty() ? path : place.Resolve(path);
           },
           [](const Config& config) { return Json(config.cache_dir); }, TextToJson};
 }
@@ -62,10 +61,10 @@ Codec<Config> AccessLogFile() {
             if (!value.is_string() || value.get_ref<const std::string&>().empty()) {
               return place.Expected("the path of a file", value);
             }
-            config.access_log_file = (place.directory() / value.get<std::string>()).string();
+            config.access_log_file = place.Resolve(value.get<std::string>());
           },
           [](const Config& config) { return config.access_log_file.empty() ? Json() : Json(config.access_log_file); },
-          [](const std::string& text) { return Json(text.empty() ? text : std::filesystem::absolute(text).string()); }};
+          TextToJson};
 }
 
 Codec<Config> Datasets() {

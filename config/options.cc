@@ -27,12 +27,12 @@ std::vector<OptionInfo> Infos(const std::vector<Option<Target>>& table) {
 
 template <typename Target>
 void SetFromText(const std::vector<Option<Target>>& table, std::string_view key, const std::string& text,
-                 Target& target, std::vector<ConfigError>& errors) {
+                 const std::filesystem::path& directory, Target& target, std::vector<ConfigError>& errors) {
   const auto option =
       std::find_if(table.begin(), table.end(), [&](const Option<Target>& candidate) { return candidate.key == key; });
   TERRACE_CHECK(option != table.end() && option->codec.from_text != nullptr);
   std::vector<ConfigError> found;
-  option->codec.read(option->codec.from_text(text), Place({}, "", found), target);
+  option->codec.read(option->codec.from_text(text), Place::InWorkingDirectory(directory, found), target);
   for (const ConfigError& error : found) errors.push_back({FlagOf(key), error.message});
 }
 
@@ -51,13 +51,14 @@ std::vector<std::string> ChangedServerOptions(const Config& a, const Config& b) 
   return keys;
 }
 
-void SetServerOption(std::string_view key, const std::string& text, Config& config, std::vector<ConfigError>& errors) {
-  SetFromText(ServerOptionTable(), key, text, config, errors);
+void SetServerOption(std::string_view key, const std::string& text, const std::filesystem::path& directory,
+                     Config& config, std::vector<ConfigError>& errors) {
+  SetFromText(ServerOptionTable(), key, text, directory, config, errors);
 }
 
-void SetDatasetOption(std::string_view key, const std::string& text, DatasetConfig& dataset,
-                      std::vector<ConfigError>& errors) {
-  SetFromText(DatasetOptionTable(), key, text, dataset, errors);
+void SetDatasetOption(std::string_view key, const std::string& text, const std::filesystem::path& directory,
+                      DatasetConfig& dataset, std::vector<ConfigError>& errors) {
+  SetFromText(DatasetOptionTable(), key, text, directory, dataset, errors);
 }
 
 }  // namespace terrace::config

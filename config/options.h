@@ -1,6 +1,7 @@
 // The options of the configuration one by one: for the command line, where each of them is a flag, and for its help.
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -28,9 +29,11 @@ std::vector<OptionInfo> DatasetOptions();
 std::vector<std::string> ChangedServerOptions(const Config& a, const Config& b);
 
 // Sets the option `key` from the text of its flag. What is wrong is appended to `errors`, with the flag as its path.
+// `directory` is what FromWorkingDirectory takes; where it is empty, relative paths are errors.
 // Precondition: the option exists and has a flag.
-void SetServerOption(std::string_view key, const std::string& text, Config& config, std::vector<ConfigError>& errors);
-void SetDatasetOption(std::string_view key, const std::string& text, DatasetConfig& dataset,
-                      std::vector<ConfigError>& errors);
+void SetServerOption(std::string_view key, const std::string& text, const std::filesystem::path& directory,
+                     Config& config, std::vector<ConfigError>& errors);
+void SetDatasetOption(std::string_view key, const std::string& text, const std::filesystem::path& directory,
+                      DatasetConfig& dataset, std::vector<ConfigError>& errors);
 
 }  // namespace terrace::config

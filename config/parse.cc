@@ -41,7 +41,10 @@ ConfigResult LoadConfig(const std::filesystem::path& file) {
   if (!stream) return Unreadable("cannot be read: " + std::generic_category().message(errno));
   const std::string text{std::istreambuf_iterator<char>(stream), {}};
   if (stream.bad()) return Unreadable("cannot be read to its end");
-  return ParseConfig(text, std::filesystem::absolute(file).parent_path());
+  std::error_code unnamed;
+  const std::filesystem::path whole = std::filesystem::absolute(file, unnamed);
+  if (unnamed) return Unreadable("is relative to the working directory, which cannot be named: " + unnamed.message());
+  return ParseConfig(text, whole.parent_path());
 }
 
 Result<SourceConfig> SourceAt(const std::string& path) {

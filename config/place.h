@@ -9,6 +9,7 @@
 
 #include "config/config.h"
 #include "config/json_text.h"
+#include "config/working_directory.h"
 
 namespace terrace::config {
 
@@ -17,8 +18,18 @@ class Place {
   // `errors` must outlive this and every place made from it.
   Place(std::filesystem::path directory, std::string path, std::vector<ConfigError>& errors)
       : directory_(std::move(directory)), path_(std::move(path)), errors_(&errors) {}
+  // Of the command line; an empty directory is one that cannot be named.
+  static Place InWorkingDirectory(std::filesystem::path directory, std::vector<ConfigError>& errors) {
+    Place place(std::move(directory), "", errors);
+    place.is_command_line_ = true;
+    return place;
+  }
 
-  Place At(std::string_view key) const { return {directory_, AppendKey(path_, key), *errors_}; }
+  Place At(std::string_view key) const {
+    Place place = *this;
+    place.path_ = AppendKey(path_, key);
+    return place;
+  }
   Place At(std::size_t index) const { return At(std::to_string(index)); }
 
   void Fail(std::string message) const { errors_->push_back({path_, std::move(message)}); }
@@ -29,11 +40,18 @@ class Place {
 
   // What relative paths are relative to.
   const std::filesystem::path& directory() const { return directory_; }
+  // A path in full, as it is used from then on.
+  std::string Resolve(const std::filesystem::path& path) const {
+    if (!is_command_line_) return (directory_ / path).string();
+    if (directory_.empty() && path.is_relative()) Fail(path.string() + " " + kNoWorkingDirectory);
+    return FromWorkingDirectory(directory_, path);
+  }
 
  private:
   std::filesystem::path directory_;
   std::string path_;
   std::vector<ConfigError>* errors_;
+  bool is_command_line_ = false;
 };
 
 }  // namespace terrace::config

@@ -33,7 +33,7 @@ bool IsVerticalName(const std::string& text) {
 std::optional<std::string> ReadVertical(const Json& value, const Place& place) {
   const std::string text = value.is_string() ? value.get<std::string>() : "";
   if (IsVerticalName(text)) return text;
-  if (IsGrid(text) && !HasControlCharacter(text)) return (place.directory() / text).string();
+  if (IsGrid(text) && !HasControlCharacter(text)) return place.Resolve(text);
   place.Expected(kVerticalExpected, value);
   return std::nullopt;
 }
@@ -134,11 +134,7 @@ Codec<DatasetConfig> VerticalCodec() {
   return {[](const Json& value, const Place& place, DatasetConfig& dataset) {
             if (auto vertical = ReadVertical(value, place)) dataset.vertical = *std::move(vertical);
           },
-          [](const DatasetConfig& dataset) { return Json(dataset.vertical); },
-          [](const std::string& text) {
-            // So that --print-config holds in any folder.
-            return Json(IsGrid(text) ? std::filesystem::absolute(text).string() : text);
-          }};
+          [](const DatasetConfig& dataset) { return Json(dataset.vertical); }, TextToJson};
 }
 
 Codec<DatasetConfig> NodataCodec() {
@@ -157,7 +153,7 @@ Codec<Config> TextList(std::vector<std::string> Config::*member, const char* exp
                 return place.Expected(expected, value);
               }
               const auto text = item.get<std::string>();
-              texts.push_back(is_path ? (place.directory() / text).string() : text);
+              texts.push_back(is_path ? place.Resolve(text) : text);
             }
             config.*member = std::move(texts);
           },

@@ -188,7 +188,9 @@ GeoBounds BoundsOf(const Rasters& rasters) {
   for (const auto& raster : rasters) boxes.push_back(raster->footprint());
   std::ranges::sort(boxes, {}, &Footprint::west);
   Footprint hull = boxes.front();
-  double covered = hull.east, gap = 0, gap_end = hull.west;  // the widest gap between longitudes ends at gap_end
+  // What lies beyond the antimeridian comes first in the order of longitudes.
+  const double beyond = std::ranges::max_element(boxes, {}, &Footprint::east)->east - 360;
+  double covered = std::max(hull.east, beyond), gap = 0, gap_end = hull.west;  // the widest gap ends at gap_end
   for (const Footprint& box : boxes) {
     hull.south = std::min(hull.south, box.south);
     hull.north = std::max(hull.north, box.north);

@@ -1,6 +1,7 @@
 #include "engine/dem/image_pool.h"
 
 #include <algorithm>
+#include <new>
 #include <utility>
 
 #include "engine/dem/image_bins.h"
@@ -63,7 +64,12 @@ Result<void> ImagePool::CheckUnchanged() {
 
 void ImagePool::Return(std::size_t size, ImageFile image, std::uint64_t epoch) {
   const std::lock_guard lock(mutex_);
-  if (epoch == epoch_) idle_[size].push_back(std::move(image));
+  if (epoch != epoch_) return;
+  try {
+    idle_[size].push_back(std::move(image));
+  } catch (const std::bad_alloc&) {
+    // It is closed, and opened anew when it is wanted.
+  }
 }
 
 }  // namespace terrace::dem

@@ -1,5 +1,7 @@
 #include "engine/dem/operation_pool.h"
 
+#include <new>
+
 #include "engine/dem/proj_handle.h"
 
 namespace terrace::dem {
@@ -32,7 +34,11 @@ std::unique_ptr<ProjOperation> OperationPool::Borrow() const {
 void OperationPool::Return(std::unique_ptr<ProjOperation> operation) const {
   proj_errno_reset(operation->operation.get());
   const std::lock_guard lock(mutex_);
-  idle_.push_back(std::move(operation));
+  try {
+    idle_.push_back(std::move(operation));
+  } catch (const std::bad_alloc&) {
+    // It is let go, and set up anew when one is wanted.
+  }
 }
 
 }  // namespace terrace::dem

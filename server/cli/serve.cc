@@ -19,6 +19,7 @@
 #include "config/config.h"
 #include "config/options.h"
 #include "config/parse.h"
+#include "config/working_directory.h"
 #include "engine/dem/source_policy.h"
 #include "server/cli/command.h"
 #include "server/cli/fail.h"
@@ -40,8 +41,9 @@ namespace terrace::cli {
 namespace {
 
 struct ServeArguments {
+  std::filesystem::path directory;  // the working directory at the start; empty: it cannot be named
   std::vector<std::string> dems;
-  std::string config_file;
+  std::string config_file, config_path;  // as it was given, and in full
   bool print_config = false, check_config = false;
   std::map<std::string, std::string> server_flags, dataset_flags;  // by option key
 };
@@ -58,7 +60,7 @@ int Report(const std::vector<config::ConfigError>& errors, const std::string& fi
 // A folder keeps what looks like an extension, and a trailing slash changes nothing.
 std::string StemOf(const std::string& dem) {
   std::error_code ignored;
-  const std::filesystem::path path = std::filesystem::absolute(dem).lexically_normal();
+  const std::filesystem::path path = std::filesystem::path(dem).lexically_normal();
   if (!std::filesystem::is_directory(path, ignored)) return path.stem().string();
   return path.has_filename() ? path.filename().string() : path.parent_path().filename().string();
 }
@@ -73,13 +75,15 @@ bool IsPipe(const std::string& path) {
 config::Config MakeConfig(const ServeArguments& arguments, std::vector<config::ConfigError>& errors) {
   config::Config config;
   if (!arguments.config_file.empty()) {
-    config::ConfigResult loaded = config::LoadConfig(arguments.config_file);
+    config::ConfigResult loaded = config::LoadConfig(arguments.config_path);
     if (loaded)
       config = *std::move(loaded);
     else
       errors = std::move(loaded).error();
   }
-  for (const auto& [key, text] : arguments.server_flags) config::SetServerOption(key, text, config, errors);
+  for (const auto& [key, text] : arguments.server_flags) {
+    config::SetServerOption(key, text, arguments.directory, config, errors);
+  }
   if (arguments.dems.empty() && !arguments.dataset_flags.empty()) {
     errors.push_back(
         {"", "options of a dataset need a DEM on the command line; in a config file they stand in its dataset"});
@@ -88,16 +92,26 @@ config::Config MakeConfig(const ServeArguments& arguments, std::vector<config::C
     errors.push_back({"--name", "names one dataset; give one DEM, or a config file with a name for each"});
   }
   config::DatasetConfig flags;  // checked once, however many DEMs they apply to
-  for (const auto& [key, text] : arguments.dataset_flags) config::SetDatasetOption(key, text, flags, errors);
-  for (const std::string& dem : arguments.dems) {
+  for (const auto& [key, text] : arguments.dataset_flags) {
+    config::SetDatasetOption(key, text, arguments.directory, flags, errors);
+  }
+  for (const std::string& written : arguments.dems) {
+    if (written.empty()) {
+      errors.push_back({"", "a DEM on the command line has an empty name"});
+      continue;
+    }
+    const std::string dem = config::FromWorkingDirectory(arguments.directory, written);
+    if (std::filesystem::path(dem).is_relative()) {
+      errors.push_back({written, config::kNoWorkingDirectory});
+      continue;
+    }
     config::DatasetConfig& dataset = config.datasets.emplace_back(flags);
     if (dataset.name.empty()) dataset.name = config::SanitizeDatasetName(StemOf(dem));
-    // In full, so that --print-config holds in any folder.
-    Result<config::SourceConfig> source = config::SourceAt(std::filesystem::absolute(dem).string());
+    Result<config::SourceConfig> source = config::SourceAt(dem);
     if (source)
       dataset.sources = {*std::move(source)};
     else
-      errors.push_back({dem, source.error().message});
+      errors.push_back({written, source.error().message});
   }
   const std::vector<config::ConfigError> duplicates = config::FindDuplicateNames(config.datasets);
   if (errors.empty()) errors = duplicates;
@@ -305,7 +319,7 @@ int Serve(const ServeArguments& arguments) {
   std::signal(SIGPIPE, SIG_IGN);  // whoever reads the log may go away; the server stays
   std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow fails to be written, as on a full disk
   std::vector<config::ConfigError> errors;
-  const bool is_read_once = IsPipe(arguments.config_file);
+  const bool is_read_once = IsPipe(arguments.config_path);
   const config::Config config = MakeConfig(arguments, errors);
   if (!errors.empty()) return Report(errors, arguments.config_file);
   if (arguments.print_config) {
@@ -340,7 +354,7 @@ int Serve(const ServeArguments& arguments) {
   server::Reloader::Hooks hooks;
   hooks.load = [&arguments, config, is_read_once]() -> config::ConfigResult {
     if (is_read_once) return config;
-    if (IsPipe(arguments.config_file)) {
+    if (IsPipe(arguments.config_path)) {
       return tl::unexpected(std::vector<config::ConfigError>{{"", "has become a pipe or device; make it a file"}});
     }
     std::vector<config::ConfigError> wrong;
@@ -437,7 +451,14 @@ void AddServe(CLI::App& app, int& exit_code) {
                     "Says whether the server could start, without opening rasters or listening, and ends");
   AddFlags(*command, config::ServerOptions(), "Server", arguments->server_flags);
   AddFlags(*command, config::DatasetOptions(), "Datasets of the command line", arguments->dataset_flags);
-  command->callback([arguments, &exit_code] { exit_code = Serve(*arguments); });
+  command->callback([arguments, &exit_code] {
+    std::error_code unnamed;
+    arguments->directory = std::filesystem::current_path(unnamed);
+    if (!arguments->config_file.empty()) {
+      arguments->config_path = config::FromWorkingDirectory(arguments->directory, arguments->config_file);
+    }
+    exit_code = Serve(*arguments);
+  });
 }
 
 }  // namespace terrace::cli

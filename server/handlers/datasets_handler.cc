@@ -46,10 +46,11 @@ std::string PercentEncode(std::string_view name) {
   return encoded;
 }
 
-std::string DatasetsJson(std::span<const DatasetView> datasets) {
+std::string DatasetsJson(std::span<const DatasetView> datasets, const IsSeen& is_seen) {
   using Json = nlohmann::ordered_json;
   Json list = Json::array();
   for (const DatasetView& dataset : datasets) {
+    if (!is_seen(dataset)) continue;
     const std::string base = fmt::format("/{}", PercentEncode(dataset.name));
     Json entry;
     entry["name"] = dataset.name;
@@ -74,9 +75,10 @@ std::string DatasetsJson(std::span<const DatasetView> datasets) {
   return document.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
-std::string IndexHtml(std::span<const DatasetView> datasets) {
+std::string IndexHtml(std::span<const DatasetView> datasets, const IsSeen& is_seen) {
   std::string items;
   for (const DatasetView& dataset : datasets) {
+    if (!is_seen(dataset)) continue;
     fmt::format_to(std::back_inserter(items),
                    "<li>{1}: <a href=\"/{0}/layer.json\">layer.json</a>, "
                    "<a href=\"/{0}/tileset.json\">tileset.json</a>, <a href=\"/{0}/tiles.json\">tiles.json</a></li>\n",

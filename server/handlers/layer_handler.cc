@@ -12,13 +12,15 @@
 namespace terrace::server {
 namespace {
 
+constexpr std::string_view kJson = "application/json";
+
 std::string Print(double value) {
   std::string text = fmt::format("{}", value);
   std::erase(text, '+');
   return text;
 }
 
-Document MakeLayer(const DatasetView& dataset, std::string tile_query) {
+std::string WriteLayer(const DatasetView& dataset, std::string tile_query) {
   proto::LayerDescription layer;
   layer.name = dataset.name;
   layer.attribution = dataset.attribution;
@@ -31,7 +33,7 @@ Document MakeLayer(const DatasetView& dataset, std::string tile_query) {
   layer.water_mask = dataset.has_water;
   layer.metadata_levels = dataset.metadata_levels;
   layer.tile_query = std::move(tile_query);
-  return Document::Make(proto::EncodeLayerJson(layer), "application/json");
+  return proto::EncodeLayerJson(layer);
 }
 
 }  // namespace
@@ -49,17 +51,25 @@ std::string WithToken(std::string query, const Request& request) {
 
 LayerHandler::LayerHandler(std::span<const DatasetView> datasets, std::string cache_control)
     : datasets_(datasets), cache_control_(std::move(cache_control)) {
-  for (const DatasetView& dataset : datasets_) plain_.push_back(MakeLayer(dataset, ""));
+  for (const DatasetView& dataset : datasets_) plain_.push_back(Document::Make(WriteLayer(dataset, ""), kJson));
 }
 
-Response LayerHandler::Handle(const Route& route, const Request& request) const {
+Answer LayerHandler::Handle(const Route& route, const Request& request) const {
   const Result<std::uint32_t> dataset = FindDataset(route.dataset, datasets_);
   if (!dataset) return ClientErrorResponse(dataset.error(), request.id);
   const Result<TileParameters> parameters = ParseTileParameters(route.query, /*allow_at_least=*/false);
   if (!parameters) return ClientErrorResponse(parameters.error(), request.id);
   std::string tile_query = WithToken(TileQuery(parameters->wish), request);
   if (tile_query.empty()) return Serve(plain_[*dataset], request, cache_control_);
-  return Serve(MakeLayer(datasets_[*dataset], std::move(tile_query)), request, cache_control_);
+  DocumentPlan plan;
+  plan.key = fmt::format("layer {} {}", *dataset, tile_query);
+  plan.bytes = plain_[*dataset].identity->size();
+  plan.content_type = kJson;
+  plan.cache_control = cache_control_;
+  plan.write = [&view = datasets_[*dataset], tile_query = std::move(tile_query)] {
+    return WriteLayer(view, tile_query);
+  };
+  return plan;
 }
 
 }  // namespace terrace::server

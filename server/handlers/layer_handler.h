@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "server/handlers/document.h"
+#include "server/handlers/document_maker.h"
 #include "server/http/query.h"
 #include "server/http/router.h"
 #include "server/tiles/dataset_view.h"
@@ -18,7 +19,7 @@ class LayerHandler {
   LayerHandler(std::span<const DatasetView> datasets, std::string cache_control);
 
   // Precondition: a kLayer route. `?error=E` and `?fraction=F` go into the tile template.
-  Response Handle(const Route& route, const Request& request) const;
+  Answer Handle(const Route& route, const Request& request) const;
 
  private:
   const std::span<const DatasetView> datasets_;

@@ -2,13 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <iterator>
 #include <map>
 #include <memory>
 #include <utility>
 
-#include "server/handlers/datasets_handler.h"
 #include "server/http/http_error.h"
 #include "server/http/negotiate.h"
 
@@ -63,12 +60,19 @@ Routes::Routes(CatalogPtr catalog, TileService& tiles, std::shared_ptr<const Sta
       viewer_(std::move(viewer)),
       datasets_(Document::Make(DatasetsJson(catalog_->datasets), "application/json")),
       index_(Document::Make(IndexHtml(catalog_->datasets), "text/html; charset=utf-8")),
+      documents_(catalog_, tiles, options),
       state_(std::move(state)) {}
 
 std::optional<Response> Routes::ServeAtOnce(const Route& route, const Request& request) const {
   if (route.kind == RouteKind::kHeights || route.kind == RouteKind::kMesh) return std::nullopt;
-  std::optional<Response> response =
-      route.kind == RouteKind::kTile ? tiles_.HandleNow(route, request) : ServeNow(route, request);
+  std::optional<Response> response;
+  if (route.kind == RouteKind::kTile) {
+    response = tiles_.HandleNow(route, request);
+  } else {
+    Answer answer = Describe(route, request);
+    const auto* plan = std::get_if<DocumentPlan>(&answer);
+    response = plan != nullptr ? documents_.ServeAtOnce(*plan, request) : std::get<Response>(std::move(answer));
+  }
   if (response) Label(*response, route.kind, route.dataset);
   return response;
 }
@@ -84,7 +88,12 @@ asio::awaitable<Response> Routes::Serve(Route route, Request request) const {
   } else if (kind == RouteKind::kMesh) {
     response = co_await areas_.Handle(std::move(route), std::move(request));
   } else {
-    response = ServeNow(route, request);
+    Answer answer = Describe(route, request);
+    if (auto* plan = std::get_if<DocumentPlan>(&answer)) {
+      response = co_await documents_.Serve(std::move(*plan), std::move(request));
+    } else {
+      response = std::get<Response>(std::move(answer));
+    }
   }
   Label(response, kind, dataset);
   co_return response;
@@ -96,8 +105,8 @@ void Routes::Label(Response& response, RouteKind kind, const std::string& datase
   if (!dataset.empty() && FindDataset(dataset, catalog_->datasets)) response.dataset = dataset;
 }
 
-Response Routes::ServeNow(const Route& route, const Request& request) const {
-  if (route.kind == RouteKind::kViewer) return ServeViewer(route, request);
+Answer Routes::Describe(const Route& route, const Request& request) const {
+  if (route.kind == RouteKind::kViewer) return DescribeViewer(route, request);
   if (route.kind == RouteKind::kLayer) return layers_.Handle(route, request);
   if (route.kind == RouteKind::kTileset) return tilesets_.Handle(route, request);
   if (route.kind == RouteKind::kSubtree) return tilesets_.HandleSubtree(route, request);
@@ -108,8 +117,7 @@ Response Routes::ServeNow(const Route& route, const Request& request) const {
   switch (route.kind) {
     case RouteKind::kDatasets:
       if (SeesAll(request)) return terrace::server::Serve(datasets_, request, kRevalidate);
-      return terrace::server::Serve(Document::Make(DatasetsJson(SeenBy(request)), "application/json"), request,
-                                    kRevalidate);
+      return PlanOfSeen(datasets_, request, DatasetsJson);
     case RouteKind::kReady:
       return Ready(state_, SeesAll(request));
     case RouteKind::kMetrics:
@@ -119,22 +127,32 @@ Response Routes::ServeNow(const Route& route, const Request& request) const {
   }
 }
 
-std::vector<DatasetView> Routes::SeenBy(const Request& request) const {
-  std::vector<DatasetView> seen;
-  std::copy_if(catalog_->datasets.begin(), catalog_->datasets.end(), std::back_inserter(seen),
-               [&](const DatasetView& view) { return request.grant->Sees(view.name); });
-  return seen;
+// What `write` makes of the datasets that the request may see; `all`: the same of all datasets.
+DocumentPlan Routes::PlanOfSeen(const Document& all, const Request& request,
+                                std::string (*write)(std::span<const DatasetView>, const IsSeen&)) const {
+  DocumentPlan plan;
+  // There is one grant of each token, for as long as the server runs.
+  plan.key = fmt::format("{} {}", all.identity_etag, fmt::ptr(request.grant.get()));
+  plan.bytes = all.identity->size();
+  plan.content_type = all.content_type;
+  plan.cache_control = kRevalidate;
+  plan.write = [&datasets = catalog_->datasets, grant = request.grant, write] {
+    return write(datasets, [&](const DatasetView& view) { return grant->Sees(view.name); });
+  };
+  return plan;
 }
 
 // Its pages keep their state in the query, so any query goes.
-Response Routes::ServeViewer(const Route& route, const Request& request) const {
+Answer Routes::DescribeViewer(const Route& route, const Request& request) const {
   if (const Document* file = viewer_->Find(route.file)) return terrace::server::Serve(*file, request, kRevalidate);
   if (viewer_->empty() && route.file == "index.html") {
-    Response index = SeesAll(request) ? terrace::server::Serve(index_, request, kRevalidate)
-                                      : terrace::server::Serve(
-                                            Document::Make(IndexHtml(SeenBy(request)), "text/html; charset=utf-8"),
-                                            request, kRevalidate);
-    index.for_grant = request.grant != nullptr;
+    if (SeesAll(request)) {
+      Response index = terrace::server::Serve(index_, request, kRevalidate);
+      index.for_grant = request.grant != nullptr;
+      return index;
+    }
+    DocumentPlan index = PlanOfSeen(index_, request, IndexHtml);
+    index.for_grant = true;
     return index;
   }
   return ProblemResponse(404, "no such URL; /datasets lists those of each dataset", request.id);

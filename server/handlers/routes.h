@@ -6,12 +6,14 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
-#include <vector>
 
 #include "server/asio.h"
 #include "server/handlers/area_handler.h"
+#include "server/handlers/datasets_handler.h"
 #include "server/handlers/document.h"
+#include "server/handlers/document_maker.h"
 #include "server/handlers/heights_handler.h"
 #include "server/handlers/layer_handler.h"
 #include "server/handlers/metrics.h"
@@ -26,7 +28,7 @@
 
 namespace terrace::server {
 
-// Answers from one catalog. Thread-safe: immutable after construction.
+// Answers from one catalog. Thread-safe.
 class Routes {
  public:
   // What the probes and /metrics ask.
@@ -40,8 +42,8 @@ class Routes {
   Routes(CatalogPtr catalog, TileService& tiles, std::shared_ptr<const StaticFiles> viewer, TileHandlerOptions options,
          std::size_t max_locations, State state);
 
-  // Answers what needs no waiting, which is most: all but tiles that must be built, heights and meshes. Nothing for
-  // those.
+  // Answers what needs no waiting, which is most: all but tiles that must be built, heights, meshes, and long documents
+  // with wishes in them. Nothing for those.
   std::optional<Response> ServeAtOnce(const Route& route, const Request& request) const;
 
   // Answers GET, HEAD, and POST where TakesPost says so. Whoever waits keeps this alive.
@@ -51,9 +53,10 @@ class Routes {
 
  private:
   void Label(Response& response, RouteKind kind, const std::string& dataset) const;
-  Response ServeNow(const Route& route, const Request& request) const;
-  Response ServeViewer(const Route& route, const Request& request) const;
-  std::vector<DatasetView> SeenBy(const Request& request) const;
+  Answer Describe(const Route& route, const Request& request) const;
+  Answer DescribeViewer(const Route& route, const Request& request) const;
+  DocumentPlan PlanOfSeen(const Document& all, const Request& request,
+                          std::string (*write)(std::span<const DatasetView>, const IsSeen&)) const;
 
   const CatalogPtr catalog_;
   const TileHandler tiles_;
@@ -65,6 +68,7 @@ class Routes {
   const std::shared_ptr<const StaticFiles> viewer_;
   const Document datasets_;
   const Document index_;  // for `/` without a viewer
+  const DocumentMaker documents_;
   const State state_;
 };
 

@@ -1,5 +1,7 @@
 #include "server/handlers/tileset_handler.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -14,6 +16,8 @@
 namespace terrace::server {
 namespace {
 
+constexpr std::string_view kJson = "application/json";
+
 // What the content templates carry for a request. The values of `compression` and `texture` have been checked.
 std::string ContentQuery(const ErrorWish& wish, std::string_view query) {
   std::string content = TileQuery(wish);
@@ -25,11 +29,12 @@ std::string ContentQuery(const ErrorWish& wish, std::string_view query) {
   return content;
 }
 
-Document MakeTileset(const DatasetView& dataset, ErrorWish wish, std::string content_query, std::string subtree_query) {
+std::string WriteTileset(const DatasetView& dataset, const std::vector<proto::TreeRoot>& roots, ErrorWish wish,
+                         std::string content_query, std::string subtree_query) {
   wish.at_least = wish.error_m.has_value();  // as TileQuery writes it into the templates
   proto::TilesetDescription tileset;
   tileset.attribution = dataset.attribution;
-  tileset.roots = proto::ImplicitTrees(dataset.available);
+  tileset.roots = roots;
   const int level = tileset.roots.front().tile.level;
   // The roots have the largest error, and with it the deepest skirts and the coarsest rounding of heights.
   const double error_m =
@@ -40,17 +45,20 @@ Document MakeTileset(const DatasetView& dataset, ErrorWish wish, std::string con
   tileset.max_height_m = std::max(dataset.max_height_m, dataset.floor_m) + rounding_m;
   tileset.content_query = std::move(content_query);
   tileset.subtree_query = std::move(subtree_query);
-  return Document::Make(proto::EncodeTileset(tileset), "application/json");
+  return proto::EncodeTileset(tileset);
 }
 
 }  // namespace
 
 TilesetHandler::TilesetHandler(std::span<const DatasetView> datasets, std::string cache_control)
     : datasets_(datasets), cache_control_(std::move(cache_control)) {
-  for (const DatasetView& dataset : datasets_) plain_.push_back(MakeTileset(dataset, {}, "", ""));
+  for (const DatasetView& dataset : datasets_) {
+    roots_.push_back(std::make_shared<const std::vector<proto::TreeRoot>>(proto::ImplicitTrees(dataset.available)));
+    plain_.push_back(Document::Make(WriteTileset(dataset, *roots_.back(), {}, "", ""), kJson));
+  }
 }
 
-Response TilesetHandler::Handle(const Route& route, const Request& request) const {
+Answer TilesetHandler::Handle(const Route& route, const Request& request) const {
   const Result<std::uint32_t> dataset = FindDataset(route.dataset, datasets_);
   if (!dataset) return ClientErrorResponse(dataset.error(), request.id);
   const Result<TileParameters> parameters =
@@ -58,8 +66,17 @@ Response TilesetHandler::Handle(const Route& route, const Request& request) cons
   if (!parameters) return ClientErrorResponse(parameters.error(), request.id);
   std::string content_query = WithToken(ContentQuery(parameters->wish, route.query), request);
   if (content_query.empty()) return Serve(plain_[*dataset], request, cache_control_);
-  return Serve(MakeTileset(datasets_[*dataset], parameters->wish, std::move(content_query), WithToken("", request)),
-               request, cache_control_);
+  std::string subtree_query = WithToken("", request);
+  DocumentPlan plan;
+  plan.key = fmt::format("tileset {} {} {}", *dataset, content_query, subtree_query);
+  plan.bytes = plain_[*dataset].identity->size();
+  plan.content_type = kJson;
+  plan.cache_control = cache_control_;
+  plan.write = [&view = datasets_[*dataset], roots = roots_[*dataset], wish = parameters->wish,
+                content_query = std::move(content_query), subtree_query = std::move(subtree_query)] {
+    return WriteTileset(view, *roots, wish, content_query, subtree_query);
+  };
+  return plan;
 }
 
 Response TilesetHandler::HandleSubtree(const Route& route, const Request& request) const {

@@ -1,11 +1,14 @@
 // GET /{dataset}/tileset.json and the .subtree files under it.
 #pragma once
 
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "proto/implicit_tree.h"
 #include "server/handlers/document.h"
+#include "server/handlers/document_maker.h"
 #include "server/http/query.h"
 #include "server/http/router.h"
 #include "server/tiles/dataset_view.h"
@@ -20,7 +23,7 @@ class TilesetHandler {
   TilesetHandler(std::span<const DatasetView> datasets, std::string cache_control);
 
   // Precondition: a kTileset route. `?error=E` and `?fraction=F` go into the content templates.
-  Response Handle(const Route& route, const Request& request) const;
+  Answer Handle(const Route& route, const Request& request) const;
 
   // Precondition: a kSubtree route. Any available tile may be the root, so that a tileset.json which a client has kept
   // from an earlier day stays good. 404 where no subtree begins.
@@ -29,7 +32,9 @@ class TilesetHandler {
  private:
   const std::span<const DatasetView> datasets_;
   const std::string cache_control_;
-  std::vector<Document> plain_;  // one per dataset: what is served without a wish
+  // One per dataset: where its trees are rooted, and what is served without a wish.
+  std::vector<std::shared_ptr<const std::vector<proto::TreeRoot>>> roots_;
+  std::vector<Document> plain_;
 };
 
 }  // namespace terrace::server

@@ -125,6 +125,8 @@ void DatasetSlot::OpenIfDue(const DatasetOpener& open) {
     opening_ = std::async(std::launch::async, OpenQuietly, open, wanted_, stop_opening_.get_token());
   } catch (const std::system_error& error) {
     Fail({ErrorCode::kUnavailable, fmt::format("no thread to open it on: {}", error.code().message())});
+  } catch (const std::exception& exception) {
+    Fail({ErrorCode::kUnavailable, fmt::format("it cannot be begun: {}", exception.what())});
   }
 }
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <exception>
 #include <string_view>
 #include <utility>
 
@@ -140,8 +141,17 @@ bool Reloader::IsBusy() const {
          });
 }
 
+// An exception tells nothing of the configuration. Nothing has been changed yet, so the next look may try again.
+config::ConfigResult Reloader::Load() const {
+  try {
+    return hooks_.load();
+  } catch (const std::exception& exception) {
+    return tl::unexpected(std::vector<config::ConfigError>{{"", exception.what()}});
+  }
+}
+
 void Reloader::LookAtConfig(bool asked) {
-  config::ConfigResult next = hooks_.load();
+  config::ConfigResult next = Load();
   config_settles_ = !asked && next != seen_;
   seen_ = next;
   if (config_settles_) return;

@@ -53,6 +53,7 @@ class Reloader {
  private:
   void Run();
   void LookAtFiles();
+  config::ConfigResult Load() const;
   void LookAtConfig(bool asked);
   void Apply(config::Config next);
   bool StepOpenings();

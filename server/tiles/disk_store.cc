@@ -82,8 +82,8 @@ void DiskStore::Enqueue(Job job) {
       dropped_.fetch_add(1, std::memory_order_relaxed);
       return;
     }
-    queued_bytes_ += job.charge;
     queue_.push_back(std::move(job));
+    queued_bytes_ += queue_.back().charge;
   }
   changed_.notify_all();
 }
@@ -106,12 +106,11 @@ void DiskStore::Run() {
       continue;
     }
     if (!queue_.empty()) {
-      std::vector<Job> jobs;
+      std::list<Job> jobs;
       std::size_t bytes = 0;
       while (!queue_.empty() && bytes < kBatchBytes) {
         bytes += queue_.front().charge;
-        jobs.push_back(std::move(queue_.front()));
-        queue_.pop_front();
+        jobs.splice(jobs.end(), queue_, queue_.begin());
       }
       busy_ = true;
       lock.unlock();
@@ -126,7 +125,7 @@ void DiskStore::Run() {
   }
 }
 
-void DiskStore::Write(std::vector<Job> jobs) {
+void DiskStore::Write(std::list<Job> jobs) {
   std::shared_ptr<RecordDb> db;
   {
     const std::lock_guard lock(mutex_);
@@ -157,7 +156,7 @@ void DiskStore::Write(std::vector<Job> jobs) {
 // Reading goes on after a failed write: what a full disk holds is as good as before.
 void DiskStore::SwitchOff(const std::string& why, bool reading) {
   bool was_on = false;
-  std::deque<Job> waiting;
+  std::list<Job> waiting;
   std::shared_ptr<RecordDb> closed;  // after the lock
   {
     const std::lock_guard lock(mutex_);

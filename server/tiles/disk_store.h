@@ -9,8 +9,8 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
-#include <deque>
 #include <functional>
+#include <list>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -69,7 +69,7 @@ class DiskStore {
 
   void Run();
   void Enqueue(Job job);
-  void Write(std::vector<Job> jobs);
+  void Write(std::list<Job> jobs);
   void Reopen();
   void Open();
   void SwitchOff(const std::string& why, bool reading);
@@ -80,7 +80,7 @@ class DiskStore {
   std::shared_ptr<RecordDb> db_;  // null: nothing is read
   bool writing_ = false;
   std::chrono::steady_clock::time_point retry_at_;  // while not writing
-  std::deque<Job> queue_;
+  std::list<Job> queue_;                            // whose jobs move without memory being asked for
   std::size_t queued_bytes_ = 0;
   bool busy_ = false;  // jobs have left the queue and are not done
   bool stop_ = false;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "config/working_directory.h"
 #include "tests/config/errors.h"
 
 namespace terrace::config {
@@ -12,7 +13,7 @@ using testing::IsEmpty;
 
 std::vector<ConfigError> Set(std::string_view key, const std::string& text, Config& config) {
   std::vector<ConfigError> errors;
-  SetServerOption(key, text, config, errors);
+  SetServerOption(key, text, "/start", config, errors);
   return errors;
 }
 
@@ -72,16 +73,62 @@ TEST(SetServerOption, ReadsNumbersSwitchesAndText) {
   EXPECT_EQ(config.cache_control, "123");
 }
 
+TEST(SetServerOption, ResolvesPathsAgainstTheDirectoryItIsGiven) {
+  Config config;
+  EXPECT_THAT(Set("viewer", "page", config), IsEmpty());
+  EXPECT_THAT(Set("cache_dir", "surveys", config), IsEmpty());
+  EXPECT_THAT(Set("disk_cache", "../tiles", config), IsEmpty());
+  EXPECT_THAT(Set("access_log_file", "a.log", config), IsEmpty());
+  EXPECT_THAT(Set("tls", "a.pem,/b.key", config), IsEmpty());
+  EXPECT_THAT(Set("data_roots", "/dems,more", config), IsEmpty());
+  EXPECT_THAT(Set("allowed_prefixes", "/vsis3/bucket/", config), IsEmpty());
+  EXPECT_EQ(config.viewer.directory, "/start/page");
+  EXPECT_EQ(config.cache_dir, "/start/surveys");
+  EXPECT_EQ(config.disk_cache.directory, "/tiles");
+  EXPECT_EQ(config.access_log_file, "/start/a.log");
+  EXPECT_EQ(config.tls, (TlsConfig{"/start/a.pem", "/b.key"}));
+  EXPECT_THAT(config.data_roots, ElementsAre("/dems", "/start/more"));
+  DatasetConfig dataset;
+  std::vector<ConfigError> errors;
+  SetDatasetOption("water", "sea.tif", "/start", dataset, errors);
+  SetDatasetOption("imagery", "photo.tif", "/start", dataset, errors);
+  SetDatasetOption("vertical", "grid.gtx", "/start", dataset, errors);
+  EXPECT_THAT(errors, IsEmpty());
+  EXPECT_EQ(dataset.water.mask, "/start/sea.tif");
+  EXPECT_EQ(dataset.imagery.image, "/start/photo.tif");
+  EXPECT_EQ(dataset.vertical, "/start/grid.gtx");
+}
+
+TEST(FromWorkingDirectory, TakesOffWhatAPathGoesUp) {
+  EXPECT_EQ(FromWorkingDirectory("/a/b", "c/d"), "/a/b/c/d");
+  EXPECT_EQ(FromWorkingDirectory("/a/b", ".././../c/"), "/c/");
+  EXPECT_EQ(FromWorkingDirectory("/a/b", ".."), "/a");
+  EXPECT_EQ(FromWorkingDirectory("/a/b", "../../../.."), "/");
+  EXPECT_EQ(FromWorkingDirectory("/a/b", "link/../c"), "/a/b/link/../c") << "a link may lead elsewhere";
+  EXPECT_EQ(FromWorkingDirectory("/a/b", "/c"), "/c");
+  EXPECT_EQ(FromWorkingDirectory("", "../c"), "../c");
+}
+
+TEST(SetServerOption, RefusesRelativePathsWhereThereIsNoDirectory) {
+  Config config;
+  std::vector<ConfigError> errors;
+  SetServerOption("cache_dir", "/surveys", "", config, errors);
+  SetServerOption("io_threads", "3", "", config, errors);
+  EXPECT_THAT(errors, IsEmpty());
+  SetServerOption("cache_dir", "surveys", "", config, errors);
+  EXPECT_THAT(errors, ElementsAre(IsError("--cache-dir", "cannot be named; give the path in full")));
+}
+
 TEST(SetDatasetOption, SetsOneDataset) {
   DatasetConfig dataset;
   std::vector<ConfigError> errors;
-  SetDatasetOption("floor", "-3.5", dataset, errors);
-  SetDatasetOption("name", "2024", dataset, errors);
+  SetDatasetOption("floor", "-3.5", "/start", dataset, errors);
+  SetDatasetOption("name", "2024", "/start", dataset, errors);
   EXPECT_THAT(errors, IsEmpty());
   EXPECT_EQ(dataset.floor, -3.5);
   EXPECT_EQ(dataset.name, "2024");
-  SetDatasetOption("error_fraction", "2", dataset, errors);
-  SetDatasetOption("name", "livez", dataset, errors);
+  SetDatasetOption("error_fraction", "2", "/start", dataset, errors);
+  SetDatasetOption("name", "livez", "/start", dataset, errors);
   EXPECT_THAT(errors, ElementsAre(IsError("--error-fraction", "a number from 0.05 to 1, not 2"),
                                   IsError("--name", "is a URL of the server itself")));
 }
@@ -89,13 +136,13 @@ TEST(SetDatasetOption, SetsOneDataset) {
 TEST(SetDatasetOption, TellsASeaLevelFromAMask) {
   DatasetConfig dataset;
   std::vector<ConfigError> errors;
-  SetDatasetOption("water", "-2.5", dataset, errors);
+  SetDatasetOption("water", "-2.5", "/start", dataset, errors);
   EXPECT_EQ(dataset.water, (WaterConfig{"", -2.5}));
-  SetDatasetOption("water", "/data/water.tif", dataset, errors);
+  SetDatasetOption("water", "/data/water.tif", "/start", dataset, errors);
   EXPECT_EQ(dataset.water, (WaterConfig{"/data/water.tif", std::nullopt}));
   EXPECT_THAT(errors, IsEmpty());
-  SetDatasetOption("water", "1e9", dataset, errors);
-  SetDatasetOption("water", "", dataset, errors);
+  SetDatasetOption("water", "1e9", "/start", dataset, errors);
+  SetDatasetOption("water", "", "/start", dataset, errors);
   EXPECT_THAT(errors, ElementsAre(IsError("--water", "a number from -20000 to 20000"),
                                   IsError("--water", "the path of a raster")));
 }
@@ -103,12 +150,12 @@ TEST(SetDatasetOption, TellsASeaLevelFromAMask) {
 TEST(SetDatasetOption, TakesTheImageOfImageryAlone) {
   DatasetConfig dataset;
   std::vector<ConfigError> errors;
-  SetDatasetOption("imagery", "/data/photo.tif", dataset, errors);
+  SetDatasetOption("imagery", "/data/photo.tif", "/start", dataset, errors);
   EXPECT_THAT(errors, IsEmpty());
   ImageryConfig expected;
   expected.image = "/data/photo.tif";
   EXPECT_EQ(dataset.imagery, expected);
-  SetDatasetOption("imagery", "", dataset, errors);
+  SetDatasetOption("imagery", "", "/start", dataset, errors);
   EXPECT_THAT(errors, ElementsAre(IsError("--imagery", "the path of an image")));
 }
 

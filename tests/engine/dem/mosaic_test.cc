@@ -306,6 +306,28 @@ TEST(Mosaic, DescriptionOfManyScatteredSourcesStaysSmall) {
   EXPECT_EQ(HeightAt(*source, -170 + 17.03 + 0.0002, 80 - 8.03 - 0.0002), 21);
 }
 
+TEST(Mosaic, BoundsReachAroundTheAntimeridian) {
+  const auto bounds = [](const std::vector<std::pair<int, int>>& longitudes) {  // west and east, which may be past 180
+    const TempDir dir;
+    std::vector<DemFile> files;
+    for (const auto& [west, east] : longitudes) {
+      RasterSpec spec;
+      spec.width = east - west;
+      spec.height = 10;
+      spec.geo_transform = {static_cast<double>(west), 1, 0, 5, 0, -1};
+      files.push_back({WriteRaster(dir, spec, std::to_string(files.size()) + ".tif")});
+    }
+    const GeoBounds found = OpenAll(files)->info().bounds;
+    return std::pair(found.west, found.east);
+  };
+  EXPECT_EQ(bounds({{-179, -170}, {100, 200}}), std::pair(100.0, -160.0)) << "one lies beyond, inside of the other";
+  EXPECT_EQ(bounds({{-165, -150}, {170, 200}}), std::pair(170.0, -150.0)) << "one begins beyond, inside of the other";
+  EXPECT_EQ(bounds({{-150, -140}, {170, 200}}), std::pair(170.0, -140.0));
+  EXPECT_EQ(bounds({{-179, -170}, {170, 178}, {100, 200}}), std::pair(100.0, -160.0));
+  EXPECT_EQ(bounds({{-150, -140}, {0, 10}}), std::pair(-150.0, 10.0));
+  EXPECT_EQ(bounds({{-100, 120}, {100, 300}}), std::pair(-180.0, 180.0)) << "all around";
+}
+
 TEST(Mosaic, HeightsLieWithinTheBoundOfTheirTile) {
   for (const Cut& cut : Cuts()) {
     SCOPED_TRACE(cut.name);

@@ -4,11 +4,13 @@ import json
 import os
 import pathlib
 import re
+import shutil
 import signal
 import struct
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 import urllib.request
 
@@ -159,6 +161,76 @@ class AccessLog(unittest.TestCase):
         self.assertRegex(self.lines("combined")[0], r'^127\.0\.0\.1 - - \[.+\] "GET /livez HTTP/1\.1" 200 \d+ ')
         self.assertEqual(json.loads(self.lines("json")[0])["target"], "/livez")
         self.assertEqual(self.lines("off"), [])
+
+
+class WorkingDirectory(unittest.TestCase):
+    """Names on the command line count from where the server was started, whatever becomes of that folder."""
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+        (self.folder / "run").mkdir()
+        shutil.copy2(DEM, self.folder / "beside.tif")
+        config = {"datasets": [{"name": "configured", "sources": ["beside.tif"]}]}
+        (self.folder / "terrace.json").write_text(json.dumps(config))
+
+    def outlive(self, leave, *arguments):
+        """What /readyz says after the start and after `leave` and a few looks at the files."""
+        log = tempfile.TemporaryFile("w+")
+        self.addCleanup(log.close)
+        process = subprocess.Popen([BINARY, "serve", "--listen", "127.0.0.1:0", *arguments], cwd=self.folder / "run",
+                                   stdout=subprocess.PIPE, stderr=log, text=True)
+        try:
+            url = re.search(r"http://\S+/", process.stdout.readline())[0]
+            tile = urllib.request.urlopen(f"{url}{self.dataset}/{TILE}.terrain", timeout=30).read()
+            states = [urllib.request.urlopen(url + "readyz", timeout=30).read().splitlines()[0]]
+            leave()
+            time.sleep(3)
+            process.send_signal(signal.SIGHUP)
+            time.sleep(1)
+            states.append(urllib.request.urlopen(url + "readyz", timeout=30).read().splitlines()[0])
+            self.assertEqual(urllib.request.urlopen(f"{url}{self.dataset}/{TILE}.terrain", timeout=30).read(), tile)
+        finally:
+            process.terminate()
+            process.stdout.close()
+            log.seek(0)
+            self.assertEqual(process.wait(60), 0, log.read())
+        return states
+
+    def remove(self):
+        shutil.rmtree(self.folder / "run")
+
+    def test_may_be_removed(self):
+        self.dataset = "beside"
+        flags = ("--config", "../terrace.json", "--cache-dir", "../surveys", "--data-roots", "..")
+        self.assertEqual(self.outlive(self.remove, *flags, "../beside.tif"), [b"ready", b"ready"])
+
+    def test_may_be_removed_with_the_sources(self):
+        shutil.copy2(DEM, self.folder / "run/inside.tif")
+        self.dataset = "inside"
+        self.assertEqual(self.outlive(self.remove, "--config", "../terrace.json", "inside.tif"), [b"ready", b"degraded"])
+
+    def test_may_be_renamed(self):
+        def rename():
+            os.rename(self.folder / "run", self.folder / "gone")
+            os.symlink("gone", self.folder / "run")
+
+        shutil.copy2(DEM, self.folder / "run/inside.tif")
+        self.dataset = "inside"
+        self.assertEqual(self.outlive(rename, "--config", "../terrace.json", "inside.tif"), [b"ready", b"ready"])
+
+    def test_must_have_a_name_at_the_start_where_names_count_from_it(self):
+        def start(*arguments):
+            return subprocess.run(["sh", "-c", 'cd "$1" && rmdir "$1" && shift && exec "$@"', "sh", self.folder / "run", BINARY,
+                                   "serve", "--print-config", *arguments], capture_output=True, text=True, timeout=60)
+
+        result = start("dem.tif", "--cache-dir", "surveys")
+        self.assertEqual(result.returncode, 2, result.stderr)
+        self.assertRegex(result.stderr, r"(?m)^  dem\.tif: .*cannot be named; give the path in full$")
+        self.assertRegex(result.stderr, r"(?m)^  --cache-dir: .*cannot be named; give the path in full$")
+        (self.folder / "run").mkdir()
+        self.assertEqual(start(DEM, "--cache-dir", "/surveys").returncode, 0)
 
 
 class Info(unittest.TestCase):

@@ -5,6 +5,8 @@
 #include <array>
 #include <nlohmann/json.hpp>
 
+#include "tests/server/handlers/at_once.h"
+
 namespace terrace::server {
 namespace {
 
@@ -21,7 +23,7 @@ class LayerHandlerTest : public testing::Test {
   Response Get(const char* target, const char* accept_encoding = "") {
     Request request;
     request.fields.Set(&RequestFields::accept_encoding, accept_encoding);
-    return handler_->Handle(*Match(target), request);
+    return AtOnce(handler_->Handle(*Match(target), request), request);
   }
 
   std::array<DatasetView, 1> datasets_;

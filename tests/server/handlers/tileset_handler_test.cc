@@ -8,6 +8,7 @@
 #include "engine/geo/error_ladder.h"
 #include "proto/skirt.h"
 #include "tests/proto/subtree_reader.h"
+#include "tests/server/handlers/at_once.h"
 
 namespace terrace::server {
 namespace {
@@ -37,7 +38,7 @@ class TilesetHandlerTest : public testing::Test {
     EXPECT_TRUE(route) << target;
     Request request;
     request.fields.Set(&RequestFields::accept_encoding, accept_encoding);
-    return route->kind == RouteKind::kTileset ? handler_->Handle(*route, request)
+    return route->kind == RouteKind::kTileset ? AtOnce(handler_->Handle(*route, request), request)
                                               : handler_->HandleSubtree(*route, request);
   }
   Json Tileset(const std::string& query = "") { return Json::parse(*Get("/maui/tileset.json" + query).body); }

@@ -7,6 +7,7 @@
 #include <atomic>
 #include <filesystem>
 #include <functional>
+#include <stdexcept>
 #include <thread>
 #include <utility>
 
@@ -75,6 +76,7 @@ class ReloaderTest : public testing::Test {
     openings_ = 0;
     Reloader::Hooks hooks;
     hooks.load = [this] {
+      if (throws_) throw std::runtime_error("no memory");
       const std::lock_guard lock(mutex_);
       return next_;
     };
@@ -115,7 +117,7 @@ class ReloaderTest : public testing::Test {
   fs::path folder_;
   config::Config config_;
   std::atomic<int> openings_{0};
-  std::atomic<bool> blocks_{false}, fails_{false};
+  std::atomic<bool> blocks_{false}, fails_{false}, throws_{false};
   std::mutex mutex_;
   config::ConfigResult next_;                                  // guarded by mutex_, as the rest
   std::vector<std::pair<std::string, std::uint64_t>> served_;  // name and generation
@@ -133,6 +135,17 @@ TEST_F(ReloaderTest, OpensWhatChangedAndNothingElse) {
   EXPECT_EQ(Served()[0], before[0]);
   EXPECT_NE(Served()[1].second, before[1].second);
   EXPECT_EQ(openings_, 1);
+}
+
+TEST_F(ReloaderTest, SurvivesAnExceptionOfLoading) {
+  Start();
+  throws_ = true;
+  ASSERT_TRUE(Eventually([&] { return Troubles()[""] == "no memory"; }));
+  reloader_->Reload();
+  throws_ = false;
+  ASSERT_TRUE(Eventually([&] { return Troubles().empty(); }));
+  EXPECT_EQ(Served().size(), 1u);
+  EXPECT_EQ(openings_, 0);
 }
 
 TEST_F(ReloaderTest, KeepsUnchangedDatasetsWhateverTheirPlace) {

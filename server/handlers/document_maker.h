@@ -1,0 +1,86 @@
+// Documents with a request's wishes in them. Short ones are made at once; long ones on a worker, where nobody else
+// waits for them, and are kept for a while.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <variant>
+
+#include "server/asio.h"
+#include "server/handlers/tile_handler.h"
+#include "server/http/request.h"
+#include "server/http/response.h"
+#include "server/tiles/byte_cache.h"
+#include "server/tiles/catalog.h"
+#include "server/tiles/tile_service.h"
+
+namespace terrace::server {
+
+struct DocumentPlan {
+  std::string key;                     // of one catalog's documents, equal for equal ones alone
+  std::size_t bytes = 0;               // about so many of it
+  std::string_view content_type;       // a literal
+  std::string_view cache_control;      // outlives the request
+  bool for_grant = false;              // as in Response
+  std::function<std::string()> write;  // on any thread; refers to nothing but the catalog and what it holds itself
+};
+
+// What a handler answers: the reply, or what it takes to make it.
+using Answer = std::variant<Response, DocumentPlan>;
+
+// In the one coding that was wanted.
+struct MadeDocument {
+  Body body;
+  Coding coding = Coding::kIdentity;
+  std::string etag;
+};
+inline std::size_t BytesOf(const MadeDocument& made) { return made.body->size() + made.etag.size(); }
+
+// `coding`: kGzip gives identity where that is not larger. Bytes and ETag are those of a Document of the same text.
+MadeDocument MakeDocument(const std::function<std::string()>& write, Coding coding);
+
+// As Serve of a Document.
+Response Serve(const MadeDocument& made, const DocumentPlan& plan, const Request& request);
+
+// Thread-safe.
+class DocumentMaker {
+ public:
+  // Longer documents are made on a worker: this many bytes are written and compressed in a fifth of a millisecond.
+  static constexpr std::size_t kShortBytes = 4096;
+  // Of those kept, least recently asked for leave first.
+  static constexpr std::size_t kKeptBytes = std::size_t{8} << 20;
+
+  // `workers` must outlive this. Plans are about `catalog`.
+  DocumentMaker(CatalogPtr catalog, TileService& workers, TileHandlerOptions options);
+
+  // Nothing: it takes a worker.
+  std::optional<Response> ServeAtOnce(const DocumentPlan& plan, const Request& request) const;
+
+  asio::awaitable<Response> Serve(DocumentPlan plan, Request request) const;
+
+ private:
+  struct Key {
+    std::string text;
+    Coding coding = Coding::kIdentity;
+    std::uint64_t generation = 0;  // of one catalog all are
+
+    friend bool operator==(const Key&, const Key&) = default;
+  };
+  struct KeyHash {
+    std::size_t operator()(const Key& key) const noexcept {
+      return std::hash<std::string>{}(key.text) ^ static_cast<std::size_t>(key.coding);
+    }
+  };
+
+  const CatalogPtr catalog_;
+  TileService& workers_;
+  const TileHandlerOptions options_;
+  mutable ByteCache<Key, KeyHash, MadeDocument> kept_{kKeptBytes};
+};
+
+}  // namespace terrace::server

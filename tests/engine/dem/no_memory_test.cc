@@ -1,0 +1,61 @@
+// What is given back while there is no memory is let go. A program of its own, as it replaces operator new.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <new>
+#include <optional>
+#include <utility>
+
+#include "engine/dem/geoid.h"
+#include "engine/dem/image_pool.h"
+#include "tests/engine/dem/dem_fixture.h"
+
+namespace {
+// The next allocation of this thread fails; only that one, as GDAL could not close a file otherwise.
+thread_local bool fails_next = false;
+}  // namespace
+
+void* operator new(std::size_t size) {
+  void* const memory = std::exchange(fails_next, false) ? nullptr : std::malloc(size);
+  if (memory == nullptr) throw std::bad_alloc();
+  return memory;
+}
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+
+namespace terrace::dem {
+namespace {
+
+TEST(NoMemory, LetsOperationsGo) {
+  const auto geoid = Geoid::OfCrs("EPSG:5773", {8, 46});
+  ASSERT_TRUE(geoid);
+  std::optional<Geoid::Reader> first, second;
+  first.emplace(**geoid);
+  second.emplace(**geoid);
+  const double expected = second->At({8, 46});
+  first.reset();  // the pool has room for it, which the first one took
+  fails_next = true;
+  second.reset();
+  EXPECT_FALSE(fails_next) << "nothing was asked for";
+  EXPECT_EQ((*geoid)->Undulation({8, 46}), expected);
+}
+
+TEST(NoMemory, LetsImagesGo) {
+  const TempDir dir;
+  RasterSpec spec;
+  spec.type = "Byte";
+  const std::string path = WriteRaster(dir, spec);
+  auto image = ImageFile::Open(path);
+  ASSERT_TRUE(image) << image.error().message;
+  ImagePool pool(*std::move(image), StampedFiles({path}));
+  {
+    auto first = pool.Borrow(1), second = pool.Borrow(1);
+    ASSERT_TRUE(first && second);
+    fails_next = true;
+  }
+  EXPECT_FALSE(fails_next) << "nothing was asked for";
+  EXPECT_TRUE(pool.Borrow(1));
+}
+
+}  // namespace
+}  // namespace terrace::dem

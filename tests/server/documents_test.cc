@@ -1,0 +1,139 @@
+// Documents with wishes in them: where they are made, and that they are what they were when all were made beforehand.
+#include <gtest/gtest.h>
+
+#include <condition_variable>
+#include <mutex>
+
+#include "proto/compress.h"
+#include "server/handlers/document.h"
+#include "tests/server/server_fixture.h"
+
+namespace terrace::server {
+namespace {
+
+using namespace std::chrono_literals;
+
+class DocumentsTest : public ServerFixture {
+ protected:
+  // Builds wait until the gate is open, longer than anybody waits for them.
+  DocumentsTest() {
+    builder_ = [this](const TileRequest&, const std::stop_token&) -> Result<EncodedTile> {
+      ++builds_;
+      std::unique_lock lock(mutex_);
+      opened_.wait(lock, [this] { return is_open_; });
+      EncodedTile tile;
+      tile.bytes = "tile";
+      return tile;
+    };
+  }
+  ~DocumentsTest() override { Open(true); }
+
+  static ServerOptions OneWorker() {
+    ServerOptions options;
+    options.worker_threads = 1;
+    options.request_deadline = 400ms;
+    return options;
+  }
+  // "blocks" has long documents, "maui" short ones.
+  void StartWithOneWorker() {
+    DatasetView blocks;
+    blocks.name = "blocks";
+    blocks.available = {{{0, 0, 1, 0}}, {{0, 0, 3, 1}}, {{0, 0, 7, 3}}};
+    blocks.available.emplace_back();
+    for (int i = 0; i < 100; ++i) blocks.available.back().push_back({i % 16, i / 16, i % 16, i / 16});
+    more_datasets_ = {blocks};
+    Start(OneWorker());
+  }
+  void Open(bool is_open) {
+    const std::lock_guard lock(mutex_);
+    is_open_ = is_open;
+    opened_.notify_all();
+  }
+
+  std::mutex mutex_;
+  std::condition_variable opened_;
+  bool is_open_ = false;  // guarded by mutex_
+};
+
+TEST_F(DocumentsTest, LongOnesAreMadeOnWorkersAndKept) {
+  StartWithOneWorker();
+  RawClient holder(port());
+  ASSERT_TRUE(holder.Send(Get("/maui/2/0/0.terrain")));
+  ASSERT_TRUE(Eventually([this] { return builds_ > 0; }));
+  const Reply refused = Fetch(port(), "/blocks/layer.json?fraction=0.5");
+  EXPECT_EQ(refused.status, 503);
+  EXPECT_EQ(refused.Field("retry-after"), "5") << "not ready in time";
+  EXPECT_EQ(Fetch(port(), "/blocks/layer.json").status, 200) << "made when the server started";
+  EXPECT_EQ(Fetch(port(), "/maui/layer.json?fraction=0.5").status, 200) << "short";
+  EXPECT_EQ(Fetch(port(), "/blocks/layer.json?fraction=wide").status, 400);
+
+  Open(true);
+  const Reply made = Fetch(port(), "/blocks/layer.json?fraction=0.5");
+  EXPECT_EQ(made.status, 200);
+  EXPECT_EQ(made.Field("content-type"), "application/json");
+  Open(false);
+  const int before = builds_;
+  RawClient again(port());
+  ASSERT_TRUE(again.Send(Get("/maui/2/1/0.terrain")));
+  ASSERT_TRUE(Eventually([&] { return builds_ > before; }));
+  const Reply kept = Fetch(port(), "/blocks/layer.json?v=2&fraction=.50");
+  EXPECT_EQ(kept.status, 200) << "the same wish";
+  EXPECT_EQ(kept.body, made.body);
+  EXPECT_EQ(Fetch(port(), "/blocks/layer.json?fraction=0.5", "If-None-Match: " + made.Field("etag") + "\r\n").status,
+            304);
+  EXPECT_EQ(Fetch(port(), "/blocks/layer.json?fraction=0.25").status, 503) << "another wish";
+  Open(true);
+}
+
+TEST_F(DocumentsTest, AreTheSameWhereverTheyAreMade) {
+  StartWithOneWorker();
+  Open(true);
+  for (const char* target :
+       {"/blocks/layer.json?error=5", "/blocks/tileset.json?fraction=0.5", "/maui/layer.json?error=5"}) {
+    for (int i = 0; i < 2; ++i) {
+      const Reply plain = Fetch(port(), target), gzip = Fetch(port(), target, "Accept-Encoding: gzip\r\n");
+      const Document expected = Document::Make(plain.body, "application/json");
+      EXPECT_EQ(plain.Field("etag"), expected.identity_etag) << target;
+      EXPECT_EQ(plain.Field("content-encoding"), "");
+      ASSERT_NE(expected.gzip, nullptr);
+      EXPECT_EQ(gzip.body, *expected.gzip) << target;
+      EXPECT_EQ(gzip.Field("etag"), expected.gzip_etag) << target;
+      EXPECT_EQ(gzip.Field("content-encoding"), "gzip");
+      for (const Reply* reply : {&plain, &gzip}) {
+        EXPECT_EQ(reply->Field("vary"), Fetch(port(), "/blocks/layer.json").Field("vary"));
+        EXPECT_EQ(reply->Field("cache-control"), "public, max-age=3600");
+      }
+    }
+  }
+}
+
+TEST_F(DocumentsTest, ListsOfWhatATokenSeesAreMadeOnWorkersWhereTheyAreLong) {
+  for (int i = 0; i < 100; ++i) {
+    DatasetView view;
+    view.name = "dataset" + std::to_string(i);
+    view.available = {{{0, 0, 1, 0}}};
+    more_datasets_.push_back(view);
+  }
+  ServerOptions options = OneWorker();
+  options.edge.tokens = {{"one", "secret-of-one", "", {"dataset7"}, 0}};
+  options.edge.public_datasets = {"maui"};
+  Start(std::move(options));
+  const std::string token = "Authorization: Bearer secret-of-one\r\n";
+  const Reply list = Fetch(port(), "/datasets", token), page = Fetch(port(), "/", token);
+  EXPECT_NE(list.body.find("dataset7"), std::string::npos);
+  EXPECT_EQ(list.body.find("dataset8"), std::string::npos);
+  EXPECT_NE(page.body.find("dataset7"), std::string::npos);
+  EXPECT_EQ(Fetch(port(), "/datasets").body.find("dataset7"), std::string::npos) << "without the token";
+  for (const Reply* reply : {&list, &page}) {
+    EXPECT_EQ(reply->Field("cache-control"), "private, no-cache");
+    EXPECT_NE(reply->Field("vary").find("Authorization"), std::string::npos);
+  }
+  RawClient holder(port());
+  ASSERT_TRUE(holder.Send(Get("/maui/2/0/0.terrain")));
+  ASSERT_TRUE(Eventually([this] { return builds_ > 0; }));
+  EXPECT_EQ(Fetch(port(), "/datasets", token).body, list.body) << "kept";
+  EXPECT_EQ(Fetch(port(), "/datasets", token + "Accept-Encoding: gzip\r\n").status, 503) << "in another coding";
+}
+
+}  // namespace
+}  // namespace terrace::server
