@@ -76,10 +76,11 @@ std::vector<geo::Vec3> AreaWeightedNormals(const std::vector<std::array<std::uin
   return normals;
 }
 
-// `normal`, turned towards `goal` until they are at most kWidestTurn apart. Both are unit vectors.
+// `normal`, turned towards `goal` until they are at most kWidestTurn apart. Both are unit vectors; the goal may be
+// zero, of triangles without an area beside a pole: then there is none.
 geo::Vec3 TurnTowards(geo::Vec3 normal, geo::Vec3 goal) {
   const double cosine = geo::Dot(normal, goal);
-  if (cosine >= kCosWidestTurn) return normal;
+  if (cosine >= kCosWidestTurn || (goal.x == 0 && goal.y == 0 && goal.z == 0)) return normal;
   const geo::Vec3 across = geo::Normalized(normal - goal * cosine);
   return goal * kCosWidestTurn + across * kSinWidestTurn;
 }

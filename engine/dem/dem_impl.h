@@ -1,6 +1,7 @@
 // What a DemSource holds. Everything is settled by Open.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -10,11 +11,17 @@
 
 namespace terrace::dem {
 
+// What Fill noted of a window, or of a part of it; then without positions.
+struct PartTrace {
+  std::optional<NodeWindow> part = {};
+  SheetTrace trace = {};
+};
+
 class DemSource::Impl {
  public:
   // `what` is read, for messages. `traces`, unless it is null, gets those of the sheets that were read, in their order.
   Result<std::vector<float>> ReadNodes(int level, const NodeWindow& window, Counting counting, const std::string& what,
-                                       const std::stop_token& stop, std::vector<SheetTrace>* traces = nullptr) const;
+                                       const std::stop_token& stop, std::vector<PartTrace>* traces = nullptr) const;
   Result<TileHeights> Read(const geo::TileKey& key, Counting counting, const std::stop_token& stop) const;
   Result<std::vector<float>> ReadMercator(int depth, const NodeWindow& window, const std::stop_token& stop) const;
   Result<std::vector<float>> ReadPoints(std::span<const GeoPosition> points, HeightDatum datum,
@@ -26,8 +33,8 @@ class DemSource::Impl {
   template <typename Grid>
   Result<std::vector<float>> ReadSheets(const Grid& grid, const NodeWindow& window, Counting counting,
                                         const std::string& what, const std::stop_token& stop,
-                                        std::vector<SheetTrace>* traces) const;
-  Result<double> GapOf(const TileHeights& tile, const NodeWindow& window, const std::vector<SheetTrace>& traces,
+                                        std::vector<PartTrace>* traces) const;
+  Result<double> GapOf(const TileHeights& tile, const NodeWindow& window, std::vector<PartTrace> traces,
                        const std::stop_token& stop) const;
   // Those that can have heights there, in their order.
   std::vector<std::size_t> SheetsAt(const Box& degrees) const;

@@ -1,7 +1,9 @@
 // Heights of a dataset: each node takes the first sheet that has one there, then the floor.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
+#include <utility>
 
 #include "engine/core/check.h"
 #include "engine/dem/dem_impl.h"
@@ -30,6 +32,106 @@ Box BoxOf(const Grid& grid, const NodeWindow& window) {
   const double west = grid.Longitude(window.column);
   const auto [south, north] = std::minmax({grid.Latitude(window.row), grid.Latitude(window.row + window.rows - 1)});
   return {west - kSlack, south - kSlack, west + (window.columns - 1) * grid.StepDegrees() + kSlack, north + kSlack};
+}
+
+// Up to so many sheets are asked about whole windows.
+constexpr std::size_t kFewSheets = 8;
+// What is judged together (SourceGap), and a node more.
+constexpr int kAround = 17;
+
+// A range of steps of an axis, as nodes.
+struct NodeRange {
+  int first = std::numeric_limits<int>::max(), last = -1;
+
+  void AddStep(int step) {
+    first = std::min(first, step);
+    last = std::max(last, step + 1);
+  }
+};
+
+// The nodes of a window that a sheet may give heights to; `around`: and so many more on each side. Never none, since
+// its files are looked at in any case.
+template <typename Grid>
+NodeWindow PartOf(const Sheet& sheet, const Grid& grid, const NodeWindow& window, int around) {
+  const Footprint& reach = sheet.reach();
+  const bool is_polar = sheet.pole_heights()[0] || sheet.pole_heights()[1];
+  if (is_polar || reach.south <= -90 || reach.north >= 90 || reach.all_longitudes()) return window;
+  NodeRange rows, columns;
+  for (int j = 0; j + 1 < window.rows; ++j) {
+    const auto [south, north] = std::minmax({grid.Latitude(window.row + j), grid.Latitude(window.row + j + 1)});
+    if (north >= reach.south && south <= reach.north) rows.AddStep(j);
+  }
+  for (int i = 0; i + 1 < window.columns; ++i) {
+    const double west = grid.Longitude(window.column + i), east = west + grid.StepDegrees();
+    for (const int turn : {-360, 0, 360}) {
+      if (east + turn >= reach.west && west + turn <= reach.east) columns.AddStep(i);
+    }
+  }
+  if (rows.last < 0 || columns.last < 0) return {window.column, window.row, 1, 1};
+  const auto grown = [around](NodeRange range, int count) {
+    return NodeRange{std::max(range.first - around, 0), std::min(range.last + around, count - 1)};
+  };
+  const auto [west, east] = grown(columns, window.columns);
+  const auto [south, north] = grown(rows, window.rows);
+  return {window.column + west, window.row + south, east - west + 1, north - south + 1};
+}
+
+// Calls visit(node of the part, node of the window), for all nodes of the part.
+template <typename Visit>
+void ForPart(const NodeWindow& part, const NodeWindow& window, Visit&& visit) {
+  const auto stride = static_cast<std::size_t>(window.columns);
+  std::size_t of_part = 0;
+  for (std::int64_t row = part.row; row < part.row + part.rows; ++row) {
+    std::size_t of_window =
+        static_cast<std::size_t>(row - window.row) * stride + static_cast<std::size_t>(part.column - window.column);
+    for (int i = 0; i < part.columns; ++i) visit(of_part++, of_window++);
+  }
+}
+
+// FillFrom, where there are many sheets for the part of the window alone that this one reaches: thousands of small ones
+// may lie in a shallow tile, and what they note waits until all heights are known.
+template <typename Grid>
+Result<void> FillAny(const Sheet& sheet, const Grid& grid, const NodeWindow& window, std::size_t sheets,
+                     Counting counting, std::vector<float>& heights, const std::stop_token& stop,
+                     std::vector<float>& weights, PartTrace* traced) {
+  SheetTrace* const trace = traced != nullptr ? &traced->trace : nullptr;
+  if (sheets <= kFewSheets) return FillFrom(sheet, grid, window, counting, heights, stop, weights, trace);
+  const NodeWindow part = PartOf(sheet, grid, window, 0);
+  const std::size_t nodes = static_cast<std::size_t>(part.columns) * static_cast<std::size_t>(part.rows);
+  std::vector<float> of_part(nodes), weights_of_part(weights.empty() ? 0 : nodes, 1);
+  ForPart(part, window, [&](std::size_t to, std::size_t from) { of_part[to] = heights[from]; });
+  const auto filled = FillFrom(sheet, grid, part, counting, of_part, stop, weights_of_part, trace);
+  if (!filled) return filled;
+  ForPart(part, window, [&](std::size_t from, std::size_t to) { heights[to] = of_part[from]; });
+  if (!weights.empty()) {
+    ForPart(part, window, [&](std::size_t from, std::size_t to) { weights[to] = weights_of_part[from]; });
+  }
+  if (traced != nullptr) {
+    traced->part = part;
+    trace->positions = {};  // can be found again
+  }
+  return filled;
+}
+
+// A trace of a part as one of the window. Positions are known as far as the sheet reaches and a little further.
+SheetTrace Widened(PartTrace&& of_part, const Sheet& sheet, const geo::Lattice& lattice, const NodeWindow& window) {
+  if (!of_part.part) return std::move(of_part.trace);
+  SheetTrace trace = std::move(of_part.trace);
+  const std::size_t nodes = static_cast<std::size_t>(window.columns) * static_cast<std::size_t>(window.rows);
+  std::vector<std::int32_t> cell_of_node(nodes, -1);
+  std::vector<float> heights(nodes, SampleRules::kVoid);
+  ForPart(*of_part.part, window, [&](std::size_t from, std::size_t to) {
+    cell_of_node[to] = trace.cell_of_node[from];
+    heights[to] = trace.heights[from];
+  });
+  trace.cell_of_node = std::move(cell_of_node);
+  trace.heights = std::move(heights);
+  const NodeWindow around = PartOf(sheet, lattice, window, kAround);
+  const std::vector<Position> positions = sheet.PositionsOf(lattice, around, trace.factor);
+  trace.positions.assign(nodes, kNowhere);
+  ForPart(around, window, [&](std::size_t from, std::size_t to) { trace.positions[to] = positions[from]; });
+  if (!trace.undulations.empty()) trace.undulations = sheet.undulations()->At(lattice, window);
+  return trace;
 }
 
 }  // namespace
@@ -90,7 +192,7 @@ class Blend {
 template <typename Grid>
 Result<std::vector<float>> DemSource::Impl::ReadSheets(const Grid& grid, const NodeWindow& window, Counting counting,
                                                        const std::string& what, const std::stop_token& stop,
-                                                       std::vector<SheetTrace>* traces) const {
+                                                       std::vector<PartTrace>* traces) const {
   const std::size_t nodes = static_cast<std::size_t>(window.columns) * static_cast<std::size_t>(window.rows);
   std::vector<float> heights(nodes, SampleRules::kVoid);
   const std::vector<std::size_t> order = SheetsAt(BoxOf(grid, window));
@@ -102,8 +204,9 @@ Result<std::vector<float>> DemSource::Impl::ReadSheets(const Grid& grid, const N
       heights = blend.Wanted();
       weights.assign(nodes, 1);
     }
-    SheetTrace* const trace = traces != nullptr ? &traces->emplace_back() : nullptr;
-    if (const auto filled = FillFrom(sheets[i], grid, window, counting, heights, stop, weights, trace); !filled) {
+    PartTrace* const trace = traces != nullptr ? &traces->emplace_back() : nullptr;
+    const auto filled = FillAny(sheets[i], grid, window, order.size(), counting, heights, stop, weights, trace);
+    if (!filled) {
       return MakeError(filled.error().code, "{}: {}", what, filled.error().message);
     }
     if (feathers) blend.Add(heights, weights);
@@ -125,7 +228,7 @@ const geo::Lattice& DemSource::Impl::LatticeOf(int level) const {
 
 Result<std::vector<float>> DemSource::Impl::ReadNodes(int level, const NodeWindow& window, Counting counting,
                                                       const std::string& what, const std::stop_token& stop,
-                                                      std::vector<SheetTrace>* traces) const {
+                                                      std::vector<PartTrace>* traces) const {
   const geo::Lattice& lattice = LatticeOf(level);
   auto heights = ReadSheets(lattice, window, counting, what, stop, traces);
   if (!heights || std::ranges::none_of(*heights, IsVoid)) return heights;
@@ -147,32 +250,36 @@ Result<TileHeights> DemSource::Impl::Read(const geo::TileKey& key, Counting coun
   const NodeWindow window = WindowOfTile(lattice, key);
   const std::string what = "tile " + geo::ToString(key);
   const bool is_certified = counting == Counting::kEllipsoid;
-  std::vector<SheetTrace> traces;
+  std::vector<PartTrace> traces;
   auto heights = ReadNodes(key.level, window, counting, what, stop, is_certified ? &traces : nullptr);
   if (!heights) return tl::unexpected(std::move(heights).error());
   TileHeights tile{lattice, lattice.cells + 3, *std::move(heights)};
   if (!is_certified) return tile;
-  const auto gap = GapOf(tile, window, traces, stop);
+  const auto gap = GapOf(tile, window, std::move(traces), stop);
   if (!gap) return MakeError(gap.error().code, "{}: {}", what, gap.error().message);
   tile.source_gap_m = *gap;
   return tile;
 }
 
 // `traces`: of the sheets that were read for the heights, the first of the tile's.
-Result<double> DemSource::Impl::GapOf(const TileHeights& tile, const NodeWindow& window,
-                                      const std::vector<SheetTrace>& traces, const std::stop_token& stop) const {
+Result<double> DemSource::Impl::GapOf(const TileHeights& tile, const NodeWindow& window, std::vector<PartTrace> traces,
+                                      const std::stop_token& stop) const {
   const std::vector<std::size_t> order = SheetsAt(BoxOf(tile.lattice, window));
   SourceGap gap(tile.lattice, window, tile.heights, has_feather && order.size() > 1);
   for (std::size_t k = 0; k < traces.size(); ++k) {
-    if (const auto added = gap.Add(sheets[order[k]], traces[k], stop); !added) return tl::unexpected(added.error());
+    const Sheet& sheet = sheets[order[k]];
+    const SheetTrace trace = Widened(std::move(traces[k]), sheet, tile.lattice, window);
+    if (const auto added = gap.Add(sheet, trace, stop); !added) return tl::unexpected(added.error());
   }
   // All nodes have their height; samples of further sheets may still show between them.
-  std::vector<float> none_wanted = tile.heights;
+  std::vector<float> none_wanted = tile.heights, no_weights;
   for (std::size_t k = traces.size(); k < order.size() && !gap.is_covered(); ++k) {
     const Sheet& sheet = sheets[order[k]];
-    SheetTrace trace;
-    const auto filled = sheet.Fill(tile.lattice, window, Counting::kEllipsoid, none_wanted, stop, {}, &trace);
+    PartTrace traced;
+    const auto filled = FillAny(sheet, tile.lattice, window, order.size(), Counting::kEllipsoid, none_wanted, stop,
+                                no_weights, &traced);
     if (!filled) return tl::unexpected(filled.error());
+    const SheetTrace trace = Widened(std::move(traced), sheet, tile.lattice, window);
     if (const auto added = gap.Add(sheet, trace, stop); !added) return tl::unexpected(added.error());
   }
   return gap.bound();

@@ -201,7 +201,8 @@ GeoBounds BoundsOf(const Rasters& rasters) {
     covered = std::max(covered, box.east);
   }
   const double last_gap = boxes.front().west + 360 - covered;
-  if (std::max(gap, last_gap) <= 0) return {-180, hull.south, 180, hull.north};
+  constexpr double kNoGap = 1e-9;  // pieces of one grid meet as exactly as their corners are rounded
+  if (std::max(gap, last_gap) <= kNoGap) return {-180, hull.south, 180, hull.north};
   const double west = last_gap >= gap ? boxes.front().west : gap_end;
   const double east = west + 360 - std::max(gap, last_gap);
   return {west, hull.south, east > 180 ? east - 360 : east, hull.north};

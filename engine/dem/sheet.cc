@@ -297,11 +297,15 @@ void Sheet::TraceOthers(const Cells& others, const std::vector<float>& samples, 
   }
 }
 
+std::vector<Position> Sheet::PositionsOf(const geo::Lattice& lattice, const NodeWindow& window, int factor) const {
+  return NodePositions(georeference_, reach_, lattice, window, kPositionTolerance * factor);
+}
+
 Result<void> Sheet::Fill(const geo::Lattice& lattice, const NodeWindow& window, Counting counting,
                          std::span<float> heights, const std::stop_token& stop, std::span<float> weights,
                          SheetTrace* trace) const {
   const int factor = AveragingFactor(SamplesPerCell(lattice, spacing_));
-  auto positions = NodePositions(georeference_, reach_, lattice, window, kPositionTolerance * factor);
+  auto positions = PositionsOf(lattice, window, factor);
   if (trace != nullptr) {
     trace->positions = positions;
     trace->cell_of_node.assign(positions.size(), -1);

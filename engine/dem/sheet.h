@@ -97,6 +97,9 @@ class Sheet {
   Result<void> Fill(const geo::MercatorGrid& grid, const NodeWindow& window, std::span<float> heights,
                     const std::stop_token& stop, std::span<float> weights = {}) const;
 
+  // Pixel positions of the window's nodes as Fill finds them for averages by `factor`.
+  std::vector<Position> PositionsOf(const geo::Lattice& lattice, const NodeWindow& window, int factor) const;
+
   // The same at single points, as measured: nothing is averaged and nothing is filled.
   Result<void> FillPoints(std::span<const GeoPosition> points, HeightDatum datum, std::span<float> heights,
                           const std::stop_token& stop) const;

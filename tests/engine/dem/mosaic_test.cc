@@ -328,6 +328,70 @@ TEST(Mosaic, BoundsReachAroundTheAntimeridian) {
   EXPECT_EQ(bounds({{-100, 120}, {100, 300}}), std::pair(-180.0, 180.0)) << "all around";
 }
 
+// Where pieces meet their corners differ by rounding.
+TEST(Mosaic, PiecesOfTheGlobeHaveItsBounds) {
+  for (const int width : {90, 110, 130, 170, 230, 330, 410}) {
+    const TempDir dir;
+    Cut cut{"globe", {}, {0, width / 3, width * 2 / 3}, {0}};
+    cut.whole.width = width;
+    cut.whole.height = 20;
+    cut.whole.geo_transform = {-180, 360.0 / width, 0, 90, 0, -9};
+    const auto source = OpenAll(WritePieces(dir, cut));
+    ASSERT_NE(source, nullptr);
+    EXPECT_NEAR(source->info().bounds.west, -180, 1e-9) << width;
+    EXPECT_NEAR(source->info().bounds.east, 180, 1e-9) << width;
+  }
+}
+
+// More sheets than are asked about whole windows, far apart and across the antimeridian, each of one height: what a
+// shallow tile has of them is what they have at its nodes.
+TEST(Mosaic, ManySmallSheetsLieWhereTheyDo) {
+  const TempDir dir;
+  std::vector<DemFile> files;
+  for (int k = 0; k < 24; ++k) {
+    RasterSpec spec;
+    spec.width = 30 + k;
+    spec.height = 20;
+    const double step = 0.1 + k * 0.003;  // no two on one grid
+    spec.geo_transform = {-181.7 + k * 15.01, step, 0, 60.0 - k * 4.9, 0, -step};
+    spec.value = [k](int, int) { return 100.0 + k; };
+    files.push_back({WriteRaster(dir, spec, "s" + std::to_string(k) + ".tif")});
+  }
+  DemOptions options;
+  options.floor = -5;
+  const auto source = OpenAll(files, options);
+  ASSERT_NE(source, nullptr);
+  int found = 0;
+  for (int level = 0; level <= 3; ++level) {
+    for (const geo::TileRange& range : source->Available(level)) {
+      for (std::int64_t x = range.start_x; x <= range.end_x; ++x) {
+        for (std::int64_t y = range.start_y; y <= range.end_y; ++y) {
+          const geo::TileKey key{level, x, y};
+          const auto tile = source->Read(key);
+          ASSERT_TRUE(tile);
+          std::vector<GeoPosition> nodes;
+          for (int j = 0; j <= tile->lattice.cells; ++j) {
+            for (int i = 0; i <= tile->lattice.cells; ++i) {
+              nodes.push_back({tile->lattice.Longitude(tile->lattice.FirstColumn(key) + i),
+                               tile->lattice.Latitude(tile->lattice.FirstRow(key) + j)});
+            }
+          }
+          const auto heights = source->ReadPoints(nodes, HeightDatum::kEllipsoid);
+          ASSERT_TRUE(heights);
+          for (std::size_t n = 0; n < nodes.size(); ++n) {
+            const int row = static_cast<int>(n) / (tile->lattice.cells + 1);
+            const int column = static_cast<int>(n) % (tile->lattice.cells + 1);
+            const float expected = std::isnan((*heights)[n]) ? -5 : (*heights)[n];
+            ASSERT_EQ(tile->At(column, row), expected) << geo::ToString(key) << ' ' << column << ' ' << row;
+            found += expected > 0 ? 1 : 0;
+          }
+        }
+      }
+    }
+  }
+  EXPECT_GT(found, 500);
+}
+
 TEST(Mosaic, HeightsLieWithinTheBoundOfTheirTile) {
   for (const Cut& cut : Cuts()) {
     SCOPED_TRACE(cut.name);
