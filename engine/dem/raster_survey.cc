@@ -178,8 +178,12 @@ Result<RasterSurvey> SurveyAssembler::Finish(GDALDataset& dataset, const std::st
         ErrorCode::kNotFound,
         "has no valid sample, only voids; check its nodata value with gdalinfo and correct it with "
         "`gdal_translate -a_nodata VALUE in out`; heights beyond {:g} m are voids too: those in another unit "
-        "need `-a_scale FACTOR`, the metres of one",
-        kMaxAbsHeight);
+        "need `-a_scale FACTOR`, the metres of one{}",
+        kMaxAbsHeight,
+        layout_.rules.marks.empty() && layout_.rules.rim <= 0
+            ? ""
+            : "; heights that the file does not declare to be voids were taken for such: with --nodata declared (in a "
+              "configuration \"nodata\": \"declared\") they are not");
   }
   const BlockRange samples = survey_.table.OfFinest();
   survey_.lowest = samples.min;
