@@ -26,6 +26,11 @@ struct BlockSum {
   float Mean() const { return weight == 0 ? SampleRules::kVoid : static_cast<float>(sum / weight); }
 };
 
+// How much of a block of `step` samples lies on an axis of `size` samples: the last one may stick out.
+inline double ShareOf(std::int64_t block, int step, std::int64_t size) {
+  return static_cast<double>(std::min<std::int64_t>(step, size - block * step)) / step;
+}
+
 // Blocks of a single sample: the averages are the samples, with one zero, `columns` to a row.
 inline void CopyRows(std::span<const float> samples, std::int64_t columns, float* out, std::int64_t stride) {
   for (; !samples.empty(); samples = samples.subspan(static_cast<std::size_t>(columns)), out += stride) {

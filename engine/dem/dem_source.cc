@@ -55,7 +55,7 @@ using Rasters = std::vector<std::shared_ptr<const RasterSource>>;
 
 std::uint64_t FingerprintOf(const std::vector<Sheet>& sheets, const DemOptions& options, double floor) {
   // Changes whenever the same files and options would give other heights than before.
-  constexpr std::uint32_t kResamplingVersion = 1;
+  constexpr std::uint32_t kResamplingVersion = 2;
   ByteWriter writer;
   writer.Put(kResamplingVersion);
   for (const Sheet& sheet : sheets) {

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "engine/dem/image_bins.h"
+#include "engine/dem/overview_axis.h"
 #include "engine/dem/raster_file.h"
 #include "engine/dem/sample_grid.h"
 
@@ -14,10 +15,11 @@ ImagePool::ImagePool(ImageFile image, StampedFiles files) : path_(image.path()),
   GDALRasterBand& band = *image.dataset().GetRasterBand(1);
   sizes_.push_back({});
   for (const int factor : OverviewFactors(band)) {
-    const GDALRasterBand* const wanted = FindOverview(band, factor);
+    GDALRasterBand* const wanted = FindOverview(band, factor);
     for (int i = 0; i < band.GetOverviewCount(); ++i) {
       if (band.GetOverview(i) != wanted) continue;
-      sizes_.push_back({factor, i});
+      sizes_.push_back({factor, i, PixelsPerSample(image.dataset(), factor, image.width(), wanted->GetXSize()),
+                        PixelsPerSample(image.dataset(), factor, image.height(), wanted->GetYSize())});
       break;
     }
   }

@@ -27,7 +27,10 @@ class ImagePool {
       if (image_ != nullptr) pool_->Return(size_, std::move(*image_), epoch_);
     }
     ImageFile& operator*() const { return *image_; }
-    int factor() const { return pool_->sizes_[size_].factor; }  // pixels of the full image, per axis, in one of this
+    int factor() const { return pool_->sizes_[size_].factor; }
+    // Pixels of the full image in one of this: the factor, or a little less.
+    double pixels_across() const { return pool_->sizes_[size_].across; }
+    double pixels_down() const { return pool_->sizes_[size_].down; }
 
    private:
     ImagePool* pool_;
@@ -53,7 +56,8 @@ class ImagePool {
  private:
   struct Size {
     int factor = 1;
-    int overview = -1;  // GDAL's number of it; -1: the full image
+    int overview = -1;            // GDAL's number of it; -1: the full image
+    double across = 1, down = 1;  // Handle::pixels_across, pixels_down
   };
 
   void Return(std::size_t size, ImageFile image, std::uint64_t epoch);

@@ -58,7 +58,7 @@ Result<std::optional<TilePicture>> Imagery::Impl::Read(const geo::TileKey& key, 
   for (Position& p : positions) {
     const bool is_inside = p.x >= 0 && p.x <= georeference.width() && p.y >= 0 && p.y <= georeference.height();
     is_there = is_there || is_inside;
-    p = is_inside ? Position{p.x / image->factor(), p.y / image->factor()} : Position{NAN, NAN};
+    p = is_inside ? Position{p.x / image->pixels_across(), p.y / image->pixels_down()} : Position{NAN, NAN};
   }
   if (!is_there) return std::nullopt;
   const auto bins = ImageBins::Read(**image, factor / image->factor(), positions, stop);

@@ -14,6 +14,9 @@
 namespace terrace::dem {
 namespace {
 
+// Changes whenever blocks are read otherwise from the same overviews: a survey compares samples with them.
+constexpr std::uint32_t kOverviewReading = 2;
+
 // Everything that decides what a survey says of a raster, and is known before.
 std::uint64_t KeyOf(const RasterLayout& layout, bool find_voids, const std::string& path, const StampedFiles& files) {
   ByteWriter writer;
@@ -33,6 +36,7 @@ std::uint64_t KeyOf(const RasterLayout& layout, bool find_voids, const std::stri
   writer.Put(static_cast<std::uint32_t>(rules.marks.size()));
   for (const double mark : rules.marks) writer.Put(mark);
   for (const int factor : layout.overview_factors) writer.Put(factor);
+  if (!layout.overview_factors.empty()) writer.Put(kOverviewReading);
   writer.Put(layout.coast_step_m);
   const std::string bytes = writer.Take();
   return XXH3_64bits(bytes.data(), bytes.size());

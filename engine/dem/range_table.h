@@ -24,8 +24,8 @@ class RangeTable {
   RangeTable() = default;
   RangeTable(int width, int height);
 
-  // Adds the heights of a pixel window; `pixel_step` source pixels lie between its samples (1, or an overview's
-  // factor).
+  // Adds the heights of a pixel window; `pixel_step` source pixels lie between them (1, or the factor of
+  // averages).
   void AddWindow(int col, int row, int cols, int rows, const float* heights, int pixel_step = 1);
 
   // Adds ranges of finest blocks, `columns` wide, from this block on.

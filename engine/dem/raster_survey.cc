@@ -9,29 +9,10 @@
 namespace terrace::dem {
 namespace {
 
-// Multiples of the usual storage blocks, so that each is decoded once.
+// Of an overview that are read at once: multiples of the usual storage blocks, so that each is decoded once.
 constexpr int kStripRows = 256, kStripColumns = 4096;
 
 constexpr int DivideUp(int a, int b) { return (a + b - 1) / b; }
-
-// Calls visit(box, heights) for every part of the band, from the north-west, by rows.
-template <typename Visit>
-Result<void> ForEachStrip(GDALRasterBand& band, const SampleRules& rules, const std::stop_token& stop,
-                          const Visit& visit) {
-  std::vector<float> heights;
-  for (int row = 0; row < band.GetYSize(); row += kStripRows) {
-    for (int col = 0; col < band.GetXSize(); col += kStripColumns) {
-      const Chunk box{col, row, std::min(kStripColumns, band.GetXSize() - col),
-                      std::min(kStripRows, band.GetYSize() - row)};
-      heights.resize(static_cast<std::size_t>(box.cols) * static_cast<std::size_t>(box.rows));
-      if (auto read = ReadHeights(band, rules, box.col, box.row, box.cols, box.rows, heights.data(), stop); !read) {
-        return read;
-      }
-      visit(box, heights);
-    }
-  }
-  return {};
-}
 
 std::optional<double> MeanOf(const BlockSum& sum) {
   return sum.weight == 0 ? std::nullopt : std::optional(sum.sum / sum.weight);
@@ -158,14 +139,15 @@ Result<void> SurveyAssembler::FinishCoarse(GDALDataset& dataset, const std::stop
 
 Result<void> SurveyAssembler::AddOverviews(GDALDataset& dataset, const std::stop_token& stop) {
   for (const int factor : layout_.overview_factors) {
-    GDALRasterBand* overview = FindOverview(*dataset.GetRasterBand(1), factor);
-    if (overview == nullptr) {
-      return MakeError(ErrorCode::kUnavailable, "its overview of factor {} is gone since it was opened", factor);
+    const int columns = DivideUp(layout_.columns, factor), rows = DivideUp(layout_.height, factor);
+    for (int row = 0; row < rows; row += kStripRows) {
+      for (int column = 0; column < columns; column += kStripColumns) {
+        const Chunk box{column, row, std::min(kStripColumns, columns - column), std::min(kStripRows, rows - row)};
+        const auto heights = ReadGrid(dataset, layout_, factor, {box.col, box.row, box.cols, box.rows}, stop);
+        if (!heights) return tl::unexpected(heights.error());
+        survey_.table.AddWindow(box.col, box.row, box.cols, box.rows, heights->data(), factor);
+      }
     }
-    auto read = ForEachStrip(*overview, layout_.rules, stop, [&](const Chunk& box, const std::vector<float>& heights) {
-      survey_.table.AddWindow(box.col, box.row, box.cols, box.rows, heights.data(), factor);
-    });
-    if (!read) return read;
   }
   return {};
 }

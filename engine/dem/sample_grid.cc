@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "engine/dem/block_averages.h"
+#include "engine/dem/grid_cells.h"
+#include "engine/dem/overview_axis.h"
 
 namespace terrace::dem {
 namespace {
@@ -12,11 +15,17 @@ constexpr std::int64_t kSamplesPerStrip = std::int64_t{1} << 20;
 
 std::int64_t FloorMod(std::int64_t value, std::int64_t modulus) { return (value % modulus + modulus) % modulus; }
 
-// The band to read and how many of its samples, per axis, make one sample of the grid.
+// What a grid is averaged from: the samples, or blocks of `start` x `start` of them as an overview gives them.
 struct Level {
   GDALRasterBand* band;
-  int block;
-  int columns, rows;  // of the band in use
+  int start;
+  int block;               // how many of those blocks, per axis, make one of the grid
+  GridAxis columns, rows;  // of blocks of `start`
+  OverviewAxis x, y;
+  bool is_band;  // a block is the band's sample of its number
+
+  double ColumnShare(std::int64_t column) const { return ShareOf(column, start, columns.samples()); }
+  double RowShare(std::int64_t row) const { return ShareOf(row, start, rows.samples()); }
 };
 
 Result<Level> StartingLevel(GDALDataset& dataset, const RasterLayout& layout, int factor) {
@@ -26,7 +35,65 @@ Result<Level> StartingLevel(GDALDataset& dataset, const RasterLayout& layout, in
   if (band == nullptr) {
     return MakeError(ErrorCode::kUnavailable, "its overview of factor {} is gone since it was opened", start);
   }
-  return Level{band, factor / start, (layout.columns + start - 1) / start, (layout.height + start - 1) / start};
+  const GridAxis columns(layout.columns, start, layout.wraps), rows(layout.height, start, false);
+  const bool is_whole = layout.width % start == 0 && layout.height % start == 0;
+  const bool is_own = !is_whole && HasOwnOverviews(dataset);
+  return Level{band,
+               start,
+               factor / start,
+               columns,
+               rows,
+               {columns, layout.width, band->GetXSize(), is_own},
+               {rows, layout.height, band->GetYSize(), is_own},
+               is_whole || is_own};
+}
+
+// Samples of an overview; the column behind the last one is the first.
+Result<std::vector<float>> ReadSamples(const Level& level, const SampleRules& rules, const GridWindow& window,
+                                       const std::stop_token& stop) {
+  std::vector<float> samples(static_cast<std::size_t>(window.columns * window.rows));
+  const auto read = [&](std::int64_t column, std::int64_t columns, float* out) {
+    return ReadHeights(*level.band, rules, static_cast<int>(column), static_cast<int>(window.row),
+                       static_cast<int>(columns), static_cast<int>(window.rows), out, stop);
+  };
+  const std::int64_t here = std::min(window.columns, level.x.samples() - window.column);
+  if (auto done = read(window.column, here, samples.data()); !done) return tl::unexpected(done.error());
+  if (here == window.columns) return samples;
+  std::vector<float> first(static_cast<std::size_t>(window.rows));
+  if (auto done = read(0, 1, first.data()); !done) return tl::unexpected(done.error());
+  std::vector<float> both(samples.size());
+  CopyRows(std::span(samples).first(static_cast<std::size_t>(here * window.rows)), here, both.data(), window.columns);
+  CopyRows(first, 1, both.data() + here, window.columns);
+  return both;
+}
+
+// Blocks of level.start between the overview's samples. The window does not wrap.
+Result<void> InterpolateBlocks(const Level& level, const SampleRules& rules, const GridWindow& window, float* out,
+                               const std::stop_token& stop) {
+  std::vector<GridAxis::Place> columns;
+  for (std::int64_t c = 0; c < window.columns; ++c) columns.push_back(level.x.Around(window.column + c));
+  const auto end = [](const GridAxis::Place& place) { return place.index + (place.weight > 0 ? 2 : 1); };
+  GridWindow around{columns.front().index, level.y.Around(window.row).index, 0, 0};
+  around.columns = end(columns.back()) - around.column;
+  around.rows = end(level.y.Around(window.row + window.rows - 1)) - around.row;
+  const auto samples = ReadSamples(level, rules, around, stop);
+  if (!samples) return tl::unexpected(samples.error());
+  std::vector<double> line(static_cast<std::size_t>(around.columns));
+  for (std::int64_t r = 0; r < window.rows; ++r) {
+    const GridAxis::Place y = level.y.Around(window.row + r);
+    const float* const upper = samples->data() + (y.index - around.row) * around.columns;
+    const float* const lower = y.weight > 0 ? upper + around.columns : upper;
+    for (std::size_t i = 0; i < line.size(); ++i) line[i] = upper[i] * (1 - y.weight) + lower[i] * y.weight;
+    for (const GridAxis::Place& x : columns) {
+      const double* const at = line.data() + (x.index - around.column);
+      double height = x.weight > 0 ? at[0] + x.weight * (at[1] - at[0]) : at[0];
+      if (std::isnan(height)) {
+        height = Interpolate(*samples, around, {x.index, y.index, x.weight, y.weight}).value_or(SampleRules::kVoid);
+      }
+      *out++ = static_cast<float>(height);
+    }
+  }
+  return {};
 }
 
 // Blocks `column` .. `column + columns` without wrapping, all rows of the window, into columns of `out` that is
@@ -34,28 +101,29 @@ Result<Level> StartingLevel(GDALDataset& dataset, const RasterLayout& layout, in
 Result<void> ReadBlocks(const Level& level, const SampleRules& rules, const GridWindow& window, float* out,
                         std::int64_t stride, const std::stop_token& stop) {
   const std::int64_t first = window.column * level.block;
-  const std::int64_t count = std::min<std::int64_t>(level.columns - first, window.columns * level.block);
+  const std::int64_t count = std::min<std::int64_t>(level.columns.count() - first, window.columns * level.block);
   const std::int64_t top = window.row * level.block;
-  const std::int64_t rows = std::min<std::int64_t>(level.rows - top, window.rows * level.block);
+  const std::int64_t rows = std::min<std::int64_t>(level.rows.count() - top, window.rows * level.block);
   // In sample rows: a row of blocks can be the whole raster.
   const std::int64_t strip = std::max<std::int64_t>(1, kSamplesPerStrip / count);
   const bool is_plain = level.block == 1 && count == window.columns;
   std::vector<float> samples;
   BlockAverages averages(is_plain ? 0 : window.columns, level.block);
   for (std::int64_t done = 0; done < rows; done += strip) {
-    const std::int64_t here = std::min(strip, rows - done);
-    samples.resize(static_cast<std::size_t>(count * here));
-    if (auto read = ReadHeights(*level.band, rules, static_cast<int>(first), static_cast<int>(top + done),
-                                static_cast<int>(count), static_cast<int>(here), samples.data(), stop);
-        !read) {
-      return read;
-    }
+    const GridWindow here{first, top + done, count, std::min(strip, rows - done)};
+    samples.resize(static_cast<std::size_t>(here.columns * here.rows));
+    auto read = level.is_band
+                    ? ReadHeights(*level.band, rules, static_cast<int>(here.column), static_cast<int>(here.row),
+                                  static_cast<int>(here.columns), static_cast<int>(here.rows), samples.data(), stop)
+                    : InterpolateBlocks(level, rules, here, samples.data(), stop);
+    if (!read) return read;
     if (is_plain) {
       CopyRows(samples, count, out + done * stride, stride);
       continue;
     }
-    for (std::int64_t r = 0; r < here; ++r) {
-      averages.AddRow(samples.data() + r * count, count);
+    for (std::int64_t r = 0; r < here.rows; ++r) {
+      averages.AddRow(samples.data() + r * count, count, level.RowShare(here.row + r),
+                      level.ColumnShare(first + count - 1));
       const std::int64_t at = done + r;
       if ((at + 1) % level.block == 0 || at + 1 == rows) averages.Take(out + at / level.block * stride);
     }

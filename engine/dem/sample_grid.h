@@ -36,6 +36,7 @@ class GridAxis {
 
   std::int64_t count() const { return count_; }
   bool wraps() const { return wraps_; }
+  int samples() const { return samples_; }
   // Centre of the block; the last block of an axis may be a smaller one.
   double Center(std::int64_t index) const;
 
@@ -51,7 +52,8 @@ struct GridWindow {
 };
 
 // Averages of the valid samples of each block in the window, NaN where there is none, row by row from the north. A
-// value is a function of its block alone. Starts from the coarsest overview that `factor` is a multiple of.
+// value is a function of its block alone. Starts from the coarsest overview that `factor` is a multiple of; where its
+// samples stand for other pixels than blocks of its factor do, blocks are interpolated between them.
 Result<std::vector<float>> ReadGrid(GDALDataset& dataset, const RasterLayout& layout, int factor,
                                     const GridWindow& window, const std::stop_token& stop);
 

@@ -13,11 +13,6 @@ constexpr std::int64_t kSamplesPerStrip = std::int64_t{1} << 20;
 
 std::int64_t FloorMod(std::int64_t value, std::int64_t modulus) { return (value % modulus + modulus) % modulus; }
 
-// How much of a block of `step` samples lies on an axis of `size` samples: the last one may stick out.
-double ShareOf(std::int64_t block, int step, std::int64_t size) {
-  return static_cast<double>(std::min<std::int64_t>(step, size - block * step)) / step;
-}
-
 // Blocks of a member along one axis: the first, how many, and how many of its samples the last one has.
 struct BlockSpan {
   std::int64_t first, count, last_samples;

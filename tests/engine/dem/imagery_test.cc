@@ -113,6 +113,22 @@ TEST(Imagery, AveragesFinerPixelsWithAndWithoutOverviews) {
   }
 }
 
+TEST(Imagery, OverviewsOfOddSidesShowThePixelsWhereTheyAre) {
+  const TempDir dir;
+  ImageSpec spec = TileSpec(8);
+  spec.width = spec.height = 2041;  // ends within the tile
+  spec.overviews = {2, 4, 8};
+  const auto level = [](int pixel) { return std::clamp(pixel - 1800, 0, 240); };
+  spec.color = [&](int column, int row) { return Color{level(column), level(row), 7}; };
+  const auto picture = ReadOrFail(*OpenImage(WriteImage(dir, spec)), kTile, 256);
+  ASSERT_TRUE(picture.has_value());
+  for (const int at : {230, 240, 250}) {
+    const double centre = 8 * at + 3.5 - 1800;
+    EXPECT_NEAR(At(*picture, 100, at)[0], centre, 1) << at;
+    EXPECT_NEAR(At(*picture, at, 100)[1], centre, 1) << at;
+  }
+}
+
 TEST(Imagery, InterpolatesCoarserPixelsAcrossTiles) {
   const TempDir dir;
   ImageSpec spec = TileSpec();

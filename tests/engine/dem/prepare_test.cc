@@ -170,12 +170,20 @@ TEST(Prepare, ErrorsOfAveragesHoldForEverySample) {
   ExpectErrorsHold(WriteRaster(dir, spec, "holes.tif"));
   spec.overviews = {2, 8};
   ExpectErrorsHold(WriteRaster(dir, spec, "overviews.tif"));
+  spec.width = 1301;
+  spec.height = 703;
+  spec.overviews = {2, 4, 8, 16, 64};
+  ExpectErrorsHold(WriteRaster(dir, spec, "odd.tif"));
   RasterSpec globe;
   globe.width = 1080;
   globe.height = 540;
   globe.geo_transform = {-180, 1 / 3.0, 0, 90, 0, -1 / 3.0};
   globe.value = [](int c, int r) { return 3000 * std::sin(c * .05) * std::sin(r * .03) + c; };
   ExpectErrorsHold(WriteRaster(dir, globe, "globe.tif"));
+  globe.width = 1081;
+  globe.geo_transform[1] = 360.0 / 1081;
+  globe.overviews = {2, 4, 8};
+  ExpectErrorsHold(WriteRaster(dir, globe, "odd_globe.tif"));
 }
 
 // A child opens the raster and is killed after this share; true if it died by that.

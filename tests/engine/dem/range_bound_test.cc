@@ -48,12 +48,15 @@ TEST(RangeBound, ContainsTilesAroundTheAvailableOnes) {
 
 TEST(RangeBound, ContainsHeightsOfOverviewsThatOvershoot) {
   const TempDir dir;
-  RasterSpec spec{.width = 512, .height = 512, .geo_transform = {7, .001, 0, 47, 0, -.001}, .overviews = {2, 4, 8}};
+  RasterSpec spec{.geo_transform = {7, .001, 0, 47, 0, -.001}, .overviews = {2, 4, 8}};
   spec.value = [](int col, int row) { return (col / 7 + row / 5) % 2 * 1000.0; };
-  const auto source = OpenOrFail(WriteRaster(dir, spec));
-  EXPECT_EQ(source->info().sources[0].overview_factors, (std::vector<int>{2, 4, 8}));
-  for (int level = 0; level <= source->max_level(); ++level) {
-    for (const geo::TileKey& key : SomeTiles(*source, level, 8)) ExpectContained(*source, key);
+  for (const int side : {512, 509}) {
+    spec.width = spec.height = side;
+    const auto source = OpenOrFail(WriteRaster(dir, spec, std::to_string(side) + ".tif"));
+    EXPECT_EQ(source->info().sources[0].overview_factors, (std::vector<int>{2, 4, 8}));
+    for (int level = 0; level <= source->max_level(); ++level) {
+      for (const geo::TileKey& key : SomeTiles(*source, level, 8)) ExpectContained(*source, key);
+    }
   }
 }
 

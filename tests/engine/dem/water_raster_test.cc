@@ -131,6 +131,20 @@ TEST(WaterRaster, ReadsOverviewsAndOtherReferenceSystems) {
   EXPECT_EQ(At(ReadOrFail(*mask, {5, 34, 24}), 250, 175), 255);
 }
 
+TEST(WaterRaster, OverviewsOfOddSidesShowTheCoastWhereItIs) {
+  const TempDir dir;
+  RasterSpec spec = TileSpec(8);
+  spec.width = spec.height = 1601;
+  spec.overviews = {2, 4, 8};
+  // Where a sample of the coarsest overview begins: none of them is mixed.
+  spec.value = [](int column, int row) { return column >= 1498 || row >= 1498 ? 1 : 0; };
+  const auto pixels = ReadOrFail(*OpenMask(WriteRaster(dir, spec)), kTile);
+  constexpr int kCoast = 187;  // three quarters of this pixel are water
+  EXPECT_NEAR(At(pixels, 100, kCoast), 191, 40);
+  EXPECT_NEAR(At(pixels, kCoast, 100), 191, 40);
+  EXPECT_LT(At(pixels, 100, kCoast - 1), 64);
+}
+
 TEST(WaterRaster, GoesOnAcrossTheAntimeridian) {
   const TempDir dir;
   RasterSpec spec;

@@ -97,6 +97,13 @@ void Cut(const std::string& from, const std::string& to, const std::array<int, 2
   GDALClose(cut);
 }
 
+void AddOverviews(const std::string& path) {
+  const GDALDatasetUniquePtr dataset(GDALDataset::Open(path.c_str(), GDAL_OF_RASTER | GDAL_OF_UPDATE));
+  ASSERT_NE(dataset, nullptr);
+  std::array<int, 4> factors = {2, 4, 8, 16};
+  EXPECT_EQ(dataset->BuildOverviews("AVERAGE", 4, factors.data(), 0, nullptr, GDALDummyProgress, nullptr), CE_None);
+}
+
 TEST(CertifiedMosaic, RealTilesOverACoarseBase) {
   const auto base = test_support::TestDataPath("etopo5_global_10min.tif");
   if (!base) GTEST_SKIP() << test_support::MissingTestData("etopo5_global_10min.tif");
@@ -125,6 +132,14 @@ TEST(CertifiedMosaic, RealTilesOverACoarseBase) {
   }
   dem::DemOptions options;
   ExpectCertified("four tiles over a base", OpenMosaic(files, options), samples, 3);
+  // Of 641 samples, which no factor divides.
+  for (const dem::DemFile& file : files) {
+    if (file.rank == 0) AddOverviews(file.path);
+  }
+  ExpectCertified("the same with overviews", OpenMosaic(files, options), samples, 3);
+  for (const std::size_t one : {0, 3}) {
+    ExpectCertified("one with overviews", OpenMosaic({files[one]}, options), SamplesOf(files[one].path), 3);
+  }
   options.source.vertical = "egm96";
   const auto geoid = dem::Geoid::OfCrs("EPSG:5773", {-157, 21});
   ASSERT_TRUE(geoid.has_value());

@@ -1,0 +1,196 @@
+// Overviews of rasters whose sides are no multiples of their factors: heights lie where the ground lies.
+#include <gdal_priv.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/dem/overview_axis.h"
+#include "engine/dem/raster_source.h"
+#include "tests/engine/dem/dem_fixture.h"
+
+namespace terrace::dem {
+namespace {
+
+constexpr double kPixel = 1 / 120.0;
+// Metres of height to a pixel of the ramps, along either axis; and how far off heights may be: a 64th of a sample of
+// factor 16, as averages of averages of so few samples are a little off themselves.
+constexpr double kAcross = 4, kDown = 16, kSlack = 5;
+
+double Ramp(double column, double row) { return kAcross * column + kDown * row; }
+
+// Its first pixel is the ramp's at `west`; its first pixel's centre lies at 10 degrees and as many pixels east.
+RasterSpec RampSpec(int width, int height, int west = 0) {
+  RasterSpec spec{.width = width, .height = height, .overviews = {2, 4, 8, 16}};
+  spec.geo_transform = {10 + (west - .5) * kPixel, kPixel, 0, 47 + .5 * kPixel, 0, -kPixel};
+  spec.value = [west](int column, int row) { return Ramp(west + column, row); };
+  return spec;
+}
+
+std::unique_ptr<RasterSource> OpenRasterOrFail(const std::string& path) {
+  auto source = RasterSource::Open(path, {}, {});
+  EXPECT_TRUE(source.has_value()) << source.error().message;
+  return source ? *std::move(source) : nullptr;
+}
+
+TEST(OverviewAxis, PutsBlocksBetweenTheSamplesAroundTheirCentres) {
+  const OverviewAxis even(GridAxis(32, 4, false), 32, 8, false);
+  for (const int block : {0, 3, 7}) {
+    EXPECT_EQ(even.Around(block).index, block);
+    EXPECT_EQ(even.Around(block).weight, 0);
+  }
+  // Three samples of 3 pixels with centres 1.5, 4.5, 7.5 for blocks of 4 with centres 2, 6, 8.5.
+  const OverviewAxis odd(GridAxis(9, 4, false), 9, 3, false);
+  EXPECT_EQ(odd.Around(0).index, 0);
+  EXPECT_DOUBLE_EQ(odd.Around(0).weight, .5 / 3);
+  EXPECT_EQ(odd.Around(1).index, 1);
+  EXPECT_DOUBLE_EQ(odd.Around(1).weight, .5);
+  EXPECT_EQ(odd.Around(2).index, 2);
+  EXPECT_EQ(odd.Around(2).weight, 0);
+  const OverviewAxis around(GridAxis(9, 4, true), 9, 3, false);  // the first sample again at 10.5
+  EXPECT_EQ(around.Around(2).index, 2);
+  EXPECT_DOUBLE_EQ(around.Around(2).weight, 1.0 / 3);
+  // Column 8 is column 0 again, which samples take for a further one: the first again at 9.5.
+  const OverviewAxis twice(GridAxis(8, 4, true), 9, 3, false);
+  EXPECT_EQ(twice.Around(1).index, 1);
+  EXPECT_DOUBLE_EQ(twice.Around(1).weight, .5);
+  const OverviewAxis own(GridAxis(9, 4, false), 9, 3, true);
+  EXPECT_EQ(own.Around(1).index, 1);
+  EXPECT_EQ(own.Around(1).weight, 0);
+}
+
+// JPEG's own, which it makes of whole blocks; then GDAL's beside it.
+TEST(Overviews, OfAFormatStandForWholeBlocks) {
+  const TempDir dir;
+  RasterSpec spec{.width = 1001, .height = 300, .type = "Byte"};
+  spec.value = [](int column, int) { return column / 4; };
+  const GDALDatasetUniquePtr original(GDALDataset::Open(WriteRaster(dir, spec).c_str()));
+  const std::string path = dir.File("dem.jpg");
+  GDALDriver* const driver = GetGDALDriverManager()->GetDriverByName("JPEG");
+  ASSERT_NE(driver, nullptr);
+  GDALClose(driver->CreateCopy(path.c_str(), original.get(), 0, nullptr, nullptr, nullptr));
+  {
+    const GDALDatasetUniquePtr dataset(GDALDataset::Open(path.c_str()));
+    ASSERT_EQ(OverviewFactors(*dataset->GetRasterBand(1)), (std::vector<int>{2, 4}));
+    EXPECT_TRUE(HasOwnOverviews(*dataset));
+    EXPECT_EQ(PixelsPerSample(*dataset, 4, 1001, 251), 4);
+    RasterLayout layout{.width = 1001, .height = 300, .columns = 1001};
+    layout.rules = SampleRules::Of(*dataset->GetRasterBand(1), "");
+    layout.overview_factors = {4};
+    const auto heights = ReadGrid(*dataset, layout, 4, {240, 10, 1, 1}, {});
+    ASSERT_TRUE(heights);
+    EXPECT_NEAR((*heights)[0], 240, 1);
+  }
+  const GDALDatasetUniquePtr dataset(GDALDataset::Open(path.c_str()));
+  int factor = 4;
+  ASSERT_EQ(dataset->BuildOverviews("AVERAGE", 1, &factor, 0, nullptr, GDALDummyProgress, nullptr), CE_None);
+  const GDALDatasetUniquePtr again(GDALDataset::Open(path.c_str()));
+  EXPECT_FALSE(HasOwnOverviews(*again));
+  EXPECT_EQ(PixelsPerSample(*again, 4, 1001, 251), 1001 / 251.0);
+}
+
+TEST(Overviews, BlocksLieWhereTheyLieWithout) {
+  for (const auto& [width, height] : {std::pair{361, 241}, {360, 241}, {353, 255}, {368, 240}}) {
+    SCOPED_TRACE(width);
+    const TempDir dir;
+    const auto source = OpenRasterOrFail(WriteRaster(dir, RampSpec(width, height)));
+    ASSERT_NE(source, nullptr);
+    ASSERT_EQ(source->layout().overview_factors, (std::vector<int>{2, 4, 8, 16}));
+    for (const int factor : {2, 4, 8, 16, 32}) {
+      const GridAxis columns(width, factor, false), rows(height, factor, false);
+      const auto read = source->ReadBlocks(factor, {0, 0, columns.count(), rows.count()}, {});
+      ASSERT_TRUE(read);
+      for (std::int64_t r = 0; r < rows.count(); ++r) {
+        for (std::int64_t c = 0; c < columns.count(); ++c) {
+          const double truth = Ramp(columns.Center(c) - .5, rows.Center(r) - .5);
+          // The last block may lie beyond the last sample's centre, by less than half a sample.
+          const double beyond_x = c + 1 == columns.count() && width % factor != 0 ? kAcross * factor / 2 : 0;
+          const double beyond_y = r + 1 == rows.count() && height % factor != 0 ? kDown * factor / 2 : 0;
+          ASSERT_NEAR((*read)[static_cast<std::size_t>(r * columns.count() + c)], truth, kSlack + beyond_x + beyond_y)
+              << "factor " << factor << " block " << c << ", " << r;
+        }
+      }
+    }
+  }
+}
+
+TEST(Overviews, AWindowChangesNoBlock) {
+  for (const bool around : {false, true}) {
+    const TempDir dir;
+    RasterSpec spec{.width = 361, .height = 179, .nodata = -1, .overviews = {2, 4, 8, 16}};
+    spec.geo_transform = {around ? -180.0 : 5, around ? 360.0 / 361 : .01, 0, 80, 0, around ? -.9 : -.01};
+    spec.value = [](int column, int row) {
+      return column % 50 < 9 && row % 40 < 9 ? -1 : 900 + 300 * std::sin(column * 1.7) * std::cos(row * 2.3);
+    };
+    const auto source = OpenRasterOrFail(WriteRaster(dir, spec));
+    ASSERT_NE(source, nullptr);
+    ASSERT_EQ(source->layout().wraps, around);
+    for (const int factor : {2, 4, 8, 16, 32}) {
+      const std::int64_t columns = (361 + factor - 1) / factor, rows = (179 + factor - 1) / factor;
+      const auto whole = source->ReadBlocks(factor, {0, 0, columns, rows}, {});
+      ASSERT_TRUE(whole);
+      for (std::int64_t c = around ? -3 : 0; c < columns + (around ? 3 : 0); ++c) {
+        for (std::int64_t r = 0; r < rows; r += 3) {
+          const auto one = source->ReadBlocks(factor, {c, r, 1, 1}, {});
+          ASSERT_TRUE(one);
+          const float other = (*whole)[static_cast<std::size_t>(r * columns + (c + columns) % columns)];
+          ASSERT_TRUE((*one)[0] == other || (std::isnan((*one)[0]) && std::isnan(other))) << factor << " " << c;
+        }
+      }
+    }
+  }
+}
+
+// The largest distance of heights from the ramp, at nodes that lie this many pixels within its sides.
+double LargestOff(const DemSource& source, int level, int width, int height, double margin) {
+  const geo::Lattice lattice = source.LatticeOf(level);
+  const double step = lattice.StepDegrees();
+  const auto west = static_cast<std::int64_t>(std::ceil((10 + 180) / step)),
+             east = static_cast<std::int64_t>(std::floor((10 + width * kPixel + 180) / step));
+  const auto south = static_cast<std::int64_t>(std::ceil((47 - height * kPixel + 90) / step)),
+             north = static_cast<std::int64_t>(std::floor((47 + 90) / step));
+  const NodeWindow window{west, south, static_cast<int>(east - west + 1), static_cast<int>(north - south + 1)};
+  const auto heights = source.ReadNodes(level, window);
+  EXPECT_TRUE(heights);
+  double worst = 0;
+  for (std::int64_t j = south; j <= north; ++j) {
+    for (std::int64_t i = west; i <= east; ++i) {
+      const double column = (lattice.Longitude(i) - 10) / kPixel, row = (47 - lattice.Latitude(j)) / kPixel;
+      if (std::min({column, row, width - 1 - column, height - 1 - row}) < margin) continue;
+      const float read = (*heights)[static_cast<std::size_t>((j - south) * window.columns + (i - west))];
+      worst = std::max(worst, std::abs(read - Ramp(column, row)));
+    }
+  }
+  return worst;
+}
+
+TEST(Overviews, ShallowTilesShowTheGroundWhereItIs) {
+  const TempDir dir;
+  const auto source = OpenOrFail(WriteRaster(dir, RampSpec(361, 241)));
+  ASSERT_NE(source, nullptr);
+  // Up to 42 pixels to a step.
+  for (int level = 1; level <= 7; ++level) {
+    EXPECT_LT(LargestOff(*source, level, 361, 241, level < 3 ? 34 : 17), kSlack) << level;
+  }
+}
+
+TEST(Overviews, OfAMosaicHaveNoStepAtTheJoint) {
+  // Neighbours that share a column of pixels, as SRTM's do.
+  const TempDir dir;
+  const std::string west = WriteRaster(dir, RampSpec(361, 241), "west.tif"),
+                    east = WriteRaster(dir, RampSpec(361, 241, 360), "east.tif");
+  const auto source = DemSource::Open(std::vector<DemFile>{{west}, {east}}, {});
+  ASSERT_TRUE(source);
+  for (int level = 1; level <= 7; ++level) {
+    EXPECT_LT(LargestOff(**source, level, 721, 241, level < 3 ? 34 : 17), kSlack) << level;
+  }
+  for (const geo::TileKey& key : SomeTiles(**source, 4, 4)) {
+    const auto tile = (*source)->Read(key), next = (*source)->Read(geo::Neighbour(key, 1, 0));
+    ASSERT_TRUE(tile && next);
+    for (int j = 0; j <= tile->lattice.cells; ++j) {
+      ASSERT_EQ(tile->At(tile->lattice.cells, j), next->At(0, j)) << geo::ToString(key);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace terrace::dem
