@@ -2,7 +2,9 @@
 #include <gdal_priv.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <filesystem>
 
 #include "engine/dem/overview_axis.h"
 #include "engine/dem/raster_source.h"
@@ -73,7 +75,9 @@ TEST(Overviews, OfAFormatStandForWholeBlocks) {
     ASSERT_EQ(OverviewFactors(*dataset->GetRasterBand(1)), (std::vector<int>{2, 4}));
     EXPECT_TRUE(HasOwnOverviews(*dataset));
     EXPECT_EQ(PixelsPerSample(*dataset, 4, 1001, 251), 4);
-    RasterLayout layout{.width = 1001, .height = 300, .columns = 1001};
+    RasterLayout layout;
+    layout.width = layout.columns = 1001;
+    layout.height = 300;
     layout.rules = SampleRules::Of(*dataset->GetRasterBand(1), "");
     layout.overview_factors = {4};
     const auto heights = ReadGrid(*dataset, layout, 4, {240, 10, 1, 1}, {});
@@ -189,6 +193,39 @@ TEST(Overviews, OfAMosaicHaveNoStepAtTheJoint) {
     for (int j = 0; j <= tile->lattice.cells; ++j) {
       ASSERT_EQ(tile->At(tile->lattice.cells, j), next->At(0, j)) << geo::ToString(key);
     }
+  }
+}
+
+// 3,601 samples a side: most of a tile is as without overviews, within what other averages make of steep ground.
+TEST(Overviews, OfRealGroundChangeLittle) {
+  TERRACE_REQUIRE_DATA(path, "srtm1_N20W157_maui_se_haleakala.tif");
+  const TempDir dir;
+  const std::string copy = dir.File("copy.tif");
+  std::filesystem::copy_file(path, copy);
+  std::filesystem::permissions(copy, std::filesystem::perms::owner_write, std::filesystem::perm_options::add);
+  {
+    const GDALDatasetUniquePtr dataset(GDALDataset::Open(copy.c_str(), GDAL_OF_RASTER | GDAL_OF_UPDATE));
+    ASSERT_NE(dataset, nullptr);
+    std::array<int, 4> factors = {2, 4, 8, 16};
+    ASSERT_EQ(dataset->BuildOverviews("AVERAGE", 4, factors.data(), 0, nullptr, GDALDummyProgress, nullptr), CE_None);
+  }
+  const auto without = OpenOrFail(path), with = OpenOrFail(copy);
+  ASSERT_TRUE(without && with);
+  ASSERT_EQ(with->info().sources[0].overview_factors, (std::vector<int>{2, 4, 8, 16}));
+  for (const int level : {7, 8, 9}) {
+    std::vector<float> differences;
+    for (const geo::TileKey& key : SomeTiles(*without, level, 9)) {
+      const auto expected = without->Read(key), read = with->Read(key);
+      ASSERT_TRUE(expected && read);
+      for (std::size_t i = 0; i < expected->heights.size(); ++i) {
+        if (expected->heights[i] <= 1) continue;  // the sea, and beside the raster
+        differences.push_back(std::abs(expected->heights[i] - read->heights[i]));
+      }
+    }
+    ASSERT_GT(differences.size(), 1000u);
+    std::ranges::sort(differences);
+    EXPECT_LT(differences[differences.size() / 2], 3) << level;
+    EXPECT_LT(differences[differences.size() * 9 / 10], 15) << level;
   }
 }
 
