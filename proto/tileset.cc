@@ -82,7 +82,8 @@ geo::TileRange BlockOf(const std::vector<TreeRoot>& roots) {
 
 // About the middle of the block, as far as half its width and half its height along the ground, and its whole range of
 // heights, take one together; but never farther than the other side of the Earth.
-// A block all around a pole has its middle there.
+// A block all around a pole has its middle there, and reaches to the equator: clients look at the sphere as a whole,
+// and from nearer by, past the pole, a map of it is a flat disc.
 Json Sphere(const TilesetDescription& tileset, const geo::TileRange& block) {
   const double tile = std::ldexp(180, -tileset.roots.front().tile.level);
   const double width = static_cast<double>(block.end_x + 1 - block.start_x) * tile;
@@ -90,7 +91,8 @@ Json Sphere(const TilesetDescription& tileset, const geo::TileRange& block) {
   const double north = -90 + static_cast<double>(block.end_y + 1) * tile;
   if (const double pole = north == 90 ? 90 : -90; width == 360 && (south == -90) != (north == 90)) {
     const geo::Vec3 middle = geo::ToEcef(0, pole, tileset.min_height_m);
-    const geo::Vec3 rim = geo::ToEcef(0, pole > 0 ? south : north, tileset.max_height_m);
+    const double rim_latitude = pole > 0 ? std::min(south, 0.0) : std::max(north, 0.0);
+    const geo::Vec3 rim = geo::ToEcef(0, rim_latitude, tileset.max_height_m);
     const double relief = tileset.max_height_m - tileset.min_height_m;
     return {{"sphere", {middle.x, middle.y, middle.z, geo::Length(rim - middle) + relief}}};
   }
