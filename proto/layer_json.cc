@@ -23,10 +23,9 @@ Json Available(const std::vector<std::vector<geo::TileRange>>& levels) {
 }
 
 Json Bounds(const LayerDescription& layer) {
-  if (layer.east - layer.west >= 360) return Json::array({-180, layer.south, 180, layer.north});
-  const double west = layer.west < -180 ? layer.west + 360 : layer.west;
-  const double east = layer.east > 180 ? layer.east - 360 : layer.east;
-  return Json::array({west, layer.south, east, layer.north});
+  const bool crosses_antimeridian = layer.west > layer.east || layer.east > 180 || layer.west < -180;
+  if (crosses_antimeridian) return Json::array({-180, layer.south, 180, layer.north});
+  return Json::array({layer.west, layer.south, layer.east, layer.north});
 }
 
 }  // namespace

@@ -13,8 +13,8 @@ struct LayerDescription {
   std::string attribution;
   std::string version = "1.0.0";
   std::vector<std::vector<geo::TileRange>> available;  // by level, from 0
-  // Degrees. west > east, west < -180 or east > 180 is a box across the antimeridian: layer.json has west > east then.
-  // Terrain clients find tiles by what is available; whoever does read the box finds the data in it.
+  // Degrees. west > east, or east > 180, is a box across the antimeridian: layer.json then spans all longitudes,
+  // because its readers know only boxes with west < east.
   double west = -180, south = -90, east = 180, north = 90;
   bool water_mask = false;  // tiles have it for those who ask
   int metadata_levels = 0;  // tiles of every so many levels have metadata for those who ask; 0: none

@@ -56,6 +56,7 @@ NodeWindow PartOf(const Sheet& sheet, const Grid& grid, const NodeWindow& window
   const Footprint& reach = sheet.reach();
   const bool is_polar = sheet.pole_heights()[0] || sheet.pole_heights()[1];
   if (is_polar || reach.south <= -90 || reach.north >= 90 || reach.all_longitudes()) return window;
+  if (window.rows < 2 || window.columns < 2) return window;
   NodeRange rows, columns;
   for (int j = 0; j + 1 < window.rows; ++j) {
     const auto [south, north] = std::minmax({grid.Latitude(window.row + j), grid.Latitude(window.row + j + 1)});
@@ -117,6 +118,7 @@ Result<void> FillAny(const Sheet& sheet, const Grid& grid, const NodeWindow& win
 SheetTrace Widened(PartTrace&& of_part, const Sheet& sheet, const geo::Lattice& lattice, const NodeWindow& window) {
   if (!of_part.part) return std::move(of_part.trace);
   SheetTrace trace = std::move(of_part.trace);
+  trace.is_part = true;
   const std::size_t nodes = static_cast<std::size_t>(window.columns) * static_cast<std::size_t>(window.rows);
   std::vector<std::int32_t> cell_of_node(nodes, -1);
   std::vector<float> heights(nodes, SampleRules::kVoid);

@@ -83,6 +83,7 @@ Imagery::Imagery(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Imagery::~Imagery() = default;
 
 Result<std::unique_ptr<Imagery>> Imagery::Open(const std::string& path, const GeoBounds& around) {
+  ForgetRemote(path);
   const auto before = StampOf(path);
   auto image = ImageFile::Open(path);
   if (!image) return tl::unexpected(image.error());

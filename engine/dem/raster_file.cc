@@ -155,6 +155,14 @@ Result<void> CheckSizeToMesh(const std::string& path, int width, int height) {
                    path, width, height, kMostSamples, kMostPerSide);
 }
 
+void ForgetRemote(const std::string& path) {
+  if (IsRemote(path)) return VSICurlPartialClearCache(path.c_str());
+  if (path.starts_with("/vsi") || !CheckSourceName(path) || !LooksLikeVrt(path)) return;
+  for (const std::string& part : PartsOfVrt(path)) {
+    if (IsRemote(part)) VSICurlPartialClearCache(part.c_str());
+  }
+}
+
 bool IsRaster(const std::string& path) {
   // GDAL's driver for ESRI's .hdr takes whatever lies beside one for the raster.
   for (const char* sidecar : {"ovr", "msk", "aux", "rrd", "hdr", "prj", "qpj", "stx", "clr", "blw", "tfw", "wld"}) {
@@ -177,7 +185,6 @@ GDALDatasetUniquePtr ReopenRaster(const std::string& path, int overview) {
 Result<GDALDatasetUniquePtr> OpenRaster(const std::string& path, int overview) {
   InitGdal();
   if (auto name = CheckSourceName(path); !name) return tl::unexpected(name.error());
-  if (IsRemote(path)) VSICurlPartialClearCache(path.c_str());  // as it is now, not as it once was
   GDALDatasetUniquePtr dataset = ReopenRaster(path, overview);
   if (dataset == nullptr) {
     std::string problem = TakeGdalError();
@@ -236,6 +243,7 @@ std::vector<std::string> FilesOf(GDALDataset& dataset, const std::string& path) 
   for (const std::string& part : PartsOfVrt(path)) {
     for (const char* beside : {"", ".ovr", ".msk", ".aux.xml"}) {
       if (std::string name = part + beside; known.insert(name).second) files.push_back(std::move(name));
+      if (IsRemote(part)) break;  // what is beside it takes a request each to know
     }
   }
   return files;

@@ -15,6 +15,10 @@ namespace terrace::dem {
 // `overview`: the raster as the overview of that number has it; -1: in full.
 Result<GDALDatasetUniquePtr> OpenRaster(const std::string& path, int overview = -1);
 
+// Before a dataset is opened anew: lets go of what GDAL remembers of remote files, the raster or the parts of a VRT, so
+// that they are read as they are now and not as they once were.
+void ForgetRemote(const std::string& path);
+
 // Whether a driver takes the file for one of its own, by name and first bytes. Overviews and masks beside a raster are
 // none.
 bool IsRaster(const std::string& path);

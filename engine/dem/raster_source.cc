@@ -102,6 +102,7 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
                                                          std::shared_ptr<HandleLimit> handles,
                                                          const std::stop_token& stop) {
   const auto start = std::chrono::steady_clock::now();
+  ForgetRemote(path);
   const auto before = StampOf(path);
   auto dataset = OpenRaster(path);
   if (!dataset) return tl::unexpected(dataset.error());

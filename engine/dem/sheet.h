@@ -33,6 +33,7 @@ struct SheetRange {
 // What Fill saw of a window, for whoever wants to know how far its heights are from the samples.
 struct SheetTrace {
   std::vector<Position> positions;  // by node, in pixels; NaN where there is none
+  bool is_part = false;             // nodes far from the sheet were not asked about: NaN as well
   // In `cells`; -1: the sheet has no interpolated height for the node. Where sheets are blended, nodes that others fill
   // have theirs too, as far as what was read tells it.
   std::vector<std::int32_t> cell_of_node;

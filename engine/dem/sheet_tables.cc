@@ -19,6 +19,7 @@ std::vector<std::size_t> SheetTables::MembersAround() const {
   Box hull{1e300, 1e300, -1e300, -1e300};
   bool known = !sheet_.wraps();
   for (const Position& p : trace_.positions) {
+    if (trace_.is_part && std::isnan(p.x)) continue;  // far from the sheet
     known &= std::isfinite(p.x) && std::isfinite(p.y);
     hull = {std::min(hull.west, p.x), std::min(hull.south, p.y), std::max(hull.east, p.x), std::max(hull.north, p.y)};
   }

@@ -25,7 +25,6 @@ std::string WriteLayer(const DatasetView& dataset, std::string tile_query) {
   layer.name = dataset.name;
   layer.attribution = dataset.attribution;
   layer.available = dataset.available;
-  // layer.json has no way to cross the antimeridian.
   layer.west = dataset.west;
   layer.east = dataset.east;
   layer.south = dataset.south;

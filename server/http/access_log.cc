@@ -146,10 +146,10 @@ void AccessLog::Write(const ReplyRecord& record) {
   {
     const std::lock_guard lock(mutex_);
     LineWriter& writer = writer_ ? *writer_ : LineWriter::Stderr();
-    if (!writer.Write(line) || !writer_) return;  // what is missing of stderr is told with the log
+    if (!writer.Write(line)) return;
     missed = writer.TakeMissed();
   }
-  if (missed > 0) spdlog::warn("access log {}: {} lines before the last one are missing", file_.string(), missed);
+  if (missed > 0) spdlog::warn("{}: {} lines before the last one are missing: nobody took them", name(), missed);
 }
 
 void AccessLog::Reopen() {
@@ -159,9 +159,14 @@ void AccessLog::Reopen() {
     spdlog::error("access log {}: cannot be opened anew: {}", file_.string(), std::generic_category().message(errno));
     return;
   }
-  const std::lock_guard lock(mutex_);
-  ::close(std::exchange(descriptor_, descriptor));
-  writer_ = std::make_unique<LineWriter>(descriptor);
+  std::uint64_t missed = 0;
+  {
+    const std::lock_guard lock(mutex_);
+    missed = writer_->TakeMissed();
+    ::close(std::exchange(descriptor_, descriptor));
+    writer_ = std::make_unique<LineWriter>(descriptor);
+  }
+  if (missed > 0) spdlog::warn("{}: {} lines are missing at the end of the old file", name(), missed);
 }
 
 }  // namespace terrace::server

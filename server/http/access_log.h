@@ -68,6 +68,7 @@ class AccessLog {
 
  private:
   AccessLog(AccessLogForm form, std::filesystem::path file, int descriptor);
+  std::string name() const { return file_.empty() ? "stderr" : "access log " + file_.string(); }
 
   const AccessLogForm form_;
   const std::filesystem::path file_;

@@ -11,15 +11,10 @@
 #include <utility>
 
 namespace terrace::server {
-namespace {
-
-using Clock = std::chrono::steady_clock;
-
-}  // namespace
 
 LineWriter::LineWriter(int descriptor) : descriptor_(descriptor) {
   struct stat status {};
-  is_file_ = ::fstat(descriptor, &status) == 0 && S_ISREG(status.st_mode);
+  takes_all_ = (::fstat(descriptor, &status) == 0 && S_ISREG(status.st_mode)) || ::isatty(descriptor) != 0;
 }
 
 LineWriter& LineWriter::Stderr() {
@@ -42,7 +37,7 @@ std::uint64_t LineWriter::TakeMissed() {
 // A pipe with room at all takes PIPE_BUF bytes without waiting (pipe(7)).
 bool LineWriter::Put(std::string_view text) {
   while (!text.empty()) {
-    const std::string_view piece = is_file_ ? text : text.substr(0, PIPE_BUF);
+    const std::string_view piece = takes_all_ ? text : text.substr(0, PIPE_BUF);
     const ssize_t written = IsReady() ? ::write(descriptor_, piece.data(), piece.size()) : -1;
     if (written < 0 && errno == EINTR) continue;
     if (written <= 0) return false;
@@ -55,17 +50,22 @@ bool LineWriter::Put(std::string_view text) {
 // Asked before, as writing may well block: a descriptor that came from elsewhere cannot be told not to without telling
 // all who share it.
 bool LineWriter::IsReady() {
-  if (is_file_) return true;
-  const auto deadline = Clock::now() + (is_stalled_ ? Clock::duration::zero() : kPatience);
-  for (;;) {
-    const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now());
+  if (takes_all_) return true;
+  const auto poll_for = [&](Clock::duration time) {
     pollfd waited{descriptor_, POLLOUT, 0};
-    const int ready = ::poll(&waited, 1, std::max(0, static_cast<int>(left.count())));
-    if (ready < 0 && errno == EINTR) continue;
-    is_stalled_ = ready == 0;
-    if (is_stalled_) errno = EAGAIN;
-    return ready > 0;
+    return ::poll(&waited, 1, static_cast<int>(std::chrono::ceil<std::chrono::milliseconds>(time).count()));
+  };
+  const auto now = Clock::now();
+  patience_ = std::min(kPatience, patience_ + (now - asked_) / kShare);
+  asked_ = now;
+  int ready = poll_for(Clock::duration::zero());
+  if (ready == 0 && patience_ >= std::chrono::milliseconds(1)) {
+    ready = poll_for(patience_);
+    asked_ = Clock::now();
+    patience_ = std::max(patience_ - (asked_ - now), Clock::duration::zero());
   }
+  if (ready == 0) errno = EAGAIN;
+  return ready > 0;
 }
 
 }  // namespace terrace::server

@@ -32,7 +32,7 @@ std::vector<geo::Vec3> RoundedNormals(std::vector<geo::Vec3> normals) {
 
 Result<MeshedGlb> MeshGlb(const dem::DemSource& source, const proto::LatticeView& lattice,
                           const tin::Refinement& refinement, const MeshRules& rules, double wanted_error_m,
-                          proto::PositionWidth width, const std::stop_token& stop) {
+                          double asked_error_m, proto::PositionWidth width, const std::stop_token& stop) {
   constexpr int kMaxRounds = 16;  // as for quantized-mesh
   const Clock::time_point start = Clock::now();
   Result<StartedMesh> started = StartMesh(source, lattice, refinement, rules, wanted_error_m, stop);
@@ -42,7 +42,7 @@ Result<MeshedGlb> MeshGlb(const dem::DemSource& source, const proto::LatticeView
 
   tin::TinMesh& mesh = started->mesh;
   double step_m = proto::GridStep(lattice.lattice, wanted_error_m, width);
-  const double depth_m = proto::SkirtDepth(lattice.key.level, wanted_error_m);
+  const double depth_m = proto::SkirtDepth(lattice.key.level, asked_error_m);
   proto::TileMeter meter(lattice, started->error_m);
   for (int round = 1;; ++round) {
     if (stop.stop_requested()) return Cancelled();
@@ -54,9 +54,8 @@ Result<MeshedGlb> MeshGlb(const dem::DemSource& source, const proto::LatticeView
     if (error.misses.empty() || round == kMaxRounds ||
         mesh.vertices.size() + error.misses.size() > proto::kMaxTileVertices) {
       meshed.surface_error_m = std::max(error.max_m, proto::MeasureFlatEdgeError(lattice, mesh, positions));
-      meshed.mesh =
-          proto::MakeGridMesh(lattice, mesh, points, RoundedNormals(proto::VertexNormals(lattice, mesh, positions)),
-                              step_m, proto::SkirtDepth(lattice.key.level, wanted_error_m));
+      meshed.mesh = proto::MakeGridMesh(
+          lattice, mesh, points, RoundedNormals(proto::VertexNormals(lattice, mesh, positions)), step_m, depth_m);
       return meshed;
     }
     mesh = tin::InsertSamples(mesh, error.misses);

@@ -23,7 +23,7 @@ tin::TinMesh WithInnerVertices(const proto::LatticeView& lattice, tin::TinMesh m
         geo::ToEcef(lattice.Longitude(p.x), lattice.Latitude(p.y), static_cast<double>(lattice.At(p.x, p.y))));
   }
   const std::size_t misfits = proto::CountMisfits(mesh, positions, proto::VertexNormals(lattice, mesh, positions));
-  if (2 * (misfits + 1) < mesh.vertices.size()) return mesh;
+  if (2 * misfits < mesh.vertices.size()) return mesh;
 
   const int side = std::min(static_cast<int>(std::sqrt(static_cast<double>(on_edges))) + 1, cells - 1);
   std::vector<tin::SamplePosition> inside;

@@ -104,8 +104,9 @@ Result<void> TilePipeline::EncodeGlb(const TileRequest& request, const RefinedTi
   const Dataset& dataset = datasets_[request.dataset];
   const Clock::time_point start = Clock::now();
   const proto::LatticeView lattice{request.key, refined.heights.lattice, refined.heights.heights};
+  const double asked_error_m = geo::LadderError(request.key.level, request.error_step, dataset.error_fraction);
   const Result<MeshedGlb> meshed = MeshGlb(*dataset.source, lattice, refined.refinement, dataset.rules, error_m,
-                                           proto::WidthOf(request.compression), stop);
+                                           asked_error_m, proto::WidthOf(request.compression), stop);
   if (!meshed) return tl::unexpected(meshed.error());
   proto::GlbOptions options = dataset.glb;
   options.compression = request.compression;

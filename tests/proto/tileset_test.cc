@@ -116,7 +116,6 @@ TEST(Tileset, RootsOfTheGlobeLieInASphere) {
   EXPECT_EQ(root.at("children").back().at("boundingVolume").at("region")[2], std::numbers::pi);
 }
 
-// loaders.gl makes of a region with a corner at a pole a box without width.
 // Clients look at the middle of the sphere: of a map of the Arctic that is the pole.
 TEST(Tileset, RootsAllAroundAPoleLieInASphereAboutIt) {
   for (const std::int64_t y : {0, 3}) {
@@ -141,6 +140,7 @@ TEST(Tileset, RootsAllAroundAPoleLieInASphereAboutIt) {
   }
 }
 
+// loaders.gl makes of a region with a corner at a pole a box without width.
 TEST(Tileset, TilesBesideThePolesAreBoundedBySpheres) {
   TilesetDescription tileset = Maui();
   tileset.content_query = "error=5";

@@ -5,10 +5,12 @@
 #include <unistd.h>
 
 #include <array>
+#include <chrono>
 #include <climits>
 #include <csignal>
 #include <cstddef>
 #include <string>
+#include <thread>
 
 namespace terrace::server {
 namespace {
@@ -27,6 +29,11 @@ class Pipe {
   void CloseReader() {
     if (ends_[0] >= 0) ::close(ends_[0]);
     ends_[0] = -1;
+  }
+  void Take(std::size_t most) {
+    std::string part(most, ' ');
+    ::fcntl(ends_[0], F_SETFL, O_NONBLOCK);
+    static_cast<void>(::read(ends_[0], part.data(), most) > 0);
   }
   // What is in it.
   std::string Read() {
@@ -70,6 +77,20 @@ TEST(LineWriter, DoesNotWaitForAReaderThatStallsAndCountsWhatHeMisses) {
   EXPECT_EQ(writer.TakeMissed(), 0U);
   EXPECT_TRUE(writer.Write("again\n"));
   EXPECT_EQ(pipe.Read(), "again\n");
+}
+
+// One who takes a little again and again does not hold everything up for ever.
+TEST(LineWriter, DoesNotFollowAReaderWhoIsSlow) {
+  Pipe pipe;
+  LineWriter writer(pipe.writer());
+  const std::jthread reader([&pipe](const std::stop_token& done) {
+    while (!done.stop_requested()) {
+      pipe.Take(4096);
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+  });
+  for (int i = 0; i < 20'000; ++i) writer.Write(Line('x', 100));
+  EXPECT_GT(writer.TakeMissed(), 1000U);
 }
 
 TEST(LineWriter, EndsALineThatWasCut) {
