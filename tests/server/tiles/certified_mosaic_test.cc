@@ -104,6 +104,26 @@ void AddOverviews(const std::string& path) {
   EXPECT_EQ(dataset->BuildOverviews("AVERAGE", 4, factors.data(), 0, nullptr, GDALDummyProgress, nullptr), CE_None);
 }
 
+// More sheets than are asked about whole windows, each on a grid of its own.
+TEST(CertifiedMosaic, ManySmallSheets) {
+  const dem::TempDir dir;
+  std::vector<dem::DemFile> files;
+  std::vector<Sample> samples;
+  for (int k = 0; k < 16; ++k) {
+    dem::RasterSpec spec;
+    spec.width = 60;
+    spec.height = 50;
+    const double step = 0.01 + 0.0001 * k;
+    spec.geo_transform = {10.0 + 0.8 * (k % 4), step, 0, 40.0 + 0.8 * (k / 4), 0, -step};
+    spec.value = [k](int x, int y) {
+      return 900 + 300 * std::sin(0.2 * x + k) * std::cos(0.13 * y) + (x * 7 + y * 11) % 17;
+    };
+    files.push_back({dem::WriteRaster(dir, spec, "s" + std::to_string(k) + ".tif")});
+    for (const Sample& sample : SamplesOf(files.back().path)) samples.push_back(sample);
+  }
+  ExpectCertified("sixteen small rasters", OpenMosaic(files, {}), samples, 3);
+}
+
 TEST(CertifiedMosaic, RealTilesOverACoarseBase) {
   const auto base = test_support::TestDataPath("etopo5_global_10min.tif");
   if (!base) GTEST_SKIP() << test_support::MissingTestData("etopo5_global_10min.tif");
