@@ -36,8 +36,8 @@ Box BoxOf(const Grid& grid, const NodeWindow& window) {
 
 // Up to so many sheets are asked about whole windows.
 constexpr std::size_t kFewSheets = 8;
-// What is judged together (SourceGap), and a node more.
-constexpr int kAround = 17;
+// Nodes around a sheet's reach whose positions are asked for: those of groups that touch it, and one more.
+constexpr int kAround = SourceGap::kGroup + 1;
 
 // A range of steps of an axis, as nodes.
 struct NodeRange {

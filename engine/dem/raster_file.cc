@@ -156,6 +156,7 @@ Result<void> CheckSizeToMesh(const std::string& path, int width, int height) {
 }
 
 void ForgetRemote(const std::string& path) {
+  if (!AllowsRemote()) return;
   if (IsRemote(path)) return VSICurlPartialClearCache(path.c_str());
   if (path.starts_with("/vsi") || !CheckSourceName(path) || !LooksLikeVrt(path)) return;
   for (const std::string& part : PartsOfVrt(path)) {

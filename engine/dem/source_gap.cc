@@ -11,12 +11,6 @@
 #include "engine/dem/smooth_gap.h"
 
 namespace terrace::dem {
-namespace {
-
-// Cells per axis that are judged together where nothing is in the way.
-constexpr int kGroup = 16;
-
-}  // namespace
 
 // One sheet's part: groups of cells, and the cells of groups where something is in the way.
 class SheetGap {
@@ -33,6 +27,7 @@ class SheetGap {
         loose_(sheet, single_) {}
 
   Result<void> Add(const std::stop_token& stop) {
+    constexpr int kGroup = SourceGap::kGroup;
     const int cells = nodes_.cells();
     for (int south = 0; south < cells; south += kGroup) {
       for (int west = 0; west < cells; west += kGroup) {

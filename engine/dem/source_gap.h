@@ -17,6 +17,9 @@ namespace terrace::dem {
 // Measures one tile: one Add for each sheet, in their order.
 class SourceGap {
  public:
+  // Cells per axis that are judged together where nothing is in the way.
+  static constexpr int kGroup = 16;
+
   // `window` and `heights`: the tile's samples and one more on each side, as they are served. `blends`: sheets are
   // blended where one gives way to the next.
   SourceGap(const geo::Lattice& lattice, const NodeWindow& window, std::span<const float> heights, bool blends);

@@ -142,6 +142,7 @@ bool IsRemote(const std::string& path) {
 }
 
 bool HasDataRoots() { return !Current()->roots.empty(); }
+bool AllowsRemote() { return !Current()->prefixes.empty(); }
 
 Result<void> CheckPlainFile(const std::string& path) {
   const auto policy = Current();

@@ -43,6 +43,7 @@ Result<void> CheckLinks(GDALDataset& dataset, const std::string& path);
 Result<void> CheckPlainFile(const std::string& path);
 
 bool HasDataRoots();
+bool AllowsRemote();
 
 // A name that CheckSourceName finds below an allowed remote prefix.
 bool IsRemote(const std::string& path);

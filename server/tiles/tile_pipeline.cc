@@ -23,9 +23,10 @@ std::chrono::microseconds Since(Clock::time_point start) {
   return std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - start);
 }
 
-// What a tile's mesh is held to, so that it keeps `error_m` to the ground: heights at nodes are rounded to 2^-10 m.
+// What a tile's mesh is held to, so that it keeps `error_m` to the ground: heights at nodes are rounded to 2^-10 m, and
+// their positions are a little off as well.
 double MeshError(double error_m) {
-  constexpr double kRounding = 0x1p-11 + 0x1p-14;  // and what positions are rounded by, as slopes mostly are
+  constexpr double kRounding = 0x1p-11 + 0x1p-14;
   return std::max(error_m - kRounding, error_m / 2);
 }
 

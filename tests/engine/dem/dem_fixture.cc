@@ -70,6 +70,12 @@ std::unique_ptr<DemSource> OpenOrFail(const std::string& path, const DemOptions&
   return source ? *std::move(source) : nullptr;
 }
 
+std::unique_ptr<DemSource> OpenOrFail(const std::vector<DemFile>& files, const DemOptions& options) {
+  auto source = DemSource::Open(files, options);
+  EXPECT_TRUE(source.has_value()) << source.error().message;
+  return source ? *std::move(source) : nullptr;
+}
+
 std::vector<geo::TileKey> SomeTiles(const DemSource& source, int level, int count) {
   std::vector<geo::TileKey> keys;
   for (const geo::TileRange& range : source.Available(level)) {

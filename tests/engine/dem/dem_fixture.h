@@ -51,6 +51,7 @@ std::optional<std::string> TestDataFile(const std::string& name);
 
 // Opens or fails the test; null then.
 std::unique_ptr<DemSource> OpenOrFail(const std::string& path, const DemOptions& options = {});
+std::unique_ptr<DemSource> OpenOrFail(const std::vector<DemFile>& files, const DemOptions& options = {});
 
 // Tiles across the available ranges of a level, at most about `count`.
 std::vector<geo::TileKey> SomeTiles(const DemSource& source, int level, int count);
