@@ -1,14 +1,16 @@
 // Data-dependent triangulation: which triangles an inserted vertex replaces, by how well they fit the samples.
 //
-// Garland and Heckbert (1997), section 3.4. Around a new vertex p, an edge (u, v) of the cavity's outline is suspect:
-// the quadrilateral (p, u, w, v) with the triangle beyond it is cut by u-v or by p-w, whichever fits better, and the
-// edges that take its place are suspect in turn. Spokes (edges at p) are not. Each test is a function of its
-// quadrilateral alone, so that the cavity does not depend on the order of the tests, on the triangle that the insertion
-// starts from, or on slots.
+//        w           Garland and Heckbert (1997), section 3.4. Around a new vertex p, an edge (u, v) of the cavity's
+//       / \          outline is suspect: the quadrilateral (p, u, w, v) with the triangle beyond it is cut by u-v or by
+//      /   \         p-w, whichever fits better, and the edges that take its place are suspect in turn. Spokes (edges
+//     u-----v        at p) are not. Each test is a function of its quadrilateral alone, so that the cavity does not
+//      \   /         depend on the order of the tests, on the triangle that the insertion starts from, or on slots.
+//        p
 //
-// Scanned once: a triangle that was scanned for a test and ends up in the star is not scanned for its candidate again.
-// The test is lazy: first the shape, then the two samples whose errors are known to be largest, and the new triangles
-// only where p-w can still fit better. The outcome is that of the full test.
+// So tests may wait for each other. The walk around p takes what the shape decides; then one scan fits the triangles of
+// the outline it has found and both of the other cut wherever the fit decides; edges that have come into the outline
+// are the next round. A scan costs more to begin than its triangles do, and what it finds of the final ones is not
+// looked for again: they are scanned once.
 //
 // Whatever is chosen here, candidates are the exact worst samples of the final triangles: the bound is kept as with any
 // other criterion.
@@ -16,12 +18,11 @@
 // Not thread-safe; different objects are independent.
 #pragma once
 
-#include <algorithm>
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
+#include "engine/tin/fit_errors.h"
 #include "engine/tin/greedy.h"
 #include "engine/tin/height_field.h"
 #include "engine/tin/quadrilateral.h"
@@ -49,65 +50,82 @@ class DataDependentCriterion {
  private:
   static constexpr double kUnknown = -1;
   static constexpr std::size_t kLikelyEdges = 64;  // of an outline
-  static constexpr std::size_t kMostFitted = 4;    // triangles at once
+  static constexpr std::size_t kSpareSlots = std::size_t{1} << 10;
+  static constexpr std::size_t kMostPairs = (Star::kMostLeftOut + 1) / 3;  // in a scan of nothing else
+  static constexpr std::uint32_t kBetweenPairs = 0b100'100'100'100'100'100'100'100'100'100;
 
-  // How well a triangle fits that has its last corner at p.
+  // Of a triangle with p.
   struct Fit {
-    double error = kUnknown;  // by the measure
-    double distance = -1;     // of the sample that is furthest off, as PlaneMisfit has it; with maxima only
-    std::uint32_t worst = kNoSample;
-  };
-  using FitId = std::uint32_t;
-  static constexpr FitId kUnknownFit = 0;
-
-  // What is remembered of a triangle, by slot.
-  struct KnownFit {
+    PlaneMisfit misfit;  // with maxima only
     double error = kUnknown;
-    std::uint32_t worst = kNoSample;  // the sample that is furthest off
-    float worst_height = 0;           // beside it: a test need not fetch it from the field
   };
 
-  bool UsesMaxima() const { return options_.measure == FitMeasure::kSumMax || options_.measure == FitMeasure::kMaxMax; }
-  double Combine(double a, double b) const { return options_.measure == FitMeasure::kMaxMax ? std::max(a, b) : a + b; }
+  // An edge whose quadrilateral may be cut the other way.
+  struct Suspect {
+    std::uint32_t edge = 0;  // by its place in the outline
+    HalfEdgeId outside = 0;
+    bool is_certain = false;        // for its shape
+    bool is_shaped_better = false;  // along p-w
+    Triangulation::Beyond beyond;
+  };
 
-  void Begin(TriangleId triangle);
-  bool Absorbs(const RingVertex& u, const RingVertex& v, const RingVertex& w, HalfEdgeId back, WalkPlace place);
-  void Keep(WalkPlace place);
-  void End(const Star& star);
-  bool IsBetterAlongPw(const Quadrilateral& q, TriangleId beyond, FitId& uv, FitId& halves);
-  void RaiseLeastErrors(const Quadrilateral& q, std::uint32_t sample, float height, std::array<double, 2>& least) const;
-  KnownFit FitBeyond(TriangleId t);
-  KnownFit Remembered(const Fit& fit) const;
-  template <std::size_t kVertices>
-  FitId FitAround(const Triangulation::Vertex& p, const std::array<RingVertex, kVertices>& ring);
-  Fit FitOf(const PlaneMisfit& misfit, SamplePosition p, float p_height, const RingVertex& u,
-            const RingVertex& v) const;
-  double WorstOnBorders(SamplePosition p, float p_height, const RingVertex& u, const RingVertex& v) const;
-  bool IsInside(int x, int y) const;
+  // One that is cut the other way: u-w and w-v take its place.
+  struct Flip {
+    std::uint32_t edge = 0;
+    Triangulation::Beyond beyond;
+    Fit of_uw, of_wv;  // of (u, w, p) and (w, v, p)
+  };
+
+  // Of an outline that is being changed, linked in its order: from u to the next one's.
+  struct Edge {
+    RingVertex u;
+    HalfEdgeId outside = 0;
+    std::uint32_t next = 0;
+    Fit fit;
+  };
+
+  struct Ends {
+    RingVertex u, v;
+  };
+
+  Star& OutlineByShape(const Triangulation::Vertex& vertex, TriangleId triangle);
+  bool IsDecided(const ShapeQuality& quality) const;
+  void FitOutline(Star& star);
+  void FitSuspects(const Star& star, std::size_t first);
+  void FitOneByOne(const Star& star, const Suspect& suspect);
+  std::size_t PutPair(Star& star, std::size_t end, const Ends& ends, const Triangulation::Beyond& beyond) const;
+  void Decide(const Suspect& suspect, const PlaneMisfit* misfits, const double* errors);
+  void ReplaceEdges(Star& star);
+  void ReplaceEdge(Star& star, const Flip& flip);
+  void SuspectEdge(Star& star, std::uint32_t index);
+  Ends EndsOf(const Star& star, std::uint32_t edge) const;
+  double& NearError(std::uint32_t edge) { return edge_count_ == 0 ? errors_[edge] : edges_[edge].fit.error; }
+  double ErrorBeyond(TriangleId t);
+  void PrefetchError(TriangleId t) const;
   void MakeRoom(const Star& star);
   void CoverSlots();
 
-  const HeightField* field_;
-  const Sagitta* sagitta_;
   Triangulation* triangulation_;
   DataDependentOptions options_;
-  StarScan scan_star_ = BestStarScan();
-
-  LargeArray<KnownFit> known_;  // by slot
+  FitErrors fit_errors_;
+  LargeArray<double> errors_by_slot_;
 
   // Of the insertion at work.
   Triangulation::Vertex vertex_;
-  std::vector<Fit> fits_ = std::vector<Fit>(4 * kLikelyEdges);  // the first one is unknown
-  std::uint32_t fit_count_ = 1;
-  std::vector<FitId> pending_ = std::vector<FitId>(kLikelyEdges);  // by WalkPlace::pending, from 1 on
-  std::array<FitId, 2> split_;                                     // beyond the edge that the vertex lies on
-  std::vector<FitId> kept_ = pending_;                             // by edge of the outline
+  std::vector<Suspect> suspects_ = std::vector<Suspect>(kLikelyEdges);
+  std::vector<Flip> flips_ = std::vector<Flip>(kLikelyEdges);
+  std::vector<Edge> edges_ = std::vector<Edge>(kLikelyEdges);
+  std::size_t suspect_count_ = 0, flip_count_ = 0;
+  std::size_t edge_count_ = 0;  // 0 as long as the outline is the star's
+  Star pairs_;
+  std::vector<PlaneMisfit> pair_misfits_ = std::vector<PlaneMisfit>(3 * kMostPairs + FitErrors::kPadding);
+  std::vector<double> pair_errors_ = std::vector<double>(3 * kMostPairs + FitErrors::kPadding);
 
   // Of the last star.
   VertexId centre_ = 0;
   std::size_t count_ = 0;
   std::vector<PlaneMisfit> misfits_;
-  Star scratch_;
+  std::vector<double> errors_;
 };
 
 }  // namespace terrace::tin

@@ -1,7 +1,6 @@
 #include "engine/tin/greedy.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <optional>
 #include <utility>
@@ -30,13 +29,6 @@ void CheckOptions(const GreedyOptions& options) {
       TERRACE_CHECK(std::isfinite(value) && value >= 0);
     }
   }
-}
-
-// A distance, or 0 for a negative one. By its sign: a maximum becomes a branch, and whether a triangle has samples
-// cannot be foretold.
-double NoneIsZero(double distance) {
-  const auto bits = std::bit_cast<std::int64_t>(distance);
-  return std::bit_cast<double>(bits & ~(bits >> 63));
 }
 
 std::size_t CountValid(const HeightField& field) {
@@ -262,7 +254,7 @@ void GreedyTriangulation::Impl::ScanStarOf(const Star& star) {
   const std::uint32_t* const slots = star.triangles.data();
   if (is_plain) {
     candidates_.SetAll(slots, star.count, [misfits](std::size_t i) {
-      return Candidate{NoneIsZero(misfits[i].distance), misfits[i].sample};
+      return Candidate{DistanceOrZero(misfits[i]), misfits[i].sample};
     });
   } else {
     candidates_.SetAll(slots, star.count, [&](std::size_t i) { return CandidateOf(star, i, misfits[i]); });

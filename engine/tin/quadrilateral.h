@@ -52,14 +52,11 @@ inline IntVector BoxDiameters(const RingVertex& u_vertex, const RingVertex& v_ve
 }
 
 inline ShapeQuality ShapeQualityOf(const Quadrilateral& q) {
-  const std::int32_t uvp = Cross(q.u, q.v), uwp = Cross(q.u, q.w), wvp = Cross(q.w, q.v);
-  const std::int64_t vuw = std::int64_t{uwp} + wvp - uvp;
+  const double uvp = Cross(q.u, q.v), uwp = Cross(q.u, q.w), wvp = Cross(q.w, q.v);
   const IntVector diameters = BoxDiameters(q.u, q.v, q.w);
-  // Instead of a division by the one, a multiplication by the other.
-  const std::int64_t of_pw = std::int64_t{diameters[0]} * diameters[1];
-  const std::int64_t of_uv = std::int64_t{diameters[2]} * diameters[3];
-  return {static_cast<double>(uvp) * static_cast<double>(vuw) * static_cast<double>(of_pw),
-          static_cast<double>(uwp) * static_cast<double>(wvp) * static_cast<double>(of_uv)};
+  // Instead of a division by the one, a multiplication by the other. Below 2^30.
+  const double of_pw = diameters[0] * diameters[1], of_uv = diameters[2] * diameters[3];
+  return {uvp * (uwp + wvp - uvp) * of_pw, uwp * wvp * of_uv};
 }
 
 // The upward normal (x, y, 1) of the plane through three vertices, in metres per sample.

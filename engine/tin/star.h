@@ -55,12 +55,17 @@ struct Star {
   bool is_closed = true;
   bool has_border = false;  // some triangle may have an edge on the border
   std::size_t count = 0;
+  // For scans: a set of bits, triangles of the first kMostLeftOut that there are none of. A ring may hold several fans.
+  static constexpr std::size_t kMostLeftOut = 32;
+  std::uint32_t left_out = 0;
   // Of an open one: the edge of the walk's outline that holds the centre. The ring begins after it.
   std::size_t gap = 0;
   Ring ring;
   std::vector<TriangleId> triangles;  // `count` of them are valid; those of an insertion are padded as a ring is
   std::vector<HalfEdgeId> outside;    // by triangle: the twin of the ring's edge
   std::size_t removed_count = 0;      // the first slots of `triangles` are those of triangles that were removed
+
+  bool IsLeftOut(std::size_t i) const { return i < kMostLeftOut && (left_out >> i & 1) != 0; }
 };
 
 inline void Ring::Grow(std::size_t capacity) {

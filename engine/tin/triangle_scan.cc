@@ -211,7 +211,9 @@ HWY_INLINE void ScanTogether(const HeightField& field, const Star& star, const S
 
 void ScanStar(const HeightField& field, const Star& star, PlaneMisfit* misfits) {
 #if HWY_TARGET == HWY_SCALAR
-  for (std::size_t i = 0; i < star.count; ++i) misfits[i] = ScanExactly(field, ExactPlaneOf(field, star, i));
+  for (std::size_t i = 0; i < star.count; ++i) {
+    if (!star.IsLeftOut(i)) misfits[i] = ScanExactly(field, ExactPlaneOf(field, star, i));
+  }
 #else
   StarPlanes planes;
   const std::size_t lanes = hn::Lanes(kFloats);
@@ -219,7 +221,8 @@ void ScanStar(const HeightField& field, const Star& star, PlaneMisfit* misfits) 
   for (std::size_t first = 0; first < star.count; first += lanes) {
     planes.Work(field, star, first);
     const std::size_t count = std::min(lanes, star.count - first);
-    ScanTogether(field, star, planes, first, (1U << count) - 1, most_exact, misfits + first);
+    const std::uint32_t left_out = first < Star::kMostLeftOut ? star.left_out >> first : 0;
+    ScanTogether(field, star, planes, first, ((1U << count) - 1) & ~left_out, most_exact, misfits + first);
   }
 #endif
 }

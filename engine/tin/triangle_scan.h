@@ -12,6 +12,7 @@
 // Safe to call from many threads at once.
 #pragma once
 
+#include <bit>
 #include <cstdint>
 
 #include "engine/tin/candidate.h"
@@ -25,8 +26,15 @@ struct PlaneMisfit {
   std::uint32_t sample = kNoSample;  // its number; the smallest of equally distant samples
 };
 
-// misfits[i] is that of triangle i of the star. Precondition: vertices have the heights of the field, or any where that
-// is void.
+// Its distance, or 0 where there are no samples. By its sign: a maximum becomes a branch, and whether a triangle has
+// samples cannot be foretold.
+inline double DistanceOrZero(const PlaneMisfit& misfit) {
+  const auto bits = std::bit_cast<std::int64_t>(misfit.distance);
+  return std::bit_cast<double>(bits & ~(bits >> 63));
+}
+
+// misfits[i] is that of triangle i of the star; of one that is left out it is anything. Precondition: vertices have the
+// heights of the field, or any where that is void.
 using StarScan = void (*)(const HeightField& field, const Star& star, PlaneMisfit* misfits);
 
 // The scan for this processor.

@@ -83,6 +83,11 @@ void Triangulation::Grow() {
   star_.outside.resize(capacity);
 }
 
+void Triangulation::Remove(TriangleId t) {
+  if (star_.removed_count + 5 > pending_.size()) Grow();  // as for the walk
+  star_.triangles[star_.removed_count++] = t;
+}
+
 void Triangulation::Widen() {
   wide_.slots.reserve(2 * narrow_.slots.size());
   for (TriangleId t = 0; t < narrow_.slots.size(); ++t) {

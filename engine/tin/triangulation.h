@@ -74,6 +74,27 @@ class Triangulation {
 
   const Star& InsertDelaunay(const Vertex& vertex, TriangleId triangle);
 
+  // The same in steps, for a criterion that asks about several edges at once. First the outline of what `absorbs` takes
+  // alone: the star's ring, and `outside` by edge, all but the triangles. Whoever calls may then replace an edge of it
+  // by the two others of the triangle beyond, in both, once that is told by Remove. At last the star is filled.
+  template <typename Absorbs, typename Keeps>
+  Star& Outline(const Vertex& vertex, TriangleId triangle, Absorbs&& absorbs, Keeps&& keeps);
+  void Remove(TriangleId t);
+  const Star& Fill();
+
+  // The triangle beyond an edge from u to v of an outline, seen from the outline's inside. Twins are as in `outside`.
+  struct Beyond {
+    RingVertex w;
+    HalfEdgeId uw = 0, wv = 0;
+  };
+  bool IsBorder(HalfEdgeId outside) const {
+    return outside == (is_wide_ ? WideTriangles::kNone : NarrowTriangles::kNone);
+  }
+  // Precondition: not at the border.
+  Beyond BeyondOf(HalfEdgeId outside, SamplePosition point) const {
+    return is_wide_ ? BeyondOf(wide_, outside, point) : BeyondOf(narrow_, outside, point);
+  }
+
   // A triangle that contains the point, inside, on an edge or as a corner, found by a walk from `start`; should the
   // walk turn in circles, which it can where triangles are not Delaunay, by looking at all of them.
   TriangleId Locate(SamplePosition point, TriangleId start) const;
@@ -87,6 +108,14 @@ class Triangulation {
   }
   void PrefetchAround(TriangleId t) const;
   void PrefetchBeyond(TriangleId t) const;
+  // What BeyondOf reads first. Of an edge on the border it is some address, which does no harm.
+  void PrefetchAcross(HalfEdgeId outside) const {
+    const std::size_t t = outside / 4;
+    const auto address =
+        is_wide_ ? reinterpret_cast<std::uintptr_t>(wide_.slots.data()) + t * sizeof(WideTriangles::Triangle)
+                 : reinterpret_cast<std::uintptr_t>(narrow_.slots.data()) + t * sizeof(NarrowTriangles::Triangle);
+    __builtin_prefetch(reinterpret_cast<const void*>(address));
+  }
 
   TinMesh Mesh() const;
 
@@ -123,7 +152,13 @@ class Triangulation {
   template <typename Triangles, typename Absorbs, typename Keeps>
   void Replace(Triangles& triangles, SamplePosition point, TriangleId triangle, Absorbs&& absorbs, Keeps&& keeps);
   template <typename Triangles>
-  void FillCavity(Triangles& triangles, std::size_t edges);
+  Beyond BeyondOf(const Triangles& triangles, HalfEdgeId outside, SamplePosition point) const {
+    const auto& beyond = triangles.slots[outside / 4];
+    return {Relative(vertices_.data(), beyond.opposite(outside % 4), point), beyond.next_twin(outside % 4),
+            beyond.previous_twin(outside % 4)};
+  }
+  template <typename Triangles>
+  void FillCavity(Triangles& triangles);
   void OpenRing(std::size_t edges);
   template <typename Triangles>
   static HalfEdgeId TwinIn(const Triangles& triangles, HalfEdgeId edge) {
@@ -175,6 +210,12 @@ constexpr bool Sees(const RingVertex& u, const RingVertex& v, const RingVertex& 
 
 template <typename Absorbs, typename Keeps>
 const Star& Triangulation::Insert(const Vertex& vertex, TriangleId triangle, Absorbs&& absorbs, Keeps&& keeps) {
+  Outline(vertex, triangle, absorbs, keeps);
+  return Fill();
+}
+
+template <typename Absorbs, typename Keeps>
+Star& Triangulation::Outline(const Vertex& vertex, TriangleId triangle, Absorbs&& absorbs, Keeps&& keeps) {
   star_.centre = static_cast<VertexId>(vertices_.size());
   star_.x = vertex.position.x;
   star_.y = vertex.position.y;
@@ -259,7 +300,17 @@ void Triangulation::Replace(Triangles& triangles, SamplePosition point, Triangle
     --top;
   }
   star_.removed_count = removed;
-  FillCavity(triangles, edges);
+  if (star_.is_closed) {
+    star_.ring.Repeat(0, edges);
+  } else {
+    OpenRing(edges--);
+  }
+  star_.count = edges;
+}
+
+inline const Star& Triangulation::Fill() {
+  is_wide_ ? FillCavity(wide_) : FillCavity(narrow_);
+  return star_;
 }
 
 //      u3---u2                u3---u2
@@ -268,13 +319,8 @@ void Triangulation::Replace(Triangles& triangles, SamplePosition point, Triangle
 //     \       /              \ / \ t0/            triangle.
 //      u5---u0                u5---u0
 template <typename Triangles>
-void Triangulation::FillCavity(Triangles& triangles, std::size_t edges) {
-  if (star_.is_closed) {
-    star_.ring.Repeat(0, edges);
-  } else {
-    OpenRing(edges--);
-  }
-  star_.count = edges;
+void Triangulation::FillCavity(Triangles& triangles) {
+  const std::size_t edges = star_.count;
   TriangleId* const made = star_.triangles.data();  // those of what was removed come first, and are there
   const auto appended = static_cast<TriangleId>(triangles.slots.size());
   TERRACE_CHECK(appended < kNone / 4 - 2);

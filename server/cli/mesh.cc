@@ -258,8 +258,9 @@ void AddMesh(CLI::App& app, int& exit_code) {
       ->check(OneOf(kMeasures))
       ->type_name("NAME");
   command
-      ->add_option("--qthresh", arguments->qthresh,
-                   "Data-dependent: 0 looks at the fit alone, 1 at the shape of triangles alone (default 0.5)")
+      ->add_option(
+          "--qthresh", arguments->qthresh,
+          "Data-dependent: 0 looks at the fit alone, 1 at the shape of triangles wherever it differs (default 0.5)")
       ->check(NumberFrom(0, 1, "a number from 0 to 1"))
       ->type_name("SHARE");
   command->add_option("--threads", arguments->threads, "Threads to use at most; the mesh does not depend on it")

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <optional>
 #include <set>
 #include <utility>
@@ -17,6 +18,7 @@
 #include "engine/tin/mesh_error.h"
 #include "engine/tin/predicates.h"
 #include "engine/tin/quadrilateral.h"
+#include "engine/tin/sagitta.h"
 #include "engine/tin/squared_distances.h"
 #include "tests/engine/tin/mesh_laws.h"
 #include "tests/engine/tin/test_fields.h"
@@ -73,6 +75,13 @@ class NaiveDataDependent {
  public:
   NaiveDataDependent(const HeightField& field, DataDependentOptions options)
       : field_(field), options_(options), triangulation_(field) {}
+
+  TinMesh Mesh() const { return triangulation_.Mesh(); }
+
+  void Insert(SamplePosition at) { Insert(SampleNumber(at.x, at.y), triangulation_.Locate(at, 0)); }
+  void InsertDelaunay(SamplePosition at) {
+    triangulation_.InsertDelaunay(Triangulation::VertexAt(field_, at.x, at.y), triangulation_.Locate(at, 0));
+  }
 
   TinMesh Run(double max_error) {
     for (;;) {
@@ -142,7 +151,7 @@ class NaiveDataDependent {
   bool Swaps(const Quadrilateral& q, const Corner& p, TriangleId beyond) const {
     const ShapeQuality quality = ShapeQualityOf(q);
     const bool is_shaped_better = quality.pw > quality.uv;
-    if (std::min(quality.uv, quality.pw) <= options_.qthresh * std::max(quality.uv, quality.pw)) {
+    if (std::min(quality.uv, quality.pw) < options_.qthresh * std::max(quality.uv, quality.pw)) {
       return is_shaped_better;
     }
     if (options_.measure == FitMeasure::kNormals) return BendsLessAlongPw(q);
@@ -201,6 +210,39 @@ TEST(DataDependent, ChoosesAsTheFullTestWhereShapeAndFitTakeTurns) {
     ASSERT_TRUE(AreEqual(MeshAt(field, {0.5}, DataDependent(measure, qthresh)),
                          NaiveDataDependent(field, {measure, qthresh}).Run(0.5)))
         << seed << ", measure " << static_cast<int>(measure) << ", " << qthresh;
+  }
+}
+
+// Two rings of vertices close to each other, and then their middle: the inner one becomes its outline, and what is
+// beyond each of its edges is a matter of the fit. More pairs than one scan takes.
+TEST(DataDependent, ChoosesAsTheFullTestOfOutlinesOfManyEdges) {
+  constexpr int kMiddle = 40, kEdges = 24;
+  std::vector<SamplePosition> rings;
+  for (const auto& [radius, turn] : {std::pair(30.0, 0.0), {34.0, 0.5}}) {
+    for (int i = 0; i < kEdges; ++i) {
+      const double angle = (i + turn) * 2 * std::numbers::pi / kEdges;
+      rings.push_back({static_cast<std::uint16_t>(std::lround(kMiddle + radius * std::cos(angle))),
+                       static_cast<std::uint16_t>(std::lround(kMiddle + radius * std::sin(angle)))});
+    }
+  }
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    const HeightField field = HillField(2 * kMiddle + 1, 2 * kMiddle + 1, seed);
+    const Sagitta flat({}, field.height());
+    for (const FitMeasure measure : kMeasures) {
+      Triangulation triangulation(field);
+      NaiveDataDependent naive(field, {measure, 0.45});
+      for (const SamplePosition at : rings) {
+        triangulation.InsertDelaunay(Triangulation::VertexAt(field, at.x, at.y), triangulation.Locate(at, 0));
+        naive.InsertDelaunay(at);
+      }
+      DataDependentCriterion criterion(field, flat, triangulation, {measure, 0.45});
+      const SamplePosition middle{kMiddle, kMiddle};
+      const Star& star =
+          criterion.Insert(Triangulation::VertexAt(field, kMiddle, kMiddle), triangulation.Locate(middle, 0));
+      naive.Insert(middle);
+      EXPECT_TRUE(AreEqual(triangulation.Mesh(), naive.Mesh())) << seed << ", measure " << static_cast<int>(measure);
+      EXPECT_GE(star.count, std::size_t{kEdges});
+    }
   }
 }
 

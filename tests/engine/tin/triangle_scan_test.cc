@@ -352,6 +352,35 @@ TEST(TriangleScan, ScansStarsOfAnySize) {
   }
 }
 
+// What is left out has any corners: a ring may hold several fans one behind the other.
+TEST(TriangleScan, LeavesOutWhatIsNoTriangle) {
+  for (std::uint64_t seed = 0; seed < 200; ++seed) {
+    Random random(seed);
+    const HeightField field = NoiseField(24, 24, seed);
+    const SamplePosition p = RandomSample(random, field);
+    std::vector<SamplePosition> ring = {RandomSample(random, field)};
+    std::uint32_t left_out = 0;
+    for (int i = random.Below(static_cast<int>(Star::kMostLeftOut)); i >= 0; --i) {
+      const SamplePosition next = RandomSample(random, field);
+      const bool is_left_out = Orientation(p, ring.back(), next) <= 0 || random.Below(4) == 0;
+      left_out |= std::uint32_t{is_left_out} << (ring.size() - 1);
+      ring.push_back(next);
+    }
+    Star star = *TestStar(field, p, ring);
+    star.left_out = left_out;
+    ForEachInstructionSet([&] {
+      std::vector<PlaneMisfit> misfits(star.count);
+      BestStarScan()(field, star, misfits.data());
+      for (std::size_t i = 0; i < star.count; ++i) {
+        if (star.IsLeftOut(i)) continue;
+        const PlaneMisfit expected = Reference(field, star, i);
+        ASSERT_EQ(misfits[i].distance, expected.distance) << seed << ", triangle " << i;
+        ASSERT_EQ(misfits[i].sample, expected.sample) << seed << ", triangle " << i;
+      }
+    });
+  }
+}
+
 TEST(TriangleScan, ReachesTheLargestTriangleOfTheLongestField) {
   constexpr int kLength = HeightField::kMaxSide;
   const HeightField field = MakeField(kLength, 3, [](int x, int y) { return x == kLength - 3 && y == 1 ? 9.f : 0.f; });
