@@ -53,10 +53,12 @@ def replace(path, by):
 
 
 class Server:
-    def __init__(self, *arguments):
+    def __init__(self, *arguments, meanwhile=lambda server: None):
+        """`meanwhile` is called while it starts."""
         self.log_file = tempfile.TemporaryFile("w+")
         self.process = subprocess.Popen([BINARY, "serve", "--listen", "127.0.0.1:0", *map(str, arguments)],
                                         stdout=subprocess.PIPE, stderr=self.log_file, text=True)
+        meanwhile(self)
         ready = self.process.stdout.readline()
         match = re.search(r"http://127\.0\.0\.1:(\d+)", ready)
         if not match:
@@ -159,8 +161,8 @@ class ReloadTest(unittest.TestCase):
             if server.process.poll() is None:
                 self.assertEqual(server.stop(), 0)
 
-    def serve(self, *arguments):
-        server = Server(*arguments)
+    def serve(self, *arguments, **more):
+        server = Server(*arguments, **more)
         self.servers.append(server)
         return server
 
@@ -437,6 +439,19 @@ class Configuration(ReloadTest):
             self.assertIn("READY=1", manager.recv(4096).decode())
             self.assertEqual(server.stop(), 0)
             self.assertIn("STOPPING=1", manager.recv(4096).decode())
+
+    def test_signals_wait_until_it_runs(self):
+        (self.folder / NAME).write_bytes(b"\1\0" * 3601 ** 2)  # takes a moment to be read
+
+        def send(server):
+            self.assertTrue(eventually(lambda: "dataset d0" in server.log()), server.log())
+            for number in (signal.SIGHUP, signal.SIGUSR1):
+                server.process.send_signal(number)
+
+        config = {"datasets": [{"name": f"d{i}", "sources": [NAME]} for i in range(8)]}
+        server = self.serve("--config", self.write_config(config), meanwhile=send)
+        self.assertTrue(eventually(lambda: "the configuration is as it was" in server.log()
+                                   and "log level: debug" in server.log()), server.log())
 
     def test_the_log_level_changes_while_it_runs(self):
         config = {"datasets": [self.dataset("a")], "log_level": "warn"}
