@@ -395,6 +395,21 @@ class Configuration(ReloadTest):
         self.assertTrue(eventually(lambda: self.names(server) == ["b"]))
         self.assertEqual(server.get("/a/0/0/0.terrain")[0], 404)
 
+    def test_who_sees_a_dataset_that_comes_back_as_another_is_told(self):
+        token = {"name": "team", "token": "0123456789abcdef"}
+        public, other = self.dataset("a", public=True), self.dataset("b")
+        server = self.serve("--config", self.write_config({"tokens": [token], "datasets": [public, other]}))
+        warning = '"public" of dataset a has changed'
+        self.write_config({"tokens": [token], "datasets": [other]})
+        self.assertTrue(eventually(lambda: server.get("/a/layer.json")[0] == 404), server.log())
+        self.assertNotIn(warning, server.log())
+        self.write_config({"tokens": [token], "datasets": [other, self.dataset("a")]})
+        self.assertTrue(eventually(lambda: server.get("/a/layer.json")[0] == 200), server.log())
+        self.assertIn(f"{warning}, which takes a restart; until then everybody sees it", server.log())
+        self.write_config({"tokens": [token], "datasets": [other, public, self.dataset("c", public=True)]})
+        self.assertTrue(eventually(lambda: "until then it takes a token to see it" in server.log()), server.log())
+        self.assertEqual(server.log().count(warning), 1)  # it is as it was at the start
+
     def test_a_glob_finds_what_is_put_into_its_folder(self):
         home = self.folder / "dems"
         home.mkdir()
