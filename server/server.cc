@@ -332,7 +332,7 @@ std::vector<Error> Server::TryFiles(const ServerOptions& options) {
     if (!opened) errors.push_back(opened.error());
   };
   note(StaticFiles::Load(options.viewer_dir));
-  note(AccessLog::Open(options.access_log, options.access_log_file));
+  note(AccessLog::Try(options.access_log, options.access_log_file));
   note(Edge::Open(options.edge, DescriptorsForFiles(options)));
   return errors;
 }
