@@ -121,6 +121,7 @@ class Server::Impl {
       ++catalogs_;
     }
     tiles_.RetainTilesOf(*catalog);
+    metrics_.RetainDatasets(catalog->datasets);
   }
 
   void SetTroubles(std::map<std::string, std::string> troubles) {
