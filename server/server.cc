@@ -212,7 +212,7 @@ class Server::Impl {
     handler.cache_control = options.cache_control;
     handler.deadline = options.request_deadline;
     return std::make_shared<const Routes>(std::move(catalog), tiles_, viewer_, std::move(handler),
-                                          options.max_locations, RouteState());
+                                          options_.max_locations, RouteState());
   }
 
   std::shared_ptr<const Routes> CurrentRoutes() const {

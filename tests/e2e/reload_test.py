@@ -387,10 +387,13 @@ class Configuration(ReloadTest):
 
     def test_the_file_is_watched_and_datasets_come_and_go(self):
         server = self.serve("--config", self.write_config({"datasets": [self.dataset("a")]}))
-        self.write_config({"datasets": [self.dataset("b"), self.dataset("a", attribution="new")], "max_connections": 7})
+        self.write_config({"datasets": [self.dataset("b"), self.dataset("a", attribution="new")], "max_connections": 7,
+                           "max_locations": 1})
         self.assertTrue(eventually(lambda: self.names(server) == ["b", "a"]
                                    and server.json("/datasets")["datasets"][1]["attribution"] == "new"), server.log())
         self.assertIn("max_connections has changed, which takes a restart", server.log())
+        self.assertIn("max_locations has changed, which takes a restart; until then the old value holds", server.log())
+        self.assertEqual(server.get("/a/heights?locations=36.3,-84.2|36.3,-84.1")[0], 200)
         self.write_config({"datasets": [self.dataset("b")]})
         self.assertTrue(eventually(lambda: self.names(server) == ["b"]))
         self.assertEqual(server.get("/a/0/0/0.terrain")[0], 404)
