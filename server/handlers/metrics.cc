@@ -266,10 +266,12 @@ void Metrics::CountBuild(const DatasetView& dataset, const Result<TilePtr>& tile
 }
 
 void Metrics::RetainDatasets(const std::vector<DatasetView>& datasets) {
-  const std::unique_lock lock(families_->mutex);
+  std::set<std::string_view> served = {""};  // what has no dataset stays as well
+  for (const DatasetView& dataset : datasets) served.insert(dataset.name);
+  const std::unique_lock lock(families_->mutex);  // every reply waits for it
   std::erase_if(families_->of_datasets, [&](const auto& known) {
     const auto& [name, metrics] = known;
-    if (name.empty() || std::ranges::find(datasets, name, &DatasetView::name) != datasets.end()) return false;
+    if (served.contains(name)) return false;
     families_->Forget(name, metrics);
     return true;
   });
