@@ -38,7 +38,7 @@ std::optional<std::uint16_t> ParsePort(std::string_view text) {
 
 Result<ListenAddress> ParseListenAddress(std::string_view text) {
   const std::size_t colon = text.rfind(':');
-  if (colon == std::string_view::npos) {
+  if (colon == std::string_view::npos || text.ends_with(']')) {
     return MakeError(ErrorCode::kInvalidArgument, "\"{}\" has no port; write {}", text, kExamples);
   }
   const std::optional<std::uint16_t> port = ParsePort(text.substr(colon + 1));

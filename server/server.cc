@@ -121,6 +121,7 @@ class Server::Impl {
       ++catalogs_;
     }
     tiles_.RetainTilesOf(*catalog);
+    metrics_.RetainDatasets(catalog->datasets);
   }
 
   void SetTroubles(std::map<std::string, std::string> troubles) {
@@ -211,7 +212,7 @@ class Server::Impl {
     handler.cache_control = options.cache_control;
     handler.deadline = options.request_deadline;
     return std::make_shared<const Routes>(std::move(catalog), tiles_, viewer_, std::move(handler),
-                                          options.max_locations, RouteState());
+                                          options_.max_locations, RouteState());
   }
 
   std::shared_ptr<const Routes> CurrentRoutes() const {
@@ -332,7 +333,7 @@ std::vector<Error> Server::TryFiles(const ServerOptions& options) {
     if (!opened) errors.push_back(opened.error());
   };
   note(StaticFiles::Load(options.viewer_dir));
-  note(AccessLog::Open(options.access_log, options.access_log_file));
+  note(AccessLog::Try(options.access_log, options.access_log_file));
   note(Edge::Open(options.edge, DescriptorsForFiles(options)));
   return errors;
 }

@@ -66,9 +66,9 @@ class Server {
   static Result<void> TryAddress(const ServerOptions& options);
 
   // Requests that come from now on are answered from `catalog`; those that have begun keep the one they began with.
-  // Cached tiles of datasets that stay in the same generation stay. Of `options`, cache_bytes, cache_control,
-  // request_deadline and max_locations are taken over. kInvalidArgument as above: nothing has changed then. From any
-  // thread, one at a time.
+  // Cached tiles of datasets that stay in the same generation stay. Of `options`, cache_bytes, cache_control and
+  // request_deadline are taken over. kInvalidArgument as above: nothing has changed then. From any thread, one at a
+  // time.
   Result<void> Replace(CatalogPtr catalog, const ServerOptions& options);
 
   // Stops and waits.

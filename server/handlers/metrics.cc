@@ -8,8 +8,10 @@
 
 #include <algorithm>
 #include <chrono>
+#include <functional>
 #include <map>
 #include <mutex>
+#include <set>
 #include <shared_mutex>
 #include <string>
 #include <string_view>
@@ -171,39 +173,68 @@ struct Metrics::Families {
     bool operator()(const OwnedLabels& a, const ReplyLabels& b) const { return a.View() < b; }
     bool operator()(const ReplyLabels& a, const OwnedLabels& b) const { return a < b.View(); }
   };
-  const Reply& ReplyOf(const ReplyRecord& record);
+  // What has one dataset as a label.
+  struct OfDataset {
+    std::set<prometheus::Counter*> requests, builds;
+    std::set<prometheus::Histogram*> durations, stages;
+  };
+  const Reply& AddReply(const ReplyRecord& record);
+  void Forget(const std::string& dataset, const OfDataset& metrics);
 
+  // Guards the maps and, held shared, keeps what they point at from being forgotten.
   std::shared_mutex mutex;
-  std::map<OwnedLabels, Reply, ByLabels> replies;  // guarded by mutex
+  std::map<OwnedLabels, Reply, ByLabels> replies;
+  std::map<std::string, OfDataset, std::less<>> of_datasets;
 };
 
-const Metrics::Families::Reply& Metrics::Families::ReplyOf(const ReplyRecord& record) {
-  {
-    const std::shared_lock lock(mutex);
-    const ReplyLabels labels{record.route, record.status, record.cache, record.dataset};
-    if (const auto found = replies.find(labels); found != replies.end()) return found->second;
-  }
+// `mutex` is held.
+const Metrics::Families::Reply& Metrics::Families::AddReply(const ReplyRecord& record) {
   OwnedLabels labels{std::string(record.route), std::string(record.cache), std::string(record.dataset), record.status};
   const std::string status = fmt::to_string(record.status);
   const Reply reply{
       requests.Add({{"route", labels.route}, {"dataset", labels.dataset}, {"status", status}}),
       durations.Add({{"route", labels.route}, {"dataset", labels.dataset}, {"cache", labels.cache}}, Seconds())};
-  const std::unique_lock lock(mutex);
+  OfDataset& of_dataset = of_datasets[labels.dataset];
+  of_dataset.requests.insert(&reply.count);
+  of_dataset.durations.insert(&reply.duration);
   return replies.emplace(std::move(labels), reply).first->second;
+}
+
+// Likewise.
+void Metrics::Families::Forget(const std::string& dataset, const OfDataset& metrics) {
+  std::erase_if(replies, [&](const auto& reply) { return reply.first.dataset == dataset; });
+  for (prometheus::Counter* count : metrics.requests) requests.Remove(count);
+  for (prometheus::Counter* count : metrics.builds) builds.Remove(count);
+  for (prometheus::Histogram* duration : metrics.durations) durations.Remove(duration);
+  for (prometheus::Histogram* stage : metrics.stages) stages.Remove(stage);
 }
 
 Metrics::Metrics() : families_(std::make_unique<Families>()) {}
 Metrics::~Metrics() = default;
 
 void Metrics::CountReply(const ReplyRecord& record) {
-  const Families::Reply& reply = families_->ReplyOf(record);
-  reply.count.Increment();
-  reply.duration.Observe(InSeconds(record.duration));
+  const auto count = [&](const Families::Reply& reply) {
+    reply.count.Increment();
+    reply.duration.Observe(InSeconds(record.duration));
+  };
+  {
+    const std::shared_lock lock(families_->mutex);
+    const Families::ReplyLabels labels{record.route, record.status, record.cache, record.dataset};
+    if (const auto found = families_->replies.find(labels); found != families_->replies.end()) {
+      return count(found->second);
+    }
+  }
+  const std::unique_lock lock(families_->mutex);
+  count(families_->AddReply(record));
 }
 
 void Metrics::CountBuild(const DatasetView& dataset, const Result<TilePtr>& tile) {
   const std::string_view result = tile ? "ok" : ToString(tile.error().code);
-  families_->builds.Add({{"dataset", dataset.name}, {"result", std::string(result)}}).Increment();
+  const std::unique_lock lock(families_->mutex);
+  Families::OfDataset& of_dataset = families_->of_datasets[dataset.name];
+  prometheus::Counter& builds = families_->builds.Add({{"dataset", dataset.name}, {"result", std::string(result)}});
+  builds.Increment();
+  of_dataset.builds.insert(&builds);
   if (!tile) {
     if (tile.error().code == ErrorCode::kUnavailable) families_->source_errors.Increment();
     return;
@@ -228,8 +259,22 @@ void Metrics::CountBuild(const DatasetView& dataset, const Result<TilePtr>& tile
                                                                       {"encode", times.encode},
                                                                       {"compress", times.compress}};
   for (const auto& [stage, time] : stages) {
-    families_->stages.Add({{"dataset", dataset.name}, {"stage", stage}}, Seconds()).Observe(InSeconds(time));
+    prometheus::Histogram& histogram = families_->stages.Add({{"dataset", dataset.name}, {"stage", stage}}, Seconds());
+    histogram.Observe(InSeconds(time));
+    of_dataset.stages.insert(&histogram);
   }
+}
+
+void Metrics::RetainDatasets(const std::vector<DatasetView>& datasets) {
+  std::set<std::string_view> served = {""};  // what has no dataset stays as well
+  for (const DatasetView& dataset : datasets) served.insert(dataset.name);
+  const std::unique_lock lock(families_->mutex);  // every reply waits for it
+  std::erase_if(families_->of_datasets, [&](const auto& known) {
+    const auto& [name, metrics] = known;
+    if (served.contains(name)) return false;
+    families_->Forget(name, metrics);
+    return true;
+  });
 }
 
 std::string Metrics::Text(const TileService::Stats& tiles, const ByteCacheStats& refinements,

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "server/http/access_log.h"
 #include "server/http/edge.h"
@@ -20,6 +21,10 @@ class Metrics {
 
   void CountReply(const ReplyRecord& record);
   void CountBuild(const DatasetView& dataset, const Result<TilePtr>& tile);
+
+  // Forgets what was counted of other datasets: names come and go for as long as the server runs. A reply that began
+  // before may still count for one that is gone, until the next call.
+  void RetainDatasets(const std::vector<DatasetView>& datasets);
 
   struct ServerState {
     EdgeStats edge;

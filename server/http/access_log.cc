@@ -55,10 +55,24 @@ std::string_view ClientOf(const ReplyRecord& record) {
 
 std::string_view ProtocolOf(const ReplyRecord& record) { return record.version == 10 ? "HTTP/1.0" : "HTTP/1.1"; }
 
-// -1: errno tells why not.
-int OpenToAppend(const std::filesystem::path& file) {
+// `create`: O_CREAT or 0. -1: errno tells why not.
+int OpenToAppend(const std::filesystem::path& file, int create = O_CREAT) {
   // A pipe without a reader is refused, not waited for.
-  return ::open(file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC | O_NONBLOCK, 0640);
+  return ::open(file.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC | O_NONBLOCK | create, 0640);
+}
+
+bool IsOfFile(AccessLogForm form, const std::filesystem::path& file) {
+  return (form == AccessLogForm::kCombined || form == AccessLogForm::kJson) && !file.empty();
+}
+
+// By errno.
+tl::unexpected<Error> CannotOpen(const std::filesystem::path& file) {
+  if (errno == ENXIO) {
+    return MakeError(ErrorCode::kUnavailable, "access log {}: is a pipe that nobody reads; start its reader first",
+                     file.string());
+  }
+  return MakeError(ErrorCode::kUnavailable, "access log {}: {}; give a file in a folder that the server may write to",
+                   file.string(), std::generic_category().message(errno));
 }
 
 }  // namespace
@@ -117,19 +131,21 @@ AccessLog::~AccessLog() {
   if (!file_.empty() && descriptor_ >= 0) ::close(descriptor_);
 }
 
+Result<void> AccessLog::Try(AccessLogForm form, const std::filesystem::path& file) {
+  if (!IsOfFile(form, file)) return {};
+  const int descriptor = OpenToAppend(file, /*create=*/0);
+  if (descriptor >= 0) {
+    ::close(descriptor);
+    return {};
+  }
+  if (errno == ENOENT && ::access(file.parent_path().c_str(), W_OK | X_OK) == 0) return {};
+  return CannotOpen(file);
+}
+
 Result<AccessLog> AccessLog::Open(AccessLogForm form, std::filesystem::path file) {
-  if (form == AccessLogForm::kLog || form == AccessLogForm::kOff || file.empty()) {
-    return AccessLog(form, {}, STDERR_FILENO);
-  }
+  if (!IsOfFile(form, file)) return AccessLog(form, {}, STDERR_FILENO);
   const int descriptor = OpenToAppend(file);
-  if (descriptor < 0) {
-    if (errno == ENXIO) {
-      return MakeError(ErrorCode::kUnavailable, "access log {}: is a pipe that nobody reads; start its reader first",
-                       file.string());
-    }
-    return MakeError(ErrorCode::kUnavailable, "access log {}: {}; give a file in a folder that the server may write to",
-                     file.string(), std::generic_category().message(errno));
-  }
+  if (descriptor < 0) return CannotOpen(file);
   return AccessLog(form, std::move(file), descriptor);
 }
 

@@ -56,6 +56,8 @@ class AccessLog {
  public:
   // `file`: of kCombined and kJson; empty: stderr. kUnavailable: it cannot be written.
   static Result<AccessLog> Open(AccessLogForm form, std::filesystem::path file);
+  // Whether Open could, without making the file, which would belong to whoever asks. `file` is absolute.
+  static Result<void> Try(AccessLogForm form, const std::filesystem::path& file);
   AccessLog(AccessLog&& other) noexcept;  // before the first Write
   AccessLog& operator=(AccessLog&&) = delete;
   ~AccessLog();

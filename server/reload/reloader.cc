@@ -42,15 +42,23 @@ void WarnOfRestart(const config::Config& started, const config::Config& now, con
   }
 }
 
-// Who may see a dataset is settled at the start. Until then a new one is seen by tokens alone where there are any.
-void WarnOfAccess(const std::vector<DatasetSlot>& slots, const config::Config& next) {
-  if (next.tokens.empty()) return;
+const config::DatasetConfig* Find(const config::Config& config, const std::string& name) {
+  const auto found = std::ranges::find(config.datasets, name, &config::DatasetConfig::name);
+  return found == config.datasets.end() ? nullptr : &*found;
+}
+
+// Who may see a dataset is settled at the start, by its name: one that comes under a name that was public then is seen
+// by everybody, whatever was between them.
+void WarnOfAccess(const config::Config& started, const config::Config& now, const config::Config& next) {
+  if (started.tokens.empty()) return;
   for (const config::DatasetConfig& dataset : next.datasets) {
-    const auto known = std::find_if(slots.begin(), slots.end(),
-                                    [&](const DatasetSlot& slot) { return slot.wanted().name == dataset.name; });
-    const bool was_public = known != slots.end() && known->wanted().is_public;
-    if (dataset.is_public == was_public) continue;
-    spdlog::warn("configuration: \"public\" of dataset {} has changed, which takes a restart", dataset.name);
+    const config::DatasetConfig* const first = Find(started, dataset.name);
+    const config::DatasetConfig* const before = Find(now, dataset.name);
+    const bool is_seen = first != nullptr && first->is_public;
+    if (dataset.is_public == is_seen) continue;
+    if (before != nullptr && before->is_public == dataset.is_public) continue;  // told already
+    spdlog::warn("configuration: \"public\" of dataset {} has changed, which takes a restart; until then {}",
+                 dataset.name, is_seen ? "everybody sees it" : "it takes a token to see it");
   }
 }
 
@@ -174,7 +182,7 @@ void Reloader::LookAtConfig(bool asked) {
 void Reloader::Apply(config::Config next) {
   WarnOfRestart(started_, config_, next);
   const bool is_rewritten = AsWritten(config_) != AsWritten(next);
-  WarnOfAccess(slots_, next);
+  WarnOfAccess(started_, config_, next);
   std::vector<DatasetSlot> slots;
   for (const config::DatasetConfig& wanted : next.datasets) {
     const auto known = std::find_if(slots_.begin(), slots_.end(),

@@ -50,12 +50,13 @@ Result<int> LockDirectory(const std::filesystem::path& directory) {
   return file;
 }
 
-std::unique_ptr<DiskStore> OpenStore(const DiskCacheOptions& cache, std::size_t bytes, const char* name,
-                                     bool compress) {
+std::unique_ptr<DiskStore> OpenStore(const DiskCacheOptions& cache, std::size_t bytes, const char* name, bool compress,
+                                     bool anew) {
   if (bytes == 0) return nullptr;
   DiskStoreOptions options;
   options.db = {cache.directory / name, std::max(bytes, RecordDb::kMinCapacity), compress, cache.env};
   options.name = name;
+  if (anew) static_cast<void>(RecordDb::Destroy(options.db));  // opening says what is wrong
   options.retry_after = cache.retry_after;
   return std::make_unique<DiskStore>(std::move(options));
 }
@@ -86,21 +87,21 @@ Result<std::shared_ptr<DiskCache>> DiskCache::Open(const DiskCacheOptions& optio
 DiskCache::DiskCache(const DiskCacheOptions& options, int lock) : lock_(lock) { OpenStores(options); }
 
 // RocksDB as Debian builds it asserts, and so ends the process, on some damage to what it reads while it opens a store.
-// The lock file counts openings that have not come to their end: after two, what is there is thrown away.
+// The lock file counts openings that have not come to their end: after two, the stores are thrown away. Nothing else
+// is: whoever names a directory in which other files lie must not lose them.
 void DiskCache::OpenStores(const DiskCacheOptions& options) {
   constexpr off_t kMostUnfinished = 2;
   struct stat status {};
   off_t unfinished = fstat(lock_, &status) == 0 ? status.st_size : 0;
-  if (unfinished >= kMostUnfinished) {
+  const bool anew = unfinished >= kMostUnfinished;
+  if (anew) {
     spdlog::warn("disk cache in {}: {} starts ended while it was opened; begun anew, check the disk",
                  options.directory.string(), unfinished);
-    std::error_code ignored;  // then opening says what is wrong
-    for (const char* name : {kTiles, kRefinements}) std::filesystem::remove_all(options.directory / name, ignored);
     unfinished = 0;
   }
   SetSize(lock_, unfinished + 1);
-  tiles_ = OpenStore(options, options.tile_bytes, kTiles, false);  // compressed already, or refuse to be
-  refinements_ = OpenStore(options, options.refinement_bytes, kRefinements, true);
+  tiles_ = OpenStore(options, options.tile_bytes, kTiles, false, anew);  // compressed already, or refuse to be
+  refinements_ = OpenStore(options, options.refinement_bytes, kRefinements, true, anew);
   SetSize(lock_, 0);
 }
 

@@ -102,6 +102,12 @@ Result<std::unique_ptr<RecordDb>> RecordDb::Open(const RecordDbOptions& options,
   return std::unique_ptr<RecordDb>(new RecordDb(std::make_unique<Impl>(std::unique_ptr<rocksdb::DB>(db))));
 }
 
+Result<void> RecordDb::Destroy(const RecordDbOptions& options) {
+  const rocksdb::Status status = rocksdb::DestroyDB(options.directory.string(), OptionsOf(options));
+  if (!status.ok()) return MakeError(ErrorCode::kUnavailable, "{}: {}", options.directory.string(), status.ToString());
+  return {};
+}
+
 Result<std::optional<std::string>> RecordDb::Get(std::string_view key) const {
   std::string value;
   const rocksdb::Status status = impl_->db->Get(rocksdb::ReadOptions(), SliceOf(key), &value);

@@ -39,6 +39,9 @@ class RecordDb {
   // Closes quickly: nothing is rewritten.
   ~RecordDb();
 
+  // Erases the files of a store that is not open, unread; what else lies in its directory stays.
+  static Result<void> Destroy(const RecordDbOptions& options);
+
   // Nothing if there is no such record. kInvalidArgument: it is damaged. kUnavailable: the disk does not answer.
   Result<std::optional<std::string>> Get(std::string_view key) const;
 

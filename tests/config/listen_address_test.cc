@@ -34,6 +34,7 @@ TEST(ParseListenAddress, SaysWhatWouldBeRight) {
   ExpectRefused("8080", "has no port");
   ExpectRefused("::1:8080", "must stand in brackets, as in [::1]:8080");
   ExpectRefused("::1", "must stand in brackets");
+  ExpectRefused("[::1]", "has no port");
   for (const char* text : {"localhost:", "localhost:http", "localhost:65536", "localhost:-1", "localhost:+1",
                            "localhost: 80", "localhost:80 ", "[::1]:x"}) {
     ExpectRefused(text, "must be a number from 0 (any free port) to 65535");

@@ -362,6 +362,9 @@ class DiskCache(unittest.TestCase):
         with Server(*self.flags()) as server:
             crawl(server.port, some)
             server.stop()
+        foreign = self.directory / "tiles" / "0"  # somebody's own pyramid
+        foreign.mkdir()
+        (foreign / "0.png").write_text("dear")
         for unfinished, found in ((1, len(some)), (2, 0)):
             (self.directory / "lock").write_bytes(b"." * unfinished)
             with Server(*self.flags()) as server:
@@ -369,6 +372,8 @@ class DiskCache(unittest.TestCase):
                 self.assertEqual((self.directory / "lock").stat().st_size, 0)
                 self.assertEqual("2 starts ended while it was opened" in server.text(), found == 0)
                 server.stop()
+        self.assertEqual((foreign / "0.png").read_text(), "dear")
+        shutil.rmtree(self.directory)
 
 
 if __name__ == "__main__":

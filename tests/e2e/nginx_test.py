@@ -120,6 +120,12 @@ class Proxied(unittest.TestCase):
         self.assertEqual(check.returncode, 0, check.stderr)
         self.assertNotIn("[warn]", check.stderr)
 
+    def test_connections_are_given_up_before_terrace_closes_them(self):
+        upstream = re.search(r"upstream terrace \{(.*?)\n\}", TEMPLATE.read_text(), re.DOTALL)[1]
+        seconds = float(re.search(r"keepalive_timeout (\d+)s;", upstream)[1])
+        printed = subprocess.run([BINARY, "serve", "--print-config"], check=True, stdout=subprocess.PIPE, text=True).stdout
+        self.assertLess(seconds, json.loads(printed)["idle_timeout_s"])
+
     def test_http2_over_tls(self):
         reply = self.get(TILE)
         self.assertEqual((reply.version, reply.status), ("2", 200))

@@ -53,10 +53,12 @@ def replace(path, by):
 
 
 class Server:
-    def __init__(self, *arguments):
+    def __init__(self, *arguments, meanwhile=lambda server: None):
+        """`meanwhile` is called while it starts."""
         self.log_file = tempfile.TemporaryFile("w+")
         self.process = subprocess.Popen([BINARY, "serve", "--listen", "127.0.0.1:0", *map(str, arguments)],
                                         stdout=subprocess.PIPE, stderr=self.log_file, text=True)
+        meanwhile(self)
         ready = self.process.stdout.readline()
         match = re.search(r"http://127\.0\.0\.1:(\d+)", ready)
         if not match:
@@ -159,8 +161,8 @@ class ReloadTest(unittest.TestCase):
             if server.process.poll() is None:
                 self.assertEqual(server.stop(), 0)
 
-    def serve(self, *arguments):
-        server = Server(*arguments)
+    def serve(self, *arguments, **more):
+        server = Server(*arguments, **more)
         self.servers.append(server)
         return server
 
@@ -385,13 +387,31 @@ class Configuration(ReloadTest):
 
     def test_the_file_is_watched_and_datasets_come_and_go(self):
         server = self.serve("--config", self.write_config({"datasets": [self.dataset("a")]}))
-        self.write_config({"datasets": [self.dataset("b"), self.dataset("a", attribution="new")], "max_connections": 7})
+        self.write_config({"datasets": [self.dataset("b"), self.dataset("a", attribution="new")], "max_connections": 7,
+                           "max_locations": 1})
         self.assertTrue(eventually(lambda: self.names(server) == ["b", "a"]
                                    and server.json("/datasets")["datasets"][1]["attribution"] == "new"), server.log())
         self.assertIn("max_connections has changed, which takes a restart", server.log())
+        self.assertIn("max_locations has changed, which takes a restart; until then the old value holds", server.log())
+        self.assertEqual(server.get("/a/heights?locations=36.3,-84.2|36.3,-84.1")[0], 200)
         self.write_config({"datasets": [self.dataset("b")]})
         self.assertTrue(eventually(lambda: self.names(server) == ["b"]))
         self.assertEqual(server.get("/a/0/0/0.terrain")[0], 404)
+
+    def test_who_sees_a_dataset_that_comes_back_as_another_is_told(self):
+        token = {"name": "team", "token": "0123456789abcdef"}
+        public, other = self.dataset("a", public=True), self.dataset("b")
+        server = self.serve("--config", self.write_config({"tokens": [token], "datasets": [public, other]}))
+        warning = '"public" of dataset a has changed'
+        self.write_config({"tokens": [token], "datasets": [other]})
+        self.assertTrue(eventually(lambda: server.get("/a/layer.json")[0] == 404), server.log())
+        self.assertNotIn(warning, server.log())
+        self.write_config({"tokens": [token], "datasets": [other, self.dataset("a")]})
+        self.assertTrue(eventually(lambda: server.get("/a/layer.json")[0] == 200), server.log())
+        self.assertIn(f"{warning}, which takes a restart; until then everybody sees it", server.log())
+        self.write_config({"tokens": [token], "datasets": [other, public, self.dataset("c", public=True)]})
+        self.assertTrue(eventually(lambda: "until then it takes a token to see it" in server.log()), server.log())
+        self.assertEqual(server.log().count(warning), 1)  # it is as it was at the start
 
     def test_a_glob_finds_what_is_put_into_its_folder(self):
         home = self.folder / "dems"
@@ -437,6 +457,19 @@ class Configuration(ReloadTest):
             self.assertIn("READY=1", manager.recv(4096).decode())
             self.assertEqual(server.stop(), 0)
             self.assertIn("STOPPING=1", manager.recv(4096).decode())
+
+    def test_signals_wait_until_it_runs(self):
+        (self.folder / NAME).write_bytes(b"\1\0" * 3601 ** 2)  # takes a moment to be read
+
+        def send(server):
+            self.assertTrue(eventually(lambda: "dataset d0" in server.log()), server.log())
+            for number in (signal.SIGHUP, signal.SIGUSR1):
+                server.process.send_signal(number)
+
+        config = {"datasets": [{"name": f"d{i}", "sources": [NAME]} for i in range(8)]}
+        server = self.serve("--config", self.write_config(config), meanwhile=send)
+        self.assertTrue(eventually(lambda: "the configuration is as it was" in server.log()
+                                   and "log level: debug" in server.log()), server.log())
 
     def test_the_log_level_changes_while_it_runs(self):
         config = {"datasets": [self.dataset("a")], "log_level": "warn"}

@@ -64,6 +64,24 @@ TEST_F(Replace, AnswersFromTheNextCatalog) {
   EXPECT_NE(metrics.body.find("terrace_catalogs_total 2"), std::string::npos);
 }
 
+TEST_F(Replace, ForgetsWhatWasCountedOfDatasetsThatAreGone) {
+  Start(CatalogOf(1, Says("old")));
+  const auto tells = [&](const char* text) {
+    return Fetch(server_->port(), "/metrics").body.find(text) != std::string::npos;
+  };
+  const char* const once = R"(terrace_http_requests_total{dataset="maui",route="tile",status="200"} 1)";
+  Tile();
+  ASSERT_TRUE(Eventually([&] { return tells(once); })) << "a reply is counted when it is sent";
+  ASSERT_TRUE(server_->Replace(CatalogOf(2, Says("new")), options_));
+  EXPECT_TRUE(tells(once));
+  EXPECT_TRUE(tells(R"(terrace_tile_builds_total{dataset="maui")"));
+  ASSERT_TRUE(server_->Replace(CatalogOf(2, Says("new"), "oahu"), options_));
+  EXPECT_FALSE(tells(R"(dataset="maui")"));
+  ASSERT_TRUE(server_->Replace(CatalogOf(3, Says("new")), options_));
+  Tile();
+  EXPECT_TRUE(Eventually([&] { return tells(once); }));
+}
+
 TEST_F(Replace, KeepsRequestsWithTheCatalogTheyBeganWith) {
   std::atomic<bool> begun{false}, go_on{false};
   Start(CatalogOf(1, [&](const TileRequest&, std::stop_token) -> Result<EncodedTile> {

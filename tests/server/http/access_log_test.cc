@@ -84,6 +84,9 @@ TEST(AccessLog, AppendsToItsFileAndFollowsARotation) {
       std::filesystem::path(testing::TempDir()) / ("access_log_" + std::to_string(::getpid()));
   std::filesystem::remove_all(folder);
   std::filesystem::create_directories(folder);
+  EXPECT_TRUE(AccessLog::Try(AccessLogForm::kCombined, folder / "access.log"));
+  EXPECT_TRUE(std::filesystem::is_empty(folder));
+  EXPECT_FALSE(AccessLog::Try(AccessLogForm::kCombined, folder));
   auto log = AccessLog::Open(AccessLogForm::kCombined, folder / "access.log");
   ASSERT_TRUE(log) << log.error().message;
   log->Write(Record());
@@ -97,6 +100,7 @@ TEST(AccessLog, AppendsToItsFileAndFollowsARotation) {
   std::filesystem::remove_all(folder);
   log->Reopen();  // nowhere to go: the old file stays in use
   log->Write(Record());
+  EXPECT_FALSE(AccessLog::Try(AccessLogForm::kJson, folder / "nothing" / "access.log"));
   EXPECT_FALSE(AccessLog::Open(AccessLogForm::kJson, folder / "nothing" / "access.log"));
 }
 
