@@ -1,6 +1,8 @@
 // Heights above geoids become ellipsoidal, everywhere alike: in tiles, at points, on Web Mercator, in bounds.
 #include "engine/dem/vertical_datum.h"
 
+#include <stdlib.h>
+
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -94,6 +96,35 @@ TEST(VerticalDatum, AThirdAxisInFeetIsConverted) {
   const auto of_feet = feet->ReadPoints(SomePoints()), of_metres = metres->ReadPoints(SomePoints());
   ASSERT_TRUE(of_feet && of_metres);
   for (std::size_t i = 0; i < of_feet->size(); ++i) EXPECT_NEAR((*of_feet)[i], (*of_metres)[i] * .3048, .002) << i;
+}
+
+// Feet of a county: the file says neither what they count from nor what they are, its owner says both with one name.
+TEST(VerticalDatum, AFileWithoutAUnitHasThatOfTheReferenceSystemThatTheConfigurationNames) {
+  const TempDir dir;
+  RasterSpec undulations{.geo_transform = {-128, 1, 0, 44, 0, -1}, .crs = "EPSG:6319"};
+  undulations.value = [](int, int) { return -35.0; };
+  WriteRaster(dir, undulations, "us_noaa_g2018u0.tif");
+  ::setenv("PROJ_DATA", (dir.path().string() + ":/usr/share/proj").c_str(), 1);
+  RasterSpec county = Hills("EPSG:4326");
+  county.geo_transform = {-120, 1.0 / 120, 0, 37, 0, -1.0 / 120};
+  const std::string path = WriteRaster(dir, county, "county.tif");
+  county.unit = "metre";
+  const std::string says_metres = WriteRaster(dir, county, "metres.tif");
+  const auto raw = OpenOrFail(path), metres = OpenOrFail(path, With("EPSG:5703")),
+             feet = OpenOrFail(path, With("EPSG:6360")), stated = OpenOrFail(says_metres, With("EPSG:6360"));
+  ::unsetenv("PROJ_DATA");
+  ASSERT_TRUE(raw && metres && feet && stated);
+  EXPECT_EQ(feet->info().sources.front().height_unit, "US survey foot");
+  EXPECT_NE(feet->fingerprint(), metres->fingerprint());
+  const std::vector<GeoPosition> points = {{-119.5, 36.5}, {-119.62, 36.33}, {-119.07, 36.91}};
+  const auto given = raw->ReadPoints(points), in_metres = metres->ReadPoints(points),
+             in_feet = feet->ReadPoints(points), as_stated = stated->ReadPoints(points);
+  ASSERT_TRUE(given && in_metres && in_feet && as_stated);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    EXPECT_NEAR((*in_metres)[i], (*given)[i] - 35, .002) << i;
+    EXPECT_NEAR((*in_feet)[i], (*given)[i] * 1200 / 3937 - 35, .002) << i;
+    EXPECT_EQ((*as_stated)[i], (*in_metres)[i]) << "the file's own word counts";
+  }
 }
 
 TEST(VerticalDatum, TilesBoundsAndMercatorPixelsAreConvertedAlike) {
