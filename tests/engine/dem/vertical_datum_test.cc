@@ -1,6 +1,7 @@
 // Heights above geoids become ellipsoidal, everywhere alike: in tiles, at points, on Web Mercator, in bounds.
 #include "engine/dem/vertical_datum.h"
 
+#include <gdal_priv.h>
 #include <stdlib.h>
 
 #include <chrono>
@@ -66,6 +67,23 @@ TEST(VerticalDatum, ConvertsWhatTheReferenceSystemStates) {
   EXPECT_FALSE(ignored->has_datum());
   EXPECT_TRUE(denied->has_datum());
   EXPECT_EQ(*denied->ReadPoints(SomePoints()), *ignored->ReadPoints(SomePoints()));
+}
+
+// GeoTIFF has said so since its first version, which most files are of.
+TEST(VerticalDatum, ConvertsWhatAGeoTiffOfTheFirstVersionStates) {
+  const TempDir dir;
+  const std::string path = WriteRaster(dir, Hills("EPSG:4326+5773")), old = dir.File("old.tif");
+  {
+    const char* const options[] = {"GEOTIFF_VERSION=1.0", nullptr};
+    const GDALDatasetUniquePtr now(GDALDataset::Open(path.c_str()));
+    GDALDriver* const driver = GetGDALDriverManager()->GetDriverByName("GTiff");
+    GDALDatasetUniquePtr(
+        driver->CreateCopy(old.c_str(), now.get(), TRUE, const_cast<char**>(options), nullptr, nullptr));
+  }
+  const auto source = OpenOrFail(old), now = OpenOrFail(path);
+  ASSERT_TRUE(source && now);
+  EXPECT_EQ(source->info().sources.front().counts_from, "EGM96 height");
+  EXPECT_EQ(*source->ReadPoints(SomePoints()), *now->ReadPoints(SomePoints()));
 }
 
 TEST(VerticalDatum, EllipsoidalReferenceSystemsPass) {
