@@ -189,11 +189,14 @@ Result<void> Georeference::ReadCrs(const OGRSpatialReference& srs, const std::st
 }
 
 // A cylindrical projection whose eastings go on beyond the antimeridian: they come back a whole turn less. Looked at
-// are the outermost pixels' centres, which a raster of the whole Earth has on this side of it.
+// are the outermost pixels' centres, which a raster of the whole Earth has on this side of it: of a rotated raster any
+// corner may be beyond, and the first and last rows may lie beyond the poles, where there is no place to come back to.
 void Georeference::FindTurn() {
   const double pixel_size = std::max(pixel_width(), pixel_height());
-  for (const double column : {0.5, width_ - 0.5}) {
-    const Position there = Apply(to_crs_, {column, 0.5});
+  const double right = width_ - 0.5, middle = height_ / 2.0, bottom = height_ - 0.5;
+  for (const Position pixel :
+       {Position{0.5, 0.5}, {right, 0.5}, {0.5, middle}, {right, middle}, {0.5, bottom}, {right, bottom}}) {
+    const Position there = Apply(to_crs_, pixel);
     std::array<Position, 1> back = {there};
     projector_->Inverse(back);
     projector_->Forward(back);
@@ -202,7 +205,7 @@ void Georeference::FindTurn() {
     // The same in other rows: outside its outline, a projection that is not cylindrical has a turn for each of them.
     std::array<Position, 6> pairs;
     for (std::size_t k = 0; k < 3; ++k) {
-      pairs[2 * k] = Apply(to_crs_, {column, height_ * (0.3 * static_cast<double>(k) + 0.1)});
+      pairs[2 * k] = Apply(to_crs_, {pixel.x, height_ * (0.3 * static_cast<double>(k) + 0.1)});
       pairs[2 * k + 1] = {pairs[2 * k].x + turn, pairs[2 * k].y};
     }
     projector_->Inverse(pairs);
