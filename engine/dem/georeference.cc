@@ -64,9 +64,13 @@ std::string UnitOfHeightAxis(const OGRSpatialReference& srs) {
 // Name and unit of what heights count from, as far as the CRS says.
 std::pair<std::string, std::string> VerticalPart(const OGRSpatialReference& srs) {
   if (srs.IsCompound() != 0) {
+    const char* crs = srs.GetAttrValue("COMPD_CS|VERT_CS");
     const char* name = srs.GetAttrValue("COMPD_CS|VERT_CS|VERT_DATUM");
     const char* unit = srs.GetAttrValue("COMPD_CS|VERT_CS|UNIT");
-    return {name == nullptr ? "unnamed" : name, unit == nullptr ? "" : unit};
+    // Of a GeoTIFF that states the unit of its heights and no more GDAL makes a vertical part by that name.
+    const auto is_unknown = [](const char* text) { return text != nullptr && EQUAL(text, "unknown"); };
+    const bool is_unit_alone = is_unknown(crs) && is_unknown(name);
+    return {is_unit_alone ? "" : name == nullptr ? "unnamed" : name, unit == nullptr ? "" : unit};
   }
   if (srs.GetAxesCount() == 3) return {"ellipsoid", UnitOfHeightAxis(srs)};
   return {};
@@ -146,7 +150,7 @@ Result<void> Georeference::ReadCrs(const OGRSpatialReference& srs, const std::st
   wkt_ = Wkt(srs);
   crs_ = NameAndCode(srs);
   std::tie(vertical_datum_, vertical_unit_) = VerticalPart(srs);
-  if (srs.IsCompound() != 0) vertical_crs_ = Wkt(srs);
+  if (srs.IsCompound() != 0 && !vertical_datum_.empty()) vertical_crs_ = Wkt(srs);
   OGRSpatialReference horizontal(srs);
   if (horizontal.IsCompound() != 0) horizontal.StripVertical();
   if (horizontal.GetAxesCount() == 3) horizontal.DemoteTo2D(nullptr);
