@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "engine/dem/gdal_runtime.h"
+#include "engine/dem/raster_file.h"
 
 namespace terrace::dem {
 namespace {
@@ -41,7 +42,7 @@ std::optional<double> NodataOf(GDALRasterBand& band) {
 // The band that says which samples are valid: GDAL's mask, or alpha of a type that it does not take for one. Null: all
 // are.
 GDALRasterBand* MaskOf(GDALRasterBand& band) {
-  if ((band.GetMaskFlags() & GMF_PER_DATASET) != 0) return band.GetMaskBand();
+  if (HasMaskBand(band)) return band.GetMaskBand();
   GDALDataset* const dataset = band.GetDataset();
   for (int i = 1; dataset != nullptr && i <= dataset->GetRasterCount(); ++i) {
     GDALRasterBand* const other = dataset->GetRasterBand(i);
