@@ -65,7 +65,7 @@ std::optional<double> MetresPerUnit(const std::string& unit) {
       name += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   }
   constexpr double kFoot = 0.3048, kSurveyFoot = 1200.0 / 3937.0;
-  constexpr std::array<std::pair<std::string_view, double>, 31> kUnits = {{
+  constexpr std::array<std::pair<std::string_view, double>, 36> kUnits = {{
       {"", 1},
       {"m", 1},
       {"metre", 1},
@@ -88,8 +88,13 @@ std::optional<double> MetresPerUnit(const std::string& unit) {
       {"ussurveyfeet", kSurveyFoot},
       {"footus", kSurveyFoot},
       {"surveyfoot", kSurveyFoot},
+      {"feetus", kSurveyFoot},
+      {"usfeet", kSurveyFoot},
+      {"usfoot", kSurveyFoot},
       {"yard", 3 * kFoot},
+      {"yards", 3 * kFoot},
       {"fathom", 6 * kFoot},
+      {"fathoms", 6 * kFoot},
       {"dm", .1},
       {"decimeter", .1},
       {"centimeter", .01},
