@@ -35,6 +35,8 @@ void InitOnce() {
   CPLSetErrorHandler(KeepLastError);
   CPLSetConfigOption("GDAL_VRT_ENABLE_PYTHON", "NO");
   CPLSetConfigOption("GDAL_DRIVER_PATH", "disable");
+  // What heights count from is left out of GeoTIFFs before version 1.1 otherwise.
+  CPLSetConfigOption("GTIFF_REPORT_COMPD_CS", "YES");
   OSRSetPROJEnableNetwork(0);
   GDALSetCacheMax64(kBlockCacheBytes);
   // Settings come from terrace's configuration; GDAL would read its own files otherwise.

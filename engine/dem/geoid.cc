@@ -28,6 +28,16 @@ ProjObjectPtr VerticalPart(PJ_CONTEXT* context, const std::string& text) {
   return crs != nullptr && proj_get_type(crs.get()) == PJ_TYPE_VERTICAL_CRS ? std::move(crs) : nullptr;
 }
 
+std::string UnitOf(PJ_CONTEXT* context, const PJ* vertical) {
+  const ProjObjectPtr axes(proj_crs_get_coordinate_system(context, vertical));
+  const char* unit = nullptr;
+  if (axes == nullptr ||
+      proj_cs_get_axis_info(context, axes.get(), 0, nullptr, nullptr, nullptr, nullptr, &unit, nullptr, nullptr) == 0) {
+    return "";
+  }
+  return unit == nullptr ? "" : unit;
+}
+
 std::string Wkt(PJ_CONTEXT* context, const PJ* crs) {
   const char* text = crs == nullptr ? nullptr : proj_as_wkt(context, crs, PJ_WKT2_2019, nullptr);
   return text == nullptr ? "" : text;
@@ -106,6 +116,7 @@ Result<std::shared_ptr<const Geoid>> Geoid::OfCrs(const std::string& vertical_cr
   const char* name = proj_get_name(vertical.get());
   const std::shared_ptr<Geoid> geoid(new Geoid);
   geoid->name_ = name == nullptr ? "unnamed" : name;
+  geoid->unit_ = UnitOf(context.get(), vertical.get());
   const ProjListPtr operations = OperationsFrom(context.get(), vertical.get());
   const int count = operations == nullptr ? 0 : proj_list_get_count(operations.get());
   std::string missing;  // of the best operation that cannot run

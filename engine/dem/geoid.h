@@ -48,6 +48,7 @@ class Geoid {
   };
 
   const std::string& name() const { return name_; }                       // "EGM96 height"
+  const std::string& unit() const { return unit_; }                       // of its heights; empty: that is not stated
   const std::string& description() const { return description_; }         // of the operation, for people
   const std::string& pipeline() const { return operations_.pipeline(); }  // as PROJ runs it
   // What the operation reads, as it was when it was set up.
@@ -58,7 +59,7 @@ class Geoid {
   static Result<std::shared_ptr<const Geoid>> Checked(std::shared_ptr<const Geoid> geoid, Position centre);
   static std::shared_ptr<const Geoid> FindShared(const std::string& vertical_crs, std::shared_ptr<const Geoid> made);
 
-  std::string name_, description_;
+  std::string name_, unit_, description_;
   StampedFiles files_;
   OperationPool operations_;
 };

@@ -64,9 +64,13 @@ std::string UnitOfHeightAxis(const OGRSpatialReference& srs) {
 // Name and unit of what heights count from, as far as the CRS says.
 std::pair<std::string, std::string> VerticalPart(const OGRSpatialReference& srs) {
   if (srs.IsCompound() != 0) {
+    const char* crs = srs.GetAttrValue("COMPD_CS|VERT_CS");
     const char* name = srs.GetAttrValue("COMPD_CS|VERT_CS|VERT_DATUM");
     const char* unit = srs.GetAttrValue("COMPD_CS|VERT_CS|UNIT");
-    return {name == nullptr ? "unnamed" : name, unit == nullptr ? "" : unit};
+    // Of a GeoTIFF that states the unit of its heights and no more GDAL makes a vertical part by that name.
+    const auto is_unknown = [](const char* text) { return text != nullptr && EQUAL(text, "unknown"); };
+    const bool is_unit_alone = is_unknown(crs) && is_unknown(name);
+    return {is_unit_alone ? "" : name == nullptr ? "unnamed" : name, unit == nullptr ? "" : unit};
   }
   if (srs.GetAxesCount() == 3) return {"ellipsoid", UnitOfHeightAxis(srs)};
   return {};
@@ -146,7 +150,7 @@ Result<void> Georeference::ReadCrs(const OGRSpatialReference& srs, const std::st
   wkt_ = Wkt(srs);
   crs_ = NameAndCode(srs);
   std::tie(vertical_datum_, vertical_unit_) = VerticalPart(srs);
-  if (srs.IsCompound() != 0) vertical_crs_ = Wkt(srs);
+  if (srs.IsCompound() != 0 && !vertical_datum_.empty()) vertical_crs_ = Wkt(srs);
   OGRSpatialReference horizontal(srs);
   if (horizontal.IsCompound() != 0) horizontal.StripVertical();
   if (horizontal.GetAxesCount() == 3) horizontal.DemoteTo2D(nullptr);
@@ -189,11 +193,14 @@ Result<void> Georeference::ReadCrs(const OGRSpatialReference& srs, const std::st
 }
 
 // A cylindrical projection whose eastings go on beyond the antimeridian: they come back a whole turn less. Looked at
-// are the outermost pixels' centres, which a raster of the whole Earth has on this side of it.
+// are the outermost pixels' centres, which a raster of the whole Earth has on this side of it: of a rotated raster any
+// corner may be beyond, and the first and last rows may lie beyond the poles, where there is no place to come back to.
 void Georeference::FindTurn() {
   const double pixel_size = std::max(pixel_width(), pixel_height());
-  for (const double column : {0.5, width_ - 0.5}) {
-    const Position there = Apply(to_crs_, {column, 0.5});
+  const double right = width_ - 0.5, middle = height_ / 2.0, bottom = height_ - 0.5;
+  for (const Position pixel :
+       {Position{0.5, 0.5}, {right, 0.5}, {0.5, middle}, {right, middle}, {0.5, bottom}, {right, bottom}}) {
+    const Position there = Apply(to_crs_, pixel);
     std::array<Position, 1> back = {there};
     projector_->Inverse(back);
     projector_->Forward(back);
@@ -202,7 +209,7 @@ void Georeference::FindTurn() {
     // The same in other rows: outside its outline, a projection that is not cylindrical has a turn for each of them.
     std::array<Position, 6> pairs;
     for (std::size_t k = 0; k < 3; ++k) {
-      pairs[2 * k] = Apply(to_crs_, {column, height_ * (0.3 * static_cast<double>(k) + 0.1)});
+      pairs[2 * k] = Apply(to_crs_, {pixel.x, height_ * (0.3 * static_cast<double>(k) + 0.1)});
       pairs[2 * k + 1] = {pairs[2 * k].x + turn, pairs[2 * k].y};
     }
     projector_->Inverse(pairs);

@@ -21,7 +21,7 @@ std::string WhyMisleading(GDALDataset& dataset, const SampleRules& rules) {
   if (!rules.has_mask) return {};
   constexpr const char* kOwnMask =
       "; copy it with `gdal_translate --config GDAL_TIFF_INTERNAL_MASK YES in out` and make the copy's overviews";
-  if ((band.GetMaskFlags() & GMF_PER_DATASET) == 0) {
+  if (!HasMaskBand(band)) {
     return "they were made without regard to an alpha band of this type, which GDAL takes for no mask; make it one of "
            "bytes, and the overviews anew";
   }
@@ -34,8 +34,8 @@ std::string WhyMisleading(GDALDataset& dataset, const SampleRules& rules) {
     GDALRasterBand* const overview = band.GetOverview(i);
     if (overview == nullptr) continue;
     GDALRasterBand* const mask = overview->GetMaskBand();
-    const bool has_mask = (overview->GetMaskFlags() & GMF_PER_DATASET) != 0 && mask != nullptr &&
-                          mask->GetXSize() == overview->GetXSize() && mask->GetYSize() == overview->GetYSize();
+    const bool has_mask = HasMaskBand(*overview) && mask != nullptr && mask->GetXSize() == overview->GetXSize() &&
+                          mask->GetYSize() == overview->GetYSize();
     if (!has_mask) return std::string("they have no masks, as the raster has") + kOwnMask;
   }
   return {};

@@ -78,7 +78,7 @@ Result<void> CheckShape(GDALDataset& dataset, const std::string& path) {
   }
   if (auto blocks = CheckBlocks(dataset, band, path); !blocks) return blocks;
   if (auto links = CheckLinks(dataset, path); !links) return links;
-  if ((band.GetMaskFlags() & GMF_PER_DATASET) != 0) {
+  if (HasMaskBand(band)) {
     if (auto blocks = CheckBlocks(dataset, *band.GetMaskBand(), path); !blocks) return blocks;
   }
   for (int i = 0; i < band.GetOverviewCount(); ++i) {
@@ -218,12 +218,17 @@ Result<void> CheckComplete(GDALDataset& dataset, const std::string& path, int ba
     for (int i = 0; has_own_overviews && i < band.GetOverviewCount(); ++i) {
       if (GDALRasterBand* const overview = band.GetOverview(i)) ends.Add(*overview);
     }
-    if (has_own_mask && (band.GetMaskFlags() & GMF_PER_DATASET) != 0) ends.Add(*band.GetMaskBand());
+    if (has_own_mask && HasMaskBand(band)) ends.Add(*band.GetMaskBand());
   }
   if (ends.last() <= size) return {};
   return MakeError(ErrorCode::kUnavailable,
                    "{}: is cut short: it has {} bytes, and its last samples lie up to byte {}; copy it again", path,
                    size, ends.last());
+}
+
+bool HasMaskBand(GDALRasterBand& band) {
+  const int flags = band.GetMaskFlags();
+  return (flags & GMF_PER_DATASET) != 0 || flags == 0;  // 0: a mask of this band alone
 }
 
 std::string PicturePartOf(GDALRasterBand& band) {

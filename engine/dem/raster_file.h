@@ -37,6 +37,10 @@ std::vector<std::string> FilesOf(GDALDataset& dataset, const std::string& path);
 // Refuses what is too large to mesh in one piece.
 Result<void> CheckSizeToMesh(const std::string& path, int width, int height);
 
+// Whether another band says which samples are valid: the mask of the dataset or of this band alone, or alpha that GDAL
+// takes for one. A nodata value is none.
+bool HasMaskBand(GDALRasterBand& band);
+
 // What of a picture a band is, as GDAL calls it; empty where it may be heights, as a grey one well may. Indices into a
 // palette may not.
 std::string PicturePartOf(GDALRasterBand& band);

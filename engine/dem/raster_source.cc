@@ -14,13 +14,16 @@
 namespace terrace::dem {
 namespace {
 
-RasterLayout LayoutOf(GDALDataset& dataset, const Georeference& georeference) {
+RasterLayout LayoutOf(GDALDataset& dataset, const Georeference& georeference, const VerticalDatum& vertical) {
   RasterLayout layout;
   layout.width = georeference.width();
   layout.height = georeference.height();
   layout.wraps = georeference.wrap_columns() > 0;
   layout.columns = layout.wraps ? georeference.wrap_columns() : layout.width;
-  layout.rules = SampleRules::Of(HeightBand(dataset), georeference.vertical_unit());
+  // Where the file names no unit, the reference system does that its owner says the heights are in.
+  const std::string& stated = georeference.vertical_unit();
+  layout.rules = SampleRules::Of(HeightBand(dataset),
+                                 stated.empty() && vertical.geoid != nullptr ? vertical.geoid->unit() : stated);
   layout.overview_factors = OverviewFactors(HeightBand(dataset));
   return layout;
 }
@@ -116,7 +119,10 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
 
   std::unique_ptr<RasterSource> source(
       new RasterSource(path, *std::move(files), *std::move(georeference), std::move(handles)));
-  source->layout_ = LayoutOf(**dataset, source->georeference_);
+  auto vertical = ResolveVertical(options.vertical, source->georeference_, CentreOf(source->georeference_));
+  if (!vertical) return MakeError(vertical.error().code, "{}: {}", path, vertical.error().message);
+  source->vertical_ = *std::move(vertical);
+  source->layout_ = LayoutOf(**dataset, source->georeference_, source->vertical_);
   if (const double scale = source->layout_.rules.scale; !std::isfinite(scale) || scale == 0) {
     return MakeError(
         ErrorCode::kInvalidArgument,
@@ -125,9 +131,6 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
         path, scale);
   }
   source->layout_.coast_step_m = ZeroEdges::CoastStep(spacing->finer);
-  auto vertical = ResolveVertical(options.vertical, source->georeference_, CentreOf(source->georeference_));
-  if (!vertical) return MakeError(vertical.error().code, "{}: {}", path, vertical.error().message);
-  source->vertical_ = *std::move(vertical);
   source->layout_.rules.marks = options.nodata;
   std::string overviews_unused = DropMisleadingOverviews(**dataset, source->layout_);
   const PrepareOptions prepare{cache_dir, options.find_voids, progress, stop};

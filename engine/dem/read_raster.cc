@@ -60,6 +60,9 @@ Result<RasterHeights> ReadRaster(const std::string& path, const ReadOptions& opt
   // What is served has a place on Earth, and its heights the unit of its CRS; what is meshed need not have one.
   const auto georeference = Georeference::Of(**dataset, path);
   const auto spacing = georeference ? SourceSpacing::Of(*georeference, path) : SourceSpacing{};
+  if (georeference && MetresPerUnit(georeference->pixel_unit()).value_or(1) != 1) {
+    raster.coordinate_unit = georeference->pixel_unit();
+  }
   SampleRules rules = SampleRules::Of(band, georeference ? georeference->vertical_unit() : "");
   rules.marks = options.nodata;
   // With room for a mesher to lay rows further apart (tin::HeightField) without a second copy of all.

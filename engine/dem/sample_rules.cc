@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "engine/dem/gdal_runtime.h"
+#include "engine/dem/raster_file.h"
 
 namespace terrace::dem {
 namespace {
@@ -41,7 +42,7 @@ std::optional<double> NodataOf(GDALRasterBand& band) {
 // The band that says which samples are valid: GDAL's mask, or alpha of a type that it does not take for one. Null: all
 // are.
 GDALRasterBand* MaskOf(GDALRasterBand& band) {
-  if ((band.GetMaskFlags() & GMF_PER_DATASET) != 0) return band.GetMaskBand();
+  if (HasMaskBand(band)) return band.GetMaskBand();
   GDALDataset* const dataset = band.GetDataset();
   for (int i = 1; dataset != nullptr && i <= dataset->GetRasterCount(); ++i) {
     GDALRasterBand* const other = dataset->GetRasterBand(i);
@@ -64,7 +65,7 @@ std::optional<double> MetresPerUnit(const std::string& unit) {
       name += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   }
   constexpr double kFoot = 0.3048, kSurveyFoot = 1200.0 / 3937.0;
-  constexpr std::array<std::pair<std::string_view, double>, 31> kUnits = {{
+  constexpr std::array<std::pair<std::string_view, double>, 36> kUnits = {{
       {"", 1},
       {"m", 1},
       {"metre", 1},
@@ -87,8 +88,13 @@ std::optional<double> MetresPerUnit(const std::string& unit) {
       {"ussurveyfeet", kSurveyFoot},
       {"footus", kSurveyFoot},
       {"surveyfoot", kSurveyFoot},
+      {"feetus", kSurveyFoot},
+      {"usfeet", kSurveyFoot},
+      {"usfoot", kSurveyFoot},
       {"yard", 3 * kFoot},
+      {"yards", 3 * kFoot},
       {"fathom", 6 * kFoot},
+      {"fathoms", 6 * kFoot},
       {"dm", .1},
       {"decimeter", .1},
       {"centimeter", .01},

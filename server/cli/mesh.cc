@@ -186,7 +186,7 @@ int Mesh(const MeshArguments& arguments) {
     return dem::ReadRaster(arguments.dem, ReadOptionsOf(arguments.nodata, progress.Callback()));
   }();
   if (!raster) return Fail(raster.error().message, kExitFailure);
-  WarnOf(arguments.dem, *raster);
+  WarnOf(arguments.dem, *raster, arguments.coordinates);
   const auto placement =
       PlacementOf(arguments.dem, raster->georeferenced, raster->geo_transform, arguments.coordinates);
   if (!placement) return Fail(placement.error().message, kExitUsage);

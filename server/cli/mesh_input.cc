@@ -42,7 +42,14 @@ dem::ReadOptions ReadOptionsOf(const std::string& nodata, std::function<void(dou
   return options;
 }
 
-void WarnOf(const std::string& path, const dem::RasterHeights& raster) {
+void WarnOf(const std::string& path, const dem::RasterHeights& raster, const std::string& coordinates) {
+  if (!raster.coordinate_unit.empty() && coordinates != "pixel") {
+    fmt::print(
+        stderr,
+        "terrace: {}: x and y of the mesh are in its reference system's unit ({}), heights in metres; for metres "
+        "throughout, project it first with `gdalwarp -t_srs EPSG:XXXX -r bilinear in out`\n",
+        path, raster.coordinate_unit);
+  }
   if (!raster.found_voids.empty()) {
     fmt::print(stderr,
                "terrace: {}: undeclared voids, which are no samples: {}; --nodata declared takes them for heights\n",

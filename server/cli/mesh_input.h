@@ -18,7 +18,7 @@ void AddNodataOption(CLI::App& command, std::string& nodata);
 // Precondition: the option took the text.
 dem::ReadOptions ReadOptionsOf(const std::string& nodata, std::function<void(double)> progress);
 
-// On stderr, what a mesh of the raster may surprise by.
-void WarnOf(const std::string& path, const dem::RasterHeights& raster);
+// On stderr, what a mesh of the raster in these coordinates (--coordinates) may surprise by.
+void WarnOf(const std::string& path, const dem::RasterHeights& raster, const std::string& coordinates);
 
 }  // namespace terrace::cli

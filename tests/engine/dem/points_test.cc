@@ -141,6 +141,37 @@ TEST(Points, OfACylindricalProjectionLieOnBothSidesOfTheAntimeridian) {
   }
 }
 
+// Of rotated rasters any corner may be the one beyond the antimeridian; a first row may lie beyond the pole.
+TEST(Points, BeyondTheAntimeridianAreFoundFromEveryCornerAndRow) {
+  constexpr double kDegree = 20'037'508.342789244 / 180;  // of EPSG:4087, metres
+  constexpr double kPixel = kDegree / 10;
+  const TempDir dir;
+  struct Case {
+    const char* what;
+    std::array<double, 6> geo_transform;
+    double column, row;  // of a pixel beyond
+  };
+  const double west = 177.9 * kDegree;
+  for (const Case& c : {Case{"lower left", {west, .2 * kPixel, .9 * kPixel, 0, .9 * kPixel, -.2 * kPixel}, 5, 38},
+                        {"lower right", {west, .5 * kPixel, .5 * kPixel, 0, .5 * kPixel, -.6 * kPixel}, 38, 38},
+                        {"rows beyond the poles", {0, 9 * kDegree, 0, 95 * kDegree, 0, -4.75 * kDegree}, 30, 20}}) {
+    SCOPED_TRACE(c.what);
+    RasterSpec spec{.width = 40, .height = 40, .geo_transform = c.geo_transform, .crs = "EPSG:4087"};
+    spec.value = [](int col, int row) { return 1000.0 + 10 * col + row; };
+    const auto source = OpenOrFail(WriteRaster(dir, spec));
+    ASSERT_NE(source, nullptr);
+    const auto& t = c.geo_transform;
+    const double column = c.column + .5, row = c.row + .5;
+    const double longitude = (t[0] + column * t[1] + row * t[2]) / kDegree,
+                 latitude = (t[3] + column * t[4] + row * t[5]) / kDegree;
+    ASSERT_GT(longitude, 180);
+    const std::vector<GeoPosition> points = {{longitude - 360, latitude}};
+    const auto heights = source->ReadPoints(points);
+    ASSERT_TRUE(heights);
+    EXPECT_NEAR((*heights)[0], spec.value(static_cast<int>(c.column), static_cast<int>(c.row)), .01);
+  }
+}
+
 TEST(Points, StopWhenAsked) {
   const TempDir dir;
   const auto source = OpenOrFail(WriteRaster(dir, Steps()));

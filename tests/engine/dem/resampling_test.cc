@@ -170,7 +170,9 @@ TEST(Resampling, UndeclaredVoidsAndUnitsAreUnderstood) {
                                    {"Float32", "", -3.4028234663852886e38, -3.4028234663852886e38, 10, 10},
                                    {"Int32", "US survey foot", -99999, -99999, 3937, 1200},
                                    {"Int32", "Foot_US", -99999, -99999, 3937, 1200},
+                                   {"Int32", "Feet (US)", -99999, -99999, 3937, 1200},
                                    {"Int32", "fathom", -99999, -99999, 1000, 1828.8},
+                                   {"Int32", "Fathoms", -99999, -99999, 1000, 1828.8},
                                    {"Byte", "m", 255, 255, 7, 7}};
   int index = 0;
   for (const Case& c : cases) {

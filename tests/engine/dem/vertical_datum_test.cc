@@ -1,6 +1,9 @@
 // Heights above geoids become ellipsoidal, everywhere alike: in tiles, at points, on Web Mercator, in bounds.
 #include "engine/dem/vertical_datum.h"
 
+#include <gdal_priv.h>
+#include <stdlib.h>
+
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -66,6 +69,43 @@ TEST(VerticalDatum, ConvertsWhatTheReferenceSystemStates) {
   EXPECT_EQ(*denied->ReadPoints(SomePoints()), *ignored->ReadPoints(SomePoints()));
 }
 
+// GeoTIFF has said so since its first version, which most files are of.
+TEST(VerticalDatum, ConvertsWhatAGeoTiffOfTheFirstVersionStates) {
+  const TempDir dir;
+  const std::string path = WriteRaster(dir, Hills("EPSG:4326+5773")), old = dir.File("old.tif");
+  {
+    const char* const options[] = {"GEOTIFF_VERSION=1.0", nullptr};
+    const GDALDatasetUniquePtr now(GDALDataset::Open(path.c_str()));
+    GDALDriver* const driver = GetGDALDriverManager()->GetDriverByName("GTiff");
+    GDALDatasetUniquePtr(
+        driver->CreateCopy(old.c_str(), now.get(), TRUE, const_cast<char**>(options), nullptr, nullptr));
+  }
+  const auto source = OpenOrFail(old), now = OpenOrFail(path);
+  ASSERT_TRUE(source && now);
+  EXPECT_EQ(source->info().sources.front().counts_from, "EGM96 height");
+  EXPECT_EQ(*source->ReadPoints(SomePoints()), *now->ReadPoints(SomePoints()));
+}
+
+// What GDAL makes of GeoTIFFs that state the unit of their heights and no more.
+TEST(VerticalDatum, AVerticalPartWithoutANameStatesAUnitAlone) {
+  constexpr const char* kUnit =
+      R"(COMPD_CS["unknown",GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]],)"
+      R"(PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433]],)"
+      R"(VERT_CS["unknown",VERT_DATUM["unknown",2005],UNIT["foot",0.3048],AXIS["Up",UP]]])";
+  const TempDir dir;
+  const auto metres = OpenOrFail(WriteRaster(dir, Hills("EPSG:4326"), "metres.tif"));
+  const std::string path = WriteRaster(dir, Hills("EPSG:4326"), "feet.tif");
+  std::ofstream(path + ".aux.xml") << "<PAMDataset><SRS dataAxisToSRSAxisMapping=\"1,2\">" << kUnit
+                                   << "</SRS></PAMDataset>";
+  const auto feet = OpenOrFail(path);
+  ASSERT_TRUE(metres && feet);
+  EXPECT_FALSE(feet->has_datum());
+  EXPECT_EQ(feet->info().sources.front().height_unit, "foot");
+  const auto of_feet = feet->ReadPoints(SomePoints()), of_metres = metres->ReadPoints(SomePoints());
+  ASSERT_TRUE(of_feet && of_metres);
+  for (std::size_t i = 0; i < of_feet->size(); ++i) EXPECT_NEAR((*of_feet)[i], (*of_metres)[i] * .3048, .002) << i;
+}
+
 TEST(VerticalDatum, EllipsoidalReferenceSystemsPass) {
   const TempDir dir;
   const auto source = OpenOrFail(WriteRaster(dir, Hills("EPSG:4979")));
@@ -94,6 +134,35 @@ TEST(VerticalDatum, AThirdAxisInFeetIsConverted) {
   const auto of_feet = feet->ReadPoints(SomePoints()), of_metres = metres->ReadPoints(SomePoints());
   ASSERT_TRUE(of_feet && of_metres);
   for (std::size_t i = 0; i < of_feet->size(); ++i) EXPECT_NEAR((*of_feet)[i], (*of_metres)[i] * .3048, .002) << i;
+}
+
+// Feet of a county: the file says neither what they count from nor what they are, its owner says both with one name.
+TEST(VerticalDatum, AFileWithoutAUnitHasThatOfTheReferenceSystemThatTheConfigurationNames) {
+  const TempDir dir;
+  RasterSpec undulations{.geo_transform = {-128, 1, 0, 44, 0, -1}, .crs = "EPSG:6319"};
+  undulations.value = [](int, int) { return -35.0; };
+  WriteRaster(dir, undulations, "us_noaa_g2018u0.tif");
+  ::setenv("PROJ_DATA", (dir.path().string() + ":/usr/share/proj").c_str(), 1);
+  RasterSpec county = Hills("EPSG:4326");
+  county.geo_transform = {-120, 1.0 / 120, 0, 37, 0, -1.0 / 120};
+  const std::string path = WriteRaster(dir, county, "county.tif");
+  county.unit = "metre";
+  const std::string says_metres = WriteRaster(dir, county, "metres.tif");
+  const auto raw = OpenOrFail(path), metres = OpenOrFail(path, With("EPSG:5703")),
+             feet = OpenOrFail(path, With("EPSG:6360")), stated = OpenOrFail(says_metres, With("EPSG:6360"));
+  ::unsetenv("PROJ_DATA");
+  ASSERT_TRUE(raw && metres && feet && stated);
+  EXPECT_EQ(feet->info().sources.front().height_unit, "US survey foot");
+  EXPECT_NE(feet->fingerprint(), metres->fingerprint());
+  const std::vector<GeoPosition> points = {{-119.5, 36.5}, {-119.62, 36.33}, {-119.07, 36.91}};
+  const auto given = raw->ReadPoints(points), in_metres = metres->ReadPoints(points),
+             in_feet = feet->ReadPoints(points), as_stated = stated->ReadPoints(points);
+  ASSERT_TRUE(given && in_metres && in_feet && as_stated);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    EXPECT_NEAR((*in_metres)[i], (*given)[i] - 35, .002) << i;
+    EXPECT_NEAR((*in_feet)[i], (*given)[i] * 1200 / 3937 - 35, .002) << i;
+    EXPECT_EQ((*as_stated)[i], (*in_metres)[i]) << "the file's own word counts";
+  }
 }
 
 TEST(VerticalDatum, TilesBoundsAndMercatorPixelsAreConvertedAlike) {

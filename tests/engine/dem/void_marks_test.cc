@@ -313,6 +313,29 @@ TEST(Overviews, WithoutTheMaskOfTheRasterAreNotUsed) {
   ExpectUnused(WriteMasked(other, true, true), {.vertical = "unknown"}, "heights that the raster has not");
 }
 
+// GDAL keeps such masks in files of their own, too, and in VRTs.
+TEST(VoidMarks, AMaskOfTheBandAloneCounts) {
+  const TempDir dir;
+  RasterSpec spec;
+  spec.value = [](int col, int) { return col < 8 ? 500 : 8000; };
+  const std::string path = WriteRaster(dir, spec);
+  {
+    const GDALDatasetUniquePtr dataset(GDALDataset::Open(path.c_str(), GDAL_OF_RASTER | GDAL_OF_UPDATE));
+    GDALRasterBand& band = *dataset->GetRasterBand(1);
+    EXPECT_EQ(band.CreateMaskBand(0), CE_None);
+    const std::vector<std::uint8_t> line = {1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0};
+    for (int row = 0; row < spec.height; ++row) {
+      EXPECT_EQ(band.GetMaskBand()->RasterIO(GF_Write, 0, row, spec.width, 1, const_cast<std::uint8_t*>(line.data()),
+                                             spec.width, 1, GDT_Byte, 0, 0, nullptr),
+                CE_None);
+    }
+  }
+  const auto source = OpenOrFail(path, {.source = {.vertical = "unknown"}});
+  ASSERT_NE(source, nullptr);
+  EXPECT_EQ(InfoOf(*source).heights.max, 500);
+  EXPECT_EQ(InfoOf(*source).void_samples, 128U);
+}
+
 // Int16 has a mark of voids whether it is declared or not, and a cubic kernel goes a little beyond the heights it is
 // given.
 TEST(Overviews, WithTheMaskOfTheRasterAreUsed) {

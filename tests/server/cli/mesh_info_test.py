@@ -235,6 +235,20 @@ class Mesh(InFolder):
         result = run("mesh", dem, "-o", self.folder / "a.obj", "--points", 9, "--json")
         self.assertEqual(json.loads(result.stdout)["input"]["voids"], 300)
 
+    def test_tells_of_coordinates_that_are_not_metres(self):
+        for unit, metres, coordinates, is_told in (("Meter", 1, "crs", False), ("Foot_US", 1200 / 3937, "crs", True),
+                                                   ("Foot_US", 1200 / 3937, "pixel", False)):
+            self.write("county.prj", f"""PROJCS["county",GEOGCS["NAD83",DATUM["D_North_American_1983",
+                SPHEROID["GRS_1980",6378137,298.257222101]],PRIMEM["Greenwich",0],UNIT["Degree",0.0174532925199433]],
+                PROJECTION["Transverse_Mercator"],PARAMETER["latitude_of_origin",36],PARAMETER["central_meridian",-120],
+                PARAMETER["scale_factor",1],PARAMETER["false_easting",0],PARAMETER["false_northing",0],
+                UNIT["{unit}",{metres!r}]]""")
+            dem = self.write("county.asc", grid(BUMPS, PLACE))
+            result = run("mesh", dem, "-o", self.folder / "a.obj", "--max-error", 1, "--coordinates", coordinates)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            words = "x and y of the mesh are in its reference system's unit (US survey foot), heights in metres"
+            self.assertEqual(words in result.stderr, is_told, result.stderr)
+
     def test_says_what_is_wrong_with_its_arguments(self):
         out = self.folder / "a.obj"
         for words, arguments in ((["exactly one goal"], ["--out", out]),
