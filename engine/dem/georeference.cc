@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdlib>
 #include <numbers>
 #include <vector>
 
@@ -61,16 +62,30 @@ std::string UnitOfHeightAxis(const OGRSpatialReference& srs) {
   return fmt::format("{} m a unit", metres);  // known to no table: a warning says so
 }
 
+// What GDAL leaves of a compound CRS without its vertical part has lost the details of its code, as files have them
+// that state the code alone.
+std::string WktWithDetails(const OGRSpatialReference& horizontal) {
+  const char* authority = horizontal.GetAuthorityName(nullptr);
+  const char* code = horizontal.GetAuthorityCode(nullptr);
+  if (authority != nullptr && code != nullptr && EQUAL(authority, "EPSG")) {
+    OGRSpatialReference detailed;
+    detailed.SetAxisMappingStrategy(OAMS_TRADITIONAL_GIS_ORDER);
+    if (detailed.importFromEPSG(std::atoi(code)) == OGRERR_NONE && detailed.IsSame(&horizontal) != 0) {
+      return Wkt(detailed);
+    }
+  }
+  return Wkt(horizontal);
+}
+
 // Name and unit of what heights count from, as far as the CRS says.
 std::pair<std::string, std::string> VerticalPart(const OGRSpatialReference& srs) {
   if (srs.IsCompound() != 0) {
-    const char* crs = srs.GetAttrValue("COMPD_CS|VERT_CS");
     const char* name = srs.GetAttrValue("COMPD_CS|VERT_CS|VERT_DATUM");
     const char* unit = srs.GetAttrValue("COMPD_CS|VERT_CS|UNIT");
-    // Of a GeoTIFF that states the unit of its heights and no more GDAL makes a vertical part by that name.
-    const auto is_unknown = [](const char* text) { return text != nullptr && EQUAL(text, "unknown"); };
-    const bool is_unit_alone = is_unknown(crs) && is_unknown(name);
-    return {is_unit_alone ? "" : name == nullptr ? "unnamed" : name, unit == nullptr ? "" : unit};
+    // Of a GeoTIFF that states the unit of its heights, or says in words what they are, and no more GDAL makes a
+    // vertical part with a datum by that name.
+    const bool is_unknown = name != nullptr && EQUAL(name, "unknown");
+    return {is_unknown ? "" : name == nullptr ? "unnamed" : name, unit == nullptr ? "" : unit};
   }
   if (srs.GetAxesCount() == 3) return {"ellipsoid", UnitOfHeightAxis(srs)};
   return {};
@@ -116,7 +131,7 @@ Result<void> Georeference::SetAffine(const std::string& path) {
 std::optional<PixelOffset> Georeference::OffsetOf(const Georeference& other) const {
   // A hundredth of a pixel off is on the grid, as around the Earth (FindPeriod): corners are written with few digits.
   constexpr double kTolerance = 0.01;
-  if (wkt_.empty() || wkt_ != other.wkt_) return std::nullopt;
+  if (horizontal_wkt_.empty() || horizontal_wkt_ != other.horizontal_wkt_) return std::nullopt;
   const int side = std::max({width_, height_, other.width_, other.height_});
   const double pixel = std::min(pixel_width(), pixel_height());
   for (const std::size_t i : {1, 2, 4, 5}) {
@@ -148,12 +163,13 @@ Result<Georeference> Georeference::Moved(const PixelOffset& first, int width, in
 
 Result<void> Georeference::ReadCrs(const OGRSpatialReference& srs, const std::string& path) {
   wkt_ = Wkt(srs);
-  crs_ = NameAndCode(srs);
   std::tie(vertical_datum_, vertical_unit_) = VerticalPart(srs);
   if (srs.IsCompound() != 0 && !vertical_datum_.empty()) vertical_crs_ = Wkt(srs);
   OGRSpatialReference horizontal(srs);
   if (horizontal.IsCompound() != 0) horizontal.StripVertical();
   if (horizontal.GetAxesCount() == 3) horizontal.DemoteTo2D(nullptr);
+  horizontal_wkt_ = srs.IsCompound() != 0 ? WktWithDetails(horizontal) : Wkt(horizontal);
+  crs_ = NameAndCode(vertical_datum_.empty() ? horizontal : srs);
   if (horizontal.IsGeographic() == 0 && horizontal.IsProjected() == 0) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "{}: its coordinate reference system \"{}\" is not tied to the Earth; assign the right one with "

@@ -86,7 +86,7 @@ class Georeference {
   double period_ = 0;
   int wrap_columns_ = 0;
   std::shared_ptr<const Projector> projector_;  // null: the CRS is WGS 84 longitude and latitude
-  std::string wkt_;                             // of the CRS as stated
+  std::string wkt_, horizontal_wkt_;            // of the CRS as stated, and without what heights count from
   std::string crs_, vertical_datum_, vertical_unit_, vertical_crs_, pixel_unit_;
 };
 

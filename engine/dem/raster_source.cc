@@ -81,13 +81,21 @@ void LogWhatMatters(GDALDataset& dataset, const RasterInfo& info, const Georefer
   }
 }
 
-void LogVertical(const std::string& path, const VerticalDatum& vertical) {
+void LogVertical(const std::string& path, const VerticalDatum& vertical, const std::string& unit) {
   if (!vertical.is_known()) {
     spdlog::warn("{}: no vertical datum stated, heights pass through as given", path);
   } else if (vertical.geoid) {
     spdlog::info("{}: heights count from {}, made ellipsoidal by PROJ operation \"{}\"", path, vertical.name,
                  vertical.geoid->description());
     spdlog::debug("{}: {}", path, vertical.geoid->pipeline());
+    // Programs write feet where GDAL does not read them.
+    const auto stated = MetresPerUnit(unit), counted = MetresPerUnit(vertical.geoid->unit());
+    if (!unit.empty() && !vertical.geoid->unit().empty() && stated && counted && *stated != *counted) {
+      spdlog::warn(
+          "{}: heights are taken for {}, which the file states; {} counts in {}: if they are in that, say so with "
+          "`gdal_edit.py -units \"{}\" file`",
+          path, unit, vertical.name, vertical.geoid->unit(), vertical.geoid->unit());
+    }
   }
 }
 
@@ -167,7 +175,7 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
   source->info_.valid_samples = survey.valid;
   source->info_.void_samples = survey.voids;
   LogWhatMatters(**dataset, source->info_, source->georeference_, source->layout_);
-  LogVertical(path, source->vertical_);
+  LogVertical(path, source->vertical_, source->layout_.rules.unit);
   if (!found_voids.empty()) {
     spdlog::warn("{}: voids that it does not declare: {}; `nodata` of the configuration decides otherwise", path,
                  found_voids);

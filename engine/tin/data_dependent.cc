@@ -30,13 +30,13 @@ const Star& DataDependentCriterion::Insert(const Triangulation::Vertex& vertex, 
   return star;
 }
 
-// Leaves the edges whose fit decides as suspects.
+// Leaves the edges whose fit decides as suspects: none where normals do, which takes no scan.
 Star& DataDependentCriterion::OutlineByShape(const Triangulation::Vertex& vertex, TriangleId triangle) {
   bool is_suspect = false;
   Suspect* suspect = suspects_.data();
   Star& star = triangulation_->Outline(
       vertex, triangle,
-      [&](const RingVertex& u, const RingVertex& v, const RingVertex& w, HalfEdgeId back, WalkPlace)
+      [&](const RingVertex& u, const RingVertex& v, const RingVertex& w, HalfEdgeId back)
           __attribute__((always_inline)) {
             PrefetchError(back / 4);
             const Quadrilateral q{u, v, w, vertex.height};
@@ -51,8 +51,8 @@ Star& DataDependentCriterion::OutlineByShape(const Triangulation::Vertex& vertex
               return is_absorbed;
             return is_absorbed || (std::exchange(is_suspect, false) && BendsLessAlongPw(q));
           },
-      [&](WalkPlace place) __attribute__((always_inline)) {
-        suspect->edge = static_cast<std::uint32_t>(place.kept);
+      [&](std::size_t edge) __attribute__((always_inline)) {
+        suspect->edge = static_cast<std::uint32_t>(edge);
         suspect->is_certain = false;
         suspect_count_ += is_suspect;
         is_suspect = false;
@@ -225,13 +225,9 @@ void DataDependentCriterion::SuspectEdge(Star& star, std::uint32_t index) {
   const Quadrilateral q{edge.u, edges_[edge.next].u, beyond.w, vertex_.height};
   const ShapeQuality quality = ShapeQualityOf(q);
   const bool is_shaped_better = quality.pw > quality.uv;
-  bool is_certain = IsDecided(quality);
-  bool is_suspect = Sees(q.u, q.v, q.w) & (!is_certain | is_shaped_better);
-  if (options_.measure == FitMeasure::kNormals) [[unlikely]] {
-    is_suspect = is_suspect && (is_certain || BendsLessAlongPw(q));
-    is_certain = true;
-  }
+  const bool is_certain = IsDecided(quality);
   // Whether it is one cannot be foretold: not a branch.
+  const bool is_suspect = Sees(q.u, q.v, q.w) & (!is_certain | is_shaped_better);
   suspects_[suspect_count_] = {index, edge.outside, is_certain, is_shaped_better, beyond};
   suspect_count_ += is_suspect;
   if (suspect_count_ == suspects_.size()) [[unlikely]]

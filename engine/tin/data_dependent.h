@@ -3,9 +3,9 @@
 //        w           Garland and Heckbert (1997), section 3.4. Around a new vertex p, an edge (u, v) of the cavity's
 //       / \          outline is suspect: the quadrilateral (p, u, w, v) with the triangle beyond it is cut by u-v or by
 //      /   \         p-w, whichever fits better, and the edges that take its place are suspect in turn. Spokes (edges
-//     u-----v        at p) are not. Each test is a function of its quadrilateral alone, so that the cavity does not
-//      \   /         depend on the order of the tests, on the triangle that the insertion starts from, or on slots.
-//        p
+//     u-----v        at p) are not. Each test is a function of its quadrilateral and of which corner beyond is the
+//      \   /         youngest, so that the cavity does not depend on the order of the tests, on the triangle that the
+//        p           insertion starts from, or on slots.
 //
 // So tests may wait for each other. The walk around p takes what the shape decides; then one scan fits the triangles of
 // the outline it has found and both of the other cut wherever the fit decides; edges that have come into the outline

@@ -20,7 +20,7 @@ TinMesh InsertSamples(const TinMesh& mesh, std::span<const SamplePosition> sampl
     near = triangulation.Locate(sample, near);
     if (triangulation.IsCorner(sample, near)) continue;
     const Star& star = triangulation.Insert(
-        {sample, 0}, near, [](const RingVertex& u, const RingVertex& v, const RingVertex& w, HalfEdgeId, WalkPlace) {
+        {sample, 0}, near, [](const RingVertex& u, const RingVertex& v, const RingVertex& w, HalfEdgeId) {
           return Cross(u, v) == 0 || (Sees(u, v, w) && IsInsideCircle(v, u, w));
         });
     near = star.triangles[0];

@@ -1,8 +1,7 @@
 // The two ways to cut a convex quadrilateral into triangles, compared by their shape and by their bend.
 //
 //        w           The quadrilateral (p, u, w, v), counter-clockwise, seen from the point p that is being inserted.
-//        It is
-//       / \          cut by u-v into (u, v, p) and (v, u, w), or by p-w into (u, w, p) and (w, v, p).
+//       / \          It is cut by u-v into (u, v, p) and (v, u, w), or by p-w into (u, w, p) and (w, v, p).
 //      /   \         Everything here is a function of its four corners, in double without fused operations: the same on
 //     u-----v        every processor.
 //      \   /

@@ -55,7 +55,8 @@ struct Star {
   bool is_closed = true;
   bool has_border = false;  // some triangle may have an edge on the border
   std::size_t count = 0;
-  // For scans: a set of bits, triangles of the first kMostLeftOut that there are none of. A ring may hold several fans.
+  // By bits, of the first kMostLeftOut triangles: those that scans skip. So a ring may hold several fans; what joins
+  // two of them is no triangle.
   static constexpr std::size_t kMostLeftOut = 32;
   std::uint32_t left_out = 0;
   // Of an open one: the edge of the walk's outline that holds the centre. The ring begins after it.

@@ -69,10 +69,9 @@ void Triangulation::Join(Triangles& triangles, const std::vector<std::array<std:
 // The in-circle test says yes where the point lies on the edge, which is inside the circle, and no where w is not seen:
 // a circle without vertices ends beyond the edge where the edge's own ends do.
 const Star& Triangulation::InsertDelaunay(const Vertex& vertex, TriangleId triangle) {
-  return Insert(vertex, triangle,
-                [](const RingVertex& u, const RingVertex& v, const RingVertex& w, HalfEdgeId, WalkPlace) {
-                  return IsInsideCircle(v, u, w);
-                });
+  return Insert(vertex, triangle, [](const RingVertex& u, const RingVertex& v, const RingVertex& w, HalfEdgeId) {
+    return IsInsideCircle(v, u, w);
+  });
 }
 
 void Triangulation::Grow() {

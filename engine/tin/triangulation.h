@@ -30,12 +30,6 @@
 
 namespace terrace::tin {
 
-// Where an insertion's walk around the outline has come to.
-struct WalkPlace {
-  std::size_t pending;  // edges that have not been looked across yet, this one among them
-  std::size_t kept;     // edges that stay, which come before it
-};
-
 class Triangulation {
  public:
   static constexpr std::uint32_t kNone = kNoEdge;
@@ -61,15 +55,16 @@ class Triangulation {
   Triangulation(const std::vector<Vertex>& vertices, const std::vector<std::array<std::uint32_t, 3>>& triangles);
 
   // Inserts a vertex into `triangle`, which must contain the point inside or on an edge; it must not be a vertex yet.
-  // `absorbs(u, v, w, back, place)` says whether the triangle (v, u, w) is removed as well: it lies beyond the
+  // `absorbs(u, v, w, back)` says whether the triangle (v, u, w) is removed as well: it lies beyond the
   // outline's edge from u to v, and `back` is that edge seen from there. It must say yes where the point lies on the
-  // edge, and only where w lies strictly between u and v as seen from the point (Sees). `keeps(place)` is told of every
-  // edge that stays, those on the border too, which are not asked about. The star is valid until the next insertion.
+  // edge, and only where w lies strictly between u and v as seen from the point (Sees). `keeps(edge)` is told of every
+  // edge that stays, those on the border too, which are not asked about; they are numbered in their order. The star is
+  // valid until the next insertion.
   template <typename Absorbs, typename Keeps>
   const Star& Insert(const Vertex& vertex, TriangleId triangle, Absorbs&& absorbs, Keeps&& keeps);
   template <typename Absorbs>
   const Star& Insert(const Vertex& vertex, TriangleId triangle, Absorbs&& absorbs) {
-    return Insert(vertex, triangle, absorbs, [](WalkPlace) {});
+    return Insert(vertex, triangle, absorbs, [](std::size_t) {});
   }
 
   const Star& InsertDelaunay(const Vertex& vertex, TriangleId triangle);
@@ -263,11 +258,10 @@ void Triangulation::Replace(Triangles& triangles, SamplePosition point, Triangle
   std::size_t removed = 1, edges = 0;
   for (PendingEdge *bottom = stack, *top = stack + 3; top > bottom;) {
     const HalfEdgeId back = top->back;
-    const WalkPlace place{static_cast<std::size_t>(top - bottom), edges};
     if (back != Triangles::kNone) {
       const auto& beyond = slots[back / 4];
       const RingVertex w = Relative(vertices, beyond.opposite(back % 4), point);
-      if (absorbs(u, top->end, w, back, place)) {
+      if (absorbs(u, top->end, w, back)) {
         if (removed + 5 > capacity) {  // edges found and pending are two more than triangles removed
           const auto pending = top - bottom;
           Grow();
@@ -293,7 +287,7 @@ void Triangulation::Replace(Triangles& triangles, SamplePosition point, Triangle
         star_.gap = edges;
       }
     }
-    keeps(place);
+    keeps(edges);
     star_.ring.Put(edges, u);
     star_.outside[edges++] = back;
     u = top->end;

@@ -268,13 +268,17 @@ void Metrics::CountBuild(const DatasetView& dataset, const Result<TilePtr>& tile
 void Metrics::RetainDatasets(const std::vector<DatasetView>& datasets) {
   std::set<std::string_view> served = {""};  // what has no dataset stays as well
   for (const DatasetView& dataset : datasets) served.insert(dataset.name);
-  const std::unique_lock lock(families_->mutex);  // every reply waits for it
-  std::erase_if(families_->of_datasets, [&](const auto& known) {
-    const auto& [name, metrics] = known;
-    if (served.contains(name)) return false;
-    families_->Forget(name, metrics);
-    return true;
-  });
+  std::string from;  // names before it have been looked at
+  for (;;) {
+    // One by one: every reply waits meanwhile, and to take a series out of a family is to look for it.
+    const std::unique_lock lock(families_->mutex);
+    auto gone = families_->of_datasets.lower_bound(from);
+    while (gone != families_->of_datasets.end() && served.contains(gone->first)) ++gone;
+    if (gone == families_->of_datasets.end()) return;
+    families_->Forget(gone->first, gone->second);
+    from = gone->first;
+    families_->of_datasets.erase(gone);
+  }
 }
 
 std::string Metrics::Text(const TileService::Stats& tiles, const ByteCacheStats& refinements,

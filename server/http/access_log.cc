@@ -4,6 +4,7 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -133,12 +134,24 @@ AccessLog::~AccessLog() {
 
 Result<void> AccessLog::Try(AccessLogForm form, const std::filesystem::path& file) {
   if (!IsOfFile(form, file)) return {};
+  struct stat status {};
+  if (::stat(file.c_str(), &status) == 0 && S_ISFIFO(status.st_mode)) {
+    // To open it and close it again would be the end of its reader, who is asked for by Open.
+    if (::access(file.c_str(), W_OK) == 0) return {};
+    return CannotOpen(file);
+  }
   const int descriptor = OpenToAppend(file, /*create=*/0);
   if (descriptor >= 0) {
     ::close(descriptor);
     return {};
   }
-  if (errno == ENOENT && ::access(file.parent_path().c_str(), W_OK | X_OK) == 0) return {};
+  // Open makes it, where a link leads if it is one.
+  const int why = errno;
+  std::error_code ignored;
+  const std::filesystem::path target = std::filesystem::read_symlink(file, ignored);
+  const std::filesystem::path made = target.empty() ? file : file.parent_path() / target;
+  if (why == ENOENT && ::access(made.parent_path().c_str(), W_OK | X_OK) == 0) return {};
+  errno = why;
   return CannotOpen(file);
 }
 

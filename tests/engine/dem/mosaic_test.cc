@@ -25,6 +25,7 @@ struct Cut {
   RasterSpec whole;
   std::vector<int> columns, rows;  // where pieces begin; the first is 0
   int shared = 0;                  // columns and rows that neighbours have in common
+  std::string first_crs = {};      // of the first piece, if it is another one than the whole's
 };
 
 // The whole, and its pieces as files of one rank.
@@ -39,6 +40,7 @@ std::vector<DemFile> WritePieces(const TempDir& dir, const Cut& cut) {
       RasterSpec piece = cut.whole;
       piece.width = end(cut.columns, x, cut.whole.width, cut.shared) - column;
       piece.height = end(cut.rows, y, cut.whole.height, cut.shared) - row;
+      if (files.empty() && !cut.first_crs.empty()) piece.crs = cut.first_crs;
       auto& to_crs = piece.geo_transform;
       to_crs[0] += column * to_crs[1];
       to_crs[3] += row * to_crs[5];
@@ -68,6 +70,12 @@ std::vector<Cut> Cuts() {
   cuts.push_back({"nodes", Seconds(601, 481), {0, 304}, {0, 240}, 1});
   cuts.push_back({"pixels", Seconds(600, 480), {0, 304}, {0, 240}, 0});
   cuts.push_back({"odd", Seconds(600, 480), {0, 301}, {0, 239}, 0});
+  cuts.push_back({"unit", Seconds(600, 480), {0, 304}, {0, 240}, 0});  // which one file states, and no datum
+  cuts.back().first_crs =
+      R"(COMPD_CS["WGS 84 + unknown",GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563,)"
+      R"(AUTHORITY["EPSG","7030"]],AUTHORITY["EPSG","6326"]],PRIMEM["Greenwich",0,AUTHORITY["EPSG","8901"]],)"
+      R"(UNIT["degree",0.0174532925199433,AUTHORITY["EPSG","9122"]],AUTHORITY["EPSG","4326"]],)"
+      R"(VERT_CS["unknown",VERT_DATUM["unknown",2005],UNIT["metre",1,AUTHORITY["EPSG","9001"]],AXIS["Up",UP]]])";
   cuts.push_back({"holes", Seconds(601, 481), {0, 304}, {0, 192, 336}, 1});
   cuts.back().whole.value = holes;
   cuts.back().whole.nodata = -9999;

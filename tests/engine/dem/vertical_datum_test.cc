@@ -86,24 +86,27 @@ TEST(VerticalDatum, ConvertsWhatAGeoTiffOfTheFirstVersionStates) {
   EXPECT_EQ(*source->ReadPoints(SomePoints()), *now->ReadPoints(SomePoints()));
 }
 
-// What GDAL makes of GeoTIFFs that state the unit of their heights and no more.
-TEST(VerticalDatum, AVerticalPartWithoutANameStatesAUnitAlone) {
-  constexpr const char* kUnit =
-      R"(COMPD_CS["unknown",GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]],)"
-      R"(PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433]],)"
-      R"(VERT_CS["unknown",VERT_DATUM["unknown",2005],UNIT["foot",0.3048],AXIS["Up",UP]]])";
-  const TempDir dir;
-  const auto metres = OpenOrFail(WriteRaster(dir, Hills("EPSG:4326"), "metres.tif"));
-  const std::string path = WriteRaster(dir, Hills("EPSG:4326"), "feet.tif");
-  std::ofstream(path + ".aux.xml") << "<PAMDataset><SRS dataAxisToSRSAxisMapping=\"1,2\">" << kUnit
-                                   << "</SRS></PAMDataset>";
-  const auto feet = OpenOrFail(path);
-  ASSERT_TRUE(metres && feet);
-  EXPECT_FALSE(feet->has_datum());
-  EXPECT_EQ(feet->info().sources.front().height_unit, "foot");
-  const auto of_feet = feet->ReadPoints(SomePoints()), of_metres = metres->ReadPoints(SomePoints());
-  ASSERT_TRUE(of_feet && of_metres);
-  for (std::size_t i = 0; i < of_feet->size(); ++i) EXPECT_NEAR((*of_feet)[i], (*of_metres)[i] * .3048, .002) << i;
+// What GDAL makes of GeoTIFFs that state the unit of their heights, or say in words what they are, and no more.
+TEST(VerticalDatum, AVerticalPartWithoutADatumStatesAUnitAlone) {
+  for (const char* name : {"unknown", "Mean Sea Level"}) {
+    const std::string in_feet =
+        R"(COMPD_CS["unknown",GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]],)"
+        R"(PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433]],VERT_CS[")" +
+        std::string(name) + R"(",VERT_DATUM["unknown",2005],UNIT["foot",0.3048],AXIS["Up",UP]]])";
+    const TempDir dir;
+    const auto metres = OpenOrFail(WriteRaster(dir, Hills("EPSG:4326"), "metres.tif"));
+    const std::string path = WriteRaster(dir, Hills("EPSG:4326"), "feet.tif");
+    std::ofstream(path + ".aux.xml") << "<PAMDataset><SRS dataAxisToSRSAxisMapping=\"1,2\">" << in_feet
+                                     << "</SRS></PAMDataset>";
+    const auto feet = OpenOrFail(path);
+    ASSERT_TRUE(metres && feet);
+    EXPECT_FALSE(feet->has_datum());
+    EXPECT_EQ(feet->info().sources.front().height_unit, "foot");
+    EXPECT_EQ(feet->info().sources.front().crs.substr(0, 6), "WGS 84");
+    const auto of_feet = feet->ReadPoints(SomePoints()), of_metres = metres->ReadPoints(SomePoints());
+    ASSERT_TRUE(of_feet && of_metres);
+    for (std::size_t i = 0; i < of_feet->size(); ++i) EXPECT_NEAR((*of_feet)[i], (*of_metres)[i] * .3048, .002) << i;
+  }
 }
 
 TEST(VerticalDatum, EllipsoidalReferenceSystemsPass) {

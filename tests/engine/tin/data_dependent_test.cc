@@ -168,11 +168,10 @@ class NaiveDataDependent {
     const SamplePosition at = PositionOf(sample);
     const float height = field_.At(at.x, at.y);
     const Corner p{at.x, at.y, static_cast<double>(height)};
-    triangulation_.Insert(
-        {at, height}, triangle,
-        [&](const RingVertex& u, const RingVertex& v, const RingVertex& w, HalfEdgeId back, WalkPlace) {
-          return Cross(u, v) == 0 || (Sees(u, v, w) && Swaps({u, v, w, height}, p, back / 4));
-        });
+    triangulation_.Insert({at, height}, triangle,
+                          [&](const RingVertex& u, const RingVertex& v, const RingVertex& w, HalfEdgeId back) {
+                            return Cross(u, v) == 0 || (Sees(u, v, w) && Swaps({u, v, w, height}, p, back / 4));
+                          });
   }
 
   const HeightField& field_;

@@ -198,10 +198,9 @@ TEST(Triangulation, FindsItsWayAroundAnyMesh) {
     const TriangleId t = triangulation.Locate(p, 0);
     if (triangulation.IsCorner(p, t)) continue;
     // Any criterion: slivers all over.
-    triangulation.Insert({p, 0}, t,
-                         [&](const RingVertex& u, const RingVertex& v, const RingVertex& w, HalfEdgeId, WalkPlace) {
-                           return Cross(u, v) == 0 || (Sees(u, v, w) && random.Below(2) == 0);
-                         });
+    triangulation.Insert({p, 0}, t, [&](const RingVertex& u, const RingVertex& v, const RingVertex& w, HalfEdgeId) {
+      return Cross(u, v) == 0 || (Sees(u, v, w) && random.Below(2) == 0);
+    });
   }
   EXPECT_TRUE(TwinsAgree(triangulation));
   EXPECT_TRUE(CoversExactly(field, triangulation.Mesh()));

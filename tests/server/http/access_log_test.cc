@@ -1,6 +1,9 @@
 #include "server/http/access_log.h"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <poll.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -102,6 +105,30 @@ TEST(AccessLog, AppendsToItsFileAndFollowsARotation) {
   log->Write(Record());
   EXPECT_FALSE(AccessLog::Try(AccessLogForm::kJson, folder / "nothing" / "access.log"));
   EXPECT_FALSE(AccessLog::Open(AccessLogForm::kJson, folder / "nothing" / "access.log"));
+}
+
+// A reader of a pipe takes the first writer's end for the end of all.
+TEST(AccessLog, IsTriedWithoutATrace) {
+  const std::filesystem::path folder =
+      std::filesystem::path(testing::TempDir()) / ("access_log_try_" + std::to_string(::getpid()));
+  std::filesystem::remove_all(folder);
+  std::filesystem::create_directories(folder);
+  const std::filesystem::path pipe = folder / "pipe";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  const int reader = ::open(pipe.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+  ASSERT_GE(reader, 0);
+  EXPECT_TRUE(AccessLog::Try(AccessLogForm::kJson, pipe));
+  pollfd end{reader, POLLIN, 0};
+  EXPECT_EQ(::poll(&end, 1, 0), 0) << end.revents;
+  EXPECT_TRUE(AccessLog::Open(AccessLogForm::kJson, pipe));
+  ::close(reader);
+
+  std::filesystem::create_symlink("there.log", folder / "here");
+  EXPECT_TRUE(AccessLog::Try(AccessLogForm::kJson, folder / "here"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "there.log"));
+  std::filesystem::create_symlink(folder / "nothing" / "access.log", folder / "astray");
+  EXPECT_FALSE(AccessLog::Try(AccessLogForm::kJson, folder / "astray"));
+  std::filesystem::remove_all(folder);
 }
 
 }  // namespace
