@@ -92,8 +92,9 @@ void LogVertical(const std::string& path, const VerticalDatum& vertical, const s
     const auto stated = MetresPerUnit(unit), counted = MetresPerUnit(vertical.geoid->unit());
     if (!unit.empty() && !vertical.geoid->unit().empty() && stated && counted && *stated != *counted) {
       spdlog::warn(
-          "{}: heights are taken for {}, which the file states; {} counts in {}: if they are in that, say so with "
-          "`gdal_edit.py -units \"{}\" file`",
+          "{}: the file states heights in \"{}\", and they are taken for that; {} counts in \"{}\": if that is what "
+          "they "
+          "are, say so with `gdal_edit.py -units \"{}\" file`",
           path, unit, vertical.name, vertical.geoid->unit(), vertical.geoid->unit());
     }
   }

@@ -70,8 +70,9 @@ class Triangulation {
   const Star& InsertDelaunay(const Vertex& vertex, TriangleId triangle);
 
   // The same in steps, for a criterion that asks about several edges at once. First the outline of what `absorbs` takes
-  // alone: the star's ring, and `outside` by edge, all but the triangles. Whoever calls may then replace an edge of it
-  // by the two others of the triangle beyond, in both, once that is told by Remove. At last the star is filled.
+  // alone: the star without its triangles. Whoever calls may then replace edges of it by the two others of the triangle
+  // beyond, which Remove is told of: in the ring, with its last vertex, in `outside`, `count` and `has_border`. At last
+  // the star is filled.
   template <typename Absorbs, typename Keeps>
   Star& Outline(const Vertex& vertex, TriangleId triangle, Absorbs&& absorbs, Keeps&& keeps);
   void Remove(TriangleId t);
