@@ -10,12 +10,17 @@ namespace terrace::tin {
 
 DataDependentCriterion::DataDependentCriterion(const HeightField& field, const Sagitta& sagitta,
                                                Triangulation& triangulation, DataDependentOptions options)
-    : triangulation_(&triangulation), options_(options), fit_errors_(field, sagitta, options.measure) {
+    : triangulation_(&triangulation),
+      options_(options),
+      taken_below_(options.qthresh * options.qthresh),
+      kept_below_(options.qthresh),
+      kept_further_out_below_(options.qthresh * (2 - options.qthresh)),
+      fit_errors_(field, sagitta, options.measure) {
   TERRACE_CHECK(options_.qthresh >= 0 && options_.qthresh <= 1);
   pairs_.ring.Grow(3 * kMostPairs);
 }
 
-const Star& DataDependentCriterion::Insert(const Triangulation::Vertex& vertex, TriangleId triangle) {
+const Star& DataDependentCriterion::Insert(Triangulation::Vertex vertex, TriangleId triangle) {
   vertex_ = vertex;
   CoverSlots();
   suspect_count_ = flip_count_ = edge_count_ = 0;
@@ -40,16 +45,19 @@ Star& DataDependentCriterion::OutlineByShape(const Triangulation::Vertex& vertex
           __attribute__((always_inline)) {
             PrefetchError(back / 4);
             const Quadrilateral q{u, v, w, vertex.height};
-            const ShapeQuality quality = ShapeQualityOf(q);
-            const bool is_shaped_better = quality.pw > quality.uv;
-            const bool is_seen = Sees(u, v, w), is_decided = IsDecided(quality), is_split = Cross(u, v) == 0;
-            is_suspect = is_seen & !is_decided & !is_split;
+            const ShapeQuality quality = QualityOf(q);
+            const bool takes_pw = quality.uv < taken_below_ * quality.pw;
+            const bool keeps_uv = quality.pw < kept_below_ * quality.uv;
+            const bool is_seen = Sees(u, v, w), is_split = Cross(u, v) == 0;
+            is_suspect = is_seen & !takes_pw & !keeps_uv & !is_split;
             suspect->outside = back;
-            suspect->is_shaped_better = is_shaped_better;
-            const bool is_absorbed = (is_seen & is_decided & is_shaped_better) | is_split;
+            suspect->quality = quality;
+            const bool is_absorbed = (is_seen & takes_pw) | is_split;
             if (options_.measure != FitMeasure::kNormals) [[likely]]
               return is_absorbed;
-            return is_absorbed || (std::exchange(is_suspect, false) && BendsLessAlongPw(q));
+            if (!std::exchange(is_suspect, false)) return is_absorbed;
+            const Bends bends = BendsOf(q);
+            return IsBetterAlongPw(bends.uv, bends.pw, quality);
           },
       [&](std::size_t edge) __attribute__((always_inline)) {
         suspect->edge = static_cast<std::uint32_t>(edge);
@@ -68,9 +76,19 @@ Star& DataDependentCriterion::OutlineByShape(const Triangulation::Vertex& vertex
   return star;
 }
 
-// Whether the smaller one is less than so much of the larger one, without asking which is which.
-bool DataDependentCriterion::IsDecided(const ShapeQuality& quality) const {
-  return (quality.uv < options_.qthresh * quality.pw) | (quality.pw < options_.qthresh * quality.uv);
+// An angle says less about the fit than a distance does: with normals the quality counts twice.
+[[gnu::always_inline]] inline ShapeQuality DataDependentCriterion::QualityOf(const Quadrilateral& q) const {
+  const ShapeQuality quality = ShapeQualityOf(q);
+  if (options_.measure != FitMeasure::kNormals) [[likely]]
+    return quality;
+  return {quality.uv * quality.uv, quality.pw * quality.pw};
+}
+
+// Of squares of how badly the two cuts fit, each over its squared quality. Equal: by the shape alone.
+inline bool DataDependentCriterion::IsBetterAlongPw(double now, double then, const ShapeQuality& quality) const {
+  const bool is_pure = options_.qthresh == 0;
+  const double of_uv = now * (is_pure ? 1 : quality.pw), of_pw = then * (is_pure ? 1 : quality.uv);
+  return (of_pw < of_uv) | ((of_pw == of_uv) & (quality.pw >= quality.uv));
 }
 
 // The outline's triangles and, in the same scan, as many pairs of the suspects as it can take.
@@ -123,13 +141,15 @@ inline std::size_t DataDependentCriterion::PutPair(Star& star, std::size_t end, 
 
 void DataDependentCriterion::FitSuspects(const Star& star, std::size_t first) {
   if (!fit_errors_.are_maxima()) {
-    for (; first < suspect_count_; ++first) FitOneByOne(star, suspects_[first]);
+    MakeRoomForPairs();
+    for (; first < suspect_count_; ++first) FitOneByOne(star, first);
     return;
   }
   pairs_.x = star.x;
   pairs_.y = star.y;
   pairs_.height = star.height;
   pairs_.left_out = kBetweenPairs;
+  MakeRoomForPairs();
   for (; first < suspect_count_; first += kMostPairs) {
     const std::size_t pairs = std::min(suspect_count_ - first, kMostPairs);
     pairs_.has_border = star.has_border;
@@ -139,29 +159,32 @@ void DataDependentCriterion::FitSuspects(const Star& star, std::size_t first) {
       end = PutPair(pairs_, end, EndsOf(star, suspect.edge), suspect.beyond);
     }
     pairs_.count = end - 1;
-    fit_errors_.Scan(pairs_, pair_misfits_.data(), pair_errors_.data());
-    for (std::size_t i = 0; i < pairs; ++i) Decide(suspects_[first + i], &pair_misfits_[3 * i], &pair_errors_[3 * i]);
+    fit_errors_.Scan(pairs_, &pair_misfits_[3 * first], &pair_errors_[3 * first]);
+    for (std::size_t i = first; i < first + pairs; ++i) {
+      Decide(suspects_[i], &pair_misfits_[3 * i], &pair_errors_[3 * i]);
+    }
   }
 }
 
-void DataDependentCriterion::FitOneByOne(const Star& star, const Suspect& suspect) {
+void DataDependentCriterion::FitOneByOne(const Star& star, std::size_t index) {
+  const Suspect& suspect = suspects_[index];
   const auto [u, v] = EndsOf(star, suspect.edge);
-  constexpr std::array<PlaneMisfit, 2> kNone;
-  std::array<double, 2> errors = {kUnknown, kUnknown};
+  double* const errors = &pair_errors_[3 * index];
+  errors[0] = errors[1] = kUnknown;
   if (!suspect.is_certain) {
     if (double& near = NearError(suspect.edge); near == kUnknown) near = fit_errors_.Of(vertex_, u, v);
-    errors = {fit_errors_.Of(vertex_, u, suspect.beyond.w), fit_errors_.Of(vertex_, suspect.beyond.w, v)};
+    errors[0] = fit_errors_.Of(vertex_, u, suspect.beyond.w);
+    errors[1] = fit_errors_.Of(vertex_, suspect.beyond.w, v);
   }
-  Decide(suspect, kNone.data(), errors.data());
+  Decide(suspect, &pair_misfits_[3 * index], errors);
 }
 
-// By the fits of (u, w, p) and (w, v, p). Equal fits, frequent where heights are whole metres: the better shape.
+// By the fits of (u, w, p) and (w, v, p).
 inline void DataDependentCriterion::Decide(const Suspect& suspect, const PlaneMisfit* misfits, const double* errors) {
-  const double now = fit_errors_.Combined(NearError(suspect.edge), ErrorBeyond(suspect.outside / 4));
-  const double then = fit_errors_.Combined(errors[0], errors[1]);
-  const bool fits_better = (now != 0) & ((then < now) | ((then == now) & suspect.is_shaped_better));
-  flips_[flip_count_] = {suspect.edge, suspect.beyond, {misfits[0], errors[0]}, {misfits[1], errors[1]}};
-  flip_count_ += suspect.is_certain | fits_better;
+  const double now = fit_errors_.CombinedSquare(NearError(suspect.edge), ErrorBeyond(suspect.outside / 4));
+  const double then = fit_errors_.CombinedSquare(errors[0], errors[1]);
+  flips_[flip_count_] = {&suspect, misfits, errors};
+  flip_count_ += suspect.is_certain | IsBetterAlongPw(now, then, suspect.quality);
   if (flip_count_ == flips_.size()) [[unlikely]]
     flips_.resize(2 * flip_count_);
 }
@@ -182,6 +205,8 @@ void DataDependentCriterion::ReplaceEdges(Star& star) {
   edges_[last].u = star.ring[last];
   edge_count_ = last + 1;
   while (flip_count_ > 0) {
+    // Those of the round before are still read.
+    suspects_.swap(decided_);
     suspect_count_ = 0;
     for (std::size_t i = 0; i < flip_count_; ++i) ReplaceEdge(star, flips_[i]);
     flip_count_ = 0;
@@ -203,14 +228,16 @@ void DataDependentCriterion::ReplaceEdges(Star& star) {
 void DataDependentCriterion::ReplaceEdge(Star& star, const Flip& flip) {
   if (edge_count_ == edges_.size()) [[unlikely]]
     edges_.resize(2 * edge_count_);
-  Edge& edge = edges_[flip.edge];
+  const std::uint32_t index = flip.suspect->edge;
+  const Triangulation::Beyond& beyond = flip.suspect->beyond;
+  Edge& edge = edges_[index];
   const auto made = static_cast<std::uint32_t>(edge_count_++);
   triangulation_->Remove(edge.outside / 4);
-  edges_[made] = {flip.beyond.w, flip.beyond.wv, edge.next, flip.of_wv};
-  edge.outside = flip.beyond.uw;
+  edges_[made] = {beyond.w, beyond.wv, edge.next, {flip.misfits[1], flip.errors[1]}};
+  edge.outside = beyond.uw;
   edge.next = made;
-  edge.fit = flip.of_uw;
-  SuspectEdge(star, flip.edge);
+  edge.fit = {flip.misfits[0], flip.errors[0]};
+  SuspectEdge(star, index);
   SuspectEdge(star, made);
 }
 
@@ -223,12 +250,10 @@ void DataDependentCriterion::SuspectEdge(Star& star, std::uint32_t index) {
   }
   const Triangulation::Beyond beyond = triangulation_->BeyondOf(edge.outside, vertex_.position);
   const Quadrilateral q{edge.u, edges_[edge.next].u, beyond.w, vertex_.height};
-  const ShapeQuality quality = ShapeQualityOf(q);
-  const bool is_shaped_better = quality.pw > quality.uv;
-  const bool is_certain = IsDecided(quality);
+  const ShapeQuality quality = QualityOf(q);
   // Whether it is one cannot be foretold: not a branch.
-  const bool is_suspect = Sees(q.u, q.v, q.w) & (!is_certain | is_shaped_better);
-  suspects_[suspect_count_] = {index, edge.outside, is_certain, is_shaped_better, beyond};
+  const bool is_suspect = Sees(q.u, q.v, q.w) & !(quality.pw < kept_further_out_below_ * quality.uv);
+  suspects_[suspect_count_] = {index, edge.outside, quality.uv < taken_below_ * quality.pw, quality, beyond};
   suspect_count_ += is_suspect;
   if (suspect_count_ == suspects_.size()) [[unlikely]]
     suspects_.resize(2 * suspect_count_);
@@ -250,7 +275,7 @@ inline double DataDependentCriterion::ErrorBeyond(TriangleId t) {
 }
 
 // Beyond the border it is some address, which does no harm.
-inline void DataDependentCriterion::PrefetchError(TriangleId t) const {
+[[gnu::always_inline]] inline void DataDependentCriterion::PrefetchError(TriangleId t) const {
   const auto errors = reinterpret_cast<std::uintptr_t>(errors_by_slot_.data());
   __builtin_prefetch(reinterpret_cast<const void*>(errors + sizeof(double) * t));
 }
@@ -264,6 +289,13 @@ const PlaneMisfit* DataDependentCriterion::Scan(const Star& star) {
   CoverSlots();
   for (std::size_t i = 0; i < star.count; ++i) errors_by_slot_[star.triangles[i]] = errors_[i];
   return misfits_.data();
+}
+
+void DataDependentCriterion::MakeRoomForPairs() {
+  const std::size_t room = 3 * (suspect_count_ + kMostPairs) + FitErrors::kPadding;
+  if (pair_misfits_.size() >= room) return;
+  pair_misfits_.resize(2 * room);
+  pair_errors_.resize(2 * room);
 }
 
 void DataDependentCriterion::MakeRoom(const Star& star) {

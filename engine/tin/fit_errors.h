@@ -28,8 +28,12 @@ class FitErrors {
   // By the largest distance of a triangle, which scans find.
   bool are_maxima() const { return measure_ == FitMeasure::kSumMax || measure_ == FitMeasure::kMaxMax; }
 
-  // Of two triangles.
-  double Combined(double a, double b) const { return measure_ == FitMeasure::kMaxMax ? std::max(a, b) : a + b; }
+  // Of two triangles, squared: square metres by every measure.
+  double CombinedSquare(double a, double b) const {
+    if (measure_ == FitMeasure::kSumSquares) return a + b;
+    const double combined = measure_ == FitMeasure::kMaxMax ? std::max(a, b) : a + b;
+    return combined * combined;
+  }
 
   // What a StarScan finds, and errors by maxima: of a triangle that is left out, anything.
   void Scan(const Star& star, PlaneMisfit* misfits, double* errors) const {

@@ -172,17 +172,16 @@ std::optional<GreedyTriangulation::Impl::Insertion> GreedyTriangulation::Impl::N
   return Insertion{PositionOf(candidates_.sample(worst)), worst, error, false};
 }
 
-// What is inserted next lies anywhere: fetched while this one is at work. In three steps, each of which reads what the
-// one before it has fetched; in two as long as most of the triangles are in the second cache anyhow.
+// What is inserted next lies anywhere: fetched while this one is at work. In two steps, the second of which reads what
+// the first has fetched; in one as long as most of the triangles are in the second cache anyhow.
 void GreedyTriangulation::Impl::PrefetchUpcoming() const {
   constexpr std::size_t kFewTriangles = std::size_t{1} << 14;
   const auto upcoming = [this](std::size_t ahead, auto&& prefetch) {
     if (const TriangleId t = candidates_.Upcoming(ahead); t != CandidateQueue::kNoSlot) prefetch(t);
   };
-  const std::size_t late = triangulation_.triangle_count() > kFewTriangles ? 2 : 0;
-  upcoming(3 + late, [this](TriangleId t) { triangulation_.Prefetch(t); });
-  upcoming(1 + late, [this](TriangleId t) { triangulation_.PrefetchAround(t); });
-  if (late > 0) upcoming(1, [this](TriangleId t) { triangulation_.PrefetchBeyond(t); });
+  const bool are_many = triangulation_.triangle_count() > kFewTriangles;
+  upcoming(are_many ? 3 : 1, [this](TriangleId t) { triangulation_.PrefetchAround(t); });
+  if (are_many) upcoming(1, [this](TriangleId t) { triangulation_.PrefetchBeyond(t); });
 }
 
 std::optional<GreedyTriangulation::Impl::Insertion> GreedyTriangulation::Impl::NextSeed(const GreedyGoal& goal) {

@@ -83,9 +83,9 @@ enum class FitMeasure : std::uint8_t {
 
 struct DataDependentOptions {
   FitMeasure measure = FitMeasure::kSumMax;
-  // From 0 to 1. A cut whose triangles are shaped worse by more than this ratio is not considered, however well it
-  // fits: 0 looks at the fit alone, 1 at the shape wherever it differs (section 3.4.2, which lets the shape decide at
-  // the ratio, too. On a grid many small quadrilaterals have a ratio of just 1/2: up to 2 % fewer vertices at no cost.)
+  // From 0 to 1 (section 3.4.2). Below it, as a ratio of the qualities of two cuts' shapes, the better shape is taken
+  // whatever fits; 1 looks at the shape wherever it differs. Above it errors are held against the quality, which the
+  // paper does not: the cut with less error for its quality is taken. 0 looks at the fit alone.
   double qthresh = 0.5;
 };
 

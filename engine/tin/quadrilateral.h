@@ -1,4 +1,4 @@
-// The two ways to cut a convex quadrilateral into triangles, compared by their shape and by their bend.
+// The two ways to cut a convex quadrilateral into triangles: their shape and their bend.
 //
 //        w           The quadrilateral (p, u, w, v), counter-clockwise, seen from the point p that is being inserted.
 //       / \          It is cut by u-v into (u, v, p) and (v, u, w), or by p-w into (u, w, p) and (w, v, p).
@@ -22,19 +22,22 @@ struct Quadrilateral {
   float height = 0;  // of p, metres
 };
 
-// Of each cut: the product of the areas of its triangles over the product of their diameters, which the paper (section
-// 4) uses as SHAPE_QUALITY, times one number for both. Larger is better. The diameter is that of the bounding box: its
-// longer side.
+// Of each cut the SHAPE_QUALITY of the paper (section 3.4.2), squared, times one number for both. Larger is better. The
+// quality is the geometric mean of what a triangle's area is over its perimeter: a multiple of the radius of the
+// inscribed circle, but for the perimeter in which a side's length is the sum of its extents along x and y: that of the
+// triangle's bounding box. Half of that one is as good.
 struct ShapeQuality {
   double uv = 0;
   double pw = 0;
 };
 
-// Diameters of (u, w, p), (w, v, p), (u, v, p) and (v, u, w), all at once: coordinates stay below 2^15, so that offsets
-// and extents fit 16 bits. One by one, some of the many comparisons would be branches that nothing could foretell.
+// Half perimeters of (u, w, p), (w, v, p), (u, v, p) and (v, u, w), all at once: coordinates stay below 2^15, so that
+// offsets and extents fit 16 bits. One by one, some of the many comparisons would be branches that nothing could
+// foretell.
 using ShortVector = std::int16_t __attribute__((vector_size(16)));
 using IntVector = std::int32_t __attribute__((vector_size(16)));
-inline IntVector BoxDiameters(const RingVertex& u_vertex, const RingVertex& v_vertex, const RingVertex& w_vertex) {
+using UnsignedVector = std::uint32_t __attribute__((vector_size(16)));
+inline IntVector HalfPerimeters(const RingVertex& u_vertex, const RingVertex& v_vertex, const RingVertex& w_vertex) {
   const auto pair = [](const RingVertex& vertex) {
     return static_cast<std::int32_t>(static_cast<std::uint32_t>(vertex.dy) << 16 |
                                      (static_cast<std::uint32_t>(vertex.dx) & 0xFFFF));
@@ -46,15 +49,14 @@ inline IntVector BoxDiameters(const RingVertex& u_vertex, const RingVertex& v_ve
   const auto larger = [](ShortVector x, ShortVector y) { return x > y ? x : y; };
   const auto smaller = [](ShortVector x, ShortVector y) { return x < y ? x : y; };
   const auto extents = reinterpret_cast<IntVector>(larger(larger(a, b), c) - smaller(smaller(a, b), c));
-  const auto of_y = reinterpret_cast<ShortVector>(extents >> 16);
-  return reinterpret_cast<IntVector>(larger(reinterpret_cast<ShortVector>(extents), of_y)) & 0xFFFF;
+  return (extents & 0xFFFF) + (extents >> 16);
 }
 
 inline ShapeQuality ShapeQualityOf(const Quadrilateral& q) {
   const double uvp = Cross(q.u, q.v), uwp = Cross(q.u, q.w), wvp = Cross(q.w, q.v);
-  const IntVector diameters = BoxDiameters(q.u, q.v, q.w);
-  // Instead of a division by the one, a multiplication by the other. Below 2^30.
-  const double of_pw = diameters[0] * diameters[1], of_uv = diameters[2] * diameters[3];
+  const auto half = reinterpret_cast<UnsignedVector>(HalfPerimeters(q.u, q.v, q.w));
+  // Instead of a division by the one, a multiplication by the other. Below 2^32.
+  const double of_pw = half[0] * half[1], of_uv = half[2] * half[3];
   return {uvp * (uwp + wvp - uvp) * of_pw, uwp * wvp * of_uv};
 }
 
@@ -75,13 +77,17 @@ inline double CosineBetween(const Normal& a, const Normal& b) {
   return (a.x * b.x + a.y * b.y + 1) / std::sqrt((a.x * a.x + a.y * a.y + 1) * (b.x * b.x + b.y * b.y + 1));
 }
 
-// Whether the two triangles of the cut p-w are closer to one plane than those of u-v: the angle between normals of Dyn,
-// Levin and Rippa, "Data Dependent Triangulations for Piecewise Linear Interpolation" (1990), across the diagonal
-// alone.
-inline bool BendsLessAlongPw(const Quadrilateral& q) {
+// How far the two triangles of each cut are from one plane: twice the squared sine of half the angle between their
+// normals (Dyn, Levin and Rippa, "Data Dependent Triangulations for Piecewise Linear Interpolation", 1990), across the
+// diagonal alone.
+struct Bends {
+  double uv = 0;
+  double pw = 0;
+};
+inline Bends BendsOf(const Quadrilateral& q) {
   const RingVertex p{0, 0, 0, q.height};
-  return CosineBetween(Normal(q.u, q.w, p), Normal(q.w, q.v, p)) >
-         CosineBetween(Normal(q.u, q.v, p), Normal(q.v, q.u, q.w));
+  return {1 - CosineBetween(Normal(q.u, q.v, p), Normal(q.v, q.u, q.w)),
+          1 - CosineBetween(Normal(q.u, q.w, p), Normal(q.w, q.v, p))};
 }
 
 }  // namespace terrace::tin

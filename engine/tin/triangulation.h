@@ -97,15 +97,13 @@ class Triangulation {
 
   bool IsCorner(SamplePosition point, TriangleId triangle) const;
 
-  // Bring closer to the processor: a triangle that will be inserted into, what an insertion into it reads first, and
-  // what it reads next. Each reads what the one before it has brought.
-  void Prefetch(TriangleId t) const {
-    __builtin_prefetch(is_wide_ ? static_cast<const void*>(&wide_.slots[t]) : &narrow_.slots[t]);
-  }
+  // Bring closer to the processor what an insertion into the triangle reads first, and what it reads next, which is
+  // found in what the first has brought.
   void PrefetchAround(TriangleId t) const;
   void PrefetchBeyond(TriangleId t) const;
-  // What BeyondOf reads first. Of an edge on the border it is some address, which does no harm.
-  void PrefetchAcross(HalfEdgeId outside) const {
+  // What BeyondOf reads first. Of an edge on the border it is some address, which does no harm. Inline by order: to g++
+  // a function that only prefetches has no effect, and calls of it are left out.
+  [[gnu::always_inline]] void PrefetchAcross(HalfEdgeId outside) const {
     const std::size_t t = outside / 4;
     const auto address =
         is_wide_ ? reinterpret_cast<std::uintptr_t>(wide_.slots.data()) + t * sizeof(WideTriangles::Triangle)
