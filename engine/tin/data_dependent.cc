@@ -1,7 +1,7 @@
 #include "engine/tin/data_dependent.h"
 
 #include <algorithm>
-#include <array>
+#include <cmath>
 #include <utility>
 
 #include "engine/core/check.h"
@@ -13,8 +13,8 @@ DataDependentCriterion::DataDependentCriterion(const HeightField& field, const S
     : triangulation_(&triangulation),
       options_(options),
       taken_below_(options.qthresh * options.qthresh),
-      kept_below_(options.qthresh),
-      kept_further_out_below_(options.qthresh * (2 - options.qthresh)),
+      kept_below_(options.qthresh * std::sqrt(std::sqrt(options.qthresh))),
+      kept_further_out_below_(std::sqrt(std::sqrt(options.qthresh))),
       fit_errors_(field, sagitta, options.measure) {
   TERRACE_CHECK(options_.qthresh >= 0 && options_.qthresh <= 1);
   pairs_.ring.Grow(3 * kMostPairs);
@@ -140,8 +140,8 @@ inline std::size_t DataDependentCriterion::PutPair(Star& star, std::size_t end, 
 }
 
 void DataDependentCriterion::FitSuspects(const Star& star, std::size_t first) {
+  MakeRoomForPairs();
   if (!fit_errors_.are_maxima()) {
-    MakeRoomForPairs();
     for (; first < suspect_count_; ++first) FitOneByOne(star, first);
     return;
   }
@@ -149,7 +149,6 @@ void DataDependentCriterion::FitSuspects(const Star& star, std::size_t first) {
   pairs_.y = star.y;
   pairs_.height = star.height;
   pairs_.left_out = kBetweenPairs;
-  MakeRoomForPairs();
   for (; first < suspect_count_; first += kMostPairs) {
     const std::size_t pairs = std::min(suspect_count_ - first, kMostPairs);
     pairs_.has_border = star.has_border;
@@ -292,7 +291,7 @@ const PlaneMisfit* DataDependentCriterion::Scan(const Star& star) {
 }
 
 void DataDependentCriterion::MakeRoomForPairs() {
-  const std::size_t room = 3 * (suspect_count_ + kMostPairs) + FitErrors::kPadding;
+  const std::size_t room = 3 * suspect_count_ + FitErrors::kPadding;
   if (pair_misfits_.size() >= room) return;
   pair_misfits_.resize(2 * room);
   pair_errors_.resize(2 * room);

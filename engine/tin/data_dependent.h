@@ -4,14 +4,15 @@
 //       / \          outline is suspect: the quadrilateral (p, u, w, v) with the triangle beyond it is cut by u-v or by
 //      /   \         p-w, and the edges that take its place are suspect in turn. Spokes (edges at p) are not.
 //     u-----v
-//      \   /         With Q the quality of a cut's shape (quadrilateral.h), E how badly it fits, and q = qthresh:
-//        p             p-w is taken where Q(u-v) < q Q(p-w),
-//                      u-v is kept where Q(p-w)^2 < q Q(u-v)^2; where a cut by its fit has brought the edge into the
-//                      outline, already where Q(p-w)^2 < q (2 - q) Q(u-v)^2;
-//                      else p-w is taken if E(p-w) / Q(p-w) <= E(u-v) / Q(u-v), equal ones by the better shape.
-// The paper compares E alone, and has one threshold. A cut that makes the shape worse is seldom the better one in the
-// end, the less so the further out it is, and costs two scans to look at: hence more than one. Held against the
-// quality, errors choose meshes of 4 to 8 % fewer vertices. With q = 0 the fit alone decides, as in the paper.
+//      \   /         With S the squared quality of a cut's shape (quadrilateral.h), E how badly it fits, q = qthresh:
+//        p               p-w is taken where S(u-v) < q^2 S(p-w),
+//                        u-v is kept where S(p-w) < q^(5/4) S(u-v), and already where S(p-w) < q^(1/4) S(u-v) if a cut
+//                        by its fit, or one that came after it, has brought the edge into the outline,
+//                        else that with less E^2 / S; equal ones by the shape; equal in both: p-w.
+// With the angle between normals, S is squared once more, and what is further out is no different. With q = 0 the fit
+// alone decides, as in the paper. That compares E alone, and has one threshold. A cut that makes the shape worse is
+// seldom the better one in the end, the less so the further out it is, and takes two triangles more to scan: hence
+// three thresholds. All together it is 3 to 6 % fewer vertices (docs/decisions/0007).
 //
 // Each test is a function of its quadrilateral, of which corner beyond is the youngest, and of how its edge came into
 // the outline, so that the cavity does not depend on the order of the tests, on the triangle that the insertion starts
@@ -50,7 +51,8 @@ class DataDependentCriterion {
   DataDependentCriterion(const HeightField& field, const Sagitta& sagitta, Triangulation& triangulation,
                          DataDependentOptions options);
 
-  // Triangulation::Insert by this criterion.
+  // Triangulation::Insert by this criterion. The vertex by value, in a register: in memory it has just been put
+  // together field by field, and to read it as a whole would wait for that.
   const Star& Insert(Triangulation::Vertex vertex, TriangleId triangle);
 
   // What a StarScan finds, for the star of the last insertion or a triangle as a star of its own. Valid until the next
@@ -79,7 +81,9 @@ class DataDependentCriterion {
     Triangulation::Beyond beyond;
   };
 
-  // One that is cut the other way: u-w and w-v take its place.
+  // One that is cut the other way: u-w and w-v take its place. It points into the arrays of the round that decided it,
+  // which stay as they are until its edges are replaced: `suspects_` is swapped before it is written to again, and fits
+  // are not looked for meanwhile.
   struct Flip {
     const Suspect* suspect = nullptr;
     const PlaneMisfit* misfits = nullptr;  // of (u, w, p) and (w, v, p)

@@ -83,9 +83,9 @@ enum class FitMeasure : std::uint8_t {
 
 struct DataDependentOptions {
   FitMeasure measure = FitMeasure::kSumMax;
-  // From 0 to 1 (section 3.4.2). Below it, as a ratio of the qualities of two cuts' shapes, the better shape is taken
-  // whatever fits; 1 looks at the shape wherever it differs. Above it errors are held against the quality, which the
-  // paper does not: the cut with less error for its quality is taken. 0 looks at the fit alone.
+  // From 0 to 1 (section 3.4.2): how far the shapes of two cuts may be apart for their fit to count (data_dependent.h).
+  // 0 looks at the fit alone, 1 at the shape wherever it differs. Between them errors are held against the quality of
+  // the shape, which the paper does not.
   double qthresh = 0.5;
 };
 

@@ -22,22 +22,21 @@ struct Quadrilateral {
   float height = 0;  // of p, metres
 };
 
-// Of each cut the SHAPE_QUALITY of the paper (section 3.4.2), squared, times one number for both. Larger is better. The
-// quality is the geometric mean of what a triangle's area is over its perimeter: a multiple of the radius of the
-// inscribed circle, but for the perimeter in which a side's length is the sum of its extents along x and y: that of the
-// triangle's bounding box. Half of that one is as good.
+// Of each cut the squared quality, times one number for both. Larger is better. The quality is the geometric mean, over
+// the two triangles, of area over diameter: the root of the paper's SHAPE_QUALITY (section 4.3). Scape's diameter is
+// the longer side of the bounding box; this one is a quarter of the shorter side more: the diagonal within 12 %.
 struct ShapeQuality {
   double uv = 0;
   double pw = 0;
 };
 
-// Half perimeters of (u, w, p), (w, v, p), (u, v, p) and (v, u, w), all at once: coordinates stay below 2^15, so that
-// offsets and extents fit 16 bits. One by one, some of the many comparisons would be branches that nothing could
-// foretell.
+// Four times the diameters of (u, w, p), (w, v, p), (u, v, p) and (v, u, w), all at once: coordinates stay below 2^15,
+// so that offsets and extents fit 16 bits. One by one, some of the many comparisons would be branches that nothing
+// could foretell.
 using ShortVector = std::int16_t __attribute__((vector_size(16)));
 using IntVector = std::int32_t __attribute__((vector_size(16)));
-using UnsignedVector = std::uint32_t __attribute__((vector_size(16)));
-inline IntVector HalfPerimeters(const RingVertex& u_vertex, const RingVertex& v_vertex, const RingVertex& w_vertex) {
+inline IntVector QuadrupleDiameters(const RingVertex& u_vertex, const RingVertex& v_vertex,
+                                    const RingVertex& w_vertex) {
   const auto pair = [](const RingVertex& vertex) {
     return static_cast<std::int32_t>(static_cast<std::uint32_t>(vertex.dy) << 16 |
                                      (static_cast<std::uint32_t>(vertex.dx) & 0xFFFF));
@@ -49,14 +48,18 @@ inline IntVector HalfPerimeters(const RingVertex& u_vertex, const RingVertex& v_
   const auto larger = [](ShortVector x, ShortVector y) { return x > y ? x : y; };
   const auto smaller = [](ShortVector x, ShortVector y) { return x < y ? x : y; };
   const auto extents = reinterpret_cast<IntVector>(larger(larger(a, b), c) - smaller(smaller(a, b), c));
-  return (extents & 0xFFFF) + (extents >> 16);
+  const IntVector of_x = extents & 0xFFFF, of_y = extents >> 16;
+  const auto longer =
+      reinterpret_cast<IntVector>(larger(reinterpret_cast<ShortVector>(of_x), reinterpret_cast<ShortVector>(of_y)));
+  return of_x + of_y + longer + (longer << 1);
 }
 
 inline ShapeQuality ShapeQualityOf(const Quadrilateral& q) {
   const double uvp = Cross(q.u, q.v), uwp = Cross(q.u, q.w), wvp = Cross(q.w, q.v);
-  const auto half = reinterpret_cast<UnsignedVector>(HalfPerimeters(q.u, q.v, q.w));
-  // Instead of a division by the one, a multiplication by the other. Below 2^32.
-  const double of_pw = half[0] * half[1], of_uv = half[2] * half[3];
+  const IntVector diameters = QuadrupleDiameters(q.u, q.v, q.w);
+  // Instead of a division by the one, a multiplication by the other. Below 2^36.
+  const auto of_pw = static_cast<double>(std::int64_t{diameters[0]} * diameters[1]);
+  const auto of_uv = static_cast<double>(std::int64_t{diameters[2]} * diameters[3]);
   return {uvp * (uwp + wvp - uvp) * of_pw, uwp * wvp * of_uv};
 }
 
@@ -86,8 +89,9 @@ struct Bends {
 };
 inline Bends BendsOf(const Quadrilateral& q) {
   const RingVertex p{0, 0, 0, q.height};
-  return {1 - CosineBetween(Normal(q.u, q.v, p), Normal(q.v, q.u, q.w)),
-          1 - CosineBetween(Normal(q.u, q.w, p), Normal(q.w, q.v, p))};
+  // Rounding may take a cosine beyond 1.
+  const auto bend = [](const Normal& a, const Normal& b) { return std::max(0.0, 1 - CosineBetween(a, b)); };
+  return {bend(Normal(q.u, q.v, p), Normal(q.v, q.u, q.w)), bend(Normal(q.u, q.w, p), Normal(q.w, q.v, p))};
 }
 
 }  // namespace terrace::tin

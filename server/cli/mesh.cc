@@ -248,7 +248,7 @@ void AddMesh(CLI::App& app, int& exit_code) {
   command
       ->add_option("--criterion", arguments->criterion,
                    "How triangles are joined: delaunay, or data-dependent: fewer vertices for the same error, thinner "
-                   "triangles, about three times the time to mesh")
+                   "triangles, about twice the time to mesh")
       ->check(OneOf({"delaunay", kDataDependent}))
       ->type_name("NAME")
       ->capture_default_str();
