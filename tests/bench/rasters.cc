@@ -1,5 +1,6 @@
 #include "tests/bench/rasters.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <filesystem>
@@ -61,6 +62,47 @@ std::optional<std::vector<tin::HeightField>> ReadTiles(const Area& area) {
     std::optional<tin::HeightField> field = ReadField(area.file, {x, y, kTileSide, kTileSide});
     if (!field) return std::nullopt;
     fields.push_back(*std::move(field));
+  }
+  return fields;
+}
+
+std::span<const char* const> TileRasters() {
+  static constexpr std::array kFiles = {"srtm3_N46E008_swiss_alps.tif",
+                                        "srtm3_S33W071_andes.tif",
+                                        "jacksboro.tif",
+                                        "westUS.tif",
+                                        "SainteHelens.dem",
+                                        "bigtujunga_30m_utm11.tif",
+                                        "crater.tif",
+                                        "ashby.tif",
+                                        "ntc.tif",
+                                        "ozark.tif",
+                                        "srtm1_N20W156_hana_kohala.tif",
+                                        "srtm1_N20W157_maui_se_haleakala.tif",
+                                        "webmercator_sf_float32.tif",
+                                        "ortho_pair_dtm_2m_byte.tif",
+                                        "lidar_greenriver_1m.tif",
+                                        "lidar_slovenia_1m_nodata.tif"};
+  return kFiles;
+}
+
+std::optional<std::vector<tin::HeightField>> ReadQuarterTiles(const char* file) {
+  const std::optional<tin::HeightField> raster = ReadField(file);
+  if (!raster || std::min(raster->width(), raster->height()) < kTileSide) return std::nullopt;
+  const auto first = [](int size, int quarter) {
+    return std::clamp(size * quarter / 4 - kTileSide / 2, 0, size - kTileSide);
+  };
+  std::vector<tin::HeightField> fields;
+  for (const int south : {1, 3}) {
+    for (const int west : {1, 3}) {
+      const int left = first(raster->width(), west), bottom = first(raster->height(), south);
+      std::vector<float> heights;
+      for (int y = bottom; y < bottom + kTileSide; ++y) {
+        heights.insert(heights.end(), raster->Row(y) + left, raster->Row(y) + left + kTileSide);
+      }
+      const auto [low, high] = std::minmax_element(heights.begin(), heights.end());
+      if (*high - *low >= 1) fields.push_back(MakeField(kTileSide, kTileSide, std::move(heights)));
+    }
   }
   return fields;
 }

@@ -1,4 +1,5 @@
 #include <array>
+#include <cmath>
 #include <optional>
 #include <utility>
 
@@ -45,6 +46,37 @@ Table MeasureTiles(Environment& environment) {
     if (environment.options().peer.empty()) sum.theirs.reset();
     table.Add(SpeedRow(fmt::format("T1 all {} m", kErrors[i]), sum, aims[i]));
   }
+  return table;
+}
+
+Table MeasureTilesEverywhere(Environment& environment) {
+  Table table("T1-everywhere", "T1: Delaunay, tiles of elevation models of all kinds: the peer's time over ours",
+              {"raster", "tiles", "1 m", "vertices", "5 m", "vertices ", "20 m", "vertices  "});
+  std::array<double, kErrors.size()> logarithms{};
+  std::size_t rasters = 0;
+  for (const char* file : TileRasters()) {
+    const std::string name = fmt::format("T1 everywhere {}", file);
+    if (!environment.Wants(name)) continue;
+    const std::optional<std::vector<tin::HeightField>> tiles = ReadQuarterTiles(file);
+    if (!tiles) continue;
+    std::vector<Cell> row{file, Count(tiles->size())};
+    for (std::size_t i = 0; i < kErrors.size(); ++i) {
+      const Contest contest = Contend(environment, name, *tiles, {kErrors[i]});
+      const double ratio = contest.theirs ? contest.theirs->min_seconds / contest.ours.min_seconds : 1;
+      logarithms[i] += std::log(ratio);
+      row.insert(row.end(), {contest.theirs ? Ratio(ratio) : Cell(), Count(contest.ours.points)});
+    }
+    table.Add(std::move(row));
+    ++rasters;
+  }
+  if (rasters == 0 || environment.options().peer.empty()) return table;
+  std::vector<Cell> means{"geometric mean", Cell()},
+      aims{"aim", Cell(), "4x (6x)", Cell(), "5x (8x)", Cell(), "7x (10x)"};
+  for (const double logarithm : logarithms) {
+    means.insert(means.end(), {Ratio(std::exp(logarithm / static_cast<double>(rasters))), Cell()});
+  }
+  table.Add(std::move(means));
+  table.Add(std::move(aims));
   return table;
 }
 

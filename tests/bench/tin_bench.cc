@@ -20,8 +20,8 @@ int Measure(const Options& options, const std::string& json_path) {
   nlohmann::ordered_json tables = nlohmann::ordered_json::array();
   const nlohmann::ordered_json context = MachineContext();  // first: later the load would be our own
   for (const auto& measure :
-       {MeasureTiles, MeasureVertexGoals, MeasureLargeRasters, MeasureReplay, MeasureSweep, MeasureDataDependent,
-        MeasureDataDependentQuality, MeasureDropPass, MeasureMemory, MeasureVertices}) {
+       {MeasureTiles, MeasureTilesEverywhere, MeasureVertexGoals, MeasureLargeRasters, MeasureReplay, MeasureSweep,
+        MeasureDataDependent, MeasureDataDependentQuality, MeasureDropPass, MeasureMemory, MeasureVertices}) {
     const Table table = measure(environment);
     if (table.empty()) continue;
     table.Print(std::cout);
