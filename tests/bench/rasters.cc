@@ -67,7 +67,11 @@ std::optional<std::vector<tin::HeightField>> ReadTiles(const Area& area) {
 }
 
 std::span<const char* const> TileRasters() {
-  static constexpr std::array kFiles = {"srtm3_N46E008_swiss_alps.tif",
+  static constexpr std::array kFiles = {"azores_topobathy_1min_float32.tif",
+                                        "antimeridian_hawaii_topobathy_5min.tif",
+                                        "etopo5_global_10min.tif",
+                                        "pole_antarctica_bedmap_5km.tif",
+                                        "srtm3_N46E008_swiss_alps.tif",
                                         "srtm3_S33W071_andes.tif",
                                         "jacksboro.tif",
                                         "westUS.tif",
@@ -79,6 +83,12 @@ std::span<const char* const> TileRasters() {
                                         "ozark.tif",
                                         "srtm1_N20W156_hana_kohala.tif",
                                         "srtm1_N20W157_maui_se_haleakala.tif",
+                                        "srtm1_N20W158_maui_sw.tif",
+                                        "srtm1_N21W157_maui_ne_molokai.tif",
+                                        "srtm1_N21W158_maui_nw_molokai.tif",
+                                        "srtm1_N48W125_cape_flattery_half_void.tif",
+                                        "srtm1_N51E179_antimeridian_w.tif",
+                                        "srtm1_N51W180_antimeridian_e.tif",
                                         "webmercator_sf_float32.tif",
                                         "ortho_pair_dtm_2m_byte.tif",
                                         "lidar_greenriver_1m.tif",
@@ -88,7 +98,7 @@ std::span<const char* const> TileRasters() {
 
 std::optional<std::vector<tin::HeightField>> ReadQuarterTiles(const char* file) {
   const std::optional<tin::HeightField> raster = ReadField(file);
-  if (!raster || std::min(raster->width(), raster->height()) < kTileSide) return std::nullopt;
+  if (!raster) return std::nullopt;
   const auto first = [](int size, int quarter) {
     return std::clamp(size * quarter / 4 - kTileSide / 2, 0, size - kTileSide);
   };
@@ -104,6 +114,7 @@ std::optional<std::vector<tin::HeightField>> ReadQuarterTiles(const char* file) 
       if (*high - *low >= 1) fields.push_back(MakeField(kTileSide, kTileSide, std::move(heights)));
     }
   }
+  if (fields.empty()) return std::nullopt;
   return fields;
 }
 

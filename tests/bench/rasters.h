@@ -33,8 +33,9 @@ std::span<const Area> TileAreas();
 // All tiles of the area; nothing when its file is missing.
 std::optional<std::vector<tin::HeightField>> ReadTiles(const Area& area);
 
-// Elevation models of all kinds, from mountains to plains and from 1 m to 90 m a sample, each with the tiles around the
-// centres of its four quarters. One with less than a metre of relief is left out: the sea.
+// All elevation models of the test data that are large enough, from mountains to plains and from 1 m to 18 km a sample,
+// each with the tiles around the centres of its four quarters. One with less than a metre of relief is left out: the
+// sea. Nothing where none is left, or the file is missing.
 std::span<const char* const> TileRasters();
 std::optional<std::vector<tin::HeightField>> ReadQuarterTiles(const char* file);
 
