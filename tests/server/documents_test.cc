@@ -26,7 +26,10 @@ class DocumentsTest : public ServerFixture {
       return tile;
     };
   }
-  ~DocumentsTest() override { Open(true); }
+  void TearDown() override {
+    Open(true);
+    ServerFixture::TearDown();
+  }
 
   static ServerOptions OneWorker() {
     ServerOptions options;

@@ -18,6 +18,8 @@ namespace terrace::server {
 class ServerFixture : public testing::Test {
  protected:
   ServerFixture();
+  // Stops the server, whose workers may still be using what a derived fixture has made.
+  void TearDown() override { server_.reset(); }
 
   // Call once, after the knobs are set.
   void Start(ServerOptions options = {});
