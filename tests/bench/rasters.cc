@@ -98,7 +98,7 @@ std::span<const char* const> TileRasters() {
 
 std::optional<std::vector<tin::HeightField>> ReadQuarterTiles(const char* file) {
   const std::optional<tin::HeightField> raster = ReadField(file);
-  if (!raster) return std::nullopt;
+  if (!raster || std::min(raster->width(), raster->height()) < kTileSide) return std::nullopt;
   const auto first = [](int size, int quarter) {
     return std::clamp(size * quarter / 4 - kTileSide / 2, 0, size - kTileSide);
   };

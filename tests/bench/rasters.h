@@ -33,9 +33,9 @@ std::span<const Area> TileAreas();
 // All tiles of the area; nothing when its file is missing.
 std::optional<std::vector<tin::HeightField>> ReadTiles(const Area& area);
 
-// All elevation models of the test data that are large enough, from mountains to plains and from 1 m to 18 km a sample,
-// each with the tiles around the centres of its four quarters. One with less than a metre of relief is left out: the
-// sea. Nothing where none is left, or the file is missing.
+// The elevation models of the test data that hold a tile, from mountains to plains and from 1 m to 18 km a sample, each
+// with the tiles around the centres of its four quarters. One with less than a metre of relief is left out: the sea.
+// Nothing where none is left, or the file is missing or too small.
 std::span<const char* const> TileRasters();
 std::optional<std::vector<tin::HeightField>> ReadQuarterTiles(const char* file);
 
