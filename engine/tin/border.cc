@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "engine/tin/chord_scan.h"
+
 namespace terrace::tin {
 namespace {
 
@@ -44,13 +46,10 @@ double BorderError(double misfit_m, const BorderOptions& options) {
 
 Candidate WorstBorderSample(const HeightField& field, const Corner& a, const Corner& b, const BorderOptions& options) {
   const BorderEdge edge(field, a, b);
-  Candidate worst;
-  for (int k = edge.a + 1; k < edge.b; ++k) {
-    const double sagitta = options.sagitta_m * (k - edge.a) * (edge.b - k);
-    const double error = BorderError(std::abs(edge.ChordAt(k) - edge.HeightAt(k)) + sagitta, options);
-    if (error > worst.error) worst = {error, edge.SampleAt(k)};  // false for voids; the number grows with k
-  }
-  return worst;
+  const float* const heights = edge.along_x ? field.Row(edge.across) + edge.a : field.Row(edge.a) + edge.across;
+  const std::ptrdiff_t stride = edge.along_x ? 1 : field.stride();
+  const ChordMisfit worst = WorstOfChord({edge.a, edge.b, edge.h_a, edge.h_b, heights, stride}, options);
+  return worst.error > 0 ? Candidate{worst.error, edge.SampleAt(worst.at)} : Candidate();
 }
 
 double SquaredBorderDistances(const HeightField& field, const Corner& a, const Corner& b) {

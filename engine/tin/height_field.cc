@@ -7,6 +7,7 @@
 #include <limits>
 #include <utility>
 
+#include "engine/tin/height_range.h"
 #include "engine/tin/quantum.h"
 
 namespace terrace::tin {
@@ -38,23 +39,13 @@ Result<HeightField> HeightField::Make(int width, int height, std::vector<float> 
     return MakeError(ErrorCode::kInvalidArgument, "a height field of {} x {} samples needs {} heights, not {}", width,
                      height, samples, heights.size());
   }
-  std::size_t voids = 0;
-  float lowest = std::numeric_limits<float>::max(), highest = -lowest;
-  for (float& value : heights) {
-    if (std::isfinite(value)) {
-      lowest = std::min(lowest, value);
-      highest = std::max(highest, value);
-      continue;
-    }
-    value = std::numeric_limits<float>::quiet_NaN();
-    ++voids;
-  }
-  if (voids == samples) {
+  const HeightRange range = RangeOf(heights.data(), samples);
+  if (range.voids == samples) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "all {} x {} samples of the height field are void: at least one needs a height", width, height);
   }
-  return HeightField(width, height, std::move(heights), voids > 0,
-                     static_cast<double>(highest) - static_cast<double>(lowest));
+  return HeightField(width, height, std::move(heights), range.voids > 0,
+                     static_cast<double>(range.highest) - static_cast<double>(range.lowest));
 }
 
 HeightField::HeightField(int width, int height, std::vector<float> heights, bool has_voids, double relief_m)

@@ -3,14 +3,18 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "engine/tin/greedy.h"
+#include "tests/engine/tin/instruction_sets.h"
 #include "tests/engine/tin/mesh_laws.h"
 #include "tests/engine/tin/test_fields.h"
 
 namespace terrace::tin {
 namespace {
+
+constexpr float kVoid = std::numeric_limits<float>::quiet_NaN();
 
 TEST(Border, JudgesASampleByItsChord) {
   const HeightField field = MakeField(5, 3, [](int x, int y) { return y == 0 ? static_cast<float>(x * x) : 0.f; });
@@ -30,6 +34,47 @@ TEST(Border, JudgesASampleByItsChord) {
   options.scale = 2;
   EXPECT_EQ(WorstBorderSample(field, west, east, options), (Candidate{48, 2}));  // kMostBorderWeight
   EXPECT_EQ(SquaredBorderDistances(field, west, east), 9 + 16 + 9);
+}
+
+// The rule one by one, on all sides, for chords of all lengths, among voids and equal errors.
+TEST(Border, JudgesInVectorsAsOneByOne) {
+  constexpr int kWidth = 41, kHeight = 37;
+  ForEachInstructionSet([] {
+    Random random(7);
+    for (int round = 0; round < 400; ++round) {
+      const int voids_percent = random.Below(3) * 30, steps = 2 + random.Below(2) * 1000;
+      const HeightField field = MakeField(kWidth, kHeight, [&](int x, int y) {
+        const bool is_void = x + y > 0 && random.Below(100) < voids_percent;
+        return is_void ? kVoid : static_cast<float>(random.Below(steps)) / 8;
+      });
+      const bool along_x = random.Below(2) == 0;
+      const int size = along_x ? kWidth : kHeight, across = random.Below(2) * ((along_x ? kHeight : kWidth) - 1);
+      const int from = random.Below(size - 1), to = from + 1 + random.Below(size - from - 1);
+      const auto corner = [&](int k) -> Corner {
+        const int x = along_x ? k : across, y = along_x ? across : k;
+        return {x, y, static_cast<double>(field.VertexHeight(x, y))};
+      };
+      BorderOptions options;
+      options.weight = 1 + random.Below(3) * 0.7;
+      options.padding_m = random.Below(2) * 0.2;
+      options.step_m = random.Below(2) * 0.1;
+      options.sagitta_m = random.Below(2) * 0.003;
+      options.scale = 1 + random.Below(2) * 0.3;
+      const Corner a = corner(from), b = corner(to);
+      Candidate worst;
+      for (int k = from + 1; k < to; ++k) {
+        const double chord = (a.z * (to - k) + b.z * (k - from)) / (to - from);
+        const SamplePosition at{static_cast<std::uint16_t>(along_x ? k : across),
+                                static_cast<std::uint16_t>(along_x ? across : k)};
+        const double misfit =
+            std::abs(chord - static_cast<double>(field.At(at))) + options.sagitta_m * (k - from) * (to - k);
+        const double error = BorderError(misfit, options);
+        if (error > worst.error) worst = {error, SampleNumber(at.x, at.y)};
+      }
+      ASSERT_EQ(WorstBorderSample(field, a, b, options), worst) << round;
+      ASSERT_EQ(WorstBorderSample(field, b, a, options), worst) << round;
+    }
+  });
 }
 
 TEST(Border, KnowsItsFourSides) {

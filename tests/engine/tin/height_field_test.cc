@@ -3,13 +3,17 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
+#include <iterator>
 #include <limits>
 #include <set>
 #include <utility>
 #include <vector>
 
+#include "engine/tin/height_range.h"
+#include "tests/engine/tin/instruction_sets.h"
 #include "tests/engine/tin/test_fields.h"
 
 namespace terrace::tin {
@@ -37,6 +41,37 @@ TEST(HeightField, TakesInfinitiesForVoids) {
   EXPECT_EQ(field->At(0, 0), 1);
   EXPECT_TRUE(std::isnan(field->At(1, 0)) && std::isnan(field->At(0, 1)) && std::isnan(field->At(1, 1)));
   EXPECT_FALSE(NoiseField(2, 2, 1).has_voids());
+}
+
+TEST(HeightField, KnowsTheRangeOfWhatIsFinite) {
+  constexpr float kInfinity = std::numeric_limits<float>::infinity(), kMost = std::numeric_limits<float>::max();
+  constexpr std::array<float, 6> kOdd = {kVoid, kInfinity, -kInfinity, kMost, -kMost, -0.0F};
+  ForEachInstructionSet([&] {
+    Random random(3);
+    for (int round = 0; round < 500; ++round) {
+      const int odd_percent = random.Below(4) * 30;
+      std::vector<float> heights(static_cast<std::size_t>(random.Below(70)));
+      for (float& height : heights) {
+        height = random.Below(100) < odd_percent ? kOdd[static_cast<std::size_t>(random.Below(6))]
+                                                 : static_cast<float>(random.Below(2000) - 1000);
+      }
+      std::vector<float> finite;
+      std::copy_if(heights.begin(), heights.end(), std::back_inserter(finite),
+                   [](float h) { return std::isfinite(h); });
+      const std::vector<float> before = heights;
+      const HeightRange range = RangeOf(heights.data(), heights.size());
+      ASSERT_EQ(range.voids, heights.size() - finite.size());
+      for (std::size_t i = 0; i < heights.size(); ++i) {
+        ASSERT_TRUE(std::isfinite(before[i]) ? heights[i] == before[i] : std::isnan(heights[i]));
+      }
+      if (finite.empty()) {
+        ASSERT_GT(range.lowest, range.highest);
+      } else {
+        ASSERT_EQ(range.lowest, *std::min_element(finite.begin(), finite.end()));
+        ASSERT_EQ(range.highest, *std::max_element(finite.begin(), finite.end()));
+      }
+    }
+  });
 }
 
 // Widths of short rows, of rows that lie further apart than they are long, and of others; the smallest, too.
