@@ -98,6 +98,8 @@ class Furthest {
     number_ = hn::IfThenElse(hn::RebindMask(kNumbers, is_further), number, number_);
   }
 
+  // As if each sample had been visited so many columns further east.
+  HWY_INLINE void MoveEast(int columns) { number_ = hn::Add(number_, All(kNumbers, columns)); }
   // Of samples that were visited apart.
   HWY_INLINE void Merge(const Furthest& other) {
     const auto tied =
@@ -145,6 +147,7 @@ class FurthestTwo {
     runner_up_ = MaxOrSecond(MinOrSecond(furthest_.numerators(), numerator), runner_up_);
     furthest_.Visit(numerator, number);
   }
+  HWY_INLINE void MoveEast(int columns) { furthest_.MoveEast(columns); }
   HWY_INLINE void Merge(const FurthestTwo& other) {
     runner_up_ =
         hn::Max(hn::Max(runner_up_, other.runner_up_), hn::Min(furthest_.numerators(), other.furthest_.numerators()));

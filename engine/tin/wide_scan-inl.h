@@ -156,32 +156,77 @@ class ColumnsOfPlane<Furthest<IntsTag>> {
   Ints d_, b_, beyond_, plane_;
 };
 
-// Every sample of some columns of the bounding box, in single precision or integers: no spans, no divisions, no
+// A vector of columns of the bounding box, row by row, in single precision or integers: no spans, no divisions, no
 // branches but the loop. Barycentric coordinates are integers, whose signs make what is outside NaN, or negative.
 template <typename Found>
-HWY_INLINE Found ScanColumnsIn32Bits(const HeightField& field, const PlaneFor<Found>& t, int column) {
-  constexpr typename Found::Tag tag;
-  const auto x = From(kInts, column);
-  auto of_u = hn::Sub(hn::Mul(All(kInts, t.vy), x), All(kInts, t.vx * t.south));
-  auto of_v = hn::Sub(All(kInts, t.ux * t.south), hn::Mul(All(kInts, t.uy), x));
-  auto of_p = hn::Sub(All(kInts, t.ux * t.vy - t.uy * t.vx), hn::Add(of_u, of_v));
-  const auto step_u = All(kInts, t.vx), step_v = All(kInts, t.ux), step_p = All(kInts, t.vx - t.ux);
+class ColumnsOfTriangle {
+ public:
+  HWY_INLINE ColumnsOfTriangle(const PlaneFor<Found>& t, int column)
+      : step_u_(All(kInts, t.vx)), step_v_(All(kInts, t.ux)), step_p_(All(kInts, t.vx - t.ux)), plane_(t, column) {
+    const auto x = From(kInts, column);
+    of_u_ = hn::Sub(hn::Mul(All(kInts, t.vy), x), All(kInts, t.vx * t.south));
+    of_v_ = hn::Sub(All(kInts, t.ux * t.south), hn::Mul(All(kInts, t.uy), x));
+    of_p_ = hn::Sub(All(kInts, t.ux * t.vy - t.uy * t.vx), hn::Add(of_u_, of_v_));
+  }
+
+  // The samples of a row from `heights` on, and then the next row.
+  HWY_INLINE void Visit(const float* heights, Ints numbers) {
+    const auto outside = hn::ShiftRight<31>(hn::Or3(of_u_, of_v_, of_p_));
+    furthest_.Visit(hn::Or(plane_.Numerators(heights), hn::BitCast(typename Found::Tag(), outside)), numbers);
+    plane_.Step();
+    of_u_ = hn::Sub(of_u_, step_u_);
+    of_v_ = hn::Add(of_v_, step_v_);
+    of_p_ = hn::Add(of_p_, step_p_);
+  }
+  HWY_INLINE const Found& furthest() const { return furthest_; }
+
+ private:
+  Ints step_u_, step_v_, step_p_;
+  Ints of_u_, of_v_, of_p_;
+  ColumnsOfPlane<Found> plane_;
+  Found furthest_;
+};
+
+// Calls visit(heights, numbers) for the rows of the box from a column on: where its samples are, and a vector of their
+// numbers.
+template <typename Visit>
+HWY_INLINE void ForEachRow(const HeightField& field, const TriangleBox& t, int column, Visit&& visit) {
   const int stride = field.stride(), first_row = t.py + t.south;
   const float* from = field.Row(first_row) + t.px + column;
-  auto number = From(kInts, SampleNumber(t.px + column, first_row));
+  auto numbers = From(kInts, SampleNumber(t.px + column, first_row));
   const auto next_row = All(kInts, SampleNumber(0, 1));
-  ColumnsOfPlane<Found> plane(t, column);
-  Found furthest;
   for (int j = t.south; j <= t.north; ++j) {
-    const auto outside = hn::ShiftRight<31>(hn::Or3(of_u, of_v, of_p));
-    furthest.Visit(hn::Or(plane.Numerators(from), hn::BitCast(tag, outside)), number);
+    visit(from, numbers);
     from += stride;
-    plane.Step();
-    number = hn::Add(number, next_row);
-    of_u = hn::Sub(of_u, step_u);
-    of_v = hn::Add(of_v, step_v);
-    of_p = hn::Add(of_p, step_p);
+    numbers = hn::Add(numbers, next_row);
   }
+}
+
+template <typename Found>
+HWY_INLINE Found ScanColumnsIn32Bits(const HeightField& field, const PlaneFor<Found>& t, int column) {
+  ColumnsOfTriangle<Found> columns(t, column);
+  ForEachRow(field, t, column, [&](const float* heights, Ints numbers) HWY_ATTR { columns.Visit(heights, numbers); });
+  return columns.furthest();
+}
+
+// Two vectors of columns side by side: rows are counted once, and neither waits for the other. It takes more than the
+// sixteen registers of older processors.
+#if HWY_ARCH_X86 && HWY_TARGET > HWY_AVX3
+constexpr bool kColumnsInPairs = false;
+#else
+constexpr bool kColumnsInPairs = true;
+#endif
+template <typename Found>
+HWY_INLINE Found ScanColumnPairIn32Bits(const HeightField& field, const PlaneFor<Found>& t, int column) {
+  const int lanes = LanesOf<typename Found::Tag>();
+  ColumnsOfTriangle<Found> west(t, column), east(t, column + lanes);
+  ForEachRow(field, t, column, [&](const float* heights, Ints numbers) HWY_ATTR {
+    west.Visit(heights, numbers);
+    east.Visit(heights + lanes, numbers);
+  });
+  Found furthest = east.furthest();
+  furthest.MoveEast(lanes);
+  furthest.Merge(west.furthest());
   return furthest;
 }
 
@@ -217,6 +262,9 @@ HWY_INLINE Furthest<DoublesTag> ScanColumnsInDouble(const HeightField& field, co
   return furthest;
 }
 
+// Up to so many vectors of columns the box is quicker than its spans.
+constexpr int kMostBoxVectors = 3;
+
 template <typename Found>
 HWY_INLINE Found ScanColumns(const HeightField& field, const PlaneFor<Found>& t, int column) {
   if constexpr (std::is_same_v<typename Found::Tag, DoublesTag>) {
@@ -228,7 +276,16 @@ HWY_INLINE Found ScanColumns(const HeightField& field, const PlaneFor<Found>& t,
 
 template <typename Found>
 HWY_INLINE Found ScanBox(const HeightField& field, const PlaneFor<Found>& t) {
+  constexpr bool kIsPaired = kColumnsInPairs && !std::is_same_v<typename Found::Tag, DoublesTag>;
   const int lanes = LanesOf<typename Found::Tag>();
+  if constexpr (kIsPaired) {
+    static_assert(kMostBoxVectors == 3);
+    const int second = t.west + lanes, third = second + lanes;
+    if (second > t.east) return ScanColumns<Found>(field, t, t.west);
+    Found furthest = ScanColumnPairIn32Bits<Found>(field, t, t.west);
+    if (third <= t.east) furthest.Merge(ScanColumns<Found>(field, t, third));
+    return furthest;
+  }
   Found furthest = ScanColumns<Found>(field, t, t.west);
   for (int column = t.west + lanes; column <= t.east; column += lanes) {
     furthest.Merge(ScanColumns<Found>(field, t, column));
@@ -332,9 +389,6 @@ HWY_INLINE ExactPlane ExactPlaneOf(const HeightField& field, const Star& star, s
   t.b = ux * vz - vx * uz;
   return t;
 }
-
-// Up to so many vectors of columns the box is quicker than its spans.
-constexpr int kMostBoxVectors = 3;
 
 template <typename Found>
 HWY_INLINE Found ScanWide(const HeightField& field, const PlaneFor<Found>& t) {
