@@ -54,12 +54,6 @@ HWY_INLINE Floats RowsFrom(const float* from, int stride) {
   }
 }
 
-HWY_INLINE std::uint32_t BitsOf(hn::Mask<FloatsTag> mask) {
-  std::uint16_t bits = 0;
-  hn::StoreMaskBits(kFloats, mask, reinterpret_cast<std::uint8_t*>(&bits));
-  return bits;
-}
-
 // Doubled areas, and what barycentric coordinates are computed from, stay below 2^24.
 constexpr int kMostExtent = 2048;
 // Beyond it single precision may overflow.
@@ -134,9 +128,9 @@ struct StarPlanes {
     // Pick's theorem: with 1, none but its corners.
     const auto has_samples = hn::Or(hn::Ne(of_d, All(kFloats, 1)), hn::Not(is_exact));
     const auto is_tame = hn::And(hn::Lt(of_magnitude, All(kFloats, kMostMagnitude)), is_exact);
-    const std::uint32_t lanes = BitsOf(has_samples), tame = lanes & BitsOf(is_tame);
-    small = tame & BitsOf(hn::RebindMask(kFloats, is_small));
-    medium = tame & BitsOf(hn::RebindMask(kFloats, is_block)) & ~small;
+    const std::uint32_t lanes = BitsOf(kFloats, has_samples), tame = lanes & BitsOf(kFloats, is_tame);
+    small = tame & BitsOf(kFloats, hn::RebindMask(kFloats, is_small));
+    medium = tame & BitsOf(kFloats, hn::RebindMask(kFloats, is_block)) & ~small;
     wild = lanes & ~tame;
     large = tame & ~small & ~medium;
   }
@@ -235,7 +229,7 @@ HWY_INLINE BlockFind ScanBlock(const HeightField& field, const Star& star, const
     least = All(kFloats, LeastInDoubt(find.most, planes.largest[i], planes.magnitude[i], most_exact, kDoubtInBlocks));
 #pragma GCC unroll 8
   for (int k = 0; k < kVectors; ++k) {
-    find.found |= std::uint64_t{BitsOf(hn::Ge(numerators[k], least))} << (k * kLanes);
+    find.found |= std::uint64_t{BitsOf(kFloats, hn::Ge(numerators[k], least))} << (k * kLanes);
   }
   return find;
 }

@@ -9,6 +9,7 @@
 
 #include <hwy/highway.h>
 
+#include <bit>
 #include <cstdint>
 #include <limits>
 #include <type_traits>
@@ -55,6 +56,13 @@ template <typename Tag, typename Value>
 HWY_INLINE hn::Vec<Tag> From(Tag tag, Value first) {
   static_assert(hn::MaxLanes(Tag()) <= 16);
   return hn::Add(All(tag, first), hn::Load(tag, LaneNumbers<hn::TFromD<Tag>>::kValues));
+}
+
+template <typename Tag>
+HWY_INLINE std::uint32_t BitsOf(Tag tag, hn::Mask<Tag> mask) {
+  std::uint16_t bits = 0;
+  hn::StoreMaskBits(tag, mask, reinterpret_cast<std::uint8_t*>(&bits));
+  return bits;
 }
 
 // The larger or the smaller one; b where one is NaN.
@@ -111,11 +119,20 @@ class Furthest {
   HWY_INLINE Numbers numbers() const { return number_; }
   HWY_INLINE hn::TFromD<Tag> numerator() const { return hn::GetLane(hn::MaxOfLanes(kTag, numerator_)); }
 
-  // Precondition: some sample was visited.
+  // Precondition: some sample was visited. Most often a single lane has it, and the smallest number of lanes is waited
+  // for.
   HWY_INLINE std::uint32_t sample() const {
     const auto foremost = hn::RebindMask(kNumbers, hn::Eq(numerator_, hn::MaxOfLanes(kTag, numerator_)));
-    const Numbers none = All(kNumbers, std::numeric_limits<std::int32_t>::max());
-    const auto first = hn::GetLane(hn::MinOfLanes(kNumbers, hn::IfThenElse(foremost, number_, none)));
+    const std::uint32_t lanes = BitsOf(kNumbers, foremost);
+    auto first = hn::TFromD<NumberTag<Tag>>();
+    if (std::has_single_bit(lanes)) [[likely]] {
+      HWY_ALIGN decltype(first) numbers[hn::MaxLanes(kNumbers)];
+      hn::Store(number_, kNumbers, numbers);
+      first = numbers[std::countr_zero(lanes)];
+    } else {
+      const Numbers none = All(kNumbers, std::numeric_limits<std::int32_t>::max());
+      first = hn::GetLane(hn::MinOfLanes(kNumbers, hn::IfThenElse(foremost, number_, none)));
+    }
     return static_cast<std::uint32_t>(static_cast<std::int64_t>(first));
   }
 

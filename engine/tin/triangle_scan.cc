@@ -122,7 +122,7 @@ HWY_NOINLINE PlaneMisfit ScanDoubtfully(const HeightField& field, const Star& st
   hn::Store(two.furthest().numbers(), kInts, samples);
   double most = -1;
   std::uint32_t best = kNoSample;
-  for (std::uint32_t bits = BitsOf(hn::Ge(two.furthest().numerators(), All(kFloats, least))); bits != 0;
+  for (std::uint32_t bits = BitsOf(kFloats, hn::Ge(two.furthest().numerators(), All(kFloats, least))); bits != 0;
        bits &= bits - 1) {
     const auto sample = static_cast<std::uint32_t>(samples[std::countr_zero(bits)]);
     const SamplePosition at = PositionOf(sample);
