@@ -1,6 +1,5 @@
 #include "engine/tin/border.h"
 
-#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -38,16 +37,10 @@ Side SideOf(const HeightField& field, const Corner& a, const Corner& b) {
   return a.x == field.width() - 1 ? Side::kEast : Side::kWest;
 }
 
-double BorderError(double misfit_m, const BorderOptions& options) {
-  const double padded = misfit_m + options.padding_m;
-  return options.scale *
-         std::min(std::max(padded * options.weight, padded + options.step_m), kMostBorderWeight * misfit_m);
-}
-
 Candidate WorstBorderSample(const HeightField& field, const Corner& a, const Corner& b, const BorderOptions& options) {
   const BorderEdge edge(field, a, b);
   const float* const heights = edge.along_x ? field.Row(edge.across) + edge.a : field.Row(edge.a) + edge.across;
-  const std::ptrdiff_t stride = edge.along_x ? 1 : field.stride();
+  const int stride = edge.along_x ? 1 : field.stride();
   const ChordMisfit worst = WorstOfChord({edge.a, edge.b, edge.h_a, edge.h_b, heights, stride}, options);
   return worst.error > 0 ? Candidate{worst.error, edge.SampleAt(worst.at)} : Candidate();
 }

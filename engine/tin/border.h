@@ -16,10 +16,8 @@ namespace terrace::tin {
 // The side that both ends lie on. Precondition: they are different and share a border.
 Side SideOf(const HeightField& field, const Corner& a, const Corner& b);
 
-// The error of a sample that misses its chord by so much: the rule of BorderOptions.
-double BorderError(double misfit_m, const BorderOptions& options);
-
-// The worst valid sample strictly between two neighbouring border vertices, given in any order; its error is weighted.
+// The worst valid sample strictly between two neighbouring border vertices, given in any order, by the rule of
+// BorderOptions.
 Candidate WorstBorderSample(const HeightField& field, const Corner& a, const Corner& b, const BorderOptions& options);
 
 // Sum of the squared vertical distances of those samples from the chord: no weight, no sagitta.

@@ -1,5 +1,6 @@
 #include "engine/tin/chord_scan.h"
 
+#include <cstdint>
 #include <limits>
 
 #undef HWY_TARGET_INCLUDE
@@ -17,13 +18,16 @@ ChordMisfit ScanChord(const Chord& chord, const BorderOptions& options) {
   const hn::Rebind<float, decltype(doubles)> floats;
   const hn::Rebind<std::int32_t, decltype(doubles)> ints;
   const auto all = [&](double value) HWY_ATTR { return hn::Set(doubles, value); };
+  // Of numbers that may be NaN, as std::max and std::min choose: the instructions of processors differ.
+  const auto larger = [](auto x, auto y) HWY_ATTR { return hn::IfThenElse(hn::Lt(x, y), y, x); };
+  const auto smaller = [](auto x, auto y) HWY_ATTR { return hn::IfThenElse(hn::Lt(y, x), y, x); };
   const auto a = all(chord.a), b = all(chord.b), h_a = all(chord.h_a), h_b = all(chord.h_b);
   const auto length = all(chord.b - chord.a), sagitta = all(options.sagitta_m);
   const auto padding = all(options.padding_m), weight = all(options.weight), step = all(options.step_m);
   const auto scale = all(options.scale), most_weight = all(kMostBorderWeight);
   const auto lanes = static_cast<int>(hn::Lanes(doubles));
 
-  const auto last = hn::Set(ints, chord.b - chord.a - 1), stride = hn::Set(ints, static_cast<int>(chord.stride));
+  const auto last = hn::Set(ints, chord.b - chord.a - 1), stride = hn::Set(ints, chord.stride);
   auto k = hn::Iota(doubles, chord.a + 1), most = hn::Zero(doubles), at = most;
   for (int first = 1; first < chord.b - chord.a; first += lanes) {
     const auto index = hn::Mul(hn::Min(hn::Iota(ints, first), last), stride);
@@ -32,8 +36,8 @@ ChordMisfit ScanChord(const Chord& chord, const BorderOptions& options) {
     const auto on_chord = hn::Div(hn::Add(hn::Mul(h_a, left), hn::Mul(h_b, done)), length);
     const auto misfit = hn::Add(hn::Abs(hn::Sub(on_chord, height)), hn::Mul(hn::Mul(sagitta, done), left));
     const auto padded = hn::Add(misfit, padding);
-    const auto weighted = hn::Max(hn::Mul(padded, weight), hn::Add(padded, step));
-    const auto error = hn::Mul(scale, hn::Min(weighted, hn::Mul(most_weight, misfit)));
+    const auto weighted = larger(hn::Mul(padded, weight), hn::Add(padded, step));
+    const auto error = hn::Mul(scale, smaller(weighted, hn::Mul(most_weight, misfit)));
     const auto is_worse = hn::And(hn::Gt(error, most), hn::Lt(k, b));  // never at a void
     most = hn::IfThenElse(is_worse, error, most);
     at = hn::IfThenElse(is_worse, k, at);

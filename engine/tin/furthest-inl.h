@@ -60,9 +60,9 @@ HWY_INLINE hn::Vec<Tag> From(Tag tag, Value first) {
 
 template <typename Tag>
 HWY_INLINE std::uint32_t BitsOf(Tag tag, hn::Mask<Tag> mask) {
-  std::uint16_t bits = 0;
+  std::uint64_t bits = 0;  // at least eight bytes
   hn::StoreMaskBits(tag, mask, reinterpret_cast<std::uint8_t*>(&bits));
-  return bits;
+  return static_cast<std::uint32_t>(bits);
 }
 
 // The larger or the smaller one; b where one is NaN.
@@ -119,8 +119,8 @@ class Furthest {
   HWY_INLINE Numbers numbers() const { return number_; }
   HWY_INLINE hn::TFromD<Tag> numerator() const { return hn::GetLane(hn::MaxOfLanes(kTag, numerator_)); }
 
-  // Precondition: some sample was visited. Most often a single lane has it, and the smallest number of lanes is waited
-  // for.
+  // Precondition: numerator() is not negative. Most often a single lane has it; to find the smallest number of several
+  // is a chain of eight operations.
   HWY_INLINE std::uint32_t sample() const {
     const auto foremost = hn::RebindMask(kNumbers, hn::Eq(numerator_, hn::MaxOfLanes(kTag, numerator_)));
     const std::uint32_t lanes = BitsOf(kNumbers, foremost);

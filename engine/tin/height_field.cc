@@ -39,7 +39,7 @@ Result<HeightField> HeightField::Make(int width, int height, std::vector<float> 
     return MakeError(ErrorCode::kInvalidArgument, "a height field of {} x {} samples needs {} heights, not {}", width,
                      height, samples, heights.size());
   }
-  const HeightRange range = RangeOf(heights.data(), samples);
+  const HeightRange range = MarkVoids(heights.data(), samples);
   if (range.voids == samples) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "all {} x {} samples of the height field are void: at least one needs a height", width, height);

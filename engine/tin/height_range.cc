@@ -50,7 +50,7 @@ namespace terrace::tin {
 
 HWY_EXPORT(ScanHeights);
 
-HeightRange RangeOf(float* heights, std::size_t count) { return HWY_DYNAMIC_DISPATCH(ScanHeights)(heights, count); }
+HeightRange MarkVoids(float* heights, std::size_t count) { return HWY_DYNAMIC_DISPATCH(ScanHeights)(heights, count); }
 
 }  // namespace terrace::tin
 #endif

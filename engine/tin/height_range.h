@@ -1,4 +1,4 @@
-// What a height field's samples are before it is made: how many there are, and how far apart.
+// The samples of a height field before it is made: which are voids, and between what heights the others lie.
 #pragma once
 
 #include <cstddef>
@@ -10,7 +10,7 @@ struct HeightRange {
   std::size_t voids = 0;
 };
 
-// Of all finite heights. What is not finite becomes NaN: a void.
-HeightRange RangeOf(float* heights, std::size_t count);
+// Makes a void, NaN, of all that is not finite, and tells of the rest. Safe to call from many threads at once.
+HeightRange MarkVoids(float* heights, std::size_t count);
 
 }  // namespace terrace::tin

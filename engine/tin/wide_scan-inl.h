@@ -209,9 +209,9 @@ HWY_INLINE Found ScanColumnsIn32Bits(const HeightField& field, const PlaneFor<Fo
   return columns.furthest();
 }
 
-// Two vectors of columns side by side: rows are counted once, and neither waits for the other. It takes more than the
-// sixteen registers of older processors.
-#if HWY_ARCH_X86 && HWY_TARGET > HWY_AVX3
+// Two vectors of columns side by side: rows are counted once, and neither waits for the other. It takes more than
+// sixteen vector registers, which AVX2 has.
+#if (HWY_ARCH_X86 && HWY_TARGET > HWY_AVX3) || HWY_ARCH_ARM_V7
 constexpr bool kColumnsInPairs = false;
 #else
 constexpr bool kColumnsInPairs = true;

@@ -1,14 +1,18 @@
 #include "engine/tin/border.h"
 
 #include <gtest/gtest.h>
+#include <sys/mman.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <limits>
 #include <vector>
 
+#include "engine/tin/chord_scan.h"
 #include "engine/tin/greedy.h"
 #include "tests/engine/tin/instruction_sets.h"
 #include "tests/engine/tin/mesh_laws.h"
+#include "tests/engine/tin/naive_greedy.h"
 #include "tests/engine/tin/test_fields.h"
 
 namespace terrace::tin {
@@ -36,19 +40,36 @@ TEST(Border, JudgesASampleByItsChord) {
   EXPECT_EQ(SquaredBorderDistances(field, west, east), 9 + 16 + 9);
 }
 
-// The rule one by one, on all sides, for chords of all lengths, among voids and equal errors.
+// The rule one by one.
+Candidate WorstOneByOne(const HeightField& field, const Corner& a, const Corner& b, const BorderOptions& options) {
+  const bool along_x = a.y == b.y;
+  const int from = along_x ? a.x : a.y, to = along_x ? b.x : b.y;
+  Candidate worst;
+  for (int k = from + 1; k < to; ++k) {
+    const int x = along_x ? k : a.x, y = along_x ? a.y : k;
+    const double chord = (a.z * (to - k) + b.z * (k - from)) / (to - from);
+    const double misfit =
+        std::abs(chord - static_cast<double>(field.At(x, y))) + options.sagitta_m * (k - from) * (to - k);
+    const double error = BorderError(misfit, options);
+    if (error > worst.error) worst = {error, SampleNumber(x, y)};
+  }
+  return worst;
+}
+
+// On all sides, for chords of all lengths, among voids and equal errors; rows of the wider field lie further apart than
+// they are long.
 TEST(Border, JudgesInVectorsAsOneByOne) {
-  constexpr int kWidth = 41, kHeight = 37;
   ForEachInstructionSet([] {
     Random random(7);
-    for (int round = 0; round < 400; ++round) {
+    for (int round = 0; round < 440; ++round) {
+      const int width = round % 11 == 0 ? 1024 : 41, height = 37;
       const int voids_percent = random.Below(3) * 30, steps = 2 + random.Below(2) * 1000;
-      const HeightField field = MakeField(kWidth, kHeight, [&](int x, int y) {
+      const HeightField field = MakeField(width, height, [&](int x, int y) {
         const bool is_void = x + y > 0 && random.Below(100) < voids_percent;
         return is_void ? kVoid : static_cast<float>(random.Below(steps)) / 8;
       });
       const bool along_x = random.Below(2) == 0;
-      const int size = along_x ? kWidth : kHeight, across = random.Below(2) * ((along_x ? kHeight : kWidth) - 1);
+      const int size = along_x ? width : height, across = random.Below(2) * ((along_x ? height : width) - 1);
       const int from = random.Below(size - 1), to = from + 1 + random.Below(size - from - 1);
       const auto corner = [&](int k) -> Corner {
         const int x = along_x ? k : across, y = along_x ? across : k;
@@ -61,20 +82,40 @@ TEST(Border, JudgesInVectorsAsOneByOne) {
       options.sagitta_m = random.Below(2) * 0.003;
       options.scale = 1 + random.Below(2) * 0.3;
       const Corner a = corner(from), b = corner(to);
-      Candidate worst;
-      for (int k = from + 1; k < to; ++k) {
-        const double chord = (a.z * (to - k) + b.z * (k - from)) / (to - from);
-        const SamplePosition at{static_cast<std::uint16_t>(along_x ? k : across),
-                                static_cast<std::uint16_t>(along_x ? across : k)};
-        const double misfit =
-            std::abs(chord - static_cast<double>(field.At(at))) + options.sagitta_m * (k - from) * (to - k);
-        const double error = BorderError(misfit, options);
-        if (error > worst.error) worst = {error, SampleNumber(at.x, at.y)};
-      }
+      const Candidate worst = WorstOneByOne(field, a, b, options);
       ASSERT_EQ(WorstBorderSample(field, a, b, options), worst) << round;
       ASSERT_EQ(WorstBorderSample(field, b, a, options), worst) << round;
     }
   });
+}
+
+TEST(Border, JudgesSumsThatOverflowAsOneByOne) {
+  const HeightField field = MakeField(5, 3, [](int x, int) { return static_cast<float>(x * x); });
+  const Corner west{0, 0, 0}, east{4, 0, 16};
+  for (const double weight : {0.0, 1.0}) {
+    BorderOptions options;
+    options.weight = weight;
+    options.sagitta_m = 1e308;
+    const Candidate worst = WorstOneByOne(field, west, east, options);
+    ForEachInstructionSet([&] { ASSERT_EQ(WorstBorderSample(field, west, east, options), worst) << weight; });
+  }
+}
+
+// Behind the last sample between the ends lies a page that must not be read.
+TEST(Border, ReadsNothingBeyondTheChord) {
+  const auto page = static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
+  void* const pages = mmap(nullptr, 2 * page, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  ASSERT_NE(pages, MAP_FAILED);
+  auto* const beyond = reinterpret_cast<float*>(static_cast<char*>(pages) + page);
+  ASSERT_EQ(mprotect(beyond, page, PROT_NONE), 0);
+  for (const int stride : {1, 3, 17}) {
+    for (int length = 1; length <= 40; ++length) {
+      const float* const heights = beyond - (length - 1) * stride - 1;
+      const Chord chord{5, 5 + length, 0, 1, heights, stride};
+      ForEachInstructionSet([&] { EXPECT_EQ(WorstOfChord(chord, {}).error > 0, length > 1) << length; });
+    }
+  }
+  EXPECT_EQ(munmap(pages, 2 * page), 0);
 }
 
 TEST(Border, KnowsItsFourSides) {

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "engine/core/check.h"
-#include "engine/tin/border.h"
 #include "engine/tin/candidate.h"
 #include "engine/tin/candidate_queue.h"
 #include "engine/tin/plane.h"
@@ -91,6 +90,12 @@ class NaivePass {
 };
 
 }  // namespace
+
+double BorderError(double misfit_m, const BorderOptions& options) {
+  const double padded = misfit_m + options.padding_m;
+  return options.scale *
+         std::min(std::max(padded * options.weight, padded + options.step_m), kMostBorderWeight * misfit_m);
+}
 
 TinMesh NaiveGreedy(const HeightField& field, const std::array<BorderOptions, 4>& borders, const GreedyGoal& goal) {
   Triangulation triangulation(field);

@@ -10,6 +10,9 @@
 
 namespace terrace::tin {
 
+// The rule of BorderOptions for a border sample that misses its chord by so much, sagitta included; metres.
+double BorderError(double misfit_m, const BorderOptions& options);
+
 // Knows borders and goals, but no curvature and no seeds.
 TinMesh NaiveGreedy(const HeightField& field, const std::array<BorderOptions, 4>& borders, const GreedyGoal& goal);
 

@@ -174,6 +174,56 @@ TEST(TriangleScan, TellsApartWhatSinglePrecisionDoesNot) {
   }
 }
 
+// Boxes from a vector of columns to spans of several, the furthest sample in the first or the last column; in single
+// precision, in integers and in doubt.
+TEST(TriangleScan, SeesTheFirstAndTheLastColumnOfBoxesOfAnyWidth) {
+  const auto at = [](int x, int y) {
+    return SamplePosition{static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)};
+  };
+  for (const float base : {0.0F, 0x1p-10F, 0.37F}) {
+    for (int reach = 2; reach <= 70; ++reach) {
+      const int end = 1 + reach;
+      for (const int column : {1, end}) {
+        const HeightField field = MakeField(reach + 4, reach + 4, [&](int x, int y) {
+          if (x == 0 && y == 0) return base;  // which single precision is exact with, or not
+          if (x == column && y == 1 + reach / 2) return 5.0F;
+          return x == 1 + reach / 2 && y == 1 + reach / 2 ? 1.0F : 0.0F;
+        });
+        ExpectReference(field, column == end ? *TestStar(field, at(1, 1), {at(end, 1), at(end, end)})
+                                             : *TestStar(field, at(1, 1), {at(end, 1), at(1, end)}));
+        ASSERT_FALSE(HasFatalFailure()) << "columns " << reach + 1;
+      }
+    }
+  }
+}
+
+// Two to four samples that only double tells apart, in columns that share a lane of any vector: of one row of vectors
+// or of several.
+TEST(TriangleScan, TellsApartWhatSharesALane) {
+  Random random(23);
+  for (int i = 0; i < 3000; ++i) {
+    const int reach = 8 + random.Below(60), size = reach + 4, lane = random.Below(16);
+    std::vector<float> heights(static_cast<std::size_t>(size * size), std::numeric_limits<float>::quiet_NaN());
+    const float base = 1 + static_cast<float>(random.Unit());
+    for (int k = 2 + random.Below(3); k > 0; --k) {
+      const int column = 2 + lane + 16 * random.Below(4), row = 2 + random.Below(reach);
+      if (column >= size) continue;
+      heights[static_cast<std::size_t>(row * size + column)] =
+          base * (1 + static_cast<float>(random.Below(4)) * 0x1p-23F);
+    }
+    const std::array<std::array<int, 2>, 3> corners = {
+        {{1, 1}, {1 + reach, 1}, {1 + random.Below(reach + 1), 1 + reach}}};
+    for (const auto [x, y] : corners) heights[static_cast<std::size_t>(y * size + x)] = 0;
+    const HeightField field =
+        MakeField(size, size, [&](int x, int y) { return heights[static_cast<std::size_t>(y * size + x)]; });
+    const auto corner = [&](std::size_t k) {
+      return SamplePosition{static_cast<std::uint16_t>(corners[k][0]), static_cast<std::uint16_t>(corners[k][1])};
+    };
+    ExpectReference(field, *TestStar(field, corner(0), {corner(1), corner(2)}));
+    ASSERT_FALSE(HasFatalFailure()) << i;
+  }
+}
+
 // Planes whose steps round in opposite ways at two samples that are almost equally far: found by a search for the most
 // that a block's single precision can be off. With a doubt of 2^-20 in blocks the wrong sample of the first one wins
 // where vectors have eight lanes.
