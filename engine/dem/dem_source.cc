@@ -91,8 +91,8 @@ bool LooksLikeRaster(const std::string& path) {
   return std::ranges::any_of(kEndings, [&](std::string_view ending) { return name.ends_with(ending); });
 }
 
-// Those files of folders that are no rasters go away.
-void LeaveOutOthers(std::vector<DemFile>& files) {
+// Those files of folders that are no rasters go away. Which of them look like some, and why they are none.
+std::vector<std::string> LeaveOutOthers(std::vector<DemFile>& files) {
   std::vector<std::string> missed, others;
   std::erase_if(files, [&](const DemFile& file) {
     if (!file.may_be_other || IsRaster(file.path)) return false;
@@ -115,11 +115,12 @@ void LeaveOutOthers(std::vector<DemFile>& files) {
   };
   tell(spdlog::level::warn, missed);
   tell(spdlog::level::debug, others);
+  return missed;
 }
 
-Result<Rasters> OpenAll(std::vector<DemFile>& files, const DemOptions& options) {
+Result<Rasters> OpenAll(std::vector<DemFile>& files, const DemOptions& options, std::vector<std::string>& left_out) {
   const std::string first = files.front().path;
-  LeaveOutOthers(files);
+  left_out = LeaveOutOthers(files);
   if (files.empty()) {
     return MakeError(
         ErrorCode::kNotFound,
@@ -139,6 +140,7 @@ Result<Rasters> OpenAll(std::vector<DemFile>& files, const DemOptions& options) 
     const bool is_nothing = !raster && raster.error().code == ErrorCode::kNotFound;
     if (is_nothing && files[i].may_be_other && files.size() > 1) {
       spdlog::warn("left out of a folder: {}", raster.error().message);
+      left_out.push_back(raster.error().message);
       files.erase(files.begin() + static_cast<std::ptrdiff_t>(i));
       continue;
     }
@@ -253,7 +255,8 @@ Result<std::unique_ptr<DemSource>> DemSource::Open(std::vector<DemFile> files, c
   TERRACE_CHECK(!files.empty());
   if (auto checked = CheckOptions(options); !checked)
     return MakeError(checked.error().code, "{}: {}", files.front().path, checked.error().message);
-  const auto rasters = OpenAll(files, options);
+  std::vector<std::string> left_out;
+  const auto rasters = OpenAll(files, options, left_out);
   if (!rasters) return tl::unexpected(rasters.error());
   auto sheets = SheetsOf(files, *rasters, {options.max_void_gap, options.feather});
   if (!sheets) return tl::unexpected(sheets.error());
@@ -265,6 +268,7 @@ Result<std::unique_ptr<DemSource>> DemSource::Open(std::vector<DemFile> files, c
   const auto finest = std::ranges::min_element(impl->sheets, {}, [](const Sheet& s) { return s.spacing().finer; });
   impl->lattices = PlanLattices(finest->spacing());
   impl->info = InfoOf(impl->sheets, *rasters, options);
+  impl->info.left_out = std::move(left_out);
   impl->available = AvailableTiles(ReachesOf(impl->sheets, options));
   impl->info.max_level = static_cast<int>(impl->available.size()) - 1;
   impl->floor = static_cast<float>(impl->info.floor);

@@ -134,6 +134,8 @@ struct DemInfo {
   double floor = 0;
   int max_level = 0;
   int max_mercator_depth = 1;
+  // Files of folders that have no part in it though they look like rasters, each with the reason.
+  std::vector<std::string> left_out;
 };
 
 // Samples read for tiles, at the resolution they were read at.

@@ -24,8 +24,8 @@ Result<void> ImageFile::FindBands() {
   const bool has_alpha = dataset_->GetRasterBand(count)->GetColorInterpretation() == GCI_AlphaBand;
   if (const GDALDataType type = first->GetRasterDataType(); type != GDT_Byte && type != GDT_UInt16) {
     return MakeError(ErrorCode::kInvalidArgument,
-                     "{}: samples are {}, colours must have 8 or 16 bits; convert with `gdal_translate -ot Byte -scale "
-                     "in out.tif`",
+                     "{}: samples are {}, colours must be unsigned, of 8 or 16 bits; convert with `gdal_translate -ot "
+                     "Byte -scale in out.tif`",
                      path_, GDALGetDataTypeName(type));
   }
   if (count - (has_alpha ? 1 : 0) == 1) {

@@ -192,10 +192,13 @@ int Info(const std::vector<std::string>& dems, const std::string& vertical, cons
     }
     const dem::DemInfo& info = (*source)->info();
     const bool is_one = info.sources.size() == 1;
-    if (json)
+    if (json) {
       all.push_back(is_one ? ToJson(info) : nlohmann::json::parse(MosaicJson(name, info)));
-    else
+      all.back()["left_out"] = info.left_out;
+    } else {
       is_one ? PrintText(info) : PrintMosaic(name, info);
+      for (const std::string& file : info.left_out) fmt::print("  {:<14}{}\n", "left out", file);
+    }
   }
   if (json) fmt::print("{}\n", all.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
   return exit_code;

@@ -228,7 +228,7 @@ TEST(Imagery, ARasterOfHeightsIsRefused) {
   const TempDir dir;
   const auto refused = Imagery::Open(WriteRaster(dir, {}), {});
   ASSERT_FALSE(refused.has_value());
-  EXPECT_NE(refused.error().message.find("colours must have 8 or 16 bits"), std::string::npos)
+  EXPECT_NE(refused.error().message.find("colours must be unsigned, of 8 or 16 bits"), std::string::npos)
       << refused.error().message;
 }
 

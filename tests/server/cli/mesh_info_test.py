@@ -3,6 +3,7 @@ import html
 import json
 import math
 import pathlib
+import re
 import signal
 import struct
 import subprocess
@@ -353,6 +354,18 @@ class InfoOfMosaics(InFolder):
             </VRTRasterBand></VRTDataset>""")
         self.assertIn('allowed_drivers of its configuration lists "VRT"', run("info", vrt).stdout)
 
+    def test_tells_what_looks_like_a_raster_and_has_no_part_in_it(self):
+        self.place("a", 10, 0.01), self.place("b", 10.4, 0.01)
+        (info,) = json.loads(run("info", self.folder, "--json").stdout)
+        self.assertEqual(info["left_out"], [])
+        empty, _ = self.write("empty.tif", b""), self.write("notes.txt", "no raster, and no such name")
+        text = run("info", self.folder)
+        self.assertEqual(text.returncode, 0)
+        self.assertRegex(text.stdout, rf"left out +{re.escape(str(empty))} \(no raster")
+        self.assertNotIn("notes.txt", text.stdout)
+        (info,) = json.loads(run("info", self.folder, "--json").stdout)
+        self.assertEqual([file.split()[0] for file in info["left_out"]], [str(empty)])
+
     def test_the_order_of_the_command_line_counts(self):
         fine, coarse = self.place("fine", 10, 0.01), self.place("coarse", 9, 0.1)
         (info,) = json.loads(run("info", "--mosaic", "--json", coarse, fine).stdout)
@@ -361,25 +374,27 @@ class InfoOfMosaics(InFolder):
 
 
 class BadRasters(InFolder):
+    SERVE = ("serve", "--listen", "127.0.0.1:0")  # whatever else listens on this machine
+
     def test_are_refused_with_the_reason(self):
         empty = self.write("empty.tif", b"")
         text = self.write("notes.tif", "not a raster")
         plain = self.write("plain.pgm", b"P5\n4 4\n255\n" + bytes(range(16)))
-        for command in ("serve", "info"):
+        for command in (self.SERVE, ("info",)):
             for dem in ("/nowhere.tif", empty, text, self.folder):
-                self.assert_refused(1, [str(dem)], command, dem)
-            self.assert_refused(1, [str(plain), "georeference", "gdal_translate -a_srs", "-a_ullr"], command, plain)
+                self.assert_refused(1, [str(dem)], *command, dem)
+            self.assert_refused(1, [str(plain), "georeference", "gdal_translate -a_srs", "-a_ullr"], *command, plain)
 
     def test_of_voids_only_are_refused(self):
         voids = self.write("voids.asc", grid([[-9999] * 5] * 5, PLACE))
         self.write("voids.prj", 'GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]],'
                                 'PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433]]')
-        for arguments in (["serve"], ["info"], ["mesh", "--points", "4", "--out", str(self.folder / "a.obj")]):
+        for arguments in (self.SERVE, ["info"], ["mesh", "--points", "4", "--out", str(self.folder / "a.obj")]):
             self.assert_refused(1, ["voids.asc"], *arguments, voids)
         self.assertNotIn("a.obj", self.files())
 
     def test_are_all_told_together(self):
-        self.assert_refused(1, ["/nowhere/a.tif", "/nowhere/b.tif"], "serve", "/nowhere/a.tif", "/nowhere/b.tif")
+        self.assert_refused(1, ["/nowhere/a.tif", "/nowhere/b.tif"], *self.SERVE, "/nowhere/a.tif", "/nowhere/b.tif")
 
 
 if __name__ == "__main__":
