@@ -7,7 +7,7 @@
 #include <limits>
 #include <utility>
 
-#include "engine/tin/height_range.h"
+#include "engine/tin/mark_voids.h"
 #include "engine/tin/quantum.h"
 
 namespace terrace::tin {
@@ -39,13 +39,13 @@ Result<HeightField> HeightField::Make(int width, int height, std::vector<float> 
     return MakeError(ErrorCode::kInvalidArgument, "a height field of {} x {} samples needs {} heights, not {}", width,
                      height, samples, heights.size());
   }
-  const HeightRange range = MarkVoids(heights.data(), samples);
-  if (range.voids == samples) {
+  const ValidHeights valid = MarkVoids(heights.data(), samples);
+  if (valid.voids == samples) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "all {} x {} samples of the height field are void: at least one needs a height", width, height);
   }
-  return HeightField(width, height, std::move(heights), range.voids > 0,
-                     static_cast<double>(range.highest) - static_cast<double>(range.lowest));
+  return HeightField(width, height, std::move(heights), valid.voids > 0,
+                     static_cast<double>(valid.highest) - static_cast<double>(valid.lowest));
 }
 
 HeightField::HeightField(int width, int height, std::vector<float> heights, bool has_voids, double relief_m)

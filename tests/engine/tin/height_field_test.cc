@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "engine/tin/height_range.h"
+#include "engine/tin/mark_voids.h"
 #include "tests/engine/tin/instruction_sets.h"
 #include "tests/engine/tin/test_fields.h"
 
@@ -59,7 +59,7 @@ TEST(HeightField, KnowsTheRangeOfWhatIsFinite) {
       std::copy_if(heights.begin(), heights.end(), std::back_inserter(finite),
                    [](float h) { return std::isfinite(h); });
       const std::vector<float> before = heights;
-      const HeightRange range = MarkVoids(heights.data(), heights.size());
+      const ValidHeights range = MarkVoids(heights.data(), heights.size());
       ASSERT_EQ(range.voids, heights.size() - finite.size());
       for (std::size_t i = 0; i < heights.size(); ++i) {
         ASSERT_TRUE(std::isfinite(before[i]) ? heights[i] == before[i] : std::isnan(heights[i]));

@@ -5,12 +5,12 @@
 
 namespace terrace::tin {
 
-struct HeightRange {
+struct ValidHeights {
   float lowest = 0, highest = 0;  // metres; of no valid sample: lowest > highest
   std::size_t voids = 0;
 };
 
 // Makes a void, NaN, of all that is not finite, and tells of the rest. Safe to call from many threads at once.
-HeightRange MarkVoids(float* heights, std::size_t count);
+ValidHeights MarkVoids(float* heights, std::size_t count);
 
 }  // namespace terrace::tin

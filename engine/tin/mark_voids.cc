@@ -1,9 +1,9 @@
-#include "engine/tin/height_range.h"
+#include "engine/tin/mark_voids.h"
 
 #include <limits>
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "engine/tin/height_range.cc"
+#define HWY_TARGET_INCLUDE "engine/tin/mark_voids.cc"
 #include <hwy/foreach_target.h>  // includes this file once for each set of instructions
 #include <hwy/highway.h>
 
@@ -11,7 +11,7 @@ HWY_BEFORE_NAMESPACE();
 namespace terrace::tin {
 namespace HWY_NAMESPACE {
 
-HeightRange ScanHeights(float* heights, std::size_t count) {
+ValidHeights ScanHeights(float* heights, std::size_t count) {
   namespace hn = hwy::HWY_NAMESPACE;
   const hn::CappedTag<float, 16> floats;
   const std::size_t lanes = hn::Lanes(floats);
@@ -50,7 +50,7 @@ namespace terrace::tin {
 
 HWY_EXPORT(ScanHeights);
 
-HeightRange MarkVoids(float* heights, std::size_t count) { return HWY_DYNAMIC_DISPATCH(ScanHeights)(heights, count); }
+ValidHeights MarkVoids(float* heights, std::size_t count) { return HWY_DYNAMIC_DISPATCH(ScanHeights)(heights, count); }
 
 }  // namespace terrace::tin
 #endif

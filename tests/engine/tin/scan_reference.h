@@ -1,0 +1,35 @@
+// What scans of triangles are held against: the formula of triangle_scan.h, sample by sample.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "engine/tin/height_field.h"
+#include "engine/tin/star.h"
+#include "engine/tin/triangle_scan.h"
+#include "tests/engine/tin/test_fields.h"
+
+namespace terrace::tin {
+
+// Stars of one triangle or more, as long as they are counter-clockwise around their centre.
+class TestStar {
+ public:
+  TestStar(const HeightField& field, SamplePosition centre, const std::vector<SamplePosition>& ring);
+  const Star& operator*() const { return star_; }
+
+ private:
+  Star star_;
+};
+
+// The header's formula, for one triangle of the star.
+PlaneMisfit Reference(const HeightField& field, const Star& star, std::size_t i);
+
+SamplePosition RandomSample(Random& random, const HeightField& field);
+
+// Fails where a scan by any set of instructions differs in a bit.
+void ExpectReference(const HeightField& field, const Star& star);
+
+// One triangle with corners at random, unless they have the wrong order.
+void ExpectReferenceAtRandom(Random& random, const HeightField& field);
+
+}  // namespace terrace::tin
