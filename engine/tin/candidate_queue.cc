@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <span>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "engine/tin/candidate_queue.cc"
@@ -33,6 +34,23 @@ float Largest(const float* errors, std::size_t count) {
     also = hn::Max(also, hn::LoadU(floats, errors + i + lanes));
   }
   return hn::GetLane(hn::MaxOfLanes(floats, hn::Max(most, also)));
+}
+
+// Sorts different words into `sorted`, the largest first: a word comes after as many others as are larger. Reads up to
+// a vector beyond the words.
+void SortFew(const std::uint64_t* words, std::size_t count, std::uint64_t* sorted) {
+  const hn::CappedTag<std::uint64_t, kMostLanes> tag;
+  const std::size_t lanes = hn::Lanes(tag);
+  HWY_ALIGN std::array<std::uint64_t, kMostLanes> places;
+  for (std::size_t first = 0; first < count; first += lanes) {
+    const auto block = hn::LoadU(tag, words + first);
+    auto larger = hn::Zero(tag);
+    for (std::size_t k = 0; k < count; ++k) {
+      larger = hn::Sub(larger, hn::VecFromMask(tag, hn::Gt(hn::Set(tag, words[k]), block)));
+    }
+    hn::Store(larger, tag, places.data());
+    for (std::size_t i = 0; i < std::min(lanes, count - first); ++i) sorted[places[i]] = words[first + i];
+  }
 }
 
 // Writes the indices of errors at or above the threshold, ascending, and up to a vector beyond; returns how many.
@@ -85,6 +103,7 @@ namespace terrace::tin {
 namespace {
 
 HWY_EXPORT(Largest);
+HWY_EXPORT(SortFew);
 HWY_EXPORT(Sweep);
 
 constexpr std::size_t kBlock = 64;    // slots: two vectors of the widest there are
@@ -93,6 +112,15 @@ constexpr std::size_t kBeyond = 16;   // what a sweep writes beyond what it foun
 constexpr std::size_t kAhead = 8;     // entries: their slots are fetched so early
 constexpr std::ptrdiff_t kNear = 8;   // entries looked at one by one
 constexpr std::size_t kRoom = 32;     // entries that fit before those that a sweep found
+constexpr std::size_t kFew = 64;      // words that are quicker sorted without hwy::Sorter
+
+// The largest first. Each call asks the system for random numbers, and each hwy::Sorter that is made for its clock:
+// where there is little to sort, both take longer than that.
+template <typename Word>
+void Sort(Word* words, std::size_t count) {
+  thread_local hwy::Sorter sorter;
+  sorter(words, count, hwy::SortDescending());
+}
 
 }  // namespace
 
@@ -165,13 +193,20 @@ void CandidateQueue::SortSwept() {
   if (bits + static_cast<unsigned>(std::bit_width(beyond)) > 64) return SortPairs();
   const std::uint64_t place_mask = (std::uint64_t{1} << place_bits) - 1;
   const std::uint64_t sample_mask = (std::uint64_t{1} << sample_bits) - 1;
-  words_.resize(swept_.size());
+  words_.resize(swept_.size() + kBeyond);
   for (std::size_t i = 0; i < swept_.size(); ++i) {
     const std::uint64_t error = std::bit_cast<std::uint32_t>(errors_[swept_[i]]) - least;
     words_[i] = error << bits | (~std::uint64_t{samples_[swept_[i]]} & sample_mask) << place_bits | i;
   }
-  hwy::Sorter()(words_.data(), words_.size(), hwy::SortDescending());
-  for (const std::uint64_t word : words_) {
+  std::array<std::uint64_t, kFew> few;
+  std::span<const std::uint64_t> sorted(words_.data(), swept_.size());
+  if (sorted.size() <= kFew) {
+    HWY_DYNAMIC_DISPATCH(SortFew)(words_.data(), sorted.size(), few.data());
+    sorted = {few.data(), sorted.size()};
+  } else {
+    Sort(words_.data(), sorted.size());
+  }
+  for (const std::uint64_t word : sorted) {
     const std::uint64_t sample = ~(word >> place_bits) & sample_mask;
     run_.push_back({(least + (word >> bits)) << 32 | (sample ^ 0xFFFFFFFF), swept_[word & place_mask]});
   }
@@ -181,7 +216,7 @@ void CandidateQueue::SortPairs() {
   std::vector<hwy::uint128_t> pairs;
   pairs.reserve(swept_.size());
   for (const std::uint32_t slot : swept_) pairs.push_back({slot, OrderOf(slot)});
-  hwy::Sorter()(pairs.data(), pairs.size(), hwy::SortDescending());
+  Sort(pairs.data(), pairs.size());
   for (const hwy::uint128_t& pair : pairs) run_.push_back({pair.hi, static_cast<std::uint32_t>(pair.lo)});
 }
 

@@ -103,7 +103,7 @@ class CandidateQueue {
   std::vector<Entry> run_;             // foremost first, from run_begin_ on
   std::size_t run_begin_ = 0;
   std::vector<std::uint32_t> swept_;   // slots that the last sweep found, ascending
-  std::vector<std::uint64_t> words_;   // of SortSwept
+  std::vector<std::uint64_t> words_;   // of SortSwept, and room for a vector beyond them
   std::size_t wanted_ = kLeastWanted;  // entries between two sweeps
   std::size_t entered_ = 0;            // since the last one
 };

@@ -94,12 +94,14 @@ class GreedyTriangulation::Impl {
   std::vector<TriangleId> awaiting_scan_;
   std::vector<std::uint8_t> awaits_scan_;  // by triangle
 
-  // The worst sample of each border edge, by side and the position where the edge begins.
+  // The worst sample of each border edge, by side and the position where the edge begins. Zeros at first: a tile with
+  // few vertices takes longer to fill these with candidates than with anything else but heights.
   struct BorderWorst {
-    std::uint16_t end = 0;  // of the edge that this is about; 0: of none
-    Candidate worst;
+    double error;
+    std::uint32_t sample;
+    std::uint32_t end;  // of the edge that this is about; 0: of none
   };
-  std::array<std::vector<BorderWorst>, 4> border_worst_;
+  std::array<std::unique_ptr<BorderWorst[]>, 4> border_worst_;
 
   std::optional<SquaredErrors> squares_;  // by triangle; from the first root-mean-square goal on
   std::size_t valid_samples_ = 0;         // counted with it
@@ -120,8 +122,8 @@ GreedyTriangulation::Impl::Impl(const HeightField& field, GreedyOptions options)
   CheckOptions(options_);
   for (const Side side : {Side::kSouth, Side::kEast, Side::kNorth, Side::kWest}) {
     const bool along_x = side == Side::kSouth || side == Side::kNorth;
-    border_worst_[static_cast<std::size_t>(side)].resize(
-        static_cast<std::size_t>(along_x ? field.width() : field.height()));
+    border_worst_[static_cast<std::size_t>(side)] =
+        std::make_unique<BorderWorst[]>(static_cast<std::size_t>(along_x ? field.width() : field.height()));
   }
   if (options_.criterion == Criterion::kDataDependent) {
     data_dependent_.emplace(field, sagitta_, triangulation_, options_.data_dependent);
@@ -331,10 +333,11 @@ Candidate GreedyTriangulation::Impl::WorstOnBorder(VertexId from, VertexId to) {
   const bool along_x = a.y == b.y;
   const auto [begin, end] = along_x ? std::minmax(a.x, b.x) : std::minmax(a.y, b.y);
   BorderWorst& known = border_worst_[side][static_cast<std::size_t>(begin)];
-  if (known.end != end) {
-    known = {static_cast<std::uint16_t>(end), WorstBorderSample(*field_, a, b, options_.borders[side])};
+  if (const auto edge_end = static_cast<std::uint32_t>(end); known.end != edge_end) {
+    const Candidate worst = WorstBorderSample(*field_, a, b, options_.borders[side]);
+    known = {worst.error, worst.sample, edge_end};
   }
-  return known.worst;
+  return {known.error, known.sample};
 }
 
 double GreedyTriangulation::Impl::SquaresOf(TriangleId t) const {

@@ -7,6 +7,7 @@
 #include <limits>
 #include <vector>
 
+#include "tests/engine/tin/instruction_sets.h"
 #include "tests/engine/tin/test_fields.h"
 
 namespace terrace::tin {
@@ -157,6 +158,29 @@ TEST(CandidateQueue, SortsWhatASweepFinds) {
       queue.Set(winner, {});
     }
   }
+}
+
+// Few are sorted in another way than many: from one to more than few, with ties of two, on every set of instructions.
+TEST(CandidateQueue, SortsFewAndMany) {
+  ForEachInstructionSet([] {
+    Random random(11);
+    for (std::uint32_t count = 1; count < 140; ++count) {
+      CandidateQueue queue;
+      std::vector<Candidate> candidates;
+      for (std::uint32_t slot = 0; slot < count; ++slot) {
+        const bool is_tie = slot % 5 == 4;
+        candidates.push_back(is_tie ? candidates.back()
+                                    : Candidate{1.9 + 0.1 * random.Unit(), SampleNumber(random.Below(257), 3)});
+        queue.Set(slot, candidates.back());
+      }
+      for (std::uint32_t left = count; left > 0; --left) {
+        ASSERT_TRUE(Agrees(queue, candidates)) << left << " of " << count;
+        const std::uint32_t winner = queue.Winner();
+        candidates[winner] = {};
+        queue.Set(winner, {});
+      }
+    }
+  });
 }
 
 TEST(CandidateQueue, RoundsUp) {
