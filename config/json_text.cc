@@ -75,12 +75,27 @@ std::string Reason(std::string_view message) {
   return std::string(name_end == std::string_view::npos ? message : message.substr(name_end + 2));
 }
 
+// What most often makes the parser stop after `before`, said in other words than the parser's.
+std::string HintOf(std::string_view text, std::string_view before) {
+  if (text.find('\0') != std::string_view::npos) {
+    return "; this is not text: a DEM is served without --config (terrace serve dem.tif)";
+  }
+  const std::size_t last = before.find_last_not_of(" \t\r\n");
+  const bool closes = before.size() < text.size() && (text[before.size()] == '}' || text[before.size()] == ']');
+  if (closes && last != std::string_view::npos && before[last] == ',') return "; no comma before it";
+  if (before.size() < text.size() && (text[before.size()] == '#' || text.substr(before.size(), 2) == "//")) {
+    return "; JSON has no comments";
+  }
+  return {};
+}
+
 std::string DescribeSyntaxError(std::string_view text, const nlohmann::detail::parse_error& error) {
   // `byte` counts from 1 and is one past the end where the text stops too early.
   const std::string_view before = text.substr(0, std::min(text.size(), error.byte == 0 ? 0 : error.byte - 1));
   const auto line = 1 + std::count(before.begin(), before.end(), '\n');
   const std::size_t line_start = before.rfind('\n') == std::string_view::npos ? 0 : before.rfind('\n') + 1;
-  return fmt::format("line {}, column {}: {}", line, before.size() - line_start + 1, Reason(error.what()));
+  return fmt::format("line {}, column {}: {}", line, before.size() - line_start + 1, Reason(error.what())) +
+         HintOf(text, before);
 }
 
 }  // namespace

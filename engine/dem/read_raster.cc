@@ -63,6 +63,7 @@ Result<RasterHeights> ReadRaster(const std::string& path, const ReadOptions& opt
   if (georeference && MetresPerUnit(georeference->pixel_unit()).value_or(1) != 1) {
     raster.coordinate_unit = georeference->pixel_unit();
   }
+  raster.in_degrees = georeference && georeference->is_geographic_grid();
   SampleRules rules = SampleRules::Of(band, georeference ? georeference->vertical_unit() : "");
   rules.marks = options.nodata;
   // With room for a mesher to lay rows further apart (tin::HeightField) without a second copy of all.

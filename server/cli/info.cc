@@ -6,12 +6,16 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "config/config.h"
+#include "config/options.h"
 #include "config/parse.h"
 #include "engine/dem/dem_source.h"
 #include "engine/dem/source_policy.h"
@@ -20,6 +24,7 @@
 #include "server/cli/fail.h"
 #include "server/cli/mosaic_info.h"
 #include "server/cli/open_source.h"
+#include "server/cli/option_flags.h"
 #include "server/cli/progress.h"
 #include "server/cli/try_folder.h"
 
@@ -165,9 +170,23 @@ std::vector<std::vector<config::SourceConfig>> Datasets(const std::vector<std::s
   return datasets;
 }
 
-int Info(const std::vector<std::string>& dems, const std::string& vertical, const std::string& cache_dir, bool json,
-         bool mosaic) {
+struct InfoArguments {
+  std::vector<std::string> dems;
+  std::map<std::string, std::string> dataset_flags;  // by option key
+  std::string cache_dir;
+  bool json = false, mosaic = false;
+};
+
+int Info(const InfoArguments& arguments) {
   spdlog::set_level(spdlog::level::err);  // what opening logs is printed below
+  const auto& [dems, dataset_flags, cache_dir, json, mosaic] = arguments;
+  config::DatasetConfig flags;
+  std::vector<config::ConfigError> wrong;
+  std::error_code unnamed;
+  const std::filesystem::path directory = std::filesystem::current_path(unnamed);
+  for (const auto& [key, text] : dataset_flags) config::SetDatasetOption(key, text, directory, flags, wrong);
+  for (const config::ConfigError& error : wrong) Fail(error.path + ": " + error.message, kExitUsage);
+  if (!wrong.empty()) return kExitUsage;
   int exit_code = dem::AllowVrts() ? kExitOk : kExitFailure;
   if (!cache_dir.empty()) {
     if (const auto folder = TryFolder(cache_dir); !folder) {
@@ -179,9 +198,8 @@ int Info(const std::vector<std::string>& dems, const std::string& vertical, cons
   for (const auto& sources : Datasets(dems, mosaic, exit_code)) {
     const std::string name = NameOf(sources);
     Progress progress((cache_dir.empty() ? "reading " : "preparing ") + name, FileCount(sources));
-    config::DatasetConfig dataset;
+    config::DatasetConfig dataset = flags;
     dataset.sources = sources;
-    dataset.vertical = vertical;
     std::vector<Error> faults;  // of files, all of them
     const auto source = OpenSource(dataset, cache_dir, progress.Callback(), {},
                                    [&faults](const Error& fault) { faults.push_back(fault); });
@@ -207,9 +225,7 @@ int Info(const std::vector<std::string>& dems, const std::string& vertical, cons
 }  // namespace
 
 void AddInfo(CLI::App& app, int& exit_code) {
-  auto dems = std::make_shared<std::vector<std::string>>();
-  auto vertical = std::make_shared<std::string>("crs"), cache_dir = std::make_shared<std::string>();
-  auto json = std::make_shared<bool>(false), mosaic = std::make_shared<bool>(false);
+  auto arguments = std::make_shared<InfoArguments>();
   CLI::App* command =
       app.add_subcommand("info", "Tells what rasters hold, the levels they can serve, and what to mend");
   command->footer(
@@ -219,19 +235,20 @@ void AddInfo(CLI::App& app, int& exit_code) {
       "  terrace info --mosaic lidar/ base.tif\n\n"
       "A raster that cannot be served is told on stderr with the reason and the remedy; the others are\n"
       "still shown, but for those of the same folder or mosaic: with it none of them can be served.");
-  command->add_option("DEM", *dems, "Rasters that GDAL can read, or folders of them")->required();
-  command->add_flag("--json", *json, "One JSON array instead of text");
-  command->add_flag("--mosaic", *mosaic, "Takes all of them for one dataset, the first counting most");
+  command->add_option("DEM", arguments->dems, "Rasters that GDAL can read, or folders of them")->required();
+  command->add_flag("--json", arguments->json, "One JSON array instead of text");
+  command->add_flag("--mosaic", arguments->mosaic, "Takes all of them for one dataset, the first counting most");
+  std::vector<config::OptionInfo> about_heights = config::DatasetOptions();  // the others are about serving
+  about_heights.erase(
+      std::remove_if(about_heights.begin(), about_heights.end(),
+                     [](const auto& option) { return option.key != "vertical" && option.key != "nodata"; }),
+      about_heights.end());
+  AddFlags(*command, about_heights, "Heights, as in a configuration", arguments->dataset_flags);
   command
-      ->add_option("--vertical", *vertical,
-                   "What heights count from: crs (as the raster states), unknown, ellipsoid, egm96, egm2008, EPSG:N or "
-                   "the path of a grid")
-      ->type_name("DATUM");
-  command->add_option("--cache-dir", *cache_dir, "Keeps what is learnt in this folder, for 'terrace serve --cache-dir'")
+      ->add_option("--cache-dir", arguments->cache_dir,
+                   "Keeps what is learnt in this folder, for 'terrace serve --cache-dir'")
       ->type_name("DIR");
-  command->callback([dems, vertical, cache_dir, json, mosaic, &exit_code] {
-    exit_code = FinishOutput(Info(*dems, *vertical, *cache_dir, *json, *mosaic));
-  });
+  command->callback([arguments, &exit_code] { exit_code = FinishOutput(Info(*arguments)); });
 }
 
 }  // namespace terrace::cli

@@ -186,7 +186,7 @@ int Mesh(const MeshArguments& arguments) {
     return dem::ReadRaster(arguments.dem, ReadOptionsOf(arguments.nodata, progress.Callback()));
   }();
   if (!raster) return Fail(raster.error().message, kExitFailure);
-  WarnOf(arguments.dem, *raster, arguments.coordinates);
+  WarnOf(arguments.dem, *raster, arguments.coordinates, arguments.out);
   const auto placement =
       PlacementOf(arguments.dem, raster->georeferenced, raster->geo_transform, arguments.coordinates);
   if (!placement) return Fail(placement.error().message, kExitUsage);
@@ -205,6 +205,10 @@ int Mesh(const MeshArguments& arguments) {
   if (!written) return Fail(written.error().message, kExitFailure);
   seconds.write = SecondsSince(start);
   Print(arguments, *field, mesh, tin::MeasureError(*field, mesh), seconds);
+  if (mesh.vertices.size() < arguments.points) {
+    fmt::print(stderr, "terrace: {}: {} vertices meet every sample; there is no use for {}\n", arguments.dem,
+               mesh.vertices.size(), arguments.points);
+  }
   return kExitOk;
 }
 

@@ -53,7 +53,7 @@ Result<Source> ReadDem(const ColoredMeshArguments& arguments) {
   auto heights = tin::HeightField::Make(raster->width, raster->height, std::move(raster->heights));
   if (!heights) return MakeError(heights.error().code, "{}: {}", arguments.raster, heights.error().message);
   progress.reset();
-  WarnOf(arguments.raster, *raster, arguments.coordinates);
+  WarnOf(arguments.raster, *raster, arguments.coordinates, arguments.out);
   return MakeSource(arguments.color.image, *std::move(heights), *std::move(colors), arguments.color.weight,
                     raster->georeferenced, raster->geo_transform);
 }

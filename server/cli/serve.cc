@@ -27,6 +27,7 @@
 #include "server/cli/log.h"
 #include "server/cli/open_layers.h"
 #include "server/cli/open_source.h"
+#include "server/cli/option_flags.h"
 #include "server/cli/progress.h"
 #include "server/cli/service_manager.h"
 #include "server/cli/try_folder.h"
@@ -432,22 +433,6 @@ int Serve(const ServeArguments& arguments) {
   const bool drained = server->Wait();
   reloader.Stop();
   return drained ? kExitOk : kExitFailure;
-}
-
-// Every option of the configuration is a flag; its text is kept until the file has been read, and checked then.
-void AddFlags(CLI::App& command, const std::vector<config::OptionInfo>& options, const std::string& group,
-              std::map<std::string, std::string>& values) {
-  for (const config::OptionInfo& option : options) {
-    if (!option.has_flag) continue;
-    const std::string key(option.key);
-    std::string help(option.help);
-    if (!option.default_value.empty()) help += " [" + option.default_value + "]";
-    command
-        .add_option_function<std::string>(
-            option.Flag(), [&values, key](const std::string& text) { values[key] = text; }, help)
-        ->type_name(std::string(option.value))
-        ->group(group);
-  }
 }
 
 }  // namespace

@@ -29,6 +29,14 @@ TEST(ParseJsonText, RefusesCommentsAndTextAfterTheEnd) {
   EXPECT_THAT(ErrorsOf("{}{}"), ElementsAre(IsError("", "line 1, column 3")));
 }
 
+TEST(ParseJsonText, SaysWhatItMostLikelyIs) {
+  EXPECT_THAT(ErrorsOf(R"({"sources": ["a.tif", "b.tif", ] })"), ElementsAre(IsError("", "no comma before it")));
+  EXPECT_THAT(ErrorsOf("{\"viewer\": true,\n}"), ElementsAre(IsError("", "line 2, column 1: syntax error")));
+  EXPECT_THAT(ErrorsOf("{\"viewer\": true,\n}"), ElementsAre(IsError("", "no comma before it")));
+  EXPECT_THAT(ErrorsOf("{\n# the viewer\n\"viewer\": true}"), ElementsAre(IsError("", "JSON has no comments")));
+  EXPECT_THAT(ErrorsOf(std::string("II*\0\b\0", 6)), ElementsAre(IsError("", "a DEM is served without --config")));
+}
+
 TEST(ParseJsonText, RefusesNumbersThatNoDoubleHolds) {
   std::vector<ConfigError> errors;
   EXPECT_TRUE(ParseJsonText("[1e999]", errors).is_discarded());

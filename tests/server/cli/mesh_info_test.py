@@ -115,6 +115,18 @@ class Mesh(InFolder):
         top_left = next(v for v in vertices if v[:2] == (101, 259))
         self.assertAlmostEqual(top_left[2], BUMPS[0][0], places=3)
 
+    def test_tells_of_more_vertices_than_there_is_use_for(self):
+        result = run("mesh", self.write("flat.asc", grid([[5] * 4] * 3, PLACE)), "--out", self.folder / "a.obj", "--points", 9)
+        self.assertEqual(result.returncode, 0)
+        self.assertRegex(result.stderr, r"^terrace: .*flat\.asc: 4 vertices meet every sample; there is no use for 9\n$")
+
+    def test_tells_of_degrees_where_gltf_has_metres(self):
+        told = "degrees, heights metres"
+        self.assertIn(told, run("mesh", SAMPLE, "--out", self.folder / "a.glb", "--points", 99).stderr)
+        for arguments in ((self.folder / "a.ply",), (self.folder / "b.glb", "--coordinates", "pixel")):
+            result = run("mesh", SAMPLE, "--points", 99, "--out", *arguments)
+            self.assertEqual((result.returncode, result.stderr), (0, ""))
+
     def test_reaches_each_kind_of_goal(self):
         self.assertEqual(self.mesh(SAMPLE, "a.ply", "--points", 1000)[0]["points"], 1000)
         self.assertLessEqual(self.mesh(SAMPLE, "a.ply", "--rms", 4)[0]["rms_error"], 4)
@@ -137,10 +149,11 @@ class Mesh(InFolder):
         rows = [[round(40 * math.sin(x / 9) * math.cos(y / 7 + x / 90), 2) for x in range(700)] for y in range(500)]
         large = self.write("large.asc", grid(rows, PLACE))  # meshed in six blocks
         for dem, bound in ((SAMPLE, 20), (large, 1)):
-            statistics, one = self.mesh(dem, "one.glb", "--max-error", bound)
+            goal = ("--max-error", bound, "--coordinates", "pixel")
+            statistics, one = self.mesh(dem, "one.glb", *goal)
             self.assertLessEqual(statistics["max_error"], bound)
             for threads in (2, 4):
-                more = self.mesh(dem, "more.glb", "--max-error", bound, "--threads", threads)[1]
+                more = self.mesh(dem, "more.glb", *goal, "--threads", threads)[1]
                 self.assertEqual(one.read_bytes(), more.read_bytes())
             self.assertEqual(one.read_bytes()[:4], b"glTF")
 
@@ -304,7 +317,7 @@ class Info(unittest.TestCase):
         self.assertEqual(len(json.loads(result.stdout)), 1)
 
 
-class InfoOfMosaics(InFolder):
+class InfoOfFiles(InFolder):
     WGS84 = ('GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]],PRIMEM["Greenwich",0],'
              'UNIT["degree",0.0174532925199433]]')
 
@@ -313,6 +326,15 @@ class InfoOfMosaics(InFolder):
         self.write(name + ".prj", self.WGS84)
         return self.write(name + ".asc",
                           grid(heights, f"xllcorner {west}\nyllcorner 20\ncellsize {cell}\nNODATA_value -9999"))
+
+    def test_takes_what_heights_are_as_a_configuration_does(self):
+        dem = self.write("a.asc", grid([[1, 2, 77], [3, 4, 5]], "xllcorner 7\nyllcorner 46\ncellsize 0.001"))
+        self.write("a.prj", self.WGS84)
+        (info,) = json.loads(run("info", "--nodata", "77", "--vertical", "ellipsoid", "--json", dem).stdout)
+        self.assertEqual((info["void_samples"], info["heights"]["max"]), (1, 5))
+        self.assertIn("ellipsoid", info["counts_from"])
+        for flag in ("--vertical", "--nodata"):
+            self.assert_refused(2, [flag + ": must be", '"foo"'], "info", flag, "foo", dem)
 
     def test_a_coarse_source_before_a_fine_one_is_told(self):
         fine, coarse = self.place("fine", 10, 0.01), self.place("coarse", 9, 0.1)
