@@ -100,7 +100,7 @@ class EdgeMeter {
     Lines columns(a.x, b.x), rows(a.y, b.y);
     const double turn = (b.x - a.x) * (b.y - a.y);
     for (double begin = 0; begin < 1;) {
-      const double end = std::min({columns.at, rows.at, 1.0});
+      const double end = std::min(std::min(columns.at, rows.at), 1.0);
       if (columns.at <= end) columns.Next();
       if (rows.at <= end) rows.Next();
       if (!(end > begin)) continue;
@@ -160,15 +160,8 @@ void ForEachEdge(const std::vector<std::array<std::uint32_t, 3>>& triangles, con
   }
 }
 
-// How far edges span, by the sum of their degrees in longitude and latitude: radians.
-double WidestSpan(const EdgeMeter& meter, const std::vector<Place>& places,
-                  const std::vector<std::array<std::uint32_t, 3>>& triangles, double step) {
-  double widest = 0;
-  ForEachEdge(triangles, places, meter, [&](std::uint32_t a, std::uint32_t b) {
-    widest = std::max(widest, std::abs(places[a].x - places[b].x) + std::abs(places[a].y - places[b].y));
-  });
-  return widest * step;
-}
+// Lattice steps along both axes together.
+double SpanOf(Place a, Place b) { return std::abs(a.x - b.x) + std::abs(a.y - b.y); }
 
 // Metres: the largest of the smallest circles around triangles, about the middle of the longest edge or through all
 // vertices. `step`: of a lattice step of either axis, at most.
@@ -214,8 +207,7 @@ class Drawn {
   // derivative of the height is at most 3 |n''| |P'| + |n'''| |P| + |s'''| < 7.2 a w^3 + 5.3 w^2 |difference of
   // heights|. A quadratic through both ends and the middle is off by 0.0081 of it.
   Edge EdgeOf(std::uint32_t a, std::uint32_t b) const {
-    const double span =
-        (std::abs(places_[a].x - places_[b].x) + std::abs(places_[a].y - places_[b].y)) * ground_.step_radians();
+    const double span = SpanOf(places_[a], places_[b]) * ground_.step_radians();
     Edge edge{heights_[a], heights_[b]};
     constexpr double kWide = 0.01;  // the slack is up to 0.4 m below
     edge.is_quadratic = span < kWide;
@@ -237,9 +229,9 @@ class Drawn {
   std::vector<double> heights_;  // by vertex
 };
 
-// The largest differences along edges from the lattice surface.
+// The largest differences along edges from the lattice surface, metres, and the largest span of an edge.
 struct Largest {
-  double planar = 0, drawn = 0;
+  double planar = 0, drawn = 0, span = 0;
 };
 
 // `heights`: by vertex, of the reading in longitude and latitude; empty: it is not measured. `drawn`: null, or the flat
@@ -247,8 +239,12 @@ struct Largest {
 Largest MeasureEdges(const EdgeMeter& meter, const std::vector<Place>& places, const std::vector<double>& heights,
                      const Drawn* drawn, const std::vector<std::array<std::uint32_t, 3>>& triangles) {
   Largest largest;
+  std::vector<double> samples;  // of the lattice surface, by vertex
+  samples.reserve(places.size());
+  for (const Place place : places) samples.push_back(meter.SampleAt(place));
   ForEachEdge(triangles, places, meter, [&](std::uint32_t a, std::uint32_t b) {
-    const double sample = meter.SampleAt(places[a]);
+    largest.span = std::max(largest.span, SpanOf(places[a], places[b]));
+    const double sample = samples[a];
     const double first = heights.empty() ? 0 : heights[a], rise = heights.empty() ? 0 : heights[b] - heights[a];
     const Drawn::Edge edge = drawn != nullptr ? drawn->EdgeOf(a, b) : Drawn::Edge{};
     double planar = first - sample, flat = edge.first - sample, most = largest.drawn - edge.slack;
@@ -276,10 +272,9 @@ Largest MeasureEdges(const EdgeMeter& meter, const std::vector<Place>& places, c
 }
 
 // Between the ends of pieces, and on the triangles between edges, the height of a chord strays from a linear one by at
-// most this.
-double Stray(const EdgeMeter& meter, const Ground& ground, const std::vector<Place>& places,
-             const std::vector<std::array<std::uint32_t, 3>>& triangles) {
-  const double diagonal = ground.WidestDiagonal(), span = WidestSpan(meter, places, triangles, ground.step_radians());
+// most this. `steps`: the largest span of an edge.
+double Stray(const Ground& ground, double steps) {
+  const double diagonal = ground.WidestDiagonal(), span = steps * ground.step_radians();
   return kHeights * (0.75 * diagonal * diagonal / kSmallestRadius + span * span / 8 * diagonal);
 }
 
@@ -299,7 +294,7 @@ double MeasureEdgeError(const LatticeView& lattice, const QuantizedTile& tile, b
     const std::vector<geo::Vec3> ecef = DecodePositions(tile);
     const Drawn drawn(ground, places, ecef);
     const Largest largest = MeasureEdges(meter, places, heights, &drawn, tile.triangles);
-    return std::max(largest.planar, largest.drawn + Stray(meter, ground, places, tile.triangles));
+    return std::max(largest.planar, largest.drawn + Stray(ground, largest.span));
   }
   const double planar = MeasureEdges(meter, places, heights, nullptr, tile.triangles).planar;
   // A function whose second derivatives are at most M strays from its linear interpolation on a triangle by at most
@@ -317,8 +312,8 @@ double MeasureFlatEdgeError(const LatticeView& lattice, const tin::TinMesh& mesh
   const EdgeMeter meter(lattice);
   const Ground ground(lattice);
   const Drawn drawn(ground, places, positions);
-  const double edges = MeasureEdges(meter, places, {}, &drawn, mesh.triangles).drawn;
-  return edges + Stray(meter, ground, places, mesh.triangles);
+  const Largest largest = MeasureEdges(meter, places, {}, &drawn, mesh.triangles);
+  return largest.drawn + Stray(ground, largest.span);
 }
 
 }  // namespace terrace::proto

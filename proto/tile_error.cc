@@ -72,13 +72,24 @@ struct Surface {
   bool is_curved() const { return !ecef.empty(); }
 };
 
-// Whether a triangle lies in the same place in both.
-bool IsSame(const Surface& a, const Surface& b, std::size_t t) {
+template <typename Value>
+bool StartsWith(const std::vector<Value>& values, const std::vector<Value>& first) {
+  return values.size() >= first.size() && std::equal(first.begin(), first.end(), values.begin());
+}
+
+// Whether `b` has the vertices of `a`, all in the same place, and perhaps more.
+bool HasVerticesOf(const Surface& a, const Surface& b) {
+  return a.unit == b.unit && a.is_planar() == b.is_planar() && a.is_curved() == b.is_curved() &&
+         StartsWith(b.points, a.points) && StartsWith(b.heights, a.heights) && StartsWith(b.ecef, a.ecef);
+}
+
+// Whether a triangle lies in the same place in both. `of_same_vertices`: HasVerticesOf.
+bool IsSame(const Surface& a, const Surface& b, std::size_t t, bool of_same_vertices) {
   if (t >= a.triangles.size() || t >= b.triangles.size() || a.triangles[t] != b.triangles[t]) return false;
-  return std::ranges::all_of(a.triangles[t], [&](std::uint32_t k) {
-    return a.points[k] == b.points[k] && (!a.is_planar() || a.heights[k] == b.heights[k]) &&
-           (!a.is_curved() || a.ecef[k] == b.ecef[k]);
-  });
+  return of_same_vertices || std::ranges::all_of(a.triangles[t], [&](std::uint32_t k) {
+           return a.points[k] == b.points[k] && (!a.is_planar() || a.heights[k] == b.heights[k]) &&
+                  (!a.is_curved() || a.ecef[k] == b.ecef[k]);
+         });
 }
 
 }  // namespace
@@ -88,11 +99,13 @@ class TileMeter::Impl {
   Impl(const LatticeView& lattice, double bound_m) : lattice_(lattice), cells_(lattice.cells()), bound_(bound_m) {}
 
   int cells() const { return cells_; }
+  const Surface& surface() const { return surface_; }
 
   TileError Measure(Surface surface) {
     const Surface before = std::exchange(surface_, std::move(surface));
     const bool is_alike = before.unit == surface_.unit && before.is_planar() == surface_.is_planar() &&
                           before.is_curved() == surface_.is_curved();
+    const bool of_same_vertices = HasVerticesOf(before, surface_);
     planar_ = surface_.is_planar();
     curved_ = surface_.is_curved();
     is_vertex_.assign(static_cast<std::size_t>(cells_ + 1) * static_cast<std::size_t>(cells_ + 1), false);
@@ -103,7 +116,8 @@ class TileMeter::Impl {
     for (std::size_t t = 0; t < surface_.triangles.size(); ++t) {
       const std::size_t misses = result.misses.size();
       double& error = errors_[t];
-      if (!is_alike || error == kUnknown || !IsSame(before, surface_, t)) error = MeasureTriangle(t, result.misses);
+      if (!is_alike || error == kUnknown || !IsSame(before, surface_, t, of_same_vertices))
+        error = MeasureTriangle(t, result.misses);
       result.max_m = std::max(result.max_m, error);
       if (result.misses.size() > misses) error = kUnknown;  // the miss is to be told again
     }
@@ -220,7 +234,14 @@ TileError TileMeter::Measure(const QuantizedTile& tile, bool curved) {
     surface.points.push_back({tile.u[k] * cells, tile.v[k] * cells});
     surface.heights.push_back(HeightAt(tile, tile.h[k]));
   }
-  if (curved) surface.ecef = DecodePositions(tile);
+  if (curved) {
+    // Equal places and heights have equal positions.
+    const Surface& before = impl_->surface();
+    const bool is_continued = before.unit == surface.unit && StartsWith(surface.points, before.points) &&
+                              StartsWith(surface.heights, before.heights);
+    if (is_continued) surface.ecef = before.ecef;
+    DecodeFurtherPositions(tile, surface.ecef);
+  }
   return impl_->Measure(std::move(surface));
 }
 

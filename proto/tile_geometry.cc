@@ -122,13 +122,17 @@ double HeightAt(const QuantizedTile& tile, std::uint16_t h) {
 
 std::vector<geo::Vec3> DecodePositions(const QuantizedTile& tile) {
   std::vector<geo::Vec3> positions;
+  DecodeFurtherPositions(tile, positions);
+  return positions;
+}
+
+void DecodeFurtherPositions(const QuantizedTile& tile, std::vector<geo::Vec3>& positions) {
   positions.reserve(tile.u.size());
   Angles longitudes([&](std::uint16_t u) { return LongitudeAt(tile.key, u); });
   Angles latitudes([&](std::uint16_t v) { return LatitudeAt(tile.key, v); });
-  for (std::size_t i = 0; i < tile.u.size(); ++i) {
+  for (std::size_t i = positions.size(); i < tile.u.size(); ++i) {
     positions.push_back(geo::ToEcef(longitudes.At(tile.u[i]), latitudes.At(tile.v[i]), HeightAt(tile, tile.h[i])));
   }
-  return positions;
 }
 
 BoundingSphere EnclosingSphere(const std::vector<geo::Vec3>& positions) {

@@ -4,28 +4,44 @@
 #include <vector>
 
 #include "engine/core/check.h"
-#include "engine/tin/triangulation.h"
 
 namespace terrace::tin {
+namespace {
 
-TinMesh InsertSamples(const TinMesh& mesh, std::span<const SamplePosition> samples) {
+Triangulation TriangulationOf(const TinMesh& mesh) {
   std::vector<Triangulation::Vertex> vertices;
-  vertices.reserve(mesh.vertices.size() + samples.size());
+  vertices.reserve(mesh.vertices.size());
   for (const SamplePosition position : mesh.vertices) vertices.push_back({position, 0});
+  return {std::move(vertices), mesh.triangles};
+}
+
+}  // namespace
+
+void SampleInserter::InsertInto(TinMesh& mesh, std::span<const SamplePosition> samples) {
+  if (!triangulation_) triangulation_ = TriangulationOf(mesh);
+  TERRACE_CHECK(triangulation_->vertex_count() == mesh.vertices.size());
   const SamplePosition last = mesh.vertices[2];
-  Triangulation triangulation(std::move(vertices), mesh.triangles);
   TriangleId near = 0;
   for (const SamplePosition sample : samples) {
     TERRACE_CHECK(sample.x > 0 && sample.x < last.x && sample.y > 0 && sample.y < last.y);
-    near = triangulation.Locate(sample, near);
-    if (triangulation.IsCorner(sample, near)) continue;
-    const Star& star = triangulation.Insert(
+    near = triangulation_->Locate(sample, near);
+    if (triangulation_->IsCorner(sample, near)) continue;
+    const Star& star = triangulation_->Insert(
         {sample, 0}, near, [](const RingVertex& u, const RingVertex& v, const RingVertex& w, HalfEdgeId) {
           return Cross(u, v) == 0 || (Sees(u, v, w) && IsInsideCircle(v, u, w));
         });
     near = star.triangles[0];
+    mesh.vertices.push_back(sample);
+    mesh.triangles.resize(triangulation_->triangle_count());
+    for (std::size_t i = 0; i < star.count; ++i) {
+      mesh.triangles[star.triangles[i]] = triangulation_->triangle(star.triangles[i]);
+    }
   }
-  return triangulation.Mesh();
+}
+
+TinMesh InsertSamples(TinMesh mesh, std::span<const SamplePosition> samples) {
+  SampleInserter().InsertInto(mesh, samples);
+  return mesh;
 }
 
 }  // namespace terrace::tin

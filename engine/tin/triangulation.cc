@@ -36,34 +36,47 @@ Triangulation::Triangulation(const std::vector<Vertex>& vertices,
   Grow();
 }
 
-// Half-edges sorted by the corner they start from: the twin of (a, b) is found among the few that start from b.
+// Half-edges sorted by the corner they start from, those that go up in ids: the twin of (b, a) is found among the few
+// that start from a.
 template <typename Triangles>
 void Triangulation::Join(Triangles& triangles, const std::vector<std::array<std::uint32_t, 3>>& corners) {
-  std::vector<std::uint32_t> first(vertices_.size() + 1, 0);
+  const auto for_each_edge = [&](auto&& visit) {
+    for (TriangleId t = 0; t < corners.size(); ++t) {
+      const auto [a, b, c] = corners[t];
+      visit(a, b, 4 * t);
+      visit(b, c, 4 * t + 1);
+      visit(c, a, 4 * t + 2);
+    }
+  };
   triangles.slots.reserve(corners.size());
   for (const auto& [a, b, c] : corners) {
     triangles.slots.push_back(Triangles::Triangle::Of(a, b, c, Triangles::kNone, Triangles::kNone, Triangles::kNone));
-    for (const VertexId corner : {a, b, c}) ++first[corner + 1];
   }
-  for (std::size_t vertex = 0; vertex < vertices_.size(); ++vertex) first[vertex + 1] += first[vertex];
-  std::vector<HalfEdgeId> leaving(3 * corners.size());
-  for (TriangleId t = 0; t < corners.size(); ++t) {
-    // Afterwards first[v] is where v's half-edges END.
-    for (unsigned i = 0; i < 3; ++i) leaving[first[corners[t][i]]++] = 4 * t + i;
-  }
-  for (TriangleId t = 0; t < corners.size(); ++t) {
-    for (unsigned i = 0; i < 3; ++i) {
-      if (triangles.slots[t].twin(i) != Triangles::kNone) continue;
-      const VertexId a = corners[t][i], b = corners[t][(i + 1) % 3];
-      for (std::uint32_t k = b == 0 ? 0 : first[b - 1]; k < first[b]; ++k) {
-        const HalfEdgeId back = leaving[k];
-        if (corners[back / 4][(back % 4 + 1) % 3] != a) continue;
-        triangles.slots[t].set_twin(i, back);
-        triangles.slots[back / 4].set_twin(back % 4, 4 * t + i);
-        break;
-      }
+  // Without a branch: which way an edge goes cannot be foretold.
+  std::vector<std::uint32_t> ends(vertices_.size() + 1, 0);
+  for_each_edge([&](VertexId a, VertexId b, HalfEdgeId) { ends[a + std::size_t{1}] += a < b ? 1 : 0; });
+  for (std::size_t vertex = 0; vertex < vertices_.size(); ++vertex) ends[vertex + 1] += ends[vertex];
+  struct Rising {
+    VertexId end;
+    HalfEdgeId edge;
+  };
+  const std::uint32_t unused = ends.back();
+  std::vector<Rising> rising(unused + std::size_t{1});
+  // Where those of a vertex begin becomes where they end.
+  for_each_edge([&](VertexId a, VertexId b, HalfEdgeId edge) {
+    rising[a < b ? ends[a] : unused] = {b, edge};
+    ends[a] += a < b ? 1 : 0;
+  });
+  for_each_edge([&](VertexId b, VertexId a, HalfEdgeId edge) {
+    if (b < a) return;
+    for (std::uint32_t k = a == 0 ? 0 : ends[a - 1]; k < ends[a]; ++k) {
+      if (rising[k].end != b) continue;
+      const HalfEdgeId back = rising[k].edge;
+      triangles.slots[edge / 4].set_twin(edge % 4, back);
+      triangles.slots[back / 4].set_twin(back % 4, edge);
+      return;
     }
-  }
+  });
 }
 
 // The in-circle test says yes where the point lies on the edge, which is inside the circle, and no where w is not seen:

@@ -127,6 +127,7 @@ PlacedMesh PlaceInSpace(const tin::HeightField& field, tin::TinMesh& mesh, const
                         const std::optional<Frame>& frame, double bound_m, const std::stop_token& stop) {
   constexpr int kMaxRounds = 16;          // as for tiles
   constexpr double kRounding_m = 0x1p-8;  // what RoundPosition may take on a steep slope: no vertex mends that
+  tin::SampleInserter inserter;
   for (int round = 1;; ++round) {
     PlacedMesh placed;
     std::vector<geo::Vec3> ecef;
@@ -141,7 +142,7 @@ PlacedMesh PlaceInSpace(const tin::HeightField& field, tin::TinMesh& mesh, const
       placed.max_error_m = RoundPosition({error.max_m, 0, 0}).x;
       return placed;
     }
-    mesh = tin::InsertSamples(mesh, error.misses);
+    inserter.InsertInto(mesh, error.misses);
   }
 }
 

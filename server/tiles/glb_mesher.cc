@@ -44,6 +44,7 @@ Result<MeshedGlb> MeshGlb(const dem::DemSource& source, const proto::LatticeView
   double step_m = proto::GridStep(lattice.lattice, wanted_error_m, width);
   const double depth_m = proto::SkirtDepth(lattice.key.level, asked_error_m);
   proto::TileMeter meter(lattice, started->error_m);
+  tin::SampleInserter inserter;
   for (int round = 1;; ++round) {
     if (stop.stop_requested()) return Cancelled();
     std::vector<proto::GridPoint> points = proto::SnapVertices(lattice, mesh, step_m);
@@ -58,7 +59,7 @@ Result<MeshedGlb> MeshGlb(const dem::DemSource& source, const proto::LatticeView
           lattice, mesh, points, RoundedNormals(proto::VertexNormals(lattice, mesh, positions)), step_m, depth_m);
       return meshed;
     }
-    mesh = tin::InsertSamples(mesh, error.misses);
+    inserter.InsertInto(mesh, error.misses);
   }
 }
 

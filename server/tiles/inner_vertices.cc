@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "engine/geo/ellipsoid.h"
@@ -33,7 +34,7 @@ tin::TinMesh WithInnerVertices(const proto::LatticeView& lattice, tin::TinMesh m
           {static_cast<std::uint16_t>(i * cells / (side + 1)), static_cast<std::uint16_t>(j * cells / (side + 1))});
     }
   }
-  return tin::InsertSamples(mesh, inside);
+  return tin::InsertSamples(std::move(mesh), inside);
 }
 
 }  // namespace terrace::server

@@ -46,6 +46,7 @@ Result<MeshedTile> Finish(tin::TinMesh mesh, const proto::LatticeView& lattice, 
                           double error_m, bool curved, const std::stop_token& stop) {
   constexpr int kMaxRounds = 16;  // two are usual; a cliff may keep a sample out of reach for ever
   proto::TileMeter meter(lattice, error_m);
+  tin::SampleInserter inserter;
   for (int round = 1;; ++round) {
     if (stop.stop_requested()) return Cancelled();
     MeshedTile measured;
@@ -58,7 +59,7 @@ Result<MeshedTile> Finish(tin::TinMesh mesh, const proto::LatticeView& lattice, 
       measured.mesh = std::move(mesh);
       return measured;
     }
-    mesh = tin::InsertSamples(mesh, error.misses);
+    inserter.InsertInto(mesh, error.misses);
   }
 }
 

@@ -109,6 +109,13 @@ TEST(TileMeter, MeasuresAsIfItWereTheFirstTime) {
         ExpectEqual(meter.Measure(next, reading), MeasureTileError(ground.view(), next, 60, reading));
       }
     }
+    // The same reading throughout: other vertices, and the same ones at other heights.
+    QuantizedTile lifted = tile;
+    lifted.min_height += 64;
+    lifted.max_height += 64;
+    for (const QuantizedTile& next : {tile, other, tile, lifted, tile}) {
+      ExpectEqual(meter.Measure(next, curved), MeasureTileError(ground.view(), next, 60, curved));
+    }
   }
 }
 

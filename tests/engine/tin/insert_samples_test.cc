@@ -55,11 +55,41 @@ TEST(InsertSamples, KeepsAnyMeshAMesh) {
   EXPECT_TRUE(CoversExactly(field, InsertSamples(fan, samples)));
 }
 
+TEST(SampleInserter, GoesOnAsIfItBeganAnew) {
+  const HeightField field = HillField(65, 65, 3);
+  for (const Criterion criterion : {Criterion::kDelaunay, Criterion::kDataDependent}) {
+    GreedyOptions options;
+    options.criterion = criterion;
+    GreedyTriangulation tin(field, options);
+    EXPECT_TRUE(tin.Run({10}));
+    TinMesh mesh = tin.Mesh(), anew = mesh;
+    SampleInserter inserter;
+    Random random(4);
+    for (int round = 0; round < 20; ++round) {
+      std::vector<SamplePosition> samples;
+      for (int i = random.Below(12); i >= 0; --i) {
+        samples.push_back(
+            {static_cast<std::uint16_t>(1 + random.Below(63)), static_cast<std::uint16_t>(1 + random.Below(63))});
+      }
+      inserter.InsertInto(mesh, samples);
+      anew = InsertSamples(anew, samples);
+      ASSERT_EQ(mesh.vertices, anew.vertices) << round;
+      ASSERT_EQ(mesh.triangles, anew.triangles) << round;
+    }
+    EXPECT_TRUE(CoversExactly(field, mesh));
+  }
+}
+
 TEST(InsertSamplesDeathTest, RefusesBorderSamples) {
   const HeightField field = HillField(33, 33, 2);
   GreedyTriangulation tin(field);
   const SamplePosition on_border{32, 4};
   EXPECT_DEATH(InsertSamples(tin.Mesh(), {&on_border, 1}), "check failed");
+  const SamplePosition inside{7, 9};
+  SampleInserter inserter;
+  TinMesh mesh = tin.Mesh(), other = mesh;
+  inserter.InsertInto(mesh, {&inside, 1});
+  EXPECT_DEATH(inserter.InsertInto(other, {&inside, 1}), "check failed");  // not what it has left
 }
 
 }  // namespace
