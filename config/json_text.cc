@@ -75,27 +75,32 @@ std::string Reason(std::string_view message) {
   return std::string(name_end == std::string_view::npos ? message : message.substr(name_end + 2));
 }
 
-// What most often makes the parser stop after `before`, said in other words than the parser's.
-std::string HintOf(std::string_view text, std::string_view before) {
-  if (text.find('\0') != std::string_view::npos) {
-    return "; this is not text: a DEM is served without --config (terrace serve dem.tif)";
-  }
+bool IsUtf16(std::string_view text) {
+  const auto starts = [&](char first, char second) { return text.size() > 1 && text[0] == first && text[1] == second; };
+  return starts('\xFF', '\xFE') || starts('\xFE', '\xFF') || starts('{', '\0') || starts('\0', '{');
+}
+
+// What most often makes the parser stop at a place, said in other words than the parser's.
+std::string HintOf(std::string_view text, std::size_t at, std::string_view reason) {
+  if (IsUtf16(text)) return "; this is UTF-16: save it as UTF-8";
+  const std::string_view before = text.substr(0, at), rest = text.substr(at);
+  const auto follows = [&](std::string_view word) { return rest.substr(0, word.size()) == word; };
+  const bool is_in_string = reason.find("invalid string") != std::string_view::npos;
+  if (!is_in_string && (follows("#") || follows("//") || follows("/*"))) return "; JSON has no comments";
   const std::size_t last = before.find_last_not_of(" \t\r\n");
-  const bool closes = before.size() < text.size() && (text[before.size()] == '}' || text[before.size()] == ']');
-  if (closes && last != std::string_view::npos && before[last] == ',') return "; no comma before it";
-  if (before.size() < text.size() && (text[before.size()] == '#' || text.substr(before.size(), 2) == "//")) {
-    return "; JSON has no comments";
-  }
+  if ((follows("}") || follows("]")) && last != std::string_view::npos && before[last] == ',')
+    return "; take away the comma before it";
+  const std::size_t first = text.find_first_not_of(" \t\r\n\xEF\xBB\xBF");  // a byte order mark is no fault
+  if (first != std::string_view::npos && text[first] != '{')
+    return "; a configuration begins with {, and a DEM is served without --config (terrace serve dem.tif)";
   return {};
 }
 
-std::string DescribeSyntaxError(std::string_view text, const nlohmann::detail::parse_error& error) {
-  // `byte` counts from 1 and is one past the end where the text stops too early.
-  const std::string_view before = text.substr(0, std::min(text.size(), error.byte == 0 ? 0 : error.byte - 1));
+std::string DescribeFault(std::string_view text, std::size_t at, const std::string& reason) {
+  const std::string_view before = text.substr(0, at);
   const auto line = 1 + std::count(before.begin(), before.end(), '\n');
   const std::size_t line_start = before.rfind('\n') == std::string_view::npos ? 0 : before.rfind('\n') + 1;
-  return fmt::format("line {}, column {}: {}", line, before.size() - line_start + 1, Reason(error.what())) +
-         HintOf(text, before);
+  return fmt::format("line {}, column {}: {}{}", line, at - line_start + 1, reason, HintOf(text, at, reason));
 }
 
 }  // namespace
@@ -106,10 +111,17 @@ Json ParseJsonText(std::string_view text, std::vector<ConfigError>& errors) {
     duplicates.OnEvent(event, parsed);
     return true;
   };
+  // To the parser it is the end of the text, whatever follows.
+  if (const std::size_t zero = text.find('\0'); zero != std::string_view::npos) {
+    errors.push_back({"", DescribeFault(text, zero, "a byte of zero, which no text has")});
+    return Json(Json::value_t::discarded);
+  }
   try {
     return Json::parse(text, follow);
   } catch (const nlohmann::detail::parse_error& error) {
-    errors.push_back({"", DescribeSyntaxError(text, error)});
+    // `byte` counts from 1 and is one past the end where the text stops too early.
+    const std::size_t at = std::min(text.size(), error.byte == 0 ? 0 : error.byte - 1);
+    errors.push_back({"", DescribeFault(text, at, Reason(error.what()))});
   } catch (const nlohmann::detail::exception& error) {
     errors.push_back({"", Reason(error.what())});
   }

@@ -19,7 +19,8 @@ struct TileError {
 };
 
 // Measures a tile's mesh again and again while samples are inserted into it: triangles that are what they were the time
-// before are not looked at again. What each function measures is said below, of the one for a single time.
+// before are not looked at again. What each function measures is said below, of the one for a single time. All meshes
+// are those of the lattice's tile.
 class TileMeter {
  public:
   TileMeter(const LatticeView& lattice, double bound_m);

@@ -16,8 +16,10 @@ double LongitudeAt(const geo::TileKey& key, std::uint16_t u);
 double LatitudeAt(const geo::TileKey& key, std::uint16_t v);
 double HeightAt(const QuantizedTile& tile, std::uint16_t h);
 
-// The tile's vertices in the tile's own order. `positions` holds the first of them already; the others are appended.
+// The tile's vertices in the tile's own order.
 std::vector<geo::Vec3> DecodePositions(const QuantizedTile& tile);
+
+// The same where the first of them, or all, are in `positions` already: the others are appended.
 void DecodeFurtherPositions(const QuantizedTile& tile, std::vector<geo::Vec3>& positions);
 
 struct BoundingSphere {

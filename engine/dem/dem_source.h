@@ -257,7 +257,7 @@ struct RasterHeights {
   bool georeferenced = false;
   std::array<double, 6> geo_transform{};  // GDAL's order: x0, dx/dcol, dx/drow, y0, dy/dcol, dy/drow (pixel corners)
   std::string coordinate_unit;            // in feet, kilometres ..: their name; empty: metres, degrees, or not known
-  bool in_degrees = false;                // x and y are longitudes and latitudes
+  bool in_angles = false;                 // x and y are longitudes and latitudes
   std::string found_voids;                // what find_voids found, for people; empty: nothing
   std::string picture_part;               // as RasterInfo has it
 };

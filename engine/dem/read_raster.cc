@@ -1,3 +1,5 @@
+#include <ogr_spatialref.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -63,7 +65,8 @@ Result<RasterHeights> ReadRaster(const std::string& path, const ReadOptions& opt
   if (georeference && MetresPerUnit(georeference->pixel_unit()).value_or(1) != 1) {
     raster.coordinate_unit = georeference->pixel_unit();
   }
-  raster.in_degrees = georeference && georeference->is_geographic_grid();
+  const OGRSpatialReference* const crs = (*dataset)->GetSpatialRef();
+  raster.in_angles = raster.georeferenced && crs != nullptr && crs->IsGeographic() != 0;
   SampleRules rules = SampleRules::Of(band, georeference ? georeference->vertical_unit() : "");
   rules.marks = options.nodata;
   // With room for a mesher to lay rows further apart (tin::HeightField) without a second copy of all.

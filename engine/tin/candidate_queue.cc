@@ -108,19 +108,11 @@ HWY_EXPORT(Sweep);
 
 constexpr std::size_t kBlock = 64;    // slots: two vectors of the widest there are
 constexpr std::size_t kSwept = 4096;  // slots swept in one go
-constexpr std::size_t kBeyond = 16;   // what a sweep writes beyond what it found
+constexpr std::size_t kBeyond = 16;   // a vector of the widest: what is written beyond a sweep, read beyond words
 constexpr std::size_t kAhead = 8;     // entries: their slots are fetched so early
 constexpr std::ptrdiff_t kNear = 8;   // entries looked at one by one
 constexpr std::size_t kRoom = 32;     // entries that fit before those that a sweep found
-constexpr std::size_t kFew = 64;      // words that are quicker sorted without hwy::Sorter
-
-// The largest first. Each call asks the system for random numbers, and each hwy::Sorter that is made for its clock:
-// where there is little to sort, both take longer than that.
-template <typename Word>
-void Sort(Word* words, std::size_t count) {
-  thread_local hwy::Sorter sorter;
-  sorter(words, count, hwy::SortDescending());
-}
+constexpr std::size_t kFew = 64;      // words: hwy::Sorter asks the system for random numbers, however few there are
 
 }  // namespace
 
@@ -204,7 +196,7 @@ void CandidateQueue::SortSwept() {
     HWY_DYNAMIC_DISPATCH(SortFew)(words_.data(), sorted.size(), few.data());
     sorted = {few.data(), sorted.size()};
   } else {
-    Sort(words_.data(), sorted.size());
+    hwy::Sorter()(words_.data(), sorted.size(), hwy::SortDescending());
   }
   for (const std::uint64_t word : sorted) {
     const std::uint64_t sample = ~(word >> place_bits) & sample_mask;
@@ -216,7 +208,7 @@ void CandidateQueue::SortPairs() {
   std::vector<hwy::uint128_t> pairs;
   pairs.reserve(swept_.size());
   for (const std::uint32_t slot : swept_) pairs.push_back({slot, OrderOf(slot)});
-  Sort(pairs.data(), pairs.size());
+  hwy::Sorter()(pairs.data(), pairs.size(), hwy::SortDescending());
   for (const hwy::uint128_t& pair : pairs) run_.push_back({pair.hi, static_cast<std::uint32_t>(pair.lo)});
 }
 

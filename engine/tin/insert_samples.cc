@@ -1,6 +1,5 @@
 #include "engine/tin/insert_samples.h"
 
-#include <utility>
 #include <vector>
 
 #include "engine/core/check.h"
@@ -12,7 +11,7 @@ Triangulation TriangulationOf(const TinMesh& mesh) {
   std::vector<Triangulation::Vertex> vertices;
   vertices.reserve(mesh.vertices.size());
   for (const SamplePosition position : mesh.vertices) vertices.push_back({position, 0});
-  return {std::move(vertices), mesh.triangles};
+  return {vertices, mesh.triangles};
 }
 
 }  // namespace

@@ -205,10 +205,7 @@ int Mesh(const MeshArguments& arguments) {
   if (!written) return Fail(written.error().message, kExitFailure);
   seconds.write = SecondsSince(start);
   Print(arguments, *field, mesh, tin::MeasureError(*field, mesh), seconds);
-  if (mesh.vertices.size() < arguments.points) {
-    fmt::print(stderr, "terrace: {}: {} vertices meet every sample; there is no use for {}\n", arguments.dem,
-               mesh.vertices.size(), arguments.points);
-  }
+  TellOfUnused(arguments.dem, arguments.points, mesh.vertices.size());
   return kExitOk;
 }
 

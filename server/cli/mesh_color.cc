@@ -166,6 +166,9 @@ int MeshColored(const ColoredMeshArguments& arguments) {
   if (!written) return Fail(written.error().message, kExitFailure);
   seconds.write = SecondsSince(start);
   Print(arguments, source->field, mesh, tin::MeasureExtendedError(source->field, mesh), seconds);
+  if (arguments.goal.max_points != tin::ExtendedGoal{}.max_points) {
+    TellOfUnused(arguments.raster, arguments.goal.max_points, mesh.tin.vertices.size());
+  }
   return kExitOk;
 }
 

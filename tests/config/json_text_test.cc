@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <string>
+#include <utility>
+#include <vector>
+
 #include "tests/config/errors.h"
 
 namespace terrace::config {
@@ -30,11 +34,37 @@ TEST(ParseJsonText, RefusesCommentsAndTextAfterTheEnd) {
 }
 
 TEST(ParseJsonText, SaysWhatItMostLikelyIs) {
-  EXPECT_THAT(ErrorsOf(R"({"sources": ["a.tif", "b.tif", ] })"), ElementsAre(IsError("", "no comma before it")));
-  EXPECT_THAT(ErrorsOf("{\"viewer\": true,\n}"), ElementsAre(IsError("", "line 2, column 1: syntax error")));
-  EXPECT_THAT(ErrorsOf("{\"viewer\": true,\n}"), ElementsAre(IsError("", "no comma before it")));
-  EXPECT_THAT(ErrorsOf("{\n# the viewer\n\"viewer\": true}"), ElementsAre(IsError("", "JSON has no comments")));
-  EXPECT_THAT(ErrorsOf(std::string("II*\0\b\0", 6)), ElementsAre(IsError("", "a DEM is served without --config")));
+  const std::string comma = "take away the comma", comment = "JSON has no comments", dem = "served without --config";
+  const std::string utf16 = "save it as UTF-8";
+  const std::vector<std::pair<std::string, std::string>> cases = {
+      {R"({"sources": ["a.tif", "b.tif", ] })", comma},
+      {"{\"viewer\": true,\n}", comma},
+      {"{\n# the viewer\n\"viewer\": true}", comment},
+      {"// a configuration\n{}", comment},
+      {"{\"viewer\": true /* or false */}", comment},
+      {std::string("II*\0\b\0", 6), dem},
+      {"ncols 40\nnrows 30\n", dem},
+      {std::string("\xFF\xFE{\0}\0", 6), utf16},
+      {std::string("{\0}\0", 4), utf16},
+      {"{\"viewer\": tru}", ""},
+      {"{\"viewer\" true, \"listen\": 1}", ""},
+      {R"({"a": "C:\#x"})", ""},
+      {"{\"a\": \"caf\xE9//1\"}", ""},
+      {"\xEF\xBB\xBF {\"viewer\": }", ""},
+      {std::string("{\"viewer\": true}\0", 17), ""},
+  };
+  for (const auto& [text, hint] : cases) {
+    std::vector<ConfigError> errors;
+    EXPECT_TRUE(ParseJsonText(text, errors).is_discarded()) << text;
+    ASSERT_EQ(errors.size(), 1u) << text;
+    for (const std::string& any : {comma, comment, dem, utf16}) {
+      EXPECT_EQ(errors[0].message.find(any) != std::string::npos, any == hint) << text << ": " << errors[0].message;
+    }
+  }
+}
+
+TEST(ParseJsonText, RefusesWhatFollowsAZero) {
+  EXPECT_THAT(ErrorsOf({"{}\n\0junk", 8}), ElementsAre(IsError("", "line 2, column 1: a byte of zero")));
 }
 
 TEST(ParseJsonText, RefusesNumbersThatNoDoubleHolds) {

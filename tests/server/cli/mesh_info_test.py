@@ -120,8 +120,14 @@ class Mesh(InFolder):
         self.assertEqual(result.returncode, 0)
         self.assertRegex(result.stderr, r"^terrace: .*flat\.asc: 4 vertices meet every sample; there is no use for 9\n$")
 
-    def test_tells_of_degrees_where_gltf_has_metres(self):
-        told = "degrees, heights metres"
+        picture = self.write("grey.pgm", b"P5 3 2 255\n" + bytes([7] * 6))
+        told = "4 vertices meet every sample; there is no use for 9\n"
+        image = ("mesh", picture, "--image", "--out", self.folder / "a.ply")
+        self.assertIn(told, run(*image, "--points", 9).stderr)
+        self.assertEqual(run(*image, "--max-error", 0.1).stderr, "")
+
+    def test_tells_of_angles_where_gltf_has_metres(self):
+        told = "angles, heights metres"
         self.assertIn(told, run("mesh", SAMPLE, "--out", self.folder / "a.glb", "--points", 99).stderr)
         for arguments in ((self.folder / "a.ply",), (self.folder / "b.glb", "--coordinates", "pixel")):
             result = run("mesh", SAMPLE, "--points", 99, "--out", *arguments)
