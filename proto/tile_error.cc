@@ -77,13 +77,12 @@ bool StartsWith(const std::vector<Value>& values, const std::vector<Value>& firs
   return values.size() >= first.size() && std::equal(first.begin(), first.end(), values.begin());
 }
 
-// Whether `b` has the vertices of `a`, all in the same place, and perhaps more.
+// Whether `b` has the vertices of `a`, all in the same place on the grid and in height, and perhaps more.
 bool HasVerticesOf(const Surface& a, const Surface& b) {
-  return a.unit == b.unit && a.is_planar() == b.is_planar() && a.is_curved() == b.is_curved() &&
-         StartsWith(b.points, a.points) && StartsWith(b.heights, a.heights) && StartsWith(b.ecef, a.ecef);
+  return a.unit == b.unit && StartsWith(b.points, a.points) && StartsWith(b.heights, a.heights);
 }
 
-// Whether a triangle lies in the same place in both. `of_same_vertices`: HasVerticesOf.
+// Whether a triangle lies in the same place in both. `of_same_vertices`: it does if it has the same corners.
 bool IsSame(const Surface& a, const Surface& b, std::size_t t, bool of_same_vertices) {
   if (t >= a.triangles.size() || t >= b.triangles.size() || a.triangles[t] != b.triangles[t]) return false;
   return of_same_vertices || std::ranges::all_of(a.triangles[t], [&](std::uint32_t k) {
@@ -105,7 +104,7 @@ class TileMeter::Impl {
     const Surface before = std::exchange(surface_, std::move(surface));
     const bool is_alike = before.unit == surface_.unit && before.is_planar() == surface_.is_planar() &&
                           before.is_curved() == surface_.is_curved();
-    const bool of_same_vertices = HasVerticesOf(before, surface_);
+    const bool of_same_vertices = is_alike && HasVerticesOf(before, surface_) && StartsWith(surface_.ecef, before.ecef);
     planar_ = surface_.is_planar();
     curved_ = surface_.is_curved();
     is_vertex_.assign(static_cast<std::size_t>(cells_ + 1) * static_cast<std::size_t>(cells_ + 1), false);
@@ -237,9 +236,7 @@ TileError TileMeter::Measure(const QuantizedTile& tile, bool curved) {
   if (curved) {
     // Equal places and heights have equal positions.
     const Surface& before = impl_->surface();
-    const bool is_continued = before.unit == surface.unit && StartsWith(surface.points, before.points) &&
-                              StartsWith(surface.heights, before.heights);
-    if (is_continued) surface.ecef = before.ecef;
+    if (HasVerticesOf(before, surface)) surface.ecef = before.ecef;
     DecodeFurtherPositions(tile, surface.ecef);
   }
   return impl_->Measure(std::move(surface));

@@ -94,8 +94,8 @@ class GreedyTriangulation::Impl {
   std::vector<TriangleId> awaiting_scan_;
   std::vector<std::uint8_t> awaits_scan_;  // by triangle
 
-  // The worst sample of each border edge, by side and the position where the edge begins. Zeros at first: a tile with
-  // few vertices takes longer to fill these with candidates than with anything else but heights.
+  // The worst sample of each border edge, by side and the position where the edge begins. All zeros at first, which
+  // is quicker written than candidates are: that was a twentieth of the time of a tile of four vertices.
   struct BorderWorst {
     double error;
     std::uint32_t sample;
