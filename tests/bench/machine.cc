@@ -9,6 +9,8 @@
 #include <memory>
 #include <thread>
 
+#include "tests/support/source_dir.h"
+
 namespace terrace::bench {
 namespace {
 
@@ -48,7 +50,8 @@ std::string FirstLineOf(const std::string& command) {
 }
 
 nlohmann::ordered_json MachineContext() {
-  const std::string commit = FirstLineOf("git -C '" TERRACE_SOURCE_DIR "' describe --always --dirty 2> /dev/null");
+  const std::string commit =
+      FirstLineOf("git -C '" + test_support::SourceDir().string() + "' describe --always --dirty 2> /dev/null");
   return {{"cpu", CpuModel()},
           {"cores", std::thread::hardware_concurrency()},
           {"load", Load()},

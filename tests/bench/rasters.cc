@@ -10,6 +10,7 @@
 
 #include "engine/core/check.h"
 #include "engine/dem/void_fill.h"
+#include "tests/support/source_dir.h"
 #include "tests/support/test_data.h"
 
 namespace terrace::bench {
@@ -18,7 +19,7 @@ namespace {
 constexpr int kMaxVoidGap = 64;  // samples
 
 std::string PathOf(const std::string& name) {
-  const std::filesystem::path sample = std::filesystem::path(TERRACE_SOURCE_DIR) / "config" / "samples" / name;
+  const std::filesystem::path sample = test_support::SourceDir() / "config" / "samples" / name;
   return std::filesystem::exists(sample) ? sample.string() : name;
 }
 

@@ -11,6 +11,7 @@
 #include "config/json_text.h"
 #include "config/options.h"
 #include "tests/config/errors.h"
+#include "tests/support/source_dir.h"
 
 namespace terrace::config {
 namespace {
@@ -18,7 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 
 std::string ReadText(const fs::path& path) {
-  std::ifstream stream(fs::path(TERRACE_SOURCE_DIR) / path);
+  std::ifstream stream(test_support::SourceDir() / path);
   EXPECT_TRUE(stream) << path;
   return {std::istreambuf_iterator<char>(stream), {}};
 }
@@ -102,7 +103,7 @@ TEST(Parser, TellsTheCasesApart) {
 }
 
 TEST(Examples, AreAccepted) {
-  const fs::path config = fs::path(TERRACE_SOURCE_DIR) / "config";
+  const fs::path config = test_support::SourceDir() / "config";
   std::vector<fs::path> files = {config / "samples/samples.json"};
   for (const auto& entry : fs::directory_iterator(config / "examples")) files.push_back(entry.path());
   EXPECT_GE(files.size(), 3u);

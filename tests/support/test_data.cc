@@ -8,12 +8,14 @@
 #include <limits>
 #include <memory>
 
+#include "tests/support/source_dir.h"
+
 namespace terrace::test_support {
 namespace {
 
 std::filesystem::path Folder() {
   if (const char* named = std::getenv("TERRACE_TEST_DATA"); named != nullptr && *named != '\0') return named;
-  return std::filesystem::path(TERRACE_SOURCE_DIR) / ".." / "shared" / "data";
+  return SourceDir() / ".." / "shared" / "data";
 }
 
 }  // namespace

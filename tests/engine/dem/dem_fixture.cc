@@ -8,6 +8,8 @@
 #include <cstdlib>
 #include <iostream>
 
+#include "tests/support/source_dir.h"
+
 namespace terrace::dem {
 
 TempDir::TempDir() {
@@ -56,9 +58,7 @@ std::string WriteRaster(const TempDir& dir, const RasterSpec& spec, const std::s
 std::optional<std::string> TestDataFile(const std::string& name) {
   const char* folder = std::getenv("TERRACE_TEST_DATA");
   const std::filesystem::path path =
-      (folder != nullptr ? std::filesystem::path(folder)
-                         : std::filesystem::path(TERRACE_SOURCE_DIR) / "../shared/data") /
-      name;
+      (folder != nullptr ? std::filesystem::path(folder) : test_support::SourceDir() / "../shared/data") / name;
   if (std::filesystem::exists(path)) return path.string();
   std::cerr << "test data missing: " << path << "; set TERRACE_TEST_DATA\n";
   return std::nullopt;

@@ -11,6 +11,8 @@
 #include <thread>
 #include <utility>
 
+#include "tests/support/source_dir.h"
+
 namespace terrace::server {
 namespace {
 
@@ -49,7 +51,7 @@ class ReloaderTest : public testing::Test {
   // A new file under the source's name, written long ago.
   void Put(const std::string& name) {
     const fs::path beside = folder_ / "new";
-    fs::copy_file(fs::path(TERRACE_SOURCE_DIR) / "config/samples/jacksboro.tif", beside);
+    fs::copy_file(test_support::SourceDir() / "config/samples/jacksboro.tif", beside);
     fs::last_write_time(beside, fs::file_time_type::clock::now() - 1h);
     fs::rename(beside, folder_ / (name + ".tif"));
   }

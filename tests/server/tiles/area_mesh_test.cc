@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "engine/geo/ellipsoid.h"
+#include "tests/support/source_dir.h"
 
 namespace terrace::server {
 namespace {
@@ -18,7 +19,7 @@ constexpr std::size_t kMany = 1'000'000;
 class AreaMeshTest : public testing::Test {
  protected:
   void SetUp() override {
-    auto opened = dem::DemSource::Open(TERRACE_SOURCE_DIR "/config/samples/jacksboro.tif");
+    auto opened = dem::DemSource::Open(test_support::SourceDir() / "config/samples/jacksboro.tif");
     ASSERT_TRUE(opened) << opened.error().message;
     source_ = *std::move(opened);
     area_ = {-84.25, 36.25, -84.2, 36.29, 5, proto::MeshFileFormat::kObj, AreaCoordinates::kGeographic};
@@ -149,7 +150,7 @@ TEST_F(AreaMeshTest, LiesWhereItsCoordinatesSay) {
 
 // Without the Earth's curvature two triangles would do for a plain, and be far below it.
 TEST_F(AreaMeshTest, LargeTrianglesDoNotCutThroughTheEarth) {
-  auto opened = dem::DemSource::Open(TERRACE_SOURCE_DIR "/config/samples/etopo5.tif");
+  auto opened = dem::DemSource::Open(test_support::SourceDir() / "config/samples/etopo5.tif");
   ASSERT_TRUE(opened) << opened.error().message;
   source_ = *std::move(opened);
   AreaRequest area{-30, 20, 30, 60, 2000, proto::MeshFileFormat::kGlb, AreaCoordinates::kEcef};
@@ -162,7 +163,7 @@ TEST_F(AreaMeshTest, LargeTrianglesDoNotCutThroughTheEarth) {
 
 // Triangles that go half around the Earth collapse into a line; one of them used to be measured as exact.
 TEST_F(AreaMeshTest, TheWholeEarthStaysRoundWhateverTheError) {
-  auto opened = dem::DemSource::Open(TERRACE_SOURCE_DIR "/config/samples/etopo5.tif");
+  auto opened = dem::DemSource::Open(test_support::SourceDir() / "config/samples/etopo5.tif");
   ASSERT_TRUE(opened) << opened.error().message;
   source_ = *std::move(opened);
   for (const AreaCoordinates coordinates : {AreaCoordinates::kEcef, AreaCoordinates::kEnu}) {
@@ -175,7 +176,7 @@ TEST_F(AreaMeshTest, TheWholeEarthStaysRoundWhateverTheError) {
 
 // Near a pole parallels are small circles: triangles in space lie beside where they are in longitude and latitude.
 TEST_F(AreaMeshTest, KeepsTheErrorUpToThePole) {
-  auto opened = dem::DemSource::Open(TERRACE_SOURCE_DIR "/config/samples/etopo5.tif");
+  auto opened = dem::DemSource::Open(test_support::SourceDir() / "config/samples/etopo5.tif");
   ASSERT_TRUE(opened) << opened.error().message;
   source_ = *std::move(opened);
   for (const double error_m : {10.0, 50.0}) {
@@ -186,7 +187,7 @@ TEST_F(AreaMeshTest, KeepsTheErrorUpToThePole) {
 
 // Closer to the pole than a node's rounding: one row of cells, not less.
 TEST_F(AreaMeshTest, AreasAtThePoleHaveOneRowOfCells) {
-  auto opened = dem::DemSource::Open(TERRACE_SOURCE_DIR "/config/samples/etopo5.tif");
+  auto opened = dem::DemSource::Open(test_support::SourceDir() / "config/samples/etopo5.tif");
   ASSERT_TRUE(opened) << opened.error().message;
   source_ = *std::move(opened);
   AreaRequest area{0, 89.99999999999, 1, 90, 100, proto::MeshFileFormat::kGlb, AreaCoordinates::kEnu};
@@ -203,7 +204,7 @@ TEST_F(AreaMeshTest, AreasAtThePoleHaveOneRowOfCells) {
 }
 
 TEST_F(AreaMeshTest, CrossesTheAntimeridian) {
-  auto opened = dem::DemSource::Open(TERRACE_SOURCE_DIR "/config/samples/etopo5.tif");
+  auto opened = dem::DemSource::Open(test_support::SourceDir() / "config/samples/etopo5.tif");
   ASSERT_TRUE(opened) << opened.error().message;
   source_ = *std::move(opened);
   const AreaRequest area{175, -20, 190, -10, 100, proto::MeshFileFormat::kObj, AreaCoordinates::kGeographic};

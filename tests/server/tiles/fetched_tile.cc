@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "engine/geo/tile_key.h"
+#include "tests/support/source_dir.h"
 
 namespace terrace::server {
 
@@ -19,7 +20,7 @@ Dataset OpenDataset(const std::string& name, const std::string& path) {
 }
 
 Dataset OpenSample(const std::string& name) {
-  return OpenDataset(name, std::string(TERRACE_SOURCE_DIR) + "/config/samples/" + name + ".tif");
+  return OpenDataset(name, test_support::SourceDir() / "config/samples" / (name + ".tif"));
 }
 
 FetchedTile FetchTile(const TilePipeline& pipeline, TileRequest request) {
