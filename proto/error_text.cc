@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <charconv>
-#include <cmath>
 
 namespace terrace::proto {
 
@@ -13,7 +12,14 @@ std::string FormatErrorUp(double error_m) {
   std::from_chars(text.data(), text.data() + text.size(), printed);
   if (printed >= error_m) return text;
   // Rounding went down by less than half a unit of the last digit: one unit more rounds to the next number up.
-  const double unit = std::pow(10.0, std::floor(std::log10(error_m)) - 5);
+  // The unit is read from text as well: powers of ten of the C library may differ between processors.
+  const std::string digits = fmt::format("{:.5e}", error_m);
+  int exponent = 0;
+  const std::size_t mark = digits.find('e') + 1, sign = digits[mark] == '+' ? 1 : 0;
+  std::from_chars(digits.data() + mark + sign, digits.data() + digits.size(), exponent);
+  const std::string one = fmt::format("1e{}", exponent - 5);
+  double unit = 0;
+  std::from_chars(one.data(), one.data() + one.size(), unit);
   return fmt::format("{:.6g}", error_m + unit);
 }
 

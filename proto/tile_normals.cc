@@ -58,10 +58,7 @@ geo::Vec3 LatticeNormal(const LatticeView& lattice, const LocalFrame& frame, geo
     east = Limited(east, from_west, 2 * east - from_west);
     north = Limited(north, from_south, 2 * north - from_south);
   }
-  // hypot minds overflow, and takes its time for it.
-  constexpr double kSurelyTame = 0.99 * kSteepestSlope;
-  const bool is_tame = east * east + north * north < kSurelyTame * kSurelyTame;
-  const double tamed = is_tame ? 1 : kSteepestSlope / std::max(std::hypot(east, north), kSteepestSlope);
+  const double tamed = kSteepestSlope / std::max(std::sqrt(east * east + north * north), kSteepestSlope);
   return geo::Normalized(frame.up - frame.east * (east * tamed) - frame.north * (north * tamed));
 }
 

@@ -22,6 +22,7 @@
 #include "engine/dem/level_plan.h"
 #include "engine/dem/raster_file.h"
 #include "engine/dem/raster_source.h"
+#include "engine/geo/octave.h"
 
 namespace terrace::dem {
 namespace {
@@ -158,7 +159,11 @@ Result<Rasters> OpenAll(std::vector<DemFile>& files, const DemOptions& options, 
 }
 
 // A sixteenth of an octave: tiles of one product differ by less, as meridians converge.
-long ResolutionStep(const RasterSource& raster) { return std::lround(std::log2(raster.spacing().finer) * 16); }
+int ResolutionStep(const RasterSource& raster) {
+  double power = raster.spacing().finer;
+  for (int i = 0; i < 4; ++i) power *= power;  // the sixteenth: squared four times
+  return geo::NearestOctave(power);
+}
 
 // Of one rank: the sheets that they make, finer ones first, then by path.
 Result<void> AddSheets(Rasters rasters, const SheetOptions& options, std::vector<Sheet>& sheets) {

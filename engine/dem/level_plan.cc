@@ -6,6 +6,7 @@
 
 #include "engine/geo/ellipsoid.h"
 #include "engine/geo/error_ladder.h"
+#include "engine/geo/octave.h"
 
 namespace terrace::dem {
 namespace {
@@ -18,10 +19,13 @@ struct Step {
 Step GroundStep(Position from, Position to, Position centre) {
   const geo::Vec3 chord = geo::ToEcef(to.x, to.y, 0) - geo::ToEcef(from.x, from.y, 0);
   const geo::Vec3 up = geo::SurfaceNormal(centre.x, centre.y);
-  const double longitude = geo::ToRadians(centre.x);
-  const geo::Vec3 east{-std::sin(longitude), std::cos(longitude), 0};
+  const geo::SinCos longitude = geo::RoundedSinCos(centre.x);
+  const geo::Vec3 east{-longitude.sin, longitude.cos, 0};
   return {geo::Dot(chord, east), geo::Dot(chord, geo::Cross(up, east))};
 }
+
+// std::hypot is not the same to the last bit everywhere; metres do not overflow.
+double LengthOf(double east, double north) { return std::sqrt(east * east + north * north); }
 
 int CellsOf(int level, const SourceSpacing& spacing) {
   constexpr int kCoarsest = 32, kFinest = 256;
@@ -71,10 +75,10 @@ Result<SourceSpacing> SourceSpacing::Of(const Georeference& georeference, const 
   SourceSpacing spacing;
   spacing.latitude = cross[0].y;
   spacing.geographic = georeference.is_geographic_grid();
-  spacing.finer = std::min(std::hypot(column.east, column.north), std::hypot(row.east, row.north));
+  spacing.finer = std::min(LengthOf(column.east, column.north), LengthOf(row.east, row.north));
   // Rows of the inverse of (column, row): pixels passed per metre east, per metre north.
-  spacing.east = std::abs(area) / std::hypot(row.north, column.north);
-  spacing.north = std::abs(area) / std::hypot(row.east, column.east);
+  spacing.east = std::abs(area) / LengthOf(row.north, column.north);
+  spacing.north = std::abs(area) / LengthOf(row.east, column.east);
   if (!(spacing.finer > 0) || !std::isfinite(spacing.east) || !std::isfinite(spacing.north) || area == 0) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "{}: its pixels have no extent on the ground in {}; check the georeference "
@@ -92,8 +96,8 @@ double SamplesPerCell(const geo::Lattice& lattice, const SourceSpacing& spacing)
 }
 
 int AveragingFactor(double samples_per_cell) {
-  constexpr double kMost = 22;  // one block then holds the largest raster (raster_file.cc, kMaxSide)
-  return 1 << static_cast<int>(std::lround(std::clamp(std::log2(samples_per_cell), 0.0, kMost)));
+  constexpr int kMost = 22;  // one block then holds the largest raster (raster_file.cc, kMaxSide)
+  return 1 << std::clamp(geo::NearestOctave(samples_per_cell), 0, kMost);
 }
 
 std::vector<geo::Lattice> PlanLattices(const SourceSpacing& finest) {

@@ -9,15 +9,6 @@ double PrimeVerticalRadiusFromSine(double sine) {
 
 }  // namespace
 
-SinCos RoundedSinCos(double degrees) {
-  if (degrees == 0) return {0, 1};
-  if (degrees == 90 || degrees == -90) return {degrees / 90, 0};
-  if (degrees == 180 || degrees == -180) return {0, -1};
-  constexpr double kGrid = 17592186044416.0;  // 2^44
-  const double radians = ToRadians(degrees);
-  return {std::nearbyint(std::sin(radians) * kGrid) / kGrid, std::nearbyint(std::cos(radians) * kGrid) / kGrid};
-}
-
 Vec3 Normalized(Vec3 a) {
   const double length = Length(a);
   return length > 0 ? a * (1 / length) : a;

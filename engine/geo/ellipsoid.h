@@ -3,6 +3,8 @@
 
 #include <cmath>
 
+#include "engine/geo/sine.h"
+
 namespace terrace::geo {
 
 inline constexpr double kSemiMajorAxis = 6378137.0;
@@ -26,15 +28,6 @@ inline double Dot(Vec3 a, Vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 inline Vec3 Cross(Vec3 a, Vec3 b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
 inline double Length(Vec3 a) { return std::sqrt(Dot(a, a)); }
 Vec3 Normalized(Vec3 a);  // the zero vector stays zero
-
-struct SinCos {
-  double sin = 0, cos = 1;
-};
-
-// Exact at multiples of 90 degrees, and rounded to 2^-44 elsewhere (0.4 micrometres on the ground): libm's last bit
-// differs between processors, and tiles must not. All that follows is made of these; what has many positions on few
-// meridians and parallels finds them out once.
-SinCos RoundedSinCos(double degrees);
 
 // Unit normal of the ellipsoid ("up") at a geodetic position, degrees. At the poles exactly (0, 0, +-1).
 Vec3 SurfaceNormal(SinCos longitude, SinCos latitude);
