@@ -1,8 +1,8 @@
 // Which pixels of a raster its overviews stand for.
 //
-// GDAL makes ceil(W / f) samples of W pixels for factor f, and each stands for W / ceil(W / f) of them: less than f
-// where f does not divide W. So samples drift away from the blocks of f pixels of their number, by up to f pixels at
-// the far end of the axis.
+// GDAL makes n samples of W pixels for factor f, and each stands for W / n of them: n is W / f, rounded up by gdaladdo
+// and down in cloud-optimized GeoTIFFs, so where f does not divide W that is less or more than f. Samples drift away
+// from the blocks of f pixels of their number, by up to f pixels at the far end of the axis.
 #pragma once
 
 #include <gdal_priv.h>

@@ -46,8 +46,8 @@ std::string WhyMisleading(GDALDataset& dataset, const SampleRules& rules) {
 std::string DropMisleadingOverviews(GDALDataset& dataset, RasterLayout& layout) {
   if (HeightBand(dataset).GetOverviewCount() == 0) return {};
   if (layout.overview_factors.empty()) {
-    return "their sides are not those of the raster by 2, 4, 8 .., rounded up (COGs have others where sides are odd); "
-           "`gdal_translate in out` without them and `gdaladdo -r average out` make such ones";
+    return "their sides are not those of the raster by 2, 4, 8 .., rounded up or down; `gdal_translate in out` without "
+           "them and `gdaladdo -r average out` make such ones";
   }
   std::string why = WhyMisleading(dataset, layout.rules);
   if (!why.empty()) layout.overview_factors.clear();

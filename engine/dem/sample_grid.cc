@@ -168,10 +168,16 @@ GridAxis::Place GridAxis::Locate(double position) const {
 }
 
 GDALRasterBand* FindOverview(GDALRasterBand& band, int factor) {
-  const int columns = (band.GetXSize() + factor - 1) / factor, rows = (band.GetYSize() + factor - 1) / factor;
+  GDALDataset* const dataset = band.GetDataset();
+  const bool is_own = dataset != nullptr && HasOwnOverviews(*dataset);
+  const auto fits = [&](int samples, int pixels) {
+    if (samples == pixels / factor && samples > 0) return !is_own || pixels % factor == 0;
+    return samples == (pixels + factor - 1) / factor;
+  };
   for (int i = 0; i < band.GetOverviewCount(); ++i) {
     GDALRasterBand* overview = band.GetOverview(i);
-    if (overview != nullptr && overview->GetXSize() == columns && overview->GetYSize() == rows) return overview;
+    if (overview == nullptr) continue;
+    if (fits(overview->GetXSize(), band.GetXSize()) && fits(overview->GetYSize(), band.GetYSize())) return overview;
   }
   return nullptr;
 }

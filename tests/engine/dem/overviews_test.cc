@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "engine/dem/level_plan.h"
 #include "engine/dem/overview_axis.h"
 #include "engine/dem/raster_source.h"
 #include "tests/engine/dem/dem_fixture.h"
@@ -117,6 +118,135 @@ TEST(Overviews, BlocksLieWhereTheyLieWithout) {
   }
 }
 
+// Sides of a raster and of its overviews are free, and what is read of each is counted. Heights are columns of the
+// raster, as its overviews show them.
+class CountingDataset : public GDALDataset {
+ public:
+  class Band : public GDALRasterBand {
+   public:
+    Band(GDALDataset* dataset, int pixels, int width, int height) : pixels_(pixels) {
+      poDS = dataset;
+      nBand = 1;
+      nRasterXSize = width;
+      nRasterYSize = height;
+      eDataType = GDT_Float32;
+      nBlockXSize = nBlockYSize = 16;
+    }
+    CPLErr IReadBlock(int column, int, void* out) override {
+      ++blocks_read;
+      const double pixels = static_cast<double>(pixels_) / nRasterXSize;
+      for (int i = 0; i < 256; ++i) {
+        static_cast<float*>(out)[i] = static_cast<float>((column * 16 + i % 16 + 0.5) * pixels);
+      }
+      return CE_None;
+    }
+    int GetOverviewCount() override { return static_cast<int>(overviews.size()); }
+    GDALRasterBand* GetOverview(int i) override { return overviews[static_cast<std::size_t>(i)].get(); }
+
+    int blocks_read = 0;
+    std::vector<std::unique_ptr<Band>> overviews;
+
+   private:
+    int pixels_;
+  };
+
+  CountingDataset(int width, int height, const std::vector<std::pair<int, int>>& overviews) {
+    nRasterXSize = width;
+    nRasterYSize = height;
+    auto* const band = new Band(this, width, width, height);
+    SetBand(1, band);
+    for (const auto& [columns, rows] : overviews) {
+      band->overviews.push_back(std::make_unique<Band>(this, width, columns, rows));
+    }
+  }
+  Band& band() { return static_cast<Band&>(*GetRasterBand(1)); }
+};
+
+// A degree of SRTM as a cloud-optimized GeoTIFF has it, as gdaladdo does, and with an axis of each kind.
+TEST(Overviews, OfSidesRoundedEitherWayAreReadInPlaceOfTheRaster) {
+  GDALAllRegister();
+  constexpr int kSide = 3601;
+  using Sides = std::vector<std::pair<int, int>>;
+  for (const Sides& sides : {Sides{{1800, 1800}, {900, 900}, {450, 450}}, Sides{{1801, 1801}, {901, 901}, {451, 451}},
+                             Sides{{1801, 1800}, {900, 901}, {450, 451}}}) {
+    SCOPED_TRACE(sides[0].second);
+    CountingDataset dataset(kSide, kSide, sides);
+    RasterLayout layout;
+    layout.width = layout.columns = layout.height = kSide;
+    layout.rules = SampleRules::Of(dataset.band(), "");
+    layout.overview_factors = OverviewFactors(dataset.band());
+    ASSERT_EQ(layout.overview_factors, (std::vector<int>{2, 4, 8}));
+    // Level 8 of such a source.
+    const int factor = AveragingFactor(SamplesPerCell({8, 256}, {30, 30, 30, 0.5, true}));
+    ASSERT_EQ(factor, 8);
+    const GridAxis blocks(kSide, factor, false);
+    const auto heights = ReadGrid(dataset, layout, factor, {0, 0, blocks.count(), blocks.count()}, {});
+    ASSERT_TRUE(heights);
+    EXPECT_EQ(dataset.band().blocks_read, 0);
+    EXPECT_EQ(dataset.band().overviews[0]->blocks_read + dataset.band().overviews[1]->blocks_read, 0);
+    EXPECT_EQ(dataset.band().overviews[2]->blocks_read, 29 * 29);
+    for (std::int64_t c = 0; c < blocks.count(); ++c) {
+      // Beyond the last sample's centre it counts on.
+      const double last = kSide - 0.5 * kSide / sides[2].first;
+      ASSERT_NEAR((*heights)[static_cast<std::size_t>(7 * blocks.count() + c)],
+                  std::clamp(blocks.Center(c), kSide - last, last), 1e-3)
+          << c;
+    }
+  }
+}
+
+TEST(Overviews, OfOtherSidesAreLeftAlone) {
+  CountingDataset dataset(3601, 3601, {{1799, 1800}, {1802, 1801}, {1800, 1799}, {1200, 1200}});
+  EXPECT_TRUE(OverviewFactors(dataset.band()).empty());
+}
+
+// The largest distance of heights from the ramp, at nodes that lie this many pixels within its sides.
+double LargestOff(const DemSource& source, int level, int width, int height, double margin) {
+  const geo::Lattice lattice = source.LatticeOf(level);
+  const double step = lattice.StepDegrees();
+  const auto west = static_cast<std::int64_t>(std::ceil((10 + 180) / step)),
+             east = static_cast<std::int64_t>(std::floor((10 + width * kPixel + 180) / step));
+  const auto south = static_cast<std::int64_t>(std::ceil((47 - height * kPixel + 90) / step)),
+             north = static_cast<std::int64_t>(std::floor((47 + 90) / step));
+  const NodeWindow window{west, south, static_cast<int>(east - west + 1), static_cast<int>(north - south + 1)};
+  const auto heights = source.ReadNodes(level, window);
+  EXPECT_TRUE(heights);
+  double worst = 0;
+  for (std::int64_t j = south; j <= north; ++j) {
+    for (std::int64_t i = west; i <= east; ++i) {
+      const double column = (lattice.Longitude(i) - 10) / kPixel, row = (47 - lattice.Latitude(j)) / kPixel;
+      if (std::min({column, row, width - 1 - column, height - 1 - row}) < margin) continue;
+      const float read = (*heights)[static_cast<std::size_t>((j - south) * window.columns + (i - west))];
+      worst = std::max(worst, std::abs(read - Ramp(column, row)));
+    }
+  }
+  return worst;
+}
+
+// As GDAL writes them: heights lie where the ground lies.
+TEST(Overviews, OfCloudOptimizedGeoTiffsShowTheGroundWhereItIs) {
+  const TempDir dir;
+  RasterSpec spec = RampSpec(1001, 777);
+  spec.overviews = {};
+  const std::string path = dir.File("cog.tif");
+  {
+    const GDALDatasetUniquePtr original(GDALDataset::Open(WriteRaster(dir, spec).c_str()));
+    GDALDriver* const driver = GetGDALDriverManager()->GetDriverByName("COG");
+    ASSERT_NE(driver, nullptr);
+    const char* const options[] = {"BLOCKSIZE=128", "OVERVIEW_RESAMPLING=AVERAGE", nullptr};
+    GDALClose(driver->CreateCopy(path.c_str(), original.get(), 0, const_cast<char**>(options), nullptr, nullptr));
+    const GDALDatasetUniquePtr written(GDALDataset::Open(path.c_str()));
+    ASSERT_EQ(written->GetRasterBand(1)->GetOverview(0)->GetXSize(), 500);
+  }
+  const auto source = OpenOrFail(path);
+  ASSERT_NE(source, nullptr);
+  EXPECT_EQ(source->info().sources[0].overview_factors, (std::vector<int>{2, 4, 8}));
+  EXPECT_EQ(source->info().sources[0].overviews_unused, "");
+  for (int level = 2; level <= 7; ++level) {
+    EXPECT_LT(LargestOff(*source, level, 1001, 777, level < 3 ? 34 : 17), kSlack) << level;
+  }
+}
+
 TEST(Overviews, AWindowChangesNoBlock) {
   for (const bool around : {false, true}) {
     const TempDir dir;
@@ -142,29 +272,6 @@ TEST(Overviews, AWindowChangesNoBlock) {
       }
     }
   }
-}
-
-// The largest distance of heights from the ramp, at nodes that lie this many pixels within its sides.
-double LargestOff(const DemSource& source, int level, int width, int height, double margin) {
-  const geo::Lattice lattice = source.LatticeOf(level);
-  const double step = lattice.StepDegrees();
-  const auto west = static_cast<std::int64_t>(std::ceil((10 + 180) / step)),
-             east = static_cast<std::int64_t>(std::floor((10 + width * kPixel + 180) / step));
-  const auto south = static_cast<std::int64_t>(std::ceil((47 - height * kPixel + 90) / step)),
-             north = static_cast<std::int64_t>(std::floor((47 + 90) / step));
-  const NodeWindow window{west, south, static_cast<int>(east - west + 1), static_cast<int>(north - south + 1)};
-  const auto heights = source.ReadNodes(level, window);
-  EXPECT_TRUE(heights);
-  double worst = 0;
-  for (std::int64_t j = south; j <= north; ++j) {
-    for (std::int64_t i = west; i <= east; ++i) {
-      const double column = (lattice.Longitude(i) - 10) / kPixel, row = (47 - lattice.Latitude(j)) / kPixel;
-      if (std::min({column, row, width - 1 - column, height - 1 - row}) < margin) continue;
-      const float read = (*heights)[static_cast<std::size_t>((j - south) * window.columns + (i - west))];
-      worst = std::max(worst, std::abs(read - Ramp(column, row)));
-    }
-  }
-  return worst;
 }
 
 TEST(Overviews, ShallowTilesShowTheGroundWhereItIs) {
