@@ -143,7 +143,7 @@ struct Config {
 
   unsigned io_threads = 2;      // sockets only; everything that computes runs on workers
   unsigned worker_threads = 0;  // 0: one per processor
-  std::size_t queue_length = 256;
+  std::size_t queue_length = 10'000;
   std::size_t cache_bytes = std::size_t{256} << 20;             // 0: no cache
   std::size_t refinement_cache_bytes = std::size_t{128} << 20;  // 0: no cache
   DiskCacheConfig disk_cache;

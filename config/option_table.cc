@@ -103,7 +103,7 @@ const std::vector<Option<Config>>& ServerOptionTable() {
        Integer(&Config::worker_threads, 0, 1024)},
       {"cache_dir", "DIR", "Folder for what is learnt of sources once: a second start needs no scan; empty is none",
        CacheDir()},
-      {"queue_length", "N", "Builds that may wait for a worker; more get 503 with Retry-After",
+      {"queue_length", "N", "Builds that may wait for a worker; of more the newest of who has most get 503",
        Integer(&Config::queue_length, 1, 1'000'000)},
       {"cache_bytes", "BYTES", "Memory for finished tiles, such as 512MB or 1GiB; 0 is no cache",
        Bytes(&Config::cache_bytes, kMaxCacheBytes)},

@@ -26,7 +26,7 @@ struct ServerOptions {
   std::uint16_t port = 8080;                           // 0: any that is free
   unsigned io_threads = 0;                             // 0: a quarter of the processors, at least one
   unsigned worker_threads = 0;                         // 0: as many as processors
-  std::size_t queue_length = 256;                      // builds that wait for a worker
+  std::size_t queue_length = 10'000;                   // jobs that wait for a worker, of all clients
   std::size_t cache_bytes = std::size_t{256} << 20;    // of finished tiles; 0: none
   std::shared_ptr<DiskCache> disk_cache;               // of finished tiles, below memory; may be null
   std::function<ByteCacheStats()> refinement_stats;    // of what tiles are made from; may be empty

@@ -21,6 +21,9 @@ namespace {
 // else. A query of so many bytes holds a few points and is read in microseconds.
 constexpr std::size_t kQuickQuery = 256;
 
+// Points that are read as long work, for which not all workers may be taken: each may lie in a block of its own.
+constexpr std::size_t kShortList = 1000;
+
 // `type`: of the body's content; empty where there is none.
 Result<HeightsQuery> Parse(std::string_view query, std::string_view type, std::string_view body,
                            std::size_t max_locations) {
@@ -118,8 +121,8 @@ asio::awaitable<Response> HeightsHandler::Handle(Route route, Request request) c
     reply.bytes = Compress(std::move(reply.bytes), coding);
     return reply;
   };
-  const Result<TilePtr> reply =
-      co_await tiles_.Run(std::move(work), TileService::Length::kShort, deadline, request.client);
+  const auto length = query->points.size() > kShortList ? TileService::Length::kLong : TileService::Length::kShort;
+  const Result<TilePtr> reply = co_await tiles_.Run(std::move(work), length, deadline, request.client);
   if (!reply) co_return co_await BackendFailure(reply.error(), std::string(request.id), options_.refusal_delay);
   response.body = Body(*reply, &(*reply)->bytes);
   response.headers.emplace_back("Server-Timing", FormatServerTiming(CacheStatus::kMiss, (*reply)->times));

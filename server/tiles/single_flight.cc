@@ -50,19 +50,19 @@ void Wake(Waiter waiter) {
 
 // Everything but `stop` is guarded by SingleFlight::mutex_.
 struct SingleFlight::Flight {
-  explicit Flight(Clock::time_point d) : deadline(d) {}
-
-  const Clock::time_point deadline;
+  Clock::time_point deadline{};  // of the waiter that waits longest
   std::stop_source stop;
+  bool begun = false;
+  std::vector<std::weak_ptr<PoolJob>> jobs;  // one of each client, until one of them runs; the pool owns them
   std::vector<Waiter> waiters;
   std::optional<Result<TilePtr>> outcome;
 };
 
-// Holds one waiter's place; giving it back may stop the flight. Lives in Join's frame, so that the place is given back
-// however the coroutine ends.
+// Holds one waiter's place; giving it back may stop the flight and withdraw its jobs. Lives in Join's frame, so that
+// the place is given back however the coroutine ends.
 class SingleFlight::Seat {
  public:
-  Seat(SingleFlight& owner, CacheKey key, std::shared_ptr<Flight> flight, Waiter waiter)
+  Seat(SingleFlight& owner, CacheKey key, FlightPtr flight, Waiter waiter)
       : owner_(owner), key_(key), flight_(std::move(flight)), waiter_(std::move(waiter)) {}
   Seat(const Seat&) = delete;
   Seat& operator=(const Seat&) = delete;
@@ -71,32 +71,41 @@ class SingleFlight::Seat {
     std::erase(flight_->waiters, waiter_);
     if (!flight_->waiters.empty() || flight_->outcome) return;
     owner_.Forget(key_, flight_);
+    const auto jobs = std::exchange(flight_->jobs, {});
     lock.unlock();  // stopping runs the builder's callbacks
+    for (const auto& job : jobs) owner_.pool_.Withdraw(job.lock());
     flight_->stop.request_stop();
   }
 
  private:
   SingleFlight& owner_;
   const CacheKey key_;
-  const std::shared_ptr<Flight> flight_;
+  const FlightPtr flight_;
   const Waiter waiter_;
 };
 
 asio::awaitable<SingleFlight::Landing> SingleFlight::Join(CacheKey key, Build build, Clock::time_point deadline,
                                                           JobOrder order) {
   const auto executor = co_await asio::this_coro::executor;
-  const auto waiter = std::make_shared<asio::steady_timer>(executor);
+  const auto waiter = std::make_shared<asio::steady_timer>(executor, deadline);
   std::unique_lock lock(mutex_);
-  bool joined = false;
-  const Result<std::shared_ptr<Flight>> boarded = Board(key, std::move(build), deadline, order, &joined);
-  if (!boarded) co_return Landing(tl::unexpected(boarded.error()), joined);
-  const std::shared_ptr<Flight> flight = *boarded;
+  if (shut_down_) co_return Landing(MakeError(ErrorCode::kUnavailable, "the server is shutting down"), false);
+  const auto found = flights_.find(key);
+  const bool joined = found != flights_.end();
+  const FlightPtr flight = joined ? found->second : std::make_shared<Flight>();
   flight->waiters.push_back(waiter);
+  flight->deadline = std::max(flight->deadline, deadline);
+  if (!joined) flights_.emplace(key, flight);
+  const bool has_job = flight->begun || std::ranges::any_of(flight->jobs, [&](const auto& job) {
+                         const PoolJobPtr waiting = job.lock();
+                         return waiting && waiting->order.client == order.client;
+                       });
   lock.unlock();
   const Seat seat(*this, key, flight, waiter);
+  if (joined) joined_total_.fetch_add(1, std::memory_order_relaxed);
+  order.deadline = deadline;
+  if (!has_job) Launch(key, flight, std::move(build), order);
 
-  // Nobody waits past the flight's deadline, so then its last waiter leaves, and it stops.
-  waiter->expires_at(std::min(deadline, flight->deadline));
   boost::system::error_code ignored;  // landed, expired or cancelled: the outcome tells
   co_await waiter->async_wait(asio::redirect_error(asio::use_awaitable, ignored));
 
@@ -107,29 +116,51 @@ asio::awaitable<SingleFlight::Landing> SingleFlight::Join(CacheKey key, Build bu
   co_return Landing(std::move(*outcome), joined);
 }
 
-// Finds the flight of `key` or starts one. mutex_ is held, so that nobody can board a flight the pool refused.
-Result<std::shared_ptr<SingleFlight::Flight>> SingleFlight::Board(const CacheKey& key, Build build,
-                                                                  Clock::time_point deadline, JobOrder order,
-                                                                  bool* joined) {
-  if (shut_down_) return MakeError(ErrorCode::kUnavailable, "the server is shutting down");
-  if (const auto found = flights_.find(key); found != flights_.end()) {
-    *joined = true;
-    joined_total_.fetch_add(1, std::memory_order_relaxed);
-    return found->second;
+// mutex_ is not held: the pool may displace another flight's job.
+void SingleFlight::Launch(const CacheKey& key, const FlightPtr& flight, Build build, JobOrder order) {
+  PoolJobPtr job;
+  Result<void> submitted;
+  try {
+    job = std::make_shared<PoolJob>();
+    job->order = order;
+    job->run = [this, key, flight, build = std::move(build)] { Fly(key, flight, build); };
+    job->displaced = [this, key, flight, self = job.get()] {
+      Fail(key, flight, self, Error{ErrorCode::kOverloaded, NameOf(key) + ": displaced from the full queue of work"});
+    };
+    {
+      const std::lock_guard lock(mutex_);
+      flight->jobs.push_back(job);
+    }
+    submitted = pool_.Submit(job);
+  } catch (const std::exception&) {
+    submitted = tl::unexpected(Error{ErrorCode::kUnavailable, "no memory"});
   }
-  auto flight = std::make_shared<Flight>(deadline);
-  auto job = [this, key, flight, build = std::move(build)] { Fly(key, flight, build); };
-  if (!pool_.TrySubmit(std::move(job), order)) {
-    return MakeError(ErrorCode::kOverloaded, "{}: the queue of builds is full", NameOf(key));
+  if (!submitted) Fail(key, flight, job.get(), std::move(submitted.error()));
+}
+
+// `job` will not run. Those who wait share the failure unless another client's job is to build for them.
+void SingleFlight::Fail(const CacheKey& key, const FlightPtr& flight, const PoolJob* job, Error error) {
+  {
+    const std::lock_guard lock(mutex_);
+    std::erase_if(flight->jobs, [job](const auto& known) { return known.expired() || known.lock().get() == job; });
+    if (flight->begun || !flight->jobs.empty()) return;
   }
-  flights_.emplace(key, flight);
-  return flight;
+  Land(key, flight, tl::unexpected(std::move(error)));
 }
 
 // On a worker thread.
-void SingleFlight::Fly(const CacheKey& key, const std::shared_ptr<Flight>& flight, const Build& build) {
-  Result<TilePtr> outcome = Outcome(key, build, flight->stop.get_token());
+void SingleFlight::Fly(const CacheKey& key, const FlightPtr& flight, const Build& build) {
+  std::vector<std::weak_ptr<PoolJob>> others;
+  {
+    const std::lock_guard lock(mutex_);
+    if (std::exchange(flight->begun, true) || flight->outcome) return;  // another client's turn came before
+    others.swap(flight->jobs);
+  }
+  for (const auto& job : others) pool_.Withdraw(job.lock());
+  Land(key, flight, Outcome(key, build, flight->stop.get_token()));
+}
 
+void SingleFlight::Land(const CacheKey& key, const FlightPtr& flight, Result<TilePtr> outcome) {
   std::vector<Waiter> waiters;
   {
     const std::lock_guard lock(mutex_);
@@ -141,7 +172,7 @@ void SingleFlight::Fly(const CacheKey& key, const std::shared_ptr<Flight>& fligh
   for (Waiter& waiter : waiters) Wake(std::move(waiter));
 }
 
-void SingleFlight::Forget(const CacheKey& key, const std::shared_ptr<Flight>& flight) {
+void SingleFlight::Forget(const CacheKey& key, const FlightPtr& flight) {
   const auto found = flights_.find(key);
   if (found != flights_.end() && found->second == flight) flights_.erase(found);
 }

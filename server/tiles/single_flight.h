@@ -4,8 +4,12 @@
 // for the same outcome. Outcomes, failures too, go to everybody who waits and are forgotten here; keeping the good ones
 // is the cache's work.
 //
-// A flight is told to stop when its last waiter leaves, at its deadline (that of the request that started it), or at
-// shutdown. A stopped flight takes no more passengers; the next request starts a new one.
+// Each client that waits for a flight has a job for it in the pool's queue, and the first whose turn comes builds:
+// nobody waits longer because somebody else asked before.
+//
+// A flight is told to stop when its last waiter leaves, which each does at its own deadline at the latest, or at
+// shutdown; its jobs leave the queue then. A stopped flight takes no more passengers; the next
+// request starts a new one.
 //
 // Thread-safe, with one condition: a coroutine that waits in Join runs on a single thread (or a strand).
 #pragma once
@@ -46,8 +50,8 @@ class SingleFlight {
   SingleFlight& operator=(const SingleFlight&) = delete;
 
   // Waits for the flight of `key`, which runs `build` in its `order` if it has to be started. An exception of `build`
-  // counts as kUnavailable. kOverloaded: the pool's queue is full. kCancelled: `deadline` or the flight's own passed,
-  // or the awaiting coroutine was cancelled. kUnavailable: shutting down. Otherwise whatever `build` returned.
+  // counts as kUnavailable. kOverloaded: the pool has refused or displaced the flight's job. kCancelled: `deadline`
+  // passed, or the awaiting coroutine was cancelled. kUnavailable: shutting down. Otherwise whatever `build` returned.
   asio::awaitable<Landing> Join(CacheKey key, Build build, Clock::time_point deadline, JobOrder order = {});
 
   // Stops every flight and starts no more.
@@ -60,14 +64,17 @@ class SingleFlight {
   struct Flight;
   class Seat;
 
-  Result<std::shared_ptr<Flight>> Board(const CacheKey& key, Build build, Clock::time_point deadline, JobOrder order,
-                                        bool* joined);
-  void Fly(const CacheKey& key, const std::shared_ptr<Flight>& flight, const Build& build);
-  void Forget(const CacheKey& key, const std::shared_ptr<Flight>& flight);  // mutex_ is held
+  using FlightPtr = std::shared_ptr<Flight>;
+
+  void Launch(const CacheKey& key, const FlightPtr& flight, Build build, JobOrder order);
+  void Fly(const CacheKey& key, const FlightPtr& flight, const Build& build);
+  void Fail(const CacheKey& key, const FlightPtr& flight, const PoolJob* job, Error error);
+  void Land(const CacheKey& key, const FlightPtr& flight, Result<TilePtr> outcome);
+  void Forget(const CacheKey& key, const FlightPtr& flight);  // mutex_ is held
 
   WorkerPool& pool_;
   mutable std::mutex mutex_;
-  std::unordered_map<CacheKey, std::shared_ptr<Flight>, CacheKeyHash> flights_;  // those that take passengers
+  std::unordered_map<CacheKey, FlightPtr, CacheKeyHash> flights_;  // those that take passengers
   bool shut_down_ = false;
   std::atomic<std::uint64_t> joined_total_{0};
 };

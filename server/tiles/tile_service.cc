@@ -1,6 +1,5 @@
 #include "server/tiles/tile_service.h"
 
-#include <algorithm>
 #include <exception>
 #include <memory>
 #include <string>
@@ -67,7 +66,10 @@ asio::awaitable<Result<ServedTile>> TileService::Get(CatalogPtr catalog, TileReq
                                asked = Clock::now()](std::stop_token stop) {
     return BuildAndKeep(*catalog, request, key, asked, std::move(stop));
   };
-  SingleFlight::Landing landing = co_await flights_.Join(key, std::move(build), deadline, {client, request.key.level});
+  JobOrder order;
+  order.client = client;
+  order.level = request.key.level;
+  SingleFlight::Landing landing = co_await flights_.Join(key, std::move(build), deadline, order);
   if (!landing.joined) misses_.fetch_add(1, std::memory_order_relaxed);
   if (!landing.tile) co_return tl::unexpected(std::move(landing.tile.error()));
   const CacheStatus found = (*landing.tile)->from_disk ? CacheStatus::kDisk : CacheStatus::kMiss;
@@ -97,53 +99,20 @@ Result<TilePtr> TileService::BuildAndKeep(const Catalog& catalog, const TileRequ
   return tile;
 }
 
-// One of those that may do long work at once. Ends once: when it is told to, or else, of work that never ran, with the
-// last copy of it.
-class TileService::LongTurn {
- public:
-  explicit LongTurn(std::atomic<unsigned>& under_way) : under_way_(under_way) {}
-  ~LongTurn() { End(); }
-  LongTurn(const LongTurn&) = delete;
-  LongTurn& operator=(const LongTurn&) = delete;
-
-  void End() {
-    if (!ended_.exchange(true)) under_way_.fetch_sub(1);
-  }
-
- private:
-  std::atomic<unsigned>& under_way_;
-  std::atomic<bool> ended_{false};
-};
-
-// Nothing where there are too many.
-std::shared_ptr<TileService::LongTurn> TileService::BeginLong() {
-  const unsigned most = std::max(pool_.threads(), 2U) - 1;
-  unsigned under_way = long_under_way_.load();
-  do {
-    if (under_way >= most) return nullptr;
-  } while (!long_under_way_.compare_exchange_weak(under_way, under_way + 1));
-  return std::make_shared<LongTurn>(long_under_way_);
-}
-
 asio::awaitable<Result<TilePtr>> TileService::Run(SingleFlight::Work work, Length length, Clock::time_point deadline,
                                                   std::uint64_t client) {
-  std::shared_ptr<LongTurn> turn;
-  if (length == Length::kLong) {
-    turn = BeginLong();
-    if (!turn) co_return MakeError(ErrorCode::kOverloaded, "as much long work is under way as may be");
-  }
   CacheKey key;
   key.solo = 1 + solos_.fetch_add(1, std::memory_order_relaxed);
-  SingleFlight::Build build = [work = std::move(work), turn = std::move(turn),
-                               asked = Clock::now()](std::stop_token stop) -> Result<TilePtr> {
+  SingleFlight::Build build = [work = std::move(work), asked = Clock::now()](std::stop_token stop) -> Result<TilePtr> {
     Result<EncodedTile> made = RunWork(work, "work for one request", asked, std::move(stop));
-    // Before the client can have its answer: its next request finds the place free.
-    if (turn) turn->End();
     if (!made) return tl::unexpected(std::move(made.error()));
     return std::make_shared<const EncodedTile>(*std::move(made));
   };
-  SingleFlight::Landing landing =
-      co_await flights_.Join(key, std::move(build), deadline, {client, length == Length::kLong ? kAfterTiles : 0});
+  JobOrder order;
+  order.client = client;
+  order.is_long = length == Length::kLong;
+  order.level = order.is_long ? kAfterTiles : 0;
+  SingleFlight::Landing landing = co_await flights_.Join(key, std::move(build), deadline, order);
   co_return std::move(landing.tile);
 }
 

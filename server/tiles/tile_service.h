@@ -29,7 +29,7 @@ using BuildObserver = std::function<void(const DatasetView&, const Result<TilePt
 
 struct TileServiceOptions {
   unsigned worker_threads = 0;                       // 0: as many as the machine has processors
-  std::size_t queue_length = 256;                    // builds that wait for a worker; one more is refused
+  std::size_t queue_length = 10'000;                 // jobs that wait for a worker, of all clients
   std::size_t cache_bytes = std::size_t{256} << 20;  // 0: no cache
   std::shared_ptr<DiskCache> disk;                   // null: none
 };
@@ -61,8 +61,8 @@ class TileService {
                                           std::uint64_t client = 0);
 
   // Runs `work` on a worker for this caller alone: nothing is shared or kept. Errors and conditions as those of Get. An
-  // exception of `work` counts as kUnavailable. Long work is refused (kOverloaded) as soon as it has all workers but
-  // one, of several: tiles go on being served beside it.
+  // exception of `work` counts as kUnavailable. Long work has at most all workers but one, of several, and waits until
+  // it may: tiles go on being served beside it.
   enum class Length { kShort, kLong };
   asio::awaitable<Result<TilePtr>> Run(SingleFlight::Work work, Length length, Clock::time_point deadline,
                                        std::uint64_t client = 0);
@@ -88,8 +88,6 @@ class TileService {
  private:
   Result<TilePtr> BuildAndKeep(const Catalog& catalog, const TileRequest& request, const CacheKey& key,
                                Clock::time_point asked, std::stop_token stop);
-  class LongTurn;
-  std::shared_ptr<LongTurn> BeginLong();
 
   const BuildObserver observer_;
   TileCache cache_;
@@ -97,7 +95,6 @@ class TileService {
   WorkerPool pool_;
   SingleFlight flights_;
   std::atomic<std::uint64_t> hits_{0}, misses_{0}, solos_{0};
-  std::atomic<unsigned> long_under_way_{0};
 };
 
 }  // namespace terrace::server

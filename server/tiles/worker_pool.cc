@@ -4,19 +4,12 @@
 #include <utility>
 
 namespace terrace::server {
-namespace {
 
-// Jobs of a client that may wait for each place that is left: a single one gets two thirds of the queue.
-constexpr std::size_t kShare = 2;
-
-// A job goes before one of the next deeper level that has waited for this long.
-constexpr std::chrono::milliseconds kAgeOfLevel{100};
-
-}  // namespace
-
-WorkerPool::WorkerPool(unsigned threads, std::size_t queue_length)
+WorkerPool::WorkerPool(unsigned threads, std::size_t queue_length, Now now)
     : thread_count_(threads > 0 ? threads : std::max(1u, std::thread::hardware_concurrency())),
       queue_length_(queue_length),
+      now_(std::move(now)),
+      queue_(thread_count_),
       idle_(thread_count_) {
   threads_.reserve(thread_count_);
   for (unsigned i = 0; i < thread_count_; ++i) threads_.emplace_back([this] { Run(); });
@@ -24,35 +17,30 @@ WorkerPool::WorkerPool(unsigned threads, std::size_t queue_length)
 
 WorkerPool::~WorkerPool() { Shutdown(); }
 
-bool WorkerPool::TrySubmit(std::function<void()> job, JobOrder order) {
+Result<void> WorkerPool::Submit(PoolJobPtr job) {
+  PoolJobPtr displaced;
   {
     const std::lock_guard lock(mutex_);
-    if (shut_down_ || !HasPlace(order.client)) return false;
-    queue_[order.client].emplace(std::chrono::steady_clock::now() + order.level * kAgeOfLevel, std::move(job));
-    ++queued_;
+    if (shut_down_) return MakeError(ErrorCode::kUnavailable, "the server is shutting down");
+    const JobClock::time_point now = now_();
+    // Compared as seconds: a deadline may be the last time there is.
+    if (queue_.ExpectedWait(job->order, now) > std::chrono::duration<double>(job->order.deadline - now)) {
+      return MakeError(ErrorCode::kOverloaded, "too much work is waiting to begin with this before its deadline");
+    }
+    queue_.Push(job, now);
+    // Jobs that an idle thread is about to fetch are not waiting: a pool with queue length 0 still works.
+    if (queue_.size() > queue_length_ + idle_) displaced = queue_.RemoveNewestOfLargest();
+    if (displaced == job) return MakeError(ErrorCode::kOverloaded, "the queue of work is full");
   }
   wake_.notify_one();
-  return true;
+  if (displaced && displaced->displaced) displaced->displaced();
+  return {};
 }
 
-bool WorkerPool::HasPlace(std::uint64_t client) const {
-  // Jobs that an idle thread is about to fetch are not waiting: a pool with queue length 0 still works.
-  const std::size_t places = queue_length_ + idle_;
-  if (queued_ >= places) return false;
-  const auto own = queue_.find(client);
-  return client == 0 || own == queue_.end() || own->second.size() <= kShare * (places - queued_);
-}
-
-WorkerPool::Job WorkerPool::TakeNext() {
-  auto client = queue_.upper_bound(last_client_);
-  if (client == queue_.end()) client = queue_.begin();
-  auto& [key, jobs] = *client;
-  last_client_ = key;
-  Job job = std::move(jobs.begin()->second);
-  jobs.erase(jobs.begin());
-  if (jobs.empty()) queue_.erase(client);
-  --queued_;
-  return job;
+void WorkerPool::Withdraw(const PoolJobPtr& job) {
+  if (!job) return;
+  const std::lock_guard lock(mutex_);
+  queue_.Remove(job);
 }
 
 void WorkerPool::Shutdown() {
@@ -68,21 +56,23 @@ void WorkerPool::Shutdown() {
 
 std::size_t WorkerPool::queued() const {
   const std::lock_guard lock(mutex_);
-  return queued_;
+  return queue_.size();
 }
 
 void WorkerPool::Run() {
   std::unique_lock lock(mutex_);
   for (;;) {
-    wake_.wait(lock, [this] { return shut_down_ || queued_ > 0; });
-    if (queued_ == 0) return;
-    Job job = TakeNext();
+    wake_.wait(lock, [this] { return shut_down_ || queue_.HasNext(); });
+    PoolJobPtr job = queue_.Take(now_(), /*all=*/shut_down_);
+    if (!job) return;  // shut down
     --idle_;
     lock.unlock();
-    job();
-    job = nullptr;  // what it holds is released outside the lock
+    job->run();
+    job->run = nullptr;  // what it holds is released outside the lock
+    job->displaced = nullptr;
     lock.lock();
     ++idle_;
+    queue_.Finish(job, now_());
   }
 }
 

@@ -1,41 +1,40 @@
-// The threads that compute and read files, behind a queue of bounded length.
+// The threads that compute and read files, behind one queue in which clients take turns (FairQueue).
 //
-// Clients take turns, however many jobs one of them has waiting, and a client's own jobs go by their level and age. No
-// client fills the queue: it may have twice as many jobs waiting as there are places left (dynamic thresholds:
-// Choudhury and Hahne, IEEE/ACM Transactions on Networking 6(2), 1998), so that there is one for whoever comes next.
+// A job waits; it is refused only where it would have to wait past its deadline, or where more wait than the bound, and
+// then it is the newest job of the client that has most waiting. Whoever has nothing to wait for any more withdraws its
+// job.
 //
-// Thread-safe. A job that was taken is run, also during shutdown; a job that finds no place is refused, so that the
-// time a request waits is bounded by configuration and not by load.
+// Thread-safe. A job that was taken is run, also during shutdown.
 #pragma once
 
-#include <chrono>
 #include <condition_variable>
 #include <cstddef>
-#include <cstdint>
 #include <functional>
-#include <map>
 #include <mutex>
 #include <thread>
 #include <vector>
 
-namespace terrace::server {
+#include "engine/core/result.h"
+#include "server/tiles/fair_queue.h"
 
-struct JobOrder {
-  std::uint64_t client = 0;  // whose turn it takes; 0: nobody's in particular, which may fill the queue
-  int level = 0;             // of the client's jobs a lower one goes first, if it comes soon after: shallow tiles
-                             // cover what deep ones refine, but must not keep them waiting for ever
-};
+namespace terrace::server {
 
 class WorkerPool {
  public:
-  // `threads` 0 means as many as the machine has processors. `queue_length` counts the jobs that wait for a thread.
-  WorkerPool(unsigned threads, std::size_t queue_length);
+  using Now = std::function<JobClock::time_point()>;
+
+  // `threads` 0 means as many as the machine has processors. `queue_length` bounds the jobs that wait for a thread.
+  WorkerPool(unsigned threads, std::size_t queue_length, Now now = JobClock::now);
   ~WorkerPool();
   WorkerPool(const WorkerPool&) = delete;
   WorkerPool& operator=(const WorkerPool&) = delete;
 
-  // False: there is no place in the queue or the pool is shut down, and `job` will not run. Jobs must not throw.
-  [[nodiscard]] bool TrySubmit(std::function<void()> job, JobOrder order = {});
+  // kOverloaded: the job cannot begin before its deadline, or there is no place for it. kUnavailable: the pool is shut
+  // down. It will not run then. May call another job's `displaced`.
+  Result<void> Submit(PoolJobPtr job);
+
+  // A job that still waits never runs. Null: nothing to do.
+  void Withdraw(const PoolJobPtr& job);
 
   // Takes no more jobs, runs those it has and joins the threads. May be called twice; not from a job.
   void Shutdown();
@@ -44,21 +43,15 @@ class WorkerPool {
   unsigned threads() const { return thread_count_; }
 
  private:
-  using Job = std::function<void()>;
-
   void Run();
-  bool HasPlace(std::uint64_t client) const;  // mutex_ is held, as for the next one
-  Job TakeNext();
 
   const unsigned thread_count_;
   const std::size_t queue_length_;
+  const Now now_;
   mutable std::mutex mutex_;
   std::condition_variable wake_;
-  // Client -> when its jobs would have come if a level were an age -> jobs, oldest first; none is empty.
-  std::map<std::uint64_t, std::multimap<std::chrono::steady_clock::time_point, Job>> queue_;
-  std::size_t queued_ = 0;         // jobs in queue_
-  std::uint64_t last_client_ = 0;  // whose job was taken last
-  unsigned idle_ = 0;              // threads without a job
+  FairQueue queue_;
+  unsigned idle_ = 0;  // threads without a job
   bool shut_down_ = false;
   std::vector<std::thread> threads_;
 };

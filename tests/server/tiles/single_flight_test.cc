@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <boost/asio/bind_cancellation_slot.hpp>
 #include <boost/asio/cancellation_signal.hpp>
@@ -11,6 +12,7 @@
 #include <exception>
 #include <future>
 #include <latch>
+#include <mutex>
 #include <thread>
 #include <vector>
 
@@ -37,9 +39,34 @@ class SingleFlightTest : public testing::Test {
     asio::co_spawn(io_, flights_.Join(CacheKey(), std::move(build), deadline),
                    asio::bind_cancellation_slot(slot, keep));
   }
+  void JoinAs(CacheKey key, JobOrder order, SingleFlight::Build build,
+              asio::cancellation_slot slot = asio::cancellation_slot()) {
+    auto keep = [this](std::exception_ptr, SingleFlight::Landing landing) { landings_.push_back(std::move(landing)); };
+    asio::co_spawn(io_, flights_.Join(key, std::move(build), Soon(), order), asio::bind_cancellation_slot(slot, keep));
+  }
+  // As jobs of the first client.
+  void HoldWorkers(const std::shared_future<void>& open) {
+    std::latch begun(pool_.threads());
+    for (unsigned i = 0; i < pool_.threads(); ++i) {
+      auto job = std::make_shared<PoolJob>();
+      job->order.client = 1;
+      job->run = [&begun, open] {
+        begun.count_down();
+        open.wait();
+      };
+      ASSERT_TRUE(pool_.Submit(job));
+    }
+    begun.wait();
+  }
+  static CacheKey CacheKeyOf(std::size_t i) {
+    CacheKey key;
+    key.request.key.x = static_cast<std::int64_t>(i);
+    return key;
+  }
+  static std::shared_future<void> GateOf(std::promise<void>& gate) { return gate.get_future().share(); }
   static SingleFlight::Clock::time_point Soon() { return SingleFlight::Clock::now() + 10s; }
 
-  WorkerPool pool_{2, 4};
+  WorkerPool pool_{2, 10'000};
   SingleFlight flights_{pool_};
   asio::io_context io_{1};
   std::vector<SingleFlight::Landing> landings_;
@@ -121,7 +148,7 @@ TEST_F(SingleFlightTest, StopsWhenTheLastWaiterLeaves) {
   EXPECT_TRUE(stopped.get_future().get());
 }
 
-TEST_F(SingleFlightTest, StopsAtItsDeadline) {
+TEST_F(SingleFlightTest, StopsAtTheDeadlineOfWhoWaitsLongest) {
   std::promise<bool> stopped;
   Join(
       [&](std::stop_token stop) -> Result<TilePtr> {
@@ -129,12 +156,111 @@ TEST_F(SingleFlightTest, StopsAtItsDeadline) {
         return MakeError(ErrorCode::kCancelled, "stopped");
       },
       SingleFlight::Clock::now() + 50ms);
-  // A passenger with more time does not keep it in the air.
-  Join([](std::stop_token) -> Result<TilePtr> { return SomeTile(); }, Soon());
+  Join([](std::stop_token) -> Result<TilePtr> { return SomeTile(); }, SingleFlight::Clock::now() + 80ms);
   io_.run();
   ASSERT_EQ(landings_.size(), 2u);
   for (const auto& landing : landings_) EXPECT_EQ(landing.tile.error().code, ErrorCode::kCancelled);
   EXPECT_TRUE(stopped.get_future().get());
+}
+
+TEST_F(SingleFlightTest, ALateJoinerHasItsWholeDeadline) {
+  std::promise<void> gate;
+  const auto build = [open = gate.get_future().share()](std::stop_token stop) -> Result<TilePtr> {
+    open.wait();
+    if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "stopped");
+    return SomeTile();
+  };
+  Join(build, SingleFlight::Clock::now() + 50ms);
+  Join(build, SingleFlight::Clock::now() + 1h);
+  while (landings_.empty()) io_.run_one();  // the first gives up
+  EXPECT_EQ(landings_[0].tile.error().code, ErrorCode::kCancelled);
+  gate.set_value();
+  io_.run();
+  ASSERT_EQ(landings_.size(), 2u);
+  EXPECT_TRUE(landings_[1].joined);
+  EXPECT_TRUE(landings_[1].tile) << "the deadline is not the first one's";
+}
+
+TEST_F(SingleFlightTest, WhoLeavesTakesItsJobOutOfTheQueue) {
+  std::promise<void> gate;
+  std::atomic<int> builds{0};
+  HoldWorkers(GateOf(gate));
+  std::vector<asio::cancellation_signal> leave(240);
+  for (std::size_t i = 0; i < leave.size(); ++i) {
+    JoinAs(
+        CacheKeyOf(i), {i % 7 + 1, static_cast<int>(i % 15)},
+        [&](std::stop_token) -> Result<TilePtr> {
+          ++builds;
+          return SomeTile();
+        },
+        leave[i].slot());
+  }
+  io_.poll();
+  EXPECT_EQ(pool_.queued(), 240u);
+  for (auto& signal : leave) signal.emit(asio::cancellation_type::terminal);
+  io_.restart();
+  io_.run();
+  EXPECT_EQ(pool_.queued(), 0u);
+  EXPECT_EQ(flights_.in_flight(), 0u);
+  gate.set_value();
+  pool_.Shutdown();
+  EXPECT_EQ(builds, 0);
+}
+
+TEST_F(SingleFlightTest, WhoJoinsWaitsInItsOwnTurn) {
+  std::promise<void> gate;
+  HoldWorkers(GateOf(gate));
+  std::mutex mutex;
+  std::vector<std::size_t> built;
+  const auto note = [&](std::size_t i) {
+    return [&, i](std::stop_token) -> Result<TilePtr> {
+      const std::lock_guard lock(mutex);
+      built.push_back(i);
+      return SomeTile();
+    };
+  };
+  for (std::size_t i = 0; i < 100; ++i) JoinAs(CacheKeyOf(i), {1, 0}, note(i));
+  JoinAs(CacheKeyOf(99), {2, 0}, note(99));
+  io_.poll();
+  EXPECT_EQ(pool_.queued(), 101u);
+  gate.set_value();
+  io_.restart();
+  io_.run();
+  ASSERT_EQ(built.size(), 100u) << "once each";
+  EXPECT_LT(std::ranges::find(built, 99u) - built.begin(), 2) << "the second client is served next";
+  EXPECT_EQ(pool_.queued(), 0u);
+}
+
+TEST_F(SingleFlightTest, TellsWhomTheQueueDisplaces) {
+  WorkerPool small(1, 1);
+  SingleFlight flights(small);
+  std::promise<void> gate;
+  const auto wait = [open = GateOf(gate)](std::stop_token) -> Result<TilePtr> {
+    open.wait();
+    return SomeTile();
+  };
+  std::vector<Result<TilePtr>> ends;
+  const auto join = [&](std::size_t i, std::uint64_t client) {
+    JobOrder order;
+    order.client = client;
+    asio::co_spawn(io_, flights.Join(CacheKeyOf(i), wait, Soon(), order),
+                   [&](std::exception_ptr, SingleFlight::Landing landing) { ends.push_back(std::move(landing.tile)); });
+    io_.poll();
+    io_.restart();
+  };
+  join(0, 1);
+  while (small.queued() > 0) std::this_thread::yield();
+  join(1, 1);
+  join(2, 1);
+  ASSERT_EQ(ends.size(), 1u) << "the newest of the one client";
+  EXPECT_EQ(ends[0].error().code, ErrorCode::kOverloaded);
+  join(3, 2);
+  io_.poll();
+  gate.set_value();
+  io_.restart();
+  io_.run();
+  small.Shutdown();
+  ASSERT_EQ(ends.size(), 4u);
 }
 
 TEST_F(SingleFlightTest, StopsEverythingAtShutdown) {
@@ -164,7 +290,7 @@ TEST_F(SingleFlightTest, RefusesWhatThePoolRefuses) {
   Join([](std::stop_token) -> Result<TilePtr> { return SomeTile(); }, Soon());
   io_.run();
   ASSERT_EQ(landings_.size(), 1u);
-  EXPECT_EQ(landings_[0].tile.error().code, ErrorCode::kOverloaded);
+  EXPECT_EQ(landings_[0].tile.error().code, ErrorCode::kUnavailable);
   EXPECT_EQ(flights_.in_flight(), 0u);
 }
 

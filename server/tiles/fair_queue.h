@@ -1,0 +1,114 @@
+// The order in which the jobs of many clients are run: fair queueing by measured time.
+//
+// The client that has used the least of the workers' time is served next. Time is virtual, as in A. Demers, S. Keshav
+// and S. Shenker, "Analysis and simulation of a fair queueing algorithm", SIGCOMM 1989: it advances by the time of each
+// job divided by the number of clients that have jobs, and a client that had none starts at the present, so that being
+// idle earns nothing. Jobs cannot be interrupted, so a client's share is exact only over several of its jobs.
+//
+// Not thread-safe.
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <vector>
+
+namespace terrace::server {
+
+using JobClock = std::chrono::steady_clock;
+
+struct JobOrder {
+  std::uint64_t client = 0;
+  int level = 0;  // of the client's jobs a lower one goes first, if it comes soon after: shallow tiles cover what
+                  // deep ones refine, but must not keep them waiting for ever
+  bool is_long = false;  // takes seconds: a bounded number of these runs at a time
+  JobClock::time_point deadline = JobClock::time_point::max();  // of the wait
+};
+
+// A job that waits or runs. Its functions must not throw.
+struct PoolJob {
+  std::function<void()> run;
+  std::function<void()> displaced;  // called instead of `run` where the job has to make room for others'; may be empty
+  JobOrder order;
+
+ private:
+  friend class FairQueue;
+  enum class State : std::uint8_t { kNew, kWaiting, kRunning, kDone };
+  State state = State::kNew;
+  JobClock::time_point key{};      // among the client's jobs
+  JobClock::time_point started{};  // once it runs
+  std::uint64_t number = 0;        // in the order of arrival
+  double expected_s = 0;
+};
+using PoolJobPtr = std::shared_ptr<PoolJob>;
+
+class FairQueue {
+ public:
+  // `threads` run the jobs, at least 1. Of several, one is kept from long jobs.
+  explicit FairQueue(unsigned threads);
+
+  void Push(PoolJobPtr job, JobClock::time_point now);
+
+  // The next job, which runs from now on. Null: there is none, or only long ones that have to wait for others to end.
+  // `all`: nothing has to wait.
+  PoolJobPtr Take(JobClock::time_point now, bool all = false);
+  bool HasNext(bool all = false) const;
+
+  // A job of Take has ended.
+  void Finish(const PoolJobPtr& job, JobClock::time_point now);
+
+  // False: it does not wait (any more).
+  bool Remove(const PoolJobPtr& job);
+
+  // Removes the newest job of the client that has most waiting. Null: none waits.
+  PoolJobPtr RemoveNewestOfLargest();
+
+  // How long a new job of this order would wait for those before it, by the mean time that jobs of their kind took: its
+  // client's own, and as much work of each other client. What runs already is not counted, nor a kind that never ran.
+  std::chrono::duration<double> ExpectedWait(const JobOrder& order, JobClock::time_point now) const;
+
+  std::size_t size() const { return size_; }
+
+ private:
+  enum Length : std::uint8_t { kShort, kLong, kLengths };
+  using Waiting = std::multimap<JobClock::time_point, PoolJobPtr>;
+  struct Client {
+    std::array<Waiting, kLengths> waiting;
+    std::array<double, kLengths> expected_s{};  // of those waiting, in all
+    std::vector<JobClock::time_point> started;  // of those that run
+    double used_s = 0;                          // virtual time
+    std::uint64_t last_turn = 0;
+
+    bool active() const { return !started.empty() || !waiting[kShort].empty() || !waiting[kLong].empty(); }
+    double UsedAt(JobClock::time_point now) const;
+  };
+  using Clients = std::map<std::uint64_t, Client>;
+  struct Mean {
+    double seconds = 0;
+    unsigned samples = 0;
+  };
+
+  static constexpr std::size_t kKinds = 64;  // levels of tiles, and long jobs
+
+  static std::size_t KindOf(const JobOrder& order);
+  static Length LengthOf(const PoolJob& job) { return job.order.is_long ? kLong : kShort; }
+  bool MayRunLong(bool all) const { return all || long_running_ < max_long_; }
+  PoolJobPtr* FirstOf(Client& client, bool all) const;
+  void Erase(Client& client, const PoolJobPtr& job);
+  void Leave(Clients::iterator client);
+
+  const unsigned threads_, max_long_;
+  Clients clients_;  // those with jobs, and those that have used more than the present
+  std::array<Mean, kKinds> means_{};
+  double now_s_ = 0;  // virtual time
+  std::size_t size_ = 0, long_waiting_ = 0;
+  std::size_t active_ = 0;  // clients with jobs
+  unsigned long_running_ = 0;
+  std::uint64_t next_number_ = 1, next_turn_ = 1;
+};
+
+}  // namespace terrace::server

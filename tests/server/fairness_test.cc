@@ -1,0 +1,203 @@
+// Many clients and few workers, over HTTP: who waits, who is next, and who is refused.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <condition_variable>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "tests/server/server_fixture.h"
+
+namespace terrace::server {
+namespace {
+
+using namespace std::chrono_literals;
+
+// Clients are told apart by what a proxy says of them.
+std::string From(const std::string& client) { return "X-Forwarded-For: " + client + "\r\n"; }
+
+class Fairness : public ServerFixture {
+ protected:
+  // Workers stop in every piece of work until they are let go. Work is noted in the order in which it begins.
+  void StartHeld(ServerOptions options = {}) {
+    builder_ = [this](const TileRequest& request, std::stop_token stop) -> Result<EncodedTile> {
+      Begin(geo::ToString(request.key), stop);
+      EncodedTile tile;
+      tile.bytes = BodyOf(request);
+      tile.etag = "\"" + geo::ToString(request.key) + "\"";
+      return tile;
+    };
+    area_mesher_.plan = [](std::uint32_t, const AreaRequest&) -> Result<AreaPlan> { return AreaPlan(); };
+    area_mesher_.build = [this](std::uint32_t, const AreaPlan&, const AreaRequest& area,
+                                std::stop_token stop) -> Result<EncodedTile> {
+      Begin("mesh " + std::to_string(static_cast<int>(area.error_m)), stop);
+      return EncodedTile();
+    };
+    read_points_ = [this](std::uint32_t, std::span<const dem::GeoPosition> points, dem::HeightDatum,
+                          std::stop_token stop) -> Result<std::vector<float>> {
+      Begin("heights " + std::to_string(static_cast<int>(points[0].latitude)), stop);
+      return std::vector<float>(points.size());
+    };
+    options.request_deadline = 1h;
+    options.edge.trusted_proxies = {"127.0.0.1"};
+    options.edge.max_connections = 4000;
+    Start(options);
+  }
+  void TearDown() override {
+    LetAllGo();
+    ServerFixture::TearDown();
+  }
+
+  RawClient& Send(const std::string& request) {
+    clients_.push_back(std::make_unique<RawClient>(port()));
+    clients_.back()->Send(request);
+    return *clients_.back();
+  }
+  int StatusOf(RawClient& client) {
+    const auto reply = client.Read();
+    return reply ? reply->status : 0;
+  }
+  void LetOneGo() {
+    const std::lock_guard lock(mutex_);
+    ++let_go_;
+    changed_.notify_all();
+  }
+  void LetAllGo() {
+    const std::lock_guard lock(mutex_);
+    all_ = true;
+    changed_.notify_all();
+  }
+  std::vector<std::string> Begun() {
+    const std::lock_guard lock(mutex_);
+    return begun_;
+  }
+  long Gauge(const std::string& name) {
+    const std::string text = "\n" + Fetch(port(), "/metrics").body;
+    return std::stol(text.substr(text.find("\n" + name + " ") + name.size() + 2));
+  }
+  bool Waiting(long jobs) {
+    return Eventually([&] { return Gauge("terrace_queue_length") == jobs; });
+  }
+  // The two workers are held, and `asked` is what the polite client's request is called when it begins: it must be the
+  // next after one of them.
+  void ExpectNext(RawClient& polite, const std::string& asked) {
+    LetOneGo();
+    ASSERT_TRUE(Eventually([&] { return Begun().size() == 3; }));
+    EXPECT_EQ(Begun()[2], asked);
+    LetAllGo();
+    EXPECT_EQ(StatusOf(polite), 200);
+    for (auto& client : clients_) {
+      EXPECT_TRUE(client.get() == &polite || StatusOf(*client) == 200);
+    }
+  }
+  static std::string Tile(int i) {
+    return "/maui/3/" + std::to_string(i % 16) + "/" + std::to_string(i / 16 % 8) +
+           ".terrain?fraction=" + std::to_string(0.05 * (1 << (i / 128)));
+  }
+  static std::string Post(const std::string& latitude, const std::string& fields) {
+    const std::string body = R"({"locations": ")" + latitude + R"(,7"})";
+    return "POST /maui/heights HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\nContent-Length: " +
+           std::to_string(body.size()) + "\r\n" + fields + "\r\n" + body;
+  }
+
+  std::vector<std::unique_ptr<RawClient>> clients_;
+
+ private:
+  void Begin(const std::string& what, const std::stop_token& stop) {
+    const std::stop_callback wake(stop, [this] { changed_.notify_all(); });
+    std::unique_lock lock(mutex_);
+    begun_.push_back(what);
+    changed_.wait(lock, [&] { return all_ || let_go_ > 0 || stop.stop_requested(); });
+    if (!all_ && let_go_ > 0) --let_go_;
+  }
+
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::vector<std::string> begun_;
+  int let_go_ = 0;
+  bool all_ = false;
+};
+
+TEST_F(Fairness, FourHundredAndEightyColdTilesOfOneClientAreAllServed) {
+  StartHeld();
+  for (int i = 0; i < 480; ++i) Send(Get(Tile(i)));
+  ASSERT_TRUE(Waiting(478));
+  LetAllGo();
+  for (auto& client : clients_) EXPECT_EQ(StatusOf(*client), 200);
+}
+
+TEST_F(Fairness, WhoLeavesLeavesTheQueue) {
+  StartHeld();
+  for (int i = 0; i < 242; ++i) Send(Get(Tile(i), From("192.0.2.1")));
+  ASSERT_TRUE(Waiting(240));
+  for (auto& client : clients_) client->Reset();
+  EXPECT_TRUE(Waiting(0));
+  EXPECT_EQ(StatusOf(Send(Get("/livez"))), 200);
+}
+
+TEST_F(Fairness, ATileIsNextBesideAFloodOfTiles) {
+  StartHeld();
+  for (int i = 0; i < 300; ++i) Send(Get(Tile(i), From("192.0.2.1")));
+  ASSERT_TRUE(Waiting(298));
+  RawClient& polite = Send(Get("/maui/2/1/1.terrain", From("192.0.2.2")));
+  ASSERT_TRUE(Waiting(299));
+  ExpectNext(polite, "2/1/1");
+}
+
+TEST_F(Fairness, ATileThatTheFloodAskedForIsNextAllTheSame) {
+  StartHeld();
+  for (int i = 0; i < 120; ++i) Send(Get(Tile(i), From("192.0.2.1")));
+  ASSERT_TRUE(Waiting(118));
+  RawClient& polite = Send(Get(Tile(100), From("192.0.2.2")));
+  ASSERT_TRUE(Waiting(119));
+  ExpectNext(polite, "3/4/6");
+}
+
+TEST_F(Fairness, HeightsAreNextBesideAFloodOfHeights) {
+  StartHeld();
+  for (int i = 0; i < 300; ++i) Send(Get("/maui/heights?locations=1,7", From("192.0.2.1")));
+  ASSERT_TRUE(Waiting(298));
+  RawClient& polite = Send(Get("/maui/heights?locations=2,7", From("192.0.2.2")));
+  ASSERT_TRUE(Waiting(299));
+  ExpectNext(polite, "heights 2");
+}
+
+TEST_F(Fairness, AMeshIsNextBesideAFloodOfMeshes) {
+  StartHeld();  // two workers, of which long work has one
+  const std::string mesh = "/maui/mesh?bbox=-157,20,-156,21&error=";
+  for (int i = 0; i < 12; ++i) Send(Get(mesh + "1", From("192.0.2.1")));
+  ASSERT_TRUE(Waiting(11));
+  EXPECT_EQ(Begun().size(), 1u) << "a worker is kept for tiles";
+  RawClient& polite = Send(Get(mesh + "2", From("192.0.2.2")));
+  ASSERT_TRUE(Waiting(12));
+  LetOneGo();
+  ASSERT_TRUE(Eventually([&] { return Begun().size() == 2; }));
+  EXPECT_EQ(Begun()[1], "mesh 2");
+  LetAllGo();
+  EXPECT_EQ(StatusOf(polite), 200);
+  for (auto& client : clients_) {
+    EXPECT_TRUE(client.get() == &polite || StatusOf(*client) == 200);
+  }
+}
+
+TEST_F(Fairness, LongListsOfPointsLeaveAWorkerForTiles) {
+  StartHeld();
+  std::string body = R"({"locations": ")";
+  for (int i = 0; i < 5000; ++i) body += "1,7|";
+  body += R"(1,7"})";
+  const std::string post = "POST /maui/heights HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\n" +
+                           From("192.0.2.1") + "Content-Length: " + std::to_string(body.size()) + "\r\n\r\n" + body;
+  for (int i = 0; i < 4; ++i) Send(post);
+  ASSERT_TRUE(Waiting(3));
+  RawClient& polite = Send(Get("/maui/0/0/0.terrain", From("192.0.2.2")));
+  ASSERT_TRUE(Eventually([&] { return Begun().size() == 2; }));
+  EXPECT_EQ(Begun()[1], "0/0/0");
+  LetAllGo();
+  EXPECT_EQ(StatusOf(polite), 200);
+}
+
+}  // namespace
+}  // namespace terrace::server
