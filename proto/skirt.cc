@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "engine/geo/ellipsoid.h"
+#include "engine/geo/error_ladder.h"
 
 namespace terrace::proto {
 
@@ -13,6 +14,10 @@ double SkirtDepth(int level, double error_m) {
   // A chord over the whole edge; but an edge's error counts what its chords cut off, so that none cuts off more.
   const double sagitta = std::min(edge * edge / (8 * kSmallestRadius), error_m);
   return error_m + 2 * error_m + sagitta;
+}
+
+double SkirtError(int level, int step, bool is_deepest, double error_fraction) {
+  return geo::LadderError(level, is_deepest ? std::min(step, 0) : step, error_fraction);
 }
 
 }  // namespace terrace::proto

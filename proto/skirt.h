@@ -8,7 +8,11 @@ namespace terrace::proto {
 // a tileset's root region must reach below the lowest height.
 //
 // The parent's error is taken as twice the tile's: at one `fraction` it is that, and at one `error` it is at most that,
-// whichever end of the ladder clamps (engine/geo/error_ladder.h).
+// whichever end of the ladder clamps (engine/geo/error_ladder.h). `error_m` is SkirtError of the request.
 double SkirtDepth(int level, double error_m);
+
+// Metres: the error that a tile's skirts are made for, the ladder error of its step. At a dataset's deepest level it is
+// at least the default error: `error=E&atleast=1` gives E there and the parent its default.
+double SkirtError(int level, int step, bool is_deepest, double error_fraction);
 
 }  // namespace terrace::proto

@@ -37,11 +37,12 @@ std::string WriteTileset(const DatasetView& dataset, const std::vector<proto::Tr
   tileset.roots = roots;
   const int level = tileset.roots.front().tile.level;
   // The roots have the largest error, and with it the deepest skirts and the coarsest rounding of heights.
-  const double error_m =
-      geo::LadderError(level, ErrorStep(wish, level, dataset.error_fraction), dataset.error_fraction);
-  const double rounding_m = error_m / 32;
+  const bool is_deepest = level == dataset.max_level();
+  const int step = ErrorStep(wish, level, is_deepest, dataset.error_fraction);
+  const double rounding_m = geo::LadderError(level, step, dataset.error_fraction) / 32;
+  const double skirt_error_m = proto::SkirtError(level, step, is_deepest, dataset.error_fraction);
   tileset.min_height_m =
-      std::min(dataset.min_height_m, dataset.floor_m) - proto::SkirtDepth(level, error_m) - rounding_m;
+      std::min(dataset.min_height_m, dataset.floor_m) - proto::SkirtDepth(level, skirt_error_m) - rounding_m;
   tileset.max_height_m = std::max(dataset.max_height_m, dataset.floor_m) + rounding_m;
   tileset.content_query = std::move(content_query);
   tileset.subtree_query = std::move(subtree_query);

@@ -78,7 +78,7 @@ proto::TileExtensions WantedExtensions(std::string_view accept, const std::vecto
   return wanted;
 }
 
-int ErrorStep(const ErrorWish& wish, int level, double error_fraction) {
+int ErrorStep(const ErrorWish& wish, int level, bool is_deepest, double error_fraction) {
   if (wish.fraction) {
     // The product may leave the doubles; the ladder's ends are far inside.
     const double error_m = std::clamp(*wish.fraction * geo::LevelError(level), std::numeric_limits<double>::min(),
@@ -88,7 +88,7 @@ int ErrorStep(const ErrorWish& wish, int level, double error_fraction) {
   if (!wish.error_m) return 0;
   const int step = geo::SnapToLadder(level, *wish.error_m, error_fraction);
   // max(error, default): steps above 0 are finer than the default.
-  return wish.at_least ? std::min(step, 0) : step;
+  return wish.at_least && !is_deepest ? std::min(step, 0) : step;
 }
 
 Result<std::uint32_t> FindDataset(std::string_view name, std::span<const DatasetView> datasets) {
@@ -133,7 +133,8 @@ Result<TileRequest> Negotiate(const Route& route, const Request& request, std::s
   TileRequest tile;
   tile.dataset = *dataset;
   tile.key = route.key;
-  tile.error_step = ErrorStep(parameters->wish, route.key.level, view.error_fraction);
+  tile.error_step =
+      ErrorStep(parameters->wish, route.key.level, route.key.level == view.max_level(), view.error_fraction);
   tile.format = route.format;
   if (route.format == TileFormat::kGlb) {
     tile.compression = parameters->compression.value_or(view.glb_compression);

@@ -32,7 +32,8 @@ Coding NegotiateCoding(std::string_view accept_encoding, std::span<const Coding>
 // ignored. 3DTilesRendererJS hangs the parameter on application/octet-stream.
 proto::TileExtensions WantedExtensions(std::string_view accept, const std::vector<std::string>& query_extensions);
 
-// The step on the level's ladder that a wish comes to; 0 without a wish.
-int ErrorStep(const ErrorWish& wish, int level, double error_fraction);
+// The step on the level's ladder that a wish comes to; 0 without a wish. `is_deepest`: the level is the dataset's last
+// one. No finer level follows it, so `atleast` does not hold its tiles back to their default error.
+int ErrorStep(const ErrorWish& wish, int level, bool is_deepest, double error_fraction);
 
 }  // namespace terrace::server

@@ -32,7 +32,7 @@ std::vector<geo::Vec3> RoundedNormals(std::vector<geo::Vec3> normals) {
 
 Result<MeshedGlb> MeshGlb(const dem::DemSource& source, const proto::LatticeView& lattice,
                           const tin::Refinement& refinement, const MeshRules& rules, double wanted_error_m,
-                          double asked_error_m, proto::PositionWidth width, const std::stop_token& stop) {
+                          double skirt_error_m, proto::PositionWidth width, const std::stop_token& stop) {
   constexpr int kMaxRounds = 16;  // as for quantized-mesh
   const Clock::time_point start = Clock::now();
   Result<StartedMesh> started = StartMesh(source, lattice, refinement, rules, wanted_error_m, stop);
@@ -42,7 +42,7 @@ Result<MeshedGlb> MeshGlb(const dem::DemSource& source, const proto::LatticeView
 
   tin::TinMesh& mesh = started->mesh;
   double step_m = proto::GridStep(lattice.lattice, wanted_error_m, width);
-  const double depth_m = proto::SkirtDepth(lattice.key.level, asked_error_m);
+  const double depth_m = proto::SkirtDepth(lattice.key.level, skirt_error_m);
   proto::TileMeter meter(lattice, started->error_m);
   tin::SampleInserter inserter;
   for (int round = 1;; ++round) {

@@ -23,10 +23,10 @@ struct MeshedGlb {
 // The mesh of the tile's quantized-mesh form to the same error, with its vertices on the grid of proto/grid_mesh.h,
 // measured there, and mended where that rounding pushed a sample over the bound. Edges are never touched: an edge is
 // refined to 15/16 of the error, and the grid's rounding is within the rest. `refinement` is as for MeshTile. Skirts
-// hang by `asked_error_m`, the error of the ladder, as tilesets say.
+// hang for `skirt_error_m` (proto/skirt.h), as tilesets say.
 // kCancelled: stopped.
 Result<MeshedGlb> MeshGlb(const dem::DemSource& source, const proto::LatticeView& lattice,
                           const tin::Refinement& refinement, const MeshRules& rules, double wanted_error_m,
-                          double asked_error_m, proto::PositionWidth width, const std::stop_token& stop);
+                          double skirt_error_m, proto::PositionWidth width, const std::stop_token& stop);
 
 }  // namespace terrace::server

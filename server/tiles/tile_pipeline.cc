@@ -6,6 +6,7 @@
 #include "engine/geo/error_ladder.h"
 #include "engine/tin/greedy.h"
 #include "proto/quantized_mesh.h"
+#include "proto/skirt.h"
 #include "proto/tile_normals.h"
 #include "server/tiles/glb_mesher.h"
 #include "server/tiles/height_tile.h"
@@ -105,9 +106,11 @@ Result<void> TilePipeline::EncodeGlb(const TileRequest& request, const RefinedTi
   const Dataset& dataset = datasets_[request.dataset];
   const Clock::time_point start = Clock::now();
   const proto::LatticeView lattice{request.key, refined.heights.lattice, refined.heights.heights};
-  const double asked_error_m = geo::LadderError(request.key.level, request.error_step, dataset.error_fraction);
+  const bool is_deepest = request.key.level == dataset.source->max_level();
+  const double skirt_error_m =
+      proto::SkirtError(request.key.level, request.error_step, is_deepest, dataset.error_fraction);
   const Result<MeshedGlb> meshed = MeshGlb(*dataset.source, lattice, refined.refinement, dataset.rules, error_m,
-                                           asked_error_m, proto::WidthOf(request.compression), stop);
+                                           skirt_error_m, proto::WidthOf(request.compression), stop);
   if (!meshed) return tl::unexpected(meshed.error());
   proto::GlbOptions options = dataset.glb;
   options.compression = request.compression;

@@ -47,8 +47,10 @@ void ExpectInLadder(const ErrorWish& wish) {
   TERRACE_CHECK(!wish.error_m || (std::isfinite(*wish.error_m) && *wish.error_m > 0));
   TERRACE_CHECK(!wish.fraction || (std::isfinite(*wish.fraction) && *wish.fraction > 0));
   for (const int level : {0, 7, geo::kMaxLevel}) {
-    const int step = ErrorStep(wish, level, geo::kDefaultErrorFraction);
-    TERRACE_CHECK(step >= geo::kCoarsestStep && step <= geo::kFinestStep);
+    for (const bool is_deepest : {false, true}) {
+      const int step = ErrorStep(wish, level, is_deepest, geo::kDefaultErrorFraction);
+      TERRACE_CHECK(step >= geo::kCoarsestStep && step <= geo::kFinestStep);
+    }
   }
 }
 

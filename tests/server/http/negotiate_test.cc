@@ -5,8 +5,10 @@
 #include <array>
 #include <cmath>
 #include <set>
+#include <string>
 
 #include "engine/geo/error_ladder.h"
+#include "proto/skirt.h"
 
 namespace terrace::server {
 namespace {
@@ -117,37 +119,58 @@ ErrorWish Wish(std::optional<double> error_m, bool at_least = false, std::option
 
 TEST(Negotiate, PutsErrorsOnTheLadder) {
   const double d = geo::DefaultError(10);
-  EXPECT_EQ(ErrorStep(Wish({}), 10, 0.5), 0);
-  EXPECT_EQ(ErrorStep(Wish(d), 10, 0.5), 0);
-  EXPECT_EQ(ErrorStep(Wish(d * 0.99), 10, 0.5), 1) << "down, never up";
-  EXPECT_EQ(ErrorStep(Wish(d / 2), 10, 0.5), 4);
-  EXPECT_EQ(ErrorStep(Wish(d * 4), 10, 0.5), -8);
-  EXPECT_EQ(ErrorStep(Wish(1e308), 24, 0.5), geo::kCoarsestStep);
-  EXPECT_EQ(ErrorStep(Wish(5e-324), 0, 0.5), geo::kFinestStep);
+  EXPECT_EQ(ErrorStep(Wish({}), 10, false, 0.5), 0);
+  EXPECT_EQ(ErrorStep(Wish(d), 10, false, 0.5), 0);
+  EXPECT_EQ(ErrorStep(Wish(d * 0.99), 10, false, 0.5), 1) << "down, never up";
+  EXPECT_EQ(ErrorStep(Wish(d / 2), 10, false, 0.5), 4);
+  EXPECT_EQ(ErrorStep(Wish(d * 4), 10, false, 0.5), -8);
+  EXPECT_EQ(ErrorStep(Wish(1e308), 24, false, 0.5), geo::kCoarsestStep);
+  EXPECT_EQ(ErrorStep(Wish(5e-324), 0, false, 0.5), geo::kFinestStep);
 }
 
 TEST(Negotiate, AtLeastNeverGoesBelowTheDefault) {
   const double d = geo::DefaultError(10);
-  EXPECT_EQ(ErrorStep(Wish(d / 8, true), 10, 0.5), 0);
-  EXPECT_EQ(ErrorStep(Wish(d * 2, true), 10, 0.5), -4);
+  EXPECT_EQ(ErrorStep(Wish(d / 8, true), 10, false, 0.5), 0);
+  EXPECT_EQ(ErrorStep(Wish(d * 2, true), 10, false, 0.5), -4);
+}
+
+// Nothing finer follows the deepest level: layer.json?error=E would otherwise never show E. A tile of another level
+// without children is not deepest: clients stop there because of availability, and the neighbours go deeper.
+TEST(Negotiate, AtLeastGivesTheErrorAskedForAtTheDeepestLevel) {
+  std::array<DatasetView, 1> datasets;
+  datasets[0].name = "maui";
+  datasets[0].available = {{{0, 0, 1, 0}}, {{0, 0, 3, 1}}, {{0, 0, 1, 1}}};
+  const auto error = [&](const std::string& target) {
+    const Result<TileRequest> tile = Negotiate(*Match(target), Request(), datasets);
+    EXPECT_TRUE(tile) << target;
+    return tile ? geo::LadderError(tile->key.level, tile->error_step) : 0;
+  };
+  for (const std::string format : {".terrain", ".glb"}) {
+    EXPECT_LE(error("/maui/2/0/0" + format + "?error=500&atleast=1"), 500);
+    EXPECT_GT(error("/maui/2/0/0" + format + "?error=500&atleast=1"), 420) << "not finer than the ladder makes it";
+    EXPECT_EQ(error("/maui/2/0/0" + format + "?error=500&atleast=1"), error("/maui/2/0/0" + format + "?error=500"));
+    EXPECT_EQ(error("/maui/1/0/0" + format + "?error=500&atleast=1"), geo::DefaultError(1));
+    EXPECT_EQ(error("/maui/1/3/1" + format + "?error=500&atleast=1"), geo::DefaultError(1)) << "without children";
+    EXPECT_EQ(error("/maui/2/0/0" + format + "?error=20000&atleast=1"), error("/maui/2/0/0" + format + "?error=20000"));
+  }
 }
 
 TEST(Negotiate, AFractionScalesEveryLevelAlike) {
   for (int level = 0; level <= 20; ++level) {
-    EXPECT_EQ(ErrorStep(Wish({}, false, 0.5), level, 0.5), 0);
-    EXPECT_EQ(ErrorStep(Wish({}, false, 0.25), level, 0.5), 4);
-    EXPECT_EQ(ErrorStep(Wish({}, false, 0.25), level, 0.25), 0);
+    EXPECT_EQ(ErrorStep(Wish({}, false, 0.5), level, false, 0.5), 0);
+    EXPECT_EQ(ErrorStep(Wish({}, false, 0.25), level, false, 0.5), 4);
+    EXPECT_EQ(ErrorStep(Wish({}, false, 0.25), level, false, 0.25), 0);
   }
-  EXPECT_EQ(ErrorStep(Wish({}, false, 1e308), 0, 0.5), geo::kCoarsestStep) << "the product overflows";
-  EXPECT_EQ(ErrorStep(Wish({}, false, 5e-324), 24, 0.5), geo::kFinestStep) << "the product underflows";
+  EXPECT_EQ(ErrorStep(Wish({}, false, 1e308), 0, false, 0.5), geo::kCoarsestStep) << "the product overflows";
+  EXPECT_EQ(ErrorStep(Wish({}, false, 5e-324), 24, false, 0.5), geo::kFinestStep) << "the product underflows";
 }
 
 // A million wishes must not make a million cache entries.
 TEST(Negotiate, ComesToFortyOneErrorsAtMost) {
   constexpr int kWishes = 1'000'000;
   std::set<int> steps;
-  for (int i = 0; i < kWishes; ++i) steps.insert(ErrorStep(Wish(std::exp2(-400 + 800.0 * i / kWishes)), 7, 0.5));
-  for (int i = 0; i < kWishes; ++i) steps.insert(ErrorStep(Wish(i * 0.01 + 0.003), 7, 0.5));
+  for (int i = 0; i < kWishes; ++i) steps.insert(ErrorStep(Wish(std::exp2(-400 + 800.0 * i / kWishes)), 7, false, 0.5));
+  for (int i = 0; i < kWishes; ++i) steps.insert(ErrorStep(Wish(i * 0.01 + 0.003), 7, false, 0.5));
   EXPECT_EQ(*steps.begin(), geo::kCoarsestStep);
   EXPECT_EQ(*steps.rbegin(), geo::kFinestStep);
   RecordProperty("wishes", 2 * kWishes);
@@ -238,14 +261,16 @@ TEST(Negotiate, GlbTilesAreCanonicalToo) {
   EXPECT_EQ(negotiate("/maui/0/1/0.terrain")->compression, TileRequest{}.compression);
 }
 
-// What skirts rely on (proto/skirt.h): whatever is asked for, a parent's error is at most twice that of its child.
+// What skirts rely on (proto/skirt.h): whatever is asked for, a parent's error is at most twice what they are made for.
 TEST(Negotiate, AParentIsAtMostTwiceAsCoarse) {
   for (int level = 1; level <= geo::kMaxLevel; ++level) {
     for (double wish_m = 1e-5; wish_m < 1e8; wish_m *= 1.31) {
       for (const ErrorWish& wish : {ErrorWish{wish_m, {}, false}, ErrorWish{wish_m, {}, true},
                                     ErrorWish{{}, wish_m / 1000, false}, ErrorWish{}}) {
-        const auto error = [&](int at) { return geo::LadderError(at, ErrorStep(wish, at, 0.5), 0.5); };
+        const auto error = [&](int at) { return geo::LadderError(at, ErrorStep(wish, at, false, 0.5), 0.5); };
         EXPECT_LE(error(level - 1), 2 * error(level) * (1 + 1e-12)) << level << ", " << wish_m;
+        const double skirt = proto::SkirtError(level, ErrorStep(wish, level, true, 0.5), true, 0.5);
+        EXPECT_LE(error(level - 1), 2 * skirt * (1 + 1e-12)) << "deepest: " << level << ", " << wish_m;
       }
     }
   }
