@@ -57,6 +57,7 @@ LIBRARIES = [
     Library("Beast", r"boost/beast.*", r"server/http/request\.cc"),
     Library("OpenSSL", r"openssl/.*|boost/asio/ssl.*", r"server/http/.*\.cc"),
     Library("Boost.Geometry", r"boost/geometry/.*", r"engine/dem/.*\.cc"),
+    Library("Boost.JSON", r"boost/json.*", r"server/http/json_parameters\.cc"),
     Library("Boost", r"boost/.*", r"server/"),
     Library("CLI11", r"CLI/.*", r"server/cli/"),
     Library("systemd", r"systemd/.*", r"server/cli/.*\.cc"),

@@ -21,14 +21,19 @@ geod_geodesic Ellipsoid() {
   return ellipsoid;
 }
 
+// How many geodesics are solved between two looks at the stop token: a millisecond's worth.
+constexpr std::size_t kStopStride = 512;
+
 double RoundTo(double value, double parts) { return std::round(value * parts) / parts; }
 
 }  // namespace
 
-GeodesicPath::GeodesicPath(std::vector<GeoPosition> corners) : corners_(std::move(corners)), ends_m_{0} {
+GeodesicPath::GeodesicPath(std::vector<GeoPosition> corners, std::stop_token stop)
+    : corners_(std::move(corners)), stop_(std::move(stop)), ends_m_{0} {
   TERRACE_CHECK(corners_.size() >= 2);
   const geod_geodesic ellipsoid = Ellipsoid();
   for (std::size_t i = 1; i < corners_.size(); ++i) {
+    if (i % kStopStride == 0 && stop_.stop_requested()) return;
     const GeoPosition &from = corners_[i - 1], &to = corners_[i];
     double length = 0;
     geod_inverse(&ellipsoid, from.latitude, from.longitude, to.latitude, to.longitude, &length, nullptr, nullptr);
@@ -44,6 +49,7 @@ std::vector<PathPoint> GeodesicPath::At(std::span<const double> distances) const
   geod_geodesicline line;
   bool has_line = false;
   for (const double distance : distances) {
+    if (points.size() % kStopStride == 0 && stop_.stop_requested()) return {};
     for (; leg + 2 < corners_.size() && distance > ends_m_[leg + 1]; ++leg) has_line = false;
     if (!has_line) {
       const GeoPosition &from = corners_[leg], &to = corners_[leg + 1];

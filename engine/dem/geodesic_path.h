@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <span>
+#include <stop_token>
 #include <vector>
 
 #include "engine/dem/dem_source.h"
@@ -18,8 +19,9 @@ struct PathPoint {
 // last bits differ between machines.
 class GeodesicPath {
  public:
+  // Once a stop is requested the path is of no more use: its length is wrong, and it has no points.
   // Precondition: at least two corners, latitudes in -90 .. 90, longitudes finite.
-  explicit GeodesicPath(std::vector<GeoPosition> corners);
+  explicit GeodesicPath(std::vector<GeoPosition> corners, std::stop_token stop = {});
 
   double length_m() const { return ends_m_.back(); }
 
@@ -38,6 +40,7 @@ class GeodesicPath {
   std::vector<PathPoint> At(std::span<const double> distances) const;  // ascending
 
   std::vector<GeoPosition> corners_;
+  std::stop_token stop_;
   std::vector<double> ends_m_;  // distance of each corner
 };
 

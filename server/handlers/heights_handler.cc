@@ -24,19 +24,6 @@ constexpr std::size_t kQuickQuery = 256;
 // Points that are read as long work, for which not all workers may be taken: each may lie in a block of its own.
 constexpr std::size_t kShortList = 1000;
 
-// `type`: of the body's content; empty where there is none.
-Result<HeightsQuery> Parse(std::string_view query, std::string_view type, std::string_view body,
-                           std::size_t max_locations) {
-  Result<QueryParameters> parameters = ParseQuery(query);
-  if (!parameters) return tl::unexpected(std::move(parameters).error());
-  if (!type.empty()) {
-    Result<QueryParameters> sent = ParseHeightsBody(type, body);
-    if (!sent) return tl::unexpected(std::move(sent).error());
-    std::move(sent->begin(), sent->end(), std::back_inserter(*parameters));
-  }
-  return ParseHeightsQuery(*parameters, max_locations);
-}
-
 }  // namespace
 
 HeightsHandler::HeightsHandler(CatalogPtr catalog, TileService& tiles, TileHandlerOptions options,
@@ -45,16 +32,17 @@ HeightsHandler::HeightsHandler(CatalogPtr catalog, TileService& tiles, TileHandl
 
 asio::awaitable<Result<HeightsQuery>> HeightsHandler::ParseAside(const Route& route, const Request& request,
                                                                  TileService::Clock::time_point deadline) const {
-  // Two corners of a path may have thousands of points between them, and a percent sign may hide its name.
-  const bool may_be_path = route.query.find("path") != std::string::npos || route.query.find('%') != std::string::npos;
+  // Two corners of a path may have thousands of points between them.
+  const bool may_be_path = route.query.find("path") != std::string::npos;
   if (request.method != Method::kPost && route.query.size() <= kQuickQuery && !may_be_path) {
-    co_return Parse(route.query, {}, {}, max_locations_);
+    const HeightsInput input{route.query, {}, {}};
+    co_return ParseHeights(input, max_locations_);
   }
   const auto parsed = std::make_shared<Result<HeightsQuery>>();
   const std::string_view type = request.method == Method::kPost ? request.fields->content_type : std::string_view();
   SingleFlight::Work parse = [parsed, query = route.query, type = std::string(type), body = request.body,
-                              most = max_locations_](const std::stop_token&) -> Result<EncodedTile> {
-    *parsed = Parse(query, type, body, most);
+                              most = max_locations_](const std::stop_token& stop) -> Result<EncodedTile> {
+    *parsed = ParseHeights({query, type, body}, most, stop);
     return EncodedTile();
   };
   const Result<TilePtr> done =

@@ -1,7 +1,8 @@
 #include "server/http/query.h"
 
-#include <algorithm>
+#include <utility>
 
+#include "server/http/parameters.h"
 #include "server/http/text.h"
 
 namespace terrace::server {
@@ -53,6 +54,29 @@ Result<void> CheckTogether(const ErrorWish& wish) {
   return {};
 }
 
+class Collector final : public ParameterSink {
+ public:
+  Result<void> AddToName(std::string_view part) override {
+    name_ += part;
+    return {};
+  }
+  Result<void> EndName() override {
+    parameters_.emplace_back(std::exchange(name_, {}), "");
+    return {};
+  }
+  Result<void> AddToValue(std::string_view part) override {
+    parameters_.back().second += part;
+    return {};
+  }
+  Result<void> EndValue() override { return {}; }
+
+  QueryParameters Take() && { return std::move(parameters_); }
+
+ private:
+  QueryParameters parameters_;
+  std::string name_;
+};
+
 }  // namespace
 
 std::optional<std::string> PercentDecode(std::string_view text) {
@@ -75,18 +99,12 @@ std::optional<std::string> PercentDecode(std::string_view text) {
 }
 
 Result<QueryParameters> ParseQuery(std::string_view query) {
-  QueryParameters parameters;
-  while (!query.empty()) {
-    const std::string_view piece = query.substr(0, query.find('&'));
-    query.remove_prefix(std::min(query.size(), piece.size() + 1));
-    if (piece.empty()) continue;
-    const std::size_t equals = std::min(piece.find('='), piece.size());
-    std::optional<std::string> name = PercentDecode(piece.substr(0, equals));
-    std::optional<std::string> value = PercentDecode(piece.substr(std::min(equals + 1, piece.size())));
-    if (!name || !value) return MakeError(ErrorCode::kInvalidArgument, "malformed percent-encoding in the query");
-    parameters.emplace_back(std::move(*name), std::move(*value));
+  Collector collector;
+  std::size_t at = 0;
+  if (const Result<void> read = ReadForm(PartsOf(query, {}), PlusSign::kIsPlus, collector, at); !read) {
+    return tl::unexpected(read.error());
   }
-  return parameters;
+  return std::move(collector).Take();
 }
 
 Result<TileParameters> ParseTileParameters(std::string_view query, bool allow_at_least, bool allow_compression) {

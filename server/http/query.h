@@ -18,10 +18,10 @@ namespace terrace::server {
 // character. '+' stays '+'.
 std::optional<std::string> PercentDecode(std::string_view text);
 
-// name -> value in the order sent, decoded. Pieces without '=' have an empty value; empty pieces are skipped.
+// name -> value in the order sent, as ReadForm tells them.
 using QueryParameters = std::vector<std::pair<std::string, std::string>>;
 
-// kInvalidArgument: malformed percent-encoding.
+// Of a URL, which is short. Errors: those of ReadForm.
 Result<QueryParameters> ParseQuery(std::string_view query);
 
 // What a client may say about the geometric error, all of it optional.

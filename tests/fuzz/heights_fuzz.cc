@@ -16,12 +16,7 @@ constexpr std::size_t kMostPoints = 100;
 
 void Try(std::string_view content_type, std::string_view body) {
   TERRACE_CHECK(server::IsHeightsBody(content_type));
-  const auto parameters = server::ParseHeightsBody(content_type, body);
-  if (!parameters) {
-    TERRACE_CHECK(parameters.error().code == ErrorCode::kInvalidArgument);
-    return;
-  }
-  const auto query = server::ParseHeightsQuery(*parameters, kMostPoints);
+  const auto query = server::ParseHeights({{}, content_type, body}, kMostPoints);
   if (!query) {
     TERRACE_CHECK(query.error().code == ErrorCode::kInvalidArgument);
     // Nothing of the request comes back: messages are the server's words and numbers.

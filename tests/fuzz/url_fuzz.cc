@@ -71,7 +71,7 @@ void TryQuery(std::string_view query) {
     for (const unsigned char c : name + value) TERRACE_CHECK(c != 0 || query.find('\0') != std::string_view::npos);
   }
   constexpr std::size_t kMostPoints = 50;
-  const auto heights = ParseHeightsQuery(*parameters, kMostPoints);
+  const auto heights = ParseHeights({query, {}, {}}, kMostPoints);
   if (!heights) return ExpectClientError(heights.error());
   TERRACE_CHECK(!heights->points.empty() && heights->points.size() <= kMostPoints);
   for (const dem::GeoPosition& point : heights->points) {

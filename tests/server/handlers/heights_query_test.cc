@@ -4,14 +4,17 @@
 
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <stop_token>
+#include <string>
 
 #include "server/handlers/heights_handler.h"
+#include "server/handlers/heights_parameters.h"
 
 namespace terrace::server {
 namespace {
 
 Result<HeightsQuery> Parse(const char* query, std::size_t max_locations = 100) {
-  return ParseHeightsQuery(*ParseQuery(query), max_locations);
+  return ParseHeights({query, {}, {}}, max_locations);
 }
 
 std::string Refusal(const char* query, std::size_t max_locations = 100) {
@@ -35,7 +38,7 @@ TEST(HeightsQuery, ReadsLatitudeBeforeLongitude) {
 }
 
 TEST(HeightsQuery, CountsFromTheEllipsoidUnlessToldOtherwise) {
-  const auto datum = [](const char* query) { return ParseHeightsQuery(*ParseQuery(query), 100)->datum; };
+  const auto datum = [](const char* query) { return Parse(query)->datum; };
   EXPECT_EQ(datum("locations=1,2"), dem::HeightDatum::kEllipsoid);
   EXPECT_EQ(datum("locations=1,2&datum=ellipsoid"), dem::HeightDatum::kEllipsoid);
   EXPECT_EQ(datum("locations=1,2&datum=orthometric"), dem::HeightDatum::kOrthometric);
@@ -43,7 +46,7 @@ TEST(HeightsQuery, CountsFromTheEllipsoidUnlessToldOtherwise) {
 }
 
 TEST(HeightsQuery, CertifiesDownToALevel) {
-  const auto level = [](const char* query) { return ParseHeightsQuery(*ParseQuery(query), 100)->certify_level; };
+  const auto level = [](const char* query) { return Parse(query)->certify_level; };
   EXPECT_EQ(level("locations=1,2"), std::nullopt);
   EXPECT_EQ(level("locations=1,2&certify=0"), 0);
   EXPECT_EQ(level("locations=1,2&certify=12&datum=orthometric"), 12);
@@ -123,25 +126,103 @@ TEST(HeightsQuery, WalksAlongAPath) {
   EXPECT_EQ(query->points.back().longitude, 11);
 }
 
-TEST(HeightsQuery, ReadsBodies) {
-  const auto json =
-      ParseHeightsBody("Application/JSON; charset=utf-8", R"({"path": "1,2|3,4", "step": 50.5, "samples": 3})");
-  ASSERT_TRUE(json);
-  EXPECT_EQ(*json, (QueryParameters{{"path", "1,2|3,4"}, {"samples", "3"}, {"step", "50.5"}}));
-  const auto form = ParseHeightsBody("application/x-www-form-urlencoded", "locations=1%2C2%7C3%2C+4&v=1");
-  ASSERT_TRUE(form);
-  EXPECT_EQ(*form, (QueryParameters{{"locations", "1,2|3, 4"}, {"v", "1"}}));
+constexpr const char* kJson = "application/json";
+constexpr const char* kForm = "application/x-www-form-urlencoded";
+
+Result<HeightsQuery> ParseBody(const char* type, std::string_view body, std::size_t max_locations = 100) {
+  return ParseHeights({"v=1", type, body}, max_locations);
 }
 
-TEST(HeightsQuery, RefusesOtherBodies) {
-  for (const char* body :
-       {"", "{", "[]", "null", "\"1,2\"", R"({"locations": ["1,2"]})", R"({"locations": null})",
-        R"({"locations": {"a": 1}})", R"({"locations": true})", "{\"locations\": \"\xff\"}", "NaN"}) {
-    EXPECT_FALSE(ParseHeightsBody("application/json", body)) << body;
+TEST(HeightsQuery, ReadsBodies) {
+  const auto path =
+      ParseBody("Application/JSON; charset=utf-8", R"( {"path": "0,10|0,11", "step": 5e4, "certify": 3, "v": "x"} )");
+  ASSERT_TRUE(path) << path.error().message;
+  EXPECT_EQ(path->distances_m, (std::vector<double>{0, 50'000, 100'000, 111'319.491}));
+  EXPECT_EQ(path->certify_level, 3);
+  const auto samples = ParseBody(kJson, R"({"samples": 3, "path": "1,2|3,4"})");
+  ASSERT_TRUE(samples) << samples.error().message;
+  EXPECT_EQ(samples->points.size(), 3u);
+  const auto form = ParseBody(kForm, "locations=1%2C2%7C3%2C+4&v=1&&v=2");
+  ASSERT_TRUE(form) << form.error().message;
+  ASSERT_EQ(form->points.size(), 2u);
+  EXPECT_EQ(form->points[1].longitude, 4);
+  for (const char* body : {"\xEF\xBB\xBF{\"locations\": \"1,2|3,4\"}", "{\"\\u006cocations\": \"1,2\\u007c3,\\u0034\"}",
+                           "\r\n\t{\"locations\"\n:\"1,2|3,4\" , \"datum\":\"orthometric\"}\n"}) {
+    const auto json = ParseBody(kJson, body);
+    ASSERT_TRUE(json) << body << ": " << json.error().message;
+    EXPECT_EQ(json->points.size(), 2u) << body;
   }
-  const std::string deep(200'000, '[');
-  EXPECT_FALSE(ParseHeightsBody("application/json", deep));
-  EXPECT_FALSE(ParseHeightsBody("application/x-www-form-urlencoded", "locations=%zz"));
+}
+
+TEST(HeightsQuery, ReadsPartsOfAnySize) {
+  const std::string_view json = R"({"locations": "1\u002c2|3.5,-4e1", "datum": "orthometric", "certify": 12})";
+  const std::string_view form = "locations=1%2c2%7C3.5,-4e1&datum=orthometric&certify=12";
+  for (std::size_t size = 1; size <= json.size(); ++size) {
+    for (const bool is_json : {true, false}) {
+      std::string_view rest = is_json ? json : form;
+      const TextParts parts = [&]() -> Result<std::string_view> {
+        const std::string_view part = rest.substr(0, size);
+        rest.remove_prefix(part.size());
+        return part;
+      };
+      HeightsParameters parameters(2, json.size());
+      std::size_t at = 0;
+      const Result<void> read =
+          is_json ? ReadJsonObject(parts, parameters, at) : ReadForm(parts, PlusSign::kIsBlank, parameters, at);
+      ASSERT_TRUE(read) << size << ": " << read.error().message;
+      EXPECT_EQ(at, (is_json ? json : form).size());
+      const auto points = parameters.TakePoints();
+      ASSERT_EQ(points.size(), 2u);
+      EXPECT_EQ(points[0].longitude, 2);
+      EXPECT_EQ(points[1].longitude, -40);
+      EXPECT_EQ(parameters.text(HeightsParameters::kDatum), "orthometric");
+      EXPECT_EQ(parameters.text(HeightsParameters::kCertify), "12");
+    }
+  }
+}
+
+TEST(HeightsQuery, NamesTheByteWhereABodyIsWrong) {
+  const struct {
+    const char* type;
+    const char* body;
+    const char* says;
+  } cases[] = {
+      {kJson, "", "byte 0: this is no valid JSON"},
+      {kJson, "{", "byte 1: this is no valid JSON"},
+      {kJson, "NaN", "byte 0: this is no valid JSON"},
+      {kJson, "{\"locations\": \"\xff\"}", "this is no valid JSON"},
+      {kJson, R"({"locations": "1,2"} x)", "byte 21: this is no valid JSON"},
+      {kJson, R"({"locations": "1,2"}{})", "byte 20: this is no valid JSON"},
+      {kJson, "[]", "byte 0: this is not a JSON object"},
+      {kJson, "null", "this is not a JSON object"},
+      {kJson, "\"1,2\"", "this is not a JSON object"},
+      {kJson, "7", "this is not a JSON object"},
+      {kJson, R"({"locations": ["1,2"]})", "byte 14: values must be texts or numbers"},
+      {kJson, R"({"locations": null})", "values must be texts or numbers"},
+      {kJson, R"({"locations": {"a": 1}})", "byte 14: values must be texts or numbers"},
+      {kJson, R"({"locations": true})", "values must be texts or numbers"},
+      {kJson, R"({"interpolation": 1})", "unknown parameter; known are locations"},
+      {kJson, R"({"locations": "1,2", "locations": "3,4"})", "locations is given more than once"},
+      {kJson, R"({"locations": "1,2", "\u006cocations": "3,4"})", "locations is given more than once"},
+      {kJson, R"({"locations": "1,2", "path": "3,4"})", "either locations or path"},
+      {kJson, R"({"locations": "1,2|91,0|1,2"})", "locations: item 2: the latitude"},
+      {kForm, "locations=1,2&step=%zz", "byte 21: malformed percent-encoding"},
+      {kForm, "locations=1,2&datum=%0a", "malformed percent-encoding"},
+      {kForm, "locations=1,2%7", "malformed percent-encoding"},
+      {kForm, "%6cocations=1,2", "byte 1: a parameter's name has a percent sign"},
+  };
+  for (const auto& c : cases) {
+    const auto refused = ParseBody(c.type, c.body);
+    ASSERT_FALSE(refused) << c.body;
+    EXPECT_EQ(refused.error().code, ErrorCode::kInvalidArgument) << c.body;
+    EXPECT_NE(refused.error().message.find(c.says), std::string::npos) << c.body << ": " << refused.error().message;
+  }
+  const auto twice = ParseHeights({"locations=1,2", kJson, R"({"locations": "1,2"})"}, 9);
+  ASSERT_FALSE(twice);
+  EXPECT_NE(twice.error().message.find("given more than once"), std::string::npos);
+}
+
+TEST(HeightsQuery, KnowsTheTypesOfBodies) {
   for (const char* type :
        {"", "text/plain", "application/xml", "multipart/form-data; boundary=x", "application/jsonx"}) {
     EXPECT_FALSE(IsHeightsBody(type)) << type;
@@ -149,11 +230,14 @@ TEST(HeightsQuery, RefusesOtherBodies) {
   EXPECT_TRUE(IsHeightsBody("Application/JSON ; charset=utf-8"));
 }
 
-TEST(HeightsQuery, RefusesKeysThatAreGivenTwice) {
-  const auto twice = ParseHeightsBody("application/json", R"({"locations": "1,2", "locations": "3,4"})");
-  ASSERT_FALSE(twice);
-  EXPECT_NE(twice.error().message.find("more than once"), std::string::npos);
-  EXPECT_FALSE(ParseHeightsBody("application/json", "{\"locations\": \"1,2\", \"\\u006cocations\": \"3,4\"}"));
+TEST(HeightsQuery, IsCancelledWhileItReadsAndWalks) {
+  std::stop_source source;
+  source.request_stop();
+  for (const char* query : {"locations=1,2", "path=1,2|3,4&samples=9"}) {
+    const auto cancelled = ParseHeights({query, {}, {}}, 100, source.get_token());
+    ASSERT_FALSE(cancelled);
+    EXPECT_EQ(cancelled.error().code, ErrorCode::kCancelled);
+  }
 }
 
 TEST(HeightsJson, IsWhatOpenTopoDataSends) {

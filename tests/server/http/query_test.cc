@@ -6,9 +6,17 @@ namespace terrace::server {
 namespace {
 
 TEST(Query, DecodesPairsInOrder) {
-  const Result<QueryParameters> parameters = ParseQuery("a=1&&b&c=x%3Dy=z&%64=");
+  const Result<QueryParameters> parameters = ParseQuery("a=1&&b&c=x%3Dy=z&d=+&e");
   ASSERT_TRUE(parameters);
-  EXPECT_EQ(*parameters, (QueryParameters{{"a", "1"}, {"b", ""}, {"c", "x=y=z"}, {"d", ""}}));
+  EXPECT_EQ(*parameters, (QueryParameters{{"a", "1"}, {"b", ""}, {"c", "x=y=z"}, {"d", "+"}, {"e", ""}}));
+}
+
+TEST(Query, RefusesEncodedNames) {
+  for (const char* query : {"%65rror=5", "error=5&%74oken=x", "token%3Dx", "%2574oken=x", "a%=1", "%"}) {
+    const Result<QueryParameters> refused = ParseQuery(query);
+    ASSERT_FALSE(refused) << query;
+    EXPECT_NE(refused.error().message.find("name has a percent sign"), std::string::npos) << query;
+  }
 }
 
 TEST(Query, TakesGoodTileParameters) {
