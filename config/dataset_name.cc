@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <map>
 #include <string_view>
 
 #include "config/config.h"
@@ -51,14 +52,13 @@ std::string SanitizeDatasetName(const std::string& text) {
 
 std::vector<ConfigError> FindDuplicateNames(const std::vector<DatasetConfig>& datasets) {
   std::vector<ConfigError> errors;
-  for (std::size_t later = 1; later < datasets.size(); ++later) {
-    for (std::size_t first = 0; first < later; ++first) {
-      if (datasets[first].name.empty() || datasets[first].name != datasets[later].name) continue;
-      errors.push_back({fmt::format("/datasets/{}/name", later),
-                        fmt::format("\"{}\" is the name of /datasets/{} too; every dataset needs its own",
-                                    datasets[later].name, first)});
-      break;
-    }
+  std::map<std::string_view, std::size_t> first_of;
+  for (std::size_t i = 0; i < datasets.size(); ++i) {
+    const auto [first, is_new] = first_of.emplace(datasets[i].name, i);
+    if (is_new || datasets[i].name.empty()) continue;
+    errors.push_back({fmt::format("/datasets/{}/name", i),
+                      fmt::format("\"{}\" is the name of /datasets/{} too; every dataset needs its own",
+                                  datasets[i].name, first->second)});
   }
   return errors;
 }

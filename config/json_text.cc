@@ -8,67 +8,89 @@
 namespace terrace::config {
 namespace {
 
-// Follows the parser through the text and reports keys that an object has twice: the library silently keeps the last.
-class DuplicateKeyFinder {
+// Makes the value as the library does, and reports keys that an object has twice, of which the library silently keeps
+// the last. Not by the library's callback: to take values away that a callback refuses, that looks through the whole
+// list at the end of each object in it.
+class DuplicateKeyFinder : public nlohmann::detail::json_sax_dom_parser<Json> {
  public:
-  explicit DuplicateKeyFinder(std::vector<ConfigError>& errors) : errors_(errors) {}
+  DuplicateKeyFinder(Json& value, std::vector<ConfigError>& errors) : json_sax_dom_parser(value), errors_(errors) {}
 
-  void OnEvent(Json::parse_event_t event, const Json& parsed) {
-    switch (event) {
-      case Json::parse_event_t::object_start:
-      case Json::parse_event_t::array_start:
-        Open(event == Json::parse_event_t::array_start);
-        break;
-      case Json::parse_event_t::key:
-        OnKey(parsed.get<std::string>());
-        break;
-      case Json::parse_event_t::value:
-        Advance();
-        break;
-      case Json::parse_event_t::object_end:
-      case Json::parse_event_t::array_end:
-        levels_.pop_back();
-        Advance();
-        break;
-    }
+  bool start_object(std::size_t size) {
+    Open(/*is_array=*/false);
+    return json_sax_dom_parser::start_object(size);
   }
+  bool start_array(std::size_t size) {
+    Open(/*is_array=*/true);
+    return json_sax_dom_parser::start_array(size);
+  }
+  bool key(std::string& key) {
+    Level& level = levels_.back();
+    level.key = key;
+    if (!level.seen.insert(key).second) {
+      errors_.push_back({AppendKey(PathOf(level), key), "appears twice; keep one of them"});
+    }
+    return json_sax_dom_parser::key(key);
+  }
+  bool end_object() { return Close() && json_sax_dom_parser::end_object(); }
+  bool end_array() { return Close() && json_sax_dom_parser::end_array(); }
+
+  bool parse_error(std::size_t position, const std::string&, const nlohmann::detail::exception& error) {
+    // It counts from 1 and is one past the end where the text stops too early.
+    fault_at_ = position == 0 ? 0 : position - 1;
+    fault_ = error.what();
+    return false;
+  }
+  std::size_t fault_at() const { return fault_at_; }
+  const std::string& fault() const { return fault_; }
+
+  bool null() { return Advance() && json_sax_dom_parser::null(); }
+  bool boolean(bool value) { return Advance() && json_sax_dom_parser::boolean(value); }
+  bool number_integer(std::int64_t value) { return Advance() && json_sax_dom_parser::number_integer(value); }
+  bool number_unsigned(std::uint64_t value) { return Advance() && json_sax_dom_parser::number_unsigned(value); }
+  bool number_float(double value, const std::string& text) {
+    return Advance() && json_sax_dom_parser::number_float(value, text);
+  }
+  bool string(std::string& value) { return Advance() && json_sax_dom_parser::string(value); }
 
  private:
   struct Level {
     bool is_array = false;
-    std::string path;  // of the container
-    std::string key;   // of the current value in an object
-    std::size_t index = 0;
+    std::string key;        // of the current value in an object
+    std::size_t index = 0;  // of the current value in a list
     std::set<std::string> seen;
   };
 
-  void Open(bool is_array) {
+  // JSON Pointer to the object that is `innermost`.
+  std::string PathOf(const Level& innermost) const {
     std::string path;
-    if (!levels_.empty()) {
-      const Level& outer = levels_.back();
-      path = AppendKey(outer.path, outer.is_array ? std::to_string(outer.index) : outer.key);
+    for (const Level& level : levels_) {
+      if (&level == &innermost) break;
+      path = AppendKey(path, level.is_array ? std::to_string(level.index) : level.key);
     }
-    levels_.push_back({is_array, std::move(path), {}, 0, {}});
+    return path;
   }
 
-  void OnKey(const std::string& key) {
-    Level& level = levels_.back();
-    level.key = key;
-    if (!level.seen.insert(key).second)
-      errors_.push_back({AppendKey(level.path, key), "appears twice; keep one of them"});
+  void Open(bool is_array) { levels_.push_back({is_array, {}, 0, {}}); }
+  bool Close() {
+    levels_.pop_back();
+    return Advance();
   }
-
-  void Advance() {
+  bool Advance() {
     if (!levels_.empty()) ++levels_.back().index;
+    return true;
   }
 
   std::vector<ConfigError>& errors_;
   std::vector<Level> levels_;
+  std::size_t fault_at_ = 0;
+  std::string fault_;
 };
 
 // What the library says without its own names: "[json.exception.parse_error.101] parse error at line 3, column 5: what"
-// and "[json.exception.out_of_range.406] what" become "what".
+// and "[json.exception.out_of_range.406] what" become "what". Nor does it quote the text: a token may stand there.
 std::string Reason(std::string_view message) {
+  message = message.substr(0, message.find("; last read"));
+  message = message.substr(0, message.find(" parsing '"));  // a number that is too large
   if (const std::size_t start = message.find("syntax error"); start != std::string_view::npos)
     return std::string(message.substr(start));
   const std::size_t name_end = message.find("] ");
@@ -106,25 +128,15 @@ std::string DescribeFault(std::string_view text, std::size_t at, const std::stri
 }  // namespace
 
 Json ParseJsonText(std::string_view text, std::vector<ConfigError>& errors) {
-  DuplicateKeyFinder duplicates(errors);
-  const auto follow = [&](int, Json::parse_event_t event, Json& parsed) {
-    duplicates.OnEvent(event, parsed);
-    return true;
-  };
   // To the parser it is the end of the text, whatever follows.
   if (const std::size_t zero = text.find('\0'); zero != std::string_view::npos) {
     errors.push_back({"", DescribeFault(text, zero, "a byte of zero, which no text has")});
     return Json(Json::value_t::discarded);
   }
-  try {
-    return Json::parse(text, follow);
-  } catch (const nlohmann::detail::parse_error& error) {
-    // `byte` counts from 1 and is one past the end where the text stops too early.
-    const std::size_t at = std::min(text.size(), error.byte == 0 ? 0 : error.byte - 1);
-    errors.push_back({"", DescribeFault(text, at, Reason(error.what()))});
-  } catch (const nlohmann::detail::exception& error) {
-    errors.push_back({"", Reason(error.what())});
-  }
+  Json value;
+  DuplicateKeyFinder reader(value, errors);
+  if (Json::sax_parse(text, &reader)) return value;
+  errors.push_back({"", DescribeFault(text, std::min(text.size(), reader.fault_at()), Reason(reader.fault()))});
   return Json(Json::value_t::discarded);
 }
 

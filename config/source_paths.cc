@@ -59,4 +59,13 @@ Result<SourceConfig> ExpandSource(const std::string& written, const std::filesys
   return source;
 }
 
+bool IsExpanded(const SourceConfig& source) {
+  return source.is_folder || source.files.size() != 1 || source.files.front() != source.written;
+}
+
+bool HoldsOtherFiles(const SourceConfig& source) {
+  const Result<SourceConfig> now = ExpandSource(source.written, {});
+  return !now || now->files != source.files || now->is_folder != source.is_folder;
+}
+
 }  // namespace terrace::config

@@ -15,4 +15,9 @@ namespace terrace::config {
 // empty. kUnavailable: a folder is missing or cannot be read.
 Result<SourceConfig> ExpandSource(const std::string& written, const std::filesystem::path& directory);
 
+// Whether ExpandSource made it of a folder or a glob; else it stands for itself.
+bool IsExpanded(const SourceConfig& source);
+// Of one that is: whether it holds other files by now.
+bool HoldsOtherFiles(const SourceConfig& source);
+
 }  // namespace terrace::config

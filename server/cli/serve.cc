@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "config/config.h"
+#include "config/config_watch.h"
 #include "config/options.h"
 #include "config/parse.h"
 #include "config/working_directory.h"
@@ -371,8 +372,7 @@ int Serve(const ServeArguments& arguments) {
     const std::size_t datasets_served = count;
     return fmt::format("{} dataset{} at {}", datasets_served, datasets_served == 1 ? "" : "s", server->url());
   };
-  server::Reloader::Hooks hooks;
-  hooks.load = [&arguments, config, is_read_once]() -> config::ConfigResult {
+  config::ConfigWatch watch(arguments.config_path, [&arguments, config, is_read_once]() -> config::ConfigResult {
     if (is_read_once) return config;
     if (IsPipe(arguments.config_path)) {
       return tl::unexpected(std::vector<config::ConfigError>{{"", "has become a pipe or device; make it a file"}});
@@ -381,7 +381,10 @@ int Serve(const ServeArguments& arguments) {
     config::Config loaded = MakeConfig(arguments, wrong);
     if (!wrong.empty()) return tl::unexpected(std::move(wrong));
     return loaded;
-  };
+  });
+  server::Reloader::Hooks hooks;
+  hooks.load = [&watch] { return watch.Load(); };
+  hooks.may_have_changed = [&watch] { return watch.MayHaveChanged(); };
   hooks.open = [cache_dir = config.cache_dir](const config::DatasetConfig& wanted, std::stop_token stop) {
     return OpenDataset(wanted, cache_dir, {}, std::move(stop));
   };

@@ -42,21 +42,23 @@ void WarnOfRestart(const config::Config& started, const config::Config& now, con
   }
 }
 
-const config::DatasetConfig* Find(const config::Config& config, const std::string& name) {
-  const auto found = std::ranges::find(config.datasets, name, &config::DatasetConfig::name);
-  return found == config.datasets.end() ? nullptr : &*found;
+// Whether each dataset is public.
+std::map<std::string_view, bool> PublicByName(const config::Config& config) {
+  std::map<std::string_view, bool> by_name;
+  for (const config::DatasetConfig& dataset : config.datasets) by_name.emplace(dataset.name, dataset.is_public);
+  return by_name;
 }
 
 // Who may see a dataset is settled at the start, by its name: one that comes under a name that was public then is seen
 // by everybody, whatever was between them.
 void WarnOfAccess(const config::Config& started, const config::Config& now, const config::Config& next) {
   if (started.tokens.empty()) return;
+  const auto at_start = PublicByName(started), until_now = PublicByName(now);
   for (const config::DatasetConfig& dataset : next.datasets) {
-    const config::DatasetConfig* const first = Find(started, dataset.name);
-    const config::DatasetConfig* const before = Find(now, dataset.name);
-    const bool is_seen = first != nullptr && first->is_public;
+    const auto first = at_start.find(dataset.name), before = until_now.find(dataset.name);
+    const bool is_seen = first != at_start.end() && first->second;
     if (dataset.is_public == is_seen) continue;
-    if (before != nullptr && before->is_public == dataset.is_public) continue;  // told already
+    if (before != until_now.end() && before->second == dataset.is_public) continue;  // told already
     spdlog::warn("configuration: \"public\" of dataset {} has changed, which takes a restart; until then {}",
                  dataset.name, is_seen ? "everybody sees it" : "it takes a token to see it");
   }
@@ -159,6 +161,8 @@ config::ConfigResult Reloader::Load() const {
 }
 
 void Reloader::LookAtConfig(bool asked) {
+  const bool may_differ = asked || config_settles_ || !hooks_.may_have_changed || hooks_.may_have_changed();
+  if (!may_differ) return;
   config::ConfigResult next = Load();
   config_settles_ = !asked && next != seen_;
   seen_ = next;
@@ -183,19 +187,20 @@ void Reloader::Apply(config::Config next) {
   WarnOfRestart(started_, config_, next);
   const bool is_rewritten = AsWritten(config_) != AsWritten(next);
   WarnOfAccess(started_, config_, next);
+  std::map<std::string, DatasetSlot> left;
+  for (DatasetSlot& slot : slots_) left.emplace(slot.wanted().name, std::move(slot));
   std::vector<DatasetSlot> slots;
   for (const config::DatasetConfig& wanted : next.datasets) {
-    const auto known = std::find_if(slots_.begin(), slots_.end(),
-                                    [&](const DatasetSlot& slot) { return slot.wanted().name == wanted.name; });
-    if (known == slots_.end()) {
+    const auto known = left.find(wanted.name);
+    if (known == left.end()) {
       slots.emplace_back(wanted);
       continue;
     }
-    if (known->wanted() != wanted) known->Want(wanted);
-    slots.push_back(std::move(*known));
-    slots_.erase(known);
+    if (known->second.wanted() != wanted) known->second.Want(wanted);
+    slots.push_back(std::move(known->second));
+    left.erase(known);
   }
-  for (DatasetSlot& slot : slots_) {
+  for (auto& [name, slot] : left) {
     spdlog::info("dataset {}: is not served any more", slot.wanted().name);
     slot.StopOpening();
     if (slot.is_opening()) leaving_.push_back(std::move(slot));
@@ -221,9 +226,12 @@ bool Reloader::StepOpenings() {
   std::erase_if(leaving_, [](DatasetSlot& slot) { return slot.TakeOpened() || !slot.is_opening(); });
   bool is_new = false;
   for (DatasetSlot& slot : slots_) is_new = slot.TakeOpened() || is_new;
+  auto openings = std::count_if(slots_.begin(), slots_.end(), [](const auto& slot) { return slot.is_opening(); });
   for (DatasetSlot& slot : slots_) {
-    const auto openings = std::count_if(slots_.begin(), slots_.end(), [](const auto& s) { return s.is_opening(); });
-    if (openings < kMostOpenings) slot.OpenIfDue(hooks_.open);
+    if (openings >= kMostOpenings) break;
+    if (slot.is_opening()) continue;
+    slot.OpenIfDue(hooks_.open);
+    if (slot.is_opening()) ++openings;
   }
   return is_new;
 }

@@ -27,6 +27,8 @@ class Reloader {
   struct Hooks {
     // The configuration as it would be if the server started now.
     std::function<config::ConfigResult()> load;
+    // False: `load` would give what it gave last. May be empty: it may always give another.
+    std::function<bool()> may_have_changed = {};
     DatasetOpener open;
     // Serve these from now on, under these options. On the reloader's thread.
     std::function<void(const std::vector<Dataset>&, const config::Config&)> publish;

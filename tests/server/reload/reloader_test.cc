@@ -77,7 +77,12 @@ class ReloaderTest : public testing::Test {
     for (const config::DatasetConfig& wanted : config_.datasets) datasets.push_back(*Open(wanted, {}));
     openings_ = 0;
     Reloader::Hooks hooks;
+    hooks.may_have_changed = [this] {
+      ++looks_;
+      return changes_.load();
+    };
     hooks.load = [this] {
+      ++loads_;
       if (throws_) throw std::runtime_error("no memory");
       const std::lock_guard lock(mutex_);
       return next_;
@@ -118,7 +123,8 @@ class ReloaderTest : public testing::Test {
 
   fs::path folder_;
   config::Config config_;
-  std::atomic<int> openings_{0};
+  std::atomic<int> openings_{0}, looks_{0}, loads_{0};
+  std::atomic<bool> changes_{true};
   std::atomic<bool> blocks_{false}, fails_{false}, throws_{false};
   std::mutex mutex_;
   config::ConfigResult next_;                                  // guarded by mutex_, as the rest
@@ -197,6 +203,15 @@ TEST_F(ReloaderTest, WatchesTheConfigurationWithoutBeingAsked) {
     next_ = next;
   }
   EXPECT_TRUE(Eventually([&] { return Served().size() == 2; }));
+}
+
+TEST_F(ReloaderTest, LoadsNoConfigurationThatStaysAsItIs) {
+  changes_ = false;
+  Start();
+  ASSERT_TRUE(Eventually([&] { return looks_ >= 3; }));
+  EXPECT_EQ(loads_, 0);
+  reloader_->Reload();  // who asks knows better
+  ASSERT_TRUE(Eventually([&] { return loads_ == 1; }));
 }
 
 TEST_F(ReloaderTest, ADatasetThatGoesWhileItIsOpenedIsForgotten) {

@@ -1,0 +1,55 @@
+#include "config/config_watch.h"
+
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdlib>
+#include <iterator>
+
+#include "config/source_paths.h"
+
+namespace terrace::config {
+namespace {
+
+// Times of files advance in ticks, of 10 ms at most, and in seconds on old file systems: what was read within this time
+// of a change may have changed once more without another stamp.
+constexpr std::int64_t kFreshNs = 2'000'000'000;
+
+std::int64_t InNanoseconds(const timespec& time) { return std::int64_t{time.tv_sec} * 1'000'000'000 + time.tv_nsec; }
+
+}  // namespace
+
+std::int64_t ConfigWatch::SystemTimeNs() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
+
+std::optional<ConfigWatch::Stamp> ConfigWatch::StampOf(const std::filesystem::path& file) {
+  struct stat status {};
+  if (::stat(file.c_str(), &status) != 0 || !S_ISREG(status.st_mode)) return std::nullopt;
+  return Stamp{status.st_dev, status.st_ino, static_cast<std::uint64_t>(status.st_size), InNanoseconds(status.st_mtim),
+               InNanoseconds(status.st_ctim)};
+}
+
+ConfigResult ConfigWatch::Load() {
+  // Before the file is read: a change meanwhile shows at the next look.
+  stamp_ = StampOf(file_);
+  is_fresh_ = stamp_ && std::abs(now_ns_() - stamp_->status_changed_ns) < kFreshNs;
+  is_loaded_ = false;
+  ConfigResult loaded = load_();
+  is_loaded_ = loaded.has_value();
+  expandable_.clear();
+  if (!loaded) return loaded;
+  for (const DatasetConfig& dataset : loaded->datasets) {
+    std::copy_if(dataset.sources.begin(), dataset.sources.end(), std::back_inserter(expandable_), IsExpanded);
+  }
+  return loaded;
+}
+
+bool ConfigWatch::MayHaveChanged() const {
+  if (!is_loaded_ || is_fresh_ || StampOf(file_) != stamp_) return true;
+  return std::any_of(expandable_.begin(), expandable_.end(), HoldsOtherFiles);
+}
+
+}  // namespace terrace::config
