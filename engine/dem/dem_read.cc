@@ -132,7 +132,11 @@ SheetTrace Widened(PartTrace&& of_part, const Sheet& sheet, const geo::Lattice& 
   const std::vector<Position> positions = sheet.PositionsOf(lattice, around, trace.factor);
   trace.positions.assign(nodes, kNowhere);
   ForPart(around, window, [&](std::size_t from, std::size_t to) { trace.positions[to] = positions[from]; });
-  if (!trace.undulations.empty()) trace.undulations = sheet.undulations()->At(lattice, window);
+  if (!trace.undulations.empty()) {
+    auto undulations = sheet.undulations()->At(lattice, window);
+    constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();  // and so is the bound then
+    trace.undulations = undulations ? *std::move(undulations) : std::vector<double>(nodes, kUnknown);
+  }
   return trace;
 }
 
@@ -238,10 +242,11 @@ Result<std::vector<float>> DemSource::Impl::ReadNodes(int level, const NodeWindo
     std::ranges::replace_if(*heights, IsVoid, floor);
     return heights;
   }
-  const std::vector<double> undulations = floor_undulations->At(lattice, window);
+  const auto undulations = floor_undulations->At(lattice, window);
+  if (!undulations) return tl::unexpected(undulations.error());
   for (std::size_t i = 0; i < heights->size(); ++i) {
     if (!IsVoid((*heights)[i])) continue;
-    (*heights)[i] = std::isnan(undulations[i]) ? floor : RoundHeight(floor - undulations[i]);
+    (*heights)[i] = std::isnan((*undulations)[i]) ? floor : RoundHeight(floor - (*undulations)[i]);
   }
   return heights;
 }

@@ -279,7 +279,9 @@ Result<std::unique_ptr<DemSource>> DemSource::Open(std::vector<DemFile> files, c
   impl->floor = static_cast<float>(impl->info.floor);
   for (const Sheet& sheet : impl->sheets) {
     if (const auto& geoid = sheet.vertical().geoid) {
-      impl->floor_undulations = std::make_shared<const Undulations>(geoid, Footprint{});
+      auto undulations = Undulations::OfEarth(geoid);
+      if (!undulations) return tl::unexpected(undulations.error());
+      impl->floor_undulations = *std::move(undulations);
     }
   }
   impl->fingerprint = FingerprintOf(impl->sheets, options, impl->floor);

@@ -1,7 +1,5 @@
 #include "engine/dem/driver_list.h"
 
-#include <gdal_priv.h>
-
 #include <algorithm>
 #include <mutex>
 #include <string_view>
@@ -78,6 +76,17 @@ std::optional<std::string> LeftOutDriverOf(const std::string& path) {
     if (is_raster && driver->pfnIdentify != nullptr && driver->pfnIdentify(&file) > 0) return driver->GetDescription();
   }
   return std::nullopt;
+}
+
+GDALDatasetUniquePtr OpenWithDriver(const std::string& name, const std::string& path) {
+  const std::lock_guard lock(RetiredMutex());
+  GDALDriver* driver = GetGDALDriverManager()->GetDriverByName(name.c_str());
+  for (GDALDriver* const retired : Retired()) {
+    if (name == retired->GetDescription()) driver = retired;
+  }
+  if (driver == nullptr || driver->pfnOpen == nullptr) return nullptr;
+  GDALOpenInfo file(path.c_str(), GDAL_OF_RASTER | GDAL_OF_READONLY);
+  return GDALDatasetUniquePtr(driver->pfnOpen(&file));
 }
 
 }  // namespace terrace::dem

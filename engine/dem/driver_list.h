@@ -1,6 +1,8 @@
 // The formats that GDAL reads in this process.
 #pragma once
 
+#include <gdal_priv.h>
+
 #include <optional>
 #include <string>
 #include <vector>
@@ -20,5 +22,9 @@ Result<void> UseDrivers(const std::vector<std::string>& names);
 // The format of a raster that UseDrivers left out, by GDAL's short name: what it would have been taken for. Looks at
 // its name and first bytes.
 std::optional<std::string> LeftOutDriverOf(const std::string& path);
+
+// Opens a file of the program's own, such as PROJ's, with the driver of that short name, whether or not UseDrivers left
+// it out. Null: it is no such file, or GDAL has no such driver.
+GDALDatasetUniquePtr OpenWithDriver(const std::string& name, const std::string& path);
 
 }  // namespace terrace::dem

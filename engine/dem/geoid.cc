@@ -6,6 +6,9 @@
 #include <limits>
 #include <map>
 #include <new>
+#include <numbers>
+#include <random>
+#include <sstream>
 #include <system_error>
 
 #include "engine/dem/proj_grids.h"
@@ -91,7 +94,67 @@ double HeightAt(const ProjOperation& operation, Position degrees, double height)
   return std::isfinite(result.xyz.z) ? result.xyz.z : kUnknown;
 }
 
+// Whether a pipeline shifts heights by one grid, and changes units and the order of axes besides.
+bool IsShiftByOneGrid(const std::string& pipeline) {
+  std::istringstream words(pipeline);
+  int shifts = 0;
+  for (std::string word; words >> word;) {
+    if (word.starts_with('+')) word.erase(0, 1);
+    if (!word.starts_with("proj=")) continue;
+    if (word == "proj=vgridshift") {
+      ++shifts;
+    } else if (word != "proj=pipeline" && word != "proj=unitconvert" && word != "proj=axisswap") {
+      return false;
+    }
+  }
+  return shifts == 1;
+}
+
+// PROJ decides what a grid's numbers mean: both are compared in cells of every edge and corner and in others.
+bool Agrees(const UndulationGrid& grid, const ProjOperation& operation) {
+  constexpr int kCells = 96;
+  constexpr double kTolerance = 1e-6;  // metres
+  std::mt19937 random(1);
+  int known = 0;
+  for (int i = 0; i < kCells; ++i) {
+    const auto pick = [&random](int count, int edge) {
+      const auto inside = static_cast<int>(random() % static_cast<unsigned>(count));
+      return edge == 0 ? 0 : edge == 1 ? count - 1 : inside;
+    };
+    const int cells = grid.wraps() ? grid.columns() : grid.columns() - 1;
+    const double column = pick(cells, i % 4) + 0.3, row = pick(grid.rows() - 1, i / 4 % 4) + 0.6;
+    const NodePlace x = grid.AtColumn(column), y = grid.AtRow(row);
+    const auto patch = UndulationPatch::Read(grid, {&x, 1}, {&y, 1});
+    if (!patch) return false;
+    const double here = patch->At(x, y), there = HeightAt(operation, grid.DegreesOf(column, row), 0);
+    known += std::isnan(here) ? 0 : 1;
+    if (std::isnan(here) != std::isnan(there) || std::abs(here - there) > kTolerance) return false;
+  }
+  return known > 0;
+}
+
+// 0: it is not known.
+double CellOf(const std::string& file) {
+  const PJ_GRID_INFO info = proj_grid_info(file.c_str());
+  const double cell = std::min(info.cs_lon, info.cs_lat) * 180 / std::numbers::pi;
+  return cell > 0 ? cell : 0;
+}
+
 }  // namespace
+
+void Geoid::FindGrid() {
+  finest_cell_ = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < files_.size(); ++i) finest_cell_ = std::min(finest_cell_, CellOf(files_.path(i)));
+  if (files_.size() != 1 || !IsShiftByOneGrid(pipeline())) return;
+  std::shared_ptr<const UndulationGrid> grid = UndulationGrid::Open(files_.path(0));
+  std::unique_ptr<ProjOperation> operation = operations_.Borrow();
+  if (operation == nullptr) return;
+  if (grid != nullptr && Agrees(*grid, *operation)) {
+    finest_cell_ = std::min(grid->column_step(), grid->row_step());
+    grid_ = std::move(grid);
+  }
+  operations_.Return(std::move(operation));
+}
 
 // Most height systems have one operation for the whole Earth: thousands of sources share it, and looking it up takes
 // PROJ some 20 ms. Failures are not kept: the missing grid may be there the next time.
@@ -136,6 +199,7 @@ Result<std::shared_ptr<const Geoid>> Geoid::OfCrs(const std::string& vertical_cr
     std::vector<std::string> files;
     for (const ProjGrid& grid : grids) files.push_back(grid.file);
     geoid->files_ = StampedFiles(files);
+    geoid->FindGrid();
     auto checked = Checked(geoid, centre);
     if (checked && count == 1) FindShared(vertical_crs, *checked);
     return checked;
@@ -162,6 +226,7 @@ Result<std::shared_ptr<const Geoid>> Geoid::OfGrid(const std::string& path, Posi
       fmt::format("+proj=pipeline +step +proj=unitconvert +xy_in=deg +xy_out=rad +step +proj=vgridshift +grids=\"{}\" "
                   "+multiplier=1 +step +proj=unitconvert +xy_in=rad +xy_out=deg",
                   std::filesystem::absolute(path, ignored).string()));
+  geoid->FindGrid();
   return Checked(geoid, centre);
 }
 

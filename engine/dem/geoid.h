@@ -15,6 +15,7 @@
 #include "engine/dem/file_stamp.h"
 #include "engine/dem/operation_pool.h"
 #include "engine/dem/projector.h"
+#include "engine/dem/undulation_grid.h"
 
 namespace terrace::dem {
 
@@ -53,14 +54,21 @@ class Geoid {
   const std::string& pipeline() const { return operations_.pipeline(); }  // as PROJ runs it
   // What the operation reads, as it was when it was set up.
   const StampedFiles& files() const { return files_; }
+  // Where the operation is bilinear interpolation in one grid and nothing else: that grid. Else null.
+  const UndulationGrid* grid() const { return grid_.get(); }
+  // Degrees, the smaller side of a cell of the finest grid that the operation reads; 0 where that is not known.
+  double finest_cell() const { return finest_cell_; }
 
  private:
   Geoid() = default;
   static Result<std::shared_ptr<const Geoid>> Checked(std::shared_ptr<const Geoid> geoid, Position centre);
+  void FindGrid();
   static std::shared_ptr<const Geoid> FindShared(const std::string& vertical_crs, std::shared_ptr<const Geoid> made);
 
   std::string name_, unit_, description_;
   StampedFiles files_;
+  std::shared_ptr<const UndulationGrid> grid_;
+  double finest_cell_ = 0;
   OperationPool operations_;
 };
 

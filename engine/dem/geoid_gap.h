@@ -2,7 +2,9 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <span>
+#include <vector>
 
 #include "engine/dem/gap_cells.h"
 #include "engine/dem/undulations.h"
@@ -12,8 +14,7 @@ namespace terrace::dem {
 class GeoidGap {
  public:
   // `geoid`: null where none is added. `added`: by node of the tile. What these refer to outlives it.
-  GeoidGap(const TileNodes& tile, const Undulations* geoid, std::span<const double> added)
-      : tile_(tile), geoid_(geoid), added_(added) {}
+  GeoidGap(const TileNodes& tile, const Undulations* geoid, std::span<const double> added);
 
   bool is_added() const { return geoid_ != nullptr; }
   double AddedAt(std::size_t node) const { return added_[node]; }
@@ -28,11 +29,19 @@ class GeoidGap {
   }
 
  private:
+  double OverNodes(const CellBox& box) const;
+  double OverNodes(const TileCell& cell) const;
   double OverCoarse(const CellBox& box) const;
+  double OverSmooth(const CellBox& box) const;
 
   const TileNodes tile_;
   const Undulations* const geoid_;
   const std::span<const double> added_;
+
+  // Of a geoid that is a grid: where the tile's columns and rows of nodes lie on it, in its steps, and the grid's own
+  // nodes around them. None where the grid's are much denser.
+  std::vector<double> columns_, rows_;
+  std::optional<UndulationPatch> patch_;
 };
 
 }  // namespace terrace::dem

@@ -83,7 +83,9 @@ Result<Sheet> Sheet::Make(SheetPlan plan, const SheetOptions& options) {
   sheet.IndexMembers();
   sheet.FindPoleHeights();
   if (const auto& geoid = sheet.vertical().geoid) {
-    sheet.undulations_ = std::make_shared<const Undulations>(geoid, sheet.reach_);
+    auto undulations = Undulations::Of(geoid, sheet.reach_);
+    if (!undulations) return tl::unexpected(undulations.error());
+    sheet.undulations_ = *std::move(undulations);
   }
   return sheet;
 }
@@ -325,7 +327,11 @@ Result<void> Sheet::Fill(const geo::Lattice& lattice, const NodeWindow& window, 
     }
   }
   std::vector<double> undulations;
-  if (undulations_ && counting == Counting::kEllipsoid) undulations = undulations_->At(lattice, window);
+  if (undulations_ && counting == Counting::kEllipsoid) {
+    auto found = undulations_->At(lattice, window);
+    if (!found) return tl::unexpected(found.error());
+    undulations = *std::move(found);
+  }
   if (trace != nullptr) trace->undulations = undulations;
   return FillAt(positions, static_cast<std::size_t>(window.columns), undulations, factor, heights, stop, weights,
                 trace);
@@ -335,7 +341,11 @@ Result<void> Sheet::Fill(const geo::MercatorGrid& grid, const NodeWindow& window
                          const std::stop_token& stop, std::span<float> weights) const {
   const int factor = MercatorFactor(grid.depth, spacing_);
   std::vector<double> undulations;
-  if (undulations_) undulations = undulations_->At(grid, window);
+  if (undulations_) {
+    auto found = undulations_->At(grid, window);
+    if (!found) return tl::unexpected(found.error());
+    undulations = *std::move(found);
+  }
   return FillAt(NodePositions(georeference_, reach_, grid, window, kPositionTolerance * factor),
                 static_cast<std::size_t>(window.columns), undulations, factor, heights, stop, weights);
 }

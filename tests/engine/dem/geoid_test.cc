@@ -9,7 +9,7 @@
 #include <string>
 #include <thread>
 
-#include "tests/engine/dem/dem_fixture.h"
+#include "tests/engine/dem/geoid_grids.h"
 
 namespace terrace::dem {
 namespace {
@@ -81,31 +81,10 @@ TEST(Geoid, RefusesWhatIsNoHeightSystem) {
   EXPECT_FALSE(Geoid::OfCrs("EPSG:5705", {40, 50})) << "Baltic heights: PROJ knows no way";
 }
 
-// NTv2's vertical cousin: a header of the south-western corner, steps, rows and columns, then floats, all big-endian.
-std::string WriteGtx(const TempDir& dir, const std::string& name, float (*value)(int column, int row)) {
-  constexpr int kRows = 21, kColumns = 31;  // of a tenth of a degree, from 7 E 45 N
-  std::string bytes;
-  const auto put = [&bytes](const auto number) {
-    const char* raw = reinterpret_cast<const char*>(&number);
-    for (std::size_t i = sizeof number; i > 0; --i) bytes += raw[i - 1];
-  };
-  put(45.0);
-  put(7.0);
-  put(0.1);
-  put(0.1);
-  put(std::int32_t{kRows});
-  put(std::int32_t{kColumns});
-  for (int row = 0; row < kRows; ++row) {
-    for (int column = 0; column < kColumns; ++column) put(value(column, row));
-  }
-  std::ofstream(dir.File(name), std::ios::binary) << bytes;
-  return dir.File(name);
-}
-
 TEST(Geoid, ReadsAGridFile) {
   const TempDir dir;
-  const std::string path =
-      WriteGtx(dir, "my own.gtx", [](int column, int row) { return static_cast<float>(40 + column + 2 * row); });
+  const std::string path = WriteGtx(
+      dir, "my own.gtx", {.value = [](int column, int row) { return static_cast<float>(40 + column + 2 * row); }});
   const auto geoid = Geoid::OfGrid(path, {8, 46});
   ASSERT_TRUE(geoid) << geoid.error().message;
   EXPECT_NEAR((*geoid)->Undulation({8, 46}), 40 + 10 + 20, 1e-6);
@@ -115,7 +94,7 @@ TEST(Geoid, ReadsAGridFile) {
 
 TEST(Geoid, RefusesGridFilesWithTheReason) {
   const TempDir dir;
-  const std::string path = WriteGtx(dir, "grid.gtx", [](int, int) { return 1.0f; });
+  const std::string path = WriteGtx(dir, "grid.gtx", {.value = [](int, int) { return 1.0f; }});
   EXPECT_NE(Geoid::OfGrid(path, {20, 46}).error().message.find("not known at the centre"), std::string::npos);
   EXPECT_NE(Geoid::OfGrid(dir.File("none.gtx"), {8, 46}).error().message.find("is no file"), std::string::npos);
   std::ofstream(dir.File("text.gtx")) << "This is no grid.";
