@@ -4,6 +4,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <atomic>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
 #include <boost/asio/signal_set.hpp>
@@ -88,8 +89,9 @@ class Server::Impl {
       : options_(std::move(options)),
         access_log_(std::move(access_log)),
         viewer_(std::make_shared<const StaticFiles>(std::move(viewer))),
-        tiles_(ServiceOptions(options_), std::bind_front(&Metrics::CountBuild, &metrics_)),
         edge_(std::move(edge)),
+        deadline_(options_.request_deadline),
+        tiles_(ServiceOptions(options_), std::bind_front(&Metrics::CountBuild, &metrics_)),
         routes_(MakeRoutes(std::move(catalog), options_)),
         io_(IoThreadCount(options_.io_threads)),
         signals_(io_.first()) {}
@@ -115,6 +117,7 @@ class Server::Impl {
   void Replace(CatalogPtr catalog, const ServerOptions& options) {
     std::shared_ptr<const Routes> routes = MakeRoutes(catalog, options);
     tiles_.SetCacheBytes(options.cache_bytes);
+    deadline_.store(options.request_deadline, std::memory_order_relaxed);
     {
       const std::lock_guard lock(state_mutex_);
       routes_.swap(routes);
@@ -280,7 +283,7 @@ class Server::Impl {
 
   std::shared_ptr<const SessionContext> Context() {
     auto context = std::make_shared<SessionContext>();
-    context->options.read = {options_.header_timeout, options_.idle_timeout};
+    context->options.read = {options_.header_timeout, options_.idle_timeout, options_.min_read_rate};
     context->options.write_timeout = options_.write_timeout;
     context->options.min_rate = options_.min_read_rate;
     context->options.max_body_bytes = kBodyBytes + kBytesPerLocation * options_.max_locations;
@@ -294,6 +297,7 @@ class Server::Impl {
     };
     context->connections = &edge_->connections;
     context->transfers = &edge_->transfers;
+    context->deadline = &deadline_;
     context->gate = &edge_->gate;
     context->cors = edge_->cors;
     context->tls = edge_->tls.get();
@@ -304,8 +308,9 @@ class Server::Impl {
   AccessLog access_log_;
   const std::shared_ptr<const StaticFiles> viewer_;
   Metrics metrics_;
+  const std::unique_ptr<Edge> edge_;  // jobs of workers hold bodies that count in it
+  std::atomic<std::chrono::milliseconds> deadline_;
   TileService tiles_;
-  const std::unique_ptr<Edge> edge_;
   mutable std::mutex state_mutex_;
   std::shared_ptr<const Routes> routes_;         // never null; guarded by state_mutex_
   std::map<std::string, std::string> troubles_;  // by dataset; guarded by state_mutex_

@@ -297,9 +297,11 @@ std::string Metrics::Text(const TileService::Stats& tiles, const ByteCacheStats&
   add(kGauge, "terrace_http_connections", "Open connections", state.edge.connections);
   add(kCounter, "terrace_http_connections_refused_total", "Connections turned away", state.edge.refused_connections);
   add(kGauge, "terrace_http_transfer_bytes", "Bytes of bodies on their way", state.edge.transfers.held_bytes);
-  add(kCounter, "terrace_http_transfers_refused_total", "Bodies that found no room", state.edge.transfers.refused);
-  add(kCounter, "terrace_http_transfers_cut_total", "Replies cut off because others needed their room",
-      state.edge.transfers.cut);
+  add(kGauge, "terrace_http_transfers_waiting", "Bodies that wait for room", state.edge.transfers.waiting);
+  add(kCounter, "terrace_http_transfers_refused_total", "Bodies that found no room before their deadline",
+      state.edge.transfers.refused);
+  add(kCounter, "terrace_http_transfers_cut_total",
+      "Replies cut off and uploads displaced because others needed their room", state.edge.transfers.cut);
   add(kGauge, "terrace_datasets", "Datasets served", state.datasets);
   add(kGauge, "terrace_degraded", "Troubles that /readyz tells of", state.troubles);
   add(kCounter, "terrace_catalogs_total", "How often what is served was replaced", state.catalogs);

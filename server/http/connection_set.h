@@ -26,6 +26,8 @@ class Connection {
   // Finish the request that has begun, if one has, and close.
   virtual void Drain() = 0;
   virtual void Abort() = 0;
+  // Refuse the request whose body takes room that is needed.
+  virtual void Displace() { Abort(); }
 };
 
 class ConnectionSet {

@@ -52,19 +52,23 @@ std::uint64_t Gate::NumberOf(const Request& request, const Caller& caller) {
   return HasName(request) ? std::hash<std::string>{}(Who(request, caller)) | 1 : caller.number;
 }
 
-std::optional<Response> Gate::RefuseForRate(const Request& request, const Result<Route>& route, const Caller& caller) {
-  if (route && IsProbe(route->kind)) return std::nullopt;
+RateLimiter::Turn Gate::TakeTurn(const Request& request, const Result<Route>& route, const Caller& caller,
+                                 std::chrono::milliseconds longest_wait) {
+  if (route && IsProbe(route->kind)) return {};
   const bool has_name = HasName(request);
   RateLimiter::Rate rate = options_.rate;
   if (has_name && request.grant->requests_per_second > 0) {
     rate.per_second = request.grant->requests_per_second;
     rate.burst = 2 * rate.per_second;
   }
-  if (rate.per_second <= 0) return std::nullopt;
-  const auto wait = limiter_.Refuse(Who(request, caller), rate, RateLimiter::Clock::now());
-  if (!wait) return std::nullopt;
+  if (rate.per_second <= 0) return {};
+  return limiter_.Take(Who(request, caller), rate, RateLimiter::Clock::now(), longest_wait);
+}
+
+Response Gate::TooManyRequests(const RateLimiter::Turn& turn, const Request& request, const Result<Route>& route) {
   Response response = ProblemResponse(429, "too many requests", request.id);
-  response.headers.emplace_back("Retry-After", fmt::to_string(std::max<std::int64_t>((wait->count() + 999) / 1000, 1)));
+  const std::int64_t seconds = (turn.wait.count() + 999) / 1000;
+  response.headers.emplace_back("Retry-After", fmt::to_string(std::max<std::int64_t>(seconds, 1)));
   if (route) response.route = ToString(route->kind);
   return response;
 }

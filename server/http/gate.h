@@ -3,6 +3,7 @@
 // Thread-safe.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -48,8 +49,12 @@ class Gate {
   // The same in short; never 0.
   static std::uint64_t NumberOf(const Request& request, const Caller& caller);
 
-  // 429; nothing where the request may go on. All but probes count, those to URLs that do not exist among them.
-  std::optional<Response> RefuseForRate(const Request& request, const Result<Route>& route, const Caller& caller);
+  // When the request may go on, at most after `longest_wait`: clients that ask too often wait. All but probes count,
+  // those to URLs that do not exist among them.
+  RateLimiter::Turn TakeTurn(const Request& request, const Result<Route>& route, const Caller& caller,
+                             std::chrono::milliseconds longest_wait);
+  // 429, to whom no turn was granted.
+  static Response TooManyRequests(const RateLimiter::Turn& turn, const Request& request, const Result<Route>& route);
 
   // 401 or 403; nothing where the request may go on.
   std::optional<Response> Refuse(const Request& request, const Route& route) const;

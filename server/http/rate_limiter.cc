@@ -19,9 +19,10 @@ double RateLimiter::Bucket::LevelAt(Clock::time_point now) const {
   return std::min(level + seconds * rate, static_cast<double>(burst));
 }
 
-std::optional<std::chrono::milliseconds> RateLimiter::Refuse(std::string_view client, Rate rate,
-                                                             Clock::time_point now) {
-  if (rate.per_second <= 0) return std::nullopt;
+RateLimiter::Turn RateLimiter::Take(std::string_view client, Rate rate, Clock::time_point now,
+                                    std::chrono::milliseconds longest_wait) {
+  Turn turn;
+  if (rate.per_second <= 0) return turn;
   const std::uint64_t hash = std::max<std::uint64_t>(XXH3_64bits_withSeed(client.data(), client.size(), seed_), 1);
   const std::size_t set = hash % kSets;
   const std::lock_guard lock(locks_[set % kLocks]);
@@ -35,10 +36,17 @@ std::optional<std::chrono::milliseconds> RateLimiter::Refuse(std::string_view cl
     *bucket = {hash, now, burst, static_cast<float>(rate.per_second), burst};
   }
   const double level = bucket->LevelAt(now);
-  if (level < 1) return std::chrono::milliseconds(std::llround(std::ceil((1 - level) / rate.per_second * 1000)));
+  if (level < 1) {
+    turn.wait = std::chrono::milliseconds(std::llround(std::ceil((1 - level) / rate.per_second * 1000)));
+    turn.granted = turn.wait <= longest_wait;
+    if (!turn.granted) {
+      turn.wait -= longest_wait;
+      return turn;
+    }
+  }
   bucket->level = static_cast<float>(level - 1);
   bucket->filled_at = now;
-  return std::nullopt;
+  return turn;
 }
 
 }  // namespace terrace::server

@@ -7,7 +7,6 @@
 #include <chrono>
 #include <cstdint>
 #include <mutex>
-#include <optional>
 #include <string_view>
 #include <vector>
 
@@ -24,8 +23,13 @@ class RateLimiter {
 
   RateLimiter();
 
-  // Takes one request from the client's bucket. Not there: how long until it will be.
-  std::optional<std::chrono::milliseconds> Refuse(std::string_view client, Rate rate, Clock::time_point now);
+  struct Turn {
+    bool granted = true;
+    std::chrono::milliseconds wait{0};  // until the request may go on, or until the next one would be granted
+  };
+
+  // Takes one request from the client's bucket, also one that will only be there in `longest_wait` or before.
+  Turn Take(std::string_view client, Rate rate, Clock::time_point now, std::chrono::milliseconds longest_wait);
 
  private:
   static constexpr std::size_t kSets = 16'384, kPlaces = 4, kLocks = 64;
@@ -33,7 +37,7 @@ class RateLimiter {
   struct Bucket {
     std::uint64_t client = 0;  // a keyed hash; 0: free
     Clock::time_point filled_at{};
-    float level = 0;  // at `filled_at`
+    float level = 0;  // at `filled_at`; below 0: requests wait for it
     float rate = 0, burst = 0;
 
     double LevelAt(Clock::time_point now) const;

@@ -69,6 +69,22 @@ class RequestId {
   std::size_t size_ = 0;
 };
 
+// The body of a request, shared by the request's copies and by jobs that read it. What its memory counts against is
+// told when the last of them is gone.
+class RequestBody {
+ public:
+  RequestBody() = default;
+  explicit RequestBody(std::shared_ptr<const std::string> text) : text_(std::move(text)) {}
+
+  operator std::string_view() const {  // NOLINT(google-explicit-constructor)
+    return text_ ? std::string_view(*text_) : std::string_view();
+  }
+  std::size_t size() const { return text_ ? text_->size() : 0; }
+
+ private:
+  std::shared_ptr<const std::string> text_;
+};
+
 struct Request {
   Method method = Method::kGet;
   unsigned version = 11;    // 10 or 11
@@ -80,7 +96,7 @@ struct Request {
   SharedFields fields;
   std::size_t content_length = 0;  // of a POST
   bool expects_continue = false;   // the client waits for a 100 before it sends the body
-  std::string body;                // of a POST, once the session has read it
+  RequestBody body;                // of a POST, once the session has read it
 
   // Given by the server.
   RequestId id;

@@ -86,20 +86,29 @@ bool RequestReader::FillWithWhatArrived() {
   return got > 0;
 }
 
-asio::awaitable<tl::expected<void, BadRequest>> RequestReader::ReadBody(Request& request) {
+asio::awaitable<tl::expected<void, BadRequest>> RequestReader::ReadBody(const Request& request, std::string& text,
+                                                                        std::size_t size) {
+  const auto begun = Stream::Clock::now();
   stream_.ExpiresAfter(timeouts_.message);
-  if (request.expects_continue && Unread().empty()) {
+  if (request.expects_continue && text.empty() && Unread().empty()) {
     const BufferPair interim = {asio::buffer(kContinue), asio::const_buffer()};
     const Transfer sent = co_await stream_.WriteSome(interim);
     if (!sent) co_return tl::unexpected(Gone());
   }
-  for (;;) {
-    const std::string_view here = Unread().substr(0, request.content_length - request.body.size());
-    request.body.append(here);
+  for (std::size_t arrived = 0;;) {
+    const std::string_view here = Unread().substr(0, size - text.size());
+    text.append(here);
     Consume(here.size());
-    if (request.body.size() == request.content_length) co_return tl::expected<void, BadRequest>();
-    const Transfer got = co_await Fill(std::min(request.content_length - request.body.size(), kMaxHeadBytes));
+    if (text.size() == size) co_return tl::expected<void, BadRequest>();
+    const Transfer got = co_await Fill(std::min(size - text.size(), kMaxHeadBytes));
     if (!got) co_return tl::unexpected(stream_.expired() ? TooSlow() : Gone());
+    arrived += *got;
+    auto deadline = Stream::Clock::now() + timeouts_.message;
+    if (timeouts_.min_rate > 0) {
+      const std::chrono::milliseconds earned(arrived * 1000 / timeouts_.min_rate);
+      deadline = std::min(deadline, begun + timeouts_.message + earned);
+    }
+    stream_.ExpiresAt(deadline);
   }
 }
 

@@ -17,8 +17,10 @@
 namespace terrace::server {
 
 struct ReadTimeouts {
-  std::chrono::milliseconds message{5'000};  // from a request's first byte to its empty line; again for its body
+  std::chrono::milliseconds message{5'000};  // from a request's first byte to its empty line; of a body, without a
+                                             // single byte, and before min_rate counts
   std::chrono::milliseconds idle{30'000};    // between a reply and the next request
+  std::size_t min_rate = 4096;               // bytes a second of a body in the long run; 0: any
 };
 
 class RequestReader {
@@ -30,9 +32,9 @@ class RequestReader {
   using Head = std::optional<tl::expected<void, BadRequest>>;
   asio::awaitable<Head> ReadHead(Request& request, Stream::Clock::time_point now);
 
-  // Reads as many bytes as the request promises; memory is taken as they arrive. What went wrong: `status` 0 says that
-  // the client left.
-  asio::awaitable<tl::expected<void, BadRequest>> ReadBody(Request& request);
+  // Reads the request's body until `text`, which has its beginning, has `size` bytes of it. What went wrong: `status` 0
+  // says that the client left, or that the stream was cancelled.
+  asio::awaitable<tl::expected<void, BadRequest>> ReadBody(const Request& request, std::string& text, std::size_t size);
 
   // No further request is waited for; one that has begun is read.
   void Close();

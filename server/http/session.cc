@@ -8,6 +8,7 @@
 #include <boost/asio/detached.hpp>
 #include <boost/asio/dispatch.hpp>
 #include <boost/asio/experimental/awaitable_operators.hpp>
+#include <boost/asio/redirect_error.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/system/system_error.hpp>
@@ -20,6 +21,7 @@
 #include "server/http/http_error.h"
 #include "server/http/stream.h"
 #include "server/http/text.h"
+#include "server/http/waits.h"
 
 namespace terrace::server {
 namespace {
@@ -51,6 +53,12 @@ std::optional<Response> WhyNoBody(const Request& request, std::size_t max_body_b
   return std::nullopt;
 }
 
+// A request's body and its room.
+struct HeldBody {
+  TransferBudget::Hold room;
+  std::string text;
+};
+
 // Off the front.
 void Skip(std::size_t bytes, BufferPair& buffers) {
   const std::size_t of_head = std::min(bytes, buffers[0].size());
@@ -63,7 +71,8 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   Session(asio::ip::tcp::socket socket, std::shared_ptr<const SessionContext> context)
       : context_(std::move(context)),
         stream_(std::move(socket), context_->tls ? context_->tls->Current() : nullptr),
-        reader_(stream_, context_->options.read) {
+        reader_(stream_, context_->options.read),
+        displacement_(stream_.socket().get_executor(), Clock::time_point::max()) {
     boost::system::error_code error;
     const auto peer = stream_.socket().remote_endpoint(error);
     if (error) return;
@@ -77,6 +86,7 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   void CloseIfIdle() override { Post(&Session::CloseIfIdleHere); }
   void Drain() override { Post(&Session::DrainHere); }
   void Abort() override { Post(&Session::AbortHere); }
+  void Displace() override { Post(&Session::DisplaceHere); }
 
  private:
   // The request that the session is at, and what is to be told about it.
@@ -100,16 +110,31 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
     stream_.Reset();
   }
 
+  // Its reply is under way, or its body has no room: then there is nothing to give up.
+  void DisplaceHere() {
+    if (!has_upload_) return;
+    displaced_ = true;
+    if (is_receiving_) stream_.Cancel();
+    displacement_.cancel();
+  }
+
   asio::awaitable<void> ServeAll();
   asio::awaitable<bool> ServeOne();
   asio::awaitable<void> RefuseMessage(BadRequest why);
   asio::awaitable<bool> ServeLater(Route route);
+  asio::awaitable<bool> ReceiveBody();
+  asio::awaitable<void> RefuseUpload();
   std::optional<Response> Refuse(const Result<Route>& route) const;
   asio::awaitable<void> HoldBack();
   std::optional<Response> AnswerAtOnce(const Result<Route>& route) const;
   asio::awaitable<std::optional<Response>> AnswerWhileConnected(Route route, Request request);
   asio::awaitable<Response> Answer(Route route, Request request);
-  asio::awaitable<bool> Reply(Response& response);
+  asio::awaitable<void> Interrupted();
+  asio::awaitable<std::optional<TransferBudget::Hold>> RoomLater(Route route, Response& response);
+  TransferBudget::Ask AskFor(const Response& response) const;
+  bool SendsBody(const Response& response) const;
+  Clock::time_point Deadline() const { return exchange_.begun + context_->deadline->load(std::memory_order_relaxed); }
+  asio::awaitable<bool> Reply(Response& response, const Route* route = nullptr);
   asio::awaitable<bool> WriteRest(BufferPair left, std::size_t total);
   asio::awaitable<void> CloseGently();
   void Report(const Response& response, std::size_t bytes);
@@ -122,7 +147,11 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   Exchange exchange_;
   Clock::time_point replied_;  // when the last reply was told about: the present, once the next request is waited for
   std::uint64_t served_ = 0;
-  bool hurried_ = false;  // others wait for this connection's place
+  bool hurried_ = false;             // others wait for this connection's place
+  asio::steady_timer displacement_;  // never expires; cancelled when displaced_ is set
+  bool has_upload_ = false;          // the request's body has room that others may need
+  bool is_receiving_ = false;        // the body is being read
+  bool displaced_ = false;           // others need the room of the request's body
 };
 
 asio::awaitable<void> Session::ServeAll() {
@@ -165,32 +194,32 @@ asio::awaitable<bool> Session::ServeOne() {
   request.is_https = stream_.is_tls();
   exchange_.caller = context_->gate->Identify(request, peer_);
   const Result<Route> route = Match(request.target);
+  const RateLimiter::Turn turn =
+      context_->gate->TakeTurn(request, route, exchange_.caller, context_->deadline->load(std::memory_order_relaxed));
+  if (!turn.granted) {
+    Response response = Gate::TooManyRequests(turn, request, route);
+    response.close = request.content_length > 0;
+    co_await HoldBack();
+    co_return co_await Reply(response);
+  }
+  if (turn.wait.count() > 0 && !co_await SleepWhileConnected(stream_, turn.wait)) co_return false;
   std::optional<Response> response = AnswerAtOnce(route);
   if (!response) co_return co_await ServeLater(*route);
-  if (response->status == 429) co_await HoldBack();
-  co_return co_await Reply(*response);
+  co_return co_await Reply(*response, route ? &*route : nullptr);
 }
 
 // What has to be waited for: the request's body, and the answer.
 asio::awaitable<bool> Session::ServeLater(Route route) {
   Request& request = exchange_.request;
   request.client = Gate::NumberOf(request, exchange_.caller);
-  std::optional<TransferBudget::Hold> incoming =
-      context_->transfers->TryHold(request.content_length, weak_from_this(), exchange_.begun);
-  if (!incoming) {
-    Response response = Overloaded("too many request bodies are on their way", request.id);
-    response.close = true;
-    co_await HoldBack();
-    co_return co_await Reply(response);
-  }
-  if (request.content_length > 0) {
-    const tl::expected<void, BadRequest> read = co_await reader_.ReadBody(request);
-    if (!read && read.error().status > 0) co_await RefuseMessage(read.error());
-    if (!read) co_return false;
-    incoming->Settle();  // it is the server's turn
-  }
+  displaced_ = has_upload_ = false;
+  if (request.content_length > 0 && !co_await ReceiveBody()) co_return false;
   stream_.ExpiresNever();  // the handlers have deadlines of their own
   std::optional<Response> response = co_await AnswerWhileConnected(route, request);
+  if (!response && displaced_) {
+    co_await RefuseUpload();
+    co_return false;
+  }
   if (!response) {
     Response nobody;
     nobody.status = kClientLeft;
@@ -198,17 +227,61 @@ asio::awaitable<bool> Session::ServeLater(Route route) {
     stream_.Close();
     co_return false;
   }
+  has_upload_ = false;
   context_->gate->Mark(request, route, *response);
-  const bool keep = co_await Reply(*response);
-  request.body = std::string();  // nothing of it is held while the connection waits
+  const bool keep = co_await Reply(*response, &route);
+  request.body = RequestBody();  // nothing of it is held while the connection waits
   co_return keep;
+}
+
+// False: it did not come, what was to be said has been said, and the connection is to be closed. A body has room as a
+// whole once more than kFreeBytes of it have come: whoever only announces one takes nothing.
+asio::awaitable<bool> Session::ReceiveBody() {
+  Request& request = exchange_.request;
+  const auto body = std::make_shared<HeldBody>();
+  is_receiving_ = true;
+  const std::size_t first = std::min(request.content_length, TransferBudget::kFreeBytes);
+  tl::expected<void, BadRequest> read = co_await reader_.ReadBody(request, body->text, first);
+  if (read && request.content_length > first) {
+    TransferBudget::Ask ask;
+    ask.kind = TransferBudget::Kind::kUpload;
+    ask.bytes = request.content_length;
+    ask.client = request.client;
+    ask.holder = weak_from_this();
+    std::optional<TransferBudget::Hold> room =
+        co_await HoldWhileConnected(stream_, *context_->transfers, std::move(ask), Deadline());
+    if (!room) {
+      co_await RefuseUpload();
+      co_return false;
+    }
+    body->room = *std::move(room);
+    has_upload_ = true;
+    body->text.reserve(request.content_length);
+    read = co_await reader_.ReadBody(request, body->text, request.content_length);
+  }
+  is_receiving_ = false;
+  if (displaced_) co_await RefuseUpload();
+  if (!read && !displaced_ && read.error().status > 0) co_await RefuseMessage(read.error());
+  if (!read || displaced_) co_return false;
+  body->room.Settle();  // it is the server's turn
+  request.body = RequestBody(std::shared_ptr<const std::string>(body, &body->text));
+  co_return true;
+}
+
+// Its room goes to others: nothing of it is kept.
+asio::awaitable<void> Session::RefuseUpload() {
+  exchange_.request.body = RequestBody();
+  has_upload_ = is_receiving_ = false;
+  Response response = Overloaded("too many request bodies are on their way", exchange_.request.id);
+  response.close = true;
+  co_await HoldBack();
+  co_await Reply(response);
 }
 
 // What can be said without the request's body. Preflights come before access: they carry no token.
 std::optional<Response> Session::Refuse(const Result<Route>& route) const {
   const Request& request = exchange_.request;
   const bool takes_post = route && TakesPost(route->kind);
-  if (std::optional<Response> refusal = context_->gate->RefuseForRate(request, route, exchange_.caller)) return refusal;
   if (request.method == Method::kOptions) return PreflightResponse(takes_post);
   if (request.method == Method::kOther || (request.method == Method::kPost && !takes_post)) {
     return NoSuchMethodResponse(takes_post, request.id);
@@ -246,13 +319,21 @@ std::optional<Response> Session::AnswerAtOnce(const Result<Route>& route) const 
   return response;
 }
 
-// Nothing: the client is gone.
+// Nothing: the client is gone, or the request's room goes to others.
 asio::awaitable<std::optional<Response>> Session::AnswerWhileConnected(Route route, Request request) {
   using asio::experimental::awaitable_operators::operator||;
   std::variant<Response, std::monostate> first =
-      co_await (Answer(std::move(route), std::move(request)) || ClientLeft(stream_));
+      co_await (Answer(std::move(route), std::move(request)) || Interrupted());
   if (first.index() == 1) co_return std::nullopt;
   co_return std::move(std::get<0>(first));
+}
+
+asio::awaitable<void> Session::Interrupted() {
+  using asio::experimental::awaitable_operators::operator||;
+  if (!has_upload_) co_return co_await ClientLeft(stream_);
+  boost::system::error_code ignored;  // cancelled, which is what is waited for
+  auto displaced = asio::redirect_error(asio::use_awaitable, ignored);
+  if (!displaced_) co_await (ClientLeft(stream_) || displacement_.async_wait(std::move(displaced)));
 }
 
 // Never throws, so that the race above always has a winner.
@@ -271,19 +352,61 @@ asio::awaitable<Response> Session::Answer(Route route, Request request) {
   co_return BackendErrorResponse(error, id);
 }
 
-// False: the connection is to be closed. `response` has to live as long.
-asio::awaitable<bool> Session::Reply(Response& response) {
+bool Session::SendsBody(const Response& response) const {
+  return exchange_.request.method != Method::kHead && response.status != 304 && response.body;
+}
+
+TransferBudget::Ask Session::AskFor(const Response& response) const {
+  TransferBudget::Ask ask;
+  ask.kind = response.is_vital ? TransferBudget::Kind::kVitalReply : TransferBudget::Kind::kReply;
+  ask.bytes = SendsBody(response) ? response.body->size() : 0;
+  ask.body = response.body;
+  ask.client = Gate::NumberOf(exchange_.request, exchange_.caller);
+  ask.holder = std::const_pointer_cast<Session>(shared_from_this());
+  return ask;
+}
+
+// Lets go of the reply's body, waits for room for it, and makes the reply again, mostly from a cache: what waits must
+// not take the memory that it waits for. Nothing: there was none before the deadline, or the client is gone.
+asio::awaitable<std::optional<TransferBudget::Hold>> Session::RoomLater(Route route, Response& response) {
+  for (;;) {
+    TransferBudget::Ask ask = AskFor(response);
+    const std::size_t bytes = ask.bytes;
+    ask.body = nullptr;
+    Response bare;  // its lines refer to the body's owner too
+    bare.route = response.route;
+    bare.dataset = std::move(response.dataset);
+    response = std::move(bare);
+    std::optional<TransferBudget::Hold> room =
+        co_await HoldWhileConnected(stream_, *context_->transfers, std::move(ask), Deadline());
+    if (!room) co_return room;
+    std::optional<Response> again = co_await AnswerWhileConnected(route, exchange_.request);
+    if (!again) co_return std::nullopt;
+    context_->gate->Mark(exchange_.request, route, *again);
+    response = *std::move(again);
+    if (SendsBody(response) && response.body->size() > bytes) continue;  // of another dataset than before
+    room->Keep(response.body);
+    co_return room;
+  }
+}
+
+// False: the connection is to be closed. `response` has to live as long. `route`: how to make it again; null: it is
+// small.
+asio::awaitable<bool> Session::Reply(Response& response, const Route* route) {
   const Request& request = exchange_.request;
-  const bool with_body = request.method != Method::kHead && response.status != 304;
-  const auto kind = response.is_vital ? TransferBudget::Kind::kVitalReply : TransferBudget::Kind::kReply;
-  std::optional<TransferBudget::Hold> room =
-      context_->transfers->TryHold(with_body ? response.body : nullptr, weak_from_this(), Clock::now(), kind,
-                                   Gate::NumberOf(request, exchange_.caller));
+  const bool with_body = SendsBody(response);
+  std::optional<TransferBudget::Hold> room;
+  if (!with_body || response.body->size() <= TransferBudget::kFreeBytes) {
+    room.emplace();
+  } else {
+    room = context_->transfers->TryHold(AskFor(response));
+  }
+  if (!room && route != nullptr) room = co_await RoomLater(*route, response);
   if (!room) {
-    const std::string_view route = response.route;
+    const std::string_view label = response.route;
     const std::string dataset = std::move(response.dataset);
-    response = Overloaded("too many replies are on their way", request.id);  // at once: there is no room for the body
-    response.route = route;
+    response = Overloaded("too many replies are on their way", request.id);
+    response.route = label;
     response.dataset = dataset;
     room.emplace();
     co_await HoldBack();
@@ -294,7 +417,7 @@ asio::awaitable<bool> Session::Reply(Response& response) {
   options.cors = &context_->cors;
   options.origin = request.fields->origin;
   const std::string head = SerializeHead(response, options);
-  const std::size_t body_bytes = with_body && response.body ? response.body->size() : 0;
+  const std::size_t body_bytes = SendsBody(response) ? response.body->size() : 0;
 
   BufferPair left = {asio::buffer(head), body_bytes > 0 ? asio::buffer(*response.body) : asio::const_buffer()};
   // What the kernel takes at once needs no deadline. An error shows again when the rest is written.

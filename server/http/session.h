@@ -2,9 +2,11 @@
 //
 // Everything of a session happens on one thread. What a client can make it hold is bounded: one read buffer of
 // kMaxHeadBytes, one request with a body of at most max_body_bytes, one reply; bodies count in a budget that all
-// sessions share.
+// sessions share. Where there is no room, or requests come faster than they may, the session waits; it refuses when
+// the request's deadline comes.
 #pragma once
 
+#include <atomic>
 #include <boost/asio/ip/tcp.hpp>
 #include <chrono>
 #include <functional>
@@ -49,6 +51,7 @@ struct SessionContext {
   std::function<void(const ReplyRecord&)> observer;  // after every reply; called on any io thread
   ConnectionSet* connections = nullptr;
   TransferBudget* transfers = nullptr;
+  const std::atomic<std::chrono::milliseconds>* deadline = nullptr;  // of a request, since its head
   Gate* gate = nullptr;
   CorsPolicy cors;
   const TlsContext* tls = nullptr;  // null: plain HTTP

@@ -52,11 +52,13 @@ asio::awaitable<void> ReadAll(RequestReader& reader, Seen& seen) {
       break;
     }
     if (request.content_length > 0) {
-      const auto body = co_await reader.ReadBody(request);
+      auto text = std::make_shared<std::string>();
+      const auto body = co_await reader.ReadBody(request, *text, request.content_length);
       if (!body) {
         seen.refused = body.error().status;
         break;
       }
+      request.body = RequestBody(std::move(text));
     }
     more = request.keep_alive;
     seen.requests.push_back(std::move(request));

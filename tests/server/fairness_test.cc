@@ -199,5 +199,102 @@ TEST_F(Fairness, LongListsOfPointsLeaveAWorkerForTiles) {
   EXPECT_EQ(StatusOf(polite), 200);
 }
 
+class Uploads : public Fairness {
+ protected:
+  // Of the largest size that is taken, most of it blanks.
+  static std::string Large(const std::string& fields) {
+    std::string body = R"({"locations": "1,7"})";
+    body.resize(600'000, ' ');
+    return "POST /maui/heights HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\nContent-Length: 600000\r\n" +
+           fields + "\r\n" + body;
+  }
+  static std::string Begun(std::size_t bytes, const std::string& fields) {
+    const std::string whole = Large(fields);
+    return whole.substr(0, whole.find("\r\n\r\n") + 4 + bytes);
+  }
+};
+
+TEST_F(Uploads, ThatAreOnlyAnnouncedTakeNothing) {
+  ServerOptions options;
+  options.header_timeout = 1h;
+  StartHeld(options);
+  LetAllGo();
+  for (int i = 0; i < 60; ++i) Send(Begun(1, From("192.0.2.1")));
+  EXPECT_EQ(StatusOf(Send(Large(From("192.0.2.2")))), 200);
+  EXPECT_EQ(Gauge("terrace_http_transfers_cut_total"), 0);
+}
+
+TEST_F(Uploads, OfAFloodMakeRoomForAnothers) {
+  ServerOptions options;
+  options.header_timeout = 1h;
+  StartHeld(options);
+  LetAllGo();
+  for (int i = 0; i < 60; ++i) Send(Begun(20'000, From("192.0.2.1")));
+  ASSERT_TRUE(Eventually([&] { return Gauge("terrace_http_transfers_waiting") >= 40; }));
+  EXPECT_EQ(StatusOf(Send(Large(From("192.0.2.2")))), 200);
+  EXPECT_EQ(Gauge("terrace_http_transfers_cut_total"), 1) << "the newest of the flood";
+}
+
+TEST_F(Uploads, ThatAreDisplacedAreTold) {
+  ServerOptions options;
+  options.header_timeout = 1h;
+  options.edge.transfer_bytes = std::size_t{6} << 20;  // two uploads
+  StartHeld(options);
+  RawClient& answered = Send(Large(From("192.0.2.1")));
+  ASSERT_TRUE(Eventually([&] { return Fairness::Begun().size() == 1; }));
+  RawClient& reading = Send(Begun(20'000, From("192.0.2.1")));
+  ASSERT_TRUE(Eventually([&] { return Gauge("terrace_http_transfer_bytes") == 1'200'000; }));
+  RawClient& polite = Send(Large(From("192.0.2.2")));
+  const auto told = reading.Read();
+  ASSERT_TRUE(told);
+  EXPECT_EQ(told->status, 503);
+  EXPECT_NE(told->Field("retry-after"), "");
+  LetAllGo();
+  EXPECT_EQ(StatusOf(polite), 200);
+  EXPECT_EQ(StatusOf(answered), 200);
+}
+
+TEST_F(Uploads, ThatLeaveStayWithinTheirRoom) {
+  StartHeld();
+  for (int i = 0; i < 2; ++i) Send(Get(Tile(i)));  // the workers are busy
+  ASSERT_TRUE(Eventually([&] { return Fairness::Begun().size() == 2; }));
+  for (int i = 0; i < 260; ++i) {
+    RawClient client(port());
+    client.Send(Large(From("192.0.2.1")));
+    EXPECT_TRUE(i % 20 != 0 || Gauge("terrace_http_transfer_bytes") <= 8 << 20);
+  }
+  EXPECT_LE(Gauge("terrace_http_transfer_bytes"), 8 << 20);
+  EXPECT_TRUE(Eventually([&] { return Gauge("terrace_http_transfer_bytes") == 0; }));
+  EXPECT_TRUE(Waiting(0));
+}
+
+TEST_F(Uploads, HaveTheirRoomUntilTheJobHasEnded) {
+  StartHeld();
+  Send(Large(""));
+  ASSERT_TRUE(Eventually([&] { return Fairness::Begun().size() == 1; }));
+  EXPECT_EQ(Gauge("terrace_http_transfer_bytes"), 600'000);
+  LetAllGo();
+  EXPECT_EQ(StatusOf(*clients_.back()), 200);
+  EXPECT_TRUE(Eventually([&] { return Gauge("terrace_http_transfer_bytes") == 0; }));
+}
+
+TEST_F(Uploads, OfSlowClientsAreReadToTheirEnd) {
+  ServerOptions options;
+  options.header_timeout = 300ms;
+  options.min_read_rate = 4096;
+  StartHeld(options);
+  LetAllGo();
+  std::string body = R"({"locations": "1,7"})";
+  body.resize(99'000, ' ');
+  RawClient& client =
+      Send("POST /maui/heights HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\nContent-Length: " +
+           std::to_string(body.size()) + "\r\n\r\n");
+  for (std::size_t at = 0; at < body.size(); at += 9'000) {
+    std::this_thread::sleep_for(100ms);  // 90,000 bytes a second, for longer than the timeout
+    client.Send(body.substr(at, 9'000));
+  }
+  EXPECT_EQ(StatusOf(client), 200);
+}
+
 }  // namespace
 }  // namespace terrace::server

@@ -14,7 +14,7 @@ class RateLimiterTest : public testing::Test {
   // How many of `tries` requests pass at once.
   int Passing(std::string_view client, RateLimiter::Rate rate, int tries) {
     int passed = 0;
-    for (int i = 0; i < tries; ++i) passed += !limiter_.Refuse(client, rate, now_);
+    for (int i = 0; i < tries; ++i) passed += limiter_.Take(client, rate, now_, 0ms).granted;
     return passed;
   }
 
@@ -33,12 +33,30 @@ TEST_F(RateLimiterTest, LetsABurstPassAndThenTheRate) {
 
 TEST_F(RateLimiterTest, SaysHowLongToWait) {
   const RateLimiter::Rate rate{0.5, 1};
-  EXPECT_FALSE(limiter_.Refuse("a", rate, now_));
-  EXPECT_EQ(limiter_.Refuse("a", rate, now_), 2000ms);
+  const auto take = [&] { return limiter_.Take("a", rate, now_, 0ms); };
+  EXPECT_TRUE(take().granted);
+  EXPECT_FALSE(take().granted);
+  EXPECT_EQ(take().wait, 2000ms);
   now_ += 1500ms;
-  EXPECT_EQ(limiter_.Refuse("a", rate, now_), 500ms);
+  EXPECT_EQ(take().wait, 500ms);
   now_ += 501ms;
-  EXPECT_FALSE(limiter_.Refuse("a", rate, now_));
+  EXPECT_TRUE(take().granted);
+}
+
+TEST_F(RateLimiterTest, WhoCanWaitIsGivenATurn) {
+  const RateLimiter::Rate rate{10, 2};
+  const auto take = [&] { return limiter_.Take("a", rate, now_, 1s); };
+  for (int i = 0; i < 2; ++i) EXPECT_EQ(take().wait, 0ms);
+  for (int i = 1; i <= 10; ++i) {
+    const RateLimiter::Turn turn = take();
+    EXPECT_TRUE(turn.granted) << i;
+    EXPECT_EQ(turn.wait, i * 100ms) << "one after the other";
+  }
+  const RateLimiter::Turn refused = take();
+  EXPECT_FALSE(refused.granted);
+  EXPECT_EQ(refused.wait, 100ms) << "then one more would be given a turn";
+  now_ += 100ms;
+  EXPECT_TRUE(take().granted) << "a refusal has taken nothing";
 }
 
 TEST_F(RateLimiterTest, CountsEachClientByItself) {
@@ -54,7 +72,7 @@ TEST_F(RateLimiterTest, LetsAtLeastOnePass) { EXPECT_EQ(Passing("a", {1, 0.1}, 3
 TEST_F(RateLimiterTest, DoesNotForgetTheBusyForTheQuiet) {
   const RateLimiter::Rate rate{1, 100};
   EXPECT_EQ(Passing("busy", rate, 100), 100);
-  for (int i = 0; i < 300'000; ++i) limiter_.Refuse(std::to_string(i), rate, now_);
+  for (int i = 0; i < 300'000; ++i) limiter_.Take(std::to_string(i), rate, now_, 0ms);
   EXPECT_EQ(Passing("busy", rate, 10), 0) << "more clients than there are places";
 }
 
