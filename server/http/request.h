@@ -81,6 +81,10 @@ class RequestBody {
   }
   std::size_t size() const { return text_ ? text_->size() : 0; }
 
+  friend bool operator==(const RequestBody& a, const RequestBody& b) {
+    return std::string_view(a) == std::string_view(b);
+  }
+
  private:
   std::shared_ptr<const std::string> text_;
 };

@@ -15,6 +15,7 @@ import tempfile
 import threading
 import time
 
+import floods
 import soak
 from server import Server, fetch, get, percentile, read_reply, wait_until
 
@@ -557,3 +558,40 @@ def row_34(_, test_binary, __):
     kept, count, recorded, failed = tests(binary_of(test_binary, "allocation_test"), "*")
     return kept, f"{count} requests, each with every allocation on its way failing once: 503, an answer all the same or the end of the connection, " \
                  "and the next request is answered" + (f"; failed: {failed}" if failed else "")
+
+
+def row_37(binary, _, __):
+    """RSS beside a flood that keeps the workers busy, before and after 260 clients have sent whole uploads and left."""
+    with Server(binary, "--worker-threads", "2", "--trusted-proxies", "127.0.0.1") as server:
+        floods.leave(server.port, 20)
+        everything, _ = floods.floods(server.port)
+        with everything["12 meshes"]:
+            before = server.resident_kib()
+            floods.leave(server.port, 260)
+            grown = max(server.resident_kib() - before, 0)
+    return grown * 1024 <= 32 << 20, f"260 uploads of 600 kB left while workers were busy: RSS +{grown / 1024:.0f} MB of 32 MiB"
+
+
+def row_38(binary, test_binary, long):
+    kept, count, _, failed = tests(test_binary, "Fairness.*:Uploads.*")
+    told = [f"{count} tests" + (f", failed: {failed}" if failed else "")]
+    with Server(binary, "--worker-threads", "2", "--trusted-proxies", "127.0.0.1") as server:
+        everything, polite = floods.floods(server.port)
+        for name, flood in everything.items():
+            statuses = floods.beside(flood, polite, server.port, 20 if long else 5)
+            bad = sum(count for of_kind in statuses.values() for status, count in of_kind.items() if status != 200)
+            kept = kept and bad == 0
+            told.append(f"beside {name}: {bad} of {sum(sum(of_kind.values()) for of_kind in statuses.values())} refused")
+    return kept, "; ".join(told)
+
+
+def row_42(binary, _, long):
+    """Clients that never retry: as many connections at once as a crowd of them has, one cold tile each."""
+    connections = 480
+    with Server(binary, "--worker-threads", "2", "--cache-bytes", "0", "--refinement-cache-bytes", "0") as server:
+        told, kept = [], True
+        for _ in range(5 if long else 1):
+            statuses, slowest = floods.patient(server.port, connections, tiles())
+            kept = kept and statuses == {200: connections}
+            told.append(f"{statuses.get(200, 0)} of {connections} served, slowest {slowest:.1f} s")
+    return kept, "; ".join(told)
