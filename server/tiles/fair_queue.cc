@@ -29,18 +29,13 @@ double FairQueue::Client::UsedAt(JobClock::time_point now) const {
   return used;
 }
 
-std::size_t FairQueue::KindOf(const JobOrder& order) {
-  if (order.is_long) return kKinds - 1;
-  return static_cast<std::size_t>(std::clamp(order.level, 0, static_cast<int>(kKinds) - 2));
-}
-
 void FairQueue::Push(PoolJobPtr job, JobClock::time_point now) {
   Client& client = clients_[job->order.client];
   const bool was_active = client.active();
   const Length length = LengthOf(*job);
   job->key = KeyOf(job->order, now);
   job->number = next_number_++;
-  job->expected_s = means_[KindOf(job->order)].seconds;
+  job->expected_s = MeanOf(job->order).seconds;
   // What may fail for want of memory comes first; Take must not.
   client.started.reserve(threads_);
   client.waiting[length].emplace(job->key, job);
@@ -90,7 +85,7 @@ PoolJobPtr FairQueue::Take(JobClock::time_point now, bool all) {
 
 void FairQueue::Finish(const PoolJobPtr& job, JobClock::time_point now) {
   const double seconds = std::max(Seconds(now - job->started).count(), 0.0);
-  Mean& mean = means_[KindOf(job->order)];
+  Mean& mean = means_[job->order.kind % kKinds];
   mean.samples = std::min(mean.samples + 1, kMeanSamples);
   mean.seconds += (seconds - mean.seconds) / mean.samples;
   const auto client = clients_.find(job->order.client);
@@ -138,7 +133,7 @@ Seconds FairQueue::ExpectedWait(const JobOrder& order, JobClock::time_point now)
     for (auto job = waiting.begin(); job != end; ++job) own += job->second->expected_s;
   }
   double ahead = own;
-  const double until_its_turn = own + means_[KindOf(order)].seconds;
+  const double until_its_turn = own + MeanOf(order).seconds;
   for (const auto& [number, client] : clients_) {
     if (number != order.client) ahead += std::min(client.expected_s[length], until_its_turn);
   }

@@ -27,6 +27,7 @@ struct JobOrder {
                   // deep ones refine, but must not keep them waiting for ever
   bool is_long = false;  // takes seconds: a bounded number of these runs at a time
   JobClock::time_point deadline = JobClock::time_point::max();  // of the wait
+  std::uint64_t kind = 0;                                       // jobs of one kind take about the same time
 };
 
 // A job that waits or runs. Its functions must not throw.
@@ -92,9 +93,9 @@ class FairQueue {
     unsigned samples = 0;
   };
 
-  static constexpr std::size_t kKinds = 64;  // levels of tiles, and long jobs
+  static constexpr std::size_t kKinds = 1024;  // that are told apart: others share a mean
 
-  static std::size_t KindOf(const JobOrder& order);
+  const Mean& MeanOf(const JobOrder& order) const { return means_[order.kind % kKinds]; }
   static Length LengthOf(const PoolJob& job) { return job.order.is_long ? kLong : kShort; }
   bool MayRunLong(bool all) const { return all || long_running_ < max_long_; }
   PoolJobPtr* FirstOf(Client& client, bool all) const;

@@ -15,6 +15,12 @@ using Clock = TileService::Clock;
 
 constexpr int kAfterTiles = 40;  // deeper than any
 
+// Of jobs (JobOrder): tiles of a dataset and level, and work for one request.
+std::uint64_t KindOfTile(const CacheKey& key) {
+  return key.generation * 64 + static_cast<std::uint64_t>(key.request.key.level);
+}
+constexpr std::uint64_t kShortKind = 62, kLongKind = 63;  // no level
+
 Result<EncodedTile> RunWork(const SingleFlight::Work& work, const std::string& what, Clock::time_point asked,
                             std::stop_token stop) {
   const auto queued = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - asked);
@@ -69,6 +75,7 @@ asio::awaitable<Result<ServedTile>> TileService::Get(CatalogPtr catalog, TileReq
   JobOrder order;
   order.client = client;
   order.level = request.key.level;
+  order.kind = KindOfTile(key);
   SingleFlight::Landing landing = co_await flights_.Join(key, std::move(build), deadline, order);
   if (!landing.joined) misses_.fetch_add(1, std::memory_order_relaxed);
   if (!landing.tile) co_return tl::unexpected(std::move(landing.tile.error()));
@@ -112,6 +119,7 @@ asio::awaitable<Result<TilePtr>> TileService::Run(SingleFlight::Work work, Lengt
   order.client = client;
   order.is_long = length == Length::kLong;
   order.level = order.is_long ? kAfterTiles : 0;
+  order.kind = order.is_long ? kLongKind : kShortKind;
   SingleFlight::Landing landing = co_await flights_.Join(key, std::move(build), deadline, order);
   co_return std::move(landing.tile);
 }

@@ -26,8 +26,7 @@ BOUND_MB = sum(CACHES.values()) + 128
 PAUSE_S = 0.02  # of a client between two requests
 CODINGS = ("", "Accept-Encoding: gzip\r\n", "Accept-Encoding: br\r\n", "Accept-Encoding: zstd\r\n")
 NORMALS = "Accept: application/vnd.quantized-mesh;extensions=octvertexnormals\r\n"
-# What all workers but one are busy with is refused at once, rather than made to wait: docs/http-api.md, status 503.
-MESH = {200, "503 + Retry-After"}
+MESH = {200}
 
 
 @dataclasses.dataclass(frozen=True)

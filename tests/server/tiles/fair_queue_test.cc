@@ -14,11 +14,12 @@ using namespace std::chrono_literals;
 
 class FairQueueTest : public testing::Test {
  protected:
-  PoolJobPtr Push(FairQueue& queue, std::uint64_t client, int level = 0, bool is_long = false) {
+  PoolJobPtr Push(FairQueue& queue, std::uint64_t client, int level = 0, bool is_long = false, std::uint64_t kind = 0) {
     auto job = std::make_shared<PoolJob>();
     job->order.client = client;
     job->order.level = level;
     job->order.is_long = is_long;
+    job->order.kind = kind;
     queue.Push(job, now_);
     return job;
   }
@@ -167,7 +168,11 @@ TEST_F(FairQueueTest, TheNewestOfTheLargestMakesRoom) {
 
 TEST_F(FairQueueTest, ExpectsToWaitForItsShareOfWhatIsAhead) {
   FairQueue queue(2);
-  JobOrder greedy{1, 0, false, {}}, polite{2, 0, false, {}};
+  JobOrder greedy, polite, other;
+  greedy.client = 1;
+  polite.client = 2;
+  other.client = 1;
+  other.kind = 7;
   EXPECT_EQ(queue.ExpectedWait(greedy, now_).count(), 0) << "nothing is known yet";
   Push(queue, 1);
   Serve(queue, 100ms);
@@ -175,6 +180,10 @@ TEST_F(FairQueueTest, ExpectsToWaitForItsShareOfWhatIsAhead) {
   EXPECT_NEAR(queue.ExpectedWait(greedy, now_).count(), 5.0, 1e-6)
       << "a hundred jobs of a tenth of a second, two at a time";
   EXPECT_NEAR(queue.ExpectedWait(polite, now_).count(), 0.05, 1e-6) << "one of the other's";
+  EXPECT_NEAR(queue.ExpectedWait(other, now_).count(), 5.0, 1e-6) << "whatever it takes itself";
+  for (int i = 0; i < 100; ++i) Push(queue, 3, 0, false, 7);
+  other.client = 3;
+  EXPECT_EQ(queue.ExpectedWait(other, now_).count(), 0) << "jobs of a kind that never ran are not counted";
 }
 
 }  // namespace
