@@ -265,12 +265,8 @@ server::ServerOptions OptionsOf(const config::Config& config) {
   return options;
 }
 
-// Signals that mean something to the running server. Without a file the end of a terminal is what it always was.
-std::vector<int> SignalsToAnswer(const ServeArguments& arguments, const config::Config& config) {
-  std::vector<int> signals = {SIGUSR1, SIGUSR2};
-  if (!arguments.config_file.empty() || !config.watch) signals.push_back(SIGHUP);
-  return signals;
-}
+// Signals that mean something to the running server, besides those that end it.
+const std::vector<int> kAnsweredSignals = {SIGUSR1, SIGUSR2, SIGHUP};
 
 // `how`: SIG_BLOCK or SIG_UNBLOCK. For this thread and those that it begins.
 void MaskSignals(int how, const std::vector<int>& signals) {
@@ -347,8 +343,7 @@ int Serve(const ServeArguments& arguments) {
   SetUpLog(config.log_level, config.log_format);
   if (arguments.check_config) return CheckConfig(arguments, config);
   // Until they are answered they would be the end, and who rotates logs does not ask how long sources take to open.
-  const std::vector<int> signals = SignalsToAnswer(arguments, config);
-  MaskSignals(SIG_BLOCK, signals);
+  MaskSignals(SIG_BLOCK, kAnsweredSignals);
   server::EncoderVersion();  // of the libraries there are, before GDAL or the system's resolver loads others
   if (const int exit_code = TryStart(config, /*is_running=*/false); exit_code != kExitOk) return exit_code;
   // Before sources are opened, which may take long.
@@ -411,12 +406,10 @@ int Serve(const ServeArguments& arguments) {
   options.disk_cache = *std::move(disk);
   options.refinement_stats = [refinements] { return refinements->stats(); };
   options.on_source_changed = config.watch ? std::function<void()>([&reloader] { reloader.Look(); }) : nullptr;
-  if (std::ranges::find(signals, SIGHUP) != signals.end()) {
-    options.on_signal[SIGHUP] = [&reloader] {
-      NotifyReloading();
-      reloader.Reload();
-    };
-  }
+  options.on_signal[SIGHUP] = [&reloader] {
+    NotifyReloading();
+    reloader.Reload();
+  };
   options.on_stop = NotifyStopping;
   options.on_signal[SIGUSR1] = [] { SetLogLevel(config::LogLevel::kDebug); };
   options.on_signal[SIGUSR2] = [level] { SetLogLevel(*level); };
@@ -431,7 +424,7 @@ int Serve(const ServeArguments& arguments) {
   fmt::print("terrace: serving {}\n", served_text());
   std::fflush(stdout);
   NotifyReady(served_text());
-  MaskSignals(SIG_UNBLOCK, signals);
+  MaskSignals(SIG_UNBLOCK, kAnsweredSignals);
   const server::MemoryTrimmer trimmer;
   const bool drained = server->Wait();
   reloader.Stop();

@@ -14,15 +14,17 @@ namespace {
 
 // A request that takes longer than this is worth asking whether its client is still there.
 constexpr std::chrono::milliseconds kPatience{100};
-// Where bytes that nobody reads yet, another request or the end of TLS, hide whether more will come, the kernel is
-// asked so often.
+// Where bytes that nobody reads yet, another request or the end of what the client sends, hide whether the connection
+// stands, the kernel is asked so often.
 constexpr std::chrono::milliseconds kInterval{250};
 
+// A client that has only ended its own sending (FIN: CLOSE_WAIT here) may still read the reply; RFC 9293, section 3.6.
+// One that closed altogether looks the same until bytes are sent to it, and its tile is built and cached in vain.
 bool IsOpen(asio::ip::tcp::socket& socket) {
   tcp_info info{};
   socklen_t size = sizeof info;
   if (::getsockopt(socket.native_handle(), IPPROTO_TCP, TCP_INFO, &info, &size) != 0) return false;
-  return info.tcpi_state == TCP_ESTABLISHED;
+  return info.tcpi_state == TCP_ESTABLISHED || info.tcpi_state == TCP_CLOSE_WAIT;
 }
 
 }  // namespace

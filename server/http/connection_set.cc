@@ -1,14 +1,16 @@
 #include "server/http/connection_set.h"
 
+#include <optional>
+#include <tuple>
+
 namespace terrace::server {
 
 void ConnectionSet::Add(const std::shared_ptr<Connection>& connection, const std::string& client) {
   bool draining = false;
   {
     const std::lock_guard lock(mutex_);
-    const bool counts = most_of_one_ > 0 && !client.empty();
-    connections_.emplace(connection.get(), Member{connection, counts ? client : std::string()});
-    if (counts) ++of_client_[client];
+    connections_.emplace(connection.get(), Member{connection, client, ++last_number_});
+    ++of_client_[client];
     draining = draining_;
   }
   if (draining) connection->Drain();
@@ -31,6 +33,7 @@ std::size_t ConnectionSet::size() const {
 }
 
 bool ConnectionSet::HasTooMany(const std::string& client) const {
+  if (most_of_one_ == 0 || client.empty()) return false;
   const std::lock_guard lock(mutex_);
   const auto count = of_client_.find(client);
   return count != of_client_.end() && count->second >= most_of_one_;
@@ -52,8 +55,24 @@ std::vector<std::shared_ptr<Connection>> ConnectionSet::Snapshot() const {
   return connections;
 }
 
-void ConnectionSet::CloseIdle() {
-  for (const auto& connection : Snapshot()) connection->CloseIfIdle();
+bool ConnectionSet::EvictOne() {
+  std::weak_ptr<Connection> chosen;
+  {
+    const std::lock_guard lock(mutex_);
+    using Rank = std::tuple<Connection::Phase, std::int64_t, std::uint64_t>;
+    std::optional<Rank> least_worthy;
+    for (const auto& [pointer, member] : connections_) {
+      const Connection::Phase phase = pointer->phase();  // good: a connection that ends waits for mutex_ in Remove
+      if (phase == Connection::Phase::kServes) continue;
+      const Rank rank(phase, -static_cast<std::int64_t>(of_client_.at(member.client)), member.number);
+      if (least_worthy && *least_worthy < rank) continue;
+      least_worthy = rank;
+      chosen = member.connection;
+    }
+    if (!least_worthy) return false;
+  }
+  if (const auto connection = chosen.lock()) connection->Evict();  // else it has just ended
+  return true;
 }
 
 void ConnectionSet::Drain() {

@@ -16,13 +16,20 @@
 
 namespace terrace::server {
 
-// What the set may tell a connection, from any thread.
+// What the set may ask and tell a connection, from any thread.
 class Connection {
  public:
   virtual ~Connection() = default;
 
-  // Close if a reply was sent and no next request has begun.
-  virtual void CloseIfIdle() = 0;
+  enum class Phase : std::uint8_t {
+    kIdle,       // a reply was sent, no next request has begun
+    kReadsHead,  // no complete request head has arrived yet, or TLS is being negotiated
+    kServes,
+  };
+  virtual Phase phase() const = 0;
+
+  // Close, unless it serves a request.
+  virtual void Evict() = 0;
   // Finish the request that has begun, if one has, and close.
   virtual void Drain() = 0;
   virtual void Abort() = 0;
@@ -49,8 +56,9 @@ class ConnectionSet {
   std::uint64_t refused() const { return refused_.load(std::memory_order_relaxed); }
   bool draining() const;
 
-  // Makes room: connections that are only kept alive are the first to go.
-  void CloseIdle();
+  // Makes room for a connection: tells the least worthy one to close. Idle connections go before those without a
+  // complete request head; of these, the oldest of the client that has most. False: all serve requests.
+  bool EvictOne();
 
   // From now on every connection ends after the request it is at.
   void Drain();
@@ -65,13 +73,15 @@ class ConnectionSet {
   struct Member {
     std::weak_ptr<Connection> connection;
     std::string client;
+    std::uint64_t number = 0;  // in the order in which they came
   };
 
   const std::size_t capacity_, most_of_one_;
   mutable std::mutex mutex_;
   std::condition_variable emptied_;
   std::unordered_map<const Connection*, Member> connections_;
-  std::unordered_map<std::string, std::size_t> of_client_;  // connections of each, where that is limited
+  std::unordered_map<std::string, std::size_t> of_client_;  // connections of each
+  std::uint64_t last_number_ = 0;
   bool draining_ = false;
   std::atomic<std::uint64_t> refused_{0};
 };

@@ -23,7 +23,7 @@ namespace {
 using asio::ip::tcp;
 using boost::system::error_code;
 
-constexpr std::chrono::milliseconds kBackOff{10};
+constexpr std::chrono::milliseconds kBackOff{1};
 constexpr std::chrono::milliseconds kMoment{100};
 constexpr int kShedAtOnce = 1000;
 
@@ -180,10 +180,10 @@ asio::awaitable<void> Listener::Pause(std::chrono::milliseconds time) {
   co_await timer.async_wait(asio::redirect_error(asio::use_awaitable, ignored));
 }
 
-// Waits a moment for connections to end, beginning with those that are only kept alive.
+// Takes the place of the least worthy connection, or waits a moment for one to end.
 asio::awaitable<void> Listener::MakeRoom() {
   const auto until = std::chrono::steady_clock::now() + kMoment;
-  context_->connections->CloseIdle();
+  context_->connections->EvictOne();
   do {
     co_await Pause(kBackOff);
   } while (context_->connections->full() && std::chrono::steady_clock::now() < until);

@@ -6,6 +6,8 @@
 #include <boost/beast/http/empty_body.hpp>
 #include <boost/beast/http/fields.hpp>
 #include <boost/beast/http/parser.hpp>
+#include <boost/beast/http/rfc7230.hpp>
+#include <boost/beast/http/verb.hpp>
 #include <cstdint>
 #include <optional>
 #include <random>
@@ -34,6 +36,14 @@ std::string Joined(const Fields& fields, Name name) {
     joined.append(field->value());
   }
   return joined;
+}
+
+// RFC 9112, section 9.3; Beast's own answer knows the first Connection field alone.
+bool WantsKeepAlive(const Fields& fields) {
+  const std::string options = Joined(fields, http::field::connection);
+  http::token_list tokens(options);
+  if (tokens.exists("close")) return false;
+  return fields.version() >= 11 || tokens.exists("keep-alive");
 }
 
 Method ToMethod(http::verb verb) {
@@ -233,6 +243,23 @@ std::size_t TakeRepeated(std::string_view bytes, const HeadMemo& memo, Request& 
   return line->size + memo.bytes.size();
 }
 
+Request FirstLineOf(std::string_view bytes) {
+  Request request;
+  request.method = Method::kOther;
+  std::string_view line = bytes.substr(0, bytes.find_first_of("\r\n"));
+  const std::size_t blank = line.find(' ');
+  const std::string_view method = line.substr(0, blank);
+  if (blank == std::string_view::npos || method.size() > 32 ||
+      !std::all_of(method.begin(), method.end(), [](char c) { return (c >= 'A' && c <= 'Z') || c == '-'; })) {
+    return request;
+  }
+  request.method_name = std::string(method);
+  request.method = ToMethod(http::string_to_verb(method));
+  line.remove_prefix(blank + 1);
+  SetTarget(request, line.substr(0, line.find(' ')));
+  return request;
+}
+
 tl::expected<Request, BadRequest> ParseHead(std::string_view head, HeadMemo* memo) {
   // Beast unfolds continued lines; another reader may see a field there.
   if (head.find("\r\n ") != std::string_view::npos || head.find("\r\n\t") != std::string_view::npos) {
@@ -253,7 +280,7 @@ tl::expected<Request, BadRequest> ParseHead(std::string_view head, HeadMemo* mem
   Request request;
   request.method = ToMethod(fields.method());
   request.version = fields.version();
-  request.keep_alive = fields.keep_alive();
+  request.keep_alive = WantsKeepAlive(fields);
   request.method_name = std::string(fields.method_string());
   RequestFields said = FieldsOf(fields);
   // RFC 9112, section 3.2.2: whatever Host says. Remember takes no such target.

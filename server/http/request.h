@@ -120,6 +120,11 @@ struct BadRequest {
 // `scanned` bytes were looked at by an earlier call with the same beginning.
 tl::expected<std::size_t, BadRequest> FindHeadEnd(std::string_view bytes, std::size_t scanned);
 
+// What the first line of `bytes` says of a message that is refused, for the log and for the form of the reply: its
+// method and the beginning of its target, as far as they can be told; kOther and nothing else where they cannot.
+// Nothing of it is answered.
+Request FirstLineOf(std::string_view bytes);
+
 // The header of a connection's last request without a body, byte by byte: the next one that repeats it needs no parsing
 // but of its first line.
 struct HeadMemo {

@@ -22,6 +22,10 @@ void RequestReader::Close() {
 }
 
 asio::awaitable<RequestReader::Head> RequestReader::ReadHead(Request& request, Stream::Clock::time_point now) {
+  const auto refused = [&](BadRequest why) {
+    request = FirstLineOf(Unread());
+    return Head(tl::unexpected(why));
+  };
   std::size_t scanned = 0;
   bool begun = !Unread().empty();
   stream_.ExpiresAt(now + (begun || is_first_ ? timeouts_.message : timeouts_.idle));
@@ -38,11 +42,11 @@ asio::awaitable<RequestReader::Head> RequestReader::ReadHead(Request& request, S
     }
     if (!Unread().empty()) {
       const auto end = FindHeadEnd(Unread(), scanned);
-      if (!end) co_return Head(tl::unexpected(end.error()));
+      if (!end) co_return refused(end.error());
       if (*end > 0) {
         tl::expected<Request, BadRequest> parsed = ParseHead(Unread().substr(0, *end), &memo_);
+        if (!parsed) co_return refused(parsed.error());
         Consume(*end);
-        if (!parsed) co_return Head(tl::unexpected(parsed.error()));
         request = *std::move(parsed);
         co_return Head(std::in_place);
       }
@@ -58,7 +62,7 @@ asio::awaitable<RequestReader::Head> RequestReader::ReadHead(Request& request, S
     end_ += got.value_or(0);
     waiting_ = false;
     if (got) continue;
-    if (stream_.expired() && begun) co_return Head(tl::unexpected(TooSlow()));
+    if (stream_.expired() && begun) co_return refused(TooSlow());
     // A drain cuts the wait short; a request may have arrived in that very moment.
     const bool drained = closing_ && got.error() == asio::error::operation_aborted && stream_.socket().is_open();
     if (!drained || stream_.expired()) co_return std::nullopt;

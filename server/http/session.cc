@@ -4,6 +4,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <atomic>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
 #include <boost/asio/dispatch.hpp>
@@ -83,7 +84,8 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
 
   static asio::awaitable<void> Run(std::shared_ptr<Session> self) { co_await self->ServeAll(); }
 
-  void CloseIfIdle() override { Post(&Session::CloseIfIdleHere); }
+  Phase phase() const override { return phase_.load(std::memory_order_relaxed); }
+  void Evict() override { Post(&Session::EvictHere); }
   void Drain() override { Post(&Session::DrainHere); }
   void Abort() override { Post(&Session::AbortHere); }
   void Displace() override { Post(&Session::DisplaceHere); }
@@ -99,10 +101,11 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   void Post(void (Session::*step)()) {
     asio::dispatch(stream_.socket().get_executor(), [self = shared_from_this(), step] { ((*self).*step)(); });
   }
-  void CloseIfIdleHere() {
-    if (!reader_.waiting() || served_ == 0) return;
+  void EvictHere() {
+    if (phase() == Phase::kServes) return;
     hurried_ = true;
     reader_.Close();
+    if (!reader_.waiting() || served_ == 0) stream_.Reset();  // an unfinished head or handshake
   }
   void DrainHere() { reader_.Close(); }
   void AbortHere() {
@@ -147,11 +150,12 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   Exchange exchange_;
   Clock::time_point replied_;  // when the last reply was told about: the present, once the next request is waited for
   std::uint64_t served_ = 0;
-  bool hurried_ = false;             // others wait for this connection's place
-  asio::steady_timer displacement_;  // never expires; cancelled when displaced_ is set
-  bool has_upload_ = false;          // the request's body has room that others may need
-  bool is_receiving_ = false;        // the body is being read
-  bool displaced_ = false;           // others need the room of the request's body
+  std::atomic<Phase> phase_ = Phase::kReadsHead;  // written on the session's own thread
+  bool hurried_ = false;                          // others wait for this connection's place
+  asio::steady_timer displacement_;               // never expires; cancelled when displaced_ is set
+  bool has_upload_ = false;                       // the request's body has room that others may need
+  bool is_receiving_ = false;                     // the body is being read
+  bool displaced_ = false;                        // others need the room of the request's body
 };
 
 asio::awaitable<void> Session::ServeAll() {
@@ -163,14 +167,15 @@ asio::awaitable<void> Session::ServeAll() {
   }
   replied_ = Clock::now();
   for (bool keep = true; keep;) {
+    if (served_ > 0) phase_.store(Phase::kIdle, std::memory_order_relaxed);
     const RequestReader::Head head = co_await reader_.ReadHead(exchange_.request, replied_);
     if (!head) break;
+    phase_.store(Phase::kServes, std::memory_order_relaxed);
     exchange_.begun = Clock::now();
     if (*head) {
       keep = co_await ServeOne();
       ++served_;
     } else {
-      exchange_.request = Request();  // not the last one
       exchange_.caller = peer_;
       co_await RefuseMessage(head->error());
       break;

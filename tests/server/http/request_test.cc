@@ -225,5 +225,19 @@ TEST(HeadEnd, RefusesLinesWithoutCr) {
   EXPECT_EQ(FindHeadEnd("\n", 0).error().status, 400);
 }
 
+TEST(FirstLine, IsToldOfWhatIsRefused) {
+  const Request head = FirstLineOf("HEAD /maui/layer.json?token=secret-1&x=1 HTTP/1.1\r\nHost: a\r\nHost: b\r\n\r\n");
+  EXPECT_EQ(head.method, Method::kHead);
+  EXPECT_EQ(head.method_name, "HEAD");
+  EXPECT_EQ(head.target, "/maui/layer.json?x=1");
+  const Request cut = FirstLineOf("GET /" + std::string(100, 'a'));
+  EXPECT_EQ(cut.method, Method::kGet);
+  EXPECT_EQ(cut.target, "/" + std::string(100, 'a'));
+  for (const char* bytes : {"", "GET", "get / HTTP/1.1\r\n", "\x16\x03\x01 \x01\r\n", " / HTTP/1.1\r\n"}) {
+    EXPECT_EQ(FirstLineOf(bytes).method, Method::kOther) << bytes;
+    EXPECT_EQ(FirstLineOf(bytes).method_name, "") << bytes;
+  }
+}
+
 }  // namespace
 }  // namespace terrace::server

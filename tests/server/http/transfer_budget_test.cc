@@ -15,7 +15,8 @@ namespace {
 using namespace std::chrono_literals;
 
 struct FakeConnection : Connection {
-  void CloseIfIdle() override {}
+  Phase phase() const override { return Phase::kServes; }
+  void Evict() override {}
   void Drain() override {}
   void Abort() override { ++aborts; }
   void Displace() override { ++displaced; }

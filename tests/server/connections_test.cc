@@ -1,0 +1,71 @@
+// Connections as clients treat them: half closed, begun and left, more than there may be.
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <vector>
+
+#include "tests/server/server_fixture.h"
+
+namespace terrace::server {
+namespace {
+
+using namespace std::chrono_literals;
+
+class Connections : public ServerFixture {};
+
+// RFC 9293, section 3.6: who has closed one direction may still receive. The build outlasts every look at the client.
+TEST_F(Connections, AClientThatEndsItsSendingGetsItsTile) {
+  build_ms_ = 900;
+  Start();
+  RawClient client(port());
+  client.Send(Get("/maui/0/0/0.terrain"));
+  client.CloseOwnDirection();
+  const auto reply = client.Read();
+  ASSERT_TRUE(reply);
+  EXPECT_EQ(reply->status, 200);
+  EXPECT_TRUE(client.Ended());
+}
+
+TEST_F(Connections, NewcomersTakeThePlacesOfUnfinishedHeads) {
+  ServerOptions options;
+  options.edge.max_connections = 20;
+  Start(options);
+  std::vector<std::unique_ptr<RawClient>> slow;
+  for (int i = 0; i < 60; ++i) {
+    slow.push_back(std::make_unique<RawClient>(port()));
+    slow.back()->Send("GET /maui/0/0/0.terrain HTTP/1.1\r\nHost:");
+  }
+  for (int i = 0; i < 40; ++i) EXPECT_EQ(Fetch(port(), "/maui/0/0/0.terrain").status, 200) << i;
+}
+
+TEST_F(Connections, ARequestThatIsServedKeepsItsPlace) {
+  build_ms_ = 500;
+  ServerOptions options;
+  options.edge.max_connections = 4;
+  Start(options);
+  RawClient served(port());
+  served.Send(Get("/maui/0/0/0.terrain"));
+  ASSERT_TRUE(Eventually([&] { return builds_ == 1; }));
+  std::vector<std::unique_ptr<RawClient>> slow;
+  for (int i = 0; i < 20; ++i) {
+    slow.push_back(std::make_unique<RawClient>(port()));
+    slow.back()->Send("GET / HT");
+  }
+  const auto reply = served.Read();
+  ASSERT_TRUE(reply);
+  EXPECT_EQ(reply->status, 200);
+}
+
+// RFC 9110, section 9.3.2: not even an error has a body then.
+TEST_F(Connections, ARefusedHeadRequestGetsNoBody) {
+  Start();
+  RawClient client(port());
+  client.Send("HEAD /livez HTTP/1.1\r\nHost: a\r\nHost: b\r\n\r\n");
+  const auto reply = client.Read(/*head=*/true);
+  ASSERT_TRUE(reply);
+  EXPECT_EQ(reply->status, 400);
+  EXPECT_TRUE(client.Ended());
+}
+
+}  // namespace
+}  // namespace terrace::server
