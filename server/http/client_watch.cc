@@ -8,6 +8,7 @@
 #include <boost/asio/this_coro.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <chrono>
+#include <string_view>
 
 namespace terrace::server {
 namespace {
@@ -18,13 +19,24 @@ constexpr std::chrono::milliseconds kPatience{100};
 // stands, the kernel is asked so often.
 constexpr std::chrono::milliseconds kInterval{250};
 
-// A client that has only ended its own sending (FIN: CLOSE_WAIT here) may still read the reply; RFC 9293, section 3.6.
-// One that closed altogether looks the same until bytes are sent to it, and its tile is built and cached in vain.
-bool IsOpen(asio::ip::tcp::socket& socket) {
+// What every reply begins with; RFC 9112, section 4.
+constexpr std::string_view kReplyBegin = "HTTP/1.";
+
+// As the kernel has it: TCP_ESTABLISHED, TCP_CLOSE_WAIT once the client has ended its sending, ...
+int StateOf(asio::ip::tcp::socket& socket) {
   tcp_info info{};
   socklen_t size = sizeof info;
-  if (::getsockopt(socket.native_handle(), IPPROTO_TCP, TCP_INFO, &info, &size) != 0) return false;
-  return info.tcpi_state == TCP_ESTABLISHED || info.tcpi_state == TCP_CLOSE_WAIT;
+  if (::getsockopt(socket.native_handle(), IPPROTO_TCP, TCP_INFO, &info, &size) != 0) return TCP_CLOSE;
+  return info.tcpi_state;
+}
+
+bool IsOpen(Stream& stream) {
+  const int state = StateOf(stream.socket());
+  if (state == TCP_CLOSE_WAIT && !stream.is_tls()) {
+    stream.SendAhead(kReplyBegin);
+    return true;
+  }
+  return state == TCP_ESTABLISHED;
 }
 
 }  // namespace
@@ -34,7 +46,7 @@ asio::awaitable<void> ClientLeft(Stream& stream) {
   asio::steady_timer timer(co_await asio::this_coro::executor, kPatience);
   co_await timer.async_wait(asio::use_awaitable);
   co_await socket.async_wait(asio::ip::tcp::socket::wait_read, asio::use_awaitable);
-  while (IsOpen(socket)) {
+  while (IsOpen(stream)) {
     timer.expires_after(kInterval);
     co_await timer.async_wait(asio::use_awaitable);
   }

@@ -20,11 +20,13 @@ void ConnectionSet::Remove(const Connection* connection) {
   const std::lock_guard lock(mutex_);
   const auto member = connections_.find(connection);
   if (member == connections_.end()) return;
-  if (const auto count = of_client_.find(member->second.client); count != of_client_.end() && --count->second == 0) {
-    of_client_.erase(count);
-  }
+  if (!member->second.is_evicted) Uncount(member->second.client);
   connections_.erase(member);
   if (connections_.empty()) emptied_.notify_all();
+}
+
+void ConnectionSet::Uncount(const std::string& client) {
+  if (const auto count = of_client_.find(client); --count->second == 0) of_client_.erase(count);
 }
 
 std::size_t ConnectionSet::size() const {
@@ -55,23 +57,36 @@ std::vector<std::shared_ptr<Connection>> ConnectionSet::Snapshot() const {
   return connections;
 }
 
-bool ConnectionSet::EvictOne() {
-  std::weak_ptr<Connection> chosen;
+bool ConnectionSet::EvictOne(const std::string& newcomer) {
+  std::shared_ptr<Connection> chosen;
+  bool serves = false;
   {
     const std::lock_guard lock(mutex_);
-    using Rank = std::tuple<Connection::Phase, std::int64_t, std::uint64_t>;
-    std::optional<Rank> least_worthy;
-    for (const auto& [pointer, member] : connections_) {
+    const auto held = of_client_.find(newcomer);
+    const std::size_t after = held == of_client_.end() ? 1 : held->second + 1;
+    using Rank = std::tuple<Connection::Phase, std::int64_t, std::int64_t>;
+    std::optional<Rank> least;
+    Member* of_least = nullptr;
+    for (auto& [pointer, member] : connections_) {
+      if (member.is_evicted) continue;
       const Connection::Phase phase = pointer->phase();  // good: a connection that ends waits for mutex_ in Remove
-      if (phase == Connection::Phase::kServes) continue;
-      const Rank rank(phase, -static_cast<std::int64_t>(of_client_.at(member.client)), member.number);
-      if (least_worthy && *least_worthy < rank) continue;
-      least_worthy = rank;
-      chosen = member.connection;
+      const std::size_t of_client = of_client_.at(member.client);
+      const bool is_serving = phase == Connection::Phase::kServes;
+      if (is_serving && (member.client.empty() || of_client <= after)) continue;
+      const auto number = static_cast<std::int64_t>(member.number);
+      const Rank rank(phase, -static_cast<std::int64_t>(of_client), is_serving ? -number : number);
+      if (least && *least < rank) continue;
+      least = rank;
+      of_least = &member;
+      serves = is_serving;
     }
-    if (!least_worthy) return false;
+    if (of_least == nullptr) return false;
+    of_least->is_evicted = true;
+    Uncount(of_least->client);
+    chosen = of_least->connection.lock();
   }
-  if (const auto connection = chosen.lock()) connection->Evict();  // else it has just ended
+  if (!chosen) return true;  // it has just ended
+  serves ? chosen->Abort() : chosen->Evict();
   return true;
 }
 

@@ -22,8 +22,8 @@ class Connection {
   virtual ~Connection() = default;
 
   enum class Phase : std::uint8_t {
-    kIdle,       // a reply was sent, no next request has begun
-    kReadsHead,  // no complete request head has arrived yet, or TLS is being negotiated
+    kIdle,      // a reply was sent, no next request has arrived
+    kReceives,  // no complete request, head and body, has arrived yet, or TLS is being negotiated
     kServes,
   };
   virtual Phase phase() const = 0;
@@ -56,9 +56,11 @@ class ConnectionSet {
   std::uint64_t refused() const { return refused_.load(std::memory_order_relaxed); }
   bool draining() const;
 
-  // Makes room for a connection: tells the least worthy one to close. Idle connections go before those without a
-  // complete request head; of these, the oldest of the client that has most. False: all serve requests.
-  bool EvictOne();
+  // Makes room for a connection of `newcomer`: tells another one to close. Idle connections go before those without a
+  // complete request; of these, the oldest of the client that has most. Last, where a client has more connections
+  // than the newcomer will have, the newest of its connections, whatever it is at; those of nobody ("") stay.
+  // False: all others have to stay.
+  bool EvictOne(const std::string& newcomer);
 
   // From now on every connection ends after the request it is at.
   void Drain();
@@ -69,18 +71,20 @@ class ConnectionSet {
 
  private:
   std::vector<std::shared_ptr<Connection>> Snapshot() const;
+  void Uncount(const std::string& client);
 
   struct Member {
     std::weak_ptr<Connection> connection;
     std::string client;
     std::uint64_t number = 0;  // in the order in which they came
+    bool is_evicted = false;   // told to go, and not counted any more
   };
 
   const std::size_t capacity_, most_of_one_;
   mutable std::mutex mutex_;
   std::condition_variable emptied_;
   std::unordered_map<const Connection*, Member> connections_;
-  std::unordered_map<std::string, std::size_t> of_client_;  // connections of each
+  std::unordered_map<std::string, std::size_t> of_client_;  // connections of each that may stay
   std::uint64_t last_number_ = 0;
   bool draining_ = false;
   std::atomic<std::uint64_t> refused_{0};

@@ -153,23 +153,17 @@ asio::awaitable<void> Listener::AcceptAll() {
   OpenSpare(acceptor_.get_executor(), spare_);
   while (acceptor_.is_open()) {
     error_code error;
-    if (context_->connections->full()) {
-      co_await acceptor_.async_wait(tcp::acceptor::wait_read, asio::redirect_error(asio::use_awaitable, error));
-      if (error) break;
-      co_await MakeRoom();
-      if (context_->connections->full()) Shed();
-      continue;
-    }
     tcp::socket socket = co_await acceptor_.async_accept(io_.Next(), asio::redirect_error(asio::use_awaitable, error));
     if (error == asio::error::operation_aborted) break;
     if (error == asio::error::connection_aborted) continue;
     if (!error) {
-      Admit(std::move(socket));
+      co_await Admit(std::move(socket));
       continue;
     }
     // No descriptors, or no memory for one more.
     Warn(crowded_, error.message());
-    co_await MakeRoom();
+    context_->connections->EvictOne("");
+    co_await Pause(kBackOff);
     Shed();
   }
 }
@@ -180,24 +174,25 @@ asio::awaitable<void> Listener::Pause(std::chrono::milliseconds time) {
   co_await timer.async_wait(asio::redirect_error(asio::use_awaitable, ignored));
 }
 
-// Takes the place of the least worthy connection, or waits a moment for one to end.
-asio::awaitable<void> Listener::MakeRoom() {
-  const auto until = std::chrono::steady_clock::now() + kMoment;
-  context_->connections->EvictOne();
-  do {
-    co_await Pause(kBackOff);
-  } while (context_->connections->full() && std::chrono::steady_clock::now() < until);
+std::string Listener::ClientOf(const asio::ip::address& peer) const {
+  const asio::ip::address address = Canonical(peer);
+  return context_->gate->proxies().trusted.Contains(address) ? "" : ClientBlock(address);
 }
 
-void Listener::Admit(tcp::socket socket) {
-  crowded_ = false;
+// Where there is no room, another connection gives way, or one may end in a moment. Once somebody was refused the next
+// ones are not kept waiting.
+asio::awaitable<void> Listener::Admit(tcp::socket socket) {
   error_code error;
   const auto peer = socket.remote_endpoint(error);
-  if (error) return;  // gone already
-  const asio::ip::address address = Canonical(peer.address());
-  // A proxy speaks for many.
-  const std::string client = context_->gate->proxies().trusted.Contains(address) ? "" : ClientBlock(address);
-  if (context_->connections->HasTooMany(client)) return Refuse(socket, 429);
+  if (error) co_return;  // gone already
+  const std::string client = ClientOf(peer.address());
+  ConnectionSet& connections = *context_->connections;
+  if (connections.HasTooMany(client)) co_return Refuse(socket, 429);
+  const bool evicts = connections.full() && connections.EvictOne(client);
+  const auto until = std::chrono::steady_clock::now() + (evicts || !crowded_ ? kMoment : kBackOff);
+  while (connections.full() && std::chrono::steady_clock::now() < until) co_await Pause(kBackOff);
+  if (connections.full() && !evicts) co_return Refuse(socket, 503);
+  crowded_ = false;
   StartSession(std::move(socket), context_, client);
 }
 
@@ -248,8 +243,9 @@ void Listener::CloseOnItsThread() {
   acceptor_.non_blocking(true, error);
   while (!error && !context_->connections->full()) {
     tcp::socket socket(io_.Next());
-    acceptor_.accept(socket, error);
-    if (!error) Admit(std::move(socket));
+    tcp::endpoint peer;
+    acceptor_.accept(socket, peer, error);
+    if (!error) StartSession(std::move(socket), context_, ClientOf(peer.address()));
   }
   acceptor_.close(error);
 }

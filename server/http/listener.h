@@ -1,8 +1,8 @@
 // The listening socket: accepts connections while there is room for them.
 //
-// At the cap, connections that are only kept alive are asked to go. Clients for whom there is no room after a moment
-// are accepted, told 503 and closed: one that waits in the kernel's queue does not know whether to try elsewhere.
-// Running out of file descriptors is treated the same way, with one that is kept for that purpose.
+// At the cap, a newcomer takes the place of another connection (ConnectionSet::EvictOne), or is told 503 and closed: a
+// client that waits in the kernel's queue does not know whether to try elsewhere. Running out of file descriptors is
+// treated the same way, with one that is kept for that purpose.
 #pragma once
 
 #include <boost/asio/ip/tcp.hpp>
@@ -44,8 +44,8 @@ class Listener : public std::enable_shared_from_this<Listener> {
   static asio::awaitable<void> Run(std::shared_ptr<Listener> self);
   asio::awaitable<void> AcceptAll();
   asio::awaitable<void> Pause(std::chrono::milliseconds time);
-  asio::awaitable<void> MakeRoom();
-  void Admit(asio::ip::tcp::socket socket);
+  std::string ClientOf(const asio::ip::address& peer) const;
+  asio::awaitable<void> Admit(asio::ip::tcp::socket socket);
   void Shed();
   void Refuse(asio::ip::tcp::socket& socket, int status);
   void CloseOnItsThread();

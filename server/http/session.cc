@@ -60,13 +60,6 @@ struct HeldBody {
   std::string text;
 };
 
-// Off the front.
-void Skip(std::size_t bytes, BufferPair& buffers) {
-  const std::size_t of_head = std::min(bytes, buffers[0].size());
-  buffers[0] += of_head;
-  buffers[1] += bytes - of_head;
-}
-
 class Session : public Connection, public std::enable_shared_from_this<Session> {
  public:
   Session(asio::ip::tcp::socket socket, std::shared_ptr<const SessionContext> context)
@@ -150,12 +143,12 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   Exchange exchange_;
   Clock::time_point replied_;  // when the last reply was told about: the present, once the next request is waited for
   std::uint64_t served_ = 0;
-  std::atomic<Phase> phase_ = Phase::kReadsHead;  // written on the session's own thread
-  bool hurried_ = false;                          // others wait for this connection's place
-  asio::steady_timer displacement_;               // never expires; cancelled when displaced_ is set
-  bool has_upload_ = false;                       // the request's body has room that others may need
-  bool is_receiving_ = false;                     // the body is being read
-  bool displaced_ = false;                        // others need the room of the request's body
+  std::atomic<Phase> phase_ = Phase::kReceives;  // written on the session's own thread
+  bool hurried_ = false;                         // others wait for this connection's place
+  asio::steady_timer displacement_;              // never expires; cancelled when displaced_ is set
+  bool has_upload_ = false;                      // the request's body has room that others may need
+  bool is_receiving_ = false;                    // the body is being read
+  bool displaced_ = false;                       // others need the room of the request's body
 };
 
 asio::awaitable<void> Session::ServeAll() {
@@ -172,14 +165,13 @@ asio::awaitable<void> Session::ServeAll() {
     if (!head) break;
     phase_.store(Phase::kServes, std::memory_order_relaxed);
     exchange_.begun = Clock::now();
-    if (*head) {
-      keep = co_await ServeOne();
-      ++served_;
-    } else {
+    if (!*head) {
       exchange_.caller = peer_;
       co_await RefuseMessage(head->error());
       break;
     }
+    keep = co_await ServeOne();
+    ++served_;
   }
   co_await CloseGently();
 }
@@ -218,7 +210,11 @@ asio::awaitable<bool> Session::ServeLater(Route route) {
   Request& request = exchange_.request;
   request.client = Gate::NumberOf(request, exchange_.caller);
   displaced_ = has_upload_ = false;
-  if (request.content_length > 0 && !co_await ReceiveBody()) co_return false;
+  if (request.content_length > 0) {
+    phase_.store(Phase::kReceives, std::memory_order_relaxed);
+    if (!co_await ReceiveBody()) co_return false;
+    phase_.store(Phase::kServes, std::memory_order_relaxed);
+  }
   stream_.ExpiresNever();  // the handlers have deadlines of their own
   std::optional<Response> response = co_await AnswerWhileConnected(route, request);
   if (!response && displaced_) {
@@ -425,6 +421,7 @@ asio::awaitable<bool> Session::Reply(Response& response, const Route* route) {
   const std::size_t body_bytes = SendsBody(response) ? response.body->size() : 0;
 
   BufferPair left = {asio::buffer(head), body_bytes > 0 ? asio::buffer(*response.body) : asio::const_buffer()};
+  Skip(stream_.TakeAhead(), left);
   // What the kernel takes at once needs no deadline. An error shows again when the rest is written.
   const std::size_t taken = stream_.WriteReady(left).value_or(0);
   Skip(taken, left);

@@ -2,12 +2,14 @@
 
 #include <netinet/tcp.h>
 
+#include <algorithm>
 #include <boost/asio/redirect_error.hpp>
 #include <boost/asio/ssl/context.hpp>
 #include <boost/asio/ssl/stream.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <optional>
+#include <utility>
 
 namespace terrace::server {
 namespace {
@@ -22,6 +24,12 @@ using NotSentLowWater = asio::detail::socket_option::integer<IPPROTO_TCP, TCP_NO
 constexpr int kUnsentBytes = 128 * 1024;
 
 }  // namespace
+
+void Skip(std::size_t bytes, BufferPair& buffers) {
+  const std::size_t of_first = std::min(bytes, buffers[0].size());
+  buffers[0] += of_first;
+  buffers[1] += bytes - of_first;
+}
 
 struct Stream::State : std::enable_shared_from_this<State> {
   State(tcp::socket s, std::shared_ptr<asio::ssl::context> t)
@@ -56,6 +64,7 @@ struct Stream::State : std::enable_shared_from_this<State> {
   const std::shared_ptr<asio::ssl::context> context;
   std::optional<asio::ssl::stream<tcp::socket&>> tls;
   Clock::time_point deadline = Clock::time_point::max();
+  std::size_t ahead = 0;  // bytes of the next message that were sent
   bool watching = false;
   bool expired = false;
 };
@@ -141,6 +150,12 @@ Transfer Stream::WriteReady(BufferPair buffers) {
   if (error && error != asio::error::would_block) return tl::unexpected(error);
   return sent;
 }
+
+void Stream::SendAhead(std::string_view bytes) {
+  if (state_->ahead == 0) state_->ahead = WriteReady({asio::buffer(bytes), asio::const_buffer()}).value_or(0);
+}
+
+std::size_t Stream::TakeAhead() { return std::exchange(state_->ahead, 0); }
 
 void Stream::Cancel() {
   error_code ignored;

@@ -10,6 +10,7 @@
 #include <chrono>
 #include <cstddef>
 #include <memory>
+#include <string_view>
 #include <tl/expected.hpp>
 
 #include "server/asio.h"
@@ -22,6 +23,9 @@ namespace terrace::server {
 
 using Transfer = tl::expected<std::size_t, boost::system::error_code>;  // bytes
 using BufferPair = std::array<asio::const_buffer, 2>;
+
+// Takes `bytes` off the front of what is to be sent.
+void Skip(std::size_t bytes, BufferPair& buffers);
 
 class Stream {
  public:
@@ -52,6 +56,13 @@ class Stream {
 
   // What can be sent without waiting; 0 bytes if nothing, and always for TLS.
   Transfer WriteReady(BufferPair buffers);
+
+  // Sends `bytes`, with which the next message will begin, ahead of it, once for each message. A peer that has closed
+  // the connection altogether answers with a reset; one that has closed its own direction alone (RFC 9293, section 3.6)
+  // takes them. Does nothing for TLS.
+  void SendAhead(std::string_view bytes);
+  // How many bytes of the message that begins now were sent ahead.
+  std::size_t TakeAhead();
 
   // Ends the operation under way.
   void Cancel();

@@ -56,6 +56,23 @@ TEST_F(Connections, ARequestThatIsServedKeepsItsPlace) {
   EXPECT_EQ(reply->status, 200);
 }
 
+// Whoever sends its requests' bodies byte by byte, or asks for more than all others, does not keep others out.
+TEST_F(Connections, NewcomersTakeThePlacesOfUnfinishedBodiesAndOfBusyFloods) {
+  build_ms_ = 3000;
+  ServerOptions options;
+  options.edge.max_connections = 20;
+  Start(options);
+  std::vector<std::unique_ptr<RawClient>> flood;
+  const auto send = [&](const std::string& message) {
+    flood.push_back(std::make_unique<RawClient>(port(), 0, "127.0.0.2"));
+    flood.back()->Send(message);
+  };
+  for (int i = 0; i < 40; ++i) send("POST /maui/heights HTTP/1.1\r\nHost: x\r\nContent-Length: 99\r\n\r\n{");
+  EXPECT_EQ(Fetch(port(), "/livez").status, 200) << "beside bodies";
+  for (int i = 0; i < 40; ++i) send(Get("/maui/" + std::to_string(i) + "/0/0.terrain"));
+  EXPECT_EQ(Fetch(port(), "/livez").status, 200) << "beside tiles";
+}
+
 // RFC 9110, section 9.3.2: not even an error has a body then.
 TEST_F(Connections, ARefusedHeadRequestGetsNoBody) {
   Start();

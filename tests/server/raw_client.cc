@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cstdlib>
+#include <utility>
 
 namespace terrace::server {
 
@@ -17,7 +18,8 @@ std::string Reply::Field(const std::string& name) const {
   return found == fields.end() ? "" : found->second;
 }
 
-RawClient::RawClient(std::uint16_t port, int receive_buffer_bytes) : socket_(::socket(AF_INET, SOCK_STREAM, 0)) {
+RawClient::RawClient(std::uint16_t port, int receive_buffer_bytes, const char* from)
+    : socket_(::socket(AF_INET, SOCK_STREAM, 0)) {
   const timeval timeout{10, 0};
   ::setsockopt(socket_, SOL_SOCKET, SO_RCVTIMEO, &timeout, sizeof timeout);
   ::setsockopt(socket_, SOL_SOCKET, SO_SNDTIMEO, &timeout, sizeof timeout);
@@ -26,6 +28,8 @@ RawClient::RawClient(std::uint16_t port, int receive_buffer_bytes) : socket_(::s
   }
   sockaddr_in address{};
   address.sin_family = AF_INET;
+  ::inet_pton(AF_INET, from, &address.sin_addr);
+  ::bind(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof address);
   address.sin_port = htons(port);
   address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
   if (::connect(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
@@ -99,6 +103,8 @@ std::size_t RawClient::TakeSome(std::size_t most) {
 }
 
 void RawClient::CloseOwnDirection() { ::shutdown(socket_, SHUT_WR); }
+
+void RawClient::Close() { ::close(std::exchange(socket_, -1)); }
 
 void RawClient::Reset() {
   const linger at_once{1, 0};

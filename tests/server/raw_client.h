@@ -21,7 +21,8 @@ struct Reply {
 
 class RawClient {
  public:
-  explicit RawClient(std::uint16_t port, int receive_buffer_bytes = 0);
+  // `from`: the loopback address it connects from.
+  explicit RawClient(std::uint16_t port, int receive_buffer_bytes = 0, const char* from = "127.0.0.1");
   ~RawClient();
   RawClient(const RawClient&) = delete;
   RawClient& operator=(const RawClient&) = delete;
@@ -40,6 +41,7 @@ class RawClient {
   std::size_t TakeSome(std::size_t most);
 
   void CloseOwnDirection();
+  void Close();
   void Reset();  // the kernel tells the server at once
 
  private:

@@ -338,7 +338,7 @@ TEST_F(AbandonedBuild, StopsAfterAReset) {
 }
 
 TEST_F(AbandonedBuild, StopsAfterAClose) {
-  ExpectStopWhen([](RawClient& client) { client.CloseOwnDirection(); });
+  ExpectStopWhen([](RawClient& client) { client.Close(); });
 }
 
 TEST_F(AbandonedBuild, StopsAfterAResetBehindAPipelinedRequest) {

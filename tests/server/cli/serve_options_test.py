@@ -163,6 +163,28 @@ class AccessLog(unittest.TestCase):
         self.assertEqual(self.lines("off"), [])
 
 
+class HangUp(unittest.TestCase):
+    def test_reopens_the_log_and_serves_on_without_a_configuration(self):
+        with tempfile.TemporaryDirectory() as folder:
+            log = pathlib.Path(folder, "access.log")
+            process = subprocess.Popen([BINARY, "serve", "--listen", "127.0.0.1:0", "--access-log", "combined", "--access-log-file",
+                                        log, DEM], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+            self.addCleanup(process.stdout.close)
+            try:
+                url = re.search(r"http://\S+/", process.stdout.readline())[0]
+                log.rename(log.with_suffix(".1"))
+                process.send_signal(signal.SIGHUP)
+                deadline = time.monotonic() + 30
+                while not log.exists() and time.monotonic() < deadline:
+                    time.sleep(.05)
+                self.assertTrue(log.exists(), "the log was not opened anew")
+                urllib.request.urlopen(url + "readyz", timeout=30).read()
+            finally:
+                process.terminate()
+            self.assertEqual(process.wait(60), 0)
+            self.assertIn("/readyz", log.read_text())
+
+
 class WorkingDirectory(unittest.TestCase):
     """Names on the command line count from where the server was started, whatever becomes of that folder."""
 

@@ -17,9 +17,9 @@ class FakeConnection : public Connection {
   Phase phase() const override { return phase_; }
   void Evict() override { evicted = true; }
   void Drain() override {}
-  void Abort() override {}
+  void Abort() override { aborted = true; }
 
-  bool evicted = false;
+  bool evicted = false, aborted = false;
 
  private:
   const Phase phase_;
@@ -40,30 +40,43 @@ class Eviction : public testing::Test {
 
 TEST_F(Eviction, BeginsWithIdleConnections) {
   const FakeConnection& serving = Add(Phase::kServes, "a");
-  const FakeConnection& head = Add(Phase::kReadsHead, "a");
+  const FakeConnection& head = Add(Phase::kReceives, "a");
   const FakeConnection& idle = Add(Phase::kIdle, "b");
-  EXPECT_TRUE(set_.EvictOne());
+  EXPECT_TRUE(set_.EvictOne("new"));
   EXPECT_TRUE(idle.evicted);
   EXPECT_FALSE(head.evicted || serving.evicted);
 }
 
 TEST_F(Eviction, TakesTheOldestOfTheClientThatHasMost) {
-  const FakeConnection& polite = Add(Phase::kReadsHead, "polite");
-  FakeConnection& first = Add(Phase::kReadsHead, "flood");
-  const FakeConnection& second = Add(Phase::kReadsHead, "flood");
-  EXPECT_TRUE(set_.EvictOne());
+  const FakeConnection& polite = Add(Phase::kReceives, "polite");
+  FakeConnection& first = Add(Phase::kReceives, "flood");
+  const FakeConnection& second = Add(Phase::kReceives, "flood");
+  EXPECT_TRUE(set_.EvictOne("new"));
   EXPECT_TRUE(first.evicted);
   EXPECT_FALSE(polite.evicted || second.evicted);
   Remove(first);
-  EXPECT_TRUE(set_.EvictOne());
+  EXPECT_TRUE(set_.EvictOne("new"));
   EXPECT_TRUE(polite.evicted) << "both have one: the older goes";
+}
+
+TEST_F(Eviction, TakesTheNewestServingConnectionOfAClientThatHasMoreThanTheNewcomer) {
+  const FakeConnection& polite = Add(Phase::kServes, "polite");
+  const FakeConnection& proxies = Add(Phase::kServes, "");
+  Add(Phase::kServes, "");
+  const FakeConnection& first = Add(Phase::kServes, "flood");
+  const FakeConnection& second = Add(Phase::kServes, "flood");
+  EXPECT_FALSE(set_.EvictOne("flood"));
+  EXPECT_TRUE(set_.EvictOne("new"));
+  EXPECT_TRUE(second.aborted);
+  EXPECT_FALSE(first.aborted || polite.aborted || proxies.aborted);
+  EXPECT_FALSE(set_.EvictOne("new")) << "the flood has one left, as the newcomer will";
 }
 
 TEST_F(Eviction, LeavesConnectionsThatServe) {
   const FakeConnection& serving = Add(Phase::kServes, "a");
-  EXPECT_FALSE(set_.EvictOne());
+  EXPECT_FALSE(set_.EvictOne("new"));
   EXPECT_FALSE(serving.evicted);
-  EXPECT_FALSE(ConnectionSet(1).EvictOne()) << "nobody is there";
+  EXPECT_FALSE(ConnectionSet(1).EvictOne("new")) << "nobody is there";
 }
 
 }  // namespace
