@@ -20,7 +20,10 @@ add_library(terrace_options INTERFACE)
 target_compile_options(terrace_options INTERFACE
   -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion -Werror=return-type
   # The same input gives the same bytes: GCC fuses a*b+c into one rounding where the CPU can.
-  -ffp-contract=off)
+  -ffp-contract=off
+  # What is local to one source of a unity build is not to the next: shadowed names are told where sources stand alone.
+  $<$<BOOL:$<TARGET_PROPERTY:UNITY_BUILD>>:-Wno-shadow>
+  $<$<AND:$<BOOL:$<TARGET_PROPERTY:UNITY_BUILD>>,$<CXX_COMPILER_ID:GNU>>:-Wno-subobject-linkage>)
 target_include_directories(terrace_options INTERFACE "${PROJECT_SOURCE_DIR}")
 
 if(TERRACE_SANITIZER STREQUAL "address")

@@ -8,13 +8,15 @@ function(terrace_library name)
 endfunction()
 
 # terrace_test(NAME SOURCES a_test.cc [DEPS ...] [LABELS ...] [TIMEOUT seconds] [SHARDS n])
-# One GoogleTest binary, one ctest entry; with SHARDS its tests are dealt out to n entries that can run at once.
+# One GoogleTest binary, one ctest entry; with SHARDS its tests are dealt out to n entries that can run at once. Its sources
+# are compiled several at a time (CMake's unity build), so file-local names differ between them.
 function(terrace_test name)
   cmake_parse_arguments(ARG "" "TIMEOUT;SHARDS" "SOURCES;DEPS;LABELS" ${ARGN})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 300)
   endif()
   add_executable(${name} ${ARG_SOURCES})
+  set_target_properties(${name} PROPERTIES UNITY_BUILD ON)
   target_link_libraries(${name} PRIVATE terrace_options ${ARG_DEPS} terrace_source_dir GTest::gtest GTest::gtest_main Threads::Threads)
   if(NOT ARG_SHARDS)
     add_test(NAME ${name} COMMAND ${name})

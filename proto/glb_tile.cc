@@ -35,12 +35,12 @@ GltfComponent IndexComponent(std::size_t vertices) {
   return vertices > kMaxNarrowVertices ? GltfComponent::kUnsignedInt : GltfComponent::kUnsignedShort;
 }
 
-struct Box {
+struct TileBox {
   Position min{}, max{};
 };
 
-Box BoxOf(const GridMesh& mesh) {
-  Box box{mesh.positions.front(), mesh.positions.front()};
+TileBox BoxOf(const GridMesh& mesh) {
+  TileBox box{mesh.positions.front(), mesh.positions.front()};
   for (const Position& p : mesh.positions) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       box.min[axis] = std::min(box.min[axis], p[axis]);
@@ -50,7 +50,7 @@ Box BoxOf(const GridMesh& mesh) {
   return box;
 }
 
-bool FitsShort(const Box& box) {
+bool FitsShort(const TileBox& box) {
   constexpr std::int64_t kMaxShort = std::numeric_limits<std::uint16_t>::max();
   for (std::size_t axis = 0; axis < 3; ++axis) {
     if (std::int64_t{box.max[axis]} - box.min[axis] > kMaxShort) return false;
@@ -71,7 +71,7 @@ struct Arrays {
 std::int8_t NormalByte(double component) { return static_cast<std::int8_t>(std::floor(component * 127 + 0.5)); }
 
 // Whole steps above the box's corner, in records of 8 bytes: vertex attributes are aligned to 4.
-void PutShortPositions(const GridMesh& mesh, const Box& box, Arrays& arrays) {
+void PutShortPositions(const GridMesh& mesh, const TileBox& box, Arrays& arrays) {
   ByteWriter out;
   out.Reserve(8 * mesh.positions.size());
   for (const Position& p : mesh.positions) {
@@ -89,7 +89,7 @@ void PutShortPositions(const GridMesh& mesh, const Box& box, Arrays& arrays) {
   }
 }
 
-void PutFloatPositions(const GridMesh& mesh, const Box& box, Arrays& arrays) {
+void PutFloatPositions(const GridMesh& mesh, const TileBox& box, Arrays& arrays) {
   ByteWriter out;
   out.Reserve(12 * mesh.positions.size());
   for (const Position& p : mesh.positions) {
@@ -152,7 +152,7 @@ void PutFloatTextureCoordinates(const GridMesh& mesh, Arrays& arrays) {
 }
 
 Arrays MakeArrays(const GridMesh& mesh, bool quantized) {
-  const Box box = BoxOf(mesh);
+  const TileBox box = BoxOf(mesh);
   Arrays arrays;
   if (quantized && FitsShort(box)) {
     PutShortPositions(mesh, box, arrays);

@@ -98,12 +98,12 @@ void Weld(const std::vector<GridPoint>& points, const std::vector<geo::Vec3>& no
   }
 }
 
-struct Box {
+struct GridBox {
   GridPoint min{}, max{};
 };
 
-Box BoxOf(const std::vector<GridPoint>& points) {
-  Box box{points.front(), points.front()};
+GridBox BoxOf(const std::vector<GridPoint>& points) {
+  GridBox box{points.front(), points.front()};
   for (const GridPoint& p : points) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       box.min[axis] = std::min(box.min[axis], p[axis]);
@@ -136,7 +136,7 @@ std::vector<GridPoint> SnapVertices(const LatticeView& lattice, const tin::TinMe
 
 bool FitsFloats(const std::vector<GridPoint>& points, double step_m, double skirt_depth_m) {
   constexpr double kMaxSteps = 0x1p23;
-  const Box box = BoxOf(points);
+  const GridBox box = BoxOf(points);
   const double feet = skirt_depth_m / step_m + 2;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     if (static_cast<double>(box.max[axis] - box.min[axis]) + feet >= kMaxSteps) return false;
@@ -176,7 +176,7 @@ GridMesh MakeGridMesh(const LatticeView& lattice, const tin::TinMesh& mesh, cons
   VertexOrder order = OrderByFirstUse(triangles, all.size());
   GridMesh grid;
   grid.step_m = step_m;
-  const Box box = BoxOf(all);
+  const GridBox box = BoxOf(all);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     grid.origin[axis] = box.min[axis] + (box.max[axis] - box.min[axis]) / 2;
   }

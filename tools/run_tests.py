@@ -3,8 +3,8 @@
 
     tools/run_tests.py [--jobs N] [SUITE ...]     suites: release asan tsan; default: all three, in this order
 
-A sanitizer suite takes the tests that are executables of the build, without those labelled `slow`, and builds only
-these. The last line says `N passed, N failed`, counted from ctest's own reports; a test that could not be built or found
+A sanitizer suite takes tests that are executables of the build, and builds only these: `asan` all but those labelled
+`slow`, `tsan` those labelled `threads`, which are about what several threads do at once. The last line says `N passed, N failed`, counted from ctest's own reports; a test that could not be built or found
 counts as failed. Exit status 0 only if everything was built and nothing failed.
 """
 import argparse
@@ -25,7 +25,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 @dataclasses.dataclass(frozen=True)
 class Suite:
     name: str  # of the CMake preset
-    sanitizer: bool = False
+    choice: tuple = ()  # of ctest, by label; a suite with one takes executables of the build alone
     environment: dict = dataclasses.field(default_factory=dict)
 
 
@@ -38,8 +38,8 @@ SUITES = {
     suite.name: suite
     for suite in (
         Suite("release"),
-        Suite("asan", True, SANITIZER_TOOLS | {"UBSAN_OPTIONS": "print_stacktrace=1"}),
-        Suite("tsan", True, SANITIZER_TOOLS | {
+        Suite("asan", ("-LE", "^slow$"), SANITIZER_TOOLS | {"UBSAN_OPTIONS": "print_stacktrace=1"}),
+        Suite("tsan", ("-L", "^threads$"), SANITIZER_TOOLS | {
             "TSAN_OPTIONS": f"suppressions={ROOT}/tools/tsan.supp second_deadlock_stack=1 "
                             "external_symbolizer_path=/usr/bin/llvm-symbolizer-14"}),
     )
@@ -65,9 +65,9 @@ def run(command, **kwargs):
     return subprocess.run(command, cwd=ROOT, stdin=subprocess.DEVNULL, **kwargs).returncode
 
 
-def sanitizer_tests(build):
-    """Test -> executable of the build, of the tests not labelled `slow`. terrace_test gives both one name; shards have a number."""
-    listing = subprocess.run(["ctest", "--test-dir", str(build), "--show-only=json-v1", "-LE", "^slow$"], cwd=ROOT, check=True,
+def programs_of(build, choice):
+    """Test -> executable of the build, of the chosen tests. terrace_test gives both one name; shards have a number."""
+    listing = subprocess.run(["ctest", "--test-dir", str(build), "--show-only=json-v1", *choice], cwd=ROOT, check=True,
                              stdout=subprocess.PIPE, stdin=subprocess.DEVNULL)
     targets = subprocess.run(["ninja", "-C", str(build), "-t", "targets", "all"], check=True, stdout=subprocess.PIPE, text=True)
     known = {line.partition(":")[0] for line in targets.stdout.splitlines()}
@@ -109,8 +109,8 @@ def run_suite(suite, jobs):
     report.unlink(missing_ok=True)
     ctest = ["ctest", "--test-dir", str(build), "--output-on-failure", "--no-tests=error", "-j", str(jobs),
              "--output-junit", str(report)]
-    if suite.sanitizer:
-        tests = sanitizer_tests(build)
+    if suite.choice:
+        tests = programs_of(build, suite.choice)
         if not tests:
             return Outcome(broken=[f"{suite.name}: no tests found"])
         build_command += sorted(set(tests.values()))

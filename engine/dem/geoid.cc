@@ -17,7 +17,7 @@
 namespace terrace::dem {
 namespace {
 
-constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+constexpr double kNoAnswer = std::numeric_limits<double>::quiet_NaN();
 
 // The vertical part of a reference system; null: it has none.
 ProjObjectPtr VerticalPart(PJ_CONTEXT* context, const std::string& text) {
@@ -91,7 +91,7 @@ double HeightAt(const ProjOperation& operation, Position degrees, double height)
   const double longitude = degrees.x - 360 * std::floor((degrees.x + 180) / 360);
   const PJ_COORD result =
       proj_trans(operation.operation.get(), PJ_FWD, proj_coord(longitude, degrees.y, height, HUGE_VAL));
-  return std::isfinite(result.xyz.z) ? result.xyz.z : kUnknown;
+  return std::isfinite(result.xyz.z) ? result.xyz.z : kNoAnswer;
 }
 
 // Whether a pipeline shifts heights by one grid, and changes units and the order of axes besides.

@@ -14,8 +14,6 @@ namespace {
 // Averages of the largest factor that is compared directly reach this far out of a part.
 constexpr int kHalo = kLargestDirect;
 
-constexpr int DivideUp(int a, int b) { return (a + b - 1) / b; }
-
 // Factors of the raster up to `most`, from `least` on.
 template <typename Visit>
 void ForEachFactor(const RasterLayout& layout, int least, int most, const Visit& visit) {

@@ -22,6 +22,8 @@ struct Chunk {
   int col = 0, row = 0, cols = 0, rows = 0;  // pixels
 };
 
+constexpr int DivideUp(int a, int b) { return (a + b - 1) / b; }
+
 // The parts of a raster, by rows from the north-west.
 class ChunkGrid {
  public:
@@ -29,7 +31,7 @@ class ChunkGrid {
 
   ChunkGrid() = default;
   ChunkGrid(int width, int height)
-      : width_(width), height_(height), columns_((width + kSide - 1) / kSide), rows_((height + kSide - 1) / kSide) {}
+      : width_(width), height_(height), columns_(DivideUp(width, kSide)), rows_(DivideUp(height, kSide)) {}
 
   int columns() const { return columns_; }
   int count() const { return columns_ * rows_; }

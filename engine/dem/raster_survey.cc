@@ -12,8 +12,6 @@ namespace {
 // Of an overview that are read at once: multiples of the usual storage blocks, so that each is decoded once.
 constexpr int kStripRows = 256, kStripColumns = 4096;
 
-constexpr int DivideUp(int a, int b) { return (a + b - 1) / b; }
-
 std::optional<double> MeanOf(const BlockSum& sum) {
   return sum.weight == 0 ? std::nullopt : std::optional(sum.sum / sum.weight);
 }

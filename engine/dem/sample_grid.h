@@ -60,8 +60,8 @@ Result<std::vector<float>> ReadGrid(GDALDataset& dataset, const RasterLayout& la
 // The factor of the overview that ReadGrid starts from; 1: the samples themselves.
 int StartingFactor(const RasterLayout& layout, int factor);
 
-// The overview of that factor: its sides are the band's divided by it, each rounded up, as gdaladdo makes them, or down,
-// as in cloud-optimized GeoTIFFs. Null when there is none (any more).
+// The overview of that factor: its sides are the band's divided by it, each rounded up, as gdaladdo makes them, or
+// down, as in cloud-optimized GeoTIFFs. Null when there is none (any more).
 GDALRasterBand* FindOverview(GDALRasterBand& band, int factor);
 
 // The factors, powers of two, of the overviews that ReadGrid can use.

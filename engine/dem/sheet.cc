@@ -17,9 +17,9 @@ namespace {
 
 // Interpolated positions are this close to exact ones, in samples of the grid they are read from: a slope of 45 degrees
 // at 30 m turns it into 0.3 mm.
-constexpr double kPositionTolerance = 1e-5;
+constexpr double kSheetPositionTolerance = 1e-5;
 // Positions this close to the raster's edge, in pixels, are on it.
-constexpr double kEdgeTolerance = 1e-6;
+constexpr double kSheetEdgeTolerance = 1e-6;
 
 GridWindow Grown(const GridWindow& window, int halo, const GridAxis& columns, const GridAxis& rows) {
   GridWindow wide{window.column - halo, window.row - halo, window.columns + std::int64_t{2} * halo,
@@ -118,7 +118,7 @@ void Sheet::FindPoleHeights() {
   for (const int pole : {0, 1}) {
     Position position{0, pole == 0 ? -90.0 : 90.0};
     georeference_.ToPixels({&position, 1});
-    if (!(position.y >= -kEdgeTolerance && position.y <= height_ + kEdgeTolerance)) continue;
+    if (!(position.y >= -kSheetEdgeTolerance && position.y <= height_ + kSheetEdgeTolerance)) continue;
     const bool first_row = position.y < height_ / 2.0;
     double sum = 0, weights = 0;
     for (const SheetMember& member : members_) {
@@ -144,14 +144,15 @@ Sheet::Cells Sheet::CellsAt(std::span<const Position> positions, std::size_t str
   }
   Cells found;
   if (hull.west > hull.east) return found;
-  const std::vector<std::size_t> blocks = cover_index_.Find({hull.west - kEdgeTolerance, hull.south - kEdgeTolerance,
-                                                             hull.east + kEdgeTolerance, hull.north + kEdgeTolerance});
+  const std::vector<std::size_t> blocks =
+      cover_index_.Find({hull.west - kSheetEdgeTolerance, hull.south - kSheetEdgeTolerance,
+                         hull.east + kSheetEdgeTolerance, hull.north + kSheetEdgeTolerance});
   CellFinder finder(Columns(factor), Rows(factor), width_, height_, stride);
   std::vector<Box> boxes;
   for (const std::size_t block : blocks) {
     const Box box = BoxOf(cover_[block]);
-    boxes.push_back(
-        {box.west - kEdgeTolerance, box.south - kEdgeTolerance, box.east + kEdgeTolerance, box.north + kEdgeTolerance});
+    boxes.push_back({box.west - kSheetEdgeTolerance, box.south - kSheetEdgeTolerance, box.east + kSheetEdgeTolerance,
+                     box.north + kSheetEdgeTolerance});
   }
   const auto is_inside = [&](const Position& p) {
     return std::ranges::any_of(boxes, [&](const Box& box) {
@@ -300,7 +301,7 @@ void Sheet::TraceOthers(const Cells& others, const std::vector<float>& samples, 
 }
 
 std::vector<Position> Sheet::PositionsOf(const geo::Lattice& lattice, const NodeWindow& window, int factor) const {
-  return NodePositions(georeference_, reach_, lattice, window, kPositionTolerance * factor);
+  return NodePositions(georeference_, reach_, lattice, window, kSheetPositionTolerance * factor);
 }
 
 Result<void> Sheet::Fill(const geo::Lattice& lattice, const NodeWindow& window, Counting counting,
@@ -346,7 +347,7 @@ Result<void> Sheet::Fill(const geo::MercatorGrid& grid, const NodeWindow& window
     if (!found) return tl::unexpected(found.error());
     undulations = *std::move(found);
   }
-  return FillAt(NodePositions(georeference_, reach_, grid, window, kPositionTolerance * factor),
+  return FillAt(NodePositions(georeference_, reach_, grid, window, kSheetPositionTolerance * factor),
                 static_cast<std::size_t>(window.columns), undulations, factor, heights, stop, weights);
 }
 

@@ -31,7 +31,7 @@ constexpr std::uint32_t kPartMagic = 0x54'52'41'50;                // "PART"
 constexpr std::size_t kHeaderBytes = 36, kPartHeaderBytes = 32, kFooterBytes = 24;
 constexpr std::uint64_t kMostHeaderBytes = 1 << 16;  // findings are a few numbers and a line of text
 
-constexpr int DivideUp(int a, int b) { return (a + b - 1) / b; }
+constexpr int CeilingOf(int a, int b) { return (a + b - 1) / b; }
 
 std::uint64_t HashOf(std::string_view bytes) { return XXH3_64bits(bytes.data(), bytes.size()); }
 std::string ErrorText() { return std::generic_category().message(errno); }
@@ -90,8 +90,8 @@ AveragesPlace PlaceOf(const Chunk& chunk, const RasterLayout& layout, int factor
   AveragesPlace place;
   const int used = std::clamp(layout.columns - chunk.col, 0, chunk.cols);
   for (int f = 2;; f *= 2) {
-    place.columns = DivideUp(used, f);
-    place.rows = DivideUp(chunk.rows, f);
+    place.columns = CeilingOf(used, f);
+    place.rows = CeilingOf(chunk.rows, f);
     if (f == factor) return place;
     place.offset += sizeof(std::uint64_t) + place.bytes();
   }
@@ -229,7 +229,7 @@ Result<void> RecordedAverages::CopyPart(int factor, int part, const GridWindow& 
 
 Result<std::vector<float>> RecordedAverages::Read(int factor, const GridWindow& window) const {
   std::vector<float> heights(static_cast<std::size_t>(window.columns * window.rows), SampleRules::kVoid);
-  const std::int64_t count = DivideUp(layout_.columns, factor), side = ChunkGrid::kSide / factor;
+  const std::int64_t count = CeilingOf(layout_.columns, factor), side = ChunkGrid::kSide / factor;
   const auto turn = [&](std::int64_t column) { return column >= 0 ? column / count : -((count - 1 - column) / count); };
   for (std::int64_t t = turn(window.column); t <= turn(window.column + window.columns - 1); ++t) {
     GridWindow here = window;

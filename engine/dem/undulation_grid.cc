@@ -14,10 +14,10 @@
 namespace terrace::dem {
 namespace {
 
-constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+constexpr double kNoUndulation = std::numeric_limits<double>::quiet_NaN();
 
 // PROJ takes positions this far outside for positions on the edge, in steps of the grid (REL_TOLERANCE_HGRIDSHIFT).
-constexpr double kEdgeTolerance = 1e-5;
+constexpr double kGridEdgeTolerance = 1e-5;
 
 // PROJ finds the undulations among the samples of a GeoTIFF by their description.
 int BandOfUndulations(GDALDataset& dataset) {
@@ -84,7 +84,7 @@ double UndulationGrid::ColumnOf(double longitude) const {
 
 NodePlace UndulationGrid::AtColumn(double column) const {
   if (!wraps_) {
-    if (!(column >= -kEdgeTolerance && column <= columns_ - 1 + kEdgeTolerance)) return {};
+    if (!(column >= -kGridEdgeTolerance && column <= columns_ - 1 + kGridEdgeTolerance)) return {};
     column = std::clamp(column, 0.0, columns_ - 1.0);
   }
   const double floor = std::floor(column);
@@ -94,7 +94,7 @@ NodePlace UndulationGrid::AtColumn(double column) const {
 }
 
 NodePlace UndulationGrid::AtRow(double row) const {
-  if (!(row >= -kEdgeTolerance && row <= rows_ - 1 + kEdgeTolerance)) return {};
+  if (!(row >= -kGridEdgeTolerance && row <= rows_ - 1 + kGridEdgeTolerance)) return {};
   row = std::clamp(row, 0.0, rows_ - 1.0);
   const double floor = std::floor(row);
   const auto node = static_cast<int>(floor);
@@ -158,7 +158,7 @@ bool UndulationPatch::IsWhole(const NodePlace& column, const NodePlace& row) con
 }
 
 double UndulationPatch::At(const NodePlace& column, const NodePlace& row) const {
-  if (!column.is_inside() || !row.is_inside()) return kUnknown;
+  if (!column.is_inside() || !row.is_inside()) return kNoUndulation;
   const double x = column.weight, y = row.weight;
   const std::array<double, 4> nodes = Around(column, row);
   const std::array<double, 4> weights = {(1 - x) * (1 - y), x * (1 - y), (1 - x) * y, x * y};
@@ -170,7 +170,7 @@ double UndulationPatch::At(const NodePlace& column, const NodePlace& row) const 
     known += weights[i] * nodes[i];
     weight += weights[i];
   }
-  return weight > 0 ? known / weight : kUnknown;
+  return weight > 0 ? known / weight : kNoUndulation;
 }
 
 }  // namespace terrace::dem

@@ -15,14 +15,14 @@ constexpr int kPixelsPerNode = 8;
 // Positions are computed in other orders elsewhere: steps of the grid.
 constexpr double kSlack = 1e-6;
 
-struct NodeRange {
+struct IndexRange {
   int first = 0, last = -1;
 
   bool is_empty() const { return first > last; }
 };
 
 // The nodes around positions from .. to, of `count`.
-NodeRange Around(double from, double to, int count) {
+IndexRange Around(double from, double to, int count) {
   return {static_cast<int>(std::max(std::floor(from - kSlack), 0.0)),
           static_cast<int>(std::min(std::floor(to + kSlack) + 1, count - 1.0))};
 }
@@ -33,13 +33,13 @@ Result<UndulationRanges> UndulationRanges::Of(const UndulationGrid& grid, const 
   UndulationRanges ranges(grid);
   ranges.whole_ = {kInfinity, -kInfinity};
   const double north = grid.RowOf(area.north), south = grid.RowOf(area.south);
-  const NodeRange rows = Around(north, south, grid.rows());
+  const IndexRange rows = Around(north, south, grid.rows());
   const double start = grid.ColumnOf(area.west), extent = (area.east - area.west) / grid.column_step();
-  NodeRange columns{grid.columns(), -1};
+  IndexRange columns{grid.columns(), -1};
   bool holds_longitudes = grid.wraps();
   for (const int turn : {-1, 0, 1}) {
     const double from = start + turn * 360 / grid.column_step();
-    const NodeRange here = Around(from, from + extent, grid.columns());
+    const IndexRange here = Around(from, from + extent, grid.columns());
     if (here.is_empty()) continue;
     columns = {std::min(columns.first, here.first), std::max(columns.last, here.last)};
     holds_longitudes |= from >= -kSlack && from + extent <= grid.columns() - 1 + kSlack;
@@ -66,11 +66,11 @@ Result<UndulationRanges> UndulationRanges::Of(const UndulationGrid& grid, const 
 HeightRange UndulationRanges::Query(double west, double south, double width, double height) const {
   HeightRange range{kInfinity, -kInfinity};
   if (!(whole_.min <= whole_.max)) return range;
-  const NodeRange rows = Around(grid_->RowOf(south + height), grid_->RowOf(south), grid_->rows());
+  const IndexRange rows = Around(grid_->RowOf(south + height), grid_->RowOf(south), grid_->rows());
   const double start = grid_->ColumnOf(west);
   for (const int turn : {-1, 0, 1}) {
     const double from = start + turn * 360 / grid_->column_step();
-    const NodeRange columns = Around(from, from + width / grid_->column_step(), grid_->columns());
+    const IndexRange columns = Around(from, from + width / grid_->column_step(), grid_->columns());
     if (columns.is_empty() || rows.is_empty()) continue;
     const auto pixel = [](int node, int first) { return static_cast<double>(kPixelsPerNode) * (node - first); };
     const BlockRange found = table_.Query(pixel(columns.first, first_column_), pixel(rows.first, first_row_),

@@ -9,7 +9,7 @@
 namespace terrace::dem {
 namespace {
 
-constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+constexpr double kUnknownUndulation = std::numeric_limits<double>::quiet_NaN();
 
 // Boxes of the bounds are no wider than the cells of the finest grid that the geoid reads, as far as there are not too
 // many of them.
@@ -21,8 +21,8 @@ int BoxesAlong(double degrees, double finest_cell) {
   return static_cast<int>(std::clamp(std::ceil(degrees / box), double{kFewestBoxes}, double{kMostBoxes}));
 }
 
-bool IsPoleRow(const geo::Lattice& lattice, std::int64_t row) { return row <= 0 || row >= lattice.rows(); }
-bool IsPoleRow(const geo::MercatorGrid&, std::int64_t) { return false; }
+bool IsAtPole(const geo::Lattice& lattice, std::int64_t row) { return row <= 0 || row >= lattice.rows(); }
+bool IsAtPole(const geo::MercatorGrid&, std::int64_t) { return false; }
 
 // One global cell of nodes, filled from its corners inwards; every node is evaluated at most once.
 template <typename Grid>
@@ -38,7 +38,7 @@ class NodeCell {
   void Fill(std::int64_t column, std::int64_t row) {
     column_ = column;
     row_ = row;
-    known_.fill(kUnknown);
+    known_.fill(kUnknownUndulation);
     is_known_.fill(false);
     Divide(0, 0, kSize);
   }
@@ -221,7 +221,8 @@ HeightRange Undulations::RangeOf(double west, double south, double width, double
       }
     }
   }
-  for (const double pole : {south <= -90 ? poles_[0] : kUnknown, south + height >= 90 ? poles_[1] : kUnknown}) {
+  for (const double pole :
+       {south <= -90 ? poles_[0] : kUnknownUndulation, south + height >= 90 ? poles_[1] : kUnknownUndulation}) {
     if (std::isnan(pole)) continue;
     range.min = std::min(range.min, pole);
     range.max = std::max(range.max, pole);
@@ -295,10 +296,10 @@ void Undulations::Ask(const Grid& grid, const NodeWindow& window, std::vector<do
       if (std::isnan(value)) continue;
       const double longitude = grid.Longitude(FloorMod(column, grid.columns())), latitude = grid.Latitude(row);
       if (!IsInside(longitude, latitude)) {
-        value = kUnknown;
+        value = kUnknownUndulation;
       } else if (!boxes_.empty()) {
         const HeightRange& bound = BoxAt(longitude, latitude);
-        value = bound.min <= bound.max ? std::clamp(value, bound.min, bound.max) : kUnknown;
+        value = bound.min <= bound.max ? std::clamp(value, bound.min, bound.max) : kUnknownUndulation;
       }
     }
   }
@@ -306,14 +307,15 @@ void Undulations::Ask(const Grid& grid, const NodeWindow& window, std::vector<do
 
 template <typename Grid>
 Result<std::vector<double>> Undulations::AtNodes(const Grid& grid, const NodeWindow& window) const {
-  std::vector<double> out(static_cast<std::size_t>(window.columns) * static_cast<std::size_t>(window.rows), kUnknown);
+  std::vector<double> out(static_cast<std::size_t>(window.columns) * static_cast<std::size_t>(window.rows),
+                          kUnknownUndulation);
   if (geoid_->grid() == nullptr) {
     Ask(grid, window, out);
   } else if (auto done = Interpolate(grid, window, out); !done) {
     return tl::unexpected(done.error());
   }
   for (int row = 0; row < window.rows; ++row) {
-    if (!IsPoleRow(grid, window.row + row)) continue;
+    if (!IsAtPole(grid, window.row + row)) continue;
     std::fill_n(out.begin() + std::ptrdiff_t{row} * window.columns, window.columns,
                 poles_[window.row + row <= 0 ? 0 : 1]);
   }

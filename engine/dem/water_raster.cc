@@ -18,7 +18,7 @@ namespace terrace::dem {
 namespace {
 
 // In samples of the grid that is read: far below what shows in 8 bits.
-constexpr double kPositionTolerance = 1e-3;
+constexpr double kWaterPositionTolerance = 1e-3;
 
 RasterLayout LayoutOf(GDALDataset& dataset, const Georeference& georeference) {
   RasterLayout layout;
@@ -64,7 +64,7 @@ Result<std::vector<std::uint8_t>> WaterRaster::Impl::Read(const geo::TileKey& ke
   const double sharpness = std::max(1.0, factor / samples_per_pixel);
 
   const std::vector<Position> positions =
-      CellCentrePositions(georeference, footprint, lattice, key, kPositionTolerance * factor);
+      CellCentrePositions(georeference, footprint, lattice, key, kWaterPositionTolerance * factor);
   const GridAxis columns(layout.columns, factor, layout.wraps), rows(layout.height, factor, false);
   CellFinder finder(columns, rows, layout.width, layout.height, kSide);
   std::vector<GridCell> cells;

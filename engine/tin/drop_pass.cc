@@ -21,12 +21,12 @@ namespace terrace::tin {
 namespace {
 
 // Visits between two looks at the stop token: about a quarter of a millisecond.
-constexpr std::size_t kStopPeriod = 256;
+constexpr std::size_t kPassStopPeriod = 256;
 
 // Samples a side of the blocks that visits finish one by one, so that what a visit touches is in the cache. A field of
 // 257 x 257 samples is one block, its last row and column being border; smaller blocks miss more where a few straight
 // lines are all there is to keep.
-constexpr int kBlock = 256;
+constexpr int kPassBlock = 256;
 
 void CheckOptions(const HeightField& field, const DropOptions& options) {
   TERRACE_CHECK(options.max_error >= 0);
@@ -86,7 +86,7 @@ bool DropPass::Run(const std::stop_token& stop) {
   for (const std::uint32_t v : next_) awaits_[v] = 1;
   for (std::size_t visits = 0; !next_.empty();) {
     for (const std::uint32_t v : InOrderOfVisits(std::exchange(next_, {}))) {
-      if (visits++ % kStopPeriod == 0 && stop.stop_requested()) return false;
+      if (visits++ % kPassStopPeriod == 0 && stop.stop_requested()) return false;
       awaits_[v] = 0;
       Drop(v);
     }
@@ -99,11 +99,11 @@ std::vector<std::uint32_t> DropPass::InOrderOfVisits(std::vector<std::uint32_t> 
   std::sort(sweep.begin(), sweep.end(), std::greater<>());
   const auto block = [&](std::uint32_t v) {
     const SamplePosition p = vertices_[v].position;
-    return static_cast<std::size_t>(p.y / kBlock) * static_cast<std::size_t>(field_.width() / kBlock + 1) +
-           static_cast<std::size_t>(p.x / kBlock);
+    return static_cast<std::size_t>(p.y / kPassBlock) * static_cast<std::size_t>(field_.width() / kPassBlock + 1) +
+           static_cast<std::size_t>(p.x / kPassBlock);
   };
-  std::vector<std::size_t> places(static_cast<std::size_t>(field_.width() / kBlock + 1) *
-                                  static_cast<std::size_t>(field_.height() / kBlock + 1));
+  std::vector<std::size_t> places(static_cast<std::size_t>(field_.width() / kPassBlock + 1) *
+                                  static_cast<std::size_t>(field_.height() / kPassBlock + 1));
   for (const std::uint32_t v : sweep) ++places[block(v)];
   std::exclusive_scan(places.begin(), places.end(), places.begin(), std::size_t{0});
   std::vector<std::uint32_t> ordered(sweep.size());

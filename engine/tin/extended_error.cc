@@ -13,7 +13,7 @@
 namespace terrace::tin {
 namespace {
 
-constexpr std::size_t kStopPeriod = 1024;  // triangles
+constexpr std::size_t kExtendedErrorStopPeriod = 1024;  // triangles
 
 using Surface = std::array<double, 4>;  // z, r, g, b; colours from 0 to 255
 
@@ -33,7 +33,7 @@ ExtendedError MeasureExtendedError(const ExtendedField& field, const ColoredMesh
   std::vector<bool> is_measured(width * static_cast<std::size_t>(field.height()));
   CompensatedSum squares;
   for (std::size_t t = 0; t < mesh.tin.triangles.size(); ++t) {
-    if (t % kStopPeriod == 0 && stop.stop_requested()) break;
+    if (t % kExtendedErrorStopPeriod == 0 && stop.stop_requested()) break;
     std::array<SamplePosition, 3> corners;
     std::array<Surface, 3> surfaces;
     for (std::size_t i = 0; i < 3; ++i) {

@@ -10,7 +10,7 @@ namespace terrace::tin {
 namespace {
 
 // Insertions between two looks at the stop token: well below a millisecond.
-constexpr std::size_t kStopPeriod = 256;
+constexpr std::size_t kExtendedStopPeriod = 256;
 
 // A triangle as one plane for z, r, g and b each, relative to its last corner p and times D, twice its area: a sample
 // at (x, y) from p misses channel c by |D (c - c_p) - (a x + b y)| / D. With colours all of this is exact: D < 2^30,
@@ -92,7 +92,7 @@ ExtendedGreedy::ExtendedGreedy(const ExtendedField& field) : field_(&field), tri
 
 bool ExtendedGreedy::Run(const ExtendedGoal& goal, std::stop_token stop) {
   for (std::size_t count = 0;; ++count) {
-    if (count % kStopPeriod == 0 && stop.stop_requested()) return false;
+    if (count % kExtendedStopPeriod == 0 && stop.stop_requested()) return false;
     if (vertex_count() >= goal.max_points) return true;
     const TriangleId worst = candidates_.Winner();
     if (worst == CandidateQueue::kNoSlot || static_cast<double>(candidates_.error(worst)) <= goal.max_error)

@@ -13,12 +13,12 @@ using Wide = InsertionRecord<std::uint32_t>;
 constexpr std::size_t kLikelyWords = 11;
 
 // What is copied in one go: all of what most insertions have.
-constexpr std::size_t kFew = 8;
-static_assert(kFew <= Ring::kPadding);
+constexpr std::size_t kFewest = 8;
+static_assert(kFewest <= Ring::kPadding);
 
 // Most often a single step: std::copy would be a call that has to find out how little there is.
 void CopyFew(const std::uint32_t* from, std::size_t count, std::uint32_t* to) {
-  for (std::size_t i = 0; i < count; i += kFew) std::memcpy(to + i, from + i, kFew * sizeof *to);
+  for (std::size_t i = 0; i < count; i += kFewest) std::memcpy(to + i, from + i, kFewest * sizeof *to);
 }
 
 // Where the smallest of them is, without a branch that cannot be foretold.
@@ -56,7 +56,7 @@ void InsertionRecorder::Append(SamplePosition inserted, float error_before, cons
   const std::size_t corners = star.count + (star.is_closed ? 0 : 1), words = 1 + corners + star.removed_count;
   made_ += star.count;
   corners_ += corners;
-  if (log_.capacity() - log_.size() < words + kFew) log_.reserve(2 * (log_.capacity() + words + kFew));
+  if (log_.capacity() - log_.size() < words + kFewest) log_.reserve(2 * (log_.capacity() + words + kFewest));
   log_.GrowBy(words);
   Word* word = log_.end() - words;
   *word++ = static_cast<Word>(star.count) | (star.is_closed ? 0 : Wide::kOpen);

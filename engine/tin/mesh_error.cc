@@ -12,7 +12,7 @@
 namespace terrace::tin {
 namespace {
 
-constexpr std::size_t kStopPeriod = 1024;  // triangles
+constexpr std::size_t kErrorStopPeriod = 1024;  // triangles
 
 }  // namespace
 
@@ -38,7 +38,7 @@ MeshError MeasureError(const HeightField& field, const TinMesh& mesh, std::stop_
   };
 
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    if (t % kStopPeriod == 0 && stop.stop_requested()) break;
+    if (t % kErrorStopPeriod == 0 && stop.stop_requested()) break;
     const auto& triangle = mesh.triangles[t];
     const std::array<SamplePosition, 3> corners = {mesh.vertices[triangle[0]], mesh.vertices[triangle[1]],
                                                    mesh.vertices[triangle[2]]};

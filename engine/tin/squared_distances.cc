@@ -9,7 +9,7 @@ namespace terrace::tin {
 namespace {
 
 // Twice the signed area of (a, b, (x, y)); 0 on the line through a and b.
-std::int64_t Side(const Corner& a, const Corner& b, int x, int y) {
+std::int64_t SideOf(const Corner& a, const Corner& b, int x, int y) {
   return static_cast<std::int64_t>(b.x - a.x) * (y - a.y) - static_cast<std::int64_t>(b.y - a.y) * (x - a.x);
 }
 
@@ -26,7 +26,7 @@ double SquaredDistances(const HeightField& field, const std::array<Corner, 3>& c
     for (int x = first; x <= last; ++x) {
       const double distance = plane.At(x, at_row) - static_cast<double>(row[x]);
       if (std::isnan(distance)) continue;
-      const bool on_edge = Side(a, b, x, y) == 0 || Side(b, c, x, y) == 0 || Side(c, a, x, y) == 0;
+      const bool on_edge = SideOf(a, b, x, y) == 0 || SideOf(b, c, x, y) == 0 || SideOf(c, a, x, y) == 0;
       sum += (on_edge ? 0.5 : 1.0) * distance * distance;
     }
   });

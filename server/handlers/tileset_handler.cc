@@ -16,7 +16,7 @@
 namespace terrace::server {
 namespace {
 
-constexpr std::string_view kJson = "application/json";
+constexpr std::string_view kJsonType = "application/json";
 
 // What the content templates carry for a request. The values of `compression` and `texture` have been checked.
 std::string ContentQuery(const ErrorWish& wish, std::string_view query) {
@@ -55,7 +55,7 @@ TilesetHandler::TilesetHandler(std::span<const DatasetView> datasets, std::strin
     : datasets_(datasets), cache_control_(std::move(cache_control)) {
   for (const DatasetView& dataset : datasets_) {
     roots_.push_back(std::make_shared<const std::vector<proto::TreeRoot>>(proto::ImplicitTrees(dataset.available)));
-    plain_.push_back(Document::Make(WriteTileset(dataset, *roots_.back(), {}, "", ""), kJson));
+    plain_.push_back(Document::Make(WriteTileset(dataset, *roots_.back(), {}, "", ""), kJsonType));
   }
 }
 
@@ -71,7 +71,7 @@ Answer TilesetHandler::Handle(const Route& route, const Request& request) const 
   DocumentPlan plan;
   plan.key = fmt::format("tileset {} {} {}", *dataset, content_query, subtree_query);
   plan.bytes = plain_[*dataset].identity->size();
-  plan.content_type = kJson;
+  plan.content_type = kJsonType;
   plan.cache_control = cache_control_;
   plan.write = [&view = datasets_[*dataset], roots = roots_[*dataset], wish = parameters->wish,
                 content_query = std::move(content_query), subtree_query = std::move(subtree_query)] {

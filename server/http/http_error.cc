@@ -65,7 +65,7 @@ const char* RetryAfter(ErrorCode code) {
 
 // For a string in JSON. Not by a library of JSON: the one used elsewhere asserts where it finds no memory, and that is
 // one of the things to be told.
-std::string Escaped(std::string_view text) {
+std::string EscapedForJson(std::string_view text) {
   std::string escaped;
   for (const char c : text) {
     if (c == '"' || c == '\\') {
@@ -104,7 +104,7 @@ Response ProblemResponse(int status, std::string_view detail, std::string_view r
   response.content_type = "application/problem+json";
   response.body = std::make_shared<const std::string>(
       fmt::format(R"({{"type":"about:blank","title":"{}","status":{},"detail":"{}","request_id":"{}"}})",
-                  TitleOf(status), status, Escaped(detail), request_id));
+                  TitleOf(status), status, EscapedForJson(detail), request_id));
   response.cache_control = "no-store";
   return response;
 }

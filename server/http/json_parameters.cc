@@ -12,14 +12,14 @@ namespace {
 using boost::system::error_code;
 
 // What Boost.JSON's parser calls. It hands texts on in parts, so that nothing here grows with the text.
-class Handler {
+class ObjectHandler {
  public:
   static constexpr std::size_t kUnlimited = std::numeric_limits<std::size_t>::max();
   // The names are the library's.
   static constexpr std::size_t max_object_size = kUnlimited, max_array_size = kUnlimited, max_key_size = kUnlimited,
                                max_string_size = kUnlimited;
 
-  explicit Handler(ParameterSink& sink) : sink_(sink) {}
+  explicit ObjectHandler(ParameterSink& sink) : sink_(sink) {}
 
   const Result<void>& result() const { return result_; }
 
@@ -81,7 +81,7 @@ class Handler {
 Result<void> ReadJsonObject(const TextParts& next, ParameterSink& sink, std::size_t& at) {
   constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
   at = 0;
-  boost::json::basic_parser<Handler> parser(boost::json::parse_options(), sink);
+  boost::json::basic_parser<ObjectHandler> parser(boost::json::parse_options(), sink);
   for (;;) {
     const Result<std::string_view> part = next();
     if (!part) return tl::unexpected(part.error());

@@ -27,10 +27,6 @@ using Clock = std::chrono::steady_clock;
 // Flat triangles that are farther off than this are those that go half around the Earth and collapse into a line.
 constexpr double kMostSag_m = 1e6;
 
-std::chrono::microseconds Since(Clock::time_point start) {
-  return std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - start);
-}
-
 // The part of the area inside the source's bounds; of two parts the wider one. Nothing where they do not meet.
 std::optional<AreaRequest> Clip(const AreaRequest& area, const dem::GeoBounds& bounds) {
   const double bounds_east = bounds.east < bounds.west ? bounds.east + 360 : bounds.east;
@@ -173,7 +169,7 @@ Result<EncodedTile> BuildAreaMesh(const dem::DemSource& source, const AreaPlan& 
   Clock::time_point start = Clock::now();
   Result<std::vector<float>> heights = source.ReadNodes(plan.level, plan.window, stop);
   if (!heights) return tl::unexpected(std::move(heights).error());
-  encoded.times.read = Since(start);
+  encoded.times.read = MicrosecondsSince(start);
 
   start = Clock::now();
   const auto field = tin::HeightField::Make(plan.window.columns, plan.window.rows, *std::move(heights));
@@ -188,7 +184,7 @@ Result<EncodedTile> BuildAreaMesh(const dem::DemSource& source, const AreaPlan& 
   goal.max_error = bound_m;
   if (!greedy.Run(goal, stop)) return cancelled();
   tin::TinMesh mesh = greedy.Mesh();
-  encoded.times.refine = Since(start);
+  encoded.times.refine = MicrosecondsSince(start);
 
   start = Clock::now();
   std::optional<Frame> frame;
@@ -202,7 +198,7 @@ Result<EncodedTile> BuildAreaMesh(const dem::DemSource& source, const AreaPlan& 
     return tl::unexpected(std::move(written).error());
   }
   encoded.bytes = std::move(out).str();
-  encoded.times.encode = Since(start);
+  encoded.times.encode = MicrosecondsSince(start);
   encoded.etag = StrongETag(encoded.bytes);
   encoded.max_error_m = placed.max_error_m;
   encoded.vertices = static_cast<std::uint32_t>(mesh.vertices.size());

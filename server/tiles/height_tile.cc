@@ -14,10 +14,6 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-std::chrono::microseconds Since(Clock::time_point start) {
-  return std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - start);
-}
-
 // Heights beyond the code's range are far off, not only rounded.
 double LargestLoss(const std::vector<float>& heights, proto::HeightEncoding encoding) {
   double largest = 0;
@@ -44,11 +40,11 @@ Result<EncodedTile> BuildHeightTile(const dem::DemSource& source, const TileRequ
   const dem::NodeWindow window{request.key.x * size, request.key.y * size, size, size};
   const Result<std::vector<float>> heights = source.ReadMercator(depth, window, std::move(stop));
   if (!heights) return tl::unexpected(heights.error());
-  encoded.times.read = Since(start);
+  encoded.times.read = MicrosecondsSince(start);
 
   start = Clock::now();
   encoded.bytes = proto::EncodeHeightPng(*heights, size, request.height_encoding);
-  encoded.times.encode = Since(start);
+  encoded.times.encode = MicrosecondsSince(start);
   encoded.etag = StrongETag(encoded.bytes);
   encoded.max_error_m = LargestLoss(*heights, request.height_encoding);
   return encoded;

@@ -12,15 +12,16 @@
 namespace terrace::server {
 namespace {
 
-constexpr double kSmallestRadius =
+constexpr double kSmallestCurvatureRadius =
     geo::kSemiMinorAxis * geo::kSemiMinorAxis / geo::kSemiMajorAxis;  // meridian, at the equator
-constexpr double kLargestRadius = geo::kSemiMajorAxis * geo::kSemiMajorAxis / geo::kSemiMinorAxis;  // at the poles
+constexpr double kLargestCurvatureRadius =
+    geo::kSemiMajorAxis * geo::kSemiMajorAxis / geo::kSemiMinorAxis;  // at the poles
 
 // Metres that the right triangles of a grid of `divisions` x `divisions` over a tile of this level can sag. The same
 // for every tile of the level, so that neighbours start from the same grid: tiles are taken as wide as at the equator.
 double GridSagitta(int level, int divisions) {
   const double side = std::ldexp(geo::kSemiMajorAxis * geo::ToRadians(180), -level) / divisions;
-  return side * side / (4 * kSmallestRadius);
+  return side * side / (4 * kSmallestCurvatureRadius);
 }
 
 tin::Curvature MakeCurvature(const proto::LatticeView& lattice) {
@@ -37,9 +38,9 @@ tin::Curvature MakeCurvature(const proto::LatticeView& lattice) {
   std::inclusive_scan(begin, widest, begin, wider);
   const auto back = curvature.east_m2.rbegin(), widest_back = std::make_reverse_iterator(widest);
   std::inclusive_scan(back, widest_back, back, wider);
-  const double north = geo::ToRadians(step) * kLargestRadius;
+  const double north = geo::ToRadians(step) * kLargestCurvatureRadius;
   curvature.north_m2 = north * north;
-  curvature.radius_m = kSmallestRadius;
+  curvature.radius_m = kSmallestCurvatureRadius;
   return curvature;
 }
 
@@ -56,7 +57,7 @@ std::vector<tin::SeedGrid> MakeSeedGrids(const proto::LatticeView& lattice) {
 // Half the second difference of the ground along an edge, per sample squared.
 double BorderSagitta(const proto::LatticeView& lattice, tin::Side side) {
   const double step = geo::ToRadians(lattice.lattice.StepDegrees());
-  if (side == tin::Side::kEast || side == tin::Side::kWest) return step * step * kLargestRadius / 2;
+  if (side == tin::Side::kEast || side == tin::Side::kWest) return step * step * kLargestCurvatureRadius / 2;
   const double latitude = lattice.Latitude(side == tin::Side::kSouth ? 0 : lattice.cells());
   const double cosine = geo::SurfaceNormal(0, latitude).x;
   return step * step * geo::PrimeVerticalRadius(latitude) * cosine * cosine / 2;

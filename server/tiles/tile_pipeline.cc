@@ -20,10 +20,6 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-std::chrono::microseconds Since(Clock::time_point start) {
-  return std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - start);
-}
-
 // What a tile's mesh is held to, so that it keeps `error_m` to the ground: heights at nodes are rounded to 2^-10 m, and
 // their positions are a little off as well.
 double MeshError(double error_m) {
@@ -58,7 +54,7 @@ Result<RefinedTilePtr> TilePipeline::Refine(const Dataset& dataset, const geo::T
     Result<dem::TileHeights> read = dataset.source->Read(key, stop);
     if (!read) return tl::unexpected(std::move(read).error());
     heights = *std::move(read);
-    encoded.times.read = Since(start);
+    encoded.times.read = MicrosecondsSince(start);
     start = Clock::now();
   }
   const proto::LatticeView lattice{key, heights.lattice, heights.heights};
@@ -71,7 +67,7 @@ Result<RefinedTilePtr> TilePipeline::Refine(const Dataset& dataset, const geo::T
   goal.max_points = proto::kMaxTileVertices + 1;
   if (!greedy.Run(goal, stop)) return Cancelled();
   auto refined = std::make_shared<RefinedTile>(RefinedTile{std::move(heights), greedy.MakeRefinement(), error_m});
-  encoded.times.refine = Since(start);
+  encoded.times.refine = MicrosecondsSince(start);
   // One that ended at the format's number of vertices holds no mesh to this error. Another build may have gone further
   // meanwhile.
   const RefinedTilePtr other = refinements_->FindInMemory(cache_key);
@@ -93,7 +89,7 @@ Result<void> TilePipeline::EncodeQuantizedMesh(const TileRequest& request, const
   if (!options) return tl::unexpected(options.error());
   encoded.bytes = proto::EncodeQuantizedMesh(measured->tile, *options);
   encoded.times.refine += measured->replayed;
-  encoded.times.encode = Since(start) - measured->replayed;
+  encoded.times.encode = MicrosecondsSince(start) - measured->replayed;
   encoded.max_error_m = measured->max_error_m;
   encoded.certified_error_m = measured->surface_error_m + refined.heights.source_gap_m;
   encoded.vertices = static_cast<std::uint32_t>(measured->tile.u.size());
@@ -123,7 +119,7 @@ Result<void> TilePipeline::EncodeGlb(const TileRequest& request, const RefinedTi
   if (!glb) return tl::unexpected(std::move(glb).error());
   encoded.bytes = std::move(glb->bytes);
   encoded.times.refine += meshed->replayed;
-  encoded.times.encode = Since(start) - meshed->replayed;
+  encoded.times.encode = MicrosecondsSince(start) - meshed->replayed;
   encoded.max_error_m = meshed->max_error_m;
   encoded.certified_error_m = options.certified_error_m;
   encoded.vertices = glb->vertices;
@@ -151,7 +147,7 @@ Result<EncodedTile> TilePipeline::Build(const TileRequest& request, std::stop_to
   if (request.coding != Coding::kIdentity) {
     const Clock::time_point start = Clock::now();
     encoded.bytes = Compress(std::move(encoded.bytes), request.coding);
-    encoded.times.compress = Since(start);
+    encoded.times.compress = MicrosecondsSince(start);
   }
   encoded.etag = StrongETag(encoded.bytes);
   return encoded;

@@ -82,11 +82,16 @@ class Fairness : public ServerFixture {
   bool Waiting(long jobs) {
     return Eventually([&] { return Gauge("terrace_queue_length") == jobs; });
   }
+  // A job leaves the queue before it says that it has begun.
+  bool HaveBegun(std::size_t jobs) {
+    return Eventually([&] { return Begun().size() == jobs; });
+  }
   // The two workers are held, and `asked` is what the polite client's request is called when it begins: it must be the
   // next after one of them.
   void ExpectNext(RawClient& polite, const std::string& asked) {
+    ASSERT_TRUE(HaveBegun(2));
     LetOneGo();
-    ASSERT_TRUE(Eventually([&] { return Begun().size() == 3; }));
+    ASSERT_TRUE(HaveBegun(3));
     EXPECT_EQ(Begun()[2], asked);
     LetAllGo();
     EXPECT_EQ(StatusOf(polite), 200);
@@ -171,11 +176,11 @@ TEST_F(Fairness, AMeshIsNextBesideAFloodOfMeshes) {
   const std::string mesh = "/maui/mesh?bbox=-157,20,-156,21&error=";
   for (int i = 0; i < 12; ++i) Send(Get(mesh + "1", From("192.0.2.1")));
   ASSERT_TRUE(Waiting(11));
-  EXPECT_EQ(Begun().size(), 1u) << "a worker is kept for tiles";
+  ASSERT_TRUE(HaveBegun(1)) << "a worker is kept for tiles";
   RawClient& polite = Send(Get(mesh + "2", From("192.0.2.2")));
   ASSERT_TRUE(Waiting(12));
   LetOneGo();
-  ASSERT_TRUE(Eventually([&] { return Begun().size() == 2; }));
+  ASSERT_TRUE(HaveBegun(2));
   EXPECT_EQ(Begun()[1], "mesh 2");
   LetAllGo();
   EXPECT_EQ(StatusOf(polite), 200);
@@ -193,8 +198,9 @@ TEST_F(Fairness, LongListsOfPointsLeaveAWorkerForTiles) {
                            From("192.0.2.1") + "Content-Length: " + std::to_string(body.size()) + "\r\n\r\n" + body;
   for (int i = 0; i < 4; ++i) Send(post);
   ASSERT_TRUE(Waiting(3));
+  ASSERT_TRUE(HaveBegun(1));
   RawClient& polite = Send(Get("/maui/0/0/0.terrain", From("192.0.2.2")));
-  ASSERT_TRUE(Eventually([&] { return Begun().size() == 2; }));
+  ASSERT_TRUE(HaveBegun(2));
   EXPECT_EQ(Begun()[1], "0/0/0");
   LetAllGo();
   EXPECT_EQ(StatusOf(polite), 200);

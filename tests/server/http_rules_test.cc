@@ -10,7 +10,7 @@
 namespace terrace::server {
 namespace {
 
-using std::string_literals::operator""s;
+using namespace std::string_literals;
 
 struct Rule {
   const char* says;
@@ -26,7 +26,7 @@ std::string Head(const std::string& request_line, const std::string& fields = "H
 }
 std::string With(const std::string& fields) { return Head("GET /livez HTTP/1.1", "Host: x\r\n" + fields); }
 
-std::string Post(const std::string& fields, const std::string& body, const std::string& version = "1.1") {
+std::string PostOf(const std::string& fields, const std::string& body, const std::string& version = "1.1") {
   return "POST /maui/heights HTTP/" + version +
          "\r\nHost: x\r\nContent-Type: application/json\r\nContent-Length: " + std::to_string(body.size()) + "\r\n" +
          fields + "\r\n" + body;
@@ -140,8 +140,8 @@ std::vector<Rule> Bodies() {
       {"a negative length", With("Content-Length: -1\r\n"), {400}, kCloses},
       {"two lengths", With("Content-Length: 0\r\nContent-Length: 0\r\n"), {400}, kCloses},
       {"a list of lengths", With("Content-Length: 0, 0\r\n"), {400}, kCloses},
-      {"a body by its length", Post("", kBody) + next, {200, 200}},
-      {"two bodies", Post("", kBody) + Post("", kBody), {200, 200}},
+      {"a body by its length", PostOf("", kBody) + next, {200, 200}},
+      {"two bodies", PostOf("", kBody) + PostOf("", kBody), {200, 200}},
       {"no length is no body",
        "POST /maui/heights HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\n\r\n",
        {400}},
@@ -153,8 +153,8 @@ std::vector<Rule> Bodies() {
        Head("POST /maui/heights HTTP/1.1", "Host: x\r\nContent-Length: 99999999\r\n"),
        {413},
        kCloses},
-      {"a body in a coding", Post("Content-Encoding: gzip\r\n", kBody), {415}, kCloses},
-      {"a body in the coding that is none", Post("Content-Encoding: identity\r\n", kBody), {200}},
+      {"a body in a coding", PostOf("Content-Encoding: gzip\r\n", kBody), {415}, kCloses},
+      {"a body in the coding that is none", PostOf("Content-Encoding: identity\r\n", kBody), {200}},
       {"a body of another type",
        "POST /maui/heights HTTP/1.1\r\nHost: x\r\nContent-Type: text/plain\r\nContent-Length: 2\r\n\r\nhi",
        {415}},
@@ -166,7 +166,7 @@ std::vector<Rule> Bodies() {
        Head("POST /maui/heights HTTP/1.1", "Host: x\r\nExpect: 100-continue\r\nContent-Length: 99999999\r\n"),
        {413},
        kCloses},
-      {"no interim reply to HTTP/1.0", Post("Expect: 100-continue\r\n", kBody, "1.0"), {200}, kCloses},
+      {"no interim reply to HTTP/1.0", PostOf("Expect: 100-continue\r\n", kBody, "1.0"), {200}, kCloses},
   };
 }
 

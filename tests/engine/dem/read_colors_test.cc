@@ -11,7 +11,7 @@
 namespace terrace::dem {
 namespace {
 
-struct ImageSpec {
+struct ColorSpec {
   int width = 16, height = 16, bands = 3;
   GDALDataType type = GDT_Byte;
   std::array<double, 6> geo_transform = {0, 1, 0, 0, 0, -1};
@@ -26,7 +26,7 @@ struct ImageSpec {
 
 const std::array<GDALColorEntry, 3> kPalette = {{{10, 20, 30, 255}, {200, 100, 50, 255}, {1, 2, 3, 255}}};
 
-std::string WriteImage(const TempDir& dir, ImageSpec spec, const std::string& name = "image.tif") {
+std::string WriteColors(const TempDir& dir, ColorSpec spec, const std::string& name = "image.tif") {
   GDALAllRegister();
   const std::string path = dir.File(name);
   GDALDriver* const driver = GetGDALDriverManager()->GetDriverByName("GTiff");
@@ -74,7 +74,7 @@ void ExpectRefused(const std::string& image, const std::string& dem, const std::
 
 // Red is the longitude, green the latitude, both in tenths of a degree from the corner at 6 E, 46 N: linear, so that
 // bilinear interpolation gives it back.
-ImageSpec Gradient() {
+ColorSpec Gradient() {
   return {
       .width = 200, .height = 100, .geo_transform = {6, .1, 0, 56, 0, -.1}, .value = [](int col, int row, int band) {
         return band == 0 ? col : band == 1 ? 99 - row : 77;
@@ -85,7 +85,7 @@ TEST(ReadColors, TakesPixelBySampleWithoutAGeoreference) {
   const TempDir dir;
   const auto value = [](int col, int row, int band) { return 10 * col + row + 60 * band; };
   const std::string image =
-      WriteImage(dir, {.width = 7, .height = 5, .georeferenced = false, .crs = "", .value = value});
+      WriteColors(dir, {.width = 7, .height = 5, .georeferenced = false, .crs = "", .value = value});
   const std::string dem = WriteRaster(dir, {.width = 7, .height = 5});
   const auto colors = Colors(image, dem);
   ASSERT_TRUE(colors) << colors.error().message;
@@ -97,7 +97,7 @@ TEST(ReadColors, TakesPixelBySampleWithoutAGeoreference) {
 
 TEST(ReadColors, PlacesByDegrees) {
   const TempDir dir;
-  const std::string image = WriteImage(dir, Gradient());
+  const std::string image = WriteColors(dir, Gradient());
   for (const double turn : {0.0, 360.0}) {  // a DEM that counts from 0 to 360 degrees or beyond
     const std::string dem =
         WriteRaster(dir, {.width = 30, .height = 20, .geo_transform = {8 + turn, .05, 0, 50, 0, -.05}});
@@ -114,7 +114,7 @@ TEST(ReadColors, PlacesByDegrees) {
 
 TEST(ReadColors, PlacesThroughProjWhereReferenceSystemsDiffer) {
   const TempDir dir;
-  const std::string image = WriteImage(dir, Gradient());
+  const std::string image = WriteColors(dir, Gradient());
   const std::string dem = WriteRaster(
       dir, {.width = 40, .height = 30, .geo_transform = {400000, 5000, 0, 5500000, 0, -5000}, .crs = "EPSG:32632"});
   const auto colors = Colors(image, dem);
@@ -135,11 +135,11 @@ TEST(ReadColors, PlacesThroughProjWhereReferenceSystemsDiffer) {
 TEST(ReadColors, AveragesPixelsThatAreFinerThanSamples) {
   const TempDir dir;
   // A chequerboard under samples that are 8 pixels apart: nearest or bilinear alone would give black or white.
-  const std::string image = WriteImage(dir, {.width = 128,
-                                             .height = 128,
-                                             .geo_transform = {500000, 1, 0, 5000000, 0, -1},
-                                             .crs = "EPSG:32632",
-                                             .value = [](int col, int row, int) { return (col + row) % 2 * 255; }});
+  const std::string image = WriteColors(dir, {.width = 128,
+                                              .height = 128,
+                                              .geo_transform = {500000, 1, 0, 5000000, 0, -1},
+                                              .crs = "EPSG:32632",
+                                              .value = [](int col, int row, int) { return (col + row) % 2 * 255; }});
   const std::string dem = WriteRaster(
       dir, {.width = 16, .height = 16, .geo_transform = {500000, 8, 0, 5000000, 0, -8}, .crs = "EPSG:32632"});
   const auto colors = Colors(image, dem);
@@ -150,10 +150,10 @@ TEST(ReadColors, AveragesPixelsThatAreFinerThanSamples) {
 TEST(ReadColors, DoesNotMixInWhatIsTransparent) {
   const TempDir dir;
   const std::string dem = WriteRaster(dir, {.width = 30, .height = 30, .geo_transform = {.1, .5, 0, -.1, 0, -.5}});
-  const std::string image = WriteImage(dir, {.bands = 4, .has_alpha = true, .value = [](int col, int, int band) {
-                                               if (band == 3) return col < 8 ? 0 : 255;
-                                               return col < 8 ? 255 : 40;
-                                             }});
+  const std::string image = WriteColors(dir, {.bands = 4, .has_alpha = true, .value = [](int col, int, int band) {
+                                                if (band == 3) return col < 8 ? 0 : 255;
+                                                return col < 8 ? 255 : 40;
+                                              }});
   const auto colors = Colors(image, dem);
   ASSERT_TRUE(colors) << colors.error().message;
   for (int i = 0; i < 900; ++i) {
@@ -167,27 +167,27 @@ TEST(ReadColors, RefusesAnImageThatDoesNotFit) {
   const TempDir dir;
   const std::string dem = WriteRaster(dir, {.width = 30, .height = 20, .geo_transform = {8, .05, 0, 50, 0, -.05}});
   const std::string plain =
-      WriteImage(dir, {.width = 31, .height = 20, .georeferenced = false, .crs = ""}, "plain.tif");
+      WriteColors(dir, {.width = 31, .height = 20, .georeferenced = false, .crs = ""}, "plain.tif");
   ExpectRefused(plain, dem, {"plain.tif has 31 x 20", "30 x 20", "no georeference", "-outsize 30 20", "-a_ullr"});
-  ImageSpec beside = Gradient();
+  ColorSpec beside = Gradient();
   beside.geo_transform[0] = 8.2;
-  ExpectRefused(WriteImage(dir, beside, "beside.tif"), dem,
+  ExpectRefused(WriteColors(dir, beside, "beside.tif"), dem,
                 {"beside.tif does not cover", "column 0, row 0", "gdalwarp"});
-  ImageSpec placeless = Gradient();
+  ColorSpec placeless = Gradient();
   placeless.crs = "";
-  ExpectRefused(WriteImage(dir, placeless, "placeless.tif"), dem, {"placeless.tif", "-a_srs"});
+  ExpectRefused(WriteColors(dir, placeless, "placeless.tif"), dem, {"placeless.tif", "-a_srs"});
 }
 
 TEST(ReadColors, NeedsNoImageUnderVoids) {
   const TempDir dir;
-  ImageSpec beside = Gradient();
+  ColorSpec beside = Gradient();
   beside.geo_transform[0] = 8.2;
   const std::string dem = WriteRaster(
       dir,
       {.width = 30, .height = 20, .geo_transform = {8, .05, 0, 50, 0, -.05}, .nodata = -1, .value = [](int col, int) {
          return col < 6 ? -1 : 5;
        }});
-  const auto colors = Colors(WriteImage(dir, beside), dem);
+  const auto colors = Colors(WriteColors(dir, beside), dem);
   ASSERT_TRUE(colors) << colors.error().message;
   EXPECT_EQ((*colors)[0], ColorSample{});
   EXPECT_EQ((*colors)[29][3], 255);
@@ -195,8 +195,8 @@ TEST(ReadColors, NeedsNoImageUnderVoids) {
 
 TEST(ReadImage, KnowsEveryKindOfBands) {
   const TempDir dir;
-  const auto pixel = [&](const ImageSpec& spec, int col, int row) {
-    const auto image = ReadImage(WriteImage(dir, spec));
+  const auto pixel = [&](const ColorSpec& spec, int col, int row) {
+    const auto image = ReadImage(WriteColors(dir, spec));
     EXPECT_TRUE(image) << image.error().message;
     return image ? image->colors[static_cast<std::size_t>(row * image->width + col)] : ColorSample{};
   };
@@ -227,8 +227,8 @@ TEST(ReadImage, RefusesWhatIsNoImage) {
     EXPECT_NE(image.error().message.find(words), std::string::npos) << image.error().message;
     EXPECT_NE(image.error().message.find(path), std::string::npos) << image.error().message;
   };
-  refuses(WriteImage(dir, {.bands = 1, .type = GDT_Float32}, "heights.tif"), "gdal_translate -ot Byte -scale");
-  refuses(WriteImage(dir, {.bands = 2}, "two.tif"), "gdal_translate -b 1 -b 2 -b 3");
+  refuses(WriteColors(dir, {.bands = 1, .type = GDT_Float32}, "heights.tif"), "gdal_translate -ot Byte -scale");
+  refuses(WriteColors(dir, {.bands = 2}, "two.tif"), "gdal_translate -b 1 -b 2 -b 3");
   refuses(dir.File("missing.tif"), "No such file");
   const std::string text = dir.File("text.tif");
   std::ofstream(text) << "no image";

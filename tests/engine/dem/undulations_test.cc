@@ -29,7 +29,7 @@ std::vector<double> At(const Undulations& undulations, const Grid& grid, const N
 }
 
 // Metres from what PROJ gives: both interpolate between the same nodes.
-constexpr double kClose = 1e-6;
+constexpr double kCloseToProj = 1e-6;
 
 struct Area {
   const char* name;
@@ -62,7 +62,7 @@ TEST(Undulations, AreTheGeoids) {
         const bool pole = row == 0 || row == lattice.rows();
         const double exact = geoid->Undulation(
             {pole ? 0 : lattice.Longitude(window.column + i % window.columns), lattice.Latitude(row)});
-        ASSERT_NEAR(values[i], exact, kClose) << name << ", level " << level << ", node " << i;
+        ASSERT_NEAR(values[i], exact, kCloseToProj) << name << ", level " << level << ", node " << i;
         ++seen;
       }
       EXPECT_GT(seen, 0) << name << ", level " << level;
@@ -83,7 +83,7 @@ TEST(Undulations, NearThePoleAreTheGeoidsAtEveryNode) {
       const auto values = At(*undulations, lattice, window);
       for (std::int64_t column = 0; column < lattice.columns(); ++column) {
         ASSERT_NEAR(values[static_cast<std::size_t>(column)],
-                    exact.At({lattice.Longitude(column), lattice.Latitude(row)}), kClose)
+                    exact.At({lattice.Longitude(column), lattice.Latitude(row)}), kCloseToProj)
             << "level " << level << ", column " << column << ", row " << row;
       }
     }
@@ -122,7 +122,7 @@ TEST(Undulations, OfWebMercatorPixelsAreTheGeoids) {
     for (int i = 0; i < window.columns * window.rows; ++i) {
       const double exact = geoid->Undulation(
           {grid.Longitude(window.column + i % window.columns), grid.Latitude(window.row + i / window.columns)});
-      ASSERT_NEAR(values[i], exact, kClose) << depth << ": " << i;
+      ASSERT_NEAR(values[i], exact, kCloseToProj) << depth << ": " << i;
     }
   }
 }

@@ -31,7 +31,7 @@ int At(const std::vector<std::uint8_t>& pixels, int row, int column) {
 }
 
 // Exactly tile 6/65/32 (2.8125 degrees wide), 256 samples a side times `finer`.
-RasterSpec TileSpec(int finer = 1) {
+RasterSpec WaterSpec(int finer = 1) {
   constexpr double kTile = 180.0 / 64;
   RasterSpec spec;
   spec.width = spec.height = kSide * finer;
@@ -39,15 +39,15 @@ RasterSpec TileSpec(int finer = 1) {
   spec.geo_transform = {kTile, kTile / kSide / finer, 0, kTile, 0, -kTile / kSide / finer};
   return spec;
 }
-constexpr geo::TileKey kTile{6, 65, 32};
+constexpr geo::TileKey kWaterTile{6, 65, 32};
 
 TEST(WaterRaster, PixelsAreTheSamplesWhereBothAgree) {
   const TempDir dir;
-  RasterSpec spec = TileSpec();
+  RasterSpec spec = WaterSpec();
   const auto value = [](int column, int row) { return column < 100 && row >= 30 ? 7 : 0; };
   spec.value = [&](int column, int row) { return value(column, row); };
   const auto mask = OpenMask(WriteRaster(dir, spec));
-  const auto pixels = ReadOrFail(*mask, kTile);
+  const auto pixels = ReadOrFail(*mask, kWaterTile);
   for (int row = 0; row < kSide; ++row) {
     for (int column = 0; column < kSide; ++column) {
       ASSERT_EQ(At(pixels, row, column), value(column, row) != 0 ? 255 : 0) << row << " " << column;
@@ -57,9 +57,9 @@ TEST(WaterRaster, PixelsAreTheSamplesWhereBothAgree) {
 
 TEST(WaterRaster, AveragesFinerSamples) {
   const TempDir dir;
-  RasterSpec spec = TileSpec(4);
+  RasterSpec spec = WaterSpec(4);
   spec.value = [](int column, int) { return column < 402 ? 1 : 0; };  // half of pixel 100
-  const auto pixels = ReadOrFail(*OpenMask(WriteRaster(dir, spec)), kTile);
+  const auto pixels = ReadOrFail(*OpenMask(WriteRaster(dir, spec)), kWaterTile);
   EXPECT_EQ(At(pixels, 9, 99), 255);
   EXPECT_EQ(At(pixels, 9, 100), 128);
   EXPECT_EQ(At(pixels, 9, 101), 0);
@@ -67,7 +67,7 @@ TEST(WaterRaster, AveragesFinerSamples) {
 
 TEST(WaterRaster, CoarserSamplesStillGiveASharpCoast) {
   const TempDir dir;
-  RasterSpec spec = TileSpec();
+  RasterSpec spec = WaterSpec();
   spec.value = [](int column, int) { return column < 100 ? 1 : 0; };
   // Three levels deeper a sample is 8 pixels wide: the coast is the line between samples 99 and 100.
   const auto pixels = ReadOrFail(*OpenMask(WriteRaster(dir, spec)), {9, 65 * 8 + 3, 32 * 8});
@@ -80,11 +80,11 @@ TEST(WaterRaster, CoarserSamplesStillGiveASharpCoast) {
 
 TEST(WaterRaster, NoDataAndTheOutsideAreLand) {
   const TempDir dir;
-  RasterSpec spec = TileSpec();
+  RasterSpec spec = WaterSpec();
   spec.nodata = 9;
   spec.value = [](int column, int) { return column < 128 ? 9 : 1; };
   const auto mask = OpenMask(WriteRaster(dir, spec));
-  const auto pixels = ReadOrFail(*mask, kTile);
+  const auto pixels = ReadOrFail(*mask, kWaterTile);
   EXPECT_EQ(At(pixels, 128, 100), 0);
   EXPECT_EQ(At(pixels, 128, 200), 255);
   const auto parent = ReadOrFail(*mask, {5, 32, 16});  // the mask is its south-eastern quarter
@@ -98,7 +98,7 @@ TEST(WaterRaster, NoDataAndTheOutsideAreLand) {
 // No pixel depends on the window that was read for its tile.
 TEST(WaterRaster, TilesOfALevelFitTogether) {
   const TempDir dir;
-  RasterSpec spec = TileSpec(2);
+  RasterSpec spec = WaterSpec(2);
   spec.value = [](int column, int row) { return (column / 8 + row / 8) % 2; };
   const auto mask = OpenMask(WriteRaster(dir, spec));
   const auto west = ReadOrFail(*mask, {7, 130, 64}), east = ReadOrFail(*mask, {7, 131, 64});
@@ -133,12 +133,12 @@ TEST(WaterRaster, ReadsOverviewsAndOtherReferenceSystems) {
 
 TEST(WaterRaster, OverviewsOfOddSidesShowTheCoastWhereItIs) {
   const TempDir dir;
-  RasterSpec spec = TileSpec(8);
+  RasterSpec spec = WaterSpec(8);
   spec.width = spec.height = 1601;
   spec.overviews = {2, 4, 8};
   // Where a sample of the coarsest overview begins: none of them is mixed.
   spec.value = [](int column, int row) { return column >= 1498 || row >= 1498 ? 1 : 0; };
-  const auto pixels = ReadOrFail(*OpenMask(WriteRaster(dir, spec)), kTile);
+  const auto pixels = ReadOrFail(*OpenMask(WriteRaster(dir, spec)), kWaterTile);
   constexpr int kCoast = 187;  // three quarters of this pixel are water
   EXPECT_NEAR(At(pixels, 100, kCoast), 191, 40);
   EXPECT_NEAR(At(pixels, kCoast, 100), 191, 40);
@@ -164,7 +164,7 @@ TEST(WaterRaster, GoesOnAcrossTheAntimeridian) {
 
 TEST(WaterRaster, ARasterOfAnotherPlaceIsRefused) {
   const TempDir dir;
-  const std::string path = WriteRaster(dir, TileSpec());
+  const std::string path = WriteRaster(dir, WaterSpec());
   const auto refused = WaterRaster::Open(path, {-80, 20, -70, 30});
   ASSERT_FALSE(refused.has_value());
   EXPECT_EQ(refused.error().code, ErrorCode::kInvalidArgument);
@@ -175,7 +175,7 @@ TEST(WaterRaster, ARasterOfAnotherPlaceIsRefused) {
 
 TEST(WaterRaster, ARasterWithoutGeoreferenceIsRefused) {
   const TempDir dir;
-  RasterSpec spec = TileSpec();
+  RasterSpec spec = WaterSpec();
   spec.georeferenced = false;
   const auto refused = WaterRaster::Open(WriteRaster(dir, spec), {});
   ASSERT_FALSE(refused.has_value());
@@ -184,26 +184,26 @@ TEST(WaterRaster, ARasterWithoutGeoreferenceIsRefused) {
 
 TEST(WaterRaster, SaysWhenItsFileChanged) {
   const TempDir dir;
-  const std::string path = WriteRaster(dir, TileSpec());
+  const std::string path = WriteRaster(dir, WaterSpec());
   const auto mask = OpenMask(path);
   const std::uint64_t before = mask->fingerprint();
   std::filesystem::resize_file(path, 100);
-  EXPECT_EQ(mask->Read(kTile).error().code, ErrorCode::kChanged);
-  WriteRaster(dir, TileSpec(2));
+  EXPECT_EQ(mask->Read(kWaterTile).error().code, ErrorCode::kChanged);
+  WriteRaster(dir, WaterSpec(2));
   EXPECT_NE(OpenMask(path)->fingerprint(), before);
 }
 
 TEST(WaterRaster, StopsAndServesManyThreads) {
   const TempDir dir;
-  RasterSpec spec = TileSpec();
+  RasterSpec spec = WaterSpec();
   spec.value = [](int column, int row) { return (column * row) % 3; };
   const auto mask = OpenMask(WriteRaster(dir, spec));
   std::stop_source stop;
   stop.request_stop();
-  EXPECT_EQ(mask->Read(kTile, stop.get_token()).error().code, ErrorCode::kCancelled);
-  const auto expected = ReadOrFail(*mask, kTile);
+  EXPECT_EQ(mask->Read(kWaterTile, stop.get_token()).error().code, ErrorCode::kCancelled);
+  const auto expected = ReadOrFail(*mask, kWaterTile);
   std::vector<std::thread> threads;
-  for (int k = 0; k < 4; ++k) threads.emplace_back([&] { EXPECT_EQ(ReadOrFail(*mask, kTile), expected); });
+  for (int k = 0; k < 4; ++k) threads.emplace_back([&] { EXPECT_EQ(ReadOrFail(*mask, kWaterTile), expected); });
   for (std::thread& thread : threads) thread.join();
 }
 

@@ -12,12 +12,14 @@
 namespace terrace::geo {
 namespace {
 
-using Wide = boost::multiprecision::cpp_bin_float_50;
+using Float50 = boost::multiprecision::cpp_bin_float_50;
 
-double RoundedToGrid(const Wide& value) { return static_cast<double>(ldexp(floor(ldexp(value, 44) + Wide(0.5)), -44)); }
+double RoundedToGrid(const Float50& value) {
+  return static_cast<double>(ldexp(floor(ldexp(value, 44) + Float50(0.5)), -44));
+}
 
 void ExpectNearestOfGrid(double degrees) {
-  const Wide radians = Wide(degrees) * boost::math::constants::pi<Wide>() / 180;
+  const Float50 radians = Float50(degrees) * boost::math::constants::pi<Float50>() / 180;
   const SinCos found = RoundedSinCos(degrees);
   EXPECT_EQ(found.sin, RoundedToGrid(sin(radians))) << std::hexfloat << degrees;
   EXPECT_EQ(found.cos, RoundedToGrid(cos(radians))) << std::hexfloat << degrees;

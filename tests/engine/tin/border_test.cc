@@ -18,8 +18,6 @@
 namespace terrace::tin {
 namespace {
 
-constexpr float kVoid = std::numeric_limits<float>::quiet_NaN();
-
 TEST(Border, JudgesASampleByItsChord) {
   const HeightField field = MakeField(5, 3, [](int x, int y) { return y == 0 ? static_cast<float>(x * x) : 0.f; });
   const Corner west{0, 0, 0}, east{4, 0, 16};

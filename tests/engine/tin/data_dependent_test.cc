@@ -27,7 +27,6 @@
 namespace terrace::tin {
 namespace {
 
-constexpr float kVoid = std::numeric_limits<float>::quiet_NaN();
 constexpr std::array kMeasures = {FitMeasure::kSumMax, FitMeasure::kSumSquares, FitMeasure::kMaxMax,
                                   FitMeasure::kNormals};
 
@@ -38,12 +37,6 @@ GreedyOptions DataDependent(FitMeasure measure = FitMeasure::kSumMax, double qth
   return options;
 }
 
-TinMesh MeshAt(const HeightField& field, const GreedyGoal& goal, const GreedyOptions& options) {
-  GreedyTriangulation tin(field, options);
-  EXPECT_TRUE(tin.Run(goal));
-  return tin.Mesh();
-}
-
 HeightField FieldWithVoids(int width, int height, std::uint64_t seed) {
   Random random(seed);
   return MakeField(width, height, [&](int x, int y) {
@@ -52,7 +45,7 @@ HeightField FieldWithVoids(int width, int height, std::uint64_t seed) {
 }
 
 // Whatever the slots are: triangles from their smallest vertex on, sorted.
-std::set<std::array<VertexId, 3>> Triangles(const TinMesh& mesh) {
+std::set<std::array<VertexId, 3>> TrianglesOf(const TinMesh& mesh) {
   std::set<std::array<VertexId, 3>> triangles;
   for (std::array<VertexId, 3> triangle : mesh.triangles) {
     std::rotate(triangle.begin(), std::min_element(triangle.begin(), triangle.end()), triangle.end());
@@ -61,11 +54,11 @@ std::set<std::array<VertexId, 3>> Triangles(const TinMesh& mesh) {
   return triangles;
 }
 
-testing::AssertionResult AreEqual(const TinMesh& a, const TinMesh& b) {
+testing::AssertionResult HaveTheSameTriangles(const TinMesh& a, const TinMesh& b) {
   if (a.vertices != b.vertices) {
     return testing::AssertionFailure() << a.vertices.size() << " and " << b.vertices.size() << " vertices";
   }
-  if (Triangles(a) != Triangles(b)) return testing::AssertionFailure() << "triangles differ";
+  if (TrianglesOf(a) != TrianglesOf(b)) return testing::AssertionFailure() << "triangles differ";
   return testing::AssertionSuccess();
 }
 
@@ -231,8 +224,8 @@ TEST(DataDependent, ChoosesAsTheFullTestOfEveryQuadrilateral) {
                                               : FieldWithVoids(width, height, seed);
     for (const FitMeasure measure : kMeasures) {
       for (const double qthresh : {0.0, 0.5, 1.0}) {
-        ASSERT_TRUE(AreEqual(MeshAt(field, {0.5}, DataDependent(measure, qthresh)),
-                             NaiveDataDependent(field, {measure, qthresh}).Run(0.5)))
+        ASSERT_TRUE(HaveTheSameTriangles(MeshAt(field, {0.5}, DataDependent(measure, qthresh)),
+                                         NaiveDataDependent(field, {measure, qthresh}).Run(0.5)))
             << seed << ", measure " << static_cast<int>(measure) << ", " << qthresh;
       }
     }
@@ -248,8 +241,8 @@ TEST(DataDependent, ChoosesAsTheFullTestWhereShapeAndFitTakeTurns) {
     const HeightField field = seed % 2 == 0 ? StepField(width, height, 3, seed) : HillField(width, height, seed);
     const FitMeasure measure = seed % 3 == 0 ? kMeasures[seed / 3 % 4] : FitMeasure::kSumSquares;
     const double qthresh = seed % 5 == 0 ? 0.8 : 0.3;
-    ASSERT_TRUE(AreEqual(MeshAt(field, {0.5}, DataDependent(measure, qthresh)),
-                         NaiveDataDependent(field, {measure, qthresh}).Run(0.5)))
+    ASSERT_TRUE(HaveTheSameTriangles(MeshAt(field, {0.5}, DataDependent(measure, qthresh)),
+                                     NaiveDataDependent(field, {measure, qthresh}).Run(0.5)))
         << seed << ", measure " << static_cast<int>(measure) << ", " << qthresh;
   }
 }
@@ -285,7 +278,7 @@ TEST(DataDependent, ChoosesAsTheFullTestOfOutlinesOfManyEdges) {
         const Star& star =
             criterion.Insert(Triangulation::VertexAt(field, kMiddle, kMiddle), triangulation.Locate(middle, 0));
         naive.Insert(middle);
-        EXPECT_TRUE(AreEqual(triangulation.Mesh(), naive.Mesh()))
+        EXPECT_TRUE(HaveTheSameTriangles(triangulation.Mesh(), naive.Mesh()))
             << seed << ", measure " << static_cast<int>(measure) << ", " << qthresh;
         wide_outlines += star.count >= kEdges / 2 ? 1 : 0;
       }
@@ -400,9 +393,9 @@ TEST(DataDependent, ReplaysEveryPrefixOfARun) {
         GreedyTriangulation tin(field, options);
         EXPECT_TRUE(tin.Run({1}));
         const Refinement refinement = tin.MakeRefinement();
-        EXPECT_TRUE(AreEqual(refinement.MeshOf(refinement.vertex_count()), tin.Mesh()));
+        EXPECT_TRUE(HaveTheSameTriangles(refinement.MeshOf(refinement.vertex_count()), tin.Mesh()));
         for (const double error : {50.0, 20.0, 10.0, 5.0}) {
-          EXPECT_TRUE(AreEqual(refinement.MeshAt(error), MeshAt(field, {error}, options))) << error;
+          EXPECT_TRUE(HaveTheSameTriangles(refinement.MeshAt(error), MeshAt(field, {error}, options))) << error;
         }
       }
     }
@@ -421,7 +414,7 @@ TEST(DataDependent, ContinuesARefinementToTheRefinementOfOneRun) {
         EXPECT_TRUE(fine.Run({1}));
         GreedyTriangulation continued(field, options, coarse.MakeRefinement());
         EXPECT_TRUE(continued.Run({1}));
-        EXPECT_TRUE(AreEqual(continued.Mesh(), fine.Mesh()));
+        EXPECT_TRUE(HaveTheSameTriangles(continued.Mesh(), fine.Mesh()));
         EXPECT_EQ(continued.MakeRefinement(), fine.MakeRefinement());
       }
     }
@@ -433,7 +426,7 @@ TEST(DataDependent, StopsAtTheFirstMeshWithinTheRootMeanSquare) {
   for (const double rms : {8.0, 3.0, 0.7}) {
     const TinMesh mesh = MeshAt(field, {0, std::numeric_limits<std::size_t>::max(), rms}, DataDependent());
     EXPECT_LE(MeasureError(field, mesh).rms, rms * (1 + 1e-12));
-    EXPECT_TRUE(AreEqual(mesh, MeshAt(field, {0, mesh.vertices.size()}, DataDependent())));
+    EXPECT_TRUE(HaveTheSameTriangles(mesh, MeshAt(field, {0, mesh.vertices.size()}, DataDependent())));
     EXPECT_GT(MeasureError(field, MeshAt(field, {0, mesh.vertices.size() - 1}, DataDependent())).rms,
               rms * (1 - 1e-12));
   }

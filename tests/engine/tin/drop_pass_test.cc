@@ -27,7 +27,6 @@
 namespace terrace::tin {
 namespace {
 
-constexpr float kVoid = std::numeric_limits<float>::quiet_NaN();
 constexpr std::array<Side, 4> kSides = {Side::kSouth, Side::kEast, Side::kNorth, Side::kWest};
 
 TinMesh GreedyMesh(const HeightField& field, double error, const GreedyOptions& options = {}) {

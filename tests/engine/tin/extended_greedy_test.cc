@@ -16,8 +16,6 @@
 namespace terrace::tin {
 namespace {
 
-constexpr float kVoid = __builtin_nanf("");
-
 std::vector<ColorSample> Colors(int width, int height, const std::function<ColorSample(int, int)>& at) {
   std::vector<ColorSample> colors;
   for (int y = 0; y < height; ++y) {

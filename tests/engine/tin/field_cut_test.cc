@@ -19,8 +19,6 @@
 namespace terrace::tin {
 namespace {
 
-constexpr float kVoid = std::numeric_limits<float>::quiet_NaN();
-
 TinMesh MeshInBlocks(const HeightField& field, const FieldCut& cut, double error) {
   BlockJoiner joiner(cut);
   for (std::size_t i = 0; i < cut.size(); ++i) {
@@ -35,12 +33,6 @@ TinMesh MeshWhole(const HeightField& field, double error) {
   GreedyTriangulation greedy(field);
   EXPECT_TRUE(greedy.Run({error}));
   return greedy.Mesh();
-}
-
-testing::AssertionResult AreEqual(const TinMesh& a, const TinMesh& b) {
-  if (a.vertices != b.vertices) return testing::AssertionFailure() << "vertices differ";
-  if (a.triangles != b.triangles) return testing::AssertionFailure() << "triangles differ";
-  return testing::AssertionSuccess();
 }
 
 // The joined mesh keeps every law of a mesh but Delaunay's.

@@ -19,8 +19,6 @@
 namespace terrace::tin {
 namespace {
 
-constexpr float kVoid = std::numeric_limits<float>::quiet_NaN();
-
 TEST(HeightField, RefusesWhatCannotBeTriangulated) {
   EXPECT_FALSE(HeightField::Make(1, 5, std::vector<float>(5)));
   EXPECT_FALSE(HeightField::Make(5, 1, std::vector<float>(5)));

@@ -117,4 +117,21 @@ std::vector<int> BorderVertices(const HeightField& field, const TinMesh& mesh, S
   return along;
 }
 
+testing::AssertionResult AreEqual(const TinMesh& a, const TinMesh& b) {
+  if (a.vertices.size() != b.vertices.size()) {
+    return testing::AssertionFailure() << a.vertices.size() << " and " << b.vertices.size() << " vertices";
+  }
+  for (std::size_t i = 0; i < a.vertices.size(); ++i) {
+    if (!(a.vertices[i] == b.vertices[i])) return testing::AssertionFailure() << "vertex " << i << " differs";
+  }
+  if (a.triangles != b.triangles) return testing::AssertionFailure() << "triangles differ";
+  return testing::AssertionSuccess();
+}
+
+TinMesh MeshAt(const HeightField& field, const GreedyGoal& goal, const GreedyOptions& options) {
+  GreedyTriangulation tin(field, options);
+  EXPECT_TRUE(tin.Run(goal));
+  return tin.Mesh();
+}
+
 }  // namespace terrace::tin

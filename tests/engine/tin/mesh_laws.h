@@ -24,4 +24,10 @@ testing::AssertionResult IsWithin(const HeightField& field, const TinMesh& mesh,
 // The positions of the vertices on one side along that side, ascending.
 std::vector<int> BorderVertices(const HeightField& field, const TinMesh& mesh, Side side);
 
+// The same vertices in the same order, and the same triangles in the same order.
+testing::AssertionResult AreEqual(const TinMesh& a, const TinMesh& b);
+
+// The mesh of the mesher, which must reach the goal.
+TinMesh MeshAt(const HeightField& field, const GreedyGoal& goal, const GreedyOptions& options = {});
+
 }  // namespace terrace::tin

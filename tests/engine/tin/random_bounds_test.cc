@@ -22,7 +22,6 @@
 namespace terrace::tin {
 namespace {
 
-constexpr float kVoid = std::numeric_limits<float>::quiet_NaN();
 constexpr std::uint64_t kFields = 1000;  // of each sort
 
 enum class Sort { kNoise, kSteps, kSpikes, kCliff, kConstant, kMagnitudes };

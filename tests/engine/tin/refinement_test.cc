@@ -34,14 +34,6 @@ Refinement RefineTo(const HeightField& field, double error, const GreedyOptions&
   return tin.MakeRefinement();
 }
 
-testing::AssertionResult AreEqual(const TinMesh& a, const TinMesh& b) {
-  if (a.vertices != b.vertices) {
-    return testing::AssertionFailure() << a.vertices.size() << " and " << b.vertices.size() << " vertices";
-  }
-  if (a.triangles != b.triangles) return testing::AssertionFailure() << "triangles differ";
-  return testing::AssertionSuccess();
-}
-
 std::vector<HeightField> Fields() {
   std::vector<HeightField> fields;
   fields.push_back(HillField(65, 65, 1));

@@ -16,19 +16,19 @@ namespace terrace::tin {
 namespace {
 
 using Triangles = std::vector<std::array<std::uint32_t, 3>>;
-using Wide = InsertionRecord<std::uint32_t>;
+using WideRecord = InsertionRecord<std::uint32_t>;
 
 // Rings of anything, of one triangle to `most`, open and closed; what an insertion removes is any that stands.
-Wide RandomRecord(Random& random, std::size_t insertions, int most) {
-  Wide record;
-  record.removed.assign(2, Wide::kNever);
+WideRecord RandomRecord(Random& random, std::size_t insertions, int most) {
+  WideRecord record;
+  record.removed.assign(2, WideRecord::kNever);
   std::vector<std::size_t> standing = {0, 1};
   for (std::size_t i = 0; i < insertions; ++i) {
     bool is_open = random.Below(4) == 0;
     const int at_most = std::min(most, static_cast<int>(standing.size()) + (is_open ? 1 : 2));
     const std::size_t count = 1 + static_cast<std::size_t>(random.Below(at_most));
     is_open |= count == 1;
-    record.sizes.push_back(static_cast<std::uint32_t>(count) | (is_open ? Wide::kOpen : 0));
+    record.sizes.push_back(static_cast<std::uint32_t>(count) | (is_open ? WideRecord::kOpen : 0));
     for (std::size_t k = 0; k < count + (is_open ? 1 : 0); ++k) {
       record.rings.push_back(static_cast<std::uint32_t>(random.Below(static_cast<int>(4 + i))));
     }
@@ -39,18 +39,18 @@ Wide RandomRecord(Random& random, std::size_t insertions, int most) {
     }
     for (std::size_t k = 0; k < count; ++k) {
       standing.push_back(record.removed.size());
-      record.removed.push_back(Wide::kNever);
+      record.removed.push_back(WideRecord::kNever);
     }
   }
   return record;
 }
 
-Triangles OneByOne(const Wide& record, std::size_t insertions) {
+Triangles OneByOne(const WideRecord& record, std::size_t insertions) {
   Triangles made = {{0, 1, 2}, {2, 3, 0}};
   std::size_t ring = 0;
   for (std::size_t i = 0; i < insertions; ++i) {
-    const bool is_open = (record.sizes[i] & Wide::kOpen) != 0;
-    const std::size_t count = record.sizes[i] & ~Wide::kOpen, vertices = count + (is_open ? 1 : 0);
+    const bool is_open = (record.sizes[i] & WideRecord::kOpen) != 0;
+    const std::size_t count = record.sizes[i] & ~WideRecord::kOpen, vertices = count + (is_open ? 1 : 0);
     for (std::size_t k = 0; k < count; ++k) {
       made.push_back(
           {record.rings[ring + k], record.rings[ring + (k + 1) % vertices], static_cast<std::uint32_t>(4 + i)});
@@ -69,7 +69,7 @@ TEST(StandingTriangles, AreThoseThatNothingHasRemovedYet) {
   Random random(1);
   for (const int most : {2, 6, 8, 9, 40}) {
     for (const std::size_t length : {0u, 1u, 7u, 60u}) {
-      const Wide record = RandomRecord(random, length, most);
+      const WideRecord record = RandomRecord(random, length, most);
       // Copies have no room beyond their ends: what is read there is a fault that AddressSanitizer sees.
       const auto wide = ConvertTo<std::uint32_t>(record);
       const auto narrow = ConvertTo<std::uint16_t>(record);

@@ -4,11 +4,14 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <limits>
 
 #include "engine/tin/height_field.h"
 #include "engine/tin/plane.h"
 
 namespace terrace::tin {
+
+inline constexpr float kVoid = std::numeric_limits<float>::quiet_NaN();
 
 // A small generator of its own: the same numbers with every standard library.
 class Random {

@@ -14,7 +14,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-struct FakeConnection : Connection {
+struct FakeTransfer : Connection {
   Phase phase() const override { return Phase::kServes; }
   void Evict() override {}
   void Drain() override {}
@@ -69,7 +69,7 @@ class TransferBudgetTest : public testing::Test {
   }
 
   TransferBudget budget_{4 * kMb};
-  std::shared_ptr<FakeConnection> connection_ = std::make_shared<FakeConnection>();
+  std::shared_ptr<FakeTransfer> connection_ = std::make_shared<FakeTransfer>();
   TransferBudget::Clock::time_point now_ = TransferBudget::Clock::now();
   std::vector<int> granted_, refused_;
   std::vector<Hold> holds_;
@@ -209,8 +209,7 @@ TEST_F(TransferBudgetTest, WhoLeavesDoesNotBlockTheLine) {
 }
 
 TEST_F(TransferBudgetTest, CutsWhoHasHadTheirTimeAndHoldsMost) {
-  const auto greedy = connection_, modest = std::make_shared<FakeConnection>(),
-             recent = std::make_shared<FakeConnection>();
+  const auto greedy = connection_, modest = std::make_shared<FakeTransfer>(), recent = std::make_shared<FakeTransfer>();
   now_ -= 60s;
   const auto large = Try(BodyOf(kMb), 1);
   connection_ = modest;
@@ -231,10 +230,10 @@ TEST_F(TransferBudgetTest, CutsWhoHasHadTheirTimeAndHoldsMost) {
 }
 
 TEST_F(TransferBudgetTest, AnUploadTakesFromWhoHoldsMost) {
-  std::vector<std::shared_ptr<FakeConnection>> uploaders;
+  std::vector<std::shared_ptr<FakeTransfer>> uploaders;
   std::vector<Hold> holds;
   for (int i = 0; i < 10; ++i) {
-    connection_ = std::make_shared<FakeConnection>();
+    connection_ = std::make_shared<FakeTransfer>();
     uploaders.push_back(connection_);
     auto hold = TryUpload(kMb / 10, 1);
     ASSERT_TRUE(hold);
@@ -252,7 +251,7 @@ TEST_F(TransferBudgetTest, AnUploadTakesFromWhoHoldsMost) {
 }
 
 TEST_F(TransferBudgetTest, UploadsThatDoNotArriveMakeRoomForThoseOfOthers) {
-  const auto slow = connection_, whole = std::make_shared<FakeConnection>();
+  const auto slow = connection_, whole = std::make_shared<FakeTransfer>();
   now_ -= 60s;
   const auto unfinished = TryUpload(kMb / 2, 1);
   connection_ = whole;

@@ -10,7 +10,7 @@
 namespace terrace::server {
 namespace {
 
-EncodedTile Tile() {
+EncodedTile HeadTile() {
   EncodedTile tile;
   tile.bytes = "12345";
   tile.etag = "\"e\"";
@@ -22,7 +22,7 @@ TEST(TileHead, SaysWhatTheTileIs) {
   TileRequest request;
   request.format = TileFormat::kGlb;
   request.coding = Coding::kGzip;
-  EncodedTile tile = Tile();
+  EncodedTile tile = HeadTile();
   tile.certified_error_m = 9.5;
   EXPECT_EQ(MakeTileHead(request, tile).text,
             "Content-Type: model/gltf-binary\r\nContent-Encoding: gzip\r\nContent-Length: 5\r\n"
@@ -32,27 +32,27 @@ TEST(TileHead, SaysWhatTheTileIs) {
 TEST(TileHead, NamesTheFormatWithItsExtensions) {
   TileRequest request;
   request.normals = true;
-  EXPECT_TRUE(MakeTileHead(request, Tile())
+  EXPECT_TRUE(MakeTileHead(request, HeadTile())
                   .text.starts_with("Content-Type: application/vnd.quantized-mesh;extensions=octvertexnormals\r\n"))
-      << MakeTileHead(request, Tile()).text;
+      << MakeTileHead(request, HeadTile()).text;
   request.format = TileFormat::kHeightPng;
-  EXPECT_TRUE(MakeTileHead(request, Tile()).text.starts_with("Content-Type: image/png\r\nContent-Length: 5\r\n"));
+  EXPECT_TRUE(MakeTileHead(request, HeadTile()).text.starts_with("Content-Type: image/png\r\nContent-Length: 5\r\n"));
 }
 
 TEST(TileHead, PutsWhatDescribesTheBodyFirst) {
-  const HeadLines head = MakeTileHead({}, Tile());
+  const HeadLines head = MakeTileHead({}, HeadTile());
   EXPECT_EQ(head.text.substr(head.of_body), "ETag: \"e\"\r\nTerrain-Max-Error: 3.87\r\n");
 }
 
 // A tile has such an error where a source's own is not known.
 TEST(TileHead, LeavesAnErrorWithoutBoundUnsaid) {
-  EncodedTile tile = Tile();
+  EncodedTile tile = HeadTile();
   tile.certified_error_m = std::numeric_limits<double>::infinity();
   EXPECT_EQ(MakeTileHead({}, tile).text.find("Certified"), std::string::npos);
 }
 
 TEST(TileHead, CountsAmongATilesBytes) {
-  EncodedTile tile = Tile();
+  EncodedTile tile = HeadTile();
   EXPECT_EQ(BytesOf(tile), 5u);
   tile.head = MakeTileHead({}, tile);
   EXPECT_EQ(BytesOf(tile), 5u + tile.head.text.size());

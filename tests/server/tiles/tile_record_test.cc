@@ -11,7 +11,7 @@
 namespace terrace::server {
 namespace {
 
-EncodedTile Tile() {
+EncodedTile RecordTile() {
   EncodedTile tile;
   tile.bytes = std::string("a\0b", 3) + std::string(100, 'x');
   tile.etag = "\"0123\"";
@@ -45,7 +45,7 @@ RefinedTile Refined() {
 }
 
 TEST(TileRecord, KeepsTiles) {
-  const EncodedTile tile = Tile();
+  const EncodedTile tile = RecordTile();
   const auto again = ParseTile(SerializeTile(tile));
   ASSERT_TRUE(again);
   EXPECT_EQ(again->bytes, tile.bytes);
@@ -71,7 +71,7 @@ TEST(TileRecord, KeepsRefinements) {
 }
 
 TEST(TileRecord, RefusesEveryOtherLength) {
-  const std::string tile = SerializeTile(Tile()), refined = SerializeRefinedTile(Refined());
+  const std::string tile = SerializeTile(RecordTile()), refined = SerializeRefinedTile(Refined());
   for (std::size_t size = 0; size < tile.size(); ++size) EXPECT_FALSE(ParseTile(tile.substr(0, size))) << size;
   for (std::size_t size = 0; size < refined.size(); ++size) {
     EXPECT_FALSE(ParseRefinedTile(refined.substr(0, size))) << size;
@@ -122,7 +122,7 @@ TEST(TileRecord, KeysOfRefinementsDiffer) {
 }
 
 TEST(Seal, FindsEveryFlippedBitAndEveryLength) {
-  const std::string key = "key", value = SerializeTile(Tile());
+  const std::string key = "key", value = SerializeTile(RecordTile());
   const std::string sealed = Seal(key, value);
   ASSERT_EQ(Unseal(key, sealed), value);
   for (std::size_t bit = 0; bit < sealed.size() * 8; ++bit) {
