@@ -189,7 +189,7 @@ GltfMesh Describe(const GlbOptions& options) {
   gltf.generator = options.generator;
   gltf.material.emplace();
   if (!options.texture) gltf.material->color = kGroundColor;
-  if (options.texture) gltf.copyright = options.copyright;
+  gltf.copyright = options.copyright;
   const auto add = [&gltf](std::string_view name, const std::optional<double>& error_m) {
     if (error_m && std::isfinite(*error_m)) {
       gltf.scene_extras.emplace_back(name, std::strtod(FormatErrorUp(*error_m).c_str(), nullptr));

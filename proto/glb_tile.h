@@ -38,7 +38,7 @@ struct GlbOptions {
   DracoOptions draco;
   std::string generator = "terrace";       // asset.generator
   std::optional<GlbTexture> texture = {};  // none: the ground is plain grey
-  std::string copyright = {};              // asset.copyright, of the texture
+  std::string copyright = {};              // asset.copyright (glTF 2.0, 3.2); empty: none
   // Metres, of the tile at its finest reading: extras of the scene, each where it is known and finite.
   std::optional<double> max_error_m = {}, certified_error_m = {};
 };

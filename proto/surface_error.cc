@@ -5,8 +5,10 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <numbers>
 
 #include "proto/lattice_angles.h"
+#include "proto/plumb_nodes.h"
 #include "proto/tile_geometry.h"
 
 namespace terrace::proto {
@@ -30,7 +32,11 @@ Place Between(Place a, Place b, double t) { return {a.x + t * (b.x - a.x), a.y +
 class Ground {
  public:
   explicit Ground(const LatticeView& lattice)
-      : step_(geo::ToRadians(lattice.lattice.StepDegrees())), angles_(lattice) {}
+      : step_(geo::ToRadians(lattice.lattice.StepDegrees())),
+        west_(geo::ToRadians(lattice.Longitude(0))),
+        south_(geo::ToRadians(lattice.Latitude(0))),
+        angles_(lattice),
+        narrowest_(std::min(angles_.rows.front().cos, angles_.rows.back().cos) - step_) {}
 
   // Metres above the ellipsoid of a point near the place, along the normal there.
   double HeightOf(const geo::Vec3& point, Place place) const {
@@ -46,6 +52,12 @@ class Ground {
     constexpr double kLargestRadius = geo::kSemiMajorAxis * geo::kSemiMajorAxis / geo::kSemiMinorAxis;
     return {widest * step_ * kLargestRadius, step_ * kLargestRadius};
   }
+  // The same, at least; not above zero where a pole is.
+  Place NarrowestStep() const {
+    double narrowest = 1;
+    for (const geo::SinCos& row : angles_.rows) narrowest = std::min(narrowest, row.cos);
+    return {std::max(narrowest, 1e-12) * step_ * kSmallestRadius * 0.98, step_ * kSmallestRadius * 0.98};
+  }
   // Metres, at most.
   double WidestDiagonal() const {
     const Place step = WidestStep();
@@ -53,17 +65,55 @@ class Ground {
   }
   double step_radians() const { return step_; }
 
+  // Where the plumb line through the point meets the ellipsoid (Bowring, "Transformation from spatial to geographical
+  // coordinates", Survey Review 1976). `near`: a place within half a turn.
+  Place PlaceOf(const geo::Vec3& point, Place near) const {
+    constexpr double kSecond = geo::kEccentricitySquared / (1 - geo::kEccentricitySquared);
+    const double radius = std::hypot(point.x, point.y);
+    const double reduced = std::atan2(point.z * geo::kSemiMajorAxis, radius * geo::kSemiMinorAxis);
+    const double sine = std::sin(reduced), cosine = std::cos(reduced);
+    const double latitude =
+        std::atan2(point.z + kSecond * geo::kSemiMinorAxis * sine * sine * sine,
+                   radius - geo::kEccentricitySquared * geo::kSemiMajorAxis * cosine * cosine * cosine);
+    const double turn = 2 * std::numbers::pi / step_;
+    double x = (std::atan2(point.y, point.x) - west_) / step_;
+    x -= std::round((x - near.x) / turn) * turn;
+    return {x, (latitude - south_) / step_};
+  }
+
+  // Lattice steps by which the points of a chord may lie beside the line between the places of its ends: it is nearer
+  // to the axis than they are, its longitude is the mean of theirs weighted with the distances from the axis, and its
+  // latitude the mean weighted with the radii of curvature. Infinite where no bound is known.
+  Place Shift(Place a, Place b, double rise_m) const {
+    constexpr double kUnknown = std::numeric_limits<double>::infinity();
+    const double width = std::abs(a.x - b.x) * step_, height = std::abs(a.y - b.y) * step_;
+    if (width > 0.5) return {kUnknown, kUnknown};
+    const double heights = std::abs(rise_m) / kSmallestRadius;
+    const double y = width * width / 16 + height * (heights / 4 + height * (0.005 + height));
+    if (width == 0) return {0, y / step_};
+    // Of the tile where that will do, else of the chord's rows.
+    const double least = narrowest_ > 0.1 ? narrowest_ : std::min(RowNear(a.y).cos, RowNear(b.y).cos) - step_ / 2;
+    if (least < height / 8 + 1e-9) return {kUnknown, kUnknown};  // about a pole
+    return {width * (height / least / 4 + heights / 2 + width * width / 16) / step_, y / step_};
+  }
+
  private:
+  const geo::SinCos& RowNear(double y) const {
+    return angles_.rows[std::min(static_cast<std::size_t>(std::max(y + 0.5, 0.0)), angles_.rows.size() - 1)];
+  }
   geo::SinCos Turn(const std::vector<geo::SinCos>& nodes, double at) const {
-    const auto nearest = static_cast<std::size_t>(at + 0.5);
-    const double a = (at - static_cast<double>(nearest)) * step_, a2 = a * a;
-    const double cosine = 1 - a2 / 2 * (1 - a2 / 12), sine = a * (1 - a2 / 6 * (1 - a2 / 20));
+    const double last = static_cast<double>(nodes.size() - 1);
+    const auto nearest = static_cast<std::size_t>(std::clamp(at, 0.0, last) + 0.5);
     const geo::SinCos node = nodes[nearest];
+    const double a = (at - static_cast<double>(nearest)) * step_, a2 = a * a;
+    double cosine = 1 - a2 / 2 * (1 - a2 / 12), sine = a * (1 - a2 / 6 * (1 - a2 / 20));
+    if (at < -0.5 || at > last + 0.5) cosine = std::cos(a), sine = std::sin(a);  // a chord that leaves the tile
     return {node.sin * cosine + node.cos * sine, node.cos * cosine - node.sin * sine};
   }
 
-  double step_;
+  double step_, west_, south_;  // radians
   LatticeAngles angles_;
+  double narrowest_;  // the smallest cosine of a latitude, a step beyond the rows too
 };
 
 // A piece of an edge within one lattice cell: the lattice surface on it is a quadratic.
@@ -92,7 +142,24 @@ double LargestOn(double length, double edge_bend, double first, double last, dou
 
 class EdgeMeter {
  public:
-  explicit EdgeMeter(const LatticeView& lattice) : lattice_(lattice), cells_(lattice.cells()) {}
+  explicit EdgeMeter(const LatticeView& lattice) : lattice_(lattice), cells_(lattice.cells()) {
+    for (int j = 0; j <= cells_; ++j) {
+      for (int i = 0; i <= cells_; ++i) {
+        const double height = lattice.At(i, j);
+        if (i < cells_) steepest_.x = std::max(steepest_.x, std::abs(lattice.At(i + 1, j) - height));
+        if (j < cells_) steepest_.y = std::max(steepest_.y, std::abs(lattice.At(i, j + 1) - height));
+        lowest_ = std::min(lowest_, height);
+        highest_ = std::max(highest_, height);
+      }
+    }
+  }
+
+  // Metres by which the lattice surface changes over these steps, at most.
+  double LargestChange(Place steps) const {
+    const double relief = highest_ - lowest_;
+    if (!std::isfinite(steps.x) || !std::isfinite(steps.y)) return relief;
+    return std::min(relief, steps.x * steepest_.x + steps.y * steepest_.y);
+  }
 
   // Every piece of the edge a - b between places where it leaves a cell, in order: visit(piece).
   template <typename Visit>
@@ -146,6 +213,8 @@ class EdgeMeter {
 
   const LatticeView& lattice_;
   const int cells_;
+  Place steepest_;  // metres between neighbouring samples of a row and of a column
+  double lowest_ = std::numeric_limits<double>::infinity(), highest_ = -lowest_;
 };
 
 // Every edge once: those inside the tile belong to two triangles with opposite directions.
@@ -163,112 +232,90 @@ void ForEachEdge(const std::vector<std::array<std::uint32_t, 3>>& triangles, con
 // Lattice steps along both axes together.
 double SpanOf(Place a, Place b) { return std::abs(a.x - b.x) + std::abs(a.y - b.y); }
 
-// Metres: the largest of the smallest circles around triangles, about the middle of the longest edge or through all
-// vertices. `step`: of a lattice step of either axis, at most.
-double WidestCircle(const std::vector<Place>& places, const std::vector<std::array<std::uint32_t, 3>>& triangles,
-                    const Place& step) {
-  double widest = 0;  // squared
-  for (const auto& triangle : triangles) {
-    std::array<double, 3> sides{};  // squared
-    for (std::size_t k = 0; k < 3; ++k) {
-      const Place &a = places[triangle[k]], &b = places[triangle[(k + 1) % 3]];
-      const double x = (a.x - b.x) * step.x, y = (a.y - b.y) * step.y;
-      sides[k] = x * x + y * y;
-    }
-    const auto [a, b, c] = sides;
-    const double longest = std::max({a, b, c});
-    const double area = 2 * (a * b + b * c + c * a) - (a * a + b * b + c * c);  // its square, times 16
-    const bool is_obtuse = 2 * longest >= a + b + c;
-    widest = std::max(widest, is_obtuse || area <= 0 ? longest / 4 : std::min(longest / 3, a * b * c / area));
-  }
-  return std::sqrt(widest);
+// A point of a flat triangle's edge.
+struct End {
+  Place place;  // where its plumb line meets the ellipsoid
+  geo::Vec3 point;
+  double height = 0;  // above the ellipsoid, metres
+};
+
+// The height of a chord above the ellipsoid along the line between its ends' places: a quadratic with that leading
+// coefficient, but for `slack`.
+struct Chord {
+  double first = 0, last = 0, bend = 0, slack = 0;
+  bool is_quadratic = true;  // else it is to be told at every place
+
+  double At(double t) const { return first + t * (last - first) + bend * t * (t - 1); }
+};
+
+double HeightOn(const Ground& ground, const End& a, const End& b, double t) {
+  return ground.HeightOf(a.point + (b.point - a.point) * t, Between(a.place, b.place, t));
 }
 
-// The flat triangles, by their heights above the ellipsoid along edges.
-class Drawn {
- public:
-  Drawn(const Ground& ground, const std::vector<Place>& places, const std::vector<geo::Vec3>& ecef)
-      : ground_(ground), places_(places), ecef_(ecef) {
-    heights_.reserve(ecef.size());
-    for (std::size_t k = 0; k < ecef.size(); ++k) heights_.push_back(ground.HeightOf(ecef[k], places[k]));
-  }
+// The height above the ellipsoid at a part t of the chord is n(t) P(t) - s(t): n the normal there, P the chord's
+// point, s how far the tangential plane is from the centre. Components of n are sums of sines of (longitude +-
+// latitude), so their k-th derivatives are at most w^k, w the edge's span in radians of both together. The third
+// derivative of the height is at most 3 |n''| |P'| + |n'''| |P| + |s'''| < 7.2 a w^3 + 5.3 w^2 |difference of
+// heights|. A quadratic through both ends and the middle is off by 0.0081 of it.
+Chord ChordOf(const Ground& ground, const End& a, const End& b) {
+  const double span = SpanOf(a.place, b.place) * ground.step_radians();
+  Chord chord{a.height, b.height};
+  constexpr double kWide = 0.01;  // the slack is up to 0.4 m below
+  chord.is_quadratic = span < kWide;
+  if (!chord.is_quadratic) return chord;
+  chord.bend = 2 * (chord.first + chord.last) - 4 * HeightOn(ground, a, b, 0.5);
+  chord.slack = 0.0081 * span * span * (7.2 * geo::kSemiMajorAxis * span + 5.3 * std::abs(chord.last - chord.first));
+  return chord;
+}
 
-  // The height along an edge between its ends: a quadratic with that leading coefficient, but for `slack`.
-  struct Edge {
-    double first = 0, last = 0, bend = 0, slack = 0;
-    bool is_quadratic = true;  // else it is to be told at every place
-
-    double At(double t) const { return first + t * (last - first) + bend * t * (t - 1); }
-  };
-
-  // The height above the ellipsoid at a part t of the edge is n(t) P(t) - s(t): n the normal there, P the chord's
-  // point, s how far the tangential plane is from the centre. Components of n are sums of sines of (longitude +-
-  // latitude), so their k-th derivatives are at most w^k, w the edge's span in radians of both together. The third
-  // derivative of the height is at most 3 |n''| |P'| + |n'''| |P| + |s'''| < 7.2 a w^3 + 5.3 w^2 |difference of
-  // heights|. A quadratic through both ends and the middle is off by 0.0081 of it.
-  Edge EdgeOf(std::uint32_t a, std::uint32_t b) const {
-    const double span = SpanOf(places_[a], places_[b]) * ground_.step_radians();
-    Edge edge{heights_[a], heights_[b]};
-    constexpr double kWide = 0.01;  // the slack is up to 0.4 m below
-    edge.is_quadratic = span < kWide;
-    if (!edge.is_quadratic) return edge;
-    const double middle = HeightOn(a, b, 0.5);
-    edge.bend = 2 * (edge.first + edge.last) - 4 * middle;
-    edge.slack = 0.0081 * span * span * (7.2 * geo::kSemiMajorAxis * span + 5.3 * std::abs(edge.last - edge.first));
-    return edge;
-  }
-
-  double HeightOn(std::uint32_t a, std::uint32_t b, double t) const {
-    return ground_.HeightOf(ecef_[a] + (ecef_[b] - ecef_[a]) * t, Between(places_[a], places_[b], t));
-  }
-
- private:
-  const Ground& ground_;
-  const std::vector<Place>& places_;
-  const std::vector<geo::Vec3>& ecef_;
-  std::vector<double> heights_;  // by vertex
-};
-
-// The largest differences along edges from the lattice surface, metres, and the largest span of an edge.
-struct Largest {
-  double planar = 0, drawn = 0, span = 0;
-};
-
-// `heights`: by vertex, of the reading in longitude and latitude; empty: it is not measured. `drawn`: null, or the flat
-// triangles, whose heights between the ends of pieces are for the caller to bound where edges are no quadratics.
-Largest MeasureEdges(const EdgeMeter& meter, const std::vector<Place>& places, const std::vector<double>& heights,
-                     const Drawn* drawn, const std::vector<std::array<std::uint32_t, 3>>& triangles) {
-  Largest largest;
-  std::vector<double> samples;  // of the lattice surface, by vertex
-  samples.reserve(places.size());
-  for (const Place place : places) samples.push_back(meter.SampleAt(place));
-  ForEachEdge(triangles, places, meter, [&](std::uint32_t a, std::uint32_t b) {
-    largest.span = std::max(largest.span, SpanOf(places[a], places[b]));
-    const double sample = samples[a];
-    const double first = heights.empty() ? 0 : heights[a], rise = heights.empty() ? 0 : heights[b] - heights[a];
-    const Drawn::Edge edge = drawn != nullptr ? drawn->EdgeOf(a, b) : Drawn::Edge{};
-    double planar = first - sample, flat = edge.first - sample, most = largest.drawn - edge.slack;
-    meter.ForEachPiece(places[a], places[b], [&](const Piece& piece) {
-      // The surface is subtracted, and so is its bend.
-      const double length = piece.end - piece.begin;
-      if (!heights.empty()) {
-        const double at_end = first + piece.end * rise - piece.end_sample;
-        if (IsLarger(length, -piece.bend, planar, at_end, largest.planar)) {
-          largest.planar = LargestOn(length, -piece.bend, planar, at_end, largest.planar);
-        }
-        planar = at_end;
-      }
-      if (drawn != nullptr) {
-        const double height = edge.is_quadratic ? edge.At(piece.end) : drawn->HeightOn(a, b, piece.end);
-        const double at_end = height - piece.end_sample;
-        const double bend = edge.bend - piece.bend;
-        if (IsLarger(length, bend, flat, at_end, most)) most = LargestOn(length, bend, flat, at_end, most);
-        flat = at_end;
-      }
-    });
-    largest.drawn = std::max(largest.drawn, most + edge.slack);
+// The larger of `known` and the largest difference from the lattice surface along the line between two places, of a
+// height that is linear along it.
+double LargestOfLine(const EdgeMeter& meter, Place a, Place b, double first, double last, double known) {
+  double before = first - meter.SampleAt(a);
+  meter.ForEachPiece(a, b, [&](const Piece& piece) {
+    // The surface is subtracted, and so is its bend.
+    const double length = piece.end - piece.begin;
+    const double at_end = first + piece.end * (last - first) - piece.end_sample;
+    if (IsLarger(length, -piece.bend, before, at_end, known)) {
+      known = LargestOn(length, -piece.bend, before, at_end, known);
+    }
+    before = at_end;
   });
-  return largest;
+  return known;
+}
+
+// The same of a chord whose points lie off the line by `shift` at most. Its heights between the ends of pieces are for
+// the caller to bound where they are no quadratics.
+double LargestOfChord(const EdgeMeter& meter, const Ground& ground, const End& a, const End& b, Place shift,
+                      double known) {
+  const Chord chord = ChordOf(ground, a, b);
+  const double slack = chord.slack + meter.LargestChange(shift);
+  double before = chord.first - meter.SampleAt(a.place), most = known - slack;
+  meter.ForEachPiece(a.place, b.place, [&](const Piece& piece) {
+    const double length = piece.end - piece.begin, bend = chord.bend - piece.bend;
+    const double height = chord.is_quadratic ? chord.At(piece.end) : HeightOn(ground, a, b, piece.end);
+    const double at_end = height - piece.end_sample;
+    if (IsLarger(length, bend, before, at_end, most)) most = LargestOn(length, bend, before, at_end, most);
+    before = at_end;
+  });
+  return std::max(known, most + slack);
+}
+
+// A chord whose points lie beside the line between its ends' places is halved until they hardly do.
+double LargestOfHalves(const EdgeMeter& meter, const Ground& ground, const End& a, const End& b, int depth,
+                       double known) {
+  constexpr double kSmall = 1e-3;  // of a lattice step
+  constexpr int kDeepest = 8;
+  const Place shift = ground.Shift(a.place, b.place, a.height - b.height);
+  if ((shift.x <= kSmall && shift.y <= kSmall) || depth == kDeepest) {
+    return LargestOfChord(meter, ground, a, b, shift, known);
+  }
+  End middle;
+  middle.point = (a.point + b.point) * 0.5;
+  middle.place = ground.PlaceOf(middle.point, Between(a.place, b.place, 0.5));
+  middle.height = ground.HeightOf(middle.point, middle.place);
+  known = LargestOfHalves(meter, ground, a, middle, depth + 1, known);
+  return LargestOfHalves(meter, ground, middle, b, depth + 1, known);
 }
 
 // Between the ends of pieces, and on the triangles between edges, the height of a chord strays from a linear one by at
@@ -278,11 +325,46 @@ double Stray(const Ground& ground, double steps) {
   return kHeights * (0.75 * diagonal * diagonal / kSmallestRadius + span * span / 8 * diagonal);
 }
 
+// The largest difference along edges from the lattice surface, metres, with Stray. `heights`: by vertex, of the reading
+// in longitude and latitude; empty: it is not measured. `ecef`: by vertex, of the flat triangles, which lie `beside_m`
+// beside their places at most.
+//
+// A chord is at most its sagitta below the line between its ends, and the lattice surface changes little over its
+// shift. So most chords are known to matter less than what was found already, without a look at them.
+double MeasureEdges(const EdgeMeter& meter, const Ground& ground, const std::vector<Place>& places,
+                    const std::vector<double>& heights, const std::vector<geo::Vec3>& ecef, double beside_m,
+                    const std::vector<std::array<std::uint32_t, 3>>& triangles) {
+  std::vector<End> ends(places.size());
+  for (std::size_t k = 0; k < places.size(); ++k) ends[k] = {places[k], ecef[k], ground.HeightOf(ecef[k], places[k])};
+  double span = 0;
+  ForEachEdge(triangles, places, meter,
+              [&](std::uint32_t a, std::uint32_t b) { span = std::max(span, SpanOf(places[a], places[b])); });
+  const Place step = ground.WidestStep(), narrowest = ground.NarrowestStep();
+  const double stray = Stray(ground, span) + meter.LargestChange({beside_m / narrowest.x, beside_m / narrowest.y});
+  double largest = stray;
+  ForEachEdge(triangles, places, meter, [&](std::uint32_t a, std::uint32_t b) {
+    const double x = (places[a].x - places[b].x) * step.x, y = (places[a].y - places[b].y) * step.y;
+    const double sagitta = kHeights * (x * x + y * y) / (8 * kSmallestRadius);
+    const Place shift = ground.Shift(places[a], places[b], ends[a].height - ends[b].height);
+    // Heights of the two readings differ by their rounding too where both are measured.
+    double rounding = 0;
+    if (!heights.empty())
+      rounding = std::max(std::abs(heights[a] - ends[a].height), std::abs(heights[b] - ends[b].height));
+    const double beyond = sagitta + meter.LargestChange(shift) + rounding + stray;
+    const double first = heights.empty() ? ends[a].height : heights[a],
+                 last = heights.empty() ? ends[b].height : heights[b];
+    const double known = std::max(largest - beyond, 0.0);
+    const double linear = LargestOfLine(meter, places[a], places[b], first, last, known);
+    if (linear <= known && known + beyond <= largest) return;
+    if (!heights.empty() && linear > known) largest = std::max(largest, linear);
+    largest = LargestOfHalves(meter, ground, ends[a], ends[b], 0, largest - stray) + stray;
+  });
+  return largest;
+}
+
 }  // namespace
 
-double MeasureEdgeError(const LatticeView& lattice, const QuantizedTile& tile, bool curved) {
-  const EdgeMeter meter(lattice);
-  const Ground ground(lattice);
+double MeasureEdgeError(const LatticeView& lattice, const QuantizedTile& tile) {
   std::vector<Place> places;
   std::vector<double> heights;
   const double scale = static_cast<double>(lattice.cells()) / kQuantizedMax;
@@ -290,17 +372,7 @@ double MeasureEdgeError(const LatticeView& lattice, const QuantizedTile& tile, b
     places.push_back({tile.u[k] * scale, tile.v[k] * scale});
     heights.push_back(HeightAt(tile, tile.h[k]));
   }
-  if (curved) {
-    const std::vector<geo::Vec3> ecef = DecodePositions(tile);
-    const Drawn drawn(ground, places, ecef);
-    const Largest largest = MeasureEdges(meter, places, heights, &drawn, tile.triangles);
-    return std::max(largest.planar, largest.drawn + Stray(ground, largest.span));
-  }
-  const double planar = MeasureEdges(meter, places, heights, nullptr, tile.triangles).planar;
-  // A function whose second derivatives are at most M strays from its linear interpolation on a triangle by at most
-  // M r^2 / 2, r the radius of a circle around it.
-  const double radius = WidestCircle(places, tile.triangles, ground.WidestStep());
-  return planar + kHeights * radius * radius / (2 * kSmallestRadius);
+  return MeasureEdges(EdgeMeter(lattice), Ground(lattice), places, heights, DecodePositions(tile), 0, tile.triangles);
 }
 
 double MeasureFlatEdgeError(const LatticeView& lattice, const tin::TinMesh& mesh,
@@ -309,11 +381,13 @@ double MeasureFlatEdgeError(const LatticeView& lattice, const tin::TinMesh& mesh
   for (const tin::SamplePosition p : mesh.vertices) {
     places.push_back({static_cast<double>(p.x), static_cast<double>(p.y)});
   }
-  const EdgeMeter meter(lattice);
-  const Ground ground(lattice);
-  const Drawn drawn(ground, places, positions);
-  const Largest largest = MeasureEdges(meter, places, {}, &drawn, mesh.triangles);
-  return largest.drawn + Stray(ground, largest.span);
+  const PlumbNodes plumb(lattice);
+  double beside_m = 0;
+  for (std::size_t k = 0; k < positions.size(); ++k) {
+    const tin::SamplePosition node = mesh.vertices[k];
+    beside_m = std::max(beside_m, plumb.PositionOf(positions[k], node.x, node.y).beside_m);
+  }
+  return MeasureEdges(EdgeMeter(lattice), Ground(lattice), places, {}, positions, beside_m, mesh.triangles);
 }
 
 }  // namespace terrace::proto

@@ -15,9 +15,8 @@ namespace terrace::proto {
 
 // Metres: at least the distance between the two surfaces wherever a triangle's edge runs, for the height interpolated
 // in longitude and latitude and for the flat triangles in ECEF. The larger of this and TileError::max_m bounds both
-// readings at every place of the tile: docs/decisions/0011-certified-error.md has the proof. `curved` as for
-// MeasureTileError: where it is false, the flat triangles are bounded by their sagitta.
-double MeasureEdgeError(const LatticeView& lattice, const QuantizedTile& tile, bool curved);
+// readings at every place of the tile: docs/decisions/0011-certified-error.md has the proof.
+double MeasureEdgeError(const LatticeView& lattice, const QuantizedTile& tile);
 
 // The same of flat triangles with their vertices at exact lattice positions, as MeasureFlatError reads them.
 double MeasureFlatEdgeError(const LatticeView& lattice, const tin::TinMesh& mesh,

@@ -26,7 +26,7 @@ class TileMeter {
   TileMeter(const LatticeView& lattice, double bound_m);
   ~TileMeter();
 
-  TileError Measure(const QuantizedTile& tile, bool curved);
+  TileError Measure(const QuantizedTile& tile);
   TileError MeasureFlat(const tin::TinMesh& mesh, const std::vector<geo::Vec3>& positions);
 
  private:
@@ -34,14 +34,14 @@ class TileMeter {
   std::unique_ptr<Impl> impl_;
 };
 
-// Measures at every lattice sample the height interpolated in longitude and latitude, which is what clients sample, and
-// with `curved` the flat triangle in ECEF, which is what they draw: its point with the sample's barycentric
-// coordinates, along the ellipsoid's normal at the sample.
-TileError MeasureTileError(const LatticeView& lattice, const QuantizedTile& tile, double bound_m, bool curved);
+// Measures at every lattice sample two readings of the surface: the height interpolated in longitude and latitude,
+// which is what clients sample, and the flat triangle in ECEF, which is what they draw, where the plumb line of the
+// sample (the ellipsoid's normal) passes through it. Where triangles overlap along a plumb line, the farthest one
+// counts.
+TileError MeasureTileError(const LatticeView& lattice, const QuantizedTile& tile, double bound_m);
 
-// The same for `mesh` with its vertices at exact lattice positions in longitude and latitude and at `positions` in
-// ECEF: measures the flat triangles that clients draw. Triangles whose corners merged on the way count as what is left
-// of them, a line.
+// The flat triangles alone, of `mesh` with its vertices near lattice nodes, at `positions` in ECEF. Triangles whose
+// corners merged on the way count as what is left of them, a line.
 TileError MeasureFlatError(const LatticeView& lattice, const tin::TinMesh& mesh,
                            const std::vector<geo::Vec3>& positions, double bound_m);
 

@@ -66,10 +66,10 @@ Result<void> OpenLayers(const config::DatasetConfig& wanted, server::Dataset& da
 std::string LayersFingerprint(const server::Dataset& dataset) {
   const server::WaterRules& water = dataset.water;
   const server::ImageryRules& imagery = dataset.imagery;
-  return fmt::format("{} {} {} {} {} {} {}", water.mask ? water.mask->fingerprint() : 0,
+  return fmt::format("{} {} {} {} {} {} {} {}", water.mask ? water.mask->fingerprint() : 0,
                      water.sea_level_m ? fmt::format("{}", *water.sea_level_m) : "none", dataset.metadata_levels,
                      imagery.image ? imagery.image->fingerprint() : 0, imagery.side, imagery.quality,
-                     imagery.attribution);
+                     imagery.attribution, dataset.attribution);
 }
 
 }  // namespace terrace::cli

@@ -96,6 +96,4 @@ tin::GreedyOptions MakeRefinePlan(const proto::LatticeView& lattice, const proto
   return options;
 }
 
-bool IsCurved(int level, double error_m) { return GridSagitta(level, 1) > error_m / 100; }
-
 }  // namespace terrace::server

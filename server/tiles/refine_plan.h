@@ -13,8 +13,4 @@ namespace terrace::server {
 // `needed`: the steps that the edges' heights need at any error, MakeEdgeSteps for the smallest one.
 tin::GreedyOptions MakeRefinePlan(const proto::LatticeView& lattice, const proto::EdgeSteps& needed);
 
-// Whether a triangle over the whole tile would sag more than 1 % of the error: then the flat triangle that clients draw
-// is measured as well.
-bool IsCurved(int level, double error_m);
-
 }  // namespace terrace::server

@@ -43,7 +43,7 @@ proto::EdgeSteps EdgeStepsOf(const dem::DemSource& source, const geo::TileKey& k
 
 // Inserts what the wire's rounding pushed over the bound, until nothing that an insertion can mend is left.
 Result<MeshedTile> Finish(tin::TinMesh mesh, const proto::LatticeView& lattice, const proto::EdgeSteps& steps,
-                          double error_m, bool curved, const std::stop_token& stop) {
+                          double error_m, const std::stop_token& stop) {
   constexpr int kMaxRounds = 16;  // two are usual; a cliff may keep a sample out of reach for ever
   proto::TileMeter meter(lattice, error_m);
   tin::SampleInserter inserter;
@@ -51,11 +51,11 @@ Result<MeshedTile> Finish(tin::TinMesh mesh, const proto::LatticeView& lattice, 
     if (stop.stop_requested()) return Cancelled();
     MeshedTile measured;
     measured.tile = proto::QuantizeTile(lattice, mesh, steps);
-    const proto::TileError error = meter.Measure(measured.tile, curved);
+    const proto::TileError error = meter.Measure(measured.tile);
     measured.max_error_m = error.max_m;
     if (error.misses.empty() || round == kMaxRounds ||
         mesh.vertices.size() + error.misses.size() > proto::kMaxTileVertices) {
-      measured.surface_error_m = std::max(error.max_m, proto::MeasureEdgeError(lattice, measured.tile, curved));
+      measured.surface_error_m = std::max(error.max_m, proto::MeasureEdgeError(lattice, measured.tile));
       measured.mesh = std::move(mesh);
       return measured;
     }
@@ -140,14 +140,13 @@ Result<StartedMesh> StartMesh(const dem::DemSource& source, const proto::Lattice
 Result<MeshedTile> MeshTile(const dem::DemSource& source, const proto::LatticeView& lattice,
                             const tin::Refinement& refinement, const MeshRules& rules, double wanted_error_m,
                             const std::stop_token& stop) {
-  const int level = lattice.key.level;
   const proto::EdgeSteps steps = EdgeStepsOf(source, lattice.key, wanted_error_m);
   const Clock::time_point start = Clock::now();
   Result<StartedMesh> started = StartMesh(source, lattice, refinement, rules, wanted_error_m, stop);
   if (!started) return tl::unexpected(std::move(started).error());
   double error_m = started->error_m;
   const auto replayed = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - start);
-  Result<MeshedTile> meshed = Finish(std::move(started->mesh), lattice, steps, error_m, IsCurved(level, error_m), stop);
+  Result<MeshedTile> meshed = Finish(std::move(started->mesh), lattice, steps, error_m, stop);
   if (meshed) meshed->replayed = replayed;
   if (!meshed || proto::AllCounterClockwise(meshed->tile)) return meshed;
 
@@ -155,7 +154,7 @@ Result<MeshedTile> MeshTile(const dem::DemSource& source, const proto::LatticeVi
   Result<tin::TinMesh> mesh =
       RefineWithinFormat(FieldOf(lattice), PlanOf(source, lattice, tin::Criterion::kDelaunay), 1, error_m, stop);
   if (!mesh) return tl::unexpected(std::move(mesh).error());
-  meshed = Finish(*std::move(mesh), lattice, steps, error_m, IsCurved(level, error_m), stop);
+  meshed = Finish(*std::move(mesh), lattice, steps, error_m, stop);
   if (meshed && !proto::AllCounterClockwise(meshed->tile)) {
     return MakeError(ErrorCode::kInternal, "{}: a triangle turned over", geo::ToString(lattice.key));
   }

@@ -110,6 +110,7 @@ Result<void> TilePipeline::EncodeGlb(const TileRequest& request, const RefinedTi
   if (!meshed) return tl::unexpected(meshed.error());
   proto::GlbOptions options = dataset.glb;
   options.compression = request.compression;
+  options.copyright = dataset.attribution;
   options.max_error_m = meshed->max_error_m;
   options.certified_error_m = meshed->surface_error_m + refined.heights.source_gap_m;
   if (const Result<void> added = AddTexture(dataset.imagery, request, options, stop); !added) {

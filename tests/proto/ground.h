@@ -50,6 +50,14 @@ struct RandomGround {
     for (int k = 0; k < (cells + 3) * (cells + 3); ++k) {
       heights.push_back(static_cast<float>(relief * static_cast<double>(random() % 4096) / 4096));
     }
+    // A pole has one height, as the contract of DemSource says.
+    const std::size_t stride = static_cast<std::size_t>(cells) + 3;
+    const std::int64_t south = lattice.FirstRow(tile), north = south + cells;
+    if (south == 0) std::fill_n(heights.begin() + static_cast<std::ptrdiff_t>(stride), stride, heights[stride]);
+    if (north == lattice.rows()) {
+      const std::size_t first = stride * (static_cast<std::size_t>(cells) + 1);
+      std::fill_n(heights.begin() + static_cast<std::ptrdiff_t>(first), stride, heights[first]);
+    }
   }
   LatticeView view() const { return {key, lattice, heights}; }
 };

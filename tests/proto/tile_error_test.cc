@@ -9,8 +9,10 @@
 
 #include "engine/tin/insert_samples.h"
 #include "proto/grid_mesh.h"
+#include "proto/tile_geometry.h"
 #include "proto/tile_mesh.h"
 #include "tests/proto/ground.h"
+#include "tests/proto/plumb_error.h"
 
 namespace terrace::proto {
 namespace {
@@ -51,6 +53,17 @@ double LargestError(const LatticeView& lattice, const QuantizedTile& tile) {
   return largest;
 }
 
+TEST(TileError, ListsForEachTriangleASampleThatMissesTheBound) {
+  const RandomGround ground({9, 300, 400}, 64, 256, 9);
+  const QuantizedTile tile = QuantizeTile(ground.view(), GreedyMesh(ground.view(), {.max_error = 120}), FineSteps());
+  const TileError error = MeasureTileError(ground.view(), tile, 60);
+  ASSERT_FALSE(error.misses.empty());
+  EXPECT_LE(error.misses.size(), tile.triangles.size());
+  for (const tin::SamplePosition miss : error.misses) {
+    EXPECT_TRUE(miss.x > 0 && miss.y > 0 && miss.x < 64 && miss.y < 64);
+  }
+}
+
 // Rounded positions leave the nodes, so that slivers lie between rows and edges pass nodes by a hair.
 TEST(TileError, FindsTheLargestErrorThatAnySampleHas) {
   for (const int cells : {32, 64}) {
@@ -59,21 +72,40 @@ TEST(TileError, FindsTheLargestErrorThatAnySampleHas) {
       const RandomGround ground({9, 300, 400}, cells, 256, seed);
       const QuantizedTile tile =
           QuantizeTile(ground.view(), GreedyMesh(ground.view(), {.max_error = 40.0 + 20 * seed}), FineSteps());
-      const TileError error = MeasureTileError(ground.view(), tile, 1e9, false);
-      EXPECT_NEAR(error.max_m, LargestError(ground.view(), tile), 1e-6) << cells << ' ' << seed;
+      const TileError error = MeasureTileError(ground.view(), tile, 1e9);
+      const double planar = LargestError(ground.view(), tile);
+      const FlatError drawn = LargestFlatError(ground.view(), DecodePositions(tile), tile.triangles);
+      EXPECT_GE(error.max_m, std::max(planar, drawn.least) - 1e-6) << cells << ' ' << seed;
+      EXPECT_LE(error.max_m, std::max(planar, drawn.most) + 1e-3) << cells << ' ' << seed;
       EXPECT_TRUE(error.misses.empty());
     }
   }
 }
 
-TEST(TileError, ListsForEachTriangleASampleThatMissesTheBound) {
-  const RandomGround ground({9, 300, 400}, 64, 256, 9);
-  const QuantizedTile tile = QuantizeTile(ground.view(), GreedyMesh(ground.view(), {.max_error = 120}), FineSteps());
-  const TileError error = MeasureTileError(ground.view(), tile, 60, false);
-  ASSERT_FALSE(error.misses.empty());
-  EXPECT_LE(error.misses.size(), tile.triangles.size());
-  for (const tin::SamplePosition miss : error.misses) {
-    EXPECT_TRUE(miss.x > 0 && miss.y > 0 && miss.x < 64 && miss.y < 64);
+// From a street to a sixth of the Earth, at both poles, at the antimeridian and in between.
+TEST(TileError, IsThatOfThePlumbLinesOfAllSamples) {
+  for (const int level : {2, 4, 6, 8, 12, 15}) {
+    const std::int64_t rows = geo::TileRows(level), columns = geo::TileColumns(level);
+    for (const std::int64_t row : {std::int64_t{0}, rows / 6, rows / 2, rows * 3 / 4, rows - 1}) {
+      const RandomGround ground({level, row % 2 == 0 ? columns / 3 : columns - 1, row}, 32, 40000.0 / (1 << level), 5);
+      const tin::TinMesh mesh = GreedyMesh(ground.view(), {.max_points = 300});
+      const QuantizedTile tile = QuantizeTile(ground.view(), mesh, FineSteps());
+      const double planar = LargestError(ground.view(), tile);
+      const FlatError drawn = LargestFlatError(ground.view(), DecodePositions(tile), tile.triangles);
+      const double stated = MeasureTileError(ground.view(), tile, 1e9).max_m;
+      EXPECT_GE(stated, std::max(planar, drawn.least) - 1e-6) << level << ' ' << row;
+      EXPECT_LE(stated, std::max(planar, drawn.most) * 1.001 + 0.001) << level << ' ' << row;
+
+      std::vector<geo::Vec3> positions;
+      for (const tin::SamplePosition p : mesh.vertices) {
+        positions.push_back(
+            geo::ToEcef(ground.view().Longitude(p.x), ground.view().Latitude(p.y), ground.view().At(p.x, p.y)));
+      }
+      const FlatError flat = LargestFlatError(ground.view(), positions, mesh.triangles);
+      const double stated_flat = MeasureFlatError(ground.view(), mesh, positions, 1e9).max_m;
+      EXPECT_GE(stated_flat, flat.least - 1e-6) << level << ' ' << row;
+      EXPECT_LE(stated_flat, flat.most * 1.001 + 0.001) << level << ' ' << row;
+    }
   }
 }
 
@@ -88,34 +120,27 @@ void ExpectEqual(const TileError& a, const TileError& b) {
 // Round by round: what is inserted moves the tile's lowest and highest vertex, and with them all heights, in some
 // rounds and not in others. Then another reading, a mesh of other triangles, and the same one twice.
 TEST(TileMeter, MeasuresAsIfItWereTheFirstTime) {
-  for (const bool curved : {false, true}) {
-    const RandomGround ground({9, 300, 400}, 64, 256, 9);
-    TileMeter meter(ground.view(), 60);
-    tin::TinMesh mesh = GreedyMesh(ground.view(), {.max_error = 150});
-    QuantizedTile tile;
-    int rounds = 0;
-    for (bool misses = true; misses; ++rounds) {
-      ASSERT_LT(rounds, 100);
-      tile = QuantizeTile(ground.view(), mesh, FineSteps());
-      const TileError error = meter.Measure(tile, curved);
-      ExpectEqual(error, MeasureTileError(ground.view(), tile, 60, curved));
-      misses = !error.misses.empty();
-      if (misses) mesh = tin::InsertSamples(mesh, {error.misses.data(), 1 + error.misses.size() / 3});
-    }
-    EXPECT_GT(rounds, 5);
-    const QuantizedTile other = QuantizeTile(ground.view(), GreedyMesh(ground.view(), {.max_error = 100}), FineSteps());
-    for (const QuantizedTile& next : {tile, other, other, tile}) {
-      for (const bool reading : {curved, !curved, !curved}) {
-        ExpectEqual(meter.Measure(next, reading), MeasureTileError(ground.view(), next, 60, reading));
-      }
-    }
-    // The same reading throughout: other vertices, and the same ones at other heights.
-    QuantizedTile lifted = tile;
-    lifted.min_height += 64;
-    lifted.max_height += 64;
-    for (const QuantizedTile& next : {tile, other, tile, lifted, tile}) {
-      ExpectEqual(meter.Measure(next, curved), MeasureTileError(ground.view(), next, 60, curved));
-    }
+  const RandomGround ground({9, 300, 400}, 64, 256, 9);
+  TileMeter meter(ground.view(), 60);
+  tin::TinMesh mesh = GreedyMesh(ground.view(), {.max_error = 150});
+  QuantizedTile tile;
+  int rounds = 0;
+  for (bool misses = true; misses; ++rounds) {
+    ASSERT_LT(rounds, 100);
+    tile = QuantizeTile(ground.view(), mesh, FineSteps());
+    const TileError error = meter.Measure(tile);
+    ExpectEqual(error, MeasureTileError(ground.view(), tile, 60));
+    misses = !error.misses.empty();
+    if (misses) mesh = tin::InsertSamples(mesh, {error.misses.data(), 1 + error.misses.size() / 3});
+  }
+  EXPECT_GT(rounds, 5);
+  const QuantizedTile other = QuantizeTile(ground.view(), GreedyMesh(ground.view(), {.max_error = 100}), FineSteps());
+  // Other vertices, and the same ones at other heights.
+  QuantizedTile lifted = tile;
+  lifted.min_height += 64;
+  lifted.max_height += 64;
+  for (const QuantizedTile& next : {tile, other, other, tile, lifted, tile}) {
+    ExpectEqual(meter.Measure(next), MeasureTileError(ground.view(), next, 60));
   }
 }
 

@@ -47,6 +47,7 @@ const TilePipeline& Earth() {
     auto image = dem::Imagery::Open(WriteHalves(), datasets[0].source->info().bounds);
     EXPECT_TRUE(image.has_value()) << (image ? "" : image.error().message);
     if (image) datasets[0].imagery.image = *std::move(image);
+    datasets[0].attribution = "a survey";
     datasets[0].imagery.side = 128;
     datasets[0].imagery.attribution = "halves";
     return new TilePipeline(std::move(datasets));
@@ -94,13 +95,15 @@ TEST(TileTexture, ShowsTheImageOfThePlace) {
     EXPECT_LT(red[1], 50);
     EXPECT_GT(green[1], 200);
     EXPECT_LT(green[0], 50);
-    EXPECT_EQ(west.json.at("asset").at("copyright"), "halves");
+    EXPECT_EQ(west.json.at("asset").at("copyright"), "a survey; halves");
   }
 }
 
 TEST(TileTexture, IsLeftOutWhereThereIsNoPictureOrNoneIsWanted) {
   EXPECT_TRUE(Fetch(GlbRequest({2, 0, 2}, proto::TextureFormat::kJpeg)).image.empty()) << "beyond the image";
-  EXPECT_TRUE(Fetch(GlbRequest({2, 3, 2}, proto::TextureFormat::kNone)).image.empty());
+  const proto::DecodedGlb bare = Fetch(GlbRequest({2, 3, 2}, proto::TextureFormat::kNone));
+  EXPECT_TRUE(bare.image.empty());
+  EXPECT_EQ(bare.json.at("asset").at("copyright"), "a survey") << "the ground has its credit without a picture too";
   TileRequest terrain = GlbRequest({2, 3, 2}, proto::TextureFormat::kNone);
   terrain.format = TileFormat::kQuantizedMesh;
   const auto plain = Earth().Build(terrain, {});

@@ -1,0 +1,56 @@
+#include "tests/proto/plumb_error.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace terrace::proto {
+namespace {
+
+// The plumb line passes the first corner further off than any of the other two lie from it.
+bool IsFarFrom(const geo::Vec3& foot, const geo::Vec3& up, const geo::Vec3& a, const geo::Vec3& b, const geo::Vec3& c) {
+  return geo::Length(geo::Cross(a - foot, up)) > std::max(geo::Length(b - a), geo::Length(c - a)) * 1.01 + 1;
+}
+
+}  // namespace
+
+FlatError LargestFlatError(const LatticeView& lattice, const std::vector<geo::Vec3>& ecef,
+                           const std::vector<std::array<std::uint32_t, 3>>& triangles) {
+  using Vector = std::array<long double, 3>;
+  const auto minus = [](const geo::Vec3& a, const geo::Vec3& b) {
+    return Vector{static_cast<long double>(a.x) - b.x, static_cast<long double>(a.y) - b.y,
+                  static_cast<long double>(a.z) - b.z};
+  };
+  const auto determinant = [](const Vector& a, const Vector& b, const Vector& c) {
+    return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0]);
+  };
+  const auto length = [](const Vector& a) { return std::sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]); };
+  FlatError largest;
+  for (int j = 0; j <= lattice.cells(); ++j) {
+    for (int i = 0; i <= lattice.cells(); ++i) {
+      const geo::Vec3 foot = geo::ToEcef(lattice.Longitude(i), lattice.Latitude(j), 0);
+      const geo::Vec3 normal = geo::SurfaceNormal(lattice.Longitude(i), lattice.Latitude(j));
+      const Vector down = {-normal.x, -normal.y, -normal.z};
+      for (const auto& t : triangles) {
+        if (IsFarFrom(foot, normal, ecef[t[0]], ecef[t[1]], ecef[t[2]])) continue;
+        // foot + height up = a + u (b - a) + v (c - a)
+        const Vector ab = minus(ecef[t[1]], ecef[t[0]]), ac = minus(ecef[t[2]], ecef[t[0]]);
+        const Vector bc = minus(ecef[t[2]], ecef[t[1]]), to_foot = minus(foot, ecef[t[0]]);
+        const long double all = determinant(ab, ac, down);
+        const long double area =
+            length({ab[1] * ac[2] - ab[2] * ac[1], ab[2] * ac[0] - ab[0] * ac[2], ab[0] * ac[1] - ab[1] * ac[0]});
+        if (std::abs(all) <= 1e-5L * area) continue;
+        const long double u = determinant(to_foot, ac, down) / all, v = determinant(ab, to_foot, down) / all;
+        const long double beside = 2e-6L / std::abs(all);
+        if (u < -beside * length(ac) || v < -beside * length(ab) || 1 - u - v < -beside * length(bc)) continue;
+        const long double height = determinant(ab, ac, to_foot) / all;
+        const auto error = static_cast<double>(std::abs(height - lattice.At(i, j)));
+        largest.most = std::max(largest.most, error);
+        const bool is_inside = u > beside * length(ac) && v > beside * length(ab) && 1 - u - v > beside * length(bc);
+        if (is_inside) largest.least = std::max(largest.least, error);
+      }
+    }
+  }
+  return largest;
+}
+
+}  // namespace terrace::proto
