@@ -22,6 +22,7 @@
 #include "engine/dem/level_plan.h"
 #include "engine/dem/raster_file.h"
 #include "engine/dem/raster_source.h"
+#include "engine/dem/source_policy.h"
 #include "engine/geo/octave.h"
 
 namespace terrace::dem {
@@ -96,7 +97,12 @@ bool LooksLikeRaster(const std::string& path) {
 std::vector<std::string> LeaveOutOthers(std::vector<DemFile>& files) {
   std::vector<std::string> missed, others;
   std::erase_if(files, [&](const DemFile& file) {
-    if (!file.may_be_other || IsRaster(file.path)) return false;
+    if (!file.may_be_other) return false;
+    if (!IsOneLine(file.path)) {
+      missed.push_back(EscapeControls(file.path) + " (a control character in its name: rename it)");
+      return true;
+    }
+    if (IsRaster(file.path)) return false;
     const auto format = LeftOutDriverOf(file.path);
     if (format) {
       missed.push_back(fmt::format("{} ({} is not among the allowed_drivers)", file.path, *format));
@@ -120,7 +126,7 @@ std::vector<std::string> LeaveOutOthers(std::vector<DemFile>& files) {
 }
 
 Result<Rasters> OpenAll(std::vector<DemFile>& files, const DemOptions& options, std::vector<std::string>& left_out) {
-  const std::string first = files.front().path;
+  const std::string first = EscapeControls(files.front().path);
   left_out = LeaveOutOthers(files);
   if (files.empty()) {
     return MakeError(

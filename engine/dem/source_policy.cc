@@ -1,5 +1,6 @@
 #include "engine/dem/source_policy.h"
 
+#include <fmt/format.h>
 #include <gdal_priv.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -137,6 +138,20 @@ Result<void> AllowVrts() {
   return SetSourcePolicy(policy);
 }
 
+bool IsOneLine(const std::string& path) { return !HasControlCharacter(path); }
+
+std::string EscapeControls(const std::string& path) {
+  std::string escaped;
+  for (const char c : path) {
+    if (HasControlCharacter(std::string(1, c))) {
+      escaped += fmt::format("\\x{:02x}", static_cast<unsigned char>(c));
+    } else {
+      escaped += c;
+    }
+  }
+  return escaped;
+}
+
 bool IsRemote(const std::string& path) {
   return path.starts_with("/vsi") && !HasControlCharacter(path) && IsAllowedRemote(*Current(), path);
 }
@@ -146,8 +161,10 @@ bool AllowsRemote() { return !Current()->prefixes.empty(); }
 
 Result<void> CheckPlainFile(const std::string& path) {
   const auto policy = Current();
-  if (path.empty() || HasControlCharacter(path)) {
-    return MakeError(ErrorCode::kInvalidArgument, "the name of a source is empty or not one line of text");
+  if (path.empty()) return MakeError(ErrorCode::kInvalidArgument, "the name of a source is empty");
+  if (HasControlCharacter(path)) {
+    return MakeError(ErrorCode::kInvalidArgument, "{}: a file name with a control character; rename the file",
+                     EscapeControls(path));
   }
   if (path.starts_with("/vsi")) {
     return MakeError(ErrorCode::kInvalidArgument,

@@ -42,6 +42,11 @@ Result<void> CheckLinks(GDALDataset& dataset, const std::string& path);
 // The part of it that any regular file must pass, whatever is in it: for files that no raster driver reads.
 Result<void> CheckPlainFile(const std::string& path);
 
+// Whether a name has no control character, as a newline is; names that have some are refused. And a name with these
+// written as \x0a, for messages and logs.
+bool IsOneLine(const std::string& path);
+std::string EscapeControls(const std::string& path);
+
 bool HasDataRoots();
 bool AllowsRemote();
 

@@ -71,6 +71,7 @@ Result<void> TryPolicy(const config::DatasetConfig& dataset) {
   };
   for (const config::SourceConfig& source : dataset.sources) {
     for (const std::string& file : source.files) {
+      if (source.is_folder && !dem::IsOneLine(file)) continue;  // left out, and told
       // What a folder has besides rasters is left out when it is opened, whatever it is.
       const Result<void> allowed = source.is_folder ? dem::CheckPlainFile(file) : dem::CheckSourceName(file);
       if (!allowed) return checked(allowed);

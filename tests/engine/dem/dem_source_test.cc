@@ -173,6 +173,25 @@ TEST(DemSource, LeavesFilesWithoutAHeightOutOfAFolder) {
   EXPECT_FALSE(DemSource::Open({{good, 0, false}, {none, 1, false}}));
 }
 
+// It cannot be told in a line of a log or of a configuration.
+TEST(DemSource, LeavesFilesWithALineBreakInTheirNameOutOfAFolder) {
+  const TempDir dir;
+  const std::string good = WriteRaster(dir, {}, "good.tif"), other = WriteRaster(dir, {}, "plain.tif");
+  const std::string broken = dir.path().string() + "/a\nb.tif";
+  std::filesystem::rename(other, broken);
+  const auto source = DemSource::Open({{good, 0, true}, {broken, 0, true}});
+  ASSERT_TRUE(source) << source.error().message;
+  EXPECT_EQ((*source)->info().sources.size(), 1u);
+  ASSERT_EQ((*source)->info().left_out.size(), 1u);
+  EXPECT_NE((*source)->info().left_out.front().find("a\\x0ab.tif"), std::string::npos)
+      << (*source)->info().left_out.front();
+  const auto named = DemSource::Open({{broken, 0, false}});
+  ASSERT_FALSE(named);
+  EXPECT_EQ(named.error().message.find('\n'), std::string::npos);
+  EXPECT_NE(named.error().message.find("a\\x0ab.tif: a file name with a control character"), std::string::npos)
+      << named.error().message;
+}
+
 // What holds colours is served all the same, but said to.
 TEST(DemSource, TellsPicturesFromHeights) {
   TERRACE_REQUIRE_DATA(photo, "ortho_pair_rgb_2m.tif");
