@@ -232,7 +232,8 @@ TEST(MeasureFlatError, SeesTheGridsRounding) {
     return MeasureFlatError(ground.view(), mesh, GridPositions(SnapVertices(ground.view(), mesh, step), step), 1000)
         .max_m;
   };
-  // A vertex moves by sqrt(3) / 2 of a step at most, on slopes of up to 50 m over 38 m by latitude and 31 m by longitude.
+  // A vertex moves by sqrt(3) / 2 of a step at most, on slopes of up to 50 m over 38 m by latitude and 31 m by
+  // longitude.
   constexpr double kMost = 0.87 * (1 + 2.1);
   EXPECT_LE(measured(1.0 / 64), kMost / 64);
   EXPECT_GT(measured(4), 0.5);
