@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
@@ -31,7 +32,8 @@ namespace terrace::server {
 namespace {
 
 // For replies to requests whose builds were just cancelled, and again for sockets that were just aborted.
-constexpr std::chrono::milliseconds kLastWords{1'000};
+// Twice this is less than the second that stopping may take beyond the drain timeout.
+constexpr std::chrono::milliseconds kLastWords{400};
 
 // How long a request waits for a source that was replaced, and how often it looks.
 constexpr std::chrono::milliseconds kReplaceTime{3'000}, kReplacePeriod{20};
@@ -203,7 +205,11 @@ class Server::Impl {
       if (const auto known = options_.on_signal.find(signal); known != options_.on_signal.end()) {
         known->second();
       } else {
-        spdlog::info("stopping: signal {}", signal);
+        spdlog::info("stopping: signal {}; a second one ends the server at once", signal);
+        for (const int end : {SIGINT, SIGTERM}) {
+          signals_.remove(end);
+          std::signal(end, [](int) { ::_exit(1); });
+        }
         RequestStop();
       }
       WaitForSignal();

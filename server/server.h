@@ -42,7 +42,7 @@ struct ServerOptions {
   std::size_t min_read_rate = 4096;                    // bytes a second that a client has to take; 0: any
   std::chrono::milliseconds request_deadline{30'000};  // of a tile, waiting for its build included
   std::chrono::milliseconds drain_timeout{10'000};
-  bool stop_on_signals = false;  // SIGINT and SIGTERM act like RequestStop
+  bool stop_on_signals = false;  // SIGINT and SIGTERM act like RequestStop; the second ends the process with status 1
   // Called on an io thread for each of these signals: must not block.
   std::map<int, std::function<void()>> on_signal;
   std::function<void()> on_stop;  // called once, when stopping begins; may be empty
@@ -86,7 +86,8 @@ class Server {
   // Begins to stop and returns at once. From any thread, any number of times; not from a signal handler.
   void RequestStop();
 
-  // Blocks until somebody asks to stop and the server has. False: requests were cut off because drain_timeout passed.
+  // Blocks until somebody asks to stop and the server has: at least until the running jobs have ended, for a read of a
+  // source cannot be cancelled. False: requests were cut off because drain_timeout passed.
   bool Wait();
 
  private:

@@ -6,6 +6,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <csignal>
 #include <cstdio>
 #include <filesystem>
@@ -31,6 +32,7 @@
 #include "server/cli/option_flags.h"
 #include "server/cli/progress.h"
 #include "server/cli/service_manager.h"
+#include "server/cli/stop_limit.h"
 #include "server/cli/try_folder.h"
 #include "server/memory_trimmer.h"
 #include "server/reload/reloader.h"
@@ -265,6 +267,9 @@ server::ServerOptions OptionsOf(const config::Config& config) {
   return options;
 }
 
+// What stopping may take beyond the drain timeout.
+constexpr std::chrono::seconds kStopTime{1};
+
 // Signals that mean something to the running server, besides those that end it.
 const std::vector<int> kAnsweredSignals = {SIGUSR1, SIGUSR2, SIGHUP};
 
@@ -346,6 +351,7 @@ int Serve(const ServeArguments& arguments) {
   MaskSignals(SIG_BLOCK, kAnsweredSignals);
   server::EncoderVersion();  // of the libraries there are, before GDAL or the system's resolver loads others
   if (const int exit_code = TryStart(config, /*is_running=*/false); exit_code != kExitOk) return exit_code;
+  StopLimit stop_limit;  // first, as it bounds how long the others take to end
   // Before sources are opened, which may take long.
   Result<std::shared_ptr<server::DiskCache>> disk = OpenDiskCache(config.disk_cache);
   if (!disk) {
@@ -410,7 +416,10 @@ int Serve(const ServeArguments& arguments) {
     NotifyReloading();
     reloader.Reload();
   };
-  options.on_stop = NotifyStopping;
+  options.on_stop = [&stop_limit, limit = config.drain_timeout + kStopTime] {
+    stop_limit.Begin(limit);
+    NotifyStopping();
+  };
   options.on_signal[SIGUSR1] = [] { SetLogLevel(config::LogLevel::kDebug); };
   options.on_signal[SIGUSR2] = [level] { SetLogLevel(*level); };
   auto started = server::Server::Start(catalog_of(datasets, config), options);
@@ -442,7 +451,8 @@ void AddServe(CLI::App& app, int& exit_code) {
       "  terrace serve --config terrace.json --listen 0.0.0.0:8080\n\n"
       "Each DEM becomes a dataset named after its file; a folder of DEMs becomes one dataset. Flags override the "
       "config file. Prints one line with\n"
-      "the URL when it is ready; logs go to stderr; SIGTERM and SIGINT end it after open requests are answered.");
+      "the URL when it is ready; logs go to stderr; SIGTERM and SIGINT end it after open requests are answered, a "
+      "second one at once.");
   command->add_option("DEM", arguments->dems, "Rasters that GDAL can read, or folders of them, one dataset each");
   command->add_option("--config", arguments->config_file, "Configuration in JSON (config/config.schema.json)")
       ->type_name("FILE");

@@ -1,11 +1,13 @@
 """What options of `terrace serve` do to replies and logs: serve_options_test.py BINARY SOURCE_DIR."""
 import contextlib
+import fcntl
 import json
 import os
 import pathlib
 import re
 import shutil
 import signal
+import socket
 import struct
 import subprocess
 import sys
@@ -183,6 +185,51 @@ class HangUp(unittest.TestCase):
                 process.terminate()
             self.assertEqual(process.wait(60), 0)
             self.assertIn("/readyz", log.read_text())
+
+
+class Stopping(unittest.TestCase):
+    def start(self, *arguments):
+        process = subprocess.Popen([BINARY, "serve", "--listen", "127.0.0.1:0", *arguments], stdout=subprocess.PIPE,
+                                   stderr=subprocess.PIPE, text=True)
+        self.addCleanup(process.kill)
+        port = int(re.search(r":(\d+)/", process.stdout.readline())[1])
+        return process, port
+
+    def wait_for(self, stream, text):
+        for line in stream:
+            if text in line:
+                return
+        self.fail(f"the log ended without {text!r}")
+
+    def test_a_second_signal_ends_it_at_once(self):
+        process, port = self.start("--drain-timeout-s", "3600", "--header-timeout-s", "600", DEM)
+        with socket.create_connection(("127.0.0.1", port)) as unfinished:
+            unfinished.sendall(b"GET /livez HTTP/1.1\r\n")
+            urllib.request.urlopen(f"http://127.0.0.1:{port}/livez", timeout=30).read()
+            process.terminate()
+            self.wait_for(process.stderr, "a second one ends the server at once")
+            with self.assertRaises(subprocess.TimeoutExpired):
+                process.wait(1)  # for the unfinished request
+            process.terminate()
+            process.communicate(timeout=60)
+        self.assertEqual(process.returncode, 1)
+
+    def test_a_source_that_cannot_be_read_does_not_keep_it(self):
+        """Opening a file that somebody has a write lease of waits for up to 45 s, as on a mount that does not answer."""
+        signal.signal(signal.SIGIO, signal.SIG_IGN)
+        with tempfile.TemporaryDirectory() as folder:
+            source, beside = pathlib.Path(folder, "source.tif"), pathlib.Path(folder, "beside.tif")
+            shutil.copy2(DEM, source)
+            shutil.copy(DEM, beside)
+            process, port = self.start("--drain-timeout-s", "0.2", source)
+            with open(beside, "rb+") as leased:
+                fcntl.fcntl(leased, fcntl.F_SETLEASE, fcntl.F_WRLCK)
+                os.rename(beside, source)
+                self.wait_for(process.stderr, "opening")
+                process.terminate()
+                log = process.communicate(timeout=120)[1]
+            self.assertEqual(process.returncode, 1, log)
+            self.assertIn("look whether a source can be read", log)
 
 
 class WorkingDirectory(unittest.TestCase):
