@@ -21,6 +21,7 @@
 #include <utility>
 
 #include "server/handlers/metrics.h"
+#include "server/handlers/metrics_page.h"
 #include "server/handlers/routes.h"
 #include "server/handlers/static_files.h"
 #include "server/http/edge.h"
@@ -94,6 +95,9 @@ class Server::Impl {
         edge_(std::move(edge)),
         deadline_(options_.request_deadline),
         tiles_(ServiceOptions(options_), std::bind_front(&Metrics::CountBuild, &metrics_)),
+        metrics_page_(
+            [this] { return metrics_.Text(tiles_.stats(), RefinementStats(), SourceNumbers(), CurrentState()); },
+            options_.metrics_age),
         routes_(MakeRoutes(std::move(catalog), options_)),
         io_(IoThreadCount(options_.io_threads)),
         signals_(io_.first()) {}
@@ -180,6 +184,7 @@ class Server::Impl {
       edge_->connections.WaitUntilEmpty(kLastWords);
     }
     io_.Stop();
+    metrics_page_.Stop();
     tiles_.Shutdown();
     if (drained) {
       spdlog::info("stopped: every request was answered");
@@ -281,9 +286,7 @@ class Server::Impl {
     Routes::State state;
     state.draining = [this] { return edge_->connections.draining(); };
     state.troubles = [this] { return Troubles(); };
-    state.metrics_text = [this] {
-      return metrics_.Text(tiles_.stats(), RefinementStats(), SourceNumbers(), CurrentState());
-    };
+    state.metrics_text = [this] { return metrics_page_.Get(); };
     return state;
   }
 
@@ -317,6 +320,7 @@ class Server::Impl {
   const std::unique_ptr<Edge> edge_;  // jobs of workers hold bodies that count in it
   std::atomic<std::chrono::milliseconds> deadline_;
   TileService tiles_;
+  MetricsPage metrics_page_;
   mutable std::mutex state_mutex_;
   std::shared_ptr<const Routes> routes_;         // never null; guarded by state_mutex_
   std::map<std::string, std::string> troubles_;  // by dataset; guarded by state_mutex_

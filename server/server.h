@@ -33,6 +33,7 @@ struct ServerOptions {
   std::size_t max_locations = 10'000;                  // in one request for heights
   EdgeOptions edge;                                    // limits of clients, tokens, proxies, TLS
   std::string cache_control = "public, max-age=3600";  // of tiles and layer.json
+  std::chrono::milliseconds metrics_age{1'000};        // for which a text of /metrics serves
   AccessLogForm access_log = AccessLogForm::kLog;
   std::filesystem::path access_log_file;  // of some forms; empty: stderr
   std::filesystem::path viewer_dir;       // empty or missing: a plain page instead

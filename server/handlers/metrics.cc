@@ -176,7 +176,6 @@ struct Metrics::Families {
   // What has one dataset as a label.
   struct OfDataset {
     std::set<prometheus::Counter*> requests, builds;
-    std::set<prometheus::Histogram*> durations, stages;
   };
   const Reply& AddReply(const ReplyRecord& record);
   void Forget(const std::string& dataset, const OfDataset& metrics);
@@ -191,12 +190,10 @@ struct Metrics::Families {
 const Metrics::Families::Reply& Metrics::Families::AddReply(const ReplyRecord& record) {
   OwnedLabels labels{std::string(record.route), std::string(record.cache), std::string(record.dataset), record.status};
   const std::string status = fmt::to_string(record.status);
-  const Reply reply{
-      requests.Add({{"route", labels.route}, {"dataset", labels.dataset}, {"status", status}}),
-      durations.Add({{"route", labels.route}, {"dataset", labels.dataset}, {"cache", labels.cache}}, Seconds())};
+  const Reply reply{requests.Add({{"route", labels.route}, {"dataset", labels.dataset}, {"status", status}}),
+                    durations.Add({{"route", labels.route}, {"cache", labels.cache}}, Seconds())};
   OfDataset& of_dataset = of_datasets[labels.dataset];
   of_dataset.requests.insert(&reply.count);
-  of_dataset.durations.insert(&reply.duration);
   return replies.emplace(std::move(labels), reply).first->second;
 }
 
@@ -205,8 +202,6 @@ void Metrics::Families::Forget(const std::string& dataset, const OfDataset& metr
   std::erase_if(replies, [&](const auto& reply) { return reply.first.dataset == dataset; });
   for (prometheus::Counter* count : metrics.requests) requests.Remove(count);
   for (prometheus::Counter* count : metrics.builds) builds.Remove(count);
-  for (prometheus::Histogram* duration : metrics.durations) durations.Remove(duration);
-  for (prometheus::Histogram* stage : metrics.stages) stages.Remove(stage);
 }
 
 Metrics::Metrics() : families_(std::make_unique<Families>()) {}
@@ -259,9 +254,7 @@ void Metrics::CountBuild(const DatasetView& dataset, const Result<TilePtr>& tile
                                                                       {"encode", times.encode},
                                                                       {"compress", times.compress}};
   for (const auto& [stage, time] : stages) {
-    prometheus::Histogram& histogram = families_->stages.Add({{"dataset", dataset.name}, {"stage", stage}}, Seconds());
-    histogram.Observe(InSeconds(time));
-    of_dataset.stages.insert(&histogram);
+    families_->stages.Add({{"stage", stage}}, Seconds()).Observe(InSeconds(time));
   }
 }
 

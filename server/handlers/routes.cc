@@ -16,14 +16,18 @@ namespace {
 constexpr std::string_view kRevalidate = "no-cache";
 
 // What whoever operates the server asks it.
-Response StateResponse(int status, std::string_view content_type, std::string text) {
+Response StateResponse(int status, std::string_view content_type, std::shared_ptr<const std::string> text) {
   Response response;
   response.status = status;
   response.is_vital = true;
   response.content_type = content_type;
-  response.body = std::make_shared<const std::string>(std::move(text));
+  response.body = std::move(text);
   response.cache_control = "no-store";
   return response;
+}
+
+Response PlainState(int status, std::string text) {
+  return StateResponse(status, "text/plain; charset=utf-8", std::make_shared<const std::string>(std::move(text)));
 }
 
 bool SeesAll(const Request& request) { return !request.grant || request.grant->sees_all; }
@@ -32,7 +36,7 @@ bool SeesAll(const Request& request) { return !request.grant || request.grant->s
 // name files: they are for the log. Datasets are named to those who may see them all.
 Response Ready(const Routes::State& state, bool sees_all) {
   if (state.draining()) {
-    Response response = StateResponse(503, "text/plain; charset=utf-8", "draining\n");
+    Response response = PlainState(503, "draining\n");
     response.headers.emplace_back("Retry-After", "5");
     return response;
   }
@@ -43,7 +47,7 @@ Response Ready(const Routes::State& state, bool sees_all) {
                 ? "the configuration file is wrong, the last good one is in force\n"
                 : fmt::format("dataset{}: its source cannot be opened as it is now\n", sees_all ? " " + dataset : "");
   }
-  return StateResponse(200, "text/plain; charset=utf-8", std::move(text));
+  return PlainState(200, std::move(text));
 }
 
 }  // namespace
@@ -64,7 +68,9 @@ Routes::Routes(CatalogPtr catalog, TileService& tiles, std::shared_ptr<const Sta
       state_(std::move(state)) {}
 
 std::optional<Response> Routes::ServeAtOnce(const Route& route, const Request& request) const {
-  if (route.kind == RouteKind::kHeights || route.kind == RouteKind::kMesh) return std::nullopt;
+  if (route.kind == RouteKind::kHeights || route.kind == RouteKind::kMesh || route.kind == RouteKind::kMetrics) {
+    return std::nullopt;
+  }
   std::optional<Response> response;
   if (route.kind == RouteKind::kTile) {
     response = tiles_.HandleNow(route, request);
@@ -87,6 +93,8 @@ asio::awaitable<Response> Routes::Serve(Route route, Request request) const {
     response = co_await heights_.Handle(std::move(route), std::move(request));
   } else if (kind == RouteKind::kMesh) {
     response = co_await areas_.Handle(std::move(route), std::move(request));
+  } else if (kind == RouteKind::kMetrics) {
+    response = co_await ServeMetrics(std::move(route), std::move(request));
   } else {
     Answer answer = Describe(route, request);
     if (auto* plan = std::get_if<DocumentPlan>(&answer)) {
@@ -97,6 +105,14 @@ asio::awaitable<Response> Routes::Serve(Route route, Request request) const {
   }
   Label(response, kind, dataset);
   co_return response;
+}
+
+asio::awaitable<Response> Routes::ServeMetrics(Route route, Request request) const {
+  if (const Result<void> none = RefuseParameters(route.query); !none) {
+    co_return ClientErrorResponse(none.error(), request.id);
+  }
+  std::shared_ptr<const std::string> text = co_await state_.metrics_text();
+  co_return StateResponse(200, "text/plain; version=0.0.4; charset=utf-8", std::move(text));
 }
 
 // Names that nobody serves must not become labels of the metrics.
@@ -120,10 +136,8 @@ Answer Routes::Describe(const Route& route, const Request& request) const {
       return PlanOfSeen(datasets_, request, DatasetsJson);
     case RouteKind::kReady:
       return Ready(state_, SeesAll(request));
-    case RouteKind::kMetrics:
-      return StateResponse(200, "text/plain; version=0.0.4; charset=utf-8", state_.metrics_text());
     default:
-      return StateResponse(200, "text/plain; charset=utf-8", "ok\n");
+      return PlainState(200, "ok\n");
   }
 }
 

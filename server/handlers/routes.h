@@ -35,15 +35,15 @@ class Routes {
   struct State {
     std::function<bool()> draining;
     std::function<std::map<std::string, std::string>()> troubles;  // by dataset; "" is the configuration
-    std::function<std::string()> metrics_text;
+    std::function<asio::awaitable<std::shared_ptr<const std::string>>()> metrics_text;
   };
 
   // `tiles` must outlive this. `max_locations`: of one request for heights.
   Routes(CatalogPtr catalog, TileService& tiles, std::shared_ptr<const StaticFiles> viewer, TileHandlerOptions options,
          std::size_t max_locations, State state);
 
-  // Answers what needs no waiting, which is most: all but tiles that must be built, heights, meshes, and long documents
-  // with wishes in them. Nothing for those.
+  // Answers what needs no waiting, which is most: all but tiles that must be built, heights, meshes, metrics, and
+  // long documents with wishes in them. Nothing for those.
   std::optional<Response> ServeAtOnce(const Route& route, const Request& request) const;
 
   // Answers GET, HEAD, and POST where TakesPost says so. Whoever waits keeps this alive.
@@ -53,6 +53,7 @@ class Routes {
 
  private:
   void Label(Response& response, RouteKind kind, const std::string& dataset) const;
+  asio::awaitable<Response> ServeMetrics(Route route, Request request) const;
   Answer Describe(const Route& route, const Request& request) const;
   Answer DescribeViewer(const Route& route, const Request& request) const;
   DocumentPlan PlanOfSeen(const Document& all, const Request& request,

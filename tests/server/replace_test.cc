@@ -41,6 +41,7 @@ class Replace : public testing::Test {
   void Start(CatalogPtr catalog) {
     options_.port = 0;
     options_.io_threads = 2;
+    options_.metrics_age = std::chrono::milliseconds(0);
     auto server = Server::Start(std::move(catalog), options_);
     ASSERT_TRUE(server) << server.error().message;
     server_ = std::move(*server);

@@ -30,6 +30,7 @@ ServerFixture::ServerFixture() {
 void ServerFixture::Start(ServerOptions options) {
   options.port = 0;
   options.io_threads = 2;
+  options.metrics_age = std::chrono::milliseconds(0);  // tests look for what they have just done
   if (options.worker_threads == 0) options.worker_threads = 2;
   DatasetView maui;
   maui.name = "maui";
