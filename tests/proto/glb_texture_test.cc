@@ -15,11 +15,11 @@
 namespace terrace::proto {
 namespace {
 
-constexpr GlbCompression kAll[] = {GlbCompression::kDraco, GlbCompression::kNone, GlbCompression::kQuantized,
-                                   GlbCompression::kMeshopt};
+constexpr GlbCompression kEachCompression[] = {GlbCompression::kDraco, GlbCompression::kNone,
+                                               GlbCompression::kQuantized, GlbCompression::kMeshopt};
 constexpr geo::TileKey kKey{9, 533, 388};
 
-GridMesh Tile(const geo::TileKey& key, int cells) {
+GridMesh TexturedTile(const geo::TileKey& key, int cells) {
   const GlobalGround ground(key, cells, Scattered(1000));
   const tin::TinMesh mesh = RegularMesh(cells, 4);
   const double error = geo::LadderError(key.level, 0);
@@ -37,7 +37,7 @@ GlbOptions Textured(GlbCompression compression, std::string_view media_type = "i
   return options;
 }
 
-DecodedGlb Decoded(const GridMesh& mesh, const GlbOptions& options) {
+DecodedGlb DecodedTexture(const GridMesh& mesh, const GlbOptions& options) {
   const Result<GlbTile> tile = EncodeGlb(mesh, options);
   EXPECT_TRUE(tile.has_value()) << (tile ? "" : tile.error().message);
   const std::optional<DecodedGlb> glb = tile ? DecodeGlb(tile->bytes) : std::nullopt;
@@ -61,11 +61,11 @@ std::array<double, 2> Degrees(const geo::Vec3& p) {
 // The picture's edges are the tile's, its top the tile's north; skirts hang below their rim.
 TEST(GlbTexture, EveryVertexIsWhereThePictureShowsIt) {
   for (const int cells : {32, 256}) {
-    const GridMesh mesh = Tile(kKey, cells);
+    const GridMesh mesh = TexturedTile(kKey, cells);
     const double width = 180.0 / 512, west = static_cast<double>(kKey.x) * width - 180,
                  north = static_cast<double>(kKey.y + 1) * width - 90;
-    for (const GlbCompression compression : kAll) {
-      const DecodedGlb glb = Decoded(mesh, Textured(compression));
+    for (const GlbCompression compression : kEachCompression) {
+      const DecodedGlb glb = DecodedTexture(mesh, Textured(compression));
       ASSERT_EQ(glb.uv.size(), glb.positions.size());
       for (std::size_t k = 0; k < glb.uv.size(); ++k) {
         const auto [longitude, latitude] = Degrees(glb.positions[k]);
@@ -77,9 +77,9 @@ TEST(GlbTexture, EveryVertexIsWhereThePictureShowsIt) {
 }
 
 TEST(GlbTexture, IsDescribedAsClientsReadIt) {
-  const GridMesh mesh = Tile(kKey, 32);
-  for (const GlbCompression compression : kAll) {
-    const DecodedGlb glb = Decoded(mesh, Textured(compression));
+  const GridMesh mesh = TexturedTile(kKey, 32);
+  for (const GlbCompression compression : kEachCompression) {
+    const DecodedGlb glb = DecodedTexture(mesh, Textured(compression));
     EXPECT_EQ(glb.image, "not a picture, but bytes");
     EXPECT_EQ(glb.json.at("asset").at("copyright"), "© a survey");
     EXPECT_EQ(glb.json.at("images").at(0).at("mimeType"), "image/jpeg");
@@ -93,8 +93,8 @@ TEST(GlbTexture, IsDescribedAsClientsReadIt) {
 }
 
 TEST(GlbTexture, WebpIsAnExtensionThatReadersMustKnow) {
-  for (const GlbCompression compression : kAll) {
-    const DecodedGlb glb = Decoded(Tile(kKey, 32), Textured(compression, "image/webp"));
+  for (const GlbCompression compression : kEachCompression) {
+    const DecodedGlb glb = DecodedTexture(TexturedTile(kKey, 32), Textured(compression, "image/webp"));
     EXPECT_EQ(glb.json.at("textures").at(0).at("extensions").at("EXT_texture_webp").at("source"), 0);
     EXPECT_FALSE(glb.json.at("textures").at(0).contains("source"));
     const auto required = glb.json.at("extensionsRequired").get<std::vector<std::string>>();
@@ -103,11 +103,11 @@ TEST(GlbTexture, WebpIsAnExtensionThatReadersMustKnow) {
 }
 
 TEST(GlbTexture, TilesWithoutOneAreAsBefore) {
-  const GridMesh mesh = Tile(kKey, 32);
-  for (const GlbCompression compression : kAll) {
+  const GridMesh mesh = TexturedTile(kKey, 32);
+  for (const GlbCompression compression : kEachCompression) {
     GlbOptions options = Textured(compression);
     options.texture.reset();
-    const DecodedGlb plain = Decoded(mesh, options), textured = Decoded(mesh, Textured(compression));
+    const DecodedGlb plain = DecodedTexture(mesh, options), textured = DecodedTexture(mesh, Textured(compression));
     EXPECT_TRUE(plain.uv.empty() && plain.image.empty());
     EXPECT_FALSE(plain.json.contains("textures"));
     EXPECT_EQ(Surface(plain), Surface(textured)) << "a texture moves no vertex";
@@ -117,8 +117,8 @@ TEST(GlbTexture, TilesWithoutOneAreAsBefore) {
 // Where a pole's row of nodes is one point, triangles are left out and vertices merged.
 TEST(GlbTexture, SurvivesThePoles) {
   for (const geo::TileKey key : {geo::TileKey{0, 0, 0}, geo::TileKey{4, 3, 15}}) {
-    for (const GlbCompression compression : kAll) {
-      const DecodedGlb glb = Decoded(Tile(key, 32), Textured(compression));
+    for (const GlbCompression compression : kEachCompression) {
+      const DecodedGlb glb = DecodedTexture(TexturedTile(key, 32), Textured(compression));
       ASSERT_EQ(glb.uv.size(), glb.positions.size());
       for (const auto& [u, v] : glb.uv) ASSERT_TRUE(u >= 0 && u <= 1 && v >= 0 && v <= 1);
     }
@@ -128,7 +128,7 @@ TEST(GlbTexture, SurvivesThePoles) {
 TEST(GlbTexture, ACopyrightThatIsNotUtf8DoesNotStopIt) {
   GlbOptions options = Textured(GlbCompression::kNone);
   options.copyright = "Universit\xe9";  // Latin-1
-  EXPECT_EQ(Decoded(Tile(kKey, 32), options).json.at("asset").at("copyright"), "Universit\xef\xbf\xbd");
+  EXPECT_EQ(DecodedTexture(TexturedTile(kKey, 32), options).json.at("asset").at("copyright"), "Universit\xef\xbf\xbd");
 }
 
 }  // namespace

@@ -20,8 +20,8 @@
 namespace terrace::proto {
 namespace {
 
-constexpr GlbCompression kAll[] = {GlbCompression::kDraco, GlbCompression::kNone, GlbCompression::kQuantized,
-                                   GlbCompression::kMeshopt};
+constexpr GlbCompression kAllCompressions[] = {GlbCompression::kDraco, GlbCompression::kNone,
+                                               GlbCompression::kQuantized, GlbCompression::kMeshopt};
 
 GridMesh Tile(const geo::TileKey& key, int cells, int stride, int ladder = 0, double relief = 1000,
               PositionWidth width = PositionWidth::kFloat) {
@@ -88,7 +88,7 @@ TEST(GlbTile, DecodesToTheGridInEveryForm) {
   for (const geo::TileKey key : {geo::TileKey{0, 0, 0}, geo::TileKey{1, 3, 1}, geo::TileKey{5, 0, 31},
                                  geo::TileKey{9, 533, 388}, geo::TileKey{13, 8548, 6199}, geo::TileKey{24, 7, 9}}) {
     for (const int ladder : {-16, 0, 13}) {
-      for (const GlbCompression compression : kAll) {
+      for (const GlbCompression compression : kAllCompressions) {
         const GridMesh mesh = Tile(key, 32, 2, ladder, 1000, WidthOf(compression));
         SCOPED_TRACE(testing::Message() << geo::ToString(key) << " ladder " << ladder << " compression "
                                         << static_cast<int>(compression));
@@ -133,7 +133,7 @@ TEST(GlbTile, IsClosedButForTheFeetOfItsSkirts) {
 TEST(GlbTile, SaysWhatClientsNeed) {
   const GridMesh mesh = Tile({9, 533, 388}, 32, 4);
   const auto json = [&](GlbCompression compression) { return DecodeGlb(Encode(mesh, compression).bytes)->json; };
-  for (const GlbCompression compression : kAll) {
+  for (const GlbCompression compression : kAllCompressions) {
     const nlohmann::json glb = json(compression);
     EXPECT_EQ(glb.at("asset").at("generator"), "terrace 1.2.3");
     EXPECT_EQ(glb.at("scenes").at(0).at("nodes"), nlohmann::json::array({0}));
@@ -178,14 +178,14 @@ TEST(GlbTile, TakesFloatsWhereSixteenBitsAreTooFew) {
 TEST(GlbTile, SurvivesCliffsBeyondTheGrid) {
   const GridMesh mesh = Tile({24, 7, 9}, 32, 2, geo::kFinestStep, 4000);
   EXPECT_GT(mesh.step_m, GridStep({24, 32}, geo::LadderError(24, geo::kFinestStep), PositionWidth::kFloat));
-  for (const GlbCompression compression : kAll) ExpectTile(mesh, Encode(mesh, compression), 1);
+  for (const GlbCompression compression : kAllCompressions) ExpectTile(mesh, Encode(mesh, compression), 1);
 }
 
 // 256 x 256 cells, all of them vertices, and the skirts: more than 65,535.
 TEST(GlbTile, WidensIndicesPast65535Vertices) {
   const GridMesh mesh = Tile({9, 533, 388}, 256, 1);
   ASSERT_GT(mesh.positions.size(), 65'535u);
-  for (const GlbCompression compression : kAll) {
+  for (const GlbCompression compression : kAllCompressions) {
     const GlbTile tile = Encode(mesh, compression);
     const std::optional<DecodedGlb> glb = DecodeGlb(tile.bytes);
     ASSERT_TRUE(glb.has_value()) << static_cast<int>(compression);
@@ -195,7 +195,7 @@ TEST(GlbTile, WidensIndicesPast65535Vertices) {
 }
 
 TEST(GlbTile, GivesTheSameBytesAgain) {
-  for (const GlbCompression compression : kAll) {
+  for (const GlbCompression compression : kAllCompressions) {
     EXPECT_EQ(Encode(Tile({9, 533, 388}, 32, 2), compression).bytes,
               Encode(Tile({9, 533, 388}, 32, 2), compression).bytes);
   }
@@ -203,7 +203,7 @@ TEST(GlbTile, GivesTheSameBytesAgain) {
 
 TEST(GlbTile, EveryTruncationIsNoticed) {
   const GridMesh mesh = Tile({9, 533, 388}, 32, 8);
-  for (const GlbCompression compression : kAll) {
+  for (const GlbCompression compression : kAllCompressions) {
     const std::string bytes = Encode(mesh, compression).bytes;
     ASSERT_TRUE(DecodeGlb(bytes).has_value());
     for (std::size_t size = 0; size < bytes.size(); ++size) {

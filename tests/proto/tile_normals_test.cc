@@ -15,12 +15,13 @@ namespace {
 
 constexpr int kCells = 32;
 
-struct Ground {
+struct SampledGround {
   geo::TileKey key;
   geo::Lattice lattice;
   std::vector<float> heights;
 
-  Ground(geo::TileKey tile, const std::function<double(int, int)>& height) : key(tile), lattice{tile.level, kCells} {
+  SampledGround(geo::TileKey tile, const std::function<double(int, int)>& height)
+      : key(tile), lattice{tile.level, kCells} {
     for (int j = -1; j <= kCells + 1; ++j) {
       for (int i = -1; i <= kCells + 1; ++i) heights.push_back(static_cast<float>(height(i, j)));
     }
@@ -33,7 +34,7 @@ tin::TinMesh Fan(std::uint16_t x, std::uint16_t y) {
   return {{{0, 0}, {kCells, 0}, {kCells, kCells}, {0, kCells}, {x, y}}, {{0, 1, 4}, {1, 2, 4}, {2, 3, 4}, {3, 0, 4}}};
 }
 
-std::vector<geo::Vec3> NormalsOf(const Ground& ground, const tin::TinMesh& mesh) {
+std::vector<geo::Vec3> NormalsOf(const SampledGround& ground, const tin::TinMesh& mesh) {
   const EdgeSteps steps{{1, 1, 1, 1}, {1, 1, 1, 1}};
   std::vector<geo::Vec3> normals;
   for (const auto& [x, y] : TileNormals(ground.view(), mesh, QuantizeTile(ground.view(), mesh, steps))) {
@@ -48,7 +49,7 @@ double DegreesBetween(geo::Vec3 a, geo::Vec3 b) {
 }
 
 TEST(TileNormals, PointUpOnLevelGround) {
-  const Ground ground({13, 8700, 6200}, [](int, int) { return 250; });
+  const SampledGround ground({13, 8700, 6200}, [](int, int) { return 250; });
   const auto normals = NormalsOf(ground, Fan(16, 16));
   EXPECT_LT(DegreesBetween(normals[4], geo::SurfaceNormal(ground.view().Longitude(16), ground.view().Latitude(16))),
             1.2);
@@ -58,7 +59,7 @@ TEST(TileNormals, LeanAwayFromTheRise) {
   const geo::TileKey key{13, 8192, 4096};  // at the equator and Greenwich: east is +y, up is +x
   const geo::Lattice lattice{key.level, kCells};
   const double metres = lattice.StepDegrees() * geo::MetresPerDegreeEast(0);
-  const auto normals = NormalsOf(Ground(key, [&](int i, int) { return i * metres; }), Fan(16, 16));
+  const auto normals = NormalsOf(SampledGround(key, [&](int i, int) { return i * metres; }), Fan(16, 16));
   for (const geo::Vec3 normal : normals) {
     EXPECT_NEAR(normal.x, std::sqrt(0.5), 0.02);
     EXPECT_NEAR(normal.y, -std::sqrt(0.5), 0.02);
@@ -72,11 +73,11 @@ TEST(TileNormals, AreEqualOnBothSidesOfAnEdge) {
   };
   const geo::TileKey west{12, 4300, 2900}, east{12, 4301, 2900};
   const auto ground_of = [&](const geo::TileKey& key) {
-    return Ground(key, [&height, key](int i, int j) { return height(key.x * kCells + i, key.y * kCells + j); });
+    return SampledGround(key, [&height, key](int i, int j) { return height(key.x * kCells + i, key.y * kCells + j); });
   };
   // Other insides, the same edge.
   const tin::TinMesh left = Fan(9, 20), right = Fan(27, 3);
-  const Ground a = ground_of(west), b = ground_of(east);
+  const SampledGround a = ground_of(west), b = ground_of(east);
   const EdgeSteps steps{{1, 1, 1, 1}, {1, 1, 1, 1}};
   const auto of_west = TileNormals(a.view(), left, QuantizeTile(a.view(), left, steps));
   const auto of_east = TileNormals(b.view(), right, QuantizeTile(b.view(), right, steps));
@@ -87,7 +88,7 @@ TEST(TileNormals, AreEqualOnBothSidesOfAnEdge) {
 // A lone spike: the lattice says level at its top's flank, the mesh is steep there.
 TEST(TileNormals, StayNearTheMeshInside) {
   const geo::TileKey key{13, 8192, 4096};
-  const Ground ground(key, [](int i, int j) { return i == 17 && j == 16 ? 2000 : 0; });
+  const SampledGround ground(key, [](int i, int j) { return i == 17 && j == 16 ? 2000 : 0; });
   const tin::TinMesh mesh = Fan(16, 16);  // the mesh has no spike: level
   const auto normals = NormalsOf(ground, mesh);
   const geo::Vec3 up = geo::SurfaceNormal(ground.view().Longitude(16), ground.view().Latitude(16));
@@ -102,26 +103,26 @@ TEST(TileNormals, OnEdgesACliffIsNoSlope) {
   constexpr double kCliff = 3000;
   for (const bool is_along_x : {true, false}) {
     for (const int end : {-1, 0, 1, 2}) {  // where it is level again
-      const Ground ground(key, [&](int i, int j) { return (is_along_x ? i : j) < end ? kCliff : 0; });
+      const SampledGround ground(key, [&](int i, int j) { return (is_along_x ? i : j) < end ? kCliff : 0; });
       const auto normals = NormalsOf(ground, Fan(16, 16));
       const geo::Vec3 up = geo::SurfaceNormal(ground.view().Longitude(0), ground.view().Latitude(0));
       EXPECT_LT(DegreesBetween(normals[0], up), 14.5) << is_along_x << ' ' << end;
     }
-    const Ground slope(key, [&](int i, int j) { return -kCliff * std::clamp(is_along_x ? i : j, -1, 1); });
+    const SampledGround slope(key, [&](int i, int j) { return -kCliff * std::clamp(is_along_x ? i : j, -1, 1); });
     const geo::Vec3 up = geo::SurfaceNormal(slope.view().Longitude(0), slope.view().Latitude(0));
     EXPECT_GT(DegreesBetween(NormalsOf(slope, Fan(16, 16))[0], up), 80);
   }
 }
 
 TEST(TileNormals, AreTheEllipsoidsAtThePole) {
-  const Ground ground({3, 5, 7}, [](int i, int j) { return 100 * i + 37 * j; });
+  const SampledGround ground({3, 5, 7}, [](int i, int j) { return 100 * i + 37 * j; });
   const auto normals = NormalsOf(ground, Fan(16, 16));
   EXPECT_LT(DegreesBetween(normals[2], {0, 0, 1}), 1.2);
   EXPECT_LT(DegreesBetween(normals[3], {0, 0, 1}), 1.2);
 }
 
 TEST(TileNormals, NeverPointIntoTheGround) {
-  const Ground ground({18, 140000, 200000}, [](int i, int j) { return (i + j) % 2 == 0 ? 8000 : -8000; });
+  const SampledGround ground({18, 140000, 200000}, [](int i, int j) { return (i + j) % 2 == 0 ? 8000 : -8000; });
   const tin::TinMesh mesh = Fan(15, 16);
   const auto normals = NormalsOf(ground, mesh);
   for (std::size_t k = 0; k < normals.size(); ++k) {

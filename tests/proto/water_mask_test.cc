@@ -11,8 +11,8 @@ namespace terrace::proto {
 namespace {
 
 // Heights at global nodes; the halo is NaN, as nobody may look at it.
-struct Tile {
-  Tile(geo::TileKey key, int cells, const std::function<float(std::int64_t, std::int64_t)>& height)
+struct WaterTile {
+  WaterTile(geo::TileKey key, int cells, const std::function<float(std::int64_t, std::int64_t)>& height)
       : view{key, {key.level, cells}, {}} {
     for (int j = -1; j <= cells + 1; ++j) {
       for (int i = -1; i <= cells + 1; ++i) {
@@ -32,7 +32,7 @@ int Pixel(const WaterMask& mask, int row, int column) {
 
 TEST(SeaLevelMask, RowsRunFromTheNorthAndColumnsFromTheWest) {
   // Only the north-western quarter is under water.
-  const Tile tile({4, 5, 6}, 256, [](std::int64_t column, std::int64_t row) {
+  const WaterTile tile({4, 5, 6}, 256, [](std::int64_t column, std::int64_t row) {
     return column - 5 * 256 < 128 && row - 6 * 256 >= 128 ? -10.0f : 10.0f;
   });
   const WaterMask mask = SeaLevelMask(tile.view, 0);
@@ -45,7 +45,7 @@ TEST(SeaLevelMask, RowsRunFromTheNorthAndColumnsFromTheWest) {
 
 TEST(SeaLevelMask, TheLevelItselfIsWater) {
   const auto flat = [](float height) {
-    return Tile({3, 1, 1}, 64, [=](std::int64_t, std::int64_t) { return height; });
+    return WaterTile({3, 1, 1}, 64, [=](std::int64_t, std::int64_t) { return height; });
   };
   EXPECT_EQ(Shortest(SeaLevelMask(flat(0).view, 0)), WaterMask{255});
   EXPECT_EQ(Shortest(SeaLevelMask(flat(0.0009765625f).view, 0)), WaterMask{0});
@@ -56,7 +56,7 @@ TEST(SeaLevelMask, ACoastIsWaterByItsShare) {
   // Heights rise to the east and pass 0 in the middle of pixel 100, whatever the lattice.
   for (const int cells : {32, 64, 128, 256}) {
     const double column_of_coast = 100.5 * cells / 256;
-    const Tile tile({2, 0, 0}, cells, [=](std::int64_t column, std::int64_t) {
+    const WaterTile tile({2, 0, 0}, cells, [=](std::int64_t column, std::int64_t) {
       return static_cast<float>(static_cast<double>(column) - column_of_coast);
     });
     const WaterMask mask = SeaLevelMask(tile.view, 0);
@@ -71,7 +71,7 @@ TEST(SeaLevelMask, IsAFunctionOfTheGlobalPosition) {
   const auto waves = [](std::int64_t column, std::int64_t row) {
     return static_cast<float>(static_cast<int>((column * 7 + row * 13) % 32) - 16);  // repeats every 32 columns
   };
-  const Tile tile({6, 40, 20}, 128, waves), east({6, 41, 20}, 128, waves);
+  const WaterTile tile({6, 40, 20}, 128, waves), east({6, 41, 20}, 128, waves);
   EXPECT_EQ(SeaLevelMask(tile.view, 0), SeaLevelMask(east.view, 0));
 }
 
