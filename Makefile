@@ -10,7 +10,7 @@ SOURCES = git ls-files '*.h' '*.cc'
 TERRACE = build/release/server/cli/terrace
 
 .DEFAULT_GOAL := help
-.PHONY: help deps test-deps build run test coverage reliability reliability-long bench paper format lint clean
+.PHONY: help deps test-deps build run test sanitize coverage reliability reliability-long bench paper format lint clean
 
 help:  ## list these targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-16s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -29,8 +29,11 @@ run: build  ## build, then serve the sample data (LISTEN=HOST:PORT, CONFIG=FILE)
 	@echo "Open the address below in a browser. Ctrl-C ends the server."
 	@exec $(TERRACE) serve --config $(CONFIG) $(if $(LISTEN),--listen $(LISTEN))
 
-test: test-deps  ## build and run every test, then the unit tests under ASan + UBSan and TSan
-	@tools/run_tests.py --jobs $(JOBS)
+test: test-deps  ## build and run every test
+	@tools/run_tests.py release --jobs $(JOBS)
+
+sanitize: test-deps  ## the unit tests under ASan + UBSan, and those with threads under TSan
+	@tools/run_tests.py asan tsan --jobs $(JOBS)
 
 coverage: test-deps  ## build with counters, run the tests, print which lines of each room they run
 	@tools/run_coverage.py --missed --jobs $(JOBS)
@@ -54,8 +57,8 @@ paper: test-deps  ## repeat the experiments of the paper (docs/engine.md) into b
 format:  ## format the C++ sources
 	$(SOURCES) | xargs clang-format-14 -i
 
-lint:  ## layers, self-contained headers, formatting, clang-tidy where installed
-	@tools/lint.sh
+lint: test-deps  ## layers, leftovers, formatting, self-contained headers, clang-tidy
+	@tools/lint.sh $(JOBS)
 
 clean:  ## remove everything that was built
 	rm -rf build

@@ -4,8 +4,8 @@
     tools/run_tests.py [--jobs N] [SUITE ...]     suites: release asan tsan; default: all three, in this order
 
 A sanitizer suite takes tests that are executables of the build, and builds only these: `asan` all but those labelled
-`slow`, `tsan` those labelled `threads`, which are about what several threads do at once. The last line says `N passed, N failed`, counted from ctest's own reports; a test that could not be built or found
-counts as failed. Exit status 0 only if everything was built and nothing failed.
+`slow`, `tsan` those labelled `threads`, which are about what several threads do at once. The last line says
+`N passed, N failed`, counted from ctest's own reports; a test that could not be built or found counts as failed. Exit status 0 only if everything was built and nothing failed.
 """
 import argparse
 import dataclasses
@@ -107,7 +107,8 @@ def run_suite(suite, jobs):
     build_command = ["ninja", "-C", str(build), "-j", str(jobs), "-k", "0"]
     report = build / "ctest.xml"
     report.unlink(missing_ok=True)
-    ctest = ["ctest", "--test-dir", str(build), "--output-on-failure", "--no-tests=error", "-j", str(jobs),
+    # Many tests wait for a server or a clock most of the time. Those that need all processors run alone.
+    ctest = ["ctest", "--test-dir", str(build), "--output-on-failure", "--no-tests=error", "-j", str(2 * jobs),
              "--output-junit", str(report)]
     if suite.choice:
         tests = programs_of(build, suite.choice)
