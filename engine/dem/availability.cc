@@ -45,11 +45,6 @@ std::vector<Ranges> AvailableTiles(std::span<const Reach> sources) {
     Ranges& those = worth[static_cast<std::size_t>(source.depth)];
     those.insert(those.end(), tiles.begin(), tiles.end());
   }
-  Ranges all;
-  for (Ranges& those : worth) {
-    those = geo::Disjoint(std::move(those));
-    all = Merged(std::move(all), those);
-  }
   Ranges wanted;  // of the deepest level: of sources worth the level at hand
   for (int level = deepest; level > 0; --level) {
     const int up = deepest - level;
@@ -57,8 +52,7 @@ std::vector<Ranges> AvailableTiles(std::span<const Reach> sources) {
     wanted = Merged(std::move(wanted), worth[static_cast<std::size_t>(level)]);
     here = Up(wanted, up);
     if (level < deepest) here = Merged(std::move(here), Up(levels[static_cast<std::size_t>(level) + 1], 1));
-    const Ranges families = geo::Intersection(Down(Up(here, 1), 1), Up(all, up));
-    here = Merged(std::move(here), families);
+    here = Down(Up(here, 1), 1);
     for (int coarser = 1; here.size() > kMostBlocks && coarser <= level; ++coarser) {
       here = geo::Disjoint(Down(Up(here, coarser), coarser));
     }

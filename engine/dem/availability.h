@@ -18,9 +18,8 @@ struct Reach {
 // Per level 0 .. the deepest: blocks without overlap, sorted by row, then column, that hold
 // - every tile that a source touches which is worth this level;
 // - every ancestor of such a tile, and both roots;
-// - of the children of a tile that has any, all that touch a source at all: clients of 3D Tiles drop the parent for its
-//   children, and a missing one would be a hole.
-// A level of more blocks than its description may grow to is made of larger ones, with tiles outside all sources.
+// - all four children of a tile that has any: 3D Tiles clients replace a tile by its children, so a missing child is a
+// hole. A level of more blocks than its description may grow to is made of larger ones, with tiles outside all sources.
 // Precondition: not empty.
 std::vector<std::vector<geo::TileRange>> AvailableTiles(std::span<const Reach> sources);
 

@@ -65,17 +65,6 @@ std::vector<TileRange> Disjoint(std::vector<TileRange> ranges) {
   return cover;
 }
 
-std::vector<TileRange> Intersection(const std::vector<TileRange>& a, const std::vector<TileRange>& b) {
-  std::vector<TileRange> common;
-  for (const TileRange& here : a) {
-    for (const TileRange& there : b) {
-      if (there.start_y > here.end_y) break;
-      if (const TileRange both = Common(here, there); !IsEmpty(both)) common.push_back(both);
-    }
-  }
-  return Disjoint(std::move(common));
-}
-
 TileRange Hull(const TileRange& a, const TileRange& b) {
   return {std::min(a.start_x, b.start_x), std::min(a.start_y, b.start_y), std::max(a.end_x, b.end_x),
           std::max(a.end_y, b.end_y)};

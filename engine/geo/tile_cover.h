@@ -11,9 +11,6 @@ namespace terrace::geo {
 // is one rectangle, and so is what lies on top of each other with the same columns.
 std::vector<TileRange> Disjoint(std::vector<TileRange> ranges);
 
-// What lies in both, as above. Preconditions: both are without overlap and sorted by start_y.
-std::vector<TileRange> Intersection(const std::vector<TileRange>& a, const std::vector<TileRange>& b);
-
 // The smallest range that holds both ranges.
 TileRange Hull(const TileRange& a, const TileRange& b);
 

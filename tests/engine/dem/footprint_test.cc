@@ -5,7 +5,7 @@
 namespace terrace::dem {
 namespace {
 
-// Laws of availability: both roots; every ancestor of an available tile; no overlaps.
+// Laws of availability: both roots; every ancestor of an available tile; four children or none; no overlaps.
 void ExpectLawful(const DemSource& source) {
   EXPECT_TRUE(source.IsAvailable({0, 0, 0}) && source.IsAvailable({0, 1, 0}));
   EXPECT_TRUE(source.Available(source.max_level() + 1).empty());
@@ -15,6 +15,10 @@ void ExpectLawful(const DemSource& source) {
            {geo::TileKey{level, range.start_x, range.start_y}, {level, range.end_x, range.end_y}}) {
         EXPECT_TRUE(geo::IsValid(corner));
         EXPECT_TRUE(source.IsAvailable({level - 1, corner.x / 2, corner.y / 2}));
+        // 3D Tiles clients replace a tile by its children: a missing one is a hole.
+        for (const std::int64_t child : {0, 1, 2, 3}) {
+          EXPECT_TRUE(source.IsAvailable({level, corner.x / 2 * 2 + child % 2, corner.y / 2 * 2 + child / 2}));
+        }
         EXPECT_EQ(std::ranges::count_if(source.Available(level), [&](const auto& r) { return r.Contains(corner); }), 1);
       }
     }
@@ -39,7 +43,7 @@ TEST(Footprint, CrossesTheAntimeridianInTwoRanges) {
   EXPECT_NEAR(bounds.west, 159.7917, 1e-3);
   EXPECT_NEAR(bounds.east, -139.7917, 1e-3);
   // Level 4: tiles of 11.25 degrees.
-  EXPECT_EQ(source->Available(4), (std::vector<geo::TileRange>{{0, 8, 3, 12}, {30, 8, 31, 12}}));
+  EXPECT_EQ(source->Available(4), (std::vector<geo::TileRange>{{0, 8, 3, 13}, {30, 8, 31, 13}}));
 }
 
 TEST(Footprint, OfAGlobalSourceIsTheWholeEarth) {

@@ -273,11 +273,6 @@ TEST(Mosaic, DeepTilesLieOnlyWhereAFineSourceDoes) {
       for (std::int64_t y = range.start_y; y <= std::min(range.end_y, range.start_y + 40); ++y) {
         for (std::int64_t x = range.start_x; x <= std::min(range.end_x, range.start_x + 40); ++x) {
           EXPECT_TRUE(source->IsAvailable({level - 1, x / 2, y / 2}));
-          // Deeper than the base is worth whole families: a missing child would be a hole.
-          if (level <= alone->max_level()) continue;
-          for (const std::int64_t child : {0, 1, 2, 3}) {
-            EXPECT_TRUE(source->IsAvailable({level, x / 2 * 2 + child % 2, y / 2 * 2 + child / 2})) << level;
-          }
         }
       }
     }
@@ -290,6 +285,28 @@ TEST(Mosaic, DeepTilesLieOnlyWhereAFineSourceDoes) {
     }
   }
   EXPECT_FALSE(source->IsAvailable({source->max_level(), 5, 5}));
+}
+
+// 3D Tiles clients replace a tile by its children: a missing one is a hole.
+TEST(Mosaic, ATileHasFourChildrenOrNoneWhereACellIsMissing) {
+  const TempDir dir;
+  std::vector<DemFile> files;
+  for (const auto& [west, north] : {std::pair(10, 50), {11, 50}, {10, 51}}) {  // three of four cells
+    files.push_back({WriteRaster(dir, Flat(west, north, 100, 0.01, 5), std::to_string(west + 100 * north) + ".tif")});
+  }
+  const auto source = OpenOrFail(files);
+  ASSERT_NE(source, nullptr);
+  for (int level = 1; level <= source->max_level(); ++level) {
+    for (const geo::TileRange& range : source->Available(level)) {
+      for (std::int64_t y = range.start_y; y <= range.end_y; ++y) {
+        for (std::int64_t x = range.start_x; x <= range.end_x; ++x) {
+          for (const std::int64_t child : {0, 1, 2, 3}) {
+            ASSERT_TRUE(source->IsAvailable({level, x / 2 * 2 + child % 2, y / 2 * 2 + child / 2})) << level;
+          }
+        }
+      }
+    }
+  }
 }
 
 TEST(Mosaic, DescriptionOfManyScatteredSourcesStaysSmall) {

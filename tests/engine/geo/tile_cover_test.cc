@@ -54,17 +54,5 @@ TEST(TileCover, JoinsWhatLiesSideBySideOrOnTop) {
   EXPECT_TRUE(Disjoint({{0, 0, -1, 5}}).empty());
 }
 
-TEST(TileCover, IntersectsCellByCell) {
-  std::mt19937 random(2);
-  for (int round = 0; round < 200; ++round) {
-    const auto a = Disjoint(Drawn(random, 6)), b = Disjoint(Drawn(random, 6));
-    std::set<Cell> expected;
-    std::ranges::set_intersection(CellsOf(a), CellsOf(b), std::inserter(expected, expected.end()));
-    const std::vector<TileRange> both = Intersection(a, b);
-    ASSERT_EQ(CellsOf(both), expected);
-    ASSERT_EQ(Count(both), static_cast<std::int64_t>(expected.size()));
-  }
-}
-
 }  // namespace
 }  // namespace terrace::geo
