@@ -2,8 +2,11 @@
 
 #include <brotli/encode.h>
 #include <libdeflate.h>
+#include <zlib.h>
 #include <zstd.h>
 
+#include <algorithm>
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <new>
@@ -30,29 +33,92 @@ std::string CompressWith(Bound bound, Compress compress, std::string_view bytes,
   return out;
 }
 
+// Hands `bytes` on in pieces of kCompressedAtOnce; `take` is told which is the last one. False: a stop was requested.
+bool InPieces(std::string_view bytes, const std::stop_token& stop, const auto& take) {
+  do {
+    if (stop.stop_requested()) return false;
+    const std::string_view piece = bytes.substr(0, kCompressedAtOnce);
+    bytes.remove_prefix(piece.size());
+    take(piece, bytes.empty());
+  } while (!bytes.empty());
+  return true;
+}
+
+std::string GzipByZlib(std::string_view bytes, int level, const std::stop_token& stop) {
+  constexpr int kGzipHeader = 16, kMemory = 8, kMaxLevel = 9;
+  z_stream stream{};
+  if (::deflateInit2(&stream, std::min(level, kMaxLevel), Z_DEFLATED, kGzipHeader + MAX_WBITS, kMemory,
+                     Z_DEFAULT_STRATEGY) != Z_OK) {
+    throw std::bad_alloc();  // levels are those that there are
+  }
+  const std::unique_ptr<z_stream, int (*)(z_stream*)> owner(&stream, ::deflateEnd);
+  std::string out;
+  const bool is_done = InPieces(bytes, stop, [&](std::string_view piece, bool is_last) {
+    stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(piece.data()));
+    stream.avail_in = static_cast<uInt>(piece.size());
+    do {
+      std::array<char, 1 << 16> part;
+      stream.next_out = reinterpret_cast<Bytef*>(part.data());
+      stream.avail_out = part.size();
+      TERRACE_CHECK(::deflate(&stream, is_last ? Z_FINISH : Z_NO_FLUSH) != Z_STREAM_ERROR);
+      out.append(part.data(), part.size() - stream.avail_out);
+    } while (stream.avail_out == 0);
+  });
+  return is_done ? out : "";
+}
+
 }  // namespace
 
-std::string Gzip(std::string_view bytes, int level) {
+std::string Gzip(std::string_view bytes, int level, const std::stop_token& stop) {
+  if (stop.stop_requested()) return {};
+  if (bytes.size() > kCompressedAtOnce) return GzipByZlib(bytes, level, stop);
   return CompressWith(libdeflate_gzip_compress_bound, libdeflate_gzip_compress, bytes, level);
 }
 
-std::string Brotli(std::string_view bytes, int quality) {
-  std::size_t size = BrotliEncoderMaxCompressedSize(bytes.size());
-  TERRACE_CHECK(size > 0);  // zero only beyond 2^63
-  std::string out(size, '\0');
-  const auto done = BrotliEncoderCompress(quality, BROTLI_DEFAULT_WINDOW, BROTLI_MODE_GENERIC, bytes.size(),
-                                          reinterpret_cast<const std::uint8_t*>(bytes.data()), &size,
-                                          reinterpret_cast<std::uint8_t*>(out.data()));
-  if (done != BROTLI_TRUE) throw std::bad_alloc();  // the bound is never too small
-  out.resize(size);
+// The same bytes as of BrotliEncoderCompress: its blocks do not depend on how the text is cut.
+std::string Brotli(std::string_view bytes, int quality, const std::stop_token& stop) {
+  if (bytes.empty()) return "\x06";
+  const std::unique_ptr<BrotliEncoderState, void (*)(BrotliEncoderState*)> encoder(
+      BrotliEncoderCreateInstance(nullptr, nullptr, nullptr), BrotliEncoderDestroyInstance);
+  if (encoder == nullptr) throw std::bad_alloc();
+  BrotliEncoderSetParameter(encoder.get(), BROTLI_PARAM_QUALITY, static_cast<std::uint32_t>(quality));
+  BrotliEncoderSetParameter(encoder.get(), BROTLI_PARAM_SIZE_HINT,
+                            static_cast<std::uint32_t>(std::min<std::size_t>(bytes.size(), 1 << 30)));
+  std::string out(BrotliEncoderMaxCompressedSize(bytes.size()), '\0');
+  std::size_t room = out.size();
+  auto* to = reinterpret_cast<std::uint8_t*>(out.data());
+  const bool is_done = InPieces(bytes, stop, [&](std::string_view piece, bool is_last) {
+    std::size_t left = piece.size();
+    const auto* from = reinterpret_cast<const std::uint8_t*>(piece.data());
+    const auto operation = is_last ? BROTLI_OPERATION_FINISH : BROTLI_OPERATION_PROCESS;
+    const auto taken = BrotliEncoderCompressStream(encoder.get(), operation, &left, &from, &room, &to, nullptr);
+    if (taken != BROTLI_TRUE) throw std::bad_alloc();
+    TERRACE_CHECK(left == 0);  // the bound is never too small
+  });
+  if (!is_done) return {};
+  TERRACE_CHECK(BrotliEncoderIsFinished(encoder.get()) == BROTLI_TRUE);
+  out.resize(out.size() - room);
   return out;
 }
 
-std::string Zstd(std::string_view bytes, int level) {
+std::string Zstd(std::string_view bytes, int level, const std::stop_token& stop) {
+  const std::unique_ptr<ZSTD_CCtx, std::size_t (*)(ZSTD_CCtx*)> context(ZSTD_createCCtx(), ZSTD_freeCCtx);
+  if (context == nullptr) throw std::bad_alloc();
+  ZSTD_CCtx_setParameter(context.get(), ZSTD_c_compressionLevel, level);
+  ZSTD_CCtx_setPledgedSrcSize(context.get(), bytes.size());
   std::string out(ZSTD_compressBound(bytes.size()), '\0');
-  const std::size_t size = ZSTD_compress(out.data(), out.size(), bytes.data(), bytes.size(), level);
-  if (ZSTD_isError(size) != 0) throw std::bad_alloc();  // the bound is never too small
-  out.resize(size);
+  ZSTD_outBuffer to{out.data(), out.size(), 0};
+  const bool is_done = InPieces(bytes, stop, [&](std::string_view piece, bool is_last) {
+    ZSTD_inBuffer from{piece.data(), piece.size(), 0};
+    const auto mode = is_last ? ZSTD_e_end : ZSTD_e_continue;
+    std::size_t left = 0;
+    do {
+      left = ZSTD_compressStream2(context.get(), &to, &from, mode);
+      if (ZSTD_isError(left) != 0) throw std::bad_alloc();  // the bound is never too small
+    } while (from.pos < from.size || (is_last && left > 0));
+  });
+  if (!is_done) return {};
+  out.resize(to.pos);
   return out;
 }
 

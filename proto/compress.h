@@ -1,23 +1,35 @@
 // Deterministic compression of response bodies and of what lies inside them.
+//
+// Up to kCompressedAtOnce bytes are compressed in one go. Of more the stop token is asked before each
+// kCompressedAtOnce: a function returns nothing, the empty text, once a stop was requested.
 #pragma once
 
+#include <cstddef>
+#include <stop_token>
 #include <string>
 #include <string_view>
 
 namespace terrace::proto {
 
-// RFC 1952 gzip with libdeflate: no time stamp, no name, so that equal bytes compress to equal bytes.
-// Thread-safe. Precondition: 0 <= level <= 12; 0 stores, 12 is slowest and smallest.
-std::string Gzip(std::string_view bytes, int level = 6);
+// Defaults: a tenth of a tile's build, and most of what there is to save.
+inline constexpr int kGzipLevel = 6, kBrotliQuality = 4, kZstdLevel = 6;
 
-// RFC 7932 brotli. Thread-safe. Precondition: 0 <= quality <= 11. From 5 on it takes twice the time of 4 and saves a
+// Ten milliseconds' worth.
+inline constexpr std::size_t kCompressedAtOnce = std::size_t{1} << 20;
+
+// RFC 1952 gzip, one member: no time stamp, no name, so that equal bytes compress to equal bytes. By libdeflate up to
+// kCompressedAtOnce bytes, as it takes a text as a whole, by zlib above. Thread-safe. Precondition: 0 <= level <= 12;
+// 0 stores, 12 is slowest and smallest (zlib ends at 9).
+std::string Gzip(std::string_view bytes, int level = kGzipLevel, const std::stop_token& stop = {});
+
+// RFC 7932 brotli. Thread-safe. Precondition: 2 <= quality <= 9. From 5 on it takes twice the time of 4 and saves a
 // thousandth.
-std::string Brotli(std::string_view bytes, int quality = 4);
+std::string Brotli(std::string_view bytes, int quality = kBrotliQuality, const std::stop_token& stop = {});
 
 // RFC 8878 zstd, one frame, without a checksum. Thread-safe. Precondition: 1 <= level <= 19.
-std::string Zstd(std::string_view bytes, int level = 6);
+std::string Zstd(std::string_view bytes, int level = kZstdLevel, const std::stop_token& stop = {});
 
-// RFC 1950 zlib, as PNG holds it, on the same terms.
+// RFC 1950 zlib, as PNG holds it: by libdeflate, in one go. Thread-safe. Precondition: as of Gzip.
 std::string Zlib(std::string_view bytes, int level = 6);
 
 }  // namespace terrace::proto

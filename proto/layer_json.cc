@@ -1,6 +1,11 @@
 #include "proto/layer_json.h"
 
+#include <fmt/format.h>
+
+#include <cstddef>
+#include <iterator>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "engine/core/check.h"
 
@@ -9,17 +14,27 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json Available(const std::vector<std::vector<geo::TileRange>>& levels) {
-  Json json = Json::array();
+// Ranges between two looks at the stop token: a tenth of a millisecond's worth.
+constexpr std::size_t kStopPeriod = 1024;
+
+// Of a mosaic of scattered sources there are megabytes: they are written without a tree of them. False: a stop was
+// requested.
+bool AppendAvailable(const std::vector<std::vector<geo::TileRange>>& levels, const std::stop_token& stop,
+                     std::string& json) {
+  std::size_t count = 0;
+  const char* before_level = "[";
   for (const std::vector<geo::TileRange>& ranges : levels) {
-    Json level = Json::array();
+    json.append(std::exchange(before_level, ",")).append("[");
+    const char* before = "";
     for (const geo::TileRange& range : ranges) {
-      level.push_back(
-          {{"startX", range.start_x}, {"startY", range.start_y}, {"endX", range.end_x}, {"endY", range.end_y}});
+      if (count++ % kStopPeriod == 0 && stop.stop_requested()) return false;
+      fmt::format_to(std::back_inserter(json), R"({}{{"startX":{},"startY":{},"endX":{},"endY":{}}})",
+                     std::exchange(before, ","), range.start_x, range.start_y, range.end_x, range.end_y);
     }
-    json.push_back(std::move(level));
+    json += ']';
   }
-  return json;
+  json += ']';
+  return true;
 }
 
 Json Bounds(const LayerDescription& layer) {
@@ -30,7 +45,7 @@ Json Bounds(const LayerDescription& layer) {
 
 }  // namespace
 
-std::string EncodeLayerJson(const LayerDescription& layer) {
+std::string EncodeLayerJson(const LayerDescription& layer, const std::stop_token& stop) {
   TERRACE_CHECK(!layer.available.empty());
   // One template only: cesium-native and 3DTilesRendererJS read no other than the first.
   std::string tile_template = "{z}/{x}/{y}.terrain?v={version}";
@@ -54,9 +69,12 @@ std::string EncodeLayerJson(const LayerDescription& layer) {
     json["extensions"].push_back("metadata");
     json["metadataAvailability"] = layer.metadata_levels;
   }
-  json["available"] = Available(layer.available);
   // Names and attributions come from files: bytes that are not UTF-8 become U+FFFD instead of an exception.
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+  std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace);
+  text.back() = ',';  // instead of the end of the object
+  text += R"("available":)";
+  if (!AppendAvailable(layer.available, stop, text)) return {};
+  return text + '}';
 }
 
 }  // namespace terrace::proto

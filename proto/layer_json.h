@@ -1,6 +1,7 @@
 // layer.json: what CesiumJS, cesium-native and 3DTilesRendererJS read before the first tile.
 #pragma once
 
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -23,7 +24,7 @@ struct LayerDescription {
 
 // UTF-8 JSON. `available` must be complete: from both roots down, every ancestor of an available tile included. It is
 // written whatever `metadata_levels` is: CesiumJS and cesium-native then ignore it for the metadata of tiles, others
-// read nothing else. Precondition: available is not empty.
-std::string EncodeLayerJson(const LayerDescription& layer);
+// read nothing else. Empty: a stop was requested. Precondition: available is not empty.
+std::string EncodeLayerJson(const LayerDescription& layer, const std::stop_token& stop = {});
 
 }  // namespace terrace::proto

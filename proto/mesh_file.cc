@@ -41,15 +41,30 @@ class BufferedText {
   fmt::memory_buffer buffer_;
 };
 
+// Asks the stop token at every so many vertices or triangles: a tenth of a millisecond's worth.
+class StopPoll {
+ public:
+  explicit StopPoll(const std::stop_token& stop) : stop_(stop) {}
+
+  bool IsStopped() { return ++count_ % kPeriod == 0 && stop_.stop_requested(); }
+
+ private:
+  static constexpr std::size_t kPeriod = 1024;
+
+  const std::stop_token& stop_;
+  std::size_t count_ = 0;
+};
+
 void Write(std::ostream& out, const std::string& bytes) {
   out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
 }
 
 void WriteObj(std::ostream& out, const std::vector<MeshVertex>& vertices, const std::vector<Triangle>& triangles,
-              const std::vector<VertexColor>& colors) {
+              const std::vector<VertexColor>& colors, StopPoll poll) {
   BufferedText text(out);
   text.Append("# terrace: {} vertices, {} triangles\n", vertices.size(), triangles.size());
   for (std::size_t i = 0; i < vertices.size(); ++i) {
+    if (poll.IsStopped()) return;
     const MeshVertex& v = vertices[i];
     text.Append("v {} {} {}", v.x, v.y, v.z);
     if (!colors.empty()) {
@@ -58,12 +73,13 @@ void WriteObj(std::ostream& out, const std::vector<MeshVertex>& vertices, const 
     text.Append("\n");
   }
   for (const Triangle& t : triangles) {  // OBJ counts from 1
+    if (poll.IsStopped()) return;
     text.Append("f {} {} {}\n", t[0] + std::uint64_t{1}, t[1] + std::uint64_t{1}, t[2] + std::uint64_t{1});
   }
 }
 
 void WritePly(std::ostream& out, const std::vector<MeshVertex>& vertices, const std::vector<Triangle>& triangles,
-              const std::vector<VertexColor>& colors) {
+              const std::vector<VertexColor>& colors, StopPoll poll) {
   const std::string_view color_properties =
       colors.empty() ? "" : "property uchar red\nproperty uchar green\nproperty uchar blue\n";
   Write(out, fmt::format("ply\nformat binary_little_endian 1.0\ncomment terrace\nelement vertex {}\nproperty double x\n"
@@ -75,6 +91,7 @@ void WritePly(std::ostream& out, const std::vector<MeshVertex>& vertices, const 
     if (always || block.size() >= kFlushBytes) Write(out, block.Take());
   };
   for (std::size_t i = 0; i < vertices.size(); ++i) {
+    if (poll.IsStopped()) return;
     const MeshVertex& v = vertices[i];
     block.Put(v.x);
     block.Put(v.y);
@@ -85,6 +102,7 @@ void WritePly(std::ostream& out, const std::vector<MeshVertex>& vertices, const 
     flush(false);
   }
   for (const Triangle& t : triangles) {
+    if (poll.IsStopped()) return;
     block.Put(std::uint8_t{3});
     for (std::uint32_t index : t) block.Put(static_cast<std::int32_t>(index));
     flush(false);
@@ -185,15 +203,18 @@ std::array<std::uint16_t, 256> LinearLevels() {
   return levels;
 }
 
+// Empty: a stop was requested.
 std::string GlbBuffer(const GlbLayout& layout, const std::vector<MeshVertex>& vertices,
-                      const std::vector<Triangle>& triangles, const std::vector<VertexColor>& colors) {
+                      const std::vector<Triangle>& triangles, const std::vector<VertexColor>& colors, StopPoll poll) {
   ByteWriter buffer;
   buffer.Reserve(layout.buffer_bytes());
   for (const MeshVertex& vertex : vertices) {
+    if (poll.IsStopped()) return {};
     const Vec3d p = YUp(vertex);
     for (std::size_t i = 0; i < 3; ++i) buffer.Put(static_cast<float>(p[i] - layout.center[i]));
   }
   for (const Triangle& triangle : triangles) {
+    if (poll.IsStopped()) return {};
     for (std::uint32_t index : triangle) {
       if (layout.wide()) {
         buffer.Put(index);
@@ -212,7 +233,7 @@ std::string GlbBuffer(const GlbLayout& layout, const std::vector<MeshVertex>& ve
 }
 
 Result<void> WriteGlb(std::ostream& out, const std::vector<MeshVertex>& vertices,
-                      const std::vector<Triangle>& triangles, const std::vector<VertexColor>& colors) {
+                      const std::vector<Triangle>& triangles, const std::vector<VertexColor>& colors, StopPoll poll) {
   const GlbLayout layout = MakeGlbLayout(vertices, 3 * triangles.size(), !colors.empty());
   const std::string head = GlbHead(GltfJson(GltfOf(layout)), layout.buffer_bytes());
   if (head.empty()) {
@@ -220,8 +241,10 @@ Result<void> WriteGlb(std::ostream& out, const std::vector<MeshVertex>& vertices
                      "a .glb file holds 4 GiB and this mesh needs more than {} bytes; write .ply",
                      layout.buffer_bytes());
   }
+  const std::string buffer = GlbBuffer(layout, vertices, triangles, colors, poll);
+  if (buffer.empty()) return {};
   Write(out, head);
-  Write(out, GlbBuffer(layout, vertices, triangles, colors));
+  Write(out, buffer);
   return {};
 }
 
@@ -260,22 +283,24 @@ Result<MeshFileFormat> MeshFileFormatOf(std::string_view file_name) {
 }
 
 Result<void> WriteMesh(std::ostream& out, MeshFileFormat format, const std::vector<MeshVertex>& vertices,
-                       const std::vector<Triangle>& triangles, const std::vector<VertexColor>& colors) {
+                       const std::vector<Triangle>& triangles, const std::vector<VertexColor>& colors,
+                       const std::stop_token& stop) {
   TERRACE_CHECK(colors.empty() || colors.size() == vertices.size());
   if (Result<void> checked = CheckMesh(vertices, triangles); !checked) return checked;
   Result<void> written;
   switch (format) {
     case MeshFileFormat::kObj:
-      WriteObj(out, vertices, triangles, colors);
+      WriteObj(out, vertices, triangles, colors, StopPoll(stop));
       break;
     case MeshFileFormat::kPly:
-      WritePly(out, vertices, triangles, colors);
+      WritePly(out, vertices, triangles, colors, StopPoll(stop));
       break;
     case MeshFileFormat::kGlb:
-      written = WriteGlb(out, vertices, triangles, colors);
+      written = WriteGlb(out, vertices, triangles, colors, StopPoll(stop));
       break;
   }
   out.flush();
+  if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the mesh any more");
   if (written && !out) return MakeError(ErrorCode::kUnavailable, "writing the mesh failed; is the disk full?");
   return written;
 }

@@ -14,6 +14,7 @@
 #include <array>
 #include <cstdint>
 #include <ostream>
+#include <stop_token>
 #include <string_view>
 #include <vector>
 
@@ -35,9 +36,10 @@ using VertexColor = std::array<std::uint8_t, 3>;
 
 // Appends the whole file to `out`, which must be in binary mode. kInvalidArgument: a mesh without triangles, a
 // coordinate that is not finite, or more than the format can hold; nothing is written then. kUnavailable: `out` failed,
-// a full disk. Preconditions: every index is below vertices.size(); `colors` is empty or has one entry a vertex.
+// a full disk. kCancelled: a stop was requested; part of the file may be written. Preconditions: every index is below
+// vertices.size(); `colors` is empty or has one entry a vertex.
 Result<void> WriteMesh(std::ostream& out, MeshFileFormat format, const std::vector<MeshVertex>& vertices,
                        const std::vector<std::array<std::uint32_t, 3>>& triangles,
-                       const std::vector<VertexColor>& colors = {});
+                       const std::vector<VertexColor>& colors = {}, const std::stop_token& stop = {});
 
 }  // namespace terrace::proto

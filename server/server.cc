@@ -178,6 +178,8 @@ class Server::Impl {
     edge_->connections.Drain();
     const bool drained = edge_->connections.WaitUntilEmpty(options_.drain_timeout);
     tiles_.CancelBuilds();
+    // What stopping may take beyond the drain timeout is not for the disk.
+    if (!drained && options_.disk_cache) options_.disk_cache->Abandon();
     if (!drained && !edge_->connections.WaitUntilEmpty(kLastWords)) {
       spdlog::warn("{} connections are cut off: the drain timeout has passed", edge_->connections.size());
       edge_->connections.AbortAll();

@@ -12,15 +12,15 @@ root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 build_packages=(
   g++ cmake ninja-build make git pkg-config ccache ca-certificates gzip python3
   libgdal-dev libproj-dev gdal-bin nlohmann-json3-dev libspdlog-dev libfmt-dev libexpected-dev libcli11-dev prometheus-cpp-dev
-  libssl-dev libdeflate-dev libbrotli-dev libzstd-dev libxxhash-dev libhwy-dev libdraco-dev libmeshoptimizer-dev
+  libssl-dev libdeflate-dev zlib1g-dev libbrotli-dev libzstd-dev libxxhash-dev libhwy-dev libdraco-dev libmeshoptimizer-dev
   libjpeg62-turbo-dev libwebp-dev librocksdb-dev libsystemd-dev
 )
 runtime_packages=(
-  ca-certificates libgdal32 libproj25 libspdlog1.10 libfmt9 libprometheus-cpp-core1.0 libssl3 libdeflate0 libbrotli1 libzstd1
+  ca-certificates libgdal32 libproj25 libspdlog1.10 libfmt9 libprometheus-cpp-core1.0 libssl3 libdeflate0 zlib1g libbrotli1 libzstd1
   libxxhash0 librocksdb7.8 libhwy1 libdraco7 libmeshoptimizer2d libjpeg62-turbo libwebp7 libsystemd0
 )
 test_packages=(
-  libgtest-dev libgmock-dev libbenchmark-dev zlib1g-dev libpng-dev chromium python3-jsonschema strace wrk proj-bin
+  libgtest-dev libgmock-dev libbenchmark-dev libpng-dev chromium python3-jsonschema strace wrk proj-bin
   clang-14 libclang-rt-14-dev llvm-14 clang-format-14 clang-tidy-14 nginx-light curl openssl faketime pyflakes3
 )
 

@@ -147,9 +147,10 @@ asio::awaitable<Response> AreaHandler::Handle(Route route, Request request) cons
 
   SingleFlight::Work work = [catalog = catalog_, index = *dataset, area = *area, plan = *plan,
                              coding](std::stop_token stop) -> Result<EncodedTile> {
-    Result<EncodedTile> mesh = catalog->area_mesher.build(index, plan, area, std::move(stop));
+    Result<EncodedTile> mesh = catalog->area_mesher.build(index, plan, area, stop);
     if (!mesh || coding == Coding::kIdentity) return mesh;
-    mesh->bytes = Compress(std::move(mesh->bytes), coding);
+    mesh->bytes = Compress(std::move(mesh->bytes), coding, stop);
+    if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the mesh any more");
     return mesh;
   };
   const auto deadline = TileService::Clock::now() + options_.deadline;

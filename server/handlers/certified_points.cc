@@ -18,9 +18,11 @@ geo::TileKey TileAt(const dem::GeoPosition& point, int level) {
 
 }  // namespace
 
-Result<CertifiedPoints> TilesOf(const DatasetView& dataset, std::span<const dem::GeoPosition> points, int deepest) {
+Result<CertifiedPoints> TilesOf(const DatasetView& dataset, std::span<const dem::GeoPosition> points, int deepest,
+                                const std::stop_token& stop) {
   CertifiedPoints certified;
   for (const dem::GeoPosition& point : points) {
+    if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the tiles any more");
     int level = std::min(deepest, dataset.max_level());
     geo::TileKey key = TileAt(point, level);
     while (level > 0 && !IsAvailable(dataset, key)) key = TileAt(point, --level);

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <optional>
 #include <span>
+#include <stop_token>
 #include <vector>
 
 #include "engine/core/result.h"
@@ -23,7 +24,8 @@ struct CertifiedPoints {
 };
 
 // Of each point the deepest tile that there is, down to `deepest`. kInvalidArgument, with a message for the client:
-// more than kMostCertifiedTiles.
-Result<CertifiedPoints> TilesOf(const DatasetView& dataset, std::span<const dem::GeoPosition> points, int deepest);
+// more than kMostCertifiedTiles. kCancelled: a stop was requested.
+Result<CertifiedPoints> TilesOf(const DatasetView& dataset, std::span<const dem::GeoPosition> points, int deepest,
+                                const std::stop_token& stop = {});
 
 }  // namespace terrace::server

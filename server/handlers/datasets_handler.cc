@@ -46,10 +46,11 @@ std::string PercentEncode(std::string_view name) {
   return encoded;
 }
 
-std::string DatasetsJson(std::span<const DatasetView> datasets, const IsSeen& is_seen) {
+std::string DatasetsJson(std::span<const DatasetView> datasets, const IsSeen& is_seen, const std::stop_token& stop) {
   using Json = nlohmann::ordered_json;
   Json list = Json::array();
   for (const DatasetView& dataset : datasets) {
+    if (stop.stop_requested()) return {};
     if (!is_seen(dataset)) continue;
     const std::string base = fmt::format("/{}", PercentEncode(dataset.name));
     Json entry;
@@ -75,9 +76,10 @@ std::string DatasetsJson(std::span<const DatasetView> datasets, const IsSeen& is
   return document.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
-std::string IndexHtml(std::span<const DatasetView> datasets, const IsSeen& is_seen) {
+std::string IndexHtml(std::span<const DatasetView> datasets, const IsSeen& is_seen, const std::stop_token& stop) {
   std::string items;
   for (const DatasetView& dataset : datasets) {
+    if (stop.stop_requested()) return {};
     if (!is_seen(dataset)) continue;
     fmt::format_to(std::back_inserter(items),
                    "<li>{1}: <a href=\"/{0}/layer.json\">layer.json</a>, "

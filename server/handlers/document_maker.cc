@@ -14,16 +14,17 @@ Coding CodingFor(const Request& request) { return NegotiateCoding(request.fields
 
 }  // namespace
 
-MadeDocument MakeDocument(const std::function<std::string()>& write, Coding coding) {
-  std::string bytes = write();
+Result<MadeDocument> MakeDocument(const DocumentPlan::Write& write, Coding coding, const std::stop_token& stop) {
+  std::string bytes = write(stop);
   MadeDocument made;
   if (coding == Coding::kGzip) {
-    std::string compressed = proto::Gzip(bytes);
+    std::string compressed = proto::Gzip(bytes, proto::kGzipLevel, stop);
     if (compressed.size() < bytes.size()) {
       made.coding = Coding::kGzip;
       bytes = std::move(compressed);
     }
   }
+  if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the document any more");
   made.etag = StrongETag(bytes);
   made.body = std::make_shared<const std::string>(std::move(bytes));
   return made;
@@ -46,7 +47,7 @@ DocumentMaker::DocumentMaker(CatalogPtr catalog, TileService& workers, TileHandl
 
 std::optional<Response> DocumentMaker::ServeAtOnce(const DocumentPlan& plan, const Request& request) const {
   const Coding coding = CodingFor(request);
-  if (plan.bytes <= kShortBytes) return terrace::server::Serve(MakeDocument(plan.write, coding), plan, request);
+  if (plan.bytes <= kShortBytes) return terrace::server::Serve(*MakeDocument(plan.write, coding, {}), plan, request);
   const std::shared_ptr<const MadeDocument> kept = kept_.Find(Key{plan.key, coding});
   if (!kept) return std::nullopt;
   return terrace::server::Serve(*kept, plan, request);
@@ -59,8 +60,10 @@ asio::awaitable<Response> DocumentMaker::Serve(DocumentPlan plan, Request reques
   const auto made = std::make_shared<MadeDocument>();
   // Whoever waits may leave before the worker does.
   SingleFlight::Work work = [catalog = catalog_, write = plan.write, coding,
-                             made](const std::stop_token&) -> Result<EncodedTile> {
-    *made = MakeDocument(write, coding);
+                             made](const std::stop_token& stop) -> Result<EncodedTile> {
+    Result<MadeDocument> document = MakeDocument(write, coding, stop);
+    if (!document) return tl::unexpected(document.error());
+    *made = *std::move(document);
     return EncodedTile();
   };
   const auto deadline = TileService::Clock::now() + options_.deadline;

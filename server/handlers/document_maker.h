@@ -7,10 +7,12 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <string_view>
 #include <variant>
 
+#include "engine/core/result.h"
 #include "server/asio.h"
 #include "server/handlers/tile_handler.h"
 #include "server/http/request.h"
@@ -22,12 +24,16 @@
 namespace terrace::server {
 
 struct DocumentPlan {
-  std::string key;                     // of one catalog's documents, equal for equal ones alone
-  std::size_t bytes = 0;               // about so many of it
-  std::string_view content_type;       // a literal
-  std::string_view cache_control;      // outlives the request
-  bool for_grant = false;              // as in Response
-  std::function<std::string()> write;  // on any thread; refers to nothing but the catalog and what it holds itself
+  // On any thread; refers to nothing but the catalog and what it holds itself. Asks the stop token as it writes, and
+  // what it gives after a stop is of no use.
+  using Write = std::function<std::string(const std::stop_token&)>;
+
+  std::string key;                 // of one catalog's documents, equal for equal ones alone; holds no token
+  std::size_t bytes = 0;           // about so many of it
+  std::string_view content_type;   // a literal
+  std::string_view cache_control;  // outlives the request
+  bool for_grant = false;          // as in Response
+  Write write;
 };
 
 // What a handler answers: the reply, or what it takes to make it.
@@ -42,7 +48,8 @@ struct MadeDocument {
 inline std::size_t BytesOf(const MadeDocument& made) { return made.body->size() + made.etag.size(); }
 
 // `coding`: kGzip gives identity where that is not larger. Bytes and ETag are those of a Document of the same text.
-MadeDocument MakeDocument(const std::function<std::string()>& write, Coding coding);
+// kCancelled: a stop was requested.
+Result<MadeDocument> MakeDocument(const DocumentPlan::Write& write, Coding coding, const std::stop_token& stop);
 
 // As Serve of a Document.
 Response Serve(const MadeDocument& made, const DocumentPlan& plan, const Request& request);

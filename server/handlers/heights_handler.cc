@@ -24,6 +24,9 @@ constexpr std::size_t kQuickQuery = 256;
 // Points that are read as long work, for which not all workers may be taken: each may lie in a block of its own.
 constexpr std::size_t kShortList = 1000;
 
+// Points that are written between two looks at the stop token.
+constexpr std::size_t kStopPeriod = 1024;
+
 }  // namespace
 
 HeightsHandler::HeightsHandler(CatalogPtr catalog, TileService& tiles, TileHandlerOptions options,
@@ -100,13 +103,13 @@ asio::awaitable<Response> HeightsHandler::Handle(Route route, Request request) c
   SingleFlight::Work work = [catalog = catalog_, index = *dataset, coding, query,
                              certified](std::stop_token stop) -> Result<EncodedTile> {
     const auto begun = TileService::Clock::now();
-    const Result<std::vector<float>> heights =
-        catalog->read_points(index, query->points, query->datum, std::move(stop));
+    const Result<std::vector<float>> heights = catalog->read_points(index, query->points, query->datum, stop);
     if (!heights) return tl::unexpected(heights.error());
     EncodedTile reply;
     reply.times.read = std::chrono::duration_cast<std::chrono::microseconds>(TileService::Clock::now() - begun);
-    reply.bytes = HeightsJson(*query, *heights, catalog->datasets[index].name, certified.get());
-    reply.bytes = Compress(std::move(reply.bytes), coding);
+    reply.bytes = HeightsJson(*query, *heights, catalog->datasets[index].name, certified.get(), stop);
+    reply.bytes = Compress(std::move(reply.bytes), coding, stop);
+    if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the heights any more");
     return reply;
   };
   const auto length = query->points.size() > kShortList ? TileService::Length::kLong : TileService::Length::kShort;
@@ -123,8 +126,8 @@ asio::awaitable<Result<CertifiedPoints>> HeightsHandler::Certify(std::uint32_t d
   // On a worker: of a mosaic with thousands of blocks it takes time to find the tiles of thousands of points.
   auto found = std::make_shared<CertifiedPoints>();
   SingleFlight::Work find = [catalog = catalog_, dataset, wanted = query.points, level = *query.certify_level,
-                             found](const std::stop_token&) -> Result<EncodedTile> {
-    Result<CertifiedPoints> tiles = TilesOf(catalog->datasets[dataset], wanted, level);
+                             found](const std::stop_token& stop) -> Result<EncodedTile> {
+    Result<CertifiedPoints> tiles = TilesOf(catalog->datasets[dataset], wanted, level, stop);
     if (!tiles) return tl::unexpected(tiles.error());
     *found = *std::move(tiles);
     return EncodedTile();
@@ -145,11 +148,12 @@ asio::awaitable<Result<CertifiedPoints>> HeightsHandler::Certify(std::uint32_t d
 }
 
 std::string HeightsJson(const HeightsQuery& query, std::span<const float> heights, std::string_view dataset,
-                        const CertifiedPoints* certified) {
+                        const CertifiedPoints* certified, const std::stop_token& stop) {
   const std::string name = nlohmann::json(dataset).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
   std::string json = "{\"results\":[";
   const auto out = std::back_inserter(json);
   for (std::size_t i = 0; i < heights.size(); ++i) {
+    if (i % kStopPeriod == 0 && stop.stop_requested()) return {};
     if (i > 0) json += ',';
     json += "{\"elevation\":";
     if (std::isnan(heights[i])) {

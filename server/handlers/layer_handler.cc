@@ -20,7 +20,7 @@ std::string Print(double value) {
   return text;
 }
 
-std::string WriteLayer(const DatasetView& dataset, std::string tile_query) {
+std::string WriteLayer(const DatasetView& dataset, std::string tile_query, const std::stop_token& stop = {}) {
   proto::LayerDescription layer;
   layer.name = dataset.name;
   layer.attribution = dataset.attribution;
@@ -32,7 +32,7 @@ std::string WriteLayer(const DatasetView& dataset, std::string tile_query) {
   layer.water_mask = dataset.has_water;
   layer.metadata_levels = dataset.metadata_levels;
   layer.tile_query = std::move(tile_query);
-  return proto::EncodeLayerJson(layer);
+  return proto::EncodeLayerJson(layer, stop);
 }
 
 }  // namespace
@@ -43,8 +43,13 @@ std::string TileQuery(const ErrorWish& wish) {
   return {};
 }
 
+const Grant* GrantInQuery(const Request& request) {
+  const bool has_name = request.grant && !request.grant->name.empty();
+  return request.token_in_query && has_name ? request.grant.get() : nullptr;
+}
+
 std::string WithToken(std::string query, const Request& request) {
-  if (!request.token_in_query || !request.grant || request.grant->name.empty()) return query;
+  if (GrantInQuery(request) == nullptr) return query;
   return query + (query.empty() ? "" : "&") + "token=" + PercentEncode(request.token);
 }
 
@@ -61,12 +66,12 @@ Answer LayerHandler::Handle(const Route& route, const Request& request) const {
   std::string tile_query = WithToken(TileQuery(parameters->wish), request);
   if (tile_query.empty()) return Serve(plain_[*dataset], request, cache_control_);
   DocumentPlan plan;
-  plan.key = fmt::format("layer {} {}", *dataset, tile_query);
+  plan.key = fmt::format("layer {} {} {}", *dataset, TileQuery(parameters->wish), fmt::ptr(GrantInQuery(request)));
   plan.bytes = plain_[*dataset].identity->size();
   plan.content_type = kJson;
   plan.cache_control = cache_control_;
-  plan.write = [&view = datasets_[*dataset], tile_query = std::move(tile_query)] {
-    return WriteLayer(view, tile_query);
+  plan.write = [&view = datasets_[*dataset], tile_query = std::move(tile_query)](const std::stop_token& stop) {
+    return WriteLayer(view, tile_query, stop);
   };
   return plan;
 }

@@ -35,4 +35,8 @@ std::string TileQuery(const ErrorWish& wish);
 // as they are.
 std::string WithToken(std::string query, const Request& request);
 
+// Stands for that token where it must not be kept itself: there is one grant of each, for as long as the server runs.
+// Null: WithToken adds none.
+const Grant* GrantInQuery(const Request& request);
+
 }  // namespace terrace::server

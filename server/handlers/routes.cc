@@ -142,16 +142,16 @@ Answer Routes::Describe(const Route& route, const Request& request) const {
 }
 
 // What `write` makes of the datasets that the request may see; `all`: the same of all datasets.
-DocumentPlan Routes::PlanOfSeen(const Document& all, const Request& request,
-                                std::string (*write)(std::span<const DatasetView>, const IsSeen&)) const {
+DocumentPlan Routes::PlanOfSeen(const Document& all, const Request& request, WriteDatasets write) const {
   DocumentPlan plan;
   // There is one grant of each token, for as long as the server runs.
   plan.key = fmt::format("{} {}", all.identity_etag, fmt::ptr(request.grant.get()));
   plan.bytes = all.identity->size();
   plan.content_type = all.content_type;
   plan.cache_control = kRevalidate;
-  plan.write = [&datasets = catalog_->datasets, grant = request.grant, write] {
-    return write(datasets, [&](const DatasetView& view) { return grant->Sees(view.name); });
+  plan.write = [&datasets = catalog_->datasets, grant = request.grant, write](const std::stop_token& stop) {
+    return write(
+        datasets, [&](const DatasetView& view) { return grant->Sees(view.name); }, stop);
   };
   return plan;
 }

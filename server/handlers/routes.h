@@ -56,8 +56,8 @@ class Routes {
   asio::awaitable<Response> ServeMetrics(Route route, Request request) const;
   Answer Describe(const Route& route, const Request& request) const;
   Answer DescribeViewer(const Route& route, const Request& request) const;
-  DocumentPlan PlanOfSeen(const Document& all, const Request& request,
-                          std::string (*write)(std::span<const DatasetView>, const IsSeen&)) const;
+  using WriteDatasets = std::string (*)(std::span<const DatasetView>, const IsSeen&, const std::stop_token&);
+  DocumentPlan PlanOfSeen(const Document& all, const Request& request, WriteDatasets write) const;
 
   const CatalogPtr catalog_;
   const TileHandler tiles_;

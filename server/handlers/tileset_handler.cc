@@ -65,18 +65,18 @@ Answer TilesetHandler::Handle(const Route& route, const Request& request) const 
   const Result<TileParameters> parameters =
       ParseTileParameters(route.query, /*allow_at_least=*/false, /*allow_compression=*/true);
   if (!parameters) return ClientErrorResponse(parameters.error(), request.id);
-  std::string content_query = WithToken(ContentQuery(parameters->wish, route.query), request);
+  const std::string wished = ContentQuery(parameters->wish, route.query);
+  std::string content_query = WithToken(wished, request);
   if (content_query.empty()) return Serve(plain_[*dataset], request, cache_control_);
   std::string subtree_query = WithToken("", request);
   DocumentPlan plan;
-  plan.key = fmt::format("tileset {} {} {}", *dataset, content_query, subtree_query);
+  plan.key = fmt::format("tileset {} {} {}", *dataset, wished, fmt::ptr(GrantInQuery(request)));
   plan.bytes = plain_[*dataset].identity->size();
   plan.content_type = kJsonType;
   plan.cache_control = cache_control_;
   plan.write = [&view = datasets_[*dataset], roots = roots_[*dataset], wish = parameters->wish,
-                content_query = std::move(content_query), subtree_query = std::move(subtree_query)] {
-    return WriteTileset(view, *roots, wish, content_query, subtree_query);
-  };
+                content_query = std::move(content_query), subtree_query = std::move(subtree_query)](
+                   const std::stop_token&) { return WriteTileset(view, *roots, wish, content_query, subtree_query); };
   return plan;
 }
 

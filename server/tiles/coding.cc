@@ -18,16 +18,16 @@ std::string_view NameOf(Coding coding) {
   return "";
 }
 
-std::string Compress(std::string bytes, Coding coding) {
+std::string Compress(std::string bytes, Coding coding, const std::stop_token& stop) {
   switch (coding) {
     case Coding::kIdentity:
       break;
     case Coding::kGzip:
-      return proto::Gzip(bytes);
+      return proto::Gzip(bytes, proto::kGzipLevel, stop);
     case Coding::kBrotli:
-      return proto::Brotli(bytes);
+      return proto::Brotli(bytes, proto::kBrotliQuality, stop);
     case Coding::kZstd:
-      return proto::Zstd(bytes);
+      return proto::Zstd(bytes, proto::kZstdLevel, stop);
   }
   return bytes;
 }

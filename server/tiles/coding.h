@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <stop_token>
 #include <string>
 #include <string_view>
 
@@ -20,7 +21,8 @@ inline constexpr std::array<Coding, 1> kGzipOnly = {Coding::kGzip};
 // As Content-Encoding names it: "br". Empty for identity.
 std::string_view NameOf(Coding coding);
 
-// Deterministic: equal bytes are compressed to equal bytes.
-std::string Compress(std::string bytes, Coding coding);
+// Deterministic: equal bytes are compressed to equal bytes. Empty, where `coding` is none of kIdentity, if a stop was
+// requested (proto/compress.h).
+std::string Compress(std::string bytes, Coding coding, const std::stop_token& stop = {});
 
 }  // namespace terrace::server

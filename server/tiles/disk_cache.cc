@@ -158,6 +158,12 @@ void DiskCache::Flush() {
   }
 }
 
+void DiskCache::Abandon() {
+  for (DiskStore* store : {tiles_.get(), refinements_.get()}) {
+    if (store != nullptr) store->Abandon();
+  }
+}
+
 DiskCacheStats DiskCache::stats() const {
   DiskCacheStats stats;
   if (tiles_) stats.tiles = tiles_->stats();

@@ -45,6 +45,9 @@ class DiskCache {
   // Returns when everything that was kept before the call is written or dropped.
   void Flush();
 
+  // Drops what waits to be written, and keeps nothing more.
+  void Abandon();
+
   DiskCacheStats stats() const;
 
  private:

@@ -13,9 +13,6 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// One write of the database: few enough that erasing and closing do not wait long, many enough that small tiles do not
-// cost a call each.
-constexpr std::size_t kBatchBytes = std::size_t{1} << 20;
 constexpr std::size_t kJobBytes = 256;  // a job beside its value
 
 }  // namespace
@@ -32,6 +29,18 @@ DiskStore::~DiskStore() {
   }
   changed_.notify_all();
   thread_.join();
+}
+
+void DiskStore::Abandon() {
+  std::list<Job> waiting;
+  {
+    const std::lock_guard lock(mutex_);
+    abandoned_ = true;
+    waiting.swap(queue_);
+    for (const Job& job : waiting) queued_bytes_ -= job.charge;
+  }
+  dropped_.fetch_add(waiting.size(), std::memory_order_relaxed);
+  changed_.notify_all();
 }
 
 std::optional<std::string> DiskStore::Find(const std::string& key) {
@@ -78,7 +87,7 @@ void DiskStore::Forget(const std::string& key) {
 void DiskStore::Enqueue(Job job) {
   {
     const std::lock_guard lock(mutex_);
-    if (!writing_ || stop_ || queued_bytes_ + job.charge > options_.queue_bytes) {
+    if (!writing_ || stop_ || abandoned_ || queued_bytes_ + job.charge > options_.queue_bytes) {
       dropped_.fetch_add(1, std::memory_order_relaxed);
       return;
     }
@@ -188,7 +197,13 @@ void DiskStore::Reopen() {
     const std::lock_guard lock(mutex_);
     old.swap(db_);
   }
-  while (old.use_count() > 1) std::this_thread::sleep_for(std::chrono::milliseconds(1));  // reads under way
+  while (old.use_count() > 1) {  // reads under way, which may never end
+    {
+      const std::lock_guard lock(mutex_);
+      if (stop_) return;
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
   old.reset();
   Open();
 }

@@ -46,6 +46,10 @@ class DiskStore {
   // Writes what waits, unless the disk fails.
   ~DiskStore();
 
+  // From now on nothing is kept, and what waits is dropped but for the values that are being written, kBatchBytes: for
+  // who has no time to wait for the disk.
+  void Abandon();
+
   // Nothing if it is not there, or was damaged, or the disk failed.
   std::optional<std::string> Find(const std::string& key);
 
@@ -59,6 +63,10 @@ class DiskStore {
   void Flush();
 
   DiskStoreStats stats() const;
+
+  // One write of the database: few enough that erasing and closing do not wait long, many enough that small tiles do
+  // not cost a call each.
+  static constexpr std::size_t kBatchBytes = std::size_t{1} << 20;
 
  private:
   struct Job {
@@ -84,6 +92,7 @@ class DiskStore {
   std::size_t queued_bytes_ = 0;
   bool busy_ = false;  // jobs have left the queue and are not done
   bool stop_ = false;
+  bool abandoned_ = false;
 
   std::atomic<std::uint64_t> hits_{0}, misses_{0}, errors_{0}, damaged_{0}, written_{0}, dropped_{0};
   std::atomic<std::size_t> entries_{0}, bytes_{0};

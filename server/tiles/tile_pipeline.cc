@@ -147,7 +147,8 @@ Result<EncodedTile> TilePipeline::Build(const TileRequest& request, std::stop_to
 
   if (request.coding != Coding::kIdentity) {
     const Clock::time_point start = Clock::now();
-    encoded.bytes = Compress(std::move(encoded.bytes), request.coding);
+    encoded.bytes = Compress(std::move(encoded.bytes), request.coding, stop);
+    if (stop.stop_requested()) return Cancelled();
     encoded.times.compress = MicrosecondsSince(start);
   }
   encoded.etag = StrongETag(encoded.bytes);

@@ -1,12 +1,21 @@
 #include "proto/compress.h"
 
 #include <brotli/decode.h>
+#include <brotli/encode.h>
 #include <gtest/gtest.h>
+#include <sys/mman.h>
+#include <unistd.h>
 #include <zlib.h>
 #include <zstd.h>
 
+#include <algorithm>
+#include <csignal>
 #include <cstdint>
+#include <cstdlib>
+#include <stop_token>
 #include <string>
+#include <string_view>
+#include <utility>
 
 namespace terrace::proto {
 namespace {
@@ -85,6 +94,90 @@ TEST(Gzip, HeaderHoldsNeitherTimeNorName) {
 }
 
 TEST(Gzip, MakesRepetitiveBytesSmaller) { EXPECT_LT(Gzip(Waves(50000)).size(), 10000u); }
+
+std::string OneShotBrotli(const std::string& bytes, int quality) {
+  std::string out(BrotliEncoderMaxCompressedSize(bytes.size()), '\0');
+  std::size_t size = out.size();
+  EXPECT_EQ(BrotliEncoderCompress(quality, BROTLI_DEFAULT_WINDOW, BROTLI_MODE_GENERIC, bytes.size(),
+                                  reinterpret_cast<const std::uint8_t*>(bytes.data()), &size,
+                                  reinterpret_cast<std::uint8_t*>(out.data())),
+            BROTLI_TRUE);
+  out.resize(size);
+  return out;
+}
+
+TEST(Brotli, GivesTheBytesOfTheLibrarysOwnFunction) {
+  for (const std::size_t size : {std::size_t{0}, std::size_t{1}, std::size_t{70'000}, kCompressedAtOnce - 1,
+                                 kCompressedAtOnce, kCompressedAtOnce + 1, 3 * kCompressedAtOnce + 12'345}) {
+    EXPECT_TRUE(Brotli(Waves(size)) == OneShotBrotli(Waves(size), kBrotliQuality)) << size << " bytes";
+  }
+}
+
+TEST(Compress, LongTextsComeBack) {
+  for (const std::size_t size : {kCompressedAtOnce, kCompressedAtOnce + 1, 2 * kCompressedAtOnce, 5'000'000ul}) {
+    const std::string bytes = Waves(size);
+    EXPECT_TRUE(Gunzip(Gzip(bytes), size) == bytes) << size;
+    EXPECT_TRUE(Unzstd(Zstd(bytes), size) == bytes) << size;
+    EXPECT_TRUE(Unbrotli(Brotli(bytes), size) == bytes) << size;
+    EXPECT_TRUE(Gzip(bytes) == Gzip(bytes) && Zstd(bytes) == Zstd(bytes)) << size;
+  }
+}
+
+// A text that requests a stop when its second piece is first read, and counts the pages that are read after it: its
+// pages cannot be read until the handler of the fault has counted them.
+class WatchedText {
+ public:
+  static constexpr std::size_t kPieces = 16, kSize = kPieces * kCompressedAtOnce;
+
+  WatchedText() : page_(static_cast<std::size_t>(::sysconf(_SC_PAGESIZE))) {
+    memory_ = static_cast<char*>(::mmap(nullptr, kSize, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0));
+    EXPECT_NE(memory_, MAP_FAILED);
+    const std::string waves = Waves(kSize);
+    std::copy(waves.begin(), waves.end(), memory_);
+    ::mprotect(memory_, kSize, PROT_NONE);
+    current_ = this;
+    struct sigaction action {};
+    action.sa_sigaction = [](int, siginfo_t* fault, void*) { current_->Note(static_cast<char*>(fault->si_addr)); };
+    action.sa_flags = SA_SIGINFO;
+    ::sigaction(SIGSEGV, &action, &before_);
+  }
+  ~WatchedText() {
+    ::sigaction(SIGSEGV, &before_, nullptr);
+    ::munmap(memory_, kSize);
+  }
+  WatchedText(const WatchedText&) = delete;
+  WatchedText& operator=(const WatchedText&) = delete;
+
+  std::string_view text() const { return {memory_, kSize}; }
+  std::stop_token token() const { return source_.get_token(); }
+  std::size_t read_after() const { return read_after_; }
+
+ private:
+  void Note(char* place) {
+    if (place < memory_ || place >= memory_ + kSize) std::abort();
+    if (source_.stop_requested()) read_after_ += page_;
+    if (static_cast<std::size_t>(place - memory_) >= kCompressedAtOnce) source_.request_stop();
+    ::mprotect(memory_ + static_cast<std::size_t>(place - memory_) / page_ * page_, page_, PROT_READ);
+  }
+
+  static inline WatchedText* current_ = nullptr;
+  const std::size_t page_;
+  char* memory_ = nullptr;
+  std::stop_source source_;
+  std::size_t read_after_ = 0;
+  struct sigaction before_ {};
+};
+
+TEST(Compress, ReadsNoMoreThanAPieceAfterAStop) {
+  const std::pair<const char*, std::string (*)(std::string_view, int, const std::stop_token&)> functions[] = {
+      {"gzip", Gzip}, {"br", Brotli}, {"zstd", Zstd}};
+  for (const auto& [name, compress] : functions) {
+    WatchedText watched;
+    EXPECT_EQ(compress(watched.text(), 4, watched.token()), "") << name;
+    EXPECT_TRUE(watched.token().stop_requested()) << name;
+    EXPECT_LE(watched.read_after(), kCompressedAtOnce) << name;
+  }
+}
 
 }  // namespace
 }  // namespace terrace::proto

@@ -7,6 +7,8 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <sstream>
+#include <stop_token>
+#include <streambuf>
 
 namespace terrace::proto {
 namespace {
@@ -247,6 +249,35 @@ TEST(MeshFile, ReportsAFailingStream) {
   for (MeshFileFormat format : {MeshFileFormat::kObj, MeshFileFormat::kPly, MeshFileFormat::kGlb}) {
     std::ostream broken(nullptr);
     EXPECT_EQ(WriteMesh(broken, format, kSquare, kTwo).error().code, ErrorCode::kUnavailable);
+  }
+}
+
+// Requests a stop with the first bytes that are written, and counts those after it.
+class StopAtFirstWrite : public std::streambuf {
+ public:
+  std::stop_source source;
+  std::streamsize first = 0, after = 0;
+
+ protected:
+  std::streamsize xsputn(const char*, std::streamsize count) override {
+    (first == 0 ? first : after) += count;
+    source.request_stop();
+    return count;
+  }
+  int overflow(int c) override { return xsputn(nullptr, 1) == 1 ? c : 0; }
+};
+
+TEST(WriteMesh, EndsSoonAfterAStop) {
+  const std::vector<MeshVertex> vertices(100'000, MeshVertex{1.5, 2.25, 3.125});
+  const Triangles triangles(200'000, {0, 1, 2});
+  for (const MeshFileFormat format : {MeshFileFormat::kObj, MeshFileFormat::kPly, MeshFileFormat::kGlb}) {
+    StopAtFirstWrite buffer;
+    std::ostream out(&buffer);
+    if (format == MeshFileFormat::kGlb) buffer.source.request_stop();  // it is made as a whole before it is written
+    const Result<void> written = WriteMesh(out, format, vertices, triangles, {}, buffer.source.get_token());
+    ASSERT_FALSE(written);
+    EXPECT_EQ(written.error().code, ErrorCode::kCancelled);
+    EXPECT_LE(buffer.after, std::streamsize{200'000}) << "of 2 MB and more";
   }
 }
 

@@ -1,39 +1,14 @@
 // Bodies that were made to cost: each is read at most once, to its first fault, in memory of at most twice its size,
-// and reading ends at the stop token. A program of its own, as it replaces operator new.
+// and reading ends at the stop token.
 #include <gtest/gtest.h>
-#include <malloc.h>
 
-#include <atomic>
-#include <cstdlib>
-#include <new>
 #include <stop_token>
 #include <string>
 
 #include "server/handlers/heights_parameters.h"
 #include "server/handlers/heights_query.h"
 #include "server/http/parameters.h"
-
-namespace {
-
-std::atomic<std::size_t> held{0}, peak{0};
-
-void* Allocate(std::size_t size) {
-  void* const memory = std::malloc(size);
-  if (memory == nullptr) throw std::bad_alloc();
-  const std::size_t now = held += ::malloc_usable_size(memory);
-  if (now > peak) peak = now;
-  return memory;
-}
-void Free(void* memory) {
-  if (memory != nullptr) held -= ::malloc_usable_size(memory);
-  std::free(memory);
-}
-
-}  // namespace
-
-void* operator new(std::size_t size) { return Allocate(size); }
-void operator delete(void* memory) noexcept { Free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { Free(memory); }
+#include "tests/server/handlers/allocations.h"
 
 namespace terrace::server {
 namespace {
@@ -107,11 +82,11 @@ TEST(HostileBodies, AreReadAtMostOnceAndToTheirFirstFault) {
 TEST(HostileBodies, TakeAtMostTwiceTheirSize) {
   for (const Hostile& hostile : HostileBodies()) {
     const char* const type = hostile.is_json ? "application/json" : "application/x-www-form-urlencoded";
-    const std::size_t before = held;
-    peak = before;
+    const std::size_t before = held_bytes;
+    peak_bytes = before;
     const Result<HeightsQuery> query = ParseHeights({{}, type, hostile.body}, kMaxLocations);
     EXPECT_FALSE(query) << hostile.name;
-    EXPECT_LE(peak - before, 2 * hostile.body.size() + kOverhead) << hostile.name;
+    EXPECT_LE(peak_bytes - before, 2 * hostile.body.size() + kOverhead) << hostile.name;
   }
 }
 
@@ -119,12 +94,12 @@ TEST(HostileBodies, AsManyPointsAsThereMayBeTakeAtMostTwiceTheirSize) {
   std::string body = "{\"locations\":\"46.51,8.12";
   for (std::size_t i = 1; i < kMaxLocations; ++i) body += "|46.51,8.12";
   body += "\"}";
-  const std::size_t before = held;
-  peak = before;
+  const std::size_t before = held_bytes;
+  peak_bytes = before;
   const Result<HeightsQuery> query = ParseHeights({{}, "application/json", body}, kMaxLocations);
   ASSERT_TRUE(query) << query.error().message;
   EXPECT_EQ(query->points.size(), kMaxLocations);
-  EXPECT_LE(peak - before, 2 * body.size() + kOverhead);
+  EXPECT_LE(peak_bytes - before, 2 * body.size() + kOverhead);
 }
 
 TEST(HostileBodies, EndAtTheNextPartOnceAStopIsRequested) {

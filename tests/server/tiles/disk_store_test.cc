@@ -168,6 +168,34 @@ TEST_F(DiskStoreTest, DropsWhatItCannotWriteInTime) {
   EXPECT_EQ(stats.written + stats.dropped, 101u);
 }
 
+TEST_F(DiskStoreTest, WritesNothingMoreOnceItIsAbandoned) {
+  std::atomic<bool> begun{false}, go{false};
+  std::atomic<int> asked{0};
+  DiskStore store(Options());
+  store.Keep(
+      "slow",
+      [&] {
+        begun = true;
+        while (!go) std::this_thread::sleep_for(milliseconds(1));
+        return std::string("slow");
+      },
+      100);
+  ASSERT_TRUE(Eventually([&] { return begun.load(); }));
+  const auto value = [&asked] {
+    ++asked;
+    return std::string(DiskStore::kBatchBytes / 2, 'x');
+  };
+  for (int i = 0; i < 20; ++i) store.Keep(KeyOf(i), value, DiskStore::kBatchBytes / 2);
+  store.Abandon();
+  for (int i = 20; i < 30; ++i) store.Keep(KeyOf(i), value, DiskStore::kBatchBytes / 2);
+  go = true;
+  store.Flush();
+  EXPECT_EQ(asked, 0);
+  EXPECT_EQ(store.Find("slow"), "slow");
+  EXPECT_EQ(store.stats().written, 1u);
+  EXPECT_EQ(store.stats().dropped, 30u);
+}
+
 TEST_F(DiskStoreTest, ErasesWhatItsOwnerForgets) {
   DiskStore store(Options());
   Keep(store, 1);

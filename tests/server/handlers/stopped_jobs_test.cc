@@ -1,0 +1,86 @@
+// Jobs ask their stop token as they go: one that is requested in their middle ends them before they have asked for as
+// much memory again.
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "proto/layer_json.h"
+#include "server/handlers/certified_points.h"
+#include "server/handlers/datasets_handler.h"
+#include "server/handlers/document_maker.h"
+#include "server/handlers/heights_handler.h"
+#include "tests/server/handlers/allocations.h"
+
+namespace terrace::server {
+namespace {
+
+// Texts and lists grow by doubling.
+constexpr std::size_t kMiddle = std::size_t{256} << 10;
+
+std::vector<DatasetView> Views(std::size_t count) {
+  std::vector<DatasetView> views(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    views[i].name = "dataset" + std::to_string(i);
+    views[i].available = {{{0, 0, 1, 0}}};
+  }
+  return views;
+}
+
+TEST(StoppedJobs, LayerJsonEnds) {
+  proto::LayerDescription layer;
+  layer.available.emplace_back(400'000, geo::TileRange{123'456, 123'456, 123'457, 123'457});
+  const StopAtAllocation stop(kMiddle);
+  EXPECT_EQ(proto::EncodeLayerJson(layer, stop.token()), "");
+  EXPECT_TRUE(stop.happened());
+  EXPECT_LE(stop.largest_after(), kMiddle);
+}
+
+TEST(StoppedJobs, ListsOfDatasetsEnd) {
+  const std::vector<DatasetView> views = Views(10'000);
+  {
+    const StopAtAllocation stop(kMiddle / 4);
+    EXPECT_EQ(DatasetsJson(views, SeeAll, stop.token()), "");
+    EXPECT_TRUE(stop.happened());
+    EXPECT_LE(stop.largest_after(), kMiddle / 2) << "its tree is taken down with a list of its own";
+  }
+  const StopAtAllocation stop(kMiddle);
+  EXPECT_EQ(IndexHtml(views, SeeAll, stop.token()), "");
+  EXPECT_TRUE(stop.happened());
+  EXPECT_LE(stop.largest_after(), kMiddle);
+}
+
+TEST(StoppedJobs, DocumentsAreNotCompressed) {
+  std::stop_source source;
+  const auto write = [&](const std::stop_token&) {
+    source.request_stop();
+    return std::string(std::size_t{8} << 20, 'a');
+  };
+  const auto made = MakeDocument(write, Coding::kGzip, source.get_token());
+  ASSERT_FALSE(made);
+  EXPECT_EQ(made.error().code, ErrorCode::kCancelled);
+}
+
+TEST(StoppedJobs, HeightsEnd) {
+  HeightsQuery query;
+  query.points.resize(200'000);
+  const std::vector<float> heights(query.points.size(), 1.5F);
+  const StopAtAllocation stop(kMiddle);
+  EXPECT_EQ(HeightsJson(query, heights, "maui", nullptr, stop.token()), "");
+  EXPECT_TRUE(stop.happened());
+  EXPECT_LE(stop.largest_after(), kMiddle);
+}
+
+TEST(StoppedJobs, CertifiedPointsEnd) {
+  const std::vector<DatasetView> views = Views(1);
+  const std::vector<dem::GeoPosition> points(400'000);
+  const StopAtAllocation stop(kMiddle);
+  const auto tiles = TilesOf(views[0], points, 5, stop.token());
+  ASSERT_FALSE(tiles);
+  EXPECT_EQ(tiles.error().code, ErrorCode::kCancelled);
+  EXPECT_TRUE(stop.happened());
+  EXPECT_LE(stop.largest_after(), kMiddle);
+}
+
+}  // namespace
+}  // namespace terrace::server
