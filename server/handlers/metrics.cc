@@ -7,6 +7,7 @@
 #include <prometheus/text_serializer.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <functional>
 #include <map>
@@ -142,6 +143,15 @@ struct Metrics::Families {
           .Name("terrace_tile_build_stage_seconds")
           .Help("Time of each step of a build, waiting for a worker included")
           .Register(registry);
+  struct Stage {
+    std::chrono::microseconds StageTimes::*time;
+    prometheus::Histogram& histogram;
+  };
+  const std::array<Stage, 5> each_stage = {{{&StageTimes::queue, stages.Add({{"stage", "queue"}}, Seconds())},
+                                            {&StageTimes::read, stages.Add({{"stage", "read"}}, Seconds())},
+                                            {&StageTimes::refine, stages.Add({{"stage", "refine"}}, Seconds())},
+                                            {&StageTimes::encode, stages.Add({{"stage", "encode"}}, Seconds())},
+                                            {&StageTimes::compress, stages.Add({{"stage", "compress"}}, Seconds())}}};
   prometheus::Family<prometheus::Counter>& refinements =
       prometheus::BuildCounter()
           .Name("terrace_refinements_total")
@@ -175,12 +185,16 @@ struct Metrics::Families {
   };
   // What has one dataset as a label.
   struct OfDataset {
-    std::set<prometheus::Counter*> requests, builds;
+    std::set<prometheus::Counter*> requests;
+    std::map<std::string, prometheus::Counter*, std::less<>> builds;  // by result
   };
   const Reply& AddReply(const ReplyRecord& record);
+  void CountBuild(const std::string& dataset, std::string_view result);
   void Forget(const std::string& dataset, const OfDataset& metrics);
 
-  // Guards the maps and, held shared, keeps what they point at from being forgotten.
+  // Guards the maps and, held shared, keeps what they point at from being forgotten. Every reply asks for it, so it is
+  // held alone only to add or forget what has a label for the first or the last time: a family that is being collected
+  // makes that wait.
   std::shared_mutex mutex;
   std::map<OwnedLabels, Reply, ByLabels> replies;
   std::map<std::string, OfDataset, std::less<>> of_datasets;
@@ -197,11 +211,25 @@ const Metrics::Families::Reply& Metrics::Families::AddReply(const ReplyRecord& r
   return replies.emplace(std::move(labels), reply).first->second;
 }
 
-// Likewise.
+void Metrics::Families::CountBuild(const std::string& dataset, std::string_view result) {
+  {
+    const std::shared_lock lock(mutex);
+    if (const auto known = of_datasets.find(dataset); known != of_datasets.end()) {
+      const auto count = known->second.builds.find(result);
+      if (count != known->second.builds.end()) return count->second->Increment();
+    }
+  }
+  const std::unique_lock lock(mutex);
+  prometheus::Counter& count = builds.Add({{"dataset", dataset}, {"result", std::string(result)}});
+  count.Increment();
+  of_datasets[dataset].builds.emplace(result, &count);
+}
+
+// `mutex` is held.
 void Metrics::Families::Forget(const std::string& dataset, const OfDataset& metrics) {
   std::erase_if(replies, [&](const auto& reply) { return reply.first.dataset == dataset; });
   for (prometheus::Counter* count : metrics.requests) requests.Remove(count);
-  for (prometheus::Counter* count : metrics.builds) builds.Remove(count);
+  for (const auto& [result, count] : metrics.builds) builds.Remove(count);
 }
 
 Metrics::Metrics() : families_(std::make_unique<Families>()) {}
@@ -225,11 +253,7 @@ void Metrics::CountReply(const ReplyRecord& record) {
 
 void Metrics::CountBuild(const DatasetView& dataset, const Result<TilePtr>& tile) {
   const std::string_view result = tile ? "ok" : ToString(tile.error().code);
-  const std::unique_lock lock(families_->mutex);
-  Families::OfDataset& of_dataset = families_->of_datasets[dataset.name];
-  prometheus::Counter& builds = families_->builds.Add({{"dataset", dataset.name}, {"result", std::string(result)}});
-  builds.Increment();
-  of_dataset.builds.insert(&builds);
+  families_->CountBuild(dataset.name, result);
   if (!tile) {
     if (tile.error().code == ErrorCode::kUnavailable) families_->source_errors.Increment();
     return;
@@ -247,14 +271,8 @@ void Metrics::CountBuild(const DatasetView& dataset, const Result<TilePtr>& tile
     case RefinementUse::kNone:
       break;
   }
-  const StageTimes& times = (*tile)->times;
-  const std::pair<const char*, std::chrono::microseconds> stages[] = {{"queue", times.queue},
-                                                                      {"read", times.read},
-                                                                      {"refine", times.refine},
-                                                                      {"encode", times.encode},
-                                                                      {"compress", times.compress}};
-  for (const auto& [stage, time] : stages) {
-    families_->stages.Add({{"stage", stage}}, Seconds()).Observe(InSeconds(time));
+  for (const Families::Stage& stage : families_->each_stage) {
+    stage.histogram.Observe(InSeconds((*tile)->times.*stage.time));
   }
 }
 
