@@ -121,7 +121,7 @@ struct DiskCacheConfig {
 // What opens datasets to whoever shows it.
 struct TokenConfig {
   std::string name;                   // in the log
-  std::string token, sha256;          // one of both: itself, or its hash in hexadecimal
+  std::string sha256;                 // TokenHash: the token itself is kept nowhere
   std::vector<std::string> datasets;  // empty: all
   double requests_per_second = 0;     // 0: as everybody
 
@@ -192,7 +192,7 @@ struct ConfigError {
   friend bool operator==(const ConfigError&, const ConfigError&) = default;
 };
 
-// Empty if `name` can name a dataset, else what is wrong with it, to be read after the name.
+// Empty if `name` can name a dataset, else what is wrong with it.
 std::string CheckDatasetName(const std::string& name);
 
 // Turns any text, a file's stem for instance, into a valid dataset name: other characters become '-'.

@@ -11,7 +11,7 @@ constexpr std::size_t kMinBytes = std::size_t{16} << 20;  // what a store of rec
 Codec<DiskCacheConfig> Directory() {
   return {[](const Json& value, const Place& place, DiskCacheConfig& cache) {
             if (!value.is_string() || value.get_ref<const std::string&>().empty()) {
-              return place.Expected("the path of a directory", value);
+              return place.Expected("the path of a directory");
             }
             cache.directory = place.Resolve(value.get<std::string>());
           },
@@ -43,7 +43,7 @@ const std::vector<Option<DiskCacheConfig>>& DiskCacheOptionTable() {
 
 Codec<Config> DiskCacheOption() {
   return {[](const Json& value, const Place& place, Config& config) {
-            if (!value.is_object()) return place.Expected(R"({"directory": "/var/cache/terrace"})", value);
+            if (!value.is_object()) return place.Expected(R"({"directory": "/var/cache/terrace"})");
             ReadObject(value, place, DiskCacheOptionTable(), config.disk_cache);
             if (!value.contains("directory")) place.Fail("\"directory\" is missing: where the cache is kept");
           },

@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "config/option_table.h"
+#include "config/token_hash.h"
 
 namespace terrace::config {
 namespace {
@@ -93,43 +94,70 @@ template <typename Target>
 Codec<Target> List(std::vector<std::string> Target::*member, std::string (*check)(const std::string&),
                    const char* example) {
   return {[=](const Json& value, const Place& place, Target& target) {
-            if (!value.is_array()) return place.Expected(fmt::format("a list such as {}", example), value);
+            if (!value.is_array()) return place.Expected(fmt::format("a list such as {}", example));
             std::vector<std::string> texts;
             for (std::size_t i = 0; i < value.size(); ++i) {
               if (!value[i].is_string()) {
-                place.At(i).Expected("text", value[i]);
+                place.At(i).Expected("text");
                 continue;
               }
               texts.push_back(value[i].template get<std::string>());
               const std::string problem = check(texts.back());
-              if (!problem.empty()) place.At(i).Fail(Quote(value[i]) + " " + problem);
+              if (!problem.empty()) place.At(i).Fail(problem);
             }
             target.*member = std::move(texts);
           },
           [=](const Target& target) { return Json(target.*member); }, ListToJson};
 }
 
+// Its hash is kept and written.
+Codec<TokenConfig> TokenText() {
+  return {[](const Json& value, const Place& place, TokenConfig& token) {
+            if (!value.is_string()) return place.Expected("text");
+            const std::string& text = value.get_ref<const std::string&>();
+            if (const std::string problem = CheckToken(text); !problem.empty()) return place.Fail(problem);
+            token.sha256 = TokenHash(text);
+          },
+          [](const TokenConfig&) { return Json(); }};
+}
+
+Codec<TokenConfig> TokenHashText() {
+  Codec<TokenConfig> codec = Text(&TokenConfig::sha256, CheckHash);
+  codec.read = [read = codec.read](const Json& value, const Place& place, TokenConfig& token) {
+    read(value, place, token);
+    std::transform(token.sha256.begin(), token.sha256.end(), token.sha256.begin(),
+                   [](char c) { return c >= 'A' && c <= 'F' ? static_cast<char>(c - 'A' + 'a') : c; });
+  };
+  return codec;
+}
+
 const std::vector<Option<TokenConfig>>& TokenOptionTable() {
   static const std::vector<Option<TokenConfig>> table = {
       {"name", "NAME", "What the log calls it", Text(&TokenConfig::name, CheckTokenName)},
-      {"token", "TEXT", "The token", Text(&TokenConfig::token, CheckToken)},
-      {"sha256", "HEX", "Its hash, instead of the token", Text(&TokenConfig::sha256, CheckHash)},
+      {"token", "TEXT", "The token", TokenText()},
+      {"sha256", "HEX", "Its hash, instead of the token", TokenHashText()},
       {"datasets", "NAMES", "What it opens; all without", List(&TokenConfig::datasets, CheckDatasetName, "[\"maui\"]")},
       {"requests_per_second", "N", "Its own rate", Number(&TokenConfig::requests_per_second, 0, kMostRequests)},
   };
   return table;
 }
 
-Json WriteToken(const TokenConfig& token) {
-  Json json = WriteObject(token, TokenOptionTable());
-  for (const char* key : {"token", "sha256"}) {
-    if (json[key] == "") json.erase(key);
+// What one token has in common with those before it.
+void CompareToken(const std::vector<TokenConfig>& tokens, std::size_t i, const Place& place) {
+  const TokenConfig& token = tokens[i];
+  for (std::size_t j = 0; j < i; ++j) {
+    if (!token.name.empty() && tokens[j].name == token.name) {
+      place.Fail(fmt::format("has the name of /tokens/{}; every token needs its own", j));
+    }
+    if (!token.sha256.empty() && tokens[j].sha256 == token.sha256) {
+      place.Fail(
+          fmt::format("is the same token as /tokens/{}; make a new one, or give the other one more datasets", j));
+    }
   }
-  return json;
 }
 
 void ReadTokens(const Json& value, const Place& place, Config& config) {
-  if (!value.is_array()) return place.Expected("a list of tokens", value);
+  if (!value.is_array()) return place.Expected("a list of tokens");
   for (std::size_t i = 0; i < value.size(); ++i) {
     TokenConfig& token = config.tokens.emplace_back();
     ReadObject(value[i], place.At(i), TokenOptionTable(), token);
@@ -138,16 +166,14 @@ void ReadTokens(const Json& value, const Place& place, Config& config) {
     if (value[i].contains("token") == value[i].contains("sha256")) {
       place.At(i).Fail("needs either \"token\" or \"sha256\", one of both");
     }
-    const auto earlier = config.tokens.end() - 1;
-    if (std::any_of(config.tokens.begin(), earlier,
-                    [&](const TokenConfig& other) { return other.name == token.name; })) {
-      place.At(i).Fail(fmt::format("another token is called \"{}\" too; every token needs its own name", token.name));
-    }
-    const auto is_same = [&](const TokenConfig& other) {
-      return token.token.empty() ? !token.sha256.empty() && other.sha256 == token.sha256 : other.token == token.token;
-    };
-    if (std::any_of(config.tokens.begin(), earlier, is_same)) {
-      place.At(i).Fail("another token is the same; make a new one, or give the other one more datasets");
+    CompareToken(config.tokens, i, place.At(i));
+  }
+  // Names are logged and printed.
+  for (std::size_t i = 0; i < config.tokens.size(); ++i) {
+    const std::string hash = TokenHash(config.tokens[i].name);
+    if (std::any_of(config.tokens.begin(), config.tokens.end(),
+                    [&](const auto& other) { return other.sha256 == hash; })) {
+      place.At(i).At("name").Fail("is a token itself, and the log shows names; choose another name");
     }
   }
 }
@@ -158,12 +184,17 @@ Json TlsToJson(const std::string& text) {
   return Json{{"certificate", text.substr(0, comma)}, {"key", text.substr(comma + 1)}};
 }
 
+// Not a key itself, of which the text of a file that is not found would be logged.
+bool IsPathOfFile(const std::string& text) {
+  return !text.empty() && !HasControlCharacter(text) && text.find("-----BEGIN") == std::string::npos;
+}
+
 void ReadTls(const Json& value, const Place& place, Config& config) {
   const auto is_path = [&](const char* key) {
-    return value.contains(key) && value[key].is_string() && !value[key].get_ref<const std::string&>().empty();
+    return value.contains(key) && value[key].is_string() && IsPathOfFile(value[key].get_ref<const std::string&>());
   };
   if (!value.is_object() || value.size() != 2 || !is_path("certificate") || !is_path("key")) {
-    return place.Expected(R"({"certificate": "server.pem", "key": "server.key"}, the paths of two PEM files)", value);
+    return place.Expected(R"({"certificate": "server.pem", "key": "server.key"}, the paths of two PEM files)");
   }
   config.tls = {place.Resolve(value["certificate"].get<std::string>()), place.Resolve(value["key"].get<std::string>())};
 }
@@ -178,7 +209,7 @@ Json WriteTls(const Config& config) {
 Codec<Config> TokensCodec() {
   return {ReadTokens, [](const Config& config) {
             Json list = Json::array();
-            for (const TokenConfig& token : config.tokens) list.push_back(WriteToken(token));
+            for (const TokenConfig& token : config.tokens) list.push_back(WriteObject(token, TokenOptionTable()));
             return list;
           }};
 }

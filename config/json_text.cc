@@ -3,36 +3,84 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstddef>
+#include <iterator>
 #include <set>
 
 namespace terrace::config {
 namespace {
+
+// Reads a text and tells how far it has come.
+class CountingIterator {
+ public:
+  using iterator_category = std::input_iterator_tag;
+  using value_type = char;
+  using difference_type = std::ptrdiff_t;
+  using pointer = const char*;
+  using reference = const char&;
+
+  // `at`: advances with the bytes read.
+  CountingIterator(const char* place, std::size_t& at) : place_(place), at_(&at) {}
+
+  reference operator*() const { return *place_; }
+  CountingIterator& operator++() {
+    ++place_;
+    ++*at_;
+    return *this;
+  }
+  friend bool operator==(const CountingIterator& a, const CountingIterator& b) { return a.place_ == b.place_; }
+  friend bool operator!=(const CountingIterator& a, const CountingIterator& b) { return a.place_ != b.place_; }
+
+ private:
+  const char* place_;
+  std::size_t* at_;
+};
+
+// Line and column of ever later places, in one pass through the text.
+class LineCounter {
+ public:
+  explicit LineCounter(std::string_view text) : text_(text) {}
+
+  // Precondition: `at` is not before the last one.
+  std::string PlaceOf(std::size_t at) {
+    for (; at_ < std::min(at, text_.size()); ++at_) {
+      if (text_[at_] != '\n') continue;
+      ++line_;
+      line_start_ = at_ + 1;
+    }
+    return fmt::format("line {}, column {}", line_, at - line_start_ + 1);
+  }
+
+ private:
+  const std::string_view text_;
+  std::size_t at_ = 0, line_ = 1, line_start_ = 0;
+};
 
 // Makes the value as the library does, and reports keys that an object has twice, of which the library silently keeps
 // the last. Not by the library's callback: to take values away that a callback refuses, that looks through the whole
 // list at the end of each object in it.
 class DuplicateKeyFinder : public nlohmann::detail::json_sax_dom_parser<Json> {
  public:
-  DuplicateKeyFinder(Json& value, std::vector<ConfigError>& errors) : json_sax_dom_parser(value), errors_(errors) {}
+  // `at`: how far the text was read.
+  DuplicateKeyFinder(std::string_view text, const std::size_t& at, Json& value, std::vector<ConfigError>& errors)
+      : json_sax_dom_parser(value), at_(at), lines_(text), errors_(errors) {}
 
   bool start_object(std::size_t size) {
-    Open(/*is_array=*/false);
+    seen_.emplace_back();
     return json_sax_dom_parser::start_object(size);
   }
-  bool start_array(std::size_t size) {
-    Open(/*is_array=*/true);
-    return json_sax_dom_parser::start_array(size);
-  }
   bool key(std::string& key) {
-    Level& level = levels_.back();
-    level.key = key;
-    if (!level.seen.insert(key).second) {
-      errors_.push_back({AppendKey(PathOf(level), key), "appears twice; keep one of them"});
+    // By its place, as any text may stand there.
+    if (!seen_.back().insert(key).second) {
+      errors_.push_back(
+          {"", lines_.PlaceOf(at_ - 1) + ": the key that ends here stands twice in its object; keep one"});
     }
     return json_sax_dom_parser::key(key);
   }
-  bool end_object() { return Close() && json_sax_dom_parser::end_object(); }
-  bool end_array() { return Close() && json_sax_dom_parser::end_array(); }
+  bool end_object() {
+    seen_.pop_back();
+    return json_sax_dom_parser::end_object();
+  }
 
   bool parse_error(std::size_t position, const std::string&, const nlohmann::detail::exception& error) {
     // It counts from 1 and is one past the end where the text stops too early.
@@ -43,45 +91,11 @@ class DuplicateKeyFinder : public nlohmann::detail::json_sax_dom_parser<Json> {
   std::size_t fault_at() const { return fault_at_; }
   const std::string& fault() const { return fault_; }
 
-  bool null() { return Advance() && json_sax_dom_parser::null(); }
-  bool boolean(bool value) { return Advance() && json_sax_dom_parser::boolean(value); }
-  bool number_integer(std::int64_t value) { return Advance() && json_sax_dom_parser::number_integer(value); }
-  bool number_unsigned(std::uint64_t value) { return Advance() && json_sax_dom_parser::number_unsigned(value); }
-  bool number_float(double value, const std::string& text) {
-    return Advance() && json_sax_dom_parser::number_float(value, text);
-  }
-  bool string(std::string& value) { return Advance() && json_sax_dom_parser::string(value); }
-
  private:
-  struct Level {
-    bool is_array = false;
-    std::string key;        // of the current value in an object
-    std::size_t index = 0;  // of the current value in a list
-    std::set<std::string> seen;
-  };
-
-  // JSON Pointer to the object that is `innermost`.
-  std::string PathOf(const Level& innermost) const {
-    std::string path;
-    for (const Level& level : levels_) {
-      if (&level == &innermost) break;
-      path = AppendKey(path, level.is_array ? std::to_string(level.index) : level.key);
-    }
-    return path;
-  }
-
-  void Open(bool is_array) { levels_.push_back({is_array, {}, 0, {}}); }
-  bool Close() {
-    levels_.pop_back();
-    return Advance();
-  }
-  bool Advance() {
-    if (!levels_.empty()) ++levels_.back().index;
-    return true;
-  }
-
+  const std::size_t& at_;
+  LineCounter lines_;
   std::vector<ConfigError>& errors_;
-  std::vector<Level> levels_;
+  std::vector<std::set<std::string>> seen_;  // keys of each object that is open
   std::size_t fault_at_ = 0;
   std::string fault_;
 };
@@ -119,10 +133,7 @@ std::string HintOf(std::string_view text, std::size_t at, std::string_view reaso
 }
 
 std::string DescribeFault(std::string_view text, std::size_t at, const std::string& reason) {
-  const std::string_view before = text.substr(0, at);
-  const auto line = 1 + std::count(before.begin(), before.end(), '\n');
-  const std::size_t line_start = before.rfind('\n') == std::string_view::npos ? 0 : before.rfind('\n') + 1;
-  return fmt::format("line {}, column {}: {}{}", line, at - line_start + 1, reason, HintOf(text, at, reason));
+  return fmt::format("{}: {}{}", LineCounter(text).PlaceOf(at), reason, HintOf(text, at, reason));
 }
 
 }  // namespace
@@ -134,8 +145,10 @@ Json ParseJsonText(std::string_view text, std::vector<ConfigError>& errors) {
     return Json(Json::value_t::discarded);
   }
   Json value;
-  DuplicateKeyFinder reader(value, errors);
-  if (Json::sax_parse(text, &reader)) return value;
+  std::size_t at = 0;
+  DuplicateKeyFinder reader(text, at, value, errors);
+  const CountingIterator begin(text.data(), at), end(text.data() + text.size(), at);
+  if (Json::sax_parse(begin, end, &reader)) return value;
   errors.push_back({"", DescribeFault(text, std::min(text.size(), reader.fault_at()), Reason(reader.fault()))});
   return Json(Json::value_t::discarded);
 }
@@ -152,13 +165,6 @@ std::string AppendKey(const std::string& path, std::string_view key) {
     }
   }
   return result;
-}
-
-std::string Quote(const Json& value) {
-  constexpr std::size_t kLongest = 60;
-  std::string text = value.dump(-1, ' ', /*ensure_ascii=*/true, Json::error_handler_t::replace);
-  if (text.size() > kLongest) text = text.substr(0, kLongest) + "...";
-  return text;
 }
 
 }  // namespace terrace::config

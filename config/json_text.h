@@ -1,5 +1,5 @@
 // JSON text to a JSON value, stricter than the library: a key that appears twice is an error, and syntax errors tell
-// the line and the column. Used inside this room only.
+// the line and the column. No error quotes the text. Used inside this room only.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -19,8 +19,5 @@ Json ParseJsonText(std::string_view text, std::vector<ConfigError>& errors);
 
 // `path` + "/" + `key`, escaped after RFC 6901.
 std::string AppendKey(const std::string& path, std::string_view key);
-
-// A value as an error message quotes it: on one line and not too long.
-std::string Quote(const Json& value);
 
 }  // namespace terrace::config

@@ -17,20 +17,20 @@ Json WaterToJson(const std::string& text) {
 void ReadWater(const Json& value, const Place& place, DatasetConfig& dataset) {
   const std::size_t keys = value.is_object() ? value.size() : 0;
   if (keys != 1 || !(value.contains("mask") || value.contains("sea_level"))) {
-    return place.Expected(R"({"mask": "water.tif"} or {"sea_level": 0}, one of both)", value);
+    return place.Expected(R"({"mask": "water.tif"} or {"sea_level": 0}, one of both)");
   }
   if (value.contains("sea_level")) {
     const Json& level = value["sea_level"];
     const double metres = level.is_number() ? level.get<double>() : std::nan("");
     if (!(std::abs(metres) <= kMostHeight)) {
-      return place.At("sea_level").Expected(fmt::format("a number from {} to {}", -kMostHeight, kMostHeight), level);
+      return place.At("sea_level").Expected(fmt::format("a number from {} to {}", -kMostHeight, kMostHeight));
     }
     dataset.water = {"", metres};
     return;
   }
   const Json& mask = value["mask"];
   if (!mask.is_string() || mask.get_ref<const std::string&>().empty()) {
-    return place.At("mask").Expected("the path of a raster", mask);
+    return place.At("mask").Expected("the path of a raster");
   }
   dataset.water = {place.Resolve(mask.get<std::string>()), std::nullopt};
 }
@@ -43,7 +43,7 @@ Json WriteWater(const DatasetConfig& dataset) {
 Codec<ImageryConfig> ImageryImage() {
   return {[](const Json& value, const Place& place, ImageryConfig& imagery) {
             if (!value.is_string() || value.get_ref<const std::string&>().empty()) {
-              return place.Expected("the path of an image", value);
+              return place.Expected("the path of an image");
             }
             imagery.image = place.Resolve(value.get<std::string>());
           },
@@ -70,7 +70,7 @@ Codec<DatasetConfig> WaterCodec() { return {ReadWater, WriteWater, WaterToJson};
 
 Codec<DatasetConfig> ImageryCodec() {
   return {[](const Json& value, const Place& place, DatasetConfig& dataset) {
-            if (!value.is_object()) return place.Expected(R"({"image": "photo.tif"})", value);
+            if (!value.is_object()) return place.Expected(R"({"image": "photo.tif"})");
             ReadObject(value, place, ImageryOptionTable(), dataset.imagery);
             if (!value.contains("image")) place.Fail("\"image\" is missing: the path of an image");
           },

@@ -39,23 +39,21 @@ std::optional<std::uint16_t> ParsePort(std::string_view text) {
 Result<ListenAddress> ParseListenAddress(std::string_view text) {
   const std::size_t colon = text.rfind(':');
   if (colon == std::string_view::npos || text.ends_with(']')) {
-    return MakeError(ErrorCode::kInvalidArgument, "\"{}\" has no port; write {}", text, kExamples);
+    return MakeError(ErrorCode::kInvalidArgument, "has no port; write {}", kExamples);
   }
   const std::optional<std::uint16_t> port = ParsePort(text.substr(colon + 1));
   std::string host(text.substr(0, colon));
   const bool bracketed = host.size() >= 2 && host.front() == '[' && host.back() == ']';
   if (bracketed) host = host.substr(1, host.size() - 2);
   if (!bracketed && host.find(':') != std::string::npos) {
-    return MakeError(ErrorCode::kInvalidArgument, "the IPv6 address in \"{}\" must stand in brackets, as in [::1]:8080",
-                     text);
+    return MakeError(ErrorCode::kInvalidArgument, "an IPv6 address must stand in brackets, as in [::1]:8080");
   }
   if (!port) {
-    return MakeError(ErrorCode::kInvalidArgument, "the port of \"{}\" must be a number from 0 (any free port) to 65535",
-                     text);
+    return MakeError(ErrorCode::kInvalidArgument, "the port must be a number from 0 (any free port) to 65535");
   }
   const bool valid_host = bracketed ? IsIpAddress(AF_INET6, host) : IsIpAddress(AF_INET, host) || IsHostName(host);
   if (!valid_host) {
-    return MakeError(ErrorCode::kInvalidArgument, "\"{}\" is not a host; write {}", text.substr(0, colon), kExamples);
+    return MakeError(ErrorCode::kInvalidArgument, "what stands before the port is not a host; write {}", kExamples);
   }
   return ListenAddress{std::move(host), *port};
 }

@@ -51,7 +51,7 @@ Codec<Target> Integer(Member Target::*member, std::int64_t min, std::int64_t max
   return {[=](const Json& value, const Place& place, Target& target) {
             const std::optional<std::int64_t> number = WholeNumber(value);
             if (!number || *number < min || *number > max) {
-              return place.Expected(fmt::format("a whole number from {} to {}", min, max), value);
+              return place.Expected(fmt::format("a whole number from {} to {}", min, max));
             }
             target.*member = static_cast<Member>(*number);
           },
@@ -60,15 +60,15 @@ Codec<Target> Integer(Member Target::*member, std::int64_t min, std::int64_t max
 
 template <typename Target>
 Codec<Target> Bytes(std::size_t Target::*member, std::int64_t max) {
-  return {[=](const Json& value, const Place& place, Target& target) {
-            const std::optional<std::int64_t> number = ByteCount(value);
-            if (!number || *number < 0 || *number > max) {
-              return place.Expected(
-                  fmt::format("a number of bytes up to {}, or text such as \"512MB\" or \"1GiB\"", max), value);
-            }
-            target.*member = static_cast<std::size_t>(*number);
-          },
-          [=](const Target& target) { return Json(target.*member); }, NumberToJson};
+  return {
+      [=](const Json& value, const Place& place, Target& target) {
+        const std::optional<std::int64_t> number = ByteCount(value);
+        if (!number || *number < 0 || *number > max) {
+          return place.Expected(fmt::format("a number of bytes up to {}, or text such as \"512MB\" or \"1GiB\"", max));
+        }
+        target.*member = static_cast<std::size_t>(*number);
+      },
+      [=](const Target& target) { return Json(target.*member); }, NumberToJson};
 }
 
 // Both ends belong to the range.
@@ -77,7 +77,7 @@ Codec<Target> Number(Member Target::*member, double min, double max) {
   return {[=](const Json& value, const Place& place, Target& target) {
             const double number = value.is_number() ? value.get<double>() : std::nan("");
             if (!(number >= min && number <= max)) {
-              return place.Expected(fmt::format("a number from {} to {}", min, max), value);
+              return place.Expected(fmt::format("a number from {} to {}", min, max));
             }
             target.*member = number;
           },
@@ -91,7 +91,7 @@ Codec<Target> Number(Member Target::*member, double min, double max) {
 template <typename Target>
 Codec<Target> Switch(bool Target::*member) {
   return {[=](const Json& value, const Place& place, Target& target) {
-            if (!value.is_boolean()) return place.Expected("true or false", value);
+            if (!value.is_boolean()) return place.Expected("true or false");
             target.*member = value.get<bool>();
           },
           [=](const Target& target) { return Json(target.*member); }, SwitchToJson};
@@ -102,7 +102,7 @@ Codec<Target> Seconds(std::chrono::milliseconds Target::*member, double min, dou
   return {[=](const Json& value, const Place& place, Target& target) {
             const double seconds = value.is_number() ? value.get<double>() : std::nan("");
             if (!(seconds >= min && seconds <= max)) {
-              return place.Expected(fmt::format("a number of seconds from {} to {}", min, max), value);
+              return place.Expected(fmt::format("a number of seconds from {} to {}", min, max));
             }
             target.*member = std::chrono::milliseconds(std::llround(seconds * 1000));
           },
@@ -122,7 +122,7 @@ Codec<Target> Choice(Member Target::*member, std::vector<std::pair<Json, Member>
               }
               allowed += (allowed.empty() ? "" : " or ") + word.dump();
             }
-            place.Expected(allowed, value);
+            place.Expected(allowed);
           },
           [=](const Target& target) {
             for (const auto& [word, meaning] : words) {
@@ -137,9 +137,9 @@ Codec<Target> Choice(Member Target::*member, std::vector<std::pair<Json, Member>
 template <typename Target>
 Codec<Target> Text(std::string Target::*member, const std::function<std::string(const std::string&)>& check) {
   return {[=](const Json& value, const Place& place, Target& target) {
-            if (!value.is_string()) return place.Expected("text", value);
+            if (!value.is_string()) return place.Expected("text");
             const std::string problem = check(value.get_ref<const std::string&>());
-            if (!problem.empty()) return place.Fail(Quote(value) + " " + problem);
+            if (!problem.empty()) return place.Fail(problem);
             target.*member = value.get<std::string>();
           },
           [=](const Target& target) { return Json(target.*member); }, TextToJson};

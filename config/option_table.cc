@@ -22,7 +22,7 @@ std::string CheckCacheControl(const std::string& text) {
 
 Codec<Config> Listen() {
   return {[](const Json& value, const Place& place, Config& config) {
-            if (!value.is_string()) return place.Expected("text such as \"127.0.0.1:8080\"", value);
+            if (!value.is_string()) return place.Expected("text such as \"127.0.0.1:8080\"");
             Result<ListenAddress> address = ParseListenAddress(value.get_ref<const std::string&>());
             if (!address) return place.Fail(address.error().message);
             config.listen = *std::move(address);
@@ -31,25 +31,25 @@ Codec<Config> Listen() {
 }
 
 Codec<Config> Viewer() {
-  return {
-      [](const Json& value, const Place& place, Config& config) {
-        if (value.is_boolean()) {
-          config.viewer = {value.get<bool>(), {}};
-        } else if (value.is_string() && !value.get_ref<const std::string&>().empty()) {
-          config.viewer = {true, place.Resolve(value.get<std::string>())};
-        } else {
-          place.Expected("the folder of a viewer, true (the viewer that comes with terrace) or false (none)", value);
-        }
-      },
-      [](const Config& config) {
-        return config.viewer.directory.empty() ? Json(config.viewer.enabled) : Json(config.viewer.directory.string());
-      },
-      SwitchToJson};
+  return {[](const Json& value, const Place& place, Config& config) {
+            if (value.is_boolean()) {
+              config.viewer = {value.get<bool>(), {}};
+            } else if (value.is_string() && !value.get_ref<const std::string&>().empty()) {
+              config.viewer = {true, place.Resolve(value.get<std::string>())};
+            } else {
+              place.Expected("the folder of a viewer, true (the viewer that comes with terrace) or false (none)");
+            }
+          },
+          [](const Config& config) {
+            return config.viewer.directory.empty() ? Json(config.viewer.enabled)
+                                                   : Json(config.viewer.directory.string());
+          },
+          SwitchToJson};
 }
 
 Codec<Config> CacheDir() {
   return {[](const Json& value, const Place& place, Config& config) {
-            if (!value.is_string()) return place.Expected("the path of a folder", value);
+            if (!value.is_string()) return place.Expected("the path of a folder");
             const auto& path = value.get_ref<const std::string&>();
             config.cache_dir = path.empty() ? path : place.Resolve(path);
           },
@@ -59,7 +59,7 @@ Codec<Config> CacheDir() {
 Codec<Config> AccessLogFile() {
   return {[](const Json& value, const Place& place, Config& config) {
             if (!value.is_string() || value.get_ref<const std::string&>().empty()) {
-              return place.Expected("the path of a file", value);
+              return place.Expected("the path of a file");
             }
             config.access_log_file = place.Resolve(value.get<std::string>());
           },
@@ -69,7 +69,7 @@ Codec<Config> AccessLogFile() {
 
 Codec<Config> Datasets() {
   return {[](const Json& value, const Place& place, Config& config) {
-            if (!value.is_array()) return place.Expected("a list of datasets", value);
+            if (!value.is_array()) return place.Expected("a list of datasets");
             for (std::size_t i = 0; i < value.size(); ++i) {
               DatasetConfig& dataset = config.datasets.emplace_back();
               ReadObject(value[i], place.At(i), DatasetOptionTable(), dataset);
@@ -227,19 +227,24 @@ const std::vector<Option<DatasetConfig>>& DatasetOptionTable() {
 template <typename Target>
 void ReadObject(const Json& object, const Place& place, const std::vector<Option<Target>>& table, Target& target) {
   if (!object.is_object())
-    return place.Expected("an object with keys such as \"" + std::string(table.front().key) + "\"", object);
+    return place.Expected("an object with keys such as \"" + std::string(table.front().key) + "\"");
   std::vector<std::string_view> keys;
   keys.reserve(table.size());
   for (const Option<Target>& option : table) keys.push_back(option.key);
+  std::size_t number = 0;
   for (const auto& [key, value] : object.items()) {
+    ++number;
     const auto found = std::find(keys.begin(), keys.end(), key);
     if (found != keys.end()) {
       table[static_cast<std::size_t>(found - keys.begin())].codec.read(value, place.At(key), target);
       continue;
     }
     const std::string_view nearest = NearestName(key, keys);
-    place.At(key).Fail(nearest.empty() ? fmt::format("unknown key; known are {}", fmt::join(keys, ", "))
-                                       : fmt::format("unknown key; did you mean \"{}\"?", nearest));
+    if (nearest.empty()) {
+      place.Fail(fmt::format("key {} of this object is unknown; known are {}", number, fmt::join(keys, ", ")));
+    } else {
+      place.At(key).Fail(fmt::format("unknown key; did you mean \"{}\"?", nearest));
+    }
   }
 }
 

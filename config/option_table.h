@@ -21,7 +21,8 @@ struct Option {
 const std::vector<Option<Config>>& ServerOptionTable();
 const std::vector<Option<DatasetConfig>>& DatasetOptionTable();
 
-// Reads every key of `object` by the table; unknown keys are errors.
+// Reads every key of `object` by the table; unknown keys are errors, told by their number, and by their name where that
+// resembles a known one.
 template <typename Target>
 void ReadObject(const Json& object, const Place& place, const std::vector<Option<Target>>& table, Target& target);
 

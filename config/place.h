@@ -1,5 +1,8 @@
 // Where in the configuration a value was read: what it is relative to, and where its errors go. Used inside this room
 // only.
+//
+// No message quotes a value, nor a key that resembles no known one: a token may stand in any place by mistake, and
+// messages go into logs.
 #pragma once
 
 #include <filesystem>
@@ -33,17 +36,14 @@ class Place {
   Place At(std::size_t index) const { return At(std::to_string(index)); }
 
   void Fail(std::string message) const { errors_->push_back({path_, std::move(message)}); }
-  // "must be a number from 0 to 1, not "abc""
-  void Expected(std::string_view what, const Json& found) const {
-    Fail("must be " + std::string(what) + ", not " + Quote(found));
-  }
+  void Expected(std::string_view what) const { Fail("must be " + std::string(what)); }
 
   // What relative paths are relative to.
   const std::filesystem::path& directory() const { return directory_; }
   // A path in full, as it is used from then on.
   std::string Resolve(const std::filesystem::path& path) const {
     if (!is_command_line_) return (directory_ / path).string();
-    if (directory_.empty() && path.is_relative()) Fail(path.string() + " " + kNoWorkingDirectory);
+    if (directory_.empty() && path.is_relative()) Fail(kNoWorkingDirectory);
     return FromWorkingDirectory(directory_, path);
   }
 

@@ -34,7 +34,7 @@ std::optional<std::string> ReadVertical(const Json& value, const Place& place) {
   const std::string text = value.is_string() ? value.get<std::string>() : "";
   if (IsVerticalName(text)) return text;
   if (IsGrid(text) && !HasControlCharacter(text)) return place.Resolve(text);
-  place.Expected(kVerticalExpected, value);
+  place.Expected(kVerticalExpected);
   return std::nullopt;
 }
 
@@ -45,7 +45,7 @@ std::optional<NodataConfig> ReadNodata(const Json& value, const Place& place) {
   const Json list = value.is_array() ? value : Json::array({value});
   for (const Json& number : list) {
     if (!number.is_number()) {
-      place.Expected(kNodataExpected, value);
+      place.Expected(kNodataExpected);
       return std::nullopt;
     }
     nodata.values.push_back(number.get<double>());
@@ -65,7 +65,7 @@ Json WriteNodata(const NodataConfig& nodata) {
 Codec<SourceConfig> SourcePath() {
   return {[](const Json& value, const Place& place, SourceConfig& source) {
             if (!value.is_string() || value.get_ref<const std::string&>().empty()) {
-              return place.Expected("a path, a glob or a folder", value);
+              return place.Expected("a path, a glob or a folder");
             }
             source.written = value.get<std::string>();
           },
@@ -104,7 +104,7 @@ void ReadSource(const Json& value, const Place& place, DatasetConfig& dataset) {
   Result<SourceConfig> expanded = ExpandSource(source.written, place.directory());
   if (!expanded) {
     return (is_object ? place.At("path") : place)
-        .Fail(expanded.error().message + "; correct the path, which is relative to the folder of this file");
+        .Fail(expanded.error().message + "; correct the path, which counts from " + place.directory().string());
   }
   expanded->vertical = std::move(source.vertical);
   expanded->nodata = std::move(source.nodata);
@@ -116,7 +116,7 @@ void ReadSource(const Json& value, const Place& place, DatasetConfig& dataset) {
 Codec<DatasetConfig> SourcesCodec() {
   return {[](const Json& value, const Place& place, DatasetConfig& dataset) {
             if (!value.is_array() || value.empty()) {
-              return place.Expected("a list of paths such as [\"lidar/*.tif\", \"base.tif\"]", value);
+              return place.Expected("a list of paths such as [\"lidar/*.tif\", \"base.tif\"]");
             }
             for (std::size_t i = 0; i < value.size(); ++i) ReadSource(value[i], place.At(i), dataset);
           },
@@ -150,7 +150,7 @@ Codec<Config> TextList(std::vector<std::string> Config::*member, const char* exp
             for (const Json& item : value.is_array() ? value : Json::array({value})) {
               if (!item.is_string() || item.get_ref<const std::string&>().empty() ||
                   HasControlCharacter(item.get<std::string>())) {
-                return place.Expected(expected, value);
+                return place.Expected(expected);
               }
               const auto text = item.get<std::string>();
               texts.push_back(is_path ? place.Resolve(text) : text);

@@ -31,8 +31,8 @@ Result<SourceConfig> FilesIn(const std::string& folder) {
     std::error_code ignored;
     if (!name.starts_with('.') && it->is_regular_file(ignored)) source.files.push_back(it->path().string());
   }
-  if (error) return MakeError(ErrorCode::kUnavailable, "the folder {} cannot be read", folder);
-  if (source.files.empty()) return MakeError(ErrorCode::kNotFound, "the folder {} holds no file", folder);
+  if (error) return MakeError(ErrorCode::kUnavailable, "the folder cannot be read");
+  if (source.files.empty()) return MakeError(ErrorCode::kNotFound, "the folder holds no file");
   std::sort(source.files.begin(), source.files.end());
   return source;
 }
@@ -50,9 +50,8 @@ Result<SourceConfig> ExpandSource(const std::string& written, const std::filesys
   glob_t matches{};
   const std::unique_ptr<glob_t, void (*)(glob_t*)> owner(&matches, globfree);
   const int status = glob(pattern.c_str(), GLOB_ERR | GLOB_NOSORT, nullptr, &matches);
-  if (status == GLOB_NOMATCH) return MakeError(ErrorCode::kNotFound, "no file matches {}", path);
-  if (status != 0)
-    return MakeError(ErrorCode::kUnavailable, "a folder on the way to {} is missing or cannot be read", path);
+  if (status == GLOB_NOMATCH) return MakeError(ErrorCode::kNotFound, "no file matches");
+  if (status != 0) return MakeError(ErrorCode::kUnavailable, "a folder on the way is missing or cannot be read");
   SourceConfig source(pattern.string());
   source.files.assign(matches.gl_pathv, matches.gl_pathv + matches.gl_pathc);
   std::sort(source.files.begin(), source.files.end());  // glob itself would sort by locale

@@ -219,7 +219,7 @@ server::EdgeOptions EdgeOf(const config::Config& config) {
   edge.request_burst = config.request_burst;
   edge.transfer_bytes = config.transfer_bytes;
   for (const config::TokenConfig& token : config.tokens) {
-    edge.tokens.push_back({token.name, token.token, token.sha256, token.datasets, token.requests_per_second});
+    edge.tokens.push_back({token.name, "", token.sha256, token.datasets, token.requests_per_second});
   }
   for (const config::DatasetConfig& dataset : config.datasets) {
     if (dataset.is_public) edge.public_datasets.push_back(dataset.name);

@@ -1,35 +1,16 @@
 #include "server/http/access.h"
 
-#include <openssl/evp.h>
+#include <algorithm>
+#include <string>
 
-#include <array>
-#include <optional>
-
-#include "engine/core/check.h"
+#include "config/token_hash.h"
 #include "server/http/text.h"
 
 namespace terrace::server {
 namespace {
 
-constexpr std::size_t kHashBytes = 32;
-
-std::string Sha256(std::string_view text) {
-  std::array<unsigned char, EVP_MAX_MD_SIZE> hash{};
-  unsigned size = 0;
-  static const EVP_MD* const kAlgorithm = ::EVP_sha256();
-  TERRACE_CHECK(::EVP_Digest(text.data(), text.size(), hash.data(), &size, kAlgorithm, nullptr) == 1);
-  return {reinterpret_cast<const char*>(hash.data()), size};
-}
-
-std::optional<std::string> FromHex(std::string_view text) {
-  if (text.size() != 2 * kHashBytes) return std::nullopt;
-  std::string bytes;
-  for (std::size_t i = 0; i < text.size(); i += 2) {
-    const int high = HexDigit(text[i]), low = HexDigit(text[i + 1]);
-    if (high < 0 || low < 0) return std::nullopt;
-    bytes += static_cast<char>(high * 16 + low);
-  }
-  return bytes;
+bool IsHash(std::string_view text) {
+  return text.size() == 64 && std::all_of(text.begin(), text.end(), [](char c) { return HexDigit(c) >= 0; });
 }
 
 }  // namespace
@@ -38,8 +19,8 @@ Result<AccessPolicy> AccessPolicy::Make(const std::vector<TokenOptions>& tokens,
                                         const std::vector<std::string>& public_datasets) {
   AccessPolicy policy;
   for (const TokenOptions& options : tokens) {
-    const std::optional<std::string> hash = options.sha256.empty() ? Sha256(options.token) : FromHex(options.sha256);
-    if (!hash) {
+    const std::string hash = options.sha256.empty() ? config::TokenHash(options.token) : Lower(options.sha256);
+    if (!IsHash(hash)) {
       return MakeError(ErrorCode::kInvalidArgument,
                        "token \"{}\": sha256 must be 64 hexadecimal digits, as sha256sum prints them", options.name);
     }
@@ -49,7 +30,7 @@ Result<AccessPolicy> AccessPolicy::Make(const std::vector<TokenOptions>& tokens,
     grant.datasets = {options.datasets.begin(), options.datasets.end()};
     grant.datasets.insert(public_datasets.begin(), public_datasets.end());
     grant.requests_per_second = options.requests_per_second;
-    if (!policy.grants_.emplace(*hash, std::make_shared<const Grant>(std::move(grant))).second) {
+    if (!policy.grants_.emplace(hash, std::make_shared<const Grant>(std::move(grant))).second) {
       return MakeError(ErrorCode::kInvalidArgument, "token \"{}\": another token is the same; make a new one",
                        options.name);
     }
@@ -62,7 +43,7 @@ Result<AccessPolicy> AccessPolicy::Make(const std::vector<TokenOptions>& tokens,
 }
 
 GrantPtr AccessPolicy::Find(std::string_view token) const {
-  const auto found = grants_.find(Sha256(token));
+  const auto found = grants_.find(config::TokenHash(token));
   return found == grants_.end() ? nullptr : found->second;
 }
 

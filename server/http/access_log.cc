@@ -13,6 +13,8 @@
 #include <system_error>
 #include <utility>
 
+#include "server/http/shown_target.h"
+
 namespace terrace::server {
 namespace {
 
@@ -49,6 +51,16 @@ std::string Latin1(std::string_view text) {
   return utf8;
 }
 
+std::string TargetOf(const ReplyRecord& record) {
+  const bool is_known = record.route != "none" && record.route != "preflight";
+  return ShownTarget(record.target, is_known);
+}
+
+// Those of HTTP are shorter than a token.
+std::string_view MethodOf(const ReplyRecord& record) {
+  return record.method.size() < kMinTokenBytes ? record.method : "...";
+}
+
 // The peer without its port: IPv6 addresses have colons of their own.
 std::string_view ClientOf(const ReplyRecord& record) {
   return record.client.empty() ? record.peer.substr(0, record.peer.rfind(':')) : record.client;
@@ -80,9 +92,9 @@ tl::unexpected<Error> CannotOpen(const std::filesystem::path& file) {
 
 std::string FormatAccessLine(const ReplyRecord& record) {
   std::string line =
-      fmt::format("{} \"{}\" {} {} B {:.3f} ms cache={} id={} peer={}", Escaped(record.method), Escaped(record.target),
-                  record.status, record.body_bytes, static_cast<double>(record.duration.count()) / 1000, record.cache,
-                  record.request_id, record.peer);
+      fmt::format("{} \"{}\" {} {} B {:.3f} ms cache={} id={} peer={}", Escaped(MethodOf(record)),
+                  Escaped(TargetOf(record)), record.status, record.body_bytes,
+                  static_cast<double>(record.duration.count()) / 1000, record.cache, record.request_id, record.peer);
   if (!record.client.empty()) line.append(" client=").append(record.client);
   if (!record.token_name.empty()) line.append(" token=").append(Escaped(record.token_name));
   return line;
@@ -90,7 +102,7 @@ std::string FormatAccessLine(const ReplyRecord& record) {
 
 std::string FormatCombinedLine(const ReplyRecord& record, SystemClock::time_point now) {
   return fmt::format("{} - - [{:%d/%b/%Y:%H:%M:%S} +0000] \"{} {} {}\" {} {} \"{}\" \"{}\"", ClientOf(record),
-                     fmt::gmtime(SystemClock::to_time_t(now)), Escaped(record.method), Escaped(record.target),
+                     fmt::gmtime(SystemClock::to_time_t(now)), Escaped(MethodOf(record)), Escaped(TargetOf(record)),
                      ProtocolOf(record), record.status, record.body_bytes, EscapedOrDash(record.referer),
                      EscapedOrDash(record.user_agent));
 }
@@ -100,8 +112,8 @@ std::string FormatJsonLine(const ReplyRecord& record, SystemClock::time_point no
   nlohmann::ordered_json line;
   line["time"] = fmt::format("{:%Y-%m-%dT%H:%M:%S}.{:03}Z", fmt::gmtime(SystemClock::to_time_t(now)), ms);
   line["client"] = Latin1(ClientOf(record));
-  line["method"] = Latin1(record.method);
-  line["target"] = Latin1(record.target);
+  line["method"] = Latin1(MethodOf(record));
+  line["target"] = Latin1(TargetOf(record));
   line["protocol"] = ProtocolOf(record);
   line["status"] = record.status;
   line["bytes"] = record.body_bytes;

@@ -15,6 +15,7 @@
 
 #include "server/asio.h"
 #include "server/http/query.h"
+#include "server/http/shown_target.h"
 #include "server/http/text.h"
 
 namespace terrace::server {
@@ -105,9 +106,9 @@ RequestFields FieldsOf(const Fields& sent) {
   fields.forwarded_for = Joined(sent, "X-Forwarded-For");
   fields.forwarded_host = Joined(sent, "X-Forwarded-Host");
   fields.forwarded_proto = Joined(sent, "X-Forwarded-Proto");
-  const auto referer = sent[http::field::referer];
-  fields.referer = std::string(referer.substr(0, referer.find('?')));
+  fields.referer = ShownReferer(sent[http::field::referer]);
   fields.user_agent = std::string(sent[http::field::user_agent]);
+  fields.has_authorization = sent.count(http::field::authorization) > 0;
   fields.bearer = BearerOf(sent);
   fields.content_type = std::string(sent[http::field::content_type]);
   fields.content_encoding = Joined(sent, http::field::content_encoding);
@@ -119,6 +120,7 @@ void SetTarget(Request& request, std::string_view target) {
   request.target = std::string(target);
   std::optional<std::string> in_query = TakeToken(request.target);
   request.token_in_query = !request.fields->bearer && in_query.has_value();
+  request.may_hold_secret = request.fields->has_authorization || in_query || !IsPlainTarget(request.target);
   request.token = request.fields->bearer ? *request.fields->bearer : std::move(in_query).value_or("");
 }
 
@@ -192,14 +194,14 @@ std::optional<std::string> TakeToken(std::string& target) {
   const std::size_t question = target.find('?');
   if (question == std::string::npos) return std::nullopt;
   std::string_view rest = std::string_view(target).substr(question + 1);
-  if (rest.find("token") == std::string_view::npos && rest.find('%') == std::string_view::npos) return std::nullopt;
+  if (rest.find("token") == std::string_view::npos) return std::nullopt;
   std::optional<std::string> token;
   std::string kept;
   while (!rest.empty()) {
     const std::string_view piece = rest.substr(0, rest.find('&'));
     rest.remove_prefix(std::min(rest.size(), piece.size() + 1));
     const std::size_t equals = std::min(piece.find('='), piece.size());
-    if (PercentDecode(piece.substr(0, equals)) == "token") {
+    if (piece.substr(0, equals) == "token") {
       std::string value = PercentDecode(piece.substr(std::min(equals + 1, piece.size()))).value_or("");
       // No token has a blank in it.
       token = !token || *token == value ? std::move(value) : *token + " " + value;
@@ -257,6 +259,7 @@ Request FirstLineOf(std::string_view bytes) {
   request.method = ToMethod(http::string_to_verb(method));
   line.remove_prefix(blank + 1);
   SetTarget(request, line.substr(0, line.find(' ')));
+  request.may_hold_secret = true;  // its header was not read
   return request;
 }
 

@@ -32,7 +32,8 @@ struct RequestFields {
   std::string origin;
   // What a proxy before the server may have written, or the client: see ResolveClient.
   std::string forwarded, forwarded_for, forwarded_host, forwarded_proto;
-  std::string referer, user_agent;    // for the log; the referer without its query, which may hold a token
+  std::string referer, user_agent;    // for the log; the referer as ShownReferer
+  bool has_authorization = false;     // of whatever scheme
   std::optional<std::string> bearer;  // of the Authorization header; a secret
   std::string content_type;
   std::string content_encoding;
@@ -97,6 +98,9 @@ struct Request {
   std::string target;       // as sent, but for the token in its query
   std::string token;        // of the Authorization header, else of the query; a secret: never logged, never a key
   bool token_in_query = false;
+  // False: there is neither an Authorization header, nor a token in the query, nor what may be one in another spelling
+  // (IsPlainTarget). Else the reply is for its sender alone.
+  bool may_hold_secret = true;
   SharedFields fields;
   std::size_t content_length = 0;  // of a POST
   bool expects_continue = false;   // the client waits for a 100 before it sends the body
@@ -122,7 +126,7 @@ tl::expected<std::size_t, BadRequest> FindHeadEnd(std::string_view bytes, std::s
 
 // What the first line of `bytes` says of a message that is refused, for the log and for the form of the reply: its
 // method and the beginning of its target, as far as they can be told; kOther and nothing else where they cannot.
-// Nothing of it is answered.
+// Nothing of it is answered. It may hold a secret, as its header was not read.
 Request FirstLineOf(std::string_view bytes);
 
 // The header of a connection's last request without a body, byte by byte: the next one that repeats it needs no parsing
@@ -145,7 +149,8 @@ std::size_t TakeRepeated(std::string_view bytes, const HeadMemo& memo, Request& 
 bool IsHostValue(std::string_view value);
 
 // Cuts every `token` parameter out of the query of `target` and returns its value, decoded; nothing where there is
-// none. Clients append it on their own, as often as they follow a link; different values are none that fits.
+// none. Clients append it on their own, as often as they follow a link; different values are none that fits. Other
+// spellings of the name stay, and are refused with the request (Match) or ignored.
 std::optional<std::string> TakeToken(std::string& target);
 
 }  // namespace terrace::server

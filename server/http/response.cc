@@ -88,13 +88,9 @@ void PutContent(std::string& head, const Response& response) {
   if (!response.etag.empty()) Put(head, "ETag", response.etag);
 }
 
-void PutCacheControl(std::string& head, const Response& response) {
-  if (response.cache_control.empty()) return;
-  if (response.for_grant) {
-    Put(head, "Cache-Control", PrivateCacheControl(response.cache_control));
-  } else {
-    Put(head, "Cache-Control", response.cache_control);
-  }
+void PutCacheControl(std::string& head, const Response& response, bool is_private) {
+  if (is_private) return Put(head, "Cache-Control", PrivateCacheControl(response.cache_control));
+  if (!response.cache_control.empty()) Put(head, "Cache-Control", response.cache_control);
 }
 
 void PutVary(std::string& head, const Response& response, const CorsPolicy& cors) {
@@ -130,7 +126,7 @@ std::string SerializeHead(const Response& response, const HeadOptions& options) 
   PutStatus(head, options.version, response.status);
   PutDate(head);
   PutContent(head, response);
-  PutCacheControl(head, response);
+  PutCacheControl(head, response, response.for_grant || options.is_private);
   PutVary(head, response, cors);
   head += response.more_lines;
   for (const Response::Header& header : response.headers) Put(head, header.name, header.value);

@@ -57,13 +57,14 @@ struct Response {
 struct HeadOptions {
   unsigned version = 11;  // the request's: an HTTP/1.0 client that is told 1.1 waits for ever
   bool keep_alive = false;
+  bool is_private = false;           // the request may hold a secret: caches that others share must not keep the reply
   const CorsPolicy* cors = nullptr;  // null: any page may read the reply
   std::string_view origin = {};      // the request's
 };
 
 std::string SerializeHead(const Response& response, const HeadOptions& options);
 
-// Cache-Control of a reply that depends on a token: as configured, but for the client alone.
+// Cache-Control of a reply for one client alone: otherwise as configured.
 std::string PrivateCacheControl(std::string_view configured);
 
 // 204 to an OPTIONS request: what a browser asks before it sends a request with headers of its own.

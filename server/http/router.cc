@@ -153,6 +153,17 @@ std::optional<Route> MatchFixed(const Segments& segments) {
   return std::nullopt;
 }
 
+// No parameter's name needs it, and who does not undo it does not know the parameter: in token%3D or %74oken= a token
+// would be told to everybody who reads the URL.
+bool HasEncodedName(std::string_view query) {
+  if (query.find('%') == std::string_view::npos) return false;
+  while (!query.empty()) {
+    const std::string_view piece = NextPiece(query, '&');
+    if (piece.substr(0, piece.find('=')).find('%') != std::string_view::npos) return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 std::string_view ToString(RouteKind kind) {
@@ -224,6 +235,10 @@ Result<Route> Match(std::string_view target) {
     if (IsReservedName(route->dataset)) return NotFound();
   }
   route->query = std::string(origin->substr(std::min(question + 1, origin->size())));
+  // The viewer's pages keep their state in the query, which is nothing to the server.
+  if (route->kind != RouteKind::kViewer && HasEncodedName(route->query)) {
+    return MakeError(ErrorCode::kInvalidArgument, "a parameter's name has a percent sign; write it plainly");
+  }
   return std::move(*route);
 }
 

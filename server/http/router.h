@@ -43,8 +43,8 @@ struct Route {
 constexpr bool TakesPost(RouteKind kind) { return kind == RouteKind::kHeights; }
 
 // `target` in origin form ("/maui/0/0/0.terrain?error=5") or absolute form ("http://host/...").
-// kInvalidArgument: neither form, or malformed percent-encoding. kNotFound: no such URL; tile numbers that are not
-// plain decimal numbers, or lie outside the tiling scheme, name no tile.
+// kInvalidArgument: neither form, malformed percent-encoding, or a parameter whose name has any. kNotFound: no such
+// URL; tile numbers that are not plain decimal numbers, or lie outside the tiling scheme, name no tile.
 Result<Route> Match(std::string_view target);
 
 }  // namespace terrace::server

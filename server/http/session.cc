@@ -415,6 +415,7 @@ asio::awaitable<bool> Session::Reply(Response& response, const Route* route) {
   HeadOptions options;
   options.version = request.version;
   options.keep_alive = request.keep_alive && !response.close && !reader_.closing();
+  options.is_private = request.may_hold_secret;
   options.cors = &context_->cors;
   options.origin = request.fields->origin;
   const std::string head = SerializeHead(response, options);

@@ -44,7 +44,7 @@ TEST(SetServerOption, TakesListsWithCommas) {
   EXPECT_THAT(Set("cors_origins", "", config), IsEmpty());
   EXPECT_THAT(config.cors_origins, IsEmpty());
   EXPECT_THAT(Set("trusted_proxies", "[::1],10.0.0.0/8", config),
-              ElementsAre(IsError("--trusted-proxies", "\"[::1]\" must be an address")));
+              ElementsAre(IsError("--trusted-proxies", "must be an address")));
   EXPECT_THAT(Set("trusted_proxies", "::1,10.0.0.0/8", config), IsEmpty());
   EXPECT_THAT(Set("tls", "/a.pem,/b.key", config), IsEmpty());
   EXPECT_EQ(config.tls, (TlsConfig{"/a.pem", "/b.key"}));
@@ -53,10 +53,11 @@ TEST(SetServerOption, TakesListsWithCommas) {
 
 TEST(SetServerOption, ReportsTheFlag) {
   Config config;
-  EXPECT_THAT(Set("cache_bytes", "lots", config), ElementsAre(IsError("--cache-bytes", "not \"lots\"")));
-  EXPECT_THAT(Set("io_threads", "", config), ElementsAre(IsError("--io-threads", "from 1 to 64, not \"\"")));
-  EXPECT_THAT(Set("io_threads", "2x", config), ElementsAre(IsError("--io-threads", "not \"2x\"")));
-  EXPECT_THAT(Set("request_deadline_s", "nan", config), ElementsAre(IsError("--request-deadline-s", "not \"nan\"")));
+  EXPECT_THAT(Set("cache_bytes", "lots", config), ElementsAre(IsError("--cache-bytes", "such as \"512MB\"")));
+  EXPECT_THAT(Set("io_threads", "", config), ElementsAre(IsError("--io-threads", "from 1 to 64")));
+  EXPECT_THAT(Set("io_threads", "2x", config), ElementsAre(IsError("--io-threads", "from 1 to 64")));
+  EXPECT_THAT(Set("request_deadline_s", "nan", config),
+              ElementsAre(IsError("--request-deadline-s", "a number of seconds")));
   EXPECT_THAT(Set("viewer", "", config), ElementsAre(IsError("--viewer", "the folder of a viewer")));
   EXPECT_EQ(config, Config{});
 }
@@ -129,7 +130,7 @@ TEST(SetDatasetOption, SetsOneDataset) {
   EXPECT_EQ(dataset.name, "2024");
   SetDatasetOption("error_fraction", "2", "/start", dataset, errors);
   SetDatasetOption("name", "livez", "/start", dataset, errors);
-  EXPECT_THAT(errors, ElementsAre(IsError("--error-fraction", "a number from 0.05 to 1, not 2"),
+  EXPECT_THAT(errors, ElementsAre(IsError("--error-fraction", "a number from 0.05 to 1"),
                                   IsError("--name", "is a URL of the server itself")));
 }
 

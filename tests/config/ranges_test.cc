@@ -54,7 +54,7 @@ TEST(Ranges, AreNamedInTheError) {
   EXPECT_THAT(ErrorsOf(R"({"cache_bytes": "2TiB"})"),
               testing::ElementsAre(IsError("/cache_bytes", "a number of bytes up to 1099511627776")));
   EXPECT_THAT(ErrorsOf(R"({"drain_timeout_s": -0.1})"),
-              testing::ElementsAre(IsError("/drain_timeout_s", "a number of seconds from 0 to 3600, not -0.1")));
+              testing::ElementsAre(IsError("/drain_timeout_s", "a number of seconds from 0 to 3600")));
 }
 
 }  // namespace

@@ -66,7 +66,7 @@ TEST(ToJson, ComesBackWithEveryOptionSet) {
   config.transfer_bytes = 5;
   config.requests_per_second = 0.25;
   config.request_burst = 7;
-  config.tokens = {{"a", "0123456789abcdef", "", {"a", "b"}, 2.5}, {"b", "", std::string(64, 'f'), {}, 0}};
+  config.tokens = {{"a", std::string(64, '0'), {"a", "b"}, 2.5}, {"b", std::string(64, 'f'), {}, 0}};
   config.cors_origins = {"https://maps.example"};
   config.trusted_proxies = {"10.0.0.0/8", "::1"};
   config.forwarded_header = ForwardedHeader::kForwarded;

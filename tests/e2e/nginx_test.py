@@ -144,6 +144,12 @@ class Proxied(unittest.TestCase):
             self.assertEqual(self.get(target).fields["x-cache"], "HIT")
         self.assertEqual(len(self.log_lines()), asked)
 
+    def test_requests_with_known_parameters_are_cached(self):
+        for target in ("/earth/4/8/11.terrain?v=1.0.0&error=50&atleast=1", "/earth/3/4/5.terrain?extensions=octvertexnormals-watermask",
+                       "/earth/heights?locations=1,2%7C3%2C4", "/earth/tileset.json?error=50&compression=meshopt",
+                       "/earth/3/2/3.png?encoding=terrarium&size=512"):
+            self.assertEqual([self.get(target).fields["x-cache"] for _ in range(2)], ["MISS", "HIT"], target)
+
     def test_codings_are_kept_apart(self):
         target = "/earth/4/10/10.terrain"
         plain = self.direct(target).body
@@ -198,10 +204,22 @@ class Proxied(unittest.TestCase):
     def test_what_depends_on_a_token_is_not_cached(self):
         target = "/secret/9/272/359.terrain"
         token = f"Authorization: Bearer {TOKEN}"
-        for headers, query, found in (([token], "", "MISS"), ([], f"?token={TOKEN}", "BYPASS")):
+        for headers, query in (([token], ""), ([], f"?token={TOKEN}")):
             for _ in range(2):
                 reply = self.get(target + query, headers=headers)
-                self.assertEqual((reply.status, reply.fields["x-cache"]), (200, found))
+                self.assertEqual((reply.status, reply.fields["x-cache"]), (200, "BYPASS"))
+                self.assertTrue(reply.fields["cache-control"].startswith("private"), reply.fields["cache-control"])
+        # Not as it should be spelled, also about what everybody may see.
+        for base in (target, TILE, "/earth/layer.json", "/"):
+            for rest in ("?Token=", "?TOKEN=", "?%54oken=", "?tok%65n=", "?token%3D", "?%2574oken=", "?;token=", "?v=1;token=", "?error=5;token=",
+                         "?extensions=metadata;token=", "?access_token=", "?token[]=", "?amp;token=", "?", "?v=1&key=", ";token=",
+                         "%3Ftoken=", "%3Ftoken%3D", "/token="):
+                for _ in range(2):
+                    reply = self.get(base + rest + TOKEN, "-g")
+                    self.assertEqual(reply.fields["x-cache"], "BYPASS", base + rest)
+                    self.assertTrue(reply.fields["cache-control"].startswith("private"), base + rest)
+        reply = self.get(f"{TILE}?token={TOKEN}", port=self.http_port, scheme="http")
+        self.assertEqual((reply.status, reply.fields["cache-control"]), (308, "private, no-store"))
         self.assertEqual(self.get(target).status, self.direct(target).status)
         self.assertIn(self.get(target).status, (401, 404))
         for file in self.folder.rglob("*"):  # logs of nginx, and its cache: the key of an entry holds the query

@@ -1,4 +1,5 @@
 // Everything that reads a request's target and the headers that choose a reply, on arbitrary text.
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -14,6 +15,7 @@
 #include "server/http/query.h"
 #include "server/http/response.h"
 #include "server/http/router.h"
+#include "server/http/shown_target.h"
 #include "tests/fuzz/fuzz_input.h"
 
 namespace terrace::fuzz {
@@ -91,6 +93,10 @@ void ExpectOneUrl(const Route& route) {
 void TryTarget(std::string target) {
   (void)TakeToken(target);
   TERRACE_CHECK(!TakeToken(target));  // none is left for the log
+  for (const bool is_known : {false, true}) {
+    const std::string shown = ShownTarget(target, is_known);
+    TERRACE_CHECK(std::all_of(shown.begin(), shown.end(), [](char c) { return c > 0x20 && c < 0x7f && c != ';'; }));
+  }
   const auto route = Match(target);
   if (!route) return ExpectClientError(route.error());
   TryQuery(route->query);

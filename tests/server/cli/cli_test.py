@@ -1,4 +1,5 @@
 """Runs the terrace binary without serving: cli_test.py BINARY SOURCE_DIR."""
+import hashlib
 import json
 import pathlib
 import re
@@ -161,7 +162,28 @@ class Config(unittest.TestCase):
         tokens = [{"name": name, "token": "a-token-of-some-length"} for name in ("one", "two")]
         result = run("serve", "--config", self.write(json.dumps({"tokens": tokens})), "--print-config")
         self.assertEqual(result.returncode, 2)
-        self.assertIn("/tokens/1: another token is the same", result.stderr)
+        self.assertIn("/tokens/1: is the same token as /tokens/0", result.stderr)
+
+    def test_a_secret_in_the_wrong_place_is_not_told(self):
+        secret = "Vk3tSecretMarker42xyz"
+        wrong = [{"tokens": secret}, {"tokens": [secret]}, {"tokens": {secret: ["a"]}}, {"tokens": [{"name": "a", "token": secret + "!"}]},
+                 {"tokens": [{"name": secret + " ", "token": [secret]}]}, {"tokens": [{secret: "a"}]}, {"token": secret},
+                 {"listen": secret}, {secret: secret}, {"tls": secret}, {"datasets": [{"name": "a", "sources": ["a.tif"], "floor": secret}]},
+                 {"tls": {"certificate": "a.pem", "key": f"-----BEGIN PRIVATE KEY-----\n{secret}"}}]
+        texts = [json.dumps(config) for config in wrong] + [f'{{"tokens": [{{"token": {secret}}}]}}', f'{{"tokens": ["{secret}]}}']
+        for text in texts:
+            result = run("serve", "--config", self.write(text), "--check-config")
+            self.assertEqual(result.returncode, 2, text)
+            self.assertNotIn(secret, result.stdout + result.stderr, text)
+        for flags in ([f"--token={secret}"], ["--tokens", secret], [f"--print-config={secret}"], ["--listen", secret], [f"--io-threads={secret}"]):
+            result = run("serve", *flags, "--check-config")
+            self.assertEqual(result.returncode, 2, flags)
+            self.assertNotIn(secret, result.stdout + result.stderr, flags)
+        fine = self.write(json.dumps({"tokens": [{"name": "a", "token": secret}]}))
+        printed = run("serve", "--config", fine, "--print-config")
+        self.assertEqual(printed.returncode, 0, printed.stderr)
+        self.assertNotIn(secret, printed.stdout + printed.stderr)
+        self.assertEqual(json.loads(printed.stdout)["tokens"][0]["sha256"], hashlib.sha256(secret.encode()).hexdigest())
 
     def test_flags_override_the_file(self):
         file = self.write('{"listen": "127.0.0.1:1", "io_threads": 3, "datasets": [{"name": "a", "sources": ["a.tif"]}]}')
@@ -197,7 +219,7 @@ class Config(unittest.TestCase):
         self.assertEqual((result.returncode, result.stdout, result.stderr), (2, "", output))
 
     def test_wrong_configurations_give_code_2(self):
-        for arguments, part in ((["/nowhere.tif", "--listen", "foo"], "--listen: \"foo\" has no port"),
+        for arguments, part in ((["/nowhere.tif", "--listen", "foo"], "--listen: has no port"),
                                 (["--config", "/nowhere.json"], "cannot be read"),
                                 (["--config", self.write("{,")], "line 1, column 2"),
                                 (["/a/x.tif", "/b/x.tif"], "\"x\" is the name of /datasets/0 too"),

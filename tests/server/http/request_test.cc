@@ -176,7 +176,8 @@ TEST(Request, TakesTheTokenOutOfTheTarget) {
       {"/a?token=s&error=5", "/a?error=5", "s"},
       {"/a?error=5&token=s", "/a?error=5", "s"},
       {"/a?error=5&token=s&v=1&token=s", "/a?error=5&v=1", "s"},
-      {"/a?%74ok%65n=s%2Fx", "/a", "s/x"},
+      {"/a?token=s%2Fx", "/a", "s/x"},
+      {"/a?%74ok%65n=s", "/a?%74ok%65n=s", ""},
       {"/a?token", "/a", ""},
       {"/a?tokens=s", "/a?tokens=s", ""},
       {"/a?error=%zz&x=token", "/a?error=%zz&x=token", ""},
@@ -189,6 +190,12 @@ TEST(Request, TakesTheTokenOutOfTheTarget) {
     EXPECT_EQ(request->target, c.kept);
     EXPECT_EQ(request->token, c.token) << c.sent;
   }
+  for (const char* target : {"/a?token=s", "/a?%74oken=s", "/a?Token=s", "/a;token=s", "/a?v=1;token=s"}) {
+    EXPECT_TRUE(ParseHead("GET " + std::string(target) + " HTTP/1.1\r\nHost: x\r\n\r\n")->may_hold_secret) << target;
+  }
+  EXPECT_FALSE(ParseHead("GET /a?v=1&error=5 HTTP/1.1\r\nHost: x\r\n\r\n")->may_hold_secret);
+  EXPECT_TRUE(ParseHead(Get("Authorization: Basic abc\r\n"))->may_hold_secret);
+  EXPECT_TRUE(FirstLineOf("GET /a HTTP/1.1\r\n").may_hold_secret);
   EXPECT_EQ(ParseHead(Get("Authorization: bearer  s \r\n"))->token, "s");
   EXPECT_EQ(ParseHead(Get("Authorization: Basic abc\r\n"))->token, "");
   EXPECT_EQ(ParseHead("GET /?token=q HTTP/1.1\r\nHost: x\r\nAuthorization: Bearer h\r\n\r\n")->token, "h");
