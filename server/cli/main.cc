@@ -49,7 +49,10 @@ std::string Explain(const CLI::App& app, const CLI::ParseError& error, const std
     const std::string flag = word.substr(0, word.find('='));
     return "unknown option " + flag + DidYouMean(flag, FlagNames(app));
   }
-  return error.what();
+  const std::string what = error.what();
+  // "Could not convert: --flag = value": a secret may stand there by mistake.
+  if (dynamic_cast<const CLI::ConversionError*>(&error) != nullptr) return what.substr(0, what.find(" = "));
+  return what;
 }
 
 int ReportUsage(const CLI::App& app, const CLI::ParseError& error, const std::vector<std::string>& arguments) {

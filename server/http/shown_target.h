@@ -10,8 +10,8 @@
 
 namespace terrace::server {
 
-// Whether nothing of the target may be a secret: it is in origin form, and plain. Of a target whose `token` was taken out
-// (TakeToken).
+// Whether nothing of the target may be a secret: it is in origin form, and plain. Of a target whose `token` was taken
+// out (TakeToken).
 bool IsPlainTarget(std::string_view target);
 
 // The plain part of the target: the path up to what is not plain ("..." stands for the rest), known parameters, and how

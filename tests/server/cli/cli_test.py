@@ -222,7 +222,7 @@ class Config(unittest.TestCase):
         for arguments, part in ((["/nowhere.tif", "--listen", "foo"], "--listen: has no port"),
                                 (["--config", "/nowhere.json"], "cannot be read"),
                                 (["--config", self.write("{,")], "line 1, column 2"),
-                                (["/a/x.tif", "/b/x.tif"], "\"x\" is the name of /datasets/0 too"),
+                                (["/a/x.tif", "/b/x.tif"], "is the name of /datasets/0 too"),
                                 (["--floor", "0"], "options of a dataset need a DEM"),
                                 ([], "there is nothing to serve")):
             result = run("serve", *arguments)
