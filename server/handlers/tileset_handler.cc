@@ -6,10 +6,10 @@
 #include <utility>
 
 #include "proto/implicit_tree.h"
-#include "proto/skirt.h"
 #include "proto/subtree.h"
 #include "proto/tileset.h"
 #include "server/handlers/layer_handler.h"
+#include "server/handlers/tile_heights.h"
 #include "server/http/http_error.h"
 #include "server/http/negotiate.h"
 
@@ -35,19 +35,24 @@ std::string WriteTileset(const DatasetView& dataset, const std::vector<proto::Tr
   proto::TilesetDescription tileset;
   tileset.attribution = dataset.attribution;
   tileset.roots = roots;
-  const int level = tileset.roots.front().tile.level;
-  // The roots have the largest error, and with it the deepest skirts and the coarsest rounding of heights.
-  const bool is_deepest = level == dataset.max_level();
-  const int step = ErrorStep(wish, level, is_deepest, dataset.error_fraction);
-  const double rounding_m = geo::LadderError(level, step, dataset.error_fraction) / 32;
-  const double skirt_error_m = proto::SkirtError(level, step, is_deepest, dataset.error_fraction);
-  tileset.min_height_m =
-      std::min(dataset.min_height_m, dataset.floor_m) - proto::SkirtDepth(level, skirt_error_m) - rounding_m;
-  tileset.max_height_m = std::max(dataset.max_height_m, dataset.floor_m) + rounding_m;
+  tileset.heights = [&](const geo::TileKey& key) { return HeightsOfTile(dataset, wish, key); };
   tileset.content_query = std::move(content_query);
   tileset.subtree_query = std::move(subtree_query);
   return proto::EncodeTileset(tileset);
 }
+
+std::string WriteSubtree(const DatasetView& dataset, const ErrorWish& wish, const geo::TileKey& top, int levels) {
+  proto::Subtree subtree;
+  subtree.levels = levels;
+  subtree.tiles = proto::BlocksBelow(dataset.available, top, levels);
+  subtree.heights = [&](const geo::TileKey& below) {
+    return HeightsOfTile(dataset, wish, proto::TileUnder(top, below.level, below.x, below.y));
+  };
+  return proto::EncodeSubtree(subtree);
+}
+
+// Of a subtree whose tiles are all there: 8 bytes of metadata for each.
+std::size_t MostBytes(int subtree_levels) { return std::size_t{8} << (2 * (subtree_levels - 1)); }
 
 }  // namespace
 
@@ -67,7 +72,7 @@ Answer TilesetHandler::Handle(const Route& route, const Request& request) const 
   if (!parameters) return ClientErrorResponse(parameters.error(), request.id);
   std::string content_query = WithToken(ContentQuery(parameters->wish, route.query), request);
   if (content_query.empty()) return Serve(plain_[*dataset], request, cache_control_);
-  std::string subtree_query = WithToken("", request);
+  std::string subtree_query = WithToken(TileQuery(parameters->wish), request);
   DocumentPlan plan;
   plan.key = fmt::format("tileset {} {} {}", *dataset, content_query, subtree_query);
   plan.bytes = plain_[*dataset].identity->size();
@@ -80,10 +85,9 @@ Answer TilesetHandler::Handle(const Route& route, const Request& request) const 
   return plan;
 }
 
-Response TilesetHandler::HandleSubtree(const Route& route, const Request& request) const {
+Answer TilesetHandler::HandleSubtree(const Route& route, const Request& request) const {
   const Result<std::uint32_t> index = FindDataset(route.dataset, datasets_);
   if (!index) return ClientErrorResponse(index.error(), request.id);
-  // Clients hang the tileset's own query on every URL under it; it changes nothing here.
   const Result<TileParameters> parameters =
       ParseTileParameters(route.query, /*allow_at_least=*/true, /*allow_compression=*/true);
   if (!parameters) return ClientErrorResponse(parameters.error(), request.id);
@@ -91,10 +95,17 @@ Response TilesetHandler::HandleSubtree(const Route& route, const Request& reques
   if (!IsAvailable(dataset, route.key) || (route.key.level - route.root.level) % route.subtree_levels != 0) {
     return ProblemResponse(404, "the dataset has no such subtree; its tileset.json says where they begin", request.id);
   }
-  proto::Subtree subtree;
-  subtree.levels = route.subtree_levels;
-  subtree.tiles = proto::BlocksBelow(dataset.available, route.key, subtree.levels);
-  return Serve(Document::Make(proto::EncodeSubtree(subtree), "application/octet-stream"), request, cache_control_);
+  const ErrorWish& wish = parameters->wish;
+  DocumentPlan plan;
+  plan.key = fmt::format("subtree {} {} {} {}{}", *index, geo::ToString(route.key), route.subtree_levels,
+                         TileQuery(wish), wish.at_least ? "" : " alone");
+  plan.bytes = MostBytes(route.subtree_levels);
+  plan.content_type = "application/octet-stream";
+  plan.cache_control = cache_control_;
+  plan.write = [&dataset, wish, top = route.key, levels = route.subtree_levels] {
+    return WriteSubtree(dataset, wish, top, levels);
+  };
+  return plan;
 }
 
 }  // namespace terrace::server
