@@ -114,8 +114,8 @@ class TilesetBoundsTest : public testing::Test {
 };
 
 std::string Fill(std::string text, int level, std::int64_t x, std::int64_t y) {
-  for (const auto& [name, value] :
-       {std::pair("{level}", std::to_string(level)), std::pair("{x}", std::to_string(x)), std::pair("{y}", std::to_string(y))}) {
+  for (const auto& [name, value] : {std::pair("{level}", std::to_string(level)), std::pair("{x}", std::to_string(x)),
+                                    std::pair("{y}", std::to_string(y))}) {
     text.replace(text.find(name), std::string_view(name).size(), value);
   }
   return text;
@@ -191,8 +191,8 @@ TEST_F(TilesetBoundsTest, HoldEveryVertexAndFootAndLieInTheirParents) {
     named_ = trees_ = checked_ = 0;
     flattest_tree_m = 1e9;
     CheckTile(Json::parse(Get(std::string("tileset.json") + query)).at("root"), true);
-    std::printf("%s: %d trees, %d named tiles, %d of all built, the flattest tree spans %.1f m\n", query, trees_, named_, checked_,
-                flattest_tree_m);
+    std::printf("%s: %d trees, %d named tiles, %d of all built, the flattest tree spans %.1f m\n", query, trees_,
+                named_, checked_, flattest_tree_m);
     EXPECT_GE(trees_, 80);
     EXPECT_GE(named_, 4) << "tiles above Tennessee";
     EXPECT_GE(checked_, 10);

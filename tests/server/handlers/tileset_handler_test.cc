@@ -71,6 +71,10 @@ TEST_F(TilesetHandlerTest, RegionHoldsDataFloorAndSkirtsOfTheErrorAskedFor) {
   holds(region("?error=5"), geo::DefaultError(7));  // at least the default is asked for
   holds(region("?error=1000"), geo::LadderError(7, geo::SnapToLadder(7, 1000)));
   holds(region("?fraction=0.05"), geo::LadderError(7, geo::SnapToLadder(7, 0.05 * geo::LevelError(7))));
+  // The deepest level's skirts hang for its default error at least, however small the fraction.
+  const Json box = region("?fraction=0.008");
+  EXPECT_LE(box[4], -20 - proto::SkirtDepth(12, geo::DefaultError(12)));
+  EXPECT_GE(box[4], -20 - proto::SkirtDepth(12, geo::DefaultError(12)) - geo::DefaultError(12));
 }
 
 TEST_F(TilesetHandlerTest, WritesWishesIntoTheContentTemplates) {
@@ -102,9 +106,9 @@ TEST_F(TilesetHandlerTest, EveryRootHasTheHeightsOfItsOwnTile) {
     return dem::HeightRange{static_cast<double>(-key.x), 1000.0 * static_cast<double>(key.x - 15)};
   };
   handler_.emplace(datasets_, "max-age=1");
-  const Json root = Tileset("?fraction=0.01").at("root");
+  const Json root = Tileset("?fraction=0.05").at("root");
   const auto region = [](const Json& tile) { return tile.at("boundingVolume").at("region"); };
-  const double error_m = geo::LadderError(7, geo::SnapToLadder(7, 0.01 * geo::LevelError(7)));
+  const double error_m = geo::LadderError(7, geo::SnapToLadder(7, 0.05 * geo::LevelError(7)));
   const double skirt_m = proto::SkirtDepth(7, error_m);
   for (const int x : {16, 17}) {
     const Json box = region(root.at("children")[static_cast<std::size_t>(x - 16)]);
