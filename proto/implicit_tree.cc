@@ -135,9 +135,9 @@ int LevelsUnder(Availability available, const geo::TileKey& root) {
   return 0;
 }
 
-std::vector<TreeRoot> ImplicitTrees(Availability available) {
+std::vector<TreeRoot> ImplicitTrees(Availability available, const std::vector<geo::TileKey>& roots) {
   std::vector<TreeRoot> trees;
-  for (const geo::TileKey& tile : ImplicitRoots(available)) {
+  for (const geo::TileKey& tile : roots) {
     TreeRoot& tree = trees.emplace_back(TreeRoot{tile, LevelsUnder(available, tile)});
     const bool is_beside_pole = tile.y == 0 || tile.y + 1 == geo::TileRows(tile.level);
     if (tile.level == kShallowestRoots && is_beside_pole) tree.below = TreesBelow(available, tile);

@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
+#include "engine/geo/tile_cover.h"
 #include "proto/implicit_tree.h"
 #include "proto/subtree.h"
 #include "proto/tileset.h"
@@ -27,6 +29,34 @@ std::string ContentQuery(const ErrorWish& wish, std::string_view query) {
     if (sent != parameters.end()) content += (content.empty() ? "" : "&") + sent->first + "=" + sent->second;
   }
   return content;
+}
+
+// Those of one level that touch columns west .. east, degrees, and the dataset's rows.
+std::vector<geo::TileRange> TilesWithin(const DatasetView& dataset, int level, double west, double east) {
+  const double tile = std::ldexp(180, -level);
+  const auto first = [&](double degrees) { return static_cast<std::int64_t>(std::floor(degrees / tile)); };
+  const auto last = [&](double degrees) { return static_cast<std::int64_t>(std::ceil(degrees / tile)) - 1; };
+  geo::TileRange box{first(west + 180), first(dataset.south + 90), last(east + 180), last(dataset.north + 90)};
+  box.end_x = std::max(box.start_x, box.end_x);
+  box.end_y = std::max(box.start_y, box.end_y);
+  std::vector<geo::TileRange> tiles;
+  for (const geo::TileRange& range : dataset.available[static_cast<std::size_t>(level)]) {
+    if (const geo::TileRange common = geo::Common(range, box); !geo::IsEmpty(common)) tiles.push_back(common);
+  }
+  return tiles;
+}
+
+// The available tiles that touch the dataset's bounds. Others only make four children of those that a tile has.
+std::vector<std::vector<geo::TileRange>> TilesWithData(const DatasetView& dataset) {
+  std::vector<std::vector<geo::TileRange>> levels;
+  const bool crosses = dataset.west > dataset.east;
+  for (int level = 0; level <= dataset.max_level(); ++level) {
+    auto& tiles = levels.emplace_back(TilesWithin(dataset, level, dataset.west, crosses ? 180 : dataset.east));
+    if (!crosses) continue;
+    for (const geo::TileRange& range : TilesWithin(dataset, level, -180, dataset.east)) tiles.push_back(range);
+    tiles = geo::Disjoint(std::move(tiles));
+  }
+  return levels;
 }
 
 std::string WriteTileset(const DatasetView& dataset, const std::vector<proto::TreeRoot>& roots, ErrorWish wish,
@@ -59,7 +89,9 @@ std::size_t MostBytes(int subtree_levels) { return std::size_t{8} << (2 * (subtr
 TilesetHandler::TilesetHandler(std::span<const DatasetView> datasets, std::string cache_control)
     : datasets_(datasets), cache_control_(std::move(cache_control)) {
   for (const DatasetView& dataset : datasets_) {
-    roots_.push_back(std::make_shared<const std::vector<proto::TreeRoot>>(proto::ImplicitTrees(dataset.available)));
+    const std::vector<geo::TileKey> roots = proto::ImplicitRoots(TilesWithData(dataset));
+    roots_.push_back(
+        std::make_shared<const std::vector<proto::TreeRoot>>(proto::ImplicitTrees(dataset.available, roots)));
     plain_.push_back(Document::Make(WriteTileset(dataset, *roots_.back(), {}, "", ""), kJsonType));
   }
 }

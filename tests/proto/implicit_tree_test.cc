@@ -24,6 +24,8 @@ Levels Above(const std::vector<geo::TileRange>& deepest, int max_level) {
   return levels;
 }
 
+std::vector<TreeRoot> TreesOf(const Levels& available) { return ImplicitTrees(available, ImplicitRoots(available)); }
+
 TEST(ImplicitRoots, OfTheWholeGlobeAreAllTilesOfLevelTwo) {
   Levels available = {{{0, 0, 1, 0}}, {{0, 0, 3, 1}}, {{0, 0, 7, 3}}, {{0, 0, 15, 7}}};
   const Keys roots = ImplicitRoots(available);
@@ -74,7 +76,7 @@ TEST(ImplicitTrees, BesideThePolesAreRootedALevelDeeper) {
   available[1] = {{0, 0, 3, 1}};
   available[2] = {{0, 0, 7, 3}};
   available[3] = {{0, 0, 15, 7}};
-  const std::vector<TreeRoot> trees = ImplicitTrees(available);
+  const std::vector<TreeRoot> trees = TreesOf(available);
   ASSERT_EQ(trees.size(), 32u);
   for (const TreeRoot& tree : trees) {
     ASSERT_EQ(tree.below.size(), tree.tile.y == 0 || tree.tile.y == 3 ? 4u : 0u) << geo::ToString(tree.tile);
@@ -84,8 +86,8 @@ TEST(ImplicitTrees, BesideThePolesAreRootedALevelDeeper) {
     }
   }
   available.resize(3);
-  for (const TreeRoot& tree : ImplicitTrees(available)) EXPECT_TRUE(tree.below.empty()) << "nothing below";
-  EXPECT_TRUE(ImplicitTrees(Above({{33, 0, 36, 0}}, 13)).front().below.empty()) << "small roots are left alone";
+  for (const TreeRoot& tree : TreesOf(available)) EXPECT_TRUE(tree.below.empty()) << "nothing below";
+  EXPECT_TRUE(TreesOf(Above({{33, 0, 36, 0}}, 13)).front().below.empty()) << "small roots are left alone";
 }
 
 // The globe down to `base`, and tiles of `deepest` over a block of it.
@@ -136,7 +138,7 @@ void Walk(const Levels& available, const std::vector<TreeRoot>& trees, Named& na
 TEST(ImplicitTrees, AreNoTallerThanASubtreeOverAnIslandOfTheGlobe) {
   const Levels available = GlobeAnd(5, {9000, 9000, 9040, 9030}, 14);
   Named named;
-  Walk(available, ImplicitTrees(available), named);
+  Walk(available, TreesOf(available), named);
   EXPECT_LE(named.tallest, kTallestSubtree);
   EXPECT_LE(named.tiles, 250u) << "only above the island";
 }
@@ -151,7 +153,7 @@ TEST(ImplicitTrees, AreNoTallerThanASubtreeOverASmallDataset) {
   }
   for (const Levels& levels : {available, deeper}) {
     Named named;
-    Walk(levels, ImplicitTrees(levels), named);
+    Walk(levels, TreesOf(levels), named);
     EXPECT_LE(named.tallest, kTallestSubtree);
   }
 }
@@ -159,7 +161,7 @@ TEST(ImplicitTrees, AreNoTallerThanASubtreeOverASmallDataset) {
 TEST(ImplicitTrees, OfADeepGlobeAreNamedNoFurtherThanADocumentHolds) {
   const Levels available = GlobeAnd(14, {0, 0, 1, 1}, 14);
   Named named;
-  Walk(available, ImplicitTrees(available), named);
+  Walk(available, TreesOf(available), named);
   EXPECT_LE(named.tiles, kMaxNamedTiles);
   EXPECT_EQ(named.trees, 512u) << "all of level 4";
   EXPECT_EQ(named.tallest, 11);

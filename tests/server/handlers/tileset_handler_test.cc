@@ -57,6 +57,43 @@ TEST_F(TilesetHandlerTest, RootsTheTreesWhereTheDataIs) {
   EXPECT_EQ(west.at("implicitTiling").at("subtreeLevels"), 6);
 }
 
+// A tile has four children or none, so that beside the data and above its roots there are tiles without any.
+TEST_F(TilesetHandlerTest, RootsTheTreesWhereTheDataIsAmongTilesThatAreThereToMakeFour) {
+  DatasetView& maui = datasets_[0];
+  const double tile = 180.0 / 4096;
+  maui.west = -180 + 513 * tile + 1e-4;
+  maui.east = -180 + 551 * tile;
+  maui.south = -90 + 1025 * tile;
+  maui.north = -90 + 1047.5 * tile;
+  for (std::size_t level = 1; level <= 12; ++level) {
+    geo::TileRange& range = maui.available[level].front();
+    range = {range.start_x & ~1, range.start_y & ~1, range.end_x | 1, range.end_y | 1};
+  }
+  const auto roots = [&] {
+    handler_.emplace(datasets_, "max-age=1");
+    const Json root = Tileset().at("root");
+    std::vector<std::string> uris;
+    for (const Json& tree : root.at("children")) uris.push_back(tree.at("content").at("uri"));
+    return uris;
+  };
+  const std::vector<std::string> expected = {"3dtiles/7-16-32/{level}/{x}/{y}.glb",
+                                             "3dtiles/7-17-32/{level}/{x}/{y}.glb"};
+  EXPECT_EQ(roots(), expected);
+
+  // The same across the antimeridian.
+  for (std::size_t level = 1; level <= 12; ++level) {
+    geo::TileRange& range = maui.available[level].front();
+    const std::int64_t columns = geo::TileColumns(static_cast<int>(level)), middle = std::int64_t{544} >> (12 - level);
+    maui.available[level] = {
+        {0, range.start_y, std::max<std::int64_t>(range.end_x - middle, 1), range.end_y},
+        {columns - std::max<std::int64_t>(middle - range.start_x, 2), range.start_y, columns - 1, range.end_y}};
+  }
+  maui.west = 180 - 31 * tile;
+  maui.east = -180 + 7 * tile;
+  EXPECT_EQ(roots(),
+            (std::vector<std::string>{"3dtiles/7-0-32/{level}/{x}/{y}.glb", "3dtiles/7-255-32/{level}/{x}/{y}.glb"}));
+}
+
 TEST_F(TilesetHandlerTest, RegionHoldsDataFloorAndSkirtsOfTheErrorAskedFor) {
   const auto region = [&](const char* query) {
     return Tileset(query).at("root").at("children")[0].at("boundingVolume").at("region");
