@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 #include <numeric>
 #include <set>
 #include <utility>
@@ -52,6 +53,65 @@ geo::TileRange PartUnder(const geo::TileRange& range, const geo::TileKey& top, i
 
 bool IsEmpty(const geo::TileRange& range) { return range.start_x > range.end_x || range.start_y > range.end_y; }
 
+// The blocks that reach under `top`, whole; levels above it are empty.
+std::vector<std::vector<geo::TileRange>> BlocksThatReachUnder(Availability available, const geo::TileKey& top) {
+  std::vector<std::vector<geo::TileRange>> blocks(available.size());
+  for (auto level = static_cast<std::size_t>(top.level); level < available.size(); ++level) {
+    const int k = static_cast<int>(level) - top.level;
+    std::ranges::copy_if(available[level], std::back_inserter(blocks[level]),
+                         [&](const geo::TileRange& range) { return !IsEmpty(PartUnder(range, top, k)); });
+  }
+  return blocks;
+}
+
+// The children of a tile as roots of trees; none where it has no children.
+std::vector<TreeRoot> TreesBelow(Availability available, const geo::TileKey& tile) {
+  const std::vector<std::vector<geo::TileRange>> here = BlocksThatReachUnder(available, tile);
+  const std::vector<std::vector<geo::TileRange>> blocks = BlocksBelow(here, tile, 1);
+  std::vector<TreeRoot> trees;
+  for (const geo::TileRange& block : blocks[1]) {
+    for (std::int64_t y = block.start_y; y <= block.end_y; ++y) {
+      for (std::int64_t x = block.start_x; x <= block.end_x; ++x) {
+        const geo::TileKey child = TileUnder(tile, 1, x, y);
+        trees.push_back({child, LevelsUnder(here, child)});
+      }
+    }
+  }
+  return trees;
+}
+
+std::size_t CountTiles(const std::vector<TreeRoot>& trees) {
+  std::size_t count = trees.size();
+  for (const TreeRoot& tree : trees) count += CountTiles(tree.below);
+  return count;
+}
+
+// Pointers stay good while nothing is added to a vector that holds one of them.
+void FindTrees(std::vector<TreeRoot>& trees, int levels, std::vector<TreeRoot*>& found) {
+  for (TreeRoot& tree : trees) {
+    if (!tree.below.empty()) {
+      FindTrees(tree.below, levels, found);
+    } else if (tree.levels == levels) {
+      found.push_back(&tree);
+    }
+  }
+}
+
+// Trees of as many levels are split together or not at all, so that neighbours are alike.
+void SplitTallTrees(Availability available, std::vector<TreeRoot>& trees) {
+  std::size_t named = CountTiles(trees);
+  for (int levels = static_cast<int>(available.size()); levels > kTallestSubtree; --levels) {
+    std::vector<TreeRoot*> tall;
+    FindTrees(trees, levels, tall);
+    std::vector<std::vector<TreeRoot>> below;
+    for (const TreeRoot* tree : tall) {
+      named += below.emplace_back(TreesBelow(available, tree->tile)).size();
+      if (named > kMaxNamedTiles) return;
+    }
+    for (std::size_t i = 0; i < tall.size(); ++i) tall[i]->below = std::move(below[i]);
+  }
+}
+
 }  // namespace
 
 std::vector<geo::TileKey> ImplicitRoots(Availability available) {
@@ -75,22 +135,14 @@ int LevelsUnder(Availability available, const geo::TileKey& root) {
   return 0;
 }
 
-std::vector<TreeRoot> ImplicitTrees(Availability available) {
+std::vector<TreeRoot> ImplicitTrees(Availability available, const std::vector<geo::TileKey>& roots) {
   std::vector<TreeRoot> trees;
-  for (const geo::TileKey& tile : ImplicitRoots(available)) {
+  for (const geo::TileKey& tile : roots) {
     TreeRoot& tree = trees.emplace_back(TreeRoot{tile, LevelsUnder(available, tile)});
     const bool is_beside_pole = tile.y == 0 || tile.y + 1 == geo::TileRows(tile.level);
-    if (tile.level != kShallowestRoots || !is_beside_pole) continue;
-    const std::vector<std::vector<geo::TileRange>> blocks = BlocksBelow(available, tile, 1);
-    for (const geo::TileRange& block : blocks[1]) {
-      for (std::int64_t y = block.start_y; y <= block.end_y; ++y) {
-        for (std::int64_t x = block.start_x; x <= block.end_x; ++x) {
-          const geo::TileKey child = TileUnder(tile, 1, x, y);
-          tree.below.push_back({child, LevelsUnder(available, child)});
-        }
-      }
-    }
+    if (tile.level == kShallowestRoots && is_beside_pole) tree.below = TreesBelow(available, tile);
   }
+  SplitTallTrees(available, trees);
   return trees;
 }
 

@@ -48,9 +48,16 @@ struct TreeRoot {
   std::vector<TreeRoot> below = {};
 };
 
-// ImplicitRoots with what is below them. Trees beside the poles are rooted a level deeper: of a region whose corner is
-// a pole loaders.gl makes a box without width, and deck.gl then draws nothing of Europe from near.
-std::vector<TreeRoot> ImplicitTrees(Availability available);
+// Tiles that a tileset.json names one by one, roots of trees included: 350 bytes each, 20 to 30 compressed.
+inline constexpr std::size_t kMaxNamedTiles = 1024;
+
+// The roots with what is below them. Two kinds of trees are rooted deeper, under tiles with regions of their own:
+// - those beside the poles, by a level: of a region whose corner is a pole loaders.gl makes a box without width, and
+//   deck.gl then draws nothing of Europe from near;
+// - those of more levels than a subtree, as deep as kMaxNamedTiles allows, trees of most levels first. Descendants
+//   inherit the root's range of heights and skirts, which six levels below it are 8 % of the distance from which they
+//   are looked at, and twice that with each further level.
+std::vector<TreeRoot> ImplicitTrees(Availability available, const std::vector<geo::TileKey>& roots);
 
 // How a root is called in URLs: "9-272-359", level, column and row.
 std::string RootName(const geo::TileKey& root);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <string_view>
 
 #include "engine/core/bytes.h"
 #include "engine/core/check.h"
@@ -35,6 +36,8 @@ class Bits {
     }
   }
   bool uniform() const { return set_ == 0 || set_ == count_; }
+  bool Has(std::size_t bit) const { return (bytes_[bit / 8] >> bit % 8 & 1) != 0; }
+  std::size_t count() const { return count_; }
   std::size_t set() const { return set_; }
   const std::string& bytes() const { return bytes_; }
 
@@ -49,10 +52,14 @@ class Buffer {
   // An availability object; its bitstream goes into the buffer unless all bits are equal.
   Json Add(const Bits& bits) {
     if (bits.uniform()) return {{"constant", bits.set() > 0 ? 1 : 0}};
-    views_.push_back({{"buffer", 0}, {"byteOffset", bytes_.size()}, {"byteLength", bits.bytes().size()}});
-    bytes_.PutBytes(bits.bytes());
+    return {{"bitstream", AddView(bits.bytes())}, {"availableCount", bits.set()}};
+  }
+  // The number of the buffer view.
+  std::size_t AddView(std::string_view bytes) {
+    views_.push_back({{"buffer", 0}, {"byteOffset", bytes_.size()}, {"byteLength", bytes.size()}});
+    bytes_.PutBytes(bytes);
     bytes_.PadTo(kAlignment);
-    return {{"bitstream", views_.size() - 1}, {"availableCount", bits.set()}};
+    return views_.size() - 1;
   }
   void Describe(Json& json) const {
     if (views_.empty()) return;
@@ -65,6 +72,46 @@ class Buffer {
   Json views_ = Json::array();
   ByteWriter bytes_;
 };
+
+std::uint32_t EveryOther(std::uint32_t bits) {
+  bits &= 0x55555555;
+  bits = (bits | bits >> 1) & 0x33333333;
+  bits = (bits | bits >> 2) & 0x0f0f0f0f;
+  bits = (bits | bits >> 4) & 0x00ff00ff;
+  return (bits | bits >> 8) & 0x0000ffff;
+}
+
+// One for each bit; of those that are not set it says nothing. A tile's children are the four bits from 4 times its
+// own, plus 1.
+std::vector<HeightSpan> HeightsOf(const Subtree& subtree, const Bits& tiles) {
+  std::vector<HeightSpan> heights(tiles.count());
+  for (int level = subtree.levels - 1; level >= 0; --level) {
+    for (std::size_t bit = FirstBit(level); bit < FirstBit(level + 1); ++bit) {
+      if (!tiles.Has(bit)) continue;
+      const auto morton = static_cast<std::uint32_t>(bit - FirstBit(level));
+      heights[bit] = subtree.heights({level, EveryOther(morton), EveryOther(morton >> 1)});
+      for (std::size_t child = 4 * bit + 1; child <= 4 * bit + 4 && child < tiles.count(); ++child) {
+        if (tiles.Has(child)) heights[bit].Add(heights[child]);
+      }
+    }
+  }
+  return heights;
+}
+
+// The property table: a row for each available tile, in the order of their bits.
+Json Table(const Subtree& subtree, const Bits& tiles, Buffer& buffer) {
+  ByteWriter lowest, highest;
+  const std::vector<HeightSpan> heights = HeightsOf(subtree, tiles);
+  for (std::size_t bit = 0; bit < tiles.count(); ++bit) {
+    if (!tiles.Has(bit)) continue;
+    lowest.Put(static_cast<float>(heights[bit].min_m));
+    highest.Put(static_cast<float>(heights[bit].max_m));
+  }
+  Json table = {{"class", kTileClass}, {"count", tiles.set()}};
+  table["properties"][kMinHeightProperty]["values"] = buffer.AddView(lowest.Take());
+  table["properties"][kMaxHeightProperty]["values"] = buffer.AddView(highest.Take());
+  return table;
+}
 
 }  // namespace
 
@@ -93,6 +140,10 @@ std::string EncodeSubtree(const Subtree& subtree) {
   availability["tileAvailability"] = buffer.Add(tiles);
   availability["contentAvailability"] = Json::array({availability["tileAvailability"]});
   availability["childSubtreeAvailability"] = buffer.Add(children);
+  if (subtree.heights) {
+    availability["propertyTables"] = Json::array({Table(subtree, tiles, buffer)});
+    availability["tileMetadata"] = 0;
+  }
   Json json = Json::object();
   buffer.Describe(json);
   json.update(availability);

@@ -5,25 +5,35 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
 #include "engine/geo/tile_key.h"
+#include "proto/height_span.h"
 
 namespace terrace::proto {
 
 inline constexpr int kMaxSubtreeLevels = 10;  // 350,000 tiles; clients make an object for each at once
+
+// Of the metadata in a subtree: the class and its properties in the tileset's schema.
+inline constexpr const char* kTileClass = "tile";
+inline constexpr const char* kMinHeightProperty = "min_height";
+inline constexpr const char* kMaxHeightProperty = "max_height";
 
 struct Subtree {
   int levels = 1;  // 1 .. kMaxSubtreeLevels
   // Entry k, 0 .. levels: blocks without overlap of the available tiles k levels below the subtree's root, numbered
   // from its south-western corner. Entry `levels` holds the roots of child subtrees.
   std::vector<std::vector<geo::TileRange>> tiles;
+  // Of a tile k levels below the root, numbered likewise, {k, x, y}: whole numbers of 2^-8 m, less than 2^16 m, which
+  // floats hold exactly. Each is widened to hold those of the tiles below it in this subtree. Empty: no metadata.
+  std::function<HeightSpan(const geo::TileKey&)> heights;
 };
 
-// The whole file. Every available tile has content. Where all bits of a bitstream are equal, the JSON says so and the
-// bitstream is left out. Preconditions: tiles has levels + 1 entries, the root is available, and so is the parent of
-// every available tile.
+// The whole file. Every available tile has content and a row of metadata. Where all bits of a bitstream are equal, the
+// JSON says so and the bitstream is left out. Preconditions: tiles has levels + 1 entries, the root is available, and
+// so is the parent of every available tile.
 std::string EncodeSubtree(const Subtree& subtree);
 
 // Where tile (x, y) of a level stands in Morton order. x and y below 2^16.

@@ -2,9 +2,11 @@
 // contains.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
+#include "proto/height_span.h"
 #include "proto/implicit_tree.h"
 
 namespace terrace::proto {
@@ -12,11 +14,11 @@ namespace terrace::proto {
 struct TilesetDescription {
   std::string attribution;
   std::vector<TreeRoot> roots;  // tiles of one level (ImplicitTrees)
-  // Metres above the ellipsoid that no vertex of any tile leaves, feet of skirts included: clients hand the range of
-  // the root down to all its descendants.
-  double min_height_m = 0, max_height_m = 0;
-  std::string subtree_query;  // appended to the subtree template, likewise; may be empty
-  std::string content_query;  // appended to the content templates, without '?': "error=5&atleast=1"; may be empty
+  // Of a tile and, where a tree is rooted at it, of all its descendants: clients hand the range of a root down. What is
+  // written of a tile holds those of the tiles below it as well.
+  std::function<HeightSpan(const geo::TileKey&)> heights;
+  std::string subtree_query;  // appended to the subtree templates, without '?'; may be empty
+  std::string content_query;  // likewise to the contents: "error=5&atleast=1"
 };
 
 // Metres. 3D Tiles clients go a level deeper where a tile's geometric error comes to more than 16 pixels, terrain
@@ -26,7 +28,7 @@ double GeometricError(int level);
 
 // UTF-8 JSON. Templates are relative to the tileset: 3dtiles/{RootName}/{level}/{x}/{y}.glb and
 // .{SubtreeLevels}.subtree, so that a tileset.json kept from a day when the tree had other levels stays good. Several
-// roots become children of a tile without content.
+// roots become children of a tile without content. The schema is that of the subtrees' metadata (proto/subtree.h).
 std::string EncodeTileset(const TilesetDescription& tileset);
 
 }  // namespace terrace::proto

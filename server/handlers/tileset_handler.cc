@@ -3,13 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
+#include "engine/geo/tile_cover.h"
 #include "proto/implicit_tree.h"
-#include "proto/skirt.h"
 #include "proto/subtree.h"
 #include "proto/tileset.h"
 #include "server/handlers/layer_handler.h"
+#include "server/handlers/tile_heights.h"
 #include "server/http/http_error.h"
 #include "server/http/negotiate.h"
 
@@ -29,32 +31,67 @@ std::string ContentQuery(const ErrorWish& wish, std::string_view query) {
   return content;
 }
 
+// Those of one level that touch columns west .. east, degrees, and the dataset's rows.
+std::vector<geo::TileRange> TilesWithin(const DatasetView& dataset, int level, double west, double east) {
+  const double tile = std::ldexp(180, -level);
+  const auto first = [&](double degrees) { return static_cast<std::int64_t>(std::floor(degrees / tile)); };
+  const auto last = [&](double degrees) { return static_cast<std::int64_t>(std::ceil(degrees / tile)) - 1; };
+  geo::TileRange box{first(west + 180), first(dataset.south + 90), last(east + 180), last(dataset.north + 90)};
+  box.end_x = std::max(box.start_x, box.end_x);
+  box.end_y = std::max(box.start_y, box.end_y);
+  std::vector<geo::TileRange> tiles;
+  for (const geo::TileRange& range : dataset.available[static_cast<std::size_t>(level)]) {
+    if (const geo::TileRange common = geo::Common(range, box); !geo::IsEmpty(common)) tiles.push_back(common);
+  }
+  return tiles;
+}
+
+// The available tiles that touch the dataset's bounds. Others only make four children of those that a tile has.
+std::vector<std::vector<geo::TileRange>> TilesWithData(const DatasetView& dataset) {
+  std::vector<std::vector<geo::TileRange>> levels;
+  const bool crosses = dataset.west > dataset.east;
+  for (int level = 0; level <= dataset.max_level(); ++level) {
+    auto& tiles = levels.emplace_back(TilesWithin(dataset, level, dataset.west, crosses ? 180 : dataset.east));
+    if (!crosses) continue;
+    for (const geo::TileRange& range : TilesWithin(dataset, level, -180, dataset.east)) tiles.push_back(range);
+    tiles = geo::Disjoint(std::move(tiles));
+  }
+  return levels;
+}
+
 std::string WriteTileset(const DatasetView& dataset, const std::vector<proto::TreeRoot>& roots, ErrorWish wish,
                          std::string content_query, std::string subtree_query) {
   wish.at_least = wish.error_m.has_value();  // as TileQuery writes it into the templates
   proto::TilesetDescription tileset;
   tileset.attribution = dataset.attribution;
   tileset.roots = roots;
-  const int level = tileset.roots.front().tile.level;
-  // The roots have the largest error, and with it the deepest skirts and the coarsest rounding of heights.
-  const bool is_deepest = level == dataset.max_level();
-  const int step = ErrorStep(wish, level, is_deepest, dataset.error_fraction);
-  const double rounding_m = geo::LadderError(level, step, dataset.error_fraction) / 32;
-  const double skirt_error_m = proto::SkirtError(level, step, is_deepest, dataset.error_fraction);
-  tileset.min_height_m =
-      std::min(dataset.min_height_m, dataset.floor_m) - proto::SkirtDepth(level, skirt_error_m) - rounding_m;
-  tileset.max_height_m = std::max(dataset.max_height_m, dataset.floor_m) + rounding_m;
+  tileset.heights = [&](const geo::TileKey& key) { return HeightsOfTile(dataset, wish, key); };
   tileset.content_query = std::move(content_query);
   tileset.subtree_query = std::move(subtree_query);
   return proto::EncodeTileset(tileset);
 }
+
+std::string WriteSubtree(const DatasetView& dataset, const ErrorWish& wish, const geo::TileKey& top, int levels) {
+  proto::Subtree subtree;
+  subtree.levels = levels;
+  subtree.tiles = proto::BlocksBelow(dataset.available, top, levels);
+  subtree.heights = [&](const geo::TileKey& below) {
+    return HeightsOfTile(dataset, wish, proto::TileUnder(top, below.level, below.x, below.y));
+  };
+  return proto::EncodeSubtree(subtree);
+}
+
+// Of a subtree whose tiles are all there: 8 bytes of metadata for each.
+std::size_t MostBytes(int subtree_levels) { return std::size_t{8} << (2 * (subtree_levels - 1)); }
 
 }  // namespace
 
 TilesetHandler::TilesetHandler(std::span<const DatasetView> datasets, std::string cache_control)
     : datasets_(datasets), cache_control_(std::move(cache_control)) {
   for (const DatasetView& dataset : datasets_) {
-    roots_.push_back(std::make_shared<const std::vector<proto::TreeRoot>>(proto::ImplicitTrees(dataset.available)));
+    const std::vector<geo::TileKey> roots = proto::ImplicitRoots(TilesWithData(dataset));
+    roots_.push_back(
+        std::make_shared<const std::vector<proto::TreeRoot>>(proto::ImplicitTrees(dataset.available, roots)));
     plain_.push_back(Document::Make(WriteTileset(dataset, *roots_.back(), {}, "", ""), kJsonType));
   }
 }
@@ -68,7 +105,7 @@ Answer TilesetHandler::Handle(const Route& route, const Request& request) const 
   const std::string wished = ContentQuery(parameters->wish, route.query);
   std::string content_query = WithToken(wished, request);
   if (content_query.empty()) return Serve(plain_[*dataset], request, cache_control_);
-  std::string subtree_query = WithToken("", request);
+  std::string subtree_query = WithToken(TileQuery(parameters->wish), request);
   DocumentPlan plan;
   plan.key = fmt::format("tileset {} {} {}", *dataset, wished, fmt::ptr(GrantInQuery(request)));
   plan.bytes = plain_[*dataset].identity->size();
@@ -80,10 +117,9 @@ Answer TilesetHandler::Handle(const Route& route, const Request& request) const 
   return plan;
 }
 
-Response TilesetHandler::HandleSubtree(const Route& route, const Request& request) const {
+Answer TilesetHandler::HandleSubtree(const Route& route, const Request& request) const {
   const Result<std::uint32_t> index = FindDataset(route.dataset, datasets_);
   if (!index) return ClientErrorResponse(index.error(), request.id);
-  // Clients hang the tileset's own query on every URL under it; it changes nothing here.
   const Result<TileParameters> parameters =
       ParseTileParameters(route.query, /*allow_at_least=*/true, /*allow_compression=*/true);
   if (!parameters) return ClientErrorResponse(parameters.error(), request.id);
@@ -91,10 +127,17 @@ Response TilesetHandler::HandleSubtree(const Route& route, const Request& reques
   if (!IsAvailable(dataset, route.key) || (route.key.level - route.root.level) % route.subtree_levels != 0) {
     return ProblemResponse(404, "the dataset has no such subtree; its tileset.json says where they begin", request.id);
   }
-  proto::Subtree subtree;
-  subtree.levels = route.subtree_levels;
-  subtree.tiles = proto::BlocksBelow(dataset.available, route.key, subtree.levels);
-  return Serve(Document::Make(proto::EncodeSubtree(subtree), "application/octet-stream"), request, cache_control_);
+  const ErrorWish& wish = parameters->wish;
+  DocumentPlan plan;
+  plan.key = fmt::format("subtree {} {} {} {}{}", *index, geo::ToString(route.key), route.subtree_levels,
+                         TileQuery(wish), wish.at_least ? "" : " alone");
+  plan.bytes = MostBytes(route.subtree_levels);
+  plan.content_type = "application/octet-stream";
+  plan.cache_control = cache_control_;
+  plan.write = [&dataset, wish, top = route.key, levels = route.subtree_levels] {
+    return WriteSubtree(dataset, wish, top, levels);
+  };
+  return plan;
 }
 
 }  // namespace terrace::server

@@ -15,19 +15,19 @@
 
 namespace terrace::server {
 
-// Thread-safe: immutable after construction. Subtrees are made anew for each request: some tens of microseconds, and
-// clients ask for each once.
+// Thread-safe: immutable after construction.
 class TilesetHandler {
  public:
   // `datasets` must outlive this.
   TilesetHandler(std::span<const DatasetView> datasets, std::string cache_control);
 
-  // Precondition: a kTileset route. `?error=E` and `?fraction=F` go into the content templates.
+  // Precondition: a kTileset route. `?error=E` and `?fraction=F` go into the templates.
   Answer Handle(const Route& route, const Request& request) const;
 
   // Precondition: a kSubtree route. Any available tile may be the root, so that a tileset.json which a client has kept
-  // from an earlier day stays good. 404 where no subtree begins.
-  Response HandleSubtree(const Route& route, const Request& request) const;
+  // from an earlier day stays good. The error that is wished for decides how deep skirts hang, and so the heights in
+  // it. 404 where no subtree begins.
+  Answer HandleSubtree(const Route& route, const Request& request) const;
 
  private:
   const std::span<const DatasetView> datasets_;

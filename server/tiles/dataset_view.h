@@ -6,11 +6,13 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "engine/dem/dem_source.h"
 #include "engine/geo/error_ladder.h"
 #include "engine/geo/tile_key.h"
 #include "proto/glb_tile.h"
@@ -28,9 +30,11 @@ struct DatasetView {
   double west = -180, south = -90, east = 180, north = 90;  // degrees; west > east: across the antimeridian
   double min_height_m = 0, max_height_m = 0;                // of the data
   double floor_m = 0;                                       // height where there is no data
-  bool has_datum = true;                                    // it is known what its heights count from
-  std::size_t sources = 1;                                  // rasters that the heights come from
-  bool has_water = false;                                   // tiles have a water mask
+  // DemSource::RangeBound: heights that no sample of a tile leaves. Reads no raster; on any thread. Empty: those above.
+  std::function<dem::HeightRange(const geo::TileKey&)> range_bound = {};
+  bool has_datum = true;                        // it is known what its heights count from
+  std::size_t sources = 1;                      // rasters that the heights come from
+  bool has_water = false;                       // tiles have a water mask
   std::optional<proto::TextureFormat> texture;  // of GLB tiles, for requests that name none; nothing: no imagery
   int metadata_levels = 0;                      // tiles of every so many levels tell what is below them; 0: none
   int max_mercator_depth = 1;                   // the deepest geo::MercatorGrid that height tiles are cut from

@@ -5,7 +5,7 @@
 namespace terrace::server {
 namespace {
 
-DatasetView ViewOf(const Dataset& dataset) {
+DatasetView ViewOf(const std::shared_ptr<const TilePipeline>& pipeline, const Dataset& dataset) {
   const dem::DemInfo& info = dataset.source->info();
   DatasetView view;
   view.name = dataset.name;
@@ -20,6 +20,7 @@ DatasetView ViewOf(const Dataset& dataset) {
   view.north = info.bounds.north;
   view.min_height_m = info.heights.min;
   view.max_height_m = info.heights.max;
+  view.range_bound = [pipeline, &source = *dataset.source](const geo::TileKey& key) { return source.RangeBound(key); };
   view.has_datum = dataset.source->has_datum();
   view.sources = info.sources.size();
   view.has_water = dataset.water.any();
@@ -34,7 +35,7 @@ DatasetView ViewOf(const Dataset& dataset) {
 
 CatalogPtr MakeCatalog(std::shared_ptr<const TilePipeline> pipeline, std::size_t max_mesh_samples) {
   auto catalog = std::make_shared<Catalog>();
-  for (const Dataset& dataset : pipeline->datasets()) catalog->datasets.push_back(ViewOf(dataset));
+  for (const Dataset& dataset : pipeline->datasets()) catalog->datasets.push_back(ViewOf(pipeline, dataset));
   catalog->read_points = [pipeline](std::uint32_t dataset, std::span<const dem::GeoPosition> points,
                                     dem::HeightDatum datum, std::stop_token stop) {
     return pipeline->datasets()[dataset].source->ReadPoints(points, datum, std::move(stop));

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 namespace terrace::proto {
 namespace {
 
@@ -21,6 +23,8 @@ Levels Above(const std::vector<geo::TileRange>& deepest, int max_level) {
   levels[0] = {{0, 0, 1, 0}};
   return levels;
 }
+
+std::vector<TreeRoot> TreesOf(const Levels& available) { return ImplicitTrees(available, ImplicitRoots(available)); }
 
 TEST(ImplicitRoots, OfTheWholeGlobeAreAllTilesOfLevelTwo) {
   Levels available = {{{0, 0, 1, 0}}, {{0, 0, 3, 1}}, {{0, 0, 7, 3}}, {{0, 0, 15, 7}}};
@@ -72,7 +76,7 @@ TEST(ImplicitTrees, BesideThePolesAreRootedALevelDeeper) {
   available[1] = {{0, 0, 3, 1}};
   available[2] = {{0, 0, 7, 3}};
   available[3] = {{0, 0, 15, 7}};
-  const std::vector<TreeRoot> trees = ImplicitTrees(available);
+  const std::vector<TreeRoot> trees = TreesOf(available);
   ASSERT_EQ(trees.size(), 32u);
   for (const TreeRoot& tree : trees) {
     ASSERT_EQ(tree.below.size(), tree.tile.y == 0 || tree.tile.y == 3 ? 4u : 0u) << geo::ToString(tree.tile);
@@ -82,8 +86,85 @@ TEST(ImplicitTrees, BesideThePolesAreRootedALevelDeeper) {
     }
   }
   available.resize(3);
-  for (const TreeRoot& tree : ImplicitTrees(available)) EXPECT_TRUE(tree.below.empty()) << "nothing below";
-  EXPECT_TRUE(ImplicitTrees(Above({{33, 0, 36, 0}}, 13)).front().below.empty()) << "small roots are left alone";
+  for (const TreeRoot& tree : TreesOf(available)) EXPECT_TRUE(tree.below.empty()) << "nothing below";
+  EXPECT_TRUE(TreesOf(Above({{33, 0, 36, 0}}, 13)).front().below.empty()) << "small roots are left alone";
+}
+
+// The globe down to `base`, and tiles of `deepest` over a block of it.
+Levels GlobeAnd(int base, const geo::TileRange& block, int deepest) {
+  Levels available = Above({block}, deepest);
+  for (int level = 1; level <= base; ++level) {
+    available[static_cast<std::size_t>(level)] = {{0, 0, (2 << level) - 1, (1 << level) - 1}};
+  }
+  // All four children of a tile that has any.
+  for (int level = base + 1; level <= deepest; ++level) {
+    geo::TileRange& range = available[static_cast<std::size_t>(level)].front();
+    range = {range.start_x & ~1, range.start_y & ~1, range.end_x | 1, range.end_y | 1};
+  }
+  return available;
+}
+
+struct Named {
+  std::size_t tiles = 0, trees = 0;
+  int tallest = 0;
+};
+
+// Checks that what is below a tile are its available children.
+void Walk(const Levels& available, const std::vector<TreeRoot>& trees, Named& named) {
+  for (const TreeRoot& tree : trees) {
+    ++named.tiles;
+    ASSERT_EQ(tree.levels, LevelsUnder(available, tree.tile)) << geo::ToString(tree.tile);
+    if (tree.below.empty()) {
+      ++named.trees;
+      named.tallest = std::max(named.tallest, tree.levels);
+      continue;
+    }
+    std::size_t children = 0;
+    for (int i = 0; i < 4; ++i) {
+      const geo::TileKey child = TileUnder(tree.tile, 1, i % 2, i / 2);
+      const auto& level = available[static_cast<std::size_t>(child.level)];
+      const auto has_child = [&](const geo::TileRange& range) { return range.Contains(child); };
+      const bool is_there = std::any_of(level.begin(), level.end(), has_child);
+      children += is_there ? 1 : 0;
+      const auto is_child = [&](const TreeRoot& root) { return root.tile == child; };
+      EXPECT_EQ(std::count_if(tree.below.begin(), tree.below.end(), is_child), is_there ? 1 : 0);
+    }
+    EXPECT_EQ(tree.below.size(), children) << geo::ToString(tree.tile);
+    Walk(available, tree.below, named);
+  }
+}
+
+// A client that inherits the heights and skirts of a root far above asks for twice the tiles.
+TEST(ImplicitTrees, AreNoTallerThanASubtreeOverAnIslandOfTheGlobe) {
+  const Levels available = GlobeAnd(5, {9000, 9000, 9040, 9030}, 14);
+  Named named;
+  Walk(available, TreesOf(available), named);
+  EXPECT_LE(named.tallest, kTallestSubtree);
+  EXPECT_LE(named.tiles, 250u) << "only above the island";
+}
+
+TEST(ImplicitTrees, AreNoTallerThanASubtreeOverASmallDataset) {
+  const Levels available = Above({{8192, 9216, 8319, 9343}}, 14);
+  ASSERT_EQ(ImplicitRoots(available).front().level, 8);
+  Levels deeper = available;
+  for (int up = 0; up < 3; ++up) {
+    deeper.push_back({{deeper.back()[0].start_x * 2, deeper.back()[0].start_y * 2, deeper.back()[0].end_x * 2 + 1,
+                       deeper.back()[0].end_y * 2 + 1}});
+  }
+  for (const Levels& levels : {available, deeper}) {
+    Named named;
+    Walk(levels, TreesOf(levels), named);
+    EXPECT_LE(named.tallest, kTallestSubtree);
+  }
+}
+
+TEST(ImplicitTrees, OfADeepGlobeAreNamedNoFurtherThanADocumentHolds) {
+  const Levels available = GlobeAnd(14, {0, 0, 1, 1}, 14);
+  Named named;
+  Walk(available, TreesOf(available), named);
+  EXPECT_LE(named.tiles, kMaxNamedTiles);
+  EXPECT_EQ(named.trees, 512u) << "all of level 4";
+  EXPECT_EQ(named.tallest, 11);
 }
 
 // loaders.gl asks for every subtree of a tree before it draws: 13 levels in subtrees of 6 end in one for each deepest

@@ -1,6 +1,7 @@
 #include "tests/proto/subtree_reader.h"
 
 #include <algorithm>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -64,6 +65,35 @@ bool ParentsExist(const ReadSubtree& subtree, int levels) {
   return true;
 }
 
+// A property of the only table, row by row, spread over the bits of its tiles.
+Result<std::vector<float>> ReadProperty(const Json& json, const char* name, const BitList& tiles,
+                                        std::string_view binary) {
+  const Json& tables = json.at("propertyTables");
+  if (tables.size() != 1 || json.at("tileMetadata") != 0 || tables[0].at("class") != "tile") return Bad("the table");
+  const std::ptrdiff_t count = std::count(tiles.begin(), tiles.end(), true);
+  if (tables[0].at("count") != count) return Bad("rows that do not fit the tiles");
+  const Result<std::string_view> bytes =
+      ViewOf(json, tables[0].at("properties").at(name).at("values").get<std::size_t>(), binary);
+  if (!bytes) return tl::unexpected(bytes.error());
+  if (bytes->size() != sizeof(float) * static_cast<std::size_t>(count)) return Bad("a column of another length");
+  ByteReader in(*bytes);
+  std::vector<float> values;
+  for (const bool there : tiles) values.push_back(there ? in.Get<float>() : std::numeric_limits<float>::quiet_NaN());
+  return values;
+}
+
+Result<void> ReadHeights(const Json& json, std::string_view binary, ReadSubtree& subtree) {
+  if (!json.contains("propertyTables")) return {};
+  const std::pair<const char*, std::vector<float>*> columns[] = {{"min_height", &subtree.min_heights},
+                                                                 {"max_height", &subtree.max_heights}};
+  for (const auto& [name, to] : columns) {
+    Result<std::vector<float>> values = ReadProperty(json, name, subtree.tiles, binary);
+    if (!values) return tl::unexpected(values.error());
+    *to = std::move(*values);
+  }
+  return {};
+}
+
 Result<ReadSubtree> ReadChunks(const Json& json, std::string_view binary, int levels) {
   const Json buffers = json.value("buffers", Json::array());
   const std::size_t stated = buffers.empty() ? 0 : buffers.at(0).at("byteLength").get<std::size_t>();
@@ -85,6 +115,9 @@ Result<ReadSubtree> ReadChunks(const Json& json, std::string_view binary, int le
   subtree.children_constant = json.at("childSubtreeAvailability").contains("constant");
   if (!subtree.tiles[0]) return Bad("the subtree's root is not available");
   if (!ParentsExist(subtree, levels)) return Bad("a tile without its parent");
+  if (const Result<void> heights = ReadHeights(json, binary, subtree); !heights) {
+    return tl::unexpected(heights.error());
+  }
   subtree.json = json.dump();
   return subtree;
 }

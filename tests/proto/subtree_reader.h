@@ -16,6 +16,8 @@ using BitList = std::vector<bool>;
 struct ReadSubtree {
   BitList tiles, contents, children;
   bool tiles_constant = false, children_constant = false;
+  // TILE_MINIMUM_HEIGHT and TILE_MAXIMUM_HEIGHT by the tile's bit, NaN where there is no tile; empty: no metadata.
+  std::vector<float> min_heights, max_heights;
   std::string json;
 };
 

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <random>
 
 #include "tests/proto/subtree_reader.h"
@@ -138,8 +139,43 @@ TEST(Subtree, SeparateBlocksOfALevelAreAllThere) {
   EXPECT_EQ(read->tiles, (BitList{true, true, false, true, true}));
 }
 
+// Different for each tile, and for no order of them but the right one.
+HeightSpan HeightsOf(const geo::TileKey& key) {
+  const auto number = static_cast<double>(1000 * key.level + 31 * key.x + key.y);
+  return {-number - 0.25, number + 0.5};
+}
+
+TEST(Subtree, EveryTileHasHeightsThatHoldThoseBelowIt) {
+  Subtree ragged = Around(6, {13, 5, 17, 40});
+  Subtree full = Full(4);
+  for (Subtree* subtree : {&ragged, &full}) {
+    subtree->heights = HeightsOf;
+    const int levels = subtree->levels;
+    const Result<ReadSubtree> read = ParseSubtree(EncodeSubtree(*subtree), levels);
+    ASSERT_TRUE(read) << read.error().message;
+    ASSERT_EQ(read->min_heights.size(), read->tiles.size());
+    for (int level = 0; level < levels; ++level) {
+      for (std::int64_t y = 0; y < 1 << level; ++y) {
+        for (std::int64_t x = 0; x < 1 << level; ++x) {
+          if (!subtree->tiles[static_cast<std::size_t>(level)][0].Contains({level, x, y})) continue;
+          // Its own numbers are less than those of the highest tile of the deepest level below it.
+          const int down = levels - 1 - level;
+          const geo::TileRange& deepest = subtree->tiles[static_cast<std::size_t>(levels - 1)][0];
+          const HeightSpan expected = HeightsOf({levels - 1, std::min(((x + 1) << down) - 1, deepest.end_x),
+                                                 std::min(((y + 1) << down) - 1, deepest.end_y)});
+          const std::size_t bit = BitOf(level, static_cast<std::size_t>(x), static_cast<std::size_t>(y));
+          ASSERT_EQ(static_cast<double>(read->min_heights[bit]), expected.min_m) << level << " " << x << " " << y;
+          ASSERT_EQ(static_cast<double>(read->max_heights[bit]), expected.max_m) << level << " " << x << " " << y;
+        }
+      }
+    }
+  }
+}
+
 TEST(Subtree, EveryTruncationIsRefused) {
-  const std::string file = EncodeSubtree(Around(4, {3, 3, 9, 12}));
+  Subtree subtree = Around(4, {3, 3, 9, 12});
+  subtree.heights = HeightsOf;
+  const std::string file = EncodeSubtree(subtree);
   ASSERT_TRUE(ParseSubtree(file, 4));
   for (std::size_t size = 0; size < file.size(); ++size) {
     EXPECT_FALSE(ParseSubtree(std::string_view(file).substr(0, size), 4)) << size << " bytes";

@@ -14,12 +14,13 @@ namespace {
 
 using Json = nlohmann::json;
 
+constexpr HeightSpan kHeights{-1500, 3055.5};
+
 TilesetDescription Maui() {
   TilesetDescription tileset;
   tileset.attribution = "© a <survey> & \"Co\"";
   tileset.roots = {{{7, 16, 78}, 8}};
-  tileset.min_height_m = -1500;
-  tileset.max_height_m = 3055.5;
+  tileset.heights = [](const geo::TileKey&) { return kHeights; };
   return tileset;
 }
 
@@ -83,7 +84,7 @@ TEST(Tileset, RootsAcrossTheAntimeridianLieInASphere) {
       const double tile = 180.0 / static_cast<double>(std::int64_t{1} << root.level);
       for (int i = 0; i <= 8; ++i) {
         for (int j = 0; j <= 8; ++j) {
-          for (const double height : {tileset.min_height_m, tileset.max_height_m}) {
+          for (const double height : {kHeights.min_m, kHeights.max_m}) {
             const geo::Vec3 point = geo::ToEcef(-180 + tile * (static_cast<double>(root.x) + i / 8.0),
                                                 -90 + tile * (static_cast<double>(root.y) + j / 8.0), height);
             farthest = std::max(farthest, geo::Length(point - middle));
@@ -108,7 +109,7 @@ TEST(Tileset, RootsOfTheGlobeLieInASphere) {
   const Json& sphere = root.at("boundingVolume").at("sphere");
   const double off = geo::Length(geo::Vec3{sphere[0], sphere[1], sphere[2]});
   EXPECT_GE(off, 6e6) << "on the ground: clients aim at it, and at the Earth's centre CesiumJS finds no longitude";
-  EXPECT_GE(sphere[3], 6378137.0 + tileset.max_height_m + off);
+  EXPECT_GE(sphere[3], 6378137.0 + kHeights.max_m + off);
   EXPECT_LE(sphere[3], 6378137.0 + 10000 + off);
   ASSERT_EQ(root.at("children").size(), 32u);
   // CesiumJS throws beyond pi.
@@ -130,7 +131,7 @@ TEST(Tileset, RootsAllAroundAPoleLieInASphereAboutIt) {
     EXPECT_EQ(middle.z > 0, y == 3);
     const double inner = y == 3 ? 45 : -45, outer = y == 3 ? 90 : -90;
     for (const double latitude : {inner, outer}) {
-      for (const double height : {tileset.min_height_m, tileset.max_height_m}) {
+      for (const double height : {kHeights.min_m, kHeights.max_m}) {
         for (const double longitude : {-180.0, -45.0, 0.0, 100.0}) {
           EXPECT_LE(geo::Length(geo::ToEcef(longitude, latitude, height) - middle), sphere[3].get<double>());
         }
@@ -162,12 +163,46 @@ TEST(Tileset, TilesBesideThePolesAreBoundedBySpheres) {
   double farthest = 0;
   for (int i = 0; i <= 32; ++i) {
     for (int j = 0; j <= 32; ++j) {
-      for (const double height : {tileset.min_height_m, tileset.max_height_m}) {
+      for (const double height : {kHeights.min_m, kHeights.max_m}) {
         farthest = std::max(farthest, geo::Length(geo::ToEcef(45 * i / 32.0, 45 + 45 * j / 32.0, height) - middle));
       }
     }
   }
   EXPECT_NEAR(farthest, sphere[3], 1e-3);
+}
+
+TEST(Tileset, EveryNamedTileHasHeightsOfItsOwnThatHoldThoseBelow) {
+  TilesetDescription tileset = Maui();
+  tileset.heights = [](const geo::TileKey& key) {
+    return HeightSpan{-static_cast<double>(key.y), 10.0 * key.level + static_cast<double>(key.x)};
+  };
+  const TreeRoot middle{{4, 10, 10}, 9, {{{5, 20, 20}, 8}, {{5, 21, 21}, 7}}};
+  tileset.roots = {{{3, 5, 5}, 10, {middle, {{4, 11, 10}, 4}}}, {{3, 6, 5}, 2}};
+  const Json root = Json::parse(EncodeTileset(tileset)).at("root");
+  const auto heights = [](const Json& tile) {
+    const Json& region = tile.at("boundingVolume").at("region");
+    return HeightSpan{region[4], region[5]};
+  };
+  EXPECT_EQ(heights(root), (HeightSpan{-21, 71}));
+  const Json& first = root.at("children")[0];
+  EXPECT_EQ(heights(first), (HeightSpan{-21, 71})) << "35 alone";
+  EXPECT_EQ(heights(root.at("children")[1]), (HeightSpan{-5, 36}));
+  EXPECT_EQ(heights(first.at("children")[0]), (HeightSpan{-21, 71})) << "50 alone";
+  EXPECT_EQ(heights(first.at("children")[1]), (HeightSpan{-10, 51}));
+  EXPECT_EQ(heights(first.at("children")[0].at("children")[0]), (HeightSpan{-20, 70}));
+  EXPECT_EQ(first.at("content").at("uri"), "3dtiles/3-5-5/0/0/0.glb");
+  EXPECT_EQ(first.at("children")[0].at("geometricError"), GeometricError(4));
+  EXPECT_EQ(first.at("children")[0].at("children")[0].at("implicitTiling").at("availableLevels"), 8);
+  const Json &west = first.at("children")[0].at("boundingVolume").at("region"),
+             &east = first.at("children")[1].at("boundingVolume").at("region");
+  EXPECT_EQ(west[2], east[0]) << "the same bits";
+}
+
+TEST(Tileset, SchemaNamesTheHeightsOfSubtrees) {
+  const Json json = Json::parse(EncodeTileset(Maui()));
+  EXPECT_EQ(json.at("schema"), Json::parse(R"({"id":"terrace","classes":{"tile":{"properties":{
+      "min_height":{"type":"SCALAR","componentType":"FLOAT32","semantic":"TILE_MINIMUM_HEIGHT"},
+      "max_height":{"type":"SCALAR","componentType":"FLOAT32","semantic":"TILE_MAXIMUM_HEIGHT"}}}}})"));
 }
 
 TEST(Tileset, GeometricErrorsFallFromTheTopAndFitTerrainClients) {

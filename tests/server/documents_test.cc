@@ -1,6 +1,7 @@
 // Documents with wishes in them: where they are made, and that they are what they were when all were made beforehand.
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <condition_variable>
 #include <mutex>
 
@@ -86,6 +87,37 @@ TEST_F(DocumentsTest, LongOnesAreMadeOnWorkersAndKept) {
             304);
   EXPECT_EQ(Fetch(port(), "/blocks/layer.json?fraction=0.25").status, 503) << "another wish";
   Open(true);
+}
+
+// They tell the heights of up to 5,461 tiles, each of them a question to the source's tables.
+TEST_F(DocumentsTest, TallSubtreesAreMadeOnWorkersAndKept) {
+  DatasetView tall;
+  tall.name = "tall";
+  for (int level = 0; level <= 7; ++level) tall.available.push_back({{0, 0, (2 << level) - 1, (1 << level) - 1}});
+  std::atomic<int> asked = 0;
+  tall.range_bound = [&asked](const geo::TileKey&) {
+    ++asked;
+    return dem::HeightRange{-100, 100};
+  };
+  more_datasets_ = {tall};
+  Start(OneWorker());
+  const int at_start = asked;
+  RawClient holder(port());
+  ASSERT_TRUE(holder.Send(Get("/tall/2/0/0.terrain")));
+  ASSERT_TRUE(Eventually([this] { return builds_ > 0; }));
+  const std::string target = "/tall/3dtiles/1-0-0/0/0/0.7.subtree";
+  EXPECT_EQ(Fetch(port(), target).status, 503);
+  EXPECT_EQ(asked, at_start);
+  EXPECT_EQ(Fetch(port(), "/tall/3dtiles/1-0-0/0/0/0.3.subtree").status, 200) << "short";
+  EXPECT_EQ(asked, at_start + 21);
+
+  Open(true);
+  const Reply made = Fetch(port(), target);
+  EXPECT_EQ(made.status, 200);
+  EXPECT_EQ(asked, at_start + 21 + 5461);
+  EXPECT_EQ(Fetch(port(), target + "?compression=none&v=3").body, made.body);
+  EXPECT_EQ(asked, at_start + 21 + 5461) << "kept";
+  EXPECT_NE(Fetch(port(), target + "?fraction=0.1").body, made.body) << "shorter skirts";
 }
 
 TEST_F(DocumentsTest, AreTheSameWhereverTheyAreMade) {

@@ -331,7 +331,7 @@ TEST_F(Limits, ATokenInTheQueryGoesIntoTemplates) {
   EXPECT_EQ(Fetch(port(), "/maui/0/0/0.terrain?" + token).Field("cache-control"), "private, max-age=3600");
   const Reply tileset = Fetch(port(), "/maui/tileset.json?error=5&" + token);
   EXPECT_TRUE(contains(tileset, ".glb?error=5&atleast=1&" + token));
-  EXPECT_TRUE(contains(tileset, ".subtree?" + token));
+  EXPECT_TRUE(contains(tileset, ".subtree?error=5&atleast=1&" + token));
   EXPECT_TRUE(contains(Fetch(port(), "/maui/tiles.json?" + token), "{y}.png?" + token));
   EXPECT_TRUE(
       contains(Fetch(port(), "/maui/tiles.json?encoding=terrarium&" + token), "{y}.png?encoding=terrarium&" + token));

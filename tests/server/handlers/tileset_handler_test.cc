@@ -7,6 +7,7 @@
 
 #include "engine/geo/error_ladder.h"
 #include "proto/skirt.h"
+#include "server/http/negotiate.h"
 #include "tests/proto/subtree_reader.h"
 #include "tests/server/handlers/at_once.h"
 
@@ -38,8 +39,8 @@ class TilesetHandlerTest : public testing::Test {
     EXPECT_TRUE(route) << target;
     Request request;
     request.fields.Set(&RequestFields::accept_encoding, accept_encoding);
-    return route->kind == RouteKind::kTileset ? AtOnce(handler_->Handle(*route, request), request)
-                                              : handler_->HandleSubtree(*route, request);
+    const bool is_subtree = route->kind == RouteKind::kSubtree;
+    return AtOnce(is_subtree ? handler_->HandleSubtree(*route, request) : handler_->Handle(*route, request), request);
   }
   Json Tileset(const std::string& query = "") { return Json::parse(*Get("/maui/tileset.json" + query).body); }
 
@@ -56,19 +57,61 @@ TEST_F(TilesetHandlerTest, RootsTheTreesWhereTheDataIs) {
   EXPECT_EQ(west.at("implicitTiling").at("subtreeLevels"), 6);
 }
 
+// A tile has four children or none, so that beside the data and above its roots there are tiles without any.
+TEST_F(TilesetHandlerTest, RootsTheTreesWhereTheDataIsAmongTilesThatAreThereToMakeFour) {
+  DatasetView& maui = datasets_[0];
+  const double tile = 180.0 / 4096;
+  maui.west = -180 + 513 * tile + 1e-4;
+  maui.east = -180 + 551 * tile;
+  maui.south = -90 + 1025 * tile;
+  maui.north = -90 + 1047.5 * tile;
+  for (std::size_t level = 1; level <= 12; ++level) {
+    geo::TileRange& range = maui.available[level].front();
+    range = {range.start_x & ~1, range.start_y & ~1, range.end_x | 1, range.end_y | 1};
+  }
+  const auto roots = [&] {
+    handler_.emplace(datasets_, "max-age=1");
+    const Json root = Tileset().at("root");
+    std::vector<std::string> uris;
+    for (const Json& tree : root.at("children")) uris.push_back(tree.at("content").at("uri"));
+    return uris;
+  };
+  const std::vector<std::string> expected = {"3dtiles/7-16-32/{level}/{x}/{y}.glb",
+                                             "3dtiles/7-17-32/{level}/{x}/{y}.glb"};
+  EXPECT_EQ(roots(), expected);
+
+  // The same across the antimeridian.
+  for (std::size_t level = 1; level <= 12; ++level) {
+    geo::TileRange& range = maui.available[level].front();
+    const std::int64_t columns = geo::TileColumns(static_cast<int>(level)), middle = std::int64_t{544} >> (12 - level);
+    maui.available[level] = {
+        {0, range.start_y, std::max<std::int64_t>(range.end_x - middle, 1), range.end_y},
+        {columns - std::max<std::int64_t>(middle - range.start_x, 2), range.start_y, columns - 1, range.end_y}};
+  }
+  maui.west = 180 - 31 * tile;
+  maui.east = -180 + 7 * tile;
+  EXPECT_EQ(roots(),
+            (std::vector<std::string>{"3dtiles/7-0-32/{level}/{x}/{y}.glb", "3dtiles/7-255-32/{level}/{x}/{y}.glb"}));
+}
+
 TEST_F(TilesetHandlerTest, RegionHoldsDataFloorAndSkirtsOfTheErrorAskedFor) {
   const auto region = [&](const char* query) {
     return Tileset(query).at("root").at("children")[0].at("boundingVolume").at("region");
   };
   const auto holds = [](const Json& box, double error_m) {
     EXPECT_LE(box[4], -20 - proto::SkirtDepth(7, error_m)) << error_m;
-    EXPECT_GE(box[4], -20 - proto::SkirtDepth(7, error_m) - error_m / 16) << "not for nothing: " << error_m;
+    EXPECT_GE(box[4], -20 - proto::SkirtDepth(7, error_m) - error_m / 3) << "not for nothing: " << error_m;
     EXPECT_GE(box[5], 3000.0);
+    EXPECT_LE(box[5], 3000 + error_m / 3) << error_m;
   };
   holds(region(""), geo::DefaultError(7));
   holds(region("?error=5"), geo::DefaultError(7));  // at least the default is asked for
   holds(region("?error=1000"), geo::LadderError(7, geo::SnapToLadder(7, 1000)));
   holds(region("?fraction=0.05"), geo::LadderError(7, geo::SnapToLadder(7, 0.05 * geo::LevelError(7))));
+  // The deepest level's skirts hang for its default error at least, however small the fraction.
+  const Json box = region("?fraction=0.008");
+  EXPECT_LE(box[4], -20 - proto::SkirtDepth(12, geo::DefaultError(12)));
+  EXPECT_GE(box[4], -20 - proto::SkirtDepth(12, geo::DefaultError(12)) - geo::DefaultError(12));
 }
 
 TEST_F(TilesetHandlerTest, WritesWishesIntoTheContentTemplates) {
@@ -82,6 +125,61 @@ TEST_F(TilesetHandlerTest, WritesWishesIntoTheContentTemplates) {
   EXPECT_EQ(content("?texture=webp&compression=none&texture=webp"),
             "3dtiles/7-17-32/{level}/{x}/{y}.glb?compression=none&texture=webp");
   EXPECT_EQ(content("?v=1"), "3dtiles/7-17-32/{level}/{x}/{y}.glb");
+}
+
+// Skirts, and with them the heights in subtrees, depend on the error.
+TEST_F(TilesetHandlerTest, WritesWishesForErrorsIntoTheSubtreeTemplates) {
+  const auto subtrees = [&](const char* query) {
+    const Json tree = Tileset(query).at("root").at("children")[1];
+    return tree.at("implicitTiling").at("subtrees").at("uri").get<std::string>();
+  };
+  EXPECT_EQ(subtrees(""), "3dtiles/7-17-32/{level}/{x}/{y}.6.subtree");
+  EXPECT_EQ(subtrees("?error=5.00"), "3dtiles/7-17-32/{level}/{x}/{y}.6.subtree?error=5&atleast=1");
+  EXPECT_EQ(subtrees("?fraction=.250&compression=none"), "3dtiles/7-17-32/{level}/{x}/{y}.6.subtree?fraction=0.25");
+}
+
+TEST_F(TilesetHandlerTest, EveryRootHasTheHeightsOfItsOwnTile) {
+  datasets_[0].range_bound = [](const geo::TileKey& key) {
+    return dem::HeightRange{static_cast<double>(-key.x), 1000.0 * static_cast<double>(key.x - 15)};
+  };
+  handler_.emplace(datasets_, "max-age=1");
+  const Json root = Tileset("?fraction=0.05").at("root");
+  const auto region = [](const Json& tile) { return tile.at("boundingVolume").at("region"); };
+  const double error_m = geo::LadderError(7, geo::SnapToLadder(7, 0.05 * geo::LevelError(7)));
+  const double skirt_m = proto::SkirtDepth(7, error_m);
+  for (const int x : {16, 17}) {
+    const Json box = region(root.at("children")[static_cast<std::size_t>(x - 16)]);
+    EXPECT_LE(box[4], -x - skirt_m);
+    EXPECT_GE(box[4], -x - skirt_m - error_m / 3);
+    EXPECT_GE(box[5], 1000 * (x - 15));
+    EXPECT_LE(box[5], 1000 * (x - 15) + error_m / 3);
+  }
+  EXPECT_EQ(region(root)[4], region(root.at("children")[1])[4]);
+  EXPECT_EQ(region(root)[5], region(root.at("children")[1])[5]);
+}
+
+TEST_F(TilesetHandlerTest, SubtreesTellTheHeightsOfEachTileAtTheErrorAskedFor) {
+  // Wider than the tiles above them: 10 m for each level.
+  datasets_[0].range_bound = [](const geo::TileKey& key) {
+    return dem::HeightRange{-10.0 * key.level, static_cast<double>(key.x % 4)};
+  };
+  for (const char* query : {"", "?error=600&atleast=1", "?fraction=0.02"}) {
+    const Result<proto::ReadSubtree> read =
+        proto::ParseSubtree(*Get(std::string("/maui/3dtiles/7-16-32/0/0/0.6.subtree") + query).body, 6);
+    ASSERT_TRUE(read) << read.error().message;
+    ASSERT_EQ(read->min_heights.size(), 1365u);
+    ErrorWish wish;
+    if (query[1] == 'e') wish = {.error_m = 600, .fraction = {}, .at_least = true};
+    if (query[1] == 'f') wish.fraction = 0.02;
+    const int step = ErrorStep(wish, 12, true, 0.5);
+    const double error_m = geo::LadderError(12, step);
+    const double lowest = -120 - proto::SkirtDepth(12, proto::SkirtError(12, step, true, 0.5));
+    EXPECT_LE(read->min_heights[341], lowest) << query;
+    EXPECT_GE(read->min_heights[341], lowest - error_m / 3) << query;
+    EXPECT_GE(read->max_heights[344], 1) << query << ": column 513, row 1025";
+    EXPECT_LE(read->max_heights[344], 1 + error_m / 3) << query;
+    EXPECT_LE(read->min_heights[0], read->min_heights[341]);
+  }
 }
 
 TEST_F(TilesetHandlerTest, SubtreesHoldExactlyTheTilesOfTheDataset) {
@@ -120,7 +218,13 @@ TEST_F(TilesetHandlerTest, IsNotThereWhereNoSubtreeBegins) {
 
 TEST_F(TilesetHandlerTest, TakesTheTilesetsParametersOnSubtreesToo) {
   const Response plain = Get("/maui/3dtiles/7-16-32/0/0/0.6.subtree");
-  EXPECT_EQ(*Get("/maui/3dtiles/7-16-32/0/0/0.6.subtree?error=5&compression=none&v=1").body, *plain.body);
+  EXPECT_EQ(*Get("/maui/3dtiles/7-16-32/0/0/0.6.subtree?compression=none&v=1").body, *plain.body);
+  const Response wished = Get("/maui/3dtiles/7-16-32/0/0/0.6.subtree?error=500&atleast=1");
+  EXPECT_EQ(wished.status, 200);
+  // deck.gl sends the tileset's query once more.
+  EXPECT_EQ(*Get("/maui/3dtiles/7-16-32/0/0/0.6.subtree?error=500&atleast=1&error=500&compression=none").body,
+            *wished.body);
+  EXPECT_NE(*wished.body, *plain.body) << "deeper skirts";
   EXPECT_EQ(Get("/maui/3dtiles/7-16-32/0/0/0.6.subtree?colour=red").status, 400);
 }
 
