@@ -138,7 +138,8 @@ class TileMeter::Impl {
 
   void Take(double error, int i, int j, Found& found) const {
     found.largest = std::max(found.largest, error);
-    if (Miss& miss = MissOf(i, j, found); error > miss.error && IsInside(i, j)) {
+    if (!(error > bound_) || !IsInside(i, j)) return;
+    if (Miss& miss = MissOf(i, j, found); error > miss.error) {
       miss = {error, {static_cast<std::uint16_t>(i), static_cast<std::uint16_t>(j)}};
     }
   }
@@ -269,7 +270,8 @@ class TileMeter::Impl {
       const PlumbFootprint::Columns columns = footprint.ColumnsOf(j);
       for (int i = static_cast<int>(columns.first); i <= columns.last; ++i) {
         const double error = std::abs(plumb_.HeightOn(plane, i, j) - lattice_.At(i, j));
-        if (!(error > found.largest || error > MissOf(i, j, found).error)) continue;  // NaN is no height
+        const bool counts = error > found.largest || (error > bound_ && error > MissOf(i, j, found).error);
+        if (!counts) continue;  // NaN is no height
         const bool meets =
             (i >= columns.inner_first && i <= columns.inner_last) || error <= kNothing_m || plumb_.Meets(corners, i, j);
         if (meets) Take(error, i, j, found);

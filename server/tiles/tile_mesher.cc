@@ -104,7 +104,8 @@ tin::HeightField FieldOf(const proto::LatticeView& lattice) {
   std::vector<float> heights;
   heights.reserve(static_cast<std::size_t>(side) * static_cast<std::size_t>(side));
   for (int j = 0; j < side; ++j) {
-    for (int i = 0; i < side; ++i) heights.push_back(lattice.At(i, j));
+    const float* const row = lattice.heights.data() + (j + 1) * (side + 2) + 1;  // within the halo
+    heights.insert(heights.end(), row, row + side);
   }
   auto field = tin::HeightField::Make(side, side, std::move(heights));
   TERRACE_CHECK(field.has_value());  // every lattice height is finite
