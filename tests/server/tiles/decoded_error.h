@@ -8,8 +8,8 @@
 
 namespace terrace::server {
 
-// Metres, of every lattice sample of the tile, by rows from the south, against the surface interpolated in longitude and
-// latitude; infinite where no triangle covers a sample, and all of them if a triangle is not counter-clockwise.
+// Metres, of every lattice sample of the tile, by rows from the south, against the surface interpolated in longitude
+// and latitude; infinite where no triangle covers a sample, and all of them if a triangle is not counter-clockwise.
 std::vector<double> DecodedErrors(const proto::DecodedTile& tile, const dem::TileHeights& heights);
 
 // The largest of them.
