@@ -142,23 +142,26 @@ double LargestOn(double length, double edge_bend, double first, double last, dou
 
 class EdgeMeter {
  public:
+  // Differences of floats are exact here: heights are multiples of 2^-10 m, and steps between them below 2^14 m.
   explicit EdgeMeter(const LatticeView& lattice) : lattice_(lattice), cells_(lattice.cells()) {
+    const auto row_of = [&](int j) { return lattice.heights.data() + (j + 1) * (cells_ + 3) + 1; };
+    float east = 0, north = 0;
     for (int j = 0; j <= cells_; ++j) {
-      for (int i = 0; i <= cells_; ++i) {
-        const double height = lattice.At(i, j);
-        if (i < cells_) steepest_.x = std::max(steepest_.x, std::abs(lattice.At(i + 1, j) - height));
-        if (j < cells_) steepest_.y = std::max(steepest_.y, std::abs(lattice.At(i, j + 1) - height));
-        lowest_ = std::min(lowest_, height);
-        highest_ = std::max(highest_, height);
+      const float *const row = row_of(j), *const next = row_of(std::min(j + 1, cells_));
+      for (int i = 0; i < cells_; ++i) {
+        east = std::max(east, std::abs(row[i + 1] - row[i]));
+        north = std::max(north, std::abs(next[i] - row[i]));
       }
+      north = std::max(north, std::abs(next[cells_] - row[cells_]));
     }
+    steepest_ = {static_cast<double>(east), static_cast<double>(north)};
   }
 
   // Metres by which the lattice surface changes over these steps, at most.
   double LargestChange(Place steps) const {
-    const double relief = highest_ - lowest_;
-    if (!std::isfinite(steps.x) || !std::isfinite(steps.y)) return relief;
-    return std::min(relief, steps.x * steepest_.x + steps.y * steepest_.y);
+    if (!std::isfinite(steps.x) || !std::isfinite(steps.y)) return Relief();
+    const double change = steps.x * steepest_.x + steps.y * steepest_.y;
+    return change <= std::max(steepest_.x, steepest_.y) ? change : std::min(change, Relief());
   }
 
   // Every piece of the edge a - b between places where it leaves a cell, in order: visit(piece).
@@ -195,6 +198,22 @@ class EdgeMeter {
   }
 
  private:
+  // Between the lowest and the highest node, metres. Few tiles ask for it.
+  double Relief() const {
+    if (relief_ < 0) {
+      double lowest = lattice_.At(0, 0), highest = lowest;
+      for (int j = 0; j <= cells_; ++j) {
+        for (int i = 0; i <= cells_; ++i) {
+          const double height = lattice_.At(i, j);
+          lowest = std::min(lowest, height);
+          highest = std::max(highest, height);
+        }
+      }
+      relief_ = highest - lowest;
+    }
+    return relief_;
+  }
+
   int CellOf(double at) const { return std::clamp(static_cast<int>(at), 0, cells_ - 1); }
 
   // Where an edge crosses the lattice's lines of one direction, as parts of the edge; infinity after the last.
@@ -214,7 +233,7 @@ class EdgeMeter {
   const LatticeView& lattice_;
   const int cells_;
   Place steepest_;  // metres between neighbouring samples of a row and of a column
-  double lowest_ = std::numeric_limits<double>::infinity(), highest_ = -lowest_;
+  mutable double relief_ = -1;
 };
 
 // Every edge once: those inside the tile belong to two triangles with opposite directions.

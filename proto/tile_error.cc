@@ -75,27 +75,33 @@ class TileMeter::Impl {
     std::size_t worst = 0;
     for (std::size_t t = 0; t < readings_.size(); ++t) {
       Reading& reading = readings_[t];
-      if (!is_alike || reading.is_missed || !IsSame(before, surface_, t, of_same_vertices)) reading = ReadLinear(t);
+      // What misses the bound is told again: what can be done about it changes.
+      if (!is_alike || reading.most_m > bound_ || !IsSame(before, surface_, t, of_same_vertices))
+        reading = ReadLinear(t);
       if (reading.most_m > readings_[worst].most_m) worst = t;
     }
     TileError result;
+    std::vector<MissedVertex> vertices;
     const auto measure = [&](std::size_t t) {
-      if (!readings_[t].is_exact) readings_[t] = ReadBoth(t, result.misses);
+      if (!readings_[t].is_exact) readings_[t] = ReadBoth(t, result.misses, vertices);
       result.max_m = std::max(result.max_m, readings_[t].most_m);
     };
     if (!readings_.empty() && readings_[worst].most_m <= bound_) measure(worst);
     for (std::size_t t = 0; t < readings_.size(); ++t) {
       if (readings_[t].most_m > std::min(result.max_m, bound_)) measure(t);
     }
+    if (result.misses.empty()) result.misses = NeighboursOf(vertices);
+    result.is_cut_through = result.misses.empty() && std::ranges::any_of(vertices, [&](const MissedVertex& vertex) {
+                              return PassesBetween(vertex);
+                            });
     return result;
   }
 
  private:
-  // Of a triangle.
+  // Of a triangle: the error that is to be stated, at most or exactly.
   struct Reading {
-    double most_m = 0;      // the error that is to be stated, at most
-    bool is_exact = false;  // or exactly
-    bool is_missed = true;  // a sample misses the bound: to be told again
+    double most_m = std::numeric_limits<double>::infinity();
+    bool is_exact = false;
   };
 
   std::size_t NodeIndex(std::int64_t i, std::int64_t j) const {
@@ -118,17 +124,61 @@ class TileMeter::Impl {
     return p;
   }
 
+  // Inside the tile, if its error is above the bound.
+  struct Miss {
+    double error = 0;
+    tin::SamplePosition at;
+  };
+  // Of a triangle: the worst of all, of the samples that are no vertices, and of those that are.
   struct Found {
-    double largest = 0, worst_miss = 0;
-    tin::SamplePosition miss;
+    explicit Found(double bound) : sample{bound, {}}, vertex{bound, {}} {}
+    double largest = 0;
+    Miss sample, vertex;
   };
 
   void Take(double error, int i, int j, Found& found) const {
     found.largest = std::max(found.largest, error);
-    if (error > found.worst_miss && CanMend(i, j)) {
-      found.worst_miss = error;
-      found.miss = {static_cast<std::uint16_t>(i), static_cast<std::uint16_t>(j)};
+    if (!(error > bound_) || !IsInside(i, j)) return;
+    if (Miss& miss = MissOf(i, j, found); error > miss.error) {
+      miss = {error, {static_cast<std::uint16_t>(i), static_cast<std::uint16_t>(j)}};
     }
+  }
+
+  Miss& MissOf(int i, int j, Found& found) const { return is_vertex_[NodeIndex(i, j)] ? found.vertex : found.sample; }
+
+  bool IsVertex(tin::SamplePosition p) const { return is_vertex_[NodeIndex(p.x, p.y)]; }
+
+  struct MissedVertex {
+    tin::SamplePosition at;
+    std::size_t triangle = 0;  // the one that misses it
+  };
+
+  // In the row and the column of a node inside the tile.
+  static std::array<tin::SamplePosition, 4> NeighboursOf(tin::SamplePosition p) {
+    const auto at = [&](int dx, int dy) {
+      return tin::SamplePosition{static_cast<std::uint16_t>(p.x + dx), static_cast<std::uint16_t>(p.y + dy)};
+    };
+    return {at(-1, 0), at(1, 0), at(0, -1), at(0, 1)};
+  }
+
+  // Those inside the tile that are no vertices themselves.
+  std::vector<tin::SamplePosition> NeighboursOf(const std::vector<MissedVertex>& vertices) const {
+    std::vector<tin::SamplePosition> samples;
+    for (const MissedVertex& vertex : vertices) {
+      for (const tin::SamplePosition p : NeighboursOf(vertex.at)) {
+        if (IsInside(p.x, p.y) && !IsVertex(p)) samples.push_back(p);
+      }
+    }
+    return samples;
+  }
+
+  // Whether the triangle is larger than half of a cell, though all four neighbours of the vertex are vertices.
+  bool PassesBetween(const MissedVertex& vertex) const {
+    const std::array<NodePoint, 3> p = CornersOf(vertex.triangle);
+    const auto [west, east] = std::minmax({NodeOf(p[0].x), NodeOf(p[1].x), NodeOf(p[2].x)});
+    const auto [south, north] = std::minmax({NodeOf(p[0].y), NodeOf(p[1].y), NodeOf(p[2].y)});
+    return (east - west > 1 || north - south > 1) &&
+           std::ranges::all_of(NeighboursOf(vertex.at), [&](tin::SamplePosition at) { return IsVertex(at); });
   }
 
   // visit(i, j, error) for nodes, of the height that is linear in longitude and latitude: `edges` are those of the
@@ -151,7 +201,7 @@ class TileMeter::Impl {
 
   // The flat triangle is at most its sagitta off the linear one, at a place that is off by the shift.
   Reading ReadLinear(std::size_t t) const {
-    constexpr Reading kUnknown = {std::numeric_limits<double>::infinity(), false, false};
+    constexpr Reading kUnknown;
     const std::array<NodePoint, 3> p = CornersOf(t);
     const std::int64_t area = TwiceArea(p);
     if (area <= 0) return kUnknown;
@@ -171,12 +221,13 @@ class TileMeter::Impl {
           for (std::size_t k = 0; k < 3; ++k) edges[k].ClipMoved(row, moves[k], first, last);
         },
         [&](int, int, double error) { most = std::max(most, error); });
-    return {most + bounds.sagitta_m + std::abs(plane.dx) * x + std::abs(plane.dy) * y, false, false};
+    return {most + bounds.sagitta_m + std::abs(plane.dx) * x + std::abs(plane.dy) * y, false};
   }
 
-  Reading ReadBoth(std::size_t t, std::vector<tin::SamplePosition>& misses) const {
+  Reading ReadBoth(std::size_t t, std::vector<tin::SamplePosition>& samples,
+                   std::vector<MissedVertex>& vertices) const {
     const std::array<NodePoint, 3> p = CornersOf(t);
-    Found found{0, bound_, {}};
+    Found found(bound_);
     const std::int64_t area = TwiceArea(p);
     if (surface_.is_planar && area > 0) {
       const std::array<EdgeRows, 3> edges = EdgesOf(p);
@@ -189,9 +240,9 @@ class TileMeter::Impl {
           [&](int i, int j, double error) { Take(error, i, j, found); });
     }
     MeasureFlat(surface_.triangles[t], p, found);
-    const bool is_missed = found.worst_miss > bound_;
-    if (is_missed) misses.push_back(found.miss);
-    return {found.largest, true, is_missed};
+    if (found.sample.error > bound_) samples.push_back(found.sample.at);
+    if (found.vertex.error > bound_) vertices.push_back({found.vertex.at, t});
+    return {found.largest, true};
   }
 
   std::array<EdgeRows, 3> EdgesOf(const std::array<NodePoint, 3>& p) const {
@@ -219,7 +270,8 @@ class TileMeter::Impl {
       const PlumbFootprint::Columns columns = footprint.ColumnsOf(j);
       for (int i = static_cast<int>(columns.first); i <= columns.last; ++i) {
         const double error = std::abs(plumb_.HeightOn(plane, i, j) - lattice_.At(i, j));
-        if (!(error > found.largest || error > found.worst_miss)) continue;  // NaN is no height
+        const bool counts = error > found.largest || (error > bound_ && error > MissOf(i, j, found).error);
+        if (!counts) continue;  // NaN is no height
         const bool meets =
             (i >= columns.inner_first && i <= columns.inner_last) || error <= kNothing_m || plumb_.Meets(corners, i, j);
         if (meets) Take(error, i, j, found);
@@ -227,9 +279,7 @@ class TileMeter::Impl {
     }
   }
 
-  bool CanMend(int i, int j) const {
-    return i > 0 && j > 0 && i < cells_ && j < cells_ && !is_vertex_[NodeIndex(i, j)];
-  }
+  bool IsInside(int i, int j) const { return i > 0 && j > 0 && i < cells_ && j < cells_; }
 
   const LatticeView lattice_;
   const int cells_;

@@ -13,9 +13,14 @@ namespace terrace::proto {
 
 struct TileError {
   double max_m = 0;  // over every lattice sample of the tile
-  // For each triangle that misses the bound, its worst sample that an insertion can mend: inside the tile, no vertex
-  // yet.
+  // What to insert: for each triangle that misses the bound, its worst sample inside the tile that is no vertex. If no
+  // such sample misses it any more, the neighbours of vertices that do, which the rounding of positions moved along
+  // steep triangles: between neighbours they are no steeper than the ground. Empty if nothing is left to insert,
+  // whatever max_m is.
   std::vector<tin::SamplePosition> misses;
+  // Nothing is left to insert, but a vertex misses the bound by a triangle with an edge that passes between it and its
+  // neighbours, as none of a Delaunay triangulation does.
+  bool is_cut_through = false;
 };
 
 // Measures a tile's mesh again and again while samples are inserted into it: triangles that are what they were the time

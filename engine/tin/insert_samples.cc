@@ -43,4 +43,14 @@ TinMesh InsertSamples(TinMesh mesh, std::span<const SamplePosition> samples) {
   return mesh;
 }
 
+TinMesh DelaunayOf(const TinMesh& mesh) {
+  const auto vertex = [&](std::size_t i) { return Triangulation::Vertex{mesh.vertices[i], 0}; };
+  Triangulation triangulation({vertex(0), vertex(1), vertex(2), vertex(3)});
+  TriangleId near = 0;
+  for (std::size_t i = 4; i < mesh.vertices.size(); ++i) {
+    near = triangulation.InsertDelaunay(vertex(i), triangulation.Locate(mesh.vertices[i], near)).triangles[0];
+  }
+  return triangulation.Mesh();
+}
+
 }  // namespace terrace::tin

@@ -25,4 +25,7 @@ class SampleInserter {
 // The same, once.
 TinMesh InsertSamples(TinMesh mesh, std::span<const SamplePosition> samples);
 
+// The Delaunay triangulation of the vertices of a mesh, those on its border too. Preconditions: as above.
+TinMesh DelaunayOf(const TinMesh& mesh);
+
 }  // namespace terrace::tin

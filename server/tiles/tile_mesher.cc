@@ -10,12 +10,12 @@
 #include "engine/core/check.h"
 #include "engine/geo/tile_key.h"
 #include "engine/tin/drop_pass.h"
-#include "engine/tin/insert_samples.h"
 #include "proto/edge_steps.h"
 #include "proto/surface_error.h"
 #include "proto/tile_error.h"
 #include "proto/tile_mesh.h"
 #include "server/tiles/inner_vertices.h"
+#include "server/tiles/mend_mesh.h"
 #include "server/tiles/refine_plan.h"
 
 namespace terrace::server {
@@ -41,26 +41,21 @@ proto::EdgeSteps EdgeStepsOf(const dem::DemSource& source, const geo::TileKey& k
   return proto::MakeEdgeSteps(error_m, needed, pole_step, key.y == 0, key.y == rows - 1);
 }
 
-// Inserts what the wire's rounding pushed over the bound, until nothing that an insertion can mend is left.
+// Quantized, with what the wire's rounding pushed over the bound inserted.
 Result<MeshedTile> Finish(tin::TinMesh mesh, const proto::LatticeView& lattice, const proto::EdgeSteps& steps,
                           double error_m, const std::stop_token& stop) {
-  constexpr int kMaxRounds = 16;  // two are usual; a cliff may keep a sample out of reach for ever
   proto::TileMeter meter(lattice, error_m);
-  tin::SampleInserter inserter;
-  for (int round = 1;; ++round) {
-    if (stop.stop_requested()) return Cancelled();
-    MeshedTile measured;
-    measured.tile = proto::QuantizeTile(lattice, mesh, steps);
-    const proto::TileError error = meter.Measure(measured.tile);
-    measured.max_error_m = error.max_m;
-    if (error.misses.empty() || round == kMaxRounds ||
-        mesh.vertices.size() + error.misses.size() > proto::kMaxTileVertices) {
-      measured.surface_error_m = std::max(error.max_m, proto::MeasureEdgeError(lattice, measured.tile));
-      measured.mesh = std::move(mesh);
-      return measured;
-    }
-    inserter.InsertInto(mesh, error.misses);
-  }
+  MeshedTile meshed;
+  const auto measure = [&](const tin::TinMesh& rounded) {
+    meshed.tile = proto::QuantizeTile(lattice, rounded, steps);
+    return meter.Measure(meshed.tile);
+  };
+  const Result<proto::TileError> error = MendMesh(mesh, measure, stop);
+  if (!error) return tl::unexpected(error.error());
+  meshed.max_error_m = error->max_m;
+  meshed.surface_error_m = std::max(error->max_m, proto::MeasureEdgeError(lattice, meshed.tile));
+  meshed.mesh = std::move(mesh);
+  return meshed;
 }
 
 // A mesh within the format's number of vertices: `coarser` times the error inside the tile, more where that is not
@@ -109,7 +104,8 @@ tin::HeightField FieldOf(const proto::LatticeView& lattice) {
   std::vector<float> heights;
   heights.reserve(static_cast<std::size_t>(side) * static_cast<std::size_t>(side));
   for (int j = 0; j < side; ++j) {
-    for (int i = 0; i < side; ++i) heights.push_back(lattice.At(i, j));
+    const float* const row = lattice.heights.data() + (j + 1) * (side + 2) + 1;  // within the halo
+    heights.insert(heights.end(), row, row + side);
   }
   auto field = tin::HeightField::Make(side, side, std::move(heights));
   TERRACE_CHECK(field.has_value());  // every lattice height is finite

@@ -14,7 +14,7 @@ bool IsFarFrom(const geo::Vec3& foot, const geo::Vec3& up, const geo::Vec3& a, c
 }  // namespace
 
 FlatError LargestFlatError(const LatticeView& lattice, const std::vector<geo::Vec3>& ecef,
-                           const std::vector<std::array<std::uint32_t, 3>>& triangles) {
+                           const std::vector<std::array<std::uint32_t, 3>>& triangles, int margin) {
   using Vector = std::array<long double, 3>;
   const auto minus = [](const geo::Vec3& a, const geo::Vec3& b) {
     return Vector{static_cast<long double>(a.x) - b.x, static_cast<long double>(a.y) - b.y,
@@ -25,8 +25,8 @@ FlatError LargestFlatError(const LatticeView& lattice, const std::vector<geo::Ve
   };
   const auto length = [](const Vector& a) { return std::sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]); };
   FlatError largest;
-  for (int j = 0; j <= lattice.cells(); ++j) {
-    for (int i = 0; i <= lattice.cells(); ++i) {
+  for (int j = margin; j <= lattice.cells() - margin; ++j) {
+    for (int i = margin; i <= lattice.cells() - margin; ++i) {
       const geo::Vec3 foot = geo::ToEcef(lattice.Longitude(i), lattice.Latitude(j), 0);
       const geo::Vec3 normal = geo::SurfaceNormal(lattice.Longitude(i), lattice.Latitude(j));
       const Vector down = {-normal.x, -normal.y, -normal.z};

@@ -16,8 +16,8 @@ struct FlatError {
 };
 
 // Every node's plumb line against every triangle in ECEF, by Cramer's rule: no plane, no footprint, no order. A
-// triangle that stands upright tells no height.
+// triangle that stands upright tells no height. `margin`: nodes so near to the tile's rim are left out.
 FlatError LargestFlatError(const LatticeView& lattice, const std::vector<geo::Vec3>& ecef,
-                           const std::vector<std::array<std::uint32_t, 3>>& triangles);
+                           const std::vector<std::array<std::uint32_t, 3>>& triangles, int margin = 0);
 
 }  // namespace terrace::proto

@@ -55,6 +55,19 @@ TEST(InsertSamples, KeepsAnyMeshAMesh) {
   EXPECT_TRUE(CoversExactly(field, InsertSamples(fan, samples)));
 }
 
+TEST(DelaunayOf, TriangulatesTheSameVertices) {
+  const HeightField field = HillField(65, 65, 3);
+  GreedyOptions options;
+  options.criterion = Criterion::kDataDependent;
+  GreedyTriangulation tin(field, options);
+  EXPECT_TRUE(tin.Run({5}));
+  const TinMesh mesh = tin.Mesh(), delaunay = DelaunayOf(mesh);
+  EXPECT_FALSE(IsDelaunay(mesh));
+  EXPECT_EQ(delaunay.vertices, mesh.vertices);
+  EXPECT_TRUE(CoversExactly(field, delaunay));
+  EXPECT_TRUE(IsDelaunay(delaunay));
+}
+
 TEST(SampleInserter, GoesOnAsIfItBeganAnew) {
   const HeightField field = HillField(65, 65, 3);
   for (const Criterion criterion : {Criterion::kDelaunay, Criterion::kDataDependent}) {
