@@ -134,7 +134,7 @@ Answer TilesetHandler::HandleSubtree(const Route& route, const Request& request)
   plan.bytes = MostBytes(route.subtree_levels);
   plan.content_type = "application/octet-stream";
   plan.cache_control = cache_control_;
-  plan.write = [&dataset, wish, top = route.key, levels = route.subtree_levels] {
+  plan.write = [&dataset, wish, top = route.key, levels = route.subtree_levels](const std::stop_token&) {
     return WriteSubtree(dataset, wish, top, levels);
   };
   return plan;
