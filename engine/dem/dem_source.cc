@@ -1,28 +1,25 @@
 #include "engine/dem/dem_source.h"
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 #include <xxhash.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <optional>
 #include <set>
-#include <string_view>
 #include <utility>
 
 #include "engine/core/bytes.h"
 #include "engine/core/check.h"
+#include "engine/dem/all_cores.h"
 #include "engine/dem/availability.h"
 #include "engine/dem/dem_impl.h"
-#include "engine/dem/driver_list.h"
 #include "engine/dem/footprint.h"
 #include "engine/dem/level_plan.h"
-#include "engine/dem/raster_file.h"
+#include "engine/dem/open_rasters.h"
 #include "engine/dem/raster_source.h"
-#include "engine/dem/source_policy.h"
 #include "engine/geo/octave.h"
 
 namespace terrace::dem {
@@ -53,8 +50,6 @@ Result<void> CheckOptions(const DemOptions& options) {
   return {};
 }
 
-using Rasters = std::vector<std::shared_ptr<const RasterSource>>;
-
 std::uint64_t FingerprintOf(const std::vector<Sheet>& sheets, const DemOptions& options, double floor) {
   // Changes whenever the same files and options would give other heights than before.
   constexpr std::uint32_t kResamplingVersion = 2;
@@ -84,86 +79,6 @@ std::uint64_t FingerprintOf(const std::vector<Sheet>& sheets, const DemOptions& 
   return XXH3_64bits(bytes.data(), bytes.size());
 }
 
-// Names that rasters have: a file of such a name that is none is damaged rather than something else.
-bool LooksLikeRaster(const std::string& path) {
-  constexpr std::string_view kEndings[] = {".tif", ".tiff", ".hgt", ".hgt.zip", ".hgt.gz", ".dt0", ".dt1",
-                                           ".dt2", ".dem",  ".asc", ".img",     ".bil",    ".flt", ".nc"};
-  std::string name = path;
-  std::ranges::transform(name, name.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return std::ranges::any_of(kEndings, [&](std::string_view ending) { return name.ends_with(ending); });
-}
-
-// Those files of folders that are no rasters go away. Which of them look like some, and why they are none.
-std::vector<std::string> LeaveOutOthers(std::vector<DemFile>& files) {
-  std::vector<std::string> missed, others;
-  std::erase_if(files, [&](const DemFile& file) {
-    if (!file.may_be_other) return false;
-    if (!IsOneLine(file.path)) {
-      missed.push_back(EscapeControls(file.path) + " (a control character in its name: rename it)");
-      return true;
-    }
-    if (IsRaster(file.path)) return false;
-    const auto format = LeftOutDriverOf(file.path);
-    if (format) {
-      missed.push_back(fmt::format("{} ({} is not among the allowed_drivers)", file.path, *format));
-    } else if (LooksLikeRaster(file.path)) {
-      missed.push_back(file.path + " (no raster, whatever its name says: is it whole?)");
-    } else {
-      others.push_back(file.path);
-    }
-    return true;
-  });
-  static constexpr std::size_t kMostNamed = 5;
-  const auto tell = [](spdlog::level::level_enum level, const std::vector<std::string>& names) {
-    if (names.empty()) return;
-    const auto end = names.begin() + static_cast<std::ptrdiff_t>(std::min(names.size(), kMostNamed));
-    spdlog::log(level, "left out of a folder: {}{}", fmt::join(names.begin(), end, ", "),
-                names.size() > kMostNamed ? fmt::format(" and {} more", names.size() - kMostNamed) : "");
-  };
-  tell(spdlog::level::warn, missed);
-  tell(spdlog::level::debug, others);
-  return missed;
-}
-
-Result<Rasters> OpenAll(std::vector<DemFile>& files, const DemOptions& options, std::vector<std::string>& left_out) {
-  const std::string first = EscapeControls(files.front().path);
-  left_out = LeaveOutOthers(files);
-  if (files.empty()) {
-    return MakeError(
-        ErrorCode::kNotFound,
-        "{} and its like: none of the files in this folder is a raster; name a folder of rasters or a raster", first);
-  }
-  const auto handles = std::make_shared<HandleLimit>(options.max_open_sources);
-  Rasters rasters;
-  std::optional<Error> fault;  // the first
-  for (std::size_t i = 0; i < files.size();) {
-    const auto progress = [&](double share) {
-      options.progress((static_cast<double>(i) + share) / static_cast<double>(files.size()));
-    };
-    auto raster =
-        RasterSource::Open(files[i].path, files[i].options.value_or(options.source), options.cache_dir,
-                           options.progress ? progress : std::function<void(double)>(), handles, options.stop);
-    // Surveys that were cut into files have some without a height.
-    const bool is_nothing = !raster && raster.error().code == ErrorCode::kNotFound;
-    if (is_nothing && files[i].may_be_other && files.size() > 1) {
-      spdlog::warn("left out of a folder: {}", raster.error().message);
-      left_out.push_back(raster.error().message);
-      files.erase(files.begin() + static_cast<std::ptrdiff_t>(i));
-      continue;
-    }
-    if (raster) {
-      rasters.push_back(*std::move(raster));
-    } else {
-      if (!options.fault || options.stop.stop_requested()) return tl::unexpected(raster.error());
-      options.fault(raster.error());
-      if (!fault) fault = raster.error();
-    }
-    ++i;
-  }
-  if (fault) return tl::unexpected(*std::move(fault));
-  return rasters;
-}
-
 // A sixteenth of an octave: tiles of one product differ by less, as meridians converge.
 int ResolutionStep(const RasterSource& raster) {
   double power = raster.spacing().finer;
@@ -171,25 +86,26 @@ int ResolutionStep(const RasterSource& raster) {
   return geo::NearestOctave(power);
 }
 
-// Of one rank: the sheets that they make, finer ones first, then by path.
-Result<void> AddSheets(Rasters rasters, const SheetOptions& options, std::vector<Sheet>& sheets) {
-  std::ranges::sort(rasters, {},
-                    [](const auto& raster) { return std::pair(ResolutionStep(*raster), raster->info().path); });
-  for (SheetPlan& plan : PlanSheets(rasters)) {
-    auto sheet = Sheet::Make(std::move(plan), options);
-    if (!sheet) return tl::unexpected(sheet.error());
-    sheets.push_back(*std::move(sheet));
-  }
-  return {};
-}
-
+// By rank, then by what the sheets of a rank have: finer ones first, then by path.
 Result<std::vector<Sheet>> SheetsOf(const std::vector<DemFile>& files, const Rasters& rasters,
                                     const SheetOptions& options) {
   std::map<int, Rasters> ranks;
   for (std::size_t i = 0; i < files.size(); ++i) ranks[files[i].rank].push_back(rasters[i]);
-  std::vector<Sheet> sheets;
+  std::vector<SheetPlan> plans;
   for (auto& [rank, those] : ranks) {
-    if (auto added = AddSheets(std::move(those), options, sheets); !added) return tl::unexpected(added.error());
+    std::ranges::sort(those, {},
+                      [](const auto& raster) { return std::pair(ResolutionStep(*raster), raster->info().path); });
+    std::ranges::move(PlanSheets(those), std::back_inserter(plans));
+  }
+  std::vector<std::optional<Result<Sheet>>> made(plans.size());
+  ForEachOnAllCores(plans.size(), [&](std::size_t i) {
+    made[i] = Sheet::Make(std::move(plans[i]), options);
+    return made[i]->has_value();
+  });
+  std::vector<Sheet> sheets;
+  for (auto& sheet : made) {
+    if (!*sheet) return tl::unexpected(sheet->error());  // those after the first that failed may be missing
+    sheets.push_back(**std::move(sheet));
   }
   return sheets;
 }
@@ -223,10 +139,15 @@ GeoBounds BoundsOf(const Rasters& rasters) {
 
 DemInfo InfoOf(const std::vector<Sheet>& sheets, const Rasters& rasters, const DemOptions& options) {
   DemInfo info;
-  info.heights = sheets.front().EllipsoidalRange();
+  std::vector<HeightRange> ranges(sheets.size());
+  ForEachOnAllCores(sheets.size(), [&](std::size_t i) {
+    ranges[i] = sheets[i].EllipsoidalRange();
+    return true;
+  });
+  info.heights = ranges.front();
   info.bounds = BoundsOf(rasters);
   for (const Sheet& sheet : sheets) {
-    const HeightRange ellipsoidal = sheet.EllipsoidalRange();
+    const HeightRange& ellipsoidal = ranges[static_cast<std::size_t>(&sheet - sheets.data())];
     info.heights.min = std::min(info.heights.min, ellipsoidal.min);
     info.heights.max = std::max(info.heights.max, ellipsoidal.max);
     for (const SheetMember& member : sheet.members()) {
@@ -267,7 +188,7 @@ Result<std::unique_ptr<DemSource>> DemSource::Open(std::vector<DemFile> files, c
   if (auto checked = CheckOptions(options); !checked)
     return MakeError(checked.error().code, "{}: {}", files.front().path, checked.error().message);
   std::vector<std::string> left_out;
-  const auto rasters = OpenAll(files, options, left_out);
+  const auto rasters = OpenRasters(files, options, left_out);
   if (!rasters) return tl::unexpected(rasters.error());
   auto sheets = SheetsOf(files, *rasters, {options.max_void_gap, options.feather});
   if (!sheets) return tl::unexpected(sheets.error());

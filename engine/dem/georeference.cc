@@ -128,20 +128,30 @@ Result<void> Georeference::SetAffine(const std::string& path) {
                    path, to_crs_[1], to_crs_[5]);
 }
 
-std::optional<PixelOffset> Georeference::OffsetOf(const Georeference& other) const {
-  // A hundredth of a pixel off is on the grid, as around the Earth (FindPeriod): corners are written with few digits.
-  constexpr double kTolerance = 0.01;
-  if (horizontal_wkt_.empty() || horizontal_wkt_ != other.horizontal_wkt_) return std::nullopt;
-  const int side = std::max({width_, height_, other.width_, other.height_});
+// Over a raster of `side` pixels a grid with pixels of `other` may not leave this one by more than the tolerance.
+bool Georeference::HasPixelsOf(const Georeference& other, int side) const {
   const double pixel = std::min(pixel_width(), pixel_height());
-  for (const std::size_t i : {1, 2, 4, 5}) {
-    if (std::abs(to_crs_[i] - other.to_crs_[i]) * side > kTolerance * pixel) return std::nullopt;
-  }
-  const Position corner = Apply(to_pixel_, {other.to_crs_[0], other.to_crs_[3]});
-  constexpr double kFarthest = 1LL << 40;
-  if (!(std::max(std::abs(corner.x), std::abs(corner.y)) < kFarthest)) return std::nullopt;
+  return std::ranges::none_of(std::array<std::size_t, 4>{1, 2, 4, 5}, [&](std::size_t i) {
+    return std::abs(to_crs_[i] - other.to_crs_[i]) * side > kOffsetTolerance * pixel;
+  });
+}
+
+bool Georeference::MayAlign(const Georeference& other) const {
+  return !horizontal_wkt_.empty() && HasPixelsOf(other, std::max(other.width_, other.height_));
+}
+
+Position Georeference::CornerOf(const Georeference& other) const {
+  return Apply(to_pixel_, {other.to_crs_[0], other.to_crs_[3]});
+}
+
+std::optional<PixelOffset> Georeference::OffsetOf(const Georeference& other) const {
+  if (horizontal_wkt_.empty() || horizontal_wkt_ != other.horizontal_wkt_) return std::nullopt;
+  if (!HasPixelsOf(other, std::max({width_, height_, other.width_, other.height_}))) return std::nullopt;
+  const Position corner = CornerOf(other);
+  if (!(std::max(std::abs(corner.x), std::abs(corner.y)) < kFarthestPixel)) return std::nullopt;
   const double column = std::round(corner.x), row = std::round(corner.y);
-  if (std::abs(corner.x - column) > kTolerance || std::abs(corner.y - row) > kTolerance) return std::nullopt;
+  if (std::abs(corner.x - column) > kOffsetTolerance || std::abs(corner.y - row) > kOffsetTolerance)
+    return std::nullopt;
   return PixelOffset{static_cast<std::int64_t>(column), static_cast<std::int64_t>(row)};
 }
 

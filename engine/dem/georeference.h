@@ -33,6 +33,14 @@ class Georeference {
   // Where the first pixel of `other` lies, if both have one CRS and their pixels lie on one grid; else nothing. Columns
   // around the Earth are not wrapped.
   std::optional<PixelOffset> OffsetOf(const Georeference& other) const;
+  // A hundredth of a pixel off is on the grid, as around the Earth (FindPeriod): corners are written with few digits.
+  static constexpr double kOffsetTolerance = 0.01;
+  static constexpr double kFarthestPixel = 1LL << 40;  // no raster on the grid begins farther from another one
+
+  // False: OffsetOf gives nothing, whatever the offsets of both are.
+  bool MayAlign(const Georeference& other) const;
+  // The outer corner of `other`'s first pixel, in pixels of this one. Precondition: both have one CRS.
+  Position CornerOf(const Georeference& other) const;
 
   // That of `width` x `height` pixels of the same grid from `first` on. `name` stands for them in errors.
   Result<Georeference> Moved(const PixelOffset& first, int width, int height, const std::string& name) const;
@@ -66,6 +74,10 @@ class Georeference {
   const std::string& pixel_unit() const { return pixel_unit_; }
   double pixel_width() const;
   double pixel_height() const;
+  // Pixels to the CRS, in GDAL's order.
+  const std::array<double, 6>& to_crs() const { return to_crs_; }
+  // The CRS without what heights count from, WKT. Empty: it has none.
+  const std::string& horizontal_wkt() const { return horizontal_wkt_; }
   const Projector* projector() const { return projector_.get(); }  // null where is_affine()
   std::string transform() const { return projector_ == nullptr ? "" : projector_->description(); }
   std::string pipeline() const { return projector_ == nullptr ? "" : projector_->pipeline(); }
@@ -75,6 +87,7 @@ class Georeference {
   Result<void> ReadCrs(const OGRSpatialReference& srs, const std::string& path);
   void FindPeriod(const OGRSpatialReference& srs);
   void FindTurn();
+  bool HasPixelsOf(const Georeference& other, int side) const;
   double CanonicalColumn(double column) const;
 
   int width_ = 0, height_ = 0;

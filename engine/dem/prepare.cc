@@ -1,7 +1,6 @@
 #include "engine/dem/prepare.h"
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 #include <xxhash.h>
 
 #include <filesystem>
@@ -10,6 +9,7 @@
 #include <utility>
 
 #include "engine/core/bytes.h"
+#include "engine/dem/source_log.h"
 
 namespace terrace::dem {
 namespace {
@@ -86,12 +86,14 @@ class Preparer {
     prepared_.findings = std::move(known->findings);
     prepared_.survey = std::move(known->survey);
     prepared_.averages = std::move(known->averages);
+    prepared_.record = record_;
+    prepared_.shape = shape_;
     prepared_.preparation.from_record = true;
     return true;
   }
 
   void GiveUpRecord(const Error& error) {
-    spdlog::warn("{}; what is learnt of the source is not kept", error.message);
+    LogSource(SourceLog::Level::kWarn, path_, "what is learnt of it is not kept: {}", error.message);
     writer_.reset();
   }
 
@@ -119,7 +121,8 @@ class Preparer {
       auto resumed = writer_->Resume([&](const ChunkSurvey& part) { assembler.Add(chunks_.At(done++), part); });
       if (!resumed) GiveUpRecord(resumed.error());
       prepared_.preparation.parts_kept += done;
-      if (done > 0) spdlog::info("{}: {} of {} parts were prepared before", path_, done, chunks_.count());
+      if (done > 0)
+        LogSource(SourceLog::Level::kInfo, path_, "{} of {} parts were prepared before", done, chunks_.count());
     }
     for (; done < chunks_.count(); ++done) {
       const auto part =
@@ -153,7 +156,11 @@ class Preparer {
     // A file that changed meanwhile is a mixture, which its caller will refuse.
     if (!writer_ || files_.FirstChanged()) return;
     if (auto finished = writer_->Finish(prepared_.survey); !finished) return GiveUpRecord(finished.error());
-    if (auto known = LoadRecord(record_, shape_)) prepared_.averages = std::move(known->averages);
+    auto known = LoadRecord(record_, shape_);
+    if (!known) return;
+    prepared_.averages = std::move(known->averages);
+    prepared_.record = record_;
+    prepared_.shape = shape_;
   }
 
   GDALDataset& dataset_;

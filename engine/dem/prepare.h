@@ -35,6 +35,8 @@ struct PreparedRaster {
   VoidFindings findings;  // undeclared voids; the survey is one without them
   RasterSurvey survey;
   std::shared_ptr<const RecordedAverages> averages;  // null: there are none
+  std::string record;                                // where the survey is kept; empty: nowhere
+  RecordShape shape;                                 // the record's
   Preparation preparation;
 };
 

@@ -2,7 +2,10 @@
 
 #include <cmath>
 #include <limits>
+#include <map>
+#include <mutex>
 #include <new>
+#include <utility>
 #include <vector>
 
 #include "engine/dem/proj_grids.h"
@@ -12,22 +15,38 @@ namespace terrace::dem {
 namespace {
 
 // Of all operations between WGS 84 and the CRS, the one PROJ uses at `centre`.
-ProjObjectPtr OperationAt(PJ_CONTEXT* context, const std::string& wkt, Position centre) {
+// `is_only`: it is the same everywhere.
+ProjObjectPtr OperationAt(PJ_CONTEXT* context, const std::string& wkt, Position centre, bool& is_only) {
   const ProjObjectPtr any(proj_create_crs_to_crs(context, "EPSG:4326", wkt.c_str(), nullptr));
   if (any == nullptr) return nullptr;
   ProjObjectPtr ordered(proj_normalize_for_visualization(context, any.get()));
   if (ordered == nullptr) return nullptr;
+  is_only = proj_get_type(ordered.get()) != PJ_TYPE_UNKNOWN;  // that of a set of operations
   const PJ_COORD there = proj_trans(ordered.get(), PJ_INV, proj_coord(centre.x, centre.y, 0, HUGE_VAL));
   proj_trans(ordered.get(), PJ_FWD, there);
   ProjObjectPtr used(proj_trans_get_last_used_operation(ordered.get()));
   return used != nullptr ? std::move(used) : std::move(ordered);
 }
 
+// Most reference systems have one operation, wherever a source lies: thousands of sources share it, and looking it up
+// takes PROJ milliseconds.
+std::shared_ptr<const Projector> FindShared(const std::string& wkt, std::shared_ptr<const Projector> made) {
+  static std::mutex mutex;
+  static std::map<std::string, std::shared_ptr<const Projector>> shared;
+  const std::lock_guard lock(mutex);
+  if (made != nullptr) return shared.insert_or_assign(wkt, std::move(made)).first->second;
+  const auto found = shared.find(wkt);
+  // A grid that was replaced is read anew.
+  return found == shared.end() || found->second->grids().FirstChanged() ? nullptr : found->second;
+}
+
 }  // namespace
 
 Result<std::shared_ptr<const Projector>> Projector::Make(const std::string& wkt, Position centre) {
+  if (auto known = FindShared(wkt, nullptr)) return known;
   const ProjContextPtr context = MakeProjContext();
-  const ProjObjectPtr operation = OperationAt(context.get(), wkt, centre);
+  bool is_only = false;
+  const ProjObjectPtr operation = OperationAt(context.get(), wkt, centre, is_only);
   const char* pipeline =
       operation == nullptr ? nullptr : proj_as_proj_string(context.get(), operation.get(), PJ_PROJ_5, nullptr);
   if (pipeline == nullptr) {
@@ -50,7 +69,7 @@ Result<std::shared_ptr<const Projector>> Projector::Make(const std::string& wkt,
                      projector->pipeline());
   }
   projector->operations_.Return(std::move(first));
-  return projector;
+  return is_only ? FindShared(wkt, projector) : projector;
 }
 
 void Projector::Transform(std::span<Position> positions, bool forward) const {

@@ -82,7 +82,25 @@ void RangeTable::Finish() {
   }
 }
 
+std::size_t RangeTable::bytes() const {
+  std::size_t blocks = 0;
+  for (const Level& level : levels_) blocks += level.blocks.size();
+  return blocks * sizeof(BlockRange);
+}
+
+RangeTable RangeTable::Coarse(std::size_t most) const {
+  RangeTable coarse = *this;
+  for (Level& level : coarse.levels_) {
+    if (level.blocks.size() > most) level.blocks = std::vector<BlockRange>();
+  }
+  return coarse;
+}
+
 BlockRange RangeTable::Query(double west, double north, double east, double south) const {
+  return *TryQuery(west, north, east, south);
+}
+
+std::optional<BlockRange> RangeTable::TryQuery(double west, double north, double east, double south) const {
   BlockRange range;
   if (east < 0 || south < 0 || west > width_ || north > height_) return range;
   const auto pixel = [](double position, int count) {
@@ -100,6 +118,7 @@ BlockRange RangeTable::Query(double west, double north, double east, double sout
     y1 /= 2;
   }
   const Level& blocks = levels_[level];
+  if (blocks.blocks.empty()) return std::nullopt;
   for (int y = y0; y <= y1; ++y) {
     for (int x = x0; x <= x1; ++x) {
       range.Add(blocks.blocks[static_cast<std::size_t>(y) * static_cast<std::size_t>(blocks.columns) +

@@ -1,8 +1,10 @@
 // Lowest and highest height and voids per block of 64 x 64 source pixels, and of ever larger blocks above.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <vector>
 
 namespace terrace::dem {
@@ -43,6 +45,14 @@ class RangeTable {
   BlockRange Query(double west, double north, double east, double south) const;
 
   BlockRange Whole() const { return levels_.back().blocks.front(); }
+
+  // Of the blocks.
+  std::size_t bytes() const;
+
+  // The same without levels of more than `most` blocks: it answers for large boxes alone (TryQuery).
+  RangeTable Coarse(std::size_t most) const;
+  // Query; nothing where that takes a level which is not here.
+  std::optional<BlockRange> TryQuery(double west, double north, double east, double south) const;
 
  private:
   struct Level {

@@ -1,9 +1,12 @@
 #include "engine/dem/raster_file.h"
 
+#include <cpl_conv.h>
+
 #include <algorithm>
 #include <cstdint>
 #include <cstdlib>
 #include <filesystem>
+#include <optional>
 #include <set>
 #include <system_error>
 #include <utility>
@@ -24,6 +27,18 @@ constexpr std::int64_t kMaxBlockBytes = std::int64_t{128} << 20;
 constexpr int kMostBands = 4096;  // hyperspectral images have hundreds
 
 constexpr unsigned kOpenFlags = GDAL_OF_RASTER | GDAL_OF_READONLY | GDAL_OF_VERBOSE_ERROR;
+
+// While it lives GDAL looks for files beside a raster by their names, instead of listing the folder at each opening: of
+// thousands of rasters in one folder that would be most of the work. Of remote folders a listing is one request.
+class LookUpSidecars {
+ public:
+  explicit LookUpSidecars(const std::string& path) {
+    if (!IsRemote(path)) option_.emplace("GDAL_DISABLE_READDIR_ON_OPEN", "TRUE", /*bSetOnlyIfUndefined=*/false);
+  }
+
+ private:
+  std::optional<CPLConfigOptionSetter> option_;  // of this thread
+};
 
 // What one read of a band decodes at least: a block, with those of the bands it is stored with.
 std::int64_t BytesPerBlock(GDALDataset& dataset, GDALRasterBand& band) {
@@ -172,12 +187,14 @@ bool IsRaster(const std::string& path) {
   if (path.ends_with(".aux.xml")) return false;
   InitGdal();
   if (!CheckPlainFile(path)) return true;  // opening it says why not
+  const LookUpSidecars looked_up(path);
   return GDALIdentifyDriverEx(path.c_str(), GDAL_OF_RASTER, nullptr, nullptr) != nullptr;
 }
 
 GDALDatasetUniquePtr ReopenRaster(const std::string& path, int overview) {
   InitGdal();
   ForgetGdalError();
+  const LookUpSidecars looked_up(path);
   const std::string level = fmt::format("OVERVIEW_LEVEL={}", overview);
   const char* const options[] = {overview < 0 ? nullptr : level.c_str(), nullptr};
   return GDALDatasetUniquePtr(GDALDataset::Open(path.c_str(), kOpenFlags, nullptr, options));

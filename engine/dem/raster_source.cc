@@ -5,11 +5,13 @@
 
 #include <chrono>
 #include <cmath>
+#include <stdexcept>
 #include <utility>
 
 #include "engine/dem/gdal_runtime.h"
 #include "engine/dem/overview_trust.h"
 #include "engine/dem/raster_file.h"
+#include "engine/dem/source_log.h"
 
 namespace terrace::dem {
 namespace {
@@ -63,39 +65,42 @@ std::string DoubtsOf(const HeightRange& heights) {
 void LogWhatMatters(GDALDataset& dataset, const RasterInfo& info, const Georeference& georeference,
                     const RasterLayout& layout) {
   if (dataset.GetRasterCount() > 1) {
-    spdlog::info("{}: has {} bands, heights are read from band 1", info.path, dataset.GetRasterCount());
+    LogSource(SourceLog::Level::kInfo, info.path, "has {} bands, heights are read from band 1",
+              dataset.GetRasterCount());
   }
   if (!info.knows_height_unit) {
-    spdlog::warn("{}: height unit \"{}\" is not known, heights are taken as metres", info.path, layout.rules.unit);
+    LogSource(SourceLog::Level::kWarn, info.path, "height unit \"{}\" is not known, heights are taken as metres",
+              layout.rules.unit);
   }
-  if (!info.heights_doubted.empty()) spdlog::warn("{}: {}", info.path, info.heights_doubted);
+  if (!info.heights_doubted.empty()) LogSource(SourceLog::Level::kWarn, info.path, "{}", info.heights_doubted);
   if (!info.overviews_unused.empty()) {
-    spdlog::warn("{}: its overviews are not used: {}", info.path, info.overviews_unused);
+    LogSource(SourceLog::Level::kWarn, info.path, "its overviews are not used: {}", info.overviews_unused);
   }
   if (!info.picture_part.empty()) {
-    spdlog::warn("{}: is a picture (its band 1 is \"{}\"), whose values are taken for heights", info.path,
-                 info.picture_part);
+    LogSource(SourceLog::Level::kWarn, info.path,
+              "is a picture (its band 1 is \"{}\"), whose values are taken for heights", info.picture_part);
   }
   if (!info.transform.empty()) {
-    spdlog::debug("{}: placed by PROJ operation \"{}\": {}", info.path, info.transform, georeference.pipeline());
+    LogSource(SourceLog::Level::kDebug, info.path, "placed by PROJ operation \"{}\": {}", info.transform,
+              georeference.pipeline());
   }
 }
 
 void LogVertical(const std::string& path, const VerticalDatum& vertical, const std::string& unit) {
   if (!vertical.is_known()) {
-    spdlog::warn("{}: no vertical datum stated, heights pass through as given", path);
+    LogSource(SourceLog::Level::kWarn, path, "no vertical datum stated, heights pass through as given");
   } else if (vertical.geoid) {
-    spdlog::info("{}: heights count from {}, made ellipsoidal by PROJ operation \"{}\"", path, vertical.name,
-                 vertical.geoid->description());
-    spdlog::debug("{}: {}", path, vertical.geoid->pipeline());
+    LogSource(SourceLog::Level::kInfo, path, "heights count from {}, made ellipsoidal by PROJ operation \"{}\"",
+              vertical.name, vertical.geoid->description());
+    LogSource(SourceLog::Level::kDebug, path, "{}", vertical.geoid->pipeline());
     // Programs write feet where GDAL does not read them.
     const auto stated = MetresPerUnit(unit), counted = MetresPerUnit(vertical.geoid->unit());
     if (!unit.empty() && !vertical.geoid->unit().empty() && stated && counted && *stated != *counted) {
-      spdlog::warn(
-          "{}: the file states heights in \"{}\", and they are taken for that; {} counts in \"{}\": if that is what "
-          "they "
-          "are, say so with `gdal_edit.py -units \"{}\" file`",
-          path, unit, vertical.name, vertical.geoid->unit(), vertical.geoid->unit());
+      LogSource(SourceLog::Level::kWarn, path,
+                "the file states heights in \"{}\", and they are taken for that; {} counts in \"{}\": if that is what "
+                "they "
+                "are, say so with `gdal_edit.py -units \"{}\" file`",
+                unit, vertical.name, vertical.geoid->unit(), vertical.geoid->unit());
     }
   }
 }
@@ -112,8 +117,10 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
                                                          const std::string& cache_dir,
                                                          const std::function<void(double)>& progress,
                                                          std::shared_ptr<HandleLimit> handles,
-                                                         const std::stop_token& stop) {
+                                                         const std::stop_token& stop,
+                                                         std::shared_ptr<SurveyPages> pages) {
   const auto start = std::chrono::steady_clock::now();
+  if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "{}: opening it was stopped", path);
   ForgetRemote(path);
   const auto before = StampOf(path);
   auto dataset = OpenRaster(path);
@@ -153,10 +160,9 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
   }
   if (!prepared) return tl::unexpected(prepared.error());
   source->layout_ = WithFindings(std::move(source->layout_), prepared->findings);
-  source->survey_ = std::move(prepared->survey);
-  source->averages_ = std::move(prepared->averages);
+  source->averages_ = prepared->averages;
   source->preparation_ = prepared->preparation;
-  const RasterSurvey& survey = source->survey_;
+  const RasterSurvey& survey = prepared->survey;
   const std::string& found_voids = prepared->findings.text;
 
   source->footprint_ = Footprint::Of(source->georeference_);
@@ -178,19 +184,70 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
   LogWhatMatters(**dataset, source->info_, source->georeference_, source->layout_);
   LogVertical(path, source->vertical_, source->layout_.rules.unit);
   if (!found_voids.empty()) {
-    spdlog::warn("{}: voids that it does not declare: {}; `nodata` of the configuration decides otherwise", path,
-                 found_voids);
+    LogSource(SourceLog::Level::kWarn, path,
+              "voids that it does not declare: {}; `nodata` of the configuration decides otherwise", found_voids);
   }
   if (auto unchanged = source->CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
+  source->KeepTables(*std::move(prepared), prepare, std::move(pages));
   return source;
+}
+
+RasterSource::~RasterSource() {
+  if (paging_) paging_->pages->Forget(this);
+}
+
+// Of a dataset of thousands of rasters tables take more memory than anything else.
+void RasterSource::KeepTables(PreparedRaster prepared, const PrepareOptions& prepare,
+                              std::shared_ptr<SurveyPages> pages) {
+  constexpr std::size_t kMostCoarse = 64;  // blocks of a level
+  RasterSurvey& survey = prepared.survey;
+  edge_row_means_ = survey.edge_row_means;
+  if (pages == nullptr || prepared.record.empty() || pages->Admit(survey.bytes())) {
+    kept_ = std::make_shared<const RasterSurvey>(std::move(survey));
+    return;
+  }
+  paging_ = std::make_unique<const Paging>(Paging{std::move(pages),
+                                                  survey.table.Coarse(kMostCoarse),
+                                                  !survey.coarse.grids.empty(),
+                                                  std::move(prepared.record),
+                                                  std::move(prepared.shape),
+                                                  {prepare.cache_dir, prepare.find_voids, {}, {}}});
+}
+
+SurveyPages::Tables RasterSource::tables() const {
+  if (kept_) return kept_;
+  if (auto known = paging_->pages->Find(this)) return known;
+  auto survey = ReadTables();
+  if (!survey) throw std::runtime_error(survey.error().message);
+  auto tables = std::make_shared<const RasterSurvey>(*std::move(survey));
+  paging_->pages->Add(this, tables);
+  return tables;
+}
+
+Result<RasterSurvey> RasterSource::ReadTables() const {
+  if (auto known = LoadRecord(paging_->record, paging_->shape)) return std::move(known->survey);
+  spdlog::warn("{}: {} is gone or damaged; the source is prepared anew", info_.path, paging_->record);
+  auto handle = handles_.Borrow();
+  if (!handle) return tl::unexpected(handle.error());
+  auto prepared = PrepareRaster(**handle, paging_->shape.layout, info_.path, files(), paging_->prepare);
+  if (auto unchanged = handles_.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
+  if (!prepared) return tl::unexpected(prepared.error());
+  return std::move(prepared->survey);
+}
+
+BlockRange RasterSource::RangeIn(double west, double north, double east, double south) const {
+  if (kept_) return kept_->table.Query(west, north, east, south);
+  if (const auto known = paging_->ranges.TryQuery(west, north, east, south)) return *known;
+  return tables()->table.Query(west, north, east, south);
 }
 
 Result<std::vector<float>> RasterSource::ReadBlocks(int factor, const GridWindow& window,
                                                     const std::stop_token& stop) const {
   // From memory and from the record only while the files are those that were prepared.
-  if (survey_.coarse.Has(factor)) {
+  if (factor >= kLargestDirect && (kept_ ? !kept_->coarse.grids.empty() : paging_->has_coarse_averages)) {
     if (auto unchanged = handles_.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
-    return survey_.coarse.Read(factor, window);
+    if (const SurveyPages::Tables known = tables(); known->coarse.Has(factor))
+      return known->coarse.Read(factor, window);
   }
   if (averages_ && RecordedAverages::Has(factor) && !averages_damaged_) {
     if (auto unchanged = handles_.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());

@@ -21,6 +21,7 @@
 #include "engine/dem/prepare.h"
 #include "engine/dem/raster_survey.h"
 #include "engine/dem/sample_grid.h"
+#include "engine/dem/survey_pages.h"
 #include "engine/dem/vertical_datum.h"
 
 namespace terrace::dem {
@@ -29,12 +30,14 @@ class RasterSource {
  public:
   // Opens a raster, checks it, and scans it once for its heights. Errors name the file, what is wrong and the remedy.
   // What is learnt is kept in `cache_dir`, or taken from there; empty for none. `handles` bounds what this and other
-  // rasters keep open; null: nothing does. kCancelled: stopped.
+  // rasters keep open, `pages` the memory of their tables; null: nothing does. kCancelled: stopped.
   static Result<std::unique_ptr<RasterSource>> Open(const std::string& path, const SourceOptions& options = {},
                                                     const std::string& cache_dir = {},
                                                     const std::function<void(double)>& progress = {},
                                                     std::shared_ptr<HandleLimit> handles = nullptr,
-                                                    const std::stop_token& stop = {});
+                                                    const std::stop_token& stop = {},
+                                                    std::shared_ptr<SurveyPages> pages = nullptr);
+  ~RasterSource();
 
   const RasterInfo& info() const { return info_; }
   const Georeference& georeference() const { return georeference_; }
@@ -43,10 +46,14 @@ class RasterSource {
   const RasterLayout& layout() const { return layout_; }
   const Footprint& footprint() const { return footprint_; }
   const SourceSpacing& spacing() const { return spacing_; }
-  const RangeTable& ranges() const { return survey_.table; }
-  const AveragingErrors& averaging_errors() const { return survey_.errors; }
   // Of the valid samples of the first and the last row.
-  const std::array<std::optional<double>, 2>& edge_row_means() const { return survey_.edge_row_means; }
+  const std::array<std::optional<double>, 2>& edge_row_means() const { return edge_row_means_; }
+
+  // Its survey's tables, which may have to be read anew: whoever asks often keeps them. Throws std::runtime_error where
+  // they can be neither read nor made again, as when the file is gone.
+  SurveyPages::Tables tables() const;
+  // What they say of a box of pixels (RangeTable::Query). Of large boxes that is known without them.
+  BlockRange RangeIn(double west, double north, double east, double south) const;
   const StampedFiles& files() const { return handles_.files(); }
 
   // How opening went.
@@ -60,6 +67,9 @@ class RasterSource {
   Result<void> CheckUnchanged() const { return handles_.CheckUnchanged(); }
 
  private:
+  void KeepTables(PreparedRaster prepared, const PrepareOptions& prepare, std::shared_ptr<SurveyPages> pages);
+  Result<RasterSurvey> ReadTables() const;
+
   RasterSource(std::string path, StampedFiles files, Georeference where, std::shared_ptr<HandleLimit> handles)
       : handles_(std::move(path), std::move(files), std::move(handles)), georeference_(std::move(where)) {}
 
@@ -69,7 +79,18 @@ class RasterSource {
   RasterLayout layout_;
   Footprint footprint_;
   SourceSpacing spacing_;
-  RasterSurvey survey_;
+  std::array<std::optional<double>, 2> edge_row_means_;
+  SurveyPages::Tables kept_;  // null: they are paged
+  // Of paged tables.
+  struct Paging {
+    std::shared_ptr<SurveyPages> pages;
+    RangeTable ranges;  // the coarse ones
+    bool has_coarse_averages;
+    std::string record;
+    RecordShape shape;
+    PrepareOptions prepare;
+  };
+  std::unique_ptr<const Paging> paging_;
   std::shared_ptr<const RecordedAverages> averages_;  // null: none
   mutable std::atomic<bool> averages_damaged_{false};
   Preparation preparation_;

@@ -48,6 +48,13 @@ std::vector<float> CoarseAverages::Read(int factor, const GridWindow& window) co
   return heights;
 }
 
+std::size_t RasterSurvey::bytes() const {
+  std::size_t bytes = sizeof(RasterSurvey) + table.bytes();
+  for (const AveragingErrors::Level& level : errors.levels()) bytes += level.errors.size() * sizeof(float);
+  for (const CoarseAverages::Grid& grid : coarse.grids) bytes += grid.heights.size() * sizeof(float);
+  return bytes;
+}
+
 SurveyAssembler::SurveyAssembler(const RasterLayout& layout) : layout_(layout) {
   survey_.table = RangeTable(layout.width, layout.height);
   survey_.errors = AveragingErrors(layout.width, layout.height);

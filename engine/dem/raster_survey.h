@@ -46,6 +46,9 @@ struct RasterSurvey {
   std::array<std::optional<double>, 2> edge_row_means;  // of the first and the last row's valid samples
   AveragingErrors errors;
   CoarseAverages coarse;
+
+  // Of the tables, in memory.
+  std::size_t bytes() const;
 };
 
 // Puts a raster's parts together, in the order of ChunkGrid.

@@ -52,6 +52,47 @@ Box BoxOf(const geo::TileRange& pixels) {
           static_cast<double>(pixels.end_x + 1), static_cast<double>(pixels.end_y + 1)};
 }
 
+// Whether positions lie in one of the boxes that pixels are covered by. For one thread.
+class InsideTest {
+ public:
+  // `hull`: of all positions that are asked about. What these refer to outlives it.
+  InsideTest(const std::vector<geo::TileRange>& cover, const BoxIndex& index, const Box& hull)
+      : cover_(cover), index_(index), near_(index.Find(Grown(hull))) {}
+
+  bool operator()(const Position& p) const {
+    if (std::isnan(p.x) || std::isnan(p.y)) return false;
+    // Neighbours mostly lie in one box.
+    if (last_ && Holds(*last_, p)) return true;
+    // Boxes reach farther than by the tolerance here: Holds decides.
+    if (near_.size() <= kFewBoxes) return HoldsAny(near_, p);
+    return HoldsAny(index_.Find(Grown({p.x, p.y, p.x, p.y})), p);
+  }
+
+ private:
+  // Up to so many are asked in turn; of more the index tells which.
+  static constexpr std::size_t kFewBoxes = 8;
+
+  static Box Grown(const Box& box) {
+    constexpr double kHalo = 2 * kSheetEdgeTolerance;
+    return {box.west - kHalo, box.south - kHalo, box.east + kHalo, box.north + kHalo};
+  }
+  bool Holds(std::size_t block, const Position& p) const {
+    const Box box = BoxOf(cover_[block]);
+    return p.x >= box.west - kSheetEdgeTolerance && p.x <= box.east + kSheetEdgeTolerance &&
+           p.y >= box.south - kSheetEdgeTolerance && p.y <= box.north + kSheetEdgeTolerance;
+  }
+  bool HoldsAny(const std::vector<std::size_t>& blocks, const Position& p) const {
+    const auto found = std::ranges::find_if(blocks, [&](std::size_t block) { return Holds(block, p); });
+    if (found != blocks.end()) last_ = *found;
+    return found != blocks.end();
+  }
+
+  const std::vector<geo::TileRange>& cover_;
+  const BoxIndex& index_;
+  const std::vector<std::size_t> near_;
+  mutable std::optional<std::size_t> last_;
+};
+
 Result<Georeference> GeoreferenceOf(const SheetPlan& plan) {
   if (plan.members.size() == 1) return plan.members.front().raster->georeference();
   // That of the member in the corner, if there is one, goes over as it is.
@@ -93,9 +134,12 @@ Result<Sheet> Sheet::Make(SheetPlan plan, const SheetOptions& options) {
 void Sheet::IndexMembers() {
   const std::int64_t turn = wraps_ ? columns_ : 0;
   alignment_ = 1 << 22;  // AveragingFactor's largest
+  heights_ = members_.front().raster->info().heights;
   std::vector<BoxIndex::Entry> entries, blocks;
   for (std::size_t i = 0; i < members_.size(); ++i) {
     const SheetMember& member = members_[i];
+    const HeightRange& heights = member.raster->info().heights;
+    heights_ = {std::min(heights_.min, heights.min), std::max(heights_.max, heights.max)};
     while (member.column % alignment_ != 0 || member.row % alignment_ != 0 || (turn > 0 && turn % alignment_ != 0)) {
       alignment_ /= 2;
     }
@@ -144,21 +188,8 @@ Sheet::Cells Sheet::CellsAt(std::span<const Position> positions, std::size_t str
   }
   Cells found;
   if (hull.west > hull.east) return found;
-  const std::vector<std::size_t> blocks =
-      cover_index_.Find({hull.west - kSheetEdgeTolerance, hull.south - kSheetEdgeTolerance,
-                         hull.east + kSheetEdgeTolerance, hull.north + kSheetEdgeTolerance});
+  const InsideTest is_inside(cover_, cover_index_, hull);
   CellFinder finder(Columns(factor), Rows(factor), width_, height_, stride);
-  std::vector<Box> boxes;
-  for (const std::size_t block : blocks) {
-    const Box box = BoxOf(cover_[block]);
-    boxes.push_back({box.west - kSheetEdgeTolerance, box.south - kSheetEdgeTolerance, box.east + kSheetEdgeTolerance,
-                     box.north + kSheetEdgeTolerance});
-  }
-  const auto is_inside = [&](const Position& p) {
-    return std::ranges::any_of(boxes, [&](const Box& box) {
-      return p.x >= box.west && p.x <= box.east && p.y >= box.south && p.y <= box.north;
-    });
-  };
   found.cells.reserve(positions.size());
   found.nodes.reserve(positions.size());
   for (std::size_t i = 0; i < positions.size(); ++i) {

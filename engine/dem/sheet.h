@@ -86,6 +86,8 @@ class Sheet {
 
   SampleCounts CountSamples() const { return {counts_->measured, counts_->filled, counts_->voids}; }
 
+  // Of all its samples, as they count.
+  const HeightRange& heights() const { return heights_; }
   // At least the ellipsoidal heights of all its samples.
   HeightRange EllipsoidalRange() const;
 
@@ -175,6 +177,7 @@ class Sheet {
   std::array<std::optional<float>, 2> pole_heights_;
 
   std::vector<SheetMember> members_;
+  HeightRange heights_;
   BoxIndex member_index_;              // by pixels; of sheets that wrap also a turn before and after
   std::vector<geo::TileRange> cover_;  // pixels that members have, without overlap
   BoxIndex cover_index_;

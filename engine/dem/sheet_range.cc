@@ -71,15 +71,14 @@ std::optional<PixelBox> ProjectedBox(const Georeference& georeference, const geo
 
 BlockRange Sheet::Ranges(const Box& pixels) const {
   if (members_.size() == 1) {
-    return members_.front().raster->ranges().Query(pixels.west, pixels.south, pixels.east, pixels.north);
+    return members_.front().raster->RangeIn(pixels.west, pixels.south, pixels.east, pixels.north);
   }
   BlockRange range;
   const double turn = wraps_ ? columns_ : 0;
   for (const std::size_t i : member_index_.Find(pixels)) {
     for (const double shift : {0.0, -turn, turn}) {
       const double x = static_cast<double>(members_[i].column) + shift, y = static_cast<double>(members_[i].row);
-      range.Add(
-          members_[i].raster->ranges().Query(pixels.west - x, pixels.south - y, pixels.east - x, pixels.north - y));
+      range.Add(members_[i].raster->RangeIn(pixels.west - x, pixels.south - y, pixels.east - x, pixels.north - y));
       if (turn == 0) break;
     }
   }
@@ -158,12 +157,7 @@ SheetRange Sheet::RangeOf(const geo::Lattice& lattice, const geo::TileKey& key) 
 }
 
 HeightRange Sheet::EllipsoidalRange() const {
-  HeightRange counted = members_.front().raster->info().heights;
-  for (const SheetMember& member : members_) {
-    counted.min = std::min(counted.min, member.raster->info().heights.min);
-    counted.max = std::max(counted.max, member.raster->info().heights.max);
-  }
-  if (!undulations_) return counted;
+  if (!undulations_) return heights_;
   // Tile by tile: the geoid's range over a large sheet says little about any place in it.
   constexpr std::int64_t kMostTiles = 1024;
   constexpr int kDeepest = 12;
@@ -182,7 +176,7 @@ HeightRange Sheet::EllipsoidalRange() const {
       }
     }
   }
-  return blocks.min <= blocks.max ? HeightRange{blocks.min, blocks.max} : counted;
+  return blocks.min <= blocks.max ? HeightRange{blocks.min, blocks.max} : heights_;
 }
 
 }  // namespace terrace::dem

@@ -20,7 +20,7 @@ class SheetGap {
         nodes_{tile.lattice_, tile.window_, tile.heights_},
         sheet_(sheet),
         trace_(trace),
-        tables_(sheet, trace),
+        tables_(sheet, trace, nodes_.stride()),
         geoid_(nodes_, sheet.undulations(), trace.undulations),
         smooth_(nodes_, sheet, trace, tables_, geoid_, tile.blends_),
         single_(nodes_, sheet, trace, tables_, geoid_),

@@ -1,7 +1,6 @@
 #include "engine/dem/survey_record.h"
 
 #include <fcntl.h>
-#include <spdlog/spdlog.h>
 #include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -18,6 +17,7 @@
 #include <utility>
 
 #include "engine/core/bytes.h"
+#include "engine/dem/source_log.h"
 #include "engine/dem/survey_codec.h"
 
 namespace terrace::dem {
@@ -29,6 +29,7 @@ constexpr std::uint64_t kHeaderMagic = 0x32'59'56'52'55'53'52'54;  // "TRSURVY2"
 constexpr std::uint64_t kFooterMagic = 0x44'4e'45'59'56'52'55'53;  // "SURVYEND"
 constexpr std::uint32_t kPartMagic = 0x54'52'41'50;                // "PART"
 constexpr std::size_t kHeaderBytes = 36, kPartHeaderBytes = 32, kFooterBytes = 24;
+constexpr int kMostUnsynced = 64;                    // parts: a few seconds of work
 constexpr std::uint64_t kMostHeaderBytes = 1 << 16;  // findings are a few numbers and a line of text
 
 constexpr int CeilingOf(int a, int b) { return (a + b - 1) / b; }
@@ -255,7 +256,8 @@ std::optional<FinishedRecord> LoadRecord(const std::string& path, const RecordSh
   if (!file.is_open()) return std::nullopt;
   const std::uint64_t size = SizeOf(file.get());
   const auto damaged = [&](const char* what) {
-    spdlog::warn("{}: {} does not fit its checksum, or was cut; the source is prepared anew", path, what);
+    LogSource(SourceLog::Level::kWarn, path, "{} does not fit its checksum, or was cut; the source is prepared anew",
+              what);
     return std::nullopt;
   };
   RecordShape shape = wanted;
@@ -264,7 +266,7 @@ std::optional<FinishedRecord> LoadRecord(const std::string& path, const RecordSh
     case HeaderState::kDamaged:
       return damaged("its header");
     case HeaderState::kOther:
-      spdlog::info("{}: was made from another state of the source, or by another version", path);
+      LogSource(SourceLog::Level::kInfo, path, "was made from another state of the source, or by another version");
       return std::nullopt;
     case HeaderState::kSame:
       break;
@@ -308,7 +310,8 @@ Result<std::optional<RecordWriter>> RecordWriter::Open(const std::string& path, 
       if (errno != EWOULDBLOCK) {
         return MakeError(ErrorCode::kUnavailable, "{}: cannot be locked: {}", partial, ErrorText());
       }
-      if (!std::exchange(waiting, true)) spdlog::info("{}: somebody else makes it; waiting for that", path);
+      if (!std::exchange(waiting, true))
+        LogSource(SourceLog::Level::kInfo, path, "somebody else makes it; waiting for that");
       if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "{}: waiting for it was stopped", path);
       std::this_thread::sleep_for(std::chrono::milliseconds(100));
       continue;
@@ -407,10 +410,13 @@ Result<void> RecordWriter::Finish(const RasterSurvey& survey) {
   footer.Put(kFooterMagic);
   if (auto written = Write(bytes); !written) return written;
   if (auto written = Write(footer.Take()); !written) return written;
-  if (::fsync(file_.get()) != 0 || ::rename((path_ + ".partial").c_str(), path_.c_str()) != 0) {
+  // A record that a power cut has damaged is found and made anew. Where that is quick the disk is not waited for: of
+  // tens of thousands of sources that would be most of the time.
+  const bool is_waited_for = chunks_.count() > kMostUnsynced;
+  if ((is_waited_for && ::fsync(file_.get()) != 0) || ::rename((path_ + ".partial").c_str(), path_.c_str()) != 0) {
     return MakeError(ErrorCode::kUnavailable, "{}: cannot be finished: {}", path_, ErrorText());
   }
-  SyncFolderOf(path_);
+  if (is_waited_for) SyncFolderOf(path_);
   return {};
 }
 

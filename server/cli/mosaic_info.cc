@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "engine/dem/box_index.h"
 #include "engine/geo/error_ladder.h"
 
 namespace terrace::cli {
@@ -33,25 +34,51 @@ bool Covers(const dem::GeoBounds& outer, const dem::GeoBounds& inner) {
 
 std::string Sources(std::ptrdiff_t count) { return fmt::format("{} source{}", count, count == 1 ? "" : "s"); }
 
+// Sources by their bounds.
+class BoundsIndex {
+ public:
+  explicit BoundsIndex(const std::vector<dem::RasterInfo>& sources) : sources_(sources), index_(EntriesOf(sources)) {}
+
+  // How many sources have one before them for which is_so(upper, lower) holds. Precondition: it holds of none that lie
+  // apart.
+  template <typename IsSo>
+  std::ptrdiff_t CountUnder(const IsSo& is_so) const {
+    std::ptrdiff_t count = 0;
+    for (std::size_t i = 0; i < sources_.size(); ++i) {
+      const std::vector<std::size_t> near = index_.Find(BoxOf(sources_[i].bounds, 0));
+      count += std::any_of(near.begin(), near.end(),
+                           [&](std::size_t upper) { return upper < i && is_so(sources_[upper], sources_[i]); });
+    }
+    return count;
+  }
+
+ private:
+  static dem::Box BoxOf(const dem::GeoBounds& bounds, double turn) {
+    return {bounds.west + turn, bounds.south, bounds.west + turn + Width(bounds), bounds.north};
+  }
+  static std::vector<dem::BoxIndex::Entry> EntriesOf(const std::vector<dem::RasterInfo>& sources) {
+    std::vector<dem::BoxIndex::Entry> entries;
+    for (std::size_t i = 0; i < sources.size(); ++i) {
+      for (const double turn : {-360, 0, 360}) entries.push_back({BoxOf(sources[i].bounds, turn), i});
+    }
+    return entries;
+  }
+
+  const std::vector<dem::RasterInfo>& sources_;
+  const dem::BoxIndex index_;
+};
+
 // Sources that lie, in part at least, under one that comes before them.
 std::ptrdiff_t CountOverlapped(const std::vector<dem::RasterInfo>& sources) {
-  std::ptrdiff_t count = 0;
-  for (std::size_t i = 0; i < sources.size(); ++i) {
-    count += std::any_of(sources.begin(), sources.begin() + static_cast<std::ptrdiff_t>(i),
-                         [&](const dem::RasterInfo& upper) { return Overlap(upper.bounds, sources[i].bounds); });
-  }
-  return count;
+  return BoundsIndex(sources).CountUnder(
+      [](const dem::RasterInfo& upper, const dem::RasterInfo& lower) { return Overlap(upper.bounds, lower.bounds); });
 }
 
 // Sources under a coarser one that lies over all of them.
 std::ptrdiff_t CountHidden(const std::vector<dem::RasterInfo>& sources) {
-  std::ptrdiff_t count = 0;
-  for (auto lower = sources.begin(); lower != sources.end(); ++lower) {
-    count += std::any_of(sources.begin(), lower, [&](const dem::RasterInfo& upper) {
-      return upper.spacing_m > lower->spacing_m && Covers(upper.bounds, lower->bounds);
-    });
-  }
-  return count;
+  return BoundsIndex(sources).CountUnder([](const dem::RasterInfo& upper, const dem::RasterInfo& lower) {
+    return upper.spacing_m > lower.spacing_m && Covers(upper.bounds, lower.bounds);
+  });
 }
 
 std::vector<std::string> AdviceFor(const dem::DemInfo& info) {

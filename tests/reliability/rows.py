@@ -16,6 +16,7 @@ import threading
 import time
 
 import floods
+import many_sources
 import soak
 from server import Server, fetch, get, percentile, read_reply, wait_until
 
@@ -595,3 +596,41 @@ def row_42(binary, _, long):
             kept = kept and statuses == {200: connections}
             told.append(f"{statuses.get(200, 0)} of {connections} served, slowest {slowest:.1f} s")
     return kept, "; ".join(told)
+
+
+def row_46(binary, _, long):
+    """Many sources around the Earth, started twice, and the cost of cold tiles beside the antimeridian with and without the others."""
+    count, pixels = (24_649, 3600) if long else (2_000, 600)
+    place = (-83, -180)
+    with tempfile.TemporaryDirectory() as scratch:
+        folder, one = pathlib.Path(scratch) / "many", pathlib.Path(scratch) / "one"
+        many_sources.write(folder, many_sources.cells(count), pixels)
+        many_sources.write(one, [place], pixels)
+
+        def served(dem):
+            begun = time.monotonic()
+            flags = (str(dem), "--cache-dir", f"{scratch}/cache", "--cache-bytes", "0", "--refinement-cache-bytes", "0", "--worker-threads", "2")
+            server = Server(binary, *flags)
+            return server, time.monotonic() - begun
+
+        def tile_cost(server, dem):
+            """Processor seconds of a tile, of which every request builds one."""
+            targets = [f"/{dem.name}/9/{x}/{y}.terrain?error={error}" for x in (0, 1) for y in (20, 21) for error in (3, 5, 9, 20, 40)]
+            statuses = [fetch(server, target, timeout=60)[0] for target in targets]
+            begun = server.cpu_seconds()
+            statuses += [fetch(server, target, timeout=60)[0] for target in targets]
+            return (server.cpu_seconds() - begun) / len(targets), set(statuses)
+
+        server, first = served(folder)
+        with server:
+            pass
+        server, second = served(folder)
+        with server:
+            resident = server.resident_kib()
+            of_many, statuses = tile_cost(server, folder)
+        server, _ = served(one)
+        with server:
+            of_one, _ = tile_cost(server, one)
+    kept = second <= 10 and resident < 1 << 20 and statuses == {200} and of_many <= 2 * of_one + 0.001
+    return kept, f"{count:,} sources of {pixels} rows: {first:.0f} s to start, {second:.1f} s with statistics kept, RSS {resident / 1024:.0f} MB; " \
+                 f"a cold tile takes {1000 * of_many:.1f} ms of a processor, {1000 * of_one:.1f} ms with its source alone; {statuses}"

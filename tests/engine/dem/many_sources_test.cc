@@ -1,0 +1,326 @@
+// Thousands of sources: what is looked at for a tile, what stays in memory, and how they are opened.
+#include <spdlog/sinks/ostream_sink.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <latch>
+#include <random>
+#include <sstream>
+#include <thread>
+#include <utility>
+
+#include "engine/dem/all_cores.h"
+#include "engine/dem/raster_source.h"
+#include "engine/dem/sheet.h"
+#include "engine/dem/sheet_tables.h"
+#include "tests/engine/dem/dem_fixture.h"
+
+namespace terrace::dem {
+namespace {
+
+std::shared_ptr<const RasterSource> OpenRasterOrFail(const std::string& path) {
+  auto raster = RasterSource::Open(path);
+  EXPECT_TRUE(raster.has_value()) << raster.error().message;
+  return raster ? *std::move(raster) : nullptr;
+}
+
+// One sheet of columns x rows rasters of side x side samples, each at its own height.
+Sheet MakeSheet(const TempDir& dir, const std::array<double, 6>& first, const std::string& crs, int columns, int rows,
+                int side) {
+  std::vector<std::shared_ptr<const RasterSource>> rasters;
+  for (int y = 0; y < rows; ++y) {
+    for (int x = 0; x < columns; ++x) {
+      RasterSpec spec;
+      spec.width = spec.height = side;
+      spec.crs = crs;
+      spec.geo_transform = first;
+      spec.geo_transform[0] += x * side * first[1];
+      spec.geo_transform[3] += y * side * first[5];
+      spec.value = [x, y](int column, int row) { return 100.0 * y + x + 0.01 * (column + row); };
+      rasters.push_back(OpenRasterOrFail(WriteRaster(dir, spec, std::to_string(y) + "-" + std::to_string(x) + ".tif")));
+    }
+  }
+  std::vector<SheetPlan> plans = PlanSheets(rasters);
+  EXPECT_EQ(plans.size(), 1U);
+  auto sheet = Sheet::Make(std::move(plans.front()), {64, 0});
+  EXPECT_TRUE(sheet.has_value());
+  return *std::move(sheet);
+}
+
+SheetTrace TraceOf(const Sheet& sheet, const geo::Lattice& lattice, const geo::TileKey& key) {
+  const NodeWindow window{lattice.FirstColumn(key) - 1, lattice.FirstRow(key) - 1, lattice.cells + 3,
+                          lattice.cells + 3};
+  std::vector<float> heights(static_cast<std::size_t>(window.columns) * static_cast<std::size_t>(window.rows),
+                             SampleRules::kVoid);
+  SheetTrace trace;
+  EXPECT_TRUE(sheet.Fill(lattice, window, Counting::kEllipsoid, heights, {}, {}, &trace));
+  return trace;
+}
+
+// What the tables of all members say of a box.
+BlockRange OfAllMembers(const Sheet& sheet, double west, double north, double east, double south) {
+  BlockRange range;
+  for (const SheetMember& member : sheet.members()) {
+    const auto x = static_cast<double>(member.column), y = static_cast<double>(member.row);
+    range.Add(member.raster->tables()->table.Query(west - x, north - y, east - x, south - y));
+  }
+  return range;
+}
+
+// Asks for a box around every position of a trace. How many members were looked at, of one box at most and for all.
+std::pair<std::size_t, std::size_t> LookAround(const Sheet& sheet, const SheetTrace& trace, std::size_t stride) {
+  const SheetTables tables(sheet, trace, stride);
+  std::size_t most = 0;
+  for (const Position& p : trace.positions) {
+    if (!std::isfinite(p.x) || !std::isfinite(p.y)) continue;
+    const std::size_t before = tables.members_visited();
+    const BlockRange found = tables.Ranges(p.x - 1, p.y - 1, p.x + 1, p.y + 1);
+    most = std::max(most, tables.members_visited() - before);
+    const BlockRange expected = OfAllMembers(sheet, p.x - 1, p.y - 1, p.x + 1, p.y + 1);
+    EXPECT_EQ(found.min, expected.min) << p.x << ' ' << p.y;
+    EXPECT_EQ(found.max, expected.max) << p.x << ' ' << p.y;
+  }
+  return {most, tables.members_visited()};
+}
+
+// Columns of a sheet around the Earth begin anew at one meridian: a tile there has pixels at both ends.
+TEST(ManySources, AroundTheEarthATileLooksAtItsOwnSources) {
+  const TempDir dir;
+  const Sheet sheet = MakeSheet(dir, {-180, 0.5, 0, 85, 0, -0.5}, "EPSG:4326", 36, 4, 20);
+  ASSERT_TRUE(sheet.wraps());
+  ASSERT_EQ(sheet.members().size(), 144U);
+  const geo::Lattice lattice{5, 32};
+  const std::int64_t columns = 1 << 6;
+  for (const std::int64_t x : {std::int64_t{0}, std::int64_t{7}, columns - 1}) {
+    const SheetTrace trace = TraceOf(sheet, lattice, {5, x, 27});
+    const auto [most, all] = LookAround(sheet, trace, static_cast<std::size_t>(lattice.cells) + 3);
+    EXPECT_LE(most, 4U) << "a tile of 5.6 degrees among sources of 10, column " << x;
+    EXPECT_GT(all, 0U);
+  }
+}
+
+// A shallow tile of many sources: the index tells which of them a box meets.
+TEST(ManySources, AShallowTileLooksAtTheSourcesOfEachBox) {
+  const TempDir dir;
+  const Sheet sheet = MakeSheet(dir, {-180, 0.5, 0, 85, 0, -0.5}, "EPSG:4326", 36, 4, 20);
+  const geo::Lattice lattice{0, 32};
+  const SheetTrace trace = TraceOf(sheet, lattice, {0, 0, 0});
+  const auto [most, all] = LookAround(sheet, trace, static_cast<std::size_t>(lattice.cells) + 3);
+  EXPECT_LE(most, 4U);
+}
+
+// Nodes beyond a projected sheet have no positions; they must not make the tile look at all sources.
+TEST(ManySources, AtTheRimOfAProjectionATileLooksAtItsOwnSources) {
+  const TempDir dir;
+  const Sheet sheet = MakeSheet(dir, {300'000, 100, 0, 5'000'000, 0, -100}, "EPSG:32632", 12, 12, 20);
+  const geo::Lattice lattice{11, 32};
+  const auto [west, north] = std::pair(sheet.reach().west, sheet.reach().north);
+  const double tile = 180.0 / (1 << 11);
+  const geo::TileKey corner{11, static_cast<std::int64_t>((west + 0.02 + 180) / tile),
+                            static_cast<std::int64_t>((north - 0.02 + 90) / tile)};
+  SheetTrace trace = TraceOf(sheet, lattice, corner);
+  // As nodes far from a sheet and outside its projection have it.
+  for (std::size_t i = 0; i < 40; ++i) trace.positions[i] = {std::nan(""), std::nan("")};
+  const auto [most, all] = LookAround(sheet, trace, static_cast<std::size_t>(lattice.cells) + 3);
+  EXPECT_GT(all, 0U);
+  EXPECT_LE(most, 8U);
+}
+
+RasterSpec Rough(int side) {
+  RasterSpec spec;
+  spec.width = spec.height = side;
+  spec.geo_transform = {7, 1.0 / 3600, 0, 47, 0, -1.0 / 3600};
+  spec.value = [](int column, int row) {
+    return std::sin(column * 0.37) * 300 + std::cos(row * 0.21) * 200 + column * row % 97;
+  };
+  return spec;
+}
+
+TEST(ManySources, PagedTablesSayWhatKeptOnesDo) {
+  const TempDir dir, cache;
+  const std::string path = WriteRaster(dir, Rough(1500));
+  const auto kept = OpenRasterOrFail(path);
+  const auto pages = std::make_shared<SurveyPages>(0, 1);
+  auto opened = RasterSource::Open(path, {}, cache.path().string(), {}, nullptr, {}, pages);
+  ASSERT_TRUE(opened.has_value()) << opened.error().message;
+  const RasterSource& paged = **opened;
+  EXPECT_EQ(pages->paged_bytes(), 0U) << "nothing was asked for yet";
+  std::mt19937 random(3);
+  const auto pick = [&random](int count) { return static_cast<double>(random() % static_cast<unsigned>(count)); };
+  for (int i = 0; i < 300; ++i) {
+    const double west = pick(1500), north = pick(1500), size = pick(i % 2 == 0 ? 40 : 1500);
+    const BlockRange a = kept->RangeIn(west, north, west + size, north + size);
+    const BlockRange b = paged.RangeIn(west, north, west + size, north + size);
+    ASSERT_EQ(a.min, b.min);
+    ASSERT_EQ(a.max, b.max);
+    ASSERT_EQ(a.has_voids, b.has_voids);
+    for (const int factor : {2, 8, 64}) {
+      ASSERT_EQ(kept->tables()->errors.Largest(factor, west, north, west + size, north + size),
+                paged.tables()->errors.Largest(factor, west, north, west + size, north + size));
+    }
+  }
+  EXPECT_GT(pages->paged_bytes(), 0U);
+  EXPECT_EQ(kept->ReadBlocks(64, {3, 4, 5, 6}, {}).value(), paged.ReadBlocks(64, {3, 4, 5, 6}, {}).value());
+}
+
+TEST(ManySources, PagedTablesOfALostRecordAreMadeAgain) {
+  const TempDir dir, cache;
+  const std::string path = WriteRaster(dir, Rough(1100));
+  const auto pages = std::make_shared<SurveyPages>(0, 1);
+  auto opened = RasterSource::Open(path, {}, cache.path().string(), {}, nullptr, {}, pages);
+  ASSERT_TRUE(opened.has_value());
+  const RasterSource& raster = **opened;
+  const auto drop = [&] {
+    pages->Forget(&raster);
+    for (const auto& entry : std::filesystem::directory_iterator(cache.path())) std::filesystem::remove(entry.path());
+  };
+  const float highest = raster.RangeIn(10, 10, 20, 20).max;
+  drop();
+  EXPECT_EQ(raster.RangeIn(10, 10, 20, 20).max, highest);
+  EXPECT_FALSE(std::filesystem::is_empty(cache.path())) << "and kept again";
+  drop();
+  std::filesystem::remove(path);
+  EXPECT_THROW(raster.RangeIn(10, 10, 20, 20), std::runtime_error) << "no bound is better than a wrong one";
+}
+
+TEST(ManySources, PagesGoThatWereUsedLongestAgo) {
+  const auto tables = [] {
+    RasterSurvey survey;
+    survey.table = RangeTable(1000, 1000);
+    survey.table.Finish();
+    return std::make_shared<const RasterSurvey>(std::move(survey));
+  };
+  const std::size_t bytes = tables()->bytes();
+  SurveyPages pages(0, 2 * bytes);
+  const int a = 0, b = 0, c = 0;
+  pages.Add(&a, tables());
+  pages.Add(&b, tables());
+  EXPECT_NE(pages.Find(&a), nullptr);
+  pages.Add(&c, tables());
+  EXPECT_NE(pages.Find(&a), nullptr);
+  EXPECT_EQ(pages.Find(&b), nullptr);
+  EXPECT_EQ(pages.paged_bytes(), 2 * bytes);
+  pages.Forget(&a);
+  EXPECT_EQ(pages.paged_bytes(), bytes);
+}
+
+TEST(ManySources, SourcesOfOneProjectionShareItsOperation) {
+  const TempDir dir;
+  RasterSpec spec;
+  spec.crs = "EPSG:32632";
+  spec.geo_transform = {500'000, 30, 0, 5'000'000, 0, -30};
+  const auto first = OpenRasterOrFail(WriteRaster(dir, spec, "a.tif"));
+  spec.geo_transform[0] = 600'000;
+  const auto second = OpenRasterOrFail(WriteRaster(dir, spec, "b.tif"));
+  ASSERT_NE(first->georeference().projector(), nullptr);
+  EXPECT_EQ(first->georeference().projector(), second->georeference().projector());
+}
+
+TEST(AllCores, WorkIsDoneAtOnceAndOnce) {
+  if (std::thread::hardware_concurrency() < 2) GTEST_SKIP() << "one core";
+  std::vector<int> done(100);
+  std::latch both(2);
+  bool met = true;
+  ForEachOnAllCores(done.size(), [&](std::size_t i) {
+    ++done[i];
+    if (i > 1) return true;
+    // The first two wait for each other.
+    both.count_down();
+    for (int waited = 0; !both.try_wait() && waited < 3000; ++waited)
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    if (!both.try_wait()) met = false;
+    return true;
+  });
+  EXPECT_TRUE(met);
+  EXPECT_EQ(std::ranges::count(done, 1), 100);
+}
+
+TEST(AllCores, NothingBeginsAfterFalseAndWhatIsThrownComesOut) {
+  std::size_t begun = 0;
+  std::mutex mutex;
+  EXPECT_THROW(ForEachOnAllCores(100'000,
+                                 [&](std::size_t i) -> bool {
+                                   {
+                                     const std::lock_guard lock(mutex);
+                                     ++begun;
+                                   }
+                                   if (i == 3) throw std::runtime_error("three");
+                                   return true;
+                                 }),
+               std::runtime_error);
+  EXPECT_LT(begun, 100'000U);
+}
+
+std::vector<DemFile> WriteFolder(const TempDir& dir, int count) {
+  std::vector<DemFile> files;
+  for (int i = 0; i < count; ++i) {
+    RasterSpec spec;
+    spec.geo_transform = {i * 1.0, 1.0 / 16, 0, 10, 0, -1.0 / 16};
+    spec.value = [i](int, int) { return i; };
+    files.push_back({WriteRaster(dir, spec, std::to_string(1000 + i) + ".tif"), 0, true});
+  }
+  return files;
+}
+
+// Whatever ends first.
+TEST(ManySources, TheFirstFaultIsToldAndWithAListenerAllInOrder) {
+  const TempDir dir;
+  std::vector<DemFile> files = WriteFolder(dir, 40);
+  for (const std::size_t bad : {11, 12, 30}) {
+    std::filesystem::resize_file(files[bad].path, std::filesystem::file_size(files[bad].path) - 300);
+  }
+  for (int round = 0; round < 5; ++round) {
+    const auto failed = DemSource::Open(files);
+    ASSERT_FALSE(failed.has_value());
+    EXPECT_NE(failed.error().message.find("1011.tif"), std::string::npos) << failed.error().message;
+  }
+  std::vector<std::string> told;
+  DemOptions options;
+  options.fault = [&told](const Error& error) { told.push_back(error.message); };
+  ASSERT_FALSE(DemSource::Open(files, options).has_value());
+  ASSERT_EQ(told.size(), 3U);
+  EXPECT_NE(told[0].find("1011.tif"), std::string::npos);
+  EXPECT_NE(told[2].find("1030.tif"), std::string::npos);
+}
+
+TEST(ManySources, OpeningTellsItsProgressAndStops) {
+  const TempDir dir;
+  const std::vector<DemFile> files = WriteFolder(dir, 30);
+  DemOptions options;
+  std::vector<double> shares;
+  options.progress = [&shares](double share) { shares.push_back(share); };
+  ASSERT_TRUE(DemSource::Open(files, options).has_value());
+  EXPECT_TRUE(std::ranges::is_sorted(shares));
+  EXPECT_NEAR(shares.back(), 1, 1e-9);
+  EXPECT_GE(shares.size(), 30U);
+  std::stop_source stop;
+  options.stop = stop.get_token();
+  options.progress = [&stop](double share) {
+    if (share > 0.3) stop.request_stop();
+  };
+  const auto stopped = DemSource::Open(files, options);
+  ASSERT_FALSE(stopped.has_value());
+  EXPECT_EQ(stopped.error().code, ErrorCode::kCancelled);
+}
+
+TEST(ManySources, TheLogSaysTheSameOfManySourcesAFewTimes) {
+  const TempDir dir;
+  const std::vector<DemFile> files = WriteFolder(dir, 30);
+  std::ostringstream text;
+  const auto before = spdlog::default_logger();
+  spdlog::set_default_logger(
+      std::make_shared<spdlog::logger>("test", std::make_shared<spdlog::sinks::ostream_sink_mt>(text)));
+  const bool opened = DemSource::Open(files).has_value();
+  spdlog::set_default_logger(before);
+  ASSERT_TRUE(opened);
+  const std::string log = text.str();
+  EXPECT_EQ(std::ranges::count(log, '\n'), 6) << log;
+  EXPECT_NE(log.find("25 more sources have lines like this one: no vertical datum stated"), std::string::npos) << log;
+}
+
+}  // namespace
+}  // namespace terrace::dem
