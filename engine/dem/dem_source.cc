@@ -133,16 +133,14 @@ Result<Rasters> OpenAll(std::vector<DemFile>& files, const DemOptions& options, 
         ErrorCode::kNotFound,
         "{} and its like: none of the files in this folder is a raster; name a folder of rasters or a raster", first);
   }
-  const auto handles = std::make_shared<HandleLimit>(options.max_open_sources);
   Rasters rasters;
   std::optional<Error> fault;  // the first
   for (std::size_t i = 0; i < files.size();) {
     const auto progress = [&](double share) {
       options.progress((static_cast<double>(i) + share) / static_cast<double>(files.size()));
     };
-    auto raster =
-        RasterSource::Open(files[i].path, files[i].options.value_or(options.source), options.cache_dir,
-                           options.progress ? progress : std::function<void(double)>(), handles, options.stop);
+    auto raster = RasterSource::Open(files[i].path, files[i].options.value_or(options.source), options.cache_dir,
+                                     options.progress ? progress : std::function<void(double)>(), options.stop);
     // Surveys that were cut into files have some without a height.
     const bool is_nothing = !raster && raster.error().code == ErrorCode::kNotFound;
     if (is_nothing && files[i].may_be_other && files.size() > 1) {

@@ -61,6 +61,7 @@ TEST(ToJson, ComesBackWithEveryOptionSet) {
   config.data_roots = {"/data", "/srv/dems"};
   config.allowed_prefixes = {"/vsis3/bucket/"};
   config.allowed_drivers = {"GTiff", "VRT"};
+  config.max_open_sources = 0;
   config.max_connections = 7;
   config.max_connections_per_client = 3;
   config.transfer_bytes = 5;

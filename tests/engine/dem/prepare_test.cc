@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <csignal>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -251,6 +252,23 @@ TEST(Prepare, TwoProcessesShareOneRecord) {
   EXPECT_TRUE(source->preparation().from_record);
   ExpectSameAverages(path, *source);
   EXPECT_FALSE(std::filesystem::exists(RecordPath(cache, path) + ".partial"));
+}
+
+TEST(Prepare, KeepsNoRecordOpenAndDoesWithoutOneThatIsGone) {
+  const TempDir dir;
+  const std::string path = WriteLargeRaster(dir), cache = dir.File("cache");
+  OpenRecorded(path, cache);
+  const auto source = OpenRecorded(path, cache);
+  EXPECT_TRUE(source->preparation().from_record);
+  const auto before = source->ReadBlocks(8, {300, 200, 100, 100}, {});
+  for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) {
+    std::error_code gone;
+    EXPECT_FALSE(std::filesystem::read_symlink(entry, gone).string().starts_with(cache));
+  }
+  std::filesystem::remove_all(cache);
+  const auto after = source->ReadBlocks(8, {300, 200, 100, 100}, {});
+  ASSERT_TRUE(before && after);
+  EXPECT_TRUE(std::memcmp(before->data(), after->data(), before->size() * sizeof(float)) == 0) << "voids are NaN";
 }
 
 TEST(Prepare, RastersWhoseOverviewsMisleadAreLookedAtOnce) {
