@@ -46,25 +46,20 @@ Result<DescriptorBudget> SplitDescriptors(const DescriptorDemand& demand, std::s
                      "raise it (ulimit -n, LimitNOFILE= of systemd), or take fewer threads or no disk_cache",
                      limit, least, in_use, server, of_stores, threads, kLeastConnections);
   }
-  const std::size_t sources =
-      (kOfSource - 1) * threads + kOfSource * demand.open_sources + VrtParts(demand.open_sources, threads);
+  // A source's second descriptor, and the parts of VRTs without which a thread fails.
+  const std::size_t beside = (kOfSource - 1) * threads + (demand.has_vrts ? VrtParts(0, threads) : 0);
+  const std::size_t left = limit - least - std::min(limit - least, beside);
+  const std::size_t of_open_source = kOfSource + (demand.has_vrts ? 1 : 0);
+  const std::size_t sources = of_open_source * demand.open_sources;
   const std::size_t files = demand.store_files - std::min(demand.store_files, RecordDb::kMinOpenFiles);
   const std::size_t connections = demand.connections - std::min(demand.connections, kLeastConnections);
-  const std::size_t wanted = sources + demand.stores * files + connections, left = limit - least;
-  const double share = left < wanted ? static_cast<double>(left) / static_cast<double>(wanted) : 1;
-  const auto share_of = [&](std::size_t count) {
-    return share < 1 ? static_cast<std::size_t>(share * static_cast<double>(count)) : count;
-  };
+  const std::size_t wanted = sources + demand.stores * files + connections;
+  const auto share_of = [&](std::size_t count) { return left < wanted ? count * left / wanted : count; };
 
   DescriptorBudget budget;
   budget.connections = std::min(demand.connections, kLeastConnections) + share_of(connections);
   budget.store_files = RecordDb::kMinOpenFiles + share_of(files);
-  budget.open_sources = demand.open_sources;
-  if (share < 1) {
-    const std::size_t of_threads = (kOfSource - 1) * threads, of_sources = share_of(sources);
-    budget.open_sources =
-        std::min((of_sources - std::min(of_sources, of_threads)) / (kOfSource + 1), demand.open_sources);
-  }
+  budget.open_sources = share_of(sources) / of_open_source;
   budget.vrt_parts = VrtParts(budget.open_sources, threads);
   return budget;
 }

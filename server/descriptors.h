@@ -17,6 +17,7 @@ struct DescriptorDemand {
   std::size_t stores = 0;       // of the disk cache
   std::size_t store_files = 0;  // record files of each that are open at a time
   std::size_t open_sources = 0;
+  bool has_vrts = false;  // whose parts GDAL keeps open beside
   std::size_t connections = 1;
 };
 
@@ -27,9 +28,9 @@ struct DescriptorBudget {
   std::size_t connections = 0;
 };
 
-// `limit`: of the process. `in_use`: descriptors that are open before the server opens any. Where not everybody gets
-// what he would take, what is left above everybody's least is shared out in proportion. kUnavailable: not even the
-// least is there; the message says what it is made of.
+// `limit`: of the process. `in_use`: descriptors that are open before the server opens any. Everybody gets his least;
+// then the threads that use sources get what they may need for overviews and parts of VRTs; what is left is shared out
+// in proportion to what is wanted. kUnavailable: not even the least is there; the message says what it is made of.
 Result<DescriptorBudget> SplitDescriptors(const DescriptorDemand& demand, std::size_t limit, std::size_t in_use);
 
 // The limit on open files, after raising it as far as this process may.

@@ -3,12 +3,21 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <string>
 #include <thread>
 
 #include "server/tiles/record_db.h"
 
 namespace terrace::cli {
 namespace {
+
+bool HasVrt(const config::DatasetConfig& dataset) {
+  const auto is_vrt = [](const std::string& file) { return file.ends_with(".vrt") || file.ends_with(".VRT"); };
+  return is_vrt(dataset.imagery.image) || is_vrt(dataset.water.mask) ||
+         std::ranges::any_of(dataset.sources, [&](const config::SourceConfig& source) {
+           return std::ranges::any_of(source.files, is_vrt);
+         });
+}
 
 server::DescriptorDemand DemandOf(const config::Config& config) {
   server::DescriptorDemand demand;
@@ -17,6 +26,7 @@ server::DescriptorDemand DemandOf(const config::Config& config) {
       config.worker_threads > 0 ? config.worker_threads : std::max(1u, std::thread::hardware_concurrency());
   demand.access_log_file = !config.access_log_file.empty();
   demand.open_sources = config.max_open_sources;
+  demand.has_vrts = std::ranges::any_of(config.datasets, HasVrt);
   demand.connections = config.max_connections;
   if (config.disk_cache.directory.empty()) return demand;
   for (const std::size_t bytes : {config.disk_cache.tile_bytes, config.disk_cache.refinement_bytes}) {

@@ -296,7 +296,8 @@ Result<std::shared_ptr<server::DiskCache>> OpenDiskCache(const config::DiskCache
 }
 
 int CheckConfig(const ServeArguments& arguments, const config::Config& config) {
-  if (const int exit_code = TryStart(config, OptionsOf(config), /*tries_address=*/false); exit_code != kExitOk)
+  if (const int exit_code = TryStart(config, OptionsOf(config), PlanDescriptors(config), /*tries_address=*/false);
+      exit_code != kExitOk)
     return exit_code;
   const std::size_t count = config.datasets.size();
   fmt::print(
@@ -331,9 +332,8 @@ int Serve(const ServeArguments& arguments) {
   server::ServerOptions options = OptionsOf(config);
   options.listen_socket = passed->value_or(-1);
   const bool tries_address = !passed->has_value();
-  if (const int exit_code = TryStart(config, options, tries_address); exit_code != kExitOk) return exit_code;
   const Result<server::DescriptorBudget> budget = PlanDescriptors(config);
-  if (!budget) return Fail(budget.error());
+  if (const int exit_code = TryStart(config, options, budget, tries_address); exit_code != kExitOk) return exit_code;
   WarnAboutFewDescriptors(config, *budget);
   options.edge.max_connections = budget->connections;
   dem::SetGdalCache(config.gdal_cache_bytes);

@@ -7,13 +7,13 @@
 
 #include "engine/dem/source_policy.h"
 #include "server/cli/command.h"
-#include "server/cli/descriptor_plan.h"
 #include "server/cli/open_source.h"
 #include "server/cli/try_folder.h"
 
 namespace terrace::cli {
 
-int TryStart(const config::Config& config, const server::ServerOptions& options, bool tries_address) {
+int TryStart(const config::Config& config, const server::ServerOptions& options,
+             const Result<server::DescriptorBudget>& descriptors, bool tries_address) {
   std::vector<Error> errors = server::Server::TryFiles(options);
   const auto note = [&](const Result<void>& result) {
     if (!result) errors.push_back(result.error());
@@ -31,7 +31,7 @@ int TryStart(const config::Config& config, const server::ServerOptions& options,
       note(MakeError(folder.error().code, "disk_cache: {}", folder.error().message));
     }
   }
-  if (const auto budget = PlanDescriptors(config); !budget) errors.push_back(budget.error());
+  if (!descriptors) errors.push_back(descriptors.error());
   if (tries_address) note(server::Server::TryAddress(options));
   const Result<void> policy =
       dem::SetSourcePolicy({config.data_roots, config.allowed_prefixes, config.allowed_drivers});

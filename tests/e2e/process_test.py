@@ -57,7 +57,8 @@ class Opening(unittest.TestCase):
             slow = pathlib.Path(folder, "slow.tif")
             shutil.copy(DEM, slow)
             with restarts.leased(slow):
-                process = held.start(BINARY, "serve", slow, "--drain-timeout-s", "0.5", stderr=subprocess.PIPE)
+                # A folder, for the files of one are looked into when the dataset is opened, and not before.
+                process = held.start(BINARY, "serve", folder, "--drain-timeout-s", "0.5", stderr=subprocess.PIPE)
                 state = f"http://127.0.0.1:{held.port}/readyz"
                 with self.assertRaises(urllib.error.HTTPError) as opening:
                     urllib.request.urlopen(state, timeout=30)
