@@ -174,7 +174,7 @@ void SetGdalCache(std::size_t bytes);
 
 // How many files of sources are kept open between reads, those of all datasets together: rasters, images, grids of
 // PROJ. What is in use comes on top, one a thread. `vrt_parts`: how many parts of VRTs GDAL keeps open, in use or not;
-// 2 to 1000. Until the first call any number and 100. Before the first source is opened.
+// 2 to 1000. Until the first call 256 and 100. Before the first source is opened.
 void SetOpenSources(std::size_t idle, std::size_t vrt_parts);
 
 class DemSource {

@@ -1,7 +1,6 @@
 #include "engine/dem/idle_pool.h"
 
 #include <iterator>
-#include <limits>
 #include <list>
 #include <mutex>
 #include <new>
@@ -72,7 +71,7 @@ class IdleList {
   }
 
   std::mutex mutex_;  // guards what follows, and the pools' epochs
-  std::size_t limit_ = std::numeric_limits<std::size_t>::max();
+  std::size_t limit_ = 256;
   Items items_;  // the one used last comes first
   std::unordered_map<const AnyIdlePool*, std::vector<Items::iterator>> by_pool_;
 };

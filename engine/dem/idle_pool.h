@@ -12,7 +12,7 @@
 
 namespace terrace::dem {
 
-// How many the pools of the process keep together. Until the first call: any number.
+// How many the pools of the process keep together. Until the first call: 256.
 void SetMostIdle(std::size_t count);
 
 class AnyIdlePool {

@@ -71,7 +71,9 @@ bool IsDamaged(const rocksdb::Status& status) {
 
 }  // namespace
 
-std::size_t RecordDb::FilesOf(std::size_t capacity_bytes) { return capacity_bytes / FileBytes(capacity_bytes); }
+// Asked for in turn by look-ups, files beyond those that may be open would drive each other out, so that there is none
+// that is found open.
+std::size_t RecordDb::FilesOf(std::size_t capacity_bytes) { return 4 * (capacity_bytes / FileBytes(capacity_bytes)); }
 
 class RecordDb::Impl {
  public:

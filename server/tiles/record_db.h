@@ -41,7 +41,7 @@ class RecordDb {
   // the file that is being written.
   static constexpr std::size_t kOtherDescriptors = 10;
 
-  // How many record files a store of this capacity comes to, about.
+  // As many record files as a store of this capacity may come to; mostly a quarter, but more where they are compressed.
   static std::size_t FilesOf(std::size_t capacity_bytes);
 
   // A store that is too damaged to be opened is emptied, and `*discarded` says so. kUnavailable: the disk does not
