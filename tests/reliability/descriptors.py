@@ -11,6 +11,8 @@ import threading
 import time
 import urllib.request
 
+import restarts
+
 MB = 1 << 20
 CLIENTS = 6
 
@@ -39,8 +41,8 @@ class Watch:
         while not self.stop.wait(0.01):
             names = []
             try:
-                for entry in os.scandir(f"/proc/{self.pid}/fd"):
-                    names.append(os.readlink(entry.path))
+                for entry in os.listdir(f"/proc/{self.pid}/fd"):
+                    names.append(os.readlink(f"/proc/{self.pid}/fd/{entry}"))
             except OSError:
                 continue  # it was closed meanwhile
             self.told.most = max(self.told.most, len(names))
@@ -69,17 +71,18 @@ def ask_all(url, wanted, told):
     wanted, lock = iter(wanted), threading.Lock()
 
     def run():
+        client = restarts.PatientClient(int(re.search(r":(\d+)/", url)[1]), 120)
         while True:
             with lock:
                 target = next(wanted, None)
             if target is None:
-                return
-            problem = None
+                return client.close()
             try:
-                with urllib.request.urlopen(url + target, timeout=120) as reply:
-                    reply.read()
-            except OSError as error:
-                problem = f"{target}: {error}"
+                status = client.ask("/" + target)
+                problem = None if status == 200 else f"{target}: {status}"
+            except (restarts.Lost, OSError) as error:
+                problem = repr(error)
+                client.close()
             with lock:
                 told.requests += 1
                 told.wrong += [problem] if problem else []
