@@ -454,7 +454,7 @@ TEST(Prepare, StopsWhenToldAndGoesOnNextTime) {
       [&](double done) {
         if (done >= .3) stop.request_stop();
       },
-      nullptr, stop.get_token());
+      stop.get_token());
   ASSERT_FALSE(stopped.has_value());
   EXPECT_EQ(stopped.error().code, ErrorCode::kCancelled);
   const auto source = OpenRecorded(path, cache);
