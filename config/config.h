@@ -87,7 +87,6 @@ struct DatasetConfig {
   std::optional<double> floor;         // metres; height outside the source and in large voids
   int max_void_gap = 64;               // source samples; narrower voids are filled
   double feather = 0;                  // metres: how far from its edges a source gives way to the next
-  std::size_t max_open_sources = 64;   // files kept open between reads
   Criterion criterion = Criterion::kDelaunay;
   bool compact = false;  // tiles go through the drop pass
   GlbCompression glb_compression = GlbCompression::kDraco;
@@ -149,6 +148,7 @@ struct Config {
   DiskCacheConfig disk_cache;
   std::string cache_dir = {};                             // what is learnt of sources is kept there; empty: nowhere
   std::size_t gdal_cache_bytes = std::size_t{256} << 20;  // blocks of sources
+  std::size_t max_open_sources = 256;                     // files of all datasets kept open between reads
   std::size_t max_connections = 1024;
   std::size_t max_connections_per_client = 0;          // 0: as many as there may be in all
   std::size_t transfer_bytes = std::size_t{32} << 20;  // of bodies on their way

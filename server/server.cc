@@ -25,6 +25,7 @@
 #include "server/handlers/routes.h"
 #include "server/handlers/static_files.h"
 #include "server/http/edge.h"
+#include "server/http/http_error.h"
 #include "server/http/io_threads.h"
 #include "server/http/listener.h"
 #include "server/http/session.h"
@@ -67,12 +68,6 @@ unsigned IoThreadCount(unsigned configured) {
   return configured > 0 ? configured : std::max(1u, std::thread::hardware_concurrency() / 4);
 }
 
-// Sources that workers have open, and what opens files on the way: the log, GDAL's and PROJ's own.
-std::size_t DescriptorsForFiles(const ServerOptions& options) {
-  const unsigned workers = options.worker_threads > 0 ? options.worker_threads : std::thread::hardware_concurrency();
-  return 16 + 4 * std::size_t{workers};
-}
-
 TileServiceOptions ServiceOptions(const ServerOptions& options) {
   TileServiceOptions service;
   service.worker_threads = options.worker_threads;
@@ -98,7 +93,8 @@ class Server::Impl {
         metrics_page_(
             [this] { return metrics_.Text(tiles_.stats(), RefinementStats(), SourceNumbers(), CurrentState()); },
             options_.metrics_age),
-        routes_(MakeRoutes(std::move(catalog), options_)),
+        routes_(MakeRoutes(catalog ? catalog : std::make_shared<const Catalog>(), options_)),
+        opening_(catalog == nullptr),
         io_(IoThreadCount(options_.io_threads)),
         signals_(io_.first()) {}
 
@@ -109,7 +105,9 @@ class Server::Impl {
   }
 
   Result<void> Start() {
-    Result<std::shared_ptr<Listener>> listener = Listener::Open(io_, options_.host, options_.port, Context());
+    Result<std::shared_ptr<Listener>> listener = options_.listen_socket >= 0
+                                                     ? Listener::Adopt(io_, options_.listen_socket, Context())
+                                                     : Listener::Open(io_, options_.host, options_.port, Context());
     if (!listener) return tl::unexpected(listener.error());
     listener_ = std::move(*listener);
     WatchSignals();
@@ -127,7 +125,7 @@ class Server::Impl {
     {
       const std::lock_guard lock(state_mutex_);
       routes_.swap(routes);
-      ++catalogs_;
+      if (!opening_.exchange(false)) ++catalogs_;
     }
     tiles_.RetainTilesOf(*catalog);
     metrics_.RetainDatasets(catalog->datasets);
@@ -144,7 +142,7 @@ class Server::Impl {
   void ReopenAccessLog() { access_log_.Reopen(); }
 
   std::uint16_t port() const { return listener_->port(); }
-  const std::string& host() const { return options_.host; }
+  const std::string& host() const { return listener_->host(); }
   bool is_tls() const { return edge_->tls != nullptr; }
 
   void RequestStop() {
@@ -174,9 +172,12 @@ class Server::Impl {
   }
 
   bool Stop() {
-    listener_->Close();
+    const auto until = std::chrono::steady_clock::now() + options_.drain_timeout;
     edge_->connections.Drain();
-    const bool drained = edge_->connections.WaitUntilEmpty(options_.drain_timeout);
+    edge_->connections.WaitUntilEmpty(DrainGrace());
+    listener_->Close();
+    const bool drained = edge_->connections.WaitUntilEmpty(std::chrono::duration_cast<std::chrono::milliseconds>(
+        std::max(until - std::chrono::steady_clock::now(), std::chrono::steady_clock::duration(0))));
     tiles_.CancelBuilds();
     // What stopping may take beyond the drain timeout is not for the disk.
     if (!drained && options_.disk_cache) options_.disk_cache->Abandon();
@@ -196,6 +197,8 @@ class Server::Impl {
     }
     return drained;
   }
+
+  std::chrono::milliseconds DrainGrace() const { return std::min(options_.drain_grace, options_.drain_timeout); }
 
   void WatchSignals() {
     if (options_.stop_on_signals) {
@@ -257,8 +260,37 @@ class Server::Impl {
     return state;
   }
 
+  // What the first catalog has nothing to do with.
+  static bool IsOfProcess(RouteKind kind) {
+    return kind == RouteKind::kLive || kind == RouteKind::kReady || kind == RouteKind::kMetrics;
+  }
+
+  std::optional<Response> ServeAtOnce(const Route& route, const Request& request) const {
+    if (opening_.load(std::memory_order_acquire) && !IsOfProcess(route.kind)) return std::nullopt;
+    return CurrentRoutes()->ServeAtOnce(route, request);
+  }
+
+  // False: there was none in time, or will be none.
+  static asio::awaitable<bool> FirstCatalog(Impl* self) {
+    const auto give_up = std::chrono::steady_clock::now() + self->deadline_.load(std::memory_order_relaxed);
+    asio::steady_timer timer(co_await asio::this_coro::executor);
+    while (self->opening_.load(std::memory_order_acquire)) {
+      if (self->edge_->connections.draining() || std::chrono::steady_clock::now() >= give_up) co_return false;
+      timer.expires_after(kReplacePeriod);
+      co_await timer.async_wait(asio::use_awaitable);
+    }
+    co_return true;
+  }
+
   // The request's frame keeps what it is answered from. Where that turns out to be gone, the next catalog answers.
   static asio::awaitable<Response> Serve(Impl* self, Route route, Request request) {
+    const bool is_open = IsOfProcess(route.kind) || co_await FirstCatalog(self);
+    if (!is_open) {
+      Response response = ProblemResponse(503, "the sources are being opened", request.id);
+      response.headers.emplace_back("Retry-After", "5");
+      response.route = ToString(route.kind);
+      co_return response;
+    }
     const auto give_up = std::chrono::steady_clock::now() + kReplaceTime;
     for (;;) {
       const std::shared_ptr<const Routes> routes = self->CurrentRoutes();
@@ -287,6 +319,7 @@ class Server::Impl {
   Routes::State RouteState() {
     Routes::State state;
     state.draining = [this] { return edge_->connections.draining(); };
+    state.opening = [this] { return opening_.load(std::memory_order_relaxed); };
     state.troubles = [this] { return Troubles(); };
     state.metrics_text = [this] { return metrics_page_.Get(); };
     return state;
@@ -298,9 +331,8 @@ class Server::Impl {
     context->options.write_timeout = options_.write_timeout;
     context->options.min_rate = options_.min_read_rate;
     context->options.max_body_bytes = kBodyBytes + kBytesPerLocation * options_.max_locations;
-    context->quick_handler = [this](const Route& route, const Request& request) {
-      return CurrentRoutes()->ServeAtOnce(route, request);
-    };
+    context->options.drain_grace = DrainGrace();
+    context->quick_handler = std::bind_front(&Impl::ServeAtOnce, this);
     context->handler = std::bind_front(&Impl::Serve, this);
     context->observer = [this](const ReplyRecord& record) {
       metrics_.CountReply(record);
@@ -325,6 +357,7 @@ class Server::Impl {
   MetricsPage metrics_page_;
   mutable std::mutex state_mutex_;
   std::shared_ptr<const Routes> routes_;         // never null; guarded by state_mutex_
+  std::atomic<bool> opening_;                    // routes_ is empty still: the first catalog has not come
   std::map<std::string, std::string> troubles_;  // by dataset; guarded by state_mutex_
   // Since when, of the same datasets; guarded likewise.
   std::map<std::string, std::chrono::steady_clock::time_point> trouble_since_;
@@ -351,7 +384,7 @@ std::vector<Error> Server::TryFiles(const ServerOptions& options) {
   };
   note(StaticFiles::Load(options.viewer_dir));
   note(AccessLog::Try(options.access_log, options.access_log_file));
-  note(Edge::Open(options.edge, DescriptorsForFiles(options)));
+  note(Edge::Open(options.edge));
   return errors;
 }
 
@@ -360,12 +393,13 @@ Result<void> Server::TryAddress(const ServerOptions& options) {
 }
 
 Result<std::unique_ptr<Server>> Server::Start(CatalogPtr catalog, ServerOptions options) {
-  if (const Result<void> named = CheckNames(catalog->datasets); !named) return tl::unexpected(named.error());
+  const Result<void> named = catalog ? CheckNames(catalog->datasets) : Result<void>();
+  if (!named) return tl::unexpected(named.error());
   Result<StaticFiles> viewer = StaticFiles::Load(options.viewer_dir);
   if (!viewer) return tl::unexpected(viewer.error());
   Result<AccessLog> access_log = AccessLog::Open(options.access_log, options.access_log_file);
   if (!access_log) return tl::unexpected(access_log.error());
-  Result<std::unique_ptr<Edge>> edge = Edge::Open(options.edge, DescriptorsForFiles(options));
+  Result<std::unique_ptr<Edge>> edge = Edge::Open(options.edge);
   if (!edge) return tl::unexpected(edge.error());
   auto impl = std::make_unique<Impl>(std::move(catalog), std::move(*viewer), std::move(*access_log), *std::move(edge),
                                      std::move(options));

@@ -1,8 +1,9 @@
 // The server as one object: start it, ask it to stop, wait until it has.
 //
-// Threads: a few for the network, a bounded pool for building tiles. Stopping goes in this order: no new connections;
-// /readyz says draining; requests that have begun are answered (bounded by drain_timeout); builds are cancelled;
-// threads are joined.
+// Threads: a few for the network, a bounded pool for building tiles. Stopping goes in this order: /readyz says
+// draining, and every connection ends with its next reply; after drain_grace, or when there is none left, idle
+// connections close and no new ones are taken; requests that have begun are answered (bounded by drain_timeout); builds
+// are cancelled; threads are joined.
 #pragma once
 
 #include <chrono>
@@ -24,6 +25,7 @@ namespace terrace::server {
 struct ServerOptions {
   std::string host = "127.0.0.1";
   std::uint16_t port = 8080;                           // 0: any that is free
+  int listen_socket = -1;                              // instead of both: one that somebody else holds as well
   unsigned io_threads = 0;                             // 0: a quarter of the processors, at least one
   unsigned worker_threads = 0;                         // 0: as many as processors
   std::size_t queue_length = 10'000;                   // jobs that wait for a worker, of all clients
@@ -43,6 +45,7 @@ struct ServerOptions {
   std::size_t min_read_rate = 4096;                    // bytes a second that a client has to take; 0: any
   std::chrono::milliseconds request_deadline{30'000};  // of a tile, waiting for its build included
   std::chrono::milliseconds drain_timeout{10'000};
+  std::chrono::milliseconds drain_grace{500};  // for which connections are served on; part of drain_timeout
   bool stop_on_signals = false;  // SIGINT and SIGTERM act like RequestStop; the second ends the process with status 1
   // Called on an io thread for each of these signals: must not block.
   std::map<int, std::function<void()>> on_signal;
@@ -54,7 +57,8 @@ struct ServerOptions {
 
 class Server {
  public:
-  // Listens when it returns. The catalog's functions are called on worker threads.
+  // Listens when it returns. The catalog's functions are called on worker threads. Without a catalog (null) requests
+  // wait for the first Replace, for request_deadline at most, while /livez, /metrics and /readyz ("opening") answer.
   // kInvalidArgument: a dataset's name is reserved, empty or used twice. kUnavailable: the address cannot be listened
   // on, the viewer cannot be read, or the access log
   // cannot be written. Messages name the remedy.

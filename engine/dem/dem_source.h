@@ -54,7 +54,6 @@ struct DemOptions {
   std::string cache_dir = {};
   // Metres, of a mosaic: so far from its edges and voids a source begins to give way to what lies below it. 0: at them.
   double feather = 0;
-  std::size_t max_open_sources = 64;  // kept open between reads; what is in use comes on top, one a thread
   // Called now and then while Open scans the sources, with the share done, 0..1: files count alike. May be empty.
   std::function<void(double)> progress = {};
   std::stop_token stop = {};  // Open gives up (kCancelled)
@@ -172,6 +171,11 @@ GdalCounts CountGdalErrors();
 
 // How much memory blocks of rasters may take, in all threads together.
 void SetGdalCache(std::size_t bytes);
+
+// How many files of sources are kept open between reads, those of all datasets together: rasters, images, grids of
+// PROJ. What is in use comes on top, one a thread. `vrt_parts`: how many parts of VRTs GDAL keeps open, in use or not;
+// 2 to 1000. Until the first call 256 and 100. Before the first source is opened.
+void SetOpenSources(std::size_t idle, std::size_t vrt_parts);
 
 class DemSource {
  public:

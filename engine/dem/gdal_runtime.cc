@@ -7,11 +7,13 @@
 
 #include <atomic>
 #include <mutex>
+#include <string>
 #include <utility>
 
 #include "engine/core/check.h"
 #include "engine/dem/dem_source.h"
 #include "engine/dem/driver_list.h"
+#include "engine/dem/idle_pool.h"
 #include "engine/dem/network_guard.h"
 
 namespace terrace::dem {
@@ -58,6 +60,12 @@ void InitGdal() {
 void SetGdalCache(std::size_t bytes) {
   InitGdal();
   GDALSetCacheMax64(static_cast<GIntBig>(bytes));
+}
+
+void SetOpenSources(std::size_t idle, std::size_t vrt_parts) {
+  InitGdal();
+  SetMostIdle(idle);
+  CPLSetConfigOption("GDAL_MAX_DATASET_POOL_SIZE", std::to_string(vrt_parts).c_str());
 }
 
 GdalCounts CountGdalErrors() { return {errors, warnings, static_cast<std::uint64_t>(GDALGetCacheUsed64())}; }

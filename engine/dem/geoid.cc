@@ -147,7 +147,7 @@ void Geoid::FindGrid() {
   for (std::size_t i = 0; i < files_.size(); ++i) finest_cell_ = std::min(finest_cell_, CellOf(files_.path(i)));
   if (files_.size() != 1 || !IsShiftByOneGrid(pipeline())) return;
   std::shared_ptr<const UndulationGrid> grid = UndulationGrid::Open(files_.path(0));
-  std::unique_ptr<ProjOperation> operation = operations_.Borrow();
+  std::shared_ptr<ProjOperation> operation = operations_.Borrow();
   if (operation == nullptr) return;
   if (grid != nullptr && Agrees(*grid, *operation)) {
     finest_cell_ = std::min(grid->column_step(), grid->row_step());
@@ -232,7 +232,7 @@ Result<std::shared_ptr<const Geoid>> Geoid::OfGrid(const std::string& path, Posi
 
 // What cannot be evaluated, and what counts downwards, is found here and not in a tile.
 Result<std::shared_ptr<const Geoid>> Geoid::Checked(std::shared_ptr<const Geoid> geoid, Position centre) {
-  std::unique_ptr<ProjOperation> operation = geoid->operations_.Borrow();
+  std::shared_ptr<ProjOperation> operation = geoid->operations_.Borrow();
   if (operation == nullptr) {
     return MakeError(ErrorCode::kInvalidArgument, "{}: PROJ cannot read its grid ({}); check it with `gdalinfo {}`",
                      geoid->name_, geoid->description_, geoid->files_.size() == 0 ? "" : geoid->files_.path(0));

@@ -45,7 +45,7 @@ class Geoid {
 
    private:
     const Geoid& geoid_;
-    std::unique_ptr<ProjOperation> operation_;
+    std::shared_ptr<ProjOperation> operation_;
   };
 
   const std::string& name() const { return name_; }                       // "EGM96 height"

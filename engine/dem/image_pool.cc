@@ -1,7 +1,5 @@
 #include "engine/dem/image_pool.h"
 
-#include <algorithm>
-#include <new>
 #include <utility>
 
 #include "engine/dem/image_bins.h"
@@ -13,65 +11,46 @@ namespace terrace::dem {
 
 ImagePool::ImagePool(ImageFile image, StampedFiles files) : path_(image.path()), files_(std::move(files)) {
   GDALRasterBand& band = *image.dataset().GetRasterBand(1);
-  sizes_.push_back({});
+  sizes_.push_back(std::make_unique<Size>());
   for (const int factor : OverviewFactors(band)) {
     GDALRasterBand* const wanted = FindOverview(band, factor);
     for (int i = 0; i < band.GetOverviewCount(); ++i) {
       if (band.GetOverview(i) != wanted) continue;
-      sizes_.push_back({factor, i, PixelsPerSample(image.dataset(), factor, image.width(), wanted->GetXSize()),
-                        PixelsPerSample(image.dataset(), factor, image.height(), wanted->GetYSize())});
+      Size& size = *sizes_.emplace_back(std::make_unique<Size>());
+      size.factor = factor;
+      size.overview = i;
+      size.across = PixelsPerSample(image.dataset(), factor, image.width(), wanted->GetXSize());
+      size.down = PixelsPerSample(image.dataset(), factor, image.height(), wanted->GetYSize());
       break;
     }
   }
-  idle_.resize(sizes_.size());
-  idle_[0].push_back(std::move(image));
+  IdlePool<ImageFile>& full = sizes_[0]->idle;
+  IdlePool<ImageFile>::Taken first = full.Take();
+  first.item = std::make_shared<ImageFile>(std::move(image));
+  full.Keep(std::move(first));
 }
 
-ImagePool::ImagePool(ImagePool&& other) noexcept
-    : path_(std::move(other.path_)),
-      files_(std::move(other.files_)),
-      sizes_(std::move(other.sizes_)),
-      idle_(std::move(other.idle_)) {}
-
-int ImagePool::MostAveraged() const { return sizes_.back().factor * ImageBins::kMostPixels; }
+int ImagePool::MostAveraged() const { return sizes_.back()->factor * ImageBins::kMostPixels; }
 
 Result<ImagePool::Handle> ImagePool::Borrow(int factor) {
-  std::size_t size = 0;
-  while (size + 1 < sizes_.size() && sizes_[size + 1].factor <= factor) ++size;
-  std::uint64_t epoch = 0;
-  {
-    const std::lock_guard lock(mutex_);
-    epoch = epoch_;
-    if (std::vector<ImageFile>& idle = idle_[size]; !idle.empty()) {
-      Handle handle(*this, size, std::move(idle.back()), epoch);
-      idle.pop_back();
-      return handle;
-    }
-  }
-  auto image = ImageFile::Open(path_, sizes_[size].overview);
+  std::size_t i = 0;
+  while (i + 1 < sizes_.size() && sizes_[i + 1]->factor <= factor) ++i;
+  Size& size = *sizes_[i];
+  IdlePool<ImageFile>::Taken image = size.idle.Take();
+  if (image.item != nullptr) return Handle(size, std::move(image));
+  auto opened = ImageFile::Open(path_, size.overview);
   if (auto unchanged = CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
-  if (!image) return MakeError(ErrorCode::kUnavailable, "{}", image.error().message);
-  return Handle(*this, size, *std::move(image), epoch);
+  if (!opened) return MakeError(ErrorCode::kUnavailable, "{}", opened.error().message);
+  image.item = std::make_shared<ImageFile>(*std::move(opened));
+  return Handle(size, std::move(image));
 }
 
 Result<void> ImagePool::CheckUnchanged() {
   Result<void> unchanged = files_.CheckUnchanged(path_);
   if (!unchanged) {
-    const std::lock_guard lock(mutex_);
-    ++epoch_;
-    for (std::vector<ImageFile>& idle : idle_) idle.clear();
+    for (const auto& size : sizes_) size->idle.Clear();
   }
   return unchanged;
-}
-
-void ImagePool::Return(std::size_t size, ImageFile image, std::uint64_t epoch) {
-  const std::lock_guard lock(mutex_);
-  if (epoch != epoch_) return;
-  try {
-    idle_[size].push_back(std::move(image));
-  } catch (const std::bad_alloc&) {
-    // It is closed, and opened anew when it is wanted.
-  }
 }
 
 }  // namespace terrace::dem

@@ -91,11 +91,7 @@ class Opening {
   using Opened = Result<std::unique_ptr<RasterSource>>;
 
   Opening(const std::vector<DemFile>& files, const DemOptions& options)
-      : files_(files),
-        options_(options),
-        handles_(std::make_shared<HandleLimit>(options.max_open_sources)),
-        shares_(files.size()),
-        opened_(files.size()) {}
+      : files_(files), options_(options), shares_(files.size()), opened_(files.size()) {}
 
   // False: there is an error that ends it all. Files before this one are opened nevertheless, as theirs would count.
   bool Open(std::size_t i) {
@@ -107,7 +103,7 @@ class Opening {
       running_.emplace(i, stop);
     }
     Opened opened = RasterSource::Open(files_[i].path, files_[i].options.value_or(options_.source), options_.cache_dir,
-                                       ProgressOf(i), handles_, stop.get_token(), pages_);
+                                       ProgressOf(i), stop.get_token(), pages_);
     if (options_.progress) AddProgress(i, 1);
     const bool goes_on = opened || IsNothing(i, opened) || (options_.fault && !options_.stop.stop_requested());
     const std::lock_guard lock(mutex_);
@@ -142,7 +138,6 @@ class Opening {
 
   const std::vector<DemFile>& files_;
   const DemOptions& options_;
-  const std::shared_ptr<HandleLimit> handles_;
   const std::shared_ptr<SurveyPages> pages_ = std::make_shared<SurveyPages>(kKeptTables, kPagedTables);
   SourceLog log_;
   std::mutex mutex_;

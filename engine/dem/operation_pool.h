@@ -1,11 +1,12 @@
-// One pinned PROJ operation for many threads: each borrows a copy with a context of its own, and gives it back.
+// One pinned PROJ operation for many threads: each borrows a copy with a context of its own, and gives it back. What is
+// not in use is kept as IdlePool says, for a copy holds the files of its grids open.
 #pragma once
 
 #include <memory>
-#include <mutex>
 #include <string>
 #include <utility>
-#include <vector>
+
+#include "engine/dem/idle_pool.h"
 
 namespace terrace::dem {
 
@@ -13,22 +14,18 @@ struct ProjOperation;
 
 class OperationPool {
  public:
-  OperationPool();
-  ~OperationPool();
-
   // As PROJ writes it. Set once, before the first Borrow.
   void set_pipeline(std::string pipeline) { pipeline_ = std::move(pipeline); }
   const std::string& pipeline() const { return pipeline_; }
 
   // Null: PROJ cannot set it up. Where it could before, memory or descriptors for its grids are short.
-  std::unique_ptr<ProjOperation> Borrow() const;
+  std::shared_ptr<ProjOperation> Borrow() const;
   // Forgets PROJ's error of the last use.
-  void Return(std::unique_ptr<ProjOperation> operation) const;
+  void Return(std::shared_ptr<ProjOperation> operation) const;
 
  private:
   std::string pipeline_;
-  mutable std::mutex mutex_;
-  mutable std::vector<std::unique_ptr<ProjOperation>> idle_;  // guarded by mutex_
+  mutable IdlePool<ProjOperation> idle_;  // never cleared: grids are looked at by whoever uses the operation
 };
 
 }  // namespace terrace::dem

@@ -63,7 +63,7 @@ Result<std::shared_ptr<const Projector>> Projector::Make(const std::string& wkt,
   std::vector<std::string> files;
   for (const ProjGrid& grid : GridsOf(context.get(), operation.get())) files.push_back(grid.file);
   projector->grids_ = StampedFiles(files);
-  std::unique_ptr<ProjOperation> first = projector->operations_.Borrow();
+  std::shared_ptr<ProjOperation> first = projector->operations_.Borrow();
   if (first == nullptr) {
     return MakeError(ErrorCode::kInvalidArgument, "the transformation from WGS 84 cannot be set up: {}",
                      projector->pipeline());
@@ -73,7 +73,7 @@ Result<std::shared_ptr<const Projector>> Projector::Make(const std::string& wkt,
 }
 
 void Projector::Transform(std::span<Position> positions, bool forward) const {
-  std::unique_ptr<ProjOperation> operation = operations_.Borrow();
+  std::shared_ptr<ProjOperation> operation = operations_.Borrow();
   // The same string was set up once in Make. Where it cannot be now, for want of memory or of descriptors for its
   // grids, no position is known; the caller's read fails.
   if (operation == nullptr) throw std::bad_alloc();

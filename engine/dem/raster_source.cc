@@ -116,7 +116,6 @@ Position CentreOf(const Georeference& georeference) {
 Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path, const SourceOptions& options,
                                                          const std::string& cache_dir,
                                                          const std::function<void(double)>& progress,
-                                                         std::shared_ptr<HandleLimit> handles,
                                                          const std::stop_token& stop,
                                                          std::shared_ptr<SurveyPages> pages) {
   const auto start = std::chrono::steady_clock::now();
@@ -133,8 +132,7 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
   const auto spacing = SourceSpacing::Of(*georeference, path);
   if (!spacing) return tl::unexpected(spacing.error());
 
-  std::unique_ptr<RasterSource> source(
-      new RasterSource(path, *std::move(files), *std::move(georeference), std::move(handles)));
+  std::unique_ptr<RasterSource> source(new RasterSource(path, *std::move(files), *std::move(georeference)));
   auto vertical = ResolveVertical(options.vertical, source->georeference_, CentreOf(source->georeference_));
   if (!vertical) return MakeError(vertical.error().code, "{}: {}", path, vertical.error().message);
   source->vertical_ = *std::move(vertical);
@@ -252,7 +250,7 @@ Result<std::vector<float>> RasterSource::ReadBlocks(int factor, const GridWindow
   if (averages_ && RecordedAverages::Has(factor) && !averages_damaged_) {
     if (auto unchanged = handles_.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
     auto averages = averages_->Read(factor, window);
-    if (averages) return averages;
+    if (averages || averages.error().code == ErrorCode::kUnavailable) return averages;
     averages_damaged_ = true;
     averages_->Discard();
     spdlog::error("{}; {} is read at its full resolution instead, and prepared anew when it is next opened",

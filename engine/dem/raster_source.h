@@ -29,12 +29,11 @@ namespace terrace::dem {
 class RasterSource {
  public:
   // Opens a raster, checks it, and scans it once for its heights. Errors name the file, what is wrong and the remedy.
-  // What is learnt is kept in `cache_dir`, or taken from there; empty for none. `handles` bounds what this and other
-  // rasters keep open, `pages` the memory of their tables; null: nothing does. kCancelled: stopped.
+  // What is learnt is kept in `cache_dir`, or taken from there; empty for none. `pages` bounds
+  // the memory of the tables of this and other rasters; null: nothing does. kCancelled: stopped.
   static Result<std::unique_ptr<RasterSource>> Open(const std::string& path, const SourceOptions& options = {},
                                                     const std::string& cache_dir = {},
                                                     const std::function<void(double)>& progress = {},
-                                                    std::shared_ptr<HandleLimit> handles = nullptr,
                                                     const std::stop_token& stop = {},
                                                     std::shared_ptr<SurveyPages> pages = nullptr);
   ~RasterSource();
@@ -70,8 +69,8 @@ class RasterSource {
   void KeepTables(PreparedRaster prepared, const PrepareOptions& prepare, std::shared_ptr<SurveyPages> pages);
   Result<RasterSurvey> ReadTables() const;
 
-  RasterSource(std::string path, StampedFiles files, Georeference where, std::shared_ptr<HandleLimit> handles)
-      : handles_(std::move(path), std::move(files), std::move(handles)), georeference_(std::move(where)) {}
+  RasterSource(std::string path, StampedFiles files, Georeference where)
+      : handles_(std::move(path), std::move(files)), georeference_(std::move(where)) {}
 
   mutable HandlePool handles_;  // thread-safe
   const Georeference georeference_;

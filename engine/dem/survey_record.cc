@@ -168,11 +168,21 @@ void SyncFolderOf(const std::string& path) {
   if (opened.is_open()) ::fsync(opened.get());
 }
 
+std::optional<FileIdentity> IdentityOf(int file) {
+  struct stat status {};
+  if (::fstat(file, &status) != 0) return std::nullopt;
+  return FileIdentity{status.st_dev, status.st_ino};
+}
+
+std::optional<FileIdentity> IdentityOf(const std::string& path) {
+  struct stat status {};
+  if (::stat(path.c_str(), &status) != 0) return std::nullopt;
+  return FileIdentity{status.st_dev, status.st_ino};
+}
+
 bool IsSameFile(int file, const std::string& path) {
-  struct stat opened {
-  }, named{};
-  return ::fstat(file, &opened) == 0 && ::stat(path.c_str(), &named) == 0 && opened.st_ino == named.st_ino &&
-         opened.st_dev == named.st_dev;
+  const auto opened = IdentityOf(file);
+  return opened && opened == IdentityOf(path);
 }
 
 }  // namespace
@@ -192,16 +202,28 @@ RasterLayout WithFindings(RasterLayout layout, const VoidFindings& findings) {
   return layout;
 }
 
-RecordedAverages::RecordedAverages(OpenFile file, std::string path, RasterLayout layout,
+RecordedAverages::RecordedAverages(const OpenFile& file, std::string path, RasterLayout layout,
                                    std::vector<std::uint64_t> offsets)
-    : file_(std::move(file)),
+    : identity_(IdentityOf(file.get()).value_or(FileIdentity())),
       path_(std::move(path)),
       layout_(std::move(layout)),
       chunks_(layout_.width, layout_.height),
       offsets_(std::move(offsets)) {}
 
+Result<OpenFile> RecordedAverages::Open() const {
+  OpenFile file(::open(path_.c_str(), O_RDONLY | O_CLOEXEC));
+  if (!file.is_open() && errno != ENOENT) {
+    return MakeError(ErrorCode::kUnavailable, "{}: cannot be opened: {}", path_, ErrorText());
+  }
+  if (!file.is_open() || IdentityOf(file.get()) != identity_) {
+    return MakeError(ErrorCode::kInvalidArgument, "{}: is gone", path_);
+  }
+  return file;
+}
+
 // The window does not wrap here: columns of the part lie at `window.column` + multiples of the grid's width.
-Result<void> RecordedAverages::CopyPart(int factor, int part, const GridWindow& window, float* out) const {
+Result<void> RecordedAverages::CopyPart(const OpenFile& file, int factor, int part, const GridWindow& window,
+                                        float* out) const {
   const Chunk chunk = chunks_.At(part);
   const AveragesPlace place = PlaceOf(chunk, layout_, factor);
   const std::int64_t left = chunk.col / factor, top = chunk.row / factor;
@@ -212,11 +234,11 @@ Result<void> RecordedAverages::CopyPart(int factor, int part, const GridWindow& 
   std::string bytes(sizeof(std::uint64_t) + place.bytes(), '\0');
   std::uint64_t checksum = 0;
   const bool read =
-      ReadAt(file_.get(), offsets_[static_cast<std::size_t>(part)] + place.offset, bytes.data(), bytes.size());
+      ReadAt(file.get(), offsets_[static_cast<std::size_t>(part)] + place.offset, bytes.data(), bytes.size());
   std::memcpy(&checksum, bytes.data(), sizeof checksum);
   const char* floats = bytes.data() + sizeof checksum;
   if (!read || XXH3_64bits(floats, place.bytes()) != checksum) {
-    return MakeError(ErrorCode::kUnavailable, "{}: the averages of part {} by factor {} are damaged", path_, part,
+    return MakeError(ErrorCode::kInvalidArgument, "{}: the averages of part {} by factor {} are damaged", path_, part,
                      factor);
   }
   bytes_read_ += bytes.size();
@@ -229,6 +251,8 @@ Result<void> RecordedAverages::CopyPart(int factor, int part, const GridWindow& 
 }
 
 Result<std::vector<float>> RecordedAverages::Read(int factor, const GridWindow& window) const {
+  const Result<OpenFile> file = Open();
+  if (!file) return tl::unexpected(file.error());
   std::vector<float> heights(static_cast<std::size_t>(window.columns * window.rows), SampleRules::kVoid);
   const std::int64_t count = CeilingOf(layout_.columns, factor), side = ChunkGrid::kSide / factor;
   const auto turn = [&](std::int64_t column) { return column >= 0 ? column / count : -((count - 1 - column) / count); };
@@ -239,7 +263,7 @@ Result<std::vector<float>> RecordedAverages::Read(int factor, const GridWindow& 
     const std::int64_t east = (std::min(here.column + here.columns, count) - 1) / side;
     for (std::int64_t row = here.row / side; row <= (here.row + here.rows - 1) / side; ++row) {
       for (std::int64_t column = west; column <= east; ++column) {
-        auto copied = CopyPart(factor, static_cast<int>(row * chunks_.columns() + column), here, heights.data());
+        auto copied = CopyPart(*file, factor, static_cast<int>(row * chunks_.columns() + column), here, heights.data());
         if (!copied) return tl::unexpected(copied.error());
       }
     }
@@ -248,7 +272,7 @@ Result<std::vector<float>> RecordedAverages::Read(int factor, const GridWindow& 
 }
 
 void RecordedAverages::Discard() const {
-  if (IsSameFile(file_.get(), path_)) ::unlink(path_.c_str());
+  if (IdentityOf(path_) == identity_) ::unlink(path_.c_str());
 }
 
 std::optional<FinishedRecord> LoadRecord(const std::string& path, const RecordShape& wanted) {
@@ -288,7 +312,7 @@ std::optional<FinishedRecord> LoadRecord(const std::string& path, const RecordSh
   if (!survey) return damaged("its survey");
   FinishedRecord record{std::move(shape.findings), *std::move(survey), nullptr};
   if (NeedsAverages(layout)) {
-    record.averages = std::make_shared<const RecordedAverages>(std::move(file), path, layout, std::move(offsets));
+    record.averages = std::make_shared<const RecordedAverages>(file, path, layout, std::move(offsets));
   }
   return record;
 }

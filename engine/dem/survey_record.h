@@ -37,6 +37,13 @@ class OpenFile {
   int descriptor_;
 };
 
+// What tells a file from others while it is there, whatever is written to it.
+struct FileIdentity {
+  std::uint64_t device = 0, inode = 0;
+
+  friend bool operator==(const FileIdentity&, const FileIdentity&) = default;
+};
+
 // Rasters with more samples than this and no overviews get averages in the cache folder: the first shallow tile of any
 // other reads at most as many.
 inline constexpr std::int64_t kMostSamplesWithoutAverages = std::int64_t{4096} * 4096;
@@ -56,13 +63,16 @@ struct RecordShape {
   bool keeps_averages() const { return NeedsAverages(EffectiveLayout()); }
 };
 
-// Averages of factors 2 .. kLargestDirect / 2 in a finished record. Thread-safe.
+// Averages of factors 2 .. kLargestDirect / 2 in a finished record. Thread-safe. The file is open only while it is
+// read: a dataset may have thousands of them.
 class RecordedAverages {
  public:
-  RecordedAverages(OpenFile file, std::string path, RasterLayout layout, std::vector<std::uint64_t> offsets);
+  // `file`: the record, which `path` names.
+  RecordedAverages(const OpenFile& file, std::string path, RasterLayout layout, std::vector<std::uint64_t> offsets);
 
   static bool Has(int factor) { return factor > 1 && factor < kLargestDirect; }
-  // What ReadGrid gives. kUnavailable: the record is damaged. Precondition: Has(factor).
+  // What ReadGrid gives. kInvalidArgument: the record is damaged, or gone. kUnavailable: it cannot be opened now.
+  // Precondition: Has(factor).
   Result<std::vector<float>> Read(int factor, const GridWindow& window) const;
 
   // Removes the record's name, if it still has it: it is of no use any more.
@@ -72,9 +82,10 @@ class RecordedAverages {
   std::uint64_t bytes_read() const { return bytes_read_; }
 
  private:
-  Result<void> CopyPart(int factor, int part, const GridWindow& window, float* out) const;
+  Result<OpenFile> Open() const;
+  Result<void> CopyPart(const OpenFile& file, int factor, int part, const GridWindow& window, float* out) const;
 
-  OpenFile file_;
+  FileIdentity identity_;
   std::string path_;
   RasterLayout layout_;
   ChunkGrid chunks_;

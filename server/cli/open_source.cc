@@ -94,7 +94,6 @@ Result<std::unique_ptr<dem::DemSource>> OpenSource(const config::DatasetConfig& 
   options.max_void_gap = wanted.max_void_gap;
   options.cache_dir = cache_dir;
   options.feather = wanted.feather;
-  options.max_open_sources = wanted.max_open_sources;
   options.progress = progress;
   options.stop = std::move(stop);
   options.fault = std::move(fault);

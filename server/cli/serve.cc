@@ -13,6 +13,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <stop_token>
 #include <string>
 #include <utility>
@@ -23,8 +24,8 @@
 #include "config/options.h"
 #include "config/parse.h"
 #include "config/working_directory.h"
-#include "engine/dem/source_policy.h"
 #include "server/cli/command.h"
+#include "server/cli/descriptor_plan.h"
 #include "server/cli/fail.h"
 #include "server/cli/log.h"
 #include "server/cli/open_layers.h"
@@ -33,7 +34,7 @@
 #include "server/cli/progress.h"
 #include "server/cli/service_manager.h"
 #include "server/cli/stop_limit.h"
-#include "server/cli/try_folder.h"
+#include "server/cli/try_start.h"
 #include "server/memory_trimmer.h"
 #include "server/reload/reloader.h"
 #include "server/server.h"
@@ -179,13 +180,14 @@ Result<server::Dataset> OpenDataset(const config::DatasetConfig& wanted, const s
   return dataset;
 }
 
-// Opens every source; false if one could not be, after all of them had their message.
-bool OpenDatasets(const config::Config& config, std::vector<server::Dataset>& datasets) {
+// Opens every source; false if one could not be, after all of them had their message, or if it was stopped.
+bool OpenDatasets(const config::Config& config, const std::stop_token& stop, std::vector<server::Dataset>& datasets) {
   bool all_open = true;
   for (const config::DatasetConfig& wanted : config.datasets) {
     Progress progress((config.cache_dir.empty() ? "reading " : "preparing ") + NameOf(wanted.sources),
                       FileCount(wanted.sources));
-    Result<server::Dataset> dataset = OpenDataset(wanted, config.cache_dir, progress.Callback(), {});
+    Result<server::Dataset> dataset = OpenDataset(wanted, config.cache_dir, progress.Callback(), stop);
+    if (stop.stop_requested()) return false;
     if (!dataset) {
       std::fprintf(stderr, "terrace: dataset %s: %s\n", wanted.name.c_str(), dataset.error().message.c_str());
       all_open = false;
@@ -282,56 +284,31 @@ void MaskSignals(int how, const std::vector<int>& signals) {
 }
 
 // Null where there is to be none.
-Result<std::shared_ptr<server::DiskCache>> OpenDiskCache(const config::DiskCacheConfig& config) {
+Result<std::shared_ptr<server::DiskCache>> OpenDiskCache(const config::DiskCacheConfig& config,
+                                                         std::size_t open_files) {
   if (config.directory.empty()) return nullptr;
   server::DiskCacheOptions options;
   options.directory = config.directory;
   options.tile_bytes = config.tile_bytes;
   options.refinement_bytes = config.refinement_bytes;
+  options.open_files = open_files;
   return server::DiskCache::Open(options);
 }
 
-// Everything that keeps the server from starting and can be told before sources are opened; kExitOk if there is
-// nothing. The policy of sources is in force then.
-int TryStart(const config::Config& config, bool is_running) {
-  const server::ServerOptions options = OptionsOf(config);
-  std::vector<Error> errors = server::Server::TryFiles(options);
-  const auto note = [&](const Result<void>& result) {
-    if (!result) errors.push_back(result.error());
-  };
-  std::error_code ignored;
-  if (const auto& viewer = config.viewer.directory;
-      !viewer.empty() && !std::filesystem::is_directory(viewer, ignored)) {
-    note(MakeError(ErrorCode::kNotFound, "viewer {}: is no folder; name one with a web page, or true or false",
-                   viewer.string()));
-  }
-  // One that is there is opened even where its disk has become read-only: a cache is no reason not to start.
-  const std::filesystem::path cache = config.disk_cache.directory;
-  if (!cache.empty() && !std::filesystem::exists(cache / "lock", ignored)) {
-    if (const auto folder = TryFolder(cache); !folder) {
-      note(MakeError(folder.error().code, "disk_cache: {}", folder.error().message));
-    }
-  }
-  if (!is_running) note(server::Server::TryAddress(options));
-  const Result<void> policy =
-      dem::SetSourcePolicy({config.data_roots, config.allowed_prefixes, config.allowed_drivers});
-  note(policy);
-  for (const config::DatasetConfig& dataset : config.datasets) {
-    const Result<void> readable = TryReading(dataset);
-    note(readable && policy ? TryPolicy(dataset) : readable);
-  }
-  for (const Error& error : errors) std::fprintf(stderr, "terrace: %s\n", error.message.c_str());
-  if (!policy) return kExitUsage;
-  return errors.empty() ? kExitOk : kExitFailure;
-}
-
 int CheckConfig(const ServeArguments& arguments, const config::Config& config) {
-  if (const int exit_code = TryStart(config, /*is_running=*/true); exit_code != kExitOk) return exit_code;
+  if (const int exit_code = TryStart(config, OptionsOf(config), PlanDescriptors(config), /*tries_address=*/false);
+      exit_code != kExitOk)
+    return exit_code;
   const std::size_t count = config.datasets.size();
   fmt::print(
       "terrace: the configuration{}{} is fine: {} dataset{}; rasters were not opened, 'terrace info' does that\n",
       arguments.config_file.empty() ? "" : " ", arguments.config_file, count, count == 1 ? "" : "s");
   return FinishOutput(kExitOk);
+}
+
+int Fail(const Error& error) {
+  std::fprintf(stderr, "terrace: %s\n", error.message.c_str());
+  return kExitFailure;
 }
 
 int Serve(const ServeArguments& arguments) {
@@ -347,28 +324,56 @@ int Serve(const ServeArguments& arguments) {
   }
   SetUpLog(config.log_level, config.log_format);
   if (arguments.check_config) return CheckConfig(arguments, config);
+  const Result<std::optional<int>> passed = TakeListenSocket();
+  if (!passed) return Fail(passed.error());
   // Until they are answered they would be the end, and who rotates logs does not ask how long sources take to open.
   MaskSignals(SIG_BLOCK, kAnsweredSignals);
   server::EncoderVersion();  // of the libraries there are, before GDAL or the system's resolver loads others
-  if (const int exit_code = TryStart(config, /*is_running=*/false); exit_code != kExitOk) return exit_code;
-  StopLimit stop_limit;  // first, as it bounds how long the others take to end
-  // Before sources are opened, which may take long.
-  Result<std::shared_ptr<server::DiskCache>> disk = OpenDiskCache(config.disk_cache);
-  if (!disk) {
-    std::fprintf(stderr, "terrace: %s\n", disk.error().message.c_str());
-    return kExitFailure;
-  }
+  server::ServerOptions options = OptionsOf(config);
+  options.listen_socket = passed->value_or(-1);
+  const bool tries_address = !passed->has_value();
+  const Result<server::DescriptorBudget> budget = PlanDescriptors(config);
+  if (const int exit_code = TryStart(config, options, budget, tries_address); exit_code != kExitOk) return exit_code;
+  WarnAboutFewDescriptors(config, *budget);
+  options.edge.max_connections = budget->connections;
   dem::SetGdalCache(config.gdal_cache_bytes);
-  std::vector<server::Dataset> datasets;
-  if (!OpenDatasets(config, datasets)) return kExitFailure;
-  std::atomic<std::size_t> count = datasets.size();
+  dem::SetOpenSources(budget->open_sources, budget->vrt_parts);
 
+  StopLimit stop_limit;  // first, as it bounds how long the others take to end
+  Result<std::shared_ptr<server::DiskCache>> disk = OpenDiskCache(config.disk_cache, budget->store_files);
+  if (!disk) return Fail(disk.error());
   const auto refinements = std::make_shared<server::RefinementCache>(config.refinement_cache_bytes, *disk);
+  options.disk_cache = *std::move(disk);
+  options.refinement_stats = [refinements] { return refinements->stats(); };
+  std::unique_ptr<server::Reloader> reloader;  // once there is something to look after
+  options.on_source_changed = config.watch ? std::function<void()>([&reloader] { reloader->Look(); }) : nullptr;
+  options.on_signal[SIGHUP] = [&reloader] {
+    NotifyReloading();
+    reloader->Reload();
+  };
+  std::stop_source stop_opening;
+  options.on_stop = [&stop_limit, &stop_opening, limit = config.drain_timeout + kStopTime] {
+    stop_limit.Begin(limit);
+    stop_opening.request_stop();
+    NotifyStopping();
+  };
+  const auto level = std::make_shared<std::atomic<config::LogLevel>>(config.log_level);  // the configured one
+  options.on_signal[SIGUSR1] = [] { SetLogLevel(config::LogLevel::kDebug); };
+  options.on_signal[SIGUSR2] = [level] { SetLogLevel(*level); };
+  // Before sources are opened, which may take long: who asks meanwhile waits.
+  auto started = server::Server::Start(nullptr, options);
+  if (!started) return Fail(started.error());
+  const std::unique_ptr<server::Server> server = *std::move(started);
+  NotifyOpening();
+
+  std::vector<server::Dataset> datasets;
+  const bool are_open = OpenDatasets(config, stop_opening.get_token(), datasets);
+  if (stop_opening.stop_requested()) return server->Wait() ? kExitOk : kExitFailure;
+  if (!are_open) return kExitFailure;
+  std::atomic<std::size_t> count = datasets.size();
   const auto catalog_of = [refinements](const std::vector<server::Dataset>& served, const config::Config& now) {
     return server::MakeCatalog(std::make_shared<const server::TilePipeline>(served, refinements), now.max_mesh_samples);
   };
-  const auto level = std::make_shared<std::atomic<config::LogLevel>>(config.log_level);  // the configured one
-  std::unique_ptr<server::Server> server;
   const auto served_text = [&] {
     const std::size_t datasets_served = count;
     return fmt::format("{} dataset{} at {}", datasets_served, datasets_served == 1 ? "" : "s", server->url());
@@ -406,37 +411,19 @@ int Serve(const ServeArguments& arguments) {
     NotifyReady(served_text());
   };
   hooks.tell = [&](const std::map<std::string, std::string>& troubles) { server->SetTroubles(troubles); };
-  server::Reloader reloader(config, datasets, std::move(hooks));
-
-  server::ServerOptions options = OptionsOf(config);
-  options.disk_cache = *std::move(disk);
-  options.refinement_stats = [refinements] { return refinements->stats(); };
-  options.on_source_changed = config.watch ? std::function<void()>([&reloader] { reloader.Look(); }) : nullptr;
-  options.on_signal[SIGHUP] = [&reloader] {
-    NotifyReloading();
-    reloader.Reload();
-  };
-  options.on_stop = [&stop_limit, limit = config.drain_timeout + kStopTime] {
-    stop_limit.Begin(limit);
-    NotifyStopping();
-  };
-  options.on_signal[SIGUSR1] = [] { SetLogLevel(config::LogLevel::kDebug); };
-  options.on_signal[SIGUSR2] = [level] { SetLogLevel(*level); };
-  auto started = server::Server::Start(catalog_of(datasets, config), options);
-  if (!started) {
-    std::fprintf(stderr, "terrace: %s\n", started.error().message.c_str());
-    return kExitFailure;
+  reloader = std::make_unique<server::Reloader>(config, datasets, std::move(hooks));
+  if (const Result<void> served = server->Replace(catalog_of(datasets, config), options); !served) {
+    return Fail(served.error());
   }
-  server = *std::move(started);
   datasets.clear();  // what is replaced must not stay open
-  reloader.Start(config.watch);
+  reloader->Start(config.watch);
   fmt::print("terrace: serving {}\n", served_text());
   std::fflush(stdout);
   NotifyReady(served_text());
   MaskSignals(SIG_UNBLOCK, kAnsweredSignals);
   const server::MemoryTrimmer trimmer;
   const bool drained = server->Wait();
-  reloader.Stop();
+  reloader->Stop();
   return drained ? kExitOk : kExitFailure;
 }
 

@@ -1,11 +1,34 @@
 #include "server/cli/service_manager.h"
 
 #include <fmt/format.h>
+#include <sys/socket.h>
 #include <systemd/sd-daemon.h>
 
 #include <chrono>
 
 namespace terrace::cli {
+
+Result<std::optional<int>> TakeListenSocket() {
+  const int count = ::sd_listen_fds(/*unset_environment=*/1);
+  if (count <= 0) return std::nullopt;  // below 0: the variables are not for us, or make no sense
+  if (count > 1) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{} sockets were passed, and one is served: give the .socket unit one ListenStream=, which may be "
+                     "a port alone for IPv6 and IPv4",
+                     count);
+  }
+  const auto listens = [](int family) {
+    return ::sd_is_socket(SD_LISTEN_FDS_START, family, SOCK_STREAM, /*listening=*/1) > 0;
+  };
+  if (!listens(AF_INET) && !listens(AF_INET6)) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "the socket that was passed is no listening TCP socket: give the .socket unit "
+                     "ListenStream=PORT or ADDRESS:PORT, and Accept=no");
+  }
+  return SD_LISTEN_FDS_START;
+}
+
+void NotifyOpening() { ::sd_notify(0, "STATUS=listening, opening the sources"); }
 
 void NotifyReady(const std::string& status) { ::sd_notify(0, fmt::format("READY=1\nSTATUS={}", status).c_str()); }
 

@@ -35,8 +35,8 @@ bool SeesAll(const Request& request) { return !request.grant || request.grant->s
 // The first word is the state. A degraded server goes on answering, so it is not to be taken out of service. Reasons
 // name files: they are for the log. Datasets are named to those who may see them all.
 Response Ready(const Routes::State& state, bool sees_all) {
-  if (state.draining()) {
-    Response response = PlainState(503, "draining\n");
+  if (state.draining() || state.opening()) {
+    Response response = PlainState(503, state.draining() ? "draining\n" : "opening\n");
     response.headers.emplace_back("Retry-After", "5");
     return response;
   }

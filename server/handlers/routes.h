@@ -34,6 +34,7 @@ class Routes {
   // What the probes and /metrics ask.
   struct State {
     std::function<bool()> draining;
+    std::function<bool()> opening;                                 // what is served has not been opened yet
     std::function<std::map<std::string, std::string>()> troubles;  // by dataset; "" is the configuration
     std::function<asio::awaitable<std::shared_ptr<const std::string>>()> metrics_text;
   };

@@ -30,7 +30,7 @@ class Connection {
 
   // Close, unless it serves a request.
   virtual void Evict() = 0;
-  // Finish the request that has begun, if one has, and close.
+  // Finish the request that has begun, or one that begins in a moment, and close.
   virtual void Drain() = 0;
   virtual void Abort() = 0;
   // Refuse the request whose body takes room that is needed.

@@ -7,17 +7,15 @@
 #include <boost/asio/use_awaitable.hpp>
 #include <utility>
 
-#include "server/http/descriptors.h"
-
 namespace terrace::server {
 
-Edge::Edge(const EdgeOptions& options, std::size_t room, GateOptions gate_options)
-    : connections(room, options.max_connections_per_client),
+Edge::Edge(const EdgeOptions& options, GateOptions gate_options)
+    : connections(options.max_connections, options.max_connections_per_client),
       transfers(options.transfer_bytes),
       gate(std::move(gate_options)),
       cors(options.cors_origins) {}
 
-Result<std::unique_ptr<Edge>> Edge::Open(const EdgeOptions& options, std::size_t for_files) {
+Result<std::unique_ptr<Edge>> Edge::Open(const EdgeOptions& options) {
   GateOptions gate;
   Result<AddressRanges> trusted = AddressRanges::Parse(options.trusted_proxies);
   if (!trusted) return tl::unexpected(std::move(trusted.error()));
@@ -34,8 +32,7 @@ Result<std::unique_ptr<Edge>> Edge::Open(const EdgeOptions& options, std::size_t
     if (!opened) return tl::unexpected(std::move(opened.error()));
     tls = *std::move(opened);
   }
-  const std::size_t room = RoomForConnections(options.max_connections, for_files);
-  auto edge = std::make_unique<Edge>(options, room, std::move(gate));
+  auto edge = std::make_unique<Edge>(options, std::move(gate));
   edge->tls = std::move(tls);
   return edge;
 }

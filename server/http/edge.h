@@ -23,10 +23,10 @@ struct EdgeStats {
 };
 
 struct Edge {
-  // `for_files`: descriptors that are to be left for files. Errors name the option's text, or the file.
-  static Result<std::unique_ptr<Edge>> Open(const EdgeOptions& options, std::size_t for_files);
+  // Errors name the option's text, or the file.
+  static Result<std::unique_ptr<Edge>> Open(const EdgeOptions& options);
 
-  Edge(const EdgeOptions& options, std::size_t room, GateOptions gate_options);
+  Edge(const EdgeOptions& options, GateOptions gate_options);
 
   EdgeStats stats() const { return {connections.size(), connections.refused(), transfers.stats()}; }
 

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <spdlog/spdlog.h>
+#include <sys/socket.h>
 
 #include <array>
 #include <boost/asio/co_spawn.hpp>
@@ -10,9 +11,9 @@
 #include <boost/asio/redirect_error.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/use_awaitable.hpp>
+#include <cerrno>
 #include <chrono>
 #include <exception>
-#include <future>
 #include <thread>
 
 #include "server/http/http_error.h"
@@ -97,7 +98,23 @@ Result<std::shared_ptr<Listener>> Listener::Open(IoThreads& io, const std::strin
   error_code error;
   acceptor.listen(tcp::acceptor::max_listen_connections, error);
   if (error) return ListenError(host, port, error);
+  listener->host_ = host;
   listener->port_ = acceptor.local_endpoint().port();
+  return listener;
+}
+
+Result<std::shared_ptr<Listener>> Listener::Adopt(IoThreads& io, int socket,
+                                                  std::shared_ptr<const SessionContext> context) {
+  std::shared_ptr<Listener> listener(new Listener(io, std::move(context)));
+  tcp::endpoint endpoint;
+  socklen_t size = static_cast<socklen_t>(endpoint.capacity());
+  error_code error;
+  if (::getsockname(socket, endpoint.data(), &size) != 0) error.assign(errno, boost::system::system_category());
+  if (!error) listener->acceptor_.assign(endpoint.protocol(), socket, error);
+  if (error) return MakeError(ErrorCode::kUnavailable, "cannot listen on socket {}: {}", socket, error.message());
+  listener->is_adopted_ = true;
+  listener->host_ = endpoint.address().to_string();
+  listener->port_ = endpoint.port();
   return listener;
 }
 
@@ -151,11 +168,10 @@ asio::awaitable<void> Listener::Run(std::shared_ptr<Listener> self) {
 
 asio::awaitable<void> Listener::AcceptAll() {
   OpenSpare(acceptor_.get_executor(), spare_);
-  while (acceptor_.is_open()) {
+  while (!closing_) {
     error_code error;
     tcp::socket socket = co_await acceptor_.async_accept(io_.Next(), asio::redirect_error(asio::use_awaitable, error));
-    if (error == asio::error::operation_aborted) break;
-    if (error == asio::error::connection_aborted) continue;
+    if (error == asio::error::operation_aborted || error == asio::error::connection_aborted) continue;
     if (!error) {
       co_await Admit(std::move(socket));
       continue;
@@ -166,6 +182,10 @@ asio::awaitable<void> Listener::AcceptAll() {
     co_await Pause(kBackOff);
     Shed();
   }
+  if (!is_adopted_) TakeQueue();
+  error_code ignored;
+  acceptor_.close(ignored);
+  closed_.set_value();
 }
 
 asio::awaitable<void> Listener::Pause(std::chrono::milliseconds time) {
@@ -228,18 +248,18 @@ void Listener::Refuse(tcp::socket& socket, int status) {
   socket.shutdown(tcp::socket::shutdown_send, ignored);
 }
 
+// The coroutine that accepts ends itself: it may hold a connection that has no session yet.
 void Listener::Close() {
-  std::promise<void> closed;
-  asio::post(acceptor_.get_executor(), [this, &closed] {
-    CloseOnItsThread();
-    closed.set_value();
+  asio::post(acceptor_.get_executor(), [this] {
+    closing_ = true;
+    error_code ignored;
+    acceptor_.cancel(ignored);
   });
-  closed.get_future().wait();
+  closed_.get_future().wait();
 }
 
-void Listener::CloseOnItsThread() {
+void Listener::TakeQueue() {
   error_code error;
-  acceptor_.cancel(error);
   acceptor_.non_blocking(true, error);
   while (!error && !context_->connections->full()) {
     tcp::socket socket(io_.Next());
@@ -247,7 +267,6 @@ void Listener::CloseOnItsThread() {
     acceptor_.accept(socket, peer, error);
     if (!error) StartSession(std::move(socket), context_, ClientOf(peer.address()));
   }
-  acceptor_.close(error);
 }
 
 }  // namespace terrace::server

@@ -9,6 +9,7 @@
 #include <boost/asio/posix/stream_descriptor.hpp>
 #include <chrono>
 #include <cstdint>
+#include <future>
 #include <memory>
 #include <optional>
 #include <string>
@@ -26,15 +27,22 @@ class Listener : public std::enable_shared_from_this<Listener> {
   static Result<std::shared_ptr<Listener>> Open(IoThreads& io, const std::string& host, std::uint16_t port,
                                                 std::shared_ptr<const SessionContext> context);
 
+  // On a TCP socket that listens already and that somebody else goes on holding: who is not accepted here waits for the
+  // next process. Takes over the descriptor.
+  static Result<std::shared_ptr<Listener>> Adopt(IoThreads& io, int socket,
+                                                 std::shared_ptr<const SessionContext> context);
+
   // Whether Open could have the address now. It is not listened on meanwhile: nobody can connect.
   static Result<void> TryAddress(const std::string& host, std::uint16_t port);
 
+  const std::string& host() const { return host_; }  // an adopted socket's address
   std::uint16_t port() const { return port_; }
 
   // Begins to accept. Call once.
   void Start();
 
-  // Accepts what already waits in the kernel's queue, then closes. Blocks until that is done: not from an io thread.
+  // Accepts what already waits in the kernel's queue, unless somebody else holds the socket, then closes. Blocks until
+  // that is done and every accepted connection has its session: not from an io thread. Call once, after Start.
   void Close();
 
  private:
@@ -48,12 +56,16 @@ class Listener : public std::enable_shared_from_this<Listener> {
   asio::awaitable<void> Admit(asio::ip::tcp::socket socket);
   void Shed();
   void Refuse(asio::ip::tcp::socket& socket, int status);
-  void CloseOnItsThread();
+  void TakeQueue();
 
   IoThreads& io_;
   const std::shared_ptr<const SessionContext> context_;
   asio::ip::tcp::acceptor acceptor_;
+  bool is_adopted_ = false;
+  std::string host_;
   std::uint16_t port_ = 0;
+  bool closing_ = false;  // for the acceptor's thread
+  std::promise<void> closed_;
   std::optional<asio::posix::stream_descriptor> spare_;  // given up for a moment when there are no descriptors left
   bool crowded_ = false;
 };

@@ -16,9 +16,10 @@ BadRequest Gone() { return BadRequest{0, ""}; }
 
 RequestReader::RequestReader(Stream& stream, ReadTimeouts timeouts) : stream_(stream), timeouts_(timeouts) {}
 
-void RequestReader::Close() {
+void RequestReader::Close(std::chrono::milliseconds grace) {
   closing_ = true;
-  if (waiting_) stream_.Cancel();
+  close_at_ = std::min(close_at_, Stream::Clock::now() + grace);
+  if (waiting_) stream_.ExpiresAt(std::min(stream_.deadline(), close_at_));
 }
 
 asio::awaitable<RequestReader::Head> RequestReader::ReadHead(Request& request, Stream::Clock::time_point now) {
@@ -28,7 +29,8 @@ asio::awaitable<RequestReader::Head> RequestReader::ReadHead(Request& request, S
   };
   std::size_t scanned = 0;
   bool begun = !Unread().empty();
-  stream_.ExpiresAt(now + (begun || is_first_ ? timeouts_.message : timeouts_.idle));
+  const auto timeout = now + (begun || is_first_ ? timeouts_.message : timeouts_.idle);
+  stream_.ExpiresAt(begun ? timeout : std::min(timeout, close_at_));
   is_first_ = false;
   for (;;) {
     // RFC 9112, section 2.2: empty lines before a request are to be ignored.
@@ -54,8 +56,10 @@ asio::awaitable<RequestReader::Head> RequestReader::ReadHead(Request& request, S
       if (!begun) stream_.ExpiresAfter(timeouts_.message);
       begun = true;
     }
-    if (closing_ && !begun && !FillWithWhatArrived()) co_return std::nullopt;
-    if (closing_ && Unread().size() > scanned) continue;
+    if (!begun && Stream::Clock::now() >= close_at_) {
+      if (!FillWithWhatArrived()) co_return std::nullopt;
+      continue;
+    }
 
     waiting_ = !begun;
     const Transfer got = co_await stream_.ReadSome(Room(std::min(kReadBytes, kMaxHeadBytes - Unread().size())));
@@ -63,9 +67,8 @@ asio::awaitable<RequestReader::Head> RequestReader::ReadHead(Request& request, S
     waiting_ = false;
     if (got) continue;
     if (stream_.expired() && begun) co_return refused(TooSlow());
-    // A drain cuts the wait short; a request may have arrived in that very moment.
-    const bool drained = closing_ && got.error() == asio::error::operation_aborted && stream_.socket().is_open();
-    if (!drained || stream_.expired()) co_return std::nullopt;
+    if (!stream_.expired() || !stream_.socket().is_open()) co_return std::nullopt;
+    Close();  // the wait is over, and a request may have arrived in this very moment
   }
 }
 

@@ -27,8 +27,8 @@ class RequestReader {
  public:
   RequestReader(Stream& stream, ReadTimeouts timeouts);
 
-  // Nothing: the connection ended, was idle for too long, or is closing and no request has begun. `now`: the present,
-  // or shortly before.
+  // Nothing: the connection ended, was idle for too long, or is closing and no request came in time. `now`: the
+  // present, or shortly before.
   using Head = std::optional<tl::expected<void, BadRequest>>;
   asio::awaitable<Head> ReadHead(Request& request, Stream::Clock::time_point now);
 
@@ -36,8 +36,9 @@ class RequestReader {
   // says that the client left, or that the stream was cancelled.
   asio::awaitable<tl::expected<void, BadRequest>> ReadBody(const Request& request, std::string& text, std::size_t size);
 
-  // No further request is waited for; one that has begun is read.
-  void Close();
+  // The next request is the last one, and is waited for only until `grace` has passed from now; one that has begun by
+  // then is read.
+  void Close(std::chrono::milliseconds grace = std::chrono::milliseconds(0));
   bool closing() const { return closing_; }
   bool waiting() const { return waiting_; }  // for the first byte of a request
 
@@ -60,6 +61,7 @@ class RequestReader {
   bool is_first_ = true;
   bool waiting_ = false;
   bool closing_ = false;
+  Stream::Clock::time_point close_at_ = Stream::Clock::time_point::max();  // unless a request has begun
 };
 
 }  // namespace terrace::server

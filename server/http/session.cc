@@ -100,7 +100,7 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
     reader_.Close();
     if (!reader_.waiting() || served_ == 0) stream_.Reset();  // an unfinished head or handshake
   }
-  void DrainHere() { reader_.Close(); }
+  void DrainHere() { reader_.Close(context_->options.drain_grace); }
   void AbortHere() {
     reader_.Close();
     stream_.Reset();

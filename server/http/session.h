@@ -34,6 +34,7 @@ struct SessionOptions {
   std::size_t min_rate = 4096;                   // bytes a second that a client has to take in the long run; 0: any
   std::size_t max_body_bytes = 0;                // of a POST
   std::chrono::milliseconds refusal_delay{200};  // before a 429: who is refused at once asks again at once
+  std::chrono::milliseconds drain_grace{0};      // for which a draining connection waits for one more request
 };
 
 // Answers GET, HEAD, and POST where TakesPost says so; the session leaves a HEAD's body away. Cancelled when the client

@@ -95,6 +95,8 @@ void Stream::ExpiresNever() {
   state_->expired = false;
 }
 
+Clock::time_point Stream::deadline() const { return state_->deadline; }
+
 bool Stream::expired() const { return state_->expired; }
 
 asio::awaitable<Transfer> Stream::Handshake() {

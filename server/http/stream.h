@@ -44,6 +44,7 @@ class Stream {
   void ExpiresAfter(std::chrono::milliseconds time);
   void ExpiresAt(Clock::time_point deadline);
   void ExpiresNever();
+  Clock::time_point deadline() const;
   bool expired() const;
 
   // Of TLS; nothing to do for others.

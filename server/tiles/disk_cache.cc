@@ -54,7 +54,11 @@ std::unique_ptr<DiskStore> OpenStore(const DiskCacheOptions& cache, std::size_t 
                                      bool anew) {
   if (bytes == 0) return nullptr;
   DiskStoreOptions options;
-  options.db = {cache.directory / name, std::max(bytes, RecordDb::kMinCapacity), compress, cache.env};
+  options.db.directory = cache.directory / name;
+  options.db.capacity_bytes = std::max(bytes, RecordDb::kMinCapacity);
+  options.db.compress = compress;
+  options.db.open_files = cache.open_files;
+  options.db.env = cache.env;
   options.name = name;
   if (anew) static_cast<void>(RecordDb::Destroy(options.db));  // opening says what is wrong
   options.retry_after = cache.retry_after;

@@ -20,7 +20,8 @@ struct DiskCacheOptions {
   std::filesystem::path directory;   // made if it is missing
   std::size_t tile_bytes = 0;        // of files with encoded tiles, RecordDb::kMinCapacity at least; 0: none
   std::size_t refinement_bytes = 0;  // of files with refinements, likewise
-  rocksdb::Env* env = nullptr;       // RecordDbOptions::env
+  std::size_t open_files = RecordDbOptions().open_files;  // of each store
+  rocksdb::Env* env = nullptr;                            // RecordDbOptions::env
   std::chrono::milliseconds retry_after = DiskStoreOptions().retry_after;
 };
 

@@ -41,7 +41,10 @@ rocksdb::Options OptionsOf(const RecordDbOptions& options) {
   // more is there until the oldest one is gone.
   db.compaction_options_fifo.max_table_files_size = options.capacity_bytes - 6 * db.write_buffer_size;
   db.compression = options.compress ? rocksdb::kLZ4Compression : rocksdb::kNoCompression;
-  db.max_open_files = -1;  // all are opened, and checked, at the start
+  // RocksDB keeps ten of them for its other files. In one shard: the cache of files in 64 would hold up to 64 more.
+  db.max_open_files =
+      static_cast<int>(std::clamp<std::size_t>(options.open_files, RecordDb::kMinOpenFiles, 1 << 20)) + 10;
+  db.table_cache_numshardbits = 0;
   // A log that ends in the middle of a record, or has a damaged one, loses that record and not the store.
   db.wal_recovery_mode = rocksdb::WALRecoveryMode::kSkipAnyCorruptedRecords;
   db.avoid_flush_during_shutdown = true;  // the log has it
@@ -67,6 +70,10 @@ bool IsDamaged(const rocksdb::Status& status) {
 }
 
 }  // namespace
+
+// Asked for in turn by look-ups, files beyond those that may be open would drive each other out, so that there is none
+// that is found open.
+std::size_t RecordDb::FilesOf(std::size_t capacity_bytes) { return 4 * (capacity_bytes / FileBytes(capacity_bytes)); }
 
 class RecordDb::Impl {
  public:

@@ -26,12 +26,23 @@ struct RecordDbOptions {
   std::filesystem::path directory;  // made if it is missing; its parent exists
   std::size_t capacity_bytes = 0;   // of its files, kMinCapacity at least
   bool compress = false;            // LZ4
-  rocksdb::Env* env = nullptr;      // what stands for the disk, in tests; null: the disk. Outlives the store
+  // Record files open at a time, kMinOpenFiles at least. With fewer than FilesOf(capacity_bytes) a look-up may have to
+  // open files first.
+  std::size_t open_files = 1024;
+  rocksdb::Env* env = nullptr;  // what stands for the disk, in tests; null: the disk. Outlives the store
 };
 
 class RecordDb {
  public:
   static constexpr std::size_t kMinCapacity = std::size_t{16} << 20;
+  static constexpr std::size_t kMinOpenFiles = 10;  // RocksDB's
+
+  // Descriptors of a store beside those of record files: its lock, log, directories, manifests, write-ahead logs, and
+  // the file that is being written.
+  static constexpr std::size_t kOtherDescriptors = 10;
+
+  // As many record files as a store of this capacity may come to; mostly a quarter, but more where they are compressed.
+  static std::size_t FilesOf(std::size_t capacity_bytes);
 
   // A store that is too damaged to be opened is emptied, and `*discarded` says so. kUnavailable: the disk does not
   // answer, or the store is open already.

@@ -28,19 +28,9 @@ TEST(ToJson, ComesBackAsTheDefaults) { ExpectComesBack(Config{}); }
 TEST(ToJson, ComesBackWithEveryOptionSet) {
   Config config;
   config.listen = {"2001:db8::1", 0};
-  DatasetConfig dataset{"a",
-                        {"/data/a.tif"},
-                        "egm96",
-                        NodataConfig{false, {-9999, 0.5}},
-                        "© \"ét\\é\"",
-                        0.1,
-                        1e-3,
-                        -0.3,
-                        7,
-                        12.5,
-                        9,
-                        Criterion::kDataDependent,
-                        true};
+  DatasetConfig dataset{
+      "a",  {"/data/a.tif"},           "egm96", NodataConfig{false, {-9999, 0.5}}, "© \"ét\\é\"", 0.1, 1e-3, -0.3, 7,
+      12.5, Criterion::kDataDependent, true};
   dataset.sources.front().vertical = "EPSG:5703";
   dataset.sources.front().nodata = NodataConfig{false, {}};
   dataset.water.sea_level = -1.25;
@@ -61,6 +51,7 @@ TEST(ToJson, ComesBackWithEveryOptionSet) {
   config.data_roots = {"/data", "/srv/dems"};
   config.allowed_prefixes = {"/vsis3/bucket/"};
   config.allowed_drivers = {"GTiff", "VRT"};
+  config.max_open_sources = 0;
   config.max_connections = 7;
   config.max_connections_per_client = 3;
   config.transfer_bytes = 5;

@@ -15,10 +15,12 @@ import tempfile
 import threading
 import time
 
+import descriptors
 import floods
 import many_sources
+import restarts
 import soak
-from server import Server, fetch, get, percentile, read_reply, wait_until
+from server import ROOT, Server, fetch, get, percentile, read_reply, wait_until
 
 HOT = "/earth/0/0/0.terrain"
 
@@ -179,7 +181,7 @@ def row_13(binary, _, __):
         for client in clients:
             client.close()
         normal = wait_until(lambda: ok(server), 10)
-    with Server(binary, open_files=24) as server:
+    with Server(binary, "--worker-threads", "2", open_files=24) as server:
         clients = []
         for _ in range(60):
             clients.append(server.connect())
@@ -596,6 +598,20 @@ def row_42(binary, _, long):
             kept = kept and statuses == {200: connections}
             told.append(f"{statuses.get(200, 0)} of {connections} served, slowest {slowest:.1f} s")
     return kept, "; ".join(told)
+
+
+def row_39(binary, _, __):
+    with tempfile.TemporaryDirectory() as folder:
+        told = descriptors.serve_with_few(binary, ROOT, pathlib.Path(folder), 80)
+    return not told.wrong and told.files > 80 and told.most < 80, str(told)
+
+
+def row_43(binary, _, __):
+    with tempfile.TemporaryDirectory() as folder:
+        load = restarts.restart_under_load(binary, 20, 24, restarts.TARGETS, "--config", restarts.SAMPLES, "--disk-cache", folder)
+    figures = (f"20 restarts, {load.count} requests of 24 clients: {len(load.failures)} failed, {load.again} sent again as their connection "
+               f"closed, slowest {load.slowest:.1f} s")
+    return not load.failures and load.count > 1000, figures
 
 
 def row_46(binary, _, long):

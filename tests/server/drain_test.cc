@@ -76,7 +76,50 @@ TEST_F(Drain, CancelsWhatDoesNotFinishInTime) {
   EXPECT_LT(std::chrono::steady_clock::now() - begun, 4s);
 }
 
-TEST_F(Drain, ClosesIdleConnectionsAtOnceAndTakesNoNewOnes) {
+// Until /readyz says so, on a connection of its own.
+void WaitUntilDraining(std::uint16_t port) {
+  EXPECT_TRUE(Eventually([&] { return Fetch(port, "/readyz").body == "draining\n"; }));
+}
+
+TEST_F(Drain, AnswersAnotherRequestOnIdleConnectionsAndTheFirstOfNewOnes) {
+  ServerOptions options;
+  options.drain_timeout = options.drain_grace = 60s;  // no more is needed: each connection ends with its reply
+  Start(options);
+  RawClient idle(port()), unused(port());
+  idle.Send(Get("/livez"));
+  ASSERT_TRUE(idle.Read());
+  server_->RequestStop();
+  WaitUntilDraining(port());
+  for (RawClient* client : {&idle, &unused}) {
+    ASSERT_TRUE(client->Send(Get("/maui/0/0/0.terrain")));
+    const auto reply = client->Read();
+    ASSERT_TRUE(reply);
+    EXPECT_EQ(reply->status, 200);
+    EXPECT_EQ(reply->Field("connection"), "close");
+    EXPECT_TRUE(client->Ended());
+  }
+  EXPECT_TRUE(server_->Wait());
+}
+
+TEST_F(Drain, AnswersARequestWhoseFirstHalfCameInTheGrace) {
+  ServerOptions options;
+  options.drain_grace = 200ms;
+  Start(options);
+  RawClient client(port());
+  client.Send(Get("/livez"));
+  ASSERT_TRUE(client.Read());
+  server_->RequestStop();
+  ASSERT_TRUE(client.Send("GET /livez HTTP/1.1\r\n"));
+  RawClient idle(port());
+  EXPECT_TRUE(idle.Ended()) << "the grace is over";
+  ASSERT_TRUE(client.Send("Host: x\r\n\r\n"));
+  const auto reply = client.Read();
+  ASSERT_TRUE(reply);
+  EXPECT_EQ(reply->status, 200);
+  EXPECT_TRUE(server_->Wait());
+}
+
+TEST_F(Drain, ClosesIdleConnectionsAfterTheGraceAndTakesNoNewOnes) {
   Start();
   RawClient idle(port());
   idle.Send(Get("/livez"));

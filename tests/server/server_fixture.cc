@@ -6,11 +6,13 @@
 #include <thread>
 
 #include "proto/compress.h"
+#include "server/descriptors.h"
 
 namespace terrace::server {
 
 ServerFixture::ServerFixture() {
   spdlog::set_level(spdlog::level::err);
+  RaiseDescriptorLimit();
   builder_ = [this](const TileRequest& request, std::stop_token stop) -> Result<EncodedTile> {
     ++builds_;
     const auto until = std::chrono::steady_clock::now() + std::chrono::milliseconds(build_ms_);
@@ -28,19 +30,29 @@ ServerFixture::ServerFixture() {
 }
 
 void ServerFixture::Start(ServerOptions options) {
+  Listen(options);
+  ASSERT_TRUE(server_);
+  const Result<void> served = server_->Replace(MakeCatalog(), options);
+  ASSERT_TRUE(served) << served.error().message;
+}
+
+void ServerFixture::Listen(ServerOptions options) {
   options.port = 0;
   options.io_threads = 2;
   options.metrics_age = std::chrono::milliseconds(0);  // tests look for what they have just done
   if (options.worker_threads == 0) options.worker_threads = 2;
+  auto server = Server::Start(nullptr, options);
+  ASSERT_TRUE(server) << server.error().message;
+  server_ = std::move(*server);
+}
+
+CatalogPtr ServerFixture::MakeCatalog() const {
   DatasetView maui;
   maui.name = "maui";
   maui.available = {{{0, 0, 1, 0}}, {{0, 0, 3, 1}}, {{0, 0, 7, 3}}, {{0, 0, 15, 7}}};
   std::vector<DatasetView> datasets = more_datasets_;
   datasets.insert(datasets.begin(), maui);
-  auto catalog = std::make_shared<const Catalog>(Catalog{std::move(datasets), builder_, read_points_, area_mesher_});
-  auto server = Server::Start(std::move(catalog), options);
-  ASSERT_TRUE(server) << server.error().message;
-  server_ = std::move(*server);
+  return std::make_shared<const Catalog>(Catalog{std::move(datasets), builder_, read_points_, area_mesher_});
 }
 
 std::string ServerFixture::BodyOf(const TileRequest& request) {

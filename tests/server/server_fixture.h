@@ -23,6 +23,9 @@ class ServerFixture : public testing::Test {
 
   // Call once, after the knobs are set.
   void Start(ServerOptions options = {});
+  // The same in two steps: listening, and the datasets.
+  void Listen(ServerOptions options = {});
+  CatalogPtr MakeCatalog() const;
   std::uint16_t port() const { return server_->port(); }
 
   // What the default builder makes of a request: readable, and different wherever the request differs.

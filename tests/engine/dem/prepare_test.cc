@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <csignal>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -253,6 +254,23 @@ TEST(Prepare, TwoProcessesShareOneRecord) {
   EXPECT_FALSE(std::filesystem::exists(RecordPath(cache, path) + ".partial"));
 }
 
+TEST(Prepare, KeepsNoRecordOpenAndDoesWithoutOneThatIsGone) {
+  const TempDir dir;
+  const std::string path = WriteLargeRaster(dir), cache = dir.File("cache");
+  OpenRecorded(path, cache);
+  const auto source = OpenRecorded(path, cache);
+  EXPECT_TRUE(source->preparation().from_record);
+  const auto before = source->ReadBlocks(8, {300, 200, 100, 100}, {});
+  for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) {
+    std::error_code gone;
+    EXPECT_FALSE(std::filesystem::read_symlink(entry, gone).string().starts_with(cache));
+  }
+  std::filesystem::remove_all(cache);
+  const auto after = source->ReadBlocks(8, {300, 200, 100, 100}, {});
+  ASSERT_TRUE(before && after);
+  EXPECT_TRUE(std::memcmp(before->data(), after->data(), before->size() * sizeof(float)) == 0) << "voids are NaN";
+}
+
 TEST(Prepare, RastersWhoseOverviewsMisleadAreLookedAtOnce) {
   const TempDir dir;
   RasterSpec spec{.width = 300, .height = 200, .type = "Int16", .geo_transform = {8, .01, 0, 47, 0, -.01}};
@@ -436,7 +454,7 @@ TEST(Prepare, StopsWhenToldAndGoesOnNextTime) {
       [&](double done) {
         if (done >= .3) stop.request_stop();
       },
-      nullptr, stop.get_token());
+      stop.get_token());
   ASSERT_FALSE(stopped.has_value());
   EXPECT_EQ(stopped.error().code, ErrorCode::kCancelled);
   const auto source = OpenRecorded(path, cache);

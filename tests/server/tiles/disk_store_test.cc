@@ -42,7 +42,9 @@ class DiskStoreTest : public testing::Test {
 
   DiskStoreOptions Options(rocksdb::Env* env = nullptr) const {
     DiskStoreOptions options;
-    options.db = {scratch_.path() / "tiles", RecordDb::kMinCapacity, false, env};
+    options.db.directory = scratch_.path() / "tiles";
+    options.db.capacity_bytes = RecordDb::kMinCapacity;
+    options.db.env = env;
     options.name = "tiles";
     options.retry_after = milliseconds(20);
     return options;
@@ -80,6 +82,18 @@ class DiskStoreTest : public testing::Test {
     }
     return bytes;
   }
+
+  // Of this store, by this process; those of records alone.
+  std::size_t OpenFiles(const std::string& ending = "") const {
+    std::size_t count = 0;
+    for (const auto& entry : fs::directory_iterator("/proc/self/fd")) {
+      std::error_code gone;
+      const std::string file = fs::read_symlink(entry, gone).string();
+      count += file.starts_with(scratch_.path().string()) && file.ends_with(ending) ? 1 : 0;
+    }
+    return count;
+  }
+  std::size_t OpenTables() const { return OpenFiles(".sst"); }
 
   const ScratchDirectory scratch_;
 };
@@ -145,6 +159,34 @@ TEST_F(DiskStoreTest, KeepsTheNewestWithinItsCapacity) {
   EXPECT_LE(found, 168);
   EXPECT_TRUE(store.Find(KeyOf(kCount - 1)));
   EXPECT_FALSE(store.Find(KeyOf(0)));
+}
+
+TEST_F(DiskStoreTest, OpensNoMoreFilesThanItMay) {
+  constexpr int kCount = 400;
+  constexpr std::size_t kBytes = 100'000;
+  DiskStoreOptions options = Options();
+  options.db.capacity_bytes = std::size_t{64} << 20;  // in files of 1 MiB
+  options.db.open_files = RecordDb::kMinOpenFiles;
+  const auto most_open = [&](DiskStore& store) {
+    std::size_t most = 0;
+    for (int i = 0; i < kCount; ++i) {
+      EXPECT_TRUE(store.Find(KeyOf(i))) << i;
+      if (i % 20 == 0) most = std::max(most, OpenTables());
+    }
+    return most;
+  };
+  {
+    DiskStore store(options);
+    for (int i = 0; i < kCount; ++i) {
+      Keep(store, i, kBytes);
+      if (i % 50 == 0) store.Flush();
+    }
+    store.Flush();
+    EXPECT_LE(most_open(store), RecordDb::kMinOpenFiles + 1);
+  }
+  DiskStore again(options);
+  EXPECT_LE(most_open(again), RecordDb::kMinOpenFiles + 1);
+  EXPECT_LE(OpenFiles(), RecordDb::kMinOpenFiles + RecordDb::kOtherDescriptors);
 }
 
 TEST_F(DiskStoreTest, DropsWhatItCannotWriteInTime) {

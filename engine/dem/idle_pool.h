@@ -1,0 +1,59 @@
+// What keeps files open between uses: GDAL datasets, images, PROJ operations with their grids.
+//
+// Each is used by one thread at a time and kept in the pool it came from. All pools of the process share one list with
+// a limit: those used longest ago are let go, whosever they are. What is in use does not count; that is bounded by the
+// number of threads. Thread-safe.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <utility>
+
+namespace terrace::dem {
+
+// How many the pools of the process keep together. Until the first call: 256.
+void SetMostIdle(std::size_t count);
+
+class AnyIdlePool {
+ public:
+  AnyIdlePool() = default;
+  AnyIdlePool(const AnyIdlePool&) = delete;
+  AnyIdlePool& operator=(const AnyIdlePool&) = delete;
+  ~AnyIdlePool() { Clear(); }
+
+  // Lets go of all that is idle, and of what is in use when it comes back.
+  void Clear() noexcept;
+
+ protected:
+  struct Lease {
+    std::shared_ptr<void> item;
+    std::uint64_t epoch = 0;
+  };
+  Lease TakeAny();
+  // Where there is no memory to keep it, it is let go.
+  void KeepAny(Lease lease) noexcept;
+
+ private:
+  friend class IdleList;
+  std::uint64_t epoch_ = 0;  // counts calls of Clear; guarded by the list's mutex
+};
+
+template <typename T>
+class IdlePool : public AnyIdlePool {
+ public:
+  // What was taken, or made in place of it. `epoch` tells whether Clear was called since.
+  struct Taken {
+    std::shared_ptr<T> item;
+    std::uint64_t epoch = 0;
+  };
+
+  // The one used last; null: none is idle, and the caller makes one.
+  Taken Take() {
+    Lease lease = TakeAny();
+    return {std::static_pointer_cast<T>(std::move(lease.item)), lease.epoch};
+  }
+  void Keep(Taken taken) noexcept { KeepAny({std::move(taken.item), taken.epoch}); }
+};
+
+}  // namespace terrace::dem

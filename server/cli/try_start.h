@@ -1,0 +1,17 @@
+// What is tried before a server starts.
+#pragma once
+
+#include "config/config.h"
+#include "engine/core/result.h"
+#include "server/descriptors.h"
+#include "server/server.h"
+
+namespace terrace::cli {
+
+// Tells, on stderr, of everything that keeps the server from starting and can be known before sources are opened; the
+// exit code, kExitOk if there is nothing. The policy of sources is in force then. `options` and `descriptors`: made of
+// `config`. `tries_address`: whether the address is to be free.
+int TryStart(const config::Config& config, const server::ServerOptions& options,
+             const Result<server::DescriptorBudget>& descriptors, bool tries_address);
+
+}  // namespace terrace::cli

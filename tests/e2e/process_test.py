@@ -1,0 +1,93 @@
+"""The real binary as a process among others: restarts on a held socket, and few file descriptors: process_test.py BINARY SOURCE_DIR."""
+import pathlib
+import resource
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import unittest
+import urllib.error
+import urllib.request
+
+BINARY = pathlib.Path(sys.argv.pop(1)).resolve()
+SOURCE_DIR = pathlib.Path(sys.argv.pop(1)).resolve()
+sys.path.insert(0, str(SOURCE_DIR / "tests/reliability"))
+import descriptors  # noqa: E402
+import restarts  # noqa: E402
+
+DEM = SOURCE_DIR / "config/samples/jacksboro.tif"
+
+
+class HeldSocket(unittest.TestCase):
+    def test_loses_no_request_in_restarts(self):
+        with tempfile.TemporaryDirectory() as folder:
+            load = restarts.restart_under_load(BINARY, 3, 8, restarts.TARGETS, "--config", restarts.SAMPLES, "--worker-threads", "2",
+                                               "--disk-cache", folder, "--log-level", "error")
+        self.assertEqual(load.failures, [])
+        self.assertGreater(load.count, 100)
+        print(f"{load.count} requests, {load.again} sent again, slowest {load.slowest:.2f} s", file=sys.stderr)
+
+    def test_is_served_instead_of_the_configured_address(self):
+        with restarts.HeldSocket() as held:
+            process = held.start(BINARY, "serve", DEM, "--listen", "127.0.0.1:1", "--log-level", "error")
+            try:
+                self.assertIn(f"http://127.0.0.1:{held.port}/", process.stdout.readline())
+                self.assertEqual(urllib.request.urlopen(f"http://127.0.0.1:{held.port}/readyz", timeout=30).read(), b"ready\n")
+            finally:
+                process.terminate()
+                process.stdout.close()
+                self.assertEqual(process.wait(60), 0)
+
+    def test_must_be_one_that_listens(self):
+        for kind in (socket.SOCK_STREAM, socket.SOCK_DGRAM):
+            with self.subTest(kind=kind), socket.socket(socket.AF_INET, kind) as other:
+                other.bind(("127.0.0.1", 0))
+                number = other.fileno()
+                done = subprocess.run(["bash", "-c", restarts.PASS, "bash", str(number), BINARY, "serve", DEM], pass_fds=(number,),
+                                      capture_output=True, text=True, timeout=60, check=False)
+                self.assertEqual(done.returncode, 1)
+                self.assertIn("no listening TCP socket", done.stderr)
+
+
+class Opening(unittest.TestCase):
+    def test_ends_when_it_is_told_to(self):
+        with tempfile.TemporaryDirectory() as folder, restarts.HeldSocket() as held:
+            slow = pathlib.Path(folder, "slow.tif")
+            shutil.copy(DEM, slow)
+            with restarts.leased(slow):
+                # A folder, for the files of one are looked into when the dataset is opened, and not before.
+                process = held.start(BINARY, "serve", folder, "--drain-timeout-s", "0.5", stderr=subprocess.PIPE)
+                state = f"http://127.0.0.1:{held.port}/readyz"
+                with self.assertRaises(urllib.error.HTTPError) as opening:
+                    urllib.request.urlopen(state, timeout=30)
+                self.assertEqual((opening.exception.code, opening.exception.read()), (503, b"opening\n"))
+                self.assertEqual(urllib.request.urlopen(state.replace("readyz", "livez"), timeout=30).status, 200)
+                process.send_signal(signal.SIGTERM)
+                log = process.communicate(timeout=60)[1]
+            self.assertEqual(process.returncode, 1, log)  # the open that cannot be given up
+            self.assertIn("look whether a source can be read", log)
+
+
+class Descriptors(unittest.TestCase):
+    def test_80_are_enough_for_two_disk_stores_and_a_reload(self):
+        with tempfile.TemporaryDirectory() as folder:
+            told = descriptors.serve_with_few(BINARY, SOURCE_DIR, pathlib.Path(folder), 80)
+        print(told, file=sys.stderr)
+        self.assertEqual(told.wrong, [])
+        self.assertGreater(told.files, 80, "there are more files of records than descriptors")
+        self.assertLess(told.most, 80)
+
+    def test_too_few_are_told_at_the_start(self):
+        with tempfile.TemporaryDirectory() as folder:
+            done = subprocess.run([BINARY, "serve", DEM, "--listen", "127.0.0.1:0", "--worker-threads", "2", "--disk-cache", folder], text=True,
+                                  capture_output=True, timeout=60, check=False,
+                                  preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (50, 50)))
+        self.assertEqual(done.returncode, 1)
+        self.assertEqual(done.stdout, "")
+        self.assertRegex(done.stderr, r"the limit on open files is 50, and this configuration takes \d+ at least: .*ulimit -n")
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,125 @@
+// A server that listens before it has anything to serve, and one on a socket that somebody else holds.
+#include <arpa/inet.h>
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <memory>
+#include <vector>
+
+#include "tests/server/server_fixture.h"
+
+namespace terrace::server {
+namespace {
+
+using namespace std::chrono_literals;
+
+class Opening : public ServerFixture {};
+
+TEST_F(Opening, AnswersProbesAndMetricsAndLetsOthersWait) {
+  Listen();
+  RawClient tile(port()), documents(port());
+  tile.Send(Get("/maui/0/0/0.terrain"));
+  documents.Send(Get("/datasets"));
+  EXPECT_EQ(Fetch(port(), "/livez").status, 200);
+  EXPECT_EQ(Fetch(port(), "/metrics").status, 200);
+  const Reply probe = Fetch(port(), "/readyz");
+  EXPECT_EQ(probe.status, 503);
+  EXPECT_EQ(probe.body, "opening\n");
+  EXPECT_NE(probe.Field("retry-after"), "");
+
+  ASSERT_TRUE(server_->Replace(MakeCatalog(), {}));
+  const auto reply = tile.Read(), list = documents.Read();
+  ASSERT_TRUE(reply && list);
+  EXPECT_EQ(reply->status, 200);
+  EXPECT_NE(list->body.find("maui"), std::string::npos);
+  EXPECT_EQ(Fetch(port(), "/readyz").body, "ready\n");
+  EXPECT_NE(Fetch(port(), "/metrics").body.find("terrace_catalogs_total 0"), std::string::npos)
+      << "nothing was replaced";
+}
+
+TEST_F(Opening, TellsWhoWaitsUntilItsDeadlineToAskAgain) {
+  ServerOptions options;
+  options.request_deadline = 100ms;
+  Listen(options);
+  const Reply reply = Fetch(port(), "/maui/0/0/0.terrain");
+  EXPECT_EQ(reply.status, 503);
+  EXPECT_NE(reply.Field("retry-after"), "");
+}
+
+TEST_F(Opening, MayBeStopped) {
+  Listen();
+  RawClient tile(port());
+  tile.Send(Get("/maui/0/0/0.terrain"));
+  EXPECT_EQ(Fetch(port(), "/livez").status, 200);
+  server_->RequestStop();
+  const auto reply = tile.Read();
+  ASSERT_TRUE(reply);
+  EXPECT_EQ(reply->status, 503) << "told, not cut off";
+  EXPECT_TRUE(server_->Wait());
+}
+
+// A listening socket that the test holds, as systemd does.
+class HeldSocket : public ServerFixture {
+ protected:
+  HeldSocket() : socket_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = ::htonl(INADDR_LOOPBACK);
+    socklen_t size = sizeof address;
+    EXPECT_EQ(::bind(socket_, reinterpret_cast<sockaddr*>(&address), size), 0);
+    EXPECT_EQ(::listen(socket_, 100), 0);
+    EXPECT_EQ(::getsockname(socket_, reinterpret_cast<sockaddr*>(&address), &size), 0);
+    held_port_ = ::ntohs(address.sin_port);
+  }
+  ~HeldSocket() override { ::close(socket_); }
+
+  ServerOptions OnIt() const {
+    ServerOptions options;
+    options.listen_socket = ::fcntl(socket_, F_DUPFD_CLOEXEC, 3);
+    return options;
+  }
+
+  const int socket_;
+  std::uint16_t held_port_ = 0;
+};
+
+TEST_F(HeldSocket, KeepsThoseWhoComeBetweenTwoServers) {
+  Start(OnIt());
+  EXPECT_EQ(port(), held_port_);
+  EXPECT_NE(server_->url().find("http://127.0.0.1:"), std::string::npos);
+  EXPECT_EQ(Fetch(held_port_, "/livez").status, 200);
+  server_->RequestStop();
+  EXPECT_TRUE(server_->Wait());
+  server_.reset();
+
+  std::vector<std::unique_ptr<RawClient>> clients;
+  for (int i = 0; i < 20; ++i) {
+    clients.push_back(std::make_unique<RawClient>(held_port_));
+    ASSERT_TRUE(clients.back()->Send(Get("/maui/0/0/0.terrain")));
+  }
+  Start(OnIt());
+  for (const auto& client : clients) {
+    const auto reply = client->Read();
+    ASSERT_TRUE(reply);
+    EXPECT_EQ(reply->status, 200);
+  }
+}
+
+TEST_F(HeldSocket, LeavesWhomItDoesNotAcceptToTheNextServer) {
+  Start(OnIt());
+  server_->RequestStop();
+  EXPECT_TRUE(server_->Wait());
+  RawClient late(held_port_);
+  ASSERT_TRUE(late.Send(Get("/livez")));
+  server_.reset();
+  Start(OnIt());
+  const auto reply = late.Read();
+  ASSERT_TRUE(reply);
+  EXPECT_EQ(reply->status, 200);
+}
+
+}  // namespace
+}  // namespace terrace::server
