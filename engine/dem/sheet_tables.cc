@@ -12,6 +12,10 @@ SheetTables::SheetTables(const Sheet& sheet, const SheetTrace& trace)
     heights_.min = std::min(heights_.min, member.raster->info().heights.min);
     heights_.max = std::max(heights_.max, member.raster->info().heights.max);
   }
+  for (const std::size_t i : near_) {
+    const Position& off = sheet.members()[i].misplacement;
+    misplacement_ = {std::max(misplacement_.x, off.x), std::max(misplacement_.y, off.y)};
+  }
 }
 
 std::vector<std::size_t> SheetTables::MembersAround() const {

@@ -16,6 +16,9 @@ class SheetTables {
   // Of all of the sheet.
   const HeightRange& heights() const { return heights_; }
 
+  // Pixels by which samples of the rasters around the tile lie off the sheet's, the most on each axis.
+  const Position& misplacement() const { return misplacement_; }
+
   // At least the range of pixels in a box, clipped to the sheet.
   BlockRange Ranges(double west, double north, double east, double south) const;
 
@@ -31,6 +34,7 @@ class SheetTables {
   const SheetTrace& trace_;
   std::vector<std::size_t> near_;  // members around the tile
   HeightRange heights_;
+  Position misplacement_{0, 0};
 };
 
 }  // namespace terrace::dem
