@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "engine/geo/error_ladder.h"
 #include "server/tiles/tile_pipeline.h"
 #include "tests/server/tiles/certified_sources.h"
 #include "tests/server/tiles/fetched_tile.h"
@@ -66,11 +67,12 @@ class RandomTiles {
   RandomTiles(const dem::DemSource& source, const SampleIndex& samples)
       : source_(source), samples_(samples), tries_(static_cast<std::size_t>(source.max_level() + 1)) {}
 
-  // Of a level that is still wanted.
-  TileRequest Next() {
+  // Of a level that is still wanted. `deep_and_fine`: of the two deepest ones, with the smallest error.
+  TileRequest Next(bool deep_and_fine) {
     TileRequest request;
     do {
-      const int level = static_cast<int>(random_() % tries_.size());
+      const std::size_t levels = deep_and_fine ? std::min<std::size_t>(tries_.size(), 2) : tries_.size();
+      const int level = static_cast<int>(tries_.size() - 1 - random_() % levels);
       const Sample& at = samples_.all()[random_() % samples_.all().size()];
       const double side = 180.0 / static_cast<double>(geo::TileRows(level));
       const auto tile = [side](double from, std::int64_t count) {
@@ -79,7 +81,7 @@ class RandomTiles {
       request.key = {level, tile(at.longitude + 180, 2 * geo::TileRows(level)),
                      tile(at.latitude + 90, geo::TileRows(level))};
     } while (!source_.IsAvailable(request.key) || !IsWanted(request.key));
-    request.error_step = static_cast<int>(random_() % 25) - 8;
+    request.error_step = deep_and_fine ? geo::kFinestStep : static_cast<int>(random_() % 25) - 8;
     return request;
   }
 
@@ -115,7 +117,7 @@ TEST_P(CertifiedError, IsNeverBelowTheTruthAndNotMuchAboveIt) {
   int above = 0;
   std::vector<double> ratios;
   for (int i = 0; i < tiles; ++i) {
-    const TileRequest request = random.Next();
+    const TileRequest request = random.Next(tried.deep_and_fine && i % 2 == 0);
     const FetchedTile tile = FetchTile(*pipeline, request);
     ASSERT_TRUE(tile.encoded.certified_error_m.has_value());
     const double truth = TileSurface(tile.mesh, request.key).LargestError(samples);

@@ -22,7 +22,8 @@ struct CertifiedCase {
   std::string name;
   // What it writes goes into the folder. Nothing: data is missing, and `missing` says which.
   std::function<std::optional<CertifiedSource>(const dem::TempDir& dir, std::string& missing)> make;
-  double most_in_median = 3;  // certified over true error
+  double most_in_median = 3;   // certified over true error
+  bool deep_and_fine = false;  // half of the tiles tried are of the deepest levels, with the smallest errors
 };
 
 // Of real rasters, each alone, and of real mosaics.
