@@ -87,7 +87,7 @@ class RandomTiles {
 
  private:
   bool IsWanted(const geo::TileKey& key) {
-    constexpr int kManySamples = 200'000, kOfMany = 4;  // tiles of a level, whose samples take seconds
+    constexpr int kManySamples = 100'000, kOfMany = 2;  // tiles of a level, whose samples take seconds
     int& tries = tries_[static_cast<std::size_t>(key.level)];
     if (tries < kOfMany) return ++tries > 0;
     const double side = 180.0 / static_cast<double>(geo::TileRows(key.level));

@@ -9,6 +9,16 @@ namespace {
 
 constexpr double kMost = 32767;  // u and v at the eastern and the northern edge
 
+// The plumb line of a place, and where it meets the ellipsoid.
+geo::Vec3 UpAt(double longitude, double latitude) {
+  const double x = longitude * std::numbers::pi / 180, y = latitude * std::numbers::pi / 180;
+  return {std::cos(y) * std::cos(x), std::cos(y) * std::sin(x), std::sin(y)};
+}
+geo::Vec3 FootAt(const geo::Vec3& up) {
+  const double across = geo::kSemiMajorAxis / std::sqrt(1 - geo::kEccentricitySquared * up.z * up.z);
+  return {across * up.x, across * up.y, across * (1 - geo::kEccentricitySquared) * up.z};
+}
+
 // Degrees, of the place whose plumb line passes through a point.
 double LatitudeOf(const geo::Vec3& point) {
   const double radius = std::hypot(point.x, point.y);
@@ -23,51 +33,56 @@ double LatitudeOf(const geo::Vec3& point) {
 
 }  // namespace
 
-TileSurface::TileSurface(const proto::DecodedTile& mesh, const geo::TileKey& key) : mesh_(mesh), bins_(kBins * kBins) {
+TileSurface::TileSurface(const proto::DecodedTile& mesh, const geo::TileKey& key)
+    : mesh_(mesh),
+      bins_per_side_(std::clamp(static_cast<int>(std::sqrt(static_cast<double>(mesh.triangles.size()))), 1, 512)),
+      bins_(static_cast<std::size_t>(bins_per_side_ * bins_per_side_)) {
   side_ = 180.0 / static_cast<double>(geo::TileRows(key.level));
   west_ = side_ * static_cast<double>(key.x) - 180;
   south_ = side_ * static_cast<double>(key.y) - 90;
   for (std::size_t k = 0; k < mesh.u.size(); ++k) {
-    ecef_.push_back(geo::ToEcef(west_ + side_ * mesh.u[k] / kMost, south_ + side_ * mesh.v[k] / kMost, HeightOf(k)));
+    const geo::Vec3 up = UpAt(west_ + side_ * mesh.u[k] / kMost, south_ + side_ * mesh.v[k] / kMost);
+    ecef_.push_back(FootAt(up) + up * HeightOf(k));
   }
   for (const auto& corners : mesh.triangles) AddTriangle(corners);
 }
 
 void TileSurface::AddTriangle(const std::array<std::uint32_t, 3>& corners) {
   Triangle triangle;
-  int low = 32767, high = 0;
-  for (std::size_t i = 0; i < 3; ++i) {
-    triangle.k[i] = corners[i];
-    low = std::min(low, mesh_.u[corners[i]]), high = std::max(high, mesh_.u[corners[i]]);
-  }
+  std::ranges::copy(corners, triangle.k.begin());
   const geo::Vec3 &a = ecef_[corners[0]], &b = ecef_[corners[1]], &c = ecef_[corners[2]];
   triangle.normal = geo::Cross(b - a, c - a);
   triangle.longest = std::max({geo::Length(b - a), geo::Length(c - a), geo::Length(c - b)});
-  const auto [south, north] = RowsOf(triangle);
-  // Between the meridians of the corners: a wedge is convex.
-  for (int v = BinOf(south); v <= BinOf(north); ++v) {
-    for (int u = BinOf(low); u <= BinOf(high); ++u) {
-      bins_[static_cast<std::size_t>(v * kBins + u)].push_back(triangles_.size());
+  FindExtent(triangle);
+  for (int v = BinOf(triangle.south); v <= BinOf(triangle.north); ++v) {
+    for (int u = BinOf(triangle.west); u <= BinOf(triangle.east); ++u) {
+      bins_[static_cast<std::size_t>(v * bins_per_side_ + u)].push_back(triangles_.size());
     }
   }
   triangles_.push_back(triangle);
 }
 
-// In steps of v, of all plumb lines that may pass through the triangle: chords bulge towards the pole.
-std::array<double, 2> TileSurface::RowsOf(const Triangle& triangle) const {
+// Between the meridians of the corners, as a wedge is convex; chords bulge towards the pole.
+void TileSurface::FindExtent(Triangle& triangle) const {
   constexpr int kSteps = 8;
-  double low = kMost, high = 0, bulge = 0;
+  constexpr double kSlack = 1e-3;
+  double bulge = 0;
+  triangle.west = triangle.south = kMost;
   for (std::size_t i = 0; i < 3; ++i) {
     const std::size_t a = triangle.k[i], b = triangle.k[(i + 1) % 3];
+    triangle.west = std::min<double>(triangle.west, mesh_.u[a]);
+    triangle.east = std::max<double>(triangle.east, mesh_.u[a]);
     for (int step = 0; step < kSteps; ++step) {
       const double t = static_cast<double>(step) / kSteps;
       const double linear = mesh_.v[a] + t * (mesh_.v[b] - mesh_.v[a]);
       const double v = step == 0 ? linear : (LatitudeOf(ecef_[a] + (ecef_[b] - ecef_[a]) * t) - south_) / side_ * kMost;
       bulge = std::max(bulge, std::abs(v - linear));
-      low = std::min(low, v), high = std::max(high, v);
+      triangle.south = std::min(triangle.south, v);
+      triangle.north = std::max(triangle.north, v);
     }
   }
-  return {low - bulge / 4 - 1e-3, high + bulge / 4 + 1e-3};
+  triangle.west -= kSlack, triangle.east += kSlack;
+  triangle.south -= bulge / 4 + kSlack, triangle.north += bulge / 4 + kSlack;
 }
 
 double TileSurface::ErrorAt(const Sample& sample) const {
@@ -75,11 +90,11 @@ double TileSurface::ErrorAt(const Sample& sample) const {
   longitude -= 360 * std::floor(longitude / 360);
   const double u = longitude / side_ * kMost, v = (sample.latitude - south_) / side_ * kMost;
   if (!(u >= 0 && u <= kMost && v >= 0 && v <= kMost)) return -1;
-  const geo::Vec3 foot = geo::ToEcef(sample.longitude, sample.latitude, 0);
-  const geo::Vec3 up = geo::SurfaceNormal(sample.longitude, sample.latitude);
+  const geo::Vec3 up = UpAt(sample.longitude, sample.latitude), foot = FootAt(up);
   double error = -1;
-  for (const std::size_t t : bins_[static_cast<std::size_t>(BinOf(v) * kBins + BinOf(u))]) {
+  for (const std::size_t t : bins_[static_cast<std::size_t>(BinOf(v) * bins_per_side_ + BinOf(u))]) {
     const Triangle& triangle = triangles_[t];
+    if (u < triangle.west || u > triangle.east || v < triangle.south || v > triangle.north) continue;
     const auto& k = triangle.k;
     const auto cross = [&](std::size_t a, std::size_t b) {
       return (mesh_.u[k[a]] - u) * (mesh_.v[k[b]] - v) - (mesh_.v[k[a]] - v) * (mesh_.u[k[b]] - u);
@@ -110,8 +125,8 @@ double TileSurface::LargestError(const SampleIndex& samples) const {
   return largest;
 }
 
-int TileSurface::BinOf(double at) {
-  return static_cast<int>(std::clamp(std::floor(at * kBins / 32768), 0.0, kBins - 1.0));
+int TileSurface::BinOf(double at) const {
+  return static_cast<int>(std::clamp(std::floor(at * bins_per_side_ / (kMost + 1)), 0.0, bins_per_side_ - 1.0));
 }
 
 double TileSurface::HeightOf(std::size_t k) const {

@@ -26,21 +26,22 @@ class TileSurface {
   double LargestError(const SampleIndex& samples) const;
 
  private:
-  static constexpr int kBins = 64;
-
   struct Triangle {
     std::array<std::size_t, 3> k{};  // counter-clockwise
     geo::Vec3 normal;                // of the flat triangle, as long as twice its area
     double longest = 0;              // of its sides, metres
+    // Steps of u and v: of all plumb lines that may pass through it.
+    double west = 0, south = 0, east = 0, north = 0;
   };
 
-  static int BinOf(double at);
+  int BinOf(double at) const;
   double HeightOf(std::size_t k) const;
-  std::array<double, 2> RowsOf(const Triangle& triangle) const;
+  void FindExtent(Triangle& triangle) const;
   void AddTriangle(const std::array<std::uint32_t, 3>& corners);
 
   const proto::DecodedTile& mesh_;
   double west_, south_, side_;
+  int bins_per_side_;
   std::vector<geo::Vec3> ecef_;
   std::vector<Triangle> triangles_;
   std::vector<std::vector<std::size_t>> bins_;
