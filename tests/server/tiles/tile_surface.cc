@@ -64,16 +64,21 @@ void TileSurface::AddTriangle(const std::array<std::uint32_t, 3>& corners) {
 
 // Between the meridians of the corners, as a wedge is convex; chords bulge towards the pole.
 void TileSurface::FindExtent(Triangle& triangle) const {
-  constexpr int kSteps = 8;
+  // Small ones far from the poles bulge by less than this, and need no closer look.
+  constexpr double kSmall = 20'000, kRadius = 6'356'000, kFromPole = 10;  // metres, degrees
+  const double middle = south_ + side_ * mesh_.v[triangle.k[0]] / kMost;
+  const bool is_small = triangle.longest < kSmall && std::abs(middle) < 90 - kFromPole;
+  constexpr double kPerMetre = 180 / (std::numbers::pi * kRadius);
+  const int steps = is_small ? 1 : 8;
   constexpr double kSlack = 1e-3;
-  double bulge = 0;
+  double bulge = is_small ? 4 * triangle.longest * triangle.longest / kRadius * kPerMetre / side_ * kMost : 0;
   triangle.west = triangle.south = kMost;
   for (std::size_t i = 0; i < 3; ++i) {
     const std::size_t a = triangle.k[i], b = triangle.k[(i + 1) % 3];
     triangle.west = std::min<double>(triangle.west, mesh_.u[a]);
     triangle.east = std::max<double>(triangle.east, mesh_.u[a]);
-    for (int step = 0; step < kSteps; ++step) {
-      const double t = static_cast<double>(step) / kSteps;
+    for (int step = 0; step < steps; ++step) {
+      const double t = static_cast<double>(step) / steps;
       const double linear = mesh_.v[a] + t * (mesh_.v[b] - mesh_.v[a]);
       const double v = step == 0 ? linear : (LatitudeOf(ecef_[a] + (ecef_[b] - ecef_[a]) * t) - south_) / side_ * kMost;
       bulge = std::max(bulge, std::abs(v - linear));
@@ -104,8 +109,10 @@ double TileSurface::ErrorAt(const Sample& sample) const {
       const double sampled = (w0 * HeightOf(k[0]) + w1 * HeightOf(k[1]) + w2 * HeightOf(k[2])) / sum;
       error = std::max(error, std::abs(sampled - sample.height));
     }
-    // foot + height * up lies in the plane. One that stands upright tells no height.
+    // foot + height * up lies in the plane. A triangle that stands upright tells no height, and one of two corners at a
+    // pole is a line.
     const double across = geo::Dot(up, triangle.normal);
+    if (geo::Length(triangle.normal) <= 1e-6 * triangle.longest) continue;
     if (std::abs(across) <= 1e-5 * geo::Length(triangle.normal)) continue;
     const auto side = [&](std::size_t a, std::size_t b) {
       return geo::Dot(up, geo::Cross(ecef_[k[a]] - foot, ecef_[k[b]] - foot)) * (across < 0 ? -1 : 1);
