@@ -103,24 +103,23 @@ CertifiedCase Feathered(double feather, const std::string& vertical) {
     if (opened) source.samples = BlendedSamples(**opened);
     return source;
   };
-  // Half of these tiles lie in the widest feather, where each raster is judged on its own.
-  return {fmt::format("feather {:.0f} m, {}", feather, vertical), make, feather < 1000 ? 3 : 3.5};
+  // Most of these tiles lie in a feather, where each raster is judged on its own.
+  return {fmt::format("feather {:.0f} m, {}", feather, vertical), make, feather == 0 ? 3.0 : 5.0};
 }
 
 // Slopes of 80 m a pixel along columns and of 40 along rows, up and down: even between creases that are far apart, so
 // that nothing but the places of samples makes an error there.
 double Zigzag(int at, int period) { return std::abs((at % period + period) % period - period / 2); }
-double Steep(int column, int row) { return 500 + 80 * Zigzag(column, 180) + 40 * Zigzag(row + 30, 180); }
+double Steep(int column, int row) { return 500 + 80 * Zigzag(column + 50, 180) + 40 * Zigzag(row + 30, 180); }
 
-// Pieces of a grid, each `off` pixels off it: by `east` and `south` at its north-western corner, and by `grow` more
+// Pieces of a grid, each some pixels off it: by `east` and `south` at its north-western corner, and by `grow` more
 // towards the opposite one.
 struct Piece {
   int column, row, width, height;
   double east = 0, south = 0, grow = 0;
 };
 
-Source WritePieces(const dem::TempDir& dir, const dem::RasterSpec& grid, const std::vector<Piece>& pieces,
-                   const std::function<double(int, int)>& ground) {
+CertifiedSource WritePieces(const dem::TempDir& dir, const dem::RasterSpec& grid, const std::vector<Piece>& pieces) {
   CertifiedSource source;
   for (const Piece& piece : pieces) {
     dem::RasterSpec spec = grid;
@@ -129,16 +128,26 @@ Source WritePieces(const dem::TempDir& dir, const dem::RasterSpec& grid, const s
     spec.geo_transform[3] += (piece.row + piece.south) * grid.geo_transform[5];
     spec.geo_transform[1] *= 1 + piece.grow / piece.width;
     spec.geo_transform[5] *= 1 + piece.grow / piece.height;
-    spec.value = [&ground, &piece](int c, int r) { return ground(piece.column + c, piece.row + r); };
+    spec.value = [&piece](int c, int r) { return Steep(piece.column + c, piece.row + r); };
     source.files.push_back({dem::WriteRaster(dir, spec, fmt::format("piece{}.tif", source.files.size()))});
     for (const Sample& sample : SamplesOf(source.files.back().path)) source.samples.push_back(sample);
   }
   return source;
 }
 
-CertifiedCase Pieces(const std::string& name, const dem::RasterSpec& grid, std::vector<Piece> pieces,
-                     std::function<double(int, int)> ground = Steep) {
-  return {name, [=](const dem::TempDir& dir, std::string&) { return WritePieces(dir, grid, pieces, ground); }, 3, true};
+CertifiedCase Pieces(const std::string& name, const dem::RasterSpec& grid, std::vector<Piece> pieces) {
+  return {name, [=](const dem::TempDir& dir, std::string&) { return WritePieces(dir, grid, pieces); }, 3, true};
+}
+
+// Of rasters that meet themselves at the antimeridian, the samples about it.
+CertifiedCase AtTheSeam(const std::string& name, const dem::RasterSpec& grid, std::vector<Piece> pieces) {
+  const auto make = [=](const dem::TempDir& dir, std::string&) -> Source {
+    CertifiedSource source = WritePieces(dir, grid, pieces);
+    std::erase_if(source.samples,
+                  [](const Sample& sample) { return std::abs(std::remainder(sample.longitude - 180, 360)) > 1; });
+    return source;
+  };
+  return {name, make, 3, true};
 }
 
 }  // namespace
@@ -171,17 +180,17 @@ std::vector<CertifiedCase> NearlyAlignedCases() {
   utm.crs = "EPSG:32632";
   cases.push_back(Pieces("nearly aligned, UTM", utm, four));
   // Around the Earth: 360 degrees are not a whole number of columns.
-  const auto around = [](double columns) {
+  constexpr int kAround = 21600;
+  const auto around = [](double off) {
     dem::RasterSpec globe;
-    globe.geo_transform = {-180, 360 / columns, 0, 80, 0, -0.5};
+    globe.geo_transform = {-180, 360 / (kAround + off), 0, 10, 0, -1.0 / 60};
     return globe;
   };
-  const auto waves = [](int column, int row) { return 500 + 80 * Zigzag(column + 40, 144) + 40 * Zigzag(row, 180); };
-  cases.push_back(Pieces("almost 720 columns around", around(719.9905), {{0, 0, 720, 320}}, waves));
-  cases.push_back(Pieces("hardly 720 columns around", around(720.0095), {{0, 0, 720, 320}}, waves));
-  cases.push_back(Pieces("and some of them twice", around(720.0095), {{0, 0, 731, 320}}, waves));
-  cases.push_back(
-      Pieces("around in two pieces", around(720.005), {{0, 0, 360, 320}, {360, 0, 360, 320, -.0099, .0099}}, waves));
+  cases.push_back(AtTheSeam("almost 21600 columns around", around(-.0095), {{0, 0, kAround, 64}}));
+  cases.push_back(AtTheSeam("hardly 21600 columns around", around(.0095), {{0, 0, kAround, 64}}));
+  cases.push_back(AtTheSeam("and some of them twice", around(.0095), {{0, 0, kAround + 11, 64}}));
+  cases.push_back(AtTheSeam("around in two pieces", around(.005),
+                            {{0, 0, kAround / 2, 64}, {kAround / 2, 0, kAround / 2, 64, -.0099, .0099}}));
   return cases;
 }
 
