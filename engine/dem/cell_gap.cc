@@ -36,8 +36,10 @@ SampleBox CellGap::Clipped(SampleBox box) const {
 // The heights served in a cell, as the sheet's samples count.
 CellSurface CellGap::SurfaceOf(const TileCell& cell, const std::array<Position, 4>& corners) const {
   constexpr double kPosition = 4e-5;  // of averages: NodePositions is exact to a hundred-thousandth
+  const Position& off = tables_.misplacement();
+  const double slack = kPosition * trace_.factor;
   const bool is_separable = sheet_.georeference().is_geographic_grid() && sheet_.georeference().is_affine();
-  CellSurface surface(corners, is_separable, kPosition * trace_.factor);
+  CellSurface surface(corners, is_separable, {off.x + slack, off.y + slack});
   const double geoid_gap = geoid_.Over(cell.box());
   const bool is_known = std::isfinite(geoid_gap);
   const HeightRange range = is_known ? HeightRange{0, 0} : geoid_.RangeOf(cell.box());
@@ -70,15 +72,32 @@ double CellGap::Apart(const TileCell& cell, double lowest, double highest) const
 }
 
 double CellGap::OfAverages(const TileCell& cell, bool& has_voids) const {
+  // Samples of the cell may count as others beside it. The last average of an axis is up to twice as near.
+  const double off_x = 2 * tables_.misplacement().x / trace_.factor,
+               off_y = 2 * tables_.misplacement().y / trace_.factor;
+  const auto below = [](double weight) { return static_cast<std::int64_t>(std::floor(weight)); };
+  const auto above = [](double weight) {
+    return std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(weight)));
+  };
   SampleBox around;
   for (const std::size_t node : cell.nodes) {
     const GridCell& at = trace_.cells[static_cast<std::size_t>(trace_.cell_of_node[node])];
-    around = around.Around({at.column, at.row, at.column + 1, at.row + 1});
+    around = around.Around({at.column + below(at.x - off_x), at.row + below(at.y - off_y),
+                            at.column + above(at.x + off_x), at.row + above(at.y + off_y)});
   }
+  const GridAxis columns(sheet_.columns(), trace_.factor, sheet_.wraps()), rows(sheet_.rows(), trace_.factor, false);
+  if (!sheet_.wraps()) {
+    around.west = std::max<std::int64_t>(around.west, 0);
+    around.east = std::min(around.east, columns.count() - 1);
+  }
+  around.north = std::max<std::int64_t>(around.north, 0);
+  around.south = std::min(around.south, rows.count() - 1);
   const GridWindow& window = trace_.window;
-  around.east = std::min(around.east, window.column + window.columns - 1);
-  around.south = std::min(around.south, window.row + window.rows - 1);
-  return OfBox(cell, around, has_voids);
+  const SampleBox read = {std::max(around.west, window.column), std::max(around.north, window.row),
+                          std::min(around.east, window.column + window.columns - 1),
+                          std::min(around.south, window.row + window.rows - 1)};
+  const double gap = OfBox(cell, read, has_voids);
+  return read == around ? gap : kUnknownGap;
 }
 
 // By averages in a box of the window.
@@ -163,7 +182,8 @@ double CellGap::OfSurroundings(const TileCell& cell, bool gives_way, bool fills,
   // Edges of cells bulge by far less. The samples are at the pixels' centres.
   constexpr double kBulge = 1.0 / 32;
   const double halo = gives_way ? 1 : 0;
-  box.Grow((box.east - box.west) * kBulge + halo, (box.south - box.north) * kBulge + halo);
+  const Position& off = tables_.misplacement();
+  box.Grow((box.east - box.west) * kBulge + halo + off.x, (box.south - box.north) * kBulge + halo + off.y);
   if (fills) {
     const double reach = sheet_.options().max_void_gap + trace_.factor;
     PixelBounds wide = box;

@@ -23,6 +23,8 @@ struct SampleBox {
   std::int64_t columns() const { return east - west + 1; }
   std::int64_t rows() const { return south - north + 1; }
   SampleBox Around(const SampleBox& other) const;
+
+  friend bool operator==(const SampleBox&, const SampleBox&) = default;
 };
 
 class CellGap {

@@ -6,7 +6,7 @@
 
 namespace terrace::dem {
 
-CellSurface::CellSurface(const std::array<Position, 4>& corners, bool is_separable, double position_slack)
+CellSurface::CellSurface(const std::array<Position, 4>& corners, bool is_separable, const Position& slack)
     : origin_(corners[0]),
       east_{corners[1].x - origin_.x, corners[1].y - origin_.y},
       north_{corners[2].x - origin_.x, corners[2].y - origin_.y},
@@ -17,8 +17,8 @@ CellSurface::CellSurface(const std::array<Position, 4>& corners, bool is_separab
   const auto extent = [](double east, double north, double twist) {
     return std::abs(east) + std::abs(north) + std::abs(twist);
   };
-  slack_x_ = bulge * extent(east_.x, north_.x, twist_.x) + position_slack;
-  slack_y_ = bulge * extent(east_.y, north_.y, twist_.y) + position_slack;
+  slack_x_ = bulge * extent(east_.x, north_.x, twist_.x) + slack.x;
+  slack_y_ = bulge * extent(east_.y, north_.y, twist_.y) + slack.y;
 }
 
 double CellSurface::Apart(const Position& at, double sample) const {

@@ -12,9 +12,9 @@ namespace terrace::dem {
 // north-eastern.
 class CellSurface {
  public:
-  // `corners`: the nodes' places in pixels, known to that slack. `is_separable`: columns are meridians and rows are
-  // parallels, evenly spaced.
-  CellSurface(const std::array<Position, 4>& corners, bool is_separable, double position_slack);
+  // `corners`: the nodes' places in pixels, known to that slack beside places of samples. `is_separable`: columns are
+  // meridians and rows are parallels, evenly spaced.
+  CellSurface(const std::array<Position, 4>& corners, bool is_separable, const Position& slack);
 
   void SetHeight(std::size_t corner, double height) { heights_[corner] = height; }
   // Heights of samples are known to this much less.

@@ -155,6 +155,20 @@ std::optional<PixelOffset> Georeference::OffsetOf(const Georeference& other) con
   return PixelOffset{static_cast<std::int64_t>(column), static_cast<std::int64_t>(row)};
 }
 
+Position Georeference::LargestMisplacement(const Georeference& other, const PixelOffset& first) const {
+  Position largest{0, 0};
+  const double width = other.width_, height = other.height_;
+  // Both grids are affine: the difference is largest at a corner.
+  for (const Position corner : {Position{0, 0}, {width, 0}, {0, height}, {width, height}}) {
+    const Position there = Apply(to_pixel_, Apply(other.to_crs_, corner));
+    double x = there.x - corner.x - static_cast<double>(first.column);
+    if (period_ > 0) x -= period_ * std::round(x / period_);
+    const double y = there.y - corner.y - static_cast<double>(first.row);
+    largest = {std::max(largest.x, std::abs(x)), std::max(largest.y, std::abs(y))};
+  }
+  return largest;
+}
+
 Result<Georeference> Georeference::Moved(const PixelOffset& first, int width, int height,
                                          const std::string& name) const {
   Georeference moved;

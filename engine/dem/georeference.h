@@ -42,6 +42,10 @@ class Georeference {
   // The outer corner of `other`'s first pixel, in pixels of this one. Precondition: both have one CRS.
   Position CornerOf(const Georeference& other) const;
 
+  // Pixels by which those of `other` lie off the pixels of this grid that they count as, `first` its first one: the
+  // most on each axis. Columns of geographic grids are counted modulo 360 degrees.
+  Position LargestMisplacement(const Georeference& other, const PixelOffset& first) const;
+
   // That of `width` x `height` pixels of the same grid from `first` on. `name` stands for them in errors.
   Result<Georeference> Moved(const PixelOffset& first, int width, int height, const std::string& name) const;
 

@@ -122,6 +122,7 @@ Result<Sheet> Sheet::Make(SheetPlan plan, const SheetOptions& options) {
   sheet.spacing_ = SourceSpacing::Of(sheet.georeference_, first.info().path).value_or(first.spacing());
   sheet.reach_ = Footprint::Of(sheet.georeference_).Padded();
   sheet.IndexMembers();
+  sheet.MeasureMembers();
   sheet.FindPoleHeights();
   if (const auto& geoid = sheet.vertical().geoid) {
     auto undulations = Undulations::Of(geoid, sheet.reach_);
@@ -154,6 +155,21 @@ void Sheet::IndexMembers() {
   for (std::size_t i = 0; i < cover_.size(); ++i) blocks.push_back({BoxOf(cover_[i]), i});
   member_index_ = BoxIndex(entries);
   cover_index_ = BoxIndex(blocks);
+}
+
+// Rasters are joined that lie a little off one grid. They are read as if they were on it; the bound on a tile's error
+// knows better.
+void Sheet::MeasureMembers() {
+  // Around the Earth 360 degrees count as whole columns: where the sheet closes its surface leaps by what is left, and
+  // columns beyond lie off by as much.
+  const double seam = wraps_ ? 2 * std::abs(georeference_.period() - columns_) : 0;
+  for (SheetMember& member : members_) {
+    if (members_.size() > 1) {
+      member.misplacement =
+          georeference_.LargestMisplacement(member.raster->georeference(), {member.column, member.row});
+    }
+    member.misplacement.x += seam;
+  }
 }
 
 // The mean of the rows that lie at a pole, of members by their width.

@@ -129,6 +129,7 @@ class Sheet {
   GridAxis Columns(int factor) const { return {columns_, factor, wraps_}; }
   GridAxis Rows(int factor) const { return {height_, factor, false}; }
   void IndexMembers();
+  void MeasureMembers();
   void FindPoleHeights();
 
   // A cell for each position inside the sheet whose height is NaN, and which it is.

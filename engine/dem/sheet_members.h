@@ -16,6 +16,8 @@ namespace terrace::dem {
 struct SheetMember {
   std::shared_ptr<const RasterSource> raster;
   std::int64_t column = 0, row = 0;  // of its first pixel in the sheet
+  // Pixels by which its samples lie off those of the sheet, the most on each axis. Set by the sheet.
+  Position misplacement = {0, 0};
 
   geo::TileRange pixels() const {  // y is the row, downwards
     return {column, row, column + raster->layout().width - 1, row + raster->layout().height - 1};

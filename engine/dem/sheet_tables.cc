@@ -18,6 +18,10 @@ SheetTables::SheetTables(const Sheet& sheet, const SheetTrace& trace, std::size_
       turn_(sheet.georeference().period()),
       around_(BoxAround(stride)),
       near_(MembersAround()) {
+  for (const std::size_t i : near_) {
+    const Position& off = sheet.members()[i].misplacement;
+    misplacement_ = {std::max(misplacement_.x, off.x), std::max(misplacement_.y, off.y)};
+  }
   if (near_.size() > kFewMembers) return;
   for (const std::size_t i : near_) tables_.push_back(sheet.members()[i].raster->tables());
 }

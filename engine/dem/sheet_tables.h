@@ -19,6 +19,9 @@ class SheetTables {
   // So far, for all that was asked. A box is to cost what it meets, not what the sheet holds.
   std::size_t members_visited() const { return members_visited_; }
 
+  // Pixels by which samples of the rasters around the tile lie off the sheet's, the most on each axis.
+  const Position& misplacement() const { return misplacement_; }
+
   // At least the range of pixels in a box, clipped to the sheet.
   BlockRange Ranges(double west, double north, double east, double south) const;
 
@@ -42,6 +45,7 @@ class SheetTables {
   std::vector<std::size_t> near_;  // members that meet it, in any turn
   mutable std::size_t members_visited_ = 0;
   std::vector<SurveyPages::Tables> tables_;  // of near_, where they are few; else empty
+  Position misplacement_{0, 0};
 };
 
 }  // namespace terrace::dem

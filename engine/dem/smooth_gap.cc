@@ -50,7 +50,12 @@ class Lanes {
 
 SmoothGap::SmoothGap(const TileNodes& tile, const Sheet& sheet, const SheetTrace& trace, const SheetTables& tables,
                      const GeoidGap& geoid, bool blends)
-    : tile_(tile), trace_(trace), tables_(tables), geoid_(geoid), blends_(blends) {
+    : tile_(tile),
+      trace_(trace),
+      tables_(tables),
+      geoid_(geoid),
+      blends_(blends),
+      misplacement_{tables.misplacement().x / trace.factor, tables.misplacement().y / trace.factor} {
   PlaceNodes(sheet);
 }
 
@@ -64,7 +69,8 @@ void SmoothGap::PlaceNodes(const Sheet& sheet) {
   const auto last = [&](const GridAxis& axis, int samples) {
     return static_cast<double>(axis.count() - (samples % trace_.factor == 0 ? 1 : 2));
   };
-  const double last_x = last(columns, sheet.columns()), last_y = last(rows, sheet.rows());
+  const double last_x = last(columns, sheet.columns()) - misplacement_.x;
+  const double last_y = last(rows, sheet.rows()) - misplacement_.y;
   for (std::size_t n = 0; n < x_.size(); ++n) {
     const std::int32_t at = trace_.cell_of_node[n];
     if (at < 0) continue;
@@ -135,10 +141,11 @@ bool SmoothGap::Measure(const CellBox& box, Steps& steps, PixelBounds& at) const
   }
   if (!std::isfinite(finite)) return false;
   // A line that bends by b per step is off its chord by b / 8; half as much again for how the bend itself changes, in
-  // both directions. Positions are known to a hundred-thousandth.
+  // both directions. Positions are known to a hundred-thousandth, those of samples to their misplacement.
   constexpr double kOffChord = 1.5 * 2 / 8, kPosition = 4e-5;
-  steps.bend_x = steps.bend_x * kOffChord + kPosition;
-  steps.bend_y = steps.bend_y * kOffChord + kPosition;
+  steps.bend_x = steps.bend_x * kOffChord + kPosition + misplacement_.x;
+  steps.bend_y = steps.bend_y * kOffChord + kPosition + misplacement_.y;
+  at.Grow(misplacement_.x, misplacement_.y);
   return true;
 }
 
@@ -161,6 +168,9 @@ double SmoothGap::Over(const CellBox& box) const {
 bool SmoothGap::Measure(std::int64_t left, std::int64_t top, std::int64_t right, std::int64_t bottom,
                         Bends& bends) const {
   const GridWindow& window = trace_.window;
+  // Beyond the outermost averages the surface goes on as it ends.
+  left = std::max(left, window.column);
+  top = std::max(top, window.row);
   right = std::min(right, window.column + window.columns - 1);
   bottom = std::min(bottom, window.row + window.rows - 1);
   const auto columns = static_cast<std::size_t>(right - left + 1);

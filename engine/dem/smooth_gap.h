@@ -30,7 +30,7 @@ class SmoothGap {
     double x = 0, y = 0, xx = 0, yy = 0, xy = 0;
   };
   // What the node positions of a box of cells say: how far it is from one node to the next, in samples, and how far
-  // that is from an even step.
+  // a place may be from where even steps have it.
   struct Steps {
     double east_x = 0, east_y = 0, north_x = 0, north_y = 0, bend_x = 0, bend_y = 0;
   };
@@ -48,7 +48,8 @@ class SmoothGap {
   const SheetTables& tables_;
   const GeoidGap& geoid_;
   const bool blends_;
-  std::vector<double> x_, y_;  // by node, in samples of the grid; NaN away from its even part
+  const Position misplacement_;  // of samples, in averages
+  std::vector<double> x_, y_;    // by node, in samples of the grid; NaN away from its even part
 };
 
 }  // namespace terrace::dem

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 
 namespace terrace::proto {
 namespace {
@@ -9,6 +10,31 @@ namespace {
 // The plumb line passes the first corner further off than any of the other two lie from it.
 bool IsFarFrom(const geo::Vec3& foot, const geo::Vec3& up, const geo::Vec3& a, const geo::Vec3& b, const geo::Vec3& c) {
   return geo::Length(geo::Cross(a - foot, up)) > std::max(geo::Length(b - a), geo::Length(c - a)) * 1.01 + 1;
+}
+
+// Triangles that are not far from every plumb line of a block of nodes: of those neither the feet nor the directions
+// differ from the middle one's by more than is added. All nodes against every triangle would take minutes.
+std::vector<std::size_t> NearBlock(const LatticeView& lattice, int west, int south, int side,
+                                   const std::vector<geo::Vec3>& ecef,
+                                   const std::vector<std::array<std::uint32_t, 3>>& triangles) {
+  const int east = std::min(west + side - 1, lattice.cells()), north = std::min(south + side - 1, lattice.cells());
+  const double x = lattice.Longitude((west + east) / 2), y = lattice.Latitude((south + north) / 2);
+  const geo::Vec3 foot = geo::ToEcef(x, y, 0), up = geo::SurfaceNormal(x, y);
+  double apart = 0, turned = 0;
+  for (int j = south; j <= north; ++j) {
+    for (int i = west; i <= east; ++i) {
+      apart = std::max(apart, geo::Length(geo::ToEcef(lattice.Longitude(i), lattice.Latitude(j), 0) - foot));
+      turned = std::max(turned, geo::Length(geo::SurfaceNormal(lattice.Longitude(i), lattice.Latitude(j)) - up));
+    }
+  }
+  std::vector<std::size_t> near;
+  for (std::size_t t = 0; t < triangles.size(); ++t) {
+    const geo::Vec3 &a = ecef[triangles[t][0]], &b = ecef[triangles[t][1]], &c = ecef[triangles[t][2]];
+    const double reach = std::max(geo::Length(b - a), geo::Length(c - a)) * 1.01 + 1;
+    const double more = apart + (geo::Length(a - foot) + apart) * turned;
+    if (geo::Length(geo::Cross(a - foot, up)) <= reach + more) near.push_back(t);
+  }
+  return near;
 }
 
 }  // namespace
@@ -25,12 +51,22 @@ FlatError LargestFlatError(const LatticeView& lattice, const std::vector<geo::Ve
   };
   const auto length = [](const Vector& a) { return std::sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]); };
   FlatError largest;
-  for (int j = margin; j <= lattice.cells() - margin; ++j) {
+  constexpr int kBlock = 8;
+  std::vector<std::vector<std::size_t>> near;  // of a row of blocks
+  for (int j = 0; j <= lattice.cells(); ++j) {
+    if (j % kBlock == 0) {
+      near.clear();
+      for (int i = 0; i <= lattice.cells(); i += kBlock) {
+        near.push_back(NearBlock(lattice, i, j, kBlock, ecef, triangles));
+      }
+    }
+    if (j < margin || j > lattice.cells() - margin) continue;
     for (int i = margin; i <= lattice.cells() - margin; ++i) {
       const geo::Vec3 foot = geo::ToEcef(lattice.Longitude(i), lattice.Latitude(j), 0);
       const geo::Vec3 normal = geo::SurfaceNormal(lattice.Longitude(i), lattice.Latitude(j));
       const Vector down = {-normal.x, -normal.y, -normal.z};
-      for (const auto& t : triangles) {
+      for (const std::size_t index : near[static_cast<std::size_t>(i / kBlock)]) {
+        const auto& t = triangles[index];
         if (IsFarFrom(foot, normal, ecef[t[0]], ecef[t[1]], ecef[t[2]])) continue;
         // foot + height up = a + u (b - a) + v (c - a)
         const Vector ab = minus(ecef[t[1]], ecef[t[0]]), ac = minus(ecef[t[2]], ecef[t[0]]);

@@ -25,14 +25,24 @@ from server import ROOT, Server, fetch, get, percentile, read_reply, wait_until
 HOT = "/earth/0/0/0.terrain"
 
 
-def tests(binary, pattern):
-    """Runs GoogleTest's tests: (all passed and there were some, what they recorded)."""
+def run_tests(binary, pattern, long=False):
+    """Runs GoogleTest's tests: what each of them reports."""
     with tempfile.NamedTemporaryFile(suffix=".json") as report:
         subprocess.run([str(binary), f"--gtest_filter={pattern}", f"--gtest_output=json:{report.name}"], stdout=subprocess.DEVNULL,
-                       stderr=subprocess.DEVNULL, timeout=300, check=False)
+                       stderr=subprocess.DEVNULL, timeout=14400 if long else 600, check=False,
+                       env=os.environ | ({"TERRACE_LONG_TESTS": "1"} if long else {}))
         suites = json.load(open(report.name, encoding="utf-8"))
-    cases = [case for suite in suites["testsuites"] for case in suite["testsuite"]]
-    recorded = {key: int(value) for case in cases for key, value in case.items() if isinstance(value, str) and value.isdigit()}
+    return [case for suite in suites["testsuites"] for case in suite["testsuite"]]
+
+
+def recorded_by(case):
+    return {key: int(value) for key, value in case.items() if isinstance(value, str) and value.isdigit()}
+
+
+def tests(binary, pattern):
+    """Runs GoogleTest's tests: (all passed and there were some, how many, what they recorded, those that did not)."""
+    cases = run_tests(binary, pattern)
+    recorded = {key: value for case in cases for key, value in recorded_by(case).items()}
     failed = [case["name"] for case in cases if case.get("failures") or case.get("result") == "SKIPPED"]
     return bool(cases) and not failed, len(cases), recorded, failed
 
@@ -650,3 +660,20 @@ def row_46(binary, _, long):
     kept = second <= 10 and resident < 1 << 20 and statuses == {200} and of_many <= 2 * of_one + 0.001
     return kept, f"{count:,} sources of {pixels} rows: {first:.0f} s to start, {second:.1f} s with statistics kept, RSS {resident / 1024:.0f} MB; " \
                  f"a cold tile takes {1000 * of_many:.1f} ms of a processor, {1000 * of_one:.1f} ms with its source alone; {statuses}"
+
+
+def row_47(_, test_binary, long):
+    """Both errors that a tile's head states, by brute force on its bytes. Cases whose data is missing are skipped and told."""
+    told, kept = [], True
+    for name, states in (("stated", "Terrain-Max-Error"), ("certified", "Terrain-Certified-Error")):
+        cases = run_tests(binary_of(test_binary, f"tiles/{name}_error_test"), "*", long)
+        tried = [recorded_by(case) for case in cases if case.get("result") != "SKIPPED"]
+        failed = [case["name"] for case in cases if case.get("failures")]
+        kept = kept and bool(tried) and not failed
+        above = sum(case.get("above", 0) for case in tried)
+        medians = sorted(case["hundredths_in_median"] / 100 for case in tried if "hundredths_in_median" in case)
+        told.append(f"{states}: {above} of {sum(case.get('tiles', 0) for case in tried):,} tiles of {len(tried)} datasets above it"
+                    + (f", {statistics.median(medians):.1f} times the true one, {medians[-1]:.1f} at most (medians)" if medians else "")
+                    + (f", {len(cases) - len(tried)} skipped for want of data" if len(tried) < len(cases) else "")
+                    + (f", failed: {failed}" if failed else ""))
+    return kept, "; ".join(told)
