@@ -44,6 +44,7 @@ class RasterSource {
   const Footprint& footprint() const { return footprint_; }
   const SourceSpacing& spacing() const { return spacing_; }
   const RangeTable& ranges() const { return survey_.table; }
+  const RimVoids& rim_voids() const { return survey_.rim_voids; }
   const AveragingErrors& averaging_errors() const { return survey_.errors; }
   // Of the valid samples of the first and the last row.
   const std::array<std::optional<double>, 2>& edge_row_means() const { return survey_.edge_row_means; }
