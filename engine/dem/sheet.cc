@@ -242,7 +242,7 @@ Result<void> Sheet::FillAt(std::span<const Position> positions, std::size_t stri
   if (trace != nullptr) window = Grown(window, kRim, factor);
   const auto bridged = ReadBridged(factor, window, stop, trace != nullptr ? &trace->samples : nullptr);
   if (!bridged) return tl::unexpected(bridged.error());
-  const auto smoothed = FillHoles(factor, window, bridged->heights, stop);
+  const auto smoothed = FillHoles(factor, window, *bridged, stop);
   if (!smoothed) return tl::unexpected(smoothed.error());
   const bool has_holes = !smoothed->empty();
   const std::vector<float>& samples = has_holes ? *smoothed : bridged->heights;

@@ -168,7 +168,7 @@ class Sheet {
                               std::vector<float>* measured = nullptr) const;
   // The same with smooth surfaces in the holes that are left (sheet_holes.cc); empty where there are none.
   // Precondition: `bridged` is what ReadBridged gives.
-  Result<std::vector<float>> FillHoles(int factor, const GridWindow& window, const std::vector<float>& bridged,
+  Result<std::vector<float>> FillHoles(int factor, const GridWindow& window, const Bridged& bridged,
                                        const std::stop_token& stop) const;
   Result<std::vector<float>> ReadSmooth(int factor, const GridWindow& window, bool is_guess,
                                         const std::stop_token& stop) const;

@@ -134,11 +134,10 @@ Result<std::vector<float>> Sheet::ReadSmooth(int factor, const GridWindow& windo
   }
 }
 
-Result<std::vector<float>> Sheet::FillHoles(int factor, const GridWindow& window, const std::vector<float>& bridged,
+Result<std::vector<float>> Sheet::FillHoles(int factor, const GridWindow& window, const Bridged& bridged,
                                             const std::stop_token& stop) const {
-  const auto is_void = [](float height) { return std::isnan(height); };
-  if (options_.voids != HoleFill::kSmooth || std::ranges::none_of(bridged, is_void)) return std::vector<float>();
-  const auto holes = voids_.HolesIn(members_, member_index_, factor, window, Columns(factor).count(), bridged);
+  if (options_.voids != HoleFill::kSmooth || bridged.voids == 0) return std::vector<float>();
+  const auto holes = voids_.HolesIn(members_, member_index_, factor, window, Columns(factor).count(), bridged.heights);
   if (std::ranges::none_of(holes, [](std::uint8_t is_hole) { return is_hole != 0; })) return std::vector<float>();
   return ReadSmooth(factor, window, false, stop);
 }

@@ -88,7 +88,7 @@ Result<void> Sheet::FillPoints(std::span<const GeoPosition> points, HeightDatum 
     std::vector<float> measured;
     const auto bridged = ReadBridged(1, window, stop, &measured);
     if (!bridged) return tl::unexpected(bridged.error());
-    const auto smoothed = FillHoles(1, window, bridged->heights, stop);
+    const auto smoothed = FillHoles(1, window, *bridged, stop);
     if (!smoothed) return tl::unexpected(smoothed.error());
     const std::vector<float>& samples = smoothed->empty() ? bridged->heights : *smoothed;
     for (std::size_t i = 0; first != end; ++first, ++i) {

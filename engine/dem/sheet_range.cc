@@ -174,9 +174,9 @@ SheetRange Sheet::RangeOf(const geo::Lattice& lattice, const geo::TileKey& key) 
     box.Grow(1.5 * factor + 1, 1.5 * factor + 1);
     BlockRange here = Ranges({box.west, box.north, box.east, box.south});
     if (here.has_voids) {
+      here.Add(RangeAroundHoles({box.west, box.north, box.east, box.south}, factor));
       box.Grow(options_.max_void_gap + factor, options_.max_void_gap + factor);
       here.Add(Ranges({box.west, box.north, box.east, box.south}));
-      here.Add(RangeAroundHoles({box.west, box.north, box.east, box.south}, factor));
     }
     blocks.Add(here);
   }

@@ -37,6 +37,7 @@ TEST(ToJson, ComesBackWithEveryOptionSet) {
                         1e-3,
                         -0.3,
                         7,
+                        HoleFill::kFloor,
                         12.5,
                         9,
                         Criterion::kDataDependent,
