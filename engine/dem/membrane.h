@@ -47,8 +47,8 @@ std::vector<VoidRegion> RegionsIn(const VoidGrid& grid, const GridWindow& core, 
 // samples stay NaN where nothing is beside it. Precondition: !region.is_cut && !region.is_large().
 void Solve(const VoidRegion& region, VoidGrid& grid);
 
-// Moves samples that have a guess towards the mean of their neighbours, kSweeps times: each then depends on those within
-// kSweeps of it. Others stay as they are, and count unless they are NaN.
+// Moves samples that have a guess towards the mean of their neighbours, kSweeps times: each then depends on those
+// within kSweeps of it. Others stay as they are, and count unless they are NaN.
 inline constexpr int kSweeps = 8;
 void Relax(const std::vector<std::size_t>& samples, VoidGrid& grid);
 
