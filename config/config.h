@@ -25,6 +25,8 @@ struct NodataConfig {
   friend bool operator==(const NodataConfig&, const NodataConfig&) = default;
 };
 
+// What large voids show that have data all around them: dem::HoleFill, which this room does not know.
+enum class HoleFill : std::uint8_t { kSmooth, kFloor };
 // How the triangles of a tile are joined: tin::Criterion, which this room does not know.
 enum class Criterion : std::uint8_t { kDelaunay, kDataDependent };
 // How GLB tiles are compressed unless a request says: proto::GlbCompression, which this room does not know.
@@ -84,8 +86,9 @@ struct DatasetConfig {
   std::string attribution;
   double error_fraction = 0.5;         // default error of a level, as a share of the error that clients assume there
   std::optional<double> finest_error;  // metres; decides the deepest level
-  std::optional<double> floor;         // metres; height outside the source and in large voids
+  std::optional<double> floor;         // metres; height outside the source and in collars
   int max_void_gap = 64;               // source samples; narrower voids are filled
+  HoleFill voids = HoleFill::kSmooth;  // of larger ones with data all around them
   double feather = 0;                  // metres: how far from its edges a source gives way to the next
   Criterion criterion = Criterion::kDelaunay;
   bool compact = false;  // tiles go through the drop pass

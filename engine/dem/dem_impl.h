@@ -25,7 +25,7 @@ class DemSource::Impl {
   Result<TileHeights> Read(const geo::TileKey& key, Counting counting, const std::stop_token& stop) const;
   Result<std::vector<float>> ReadMercator(int depth, const NodeWindow& window, const std::stop_token& stop) const;
   Result<std::vector<float>> ReadPoints(std::span<const GeoPosition> points, HeightDatum datum,
-                                        const std::stop_token& stop) const;
+                                        std::span<std::uint8_t> filled, const std::stop_token& stop) const;
   HeightRange RangeBound(const geo::TileKey& key) const;
 
   const geo::Lattice& LatticeOf(int level) const;  // 0 .. geo::kMaxLevel, also beyond the deepest level served

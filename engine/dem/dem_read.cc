@@ -16,13 +16,12 @@ namespace {
 bool IsVoid(float height) { return std::isnan(height); }
 
 Result<void> FillFrom(const Sheet& sheet, const geo::Lattice& lattice, const NodeWindow& window, Counting counting,
-                      std::span<float> heights, const std::stop_token& stop, std::span<float> weights,
-                      SheetTrace* trace) {
-  return sheet.Fill(lattice, window, counting, heights, stop, weights, trace);
+                      const NodeHeights& nodes, const std::stop_token& stop, SheetTrace* trace) {
+  return sheet.Fill(lattice, window, counting, nodes, stop, trace);
 }
 Result<void> FillFrom(const Sheet& sheet, const geo::MercatorGrid& grid, const NodeWindow& window, Counting,
-                      std::span<float> heights, const std::stop_token& stop, std::span<float> weights, SheetTrace*) {
-  return sheet.Fill(grid, window, heights, stop, weights);
+                      const NodeHeights& nodes, const std::stop_token& stop, SheetTrace*) {
+  return sheet.Fill(grid, window, nodes, stop);
 }
 
 // Around the nodes of a window. Their longitudes begin between -180 and 180, and go on eastwards.
@@ -93,20 +92,25 @@ void ForPart(const NodeWindow& part, const NodeWindow& window, Visit&& visit) {
 // may lie in a shallow tile, and what they note waits until all heights are known.
 template <typename Grid>
 Result<void> FillAny(const Sheet& sheet, const Grid& grid, const NodeWindow& window, std::size_t sheets,
-                     Counting counting, std::vector<float>& heights, const std::stop_token& stop,
-                     std::vector<float>& weights, PartTrace* traced) {
+                     Counting counting, const NodeHeights& nodes, const std::stop_token& stop, PartTrace* traced) {
   SheetTrace* const trace = traced != nullptr ? &traced->trace : nullptr;
-  if (sheets <= kFewSheets) return FillFrom(sheet, grid, window, counting, heights, stop, weights, trace);
+  if (sheets <= kFewSheets) return FillFrom(sheet, grid, window, counting, nodes, stop, trace);
   const NodeWindow part = PartOf(sheet, grid, window, 0);
-  const std::size_t nodes = static_cast<std::size_t>(part.columns) * static_cast<std::size_t>(part.rows);
-  std::vector<float> of_part(nodes), weights_of_part(weights.empty() ? 0 : nodes, 1);
-  ForPart(part, window, [&](std::size_t to, std::size_t from) { of_part[to] = heights[from]; });
-  const auto filled = FillFrom(sheet, grid, part, counting, of_part, stop, weights_of_part, trace);
+  const auto copy = [&](std::span<const float> all) {
+    std::vector<float> some(all.empty() ? 0
+                                        : static_cast<std::size_t>(part.columns) * static_cast<std::size_t>(part.rows));
+    if (!all.empty()) ForPart(part, window, [&](std::size_t to, std::size_t from) { some[to] = all[from]; });
+    return some;
+  };
+  const auto copy_back = [&](const std::vector<float>& some, std::span<float> all) {
+    if (!all.empty()) ForPart(part, window, [&](std::size_t from, std::size_t to) { all[to] = some[from]; });
+  };
+  std::vector<float> heights = copy(nodes.heights), weights = copy(nodes.weights), smooth = copy(nodes.smooth);
+  const auto filled = FillFrom(sheet, grid, part, counting, {heights, weights, smooth}, stop, trace);
   if (!filled) return filled;
-  ForPart(part, window, [&](std::size_t from, std::size_t to) { heights[to] = of_part[from]; });
-  if (!weights.empty()) {
-    ForPart(part, window, [&](std::size_t from, std::size_t to) { weights[to] = weights_of_part[from]; });
-  }
+  copy_back(heights, nodes.heights);
+  copy_back(weights, nodes.weights);
+  copy_back(smooth, nodes.smooth);
   if (traced != nullptr) {
     traced->part = part;
     trace->positions = {};  // can be found again
@@ -200,7 +204,7 @@ Result<std::vector<float>> DemSource::Impl::ReadSheets(const Grid& grid, const N
                                                        const std::string& what, const std::stop_token& stop,
                                                        std::vector<PartTrace>* traces) const {
   const std::size_t nodes = static_cast<std::size_t>(window.columns) * static_cast<std::size_t>(window.rows);
-  std::vector<float> heights(nodes, SampleRules::kVoid);
+  std::vector<float> heights(nodes, SampleRules::kVoid), smooth = heights;
   const std::vector<std::size_t> order = SheetsAt(BoxOf(grid, window));
   const bool feathers = has_feather && order.size() > 1;
   Blend blend(feathers ? nodes : 0);
@@ -211,7 +215,8 @@ Result<std::vector<float>> DemSource::Impl::ReadSheets(const Grid& grid, const N
       weights.assign(nodes, 1);
     }
     PartTrace* const trace = traces != nullptr ? &traces->emplace_back() : nullptr;
-    const auto filled = FillAny(sheets[i], grid, window, order.size(), counting, heights, stop, weights, trace);
+    const auto filled =
+        FillAny(sheets[i], grid, window, order.size(), counting, {heights, weights, smooth}, stop, trace);
     if (!filled) {
       return MakeError(filled.error().code, "{}: {}", what, filled.error().message);
     }
@@ -219,6 +224,10 @@ Result<std::vector<float>> DemSource::Impl::ReadSheets(const Grid& grid, const N
     if (feathers ? blend.is_done() : std::ranges::none_of(heights, IsVoid)) break;
   }
   if (feathers) heights = blend.Heights();
+  // What is measured coarsely in a hole is better than what is measured around it.
+  for (std::size_t i = 0; i < nodes; ++i) {
+    if (std::isnan(heights[i])) heights[i] = smooth[i];
+  }
   return heights;
 }
 
@@ -279,12 +288,12 @@ Result<double> DemSource::Impl::GapOf(const TileHeights& tile, const NodeWindow&
     if (const auto added = gap.Add(sheet, trace, stop); !added) return tl::unexpected(added.error());
   }
   // All nodes have their height; samples of further sheets may still show between them.
-  std::vector<float> none_wanted = tile.heights, no_weights;
+  std::vector<float> none_wanted = tile.heights;
   for (std::size_t k = traces.size(); k < order.size() && !gap.is_covered(); ++k) {
     const Sheet& sheet = sheets[order[k]];
     PartTrace traced;
-    const auto filled = FillAny(sheet, tile.lattice, window, order.size(), Counting::kEllipsoid, none_wanted, stop,
-                                no_weights, &traced);
+    const auto filled =
+        FillAny(sheet, tile.lattice, window, order.size(), Counting::kEllipsoid, {none_wanted}, stop, &traced);
     if (!filled) return tl::unexpected(filled.error());
     const SheetTrace trace = Widened(std::move(traced), sheet, tile.lattice, window);
     if (const auto added = gap.Add(sheet, trace, stop); !added) return tl::unexpected(added.error());
@@ -301,24 +310,36 @@ Result<std::vector<float>> DemSource::Impl::ReadMercator(int depth, const NodeWi
 }
 
 Result<std::vector<float>> DemSource::Impl::ReadPoints(std::span<const GeoPosition> points, HeightDatum datum,
+                                                       std::span<std::uint8_t> filled,
                                                        const std::stop_token& stop) const {
-  std::vector<float> heights(points.size(), SampleRules::kVoid);
+  std::vector<float> heights(points.size(), SampleRules::kVoid), smooth = heights;
   std::map<std::size_t, std::vector<std::size_t>> wanted;  // points by the sheets that may have them
   for (std::size_t i = 0; i < points.size(); ++i) {
     const double x = std::remainder(points[i].longitude, 360), y = points[i].latitude;
     for (const std::size_t sheet : SheetsAt({x, y, x, y})) wanted[sheet].push_back(i);
   }
   std::vector<GeoPosition> missing;
-  std::vector<float> found;
+  std::vector<float> found, found_smooth;
+  std::vector<std::uint8_t> found_filled;
   for (auto& [sheet, those] : wanted) {
     std::erase_if(those, [&](std::size_t i) { return !std::isnan(heights[i]); });
     missing.clear();
     for (const std::size_t i : those) missing.push_back(points[i]);
     found.assign(those.size(), SampleRules::kVoid);
-    if (const auto filled = sheets[sheet].FillPoints(missing, datum, found, stop); !filled) {
-      return tl::unexpected(filled.error());
+    found_smooth = found;
+    found_filled.assign(those.size(), 0);
+    const auto read = sheets[sheet].FillPoints(missing, datum, {found, {}, found_smooth}, found_filled, stop);
+    if (!read) return tl::unexpected(read.error());
+    for (std::size_t k = 0; k < those.size(); ++k) {
+      heights[those[k]] = found[k];
+      if (!filled.empty()) filled[those[k]] = found_filled[k];
+      if (std::isnan(smooth[those[k]])) smooth[those[k]] = found_smooth[k];
     }
-    for (std::size_t k = 0; k < those.size(); ++k) heights[those[k]] = found[k];
+  }
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (!std::isnan(heights[i]) || std::isnan(smooth[i])) continue;
+    heights[i] = smooth[i];
+    if (!filled.empty()) filled[i] = 1;
   }
   return heights;
 }

@@ -52,7 +52,7 @@ Result<void> CheckOptions(const DemOptions& options) {
 
 std::uint64_t FingerprintOf(const std::vector<Sheet>& sheets, const DemOptions& options, double floor) {
   // Changes whenever the same files and options would give other heights than before.
-  constexpr std::uint32_t kResamplingVersion = 2;
+  constexpr std::uint32_t kResamplingVersion = 3;
   ByteWriter writer;
   writer.Put(kResamplingVersion);
   for (const Sheet& sheet : sheets) {
@@ -74,6 +74,7 @@ std::uint64_t FingerprintOf(const std::vector<Sheet>& sheets, const DemOptions& 
   writer.Put(options.finest_error.value_or(0));
   writer.Put(floor);
   writer.Put(options.max_void_gap);
+  writer.Put(static_cast<std::uint8_t>(options.voids));
   if (options.feather > 0) writer.Put(options.feather);
   const std::string bytes = writer.Take();
   return XXH3_64bits(bytes.data(), bytes.size());
@@ -190,7 +191,7 @@ Result<std::unique_ptr<DemSource>> DemSource::Open(std::vector<DemFile> files, c
   std::vector<std::string> left_out;
   const auto rasters = OpenRasters(files, options, left_out);
   if (!rasters) return tl::unexpected(rasters.error());
-  auto sheets = SheetsOf(files, *rasters, {options.max_void_gap, options.feather});
+  auto sheets = SheetsOf(files, *rasters, {options.max_void_gap, options.voids, options.feather});
   if (!sheets) return tl::unexpected(sheets.error());
 
   auto impl = std::make_unique<Impl>();
@@ -290,8 +291,9 @@ Result<std::vector<float>> DemSource::ReadMercator(int depth, const NodeWindow& 
 }
 
 Result<std::vector<float>> DemSource::ReadPoints(std::span<const GeoPosition> points, HeightDatum datum,
-                                                 std::stop_token stop) const {
-  return impl_->ReadPoints(points, datum, stop);
+                                                 std::stop_token stop, std::span<std::uint8_t> filled) const {
+  TERRACE_CHECK(filled.empty() || filled.size() == points.size());
+  return impl_->ReadPoints(points, datum, filled, stop);
 }
 
 }  // namespace terrace::dem

@@ -36,6 +36,13 @@ struct SourceOptions {
   friend bool operator==(const SourceOptions&, const SourceOptions&) = default;
 };
 
+// What is drawn in a hole, a large void with data all around it, where no source has a height. Voids that touch the rim
+// of their source are collars, and show the floor in any case (docs/decisions/0015-voids.md).
+enum class HoleFill : std::uint8_t {
+  kSmooth,  // a smooth surface between the heights around it
+  kFloor,
+};
+
 // What heights are to count from.
 enum class HeightDatum : std::uint8_t {
   kEllipsoid,    // that of WGS 84, as in tiles
@@ -47,8 +54,9 @@ struct DemOptions {
   double error_fraction = 0.5;  // default error of a level, as a share of the clients' level error
   std::optional<double> finest_error =
       {};                            // metres: the deepest level is the first whose default error is at most this
-  std::optional<double> floor = {};  // metres above the ellipsoid, outside the source and in large voids; default: the
+  std::optional<double> floor = {};  // metres above the ellipsoid, outside the source and in collars; default: the
                                      // lowest height, at most
+  HoleFill voids = HoleFill::kSmooth;
   int max_void_gap = 64;  // source samples: voids narrower than this along a row, column or diagonal are filled
   // A folder for what is learnt of sources once (docs/configuration.md). Empty: nothing is kept.
   std::string cache_dir = {};
@@ -115,6 +123,7 @@ struct RasterInfo {
   std::string heights_doubted;               // why they are hardly metres, with a way out; empty: they may be
   HeightRange ellipsoidal;                   // at least as wide as they are once converted
   std::uint64_t valid_samples = 0, void_samples = 0;
+  std::uint64_t hole_samples = 0;  // of the voids, those that do not touch its rim
   std::optional<double> nodata;
   std::string found_voids;  // what find_voids found, for people; empty: nothing
   std::vector<int> overview_factors;
@@ -140,7 +149,7 @@ struct DemInfo {
 // Samples read for tiles, at the resolution they were read at.
 struct SampleCounts {
   std::uint64_t measured = 0;
-  std::uint64_t filled = 0;  // small voids, from their edges
+  std::uint64_t filled = 0;  // voids, from the heights around them
   std::uint64_t voids = 0;   // other sources or the floor show there
 };
 
@@ -220,11 +229,13 @@ class DemSource {
   // pixel alone. Depths 0 .. geo::kMaxLevel; the first that is as fine as the source is info().max_mercator_depth.
   Result<std::vector<float>> ReadMercator(int depth, const NodeWindow& window, std::stop_token stop = {}) const;
 
-  // Heights as measured: bilinear between the samples of the full resolution, in the order of `points`; NaN outside the
-  // sources and where the sample whose pixel holds the point is void in all of them. Nothing is filled. A height does
-  // not depend on the other points. Precondition: finite longitudes, latitudes in -90 .. 90.
+  // Heights of the sources' full resolution, bilinear between samples, in the order of `points`; NaN outside the
+  // sources, in collars, and in holes that are not smoothed over. Voids are filled as in tiles: `filled`, one for each
+  // point or none, becomes 1 where the sample whose pixel holds the point is void. A height does not depend on the
+  // other points. Precondition: finite longitudes, latitudes in -90 .. 90.
   Result<std::vector<float>> ReadPoints(std::span<const GeoPosition> points,
-                                        HeightDatum datum = HeightDatum::kEllipsoid, std::stop_token stop = {}) const;
+                                        HeightDatum datum = HeightDatum::kEllipsoid, std::stop_token stop = {},
+                                        std::span<std::uint8_t> filled = {}) const;
 
   // Whether it is known what every source counts from: else there are no orthometric heights.
   bool has_datum() const;

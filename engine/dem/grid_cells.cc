@@ -72,6 +72,14 @@ std::optional<double> Interpolate(const std::vector<float>& heights, const GridW
   return sum / weights;
 }
 
+bool HasSample(const std::vector<float>& heights, const GridWindow& window, const GridCell& cell) {
+  const auto has = [&](std::int64_t dx, std::int64_t dy, double weight) {
+    return weight > 0 && !std::isnan(SampleAt(heights, window, cell.column + dx, cell.row + dy));
+  };
+  return has(0, 0, (1 - cell.x) * (1 - cell.y)) || has(1, 0, cell.x * (1 - cell.y)) ||
+         has(0, 1, (1 - cell.x) * cell.y) || has(1, 1, cell.x * cell.y);
+}
+
 bool IsNearestValid(const std::vector<float>& heights, const GridWindow& window, const GridCell& cell) {
   return !std::isnan(
       SampleAt(heights, window, cell.column + (cell.x >= 0.5 ? 1 : 0), cell.row + (cell.y >= 0.5 ? 1 : 0)));

@@ -49,6 +49,9 @@ GridWindow WindowOf(std::span<GridCell> cells, const GridAxis& columns, const Gr
 // Bilinear, weights renormalized over valid samples; nothing where there is none.
 std::optional<double> Interpolate(const std::vector<float>& heights, const GridWindow& window, const GridCell& cell);
 
+// Whether one of the four samples that count is valid.
+bool HasSample(const std::vector<float>& heights, const GridWindow& window, const GridCell& cell);
+
 // Whether the nearest of the four samples is valid.
 bool IsNearestValid(const std::vector<float>& heights, const GridWindow& window, const GridCell& cell);
 

@@ -18,6 +18,7 @@ void BlockRange::Add(const BlockRange& other) {
   min = std::min(min, other.min);
   max = std::max(max, other.max);
   has_voids |= other.has_voids;
+  has_holes |= other.has_holes;
 }
 
 RangeTable::RangeTable(int width, int height) : width_(width), height_(height) {
@@ -55,6 +56,16 @@ void RangeTable::AddBlocks(int block_column, int block_row, int columns, const s
         .blocks[static_cast<std::size_t>(row) * static_cast<std::size_t>(finest.columns) +
                 static_cast<std::size_t>(column)]
         .Add(ranges[i]);
+  }
+}
+
+void RangeTable::MarkHole(int row, int first, int last) {
+  Level& finest = levels_.front();
+  for (int x = first / kBlock; x <= last / kBlock; ++x) {
+    finest
+        .blocks[static_cast<std::size_t>(row / kBlock) * static_cast<std::size_t>(finest.columns) +
+                static_cast<std::size_t>(x)]
+        .has_holes = true;
   }
 }
 

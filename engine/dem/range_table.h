@@ -1,4 +1,4 @@
-// Lowest and highest height and voids per block of 64 x 64 source pixels, and of ever larger blocks above.
+// Lowest and highest height, voids and holes per block of 64 x 64 source pixels, and of ever larger blocks above.
 #pragma once
 
 #include <cstddef>
@@ -13,6 +13,7 @@ struct BlockRange {
   float min = std::numeric_limits<float>::infinity();  // min > max: nothing but voids
   float max = -std::numeric_limits<float>::infinity();
   bool has_voids = false;
+  bool has_holes = false;  // voids with data all around them: they do not touch the raster's rim
 
   void Add(float height);  // NaN: a void
   void Add(const BlockRange& other);
@@ -32,6 +33,9 @@ class RangeTable {
 
   // Adds ranges of finest blocks, `columns` wide, from this block on.
   void AddBlocks(int block_column, int block_row, int columns, const std::vector<BlockRange>& ranges);
+
+  // Samples first .. last of a row are voids of a hole.
+  void MarkHole(int row, int first, int last);
 
   // Of all finest blocks so far.
   BlockRange OfFinest() const;

@@ -48,6 +48,16 @@ Chunk WithHalo(const Chunk& chunk, const RasterLayout& layout) {
           std::min(layout.height, chunk.row + chunk.rows + kHalo) - north};
 }
 
+// Of one row, `used` samples of it.
+void AddVoidRuns(const float* row, int r, int used, std::vector<VoidRun>& runs) {
+  for (int c = 0; c < used; ++c) {
+    if (!std::isnan(row[c])) continue;
+    const int first = c;
+    while (c + 1 < used && std::isnan(row[c + 1])) ++c;
+    runs.push_back({static_cast<std::uint16_t>(r), static_cast<std::uint16_t>(first), static_cast<std::uint16_t>(c)});
+  }
+}
+
 void CountSamples(const Samples& samples, const Chunk& chunk, const RasterLayout& layout, ChunkSurvey& survey) {
   survey.zeros.Add(samples.Row(chunk.row) + (chunk.col - samples.box.col), samples.box.cols, chunk, layout.width,
                    layout.height, layout.coast_step_m);
@@ -55,11 +65,13 @@ void CountSamples(const Samples& samples, const Chunk& chunk, const RasterLayout
   for (int r = 0; r < chunk.rows; ++r) {
     const float* row = samples.Row(chunk.row + r) + (chunk.col - samples.box.col);
     BlockRange* ranges = survey.ranges.data() + std::ptrdiff_t{r / RangeTable::kBlock} * columns;
+    const std::int64_t before = survey.valid;
     for (int c = 0; c < chunk.cols; ++c) {
       ranges[c / RangeTable::kBlock].Add(row[c]);
       survey.valid += std::isnan(row[c]) ? 0 : 1;
     }
     const int used = std::clamp(layout.columns - chunk.col, 0, chunk.cols);
+    if (survey.valid - before < chunk.cols) AddVoidRuns(row, r, used, survey.voids);
     const auto add = [&](BlockSum& sum) {
       for (int c = 0; c < used; ++c) sum.Add(row[c]);
     };

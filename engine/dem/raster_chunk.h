@@ -44,11 +44,19 @@ class ChunkGrid {
 // Factors whose averages are compared with the samples themselves: 2, 4, .. kLargestDirect.
 inline constexpr int kLargestDirect = 64;
 
+// Voids first .. last of a row, counted from a part's first sample.
+struct VoidRun {
+  std::uint16_t row, first, last;
+
+  friend bool operator==(const VoidRun&, const VoidRun&) = default;
+};
+
 struct ChunkSurvey {
   std::int64_t valid = 0;  // samples
   ZeroEdges zeros;
   BlockSum first_row, last_row;    // the part of the raster's outermost rows that lies here
   std::vector<BlockRange> ranges;  // of its RangeTable blocks, by rows
+  std::vector<VoidRun> voids;      // among the columns in use, by rows; empty where all of it is void
   // By factor 2, 4, .. kLargestDirect, as far as the raster has them:
   std::vector<std::vector<float>> errors;    // of its AveragingErrors blocks, or its part of one
   std::vector<std::vector<float>> averages;  // its own, by rows; empty where an overview gives them

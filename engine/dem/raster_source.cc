@@ -179,11 +179,16 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
   source->info_.heights_doubted = DoubtsOf(source->info_.heights);
   source->info_.valid_samples = survey.valid;
   source->info_.void_samples = survey.voids;
+  source->info_.hole_samples = survey.hole_samples;
   LogWhatMatters(**dataset, source->info_, source->georeference_, source->layout_);
   LogVertical(path, source->vertical_, source->layout_.rules.unit);
   if (!found_voids.empty()) {
     LogSource(SourceLog::Level::kWarn, path,
               "voids that it does not declare: {}; `nodata` of the configuration decides otherwise", found_voids);
+  }
+  if (survey.rim_voids.is_everything()) {
+    spdlog::warn(
+        "{}: its voids are too ragged to tell holes from collars around the data: none of them is smoothed over", path);
   }
   if (auto unchanged = source->CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
   source->KeepTables(*std::move(prepared), prepare, std::move(pages));
@@ -200,6 +205,7 @@ void RasterSource::KeepTables(PreparedRaster prepared, const PrepareOptions& pre
   constexpr std::size_t kMostCoarse = 64;  // blocks of a level
   RasterSurvey& survey = prepared.survey;
   edge_row_means_ = survey.edge_row_means;
+  rim_voids_ = std::move(survey.rim_voids);
   if (pages == nullptr || prepared.record.empty() || pages->Admit(survey.bytes())) {
     kept_ = std::make_shared<const RasterSurvey>(std::move(survey));
     return;

@@ -45,6 +45,7 @@ class RasterSource {
   const RasterLayout& layout() const { return layout_; }
   const Footprint& footprint() const { return footprint_; }
   const SourceSpacing& spacing() const { return spacing_; }
+  const RimVoids& rim_voids() const { return rim_voids_; }
   // Of the valid samples of the first and the last row.
   const std::array<std::optional<double>, 2>& edge_row_means() const { return edge_row_means_; }
 
@@ -79,6 +80,7 @@ class RasterSource {
   Footprint footprint_;
   SourceSpacing spacing_;
   std::array<std::optional<double>, 2> edge_row_means_;
+  RimVoids rim_voids_;
   SurveyPages::Tables kept_;  // null: they are paged
   // Of paged tables.
   struct Paging {

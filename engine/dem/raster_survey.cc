@@ -55,7 +55,11 @@ std::size_t RasterSurvey::bytes() const {
   return bytes;
 }
 
-SurveyAssembler::SurveyAssembler(const RasterLayout& layout) : layout_(layout) {
+SurveyAssembler::SurveyAssembler(const RasterLayout& layout)
+    : layout_(layout), voids_(layout.columns, layout.height, [this](int row, int first, int last) {
+        survey_.table.MarkHole(row, first, last);
+        survey_.hole_samples += static_cast<std::uint64_t>(last - first + 1);
+      }) {
   survey_.table = RangeTable(layout.width, layout.height);
   survey_.errors = AveragingErrors(layout.width, layout.height);
   if (!layout.overview_factors.empty()) return;
@@ -69,6 +73,7 @@ void SurveyAssembler::Add(const Chunk& chunk, const ChunkSurvey& part) {
                           DivideUp(chunk.cols, RangeTable::kBlock), part.ranges);
   survey_.valid += static_cast<std::uint64_t>(part.valid);
   survey_.zeros.Add(part.zeros);
+  voids_.Add(chunk, part);
   first_row_.Add(part.first_row);
   last_row_.Add(part.last_row);
   for (std::size_t k = 0; k < part.errors.size(); ++k) {
@@ -172,6 +177,8 @@ Result<RasterSurvey> SurveyAssembler::Finish(GDALDataset& dataset, const std::st
             : "; heights that the file does not declare to be voids were taken for such: with --nodata declared (in a "
               "configuration \"nodata\": \"declared\") they are not");
   }
+  survey_.rim_voids = voids_.Finish();
+  if (survey_.rim_voids.is_everything()) survey_.hole_samples = 0;
   const BlockRange samples = survey_.table.OfFinest();
   survey_.lowest = samples.min;
   survey_.highest = samples.max;

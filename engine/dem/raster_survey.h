@@ -14,6 +14,7 @@
 #include "engine/dem/averaging_errors.h"
 #include "engine/dem/range_table.h"
 #include "engine/dem/raster_chunk.h"
+#include "engine/dem/rim_voids.h"
 #include "engine/dem/sample_grid.h"
 #include "engine/dem/void_marks.h"
 
@@ -42,6 +43,8 @@ struct RasterSurvey {
   RangeTable table;               // overviews that are read count too: their resampling may overshoot the samples
   float lowest = 0, highest = 0;  // of the samples
   std::uint64_t valid = 0, voids = 0;
+  RimVoids rim_voids;
+  std::uint64_t hole_samples = 0;  // voids that do not touch the rim; 0 where they are too many to tell
   ZeroEdges zeros;
   std::array<std::optional<double>, 2> edge_row_means;  // of the first and the last row's valid samples
   AveragingErrors errors;
@@ -55,6 +58,8 @@ struct RasterSurvey {
 class SurveyAssembler {
  public:
   explicit SurveyAssembler(const RasterLayout& layout);
+  SurveyAssembler(const SurveyAssembler&) = delete;
+  SurveyAssembler& operator=(const SurveyAssembler&) = delete;
 
   void Add(const Chunk& chunk, const ChunkSurvey& part);
 
@@ -69,6 +74,7 @@ class SurveyAssembler {
 
   const RasterLayout layout_;
   RasterSurvey survey_;
+  RimVoidFinder voids_;
   BlockSum first_row_, last_row_;
   std::vector<BlockSum> largest_sums_;  // of factor ChunkGrid::kSide
 };

@@ -21,19 +21,6 @@ constexpr double kSheetPositionTolerance = 1e-5;
 // Positions this close to the raster's edge, in pixels, are on it.
 constexpr double kSheetEdgeTolerance = 1e-6;
 
-GridWindow Grown(const GridWindow& window, int halo, const GridAxis& columns, const GridAxis& rows) {
-  GridWindow wide{window.column - halo, window.row - halo, window.columns + std::int64_t{2} * halo,
-                  window.rows + std::int64_t{2} * halo};
-  const auto clip = [](std::int64_t& start, std::int64_t& length, std::int64_t count) {
-    const std::int64_t end = std::min(start + length, count);
-    start = std::max<std::int64_t>(start, 0);
-    length = end - start;
-  };
-  if (!columns.wraps()) clip(wide.column, wide.columns, columns.count());
-  clip(wide.row, wide.rows, rows.count());
-  return wide;
-}
-
 // Pixels that the members have, columns of sheets that wrap counted from 0 to `turn`; without overlap.
 std::vector<geo::TileRange> CoverOf(const std::vector<SheetMember>& members, std::int64_t turn) {
   std::vector<geo::TileRange> ranges;
@@ -103,6 +90,8 @@ Result<Georeference> GeoreferenceOf(const SheetPlan& plan) {
                                              member.raster->info().path);
 }
 
+bool IsVoid(float height) { return std::isnan(height); }
+
 }  // namespace
 
 float RoundHeight(double metres) { return static_cast<float>(std::nearbyint(metres * 1024) / 1024); }
@@ -124,6 +113,9 @@ Result<Sheet> Sheet::Make(SheetPlan plan, const SheetOptions& options) {
   sheet.IndexMembers();
   sheet.MeasureMembers();
   sheet.FindPoleHeights();
+  if (options.voids == HoleFill::kSmooth) {
+    sheet.voids_ = SheetVoids(sheet.members_, sheet.member_index_, sheet.wraps_ ? sheet.columns_ : 0);
+  }
   if (const auto& geoid = sheet.vertical().geoid) {
     auto undulations = Undulations::Of(geoid, sheet.reach_);
     if (!undulations) return tl::unexpected(undulations.error());
@@ -222,26 +214,33 @@ Result<void> Sheet::CheckUnread() const {
   return members_.size() == 1 ? members_.front().raster->CheckUnchanged() : Result<void>();
 }
 
-Result<std::vector<float>> Sheet::ReadFilled(int factor, const GridWindow& window, const std::stop_token& stop,
-                                             SheetTrace* trace) const {
-  const auto is_void = [](float height) { return std::isnan(height); };
+GridWindow Sheet::Grown(const GridWindow& window, int halo, int factor) const {
+  GridWindow wide{window.column - halo, window.row - halo, window.columns + std::int64_t{2} * halo,
+                  window.rows + std::int64_t{2} * halo};
+  const auto clip = [](std::int64_t& start, std::int64_t& length, std::int64_t count) {
+    const std::int64_t end = std::min(start + length, count);
+    start = std::max<std::int64_t>(start, 0);
+    length = end - start;
+  };
+  if (!wraps_) clip(wide.column, wide.columns, Columns(factor).count());
+  clip(wide.row, wide.rows, Rows(factor).count());
+  return wide;
+}
+
+Result<Sheet::Bridged> Sheet::ReadBridged(int factor, const GridWindow& window, const std::stop_token& stop,
+                                          std::vector<float>* measured) const {
   auto core = ReadBlocks(factor, window, stop);
-  if (!core) return core;
-  if (trace != nullptr) trace->samples = *core;
-  const auto voids = static_cast<std::uint64_t>(std::ranges::count_if(*core, is_void));
-  counts_->measured += core->size() - voids;
+  if (!core) return tl::unexpected(core.error());
+  if (measured != nullptr) *measured = *core;
+  Bridged bridged{*std::move(core), 0};
+  bridged.voids = static_cast<std::uint64_t>(std::ranges::count_if(bridged.heights, IsVoid));
   const int gap = options_.max_void_gap / factor;
-  if (voids == 0 || gap < 2) {
-    counts_->voids += voids;
-    return core;
-  }
-  const GridWindow wide = Grown(window, gap, Columns(factor), Rows(factor));
-  auto around = ReadBlocks(factor, wide, stop);
-  if (around && !std::ranges::all_of(*around, is_void)) core = FillVoids(*around, wide, window, gap);
-  const auto left = static_cast<std::uint64_t>(std::ranges::count_if(*core, is_void));
-  counts_->filled += voids - left;
-  counts_->voids += left;
-  return core;
+  if (gap < 2 || bridged.voids == 0) return bridged;
+  const GridWindow wide = Grown(window, gap, factor);
+  const auto around = ReadBlocks(factor, wide, stop);
+  if (!around) return tl::unexpected(around.error());
+  if (!std::ranges::all_of(*around, IsVoid)) bridged.heights = FillVoids(*around, wide, window, gap);
+  return bridged;
 }
 
 std::optional<float> Sheet::PoleHeight(int pole, Counting counting) const {
@@ -260,7 +259,7 @@ double Sheet::Feather(int factor) const {
 Result<std::vector<float>> Sheet::ReadWeights(int factor, const GridWindow& window, const std::stop_token& stop) const {
   const double feather = Feather(factor), column_step = spacing_.east * factor, row_step = spacing_.north * factor;
   const int halo = static_cast<int>(std::ceil(feather / std::min(column_step, row_step))) + 1;
-  const GridWindow wide = Grown(window, halo, Columns(factor), Rows(factor));
+  const GridWindow wide = Grown(window, halo, factor);
   const auto pixel = [factor](std::int64_t block) { return static_cast<double>(block * factor); };
   const bool ends = wide.rows < window.rows + 2 * halo || wide.columns < window.columns + 2 * halo;
   if (!ends &&
@@ -268,14 +267,14 @@ Result<std::vector<float>> Sheet::ReadWeights(int factor, const GridWindow& wind
            .has_voids) {
     return std::vector<float>();
   }
-  const auto heights = ReadFilled(factor, wide, stop);
-  if (!heights) return heights;
-  return FeatherWeights(*heights, wide, window, column_step, row_step, feather);
+  const auto bridged = ReadBridged(factor, wide, stop);
+  if (!bridged) return tl::unexpected(bridged.error());
+  return FeatherWeights(bridged->heights, wide, window, column_step, row_step, feather);
 }
 
 Result<void> Sheet::FillAt(std::span<const Position> positions, std::size_t stride, std::span<const double> undulations,
-                           int factor, std::span<float> heights, const std::stop_token& stop, std::span<float> weights,
-                           SheetTrace* trace) const {
+                           int factor, const NodeHeights& nodes, const std::stop_token& stop, SheetTrace* trace) const {
+  const auto [heights, weights, smooth] = nodes;
   Cells found = CellsAt(positions, stride, heights, factor), others;
   if (trace != nullptr && !weights.empty()) {
     std::vector<float> known(heights.size(), 0);
@@ -287,11 +286,19 @@ Result<void> Sheet::FillAt(std::span<const Position> positions, std::size_t stri
   GridWindow window = WindowOf(found.cells, Columns(factor), Rows(factor));
   // Samples between the outermost nodes and the rim are wanted too.
   constexpr int kRim = 3;
-  if (trace != nullptr) window = Grown(window, kRim, Columns(factor), Rows(factor));
-  const auto samples = ReadFilled(factor, window, stop, trace);
-  if (!samples) return tl::unexpected(samples.error());
+  if (trace != nullptr) window = Grown(window, kRim, factor);
+  const auto bridged = ReadBridged(factor, window, stop, trace != nullptr ? &trace->samples : nullptr);
+  if (!bridged) return tl::unexpected(bridged.error());
+  const auto smoothed = FillHoles(factor, window, *bridged, stop);
+  if (!smoothed) return tl::unexpected(smoothed.error());
+  const bool has_holes = !smoothed->empty();
+  const std::vector<float>& samples = has_holes ? *smoothed : bridged->heights;
+  const auto left = static_cast<std::uint64_t>(bridged->voids == 0 ? 0 : std::ranges::count_if(samples, IsVoid));
+  counts_->measured += samples.size() - bridged->voids;
+  counts_->filled += bridged->voids - left;
+  counts_->voids += left;
   if (trace != nullptr && !weights.empty() && factor == 1) {
-    trace->samples = *samples;
+    trace->samples = bridged->heights;
     trace->includes_filled = true;
   }
   std::vector<float> counts;
@@ -303,10 +310,16 @@ Result<void> Sheet::FillAt(std::span<const Position> positions, std::size_t stri
   }
   for (std::size_t i = 0; i < found.cells.size(); ++i) {
     const std::size_t node = found.nodes[i];
-    const auto height = Interpolate(*samples, window, found.cells[i]);
+    const auto height = Interpolate(samples, window, found.cells[i]);
     // Where the geoid is not known a height means nothing.
     if (!height || (!undulations.empty() && std::isnan(undulations[node]))) continue;
-    heights[node] = RoundHeight(undulations.empty() ? *height : *height + undulations[node]);
+    const float rounded = RoundHeight(undulations.empty() ? *height : *height + undulations[node]);
+    if (has_holes &&
+        !HasSample(bridged->heights, window, found.cells[i])) {  // in a hole: another sheet may know better
+      if (!smooth.empty() && std::isnan(smooth[node])) smooth[node] = rounded;
+      continue;
+    }
+    heights[node] = rounded;
     if (trace != nullptr) {
       trace->cell_of_node[node] = static_cast<std::int32_t>(i);
       trace->heights[node] = heights[node];
@@ -320,14 +333,14 @@ Result<void> Sheet::FillAt(std::span<const Position> positions, std::size_t stri
   if (trace != nullptr) {
     trace->window = window;
     trace->cells = std::move(found.cells);
-    TraceOthers(others, *samples, undulations, *trace);
+    TraceOthers(others, bridged->heights, samples, undulations, *trace);
   }
   return {};
 }
 
 // Nodes whose height others gave, as far as what was read tells the sheet's own.
-void Sheet::TraceOthers(const Cells& others, const std::vector<float>& samples, std::span<const double> undulations,
-                        SheetTrace& trace) const {
+void Sheet::TraceOthers(const Cells& others, const std::vector<float>& bridged, const std::vector<float>& filled,
+                        std::span<const double> undulations, SheetTrace& trace) const {
   const GridWindow& window = trace.window;
   const std::int64_t turn = wraps_ ? Columns(trace.factor).count() : 0;
   for (std::size_t i = 0; i < others.cells.size(); ++i) {
@@ -339,8 +352,9 @@ void Sheet::TraceOthers(const Cells& others, const std::vector<float>& samples, 
         cell.row + 1 >= window.row + window.rows) {
       continue;
     }
-    const auto height = Interpolate(samples, window, cell);
-    if (!height || (!undulations.empty() && std::isnan(undulations[node]))) continue;
+    const auto height = Interpolate(filled, window, cell);
+    if (!height || !HasSample(bridged, window, cell)) continue;
+    if (!undulations.empty() && std::isnan(undulations[node])) continue;
     trace.cell_of_node[node] = static_cast<std::int32_t>(trace.cells.size());
     trace.heights[node] = RoundHeight(undulations.empty() ? *height : *height + undulations[node]);
     trace.cells.push_back(cell);
@@ -352,8 +366,7 @@ std::vector<Position> Sheet::PositionsOf(const geo::Lattice& lattice, const Node
 }
 
 Result<void> Sheet::Fill(const geo::Lattice& lattice, const NodeWindow& window, Counting counting,
-                         std::span<float> heights, const std::stop_token& stop, std::span<float> weights,
-                         SheetTrace* trace) const {
+                         const NodeHeights& nodes, const std::stop_token& stop, SheetTrace* trace) const {
   const int factor = AveragingFactor(SamplesPerCell(lattice, spacing_));
   auto positions = PositionsOf(lattice, window, factor);
   if (trace != nullptr) {
@@ -370,7 +383,7 @@ Result<void> Sheet::Fill(const geo::Lattice& lattice, const NodeWindow& window, 
     std::fill_n(positions.begin() + static_cast<std::ptrdiff_t>(first), window.columns, kNowhere);
     if (const auto pole = PoleHeight(global <= 0 ? 0 : 1, counting)) {
       std::ranges::replace_if(
-          heights.subspan(first, static_cast<std::size_t>(window.columns)),
+          nodes.heights.subspan(first, static_cast<std::size_t>(window.columns)),
           [](float height) { return std::isnan(height); }, *pole);
     }
   }
@@ -381,12 +394,11 @@ Result<void> Sheet::Fill(const geo::Lattice& lattice, const NodeWindow& window, 
     undulations = *std::move(found);
   }
   if (trace != nullptr) trace->undulations = undulations;
-  return FillAt(positions, static_cast<std::size_t>(window.columns), undulations, factor, heights, stop, weights,
-                trace);
+  return FillAt(positions, static_cast<std::size_t>(window.columns), undulations, factor, nodes, stop, trace);
 }
 
-Result<void> Sheet::Fill(const geo::MercatorGrid& grid, const NodeWindow& window, std::span<float> heights,
-                         const std::stop_token& stop, std::span<float> weights) const {
+Result<void> Sheet::Fill(const geo::MercatorGrid& grid, const NodeWindow& window, const NodeHeights& nodes,
+                         const std::stop_token& stop) const {
   const int factor = MercatorFactor(grid.depth, spacing_);
   std::vector<double> undulations;
   if (undulations_) {
@@ -395,7 +407,7 @@ Result<void> Sheet::Fill(const geo::MercatorGrid& grid, const NodeWindow& window
     undulations = *std::move(found);
   }
   return FillAt(NodePositions(georeference_, reach_, grid, window, kSheetPositionTolerance * factor),
-                static_cast<std::size_t>(window.columns), undulations, factor, heights, stop, weights);
+                static_cast<std::size_t>(window.columns), undulations, factor, nodes, stop);
 }
 
 }  // namespace terrace::dem

@@ -1,4 +1,4 @@
-// Rasters on one pixel grid, read as if they were one, at the nodes of any grid: positions, averaging, small voids,
+// Rasters on one pixel grid, read as if they were one, at the nodes of any grid: positions, averaging, voids,
 // interpolation. Where they have nothing, nothing is said: other sheets and the floor are the dataset's business.
 //
 // Averages are those of blocks of pixels counted from the sheet's north-western corner. Of rasters that overlap the
@@ -18,7 +18,9 @@
 #include "engine/dem/box_index.h"
 #include "engine/dem/dem_source.h"
 #include "engine/dem/grid_cells.h"
+#include "engine/dem/membrane.h"
 #include "engine/dem/sheet_members.h"
+#include "engine/dem/sheet_voids.h"
 #include "engine/dem/undulations.h"
 #include "engine/geo/mercator_grid.h"
 
@@ -41,9 +43,9 @@ struct SheetTrace {
   std::vector<double> undulations;  // by node, part of the heights; empty where they count as the samples do
   std::vector<GridCell> cells;
   GridWindow window;
-  // Of the window, averages by the factor, before voids were filled; after that where `includes_filled`.
+  // Of the window, averages by the factor, before voids were filled; small ones are where `includes_filled`.
   std::vector<float> samples;
-  bool includes_filled = false;  // where sheets are blended at the full resolution what is filled in has its share
+  bool includes_filled = false;  // where sheets are blended at the full resolution what was bridged has its share
   std::vector<float> weights;    // then, of the samples; empty: all count in full
   int factor = 1;
 };
@@ -56,7 +58,17 @@ enum class Counting : std::uint8_t {
 
 struct SheetOptions {
   int max_void_gap = 0;  // samples: narrower voids are filled
+  HoleFill voids = HoleFill::kSmooth;
   double feather_m = 0;  // how far from its edges and voids a sheet begins to give way to what lies below; 0: at them
+};
+
+// Heights of a window's nodes, one each, while sheets fill them in.
+struct NodeHeights {
+  std::span<float> heights;  // NaN: still wanted
+  // What those that are filled in count beside what lies below, over 0 to 1. Empty: in full.
+  std::span<float> weights = {};
+  // What is drawn in holes that no sheet has a height for. NaN: not known so far. Empty: not wanted.
+  std::span<float> smooth = {};
 };
 
 class Sheet {
@@ -91,21 +103,21 @@ class Sheet {
   // At least the ellipsoidal heights of all its samples.
   HeightRange EllipsoidalRange() const;
 
-  // These replace the NaN among `heights`, one for each node of the window, by the sheet's heights there, as far as it
-  // has some. A height is a function of the node alone. kUnavailable: a raster cannot be read now. kCancelled: stopped.
-  // `weights`, if it is not empty, has one for each node: those of the heights that are filled in become what they
-  // count beside what lies below, over 0 to 1. `trace` is filled in, unless it is null.
-  Result<void> Fill(const geo::Lattice& lattice, const NodeWindow& window, Counting counting, std::span<float> heights,
-                    const std::stop_token& stop, std::span<float> weights = {}, SheetTrace* trace = nullptr) const;
-  Result<void> Fill(const geo::MercatorGrid& grid, const NodeWindow& window, std::span<float> heights,
-                    const std::stop_token& stop, std::span<float> weights = {}) const;
+  // These replace the NaN among the heights of a window's nodes by the sheet's, as far as it has some. A height is a
+  // function of the node alone. kUnavailable: a raster cannot be read now. kCancelled: stopped. `trace` is filled in,
+  // unless it is null.
+  Result<void> Fill(const geo::Lattice& lattice, const NodeWindow& window, Counting counting, const NodeHeights& nodes,
+                    const std::stop_token& stop, SheetTrace* trace = nullptr) const;
+  Result<void> Fill(const geo::MercatorGrid& grid, const NodeWindow& window, const NodeHeights& nodes,
+                    const std::stop_token& stop) const;
 
   // Pixel positions of the window's nodes as Fill finds them for averages by `factor`.
   std::vector<Position> PositionsOf(const geo::Lattice& lattice, const NodeWindow& window, int factor) const;
 
-  // The same at single points, as measured: nothing is averaged and nothing is filled.
-  Result<void> FillPoints(std::span<const GeoPosition> points, HeightDatum datum, std::span<float> heights,
-                          const std::stop_token& stop) const;
+  // The same at single points, of the full resolution. `filled`, one for each of them: becomes 1 where the sample whose
+  // pixel holds the point is void.
+  Result<void> FillPoints(std::span<const GeoPosition> points, HeightDatum datum, const NodeHeights& nodes,
+                          std::span<std::uint8_t> filled, const std::stop_token& stop) const;
 
   // As measured, NaN for voids, row by row from the north. Columns outside the sheet are a turn on, of sheets that
   // wrap.
@@ -119,6 +131,9 @@ class Sheet {
 
   // Of the pixels in a box; what no member covers counts as void.
   BlockRange Ranges(const Box& pixels) const;
+
+  // Of the pixels around the holes that meet a box, from which those are filled; nothing where there are none.
+  BlockRange RangeAroundHoles(const Box& pixels, int factor) const;
 
   // At least the heights that Fill gives to nodes of the tile, its edges included.
   SheetRange RangeOf(const geo::Lattice& lattice, const geo::TileKey& key) const;
@@ -147,14 +162,30 @@ class Sheet {
   Result<void> Compose(int step, const GridWindow& window, std::span<float> out, const std::stop_token& stop) const;
   Result<void> Average(int factor, const GridWindow& window, float* out, std::int64_t stride,
                        const std::stop_token& stop) const;
-  Result<std::vector<float>> ReadFilled(int factor, const GridWindow& window, const std::stop_token& stop,
-                                        SheetTrace* trace = nullptr) const;
+  // Small voids filled in. `measured`: becomes what was there before, unless it is null.
+  struct Bridged {
+    std::vector<float> heights;
+    std::uint64_t voids = 0;  // before
+  };
+  Result<Bridged> ReadBridged(int factor, const GridWindow& window, const std::stop_token& stop,
+                              std::vector<float>* measured = nullptr) const;
+  // The same with smooth surfaces in the holes that are left (sheet_holes.cc); empty where there are none.
+  // Precondition: `bridged` is what ReadBridged gives.
+  Result<std::vector<float>> FillHoles(int factor, const GridWindow& window, const Bridged& bridged,
+                                       const std::stop_token& stop) const;
+  Result<std::vector<float>> ReadSmooth(int factor, const GridWindow& window, bool is_guess,
+                                        const std::stop_token& stop) const;
+  Result<VoidGrid> ReadVoids(int factor, const GridWindow& window, bool is_guess, const std::stop_token& stop) const;
+  Result<void> GuessLarge(int factor, const GridWindow& window, const std::vector<VoidRegion>& regions, VoidGrid& grid,
+                          const std::stop_token& stop) const;
+  GridWindow Grown(const GridWindow& window, int halo, int factor) const;
+
   // `undulations`: of the same nodes, added to heights; empty: none are.
   Result<void> FillAt(std::span<const Position> positions, std::size_t stride, std::span<const double> undulations,
-                      int factor, std::span<float> heights, const std::stop_token& stop, std::span<float> weights,
+                      int factor, const NodeHeights& nodes, const std::stop_token& stop,
                       SheetTrace* trace = nullptr) const;
-  void TraceOthers(const Cells& others, const std::vector<float>& samples, std::span<const double> undulations,
-                   SheetTrace& trace) const;
+  void TraceOthers(const Cells& others, const std::vector<float>& bridged, const std::vector<float>& filled,
+                   std::span<const double> undulations, SheetTrace& trace) const;
   std::optional<float> PoleHeight(int pole, Counting counting) const;  // 0 south, 1 north
   // What each sample of the window counts; empty: all count in full.
   Result<std::vector<float>> ReadWeights(int factor, const GridWindow& window, const std::stop_token& stop) const;
@@ -176,6 +207,7 @@ class Sheet {
   Footprint reach_;
   SheetOptions options_;
   std::array<std::optional<float>, 2> pole_heights_;
+  SheetVoids voids_;
 
   std::vector<SheetMember> members_;
   HeightRange heights_;

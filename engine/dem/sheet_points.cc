@@ -1,5 +1,6 @@
-// Heights at single points, as measured. Points are read in the order of the source's blocks, whatever order they came
-// in: neighbours share a read, and no block is decoded twice because others were wanted in between.
+// Heights at single points, at the full resolution, voids filled as in tiles. Points are read in the order of the
+// source's blocks, whatever order they came in: neighbours share a read, and no block is decoded twice because others
+// were wanted in between.
 #include <algorithm>
 #include <cmath>
 #include <tuple>
@@ -52,8 +53,9 @@ class Conversion {
 
 }  // namespace
 
-Result<void> Sheet::FillPoints(std::span<const GeoPosition> points, HeightDatum datum, std::span<float> heights,
-                               const std::stop_token& stop) const {
+Result<void> Sheet::FillPoints(std::span<const GeoPosition> points, HeightDatum datum, const NodeHeights& nodes,
+                               std::span<std::uint8_t> filled, const std::stop_token& stop) const {
+  const std::span<float> heights = nodes.heights;
   const auto converted = Conversion::For(vertical(), datum);
   if (!converted) return tl::unexpected(converted.error());
   const GridAxis columns = Columns(1), rows = Rows(1);
@@ -83,12 +85,19 @@ Result<void> Sheet::FillPoints(std::span<const GeoPosition> points, HeightDatum 
     cells.clear();
     for (auto p = first; p != end; ++p) cells.push_back(p->cell);
     const GridWindow window = WindowOf(cells, columns, rows);
-    const auto samples = ReadBlocks(1, window, stop);
-    if (!samples) return tl::unexpected(samples.error());
+    std::vector<float> measured;
+    const auto bridged = ReadBridged(1, window, stop, &measured);
+    if (!bridged) return tl::unexpected(bridged.error());
+    const auto smoothed = FillHoles(1, window, *bridged, stop);
+    if (!smoothed) return tl::unexpected(smoothed.error());
+    const std::vector<float>& samples = smoothed->empty() ? bridged->heights : *smoothed;
     for (std::size_t i = 0; first != end; ++first, ++i) {
-      if (!IsNearestValid(*samples, window, cells[i])) continue;
-      const auto height = Interpolate(*samples, window, cells[i]);
-      if (height) heights[first->point] = RoundHeight(converted->Of(*height, points[first->point]));
+      const auto height = Interpolate(samples, window, cells[i]);
+      if (!height) continue;
+      const float rounded = RoundHeight(converted->Of(*height, points[first->point]));
+      const bool is_in_hole = !HasSample(bridged->heights, window, cells[i]);
+      (is_in_hole ? nodes.smooth : heights)[first->point] = rounded;
+      filled[first->point] = is_in_hole || !IsNearestValid(measured, window, cells[i]) ? 1 : 0;
     }
   }
   return {};

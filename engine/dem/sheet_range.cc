@@ -93,6 +93,41 @@ BlockRange Sheet::Ranges(const Box& pixels) const {
   return range;
 }
 
+BlockRange Sheet::RangeAroundHoles(const Box& pixels, int factor) const {
+  PixelBox box{pixels.west, pixels.south, pixels.east, pixels.north};
+  const auto has_holes = [&](double west, double north, double east, double south) {
+    const double halo = 2.0 * factor;  // an average by overviews may be void beside a hole
+    const Box wide{west - halo, north - halo, east + halo, south + halo};
+    return Ranges(wide).has_holes || voids_.SharesHole(wide);
+  };
+  if (options_.voids != HoleFill::kSmooth || !has_holes(box.west, box.north, box.east, box.south)) return {};
+  // The holes end where a band around them has none.
+  const auto grow = [&](double& side, double end, double step, bool holes) {
+    if (!holes || (step < 0 ? side <= end : side >= end)) return false;
+    side += step;
+    return true;
+  };
+  const double west = wraps_ ? -columns_ : 0, east = wraps_ ? 2.0 * columns_ : width_;
+  for (bool grown = true; grown;) {
+    const double x = RangeTable::kBlock + (box.east - box.west) / 4,
+                 y = RangeTable::kBlock + (box.south - box.north) / 4;
+    const bool at_west = has_holes(box.west - x, box.north - y, box.west, box.south + y);
+    const bool at_east = has_holes(box.east, box.north - y, box.east + x, box.south + y);
+    const bool at_north = has_holes(box.west - x, box.north - y, box.east + x, box.north);
+    const bool at_south = has_holes(box.west - x, box.south, box.east + x, box.south + y);
+    grown = grow(box.west, west, -x, at_west);
+    grown |= grow(box.east, east, x, at_east);
+    grown |= grow(box.north, 0, -y, at_north);
+    grown |= grow(box.south, height_, y, at_south);
+  }
+  // Heights beside a hole count, of averages by the factor at least, and of large holes by factors up to a sixtieth of
+  // their size; some averages off, and what small voids beside it are filled from.
+  const double size = std::max(box.east - box.west, box.south - box.north);
+  const double reach = 4 * std::max<double>(factor, size / 32) + options_.max_void_gap;
+  box.Grow(reach, reach);
+  return Ranges({box.west, box.north, box.east, box.south});
+}
+
 bool Sheet::GivesWay(const Box& pixels, int factor) const {
   PixelBox wide{pixels.west, pixels.south, pixels.east, pixels.north};
   wide.Grow(Feather(factor) / spacing_.east + 2 * factor, Feather(factor) / spacing_.north + 2 * factor);
@@ -138,6 +173,7 @@ SheetRange Sheet::RangeOf(const geo::Lattice& lattice, const geo::TileKey& key) 
     box.Grow(1.5 * factor + 1, 1.5 * factor + 1);
     BlockRange here = Ranges({box.west, box.north, box.east, box.south});
     if (here.has_voids) {
+      here.Add(RangeAroundHoles({box.west, box.north, box.east, box.south}, factor));
       box.Grow(options_.max_void_gap + factor, options_.max_void_gap + factor);
       here.Add(Ranges({box.west, box.north, box.east, box.south}));
     }

@@ -15,7 +15,7 @@ void PutRanges(ByteWriter& writer, const std::vector<BlockRange>& ranges) {
   for (const BlockRange& range : ranges) {
     writer.Put(range.min);
     writer.Put(range.max);
-    writer.Put<std::uint8_t>(range.has_voids ? 1 : 0);
+    writer.Put(static_cast<std::uint8_t>((range.has_voids ? 1 : 0) | (range.has_holes ? 2 : 0)));
   }
 }
 
@@ -24,7 +24,9 @@ void GetRanges(ByteReader& reader, std::vector<BlockRange>& ranges) {
   for (BlockRange& range : ranges) {
     range.min = reader.Get<float>();
     range.max = reader.Get<float>();
-    range.has_voids = reader.Get<std::uint8_t>() != 0;
+    const auto voids = reader.Get<std::uint8_t>();
+    range.has_voids = (voids & 1) != 0;
+    range.has_holes = (voids & 2) != 0;
   }
 }
 
@@ -57,6 +59,37 @@ ZeroEdges GetZeros(ByteReader& reader) {
   return zeros;
 }
 
+// Nothing where the bytes hold fewer than they say.
+std::optional<std::uint32_t> GetCount(ByteReader& reader, std::size_t bytes_each) {
+  const auto count = reader.Get<std::uint32_t>();
+  return count <= reader.remaining() / bytes_each ? std::optional(count) : std::nullopt;
+}
+
+void Put(ByteWriter& writer, const RimVoids& voids) {
+  writer.Put<std::uint8_t>(voids.is_everything() ? 1 : 0);
+  writer.Put(voids.regions());
+  writer.Put(static_cast<std::uint32_t>(voids.runs().size()));
+  for (const RimVoids::Run& run : voids.runs()) {
+    for (const std::int32_t place : {run.row, run.first, run.last}) writer.Put(place);
+    writer.Put(run.region);
+  }
+}
+std::optional<RimVoids> GetRimVoids(ByteReader& reader, const RasterLayout& layout) {
+  const bool is_everything = reader.Get<std::uint8_t>() != 0;
+  const auto regions = reader.Get<std::uint32_t>();
+  const auto count = GetCount(reader, sizeof(RimVoids::Run));
+  if (!count) return std::nullopt;
+  std::vector<RimVoids::Run> runs(*count);
+  for (RimVoids::Run& run : runs) {
+    for (std::int32_t* place : {&run.row, &run.first, &run.last}) *place = reader.Get<std::int32_t>();
+    run.region = reader.Get<std::uint32_t>();
+    if (run.row < (&run == runs.data() ? 0 : (&run - 1)->row) || run.row >= layout.height || run.region >= regions) {
+      return std::nullopt;
+    }
+  }
+  return is_everything ? RimVoids::Everything() : RimVoids(std::move(runs), regions);
+}
+
 BlockSum GetSum(ByteReader& reader) {
   const auto sum = reader.Get<double>();
   return {sum, reader.Get<double>()};
@@ -71,6 +104,10 @@ std::string EncodePart(const ChunkSurvey& part) {
   Put(writer, part.first_row);
   Put(writer, part.last_row);
   PutRanges(writer, part.ranges);
+  writer.Put(static_cast<std::uint32_t>(part.voids.size()));
+  for (const VoidRun& run : part.voids) {
+    for (const std::uint16_t place : {run.row, run.first, run.last}) writer.Put(place);
+  }
   for (const auto& errors : part.errors) PutFloats(writer, errors);
   if (!part.averages.empty()) PutFloats(writer, part.averages.back());
   for (const auto& sums : part.sums) {
@@ -93,6 +130,12 @@ std::optional<ChunkSurvey> DecodePart(std::string_view bytes, const Chunk& chunk
   part.first_row = GetSum(reader);
   part.last_row = GetSum(reader);
   GetRanges(reader, part.ranges);
+  const auto runs = GetCount(reader, sizeof(VoidRun));
+  if (!runs) return std::nullopt;
+  part.voids.resize(*runs);
+  for (VoidRun& run : part.voids) {
+    for (std::uint16_t* place : {&run.row, &run.first, &run.last}) *place = reader.Get<std::uint16_t>();
+  }
   for (auto& errors : part.errors) GetFloats(reader, errors);
   if (!part.averages.empty()) GetFloats(reader, part.averages.back());
   for (auto& sums : part.sums) {
@@ -108,6 +151,8 @@ std::string EncodeSurvey(const RasterSurvey& survey) {
   writer.Put(survey.highest);
   writer.Put(survey.valid);
   writer.Put(survey.voids);
+  writer.Put(survey.hole_samples);
+  Put(writer, survey.rim_voids);
   Put(writer, survey.zeros);
   for (const auto& mean : survey.edge_row_means) {
     writer.Put<std::uint8_t>(mean ? 1 : 0);
@@ -127,6 +172,10 @@ std::optional<RasterSurvey> DecodeSurvey(std::string_view bytes, const RasterLay
   survey.highest = reader.Get<float>();
   survey.valid = reader.Get<std::uint64_t>();
   survey.voids = reader.Get<std::uint64_t>();
+  survey.hole_samples = reader.Get<std::uint64_t>();
+  auto rim_voids = GetRimVoids(reader, layout);
+  if (!rim_voids) return std::nullopt;
+  survey.rim_voids = *std::move(rim_voids);
   survey.zeros = GetZeros(reader);
   for (auto& mean : survey.edge_row_means) {
     const bool has = reader.Get<std::uint8_t>() != 0;

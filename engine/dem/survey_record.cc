@@ -24,7 +24,7 @@ namespace terrace::dem {
 namespace {
 
 // Changes with every change of what a record holds or means.
-constexpr std::uint32_t kRecordVersion = 1;
+constexpr std::uint32_t kRecordVersion = 2;
 constexpr std::uint64_t kHeaderMagic = 0x32'59'56'52'55'53'52'54;  // "TRSURVY2"
 constexpr std::uint64_t kFooterMagic = 0x44'4e'45'59'56'52'55'53;  // "SURVYEND"
 constexpr std::uint32_t kPartMagic = 0x54'52'41'50;                // "PART"

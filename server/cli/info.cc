@@ -87,7 +87,9 @@ std::vector<std::string> AdviceFor(const dem::RasterInfo& info, double floor) {
   }
   if (info.void_samples > 0) {
     advice.push_back(
-        fmt::format("voids: small ones are filled from their edges, larger ones show the floor of {:g} m", floor));
+        fmt::format("voids: those with data all around them are filled from their edges, those that touch the rim of "
+                    "the raster show the floor of {:g} m",
+                    floor));
   }
   return advice;
 }
@@ -113,13 +115,14 @@ void PrintText(const dem::DemInfo& dataset) {
     line("converted", fmt::format("by {}: {:.2f} to {:.2f} m above the ellipsoid, or less", info.vertical_operation,
                                   info.ellipsoidal.min, info.ellipsoidal.max));
   }
-  line("voids", info.void_samples == 0
-                    ? "none"
-                    : fmt::format("{} samples, {}", info.void_samples,
-                                  Percent(info.void_samples, info.valid_samples + info.void_samples)));
+  line("voids",
+       info.void_samples == 0
+           ? "none"
+           : fmt::format("{} samples, {}; {} of them with data all around", info.void_samples,
+                         Percent(info.void_samples, info.valid_samples + info.void_samples), info.hole_samples));
   line("overviews",
        info.overview_factors.empty() ? "none" : fmt::format("1/{}", fmt::join(info.overview_factors, ", 1/")));
-  line("floor", fmt::format("{:g} m outside the raster and in large voids", dataset.floor));
+  line("floor", fmt::format("{:g} m outside the raster and in voids that touch its rim", dataset.floor));
   line("levels", fmt::format("0 to {}, default error {:.3g} m at the deepest", dataset.max_level,
                              geo::DefaultError(dataset.max_level)));
   if (!info.transform.empty()) line("transform", info.transform);
@@ -145,6 +148,7 @@ nlohmann::json ToJson(const dem::DemInfo& dataset) {
           {"heights", {{"min", info.heights.min}, {"max", info.heights.max}}},
           {"valid_samples", info.valid_samples},
           {"void_samples", info.void_samples},
+          {"hole_samples", info.hole_samples},
           {"overviews", info.overview_factors},
           {"floor", dataset.floor},
           {"levels", {0, dataset.max_level}},

@@ -108,8 +108,8 @@ std::vector<std::string> AdviceFor(const dem::DemInfo& info) {
   }
   if (voids > 0) {
     advice.push_back(fmt::format(
-        "with voids: {}; small ones are filled from their edges, larger ones show the next source, then the "
-        "floor of {:g} m",
+        "with voids: {}; small ones are filled from their edges, larger ones show the next source; then those with "
+        "data all around them are filled from their edges, and those that touch the rim show the floor of {:g} m",
         Sources(voids), info.floor));
   }
   return advice;
@@ -151,6 +151,7 @@ std::string MosaicJson(const std::string& name, const dem::DemInfo& info) {
                        {"spacing_m", source.spacing_m},
                        {"bounds", {source.bounds.west, source.bounds.south, source.bounds.east, source.bounds.north}},
                        {"void_samples", source.void_samples},
+                       {"hole_samples", source.hole_samples},
                        {"overviews", source.overview_factors}});
   }
   const nlohmann::json mosaic = {{"path", name},

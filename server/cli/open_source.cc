@@ -92,6 +92,7 @@ Result<std::unique_ptr<dem::DemSource>> OpenSource(const config::DatasetConfig& 
   options.finest_error = wanted.finest_error;
   options.floor = wanted.floor;
   options.max_void_gap = wanted.max_void_gap;
+  options.voids = wanted.voids == config::HoleFill::kSmooth ? dem::HoleFill::kSmooth : dem::HoleFill::kFloor;
   options.cache_dir = cache_dir;
   options.feather = wanted.feather;
   options.progress = progress;

@@ -103,7 +103,7 @@ asio::awaitable<Response> HeightsHandler::Handle(Route route, Request request) c
   SingleFlight::Work work = [catalog = catalog_, index = *dataset, coding, query,
                              certified](std::stop_token stop) -> Result<EncodedTile> {
     const auto begun = TileService::Clock::now();
-    const Result<std::vector<float>> heights = catalog->read_points(index, query->points, query->datum, stop);
+    const Result<PointHeights> heights = catalog->read_points(index, query->points, query->datum, stop);
     if (!heights) return tl::unexpected(heights.error());
     EncodedTile reply;
     reply.times.read = std::chrono::duration_cast<std::chrono::microseconds>(TileService::Clock::now() - begun);
@@ -147,8 +147,9 @@ asio::awaitable<Result<CertifiedPoints>> HeightsHandler::Certify(std::uint32_t d
   co_return points;
 }
 
-std::string HeightsJson(const HeightsQuery& query, std::span<const float> heights, std::string_view dataset,
+std::string HeightsJson(const HeightsQuery& query, const PointHeights& known, std::string_view dataset,
                         const CertifiedPoints* certified, const std::stop_token& stop) {
+  const std::vector<float>& heights = known.heights;
   const std::string name = nlohmann::json(dataset).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
   std::string json = "{\"results\":[";
   const auto out = std::back_inserter(json);
@@ -163,10 +164,13 @@ std::string HeightsJson(const HeightsQuery& query, std::span<const float> height
     }
     fmt::format_to(out, ",\"location\":{{\"lat\":{},\"lng\":{}}}", query.points[i].latitude, query.points[i].longitude);
     if (!query.distances_m.empty()) fmt::format_to(out, ",\"distance\":{}", query.distances_m[i]);
+    const bool is_filled = !known.filled.empty() && known.filled[i] != 0 && !std::isnan(heights[i]);
+    if (is_filled) json += ",\"filled\":true";
     if (certified != nullptr && !std::isnan(heights[i])) {
       const std::size_t tile = certified->tile_of_point[i];
       const std::optional<double>& error_m = certified->errors_m[tile];
-      const bool is_bounded = error_m && std::isfinite(*error_m);
+      // Of what was never measured nobody knows how far it is from the ground.
+      const bool is_bounded = error_m && std::isfinite(*error_m) && !is_filled;
       fmt::format_to(out, ",\"certified_error\":{},\"tile\":\"{}\"",
                      is_bounded ? proto::FormatErrorUp(*error_m) : "null", geo::ToString(certified->tiles[tile]));
     }

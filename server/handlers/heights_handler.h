@@ -42,10 +42,11 @@ class HeightsHandler {
 };
 
 // {"results":[{"elevation","location":{"lat","lng"},"dataset"}],"status":"OK"}, as Open Topo Data replies; points of a
-// path have their "distance" as well. Metres; null where there is no height. Orthometric ones say so: "datum".
+// path have their "distance" as well. Metres; null where there is no height, and "filled": true where a void was filled
+// in. Orthometric ones say so: "datum".
 // `certified`, unless it is null: "certified_error" and "tile" of each point that has a height. Empty: a stop was
 // requested.
-std::string HeightsJson(const HeightsQuery& query, std::span<const float> heights, std::string_view dataset,
+std::string HeightsJson(const HeightsQuery& query, const PointHeights& known, std::string_view dataset,
                         const CertifiedPoints* certified = nullptr, const std::stop_token& stop = {});
 
 }  // namespace terrace::server

@@ -26,9 +26,19 @@ namespace terrace::server {
 // the catalog's datasets.
 using TileBuilder = std::function<Result<EncodedTile>(const TileRequest&, std::stop_token)>;
 
-// Heights of a dataset at points, NaN where it has none. Blocking; called on many threads at once.
-using PointReader = std::function<Result<std::vector<float>>(
-    std::uint32_t dataset, std::span<const dem::GeoPosition> points, dem::HeightDatum, std::stop_token)>;
+// Heights of a dataset at points, NaN where it has none.
+struct PointHeights {
+  PointHeights() = default;
+  // All of them measured. Implicit: heights are such.
+  PointHeights(std::vector<float> measured) : heights(std::move(measured)) {}  // NOLINT(google-explicit-constructor)
+
+  std::vector<float> heights;
+  std::vector<std::uint8_t> filled;  // by point: 1 where a void was filled in; empty: none was
+};
+
+// Blocking; called on many threads at once.
+using PointReader = std::function<Result<PointHeights>(std::uint32_t dataset, std::span<const dem::GeoPosition> points,
+                                                       dem::HeightDatum, std::stop_token)>;
 
 // What sources were read for: GDAL's numbers since the start, those of datasets, by name, since they were opened.
 struct SourceStats {

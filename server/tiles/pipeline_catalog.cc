@@ -37,8 +37,13 @@ CatalogPtr MakeCatalog(std::shared_ptr<const TilePipeline> pipeline, std::size_t
   auto catalog = std::make_shared<Catalog>();
   for (const Dataset& dataset : pipeline->datasets()) catalog->datasets.push_back(ViewOf(pipeline, dataset));
   catalog->read_points = [pipeline](std::uint32_t dataset, std::span<const dem::GeoPosition> points,
-                                    dem::HeightDatum datum, std::stop_token stop) {
-    return pipeline->datasets()[dataset].source->ReadPoints(points, datum, std::move(stop));
+                                    dem::HeightDatum datum, std::stop_token stop) -> Result<PointHeights> {
+    std::vector<std::uint8_t> filled(points.size());
+    auto heights = pipeline->datasets()[dataset].source->ReadPoints(points, datum, std::move(stop), filled);
+    if (!heights) return tl::unexpected(heights.error());
+    PointHeights known(*std::move(heights));
+    known.filled = std::move(filled);
+    return known;
   };
   catalog->area_mesher.plan = [pipeline, max_mesh_samples](std::uint32_t index, const AreaRequest& area) {
     const Dataset& dataset = pipeline->datasets()[index];

@@ -26,7 +26,7 @@ TEST(ParseConfig, SetsWhatTheTextSaysAndNothingElse) {
   const ConfigResult config = ParseConfig(R"({
     "listen": "[::1]:9000",
     "datasets": [{"name": "maui", "sources": ["maui.tif"], "error_fraction": 0.25, "floor": -12.5, "max_void_gap": 0,
-                  "criterion": "data-dependent", "compact": true,
+                  "voids": "floor", "criterion": "data-dependent", "compact": true,
                   "glb_compression": "quantized", "draco_speed": 3, "draco_normal_bits": 10}],
     "viewer": false, "cache_control": "no-cache", "io_threads": 1, "worker_threads": 3, "queue_length": 10,
     "cache_bytes": "1GiB", "refinement_cache_bytes": "10 MiB", "max_connections": 64, "max_locations": 50, "max_mesh_samples": 5000, "request_deadline_s": 1.5, "header_timeout_s": 2,
@@ -41,6 +41,7 @@ TEST(ParseConfig, SetsWhatTheTextSaysAndNothingElse) {
   maui.error_fraction = 0.25;
   maui.floor = -12.5;
   maui.max_void_gap = 0;
+  maui.voids = HoleFill::kFloor;
   maui.criterion = Criterion::kDataDependent;
   maui.compact = true;
   maui.glb_compression = GlbCompression::kQuantized;

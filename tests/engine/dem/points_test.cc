@@ -1,4 +1,4 @@
-// Heights at single points, as measured.
+// Heights at single points, at the full resolution.
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -32,16 +32,27 @@ TEST(Points, AreBilinearBetweenCentres) {
   EXPECT_NEAR((*heights)[4], 59'900, .1);
 }
 
-TEST(Points, AreNothingOutsideAndInVoids) {
+TEST(Points, AreNothingOutside) {
   const TempDir dir;
   const auto source = OpenOrFail(WriteRaster(dir, Steps()), {.floor = 7});
-  const std::vector<GeoPosition> points = {At(-.01, 5),      At(5, 600.01),      {-120, 0},        {12, -90},
-                                           At(300.5, 300.5), At(300.01, 300.99), At(299.99, 300.5)};
-  const auto heights = source->ReadPoints(points);
+  const std::vector<GeoPosition> points = {At(-.01, 5), At(5, 600.01), {-120, 0}, {12, -90}};
+  std::vector<std::uint8_t> filled(points.size(), 7);
+  const auto heights = source->ReadPoints(points, HeightDatum::kEllipsoid, {}, filled);
   ASSERT_TRUE(heights);
-  for (std::size_t i = 0; i < 6; ++i) EXPECT_TRUE(std::isnan((*heights)[i])) << i;
-  // Beside a void the valid samples alone count.
-  EXPECT_NEAR((*heights)[6], 299 + 30'000, .1);
+  for (std::size_t i = 0; i < points.size(); ++i) EXPECT_TRUE(std::isnan((*heights)[i])) << i;
+}
+
+TEST(Points, AreFilledInSmallVoids) {
+  const TempDir dir;
+  const auto source = OpenOrFail(WriteRaster(dir, Steps()), {.floor = 7});
+  const std::vector<GeoPosition> points = {At(300.5, 300.5), At(300.01, 300.99), At(299.99, 300.5)};
+  std::vector<std::uint8_t> filled(points.size(), 7);
+  const auto heights = source->ReadPoints(points, HeightDatum::kEllipsoid, {}, filled);
+  ASSERT_TRUE(heights);
+  EXPECT_NEAR((*heights)[0], 300 + 30'000, .1);
+  EXPECT_NEAR((*heights)[1], 299.51 + 30'049, .1);
+  EXPECT_NEAR((*heights)[2], 299.49 + 30'000, .1);
+  EXPECT_EQ(filled, (std::vector<std::uint8_t>{1, 1, 0}));
 }
 
 TEST(Points, DoNotDependOnEachOtherOrTheirOrder) {

@@ -88,7 +88,7 @@ TEST(Resampling, PolesOfGlobalSourcesAreTheMeanOfTheirRow) {
   EXPECT_EQ(source->Read({2, 6, 0})->At(4, 0), 7);
 }
 
-TEST(Resampling, SmallVoidsAreBridgedAndLargeOnesFallToTheFloor) {
+TEST(Resampling, SmallVoidsAreBridgedAndLargeOnesFallToTheFloorOnDemand) {
   const TempDir dir;
   RasterSpec spec = PlaneSpec(10, 20, .01, 400, 400);
   const auto plane = spec.value;
@@ -98,7 +98,7 @@ TEST(Resampling, SmallVoidsAreBridgedAndLargeOnesFallToTheFloor) {
     const bool large = std::abs(col - 280) < 60 && std::abs(row - 280) < 60;
     return small || large ? -500 : plane(col, row);
   };
-  const auto source = OpenOrFail(WriteRaster(dir, spec), {.floor = -9});
+  const auto source = OpenOrFail(WriteRaster(dir, spec), {.floor = -9, .voids = HoleFill::kFloor});
   const auto at = [&](double longitude, double latitude) {
     const int level = source->max_level();
     const double size = 180.0 / static_cast<double>(geo::TileRows(level));

@@ -253,6 +253,24 @@ TEST(HeightsJson, IsWhatOpenTopoDataSends) {
   EXPECT_EQ(json["results"][0]["dataset"], "\"q\"");
 }
 
+TEST(HeightsJson, SaysWhatWasFilledIn) {
+  HeightsQuery query;
+  query.points = {{8.5, 46.5}, {8.6, 46.5}, {-170, 0}};
+  PointHeights heights(std::vector<float>{1473.25f, 1500, std::numeric_limits<float>::quiet_NaN()});
+  heights.filled = {1, 0, 1};
+  EXPECT_EQ(HeightsJson(query, heights, "a"),
+            R"({"results":[{"elevation":1473.25,"location":{"lat":46.5,"lng":8.5},"filled":true,"dataset":"a"},)"
+            R"({"elevation":1500,"location":{"lat":46.5,"lng":8.6},"dataset":"a"},)"
+            R"({"elevation":null,"location":{"lat":0,"lng":-170},"dataset":"a"}],"status":"OK"})");
+  CertifiedPoints certified;
+  certified.tiles = {{12, 4289, 3105}};
+  certified.tile_of_point = {0, 0, 0};
+  certified.errors_m = {12.5};
+  const auto json = nlohmann::json::parse(HeightsJson(query, heights, "a", &certified));
+  EXPECT_TRUE(json["results"][0]["certified_error"].is_null());
+  EXPECT_EQ(json["results"][1]["certified_error"], 12.5);
+}
+
 TEST(HeightsJson, SaysWhichTileIsHowFarOff) {
   HeightsQuery query;
   query.points = {{8.5, 46.5}, {-170, 0}, {8.6, 46.5}};
