@@ -5,9 +5,11 @@
 #include <stdlib.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <iostream>
 
+#include "engine/geo/tile_cover.h"
 #include "tests/support/source_dir.h"
 
 namespace terrace::dem {
@@ -76,9 +78,22 @@ std::unique_ptr<DemSource> OpenOrFail(const std::vector<DemFile>& files, const D
   return source ? *std::move(source) : nullptr;
 }
 
+std::vector<geo::TileRange> TilesWithData(const DemSource& source, int level) {
+  const GeoBounds& bounds = source.info().bounds;
+  if (bounds.west > bounds.east) return source.Available(level);
+  const auto tile = [level](double degrees) { return static_cast<std::int64_t>(std::ldexp(degrees / 180, level)); };
+  const geo::TileRange box{tile(bounds.west + 180), tile(bounds.south + 90), tile(bounds.east + 180),
+                           tile(bounds.north + 90)};
+  std::vector<geo::TileRange> ranges;
+  for (const geo::TileRange& range : source.Available(level)) {
+    if (const auto common = geo::Common(range, box); !geo::IsEmpty(common)) ranges.push_back(common);
+  }
+  return ranges;
+}
+
 std::vector<geo::TileKey> SomeTiles(const DemSource& source, int level, int count) {
   std::vector<geo::TileKey> keys;
-  for (const geo::TileRange& range : source.Available(level)) {
+  for (const geo::TileRange& range : TilesWithData(source, level)) {
     const std::int64_t columns = range.end_x - range.start_x + 1, rows = range.end_y - range.start_y + 1;
     const std::int64_t wanted = std::min<std::int64_t>(columns * rows, count);
     for (std::int64_t i = 0; i < wanted; ++i) {

@@ -53,7 +53,11 @@ std::optional<std::string> TestDataFile(const std::string& name);
 std::unique_ptr<DemSource> OpenOrFail(const std::string& path, const DemOptions& options = {});
 std::unique_ptr<DemSource> OpenOrFail(const std::vector<DemFile>& files, const DemOptions& options = {});
 
-// Tiles across the available ranges of a level, at most about `count`.
+// Of the available ranges of a level what touches the source's bounds: others only make four children of a tile's. All
+// of them where the bounds cross the antimeridian.
+std::vector<geo::TileRange> TilesWithData(const DemSource& source, int level);
+
+// Tiles across these, at most about `count`.
 std::vector<geo::TileKey> SomeTiles(const DemSource& source, int level, int count);
 
 // One real raster of every CRS kind, by file name.

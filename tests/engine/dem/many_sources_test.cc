@@ -46,7 +46,7 @@ Sheet MakeSheet(const TempDir& dir, const std::array<double, 6>& first, const st
   }
   std::vector<SheetPlan> plans = PlanSheets(rasters);
   EXPECT_EQ(plans.size(), 1U);
-  auto sheet = Sheet::Make(std::move(plans.front()), {64, 0});
+  auto sheet = Sheet::Make(std::move(plans.front()), {.max_void_gap = 64});
   EXPECT_TRUE(sheet.has_value());
   return *std::move(sheet);
 }
@@ -57,7 +57,7 @@ SheetTrace TraceOf(const Sheet& sheet, const geo::Lattice& lattice, const geo::T
   std::vector<float> heights(static_cast<std::size_t>(window.columns) * static_cast<std::size_t>(window.rows),
                              SampleRules::kVoid);
   SheetTrace trace;
-  EXPECT_TRUE(sheet.Fill(lattice, window, Counting::kEllipsoid, heights, {}, {}, &trace));
+  EXPECT_TRUE(sheet.Fill(lattice, window, Counting::kEllipsoid, {heights}, {}, &trace));
   return trace;
 }
 
@@ -145,7 +145,7 @@ TEST(ManySources, PagedTablesSayWhatKeptOnesDo) {
   const std::string path = WriteRaster(dir, Rough(1500));
   const auto kept = OpenRasterOrFail(path);
   const auto pages = std::make_shared<SurveyPages>(0, 1);
-  auto opened = RasterSource::Open(path, {}, cache.path().string(), {}, nullptr, {}, pages);
+  auto opened = RasterSource::Open(path, {}, cache.path().string(), {}, {}, pages);
   ASSERT_TRUE(opened.has_value()) << opened.error().message;
   const RasterSource& paged = **opened;
   EXPECT_EQ(pages->paged_bytes(), 0U) << "nothing was asked for yet";
@@ -171,7 +171,7 @@ TEST(ManySources, PagedTablesOfALostRecordAreMadeAgain) {
   const TempDir dir, cache;
   const std::string path = WriteRaster(dir, Rough(1100));
   const auto pages = std::make_shared<SurveyPages>(0, 1);
-  auto opened = RasterSource::Open(path, {}, cache.path().string(), {}, nullptr, {}, pages);
+  auto opened = RasterSource::Open(path, {}, cache.path().string(), {}, {}, pages);
   ASSERT_TRUE(opened.has_value());
   const RasterSource& raster = **opened;
   const auto drop = [&] {

@@ -80,7 +80,7 @@ TEST(Reference, HeightsAreThoseOfGdalwarp) {
     ASSERT_NE(source, nullptr);
     int compared = 0;
     for (int level = source->max_level(); level > source->max_level() - 3; --level) {
-      const geo::TileRange range = source->Available(level).front();
+      const geo::TileRange range = TilesWithData(*source, level).front();
       for (const int share : {1, 2, 3}) {
         const geo::TileKey key{level, range.start_x + (range.end_x - range.start_x) * share / 4,
                                range.start_y + (range.end_y - range.start_y) * (4 - share) / 4};

@@ -12,7 +12,7 @@ inline Response AtOnce(Answer answer, const Request& request) {
   const auto* plan = std::get_if<DocumentPlan>(&answer);
   if (plan == nullptr) return std::get<Response>(std::move(answer));
   const Coding coding = NegotiateCoding(request.fields->accept_encoding, kGzipOnly);
-  return Serve(MakeDocument(plan->write, coding), *plan, request);
+  return Serve(*MakeDocument(plan->write, coding, {}), *plan, request);
 }
 
 }  // namespace terrace::server
