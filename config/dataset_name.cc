@@ -57,7 +57,8 @@ std::vector<ConfigError> FindDuplicateNames(const std::vector<DatasetConfig>& da
     const auto [first, is_new] = first_of.emplace(datasets[i].name, i);
     if (is_new || datasets[i].name.empty()) continue;
     errors.push_back({fmt::format("/datasets/{}/name", i),
-                      fmt::format("is the name of /datasets/{} too; every dataset needs its own", first->second)});
+                      fmt::format("\"{}\" is the name of /datasets/{} too; every dataset needs its own",
+                                  datasets[i].name, first->second)});
   }
   return errors;
 }

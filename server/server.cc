@@ -111,7 +111,8 @@ class Server::Impl {
     if (!listener) return tl::unexpected(listener.error());
     listener_ = std::move(*listener);
     WatchSignals();
-    listener_->Start();
+    // On a held socket who comes before there is something to serve waits in its queue: a stop then loses nobody.
+    if (!opening_ || options_.listen_socket < 0) listener_->Start();
     if (edge_->tls) asio::co_spawn(io_.first(), WatchCertificate(edge_->tls.get()), asio::detached);
     io_.Start();
     stopper_ = std::thread([this] { StopWhenAsked(); });
@@ -122,11 +123,14 @@ class Server::Impl {
     std::shared_ptr<const Routes> routes = MakeRoutes(catalog, options);
     tiles_.SetCacheBytes(options.cache_bytes);
     deadline_.store(options.request_deadline, std::memory_order_relaxed);
+    bool is_first = false;
     {
       const std::lock_guard lock(state_mutex_);
       routes_.swap(routes);
-      if (!opening_.exchange(false)) ++catalogs_;
+      is_first = opening_.exchange(false);
+      if (!is_first) ++catalogs_;
     }
+    if (is_first && options_.listen_socket >= 0) listener_->Start();
     tiles_.RetainTilesOf(*catalog);
     metrics_.RetainDatasets(catalog->datasets);
   }

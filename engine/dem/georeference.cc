@@ -62,9 +62,10 @@ std::string UnitOfHeightAxis(const OGRSpatialReference& srs) {
   return fmt::format("{} m a unit", metres);  // known to no table: a warning says so
 }
 
-// What GDAL leaves of a compound CRS without its vertical part has lost the details of its code, as files have them
-// that state the code alone.
-std::string WktWithDetails(const OGRSpatialReference& horizontal) {
+// By its EPSG code where it has one. The text that GDAL keeps of a file's CRS is not always the same: a compound CRS
+// without its vertical part has lost the details of its code, and what a thread has read before decides whether the
+// datum WGS 84 is written as an ensemble. Rasters whose texts differ would not be read as one.
+std::string CanonicalWkt(const OGRSpatialReference& horizontal) {
   const char* authority = horizontal.GetAuthorityName(nullptr);
   const char* code = horizontal.GetAuthorityCode(nullptr);
   if (authority != nullptr && code != nullptr && EQUAL(authority, "EPSG")) {
@@ -192,7 +193,7 @@ Result<void> Georeference::ReadCrs(const OGRSpatialReference& srs, const std::st
   OGRSpatialReference horizontal(srs);
   if (horizontal.IsCompound() != 0) horizontal.StripVertical();
   if (horizontal.GetAxesCount() == 3) horizontal.DemoteTo2D(nullptr);
-  horizontal_wkt_ = srs.IsCompound() != 0 ? WktWithDetails(horizontal) : Wkt(horizontal);
+  horizontal_wkt_ = CanonicalWkt(horizontal);
   crs_ = NameAndCode(vertical_datum_.empty() ? horizontal : srs);
   if (horizontal.IsGeographic() == 0 && horizontal.IsProjected() == 0) {
     return MakeError(ErrorCode::kInvalidArgument,
@@ -220,7 +221,7 @@ Result<void> Georeference::ReadCrs(const OGRSpatialReference& srs, const std::st
         "served",
         path, crs_, radius / 1000);
   }
-  auto projector = Projector::Make(Wkt(horizontal), centre);
+  auto projector = Projector::Make(horizontal_wkt_, centre);
   if (!projector) {
     return MakeError(
         ErrorCode::kInvalidArgument,

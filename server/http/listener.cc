@@ -124,7 +124,14 @@ Result<void> Listener::TryAddress(const std::string& host, std::uint16_t port) {
   return Bind(acceptor, io, host, port);
 }
 
-void Listener::Start() { asio::co_spawn(acceptor_.get_executor(), Run(shared_from_this()), asio::detached); }
+void Listener::Start() {
+  asio::post(acceptor_.get_executor(), [self = shared_from_this()] {
+    self->started_ = true;
+    if (!self->closing_) self->Spawn();
+  });
+}
+
+void Listener::Spawn() { asio::co_spawn(acceptor_.get_executor(), Run(shared_from_this()), asio::detached); }
 
 // Ends with the coroutine that accepts. Where there was no memory for one connection, the coroutine ends by an
 // exception, or by being destroyed; others will find some.
@@ -142,7 +149,7 @@ class Listener::GoOn {
  private:
   static void Again(Listener& listener) {
     UntilThereIsMemory([&] {
-      if (listener.acceptor_.is_open()) listener.Start();
+      if (listener.acceptor_.is_open()) listener.Spawn();
     });
   }
 
@@ -182,6 +189,10 @@ asio::awaitable<void> Listener::AcceptAll() {
     co_await Pause(kBackOff);
     Shed();
   }
+  Finish();
+}
+
+void Listener::Finish() {
   if (!is_adopted_) TakeQueue();
   error_code ignored;
   acceptor_.close(ignored);
@@ -254,6 +265,7 @@ void Listener::Close() {
     closing_ = true;
     error_code ignored;
     acceptor_.cancel(ignored);
+    if (!started_) Finish();
   });
   closed_.get_future().wait();
 }

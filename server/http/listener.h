@@ -38,17 +38,18 @@ class Listener : public std::enable_shared_from_this<Listener> {
   const std::string& host() const { return host_; }  // an adopted socket's address
   std::uint16_t port() const { return port_; }
 
-  // Begins to accept. Call once.
+  // Begins to accept, unless Close came first. Call once.
   void Start();
 
   // Accepts what already waits in the kernel's queue, unless somebody else holds the socket, then closes. Blocks until
-  // that is done and every accepted connection has its session: not from an io thread. Call once, after Start.
+  // that is done and every accepted connection has its session: not from an io thread. Call once.
   void Close();
 
  private:
   Listener(IoThreads& io, std::shared_ptr<const SessionContext> context);
   class GoOn;
 
+  void Spawn();
   static asio::awaitable<void> Run(std::shared_ptr<Listener> self);
   asio::awaitable<void> AcceptAll();
   asio::awaitable<void> Pause(std::chrono::milliseconds time);
@@ -57,6 +58,7 @@ class Listener : public std::enable_shared_from_this<Listener> {
   void Shed();
   void Refuse(asio::ip::tcp::socket& socket, int status);
   void TakeQueue();
+  void Finish();
 
   IoThreads& io_;
   const std::shared_ptr<const SessionContext> context_;
@@ -64,7 +66,7 @@ class Listener : public std::enable_shared_from_this<Listener> {
   bool is_adopted_ = false;
   std::string host_;
   std::uint16_t port_ = 0;
-  bool closing_ = false;  // for the acceptor's thread
+  bool started_ = false, closing_ = false;  // for the acceptor's thread
   std::promise<void> closed_;
   std::optional<asio::posix::stream_descriptor> spare_;  // given up for a moment when there are no descriptors left
   bool crowded_ = false;

@@ -28,20 +28,9 @@ TEST(ToJson, ComesBackAsTheDefaults) { ExpectComesBack(Config{}); }
 TEST(ToJson, ComesBackWithEveryOptionSet) {
   Config config;
   config.listen = {"2001:db8::1", 0};
-  DatasetConfig dataset{"a",
-                        {"/data/a.tif"},
-                        "egm96",
-                        NodataConfig{false, {-9999, 0.5}},
-                        "© \"ét\\é\"",
-                        0.1,
-                        1e-3,
-                        -0.3,
-                        7,
-                        HoleFill::kFloor,
-                        12.5,
-                        9,
-                        Criterion::kDataDependent,
-                        true};
+  DatasetConfig dataset{
+      "a", {"/data/a.tif"},  "egm96", NodataConfig{false, {-9999, 0.5}}, "© \"ét\\é\"", 0.1, 1e-3, -0.3,
+      7,   HoleFill::kFloor, 12.5,    Criterion::kDataDependent,         true};
   dataset.sources.front().vertical = "EPSG:5703";
   dataset.sources.front().nodata = NodataConfig{false, {}};
   dataset.water.sea_level = -1.25;

@@ -7,6 +7,7 @@ import socket
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 import urllib.error
 import urllib.request
@@ -18,6 +19,12 @@ import descriptors  # noqa: E402
 import restarts  # noqa: E402
 
 DEM = SOURCE_DIR / "config/samples/jacksboro.tif"
+
+
+def listens(address):
+    host, _, port = address.rpartition(":")
+    with socket.socket() as connection:
+        return connection.connect_ex((host, int(port))) == 0
 
 
 class HeldSocket(unittest.TestCase):
@@ -53,13 +60,18 @@ class HeldSocket(unittest.TestCase):
 
 class Opening(unittest.TestCase):
     def test_ends_when_it_is_told_to(self):
-        with tempfile.TemporaryDirectory() as folder, restarts.HeldSocket() as held:
+        with tempfile.TemporaryDirectory() as folder:
+            with socket.create_server(("127.0.0.1", 0)) as taken:
+                address = f"127.0.0.1:{taken.getsockname()[1]}"
             slow = pathlib.Path(folder, "slow.tif")
             shutil.copy(DEM, slow)
             with restarts.leased(slow):
                 # A folder, for the files of one are looked into when the dataset is opened, and not before.
-                process = held.start(BINARY, "serve", folder, "--drain-timeout-s", "0.5", stderr=subprocess.PIPE)
-                state = f"http://127.0.0.1:{held.port}/readyz"
+                process = subprocess.Popen([BINARY, "serve", folder, "--listen", address, "--drain-timeout-s", "0.5"], text=True,
+                                           stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+                while not listens(address):
+                    time.sleep(0.01)
+                state = f"http://{address}/readyz"
                 with self.assertRaises(urllib.error.HTTPError) as opening:
                     urllib.request.urlopen(state, timeout=30)
                 self.assertEqual((opening.exception.code, opening.exception.read()), (503, b"opening\n"))

@@ -203,10 +203,11 @@ class Source(ReloadTest):
     def tiles_of(layer):
         targets = []
         for level in range(6, len(layer["available"])):
-            ranges = layer["available"][level][0]
-            middle = ((ranges["startX"] + ranges["endX"]) // 2, (ranges["startY"] + ranges["endY"]) // 2)
+            west, south, east, north = layer["bounds"]
+            side = 180 / 2 ** level  # degrees
+            middle = (int(((west + east) / 2 + 180) / side), int(((south + north) / 2 + 90) / side))
             for dx in range(2):
-                x = min(middle[0] + dx, ranges["endX"])
+                x = min(middle[0] + dx, int((east + 180 - 1e-3) / side))
                 for form in ("terrain", "glb"):
                     targets.append(f"/hills/{level}/{x}/{middle[1]}.{form}")
             targets.append(f"/hills/{level}/{middle[0]}/{middle[1]}.terrain?error=2")
@@ -429,18 +430,18 @@ class Configuration(ReloadTest):
         log = self.folder / "access.log"
         config = {"datasets": [self.dataset("a")], "access_log": "json", "access_log_file": "access.log"}
         server = self.serve("--config", self.write_config(config))
-        server.get("/a/0/0/0.terrain?v=1")
+        server.get("/a/0/0/0.terrain?error=1")
         self.assertTrue(eventually(lambda: log.exists() and log.read_text().count("\n") == 1))
         line = json.loads(log.read_text())
         self.assertEqual((line["target"], line["status"], line["dataset"], line["cache"]),
-                         ("/a/0/0/0.terrain?v=1", 200, "a", "miss"))
+                         ("/a/0/0/0.terrain?error=1", 200, "a", "miss"))
         os.rename(log, self.folder / "access.log.1")
         server.process.send_signal(signal.SIGHUP)
         self.assertTrue(eventually(log.exists))
-        server.get("/a/0/0/0.terrain?v=2")
-        self.assertTrue(eventually(lambda: "v=2" in log.read_text()))
-        self.assertNotIn("v=2", (self.folder / "access.log.1").read_text())
-        self.assertNotIn("v=1", server.log())
+        server.get("/a/0/0/0.terrain?error=2")
+        self.assertTrue(eventually(lambda: "error=2" in log.read_text()))
+        self.assertNotIn("error=2", (self.folder / "access.log.1").read_text())
+        self.assertNotIn("error=1", server.log())
 
     def test_systemd_is_told(self):
         with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
@@ -451,6 +452,7 @@ class Configuration(ReloadTest):
                 server = self.serve("--config", self.write_config({"datasets": [self.dataset("a")]}))
             finally:
                 del os.environ["NOTIFY_SOCKET"]
+            self.assertIn("STATUS=listening", manager.recv(4096).decode())
             self.assertRegex(manager.recv(4096).decode(), r"READY=1\nSTATUS=1 dataset at http://127")
             server.process.send_signal(signal.SIGHUP)
             self.assertRegex(manager.recv(4096).decode(), r"^RELOADING=1\nMONOTONIC_USEC=\d+$")
@@ -474,10 +476,10 @@ class Configuration(ReloadTest):
     def test_the_log_level_changes_while_it_runs(self):
         config = {"datasets": [self.dataset("a")], "log_level": "warn"}
         server = self.serve("--config", self.write_config(config))
-        server.get("/livez?v=quiet")
+        server.get("/a/0/0/0.terrain?error=3")
         self.write_config(config | {"log_level": "info"})
-        self.assertTrue(eventually(lambda: server.get("/livez?v=loud")[0] == 200 and "v=loud" in server.log()))
-        self.assertNotIn("v=quiet", server.log())
+        self.assertTrue(eventually(lambda: server.get("/a/0/0/0.terrain?error=4")[0] == 200 and "error=4" in server.log()))
+        self.assertNotIn("error=3", server.log())
         server.process.send_signal(signal.SIGUSR1)
         self.assertTrue(eventually(lambda: "log level: debug" in server.log()))
         server.process.send_signal(signal.SIGUSR2)

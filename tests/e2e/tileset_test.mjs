@@ -89,8 +89,14 @@ for (const dataset of ['jacksboro', 'earth']) {
         for (let x = r.startX; x <= r.endX; x++) for (let y = r.startY; y <= r.endY; y++) keys.push(`${z}/${x}/${y}`);
         return keys;
       })));
+      // What layer.json lists beside the roots only makes four children of a tile's.
+      const tops = new Set(roots.map(({ content }) => /3dtiles\/(\d+-\d+-\d+)\//.exec(content.uri)[1].replaceAll('-', '/')).concat(above));
+      const isUnder = (key) => {
+        for (let [z, x, y] = key.split('/').map(Number); z >= top; [z, x, y] = [z - 1, x >> 1, y >> 1]) if (tops.has(`${z}/${x}/${y}`)) return true;
+        return false;
+      };
       const found = (await Promise.all(roots.map((root) => tilesOf(root, base)))).flat().map(({ key }) => key).concat(above);
-      assert.deepEqual(found.sort(), listed.sort());
+      assert.deepEqual(found.sort(), listed.filter(isUnder).sort());
     });
 
     it('serve what they promise', async () => {

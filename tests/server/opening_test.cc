@@ -121,5 +121,19 @@ TEST_F(HeldSocket, LeavesWhomItDoesNotAcceptToTheNextServer) {
   EXPECT_EQ(reply->status, 200);
 }
 
+TEST_F(HeldSocket, IsNotAcceptedFromBeforeThereIsSomethingToServe) {
+  Listen(OnIt());
+  RawClient early(held_port_);
+  ASSERT_TRUE(early.Send(Get("/maui/0/0/0.terrain")));
+  server_->RequestStop();
+  EXPECT_TRUE(server_->Wait());
+  server_.reset();
+  Listen(OnIt());
+  ASSERT_TRUE(server_->Replace(MakeCatalog(), {}));
+  const auto reply = early.Read();
+  ASSERT_TRUE(reply);
+  EXPECT_EQ(reply->status, 200);
+}
+
 }  // namespace
 }  // namespace terrace::server

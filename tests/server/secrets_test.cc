@@ -31,13 +31,13 @@ bool Holds(std::string text) {
 }
 
 // With the secret for each "$".
-std::string With(std::string text) {
+std::string FieldsWith(std::string text) {
   for (std::size_t at = 0; (at = text.find('$', at)) != std::string::npos;) text.replace(at, 1, kSecret);
   return text;
 }
 
 std::string Line(const std::string& target, const std::string& fields = "") {
-  return With("GET " + target + " HTTP/1.1\r\nHost: x\r\n" + fields + "\r\n");
+  return FieldsWith("GET " + target + " HTTP/1.1\r\nHost: x\r\n" + fields + "\r\n");
 }
 
 // What follows a path.
@@ -102,26 +102,26 @@ std::vector<std::string> OtherForms(const std::string& path) {
   for (const std::string spelling : kSpellings) {
     const std::string target = path + spelling;
     requests.push_back(Line("http://x" + target));
-    requests.push_back(With("HEAD " + target + " HTTP/1.0\r\n\r\n"));
-    requests.push_back(With("OPTIONS " + target + " HTTP/1.1\r\nHost: x\r\n\r\n"));
-    requests.push_back(With("DELETE " + target + " HTTP/1.1\r\nHost: x\r\n\r\n"));
-    requests.push_back(With("GET " + target + " HTTP/1.1\r\nHost: a\r\nHost: b\r\n\r\n"));  // refused
-    requests.push_back(With("GET " + target + " x HTTP/1.1\r\nHost: x\r\n\r\n"));           // likewise
+    requests.push_back(FieldsWith("HEAD " + target + " HTTP/1.0\r\n\r\n"));
+    requests.push_back(FieldsWith("OPTIONS " + target + " HTTP/1.1\r\nHost: x\r\n\r\n"));
+    requests.push_back(FieldsWith("DELETE " + target + " HTTP/1.1\r\nHost: x\r\n\r\n"));
+    requests.push_back(FieldsWith("GET " + target + " HTTP/1.1\r\nHost: a\r\nHost: b\r\n\r\n"));  // refused
+    requests.push_back(FieldsWith("GET " + target + " x HTTP/1.1\r\nHost: x\r\n\r\n"));           // likewise
   }
   requests.push_back(Line("http://u:$@x" + path));
   requests.push_back(Line("http://$" + path));
   requests.push_back(Line("$"));
-  requests.push_back(With("$ / HTTP/1.1\r\nHost: x\r\nAuthorization: x\r\n\r\n"));
-  requests.push_back(With("CONNECT $:443 HTTP/1.1\r\nHost: x\r\n\r\n"));
+  requests.push_back(FieldsWith("$ / HTTP/1.1\r\nHost: x\r\nAuthorization: x\r\n\r\n"));
+  requests.push_back(FieldsWith("CONNECT $:443 HTTP/1.1\r\nHost: x\r\n\r\n"));
   for (const std::string referer : {"https://maps.example/globe?token=$", "https://u:$@maps.example/$;$#$", "$"}) {
     requests.push_back(Line("/livez", "Referer: " + referer + "\r\nAuthorization: x\r\n"));
   }
   const auto post = [&](const char* type, const std::string& body) {
-    const std::string text = With(body);
+    const std::string text = FieldsWith(body);
     requests.push_back(
-        With(fmt::format("POST /maui/heights HTTP/1.1\r\nHost: x\r\nAuthorization: Bearer $\r\n"
-                         "Content-Type: application/{}\r\nContent-Length: {}\r\n\r\n{}",
-                         type, text.size(), text)));
+        FieldsWith(fmt::format("POST /maui/heights HTTP/1.1\r\nHost: x\r\nAuthorization: Bearer $\r\n"
+                               "Content-Type: application/{}\r\nContent-Length: {}\r\n\r\n{}",
+                               type, text.size(), text)));
   };
   for (const char* body : {"token=$", "Token=$", "token%3D$", "locations=$", "datum=$", "$"}) {
     post("x-www-form-urlencoded", body);

@@ -130,7 +130,7 @@ TEST(HugeSource, IsPreparedOnceAndServedFromFewBytes) {
   double before = MegabytesRead();
   std::vector<Dataset> datasets(1);
   datasets[0].name = "huge";
-  datasets[0].source = Open(path, cache, [](double) { ADD_FAILURE() << "nothing is left to do"; });
+  datasets[0].source = Open(path, cache, [](double share) { EXPECT_EQ(share, 1) << "nothing is left to do"; });
   ASSERT_NE(datasets[0].source, nullptr);
   std::printf("second start: %.2f s, %.0f MB read\n", Since(start), MegabytesRead() - before);
   EXPECT_LT(MegabytesRead() - before, 200);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <cmath>
 #include <cstddef>
 #include <map>
 #include <ostream>
@@ -49,8 +50,9 @@ class RealTiles : public testing::TestWithParam<Dem> {
   // The south-western tile of a block in the middle of the source.
   static geo::TileKey FirstTile(const dem::DemSource& source, int level) {
     if (GetParam().file == nullptr) return {level, geo::TileColumns(level) - 2, geo::TileRows(level) / 2 - 1};
-    const geo::TileRange& range = source.Available(level).front();
-    return {level, (range.start_x + range.end_x) / 2 - 1, (range.start_y + range.end_y) / 2 - 1};
+    const dem::GeoBounds& bounds = source.info().bounds;
+    const auto at = [level](double degrees) { return static_cast<std::int64_t>(std::ldexp(degrees / 180, level)); };
+    return {level, at((bounds.west + bounds.east) / 2 + 180) - 1, at((bounds.south + bounds.north) / 2 + 90) - 1};
   }
 };
 
