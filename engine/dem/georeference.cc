@@ -62,17 +62,29 @@ std::string UnitOfHeightAxis(const OGRSpatialReference& srs) {
   return fmt::format("{} m a unit", metres);  // known to no table: a warning says so
 }
 
-// By its EPSG code where it has one. The text that GDAL keeps of a file's CRS is not always the same: a compound CRS
+// Nothing: it cannot be written so.
+std::optional<std::string> Proj4(const OGRSpatialReference& srs) {
+  char* text = nullptr;
+  const bool written = srs.exportToProj4(&text) == OGRERR_NONE;
+  std::optional<std::string> proj4;
+  if (written && text != nullptr) proj4 = text;
+  CPLFree(text);
+  return proj4;
+}
+
+// By its EPSG code where it has one. The text that GDAL has of a file's CRS is not always the same: a compound CRS
 // without its vertical part has lost the details of its code, and what a thread has read before decides whether the
-// datum WGS 84 is written as an ensemble. Rasters whose texts differ would not be read as one.
+// datum of WGS 84 is written as an ensemble. Rasters whose texts differ would not be read as one.
 std::string CanonicalWkt(const OGRSpatialReference& horizontal) {
   const char* authority = horizontal.GetAuthorityName(nullptr);
   const char* code = horizontal.GetAuthorityCode(nullptr);
   if (authority != nullptr && code != nullptr && EQUAL(authority, "EPSG")) {
-    OGRSpatialReference detailed;
-    detailed.SetAxisMappingStrategy(OAMS_TRADITIONAL_GIS_ORDER);
-    if (detailed.importFromEPSG(std::atoi(code)) == OGRERR_NONE && detailed.IsSame(&horizontal) != 0) {
-      return Wkt(detailed);
+    OGRSpatialReference registered;
+    registered.SetAxisMappingStrategy(OAMS_TRADITIONAL_GIS_ORDER);
+    // IsSame tells an ensemble from its datum; their projections do not differ.
+    if (registered.importFromEPSG(std::atoi(code)) == OGRERR_NONE &&
+        (registered.IsSame(&horizontal) != 0 || (Proj4(registered) && Proj4(registered) == Proj4(horizontal)))) {
+      if (std::string wkt = EpsgWkt(code); !wkt.empty()) return wkt;
     }
   }
   return Wkt(horizontal);

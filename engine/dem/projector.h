@@ -44,4 +44,8 @@ class Projector {
   OperationPool operations_;
 };
 
+// The reference system of an EPSG code as WKT 2:2019, from PROJ's database: the same on every thread. Empty: there is
+// none.
+std::string EpsgWkt(const std::string& code);
+
 }  // namespace terrace::dem
