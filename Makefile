@@ -10,7 +10,7 @@ SOURCES = git ls-files '*.h' '*.cc'
 TERRACE = build/release/server/cli/terrace
 
 .DEFAULT_GOAL := help
-.PHONY: help deps test-deps build run test sanitize coverage reliability reliability-long bench paper format lint clean
+.PHONY: help deps test-deps build run test sanitize coverage reliability reliability-long bench paper format lint tidy clean
 
 help:  ## list these targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-16s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -57,8 +57,11 @@ paper: test-deps  ## repeat the experiments of the paper (docs/engine.md) into b
 format:  ## format the C++ sources
 	$(SOURCES) | xargs clang-format-14 -i
 
-lint: test-deps  ## layers, leftovers, formatting, self-contained headers, clang-tidy
+lint: test-deps  ## layers, leftovers, formatting, self-contained headers
 	@tools/lint.sh $(JOBS)
+
+tidy: test-deps  ## clang-tidy over the product
+	@tools/tidy.sh $(JOBS)
 
 clean:  ## remove everything that was built
 	rm -rf build

@@ -1,0 +1,13 @@
+#!/usr/bin/env bash
+# clang-tidy over the product. Reads the unity sources of the sanitizer build: each header is parsed once for eight sources, which
+# takes a fifth of the time.
+#
+#   tools/tidy.sh [JOBS]
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+cmake --preset asan -DTERRACE_BUILD_TESTS=ON --log-level=ERROR > /dev/null
+python3 - <<'PYTHON' | xargs -r -d '\n' -P "${1:-$(nproc)}" -n 1 clang-tidy-14 -p build/asan --quiet 2> /dev/null
+import json
+files = {entry["file"] for entry in json.load(open("build/asan/compile_commands.json"))}
+print(*sorted(name for name in files if "/tests/" not in name), sep="\n")
+PYTHON
