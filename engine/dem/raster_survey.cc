@@ -56,8 +56,10 @@ std::size_t RasterSurvey::bytes() const {
 }
 
 SurveyAssembler::SurveyAssembler(const RasterLayout& layout)
-    : layout_(layout), voids_(layout.columns, layout.height, [this](int row, int first, int last) {
-        survey_.table.MarkHole(row, first, last);
+    : layout_(layout),
+      voids_(layout.columns, layout.height, [this](int row, int first, int last, std::int64_t samples) {
+        // A single sample is filled from its neighbours, which are within the ranges of any box that it counts in.
+        if (samples > 1) survey_.table.MarkHole(row, first, last);
         survey_.hole_samples += static_cast<std::uint64_t>(last - first + 1);
       }) {
   survey_.table = RangeTable(layout.width, layout.height);

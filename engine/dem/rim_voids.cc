@@ -140,6 +140,8 @@ void RimVoidFinder::Settle() {
   if (top_ + ChunkGrid::kSide < rows_) {
     for (const Run& run : frontier_) goes_on[RootOf(run.region)] = 1;
   }
+  std::vector<std::int64_t> samples(parents_.size());
+  for (const Run& run : open_) samples[RootOf(run.region)] += run.last - run.first + 1;
   std::erase_if(open_, [&](const Run& run) {
     const std::uint32_t root = RootOf(run.region);
     if (touches_[root] != 0) {
@@ -147,7 +149,7 @@ void RimVoidFinder::Settle() {
     } else if (goes_on[root] != 0) {
       return false;
     } else {
-      hole_(run.row, run.first, run.last);
+      hole_(run.row, run.first, run.last, samples[root]);
     }
     return true;
   });

@@ -51,8 +51,8 @@ class RimVoidFinder {
   static constexpr std::size_t kMostRuns = std::size_t{1} << 22;
 
   // Of the columns in use; the first column is at the rim even where the raster goes around the Earth. `hole` is told
-  // the runs of holes: row, first and last sample.
-  using Hole = std::function<void(std::int32_t, std::int32_t, std::int32_t)>;
+  // the runs of holes: row, first and last sample, and how many samples the hole has.
+  using Hole = std::function<void(std::int32_t, std::int32_t, std::int32_t, std::int64_t)>;
   RimVoidFinder(int columns, int rows, Hole hole, std::size_t most_runs = kMostRuns);
 
   // All parts in the order of ChunkGrid.

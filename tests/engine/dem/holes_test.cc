@@ -403,7 +403,9 @@ RimVoids FindRimVoids(int width, int height, const std::vector<std::uint8_t>& vo
   };
   RimVoidFinder finder(
       width, height,
-      [&](int row, int first, int last) { std::fill(&holes[at(first, row)], &holes[at(last, row)] + 1, 1); },
+      [&](int row, int first, int last, std::int64_t) {
+        std::fill(&holes[at(first, row)], &holes[at(last, row)] + 1, 1);
+      },
       most_runs);
   const ChunkGrid chunks(width, height);
   for (int index = 0; index < chunks.count(); ++index) {

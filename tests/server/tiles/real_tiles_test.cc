@@ -52,7 +52,8 @@ class RealTiles : public testing::TestWithParam<Dem> {
     if (GetParam().file == nullptr) return {level, geo::TileColumns(level) - 2, geo::TileRows(level) / 2 - 1};
     const dem::GeoBounds& bounds = source.info().bounds;
     const auto at = [level](double degrees) { return static_cast<std::int64_t>(std::ldexp(degrees / 180, level)); };
-    return {level, at((bounds.west + bounds.east) / 2 + 180) - 1, at((bounds.south + bounds.north) / 2 + 90) - 1};
+    return {level, (at(bounds.west + 180) + at(bounds.east + 180)) / 2 - 1,
+            (at(bounds.south + 90) + at(bounds.north + 90)) / 2 - 1};
   }
 };
 
