@@ -163,14 +163,14 @@ TEST_F(TilesetHandlerTest, SubtreesTellTheHeightsOfEachTileAtTheErrorAskedFor) {
   datasets_[0].range_bound = [](const geo::TileKey& key) {
     return dem::HeightRange{-10.0 * key.level, static_cast<double>(key.x % 4)};
   };
-  for (const char* query : {"", "?error=600&atleast=1", "?fraction=0.02"}) {
+  for (const std::string_view query : {"", "?error=600&atleast=1", "?fraction=0.02"}) {
     const Result<proto::ReadSubtree> read =
-        proto::ParseSubtree(*Get(std::string("/maui/3dtiles/7-16-32/0/0/0.6.subtree") + query).body, 6);
+        proto::ParseSubtree(*Get(std::string("/maui/3dtiles/7-16-32/0/0/0.6.subtree").append(query)).body, 6);
     ASSERT_TRUE(read) << read.error().message;
     ASSERT_EQ(read->min_heights.size(), 1365u);
     ErrorWish wish;
-    if (query[1] == 'e') wish = {.error_m = 600, .fraction = {}, .at_least = true};
-    if (query[1] == 'f') wish.fraction = 0.02;
+    if (query.starts_with("?e")) wish = {.error_m = 600, .fraction = {}, .at_least = true};
+    if (query.starts_with("?f")) wish.fraction = 0.02;
     const int step = ErrorStep(wish, 12, true, 0.5);
     const double error_m = geo::LadderError(12, step);
     const double lowest = -120 - proto::SkirtDepth(12, proto::SkirtError(12, step, true, 0.5));
