@@ -312,8 +312,8 @@ class Server::Impl {
     }
   }
 
-  ByteCacheStats RefinementStats() const {
-    return options_.refinement_stats ? options_.refinement_stats() : ByteCacheStats{};
+  tiler::ByteCacheStats RefinementStats() const {
+    return options_.refinement_stats ? options_.refinement_stats() : tiler::ByteCacheStats{};
   }
   SourceStats SourceNumbers() const {
     const std::shared_ptr<const Routes> routes = CurrentRoutes();

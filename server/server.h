@@ -24,18 +24,18 @@ namespace terrace::server {
 
 struct ServerOptions {
   std::string host = "127.0.0.1";
-  std::uint16_t port = 8080;                           // 0: any that is free
-  int listen_socket = -1;                              // instead of both: one that somebody else holds as well
-  unsigned io_threads = 0;                             // 0: a quarter of the processors, at least one
-  unsigned worker_threads = 0;                         // 0: as many as processors
-  std::size_t queue_length = 10'000;                   // jobs that wait for a worker, of all clients
-  std::size_t cache_bytes = std::size_t{256} << 20;    // of finished tiles; 0: none
-  std::shared_ptr<DiskCache> disk_cache;               // of finished tiles, below memory; may be null
-  std::function<ByteCacheStats()> refinement_stats;    // of what tiles are made from; may be empty
-  std::size_t max_locations = 10'000;                  // in one request for heights
-  EdgeOptions edge;                                    // limits of clients, tokens, proxies, TLS
-  std::string cache_control = "public, max-age=3600";  // of tiles and layer.json
-  std::chrono::milliseconds metrics_age{1'000};        // for which a text of /metrics serves
+  std::uint16_t port = 8080;                                // 0: any that is free
+  int listen_socket = -1;                                   // instead of both: one that somebody else holds as well
+  unsigned io_threads = 0;                                  // 0: a quarter of the processors, at least one
+  unsigned worker_threads = 0;                              // 0: as many as processors
+  std::size_t queue_length = 10'000;                        // jobs that wait for a worker, of all clients
+  std::size_t cache_bytes = std::size_t{256} << 20;         // of finished tiles; 0: none
+  std::shared_ptr<DiskCache> disk_cache;                    // of finished tiles, below memory; may be null
+  std::function<tiler::ByteCacheStats()> refinement_stats;  // of what tiles are made from; may be empty
+  std::size_t max_locations = 10'000;                       // in one request for heights
+  EdgeOptions edge;                                         // limits of clients, tokens, proxies, TLS
+  std::string cache_control = "public, max-age=3600";       // of tiles and layer.json
+  std::chrono::milliseconds metrics_age{1'000};             // for which a text of /metrics serves
   AccessLogForm access_log = AccessLogForm::kLog;
   std::filesystem::path access_log_file;  // of some forms; empty: stderr
   std::filesystem::path viewer_dir;       // empty or missing: a plain page instead

@@ -16,10 +16,10 @@ import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 
-# core <- {geo, tin} <- {dem, proto} <- server, and core <- config <- server. In the server, asio.h stands below all and the
+# core <- {geo, tin} <- {dem, proto} <- tiler <- server, and core <- config <- server. In the server, asio.h stands below all and the
 # files of the folder itself, which put the rooms together, above all but the command line:
 # asio.h <- tiles <- http <- handlers <- server <- cli, and tiles <- reload <- cli.
-ENGINE = ["engine/core", "engine/geo", "engine/tin", "engine/dem", "proto", "config", "server/asio.h"]
+ENGINE = ["engine/core", "engine/geo", "engine/tin", "engine/dem", "proto", "config", "tiler", "server/asio.h"]
 ROOMS = {
     "engine/core": [],
     "engine/geo": ["engine/core"],
@@ -27,6 +27,7 @@ ROOMS = {
     "engine/dem": ["engine/core", "engine/geo"],
     "proto": ["engine/core", "engine/geo", "engine/tin"],
     "config": ["engine/core"],
+    "tiler": ["engine/core", "engine/geo", "engine/tin", "engine/dem", "proto"],
     "server/asio.h": [],
     "server/tiles": ENGINE,
     "server/http": ENGINE + ["server/tiles"],
@@ -53,7 +54,7 @@ LIBRARIES = [
     Library("libwebp", r"webp/.*", r"proto/.*\.cc"),
     Library("meshoptimizer", r"meshoptimizer\.h", r"proto/.*\.cc"),
     Library("RocksDB", r"rocksdb/.*", r"server/tiles/record_db\.cc"),
-    Library("xxHash", r"xxhash\.h", r"(engine/dem|engine/tin|proto|server)/.*\.cc"),
+    Library("xxHash", r"xxhash\.h", r"(engine/dem|engine/tin|proto|tiler|server)/.*\.cc"),
     Library("spdlog", r"spdlog/.*", r"(engine/dem|server)/.*\.cc"),
     Library("Beast", r"boost/beast.*", r"server/http/request\.cc"),
     Library("OpenSSL", r"openssl/.*|boost/asio/ssl.*", r"(config/token_hash|server/http/.*)\.cc"),
@@ -64,12 +65,12 @@ LIBRARIES = [
     Library("systemd", r"systemd/.*", r"server/cli/.*\.cc"),
     Library("prometheus-cpp", r"prometheus/.*", r"server/.*\.cc"),
     # What a room promises not to know: threads and clocks, files, sockets.
-    Library("threads", r"(thread|mutex|shared_mutex|condition_variable|semaphore|future)", r"(engine/dem|server)/"),
-    Library("clocks", r"(chrono|ctime)", r"(config|server|engine/dem)/"),
+    Library("threads", r"(thread|mutex|shared_mutex|condition_variable|semaphore|future)", r"(engine/dem|tiler/store|server)/"),
+    Library("clocks", r"(chrono|ctime)", r"(config|tiler|server|engine/dem)/"),
     Library("files", r"(filesystem|fstream)", r"(config/|engine/dem/|server/|proto/mesh_file)"),
     Library("memory from the system", r"sys/mman\.h|sanitizer/asan_interface\.h", r"(engine/tin/spare_blocks|server/.*)\.cc"),
     Library("the operating system", r"(unistd|malloc|fcntl|poll|glob|signal|dirent|pthread|elf|link)\.h|(sys|arpa|netinet|linux)/.*",
-            r"(config|engine/dem|server)/.*\.cc"),
+            r"(config|engine/dem|tiler|server)/.*\.cc"),
     Library("the standard library", r"[a-z_0-9]+|(stdint|immintrin)\.h", r"."),
 ]
 

@@ -9,8 +9,8 @@
 namespace terrace::cli {
 namespace {
 
-Result<server::WaterRules> OpenWater(const config::WaterConfig& wanted, const dem::GeoBounds& bounds) {
-  server::WaterRules water;
+Result<tiler::WaterRules> OpenWater(const config::WaterConfig& wanted, const dem::GeoBounds& bounds) {
+  tiler::WaterRules water;
   water.sea_level_m = wanted.sea_level;
   if (wanted.mask.empty()) return water;
   auto mask = dem::WaterRaster::Open(wanted.mask, bounds);
@@ -36,8 +36,8 @@ proto::TextureFormat TextureOf(config::Texture texture) {
   return proto::TextureFormat::kNone;
 }
 
-Result<server::ImageryRules> OpenImagery(const config::ImageryConfig& wanted, const dem::GeoBounds& bounds) {
-  server::ImageryRules imagery;
+Result<tiler::ImageryRules> OpenImagery(const config::ImageryConfig& wanted, const dem::GeoBounds& bounds) {
+  tiler::ImageryRules imagery;
   if (wanted.image.empty()) return imagery;
   auto image = dem::Imagery::Open(wanted.image, bounds);
   if (!image) return MakeError(image.error().code, "imagery {}", image.error().message);
@@ -51,7 +51,7 @@ Result<server::ImageryRules> OpenImagery(const config::ImageryConfig& wanted, co
 
 }  // namespace
 
-Result<void> OpenLayers(const config::DatasetConfig& wanted, server::Dataset& dataset) {
+Result<void> OpenLayers(const config::DatasetConfig& wanted, tiler::Dataset& dataset) {
   const dem::GeoBounds& bounds = dataset.source->info().bounds;
   auto water = OpenWater(wanted.water, bounds);
   if (!water) return tl::unexpected(water.error());
@@ -63,9 +63,9 @@ Result<void> OpenLayers(const config::DatasetConfig& wanted, server::Dataset& da
   return {};
 }
 
-std::string LayersFingerprint(const server::Dataset& dataset) {
-  const server::WaterRules& water = dataset.water;
-  const server::ImageryRules& imagery = dataset.imagery;
+std::string LayersFingerprint(const tiler::Dataset& dataset) {
+  const tiler::WaterRules& water = dataset.water;
+  const tiler::ImageryRules& imagery = dataset.imagery;
   return fmt::format("{} {} {} {} {} {} {} {}", water.mask ? water.mask->fingerprint() : 0,
                      water.sea_level_m ? fmt::format("{}", *water.sea_level_m) : "none", dataset.metadata_levels,
                      imagery.image ? imagery.image->fingerprint() : 0, imagery.side, imagery.quality,

@@ -39,9 +39,9 @@
 #include "server/reload/reloader.h"
 #include "server/server.h"
 #include "server/tiles/disk_cache.h"
-#include "server/tiles/encoder_version.h"
 #include "server/tiles/pipeline_catalog.h"
-#include "server/tiles/tile_pipeline.h"
+#include "tiler/encoder_version.h"
+#include "tiler/tile_pipeline.h"
 
 namespace terrace::cli {
 namespace {
@@ -164,11 +164,11 @@ proto::GlbOptions GlbOptionsOf(const config::DatasetConfig& dataset) {
   return options;
 }
 
-Result<server::Dataset> OpenDataset(const config::DatasetConfig& wanted, const std::string& cache_dir,
-                                    const std::function<void(double)>& progress, std::stop_token stop) {
+Result<tiler::Dataset> OpenDataset(const config::DatasetConfig& wanted, const std::string& cache_dir,
+                                   const std::function<void(double)>& progress, std::stop_token stop) {
   auto source = OpenSource(wanted, cache_dir, progress, std::move(stop));
   if (!source) return tl::unexpected(source.error());
-  server::Dataset dataset;
+  tiler::Dataset dataset;
   dataset.name = wanted.name;
   dataset.attribution = wanted.attribution;
   dataset.error_fraction = wanted.error_fraction;
@@ -181,12 +181,12 @@ Result<server::Dataset> OpenDataset(const config::DatasetConfig& wanted, const s
 }
 
 // Opens every source; false if one could not be, after all of them had their message, or if it was stopped.
-bool OpenDatasets(const config::Config& config, const std::stop_token& stop, std::vector<server::Dataset>& datasets) {
+bool OpenDatasets(const config::Config& config, const std::stop_token& stop, std::vector<tiler::Dataset>& datasets) {
   bool all_open = true;
   for (const config::DatasetConfig& wanted : config.datasets) {
     Progress progress((config.cache_dir.empty() ? "reading " : "preparing ") + NameOf(wanted.sources),
                       FileCount(wanted.sources));
-    Result<server::Dataset> dataset = OpenDataset(wanted, config.cache_dir, progress.Callback(), stop);
+    Result<tiler::Dataset> dataset = OpenDataset(wanted, config.cache_dir, progress.Callback(), stop);
     if (stop.stop_requested()) return false;
     if (!dataset) {
       std::fprintf(stderr, "terrace: dataset %s: %s\n", wanted.name.c_str(), dataset.error().message.c_str());
@@ -328,7 +328,7 @@ int Serve(const ServeArguments& arguments) {
   if (!passed) return Fail(passed.error());
   // Until they are answered they would be the end, and who rotates logs does not ask how long sources take to open.
   MaskSignals(SIG_BLOCK, kAnsweredSignals);
-  server::EncoderVersion();  // of the libraries there are, before GDAL or the system's resolver loads others
+  tiler::EncoderVersion();  // of the libraries there are, before GDAL or the system's resolver loads others
   server::ServerOptions options = OptionsOf(config);
   options.listen_socket = passed->value_or(-1);
   const bool tries_address = !passed->has_value();
@@ -342,7 +342,9 @@ int Serve(const ServeArguments& arguments) {
   StopLimit stop_limit;  // first, as it bounds how long the others take to end
   Result<std::shared_ptr<server::DiskCache>> disk = OpenDiskCache(config.disk_cache, budget->store_files);
   if (!disk) return Fail(disk.error());
-  const auto refinements = std::make_shared<server::RefinementCache>(config.refinement_cache_bytes, *disk);
+  const auto refinements = std::make_shared<tiler::RefinementCache>(
+      config.refinement_cache_bytes,
+      *disk ? std::shared_ptr<tiler::RefinementStore>(*disk, (*disk)->refinements()) : nullptr);
   options.disk_cache = *std::move(disk);
   options.refinement_stats = [refinements] { return refinements->stats(); };
   std::unique_ptr<server::Reloader> reloader;  // once there is something to look after
@@ -366,13 +368,13 @@ int Serve(const ServeArguments& arguments) {
   const std::unique_ptr<server::Server> server = *std::move(started);
   NotifyOpening();
 
-  std::vector<server::Dataset> datasets;
+  std::vector<tiler::Dataset> datasets;
   const bool are_open = OpenDatasets(config, stop_opening.get_token(), datasets);
   if (stop_opening.stop_requested()) return server->Wait() ? kExitOk : kExitFailure;
   if (!are_open) return kExitFailure;
   std::atomic<std::size_t> count = datasets.size();
-  const auto catalog_of = [refinements](const std::vector<server::Dataset>& served, const config::Config& now) {
-    return server::MakeCatalog(std::make_shared<const server::TilePipeline>(served, refinements), now.max_mesh_samples);
+  const auto catalog_of = [refinements](const std::vector<tiler::Dataset>& served, const config::Config& now) {
+    return server::MakeCatalog(std::make_shared<const tiler::TilePipeline>(served, refinements), now.max_mesh_samples);
   };
   const auto served_text = [&] {
     const std::size_t datasets_served = count;
@@ -394,7 +396,7 @@ int Serve(const ServeArguments& arguments) {
   hooks.open = [cache_dir = config.cache_dir](const config::DatasetConfig& wanted, std::stop_token stop) {
     return OpenDataset(wanted, cache_dir, {}, std::move(stop));
   };
-  hooks.publish = [&](const std::vector<server::Dataset>& served, const config::Config& now) {
+  hooks.publish = [&](const std::vector<tiler::Dataset>& served, const config::Config& now) {
     if (level->exchange(now.log_level) != now.log_level) SetLogLevel(now.log_level);
     refinements->SetCapacity(now.refinement_cache_bytes);
     if (const Result<void> replaced = server->Replace(catalog_of(served, now), OptionsOf(now)); !replaced) {
@@ -403,7 +405,7 @@ int Serve(const ServeArguments& arguments) {
       count = served.size();
     }
     std::vector<std::uint64_t> generations;
-    for (const server::Dataset& dataset : served) generations.push_back(dataset.generation);
+    for (const tiler::Dataset& dataset : served) generations.push_back(dataset.generation);
     refinements->Retain(generations);
   };
   hooks.reloaded = [&] {

@@ -15,13 +15,13 @@
 #include "server/http/negotiate.h"
 #include "server/http/query.h"
 #include "server/http/text.h"
-#include "server/tiles/strong_etag.h"
 #include "server/tiles/tile_head.h"
+#include "tiler/strong_etag.h"
 
 namespace terrace::server {
 namespace {
 
-Result<void> SetBox(AreaRequest& area, std::string_view text) {
+Result<void> SetBox(tiler::AreaRequest& area, std::string_view text) {
   constexpr std::array<const char*, 4> kNames = {"west", "south", "east", "north"};
   std::array<double, 4> numbers{};
   for (std::size_t i = 0; i < numbers.size(); ++i) {
@@ -50,14 +50,14 @@ Result<void> SetBox(AreaRequest& area, std::string_view text) {
   return {};
 }
 
-Result<void> SetError(AreaRequest& area, std::string_view text) {
+Result<void> SetError(tiler::AreaRequest& area, std::string_view text) {
   const std::optional<double> error = PositiveNumber(text);
   if (!error) return MakeError(ErrorCode::kInvalidArgument, "error must be a finite number above 0");
   area.error_m = *error;
   return {};
 }
 
-Result<void> SetFormat(AreaRequest& area, std::string_view text) {
+Result<void> SetFormat(tiler::AreaRequest& area, std::string_view text) {
   using proto::MeshFileFormat;
   for (const auto& [name, format] : {std::pair("glb", MeshFileFormat::kGlb), std::pair("obj", MeshFileFormat::kObj),
                                      std::pair("ply", MeshFileFormat::kPly)}) {
@@ -68,10 +68,10 @@ Result<void> SetFormat(AreaRequest& area, std::string_view text) {
   return MakeError(ErrorCode::kInvalidArgument, "format must be glb, obj or ply");
 }
 
-Result<void> SetCoordinates(AreaRequest& area, std::string_view text) {
+Result<void> SetCoordinates(tiler::AreaRequest& area, std::string_view text) {
   for (const auto& [name, coordinates] :
-       {std::pair("enu", AreaCoordinates::kEnu), std::pair("ecef", AreaCoordinates::kEcef),
-        std::pair("geographic", AreaCoordinates::kGeographic)}) {
+       {std::pair("enu", tiler::AreaCoordinates::kEnu), std::pair("ecef", tiler::AreaCoordinates::kEcef),
+        std::pair("geographic", tiler::AreaCoordinates::kGeographic)}) {
     if (text != name) continue;
     area.coordinates = coordinates;
     return {};
@@ -99,13 +99,13 @@ std::string FormatOrigin(const dem::GeoPosition& centre) {
 
 }  // namespace
 
-Result<AreaRequest> ParseAreaRequest(std::string_view query) {
+Result<tiler::AreaRequest> ParseAreaRequest(std::string_view query) {
   const Result<QueryParameters> sent = ParseQuery(query);
   if (!sent) return tl::unexpected(sent.error());
-  using Set = Result<void> (*)(AreaRequest&, std::string_view);
+  using Set = Result<void> (*)(tiler::AreaRequest&, std::string_view);
   constexpr std::array<std::pair<const char*, Set>, 4> kKnown = {
       {{"bbox", SetBox}, {"error", SetError}, {"format", SetFormat}, {"coordinates", SetCoordinates}}};
-  AreaRequest area;
+  tiler::AreaRequest area;
   std::array<bool, kKnown.size()> given{};
   for (const auto& [name, value] : *sent) {
     if (name == "v") continue;
@@ -131,35 +131,36 @@ AreaHandler::AreaHandler(CatalogPtr catalog, TileService& tiles, TileHandlerOpti
 asio::awaitable<Response> AreaHandler::Handle(Route route, Request request) const {
   const Result<std::uint32_t> dataset = FindDataset(route.dataset, catalog_->datasets);
   if (!dataset) co_return ClientErrorResponse(dataset.error(), request.id);
-  const Result<AreaRequest> area = ParseAreaRequest(route.query);
+  const Result<tiler::AreaRequest> area = ParseAreaRequest(route.query);
   if (!area) co_return ClientErrorResponse(area.error(), request.id);
-  const Result<AreaPlan> plan = catalog_->area_mesher.plan(*dataset, *area);
+  const Result<tiler::AreaPlan> plan = catalog_->area_mesher.plan(*dataset, *area);
   if (!plan) co_return ClientErrorResponse(plan.error(), request.id);
 
-  const Coding coding = NegotiateCoding(request.fields->accept_encoding);
+  const tiler::Coding coding = NegotiateCoding(request.fields->accept_encoding);
   Response response;
   response.content_type = ContentTypeOf(area->format);
   response.coding = coding;
-  response.etag = RequestETag("mesh", catalog_->datasets[*dataset], route.query, coding);
+  response.etag = tiler::RequestETag("mesh", catalog_->datasets[*dataset].name, catalog_->datasets[*dataset].generation,
+                                     route.query, coding);
   response.cache_control = options_.cache_control;
   response.vary = true;
   if (MatchesEtag(request.fields->if_none_match, response.etag)) co_return Conditional(std::move(response), request);
 
   SingleFlight::Work work = [catalog = catalog_, index = *dataset, area = *area, plan = *plan,
-                             coding](std::stop_token stop) -> Result<EncodedTile> {
-    Result<EncodedTile> mesh = catalog->area_mesher.build(index, plan, area, stop);
-    if (!mesh || coding == Coding::kIdentity) return mesh;
-    mesh->bytes = Compress(std::move(mesh->bytes), coding, stop);
+                             coding](std::stop_token stop) -> Result<tiler::EncodedTile> {
+    Result<tiler::EncodedTile> mesh = catalog->area_mesher.build(index, plan, area, stop);
+    if (!mesh || coding == tiler::Coding::kIdentity) return mesh;
+    mesh->bytes = tiler::Compress(std::move(mesh->bytes), coding, stop);
     if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the mesh any more");
     return mesh;
   };
   const auto deadline = TileService::Clock::now() + options_.deadline;
-  const Result<TilePtr> mesh =
+  const Result<tiler::TilePtr> mesh =
       co_await tiles_.Run(std::move(work), TileService::Length::kLong, deadline, request.client);
   if (!mesh) co_return co_await BackendFailure(mesh.error(), std::string(request.id), options_.refusal_delay);
   response.body = Body(*mesh, &(*mesh)->bytes);
   response.headers.emplace_back("Terrain-Max-Error", proto::FormatErrorUp((*mesh)->max_error_m));
-  if (area->coordinates == AreaCoordinates::kEnu) {
+  if (area->coordinates == tiler::AreaCoordinates::kEnu) {
     response.headers.emplace_back("Terrain-Origin", FormatOrigin(plan->centre));
   }
   response.headers.emplace_back("Server-Timing", FormatServerTiming(CacheStatus::kMiss, (*mesh)->times));

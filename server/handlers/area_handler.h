@@ -9,9 +9,9 @@
 #include "server/http/request.h"
 #include "server/http/response.h"
 #include "server/http/router.h"
-#include "server/tiles/area_mesh.h"
 #include "server/tiles/catalog.h"
 #include "server/tiles/tile_service.h"
+#include "tiler/area/area_mesh.h"
 
 namespace terrace::server {
 
@@ -32,6 +32,6 @@ class AreaHandler {
 // `bbox=west,south,east,north` and `error=METRES`, both needed; `format=glb|obj|ply`,
 // `coordinates=enu|ecef|geographic`; `v` may come any number of times. west > east is a box across the antimeridian.
 // kInvalidArgument, with a message for the client.
-Result<AreaRequest> ParseAreaRequest(std::string_view query);
+Result<tiler::AreaRequest> ParseAreaRequest(std::string_view query);
 
 }  // namespace terrace::server

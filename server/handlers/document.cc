@@ -4,7 +4,7 @@
 
 #include "proto/compress.h"
 #include "server/http/negotiate.h"
-#include "server/tiles/strong_etag.h"
+#include "tiler/strong_etag.h"
 
 namespace terrace::server {
 
@@ -12,18 +12,19 @@ Document Document::Make(std::string bytes, std::string_view content_type, std::o
   Document document;
   document.content_type = content_type;
   std::string compressed = gzipped ? std::move(*gzipped) : proto::Gzip(bytes);
-  document.identity_etag = StrongETag(bytes);
-  document.gzip_etag = StrongETag(compressed);
+  document.identity_etag = tiler::StrongETag(bytes);
+  document.gzip_etag = tiler::StrongETag(compressed);
   if (compressed.size() < bytes.size()) document.gzip = std::make_shared<const std::string>(std::move(compressed));
   document.identity = std::make_shared<const std::string>(std::move(bytes));
   return document;
 }
 
 Response Serve(const Document& document, const Request& request, std::string_view cache_control) {
-  const bool gzip = document.gzip && NegotiateCoding(request.fields->accept_encoding, kGzipOnly) == Coding::kGzip;
+  const bool gzip =
+      document.gzip && NegotiateCoding(request.fields->accept_encoding, tiler::kGzipOnly) == tiler::Coding::kGzip;
   Response response;
   response.content_type = document.content_type;
-  response.coding = gzip ? Coding::kGzip : Coding::kIdentity;
+  response.coding = gzip ? tiler::Coding::kGzip : tiler::Coding::kIdentity;
   response.body = gzip ? document.gzip : document.identity;
   response.etag = gzip ? document.gzip_etag : document.identity_etag;
   response.cache_control = cache_control;

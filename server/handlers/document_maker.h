@@ -17,9 +17,9 @@
 #include "server/handlers/tile_handler.h"
 #include "server/http/request.h"
 #include "server/http/response.h"
-#include "server/tiles/byte_cache.h"
 #include "server/tiles/catalog.h"
 #include "server/tiles/tile_service.h"
+#include "tiler/store/byte_cache.h"
 
 namespace terrace::server {
 
@@ -42,14 +42,14 @@ using Answer = std::variant<Response, DocumentPlan>;
 // In the one coding that was wanted.
 struct MadeDocument {
   Body body;
-  Coding coding = Coding::kIdentity;
+  tiler::Coding coding = tiler::Coding::kIdentity;
   std::string etag;
 };
 inline std::size_t BytesOf(const MadeDocument& made) { return made.body->size() + made.etag.size(); }
 
 // `coding`: kGzip gives identity where that is not larger. Bytes and ETag are those of a Document of the same text.
 // kCancelled: a stop was requested.
-Result<MadeDocument> MakeDocument(const DocumentPlan::Write& write, Coding coding, const std::stop_token& stop);
+Result<MadeDocument> MakeDocument(const DocumentPlan::Write& write, tiler::Coding coding, const std::stop_token& stop);
 
 // As Serve of a Document.
 Response Serve(const MadeDocument& made, const DocumentPlan& plan, const Request& request);
@@ -73,7 +73,7 @@ class DocumentMaker {
  private:
   struct Key {
     std::string text;
-    Coding coding = Coding::kIdentity;
+    tiler::Coding coding = tiler::Coding::kIdentity;
     std::uint64_t generation = 0;  // of one catalog all are
 
     friend bool operator==(const Key&, const Key&) = default;
@@ -87,7 +87,7 @@ class DocumentMaker {
   const CatalogPtr catalog_;
   TileService& workers_;
   const TileHandlerOptions options_;
-  mutable ByteCache<Key, KeyHash, MadeDocument> kept_{kKeptBytes};
+  mutable tiler::ByteCache<Key, KeyHash, MadeDocument> kept_{kKeptBytes};
 };
 
 }  // namespace terrace::server

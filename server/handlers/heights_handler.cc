@@ -12,7 +12,7 @@
 #include "server/handlers/backend_failure.h"
 #include "server/http/http_error.h"
 #include "server/http/negotiate.h"
-#include "server/tiles/strong_etag.h"
+#include "tiler/strong_etag.h"
 
 namespace terrace::server {
 namespace {
@@ -44,11 +44,11 @@ asio::awaitable<Result<HeightsQuery>> HeightsHandler::ParseAside(const Route& ro
   const auto parsed = std::make_shared<Result<HeightsQuery>>();
   const std::string_view type = request.method == Method::kPost ? request.fields->content_type : std::string_view();
   SingleFlight::Work parse = [parsed, query = route.query, type = std::string(type), body = request.body,
-                              most = max_locations_](const std::stop_token& stop) -> Result<EncodedTile> {
+                              most = max_locations_](const std::stop_token& stop) -> Result<tiler::EncodedTile> {
     *parsed = ParseHeights({query, type, body}, most, stop);
-    return EncodedTile();
+    return tiler::EncodedTile();
   };
-  const Result<TilePtr> done =
+  const Result<tiler::TilePtr> done =
       co_await tiles_.Run(std::move(parse), TileService::Length::kShort, deadline, request.client);
   if (!done) co_return tl::unexpected(done.error());
   co_return std::move(*parsed);
@@ -75,7 +75,7 @@ asio::awaitable<Response> HeightsHandler::Handle(Route route, Request request) c
     co_return ClientErrorResponse(unknown, request.id);
   }
 
-  const Coding coding = NegotiateCoding(request.fields->accept_encoding);
+  const tiler::Coding coding = NegotiateCoding(request.fields->accept_encoding);
   Response response;
   response.content_type = "application/json";
   response.coding = coding;
@@ -85,7 +85,8 @@ asio::awaitable<Response> HeightsHandler::Handle(Route route, Request request) c
     response.cache_control = options_.cache_control;
     // Certified errors are the program's, not only the data's.
     if (!parsed->certify_level) {
-      response.etag = RequestETag("heights", catalog_->datasets[*dataset], route.query, coding);
+      response.etag = tiler::RequestETag("heights", catalog_->datasets[*dataset].name,
+                                         catalog_->datasets[*dataset].generation, route.query, coding);
     }
     if (MatchesEtag(request.fields->if_none_match, response.etag)) co_return Conditional(std::move(response), request);
   }
@@ -101,19 +102,19 @@ asio::awaitable<Response> HeightsHandler::Handle(Route route, Request request) c
   }
   auto query = std::make_shared<const HeightsQuery>(*std::move(parsed));
   SingleFlight::Work work = [catalog = catalog_, index = *dataset, coding, query,
-                             certified](std::stop_token stop) -> Result<EncodedTile> {
+                             certified](std::stop_token stop) -> Result<tiler::EncodedTile> {
     const auto begun = TileService::Clock::now();
     const Result<PointHeights> heights = catalog->read_points(index, query->points, query->datum, stop);
     if (!heights) return tl::unexpected(heights.error());
-    EncodedTile reply;
+    tiler::EncodedTile reply;
     reply.times.read = std::chrono::duration_cast<std::chrono::microseconds>(TileService::Clock::now() - begun);
     reply.bytes = HeightsJson(*query, *heights, catalog->datasets[index].name, certified.get(), stop);
-    reply.bytes = Compress(std::move(reply.bytes), coding, stop);
+    reply.bytes = tiler::Compress(std::move(reply.bytes), coding, stop);
     if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the heights any more");
     return reply;
   };
   const auto length = query->points.size() > kShortList ? TileService::Length::kLong : TileService::Length::kShort;
-  const Result<TilePtr> reply = co_await tiles_.Run(std::move(work), length, deadline, request.client);
+  const Result<tiler::TilePtr> reply = co_await tiles_.Run(std::move(work), length, deadline, request.client);
   if (!reply) co_return co_await BackendFailure(reply.error(), std::string(request.id), options_.refusal_delay);
   response.body = Body(*reply, &(*reply)->bytes);
   response.headers.emplace_back("Server-Timing", FormatServerTiming(CacheStatus::kMiss, (*reply)->times));
@@ -126,20 +127,21 @@ asio::awaitable<Result<CertifiedPoints>> HeightsHandler::Certify(std::uint32_t d
   // On a worker: of a mosaic with thousands of blocks it takes time to find the tiles of thousands of points.
   auto found = std::make_shared<CertifiedPoints>();
   SingleFlight::Work find = [catalog = catalog_, dataset, wanted = query.points, level = *query.certify_level,
-                             found](const std::stop_token& stop) -> Result<EncodedTile> {
+                             found](const std::stop_token& stop) -> Result<tiler::EncodedTile> {
     Result<CertifiedPoints> tiles = TilesOf(catalog->datasets[dataset], wanted, level, stop);
     if (!tiles) return tl::unexpected(tiles.error());
     *found = *std::move(tiles);
-    return EncodedTile();
+    return tiler::EncodedTile();
   };
-  const Result<TilePtr> done = co_await tiles_.Run(std::move(find), TileService::Length::kShort, deadline, client);
+  const Result<tiler::TilePtr> done =
+      co_await tiles_.Run(std::move(find), TileService::Length::kShort, deadline, client);
   if (!done) co_return tl::unexpected(done.error());
   CertifiedPoints points = std::move(*found);
   for (std::size_t i = 0; i < points.tiles.size(); ++i) {
-    TileRequest tile;
+    tiler::TileRequest tile;
     tile.dataset = dataset;
     tile.key = points.tiles[i];
-    tile.coding = Coding::kGzip;  // the form that a cache most probably has
+    tile.coding = tiler::Coding::kGzip;  // the form that a cache most probably has
     const Result<ServedTile> served = co_await tiles_.Get(catalog_, tile, deadline, client);
     if (!served) co_return tl::unexpected(served.error());
     points.errors_m[i] = served->tile->certified_error_m;

@@ -66,7 +66,7 @@ class CacheFamily {
   prometheus::MetricFamily family_;
 };
 
-void AddCaches(const TileService::Stats& tiles, const ByteCacheStats& refinements,
+void AddCaches(const TileService::Stats& tiles, const tiler::ByteCacheStats& refinements,
                std::vector<prometheus::MetricFamily>& all) {
   constexpr auto kCounter = prometheus::MetricType::Counter;
   constexpr auto kGauge = prometheus::MetricType::Gauge;
@@ -78,13 +78,14 @@ void AddCaches(const TileService::Stats& tiles, const ByteCacheStats& refinement
     }
     all.push_back(family.Take());
   };
-  both_tiers(kCounter, "terrace_cache_hits_total", "Found in a cache", &ByteCacheStats::hits, &DiskStoreStats::hits);
-  both_tiers(kCounter, "terrace_cache_misses_total", "Looked for in a cache and not found", &ByteCacheStats::misses,
-             &DiskStoreStats::misses);
-  both_tiers(kGauge, "terrace_cache_entries", "Entries of a cache; on disk about", &ByteCacheStats::entries,
+  both_tiers(kCounter, "terrace_cache_hits_total", "Found in a cache", &tiler::ByteCacheStats::hits,
+             &DiskStoreStats::hits);
+  both_tiers(kCounter, "terrace_cache_misses_total", "Looked for in a cache and not found",
+             &tiler::ByteCacheStats::misses, &DiskStoreStats::misses);
+  both_tiers(kGauge, "terrace_cache_entries", "Entries of a cache; on disk about", &tiler::ByteCacheStats::entries,
              &DiskStoreStats::entries);
   both_tiers(kGauge, "terrace_cache_bytes", "Bytes charged to a cache; on disk those of its files",
-             &ByteCacheStats::bytes, &DiskStoreStats::bytes);
+             &tiler::ByteCacheStats::bytes, &DiskStoreStats::bytes);
   if (!tiles.disk) return;
   const auto disk_tier = [&](prometheus::MetricType type, const char* name, const char* help, auto member) {
     all.push_back(CacheFamily(type, name, help)
@@ -144,14 +145,15 @@ struct Metrics::Families {
           .Help("Time of each step of a build, waiting for a worker included")
           .Register(registry);
   struct Stage {
-    std::chrono::microseconds StageTimes::*time;
+    std::chrono::microseconds tiler::StageTimes::*time;
     prometheus::Histogram& histogram;
   };
-  const std::array<Stage, 5> each_stage = {{{&StageTimes::queue, stages.Add({{"stage", "queue"}}, Seconds())},
-                                            {&StageTimes::read, stages.Add({{"stage", "read"}}, Seconds())},
-                                            {&StageTimes::refine, stages.Add({{"stage", "refine"}}, Seconds())},
-                                            {&StageTimes::encode, stages.Add({{"stage", "encode"}}, Seconds())},
-                                            {&StageTimes::compress, stages.Add({{"stage", "compress"}}, Seconds())}}};
+  const std::array<Stage, 5> each_stage = {
+      {{&tiler::StageTimes::queue, stages.Add({{"stage", "queue"}}, Seconds())},
+       {&tiler::StageTimes::read, stages.Add({{"stage", "read"}}, Seconds())},
+       {&tiler::StageTimes::refine, stages.Add({{"stage", "refine"}}, Seconds())},
+       {&tiler::StageTimes::encode, stages.Add({{"stage", "encode"}}, Seconds())},
+       {&tiler::StageTimes::compress, stages.Add({{"stage", "compress"}}, Seconds())}}};
   prometheus::Family<prometheus::Counter>& refinements =
       prometheus::BuildCounter()
           .Name("terrace_refinements_total")
@@ -251,7 +253,7 @@ void Metrics::CountReply(const ReplyRecord& record) {
   count(families_->AddReply(record));
 }
 
-void Metrics::CountBuild(const DatasetView& dataset, const Result<TilePtr>& tile) {
+void Metrics::CountBuild(const DatasetView& dataset, const Result<tiler::TilePtr>& tile) {
   const std::string_view result = tile ? "ok" : ToString(tile.error().code);
   families_->CountBuild(dataset.name, result);
   if (!tile) {
@@ -259,16 +261,16 @@ void Metrics::CountBuild(const DatasetView& dataset, const Result<TilePtr>& tile
     return;
   }
   switch ((*tile)->refinement) {
-    case RefinementUse::kMade:
+    case tiler::RefinementUse::kMade:
       families_->made.Increment();
       break;
-    case RefinementUse::kContinued:
+    case tiler::RefinementUse::kContinued:
       families_->continued.Increment();
       break;
-    case RefinementUse::kReplayed:
+    case tiler::RefinementUse::kReplayed:
       families_->replayed.Increment();
       break;
-    case RefinementUse::kNone:
+    case tiler::RefinementUse::kNone:
       break;
   }
   for (const Families::Stage& stage : families_->each_stage) {
@@ -292,7 +294,7 @@ void Metrics::RetainDatasets(const std::vector<DatasetView>& datasets) {
   }
 }
 
-std::string Metrics::Text(const TileService::Stats& tiles, const ByteCacheStats& refinements,
+std::string Metrics::Text(const TileService::Stats& tiles, const tiler::ByteCacheStats& refinements,
                           const SourceStats& sources, const ServerState& state) const {
   constexpr auto kCounter = prometheus::MetricType::Counter;
   constexpr auto kGauge = prometheus::MetricType::Gauge;

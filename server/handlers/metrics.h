@@ -20,7 +20,7 @@ class Metrics {
   ~Metrics();
 
   void CountReply(const ReplyRecord& record);
-  void CountBuild(const DatasetView& dataset, const Result<TilePtr>& tile);
+  void CountBuild(const DatasetView& dataset, const Result<tiler::TilePtr>& tile);
 
   // Forgets what was counted of other datasets: names come and go for as long as the server runs. A reply that began
   // before may still count for one that is gone, until the next call.
@@ -32,8 +32,8 @@ class Metrics {
     std::uint64_t catalogs = 0;  // that have replaced one another
   };
   // Everything counted so far and the state given.
-  std::string Text(const TileService::Stats& tiles, const ByteCacheStats& refinements, const SourceStats& sources,
-                   const ServerState& state) const;
+  std::string Text(const TileService::Stats& tiles, const tiler::ByteCacheStats& refinements,
+                   const SourceStats& sources, const ServerState& state) const;
 
  private:
   struct Families;

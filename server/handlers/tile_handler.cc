@@ -33,7 +33,7 @@ TileHandler::TileHandler(CatalogPtr catalog, TileService& tiles, TileHandlerOpti
     : catalog_(std::move(catalog)), tiles_(tiles), options_(std::move(options)) {}
 
 std::optional<Response> TileHandler::HandleNow(const Route& route, const Request& request) const {
-  const Result<TileRequest> tile = Negotiate(route, request, catalog_->datasets);
+  const Result<tiler::TileRequest> tile = Negotiate(route, request, catalog_->datasets);
   if (!tile) return ClientErrorResponse(tile.error(), request.id);
   const std::optional<ServedTile> found = tiles_.Find(*catalog_, *tile);
   if (!found) return std::nullopt;
@@ -41,7 +41,7 @@ std::optional<Response> TileHandler::HandleNow(const Route& route, const Request
 }
 
 asio::awaitable<Response> TileHandler::Handle(Route route, Request request) const {
-  const Result<TileRequest> tile = Negotiate(route, request, catalog_->datasets);
+  const Result<tiler::TileRequest> tile = Negotiate(route, request, catalog_->datasets);
   if (!tile) co_return ClientErrorResponse(tile.error(), request.id);
   const auto deadline = TileService::Clock::now() + options_.deadline;
   const Result<ServedTile> served = co_await tiles_.Get(catalog_, *tile, deadline, request.client);
@@ -49,11 +49,11 @@ asio::awaitable<Response> TileHandler::Handle(Route route, Request request) cons
   co_return co_await BackendFailure(served.error(), std::string(request.id), options_.refusal_delay);
 }
 
-Response TileHandler::Reply(const ServedTile& served, const TileRequest& tile, const Request& request) const {
+Response TileHandler::Reply(const ServedTile& served, const tiler::TileRequest& tile, const Request& request) const {
   Response response;
-  response.lines = std::shared_ptr<const HeadLines>(served.tile, &served.tile->head);
+  response.lines = std::shared_ptr<const tiler::HeadLines>(served.tile, &served.tile->head);
   response.cache_control = options_.cache_control;
-  response.vary = tile.format != TileFormat::kHeightPng;  // which has one form
+  response.vary = tile.format != tiler::TileFormat::kHeightPng;  // which has one form
   if (served.cache == CacheStatus::kHit) {
     response.more_lines = "Server-Timing: cache;desc=hit\r\n";
   } else {
@@ -68,7 +68,7 @@ Response TileHandler::Reply(const ServedTile& served, const TileRequest& tile, c
   return response;
 }
 
-std::string FormatServerTiming(CacheStatus cache, const StageTimes& times) {
+std::string FormatServerTiming(CacheStatus cache, const tiler::StageTimes& times) {
   std::string text = fmt::format("cache;desc={}", Name(cache));
   if (cache == CacheStatus::kHit) return text;
   const std::pair<const char*, std::chrono::microseconds> steps[] = {{"queue", times.queue},

@@ -34,7 +34,7 @@ class TileHandler {
   asio::awaitable<Response> Handle(Route route, Request request) const;
 
  private:
-  Response Reply(const ServedTile& served, const TileRequest& tile, const Request& request) const;
+  Response Reply(const ServedTile& served, const tiler::TileRequest& tile, const Request& request) const;
 
   const CatalogPtr catalog_;
   TileService& tiles_;
@@ -42,6 +42,6 @@ class TileHandler {
 };
 
 // "cache;desc=miss, queue;dur=0.021, read;dur=1.234, ...": milliseconds, the steps of the build that was waited for.
-std::string FormatServerTiming(CacheStatus cache, const StageTimes& times);
+std::string FormatServerTiming(CacheStatus cache, const tiler::StageTimes& times);
 
 }  // namespace terrace::server

@@ -16,11 +16,11 @@ namespace {
 constexpr std::string_view kBlanksAndQuotes = " \t\"";
 
 // The coding of a name, or nothing of those nobody here speaks.
-std::optional<Coding> CodingOf(std::string_view name) {
-  if (EqualsIgnoringCase(name, "identity")) return Coding::kIdentity;
-  if (EqualsIgnoringCase(name, "x-gzip")) return Coding::kGzip;
-  for (const Coding coding : kCodings) {
-    if (EqualsIgnoringCase(name, NameOf(coding))) return coding;
+std::optional<tiler::Coding> CodingOf(std::string_view name) {
+  if (EqualsIgnoringCase(name, "identity")) return tiler::Coding::kIdentity;
+  if (EqualsIgnoringCase(name, "x-gzip")) return tiler::Coding::kGzip;
+  for (const tiler::Coding coding : tiler::kCodings) {
+    if (EqualsIgnoringCase(name, tiler::NameOf(coding))) return coding;
   }
   return std::nullopt;
 }
@@ -39,14 +39,14 @@ double Quality(std::string_view parameters) {
 }
 
 // Draco ends in an entropy coder; meshopt leaves that to the transport.
-bool CompressionHelps(const TileRequest& tile) {
-  return tile.format == TileFormat::kQuantizedMesh || tile.compression != proto::GlbCompression::kDraco;
+bool CompressionHelps(const tiler::TileRequest& tile) {
+  return tile.format == tiler::TileFormat::kQuantizedMesh || tile.compression != proto::GlbCompression::kDraco;
 }
 
 }  // namespace
 
-Coding NegotiateCoding(std::string_view accept_encoding, std::span<const Coding> offered) {
-  constexpr std::size_t kKnown = 1 + kCodings.size();
+tiler::Coding NegotiateCoding(std::string_view accept_encoding, std::span<const tiler::Coding> offered) {
+  constexpr std::size_t kKnown = 1 + tiler::kCodings.size();
   std::array<std::optional<double>, kKnown> named;  // qualities, by coding
   std::optional<double> any;
   while (!accept_encoding.empty()) {
@@ -55,17 +55,17 @@ Coding NegotiateCoding(std::string_view accept_encoding, std::span<const Coding>
     const double quality = Quality(item);
     if (name == "*") {
       any = quality;
-    } else if (const std::optional<Coding> coding = CodingOf(name)) {
+    } else if (const std::optional<tiler::Coding> coding = CodingOf(name)) {
       std::optional<double>& known = named[static_cast<std::size_t>(*coding)];
       known = std::max(known.value_or(0), quality);
     }
   }
   // An identity that is not mentioned is acceptable, but only if nothing else is.
-  Coding best = Coding::kIdentity;
-  double most = named[static_cast<std::size_t>(Coding::kIdentity)].value_or(0);
-  for (const Coding coding : offered) {
+  tiler::Coding best = tiler::Coding::kIdentity;
+  double most = named[static_cast<std::size_t>(tiler::Coding::kIdentity)].value_or(0);
+  for (const tiler::Coding coding : offered) {
     const double quality = named[static_cast<std::size_t>(coding)].value_or(any.value_or(0));
-    if (quality <= 0 || quality < most || (quality == most && best != Coding::kIdentity)) continue;
+    if (quality <= 0 || quality < most || (quality == most && best != tiler::Coding::kIdentity)) continue;
     best = coding;
     most = quality;
   }
@@ -101,14 +101,14 @@ Result<std::uint32_t> FindDataset(std::string_view name, std::span<const Dataset
 namespace {
 
 // PNG is compressed already: whatever the client accepts, it is sent as it is.
-Result<TileRequest> NegotiateHeightTile(const Route& route, std::uint32_t dataset, const DatasetView& view) {
+Result<tiler::TileRequest> NegotiateHeightTile(const Route& route, std::uint32_t dataset, const DatasetView& view) {
   const Result<HeightTileParameters> parameters = ParseHeightTileParameters(route.query);
   if (!parameters) return tl::unexpected(parameters.error());
   if (!IsHeightTileAvailable(view, route.key, parameters->size)) {
     return MakeError(ErrorCode::kNotFound,
                      "the dataset has no such tile; its tiles.json tells the bounds and levels of what it has");
   }
-  TileRequest tile;
+  tiler::TileRequest tile;
   tile.dataset = dataset;
   tile.key = route.key;
   tile.format = route.format;
@@ -119,29 +119,30 @@ Result<TileRequest> NegotiateHeightTile(const Route& route, std::uint32_t datase
 
 }  // namespace
 
-Result<TileRequest> Negotiate(const Route& route, const Request& request, std::span<const DatasetView> datasets) {
+Result<tiler::TileRequest> Negotiate(const Route& route, const Request& request,
+                                     std::span<const DatasetView> datasets) {
   const Result<std::uint32_t> dataset = FindDataset(route.dataset, datasets);
   if (!dataset) return tl::unexpected(dataset.error());
   const DatasetView& view = datasets[*dataset];
-  if (route.format == TileFormat::kHeightPng) return NegotiateHeightTile(route, *dataset, view);
-  const Result<TileParameters> parameters =
-      ParseTileParameters(route.query, /*allow_at_least=*/true, /*allow_compression=*/route.format == TileFormat::kGlb);
+  if (route.format == tiler::TileFormat::kHeightPng) return NegotiateHeightTile(route, *dataset, view);
+  const Result<TileParameters> parameters = ParseTileParameters(
+      route.query, /*allow_at_least=*/true, /*allow_compression=*/route.format == tiler::TileFormat::kGlb);
   if (!parameters) return tl::unexpected(parameters.error());
   if (!IsAvailable(view, route.key)) {
     return MakeError(ErrorCode::kNotFound, "the dataset has no such tile; its layer.json lists what it has");
   }
-  TileRequest tile;
+  tiler::TileRequest tile;
   tile.dataset = *dataset;
   tile.key = route.key;
   tile.error_step =
       ErrorStep(parameters->wish, route.key.level, route.key.level == view.max_level(), view.error_fraction);
   tile.format = route.format;
-  if (route.format == TileFormat::kGlb) {
+  if (route.format == tiler::TileFormat::kGlb) {
     tile.compression = parameters->compression.value_or(view.glb_compression);
     if (view.texture) tile.texture = parameters->texture.value_or(*view.texture);
   }
   if (CompressionHelps(tile)) tile.coding = NegotiateCoding(request.fields->accept_encoding);
-  if (route.format == TileFormat::kQuantizedMesh) {
+  if (route.format == tiler::TileFormat::kQuantizedMesh) {
     const proto::TileExtensions wanted = WantedExtensions(request.fields->accept, parameters->extensions);
     tile.normals = wanted.octvertexnormals;
     tile.water_mask = wanted.watermask && view.has_water;

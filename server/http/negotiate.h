@@ -12,21 +12,22 @@
 #include "server/http/request.h"
 #include "server/http/router.h"
 #include "server/tiles/dataset_view.h"
-#include "server/tiles/tile_request.h"
+#include "tiler/tile_request.h"
 
 namespace terrace::server {
 
 // kNotFound: no such dataset, or the tile lies outside what the dataset has. kInvalidArgument: see ParseTileParameters
 // and ParseHeightTileParameters.
 // Precondition: a kTile route.
-Result<TileRequest> Negotiate(const Route& route, const Request& request, std::span<const DatasetView> datasets);
+Result<tiler::TileRequest> Negotiate(const Route& route, const Request& request, std::span<const DatasetView> datasets);
 
 // The dataset's index, or kNotFound.
 Result<std::uint32_t> FindDataset(std::string_view name, std::span<const DatasetView> datasets);
 
 // Of `offered` the one that the client takes most gladly, if at least as gladly as identity; of several the first.
 // Without Accept-Encoding: identity.
-Coding NegotiateCoding(std::string_view accept_encoding, std::span<const Coding> offered = kCodings);
+tiler::Coding NegotiateCoding(std::string_view accept_encoding,
+                              std::span<const tiler::Coding> offered = tiler::kCodings);
 
 // What `extensions=a-b` parameters anywhere in Accept, and the query's values, name together. Names nobody knows are
 // ignored. 3DTilesRendererJS hangs the parameter on application/octet-stream.

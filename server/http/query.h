@@ -10,7 +10,7 @@
 #include "engine/core/result.h"
 #include "proto/glb_tile.h"
 #include "proto/texture.h"
-#include "server/tiles/tile_request.h"
+#include "tiler/tile_request.h"
 
 namespace terrace::server {
 
@@ -47,7 +47,7 @@ Result<TileParameters> ParseTileParameters(std::string_view query, bool allow_at
 
 struct HeightTileParameters {
   proto::HeightEncoding encoding = proto::HeightEncoding::kMapbox;
-  int size = kHeightSizes[0];
+  int size = tiler::kHeightSizes[0];
 };
 
 // `encoding` and `size`, of height tiles and of the TileJSON that describes them. `v` may come any number of times.

@@ -76,13 +76,13 @@ bool HasBody(int status) { return status != 204 && status != 304; }
 // What the reply says of its body.
 void PutContent(std::string& head, const Response& response) {
   if (response.lines) {
-    const HeadLines& lines = *response.lines;
+    const tiler::HeadLines& lines = *response.lines;
     head += std::string_view(lines.text).substr(HasBody(response.status) ? 0 : lines.of_body);
     return;
   }
   if (HasBody(response.status)) {
     if (!response.content_type.empty()) Put(head, "Content-Type", response.content_type);
-    if (response.coding != Coding::kIdentity) Put(head, "Content-Encoding", NameOf(response.coding));
+    if (response.coding != tiler::Coding::kIdentity) Put(head, "Content-Encoding", tiler::NameOf(response.coding));
     Put(head, "Content-Length", fmt::format_int(response.body ? response.body->size() : 0).c_str());
   }
   if (!response.etag.empty()) Put(head, "ETag", response.etag);

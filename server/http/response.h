@@ -12,8 +12,8 @@
 
 #include "server/http/cors.h"
 #include "server/http/request.h"
-#include "server/tiles/encoded_tile.h"
-#include "server/tiles/tile_request.h"
+#include "tiler/encoded_tile.h"
+#include "tiler/tile_request.h"
 
 namespace terrace::server {
 
@@ -24,7 +24,7 @@ struct Response {
   int status = 200;
   std::string_view content_type;  // a literal; empty where there is no body
   Body body;                      // null: empty
-  Coding coding = Coding::kIdentity;
+  tiler::Coding coding = tiler::Coding::kIdentity;
   std::string etag;           // with its quotes; may be empty
   std::string cache_control;  // may be empty
   bool vary = false;          // the reply depends on Accept and Accept-Encoding
@@ -42,7 +42,7 @@ struct Response {
   std::vector<Header> headers;
 
   // Lines that were made beforehand, in place of content_type, coding and etag; null: none.
-  std::shared_ptr<const HeadLines> lines;
+  std::shared_ptr<const tiler::HeadLines> lines;
   std::string_view more_lines;  // a literal: further ones, each with its CR LF
 
   bool source_changed = false;  // why it is a 503: whoever opens the source anew can answer

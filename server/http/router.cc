@@ -32,14 +32,16 @@ std::optional<std::string_view> OriginForm(std::string_view target) {
 std::optional<std::int64_t> TileNumber(std::string_view text) { return PlainDecimal(text, /*max_digits=*/9); }
 
 // Web Mercator has one root, TMS geodetic two side by side.
-bool IsInScheme(const geo::TileKey& key, TileFormat format) {
-  return geo::IsValid(key) && (format != TileFormat::kHeightPng || key.x < geo::TileRows(key.level));
+bool IsInScheme(const geo::TileKey& key, tiler::TileFormat format) {
+  return geo::IsValid(key) && (format != tiler::TileFormat::kHeightPng || key.x < geo::TileRows(key.level));
 }
 
 // Cuts the extension of a tile URL off its last segment.
-std::optional<TileFormat> CutFormat(std::string_view& name) {
-  constexpr std::pair<std::string_view, TileFormat> kSuffixes[] = {
-      {".terrain", TileFormat::kQuantizedMesh}, {".glb", TileFormat::kGlb}, {".png", TileFormat::kHeightPng}};
+std::optional<tiler::TileFormat> CutFormat(std::string_view& name) {
+  constexpr std::pair<std::string_view, tiler::TileFormat> kSuffixes[] = {
+      {".terrain", tiler::TileFormat::kQuantizedMesh},
+      {".glb", tiler::TileFormat::kGlb},
+      {".png", tiler::TileFormat::kHeightPng}};
   for (const auto& [suffix, format] : kSuffixes) {
     if (!name.ends_with(suffix)) continue;
     name.remove_suffix(suffix.size());
@@ -49,7 +51,7 @@ std::optional<TileFormat> CutFormat(std::string_view& name) {
 }
 
 std::optional<geo::TileKey> ParseTileKey(std::string_view z, std::string_view x, std::string_view y,
-                                         TileFormat format) {
+                                         tiler::TileFormat format) {
   const auto level = TileNumber(z), column = TileNumber(x), row = TileNumber(y);
   if (!level || !column || !row || *level > geo::kMaxLevel) return std::nullopt;
   const geo::TileKey key{static_cast<int>(*level), *column, *row};
@@ -61,7 +63,7 @@ std::optional<geo::TileKey> ParseRoot(std::string_view name) {
   const std::size_t first = name.find('-'), second = name.find('-', first + 1);
   if (first == std::string_view::npos || second == std::string_view::npos) return std::nullopt;
   return ParseTileKey(name.substr(0, first), name.substr(first + 1, second - first - 1), name.substr(second + 1),
-                      TileFormat::kGlb);
+                      tiler::TileFormat::kGlb);
 }
 
 // Cuts ".7.subtree" off the last segment of a subtree's URL, and gives the 7; nothing where it is not there.
@@ -114,7 +116,7 @@ std::optional<Route> MatchImplicit(const Segments& segments) {
   if (segments.size() != 6 || segments[1] != "3dtiles") return std::nullopt;
   std::string_view row = segments[5];
   const std::optional<int> subtree_levels = CutSubtreeLevels(row);
-  if (!subtree_levels && CutFormat(row) != TileFormat::kGlb) return std::nullopt;
+  if (!subtree_levels && CutFormat(row) != tiler::TileFormat::kGlb) return std::nullopt;
   const auto root = ParseRoot(segments[2]);
   const auto level = TileNumber(segments[3]), x = TileNumber(segments[4]), y = TileNumber(row);
   if (!root || !level || !x || !y || root->level + *level > geo::kMaxLevel) return std::nullopt;
@@ -125,7 +127,7 @@ std::optional<Route> MatchImplicit(const Segments& segments) {
   route.key = {root->level + static_cast<int>(*level), root->x * side + *x, root->y * side + *y};
   route.kind = subtree_levels ? RouteKind::kSubtree : RouteKind::kTile;
   route.subtree_levels = subtree_levels.value_or(0);
-  route.format = TileFormat::kGlb;
+  route.format = tiler::TileFormat::kGlb;
   return route;
 }
 

@@ -6,7 +6,7 @@
 
 #include "engine/core/result.h"
 #include "engine/geo/tile_key.h"
-#include "server/tiles/tile_request.h"
+#include "tiler/tile_request.h"
 
 namespace terrace::server {
 
@@ -30,11 +30,11 @@ std::string_view ToString(RouteKind kind);
 
 struct Route {
   RouteKind kind = RouteKind::kViewer;
-  std::string dataset;                             // where the URL begins with one: decoded
-  geo::TileKey key;                                // kTile, kSubtree: inside the tiling scheme of its format
-  geo::TileKey root;                               // kSubtree: of the tree the URL counts in, an ancestor of `key`
-  int subtree_levels = 0;                          // kSubtree: 1 .. proto::kTallestSubtree
-  TileFormat format = TileFormat::kQuantizedMesh;  // kTile: by the extension
+  std::string dataset;     // where the URL begins with one: decoded
+  geo::TileKey key;        // kTile, kSubtree: inside the tiling scheme of its format
+  geo::TileKey root;       // kSubtree: of the tree the URL counts in, an ancestor of `key`
+  int subtree_levels = 0;  // kSubtree: 1 .. proto::kTallestSubtree
+  tiler::TileFormat format = tiler::TileFormat::kQuantizedMesh;  // kTile: by the extension
   std::string file;   // kViewer: relative to the viewer's folder, decoded: "index.html" for "/"
   std::string query;  // without '?', not decoded
 };

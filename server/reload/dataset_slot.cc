@@ -22,7 +22,7 @@ constexpr std::chrono::seconds kPatience{10};
 // Tiles come first: opening a large source takes a processor for a while.
 constexpr int kNiceness = 10;
 
-dem::StampedFiles FilesOf(const Dataset& dataset) {
+dem::StampedFiles FilesOf(const tiler::Dataset& dataset) {
   dem::StampedFiles files = dataset.source->files();
   if (dataset.water.mask) files.Append(dataset.water.mask->files());
   if (dataset.imagery.image) files.Append(dataset.imagery.image->files());
@@ -46,7 +46,8 @@ std::vector<std::optional<dem::FileStamp>> StampsOf(const std::vector<std::strin
   return stamps;
 }
 
-Result<Dataset> OpenQuietly(const DatasetOpener& open, const config::DatasetConfig& wanted, std::stop_token stop) {
+Result<tiler::Dataset> OpenQuietly(const DatasetOpener& open, const config::DatasetConfig& wanted,
+                                   std::stop_token stop) {
   ::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kNiceness);  // on Linux, of this thread alone
   try {
     return open(wanted, std::move(stop));
@@ -57,7 +58,7 @@ Result<Dataset> OpenQuietly(const DatasetOpener& open, const config::DatasetConf
 
 }  // namespace
 
-DatasetSlot::DatasetSlot(config::DatasetConfig wanted, Dataset serving)
+DatasetSlot::DatasetSlot(config::DatasetConfig wanted, tiler::Dataset serving)
     : wanted_(std::move(wanted)), serving_(std::move(serving)), files_(FilesOf(*serving_)) {}
 
 DatasetSlot::~DatasetSlot() { stop_opening_.request_stop(); }
@@ -140,7 +141,7 @@ void DatasetSlot::Fail(const Error& error) {
 
 bool DatasetSlot::TakeOpened() {
   if (!is_opening() || opening_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return false;
-  Result<Dataset> opened = opening_.get();
+  Result<tiler::Dataset> opened = opening_.get();
   const bool is_unwanted = std::exchange(reopen_, false) || (!opened && opened.error().code == ErrorCode::kCancelled);
   if (is_unwanted) return false;
   if (!opened) {

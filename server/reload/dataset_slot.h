@@ -15,12 +15,12 @@
 #include "config/config.h"
 #include "engine/core/result.h"
 #include "engine/dem/file_stamp.h"
-#include "server/tiles/tile_pipeline.h"
+#include "tiler/tile_pipeline.h"
 
 namespace terrace::server {
 
 // Blocking. kCancelled: stopped.
-using DatasetOpener = std::function<Result<Dataset>(const config::DatasetConfig&, std::stop_token)>;
+using DatasetOpener = std::function<Result<tiler::Dataset>(const config::DatasetConfig&, std::stop_token)>;
 
 class DatasetSlot {
  public:
@@ -29,13 +29,13 @@ class DatasetSlot {
   // Serves nothing yet; opens as soon as it may.
   explicit DatasetSlot(config::DatasetConfig wanted) : wanted_(std::move(wanted)) {}
   // Serves `serving`, opened from `wanted`.
-  DatasetSlot(config::DatasetConfig wanted, Dataset serving);
+  DatasetSlot(config::DatasetConfig wanted, tiler::Dataset serving);
   DatasetSlot(DatasetSlot&&) = default;
   DatasetSlot& operator=(DatasetSlot&&) = default;
   ~DatasetSlot();  // stops an opening that is under way, and waits for it
 
   const config::DatasetConfig& wanted() const { return wanted_; }
-  const std::optional<Dataset>& serving() const { return serving_; }
+  const std::optional<tiler::Dataset>& serving() const { return serving_; }
   bool is_opening() const { return opening_.valid(); }
   // Or given up for now.
   bool is_current() const { return serving_ ? !stale_since_ || !problem_.empty() : !problem_.empty(); }
@@ -63,12 +63,12 @@ class DatasetSlot {
   void MarkStale();
 
   config::DatasetConfig wanted_;
-  std::optional<Dataset> serving_;
+  std::optional<tiler::Dataset> serving_;
   dem::StampedFiles files_;                       // of serving_
   std::size_t next_file_ = 0;                     // to look at
   std::optional<Clock::time_point> stale_since_;  // when serving_ was found not to be what is wanted
 
-  std::future<Result<Dataset>> opening_;
+  std::future<Result<tiler::Dataset>> opening_;
   std::stop_source stop_opening_;
   bool reopen_ = false;                               // what is being opened is not what is wanted any more
   std::string problem_;                               // of the last attempt

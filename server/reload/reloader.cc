@@ -83,7 +83,7 @@ std::string TextOf(const std::vector<config::ConfigError>& errors) {
 
 }  // namespace
 
-Reloader::Reloader(config::Config config, std::vector<Dataset> datasets, Hooks hooks)
+Reloader::Reloader(config::Config config, std::vector<tiler::Dataset> datasets, Hooks hooks)
     : hooks_(std::move(hooks)), config_(std::move(config)), started_(config_), seen_(config_) {
   for (std::size_t i = 0; i < datasets.size(); ++i) slots_.emplace_back(config_.datasets[i], std::move(datasets[i]));
 }
@@ -237,7 +237,7 @@ bool Reloader::StepOpenings() {
 }
 
 void Reloader::Publish() {
-  std::vector<Dataset> datasets;
+  std::vector<tiler::Dataset> datasets;
   for (const DatasetSlot& slot : slots_) {
     if (slot.serving()) datasets.push_back(*slot.serving());
   }

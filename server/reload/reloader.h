@@ -31,7 +31,7 @@ class Reloader {
     std::function<bool()> may_have_changed = {};
     DatasetOpener open;
     // Serve these from now on, under these options. On the reloader's thread.
-    std::function<void(const std::vector<Dataset>&, const config::Config&)> publish;
+    std::function<void(const std::vector<tiler::Dataset>&, const config::Config&)> publish;
     // A Reload was looked after; what has to be opened is not open yet. On the reloader's thread; may be empty.
     std::function<void()> reloaded = {};
     // What is wrong, by dataset; "" is the configuration. Called when it changes, on the reloader's thread.
@@ -39,7 +39,7 @@ class Reloader {
   };
 
   // `datasets` are what is served, opened from `config.datasets` in the same order.
-  Reloader(config::Config config, std::vector<Dataset> datasets, Hooks hooks);
+  Reloader(config::Config config, std::vector<tiler::Dataset> datasets, Hooks hooks);
   ~Reloader();  // Stop
 
   // Begins to look; `watch` false: only when it is asked to.

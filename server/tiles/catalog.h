@@ -15,16 +15,16 @@
 
 #include "engine/core/result.h"
 #include "engine/dem/dem_source.h"
-#include "server/tiles/area_mesh.h"
 #include "server/tiles/dataset_view.h"
-#include "server/tiles/encoded_tile.h"
-#include "server/tiles/tile_request.h"
+#include "tiler/area/area_mesh.h"
+#include "tiler/encoded_tile.h"
+#include "tiler/tile_request.h"
 
 namespace terrace::server {
 
 // Blocking; called on many threads at once. An exception counts as kUnavailable. TileRequest::dataset is an index into
 // the catalog's datasets.
-using TileBuilder = std::function<Result<EncodedTile>(const TileRequest&, std::stop_token)>;
+using TileBuilder = std::function<Result<tiler::EncodedTile>(const tiler::TileRequest&, std::stop_token)>;
 
 // Heights of a dataset at points, NaN where it has none.
 struct PointHeights {
@@ -49,8 +49,10 @@ struct SourceStats {
 // Meshes of areas, by the dataset's index: `plan` refuses what is too large, at once and without reading; `build`
 // blocks. Both are called on many threads at once.
 struct AreaMesher {
-  std::function<Result<AreaPlan>(std::uint32_t dataset, const AreaRequest&)> plan;
-  std::function<Result<EncodedTile>(std::uint32_t dataset, const AreaPlan&, const AreaRequest&, std::stop_token)> build;
+  std::function<Result<tiler::AreaPlan>(std::uint32_t dataset, const tiler::AreaRequest&)> plan;
+  std::function<Result<tiler::EncodedTile>(std::uint32_t dataset, const tiler::AreaPlan&, const tiler::AreaRequest&,
+                                           std::stop_token)>
+      build;
 };
 
 // The functions keep alive what they need.

@@ -8,12 +8,14 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <memory>
+#include <optional>
 #include <string>
 #include <system_error>
 #include <utility>
 
-#include "server/tiles/encoder_version.h"
-#include "server/tiles/tile_record.h"
+#include "tiler/encoder_version.h"
+#include "tiler/store/tile_record.h"
 
 namespace terrace::server {
 namespace {
@@ -50,9 +52,8 @@ Result<int> LockDirectory(const std::filesystem::path& directory) {
   return file;
 }
 
-std::unique_ptr<DiskStore> OpenStore(const DiskCacheOptions& cache, std::size_t bytes, const char* name, bool compress,
-                                     bool anew) {
-  if (bytes == 0) return nullptr;
+DiskStoreOptions OptionsOf(const DiskCacheOptions& cache, std::size_t bytes, const char* name, bool compress,
+                           bool anew) {
   DiskStoreOptions options;
   options.db.directory = cache.directory / name;
   options.db.capacity_bytes = std::max(bytes, RecordDb::kMinCapacity);
@@ -62,20 +63,57 @@ std::unique_ptr<DiskStore> OpenStore(const DiskCacheOptions& cache, std::size_t 
   options.name = name;
   if (anew) static_cast<void>(RecordDb::Destroy(options.db));  // opening says what is wrong
   options.retry_after = cache.retry_after;
-  return std::make_unique<DiskStore>(std::move(options));
+  return options;
 }
 
 template <typename Key>
 std::string StoreKey(const Key& key) {
-  const std::uint64_t version = EncoderVersion();
+  const std::uint64_t version = tiler::EncoderVersion();
   std::string text(reinterpret_cast<const char*>(&version), sizeof(version));
-  return text + RecordKey(key);
+  return text + tiler::RecordKey(key);
+}
+
+// The two kinds of values as bytes.
+std::string Serialize(const tiler::EncodedTile& tile) { return tiler::SerializeTile(tile); }
+std::string Serialize(const tiler::RefinedTile& tile) { return tiler::SerializeRefinedTile(tile); }
+Result<tiler::EncodedTile> Parse(const tiler::CacheKey& /*key*/, const std::string& bytes) {
+  return tiler::ParseTile(bytes);
+}
+Result<tiler::RefinedTile> Parse(const tiler::RefinedTileKey& /*key*/, const std::string& bytes) {
+  return tiler::ParseRefinedTile(bytes);
 }
 
 }  // namespace
 
+template <typename Key, typename Value>
+class DiskCache::Tier : public tiler::Store<Key, Value> {
+ public:
+  explicit Tier(DiskStoreOptions options) : store_(std::move(options)) {}
+
+  std::shared_ptr<const Value> Find(const Key& key) override {
+    const std::string store_key = StoreKey(key);
+    const std::optional<std::string> bytes = store_.Find(store_key);
+    if (!bytes) return nullptr;
+    Result<Value> value = Parse(key, *bytes);
+    if (value) return std::make_shared<const Value>(*std::move(value));
+    store_.Forget(store_key);
+    return nullptr;
+  }
+
+  void Insert(const Key& key, std::shared_ptr<const Value> value) override {
+    const std::size_t charge = BytesOf(*value);
+    store_.Keep(
+        StoreKey(key), [value = std::move(value)] { return Serialize(*value); }, charge);
+  }
+
+  DiskStore& store() { return store_; }
+
+ private:
+  DiskStore store_;
+};
+
 Result<std::shared_ptr<DiskCache>> DiskCache::Open(const DiskCacheOptions& options) {
-  EncoderVersion();  // taken before sources are opened, for which GDAL may load libraries
+  tiler::EncoderVersion();  // taken before sources are opened, for which GDAL may load libraries
   std::error_code failed;
   std::filesystem::create_directories(options.directory, failed);
   if (failed) {
@@ -104,10 +142,20 @@ void DiskCache::OpenStores(const DiskCacheOptions& options) {
     unfinished = 0;
   }
   SetSize(lock_, unfinished + 1);
-  tiles_ = OpenStore(options, options.tile_bytes, kTiles, false, anew);  // compressed already, or refuse to be
-  refinements_ = OpenStore(options, options.refinement_bytes, kRefinements, true, anew);
+  if (options.tile_bytes > 0) {  // compressed already, or refuse to be
+    tiles_ = std::make_unique<Tier<tiler::CacheKey, tiler::EncodedTile>>(
+        OptionsOf(options, options.tile_bytes, kTiles, false, anew));
+  }
+  if (options.refinement_bytes > 0) {
+    refinements_ = std::make_unique<Tier<tiler::RefinedTileKey, tiler::RefinedTile>>(
+        OptionsOf(options, options.refinement_bytes, kRefinements, true, anew));
+  }
   SetSize(lock_, 0);
 }
+
+tiler::TileStore* DiskCache::tiles() { return tiles_.get(); }
+
+tiler::RefinementStore* DiskCache::refinements() { return refinements_.get(); }
 
 DiskCache::~DiskCache() {
   tiles_.reset();
@@ -115,63 +163,20 @@ DiskCache::~DiskCache() {
   close(lock_);
 }
 
-std::optional<EncodedTile> DiskCache::FindTile(const CacheKey& key) {
-  if (!tiles_) return std::nullopt;
-  const std::string store_key = StoreKey(key);
-  const std::optional<std::string> bytes = tiles_->Find(store_key);
-  if (!bytes) return std::nullopt;
-  Result<EncodedTile> tile = ParseTile(*bytes);
-  if (!tile) {
-    tiles_->Forget(store_key);
-    return std::nullopt;
-  }
-  tile->from_disk = true;
-  return *std::move(tile);
-}
-
-RefinedTilePtr DiskCache::FindRefinement(const RefinedTileKey& key) {
-  if (!refinements_) return nullptr;
-  const std::string store_key = StoreKey(key);
-  const std::optional<std::string> bytes = refinements_->Find(store_key);
-  if (!bytes) return nullptr;
-  Result<RefinedTile> tile = ParseRefinedTile(*bytes);
-  if (!tile) {
-    refinements_->Forget(store_key);
-    return nullptr;
-  }
-  return std::make_shared<const RefinedTile>(*std::move(tile));
-}
-
-void DiskCache::KeepTile(const CacheKey& key, TilePtr tile) {
-  if (!tiles_) return;
-  const std::size_t charge = BytesOf(*tile);
-  tiles_->Keep(
-      StoreKey(key), [tile = std::move(tile)] { return SerializeTile(*tile); }, charge);
-}
-
-void DiskCache::KeepRefinement(const RefinedTileKey& key, RefinedTilePtr tile) {
-  if (!refinements_) return;
-  const std::size_t charge = BytesOf(*tile);
-  refinements_->Keep(
-      StoreKey(key), [tile = std::move(tile)] { return SerializeRefinedTile(*tile); }, charge);
-}
-
 void DiskCache::Flush() {
-  for (DiskStore* store : {tiles_.get(), refinements_.get()}) {
-    if (store != nullptr) store->Flush();
-  }
+  if (tiles_) tiles_->store().Flush();
+  if (refinements_) refinements_->store().Flush();
 }
 
 void DiskCache::Abandon() {
-  for (DiskStore* store : {tiles_.get(), refinements_.get()}) {
-    if (store != nullptr) store->Abandon();
-  }
+  if (tiles_) tiles_->store().Abandon();
+  if (refinements_) refinements_->store().Abandon();
 }
 
 DiskCacheStats DiskCache::stats() const {
   DiskCacheStats stats;
-  if (tiles_) stats.tiles = tiles_->stats();
-  if (refinements_) stats.refinements = refinements_->stats();
+  if (tiles_) stats.tiles = tiles_->store().stats();
+  if (refinements_) stats.refinements = refinements_->store().stats();
   return stats;
 }
 

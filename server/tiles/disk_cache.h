@@ -7,12 +7,10 @@
 
 #include <filesystem>
 #include <memory>
-#include <optional>
 
 #include "engine/core/result.h"
 #include "server/tiles/disk_store.h"
-#include "server/tiles/refined_tile.h"
-#include "server/tiles/tile_cache.h"
+#include "tiler/store/tile_store.h"
 
 namespace terrace::server {
 
@@ -35,13 +33,9 @@ class DiskCache {
   static Result<std::shared_ptr<DiskCache>> Open(const DiskCacheOptions& options);
   ~DiskCache();
 
-  // Nothing when it is not there.
-  std::optional<EncodedTile> FindTile(const CacheKey& key);
-  RefinedTilePtr FindRefinement(const RefinedTileKey& key);
-
-  // Return at once. Later values for a key replace earlier ones.
-  void KeepTile(const CacheKey& key, TilePtr tile);
-  void KeepRefinement(const RefinedTileKey& key, RefinedTilePtr tile);
+  // Null where the options give them no bytes. They live as long as this.
+  tiler::TileStore* tiles();
+  tiler::RefinementStore* refinements();
 
   // Returns when everything that was kept before the call is written or dropped.
   void Flush();
@@ -52,11 +46,15 @@ class DiskCache {
   DiskCacheStats stats() const;
 
  private:
+  template <typename Key, typename Value>
+  class Tier;
+
   DiskCache(const DiskCacheOptions& options, int lock);
   void OpenStores(const DiskCacheOptions& options);
 
-  const int lock_;                                  // a file descriptor
-  std::unique_ptr<DiskStore> tiles_, refinements_;  // null: none of these
+  const int lock_;                                                                // a file descriptor
+  std::unique_ptr<Tier<tiler::CacheKey, tiler::EncodedTile>> tiles_;              // null: none
+  std::unique_ptr<Tier<tiler::RefinedTileKey, tiler::RefinedTile>> refinements_;  // null: none
 };
 
 }  // namespace terrace::server

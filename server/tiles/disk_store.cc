@@ -6,7 +6,7 @@
 #include <exception>
 #include <utility>
 
-#include "server/tiles/seal.h"
+#include "tiler/store/seal.h"
 
 namespace terrace::server {
 namespace {
@@ -55,7 +55,7 @@ std::optional<std::string> DiskStore::Find(const std::string& key) {
   }
   Result<std::optional<std::string>> record = db->Get(key);
   if (record && *record) {
-    if (const auto value = Unseal(key, **record)) {
+    if (const auto value = tiler::Unseal(key, **record)) {
       hits_.fetch_add(1, std::memory_order_relaxed);
       (*record)->resize(value->size());  // the seal is behind the value
       return *std::move(record);
@@ -146,7 +146,7 @@ void DiskStore::Write(std::list<Job> jobs) {
       std::vector<RecordDb::Change> changes;
       for (Job& job : jobs) {
         changes.push_back({job.key, std::nullopt});
-        if (job.value) changes.back().value = Seal(job.key, job.value());
+        if (job.value) changes.back().value = tiler::Seal(job.key, job.value());
       }
       done = db->Write(changes);
     } catch (const std::exception& exception) {  // std::bad_alloc

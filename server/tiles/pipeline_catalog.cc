@@ -5,7 +5,7 @@
 namespace terrace::server {
 namespace {
 
-DatasetView ViewOf(const std::shared_ptr<const TilePipeline>& pipeline, const Dataset& dataset) {
+DatasetView ViewOf(const std::shared_ptr<const tiler::TilePipeline>& pipeline, const tiler::Dataset& dataset) {
   const dem::DemInfo& info = dataset.source->info();
   DatasetView view;
   view.name = dataset.name;
@@ -33,9 +33,9 @@ DatasetView ViewOf(const std::shared_ptr<const TilePipeline>& pipeline, const Da
 
 }  // namespace
 
-CatalogPtr MakeCatalog(std::shared_ptr<const TilePipeline> pipeline, std::size_t max_mesh_samples) {
+CatalogPtr MakeCatalog(std::shared_ptr<const tiler::TilePipeline> pipeline, std::size_t max_mesh_samples) {
   auto catalog = std::make_shared<Catalog>();
-  for (const Dataset& dataset : pipeline->datasets()) catalog->datasets.push_back(ViewOf(pipeline, dataset));
+  for (const tiler::Dataset& dataset : pipeline->datasets()) catalog->datasets.push_back(ViewOf(pipeline, dataset));
   catalog->read_points = [pipeline](std::uint32_t dataset, std::span<const dem::GeoPosition> points,
                                     dem::HeightDatum datum, std::stop_token stop) -> Result<PointHeights> {
     std::vector<std::uint8_t> filled(points.size());
@@ -45,23 +45,23 @@ CatalogPtr MakeCatalog(std::shared_ptr<const TilePipeline> pipeline, std::size_t
     known.filled = std::move(filled);
     return known;
   };
-  catalog->area_mesher.plan = [pipeline, max_mesh_samples](std::uint32_t index, const AreaRequest& area) {
-    const Dataset& dataset = pipeline->datasets()[index];
-    return PlanArea(*dataset.source, dataset.error_fraction, area, max_mesh_samples);
+  catalog->area_mesher.plan = [pipeline, max_mesh_samples](std::uint32_t index, const tiler::AreaRequest& area) {
+    const tiler::Dataset& dataset = pipeline->datasets()[index];
+    return tiler::PlanArea(*dataset.source, dataset.error_fraction, area, max_mesh_samples);
   };
-  catalog->area_mesher.build = [pipeline](std::uint32_t index, const AreaPlan& plan, const AreaRequest& area,
-                                          std::stop_token stop) {
-    return BuildAreaMesh(*pipeline->datasets()[index].source, plan, area, std::move(stop));
+  catalog->area_mesher.build = [pipeline](std::uint32_t index, const tiler::AreaPlan& plan,
+                                          const tiler::AreaRequest& area, std::stop_token stop) {
+    return tiler::BuildAreaMesh(*pipeline->datasets()[index].source, plan, area, std::move(stop));
   };
   catalog->source_stats = [pipeline] {
     SourceStats stats;
     stats.gdal = dem::CountGdalErrors();
-    for (const Dataset& dataset : pipeline->datasets()) {
+    for (const tiler::Dataset& dataset : pipeline->datasets()) {
       stats.samples.emplace_back(dataset.name, dataset.source->CountSamples());
     }
     return stats;
   };
-  catalog->build = [pipeline = std::move(pipeline)](const TileRequest& request, std::stop_token stop) {
+  catalog->build = [pipeline = std::move(pipeline)](const tiler::TileRequest& request, std::stop_token stop) {
     return pipeline->Build(request, std::move(stop));
   };
   return catalog;

@@ -5,11 +5,11 @@
 #include <memory>
 
 #include "server/tiles/catalog.h"
-#include "server/tiles/tile_pipeline.h"
+#include "tiler/tile_pipeline.h"
 
 namespace terrace::server {
 
 // `max_mesh_samples`: of one mesh of an area.
-CatalogPtr MakeCatalog(std::shared_ptr<const TilePipeline> pipeline, std::size_t max_mesh_samples);
+CatalogPtr MakeCatalog(std::shared_ptr<const tiler::TilePipeline> pipeline, std::size_t max_mesh_samples);
 
 }  // namespace terrace::server

@@ -16,12 +16,12 @@
 namespace terrace::server {
 namespace {
 
-std::string NameOf(const CacheKey& key) {
+std::string NameOf(const tiler::CacheKey& key) {
   return key.solo > 0 ? "work for one request" : "tile " + geo::ToString(key.request.key);
 }
 
 // Never throws: on a worker's thread that would be the end of the program.
-Result<TilePtr> Outcome(const CacheKey& key, const SingleFlight::Build& build, std::stop_token stop) {
+Result<tiler::TilePtr> Outcome(const tiler::CacheKey& key, const SingleFlight::Build& build, std::stop_token stop) {
   try {
     if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "{}: stopped before it began", NameOf(key));
     return build(std::move(stop));
@@ -55,14 +55,14 @@ struct SingleFlight::Flight {
   bool begun = false;
   std::vector<std::weak_ptr<PoolJob>> jobs;  // one of each client, until one of them runs; the pool owns them
   std::vector<Waiter> waiters;
-  std::optional<Result<TilePtr>> outcome;
+  std::optional<Result<tiler::TilePtr>> outcome;
 };
 
 // Holds one waiter's place; giving it back may stop the flight and withdraw its jobs. Lives in Join's frame, so that
 // the place is given back however the coroutine ends.
 class SingleFlight::Seat {
  public:
-  Seat(SingleFlight& owner, CacheKey key, FlightPtr flight, Waiter waiter)
+  Seat(SingleFlight& owner, tiler::CacheKey key, FlightPtr flight, Waiter waiter)
       : owner_(owner), key_(key), flight_(std::move(flight)), waiter_(std::move(waiter)) {}
   Seat(const Seat&) = delete;
   Seat& operator=(const Seat&) = delete;
@@ -79,12 +79,12 @@ class SingleFlight::Seat {
 
  private:
   SingleFlight& owner_;
-  const CacheKey key_;
+  const tiler::CacheKey key_;
   const FlightPtr flight_;
   const Waiter waiter_;
 };
 
-asio::awaitable<SingleFlight::Landing> SingleFlight::Join(CacheKey key, Build build, Clock::time_point deadline,
+asio::awaitable<SingleFlight::Landing> SingleFlight::Join(tiler::CacheKey key, Build build, Clock::time_point deadline,
                                                           JobOrder order) {
   const auto executor = co_await asio::this_coro::executor;
   const auto waiter = std::make_shared<asio::steady_timer>(executor, deadline);
@@ -110,14 +110,14 @@ asio::awaitable<SingleFlight::Landing> SingleFlight::Join(CacheKey key, Build bu
   co_await waiter->async_wait(asio::redirect_error(asio::use_awaitable, ignored));
 
   lock.lock();
-  std::optional<Result<TilePtr>> outcome = flight->outcome;
+  std::optional<Result<tiler::TilePtr>> outcome = flight->outcome;
   lock.unlock();
   if (!outcome) outcome = MakeError(ErrorCode::kCancelled, "{}: not ready before the request's deadline", NameOf(key));
   co_return Landing(std::move(*outcome), joined);
 }
 
 // mutex_ is not held: the pool may displace another flight's job.
-void SingleFlight::Launch(const CacheKey& key, const FlightPtr& flight, Build build, JobOrder order) {
+void SingleFlight::Launch(const tiler::CacheKey& key, const FlightPtr& flight, Build build, JobOrder order) {
   PoolJobPtr job;
   Result<void> submitted;
   try {
@@ -139,7 +139,7 @@ void SingleFlight::Launch(const CacheKey& key, const FlightPtr& flight, Build bu
 }
 
 // `job` will not run. Those who wait share the failure unless another client's job is to build for them.
-void SingleFlight::Fail(const CacheKey& key, const FlightPtr& flight, const PoolJob* job, Error error) {
+void SingleFlight::Fail(const tiler::CacheKey& key, const FlightPtr& flight, const PoolJob* job, Error error) {
   {
     const std::lock_guard lock(mutex_);
     std::erase_if(flight->jobs, [job](const auto& known) { return known.expired() || known.lock().get() == job; });
@@ -149,7 +149,7 @@ void SingleFlight::Fail(const CacheKey& key, const FlightPtr& flight, const Pool
 }
 
 // On a worker thread.
-void SingleFlight::Fly(const CacheKey& key, const FlightPtr& flight, const Build& build) {
+void SingleFlight::Fly(const tiler::CacheKey& key, const FlightPtr& flight, const Build& build) {
   std::vector<std::weak_ptr<PoolJob>> others;
   {
     const std::lock_guard lock(mutex_);
@@ -160,7 +160,7 @@ void SingleFlight::Fly(const CacheKey& key, const FlightPtr& flight, const Build
   Land(key, flight, Outcome(key, build, flight->stop.get_token()));
 }
 
-void SingleFlight::Land(const CacheKey& key, const FlightPtr& flight, Result<TilePtr> outcome) {
+void SingleFlight::Land(const tiler::CacheKey& key, const FlightPtr& flight, Result<tiler::TilePtr> outcome) {
   std::vector<Waiter> waiters;
   {
     const std::lock_guard lock(mutex_);
@@ -172,7 +172,7 @@ void SingleFlight::Land(const CacheKey& key, const FlightPtr& flight, Result<Til
   for (Waiter& waiter : waiters) Wake(std::move(waiter));
 }
 
-void SingleFlight::Forget(const CacheKey& key, const FlightPtr& flight) {
+void SingleFlight::Forget(const tiler::CacheKey& key, const FlightPtr& flight) {
   const auto found = flights_.find(key);
   if (found != flights_.end() && found->second == flight) flights_.erase(found);
 }

@@ -25,22 +25,22 @@
 
 #include "engine/core/result.h"
 #include "server/asio.h"
-#include "server/tiles/tile_cache.h"
 #include "server/tiles/worker_pool.h"
+#include "tiler/store/tile_cache.h"
 
 namespace terrace::server {
 
 class SingleFlight {
  public:
   using Clock = std::chrono::steady_clock;
-  using Build = std::function<Result<TilePtr>(std::stop_token)>;
-  using Work = std::function<Result<EncodedTile>(std::stop_token)>;
+  using Build = std::function<Result<tiler::TilePtr>(std::stop_token)>;
+  using Work = std::function<Result<tiler::EncodedTile>(std::stop_token)>;
 
   struct Landing {
     Landing() = default;
-    Landing(Result<TilePtr> t, bool j) : tile(std::move(t)), joined(j) {}
+    Landing(Result<tiler::TilePtr> t, bool j) : tile(std::move(t)), joined(j) {}
 
-    Result<TilePtr> tile;
+    Result<tiler::TilePtr> tile;
     bool joined = false;  // false: this call started the flight
   };
 
@@ -52,7 +52,7 @@ class SingleFlight {
   // Waits for the flight of `key`, which runs `build` in its `order` if it has to be started. An exception of `build`
   // counts as kUnavailable. kOverloaded: the pool has refused or displaced the flight's job. kCancelled: `deadline`
   // passed, or the awaiting coroutine was cancelled. kUnavailable: shutting down. Otherwise whatever `build` returned.
-  asio::awaitable<Landing> Join(CacheKey key, Build build, Clock::time_point deadline, JobOrder order = {});
+  asio::awaitable<Landing> Join(tiler::CacheKey key, Build build, Clock::time_point deadline, JobOrder order = {});
 
   // Stops every flight and starts no more.
   void Shutdown();
@@ -66,15 +66,15 @@ class SingleFlight {
 
   using FlightPtr = std::shared_ptr<Flight>;
 
-  void Launch(const CacheKey& key, const FlightPtr& flight, Build build, JobOrder order);
-  void Fly(const CacheKey& key, const FlightPtr& flight, const Build& build);
-  void Fail(const CacheKey& key, const FlightPtr& flight, const PoolJob* job, Error error);
-  void Land(const CacheKey& key, const FlightPtr& flight, Result<TilePtr> outcome);
-  void Forget(const CacheKey& key, const FlightPtr& flight);  // mutex_ is held
+  void Launch(const tiler::CacheKey& key, const FlightPtr& flight, Build build, JobOrder order);
+  void Fly(const tiler::CacheKey& key, const FlightPtr& flight, const Build& build);
+  void Fail(const tiler::CacheKey& key, const FlightPtr& flight, const PoolJob* job, Error error);
+  void Land(const tiler::CacheKey& key, const FlightPtr& flight, Result<tiler::TilePtr> outcome);
+  void Forget(const tiler::CacheKey& key, const FlightPtr& flight);  // mutex_ is held
 
   WorkerPool& pool_;
   mutable std::mutex mutex_;
-  std::unordered_map<CacheKey, FlightPtr, CacheKeyHash> flights_;  // those that take passengers
+  std::unordered_map<tiler::CacheKey, FlightPtr, tiler::CacheKeyHash> flights_;  // those that take passengers
   bool shut_down_ = false;
   std::atomic<std::uint64_t> joined_total_{0};
 };

@@ -12,21 +12,21 @@
 namespace terrace::server {
 namespace {
 
-std::string_view ContentTypeOf(const TileRequest& tile) {
-  if (tile.format == TileFormat::kGlb) return "model/gltf-binary";
-  if (tile.format == TileFormat::kHeightPng) return "image/png";
+std::string_view ContentTypeOf(const tiler::TileRequest& tile) {
+  if (tile.format == tiler::TileFormat::kGlb) return "model/gltf-binary";
+  if (tile.format == tiler::TileFormat::kHeightPng) return "image/png";
   return proto::QuantizedMeshContentType({tile.normals, tile.water_mask, tile.metadata});
 }
 
 }  // namespace
 
-HeadLines MakeTileHead(const TileRequest& request, const EncodedTile& tile) {
-  HeadLines head;
+tiler::HeadLines MakeTileHead(const tiler::TileRequest& request, const tiler::EncodedTile& tile) {
+  tiler::HeadLines head;
   const auto put = [to = std::back_inserter(head.text)](std::string_view name, const auto& value) {
     fmt::format_to(to, "{}: {}\r\n", name, value);
   };
   put("Content-Type", ContentTypeOf(request));
-  if (request.coding != Coding::kIdentity) put("Content-Encoding", NameOf(request.coding));
+  if (request.coding != tiler::Coding::kIdentity) put("Content-Encoding", tiler::NameOf(request.coding));
   put("Content-Length", tile.bytes.size());
   head.of_body = head.text.size();
   if (!tile.etag.empty()) put("ETag", tile.etag);

@@ -3,13 +3,13 @@
 
 #include <string>
 
-#include "server/tiles/encoded_tile.h"
-#include "server/tiles/tile_request.h"
+#include "tiler/encoded_tile.h"
+#include "tiler/tile_request.h"
 
 namespace terrace::server {
 
 // Content-Type, Content-Encoding and Content-Length; ETag, Terrain-Max-Error and Terrain-Certified-Error. `tile` is
 // what answers `request`.
-HeadLines MakeTileHead(const TileRequest& request, const EncodedTile& tile);
+tiler::HeadLines MakeTileHead(const tiler::TileRequest& request, const tiler::EncodedTile& tile);
 
 }  // namespace terrace::server

@@ -16,16 +16,16 @@ using Clock = TileService::Clock;
 constexpr int kAfterTiles = 40;  // deeper than any
 
 // Of jobs (JobOrder): tiles of a dataset and level, and work for one request.
-std::uint64_t KindOfTile(const CacheKey& key) {
+std::uint64_t KindOfTile(const tiler::CacheKey& key) {
   return key.generation * 64 + static_cast<std::uint64_t>(key.request.key.level);
 }
 constexpr std::uint64_t kShortKind = 62, kLongKind = 63;  // no level
 
-Result<EncodedTile> RunWork(const SingleFlight::Work& work, const std::string& what, Clock::time_point asked,
-                            std::stop_token stop) {
+Result<tiler::EncodedTile> RunWork(const SingleFlight::Work& work, const std::string& what, Clock::time_point asked,
+                                   std::stop_token stop) {
   const auto queued = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - asked);
   try {
-    Result<EncodedTile> built = work(std::move(stop));
+    Result<tiler::EncodedTile> built = work(std::move(stop));
     if (built) built->times.queue = queued;
     return built;
   } catch (const std::exception& exception) {  // std::bad_alloc above all
@@ -34,13 +34,13 @@ Result<EncodedTile> RunWork(const SingleFlight::Work& work, const std::string& w
 }
 
 // What is cached and sent.
-TilePtr Finish(const TileRequest& request, EncodedTile tile) {
+tiler::TilePtr Finish(const tiler::TileRequest& request, tiler::EncodedTile tile) {
   tile.head = MakeTileHead(request, tile);
-  return std::make_shared<const EncodedTile>(std::move(tile));
+  return std::make_shared<const tiler::EncodedTile>(std::move(tile));
 }
 
 // The generation stands for the dataset, whose index may be another one in the next catalog.
-CacheKey KeyOf(const Catalog& catalog, TileRequest request) {
+tiler::CacheKey KeyOf(const Catalog& catalog, tiler::TileRequest request) {
   const std::uint64_t generation = catalog.datasets[request.dataset].generation;
   request.dataset = 0;
   return {request, generation};
@@ -57,17 +57,17 @@ TileService::TileService(TileServiceOptions options, BuildObserver observer)
 
 TileService::~TileService() { Shutdown(); }
 
-std::optional<ServedTile> TileService::Find(const Catalog& catalog, const TileRequest& request) {
-  TilePtr tile = cache_.Find(KeyOf(catalog, request));
+std::optional<ServedTile> TileService::Find(const Catalog& catalog, const tiler::TileRequest& request) {
+  tiler::TilePtr tile = cache_.Find(KeyOf(catalog, request));
   if (!tile) return std::nullopt;
   hits_.fetch_add(1, std::memory_order_relaxed);
   return ServedTile(std::move(tile), CacheStatus::kHit);
 }
 
-asio::awaitable<Result<ServedTile>> TileService::Get(CatalogPtr catalog, TileRequest request,
+asio::awaitable<Result<ServedTile>> TileService::Get(CatalogPtr catalog, tiler::TileRequest request,
                                                      Clock::time_point deadline, std::uint64_t client) {
   if (std::optional<ServedTile> found = Find(*catalog, request)) co_return *std::move(found);
-  const CacheKey key = KeyOf(*catalog, request);
+  const tiler::CacheKey key = KeyOf(*catalog, request);
   SingleFlight::Build build = [this, catalog = std::move(catalog), request, key,
                                asked = Clock::now()](std::stop_token stop) {
     return BuildAndKeep(*catalog, request, key, asked, std::move(stop));
@@ -83,22 +83,26 @@ asio::awaitable<Result<ServedTile>> TileService::Get(CatalogPtr catalog, TileReq
   co_return ServedTile(std::move(*landing.tile), landing.joined ? CacheStatus::kJoined : found);
 }
 
-Result<TilePtr> TileService::BuildAndKeep(const Catalog& catalog, const TileRequest& request, const CacheKey& key,
-                                          Clock::time_point asked, std::stop_token stop) {
+Result<tiler::TilePtr> TileService::BuildAndKeep(const Catalog& catalog, const tiler::TileRequest& request,
+                                                 const tiler::CacheKey& key, Clock::time_point asked,
+                                                 std::stop_token stop) {
   // Between the look into the cache and the start of this flight an earlier flight may have landed.
-  if (TilePtr tile = cache_.Find(key)) return tile;
-  if (std::optional<EncodedTile> kept = disk_ ? disk_->FindTile(key) : std::nullopt) {
-    TilePtr tile = Finish(request, *std::move(kept));
+  if (tiler::TilePtr tile = cache_.Find(key)) return tile;
+  tiler::TileStore* const disk = disk_ ? disk_->tiles() : nullptr;
+  if (const tiler::TilePtr kept = disk != nullptr ? disk->Find(key) : nullptr) {
+    tiler::EncodedTile copy = *kept;
+    copy.from_disk = true;
+    tiler::TilePtr tile = Finish(request, std::move(copy));
     cache_.Insert(key, tile);
     return tile;
   }
   const SingleFlight::Work work = [&](std::stop_token token) { return catalog.build(request, std::move(token)); };
-  Result<EncodedTile> built = RunWork(work, "tile " + geo::ToString(request.key), asked, std::move(stop));
-  Result<TilePtr> tile;
+  Result<tiler::EncodedTile> built = RunWork(work, "tile " + geo::ToString(request.key), asked, std::move(stop));
+  Result<tiler::TilePtr> tile;
   if (built) {
     tile = Finish(request, *std::move(built));
     cache_.Insert(key, *tile);
-    if (disk_) disk_->KeepTile(key, *tile);
+    if (disk != nullptr) disk->Insert(key, *tile);
   } else {
     tile = tl::unexpected(std::move(built.error()));
   }
@@ -106,14 +110,15 @@ Result<TilePtr> TileService::BuildAndKeep(const Catalog& catalog, const TileRequ
   return tile;
 }
 
-asio::awaitable<Result<TilePtr>> TileService::Run(SingleFlight::Work work, Length length, Clock::time_point deadline,
-                                                  std::uint64_t client) {
-  CacheKey key;
+asio::awaitable<Result<tiler::TilePtr>> TileService::Run(SingleFlight::Work work, Length length,
+                                                         Clock::time_point deadline, std::uint64_t client) {
+  tiler::CacheKey key;
   key.solo = 1 + solos_.fetch_add(1, std::memory_order_relaxed);
-  SingleFlight::Build build = [work = std::move(work), asked = Clock::now()](std::stop_token stop) -> Result<TilePtr> {
-    Result<EncodedTile> made = RunWork(work, "work for one request", asked, std::move(stop));
+  SingleFlight::Build build = [work = std::move(work),
+                               asked = Clock::now()](std::stop_token stop) -> Result<tiler::TilePtr> {
+    Result<tiler::EncodedTile> made = RunWork(work, "work for one request", asked, std::move(stop));
     if (!made) return tl::unexpected(std::move(made.error()));
-    return std::make_shared<const EncodedTile>(*std::move(made));
+    return std::make_shared<const tiler::EncodedTile>(*std::move(made));
   };
   JobOrder order;
   order.client = client;

@@ -16,16 +16,16 @@
 #include "server/asio.h"
 #include "server/tiles/catalog.h"
 #include "server/tiles/disk_cache.h"
-#include "server/tiles/encoded_tile.h"
 #include "server/tiles/single_flight.h"
-#include "server/tiles/tile_cache.h"
-#include "server/tiles/tile_request.h"
 #include "server/tiles/worker_pool.h"
+#include "tiler/encoded_tile.h"
+#include "tiler/store/tile_cache.h"
+#include "tiler/tile_request.h"
 
 namespace terrace::server {
 
 // Told about every build on the thread that ran it.
-using BuildObserver = std::function<void(const DatasetView&, const Result<TilePtr>&)>;
+using BuildObserver = std::function<void(const DatasetView&, const Result<tiler::TilePtr>&)>;
 
 struct TileServiceOptions {
   unsigned worker_threads = 0;                       // 0: as many as the machine has processors
@@ -38,9 +38,9 @@ enum class CacheStatus { kHit, kDisk, kMiss, kJoined };
 
 struct ServedTile {
   ServedTile() = default;
-  ServedTile(TilePtr t, CacheStatus c) : tile(std::move(t)), cache(c) {}
+  ServedTile(tiler::TilePtr t, CacheStatus c) : tile(std::move(t)), cache(c) {}
 
-  TilePtr tile;
+  tiler::TilePtr tile;
   CacheStatus cache = CacheStatus::kMiss;
 };
 
@@ -52,20 +52,20 @@ class TileService {
   ~TileService();
 
   // The tile if it is in the cache; counts as a hit then. From any thread.
-  std::optional<ServedTile> Find(const Catalog& catalog, const TileRequest& request);
+  std::optional<ServedTile> Find(const Catalog& catalog, const tiler::TileRequest& request);
 
   // Errors: those of the catalog's builder, and kOverloaded, kCancelled, kUnavailable of SingleFlight::Join. The
   // coroutine has to run on a single thread. Only successes are kept. `client`: whose turn it takes (JobOrder).
   // Precondition: the request names one of the datasets.
-  asio::awaitable<Result<ServedTile>> Get(CatalogPtr catalog, TileRequest request, Clock::time_point deadline,
+  asio::awaitable<Result<ServedTile>> Get(CatalogPtr catalog, tiler::TileRequest request, Clock::time_point deadline,
                                           std::uint64_t client = 0);
 
   // Runs `work` on a worker for this caller alone: nothing is shared or kept. Errors and conditions as those of Get. An
   // exception of `work` counts as kUnavailable. Long work has at most all workers but one, of several, and waits until
   // it may: tiles go on being served beside it.
   enum class Length { kShort, kLong };
-  asio::awaitable<Result<TilePtr>> Run(SingleFlight::Work work, Length length, Clock::time_point deadline,
-                                       std::uint64_t client = 0);
+  asio::awaitable<Result<tiler::TilePtr>> Run(SingleFlight::Work work, Length length, Clock::time_point deadline,
+                                              std::uint64_t client = 0);
 
   // Tiles of datasets that are not in `catalog` leave the cache, and builds of them that land later stay out of it.
   void RetainTilesOf(const Catalog& catalog);
@@ -80,17 +80,17 @@ class TileService {
   struct Stats {
     std::uint64_t hits = 0, misses = 0, joined = 0;
     std::size_t queued = 0, in_flight = 0;
-    ByteCacheStats cache;
+    tiler::ByteCacheStats cache;
     std::optional<DiskCacheStats> disk;  // nothing: there is none
   };
   Stats stats() const;
 
  private:
-  Result<TilePtr> BuildAndKeep(const Catalog& catalog, const TileRequest& request, const CacheKey& key,
-                               Clock::time_point asked, std::stop_token stop);
+  Result<tiler::TilePtr> BuildAndKeep(const Catalog& catalog, const tiler::TileRequest& request,
+                                      const tiler::CacheKey& key, Clock::time_point asked, std::stop_token stop);
 
   const BuildObserver observer_;
-  TileCache cache_;
+  tiler::TileCache cache_;
   const std::shared_ptr<DiskCache> disk_;
   WorkerPool pool_;
   SingleFlight flights_;

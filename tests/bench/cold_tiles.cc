@@ -17,7 +17,7 @@
 
 #include "config/parse.h"
 #include "server/cli/open_source.h"
-#include "server/tiles/tile_pipeline.h"
+#include "tiler/tile_pipeline.h"
 
 namespace terrace::bench {
 namespace {
@@ -45,14 +45,14 @@ Result<std::vector<geo::TileKey>> ReadKeys(const std::string& file) {
   return keys;
 }
 
-Result<std::vector<server::Dataset>> Open(const Arguments& arguments) {
+Result<std::vector<tiler::Dataset>> Open(const Arguments& arguments) {
   const config::ConfigResult config = config::LoadConfig(arguments.config);
   if (!config) return MakeError(ErrorCode::kInvalidArgument, "{}: {}", arguments.config, config.error()[0].message);
   for (const config::DatasetConfig& wanted : config->datasets) {
     if (wanted.name != arguments.dataset) continue;
     auto source = cli::OpenSource(wanted, config->cache_dir, {});
     if (!source) return tl::unexpected(source.error());
-    std::vector<server::Dataset> datasets(1);
+    std::vector<tiler::Dataset> datasets(1);
     datasets[0].name = wanted.name;
     datasets[0].error_fraction = wanted.error_fraction;
     datasets[0].source = *std::move(source);
@@ -64,18 +64,18 @@ Result<std::vector<server::Dataset>> Open(const Arguments& arguments) {
 Result<void> Run(const Arguments& arguments) {
   const Result<std::vector<geo::TileKey>> keys = ReadKeys(arguments.tiles);
   if (!keys) return tl::unexpected(keys.error());
-  Result<std::vector<server::Dataset>> datasets = Open(arguments);
+  Result<std::vector<tiler::Dataset>> datasets = Open(arguments);
   if (!datasets) return tl::unexpected(datasets.error());
-  const server::TilePipeline pipeline(*std::move(datasets));
+  const tiler::TilePipeline pipeline(*std::move(datasets));
 
   std::atomic<std::size_t> next{0}, bytes{0}, failed{0};
   std::atomic<std::int64_t> read{0}, refine{0}, encode{0}, compress{0};  // microseconds
   const auto work = [&] {
     for (std::size_t i = next++; i < keys->size(); i = next++) {
-      server::TileRequest request;
+      tiler::TileRequest request;
       request.key = (*keys)[i];
-      request.coding = server::Coding::kGzip;
-      const Result<server::EncodedTile> tile = pipeline.Build(request, {});
+      request.coding = tiler::Coding::kGzip;
+      const Result<tiler::EncodedTile> tile = pipeline.Build(request, {});
       if (!tile) ++failed;
       if (!tile) continue;
       bytes += tile->bytes.size();

@@ -14,16 +14,16 @@
 #include <vector>
 
 #include "engine/dem/dem_source.h"
-#include "server/tiles/tile_pipeline.h"
 #include "tests/bench/cpu_clock.h"
 #include "tests/bench/table.h"
+#include "tiler/tile_pipeline.h"
 
 namespace terrace::bench {
 namespace {
 
 using proto::GlbCompression;
-using server::Coding;
-using server::TileFormat;
+using tiler::Coding;
+using tiler::TileFormat;
 
 struct Arguments {
   std::string dem, form;
@@ -81,22 +81,22 @@ Result<void> Measure(const Variant& variant, const Arguments& arguments, Cost& c
   const std::vector<geo::TileKey> keys = TilesOf(**source, arguments);
   if (keys.empty()) return MakeError(ErrorCode::kInvalidArgument, "no tiles inside level {}", arguments.level);
   cost.tiles = keys.size();
-  std::vector<server::Dataset> datasets(1);
+  std::vector<tiler::Dataset> datasets(1);
   datasets[0].source = *std::move(source);
   datasets[0].glb.draco = variant.draco;
-  const server::TilePipeline pipeline(std::move(datasets), std::size_t{1} << 30);
+  const tiler::TilePipeline pipeline(std::move(datasets), std::size_t{1} << 30);
   for (double* const best : {&cost.cold_s, &cost.warm_s}) {
     cost.bytes = cost.vertices = 0;
     const double start = ThreadSeconds();
     for (const geo::TileKey& key : keys) {
-      server::TileRequest request;
+      tiler::TileRequest request;
       request.key = key;
       request.error_step = arguments.step;
       request.format = variant.format;
       request.compression = variant.compression;
       request.coding = variant.coding;
       request.normals = variant.format == TileFormat::kQuantizedMesh;
-      const Result<server::EncodedTile> tile = pipeline.Build(request, {});
+      const Result<tiler::EncodedTile> tile = pipeline.Build(request, {});
       if (!tile) return tl::unexpected(tile.error());
       cost.bytes += tile->bytes.size();
       cost.vertices += tile->vertices;

@@ -7,15 +7,15 @@
 
 #include "engine/core/check.h"
 #include "engine/tin/greedy.h"
-#include "server/tiles/seal.h"
-#include "server/tiles/tile_record.h"
 #include "tests/engine/tin/test_fields.h"
 #include "tests/fuzz/fuzz_input.h"
+#include "tiler/store/seal.h"
+#include "tiler/store/tile_record.h"
 
 namespace terrace::fuzz {
 namespace {
 
-using namespace server;
+using namespace tiler;
 
 const std::string& Key() {
   static const auto* const key = new std::string(RecordKey(RefinedTileKey{7, {4, 9, 11}}));

@@ -113,8 +113,9 @@ void TryTarget(std::string target) {
 }
 
 void TryHeaders(const std::string& text) {
-  const Coding coding = NegotiateCoding(text);
-  TERRACE_CHECK(coding == Coding::kIdentity || text.find_first_of("zZbB*") != std::string::npos);  // gzip, zstd, br
+  const tiler::Coding coding = NegotiateCoding(text);
+  TERRACE_CHECK(coding == tiler::Coding::kIdentity ||
+                text.find_first_of("zZbB*") != std::string::npos);  // gzip, zstd, br
   (void)WantedExtensions(text, {text});
   (void)MatchesEtag(text, "\"0123456789abcdef\"");
   static const Proxies kProxies[] = {

@@ -17,18 +17,18 @@ class AreaTest : public ServerFixture {
  protected:
   // Plans every area but those of less than a metre, and builds what tells its own error.
   void StartAreas(ServerOptions options = {}) {
-    area_mesher_.plan = [](std::uint32_t, const AreaRequest& area) -> Result<AreaPlan> {
+    area_mesher_.plan = [](std::uint32_t, const tiler::AreaRequest& area) -> Result<tiler::AreaPlan> {
       if (area.error_m < 1) return MakeError(ErrorCode::kInvalidArgument, "ask for 1 m or more");
-      AreaPlan plan;
+      tiler::AreaPlan plan;
       plan.centre = {(area.west + area.east) / 2, (area.south + area.north) / 2};
       return plan;
     };
-    area_mesher_.build = [this](std::uint32_t, const AreaPlan&, const AreaRequest& area,
-                                std::stop_token stop) -> Result<EncodedTile> {
+    area_mesher_.build = [this](std::uint32_t, const tiler::AreaPlan&, const tiler::AreaRequest& area,
+                                std::stop_token stop) -> Result<tiler::EncodedTile> {
       ++builds_;
       while (held_ && !stop.stop_requested()) std::this_thread::sleep_for(1ms);
       if (fails_) return MakeError(ErrorCode::kUnavailable, "the disk is gone");
-      EncodedTile mesh;
+      tiler::EncodedTile mesh;
       mesh.bytes = std::string(3000, 'v');
       mesh.max_error_m = area.error_m - 0.5;
       return mesh;
@@ -68,7 +68,7 @@ TEST_F(AreaTest, CompressesForThoseWhoTakeIt) {
   StartAreas();
   const Reply reply = Fetch(port(), kArea, "Accept-Encoding: gzip\r\n");
   EXPECT_EQ(reply.Field("content-encoding"), "gzip");
-  EXPECT_EQ(reply.body, Compress(std::string(3000, 'v'), Coding::kGzip));
+  EXPECT_EQ(reply.body, tiler::Compress(std::string(3000, 'v'), tiler::Coding::kGzip));
 }
 
 TEST_F(AreaTest, WhatTheClientHasIsNotMadeAgain) {

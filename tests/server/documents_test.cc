@@ -18,11 +18,11 @@ class DocumentsTest : public ServerFixture {
  protected:
   // Builds wait until the gate is open, longer than anybody waits for them.
   DocumentsTest() {
-    builder_ = [this](const TileRequest&, const std::stop_token&) -> Result<EncodedTile> {
+    builder_ = [this](const tiler::TileRequest&, const std::stop_token&) -> Result<tiler::EncodedTile> {
       ++builds_;
       std::unique_lock lock(mutex_);
       opened_.wait(lock, [this] { return is_open_; });
-      EncodedTile tile;
+      tiler::EncodedTile tile;
       tile.bytes = "tile";
       return tile;
     };

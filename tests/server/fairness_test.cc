@@ -23,18 +23,20 @@ class Fairness : public ServerFixture {
  protected:
   // Workers stop in every piece of work until they are let go. Work is noted in the order in which it begins.
   void StartHeld(ServerOptions options = {}) {
-    builder_ = [this](const TileRequest& request, std::stop_token stop) -> Result<EncodedTile> {
+    builder_ = [this](const tiler::TileRequest& request, std::stop_token stop) -> Result<tiler::EncodedTile> {
       Begin(geo::ToString(request.key), stop);
-      EncodedTile tile;
+      tiler::EncodedTile tile;
       tile.bytes = BodyOf(request);
       tile.etag = "\"" + geo::ToString(request.key) + "\"";
       return tile;
     };
-    area_mesher_.plan = [](std::uint32_t, const AreaRequest&) -> Result<AreaPlan> { return AreaPlan(); };
-    area_mesher_.build = [this](std::uint32_t, const AreaPlan&, const AreaRequest& area,
-                                std::stop_token stop) -> Result<EncodedTile> {
+    area_mesher_.plan = [](std::uint32_t, const tiler::AreaRequest&) -> Result<tiler::AreaPlan> {
+      return tiler::AreaPlan();
+    };
+    area_mesher_.build = [this](std::uint32_t, const tiler::AreaPlan&, const tiler::AreaRequest& area,
+                                std::stop_token stop) -> Result<tiler::EncodedTile> {
       Begin("mesh " + std::to_string(static_cast<int>(area.error_m)), stop);
-      return EncodedTile();
+      return tiler::EncodedTile();
     };
     read_points_ = [this](std::uint32_t, std::span<const dem::GeoPosition> points, dem::HeightDatum,
                           std::stop_token stop) -> Result<std::vector<float>> {

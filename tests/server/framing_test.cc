@@ -144,8 +144,8 @@ TEST_F(Framing, ClosesIdleConnectionsLater) {
 TEST_F(Framing, ClosesReadersThatTakeNothing) {
   ServerOptions options;
   options.write_timeout = 300ms;
-  builder_ = [](const TileRequest&, std::stop_token) -> Result<EncodedTile> {
-    EncodedTile tile;
+  builder_ = [](const tiler::TileRequest&, std::stop_token) -> Result<tiler::EncodedTile> {
+    tiler::EncodedTile tile;
     tile.bytes.assign(std::size_t{32} << 20, 'x');
     return tile;
   };

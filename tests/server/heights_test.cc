@@ -65,10 +65,10 @@ TEST_F(HeightsTest, AnswersGetAndHead) {
 }
 
 TEST_F(HeightsTest, CertifiesByTheTilesOfThePoints) {
-  builder_ = [this](const TileRequest& request, std::stop_token) -> Result<EncodedTile> {
+  builder_ = [this](const tiler::TileRequest& request, std::stop_token) -> Result<tiler::EncodedTile> {
     ++builds_;
     if (certified_fails_) return MakeError(ErrorCode::kUnavailable, "the disk is gone");
-    EncodedTile tile;
+    tiler::EncodedTile tile;
     tile.bytes = "tile";
     if (request.key.x > 0) tile.certified_error_m = 10.0 * request.key.level + static_cast<double>(request.key.x);
     return tile;

@@ -20,8 +20,8 @@ class Limits : public ServerFixture {
  protected:
   // Tiles of a megabyte, each its own.
   void MakeTilesLarge(std::size_t bytes = std::size_t{1} << 20) {
-    builder_ = [bytes](const TileRequest& request, std::stop_token) -> Result<EncodedTile> {
-      EncodedTile tile;
+    builder_ = [bytes](const tiler::TileRequest& request, std::stop_token) -> Result<tiler::EncodedTile> {
+      tiler::EncodedTile tile;
       tile.bytes.assign(bytes, static_cast<char>('a' + request.key.x % 26));
       tile.etag = "\"" + geo::ToString(request.key) + "\"";
       return tile;

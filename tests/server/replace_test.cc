@@ -23,15 +23,15 @@ CatalogPtr CatalogOf(std::uint64_t generation, TileBuilder builder, const char* 
 }
 
 TileBuilder Says(std::string text) {
-  return [text](const TileRequest&, std::stop_token) -> Result<EncodedTile> {
-    EncodedTile tile;
+  return [text](const tiler::TileRequest&, std::stop_token) -> Result<tiler::EncodedTile> {
+    tiler::EncodedTile tile;
     tile.bytes = text;
     return tile;
   };
 }
 
 TileBuilder FindsItsSourceChanged() {
-  return [](const TileRequest&, std::stop_token) -> Result<EncodedTile> {
+  return [](const tiler::TileRequest&, std::stop_token) -> Result<tiler::EncodedTile> {
     return MakeError(ErrorCode::kChanged, "/secret/maui.tif was changed");
   };
 }
@@ -85,10 +85,10 @@ TEST_F(Replace, ForgetsWhatWasCountedOfDatasetsThatAreGone) {
 
 TEST_F(Replace, KeepsRequestsWithTheCatalogTheyBeganWith) {
   std::atomic<bool> begun{false}, go_on{false};
-  Start(CatalogOf(1, [&](const TileRequest&, std::stop_token) -> Result<EncodedTile> {
+  Start(CatalogOf(1, [&](const tiler::TileRequest&, std::stop_token) -> Result<tiler::EncodedTile> {
     begun = true;
     while (!go_on) std::this_thread::sleep_for(1ms);
-    EncodedTile tile;
+    tiler::EncodedTile tile;
     tile.bytes = "old";
     return tile;
   }));

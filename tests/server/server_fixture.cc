@@ -13,17 +13,17 @@ namespace terrace::server {
 ServerFixture::ServerFixture() {
   spdlog::set_level(spdlog::level::err);
   RaiseDescriptorLimit();
-  builder_ = [this](const TileRequest& request, std::stop_token stop) -> Result<EncodedTile> {
+  builder_ = [this](const tiler::TileRequest& request, std::stop_token stop) -> Result<tiler::EncodedTile> {
     ++builds_;
     const auto until = std::chrono::steady_clock::now() + std::chrono::milliseconds(build_ms_);
     while (std::chrono::steady_clock::now() < until) {
       if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "stopped");
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
-    EncodedTile tile;
+    tiler::EncodedTile tile;
     tile.bytes = BodyOf(request);
     tile.etag = fmt::format("\"{:x}\"", std::hash<std::string>{}(tile.bytes));
-    tile.bytes = Compress(std::move(tile.bytes), request.coding);
+    tile.bytes = tiler::Compress(std::move(tile.bytes), request.coding);
     tile.max_error_m = 3.871234;
     return tile;
   };
@@ -55,7 +55,7 @@ CatalogPtr ServerFixture::MakeCatalog() const {
   return std::make_shared<const Catalog>(Catalog{std::move(datasets), builder_, read_points_, area_mesher_});
 }
 
-std::string ServerFixture::BodyOf(const TileRequest& request) {
+std::string ServerFixture::BodyOf(const tiler::TileRequest& request) {
   std::string body = fmt::format("tile {} step {} coding {} normals {} ", geo::ToString(request.key),
                                  request.error_step, static_cast<int>(request.coding), request.normals);
   body.append(2000, '.');

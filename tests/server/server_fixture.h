@@ -29,7 +29,7 @@ class ServerFixture : public testing::Test {
   std::uint16_t port() const { return server_->port(); }
 
   // What the default builder makes of a request: readable, and different wherever the request differs.
-  static std::string BodyOf(const TileRequest& request);
+  static std::string BodyOf(const tiler::TileRequest& request);
 
   PointReader read_points_;     // default: none
   AreaMesher area_mesher_;      // default: none

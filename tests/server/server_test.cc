@@ -22,7 +22,7 @@ TEST_F(ServerTest, ServesATileWithEverythingClientsRead) {
   Start();
   const Reply reply = Fetch(port(), "/maui/1/2/1.terrain", "Origin: http://example.test\r\n");
   EXPECT_EQ(reply.status, 200);
-  TileRequest request;
+  tiler::TileRequest request;
   request.key = geo::TileKey{1, 2, 1};
   EXPECT_EQ(reply.body, BodyOf(request));
   EXPECT_EQ(reply.Field("content-type"), "application/vnd.quantized-mesh");
@@ -228,9 +228,9 @@ TEST_F(ServerTest, TwoHundredClientsOnAColdTileCauseOneBuild) {
 
 TEST_F(ServerTest, SurvivesASourceThatCannotBeRead) {
   std::atomic<bool> readable{false};
-  builder_ = [&](const TileRequest&, std::stop_token) -> Result<EncodedTile> {
+  builder_ = [&](const tiler::TileRequest&, std::stop_token) -> Result<tiler::EncodedTile> {
     if (!readable) return MakeError(ErrorCode::kUnavailable, "/data/secret.tif: I/O error");
-    return EncodedTile();
+    return tiler::EncodedTile();
   };
   Start();
   const Reply reply = Fetch(port(), "/maui/0/0/0.terrain");
@@ -243,7 +243,7 @@ TEST_F(ServerTest, SurvivesASourceThatCannotBeRead) {
 }
 
 TEST_F(ServerTest, SurvivesABuilderThatThrows) {
-  builder_ = [](const TileRequest&, std::stop_token) -> Result<EncodedTile> { throw std::bad_alloc(); };
+  builder_ = [](const tiler::TileRequest&, std::stop_token) -> Result<tiler::EncodedTile> { throw std::bad_alloc(); };
   Start();
   EXPECT_EQ(Fetch(port(), "/maui/0/0/0.terrain").status, 503);
   EXPECT_EQ(Fetch(port(), "/livez").status, 200);
@@ -251,7 +251,7 @@ TEST_F(ServerTest, SurvivesABuilderThatThrows) {
 
 TEST_F(ServerTest, TellsEveryWaiterThatTheBuildFailed) {
   std::latch all_wait(1);
-  builder_ = [&](const TileRequest&, std::stop_token) -> Result<EncodedTile> {
+  builder_ = [&](const tiler::TileRequest&, std::stop_token) -> Result<tiler::EncodedTile> {
     ++builds_;
     all_wait.wait();
     return MakeError(ErrorCode::kUnavailable, "I/O error");
@@ -317,7 +317,7 @@ class AbandonedBuild : public ServerFixture {
   void ExpectStopWhen(void (*leave)(RawClient&)) {
     std::latch begun(1);
     std::promise<void> stopped;
-    builder_ = [&](const TileRequest&, std::stop_token stop) -> Result<EncodedTile> {
+    builder_ = [&](const tiler::TileRequest&, std::stop_token stop) -> Result<tiler::EncodedTile> {
       begun.count_down();
       if (Eventually([&] { return stop.stop_requested(); })) stopped.set_value();
       return MakeError(ErrorCode::kCancelled, "stopped");

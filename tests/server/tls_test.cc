@@ -53,8 +53,8 @@ TEST_F(Tls, ServesTheSameReplies) {
 }
 
 TEST_F(Tls, SendsLongRepliesWhole) {
-  builder_ = [](const TileRequest&, std::stop_token) -> Result<EncodedTile> {
-    EncodedTile tile;
+  builder_ = [](const tiler::TileRequest&, std::stop_token) -> Result<tiler::EncodedTile> {
+    tiler::EncodedTile tile;
     for (int i = 0; i < 1'000'000; ++i) tile.bytes += std::to_string(i);
     return tile;
   };
@@ -87,7 +87,7 @@ TEST_F(Tls, ClosesWhoDoesNotSpeakIt) {
 
 TEST_F(Tls, StopsBuildsOfClientsThatLeave) {
   std::atomic<bool> begun{false}, stopped{false};
-  builder_ = [&](const TileRequest&, std::stop_token stop) -> Result<EncodedTile> {
+  builder_ = [&](const tiler::TileRequest&, std::stop_token stop) -> Result<tiler::EncodedTile> {
     begun = true;
     stopped = Eventually([&] { return stop.stop_requested(); });
     return MakeError(ErrorCode::kCancelled, "stopped");

@@ -14,9 +14,10 @@ TEST(AreaRequest, ReadsTheBox) {
   EXPECT_EQ(area->north, 47);
   EXPECT_EQ(area->error_m, 5);
   EXPECT_EQ(area->format, proto::MeshFileFormat::kGlb);
-  EXPECT_EQ(area->coordinates, AreaCoordinates::kEnu);
+  EXPECT_EQ(area->coordinates, tiler::AreaCoordinates::kEnu);
   EXPECT_EQ(ParseAreaRequest("bbox=0,0,1,1&error=5&format=ply&coordinates=ecef")->format, proto::MeshFileFormat::kPly);
-  EXPECT_EQ(ParseAreaRequest("bbox=0,0,1,1&error=5&coordinates=geographic")->coordinates, AreaCoordinates::kGeographic);
+  EXPECT_EQ(ParseAreaRequest("bbox=0,0,1,1&error=5&coordinates=geographic")->coordinates,
+            tiler::AreaCoordinates::kGeographic);
 }
 
 TEST(AreaRequest, WestAboveEastCrossesTheAntimeridian) {

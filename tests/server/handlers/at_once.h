@@ -11,7 +11,7 @@ namespace terrace::server {
 inline Response AtOnce(Answer answer, const Request& request) {
   const auto* plan = std::get_if<DocumentPlan>(&answer);
   if (plan == nullptr) return std::get<Response>(std::move(answer));
-  const Coding coding = NegotiateCoding(request.fields->accept_encoding, kGzipOnly);
+  const tiler::Coding coding = NegotiateCoding(request.fields->accept_encoding, tiler::kGzipOnly);
   return Serve(*MakeDocument(plan->write, coding, {}), *plan, request);
 }
 

@@ -60,7 +60,7 @@ TEST_F(LayerHandlerTest, RefusesBadWishesAndUnknownDatasets) {
 
 TEST_F(LayerHandlerTest, CompressesOnRequest) {
   const Response plain = Get("/maui/layer.json"), gzip = Get("/maui/layer.json", "gzip");
-  EXPECT_EQ(gzip.coding, Coding::kGzip);
+  EXPECT_EQ(gzip.coding, tiler::Coding::kGzip);
   EXPECT_NE(gzip.etag, plain.etag);
   EXPECT_LT(gzip.body->size(), plain.body->size());
 }

@@ -44,7 +44,7 @@ TEST_F(StaticFilesTest, ServesTheCompressedSiblingToThoseWhoTakeIt) {
   request.fields.Set(&RequestFields::accept_encoding, "gzip");
   const Response gzip = Serve(*files->Find("a.js"), request, "");
   EXPECT_EQ(*gzip.body, "compressed");
-  EXPECT_EQ(gzip.coding, Coding::kGzip);
+  EXPECT_EQ(gzip.coding, tiler::Coding::kGzip);
   EXPECT_EQ(files->Find("a.js.gz"), nullptr);
   EXPECT_NE(files->Find("alone.gz"), nullptr);
 }

@@ -56,7 +56,7 @@ TEST(StoppedJobs, DocumentsAreNotCompressed) {
     source.request_stop();
     return std::string(std::size_t{8} << 20, 'a');
   };
-  const auto made = MakeDocument(write, Coding::kGzip, source.get_token());
+  const auto made = MakeDocument(write, tiler::Coding::kGzip, source.get_token());
   ASSERT_FALSE(made);
   EXPECT_EQ(made.error().code, ErrorCode::kCancelled);
 }

@@ -6,7 +6,7 @@ namespace terrace::server {
 namespace {
 
 TEST(TileHandler, TimesTheStepsOfABuild) {
-  StageTimes times;
+  tiler::StageTimes times;
   times.queue = std::chrono::microseconds(3);
   times.read = std::chrono::microseconds(1500);
   times.refine = std::chrono::microseconds(20);

@@ -18,8 +18,8 @@
 #include "tests/proto/glb_decoder.h"
 #include "tests/proto/subtree_reader.h"
 #include "tests/server/handlers/at_once.h"
-#include "tests/server/tiles/fetched_tile.h"
 #include "tests/support/source_dir.h"
+#include "tests/tiler/fetched_tile.h"
 
 namespace terrace::server {
 namespace {
@@ -32,10 +32,11 @@ CatalogPtr Mosaic() {
   const std::string folder = test_support::SourceDir() / "config/samples";
   auto source = dem::DemSource::Open({{folder + "/jacksboro.tif", 0}, {folder + "/etopo5.tif", 0}});
   if (!source) return nullptr;
-  Dataset dataset;
+  tiler::Dataset dataset;
   dataset.name = "earth";
   dataset.source = *std::move(source);
-  return MakeCatalog(std::make_shared<const TilePipeline>(std::vector<Dataset>{std::move(dataset)}), 1 << 20);
+  return MakeCatalog(std::make_shared<const tiler::TilePipeline>(std::vector<tiler::Dataset>{std::move(dataset)}),
+                     1 << 20);
 }
 
 struct Geodetic {
@@ -77,7 +78,7 @@ class TilesetBoundsTest : public testing::Test {
 
   proto::DecodedGlb Glb(const std::string& target) {
     const Request request;
-    const Result<TileRequest> tile = Negotiate(*Match("/earth/" + target), request, catalog_->datasets);
+    const Result<tiler::TileRequest> tile = Negotiate(*Match("/earth/" + target), request, catalog_->datasets);
     EXPECT_TRUE(tile) << target;
     const auto built = catalog_->build(*tile, {});
     EXPECT_TRUE(built) << target;

@@ -238,7 +238,7 @@ TEST_F(TilesetHandlerTest, RefusesBadWishes) {
 TEST_F(TilesetHandlerTest, CompressesOnRequest) {
   for (const char* const target : {"/maui/tileset.json", "/maui/3dtiles/7-16-32/0/0/0.6.subtree"}) {
     const Response plain = Get(target), gzip = Get(target, "gzip");
-    EXPECT_EQ(gzip.coding, Coding::kGzip) << target;
+    EXPECT_EQ(gzip.coding, tiler::Coding::kGzip) << target;
     EXPECT_NE(gzip.etag, plain.etag) << target;
     EXPECT_LT(gzip.body->size(), plain.body->size()) << target;
   }

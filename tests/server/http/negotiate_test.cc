@@ -16,43 +16,43 @@ namespace {
 TEST(Negotiate, ChoosesTheCodingByQuality) {
   const struct {
     const char* accept_encoding;
-    Coding coding;
+    tiler::Coding coding;
   } cases[] = {
-      {"", Coding::kIdentity},
-      {"gzip", Coding::kGzip},
-      {"GZIP", Coding::kGzip},
-      {"x-gzip", Coding::kGzip},
-      {"gzip, deflate, br, zstd", Coding::kBrotli},
-      {"gzip, deflate, zstd", Coding::kGzip},
-      {"zstd", Coding::kZstd},
-      {"gzip, deflate", Coding::kGzip},
-      {"deflate, br", Coding::kBrotli},
-      {"gzip, br;q=0.9", Coding::kGzip},
-      {"br;q=0, *", Coding::kGzip},
-      {"BR;q=0.5, identity;q=0.6", Coding::kIdentity},
-      {"identity", Coding::kIdentity},
-      {"*", Coding::kBrotli},
-      {"*;q=0", Coding::kIdentity},
-      {"gzip;q=0", Coding::kIdentity},
-      {"gzip;q=0.000, *", Coding::kBrotli},
-      {"gzip; q=0.5", Coding::kGzip},
-      {"gzip;q=0.5, identity;q=0.9", Coding::kIdentity},
-      {"identity;q=0.5, gzip;q=0.9", Coding::kGzip},
-      {"gzip;q=1, identity;q=1", Coding::kGzip},
-      {"identity;q=0", Coding::kIdentity},  // nothing is left: plain bytes rather than none
-      {"gzip;q=abc", Coding::kIdentity},
-      {"gzip;q=2", Coding::kIdentity},
-      {"gzip;q=nan", Coding::kIdentity},
-      {",,, gzip ,;;", Coding::kGzip},
-      {"gzipped", Coding::kIdentity},
+      {"", tiler::Coding::kIdentity},
+      {"gzip", tiler::Coding::kGzip},
+      {"GZIP", tiler::Coding::kGzip},
+      {"x-gzip", tiler::Coding::kGzip},
+      {"gzip, deflate, br, zstd", tiler::Coding::kBrotli},
+      {"gzip, deflate, zstd", tiler::Coding::kGzip},
+      {"zstd", tiler::Coding::kZstd},
+      {"gzip, deflate", tiler::Coding::kGzip},
+      {"deflate, br", tiler::Coding::kBrotli},
+      {"gzip, br;q=0.9", tiler::Coding::kGzip},
+      {"br;q=0, *", tiler::Coding::kGzip},
+      {"BR;q=0.5, identity;q=0.6", tiler::Coding::kIdentity},
+      {"identity", tiler::Coding::kIdentity},
+      {"*", tiler::Coding::kBrotli},
+      {"*;q=0", tiler::Coding::kIdentity},
+      {"gzip;q=0", tiler::Coding::kIdentity},
+      {"gzip;q=0.000, *", tiler::Coding::kBrotli},
+      {"gzip; q=0.5", tiler::Coding::kGzip},
+      {"gzip;q=0.5, identity;q=0.9", tiler::Coding::kIdentity},
+      {"identity;q=0.5, gzip;q=0.9", tiler::Coding::kGzip},
+      {"gzip;q=1, identity;q=1", tiler::Coding::kGzip},
+      {"identity;q=0", tiler::Coding::kIdentity},  // nothing is left: plain bytes rather than none
+      {"gzip;q=abc", tiler::Coding::kIdentity},
+      {"gzip;q=2", tiler::Coding::kIdentity},
+      {"gzip;q=nan", tiler::Coding::kIdentity},
+      {",,, gzip ,;;", tiler::Coding::kGzip},
+      {"gzipped", tiler::Coding::kIdentity},
   };
   for (const auto& c : cases) EXPECT_EQ(NegotiateCoding(c.accept_encoding), c.coding) << c.accept_encoding;
 }
 
 TEST(Negotiate, ChoosesAmongWhatIsOffered) {
-  EXPECT_EQ(NegotiateCoding("gzip, br, zstd", kGzipOnly), Coding::kGzip);
-  EXPECT_EQ(NegotiateCoding("br, zstd", kGzipOnly), Coding::kIdentity);
-  EXPECT_EQ(NegotiateCoding("gzip, br", {}), Coding::kIdentity);
+  EXPECT_EQ(NegotiateCoding("gzip, br, zstd", tiler::kGzipOnly), tiler::Coding::kGzip);
+  EXPECT_EQ(NegotiateCoding("br, zstd", tiler::kGzipOnly), tiler::Coding::kIdentity);
+  EXPECT_EQ(NegotiateCoding("gzip, br", {}), tiler::Coding::kIdentity);
 }
 
 TEST(Negotiate, FindsExtensionsWhereverClientsAskForThem) {
@@ -98,7 +98,7 @@ TEST(Negotiate, GivesNoExtensionThatTheTileHasNot) {
   Request request;
   request.fields.Set(&RequestFields::accept, "a/b;extensions=octvertexnormals-watermask-metadata");
   const auto extensions = [&](const char* target) {
-    const TileRequest tile = *Negotiate(*Match(target), request, datasets);
+    const tiler::TileRequest tile = *Negotiate(*Match(target), request, datasets);
     return proto::TileExtensions{tile.normals, tile.water_mask, tile.metadata};
   };
   EXPECT_EQ(extensions("/dry/0/0/0.terrain"), (proto::TileExtensions{true, false, false}));
@@ -141,7 +141,7 @@ TEST(Negotiate, AtLeastGivesTheErrorAskedForAtTheDeepestLevel) {
   datasets[0].name = "maui";
   datasets[0].available = {{{0, 0, 1, 0}}, {{0, 0, 3, 1}}, {{0, 0, 1, 1}}};
   const auto error = [&](const std::string& target) {
-    const Result<TileRequest> tile = Negotiate(*Match(target), Request(), datasets);
+    const Result<tiler::TileRequest> tile = Negotiate(*Match(target), Request(), datasets);
     EXPECT_TRUE(tile) << target;
     return tile ? geo::LadderError(tile->key.level, tile->error_step) : 0;
   };
@@ -193,15 +193,15 @@ TEST(Negotiate, HeightTilesAreThoseThatMeetTheBounds) {
   };
   for (const char* there : {"/maui/0/0/0.png", "/maui/1/0/0.png", "/maui/1/1/0.png", "/maui/5/31/14.png",
                             "/maui/5/1/15.png", "/maui/4/15/7.png?size=512"}) {
-    const Result<TileRequest> tile = find(there);
+    const Result<tiler::TileRequest> tile = find(there);
     ASSERT_TRUE(tile) << there << tile.error().message;
-    EXPECT_EQ(tile->format, TileFormat::kHeightPng);
-    EXPECT_EQ(tile->coding, Coding::kIdentity) << "PNG is compressed already";
+    EXPECT_EQ(tile->format, tiler::TileFormat::kHeightPng);
+    EXPECT_EQ(tile->coding, tiler::Coding::kIdentity) << "PNG is compressed already";
   }
   EXPECT_EQ(find("/maui/4/15/7.png?size=512")->height_size, 512);
   for (const char* missing : {"/maui/1/0/1.png", "/maui/5/16/14.png", "/maui/5/31/20.png", "/maui/6/63/29.png",
                               "/maui/5/31/14.png?size=512", "/nope/0/0/0.png"}) {
-    const Result<TileRequest> tile = find(missing);
+    const Result<tiler::TileRequest> tile = find(missing);
     ASSERT_FALSE(tile) << missing;
     EXPECT_EQ(tile.error().code, ErrorCode::kNotFound) << missing;
   }
@@ -218,11 +218,11 @@ TEST(Negotiate, MakesACanonicalRequest) {
   request.fields.Set(&RequestFields::accept, "a/b;extensions=octvertexnormals");
   const auto negotiate = [&](const char* target) { return Negotiate(*Match(target), request, datasets); };
 
-  const Result<TileRequest> tile = negotiate("/maui/1/1/0.terrain?v=3&error=100");
+  const Result<tiler::TileRequest> tile = negotiate("/maui/1/1/0.terrain?v=3&error=100");
   ASSERT_TRUE(tile);
   EXPECT_EQ(tile->dataset, 1u);
   EXPECT_EQ(tile->key, (geo::TileKey{1, 1, 0}));
-  EXPECT_EQ(tile->coding, Coding::kGzip);
+  EXPECT_EQ(tile->coding, tiler::Coding::kGzip);
   EXPECT_TRUE(tile->normals);
   EXPECT_EQ(tile->error_step, geo::SnapToLadder(1, 100));
 
@@ -244,21 +244,21 @@ TEST(Negotiate, GlbTilesAreCanonicalToo) {
   request.fields.Set(&RequestFields::accept, "a/b;extensions=octvertexnormals");
   const auto negotiate = [&](const char* target) { return Negotiate(*Match(target), request, datasets); };
 
-  const Result<TileRequest> tile = negotiate("/maui/0/1/0.glb?extensions=octvertexnormals-metadata");
+  const Result<tiler::TileRequest> tile = negotiate("/maui/0/1/0.glb?extensions=octvertexnormals-metadata");
   ASSERT_TRUE(tile);
-  EXPECT_EQ(tile->format, TileFormat::kGlb);
+  EXPECT_EQ(tile->format, tiler::TileFormat::kGlb);
   EXPECT_EQ(tile->compression, proto::GlbCompression::kMeshopt);
   EXPECT_FALSE(tile->normals) << "they have normals whatever is asked for";
   EXPECT_EQ(*tile, *negotiate("/maui/0/1/0.glb?compression=meshopt"));
   EXPECT_FALSE(*tile == *negotiate("/maui/0/1/0.glb?compression=draco"));
-  EXPECT_EQ(negotiate("/maui/0/1/0.glb?compression=draco")->coding, Coding::kIdentity);
-  EXPECT_EQ(tile->coding, Coding::kGzip);
-  EXPECT_EQ(negotiate("/maui/0/1/0.glb?compression=none")->coding, Coding::kGzip);
-  EXPECT_EQ(negotiate("/maui/0/1/0.glb?compression=quantized")->coding, Coding::kGzip);
+  EXPECT_EQ(negotiate("/maui/0/1/0.glb?compression=draco")->coding, tiler::Coding::kIdentity);
+  EXPECT_EQ(tile->coding, tiler::Coding::kGzip);
+  EXPECT_EQ(negotiate("/maui/0/1/0.glb?compression=none")->coding, tiler::Coding::kGzip);
+  EXPECT_EQ(negotiate("/maui/0/1/0.glb?compression=quantized")->coding, tiler::Coding::kGzip);
   EXPECT_EQ(negotiate("/maui/0/1/0.glb?compression=zip").error().code, ErrorCode::kInvalidArgument);
   EXPECT_EQ(negotiate("/maui/0/1/0.terrain?compression=none").error().code, ErrorCode::kInvalidArgument);
   // The dataset's word for GLB tiles makes no second variant of the others.
-  EXPECT_EQ(negotiate("/maui/0/1/0.terrain")->compression, TileRequest{}.compression);
+  EXPECT_EQ(negotiate("/maui/0/1/0.terrain")->compression, tiler::TileRequest{}.compression);
 }
 
 // What skirts rely on (proto/skirt.h): whatever is asked for, a parent's error is at most twice what they are made for.

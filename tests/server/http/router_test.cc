@@ -48,12 +48,12 @@ TEST(Router, ReadsTheTileAndTheQuery) {
   EXPECT_EQ(route->dataset, "maui");
   EXPECT_EQ(route->key, (geo::TileKey{9, 533, 388}));
   EXPECT_EQ(route->query, "error=5&v=1");
-  EXPECT_EQ(route->format, TileFormat::kQuantizedMesh);
+  EXPECT_EQ(route->format, tiler::TileFormat::kQuantizedMesh);
   const Result<Route> glb = Match("/maui/9/533/388.glb?compression=none");
   ASSERT_TRUE(glb);
   EXPECT_EQ(glb->key, route->key);
-  EXPECT_EQ(glb->format, TileFormat::kGlb);
-  EXPECT_EQ(Match("/maui/3/7/0.png")->format, TileFormat::kHeightPng);
+  EXPECT_EQ(glb->format, tiler::TileFormat::kGlb);
+  EXPECT_EQ(Match("/maui/3/7/0.png")->format, tiler::TileFormat::kHeightPng);
   EXPECT_EQ(Match("/viewer/a/b.js")->file, "a/b.js");
   EXPECT_EQ(Match("/")->file, "index.html");
   EXPECT_EQ(Match("/viewer/")->file, "index.html");
@@ -63,7 +63,7 @@ TEST(Router, CountsImplicitTilesFromTheGlobesRoots) {
   const Result<Route> content = Match("/maui/3dtiles/9-272-359/3/5/2.glb");
   ASSERT_TRUE(content);
   EXPECT_EQ(content->dataset, "maui");
-  EXPECT_EQ(content->format, TileFormat::kGlb);
+  EXPECT_EQ(content->format, tiler::TileFormat::kGlb);
   EXPECT_EQ(content->key, (geo::TileKey{12, 272 * 8 + 5, 359 * 8 + 2}));
   const Result<Route> subtree = Match("/maui/3dtiles/0-1-0/6/63/0.6.subtree");
   ASSERT_TRUE(subtree);

@@ -56,7 +56,7 @@ class ReloaderTest : public testing::Test {
     fs::rename(beside, folder_ / (name + ".tif"));
   }
 
-  Result<Dataset> Open(const config::DatasetConfig& wanted, const std::stop_token& stop) {
+  Result<tiler::Dataset> Open(const config::DatasetConfig& wanted, const std::stop_token& stop) {
     ++openings_;
     if (blocks_) {
       while (!stop.stop_requested()) std::this_thread::sleep_for(1ms);
@@ -65,7 +65,7 @@ class ReloaderTest : public testing::Test {
     if (fails_) return MakeError(ErrorCode::kInvalidArgument, "no raster");
     auto source = dem::DemSource::Open(wanted.sources.front().files.front(), {});
     if (!source) return tl::unexpected(source.error());
-    Dataset dataset;
+    tiler::Dataset dataset;
     dataset.name = wanted.name;
     dataset.source = *std::move(source);
     dataset.generation = dataset.source->fingerprint();
@@ -73,7 +73,7 @@ class ReloaderTest : public testing::Test {
   }
 
   void Start() {
-    std::vector<Dataset> datasets;
+    std::vector<tiler::Dataset> datasets;
     for (const config::DatasetConfig& wanted : config_.datasets) datasets.push_back(*Open(wanted, {}));
     openings_ = 0;
     Reloader::Hooks hooks;
@@ -90,16 +90,16 @@ class ReloaderTest : public testing::Test {
     hooks.open = [this](const config::DatasetConfig& wanted, const std::stop_token& stop) {
       return Open(wanted, stop);
     };
-    hooks.publish = [this](const std::vector<Dataset>& served, const config::Config&) {
+    hooks.publish = [this](const std::vector<tiler::Dataset>& served, const config::Config&) {
       const std::lock_guard lock(mutex_);
       served_.clear();
-      for (const Dataset& dataset : served) served_.emplace_back(dataset.name, dataset.generation);
+      for (const tiler::Dataset& dataset : served) served_.emplace_back(dataset.name, dataset.generation);
     };
     hooks.tell = [this](const std::map<std::string, std::string>& troubles) {
       const std::lock_guard lock(mutex_);
       troubles_ = troubles;
     };
-    for (const Dataset& dataset : datasets) served_.emplace_back(dataset.name, dataset.generation);
+    for (const tiler::Dataset& dataset : datasets) served_.emplace_back(dataset.name, dataset.generation);
     next_ = config_;
     reloader_ = std::make_unique<Reloader>(config_, std::move(datasets), std::move(hooks));
     reloader_->Start(/*watch=*/true);

@@ -17,7 +17,7 @@
 #include <vector>
 
 #include "tests/server/tiles/fault_env.h"
-#include "tests/server/tiles/scratch_directory.h"
+#include "tests/support/scratch_directory.h"
 
 namespace terrace::server {
 namespace {
@@ -95,7 +95,7 @@ class DiskStoreTest : public testing::Test {
   }
   std::size_t OpenTables() const { return OpenFiles(".sst"); }
 
-  const ScratchDirectory scratch_;
+  const test_support::ScratchDirectory scratch_;
 };
 
 TEST_F(DiskStoreTest, FindsWhatWasKeptAndAfterARestart) {

@@ -21,7 +21,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-TilePtr SomeTile() { return std::make_shared<const EncodedTile>(); }
+tiler::TilePtr SomeTile() { return std::make_shared<const tiler::EncodedTile>(); }
 
 // Waits until `stop` is requested, at most ten seconds.
 bool StopComes(const std::stop_token& stop) {
@@ -36,10 +36,10 @@ class SingleFlightTest : public testing::Test {
   void Join(SingleFlight::Build build, SingleFlight::Clock::time_point deadline,
             asio::cancellation_slot slot = asio::cancellation_slot()) {
     auto keep = [this](std::exception_ptr, SingleFlight::Landing landing) { landings_.push_back(std::move(landing)); };
-    asio::co_spawn(io_, flights_.Join(CacheKey(), std::move(build), deadline),
+    asio::co_spawn(io_, flights_.Join(tiler::CacheKey(), std::move(build), deadline),
                    asio::bind_cancellation_slot(slot, keep));
   }
-  void JoinAs(CacheKey key, JobOrder order, SingleFlight::Build build,
+  void JoinAs(tiler::CacheKey key, JobOrder order, SingleFlight::Build build,
               asio::cancellation_slot slot = asio::cancellation_slot()) {
     auto keep = [this](std::exception_ptr, SingleFlight::Landing landing) { landings_.push_back(std::move(landing)); };
     asio::co_spawn(io_, flights_.Join(key, std::move(build), Soon(), order), asio::bind_cancellation_slot(slot, keep));
@@ -58,8 +58,8 @@ class SingleFlightTest : public testing::Test {
     }
     begun.wait();
   }
-  static CacheKey CacheKeyOf(std::size_t i) {
-    CacheKey key;
+  static tiler::CacheKey CacheKeyOf(std::size_t i) {
+    tiler::CacheKey key;
     key.request.key.x = static_cast<std::int64_t>(i);
     return key;
   }
@@ -78,7 +78,7 @@ TEST_F(SingleFlightTest, BuildsOnceForTwoHundred) {
   const std::shared_future<void> open = gate.get_future().share();
   for (int i = 0; i < 200; ++i) {
     Join(
-        [&builds, open](std::stop_token) -> Result<TilePtr> {
+        [&builds, open](std::stop_token) -> Result<tiler::TilePtr> {
           ++builds;
           open.wait();
           return SomeTile();
@@ -105,7 +105,7 @@ TEST_F(SingleFlightTest, GivesAFailureToAllAndForgetsIt) {
   const std::shared_future<void> open = gate.get_future().share();
   for (int i = 0; i < 5; ++i) {
     Join(
-        [open](std::stop_token) -> Result<TilePtr> {
+        [open](std::stop_token) -> Result<tiler::TilePtr> {
           open.wait();
           return MakeError(ErrorCode::kUnavailable, "the disk is gone");
         },
@@ -119,7 +119,7 @@ TEST_F(SingleFlightTest, GivesAFailureToAllAndForgetsIt) {
     EXPECT_EQ(landing.tile.error().code, ErrorCode::kUnavailable);
   }
   io_.restart();
-  Join([](std::stop_token) -> Result<TilePtr> { return SomeTile(); }, Soon());
+  Join([](std::stop_token) -> Result<tiler::TilePtr> { return SomeTile(); }, Soon());
   io_.run();
   EXPECT_TRUE(landings_.back().tile);
 }
@@ -127,7 +127,7 @@ TEST_F(SingleFlightTest, GivesAFailureToAllAndForgetsIt) {
 TEST_F(SingleFlightTest, StopsWhenTheLastWaiterLeaves) {
   std::promise<bool> stopped;
   std::latch begun(1);
-  const auto build = [&](std::stop_token stop) -> Result<TilePtr> {
+  const auto build = [&](std::stop_token stop) -> Result<tiler::TilePtr> {
     begun.count_down();
     stopped.set_value(StopComes(stop));
     return MakeError(ErrorCode::kCancelled, "stopped");
@@ -151,12 +151,12 @@ TEST_F(SingleFlightTest, StopsWhenTheLastWaiterLeaves) {
 TEST_F(SingleFlightTest, StopsAtTheDeadlineOfWhoWaitsLongest) {
   std::promise<bool> stopped;
   Join(
-      [&](std::stop_token stop) -> Result<TilePtr> {
+      [&](std::stop_token stop) -> Result<tiler::TilePtr> {
         stopped.set_value(StopComes(stop));
         return MakeError(ErrorCode::kCancelled, "stopped");
       },
       SingleFlight::Clock::now() + 50ms);
-  Join([](std::stop_token) -> Result<TilePtr> { return SomeTile(); }, SingleFlight::Clock::now() + 80ms);
+  Join([](std::stop_token) -> Result<tiler::TilePtr> { return SomeTile(); }, SingleFlight::Clock::now() + 80ms);
   io_.run();
   ASSERT_EQ(landings_.size(), 2u);
   for (const auto& landing : landings_) EXPECT_EQ(landing.tile.error().code, ErrorCode::kCancelled);
@@ -165,7 +165,7 @@ TEST_F(SingleFlightTest, StopsAtTheDeadlineOfWhoWaitsLongest) {
 
 TEST_F(SingleFlightTest, ALateJoinerHasItsWholeDeadline) {
   std::promise<void> gate;
-  const auto build = [open = gate.get_future().share()](std::stop_token stop) -> Result<TilePtr> {
+  const auto build = [open = gate.get_future().share()](std::stop_token stop) -> Result<tiler::TilePtr> {
     open.wait();
     if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "stopped");
     return SomeTile();
@@ -189,7 +189,7 @@ TEST_F(SingleFlightTest, WhoLeavesTakesItsJobOutOfTheQueue) {
   for (std::size_t i = 0; i < leave.size(); ++i) {
     JoinAs(
         CacheKeyOf(i), {i % 7 + 1, static_cast<int>(i % 15)},
-        [&](std::stop_token) -> Result<TilePtr> {
+        [&](std::stop_token) -> Result<tiler::TilePtr> {
           ++builds;
           return SomeTile();
         },
@@ -213,7 +213,7 @@ TEST_F(SingleFlightTest, WhoJoinsWaitsInItsOwnTurn) {
   std::mutex mutex;
   std::vector<std::size_t> built;
   const auto note = [&](std::size_t i) {
-    return [&, i](std::stop_token) -> Result<TilePtr> {
+    return [&, i](std::stop_token) -> Result<tiler::TilePtr> {
       const std::lock_guard lock(mutex);
       built.push_back(i);
       return SomeTile();
@@ -235,11 +235,11 @@ TEST_F(SingleFlightTest, TellsWhomTheQueueDisplaces) {
   WorkerPool small(1, 1);
   SingleFlight flights(small);
   std::promise<void> gate;
-  const auto wait = [open = GateOf(gate)](std::stop_token) -> Result<TilePtr> {
+  const auto wait = [open = GateOf(gate)](std::stop_token) -> Result<tiler::TilePtr> {
     open.wait();
     return SomeTile();
   };
-  std::vector<Result<TilePtr>> ends;
+  std::vector<Result<tiler::TilePtr>> ends;
   const auto join = [&](std::size_t i, std::uint64_t client) {
     JobOrder order;
     order.client = client;
@@ -266,7 +266,7 @@ TEST_F(SingleFlightTest, TellsWhomTheQueueDisplaces) {
 TEST_F(SingleFlightTest, StopsEverythingAtShutdown) {
   std::latch begun(1);
   Join(
-      [&](std::stop_token stop) -> Result<TilePtr> {
+      [&](std::stop_token stop) -> Result<tiler::TilePtr> {
         begun.count_down();
         StopComes(stop);
         return MakeError(ErrorCode::kCancelled, "stopped");
@@ -280,14 +280,14 @@ TEST_F(SingleFlightTest, StopsEverythingAtShutdown) {
   ASSERT_EQ(landings_.size(), 1u);
   EXPECT_EQ(landings_[0].tile.error().code, ErrorCode::kCancelled);
   io_.restart();
-  Join([](std::stop_token) -> Result<TilePtr> { return SomeTile(); }, Soon());
+  Join([](std::stop_token) -> Result<tiler::TilePtr> { return SomeTile(); }, Soon());
   io_.run();
   EXPECT_EQ(landings_[1].tile.error().code, ErrorCode::kUnavailable);
 }
 
 TEST_F(SingleFlightTest, RefusesWhatThePoolRefuses) {
   pool_.Shutdown();
-  Join([](std::stop_token) -> Result<TilePtr> { return SomeTile(); }, Soon());
+  Join([](std::stop_token) -> Result<tiler::TilePtr> { return SomeTile(); }, Soon());
   io_.run();
   ASSERT_EQ(landings_.size(), 1u);
   EXPECT_EQ(landings_[0].tile.error().code, ErrorCode::kUnavailable);

@@ -10,8 +10,8 @@
 namespace terrace::server {
 namespace {
 
-EncodedTile HeadTile() {
-  EncodedTile tile;
+tiler::EncodedTile HeadTile() {
+  tiler::EncodedTile tile;
   tile.bytes = "12345";
   tile.etag = "\"e\"";
   tile.max_error_m = 3.87;
@@ -19,10 +19,10 @@ EncodedTile HeadTile() {
 }
 
 TEST(TileHead, SaysWhatTheTileIs) {
-  TileRequest request;
-  request.format = TileFormat::kGlb;
-  request.coding = Coding::kGzip;
-  EncodedTile tile = HeadTile();
+  tiler::TileRequest request;
+  request.format = tiler::TileFormat::kGlb;
+  request.coding = tiler::Coding::kGzip;
+  tiler::EncodedTile tile = HeadTile();
   tile.certified_error_m = 9.5;
   EXPECT_EQ(MakeTileHead(request, tile).text,
             "Content-Type: model/gltf-binary\r\nContent-Encoding: gzip\r\nContent-Length: 5\r\n"
@@ -30,32 +30,32 @@ TEST(TileHead, SaysWhatTheTileIs) {
 }
 
 TEST(TileHead, NamesTheFormatWithItsExtensions) {
-  TileRequest request;
+  tiler::TileRequest request;
   request.normals = true;
   EXPECT_TRUE(MakeTileHead(request, HeadTile())
                   .text.starts_with("Content-Type: application/vnd.quantized-mesh;extensions=octvertexnormals\r\n"))
       << MakeTileHead(request, HeadTile()).text;
-  request.format = TileFormat::kHeightPng;
+  request.format = tiler::TileFormat::kHeightPng;
   EXPECT_TRUE(MakeTileHead(request, HeadTile()).text.starts_with("Content-Type: image/png\r\nContent-Length: 5\r\n"));
 }
 
 TEST(TileHead, PutsWhatDescribesTheBodyFirst) {
-  const HeadLines head = MakeTileHead({}, HeadTile());
+  const tiler::HeadLines head = MakeTileHead({}, HeadTile());
   EXPECT_EQ(head.text.substr(head.of_body), "ETag: \"e\"\r\nTerrain-Max-Error: 3.87\r\n");
 }
 
 // A tile has such an error where a source's own is not known.
 TEST(TileHead, LeavesAnErrorWithoutBoundUnsaid) {
-  EncodedTile tile = HeadTile();
+  tiler::EncodedTile tile = HeadTile();
   tile.certified_error_m = std::numeric_limits<double>::infinity();
   EXPECT_EQ(MakeTileHead({}, tile).text.find("Certified"), std::string::npos);
 }
 
 TEST(TileHead, CountsAmongATilesBytes) {
-  EncodedTile tile = HeadTile();
-  EXPECT_EQ(BytesOf(tile), 5u);
+  tiler::EncodedTile tile = HeadTile();
+  EXPECT_EQ(tiler::BytesOf(tile), 5u);
   tile.head = MakeTileHead({}, tile);
-  EXPECT_EQ(BytesOf(tile), 5u + tile.head.text.size());
+  EXPECT_EQ(tiler::BytesOf(tile), 5u + tile.head.text.size());
 }
 
 }  // namespace

@@ -22,9 +22,9 @@ std::shared_ptr<Catalog> CatalogOf(TileBuilder builder) {
   return catalog;
 }
 
-Result<EncodedTile> BuildEmpty(const TileRequest&, std::stop_token) { return EncodedTile(); }
+Result<tiler::EncodedTile> BuildEmpty(const tiler::TileRequest&, std::stop_token) { return tiler::EncodedTile(); }
 
-Result<ServedTile> Get(TileService& service, CatalogPtr catalog, TileRequest request = {}) {
+Result<ServedTile> Get(TileService& service, CatalogPtr catalog, tiler::TileRequest request = {}) {
   asio::io_context io(1);
   const auto deadline = TileService::Clock::now() + std::chrono::seconds(10);
   auto got = asio::co_spawn(io, service.Get(std::move(catalog), request, deadline), asio::use_future);
@@ -35,9 +35,9 @@ Result<ServedTile> Get(TileService& service, CatalogPtr catalog, TileRequest req
 TEST(TileService, BuildsOnceAndThenHits) {
   std::atomic<int> builds{0};
   TileService service({});
-  const CatalogPtr catalog = CatalogOf([&](const TileRequest&, std::stop_token) -> Result<EncodedTile> {
+  const CatalogPtr catalog = CatalogOf([&](const tiler::TileRequest&, std::stop_token) -> Result<tiler::EncodedTile> {
     ++builds;
-    return EncodedTile();
+    return tiler::EncodedTile();
   });
   EXPECT_EQ(Get(service, catalog)->cache, CacheStatus::kMiss);
   EXPECT_EQ(Get(service, catalog)->cache, CacheStatus::kHit);
@@ -49,9 +49,9 @@ TEST(TileService, BuildsOnceAndThenHits) {
 TEST(TileService, FindsWhatIsCachedAndBuildsNothing) {
   std::atomic<int> builds{0};
   TileService service({});
-  const CatalogPtr catalog = CatalogOf([&](const TileRequest&, std::stop_token) -> Result<EncodedTile> {
+  const CatalogPtr catalog = CatalogOf([&](const tiler::TileRequest&, std::stop_token) -> Result<tiler::EncodedTile> {
     ++builds;
-    return EncodedTile();
+    return tiler::EncodedTile();
   });
   EXPECT_FALSE(service.Find(*catalog, {}));
   EXPECT_EQ(builds, 0);
@@ -67,9 +67,9 @@ TEST(TileService, FindsWhatIsCachedAndBuildsNothing) {
 TEST(TileService, KeepsNoFailure) {
   std::atomic<int> builds{0};
   TileService service({});
-  const CatalogPtr catalog = CatalogOf([&](const TileRequest&, std::stop_token) -> Result<EncodedTile> {
+  const CatalogPtr catalog = CatalogOf([&](const tiler::TileRequest&, std::stop_token) -> Result<tiler::EncodedTile> {
     if (++builds == 1) return MakeError(ErrorCode::kUnavailable, "gone");
-    return EncodedTile();
+    return tiler::EncodedTile();
   });
   EXPECT_EQ(Get(service, catalog).error().code, ErrorCode::kUnavailable);
   EXPECT_TRUE(Get(service, catalog));
@@ -77,8 +77,8 @@ TEST(TileService, KeepsNoFailure) {
 
 TEST(TileService, TurnsExceptionsIntoUnavailable) {
   TileService service({});
-  const CatalogPtr catalog =
-      CatalogOf([](const TileRequest&, std::stop_token) -> Result<EncodedTile> { throw std::bad_alloc(); });
+  const CatalogPtr catalog = CatalogOf(
+      [](const tiler::TileRequest&, std::stop_token) -> Result<tiler::EncodedTile> { throw std::bad_alloc(); });
   EXPECT_EQ(Get(service, catalog).error().code, ErrorCode::kUnavailable);
 }
 
@@ -89,7 +89,7 @@ TEST(TileService, FindsTilesOfAGenerationInLaterCatalogs) {
   const auto shifted = CatalogOf(BuildEmpty);
   shifted->datasets.insert(shifted->datasets.begin(), DatasetView());
   shifted->datasets[0].generation = 7;
-  TileRequest request;
+  tiler::TileRequest request;
   EXPECT_EQ(Get(service, shifted, request)->cache, CacheStatus::kMiss) << "another dataset has the index now";
   request.dataset = 1;
   EXPECT_EQ(Get(service, shifted, request)->cache, CacheStatus::kHit);
@@ -118,15 +118,16 @@ TEST(TileService, ForgetsGenerationsThatAreGone) {
 
 TEST(TileService, TellsTheObserverAboutEveryBuild) {
   std::atomic<int> good{0}, bad{0};
-  TileService service({}, [&](const DatasetView& dataset, const Result<TilePtr>& tile) {
+  TileService service({}, [&](const DatasetView& dataset, const Result<tiler::TilePtr>& tile) {
     EXPECT_EQ(dataset.generation, 1u);
     ++(tile ? good : bad);
   });
-  const CatalogPtr catalog = CatalogOf([](const TileRequest& request, std::stop_token) -> Result<EncodedTile> {
-    if (request.key.x == 1) return MakeError(ErrorCode::kInternal, "no");
-    return EncodedTile();
-  });
-  TileRequest request;
+  const CatalogPtr catalog =
+      CatalogOf([](const tiler::TileRequest& request, std::stop_token) -> Result<tiler::EncodedTile> {
+        if (request.key.x == 1) return MakeError(ErrorCode::kInternal, "no");
+        return tiler::EncodedTile();
+      });
+  tiler::TileRequest request;
   ASSERT_TRUE(Get(service, catalog, request));
   ASSERT_TRUE(Get(service, catalog, request));
   request.key.x = 1;
@@ -135,7 +136,7 @@ TEST(TileService, TellsTheObserverAboutEveryBuild) {
   EXPECT_EQ(bad, 1);
 }
 
-Result<TilePtr> RunAlone(TileService& service, SingleFlight::Work work, TileService::Length length) {
+Result<tiler::TilePtr> RunAlone(TileService& service, SingleFlight::Work work, TileService::Length length) {
   asio::io_context io(1);
   auto ran = asio::co_spawn(
       io, service.Run(std::move(work), length, TileService::Clock::now() + std::chrono::seconds(10)), asio::use_future);
@@ -148,12 +149,12 @@ TEST(TileService, KeepsAWorkerForTilesBesideLongWork) {
   options.worker_threads = 2;
   TileService service(options);
   std::promise<void> begun, end;
-  const SingleFlight::Work work = [&](std::stop_token) -> Result<EncodedTile> {
+  const SingleFlight::Work work = [&](std::stop_token) -> Result<tiler::EncodedTile> {
     begun.set_value();
     end.get_future().wait();
-    return EncodedTile();
+    return tiler::EncodedTile();
   };
-  const SingleFlight::Work nothing = [](std::stop_token) -> Result<EncodedTile> { return EncodedTile(); };
+  const SingleFlight::Work nothing = [](std::stop_token) -> Result<tiler::EncodedTile> { return tiler::EncodedTile(); };
   auto first = std::async(std::launch::async, [&] { return RunAlone(service, work, TileService::Length::kLong); });
   begun.get_future().wait();
   auto second = std::async(std::launch::async, [&] { return RunAlone(service, nothing, TileService::Length::kLong); });

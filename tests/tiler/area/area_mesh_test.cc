@@ -1,0 +1,277 @@
+// Meshes of areas: what is in the file, and what is refused before anything is read.
+#include "tiler/area/area_mesh.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "engine/geo/ellipsoid.h"
+#include "tests/support/source_dir.h"
+
+namespace terrace::tiler {
+namespace {
+
+constexpr std::size_t kMany = 1'000'000;
+
+class AreaMeshTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    auto opened = dem::DemSource::Open(test_support::SourceDir() / "config/samples/jacksboro.tif");
+    ASSERT_TRUE(opened) << opened.error().message;
+    source_ = *std::move(opened);
+    area_ = {-84.25, 36.25, -84.2, 36.29, 5, proto::MeshFileFormat::kObj, AreaCoordinates::kGeographic};
+  }
+  EncodedTile Build(const AreaRequest& area) const {
+    const auto plan = PlanArea(*source_, 0.5, area, kMany);
+    EXPECT_TRUE(plan) << plan.error().message;
+    auto mesh = BuildAreaMesh(*source_, *plan, area, {});
+    EXPECT_TRUE(mesh) << mesh.error().message;
+    return *std::move(mesh);
+  }
+  std::string Refusal(const AreaRequest& area, std::size_t max_samples = kMany) const {
+    const auto plan = PlanArea(*source_, 0.5, area, max_samples);
+    EXPECT_FALSE(plan);
+    if (plan) return {};
+    EXPECT_EQ(plan.error().code, ErrorCode::kInvalidArgument);
+    return plan.error().message;
+  }
+
+  std::unique_ptr<dem::DemSource> source_;
+  AreaRequest area_;
+};
+
+struct ObjMesh {
+  std::vector<geo::Vec3> vertices;
+  std::vector<std::array<std::size_t, 3>> triangles;
+};
+
+ObjMesh ReadObj(const std::string& text) {
+  ObjMesh mesh;
+  std::istringstream in(text);
+  for (std::string line; std::getline(in, line);) {
+    std::istringstream words(line.size() > 2 ? line.substr(2) : "");
+    if (line.starts_with("v ")) {
+      geo::Vec3& v = mesh.vertices.emplace_back();
+      words >> v.x >> v.y >> v.z;
+    } else if (line.starts_with("f ")) {
+      auto& triangle = mesh.triangles.emplace_back();
+      words >> triangle[0] >> triangle[1] >> triangle[2];
+      for (std::size_t& corner : triangle) --corner;
+    }
+  }
+  return mesh;
+}
+
+double DoubledArea(geo::Vec3 a, geo::Vec3 b, geo::Vec3 c) {
+  return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
+}
+
+// The surface's height at a position, by looking at every triangle; NaN where there is none.
+double HeightAt(const ObjMesh& mesh, double x, double y) {
+  const geo::Vec3 p{x, y, 0};
+  for (const auto& [i, j, k] : mesh.triangles) {
+    const geo::Vec3 a = mesh.vertices[i], b = mesh.vertices[j], c = mesh.vertices[k];
+    const double all = DoubledArea(a, b, c), u = DoubledArea(p, b, c) / all, v = DoubledArea(a, p, c) / all;
+    constexpr double kEdge = -1e-6;
+    if (u >= kEdge && v >= kEdge && 1 - u - v >= kEdge) return u * a.z + v * b.z + (1 - u - v) * c.z;
+  }
+  return std::nan("");
+}
+
+TEST_F(AreaMeshTest, KeepsTheErrorAtEverySample) {
+  const auto plan = PlanArea(*source_, 0.5, area_, kMany);
+  ASSERT_TRUE(plan);
+  const auto heights = source_->ReadNodes(plan->level, plan->window);
+  ASSERT_TRUE(heights);
+  const EncodedTile encoded = Build(area_);
+  const ObjMesh mesh = ReadObj(encoded.bytes);
+  ASSERT_EQ(mesh.vertices.size(), encoded.vertices);
+  EXPECT_LT(encoded.vertices, heights->size() / 2);
+  const geo::Lattice lattice = source_->LatticeOf(plan->level);
+  double largest = 0;
+  for (int j = 0; j < plan->window.rows; ++j) {
+    for (int i = 0; i < plan->window.columns; ++i) {
+      const double surface =
+          HeightAt(mesh, lattice.Longitude(plan->window.column + i), lattice.Latitude(plan->window.row + j));
+      const double off = std::abs(surface - (*heights)[static_cast<std::size_t>(j * plan->window.columns + i)]);
+      ASSERT_LE(off, 5.001) << i << " " << j;  // NaN, a hole, fails as well
+      largest = std::max(largest, off);
+    }
+  }
+  EXPECT_NEAR(encoded.max_error_m, largest, 1e-4) << "what is stated is what is found";
+}
+
+TEST_F(AreaMeshTest, CoversTheAreaAndWindsUpwards) {
+  const ObjMesh mesh = ReadObj(Build(area_).bytes);
+  double west = 180, east = -180, south = 90, north = -90;
+  for (const geo::Vec3& v : mesh.vertices) {
+    west = std::min(west, v.x);
+    east = std::max(east, v.x);
+    south = std::min(south, v.y);
+    north = std::max(north, v.y);
+  }
+  const double step = 0.001;
+  EXPECT_TRUE(west <= area_.west && west > area_.west - step) << west;
+  EXPECT_TRUE(east >= area_.east && east < area_.east + step) << east;
+  EXPECT_TRUE(south <= area_.south && south > area_.south - step) << south;
+  EXPECT_TRUE(north >= area_.north && north < area_.north + step) << north;
+  for (const auto& [i, j, k] : mesh.triangles) {
+    ASSERT_GT(DoubledArea(mesh.vertices[i], mesh.vertices[j], mesh.vertices[k]), 0);
+  }
+}
+
+TEST_F(AreaMeshTest, LiesWhereItsCoordinatesSay) {
+  AreaRequest area = area_;
+  area.coordinates = AreaCoordinates::kEnu;
+  const EncodedTile local_file = Build(area);
+  area.coordinates = AreaCoordinates::kEcef;
+  const EncodedTile global_file = Build(area);
+  EXPECT_LE(local_file.max_error_m, 5.002);
+  EXPECT_LE(global_file.max_error_m, 5.002);
+  const ObjMesh local = ReadObj(local_file.bytes), global = ReadObj(global_file.bytes);
+  ASSERT_EQ(local.vertices.size(), global.vertices.size());
+  const auto plan = PlanArea(*source_, 0.5, area, kMany);
+  const double lon = plan->centre.longitude, lat = plan->centre.latitude;
+  EXPECT_NEAR(lon, -84.225, 1e-9);
+  EXPECT_NEAR(lat, 36.27, 1e-9);
+  const geo::Vec3 origin = geo::ToEcef(lon, lat, 0), up = geo::SurfaceNormal(lon, lat);
+  const geo::Vec3 east{-std::sin(geo::ToRadians(lon)), std::cos(geo::ToRadians(lon)), 0}, north = geo::Cross(up, east);
+  for (std::size_t i = 0; i < local.vertices.size(); ++i) {
+    const geo::Vec3 v = local.vertices[i];
+    const geo::Vec3 in_space = origin + east * v.x + north * v.y + up * v.z;
+    ASSERT_LT(geo::Length(in_space - global.vertices[i]), 0.002) << i;
+    ASSERT_GT(v.z, 200);
+    ASSERT_LT(v.z, 1100);
+  }
+}
+
+// Without the Earth's curvature two triangles would do for a plain, and be far below it.
+TEST_F(AreaMeshTest, LargeTrianglesDoNotCutThroughTheEarth) {
+  auto opened = dem::DemSource::Open(test_support::SourceDir() / "config/samples/etopo5.tif");
+  ASSERT_TRUE(opened) << opened.error().message;
+  source_ = *std::move(opened);
+  AreaRequest area{-30, 20, 30, 60, 2000, proto::MeshFileFormat::kGlb, AreaCoordinates::kEcef};
+  const EncodedTile encoded = Build(area);
+  EXPECT_LE(encoded.max_error_m, 2000.1);
+  EXPECT_GT(encoded.vertices, 100u);
+  area.coordinates = AreaCoordinates::kGeographic;
+  EXPECT_LT(Build(area).vertices, encoded.vertices);
+}
+
+// Triangles that go half around the Earth collapse into a line; one of them used to be measured as exact.
+TEST_F(AreaMeshTest, TheWholeEarthStaysRoundWhateverTheError) {
+  auto opened = dem::DemSource::Open(test_support::SourceDir() / "config/samples/etopo5.tif");
+  ASSERT_TRUE(opened) << opened.error().message;
+  source_ = *std::move(opened);
+  for (const AreaCoordinates coordinates : {AreaCoordinates::kEcef, AreaCoordinates::kEnu}) {
+    const EncodedTile encoded = Build({-180, -90, 180, 90, 1e300, proto::MeshFileFormat::kObj, coordinates});
+    EXPECT_GT(encoded.max_error_m, 1e5) << "a few dozen triangles are no sphere, and are not said to be one";
+    EXPECT_LE(encoded.max_error_m, 1e6);
+    EXPECT_GT(encoded.vertices, 20u);
+  }
+}
+
+// Near a pole parallels are small circles: triangles in space lie beside where they are in longitude and latitude.
+TEST_F(AreaMeshTest, KeepsTheErrorUpToThePole) {
+  auto opened = dem::DemSource::Open(test_support::SourceDir() / "config/samples/etopo5.tif");
+  ASSERT_TRUE(opened) << opened.error().message;
+  source_ = *std::move(opened);
+  for (const double error_m : {10.0, 50.0}) {
+    const EncodedTile encoded = Build({-20, 80, 20, 90, error_m, proto::MeshFileFormat::kObj, AreaCoordinates::kEcef});
+    EXPECT_LE(encoded.max_error_m, error_m + 0.01);
+  }
+}
+
+// Closer to the pole than a node's rounding: one row of cells, not less.
+TEST_F(AreaMeshTest, AreasAtThePoleHaveOneRowOfCells) {
+  auto opened = dem::DemSource::Open(test_support::SourceDir() / "config/samples/etopo5.tif");
+  ASSERT_TRUE(opened) << opened.error().message;
+  source_ = *std::move(opened);
+  AreaRequest area{0, 89.99999999999, 1, 90, 100, proto::MeshFileFormat::kGlb, AreaCoordinates::kEnu};
+  const auto north = PlanArea(*source_, 0.5, area, kMany);
+  ASSERT_TRUE(north) << north.error().message;
+  EXPECT_EQ(north->window.row, source_->LatticeOf(north->level).rows() - 1);
+  EXPECT_EQ(north->window.rows, 2);
+  area.south = -90;
+  area.north = -89.99999999999;
+  const auto south = PlanArea(*source_, 0.5, area, kMany);
+  ASSERT_TRUE(south) << south.error().message;
+  EXPECT_EQ(south->window.row, 0);
+  EXPECT_EQ(south->window.rows, 2);
+}
+
+TEST_F(AreaMeshTest, CrossesTheAntimeridian) {
+  auto opened = dem::DemSource::Open(test_support::SourceDir() / "config/samples/etopo5.tif");
+  ASSERT_TRUE(opened) << opened.error().message;
+  source_ = *std::move(opened);
+  const AreaRequest area{175, -20, 190, -10, 100, proto::MeshFileFormat::kObj, AreaCoordinates::kGeographic};
+  const ObjMesh mesh = ReadObj(Build(area).bytes);
+  double west = 1e9, east = -1e9;
+  for (const geo::Vec3& v : mesh.vertices) {
+    west = std::min(west, v.x);
+    east = std::max(east, v.x);
+  }
+  EXPECT_NEAR(west, 175, .2);
+  EXPECT_NEAR(east, 190, .2);
+}
+
+TEST_F(AreaMeshTest, SameRequestSameBytes) {
+  for (const proto::MeshFileFormat format :
+       {proto::MeshFileFormat::kGlb, proto::MeshFileFormat::kObj, proto::MeshFileFormat::kPly}) {
+    AreaRequest area = area_;
+    area.format = format;
+    area.coordinates = AreaCoordinates::kEnu;
+    const EncodedTile once = Build(area), again = Build(area);
+    EXPECT_EQ(once.bytes, again.bytes);
+    EXPECT_EQ(once.etag, again.etag);
+  }
+}
+
+TEST_F(AreaMeshTest, ClipsToTheDataset) {
+  AreaRequest area = area_;
+  area.west = -90;
+  area.north = 89;
+  area.error_m = 20;
+  for (const geo::Vec3& v : ReadObj(Build(area).bytes).vertices) {
+    ASSERT_GT(v.x, -84.43);
+    ASSERT_LT(v.y, 36.46);
+  }
+}
+
+TEST_F(AreaMeshTest, RefusesWhatItCannotMesh) {
+  AreaRequest area = area_;
+  EXPECT_NE(Refusal(area, 100).find("an error of"), std::string::npos) << "names the remedy";
+  EXPECT_NE(Refusal(area, 3).find("whatever the error"), std::string::npos);
+  area.west = 10;
+  area.east = 11;
+  EXPECT_NE(Refusal(area).find("outside the dataset"), std::string::npos);
+  area = area_;
+  area.south = -40;
+  area.north = -30;
+  EXPECT_NE(Refusal(area).find("outside the dataset"), std::string::npos);
+}
+
+// The error that a refusal names is one that works.
+TEST_F(AreaMeshTest, ItsRemedyIsOne) {
+  const std::string refusal = Refusal(area_, 500);
+  const std::size_t at = refusal.find("for an error of ");
+  ASSERT_NE(at, std::string::npos) << refusal;
+  AreaRequest area = area_;
+  area.error_m = std::stod(refusal.substr(at + 16));
+  EXPECT_TRUE(PlanArea(*source_, 0.5, area, 500)) << refusal;
+}
+
+TEST_F(AreaMeshTest, StopsWhenAsked) {
+  const auto plan = PlanArea(*source_, 0.5, area_, kMany);
+  std::stop_source stop;
+  stop.request_stop();
+  const auto mesh = BuildAreaMesh(*source_, *plan, area_, stop.get_token());
+  ASSERT_FALSE(mesh);
+  EXPECT_EQ(mesh.error().code, ErrorCode::kCancelled);
+}
+
+}  // namespace
+}  // namespace terrace::tiler

@@ -1,0 +1,76 @@
+#include "tiler/mesh/inner_vertices.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <functional>
+#include <vector>
+
+#include "engine/tin/greedy.h"
+#include "proto/tile_normals.h"
+#include "tiler/mesh/tile_mesher.h"
+
+namespace terrace::tiler {
+namespace {
+
+constexpr int kCells = 64;
+
+// A tile of 40 m a cell at 45 degrees north, its halo too.
+struct Ground {
+  explicit Ground(const std::function<float(int, int)>& height) {
+    for (int j = -1; j <= kCells + 1; ++j) {
+      for (int i = -1; i <= kCells + 1; ++i) heights.push_back(height(i, j));
+    }
+  }
+  proto::LatticeView view() const { return {key, {key.level, kCells}, heights}; }
+
+  const geo::TileKey key{12, 4096, 3072};
+  std::vector<float> heights;
+};
+
+tin::TinMesh MeshOf(const proto::LatticeView& lattice, double error) {
+  const tin::HeightField field = FieldOf(lattice);
+  tin::GreedyTriangulation greedy(field, {});
+  tin::GreedyGoal goal;
+  goal.max_error = error;
+  greedy.Run(goal);
+  return greedy.Mesh();
+}
+
+std::size_t Misfits(const proto::LatticeView& lattice, const tin::TinMesh& mesh) {
+  std::vector<geo::Vec3> positions;
+  for (const tin::SamplePosition p : mesh.vertices) {
+    positions.push_back(geo::ToEcef(lattice.Longitude(p.x), lattice.Latitude(p.y), lattice.At(p.x, p.y)));
+  }
+  return proto::CountMisfits(mesh, positions, proto::VertexNormals(lattice, mesh, positions));
+}
+
+// The last column of a tile is the end of a survey, level and 1,300 m above everything else.
+TEST(InnerVertices, LightFitsATileThatHasTheRimOfASurveyAlone) {
+  const Ground ground([](int i, int) { return i >= kCells ? 1300.0F : 0.0F; });
+  const proto::LatticeView lattice = ground.view();
+  const tin::TinMesh mesh = MeshOf(lattice, 1400);
+  ASSERT_GE(2 * Misfits(lattice, mesh), mesh.vertices.size()) << "what this is for";
+  const tin::TinMesh more = WithInnerVertices(lattice, mesh);
+  EXPECT_LT(2 * Misfits(lattice, more), more.vertices.size());
+  ASSERT_GE(more.vertices.size(), mesh.vertices.size());
+  EXPECT_TRUE(std::equal(mesh.vertices.begin(), mesh.vertices.end(), more.vertices.begin())) << "they come first";
+  const auto is_inside = [](tin::SamplePosition p) { return p.x > 0 && p.y > 0 && p.x < kCells && p.y < kCells; };
+  EXPECT_TRUE(std::all_of(more.vertices.begin() + static_cast<std::ptrdiff_t>(mesh.vertices.size()),
+                          more.vertices.end(), is_inside));
+}
+
+TEST(InnerVertices, ATileThatIsLitWellStaysAsItIs) {
+  for (const auto& height :
+       {std::function<float(int, int)>([](int, int) { return 7.0F; }),
+        std::function<float(int, int)>([](int i, int j) { return static_cast<float>(3 * i + j); }),
+        std::function<float(int, int)>([](int i, int j) { return static_cast<float>((i * 37 + j * 101) % 50); })}) {
+    const Ground ground(height);
+    const tin::TinMesh mesh = MeshOf(ground.view(), 5);
+    EXPECT_EQ(WithInnerVertices(ground.view(), mesh).vertices.size(), mesh.vertices.size());
+  }
+}
+
+}  // namespace
+}  // namespace terrace::tiler

@@ -1,0 +1,231 @@
+// The whole worker path on the shipped samples: promises 1 and 2 of the contract, measured on decoded bytes.
+#include "tiler/tile_pipeline.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <iomanip>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "engine/geo/error_ladder.h"
+#include "tests/support/scratch_directory.h"
+#include "tests/tiler/fetched_tile.h"
+
+namespace terrace::tiler {
+namespace {
+
+const TilePipeline& Samples() {
+  static const TilePipeline* const pipeline = [] {
+    std::vector<Dataset> datasets;
+    datasets.push_back(OpenSample("etopo5"));
+    datasets.push_back(OpenSample("jacksboro"));
+    return new TilePipeline(std::move(datasets));
+  }();
+  return *pipeline;
+}
+
+FetchedTile Fetch(std::uint32_t dataset, geo::TileKey key, int step) {
+  TileRequest request;
+  request.dataset = dataset;
+  request.key = key;
+  request.error_step = step;
+  return FetchTile(Samples(), request);
+}
+
+geo::TileKey MiddleTile(std::uint32_t dataset, int level) {
+  const geo::TileRange& range = Samples().datasets()[dataset].source->Available(level).front();
+  return {level, (range.start_x + range.end_x) / 2, (range.start_y + range.end_y) / 2};
+}
+
+TEST(TilePipeline, NeighboursDecodeTheSameEdges) {
+  for (const std::uint32_t dataset : {0u, 1u}) {
+    for (const int step : {-8, 0, 6, 12, 24}) {
+      for (int level = 1; level <= Samples().datasets()[dataset].source->max_level(); level += 2) {
+        const geo::TileKey key = MiddleTile(dataset, level);
+        const FetchedTile tile = Fetch(dataset, key, step);
+        const geo::TileKey east = geo::Neighbour(key, 1, 0), north = geo::Neighbour(key, 0, 1);
+        if (Samples().datasets()[dataset].source->IsAvailable(east)) {
+          EXPECT_EQ(EdgeOf(tile, true, 32767), EdgeOf(Fetch(dataset, east, step), true, 0))
+              << geo::ToString(key) << " step " << step;
+        }
+        if (Samples().datasets()[dataset].source->IsAvailable(north)) {
+          EXPECT_EQ(EdgeOf(tile, false, 32767), EdgeOf(Fetch(dataset, north, step), false, 0))
+              << geo::ToString(key) << " step " << step;
+        }
+      }
+    }
+  }
+}
+
+TEST(TilePipeline, MatchesAcrossTheAntimeridianAndAtThePoles) {
+  for (const int level : {0, 1, 3, 5}) {
+    for (const std::int64_t y : {std::int64_t{0}, geo::TileRows(level) / 2, geo::TileRows(level) - 1}) {
+      const geo::TileKey west{level, geo::TileColumns(level) - 1, y}, east{level, 0, y};
+      EXPECT_EQ(EdgeOf(Fetch(0, west, 0), true, 32767), EdgeOf(Fetch(0, east, 0), true, 0)) << level << "/" << y;
+    }
+  }
+}
+
+TEST(TilePipeline, ReachesTheLadderError) {
+  for (const std::uint32_t dataset : {0u, 1u}) {
+    for (const int step : {-8, 0, 8}) {
+      for (int level = 0; level <= Samples().datasets()[dataset].source->max_level(); ++level) {
+        const FetchedTile tile = Fetch(dataset, MiddleTile(dataset, level), step);
+        // Of heights that are rounded to 2^-10 m: the ground may be half of that further off.
+        EXPECT_LE(tile.encoded.max_error_m + 0x1p-11, geo::LadderError(level, step))
+            << dataset << " level " << level << " step " << step;
+      }
+    }
+  }
+}
+
+TEST(TilePipeline, GivesTheSameBytesOnEveryThread) {
+  const geo::TileKey key = MiddleTile(1, 11);
+  const EncodedTile expected = Fetch(1, key, 4).encoded;
+  std::vector<std::thread> threads;
+  for (int k = 0; k < 4; ++k) {
+    threads.emplace_back([&] { EXPECT_EQ(Fetch(1, key, 4).encoded.bytes, expected.bytes); });
+  }
+  for (std::thread& thread : threads) thread.join();
+}
+
+// Neighbours of every error match and keep it by any rules.
+TEST(TilePipeline, KeepsErrorsAndEdgesByEveryRule) {
+  for (const tin::Criterion criterion : {tin::Criterion::kDelaunay, tin::Criterion::kDataDependent}) {
+    for (const bool compact : {false, true}) {
+      if (criterion == tin::Criterion::kDelaunay && !compact) continue;
+      std::vector<Dataset> datasets;
+      datasets.push_back(OpenSample("jacksboro"));
+      datasets.back().rules = {criterion, compact};
+      const TilePipeline pipeline(std::move(datasets));
+      for (const int level : {7, 10, 12}) {
+        for (const int step : {0, 10}) {
+          TileRequest request;
+          request.key = MiddleTile(1, level);
+          request.error_step = step;
+          const auto tile = pipeline.Build(request, {});
+          ASSERT_TRUE(tile.has_value()) << tile.error().message;
+          EXPECT_LE(tile->max_error_m, geo::LadderError(level, step));
+          const FetchedTile plain = Fetch(1, request.key, step);
+          if (plain.encoded.vertices > 500) {
+            EXPECT_LT(tile->vertices, plain.encoded.vertices) << level << " step " << step;
+          }
+          // Edges do not know how the inside is meshed.
+          const FetchedTile fetched = FetchTile(pipeline, request);
+          for (const bool vertical : {true, false}) {
+            EXPECT_EQ(EdgeOf(fetched, vertical, 0), EdgeOf(plain, vertical, 0));
+            EXPECT_EQ(EdgeOf(fetched, vertical, 32767), EdgeOf(plain, vertical, 32767));
+          }
+        }
+      }
+    }
+  }
+}
+
+// The cached refinement serves coarser errors, is continued for finer ones, and never shows in the bytes.
+TEST(TilePipeline, GivesTheSameBytesFromScratchFromReplayAndContinued) {
+  const auto open = [](std::size_t cache_bytes) {
+    std::vector<Dataset> datasets;
+    datasets.push_back(OpenSample("etopo5"));
+    datasets.push_back(OpenSample("jacksboro"));
+    return std::make_unique<TilePipeline>(std::move(datasets), cache_bytes);
+  };
+  const auto scratch = open(0), cached = open(std::size_t{64} << 20);
+  for (const std::uint32_t dataset : {0u, 1u}) {
+    for (int level = 0; level <= Samples().datasets()[dataset].source->max_level(); level += 3) {
+      TileRequest request;
+      request.dataset = dataset;
+      request.key = MiddleTile(dataset, level);
+      for (const int step : {0, 8, 4, 20, -6, 24}) {
+        request.error_step = step;
+        const auto expected = scratch->Build(request, {}), tile = cached->Build(request, {});
+        ASSERT_TRUE(expected.has_value() && tile.has_value());
+        ASSERT_EQ(tile->bytes, expected->bytes) << dataset << "/" << geo::ToString(request.key) << " step " << step;
+        ASSERT_EQ(tile->max_error_m, expected->max_error_m);
+      }
+      // Everything was made from one read.
+      request.coding = Coding::kGzip;
+      request.normals = true;
+      EXPECT_EQ(cached->Build(request, {})->times.read.count(), 0);
+    }
+  }
+  EXPECT_EQ(scratch->refinements().entries, 0u);
+  EXPECT_GT(cached->refinements().entries, 5u);
+}
+
+// A raster of level 5's own lattice: cliffs in tile 32/16, flat ground east of it.
+std::unique_ptr<dem::DemSource> OpenCliffs(const std::filesystem::path& folder) {
+  constexpr double kStep = 5.625 / 256;
+  constexpr int kColumns = 516, kRows = 260;
+  const std::string path = folder / "cliffs.img";
+  std::vector<float> heights;
+  std::uint32_t state = 1;
+  for (int j = 0; j < kRows; ++j) {
+    for (int i = 0; i < kColumns; ++i) {
+      state = state * 1664525 + 1013904223;
+      heights.push_back(i >= 1 && i < 257 ? static_cast<float>(state >> 18) : 0);
+    }
+  }
+  std::ofstream(path, std::ios::binary)
+      .write(reinterpret_cast<const char*>(heights.data()),
+             static_cast<std::streamsize>(heights.size() * sizeof(float)));
+  std::ofstream(folder / "cliffs.hdr")
+      << "ENVI\nsamples = " << kColumns << "\nlines = " << kRows
+      << "\nbands = 1\ndata type = 4\ninterleave = bsq\nbyte order = 0\nmap info = {Geographic Lat/Lon, 1, 1, "
+      << std::setprecision(17) << -1.5 * kStep << ", " << 5.625 + 1.5 * kStep << ", " << kStep << ", " << kStep
+      << ", WGS-84}\n";
+  auto source = dem::DemSource::Open(path);
+  EXPECT_TRUE(source.has_value()) << (source ? "" : source.error().message);
+  return source ? *std::move(source) : nullptr;
+}
+
+// The seeds on an edge are those of the error that was asked for, however coarse the inside has to be.
+TEST(TilePipeline, MatchesEdgesOfTilesThatTheFormatCannotHold) {
+  const test_support::ScratchDirectory scratch;
+  std::vector<Dataset> datasets(1);
+  datasets[0].source = OpenCliffs(scratch.path());
+  ASSERT_NE(datasets[0].source, nullptr);
+  const TilePipeline pipeline(std::move(datasets));
+  TileRequest request;
+  request.error_step = 24;
+  request.normals = true;
+  Edge edges[2];
+  for (const int k : {0, 1}) {
+    request.key = {5, 32 + k, 16};
+    const auto tile = pipeline.Build(request, {});
+    ASSERT_TRUE(tile.has_value()) << tile.error().message;
+    if (k == 0) {
+      EXPECT_GT(tile->max_error_m, geo::LadderError(5, 24));  // else this tests nothing
+    }
+    edges[k] = EdgeOf({*proto::DecodeQuantizedMesh(tile->bytes), *tile}, true, k == 0 ? 32767 : 0);
+  }
+  EXPECT_GT(edges[0].size(), 2u);
+  EXPECT_EQ(edges[0], edges[1]);
+}
+
+TEST(TilePipeline, RefusesWhatIsNotThere) {
+  TileRequest request;
+  request.dataset = 7;
+  EXPECT_EQ(Samples().Build(request, {}).error().code, ErrorCode::kNotFound);
+  request.dataset = 1;
+  request.key = {13, 0, 0};
+  EXPECT_EQ(Samples().Build(request, {}).error().code, ErrorCode::kNotFound);
+}
+
+TEST(TilePipeline, StopsWhenNobodyWaits) {
+  std::stop_source stop;
+  stop.request_stop();
+  TileRequest request;
+  request.dataset = 1;
+  request.key = MiddleTile(1, 10);
+  EXPECT_EQ(Samples().Build(request, stop.get_token()).error().code, ErrorCode::kCancelled);
+}
+
+}  // namespace
+}  // namespace terrace::tiler

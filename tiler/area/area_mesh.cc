@@ -1,0 +1,209 @@
+#include "tiler/area/area_mesh.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <optional>
+#include <sstream>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "engine/core/check.h"
+#include "engine/geo/ellipsoid.h"
+#include "engine/geo/error_ladder.h"
+#include "engine/tin/greedy.h"
+#include "engine/tin/height_field.h"
+#include "engine/tin/insert_samples.h"
+#include "engine/tin/mesh_error.h"
+#include "tiler/area/area_surface.h"
+#include "tiler/strong_etag.h"
+
+namespace terrace::tiler {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// Flat triangles that are farther off than this are those that go half around the Earth and collapse into a line.
+constexpr double kMostSag_m = 1e6;
+
+// The part of the area inside the source's bounds; of two parts the wider one. Nothing where they do not meet.
+std::optional<AreaRequest> Clip(const AreaRequest& area, const dem::GeoBounds& bounds) {
+  const double bounds_east = bounds.east < bounds.west ? bounds.east + 360 : bounds.east;
+  AreaRequest best = area;
+  const bool all_around = bounds_east - bounds.west >= 360;
+  if (!all_around) best.west = best.east = 0;
+  for (const double turn : {-360.0, 0.0, 360.0}) {
+    const double west = std::max(area.west, bounds.west + turn), east = std::min(area.east, bounds_east + turn);
+    if (all_around || east - west <= best.east - best.west) continue;
+    best.west = west;
+    best.east = east;
+  }
+  best.south = std::max(area.south, bounds.south);
+  best.north = std::min(area.north, bounds.north);
+  if (best.east <= best.west || best.north <= best.south) return std::nullopt;
+  return best;
+}
+
+dem::NodeWindow WindowAt(const geo::Lattice& lattice, const AreaRequest& area) {
+  const double step = lattice.StepDegrees();
+  // A node that lies on the area's edge but for the last bits is its edge.
+  constexpr double kSlack = 1e-6;
+  const auto first = [&](double degrees) { return static_cast<std::int64_t>(std::floor(degrees / step + kSlack)); };
+  const auto last = [&](double degrees) { return static_cast<std::int64_t>(std::ceil(degrees / step - kSlack)); };
+  const std::int64_t west = first(area.west + 180), east = std::max(last(area.east + 180), west + 1);
+  const std::int64_t south = std::clamp<std::int64_t>(first(area.south + 90), 0, lattice.rows() - 1);
+  const std::int64_t north = std::clamp<std::int64_t>(last(area.north + 90), south + 1, lattice.rows());
+  // Counts that an int does not hold are far above every limit.
+  const auto count = [](std::int64_t from, std::int64_t to) {
+    return static_cast<int>(std::min<std::int64_t>(to - from + 1, 1 << 30));
+  };
+  return {west, south, count(west, east), count(south, north)};
+}
+
+double SamplesOf(const dem::NodeWindow& window) { return static_cast<double>(window.columns) * window.rows; }
+
+bool Fits(const dem::NodeWindow& window, std::size_t max_samples) {
+  return SamplesOf(window) <= static_cast<double>(max_samples) &&
+         std::max(window.columns, window.rows) <= tin::HeightField::kMaxSide;
+}
+
+tl::unexpected<Error> TooLarge(const dem::DemSource& source, double error_fraction, const AreaRequest& area,
+                               const AreaPlan& plan, std::size_t max_samples) {
+  for (int level = plan.level - 1; level >= 0; --level) {
+    if (!Fits(WindowAt(source.LatticeOf(level), area), max_samples)) continue;
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "at an error of {} m this area has {} x {} samples, more than the {} that are meshed at once; ask "
+                     "for a smaller area, or for an error of {:.0f} m or more",
+                     area.error_m, plan.window.columns, plan.window.rows, max_samples,
+                     std::ceil(geo::DefaultError(level, error_fraction)));
+  }
+  return MakeError(ErrorCode::kInvalidArgument,
+                   "this area has more than the {} samples that are meshed at once, whatever the error; ask for a "
+                   "smaller area",
+                   max_samples);
+}
+
+struct Frame {
+  geo::Vec3 origin, east, north, up;
+
+  static Frame At(const dem::GeoPosition& centre) {
+    const geo::Vec3 up = geo::SurfaceNormal(centre.longitude, centre.latitude);
+    const geo::Vec3 meridian = geo::SurfaceNormal(centre.longitude, 0);
+    const geo::Vec3 east{-meridian.y, meridian.x, 0};
+    return {geo::ToEcef(centre.longitude, centre.latitude, 0), east, geo::Cross(up, east), up};
+  }
+  geo::Vec3 ToLocal(geo::Vec3 ecef) const {
+    const geo::Vec3 d = ecef - origin;
+    return {geo::Dot(d, east), geo::Dot(d, north), geo::Dot(d, up)};
+  }
+  geo::Vec3 ToEcef(geo::Vec3 local) const { return origin + east * local.x + north * local.y + up * local.z; }
+};
+
+struct PlacedMesh {
+  std::vector<proto::MeshVertex> vertices;
+  double max_error_m = 0;
+};
+
+PlacedMesh PlaceFlat(const tin::HeightField& field, const tin::TinMesh& mesh, const AreaSurface& surface,
+                     const std::stop_token& stop) {
+  PlacedMesh placed;
+  for (const tin::SamplePosition p : mesh.vertices) {
+    const dem::GeoPosition at = surface.At(p.x, p.y);
+    placed.vertices.push_back({at.longitude, at.latitude, field.VertexHeight(p.x, p.y)});
+  }
+  placed.max_error_m = tin::MeasureError(field, mesh, stop).max;
+  return placed;
+}
+
+// The mesh was refined in longitude and latitude. In space its triangles lie beside where they were drawn, by the
+// curvature of the parallels: little, but at a cliff or next to a pole that can be more than the bound. Inserts what is
+// over it.
+PlacedMesh PlaceInSpace(const tin::HeightField& field, tin::TinMesh& mesh, const AreaSurface& surface,
+                        const std::optional<Frame>& frame, double bound_m, const std::stop_token& stop) {
+  constexpr int kMaxRounds = 16;          // as for tiles
+  constexpr double kRounding_m = 0x1p-8;  // what RoundPosition may take on a steep slope: no vertex mends that
+  tin::SampleInserter inserter;
+  for (int round = 1;; ++round) {
+    PlacedMesh placed;
+    std::vector<geo::Vec3> ecef;
+    for (const tin::SamplePosition p : mesh.vertices) {
+      const geo::Vec3 exact = surface.Ecef(p.x, p.y, field.VertexHeight(p.x, p.y));
+      const geo::Vec3 rounded = RoundPosition(frame ? frame->ToLocal(exact) : exact);
+      placed.vertices.push_back({rounded.x, rounded.y, rounded.z});
+      ecef.push_back(frame ? frame->ToEcef(rounded) : rounded);
+    }
+    const AreaSurface::Error error = surface.MeasureError(field, mesh, ecef, std::max(bound_m, kRounding_m), stop);
+    if (error.misses.empty() || round == kMaxRounds || stop.stop_requested()) {
+      placed.max_error_m = RoundPosition({error.max_m, 0, 0}).x;
+      return placed;
+    }
+    inserter.InsertInto(mesh, error.misses);
+  }
+}
+
+}  // namespace
+
+Result<AreaPlan> PlanArea(const dem::DemSource& source, double error_fraction, const AreaRequest& area,
+                          std::size_t max_samples) {
+  const dem::GeoBounds& bounds = source.info().bounds;
+  const std::optional<AreaRequest> clipped = Clip(area, bounds);
+  if (!clipped) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "bbox lies outside the dataset, whose bounds are {:.6f},{:.6f},{:.6f},{:.6f}", bounds.west,
+                     bounds.south, bounds.east, bounds.north);
+  }
+  AreaPlan plan;
+  while (plan.level < source.max_level() && geo::DefaultError(plan.level, error_fraction) > area.error_m) ++plan.level;
+  plan.window = WindowAt(source.LatticeOf(plan.level), *clipped);
+  plan.centre = {(clipped->west + clipped->east) / 2, (clipped->south + clipped->north) / 2};
+  if (!Fits(plan.window, max_samples)) return TooLarge(source, error_fraction, *clipped, plan, max_samples);
+  return plan;
+}
+
+Result<EncodedTile> BuildAreaMesh(const dem::DemSource& source, const AreaPlan& plan, const AreaRequest& area,
+                                  std::stop_token stop) {
+  const auto cancelled = [] { return MakeError(ErrorCode::kCancelled, "nobody waits for this mesh any more"); };
+  EncodedTile encoded;
+  encoded.refinement = RefinementUse::kNone;
+  Clock::time_point start = Clock::now();
+  Result<std::vector<float>> heights = source.ReadNodes(plan.level, plan.window, stop);
+  if (!heights) return tl::unexpected(std::move(heights).error());
+  encoded.times.read = MicrosecondsSince(start);
+
+  start = Clock::now();
+  const auto field = tin::HeightField::Make(plan.window.columns, plan.window.rows, *std::move(heights));
+  TERRACE_CHECK(field.has_value());  // every height is finite, and PlanArea limits the sides
+  const AreaSurface surface(source.LatticeOf(plan.level), plan.window);
+  tin::GreedyOptions options;
+  if (area.coordinates != AreaCoordinates::kGeographic) surface.AddCurvature(options);
+  tin::GreedyTriangulation greedy(*field, std::move(options));
+  const double bound_m =
+      area.coordinates == AreaCoordinates::kGeographic ? area.error_m : std::min(area.error_m, kMostSag_m);
+  tin::GreedyGoal goal;
+  goal.max_error = bound_m;
+  if (!greedy.Run(goal, stop)) return cancelled();
+  tin::TinMesh mesh = greedy.Mesh();
+  encoded.times.refine = MicrosecondsSince(start);
+
+  start = Clock::now();
+  std::optional<Frame> frame;
+  if (area.coordinates == AreaCoordinates::kEnu) frame = Frame::At(plan.centre);
+  const PlacedMesh placed = area.coordinates == AreaCoordinates::kGeographic
+                                ? PlaceFlat(*field, mesh, surface, stop)
+                                : PlaceInSpace(*field, mesh, surface, frame, bound_m, stop);
+  if (stop.stop_requested()) return cancelled();
+  std::ostringstream out;
+  if (auto written = proto::WriteMesh(out, area.format, placed.vertices, mesh.triangles, {}, stop); !written) {
+    return tl::unexpected(std::move(written).error());
+  }
+  encoded.bytes = std::move(out).str();
+  encoded.times.encode = MicrosecondsSince(start);
+  encoded.etag = StrongETag(encoded.bytes);
+  encoded.max_error_m = placed.max_error_m;
+  encoded.vertices = static_cast<std::uint32_t>(mesh.vertices.size());
+  encoded.triangles = static_cast<std::uint32_t>(mesh.triangles.size());
+  return encoded;
+}
+
+}  // namespace terrace::tiler

@@ -1,0 +1,47 @@
+// One mesh of an area of interest, as a file that other programs open.
+#pragma once
+
+#include <cstdint>
+#include <stop_token>
+
+#include "engine/core/result.h"
+#include "engine/dem/dem_source.h"
+#include "proto/mesh_file.h"
+#include "tiler/encoded_tile.h"
+
+namespace terrace::tiler {
+
+enum class AreaCoordinates : std::uint8_t {
+  kEnu,        // metres east, north and up of the area's centre on the ellipsoid
+  kEcef,       // EPSG:4978
+  kGeographic  // degrees east and north, metres up
+};
+
+// Degrees, -180 <= west <= 180, west < east <= west + 360 (beyond 180 across the antimeridian), -90 <= south < north
+// <= 90.
+struct AreaRequest {
+  double west = 0, south = 0, east = 0, north = 0;
+  double error_m = 1;
+  proto::MeshFileFormat format = proto::MeshFileFormat::kGlb;
+  AreaCoordinates coordinates = AreaCoordinates::kEnu;
+};
+
+// The samples that an area is meshed from: nodes of the lattice of the first level whose default error is at most the
+// one asked for, or of the deepest level; the area is clipped to the source's bounds, then widened to whole cells.
+struct AreaPlan {
+  int level = 0;
+  dem::NodeWindow window;
+  dem::GeoPosition centre;  // of the clipped area: the origin of kEnu
+};
+
+// kInvalidArgument, with a message for the client: the area does not meet the source, or needs more than `max_samples`.
+Result<AreaPlan> PlanArea(const dem::DemSource& source, double error_fraction, const AreaRequest& area,
+                          std::size_t max_samples);
+
+// Reads, meshes, measures and encodes. EncodedTile::max_error_m is measured at every sample, along the vertical, on the
+// flat triangles of the positions in the file (on those of longitude, latitude and height for kGeographic), before a
+// GLB's rounding to 32 bits. Errors: those of PlanArea and DemSource; kCancelled: stopped.
+Result<EncodedTile> BuildAreaMesh(const dem::DemSource& source, const AreaPlan& plan, const AreaRequest& area,
+                                  std::stop_token stop);
+
+}  // namespace terrace::tiler

@@ -1,0 +1,134 @@
+#include "tiler/area/area_surface.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <iterator>
+#include <numeric>
+#include <optional>
+
+#include "engine/tin/triangle_rows.h"
+
+namespace terrace::tiler {
+namespace {
+
+constexpr double kSmallestRadius = geo::kSemiMinorAxis * geo::kSemiMinorAxis / geo::kSemiMajorAxis;
+constexpr double kLargestRadius = geo::kSemiMajorAxis * geo::kSemiMajorAxis / geo::kSemiMinorAxis;
+constexpr std::size_t kStopPeriod = 1024;  // triangles
+
+// Rotated from longitude 0 to that of the equatorial unit vector.
+geo::Vec3 Turned(geo::Vec3 at_zero, geo::Vec3 equatorial) {
+  return {at_zero.x * equatorial.x, at_zero.x * equatorial.y, at_zero.z};
+}
+
+double DistanceToSegment(geo::Vec3 point, geo::Vec3 a, geo::Vec3 b) {
+  const geo::Vec3 along = b - a, to_point = point - a;
+  const double squared = geo::Dot(along, along);
+  const double share = squared > 0 ? std::clamp(geo::Dot(to_point, along) / squared, 0.0, 1.0) : 0;
+  return geo::Length(to_point - along * share);
+}
+
+// In space.
+class FlatTriangle {
+ public:
+  FlatTriangle(geo::Vec3 a, geo::Vec3 b, geo::Vec3 c) : a_(a), b_(b), c_(c), plane_(geo::Cross(b - a, c - a)) {}
+
+  // How far a point is from the plane, along `up`. At a pole, where meridians meet, a triangle can shrink to a line
+  // that no vertical meets: then how far the point is from that.
+  double Off(geo::Vec3 point, geo::Vec3 up) const {
+    const double off = std::abs(geo::Dot(a_ - point, plane_) / geo::Dot(up, plane_));
+    if (std::isfinite(off)) return off;
+    return std::min(
+        {DistanceToSegment(point, a_, b_), DistanceToSegment(point, b_, c_), DistanceToSegment(point, c_, a_)});
+  }
+
+ private:
+  const geo::Vec3 a_, b_, c_, plane_;
+};
+
+}  // namespace
+
+AreaSurface::AreaSurface(const geo::Lattice& lattice, const dem::NodeWindow& window)
+    : lattice_(lattice), window_(window) {
+  for (int i = 0; i < window.columns; ++i) column_normals_.push_back(geo::SurfaceNormal(At(i, 0).longitude, 0));
+  for (int j = 0; j < window.rows; ++j) {
+    const double latitude = At(0, j).latitude;
+    row_normals_.push_back(geo::SurfaceNormal(0, latitude));
+    row_feet_.push_back(geo::ToEcef(0, latitude, 0));
+  }
+}
+
+dem::GeoPosition AreaSurface::At(int column, int row) const {
+  return {-180 + static_cast<double>(window_.column + column) * lattice_.StepDegrees(),
+          lattice_.Latitude(window_.row + row)};
+}
+
+geo::Vec3 AreaSurface::Up(int column, int row) const {
+  return Turned(row_normals_[static_cast<std::size_t>(row)], column_normals_[static_cast<std::size_t>(column)]);
+}
+
+geo::Vec3 AreaSurface::Ecef(int column, int row, double height_m) const {
+  const geo::Vec3 foot =
+      Turned(row_feet_[static_cast<std::size_t>(row)], column_normals_[static_cast<std::size_t>(column)]);
+  return foot + Up(column, row) * height_m;
+}
+
+void AreaSurface::AddCurvature(tin::GreedyOptions& options) const {
+  const double step = lattice_.StepDegrees(), radians = geo::ToRadians(step);
+  std::vector<double>& east = options.curvature.east_m2;
+  for (int j = 0; j < window_.rows; ++j) {
+    const double metres = geo::MetresPerDegreeEast(At(0, j).latitude) * step;
+    east.push_back(metres * metres);
+  }
+  // Near the equator neighbouring rows differ by less than the rounding of their sines; Curvature wants them to rise to
+  // the widest and fall from there.
+  const auto wider = [](double a, double b) { return std::max(a, b); };
+  const auto widest = std::max_element(east.begin(), east.end());
+  std::inclusive_scan(east.begin(), widest, east.begin(), wider);
+  std::inclusive_scan(east.rbegin(), std::make_reverse_iterator(widest), east.rbegin(), wider);
+  options.curvature.north_m2 = radians * kLargestRadius * radians * kLargestRadius;
+  options.curvature.radius_m = kSmallestRadius;
+  for (const tin::Side side : {tin::Side::kSouth, tin::Side::kEast, tin::Side::kNorth, tin::Side::kWest}) {
+    const bool is_parallel = side == tin::Side::kSouth || side == tin::Side::kNorth;
+    const double latitude = At(0, side == tin::Side::kSouth ? 0 : window_.rows - 1).latitude;
+    const double cosine = geo::SurfaceNormal(0, latitude).x;
+    const double radius = is_parallel ? geo::PrimeVerticalRadius(latitude) * cosine * cosine : kLargestRadius;
+    options.borders[static_cast<std::size_t>(side)].sagitta_m = radians * radians * radius / 2;
+  }
+}
+
+AreaSurface::Error AreaSurface::MeasureError(const tin::HeightField& field, const tin::TinMesh& mesh,
+                                             const std::vector<geo::Vec3>& ecef, double bound_m,
+                                             const std::stop_token& stop) const {
+  Error error;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    if (t % kStopPeriod == 0 && stop.stop_requested()) break;
+    const auto& triangle = mesh.triangles[t];
+    const FlatTriangle flat(ecef[triangle[0]], ecef[triangle[1]], ecef[triangle[2]]);
+    const std::array<tin::SamplePosition, 3> corners = {mesh.vertices[triangle[0]], mesh.vertices[triangle[1]],
+                                                        mesh.vertices[triangle[2]]};
+    std::optional<tin::SamplePosition> miss;
+    double worst = bound_m;
+    tin::ForEachRow(corners, [&](int row, int first, int last) {
+      for (int column = first; column <= last; ++column) {
+        const double off = flat.Off(Ecef(column, row, field.At(column, row)), Up(column, row));
+        error.max_m = std::max(error.max_m, off);
+        if (off <= worst || !IsInside(column, row)) continue;
+        const tin::SamplePosition sample{static_cast<std::uint16_t>(column), static_cast<std::uint16_t>(row)};
+        if (std::find(corners.begin(), corners.end(), sample) != corners.end()) continue;
+        worst = off;
+        miss = sample;
+      }
+    });
+    if (miss) error.misses.push_back(*miss);
+  }
+  return error;
+}
+
+geo::Vec3 RoundPosition(geo::Vec3 metres) {
+  const auto round = [](double value) { return std::nearbyint(value * 1024) / 1024; };
+  return {round(metres.x), round(metres.y), round(metres.z)};
+}
+
+}  // namespace terrace::tiler

@@ -1,0 +1,54 @@
+// Where the samples of an area lie in space, and how far flat triangles between them are from the ground.
+#pragma once
+
+#include <stop_token>
+#include <vector>
+
+#include "engine/dem/dem_source.h"
+#include "engine/geo/ellipsoid.h"
+#include "engine/geo/lattice.h"
+#include "engine/tin/greedy.h"
+#include "engine/tin/height_field.h"
+#include "engine/tin/tin_mesh.h"
+#include "proto/mesh_file.h"
+
+namespace terrace::tiler {
+
+// Rows from the south, columns from the west. Immutable and thread-safe.
+class AreaSurface {
+ public:
+  AreaSurface(const geo::Lattice& lattice, const dem::NodeWindow& window);
+
+  // Degrees; longitudes may lie beyond +-180.
+  dem::GeoPosition At(int column, int row) const;
+  // Metres, ECEF.
+  geo::Vec3 Ecef(int column, int row, double height_m) const;
+
+  // What the curved Earth takes from flat triangles, for the run that makes the mesh.
+  void AddCurvature(tin::GreedyOptions& options) const;
+
+  struct Error {
+    double max_m = 0;
+    std::vector<tin::SamplePosition> misses;  // of each triangle the worst sample over the bound that can be inserted
+  };
+  // Vertical distances between the samples and the flat triangles with corners in `ecef`, the mesh's vertices. When
+  // `stop` is requested, what was measured until then.
+  Error MeasureError(const tin::HeightField& field, const tin::TinMesh& mesh, const std::vector<geo::Vec3>& ecef,
+                     double bound_m, const std::stop_token& stop) const;
+
+ private:
+  geo::Vec3 Up(int column, int row) const;
+  bool IsInside(int column, int row) const {  // not on the border
+    return column > 0 && row > 0 && column + 1 < window_.columns && row + 1 < window_.rows;
+  }
+
+  const geo::Lattice lattice_;
+  const dem::NodeWindow window_;
+  std::vector<geo::Vec3> column_normals_, row_normals_;  // at the equator; at longitude 0
+  std::vector<geo::Vec3> row_feet_;                      // ECEF at longitude 0, height 0
+};
+
+// Positions are multiples of 2^-10 m: libm's last bits, which differ between processors, end here.
+geo::Vec3 RoundPosition(geo::Vec3 metres);
+
+}  // namespace terrace::tiler

@@ -1,0 +1,160 @@
+#include "tiler/mesh/tile_mesher.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "engine/core/check.h"
+#include "engine/geo/tile_key.h"
+#include "engine/tin/drop_pass.h"
+#include "proto/edge_steps.h"
+#include "proto/surface_error.h"
+#include "proto/tile_error.h"
+#include "proto/tile_mesh.h"
+#include "tiler/mesh/inner_vertices.h"
+#include "tiler/mesh/mend_mesh.h"
+#include "tiler/mesh/refine_plan.h"
+
+namespace terrace::tiler {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+proto::EdgeSteps EdgeStepsOf(const dem::DemSource& source, const geo::TileKey& key, double error_m) {
+  const std::int64_t rows = geo::TileRows(key.level);
+  std::array<std::array<double, 3>, 3> needed{};
+  for (int dy = -1; dy <= 1; ++dy) {
+    for (int dx = -1; dx <= 1; ++dx) {
+      const geo::TileKey neighbour = geo::Neighbour(key, dx, dy);
+      if (neighbour.y < 0 || neighbour.y >= rows) continue;
+      const dem::HeightRange range = source.RangeBound(neighbour);
+      needed[static_cast<std::size_t>(dy + 1)][static_cast<std::size_t>(dx + 1)] =
+          proto::NeededStep(range.min, range.max);
+    }
+  }
+  const dem::DemInfo& info = source.info();
+  const double pole_step =
+      proto::NeededStep(std::min(info.heights.min, info.floor), std::max(info.heights.max, info.floor));
+  return proto::MakeEdgeSteps(error_m, needed, pole_step, key.y == 0, key.y == rows - 1);
+}
+
+// Quantized, with what the wire's rounding pushed over the bound inserted.
+Result<MeshedTile> Finish(tin::TinMesh mesh, const proto::LatticeView& lattice, const proto::EdgeSteps& steps,
+                          double error_m, const std::stop_token& stop) {
+  proto::TileMeter meter(lattice, error_m);
+  MeshedTile meshed;
+  const auto measure = [&](const tin::TinMesh& rounded) {
+    meshed.tile = proto::QuantizeTile(lattice, rounded, steps);
+    return meter.Measure(meshed.tile);
+  };
+  const Result<proto::TileError> error = MendMesh(mesh, measure, stop);
+  if (!error) return tl::unexpected(error.error());
+  meshed.max_error_m = error->max_m;
+  meshed.surface_error_m = std::max(error->max_m, proto::MeasureEdgeError(lattice, meshed.tile));
+  meshed.mesh = std::move(mesh);
+  return meshed;
+}
+
+// A mesh within the format's number of vertices: `coarser` times the error inside the tile, more where that is not
+// enough. The edges never depend on the inside: they keep the threshold of the error that was asked for and the seeds
+// that are due at it, exactly, since scaling by a power of two rounds nothing. Sets the error that was reached.
+Result<tin::TinMesh> RefineWithinFormat(const tin::HeightField& field, const tin::GreedyOptions& plan, double coarser,
+                                        double& error_m, const std::stop_token& stop) {
+  for (;; coarser *= 2) {
+    tin::GreedyOptions options = plan;
+    options.record = false;
+    for (tin::BorderOptions& border : options.borders) border.scale = coarser;
+    for (tin::SeedGrid& grid : options.seeds) grid.below_error *= coarser;
+    tin::GreedyTriangulation greedy(field, std::move(options));
+    tin::GreedyGoal goal;
+    goal.max_error = error_m * coarser;
+    goal.max_points = proto::kMaxTileVertices + 1;
+    if (!greedy.Run(goal, stop)) return Cancelled();
+    if (greedy.vertex_count() > proto::kMaxTileVertices) continue;
+    error_m = goal.max_error;
+    return greedy.Mesh();
+  }
+}
+
+// The drop pass spends the whole bound it is given; what the wire's rounding then pushes over it would have to be
+// inserted again. A 32nd is kept for that.
+Result<tin::TinMesh> Compact(const tin::HeightField& field, const tin::TinMesh& mesh, const tin::GreedyOptions& plan,
+                             double error_m, const std::stop_token& stop) {
+  std::vector<std::uint16_t> wire;
+  for (int i = 0; i < field.width(); ++i) wire.push_back(proto::QuantizedPosition(i, field.width() - 1));
+  tin::DropOptions options;
+  options.max_error = error_m * 31 / 32;
+  options.curvature = plan.curvature;
+  options.wire_columns = wire;
+  options.wire_rows = wire;
+  std::optional<tin::TinMesh> dropped = tin::DropVertices(field, mesh, options, stop);
+  if (!dropped) return Cancelled();
+  return *std::move(dropped);
+}
+
+}  // namespace
+
+tl::unexpected<Error> Cancelled() { return MakeError(ErrorCode::kCancelled, "nobody waits for this tile any more"); }
+
+tin::HeightField FieldOf(const proto::LatticeView& lattice) {
+  const int side = lattice.cells() + 1;
+  std::vector<float> heights;
+  heights.reserve(static_cast<std::size_t>(side) * static_cast<std::size_t>(side));
+  for (int j = 0; j < side; ++j) {
+    const float* const row = lattice.heights.data() + (j + 1) * (side + 2) + 1;  // within the halo
+    heights.insert(heights.end(), row, row + side);
+  }
+  auto field = tin::HeightField::Make(side, side, std::move(heights));
+  TERRACE_CHECK(field.has_value());  // every lattice height is finite
+  return *std::move(field);
+}
+
+tin::GreedyOptions PlanOf(const dem::DemSource& source, const proto::LatticeView& lattice, tin::Criterion criterion) {
+  tin::GreedyOptions plan = MakeRefinePlan(lattice, EdgeStepsOf(source, lattice.key, proto::kHeightResolution));
+  plan.criterion = criterion;
+  return plan;
+}
+
+Result<StartedMesh> StartMesh(const dem::DemSource& source, const proto::LatticeView& lattice,
+                              const tin::Refinement& refinement, const MeshRules& rules, double wanted_error_m,
+                              const std::stop_token& stop) {
+  double error_m = wanted_error_m;
+  Result<tin::TinMesh> mesh =
+      refinement.vertex_count() <= proto::kMaxTileVertices
+          ? refinement.MeshAt(error_m)
+          : RefineWithinFormat(FieldOf(lattice), PlanOf(source, lattice, rules.criterion), 2, error_m, stop);
+  if (mesh && rules.compact) {
+    mesh = Compact(FieldOf(lattice), *mesh, PlanOf(source, lattice, rules.criterion), error_m, stop);
+  }
+  if (!mesh) return tl::unexpected(std::move(mesh).error());
+  return StartedMesh{WithInnerVertices(lattice, *std::move(mesh)), error_m};
+}
+
+Result<MeshedTile> MeshTile(const dem::DemSource& source, const proto::LatticeView& lattice,
+                            const tin::Refinement& refinement, const MeshRules& rules, double wanted_error_m,
+                            const std::stop_token& stop) {
+  const proto::EdgeSteps steps = EdgeStepsOf(source, lattice.key, wanted_error_m);
+  const Clock::time_point start = Clock::now();
+  Result<StartedMesh> started = StartMesh(source, lattice, refinement, rules, wanted_error_m, stop);
+  if (!started) return tl::unexpected(std::move(started).error());
+  double error_m = started->error_m;
+  const auto replayed = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - start);
+  Result<MeshedTile> meshed = Finish(std::move(started->mesh), lattice, steps, error_m, stop);
+  if (meshed) meshed->replayed = replayed;
+  if (!meshed || proto::AllCounterClockwise(meshed->tile)) return meshed;
+
+  error_m = wanted_error_m;
+  Result<tin::TinMesh> mesh =
+      RefineWithinFormat(FieldOf(lattice), PlanOf(source, lattice, tin::Criterion::kDelaunay), 1, error_m, stop);
+  if (!mesh) return tl::unexpected(std::move(mesh).error());
+  meshed = Finish(*std::move(mesh), lattice, steps, error_m, stop);
+  if (meshed && !proto::AllCounterClockwise(meshed->tile)) {
+    return MakeError(ErrorCode::kInternal, "{}: a triangle turned over", geo::ToString(lattice.key));
+  }
+  return meshed;
+}
+
+}  // namespace terrace::tiler

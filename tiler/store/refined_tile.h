@@ -1,0 +1,42 @@
+// A tile as the engine leaves it: what every error, format and coding of it is made from without reading it again.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "engine/dem/dem_source.h"
+#include "engine/geo/tile_key.h"
+#include "engine/tin/refinement.h"
+#include "tiler/store/byte_cache.h"
+#include "tiler/tile_request.h"
+
+namespace terrace::tiler {
+
+struct RefinedTile {
+  dem::TileHeights heights;
+  tin::Refinement refinement;
+  double error_m = 0;  // the refinement holds the mesh to this error and to every larger one
+};
+
+inline std::size_t BytesOf(const RefinedTile& tile) {
+  return sizeof(RefinedTile) + tile.heights.heights.capacity() * sizeof(float) + tile.refinement.bytes();
+}
+
+using RefinedTilePtr = std::shared_ptr<const RefinedTile>;
+
+struct RefinedTileKey {
+  std::uint64_t generation = 0;  // of the dataset, which it stands for
+  geo::TileKey key;
+
+  friend bool operator==(const RefinedTileKey&, const RefinedTileKey&) = default;
+};
+
+struct RefinedTileKeyHash {
+  std::size_t operator()(const RefinedTileKey& key) const noexcept {
+    TileRequest request;
+    request.key = key.key;
+    return TileRequestHash{}(request) ^ static_cast<std::size_t>(key.generation);
+  }
+};
+
+}  // namespace terrace::tiler

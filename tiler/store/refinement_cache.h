@@ -1,0 +1,39 @@
+// Refinements in memory, and in a slower store below that.
+//
+// Thread-safe.
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "tiler/store/tile_store.h"
+
+namespace terrace::tiler {
+
+class RefinementCache {
+ public:
+  // 0 bytes: none in memory. `below` may be null.
+  explicit RefinementCache(std::size_t memory_bytes, std::shared_ptr<RefinementStore> below = nullptr)
+      : memory_(memory_bytes), below_(std::move(below)) {}
+
+  // Null when it is not there. Blocks where the store below does.
+  RefinedTilePtr Find(const RefinedTileKey& key);
+  RefinedTilePtr FindInMemory(const RefinedTileKey& key) { return memory_.Find(key); }
+
+  void Insert(const RefinedTileKey& key, RefinedTilePtr tile);
+
+  // ByteCache's, of what is in memory.
+  void Retain(const std::vector<std::uint64_t>& generations) { memory_.Retain(generations); }
+  void SetCapacity(std::size_t memory_bytes) { memory_.SetCapacity(memory_bytes); }
+  // Of what is in memory.
+  ByteCacheStats stats() const;
+
+ private:
+  ByteCache<RefinedTileKey, RefinedTileKeyHash, RefinedTile> memory_;
+  const std::shared_ptr<RefinementStore> below_;
+  std::atomic<std::uint64_t> hits_{0}, misses_{0};
+};
+
+}  // namespace terrace::tiler

@@ -1,0 +1,30 @@
+// The encoded tiles that were built last.
+#pragma once
+
+#include <cstdint>
+
+#include "tiler/encoded_tile.h"
+#include "tiler/store/byte_cache.h"
+#include "tiler/tile_request.h"
+
+namespace terrace::tiler {
+
+// A request, and the generation of the dataset it is about: a replaced source never meets tiles of the old one. The
+// generation names the dataset, so that the key holds while other datasets come and go.
+struct CacheKey {
+  TileRequest request;  // its `dataset` is 0
+  std::uint64_t generation = 0;
+  std::uint64_t solo = 0;  // unless 0: work for one request alone, which nobody else may join and nothing keeps
+
+  friend bool operator==(const CacheKey&, const CacheKey&) = default;
+};
+
+struct CacheKeyHash {
+  std::size_t operator()(const CacheKey& key) const noexcept {
+    return TileRequestHash{}(key.request) ^ static_cast<std::size_t>(key.generation ^ key.solo);
+  }
+};
+
+using TileCache = ByteCache<CacheKey, CacheKeyHash, EncodedTile>;
+
+}  // namespace terrace::tiler

@@ -1,0 +1,134 @@
+#include "tiler/store/tile_record.h"
+
+#include <bit>
+#include <utility>
+
+#include "engine/core/bytes.h"
+
+namespace terrace::tiler {
+namespace {
+
+constexpr std::int32_t kMostCells = 256;  // of geo::Lattice
+
+tl::unexpected<Error> NotARecord() { return MakeError(ErrorCode::kInvalidArgument, "not a cache record"); }
+
+void Put(ByteWriter& writer, const geo::TileKey& key) {
+  const auto& [level, x, y] = key;
+  writer.Put(static_cast<std::int32_t>(level));
+  writer.Put(static_cast<std::int64_t>(x));
+  writer.Put(static_cast<std::int64_t>(y));
+}
+
+void PutText(ByteWriter& writer, std::string_view text) {
+  writer.Put(static_cast<std::uint32_t>(text.size()));
+  writer.PutBytes(text);
+}
+
+std::string_view GetText(ByteReader& reader) {
+  const auto size = reader.Get<std::uint32_t>();
+  return reader.GetBytes(size);
+}
+
+}  // namespace
+
+// Every member is named, so that one more does not compile before it has its place here: a key without it would find
+// tiles of other requests.
+std::string RecordKey(const CacheKey& key) {
+  const auto& [request, generation, solo] = key;
+  const auto& [dataset, tile, error_step, format, compression, texture, coding, normals, water_mask, metadata,
+               height_encoding, height_size] = request;
+  static_cast<void>(dataset);  // the generation stands for it
+  static_cast<void>(solo);     // work for one request is not kept
+  ByteWriter writer;
+  writer.Put(generation);
+  Put(writer, tile);
+  writer.Put(static_cast<std::int32_t>(error_step));
+  writer.Put(static_cast<std::uint8_t>(format));
+  writer.Put(static_cast<std::uint8_t>(compression));
+  writer.Put(static_cast<std::uint8_t>(texture));
+  writer.Put(static_cast<std::uint8_t>(coding));
+  writer.Put(static_cast<std::uint8_t>(normals));
+  writer.Put(static_cast<std::uint8_t>(water_mask));
+  writer.Put(static_cast<std::uint8_t>(metadata));
+  writer.Put(static_cast<std::uint8_t>(height_encoding));
+  writer.Put(static_cast<std::int32_t>(height_size));
+  return writer.Take();
+}
+
+std::string RecordKey(const RefinedTileKey& key) {
+  ByteWriter writer;
+  writer.Put(key.generation);
+  Put(writer, key.key);
+  return writer.Take();
+}
+
+std::string SerializeTile(const EncodedTile& tile) {
+  ByteWriter writer;
+  writer.Reserve(tile.bytes.size() + tile.etag.size() + 32);
+  writer.Put(tile.max_error_m);
+  writer.Put<std::uint8_t>(tile.certified_error_m ? 1 : 0);
+  writer.Put(tile.certified_error_m.value_or(0));
+  writer.Put(tile.vertices);
+  writer.Put(tile.triangles);
+  PutText(writer, tile.etag);
+  PutText(writer, tile.bytes);
+  return writer.Take();
+}
+
+Result<EncodedTile> ParseTile(std::string_view bytes) {
+  ByteReader reader(bytes);
+  EncodedTile tile;
+  tile.max_error_m = reader.Get<double>();
+  const auto is_certified = reader.Get<std::uint8_t>();
+  const auto certified_error_m = reader.Get<double>();
+  // One tile has one record.
+  if (is_certified > 1 || (is_certified == 0 && std::bit_cast<std::uint64_t>(certified_error_m) != 0))
+    return NotARecord();
+  if (is_certified == 1) tile.certified_error_m = certified_error_m;
+  tile.vertices = reader.Get<std::uint32_t>();
+  tile.triangles = reader.Get<std::uint32_t>();
+  tile.etag = GetText(reader);
+  tile.bytes = GetText(reader);
+  if (!reader.ok() || reader.remaining() > 0) return NotARecord();
+  return tile;
+}
+
+std::string SerializeRefinedTile(const RefinedTile& tile) {
+  const dem::TileHeights& heights = tile.heights;
+  ByteWriter writer;
+  writer.Reserve(heights.heights.size() * sizeof(float) + tile.refinement.bytes() + 64);
+  writer.Put(tile.error_m);
+  writer.Put(static_cast<std::int32_t>(heights.lattice.level));
+  writer.Put(static_cast<std::int32_t>(heights.lattice.cells));
+  writer.Put(static_cast<std::int32_t>(heights.stride));
+  writer.Put(heights.source_gap_m);
+  PutText(writer, {reinterpret_cast<const char*>(heights.heights.data()), heights.heights.size() * sizeof(float)});
+  PutText(writer, tile.refinement.Serialize());
+  return writer.Take();
+}
+
+Result<RefinedTile> ParseRefinedTile(std::string_view bytes) {
+  ByteReader reader(bytes);
+  const auto error_m = reader.Get<double>();
+  dem::TileHeights heights;
+  heights.lattice.level = reader.Get<std::int32_t>();
+  heights.lattice.cells = reader.Get<std::int32_t>();
+  heights.stride = reader.Get<std::int32_t>();
+  heights.source_gap_m = reader.Get<double>();
+  const std::string_view raw = GetText(reader);
+  const std::string_view record = GetText(reader);
+  if (!reader.ok() || reader.remaining() > 0) return NotARecord();
+  if (heights.lattice.cells < 1 || heights.lattice.cells > kMostCells) return NotARecord();
+  const auto side = static_cast<std::size_t>(heights.lattice.cells) + 3;
+  if (heights.stride != heights.lattice.cells + 3 || raw.size() != side * side * sizeof(float)) return NotARecord();
+  heights.heights.resize(side * side);
+  std::memcpy(heights.heights.data(), raw.data(), raw.size());
+  Result<tin::Refinement> refinement = tin::Refinement::Parse(record);
+  if (!refinement) return tl::unexpected(std::move(refinement).error());
+  if (refinement->width() != heights.lattice.cells + 1 || refinement->height() != heights.lattice.cells + 1) {
+    return NotARecord();
+  }
+  return RefinedTile{std::move(heights), *std::move(refinement), error_m};
+}
+
+}  // namespace terrace::tiler

@@ -1,0 +1,45 @@
+// What one tile request asks for, in canonical form: everything that changes the bytes and nothing else.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+
+#include "engine/geo/tile_key.h"
+#include "proto/glb_tile.h"
+#include "proto/height_png.h"
+#include "proto/texture.h"
+#include "tiler/coding.h"
+
+namespace terrace::tiler {
+
+enum class TileFormat : std::uint8_t { kQuantizedMesh, kGlb, kHeightPng };
+
+// Pixels along an edge of a height tile; the first is the default.
+inline constexpr std::array<int, 2> kHeightSizes = {256, 512};
+
+struct TileRequest {
+  std::uint32_t dataset = 0;  // index into the catalog's datasets
+  geo::TileKey key;
+  int error_step = 0;  // on the ladder of the key's level (engine/geo/error_ladder.h)
+  TileFormat format = TileFormat::kQuantizedMesh;
+  proto::GlbCompression compression = proto::GlbCompression::kDraco;  // kGlb only
+  proto::TextureFormat texture = proto::TextureFormat::kNone;         // kGlb only
+  Coding coding = Coding::kIdentity;
+  // Extensions of quantized-mesh, each only where the client asks for it and the tile has it. GLB tiles always have
+  // normals.
+  bool normals = false;
+  bool water_mask = false;
+  bool metadata = false;
+  // kHeightPng: `key` is a tile of Web Mercator's XYZ scheme, y from the NORTH, of height_size * height_size pixels.
+  proto::HeightEncoding height_encoding = proto::HeightEncoding::kMapbox;
+  int height_size = kHeightSizes[0];
+
+  friend bool operator==(const TileRequest&, const TileRequest&) = default;
+};
+
+struct TileRequestHash {
+  std::size_t operator()(const TileRequest& request) const noexcept;
+};
+
+}  // namespace terrace::tiler
