@@ -7,6 +7,7 @@
 #include <cstddef>
 
 #include "engine/core/result.h"
+#include "engine/dem/gdal/gdal_settings.h"
 
 namespace terrace::server {
 

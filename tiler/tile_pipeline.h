@@ -10,8 +10,8 @@
 
 #include "engine/core/result.h"
 #include "engine/dem/dem_source.h"
-#include "engine/dem/imagery.h"
-#include "engine/dem/water_raster.h"
+#include "engine/dem/image/imagery.h"
+#include "engine/dem/image/water_raster.h"
 #include "proto/glb_tile.h"
 #include "proto/texture.h"
 #include "tiler/encoded_tile.h"

@@ -20,11 +20,19 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 # files of the folder itself, which put the rooms together, above all but the command line:
 # asio.h <- tiles <- http <- handlers <- server <- cli, and tiles <- reload <- cli.
 ENGINE = ["engine/core", "engine/geo", "engine/tin", "engine/dem", "proto", "config", "tiler", "server/asio.h"]
+# Of elevation models, each may know those before it.
+DEM = ["engine/dem/dem_types.h", "engine/dem/common", "engine/dem/gdal", "engine/dem/crs", "engine/dem/raster", "engine/dem/statistics",
+       "engine/dem/sources", "engine/dem/mosaic", "engine/dem/bound", "engine/dem/image"]
+# Of their headers, whoever may know engine/dem may include these.
+DOORS = {"engine/dem/" + name for name in (
+    "dem_types.h", "common/box_index.h", "crs/geodesic_path.h", "gdal/file_stamp.h", "gdal/gdal_settings.h", "gdal/source_policy.h",
+    "image/imagery.h", "image/raster_colors.h", "image/water_raster.h", "sources/read_raster.h")}
 ROOMS = {
     "engine/core": [],
     "engine/geo": ["engine/core"],
     "engine/tin": ["engine/core"],
-    "engine/dem": ["engine/core", "engine/geo"],
+    **{room: ["engine/core", "engine/geo"] + DEM[:i] for i, room in enumerate(DEM)},
+    "engine/dem": ["engine/core", "engine/geo"] + DEM,
     "proto": ["engine/core", "engine/geo", "engine/tin"],
     "config": ["engine/core"],
     "tiler": ["engine/core", "engine/geo", "engine/tin", "engine/dem", "proto"],
@@ -74,7 +82,8 @@ LIBRARIES = [
     Library("the standard library", r"[a-z_0-9]+|(stdint|immintrin)\.h", r"."),
 ]
 
-# May show in a header that another room includes; inside the server Boost may, too (awaitable results).
+# May show in a header that another room includes; inside the server Boost may, too (awaitable results), and between the
+# rooms of engine/dem GDAL.
 PUBLIC = {"expected", "fmt", "the standard library", "threads", "clocks", "files"}
 
 INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*(?:<([^>\n]+)>|"([^"\n]+)")', re.MULTILINE)
@@ -136,9 +145,12 @@ class Tree:
             return f'"{quoted}": {path if room is None else quoted} lies in no room; add its folder to ROOMS'
         if room == other:
             return None
+        if quoted in DOORS and "engine/dem" in ROOMS[room]:
+            other = "engine/dem"
         if other not in ROOMS[room]:
             return f'{room} may not know {other} ("{quoted}")'
         public = PUBLIC | ({"Boost"} if room.startswith("server") and other.startswith("server") else set())
+        public |= {"GDAL", "Boost.Geometry"} if room.startswith("engine/dem") and other.startswith("engine/dem/") else set()
         hidden = self.libraries_behind(quoted) - public
         if hidden:
             return f'"{quoted}" shows {", ".join(sorted(hidden))} to {room}: keep it in .cc files or in headers of {other} alone'

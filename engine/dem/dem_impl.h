@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "engine/dem/dem_source.h"
-#include "engine/dem/sheet.h"
+#include "engine/dem/mosaic/sheet.h"
 
 namespace terrace::dem {
 

@@ -6,9 +6,9 @@
 #include <utility>
 
 #include "engine/core/check.h"
+#include "engine/dem/bound/source_gap.h"
+#include "engine/dem/crs/node_positions.h"
 #include "engine/dem/dem_impl.h"
-#include "engine/dem/node_positions.h"
-#include "engine/dem/source_gap.h"
 
 namespace terrace::dem {
 namespace {

@@ -13,13 +13,13 @@
 
 #include "engine/core/bytes.h"
 #include "engine/core/check.h"
-#include "engine/dem/all_cores.h"
-#include "engine/dem/availability.h"
+#include "engine/dem/common/all_cores.h"
+#include "engine/dem/crs/footprint.h"
+#include "engine/dem/crs/level_plan.h"
 #include "engine/dem/dem_impl.h"
-#include "engine/dem/footprint.h"
-#include "engine/dem/level_plan.h"
-#include "engine/dem/open_rasters.h"
-#include "engine/dem/raster_source.h"
+#include "engine/dem/mosaic/availability.h"
+#include "engine/dem/sources/open_rasters.h"
+#include "engine/dem/sources/raster_source.h"
 #include "engine/geo/octave.h"
 
 namespace terrace::dem {

@@ -18,7 +18,7 @@
 #include "config/options.h"
 #include "config/parse.h"
 #include "engine/dem/dem_source.h"
-#include "engine/dem/source_policy.h"
+#include "engine/dem/gdal/source_policy.h"
 #include "engine/geo/error_ladder.h"
 #include "server/cli/command.h"
 #include "server/cli/fail.h"

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "config/nearest_name.h"
-#include "engine/dem/source_policy.h"
+#include "engine/dem/gdal/source_policy.h"
 #include "server/cli/command.h"
 
 namespace terrace::cli {

@@ -17,7 +17,8 @@
 #include <vector>
 
 #include "engine/dem/dem_source.h"
-#include "engine/dem/source_policy.h"
+#include "engine/dem/gdal/source_policy.h"
+#include "engine/dem/sources/read_raster.h"
 #include "engine/tin/drop_pass.h"
 #include "engine/tin/field_cut.h"
 #include "engine/tin/greedy.h"

@@ -13,7 +13,8 @@
 #include <utility>
 #include <vector>
 
-#include "engine/dem/raster_colors.h"
+#include "engine/dem/image/raster_colors.h"
+#include "engine/dem/sources/read_raster.h"
 #include "engine/tin/extended_error.h"
 #include "engine/tin/extended_field.h"
 #include "proto/mesh_file.h"

@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <utility>
 
+#include "engine/dem/sources/read_raster.h"
 #include "proto/mesh_file.h"
 
 namespace terrace::cli {

@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
-#include "engine/dem/box_index.h"
+#include "engine/dem/common/box_index.h"
 #include "engine/geo/error_ladder.h"
 
 namespace terrace::cli {

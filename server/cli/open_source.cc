@@ -7,7 +7,7 @@
 #include <system_error>
 #include <utility>
 
-#include "engine/dem/source_policy.h"
+#include "engine/dem/gdal/source_policy.h"
 
 namespace terrace::cli {
 

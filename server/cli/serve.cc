@@ -24,6 +24,7 @@
 #include "config/options.h"
 #include "config/parse.h"
 #include "config/working_directory.h"
+#include "engine/dem/gdal/gdal_settings.h"
 #include "server/cli/command.h"
 #include "server/cli/descriptor_plan.h"
 #include "server/cli/fail.h"

@@ -5,7 +5,7 @@
 #include <system_error>
 #include <vector>
 
-#include "engine/dem/source_policy.h"
+#include "engine/dem/gdal/source_policy.h"
 #include "server/cli/command.h"
 #include "server/cli/open_source.h"
 #include "server/cli/try_folder.h"

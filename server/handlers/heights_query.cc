@@ -4,7 +4,7 @@
 #include <string>
 #include <utility>
 
-#include "engine/dem/geodesic_path.h"
+#include "engine/dem/crs/geodesic_path.h"
 #include "engine/geo/tile_key.h"
 #include "server/handlers/heights_parameters.h"
 #include "server/http/parameters.h"

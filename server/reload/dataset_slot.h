@@ -14,7 +14,7 @@
 
 #include "config/config.h"
 #include "engine/core/result.h"
-#include "engine/dem/file_stamp.h"
+#include "engine/dem/gdal/file_stamp.h"
 #include "tiler/tile_pipeline.h"
 
 namespace terrace::server {

@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "engine/dem/gdal/gdal_settings.h"
+
 namespace terrace::server {
 namespace {
 

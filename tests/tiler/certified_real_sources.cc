@@ -6,7 +6,7 @@
 #include <memory>
 #include <utility>
 
-#include "engine/dem/geoid.h"
+#include "engine/dem/crs/geoid.h"
 #include "tests/support/test_data.h"
 #include "tests/tiler/certified_sources.h"
 

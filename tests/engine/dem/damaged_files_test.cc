@@ -10,7 +10,7 @@
 #include <random>
 #include <sstream>
 
-#include "engine/dem/water_raster.h"
+#include "engine/dem/image/water_raster.h"
 #include "tests/engine/dem/dem_fixture.h"
 
 namespace terrace::dem {

@@ -1,5 +1,5 @@
 // How far tiles above a geoid are from their source's samples: the bound is one, wherever the geoid bends.
-#include "engine/dem/geoid_gap.h"
+#include "engine/dem/bound/geoid_gap.h"
 
 #include <gtest/gtest.h>
 

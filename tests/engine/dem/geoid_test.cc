@@ -1,4 +1,4 @@
-#include "engine/dem/geoid.h"
+#include "engine/dem/crs/geoid.h"
 
 #include <fmt/format.h>
 

@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "engine/dem/rim_voids.h"
+#include "engine/dem/statistics/rim_voids.h"
 #include "tests/engine/dem/dem_fixture.h"
 
 namespace terrace::dem::holes {

@@ -1,5 +1,5 @@
 // What pools keep for later, all together.
-#include "engine/dem/idle_pool.h"
+#include "engine/dem/common/idle_pool.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "engine/dem/imagery.h"
+#include "engine/dem/image/imagery.h"
 
 #include <gdal_priv.h>
 #include <gtest/gtest.h>

@@ -13,10 +13,10 @@
 #include <thread>
 #include <utility>
 
-#include "engine/dem/all_cores.h"
-#include "engine/dem/raster_source.h"
-#include "engine/dem/sheet.h"
-#include "engine/dem/sheet_tables.h"
+#include "engine/dem/bound/sheet_tables.h"
+#include "engine/dem/common/all_cores.h"
+#include "engine/dem/mosaic/sheet.h"
+#include "engine/dem/sources/raster_source.h"
 #include "tests/engine/dem/dem_fixture.h"
 
 namespace terrace::dem {

@@ -6,8 +6,8 @@
 #include <optional>
 #include <utility>
 
-#include "engine/dem/geoid.h"
-#include "engine/dem/image_pool.h"
+#include "engine/dem/crs/geoid.h"
+#include "engine/dem/image/image_pool.h"
 #include "tests/engine/dem/dem_fixture.h"
 
 namespace {

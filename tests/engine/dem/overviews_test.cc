@@ -6,9 +6,9 @@
 #include <cmath>
 #include <filesystem>
 
-#include "engine/dem/level_plan.h"
-#include "engine/dem/overview_axis.h"
-#include "engine/dem/raster_source.h"
+#include "engine/dem/crs/level_plan.h"
+#include "engine/dem/raster/overview_axis.h"
+#include "engine/dem/sources/raster_source.h"
 #include "tests/engine/dem/dem_fixture.h"
 
 namespace terrace::dem {

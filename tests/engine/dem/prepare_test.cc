@@ -1,6 +1,6 @@
 // Surveys of rasters and their records: equal heights with and without, resumed, shared, and never believed when
 // damaged.
-#include "engine/dem/prepare.h"
+#include "engine/dem/sources/prepare.h"
 
 #include <gdal_priv.h>
 #include <sys/wait.h>
@@ -16,9 +16,9 @@
 #include <map>
 #include <random>
 
-#include "engine/dem/grid_cells.h"
-#include "engine/dem/raster_file.h"
-#include "engine/dem/raster_source.h"
+#include "engine/dem/gdal/raster_file.h"
+#include "engine/dem/raster/grid_cells.h"
+#include "engine/dem/sources/raster_source.h"
 #include "tests/engine/dem/dem_fixture.h"
 
 namespace terrace::dem {

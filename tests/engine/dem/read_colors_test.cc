@@ -5,7 +5,8 @@
 #include <cmath>
 #include <fstream>
 
-#include "engine/dem/raster_colors.h"
+#include "engine/dem/image/raster_colors.h"
+#include "engine/dem/sources/read_raster.h"
 #include "tests/engine/dem/dem_fixture.h"
 
 namespace terrace::dem {

@@ -1,3 +1,5 @@
+#include "engine/dem/sources/read_raster.h"
+
 #include <algorithm>
 #include <cmath>
 

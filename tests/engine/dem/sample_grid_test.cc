@@ -1,4 +1,4 @@
-#include "engine/dem/sample_grid.h"
+#include "engine/dem/raster/sample_grid.h"
 
 #include <gdal_priv.h>
 

@@ -1,5 +1,5 @@
 // Which rasters make one sheet: many at once give what trying all pairs gives.
-#include "engine/dem/sheet_layout.h"
+#include "engine/dem/mosaic/sheet_layout.h"
 
 #include <gdal_priv.h>
 #include <ogr_spatialref.h>

@@ -1,6 +1,6 @@
 // Names of sources that are more than files: all are refused before GDAL sees them, with no byte on the network and no
 // file opened outside of the data roots.
-#include "engine/dem/source_policy.h"
+#include "engine/dem/gdal/source_policy.h"
 
 #include <arpa/inet.h>
 #include <fcntl.h>
@@ -15,8 +15,8 @@
 #include <set>
 #include <thread>
 
-#include "engine/dem/gdal_runtime.h"
-#include "engine/dem/raster_file.h"
+#include "engine/dem/gdal/gdal_runtime.h"
+#include "engine/dem/gdal/raster_file.h"
 #include "tests/engine/dem/dem_fixture.h"
 
 namespace terrace::dem {

@@ -1,5 +1,5 @@
 // Grids of undulations as PROJ reads them: PROJ itself is the judge.
-#include "engine/dem/undulation_grid.h"
+#include "engine/dem/crs/undulation_grid.h"
 
 #include <cpl_string.h>
 #include <gdal_priv.h>
@@ -7,8 +7,8 @@
 #include <cmath>
 #include <random>
 
-#include "engine/dem/gdal_runtime.h"
-#include "engine/dem/undulations.h"
+#include "engine/dem/crs/undulations.h"
+#include "engine/dem/gdal/gdal_runtime.h"
 #include "tests/engine/dem/geoid_grids.h"
 
 namespace terrace::dem {

@@ -1,4 +1,4 @@
-#include "engine/dem/undulations.h"
+#include "engine/dem/crs/undulations.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Heights above geoids become ellipsoidal, everywhere alike: in tiles, at points, on Web Mercator, in bounds.
-#include "engine/dem/vertical_datum.h"
+#include "engine/dem/crs/vertical_datum.h"
 
 #include <gdal_priv.h>
 #include <stdlib.h>
@@ -10,7 +10,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "engine/dem/sample_rules.h"
+#include "engine/dem/gdal/sample_rules.h"
 #include "engine/geo/mercator_grid.h"
 #include "tests/engine/dem/dem_fixture.h"
 

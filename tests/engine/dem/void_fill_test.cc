@@ -1,4 +1,4 @@
-#include "engine/dem/void_fill.h"
+#include "engine/dem/mosaic/void_fill.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // Voids that files do not declare. What is drawn here is drawn twice: with the damage, and as terrain that only looks
 // like it.
-#include "engine/dem/void_marks.h"
+#include "engine/dem/statistics/void_marks.h"
 
 #include <cpl_conv.h>
 #include <gdal_priv.h>

@@ -1,0 +1,242 @@
+#include "engine/dem/bound/cell_gap.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace terrace::dem {
+namespace {
+
+// Samples whose centres lie in a box of pixels, `shift` columns on.
+SampleBox CentresIn(const PixelBounds& box, double shift) {
+  const auto first = [](double pixel) { return static_cast<std::int64_t>(std::ceil(pixel - 0.5)); };
+  const auto last = [](double pixel) { return static_cast<std::int64_t>(std::floor(pixel - 0.5)); };
+  return {first(box.west + shift), first(box.north), last(box.east + shift), last(box.south)};
+}
+
+}  // namespace
+
+SampleBox SampleBox::Around(const SampleBox& other) const {
+  if (empty()) return other;
+  if (other.empty()) return *this;
+  return {std::min(west, other.west), std::min(north, other.north), std::max(east, other.east),
+          std::max(south, other.south)};
+}
+
+SampleBox CellGap::Clipped(SampleBox box) const {
+  if (!sheet_.wraps()) {
+    box.west = std::max<std::int64_t>(box.west, 0);
+    box.east = std::min<std::int64_t>(box.east, sheet_.columns() - 1);
+  }
+  box.north = std::max<std::int64_t>(box.north, 0);
+  box.south = std::min<std::int64_t>(box.south, sheet_.rows() - 1);
+  return box;
+}
+
+// The heights served in a cell, as the sheet's samples count.
+CellSurface CellGap::SurfaceOf(const TileCell& cell, const std::array<Position, 4>& corners) const {
+  constexpr double kPosition = 4e-5;  // of averages: NodePositions is exact to a hundred-thousandth
+  const Position& off = tables_.misplacement();
+  const double slack = kPosition * trace_.factor;
+  const bool is_separable = sheet_.georeference().is_geographic_grid() && sheet_.georeference().is_affine();
+  CellSurface surface(corners, is_separable, {off.x + slack, off.y + slack});
+  const double geoid_gap = geoid_.Over(cell.box());
+  const bool is_known = std::isfinite(geoid_gap);
+  const HeightRange range = is_known ? HeightRange{0, 0} : geoid_.RangeOf(cell.box());
+  for (std::size_t k = 0; k < 4; ++k) {
+    const bool is_added = is_known && geoid_.is_added();
+    const double geoid = is_added ? geoid_.AddedAt(cell.nodes[k]) : (range.min + range.max) / 2;
+    surface.SetHeight(k, double{tile_.heights[cell.nodes[k]]} - geoid);
+  }
+  surface.Widen(is_known ? geoid_gap : (range.max - range.min) / 2);
+  return surface;
+}
+
+// Between the heights served at a cell's nodes and the sheet's heights within these bounds, which count as its
+// samples do.
+double CellGap::Apart(const TileCell& cell, double lowest, double highest) const {
+  double gap = 0, geoid_gap = geoid_.Over(cell.box());
+  std::array<double, 4> geoid{};
+  if (!std::isfinite(geoid_gap)) {  // not known at all of the nodes
+    const HeightRange range = geoid_.RangeOf(cell.box());
+    lowest += range.min, highest += range.max;
+    geoid_gap = 0;
+  } else if (geoid_.is_added()) {
+    for (std::size_t k = 0; k < 4; ++k) geoid[k] = geoid_.AddedAt(cell.nodes[k]);
+  }
+  for (std::size_t k = 0; k < 4; ++k) {
+    const double height = double{tile_.heights[cell.nodes[k]]} - geoid[k];
+    gap = std::max({gap, highest - height, height - lowest});
+  }
+  return gap + geoid_gap;
+}
+
+double CellGap::OfAverages(const TileCell& cell, bool& has_voids) const {
+  // Samples of the cell may count as others beside it. The last average of an axis is up to twice as near.
+  const double off_x = 2 * tables_.misplacement().x / trace_.factor,
+               off_y = 2 * tables_.misplacement().y / trace_.factor;
+  const auto below = [](double weight) { return static_cast<std::int64_t>(std::floor(weight)); };
+  const auto above = [](double weight) {
+    return std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(weight)));
+  };
+  SampleBox around;
+  for (const std::size_t node : cell.nodes) {
+    const GridCell& at = trace_.cells[static_cast<std::size_t>(trace_.cell_of_node[node])];
+    around = around.Around({at.column + below(at.x - off_x), at.row + below(at.y - off_y),
+                            at.column + above(at.x + off_x), at.row + above(at.y + off_y)});
+  }
+  const GridAxis columns(sheet_.columns(), trace_.factor, sheet_.wraps()), rows(sheet_.rows(), trace_.factor, false);
+  if (!sheet_.wraps()) {
+    around.west = std::max<std::int64_t>(around.west, 0);
+    around.east = std::min(around.east, columns.count() - 1);
+  }
+  around.north = std::max<std::int64_t>(around.north, 0);
+  around.south = std::min(around.south, rows.count() - 1);
+  const GridWindow& window = trace_.window;
+  const SampleBox read = {std::max(around.west, window.column), std::max(around.north, window.row),
+                          std::min(around.east, window.column + window.columns - 1),
+                          std::min(around.south, window.row + window.rows - 1)};
+  const double gap = OfBox(cell, read, has_voids);
+  return read == around ? gap : kUnknownGap;
+}
+
+// By averages in a box of the window.
+double CellGap::OfBox(const TileCell& cell, const SampleBox& averages, bool& has_voids) const {
+  const GridWindow& window = trace_.window;
+  double lowest = kUnknownGap, highest = -lowest;
+  for (std::int64_t row = averages.north; row <= averages.south; ++row) {
+    const float* const line = trace_.samples.data() + (row - window.row) * window.columns - window.column;
+    for (std::int64_t column = averages.west; column <= averages.east; ++column) {
+      const float average = line[column];
+      has_voids |= std::isnan(average);
+      if (std::isnan(average)) continue;
+      lowest = std::min(lowest, double{average});
+      highest = std::max(highest, double{average});
+    }
+  }
+  const float averaging =
+      tables_.AveragingError(static_cast<double>(averages.west), static_cast<double>(averages.north),
+                             static_cast<double>(averages.east), static_cast<double>(averages.south));
+  if (lowest > highest) return averaging > 0 ? kUnknownGap : 0;
+  return Apart(cell, lowest, highest) + averaging;
+}
+
+// By the averages that samples in a box of pixels are near to; infinite where not all of them were read.
+double CellGap::OfAveragesNear(const TileCell& cell, const PixelBounds& box) const {
+  const GridAxis columns(sheet_.columns(), trace_.factor, sheet_.wraps()), rows(sheet_.rows(), trace_.factor, false);
+  const auto index = [&](double pixel) { return static_cast<std::int64_t>(std::floor(pixel / trace_.factor - 0.5)); };
+  std::int64_t left = index(box.west), right = index(box.east) + 1;
+  // The last average of an axis may stand for fewer pixels, and lie nearer: one more.
+  const std::int64_t top = std::clamp<std::int64_t>(index(box.north), 0, rows.count() - 1);
+  const std::int64_t bottom = std::clamp<std::int64_t>(index(box.south) + 2, 0, rows.count() - 1);
+  if (!sheet_.wraps()) {
+    left = std::clamp<std::int64_t>(left, 0, columns.count() - 1);
+    right = std::clamp<std::int64_t>(right + 1, 0, columns.count() - 1);
+  } else if (sheet_.columns() % trace_.factor != 0) {
+    return kUnknownGap;
+  }
+  const GridWindow& window = trace_.window;
+  if (top < window.row || bottom >= window.row + window.rows) return kUnknownGap;
+  for (const int turn : {0, -1, 1}) {
+    const std::int64_t shift = turn * columns.count();
+    if (turn != 0 && !sheet_.wraps()) continue;
+    if (left + shift < window.column || right + shift >= window.column + window.columns) continue;
+    bool has_voids = false;
+    return OfBox(cell, {left + shift, top, right + shift, bottom}, has_voids);
+  }
+  return kUnknownGap;
+}
+
+// In pixels; nothing where a place cannot be told.
+std::optional<std::array<Position, 4>> CellGap::CornersOf(const TileCell& cell) const {
+  std::array<Position, 4> corners;
+  for (std::size_t k = 0; k < 4; ++k) {
+    corners[k] = trace_.positions[cell.nodes[k]];
+    if (sheet_.georeference().is_geographic_grid()) {
+      // All of a pole's nodes have one position: their columns are those of the row beside it.
+      const std::int64_t row = tile_.window.row + 1 + cell.j + (k < 2 ? 0 : 1);
+      if (row == 0) corners[k].x = trace_.positions[cell.nodes[k] + tile_.stride()].x;
+      if (row == tile_.lattice.rows()) corners[k].x = trace_.positions[cell.nodes[k] - tile_.stride()].x;
+      const double turn = sheet_.georeference().period(), near = k == 0 ? sheet_.columns() / 2.0 : corners[0].x;
+      corners[k].x += turn * std::round((near - corners[k].x) / turn);
+    }
+    if (!std::isfinite(corners[k].x) || !std::isfinite(corners[k].y)) return std::nullopt;
+  }
+  return corners;
+}
+
+// Of sheets that nearly go around the Earth: a box may meet their last columns, or a turn on the first ones, or both.
+bool CellGap::IsOnBothEnds(const PixelBounds& box) const {
+  const double turn = sheet_.georeference().period(), columns = sheet_.columns();
+  if (sheet_.wraps() || !(turn > 0)) return false;
+  const auto meets = [&](double shift) { return box.east + shift >= 0 && box.west + shift <= columns; };
+  return meets(turn) || meets(-turn);
+}
+
+double CellGap::OfSurroundings(const TileCell& cell, bool gives_way, bool fills, std::optional<Place>& place) const {
+  const HeightRange& all = tables_.heights();
+  const auto corners = CornersOf(cell);
+  if (!corners) return Apart(cell, all.min, all.max);
+  PixelBounds box;
+  for (const Position& corner : *corners) box.Add(corner.x, corner.y);
+  // Edges of cells bulge by far less. The samples are at the pixels' centres.
+  constexpr double kBulge = 1.0 / 32;
+  const double halo = gives_way ? 1 : 0;
+  const Position& off = tables_.misplacement();
+  box.Grow((box.east - box.west) * kBulge + halo + off.x, (box.south - box.north) * kBulge + halo + off.y);
+  if (fills) {
+    const double reach = sheet_.options().max_void_gap + trace_.factor;
+    PixelBounds wide = box;
+    wide.Grow(reach, reach);
+    fills = sheet_.Ranges({wide.west, wide.north, wide.east, wide.south}).has_voids;
+    if (fills) box = wide;
+  }
+  if (IsOnBothEnds(box)) return Apart(cell, all.min, all.max);
+
+  BlockRange range;
+  for (const int turn : {0, -1, 1}) {
+    if (turn != 0 && !sheet_.wraps()) continue;
+    const SampleBox in = CentresIn(box, turn * static_cast<double>(sheet_.columns()));
+    if (in.empty()) return 0;  // as are those of other turns
+    range.Add(tables_.Ranges(static_cast<double>(in.west), static_cast<double>(in.north), static_cast<double>(in.east),
+                             static_cast<double>(in.south)));
+  }
+  if (range.min > range.max) return 0;
+  double gap = Apart(cell, range.min, range.max);
+  if (fills) return gap;
+  gap = std::min(gap, OfAveragesNear(cell, box));
+  place = Place{*corners, Clipped(CentresIn(box, 0)), gives_way};
+  if (trace_.factor > 1) return gap;
+  for (const int turn : {0, -1, 1}) {
+    if (turn != 0 && !sheet_.wraps()) continue;
+    gap = std::min(gap, OfSamples(cell, *place, trace_.window, trace_.samples,
+                                  turn * static_cast<std::int64_t>(sheet_.columns())));
+  }
+  return gap;
+}
+
+double CellGap::OfSamples(const TileCell& cell, const Place& place, const GridWindow& window,
+                          const std::vector<float>& samples, std::int64_t turn) const {
+  const SampleBox& in = place.samples;
+  if (in.empty()) return 0;
+  if (in.west + turn < window.column || in.east + turn >= window.column + window.columns || in.north < window.row ||
+      in.south >= window.row + window.rows) {
+    return kUnknownGap;
+  }
+  const CellSurface surface = SurfaceOf(cell, place.corners);
+  double gap = 0, lowest = kUnknownGap, highest = -lowest;
+  for (std::int64_t row = in.north; row <= in.south; ++row) {
+    const float* const line = samples.data() + (row - window.row) * window.columns + (turn - window.column);
+    for (std::int64_t column = in.west; column <= in.east; ++column) {
+      const double sample = line[column];
+      if (std::isnan(sample)) continue;
+      lowest = std::min(lowest, sample), highest = std::max(highest, sample);
+      if (place.between) continue;
+      gap = std::max(gap, surface.Apart({static_cast<double>(column) + 0.5, static_cast<double>(row) + 0.5}, sample));
+    }
+  }
+  if (place.between && lowest <= highest) gap = Apart(cell, lowest, highest);
+  return gap;
+}
+
+}  // namespace terrace::dem

@@ -1,0 +1,75 @@
+// Where a tile's nodes do not lie evenly on a sheet's grid: single cells, between the heights served and the sheet's
+// samples.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "engine/dem/bound/cell_surface.h"
+#include "engine/dem/bound/gap_cells.h"
+#include "engine/dem/bound/geoid_gap.h"
+#include "engine/dem/bound/sheet_tables.h"
+#include "engine/dem/mosaic/sheet.h"
+
+namespace terrace::dem {
+
+// Columns and rows of a sheet's samples, ends included; columns of sheets that wrap may lie a turn on.
+struct SampleBox {
+  std::int64_t west = 0, north = 0, east = -1, south = -1;
+
+  bool empty() const { return west > east || north > south; }
+  std::int64_t columns() const { return east - west + 1; }
+  std::int64_t rows() const { return south - north + 1; }
+  SampleBox Around(const SampleBox& other) const;
+
+  friend bool operator==(const SampleBox&, const SampleBox&) = default;
+};
+
+class CellGap {
+ public:
+  // What these refer to outlives it.
+  CellGap(const TileNodes& tile, const Sheet& sheet, const SheetTrace& trace, const SheetTables& tables,
+          const GeoidGap& geoid)
+      : tile_(tile), sheet_(sheet), trace_(trace), tables_(tables), geoid_(geoid) {}
+
+  // By the averages that the cell's nodes are interpolated from: the surface is between them, and the samples that
+  // they stand for within their error of it. `has_voids`: not all of them are there. Precondition: all of the cell's
+  // nodes took their height from the sheet.
+  double OfAverages(const TileCell& cell, bool& has_voids) const;
+
+  // A cell's nodes in pixels, and the samples that may lie in it.
+  struct Place {
+    std::array<Position, 4> corners;
+    SampleBox samples;
+    bool between = false;  // heights between samples count as well
+  };
+
+  // By what tables, averages and samples say that were read, of any cell. `gives_way`: the sheet is blended there, and
+  // its height between samples counts as they do. `fills`: what is filled in counts too. `place`: set where OfSamples
+  // may tell more, of samples that are read for that.
+  double OfSurroundings(const TileCell& cell, bool gives_way, bool fills, std::optional<Place>& place) const;
+
+  // By the samples in the cell themselves; infinite where not all of them are in the window. `turn`: how many columns
+  // on the window's samples are.
+  double OfSamples(const TileCell& cell, const Place& place, const GridWindow& window,
+                   const std::vector<float>& samples, std::int64_t turn) const;
+
+ private:
+  std::optional<std::array<Position, 4>> CornersOf(const TileCell& cell) const;
+  bool IsOnBothEnds(const PixelBounds& box) const;
+  SampleBox Clipped(SampleBox box) const;
+  CellSurface SurfaceOf(const TileCell& cell, const std::array<Position, 4>& corners) const;
+  double Apart(const TileCell& cell, double lowest, double highest) const;
+  double OfBox(const TileCell& cell, const SampleBox& averages, bool& has_voids) const;
+  double OfAveragesNear(const TileCell& cell, const PixelBounds& box) const;
+
+  const TileNodes tile_;
+  const Sheet& sheet_;
+  const SheetTrace& trace_;
+  const SheetTables& tables_;
+  const GeoidGap& geoid_;
+};
+
+}  // namespace terrace::dem

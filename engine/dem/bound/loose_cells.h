@@ -1,0 +1,48 @@
+// Cells whose bound, told from averages and tables, may be improved by reading their samples: at the joints of averaged
+// rasters, at rims and beside voids.
+#pragma once
+
+#include <cstdint>
+#include <stop_token>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "engine/dem/bound/cell_gap.h"
+
+namespace terrace::dem {
+
+class LooseCells {
+ public:
+  // Averages of more samples are judged by tables, whose blocks are as fine.
+  static bool MayRead(int factor) { return factor > 1 && factor <= 16; }
+
+  // What these refer to outlives it.
+  LooseCells(const Sheet& sheet, const CellGap& single) : sheet_(sheet), single_(single) {}
+
+  // Cells of a group lie beside each other: their samples are read together.
+  void BeginGroup() { groups_.emplace_back(); }
+
+  // `gap`: what is known. Precondition: a group has begun.
+  void Add(const TileCell& cell, const CellGap::Place& place, double gap);
+
+  // Raises `bound` to that of all cells, reading no more than that needs and no more than a bounded number of samples.
+  // kUnavailable: a raster cannot be read now. kCancelled: stopped.
+  Result<void> Read(double& bound, const std::stop_token& stop);
+
+ private:
+  struct Cell {
+    TileCell cell;
+    CellGap::Place place;
+    double gap;
+  };
+  struct Group {
+    std::vector<Cell> cells;
+    double gap = 0;
+  };
+
+  const Sheet& sheet_;
+  const CellGap& single_;
+  std::vector<Group> groups_;
+};
+
+}  // namespace terrace::dem

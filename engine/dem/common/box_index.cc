@@ -1,0 +1,53 @@
+#include "engine/dem/common/box_index.h"
+
+#include <algorithm>
+#include <boost/geometry/geometries/box.hpp>
+#include <boost/geometry/geometries/point.hpp>
+#include <boost/geometry/index/rtree.hpp>
+#include <boost/geometry/strategies/relate/cartesian.hpp>
+#include <iterator>
+#include <utility>
+
+namespace terrace::dem {
+namespace {
+
+using Point = boost::geometry::model::point<double, 2, boost::geometry::cs::cartesian>;
+using Rectangle = boost::geometry::model::box<Point>;
+using Value = std::pair<Rectangle, std::size_t>;
+
+Rectangle RectangleOf(const Box& box) { return {{box.west, box.south}, {box.east, box.north}}; }
+
+std::vector<Value> ValuesOf(const std::vector<BoxIndex::Entry>& entries) {
+  std::vector<Value> values;
+  values.reserve(entries.size());
+  for (const BoxIndex::Entry& entry : entries) values.emplace_back(RectangleOf(entry.box), entry.value);
+  return values;
+}
+
+}  // namespace
+
+struct BoxIndex::Tree {
+  explicit Tree(const std::vector<Value>& values) : tree(values) {}
+
+  boost::geometry::index::rtree<Value, boost::geometry::index::rstar<16>> tree;
+};
+
+BoxIndex::BoxIndex() = default;
+BoxIndex::BoxIndex(const std::vector<Entry>& entries) : tree_(std::make_unique<const Tree>(ValuesOf(entries))) {}
+BoxIndex::BoxIndex(BoxIndex&&) noexcept = default;
+BoxIndex& BoxIndex::operator=(BoxIndex&&) noexcept = default;
+BoxIndex::~BoxIndex() = default;
+
+std::vector<std::size_t> BoxIndex::Find(const Box& box) const {
+  std::vector<std::size_t> found;
+  if (tree_ == nullptr) return found;
+  for (auto it = tree_->tree.qbegin(boost::geometry::index::intersects(RectangleOf(box))); it != tree_->tree.qend();
+       ++it) {
+    found.push_back(it->second);
+  }
+  std::ranges::sort(found);
+  found.erase(std::unique(found.begin(), found.end()), found.end());
+  return found;
+}
+
+}  // namespace terrace::dem

@@ -1,0 +1,49 @@
+#include "engine/dem/common/source_log.h"
+
+#include <spdlog/spdlog.h>
+
+namespace terrace::dem {
+namespace {
+
+thread_local SourceLog* in_use = nullptr;
+
+spdlog::level::level_enum LevelOf(SourceLog::Level level) {
+  switch (level) {
+    case SourceLog::Level::kDebug:
+      return spdlog::level::debug;
+    case SourceLog::Level::kInfo:
+      return spdlog::level::info;
+    case SourceLog::Level::kWarn:
+      break;
+  }
+  return spdlog::level::warn;
+}
+
+}  // namespace
+
+SourceLog::Use::Use(SourceLog& log) : before_(std::exchange(in_use, &log)) {}
+SourceLog::Use::~Use() { in_use = before_; }
+
+bool SourceLog::IsWritten(Level level) { return spdlog::should_log(LevelOf(level)); }
+
+void SourceLog::Write(Level level, std::string_view kind, const std::string& path, const std::string& text) {
+  if (in_use == nullptr || in_use->Admits(level, kind, text)) spdlog::log(LevelOf(level), "{}: {}", path, text);
+}
+
+bool SourceLog::Admits(Level level, std::string_view kind, const std::string& text) {
+  const std::lock_guard lock(mutex_);
+  Lines& lines = lines_[{level, std::string(kind)}];
+  if (++lines.count > kMostLines) return false;
+  lines.example = text;
+  return true;
+}
+
+SourceLog::~SourceLog() {
+  for (const auto& [kind, lines] : lines_) {
+    if (lines.count <= kMostLines) continue;
+    spdlog::log(LevelOf(kind.first), "{} more sources have lines like this one: {}", lines.count - kMostLines,
+                lines.example);
+  }
+}
+
+}  // namespace terrace::dem

@@ -1,0 +1,114 @@
+// Where a raster lies on the globe: geographic positions to pixel positions and back.
+//
+// Pixel positions are GDAL's: (0, 0) is the outer corner of the first pixel, (.5, .5) its centre; columns to the right,
+// rows downwards in the file.
+#pragma once
+
+#include <gdal_priv.h>
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "engine/core/result.h"
+#include "engine/dem/crs/projector.h"
+#include "engine/dem/gdal/file_stamp.h"
+
+namespace terrace::dem {
+
+// A pixel of another raster on the same grid, counted in the pixels of this one.
+struct PixelOffset {
+  std::int64_t column = 0, row = 0;
+};
+
+// Immutable and thread-safe.
+class Georeference {
+ public:
+  // Errors say what is missing and the command that adds it.
+  static Result<Georeference> Of(GDALDataset& dataset, const std::string& path);
+
+  // Where the first pixel of `other` lies, if both have one CRS and their pixels lie on one grid; else nothing. Columns
+  // around the Earth are not wrapped.
+  std::optional<PixelOffset> OffsetOf(const Georeference& other) const;
+  // A hundredth of a pixel off is on the grid, as around the Earth (FindPeriod): corners are written with few digits.
+  static constexpr double kOffsetTolerance = 0.01;
+  static constexpr double kFarthestPixel = 1LL << 40;  // no raster on the grid begins farther from another one
+
+  // False: OffsetOf gives nothing, whatever the offsets of both are.
+  bool MayAlign(const Georeference& other) const;
+  // The outer corner of `other`'s first pixel, in pixels of this one. Precondition: both have one CRS.
+  Position CornerOf(const Georeference& other) const;
+
+  // Pixels by which those of `other` lie off the pixels of this grid that they count as, `first` its first one: the
+  // most on each axis. Columns of geographic grids are counted modulo 360 degrees.
+  Position LargestMisplacement(const Georeference& other, const PixelOffset& first) const;
+
+  // That of `width` x `height` pixels of the same grid from `first` on. `name` stands for them in errors.
+  Result<Georeference> Moved(const PixelOffset& first, int width, int height, const std::string& name) const;
+
+  // Degrees to pixels, in place; NaN where the CRS has no such position. Longitudes of geographic sources are counted
+  // modulo 360 degrees: the column is the one inside the raster if there is one.
+  void ToPixels(std::span<Position> positions) const;
+
+  // Pixels to degrees, in place; longitudes may lie beyond +-180.
+  void ToDegrees(std::span<Position> positions) const;
+
+  // Positions are an affine function of degrees: no PROJ, no interpolation.
+  bool is_affine() const { return projector_ == nullptr; }
+  // North is up and columns follow meridians, in degrees.
+  bool is_geographic_grid() const { return period_ > 0; }
+  bool columns_run_east() const { return to_crs_[1] > 0; }
+  // Columns in 360 degrees, of a geographic grid; else 0.
+  double period() const { return period_; }
+  // Columns after which the raster repeats itself, if it goes all around the Earth; else 0. Columns beyond are
+  // duplicates.
+  int wrap_columns() const { return wrap_columns_; }
+
+  int width() const { return width_; }
+  int height() const { return height_; }
+
+  const std::string& crs() const { return crs_; }
+  const std::string& vertical_datum() const { return vertical_datum_; }
+  // The compound reference system with the heights' own, WKT; empty where heights are ellipsoidal or nothing is stated.
+  const std::string& vertical_crs() const { return vertical_crs_; }
+  const std::string& vertical_unit() const { return vertical_unit_; }
+  const std::string& pixel_unit() const { return pixel_unit_; }
+  double pixel_width() const;
+  double pixel_height() const;
+  // Pixels to the CRS, in GDAL's order.
+  const std::array<double, 6>& to_crs() const { return to_crs_; }
+  // The CRS without what heights count from, WKT. Empty: it has none.
+  const std::string& horizontal_wkt() const { return horizontal_wkt_; }
+  const Projector* projector() const { return projector_.get(); }  // null where is_affine()
+  std::string transform() const { return projector_ == nullptr ? "" : projector_->description(); }
+  std::string pipeline() const { return projector_ == nullptr ? "" : projector_->pipeline(); }
+
+ private:
+  Result<void> SetAffine(const std::string& path);
+  Result<void> ReadCrs(const OGRSpatialReference& srs, const std::string& path);
+  void FindPeriod(const OGRSpatialReference& srs);
+  void FindTurn();
+  bool HasPixelsOf(const Georeference& other, int side) const;
+  double CanonicalColumn(double column) const;
+
+  int width_ = 0, height_ = 0;
+  std::array<double, 6> to_crs_{};    // pixels -> CRS, GDAL's order
+  std::array<double, 6> to_pixel_{};  // CRS -> pixels
+  // 360 degrees in units of the CRS, if it is geographic or goes on beyond the antimeridian; else 0.
+  double full_circle_ = 0;
+  double centre_x_ = 0;  // of the raster, in the same units
+  double period_ = 0;
+  int wrap_columns_ = 0;
+  std::shared_ptr<const Projector> projector_;  // null: the CRS is WGS 84 longitude and latitude
+  std::string wkt_, horizontal_wkt_;            // of the CRS as stated, and without what heights count from
+  std::string crs_, vertical_datum_, vertical_unit_, vertical_crs_, pixel_unit_;
+};
+
+// Identifies what is in the files of a raster and where it lies: which operation of PROJ places it, and by which grids,
+// depends on what is installed.
+std::uint64_t FingerprintOf(const StampedFiles& files, const Georeference& where);
+
+}  // namespace terrace::dem

@@ -1,0 +1,43 @@
+// How deep a source is served, and which lattice and averaging factor each level uses: functions of source and level
+// alone.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "engine/dem/crs/georeference.h"
+#include "engine/geo/lattice.h"
+#include "engine/geo/mercator_grid.h"
+
+namespace terrace::dem {
+
+// Distances between samples on the ground at the source's centre, in true metres.
+struct SourceSpacing {
+  double east = 0, north = 0;  // one sample on, going east; going north
+  double finer = 0;            // the shorter of a column step and a row step
+  double latitude = 0;         // of the centre, degrees
+  bool geographic = false;     // columns follow meridians
+
+  static Result<SourceSpacing> Of(const Georeference& georeference, const std::string& path);
+};
+
+// Samples of the source along the edge of a lattice cell, the geometric mean of both axes.
+double SamplesPerCell(const geo::Lattice& lattice, const SourceSpacing& spacing);
+
+// The nearest power of two, at least 1: how many samples per axis are averaged into one.
+int AveragingFactor(double samples_per_cell);
+
+// Lattices of levels 0 .. geo::kMaxLevel for a dataset whose finest source is this one.
+std::vector<geo::Lattice> PlanLattices(const SourceSpacing& finest);
+
+// The first depth of Web Mercator's pixels that is at least as fine as the source at its centre, 1 .. geo::kMaxLevel.
+int DeepestMercator(const SourceSpacing& spacing);
+
+// The averaging factor of a depth of Web Mercator.
+int MercatorFactor(int depth, const SourceSpacing& spacing);
+
+// The first level whose default error is at most a tenth of the finer spacing, or at most `finest_error`.
+int DeepestLevel(const SourceSpacing& spacing, double error_fraction, std::optional<double> finest_error);
+
+}  // namespace terrace::dem

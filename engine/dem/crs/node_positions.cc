@@ -1,0 +1,221 @@
+#include "engine/dem/crs/node_positions.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace terrace::dem {
+namespace {
+
+constexpr int kCellNodes = 32;  // grids have a multiple of it, so cells never cross the antimeridian or a pole
+
+// A square of `size` x `size` nodes; it owns the nodes on its western and southern edges.
+struct Cell {
+  std::int64_t column, row;
+  int size;
+};
+
+// Cells are interpolated from kKnots x kKnots of their positions, the outermost on their edges.
+constexpr int kKnots = 5;
+constexpr int kLeastCell = 2 * (kKnots - 1);  // smaller ones have hardly more nodes than that
+
+// Lagrange's weights of the knots, `step` nodes from a cell's edge.
+std::array<double, kKnots> Weights(double step, int size) {
+  const double t = step * (kKnots - 1) / size;
+  std::array<double, kKnots> weights;
+  for (int i = 0; i < kKnots; ++i) {
+    double weight = 1;
+    for (int k = 0; k < kKnots; ++k) {
+      if (k != i) weight *= (t - k) / (i - k);
+    }
+    weights[static_cast<std::size_t>(i)] = weight;
+  }
+  return weights;
+}
+
+// Centres of a lattice's cells, each counted as the node at its south-western corner.
+struct CellCentres {
+  explicit CellCentres(const geo::Lattice& lattice) : halves{lattice.level, 2 * lattice.cells} {}
+
+  double Longitude(std::int64_t column) const { return halves.Longitude(2 * column + 1); }
+  double Latitude(std::int64_t row) const { return halves.Latitude(2 * row + 1); }
+  double StepDegrees() const { return 2 * halves.StepDegrees(); }
+  std::int64_t rows() const { return halves.rows() / 2; }
+
+  geo::Lattice halves;
+};
+
+// Pole rows, and what lies beyond them, are one position each; Web Mercator and the centres of cells have none.
+bool IsPoleRow(const geo::Lattice& lattice, std::int64_t row) { return row <= 0 || row >= lattice.rows(); }
+bool IsPoleRow(const geo::MercatorGrid&, std::int64_t) { return false; }
+bool IsPoleRow(const CellCentres&, std::int64_t) { return false; }
+
+template <typename Grid>
+class GridNodes {
+ public:
+  GridNodes(const Georeference& georeference, const Footprint& footprint, const Grid& grid, const NodeWindow& window,
+            double tolerance)
+      : georeference_(georeference),
+        footprint_(footprint),
+        grid_(grid),
+        window_(window),
+        tolerance_(tolerance),
+        positions_(static_cast<std::size_t>(window.columns) * static_cast<std::size_t>(window.rows), kNowhere) {}
+
+  std::vector<Position> Compute() && {
+    if (georeference_.is_affine()) {
+      FillExactly(window_.column, window_.row, window_.columns, window_.rows);
+    } else {
+      const std::int64_t last_row = std::min(window_.row + window_.rows - 1, grid_.rows() - 1);
+      const std::int64_t east = window_.column + window_.columns;
+      for (std::int64_t row = FloorCell(std::max<std::int64_t>(window_.row, 0)); row <= last_row; row += kCellNodes) {
+        for (std::int64_t column = FloorCell(window_.column); column < east; column += kCellNodes) {
+          Fill({column, row, kCellNodes});
+        }
+      }
+    }
+    FillPoleRows();
+    return std::move(positions_);
+  }
+
+ private:
+  static std::int64_t FloorCell(std::int64_t node) { return node - (node % kCellNodes + kCellNodes) % kCellNodes; }
+
+  Position Degrees(std::int64_t column, std::int64_t row) const {
+    return {grid_.Longitude(column), grid_.Latitude(row)};
+  }
+  Position* At(std::int64_t column, std::int64_t row) {
+    return &positions_[static_cast<std::size_t>((row - window_.row) * window_.columns + (column - window_.column))];
+  }
+
+  // Part of a cell inside the tile's window, as ranges of columns and rows (end exclusive).
+  struct Part {
+    std::int64_t west, south, east, north;
+    bool empty() const { return west >= east || south >= north; }
+  };
+  Part Inside(const Cell& cell) const {
+    return {std::max(cell.column, window_.column), std::max(cell.row, window_.row),
+            std::min(cell.column + cell.size, window_.column + window_.columns),
+            std::min(cell.row + cell.size, window_.row + window_.rows)};
+  }
+
+  void FillExactly(std::int64_t column, std::int64_t row, std::int64_t columns, std::int64_t rows) {
+    for (std::int64_t r = row; r < row + rows; ++r) {
+      for (std::int64_t c = column; c < column + columns; ++c) *At(c, r) = Degrees(c, r);
+      georeference_.ToPixels({At(column, r), static_cast<std::size_t>(columns)});
+    }
+  }
+
+  bool Touches(const Cell& cell) const {
+    const auto [south, north] = std::minmax({grid_.Latitude(cell.row), grid_.Latitude(cell.row + cell.size)});
+    return footprint_.Touches(grid_.Longitude(cell.column), south, cell.size * grid_.StepDegrees(), north - south);
+  }
+
+  void Fill(const Cell& cell) {
+    const Part part = Inside(cell);
+    if (part.empty() || !Touches(cell)) return;
+    if (cell.size < kLeastCell) {
+      FillExactly(part.west, part.south, part.east - part.west, part.north - part.south);
+    } else if (!Interpolate(cell, part)) {
+      const int half = cell.size / 2;
+      Fill({cell.column, cell.row, half});
+      Fill({cell.column + half, cell.row, half});
+      Fill({cell.column, cell.row + half, half});
+      Fill({cell.column + half, cell.row + half, half});
+    }
+  }
+
+  bool Interpolate(const Cell& cell, const Part& part) {
+    // The knots, and four nodes where a term of one degree more in one of the axes is near its largest.
+    constexpr std::size_t kTried = 4;
+    const int spacing = cell.size / (kKnots - 1), half = cell.size / 2, near = cell.size / 8;
+    const std::array<std::array<int, 2>, kTried> tried = {
+        {{near, half}, {half, near}, {cell.size - near, half}, {half, cell.size - near}}};
+    std::array<Position, kKnots * kKnots + kTried> known;
+    for (int i = 0; i < kKnots * kKnots; ++i) {
+      known[static_cast<std::size_t>(i)] = Degrees(cell.column + i % kKnots * spacing, cell.row + i / kKnots * spacing);
+    }
+    for (std::size_t i = 0; i < kTried; ++i) {
+      known[kKnots * kKnots + i] = Degrees(cell.column + tried[i][0], cell.row + tried[i][1]);
+    }
+    georeference_.ToPixels(known);
+    if (std::ranges::any_of(known, [](const Position& p) { return std::isnan(p.x); })) return false;
+    // The knots' columns at one row; then any node of that row.
+    const auto row_at = [&](std::int64_t row) {
+      const auto y = Weights(static_cast<double>(row - cell.row), cell.size);
+      std::array<Position, kKnots> sums;
+      for (std::size_t i = 0; i < kKnots; ++i) {
+        for (std::size_t j = 0; j < kKnots; ++j) {
+          sums[i].x += y[j] * known[kKnots * j + i].x;
+          sums[i].y += y[j] * known[kKnots * j + i].y;
+        }
+      }
+      return sums;
+    };
+    const auto at = [](const std::array<Position, kKnots>& sums, const std::array<double, kKnots>& x) {
+      Position sum;
+      for (std::size_t i = 0; i < kKnots; ++i) {
+        sum.x += x[i] * sums[i].x;
+        sum.y += x[i] * sums[i].y;
+      }
+      return sum;
+    };
+    for (std::size_t i = 0; i < kTried; ++i) {
+      const Position tried_at = at(row_at(cell.row + tried[i][1]), Weights(tried[i][0], cell.size));
+      const Position& exact = known[kKnots * kKnots + i];
+      if (!(std::abs(tried_at.x - exact.x) <= tolerance_ && std::abs(tried_at.y - exact.y) <= tolerance_)) return false;
+    }
+    std::array<std::array<double, kKnots>, kCellNodes> weights;
+    for (std::int64_t column = part.west; column < part.east; ++column) {
+      weights[static_cast<std::size_t>(column - cell.column)] =
+          Weights(static_cast<double>(column - cell.column), cell.size);
+    }
+    for (std::int64_t row = part.south; row < part.north; ++row) {
+      const auto sums = row_at(row);
+      for (std::int64_t column = part.west; column < part.east; ++column) {
+        *At(column, row) = at(sums, weights[static_cast<std::size_t>(column - cell.column)]);
+      }
+    }
+    return true;
+  }
+
+  void FillPoleRows() {
+    for (std::int64_t row = window_.row; row < window_.row + window_.rows; ++row) {
+      if (!IsPoleRow(grid_, row)) continue;
+      Position pole{0, grid_.Latitude(row)};
+      georeference_.ToPixels({&pole, 1});
+      std::fill_n(At(window_.column, row), window_.columns, pole);
+    }
+  }
+
+  const Georeference& georeference_;
+  const Footprint& footprint_;
+  const Grid grid_;
+  const NodeWindow window_;
+  const double tolerance_;
+  std::vector<Position> positions_;
+};
+
+}  // namespace
+
+NodeWindow WindowOfTile(const geo::Lattice& lattice, const geo::TileKey& key) {
+  return {lattice.FirstColumn(key) - 1, lattice.FirstRow(key) - 1, lattice.cells + 3, lattice.cells + 3};
+}
+
+std::vector<Position> NodePositions(const Georeference& georeference, const Footprint& footprint,
+                                    const geo::Lattice& lattice, const NodeWindow& window, double tolerance) {
+  return GridNodes(georeference, footprint, lattice, window, tolerance).Compute();
+}
+
+std::vector<Position> NodePositions(const Georeference& georeference, const Footprint& footprint,
+                                    const geo::MercatorGrid& grid, const NodeWindow& window, double tolerance) {
+  return GridNodes(georeference, footprint, grid, window, tolerance).Compute();
+}
+
+std::vector<Position> CellCentrePositions(const Georeference& georeference, const Footprint& footprint,
+                                          const geo::Lattice& lattice, const geo::TileKey& key, double tolerance) {
+  const NodeWindow window{lattice.FirstColumn(key), lattice.FirstRow(key), lattice.cells, lattice.cells};
+  return GridNodes(georeference, footprint, CellCentres(lattice), window, tolerance).Compute();
+}
+
+}  // namespace terrace::dem

@@ -1,0 +1,51 @@
+// Positions on the globe to positions in a CRS and back, through one pinned PROJ operation.
+//
+// GDAL's own transformation picks, where several operations exist, the one that suits the mean of the points it is
+// handed: the same node could land elsewhere in another batch. Here the operation is chosen once, for the source's own
+// area.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <string>
+
+#include "engine/core/result.h"
+#include "engine/dem/gdal/file_stamp.h"
+#include "engine/dem/gdal/operation_pool.h"
+
+namespace terrace::dem {
+
+struct Position {
+  double x = 0, y = 0;  // degrees east and north, or the CRS's easting and northing, or pixel column and row
+};
+
+// Thread-safe: every call borrows a PROJ context of its own.
+class Projector {
+ public:
+  // Longitude and latitude (WGS 84, degrees) to the horizontal CRS `wkt`, in the order easting, northing.
+  // `centre` is a position in that CRS where the chosen operation must be at its best.
+  static Result<std::shared_ptr<const Projector>> Make(const std::string& wkt, Position centre);
+
+  // Transforms in place. Positions outside the operation's domain become NaN.
+  void Forward(std::span<Position> positions) const;  // degrees -> CRS
+  void Inverse(std::span<Position> positions) const;  // CRS -> degrees
+
+  bool is_identity() const { return pipeline() == "proj=noop"; }
+  const std::string& pipeline() const { return operations_.pipeline(); }  // as PROJ runs it
+  const StampedFiles& grids() const { return grids_; }                    // the files that it reads
+  const std::string& description() const { return description_; }         // for people
+
+ private:
+  Projector() = default;
+  void Transform(std::span<Position> positions, bool forward) const;
+
+  std::string description_;
+  StampedFiles grids_;
+  OperationPool operations_;
+};
+
+// The reference system of an EPSG code as WKT 2:2019, from PROJ's database: the same on every thread. Empty: there is
+// none.
+std::string EpsgWkt(const std::string& code);
+
+}  // namespace terrace::dem

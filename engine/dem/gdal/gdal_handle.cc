@@ -1,0 +1,28 @@
+#include "engine/dem/gdal/gdal_handle.h"
+
+#include "engine/dem/gdal/gdal_runtime.h"
+#include "engine/dem/gdal/raster_file.h"
+
+namespace terrace::dem {
+
+Result<HandlePool::Handle> HandlePool::Borrow() {
+  if (auto unchanged = CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
+  IdlePool<GDALDataset>::Taken dataset = idle_.Take();
+  if (dataset.item != nullptr) return Handle(idle_, std::move(dataset));
+  dataset.item = ReopenRaster(path_);
+  const std::string why = dataset.item == nullptr ? TakeGdalError() : "";
+  // It may have been replaced or removed between the look at it and the opening, which may have failed for that.
+  if (auto unchanged = CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
+  if (dataset.item == nullptr) {
+    return MakeError(ErrorCode::kUnavailable, "{}: cannot be opened any more ({}); restore the file", path_, why);
+  }
+  return Handle(idle_, std::move(dataset));
+}
+
+Result<void> HandlePool::CheckUnchanged() {
+  Result<void> unchanged = files_.CheckUnchanged(path_);
+  if (!unchanged) idle_.Clear();
+  return unchanged;
+}
+
+}  // namespace terrace::dem

@@ -1,0 +1,80 @@
+#include "engine/dem/gdal/gdal_runtime.h"
+
+#include <cpl_conv.h>
+#include <cpl_error.h>
+#include <gdal.h>
+#include <ogr_srs_api.h>
+
+#include <atomic>
+#include <mutex>
+#include <string>
+#include <utility>
+
+#include "engine/core/check.h"
+#include "engine/dem/common/idle_pool.h"
+#include "engine/dem/dem_types.h"
+#include "engine/dem/gdal/driver_list.h"
+#include "engine/dem/gdal/gdal_settings.h"
+#include "engine/dem/gdal/network_guard.h"
+
+namespace terrace::dem {
+namespace {
+
+constexpr GIntBig kBlockCacheBytes = GIntBig{256} << 20;  // unless SetGdalCache says otherwise
+
+std::atomic<std::uint64_t> errors{0}, warnings{0};
+
+thread_local std::string last_error;
+
+// GDAL's own handler goes silent after 1,000 messages and prints before that; ours keeps the last one, for our Errors.
+void CPL_STDCALL KeepLastError(CPLErr severity, CPLErrorNum, const char* message) {
+  if (severity == CE_Warning) ++warnings;
+  if (severity < CE_Failure) return;
+  ++errors;
+  last_error = message;
+}
+
+void InitOnce() {
+  CPLSetErrorHandler(KeepLastError);
+  CPLSetConfigOption("GDAL_VRT_ENABLE_PYTHON", "NO");
+  CPLSetConfigOption("GDAL_DRIVER_PATH", "disable");
+  // What heights count from is left out of GeoTIFFs before version 1.1 otherwise.
+  CPLSetConfigOption("GTIFF_REPORT_COMPD_CS", "YES");
+  OSRSetPROJEnableNetwork(0);
+  GDALSetCacheMax64(kBlockCacheBytes);
+  // Settings come from terrace's configuration; GDAL would read its own files otherwise.
+  CPLSetConfigOption("GDAL_CONFIG_FILE", "/dev/null");
+  GDALAllRegister();
+  // Unless the configuration says more: SetSourcePolicy.
+  const Result<void> used = UseDrivers(DefaultDrivers());
+  TERRACE_CHECK(used.has_value());
+  GuardNetwork({});
+}
+
+}  // namespace
+
+void InitGdal() {
+  static std::once_flag once;
+  std::call_once(once, InitOnce);
+}
+
+void SetGdalCache(std::size_t bytes) {
+  InitGdal();
+  GDALSetCacheMax64(static_cast<GIntBig>(bytes));
+}
+
+void SetOpenSources(std::size_t idle, std::size_t vrt_parts) {
+  InitGdal();
+  SetMostIdle(idle);
+  CPLSetConfigOption("GDAL_MAX_DATASET_POOL_SIZE", std::to_string(vrt_parts).c_str());
+}
+
+GdalCounts CountGdalErrors() { return {errors, warnings, static_cast<std::uint64_t>(GDALGetCacheUsed64())}; }
+
+std::string TakeGdalError() {
+  return last_error.empty() ? std::string("no further detail") : std::exchange(last_error, {});
+}
+
+void ForgetGdalError() { last_error.clear(); }
+
+}  // namespace terrace::dem

@@ -1,0 +1,275 @@
+#include "engine/dem/gdal/raster_file.h"
+
+#include <cpl_conv.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <cstdlib>
+#include <filesystem>
+#include <optional>
+#include <set>
+#include <system_error>
+#include <utility>
+
+#include "engine/dem/gdal/driver_list.h"
+#include "engine/dem/gdal/gdal_runtime.h"
+#include "engine/dem/gdal/source_policy.h"
+#include "engine/dem/gdal/vrt_check.h"
+
+namespace terrace::dem {
+namespace {
+
+// A one arc-second raster of the whole Earth has 1,296,000 columns.
+constexpr int kMaxSide = 1 << 22;
+constexpr std::int64_t kMaxSamples = std::int64_t{1} << 36;
+// GDAL decodes whole storage blocks, whatever its cache is allowed: a small file can claim a block of gigabytes.
+constexpr std::int64_t kMaxBlockBytes = std::int64_t{128} << 20;
+constexpr int kMostBands = 4096;  // hyperspectral images have hundreds
+
+constexpr unsigned kOpenFlags = GDAL_OF_RASTER | GDAL_OF_READONLY | GDAL_OF_VERBOSE_ERROR;
+
+// While it lives GDAL looks for files beside a raster by their names, instead of listing the folder at each opening: of
+// thousands of rasters in one folder that would be most of the work. Of remote folders a listing is one request.
+class LookUpSidecars {
+ public:
+  explicit LookUpSidecars(const std::string& path) {
+    if (!IsRemote(path)) option_.emplace("GDAL_DISABLE_READDIR_ON_OPEN", "TRUE", /*bSetOnlyIfUndefined=*/false);
+  }
+
+ private:
+  std::optional<CPLConfigOptionSetter> option_;  // of this thread
+};
+
+// What one read of a band decodes at least: a block, with those of the bands it is stored with.
+std::int64_t BytesPerBlock(GDALDataset& dataset, GDALRasterBand& band) {
+  int width = 0, height = 0;
+  band.GetBlockSize(&width, &height);
+  const char* const interleave = dataset.GetMetadataItem("INTERLEAVE", "IMAGE_STRUCTURE");
+  const std::int64_t together = interleave != nullptr && EQUAL(interleave, "PIXEL") ? dataset.GetRasterCount() : 1;
+  return std::int64_t{width} * height * GDALGetDataTypeSizeBytes(band.GetRasterDataType()) * together;
+}
+
+Result<void> CheckBlocks(GDALDataset& dataset, GDALRasterBand& band, const std::string& path) {
+  const std::int64_t bytes = BytesPerBlock(dataset, band);
+  if (bytes <= kMaxBlockBytes) return {};
+  int width = 0, height = 0;
+  band.GetBlockSize(&width, &height);
+  return MakeError(ErrorCode::kInvalidArgument,
+                   "{}: stored in blocks of {} x {} samples ({} MiB each), too large to read tiles from; rewrite it "
+                   "with `gdal_translate -b 1 -co TILED=YES -co COMPRESS=DEFLATE in out.tif`",
+                   path, width, height, bytes >> 20);
+}
+
+Result<void> CheckShape(GDALDataset& dataset, const std::string& path) {
+  if (dataset.GetRasterCount() < 1) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{}: has no raster bands; a container needs the name of one of its rasters: list them with "
+                     "`gdalinfo {}` and extract one with gdal_translate",
+                     path, path);
+  }
+  GDALRasterBand& band = HeightBand(dataset);
+  if (GDALDataTypeIsComplex(band.GetRasterDataType()) != 0) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{}: samples are complex numbers ({}), heights must be real; convert "
+                     "with `gdal_translate -ot Float32 in out`",
+                     path, GDALGetDataTypeName(band.GetRasterDataType()));
+  }
+  const std::int64_t width = dataset.GetRasterXSize(), height = dataset.GetRasterYSize();
+  if (width < 2 || height < 2) {
+    return MakeError(ErrorCode::kInvalidArgument, "{}: {} x {} samples are no surface; at least 2 x 2 are needed", path,
+                     width, height);
+  }
+  if (width > kMaxSide || height > kMaxSide || width * height > kMaxSamples) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{}: {} x {} samples; at most {} a side and {} in all can be served: cut it with gdal_translate "
+                     "-srcwin or coarsen it with `gdalwarp -tr`",
+                     path, width, height, kMaxSide, kMaxSamples);
+  }
+  if (dataset.GetRasterCount() > kMostBands) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{}: has {} bands; take the one with heights out with "
+                     "`gdal_translate -b 1 in out.tif`",
+                     path, dataset.GetRasterCount());
+  }
+  if (auto blocks = CheckBlocks(dataset, band, path); !blocks) return blocks;
+  if (auto links = CheckLinks(dataset, path); !links) return links;
+  if (HasMaskBand(band)) {
+    if (auto blocks = CheckBlocks(dataset, *band.GetMaskBand(), path); !blocks) return blocks;
+  }
+  for (int i = 0; i < band.GetOverviewCount(); ++i) {
+    GDALRasterBand* const overview = band.GetOverview(i);
+    if (overview == nullptr) continue;
+    if (auto blocks = CheckBlocks(dataset, *overview, path); !blocks) return blocks;
+  }
+  return {};
+}
+
+// Where the blocks of a GeoTIFF's bands end, at least, as its directory says.
+class BlockEnds {
+ public:
+  explicit BlockEnds(GDALDataset& dataset) {
+    const auto structure = [&dataset](const char* item) { return dataset.GetMetadataItem(item, "IMAGE_STRUCTURE"); };
+    is_compressed_ = structure("COMPRESSION") != nullptr;
+    const char* const interleave = structure("INTERLEAVE");
+    bands_of_block_ = interleave != nullptr && EQUAL(interleave, "PIXEL") ? dataset.GetRasterCount() : 1;
+  }
+
+  std::uint64_t last() const { return last_; }
+
+  void Add(GDALRasterBand& band) {
+    int width = 0, height = 0;
+    band.GetBlockSize(&width, &height);
+    const int columns = (band.GetXSize() - 1) / width + 1, rows = (band.GetYSize() - 1) / height + 1;
+    for (int row = 0; row < rows; ++row) {
+      for (int column = 0; column < columns && looked_at_ < kMostBlocks; ++column, ++looked_at_) {
+        const std::uint64_t offset = Tell(band, "BLOCK_OFFSET", column, row);
+        if (offset == 0) continue;  // it has none: zeros
+        std::uint64_t bytes = Tell(band, "BLOCK_SIZE", column, row);
+        // The last strip may state those of a whole one, and is read by the rows that it has; a tile is read whole.
+        const int strip_rows = std::min(height, band.GetYSize() - row * height);
+        if (!is_compressed_)
+          bytes = std::min(bytes, BytesOf(band, width, width == band.GetXSize() ? strip_rows : height));
+        last_ = std::max(last_, offset + bytes);
+      }
+    }
+  }
+
+ private:
+  static constexpr std::int64_t kMostBlocks = std::int64_t{1} << 20;  // half a second
+
+  static std::uint64_t Tell(GDALRasterBand& band, const char* what, int column, int row) {
+    const char* const text = band.GetMetadataItem(fmt::format("{}_{}_{}", what, column, row).c_str(), "TIFF");
+    return text == nullptr ? 0 : std::strtoull(text, nullptr, 10);
+  }
+
+  // At least: bits of samples below a byte are not counted.
+  std::uint64_t BytesOf(GDALRasterBand& band, int width, int rows) const {
+    const char* const bits = band.GetMetadataItem("NBITS", "IMAGE_STRUCTURE");
+    if (bits != nullptr) return 1;
+    const auto sample = static_cast<std::uint64_t>(GDALGetDataTypeSizeBytes(band.GetRasterDataType()));
+    return sample * static_cast<std::uint64_t>(bands_of_block_) * static_cast<std::uint64_t>(width) *
+           static_cast<std::uint64_t>(rows);
+  }
+
+  bool is_compressed_ = false;
+  int bands_of_block_ = 1;
+  std::int64_t looked_at_ = 0;
+  std::uint64_t last_ = 0;
+};
+
+}  // namespace
+
+Result<void> CheckSizeToMesh(const std::string& path, int width, int height) {
+  // Two gigabytes of floats: what is meshed in one piece must fit in memory several times over.
+  constexpr std::int64_t kMostSamples = std::int64_t{1} << 29;
+  constexpr int kMostPerSide = 1 << 15;  // the mesher's coordinates have 15 bits
+  if (std::int64_t{width} * height <= kMostSamples && std::max(width, height) <= kMostPerSide) return {};
+  return MakeError(ErrorCode::kInvalidArgument,
+                   "{}: {} x {} samples are too many to mesh in one piece (at most {} in all and {} a side); cut it "
+                   "with gdal_translate -srcwin",
+                   path, width, height, kMostSamples, kMostPerSide);
+}
+
+void ForgetRemote(const std::string& path) {
+  if (!AllowsRemote()) return;
+  if (IsRemote(path)) return VSICurlPartialClearCache(path.c_str());
+  if (path.starts_with("/vsi") || !CheckSourceName(path) || !LooksLikeVrt(path)) return;
+  for (const std::string& part : PartsOfVrt(path)) {
+    if (IsRemote(part)) VSICurlPartialClearCache(part.c_str());
+  }
+}
+
+bool IsRaster(const std::string& path) {
+  // GDAL's driver for ESRI's .hdr takes whatever lies beside one for the raster.
+  for (const char* sidecar : {"ovr", "msk", "aux", "rrd", "hdr", "prj", "qpj", "stx", "clr", "blw", "tfw", "wld"}) {
+    if (EQUAL(CPLGetExtension(path.c_str()), sidecar)) return false;
+  }
+  if (path.ends_with(".aux.xml")) return false;
+  InitGdal();
+  if (!CheckPlainFile(path)) return true;  // opening it says why not
+  const LookUpSidecars looked_up(path);
+  return GDALIdentifyDriverEx(path.c_str(), GDAL_OF_RASTER, nullptr, nullptr) != nullptr;
+}
+
+GDALDatasetUniquePtr ReopenRaster(const std::string& path, int overview) {
+  InitGdal();
+  ForgetGdalError();
+  const LookUpSidecars looked_up(path);
+  const std::string level = fmt::format("OVERVIEW_LEVEL={}", overview);
+  const char* const options[] = {overview < 0 ? nullptr : level.c_str(), nullptr};
+  return GDALDatasetUniquePtr(GDALDataset::Open(path.c_str(), kOpenFlags, nullptr, options));
+}
+
+Result<GDALDatasetUniquePtr> OpenRaster(const std::string& path, int overview) {
+  InitGdal();
+  if (auto name = CheckSourceName(path); !name) return tl::unexpected(name.error());
+  GDALDatasetUniquePtr dataset = ReopenRaster(path, overview);
+  if (dataset == nullptr) {
+    std::string problem = TakeGdalError();
+    if (const auto format = LeftOutDriverOf(path)) {
+      return MakeError(
+          ErrorCode::kInvalidArgument,
+          "{}: its format, {}, is not among the allowed_drivers; add \"{}\" to them, or convert the file with "
+          "`gdal_translate in out.tif`",
+          path, *format, *format);
+    }
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{}: cannot be opened as a raster ({}); check the file with `gdalinfo {}` and its permissions",
+                     path, problem, path);
+  }
+  if (auto shape = CheckShape(*dataset, path); !shape) return tl::unexpected(shape.error());
+  return dataset;
+}
+
+Result<void> CheckComplete(GDALDataset& dataset, const std::string& path, int bands) {
+  if (!EQUAL(dataset.GetDriverName(), "GTiff") || IsRemote(path)) return {};
+  std::error_code unknown;
+  const std::uint64_t size = std::filesystem::file_size(path, unknown);
+  if (unknown) return {};
+  const bool has_own_overviews = !std::filesystem::exists(path + ".ovr", unknown);
+  const bool has_own_mask = !std::filesystem::exists(path + ".msk", unknown);
+  BlockEnds ends(dataset);
+  for (int number = 1; number <= std::min(bands, dataset.GetRasterCount()); ++number) {
+    GDALRasterBand& band = *dataset.GetRasterBand(number);
+    ends.Add(band);
+    for (int i = 0; has_own_overviews && i < band.GetOverviewCount(); ++i) {
+      if (GDALRasterBand* const overview = band.GetOverview(i)) ends.Add(*overview);
+    }
+    if (has_own_mask && HasMaskBand(band)) ends.Add(*band.GetMaskBand());
+  }
+  if (ends.last() <= size) return {};
+  return MakeError(ErrorCode::kUnavailable,
+                   "{}: is cut short: it has {} bytes, and its last samples lie up to byte {}; copy it again", path,
+                   size, ends.last());
+}
+
+bool HasMaskBand(GDALRasterBand& band) {
+  const int flags = band.GetMaskFlags();
+  return (flags & GMF_PER_DATASET) != 0 || flags == 0;  // 0: a mask of this band alone
+}
+
+std::string PicturePartOf(GDALRasterBand& band) {
+  const GDALColorInterp part = band.GetColorInterpretation();
+  const bool is_picture = part != GCI_Undefined && part != GCI_GrayIndex && part != GCI_AlphaBand;
+  return is_picture ? GDALGetColorInterpretationName(part) : "";
+}
+
+std::vector<std::string> FilesOf(GDALDataset& dataset, const std::string& path) {
+  std::vector<std::string> files = {path};
+  char** list = dataset.GetFileList();
+  for (char** name = list; name != nullptr && *name != nullptr; ++name) {
+    if (path != *name) files.emplace_back(*name);
+  }
+  CSLDestroy(list);
+  if (IsRemote(path) || !LooksLikeVrt(path)) return files;
+  std::set<std::string> known(files.begin(), files.end());
+  for (const std::string& part : PartsOfVrt(path)) {
+    for (const char* beside : {"", ".ovr", ".msk", ".aux.xml"}) {
+      if (std::string name = part + beside; known.insert(name).second) files.push_back(std::move(name));
+      if (IsRemote(part)) break;  // what is beside it takes a request each to know
+    }
+  }
+  return files;
+}
+
+}  // namespace terrace::dem

@@ -1,0 +1,215 @@
+#include "engine/dem/gdal/sample_rules.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "engine/dem/gdal/gdal_runtime.h"
+#include "engine/dem/gdal/raster_file.h"
+
+namespace terrace::dem {
+namespace {
+
+// Raw samples converted at a time: bounds the scratch memory of a read (8 MiB) and how late a stop is noticed.
+constexpr int kSamplesPerRead = 1 << 20;
+
+std::optional<double> NodataOf(GDALRasterBand& band) {
+  int has = 0;
+  double value = 0;
+  switch (band.GetRasterDataType()) {
+    case GDT_Int64:
+      value = static_cast<double>(band.GetNoDataValueAsInt64(&has));
+      break;
+    case GDT_UInt64:
+      value = static_cast<double>(band.GetNoDataValueAsUInt64(&has));
+      break;
+    default:
+      value = band.GetNoDataValue(&has);
+      break;
+  }
+  if (has != 0) return value;
+  // Many 16-bit elevation files carry the SRTM void without declaring it; no place on Earth is there.
+  if (band.GetRasterDataType() == GDT_Int16) return std::numeric_limits<std::int16_t>::min();
+  return std::nullopt;
+}
+
+// The band that says which samples are valid: GDAL's mask, or alpha of a type that it does not take for one. Null: all
+// are.
+GDALRasterBand* MaskOf(GDALRasterBand& band) {
+  if (HasMaskBand(band)) return band.GetMaskBand();
+  GDALDataset* const dataset = band.GetDataset();
+  for (int i = 1; dataset != nullptr && i <= dataset->GetRasterCount(); ++i) {
+    GDALRasterBand* const other = dataset->GetRasterBand(i);
+    if (other != &band && other->GetColorInterpretation() == GCI_AlphaBand) return other;
+  }
+  return nullptr;
+}
+
+bool IsSignedByte(GDALRasterBand& band) {
+  const char* const type = band.GetMetadataItem("PIXELTYPE", "IMAGE_STRUCTURE");
+  return band.GetRasterDataType() == GDT_Byte && type != nullptr && EQUAL(type, "SIGNEDBYTE");
+}
+
+}  // namespace
+
+std::optional<double> MetresPerUnit(const std::string& unit) {
+  std::string name;
+  for (const char c : unit) {
+    if (std::isalpha(static_cast<unsigned char>(c)))
+      name += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  }
+  constexpr double kFoot = 0.3048, kSurveyFoot = 1200.0 / 3937.0;
+  constexpr std::array<std::pair<std::string_view, double>, 36> kUnits = {{
+      {"", 1},
+      {"m", 1},
+      {"metre", 1},
+      {"metres", 1},
+      {"meter", 1},
+      {"meters", 1},
+      {"cm", .01},
+      {"mm", .001},
+      {"km", 1000},
+      {"centimetre", .01},
+      {"decimetre", .1},
+      {"ft", kFoot},
+      {"foot", kFoot},
+      {"feet", kFoot},
+      {"internationalfoot", kFoot},
+      {"ussurveyfoot", kSurveyFoot},
+      {"footussurvey", kSurveyFoot},
+      {"ftus", kSurveyFoot},
+      {"usft", kSurveyFoot},
+      {"ussurveyfeet", kSurveyFoot},
+      {"footus", kSurveyFoot},
+      {"surveyfoot", kSurveyFoot},
+      {"feetus", kSurveyFoot},
+      {"usfeet", kSurveyFoot},
+      {"usfoot", kSurveyFoot},
+      {"yard", 3 * kFoot},
+      {"yards", 3 * kFoot},
+      {"fathom", 6 * kFoot},
+      {"fathoms", 6 * kFoot},
+      {"dm", .1},
+      {"decimeter", .1},
+      {"centimeter", .01},
+      {"millimetre", .001},
+      {"millimeter", .001},
+      {"kilometre", 1000},
+      {"kilometer", 1000},
+  }};
+  for (const auto& [known, metres] : kUnits) {
+    if (known == name) return metres;
+  }
+  return std::nullopt;
+}
+
+SampleRules SampleRules::Of(GDALRasterBand& band, const std::string& crs_unit) {
+  SampleRules rules;
+  rules.nodata = NodataOf(band);
+  rules.compare_as_float = band.GetRasterDataType() == GDT_Float32;
+  rules.has_mask = MaskOf(band) != nullptr;
+  rules.is_signed_byte = IsSignedByte(band);
+  rules.scale = band.GetScale();
+  rules.offset = band.GetOffset();
+  rules.unit = band.GetUnitType();
+  if (rules.unit.empty()) rules.unit = crs_unit;
+  rules.metres_per_unit = MetresPerUnit(rules.unit).value_or(1);
+  return rules;
+}
+
+namespace {
+
+// One mark of voids at most and nothing else to look out for: what most bands are.
+bool IsPlain(const SampleRules& rules) { return !rules.has_mask && !rules.is_indicator && rules.marks.empty(); }
+
+// As ToHeight, without its questions.
+void ToPlainHeights(const SampleRules& rules, const std::vector<double>& raw, std::size_t count, float* out) {
+  double mark = rules.nodata.value_or(std::numeric_limits<double>::quiet_NaN());  // equal to nothing
+  // Samples of Float32 bands are float32 numbers: equal as such are those that equal the rounded mark.
+  if (rules.compare_as_float) mark = static_cast<float>(mark);
+  const double scale = rules.scale, offset = rules.offset, unit = rules.metres_per_unit;
+  const double lowest = rules.lowest, highest = rules.highest;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double height = (raw[i] * scale + offset) * unit;
+    const bool is_valid = (raw[i] != mark) & (height >= lowest) & (height <= highest);
+    out[i] = is_valid ? static_cast<float>(height) : SampleRules::kVoid;
+  }
+}
+
+Result<void> ReadSamples(GDALRasterBand& band, const SampleRules& rules, int col, int row, int cols, int rows,
+                         float* out, const std::stop_token& stop) {
+  const int rows_at_once = std::clamp(kSamplesPerRead / cols, 1, rows);
+  std::vector<double> raw(static_cast<std::size_t>(cols) * static_cast<std::size_t>(rows_at_once));
+  std::vector<std::uint8_t> mask(rules.has_mask ? raw.size() : 0);
+  for (int done = 0; done < rows; done += rows_at_once) {
+    if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "reading heights was stopped");
+    const int count = std::min(rows_at_once, rows - done);
+    ForgetGdalError();
+    CPLErr status =
+        band.RasterIO(GF_Read, col, row + done, cols, count, raw.data(), cols, count, GDT_Float64, 0, 0, nullptr);
+    if (status == CE_None && rules.has_mask) {
+      GDALRasterBand* const valid = MaskOf(band);
+      status = valid == nullptr ? CE_Failure
+                                : valid->RasterIO(GF_Read, col, row + done, cols, count, mask.data(), cols, count,
+                                                  GDT_Byte, 0, 0, nullptr);
+    }
+    if (status != CE_None) {
+      return MakeError(ErrorCode::kUnavailable, "rows {}..{} cannot be read ({})", row + done, row + done + count - 1,
+                       TakeGdalError());
+    }
+    const std::size_t samples = static_cast<std::size_t>(cols) * static_cast<std::size_t>(count);
+    if (rules.is_signed_byte) {
+      for (std::size_t i = 0; i < samples; ++i) raw[i] -= raw[i] > 127 ? 256 : 0;
+    }
+    if (IsPlain(rules)) {
+      ToPlainHeights(rules, raw, samples, out);
+    } else {
+      for (std::size_t i = 0; i < samples; ++i) {
+        out[i] = rules.has_mask && mask[i] == 0 ? rules.Hidden() : rules.ToHeight(raw[i]);
+      }
+    }
+    out += samples;
+  }
+  return {};
+}
+
+// Of `count` values `stride` apart: those at most `reach` from a void become voids.
+void WidenVoids(float* first, int count, std::ptrdiff_t stride, int reach, std::vector<char>& near) {
+  near.assign(static_cast<std::size_t>(count), 0);
+  for (int i = 0; i < count; ++i) {
+    if (!std::isnan(first[i * stride])) continue;
+    std::fill(near.begin() + std::max(i - reach, 0), near.begin() + std::min(i + reach + 1, count), 1);
+  }
+  for (int i = 0; i < count; ++i) {
+    if (near[static_cast<std::size_t>(i)] != 0) first[i * stride] = SampleRules::kVoid;
+  }
+}
+
+}  // namespace
+
+Result<void> ReadHeights(GDALRasterBand& band, const SampleRules& rules, int col, int row, int cols, int rows,
+                         float* out, const std::stop_token& stop) {
+  if (rules.rim == 0) return ReadSamples(band, rules, col, row, cols, rows, out, stop);
+  // As far around as voids reach: a sample is a void or none whatever the window.
+  const int left = std::max(col - rules.rim, 0), top = std::max(row - rules.rim, 0);
+  const int wide = std::min(col + cols + rules.rim, band.GetXSize()) - left;
+  const int high = std::min(row + rows + rules.rim, band.GetYSize()) - top;
+  std::vector<float> around(static_cast<std::size_t>(wide) * static_cast<std::size_t>(high));
+  if (auto read = ReadSamples(band, rules, left, top, wide, high, around.data(), stop); !read) return read;
+  std::vector<char> near;
+  for (int r = 0; r < high; ++r) WidenVoids(&around[static_cast<std::size_t>(r) * wide], wide, 1, rules.rim, near);
+  for (int c = 0; c < wide; ++c) WidenVoids(&around[static_cast<std::size_t>(c)], high, wide, rules.rim, near);
+  for (int r = 0; r < rows; ++r) {
+    const auto first = around.begin() + std::ptrdiff_t{row - top + r} * wide + (col - left);
+    std::copy(first, first + cols, out + std::ptrdiff_t{r} * cols);
+  }
+  return {};
+}
+
+}  // namespace terrace::dem

@@ -1,0 +1,130 @@
+#include "engine/dem/image/water_raster.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "engine/core/check.h"
+#include "engine/dem/crs/footprint.h"
+#include "engine/dem/crs/georeference.h"
+#include "engine/dem/crs/level_plan.h"
+#include "engine/dem/crs/node_positions.h"
+#include "engine/dem/gdal/gdal_handle.h"
+#include "engine/dem/gdal/raster_file.h"
+#include "engine/dem/raster/grid_cells.h"
+#include "engine/dem/raster/sample_grid.h"
+
+namespace terrace::dem {
+namespace {
+
+// In samples of the grid that is read: far below what shows in 8 bits.
+constexpr double kWaterPositionTolerance = 1e-3;
+
+RasterLayout LayoutOf(GDALDataset& dataset, const Georeference& georeference) {
+  RasterLayout layout;
+  layout.width = georeference.width();
+  layout.height = georeference.height();
+  layout.wraps = georeference.wrap_columns() > 0;
+  layout.columns = layout.wraps ? georeference.wrap_columns() : layout.width;
+  layout.rules = SampleRules::Of(HeightBand(dataset), "");
+  layout.rules.is_indicator = true;
+  layout.overview_factors = OverviewFactors(HeightBand(dataset));
+  return layout;
+}
+
+}  // namespace
+
+class WaterRaster::Impl {
+ public:
+  Impl(std::string path_of_file, StampedFiles files, Georeference where)
+      : path(std::move(path_of_file)), handles(path, std::move(files)), georeference(std::move(where)) {}
+
+  Result<std::vector<std::uint8_t>> Read(const geo::TileKey& key, const std::stop_token& stop);
+
+  const std::string path;
+  HandlePool handles;
+  const Georeference georeference;
+  SourceSpacing spacing;
+  RasterLayout layout;
+  Footprint footprint;  // padded: outside it there is no water
+
+ private:
+  bool IsInside(const Position& position) const {  // false for NaN
+    const bool row = position.y >= 0 && position.y <= layout.height;
+    return row && (layout.wraps ? !std::isnan(position.x) : position.x >= 0 && position.x <= layout.width);
+  }
+};
+
+Result<std::vector<std::uint8_t>> WaterRaster::Impl::Read(const geo::TileKey& key, const std::stop_token& stop) {
+  std::vector<std::uint8_t> pixels(std::size_t{kSide} * kSide, 0);
+  const geo::Lattice lattice{key.level, kSide};
+  const double samples_per_pixel = SamplesPerCell(lattice, spacing);
+  const int factor = AveragingFactor(samples_per_pixel);
+  // From all land to all water in one pixel, however far apart the samples are.
+  const double sharpness = std::max(1.0, factor / samples_per_pixel);
+
+  const std::vector<Position> positions =
+      CellCentrePositions(georeference, footprint, lattice, key, kWaterPositionTolerance * factor);
+  const GridAxis columns(layout.columns, factor, layout.wraps), rows(layout.height, factor, false);
+  CellFinder finder(columns, rows, layout.width, layout.height, kSide);
+  std::vector<GridCell> cells;
+  std::vector<std::size_t> targets;  // pixel of each cell
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    if (!IsInside(positions[i])) continue;
+    cells.push_back(finder.At(positions[i], i));
+    const std::size_t row_from_south = i / kSide;
+    targets.push_back((kSide - 1 - row_from_south) * kSide + i % kSide);
+  }
+  // Files are looked at even where nothing must be read: no tile may outlive its mask.
+  auto handle = handles.Borrow();
+  if (!handle) return tl::unexpected(handle.error());
+  if (cells.empty()) return pixels;
+  const GridWindow window = WindowOf(cells, columns, rows);
+  const auto shares = ReadGrid(**handle, layout, factor, window, stop);
+  if (auto unchanged = handles.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
+  if (!shares) {
+    return MakeError(shares.error().code, "{}: tile {}: {}", path, geo::ToString(key), shares.error().message);
+  }
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    const double share = Interpolate(*shares, window, cells[i]).value_or(0);
+    const double sharp = std::clamp(0.5 + (share - 0.5) * sharpness, 0.0, 1.0);
+    pixels[targets[i]] = static_cast<std::uint8_t>(std::lround(255 * sharp));
+  }
+  return pixels;
+}
+
+WaterRaster::WaterRaster(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+WaterRaster::~WaterRaster() = default;
+
+Result<std::unique_ptr<WaterRaster>> WaterRaster::Open(const std::string& path, const GeoBounds& around) {
+  ForgetRemote(path);
+  const auto before = StampOf(path);
+  auto dataset = OpenRaster(path);
+  if (!dataset) return tl::unexpected(dataset.error());
+  if (auto complete = CheckComplete(**dataset, path); !complete) return tl::unexpected(complete.error());
+  auto files = StampedFiles::OfOpened(FilesOf(**dataset, path), before);
+  if (!files) return tl::unexpected(files.error());
+  auto georeference = Georeference::Of(**dataset, path);
+  if (!georeference) return tl::unexpected(georeference.error());
+  const auto spacing = SourceSpacing::Of(*georeference, path);
+  if (!spacing) return tl::unexpected(spacing.error());
+  const Footprint footprint = Footprint::Of(*georeference);
+  if (auto touches = CheckOverlap(footprint, around, path); !touches) return tl::unexpected(touches.error());
+
+  auto impl = std::make_unique<Impl>(path, *std::move(files), *std::move(georeference));
+  impl->spacing = *spacing;
+  impl->layout = LayoutOf(**dataset, impl->georeference);
+  impl->footprint = footprint.Padded();
+  if (auto unchanged = impl->handles.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
+  return std::unique_ptr<WaterRaster>(new WaterRaster(std::move(impl)));
+}
+
+Result<std::vector<std::uint8_t>> WaterRaster::Read(const geo::TileKey& key, std::stop_token stop) const {
+  TERRACE_CHECK(geo::IsValid(key));
+  return impl_->Read(key, stop);
+}
+
+std::uint64_t WaterRaster::fingerprint() const { return FingerprintOf(impl_->handles.files(), impl_->georeference); }
+const StampedFiles& WaterRaster::files() const { return impl_->handles.files(); }
+
+}  // namespace terrace::dem

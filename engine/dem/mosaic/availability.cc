@@ -1,0 +1,64 @@
+#include "engine/dem/mosaic/availability.h"
+
+#include <algorithm>
+
+#include "engine/geo/tile_cover.h"
+
+namespace terrace::dem {
+namespace {
+
+using Ranges = std::vector<geo::TileRange>;
+
+// Sixty bytes each in layer.json, which clients read before their first tile.
+constexpr std::size_t kMostBlocks = 2000;
+
+Ranges Up(const Ranges& ranges, int levels) {
+  Ranges up;
+  for (const geo::TileRange& range : ranges) {
+    up.push_back({range.start_x >> levels, range.start_y >> levels, range.end_x >> levels, range.end_y >> levels});
+  }
+  return geo::Disjoint(std::move(up));
+}
+
+Ranges Down(Ranges ranges, int levels) {
+  for (geo::TileRange& range : ranges) {
+    range = {range.start_x << levels, range.start_y << levels, ((range.end_x + 1) << levels) - 1,
+             ((range.end_y + 1) << levels) - 1};
+  }
+  return ranges;
+}
+
+Ranges Merged(Ranges ranges, const Ranges& others) {
+  ranges.insert(ranges.end(), others.begin(), others.end());
+  return geo::Disjoint(std::move(ranges));
+}
+
+}  // namespace
+
+std::vector<Ranges> AvailableTiles(std::span<const Reach> sources) {
+  const int deepest = std::ranges::max_element(sources, {}, &Reach::depth)->depth;
+  std::vector<Ranges> levels(static_cast<std::size_t>(deepest) + 1);
+  // Every level follows from the tiles of the deepest, so that no rounding can lose an ancestor.
+  std::vector<Ranges> worth(levels.size());  // of the deepest level, by the depth of their source
+  for (const Reach& source : sources) {
+    const Ranges tiles = TilesTouching(source.footprint, deepest);
+    Ranges& those = worth[static_cast<std::size_t>(source.depth)];
+    those.insert(those.end(), tiles.begin(), tiles.end());
+  }
+  Ranges wanted;  // of the deepest level: of sources worth the level at hand
+  for (int level = deepest; level > 0; --level) {
+    const int up = deepest - level;
+    Ranges& here = levels[static_cast<std::size_t>(level)];
+    wanted = Merged(std::move(wanted), worth[static_cast<std::size_t>(level)]);
+    here = Up(wanted, up);
+    if (level < deepest) here = Merged(std::move(here), Up(levels[static_cast<std::size_t>(level) + 1], 1));
+    here = Down(Up(here, 1), 1);
+    for (int coarser = 1; here.size() > kMostBlocks && coarser <= level; ++coarser) {
+      here = geo::Disjoint(Down(Up(here, coarser), coarser));
+    }
+  }
+  levels[0] = {{0, 0, 1, 0}};
+  return levels;
+}
+
+}  // namespace terrace::dem

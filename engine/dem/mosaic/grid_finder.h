@@ -1,0 +1,62 @@
+// Which rasters lie on one pixel grid, among many: by reference system, vertical datum, pixel size and offset.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <string_view>
+#include <unordered_map>
+#include <vector>
+
+#include "engine/dem/crs/georeference.h"
+#include "engine/dem/crs/vertical_datum.h"
+
+namespace terrace::dem {
+
+// Where a raster lies and what it counts from. What these point to outlives their users.
+struct PlacedRaster {
+  const Georeference* where = nullptr;
+  const VerticalDatum* vertical = nullptr;
+};
+
+// A raster may fit several grids, as offsets within a tolerance count as whole pixels (Georeference::OffsetOf): it
+// belongs to the first one that it fits, in the order in which grids were met. A look-up takes constant time where
+// pixel sizes are equal to the bit, else a time that grows with the number of different pixel sizes.
+class GridFinder {
+ public:
+  struct Place {
+    std::size_t grid = 0;  // grids are numbered from 0; the next number is a new grid
+    PixelOffset offset;    // of the raster's first pixel from that of the grid's first raster
+  };
+
+  // The raster's grid. One that fits none begins a new one.
+  Place Add(const PlacedRaster& raster);
+
+ private:
+  // Bucket of an offset's fraction of a pixel.
+  using Phase = std::uint32_t;
+
+  // Grids whose pixels are equal to the bit, apart from their offset. Numbers of grids are ascending.
+  struct Family {
+    const Georeference* first = nullptr;
+    std::vector<std::size_t> grids;
+    std::unordered_map<Phase, std::vector<std::size_t>> by_phase;
+    std::vector<std::size_t> far;  // too far away for a phase
+  };
+  // Families of one reference system and vertical datum, in the order in which they were met.
+  struct Kind {
+    const VerticalDatum* vertical = nullptr;
+    std::vector<Family> families;
+    std::map<std::array<double, 4>, std::size_t> by_pixel;
+  };
+
+  Kind& KindOf(const PlacedRaster& raster);
+  std::vector<std::size_t> Candidates(const Family& family, const Georeference& where) const;
+  void Keep(Kind& kind, const Georeference& where, std::size_t grid);
+
+  std::vector<const Georeference*> grids_;                         // their first rasters
+  std::unordered_map<std::string_view, std::vector<Kind>> kinds_;  // by the reference system
+};
+
+}  // namespace terrace::dem

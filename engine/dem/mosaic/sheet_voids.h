@@ -1,0 +1,38 @@
+// Which voids of a sheet are holes, with data all around them, and which are collars: those that touch a place where
+// the sheet has no raster. A void that several rasters share is one.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "engine/dem/common/box_index.h"
+#include "engine/dem/mosaic/sheet_members.h"
+
+namespace terrace::dem {
+
+// Immutable and thread-safe. By default there are no holes.
+class SheetVoids {
+ public:
+  SheetVoids() = default;
+  // `index`: of the members, by pixels. `turn`: columns after which the sheet repeats itself; 0: it does not.
+  SheetVoids(const std::vector<SheetMember>& members, const BoxIndex& index, std::int64_t turn);
+
+  // For each void of a window of averages, row by row: 1 if it is part of a hole; of others 0. `columns`: of the
+  // sheet's averages. `members` and `index` as above.
+  std::vector<std::uint8_t> HolesIn(const std::vector<SheetMember>& members, const BoxIndex& index, int factor,
+                                    const GridWindow& window, std::int64_t columns,
+                                    std::span<const float> heights) const;
+
+  // Whether a hole that several members share may reach into a box of pixels; RangeTable knows of all others.
+  bool SharesHole(const Box& pixels) const;
+
+ private:
+  bool IsHole(const SheetMember& member, std::size_t index, std::int64_t column, std::int64_t row) const;
+
+  std::int64_t turn_ = 0;
+  std::vector<std::vector<std::uint8_t>> closed_;  // by member and region of its RimVoids: part of a hole
+  std::vector<geo::TileRange> shared_;             // pixels around those
+};
+
+}  // namespace terrace::dem

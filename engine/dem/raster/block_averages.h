@@ -1,0 +1,90 @@
+// Averages of blocks of samples, as the rows of the samples come in: in the one order that decides their last bits.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "engine/dem/gdal/sample_rules.h"
+
+namespace terrace::dem {
+
+struct BlockSum {
+  double sum = 0, weight = 0;  // of valid samples
+
+  void Add(float sample, double times = 1) {
+    if (std::isnan(sample)) return;
+    sum += times * sample;
+    weight += times;
+  }
+  void Add(const BlockSum& other) {
+    sum += other.sum;
+    weight += other.weight;
+  }
+  float Mean() const { return weight == 0 ? SampleRules::kVoid : static_cast<float>(sum / weight); }
+};
+
+// How much of a block of `step` samples lies on an axis of `size` samples: the last one may stick out.
+inline double ShareOf(std::int64_t block, int step, std::int64_t size) {
+  return static_cast<double>(std::min<std::int64_t>(step, size - block * step)) / step;
+}
+
+// Blocks of a single sample: the averages are the samples, with one zero, `columns` to a row.
+inline void CopyRows(std::span<const float> samples, std::int64_t columns, float* out, std::int64_t stride) {
+  for (; !samples.empty(); samples = samples.subspan(static_cast<std::size_t>(columns)), out += stride) {
+    for (std::int64_t i = 0; i < columns; ++i) out[i] = samples[static_cast<std::size_t>(i)] + 0.0f;
+  }
+}
+
+// Of a row of blocks of block x block samples. A block is summed row by row, whatever lies beside it; one of more than
+// kLargestPlain samples a side by blocks of that size, each of them row by row: so large averages can be made from
+// parts of a raster that fit into memory (raster_survey.h), bit for bit.
+class BlockAverages {
+ public:
+  static constexpr int kLargestPlain = 1024;
+
+  BlockAverages(std::int64_t blocks, int block)
+      : parts_(block > kLargestPlain ? block / kLargestPlain : 1),
+        plain_(block / parts_),
+        inner_(static_cast<std::size_t>(blocks * parts_)),
+        outer_(parts_ > 1 ? static_cast<std::size_t>(blocks) : 0) {}
+
+  // Each sample counts `weight` times, the last of the row `last` times of that: it may stand for fewer pixels.
+  void AddRow(const float* samples, std::int64_t count, double weight = 1, double last = 1) {
+    BlockSum* block = inner_.data();
+    for (std::int64_t first = 0; first < count; first += plain_, ++block) {
+      const std::int64_t end = std::min<std::int64_t>(first + plain_, count);
+      BlockSum sum = *block;
+      for (std::int64_t i = first; i < end; ++i) sum.Add(samples[i], i + 1 == count ? weight * last : weight);
+      *block = sum;
+    }
+    if (parts_ > 1 && ++rows_ == kLargestPlain) Gather();
+  }
+
+  // NaN for a block without a valid sample. The next row of blocks begins.
+  void Take(float* out) {
+    if (parts_ > 1 && rows_ > 0) Gather();
+    for (BlockSum& sum : parts_ > 1 ? outer_ : inner_) {
+      *out++ = sum.Mean();
+      sum = {};
+    }
+  }
+
+ private:
+  void Gather() {
+    for (std::size_t i = 0; i < inner_.size(); ++i) {
+      outer_[i / static_cast<std::size_t>(parts_)].Add(inner_[i]);
+      inner_[i] = {};
+    }
+    rows_ = 0;
+  }
+
+  int parts_, plain_;
+  int rows_ = 0;                 // in inner_, where it is gathered
+  std::vector<BlockSum> inner_;  // of blocks, or of their parts
+  std::vector<BlockSum> outer_;
+};
+
+}  // namespace terrace::dem

@@ -1,0 +1,70 @@
+// The source at the resolution of a level: its samples, or averages of aligned blocks of factor x factor of them.
+#pragma once
+
+#include <gdal_priv.h>
+
+#include <cstdint>
+#include <stop_token>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "engine/dem/gdal/sample_rules.h"
+
+namespace terrace::dem {
+
+// How a raster is stored, as far as reading it goes. Immutable after Open.
+struct RasterLayout {
+  int width = 0, height = 0;  // of the file
+  int columns = 0;            // of them in use: without the duplicates of a raster that goes all around the Earth
+  bool wraps = false;         // column `columns` is column 0 again
+  SampleRules rules;
+  std::vector<int> overview_factors;  // powers of two, ascending; overviews of other factors are left alone
+  double coast_step_m = 100;          // ZeroEdges::CoastStep
+};
+
+// One axis of the averaged grid. Positions are in source pixels.
+class GridAxis {
+ public:
+  GridAxis(int samples, int factor, bool wraps)
+      : samples_(samples), factor_(factor), count_((samples + factor - 1) / factor), wraps_(wraps) {}
+
+  struct Place {
+    std::int64_t index;  // of the sample at or before the position; with wrapping it may be -1
+    double weight;       // of the next sample; 0 beyond the outermost centres
+  };
+  Place Locate(double position) const;
+
+  std::int64_t count() const { return count_; }
+  bool wraps() const { return wraps_; }
+  int samples() const { return samples_; }
+  // Centre of the block; the last block of an axis may be a smaller one.
+  double Center(std::int64_t index) const;
+
+ private:
+  int samples_, factor_;
+  std::int64_t count_;
+  bool wraps_;
+};
+
+struct GridWindow {
+  std::int64_t column = 0, row = 0;  // columns may lie outside 0 .. count where the axis wraps
+  std::int64_t columns = 0, rows = 0;
+};
+
+// Averages of the valid samples of each block in the window, NaN where there is none, row by row from the north. A
+// value is a function of its block alone. Starts from the coarsest overview that `factor` is a multiple of; where its
+// samples stand for other pixels than blocks of its factor do, blocks are interpolated between them.
+Result<std::vector<float>> ReadGrid(GDALDataset& dataset, const RasterLayout& layout, int factor,
+                                    const GridWindow& window, const std::stop_token& stop);
+
+// The factor of the overview that ReadGrid starts from; 1: the samples themselves.
+int StartingFactor(const RasterLayout& layout, int factor);
+
+// The overview of that factor: its sides are the band's divided by it, each rounded up, as gdaladdo makes them, or
+// down, as in cloud-optimized GeoTIFFs. Null when there is none (any more).
+GDALRasterBand* FindOverview(GDALRasterBand& band, int factor);
+
+// The factors, powers of two, of the overviews that ReadGrid can use.
+std::vector<int> OverviewFactors(GDALRasterBand& band);
+
+}  // namespace terrace::dem

@@ -1,0 +1,54 @@
+// A raster's survey, from the cache folder where it was made before, else made now and kept there.
+#pragma once
+
+#include <gdal_priv.h>
+
+#include <functional>
+#include <memory>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "engine/dem/gdal/file_stamp.h"
+#include "engine/dem/statistics/raster_survey.h"
+#include "engine/dem/statistics/survey_record.h"
+
+namespace terrace::dem {
+
+struct PrepareOptions {
+  std::string cache_dir;  // empty: none
+  bool find_voids = true;
+  std::function<void(double)> progress = {};  // of each pass, 0..1
+  std::stop_token stop = {};
+};
+
+// How a survey came about.
+struct Preparation {
+  bool from_record = false;
+  int parts = 0;       // of the raster
+  int parts_kept = 0;  // of an interrupted run
+  std::int64_t parts_read = 0;
+};
+
+struct PreparedRaster {
+  VoidFindings findings;  // undeclared voids; the survey is one without them
+  RasterSurvey survey;
+  std::shared_ptr<const RecordedAverages> averages;  // null: there are none
+  std::string record;                                // where the survey is kept; empty: nowhere
+  RecordShape shape;                                 // the record's
+  Preparation preparation;
+};
+
+// `layout`: as the raster and its owner state it. A folder that cannot be written to costs a warning, never the
+// dataset. Errors name the file. kCancelled: stopped; what was done by then is kept.
+Result<PreparedRaster> PrepareRaster(GDALDataset& dataset, const RasterLayout& layout, const std::string& path,
+                                     const StampedFiles& files, const PrepareOptions& options);
+
+// The record of a raster: named after its file and a hash of its whole path, of what its owner says of its voids, as
+// two datasets may have one file and think differently of it, and of whether overviews are used: where they turn out to
+// be made of voids it takes two records, one to know that and one without them, and both are found again.
+std::string RecordPath(const std::string& cache_dir, const std::string& path, const std::vector<double>& marks = {},
+                       bool find_voids = true, bool has_overviews = false);
+
+}  // namespace terrace::dem

@@ -1,0 +1,274 @@
+#include "engine/dem/sources/raster_source.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <chrono>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+#include "engine/dem/common/source_log.h"
+#include "engine/dem/gdal/gdal_runtime.h"
+#include "engine/dem/gdal/raster_file.h"
+#include "engine/dem/statistics/overview_trust.h"
+
+namespace terrace::dem {
+namespace {
+
+RasterLayout LayoutOf(GDALDataset& dataset, const Georeference& georeference, const VerticalDatum& vertical) {
+  RasterLayout layout;
+  layout.width = georeference.width();
+  layout.height = georeference.height();
+  layout.wraps = georeference.wrap_columns() > 0;
+  layout.columns = layout.wraps ? georeference.wrap_columns() : layout.width;
+  // Where the file names no unit, the reference system does that its owner says the heights are in.
+  const std::string& stated = georeference.vertical_unit();
+  layout.rules = SampleRules::Of(HeightBand(dataset),
+                                 stated.empty() && vertical.geoid != nullptr ? vertical.geoid->unit() : stated);
+  layout.overview_factors = OverviewFactors(HeightBand(dataset));
+  return layout;
+}
+
+RasterInfo Describe(GDALDataset& dataset, const std::string& path, const Georeference& georeference,
+                    const RasterLayout& layout) {
+  RasterInfo info;
+  info.path = path;
+  info.driver = dataset.GetDriverName();
+  info.width = layout.width;
+  info.height = layout.height;
+  info.data_type = GDALGetDataTypeName(HeightBand(dataset).GetRasterDataType());
+  info.crs = georeference.crs();
+  info.vertical_datum = georeference.vertical_datum();
+  info.height_unit = layout.rules.unit;
+  info.knows_height_unit = MetresPerUnit(layout.rules.unit).has_value();
+  info.picture_part = PicturePartOf(HeightBand(dataset));
+  info.pixel_width = georeference.pixel_width();
+  info.pixel_height = georeference.pixel_height();
+  info.pixel_unit = georeference.pixel_unit();
+  info.nodata = layout.rules.nodata;
+  info.overview_factors = layout.overview_factors;
+  info.transform = georeference.transform();
+  return info;
+}
+
+// Of heights in metres that no land or sea floor has, such as those of centimetres whose unit is not stated.
+std::string DoubtsOf(const HeightRange& heights) {
+  constexpr double kHighest = 9000, kDeepest = -11500;
+  if (heights.max <= kHighest && heights.min >= kDeepest) return "";
+  return fmt::format(
+      "heights from {:g} to {:g} m are hardly metres (Earth has -10,935 to 8,849), and those beyond {:g} count as "
+      "voids: state the metres a unit has with `gdal_translate -a_scale FACTOR in out`, 0.01 for centimetres",
+      heights.min, heights.max, kMaxAbsHeight);
+}
+
+void LogWhatMatters(GDALDataset& dataset, const RasterInfo& info, const Georeference& georeference,
+                    const RasterLayout& layout) {
+  if (dataset.GetRasterCount() > 1) {
+    LogSource(SourceLog::Level::kInfo, info.path, "has {} bands, heights are read from band 1",
+              dataset.GetRasterCount());
+  }
+  if (!info.knows_height_unit) {
+    LogSource(SourceLog::Level::kWarn, info.path, "height unit \"{}\" is not known, heights are taken as metres",
+              layout.rules.unit);
+  }
+  if (!info.heights_doubted.empty()) LogSource(SourceLog::Level::kWarn, info.path, "{}", info.heights_doubted);
+  if (!info.overviews_unused.empty()) {
+    LogSource(SourceLog::Level::kWarn, info.path, "its overviews are not used: {}", info.overviews_unused);
+  }
+  if (!info.picture_part.empty()) {
+    LogSource(SourceLog::Level::kWarn, info.path,
+              "is a picture (its band 1 is \"{}\"), whose values are taken for heights", info.picture_part);
+  }
+  if (!info.transform.empty()) {
+    LogSource(SourceLog::Level::kDebug, info.path, "placed by PROJ operation \"{}\": {}", info.transform,
+              georeference.pipeline());
+  }
+}
+
+void LogVertical(const std::string& path, const VerticalDatum& vertical, const std::string& unit) {
+  if (!vertical.is_known()) {
+    LogSource(SourceLog::Level::kWarn, path, "no vertical datum stated, heights pass through as given");
+  } else if (vertical.geoid) {
+    LogSource(SourceLog::Level::kInfo, path, "heights count from {}, made ellipsoidal by PROJ operation \"{}\"",
+              vertical.name, vertical.geoid->description());
+    LogSource(SourceLog::Level::kDebug, path, "{}", vertical.geoid->pipeline());
+    // Programs write feet where GDAL does not read them.
+    const auto stated = MetresPerUnit(unit), counted = MetresPerUnit(vertical.geoid->unit());
+    if (!unit.empty() && !vertical.geoid->unit().empty() && stated && counted && *stated != *counted) {
+      LogSource(SourceLog::Level::kWarn, path,
+                "the file states heights in \"{}\", and they are taken for that; {} counts in \"{}\": if that is what "
+                "they "
+                "are, say so with `gdal_edit.py -units \"{}\" file`",
+                unit, vertical.name, vertical.geoid->unit(), vertical.geoid->unit());
+    }
+  }
+}
+
+Position CentreOf(const Georeference& georeference) {
+  Position centre{georeference.width() / 2.0, georeference.height() / 2.0};
+  georeference.ToDegrees({&centre, 1});
+  return centre;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path, const SourceOptions& options,
+                                                         const std::string& cache_dir,
+                                                         const std::function<void(double)>& progress,
+                                                         const std::stop_token& stop,
+                                                         std::shared_ptr<SurveyPages> pages) {
+  const auto start = std::chrono::steady_clock::now();
+  if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "{}: opening it was stopped", path);
+  ForgetRemote(path);
+  const auto before = StampOf(path);
+  auto dataset = OpenRaster(path);
+  if (!dataset) return tl::unexpected(dataset.error());
+  if (auto complete = CheckComplete(**dataset, path); !complete) return tl::unexpected(complete.error());
+  auto files = StampedFiles::OfOpened(FilesOf(**dataset, path), before);
+  if (!files) return tl::unexpected(files.error());
+  auto georeference = Georeference::Of(**dataset, path);
+  if (!georeference) return tl::unexpected(georeference.error());
+  const auto spacing = SourceSpacing::Of(*georeference, path);
+  if (!spacing) return tl::unexpected(spacing.error());
+
+  std::unique_ptr<RasterSource> source(new RasterSource(path, *std::move(files), *std::move(georeference)));
+  auto vertical = ResolveVertical(options.vertical, source->georeference_, CentreOf(source->georeference_));
+  if (!vertical) return MakeError(vertical.error().code, "{}: {}", path, vertical.error().message);
+  source->vertical_ = *std::move(vertical);
+  source->layout_ = LayoutOf(**dataset, source->georeference_, source->vertical_);
+  if (const double scale = source->layout_.rules.scale; !std::isfinite(scale) || scale == 0) {
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "{}: states a scale of {}, by which no sample has a height; correct it with `gdal_translate -a_scale "
+        "1 -a_offset 0 in out`",
+        path, scale);
+  }
+  source->layout_.coast_step_m = ZeroEdges::CoastStep(spacing->finer);
+  source->layout_.rules.marks = options.nodata;
+  std::string overviews_unused = DropMisleadingOverviews(**dataset, source->layout_);
+  const PrepareOptions prepare{cache_dir, options.find_voids, progress, stop};
+  auto prepared = PrepareRaster(**dataset, source->layout_, path, source->files(), prepare);
+  if (prepared && !prepared->findings.any()) {
+    const std::string why = DropMisleadingOverviews(**dataset, prepared->survey, source->layout_);
+    if (!why.empty()) {
+      overviews_unused = why;
+      prepared = PrepareRaster(**dataset, source->layout_, path, source->files(), prepare);
+    }
+  }
+  if (!prepared) return tl::unexpected(prepared.error());
+  source->layout_ = WithFindings(std::move(source->layout_), prepared->findings);
+  source->averages_ = prepared->averages;
+  source->preparation_ = prepared->preparation;
+  const RasterSurvey& survey = prepared->survey;
+  const std::string& found_voids = prepared->findings.text;
+
+  source->footprint_ = Footprint::Of(source->georeference_);
+  source->spacing_ = *spacing;
+  source->info_ = Describe(**dataset, path, source->georeference_, source->layout_);
+  source->info_.overviews_unused = std::move(overviews_unused);
+  source->info_.needs_averages = NeedsAverages(source->layout_);
+  source->info_.prepared = source->averages_ != nullptr;
+  source->info_.seconds_to_open = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  source->info_.found_voids = found_voids;
+  source->info_.counts_from = source->vertical_.name;
+  if (source->vertical_.geoid) source->info_.vertical_operation = source->vertical_.geoid->description();
+  source->info_.spacing_m = spacing->finer;
+  source->info_.bounds = source->footprint_.Bounds();
+  source->info_.heights = {survey.lowest, survey.highest};
+  source->info_.heights_doubted = DoubtsOf(source->info_.heights);
+  source->info_.valid_samples = survey.valid;
+  source->info_.void_samples = survey.voids;
+  source->info_.hole_samples = survey.hole_samples;
+  LogWhatMatters(**dataset, source->info_, source->georeference_, source->layout_);
+  LogVertical(path, source->vertical_, source->layout_.rules.unit);
+  if (!found_voids.empty()) {
+    LogSource(SourceLog::Level::kWarn, path,
+              "voids that it does not declare: {}; `nodata` of the configuration decides otherwise", found_voids);
+  }
+  if (survey.rim_voids.is_everything()) {
+    spdlog::warn(
+        "{}: its voids are too ragged to tell holes from collars around the data: none of them is smoothed over", path);
+  }
+  if (auto unchanged = source->CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
+  source->KeepTables(*std::move(prepared), prepare, std::move(pages));
+  return source;
+}
+
+RasterSource::~RasterSource() {
+  if (paging_) paging_->pages->Forget(this);
+}
+
+// Of a dataset of thousands of rasters tables take more memory than anything else.
+void RasterSource::KeepTables(PreparedRaster prepared, const PrepareOptions& prepare,
+                              std::shared_ptr<SurveyPages> pages) {
+  constexpr std::size_t kMostCoarse = 64;  // blocks of a level
+  RasterSurvey& survey = prepared.survey;
+  edge_row_means_ = survey.edge_row_means;
+  rim_voids_ = std::move(survey.rim_voids);
+  if (pages == nullptr || prepared.record.empty() || pages->Admit(survey.bytes())) {
+    kept_ = std::make_shared<const RasterSurvey>(std::move(survey));
+    return;
+  }
+  paging_ = std::make_unique<const Paging>(Paging{std::move(pages),
+                                                  survey.table.Coarse(kMostCoarse),
+                                                  !survey.coarse.grids.empty(),
+                                                  std::move(prepared.record),
+                                                  std::move(prepared.shape),
+                                                  {prepare.cache_dir, prepare.find_voids, {}, {}}});
+}
+
+SurveyPages::Tables RasterSource::tables() const {
+  if (kept_) return kept_;
+  if (auto known = paging_->pages->Find(this)) return known;
+  auto survey = ReadTables();
+  if (!survey) throw std::runtime_error(survey.error().message);
+  auto tables = std::make_shared<const RasterSurvey>(*std::move(survey));
+  paging_->pages->Add(this, tables);
+  return tables;
+}
+
+Result<RasterSurvey> RasterSource::ReadTables() const {
+  if (auto known = LoadRecord(paging_->record, paging_->shape)) return std::move(known->survey);
+  spdlog::warn("{}: {} is gone or damaged; the source is prepared anew", info_.path, paging_->record);
+  auto handle = handles_.Borrow();
+  if (!handle) return tl::unexpected(handle.error());
+  auto prepared = PrepareRaster(**handle, paging_->shape.layout, info_.path, files(), paging_->prepare);
+  if (auto unchanged = handles_.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
+  if (!prepared) return tl::unexpected(prepared.error());
+  return std::move(prepared->survey);
+}
+
+BlockRange RasterSource::RangeIn(double west, double north, double east, double south) const {
+  if (kept_) return kept_->table.Query(west, north, east, south);
+  if (const auto known = paging_->ranges.TryQuery(west, north, east, south)) return *known;
+  return tables()->table.Query(west, north, east, south);
+}
+
+Result<std::vector<float>> RasterSource::ReadBlocks(int factor, const GridWindow& window,
+                                                    const std::stop_token& stop) const {
+  // From memory and from the record only while the files are those that were prepared.
+  if (factor >= kLargestDirect && (kept_ ? !kept_->coarse.grids.empty() : paging_->has_coarse_averages)) {
+    if (auto unchanged = handles_.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
+    if (const SurveyPages::Tables known = tables(); known->coarse.Has(factor))
+      return known->coarse.Read(factor, window);
+  }
+  if (averages_ && RecordedAverages::Has(factor) && !averages_damaged_) {
+    if (auto unchanged = handles_.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
+    auto averages = averages_->Read(factor, window);
+    if (averages || averages.error().code == ErrorCode::kUnavailable) return averages;
+    averages_damaged_ = true;
+    averages_->Discard();
+    spdlog::error("{}; {} is read at its full resolution instead, and prepared anew when it is next opened",
+                  averages.error().message, info_.path);
+  }
+  auto handle = handles_.Borrow();
+  if (!handle) return tl::unexpected(handle.error());
+  auto heights = ReadGrid(**handle, layout_, factor, window, stop);
+  // Files may be overwritten while they are read: what was read is nothing then, and so is why it could not be.
+  if (auto unchanged = handles_.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
+  if (!heights) return MakeError(heights.error().code, "{}: {}", info_.path, heights.error().message);
+  return heights;
+}
+
+}  // namespace terrace::dem

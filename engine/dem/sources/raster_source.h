@@ -1,0 +1,101 @@
+// One raster file of a dataset: where it lies, how it is stored, what its heights range over, and its samples.
+//
+// Immutable after Open and safe to use from many threads. Knows nothing of levels, floors or other rasters.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "engine/dem/crs/footprint.h"
+#include "engine/dem/crs/georeference.h"
+#include "engine/dem/crs/level_plan.h"
+#include "engine/dem/crs/vertical_datum.h"
+#include "engine/dem/dem_types.h"
+#include "engine/dem/gdal/gdal_handle.h"
+#include "engine/dem/raster/sample_grid.h"
+#include "engine/dem/sources/prepare.h"
+#include "engine/dem/statistics/raster_survey.h"
+#include "engine/dem/statistics/survey_pages.h"
+
+namespace terrace::dem {
+
+class RasterSource {
+ public:
+  // Opens a raster, checks it, and scans it once for its heights. Errors name the file, what is wrong and the remedy.
+  // What is learnt is kept in `cache_dir`, or taken from there; empty for none. `pages` bounds
+  // the memory of the tables of this and other rasters; null: nothing does. kCancelled: stopped.
+  static Result<std::unique_ptr<RasterSource>> Open(const std::string& path, const SourceOptions& options = {},
+                                                    const std::string& cache_dir = {},
+                                                    const std::function<void(double)>& progress = {},
+                                                    const std::stop_token& stop = {},
+                                                    std::shared_ptr<SurveyPages> pages = nullptr);
+  ~RasterSource();
+
+  const RasterInfo& info() const { return info_; }
+  const Georeference& georeference() const { return georeference_; }
+  // What its samples count from; they are not converted here.
+  const VerticalDatum& vertical() const { return vertical_; }
+  const RasterLayout& layout() const { return layout_; }
+  const Footprint& footprint() const { return footprint_; }
+  const SourceSpacing& spacing() const { return spacing_; }
+  const RimVoids& rim_voids() const { return rim_voids_; }
+  // Of the valid samples of the first and the last row.
+  const std::array<std::optional<double>, 2>& edge_row_means() const { return edge_row_means_; }
+
+  // Its survey's tables, which may have to be read anew: whoever asks often keeps them. Throws std::runtime_error where
+  // they can be neither read nor made again, as when the file is gone.
+  SurveyPages::Tables tables() const;
+  // What they say of a box of pixels (RangeTable::Query). Of large boxes that is known without them.
+  BlockRange RangeIn(double west, double north, double east, double south) const;
+  const StampedFiles& files() const { return handles_.files(); }
+
+  // How opening went.
+  const Preparation& preparation() const { return preparation_; }
+
+  // ReadGrid of this raster, from what was prepared where it can be. kUnavailable: a file of it is gone, was replaced
+  // or cannot be read. Errors name the file.
+  Result<std::vector<float>> ReadBlocks(int factor, const GridWindow& window, const std::stop_token& stop) const;
+
+  // Whether the files are still those that were opened.
+  Result<void> CheckUnchanged() const { return handles_.CheckUnchanged(); }
+
+ private:
+  void KeepTables(PreparedRaster prepared, const PrepareOptions& prepare, std::shared_ptr<SurveyPages> pages);
+  Result<RasterSurvey> ReadTables() const;
+
+  RasterSource(std::string path, StampedFiles files, Georeference where)
+      : handles_(std::move(path), std::move(files)), georeference_(std::move(where)) {}
+
+  mutable HandlePool handles_;  // thread-safe
+  const Georeference georeference_;
+  VerticalDatum vertical_;
+  RasterLayout layout_;
+  Footprint footprint_;
+  SourceSpacing spacing_;
+  std::array<std::optional<double>, 2> edge_row_means_;
+  RimVoids rim_voids_;
+  SurveyPages::Tables kept_;  // null: they are paged
+  // Of paged tables.
+  struct Paging {
+    std::shared_ptr<SurveyPages> pages;
+    RangeTable ranges;  // the coarse ones
+    bool has_coarse_averages;
+    std::string record;
+    RecordShape shape;
+    PrepareOptions prepare;
+  };
+  std::unique_ptr<const Paging> paging_;
+  std::shared_ptr<const RecordedAverages> averages_;  // null: none
+  mutable std::atomic<bool> averages_damaged_{false};
+  Preparation preparation_;
+  RasterInfo info_;
+};
+
+}  // namespace terrace::dem

@@ -1,0 +1,185 @@
+#include "engine/dem/statistics/rim_voids.h"
+
+#include <algorithm>
+#include <limits>
+#include <tuple>
+#include <utility>
+
+namespace terrace::dem {
+namespace {
+
+constexpr std::uint32_t kNoRegion = std::numeric_limits<std::uint32_t>::max();
+// Regions that are numbered before those that have gone are forgotten.
+constexpr std::size_t kManyRegions = std::size_t{1} << 20;
+
+}  // namespace
+
+RimVoids::RimVoids(std::vector<Run> runs, std::uint32_t regions) : runs_(std::move(runs)), regions_(regions) {
+  if (runs_.empty()) return;
+  const std::int32_t top = runs_.front().row;
+  for (std::size_t i = 0; i < runs_.size(); ++i) {
+    while (static_cast<std::int64_t>(first_of_row_.size()) <= runs_[i].row - top) {
+      first_of_row_.push_back(static_cast<std::uint32_t>(i));
+    }
+  }
+  first_of_row_.push_back(static_cast<std::uint32_t>(runs_.size()));
+}
+
+RimVoids RimVoids::Everything() {
+  RimVoids all;
+  all.regions_ = 1;
+  all.is_everything_ = true;
+  return all;
+}
+
+std::optional<std::uint32_t> RimVoids::At(std::int64_t column, std::int64_t row) const {
+  if (is_everything_) return 0;
+  if (runs_.empty()) return std::nullopt;
+  const std::int64_t index = row - runs_.front().row;
+  if (index < 0 || index + 1 >= static_cast<std::int64_t>(first_of_row_.size())) return std::nullopt;
+  const auto begin = runs_.begin() + first_of_row_[static_cast<std::size_t>(index)];
+  const auto end = runs_.begin() + first_of_row_[static_cast<std::size_t>(index) + 1];
+  const auto run = std::partition_point(begin, end, [&](const Run& r) { return r.last < column; });
+  if (run == end || run->first > column) return std::nullopt;
+  return run->region;
+}
+
+RimVoidFinder::RimVoidFinder(int columns, int rows, Hole hole, std::size_t most_runs)
+    : columns_(columns),
+      rows_(rows),
+      hole_(std::move(hole)),
+      most_runs_(most_runs),
+      band_(static_cast<std::size_t>(ChunkGrid::kSide)) {}
+
+std::uint32_t RimVoidFinder::NewRegion() {
+  parents_.push_back(static_cast<std::uint32_t>(parents_.size()));
+  touches_.push_back(0);
+  return parents_.back();
+}
+
+std::uint32_t RimVoidFinder::RootOf(std::uint32_t region) {
+  while (parents_[region] != region) {
+    parents_[region] = parents_[parents_[region]];
+    region = parents_[region];
+  }
+  return region;
+}
+
+void RimVoidFinder::Join(std::uint32_t a, std::uint32_t b) {
+  a = RootOf(a), b = RootOf(b);
+  if (a == b) return;
+  if (b < a) std::swap(a, b);
+  parents_[b] = a;
+  touches_[a] |= touches_[b];
+}
+
+void RimVoidFinder::GiveUp() {
+  has_given_up_ = true;
+  band_.clear();
+  frontier_ = rim_ = open_ = {};
+  parents_ = {};
+  touches_ = {};
+}
+
+void RimVoidFinder::AddRun(int chunk_row, std::int32_t first, std::int32_t last) {
+  std::vector<Run>& row = band_[static_cast<std::size_t>(chunk_row)];
+  if (!row.empty() && row.back().last + 1 == first) {  // goes on from the part before
+    row.back().last = last;
+    return;
+  }
+  row.push_back({top_ + chunk_row, first, last, kNoRegion});
+  ++band_runs_;
+}
+
+void RimVoidFinder::Add(const Chunk& chunk, const ChunkSurvey& part) {
+  if (has_given_up_) return;
+  const int used = std::min(chunk.cols, columns_ - chunk.col);
+  if (chunk.row != top_) {
+    Sweep();
+    top_ = chunk.row;
+  }
+  if (has_given_up_ || used <= 0) return;
+  if (part.is_void()) {
+    for (int r = 0; r < chunk.rows; ++r) AddRun(r, chunk.col, chunk.col + used - 1);
+  } else {
+    for (const VoidRun& run : part.voids) AddRun(run.row, chunk.col + run.first, chunk.col + run.last);
+  }
+  if (band_runs_ > most_runs_) GiveUp();
+}
+
+void RimVoidFinder::SweepRow(std::int32_t row, std::vector<Run>& runs) {
+  auto above = frontier_.begin();
+  for (Run& run : runs) {
+    while (above != frontier_.end() && above->last < run.first) ++above;
+    for (auto met = above; met != frontier_.end() && met->first <= run.last; ++met) {
+      if (run.region == kNoRegion) {
+        run.region = RootOf(met->region);
+      } else {
+        Join(run.region, met->region);
+      }
+    }
+    if (run.region == kNoRegion) run.region = NewRegion();
+    if (row == 0 || row == rows_ - 1 || run.first == 0 || run.last == columns_ - 1) touches_[RootOf(run.region)] = 1;
+    open_.push_back(run);
+  }
+  frontier_ = std::move(runs);
+  runs.clear();
+}
+
+void RimVoidFinder::Sweep() {
+  const int rows = std::min<int>(ChunkGrid::kSide, rows_ - top_);
+  for (int r = 0; r < rows; ++r) SweepRow(top_ + r, band_[static_cast<std::size_t>(r)]);
+  band_runs_ = 0;
+  Settle();
+  if (rim_.size() + open_.size() > most_runs_) return GiveUp();
+  if (parents_.size() > kManyRegions) Renumber();
+}
+
+void RimVoidFinder::Settle() {
+  std::vector<std::uint8_t> goes_on(parents_.size());
+  if (top_ + ChunkGrid::kSide < rows_) {
+    for (const Run& run : frontier_) goes_on[RootOf(run.region)] = 1;
+  }
+  std::vector<std::int64_t> samples(parents_.size());
+  for (const Run& run : open_) samples[RootOf(run.region)] += run.last - run.first + 1;
+  std::erase_if(open_, [&](const Run& run) {
+    const std::uint32_t root = RootOf(run.region);
+    if (touches_[root] != 0) {
+      rim_.push_back(run);
+    } else if (goes_on[root] != 0) {
+      return false;
+    } else {
+      hole_(run.row, run.first, run.last, samples[root]);
+    }
+    return true;
+  });
+}
+
+void RimVoidFinder::Renumber() {
+  std::vector<std::uint32_t> numbers(parents_.size(), kNoRegion);
+  std::vector<std::uint8_t> touches;
+  for (std::vector<Run>* runs : {&rim_, &open_, &frontier_}) {
+    for (Run& run : *runs) {
+      const std::uint32_t root = RootOf(run.region);
+      if (numbers[root] == kNoRegion) {
+        numbers[root] = static_cast<std::uint32_t>(touches.size());
+        touches.push_back(touches_[root]);
+      }
+      run.region = numbers[root];
+    }
+  }
+  parents_.clear();
+  touches_.clear();
+  for (const std::uint8_t touch : touches) touches_[NewRegion()] = touch;
+}
+
+RimVoids RimVoidFinder::Finish() {
+  if (!has_given_up_) Sweep();
+  if (has_given_up_) return RimVoids::Everything();
+  frontier_.clear();
+  std::ranges::sort(rim_, {}, [](const Run& run) { return std::tuple(run.row, run.first); });
+  Renumber();
+  return {std::move(rim_), static_cast<std::uint32_t>(parents_.size())};
+}
+
+}  // namespace terrace::dem

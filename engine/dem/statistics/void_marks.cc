@@ -1,0 +1,236 @@
+#include "engine/dem/statistics/void_marks.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "engine/dem/statistics/raster_chunk.h"
+
+namespace terrace::dem {
+namespace {
+
+constexpr std::array<double, 6> kMarks = {-32768, -32767, -9999, 9999, 32767, 65535};
+constexpr double kAloneWithin = 1'000;  // metres
+// The shore of the Dead Sea is at -433 m, the summit of Mount Everest at 8,849 m, the deepest sea floor at -10,935 m.
+constexpr double kLowestLand = -500, kHighest = 9'000, kDeepest = -12'000;
+constexpr int kReach = 3;  // samples: kernels of resampling reach 2, rounded up for oblique ones
+constexpr int kMixedRim = 2, kCollarRim = 1;
+constexpr int kChunk = 1024;  // samples along a side
+
+// What the second look at a raster counts.
+struct Evidence {
+  std::array<std::int64_t, kMarks.size()> at_mark{}, near_mark{};
+  // Heights beyond a bound, and how many of them have no void nearby.
+  std::int64_t below_land = 0, below_land_alone = 0;
+  std::int64_t below_sea = 0, below_sea_alone = 0;
+  std::int64_t above = 0, above_alone = 0;
+  // Of all others: what a mixture is mixed of.
+  std::int64_t land = 0, sea = 0;
+};
+
+class Looker {
+ public:
+  Looker(GDALRasterBand& band, const SampleRules& rules, const std::stop_token& stop)
+      : band_(band), rules_(rules), stop_(stop) {
+    for (std::size_t i = 0; i < kMarks.size(); ++i) heights_[i] = static_cast<float>(rules.Metres(kMarks[i]));
+  }
+
+  template <typename Visit>
+  Result<void> ForEachChunk(const Visit& visit) {
+    for (int row = 0; row < band_.GetYSize(); row += kChunk) {
+      for (int col = 0; col < band_.GetXSize(); col += kChunk) {
+        left_ = std::max(col - kReach, 0);
+        top_ = std::max(row - kReach, 0);
+        wide_ = std::min(col + kChunk + kReach, band_.GetXSize()) - left_;
+        high_ = std::min(row + kChunk + kReach, band_.GetYSize()) - top_;
+        samples_.resize(static_cast<std::size_t>(wide_) * static_cast<std::size_t>(high_));
+        auto read = ReadHeights(band_, rules_, left_, top_, wide_, high_, samples_.data(), stop_);
+        if (!read) return read;
+        const int end_row = std::min(row + kChunk, band_.GetYSize()),
+                  end_col = std::min(col + kChunk, band_.GetXSize());
+        for (int r = row - top_; r < end_row - top_; ++r) {
+          for (int c = col - left_; c < end_col - left_; ++c) visit(c, r);
+        }
+      }
+    }
+    return {};
+  }
+
+  float At(int c, int r) const {
+    return samples_[static_cast<std::size_t>(r) * static_cast<std::size_t>(wide_) + static_cast<std::size_t>(c)];
+  }
+
+  void CountMarks(float height, Evidence& evidence) const {
+    for (std::size_t i = 0; i < kMarks.size(); ++i) {
+      if (height == heights_[i]) {
+        ++evidence.at_mark[i];
+      } else if (std::abs(height - heights_[i]) <= kAloneWithin) {
+        ++evidence.near_mark[i];
+      }
+    }
+  }
+
+  void CountBeyond(int c, int r, Evidence& evidence) const {
+    const float height = At(c, r);
+    if (height >= kLowestLand && height <= kHighest) ++evidence.land;
+    if (height >= kDeepest && height < kLowestLand) ++evidence.sea;
+    const auto count = [&](bool beyond, std::int64_t& all, std::int64_t& alone) {
+      if (!beyond) return;
+      ++all;
+      if (!IsNearVoid(c, r)) ++alone;
+    };
+    count(height < kLowestLand, evidence.below_land, evidence.below_land_alone);
+    count(height < kDeepest, evidence.below_sea, evidence.below_sea_alone);
+    count(height > kHighest, evidence.above, evidence.above_alone);
+  }
+
+ private:
+  bool IsNearVoid(int c, int r) const {
+    for (int y = std::max(r - kReach, 0); y <= std::min(r + kReach, high_ - 1); ++y) {
+      for (int x = std::max(c - kReach, 0); x <= std::min(c + kReach, wide_ - 1); ++x) {
+        if (std::isnan(At(x, y))) return true;
+      }
+    }
+    return false;
+  }
+
+  GDALRasterBand& band_;
+  const SampleRules& rules_;
+  const std::stop_token stop_;
+  std::array<float, kMarks.size()> heights_{};
+  int left_ = 0, top_ = 0, wide_ = 0, high_ = 0;  // of the samples read
+  std::vector<float> samples_;
+};
+
+}  // namespace
+
+void ZeroEdges::Add(const float* heights, std::ptrdiff_t stride, const Chunk& part, int raster_width, int raster_height,
+                    double step_m) {
+  const int cols = part.cols, rows = part.rows;
+  const bool left = part.col == 0, right = part.col + cols == raster_width;
+  const auto pair = [this, step = static_cast<float>(step_m)](float a, float b) {
+    if ((a == 0) == (b == 0)) return;
+    const float other = std::abs(a + b);
+    if (other > step) {
+      ++high;
+    } else if (other > 0) {  // not of NaN
+      ++low;
+    }
+  };
+  for (int r = 0; r < rows; ++r) {
+    const float* const row = heights + r * stride;
+    for (int c = 0; c < cols; ++c) {
+      if (c + 1 < cols) pair(row[c], row[c + 1]);
+      if (r + 1 < rows) pair(row[c], row[c + stride]);
+    }
+    zeros += std::count(row, row + cols, 0.0f);
+    at_border += (left && row[0] == 0) + (right && row[cols - 1] == 0);
+    const int raster_row = part.row + r;
+    if (raster_row == 0 || raster_row + 1 == raster_height) at_border += std::count(row, row + cols, 0.0f);
+    AddGround(row, cols, part.col, raster_row);
+  }
+}
+
+void ZeroEdges::AddGround(const float* heights, int cols, int raster_col, int raster_row) {
+  const auto is_ground = [](float height) { return height != 0 && !std::isnan(height); };
+  const auto first = static_cast<std::int32_t>(std::find_if(heights, heights + cols, is_ground) - heights);
+  if (first == cols) return;
+  std::int32_t last = cols - 1;
+  while (!is_ground(heights[last])) --last;
+  west = std::min(west, raster_col + first);
+  east = std::max(east, raster_col + last);
+  north = std::min(north, raster_row);
+  south = std::max(south, raster_row);
+  for (std::int32_t c = first; c <= last && !(lowest < highest); ++c) {
+    if (!is_ground(heights[c])) continue;
+    lowest = std::min(lowest, heights[c]);
+    highest = std::max(highest, heights[c]);
+  }
+}
+
+void ZeroEdges::Add(const ZeroEdges& other) {
+  high += other.high;
+  low += other.low;
+  zeros += other.zeros;
+  at_border += other.at_border;
+  west = std::min(west, other.west);
+  east = std::max(east, other.east);
+  north = std::min(north, other.north);
+  south = std::max(south, other.south);
+  lowest = std::min(lowest, other.lowest);
+  highest = std::max(highest, other.highest);
+}
+
+bool ZeroEdges::IsCollar(int raster_width, int raster_height) const {
+  constexpr std::int64_t kFewest = 16, kExceptions = 50;  // one in 50
+  constexpr int kNearly = 16;                             // a sixteenth of a side
+  const int margin_x = raster_width / kNearly, margin_y = raster_height / kNearly;
+  const bool reaches_all_sides = west <= margin_x && east >= raster_width - 1 - margin_x && north <= margin_y &&
+                                 south >= raster_height - 1 - margin_y;
+  if (!reaches_all_sides || !(lowest < highest)) return false;
+  const bool is_strewn = high * 4 > zeros && at_border * 4 < zeros;
+  return at_border >= kFewest && high >= kFewest && low * kExceptions <= high && !is_strewn;
+}
+
+void VoidFindings::AddTo(SampleRules& rules) const {
+  rules.marks.insert(rules.marks.end(), marks.begin(), marks.end());
+  rules.lowest = std::max(rules.lowest, lowest);
+  rules.highest = std::min(rules.highest, highest);
+  rules.rim = std::max(rules.rim, rim);
+}
+
+bool MayHideVoids(const SampleRules& rules, double lowest, double highest, bool has_voids, bool has_collar) {
+  const auto is_mark = [&](double height) {
+    return std::ranges::any_of(kMarks, [&](double mark) { return static_cast<float>(rules.Metres(mark)) == height; });
+  };
+  return has_collar || is_mark(lowest) || is_mark(highest) || lowest < kDeepest || highest > kHighest ||
+         (has_voids && lowest < kLowestLand);
+}
+
+Result<VoidFindings> FindVoids(GDALRasterBand& band, const SampleRules& rules, bool has_collar,
+                               const std::stop_token& stop) {
+  VoidFindings findings;
+  const auto say = [&findings](const std::string& what) {
+    findings.text += (findings.text.empty() ? "" : ", ") + what;
+  };
+  Evidence evidence;
+  Looker marks(band, rules, stop);
+  auto read = marks.ForEachChunk([&](int c, int r) { marks.CountMarks(marks.At(c, r), evidence); });
+  if (!read) return tl::unexpected(read.error());
+  for (std::size_t i = 0; i < kMarks.size(); ++i) {
+    if (evidence.at_mark[i] == 0 || evidence.near_mark[i] * 4 > evidence.at_mark[i]) continue;
+    findings.marks.push_back(kMarks[i]);
+    say(fmt::format("{} samples of {:g}", evidence.at_mark[i], kMarks[i]));
+  }
+  if (has_collar) {
+    findings.marks.push_back((0 / rules.metres_per_unit - rules.offset) / rules.scale);
+    findings.rim = kCollarRim;
+    say("a collar of zeros");
+  }
+
+  // What lies beside these voids, and beside the declared ones.
+  SampleRules found = rules;
+  findings.AddTo(found);
+  found.rim = 0;
+  Looker beyond(band, found, stop);
+  read = beyond.ForEachChunk([&](int c, int r) { beyond.CountBeyond(c, r, evidence); });
+  if (!read) return tl::unexpected(read.error());
+  if (evidence.below_land > 0 && evidence.below_land_alone == 0 && evidence.below_land <= evidence.land) {
+    findings.lowest = kLowestLand;
+    say(fmt::format("{} samples below {:g} m at their edges", evidence.below_land, kLowestLand));
+  } else if (evidence.below_sea > 0 && evidence.below_sea_alone == 0 &&
+             evidence.below_sea <= evidence.land + evidence.sea) {
+    findings.lowest = kDeepest;
+    say(fmt::format("{} samples below {:g} m at their edges", evidence.below_sea, kDeepest));
+  }
+  if (evidence.above > 0 && evidence.above_alone == 0 && evidence.above <= evidence.land + evidence.sea) {
+    findings.highest = kHighest;
+    say(fmt::format("{} samples above {:g} m at their edges", evidence.above, kHighest));
+  }
+  if (findings.lowest > -kMaxAbsHeight || findings.highest < kMaxAbsHeight) findings.rim = kMixedRim;
+  return findings;
+}
+
+}  // namespace terrace::dem
