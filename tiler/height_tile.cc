@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "engine/core/check.h"
-#include "proto/height_png.h"
+#include "proto/documents/height_png.h"
 #include "tiler/strong_etag.h"
 
 namespace terrace::tiler {

@@ -3,8 +3,8 @@
 #include <utility>
 #include <vector>
 
-#include "proto/tile_metadata.h"
-#include "proto/water_mask.h"
+#include "proto/mesh/tile_metadata.h"
+#include "proto/mesh/water_mask.h"
 
 namespace terrace::tiler {
 namespace {

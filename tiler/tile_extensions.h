@@ -5,7 +5,7 @@
 
 #include "engine/core/result.h"
 #include "proto/lattice_view.h"
-#include "proto/quantized_mesh.h"
+#include "proto/mesh/quantized_mesh.h"
 #include "tiler/tile_pipeline.h"
 #include "tiler/tile_request.h"
 

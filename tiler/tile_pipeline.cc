@@ -5,9 +5,9 @@
 
 #include "engine/geo/error_ladder.h"
 #include "engine/tin/greedy.h"
-#include "proto/quantized_mesh.h"
-#include "proto/skirt.h"
-#include "proto/tile_normals.h"
+#include "proto/mesh/quantized_mesh.h"
+#include "proto/mesh/skirt.h"
+#include "proto/mesh/tile_normals.h"
 #include "tiler/height_tile.h"
 #include "tiler/mesh/glb_mesher.h"
 #include "tiler/mesh/tile_mesher.h"

@@ -6,9 +6,9 @@
 #include <string>
 
 #include "engine/geo/tile_key.h"
-#include "proto/glb_tile.h"
-#include "proto/height_png.h"
-#include "proto/texture.h"
+#include "proto/documents/height_png.h"
+#include "proto/gltf/glb_tile.h"
+#include "proto/gltf/texture.h"
 #include "tiler/coding.h"
 
 namespace terrace::tiler {

@@ -4,7 +4,7 @@
 #include <stop_token>
 
 #include "engine/core/result.h"
-#include "proto/glb_tile.h"
+#include "proto/gltf/glb_tile.h"
 #include "tiler/tile_pipeline.h"
 #include "tiler/tile_request.h"
 

@@ -19,7 +19,10 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 # core <- {geo, tin} <- {dem, proto} <- tiler <- server, and core <- config <- server. In the server, asio.h stands below all and the
 # files of the folder itself, which put the rooms together, above all but the command line:
 # asio.h <- tiles <- http <- handlers <- server <- cli, and tiles <- reload <- cli.
-ENGINE = ["engine/core", "engine/geo", "engine/tin", "engine/dem", "proto", "config", "tiler", "server/asio.h"]
+TIN = ["engine/tin/mesh", "engine/tin/scan", "engine/tin", "engine/tin/extended", "engine/tin/decimate"]
+GEOMETRY = ["engine/core", "engine/geo"] + TIN
+PROTO = ["proto", "proto/mesh", "proto/error", "proto/gltf", "proto/documents"]
+ENGINE = GEOMETRY + ["engine/dem"] + PROTO + ["config", "tiler", "server/asio.h"]
 # Of elevation models, each may know those before it.
 DEM = ["engine/dem/dem_types.h", "engine/dem/common", "engine/dem/gdal", "engine/dem/crs", "engine/dem/raster", "engine/dem/statistics",
        "engine/dem/sources", "engine/dem/mosaic", "engine/dem/bound", "engine/dem/image"]
@@ -30,12 +33,17 @@ DOORS = {"engine/dem/" + name for name in (
 ROOMS = {
     "engine/core": [],
     "engine/geo": ["engine/core"],
-    "engine/tin": ["engine/core"],
+    "engine/tin/mesh": ["engine/core"],
+    "engine/tin/scan": ["engine/core", "engine/tin/mesh"],
+    "engine/tin": ["engine/core", "engine/tin/mesh", "engine/tin/scan"],
+    "engine/tin/extended": ["engine/core", "engine/tin/mesh", "engine/tin/scan", "engine/tin"],
+    "engine/tin/decimate": ["engine/core", "engine/tin/mesh", "engine/tin/scan", "engine/tin"],
     **{room: ["engine/core", "engine/geo"] + DEM[:i] for i, room in enumerate(DEM)},
     "engine/dem": ["engine/core", "engine/geo"] + DEM,
-    "proto": ["engine/core", "engine/geo", "engine/tin"],
+    "proto": GEOMETRY,
+    **{room: GEOMETRY + PROTO[:i] for i, room in enumerate(PROTO) if i > 0},
     "config": ["engine/core"],
-    "tiler": ["engine/core", "engine/geo", "engine/tin", "engine/dem", "proto"],
+    "tiler": GEOMETRY + ["engine/dem"] + PROTO,
     "server/asio.h": [],
     "server/tiles": ENGINE,
     "server/http": ENGINE + ["server/tiles"],
@@ -75,8 +83,8 @@ LIBRARIES = [
     # What a room promises not to know: threads and clocks, files, sockets.
     Library("threads", r"(thread|mutex|shared_mutex|condition_variable|semaphore|future)", r"(engine/dem|tiler/store|server)/"),
     Library("clocks", r"(chrono|ctime)", r"(config|tiler|server|engine/dem)/"),
-    Library("files", r"(filesystem|fstream)", r"(config/|engine/dem/|server/|proto/mesh_file)"),
-    Library("memory from the system", r"sys/mman\.h|sanitizer/asan_interface\.h", r"(engine/tin/spare_blocks|server/.*)\.cc"),
+    Library("files", r"(filesystem|fstream)", r"(config/|engine/dem/|server/|proto/gltf/mesh_file)"),
+    Library("memory from the system", r"sys/mman\.h|sanitizer/asan_interface\.h", r"(engine/tin/mesh/spare_blocks|server/.*)\.cc"),
     Library("the operating system", r"(unistd|malloc|fcntl|poll|glob|signal|dirent|pthread|elf|link)\.h|(sys|arpa|netinet|linux)/.*",
             r"(config|engine/dem|tiler|server)/.*\.cc"),
     Library("the standard library", r"[a-z_0-9]+|(stdint|immintrin)\.h", r"."),

@@ -6,10 +6,10 @@
 
 #include <cstdint>
 
-#include "engine/tin/candidate.h"
 #include "engine/tin/greedy.h"
-#include "engine/tin/height_field.h"
-#include "engine/tin/plane.h"
+#include "engine/tin/mesh/candidate.h"
+#include "engine/tin/mesh/height_field.h"
+#include "engine/tin/mesh/plane.h"
 
 namespace terrace::tin {
 

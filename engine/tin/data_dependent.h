@@ -35,13 +35,13 @@
 
 #include "engine/tin/fit_errors.h"
 #include "engine/tin/greedy.h"
-#include "engine/tin/height_field.h"
-#include "engine/tin/quadrilateral.h"
+#include "engine/tin/mesh/height_field.h"
+#include "engine/tin/mesh/quadrilateral.h"
+#include "engine/tin/mesh/spare_blocks.h"
+#include "engine/tin/mesh/star.h"
+#include "engine/tin/mesh/triangulation.h"
 #include "engine/tin/sagitta.h"
-#include "engine/tin/spare_blocks.h"
-#include "engine/tin/star.h"
-#include "engine/tin/triangle_scan.h"
-#include "engine/tin/triangulation.h"
+#include "engine/tin/scan/triangle_scan.h"
 
 namespace terrace::tin {
 

@@ -3,8 +3,8 @@
 #include <array>
 
 #include "engine/tin/border.h"
-#include "engine/tin/plane.h"
-#include "engine/tin/squared_distances.h"
+#include "engine/tin/mesh/plane.h"
+#include "engine/tin/scan/squared_distances.h"
 
 namespace terrace::tin {
 namespace {

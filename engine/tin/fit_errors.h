@@ -9,11 +9,11 @@
 #include <cstddef>
 
 #include "engine/tin/greedy.h"
-#include "engine/tin/height_field.h"
+#include "engine/tin/mesh/height_field.h"
+#include "engine/tin/mesh/star.h"
+#include "engine/tin/mesh/triangulation.h"
 #include "engine/tin/sagitta.h"
-#include "engine/tin/star.h"
-#include "engine/tin/triangle_scan.h"
-#include "engine/tin/triangulation.h"
+#include "engine/tin/scan/triangle_scan.h"
 
 namespace terrace::tin {
 

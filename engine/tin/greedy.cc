@@ -7,15 +7,15 @@
 
 #include "engine/core/check.h"
 #include "engine/tin/border.h"
-#include "engine/tin/candidate_queue.h"
 #include "engine/tin/data_dependent.h"
 #include "engine/tin/insertion_recorder.h"
+#include "engine/tin/mesh/candidate_queue.h"
+#include "engine/tin/mesh/triangulation.h"
 #include "engine/tin/sagitta.h"
+#include "engine/tin/scan/squared_distances.h"
+#include "engine/tin/scan/squared_errors.h"
+#include "engine/tin/scan/triangle_scan.h"
 #include "engine/tin/seed_cursor.h"
-#include "engine/tin/squared_distances.h"
-#include "engine/tin/squared_errors.h"
-#include "engine/tin/triangle_scan.h"
-#include "engine/tin/triangulation.h"
 
 namespace terrace::tin {
 namespace {

@@ -16,9 +16,9 @@
 #include <stop_token>
 #include <vector>
 
-#include "engine/tin/height_field.h"
+#include "engine/tin/mesh/height_field.h"
+#include "engine/tin/mesh/tin_mesh.h"
 #include "engine/tin/refinement.h"
-#include "engine/tin/tin_mesh.h"
 
 namespace terrace::tin {
 

@@ -4,8 +4,8 @@
 #include <optional>
 #include <span>
 
-#include "engine/tin/tin_mesh.h"
-#include "engine/tin/triangulation.h"
+#include "engine/tin/mesh/tin_mesh.h"
+#include "engine/tin/mesh/triangulation.h"
 
 namespace terrace::tin {
 

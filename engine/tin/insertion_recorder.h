@@ -9,9 +9,9 @@
 #include <cstdint>
 #include <vector>
 
+#include "engine/tin/mesh/spare_blocks.h"
+#include "engine/tin/mesh/star.h"
 #include "engine/tin/refinement.h"
-#include "engine/tin/spare_blocks.h"
-#include "engine/tin/star.h"
 
 namespace terrace::tin {
 

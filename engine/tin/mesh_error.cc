@@ -5,9 +5,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "engine/tin/predicates.h"
-#include "engine/tin/squared_errors.h"
-#include "engine/tin/triangle_rows.h"
+#include "engine/tin/mesh/predicates.h"
+#include "engine/tin/scan/squared_errors.h"
+#include "engine/tin/scan/triangle_rows.h"
 
 namespace terrace::tin {
 namespace {

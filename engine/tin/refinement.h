@@ -17,8 +17,8 @@
 #include <vector>
 
 #include "engine/core/result.h"
-#include "engine/tin/insertion_record.h"
-#include "engine/tin/tin_mesh.h"
+#include "engine/tin/mesh/insertion_record.h"
+#include "engine/tin/mesh/tin_mesh.h"
 
 namespace terrace::tin {
 

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "engine/core/check.h"
-#include "engine/tin/predicates.h"
+#include "engine/tin/mesh/predicates.h"
 
 namespace terrace::tin {
 

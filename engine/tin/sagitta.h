@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "engine/tin/greedy.h"
-#include "engine/tin/tin_mesh.h"
+#include "engine/tin/mesh/tin_mesh.h"
 
 namespace terrace::tin {
 

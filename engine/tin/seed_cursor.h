@@ -4,9 +4,9 @@
 #include <cstddef>
 #include <vector>
 
-#include "engine/tin/candidate_queue.h"
 #include "engine/tin/greedy.h"
-#include "engine/tin/height_field.h"
+#include "engine/tin/mesh/candidate_queue.h"
+#include "engine/tin/mesh/height_field.h"
 
 namespace terrace::tin {
 

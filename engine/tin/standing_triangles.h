@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "engine/tin/insertion_record.h"
+#include "engine/tin/mesh/insertion_record.h"
 
 namespace terrace::tin {
 

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "engine/tin/block_joiner.h"
+#include "engine/tin/extended/block_joiner.h"
 #include "server/cli/progress.h"
 
 namespace terrace::cli {

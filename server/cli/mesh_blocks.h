@@ -1,10 +1,10 @@
 // The blocks of a large raster, meshed on several threads.
 #pragma once
 
-#include "engine/tin/field_cut.h"
+#include "engine/tin/extended/field_cut.h"
 #include "engine/tin/greedy.h"
-#include "engine/tin/height_field.h"
-#include "engine/tin/tin_mesh.h"
+#include "engine/tin/mesh/height_field.h"
+#include "engine/tin/mesh/tin_mesh.h"
 
 namespace terrace::cli {
 

@@ -15,9 +15,9 @@
 
 #include "engine/dem/image/raster_colors.h"
 #include "engine/dem/sources/read_raster.h"
-#include "engine/tin/extended_error.h"
-#include "engine/tin/extended_field.h"
-#include "proto/mesh_file.h"
+#include "engine/tin/extended/extended_error.h"
+#include "engine/tin/extended/extended_field.h"
+#include "proto/gltf/mesh_file.h"
 #include "server/cli/command.h"
 #include "server/cli/fail.h"
 #include "server/cli/mesh_input.h"

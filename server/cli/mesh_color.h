@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "engine/tin/extended_greedy.h"
+#include "engine/tin/extended/extended_greedy.h"
 
 namespace CLI {
 class App;

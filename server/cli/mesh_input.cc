@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "engine/dem/sources/read_raster.h"
-#include "proto/mesh_file.h"
+#include "proto/gltf/mesh_file.h"
 
 namespace terrace::cli {
 namespace {

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "engine/core/result.h"
-#include "engine/tin/height_field.h"
-#include "proto/mesh_file.h"
+#include "engine/tin/mesh/height_field.h"
+#include "proto/gltf/mesh_file.h"
 #include "server/cli/output_file.h"
 
 namespace terrace::cli {

@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "engine/core/result.h"
-#include "engine/tin/height_field.h"
-#include "engine/tin/tin_mesh.h"
-#include "proto/mesh_file.h"
+#include "engine/tin/mesh/height_field.h"
+#include "engine/tin/mesh/tin_mesh.h"
+#include "proto/gltf/mesh_file.h"
 
 namespace terrace::cli {
 

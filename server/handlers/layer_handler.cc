@@ -4,7 +4,7 @@
 
 #include <utility>
 
-#include "proto/layer_json.h"
+#include "proto/documents/layer_json.h"
 #include "server/handlers/datasets_handler.h"
 #include "server/http/http_error.h"
 #include "server/http/negotiate.h"

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "engine/geo/error_ladder.h"
-#include "proto/skirt.h"
+#include "proto/mesh/skirt.h"
 #include "server/http/negotiate.h"
 
 namespace terrace::server {

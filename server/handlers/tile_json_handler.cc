@@ -4,7 +4,7 @@
 
 #include <utility>
 
-#include "proto/tile_json.h"
+#include "proto/documents/tile_json.h"
 #include "server/handlers/datasets_handler.h"
 #include "server/handlers/document.h"
 #include "server/handlers/layer_handler.h"

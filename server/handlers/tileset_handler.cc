@@ -7,9 +7,9 @@
 #include <utility>
 
 #include "engine/geo/tile_cover.h"
-#include "proto/implicit_tree.h"
-#include "proto/subtree.h"
-#include "proto/tileset.h"
+#include "proto/documents/implicit_tree.h"
+#include "proto/documents/subtree.h"
+#include "proto/documents/tileset.h"
 #include "server/handlers/layer_handler.h"
 #include "server/handlers/tile_heights.h"
 #include "server/http/http_error.h"

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "proto/implicit_tree.h"
+#include "proto/documents/implicit_tree.h"
 #include "server/handlers/document.h"
 #include "server/handlers/document_maker.h"
 #include "server/http/query.h"

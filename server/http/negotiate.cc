@@ -7,7 +7,7 @@
 #include <optional>
 
 #include "engine/geo/error_ladder.h"
-#include "proto/tile_metadata.h"
+#include "proto/mesh/tile_metadata.h"
 #include "server/http/text.h"
 
 namespace terrace::server {

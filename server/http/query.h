@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "engine/core/result.h"
-#include "proto/glb_tile.h"
-#include "proto/texture.h"
+#include "proto/gltf/glb_tile.h"
+#include "proto/gltf/texture.h"
 #include "tiler/tile_request.h"
 
 namespace terrace::server {

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "proto/implicit_tree.h"
+#include "proto/documents/implicit_tree.h"
 #include "server/http/query.h"
 #include "server/http/text.h"
 #include "server/tiles/dataset_view.h"

@@ -15,8 +15,8 @@
 #include "engine/dem/dem_source.h"
 #include "engine/geo/error_ladder.h"
 #include "engine/geo/tile_key.h"
-#include "proto/glb_tile.h"
-#include "proto/texture.h"
+#include "proto/gltf/glb_tile.h"
+#include "proto/gltf/texture.h"
 
 namespace terrace::server {
 

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "engine/tin/greedy.h"
-#include "engine/tin/height_field.h"
-#include "engine/tin/tin_mesh.h"
+#include "engine/tin/mesh/height_field.h"
+#include "engine/tin/mesh/tin_mesh.h"
 #include "tests/bench/peer.h"
 #include "tests/bench/race.h"
 #include "tests/bench/table.h"

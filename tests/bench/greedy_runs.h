@@ -5,8 +5,8 @@
 #include <utility>
 #include <vector>
 
-#include "engine/tin/block_joiner.h"
-#include "engine/tin/field_cut.h"
+#include "engine/tin/extended/block_joiner.h"
+#include "engine/tin/extended/field_cut.h"
 #include "engine/tin/greedy.h"
 #include "tests/bench/cpu_clock.h"
 #include "tests/bench/race.h"

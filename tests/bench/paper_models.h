@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "engine/tin/greedy.h"
-#include "engine/tin/height_field.h"
+#include "engine/tin/mesh/height_field.h"
 #include "tests/bench/figure.h"
 #include "tests/bench/rasters.h"
 

@@ -9,10 +9,10 @@
 #include <cstddef>
 #include <vector>
 
-#include "engine/tin/candidate.h"
-#include "engine/tin/height_field.h"
-#include "engine/tin/tin_mesh.h"
-#include "engine/tin/triangulation.h"
+#include "engine/tin/mesh/candidate.h"
+#include "engine/tin/mesh/height_field.h"
+#include "engine/tin/mesh/tin_mesh.h"
+#include "engine/tin/mesh/triangulation.h"
 
 namespace terrace::bench {
 

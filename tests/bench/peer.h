@@ -17,7 +17,7 @@
 
 #include "engine/core/result.h"
 #include "engine/tin/greedy.h"
-#include "engine/tin/height_field.h"
+#include "engine/tin/mesh/height_field.h"
 
 namespace terrace::bench {
 

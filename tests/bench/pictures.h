@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "engine/core/result.h"
-#include "engine/tin/height_field.h"
-#include "engine/tin/tin_mesh.h"
+#include "engine/tin/mesh/height_field.h"
+#include "engine/tin/mesh/tin_mesh.h"
 
 namespace terrace::bench {
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "engine/tin/greedy.h"
-#include "engine/tin/height_field.h"
+#include "engine/tin/mesh/height_field.h"
 
 namespace terrace::bench {
 

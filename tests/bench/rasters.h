@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "engine/tin/height_field.h"
+#include "engine/tin/mesh/height_field.h"
 
 namespace terrace::bench {
 

@@ -2,7 +2,7 @@
 #include <optional>
 #include <utility>
 
-#include "engine/tin/drop_pass.h"
+#include "engine/tin/decimate/drop_pass.h"
 #include "tests/bench/greedy_runs.h"
 #include "tests/bench/rasters.h"
 #include "tests/bench/targets.h"

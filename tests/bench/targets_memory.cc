@@ -1,7 +1,7 @@
 #include <array>
 #include <optional>
 
-#include "engine/tin/spare_blocks.h"
+#include "engine/tin/mesh/spare_blocks.h"
 #include "tests/bench/greedy_runs.h"
 #include "tests/bench/rasters.h"
 #include "tests/bench/resident_memory.h"

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <array>
 
-#include "engine/tin/height_field.h"
-#include "engine/tin/predicates.h"
-#include "engine/tin/tin_mesh.h"
+#include "engine/tin/mesh/height_field.h"
+#include "engine/tin/mesh/predicates.h"
+#include "engine/tin/mesh/tin_mesh.h"
 
 namespace terrace::bench {
 

@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "engine/core/check.h"
-#include "engine/tin/drop_pass.h"
+#include "engine/tin/decimate/drop_pass.h"
 #include "engine/tin/greedy.h"
-#include "engine/tin/height_field.h"
+#include "engine/tin/mesh/height_field.h"
 #include "engine/tin/refinement.h"
 #include "tests/engine/tin/rasterizer.h"
 #include "tests/fuzz/fuzz_input.h"

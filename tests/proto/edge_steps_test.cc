@@ -1,4 +1,4 @@
-#include "proto/edge_steps.h"
+#include "proto/mesh/edge_steps.h"
 
 #include <gtest/gtest.h>
 

@@ -6,9 +6,9 @@
 #include <string>
 
 #include "engine/geo/error_ladder.h"
-#include "proto/glb_tile.h"
-#include "proto/skirt.h"
-#include "proto/tile_normals.h"
+#include "proto/gltf/glb_tile.h"
+#include "proto/mesh/skirt.h"
+#include "proto/mesh/tile_normals.h"
 #include "tests/proto/glb_decoder.h"
 #include "tests/proto/ground.h"
 

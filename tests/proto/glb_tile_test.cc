@@ -1,4 +1,4 @@
-#include "proto/glb_tile.h"
+#include "proto/gltf/glb_tile.h"
 
 #include <gtest/gtest.h>
 
@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "engine/geo/error_ladder.h"
-#include "proto/skirt.h"
-#include "proto/tile_error.h"
-#include "proto/tile_normals.h"
+#include "proto/error/tile_error.h"
+#include "proto/mesh/skirt.h"
+#include "proto/mesh/tile_normals.h"
 #include "tests/proto/glb_decoder.h"
 #include "tests/proto/ground.h"
 

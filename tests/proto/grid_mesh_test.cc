@@ -1,4 +1,4 @@
-#include "proto/grid_mesh.h"
+#include "proto/mesh/grid_mesh.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "engine/geo/error_ladder.h"
-#include "proto/skirt.h"
+#include "proto/mesh/skirt.h"
 #include "tests/proto/ground.h"
 
 namespace terrace::proto {

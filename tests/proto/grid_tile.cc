@@ -1,7 +1,7 @@
 #include "tests/proto/grid_tile.h"
 
-#include "proto/oct_normal.h"
-#include "proto/tile_geometry.h"
+#include "proto/mesh/oct_normal.h"
+#include "proto/mesh/tile_geometry.h"
 
 namespace terrace::proto {
 

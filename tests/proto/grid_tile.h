@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <functional>
 
-#include "proto/quantized_mesh.h"
+#include "proto/mesh/quantized_mesh.h"
 
 namespace terrace::proto {
 

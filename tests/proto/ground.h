@@ -11,8 +11,8 @@
 
 #include "engine/geo/lattice.h"
 #include "engine/tin/greedy.h"
-#include "engine/tin/height_field.h"
-#include "engine/tin/tin_mesh.h"
+#include "engine/tin/mesh/height_field.h"
+#include "engine/tin/mesh/tin_mesh.h"
 #include "proto/lattice_view.h"
 
 namespace terrace::proto {

@@ -1,5 +1,5 @@
 // What libpng, which is not the encoder, reads.
-#include "proto/height_png.h"
+#include "proto/documents/height_png.h"
 
 #include <gtest/gtest.h>
 #include <png.h>

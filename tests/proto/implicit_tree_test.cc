@@ -1,4 +1,4 @@
-#include "proto/implicit_tree.h"
+#include "proto/documents/implicit_tree.h"
 
 #include <gtest/gtest.h>
 

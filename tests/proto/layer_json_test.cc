@@ -1,4 +1,4 @@
-#include "proto/layer_json.h"
+#include "proto/documents/layer_json.h"
 
 #include <gtest/gtest.h>
 

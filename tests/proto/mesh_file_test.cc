@@ -1,4 +1,4 @@
-#include "proto/mesh_file.h"
+#include "proto/gltf/mesh_file.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "proto/oct_normal.h"
+#include "proto/mesh/oct_normal.h"
 
 #include <gtest/gtest.h>
 

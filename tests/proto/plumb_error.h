@@ -1,4 +1,5 @@
-// How far flat triangles are from lattice samples along plumb lines, by brute force: the oracle of proto/tile_error.
+// How far flat triangles are from lattice samples along plumb lines, by brute force: the oracle of
+// proto/error/tile_error.
 #pragma once
 
 #include <array>

@@ -1,4 +1,4 @@
-#include "proto/quantized_mesh.h"
+#include "proto/mesh/quantized_mesh.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -7,7 +7,7 @@
 #include <map>
 #include <tuple>
 
-#include "proto/tile_geometry.h"
+#include "proto/mesh/tile_geometry.h"
 #include "tests/proto/grid_tile.h"
 #include "tests/proto/quantized_mesh_decoder.h"
 

@@ -1,4 +1,4 @@
-#include "proto/subtree.h"
+#include "proto/documents/subtree.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "proto/surface_error.h"
+#include "proto/error/surface_error.h"
 
 #include <gtest/gtest.h>
 
@@ -6,9 +6,9 @@
 #include <cmath>
 #include <numbers>
 
-#include "proto/tile_error.h"
-#include "proto/tile_geometry.h"
-#include "proto/tile_mesh.h"
+#include "proto/error/tile_error.h"
+#include "proto/mesh/tile_geometry.h"
+#include "proto/mesh/tile_mesh.h"
 #include "tests/proto/ground.h"
 
 namespace terrace::proto {

@@ -1,4 +1,4 @@
-#include "proto/texture.h"
+#include "proto/gltf/texture.h"
 
 #include <gdal_priv.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "proto/tile_error.h"
+#include "proto/error/tile_error.h"
 
 #include <gtest/gtest.h>
 
@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "engine/tin/insert_samples.h"
-#include "proto/grid_mesh.h"
-#include "proto/tile_geometry.h"
-#include "proto/tile_mesh.h"
+#include "proto/mesh/grid_mesh.h"
+#include "proto/mesh/tile_geometry.h"
+#include "proto/mesh/tile_mesh.h"
 #include "tests/proto/ground.h"
 #include "tests/proto/plumb_error.h"
 

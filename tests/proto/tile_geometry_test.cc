@@ -1,4 +1,4 @@
-#include "proto/tile_geometry.h"
+#include "proto/mesh/tile_geometry.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "proto/tile_json.h"
+#include "proto/documents/tile_json.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "proto/tile_mesh.h"
+#include "proto/mesh/tile_mesh.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 
 #include "engine/geo/ellipsoid.h"
 #include "engine/tin/greedy.h"
-#include "proto/tile_error.h"
+#include "proto/error/tile_error.h"
 
 namespace terrace::proto {
 namespace {

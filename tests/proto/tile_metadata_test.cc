@@ -1,4 +1,4 @@
-#include "proto/tile_metadata.h"
+#include "proto/mesh/tile_metadata.h"
 
 #include <gtest/gtest.h>
 

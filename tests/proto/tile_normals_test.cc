@@ -1,4 +1,4 @@
-#include "proto/tile_normals.h"
+#include "proto/mesh/tile_normals.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <functional>
 
 #include "engine/geo/ellipsoid.h"
-#include "proto/tile_mesh.h"
+#include "proto/mesh/tile_mesh.h"
 #include "tests/proto/quantized_mesh_decoder.h"
 
 namespace terrace::proto {

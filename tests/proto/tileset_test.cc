@@ -1,4 +1,4 @@
-#include "proto/tileset.h"
+#include "proto/documents/tileset.h"
 
 #include <gtest/gtest.h>
 

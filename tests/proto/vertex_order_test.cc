@@ -1,4 +1,4 @@
-#include "proto/vertex_order.h"
+#include "proto/mesh/vertex_order.h"
 
 #include <gtest/gtest.h>
 

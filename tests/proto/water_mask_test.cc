@@ -1,4 +1,4 @@
-#include "proto/water_mask.h"
+#include "proto/mesh/water_mask.h"
 
 #include <gtest/gtest.h>
 

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "engine/geo/error_ladder.h"
-#include "proto/skirt.h"
+#include "proto/mesh/skirt.h"
 #include "tests/proto/glb_decoder.h"
 #include "tests/tiler/fetched_tile.h"
 #include "tiler/tile_pipeline.h"

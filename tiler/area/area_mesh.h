@@ -6,7 +6,7 @@
 
 #include "engine/core/result.h"
 #include "engine/dem/dem_source.h"
-#include "proto/mesh_file.h"
+#include "proto/gltf/mesh_file.h"
 #include "tiler/encoded_tile.h"
 
 namespace terrace::tiler {

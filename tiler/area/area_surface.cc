@@ -8,7 +8,7 @@
 #include <numeric>
 #include <optional>
 
-#include "engine/tin/triangle_rows.h"
+#include "engine/tin/scan/triangle_rows.h"
 
 namespace terrace::tiler {
 namespace {

@@ -8,9 +8,9 @@
 #include "engine/geo/ellipsoid.h"
 #include "engine/geo/lattice.h"
 #include "engine/tin/greedy.h"
-#include "engine/tin/height_field.h"
-#include "engine/tin/tin_mesh.h"
-#include "proto/mesh_file.h"
+#include "engine/tin/mesh/height_field.h"
+#include "engine/tin/mesh/tin_mesh.h"
+#include "proto/gltf/mesh_file.h"
 
 namespace terrace::tiler {
 

@@ -5,10 +5,10 @@
 #include <utility>
 #include <vector>
 
-#include "proto/skirt.h"
-#include "proto/surface_error.h"
-#include "proto/tile_error.h"
-#include "proto/tile_normals.h"
+#include "proto/error/surface_error.h"
+#include "proto/error/tile_error.h"
+#include "proto/mesh/skirt.h"
+#include "proto/mesh/tile_normals.h"
 #include "tiler/mesh/mend_mesh.h"
 
 namespace terrace::tiler {

@@ -9,7 +9,7 @@
 
 #include "engine/geo/ellipsoid.h"
 #include "engine/tin/insert_samples.h"
-#include "proto/tile_normals.h"
+#include "proto/mesh/tile_normals.h"
 
 namespace terrace::tiler {
 

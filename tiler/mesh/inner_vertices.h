@@ -1,7 +1,7 @@
 // Vertices inside of tiles that are hardly more than their edges.
 #pragma once
 
-#include "engine/tin/tin_mesh.h"
+#include "engine/tin/mesh/tin_mesh.h"
 #include "proto/lattice_view.h"
 
 namespace terrace::tiler {

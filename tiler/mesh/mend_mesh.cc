@@ -1,7 +1,7 @@
 #include "tiler/mesh/mend_mesh.h"
 
 #include "engine/tin/insert_samples.h"
-#include "proto/quantized_mesh.h"
+#include "proto/mesh/quantized_mesh.h"
 #include "tiler/mesh/tile_mesher.h"
 
 namespace terrace::tiler {

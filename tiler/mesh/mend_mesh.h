@@ -5,8 +5,8 @@
 #include <stop_token>
 
 #include "engine/core/result.h"
-#include "engine/tin/tin_mesh.h"
-#include "proto/tile_error.h"
+#include "engine/tin/mesh/tin_mesh.h"
+#include "proto/error/tile_error.h"
 
 namespace terrace::tiler {
 

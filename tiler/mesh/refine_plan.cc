@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "engine/geo/ellipsoid.h"
-#include "proto/quantized_mesh.h"
+#include "proto/mesh/quantized_mesh.h"
 
 namespace terrace::tiler {
 namespace {

@@ -4,8 +4,8 @@
 #pragma once
 
 #include "engine/tin/greedy.h"
-#include "proto/edge_steps.h"
 #include "proto/lattice_view.h"
+#include "proto/mesh/edge_steps.h"
 
 namespace terrace::tiler {
 

@@ -7,18 +7,18 @@
 #include "engine/core/result.h"
 #include "engine/dem/dem_source.h"
 #include "engine/tin/greedy.h"
-#include "engine/tin/height_field.h"
+#include "engine/tin/mesh/height_field.h"
+#include "engine/tin/mesh/tin_mesh.h"
 #include "engine/tin/refinement.h"
-#include "engine/tin/tin_mesh.h"
 #include "proto/lattice_view.h"
-#include "proto/quantized_mesh.h"
+#include "proto/mesh/quantized_mesh.h"
 
 namespace terrace::tiler {
 
 // How a dataset wants its tiles meshed.
 struct MeshRules {
   tin::Criterion criterion = tin::Criterion::kDelaunay;
-  bool compact = false;  // with the drop pass (engine/tin/drop_pass.h)
+  bool compact = false;  // with the drop pass (engine/tin/decimate/drop_pass.h)
 };
 
 struct MeshedTile {

@@ -1,4 +1,4 @@
-#include "engine/tin/candidate_queue.h"
+#include "engine/tin/mesh/candidate_queue.h"
 
 #include <gtest/gtest.h>
 

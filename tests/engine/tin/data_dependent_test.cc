@@ -13,13 +13,13 @@
 #include <vector>
 
 #include "engine/tin/border.h"
-#include "engine/tin/candidate_queue.h"
 #include "engine/tin/greedy.h"
+#include "engine/tin/mesh/candidate_queue.h"
+#include "engine/tin/mesh/predicates.h"
+#include "engine/tin/mesh/quadrilateral.h"
 #include "engine/tin/mesh_error.h"
-#include "engine/tin/predicates.h"
-#include "engine/tin/quadrilateral.h"
 #include "engine/tin/sagitta.h"
-#include "engine/tin/squared_distances.h"
+#include "engine/tin/scan/squared_distances.h"
 #include "tests/engine/tin/mesh_laws.h"
 #include "tests/engine/tin/test_fields.h"
 #include "tests/support/test_data.h"

@@ -1,4 +1,4 @@
-#include "engine/tin/drop_pass.h"
+#include "engine/tin/decimate/drop_pass.h"
 
 #include <gtest/gtest.h>
 
@@ -16,10 +16,10 @@
 #include "engine/core/check.h"
 #include "engine/tin/greedy.h"
 #include "engine/tin/insert_samples.h"
+#include "engine/tin/mesh/predicates.h"
 #include "engine/tin/mesh_error.h"
-#include "engine/tin/predicates.h"
 #include "engine/tin/sagitta.h"
-#include "engine/tin/triangle_fit.h"
+#include "engine/tin/scan/triangle_fit.h"
 #include "tests/engine/tin/mesh_laws.h"
 #include "tests/engine/tin/test_fields.h"
 #include "tests/support/test_data.h"

@@ -1,4 +1,4 @@
-#include "engine/tin/extended_greedy.h"
+#include "engine/tin/extended/extended_greedy.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <set>
 #include <utility>
 
-#include "engine/tin/extended_error.h"
+#include "engine/tin/extended/extended_error.h"
 #include "engine/tin/greedy.h"
 #include "tests/engine/tin/mesh_laws.h"
 #include "tests/engine/tin/test_fields.h"

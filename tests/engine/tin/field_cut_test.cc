@@ -1,4 +1,4 @@
-#include "engine/tin/field_cut.h"
+#include "engine/tin/extended/field_cut.h"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "engine/tin/block_joiner.h"
+#include "engine/tin/extended/block_joiner.h"
 #include "engine/tin/greedy.h"
 #include "tests/engine/tin/mesh_laws.h"
 #include "tests/engine/tin/test_fields.h"

@@ -1,4 +1,4 @@
-#include "engine/tin/height_field.h"
+#include "engine/tin/mesh/height_field.h"
 
 #include <gtest/gtest.h>
 
@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "engine/tin/mark_voids.h"
+#include "engine/tin/mesh/mark_voids.h"
 #include "tests/engine/tin/instruction_sets.h"
 #include "tests/engine/tin/test_fields.h"
 

@@ -1,4 +1,4 @@
-#include "engine/tin/hole.h"
+#include "engine/tin/mesh/hole.h"
 
 #include <gtest/gtest.h>
 

@@ -9,8 +9,8 @@
 #include <set>
 #include <utility>
 
+#include "engine/tin/mesh/predicates.h"
 #include "engine/tin/mesh_error.h"
-#include "engine/tin/predicates.h"
 
 namespace terrace::tin {
 namespace {

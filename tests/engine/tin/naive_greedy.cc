@@ -7,11 +7,11 @@
 #include <utility>
 
 #include "engine/core/check.h"
-#include "engine/tin/candidate.h"
-#include "engine/tin/candidate_queue.h"
-#include "engine/tin/plane.h"
-#include "engine/tin/predicates.h"
-#include "engine/tin/triangulation.h"
+#include "engine/tin/mesh/candidate.h"
+#include "engine/tin/mesh/candidate_queue.h"
+#include "engine/tin/mesh/plane.h"
+#include "engine/tin/mesh/predicates.h"
+#include "engine/tin/mesh/triangulation.h"
 
 namespace terrace::tin {
 namespace {

@@ -5,8 +5,8 @@
 #pragma once
 
 #include "engine/tin/greedy.h"
-#include "engine/tin/height_field.h"
-#include "engine/tin/tin_mesh.h"
+#include "engine/tin/mesh/height_field.h"
+#include "engine/tin/mesh/tin_mesh.h"
 
 namespace terrace::tin {
 

@@ -1,4 +1,4 @@
-#include "engine/tin/predicates.h"
+#include "engine/tin/mesh/predicates.h"
 
 #include <gtest/gtest.h>
 

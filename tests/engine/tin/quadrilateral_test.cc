@@ -1,10 +1,10 @@
-#include "engine/tin/quadrilateral.h"
+#include "engine/tin/mesh/quadrilateral.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "engine/tin/height_field.h"
+#include "engine/tin/mesh/height_field.h"
 #include "tests/engine/tin/test_fields.h"
 
 namespace terrace::tin {

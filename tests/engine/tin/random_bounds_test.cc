@@ -12,9 +12,9 @@
 #include <vector>
 
 #include "engine/core/check.h"
-#include "engine/tin/block_joiner.h"
-#include "engine/tin/drop_pass.h"
-#include "engine/tin/field_cut.h"
+#include "engine/tin/decimate/drop_pass.h"
+#include "engine/tin/extended/block_joiner.h"
+#include "engine/tin/extended/field_cut.h"
 #include "engine/tin/greedy.h"
 #include "tests/engine/tin/rasterizer.h"
 #include "tests/engine/tin/test_fields.h"

@@ -6,7 +6,7 @@
 #include <array>
 #include <vector>
 
-#include "engine/tin/plane.h"
+#include "engine/tin/mesh/plane.h"
 #include "tests/engine/tin/test_fields.h"
 
 namespace terrace::tin {

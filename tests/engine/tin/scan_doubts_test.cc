@@ -5,7 +5,7 @@
 #include <limits>
 #include <vector>
 
-#include "engine/tin/height_field.h"
+#include "engine/tin/mesh/height_field.h"
 #include "tests/engine/tin/scan_reference.h"
 #include "tests/engine/tin/test_fields.h"
 

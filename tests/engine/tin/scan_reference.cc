@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "engine/tin/predicates.h"
+#include "engine/tin/mesh/predicates.h"
 #include "tests/engine/tin/instruction_sets.h"
 
 namespace terrace::tin {

@@ -4,9 +4,9 @@
 #include <cstddef>
 #include <vector>
 
-#include "engine/tin/height_field.h"
-#include "engine/tin/star.h"
-#include "engine/tin/triangle_scan.h"
+#include "engine/tin/mesh/height_field.h"
+#include "engine/tin/mesh/star.h"
+#include "engine/tin/scan/triangle_scan.h"
 #include "tests/engine/tin/test_fields.h"
 
 namespace terrace::tin {

@@ -1,4 +1,4 @@
-#include "engine/tin/spare_blocks.h"
+#include "engine/tin/mesh/spare_blocks.h"
 
 #include <gtest/gtest.h>
 

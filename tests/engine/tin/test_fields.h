@@ -6,8 +6,8 @@
 #include <functional>
 #include <limits>
 
-#include "engine/tin/height_field.h"
-#include "engine/tin/plane.h"
+#include "engine/tin/mesh/height_field.h"
+#include "engine/tin/mesh/plane.h"
 
 namespace terrace::tin {
 

@@ -1,4 +1,4 @@
-#include "engine/tin/triangle_fit.h"
+#include "engine/tin/scan/triangle_fit.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <limits>
 #include <utility>
 
-#include "engine/tin/triangle_spans.h"
+#include "engine/tin/scan/triangle_spans.h"
 #include "tests/engine/tin/test_fields.h"
 
 namespace terrace::tin {

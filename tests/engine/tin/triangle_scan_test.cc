@@ -1,4 +1,4 @@
-#include "engine/tin/triangle_scan.h"
+#include "engine/tin/scan/triangle_scan.h"
 
 #include <gtest/gtest.h>
 
@@ -8,8 +8,8 @@
 #include <limits>
 #include <vector>
 
-#include "engine/tin/height_field.h"
-#include "engine/tin/predicates.h"
+#include "engine/tin/mesh/height_field.h"
+#include "engine/tin/mesh/predicates.h"
 #include "tests/engine/tin/instruction_sets.h"
 #include "tests/engine/tin/scan_reference.h"
 #include "tests/engine/tin/test_fields.h"

@@ -1,4 +1,4 @@
-#include "engine/tin/triangle_spans.h"
+#include "engine/tin/scan/triangle_spans.h"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "engine/tin/predicates.h"
-#include "engine/tin/squared_distances.h"
+#include "engine/tin/mesh/predicates.h"
+#include "engine/tin/scan/squared_distances.h"
 #include "tests/engine/tin/test_fields.h"
 
 namespace terrace::tin {

@@ -1,4 +1,4 @@
-#include "engine/tin/triangulation.h"
+#include "engine/tin/mesh/triangulation.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <set>
 #include <vector>
 
-#include "engine/tin/predicates.h"
+#include "engine/tin/mesh/predicates.h"
 #include "tests/engine/tin/mesh_laws.h"
 #include "tests/engine/tin/test_fields.h"
 

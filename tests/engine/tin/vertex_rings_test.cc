@@ -1,4 +1,4 @@
-#include "engine/tin/vertex_rings.h"
+#include "engine/tin/decimate/vertex_rings.h"
 
 #include <gtest/gtest.h>
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "proto/layer_json.h"
+#include "proto/documents/layer_json.h"
 #include "server/handlers/certified_points.h"
 #include "server/handlers/datasets_handler.h"
 #include "server/handlers/document_maker.h"

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "engine/geo/error_ladder.h"
-#include "proto/skirt.h"
+#include "proto/mesh/skirt.h"
 #include "server/http/negotiate.h"
 #include "tests/proto/subtree_reader.h"
 #include "tests/server/handlers/at_once.h"

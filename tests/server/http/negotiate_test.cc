@@ -8,7 +8,7 @@
 #include <string>
 
 #include "engine/geo/error_ladder.h"
-#include "proto/skirt.h"
+#include "proto/mesh/skirt.h"
 
 namespace terrace::server {
 namespace {
@@ -261,7 +261,8 @@ TEST(Negotiate, GlbTilesAreCanonicalToo) {
   EXPECT_EQ(negotiate("/maui/0/1/0.terrain")->compression, tiler::TileRequest{}.compression);
 }
 
-// What skirts rely on (proto/skirt.h): whatever is asked for, a parent's error is at most twice what they are made for.
+// What skirts rely on (proto/mesh/skirt.h): whatever is asked for, a parent's error is at most twice what they are made
+// for.
 TEST(Negotiate, AParentIsAtMostTwiceAsCoarse) {
   for (int level = 1; level <= geo::kMaxLevel; ++level) {
     for (double wish_m = 1e-5; wish_m < 1e8; wish_m *= 1.31) {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "engine/tin/greedy.h"
-#include "proto/tile_normals.h"
+#include "proto/mesh/tile_normals.h"
 #include "tiler/mesh/tile_mesher.h"
 
 namespace terrace::tiler {

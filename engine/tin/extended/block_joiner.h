@@ -1,0 +1,42 @@
+// The meshes of a cut's blocks (field_cut.h), joined to one mesh of the field.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "engine/tin/extended/field_cut.h"
+#include "engine/tin/mesh/tin_mesh.h"
+
+namespace terrace::tin {
+
+// Takes the blocks in the cut's order; none is needed any more once it was added. Vertices: the field's corners first,
+// as in every TinMesh, then block by block those that no earlier block had, in the block's order. Triangles block by
+// block. Holds the mesh and one id per column and row of the field. Not thread-safe.
+class BlockJoiner {
+ public:
+  // `cut` must outlive this object.
+  explicit BlockJoiner(const FieldCut& cut);
+
+  // Precondition: MeshBlock's mesh of block number added(), to the same error as the others.
+  void Add(const TinMesh& block_mesh);
+
+  std::size_t added() const { return added_; }
+
+  // Precondition: all blocks were added.
+  TinMesh Take() &&;
+
+ private:
+  std::uint32_t IdOf(SamplePosition vertex, const FieldBlock& block);
+
+  const FieldCut* cut_;
+  std::size_t added_ = 0;
+  TinMesh mesh_;
+
+  // Ids of the vertices that later blocks share. By x: the far borders (y) of the row of blocks below, replaced from
+  // x = 0 on by those of the row at work. By y: the far border (x) of the block before.
+  std::vector<std::uint32_t> ids_by_x_, ids_by_y_;
+  std::vector<std::uint32_t> ids_;  // of the block at work
+};
+
+}  // namespace terrace::tin

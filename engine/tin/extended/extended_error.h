@@ -1,0 +1,25 @@
+// How far a coloured mesh is from its extended field, measured afresh: nothing is taken from the run that made the
+// mesh.
+#pragma once
+
+#include <cstddef>
+#include <stop_token>
+
+#include "engine/tin/extended/extended_field.h"
+#include "engine/tin/extended/extended_greedy.h"
+#include "engine/tin/mesh_error.h"
+
+namespace terrace::tin {
+
+struct ExtendedError {
+  MeshError height;               // of the heights alone, over every valid sample
+  double max_combined = 0;        // metres, the formula of extended_field.h over the same samples
+  double color_rms = 0;           // root mean square over the known colours of valid samples and r, g, b; range 0 to 1
+  std::size_t color_samples = 0;  // valid samples with a known colour
+};
+
+// Rasterizes every triangle with exact integer coverage; a sample on an edge counts once. When `stop` is requested,
+// what was measured until then. Safe to call from many threads at once.
+ExtendedError MeasureExtendedError(const ExtendedField& field, const ColoredMesh& mesh, std::stop_token stop = {});
+
+}  // namespace terrace::tin

@@ -1,0 +1,65 @@
+// An extended height field, H(x, y) = (z, r, g, b): every sample has a height and a colour, and one error measures
+// both.
+//
+// Garland and Heckbert, "Fast Triangular Approximation of Terrains and Height Fields" (1997), section 3.5. A sample
+// that a surface misses by dz metres and by dr, dg and db, colours from 0 to 1, has the error
+//   (1 - w) |dz| + w (M / 3) (|dr| + |dg| + |db|)  metres,
+// with the weight w of colour, 0 to 1, and the range M of the valid heights: the whole range of colours weighs what the
+// whole range of heights does. Where all heights are the same the paper's M leaves nothing; there it is 1, so that a
+// flat field with w = 1 is an image, and its error the share of the range of colours.
+//
+// Immutable after Make: safe to use from many threads at once.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "engine/tin/mesh/height_field.h"
+
+namespace terrace::tin {
+
+// Red, green, blue.
+using Color = std::array<std::uint8_t, 3>;
+
+// Red, green, blue, alpha: 0 where the colour is not known, anything else where it is.
+using ColorSample = std::array<std::uint8_t, 4>;
+
+class ExtendedField {
+ public:
+  // `colors` has as many samples as `heights`, in the same order. A sample without a height is a void, whatever its
+  // colour. One without a colour is judged by its height alone. Refuses another number of colours, a weight that is not
+  // from 0 to 1, and colours none of which is known.
+  static Result<ExtendedField> Make(HeightField heights, std::vector<ColorSample> colors, double color_weight);
+
+  const HeightField& heights() const { return heights_; }
+  int width() const { return heights_.width(); }
+  int height() const { return heights_.height(); }
+  const ColorSample& ColorAt(int x, int y) const { return ColorRow(y)[x]; }
+  const ColorSample* ColorRow(int y) const {
+    return colors_.data() + static_cast<std::size_t>(y) * static_cast<std::size_t>(width());
+  }
+  static bool IsKnown(const ColorSample& color) { return color[3] != 0; }
+
+  // The known colour nearest to a position, ties to the smaller row, then column. Looks at all samples.
+  Color NearestColor(int x, int y) const;
+
+  // The error of a sample that is missed by so many metres, and by so many 255ths of the range in the sum of its
+  // colours.
+  double Error(double metres, double levels) const { return height_weight_ * metres + level_weight_ * levels; }
+  double color_weight() const { return color_weight_; }
+
+ private:
+  ExtendedField(HeightField heights, std::vector<ColorSample> colors, double color_weight);
+
+  HeightField heights_;
+  std::vector<ColorSample> colors_;
+  double color_weight_;   // w
+  double height_weight_;  // 1 - w
+  double level_weight_;   // w M / 3 / 255
+};
+
+}  // namespace terrace::tin

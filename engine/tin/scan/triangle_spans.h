@@ -1,0 +1,65 @@
+// Which samples a triangle is scanned for: exact integer spans, row by row.
+#pragma once
+
+#include <algorithm>
+#include <array>
+
+#include "engine/tin/mesh/plane.h"
+
+namespace terrace::tin {
+
+// Where an edge that is not horizontal crosses the rows: x = n / dy with integers n = x0 dy + (y - y0) dx and dy > 0.
+//
+// Floor and Ceil are exact with one multiplication. 0 <= n < 2^30 and dy < 2^15, so n * (1 / dy) is off by less than
+// 2^-36. A quotient that is no integer lies at least 2^-15 below the next one: adding 2^-17 lifts an integer that was
+// rounded down above itself, and lifts nothing else over an integer.
+class EdgeCrossing {
+ public:
+  EdgeCrossing(const Corner& low, const Corner& high)
+      : x0_(low.x), y0_(low.y), dx_(high.x - low.x), dy_(high.y - low.y), inverse_(1.0 / dy_) {}
+
+  int Floor(int y) const { return Quotient(x0_ * dy_ + (y - y0_) * dx_); }
+  int Ceil(int y) const { return Quotient(x0_ * dy_ + (y - y0_) * dx_ + dy_ - 1); }
+
+ private:
+  int Quotient(int n) const { return static_cast<int>(n * inverse_ + 0x1p-17); }
+
+  int x0_, y0_, dx_, dy_;
+  double inverse_;
+};
+
+// Calls visit(y, first, last), rows ascending, for the samples of the closed triangle that are neither its corners nor
+// on the border of a field of `width` columns and `height` rows; first <= last. Samples on an edge are visited from
+// both sides.
+template <typename Visit>
+void ForEachInnerSpan(const std::array<Corner, 3>& sorted, double doubled_area, int width, int height, Visit&& visit) {
+  const auto& [low, middle, high] = sorted;
+  const auto clipped = [&](int y, int first, int last) {
+    first = std::max(first, 1);
+    last = std::min(last, width - 2);
+    if (first <= last) visit(y, first, last);
+  };
+  // A horizontal edge is in the first or the last row. Only such rows can lie on the southern or northern border.
+  if (low.y == middle.y && low.y > 0) clipped(low.y, low.x + 1, middle.x - 1);
+  if (high.y - low.y >= 2) {
+    const EdgeCrossing across(low, high);
+    const bool middle_is_right = doubled_area > 0;
+    const auto rows = [&](int from, int to, const EdgeCrossing& around) {
+      const EdgeCrossing& left = middle_is_right ? across : around;
+      const EdgeCrossing& right = middle_is_right ? around : across;
+      for (int y = from; y <= to; ++y) clipped(y, left.Ceil(y), right.Floor(y));
+    };
+    if (middle.y > low.y + 1) rows(low.y + 1, middle.y - 1, EdgeCrossing(low, middle));
+    if (middle.y > low.y && middle.y < high.y) {
+      if (middle_is_right) {
+        clipped(middle.y, across.Ceil(middle.y), middle.x - 1);
+      } else {
+        clipped(middle.y, middle.x + 1, across.Floor(middle.y));
+      }
+    }
+    if (high.y > middle.y + 1) rows(middle.y + 1, high.y - 1, EdgeCrossing(middle, high));
+  }
+  if (middle.y == high.y && high.y < height - 1) clipped(high.y, middle.x + 1, high.x - 1);
+}
+
+}  // namespace terrace::tin

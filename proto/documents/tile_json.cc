@@ -1,0 +1,36 @@
+#include "proto/documents/tile_json.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "engine/geo/mercator_grid.h"
+
+namespace terrace::proto {
+
+const char* ToString(HeightEncoding encoding) { return encoding == HeightEncoding::kMapbox ? "mapbox" : "terrarium"; }
+
+std::string EncodeTileJson(const TileJsonDescription& tiles) {
+  using Json = nlohmann::ordered_json;
+  const bool crosses_antimeridian = tiles.west > tiles.east;
+  const auto clipped = [](double latitude) {
+    return std::clamp(latitude, -geo::kMercatorLatitude, geo::kMercatorLatitude);
+  };
+  Json json;
+  json["tilejson"] = "3.0.0";
+  json["name"] = tiles.name;
+  json["scheme"] = "xyz";
+  json["tiles"] = Json::array({tiles.tile_template});
+  json["minzoom"] = 0;
+  json["maxzoom"] = tiles.max_zoom;
+  json["bounds"] = Json::array({crosses_antimeridian ? -180 : tiles.west, clipped(tiles.south),
+                                crosses_antimeridian ? 180 : tiles.east, clipped(tiles.north)});
+  json["attribution"] = tiles.attribution;
+  json["type"] = "raster-dem";
+  json["format"] = "png";
+  json["encoding"] = ToString(tiles.encoding);
+  json["tileSize"] = tiles.tile_size;
+  // Names and attributions come from files: bytes that are not UTF-8 become U+FFFD instead of an exception.
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+}  // namespace terrace::proto

@@ -1,0 +1,35 @@
+// tileset.json of 3D Tiles 1.1: implicit quadtrees over TMS tiles (OGC 22-025r4). Knows nothing of what a tile
+// contains.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "proto/documents/implicit_tree.h"
+#include "proto/height_span.h"
+
+namespace terrace::proto {
+
+struct TilesetDescription {
+  std::string attribution;
+  std::vector<TreeRoot> roots;  // tiles of one level (ImplicitTrees)
+  // Of a tile and, where a tree is rooted at it, of all its descendants: clients hand the range of a root down. What is
+  // written of a tile holds those of the tiles below it as well.
+  std::function<HeightSpan(const geo::TileKey&)> heights;
+  std::string subtree_query;  // appended to the subtree templates, without '?'; may be empty
+  std::string content_query;  // likewise to the contents: "error=5&atleast=1"
+};
+
+// Metres. 3D Tiles clients go a level deeper where a tile's geometric error comes to more than 16 pixels, terrain
+// clients where the level error that they assume comes to more than 2. With 8 times that level error both choose the
+// same tiles (cesium-native turns layer.json into 3D Tiles by the same factor).
+double GeometricError(int level);
+
+// UTF-8 JSON. Templates are relative to the tileset: 3dtiles/{RootName}/{level}/{x}/{y}.glb and
+// .{SubtreeLevels}.subtree, so that a tileset.json kept from a day when the tree had other levels stays good. Several
+// roots become children of a tile without content. The schema is that of the subtrees' metadata
+// (proto/documents/subtree.h).
+std::string EncodeTileset(const TilesetDescription& tileset);
+
+}  // namespace terrace::proto

@@ -1,0 +1,412 @@
+#include "proto/error/surface_error.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <numbers>
+
+#include "proto/error/plumb_nodes.h"
+#include "proto/lattice_angles.h"
+#include "proto/mesh/tile_geometry.h"
+
+namespace terrace::proto {
+namespace {
+
+// The smallest radius of curvature there is: a meridian's at the equator.
+constexpr double kSmallestRadius = geo::kSemiMinorAxis * geo::kSemiMinorAxis / geo::kSemiMajorAxis;
+
+// Ground up to 100 km from the ellipsoid turns by that much more of a step than the ellipsoid does.
+constexpr double kHeights = 1.02;
+
+// Lattice columns and rows, from the tile's south-western sample.
+struct Place {
+  double x = 0, y = 0;
+};
+
+Place Between(Place a, Place b, double t) { return {a.x + t * (b.x - a.x), a.y + t * (b.y - a.y)}; }
+
+// The tile's ground about a place, cheaper than sines: exact at lattice nodes, and from the nearest one by series that
+// end at the fifth power of half a cell, which is below 3e-9 for the widest cells there are.
+class Ground {
+ public:
+  explicit Ground(const LatticeView& lattice)
+      : step_(geo::ToRadians(lattice.lattice.StepDegrees())),
+        west_(geo::ToRadians(lattice.Longitude(0))),
+        south_(geo::ToRadians(lattice.Latitude(0))),
+        angles_(lattice),
+        narrowest_(std::min(angles_.rows.front().cos, angles_.rows.back().cos) - step_) {}
+
+  // Metres above the ellipsoid of a point near the place, along the normal there.
+  double HeightOf(const geo::Vec3& point, Place place) const {
+    const geo::SinCos longitude = Turn(angles_.columns, place.x), latitude = Turn(angles_.rows, place.y);
+    const double surface = geo::kSemiMajorAxis * std::sqrt(1 - geo::kEccentricitySquared * latitude.sin * latitude.sin);
+    return latitude.cos * (point.x * longitude.cos + point.y * longitude.sin) + point.z * latitude.sin - surface;
+  }
+
+  // Metres along a row and along a column, at most.
+  Place WidestStep() const {
+    double widest = 0;
+    for (const geo::SinCos& row : angles_.rows) widest = std::max(widest, row.cos);
+    constexpr double kLargestRadius = geo::kSemiMajorAxis * geo::kSemiMajorAxis / geo::kSemiMinorAxis;
+    return {widest * step_ * kLargestRadius, step_ * kLargestRadius};
+  }
+  // The same, at least; not above zero where a pole is.
+  Place NarrowestStep() const {
+    double narrowest = 1;
+    for (const geo::SinCos& row : angles_.rows) narrowest = std::min(narrowest, row.cos);
+    return {std::max(narrowest, 1e-12) * step_ * kSmallestRadius * 0.98, step_ * kSmallestRadius * 0.98};
+  }
+  // Metres, at most.
+  double WidestDiagonal() const {
+    const Place step = WidestStep();
+    return std::hypot(step.x, step.y);
+  }
+  double step_radians() const { return step_; }
+
+  // Where the plumb line through the point meets the ellipsoid (Bowring, "Transformation from spatial to geographical
+  // coordinates", Survey Review 1976). `near`: a place within half a turn.
+  Place PlaceOf(const geo::Vec3& point, Place near) const {
+    constexpr double kSecond = geo::kEccentricitySquared / (1 - geo::kEccentricitySquared);
+    const double radius = std::hypot(point.x, point.y);
+    const double reduced = std::atan2(point.z * geo::kSemiMajorAxis, radius * geo::kSemiMinorAxis);
+    const double sine = std::sin(reduced), cosine = std::cos(reduced);
+    const double latitude =
+        std::atan2(point.z + kSecond * geo::kSemiMinorAxis * sine * sine * sine,
+                   radius - geo::kEccentricitySquared * geo::kSemiMajorAxis * cosine * cosine * cosine);
+    const double turn = 2 * std::numbers::pi / step_;
+    double x = (std::atan2(point.y, point.x) - west_) / step_;
+    x -= std::round((x - near.x) / turn) * turn;
+    return {x, (latitude - south_) / step_};
+  }
+
+  // Lattice steps by which the points of a chord may lie beside the line between the places of its ends: it is nearer
+  // to the axis than they are, its longitude is the mean of theirs weighted with the distances from the axis, and its
+  // latitude the mean weighted with the radii of curvature. Infinite where no bound is known.
+  Place Shift(Place a, Place b, double rise_m) const {
+    constexpr double kUnknown = std::numeric_limits<double>::infinity();
+    const double width = std::abs(a.x - b.x) * step_, height = std::abs(a.y - b.y) * step_;
+    if (width > 0.5) return {kUnknown, kUnknown};
+    const double heights = std::abs(rise_m) / kSmallestRadius;
+    const double y = width * width / 16 + height * (heights / 4 + height * (0.005 + height));
+    if (width == 0) return {0, y / step_};
+    // Of the tile where that will do, else of the chord's rows.
+    const double least = narrowest_ > 0.1 ? narrowest_ : std::min(RowNear(a.y).cos, RowNear(b.y).cos) - step_ / 2;
+    if (least < height / 8 + 1e-9) return {kUnknown, kUnknown};  // about a pole
+    return {width * (height / least / 4 + heights / 2 + width * width / 16) / step_, y / step_};
+  }
+
+ private:
+  const geo::SinCos& RowNear(double y) const {
+    return angles_.rows[std::min(static_cast<std::size_t>(std::max(y + 0.5, 0.0)), angles_.rows.size() - 1)];
+  }
+  geo::SinCos Turn(const std::vector<geo::SinCos>& nodes, double at) const {
+    const double last = static_cast<double>(nodes.size() - 1);
+    const auto nearest = static_cast<std::size_t>(std::clamp(at, 0.0, last) + 0.5);
+    const geo::SinCos node = nodes[nearest];
+    const double a = (at - static_cast<double>(nearest)) * step_, a2 = a * a;
+    double cosine = 1 - a2 / 2 * (1 - a2 / 12), sine = a * (1 - a2 / 6 * (1 - a2 / 20));
+    if (at < -0.5 || at > last + 0.5) cosine = std::cos(a), sine = std::sin(a);  // a chord that leaves the tile
+    return {node.sin * cosine + node.cos * sine, node.cos * cosine - node.sin * sine};
+  }
+
+  double step_, west_, south_;  // radians
+  LatticeAngles angles_;
+  double narrowest_;  // the smallest cosine of a latitude, a step beyond the rows too
+};
+
+// A piece of an edge within one lattice cell: the lattice surface on it is a quadratic.
+struct Piece {
+  double begin = 0, end = 0;  // of the edge, 0 .. 1
+  double bend = 0;            // the quadratic's leading coefficient along the whole edge
+  double end_sample = 0;      // of the lattice surface at the end
+};
+
+// Whether LargestOn may be more than `known`: a quadratic leaves the line between its ends by a quarter of its bend.
+inline bool IsLarger(double length, double edge_bend, double first, double last, double known) {
+  return std::max(std::abs(first), std::abs(last)) + std::abs(edge_bend) * length * length / 4 > known;
+}
+
+// The larger of `known` and the largest |value| of the quadratic with these values at the ends of a piece of that
+// length. `edge_bend`: its leading coefficient along the whole edge.
+double LargestOn(double length, double edge_bend, double first, double last, double known) {
+  const double ends = std::max({std::abs(first), std::abs(last), known});
+  const double bend = edge_bend * length * length;
+  if (bend == 0) return ends;
+  // first + (last - first) s + bend s (s - 1)
+  const double s = 0.5 - (last - first) / (2 * bend);
+  if (!(s > 0 && s < 1)) return ends;
+  return std::max(ends, std::abs(first + (last - first) * s + bend * s * (s - 1)));
+}
+
+class EdgeMeter {
+ public:
+  // Differences of floats are exact here: heights are multiples of 2^-10 m, and steps between them below 2^14 m.
+  explicit EdgeMeter(const LatticeView& lattice) : lattice_(lattice), cells_(lattice.cells()) {
+    const auto row_of = [&](int j) { return lattice.heights.data() + (j + 1) * (cells_ + 3) + 1; };
+    float east = 0, north = 0;
+    for (int j = 0; j <= cells_; ++j) {
+      const float *const row = row_of(j), *const next = row_of(std::min(j + 1, cells_));
+      for (int i = 0; i < cells_; ++i) {
+        east = std::max(east, std::abs(row[i + 1] - row[i]));
+        north = std::max(north, std::abs(next[i] - row[i]));
+      }
+      north = std::max(north, std::abs(next[cells_] - row[cells_]));
+    }
+    steepest_ = {static_cast<double>(east), static_cast<double>(north)};
+  }
+
+  // Metres by which the lattice surface changes over these steps, at most.
+  double LargestChange(Place steps) const {
+    if (!std::isfinite(steps.x) || !std::isfinite(steps.y)) return Relief();
+    const double change = steps.x * steepest_.x + steps.y * steepest_.y;
+    return change <= std::max(steepest_.x, steepest_.y) ? change : std::min(change, Relief());
+  }
+
+  // Every piece of the edge a - b between places where it leaves a cell, in order: visit(piece).
+  template <typename Visit>
+  void ForEachPiece(Place a, Place b, const Visit& visit) const {
+    Lines columns(a.x, b.x), rows(a.y, b.y);
+    const double turn = (b.x - a.x) * (b.y - a.y);
+    for (double begin = 0; begin < 1;) {
+      const double end = std::min(std::min(columns.at, rows.at), 1.0);
+      if (columns.at <= end) columns.Next();
+      if (rows.at <= end) rows.Next();
+      if (!(end > begin)) continue;
+      const Place centre = Between(a, b, (begin + end) / 2), last = Between(a, b, end);
+      const int i = CellOf(centre.x), j = CellOf(centre.y);
+      const double south_west = lattice_.At(i, j), along = lattice_.At(i + 1, j) - south_west;
+      const double across = lattice_.At(i, j + 1) - south_west;
+      const double twist = lattice_.At(i + 1, j + 1) - south_west - along - across;
+      const double x = last.x - i, y = last.y - j;
+      visit(Piece{begin, end, twist * turn, south_west + x * along + y * (across + x * twist)});
+      begin = end;
+    }
+  }
+
+  double SampleAt(Place place) const {
+    const int i = CellOf(place.x), j = CellOf(place.y);
+    const double x = place.x - i, y = place.y - j;
+    const double south = lattice_.At(i, j) + x * (double{lattice_.At(i + 1, j)} - lattice_.At(i, j));
+    const double north = lattice_.At(i, j + 1) + x * (double{lattice_.At(i + 1, j + 1)} - lattice_.At(i, j + 1));
+    return south + y * (north - south);
+  }
+
+  bool IsRim(Place a, Place b) const {
+    return (a.x == b.x && (a.x == 0 || a.x == cells_)) || (a.y == b.y && (a.y == 0 || a.y == cells_));
+  }
+
+ private:
+  // Between the lowest and the highest node, metres. Few tiles ask for it.
+  double Relief() const {
+    if (relief_ < 0) {
+      double lowest = lattice_.At(0, 0), highest = lowest;
+      for (int j = 0; j <= cells_; ++j) {
+        for (int i = 0; i <= cells_; ++i) {
+          const double height = lattice_.At(i, j);
+          lowest = std::min(lowest, height);
+          highest = std::max(highest, height);
+        }
+      }
+      relief_ = highest - lowest;
+    }
+    return relief_;
+  }
+
+  int CellOf(double at) const { return std::clamp(static_cast<int>(at), 0, cells_ - 1); }
+
+  // Where an edge crosses the lattice's lines of one direction, as parts of the edge; infinity after the last.
+  struct Lines {
+    Lines(double from, double to)
+        : first(from), last(to), inverse(1 / (to - from)), line(from < to ? std::floor(from) : std::ceil(from)) {
+      Next();
+    }
+    void Next() {
+      line += first < last ? 1 : -1;
+      const bool is_there = first < last ? line < last : line > last;
+      at = is_there && first != last ? (line - first) * inverse : std::numeric_limits<double>::infinity();
+    }
+    double first, last, inverse, line, at = 0;
+  };
+
+  const LatticeView& lattice_;
+  const int cells_;
+  Place steepest_;  // metres between neighbouring samples of a row and of a column
+  mutable double relief_ = -1;
+};
+
+// Every edge once: those inside the tile belong to two triangles with opposite directions.
+template <typename Visit>
+void ForEachEdge(const std::vector<std::array<std::uint32_t, 3>>& triangles, const std::vector<Place>& places,
+                 const EdgeMeter& meter, const Visit& visit) {
+  for (const auto& triangle : triangles) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint32_t a = triangle[k], b = triangle[(k + 1) % 3];
+      if (a < b || meter.IsRim(places[a], places[b])) visit(a, b);
+    }
+  }
+}
+
+// Lattice steps along both axes together.
+double SpanOf(Place a, Place b) { return std::abs(a.x - b.x) + std::abs(a.y - b.y); }
+
+// A point of a flat triangle's edge.
+struct End {
+  Place place;  // where its plumb line meets the ellipsoid
+  geo::Vec3 point;
+  double height = 0;  // above the ellipsoid, metres
+};
+
+// The height of a chord above the ellipsoid along the line between its ends' places: a quadratic with that leading
+// coefficient, but for `slack`.
+struct Chord {
+  double first = 0, last = 0, bend = 0, slack = 0;
+  bool is_quadratic = true;  // else it is to be told at every place
+
+  double At(double t) const { return first + t * (last - first) + bend * t * (t - 1); }
+};
+
+double HeightOn(const Ground& ground, const End& a, const End& b, double t) {
+  return ground.HeightOf(a.point + (b.point - a.point) * t, Between(a.place, b.place, t));
+}
+
+// The height above the ellipsoid at a part t of the chord is n(t) P(t) - s(t): n the normal there, P the chord's
+// point, s how far the tangential plane is from the centre. Components of n are sums of sines of (longitude +-
+// latitude), so their k-th derivatives are at most w^k, w the edge's span in radians of both together. The third
+// derivative of the height is at most 3 |n''| |P'| + |n'''| |P| + |s'''| < 7.2 a w^3 + 5.3 w^2 |difference of
+// heights|. A quadratic through both ends and the middle is off by 0.0081 of it.
+Chord ChordOf(const Ground& ground, const End& a, const End& b) {
+  const double span = SpanOf(a.place, b.place) * ground.step_radians();
+  Chord chord{a.height, b.height};
+  constexpr double kWide = 0.01;  // the slack is up to 0.4 m below
+  chord.is_quadratic = span < kWide;
+  if (!chord.is_quadratic) return chord;
+  chord.bend = 2 * (chord.first + chord.last) - 4 * HeightOn(ground, a, b, 0.5);
+  chord.slack = 0.0081 * span * span * (7.2 * geo::kSemiMajorAxis * span + 5.3 * std::abs(chord.last - chord.first));
+  return chord;
+}
+
+// The larger of `known` and the largest difference from the lattice surface along the line between two places, of a
+// height that is linear along it.
+double LargestOfLine(const EdgeMeter& meter, Place a, Place b, double first, double last, double known) {
+  double before = first - meter.SampleAt(a);
+  meter.ForEachPiece(a, b, [&](const Piece& piece) {
+    // The surface is subtracted, and so is its bend.
+    const double length = piece.end - piece.begin;
+    const double at_end = first + piece.end * (last - first) - piece.end_sample;
+    if (IsLarger(length, -piece.bend, before, at_end, known)) {
+      known = LargestOn(length, -piece.bend, before, at_end, known);
+    }
+    before = at_end;
+  });
+  return known;
+}
+
+// The same of a chord whose points lie off the line by `shift` at most. Its heights between the ends of pieces are for
+// the caller to bound where they are no quadratics.
+double LargestOfChord(const EdgeMeter& meter, const Ground& ground, const End& a, const End& b, Place shift,
+                      double known) {
+  const Chord chord = ChordOf(ground, a, b);
+  const double slack = chord.slack + meter.LargestChange(shift);
+  double before = chord.first - meter.SampleAt(a.place), most = known - slack;
+  meter.ForEachPiece(a.place, b.place, [&](const Piece& piece) {
+    const double length = piece.end - piece.begin, bend = chord.bend - piece.bend;
+    const double height = chord.is_quadratic ? chord.At(piece.end) : HeightOn(ground, a, b, piece.end);
+    const double at_end = height - piece.end_sample;
+    if (IsLarger(length, bend, before, at_end, most)) most = LargestOn(length, bend, before, at_end, most);
+    before = at_end;
+  });
+  return std::max(known, most + slack);
+}
+
+// A chord whose points lie beside the line between its ends' places is halved until they hardly do.
+double LargestOfHalves(const EdgeMeter& meter, const Ground& ground, const End& a, const End& b, int depth,
+                       double known) {
+  constexpr double kSmall = 1e-3;  // of a lattice step
+  constexpr int kDeepest = 8;
+  const Place shift = ground.Shift(a.place, b.place, a.height - b.height);
+  if ((shift.x <= kSmall && shift.y <= kSmall) || depth == kDeepest) {
+    return LargestOfChord(meter, ground, a, b, shift, known);
+  }
+  End middle;
+  middle.point = (a.point + b.point) * 0.5;
+  middle.place = ground.PlaceOf(middle.point, Between(a.place, b.place, 0.5));
+  middle.height = ground.HeightOf(middle.point, middle.place);
+  known = LargestOfHalves(meter, ground, a, middle, depth + 1, known);
+  return LargestOfHalves(meter, ground, middle, b, depth + 1, known);
+}
+
+// Between the ends of pieces, and on the triangles between edges, the height of a chord strays from a linear one by at
+// most this. `steps`: the largest span of an edge.
+double Stray(const Ground& ground, double steps) {
+  const double diagonal = ground.WidestDiagonal(), span = steps * ground.step_radians();
+  return kHeights * (0.75 * diagonal * diagonal / kSmallestRadius + span * span / 8 * diagonal);
+}
+
+// The largest difference along edges from the lattice surface, metres, with Stray. `heights`: by vertex, of the reading
+// in longitude and latitude; empty: it is not measured. `ecef`: by vertex, of the flat triangles, which lie `beside_m`
+// beside their places at most.
+//
+// A chord is at most its sagitta below the line between its ends, and the lattice surface changes little over its
+// shift. So most chords are known to matter less than what was found already, without a look at them.
+double MeasureEdges(const EdgeMeter& meter, const Ground& ground, const std::vector<Place>& places,
+                    const std::vector<double>& heights, const std::vector<geo::Vec3>& ecef, double beside_m,
+                    const std::vector<std::array<std::uint32_t, 3>>& triangles) {
+  std::vector<End> ends(places.size());
+  for (std::size_t k = 0; k < places.size(); ++k) ends[k] = {places[k], ecef[k], ground.HeightOf(ecef[k], places[k])};
+  double span = 0;
+  ForEachEdge(triangles, places, meter,
+              [&](std::uint32_t a, std::uint32_t b) { span = std::max(span, SpanOf(places[a], places[b])); });
+  const Place step = ground.WidestStep(), narrowest = ground.NarrowestStep();
+  const double stray = Stray(ground, span) + meter.LargestChange({beside_m / narrowest.x, beside_m / narrowest.y});
+  double largest = stray;
+  ForEachEdge(triangles, places, meter, [&](std::uint32_t a, std::uint32_t b) {
+    const double x = (places[a].x - places[b].x) * step.x, y = (places[a].y - places[b].y) * step.y;
+    const double sagitta = kHeights * (x * x + y * y) / (8 * kSmallestRadius);
+    const Place shift = ground.Shift(places[a], places[b], ends[a].height - ends[b].height);
+    // Heights of the two readings differ by their rounding too where both are measured.
+    double rounding = 0;
+    if (!heights.empty())
+      rounding = std::max(std::abs(heights[a] - ends[a].height), std::abs(heights[b] - ends[b].height));
+    const double beyond = sagitta + meter.LargestChange(shift) + rounding + stray;
+    const double first = heights.empty() ? ends[a].height : heights[a],
+                 last = heights.empty() ? ends[b].height : heights[b];
+    const double known = std::max(largest - beyond, 0.0);
+    const double linear = LargestOfLine(meter, places[a], places[b], first, last, known);
+    if (linear <= known && known + beyond <= largest) return;
+    if (!heights.empty() && linear > known) largest = std::max(largest, linear);
+    largest = LargestOfHalves(meter, ground, ends[a], ends[b], 0, largest - stray) + stray;
+  });
+  return largest;
+}
+
+}  // namespace
+
+double MeasureEdgeError(const LatticeView& lattice, const QuantizedTile& tile) {
+  std::vector<Place> places;
+  std::vector<double> heights;
+  const double scale = static_cast<double>(lattice.cells()) / kQuantizedMax;
+  for (std::size_t k = 0; k < tile.u.size(); ++k) {
+    places.push_back({tile.u[k] * scale, tile.v[k] * scale});
+    heights.push_back(HeightAt(tile, tile.h[k]));
+  }
+  return MeasureEdges(EdgeMeter(lattice), Ground(lattice), places, heights, DecodePositions(tile), 0, tile.triangles);
+}
+
+double MeasureFlatEdgeError(const LatticeView& lattice, const tin::TinMesh& mesh,
+                            const std::vector<geo::Vec3>& positions) {
+  std::vector<Place> places;
+  for (const tin::SamplePosition p : mesh.vertices) {
+    places.push_back({static_cast<double>(p.x), static_cast<double>(p.y)});
+  }
+  const PlumbNodes plumb(lattice);
+  double beside_m = 0;
+  for (std::size_t k = 0; k < positions.size(); ++k) {
+    const tin::SamplePosition node = mesh.vertices[k];
+    beside_m = std::max(beside_m, plumb.PositionOf(positions[k], node.x, node.y).beside_m);
+  }
+  return MeasureEdges(EdgeMeter(lattice), Ground(lattice), places, {}, positions, beside_m, mesh.triangles);
+}
+
+}  // namespace terrace::proto

@@ -1,0 +1,346 @@
+#include "proto/error/tile_error.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <utility>
+
+#include "engine/geo/ellipsoid.h"
+#include "proto/error/plumb_nodes.h"
+#include "proto/mesh/edge_rows.h"
+#include "proto/mesh/tile_geometry.h"
+
+namespace terrace::proto {
+namespace {
+
+// A linear function over the tile: value at a corner of the triangle and its two gradients.
+struct Linear {
+  double origin = 0, dx = 0, dy = 0;
+  double At(double x, double y) const { return origin + dx * x + dy * y; }
+};
+
+// What the meter needs to know of a mesh.
+struct Surface {
+  std::int64_t unit = 1;          // from one lattice node to the next
+  std::vector<NodePoint> points;  // by vertex
+  std::vector<double> heights;    // by vertex, metres above the ellipsoid
+  std::vector<geo::Vec3> ecef;    // by vertex
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+  bool is_planar = true;  // the height interpolated in longitude and latitude is measured, not the flat triangles alone
+  double beside_m = 0;    // by which the vertices lie beside the plumb lines of their points, at most
+};
+
+template <typename Value>
+bool StartsWith(const std::vector<Value>& values, const std::vector<Value>& first) {
+  return values.size() >= first.size() && std::equal(first.begin(), first.end(), values.begin());
+}
+
+// Whether `b` has the vertices of `a`, all in the same place on the grid and in height, and perhaps more.
+bool HasVerticesOf(const Surface& a, const Surface& b) {
+  return a.unit == b.unit && StartsWith(b.points, a.points) && StartsWith(b.heights, a.heights) &&
+         (b.ecef.empty() || StartsWith(b.ecef, a.ecef));
+}
+
+// Whether a triangle lies in the same place in both. `of_same_vertices`: it does if it has the same corners.
+bool IsSame(const Surface& a, const Surface& b, std::size_t t, bool of_same_vertices) {
+  if (t >= a.triangles.size() || t >= b.triangles.size() || a.triangles[t] != b.triangles[t]) return false;
+  return of_same_vertices || std::ranges::all_of(a.triangles[t], [&](std::uint32_t k) {
+           return a.points[k] == b.points[k] && a.heights[k] == b.heights[k] && a.ecef[k] == b.ecef[k];
+         });
+}
+
+}  // namespace
+
+class TileMeter::Impl {
+ public:
+  Impl(const LatticeView& lattice, double bound_m)
+      : lattice_(lattice), cells_(lattice.cells()), bound_(bound_m), plumb_(lattice) {}
+
+  int cells() const { return cells_; }
+  const Surface& surface() const { return surface_; }
+  const PlumbNodes& plumb() const { return plumb_; }
+
+  // Measures the reading in longitude and latitude of every triangle, and what the flat triangle can be at most; then
+  // the flat triangles that may be the worst or miss the bound.
+  TileError Measure(Surface surface) {
+    const Surface before = std::exchange(surface_, std::move(surface));
+    const bool is_alike =
+        before.unit == surface_.unit && before.is_planar == surface_.is_planar && before.beside_m == surface_.beside_m;
+    const bool of_same_vertices = is_alike && HasVerticesOf(before, surface_);
+    is_vertex_.assign(static_cast<std::size_t>(cells_ + 1) * static_cast<std::size_t>(cells_ + 1), false);
+    for (const NodePoint& p : surface_.points) is_vertex_[NodeIndex(NodeOf(p.x), NodeOf(p.y))] = true;
+    readings_.resize(surface_.triangles.size());
+    std::size_t worst = 0;
+    for (std::size_t t = 0; t < readings_.size(); ++t) {
+      Reading& reading = readings_[t];
+      // What misses the bound is told again: what can be done about it changes.
+      if (!is_alike || reading.most_m > bound_ || !IsSame(before, surface_, t, of_same_vertices))
+        reading = ReadLinear(t);
+      if (reading.most_m > readings_[worst].most_m) worst = t;
+    }
+    TileError result;
+    std::vector<MissedVertex> vertices;
+    const auto measure = [&](std::size_t t) {
+      if (!readings_[t].is_exact) readings_[t] = ReadBoth(t, result.misses, vertices);
+      result.max_m = std::max(result.max_m, readings_[t].most_m);
+    };
+    if (!readings_.empty() && readings_[worst].most_m <= bound_) measure(worst);
+    for (std::size_t t = 0; t < readings_.size(); ++t) {
+      if (readings_[t].most_m > std::min(result.max_m, bound_)) measure(t);
+    }
+    if (result.misses.empty()) result.misses = NeighboursOf(vertices);
+    result.is_cut_through = result.misses.empty() && std::ranges::any_of(vertices, [&](const MissedVertex& vertex) {
+                              return PassesBetween(vertex);
+                            });
+    return result;
+  }
+
+ private:
+  // Of a triangle: the error that is to be stated, at most or exactly.
+  struct Reading {
+    double most_m = std::numeric_limits<double>::infinity();
+    bool is_exact = false;
+  };
+
+  std::size_t NodeIndex(std::int64_t i, std::int64_t j) const {
+    return static_cast<std::size_t>(j) * static_cast<std::size_t>(cells_ + 1) + static_cast<std::size_t>(i);
+  }
+  // The lattice node whose rounded position this is.
+  std::int64_t NodeOf(std::int64_t coordinate) const { return (coordinate + surface_.unit / 2) / surface_.unit; }
+
+  template <typename Value>
+  Linear Through(const std::array<NodePoint, 3>& p, double area, const Value& value) const {
+    const double x1 = static_cast<double>(p[1].x - p[0].x), y1 = static_cast<double>(p[1].y - p[0].y);
+    const double x2 = static_cast<double>(p[2].x - p[0].x), y2 = static_cast<double>(p[2].y - p[0].y);
+    const double d1 = value(1) - value(0), d2 = value(2) - value(0);
+    return {value(0), (d1 * y2 - d2 * y1) / area, (d2 * x1 - d1 * x2) / area};
+  }
+
+  std::array<NodePoint, 3> CornersOf(std::size_t t) const {
+    std::array<NodePoint, 3> p;
+    for (std::size_t k = 0; k < 3; ++k) p[k] = surface_.points[surface_.triangles[t][k]];
+    return p;
+  }
+
+  // Inside the tile, if its error is above the bound.
+  struct Miss {
+    double error = 0;
+    tin::SamplePosition at;
+  };
+  // Of a triangle: the worst of all, of the samples that are no vertices, and of those that are.
+  struct Found {
+    explicit Found(double bound) : sample{bound, {}}, vertex{bound, {}} {}
+    double largest = 0;
+    Miss sample, vertex;
+  };
+
+  void Take(double error, int i, int j, Found& found) const {
+    found.largest = std::max(found.largest, error);
+    if (!(error > bound_) || !IsInside(i, j)) return;
+    if (Miss& miss = MissOf(i, j, found); error > miss.error) {
+      miss = {error, {static_cast<std::uint16_t>(i), static_cast<std::uint16_t>(j)}};
+    }
+  }
+
+  Miss& MissOf(int i, int j, Found& found) const { return is_vertex_[NodeIndex(i, j)] ? found.vertex : found.sample; }
+
+  bool IsVertex(tin::SamplePosition p) const { return is_vertex_[NodeIndex(p.x, p.y)]; }
+
+  struct MissedVertex {
+    tin::SamplePosition at;
+    std::size_t triangle = 0;  // the one that misses it
+  };
+
+  // In the row and the column of a node inside the tile.
+  static std::array<tin::SamplePosition, 4> NeighboursOf(tin::SamplePosition p) {
+    const auto at = [&](int dx, int dy) {
+      return tin::SamplePosition{static_cast<std::uint16_t>(p.x + dx), static_cast<std::uint16_t>(p.y + dy)};
+    };
+    return {at(-1, 0), at(1, 0), at(0, -1), at(0, 1)};
+  }
+
+  // Those inside the tile that are no vertices themselves.
+  std::vector<tin::SamplePosition> NeighboursOf(const std::vector<MissedVertex>& vertices) const {
+    std::vector<tin::SamplePosition> samples;
+    for (const MissedVertex& vertex : vertices) {
+      for (const tin::SamplePosition p : NeighboursOf(vertex.at)) {
+        if (IsInside(p.x, p.y) && !IsVertex(p)) samples.push_back(p);
+      }
+    }
+    return samples;
+  }
+
+  // Whether the triangle is larger than half of a cell, though all four neighbours of the vertex are vertices.
+  bool PassesBetween(const MissedVertex& vertex) const {
+    const std::array<NodePoint, 3> p = CornersOf(vertex.triangle);
+    const auto [west, east] = std::minmax({NodeOf(p[0].x), NodeOf(p[1].x), NodeOf(p[2].x)});
+    const auto [south, north] = std::minmax({NodeOf(p[0].y), NodeOf(p[1].y), NodeOf(p[2].y)});
+    return (east - west > 1 || north - south > 1) &&
+           std::ranges::all_of(NeighboursOf(vertex.at), [&](tin::SamplePosition at) { return IsVertex(at); });
+  }
+
+  // visit(i, j, error) for nodes, of the height that is linear in longitude and latitude: `edges` are those of the
+  // triangle, clip(edge, row, first, last) narrows the columns. The rows are those of [low, high].
+  template <typename Clip, typename Visit>
+  void VisitNodes(const Linear& plane, const NodePoint& corner, std::int64_t low, std::int64_t high, const Clip& clip,
+                  const Visit& visit) const {
+    const std::int64_t unit = surface_.unit, last_row = std::min<std::int64_t>(high / unit, cells_);
+    for (std::int64_t j = low > 0 ? (low + unit - 1) / unit : 0; j <= last_row; ++j) {
+      std::int64_t first = 0, last = cells_;
+      clip(j * unit, first, last);
+      const double dy = static_cast<double>(j * unit - corner.y);
+      for (std::int64_t i = first; i <= last; ++i) {
+        const double height = plane.At(static_cast<double>(i * unit - corner.x), dy);
+        const double sample = lattice_.At(static_cast<int>(i), static_cast<int>(j));
+        visit(static_cast<int>(i), static_cast<int>(j), std::abs(height - sample));
+      }
+    }
+  }
+
+  // The flat triangle is at most its sagitta off the linear one, at a place that is off by the shift.
+  Reading ReadLinear(std::size_t t) const {
+    constexpr Reading kUnknown;
+    const std::array<NodePoint, 3> p = CornersOf(t);
+    const std::int64_t area = TwiceArea(p);
+    if (area <= 0) return kUnknown;
+    const PlumbNodes::Bounds bounds = plumb_.BoundsOf(p, surface_.unit, surface_.beside_m);
+    if (!std::isfinite(bounds.shift.x)) return kUnknown;
+    const Linear plane = PlaneOf(t, p, area);
+    const double unit = static_cast<double>(surface_.unit);
+    const double x = bounds.shift.x * unit, y = bounds.shift.y * unit;
+    const std::array<EdgeRows, 3> edges = EdgesOf(p);
+    const std::array<double, 3> moves = {edges[0].Move(x, y), edges[1].Move(x, y), edges[2].Move(x, y)};
+    const auto [low, high] = std::minmax({p[0].y, p[1].y, p[2].y});
+    const auto up = static_cast<std::int64_t>(y) + 1;
+    double most = 0;
+    VisitNodes(
+        plane, p[0], low - up, high + up,
+        [&](std::int64_t row, std::int64_t& first, std::int64_t& last) {
+          for (std::size_t k = 0; k < 3; ++k) edges[k].ClipMoved(row, moves[k], first, last);
+        },
+        [&](int, int, double error) { most = std::max(most, error); });
+    return {most + bounds.sagitta_m + std::abs(plane.dx) * x + std::abs(plane.dy) * y, false};
+  }
+
+  Reading ReadBoth(std::size_t t, std::vector<tin::SamplePosition>& samples,
+                   std::vector<MissedVertex>& vertices) const {
+    const std::array<NodePoint, 3> p = CornersOf(t);
+    Found found(bound_);
+    const std::int64_t area = TwiceArea(p);
+    if (surface_.is_planar && area > 0) {
+      const std::array<EdgeRows, 3> edges = EdgesOf(p);
+      const auto [low, high] = std::minmax({p[0].y, p[1].y, p[2].y});
+      VisitNodes(
+          PlaneOf(t, p, area), p[0], low, high,
+          [&](std::int64_t row, std::int64_t& first, std::int64_t& last) {
+            for (const EdgeRows& edge : edges) edge.Clip(row, first, last);
+          },
+          [&](int i, int j, double error) { Take(error, i, j, found); });
+    }
+    MeasureFlat(surface_.triangles[t], p, found);
+    if (found.sample.error > bound_) samples.push_back(found.sample.at);
+    if (found.vertex.error > bound_) vertices.push_back({found.vertex.at, t});
+    return {found.largest, true};
+  }
+
+  std::array<EdgeRows, 3> EdgesOf(const std::array<NodePoint, 3>& p) const {
+    return {EdgeRows(p[0], p[1], surface_.unit), EdgeRows(p[1], p[2], surface_.unit),
+            EdgeRows(p[2], p[0], surface_.unit)};
+  }
+
+  Linear PlaneOf(std::size_t t, const std::array<NodePoint, 3>& p, std::int64_t area) const {
+    return Through(p, static_cast<double>(area),
+                   [&](std::size_t k) { return surface_.heights[surface_.triangles[t][k]]; });
+  }
+
+  // Where the plumb lines of the nodes pass through the flat triangle. The place of a point of the triangle is not
+  // quite the mean of its corners' places, so nodes near the rim are asked (PlumbNodes::Meets), but only those that
+  // count.
+  void MeasureFlat(const std::array<std::uint32_t, 3>& triangle, const std::array<NodePoint, 3>& p,
+                   Found& found) const {
+    constexpr double kNothing_m = 0.0005;  // less is stated without a question
+    const std::array<geo::Vec3, 3> corners = {surface_.ecef[triangle[0]], surface_.ecef[triangle[1]],
+                                              surface_.ecef[triangle[2]]};
+    const PlumbNodes::Plane plane(corners);
+    if (plane.is_line) return;
+    const PlumbFootprint footprint(p, surface_.unit, surface_.beside_m, plumb_);
+    for (int j = footprint.first_row(); j <= footprint.last_row(); ++j) {
+      const PlumbFootprint::Columns columns = footprint.ColumnsOf(j);
+      for (int i = static_cast<int>(columns.first); i <= columns.last; ++i) {
+        const double error = std::abs(plumb_.HeightOn(plane, i, j) - lattice_.At(i, j));
+        const bool counts = error > found.largest || (error > bound_ && error > MissOf(i, j, found).error);
+        if (!counts) continue;  // NaN is no height
+        const bool meets =
+            (i >= columns.inner_first && i <= columns.inner_last) || error <= kNothing_m || plumb_.Meets(corners, i, j);
+        if (meets) Take(error, i, j, found);
+      }
+    }
+  }
+
+  bool IsInside(int i, int j) const { return i > 0 && j > 0 && i < cells_ && j < cells_; }
+
+  const LatticeView lattice_;
+  const int cells_;
+  const double bound_;
+
+  // Of the mesh that is measured.
+  Surface surface_;
+  std::vector<bool> is_vertex_;    // by node
+  std::vector<Reading> readings_;  // by triangle
+
+  const PlumbNodes plumb_;
+};
+
+TileMeter::TileMeter(const LatticeView& lattice, double bound_m) : impl_(std::make_unique<Impl>(lattice, bound_m)) {}
+TileMeter::~TileMeter() = default;
+
+TileError TileMeter::Measure(const QuantizedTile& tile) {
+  Surface surface{kQuantizedMax, {}, {}, {}, tile.triangles};
+  surface.points.reserve(tile.u.size());
+  surface.heights.reserve(tile.u.size());
+  const std::int64_t cells = impl_->cells();
+  for (std::size_t k = 0; k < tile.u.size(); ++k) {
+    surface.points.push_back({tile.u[k] * cells, tile.v[k] * cells});
+    surface.heights.push_back(HeightAt(tile, tile.h[k]));
+  }
+  // Equal places and heights have equal positions.
+  const Surface& before = impl_->surface();
+  if (before.is_planar && HasVerticesOf(before, surface)) surface.ecef = before.ecef;
+  DecodeFurtherPositions(tile, surface.ecef);
+  return impl_->Measure(std::move(surface));
+}
+
+TileError TileMeter::MeasureFlat(const tin::TinMesh& mesh, const std::vector<geo::Vec3>& positions) {
+  Surface surface{1, {}, {}, positions, mesh.triangles, false};
+  surface.points.reserve(mesh.vertices.size());
+  surface.heights.reserve(mesh.vertices.size());
+  for (std::size_t k = 0; k < positions.size(); ++k) {
+    const tin::SamplePosition node = mesh.vertices[k];
+    const PlumbNodes::Position position = impl_->plumb().PositionOf(positions[k], node.x, node.y);
+    surface.points.push_back({node.x, node.y});
+    surface.heights.push_back(position.height_m);
+    surface.beside_m = std::max(surface.beside_m, position.beside_m);
+  }
+  return impl_->Measure(std::move(surface));
+}
+
+TileError MeasureTileError(const LatticeView& lattice, const QuantizedTile& tile, double bound_m) {
+  return TileMeter(lattice, bound_m).Measure(tile);
+}
+
+TileError MeasureFlatError(const LatticeView& lattice, const tin::TinMesh& mesh,
+                           const std::vector<geo::Vec3>& positions, double bound_m) {
+  return TileMeter(lattice, bound_m).MeasureFlat(mesh, positions);
+}
+
+bool AllCounterClockwise(const QuantizedTile& tile) {
+  return std::all_of(tile.triangles.begin(), tile.triangles.end(), [&](const std::array<std::uint32_t, 3>& t) {
+    const int x1 = tile.u[t[1]] - tile.u[t[0]], y1 = tile.v[t[1]] - tile.v[t[0]];
+    const int x2 = tile.u[t[2]] - tile.u[t[0]], y2 = tile.v[t[2]] - tile.v[t[0]];
+    return std::int64_t{x1} * y2 > std::int64_t{y1} * x2;
+  });
+}
+
+}  // namespace terrace::proto

@@ -1,0 +1,57 @@
+// A GridMesh as a GLB tile of 3D Tiles: docs/formats/glb.md has the layout.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "engine/core/result.h"
+#include "proto/gltf/draco_mesh.h"
+#include "proto/mesh/grid_mesh.h"
+
+namespace terrace::proto {
+
+// All of them decode to the positions of the GridMesh, bit for bit.
+enum class GlbCompression : std::uint8_t {
+  kDraco,      // KHR_draco_mesh_compression
+  kNone,       // 32-bit floats
+  kQuantized,  // KHR_mesh_quantization: 16-bit positions and 8-bit normals; floats where a tile spans 2^16 steps or
+               // more
+  kMeshopt,    // EXT_meshopt_compression of what kQuantized holds
+};
+
+// The positions that suit the form: GridStep.
+constexpr PositionWidth WidthOf(GlbCompression compression) {
+  const bool narrow = compression == GlbCompression::kQuantized || compression == GlbCompression::kMeshopt;
+  return narrow ? PositionWidth::k16Bits : PositionWidth::kFloat;
+}
+
+// A picture of the tile: an image file, whose edges are the tile's.
+struct GlbTexture {
+  std::string bytes;
+  std::string_view media_type;  // a literal: "image/jpeg", "image/webp"
+};
+
+struct GlbOptions {
+  GlbCompression compression = GlbCompression::kDraco;
+  DracoOptions draco;
+  std::string generator = "terrace";       // asset.generator
+  std::optional<GlbTexture> texture = {};  // none: the ground is plain grey
+  std::string copyright = {};              // asset.copyright (glTF 2.0, 3.2); empty: none
+  // Metres, of the tile at its finest reading: extras of the scene, each where it is known and finite.
+  std::optional<double> max_error_m = {}, certified_error_m = {};
+};
+
+struct GlbTile {
+  std::string bytes;
+  // Of what the bytes decode to, skirts included.
+  std::uint32_t vertices = 0;
+  std::uint32_t triangles = 0;
+};
+
+// Pure and thread-safe. kInternal: a coder failed, or decodes to something else (draco_mesh.h).
+// Precondition: at least one triangle.
+Result<GlbTile> EncodeGlb(const GridMesh& mesh, const GlbOptions& options);
+
+}  // namespace terrace::proto

@@ -1,0 +1,200 @@
+#include "proto/mesh/grid_mesh.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <tuple>
+
+#include "engine/core/check.h"
+#include "proto/lattice_angles.h"
+#include "proto/mesh/vertex_order.h"
+
+namespace terrace::proto {
+namespace {
+
+using Triangle = std::array<std::uint32_t, 3>;
+
+// The largest power of two that is at most `value`.
+double PowerOfTwoUpTo(double value) { return std::ldexp(1.0, std::ilogb(value)); }
+
+// 1 / step is exact, and so are products with it.
+GridPoint Snap(geo::Vec3 ecef, double per_metre) {
+  const auto whole = [&](double metres) { return static_cast<std::int64_t>(std::floor(metres * per_metre + 0.5)); };
+  return {whole(ecef.x), whole(ecef.y), whole(ecef.z)};
+}
+
+class NodePlacer {
+ public:
+  explicit NodePlacer(const LatticeView& lattice) : lattice_(lattice), angles_(lattice) {
+    for (const geo::SinCos& row : angles_.rows) bases_.push_back(geo::ToEcef({}, row, 0));
+  }
+
+  geo::Vec3 Place(tin::SamplePosition node, double below_m) const {
+    const geo::SinCos &longitude = angles_.columns[node.x], &latitude = angles_.rows[node.y];
+    const geo::Vec3& base = bases_[node.y];
+    const double height = static_cast<double>(lattice_.At(node.x, node.y)) - below_m;
+    const double from_axis = base.x + latitude.cos * height;
+    return {from_axis * longitude.cos, from_axis * longitude.sin, base.z + latitude.sin * height};
+  }
+
+ private:
+  const LatticeView& lattice_;
+  const LatticeAngles angles_;
+  std::vector<geo::Vec3> bases_;  // by row: on the ellipsoid at longitude 0
+};
+
+// The border vertices counter-clockwise from the south-western corner, each once.
+std::vector<std::uint32_t> Rim(const tin::TinMesh& mesh, int cells) {
+  std::vector<std::pair<int, std::uint32_t>> along;
+  for (std::uint32_t k = 0; k < mesh.vertices.size(); ++k) {
+    const int x = mesh.vertices[k].x, y = mesh.vertices[k].y;
+    if (y == 0 && x < cells)
+      along.emplace_back(x, k);
+    else if (x == cells && y < cells)
+      along.emplace_back(cells + y, k);
+    else if (y == cells && x > 0)
+      along.emplace_back(3 * cells - x, k);
+    else if (x == 0 && y > 0)
+      along.emplace_back(4 * cells - y, k);
+  }
+  std::sort(along.begin(), along.end());
+  std::vector<std::uint32_t> rim;
+  rim.reserve(along.size());
+  for (const auto& [distance, vertex] : along) rim.push_back(vertex);
+  return rim;
+}
+
+// Two triangles between each two neighbours on the rim and the points below them:
+//
+//     a---b      seen from outside; the feet are numbered from first_foot in the order of the rim
+//     |  /|
+//     | / |
+//     A---B
+void HangSkirt(const std::vector<std::uint32_t>& rim, std::uint32_t first_foot, std::vector<Triangle>& triangles) {
+  const auto count = static_cast<std::uint32_t>(rim.size());
+  for (std::uint32_t k = 0; k < count; ++k) {
+    const std::uint32_t next = (k + 1) % count;
+    triangles.push_back({rim[k], first_foot + k, rim[next]});
+    triangles.push_back({rim[next], first_foot + k, first_foot + next});
+  }
+}
+
+bool HasMergedCorners(const Triangle& t, const std::vector<GridPoint>& points) {
+  return points[t[0]] == points[t[1]] || points[t[1]] == points[t[2]] || points[t[2]] == points[t[0]];
+}
+
+// Gives vertices that agree in position and normal one number, the lowest of theirs.
+void Weld(const std::vector<GridPoint>& points, const std::vector<geo::Vec3>& normals,
+          std::vector<Triangle>& triangles) {
+  std::map<std::tuple<GridPoint, double, double, double>, std::uint32_t> first;
+  std::vector<std::uint32_t> number(points.size());
+  for (std::uint32_t k = 0; k < points.size(); ++k) {
+    const geo::Vec3& n = normals[k];
+    number[k] = first.emplace(std::tuple(points[k], n.x, n.y, n.z), k).first->second;
+  }
+  for (Triangle& triangle : triangles) {
+    for (std::uint32_t& corner : triangle) corner = number[corner];
+  }
+}
+
+struct GridBox {
+  GridPoint min{}, max{};
+};
+
+GridBox BoxOf(const std::vector<GridPoint>& points) {
+  GridBox box{points.front(), points.front()};
+  for (const GridPoint& p : points) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      box.min[axis] = std::min(box.min[axis], p[axis]);
+      box.max[axis] = std::max(box.max[axis], p[axis]);
+    }
+  }
+  return box;
+}
+
+}  // namespace
+
+double GridStep(const geo::Lattice& lattice, double error_m, PositionWidth width) {
+  constexpr double kFinestStepMetres = 0x1p-16;
+  const double cell_m = geo::kSemiMajorAxis * geo::ToRadians(lattice.StepDegrees());
+  const double step_m = std::max(PowerOfTwoUpTo(std::min(error_m / 32, cell_m / 64)), kFinestStepMetres);
+  if (width == PositionWidth::k16Bits) return step_m;
+  // Half the diagonal of a cube of 2^-7 m is 7 mm. A tile's side is at most 2^23 steps: FitsFloats.
+  constexpr double kBorderStepMetres = 0x1p-7;
+  const double side_m = cell_m * lattice.cells;
+  return std::min(step_m, PowerOfTwoUpTo(std::max(kBorderStepMetres, side_m / 0x1p22)));
+}
+
+std::vector<GridPoint> SnapVertices(const LatticeView& lattice, const tin::TinMesh& mesh, double step_m) {
+  const NodePlacer placer(lattice);
+  std::vector<GridPoint> points;
+  points.reserve(mesh.vertices.size());
+  for (const tin::SamplePosition node : mesh.vertices) points.push_back(Snap(placer.Place(node, 0), 1 / step_m));
+  return points;
+}
+
+bool FitsFloats(const std::vector<GridPoint>& points, double step_m, double skirt_depth_m) {
+  constexpr double kMaxSteps = 0x1p23;
+  const GridBox box = BoxOf(points);
+  const double feet = skirt_depth_m / step_m + 2;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (static_cast<double>(box.max[axis] - box.min[axis]) + feet >= kMaxSteps) return false;
+  }
+  return true;
+}
+
+std::vector<geo::Vec3> GridPositions(const std::vector<GridPoint>& points, double step_m) {
+  std::vector<geo::Vec3> positions;
+  positions.reserve(points.size());
+  for (const auto& [x, y, z] : points) {
+    positions.push_back(
+        {static_cast<double>(x) * step_m, static_cast<double>(y) * step_m, static_cast<double>(z) * step_m});
+  }
+  return positions;
+}
+
+GridMesh MakeGridMesh(const LatticeView& lattice, const tin::TinMesh& mesh, const std::vector<GridPoint>& points,
+                      const std::vector<geo::Vec3>& normals, double step_m, double skirt_depth_m) {
+  TERRACE_CHECK(points.size() == mesh.vertices.size() && normals.size() == points.size());
+  const NodePlacer placer(lattice);
+  const std::vector<std::uint32_t> rim = Rim(mesh, lattice.cells());
+  std::vector<GridPoint> all = points;
+  std::vector<geo::Vec3> all_normals = normals;
+  std::vector<tin::SamplePosition> nodes = mesh.vertices;
+  for (const std::uint32_t top : rim) {
+    all.push_back(Snap(placer.Place(mesh.vertices[top], skirt_depth_m), 1 / step_m));
+    all_normals.push_back(normals[top]);
+    nodes.push_back(mesh.vertices[top]);
+  }
+  std::vector<Triangle> triangles = mesh.triangles;
+  HangSkirt(rim, static_cast<std::uint32_t>(points.size()), triangles);
+  if (std::erase_if(triangles, [&](const Triangle& t) { return HasMergedCorners(t, all); }) > 0) {
+    Weld(all, all_normals, triangles);
+  }
+
+  VertexOrder order = OrderByFirstUse(triangles, all.size());
+  GridMesh grid;
+  grid.step_m = step_m;
+  const GridBox box = BoxOf(all);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    grid.origin[axis] = box.min[axis] + (box.max[axis] - box.min[axis]) / 2;
+  }
+  grid.triangles = std::move(order.triangles);
+  grid.cells = lattice.cells();
+  grid.uv.reserve(order.old_index.size());
+  grid.positions.reserve(order.old_index.size());
+  grid.normals.reserve(order.old_index.size());
+  for (const std::uint32_t old : order.old_index) {
+    std::array<std::int32_t, 3>& position = grid.positions.emplace_back();
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      position[axis] = static_cast<std::int32_t>(all[old][axis] - grid.origin[axis]);
+    }
+    grid.normals.push_back(all_normals[old]);
+    grid.uv.push_back(
+        {static_cast<std::uint16_t>(nodes[old].x), static_cast<std::uint16_t>(grid.cells - nodes[old].y)});
+  }
+  return grid;
+}
+
+}  // namespace terrace::proto

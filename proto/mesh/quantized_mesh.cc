@@ -1,0 +1,155 @@
+#include "proto/mesh/quantized_mesh.h"
+
+#include <algorithm>
+#include <string_view>
+
+#include "engine/core/bytes.h"
+#include "engine/core/check.h"
+#include "proto/mesh/tile_geometry.h"
+#include "proto/mesh/vertex_order.h"
+
+namespace terrace::proto {
+namespace {
+
+constexpr std::size_t kHeaderBytes = 88;
+constexpr std::uint8_t kOctVertexNormals = 1, kWaterMask = 2, kMetadata = 4;  // extension ids
+
+// Indices are 16 bits wide up to 65,536 vertices, and all of them start on even offsets (88 + 4 + 6n), so that the
+// format never needs padding here.
+static_assert(kMaxTileVertices <= 65536);
+
+void CheckPreconditions(const QuantizedTile& tile, const QuantizedMeshOptions& options) {
+  const std::size_t count = tile.u.size();
+  TERRACE_CHECK(tile.v.size() == count && tile.h.size() == count && count <= kMaxTileVertices);
+  TERRACE_CHECK(!options.normals || tile.normals.size() == count);
+  constexpr std::size_t kWaterPixels = std::size_t{kWaterMaskSide} * kWaterMaskSide;
+  TERRACE_CHECK(!options.water_mask || tile.water_mask.size() == 1 || tile.water_mask.size() == kWaterPixels);
+  TERRACE_CHECK(!options.metadata || !tile.metadata.empty());
+  TERRACE_CHECK(tile.triangles.size() >= 2);
+  TERRACE_CHECK(geo::IsValid(tile.key));
+  const auto fits = [](std::uint16_t value) { return value <= kQuantizedMax; };
+  for (const auto* values : {&tile.u, &tile.v, &tile.h}) {
+    TERRACE_CHECK(std::all_of(values->begin(), values->end(), fits));
+  }
+}
+
+template <typename T>
+std::vector<T> Reordered(const std::vector<T>& values, const std::vector<std::uint32_t>& old_index) {
+  std::vector<T> out;
+  out.reserve(old_index.size());
+  for (std::uint32_t i : old_index) out.push_back(values[i]);
+  return out;
+}
+
+void PutVec3(ByteWriter& out, geo::Vec3 v) {
+  out.Put(v.x);
+  out.Put(v.y);
+  out.Put(v.z);
+}
+
+void PutHeader(ByteWriter& out, const QuantizedTile& tile) {
+  const std::vector<geo::Vec3> positions = DecodePositions(tile);
+  const BoundingSphere sphere = EnclosingSphere(positions);
+  // Clients make vertices relative to the sphere's centre and ignore the tile's; one value serves for both.
+  PutVec3(out, sphere.center);
+  out.Put(tile.min_height);
+  out.Put(tile.max_height);
+  PutVec3(out, sphere.center);
+  out.Put(sphere.radius);
+  PutVec3(out, HorizonOcclusionPoint(positions, sphere.center, tile.min_height));
+  TERRACE_CHECK(out.size() == kHeaderBytes);
+}
+
+// Differences fit 16 bits with their sign: values have 15.
+void PutZigZagDeltas(ByteWriter& out, const std::vector<std::uint16_t>& values) {
+  int previous = 0;
+  for (std::uint16_t value : values) {
+    const int delta = value - previous;
+    out.Put(static_cast<std::uint16_t>((delta << 1) ^ (delta >> 31)));
+    previous = value;
+  }
+}
+
+// Each index as its distance below the number of vertices seen so far; zero is a new vertex.
+void PutTriangles(ByteWriter& out, const std::vector<std::array<std::uint32_t, 3>>& triangles) {
+  out.Put(static_cast<std::uint32_t>(triangles.size()));
+  std::uint32_t high_water_mark = 0;
+  for (const std::array<std::uint32_t, 3>& triangle : triangles) {
+    for (std::uint32_t index : triangle) {
+      const std::uint32_t code = high_water_mark - index;
+      out.Put(static_cast<std::uint16_t>(code));
+      if (code == 0) ++high_water_mark;
+    }
+  }
+}
+
+// The vertices whose `across` is `edge`, sorted by `along`: clients build skirts from them in this order.
+void PutEdge(ByteWriter& out, const std::vector<std::uint16_t>& across, int edge,
+             const std::vector<std::uint16_t>& along) {
+  std::vector<std::uint16_t> indices;
+  for (std::size_t i = 0; i < across.size(); ++i) {
+    if (across[i] == edge) indices.push_back(static_cast<std::uint16_t>(i));
+  }
+  TERRACE_CHECK(indices.size() >= 2);  // cesium-native computes size - 1 of an unsigned
+  std::sort(indices.begin(), indices.end(), [&](std::uint16_t a, std::uint16_t b) { return along[a] < along[b]; });
+  out.Put(static_cast<std::uint32_t>(indices.size()));
+  for (std::uint16_t index : indices) out.Put(index);
+}
+
+void PutNormals(ByteWriter& out, const std::vector<std::array<std::uint8_t, 2>>& normals) {
+  out.Put(kOctVertexNormals);
+  out.Put(static_cast<std::uint32_t>(2 * normals.size()));
+  for (const std::array<std::uint8_t, 2>& normal : normals) {
+    out.Put(normal[0]);
+    out.Put(normal[1]);
+  }
+}
+
+void PutWaterMask(ByteWriter& out, const WaterMask& mask) {
+  out.Put(kWaterMask);
+  out.Put(static_cast<std::uint32_t>(mask.size()));
+  out.PutBytes({reinterpret_cast<const char*>(mask.data()), mask.size()});
+}
+
+// Its JSON has a length of its own inside the extension's.
+void PutMetadata(ByteWriter& out, const std::string& json) {
+  out.Put(kMetadata);
+  out.Put(static_cast<std::uint32_t>(sizeof(std::uint32_t) + json.size()));
+  out.Put(static_cast<std::uint32_t>(json.size()));
+  out.PutBytes(json);
+}
+
+}  // namespace
+
+std::string EncodeQuantizedMesh(const QuantizedTile& tile, const QuantizedMeshOptions& options) {
+  CheckPreconditions(tile, options);
+  VertexOrder order = OrderByFirstUse(tile.triangles, tile.u.size());
+  QuantizedTile ordered;
+  ordered.key = tile.key;
+  ordered.min_height = tile.min_height;
+  ordered.max_height = tile.max_height;
+  ordered.u = Reordered(tile.u, order.old_index);
+  ordered.v = Reordered(tile.v, order.old_index);
+  ordered.h = Reordered(tile.h, order.old_index);
+  ordered.triangles = std::move(order.triangles);
+  if (options.normals) ordered.normals = Reordered(tile.normals, order.old_index);
+
+  ByteWriter out;
+  out.Reserve(kHeaderBytes + 64 + 9 * ordered.u.size() + 6 * ordered.triangles.size());
+  PutHeader(out, ordered);
+  out.Put(static_cast<std::uint32_t>(ordered.u.size()));
+  PutZigZagDeltas(out, ordered.u);
+  PutZigZagDeltas(out, ordered.v);
+  PutZigZagDeltas(out, ordered.h);
+  PutTriangles(out, ordered.triangles);
+  PutEdge(out, ordered.u, 0, ordered.v);              // west
+  PutEdge(out, ordered.v, 0, ordered.u);              // south
+  PutEdge(out, ordered.u, kQuantizedMax, ordered.v);  // east
+  PutEdge(out, ordered.v, kQuantizedMax, ordered.u);  // north
+  if (options.normals) PutNormals(out, ordered.normals);
+  if (options.water_mask) PutWaterMask(out, tile.water_mask);
+  if (options.metadata) PutMetadata(out, tile.metadata);
+  return out.Take();
+}
+
+}  // namespace terrace::proto

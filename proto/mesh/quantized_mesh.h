@@ -1,0 +1,44 @@
+// The quantized-mesh-1.0 tile format (CesiumGS/quantized-mesh README), encoder only.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "engine/geo/tile_key.h"
+#include "proto/mesh/water_mask.h"
+
+namespace terrace::proto {
+
+inline constexpr int kQuantizedMax = 32767;  // u, v and heights have 15 bits
+inline constexpr std::size_t kMaxTileVertices =
+    65534;  // CesiumJS misreads exactly 65536; below that indices are 16 bits
+
+// A tile as the wire will carry it: integers, and the two header heights that give them meaning.
+struct QuantizedTile {
+  geo::TileKey key;
+  std::vector<std::uint16_t> u;                         // 0 west .. 32767 east
+  std::vector<std::uint16_t> v;                         // 0 south .. 32767 north
+  std::vector<std::uint16_t> h;                         // 0 min_height .. 32767 max_height
+  std::vector<std::array<std::uint32_t, 3>> triangles;  // counter-clockwise in (u, v)
+  float min_height = 0;
+  float max_height = 0;
+  std::vector<std::array<std::uint8_t, 2>> normals;  // oct-encoded, ECEF, one per vertex
+  WaterMask water_mask;
+  std::string metadata;  // JSON (tile_metadata.h)
+};
+
+struct QuantizedMeshOptions {
+  bool normals = false;     // extension 1, octvertexnormals
+  bool water_mask = false;  // extension 2, watermask
+  bool metadata = false;    // extension 4, metadata
+};
+
+// Renumbers the vertices in order of first use (high-water-mark coding needs it), lists the edges, computes centre,
+// bounding sphere and horizon occlusion point from the decoded vertices, and writes the bytes.
+// Preconditions: at least 2 triangles, at most kMaxTileVertices vertices, all four edges complete, and what the options
+// name is in the tile.
+std::string EncodeQuantizedMesh(const QuantizedTile& tile, const QuantizedMeshOptions& options);
+
+}  // namespace terrace::proto

@@ -1,0 +1,74 @@
+#include "proto/mesh/tile_mesh.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/core/check.h"
+
+namespace terrace::proto {
+namespace {
+
+bool IsFloat(double value) { return static_cast<double>(static_cast<float>(value)) == value; }
+
+struct HeightScale {
+  double min = 0;
+  double step = 0;  // 0: all heights are equal
+};
+
+// Smallest power of two whose 32767 multiples, counted from a multiple of itself, hold [low, high] exactly in float32.
+HeightScale ChooseScale(double low, double high) {
+  if (low == high) return {low, 0};
+  double step = std::ldexp(1.0, std::ilogb((high - low) / kQuantizedMax));
+  for (;; step *= 2) {
+    const double min = std::floor(low / step) * step;
+    const double max = min + kQuantizedMax * step;
+    if (SnapHeight(high, step) <= max && IsFloat(min) && IsFloat(max)) return {min, step};
+  }
+}
+
+// The grid a vertex's height must lie on: that of its edge or corner; none inside.
+double StepAt(const EdgeSteps& steps, int x, int y, int cells) {
+  const bool south = y == 0, east = x == cells, north = y == cells, west = x == 0;
+  if (south && west) return steps.corner[0];
+  if (south && east) return steps.corner[1];
+  if (north && east) return steps.corner[2];
+  if (north && west) return steps.corner[3];
+  if (south) return steps.side[0];
+  if (east) return steps.side[1];
+  if (north) return steps.side[2];
+  if (west) return steps.side[3];
+  return 0;
+}
+
+}  // namespace
+
+QuantizedTile QuantizeTile(const LatticeView& lattice, const tin::TinMesh& mesh, const EdgeSteps& steps) {
+  const int cells = lattice.cells();
+  std::vector<double> heights;
+  heights.reserve(mesh.vertices.size());
+  for (const tin::SamplePosition p : mesh.vertices) {
+    const double height = lattice.At(p.x, p.y), step = StepAt(steps, p.x, p.y, cells);
+    heights.push_back(step > 0 ? SnapHeight(height, step) : height);
+  }
+  const auto [low, high] = std::minmax_element(heights.begin(), heights.end());
+  const HeightScale scale = ChooseScale(*low, *high);
+
+  QuantizedTile tile;
+  tile.key = lattice.key;
+  tile.min_height = static_cast<float>(scale.min);
+  tile.max_height = static_cast<float>(scale.min + kQuantizedMax * scale.step);
+  tile.triangles = mesh.triangles;
+  tile.u.reserve(heights.size());
+  tile.v.reserve(heights.size());
+  tile.h.reserve(heights.size());
+  for (std::size_t k = 0; k < heights.size(); ++k) {
+    const double units = scale.step > 0 ? std::floor((heights[k] - scale.min) / scale.step + 0.5) : 0;
+    TERRACE_CHECK(units >= 0 && units <= kQuantizedMax);
+    tile.u.push_back(QuantizedPosition(mesh.vertices[k].x, cells));
+    tile.v.push_back(QuantizedPosition(mesh.vertices[k].y, cells));
+    tile.h.push_back(static_cast<std::uint16_t>(units));
+  }
+  return tile;
+}
+
+}  // namespace terrace::proto
