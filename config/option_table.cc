@@ -197,7 +197,7 @@ const std::vector<Option<DatasetConfig>>& DatasetOptionTable() {
       {"floor", "METRES", "Height outside the source and in voids that touch its rim; by default its lowest height",
        Number(&DatasetConfig::floor, -kMostHeight, kMostHeight)},
       {"max_void_gap", "SAMPLES", "Voids narrower than this many source samples are filled from their edges",
-       Integer(&DatasetConfig::max_void_gap, 0, 100'000)},
+       Integer(&DatasetConfig::max_void_gap, 0, 4096)},
       {"voids", "NAME",
        "What larger voids with data all around them show: smooth (a surface between their edges) or floor",
        Choice(&DatasetConfig::voids, {{"smooth", HoleFill::kSmooth}, {"floor", HoleFill::kFloor}})},

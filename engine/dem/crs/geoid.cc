@@ -62,11 +62,16 @@ ProjListPtr OperationsFrom(PJ_CONTEXT* context, const PJ* vertical) {
   return ProjListPtr(proj_create_operations(context, compound.get(), ellipsoidal.get(), factory.get()));
 }
 
-bool CoversCentre(PJ_CONTEXT* context, const PJ* operation, Position centre) {
-  double west = 0, south = 0, east = 0, north = 0;
-  if (proj_get_area_of_use(context, operation, &west, &south, &east, &north, nullptr) == 0 || west < -180) return true;
-  const bool between = west <= east ? centre.x >= west && centre.x <= east : centre.x >= west || centre.x <= east;
-  return between && centre.y >= south && centre.y <= north;
+// The same place in -180 .. 180, as areas of use and PROJ's arithmetic have it.
+double WithinOneTurn(double longitude) { return longitude - 360 * std::floor((longitude + 180) / 360); }
+
+AreaOfUse AreaOf(PJ_CONTEXT* context, const PJ* operation) {
+  AreaOfUse area, told;
+  if (proj_get_area_of_use(context, operation, &told.west, &told.south, &told.east, &told.north, nullptr) == 0 ||
+      told.west < -180) {  // it is not known
+    return area;
+  }
+  return told;
 }
 
 std::string HowToGet(const ProjGrid& grid) {
@@ -87,10 +92,8 @@ std::string PipelineOf(PJ_CONTEXT* context, const PJ* operation) {
 
 // Metres above the ellipsoid of what lies `height` above the geoid.
 double HeightAt(const ProjOperation& operation, Position degrees, double height) {
-  // A turn on or back is the same place: all longitudes enter the arithmetic in the same form.
-  const double longitude = degrees.x - 360 * std::floor((degrees.x + 180) / 360);
-  const PJ_COORD result =
-      proj_trans(operation.operation.get(), PJ_FWD, proj_coord(longitude, degrees.y, height, HUGE_VAL));
+  const PJ_COORD at = proj_coord(WithinOneTurn(degrees.x), degrees.y, height, HUGE_VAL);
+  const PJ_COORD result = proj_trans(operation.operation.get(), PJ_FWD, at);
   return std::isfinite(result.xyz.z) ? result.xyz.z : kNoAnswer;
 }
 
@@ -142,6 +145,12 @@ double CellOf(const std::string& file) {
 
 }  // namespace
 
+bool AreaOfUse::Covers(Position degrees) const {
+  const double longitude = WithinOneTurn(degrees.x);
+  const bool between = west <= east ? longitude >= west && longitude <= east : longitude >= west || longitude <= east;
+  return between && degrees.y >= south && degrees.y <= north;
+}
+
 void Geoid::FindGrid() {
   finest_cell_ = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < files_.size(); ++i) finest_cell_ = std::min(finest_cell_, CellOf(files_.path(i)));
@@ -169,7 +178,9 @@ std::shared_ptr<const Geoid> Geoid::FindShared(const std::string& vertical_crs, 
 }
 
 Result<std::shared_ptr<const Geoid>> Geoid::OfCrs(const std::string& vertical_crs, Position centre) {
-  if (auto known = FindShared(vertical_crs, nullptr)) return Checked(std::move(known), centre);
+  if (auto known = FindShared(vertical_crs, nullptr); known && known->area_.Covers(centre)) {
+    return Checked(std::move(known), centre);
+  }
   const ProjContextPtr context = MakeProjContext();
   const ProjObjectPtr vertical = VerticalPart(context.get(), vertical_crs);
   if (vertical == nullptr) {
@@ -185,7 +196,8 @@ Result<std::shared_ptr<const Geoid>> Geoid::OfCrs(const std::string& vertical_cr
   std::string missing;  // of the best operation that cannot run
   for (int i = 0; i < count; ++i) {
     const ProjObjectPtr operation(proj_list_get(context.get(), operations.get(), i));
-    if (!CoversCentre(context.get(), operation.get(), centre)) continue;
+    geoid->area_ = AreaOf(context.get(), operation.get());
+    if (!geoid->area_.Covers(centre)) continue;
     const std::vector<ProjGrid> grids = GridsOf(context.get(), operation.get());
     const auto absent = std::ranges::find_if(grids, [](const ProjGrid& grid) { return grid.file.empty(); });
     if (absent != grids.end()) {

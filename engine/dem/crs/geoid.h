@@ -20,6 +20,14 @@
 namespace terrace::dem {
 
 // Thread-safe: every call borrows a PROJ context of its own.
+// Degrees; west > east: across the antimeridian. As it begins: the whole Earth.
+struct AreaOfUse {
+  double west = -180, south = -90, east = 180, north = 90;
+
+  // Longitudes a full turn apart are one place.
+  bool Covers(Position degrees) const;
+};
+
 class Geoid {
  public:
   // `vertical_crs`: what PROJ reads as a vertical or compound reference system, such as "EPSG:5773" or WKT; of a
@@ -65,6 +73,7 @@ class Geoid {
   void FindGrid();
   static std::shared_ptr<const Geoid> FindShared(const std::string& vertical_crs, std::shared_ptr<const Geoid> made);
 
+  AreaOfUse area_;
   std::string name_, unit_, description_;
   StampedFiles files_;
   std::shared_ptr<const UndulationGrid> grid_;

@@ -37,6 +37,24 @@ std::optional<double> Cs2cs(const std::string& from, Position place) {
   return found == 3 ? std::optional(height) : std::nullopt;
 }
 
+TEST(AreaOfUse, LongitudesATurnApartAreOnePlace) {
+  const AreaOfUse earth, fiji{176, -20, -178, -12}, alps{5, 43, 17, 49};
+  for (const double turn : {-360.0, 0.0, 360.0}) {
+    EXPECT_TRUE(earth.Covers({190 + turn, 10}));
+    EXPECT_TRUE(fiji.Covers({179 + turn, -15}) && fiji.Covers({-179 + turn, -15}));
+    EXPECT_FALSE(fiji.Covers({170 + turn, -15}) || fiji.Covers({179 + turn, -25}));
+    EXPECT_TRUE(alps.Covers({8 + turn, 46}));
+    EXPECT_FALSE(alps.Covers({18 + turn, 46}));
+  }
+}
+
+// A text that no other test uses: the first who asks for it decides what is found.
+TEST(Geoid, IsFoundForACentreBeyondTheAntimeridian) {
+  const auto beyond = Geoid::OfCrs("EPSG:4326+5773", {190, 20});
+  ASSERT_TRUE(beyond) << beyond.error().message;
+  EXPECT_EQ((*beyond)->Undulation({190, 20}), (*beyond)->Undulation({-170, 20}));
+}
+
 TEST(Geoid, Egm96EqualsCs2csAtNamedPlaces) {
   for (const auto& [name, degrees] : kPlaces) {
     const auto geoid = Geoid::OfCrs("EPSG:5773", degrees);
