@@ -13,10 +13,10 @@
 #include "engine/geo/ellipsoid.h"
 #include "engine/geo/error_ladder.h"
 #include "engine/tin/greedy.h"
-#include "engine/tin/insert_samples.h"
 #include "engine/tin/mesh/height_field.h"
 #include "engine/tin/mesh_error.h"
 #include "tiler/area/area_surface.h"
+#include "tiler/mesh/mend_mesh.h"
 #include "tiler/strong_etag.h"
 
 namespace terrace::tiler {
@@ -119,27 +119,26 @@ PlacedMesh PlaceFlat(const tin::HeightField& field, const tin::TinMesh& mesh, co
 // The mesh was refined in longitude and latitude. In space its triangles lie beside where they were drawn, by the
 // curvature of the parallels: little, but at a cliff or next to a pole that can be more than the bound. Inserts what is
 // over it.
-PlacedMesh PlaceInSpace(const tin::HeightField& field, tin::TinMesh& mesh, const AreaSurface& surface,
-                        const std::optional<Frame>& frame, double bound_m, const std::stop_token& stop) {
-  constexpr int kMaxRounds = 16;          // as for tiles
+Result<PlacedMesh> PlaceInSpace(const tin::HeightField& field, tin::TinMesh& mesh, const AreaSurface& surface,
+                                const std::optional<Frame>& frame, double bound_m, const std::stop_token& stop) {
   constexpr double kRounding_m = 0x1p-8;  // what RoundPosition may take on a steep slope: no vertex mends that
-  tin::SampleInserter inserter;
-  for (int round = 1;; ++round) {
-    PlacedMesh placed;
+  PlacedMesh placed;
+  const auto measure = [&](const tin::TinMesh& rounded_mesh) {
+    placed.vertices.clear();
     std::vector<geo::Vec3> ecef;
-    for (const tin::SamplePosition p : mesh.vertices) {
+    for (const tin::SamplePosition p : rounded_mesh.vertices) {
       const geo::Vec3 exact = surface.Ecef(p.x, p.y, field.VertexHeight(p.x, p.y));
       const geo::Vec3 rounded = RoundPosition(frame ? frame->ToLocal(exact) : exact);
       placed.vertices.push_back({rounded.x, rounded.y, rounded.z});
       ecef.push_back(frame ? frame->ToEcef(rounded) : rounded);
     }
-    const AreaSurface::Error error = surface.MeasureError(field, mesh, ecef, std::max(bound_m, kRounding_m), stop);
-    if (error.misses.empty() || round == kMaxRounds || stop.stop_requested()) {
-      placed.max_error_m = RoundPosition({error.max_m, 0, 0}).x;
-      return placed;
-    }
-    inserter.InsertInto(mesh, error.misses);
-  }
+    return surface.MeasureError(field, rounded_mesh, ecef, std::max(bound_m, kRounding_m), stop);
+  };
+  const std::size_t every_sample = static_cast<std::size_t>(field.width()) * static_cast<std::size_t>(field.height());
+  const Result<proto::TileError> error = MendMesh(mesh, measure, every_sample, stop);
+  if (!error) return tl::unexpected(error.error());
+  placed.max_error_m = RoundPosition({error->max_m, 0, 0}).x;
+  return placed;
 }
 
 }  // namespace
@@ -189,18 +188,18 @@ Result<EncodedTile> BuildAreaMesh(const dem::DemSource& source, const AreaPlan& 
   start = Clock::now();
   std::optional<Frame> frame;
   if (area.coordinates == AreaCoordinates::kEnu) frame = Frame::At(plan.centre);
-  const PlacedMesh placed = area.coordinates == AreaCoordinates::kGeographic
-                                ? PlaceFlat(*field, mesh, surface, stop)
-                                : PlaceInSpace(*field, mesh, surface, frame, bound_m, stop);
-  if (stop.stop_requested()) return cancelled();
+  const Result<PlacedMesh> placed = area.coordinates == AreaCoordinates::kGeographic
+                                        ? PlaceFlat(*field, mesh, surface, stop)
+                                        : PlaceInSpace(*field, mesh, surface, frame, bound_m, stop);
+  if (!placed || stop.stop_requested()) return cancelled();
   std::ostringstream out;
-  if (auto written = proto::WriteMesh(out, area.format, placed.vertices, mesh.triangles, {}, stop); !written) {
+  if (auto written = proto::WriteMesh(out, area.format, placed->vertices, mesh.triangles, {}, stop); !written) {
     return tl::unexpected(std::move(written).error());
   }
   encoded.bytes = std::move(out).str();
   encoded.times.encode = MicrosecondsSince(start);
   encoded.etag = StrongETag(encoded.bytes);
-  encoded.max_error_m = placed.max_error_m;
+  encoded.max_error_m = placed->max_error_m;
   encoded.vertices = static_cast<std::uint32_t>(mesh.vertices.size());
   encoded.triangles = static_cast<std::uint32_t>(mesh.triangles.size());
   return encoded;

@@ -98,10 +98,10 @@ void AreaSurface::AddCurvature(tin::GreedyOptions& options) const {
   }
 }
 
-AreaSurface::Error AreaSurface::MeasureError(const tin::HeightField& field, const tin::TinMesh& mesh,
-                                             const std::vector<geo::Vec3>& ecef, double bound_m,
-                                             const std::stop_token& stop) const {
-  Error error;
+proto::TileError AreaSurface::MeasureError(const tin::HeightField& field, const tin::TinMesh& mesh,
+                                           const std::vector<geo::Vec3>& ecef, double bound_m,
+                                           const std::stop_token& stop) const {
+  proto::TileError error;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     if (t % kStopPeriod == 0 && stop.stop_requested()) break;
     const auto& triangle = mesh.triangles[t];

@@ -10,6 +10,7 @@
 #include "engine/tin/greedy.h"
 #include "engine/tin/mesh/height_field.h"
 #include "engine/tin/mesh/tin_mesh.h"
+#include "proto/error/tile_error.h"
 #include "proto/gltf/mesh_file.h"
 
 namespace terrace::tiler {
@@ -27,14 +28,11 @@ class AreaSurface {
   // What the curved Earth takes from flat triangles, for the run that makes the mesh.
   void AddCurvature(tin::GreedyOptions& options) const;
 
-  struct Error {
-    double max_m = 0;
-    std::vector<tin::SamplePosition> misses;  // of each triangle the worst sample over the bound that can be inserted
-  };
-  // Vertical distances between the samples and the flat triangles with corners in `ecef`, the mesh's vertices. When
-  // `stop` is requested, what was measured until then.
-  Error MeasureError(const tin::HeightField& field, const tin::TinMesh& mesh, const std::vector<geo::Vec3>& ecef,
-                     double bound_m, const std::stop_token& stop) const;
+  // Vertical distances between the samples and the flat triangles with corners in `ecef`, the mesh's vertices. Misses
+  // are the worst sample of each triangle over the bound that can be inserted. When `stop` is requested, what was
+  // measured until then.
+  proto::TileError MeasureError(const tin::HeightField& field, const tin::TinMesh& mesh,
+                                const std::vector<geo::Vec3>& ecef, double bound_m, const std::stop_token& stop) const;
 
  private:
   geo::Vec3 Up(int column, int row) const;

@@ -50,7 +50,7 @@ Result<MeshedGlb> MeshGlb(const dem::DemSource& source, const proto::LatticeView
     positions = proto::GridPositions(points, step_m);
     return meter.MeasureFlat(rounded, positions);
   };
-  const Result<proto::TileError> error = MendMesh(mesh, measure, stop);
+  const Result<proto::TileError> error = MendMesh(mesh, measure, proto::kMaxTileVertices, stop);
   if (!error) return tl::unexpected(error.error());
   meshed.max_error_m = error->max_m;
   meshed.surface_error_m = std::max(error->max_m, proto::MeasureFlatEdgeError(lattice, mesh, positions));

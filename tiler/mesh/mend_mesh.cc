@@ -1,19 +1,19 @@
 #include "tiler/mesh/mend_mesh.h"
 
 #include "engine/tin/insert_samples.h"
-#include "proto/mesh/quantized_mesh.h"
 #include "tiler/mesh/tile_mesher.h"
 
 namespace terrace::tiler {
 namespace {
 
 // Every round but the last inserts a sample.
-Result<proto::TileError> InsertMisses(tin::TinMesh& mesh, const MeasureMesh& measure, const std::stop_token& stop) {
+Result<proto::TileError> InsertMisses(tin::TinMesh& mesh, const MeasureMesh& measure, std::size_t max_vertices,
+                                      const std::stop_token& stop) {
   tin::SampleInserter inserter;
   for (;;) {
     if (stop.stop_requested()) return Cancelled();
     proto::TileError error = measure(mesh);
-    if (error.misses.empty() || mesh.vertices.size() + error.misses.size() > proto::kMaxTileVertices) return error;
+    if (error.misses.empty() || mesh.vertices.size() + error.misses.size() > max_vertices) return error;
     inserter.InsertInto(mesh, error.misses);
   }
 }
@@ -22,11 +22,12 @@ Result<proto::TileError> InsertMisses(tin::TinMesh& mesh, const MeasureMesh& mea
 
 // Four neighbours that are vertices hem in a vertex of a Delaunay triangulation, since nothing lies in the circle over
 // the edge to any of them. In other triangulations an edge may pass between.
-Result<proto::TileError> MendMesh(tin::TinMesh& mesh, const MeasureMesh& measure, const std::stop_token& stop) {
-  Result<proto::TileError> error = InsertMisses(mesh, measure, stop);
+Result<proto::TileError> MendMesh(tin::TinMesh& mesh, const MeasureMesh& measure, std::size_t max_vertices,
+                                  const std::stop_token& stop) {
+  Result<proto::TileError> error = InsertMisses(mesh, measure, max_vertices, stop);
   if (!error || !error->is_cut_through) return error;
   mesh = tin::DelaunayOf(mesh);
-  return InsertMisses(mesh, measure, stop);
+  return InsertMisses(mesh, measure, max_vertices, stop);
 }
 
 }  // namespace terrace::tiler

@@ -50,7 +50,7 @@ Result<MeshedTile> Finish(tin::TinMesh mesh, const proto::LatticeView& lattice, 
     meshed.tile = proto::QuantizeTile(lattice, rounded, steps);
     return meter.Measure(meshed.tile);
   };
-  const Result<proto::TileError> error = MendMesh(mesh, measure, stop);
+  const Result<proto::TileError> error = MendMesh(mesh, measure, proto::kMaxTileVertices, stop);
   if (!error) return tl::unexpected(error.error());
   meshed.max_error_m = error->max_m;
   meshed.surface_error_m = std::max(error->max_m, proto::MeasureEdgeError(lattice, meshed.tile));

@@ -1,0 +1,44 @@
+// One tile without a server: an elevation model in, a quantized-mesh tile out.
+//
+//   embed DEM LEVEL X Y ERROR_M OUT.terrain
+//
+// Tiles are those of EPSG:4326 in the TMS scheme: two at level 0, y from the south. What the engine has to say about the
+// model goes to spdlog's default logger.
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+
+#include "engine/dem/dem_source.h"
+#include "engine/geo/error_ladder.h"
+#include "tiler/tile_pipeline.h"
+
+int main(int count, char** arguments) {
+  using namespace terrace;
+  if (count != 7) {
+    std::fputs("usage: embed DEM LEVEL X Y ERROR_M OUT.terrain\n", stderr);
+    return 2;
+  }
+  auto source = dem::DemSource::Open(arguments[1]);
+  if (!source) {
+    std::fprintf(stderr, "embed: %s\n", source.error().message.c_str());
+    return 1;
+  }
+  tiler::Dataset dataset;
+  dataset.name = "dem";
+  dataset.source = *std::move(source);
+  const double error_fraction = dataset.error_fraction;
+  const tiler::TilePipeline pipeline({std::move(dataset)});
+
+  tiler::TileRequest request;
+  request.key = {std::atoi(arguments[2]), std::atoll(arguments[3]), std::atoll(arguments[4])};
+  request.error_step = geo::SnapToLadder(request.key.level, std::atof(arguments[5]), error_fraction);
+  const Result<tiler::EncodedTile> tile = pipeline.Build(request, {});
+  if (!tile) {
+    std::fprintf(stderr, "embed: %s\n", tile.error().message.c_str());
+    return 1;
+  }
+  std::ofstream(arguments[6], std::ios::binary) << tile->bytes;
+  std::printf("%u triangles, at most %.3g m from the samples of the tile and %.3g m from those of the source\n",
+              tile->triangles, tile->max_error_m, *tile->certified_error_m);
+  return 0;
+}
