@@ -1,7 +1,6 @@
 #include "proto/media_type.h"
 
 #include <algorithm>
-#include <optional>
 
 namespace terrace::proto {
 namespace {
@@ -40,40 +39,6 @@ Parameter ParseParameter(std::string_view text) {
   std::string_view value = Trimmed(text);
   if (value.size() >= 2 && value.front() == '"' && value.back() == '"') value = value.substr(1, value.size() - 2);
   return {name, value};
-}
-
-// RFC 9110 section 12.4.2, in thousandths: "1", "0.5", "0.333". What is not a weight counts as zero.
-int ParseWeight(std::string_view text) {
-  if (text.empty() || text.size() > 5 || (text[0] != '0' && text[0] != '1')) return 0;
-  if (text.size() > 1 && text[1] != '.') return 0;
-  int weight = text[0] == '1' ? 1000 : 0;
-  int unit = 100;
-  for (std::size_t i = 2; i < text.size(); ++i, unit /= 10) {
-    if (text[i] < '0' || text[i] > '9') return 0;
-    weight += (text[i] - '0') * unit;
-  }
-  return weight <= 1000 ? weight : 0;
-}
-
-struct Weights {
-  std::optional<int> gzip, identity, any;
-};
-
-Weights ParseCodings(std::string_view accept_encoding) {
-  Weights weights;
-  while (!accept_encoding.empty()) {
-    std::string_view element = TakePart(accept_encoding, ',');
-    const std::string_view coding = TakePart(element, ';');
-    int weight = 1000;
-    while (!element.empty()) {
-      const Parameter parameter = ParseParameter(TakePart(element, ';'));
-      if (EqualsIgnoringCase(parameter.name, "q")) weight = ParseWeight(parameter.value);
-    }
-    if (EqualsIgnoringCase(coding, "gzip") || EqualsIgnoringCase(coding, "x-gzip")) weights.gzip = weight;
-    if (EqualsIgnoringCase(coding, "identity")) weights.identity = weight;
-    if (coding == "*") weights.any = weight;
-  }
-  return weights;
 }
 
 }  // namespace
@@ -115,14 +80,6 @@ std::string_view QuantizedMeshContentType(TileExtensions extensions) {
       "application/vnd.quantized-mesh;extensions=octvertexnormals-watermask-metadata",
   };
   return kTypes[(extensions.octvertexnormals ? 1 : 0) + (extensions.watermask ? 2 : 0) + (extensions.metadata ? 4 : 0)];
-}
-
-ContentCoding ChooseCoding(std::string_view accept_encoding) {
-  const Weights weights = ParseCodings(accept_encoding);
-  const int gzip = weights.gzip.value_or(weights.any.value_or(0));
-  // Unmentioned, identity is acceptable but wanted by nobody.
-  const int identity = weights.identity.value_or(weights.any.value_or(0));
-  return gzip > 0 && gzip >= identity ? ContentCoding::kGzip : ContentCoding::kIdentity;
 }
 
 }  // namespace terrace::proto

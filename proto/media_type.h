@@ -1,4 +1,4 @@
-// What HTTP headers say about representations: content types, quantized-mesh extensions, content codings.
+// What HTTP headers say about representations: content types and extensions of quantized-mesh.
 // Pure functions of header texts; thread-safe; malformed input never fails, it asks for nothing.
 #pragma once
 
@@ -34,11 +34,5 @@ TileExtensions ExtensionsInAccept(std::string_view accept);
 
 // The Content-Type of a quantized-mesh tile with these extensions: a literal.
 std::string_view QuantizedMeshContentType(TileExtensions extensions);
-
-enum class ContentCoding { kIdentity, kGzip };
-
-// RFC 9110 section 12.5.3: gzip if the client takes it and does not prefer identity. Without the header, and where the
-// client refuses both, identity: every client can read that.
-ContentCoding ChooseCoding(std::string_view accept_encoding);
 
 }  // namespace terrace::proto

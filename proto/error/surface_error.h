@@ -18,7 +18,7 @@ namespace terrace::proto {
 // readings at every place of the tile: docs/decisions/0011-certified-error.md has the proof.
 double MeasureEdgeError(const LatticeView& lattice, const QuantizedTile& tile);
 
-// The same of flat triangles with their vertices at exact lattice positions, as MeasureFlatError reads them.
+// The same of flat triangles with their vertices at exact lattice positions, as TileMeter::MeasureFlat reads them.
 double MeasureFlatEdgeError(const LatticeView& lattice, const tin::TinMesh& mesh,
                             const std::vector<geo::Vec3>& positions);
 

@@ -326,15 +326,6 @@ TileError TileMeter::MeasureFlat(const tin::TinMesh& mesh, const std::vector<geo
   return impl_->Measure(std::move(surface));
 }
 
-TileError MeasureTileError(const LatticeView& lattice, const QuantizedTile& tile, double bound_m) {
-  return TileMeter(lattice, bound_m).Measure(tile);
-}
-
-TileError MeasureFlatError(const LatticeView& lattice, const tin::TinMesh& mesh,
-                           const std::vector<geo::Vec3>& positions, double bound_m) {
-  return TileMeter(lattice, bound_m).MeasureFlat(mesh, positions);
-}
-
 bool AllCounterClockwise(const QuantizedTile& tile) {
   return std::all_of(tile.triangles.begin(), tile.triangles.end(), [&](const std::array<std::uint32_t, 3>& t) {
     const int x1 = tile.u[t[1]] - tile.u[t[0]], y1 = tile.v[t[1]] - tile.v[t[0]];

@@ -23,32 +23,27 @@ struct TileError {
   bool is_cut_through = false;
 };
 
-// Measures a tile's mesh again and again while samples are inserted into it: triangles that are what they were the time
-// before are not looked at again. What each function measures is said below, of the one for a single time. All meshes
-// are those of the lattice's tile.
+// Measures the mesh of a tile, again and again while samples are inserted into it: triangles that are what they were
+// the time before are not looked at again. All meshes are those of the lattice's tile.
 class TileMeter {
  public:
   TileMeter(const LatticeView& lattice, double bound_m);
   ~TileMeter();
 
+  // Measures at every lattice sample two readings of the surface: the height interpolated in longitude and latitude,
+  // which is what clients sample, and the flat triangle in ECEF, which is what they draw, where the plumb line of the
+  // sample (the ellipsoid's normal) passes through it. Where triangles overlap along a plumb line, the farthest one
+  // counts.
   TileError Measure(const QuantizedTile& tile);
+
+  // The flat triangles alone, of `mesh` with its vertices near lattice nodes, at `positions` in ECEF. Triangles whose
+  // corners merged on the way count as what is left of them, a line.
   TileError MeasureFlat(const tin::TinMesh& mesh, const std::vector<geo::Vec3>& positions);
 
  private:
   class Impl;
   std::unique_ptr<Impl> impl_;
 };
-
-// Measures at every lattice sample two readings of the surface: the height interpolated in longitude and latitude,
-// which is what clients sample, and the flat triangle in ECEF, which is what they draw, where the plumb line of the
-// sample (the ellipsoid's normal) passes through it. Where triangles overlap along a plumb line, the farthest one
-// counts.
-TileError MeasureTileError(const LatticeView& lattice, const QuantizedTile& tile, double bound_m);
-
-// The flat triangles alone, of `mesh` with its vertices near lattice nodes, at `positions` in ECEF. Triangles whose
-// corners merged on the way count as what is left of them, a line.
-TileError MeasureFlatError(const LatticeView& lattice, const tin::TinMesh& mesh,
-                           const std::vector<geo::Vec3>& positions, double bound_m);
 
 // True if all triangles are counter-clockwise in (u, v): rounding positions to 15 bits could turn a sliver.
 bool AllCounterClockwise(const QuantizedTile& tile);

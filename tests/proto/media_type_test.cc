@@ -60,42 +60,6 @@ TEST(MediaType, AcceptMayNameExtensionsAnywhere) {
   for (const ExtensionsCase& c : cases) EXPECT_EQ(ExtensionsInAccept(c.text), c.expected) << c.text;
 }
 
-TEST(MediaType, CodingFollowsTheWeights) {
-  constexpr ContentCoding kGzip = ContentCoding::kGzip, kIdentity = ContentCoding::kIdentity;
-  struct Case {
-    std::string_view header;
-    ContentCoding expected;
-  };
-  const std::vector<Case> cases = {
-      {"", kIdentity},
-      {"gzip", kGzip},
-      {"GZip", kGzip},
-      {"x-gzip", kGzip},
-      {"gzip, deflate, br, zstd", kGzip},
-      {"br", kIdentity},
-      {"identity", kIdentity},
-      {"*", kGzip},
-      {"gzip;q=0", kIdentity},
-      {"gzip;q=0.000, *", kIdentity},
-      {"gzip ; q=0.5", kGzip},
-      {"gzip;q=0.5, identity", kIdentity},
-      {"gzip;q=0.5, identity;q=0.5", kGzip},
-      {"gzip;q=0.5, identity;q=0.501", kIdentity},
-      {"identity;q=0, gzip;q=0.001", kGzip},
-      {"identity;q=0", kIdentity},
-      {"*;q=0", kIdentity},
-      {"*;q=0, gzip", kGzip},
-      {"identity;q=0.5, *;q=0", kIdentity},
-      {"identity, *;q=0.5", kIdentity},
-      {"gzip;q=abc", kIdentity},
-      {"gzip;q=1.001", kIdentity},
-      {"gzip;q=", kIdentity},
-      {"gzipped", kIdentity},
-      {",,;q=1,gzip", kGzip},
-  };
-  for (const Case& c : cases) EXPECT_EQ(ChooseCoding(c.header), c.expected) << c.header;
-}
-
 TEST(QuantizedMeshContentType, NamesWhatTheTileCarries) {
   for (int bits = 0; bits < 8; ++bits) {
     const TileExtensions extensions{(bits & 1) != 0, (bits & 2) != 0, (bits & 4) != 0};

@@ -129,7 +129,6 @@ class Triangulation {
   HalfEdgeId twin(HalfEdgeId edge) const { return is_wide_ ? TwinIn(wide_, edge) : TwinIn(narrow_, edge); }
 
   static constexpr HalfEdgeId Next(HalfEdgeId edge) { return (edge & ~HalfEdgeId{3}) + NextCorner(edge % 4); }
-  static constexpr HalfEdgeId Previous(HalfEdgeId edge) { return (edge & ~HalfEdgeId{3}) + PreviousCorner(edge % 4); }
 
  private:
   // An edge of the outline that has not been looked across yet; it starts where the one before it ends.
