@@ -131,17 +131,17 @@ TEST(ManySources, AtTheRimOfAProjectionATileLooksAtItsOwnSources) {
   EXPECT_LE(most, 8U);
 }
 
-constexpr int kSide = 40, kAcross = 4;
+// kShift: of every other row of rasters to the east.
+constexpr int kSide = 40, kAcross = 4, kShift = 13, kStride = kAcross * kSide + kShift;
 
 // Rasters of kSide x kSide samples, kAcross x kAcross of them without those of `missing`, beside each other or, with
 // `shared` rows and columns, over each other's edges.
 std::vector<SheetMember> MakeMembers(const TempDir& dir, const std::vector<std::uint8_t>& missing, int shared,
                                      const std::vector<std::uint8_t>& voids) {
-  constexpr int kStride = kAcross * kSide;
   std::vector<SheetMember> members;
   for (int k = 0; k < kAcross * kAcross; ++k) {
     if (missing[static_cast<std::size_t>(k)] != 0) continue;
-    const int left = k % kAcross * (kSide - shared), top = k / kAcross * (kSide - shared);
+    const int left = k % kAcross * (kSide - shared) + k / kAcross % 2 * kShift, top = k / kAcross * (kSide - shared);
     RasterSpec spec{.width = kSide, .height = kSide, .geo_transform = {left * 0.01, 0.01, 0, -top * 0.01, 0, -0.01}};
     spec.nodata = -9999;
     spec.value = [&, left, top](int c, int r) {
@@ -196,7 +196,6 @@ std::vector<std::uint8_t> HolesByFlood(const std::vector<SheetMember>& members, 
 }
 
 TEST(ManySources, VoidsThatGoOnInANeighbourAreThoseThatAFloodFinds) {
-  constexpr int kStride = kAcross * kSide;
   std::mt19937 random(11);
   for (int round = 0; round < 12; ++round) {
     SCOPED_TRACE(round);
@@ -226,10 +225,9 @@ TEST(ManySources, VoidsThatGoOnInANeighbourAreThoseThatAFloodFinds) {
 // What thousands of rasters cost that are mostly not stored: not as much as their rims have pixels.
 TEST(ManySources, VoidsAreComparedAsOftenAsSomethingChangesAlongTheRims) {
   const TempDir dir;
-  std::vector<std::uint8_t> voids(kAcross * kSide * kAcross * kSide, 1);
+  std::vector<std::uint8_t> voids(kStride * kStride, 1);
   for (int y = 0; y < kAcross * kSide; y += kSide) {
-    for (int x = 0; x < kAcross * kSide; x += kSide)
-      voids[static_cast<std::size_t>((y + 7) * kAcross * kSide + x + 7)] = 0;
+    for (int x = 0; x < kAcross * kSide; x += kSide) voids[static_cast<std::size_t>((y + 17) * kStride + x + 17)] = 0;
   }
   const auto members = MakeMembers(dir, std::vector<std::uint8_t>(kAcross * kAcross), 0, voids);
   const SheetVoids sheet(members, IndexOfMembers(members), 0);
@@ -272,6 +270,35 @@ TEST(ManySources, PagedTablesSayWhatKeptOnesDo) {
   }
   EXPECT_GT(pages->paged_bytes(), 0U);
   EXPECT_EQ(kept->ReadBlocks(64, {3, 4, 5, 6}, {}).value(), paged.ReadBlocks(64, {3, 4, 5, 6}, {}).value());
+}
+
+// A shallow tile takes a few averages of each of hundreds of sources; their samples would take a minute.
+TEST(ManySources, ShallowTilesReadKeptAveragesOfASource) {
+  const TempDir dir, cache;
+  const std::string path = WriteRaster(dir, Rough(1500)), small = WriteRaster(dir, Rough(900), "small.tif");
+  const auto whole = OpenRasterOrFail(path);
+  for (const bool is_known : {false, true}) {
+    SCOPED_TRACE(is_known);
+    const auto kept = RasterSource::Open(path, {}, cache.path().string());
+    ASSERT_TRUE(kept.has_value()) << kept.error().message;
+    ASSERT_NE((*kept)->averages(), nullptr);
+    for (const int factor : {2, 4, 8, 16, 32, 64}) {
+      SCOPED_TRACE(factor);
+      const std::uint64_t before = (*kept)->averages()->bytes_read();
+      const int blocks = (1500 + factor - 1) / factor;
+      EXPECT_EQ((*kept)->ReadBlocks(factor, {0, 0, blocks, blocks}, {}).value(),
+                whole->ReadBlocks(factor, {0, 0, blocks, blocks}, {}).value());
+      const std::uint64_t bytes = (*kept)->averages()->bytes_read() - before;
+      if (factor < 8 || factor > 32) {
+        EXPECT_EQ(bytes, 0U);
+      } else {
+        EXPECT_GE(bytes, std::uint64_t{4} * static_cast<unsigned>(blocks * blocks));
+      }
+    }
+  }
+  const auto read_whole = RasterSource::Open(small, {}, cache.path().string());
+  ASSERT_TRUE(read_whole.has_value());
+  EXPECT_EQ((*read_whole)->averages(), nullptr);
 }
 
 TEST(ManySources, PagedTablesOfALostRecordAreMadeAgain) {
