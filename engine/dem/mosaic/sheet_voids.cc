@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <optional>
 
@@ -20,8 +21,20 @@ struct Placed {
     const RasterLayout& layout = member->raster->layout();
     return x >= column && x < column + layout.columns && y >= member->row && y < member->row + layout.height;
   }
-  std::optional<std::uint32_t> RegionAt(std::int64_t x, std::int64_t y) const {
-    return member->raster->rim_voids().At(x - column, y - member->row);
+  // `same`: becomes the number of pixels, along the row or the column, that it holds for.
+  // Precondition: Has(x, y).
+  std::optional<std::uint32_t> RegionAt(std::int64_t x, std::int64_t y, bool along_row, std::int64_t& same) const {
+    const RasterLayout& layout = member->raster->layout();
+    const std::int64_t own_x = x - column, own_y = y - member->row;
+    const RimVoids::Stretch stretch = member->raster->rim_voids().StretchAt(own_x, own_y);
+    same = along_row ? std::min<std::int64_t>(stretch.last_column, layout.columns - 1) - own_x + 1
+                     : std::min<std::int64_t>(stretch.last_row, layout.height - 1) - own_y + 1;
+    return stretch.region;
+  }
+  // Pixels from x, y on, along the row or the column, before the member begins; as many as there are where it does not.
+  std::int64_t Before(std::int64_t x, std::int64_t y, bool along_row) const {
+    const std::int64_t before = along_row ? column - x : member->row - y;
+    return before > 0 ? before : std::numeric_limits<std::int64_t>::max();
   }
 };
 
@@ -61,48 +74,60 @@ class Joints {
     const SheetMember& member = members_[i];
     const RimVoids& voids = member.raster->rim_voids();
     if (voids.is_everything()) is_open_[RootOf(first_[i])] = 1;
-    if (voids.runs().empty()) return;
+    if (!voids.has_runs()) return;
     const RasterLayout& layout = member.raster->layout();
     const std::int64_t last_x = member.column + layout.columns - 1, last_y = member.row + layout.height - 1;
     around_ = PlacedIn(members_, index_, turn_, {member.column - 1, member.row - 1, last_x + 1, last_y + 1});
     std::erase_if(around_, [&](const Placed& p) { return p.index == i && p.column == member.column; });
-    for (const RimVoids::Run& run : voids.runs()) {
-      const std::size_t region = first_[i] + run.region;
-      const std::int64_t y = member.row + run.row;
-      const auto side = [&](std::int64_t x, std::int64_t dx, std::int64_t dy) { Touch(region, x, y, x + dx, y + dy); };
-      for (const std::int64_t dy : {-1, 1}) {
-        if (y != (dy < 0 ? member.row : last_y)) continue;
-        for (std::int64_t x = member.column + run.first; x <= member.column + run.last; ++x) side(x, 0, dy);
-      }
-      if (run.first == 0) side(member.column, -1, 0);
-      if (member.column + run.last == last_x) side(last_x, 1, 0);
+    const Placed self{&member, i, member.column};
+    for (const std::int64_t dy : {-1, 1}) {
+      const std::int64_t y = dy < 0 ? member.row : last_y;
+      for (std::int64_t x = member.column; x <= last_x;) x += Touch(self, x, y, 0, dy);
+    }
+    for (const std::int64_t dx : {-1, 1}) {
+      const std::int64_t x = dx < 0 ? member.column : last_x;
+      for (std::int64_t y = member.row; y <= last_y;) y += Touch(self, x, y, dx, 0);
     }
   }
+
+  std::size_t looks() const { return looks_; }
 
   bool IsClosed(std::size_t member, std::uint32_t region) { return is_open_[RootOf(first_[member] + region)] == 0; }
 
  private:
-  // A void at x, y, the pixel beyond its member's rim is next_x, next_y.
-  void Touch(std::size_t region, std::int64_t x, std::int64_t y, std::int64_t next_x, std::int64_t next_y) {
+  // The pixel at x, y of a member's rim; beyond it lies that at x + dx, y + dy. Returns for how many pixels along the
+  // rim, to the east or to the south, the same holds: rims have many more pixels than changes.
+  std::int64_t Touch(const Placed& self, std::int64_t x, std::int64_t y, std::int64_t dx, std::int64_t dy) {
+    const bool is_row = dx == 0;
+    std::int64_t same = 0;
+    const auto own = self.RegionAt(x, y, is_row, same);
+    ++looks_;
+    if (!own) return same;
+    const std::size_t region = first_[self.index] + *own;
     // Another member may have a sample there, or a hole: then the sheet has no void, or none that goes on.
     bool goes_on = true, is_covered = false;
     const auto meet = [&](std::int64_t column, std::int64_t row) {
       for (const Placed& other : around_) {
-        if (!other.Has(column, row)) continue;
-        is_covered = true;
-        const auto met = other.RegionAt(column, row);
-        if (met) {
-          Join(region, first_[other.index] + *met);
-        } else {
-          goes_on = false;
+        std::int64_t there = other.Before(column, row, is_row);
+        if (other.Has(column, row)) {
+          ++looks_;
+          is_covered = true;
+          const auto met = other.RegionAt(column, row, is_row, there);
+          if (met) {
+            Join(region, first_[other.index] + *met);
+          } else {
+            goes_on = false;
+          }
         }
+        same = std::min(same, there);
       }
     };
     meet(x, y);
-    if (!goes_on) return;
+    if (!goes_on) return same;
     is_covered = false;
-    meet(next_x, next_y);
+    meet(x + dx, y + dy);
     if (!is_covered) is_open_[RootOf(region)] = 1;
+    return same;
   }
 
   std::size_t RootOf(std::size_t region) {
@@ -126,6 +151,7 @@ class Joints {
   std::vector<std::size_t> parents_;  // of regions, up to their roots
   std::vector<std::uint8_t> is_open_;
   std::vector<Placed> around_;  // the member at hand
+  std::size_t looks_ = 0;       // at voids of members
 };
 
 }  // namespace
@@ -135,6 +161,7 @@ SheetVoids::SheetVoids(const std::vector<SheetMember>& members, const BoxIndex& 
   // A single raster's own regions say it all, but where its first column is the neighbour of the last.
   Joints joints(members, index, turn);
   for (std::size_t i = 0; i < members.size(); ++i) joints.Add(i);
+  looks_ = joints.looks();
   for (std::size_t i = 0; i < members.size(); ++i) {
     const RimVoids& voids = members[i].raster->rim_voids();
     for (std::uint32_t region = 0; region < voids.regions(); ++region) {
@@ -142,7 +169,7 @@ SheetVoids::SheetVoids(const std::vector<SheetMember>& members, const BoxIndex& 
     }
     if (std::ranges::none_of(closed_[i], [](std::uint8_t closed) { return closed != 0; })) continue;
     geo::TileRange around{1, 1, 0, 0};
-    for (const RimVoids::Run& run : voids.runs()) {
+    for (const RimVoids::Run& run : voids.Runs()) {
       if (closed_[i][run.region] == 0) continue;
       const std::int64_t x = members[i].column, y = members[i].row + run.row;
       const geo::TileRange pixels{x + run.first, y, x + run.last, y};

@@ -27,10 +27,14 @@ class SheetVoids {
   // Whether a hole that several members share may reach into a box of pixels; RangeTable knows of all others.
   bool SharesHole(const Box& pixels) const;
 
+  // How often the constructor looked at voids of a member: as often as something changes along the rims of members.
+  std::size_t looks() const { return looks_; }
+
  private:
   bool IsHole(const SheetMember& member, std::size_t index, std::int64_t column, std::int64_t row) const;
 
   std::int64_t turn_ = 0;
+  std::size_t looks_ = 0;
   std::vector<std::vector<std::uint8_t>> closed_;  // by member and region of its RimVoids: part of a hole
   std::vector<geo::TileRange> shared_;             // pixels around those
 };

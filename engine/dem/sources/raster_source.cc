@@ -168,7 +168,7 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
   source->info_ = Describe(**dataset, path, source->georeference_, source->layout_);
   source->info_.overviews_unused = std::move(overviews_unused);
   source->info_.needs_averages = NeedsAverages(source->layout_);
-  source->info_.prepared = source->averages_ != nullptr;
+  source->info_.prepared = source->info_.needs_averages && source->averages_ != nullptr;
   source->info_.seconds_to_open = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   source->info_.found_voids = found_voids;
   source->info_.counts_from = source->vertical_.name;
@@ -253,7 +253,7 @@ Result<std::vector<float>> RasterSource::ReadBlocks(int factor, const GridWindow
     if (const SurveyPages::Tables known = tables(); known->coarse.Has(factor))
       return known->coarse.Read(factor, window);
   }
-  if (averages_ && RecordedAverages::Has(factor) && !averages_damaged_) {
+  if (averages_ && averages_->Has(factor) && !averages_damaged_) {
     if (auto unchanged = handles_.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
     auto averages = averages_->Read(factor, window);
     if (averages || averages.error().code == ErrorCode::kUnavailable) return averages;

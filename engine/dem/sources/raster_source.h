@@ -56,6 +56,9 @@ class RasterSource {
   BlockRange RangeIn(double west, double north, double east, double south) const;
   const StampedFiles& files() const { return handles_.files(); }
 
+  // In its record; null: there are none.
+  const RecordedAverages* averages() const { return averages_.get(); }
+
   // How opening went.
   const Preparation& preparation() const { return preparation_; }
 

@@ -1,6 +1,7 @@
 #include "engine/dem/statistics/rim_voids.h"
 
 #include <algorithm>
+#include <iterator>
 #include <limits>
 #include <tuple>
 #include <utility>
@@ -14,15 +15,40 @@ constexpr std::size_t kManyRegions = std::size_t{1} << 20;
 
 }  // namespace
 
-RimVoids::RimVoids(std::vector<Run> runs, std::uint32_t regions) : runs_(std::move(runs)), regions_(regions) {
-  if (runs_.empty()) return;
-  const std::int32_t top = runs_.front().row;
-  for (std::size_t i = 0; i < runs_.size(); ++i) {
-    while (static_cast<std::int64_t>(first_of_row_.size()) <= runs_[i].row - top) {
-      first_of_row_.push_back(static_cast<std::uint32_t>(i));
+RimVoids::RimVoids(std::span<const Run> runs, std::uint32_t regions) : regions_(regions) {
+  std::int32_t next_row = 0;
+  for (std::size_t first = 0, end = 0; first < runs.size(); first = end) {
+    const std::int32_t row = runs[first].row;
+    while (end < runs.size() && runs[end].row == row) ++end;
+    if (row > next_row) AddBand(next_row, {});
+    AddBand(row, runs.subspan(first, end - first));
+    next_row = row + 1;
+  }
+  if (!runs.empty()) AddBand(next_row, {});
+  spans_.shrink_to_fit();
+  bands_.shrink_to_fit();
+}
+
+void RimVoids::AddBand(std::int32_t row, std::span<const Run> runs) {
+  const auto span_of = [](const Run& run) { return Span{run.first, run.last, run.region}; };
+  if (!bands_.empty() && std::ranges::equal(SpansOf(bands_.size() - 1), runs, {}, {}, span_of)) return;
+  bands_.push_back({row, static_cast<std::uint32_t>(spans_.size())});
+  std::ranges::transform(runs, std::back_inserter(spans_), span_of);
+}
+
+std::span<const RimVoids::Span> RimVoids::SpansOf(std::size_t band) const {
+  const std::size_t end = band + 1 < bands_.size() ? bands_[band + 1].first_span : spans_.size();
+  return std::span(spans_).subspan(bands_[band].first_span, end - bands_[band].first_span);
+}
+
+std::vector<RimVoids::Run> RimVoids::Runs() const {
+  std::vector<Run> runs;
+  for (std::size_t band = 0; band + 1 < bands_.size(); ++band) {
+    for (std::int32_t row = bands_[band].row; row < bands_[band + 1].row; ++row) {
+      for (const Span& span : SpansOf(band)) runs.push_back({row, span.first, span.last, span.region});
     }
   }
-  first_of_row_.push_back(static_cast<std::uint32_t>(runs_.size()));
+  return runs;
 }
 
 RimVoids RimVoids::Everything() {
@@ -32,16 +58,19 @@ RimVoids RimVoids::Everything() {
   return all;
 }
 
-std::optional<std::uint32_t> RimVoids::At(std::int64_t column, std::int64_t row) const {
-  if (is_everything_) return 0;
-  if (runs_.empty()) return std::nullopt;
-  const std::int64_t index = row - runs_.front().row;
-  if (index < 0 || index + 1 >= static_cast<std::int64_t>(first_of_row_.size())) return std::nullopt;
-  const auto begin = runs_.begin() + first_of_row_[static_cast<std::size_t>(index)];
-  const auto end = runs_.begin() + first_of_row_[static_cast<std::size_t>(index) + 1];
-  const auto run = std::partition_point(begin, end, [&](const Run& r) { return r.last < column; });
-  if (run == end || run->first > column) return std::nullopt;
-  return run->region;
+RimVoids::Stretch RimVoids::StretchAt(std::int64_t column, std::int64_t row) const {
+  Stretch stretch;
+  if (is_everything_) stretch.region = 0;
+  const auto next = std::ranges::upper_bound(bands_, row, {}, &Band::row);
+  if (next != bands_.end()) stretch.last_row = next->row - 1;
+  if (next == bands_.begin()) return stretch;
+  const std::span<const Span> spans = SpansOf(static_cast<std::size_t>(next - bands_.begin()) - 1);
+  const auto span = std::ranges::partition_point(spans, [&](const Span& s) { return s.last < column; });
+  if (span == spans.end()) return stretch;
+  const bool is_inside = span->first <= column;
+  if (is_inside) stretch.region = span->region;
+  stretch.last_column = is_inside ? span->last : span->first - 1;
+  return stretch;
 }
 
 RimVoidFinder::RimVoidFinder(int columns, int rows, Hole hole, std::size_t most_runs)
@@ -179,7 +208,7 @@ RimVoids RimVoidFinder::Finish() {
   frontier_.clear();
   std::ranges::sort(rim_, {}, [](const Run& run) { return std::tuple(run.row, run.first); });
   Renumber();
-  return {std::move(rim_), static_cast<std::uint32_t>(parents_.size())};
+  return {rim_, static_cast<std::uint32_t>(parents_.size())};
 }
 
 }  // namespace terrace::dem

@@ -5,14 +5,17 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "engine/dem/statistics/raster_chunk.h"
 
 namespace terrace::dem {
 
-// Immutable and thread-safe. By default there are none.
+// Immutable and thread-safe. By default there are none. Takes memory for rows that differ from the row above alone:
+// collars and missing blocks, which thousands of rasters of a dataset may have, have few of these.
 class RimVoids {
  public:
   // Samples first .. last of a row.
@@ -25,20 +28,43 @@ class RimVoids {
 
   RimVoids() = default;
   // Runs by row and column. Regions are numbered from 0.
-  RimVoids(std::vector<Run> runs, std::uint32_t regions);
+  RimVoids(std::span<const Run> runs, std::uint32_t regions);
   // Of a raster whose voids are too ragged to be told apart: all of them are one region that touches the rim.
   static RimVoids Everything();
 
   std::uint32_t regions() const { return regions_; }
   bool is_everything() const { return is_everything_; }
-  const std::vector<Run>& runs() const { return runs_; }
+  bool has_runs() const { return !spans_.empty(); }
+  std::vector<Run> Runs() const;
+  std::size_t bytes() const { return spans_.size() * sizeof(Span) + bands_.size() * sizeof(Band); }
 
   // The region of a void; none for a hole. Of a valid sample: none, or 0 where is_everything().
-  std::optional<std::uint32_t> At(std::int64_t column, std::int64_t row) const;
+  std::optional<std::uint32_t> At(std::int64_t column, std::int64_t row) const { return StretchAt(column, row).region; }
+
+  // What At says, and how far it says the same: along the row up to last_column, along the column up to last_row.
+  struct Stretch {
+    std::optional<std::uint32_t> region = {};
+    std::int64_t last_column = std::numeric_limits<std::int64_t>::max(), last_row = last_column;
+  };
+  Stretch StretchAt(std::int64_t column, std::int64_t row) const;
 
  private:
-  std::vector<Run> runs_;
-  std::vector<std::uint32_t> first_of_row_;  // in runs_, from the first run's row on; one more at the end
+  struct Span {
+    std::int32_t first, last;
+    std::uint32_t region;
+
+    friend bool operator==(const Span&, const Span&) = default;
+  };
+  // Rows from this one to that of the next band, which all have the spans up to those of the next band.
+  struct Band {
+    std::int32_t row;
+    std::uint32_t first_span;
+  };
+  std::span<const Span> SpansOf(std::size_t band) const;
+  void AddBand(std::int32_t row, std::span<const Run> runs);
+
+  std::vector<Span> spans_;
+  std::vector<Band> bands_;  // the last one, behind all runs, has no spans
   std::uint32_t regions_ = 0;
   bool is_everything_ = false;
 };

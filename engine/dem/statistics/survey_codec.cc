@@ -68,8 +68,9 @@ std::optional<std::uint32_t> GetCount(ByteReader& reader, std::size_t bytes_each
 void Put(ByteWriter& writer, const RimVoids& voids) {
   writer.Put<std::uint8_t>(voids.is_everything() ? 1 : 0);
   writer.Put(voids.regions());
-  writer.Put(static_cast<std::uint32_t>(voids.runs().size()));
-  for (const RimVoids::Run& run : voids.runs()) {
+  const std::vector<RimVoids::Run> runs = voids.Runs();
+  writer.Put(static_cast<std::uint32_t>(runs.size()));
+  for (const RimVoids::Run& run : runs) {
     for (const std::int32_t place : {run.row, run.first, run.last}) writer.Put(place);
     writer.Put(run.region);
   }
@@ -87,7 +88,7 @@ std::optional<RimVoids> GetRimVoids(ByteReader& reader, const RasterLayout& layo
       return std::nullopt;
     }
   }
-  return is_everything ? RimVoids::Everything() : RimVoids(std::move(runs), regions);
+  return is_everything ? RimVoids::Everything() : RimVoids(runs, regions);
 }
 
 BlockSum GetSum(ByteReader& reader) {

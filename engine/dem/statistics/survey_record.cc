@@ -24,7 +24,7 @@ namespace terrace::dem {
 namespace {
 
 // Changes with every change of what a record holds or means.
-constexpr std::uint32_t kRecordVersion = 2;
+constexpr std::uint32_t kRecordVersion = 3;
 constexpr std::uint64_t kHeaderMagic = 0x32'59'56'52'55'53'52'54;  // "TRSURVY2"
 constexpr std::uint64_t kFooterMagic = 0x44'4e'45'59'56'52'55'53;  // "SURVYEND"
 constexpr std::uint32_t kPartMagic = 0x54'52'41'50;                // "PART"
@@ -42,7 +42,7 @@ std::string HeaderOf(const RecordShape& shape) {
   ByteWriter writer;
   writer.Put(kHeaderMagic);
   writer.Put(kRecordVersion);
-  writer.Put<std::uint32_t>(shape.keeps_averages() ? 1 : 0);
+  writer.Put(static_cast<std::uint32_t>(shape.least_kept_factor()));
   writer.Put(shape.key);
   writer.Put<std::uint32_t>(ChunkGrid::kSide);
   writer.Put<std::uint32_t>(kLargestDirect);
@@ -90,7 +90,7 @@ struct AveragesPlace {
 AveragesPlace PlaceOf(const Chunk& chunk, const RasterLayout& layout, int factor) {
   AveragesPlace place;
   const int used = std::clamp(layout.columns - chunk.col, 0, chunk.cols);
-  for (int f = 2;; f *= 2) {
+  for (int f = LeastKeptFactor(layout);; f *= 2) {
     place.columns = CeilingOf(used, f);
     place.rows = CeilingOf(chunk.rows, f);
     if (f == factor) return place;
@@ -139,11 +139,12 @@ struct PartHeader {
   }
 };
 
-std::string EncodeRecordPart(std::uint32_t index, const ChunkSurvey& part, bool keeps_averages) {
+std::string EncodeRecordPart(std::uint32_t index, const ChunkSurvey& part, int least_kept) {
   const std::string survey = part.is_void() ? std::string() : EncodePart(part);
   ByteWriter averages;
-  if (keeps_averages && !part.is_void()) {
+  if (!part.is_void()) {
     for (std::size_t k = 0; (2 << k) < kLargestDirect; ++k) {
+      if ((2 << k) < least_kept) continue;
       const std::string_view floats(reinterpret_cast<const char*>(part.averages[k].data()),
                                     part.averages[k].size() * sizeof(float));
       averages.Put(HashOf(floats));
@@ -195,6 +196,14 @@ bool NeedsAverages(const RasterLayout& layout) {
   return layout.overview_factors.empty() && std::int64_t{layout.width} * layout.height > kMostSamplesWithoutAverages;
 }
 
+int LeastKeptFactor(const RasterLayout& layout) {
+  constexpr std::int64_t kMostReadWhole = std::int64_t{1024} * 1024;
+  constexpr int kLeastOfSmall = 8;
+  if (NeedsAverages(layout)) return 2;
+  const bool is_small = std::int64_t{layout.width} * layout.height < kMostReadWhole;
+  return layout.overview_factors.empty() && !is_small ? kLeastOfSmall : kLargestDirect;
+}
+
 RasterLayout WithFindings(RasterLayout layout, const VoidFindings& findings) {
   findings.AddTo(layout.rules);
   // They were averaged from heights and marks.
@@ -207,6 +216,7 @@ RecordedAverages::RecordedAverages(const OpenFile& file, std::string path, Raste
     : identity_(IdentityOf(file.get()).value_or(FileIdentity())),
       path_(std::move(path)),
       layout_(std::move(layout)),
+      least_(LeastKeptFactor(layout_)),
       chunks_(layout_.width, layout_.height),
       offsets_(std::move(offsets)) {}
 
@@ -311,7 +321,7 @@ std::optional<FinishedRecord> LoadRecord(const std::string& path, const RecordSh
   auto survey = DecodeSurvey(whole.GetBytes(whole.remaining()), layout);
   if (!survey) return damaged("its survey");
   FinishedRecord record{std::move(shape.findings), *std::move(survey), nullptr};
-  if (NeedsAverages(layout)) {
+  if (LeastKeptFactor(layout) < kLargestDirect) {
     record.averages = std::make_shared<const RecordedAverages>(file, path, layout, std::move(offsets));
   }
   return record;
@@ -416,7 +426,8 @@ Result<void> RecordWriter::Write(std::string_view bytes) {
 
 Result<void> RecordWriter::Add(const ChunkSurvey& part) {
   const std::uint64_t begin = end_;
-  const std::string bytes = EncodeRecordPart(static_cast<std::uint32_t>(offsets_.size()), part, NeedsAverages(layout_));
+  const std::string bytes =
+      EncodeRecordPart(static_cast<std::uint32_t>(offsets_.size()), part, LeastKeptFactor(layout_));
   if (auto written = Write(bytes); !written) return written;
   const PartHeader header = PartHeader::Of(bytes);
   offsets_.push_back(header.averages_bytes > 0 ? begin + kPartHeaderBytes + header.survey_bytes : 0);

@@ -49,6 +49,11 @@ struct FileIdentity {
 inline constexpr std::int64_t kMostSamplesWithoutAverages = std::int64_t{4096} * 4096;
 bool NeedsAverages(const RasterLayout& layout);
 
+// The least factor of averages in a record; kLargestDirect: none are, as the survey has those from there on. Rasters of
+// a mosaic mostly begin at multiples of 8 or 16 pixels of each other, so that a shallow tile reads averages by so many
+// of each of hundreds of rasters: those of 1024 x 1024 samples and more keep these, a 50th of what they have.
+int LeastKeptFactor(const RasterLayout& layout);
+
 // How a raster is read once its undeclared voids are known.
 RasterLayout WithFindings(RasterLayout layout, const VoidFindings& findings);
 
@@ -59,18 +64,17 @@ struct RecordShape {
   VoidFindings findings;  // undeclared voids, which the record itself knows
 
   RasterLayout EffectiveLayout() const { return WithFindings(layout, findings); }
-  // Also averages of factors below kLargestDirect.
-  bool keeps_averages() const { return NeedsAverages(EffectiveLayout()); }
+  int least_kept_factor() const { return LeastKeptFactor(EffectiveLayout()); }
 };
 
-// Averages of factors 2 .. kLargestDirect / 2 in a finished record. Thread-safe. The file is open only while it is
-// read: a dataset may have thousands of them.
+// Averages of factors from LeastKeptFactor up to kLargestDirect / 2 in a finished record. Thread-safe. The file is open
+// only while it is read: a dataset may have thousands of them.
 class RecordedAverages {
  public:
   // `file`: the record, which `path` names.
   RecordedAverages(const OpenFile& file, std::string path, RasterLayout layout, std::vector<std::uint64_t> offsets);
 
-  static bool Has(int factor) { return factor > 1 && factor < kLargestDirect; }
+  bool Has(int factor) const { return factor >= least_ && factor < kLargestDirect; }
   // What ReadGrid gives. kInvalidArgument: the record is damaged, or gone. kUnavailable: it cannot be opened now.
   // Precondition: Has(factor).
   Result<std::vector<float>> Read(int factor, const GridWindow& window) const;
@@ -88,6 +92,7 @@ class RecordedAverages {
   FileIdentity identity_;
   std::string path_;
   RasterLayout layout_;
+  int least_;  // factor
   ChunkGrid chunks_;
   std::vector<std::uint64_t> offsets_;  // by part, of its averages; 0: void
   mutable std::atomic<std::uint64_t> bytes_read_{0};

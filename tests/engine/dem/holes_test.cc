@@ -452,6 +452,8 @@ TEST(RimVoids, AreThoseThatAFloodFromTheRimFinds) {
       reach(c - 1, r), reach(c + 1, r), reach(c, r - 1), reach(c, r + 1);
     }
     const RimVoids rim = FindRimVoids(kWidth, kHeight, voids, RimVoidFinder::kMostRuns, holes);
+    const std::vector<RimVoids::Run> runs = rim.Runs();
+    EXPECT_EQ(RimVoids(runs, rim.regions()).Runs(), runs);
     int wrong_rims = 0, wrong_holes = 0;
     for (int r = 0; r < kHeight; ++r) {
       for (int c = 0; c < kWidth; ++c) {
@@ -464,6 +466,53 @@ TEST(RimVoids, AreThoseThatAFloodFromTheRimFinds) {
     EXPECT_EQ(wrong_holes, 0);
     if (percent == 100) EXPECT_EQ(rim.regions(), 1u);
   }
+}
+
+TEST(RimVoids, SayHowFarTheyStayTheSame) {
+  std::mt19937 random(9);
+  std::vector<RimVoids::Run> runs;
+  for (std::int32_t row = 3; row < 60; ++row) {
+    const bool is_like_the_row_above = row > 3 && random() % 4 != 0;
+    for (std::size_t i = 0, count = runs.size(); is_like_the_row_above && i < count; ++i) {
+      if (runs[i].row == row - 1) runs.push_back({row, runs[i].first, runs[i].last, runs[i].region});
+    }
+    for (std::int32_t column = 0; !is_like_the_row_above && column < 50;) {
+      const auto length = static_cast<std::int32_t>(random() % 9);
+      if (random() % 2 == 0) runs.push_back({row, column, column + length, static_cast<std::uint32_t>(random() % 3)});
+      column += length + 2;
+    }
+  }
+  const RimVoids voids(runs, 3);
+  ASSERT_EQ(voids.Runs(), runs);
+  const auto brute = [&](std::int64_t column, std::int64_t row) -> std::optional<std::uint32_t> {
+    for (const RimVoids::Run& run : runs) {
+      if (run.row == row && run.first <= column && column <= run.last) return run.region;
+    }
+    return std::nullopt;
+  };
+  for (std::int64_t row = 0; row < 64; ++row) {
+    for (std::int64_t column = 0; column < 64; ++column) {
+      const RimVoids::Stretch found = voids.StretchAt(column, row);
+      ASSERT_EQ(found.region, brute(column, row)) << column << ' ' << row;
+      ASSERT_GE(found.last_column, column);
+      ASSERT_GE(found.last_row, row);
+      for (auto x = column; x <= std::min<std::int64_t>(found.last_column, 70); ++x)
+        ASSERT_EQ(brute(x, row), found.region);
+      for (auto y = row; y <= std::min<std::int64_t>(found.last_row, 70); ++y)
+        ASSERT_EQ(brute(column, y), found.region);
+    }
+  }
+}
+
+// Tens of thousands of rasters, of which the file stores a part: a run for each of their rows would take gigabytes.
+TEST(RimVoids, TakeMemoryForRowsThatDiffer) {
+  std::vector<std::uint8_t> voids(3600 * 3600, 1), holes;
+  for (std::size_t row = 2000; row < 2128; ++row) std::fill_n(&voids[row * 3600 + 1000], 128, 0);
+  const RimVoids rim = FindRimVoids(3600, 3600, voids, RimVoidFinder::kMostRuns, holes);
+  EXPECT_EQ(rim.Runs().size(), 3600u + 128u);
+  EXPECT_LT(rim.bytes(), 200u);
+  EXPECT_TRUE(rim.At(999, 2100) && rim.At(1128, 2100) && rim.At(1000, 1999) && rim.At(1000, 2128));
+  EXPECT_FALSE(rim.At(1000, 2100));
 }
 
 TEST(RimVoids, AreAllWhereTheyAreTooRagged) {

@@ -16,6 +16,7 @@
 #include "engine/dem/bound/sheet_tables.h"
 #include "engine/dem/common/all_cores.h"
 #include "engine/dem/mosaic/sheet.h"
+#include "engine/dem/mosaic/sheet_voids.h"
 #include "engine/dem/sources/raster_source.h"
 #include "tests/engine/dem/dem_fixture.h"
 
@@ -130,6 +131,110 @@ TEST(ManySources, AtTheRimOfAProjectionATileLooksAtItsOwnSources) {
   EXPECT_LE(most, 8U);
 }
 
+// kShift: of every other row of rasters to the east.
+constexpr int kSide = 40, kAcross = 4, kShift = 13, kStride = kAcross * kSide + kShift;
+
+// Rasters of kSide x kSide samples, kAcross x kAcross of them without those of `missing`, beside each other or, with
+// `shared` rows and columns, over each other's edges.
+std::vector<SheetMember> MakeMembers(const TempDir& dir, const std::vector<std::uint8_t>& missing, int shared,
+                                     const std::vector<std::uint8_t>& voids) {
+  std::vector<SheetMember> members;
+  for (int k = 0; k < kAcross * kAcross; ++k) {
+    if (missing[static_cast<std::size_t>(k)] != 0) continue;
+    const int left = k % kAcross * (kSide - shared) + k / kAcross % 2 * kShift, top = k / kAcross * (kSide - shared);
+    RasterSpec spec{.width = kSide, .height = kSide, .geo_transform = {left * 0.01, 0.01, 0, -top * 0.01, 0, -0.01}};
+    spec.nodata = -9999;
+    spec.value = [&, left, top](int c, int r) {
+      const bool is_void = voids[static_cast<std::size_t>((top + r) * kStride + left + c)] != 0;
+      return is_void ? -9999.0 : 100.0 + c + r;
+    };
+    auto raster = OpenRasterOrFail(WriteRaster(dir, spec, std::to_string(shared) + "-" + std::to_string(k) + ".tif"));
+    if (raster) members.push_back({std::move(raster), left, top});
+  }
+  return members;
+}
+
+BoxIndex IndexOfMembers(const std::vector<SheetMember>& members) {
+  std::vector<BoxIndex::Entry> entries;
+  for (std::size_t i = 0; i < members.size(); ++i) {
+    const geo::TileRange at = members[i].pixels();
+    entries.push_back({{double(at.start_x), double(at.start_y), double(at.end_x + 1), double(at.end_y + 1)}, i});
+  }
+  return BoxIndex(entries);
+}
+
+// Voids of all members that a flood from the places without a raster does not reach.
+std::vector<std::uint8_t> HolesByFlood(const std::vector<SheetMember>& members, const std::vector<std::uint8_t>& voids,
+                                       int side) {
+  std::vector<std::uint8_t> holes(voids.size());
+  std::vector<std::uint8_t> has(voids.size());
+  for (const SheetMember& member : members) {
+    for (std::int64_t y = member.row; y < member.row + kSide; ++y) {
+      for (std::int64_t x = member.column; x < member.column + kSide; ++x)
+        has[static_cast<std::size_t>(y * side + x)] = 1;
+    }
+  }
+  for (std::size_t i = 0; i < voids.size(); ++i) holes[i] = has[i] != 0 && voids[i] != 0 ? 1 : 0;
+  const auto is_outside = [&](int x, int y) {
+    return x < 0 || y < 0 || x >= side || y >= side || has[static_cast<std::size_t>(y * side + x)] == 0;
+  };
+  std::vector<std::pair<int, int>> queue;
+  const auto reach = [&](int x, int y) {
+    if (is_outside(x, y) || std::exchange(holes[static_cast<std::size_t>(y * side + x)], 0) == 0) return;
+    queue.emplace_back(x, y);
+  };
+  for (int y = -1; y <= side; ++y) {
+    for (int x = -1; x <= side; ++x) {
+      if (is_outside(x, y)) reach(x - 1, y), reach(x + 1, y), reach(x, y - 1), reach(x, y + 1);
+    }
+  }
+  for (std::size_t i = 0; i < queue.size(); ++i) {
+    const auto [x, y] = queue[i];
+    reach(x - 1, y), reach(x + 1, y), reach(x, y - 1), reach(x, y + 1);
+  }
+  return holes;
+}
+
+TEST(ManySources, VoidsThatGoOnInANeighbourAreThoseThatAFloodFinds) {
+  std::mt19937 random(11);
+  for (int round = 0; round < 12; ++round) {
+    SCOPED_TRACE(round);
+    const TempDir dir;
+    const int shared = round % 2;
+    std::vector<std::uint8_t> missing(kAcross * kAcross), voids(kStride * kStride);
+    for (std::uint8_t& m : missing) m = random() % 6 == 0 ? 1 : 0;
+    // Speckles, and boxes across the joints.
+    for (std::uint8_t& v : voids) v = random() % 100 < (round < 6 ? 45 : 5) ? 1 : 0;
+    for (int box = 0; box < 25; ++box) {
+      const int x = static_cast<int>(random() % (kStride - 20)), y = static_cast<int>(random() % (kStride - 20));
+      for (int r = y; r < y + 15; ++r) std::fill_n(&voids[static_cast<std::size_t>(r * kStride + x)], random() % 20, 1);
+    }
+    const std::vector<SheetMember> members = MakeMembers(dir, missing, shared, voids);
+    const BoxIndex index = IndexOfMembers(members);
+    const SheetVoids sheet(members, index, 0);
+    std::vector<float> heights(voids.size());
+    for (std::size_t i = 0; i < voids.size(); ++i) heights[i] = voids[i] != 0 ? SampleRules::kVoid : 0;
+    const auto found = sheet.HolesIn(members, index, 1, {0, 0, kStride, kStride}, kStride, heights);
+    const auto expected = HolesByFlood(members, voids, kStride);
+    int wrong = 0;
+    for (std::size_t i = 0; i < voids.size(); ++i) wrong += found[i] != expected[i];
+    EXPECT_EQ(wrong, 0);
+  }
+}
+
+// What thousands of rasters cost that are mostly not stored: not as much as their rims have pixels.
+TEST(ManySources, VoidsAreComparedAsOftenAsSomethingChangesAlongTheRims) {
+  const TempDir dir;
+  std::vector<std::uint8_t> voids(kStride * kStride, 1);
+  for (int y = 0; y < kAcross * kSide; y += kSide) {
+    for (int x = 0; x < kAcross * kSide; x += kSide) voids[static_cast<std::size_t>((y + 17) * kStride + x + 17)] = 0;
+  }
+  const auto members = MakeMembers(dir, std::vector<std::uint8_t>(kAcross * kAcross), 0, voids);
+  const SheetVoids sheet(members, IndexOfMembers(members), 0);
+  EXPECT_GT(sheet.looks(), 0u);
+  EXPECT_LE(sheet.looks(), members.size() * 40) << "160 pixels of a rim, with a neighbour each";
+}
+
 RasterSpec Rough(int side) {
   RasterSpec spec;
   spec.width = spec.height = side;
@@ -165,6 +270,35 @@ TEST(ManySources, PagedTablesSayWhatKeptOnesDo) {
   }
   EXPECT_GT(pages->paged_bytes(), 0U);
   EXPECT_EQ(kept->ReadBlocks(64, {3, 4, 5, 6}, {}).value(), paged.ReadBlocks(64, {3, 4, 5, 6}, {}).value());
+}
+
+// A shallow tile takes a few averages of each of hundreds of sources; their samples would take a minute.
+TEST(ManySources, ShallowTilesReadKeptAveragesOfASource) {
+  const TempDir dir, cache;
+  const std::string path = WriteRaster(dir, Rough(1500)), small = WriteRaster(dir, Rough(900), "small.tif");
+  const auto whole = OpenRasterOrFail(path);
+  for (const bool is_known : {false, true}) {
+    SCOPED_TRACE(is_known);
+    const auto kept = RasterSource::Open(path, {}, cache.path().string());
+    ASSERT_TRUE(kept.has_value()) << kept.error().message;
+    ASSERT_NE((*kept)->averages(), nullptr);
+    for (const int factor : {2, 4, 8, 16, 32, 64}) {
+      SCOPED_TRACE(factor);
+      const std::uint64_t before = (*kept)->averages()->bytes_read();
+      const int blocks = (1500 + factor - 1) / factor;
+      EXPECT_EQ((*kept)->ReadBlocks(factor, {0, 0, blocks, blocks}, {}).value(),
+                whole->ReadBlocks(factor, {0, 0, blocks, blocks}, {}).value());
+      const std::uint64_t bytes = (*kept)->averages()->bytes_read() - before;
+      if (factor < 8 || factor > 32) {
+        EXPECT_EQ(bytes, 0U);
+      } else {
+        EXPECT_GE(bytes, std::uint64_t{4} * static_cast<unsigned>(blocks * blocks));
+      }
+    }
+  }
+  const auto read_whole = RasterSource::Open(small, {}, cache.path().string());
+  ASSERT_TRUE(read_whole.has_value());
+  EXPECT_EQ((*read_whole)->averages(), nullptr);
 }
 
 TEST(ManySources, PagedTablesOfALostRecordAreMadeAgain) {
