@@ -30,12 +30,14 @@ SheetTables::SheetTables(const Sheet& sheet, const SheetTrace& trace, std::size_
 // a turn apart. Nodes without a position, as far away from the sheet, need no table.
 Box SheetTables::BoxAround(std::size_t stride) const {
   Box hull{1e300, 1e300, -1e300, -1e300};
+  if (sheet_.members().size() == 1) return hull;  // nobody asks which members are near
   double of_row = sheet_.columns() / 2.0, last = of_row;
   for (std::size_t n = 0; n < trace_.positions.size(); ++n) {
     if (n % stride == 0) last = of_row;
     const Position& p = trace_.positions[n];
     if (!std::isfinite(p.x) || !std::isfinite(p.y)) continue;
-    const double x = turn_ > 0 ? p.x + turn_ * std::round((last - p.x) / turn_) : p.x;
+    double x = p.x;
+    if (std::abs(x - last) > turn_ / 2 && turn_ > 0) x += turn_ * std::round((last - x) / turn_);
     if (n % stride == 0) of_row = x;
     last = x;
     hull = {std::min(hull.west, x), std::min(hull.south, p.y), std::max(hull.east, x), std::max(hull.north, p.y)};

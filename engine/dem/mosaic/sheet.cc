@@ -47,9 +47,9 @@ class InsideTest {
       : cover_(cover), index_(index), near_(index.Find(Grown(hull))) {}
 
   bool operator()(const Position& p) const {
-    if (std::isnan(p.x) || std::isnan(p.y)) return false;
     // Neighbours mostly lie in one box.
-    if (last_ && Holds(*last_, p)) return true;
+    if (Holds(last_, p)) return true;
+    if (std::isnan(p.x) || std::isnan(p.y)) return false;
     // Boxes reach farther than by the tolerance here: Holds decides.
     if (near_.size() <= kFewBoxes) return HoldsAny(near_, p);
     return HoldsAny(index_.Find(Grown({p.x, p.y, p.x, p.y})), p);
@@ -63,21 +63,25 @@ class InsideTest {
     constexpr double kHalo = 2 * kSheetEdgeTolerance;
     return {box.west - kHalo, box.south - kHalo, box.east + kHalo, box.north + kHalo};
   }
-  bool Holds(std::size_t block, const Position& p) const {
-    const Box box = BoxOf(cover_[block]);
-    return p.x >= box.west - kSheetEdgeTolerance && p.x <= box.east + kSheetEdgeTolerance &&
-           p.y >= box.south - kSheetEdgeTolerance && p.y <= box.north + kSheetEdgeTolerance;
+  static bool Holds(const Box& box, const Position& p) {
+    return p.x >= box.west && p.x <= box.east && p.y >= box.south && p.y <= box.north;
   }
   bool HoldsAny(const std::vector<std::size_t>& blocks, const Position& p) const {
-    const auto found = std::ranges::find_if(blocks, [&](std::size_t block) { return Holds(block, p); });
-    if (found != blocks.end()) last_ = *found;
-    return found != blocks.end();
+    for (const std::size_t block : blocks) {
+      const Box box = BoxOf(cover_[block]);
+      const Box reach{box.west - kSheetEdgeTolerance, box.south - kSheetEdgeTolerance, box.east + kSheetEdgeTolerance,
+                      box.north + kSheetEdgeTolerance};
+      if (!Holds(reach, p)) continue;
+      last_ = reach;
+      return true;
+    }
+    return false;
   }
 
   const std::vector<geo::TileRange>& cover_;
   const BoxIndex& index_;
   const std::vector<std::size_t> near_;
-  mutable std::optional<std::size_t> last_;
+  mutable Box last_{1, 1, 0, 0};  // as it begins: none
 };
 
 Result<Georeference> GeoreferenceOf(const SheetPlan& plan) {
