@@ -8,7 +8,7 @@
 #include <string>
 #include <system_error>
 
-#include "server/tiles/record_db.h"
+#include "server/store/record_db.h"
 
 namespace terrace::server {
 namespace {
@@ -18,17 +18,17 @@ constexpr std::size_t kOfIoThread = 3;
 // The listening socket, one that is kept back to refuse connections, signals (two), PROJ's database, and one for what
 // is opened in passing: the configuration, certificates, a message to systemd.
 constexpr std::size_t kOfServer = 6;
-constexpr std::size_t kLeastConnections = 4;
+constexpr std::size_t kMinConnections = 4;
 // Datasets that are opened beside what is served (Reloader).
 constexpr std::size_t kOpeners = 2;
 // A raster and its overviews, or a grid.
 constexpr std::size_t kOfSource = 2;
 // GDAL's own default.
-constexpr std::size_t kMostVrtParts = 100;
+constexpr std::size_t kMaxVrtParts = 100;
 
 // How many parts of VRTs: each thread may use one, or two where a VRT is made of VRTs, and fails without.
 std::size_t VrtParts(std::size_t open_sources, std::size_t threads) {
-  return std::max(std::min(open_sources, kMostVrtParts), 2 * threads);
+  return std::max(std::min(open_sources, kMaxVrtParts), 2 * threads);
 }
 
 }  // namespace
@@ -38,13 +38,13 @@ Result<DescriptorBudget> SplitDescriptors(const DescriptorDemand& demand, std::s
   const std::size_t server =
       kOfServer + kOfIoThread * demand.io_threads + (demand.access_log_file ? 1 : 0) + (demand.stores > 0 ? 1 : 0);
   const std::size_t of_stores = demand.stores * (RecordDb::kOtherDescriptors + RecordDb::kMinOpenFiles);
-  const std::size_t least = in_use + server + of_stores + threads + kLeastConnections;
+  const std::size_t least = in_use + server + of_stores + threads + kMinConnections;
   if (limit < least) {
     return MakeError(ErrorCode::kUnavailable,
                      "the limit on open files is {}, and this configuration takes {} at least: {} that are open "
                      "already, {} for the server itself, {} for the disk cache, {} for sources and {} for connections; "
                      "raise it (ulimit -n, LimitNOFILE= of systemd), or take fewer threads or no disk_cache",
-                     limit, least, in_use, server, of_stores, threads, kLeastConnections);
+                     limit, least, in_use, server, of_stores, threads, kMinConnections);
   }
   // A source's second descriptor, and the parts of VRTs without which a thread fails.
   const std::size_t beside = (kOfSource - 1) * threads + (demand.has_vrts ? VrtParts(0, threads) : 0);
@@ -52,12 +52,12 @@ Result<DescriptorBudget> SplitDescriptors(const DescriptorDemand& demand, std::s
   const std::size_t of_open_source = kOfSource + (demand.has_vrts ? 1 : 0);
   const std::size_t sources = of_open_source * demand.open_sources;
   const std::size_t files = demand.store_files - std::min(demand.store_files, RecordDb::kMinOpenFiles);
-  const std::size_t connections = demand.connections - std::min(demand.connections, kLeastConnections);
+  const std::size_t connections = demand.connections - std::min(demand.connections, kMinConnections);
   const std::size_t wanted = sources + demand.stores * files + connections;
   const auto share_of = [&](std::size_t count) { return left < wanted ? count * left / wanted : count; };
 
   DescriptorBudget budget;
-  budget.connections = std::min(demand.connections, kLeastConnections) + share_of(connections);
+  budget.connections = std::min(demand.connections, kMinConnections) + share_of(connections);
   budget.store_files = RecordDb::kMinOpenFiles + share_of(files);
   budget.open_sources = share_of(sources) / of_open_source;
   budget.vrt_parts = VrtParts(budget.open_sources, threads);

@@ -9,9 +9,6 @@
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
 #include <boost/asio/signal_set.hpp>
-#include <boost/asio/steady_timer.hpp>
-#include <boost/asio/this_coro.hpp>
-#include <boost/asio/use_awaitable.hpp>
 #include <condition_variable>
 #include <csignal>
 #include <functional>
@@ -20,15 +17,16 @@
 #include <thread>
 #include <utility>
 
-#include "server/handlers/metrics.h"
-#include "server/handlers/metrics_page.h"
-#include "server/handlers/routes.h"
-#include "server/handlers/static_files.h"
-#include "server/http/edge.h"
-#include "server/http/http_error.h"
-#include "server/http/io_threads.h"
+#include "server/api/tile_head.h"
+#include "server/application.h"
+#include "server/documents/static_files.h"
+#include "server/edge.h"
 #include "server/http/listener.h"
 #include "server/http/session.h"
+#include "server/net/io_threads.h"
+#include "server/routes.h"
+#include "server/telemetry/metrics.h"
+#include "server/telemetry/metrics_page.h"
 
 namespace terrace::server {
 namespace {
@@ -37,21 +35,11 @@ namespace {
 // Twice this is less than the second that stopping may take beyond the drain timeout.
 constexpr std::chrono::milliseconds kLastWords{400};
 
-// How long a request waits for a source that was replaced, and how often it looks.
-constexpr std::chrono::milliseconds kReplaceTime{3'000}, kReplacePeriod{20};
-// A source that is replaced again while it is opened cannot be opened for a moment; one that still cannot after this
-// time waits for a person.
-constexpr std::chrono::milliseconds kPassingTrouble{1'500};
-
-// A request for heights has a body of at most so many bytes, and so many for each location that it may name: two
-// numbers with all their digits, a form's three bytes for each separator.
-constexpr std::size_t kBodyBytes = 4096, kBytesPerLocation = 64;
-
 Result<void> CheckNames(const std::vector<DatasetView>& datasets) {
   std::set<std::string_view> names;
   for (const DatasetView& dataset : datasets) {
     if (dataset.name.empty()) return MakeError(ErrorCode::kInvalidArgument, "a dataset has no name; give it one");
-    if (IsReservedName(dataset.name) || dataset.name.find('/') != std::string::npos) {
+    if (Routes().IsReserved(dataset.name) || dataset.name.find('/') != std::string::npos) {
       return MakeError(ErrorCode::kInvalidArgument,
                        "dataset \"{}\": this name is taken by a URL of the server or holds a '/'; choose another",
                        dataset.name);
@@ -74,7 +62,16 @@ TileServiceOptions ServiceOptions(const ServerOptions& options) {
   service.queue_length = options.queue_length;
   service.cache_bytes = options.cache_bytes;
   service.disk = options.disk_cache;
+  service.write_head = MakeTileHead;
   return service;
+}
+
+HandlerOptions ForHandlers(const ServerOptions& options, std::size_t max_locations) {
+  HandlerOptions handlers;
+  handlers.cache_control = options.cache_control;
+  handlers.deadline = options.request_deadline;
+  handlers.max_locations = max_locations;
+  return handlers;
 }
 
 }  // namespace
@@ -86,15 +83,14 @@ class Server::Impl {
   Impl(CatalogPtr catalog, StaticFiles viewer, AccessLog access_log, std::unique_ptr<Edge> edge, ServerOptions options)
       : options_(std::move(options)),
         access_log_(std::move(access_log)),
-        viewer_(std::make_shared<const StaticFiles>(std::move(viewer))),
         edge_(std::move(edge)),
-        deadline_(options_.request_deadline),
         tiles_(ServiceOptions(options_), std::bind_front(&Metrics::CountBuild, &metrics_)),
         metrics_page_(
             [this] { return metrics_.Text(tiles_.stats(), RefinementStats(), SourceNumbers(), CurrentState()); },
             options_.metrics_age),
-        routes_(MakeRoutes(catalog ? catalog : std::make_shared<const Catalog>(), options_)),
-        opening_(catalog == nullptr),
+        application_({*edge_, tiles_, metrics_, metrics_page_, access_log_,
+                      std::make_shared<const StaticFiles>(std::move(viewer)), options_.on_source_changed},
+                     std::move(catalog), ForHandlers(options_, options_.max_locations)),
         io_(IoThreadCount(options_.io_threads)),
         signals_(io_.first()) {}
 
@@ -112,7 +108,7 @@ class Server::Impl {
     listener_ = std::move(*listener);
     WatchSignals();
     // On a held socket who comes before there is something to serve waits in its queue: a stop then loses nobody.
-    if (!opening_ || options_.listen_socket < 0) listener_->Start();
+    if (!application_.opening() || options_.listen_socket < 0) listener_->Start();
     if (edge_->tls) asio::co_spawn(io_.first(), WatchCertificate(edge_->tls.get()), asio::detached);
     io_.Start();
     stopper_ = std::thread([this] { StopWhenAsked(); });
@@ -120,28 +116,14 @@ class Server::Impl {
   }
 
   void Replace(CatalogPtr catalog, const ServerOptions& options) {
-    std::shared_ptr<const Routes> routes = MakeRoutes(catalog, options);
     tiles_.SetCacheBytes(options.cache_bytes);
-    deadline_.store(options.request_deadline, std::memory_order_relaxed);
-    bool is_first = false;
-    {
-      const std::lock_guard lock(state_mutex_);
-      routes_.swap(routes);
-      is_first = opening_.exchange(false);
-      if (!is_first) ++catalogs_;
-    }
+    const bool is_first = application_.Replace(catalog, ForHandlers(options, options_.max_locations));
     if (is_first && options_.listen_socket >= 0) listener_->Start();
     tiles_.RetainTilesOf(*catalog);
     metrics_.RetainDatasets(catalog->datasets);
   }
 
-  void SetTroubles(std::map<std::string, std::string> troubles) {
-    const std::lock_guard lock(state_mutex_);
-    const auto now = std::chrono::steady_clock::now();
-    std::erase_if(trouble_since_, [&](const auto& known) { return !troubles.contains(known.first); });
-    for (const auto& [dataset, trouble] : troubles) trouble_since_.try_emplace(dataset, now);
-    troubles_ = std::move(troubles);
-  }
+  void SetTroubles(std::map<std::string, std::string> troubles) { application_.SetTroubles(std::move(troubles)); }
 
   void ReopenAccessLog() { access_log_.Reopen(); }
 
@@ -230,103 +212,23 @@ class Server::Impl {
     });
   }
 
-  std::shared_ptr<const Routes> MakeRoutes(CatalogPtr catalog, const ServerOptions& options) {
-    TileHandlerOptions handler;
-    handler.cache_control = options.cache_control;
-    handler.deadline = options.request_deadline;
-    return std::make_shared<const Routes>(std::move(catalog), tiles_, viewer_, std::move(handler),
-                                          options_.max_locations, RouteState());
-  }
-
-  std::shared_ptr<const Routes> CurrentRoutes() const {
-    const std::lock_guard lock(state_mutex_);
-    return routes_;
-  }
-
-  bool HasLastingTrouble(const std::string& dataset) const {
-    const std::lock_guard lock(state_mutex_);
-    const auto since = trouble_since_.find(dataset);
-    return since != trouble_since_.end() && std::chrono::steady_clock::now() - since->second >= kPassingTrouble;
-  }
-
-  std::map<std::string, std::string> Troubles() const {
-    const std::lock_guard lock(state_mutex_);
-    return troubles_;
-  }
-
   Metrics::ServerState CurrentState() const {
     Metrics::ServerState state;
-    state.edge = edge_->stats();
-    const std::lock_guard lock(state_mutex_);
-    state.datasets = routes_->catalog().datasets.size();
-    state.troubles = troubles_.size();
-    state.catalogs = catalogs_;
+    state.connections = edge_->connections.size();
+    state.refused_connections = edge_->connections.refused();
+    state.transfers = edge_->transfers.stats();
+    state.datasets = application_.catalog()->datasets.size();
+    state.troubles = application_.troubles().size();
+    state.catalogs = application_.replaced();
     return state;
-  }
-
-  // What the first catalog has nothing to do with.
-  static bool IsOfProcess(RouteKind kind) {
-    return kind == RouteKind::kLive || kind == RouteKind::kReady || kind == RouteKind::kMetrics;
-  }
-
-  std::optional<Response> ServeAtOnce(const Route& route, const Request& request) const {
-    if (opening_.load(std::memory_order_acquire) && !IsOfProcess(route.kind)) return std::nullopt;
-    return CurrentRoutes()->ServeAtOnce(route, request);
-  }
-
-  // False: there was none in time, or will be none.
-  static asio::awaitable<bool> FirstCatalog(Impl* self) {
-    const auto give_up = std::chrono::steady_clock::now() + self->deadline_.load(std::memory_order_relaxed);
-    asio::steady_timer timer(co_await asio::this_coro::executor);
-    while (self->opening_.load(std::memory_order_acquire)) {
-      if (self->edge_->connections.draining() || std::chrono::steady_clock::now() >= give_up) co_return false;
-      timer.expires_after(kReplacePeriod);
-      co_await timer.async_wait(asio::use_awaitable);
-    }
-    co_return true;
-  }
-
-  // The request's frame keeps what it is answered from. Where that turns out to be gone, the next catalog answers.
-  static asio::awaitable<Response> Serve(Impl* self, Route route, Request request) {
-    const bool is_open = IsOfProcess(route.kind) || co_await FirstCatalog(self);
-    if (!is_open) {
-      Response response = ProblemResponse(503, "the sources are being opened", request.id);
-      response.headers.emplace_back("Retry-After", "5");
-      response.route = ToString(route.kind);
-      co_return response;
-    }
-    const auto give_up = std::chrono::steady_clock::now() + kReplaceTime;
-    for (;;) {
-      const std::shared_ptr<const Routes> routes = self->CurrentRoutes();
-      Request copy = request;
-      Response response = co_await routes->Serve(route, std::move(copy));
-      if (!response.source_changed || !self->options_.on_source_changed) co_return response;
-      self->options_.on_source_changed();
-      asio::steady_timer timer(co_await asio::this_coro::executor);
-      while (self->CurrentRoutes() == routes) {
-        const bool is_hopeless = self->edge_->connections.draining() || self->HasLastingTrouble(response.dataset);
-        if (is_hopeless || std::chrono::steady_clock::now() >= give_up) co_return response;
-        timer.expires_after(kReplacePeriod);
-        co_await timer.async_wait(asio::use_awaitable);
-      }
-    }
   }
 
   tiler::ByteCacheStats RefinementStats() const {
     return options_.refinement_stats ? options_.refinement_stats() : tiler::ByteCacheStats{};
   }
   SourceStats SourceNumbers() const {
-    const std::shared_ptr<const Routes> routes = CurrentRoutes();
-    return routes->catalog().source_stats ? routes->catalog().source_stats() : SourceStats{};
-  }
-
-  Routes::State RouteState() {
-    Routes::State state;
-    state.draining = [this] { return edge_->connections.draining(); };
-    state.opening = [this] { return opening_.load(std::memory_order_relaxed); };
-    state.troubles = [this] { return Troubles(); };
-    state.metrics_text = [this] { return metrics_page_.Get(); };
-    return state;
+    const CatalogPtr catalog = application_.catalog();
+    return catalog->source_stats ? catalog->source_stats() : SourceStats{};
   }
 
   std::shared_ptr<const SessionContext> Context() {
@@ -334,18 +236,11 @@ class Server::Impl {
     context->options.read = {options_.header_timeout, options_.idle_timeout, options_.min_read_rate};
     context->options.write_timeout = options_.write_timeout;
     context->options.min_rate = options_.min_read_rate;
-    context->options.max_body_bytes = kBodyBytes + kBytesPerLocation * options_.max_locations;
     context->options.drain_grace = DrainGrace();
-    context->quick_handler = std::bind_front(&Impl::ServeAtOnce, this);
-    context->handler = std::bind_front(&Impl::Serve, this);
-    context->observer = [this](const ReplyRecord& record) {
-      metrics_.CountReply(record);
-      access_log_.Write(record);
-    };
+    context->application = &application_;
     context->connections = &edge_->connections;
     context->transfers = &edge_->transfers;
-    context->deadline = &deadline_;
-    context->gate = &edge_->gate;
+    context->deadline = &application_.deadline();
     context->cors = edge_->cors;
     context->tls = edge_->tls.get();
     return context;
@@ -353,19 +248,11 @@ class Server::Impl {
 
   const ServerOptions options_;
   AccessLog access_log_;
-  const std::shared_ptr<const StaticFiles> viewer_;
   Metrics metrics_;
   const std::unique_ptr<Edge> edge_;  // jobs of workers hold bodies that count in it
-  std::atomic<std::chrono::milliseconds> deadline_;
   TileService tiles_;
   MetricsPage metrics_page_;
-  mutable std::mutex state_mutex_;
-  std::shared_ptr<const Routes> routes_;         // never null; guarded by state_mutex_
-  std::atomic<bool> opening_;                    // routes_ is empty still: the first catalog has not come
-  std::map<std::string, std::string> troubles_;  // by dataset; guarded by state_mutex_
-  // Since when, of the same datasets; guarded likewise.
-  std::map<std::string, std::chrono::steady_clock::time_point> trouble_since_;
-  std::uint64_t catalogs_ = 0;  // that have replaced one another; guarded by state_mutex_
+  TerrainApplication application_;
   IoThreads io_;
   asio::signal_set signals_;
   std::shared_ptr<Listener> listener_;

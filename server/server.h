@@ -15,8 +15,8 @@
 #include <string>
 
 #include "engine/core/result.h"
-#include "server/http/access_log.h"
-#include "server/http/edge_options.h"
+#include "server/api/edge_options.h"
+#include "server/telemetry/access_log.h"
 #include "server/tiles/catalog.h"
 #include "server/tiles/tile_service.h"
 

@@ -16,9 +16,10 @@ import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 
-# core <- {geo, tin} <- {dem, proto} <- tiler <- server, and core <- config <- server. In the server, asio.h stands below all and the
-# files of the folder itself, which put the rooms together, above all but the command line:
-# asio.h <- tiles <- http <- handlers <- server <- cli, and tiles <- reload <- cli.
+# core <- {geo, tin} <- {dem, proto} <- tiler <- server, and core <- config <- server. In the server, asio.h stands below
+# all, the files of the folder itself put the rooms together, and the command line is above all:
+# net <- http, which know no product; jobs; store, jobs <- tiles; {http, tiles} <- {telemetry, query} <- api <- documents
+# <- handlers <- server <- cli, and tiles <- reload <- cli.
 TIN = ["engine/tin/mesh", "engine/tin/scan", "engine/tin", "engine/tin/extended", "engine/tin/decimate"]
 GEOMETRY = ["engine/core", "engine/geo"] + TIN
 PROTO = ["proto", "proto/mesh", "proto/error", "proto/gltf", "proto/documents"]
@@ -30,6 +31,8 @@ DEM = ["engine/dem/dem_types.h", "engine/dem/common", "engine/dem/gdal", "engine
 DOORS = {"engine/dem/" + name for name in (
     "dem_types.h", "common/box_index.h", "crs/geodesic_path.h", "gdal/file_stamp.h", "gdal/gdal_settings.h", "gdal/source_policy.h",
     "image/imagery.h", "image/raster_colors.h", "image/water_raster.h", "sources/read_raster.h")}
+API = ENGINE + ["server/jobs", "server/net", "server/http", "server/store", "server/tiles", "server/telemetry", "server/query"]
+SERVER = API + ["server/api", "server/documents", "server/handlers"]
 ROOMS = {
     "engine/core": [],
     "engine/geo": ["engine/core"],
@@ -45,12 +48,19 @@ ROOMS = {
     "config": ["engine/core"],
     "tiler": GEOMETRY + ["engine/dem"] + PROTO,
     "server/asio.h": [],
-    "server/tiles": ENGINE,
-    "server/http": ENGINE + ["server/tiles"],
-    "server/handlers": ENGINE + ["server/tiles", "server/http"],
+    "server/jobs": ["engine/core", "server/asio.h"],
+    "server/net": ["engine/core", "server/asio.h"],
+    "server/http": ["engine/core", "server/asio.h", "server/net"],
+    "server/store": ["engine/core", "tiler"],
+    "server/tiles": ENGINE + ["server/jobs", "server/store"],
+    "server/telemetry": ENGINE + ["server/net", "server/http", "server/tiles", "server/jobs", "server/store"],
+    "server/query": ENGINE + ["server/http"],
+    "server/api": API,
+    "server/documents": API + ["server/api"],
+    "server/handlers": API + ["server/api", "server/documents"],
     "server/reload": ENGINE + ["server/tiles"],
-    "server": ENGINE + ["server/tiles", "server/http", "server/handlers"],
-    "server/cli": ENGINE + ["server/tiles", "server/http", "server/handlers", "server/reload", "server"],
+    "server": SERVER,
+    "server/cli": SERVER + ["server", "server/reload"],
 }
 
 # Library: which headers are its own, and which files may name them (regular expressions on paths). The first match counts.
@@ -69,13 +79,13 @@ LIBRARIES = [
     Library("libjpeg", r"jpeglib\.h", r"proto/.*\.cc"),
     Library("libwebp", r"webp/.*", r"proto/.*\.cc"),
     Library("meshoptimizer", r"meshoptimizer\.h", r"proto/.*\.cc"),
-    Library("RocksDB", r"rocksdb/.*", r"server/tiles/record_db\.cc"),
+    Library("RocksDB", r"rocksdb/.*", r"server/store/record_db\.cc"),
     Library("xxHash", r"xxhash\.h", r"(engine/dem|engine/tin|proto|tiler|server)/.*\.cc"),
     Library("spdlog", r"spdlog/.*", r"(engine/dem|server)/.*\.cc"),
     Library("Beast", r"boost/beast.*", r"server/http/request\.cc"),
-    Library("OpenSSL", r"openssl/.*|boost/asio/ssl.*", r"(config/token_hash|server/http/.*)\.cc"),
+    Library("OpenSSL", r"openssl/.*|boost/asio/ssl.*", r"(config/token_hash|server/net/.*)\.cc"),
     Library("Boost.Geometry", r"boost/geometry/.*", r"engine/dem/.*\.cc"),
-    Library("Boost.JSON", r"boost/json.*", r"server/http/json_parameters\.cc"),
+    Library("Boost.JSON", r"boost/json.*", r"server/query/json_parameters\.cc"),
     Library("Boost", r"boost/.*", r"server/"),
     Library("CLI11", r"CLI/.*", r"server/cli/"),
     Library("systemd", r"systemd/.*", r"server/cli/.*\.cc"),
@@ -197,13 +207,15 @@ class SelfTest(unittest.TestCase):
             "engine/geo/key.h": '#include "engine/core/result.h"\n',
             "engine/dem/source.h": '#include "engine/geo/key.h"\n#include <stop_token>\n',
             "server/tiles/pipeline.h": '#include "engine/dem/source.h"\n',
-            "server/http/router.cc": '#include "server/tiles/pipeline.h"\n',
+            "server/api/router.cc": '#include "server/tiles/pipeline.h"\n',
         })
 
     def test_arrows_refused(self):
         for user, used in (("engine/core", "engine/geo"), ("engine/tin", "engine/geo"), ("engine/geo", "engine/tin"),
                            ("proto", "engine/dem"), ("engine/dem", "proto"), ("config", "engine/geo"), ("engine/tin", "server/tiles"),
-                           ("server/tiles", "server/http"), ("server/http", "server/handlers"), ("server/handlers", "server/cli"),
+                           ("server/tiles", "server/http"), ("server/http", "server/tiles"), ("server/http", "tiler"), ("server/http", "server/api"),
+                           ("server/jobs", "server/tiles"), ("server/jobs", "tiler"), ("server/net", "server/http"), ("server/api", "server/handlers"),
+                           ("server/handlers", "server/cli"),
                            ("server/tiles", "server")):
             with self.subTest(user=user, used=used):
                 self.assert_refused({f"{used}/b.h": "", f"{user}/a.cc": f'#include "{used}/b.h"\n'}, f"{user} may not know {used}")
@@ -246,7 +258,7 @@ class SelfTest(unittest.TestCase):
         self.assert_clean({
             "server/asio.h": "#include <boost/asio/awaitable.hpp>\n",
             "server/tiles/service.h": '#include "server/asio.h"\n',
-            "server/http/router.h": '#include "server/tiles/service.h"\n',
+            "server/api/router.h": '#include "server/tiles/service.h"\n',
         })
 
     def test_unknown_library(self):

@@ -6,7 +6,7 @@
 #include <string>
 #include <thread>
 
-#include "server/tiles/record_db.h"
+#include "server/store/record_db.h"
 
 namespace terrace::cli {
 namespace {

@@ -15,7 +15,7 @@
 #include <string_view>
 #include <utility>
 
-#include "server/http/line_writer.h"
+#include "server/telemetry/line_writer.h"
 
 namespace terrace::cli {
 namespace {

@@ -39,7 +39,7 @@
 #include "server/memory_trimmer.h"
 #include "server/reload/reloader.h"
 #include "server/server.h"
-#include "server/tiles/disk_cache.h"
+#include "server/store/disk_cache.h"
 #include "server/tiles/pipeline_catalog.h"
 #include "tiler/encoder_version.h"
 #include "tiler/tile_pipeline.h"

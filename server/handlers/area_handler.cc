@@ -10,12 +10,13 @@
 #include <utility>
 
 #include "proto/error_text.h"
-#include "server/handlers/backend_failure.h"
+#include "server/api/backend_failure.h"
+#include "server/api/negotiate.h"
+#include "server/api/tile_head.h"
+#include "server/handlers/tile_handler.h"
 #include "server/http/http_error.h"
-#include "server/http/negotiate.h"
-#include "server/http/query.h"
 #include "server/http/text.h"
-#include "server/tiles/tile_head.h"
+#include "server/query/query.h"
 #include "tiler/strong_etag.h"
 
 namespace terrace::server {
@@ -125,45 +126,54 @@ Result<tiler::AreaRequest> ParseAreaRequest(std::string_view query) {
   return area;
 }
 
-AreaHandler::AreaHandler(CatalogPtr catalog, TileService& tiles, TileHandlerOptions options)
+AreaHandler::AreaHandler(CatalogPtr catalog, TileService& tiles, HandlerOptions options)
     : catalog_(std::move(catalog)), tiles_(tiles), options_(std::move(options)) {}
 
-asio::awaitable<Response> AreaHandler::Handle(Route route, Request request) const {
-  const Result<std::uint32_t> dataset = FindDataset(route.dataset, catalog_->datasets);
-  if (!dataset) co_return ClientErrorResponse(dataset.error(), request.id);
-  const Result<tiler::AreaRequest> area = ParseAreaRequest(route.query);
-  if (!area) co_return ClientErrorResponse(area.error(), request.id);
+Answer AreaHandler::Handle(const Call& call) const {
+  const Request& request = *call.request;
+  const Result<std::uint32_t> dataset = FindDataset(call.route.dataset, catalog_->datasets);
+  if (!dataset) return ClientErrorResponse(dataset.error(), request.id);
+  const Result<tiler::AreaRequest> area = ParseAreaRequest(call.route.query);
+  if (!area) return ClientErrorResponse(area.error(), request.id);
   const Result<tiler::AreaPlan> plan = catalog_->area_mesher.plan(*dataset, *area);
-  if (!plan) co_return ClientErrorResponse(plan.error(), request.id);
+  if (!plan) return ClientErrorResponse(plan.error(), request.id);
 
+  const DatasetView& view = catalog_->datasets[*dataset];
   const tiler::Coding coding = NegotiateCoding(request.fields->accept_encoding);
   Response response;
   response.content_type = ContentTypeOf(area->format);
-  response.coding = coding;
-  response.etag = tiler::RequestETag("mesh", catalog_->datasets[*dataset].name, catalog_->datasets[*dataset].generation,
-                                     route.query, coding);
+  response.content_encoding = tiler::NameOf(coding);
+  response.etag = tiler::RequestETag("mesh", view.name, view.generation, call.route.query, coding);
   response.cache_control = options_.cache_control;
   response.vary = true;
-  if (MatchesEtag(request.fields->if_none_match, response.etag)) co_return Conditional(std::move(response), request);
+  if (MatchesEtag(request.fields->if_none_match, response.etag)) return Conditional(std::move(response), request);
+  return Build(call, *dataset, *area, *plan, coding, std::move(response));
+}
 
-  SingleFlight::Work work = [catalog = catalog_, index = *dataset, area = *area, plan = *plan,
-                             coding](std::stop_token stop) -> Result<tiler::EncodedTile> {
-    Result<tiler::EncodedTile> mesh = catalog->area_mesher.build(index, plan, area, stop);
-    if (!mesh || coding == tiler::Coding::kIdentity) return mesh;
+// `response`: all but what the mesh says.
+asio::awaitable<Response> AreaHandler::Build(const Call& call, std::uint32_t dataset, tiler::AreaRequest area,
+                                             tiler::AreaPlan plan, tiler::Coding coding, Response response) const {
+  Work<tiler::EncodedTile> work = [catalog = catalog_, dataset, area, plan, coding, asked = TileService::Clock::now()](
+                                      std::stop_token stop) -> Result<tiler::EncodedTile> {
+    const std::chrono::microseconds queued = tiler::MicrosecondsSince(asked);
+    Result<tiler::EncodedTile> mesh = catalog->area_mesher.build(dataset, plan, area, stop);
+    if (!mesh) return mesh;
+    mesh->times.queue = queued;
+    if (coding == tiler::Coding::kIdentity) return mesh;
     mesh->bytes = tiler::Compress(std::move(mesh->bytes), coding, stop);
     if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the mesh any more");
     return mesh;
   };
   const auto deadline = TileService::Clock::now() + options_.deadline;
-  const Result<tiler::TilePtr> mesh =
-      co_await tiles_.Run(std::move(work), TileService::Length::kLong, deadline, request.client);
-  if (!mesh) co_return co_await BackendFailure(mesh.error(), std::string(request.id), options_.refusal_delay);
-  response.body = Body(*mesh, &(*mesh)->bytes);
-  response.headers.emplace_back("Terrain-Max-Error", proto::FormatErrorUp((*mesh)->max_error_m));
-  if (area->coordinates == tiler::AreaCoordinates::kEnu) {
-    response.headers.emplace_back("Terrain-Origin", FormatOrigin(plan->centre));
+  Result<tiler::EncodedTile> mesh =
+      co_await tiles_.Run(std::move(work), TileService::Length::kLong, deadline, call.request->client);
+  if (!mesh) co_return co_await BackendFailure(mesh.error(), call.request->id, options_.refusal_delay);
+  response.headers.emplace_back("Terrain-Max-Error", proto::FormatErrorUp(mesh->max_error_m));
+  if (area.coordinates == tiler::AreaCoordinates::kEnu) {
+    response.headers.emplace_back("Terrain-Origin", FormatOrigin(plan.centre));
   }
-  response.headers.emplace_back("Server-Timing", FormatServerTiming(CacheStatus::kMiss, (*mesh)->times));
+  response.headers.emplace_back("Server-Timing", FormatServerTiming(CacheStatus::kMiss, mesh->times));
+  response.body = std::make_shared<const std::string>(std::move(mesh->bytes));
   co_return response;
 }
 

@@ -1,14 +1,15 @@
 // GET /{dataset}/mesh
 #pragma once
 
+#include <cstdint>
 #include <string_view>
 
 #include "engine/core/result.h"
+#include "server/api/call.h"
+#include "server/api/handler_options.h"
 #include "server/asio.h"
-#include "server/handlers/tile_handler.h"
-#include "server/http/request.h"
+#include "server/http/application.h"
 #include "server/http/response.h"
-#include "server/http/router.h"
 #include "server/tiles/catalog.h"
 #include "server/tiles/tile_service.h"
 #include "tiler/area/area_mesh.h"
@@ -18,15 +19,17 @@ namespace terrace::server {
 class AreaHandler {
  public:
   // `tiles`, whose workers mesh the areas, must outlive this.
-  AreaHandler(CatalogPtr catalog, TileService& tiles, TileHandlerOptions options);
+  AreaHandler(CatalogPtr catalog, TileService& tiles, HandlerOptions options);
 
-  // Precondition: a kMesh route.
-  asio::awaitable<Response> Handle(Route route, Request request) const;
+  Answer Handle(const Call& call) const;
 
  private:
+  asio::awaitable<Response> Build(const Call& call, std::uint32_t dataset, tiler::AreaRequest area,
+                                  tiler::AreaPlan plan, tiler::Coding coding, Response response) const;
+
   const CatalogPtr catalog_;
   TileService& tiles_;
-  const TileHandlerOptions options_;
+  const HandlerOptions options_;
 };
 
 // `bbox=west,south,east,north` and `error=METRES`, both needed; `format=glb|obj|ply`,

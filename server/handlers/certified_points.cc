@@ -28,11 +28,11 @@ Result<CertifiedPoints> TilesOf(const DatasetView& dataset, std::span<const dem:
     while (level > 0 && !IsAvailable(dataset, key)) key = TileAt(point, --level);
     auto known = std::ranges::find(certified.tiles, key);
     if (known == certified.tiles.end()) {
-      if (certified.tiles.size() == kMostCertifiedTiles) {
+      if (certified.tiles.size() == kMaxCertifiedTiles) {
         return MakeError(ErrorCode::kInvalidArgument,
                          "certify: the points lie in more than {} tiles, which is the most this server certifies at "
                          "once; ask for fewer points, or for a shallower level",
-                         kMostCertifiedTiles);
+                         kMaxCertifiedTiles);
       }
       known = certified.tiles.insert(certified.tiles.end(), key);
     }

@@ -15,7 +15,7 @@
 namespace terrace::server {
 
 // Each is built where no cache has it.
-inline constexpr std::size_t kMostCertifiedTiles = 64;
+inline constexpr std::size_t kMaxCertifiedTiles = 64;
 
 struct CertifiedPoints {
   std::vector<geo::TileKey> tiles;              // each once
@@ -24,7 +24,7 @@ struct CertifiedPoints {
 };
 
 // Of each point the deepest tile that there is, down to `deepest`. kInvalidArgument, with a message for the client:
-// more than kMostCertifiedTiles. kCancelled: a stop was requested.
+// more than kMaxCertifiedTiles. kCancelled: a stop was requested.
 Result<CertifiedPoints> TilesOf(const DatasetView& dataset, std::span<const dem::GeoPosition> points, int deepest,
                                 const std::stop_token& stop = {});
 

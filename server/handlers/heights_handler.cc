@@ -9,9 +9,10 @@
 #include <utility>
 
 #include "proto/error_text.h"
-#include "server/handlers/backend_failure.h"
+#include "server/api/backend_failure.h"
+#include "server/api/negotiate.h"
+#include "server/handlers/tile_handler.h"
 #include "server/http/http_error.h"
-#include "server/http/negotiate.h"
 #include "tiler/strong_etag.h"
 
 namespace terrace::server {
@@ -29,46 +30,49 @@ constexpr std::size_t kStopPeriod = 1024;
 
 }  // namespace
 
-HeightsHandler::HeightsHandler(CatalogPtr catalog, TileService& tiles, TileHandlerOptions options,
-                               std::size_t max_locations)
-    : catalog_(std::move(catalog)), tiles_(tiles), options_(std::move(options)), max_locations_(max_locations) {}
+HeightsHandler::HeightsHandler(CatalogPtr catalog, TileService& tiles, HandlerOptions options)
+    : catalog_(std::move(catalog)), tiles_(tiles), options_(std::move(options)) {}
 
-asio::awaitable<Result<HeightsQuery>> HeightsHandler::ParseAside(const Route& route, const Request& request,
-                                                                 TileService::Clock::time_point deadline) const {
-  // Two corners of a path may have thousands of points between them.
-  const bool may_be_path = route.query.find("path") != std::string::npos;
-  if (request.method != Method::kPost && route.query.size() <= kQuickQuery && !may_be_path) {
-    const HeightsInput input{route.query, {}, {}};
-    co_return ParseHeights(input, max_locations_);
+Answer HeightsHandler::Handle(const Call& call) const {
+  const Request& request = *call.request;
+  if (request.method == Method::kPost && !IsHeightsBody(request.fields->content_type)) {
+    return ProblemResponse(415, "the body's Content-Type must be application/json or application/x-www-form-urlencoded",
+                           request.id);
   }
-  const auto parsed = std::make_shared<Result<HeightsQuery>>();
-  const std::string_view type = request.method == Method::kPost ? request.fields->content_type : std::string_view();
-  SingleFlight::Work parse = [parsed, query = route.query, type = std::string(type), body = request.body,
-                              most = max_locations_](const std::stop_token& stop) -> Result<tiler::EncodedTile> {
-    *parsed = ParseHeights({query, type, body}, most, stop);
-    return tiler::EncodedTile();
-  };
-  const Result<tiler::TilePtr> done =
-      co_await tiles_.Run(std::move(parse), TileService::Length::kShort, deadline, request.client);
-  if (!done) co_return tl::unexpected(done.error());
-  co_return std::move(*parsed);
+  const Result<std::uint32_t> dataset = FindDataset(call.route.dataset, catalog_->datasets);
+  if (!dataset) return ClientErrorResponse(dataset.error(), request.id);
+  return Read(call, *dataset);
 }
 
-asio::awaitable<Response> HeightsHandler::Handle(Route route, Request request) const {
+asio::awaitable<Result<HeightsQuery>> HeightsHandler::ParseAside(const Call& call,
+                                                                 TileService::Clock::time_point deadline) const {
+  const Request& request = *call.request;
+  const std::string& query = call.route.query;
   const bool is_post = request.method == Method::kPost;
-  if (is_post && !IsHeightsBody(request.fields->content_type)) {
-    co_return ProblemResponse(
-        415, "the body's Content-Type must be application/json or application/x-www-form-urlencoded", request.id);
+  // Two corners of a path may have thousands of points between them.
+  const bool may_be_path = query.find("path") != std::string::npos;
+  if (!is_post && query.size() <= kQuickQuery && !may_be_path) {
+    const HeightsInput input{query, {}, {}};
+    co_return ParseHeights(input, options_.max_locations);
   }
-  const Result<std::uint32_t> dataset = FindDataset(route.dataset, catalog_->datasets);
-  if (!dataset) co_return ClientErrorResponse(dataset.error(), request.id);
+  const std::string_view type = is_post ? request.fields->content_type : std::string_view();
+  Work<HeightsQuery> parse = [query, type = std::string(type), body = request.body,
+                              most = options_.max_locations](const std::stop_token& stop) {
+    return ParseHeights({query, type, body}, most, stop);
+  };
+  co_return co_await tiles_.Run(std::move(parse), TileService::Length::kShort, deadline, request.client);
+}
+
+asio::awaitable<Response> HeightsHandler::Read(const Call& call, std::uint32_t dataset) const {
+  const Request& request = *call.request;
+  const DatasetView& view = catalog_->datasets[dataset];
   const auto deadline = TileService::Clock::now() + options_.deadline;
-  Result<HeightsQuery> parsed = co_await ParseAside(route, request, deadline);
+  Result<HeightsQuery> parsed = co_await ParseAside(call, deadline);
   if (!parsed && parsed.error().code != ErrorCode::kInvalidArgument) {
-    co_return co_await BackendFailure(parsed.error(), std::string(request.id), options_.refusal_delay);
+    co_return co_await BackendFailure(parsed.error(), request.id, options_.refusal_delay);
   }
   if (!parsed) co_return ClientErrorResponse(parsed.error(), request.id);
-  if (parsed->datum == dem::HeightDatum::kOrthometric && !catalog_->datasets[*dataset].has_datum) {
+  if (parsed->datum == dem::HeightDatum::kOrthometric && !view.has_datum) {
     const Error unknown{
         ErrorCode::kInvalidArgument,
         "datum: it is not known what this dataset's heights count from, so there are no orthometric ones"};
@@ -78,46 +82,46 @@ asio::awaitable<Response> HeightsHandler::Handle(Route route, Request request) c
   const tiler::Coding coding = NegotiateCoding(request.fields->accept_encoding);
   Response response;
   response.content_type = "application/json";
-  response.coding = coding;
+  response.content_encoding = tiler::NameOf(coding);
   response.vary = true;
   response.cache_control = "no-store";
-  if (!is_post) {
+  if (request.method != Method::kPost) {
     response.cache_control = options_.cache_control;
     // Certified errors are the program's, not only the data's.
     if (!parsed->certify_level) {
-      response.etag = tiler::RequestETag("heights", catalog_->datasets[*dataset].name,
-                                         catalog_->datasets[*dataset].generation, route.query, coding);
+      response.etag = tiler::RequestETag("heights", view.name, view.generation, call.route.query, coding);
     }
     if (MatchesEtag(request.fields->if_none_match, response.etag)) co_return Conditional(std::move(response), request);
   }
 
   std::shared_ptr<const CertifiedPoints> certified;
   if (parsed->certify_level) {
-    Result<CertifiedPoints> known = co_await Certify(*dataset, *parsed, deadline, request.client);
+    Result<CertifiedPoints> known = co_await Certify(dataset, *parsed, deadline, request.client);
     if (!known && known.error().code == ErrorCode::kInvalidArgument) {
       co_return ClientErrorResponse(known.error(), request.id);
     }
-    if (!known) co_return co_await BackendFailure(known.error(), std::string(request.id), options_.refusal_delay);
+    if (!known) co_return co_await BackendFailure(known.error(), request.id, options_.refusal_delay);
     certified = std::make_shared<const CertifiedPoints>(*std::move(known));
   }
+  const auto length = parsed->points.size() > kShortList ? TileService::Length::kLong : TileService::Length::kShort;
   auto query = std::make_shared<const HeightsQuery>(*std::move(parsed));
-  SingleFlight::Work work = [catalog = catalog_, index = *dataset, coding, query,
-                             certified](std::stop_token stop) -> Result<tiler::EncodedTile> {
+  Work<Made> work = [catalog = catalog_, dataset, coding, query, certified,
+                     asked = TileService::Clock::now()](const std::stop_token& stop) -> Result<Made> {
+    Made made;
+    made.times.queue = tiler::MicrosecondsSince(asked);
     const auto begun = TileService::Clock::now();
-    const Result<PointHeights> heights = catalog->read_points(index, query->points, query->datum, stop);
+    const Result<PointHeights> heights = catalog->read_points(dataset, query->points, query->datum, stop);
     if (!heights) return tl::unexpected(heights.error());
-    tiler::EncodedTile reply;
-    reply.times.read = std::chrono::duration_cast<std::chrono::microseconds>(TileService::Clock::now() - begun);
-    reply.bytes = HeightsJson(*query, *heights, catalog->datasets[index].name, certified.get(), stop);
-    reply.bytes = tiler::Compress(std::move(reply.bytes), coding, stop);
+    made.times.read = tiler::MicrosecondsSince(begun);
+    made.bytes = HeightsJson(*query, *heights, catalog->datasets[dataset].name, certified.get(), stop);
+    made.bytes = tiler::Compress(std::move(made.bytes), coding, stop);
     if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the heights any more");
-    return reply;
+    return made;
   };
-  const auto length = query->points.size() > kShortList ? TileService::Length::kLong : TileService::Length::kShort;
-  const Result<tiler::TilePtr> reply = co_await tiles_.Run(std::move(work), length, deadline, request.client);
-  if (!reply) co_return co_await BackendFailure(reply.error(), std::string(request.id), options_.refusal_delay);
-  response.body = Body(*reply, &(*reply)->bytes);
-  response.headers.emplace_back("Server-Timing", FormatServerTiming(CacheStatus::kMiss, (*reply)->times));
+  Result<Made> made = co_await tiles_.Run(std::move(work), length, deadline, request.client);
+  if (!made) co_return co_await BackendFailure(made.error(), request.id, options_.refusal_delay);
+  response.body = std::make_shared<const std::string>(std::move(made->bytes));
+  response.headers.emplace_back("Server-Timing", FormatServerTiming(CacheStatus::kMiss, made->times));
   co_return response;
 }
 
@@ -125,28 +129,29 @@ asio::awaitable<Result<CertifiedPoints>> HeightsHandler::Certify(std::uint32_t d
                                                                  TileService::Clock::time_point deadline,
                                                                  std::uint64_t client) const {
   // On a worker: of a mosaic with thousands of blocks it takes time to find the tiles of thousands of points.
-  auto found = std::make_shared<CertifiedPoints>();
-  SingleFlight::Work find = [catalog = catalog_, dataset, wanted = query.points, level = *query.certify_level,
-                             found](const std::stop_token& stop) -> Result<tiler::EncodedTile> {
-    Result<CertifiedPoints> tiles = TilesOf(catalog->datasets[dataset], wanted, level, stop);
-    if (!tiles) return tl::unexpected(tiles.error());
-    *found = *std::move(tiles);
-    return tiler::EncodedTile();
+  Work<CertifiedPoints> find = [catalog = catalog_, dataset, wanted = query.points,
+                                level = *query.certify_level](const std::stop_token& stop) {
+    return TilesOf(catalog->datasets[dataset], wanted, level, stop);
   };
-  const Result<tiler::TilePtr> done =
-      co_await tiles_.Run(std::move(find), TileService::Length::kShort, deadline, client);
-  if (!done) co_return tl::unexpected(done.error());
-  CertifiedPoints points = std::move(*found);
-  for (std::size_t i = 0; i < points.tiles.size(); ++i) {
+  Result<CertifiedPoints> points = co_await tiles_.Run(std::move(find), TileService::Length::kShort, deadline, client);
+  if (!points) co_return points;
+  for (std::size_t i = 0; i < points->tiles.size(); ++i) {
     tiler::TileRequest tile;
     tile.dataset = dataset;
-    tile.key = points.tiles[i];
+    tile.key = points->tiles[i];
     tile.coding = tiler::Coding::kGzip;  // the form that a cache most probably has
-    const Result<ServedTile> served = co_await tiles_.Get(catalog_, tile, deadline, client);
+    const Result<ServedTile> served = co_await TileOf(tile, deadline, client);
     if (!served) co_return tl::unexpected(served.error());
-    points.errors_m[i] = served->tile->certified_error_m;
+    points->errors_m[i] = served->tile->certified_error_m;
   }
   co_return points;
+}
+
+asio::awaitable<Result<ServedTile>> HeightsHandler::TileOf(tiler::TileRequest tile,
+                                                           TileService::Clock::time_point deadline,
+                                                           std::uint64_t client) const {
+  if (std::optional<ServedTile> found = tiles_.Find(*catalog_, tile)) co_return *std::move(found);
+  co_return co_await tiles_.Build(catalog_, tile, deadline, client);
 }
 
 std::string HeightsJson(const HeightsQuery& query, const PointHeights& known, std::string_view dataset,

@@ -1,19 +1,19 @@
 // GET and POST /{dataset}/heights
 #pragma once
 
-#include <cstddef>
+#include <cstdint>
 #include <span>
 #include <stop_token>
 #include <string>
 #include <string_view>
 
+#include "server/api/call.h"
+#include "server/api/handler_options.h"
 #include "server/asio.h"
 #include "server/handlers/certified_points.h"
-#include "server/handlers/heights_query.h"
-#include "server/handlers/tile_handler.h"
-#include "server/http/request.h"
+#include "server/http/application.h"
 #include "server/http/response.h"
-#include "server/http/router.h"
+#include "server/query/heights_query.h"
 #include "server/tiles/catalog.h"
 #include "server/tiles/tile_service.h"
 
@@ -22,23 +22,29 @@ namespace terrace::server {
 class HeightsHandler {
  public:
   // `tiles`, whose workers read the heights, must outlive this.
-  HeightsHandler(CatalogPtr catalog, TileService& tiles, TileHandlerOptions options, std::size_t max_locations);
+  HeightsHandler(CatalogPtr catalog, TileService& tiles, HandlerOptions options);
 
-  // Precondition: a kHeights route.
-  asio::awaitable<Response> Handle(Route route, Request request) const;
+  Answer Handle(const Call& call) const;
 
  private:
-  // Fills in the errors of tiles, one after the other, from the cache or by building them.
+  // One job's answer.
+  struct Made {
+    std::string bytes;  // in its coding
+    tiler::StageTimes times;
+  };
+
+  asio::awaitable<Response> Read(const Call& call, std::uint32_t dataset) const;
+  // On a worker, unless it is certain to be quick.
+  asio::awaitable<Result<HeightsQuery>> ParseAside(const Call& call, TileService::Clock::time_point deadline) const;
+  // The errors of the points' tiles, one after the other, from the cache or by building them.
   asio::awaitable<Result<CertifiedPoints>> Certify(std::uint32_t dataset, const HeightsQuery& query,
                                                    TileService::Clock::time_point deadline, std::uint64_t client) const;
-  // On a worker, unless it is certain to be quick.
-  asio::awaitable<Result<HeightsQuery>> ParseAside(const Route& route, const Request& request,
-                                                   TileService::Clock::time_point deadline) const;
+  asio::awaitable<Result<ServedTile>> TileOf(tiler::TileRequest tile, TileService::Clock::time_point deadline,
+                                             std::uint64_t client) const;
 
   const CatalogPtr catalog_;
   TileService& tiles_;
-  const TileHandlerOptions options_;
-  const std::size_t max_locations_;
+  const HandlerOptions options_;
 };
 
 // {"results":[{"elevation","location":{"lat","lng"},"dataset"}],"status":"OK"}, as Open Topo Data replies; points of a

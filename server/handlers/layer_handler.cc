@@ -5,9 +5,9 @@
 #include <utility>
 
 #include "proto/documents/layer_json.h"
+#include "server/api/negotiate.h"
 #include "server/handlers/datasets_handler.h"
 #include "server/http/http_error.h"
-#include "server/http/negotiate.h"
 
 namespace terrace::server {
 namespace {
@@ -37,20 +37,20 @@ std::string WriteLayer(const DatasetView& dataset, std::string tile_query, const
 
 }  // namespace
 
-std::string TileQuery(const ErrorWish& wish) {
-  if (wish.error_m) return fmt::format("error={}&atleast=1", Print(*wish.error_m));
-  if (wish.fraction) return fmt::format("fraction={}", Print(*wish.fraction));
+std::string TileQuery(const RequestedError& requested) {
+  if (requested.error_m) return fmt::format("error={}&atleast=1", Print(*requested.error_m));
+  if (requested.fraction) return fmt::format("fraction={}", Print(*requested.fraction));
   return {};
 }
 
-const Grant* GrantInQuery(const Request& request) {
-  const bool has_name = request.grant && !request.grant->name.empty();
-  return request.token_in_query && has_name ? request.grant.get() : nullptr;
+const Grant* GrantInQuery(const Call& call) {
+  const bool has_name = call.grant && !call.grant->name.empty();
+  return call.token_in_query && has_name ? call.grant.get() : nullptr;
 }
 
-std::string WithToken(std::string query, const Request& request) {
-  if (GrantInQuery(request) == nullptr) return query;
-  return query + (query.empty() ? "" : "&") + "token=" + PercentEncode(request.token);
+std::string WithToken(std::string query, const Call& call) {
+  if (GrantInQuery(call) == nullptr) return query;
+  return query + (query.empty() ? "" : "&") + "token=" + PercentEncode(call.token);
 }
 
 LayerHandler::LayerHandler(std::span<const DatasetView> datasets, std::string cache_control)
@@ -58,15 +58,15 @@ LayerHandler::LayerHandler(std::span<const DatasetView> datasets, std::string ca
   for (const DatasetView& dataset : datasets_) plain_.push_back(Document::Make(WriteLayer(dataset, ""), kJson));
 }
 
-Answer LayerHandler::Handle(const Route& route, const Request& request) const {
-  const Result<std::uint32_t> dataset = FindDataset(route.dataset, datasets_);
-  if (!dataset) return ClientErrorResponse(dataset.error(), request.id);
-  const Result<TileParameters> parameters = ParseTileParameters(route.query, /*allow_at_least=*/false);
-  if (!parameters) return ClientErrorResponse(parameters.error(), request.id);
-  std::string tile_query = WithToken(TileQuery(parameters->wish), request);
-  if (tile_query.empty()) return Serve(plain_[*dataset], request, cache_control_);
+Described LayerHandler::Handle(const Call& call) const {
+  const Result<std::uint32_t> dataset = FindDataset(call.route.dataset, datasets_);
+  if (!dataset) return ClientErrorResponse(dataset.error(), call.request->id);
+  const Result<TileParameters> parameters = ParseTileParameters(call.route.query, /*allow_at_least=*/false);
+  if (!parameters) return ClientErrorResponse(parameters.error(), call.request->id);
+  std::string tile_query = WithToken(TileQuery(parameters->requested), call);
+  if (tile_query.empty()) return Serve(plain_[*dataset], *call.request, cache_control_);
   DocumentPlan plan;
-  plan.key = fmt::format("layer {} {} {}", *dataset, TileQuery(parameters->wish), fmt::ptr(GrantInQuery(request)));
+  plan.key = fmt::format("layer {} {} {}", *dataset, TileQuery(parameters->requested), fmt::ptr(GrantInQuery(call)));
   plan.bytes = plain_[*dataset].identity->size();
   plan.content_type = kJson;
   plan.cache_control = cache_control_;

@@ -5,10 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "server/handlers/document.h"
-#include "server/handlers/document_maker.h"
-#include "server/http/query.h"
-#include "server/http/router.h"
+#include "server/api/call.h"
+#include "server/documents/document.h"
+#include "server/documents/document_maker.h"
+#include "server/query/query.h"
 #include "server/tiles/dataset_view.h"
 
 namespace terrace::server {
@@ -18,25 +18,25 @@ class LayerHandler {
   // `datasets` must outlive this.
   LayerHandler(std::span<const DatasetView> datasets, std::string cache_control);
 
-  // Precondition: a kLayer route. `?error=E` and `?fraction=F` go into the tile template.
-  Answer Handle(const Route& route, const Request& request) const;
+  // Precondition: a kLayer call.route. `?error=E` and `?fraction=F` go into the tile template.
+  Described Handle(const Call& call) const;
 
  private:
   const std::span<const DatasetView> datasets_;
   const std::string cache_control_;
-  std::vector<Document> plain_;  // one per dataset: what is served without a wish
+  std::vector<Document> plain_;  // one per dataset: what is served where no error is requested
 };
 
-// What the tile template carries for a wish: "error=5&atleast=1", "fraction=0.25" or nothing. Numbers are printed anew,
-// shortest form, and without '+', which CesiumJS would turn into a space.
-std::string TileQuery(const ErrorWish& wish);
+// What the tile template carries for a requested error: "error=5&atleast=1", "fraction=0.25" or nothing. Numbers are
+// printed anew, shortest form, and without '+', which CesiumJS would turn into a space.
+std::string TileQuery(const RequestedError& requested);
 
 // The query of a template, with the request's token where that came in a query: clients that send it so send templates
 // as they are.
-std::string WithToken(std::string query, const Request& request);
+std::string WithToken(std::string query, const Call& call);
 
 // Stands for that token where it must not be kept itself: there is one grant of each, for as long as the server runs.
 // Null: WithToken adds none.
-const Grant* GrantInQuery(const Request& request);
+const Grant* GrantInQuery(const Call& call);
 
 }  // namespace terrace::server

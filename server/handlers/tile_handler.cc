@@ -4,11 +4,12 @@
 
 #include <iterator>
 #include <memory>
+#include <optional>
 #include <utility>
 
-#include "server/handlers/backend_failure.h"
+#include "server/api/backend_failure.h"
+#include "server/api/negotiate.h"
 #include "server/http/http_error.h"
-#include "server/http/negotiate.h"
 
 namespace terrace::server {
 namespace {
@@ -29,38 +30,36 @@ std::string_view Name(CacheStatus cache) {
 
 }  // namespace
 
-TileHandler::TileHandler(CatalogPtr catalog, TileService& tiles, TileHandlerOptions options)
+TileHandler::TileHandler(CatalogPtr catalog, TileService& tiles, HandlerOptions options)
     : catalog_(std::move(catalog)), tiles_(tiles), options_(std::move(options)) {}
 
-std::optional<Response> TileHandler::HandleNow(const Route& route, const Request& request) const {
-  const Result<tiler::TileRequest> tile = Negotiate(route, request, catalog_->datasets);
-  if (!tile) return ClientErrorResponse(tile.error(), request.id);
-  const std::optional<ServedTile> found = tiles_.Find(*catalog_, *tile);
-  if (!found) return std::nullopt;
-  return Reply(*found, *tile, request);
+Answer TileHandler::Handle(const Call& call) const {
+  const Result<tiler::TileRequest> tile = Negotiate(call, catalog_->datasets);
+  if (!tile) return ClientErrorResponse(tile.error(), call.request->id);
+  if (const std::optional<ServedTile> found = tiles_.Find(*catalog_, *tile)) return Reply(*found, call);
+  return Build(call, *tile);
 }
 
-asio::awaitable<Response> TileHandler::Handle(Route route, Request request) const {
-  const Result<tiler::TileRequest> tile = Negotiate(route, request, catalog_->datasets);
-  if (!tile) co_return ClientErrorResponse(tile.error(), request.id);
+asio::awaitable<Response> TileHandler::Build(const Call& call, tiler::TileRequest tile) const {
   const auto deadline = TileService::Clock::now() + options_.deadline;
-  const Result<ServedTile> served = co_await tiles_.Get(catalog_, *tile, deadline, request.client);
-  if (served) co_return Reply(*served, *tile, request);
-  co_return co_await BackendFailure(served.error(), std::string(request.id), options_.refusal_delay);
+  const Result<ServedTile> served = co_await tiles_.Build(catalog_, tile, deadline, call.request->client);
+  if (served) co_return Reply(*served, call);
+  co_return co_await BackendFailure(served.error(), call.request->id, options_.refusal_delay);
 }
 
-Response TileHandler::Reply(const ServedTile& served, const tiler::TileRequest& tile, const Request& request) const {
+Response TileHandler::Reply(const ServedTile& served, const Call& call) const {
   Response response;
-  response.lines = std::shared_ptr<const tiler::HeadLines>(served.tile, &served.tile->head);
+  response.lines = std::shared_ptr<const std::string>(served.tile, &served.tile->head.text);
+  response.lines_of_body = served.tile->head.of_body;
   response.cache_control = options_.cache_control;
-  response.vary = tile.format != tiler::TileFormat::kHeightPng;  // which has one form
+  response.vary = call.route.format->varies;
   if (served.cache == CacheStatus::kHit) {
     response.more_lines = "Server-Timing: cache;desc=hit\r\n";
   } else {
     response.headers.emplace_back("Server-Timing", FormatServerTiming(served.cache, served.tile->times));
   }
-  response.cache = Name(served.cache);
-  if (MatchesEtag(request.fields->if_none_match, served.tile->etag)) {
+  response.labels.cache = Name(served.cache);
+  if (MatchesEtag(call.request->fields->if_none_match, served.tile->etag)) {
     response.status = 304;
   } else {
     response.body = Body(served.tile, &served.tile->bytes);

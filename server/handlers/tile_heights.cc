@@ -5,7 +5,7 @@
 
 #include "engine/geo/error_ladder.h"
 #include "proto/mesh/skirt.h"
-#include "server/http/negotiate.h"
+#include "server/api/negotiate.h"
 
 namespace terrace::server {
 namespace {
@@ -15,20 +15,21 @@ dem::HeightRange RangeOf(const DatasetView& dataset, const geo::TileKey& key) {
   return {std::min(dataset.min_height_m, dataset.floor_m), std::max(dataset.max_height_m, dataset.floor_m)};
 }
 
-double SkirtDepth(const DatasetView& dataset, const ErrorWish& wish, int level) {
+double SkirtDepth(const DatasetView& dataset, const RequestedError& requested, int level) {
   const bool is_deepest = level == dataset.max_level();
-  const int step = ErrorStep(wish, level, is_deepest, dataset.error_fraction);
+  const int step = ErrorStep(requested, level, is_deepest, dataset.error_fraction);
   return proto::SkirtDepth(level, proto::SkirtError(level, step, is_deepest, dataset.error_fraction));
 }
 
 }  // namespace
 
-proto::HeightSpan HeightsOfTile(const DatasetView& dataset, const ErrorWish& wish, const geo::TileKey& key) {
+proto::HeightSpan HeightsOfTile(const DatasetView& dataset, const RequestedError& requested, const geo::TileKey& key) {
   const bool is_deepest = key.level == dataset.max_level();
-  const int step = ErrorStep(wish, key.level, is_deepest, dataset.error_fraction);
+  const int step = ErrorStep(requested, key.level, is_deepest, dataset.error_fraction);
   const double error_m = geo::LadderError(key.level, step, dataset.error_fraction);
   // From level to level skirts grow shorter, but for those of the deepest level at a small `fraction`.
-  const double skirt_m = std::max(SkirtDepth(dataset, wish, key.level), SkirtDepth(dataset, wish, dataset.max_level()));
+  const double skirt_m =
+      std::max(SkirtDepth(dataset, requested, key.level), SkirtDepth(dataset, requested, dataset.max_level()));
   // Positions are rounded to a grid of at most a 32nd of the error, the feet of skirts a second time.
   const double rounding_m = error_m / 32;
   const dem::HeightRange range = RangeOf(dataset, key);

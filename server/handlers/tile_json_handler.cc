@@ -5,12 +5,12 @@
 #include <utility>
 
 #include "proto/documents/tile_json.h"
+#include "server/api/negotiate.h"
+#include "server/documents/document.h"
 #include "server/handlers/datasets_handler.h"
-#include "server/handlers/document.h"
 #include "server/handlers/layer_handler.h"
 #include "server/http/http_error.h"
-#include "server/http/negotiate.h"
-#include "server/http/query.h"
+#include "server/query/query.h"
 
 namespace terrace::server {
 namespace {
@@ -30,18 +30,18 @@ std::string HeightTileQuery(const HeightTileParameters& parameters) {
 TileJsonHandler::TileJsonHandler(std::span<const DatasetView> datasets, std::string cache_control)
     : datasets_(datasets), cache_control_(std::move(cache_control)) {}
 
-Response TileJsonHandler::Handle(const Route& route, const Request& request) const {
-  const Result<std::uint32_t> index = FindDataset(route.dataset, datasets_);
-  if (!index) return ClientErrorResponse(index.error(), request.id);
-  const Result<HeightTileParameters> parameters = ParseHeightTileParameters(route.query);
-  if (!parameters) return ClientErrorResponse(parameters.error(), request.id);
+Response TileJsonHandler::Handle(const Call& call) const {
+  const Result<std::uint32_t> index = FindDataset(call.route.dataset, datasets_);
+  if (!index) return ClientErrorResponse(index.error(), call.request->id);
+  const Result<HeightTileParameters> parameters = ParseHeightTileParameters(call.route.query);
+  if (!parameters) return ClientErrorResponse(parameters.error(), call.request->id);
   const DatasetView& dataset = datasets_[*index];
   proto::TileJsonDescription tiles;
   tiles.name = dataset.name;
   tiles.attribution = dataset.attribution;
-  const std::string query = WithToken(HeightTileQuery(*parameters), request);
-  tiles.tile_template = fmt::format("{}/{}/{{z}}/{{x}}/{{y}}.png{}{}", OriginOf(request), PercentEncode(dataset.name),
-                                    query.empty() ? "" : "?", query);
+  const std::string query = WithToken(HeightTileQuery(*parameters), call);
+  tiles.tile_template = fmt::format("{}/{}/{{z}}/{{x}}/{{y}}.png{}{}", OriginOf(*call.request),
+                                    PercentEncode(dataset.name), query.empty() ? "" : "?", query);
   tiles.max_zoom = MaxHeightLevel(dataset, parameters->size);
   tiles.tile_size = parameters->size;
   tiles.encoding = parameters->encoding;
@@ -49,7 +49,8 @@ Response TileJsonHandler::Handle(const Route& route, const Request& request) con
   tiles.south = dataset.south;
   tiles.east = dataset.east;
   tiles.north = dataset.north;
-  Response response = Serve(Document::Make(proto::EncodeTileJson(tiles), "application/json"), request, cache_control_);
+  Response response =
+      Serve(Document::Make(proto::EncodeTileJson(tiles), "application/json"), *call.request, cache_control_);
   response.vary_too = "Forwarded, X-Forwarded-Host, X-Forwarded-Proto";  // what a proxy may say of the origin
   return response;
 }

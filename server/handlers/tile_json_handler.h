@@ -4,9 +4,9 @@
 #include <span>
 #include <string>
 
+#include "server/api/call.h"
 #include "server/http/request.h"
 #include "server/http/response.h"
-#include "server/http/router.h"
 #include "server/tiles/dataset_view.h"
 
 namespace terrace::server {
@@ -16,8 +16,8 @@ class TileJsonHandler {
   // `datasets` must outlive this.
   TileJsonHandler(std::span<const DatasetView> datasets, std::string cache_control);
 
-  // Precondition: a kTileJson route. `?encoding` and `?size` go into the tile template.
-  Response Handle(const Route& route, const Request& request) const;
+  // Precondition: a kTileJson call.route. `?encoding` and `?size` go into the tile template.
+  Response Handle(const Call& call) const;
 
  private:
   const std::span<const DatasetView> datasets_;

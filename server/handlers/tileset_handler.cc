@@ -10,10 +10,10 @@
 #include "proto/documents/implicit_tree.h"
 #include "proto/documents/subtree.h"
 #include "proto/documents/tileset.h"
+#include "server/api/negotiate.h"
 #include "server/handlers/layer_handler.h"
 #include "server/handlers/tile_heights.h"
 #include "server/http/http_error.h"
-#include "server/http/negotiate.h"
 
 namespace terrace::server {
 namespace {
@@ -21,8 +21,8 @@ namespace {
 constexpr std::string_view kJsonType = "application/json";
 
 // What the content templates carry for a request. The values of `compression` and `texture` have been checked.
-std::string ContentQuery(const ErrorWish& wish, std::string_view query) {
-  std::string content = TileQuery(wish);
+std::string ContentQuery(const RequestedError& requested, std::string_view query) {
+  std::string content = TileQuery(requested);
   const QueryParameters parameters = ParseQuery(query).value_or(QueryParameters());
   for (const std::string_view wanted : {"compression", "texture"}) {
     const auto sent = std::ranges::find(parameters, wanted, &QueryParameters::value_type::first);
@@ -59,24 +59,25 @@ std::vector<std::vector<geo::TileRange>> TilesWithData(const DatasetView& datase
   return levels;
 }
 
-std::string WriteTileset(const DatasetView& dataset, const std::vector<proto::TreeRoot>& roots, ErrorWish wish,
-                         std::string content_query, std::string subtree_query) {
-  wish.at_least = wish.error_m.has_value();  // as TileQuery writes it into the templates
+std::string WriteTileset(const DatasetView& dataset, const std::vector<proto::TreeRoot>& roots,
+                         RequestedError requested, std::string content_query, std::string subtree_query) {
+  requested.at_least = requested.error_m.has_value();  // as TileQuery writes it into the templates
   proto::TilesetDescription tileset;
   tileset.attribution = dataset.attribution;
   tileset.roots = roots;
-  tileset.heights = [&](const geo::TileKey& key) { return HeightsOfTile(dataset, wish, key); };
+  tileset.heights = [&](const geo::TileKey& key) { return HeightsOfTile(dataset, requested, key); };
   tileset.content_query = std::move(content_query);
   tileset.subtree_query = std::move(subtree_query);
   return proto::EncodeTileset(tileset);
 }
 
-std::string WriteSubtree(const DatasetView& dataset, const ErrorWish& wish, const geo::TileKey& top, int levels) {
+std::string WriteSubtree(const DatasetView& dataset, const RequestedError& requested, const geo::TileKey& top,
+                         int levels) {
   proto::Subtree subtree;
   subtree.levels = levels;
   subtree.tiles = proto::BlocksBelow(dataset.available, top, levels);
   subtree.heights = [&](const geo::TileKey& below) {
-    return HeightsOfTile(dataset, wish, proto::TileUnder(top, below.level, below.x, below.y));
+    return HeightsOfTile(dataset, requested, proto::TileUnder(top, below.level, below.x, below.y));
   };
   return proto::EncodeSubtree(subtree);
 }
@@ -96,46 +97,50 @@ TilesetHandler::TilesetHandler(std::span<const DatasetView> datasets, std::strin
   }
 }
 
-Answer TilesetHandler::Handle(const Route& route, const Request& request) const {
-  const Result<std::uint32_t> dataset = FindDataset(route.dataset, datasets_);
-  if (!dataset) return ClientErrorResponse(dataset.error(), request.id);
+Described TilesetHandler::Handle(const Call& call) const {
+  const Result<std::uint32_t> dataset = FindDataset(call.route.dataset, datasets_);
+  if (!dataset) return ClientErrorResponse(dataset.error(), call.request->id);
   const Result<TileParameters> parameters =
-      ParseTileParameters(route.query, /*allow_at_least=*/false, /*allow_compression=*/true);
-  if (!parameters) return ClientErrorResponse(parameters.error(), request.id);
-  const std::string wished = ContentQuery(parameters->wish, route.query);
-  std::string content_query = WithToken(wished, request);
-  if (content_query.empty()) return Serve(plain_[*dataset], request, cache_control_);
-  std::string subtree_query = WithToken(TileQuery(parameters->wish), request);
+      ParseTileParameters(call.route.query, /*allow_at_least=*/false, /*allow_compression=*/true);
+  if (!parameters) return ClientErrorResponse(parameters.error(), call.request->id);
+  const std::string content_parameters = ContentQuery(parameters->requested, call.route.query);
+  std::string content_query = WithToken(content_parameters, call);
+  if (content_query.empty()) return Serve(plain_[*dataset], *call.request, cache_control_);
+  std::string subtree_query = WithToken(TileQuery(parameters->requested), call);
   DocumentPlan plan;
-  plan.key = fmt::format("tileset {} {} {}", *dataset, wished, fmt::ptr(GrantInQuery(request)));
+  plan.key = fmt::format("tileset {} {} {}", *dataset, content_parameters, fmt::ptr(GrantInQuery(call)));
   plan.bytes = plain_[*dataset].identity->size();
   plan.content_type = kJsonType;
   plan.cache_control = cache_control_;
-  plan.write = [&view = datasets_[*dataset], roots = roots_[*dataset], wish = parameters->wish,
-                content_query = std::move(content_query), subtree_query = std::move(subtree_query)](
-                   const std::stop_token&) { return WriteTileset(view, *roots, wish, content_query, subtree_query); };
+  plan.write = [&view = datasets_[*dataset], roots = roots_[*dataset], requested = parameters->requested,
+                content_query = std::move(content_query),
+                subtree_query = std::move(subtree_query)](const std::stop_token&) {
+    return WriteTileset(view, *roots, requested, content_query, subtree_query);
+  };
   return plan;
 }
 
-Answer TilesetHandler::HandleSubtree(const Route& route, const Request& request) const {
-  const Result<std::uint32_t> index = FindDataset(route.dataset, datasets_);
-  if (!index) return ClientErrorResponse(index.error(), request.id);
+Described TilesetHandler::HandleSubtree(const Call& call) const {
+  const Result<std::uint32_t> index = FindDataset(call.route.dataset, datasets_);
+  if (!index) return ClientErrorResponse(index.error(), call.request->id);
   const Result<TileParameters> parameters =
-      ParseTileParameters(route.query, /*allow_at_least=*/true, /*allow_compression=*/true);
-  if (!parameters) return ClientErrorResponse(parameters.error(), request.id);
+      ParseTileParameters(call.route.query, /*allow_at_least=*/true, /*allow_compression=*/true);
+  if (!parameters) return ClientErrorResponse(parameters.error(), call.request->id);
   const DatasetView& dataset = datasets_[*index];
-  if (!IsAvailable(dataset, route.key) || (route.key.level - route.root.level) % route.subtree_levels != 0) {
-    return ProblemResponse(404, "the dataset has no such subtree; its tileset.json says where they begin", request.id);
+  if (!IsAvailable(dataset, call.route.key) ||
+      (call.route.key.level - call.route.root.level) % call.route.subtree_levels != 0) {
+    return ProblemResponse(404, "the dataset has no such subtree; its tileset.json says where they begin",
+                           call.request->id);
   }
-  const ErrorWish& wish = parameters->wish;
+  const RequestedError& requested = parameters->requested;
   DocumentPlan plan;
-  plan.key = fmt::format("subtree {} {} {} {}{}", *index, geo::ToString(route.key), route.subtree_levels,
-                         TileQuery(wish), wish.at_least ? "" : " alone");
-  plan.bytes = MostBytes(route.subtree_levels);
+  plan.key = fmt::format("subtree {} {} {} {}{}", *index, geo::ToString(call.route.key), call.route.subtree_levels,
+                         TileQuery(requested), requested.at_least ? "" : " alone");
+  plan.bytes = MostBytes(call.route.subtree_levels);
   plan.content_type = "application/octet-stream";
   plan.cache_control = cache_control_;
-  plan.write = [&dataset, wish, top = route.key, levels = route.subtree_levels](const std::stop_token&) {
-    return WriteSubtree(dataset, wish, top, levels);
+  plan.write = [&dataset, requested, top = call.route.key, levels = call.route.subtree_levels](const std::stop_token&) {
+    return WriteSubtree(dataset, requested, top, levels);
   };
   return plan;
 }

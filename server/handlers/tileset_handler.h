@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "proto/documents/implicit_tree.h"
-#include "server/handlers/document.h"
-#include "server/handlers/document_maker.h"
-#include "server/http/query.h"
-#include "server/http/router.h"
+#include "server/api/call.h"
+#include "server/documents/document.h"
+#include "server/documents/document_maker.h"
+#include "server/query/query.h"
 #include "server/tiles/dataset_view.h"
 
 namespace terrace::server {
@@ -21,18 +21,18 @@ class TilesetHandler {
   // `datasets` must outlive this.
   TilesetHandler(std::span<const DatasetView> datasets, std::string cache_control);
 
-  // Precondition: a kTileset route. `?error=E` and `?fraction=F` go into the templates.
-  Answer Handle(const Route& route, const Request& request) const;
+  // `?error=E` and `?fraction=F` go into the templates.
+  Described Handle(const Call& call) const;
 
-  // Precondition: a kSubtree route. Any available tile may be the root, so that a tileset.json which a client has kept
-  // from an earlier day stays good. The error that is wished for decides how deep skirts hang, and so the heights in
+  // Any available tile may be the root, so that a tileset.json which a client has kept
+  // from an earlier day stays good. The requested error decides how deep skirts hang, and so the heights in
   // it. 404 where no subtree begins.
-  Answer HandleSubtree(const Route& route, const Request& request) const;
+  Described HandleSubtree(const Call& call) const;
 
  private:
   const std::span<const DatasetView> datasets_;
   const std::string cache_control_;
-  // One per dataset: where its trees are rooted, and what is served without a wish.
+  // One per dataset: where its trees are rooted, and what is served where no error is requested.
   std::vector<std::shared_ptr<const std::vector<proto::TreeRoot>>> roots_;
   std::vector<Document> plain_;
 };

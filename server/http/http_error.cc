@@ -133,7 +133,7 @@ Response BackendErrorResponse(const Error& error, std::string_view request_id) {
   const int status = StatusOf(code);
   Response response = ProblemResponse(status, FixedDetail(code), request_id);
   if (status == 503) response.headers.emplace_back("Retry-After", RetryAfter(error.code));
-  response.source_changed = code == ErrorCode::kChanged;
+  response.try_again = code == ErrorCode::kChanged;
   return response;
 }
 

@@ -26,7 +26,7 @@ using boost::system::error_code;
 
 constexpr std::chrono::milliseconds kBackOff{1};
 constexpr std::chrono::milliseconds kMoment{100};
-constexpr int kShedAtOnce = 1000;
+constexpr int kRejectedAtOnce = 1000;
 
 Result<tcp::endpoint> Resolve(asio::io_context& io, const std::string& host, std::uint16_t port) {
   const bool bracketed = host.size() > 2 && host.front() == '[' && host.back() == ']';  // as IPv6 stands in URLs
@@ -135,12 +135,12 @@ void Listener::Spawn() { asio::co_spawn(acceptor_.get_executor(), Run(shared_fro
 
 // Ends with the coroutine that accepts. Where there was no memory for one connection, the coroutine ends by an
 // exception, or by being destroyed; others will find some.
-class Listener::GoOn {
+class Listener::Resume {
  public:
-  explicit GoOn(std::shared_ptr<Listener> listener) : listener_(std::move(listener)) {}
-  GoOn(const GoOn&) = delete;
-  GoOn& operator=(const GoOn&) = delete;
-  ~GoOn() {
+  explicit Resume(std::shared_ptr<Listener> listener) : listener_(std::move(listener)) {}
+  Resume(const Resume&) = delete;
+  Resume& operator=(const Resume&) = delete;
+  ~Resume() {
     if (!listener_->acceptor_.is_open()) return;
     UntilThereIsMemory(
         [&] { asio::post(listener_->acceptor_.get_executor(), [listener = listener_] { Again(*listener); }); });
@@ -169,7 +169,7 @@ class Listener::GoOn {
 };
 
 asio::awaitable<void> Listener::Run(std::shared_ptr<Listener> self) {
-  const GoOn go_on(self);
+  const Resume resume(self);
   co_await self->AcceptAll();
 }
 
@@ -187,7 +187,7 @@ asio::awaitable<void> Listener::AcceptAll() {
     Warn(crowded_, error.message());
     context_->connections->EvictOne("");
     co_await Pause(kBackOff);
-    Shed();
+    RejectPending();
   }
   Finish();
 }
@@ -205,10 +205,7 @@ asio::awaitable<void> Listener::Pause(std::chrono::milliseconds time) {
   co_await timer.async_wait(asio::redirect_error(asio::use_awaitable, ignored));
 }
 
-std::string Listener::ClientOf(const asio::ip::address& peer) const {
-  const asio::ip::address address = Canonical(peer);
-  return context_->gate->proxies().trusted.Contains(address) ? "" : ClientBlock(address);
-}
+std::string Listener::ClientOf(const asio::ip::address& peer) const { return context_->application->ClientOf(peer); }
 
 // Where there is no room, another connection gives way, or one may end in a moment. Once somebody was refused the next
 // ones are not kept waiting.
@@ -228,11 +225,11 @@ asio::awaitable<void> Listener::Admit(tcp::socket socket) {
 }
 
 // Turns away those who wait, a bounded number of them.
-void Listener::Shed() {
+void Listener::RejectPending() {
   error_code error;
   spare_.reset();
   acceptor_.non_blocking(true, error);
-  for (int i = 0; i < kShedAtOnce && !error; ++i) {
+  for (int i = 0; i < kRejectedAtOnce && !error; ++i) {
     tcp::socket socket(io_.first());
     acceptor_.accept(socket, error);
     if (!error) Refuse(socket, 503);

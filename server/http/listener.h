@@ -16,8 +16,8 @@
 
 #include "engine/core/result.h"
 #include "server/asio.h"
-#include "server/http/io_threads.h"
 #include "server/http/session.h"
+#include "server/net/io_threads.h"
 
 namespace terrace::server {
 
@@ -47,7 +47,7 @@ class Listener : public std::enable_shared_from_this<Listener> {
 
  private:
   Listener(IoThreads& io, std::shared_ptr<const SessionContext> context);
-  class GoOn;
+  class Resume;
 
   void Spawn();
   static asio::awaitable<void> Run(std::shared_ptr<Listener> self);
@@ -55,7 +55,7 @@ class Listener : public std::enable_shared_from_this<Listener> {
   asio::awaitable<void> Pause(std::chrono::milliseconds time);
   std::string ClientOf(const asio::ip::address& peer) const;
   asio::awaitable<void> Admit(asio::ip::tcp::socket socket);
-  void Shed();
+  void RejectPending();
   void Refuse(asio::ip::tcp::socket& socket, int status);
   void TakeQueue();
   void Finish();

@@ -14,8 +14,6 @@
 #include <utility>
 
 #include "server/asio.h"
-#include "server/http/query.h"
-#include "server/http/shown_target.h"
 #include "server/http/text.h"
 
 namespace terrace::server {
@@ -106,22 +104,13 @@ RequestFields FieldsOf(const Fields& sent) {
   fields.forwarded_for = Joined(sent, "X-Forwarded-For");
   fields.forwarded_host = Joined(sent, "X-Forwarded-Host");
   fields.forwarded_proto = Joined(sent, "X-Forwarded-Proto");
-  fields.referer = ShownReferer(sent[http::field::referer]);
+  fields.referer = std::string(sent[http::field::referer]);
   fields.user_agent = std::string(sent[http::field::user_agent]);
   fields.has_authorization = sent.count(http::field::authorization) > 0;
   fields.bearer = BearerOf(sent);
   fields.content_type = std::string(sent[http::field::content_type]);
   fields.content_encoding = Joined(sent, http::field::content_encoding);
   return fields;
-}
-
-// What follows from the first line and the fields; the header's token counts before the one in the query.
-void SetTarget(Request& request, std::string_view target) {
-  request.target = std::string(target);
-  std::optional<std::string> in_query = TakeToken(request.target);
-  request.token_in_query = !request.fields->bearer && in_query.has_value();
-  request.may_hold_secret = request.fields->has_authorization || in_query || !IsPlainTarget(request.target);
-  request.token = request.fields->bearer ? *request.fields->bearer : std::move(in_query).value_or("");
 }
 
 // Lines that no two readers understand differently; any other goes through the whole parser.
@@ -190,31 +179,6 @@ bool IsHostValue(std::string_view value) {
   });
 }
 
-std::optional<std::string> TakeToken(std::string& target) {
-  const std::size_t question = target.find('?');
-  if (question == std::string::npos) return std::nullopt;
-  std::string_view rest = std::string_view(target).substr(question + 1);
-  if (rest.find("token") == std::string_view::npos) return std::nullopt;
-  std::optional<std::string> token;
-  std::string kept;
-  while (!rest.empty()) {
-    const std::string_view piece = rest.substr(0, rest.find('&'));
-    rest.remove_prefix(std::min(rest.size(), piece.size() + 1));
-    const std::size_t equals = std::min(piece.find('='), piece.size());
-    if (piece.substr(0, equals) == "token") {
-      std::string value = PercentDecode(piece.substr(std::min(equals + 1, piece.size()))).value_or("");
-      // No token has a blank in it.
-      token = !token || *token == value ? std::move(value) : *token + " " + value;
-    } else {
-      kept.append(kept.empty() ? 0 : 1, '&').append(piece);
-    }
-  }
-  if (!token) return std::nullopt;
-  target.resize(question);
-  if (!kept.empty()) target.append("?").append(kept);
-  return token;
-}
-
 tl::expected<std::size_t, BadRequest> FindHeadEnd(std::string_view bytes, std::size_t scanned) {
   const std::size_t from = std::max<std::size_t>(scanned, 3) - 3;  // the end may lie across two reads
   const std::size_t end = bytes.find("\r\n\r\n", from);
@@ -241,7 +205,7 @@ std::size_t TakeRepeated(std::string_view bytes, const HeadMemo& memo, Request& 
   request.method_name = line->name;
   request.keep_alive = memo.keep_alive;
   request.fields = memo.fields;
-  SetTarget(request, line->target);
+  request.target = std::string(line->target);
   return line->size + memo.bytes.size();
 }
 
@@ -258,8 +222,7 @@ Request FirstLineOf(std::string_view bytes) {
   request.method_name = std::string(method);
   request.method = ToMethod(http::string_to_verb(method));
   line.remove_prefix(blank + 1);
-  SetTarget(request, line.substr(0, line.find(' ')));
-  request.may_hold_secret = true;  // its header was not read
+  request.target = std::string(line.substr(0, line.find(' ')));
   return request;
 }
 
@@ -292,7 +255,7 @@ tl::expected<Request, BadRequest> ParseHead(std::string_view head, HeadMemo* mem
     if (said.host.empty() || !IsHostValue(said.host)) return Bad(400, "malformed host in the request target");
   }
   request.fields = SharedFields(std::move(said));
-  SetTarget(request, fields.target());
+  request.target = std::string(fields.target());
   request.content_length = static_cast<std::size_t>(*PlainLength(fields));
   // RFC 9110, section 10.1.1: HTTP/1.0 knows no interim replies.
   request.expects_continue =

@@ -7,14 +7,13 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <tl/expected.hpp>
 #include <utility>
-
-#include "server/http/access.h"
 
 namespace terrace::server {
 
@@ -30,9 +29,9 @@ struct RequestFields {
   std::string if_none_match;
   std::string host;  // host and port: letters, digits and "-._~%!$&'()*+,;=:[]"; may be empty
   std::string origin;
-  // What a proxy before the server may have written, or the client: see ResolveClient.
+  // What a proxy before the server may have written, or the client.
   std::string forwarded, forwarded_for, forwarded_host, forwarded_proto;
-  std::string referer, user_agent;    // for the log; the referer as ShownReferer
+  std::string referer, user_agent;    // for the log
   bool has_authorization = false;     // of whatever scheme
   std::optional<std::string> bearer;  // of the Authorization header; a secret
   std::string content_type;
@@ -95,12 +94,7 @@ struct Request {
   unsigned version = 11;    // 10 or 11
   bool keep_alive = true;   // what the client wants
   std::string method_name;  // as sent, for the log
-  std::string target;       // as sent, but for the token in its query
-  std::string token;        // of the Authorization header, else of the query; a secret: never logged, never a key
-  bool token_in_query = false;
-  // False: there is neither an Authorization header, nor a token in the query, nor what may be one in another spelling
-  // (IsPlainTarget). Else the reply is for its sender alone.
-  bool may_hold_secret = true;
+  std::string target;       // as sent, until it is admitted
   SharedFields fields;
   std::size_t content_length = 0;  // of a POST
   bool expects_continue = false;   // the client waits for a 100 before it sends the body
@@ -108,10 +102,9 @@ struct Request {
 
   // Given by the server.
   RequestId id;
-  bool is_https = false;  // how the client speaks to this server, or to the proxy before it
-  GrantPtr grant;         // what the client may see; null: everything
-  bool has_bad_token = false;
-  std::uint64_t client = 0;  // who takes turns with others: a hash of what Gate::Who says
+  bool is_https = false;     // how the client speaks to this server, or to the proxy before it
+  bool is_private = true;    // the reply is for its sender alone
+  std::uint64_t client = 0;  // who takes turns with others
 };
 
 // Why bytes are not a request. The connection is of no use afterwards: its framing cannot be trusted.
@@ -126,7 +119,7 @@ tl::expected<std::size_t, BadRequest> FindHeadEnd(std::string_view bytes, std::s
 
 // What the first line of `bytes` says of a message that is refused, for the log and for the form of the reply: its
 // method and the beginning of its target, as far as they can be told; kOther and nothing else where they cannot.
-// Nothing of it is answered. It may hold a secret, as its header was not read.
+// Nothing of it is answered.
 Request FirstLineOf(std::string_view bytes);
 
 // The header of a connection's last request without a body, byte by byte: the next one that repeats it needs no parsing
@@ -147,10 +140,5 @@ std::size_t TakeRepeated(std::string_view bytes, const HeadMemo& memo, Request& 
 
 // Whether it is a host and port after RFC 3986, or empty, which is what a client sends whose URI has no authority.
 bool IsHostValue(std::string_view value);
-
-// Cuts every `token` parameter out of the query of `target` and returns its value, decoded; nothing where there is
-// none. Clients append it on their own, as often as they follow a link; different values are none that fits. Other
-// spellings of the name stay, and are refused with the request (Match) or ignored.
-std::optional<std::string> TakeToken(std::string& target);
 
 }  // namespace terrace::server

@@ -12,7 +12,7 @@
 
 #include "server/asio.h"
 #include "server/http/request.h"
-#include "server/http/stream.h"
+#include "server/net/stream.h"
 
 namespace terrace::server {
 

@@ -76,13 +76,12 @@ bool HasBody(int status) { return status != 204 && status != 304; }
 // What the reply says of its body.
 void PutContent(std::string& head, const Response& response) {
   if (response.lines) {
-    const tiler::HeadLines& lines = *response.lines;
-    head += std::string_view(lines.text).substr(HasBody(response.status) ? 0 : lines.of_body);
+    head += std::string_view(*response.lines).substr(HasBody(response.status) ? 0 : response.lines_of_body);
     return;
   }
   if (HasBody(response.status)) {
     if (!response.content_type.empty()) Put(head, "Content-Type", response.content_type);
-    if (response.coding != tiler::Coding::kIdentity) Put(head, "Content-Encoding", tiler::NameOf(response.coding));
+    if (!response.content_encoding.empty()) Put(head, "Content-Encoding", response.content_encoding);
     Put(head, "Content-Length", fmt::format_int(response.body ? response.body->size() : 0).c_str());
   }
   if (!response.etag.empty()) Put(head, "ETag", response.etag);
@@ -144,7 +143,7 @@ std::string MethodsOf(bool takes_post) { return takes_post ? "GET, HEAD, OPTIONS
 Response PreflightResponse(bool takes_post) {
   Response response;
   response.status = 204;
-  response.route = "preflight";
+  response.labels.route = "preflight";
   response.headers.emplace_back("Allow", MethodsOf(takes_post));
   response.headers.emplace_back("Access-Control-Allow-Methods", MethodsOf(takes_post));
   // "*" does not cover Authorization.

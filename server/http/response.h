@@ -12,8 +12,6 @@
 
 #include "server/http/cors.h"
 #include "server/http/request.h"
-#include "tiler/encoded_tile.h"
-#include "tiler/tile_request.h"
 
 namespace terrace::server {
 
@@ -22,16 +20,16 @@ using Body = std::shared_ptr<const std::string>;
 
 struct Response {
   int status = 200;
-  std::string_view content_type;  // a literal; empty where there is no body
-  Body body;                      // null: empty
-  tiler::Coding coding = tiler::Coding::kIdentity;
-  std::string etag;           // with its quotes; may be empty
-  std::string cache_control;  // may be empty
-  bool vary = false;          // the reply depends on Accept and Accept-Encoding
-  std::string_view vary_too;  // a literal: further headers it depends on; may be empty
-  bool for_grant = false;     // another token, or none, would be answered otherwise
-  bool close = false;         // end the connection after this reply
-  bool is_vital = false;      // tells how the server is: goes out where other replies find no room
+  std::string_view content_type;      // a literal; empty where there is no body
+  Body body;                          // null: empty
+  std::string_view content_encoding;  // a literal; empty: none
+  std::string etag;                   // with its quotes; may be empty
+  std::string cache_control;          // may be empty
+  bool vary = false;                  // the reply depends on Accept and Accept-Encoding
+  std::string_view vary_too;          // a literal: further headers it depends on; may be empty
+  bool for_grant = false;             // another token, or none, would be answered otherwise
+  bool close = false;                 // end the connection after this reply
+  bool is_vital = false;              // tells how the server is: goes out where other replies find no room
 
   struct Header {
     Header(std::string_view n, std::string v) : name(n), value(std::move(v)) {}
@@ -41,16 +39,21 @@ struct Response {
   };
   std::vector<Header> headers;
 
-  // Lines that were made beforehand, in place of content_type, coding and etag; null: none.
-  std::shared_ptr<const tiler::HeadLines> lines;
+  // Lines that were made beforehand, each with its CR LF, in place of content_type, content_encoding and etag; null:
+  // none.
+  std::shared_ptr<const std::string> lines;
+  std::size_t lines_of_body =
+      0;                        // so many bytes at their front describe the body: a reply without one leaves them away
   std::string_view more_lines;  // a literal: further ones, each with its CR LF
 
-  bool source_changed = false;  // why it is a 503: whoever opens the source anew can answer
+  bool try_again = false;  // a 503 that another try, a moment later, may turn into an answer
 
-  // For the log and the metrics.
-  std::string_view route = "none";
-  std::string_view cache = "-";
-  std::string dataset;  // the one that was asked about, if it exists
+  // What the application's log and metrics call the reply; HTTP hands it on unread.
+  struct Labels {
+    std::string_view route = "none";  // literals
+    std::string_view cache = "-";
+    std::string subject;  // what was asked about, if there is such
+  } labels;
 };
 
 // What a reply's head says beyond the response itself.

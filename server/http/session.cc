@@ -18,11 +18,12 @@
 #include <utility>
 #include <variant>
 
-#include "server/http/client_watch.h"
 #include "server/http/http_error.h"
-#include "server/http/stream.h"
 #include "server/http/text.h"
-#include "server/http/waits.h"
+#include "server/net/address.h"
+#include "server/net/client_watch.h"
+#include "server/net/stream.h"
+#include "server/net/waits.h"
 
 namespace terrace::server {
 namespace {
@@ -69,9 +70,8 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
         displacement_(stream_.socket().get_executor(), Clock::time_point::max()) {
     boost::system::error_code error;
     const auto peer = stream_.socket().remote_endpoint(error);
-    if (error) return;
-    peer_ = Caller(Canonical(peer.address()));
-    peer_text_ = fmt::format("{}:{}", peer_.text, peer.port());
+    handler_ = context_->application->Connect(peer.address());
+    if (!error) peer_text_ = fmt::format("{}:{}", Canonical(peer.address()).to_string(), peer.port());
   }
   ~Session() override { context_->connections->Remove(this); }
 
@@ -84,10 +84,11 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   void Displace() override { Post(&Session::DisplaceHere); }
 
  private:
-  // The request that the session is at, and what is to be told about it.
+  // The request that the session is at.
   struct Exchange {
     Request request;
-    Caller caller;
+    Admission admission;
+    bool is_admitted = false;
     Clock::time_point begun;  // at the end of its head
   };
 
@@ -117,20 +118,20 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   asio::awaitable<void> ServeAll();
   asio::awaitable<bool> ServeOne();
   asio::awaitable<void> RefuseMessage(BadRequest why);
-  asio::awaitable<bool> ServeLater(Route route);
   asio::awaitable<bool> ReceiveBody();
   asio::awaitable<void> RefuseUpload();
-  std::optional<Response> Refuse(const Result<Route>& route) const;
-  asio::awaitable<void> HoldBack();
-  std::optional<Response> AnswerAtOnce(const Result<Route>& route) const;
-  asio::awaitable<std::optional<Response>> AnswerWhileConnected(Route route, Request request);
-  asio::awaitable<Response> Answer(Route route, Request request);
+  asio::awaitable<void> DelayRefusal();
+  asio::awaitable<bool> GiveUp();
+  Answer Handle();
+  asio::awaitable<std::optional<Response>> WhileConnected(asio::awaitable<Response> answer);
+  asio::awaitable<Response> Await(asio::awaitable<Response> answer);
+  Response Failed(const std::exception& exception) const;
   asio::awaitable<void> Interrupted();
-  asio::awaitable<std::optional<TransferBudget::Hold>> RoomLater(Route route, Response& response);
+  asio::awaitable<std::optional<TransferBudget::Hold>> RoomLater(Response& response);
   TransferBudget::Ask AskFor(const Response& response) const;
   bool SendsBody(const Response& response) const;
   Clock::time_point Deadline() const { return exchange_.begun + context_->deadline->load(std::memory_order_relaxed); }
-  asio::awaitable<bool> Reply(Response& response, const Route* route = nullptr);
+  asio::awaitable<bool> Reply(Response& response, bool can_respond_again = false);
   asio::awaitable<bool> WriteRest(BufferPair left, std::size_t total);
   asio::awaitable<void> CloseGently();
   void Report(const Response& response, std::size_t bytes);
@@ -138,7 +139,7 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   const std::shared_ptr<const SessionContext> context_;
   Stream stream_;
   RequestReader reader_;
-  Caller peer_;
+  std::unique_ptr<ConnectionHandler> handler_;
   std::string peer_text_ = "-";
   Exchange exchange_;
   Clock::time_point replied_;  // when the last reply was told about: the present, once the next request is waited for
@@ -165,8 +166,8 @@ asio::awaitable<void> Session::ServeAll() {
     if (!head) break;
     phase_.store(Phase::kServes, std::memory_order_relaxed);
     exchange_.begun = Clock::now();
+    exchange_.is_admitted = false;
     if (!*head) {
-      exchange_.caller = peer_;
       co_await RefuseMessage(head->error());
       break;
     }
@@ -189,50 +190,45 @@ asio::awaitable<bool> Session::ServeOne() {
   Request& request = exchange_.request;
   request.id = RequestId::Next();
   request.is_https = stream_.is_tls();
-  exchange_.caller = context_->gate->Identify(request, peer_);
-  const Result<Route> route = Match(request.target);
-  const RateLimiter::Turn turn =
-      context_->gate->TakeTurn(request, route, exchange_.caller, context_->deadline->load(std::memory_order_relaxed));
-  if (!turn.granted) {
-    Response response = Gate::TooManyRequests(turn, request, route);
-    response.close = request.content_length > 0;
-    co_await HoldBack();
-    co_return co_await Reply(response);
+  Admission& admission = exchange_.admission;
+  admission = handler_->Admit(request, context_->deadline->load(std::memory_order_relaxed));
+  exchange_.is_admitted = true;
+  if (!admission.refusal) admission.refusal = WhyNoBody(request, admission.max_body_bytes);
+  if (admission.delays_refusal) {
+    co_await DelayRefusal();
+  } else if (admission.wait.count() > 0 && !co_await SleepWhileConnected(stream_, admission.wait)) {
+    co_return false;
   }
-  if (turn.wait.count() > 0 && !co_await SleepWhileConnected(stream_, turn.wait)) co_return false;
-  std::optional<Response> response = AnswerAtOnce(route);
-  if (!response) co_return co_await ServeLater(*route);
-  co_return co_await Reply(*response, route ? &*route : nullptr);
+  displaced_ = has_upload_ = false;
+  if (admission.refusal) {
+    Response& refusal = *admission.refusal;
+    refusal.close = refusal.close || request.content_length > 0;  // a body may follow that nobody will read
+    co_return co_await Reply(refusal);
+  }
+  if (request.content_length > 0 && !co_await ReceiveBody()) co_return false;
+  Answer answer = Handle();
+  if (auto* later = std::get_if<asio::awaitable<Response>>(&answer)) {
+    std::optional<Response> response = co_await WhileConnected(std::move(*later));
+    if (!response) co_return co_await GiveUp();
+    answer = *std::move(response);
+  }
+  has_upload_ = false;
+  const bool keep = co_await Reply(std::get<Response>(answer), /*can_respond_again=*/true);
+  request.body = RequestBody();  // nothing of it is held while the connection waits
+  co_return keep;
 }
 
-// What has to be waited for: the request's body, and the answer.
-asio::awaitable<bool> Session::ServeLater(Route route) {
-  Request& request = exchange_.request;
-  request.client = Gate::NumberOf(request, exchange_.caller);
-  displaced_ = has_upload_ = false;
-  if (request.content_length > 0) {
-    phase_.store(Phase::kReceives, std::memory_order_relaxed);
-    if (!co_await ReceiveBody()) co_return false;
-    phase_.store(Phase::kServes, std::memory_order_relaxed);
-  }
-  stream_.ExpiresNever();  // the handlers have deadlines of their own
-  std::optional<Response> response = co_await AnswerWhileConnected(route, request);
-  if (!response && displaced_) {
+// False, as nobody waits for the answer: the client is gone, or the request's room goes to others.
+asio::awaitable<bool> Session::GiveUp() {
+  if (displaced_) {
     co_await RefuseUpload();
     co_return false;
   }
-  if (!response) {
-    Response nobody;
-    nobody.status = kClientLeft;
-    Report(nobody, 0);
-    stream_.Close();
-    co_return false;
-  }
-  has_upload_ = false;
-  context_->gate->Mark(request, route, *response);
-  const bool keep = co_await Reply(*response, &route);
-  request.body = RequestBody();  // nothing of it is held while the connection waits
-  co_return keep;
+  Response nobody;
+  nobody.status = kClientLeft;
+  Report(nobody, 0);
+  stream_.Close();
+  co_return false;
 }
 
 // False: it did not come, what was to be said has been said, and the connection is to be closed. A body has room as a
@@ -240,6 +236,7 @@ asio::awaitable<bool> Session::ServeLater(Route route) {
 asio::awaitable<bool> Session::ReceiveBody() {
   Request& request = exchange_.request;
   const auto body = std::make_shared<HeldBody>();
+  phase_.store(Phase::kReceives, std::memory_order_relaxed);
   is_receiving_ = true;
   const std::size_t first = std::min(request.content_length, TransferBudget::kFreeBytes);
   tl::expected<void, BadRequest> read = co_await reader_.ReadBody(request, body->text, first);
@@ -264,6 +261,7 @@ asio::awaitable<bool> Session::ReceiveBody() {
   if (displaced_) co_await RefuseUpload();
   if (!read && !displaced_ && read.error().status > 0) co_await RefuseMessage(read.error());
   if (!read || displaced_) co_return false;
+  phase_.store(Phase::kServes, std::memory_order_relaxed);
   body->room.Settle();  // it is the server's turn
   request.body = RequestBody(std::shared_ptr<const std::string>(body, &body->text));
   co_return true;
@@ -275,56 +273,22 @@ asio::awaitable<void> Session::RefuseUpload() {
   has_upload_ = is_receiving_ = false;
   Response response = Overloaded("too many request bodies are on their way", exchange_.request.id);
   response.close = true;
-  co_await HoldBack();
+  co_await DelayRefusal();
   co_await Reply(response);
 }
 
-// What can be said without the request's body. Preflights come before access: they carry no token.
-std::optional<Response> Session::Refuse(const Result<Route>& route) const {
-  const Request& request = exchange_.request;
-  const bool takes_post = route && TakesPost(route->kind);
-  if (request.method == Method::kOptions) return PreflightResponse(takes_post);
-  if (request.method == Method::kOther || (request.method == Method::kPost && !takes_post)) {
-    return NoSuchMethodResponse(takes_post, request.id);
-  }
-  if (!route) return ClientErrorResponse(route.error(), request.id);
-  std::optional<Response> refusal = context_->gate->Refuse(request, *route);
-  if (!refusal) return WhyNoBody(request, context_->options.max_body_bytes);
-  refusal->route = ToString(route->kind);
-  return refusal;
-}
-
-asio::awaitable<void> Session::HoldBack() {
+asio::awaitable<void> Session::DelayRefusal() {
   stream_.ExpiresNever();
   asio::steady_timer delay(stream_.socket().get_executor(), context_->options.refusal_delay);
   co_await delay.async_wait(asio::use_awaitable);
 }
 
-// Nothing: the answer has to be waited for. Most answers need not be, and then neither a timer nor a second coroutine
-// watches the client meanwhile.
-std::optional<Response> Session::AnswerAtOnce(const Result<Route>& route) const {
-  const Request& request = exchange_.request;
-  std::optional<Response> response = Refuse(route);
-  if (response) {
-    // A body may follow that nobody will read.
-    response->close = response->close || request.content_length > 0;
-    return response;
-  }
-  if (request.content_length > 0 || !context_->quick_handler) return response;
-  try {
-    response = context_->quick_handler(*route, request);
-  } catch (const std::exception&) {  // the handler will meet it again, and say so
-    return std::nullopt;
-  }
-  if (response) context_->gate->Mark(request, *route, *response);
-  return response;
-}
-
-// Nothing: the client is gone, or the request's room goes to others.
-asio::awaitable<std::optional<Response>> Session::AnswerWhileConnected(Route route, Request request) {
+// Nothing: the client is gone, or the request's room goes to others. Most answers need not be waited for, and then
+// neither a timer nor a second coroutine watches the client.
+asio::awaitable<std::optional<Response>> Session::WhileConnected(asio::awaitable<Response> answer) {
   using asio::experimental::awaitable_operators::operator||;
-  std::variant<Response, std::monostate> first =
-      co_await (Answer(std::move(route), std::move(request)) || Interrupted());
+  stream_.ExpiresNever();  // handlers have deadlines of their own
+  std::variant<Response, std::monostate> first = co_await (Await(std::move(answer)) || Interrupted());
   if (first.index() == 1) co_return std::nullopt;
   co_return std::move(std::get<0>(first));
 }
@@ -337,20 +301,30 @@ asio::awaitable<void> Session::Interrupted() {
   if (!displaced_) co_await (ClientLeft(stream_) || displacement_.async_wait(std::move(displaced)));
 }
 
-// Never throws, so that the race above always has a winner.
-asio::awaitable<Response> Session::Answer(Route route, Request request) {
-  const RequestId id = request.id;
-  Error error;
+Answer Session::Handle() {
   try {
-    co_return co_await context_->handler(std::move(route), std::move(request));
-  } catch (const boost::system::system_error& exception) {
-    // The client has left, which nobody needs to be told.
-    if (exception.code() == asio::error::operation_aborted) co_return ProblemResponse(503, "cancelled", id);
-    error.message = exception.what();
+    return handler_->Handle(exchange_.request);
   } catch (const std::exception& exception) {
-    error.message = exception.what();
+    return Failed(exception);
   }
-  co_return BackendErrorResponse(error, id);
+}
+
+// Never throws, so that the race above always has a winner.
+asio::awaitable<Response> Session::Await(asio::awaitable<Response> answer) {
+  try {
+    co_return co_await std::move(answer);
+  } catch (const std::exception& exception) {
+    co_return Failed(exception);
+  }
+}
+
+Response Session::Failed(const std::exception& exception) const {
+  const auto* const of_system = dynamic_cast<const boost::system::system_error*>(&exception);
+  // The client has left, which nobody needs to be told.
+  if (of_system != nullptr && of_system->code() == asio::error::operation_aborted) {
+    return ProblemResponse(503, "cancelled", exchange_.request.id);
+  }
+  return BackendErrorResponse(Error{ErrorCode::kInternal, exception.what()}, exchange_.request.id);
 }
 
 bool Session::SendsBody(const Response& response) const {
@@ -362,60 +336,62 @@ TransferBudget::Ask Session::AskFor(const Response& response) const {
   ask.kind = response.is_vital ? TransferBudget::Kind::kVitalReply : TransferBudget::Kind::kReply;
   ask.bytes = SendsBody(response) ? response.body->size() : 0;
   ask.body = response.body;
-  ask.client = Gate::NumberOf(exchange_.request, exchange_.caller);
+  ask.client = exchange_.request.client;
   ask.holder = std::const_pointer_cast<Session>(shared_from_this());
   return ask;
 }
 
 // Lets go of the reply's body, waits for room for it, and makes the reply again, mostly from a cache: what waits must
 // not take the memory that it waits for. Nothing: there was none before the deadline, or the client is gone.
-asio::awaitable<std::optional<TransferBudget::Hold>> Session::RoomLater(Route route, Response& response) {
+asio::awaitable<std::optional<TransferBudget::Hold>> Session::RoomLater(Response& response) {
   for (;;) {
     TransferBudget::Ask ask = AskFor(response);
     const std::size_t bytes = ask.bytes;
     ask.body = nullptr;
     Response bare;  // its lines refer to the body's owner too
-    bare.route = response.route;
-    bare.dataset = std::move(response.dataset);
+    bare.labels = std::move(response.labels);
     response = std::move(bare);
     std::optional<TransferBudget::Hold> room =
         co_await HoldWhileConnected(stream_, *context_->transfers, std::move(ask), Deadline());
     if (!room) co_return room;
-    std::optional<Response> again = co_await AnswerWhileConnected(route, exchange_.request);
-    if (!again) co_return std::nullopt;
-    context_->gate->Mark(exchange_.request, route, *again);
-    response = *std::move(again);
+    Answer again = Handle();
+    if (auto* later = std::get_if<asio::awaitable<Response>>(&again)) {
+      std::optional<Response> made = co_await WhileConnected(std::move(*later));
+      if (!made) co_return std::nullopt;
+      again = *std::move(made);
+    }
+    response = std::get<Response>(std::move(again));
+    response.for_grant = response.for_grant || exchange_.admission.for_grant;
     if (SendsBody(response) && response.body->size() > bytes) continue;  // of another dataset than before
     room->Keep(response.body);
     co_return room;
   }
 }
 
-// False: the connection is to be closed. `response` has to live as long. `route`: how to make it again; null: it is
-// small.
-asio::awaitable<bool> Session::Reply(Response& response, const Route* route) {
+// False: the connection is to be closed. `response` has to live as long, and may be let go where it can be made again.
+asio::awaitable<bool> Session::Reply(Response& response, bool can_respond_again) {
   const Request& request = exchange_.request;
   const bool with_body = SendsBody(response);
+  if (can_respond_again) response.for_grant = response.for_grant || exchange_.admission.for_grant;
   std::optional<TransferBudget::Hold> room;
   if (!with_body || response.body->size() <= TransferBudget::kFreeBytes) {
     room.emplace();
   } else {
     room = context_->transfers->TryHold(AskFor(response));
   }
-  if (!room && route != nullptr) room = co_await RoomLater(*route, response);
+  if (!room && can_respond_again) room = co_await RoomLater(response);
   if (!room) {
-    const std::string_view label = response.route;
-    const std::string dataset = std::move(response.dataset);
+    Response::Labels labels = std::move(response.labels);
     response = Overloaded("too many replies are on their way", request.id);
-    response.route = label;
-    response.dataset = dataset;
+    labels.cache = response.labels.cache;
+    response.labels = std::move(labels);
     room.emplace();
-    co_await HoldBack();
+    co_await DelayRefusal();
   }
   HeadOptions options;
   options.version = request.version;
   options.keep_alive = request.keep_alive && !response.close && !reader_.closing();
-  options.is_private = request.may_hold_secret;
+  options.is_private = request.is_private;
   options.cors = &context_->cors;
   options.origin = request.fields->origin;
   const std::string head = SerializeHead(response, options);
@@ -464,26 +440,9 @@ asio::awaitable<void> Session::CloseGently() {
 }
 
 void Session::Report(const Response& response, std::size_t bytes) {
-  const Exchange& exchange = exchange_;
-  const Request& request = exchange.request;
   replied_ = Clock::now();
-  ReplyRecord record;
-  record.method = request.method_name;
-  record.target = request.target;
-  record.status = response.status;
-  record.body_bytes = bytes;
-  record.duration = std::chrono::duration_cast<std::chrono::microseconds>(replied_ - exchange.begun);
-  record.route = response.route;
-  record.dataset = response.dataset;
-  record.cache = response.cache;
-  record.version = request.version;
-  record.referer = request.fields->referer;
-  record.user_agent = request.fields->user_agent;
-  record.request_id = request.id;
-  record.peer = peer_text_;
-  if (exchange.caller.address != peer_.address) record.client = exchange.caller.text;
-  if (request.grant) record.token_name = request.grant->name;
-  context_->observer(record);
+  const auto duration = std::chrono::duration_cast<std::chrono::microseconds>(replied_ - exchange_.begun);
+  handler_->Report({exchange_.request, response, bytes, duration, peer_text_, exchange_.is_admitted});
 }
 
 }  // namespace

@@ -23,9 +23,9 @@ constexpr std::chrono::milliseconds kBusyPeriod{100};
 // A configuration counts when it is found the same after this time: it may have been met half written.
 constexpr std::chrono::milliseconds kConfigSettleTime{300};
 // At least so long between looks, however often they are asked for.
-constexpr std::chrono::milliseconds kLeastPause{50};
+constexpr std::chrono::milliseconds kMinPause{50};
 // Each takes a processor for a while, and some handles.
-constexpr std::ptrdiff_t kMostOpenings = 2;
+constexpr std::ptrdiff_t kMaxOpenings = 2;
 
 // What is taken over from a new configuration without a restart.
 constexpr std::array<std::string_view, 7> kLiveOptions = {
@@ -119,7 +119,7 @@ void Reloader::Reload() {
 void Reloader::Run() {
   Clock::time_point next_look = Clock::now() + kPeriod, next_config = next_look;
   std::unique_lock lock(mutex_);
-  while (!wake_.wait_for(lock, kLeastPause, [this] { return stop_; })) {
+  while (!wake_.wait_for(lock, kMinPause, [this] { return stop_; })) {
     const auto is_due = [this] { return look_ || reload_ || stop_; };
     if (IsBusy() || watch_) {
       wake_.wait_for(lock, IsBusy() ? kBusyPeriod : kPeriod, is_due);
@@ -214,7 +214,7 @@ void Reloader::Apply(config::Config next) {
 }
 
 void Reloader::LookAtFiles() {
-  std::size_t left = kMostLooks;
+  std::size_t left = kMaxLooks;
   for (std::size_t i = 0; i < slots_.size() && left > 0; ++i) {
     next_slot_ %= slots_.size();
     left -= slots_[next_slot_++].LookAtFiles(left);
@@ -228,7 +228,7 @@ bool Reloader::StepOpenings() {
   for (DatasetSlot& slot : slots_) is_new = slot.TakeOpened() || is_new;
   auto openings = std::count_if(slots_.begin(), slots_.end(), [](const auto& slot) { return slot.is_opening(); });
   for (DatasetSlot& slot : slots_) {
-    if (openings >= kMostOpenings) break;
+    if (openings >= kMaxOpenings) break;
     if (slot.is_opening()) continue;
     slot.OpenIfDue(hooks_.open);
     if (slot.is_opening()) ++openings;

@@ -1,7 +1,7 @@
 // Keeps what is served in step with the configuration and with the files that it names.
 //
 // A thread looks at them every second: at the configuration, globs and folders in it included, and at the files of each
-// dataset, kMostLooks of them a time. What has changed is opened anew beside what is served, at low priority, and
+// dataset, kMaxLooks of them a time. What has changed is opened anew beside what is served, at low priority, and
 // published when it is complete; a configuration that is wrong changes nothing. Everything is told in the log.
 #pragma once
 
@@ -22,7 +22,7 @@ namespace terrace::server {
 class Reloader {
  public:
   // Files looked at in one second. Of more, each is looked at every few seconds.
-  static constexpr std::size_t kMostLooks = 10'000;
+  static constexpr std::size_t kMaxLooks = 10'000;
 
   struct Hooks {
     // The configuration as it would be if the server started now.

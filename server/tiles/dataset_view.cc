@@ -1,7 +1,6 @@
 #include "server/tiles/dataset_view.h"
 
 #include <algorithm>
-#include <array>
 
 #include "engine/geo/mercator_grid.h"
 
@@ -27,10 +26,5 @@ bool IsHeightTileAvailable(const DatasetView& dataset, const geo::TileKey& key, 
 }
 
 int MaxHeightLevel(const DatasetView& dataset, int size) { return dataset.max_mercator_depth - (size == 512 ? 1 : 0); }
-
-bool IsReservedName(std::string_view name) {
-  static constexpr std::array<std::string_view, 5> kReserved = {"datasets", "viewer", "livez", "readyz", "metrics"};
-  return std::find(kReserved.begin(), kReserved.end(), name) != kReserved.end();
-}
 
 }  // namespace terrace::server

@@ -50,8 +50,4 @@ bool IsAvailable(const DatasetView& dataset, const geo::TileKey& key);
 bool IsHeightTileAvailable(const DatasetView& dataset, const geo::TileKey& key, int size);
 int MaxHeightLevel(const DatasetView& dataset, int size);
 
-// True for the first path segments that the server answers itself: datasets, viewer, livez, readyz, metrics. No dataset
-// may be named like one of them.
-bool IsReservedName(std::string_view name);
-
 }  // namespace terrace::server

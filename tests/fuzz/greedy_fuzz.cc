@@ -24,13 +24,13 @@ using tin::FitMeasure;
 using tin::HeightField;
 using tin::TinMesh;
 
-constexpr int kMostSide = 20;
+constexpr int kMaxSide = 20;
 
 enum class Sort { kAnyBits, kPalette, kWholeMetres };
 
 // One byte a sample makes fields with ties and plateaus, four a field of any floats.
 HeightField FieldOf(Sort sort, FuzzInput& input) {
-  const int width = 2 + input.Below(kMostSide - 1), height = 2 + input.Below(kMostSide - 1);
+  const int width = 2 + input.Below(kMaxSide - 1), height = 2 + input.Below(kMaxSide - 1);
   std::array<float, 8> palette{};
   if (sort == Sort::kPalette) {
     for (float& value : palette) value = input.Take<float>();

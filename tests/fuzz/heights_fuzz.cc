@@ -6,24 +6,24 @@
 #include <string_view>
 
 #include "engine/core/check.h"
-#include "server/handlers/heights_query.h"
+#include "server/query/heights_query.h"
 #include "tests/fuzz/fuzz_input.h"
 
 namespace terrace::fuzz {
 namespace {
 
-constexpr std::size_t kMostPoints = 100;
+constexpr std::size_t kMaxPoints = 100;
 
 void Try(std::string_view content_type, std::string_view body) {
   TERRACE_CHECK(server::IsHeightsBody(content_type));
-  const auto query = server::ParseHeights({{}, content_type, body}, kMostPoints);
+  const auto query = server::ParseHeights({{}, content_type, body}, kMaxPoints);
   if (!query) {
     TERRACE_CHECK(query.error().code == ErrorCode::kInvalidArgument);
     // Nothing of the request comes back: messages are the server's words and numbers.
     for (const unsigned char c : query.error().message) TERRACE_CHECK(c >= 0x20 && c < 0x7f);
     return;
   }
-  TERRACE_CHECK(!query->points.empty() && query->points.size() <= kMostPoints);
+  TERRACE_CHECK(!query->points.empty() && query->points.size() <= kMaxPoints);
   for (const auto& point : query->points) {
     TERRACE_CHECK(std::abs(point.longitude) <= 180 && std::abs(point.latitude) <= 90);
   }

@@ -28,8 +28,8 @@ namespace {
 using namespace server;
 using asio::ip::tcp;
 
-constexpr std::size_t kMostBytes = 48 * 1024;  // what a pair of sockets holds unread
-constexpr std::size_t kMostBody = 16 * 1024;
+constexpr std::size_t kMaxBytes = 48 * 1024;  // what a pair of sockets holds unread
+constexpr std::size_t kMaxBody = 16 * 1024;
 
 struct Seen {
   std::vector<Request> requests;
@@ -47,7 +47,7 @@ asio::awaitable<void> ReadAll(RequestReader& reader, Seen& seen) {
       seen.refused = head->error().status;
       break;
     }
-    if (request.content_length > kMostBody) {
+    if (request.content_length > kMaxBody) {
       seen.refused = 413;
       break;
     }
@@ -141,7 +141,7 @@ void ExpectAsAlone(std::string_view head, const Request& request) {
   TERRACE_CHECK(alone.has_value());
   TERRACE_CHECK(alone->method == request.method && alone->method_name == request.method_name);
   TERRACE_CHECK(alone->version == request.version && alone->keep_alive == request.keep_alive);
-  TERRACE_CHECK(alone->target == request.target && alone->token == request.token);
+  TERRACE_CHECK(alone->target == request.target);
   TERRACE_CHECK(alone->content_length == request.content_length && alone->expects_continue == request.expects_continue);
   TERRACE_CHECK(*alone->fields == *request.fields);
 }
@@ -172,7 +172,7 @@ void ExpectSame(const Seen& a, const Seen& b) {
 
 void Run(FuzzInput& input) {
   std::size_t first = input.Take<std::uint16_t>(), second = input.Take<std::uint16_t>();
-  const std::string_view bytes = input.rest().substr(0, kMostBytes);
+  const std::string_view bytes = input.rest().substr(0, kMaxBytes);
   first = std::min(first, bytes.size());
   second = std::min(second, bytes.size() - first);
   const Seen whole = Converse({bytes, {}, {}});

@@ -9,13 +9,14 @@
 
 #include "engine/core/check.h"
 #include "engine/geo/error_ladder.h"
-#include "server/handlers/heights_query.h"
-#include "server/http/client_address.h"
-#include "server/http/negotiate.h"
-#include "server/http/query.h"
+#include "server/api/client_address.h"
+#include "server/api/negotiate.h"
+#include "server/api/router.h"
 #include "server/http/response.h"
-#include "server/http/router.h"
-#include "server/http/shown_target.h"
+#include "server/query/heights_query.h"
+#include "server/query/query.h"
+#include "server/routes.h"
+#include "server/telemetry/shown_target.h"
 #include "tests/fuzz/fuzz_input.h"
 
 namespace terrace::fuzz {
@@ -45,12 +46,12 @@ void ExpectClientError(const Error& error) {
   TERRACE_CHECK(error.code == ErrorCode::kInvalidArgument || error.code == ErrorCode::kNotFound);
 }
 
-void ExpectInLadder(const ErrorWish& wish) {
-  TERRACE_CHECK(!wish.error_m || (std::isfinite(*wish.error_m) && *wish.error_m > 0));
-  TERRACE_CHECK(!wish.fraction || (std::isfinite(*wish.fraction) && *wish.fraction > 0));
+void ExpectInLadder(const RequestedError& requested) {
+  TERRACE_CHECK(!requested.error_m || (std::isfinite(*requested.error_m) && *requested.error_m > 0));
+  TERRACE_CHECK(!requested.fraction || (std::isfinite(*requested.fraction) && *requested.fraction > 0));
   for (const int level : {0, 7, geo::kMaxLevel}) {
     for (const bool is_deepest : {false, true}) {
-      const int step = ErrorStep(wish, level, is_deepest, geo::kDefaultErrorFraction);
+      const int step = ErrorStep(requested, level, is_deepest, geo::kDefaultErrorFraction);
       TERRACE_CHECK(step >= geo::kCoarsestStep && step <= geo::kFinestStep);
     }
   }
@@ -60,7 +61,7 @@ void TryQuery(std::string_view query) {
   for (const bool at_least : {false, true}) {
     for (const bool compression : {false, true}) {
       const auto tile = ParseTileParameters(query, at_least, compression);
-      if (tile) ExpectInLadder(tile->wish);
+      if (tile) ExpectInLadder(tile->requested);
       if (!tile) ExpectClientError(tile.error());
     }
   }
@@ -72,10 +73,10 @@ void TryQuery(std::string_view query) {
   for (const auto& [name, value] : *parameters) {
     for (const unsigned char c : name + value) TERRACE_CHECK(c != 0 || query.find('\0') != std::string_view::npos);
   }
-  constexpr std::size_t kMostPoints = 50;
-  const auto heights = ParseHeights({query, {}, {}}, kMostPoints);
+  constexpr std::size_t kMaxPoints = 50;
+  const auto heights = ParseHeights({query, {}, {}}, kMaxPoints);
   if (!heights) return ExpectClientError(heights.error());
-  TERRACE_CHECK(!heights->points.empty() && heights->points.size() <= kMostPoints);
+  TERRACE_CHECK(!heights->points.empty() && heights->points.size() <= kMaxPoints);
   for (const dem::GeoPosition& point : heights->points) {
     TERRACE_CHECK(std::abs(point.longitude) <= 180 && std::abs(point.latitude) <= 90);
   }
@@ -83,10 +84,8 @@ void TryQuery(std::string_view query) {
 
 // One tile has one URL: what was understood, written again, is what was asked for.
 void ExpectOneUrl(const Route& route) {
-  constexpr std::string_view kSuffixes[] = {".terrain", ".glb", ".png"};
-  const std::string written =
-      "/earth/" + geo::ToString(route.key) + std::string(kSuffixes[static_cast<std::size_t>(route.format)]);
-  const auto again = Match(written);
+  const std::string written = "/earth/" + geo::ToString(route.key) + std::string(route.format->suffix);
+  const auto again = Routes().Match(written);
   TERRACE_CHECK(again && again->key == route.key && again->format == route.format);
 }
 
@@ -97,17 +96,20 @@ void TryTarget(std::string target) {
     const std::string shown = ShownTarget(target, is_known);
     TERRACE_CHECK(std::all_of(shown.begin(), shown.end(), [](char c) { return c > 0x20 && c < 0x7f && c != ';'; }));
   }
-  const auto route = Match(target);
+  const auto route = Routes().Match(target);
   if (!route) return ExpectClientError(route.error());
   TryQuery(route->query);
-  if (route->kind == RouteKind::kTile || route->kind == RouteKind::kSubtree) {
-    TERRACE_CHECK(geo::IsValid(route->key) && geo::IsValid(route->root));
-  }
-  if (route->kind != RouteKind::kTile) return;
+  TERRACE_CHECK(route->row != nullptr);
+  TERRACE_CHECK(geo::IsValid(route->key) && geo::IsValid(route->root));
+  if (route->row->label != "tile") return;
   ExpectOneUrl(*route);
-  const auto wanted = Negotiate(*route, Request(), Datasets());
+  const Request request;
+  Call call;
+  call.request = &request;
+  call.route = *route;
+  const auto wanted = Negotiate(call, Datasets());
   if (!wanted) return ExpectClientError(wanted.error());
-  TERRACE_CHECK(wanted->dataset == 0 && wanted->key == route->key && wanted->format == route->format);
+  TERRACE_CHECK(wanted->dataset == 0 && wanted->key == route->key && wanted->format == route->format->format);
   TERRACE_CHECK(wanted->error_step >= geo::kCoarsestStep && wanted->error_step <= geo::kFinestStep);
   TERRACE_CHECK(wanted->key.level <= kDeepest + 1);
 }

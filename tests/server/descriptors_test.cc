@@ -8,7 +8,7 @@
 #include <random>
 #include <string>
 
-#include "server/tiles/record_db.h"
+#include "server/store/record_db.h"
 
 namespace terrace::server {
 namespace {

@@ -1,4 +1,5 @@
-// Documents with wishes in them: where they are made, and that they are what they were when all were made beforehand.
+// Documents with parameters in them: where they are made, and that they are what they were when all were made
+// beforehand.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -6,7 +7,7 @@
 #include <mutex>
 
 #include "proto/compress.h"
-#include "server/handlers/document.h"
+#include "server/documents/document.h"
 #include "tests/server/server_fixture.h"
 
 namespace terrace::server {
@@ -81,11 +82,11 @@ TEST_F(DocumentsTest, LongOnesAreMadeOnWorkersAndKept) {
   ASSERT_TRUE(again.Send(Get("/maui/2/1/0.terrain")));
   ASSERT_TRUE(Eventually([&] { return builds_ > before; }));
   const Reply kept = Fetch(port(), "/blocks/layer.json?v=2&fraction=.50");
-  EXPECT_EQ(kept.status, 200) << "the same wish";
+  EXPECT_EQ(kept.status, 200) << "the same error";
   EXPECT_EQ(kept.body, made.body);
   EXPECT_EQ(Fetch(port(), "/blocks/layer.json?fraction=0.5", "If-None-Match: " + made.Field("etag") + "\r\n").status,
             304);
-  EXPECT_EQ(Fetch(port(), "/blocks/layer.json?fraction=0.25").status, 503) << "another wish";
+  EXPECT_EQ(Fetch(port(), "/blocks/layer.json?fraction=0.25").status, 503) << "another error";
   Open(true);
 }
 

@@ -14,14 +14,13 @@ namespace terrace::tiler {
 struct CacheKey {
   TileRequest request;  // its `dataset` is 0
   std::uint64_t generation = 0;
-  std::uint64_t solo = 0;  // unless 0: work for one request alone, which nobody else may join and nothing keeps
 
   friend bool operator==(const CacheKey&, const CacheKey&) = default;
 };
 
 struct CacheKeyHash {
   std::size_t operator()(const CacheKey& key) const noexcept {
-    return TileRequestHash{}(key.request) ^ static_cast<std::size_t>(key.generation ^ key.solo);
+    return TileRequestHash{}(key.request) ^ static_cast<std::size_t>(key.generation);
   }
 };
 

@@ -34,11 +34,10 @@ std::string_view GetText(ByteReader& reader) {
 // Every member is named, so that one more does not compile before it has its place here: a key without it would find
 // tiles of other requests.
 std::string RecordKey(const CacheKey& key) {
-  const auto& [request, generation, solo] = key;
+  const auto& [request, generation] = key;
   const auto& [dataset, tile, error_step, format, compression, texture, coding, normals, water_mask, metadata,
                height_encoding, height_size] = request;
   static_cast<void>(dataset);  // the generation stands for it
-  static_cast<void>(solo);     // work for one request is not kept
   ByteWriter writer;
   writer.Put(generation);
   Put(writer, tile);

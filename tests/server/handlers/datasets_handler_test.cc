@@ -51,10 +51,5 @@ TEST(DatasetsHandler, EscapesNamesInThePlainPage) {
   }
 }
 
-TEST(DatasetsHandler, KnowsTheReservedNames) {
-  for (const char* name : {"datasets", "viewer", "livez", "readyz", "metrics"}) EXPECT_TRUE(IsReservedName(name));
-  EXPECT_FALSE(IsReservedName("maui"));
-}
-
 }  // namespace
 }  // namespace terrace::server

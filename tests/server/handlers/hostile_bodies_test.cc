@@ -5,9 +5,9 @@
 #include <stop_token>
 #include <string>
 
-#include "server/handlers/heights_parameters.h"
-#include "server/handlers/heights_query.h"
-#include "server/http/parameters.h"
+#include "server/query/heights_parameters.h"
+#include "server/query/heights_query.h"
+#include "server/query/parameters.h"
 #include "tests/server/handlers/allocations.h"
 
 namespace terrace::server {

@@ -23,7 +23,7 @@ class LayerHandlerTest : public testing::Test {
   Response Get(const char* target, const char* accept_encoding = "") {
     Request request;
     request.fields.Set(&RequestFields::accept_encoding, accept_encoding);
-    return AtOnce(handler_->Handle(*Match(target), request), request);
+    return AtOnce(handler_->Handle(TestCall(target, request).call), request);
   }
 
   std::array<DatasetView, 1> datasets_;
@@ -42,7 +42,7 @@ TEST_F(LayerHandlerTest, DescribesTheDataset) {
   EXPECT_EQ(layer["bounds"][2], 180);
 }
 
-TEST_F(LayerHandlerTest, WritesWishesIntoTheTemplate) {
+TEST_F(LayerHandlerTest, WritesParametersIntoTheTemplate) {
   const auto tiles = [&](const char* target) {
     return nlohmann::json::parse(*Get(target).body)["tiles"][0].get<std::string>();
   };
@@ -51,7 +51,7 @@ TEST_F(LayerHandlerTest, WritesWishesIntoTheTemplate) {
   EXPECT_EQ(tiles("/maui/layer.json?v=1&extensions=a").find("error"), std::string::npos);
 }
 
-TEST_F(LayerHandlerTest, RefusesBadWishesAndUnknownDatasets) {
+TEST_F(LayerHandlerTest, RefusesBadParametersAndUnknownDatasets) {
   EXPECT_EQ(Get("/maui/layer.json?error=x").status, 400);
   EXPECT_EQ(Get("/maui/layer.json?fraction=-1").status, 400);
   EXPECT_EQ(Get("/maui/layer.json?foo=1").status, 400);
@@ -60,18 +60,18 @@ TEST_F(LayerHandlerTest, RefusesBadWishesAndUnknownDatasets) {
 
 TEST_F(LayerHandlerTest, CompressesOnRequest) {
   const Response plain = Get("/maui/layer.json"), gzip = Get("/maui/layer.json", "gzip");
-  EXPECT_EQ(gzip.coding, tiler::Coding::kGzip);
+  EXPECT_EQ(gzip.content_encoding, "gzip");
   EXPECT_NE(gzip.etag, plain.etag);
   EXPECT_LT(gzip.body->size(), plain.body->size());
 }
 
 TEST(TileQuery, PrintsNumbersThatSurviveUrls) {
-  ErrorWish wish;
-  wish.error_m = 1e20;
-  EXPECT_EQ(TileQuery(wish), "error=1e20&atleast=1") << "a '+' would become a space";
-  wish.error_m = 0.1;
-  EXPECT_EQ(TileQuery(wish), "error=0.1&atleast=1");
-  EXPECT_EQ(TileQuery(ErrorWish()), "");
+  RequestedError requested;
+  requested.error_m = 1e20;
+  EXPECT_EQ(TileQuery(requested), "error=1e20&atleast=1") << "a '+' would become a space";
+  requested.error_m = 0.1;
+  EXPECT_EQ(TileQuery(requested), "error=0.1&atleast=1");
+  EXPECT_EQ(TileQuery(RequestedError()), "");
 }
 
 }  // namespace

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "proto/documents/layer_json.h"
+#include "server/documents/document_maker.h"
 #include "server/handlers/certified_points.h"
 #include "server/handlers/datasets_handler.h"
-#include "server/handlers/document_maker.h"
 #include "server/handlers/heights_handler.h"
 #include "tests/server/handlers/allocations.h"
 

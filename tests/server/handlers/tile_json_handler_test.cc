@@ -6,6 +6,8 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "tests/server/test_call.h"
+
 namespace terrace::server {
 namespace {
 
@@ -19,7 +21,7 @@ class TileJsonHandlerTest : public testing::Test {
     Request request;
     request.fields.Set(&RequestFields::host, host);
     request.is_https = is_https;
-    return TileJsonHandler(datasets_, "max-age=1").Handle(*Match(target), request);
+    return TileJsonHandler(datasets_, "max-age=1").Handle(TestCall(target, request).call);
   }
   static nlohmann::json Parse(const Response& response) { return nlohmann::json::parse(*response.body); }
 
@@ -38,7 +40,7 @@ TEST_F(TileJsonHandlerTest, NamesTilesAsTheClientCanAskForThem) {
   EXPECT_EQ(response.vary_too, "Forwarded, X-Forwarded-Host, X-Forwarded-Proto");
 }
 
-TEST_F(TileJsonHandlerTest, WritesWishesIntoTheTemplate) {
+TEST_F(TileJsonHandlerTest, WritesParametersIntoTheTemplate) {
   const auto json = Parse(Get("/a%20b/tiles.json?size=512&encoding=terrarium&v=3"));
   EXPECT_EQ(json["tiles"][0], "http://example.test:8080/a%20b/{z}/{x}/{y}.png?encoding=terrarium&size=512");
   EXPECT_EQ(json["maxzoom"], 11);

@@ -12,8 +12,8 @@
 
 #include "engine/geo/ellipsoid.h"
 #include "proto/height_span.h"
+#include "server/api/negotiate.h"
 #include "server/handlers/tileset_handler.h"
-#include "server/http/negotiate.h"
 #include "server/tiles/pipeline_catalog.h"
 #include "tests/proto/glb_decoder.h"
 #include "tests/proto/subtree_reader.h"
@@ -66,19 +66,16 @@ class TilesetBoundsTest : public testing::Test {
   }
 
   std::string Get(const std::string& target) {
-    const Result<Route> route = Match("/earth/" + target);
-    EXPECT_TRUE(route) << target;
-    const Request request;
-    const bool is_subtree = route->kind == RouteKind::kSubtree;
+    const TestCall sent("/earth/" + target);
+    const bool is_subtree = sent.call.route.row->label == "subtree";
     const Response response =
-        AtOnce(is_subtree ? handler_->HandleSubtree(*route, request) : handler_->Handle(*route, request), request);
+        AtOnce(is_subtree ? handler_->HandleSubtree(sent.call) : handler_->Handle(sent.call), sent.request);
     EXPECT_EQ(response.status, 200) << target;
     return *response.body;
   }
 
   proto::DecodedGlb Glb(const std::string& target) {
-    const Request request;
-    const Result<tiler::TileRequest> tile = Negotiate(*Match("/earth/" + target), request, catalog_->datasets);
+    const Result<tiler::TileRequest> tile = Negotiate(TestCall("/earth/" + target).call, catalog_->datasets);
     EXPECT_TRUE(tile) << target;
     const auto built = catalog_->build(*tile, {});
     EXPECT_TRUE(built) << target;

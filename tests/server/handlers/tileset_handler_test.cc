@@ -7,7 +7,7 @@
 
 #include "engine/geo/error_ladder.h"
 #include "proto/mesh/skirt.h"
-#include "server/http/negotiate.h"
+#include "server/api/negotiate.h"
 #include "tests/proto/subtree_reader.h"
 #include "tests/server/handlers/at_once.h"
 
@@ -35,12 +35,11 @@ class TilesetHandlerTest : public testing::Test {
     handler_.emplace(datasets_, "max-age=1");
   }
   Response Get(const std::string& target, const char* accept_encoding = "") {
-    const Result<Route> route = Match(target);
-    EXPECT_TRUE(route) << target;
     Request request;
     request.fields.Set(&RequestFields::accept_encoding, accept_encoding);
-    const bool is_subtree = route->kind == RouteKind::kSubtree;
-    return AtOnce(is_subtree ? handler_->HandleSubtree(*route, request) : handler_->Handle(*route, request), request);
+    const TestCall sent(target, request);
+    const bool is_subtree = sent.call.route.row->label == "subtree";
+    return AtOnce(is_subtree ? handler_->HandleSubtree(sent.call) : handler_->Handle(sent.call), request);
   }
   Json Tileset(const std::string& query = "") { return Json::parse(*Get("/maui/tileset.json" + query).body); }
 
@@ -114,7 +113,7 @@ TEST_F(TilesetHandlerTest, RegionHoldsDataFloorAndSkirtsOfTheErrorAskedFor) {
   EXPECT_GE(box[4], -20 - proto::SkirtDepth(12, geo::DefaultError(12)) - geo::DefaultError(12));
 }
 
-TEST_F(TilesetHandlerTest, WritesWishesIntoTheContentTemplates) {
+TEST_F(TilesetHandlerTest, WritesParametersIntoTheContentTemplates) {
   const auto content = [&](const char* query) {
     return Tileset(query).at("root").at("children")[1].at("content").at("uri").get<std::string>();
   };
@@ -128,7 +127,7 @@ TEST_F(TilesetHandlerTest, WritesWishesIntoTheContentTemplates) {
 }
 
 // Skirts, and with them the heights in subtrees, depend on the error.
-TEST_F(TilesetHandlerTest, WritesWishesForErrorsIntoTheSubtreeTemplates) {
+TEST_F(TilesetHandlerTest, WritesParametersForErrorsIntoTheSubtreeTemplates) {
   const auto subtrees = [&](const char* query) {
     const Json tree = Tileset(query).at("root").at("children")[1];
     return tree.at("implicitTiling").at("subtrees").at("uri").get<std::string>();
@@ -168,10 +167,10 @@ TEST_F(TilesetHandlerTest, SubtreesTellTheHeightsOfEachTileAtTheErrorAskedFor) {
         proto::ParseSubtree(*Get(std::string("/maui/3dtiles/7-16-32/0/0/0.6.subtree").append(query)).body, 6);
     ASSERT_TRUE(read) << read.error().message;
     ASSERT_EQ(read->min_heights.size(), 1365u);
-    ErrorWish wish;
-    if (query.starts_with("?e")) wish = {.error_m = 600, .fraction = {}, .at_least = true};
-    if (query.starts_with("?f")) wish.fraction = 0.02;
-    const int step = ErrorStep(wish, 12, true, 0.5);
+    RequestedError requested;
+    if (query.starts_with("?e")) requested = {.error_m = 600, .fraction = {}, .at_least = true};
+    if (query.starts_with("?f")) requested.fraction = 0.02;
+    const int step = ErrorStep(requested, 12, true, 0.5);
     const double error_m = geo::LadderError(12, step);
     const double lowest = -120 - proto::SkirtDepth(12, proto::SkirtError(12, step, true, 0.5));
     EXPECT_LE(read->min_heights[341], lowest) << query;
@@ -219,16 +218,16 @@ TEST_F(TilesetHandlerTest, IsNotThereWhereNoSubtreeBegins) {
 TEST_F(TilesetHandlerTest, TakesTheTilesetsParametersOnSubtreesToo) {
   const Response plain = Get("/maui/3dtiles/7-16-32/0/0/0.6.subtree");
   EXPECT_EQ(*Get("/maui/3dtiles/7-16-32/0/0/0.6.subtree?compression=none&v=1").body, *plain.body);
-  const Response wished = Get("/maui/3dtiles/7-16-32/0/0/0.6.subtree?error=500&atleast=1");
-  EXPECT_EQ(wished.status, 200);
+  const Response requested = Get("/maui/3dtiles/7-16-32/0/0/0.6.subtree?error=500&atleast=1");
+  EXPECT_EQ(requested.status, 200);
   // deck.gl sends the tileset's query once more.
   EXPECT_EQ(*Get("/maui/3dtiles/7-16-32/0/0/0.6.subtree?error=500&atleast=1&error=500&compression=none").body,
-            *wished.body);
-  EXPECT_NE(*wished.body, *plain.body) << "deeper skirts";
+            *requested.body);
+  EXPECT_NE(*requested.body, *plain.body) << "deeper skirts";
   EXPECT_EQ(Get("/maui/3dtiles/7-16-32/0/0/0.6.subtree?colour=red").status, 400);
 }
 
-TEST_F(TilesetHandlerTest, RefusesBadWishes) {
+TEST_F(TilesetHandlerTest, RefusesBadParameters) {
   for (const char* const query : {"?error=x", "?fraction=-1", "?foo=1", "?compression=zip", "?error=5&error=6",
                                   "?error=5&fraction=1", "?atleast=1"}) {
     EXPECT_EQ(Get(std::string("/maui/tileset.json") + query).status, 400) << query;
@@ -238,7 +237,7 @@ TEST_F(TilesetHandlerTest, RefusesBadWishes) {
 TEST_F(TilesetHandlerTest, CompressesOnRequest) {
   for (const char* const target : {"/maui/tileset.json", "/maui/3dtiles/7-16-32/0/0/0.6.subtree"}) {
     const Response plain = Get(target), gzip = Get(target, "gzip");
-    EXPECT_EQ(gzip.coding, tiler::Coding::kGzip) << target;
+    EXPECT_EQ(gzip.content_encoding, "gzip") << target;
     EXPECT_NE(gzip.etag, plain.etag) << target;
     EXPECT_LT(gzip.body->size(), plain.body->size()) << target;
   }

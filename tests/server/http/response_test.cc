@@ -25,7 +25,7 @@ TEST(Response, CarriesCorsAndALength) {
   Response response;
   response.content_type = "text/plain";
   response.body = std::make_shared<const std::string>("hello");
-  response.coding = tiler::Coding::kGzip;
+  response.content_encoding = "gzip";
   response.etag = "\"e\"";
   response.vary = true;
   const std::string head = SerializeHead(response, {});
@@ -44,15 +44,15 @@ TEST(Response, HasNoBodyHeadersWithoutABody) {
   Response response;
   response.status = 304;
   response.content_type = "text/plain";
-  response.coding = tiler::Coding::kGzip;
+  response.content_encoding = "gzip";
   const std::string head = SerializeHead(response, {.keep_alive = true});
   EXPECT_EQ(head.find("\r\nContent-"), std::string::npos) << head;
 }
 
 TEST(Response, SendsLinesThatWereMadeBeforehand) {
   Response response;
-  response.lines =
-      std::make_shared<const tiler::HeadLines>(tiler::HeadLines{"Content-Length: 5\r\nETag: \"e\"\r\n", 19});
+  response.lines = std::make_shared<const std::string>("Content-Length: 5\r\nETag: \"e\"\r\n");
+  response.lines_of_body = 19;
   EXPECT_NE(SerializeHead(response, {}).find("\r\nContent-Length: 5\r\nETag: \"e\"\r\n"), std::string::npos);
   response.status = 304;
   const std::string head = SerializeHead(response, {});
@@ -130,7 +130,7 @@ TEST(HttpError, KeepsTheDetailFromTheClient) {
   EXPECT_EQ(response.body->find("secret"), std::string::npos);
   EXPECT_NE(response.body->find("\"request_id\":\"id7\""), std::string::npos);
   EXPECT_EQ(response.content_type, "application/problem+json");
-  EXPECT_EQ(response.coding, tiler::Coding::kIdentity);
+  EXPECT_EQ(response.content_encoding, "");
   EXPECT_NE(SerializeHead(response, {.keep_alive = true}).find("\r\nRetry-After: 5\r\n"), std::string::npos);
 }
 

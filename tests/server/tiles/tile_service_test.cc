@@ -27,7 +27,8 @@ Result<tiler::EncodedTile> BuildEmpty(const tiler::TileRequest&, std::stop_token
 Result<ServedTile> Get(TileService& service, CatalogPtr catalog, tiler::TileRequest request = {}) {
   asio::io_context io(1);
   const auto deadline = TileService::Clock::now() + std::chrono::seconds(10);
-  auto got = asio::co_spawn(io, service.Get(std::move(catalog), request, deadline), asio::use_future);
+  if (std::optional<ServedTile> found = service.Find(*catalog, request)) return *std::move(found);
+  auto got = asio::co_spawn(io, service.Build(std::move(catalog), request, deadline), asio::use_future);
   io.run();
   return got.get();
 }
@@ -136,10 +137,11 @@ TEST(TileService, TellsTheObserverAboutEveryBuild) {
   EXPECT_EQ(bad, 1);
 }
 
-Result<tiler::TilePtr> RunAlone(TileService& service, SingleFlight::Work work, TileService::Length length) {
+Result<int> RunAlone(TileService& service, Work<int> work, TileService::Length length) {
   asio::io_context io(1);
   auto ran = asio::co_spawn(
-      io, service.Run(std::move(work), length, TileService::Clock::now() + std::chrono::seconds(10)), asio::use_future);
+      io, service.Run<int>(std::move(work), length, TileService::Clock::now() + std::chrono::seconds(10)),
+      asio::use_future);
   io.run();
   return ran.get();
 }
@@ -149,12 +151,12 @@ TEST(TileService, KeepsAWorkerForTilesBesideLongWork) {
   options.worker_threads = 2;
   TileService service(options);
   std::promise<void> begun, end;
-  const SingleFlight::Work work = [&](std::stop_token) -> Result<tiler::EncodedTile> {
+  const Work<int> work = [&](std::stop_token) -> Result<int> {
     begun.set_value();
     end.get_future().wait();
-    return tiler::EncodedTile();
+    return 1;
   };
-  const SingleFlight::Work nothing = [](std::stop_token) -> Result<tiler::EncodedTile> { return tiler::EncodedTile(); };
+  const Work<int> nothing = [](std::stop_token) -> Result<int> { return 0; };
   auto first = std::async(std::launch::async, [&] { return RunAlone(service, work, TileService::Length::kLong); });
   begun.get_future().wait();
   auto second = std::async(std::launch::async, [&] { return RunAlone(service, nothing, TileService::Length::kLong); });

@@ -1,0 +1,65 @@
+// What is decided about a request before anything is done for it: who asks, how often, and what they may see.
+//
+// Thread-safe.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "server/api/access.h"
+#include "server/api/call.h"
+#include "server/api/client_address.h"
+#include "server/api/rate_limiter.h"
+#include "server/http/request.h"
+#include "server/http/response.h"
+
+namespace terrace::server {
+
+// A client as it is logged and counted.
+struct Caller {
+  Caller() = default;
+  explicit Caller(const asio::ip::address& a)
+      : address(a), text(a.to_string()), block(ClientBlock(a)), number(std::hash<std::string>{}(block) | 1) {}
+
+  asio::ip::address address;
+  std::string text = "-", block;
+  std::uint64_t number = 1;  // of the block; never 0
+};
+
+struct GateOptions {
+  Proxies proxies;
+  AccessPolicy access;
+  RateLimiter::Rate rate;  // of each token, and of each client without one
+};
+
+class Gate {
+ public:
+  explicit Gate(GateOptions options) : options_(std::move(options)) {}
+
+  // Who sent the request, behind the proxies. Takes the token out of the request's target into `call`, with what its
+  // bearer may see; sets the request's scheme, host, `is_private` and `client`. `peer`: the connection's other end.
+  Caller Identify(Request& request, const Caller& peer, Call& call) const;
+
+  // When the request may go on, at most after `longest_wait`: clients that ask too often wait. All but probes count,
+  // those to URLs that do not exist among them.
+  RateLimiter::Turn TakeTurn(const Call& call, const Caller& caller, std::chrono::milliseconds longest_wait);
+  // 429, to whom no turn was granted.
+  static Response TooManyRequests(const RateLimiter::Turn& turn, const Call& call);
+
+  // 401 or 403; nothing where the request may go on.
+  std::optional<Response> Refuse(const Call& call) const;
+
+  // Whether the reply is one that another token would not get.
+  bool IsForGrant(const Call& call) const;
+
+  const Proxies& proxies() const { return options_.proxies; }
+
+ private:
+  const GateOptions options_;
+  RateLimiter limiter_;
+};
+
+}  // namespace terrace::server

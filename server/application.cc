@@ -1,0 +1,239 @@
+#include "server/application.h"
+
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/this_coro.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <utility>
+
+#include "server/api/negotiate.h"
+#include "server/http/http_error.h"
+
+namespace terrace::server {
+namespace {
+
+using Clock = TileService::Clock;
+
+// How long a request waits for a source that was replaced, and how often it looks.
+constexpr std::chrono::milliseconds kReplaceTime{3'000}, kReplacePeriod{20};
+// A source that is replaced again while it is opened cannot be opened for a moment; one that still cannot after this
+// time waits for a person.
+constexpr std::chrono::milliseconds kPassingTrouble{1'500};
+
+asio::awaitable<void> Pause() {
+  asio::steady_timer timer(co_await asio::this_coro::executor, kReplacePeriod);
+  co_await timer.async_wait(asio::use_awaitable);
+}
+
+// Names that nobody serves must not become labels of the metrics.
+void SetLabels(const Call& call, const Handlers& handlers, Response& response) {
+  response.labels.route = call.route.row->label;
+  const std::string& dataset = call.route.dataset;
+  if (!dataset.empty() && FindDataset(dataset, handlers.catalog->datasets)) response.labels.subject = dataset;
+}
+
+}  // namespace
+
+// Serves one connection.
+class TerrainApplication::Handler final : public ConnectionHandler {
+ public:
+  Handler(TerrainApplication& application, const asio::ip::address& peer)
+      : application_(application), peer_(Canonical(peer)) {}
+
+  Admission Admit(Request& request, std::chrono::milliseconds longest_wait) override {
+    Gate& gate = application_.parts_.edge.gate;
+    call_.request = &request;
+    caller_ = gate.Identify(request, peer_, call_);
+    Result<Route> route = Routes().Match(request.target);
+    call_.route = route ? *std::move(route) : Route();
+    Admission admission;
+    const RateLimiter::Turn turn = gate.TakeTurn(call_, caller_, longest_wait);
+    if (!turn.granted) {
+      admission.refusal = Gate::TooManyRequests(turn, call_);
+      admission.delays_refusal = true;
+      return admission;
+    }
+    admission.wait = turn.wait;
+    admission.refusal = route ? Refuse() : RefuseUnknown(route.error());
+    if (admission.refusal) return admission;
+    const RouteRow& row = *call_.route.row;
+    admission.for_grant = gate.IsForGrant(call_);
+    if (row.takes_post()) admission.max_body_bytes = row.max_body_bytes(application_.max_locations());
+    return admission;
+  }
+
+  Answer Handle(const Request&) override {
+    const RouteRow& row = *call_.route.row;
+    if (application_.opening() && !row.is_of_process) return AfterOpening();
+    HandlersPtr handlers = application_.Current();
+    Answer answer = row.handle(*handlers, call_);
+    auto* response = std::get_if<Response>(&answer);
+    if (response == nullptr) return Finish(std::move(handlers), std::get<asio::awaitable<Response>>(std::move(answer)));
+    SetLabels(call_, *handlers, *response);
+    return answer;
+  }
+
+  void Report(const SentReply& reply) override;
+
+ private:
+  // Preflights come before access: they carry no token.
+  std::optional<Response> RefuseMethod(bool takes_post) const {
+    const Request& request = *call_.request;
+    if (request.method == Method::kOptions) return PreflightResponse(takes_post);
+    if (request.method == Method::kOther || (request.method == Method::kPost && !takes_post)) {
+      return NoSuchMethodResponse(takes_post, request.id);
+    }
+    return std::nullopt;
+  }
+  std::optional<Response> RefuseUnknown(const Error& error) const {
+    std::optional<Response> refusal = RefuseMethod(/*takes_post=*/false);
+    return refusal ? std::move(refusal) : ClientErrorResponse(error, call_.request->id);
+  }
+  std::optional<Response> Refuse() const {
+    std::optional<Response> refusal = RefuseMethod(call_.route.row->takes_post());
+    if (refusal) return refusal;
+    refusal = application_.parts_.edge.gate.Refuse(call_);
+    if (refusal) refusal->labels.route = call_.route.row->label;
+    return refusal;
+  }
+
+  asio::awaitable<Response> AfterOpening();
+  asio::awaitable<Response> Finish(HandlersPtr handlers, asio::awaitable<Response> answer);
+
+  TerrainApplication& application_;
+  const Caller peer_;
+  Caller caller_;
+  Call call_;
+};
+
+asio::awaitable<Response> TerrainApplication::Handler::AfterOpening() {
+  if (!co_await application_.FirstCatalog()) {
+    Response response = ProblemResponse(503, "the sources are being opened", call_.request->id);
+    response.headers.emplace_back("Retry-After", "5");
+    response.labels.route = call_.route.row->label;
+    co_return response;
+  }
+  Answer answer = Handle(*call_.request);
+  if (auto* response = std::get_if<Response>(&answer)) co_return std::move(*response);
+  co_return co_await std::get<asio::awaitable<Response>>(std::move(answer));
+}
+
+// Keeps what it is answered from. Where that turns out to be gone, the next catalog answers.
+asio::awaitable<Response> TerrainApplication::Handler::Finish(HandlersPtr handlers, asio::awaitable<Response> answer) {
+  const auto give_up = Clock::now() + kReplaceTime;
+  for (Answer next = std::move(answer);;) {
+    if (auto* later = std::get_if<asio::awaitable<Response>>(&next)) {
+      Response response = co_await std::move(*later);
+      next = std::move(response);
+    }
+    Response& response = std::get<Response>(next);
+    SetLabels(call_, *handlers, response);
+    if (!response.try_again || !application_.parts_.on_source_changed) co_return std::move(response);
+    application_.parts_.on_source_changed();
+    std::string dataset = response.labels.subject;
+    const bool is_replaced = co_await application_.NextCatalog(handlers, std::move(dataset), give_up);
+    if (!is_replaced) co_return std::move(response);
+    handlers = application_.Current();
+    next = call_.route.row->handle(*handlers, call_);
+  }
+}
+
+void TerrainApplication::Handler::Report(const SentReply& reply) {
+  const Request& request = reply.request;
+  const Response& response = reply.response;
+  ReplyRecord record;
+  record.method = request.method_name;
+  record.target = request.target;
+  record.status = response.status;
+  record.body_bytes = reply.body_bytes;
+  record.duration = reply.duration;
+  record.route = response.labels.route;
+  record.dataset = response.labels.subject;
+  record.cache = response.labels.cache;
+  record.version = request.version;
+  record.referer = request.fields->referer;
+  record.user_agent = request.fields->user_agent;
+  record.request_id = request.id;
+  record.peer = reply.peer;
+  if (reply.is_admitted && caller_.address != peer_.address) record.client = caller_.text;
+  if (reply.is_admitted && call_.grant) record.token_name = call_.grant->name;
+  application_.parts_.metrics.CountReply(record);
+  application_.parts_.access_log.Write(record);
+}
+
+TerrainApplication::TerrainApplication(ApplicationParts parts, CatalogPtr catalog, HandlerOptions options)
+    : parts_(std::move(parts)), max_locations_(options.max_locations), opening_(catalog == nullptr) {
+  if (!catalog) catalog = std::make_shared<const Catalog>();
+  handlers_ = std::make_shared<const Handlers>(std::move(catalog), parts_.tiles, parts_.viewer, options, *this);
+  deadline_.store(options.deadline);
+}
+
+std::unique_ptr<ConnectionHandler> TerrainApplication::Connect(const asio::ip::address& peer) {
+  return std::make_unique<Handler>(*this, peer);
+}
+
+std::string TerrainApplication::ClientOf(const asio::ip::address& peer) const {
+  const asio::ip::address address = Canonical(peer);
+  return parts_.edge.gate.proxies().trusted.Contains(address) ? "" : ClientBlock(address);
+}
+
+bool TerrainApplication::Replace(CatalogPtr catalog, HandlerOptions options) {
+  // The old ones end after the lock.
+  auto handlers = std::make_shared<const Handlers>(std::move(catalog), parts_.tiles, parts_.viewer, options, *this);
+  deadline_.store(options.deadline, std::memory_order_relaxed);
+  const std::lock_guard lock(mutex_);
+  handlers_.swap(handlers);
+  const bool is_first = opening_.exchange(false);
+  if (!is_first) ++replaced_;
+  return is_first;
+}
+
+void TerrainApplication::SetTroubles(std::map<std::string, std::string> troubles) {
+  const std::lock_guard lock(mutex_);
+  const auto now = Clock::now();
+  std::erase_if(trouble_since_, [&](const auto& known) { return !troubles.contains(known.first); });
+  for (const auto& [dataset, trouble] : troubles) trouble_since_.try_emplace(dataset, now);
+  troubles_ = std::move(troubles);
+}
+
+std::map<std::string, std::string> TerrainApplication::troubles() const {
+  const std::lock_guard lock(mutex_);
+  return troubles_;
+}
+
+std::uint64_t TerrainApplication::replaced() const {
+  const std::lock_guard lock(mutex_);
+  return replaced_;
+}
+
+TerrainApplication::HandlersPtr TerrainApplication::Current() const {
+  const std::lock_guard lock(mutex_);
+  return handlers_;
+}
+
+bool TerrainApplication::HasLastingTrouble(const std::string& dataset) const {
+  const std::lock_guard lock(mutex_);
+  const auto since = trouble_since_.find(dataset);
+  return since != trouble_since_.end() && Clock::now() - since->second >= kPassingTrouble;
+}
+
+// False: there was none in time, or will be none.
+asio::awaitable<bool> TerrainApplication::FirstCatalog() const {
+  const auto give_up = Clock::now() + deadline_.load(std::memory_order_relaxed);
+  while (opening()) {
+    if (draining() || Clock::now() >= give_up) co_return false;
+    co_await Pause();
+  }
+  co_return true;
+}
+
+// False: none comes in time.
+asio::awaitable<bool> TerrainApplication::NextCatalog(HandlersPtr now, std::string dataset,
+                                                      Clock::time_point give_up) const {
+  while (Current() == now) {
+    if (draining() || HasLastingTrouble(dataset) || Clock::now() >= give_up) co_return false;
+    co_await Pause();
+  }
+  co_return true;
+}
+
+}  // namespace terrace::server

@@ -1,0 +1,89 @@
+// What the server does behind HTTP: admits requests, finds who answers them, answers from what is served at the moment,
+// and reports every reply to the log and the metrics.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include "server/api/call.h"
+#include "server/api/gate.h"
+#include "server/documents/static_files.h"
+#include "server/edge.h"
+#include "server/handlers/state_handler.h"
+#include "server/http/application.h"
+#include "server/routes.h"
+#include "server/telemetry/access_log.h"
+#include "server/telemetry/metrics.h"
+#include "server/telemetry/metrics_page.h"
+#include "server/tiles/catalog.h"
+#include "server/tiles/tile_service.h"
+
+namespace terrace::server {
+
+// Where requests are answered from and told about; outlives the application.
+struct ApplicationParts {
+  Edge& edge;
+  TileService& tiles;
+  Metrics& metrics;
+  MetricsPage& metrics_page;
+  AccessLog& access_log;
+  std::shared_ptr<const StaticFiles> viewer;
+  // Told that a source is not the one that was opened any more; on io threads, must not block. Empty: nobody will open
+  // it anew.
+  std::function<void()> on_source_changed;
+};
+
+class TerrainApplication final : public Application, public ProcessState {
+ public:
+  // Without a catalog (null) requests wait for the first Replace, all but those about the process.
+  TerrainApplication(ApplicationParts parts, CatalogPtr catalog, HandlerOptions options);
+
+  std::unique_ptr<ConnectionHandler> Connect(const asio::ip::address& peer) override;
+  std::string ClientOf(const asio::ip::address& peer) const override;
+
+  // Requests that come from now on are answered from `catalog`. True: it is the first.
+  bool Replace(CatalogPtr catalog, HandlerOptions options);
+
+  // By dataset; "" is the configuration.
+  void SetTroubles(std::map<std::string, std::string> troubles);
+
+  const std::atomic<std::chrono::milliseconds>& deadline() const { return deadline_; }  // of a request
+  // Never null; empty before the first.
+  CatalogPtr catalog() const { return Current()->catalog; }
+  bool opening() const override { return opening_.load(std::memory_order_acquire); }
+  std::map<std::string, std::string> troubles() const override;
+  std::uint64_t replaced() const;  // how often a catalog has replaced another
+
+ private:
+  class Handler;
+  using HandlersPtr = std::shared_ptr<const Handlers>;
+
+  bool draining() const override { return parts_.edge.connections.draining(); }
+  asio::awaitable<std::shared_ptr<const std::string>> MetricsText() const override { return parts_.metrics_page.Get(); }
+
+  std::size_t max_locations() const { return max_locations_; }
+  HandlersPtr Current() const;
+  bool HasLastingTrouble(const std::string& dataset) const;
+
+  asio::awaitable<bool> FirstCatalog() const;
+  asio::awaitable<bool> NextCatalog(HandlersPtr now, std::string dataset, TileService::Clock::time_point give_up) const;
+
+  const ApplicationParts parts_;
+  mutable std::mutex mutex_;
+  HandlersPtr handlers_;  // never null; guarded by mutex_, as the next three are
+  std::uint64_t replaced_ = 0;
+  std::map<std::string, std::string> troubles_;
+  std::map<std::string, std::chrono::steady_clock::time_point> trouble_since_;  // of the same datasets
+  const std::size_t max_locations_;
+  std::atomic<std::chrono::milliseconds> deadline_;
+  std::atomic<bool> opening_;  // the first catalog has not come
+};
+
+}  // namespace terrace::server

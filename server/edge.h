@@ -1,0 +1,34 @@
+// The border between clients and the server as one object: who is let in, what they may ask for, and how much of it is
+// under way at a time.
+#pragma once
+
+#include <memory>
+
+#include "engine/core/result.h"
+#include "server/api/edge_options.h"
+#include "server/api/gate.h"
+#include "server/asio.h"
+#include "server/http/cors.h"
+#include "server/net/connection_set.h"
+#include "server/net/tls.h"
+#include "server/net/transfer_budget.h"
+
+namespace terrace::server {
+
+struct Edge {
+  // Errors name the option's text, or the file.
+  static Result<std::unique_ptr<Edge>> Open(const EdgeOptions& options);
+
+  Edge(const EdgeOptions& options, GateOptions gate_options);
+
+  ConnectionSet connections;
+  TransferBudget transfers;
+  Gate gate;
+  CorsPolicy cors;
+  std::unique_ptr<TlsContext> tls;  // null: plain HTTP
+};
+
+// Looks for a new certificate every two seconds, until cancelled. `tls` must outlive it.
+asio::awaitable<void> WatchCertificate(TlsContext* tls);
+
+}  // namespace terrace::server

@@ -1,0 +1,67 @@
+#include "server/handlers/state_handler.h"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "server/http/http_error.h"
+#include "server/query/query.h"
+
+namespace terrace::server {
+namespace {
+
+Response StateResponse(int status, std::string_view content_type, std::shared_ptr<const std::string> text) {
+  Response response;
+  response.status = status;
+  response.is_vital = true;
+  response.content_type = content_type;
+  response.body = std::move(text);
+  response.cache_control = "no-store";
+  return response;
+}
+
+Response PlainState(int status, std::string text) {
+  return StateResponse(status, "text/plain; charset=utf-8", std::make_shared<const std::string>(std::move(text)));
+}
+
+}  // namespace
+
+Response StateHandler::Live(const Call& call) const {
+  const Result<void> none = RefuseParameters(call.route.query);
+  return none ? PlainState(200, "ok\n") : ClientErrorResponse(none.error(), call.request->id);
+}
+
+// The first word is the state. A degraded server goes on answering, so it is not to be taken out of service. Reasons
+// name files: they are for the log. Datasets are named to those who may see them all.
+Response StateHandler::Ready(const Call& call) const {
+  if (const Result<void> none = RefuseParameters(call.route.query); !none) {
+    return ClientErrorResponse(none.error(), call.request->id);
+  }
+  if (state_.draining() || state_.opening()) {
+    Response response = PlainState(503, state_.draining() ? "draining\n" : "opening\n");
+    response.headers.emplace_back("Retry-After", "5");
+    return response;
+  }
+  const std::map<std::string, std::string> troubles = state_.troubles();
+  std::string text = troubles.empty() ? "ready\n" : "degraded\n";
+  for (const auto& [dataset, reason] : troubles) {
+    text += dataset.empty() ? "the configuration file is wrong, the last good one is in force\n"
+                            : fmt::format("dataset{}: its source cannot be opened as it is now\n",
+                                          call.sees_all() ? " " + dataset : "");
+  }
+  return PlainState(200, std::move(text));
+}
+
+Answer StateHandler::Metrics(const Call& call) const {
+  if (const Result<void> none = RefuseParameters(call.route.query); !none) {
+    return ClientErrorResponse(none.error(), call.request->id);
+  }
+  return WriteMetrics();
+}
+
+asio::awaitable<Response> StateHandler::WriteMetrics() const {
+  std::shared_ptr<const std::string> text = co_await state_.MetricsText();
+  co_return StateResponse(200, "text/plain; version=0.0.4; charset=utf-8", std::move(text));
+}
+
+}  // namespace terrace::server

@@ -1,0 +1,40 @@
+// GET /livez, /readyz and /metrics: what whoever operates the server asks it.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+
+#include "server/api/call.h"
+#include "server/asio.h"
+#include "server/http/application.h"
+
+namespace terrace::server {
+
+// The process as it is now. Thread-safe.
+class ProcessState {
+ public:
+  virtual ~ProcessState() = default;
+  virtual bool draining() const = 0;
+  virtual bool opening() const = 0;  // what is served has not been opened yet
+  // By dataset; "" is the configuration.
+  virtual std::map<std::string, std::string> troubles() const = 0;
+  virtual asio::awaitable<std::shared_ptr<const std::string>> MetricsText() const = 0;
+};
+
+class StateHandler {
+ public:
+  // `state` must outlive this.
+  explicit StateHandler(const ProcessState& state) : state_(state) {}
+
+  Response Live(const Call& call) const;
+  Response Ready(const Call& call) const;
+  Answer Metrics(const Call& call) const;
+
+ private:
+  asio::awaitable<Response> WriteMetrics() const;
+
+  const ProcessState& state_;
+};
+
+}  // namespace terrace::server

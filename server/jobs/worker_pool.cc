@@ -1,0 +1,99 @@
+#include "server/jobs/worker_pool.h"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+namespace terrace::server {
+
+Error FailureOf(std::string_view name, const std::exception& thrown) {
+  try {
+    return Error{ErrorCode::kUnavailable, std::string(name) + ": " + thrown.what()};
+  } catch (const std::exception&) {
+    return Error{ErrorCode::kUnavailable, "no memory"};  // for a longer message neither
+  }
+}
+
+Error DisplacedError(std::string_view name) {
+  try {
+    return Error{ErrorCode::kOverloaded, std::string(name) + ": displaced from the full queue of work"};
+  } catch (const std::exception&) {
+    return Error{ErrorCode::kOverloaded, "no memory"};
+  }
+}
+
+WorkerPool::WorkerPool(unsigned threads, std::size_t queue_length, Now now)
+    : thread_count_(threads > 0 ? threads : std::max(1u, std::thread::hardware_concurrency())),
+      queue_length_(queue_length),
+      now_(std::move(now)),
+      queue_(thread_count_),
+      idle_(thread_count_) {
+  threads_.reserve(thread_count_);
+  for (unsigned i = 0; i < thread_count_; ++i) threads_.emplace_back([this] { Serve(); });
+}
+
+WorkerPool::~WorkerPool() { Shutdown(); }
+
+Result<void> WorkerPool::Submit(PoolJobPtr job) {
+  PoolJobPtr displaced;
+  {
+    const std::lock_guard lock(mutex_);
+    if (cancel_.stop_requested()) return MakeError(ErrorCode::kUnavailable, "the server is shutting down");
+    const JobClock::time_point now = now_();
+    // Compared as seconds: a deadline may be the last time there is.
+    if (queue_.ExpectedWait(job->order, now) > std::chrono::duration<double>(job->order.deadline - now)) {
+      return MakeError(ErrorCode::kOverloaded, "too much work is waiting to begin with this before its deadline");
+    }
+    queue_.Push(job, now);
+    // Jobs that an idle thread is about to fetch are not waiting: a pool with queue length 0 still works.
+    if (queue_.size() > queue_length_ + idle_) displaced = queue_.RemoveNewestOfLargest();
+    if (displaced == job) return MakeError(ErrorCode::kOverloaded, "the queue of work is full");
+  }
+  wake_.notify_one();
+  if (displaced && displaced->displaced) displaced->displaced();
+  return {};
+}
+
+void WorkerPool::Withdraw(const PoolJobPtr& job) {
+  if (!job) return;
+  const std::lock_guard lock(mutex_);
+  queue_.Remove(job);
+}
+
+void WorkerPool::Cancel() { cancel_.request_stop(); }
+
+void WorkerPool::Shutdown() {
+  Cancel();
+  {
+    const std::lock_guard lock(mutex_);
+    shut_down_ = true;
+  }
+  wake_.notify_all();
+  for (std::thread& thread : threads_) {
+    if (thread.joinable()) thread.join();
+  }
+}
+
+std::size_t WorkerPool::queued() const {
+  const std::lock_guard lock(mutex_);
+  return queue_.size();
+}
+
+void WorkerPool::Serve() {
+  std::unique_lock lock(mutex_);
+  for (;;) {
+    wake_.wait(lock, [this] { return shut_down_ || queue_.HasNext(); });
+    PoolJobPtr job = queue_.Take(now_(), /*all=*/shut_down_);
+    if (!job) return;  // shut down
+    --idle_;
+    lock.unlock();
+    job->run();
+    job->run = nullptr;  // what it holds is released outside the lock
+    job->displaced = nullptr;
+    lock.lock();
+    ++idle_;
+    queue_.Finish(job, now_());
+  }
+}
+
+}  // namespace terrace::server

@@ -1,0 +1,180 @@
+// The threads that compute and read files, behind one queue in which clients take turns (FairQueue).
+//
+// A job waits; it is refused only where it would have to wait past its deadline, or where more wait than the bound, and
+// then it is the newest job of the client that has most waiting. Whoever has nothing to wait for any more withdraws its
+// job.
+//
+// Thread-safe. A job that was taken is run, also during shutdown.
+#pragma once
+
+#include <atomic>
+#include <boost/asio/redirect_error.hpp>
+#include <boost/asio/this_coro.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <condition_variable>
+#include <cstddef>
+#include <exception>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <stop_token>
+#include <string_view>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "server/asio.h"
+#include "server/jobs/fair_queue.h"
+#include "server/jobs/waiter.h"
+
+namespace terrace::server {
+
+// Blocks on a worker. Asked to stop once nobody waits for its result.
+template <typename T>
+using Work = std::function<Result<T>(std::stop_token)>;
+
+// kUnavailable, and what was thrown in the work that is called `name`. Never throws.
+Error FailureOf(std::string_view name, const std::exception& thrown);
+// kOverloaded: the job of the work that is called `name` had to make room. Never throws.
+Error DisplacedError(std::string_view name);
+
+// What the work returns; an exception counts as kUnavailable. Never throws: on a worker that would end the program.
+template <typename T>
+Result<T> Outcome(std::string_view name, const Work<T>& work, std::stop_token stop) {
+  try {
+    if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "{}: stopped before it began", name);
+    return work(std::move(stop));
+  } catch (const std::exception& thrown) {
+    return tl::unexpected(FailureOf(name, thrown));
+  }
+}
+
+class WorkerPool {
+ public:
+  using Now = std::function<JobClock::time_point()>;
+
+  // `threads` 0 means as many as the machine has processors. `queue_length` bounds the jobs that wait for a thread.
+  WorkerPool(unsigned threads, std::size_t queue_length, Now now = JobClock::now);
+  ~WorkerPool();
+  WorkerPool(const WorkerPool&) = delete;
+  WorkerPool& operator=(const WorkerPool&) = delete;
+
+  // Runs `work` on a worker for one caller, who waits for its result. Errors: those of `work` and Submit; kCancelled:
+  // the order's deadline passed, or the awaiting coroutine was cancelled. The coroutine has to run on a single thread.
+  template <typename T>
+  asio::awaitable<Result<T>> Run(Work<T> work, JobOrder order);
+
+  // kOverloaded: the job cannot begin before its deadline, or there is no place for it. kUnavailable: the pool takes no
+  // more jobs. It will not run then. May call another job's `displaced`.
+  Result<void> Submit(PoolJobPtr job);
+
+  // A job that still waits never runs. Null: nothing to do.
+  void Withdraw(const PoolJobPtr& job);
+
+  // Takes no more jobs, and asks the work of Run and of flights to stop.
+  void Cancel();
+  // Requested by Cancel.
+  std::stop_token cancelled() const { return cancel_.get_token(); }
+
+  // Cancels, runs the jobs that were taken and joins the threads. May be called twice; not from a job.
+  void Shutdown();
+
+  std::size_t queued() const;
+  // Calls of Run that wait for their result.
+  std::size_t runs() const { return runs_.load(std::memory_order_relaxed); }
+  unsigned threads() const { return thread_count_; }
+
+ private:
+  template <typename T>
+  struct Errand;
+  template <typename T>
+  class Seat;
+
+  void Serve();
+
+  const unsigned thread_count_;
+  const std::size_t queue_length_;
+  const Now now_;
+  std::stop_source cancel_;
+  std::atomic<std::size_t> runs_{0};
+  mutable std::mutex mutex_;
+  std::condition_variable wake_;
+  FairQueue queue_;
+  unsigned idle_ = 0;  // threads without a job
+  bool shut_down_ = false;
+  std::vector<std::thread> threads_;
+};
+
+// Shared by a call of Run and its job.
+template <typename T>
+struct WorkerPool::Errand {
+  static constexpr std::string_view kName = "work for one request";
+
+  Errand(Work<T> w, std::stop_token cancelled, WaiterPtr who)
+      : work(std::move(w)), at_cancel(std::move(cancelled), [this] { stop.request_stop(); }), waiter(std::move(who)) {}
+
+  void Finish(Result<T> result) {
+    std::unique_lock lock(mutex);
+    outcome = std::move(result);
+    WaiterPtr who = std::exchange(waiter, nullptr);
+    lock.unlock();
+    Wake(std::move(who));
+  }
+
+  Work<T> work;
+  std::stop_source stop;
+  std::stop_callback<std::function<void()>> at_cancel;
+  std::mutex mutex;                  // guards what follows
+  WaiterPtr waiter;                  // null: it has left, or was woken
+  std::optional<Result<T>> outcome;  // nothing: not yet
+};
+
+// The caller's part of an errand. Lives in the frame of Run, so that the job is given up however the coroutine ends.
+template <typename T>
+class WorkerPool::Seat {
+ public:
+  Seat(WorkerPool& pool, std::shared_ptr<Errand<T>> errand, PoolJobPtr job)
+      : pool_(pool), errand_(std::move(errand)), job_(std::move(job)) {
+    pool_.runs_.fetch_add(1, std::memory_order_relaxed);
+  }
+  Seat(const Seat&) = delete;
+  Seat& operator=(const Seat&) = delete;
+  ~Seat() {
+    pool_.runs_.fetch_sub(1, std::memory_order_relaxed);
+    std::unique_lock lock(errand_->mutex);
+    errand_->waiter = nullptr;
+    if (errand_->outcome) return;
+    lock.unlock();  // stopping runs the work's callbacks
+    pool_.Withdraw(job_);
+    errand_->stop.request_stop();
+  }
+
+ private:
+  WorkerPool& pool_;
+  const std::shared_ptr<Errand<T>> errand_;
+  const PoolJobPtr job_;
+};
+
+template <typename T>
+asio::awaitable<Result<T>> WorkerPool::Run(Work<T> work, JobOrder order) {
+  const auto executor = co_await asio::this_coro::executor;
+  const auto waiter = std::make_shared<asio::steady_timer>(executor, order.deadline);
+  const auto errand = std::make_shared<Errand<T>>(std::move(work), cancelled(), waiter);
+  const auto job = std::make_shared<PoolJob>();
+  job->order = order;
+  job->run = [errand] { errand->Finish(Outcome(Errand<T>::kName, errand->work, errand->stop.get_token())); };
+  job->displaced = [errand] { errand->Finish(tl::unexpected(DisplacedError(Errand<T>::kName))); };
+  const Seat<T> seat(*this, errand, job);
+  if (Result<void> submitted = Submit(job); !submitted) co_return tl::unexpected(std::move(submitted.error()));
+
+  boost::system::error_code ignored;  // finished, expired or cancelled: the outcome tells
+  co_await waiter->async_wait(asio::redirect_error(asio::use_awaitable, ignored));
+
+  const std::lock_guard lock(errand->mutex);
+  if (errand->outcome) co_return std::move(*errand->outcome);
+  co_return MakeError(ErrorCode::kCancelled, "{}: not ready before the request's deadline", Errand<T>::kName);
+}
+
+}  // namespace terrace::server

@@ -1,0 +1,55 @@
+#include "server/net/client_watch.h"
+
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <sys/socket.h>
+
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/this_coro.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <chrono>
+#include <string_view>
+
+namespace terrace::server {
+namespace {
+
+// A request that takes longer than this is worth asking whether its client is still there.
+constexpr std::chrono::milliseconds kPatience{100};
+// Where bytes that nobody reads yet, another request or the end of what the client sends, hide whether the connection
+// stands, the kernel is asked so often.
+constexpr std::chrono::milliseconds kInterval{250};
+
+// What every reply begins with; RFC 9112, section 4.
+constexpr std::string_view kReplyBegin = "HTTP/1.";
+
+// As the kernel has it: TCP_ESTABLISHED, TCP_CLOSE_WAIT once the client has ended its sending, ...
+int StateOf(asio::ip::tcp::socket& socket) {
+  tcp_info info{};
+  socklen_t size = sizeof info;
+  if (::getsockopt(socket.native_handle(), IPPROTO_TCP, TCP_INFO, &info, &size) != 0) return TCP_CLOSE;
+  return info.tcpi_state;
+}
+
+bool IsOpen(Stream& stream) {
+  const int state = StateOf(stream.socket());
+  if (state == TCP_CLOSE_WAIT && !stream.is_tls()) {
+    stream.SendAhead(kReplyBegin);
+    return true;
+  }
+  return state == TCP_ESTABLISHED;
+}
+
+}  // namespace
+
+asio::awaitable<void> ClientLeft(Stream& stream) {
+  asio::ip::tcp::socket& socket = stream.socket();
+  asio::steady_timer timer(co_await asio::this_coro::executor, kPatience);
+  co_await timer.async_wait(asio::use_awaitable);
+  co_await socket.async_wait(asio::ip::tcp::socket::wait_read, asio::use_awaitable);
+  while (IsOpen(stream)) {
+    timer.expires_after(kInterval);
+    co_await timer.async_wait(asio::use_awaitable);
+  }
+}
+
+}  // namespace terrace::server

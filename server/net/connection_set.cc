@@ -1,0 +1,110 @@
+#include "server/net/connection_set.h"
+
+#include <optional>
+#include <tuple>
+
+namespace terrace::server {
+
+void ConnectionSet::Add(const std::shared_ptr<Connection>& connection, const std::string& client) {
+  bool draining = false;
+  {
+    const std::lock_guard lock(mutex_);
+    connections_.emplace(connection.get(), Member{connection, client, ++last_number_});
+    ++of_client_[client];
+    draining = draining_;
+  }
+  if (draining) connection->Drain();
+}
+
+void ConnectionSet::Remove(const Connection* connection) {
+  const std::lock_guard lock(mutex_);
+  const auto member = connections_.find(connection);
+  if (member == connections_.end()) return;
+  if (!member->second.is_evicted) Uncount(member->second.client);
+  connections_.erase(member);
+  if (connections_.empty()) emptied_.notify_all();
+}
+
+void ConnectionSet::Uncount(const std::string& client) {
+  if (const auto count = of_client_.find(client); --count->second == 0) of_client_.erase(count);
+}
+
+std::size_t ConnectionSet::size() const {
+  const std::lock_guard lock(mutex_);
+  return connections_.size();
+}
+
+bool ConnectionSet::HasTooMany(const std::string& client) const {
+  if (most_of_one_ == 0 || client.empty()) return false;
+  const std::lock_guard lock(mutex_);
+  const auto count = of_client_.find(client);
+  return count != of_client_.end() && count->second >= most_of_one_;
+}
+
+bool ConnectionSet::draining() const {
+  const std::lock_guard lock(mutex_);
+  return draining_;
+}
+
+// Connections are told without the lock: the last reference to one may end here, and it then removes itself.
+std::vector<std::shared_ptr<Connection>> ConnectionSet::Snapshot() const {
+  std::vector<std::shared_ptr<Connection>> connections;
+  const std::lock_guard lock(mutex_);
+  connections.reserve(connections_.size());
+  for (const auto& [pointer, member] : connections_) {
+    if (auto connection = member.connection.lock()) connections.push_back(std::move(connection));
+  }
+  return connections;
+}
+
+bool ConnectionSet::EvictOne(const std::string& newcomer) {
+  std::shared_ptr<Connection> chosen;
+  bool serves = false;
+  {
+    const std::lock_guard lock(mutex_);
+    const auto held = of_client_.find(newcomer);
+    const std::size_t after = held == of_client_.end() ? 1 : held->second + 1;
+    using Rank = std::tuple<Connection::Phase, std::int64_t, std::int64_t>;
+    std::optional<Rank> least;
+    Member* of_least = nullptr;
+    for (auto& [pointer, member] : connections_) {
+      if (member.is_evicted) continue;
+      const Connection::Phase phase = pointer->phase();  // good: a connection that ends waits for mutex_ in Remove
+      const std::size_t of_client = of_client_.at(member.client);
+      const bool is_serving = phase == Connection::Phase::kServes;
+      if (is_serving && (member.client.empty() || of_client <= after)) continue;
+      const auto number = static_cast<std::int64_t>(member.number);
+      const Rank rank(phase, -static_cast<std::int64_t>(of_client), is_serving ? -number : number);
+      if (least && *least < rank) continue;
+      least = rank;
+      of_least = &member;
+      serves = is_serving;
+    }
+    if (of_least == nullptr) return false;
+    of_least->is_evicted = true;
+    Uncount(of_least->client);
+    chosen = of_least->connection.lock();
+  }
+  if (!chosen) return true;  // it has just ended
+  serves ? chosen->Abort() : chosen->Evict();
+  return true;
+}
+
+void ConnectionSet::Drain() {
+  {
+    const std::lock_guard lock(mutex_);
+    draining_ = true;
+  }
+  for (const auto& connection : Snapshot()) connection->Drain();
+}
+
+void ConnectionSet::AbortAll() {
+  for (const auto& connection : Snapshot()) connection->Abort();
+}
+
+bool ConnectionSet::WaitUntilEmpty(std::chrono::milliseconds timeout) {
+  std::unique_lock lock(mutex_);
+  return emptied_.wait_for(lock, timeout, [this] { return connections_.empty(); });
+}
+
+}  // namespace terrace::server

@@ -1,0 +1,183 @@
+#include "server/store/disk_cache.h"
+
+#include <fcntl.h>
+#include <spdlog/spdlog.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <memory>
+#include <optional>
+#include <string>
+#include <system_error>
+#include <utility>
+
+#include "tiler/encoder_version.h"
+#include "tiler/store/tile_record.h"
+
+namespace terrace::server {
+namespace {
+
+constexpr const char *kTiles = "tiles", *kRefinements = "refinements";  // the stores' directories
+
+std::string SystemMessage() { return std::system_category().message(errno); }
+
+// False where the disk does not take it.
+bool SetSize(int file, off_t size) { return ftruncate(file, size) == 0; }
+
+// The lock goes with the process, however that ends.
+Result<int> LockDirectory(const std::filesystem::path& directory) {
+  const std::filesystem::path path = directory / "lock";
+  int file = open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+  if (file < 0) {
+    const std::string why = SystemMessage();
+    file = open(path.c_str(), O_RDONLY | O_CLOEXEC);  // a disk that has become read-only
+    if (file < 0) {
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "disk_cache: {} cannot be written: {}; name a directory that the server may write to",
+                       path.string(), why);
+    }
+  }
+  if (flock(file, LOCK_EX | LOCK_NB) != 0) {
+    const bool is_used = errno == EWOULDBLOCK;
+    const std::string why = SystemMessage();
+    close(file);
+    if (!is_used) return MakeError(ErrorCode::kInvalidArgument, "disk_cache: {}: {}", path.string(), why);
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "disk_cache: {} is used by another process; give each server a directory of its own",
+                     directory.string());
+  }
+  return file;
+}
+
+DiskStoreOptions OptionsOf(const DiskCacheOptions& cache, std::size_t bytes, const char* name, bool compress,
+                           bool anew) {
+  DiskStoreOptions options;
+  options.db.directory = cache.directory / name;
+  options.db.capacity_bytes = std::max(bytes, RecordDb::kMinCapacity);
+  options.db.compress = compress;
+  options.db.open_files = cache.open_files;
+  options.db.env = cache.env;
+  options.name = name;
+  if (anew) static_cast<void>(RecordDb::Destroy(options.db));  // opening says what is wrong
+  options.retry_after = cache.retry_after;
+  return options;
+}
+
+template <typename Key>
+std::string StoreKey(const Key& key) {
+  const std::uint64_t version = tiler::EncoderVersion();
+  std::string text(reinterpret_cast<const char*>(&version), sizeof(version));
+  return text + tiler::RecordKey(key);
+}
+
+// The two kinds of values as bytes.
+std::string Serialize(const tiler::EncodedTile& tile) { return tiler::SerializeTile(tile); }
+std::string Serialize(const tiler::RefinedTile& tile) { return tiler::SerializeRefinedTile(tile); }
+Result<tiler::EncodedTile> Parse(const tiler::CacheKey& /*key*/, const std::string& bytes) {
+  return tiler::ParseTile(bytes);
+}
+Result<tiler::RefinedTile> Parse(const tiler::RefinedTileKey& /*key*/, const std::string& bytes) {
+  return tiler::ParseRefinedTile(bytes);
+}
+
+}  // namespace
+
+template <typename Key, typename Value>
+class DiskCache::Tier : public tiler::Store<Key, Value> {
+ public:
+  explicit Tier(DiskStoreOptions options) : store_(std::move(options)) {}
+
+  std::shared_ptr<const Value> Find(const Key& key) override {
+    const std::string store_key = StoreKey(key);
+    const std::optional<std::string> bytes = store_.Find(store_key);
+    if (!bytes) return nullptr;
+    Result<Value> value = Parse(key, *bytes);
+    if (value) return std::make_shared<const Value>(*std::move(value));
+    store_.Forget(store_key);
+    return nullptr;
+  }
+
+  void Insert(const Key& key, std::shared_ptr<const Value> value) override {
+    const std::size_t charge = BytesOf(*value);
+    store_.Keep(
+        StoreKey(key), [value = std::move(value)] { return Serialize(*value); }, charge);
+  }
+
+  DiskStore& store() { return store_; }
+
+ private:
+  DiskStore store_;
+};
+
+Result<std::shared_ptr<DiskCache>> DiskCache::Open(const DiskCacheOptions& options) {
+  tiler::EncoderVersion();  // taken before sources are opened, for which GDAL may load libraries
+  std::error_code failed;
+  std::filesystem::create_directories(options.directory, failed);
+  if (failed) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "disk_cache: {} cannot be made: {}; name a directory that the server may write to",
+                     options.directory.string(), failed.message());
+  }
+  const Result<int> lock = LockDirectory(options.directory);
+  if (!lock) return tl::unexpected(lock.error());
+  return std::shared_ptr<DiskCache>(new DiskCache(options, *lock));
+}
+
+DiskCache::DiskCache(const DiskCacheOptions& options, int lock) : lock_(lock) { OpenStores(options); }
+
+// RocksDB as Debian builds it asserts, and so ends the process, on some damage to what it reads while it opens a store.
+// The lock file counts openings that have not come to their end: after two, the stores are thrown away. Nothing else
+// is: whoever names a directory in which other files lie must not lose them.
+void DiskCache::OpenStores(const DiskCacheOptions& options) {
+  constexpr off_t kMaxUnfinished = 2;
+  struct stat status {};
+  off_t unfinished = fstat(lock_, &status) == 0 ? status.st_size : 0;
+  const bool anew = unfinished >= kMaxUnfinished;
+  if (anew) {
+    spdlog::warn("disk cache in {}: {} starts ended while it was opened; begun anew, check the disk",
+                 options.directory.string(), unfinished);
+    unfinished = 0;
+  }
+  SetSize(lock_, unfinished + 1);
+  if (options.tile_bytes > 0) {  // compressed already, or refuse to be
+    tiles_ = std::make_unique<Tier<tiler::CacheKey, tiler::EncodedTile>>(
+        OptionsOf(options, options.tile_bytes, kTiles, false, anew));
+  }
+  if (options.refinement_bytes > 0) {
+    refinements_ = std::make_unique<Tier<tiler::RefinedTileKey, tiler::RefinedTile>>(
+        OptionsOf(options, options.refinement_bytes, kRefinements, true, anew));
+  }
+  SetSize(lock_, 0);
+}
+
+tiler::TileStore* DiskCache::tiles() { return tiles_.get(); }
+
+tiler::RefinementStore* DiskCache::refinements() { return refinements_.get(); }
+
+DiskCache::~DiskCache() {
+  tiles_.reset();
+  refinements_.reset();
+  close(lock_);
+}
+
+void DiskCache::Flush() {
+  if (tiles_) tiles_->store().Flush();
+  if (refinements_) refinements_->store().Flush();
+}
+
+void DiskCache::Abandon() {
+  if (tiles_) tiles_->store().Abandon();
+  if (refinements_) refinements_->store().Abandon();
+}
+
+DiskCacheStats DiskCache::stats() const {
+  DiskCacheStats stats;
+  if (tiles_) stats.tiles = tiles_->store().stats();
+  if (refinements_) stats.refinements = refinements_->store().stats();
+  return stats;
+}
+
+}  // namespace terrace::server

@@ -1,0 +1,102 @@
+// Values by key on a disk that may fail: what is read back is what was written, or nothing.
+//
+// Thread-safe. Find blocks for a read; Keep returns at once, a thread of the store writes. No failure reaches the
+// caller. After one the store leaves the disk alone and tries again every `retry_after`: after a failed write it
+// goes on reading, after a failed read it finds nothing. Log and stats say so.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <functional>
+#include <list>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "server/store/record_db.h"
+
+namespace terrace::server {
+
+struct DiskStoreOptions {
+  RecordDbOptions db;
+  std::string name;                                 // in the log: "tiles"
+  std::size_t queue_bytes = std::size_t{16} << 20;  // memory of values that wait to be written; more are dropped
+  std::chrono::milliseconds retry_after{2'000};
+};
+
+struct DiskStoreStats {
+  std::uint64_t hits = 0, misses = 0;
+  std::uint64_t errors = 0;   // reads and writes that the disk failed
+  std::uint64_t damaged = 0;  // records that did not check out, and were erased
+  std::uint64_t written = 0;
+  std::uint64_t dropped = 0;           // values not written, as the disk failed or was behind
+  std::size_t entries = 0, bytes = 0;  // about, when something was written last
+  bool on = false;                     // both reading and writing
+};
+
+class DiskStore {
+ public:
+  // A disk that does not answer is no error: the store begins switched off.
+  explicit DiskStore(DiskStoreOptions options);
+  // Writes what waits, unless the disk fails.
+  ~DiskStore();
+
+  // From now on nothing is kept, and what waits is dropped but for the values that are being written, kBatchBytes: for
+  // who has no time to wait for the disk.
+  void Abandon();
+
+  // Nothing if it is not there, or was damaged, or the disk failed.
+  std::optional<std::string> Find(const std::string& key);
+
+  // `value` is called by the store's thread. `charge`: the memory that it keeps until then, about.
+  void Keep(std::string key, std::function<std::string()> value, std::size_t charge);
+
+  // For a value that Find gave and that turned out to be no such value after all.
+  void Forget(const std::string& key);
+
+  // Returns when everything that was kept before the call is written or dropped.
+  void Flush();
+
+  DiskStoreStats stats() const;
+
+  // One write of the database: few enough that erasing and closing do not wait long, many enough that small tiles do
+  // not cost a call each.
+  static constexpr std::size_t kBatchBytes = std::size_t{1} << 20;
+
+ private:
+  struct Job {
+    std::string key;
+    std::function<std::string()> value;  // empty: erase
+    std::size_t charge = 0;
+  };
+
+  void Run();
+  void Enqueue(Job job);
+  void Write(std::list<Job> jobs);
+  void Reopen();
+  void Open();
+  void SwitchOff(const std::string& why, bool reading);
+
+  const DiskStoreOptions options_;
+  mutable std::mutex mutex_;  // guards what follows, up to the counters; never held during I/O
+  std::condition_variable changed_;
+  std::shared_ptr<RecordDb> db_;  // null: nothing is read
+  bool writing_ = false;
+  std::chrono::steady_clock::time_point retry_at_;  // while not writing
+  std::list<Job> queue_;                            // whose jobs move without memory being asked for
+  std::size_t queued_bytes_ = 0;
+  bool busy_ = false;  // jobs have left the queue and are not done
+  bool stop_ = false;
+  bool abandoned_ = false;
+
+  std::atomic<std::uint64_t> hits_{0}, misses_{0}, errors_{0}, damaged_{0}, written_{0}, dropped_{0};
+  std::atomic<std::size_t> entries_{0}, bytes_{0};
+  std::thread thread_;
+};
+
+}  // namespace terrace::server

@@ -1,0 +1,328 @@
+#include "server/telemetry/metrics.h"
+
+#include <fmt/format.h>
+#include <prometheus/counter.h>
+#include <prometheus/histogram.h>
+#include <prometheus/registry.h>
+#include <prometheus/text_serializer.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <functional>
+#include <map>
+#include <mutex>
+#include <set>
+#include <shared_mutex>
+#include <string>
+#include <string_view>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+namespace terrace::server {
+namespace {
+
+using Buckets = prometheus::Histogram::BucketBoundaries;
+
+// Seconds. A cached tile takes well under a millisecond, a large build about one second.
+const Buckets& Seconds() {
+  static const Buckets buckets = {0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 30};
+  return buckets;
+}
+
+double InSeconds(std::chrono::microseconds time) { return std::chrono::duration<double>(time).count(); }
+
+prometheus::MetricFamily Value(prometheus::MetricType type, const char* name, const char* help, double value) {
+  prometheus::ClientMetric metric;
+  (type == prometheus::MetricType::Counter ? metric.counter.value : metric.gauge.value) = value;
+  prometheus::MetricFamily family;
+  family.name = name;
+  family.help = help;
+  family.type = type;
+  family.metric.push_back(std::move(metric));
+  return family;
+}
+
+// One family by tier and kind, a value for each cache that there is.
+class CacheFamily {
+ public:
+  CacheFamily(prometheus::MetricType type, const char* name, const char* help) {
+    family_.name = name;
+    family_.help = help;
+    family_.type = type;
+  }
+  CacheFamily& Add(const char* tier, const char* kind, std::uint64_t value) {
+    prometheus::ClientMetric metric;
+    metric.label = {{"tier", tier}, {"kind", kind}};
+    (family_.type == prometheus::MetricType::Counter ? metric.counter.value : metric.gauge.value) =
+        static_cast<double>(value);
+    family_.metric.push_back(std::move(metric));
+    return *this;
+  }
+  prometheus::MetricFamily Take() { return std::move(family_); }
+
+ private:
+  prometheus::MetricFamily family_;
+};
+
+void AddCaches(const TileService::Stats& tiles, const tiler::ByteCacheStats& refinements,
+               std::vector<prometheus::MetricFamily>& all) {
+  constexpr auto kCounter = prometheus::MetricType::Counter;
+  constexpr auto kGauge = prometheus::MetricType::Gauge;
+  const auto both_tiers = [&](prometheus::MetricType type, const char* name, const char* help, auto memory, auto disk) {
+    CacheFamily family(type, name, help);
+    family.Add("memory", "tiles", tiles.cache.*memory).Add("memory", "refinements", refinements.*memory);
+    if (tiles.disk) {
+      family.Add("disk", "tiles", tiles.disk->tiles.*disk).Add("disk", "refinements", tiles.disk->refinements.*disk);
+    }
+    all.push_back(family.Take());
+  };
+  both_tiers(kCounter, "terrace_cache_hits_total", "Found in a cache", &tiler::ByteCacheStats::hits,
+             &DiskStoreStats::hits);
+  both_tiers(kCounter, "terrace_cache_misses_total", "Looked for in a cache and not found",
+             &tiler::ByteCacheStats::misses, &DiskStoreStats::misses);
+  both_tiers(kGauge, "terrace_cache_entries", "Entries of a cache; on disk about", &tiler::ByteCacheStats::entries,
+             &DiskStoreStats::entries);
+  both_tiers(kGauge, "terrace_cache_bytes", "Bytes charged to a cache; on disk those of its files",
+             &tiler::ByteCacheStats::bytes, &DiskStoreStats::bytes);
+  if (!tiles.disk) return;
+  const auto disk_tier = [&](prometheus::MetricType type, const char* name, const char* help, auto member) {
+    all.push_back(CacheFamily(type, name, help)
+                      .Add("disk", "tiles", tiles.disk->tiles.*member)
+                      .Add("disk", "refinements", tiles.disk->refinements.*member)
+                      .Take());
+  };
+  disk_tier(kCounter, "terrace_cache_errors_total", "Reads and writes of a cache that the disk failed",
+            &DiskStoreStats::errors);
+  disk_tier(kCounter, "terrace_cache_damaged_total", "Records that did not check out and were erased",
+            &DiskStoreStats::damaged);
+  disk_tier(kCounter, "terrace_cache_written_total", "Values written", &DiskStoreStats::written);
+  disk_tier(kCounter, "terrace_cache_dropped_total", "Values not written, as the disk failed or was behind",
+            &DiskStoreStats::dropped);
+  disk_tier(kGauge, "terrace_cache_on", "1 while a cache reads and writes, 0 while it is switched off",
+            &DiskStoreStats::on);
+}
+
+prometheus::MetricFamily Samples(const std::vector<std::pair<std::string, dem::SampleCounts>>& datasets) {
+  prometheus::MetricFamily family;
+  family.name = "terrace_source_samples_total";
+  family.help = "Samples read for tiles: measured, small voids filled from their edges, and voids where others show";
+  family.type = prometheus::MetricType::Counter;
+  for (const auto& [dataset, counts] : datasets) {
+    const auto add = [&family, &name = dataset](const char* kind, std::uint64_t value) {
+      prometheus::ClientMetric& metric = family.metric.emplace_back();
+      metric.label = {{"dataset", name}, {"kind", kind}};
+      metric.counter.value = static_cast<double>(value);
+    };
+    add("measured", counts.measured);
+    add("filled", counts.filled);
+    add("void", counts.voids);
+  }
+  return family;
+}
+
+}  // namespace
+
+struct Metrics::Families {
+  prometheus::Registry registry;
+  prometheus::Family<prometheus::Counter>& requests = prometheus::BuildCounter()
+                                                          .Name("terrace_http_requests_total")
+                                                          .Help("Replies by route, dataset and status")
+                                                          .Register(registry);
+  prometheus::Family<prometheus::Histogram>& durations =
+      prometheus::BuildHistogram()
+          .Name("terrace_http_request_duration_seconds")
+          .Help("From the end of a request's head to its last byte sent")
+          .Register(registry);
+  prometheus::Family<prometheus::Counter>& builds = prometheus::BuildCounter()
+                                                        .Name("terrace_tile_builds_total")
+                                                        .Help("Tiles built, by dataset and result")
+                                                        .Register(registry);
+  prometheus::Family<prometheus::Histogram>& stages =
+      prometheus::BuildHistogram()
+          .Name("terrace_tile_build_stage_seconds")
+          .Help("Time of each step of a build, waiting for a worker included")
+          .Register(registry);
+  struct Stage {
+    std::chrono::microseconds tiler::StageTimes::*time;
+    prometheus::Histogram& histogram;
+  };
+  const std::array<Stage, 5> each_stage = {
+      {{&tiler::StageTimes::queue, stages.Add({{"stage", "queue"}}, Seconds())},
+       {&tiler::StageTimes::read, stages.Add({{"stage", "read"}}, Seconds())},
+       {&tiler::StageTimes::refine, stages.Add({{"stage", "refine"}}, Seconds())},
+       {&tiler::StageTimes::encode, stages.Add({{"stage", "encode"}}, Seconds())},
+       {&tiler::StageTimes::compress, stages.Add({{"stage", "compress"}}, Seconds())}}};
+  prometheus::Family<prometheus::Counter>& refinements =
+      prometheus::BuildCounter()
+          .Name("terrace_refinements_total")
+          .Help("Tiles built, by what was found of their refinement: replayed, continued, or made from the source")
+          .Register(registry);
+  prometheus::Counter& made = refinements.Add({{"use", "made"}});
+  prometheus::Counter& continued = refinements.Add({{"use", "continued"}});
+  prometheus::Counter& replayed = refinements.Add({{"use", "replayed"}});
+  prometheus::Counter& source_errors = prometheus::BuildCounter()
+                                           .Name("terrace_source_read_errors_total")
+                                           .Help("Builds that failed because a source could not be read")
+                                           .Register(registry)
+                                           .Add({});
+  // What a reply counts in, found by its labels: looking a family up takes as long as answering from the cache. Route
+  // and cache are literals, and the dataset is one that exists.
+  struct Reply {
+    prometheus::Counter& count;
+    prometheus::Histogram& duration;
+  };
+  using ReplyLabels = std::tuple<std::string_view, int, std::string_view, std::string_view>;
+  struct OwnedLabels {
+    std::string route, cache, dataset;
+    int status;
+    ReplyLabels View() const { return {route, status, cache, dataset}; }
+  };
+  struct ByLabels {
+    using is_transparent = void;
+    bool operator()(const OwnedLabels& a, const OwnedLabels& b) const { return a.View() < b.View(); }
+    bool operator()(const OwnedLabels& a, const ReplyLabels& b) const { return a.View() < b; }
+    bool operator()(const ReplyLabels& a, const OwnedLabels& b) const { return a < b.View(); }
+  };
+  // What has one dataset as a label.
+  struct OfDataset {
+    std::set<prometheus::Counter*> requests;
+    std::map<std::string, prometheus::Counter*, std::less<>> builds;  // by result
+  };
+  const Reply& AddReply(const ReplyRecord& record);
+  void CountBuild(const std::string& dataset, std::string_view result);
+  void Forget(const std::string& dataset, const OfDataset& metrics);
+
+  // Guards the maps and, held shared, keeps what they point at from being forgotten. Every reply asks for it, so it is
+  // held alone only to add or forget what has a label for the first or the last time: a family that is being collected
+  // makes that wait.
+  std::shared_mutex mutex;
+  std::map<OwnedLabels, Reply, ByLabels> replies;
+  std::map<std::string, OfDataset, std::less<>> of_datasets;
+};
+
+// `mutex` is held.
+const Metrics::Families::Reply& Metrics::Families::AddReply(const ReplyRecord& record) {
+  OwnedLabels labels{std::string(record.route), std::string(record.cache), std::string(record.dataset), record.status};
+  const std::string status = fmt::to_string(record.status);
+  const Reply reply{requests.Add({{"route", labels.route}, {"dataset", labels.dataset}, {"status", status}}),
+                    durations.Add({{"route", labels.route}, {"cache", labels.cache}}, Seconds())};
+  OfDataset& of_dataset = of_datasets[labels.dataset];
+  of_dataset.requests.insert(&reply.count);
+  return replies.emplace(std::move(labels), reply).first->second;
+}
+
+void Metrics::Families::CountBuild(const std::string& dataset, std::string_view result) {
+  {
+    const std::shared_lock lock(mutex);
+    if (const auto known = of_datasets.find(dataset); known != of_datasets.end()) {
+      const auto count = known->second.builds.find(result);
+      if (count != known->second.builds.end()) return count->second->Increment();
+    }
+  }
+  const std::unique_lock lock(mutex);
+  prometheus::Counter& count = builds.Add({{"dataset", dataset}, {"result", std::string(result)}});
+  count.Increment();
+  of_datasets[dataset].builds.emplace(result, &count);
+}
+
+// `mutex` is held.
+void Metrics::Families::Forget(const std::string& dataset, const OfDataset& metrics) {
+  std::erase_if(replies, [&](const auto& reply) { return reply.first.dataset == dataset; });
+  for (prometheus::Counter* count : metrics.requests) requests.Remove(count);
+  for (const auto& [result, count] : metrics.builds) builds.Remove(count);
+}
+
+Metrics::Metrics() : families_(std::make_unique<Families>()) {}
+Metrics::~Metrics() = default;
+
+void Metrics::CountReply(const ReplyRecord& record) {
+  const auto count = [&](const Families::Reply& reply) {
+    reply.count.Increment();
+    reply.duration.Observe(InSeconds(record.duration));
+  };
+  {
+    const std::shared_lock lock(families_->mutex);
+    const Families::ReplyLabels labels{record.route, record.status, record.cache, record.dataset};
+    if (const auto found = families_->replies.find(labels); found != families_->replies.end()) {
+      return count(found->second);
+    }
+  }
+  const std::unique_lock lock(families_->mutex);
+  count(families_->AddReply(record));
+}
+
+void Metrics::CountBuild(const DatasetView& dataset, const Result<tiler::TilePtr>& tile) {
+  const std::string_view result = tile ? "ok" : ToString(tile.error().code);
+  families_->CountBuild(dataset.name, result);
+  if (!tile) {
+    if (tile.error().code == ErrorCode::kUnavailable) families_->source_errors.Increment();
+    return;
+  }
+  switch ((*tile)->refinement) {
+    case tiler::RefinementUse::kMade:
+      families_->made.Increment();
+      break;
+    case tiler::RefinementUse::kContinued:
+      families_->continued.Increment();
+      break;
+    case tiler::RefinementUse::kReplayed:
+      families_->replayed.Increment();
+      break;
+    case tiler::RefinementUse::kNone:
+      break;
+  }
+  for (const Families::Stage& stage : families_->each_stage) {
+    stage.histogram.Observe(InSeconds((*tile)->times.*stage.time));
+  }
+}
+
+void Metrics::RetainDatasets(const std::vector<DatasetView>& datasets) {
+  std::set<std::string_view> served = {""};  // what has no dataset stays as well
+  for (const DatasetView& dataset : datasets) served.insert(dataset.name);
+  std::string from;  // names before it have been looked at
+  for (;;) {
+    // One by one: every reply waits meanwhile, and to take a series out of a family is to look for it.
+    const std::unique_lock lock(families_->mutex);
+    auto gone = families_->of_datasets.lower_bound(from);
+    while (gone != families_->of_datasets.end() && served.contains(gone->first)) ++gone;
+    if (gone == families_->of_datasets.end()) return;
+    families_->Forget(gone->first, gone->second);
+    from = gone->first;
+    families_->of_datasets.erase(gone);
+  }
+}
+
+std::string Metrics::Text(const TileService::Stats& tiles, const tiler::ByteCacheStats& refinements,
+                          const SourceStats& sources, const ServerState& state) const {
+  constexpr auto kCounter = prometheus::MetricType::Counter;
+  constexpr auto kGauge = prometheus::MetricType::Gauge;
+  std::vector<prometheus::MetricFamily> all = families_->registry.Collect();
+  const auto add = [&all](prometheus::MetricType type, const char* name, const char* help, auto value) {
+    all.push_back(Value(type, name, help, static_cast<double>(value)));
+  };
+  AddCaches(tiles, refinements, all);
+  add(kCounter, "terrace_flights_joined_total", "Tile requests that waited for a build already under way",
+      tiles.joined);
+  add(kGauge, "terrace_flights", "Builds under way or waiting", tiles.in_flight);
+  add(kGauge, "terrace_queue_length", "Builds that wait for a worker", tiles.queued);
+  add(kGauge, "terrace_http_connections", "Open connections", state.connections);
+  add(kCounter, "terrace_http_connections_refused_total", "Connections turned away", state.refused_connections);
+  add(kGauge, "terrace_http_transfer_bytes", "Bytes of bodies on their way", state.transfers.held_bytes);
+  add(kGauge, "terrace_http_transfers_waiting", "Bodies that wait for room", state.transfers.waiting);
+  add(kCounter, "terrace_http_transfers_refused_total", "Bodies that found no room before their deadline",
+      state.transfers.refused);
+  add(kCounter, "terrace_http_transfers_cut_total",
+      "Replies cut off and uploads displaced because others needed their room", state.transfers.cut);
+  add(kGauge, "terrace_datasets", "Datasets served", state.datasets);
+  add(kGauge, "terrace_degraded", "Troubles that /readyz tells of", state.troubles);
+  add(kCounter, "terrace_catalogs_total", "How often what is served was replaced", state.catalogs);
+  add(kCounter, "terrace_gdal_errors_total", "Failures that GDAL reported", sources.gdal.errors);
+  add(kCounter, "terrace_gdal_warnings_total", "Warnings that GDAL reported", sources.gdal.warnings);
+  add(kGauge, "terrace_gdal_cache_bytes", "Blocks of sources in GDAL's cache", sources.gdal.cache_bytes);
+  all.push_back(Samples(sources.samples));
+  return prometheus::TextSerializer().Serialize(all);
+}
+
+}  // namespace terrace::server

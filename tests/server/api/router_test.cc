@@ -1,0 +1,192 @@
+#include "server/api/router.h"
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "server/routes.h"
+
+namespace terrace::server {
+namespace {
+
+TEST(Router, FindsEveryUrl) {
+  const struct {
+    const char* target;
+    const char* label;
+  } cases[] = {
+      {"/", "viewer"},
+      {"/?dataset=maui", "viewer"},
+      {"/viewer/", "viewer"},
+      {"/viewer/app.js", "viewer"},
+      {"/datasets", "datasets"},
+      {"/livez", "livez"},
+      {"/readyz", "readyz"},
+      {"/metrics", "metrics"},
+      {"/maui/layer.json", "layer"},
+      {"/maui/layer.json?error=5", "layer"},
+      {"/maui/tileset.json?error=5", "tileset"},
+      {"/maui/3dtiles/9-272-359/0/0/0.6.subtree", "subtree"},
+      {"/maui/3dtiles/9-272-359/0/0/0.glb?error=5&atleast=1", "tile"},
+      {"/maui/0/1/0.terrain", "tile"},
+      {"/maui/0/1/0.glb", "tile"},
+      {"/maui/0/0/0.png", "tile"},
+      {"/maui/tiles.json", "tilejson"},
+      {"/maui/heights?locations=1,2", "heights"},
+      {"/maui/mesh?bbox=0,0,1,1&error=5", "mesh"},
+      {"http://example.test/maui/0/1/0.terrain", "tile"},
+      {"http://example.test", "viewer"},
+      {"/a%20b/layer.json", "layer"},
+  };
+  for (const auto& c : cases) {
+    const Result<Route> route = Routes().Match(c.target);
+    ASSERT_TRUE(route) << c.target << ": " << route.error().message;
+    EXPECT_EQ(route->row->label, c.label) << c.target;
+  }
+}
+
+TEST(Router, ReadsTheTileAndTheQuery) {
+  const Result<Route> route = Routes().Match("/ma%75i/9/533/388.terrain?error=5&v=1");
+  ASSERT_TRUE(route);
+  EXPECT_EQ(route->dataset, "maui");
+  EXPECT_EQ(route->key, (geo::TileKey{9, 533, 388}));
+  EXPECT_EQ(route->query, "error=5&v=1");
+  EXPECT_EQ(route->format->format, tiler::TileFormat::kQuantizedMesh);
+  const Result<Route> glb = Routes().Match("/maui/9/533/388.glb?compression=none");
+  ASSERT_TRUE(glb);
+  EXPECT_EQ(glb->key, route->key);
+  EXPECT_EQ(glb->format->format, tiler::TileFormat::kGlb);
+  EXPECT_EQ(Routes().Match("/maui/3/7/0.png")->format->format, tiler::TileFormat::kHeightPng);
+  EXPECT_EQ(Routes().Match("/viewer/a/b.js")->file, "a/b.js");
+  EXPECT_EQ(Routes().Match("/")->file, "index.html");
+  EXPECT_EQ(Routes().Match("/viewer/")->file, "index.html");
+}
+
+TEST(Router, CountsImplicitTilesFromTheGlobesRoots) {
+  const Result<Route> content = Routes().Match("/maui/3dtiles/9-272-359/3/5/2.glb");
+  ASSERT_TRUE(content);
+  EXPECT_EQ(content->dataset, "maui");
+  EXPECT_EQ(content->format->format, tiler::TileFormat::kGlb);
+  EXPECT_EQ(content->key, (geo::TileKey{12, 272 * 8 + 5, 359 * 8 + 2}));
+  const Result<Route> subtree = Routes().Match("/maui/3dtiles/0-1-0/6/63/0.6.subtree");
+  ASSERT_TRUE(subtree);
+  EXPECT_EQ(subtree->root, (geo::TileKey{0, 1, 0}));
+  EXPECT_EQ(subtree->key, (geo::TileKey{6, 64 + 63, 0}));
+  EXPECT_EQ(subtree->subtree_levels, 6);
+}
+
+TEST(Router, RefusesWhatIsNoUrl) {
+  const char* const not_found[] = {
+      "/nope",
+      "/maui",
+      "/maui/",
+      "/maui/layer.json/",
+      "//",
+      "/maui/0/0",
+      "/maui/0/0/0",
+      "/maui/0/0/0.terrain/",
+      "/maui/0/0/0.jpg",
+      "/maui/0/1/0.png",  // Web Mercator has one root
+      "/maui/1/0/2.png",
+      "/maui/1/2/0.png",
+      "/maui/25/0/0.png",
+      "/tiles.json",
+      "/maui/heights/",
+      "/maui/0/0/.terrain",
+      "/maui/0/0/.glb",
+      "/maui/0/0/0.glb.terrain",
+      "/maui/0/2/0.glb",
+      // No root, no place under it, or below the deepest level.
+      "/maui/3dtiles/9-272-359/0/0/0.terrain",
+      "/maui/3dtiles/9-272-359/0/0/0",
+      "/maui/3dtiles/9-272-359/0/0/.6.subtree",
+      "/maui/3dtiles/9-272-359/0/0/0.6.subtree.glb",
+      "/maui/3dtiles/9-272/0/0/0.6.subtree",
+      "/maui/3dtiles/9-272-359-0/0/0/0.6.subtree",
+      "/maui/3dtiles/9-272--359/0/0/0.6.subtree",
+      "/maui/3dtiles/09-272-359/0/0/0.6.subtree",
+      "/maui/3dtiles/0-2-0/0/0/0.6.subtree",
+      "/maui/3dtiles/9-272-359/0/1/0.6.subtree",
+      "/maui/3dtiles/9-272-359/2/0/4.glb",
+      "/maui/3dtiles/9-272-359/16/0/0.6.subtree",
+      "/maui/3dtiles/9-272-359/999999999/0/0.6.subtree",
+      "/maui/3dtiles/9-272-359/00/0/0.6.subtree",
+      "/maui/3dtiles/9-272-359/0/0",
+      "/maui/3dtile/9-272-359/0/0/0.6.subtree",
+      "/maui/3dtiles/9-272-359/0/0/0.subtree",
+      "/maui/3dtiles/9-272-359/0/0/0.0.subtree",
+      "/maui/3dtiles/9-272-359/0/0/0.8.subtree",
+      "/maui/3dtiles/9-272-359/0/0/0.06.subtree",
+      "/maui/3dtiles/9-272-359/0/0/0.6.6.subtree",
+      "/viewer2/tileset.json/",
+      "/metrics/tileset.json",
+      "/datasets/",
+      "/livez/x",
+      "/datasets/layer.json",
+      "/metrics/0/0/0.terrain",
+      "/viewer",
+      // Numbers that name no tile.
+      "/maui/x/0/0.terrain",
+      "/maui/-1/0/0.terrain",
+      "/maui/0/-1/0.terrain",
+      "/maui/0/0/-0.terrain",
+      "/maui/+1/0/0.terrain",
+      "/maui/0x1/0/0.terrain",
+      "/maui/1e1/0/0.terrain",
+      "/maui/1.0/0/0.terrain",
+      "/maui/00/0/0.terrain",
+      "/maui/01/0/0.terrain",
+      "/maui/%201/0/0.terrain",
+      "/maui/1%20/0/0.terrain",
+      "/maui/%2d1/0/0.terrain",
+      // Outside the tiling scheme, and out of any integer.
+      "/maui/0/2/0.terrain",
+      "/maui/0/0/1.terrain",
+      "/maui/25/0/0.terrain",
+      "/maui/24/33554432/0.terrain",
+      "/maui/64/0/0.terrain",
+      "/maui/999999999/0/0.terrain",
+      "/maui/0/4294967296/0.terrain",
+      "/maui/0/18446744073709551616/0.terrain",
+      "/maui/18446744073709551616/0/0.terrain",
+      "/maui/9/99999999999999999999999999999999999999/0.terrain",
+      "/../etc/passwd",
+      "/%2e%2e/%2e%2e/etc/passwd",
+  };
+  for (const char* target : not_found) {
+    const Result<Route> route = Routes().Match(target);
+    ASSERT_FALSE(route) << target;
+    EXPECT_EQ(route.error().code, ErrorCode::kNotFound) << target;
+  }
+}
+
+TEST(Router, TakesTheLastTileOfTheDeepestLevel) { EXPECT_TRUE(Routes().Match("/maui/24/33554431/16777215.terrain")); }
+
+TEST(Router, RefusesMalformedTargets) {
+  for (const char* target : {"", "maui", "*", "ftp://x/", "http://x?y", "/a#b", "/%", "/%4", "/%zz",
+                             "/a%00b/layer.json", "/a%0d%0ab/layer.json"}) {
+    const Result<Route> route = Routes().Match(target);
+    ASSERT_FALSE(route) << target;
+    EXPECT_EQ(route.error().code, ErrorCode::kInvalidArgument) << target;
+  }
+}
+
+TEST(Router, ReservesTheNamesOfItsOwnUrls) {
+  for (const char* name : {"datasets", "viewer", "livez", "readyz", "metrics"}) EXPECT_TRUE(Routes().IsReserved(name));
+  for (const char* name : {"maui", "", "layer.json", "{dataset}"}) EXPECT_FALSE(Routes().IsReserved(name)) << name;
+}
+
+TEST(Router, TellsWhichUrlsTakeABodyAndHowLarge) {
+  EXPECT_EQ(Routes().Match("/maui/heights")->row->max_body_bytes(10), 4096U + 640U);
+  for (const char* target : {"/", "/datasets", "/maui/mesh", "/maui/0/0/0.terrain", "/metrics"}) {
+    EXPECT_FALSE(Routes().Match(target)->row->takes_post()) << target;
+  }
+}
+
+TEST(Router, KeepsAnEncodedSlashInsideItsSegment) {
+  EXPECT_EQ(Routes().Match("/a%2Fb/layer.json")->dataset, "a/b");
+  EXPECT_EQ(Routes().Match("/viewer/..%2f..%2fetc%2fpasswd")->file, "../../etc/passwd")
+      << "a key of a map, never a path";
+}
+
+}  // namespace
+}  // namespace terrace::server

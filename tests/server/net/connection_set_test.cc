@@ -1,0 +1,83 @@
+#include "server/net/connection_set.h"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace terrace::server {
+namespace {
+
+using Phase = Connection::Phase;
+
+class FakeConnection : public Connection {
+ public:
+  explicit FakeConnection(Phase phase) : phase_(phase) {}
+  Phase phase() const override { return phase_; }
+  void Evict() override { evicted = true; }
+  void Drain() override {}
+  void Abort() override { aborted = true; }
+
+  bool evicted = false, aborted = false;
+
+ private:
+  const Phase phase_;
+};
+
+class Eviction : public testing::Test {
+ protected:
+  FakeConnection& Add(Phase phase, const std::string& client) {
+    connections_.push_back(std::make_shared<FakeConnection>(phase));
+    set_.Add(connections_.back(), client);
+    return *connections_.back();
+  }
+  void Remove(FakeConnection& connection) { set_.Remove(&connection); }
+
+  ConnectionSet set_{100};
+  std::vector<std::shared_ptr<FakeConnection>> connections_;
+};
+
+TEST_F(Eviction, BeginsWithIdleConnections) {
+  const FakeConnection& serving = Add(Phase::kServes, "a");
+  const FakeConnection& head = Add(Phase::kReceives, "a");
+  const FakeConnection& idle = Add(Phase::kIdle, "b");
+  EXPECT_TRUE(set_.EvictOne("new"));
+  EXPECT_TRUE(idle.evicted);
+  EXPECT_FALSE(head.evicted || serving.evicted);
+}
+
+TEST_F(Eviction, TakesTheOldestOfTheClientThatHasMost) {
+  const FakeConnection& polite = Add(Phase::kReceives, "polite");
+  FakeConnection& first = Add(Phase::kReceives, "flood");
+  const FakeConnection& second = Add(Phase::kReceives, "flood");
+  EXPECT_TRUE(set_.EvictOne("new"));
+  EXPECT_TRUE(first.evicted);
+  EXPECT_FALSE(polite.evicted || second.evicted);
+  Remove(first);
+  EXPECT_TRUE(set_.EvictOne("new"));
+  EXPECT_TRUE(polite.evicted) << "both have one: the older goes";
+}
+
+TEST_F(Eviction, TakesTheNewestServingConnectionOfAClientThatHasMoreThanTheNewcomer) {
+  const FakeConnection& polite = Add(Phase::kServes, "polite");
+  const FakeConnection& proxies = Add(Phase::kServes, "");
+  Add(Phase::kServes, "");
+  const FakeConnection& first = Add(Phase::kServes, "flood");
+  const FakeConnection& second = Add(Phase::kServes, "flood");
+  EXPECT_FALSE(set_.EvictOne("flood"));
+  EXPECT_TRUE(set_.EvictOne("new"));
+  EXPECT_TRUE(second.aborted);
+  EXPECT_FALSE(first.aborted || polite.aborted || proxies.aborted);
+  EXPECT_FALSE(set_.EvictOne("new")) << "the flood has one left, as the newcomer will";
+}
+
+TEST_F(Eviction, LeavesConnectionsThatServe) {
+  const FakeConnection& serving = Add(Phase::kServes, "a");
+  EXPECT_FALSE(set_.EvictOne("new"));
+  EXPECT_FALSE(serving.evicted);
+  EXPECT_FALSE(ConnectionSet(1).EvictOne("new")) << "nobody is there";
+}
+
+}  // namespace
+}  // namespace terrace::server
