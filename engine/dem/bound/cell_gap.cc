@@ -16,13 +16,6 @@ SampleBox CentresIn(const PixelBounds& box, double shift) {
 
 }  // namespace
 
-SampleBox SampleBox::Around(const SampleBox& other) const {
-  if (empty()) return other;
-  if (other.empty()) return *this;
-  return {std::min(west, other.west), std::min(north, other.north), std::max(east, other.east),
-          std::max(south, other.south)};
-}
-
 SampleBox CellGap::Clipped(SampleBox box) const {
   if (!sheet_.wraps()) {
     box.west = std::max<std::int64_t>(box.west, 0);
@@ -72,9 +65,10 @@ double CellGap::Apart(const TileCell& cell, double lowest, double highest) const
 }
 
 double CellGap::OfAverages(const TileCell& cell, bool& has_voids) const {
-  // Samples of the cell may count as others beside it. The last average of an axis is up to twice as near.
-  const double off_x = 2 * tables_.misplacement().x / trace_.factor,
-               off_y = 2 * tables_.misplacement().y / trace_.factor;
+  // Samples of the cell may count as others beside it where members are misplaced. The last average of an axis is up to
+  // twice as near.
+  const Position& off = tables_.misplacement();
+  const double off_x = 2 * off.x / trace_.factor, off_y = 2 * off.y / trace_.factor;
   const auto below = [](double weight) { return static_cast<std::int64_t>(std::floor(weight)); };
   const auto above = [](double weight) {
     return std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(weight)));
@@ -82,16 +76,19 @@ double CellGap::OfAverages(const TileCell& cell, bool& has_voids) const {
   SampleBox around;
   for (const std::size_t node : cell.nodes) {
     const GridCell& at = trace_.cells[static_cast<std::size_t>(trace_.cell_of_node[node])];
-    around = around.Around({at.column + below(at.x - off_x), at.row + below(at.y - off_y),
-                            at.column + above(at.x + off_x), at.row + above(at.y + off_y)});
+    SampleBox near{at.column, at.row, at.column + 1, at.row + 1};
+    if (off_x > 0 || off_y > 0) {
+      near = {at.column + below(at.x - off_x), at.row + below(at.y - off_y), at.column + above(at.x + off_x),
+              at.row + above(at.y + off_y)};
+    }
+    around = around.Around(near);
   }
-  const GridAxis columns(sheet_.columns(), trace_.factor, sheet_.wraps()), rows(sheet_.rows(), trace_.factor, false);
   if (!sheet_.wraps()) {
     around.west = std::max<std::int64_t>(around.west, 0);
-    around.east = std::min(around.east, columns.count() - 1);
+    around.east = std::min(around.east, columns_ - 1);
   }
   around.north = std::max<std::int64_t>(around.north, 0);
-  around.south = std::min(around.south, rows.count() - 1);
+  around.south = std::min(around.south, rows_ - 1);
   const GridWindow& window = trace_.window;
   const SampleBox read = {std::max(around.west, window.column), std::max(around.north, window.row),
                           std::min(around.east, window.column + window.columns - 1),
@@ -123,22 +120,21 @@ double CellGap::OfBox(const TileCell& cell, const SampleBox& averages, bool& has
 
 // By the averages that samples in a box of pixels are near to; infinite where not all of them were read.
 double CellGap::OfAveragesNear(const TileCell& cell, const PixelBounds& box) const {
-  const GridAxis columns(sheet_.columns(), trace_.factor, sheet_.wraps()), rows(sheet_.rows(), trace_.factor, false);
   const auto index = [&](double pixel) { return static_cast<std::int64_t>(std::floor(pixel / trace_.factor - 0.5)); };
   std::int64_t left = index(box.west), right = index(box.east) + 1;
   // The last average of an axis may stand for fewer pixels, and lie nearer: one more.
-  const std::int64_t top = std::clamp<std::int64_t>(index(box.north), 0, rows.count() - 1);
-  const std::int64_t bottom = std::clamp<std::int64_t>(index(box.south) + 2, 0, rows.count() - 1);
+  const std::int64_t top = std::clamp<std::int64_t>(index(box.north), 0, rows_ - 1);
+  const std::int64_t bottom = std::clamp<std::int64_t>(index(box.south) + 2, 0, rows_ - 1);
   if (!sheet_.wraps()) {
-    left = std::clamp<std::int64_t>(left, 0, columns.count() - 1);
-    right = std::clamp<std::int64_t>(right + 1, 0, columns.count() - 1);
+    left = std::clamp<std::int64_t>(left, 0, columns_ - 1);
+    right = std::clamp<std::int64_t>(right + 1, 0, columns_ - 1);
   } else if (sheet_.columns() % trace_.factor != 0) {
     return kUnknownGap;
   }
   const GridWindow& window = trace_.window;
   if (top < window.row || bottom >= window.row + window.rows) return kUnknownGap;
   for (const int turn : {0, -1, 1}) {
-    const std::int64_t shift = turn * columns.count();
+    const std::int64_t shift = turn * columns_;
     if (turn != 0 && !sheet_.wraps()) continue;
     if (left + shift < window.column || right + shift >= window.column + window.columns) continue;
     bool has_voids = false;

@@ -2,6 +2,7 @@
 // samples.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <optional>
@@ -22,7 +23,12 @@ struct SampleBox {
   bool empty() const { return west > east || north > south; }
   std::int64_t columns() const { return east - west + 1; }
   std::int64_t rows() const { return south - north + 1; }
-  SampleBox Around(const SampleBox& other) const;
+  SampleBox Around(const SampleBox& other) const {
+    if (empty()) return other;
+    if (other.empty()) return *this;
+    return {std::min(west, other.west), std::min(north, other.north), std::max(east, other.east),
+            std::max(south, other.south)};
+  }
 
   friend bool operator==(const SampleBox&, const SampleBox&) = default;
 };
@@ -32,7 +38,13 @@ class CellGap {
   // What these refer to outlives it.
   CellGap(const TileNodes& tile, const Sheet& sheet, const SheetTrace& trace, const SheetTables& tables,
           const GeoidGap& geoid)
-      : tile_(tile), sheet_(sheet), trace_(trace), tables_(tables), geoid_(geoid) {}
+      : tile_(tile),
+        sheet_(sheet),
+        trace_(trace),
+        tables_(tables),
+        geoid_(geoid),
+        columns_(GridAxis(sheet.columns(), trace.factor, sheet.wraps()).count()),
+        rows_(GridAxis(sheet.rows(), trace.factor, false).count()) {}
 
   // By the averages that the cell's nodes are interpolated from: the surface is between them, and the samples that
   // they stand for within their error of it. `has_voids`: not all of them are there. Precondition: all of the cell's
@@ -70,6 +82,7 @@ class CellGap {
   const SheetTrace& trace_;
   const SheetTables& tables_;
   const GeoidGap& geoid_;
+  const std::int64_t columns_, rows_;  // of averages of the trace's factor
 };
 
 }  // namespace terrace::dem
