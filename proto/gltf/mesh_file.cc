@@ -6,7 +6,9 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
+#include <optional>
 #include <string>
+#include <utility>
 
 #include "engine/core/bytes.h"
 #include "engine/core/check.h"
@@ -113,7 +115,7 @@ void WritePly(std::ostream& out, const std::vector<MeshVertex>& vertices, const 
 using Vec3f = std::array<float, 3>;
 using Vec3d = std::array<double, 3>;
 
-Vec3d YUp(const MeshVertex& v) { return {v.x, v.z, -v.y}; }
+Vec3d YUp(const MeshVertex& v) { return {v.x, v.z, 0 - v.y}; }
 
 struct Box {
   Vec3d min, max;
@@ -132,6 +134,28 @@ Box BoundsOf(const std::vector<MeshVertex>& vertices) {
   return box;
 }
 
+using NodeMatrix = std::array<double, 16>;  // column by column
+
+// The rows of a north-up raster go south: they are stored from the north-west corner on, and the matrix mirrors
+// nothing.
+double RowSign(const GridPlacement& t) { return t[1] * t[5] - t[2] * t[4] < 0 ? -1 : 1; }
+
+NodeMatrix MatrixOf(const GridPlacement& t) {
+  const double sign = RowSign(t);
+  return {t[1], 0, -t[4], 0, 0, 1, 0, 0, -sign * t[2], 0, sign * t[5], 0, t[0], 0, -t[3], 1};
+}
+
+// glTF wants matrices that are a translation, a rotation and a scale.
+bool IsNodeMatrix(const GridPlacement& t) {
+  const double column = std::hypot(t[1], t[4]), row = std::hypot(t[2], t[5]);
+  return column > 0 && row > 0 && std::isfinite(t[0] + t[3]) &&
+         std::abs(t[1] * t[2] + t[4] * t[5]) <= 1e-12 * column * row;
+}
+
+void Place(const GridPlacement& t, std::vector<MeshVertex>& vertices) {
+  for (MeshVertex& v : vertices) v = {t[0] + v.x * t[1] + v.y * t[2], t[3] + v.x * t[4] + v.y * t[5], v.z};
+}
+
 // Colours are aligned to 4 bytes, as glTF wants all vertex attributes.
 constexpr std::size_t kGlbColorBytes = 4 * sizeof(std::uint16_t);
 
@@ -140,7 +164,8 @@ constexpr std::size_t kGlbColorBytes = 4 * sizeof(std::uint16_t);
 struct GlbLayout {
   std::size_t vertices, indices;
   bool has_colors;
-  Vec3d center;
+  NodeMatrix matrix;
+  Vec3d center;  // of what is stored
   Vec3f min, max;
 
   bool wide() const { return vertices > 65535; }
@@ -151,11 +176,13 @@ struct GlbLayout {
   std::size_t buffer_bytes() const { return color_offset() + color_bytes(); }
 };
 
-GlbLayout MakeGlbLayout(const std::vector<MeshVertex>& vertices, std::size_t indices, bool has_colors) {
+// `matrix`: of the grid that the vertices lie on; else they are stored relative to their centre.
+GlbLayout MakeGlbLayout(const std::vector<MeshVertex>& vertices, std::size_t indices, bool has_colors,
+                        const std::optional<NodeMatrix>& matrix) {
   const Box box = BoundsOf(vertices);
-  GlbLayout layout{vertices.size(), indices, has_colors, {}, {}, {}};
+  GlbLayout layout{vertices.size(), indices, has_colors, matrix.value_or(GltfMesh{}.matrix), {}, {}, {}};
   for (std::size_t i = 0; i < 3; ++i) {
-    layout.center[i] = box.min[i] + (box.max[i] - box.min[i]) / 2;
+    if (!matrix) layout.matrix[12 + i] = layout.center[i] = box.min[i] + (box.max[i] - box.min[i]) / 2;
     // Subtraction and rounding to float are monotonic: the extremes of the doubles give those of the floats.
     layout.min[i] = static_cast<float>(box.min[i] - layout.center[i]);
     layout.max[i] = static_cast<float>(box.max[i] - layout.center[i]);
@@ -165,7 +192,7 @@ GlbLayout MakeGlbLayout(const std::vector<MeshVertex>& vertices, std::size_t ind
 
 GltfMesh GltfOf(const GlbLayout& layout) {
   GltfMesh mesh;
-  for (std::size_t i = 0; i < 3; ++i) mesh.matrix[12 + i] = layout.center[i];
+  mesh.matrix = layout.matrix;
   mesh.views = {{0, layout.position_bytes(), 0, GltfTarget::kVertices},
                 {layout.position_bytes(), layout.index_bytes(), 0, GltfTarget::kIndices}};
   GltfAccessor positions{.view = 0, .count = layout.vertices};
@@ -233,8 +260,9 @@ std::string GlbBuffer(const GlbLayout& layout, const std::vector<MeshVertex>& ve
 }
 
 Result<void> WriteGlb(std::ostream& out, const std::vector<MeshVertex>& vertices,
-                      const std::vector<Triangle>& triangles, const std::vector<VertexColor>& colors, StopPoll poll) {
-  const GlbLayout layout = MakeGlbLayout(vertices, 3 * triangles.size(), !colors.empty());
+                      const std::vector<Triangle>& triangles, const std::vector<VertexColor>& colors,
+                      const std::optional<NodeMatrix>& matrix, StopPoll poll) {
+  const GlbLayout layout = MakeGlbLayout(vertices, 3 * triangles.size(), !colors.empty(), matrix);
   const std::string head = GlbHead(GltfJson(GltfOf(layout)), layout.buffer_bytes());
   if (head.empty()) {
     return MakeError(ErrorCode::kInvalidArgument,
@@ -282,10 +310,18 @@ Result<MeshFileFormat> MeshFileFormatOf(std::string_view file_name) {
                    file_name);
 }
 
-Result<void> WriteMesh(std::ostream& out, MeshFileFormat format, const std::vector<MeshVertex>& vertices,
-                       const std::vector<Triangle>& triangles, const std::vector<VertexColor>& colors,
+Result<void> WriteMesh(std::ostream& out, MeshFileFormat format, std::vector<MeshVertex> vertices,
+                       const std::vector<std::array<std::uint32_t, 3>>& triangles,
+                       const std::vector<VertexColor>& colors, const std::optional<GridPlacement>& placement,
                        const std::stop_token& stop) {
   TERRACE_CHECK(colors.empty() || colors.size() == vertices.size());
+  std::optional<NodeMatrix> matrix;
+  if (placement && format == MeshFileFormat::kGlb && IsNodeMatrix(*placement)) {
+    matrix = MatrixOf(*placement);
+    for (MeshVertex& v : vertices) v.y *= RowSign(*placement);
+  } else if (placement) {
+    Place(*placement, vertices);
+  }
   if (Result<void> checked = CheckMesh(vertices, triangles); !checked) return checked;
   Result<void> written;
   switch (format) {
@@ -296,7 +332,7 @@ Result<void> WriteMesh(std::ostream& out, MeshFileFormat format, const std::vect
       WritePly(out, vertices, triangles, colors, StopPoll(stop));
       break;
     case MeshFileFormat::kGlb:
-      written = WriteGlb(out, vertices, triangles, colors, StopPoll(stop));
+      written = WriteGlb(out, vertices, triangles, colors, matrix, StopPoll(stop));
       break;
   }
   out.flush();

@@ -1,9 +1,10 @@
 // Meshes as files that other programs open: Wavefront OBJ, PLY and binary glTF, with a colour at every vertex or none.
 //
-// OBJ is text whose numbers read back to the same doubles; PLY is binary little-endian doubles. Both keep x, y, z as
-// given. GLB has 32-bit floats relative to the centre of the mesh's box, and that centre in double precision in the
-// node's matrix. glTF is y-up: a point (x, y, z) with z up is stored as (x, z, -y), a rotation, so that viewers show
-// the terrain upright and triangles keep their sense.
+// OBJ is text whose numbers read back to the same doubles; PLY is binary little-endian doubles. Both hold x, y, z
+// themselves. GLB has 32-bit floats and a matrix in double precision in its node. Where the vertices lie on a raster's
+// grid the floats are columns, rows and heights, exact, and the matrix places the grid; else they are relative to the
+// centre of the mesh's box, and rounded. glTF is y-up: a point (x, y, z) with z up is stored as (x, z, -y), a rotation,
+// so that viewers show the terrain upright and triangles keep their sense.
 //
 // Colours are sRGB, as images have them. PLY holds them as bytes; OBJ as shares of 1 behind the coordinates, with
 // digits enough to give the same bytes again. glTF wants vertex colours linear: GLB has COLOR_0 as normalized 16-bit
@@ -13,6 +14,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <ostream>
 #include <stop_token>
 #include <string_view>
@@ -31,15 +33,22 @@ struct MeshVertex {
   double x = 0, y = 0, z = 0;
 };
 
+// From columns and rows of a raster to the file's x and y, in GDAL's order: x = t[0] + column t[1] + row t[2],
+// y = t[3] + column t[4] + row t[5].
+using GridPlacement = std::array<double, 6>;
+
 // Red, green, blue in sRGB.
 using VertexColor = std::array<std::uint8_t, 3>;
 
-// Appends the whole file to `out`, which must be in binary mode. kInvalidArgument: a mesh without triangles, a
-// coordinate that is not finite, or more than the format can hold; nothing is written then. kUnavailable: `out` failed,
-// a full disk. kCancelled: a stop was requested; part of the file may be written. Preconditions: every index is below
-// vertices.size(); `colors` is empty or has one entry a vertex.
-Result<void> WriteMesh(std::ostream& out, MeshFileFormat format, const std::vector<MeshVertex>& vertices,
+// Appends the whole file to `out`, which must be in binary mode. With `placement`, x and y of the vertices are columns
+// and rows, and they and z are 32-bit floats: a GLB has them as they are, unless the raster is sheared, which no glTF
+// node may be. kInvalidArgument: a mesh without triangles, a coordinate that is not finite, or more than the format can
+// hold; nothing is written then. kUnavailable: `out` failed, a full disk. kCancelled: a stop was requested; part of the
+// file may be written. Preconditions: every index is below vertices.size(); `colors` is empty or has one entry a
+// vertex.
+Result<void> WriteMesh(std::ostream& out, MeshFileFormat format, std::vector<MeshVertex> vertices,
                        const std::vector<std::array<std::uint32_t, 3>>& triangles,
-                       const std::vector<VertexColor>& colors = {}, const std::stop_token& stop = {});
+                       const std::vector<VertexColor>& colors = {},
+                       const std::optional<GridPlacement>& placement = std::nullopt, const std::stop_token& stop = {});
 
 }  // namespace terrace::proto

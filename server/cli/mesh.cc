@@ -202,7 +202,8 @@ int Mesh(const MeshArguments& arguments) {
   seconds.triangulate = SecondsSince(start);
 
   start = Clock::now();
-  const Result<void> written = output->Write(VerticesOf(mesh, *field, *placement), TrianglesOf(mesh, *placement));
+  const Result<void> written =
+      output->Write(VerticesOf(mesh, *field, *placement), TrianglesOf(mesh, *placement), placement->grid);
   if (!written) return Fail(written.error().message, kExitFailure);
   seconds.write = SecondsSince(start);
   Print(arguments, *field, mesh, tin::MeasureError(*field, mesh), seconds);

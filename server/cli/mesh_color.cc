@@ -73,8 +73,9 @@ Result<Source> ReadPicture(const ColoredMeshArguments& arguments) {
 // An image without a place of its own is upright: y counts from the lowest row of pixels.
 Result<Placement> PlacementFor(const ColoredMeshArguments& arguments, const Source& source) {
   auto placement = PlacementOf(arguments.raster, source.georeferenced, source.geo_transform, arguments.coordinates);
-  if (!placement || *placement || !arguments.color.is_image || !arguments.coordinates.empty()) return placement;
-  return Placement({-0.5, 1, 0, source.field.heights().height() - 0.5, 0, -1});
+  if (!placement || source.georeferenced || !arguments.color.is_image || !arguments.coordinates.empty())
+    return placement;
+  return Placement{0.5, {-0.5, 1, 0, source.field.heights().height() - 0.5, 0, -1}};
 }
 
 // In steps, so that progress can be shown: the error falls about as 1 / vertices.
@@ -163,7 +164,7 @@ int MeshColored(const ColoredMeshArguments& arguments) {
 
   start = Clock::now();
   const Result<void> written = output->Write(VerticesOf(mesh.tin, source->field.heights(), *placement),
-                                             TrianglesOf(mesh.tin, *placement), mesh.colors);
+                                             TrianglesOf(mesh.tin, *placement), placement->grid, mesh.colors);
   if (!written) return Fail(written.error().message, kExitFailure);
   seconds.write = SecondsSince(start);
   Print(arguments, source->field, mesh, tin::MeasureExtendedError(source->field, mesh), seconds);

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <system_error>
+#include <utility>
 
 namespace terrace::cli {
 
@@ -22,10 +23,10 @@ Result<MeshOutput> MeshOutput::Open(const std::string& path, const std::vector<s
   return MeshOutput(*format, *std::move(file));
 }
 
-Result<void> MeshOutput::Write(const std::vector<proto::MeshVertex>& vertices,
+Result<void> MeshOutput::Write(std::vector<proto::MeshVertex> vertices,
                                const std::vector<std::array<std::uint32_t, 3>>& triangles,
-                               const std::vector<proto::VertexColor>& colors) {
-  Result<void> written = proto::WriteMesh(file_.stream(), format_, vertices, triangles, colors);
+                               const proto::GridPlacement& placement, const std::vector<proto::VertexColor>& colors) {
+  Result<void> written = proto::WriteMesh(file_.stream(), format_, std::move(vertices), triangles, colors, placement);
   return written ? file_.Commit() : written;
 }
 

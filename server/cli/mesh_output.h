@@ -21,9 +21,9 @@ class MeshOutput {
   // are read.
   static Result<MeshOutput> Open(const std::string& path, const std::vector<std::string>& inputs);
 
-  // The whole file. `colors` is empty or by vertex.
-  Result<void> Write(const std::vector<proto::MeshVertex>& vertices,
-                     const std::vector<std::array<std::uint32_t, 3>>& triangles,
+  // The whole file. The vertices lie on the placement's grid; `colors` is empty or by vertex.
+  Result<void> Write(std::vector<proto::MeshVertex> vertices,
+                     const std::vector<std::array<std::uint32_t, 3>>& triangles, const proto::GridPlacement& placement,
                      const std::vector<proto::VertexColor>& colors = {});
 
  private:

@@ -3,7 +3,6 @@
 
 #include <array>
 #include <cstdint>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,14 +13,17 @@
 
 namespace terrace::cli {
 
-// From columns and rows, counted to the outer corner of the first pixel, to the file's x and y, in GDAL's order;
-// nothing: x is the column and y the row.
-using Placement = std::optional<std::array<double, 6>>;
+// Where samples lie in the file. Those of a raster with a georeference are the centres of its pixels.
+struct Placement {
+  double first = 0;                                // column and row of the first sample
+  proto::GridPlacement grid = {0, 1, 0, 0, 0, 1};  // without a georeference x is the column and y the row
+};
 
 // What `--coordinates` asks for; empty: the reference system where the raster has one.
 Result<Placement> PlacementOf(const std::string& path, bool georeferenced, const std::array<double, 6>& geo_transform,
                               const std::string& coordinates);
 
+// Columns, rows and heights, on the placement's grid.
 std::vector<proto::MeshVertex> VerticesOf(const tin::TinMesh& mesh, const tin::HeightField& field,
                                           const Placement& placement);
 

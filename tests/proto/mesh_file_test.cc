@@ -6,6 +6,7 @@
 #include <cstring>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <sstream>
 #include <stop_token>
 #include <streambuf>
@@ -22,9 +23,9 @@ const Triangles kTwo = {{0, 1, 2}, {0, 2, 3}};
 const std::vector<VertexColor> kColors = {{0, 127, 255}, {1, 2, 3}, {254, 100, 50}, {255, 255, 255}};
 
 std::string Written(MeshFileFormat format, const std::vector<MeshVertex>& vertices, const Triangles& triangles,
-                    const std::vector<VertexColor>& colors = {}) {
+                    const std::vector<VertexColor>& colors = {}, const std::optional<GridPlacement>& placement = {}) {
   std::ostringstream out;
-  const Result<void> result = WriteMesh(out, format, vertices, triangles, colors);
+  const Result<void> result = WriteMesh(out, format, vertices, triangles, colors, placement);
   EXPECT_TRUE(result.has_value()) << (result ? "" : result.error().message);
   return out.str();
 }
@@ -56,12 +57,20 @@ Glb ParseGlb(const std::string& bytes) {
   return {Json::parse(bytes.substr(20, json_size)), bytes.substr(28 + json_size)};
 }
 
+std::array<double, 3> StoredVertex(const Glb& glb, std::size_t i) {
+  std::array<double, 3> p{};
+  for (std::size_t axis = 0; axis < 3; ++axis) p[axis] = At<float>(glb.buffer, (3 * i + axis) * 4);
+  return p;
+}
+
 // The position of a vertex in the mesh's own axes: node matrix applied, then y-up turned back to z-up.
 MeshVertex GlbVertex(const Glb& glb, std::size_t i) {
-  const Json& matrix = glb.json.at("nodes").at(0).at("matrix");
+  const auto m = glb.json.at("nodes").at(0).at("matrix").get<std::array<double, 16>>();
+  const std::array<double, 3> stored = StoredVertex(glb, i);
   std::array<double, 3> p{};
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    p[axis] = matrix.at(12 + axis).get<double>() + static_cast<double>(At<float>(glb.buffer, (3 * i + axis) * 4));
+  for (std::size_t row = 0; row < 3; ++row) {
+    p[row] = m[12 + row];
+    for (std::size_t k = 0; k < 3; ++k) p[row] += m[4 * k + row] * stored[k];
   }
   return {p[0], -p[2], p[1]};
 }
@@ -127,6 +136,64 @@ TEST(MeshFile, GlbPutsLargeCoordinatesIntoTheNode) {
     EXPECT_NEAR(v.z, kSquare[i].z, 1e-6);
   }
   for (std::size_t i = 0; i < 6; ++i) EXPECT_EQ(At<std::uint16_t>(glb.buffer, 48 + 2 * i), kTwo[i / 3][i % 3]);
+}
+
+// Steps of 1/3600 degree do not fit into 32-bit floats; columns and rows do.
+TEST(MeshFile, GlbHoldsTheGridOfARasterItself) {
+  const double step = 1 / 3600.0, cosine = std::cos(0.3), sine = std::sin(0.3);
+  const std::vector<MeshVertex> grid = {
+      {0.5, 0.5, 8848.86F}, {32767.5, 0.5, -413.1F}, {32767.5, 20001.5, 0.1F}, {1234.5, 19999.5, 1e-3F}};
+  const std::vector<GridPlacement> placements = {
+      {10.003, step, 0, 46.5, 0, -step},                                   // north up
+      {10.003, step, 0, 46.5, 0, step},                                    // south up
+      {500000.1, 10 * cosine, 10 * sine, 5.1e6, 10 * sine, -10 * cosine},  // turned
+      {500000.1, 0, 30, 5.1e6, 30, 0},                                     // rows are columns
+      {0, 1, 0, 0, 0, 1}};                                                 // no georeference
+  for (const GridPlacement& t : placements) {
+    SCOPED_TRACE(testing::PrintToString(t));
+    const Glb glb = ParseGlb(Written(MeshFileFormat::kGlb, grid, kTwo, {}, t));
+    const double to_south = t[1] * t[5] - t[2] * t[4] < 0 ? 1 : -1;
+    for (std::size_t i = 0; i < grid.size(); ++i) {
+      const MeshVertex& g = grid[i];
+      EXPECT_EQ(StoredVertex(glb, i), (std::array<double, 3>{g.x, g.z, to_south * g.y}));
+      const MeshVertex v = GlbVertex(glb, i);
+      EXPECT_NEAR(v.x, t[0] + g.x * t[1] + g.y * t[2], 1e-15 * 6e6);
+      EXPECT_NEAR(v.y, t[3] + g.x * t[4] + g.y * t[5], 1e-15 * 6e6);
+      EXPECT_EQ(v.z, g.z);
+    }
+    // The accessor's bounds are those of what is stored, and the matrix mirrors nothing.
+    const Json& accessor = glb.json.at("accessors").at(0);
+    EXPECT_EQ(accessor.at("max").at(0), 32767.5);
+    EXPECT_EQ(accessor.at("max").at(1), 8848.86F);
+    const auto m = glb.json.at("nodes").at(0).at("matrix").get<std::array<double, 16>>();
+    EXPECT_GT(m[0] * m[10] - m[2] * m[8], 0);
+    EXPECT_NEAR(m[0] * m[8] + m[2] * m[10], 0, 1e-12);
+  }
+}
+
+// No node of glTF is sheared: positions are rounded then, as those of other meshes.
+TEST(MeshFile, GlbOfAShearedRasterHasItsCoordinates) {
+  const GridPlacement sheared = {100, 2, 1, 200, 0, -2};
+  const std::vector<MeshVertex> grid = {{0.5, 0.5, 1}, {9.5, 0.5, 2}, {9.5, 7.5, 3}, {0.5, 7.5, 4}};
+  const Glb glb = ParseGlb(Written(MeshFileFormat::kGlb, grid, kTwo, {}, sheared));
+  const auto m = glb.json.at("nodes").at(0).at("matrix").get<std::vector<double>>();
+  EXPECT_EQ(std::vector(m.begin(), m.begin() + 12), (std::vector<double>{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}));
+  for (std::size_t i = 0; i < grid.size(); ++i) {
+    const MeshVertex v = GlbVertex(glb, i);
+    EXPECT_NEAR(v.x, 100 + 2 * grid[i].x + grid[i].y, 1e-6);
+    EXPECT_NEAR(v.y, 200 - 2 * grid[i].y, 1e-6);
+    EXPECT_NEAR(v.z, grid[i].z, 1e-6);
+  }
+}
+
+TEST(MeshFile, TextAndPlyHoldThePlacedCoordinates) {
+  const GridPlacement t = {10.003, 1 / 3600.0, 0, 46.5, 0, -1 / 3600.0};
+  const std::string ply =
+      Written(MeshFileFormat::kPly, {{0.5, 2.5, 7}, {9.5, 2.5, 7}, {0.5, 8.5, 7}}, {{0, 1, 2}}, {}, t);
+  const std::size_t data = ply.find("end_header\n") + 11;
+  EXPECT_EQ(At<double>(ply, data), 10.003 + 0.5 * t[1]);
+  EXPECT_EQ(At<double>(ply, data + 8), 46.5 + 2.5 * t[5]);
+  EXPECT_EQ(At<double>(ply, data + 16), 7);
 }
 
 TEST(MeshFile, GlbBoundsAreThoseOfTheStoredFloats) {
@@ -241,6 +308,8 @@ TEST(MeshFile, RefusesWhatNoFileCanHold) {
     vertices[2].z = std::nan("");
     const Result<void> result = WriteMesh(out, format, vertices, kTwo);
     EXPECT_NE(result.error().message.find("vertex 2"), std::string::npos);
+    const GridPlacement nowhere = {std::nan(""), 1, 0, 0, 0, -1};
+    EXPECT_EQ(WriteMesh(out, format, kSquare, kTwo, {}, nowhere).error().code, ErrorCode::kInvalidArgument);
     EXPECT_TRUE(out.str().empty());
   }
 }
@@ -274,7 +343,7 @@ TEST(WriteMesh, EndsSoonAfterAStop) {
     StopAtFirstWrite buffer;
     std::ostream out(&buffer);
     if (format == MeshFileFormat::kGlb) buffer.source.request_stop();  // it is made as a whole before it is written
-    const Result<void> written = WriteMesh(out, format, vertices, triangles, {}, buffer.source.get_token());
+    const Result<void> written = WriteMesh(out, format, vertices, triangles, {}, {}, buffer.source.get_token());
     ASSERT_FALSE(written);
     EXPECT_EQ(written.error().code, ErrorCode::kCancelled);
     EXPECT_LE(buffer.after, std::streamsize{200'000}) << "of 2 MB and more";

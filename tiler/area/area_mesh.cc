@@ -193,7 +193,7 @@ Result<EncodedTile> BuildAreaMesh(const dem::DemSource& source, const AreaPlan& 
                                         : PlaceInSpace(*field, mesh, surface, frame, bound_m, stop);
   if (!placed || stop.stop_requested()) return cancelled();
   std::ostringstream out;
-  if (auto written = proto::WriteMesh(out, area.format, placed->vertices, mesh.triangles, {}, stop); !written) {
+  if (auto written = proto::WriteMesh(out, area.format, placed->vertices, mesh.triangles, {}, {}, stop); !written) {
     return tl::unexpected(std::move(written).error());
   }
   encoded.bytes = std::move(out).str();

@@ -16,6 +16,8 @@ namespace {
 
 // Changes whenever blocks are read otherwise from the same overviews: a survey compares samples with them.
 constexpr std::uint32_t kOverviewReading = 2;
+// Changes whenever other voids are found in the same raster (void_marks.h).
+constexpr std::uint32_t kVoidFinding = 2;
 
 // Everything that decides what a survey says of a raster, and is known before.
 std::uint64_t KeyOf(const RasterLayout& layout, bool find_voids, const std::string& path, const StampedFiles& files) {
@@ -37,6 +39,7 @@ std::uint64_t KeyOf(const RasterLayout& layout, bool find_voids, const std::stri
   for (const double mark : rules.marks) writer.Put(mark);
   for (const int factor : layout.overview_factors) writer.Put(factor);
   if (!layout.overview_factors.empty()) writer.Put(kOverviewReading);
+  if (find_voids) writer.Put(kVoidFinding);
   writer.Put(layout.coast_step_m);
   const std::string bytes = writer.Take();
   return XXH3_64bits(bytes.data(), bytes.size());
@@ -142,7 +145,7 @@ class Preparer {
     const SampleRules& rules = shape_.layout.rules;
     const bool has_collar = survey.zeros.IsCollar(shape_.layout.width, shape_.layout.height);
     if (!MayHideVoids(rules, survey.lowest, survey.highest, survey.voids > 0, has_collar)) return survey;
-    auto findings = FindVoids(*dataset_.GetRasterBand(1), rules, has_collar, options_.stop);
+    auto findings = FindVoids(*dataset_.GetRasterBand(1), rules, has_collar, shape_.layout.coast_step_m, options_.stop);
     if (!findings) return tl::unexpected(findings.error());
     if (!findings->any()) return survey;
     shape_.findings = *std::move(findings);

@@ -76,6 +76,14 @@ void LogWhatMatters(GDALDataset& dataset, const RasterInfo& info, const Georefer
   if (!info.overviews_unused.empty()) {
     LogSource(SourceLog::Level::kWarn, info.path, "its overviews are not used: {}", info.overviews_unused);
   }
+  // One column more is that of a grid with nodes at -180 and at 180 degrees.
+  if (const int beyond = layout.width - layout.columns; beyond > 1) {
+    LogSource(
+        SourceLog::Level::kWarn, info.path,
+        "reaches more than once around the Earth: its last {} columns are taken for duplicates of its first and are "
+        "not read",
+        beyond);
+  }
   if (!info.picture_part.empty()) {
     LogSource(SourceLog::Level::kWarn, info.path,
               "is a picture (its band 1 is \"{}\"), whose values are taken for heights", info.picture_part);

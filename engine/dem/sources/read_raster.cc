@@ -41,12 +41,13 @@ Result<VoidFindings> FindVoidsOf(const RasterHeights& raster, GDALRasterBand& ba
     has_voids |= std::isnan(height);
   }
   ZeroEdges zeros;
+  const double coast_step_m = ZeroEdges::CoastStep(spacing_m);
   zeros.Add(raster.heights.data(), raster.width, {0, 0, raster.width, raster.height}, raster.width, raster.height,
-            ZeroEdges::CoastStep(spacing_m));
+            coast_step_m);
   const bool has_collar = zeros.IsCollar(raster.width, raster.height);
   const bool is_empty = !(lowest <= highest);
   if (is_empty || !MayHideVoids(rules, lowest, highest, has_voids, has_collar)) return VoidFindings{};
-  return FindVoids(band, rules, has_collar);
+  return FindVoids(band, rules, has_collar, coast_step_m);
 }
 
 }  // namespace

@@ -16,24 +16,36 @@ constexpr double kAloneWithin = 1'000;  // metres
 // The shore of the Dead Sea is at -433 m, the summit of Mount Everest at 8,849 m, the deepest sea floor at -10,935 m.
 constexpr double kLowestLand = -500, kHighest = 9'000, kDeepest = -12'000;
 constexpr int kReach = 3;  // samples: kernels of resampling reach 2, rounded up for oblique ones
+// Voids say something about the samples near them only where most samples are not near any: one in four at most.
+constexpr std::int64_t kDense = 4;
+constexpr double kLeap = 1'000;  // metres between two samples; a mark is farther from the ground
+// Resampling mixes all around a void: one in eight of the samples within reach at least.
+constexpr std::int64_t kMixed = 8;
 constexpr int kMixedRim = 2, kCollarRim = 1;
 constexpr int kChunk = 1024;  // samples along a side
+
+// Heights beyond a bound.
+struct Beyond {
+  std::int64_t all = 0, alone = 0, leaps = 0;  // alone: no void nearby; leaps: a neighbour is far off
+};
 
 // What the second look at a raster counts.
 struct Evidence {
   std::array<std::int64_t, kMarks.size()> at_mark{}, near_mark{};
-  // Heights beyond a bound, and how many of them have no void nearby.
-  std::int64_t below_land = 0, below_land_alone = 0;
-  std::int64_t below_sea = 0, below_sea_alone = 0;
-  std::int64_t above = 0, above_alone = 0;
-  // Of all others: what a mixture is mixed of.
-  std::int64_t land = 0, sea = 0;
+  Beyond below_land, below_sea, above;
+  std::int64_t valid = 0, near_void = 0;
+
+  bool IsDense() const { return near_void * kDense <= valid; }
+  bool AreMixtures(const Beyond& beyond) const {
+    return beyond.all > 0 && beyond.alone == 0 && IsDense() && beyond.leaps * 2 >= beyond.all;
+  }
 };
 
 class Looker {
  public:
-  Looker(GDALRasterBand& band, const SampleRules& rules, const std::stop_token& stop)
-      : band_(band), rules_(rules), stop_(stop) {
+  // `leap`: metres.
+  Looker(GDALRasterBand& band, const SampleRules& rules, double leap, const std::stop_token& stop)
+      : band_(band), rules_(rules), leap_(static_cast<float>(leap)), stop_(stop) {
     for (std::size_t i = 0; i < kMarks.size(); ++i) heights_[i] = static_cast<float>(rules.Metres(kMarks[i]));
   }
 
@@ -48,6 +60,7 @@ class Looker {
         samples_.resize(static_cast<std::size_t>(wide_) * static_cast<std::size_t>(high_));
         auto read = ReadHeights(band_, rules_, left_, top_, wide_, high_, samples_.data(), stop_);
         if (!read) return read;
+        FindVoidsInRows();
         const int end_row = std::min(row + kChunk, band_.GetYSize()),
                   end_col = std::min(col + kChunk, band_.GetXSize());
         for (int r = row - top_; r < end_row - top_; ++r) {
@@ -58,9 +71,7 @@ class Looker {
     return {};
   }
 
-  float At(int c, int r) const {
-    return samples_[static_cast<std::size_t>(r) * static_cast<std::size_t>(wide_) + static_cast<std::size_t>(c)];
-  }
+  float At(int c, int r) const { return samples_[Index(c, r)]; }
 
   void CountMarks(float height, Evidence& evidence) const {
     for (std::size_t i = 0; i < kMarks.size(); ++i) {
@@ -74,23 +85,48 @@ class Looker {
 
   void CountBeyond(int c, int r, Evidence& evidence) const {
     const float height = At(c, r);
-    if (height >= kLowestLand && height <= kHighest) ++evidence.land;
-    if (height >= kDeepest && height < kLowestLand) ++evidence.sea;
-    const auto count = [&](bool beyond, std::int64_t& all, std::int64_t& alone) {
-      if (!beyond) return;
-      ++all;
-      if (!IsNearVoid(c, r)) ++alone;
+    if (std::isnan(height)) return;
+    const bool is_near = IsNearVoid(c, r);
+    ++evidence.valid;
+    evidence.near_void += is_near;
+    if (height >= kLowestLand && height <= kHighest) return;
+    const bool leaps = Leaps(c, r);
+    const auto count = [&](Beyond& beyond) {
+      ++beyond.all;
+      beyond.alone += !is_near;
+      beyond.leaps += leaps;
     };
-    count(height < kLowestLand, evidence.below_land, evidence.below_land_alone);
-    count(height < kDeepest, evidence.below_sea, evidence.below_sea_alone);
-    count(height > kHighest, evidence.above, evidence.above_alone);
+    if (height < kLowestLand) count(evidence.below_land);
+    if (height < kDeepest) count(evidence.below_sea);
+    if (height > kHighest) count(evidence.above);
   }
 
  private:
+  std::size_t Index(int c, int r) const {
+    return static_cast<std::size_t>(r) * static_cast<std::size_t>(wide_) + static_cast<std::size_t>(c);
+  }
+
+  void FindVoidsInRows() {
+    void_in_row_.assign(samples_.size(), 0);
+    for (int r = 0; r < high_; ++r) {
+      const auto row = void_in_row_.begin() + static_cast<std::ptrdiff_t>(Index(0, r));
+      for (int c = 0; c < wide_; ++c) {
+        if (std::isnan(At(c, r))) std::fill(row + std::max(c - kReach, 0), row + std::min(c + kReach + 1, wide_), 1);
+      }
+    }
+  }
+
   bool IsNearVoid(int c, int r) const {
     for (int y = std::max(r - kReach, 0); y <= std::min(r + kReach, high_ - 1); ++y) {
-      for (int x = std::max(c - kReach, 0); x <= std::min(c + kReach, wide_ - 1); ++x) {
-        if (std::isnan(At(x, y))) return true;
+      if (void_in_row_[Index(c, y)] != 0) return true;
+    }
+    return false;
+  }
+
+  bool Leaps(int c, int r) const {
+    for (int y = std::max(r - 1, 0); y <= std::min(r + 1, high_ - 1); ++y) {
+      for (int x = std::max(c - 1, 0); x <= std::min(c + 1, wide_ - 1); ++x) {
+        if (std::abs(At(x, y) - At(c, r)) > leap_) return true;  // not of NaN
       }
     }
     return false;
@@ -98,10 +134,12 @@ class Looker {
 
   GDALRasterBand& band_;
   const SampleRules& rules_;
+  const float leap_;
   const std::stop_token stop_;
   std::array<float, kMarks.size()> heights_{};
   int left_ = 0, top_ = 0, wide_ = 0, high_ = 0;  // of the samples read
   std::vector<float> samples_;
+  std::vector<std::uint8_t> void_in_row_;  // within reach of a sample, in its row
 };
 
 }  // namespace
@@ -189,14 +227,15 @@ bool MayHideVoids(const SampleRules& rules, double lowest, double highest, bool 
          (has_voids && lowest < kLowestLand);
 }
 
-Result<VoidFindings> FindVoids(GDALRasterBand& band, const SampleRules& rules, bool has_collar,
+Result<VoidFindings> FindVoids(GDALRasterBand& band, const SampleRules& rules, bool has_collar, double coast_step_m,
                                const std::stop_token& stop) {
   VoidFindings findings;
   const auto say = [&findings](const std::string& what) {
     findings.text += (findings.text.empty() ? "" : ", ") + what;
   };
+  const double leap = std::max(kLeap, coast_step_m);
   Evidence evidence;
-  Looker marks(band, rules, stop);
+  Looker marks(band, rules, leap, stop);
   auto read = marks.ForEachChunk([&](int c, int r) { marks.CountMarks(marks.At(c, r), evidence); });
   if (!read) return tl::unexpected(read.error());
   for (std::size_t i = 0; i < kMarks.size(); ++i) {
@@ -206,30 +245,28 @@ Result<VoidFindings> FindVoids(GDALRasterBand& band, const SampleRules& rules, b
   }
   if (has_collar) {
     findings.marks.push_back((0 / rules.metres_per_unit - rules.offset) / rules.scale);
-    findings.rim = kCollarRim;
     say("a collar of zeros");
   }
 
   // What lies beside these voids, and beside the declared ones.
   SampleRules found = rules;
   findings.AddTo(found);
-  found.rim = 0;
-  Looker beyond(band, found, stop);
+  Looker beyond(band, found, leap, stop);
   read = beyond.ForEachChunk([&](int c, int r) { beyond.CountBeyond(c, r, evidence); });
   if (!read) return tl::unexpected(read.error());
-  if (evidence.below_land > 0 && evidence.below_land_alone == 0 && evidence.below_land <= evidence.land) {
+  if (has_collar && evidence.IsDense()) findings.rim = kCollarRim;
+  const auto mixed = [&](const Beyond& beyond_it, double bound) {
+    if (!evidence.AreMixtures(beyond_it)) return false;
+    say(fmt::format("{} samples {} {:g} m at their edges", beyond_it.all, bound < 0 ? "below" : "above", bound));
+    if (beyond_it.all * kMixed >= evidence.near_void) findings.rim = kMixedRim;
+    return true;
+  };
+  if (mixed(evidence.below_land, kLowestLand)) {
     findings.lowest = kLowestLand;
-    say(fmt::format("{} samples below {:g} m at their edges", evidence.below_land, kLowestLand));
-  } else if (evidence.below_sea > 0 && evidence.below_sea_alone == 0 &&
-             evidence.below_sea <= evidence.land + evidence.sea) {
+  } else if (mixed(evidence.below_sea, kDeepest)) {
     findings.lowest = kDeepest;
-    say(fmt::format("{} samples below {:g} m at their edges", evidence.below_sea, kDeepest));
   }
-  if (evidence.above > 0 && evidence.above_alone == 0 && evidence.above <= evidence.land + evidence.sea) {
-    findings.highest = kHighest;
-    say(fmt::format("{} samples above {:g} m at their edges", evidence.above, kHighest));
-  }
-  if (findings.lowest > -kMaxAbsHeight || findings.highest < kMaxAbsHeight) findings.rim = kMixedRim;
+  if (mixed(evidence.above, kHighest)) findings.highest = kHighest;
   return findings;
 }
 

@@ -62,15 +62,19 @@ struct VoidFindings {
 // `has_collar`: ZeroEdges::IsCollar.
 bool MayHideVoids(const SampleRules& rules, double lowest, double highest, bool has_voids, bool has_collar);
 
-// Reads the whole band once more.
+// Reads the whole band twice more. `coast_step_m`: ZeroEdges::CoastStep of its spacing.
 //
 // - A mark is one of the values in use (-32768, -32767, -9999, 9999, 32767, 65535) that stands alone: samples within
 //   1,000 m of it are at most a quarter as many as it has itself.
-// - Heights below -500 m or above 9,000 m are mixtures if each of them lies within 3 samples of a void: no land is
-//   lower or higher, and heights between the bounds are as many at least. In a sea floor they lie elsewhere too; there
-//   the bound is -12,000 m. Then all voids grow by 2 samples.
-// - Zeros are voids where they are a collar; voids then grow by one sample.
-Result<VoidFindings> FindVoids(GDALRasterBand& band, const SampleRules& rules, bool has_collar,
+// - Heights below -500 m or above 9,000 m are mixtures of heights and a mark if all of them lie within 3 samples of a
+//   void, though at most a quarter of all samples do, and at least half of them are more than 1,000 m (or the coast
+//   step) off a neighbour. No land is lower or higher, and none is so steep. In a sea floor they lie elsewhere too;
+//   there the bound is -12,000 m. Where they are an eighth of the samples near voids or more, as resampling leaves
+//   them, all voids grow by 2 samples.
+// - Zeros are voids where they are a collar; voids then grow by one sample, if at most a quarter of all lie near voids.
+//
+// So scattered voids, and voids between sparse data, take no sample beside them away.
+Result<VoidFindings> FindVoids(GDALRasterBand& band, const SampleRules& rules, bool has_collar, double coast_step_m,
                                const std::stop_token& stop = {});
 
 }  // namespace terrace::dem

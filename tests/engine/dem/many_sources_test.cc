@@ -441,19 +441,34 @@ TEST(ManySources, OpeningTellsItsProgressAndStops) {
   EXPECT_EQ(stopped.error().code, ErrorCode::kCancelled);
 }
 
-TEST(ManySources, TheLogSaysTheSameOfManySourcesAFewTimes) {
-  const TempDir dir;
-  const std::vector<DemFile> files = WriteFolder(dir, 30);
+// What opening them writes to the log.
+std::string LogOf(const std::vector<DemFile>& files) {
   std::ostringstream text;
   const auto before = spdlog::default_logger();
   spdlog::set_default_logger(
       std::make_shared<spdlog::logger>("test", std::make_shared<spdlog::sinks::ostream_sink_mt>(text)));
-  const bool opened = DemSource::Open(files).has_value();
+  EXPECT_TRUE(DemSource::Open(files).has_value());
   spdlog::set_default_logger(before);
-  ASSERT_TRUE(opened);
-  const std::string log = text.str();
+  return text.str();
+}
+
+TEST(ManySources, TheLogSaysTheSameOfManySourcesAFewTimes) {
+  const TempDir dir;
+  const std::string log = LogOf(WriteFolder(dir, 30));
   EXPECT_EQ(std::ranges::count(log, '\n'), 6) << log;
   EXPECT_NE(log.find("25 more sources have lines like this one: no vertical datum stated"), std::string::npos) << log;
+}
+
+TEST(OneSource, TheLogTellsOfColumnsBeyondAFullTurn) {
+  for (const int width : {360, 361, 540}) {  // pixels, nodes at -180 and 180 degrees, one and a half turns
+    const TempDir dir;
+    const std::string log = LogOf({{.path = WriteRaster(dir, {.width = width,
+                                                              .height = 180,
+                                                              .geo_transform = {-180, 1, 0, 90, 0, -1},
+                                                              .value = [](int col, int row) { return col + row; }})}});
+    EXPECT_EQ(log.find("its last 180 columns") != std::string::npos, width == 540) << log;
+    EXPECT_EQ(log.find("more than once around the Earth") != std::string::npos, width == 540) << log;
+  }
 }
 
 }  // namespace

@@ -4,10 +4,12 @@
 
 #include <cpl_conv.h>
 #include <gdal_priv.h>
+#include <gdal_utils.h>
 
 #include <cmath>
 #include <cstdint>
 #include <functional>
+#include <random>
 #include <vector>
 
 #include "tests/engine/dem/dem_fixture.h"
@@ -207,6 +209,138 @@ TEST(VoidMarks, NarrowBathymetryStays) {
   EXPECT_EQ(InfoOf(*source).found_voids, "");
   EXPECT_EQ(InfoOf(*source).valid_samples, 5u * 5u * 200u);
   EXPECT_EQ(InfoOf(*source).heights.min, -4000);
+}
+
+// Opens what is drawn, with -99999 declared, and expects that every other sample is served.
+void ExpectEverySampleStays(const std::function<double(int, int)>& value) {
+  const TempDir dir;
+  RasterSpec spec = Drawn(value);
+  spec.nodata = -99999;
+  std::uint64_t measured = 0;
+  double lowest = 1e9, highest = -1e9;
+  for (int i = 0; i < spec.width * spec.height; ++i) {
+    const double height = value(i % spec.width, i / spec.width);
+    if (height == -99999) continue;
+    ++measured;
+    lowest = std::min(lowest, height);
+    highest = std::max(highest, height);
+  }
+  const auto source = OpenOrFail(WriteRaster(dir, spec));
+  ASSERT_NE(source, nullptr);
+  EXPECT_EQ(InfoOf(*source).found_voids, "");
+  EXPECT_EQ(InfoOf(*source).valid_samples, measured);
+  EXPECT_FLOAT_EQ(static_cast<float>(InfoOf(*source).heights.min), static_cast<float>(lowest));
+  EXPECT_FLOAT_EQ(static_cast<float>(InfoOf(*source).heights.max), static_cast<float>(highest));
+}
+
+// Land 200 m high, then a coast and a slope to -1,400 m.
+double Shelf(int col, int row) {
+  return (col < 110 ? 200 : -100 - 6.5 * col) + 20 * std::sin(col / 7.0) * std::cos(row / 5.0);
+}
+
+TEST(VoidMarks, TracksOfAShipStay) {
+  std::mt19937 random(1);
+  for (int round = 0; round < 12; ++round) {
+    const int width = 1 + static_cast<int>(random() % 6), period = width + 2 + static_cast<int>(random() % 30);
+    const int phase = static_cast<int>(random() % 30),
+              surveyed = round % 2 == 0 ? 0 : 80 + static_cast<int>(random() % 60);
+    SCOPED_TRACE(testing::Message() << width << " of " << period << " rows, all of them west of " << surveyed);
+    ExpectEverySampleStays([&](int col, int row) {
+      return col < surveyed || (row + phase) % period < width ? Shelf(col, row) : -99999.0;
+    });
+  }
+}
+
+TEST(VoidMarks, TerrainBetweenScatteredVoidsStays) {
+  std::mt19937 random(2);
+  for (const double share : {.003, .02, .1, .4, .8}) {
+    for (const double relief : {400.0, 2000.0}) {  // the latter leaps wherever it is
+      SCOPED_TRACE(testing::Message() << share << ' ' << relief);
+      std::vector<double> drawn(200 * 200);
+      std::uniform_real_distribution<double> chance(0, 1);
+      for (std::size_t i = 0; i < drawn.size(); ++i) {
+        drawn[i] = chance(random) < share ? -99999 : -300 + relief * (chance(random) + chance(random) - 1);
+      }
+      ExpectEverySampleStays(
+          [&](int col, int row) { return drawn[static_cast<std::size_t>(row) * 200 + static_cast<std::size_t>(col)]; });
+    }
+  }
+}
+
+// The survey ends, or was cut off, just below -500 m: all that is deeper lies beside the void, and none elsewhere.
+TEST(VoidMarks, ASeaFloorThatEndsBelowTheLowestLandStays) {
+  for (const double slope : {1.0, 20.0, 300.0}) {  // metres from a column to the next, 750 m on
+    for (const int deep : {1, 2, 3}) {
+      SCOPED_TRACE(testing::Message() << slope << ' ' << deep);
+      ExpectEverySampleStays([&](int col, int row) {
+        if (col >= 100) return -99999.0;
+        return -500 - slope * (col - 99.5 + deep) + 0.2 * std::sin(row / 9.0);
+      });
+    }
+  }
+}
+
+// Samples in error beside three of many voids: these are voids, and what lies beside the others is none.
+TEST(VoidMarks, VoidsWithoutMixturesDoNotGrow) {
+  const TempDir dir;
+  const auto is_void = [](int col, int row) { return col % 25 == 12 && row % 25 == 12; };
+  const auto source =
+      OpenOrFail(WriteRaster(dir, Drawn([&](int col, int row) {
+                               if (is_void(col, row)) return -1.0;
+                               return is_void(col - 1, row) && row == 37 && col < 80 ? -5000 : Land(col, row);
+                             })));
+  ASSERT_NE(source, nullptr);
+  EXPECT_EQ(InfoOf(*source).found_voids, "3 samples below -500 m at their edges");
+  EXPECT_EQ(InfoOf(*source).void_samples, 64U + 3U);
+}
+
+TEST(VoidMarks, ACollarDoesNotGrowScatteredVoids) {
+  const TempDir dir;
+  const auto is_void = [](int col, int row) { return col % 6 == 3 && row % 6 == 3 && Framed(col, row) != 0; };
+  std::uint64_t voids = 0;
+  for (int i = 0; i < 200 * 200; ++i) voids += is_void(i % 200, i / 200) || Framed(i % 200, i / 200) == 0;
+  const auto source = OpenOrFail(
+      WriteRaster(dir, Drawn([&](int col, int row) { return is_void(col, row) ? -1.0 : Framed(col, row); })));
+  ASSERT_NE(source, nullptr);
+  EXPECT_EQ(InfoOf(*source).found_voids, "a collar of zeros");
+  EXPECT_EQ(InfoOf(*source).void_samples, voids);
+}
+
+// GDAL moves a raster by parts of a pixel, and does not know that the mark is none of its heights.
+TEST(VoidMarks, EdgesThatResamplingMixedAreFound) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> part(0.05, 0.95);
+  for (const double mark : {-32768.0, -9999.0}) {
+    for (const char* kernel : {"bilinear", "cubic"}) {
+      const TempDir dir;
+      RasterSpec spec = Drawn([&](int col, int row) {
+        const bool is_block = col > 30 && col < 60 && row > 90 && row < 150;
+        const bool is_gap = col % 50 > 40 && row % 40 > 33;
+        return is_block || is_gap || std::hypot(col - 130, row - 120) < 25 ? mark : std::round(Land(col, row));
+      });
+      spec.type = "Int16";
+      spec.nodata.reset();
+      const std::string whole = WriteRaster(dir, spec), moved = dir.File("moved.tif");
+      const std::string left = std::to_string(part(random)), top = std::to_string(part(random));
+      SCOPED_TRACE(testing::Message() << mark << ' ' << kernel << ' ' << left << ' ' << top);
+      std::vector<const char*> words = {"-srcwin",  left.c_str(), top.c_str(), "198", "198",
+                                        "-outsize", "198",        "198",       "-r",  kernel};
+      words.push_back(nullptr);
+      {
+        GDALTranslateOptions* const options = GDALTranslateOptionsNew(const_cast<char**>(words.data()), nullptr);
+        const GDALDatasetUniquePtr from(GDALDataset::Open(whole.c_str()));
+        const GDALDatasetUniquePtr to(
+            GDALDataset::FromHandle(GDALTranslate(moved.c_str(), GDALDataset::ToHandle(from.get()), options, nullptr)));
+        GDALTranslateOptionsFree(options);
+        ASSERT_NE(to, nullptr);
+        to->GetRasterBand(1)->SetNoDataValue(mark);
+      }
+      const auto source = OpenOrFail(moved);
+      ASSERT_NE(source, nullptr);
+      EXPECT_GE(InfoOf(*source).heights.min, 999) << InfoOf(*source).found_voids;
+      EXPECT_LE(InfoOf(*source).heights.max, 1401) << InfoOf(*source).found_voids;
+    }
+  }
 }
 
 TEST(VoidMarks, AnUndeclaredVoidOfARealRasterIsServedLikeADeclaredOne) {

@@ -1,10 +1,9 @@
 """terrace mesh with colours: mesh_color_test.py BINARY SOURCE_DIR."""
 import json
 import math
-import struct
 import unittest
 
-from mesh_info_test import BUMPS, PLACE, InFolder, area, grid, read_obj, run
+from mesh_info_test import BUMPS, PLACE, InFolder, area, grid, read_glb, read_obj, run
 
 WIDTH, HEIGHT = 40, 30
 PIXELS = [[(6 * x, 8 * y, 255 if (x - 20) ** 2 + (y - 15) ** 2 < 60 else 20) for x in range(WIDTH)]
@@ -15,12 +14,6 @@ IMAGE = b"P6\n%d %d\n255\n" % (WIDTH, HEIGHT) + b"".join(bytes(pixel) for row in
 def read_colors(path):
     lines = [line.split() for line in path.read_text().splitlines()]
     return [tuple(round(255 * float(share)) for share in line[4:7]) for line in lines if line and line[0] == "v"]
-
-
-def read_glb(path):
-    data = path.read_bytes()
-    size = struct.unpack_from("<I", data, 12)[0]
-    return json.loads(data[20:20 + size]), data[28 + size:]
 
 
 class Colored(InFolder):

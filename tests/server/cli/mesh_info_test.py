@@ -3,6 +3,7 @@ import html
 import json
 import math
 import pathlib
+import random
 import re
 import signal
 import struct
@@ -40,6 +41,13 @@ def grid(heights, header):
     """An ESRI ASCII grid."""
     rows = "\n".join(" ".join(map(str, row)) for row in heights)
     return f"ncols {len(heights[0])}\nnrows {len(heights)}\n{header}\n{rows}\n"
+
+
+def read_glb(path):
+    """The glTF document and its buffer."""
+    data = path.read_bytes()
+    size = struct.unpack_from("<I", data, 12)[0]
+    return json.loads(data[20:20 + size]), data[28 + size:]
 
 
 BUMPS = [[round(20 * math.sin(x / 3) + 15 * math.cos(y / 4), 2) for x in range(40)] for y in range(30)]
@@ -162,6 +170,38 @@ class Mesh(InFolder):
                 more = self.mesh(dem, "more.glb", *goal, "--threads", threads)[1]
                 self.assertEqual(one.read_bytes(), more.read_bytes())
             self.assertEqual(one.read_bytes()[:4], b"glTF")
+
+    def test_of_degrees_keep_their_error_in_a_glb(self):
+        # Spikes on a plain: triangles between them are as thin as they are steep.
+        picks = random.Random(4)
+        size, cell, west, north = 400, 1 / 3600, 10.003, 46.5
+        rows = [[0] * size for _ in range(size)]
+        for _ in range(60):
+            rows[picks.randrange(size)][picks.randrange(size)] = 5000
+        dem = self.write("spikes.asc", grid(rows, f"xllcorner {west}\nyllcorner {north - size * cell:.15f}\ncellsize {cell:.18f}"))
+        statistics, out = self.mesh(dem, "a.glb", "--max-error", 5, "--criterion", "data-dependent")
+        gltf, buffer = read_glb(out)
+        matrix = gltf["nodes"][0]["matrix"]
+        count = statistics["points"]
+        vertices = []
+        for stored in struct.iter_unpack("<3f", buffer[:12 * count]):
+            x, z, south = (sum(matrix[4 * k + i] * stored[k] for k in range(3)) + matrix[12 + i] for i in range(3))
+            vertices.append(((x - west) / cell - 0.5, (north + south) / cell - 0.5, z))
+        accessor = gltf["accessors"][1]
+        form = "<3H" if accessor["componentType"] == 5123 else "<3I"
+        offset = gltf["bufferViews"][1]["byteOffset"]
+        errors = {}
+        for triangle in struct.iter_unpack(form, buffer[offset:offset + struct.calcsize(form) * statistics["triangles"]]):
+            corners = [vertices[i] for i in triangle]
+            whole = area(*corners)
+            for y in range(math.floor(min(c[1] for c in corners)), math.ceil(max(c[1] for c in corners)) + 1):
+                for x in range(math.floor(min(c[0] for c in corners)), math.ceil(max(c[0] for c in corners)) + 1):
+                    shares = [area((x, y), corners[i - 2], corners[i - 1]) / whole for i in range(3)]
+                    if min(shares) >= -1e-9 and 0 <= x < size and 0 <= y < size:
+                        off = abs(sum(s * c[2] for s, c in zip(shares, corners)) - rows[y][x])
+                        errors[x, y] = min(off, errors.get((x, y), off))
+        self.assertGreater(len(errors), 0.99 * size * size)
+        self.assertAlmostEqual(max(errors.values()), statistics["max_error"], delta=0.001)
 
     def test_drops_what_the_bound_does_not_need(self):
         dem = self.write("bumps.asc", grid(BUMPS, PLACE))
