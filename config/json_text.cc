@@ -10,6 +10,8 @@
 namespace terrace::config {
 namespace {
 
+constexpr std::size_t kMaxKeys = 1000;  // of one object
+
 // Reads a text and tells how far it has come.
 class CountingIterator {
  public:
@@ -70,8 +72,14 @@ class DuplicateKeyFinder : public nlohmann::detail::json_sax_dom_parser<Json> {
     return json_sax_dom_parser::start_object(size);
   }
   bool key(std::string& key) {
+    // The value keeps the order of keys, and so looks through all of them for each one.
+    if (seen_.back().size() >= kMaxKeys) {
+      fault_at_ = at_ - 1;
+      fault_ = fmt::format("an object with more than {} keys, which none of a configuration has", kMaxKeys);
+      return false;
+    }
     // By its place, as any text may stand there.
-    if (!seen_.back().insert(key).second) {
+    if (!seen_.back().insert(key).second && errors_.size() < kMaxConfigErrors) {
       errors_.push_back(
           {"", lines_.PlaceOf(at_ - 1) + ": the key that ends here stands twice in its object; keep one"});
     }

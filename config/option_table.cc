@@ -70,7 +70,7 @@ Codec<Config> AccessLogFile() {
 Codec<Config> Datasets() {
   return {[](const Json& value, const Place& place, Config& config) {
             if (!value.is_array()) return place.Expected("a list of datasets");
-            for (std::size_t i = 0; i < value.size(); ++i) {
+            for (std::size_t i = 0; i < value.size() && !place.has_failed_often(); ++i) {
               DatasetConfig& dataset = config.datasets.emplace_back();
               ReadObject(value[i], place.At(i), DatasetOptionTable(), dataset);
               for (const std::string_view required : {"name", "sources"}) {
