@@ -131,7 +131,7 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   bool SendsBody(const Response& response) const;
   Clock::time_point Deadline() const { return exchange_.begun + context_->deadline->load(std::memory_order_relaxed); }
   asio::awaitable<bool> Reply(Response& response, const Route* route = nullptr);
-  asio::awaitable<bool> WriteRest(BufferPair left, std::size_t total);
+  asio::awaitable<bool> WriteRest(BufferPair left, std::size_t total, TransferBudget::Hold& room);
   asio::awaitable<void> CloseGently();
   void Report(const Response& response, std::size_t bytes);
 
@@ -395,9 +395,8 @@ asio::awaitable<std::optional<TransferBudget::Hold>> Session::RoomLater(Route ro
 // small.
 asio::awaitable<bool> Session::Reply(Response& response, const Route* route) {
   const Request& request = exchange_.request;
-  const bool with_body = SendsBody(response);
   std::optional<TransferBudget::Hold> room;
-  if (!with_body || response.body->size() <= TransferBudget::kFreeBytes) {
+  if (!SendsBody(response) || response.body->size() <= TransferBudget::kFreeBytes) {
     room.emplace();
   } else {
     room = context_->transfers->TryHold(AskFor(response));
@@ -426,15 +425,16 @@ asio::awaitable<bool> Session::Reply(Response& response, const Route* route) {
   // What the kernel takes at once needs no deadline. An error shows again when the rest is written.
   const std::size_t taken = stream_.WriteReady(left).value_or(0);
   Skip(taken, left);
-  const bool written = asio::buffer_size(left) == 0 || co_await WriteRest(left, taken);
+  const bool written = asio::buffer_size(left) == 0 || co_await WriteRest(left, taken, *room);
   Report(response, body_bytes);
   co_return options.keep_alive&& written;
 }
 
 // False: the client is gone, took nothing for too long, or takes too little in the long run. `total`: bytes of the
-// reply that were written before.
-asio::awaitable<bool> Session::WriteRest(BufferPair left, std::size_t total) {
+// reply that were written before, which tells nothing of the client: the kernel took them.
+asio::awaitable<bool> Session::WriteRest(BufferPair left, std::size_t total, TransferBudget::Hold& room) {
   const SessionOptions& options = context_->options;
+  room.Took(0);
   const auto begun = Clock::now();
   while (asio::buffer_size(left) > 0) {
     auto deadline = Clock::now() + options.write_timeout;
@@ -448,6 +448,7 @@ asio::awaitable<bool> Session::WriteRest(BufferPair left, std::size_t total) {
       stream_.Reset();
       co_return false;
     }
+    room.Took(*sent);
     total += *sent;
     Skip(*sent, left);
   }
@@ -464,15 +465,14 @@ asio::awaitable<void> Session::CloseGently() {
 }
 
 void Session::Report(const Response& response, std::size_t bytes) {
-  const Exchange& exchange = exchange_;
-  const Request& request = exchange.request;
+  const Request& request = exchange_.request;
   replied_ = Clock::now();
   ReplyRecord record;
   record.method = request.method_name;
   record.target = request.target;
   record.status = response.status;
   record.body_bytes = bytes;
-  record.duration = std::chrono::duration_cast<std::chrono::microseconds>(replied_ - exchange.begun);
+  record.duration = std::chrono::duration_cast<std::chrono::microseconds>(replied_ - exchange_.begun);
   record.route = response.route;
   record.dataset = response.dataset;
   record.cache = response.cache;
@@ -481,7 +481,7 @@ void Session::Report(const Response& response, std::size_t bytes) {
   record.user_agent = request.fields->user_agent;
   record.request_id = request.id;
   record.peer = peer_text_;
-  if (exchange.caller.address != peer_.address) record.client = exchange.caller.text;
+  if (exchange_.caller.address != peer_.address) record.client = exchange_.caller.text;
   if (request.grant) record.token_name = request.grant->name;
   context_->observer(record);
 }
