@@ -1,5 +1,6 @@
 // JSON text to a JSON value, stricter than the library: a key that appears twice is an error, and syntax errors tell
-// the line and the column. An object has 1000 keys at most. No error quotes the text. Used inside this room only.
+// the line and the column. An object has 1000 keys at most, and 100
+// lists and objects may stand in one another. No error quotes the text. Used inside this room only.
 #pragma once
 
 #include <cstddef>

@@ -24,8 +24,8 @@ tl::unexpected<std::vector<ConfigError>> Unreadable(const std::string& reason) {
 }
 
 std::string TooLarge(const std::filesystem::path& file) {
-  return fmt::format("{} is larger than the {} MiB that a configuration may have; is it the right file?", file.string(),
-                     kMaxConfigBytes >> 20);
+  return fmt::format("{} is larger than the {} MiB that a configuration may have; put the right file there",
+                     file.string(), kMaxConfigBytes >> 20);
 }
 
 // Of a file, or a pipe to its end; the error says why not. What is too large is not read.

@@ -238,8 +238,7 @@ void TransferBudget::ChooseUploads(const Ask& ask, Clock::time_point now, Victim
     // A tie is broken by number, so that it does not depend on the table's order.
     if (share.bytes > most || (share.bytes == most && client < largest)) largest = client;
   }
-  const std::size_t would_hold = HeldBy(ask.client, room) + (room.takes_one ? 0 : ask.bytes);
-  if (HeldBy(largest, room) > would_hold) {
+  if (HeldBy(largest, room) > HeldBy(ask.client, room) + ask.bytes) {
     for (auto entry = entries_.rbegin(); entry != entries_.rend(); ++entry) {
       if (entry->room == number && entry->client == largest && Tell(*entry, victims.displaced)) return;
     }

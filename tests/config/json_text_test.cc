@@ -51,6 +51,19 @@ TEST(ParseJsonText, RefusesAnObjectOfManyKeys) {
   EXPECT_THAT(errors, ElementsAre(IsError("", "line 1001, column 6: an object with more than 1000 keys")));
 }
 
+TEST(ParseJsonText, RefusesADeepText) {
+  std::string text;
+  for (int i = 0; i < 50; ++i) text += "{\"a\":[";
+  std::vector<ConfigError> errors;
+  EXPECT_TRUE(ParseJsonText(text + "[", errors).is_discarded());
+  EXPECT_TRUE(ParseJsonText(text + "{", errors).is_discarded());
+  EXPECT_THAT(errors, ElementsAre(IsError("", "line 1, column 301: lists or objects more than 100 deep"),
+                                  IsError("", "line 1, column 301: lists or objects more than 100 deep")));
+  std::string end;
+  for (int i = 0; i < 50; ++i) end += "]}";
+  EXPECT_FALSE(ParseJsonText(text + end, errors).is_discarded());
+}
+
 TEST(ParseJsonText, QuotesNothingOfTheText) {
   for (const char* text : {"{\"token\": s3cret}", "{\"token\": \"s3cret\n\"}", "{\"token\": \"s3cret", "{\"s3cret\" 1}",
                            "{\"token\": \"s3cret\\x\"}", "{} s3cret", "{\"token\": 1e9999}", "\"s3cret"}) {

@@ -183,8 +183,13 @@ TEST(LoadConfig, RefusesAFileThatIsTooLarge) {
 
 // Of another kind, and millions of things may be wrong in it.
 TEST(ParseConfig, TellsABoundedNumberOfErrors) {
-  std::string datasets = "{\"datasets\": [{}", keys = "{\"a\": 0";
-  for (int i = 0; i < 10'000; ++i) datasets += ",{}", keys += ",\"a\": 0";
+  std::string datasets = "{\"datasets\": [{}", keys = "{\"a\": 0", names = "{\"datasets\": [";
+  for (int i = 0; i < 10'000; ++i) {
+    datasets += ",{}";
+    keys += ",\"a\": 0";
+    names += std::string(i > 0 ? "," : "") + "{\"name\": \"a\", \"sources\": [\"x\"]}";
+  }
+  EXPECT_THAT(ErrorsOf(names + "]}"), SizeIs(100));
   EXPECT_THAT(ErrorsOf(datasets + "]}"), SizeIs(AllOf(Ge(100u), Le(101u))));
   EXPECT_THAT(ErrorsOf(keys + "}"), SizeIs(AllOf(Ge(100u), Le(101u))));
 }

@@ -337,9 +337,22 @@ TEST_F(TransferBudgetTest, CutsTheLateHolderOfAnOversizedBody) {
   const auto slow = Offer(10 * kMb, 1, oversized), other = Offer(2 * kMb, 5, large);
   ASSERT_TRUE(slow && other);
   now_ += 3s;
-  Wait(1, AskFor(BodyOf(10 * kMb), 2));
+  Wait(1, AskFor(BodyOf(2 * kMb), 2));
+  EXPECT_EQ(oversized->aborts, 0) << "it holds more, but its end would make no room for this one";
+  EXPECT_EQ(large->aborts, 1);
+  Wait(2, AskFor(BodyOf(10 * kMb), 2));
   EXPECT_EQ(oversized->aborts, 1);
-  EXPECT_EQ(large->aborts, 0) << "its end would help nobody";
+}
+
+// Else two of them would displace one another without end.
+TEST_F(TransferBudgetTest, AnOversizedUploadIsDisplacedOnceItIsLate) {
+  const auto upload = TryUpload(3 * kMb, 1);
+  ASSERT_TRUE(upload);
+  Wait(1, AskFor(3 * kMb, 2));
+  EXPECT_EQ(connection_->displaced, 0);
+  now_ += 6s;
+  Wait(2, AskFor(3 * kMb, 3));
+  EXPECT_EQ(connection_->displaced, 1);
 }
 
 TEST_F(TransferBudgetTest, AnUploadTakesFromWhoHoldsMost) {
