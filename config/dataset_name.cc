@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "config/config.h"
+#include "config/json_text.h"
 
 namespace terrace::config {
 namespace {
@@ -53,7 +54,7 @@ std::string SanitizeDatasetName(const std::string& text) {
 std::vector<ConfigError> FindDuplicateNames(const std::vector<DatasetConfig>& datasets) {
   std::vector<ConfigError> errors;
   std::map<std::string_view, std::size_t> first_of;
-  for (std::size_t i = 0; i < datasets.size(); ++i) {
+  for (std::size_t i = 0; i < datasets.size() && errors.size() < kMaxConfigErrors; ++i) {
     const auto [first, is_new] = first_of.emplace(datasets[i].name, i);
     if (is_new || datasets[i].name.empty()) continue;
     errors.push_back({fmt::format("/datasets/{}/name", i),

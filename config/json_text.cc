@@ -6,9 +6,13 @@
 #include <cstddef>
 #include <iterator>
 #include <set>
+#include <utility>
 
 namespace terrace::config {
 namespace {
+
+constexpr std::size_t kMaxKeys = 1000;  // of one object
+constexpr std::size_t kMaxDepth = 100;  // of lists and objects in one another
 
 // Reads a text and tells how far it has come.
 class CountingIterator {
@@ -67,17 +71,27 @@ class DuplicateKeyFinder : public nlohmann::detail::json_sax_dom_parser<Json> {
 
   bool start_object(std::size_t size) {
     seen_.emplace_back();
-    return json_sax_dom_parser::start_object(size);
+    return Descend() && json_sax_dom_parser::start_object(size);
+  }
+  bool start_array(std::size_t size) { return Descend() && json_sax_dom_parser::start_array(size); }
+  bool end_array() {
+    --depth_;
+    return json_sax_dom_parser::end_array();
   }
   bool key(std::string& key) {
+    // The value keeps the order of keys, and so looks through all of them for each one.
+    if (seen_.back().size() >= kMaxKeys) {
+      return Refuse(fmt::format("an object with more than {} keys, which none of a configuration has", kMaxKeys));
+    }
     // By its place, as any text may stand there.
-    if (!seen_.back().insert(key).second) {
+    if (!seen_.back().insert(key).second && errors_.size() < kMaxConfigErrors) {
       errors_.push_back(
           {"", lines_.PlaceOf(at_ - 1) + ": the key that ends here stands twice in its object; keep one"});
     }
     return json_sax_dom_parser::key(key);
   }
   bool end_object() {
+    --depth_;
     seen_.pop_back();
     return json_sax_dom_parser::end_object();
   }
@@ -92,10 +106,22 @@ class DuplicateKeyFinder : public nlohmann::detail::json_sax_dom_parser<Json> {
   const std::string& fault() const { return fault_; }
 
  private:
+  // Each level takes more memory than text.
+  bool Descend() {
+    if (++depth_ <= kMaxDepth) return true;
+    return Refuse(fmt::format("lists or objects more than {} deep, which none of a configuration are", kMaxDepth));
+  }
+  bool Refuse(std::string why) {
+    fault_at_ = at_ - 1;
+    fault_ = std::move(why);
+    return false;
+  }
+
   const std::size_t& at_;
   LineCounter lines_;
   std::vector<ConfigError>& errors_;
   std::vector<std::set<std::string>> seen_;  // keys of each object that is open
+  std::size_t depth_ = 0;
   std::size_t fault_at_ = 0;
   std::string fault_;
 };

@@ -70,7 +70,7 @@ Codec<Config> AccessLogFile() {
 Codec<Config> Datasets() {
   return {[](const Json& value, const Place& place, Config& config) {
             if (!value.is_array()) return place.Expected("a list of datasets");
-            for (std::size_t i = 0; i < value.size(); ++i) {
+            for (std::size_t i = 0; i < value.size() && !place.has_failed_often(); ++i) {
               DatasetConfig& dataset = config.datasets.emplace_back();
               ReadObject(value[i], place.At(i), DatasetOptionTable(), dataset);
               for (const std::string_view required : {"name", "sources"}) {
@@ -116,7 +116,7 @@ const std::vector<Option<Config>>& ServerOptionTable() {
        Bytes(&Config::gdal_cache_bytes, kMaxCacheBytes)},
       {"max_open_sources", "N", "Files of sources, of all datasets, that are kept open between reads",
        Integer(&Config::max_open_sources, 0, 100'000)},
-      {"max_connections", "N", "Connections at a time; above it idle ones are closed and new ones turned away",
+      {"max_connections", "N", "Connections at a time; above it one of the client that has most is closed",
        Integer(&Config::max_connections, 1, 1'000'000)},
       {"max_connections_per_client", "N", "Connections of one address at a time; 0 is no limit of its own",
        Integer(&Config::max_connections_per_client, 0, 1'000'000)},

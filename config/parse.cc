@@ -1,8 +1,12 @@
 #include "config/parse.h"
 
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
 #include <cerrno>
-#include <fstream>
-#include <iterator>
 #include <system_error>
 
 #include "config/json_text.h"
@@ -17,6 +21,34 @@ constexpr const char* kSchemaKey = "$schema";
 
 tl::unexpected<std::vector<ConfigError>> Unreadable(const std::string& reason) {
   return tl::unexpected(std::vector<ConfigError>{{"", reason}});
+}
+
+std::string TooLarge(const std::filesystem::path& file) {
+  return fmt::format("{} is larger than the {} MiB that a configuration may have; put the right file there",
+                     file.string(), kMaxConfigBytes >> 20);
+}
+
+// Of a file, or a pipe to its end; the error says why not. What is too large is not read.
+tl::expected<std::string, std::string> ReadText(int descriptor, const std::filesystem::path& file) {
+  struct stat status {};
+  if (::fstat(descriptor, &status) == 0) {
+    if (S_ISDIR(status.st_mode)) return tl::unexpected(std::string("is a folder; name a JSON file in it"));
+    if (S_ISREG(status.st_mode) && status.st_size > static_cast<off_t>(kMaxConfigBytes)) {
+      return tl::unexpected(TooLarge(file));
+    }
+  }
+  std::string text;
+  for (std::size_t size = 0;;) {
+    text.resize(std::min(std::max<std::size_t>(2 * size, 4096), kMaxConfigBytes + 1));
+    const ssize_t got = ::read(descriptor, text.data() + size, text.size() - size);
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) return tl::unexpected("cannot be read: " + std::generic_category().message(errno));
+    size += static_cast<std::size_t>(got);
+    if (size > kMaxConfigBytes) return tl::unexpected(TooLarge(file));
+    if (got > 0) continue;
+    text.resize(size);
+    return text;
+  }
 }
 
 }  // namespace
@@ -35,16 +67,15 @@ ConfigResult ParseConfig(std::string_view text, const std::filesystem::path& dir
 }
 
 ConfigResult LoadConfig(const std::filesystem::path& file) {
-  std::error_code ignored;
-  if (std::filesystem::is_directory(file, ignored)) return Unreadable("is a folder; name a JSON file in it");
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) return Unreadable("cannot be read: " + std::generic_category().message(errno));
-  const std::string text{std::istreambuf_iterator<char>(stream), {}};
-  if (stream.bad()) return Unreadable("cannot be read to its end");
+  const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
+  if (descriptor < 0) return Unreadable("cannot be read: " + std::generic_category().message(errno));
+  const tl::expected<std::string, std::string> text = ReadText(descriptor, file);
+  ::close(descriptor);
+  if (!text) return Unreadable(text.error());
   std::error_code unnamed;
   const std::filesystem::path whole = std::filesystem::absolute(file, unnamed);
   if (unnamed) return Unreadable("is relative to the working directory, which cannot be named: " + unnamed.message());
-  return ParseConfig(text, whole.parent_path());
+  return ParseConfig(*text, whole.parent_path());
 }
 
 Result<SourceConfig> SourceAt(const std::string& path) {

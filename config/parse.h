@@ -1,6 +1,7 @@
 // The configuration file: JSON text to Config and back. config.schema.json describes it to editors.
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -17,6 +18,9 @@ using ConfigResult = tl::expected<Config, std::vector<ConfigError>>;
 
 // `directory` is where relative paths in `text` start; globs in `sources` are looked up there.
 ConfigResult ParseConfig(std::string_view text, const std::filesystem::path& directory);
+
+// Of a file; a larger one is refused unread.
+inline constexpr std::size_t kMaxConfigBytes = std::size_t{16} << 20;
 
 // Reads and parses a file; its folder is the directory. A file that cannot be read is one error with the path "".
 ConfigResult LoadConfig(const std::filesystem::path& file);

@@ -35,7 +35,10 @@ class Place {
   }
   Place At(std::size_t index) const { return At(std::to_string(index)); }
 
-  void Fail(std::string message) const { errors_->push_back({path_, std::move(message)}); }
+  void Fail(std::string message) const {
+    if (!has_failed_often()) errors_->push_back({path_, std::move(message)});
+  }
+  bool has_failed_often() const { return errors_->size() >= kMaxConfigErrors; }
   void Expected(std::string_view what) const { Fail("must be " + std::string(what)); }
 
   // What relative paths are relative to.

@@ -220,7 +220,7 @@ asio::awaitable<void> Listener::Admit(tcp::socket socket) {
   const auto until = std::chrono::steady_clock::now() + (evicts || !crowded_ ? kMoment : kBackOff);
   while (connections.full() && std::chrono::steady_clock::now() < until) co_await Pause(kBackOff);
   if (connections.full() && !evicts) co_return Refuse(socket, 503);
-  crowded_ = false;
+  crowded_ = crowded_ && evicts;  // who takes another's place does not end the crowd
   StartSession(std::move(socket), context_, client);
 }
 

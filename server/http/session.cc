@@ -132,7 +132,7 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   bool SendsBody(const Response& response) const;
   Clock::time_point Deadline() const { return exchange_.begun + context_->deadline->load(std::memory_order_relaxed); }
   asio::awaitable<bool> Reply(Response& response, bool can_respond_again = false);
-  asio::awaitable<bool> WriteRest(BufferPair left, std::size_t total);
+  asio::awaitable<bool> WriteRest(BufferPair left, std::size_t total, TransferBudget::Hold& room);
   asio::awaitable<void> CloseGently();
   void Report(const Response& response, std::size_t bytes);
 
@@ -371,10 +371,9 @@ asio::awaitable<std::optional<TransferBudget::Hold>> Session::RoomLater(Response
 // False: the connection is to be closed. `response` has to live as long, and may be let go where it can be made again.
 asio::awaitable<bool> Session::Reply(Response& response, bool can_respond_again) {
   const Request& request = exchange_.request;
-  const bool with_body = SendsBody(response);
   if (can_respond_again) response.for_grant = response.for_grant || exchange_.admission.for_grant;
   std::optional<TransferBudget::Hold> room;
-  if (!with_body || response.body->size() <= TransferBudget::kFreeBytes) {
+  if (!SendsBody(response) || response.body->size() <= TransferBudget::kFreeBytes) {
     room.emplace();
   } else {
     room = context_->transfers->TryHold(AskFor(response));
@@ -402,15 +401,16 @@ asio::awaitable<bool> Session::Reply(Response& response, bool can_respond_again)
   // What the kernel takes at once needs no deadline. An error shows again when the rest is written.
   const std::size_t taken = stream_.WriteReady(left).value_or(0);
   Skip(taken, left);
-  const bool written = asio::buffer_size(left) == 0 || co_await WriteRest(left, taken);
+  const bool written = asio::buffer_size(left) == 0 || co_await WriteRest(left, taken, *room);
   Report(response, body_bytes);
   co_return options.keep_alive&& written;
 }
 
 // False: the client is gone, took nothing for too long, or takes too little in the long run. `total`: bytes of the
-// reply that were written before.
-asio::awaitable<bool> Session::WriteRest(BufferPair left, std::size_t total) {
+// reply that were written before, which tells nothing of the client: the kernel took them.
+asio::awaitable<bool> Session::WriteRest(BufferPair left, std::size_t total, TransferBudget::Hold& room) {
   const SessionOptions& options = context_->options;
+  room.Took(0);
   const auto begun = Clock::now();
   while (asio::buffer_size(left) > 0) {
     auto deadline = Clock::now() + options.write_timeout;
@@ -424,6 +424,7 @@ asio::awaitable<bool> Session::WriteRest(BufferPair left, std::size_t total) {
       stream_.Reset();
       co_return false;
     }
+    room.Took(*sent);
     total += *sent;
     Skip(*sent, left);
   }

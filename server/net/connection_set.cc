@@ -1,5 +1,6 @@
 #include "server/net/connection_set.h"
 
+#include <algorithm>
 #include <optional>
 #include <tuple>
 
@@ -62,19 +63,23 @@ bool ConnectionSet::EvictOne(const std::string& newcomer) {
   bool serves = false;
   {
     const std::lock_guard lock(mutex_);
-    const auto held = of_client_.find(newcomer);
-    const std::size_t after = held == of_client_.end() ? 1 : held->second + 1;
-    using Rank = std::tuple<Connection::Phase, std::int64_t, std::int64_t>;
+    const auto places = [this](const std::string& client) -> std::int64_t {
+      const auto count = of_client_.find(client);
+      return client.empty() || count == of_client_.end() ? 0 : static_cast<std::int64_t>(count->second);
+    };
+    const std::int64_t of_newcomer = places(newcomer) + 1;
+    using Rank = std::tuple<std::int64_t, Connection::Phase, std::int64_t>;
     std::optional<Rank> least;
     Member* of_least = nullptr;
     for (auto& [pointer, member] : connections_) {
       if (member.is_evicted) continue;
+      const bool is_own = !newcomer.empty() && member.client == newcomer;
+      const std::int64_t of_client = is_own ? of_newcomer : std::max<std::int64_t>(places(member.client), 1);
       const Connection::Phase phase = pointer->phase();  // good: a connection that ends waits for mutex_ in Remove
-      const std::size_t of_client = of_client_.at(member.client);
       const bool is_serving = phase == Connection::Phase::kServes;
-      if (is_serving && (member.client.empty() || of_client <= after)) continue;
+      if (of_client < of_newcomer || (is_serving && of_client == of_newcomer)) continue;
       const auto number = static_cast<std::int64_t>(member.number);
-      const Rank rank(phase, -static_cast<std::int64_t>(of_client), is_serving ? -number : number);
+      const Rank rank(-of_client, phase, is_serving ? -number : number);
       if (least && *least < rank) continue;
       least = rank;
       of_least = &member;

@@ -56,9 +56,10 @@ class ConnectionSet {
   std::uint64_t refused() const { return refused_.load(std::memory_order_relaxed); }
   bool draining() const;
 
-  // Makes room for a connection of `newcomer`: tells another one to close. Idle connections go before those without a
-  // complete request; of these, the oldest of the client that has most. Last, where a client has more connections
-  // than the newcomer will have, the newest of its connections, whatever it is at; those of nobody ("") stay.
+  // Makes room for a connection of `newcomer`: tells another one to close. It is one of the client that has most
+  // connections, the newcomer's counted, and of no client that has fewer than the newcomer's. Of that client the oldest
+  // idle one goes first, then the oldest without a complete request; last, if it is another client than the newcomer's
+  // and has more, its newest, whatever that is at. A connection of nobody ("") counts as a client of its own.
   // False: all others have to stay.
   bool EvictOne(const std::string& newcomer);
 

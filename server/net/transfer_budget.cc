@@ -6,6 +6,7 @@
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/this_coro.hpp>
 #include <boost/asio/use_awaitable.hpp>
+#include <cmath>
 #include <exception>
 
 namespace terrace::server {
@@ -14,6 +15,16 @@ namespace {
 // Who waits looks so often whether others have had their time, and whether it was overlooked when there was no memory
 // to wake it.
 constexpr std::chrono::milliseconds kLook{250};
+
+// Parts of the memory.
+constexpr std::size_t kRepliesPart = 2, kLargePart = 4, kUploadsPart = 4;
+// A small reply, of its room.
+constexpr std::size_t kSmallPart = 8;
+
+// What a client has used is compared in steps of an eighth of its room for a second: less does not take its place in
+// the line from it.
+constexpr double kClaimSteps = 8;
+constexpr std::chrono::duration<double> kHalfLife{10};
 
 }  // namespace
 
@@ -30,7 +41,7 @@ class TransferBudget::Waiter {
   ~Waiter() {
     const std::lock_guard lock(budget.mutex_);
     std::erase(budget.waiters_, this);
-    budget.WakeNext(PoolOf(ask.kind));
+    budget.WakeNext(budget.RoomOf(ask), budget.now_());
   }
 
   const Ask& ask;
@@ -38,10 +49,23 @@ class TransferBudget::Waiter {
   TransferBudget& budget;
 };
 
-std::optional<TransferBudget::Hold> TransferBudget::TryHold(const Ask& ask, Clock::time_point now) {
+TransferBudget::TransferBudget(std::size_t capacity, std::function<Clock::time_point()> now) : now_(std::move(now)) {
+  rooms_[kSmall].capacity = capacity / kRepliesPart;
+  rooms_[kLarge].capacity = rooms_[kOversized].capacity = capacity / kLargePart;
+  rooms_[kUploads].capacity = rooms_[kOversizedUpload].capacity = capacity / kUploadsPart;
+  rooms_[kOversized].takes_one = rooms_[kOversizedUpload].takes_one = true;
+}
+
+std::size_t TransferBudget::RoomOf(const Ask& ask) const {
+  if (ask.kind == Kind::kUpload) return ask.bytes <= rooms_[kUploads].capacity ? kUploads : kOversizedUpload;
+  if (ask.bytes <= rooms_[kSmall].capacity / kSmallPart) return kSmall;
+  return ask.bytes <= rooms_[kLarge].capacity ? kLarge : kOversized;
+}
+
+std::optional<TransferBudget::Hold> TransferBudget::TryHold(const Ask& ask) {
   if (ask.bytes <= kFreeBytes) return Hold();
   const std::lock_guard lock(mutex_);
-  return Take(ask, now, nullptr);
+  return Take(ask, now_(), nullptr);
 }
 
 asio::awaitable<std::optional<TransferBudget::Hold>> TransferBudget::HoldWhenRoom(Ask ask, Clock::time_point deadline) {
@@ -53,120 +77,180 @@ asio::awaitable<std::optional<TransferBudget::Hold>> TransferBudget::HoldWhenRoo
   const auto executor = co_await asio::this_coro::executor;
   const Waiter waiter(*this, ask, executor);
   for (;;) {
-    const auto now = Clock::now();
+    const auto now = now_();
     Victims victims;
     {
       const std::lock_guard lock(mutex_);
       hold = Take(ask, now, &waiter);
-      if (!hold && now < deadline) victims = ChooseVictims(ask, now);
+      if (!hold && now < deadline) {
+        ask.kind == Kind::kUpload ? ChooseUploads(ask, now, victims) : ChooseLate(ask, now, victims);
+      }
       if (!hold && now >= deadline) ++refused_;
     }
     if (hold || now >= deadline) co_return hold;
     for (const auto& connection : victims.cut) connection->Abort();
     for (const auto& connection : victims.displaced) connection->Displace();
-    waiter.timer->expires_at(std::min(deadline, now + kLook));
+    waiter.timer->expires_after(std::min<Clock::duration>(deadline - now, kLook));
     boost::system::error_code ignored;  // woken, or time to look
     co_await waiter.timer->async_wait(asio::redirect_error(asio::use_awaitable, ignored));
   }
 }
 
-std::size_t TransferBudget::HeldBy(std::uint64_t client, std::size_t pool) const {
-  const auto own = shares_.find(client);
-  return own == shares_.end() ? 0 : own->second.bytes[pool];
+std::size_t TransferBudget::HeldBy(std::uint64_t client, const Room& room) {
+  const auto own = room.shares.find(client);
+  return own == room.shares.end() ? 0 : own->second.bytes;
+}
+
+// Use grows by `bytes` a second and is forgotten by half each kHalfLife, which has a limit for constant `bytes`.
+void TransferBudget::Age(Share& share, Clock::time_point now) {
+  const double life = kHalfLife.count() / std::log(2.0);
+  const double limit = static_cast<double>(share.bytes) * life;
+  const double passed = std::chrono::duration<double>(now - share.as_of).count();
+  share.used = limit + (share.used - limit) * std::exp(-std::max(passed, 0.0) / life);
+  share.as_of = now;
+}
+
+// The room that it has used lately or may use before it is late, in steps.
+std::uint64_t TransferBudget::Claim(std::uint64_t client, const Room& room, Clock::time_point now) {
+  const auto own = room.shares.find(client);
+  if (own == room.shares.end()) return 0;
+  Share share = own->second;
+  Age(share, now);
+  const double coming = static_cast<double>(share.bytes) * std::chrono::duration<double>(kGrace).count();
+  const double step = std::max(static_cast<double>(room.capacity) / kClaimSteps, 1.0);
+  return static_cast<std::uint64_t>((share.used + coming) / step);
+}
+
+// Aged. Those of clients that are as if they had never come are dropped from time to time.
+TransferBudget::Share& TransferBudget::ShareOf(std::uint64_t client, Room& room, Clock::time_point now) {
+  if (room.shares.size() >= room.sweep_at) {
+    std::erase_if(room.shares,
+                  [&](const auto& other) { return other.second.holds == 0 && Claim(other.first, room, now) == 0; });
+    room.sweep_at = 2 * room.shares.size() + 64;
+  }
+  Share& share = room.shares[client];
+  Age(share, now);
+  return share;
 }
 
 // `waiter`: whose place in the line it is; null: the last.
-bool TransferBudget::MayTake(const Ask& ask, const Waiter* waiter) const {
-  const std::size_t number = PoolOf(ask.kind);
-  const Pool& pool = pools_[number];
+bool TransferBudget::MayTake(const Ask& ask, Clock::time_point now, const Waiter* waiter) const {
+  const std::size_t number = RoomOf(ask);
+  const Room& room = rooms_[number];
   if (ask.body && charges_.contains(ask.body.get())) return true;
-  const std::size_t own = HeldBy(ask.client, number);
-  if (!waiters_.empty()) {
-    const Waiter* next = NextWaiter(number);
-    if (next != nullptr && next != waiter && HeldBy(next->ask.client, number) <= own) return false;
-  }
-  if (pool.held + ask.bytes > pool.capacity) return ask.bytes > pool.capacity && !pool.oversized_under_way;
-  return number == 1 || own == 0 || own + ask.bytes <= kShare * (pool.capacity - pool.held - ask.bytes);
+  if (!HasRoom(ask)) return false;
+  if (waiters_.empty()) return true;
+  const Waiter* next = NextWaiter(number, now);
+  if (next == nullptr || next == waiter) return true;
+  return Claim(ask.client, room, now) < Claim(next->ask.client, room, now);
 }
 
-// The oldest of the client that holds least.
-TransferBudget::Waiter* TransferBudget::NextWaiter(std::size_t pool) const {
+// Whoever waits.
+bool TransferBudget::HasRoom(const Ask& ask) const {
+  const std::size_t number = RoomOf(ask);
+  const Room& room = rooms_[number];
+  if (room.takes_one) return room.held == 0;
+  if (room.held + ask.bytes > room.capacity) return false;
+  const std::size_t own = HeldBy(ask.client, room);
+  return number == kUploads || own == 0 || own + ask.bytes <= kShare * (room.capacity - room.held - ask.bytes);
+}
+
+// The oldest of the client that claims least.
+TransferBudget::Waiter* TransferBudget::NextWaiter(std::size_t room, Clock::time_point now) const {
   Waiter* next = nullptr;
+  std::uint64_t least = 0;
   for (Waiter* waiter : waiters_) {
-    if (PoolOf(waiter->ask.kind) != pool) continue;
-    if (next == nullptr || HeldBy(waiter->ask.client, pool) < HeldBy(next->ask.client, pool)) next = waiter;
+    if (RoomOf(waiter->ask) != room) continue;
+    const std::uint64_t claim = Claim(waiter->ask.client, rooms_[room], now);
+    if (next == nullptr || claim < least) {
+      next = waiter;
+      least = claim;
+    }
   }
   return next;
 }
 
 std::optional<TransferBudget::Hold> TransferBudget::Take(const Ask& ask, Clock::time_point now, const Waiter* waiter) {
-  const bool fits = MayTake(ask, waiter);
+  const bool fits = MayTake(ask, now, waiter);
   const bool is_beyond = !fits && ask.kind == Kind::kVitalReply && reserve_held_ + ask.bytes <= kReserve;
   if (!fits && !is_beyond) return std::nullopt;
-  const std::size_t number = PoolOf(ask.kind);
-  const auto time = kGrace + std::chrono::milliseconds(ask.bytes * 1000 / kRate);
+  const std::size_t number = RoomOf(ask);
+  Room& room = rooms_[number];
+  auto late_at = Clock::time_point::max();
+  if (ask.kind == Kind::kUpload) late_at = now + kGrace + std::chrono::milliseconds(ask.bytes * 1000 / kRate);
   // What may fail for want of memory comes first.
   Entries made;
-  made.push_back({ask.body.get(), now + time, ask.holder, ask.client, ask.kind == Kind::kUpload, ask.bytes});
+  made.push_back({ask.body.get(), number, late_at, ask.holder, ask.client});
   if (!ask.body) made.front().charge = &made.front();
-  Share& own = shares_[ask.client];
+  Share& own = ShareOf(ask.client, room, now);
   Charge& charge = charges_[made.front().charge];
   const auto entry = made.begin();
   entries_.splice(entries_.end(), made);
   ++own.holds;
   if (++charge.holders == 1) {
-    Pool& pool = pools_[number];
-    charge.client = ask.client;
-    charge.is_beyond = is_beyond;
-    charge.bytes = is_beyond || pool.held + ask.bytes <= pool.capacity ? ask.bytes : 0;
-    pool.oversized_under_way = pool.oversized_under_way || charge.bytes == 0;
-    (is_beyond ? reserve_held_ : pool.held) += charge.bytes;
-    own.bytes[number] += charge.bytes;
+    charge = {ask.bytes, 1, is_beyond, ask.client};
+    (is_beyond ? reserve_held_ : room.held) += ask.bytes;
+    own.bytes += ask.bytes;
   }
-  if (waiter != nullptr) WakeNext(number);  // there may be room for the next one too
+  if (waiter != nullptr) WakeNext(number, now);  // there may be room for the next one too
   return Hold(this, entry, ask.body);
 }
 
 // Each is told once; its room comes back when its connection has ended, or its request was let go.
-TransferBudget::Victims TransferBudget::ChooseVictims(const Ask& ask, Clock::time_point now) {
-  Victims victims;
-  const std::size_t number = PoolOf(ask.kind);
-  const bool for_upload = ask.kind == Kind::kUpload, is_vital = ask.kind == Kind::kVitalReply;
-  std::uint64_t largest = ask.client;
-  for (const auto& [client, share] : shares_) {
-    const std::size_t most = HeldBy(largest, number);
-    // A tie is broken by number, so that it does not depend on the table's order.
-    if (share.bytes[number] > most || (share.bytes[number] == most && client < largest)) largest = client;
-  }
-  const auto tell = [&](Entry& entry, std::vector<std::shared_ptr<Connection>>& whom) {
-    auto connection = entry.holder.lock();
-    entry.holder.reset();
-    if (!connection) return false;
-    whom.push_back(std::move(connection));
-    ++cut_;
-    return true;
+bool TransferBudget::Tell(Entry& entry, std::vector<std::shared_ptr<Connection>>& whom) {
+  auto connection = entry.holder.lock();
+  entry.holder.reset();
+  if (!connection) return false;
+  whom.push_back(std::move(connection));
+  ++cut_;
+  return true;
+}
+
+// All late replies of the client that holds most, also where they were told before and have not ended yet. Vital ones
+// take from the asker too.
+void TransferBudget::ChooseLate(const Ask& ask, Clock::time_point now, Victims& victims) {
+  const std::size_t number = RoomOf(ask);
+  const Room& room = rooms_[number];
+  const bool is_vital = ask.kind == Kind::kVitalReply;
+  std::size_t most = is_vital ? 0 : HeldBy(ask.client, room);
+  std::optional<std::uint64_t> client;
+  const auto is_late = [&](const Entry& entry) {
+    return entry.room == number && now >= entry.late_at && (is_vital || entry.client != ask.client);
   };
-  if (for_upload) {
-    if (HeldBy(largest, number) > HeldBy(ask.client, number) + ask.bytes) {
-      for (auto entry = entries_.rbegin(); entry != entries_.rend(); ++entry) {
-        if (entry->is_upload && entry->client == largest && tell(*entry, victims.displaced)) return victims;
-      }
-    }
-    for (Entry& entry : entries_) {
-      if (entry.is_upload && entry.client != ask.client && now >= entry.entitled_until) tell(entry, victims.displaced);
-    }
-    return victims;
+  for (const Entry& entry : entries_) {
+    if (!is_late(entry)) continue;
+    const std::size_t held = HeldBy(entry.client, room);
+    if (held <= most) continue;
+    most = held;
+    client = entry.client;
   }
   for (Entry& entry : entries_) {
-    const bool is_late = !entry.is_upload && now >= entry.entitled_until;
-    if (is_late && entry.client == largest && (is_vital || largest != ask.client)) tell(entry, victims.cut);
+    if (client && is_late(entry) && entry.client == *client) Tell(entry, victims.cut);
   }
-  return victims;
+}
+
+void TransferBudget::ChooseUploads(const Ask& ask, Clock::time_point now, Victims& victims) {
+  const std::size_t number = RoomOf(ask);
+  const Room& room = rooms_[number];
+  std::uint64_t largest = ask.client;
+  for (const auto& [client, share] : room.shares) {
+    const std::size_t most = HeldBy(largest, room);
+    // A tie is broken by number, so that it does not depend on the table's order.
+    if (share.bytes > most || (share.bytes == most && client < largest)) largest = client;
+  }
+  if (HeldBy(largest, room) > HeldBy(ask.client, room) + ask.bytes) {
+    for (auto entry = entries_.rbegin(); entry != entries_.rend(); ++entry) {
+      if (entry->room == number && entry->client == largest && Tell(*entry, victims.displaced)) return;
+    }
+  }
+  for (Entry& entry : entries_) {
+    if (entry.room == number && entry.client != ask.client && now >= entry.late_at) Tell(entry, victims.displaced);
+  }
 }
 
 // It belongs to its coroutine's thread: nothing of it may be left here once it is posted there.
-void TransferBudget::WakeNext(std::size_t pool) {
-  Waiter* next = NextWaiter(pool);
+void TransferBudget::WakeNext(std::size_t room, Clock::time_point now) {
+  Waiter* next = NextWaiter(room, now);
   if (next == nullptr) return;
   const std::weak_ptr<asio::steady_timer> timer = next->timer;
   try {
@@ -178,37 +262,54 @@ void TransferBudget::WakeNext(std::size_t pool) {
 }
 
 void TransferBudget::Release(Entries::iterator entry) {
+  const auto now = now_();
   const std::lock_guard lock(mutex_);
-  const std::size_t number = entry->is_upload ? 1 : 0;
+  const std::size_t number = entry->room;
+  const std::uint64_t client = entry->client;
+  Room& room = rooms_[number];
   const auto found = charges_.find(entry->charge);
   Charge& charge = found->second;
-  const auto own = shares_.find(entry->client);
+  Share& own = room.shares.at(client);
+  Age(own, now);
+  --own.holds;
   entries_.erase(entry);
   if (--charge.holders == 0) {
-    Pool& pool = pools_[number];
-    (charge.is_beyond ? reserve_held_ : pool.held) -= charge.bytes;
-    if (charge.bytes == 0) pool.oversized_under_way = false;
-    shares_.at(charge.client).bytes[number] -= charge.bytes;
+    (charge.is_beyond ? reserve_held_ : room.held) -= charge.bytes;
+    own.bytes -= charge.bytes;
     charges_.erase(found);
-  } else if (charge.client == own->first) {
+  } else if (charge.client == client) {
     // From now on it counts against one of those who still read it.
     const auto heir = std::ranges::find_if(entries_, [&](const Entry& other) { return other.charge == found->first; });
-    own->second.bytes[number] -= charge.bytes;
+    own.bytes -= charge.bytes;
     charge.client = heir->client;
-    shares_.at(charge.client).bytes[number] += charge.bytes;
+    Share& next = room.shares.at(charge.client);
+    Age(next, now);
+    next.bytes += charge.bytes;
   }
-  if (--own->second.holds == 0) shares_.erase(own);
-  if (!waiters_.empty()) WakeNext(number);
+  if (!waiters_.empty()) WakeNext(number, now);
+}
+
+void TransferBudget::Took(Entries::iterator entry, std::size_t bytes) {
+  const auto now = now_();
+  const std::lock_guard lock(mutex_);
+  const auto latest = now + kGrace;
+  if (entry->late_at < latest) {
+    entry->late_at = std::min(latest, entry->late_at + std::chrono::microseconds(bytes * 1'000'000 / kRate));
+  } else {
+    entry->late_at = latest;
+  }
 }
 
 void TransferBudget::Settle(Entries::iterator entry) {
   const std::lock_guard lock(mutex_);
-  entry->entitled_until = Clock::time_point::max();
+  entry->late_at = Clock::time_point::max();
 }
 
 TransferBudget::Stats TransferBudget::stats() const {
   const std::lock_guard lock(mutex_);
-  return {pools_[0].held + pools_[1].held, waiters_.size(), refused_, cut_};
+  std::size_t held = 0;
+  for (const Room& room : rooms_) held += room.held;
+  return {held, waiters_.size(), refused_, cut_};
 }
 
 }  // namespace terrace::server

@@ -1,22 +1,30 @@
-// The memory of bodies on their way: replies that clients have not taken yet, which get three quarters of it, and
-// bodies of requests that are not answered, which get the rest. Neither keeps the other out.
+// The memory of bodies on their way: replies that clients have not taken yet, and bodies of requests that are not
+// answered.
 //
-// A body that many replies share counts once. Bodies that find no room wait for it (HoldWhenRoom), those of the client
-// that holds least first. One client gets two thirds of the room for replies, or one reply: there is room for the next
-// client. Who waits takes from others:
-// - Replies that have had more than their time (kGrace, and a second for each kRate bytes) are cut off, those of the
-//   client that holds most.
-// - Of uploads the newest one of the client that holds most is displaced, if that client holds more than the one who
-//   waits would; and those of others that have not arrived whole in their time.
-// A client's own bodies wait for one another. A single body that is larger than all the room may be under way beside
-// it. What tells operators how the server is may go beyond it by kReserve: it is wanted most when there is no room.
+// It is divided into rooms that take nothing from one another: half for small replies, which are up to an eighth of
+// their room, a quarter for larger ones, a quarter for uploads. What is larger than its room is under way one at a time
+// beside it, as a room of its own. The same holds in each room:
+// - A body that many replies share counts once.
+// - Bodies that find no room wait for it (HoldWhenRoom). Next is a body of the client that has used the room least
+//   lately, in bytes times seconds, what it holds now included; of those alike the oldest.
+// - One client gets two thirds of what is for replies, or one reply: there is room for the next client.
+// - Who waits takes from others. A client has kGrace to take a reply that is on offer, and gets a second back for each
+//   kRate bytes that it takes: it is late once it lags kGrace behind that rate. Late replies are cut off, those of the
+//   client that holds most, if that is more than the client of the one who waits. Of uploads the newest one of the
+//   client that holds most is displaced, if that client holds more than the one who waits would; and those of others
+//   that have not arrived whole in kGrace and a second for each kRate bytes. A client's own bodies wait for one
+//   another.
+//
+// What tells operators how the server is may go beyond all rooms by kReserve: it is wanted most when there is no room.
 //
 // Thread-safe.
 #pragma once
 
+#include <array>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <list>
 #include <memory>
 #include <mutex>
@@ -42,8 +50,8 @@ class TransferBudget {
   static constexpr std::size_t kReserve = std::size_t{1} << 20;
   static constexpr std::size_t kShare = 2;  // a client's, of what is free: room is left for the next one
 
-  explicit TransferBudget(std::size_t capacity)
-      : pools_{{capacity - capacity / kUploadShare, 0, false}, {capacity / kUploadShare, 0, false}} {}
+  // `now`: what the time is.
+  explicit TransferBudget(std::size_t capacity, std::function<Clock::time_point()> now = Clock::now);
 
   // Gives its room back when it ends, on whatever thread.
   class Hold;
@@ -59,7 +67,7 @@ class TransferBudget {
   };
 
   // Room until the hold ends. Nothing: there is none now.
-  std::optional<Hold> TryHold(const Ask& ask, Clock::time_point now = Clock::now());
+  std::optional<Hold> TryHold(const Ask& ask);
 
   // Waits for room, at most until `deadline`; nothing then. Give no body: what waits must not take the memory that it
   // waits for. The coroutine has to run on a single thread.
@@ -74,54 +82,66 @@ class TransferBudget {
   Stats stats() const;
 
  private:
-  static constexpr std::size_t kUploadShare = 4;  // a quarter is for request bodies
-
-  struct Pool {
-    std::size_t capacity = 0, held = 0;
-    bool oversized_under_way = false;
+  struct Share {  // of a client
+    std::size_t bytes = 0;
+    std::size_t holds = 0;
+    // Byte-seconds until `as_of`, of which half are forgotten every ten seconds.
+    double used = 0;
+    Clock::time_point as_of;
   };
+  struct Room {
+    std::size_t capacity = 0;
+    bool takes_one = false;  // of any size
+    std::size_t held = 0;
+    std::unordered_map<std::uint64_t, Share> shares = {};  // by client; those that hold anything or did so lately
+    std::size_t sweep_at = 64;                             // shares
+  };
+  enum RoomNumber : std::size_t { kSmall, kLarge, kOversized, kUploads, kOversizedUpload, kRooms };
+
   struct Entry {
     const void* charge;  // what it is counted under: the body, or the entry itself where nobody shares it
-    Clock::time_point entitled_until;
+    std::size_t room = 0;
+    Clock::time_point late_at;         // max: it is not the client's turn
     std::weak_ptr<Connection> holder;  // not told to make room yet
     std::uint64_t client = 0;
-    bool is_upload = false;
-    std::size_t bytes = 0;
   };
   using Entries = std::list<Entry>;
   struct Charge {
-    std::size_t bytes = 0;  // 0: beside the budget
+    std::size_t bytes = 0;
     std::size_t holders = 0;
     bool is_beyond = false;    // in the reserve
     std::uint64_t client = 0;  // one of the holders'
-  };
-  struct Share {                    // of a client
-    std::size_t bytes[2] = {0, 0};  // in each pool
-    std::size_t holds = 0;
   };
   class Waiter;
   struct Victims {
     std::vector<std::shared_ptr<Connection>> cut, displaced;
   };
 
-  static std::size_t PoolOf(Kind kind) { return kind == Kind::kUpload ? 1 : 0; }
+  std::size_t RoomOf(const Ask& ask) const;
   // mutex_ is held, as for the following.
-  std::size_t HeldBy(std::uint64_t client, std::size_t pool) const;
-  bool MayTake(const Ask& ask, const Waiter* waiter) const;
-  Waiter* NextWaiter(std::size_t pool) const;
-  Victims ChooseVictims(const Ask& ask, Clock::time_point now);
+  static std::size_t HeldBy(std::uint64_t client, const Room& room);
+  static void Age(Share& share, Clock::time_point now);
+  static std::uint64_t Claim(std::uint64_t client, const Room& room, Clock::time_point now);
+  static Share& ShareOf(std::uint64_t client, Room& room, Clock::time_point now);
+  bool HasRoom(const Ask& ask) const;
+  bool MayTake(const Ask& ask, Clock::time_point now, const Waiter* waiter) const;
+  Waiter* NextWaiter(std::size_t room, Clock::time_point now) const;
+  void ChooseLate(const Ask& ask, Clock::time_point now, Victims& victims);
+  void ChooseUploads(const Ask& ask, Clock::time_point now, Victims& victims);
+  bool Tell(Entry& entry, std::vector<std::shared_ptr<Connection>>& whom);
   std::optional<Hold> Take(const Ask& ask, Clock::time_point now, const Waiter* waiter);
-  void WakeNext(std::size_t pool);
+  void WakeNext(std::size_t room, Clock::time_point now);
 
   void Release(Entries::iterator entry);
+  void Took(Entries::iterator entry, std::size_t bytes);
   void Settle(Entries::iterator entry);
 
+  const std::function<Clock::time_point()> now_;
   mutable std::mutex mutex_;
   Entries entries_;  // the oldest first
   std::unordered_map<const void*, Charge> charges_;
-  std::unordered_map<std::uint64_t, Share> shares_;  // by client; those that hold anything
-  Pool pools_[2];                                    // replies, uploads
-  std::list<Waiter*> waiters_;                       // the oldest first
+  std::array<Room, kRooms> rooms_;
+  std::list<Waiter*> waiters_;  // the oldest first
   std::size_t reserve_held_ = 0;
   std::uint64_t refused_ = 0, cut_ = 0;
 };
@@ -141,7 +161,13 @@ class TransferBudget::Hold {
     if (budget_) budget_->Release(entry_);
   }
 
-  // What is held is complete, and counts until the end, but is late no more.
+  // The client has taken so many more bytes of the reply. Its time begins with the first call: until then the reply is
+  // being made.
+  void Took(std::size_t bytes) {
+    if (budget_) budget_->Took(entry_, bytes);
+  }
+
+  // The upload is complete, and counts until the end, but is late no more.
   void Settle() {
     if (budget_) budget_->Settle(entry_);
   }

@@ -24,7 +24,7 @@ struct ReplyRecord {
   int status = 0;           // 499: the client left before there was a reply
   std::size_t body_bytes = 0;
   std::chrono::microseconds duration{0};  // from the end of the request's head
-  std::string_view route;                 // a literal; of "none" and "preflight" the target may be no URL of the server
+  std::string_view route;                 // a literal
   std::string_view dataset;               // one that exists, or empty
   std::string_view cache;                 // hit, miss, join or -
   std::string_view request_id;

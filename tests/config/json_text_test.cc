@@ -40,6 +40,30 @@ TEST(ParseJsonText, TakesALongListOfObjects) {
   EXPECT_THAT(errors, ElementsAre(IsError("", "the key that ends here stands twice")));
 }
 
+// Each key is looked for among all before it.
+TEST(ParseJsonText, RefusesAnObjectOfManyKeys) {
+  std::string text = "{\"0\": 0";
+  for (int i = 1; i < 1000; ++i) text += ",\n\"" + std::to_string(i) + "\": 0";
+  std::vector<ConfigError> errors;
+  EXPECT_EQ(ParseJsonText(text + "}", errors).size(), 1000u);
+  EXPECT_THAT(errors, testing::IsEmpty());
+  EXPECT_TRUE(ParseJsonText(text + ",\n\"more\": 0}", errors).is_discarded());
+  EXPECT_THAT(errors, ElementsAre(IsError("", "line 1001, column 6: an object with more than 1000 keys")));
+}
+
+TEST(ParseJsonText, RefusesADeepText) {
+  std::string text;
+  for (int i = 0; i < 50; ++i) text += "{\"a\":[";
+  std::vector<ConfigError> errors;
+  EXPECT_TRUE(ParseJsonText(text + "[", errors).is_discarded());
+  EXPECT_TRUE(ParseJsonText(text + "{", errors).is_discarded());
+  EXPECT_THAT(errors, ElementsAre(IsError("", "line 1, column 301: lists or objects more than 100 deep"),
+                                  IsError("", "line 1, column 301: lists or objects more than 100 deep")));
+  std::string end;
+  for (int i = 0; i < 50; ++i) end += "]}";
+  EXPECT_FALSE(ParseJsonText(text + end, errors).is_discarded());
+}
+
 TEST(ParseJsonText, QuotesNothingOfTheText) {
   for (const char* text : {"{\"token\": s3cret}", "{\"token\": \"s3cret\n\"}", "{\"token\": \"s3cret", "{\"s3cret\" 1}",
                            "{\"token\": \"s3cret\\x\"}", "{} s3cret", "{\"token\": 1e9999}", "\"s3cret"}) {

@@ -12,9 +12,13 @@
 namespace terrace::config {
 namespace {
 
+using testing::AllOf;
 using testing::ElementsAre;
+using testing::Ge;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::Le;
+using testing::SizeIs;
 
 TEST(ParseConfig, GivesDefaultsForAnEmptyObject) {
   const ConfigResult config = ParseConfig("{}", "/nowhere");
@@ -160,6 +164,34 @@ TEST(LoadConfig, SaysWhyAFileCannotBeRead) {
   const ConfigResult folder = LoadConfig(testing::TempDir());
   ASSERT_FALSE(folder);
   EXPECT_THAT(folder.error(), ElementsAre(IsError("", "is a folder; name a JSON file in it")));
+}
+
+TEST(LoadConfig, RefusesAFileThatIsTooLarge) {
+  const std::filesystem::path file =
+      std::filesystem::path(testing::TempDir()) / ("large_config_" + std::to_string(::getpid()) + ".json");
+  std::ofstream(file) << "{}" << std::string(kMaxConfigBytes - 2, '\n');
+  EXPECT_TRUE(LoadConfig(file));
+  std::filesystem::resize_file(file, kMaxConfigBytes + 1);  // with a hole
+  const ConfigResult larger = LoadConfig(file);
+  ASSERT_FALSE(larger);
+  EXPECT_THAT(larger.error(), ElementsAre(IsError("", file.string() + " is larger than the 16 MiB")));
+  std::filesystem::remove(file);
+  const ConfigResult endless = LoadConfig("/dev/zero");
+  ASSERT_FALSE(endless);
+  EXPECT_THAT(endless.error(), ElementsAre(IsError("", "/dev/zero is larger than the 16 MiB")));
+}
+
+// Of another kind, and millions of things may be wrong in it.
+TEST(ParseConfig, TellsABoundedNumberOfErrors) {
+  std::string datasets = "{\"datasets\": [{}", keys = "{\"a\": 0", names = "{\"datasets\": [";
+  for (int i = 0; i < 10'000; ++i) {
+    datasets += ",{}";
+    keys += ",\"a\": 0";
+    names += std::string(i > 0 ? "," : "") + "{\"name\": \"a\", \"sources\": [\"x\"]}";
+  }
+  EXPECT_THAT(ErrorsOf(names + "]}"), SizeIs(100));
+  EXPECT_THAT(ErrorsOf(datasets + "]}"), SizeIs(AllOf(Ge(100u), Le(101u))));
+  EXPECT_THAT(ErrorsOf(keys + "}"), SizeIs(AllOf(Ge(100u), Le(101u))));
 }
 
 }  // namespace

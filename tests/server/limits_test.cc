@@ -80,7 +80,7 @@ TEST_F(Limits, FiveHundredSlowReadersHoldABoundedPart) {
 TEST_F(Limits, SlowReadersOfOneClientAreAllServedInTheEnd) {
   MakeTilesLarge();
   ServerOptions options;
-  options.edge.transfer_bytes = std::size_t{8} << 20;  // six for replies
+  options.edge.transfer_bytes = std::size_t{8} << 20;  // two for replies of this size
   Start(options);
   std::vector<std::unique_ptr<RawClient>> readers;
   for (int i = 0; i < 30; ++i) {
@@ -101,6 +101,20 @@ TEST_F(Limits, SlowReadersOfOneClientAreAllServedInTheEnd) {
   EXPECT_EQ(whole, 30);
   EXPECT_EQ(Metric("terrace_http_transfers_refused_total"), "0");
   EXPECT_EQ(Metric("terrace_http_transfers_cut_total"), "0");
+}
+
+// It is larger than all the room, and so beside it. Who does not take it does not keep others from theirs.
+TEST_F(Limits, AnOversizedReplyThatIsNotTakenMakesRoomForAnothers) {
+  MakeTilesLarge(std::size_t{16} << 20);  // the kernel takes some of it
+  ServerOptions options;
+  options.edge.transfer_bytes = std::size_t{2} << 20;
+  options.edge.trusted_proxies = {"127.0.0.1"};
+  Start(options);
+  RawClient slow(port(), 4096);
+  slow.Send(Get("/maui/3/0/0.terrain", "X-Forwarded-For: 192.0.2.1\r\n"));
+  ASSERT_TRUE(Eventually([&] { return Metric("terrace_http_transfer_bytes") == "16777216"; }));
+  EXPECT_EQ(Fetch(port(), "/maui/3/1/0.terrain", "X-Forwarded-For: 192.0.2.2\r\n").status, 200);
+  EXPECT_EQ(Metric("terrace_http_transfers_cut_total"), "1");
 }
 
 TEST_F(Limits, ManyReadersOfOneTileCountOnce) {

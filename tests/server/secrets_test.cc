@@ -211,6 +211,11 @@ TEST_F(Secrets, AreInNoLogAndNoSharedReplyHoweverTheyAreSpelled) {
     for (const std::string& request : Requests(path)) Ask(request);
   }
   for (const std::string& request : OtherForms("/open/layer.json")) Ask(request);
+  // In the place of a name, in a path of a known shape.
+  for (const char* target : {"/$/layer.json", "/$/0/0/0.terrain", "/$/heights?locations=1,1", "/viewer/$", "/$"}) {
+    EXPECT_GE(Fetch(port(), FieldsWith(target)).status, 400) << target;
+    ++asked_;
+  }
   ExpectNothingTold();
 }
 

@@ -41,7 +41,7 @@ class Eviction : public testing::Test {
 TEST_F(Eviction, BeginsWithIdleConnections) {
   const FakeConnection& serving = Add(Phase::kServes, "a");
   const FakeConnection& head = Add(Phase::kReceives, "a");
-  const FakeConnection& idle = Add(Phase::kIdle, "b");
+  const FakeConnection& idle = Add(Phase::kIdle, "a");
   EXPECT_TRUE(set_.EvictOne("new"));
   EXPECT_TRUE(idle.evicted);
   EXPECT_FALSE(head.evicted || serving.evicted);
@@ -70,6 +70,42 @@ TEST_F(Eviction, TakesTheNewestServingConnectionOfAClientThatHasMoreThanTheNewco
   EXPECT_TRUE(second.aborted);
   EXPECT_FALSE(first.aborted || polite.aborted || proxies.aborted);
   EXPECT_FALSE(set_.EvictOne("new")) << "the flood has one left, as the newcomer will";
+}
+
+// Whatever those of others are at: one client that is served all it can get does not drive them out.
+TEST_F(Eviction, TakesFromTheClientThatHasMostWhateverItsConnectionsAreAt) {
+  const FakeConnection& idle = Add(Phase::kIdle, "polite");
+  const FakeConnection& secured = Add(Phase::kReceives, "slow line");
+  Add(Phase::kServes, "flood");
+  Add(Phase::kServes, "flood");
+  const FakeConnection& newest = Add(Phase::kServes, "flood");
+  EXPECT_FALSE(set_.EvictOne("flood")) << "it has most, and waits for its own";
+  EXPECT_TRUE(set_.EvictOne("new"));
+  EXPECT_TRUE(newest.aborted);
+  EXPECT_FALSE(idle.evicted || secured.evicted);
+}
+
+TEST_F(Eviction, AClientThatHasMostTakesItsOwn) {
+  const FakeConnection& idle = Add(Phase::kIdle, "polite");
+  Add(Phase::kServes, "flood");
+  const FakeConnection& own = Add(Phase::kReceives, "flood");
+  EXPECT_TRUE(set_.EvictOne("flood"));
+  EXPECT_TRUE(own.evicted);
+  EXPECT_FALSE(idle.evicted);
+}
+
+// They speak for many clients, who must not be counted as one.
+TEST_F(Eviction, ConnectionsOfProxiesAreNoClient) {
+  const FakeConnection& first = Add(Phase::kIdle, "");
+  const FakeConnection& second = Add(Phase::kReceives, "");
+  FakeConnection& direct = Add(Phase::kReceives, "direct");
+  Add(Phase::kServes, "direct");
+  EXPECT_TRUE(set_.EvictOne(""));
+  EXPECT_TRUE(direct.evicted);
+  Remove(direct);
+  EXPECT_TRUE(set_.EvictOne("new"));
+  EXPECT_TRUE(first.evicted) << "the idle one of those alike";
+  EXPECT_FALSE(second.evicted);
 }
 
 TEST_F(Eviction, LeavesConnectionsThatServe) {

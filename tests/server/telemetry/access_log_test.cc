@@ -48,6 +48,28 @@ TEST(AccessLog, CutsLongTargets) {
   EXPECT_LT(FormatJsonLine(record, kNow).size(), 3 * kMaxLoggedTargetBytes + 300);
 }
 
+// What stands where a name is expected may be a token.
+TEST(AccessLog, HidesLongPathsThatNameNothing) {
+  const std::string token = "SECRETsecret0123456789";
+  const auto shown = [&](std::string_view route, std::string_view dataset, int status, const std::string& target) {
+    ReplyRecord record = Record();
+    record.route = route;
+    record.dataset = dataset;
+    record.status = status;
+    record.target = target;
+    const std::string line = FormatAccessLine(record);
+    return line.substr(0, line.find(' ', 4));
+  };
+  EXPECT_EQ(shown("layer", "", 404, "/" + token + "/layer.json"), "GET \"/.../layer.json\"");
+  EXPECT_EQ(shown("tile", "", 401, "/" + token + "/0/0/0.terrain"), "GET \"/.../0/0/0.terrain\"");
+  EXPECT_EQ(shown("heights", "", 401, "/" + token + "/heights?locations=1,1"), "GET \"/.../heights?locations=1,1\"");
+  EXPECT_EQ(shown("viewer", "", 404, "/viewer/" + token), "GET \"/viewer/...\"");
+  EXPECT_EQ(shown("viewer", "", 404, "/viewer/a/" + token + ".js"), "GET \"/viewer/a/...\"");
+  EXPECT_EQ(shown("viewer", "", 304, "/viewer/index-0123456789abcdef.js"), "GET \"/viewer/index-0123456789abcdef.js\"");
+  EXPECT_EQ(shown("tile", "a-dataset-with-a-long-name", 200, "/a-dataset-with-a-long-name/0/0/0.terrain"),
+            "GET \"/a-dataset-with-a-long-name/0/0/0.terrain\"");
+}
+
 TEST(AccessLog, HasTheCombinedForm) {
   ReplyRecord record = Record();
   record.user_agent = "Mozilla/5.0 (\"x\")";
