@@ -51,7 +51,6 @@ Answer DocumentMaker::Make(Described described, const Call& call) const {
   auto* plan = std::get_if<DocumentPlan>(&described);
   if (plan == nullptr) return std::get<Response>(std::move(described));
   const tiler::Coding coding = CodingFor(*call.request);
-  if (plan->bytes <= kShortBytes) return Serve(*MakeDocument(plan->write, coding, {}), *plan, *call.request);
   if (const auto kept = kept_.Find(Key{plan->key, coding})) return Serve(*kept, *plan, *call.request);
   return MakeAside(std::move(*plan), coding, call);
 }

@@ -1,5 +1,5 @@
-// Documents that depend on a request's parameters. Short ones are made at once; long ones on a worker, where nobody
-// else waits for them, and are kept for a while.
+// Documents that depend on a request's parameters: made on a worker, since even short ones may take longer than a
+// cached tile (a subtree looks at the heights of hundreds of tiles), and kept for a while.
 #pragma once
 
 #include <cstddef>
@@ -30,7 +30,6 @@ struct DocumentPlan {
   using Write = std::function<std::string(const std::stop_token&)>;
 
   std::string key;                 // of one catalog's documents, equal for equal ones alone; holds no token
-  std::size_t bytes = 0;           // about so many of it
   std::string_view content_type;   // a literal
   std::string_view cache_control;  // outlives the request
   bool for_grant = false;          // as in Response
@@ -58,15 +57,13 @@ Response Serve(const MadeDocument& made, const DocumentPlan& plan, const Request
 // Thread-safe.
 class DocumentMaker {
  public:
-  // Longer documents are made on a worker: this many bytes are written and compressed in a fifth of a millisecond.
-  static constexpr std::size_t kShortBytes = 4096;
   // Of those kept, least recently asked for leave first.
   static constexpr std::size_t kKeptBytes = std::size_t{8} << 20;
 
   // `workers` must outlive this. Plans are about `catalog`.
   DocumentMaker(CatalogPtr catalog, TileService& workers, HandlerOptions options);
 
-  // At once what is short, or was kept. This and `call` outlive the answer.
+  // At once what was kept. This and `call` outlive the answer.
   Answer Make(Described described, const Call& call) const;
 
  private:

@@ -67,7 +67,6 @@ Described LayerHandler::Handle(const Call& call) const {
   if (tile_query.empty()) return Serve(plain_[*dataset], *call.request, cache_control_);
   DocumentPlan plan;
   plan.key = fmt::format("layer {} {} {}", *dataset, TileQuery(parameters->requested), fmt::ptr(GrantInQuery(call)));
-  plan.bytes = plain_[*dataset].identity->size();
   plan.content_type = kJson;
   plan.cache_control = cache_control_;
   plan.write = [&view = datasets_[*dataset], tile_query = std::move(tile_query)](const std::stop_token& stop) {

@@ -82,9 +82,6 @@ std::string WriteSubtree(const DatasetView& dataset, const RequestedError& reque
   return proto::EncodeSubtree(subtree);
 }
 
-// Of a subtree whose tiles are all there: 8 bytes of metadata for each.
-std::size_t MostBytes(int subtree_levels) { return std::size_t{8} << (2 * (subtree_levels - 1)); }
-
 }  // namespace
 
 TilesetHandler::TilesetHandler(std::span<const DatasetView> datasets, std::string cache_control)
@@ -109,7 +106,6 @@ Described TilesetHandler::Handle(const Call& call) const {
   std::string subtree_query = WithToken(TileQuery(parameters->requested), call);
   DocumentPlan plan;
   plan.key = fmt::format("tileset {} {} {}", *dataset, content_parameters, fmt::ptr(GrantInQuery(call)));
-  plan.bytes = plain_[*dataset].identity->size();
   plan.content_type = kJsonType;
   plan.cache_control = cache_control_;
   plan.write = [&view = datasets_[*dataset], roots = roots_[*dataset], requested = parameters->requested,
@@ -136,7 +132,6 @@ Described TilesetHandler::HandleSubtree(const Call& call) const {
   DocumentPlan plan;
   plan.key = fmt::format("subtree {} {} {} {}{}", *index, geo::ToString(call.route.key), call.route.subtree_levels,
                          TileQuery(requested), requested.at_least ? "" : " alone");
-  plan.bytes = MostBytes(call.route.subtree_levels);
   plan.content_type = "application/octet-stream";
   plan.cache_control = cache_control_;
   plan.write = [&dataset, requested, top = call.route.key, levels = call.route.subtree_levels](const std::stop_token&) {

@@ -50,7 +50,6 @@ DocumentPlan ViewerHandler::PlanOfSeen(const Document& all, const Call& call, Wr
   DocumentPlan plan;
   // There is one grant of each token, for as long as the server runs.
   plan.key = fmt::format("{} {}", all.identity_etag, fmt::ptr(call.grant.get()));
-  plan.bytes = all.identity->size();
   plan.content_type = all.content_type;
   plan.cache_control = kRevalidate;
   plan.write = [datasets = datasets_, grant = call.grant, write](const std::stop_token& stop) {

@@ -39,6 +39,7 @@ class RequestReader {
   // The next request is the last one, and is waited for only until `grace` has passed from now; one that has begun by
   // then is read.
   void Close(std::chrono::milliseconds grace = std::chrono::milliseconds(0));
+  bool has_unread() const { return begin_ < end_; }  // of a further request, or of its beginning
   bool closing() const { return closing_; }
   bool waiting() const { return waiting_; }  // for the first byte of a request
 

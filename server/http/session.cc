@@ -9,6 +9,7 @@
 #include <boost/asio/detached.hpp>
 #include <boost/asio/dispatch.hpp>
 #include <boost/asio/experimental/awaitable_operators.hpp>
+#include <boost/asio/post.hpp>
 #include <boost/asio/redirect_error.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/use_awaitable.hpp>
@@ -162,6 +163,10 @@ asio::awaitable<void> Session::ServeAll() {
   replied_ = Clock::now();
   for (bool keep = true; keep;) {
     if (served_ > 0) phase_.store(Phase::kIdle, std::memory_order_relaxed);
+    // Requests that were sent without waiting for replies take turns with those of other connections.
+    if (served_ > 0 && reader_.has_unread()) {
+      co_await asio::post(stream_.socket().get_executor(), asio::use_awaitable);
+    }
     const RequestReader::Head head = co_await reader_.ReadHead(exchange_.request, replied_);
     if (!head) break;
     phase_.store(Phase::kServes, std::memory_order_relaxed);

@@ -226,6 +226,8 @@ class Stopping(unittest.TestCase):
                 fcntl.fcntl(leased, fcntl.F_SETLEASE, fcntl.F_WRLCK)
                 os.rename(beside, source)
                 self.wait_for(process.stderr, "opening")
+                while fcntl.fcntl(leased, fcntl.F_GETLEASE) == fcntl.F_WRLCK:  # until the file is being opened
+                    time.sleep(0.01)
                 process.terminate()
                 log = process.communicate(timeout=120)[1]
             self.assertEqual(process.returncode, 1, log)
