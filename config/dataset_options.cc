@@ -66,7 +66,7 @@ const std::vector<Option<DatasetConfig>>& DatasetOptionTable() {
        .value = "METRES",
        .help = "Height outside the sources and in voids that nothing fills; by default their lowest height",
        .details = "Above the WGS 84 ellipsoid",
-       .codec = Number(&DatasetConfig::floor, -kMostHeight, kMostHeight)},
+       .codec = Number(&DatasetConfig::floor, -kMaxHeight, kMaxHeight)},
       {.key = "max_void_gap",
        .value = "SAMPLES",
        .help = "Voids narrower than this many source samples are filled from their edges",

@@ -14,7 +14,7 @@ namespace terrace::config {
 namespace {
 
 constexpr std::size_t kMinTokenLength = 16, kMaxTokenLength = 256, kHashDigits = 64;
-constexpr double kMostRequests = 1e6;
+constexpr double kMaxRequests = 1e6;
 
 bool IsAlphanumeric(char c) { return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9'); }
 
@@ -243,7 +243,7 @@ const std::vector<Option<TokenConfig>>& TokenOptionTable() {
        .value = "N",
        .help = "Instead of the server's; 0 is the server's",
        .details = "Twice as many may come at once",
-       .codec = Number(&TokenConfig::requests_per_second, 0, kMostRequests)},
+       .codec = Number(&TokenConfig::requests_per_second, 0, kMaxRequests)},
   };
   return table;
 }

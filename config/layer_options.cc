@@ -20,8 +20,8 @@ void ReadWater(const Json& value, const Place& place, DatasetConfig& dataset) {
   if (value.contains("sea_level")) {
     const Json& level = value["sea_level"];
     const double metres = level.is_number() ? level.get<double>() : std::nan("");
-    if (!(std::abs(metres) <= kMostHeight)) {
-      return place.At("sea_level").Expected(fmt::format("a number from {} to {}", -kMostHeight, kMostHeight));
+    if (!(std::abs(metres) <= kMaxHeight)) {
+      return place.At("sea_level").Expected(fmt::format("a number from {} to {}", -kMaxHeight, kMaxHeight));
     }
     dataset.water = {"", metres};
     return;
@@ -56,7 +56,7 @@ constexpr const char* kWaterSchema = R"({
 
 Json WaterSchema() {
   Json schema = Json::parse(kWaterSchema);
-  schema["properties"]["sea_level"] = InRange("number", NumberOut(-kMostHeight), NumberOut(kMostHeight));
+  schema["properties"]["sea_level"] = InRange("number", NumberOut(-kMaxHeight), NumberOut(kMaxHeight));
   return schema;
 }
 

@@ -46,7 +46,7 @@ inline Json InRange(const char* type, Json min, Json max) {
   return {{"type", type}, {"minimum", std::move(min)}, {"maximum", std::move(max)}};
 }
 
-inline constexpr double kMostHeight = 20'000;  // metres, up and down
+inline constexpr double kMaxHeight = 20'000;  // metres, up and down
 
 bool HasControlCharacter(const std::string& text);
 // For Text: "must be text on one line", or nothing.
