@@ -10,7 +10,7 @@ SOURCES = git ls-files '*.h' '*.cc'
 TERRACE = build/release/server/cli/terrace
 
 .DEFAULT_GOAL := help
-.PHONY: help deps test-deps build run test sanitize coverage reliability reliability-long bench paper format lint tidy clean
+.PHONY: help deps test-deps build run test sanitize coverage reliability reliability-long bench paper docs format lint tidy clean
 
 help:  ## list these targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-16s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -53,6 +53,11 @@ bench: test-deps  ## build and run the benchmarks; JSON results in build/bench/r
 
 paper: test-deps  ## repeat the experiments of the paper (docs/engine.md) into build/paper
 	@tools/run_paper.sh $(JOBS)
+
+docs: deps  ## write config.schema.json and the tables of docs/configuration.md from the options
+	cmake --preset release --log-level=WARNING
+	cmake --build build/release -j $(JOBS) --target write_option_docs
+	build/release/config/write_option_docs .
 
 format:  ## format the C++ sources
 	$(SOURCES) | xargs clang-format-14 -i

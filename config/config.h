@@ -14,6 +14,9 @@
 #include <vector>
 
 #include "config/listen_address.h"
+#include "engine/dem/dem_types.h"
+#include "engine/tin/criterion.h"
+#include "proto/gltf/gltf_types.h"
 
 namespace terrace::config {
 
@@ -25,18 +28,12 @@ struct NodataConfig {
   friend bool operator==(const NodataConfig&, const NodataConfig&) = default;
 };
 
-// What large voids show that have data all around them: dem::HoleFill, which this room does not know.
-enum class HoleFill : std::uint8_t { kSmooth, kFloor };
-// How the triangles of a tile are joined: tin::Criterion, which this room does not know.
-enum class Criterion : std::uint8_t { kDelaunay, kDataDependent };
-// How GLB tiles are compressed unless a request says: proto::GlbCompression, which this room does not know.
-enum class GlbCompression : std::uint8_t { kDraco, kNone, kQuantized, kMeshopt };
-// Which header trusted proxies write.
+// Which header trusted proxies write. A proxy passes the other one on as the client sent it, so only one may count.
 enum class ForwardedHeader : std::uint8_t { kXForwarded, kForwarded };
 enum class LogLevel : std::uint8_t { kDebug, kInfo, kWarn, kError, kOff };
 enum class LogFormat : std::uint8_t { kText, kJson };
-// Where and how requests are told of: server::AccessLogForm, which this room does not know.
-enum class AccessLog : std::uint8_t { kLog, kCombined, kJson, kOff };
+// Where and how requests are logged.
+enum class AccessLogForm : std::uint8_t { kLog, kCombined, kJson, kOff };
 
 // Where the water of a dataset's water mask comes from: one of both, or neither.
 struct WaterConfig {
@@ -47,15 +44,12 @@ struct WaterConfig {
   friend bool operator==(const WaterConfig&, const WaterConfig&) = default;
 };
 
-// How textures are written: proto::TextureFormat, which this room does not know.
-enum class Texture : std::uint8_t { kNone, kJpeg, kWebp };
-
 // The image that textures of GLB tiles are cut from.
 struct ImageryConfig {
   std::string image;  // empty: none
   std::string attribution;
-  Texture texture = Texture::kJpeg;  // of tiles whose requests name none
-  int size = 512;                    // pixels along the edge of a tile, at most
+  proto::TextureFormat texture = proto::TextureFormat::kJpeg;  // of tiles whose requests name none
+  int size = 512;                                              // pixels along the edge of a tile, at most
   int quality = 80;
 
   friend bool operator==(const ImageryConfig&, const ImageryConfig&) = default;
@@ -88,13 +82,13 @@ struct DatasetConfig {
   std::optional<double> finest_error;  // metres; decides the deepest level
   std::optional<double> floor;         // metres; height outside the source and in collars
   int max_void_gap = 64;               // source samples; narrower voids are filled
-  HoleFill voids = HoleFill::kSmooth;  // of larger ones with data all around them
-  double feather = 0;                  // metres: how far from its edges a source gives way to the next
-  Criterion criterion = Criterion::kDelaunay;
-  bool compact = false;  // tiles go through the drop pass
-  GlbCompression glb_compression = GlbCompression::kDraco;
-  int draco_speed = 7;        // 0 smallest tiles .. 10 fastest
-  int draco_normal_bits = 8;  // of each of the two coordinates of a normal
+  dem::HoleFill voids = dem::HoleFill::kSmooth;  // of larger ones with data all around them
+  double feather = 0;                            // metres: how far from its edges a source gives way to the next
+  tin::Criterion criterion = tin::Criterion::kDelaunay;
+  bool compact = false;                                                   // tiles go through the drop pass
+  proto::GlbCompression glb_compression = proto::GlbCompression::kDraco;  // of requests that name none
+  int draco_speed = 7;                                                    // 0 smallest tiles .. 10 fastest
+  int draco_normal_bits = 8;                                              // of each of the two coordinates of a normal
   WaterConfig water;
   ImageryConfig imagery;
   bool is_public = false;         // seen without a token, where there are tokens
@@ -181,7 +175,7 @@ struct Config {
 
   LogLevel log_level = LogLevel::kInfo;
   LogFormat log_format = LogFormat::kText;
-  AccessLog access_log = AccessLog::kLog;
+  AccessLogForm access_log = AccessLogForm::kLog;
   std::string access_log_file;  // of kCombined and kJson; empty: stderr
 
   friend bool operator==(const Config&, const Config&) = default;

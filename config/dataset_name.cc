@@ -1,3 +1,5 @@
+#include "config/dataset_name.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -13,7 +15,6 @@ namespace {
 
 constexpr std::size_t kMaxNameLength = 64;
 
-// First path segments that the server itself answers.
 constexpr std::array<std::string_view, 5> kReservedNames = {"datasets", "viewer", "livez", "readyz", "metrics"};
 
 bool IsNameCharacter(char c) {
@@ -28,6 +29,8 @@ bool IsReserved(std::string_view name) {
 bool IsDotSegment(std::string_view name) { return name == "." || name == ".."; }
 
 }  // namespace
+
+std::span<const std::string_view> ReservedDatasetNames() { return kReservedNames; }
 
 std::string CheckDatasetName(const std::string& name) {
   if (name.empty() || name.size() > kMaxNameLength || !std::all_of(name.begin(), name.end(), IsNameCharacter) ||

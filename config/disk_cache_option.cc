@@ -1,7 +1,5 @@
 #include "config/disk_cache_option.h"
 
-#include "config/option_table.h"
-
 namespace terrace::config {
 namespace {
 
@@ -15,7 +13,7 @@ Codec<DiskCacheConfig> Directory() {
             }
             cache.directory = place.Resolve(value.get<std::string>());
           },
-          [](const DiskCacheConfig& cache) { return Json(cache.directory); }, TextToJson};
+          [](const DiskCacheConfig& cache) { return Json(cache.directory); }, TextToJson, Json::parse(kNonEmptyText)};
 }
 
 Codec<DiskCacheConfig> FileBytes(std::size_t DiskCacheConfig::*member) {
@@ -29,23 +27,36 @@ Codec<DiskCacheConfig> FileBytes(std::size_t DiskCacheConfig::*member) {
   return codec;
 }
 
+}  // namespace
+
 const std::vector<Option<DiskCacheConfig>>& DiskCacheOptionTable() {
   static const std::vector<Option<DiskCacheConfig>> table = {
-      {"directory", "DIR", "Where; used by one server at a time", Directory()},
-      {"tile_bytes", "BYTES", "Disk for finished tiles; 0 is none", FileBytes(&DiskCacheConfig::tile_bytes)},
-      {"refinement_bytes", "BYTES", "Disk for the refinements that tiles are made from; 0 is none",
-       FileBytes(&DiskCacheConfig::refinement_bytes)},
+      {.key = "directory",
+       .value = "DIR",
+       .help = "Directory of the cache; one server at a time uses it",
+       .details = "Made if it is missing; best one that holds nothing else. A second server that names it does not "
+                  "start",
+       .codec = Directory(),
+       .missing = ": where the cache is kept"},
+      {.key = "tile_bytes",
+       .value = "BYTES",
+       .help = "Disk for finished tiles; 0 keeps none",
+       .details = "At least 16 MiB, or 0",
+       .codec = FileBytes(&DiskCacheConfig::tile_bytes)},
+      {.key = "refinement_bytes",
+       .value = "BYTES",
+       .help = "Disk for the refinements that tiles are made from; 0 keeps none",
+       .details = "At least 16 MiB, or 0: about 50 kB a tile at default errors. They make another error, format or "
+                  "coding of a tile cheap after a restart as well",
+       .codec = FileBytes(&DiskCacheConfig::refinement_bytes)},
   };
   return table;
 }
-
-}  // namespace
 
 Codec<Config> DiskCacheOption() {
   return {[](const Json& value, const Place& place, Config& config) {
             if (!value.is_object()) return place.Expected(R"({"directory": "/var/cache/terrace"})");
             ReadObject(value, place, DiskCacheOptionTable(), config.disk_cache);
-            if (!value.contains("directory")) place.Fail("\"directory\" is missing: where the cache is kept");
           },
           [](const Config& config) {
             return config.disk_cache.directory.empty() ? Json()
@@ -53,7 +64,8 @@ Codec<Config> DiskCacheOption() {
           },
           [](const std::string& text) {
             return Json{{"directory", text}};
-          }};
+          },
+          ObjectSchema(DiskCacheOptionTable())};
 }
 
 }  // namespace terrace::config

@@ -1,12 +1,15 @@
 // The option `disk_cache`: an object with keys of its own. Used inside this room only.
 #pragma once
 
-#include "config/config.h"
-#include "config/option_codec.h"
+#include <vector>
+
+#include "config/option_table.h"
 
 namespace terrace::config {
 
 // {"directory": "/var/cache/terrace", "tile_bytes": ..., ...}. As a flag the directory alone.
 Codec<Config> DiskCacheOption();
+
+const std::vector<Option<DiskCacheConfig>>& DiskCacheOptionTable();
 
 }  // namespace terrace::config

@@ -8,14 +8,13 @@
 #include <filesystem>
 #include <string_view>
 
-#include "config/option_table.h"
 #include "config/token_hash.h"
 
 namespace terrace::config {
 namespace {
 
 constexpr std::size_t kMinTokenLength = 16, kMaxTokenLength = 256, kHashDigits = 64;
-constexpr double kMostRequests = 1e6;
+constexpr double kMaxRequests = 1e6;
 
 bool IsAlphanumeric(char c) { return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9'); }
 
@@ -92,7 +91,7 @@ Json ListToJson(const std::string& text) {
 // Texts that `check` likes: it returns "must be ...", or nothing.
 template <typename Target>
 Codec<Target> List(std::vector<std::string> Target::*member, std::string (*check)(const std::string&),
-                   const char* example) {
+                   const char* example, Json schema) {
   return {[=](const Json& value, const Place& place, Target& target) {
             if (!value.is_array()) return place.Expected(fmt::format("a list such as {}", example));
             std::vector<std::string> texts;
@@ -107,7 +106,7 @@ Codec<Target> List(std::vector<std::string> Target::*member, std::string (*check
             }
             target.*member = std::move(texts);
           },
-          [=](const Target& target) { return Json(target.*member); }, ListToJson};
+          [=](const Target& target) { return Json(target.*member); }, ListToJson, std::move(schema)};
 }
 
 // Its hash is kept and written.
@@ -118,28 +117,17 @@ Codec<TokenConfig> TokenText() {
             if (const std::string problem = CheckToken(text); !problem.empty()) return place.Fail(problem);
             token.sha256 = TokenHash(text);
           },
-          [](const TokenConfig&) { return Json(); }};
+          [](const TokenConfig&) { return Json(); }, nullptr, TextLike("^[A-Za-z0-9._~+/=-]{16,256}$")};
 }
 
 Codec<TokenConfig> TokenHashText() {
-  Codec<TokenConfig> codec = Text(&TokenConfig::sha256, CheckHash);
+  Codec<TokenConfig> codec = Text(&TokenConfig::sha256, CheckHash, TextLike("^[0-9a-fA-F]{64}$"));
   codec.read = [read = codec.read](const Json& value, const Place& place, TokenConfig& token) {
     read(value, place, token);
     std::transform(token.sha256.begin(), token.sha256.end(), token.sha256.begin(),
                    [](char c) { return c >= 'A' && c <= 'F' ? static_cast<char>(c - 'A' + 'a') : c; });
   };
   return codec;
-}
-
-const std::vector<Option<TokenConfig>>& TokenOptionTable() {
-  static const std::vector<Option<TokenConfig>> table = {
-      {"name", "NAME", "What the log calls it", Text(&TokenConfig::name, CheckTokenName)},
-      {"token", "TEXT", "The token", TokenText()},
-      {"sha256", "HEX", "Its hash, instead of the token", TokenHashText()},
-      {"datasets", "NAMES", "What it opens; all without", List(&TokenConfig::datasets, CheckDatasetName, "[\"maui\"]")},
-      {"requests_per_second", "N", "Its own rate", Number(&TokenConfig::requests_per_second, 0, kMostRequests)},
-  };
-  return table;
 }
 
 // What one token has in common with those before it.
@@ -162,7 +150,6 @@ void ReadTokens(const Json& value, const Place& place, Config& config) {
     TokenConfig& token = config.tokens.emplace_back();
     ReadObject(value[i], place.At(i), TokenOptionTable(), token);
     if (!value[i].is_object()) continue;
-    if (!value[i].contains("name")) place.At(i).Fail("\"name\" is missing; every token needs one");
     if (value[i].contains("token") == value[i].contains("sha256")) {
       place.At(i).Fail("needs either \"token\" or \"sha256\", one of both");
     }
@@ -204,20 +191,81 @@ Json WriteTls(const Config& config) {
   return Json{{"certificate", config.tls.certificate}, {"key", config.tls.key}};
 }
 
+Json TokensSchema() {
+  Json schema = ObjectSchema(TokenOptionTable());
+  schema["oneOf"] = Json::parse(R"([{"required": ["token"]}, {"required": ["sha256"]}])");
+  return ListOf(std::move(schema));
+}
+
+constexpr const char* kTlsSchema = R"({
+  "type": "object", "additionalProperties": false, "required": ["certificate", "key"],
+  "properties": {
+    "certificate": {"description": "The certificate, and the chain above it", "type": "string", "minLength": 1},
+    "key": {"description": "Its private key, without a passphrase", "type": "string", "minLength": 1}
+  }
+})";
+constexpr const char* kOriginsSchema = R"({
+  "type": "array", "items": {"type": "string", "pattern": "^(\\*|https?://[A-Za-z0-9.:\\[\\]-]{1,255})$"},
+  "examples": [["https://maps.example", "http://localhost:3000"]]
+})";
+constexpr const char* kProxiesSchema = R"({
+  "type": "array", "items": {"type": "string", "pattern": "^[0-9A-Fa-f.:]+(/(0|[1-9][0-9]{0,2}))?$"},
+  "examples": [["127.0.0.1", "10.0.0.0/8", "fd00::/8"]]
+})";
+
 }  // namespace
 
+const std::vector<Option<TokenConfig>>& TokenOptionTable() {
+  static const std::vector<Option<TokenConfig>> table = {
+      {.key = "name",
+       .value = "NAME",
+       .help = "What the log calls it; unlike that of any other token",
+       .details = "1 to 64 letters, digits, `.`, `_` or `-`; not the token itself",
+       .codec = Text(&TokenConfig::name, CheckTokenName, TextLike(kNamePattern)),
+       .missing = "; every token needs one"},
+      {.key = "token",
+       .value = "TEXT",
+       .help = "What clients send",
+       .details = "16 to 256 letters, digits or any of `-._~+/=`. `openssl rand -hex 24` makes a good one. The server "
+                  "keeps its hash alone",
+       .codec = TokenText()},
+      {.key = "sha256",
+       .value = "HEX",
+       .help = "SHA-256 of the token in hexadecimal, instead of the token",
+       .details = "The file then holds no secret. `printf %s \"$TOKEN\" | sha256sum | cut -c1-64` prints it",
+       .codec = TokenHashText()},
+      {.key = "datasets",
+       .value = "NAMES",
+       .help = "Datasets that it opens; an empty list is all",
+       .details = "`/metrics` included",
+       .codec = List(&TokenConfig::datasets, CheckDatasetName, "[\"maui\"]", ListOf(TextLike(kNamePattern)))},
+      {.key = "requests_per_second",
+       .value = "N",
+       .help = "Instead of the server's; 0 is the server's",
+       .details = "Twice as many may come at once",
+       .codec = Number(&TokenConfig::requests_per_second, 0, kMaxRequests)},
+  };
+  return table;
+}
+
 Codec<Config> TokensCodec() {
-  return {ReadTokens, [](const Config& config) {
+  return {ReadTokens,
+          [](const Config& config) {
             Json list = Json::array();
             for (const TokenConfig& token : config.tokens) list.push_back(WriteObject(token, TokenOptionTable()));
             return list;
-          }};
+          },
+          nullptr, TokensSchema()};
 }
 
-Codec<Config> TlsCodec() { return {ReadTls, WriteTls, TlsToJson}; }
+Codec<Config> TlsCodec() { return {ReadTls, WriteTls, TlsToJson, Json::parse(kTlsSchema)}; }
 
-Codec<Config> OriginsCodec() { return List(&Config::cors_origins, CheckOrigin, R"(["https://maps.example"])"); }
+Codec<Config> OriginsCodec() {
+  return List(&Config::cors_origins, CheckOrigin, R"(["https://maps.example"])", Json::parse(kOriginsSchema));
+}
 
-Codec<Config> ProxiesCodec() { return List(&Config::trusted_proxies, CheckRange, R"(["127.0.0.1", "10.0.0.0/8"])"); }
+Codec<Config> ProxiesCodec() {
+  return List(&Config::trusted_proxies, CheckRange, R"(["127.0.0.1", "10.0.0.0/8"])", Json::parse(kProxiesSchema));
+}
 
 }  // namespace terrace::config

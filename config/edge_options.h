@@ -1,14 +1,17 @@
 // The options about clients: tokens, proxies, web pages, TLS. Used inside this room only.
 #pragma once
 
-#include "config/config.h"
-#include "config/option_codec.h"
+#include <vector>
+
+#include "config/option_table.h"
 
 namespace terrace::config {
 
 // [{"name": "field-team", "sha256": "9f86d0...", "datasets": ["maui"]}]. No flag: command lines are no place for
 // secrets.
 Codec<Config> TokensCodec();
+
+const std::vector<Option<TokenConfig>>& TokenOptionTable();
 
 // {"certificate": "server.pem", "key": "server.key"}. As a flag the two paths with a comma between them.
 Codec<Config> TlsCodec();

@@ -2,8 +2,6 @@
 
 #include <cmath>
 
-#include "config/option_table.h"
-
 namespace terrace::config {
 namespace {
 
@@ -22,8 +20,8 @@ void ReadWater(const Json& value, const Place& place, DatasetConfig& dataset) {
   if (value.contains("sea_level")) {
     const Json& level = value["sea_level"];
     const double metres = level.is_number() ? level.get<double>() : std::nan("");
-    if (!(std::abs(metres) <= kMostHeight)) {
-      return place.At("sea_level").Expected(fmt::format("a number from {} to {}", -kMostHeight, kMostHeight));
+    if (!(std::abs(metres) <= kMaxHeight)) {
+      return place.At("sea_level").Expected(fmt::format("a number from {} to {}", -kMaxHeight, kMaxHeight));
     }
     dataset.water = {"", metres};
     return;
@@ -47,39 +45,70 @@ Codec<ImageryConfig> ImageryImage() {
             }
             imagery.image = place.Resolve(value.get<std::string>());
           },
-          [](const ImageryConfig& imagery) { return Json(imagery.image); }, TextToJson};
+          [](const ImageryConfig& imagery) { return Json(imagery.image); }, TextToJson, Json::parse(kNonEmptyText)};
 }
 
-const std::vector<Option<ImageryConfig>>& ImageryOptionTable() {
-  static const std::vector<Option<ImageryConfig>> table = {
-      {"image", "FILE", "The image", ImageryImage()},
-      {"attribution", "TEXT", "Who to thank for it", Text(&ImageryConfig::attribution, CheckOneLine)},
-      {"texture", "FORMAT", "jpeg, webp or none",
-       Choice(&ImageryConfig::texture, {{"jpeg", Texture::kJpeg}, {"webp", Texture::kWebp}, {"none", Texture::kNone}})},
-      {"size", "PIXELS", "Pixels along the edge of a tile",
-       Choice(&ImageryConfig::size,
-              {{Json(64), 64}, {Json(128), 128}, {Json(256), 256}, {Json(512), 512}, {Json(1024), 1024}})},
-      {"quality", "N", "1 smallest .. 100 best", Integer(&ImageryConfig::quality, 1, 100)},
-  };
-  return table;
+constexpr const char* kWaterSchema = R"({
+  "type": "object", "additionalProperties": false, "minProperties": 1, "maxProperties": 1,
+  "properties": {"mask": {"type": "string", "minLength": 1}, "sea_level": {"type": "number"}},
+  "examples": [{"sea_level": 0}, {"mask": "water.tif"}]
+})";
+
+Json WaterSchema() {
+  Json schema = Json::parse(kWaterSchema);
+  schema["properties"]["sea_level"] = InRange("number", NumberOut(-kMaxHeight), NumberOut(kMaxHeight));
+  return schema;
 }
 
 }  // namespace
 
-Codec<DatasetConfig> WaterCodec() { return {ReadWater, WriteWater, WaterToJson}; }
+const std::vector<Option<ImageryConfig>>& ImageryOptionTable() {
+  static const std::vector<Option<ImageryConfig>> table = {
+      {.key = "image",
+       .value = "FILE",
+       .help = "Georeferenced image that GDAL can read: grey, RGB or a palette",
+       .codec = ImageryImage(),
+       .missing = ": the path of an image"},
+      {.key = "attribution",
+       .value = "TEXT",
+       .help = "Attribution of the image, which textured tiles carry",
+       .details = "On one line. It is the `asset.copyright` of these tiles, which CesiumJS can show",
+       .codec = OneLine(&ImageryConfig::attribution)},
+      {.key = "texture",
+       .value = "FORMAT",
+       .help = "Format of textures whose requests name none: jpeg, webp or none",
+       .details = "`webp` is smaller; not every client reads it",
+       .codec = Choice(&ImageryConfig::texture, {{"jpeg", proto::TextureFormat::kJpeg},
+                                                 {"webp", proto::TextureFormat::kWebp},
+                                                 {"none", proto::TextureFormat::kNone}})},
+      {.key = "size",
+       .value = "PIXELS",
+       .help = "Pixels along the edge of a tile, at most",
+       .details = "Levels that are finer than the image have fewer, down to 256",
+       .codec = Choice(&ImageryConfig::size,
+                       {{Json(64), 64}, {Json(128), 128}, {Json(256), 256}, {Json(512), 512}, {Json(1024), 1024}})},
+      {.key = "quality",
+       .value = "N",
+       .help = "Quality of textures: 1 is smallest, 100 best",
+       .codec = Integer(&ImageryConfig::quality, 1, 100)},
+  };
+  return table;
+}
+
+Codec<DatasetConfig> WaterCodec() { return {ReadWater, WriteWater, WaterToJson, WaterSchema()}; }
 
 Codec<DatasetConfig> ImageryCodec() {
   return {[](const Json& value, const Place& place, DatasetConfig& dataset) {
             if (!value.is_object()) return place.Expected(R"({"image": "photo.tif"})");
             ReadObject(value, place, ImageryOptionTable(), dataset.imagery);
-            if (!value.contains("image")) place.Fail("\"image\" is missing: the path of an image");
           },
           [](const DatasetConfig& dataset) {
             return dataset.imagery.image.empty() ? Json() : WriteObject(dataset.imagery, ImageryOptionTable());
           },
           [](const std::string& text) {
             return Json{{"image", text}};
-          }};
+          },
+          ObjectSchema(ImageryOptionTable())};
 }
 
 }  // namespace terrace::config

@@ -1,8 +1,9 @@
 // The options `water` and `imagery` of a dataset: objects with keys of their own. Used inside this room only.
 #pragma once
 
-#include "config/config.h"
-#include "config/option_codec.h"
+#include <vector>
+
+#include "config/option_table.h"
 
 namespace terrace::config {
 
@@ -11,5 +12,7 @@ Codec<DatasetConfig> WaterCodec();
 
 // {"image": "photo.tif", "attribution": ..., ...}. As a flag the path alone.
 Codec<DatasetConfig> ImageryCodec();
+
+const std::vector<Option<ImageryConfig>>& ImageryOptionTable();
 
 }  // namespace terrace::config

@@ -1,7 +1,8 @@
 // How the value of an option is read from JSON and written back. Used inside this room only.
 //
 // A codec is made for one member of Config or DatasetConfig. `read` either sets the member or reports to the place what
-// the value must be; `write` gives a value that `read` takes; `from_text` turns the text of a flag into such a value.
+// the value must be; `write` gives a value that `read` takes; `from_text` turns the text of a flag into such a value;
+// `schema` describes, in JSON Schema, the values that `read` takes.
 #pragma once
 
 #include <fmt/format.h>
@@ -24,6 +25,7 @@ struct Codec {
   std::function<void(const Json&, const Place&, Target&)> read;
   std::function<Json(const Target&)> write;
   Json (*from_text)(const std::string&) = nullptr;  // none: the option has no flag
+  Json schema = {};
 };
 
 inline Json TextToJson(const std::string& text) { return text; }
@@ -33,7 +35,18 @@ Json NumberToJson(const std::string& text);
 // "true" and "false" become what they say.
 Json SwitchToJson(const std::string& text);
 
-inline constexpr double kMostHeight = 20'000;  // metres, up and down
+// Schemas.
+inline constexpr const char* kNonEmptyText = R"({"type": "string", "minLength": 1})";
+inline constexpr const char* kOneLinePattern = R"(^[^\u0000-\u001f\u007f]*$)";
+inline constexpr const char* kBytesPattern = R"(^(0|[1-9][0-9]*)(\.[0-9]+)? *(B|kB|KB|MB|GB|TB|KiB|MiB|GiB|TiB)?$)";
+inline constexpr const char* kNamePattern = "^[A-Za-z0-9._-]{1,64}$";
+inline Json TextLike(const char* pattern) { return {{"type", "string"}, {"pattern", pattern}}; }
+inline Json ListOf(Json items) { return {{"type", "array"}, {"items", std::move(items)}}; }
+inline Json InRange(const char* type, Json min, Json max) {
+  return {{"type", type}, {"minimum", std::move(min)}, {"maximum", std::move(max)}};
+}
+
+inline constexpr double kMaxHeight = 20'000;  // metres, up and down
 
 bool HasControlCharacter(const std::string& text);
 // For Text: "must be text on one line", or nothing.
@@ -55,7 +68,7 @@ Codec<Target> Integer(Member Target::*member, std::int64_t min, std::int64_t max
             }
             target.*member = static_cast<Member>(*number);
           },
-          [=](const Target& target) { return Json(target.*member); }, NumberToJson};
+          [=](const Target& target) { return Json(target.*member); }, NumberToJson, InRange("integer", min, max)};
 }
 
 template <typename Target>
@@ -68,7 +81,9 @@ Codec<Target> Bytes(std::size_t Target::*member, std::int64_t max) {
         }
         target.*member = static_cast<std::size_t>(*number);
       },
-      [=](const Target& target) { return Json(target.*member); }, NumberToJson};
+      [=](const Target& target) { return Json(target.*member); }, NumberToJson,
+      Json{{"anyOf", Json::array({InRange("integer", 0, max), TextLike(kBytesPattern)})},
+           {"examples", Json::array({"512MB", "1GiB"})}}};
 }
 
 // Both ends belong to the range.
@@ -85,7 +100,7 @@ Codec<Target> Number(Member Target::*member, double min, double max) {
             const std::optional<double> number = target.*member;
             return number ? NumberOut(*number) : Json();
           },
-          NumberToJson};
+          NumberToJson, InRange("number", NumberOut(min), NumberOut(max))};
 }
 
 template <typename Target>
@@ -94,7 +109,7 @@ Codec<Target> Switch(bool Target::*member) {
             if (!value.is_boolean()) return place.Expected("true or false");
             target.*member = value.get<bool>();
           },
-          [=](const Target& target) { return Json(target.*member); }, SwitchToJson};
+          [=](const Target& target) { return Json(target.*member); }, SwitchToJson, Json{{"type", "boolean"}}};
 }
 
 template <typename Target>
@@ -107,12 +122,14 @@ Codec<Target> Seconds(std::chrono::milliseconds Target::*member, double min, dou
             target.*member = std::chrono::milliseconds(std::llround(seconds * 1000));
           },
           [=](const Target& target) { return NumberOut(static_cast<double>((target.*member).count()) / 1000); },
-          NumberToJson};
+          NumberToJson, InRange("number", NumberOut(min), NumberOut(max))};
 }
 
 // One of a few words or numbers.
 template <typename Target, typename Member>
 Codec<Target> Choice(Member Target::*member, std::vector<std::pair<Json, Member>> words) {
+  Json schema = {{"enum", Json::array()}};
+  for (const auto& [word, meaning] : words) schema["enum"].push_back(word);
   return {[=](const Json& value, const Place& place, Target& target) {
             std::string allowed;
             for (const auto& [word, meaning] : words) {
@@ -130,19 +147,25 @@ Codec<Target> Choice(Member Target::*member, std::vector<std::pair<Json, Member>
             }
             return Json();
           },
-          TextToJson};
+          TextToJson, std::move(schema)};
 }
 
 // Text that `check` likes: it returns "must be ...", or nothing.
 template <typename Target>
-Codec<Target> Text(std::string Target::*member, const std::function<std::string(const std::string&)>& check) {
+Codec<Target> Text(std::string Target::*member, const std::function<std::string(const std::string&)>& check,
+                   Json schema) {
   return {[=](const Json& value, const Place& place, Target& target) {
             if (!value.is_string()) return place.Expected("text");
             const std::string problem = check(value.get_ref<const std::string&>());
             if (!problem.empty()) return place.Fail(problem);
             target.*member = value.get<std::string>();
           },
-          [=](const Target& target) { return Json(target.*member); }, TextToJson};
+          [=](const Target& target) { return Json(target.*member); }, TextToJson, std::move(schema)};
+}
+
+template <typename Target>
+Codec<Target> OneLine(std::string Target::*member) {
+  return Text(member, CheckOneLine, TextLike(kOneLinePattern));
 }
 
 }  // namespace terrace::config

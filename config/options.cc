@@ -8,19 +8,11 @@
 namespace terrace::config {
 namespace {
 
-std::string FlagOf(std::string_view key) {
-  std::string flag = "--" + std::string(key);
-  std::replace(flag.begin(), flag.end(), '_', '-');
-  return flag;
-}
-
 template <typename Target>
 std::vector<OptionInfo> Infos(const std::vector<Option<Target>>& table) {
   std::vector<OptionInfo> infos;
   for (const Option<Target>& option : table) {
-    const std::string value = option.codec.write(Target{}).dump();
-    const bool is_empty = value == "null" || value == "\"\"" || value == "[]";
-    infos.push_back({option.key, option.value, option.help, option.codec.from_text != nullptr, is_empty ? "" : value});
+    infos.push_back({option.key, option.value, option.help, option.codec.from_text != nullptr, DefaultOf(option)});
   }
   return infos;
 }
@@ -42,6 +34,12 @@ std::string OptionInfo::Flag() const { return FlagOf(key); }
 
 std::vector<OptionInfo> ServerOptions() { return Infos(ServerOptionTable()); }
 std::vector<OptionInfo> DatasetOptions() { return Infos(DatasetOptionTable()); }
+
+bool TakesRestart(std::string_view key) {
+  const auto& table = ServerOptionTable();
+  return std::none_of(table.begin(), table.end(),
+                      [&](const Option<Config>& option) { return option.key == key && option.is_live; });
+}
 
 std::vector<std::string> ChangedServerOptions(const Config& a, const Config& b) {
   std::vector<std::string> keys;

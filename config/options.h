@@ -25,6 +25,9 @@ struct OptionInfo {
 std::vector<OptionInfo> ServerOptions();
 std::vector<OptionInfo> DatasetOptions();
 
+// Whether a change of this option at the top of the file waits for a restart.
+bool TakesRestart(std::string_view key);
+
 // The keys of the options at the top of the file whose values differ.
 std::vector<std::string> ChangedServerOptions(const Config& a, const Config& b);
 

@@ -16,9 +16,6 @@
 namespace terrace::config {
 namespace {
 
-// Editors find the schema through this key; it is no option.
-constexpr const char* kSchemaKey = "$schema";
-
 tl::unexpected<std::vector<ConfigError>> Unreadable(const std::string& reason) {
   return tl::unexpected(std::vector<ConfigError>{{"", reason}});
 }

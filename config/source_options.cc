@@ -4,7 +4,6 @@
 #include <array>
 #include <filesystem>
 
-#include "config/option_table.h"
 #include "config/source_paths.h"
 
 namespace terrace::config {
@@ -69,26 +68,31 @@ Codec<SourceConfig> SourcePath() {
             }
             source.written = value.get<std::string>();
           },
-          [](const SourceConfig& source) { return Json(source.written); }};
+          [](const SourceConfig& source) { return Json(source.written); }, nullptr, Json::parse(kNonEmptyText)};
 }
 
-const std::vector<Option<SourceConfig>>& SourceOptionTable() {
-  static const std::vector<Option<SourceConfig>> table = {
-      {"path", "PATH", "A path, a glob or a folder", SourcePath()},
-      {"vertical",
-       "DATUM",
-       "What its heights count from",
-       {[](const Json& value, const Place& place, SourceConfig& source) {
-          source.vertical = ReadVertical(value, place);
-        },
-        [](const SourceConfig& source) { return source.vertical ? Json(*source.vertical) : Json(); }}},
-      {"nodata",
-       "VALUE",
-       "Which samples are voids",
-       {[](const Json& value, const Place& place, SourceConfig& source) { source.nodata = ReadNodata(value, place); },
-        [](const SourceConfig& source) { return source.nodata ? WriteNodata(*source.nodata) : Json(); }}},
-  };
-  return table;
+constexpr const char* kVerticalSchema = R"({
+  "anyOf": [
+    {"enum": ["crs", "unknown", "ellipsoid", "egm96", "egm2008"]},
+    {"type": "string", "pattern": "^EPSG:[0-9]{1,6}$"},
+    {"type": "string", "pattern": "^[^\\u0000-\\u001f\\u007f]*\\.(gtx|tif|tiff)$"}
+  ]
+})";
+constexpr const char* kNodataSchema = R"({
+  "anyOf": [{"enum": ["auto", "declared"]}, {"type": "number"}, {"type": "array", "items": {"type": "number"}}]
+})";
+
+Codec<SourceConfig> SourceVertical() {
+  return {
+      [](const Json& value, const Place& place, SourceConfig& source) { source.vertical = ReadVertical(value, place); },
+      [](const SourceConfig& source) { return source.vertical ? Json(*source.vertical) : Json(); }, nullptr,
+      Json::parse(kVerticalSchema)};
+}
+
+Codec<SourceConfig> SourceNodata() {
+  return {[](const Json& value, const Place& place, SourceConfig& source) { source.nodata = ReadNodata(value, place); },
+          [](const SourceConfig& source) { return source.nodata ? WriteNodata(*source.nodata) : Json(); }, nullptr,
+          Json::parse(kNodataSchema)};
 }
 
 void ReadSource(const Json& value, const Place& place, DatasetConfig& dataset) {
@@ -98,7 +102,6 @@ void ReadSource(const Json& value, const Place& place, DatasetConfig& dataset) {
     SourcePath().read(value, place, source);
   } else {
     ReadObject(value, place, SourceOptionTable(), source);
-    if (!value.contains("path")) place.Fail("\"path\" is missing: a path, a glob or a folder");
   }
   if (source.written.empty()) return;
   Result<SourceConfig> expanded = ExpandSource(source.written, place.directory());
@@ -111,7 +114,32 @@ void ReadSource(const Json& value, const Place& place, DatasetConfig& dataset) {
   dataset.sources.push_back(*std::move(expanded));
 }
 
+Json SourcesSchema() {
+  Json schema = ListOf({{"anyOf", Json::array({Json::parse(kNonEmptyText), ObjectSchema(SourceOptionTable())})}});
+  schema["minItems"] = 1;
+  return schema;
+}
+
 }  // namespace
+
+const std::vector<Option<SourceConfig>>& SourceOptionTable() {
+  static const std::vector<Option<SourceConfig>> table = {
+      {.key = "path",
+       .value = "PATH",
+       .help = "A file, a glob or a folder",
+       .codec = SourcePath(),
+       .missing = ": a path, a glob or a folder"},
+      {.key = "vertical",
+       .value = "DATUM",
+       .help = "What the heights of these files count from; by default as in the dataset",
+       .codec = SourceVertical()},
+      {.key = "nodata",
+       .value = "VALUE",
+       .help = "Which of their samples are voids; by default as in the dataset",
+       .codec = SourceNodata()},
+  };
+  return table;
+}
 
 Codec<DatasetConfig> SourcesCodec() {
   return {[](const Json& value, const Place& place, DatasetConfig& dataset) {
@@ -127,24 +155,30 @@ Codec<DatasetConfig> SourcesCodec() {
               list.push_back(is_plain ? Json(source.written) : WriteObject(source, SourceOptionTable()));
             }
             return list;
-          }};
+          },
+          nullptr, SourcesSchema()};
 }
 
 Codec<DatasetConfig> VerticalCodec() {
   return {[](const Json& value, const Place& place, DatasetConfig& dataset) {
             if (auto vertical = ReadVertical(value, place)) dataset.vertical = *std::move(vertical);
           },
-          [](const DatasetConfig& dataset) { return Json(dataset.vertical); }, TextToJson};
+          [](const DatasetConfig& dataset) { return Json(dataset.vertical); }, TextToJson,
+          Json::parse(kVerticalSchema)};
 }
 
 Codec<DatasetConfig> NodataCodec() {
   return {[](const Json& value, const Place& place, DatasetConfig& dataset) {
             if (auto nodata = ReadNodata(value, place)) dataset.nodata = *std::move(nodata);
           },
-          [](const DatasetConfig& dataset) { return WriteNodata(dataset.nodata); }, NumberToJson};
+          [](const DatasetConfig& dataset) { return WriteNodata(dataset.nodata); }, NumberToJson,
+          Json::parse(kNodataSchema)};
 }
 
 Codec<Config> TextList(std::vector<std::string> Config::*member, const char* expected, bool is_path) {
+  Json text_schema = Json::parse(kNonEmptyText);
+  text_schema["pattern"] = kOneLinePattern;
+  Json schema = {{"anyOf", Json::array({text_schema, ListOf(text_schema)})}};
   return {[=](const Json& value, const Place& place, Config& config) {
             std::vector<std::string> texts;
             for (const Json& item : value.is_array() ? value : Json::array({value})) {
@@ -166,7 +200,8 @@ Codec<Config> TextList(std::vector<std::string> Config::*member, const char* exp
               start = comma + 1;
             }
             return list;
-          }};
+          },
+          std::move(schema)};
 }
 
 }  // namespace terrace::config

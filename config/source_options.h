@@ -2,13 +2,18 @@
 // inside this room only.
 #pragma once
 
-#include "config/config.h"
-#include "config/option_codec.h"
+#include <string>
+#include <vector>
+
+#include "config/option_table.h"
 
 namespace terrace::config {
 
 // ["dem.tif", {"path": "other.tif", "vertical": "egm96"}]
 Codec<DatasetConfig> SourcesCodec();
+
+// Of an entry that is an object.
+const std::vector<Option<SourceConfig>>& SourceOptionTable();
 
 // "crs", "unknown", "ellipsoid", "egm96", "egm2008", "EPSG:5703", or the path of a grid.
 Codec<DatasetConfig> VerticalCodec();

@@ -9,30 +9,34 @@
 
 namespace terrace::server {
 
-Edge::Edge(const EdgeOptions& options, GateOptions gate_options)
-    : connections(options.max_connections, options.max_connections_per_client),
-      transfers(options.transfer_bytes),
+Edge::Edge(const config::Config& config, GateOptions gate_options)
+    : connections(config.max_connections, config.max_connections_per_client),
+      transfers(config.transfer_bytes),
       gate(std::move(gate_options)),
-      cors(options.cors_origins) {}
+      cors(config.cors_origins) {}
 
-Result<std::unique_ptr<Edge>> Edge::Open(const EdgeOptions& options) {
+Result<std::unique_ptr<Edge>> Edge::Open(const config::Config& config) {
   GateOptions gate;
-  Result<AddressRanges> trusted = AddressRanges::Parse(options.trusted_proxies);
+  Result<AddressRanges> trusted = AddressRanges::Parse(config.trusted_proxies);
   if (!trusted) return tl::unexpected(std::move(trusted.error()));
-  gate.proxies = {*std::move(trusted), options.forwarded_header};
-  Result<AccessPolicy> access = AccessPolicy::Make(options.tokens, options.public_datasets);
+  gate.proxies = {*std::move(trusted), config.forwarded_header};
+  std::vector<std::string> public_datasets;
+  for (const config::DatasetConfig& dataset : config.datasets) {
+    if (dataset.is_public) public_datasets.push_back(dataset.name);
+  }
+  Result<AccessPolicy> access = AccessPolicy::Make(config.tokens, public_datasets);
   if (!access) return tl::unexpected(std::move(access.error()));
   gate.access = *std::move(access);
-  gate.rate.per_second = options.requests_per_second;
-  gate.rate.burst = options.request_burst > 0 ? options.request_burst : 2 * options.requests_per_second;
+  gate.rate.per_second = config.requests_per_second;
+  gate.rate.burst = config.request_burst > 0 ? config.request_burst : 2 * config.requests_per_second;
 
   std::unique_ptr<TlsContext> tls;
-  if (!options.tls_certificate.empty()) {
-    Result<std::unique_ptr<TlsContext>> opened = TlsContext::Open(options.tls_certificate, options.tls_key);
+  if (!config.tls.certificate.empty()) {
+    Result<std::unique_ptr<TlsContext>> opened = TlsContext::Open(config.tls.certificate, config.tls.key);
     if (!opened) return tl::unexpected(std::move(opened.error()));
     tls = *std::move(opened);
   }
-  auto edge = std::make_unique<Edge>(options, std::move(gate));
+  auto edge = std::make_unique<Edge>(config, std::move(gate));
   edge->tls = std::move(tls);
   return edge;
 }

@@ -4,8 +4,8 @@
 
 #include <memory>
 
+#include "config/config.h"
 #include "engine/core/result.h"
-#include "server/api/edge_options.h"
 #include "server/api/gate.h"
 #include "server/asio.h"
 #include "server/http/cors.h"
@@ -17,9 +17,9 @@ namespace terrace::server {
 
 struct Edge {
   // Errors name the option's text, or the file.
-  static Result<std::unique_ptr<Edge>> Open(const EdgeOptions& options);
+  static Result<std::unique_ptr<Edge>> Open(const config::Config& config);
 
-  Edge(const EdgeOptions& options, GateOptions gate_options);
+  Edge(const config::Config& config, GateOptions gate_options);
 
   ConnectionSet connections;
   TransferBudget transfers;

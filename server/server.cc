@@ -52,24 +52,20 @@ Result<void> CheckNames(const std::vector<DatasetView>& datasets) {
   return {};
 }
 
-unsigned IoThreadCount(unsigned configured) {
-  return configured > 0 ? configured : std::max(1u, std::thread::hardware_concurrency() / 4);
-}
-
 TileServiceOptions ServiceOptions(const ServerOptions& options) {
   TileServiceOptions service;
-  service.worker_threads = options.worker_threads;
-  service.queue_length = options.queue_length;
-  service.cache_bytes = options.cache_bytes;
+  service.worker_threads = options.config.worker_threads;
+  service.queue_length = options.config.queue_length;
+  service.cache_bytes = options.config.cache_bytes;
   service.disk = options.disk_cache;
   service.write_head = MakeTileHead;
   return service;
 }
 
-HandlerOptions ForHandlers(const ServerOptions& options, std::size_t max_locations) {
+HandlerOptions ForHandlers(const config::Config& config, std::size_t max_locations) {
   HandlerOptions handlers;
-  handlers.cache_control = options.cache_control;
-  handlers.deadline = options.request_deadline;
+  handlers.cache_control = config.cache_control;
+  handlers.deadline = config.request_deadline;
   handlers.max_locations = max_locations;
   return handlers;
 }
@@ -90,8 +86,8 @@ class Server::Impl {
             options_.metrics_age),
         application_({*edge_, tiles_, metrics_, metrics_page_, access_log_,
                       std::make_shared<const StaticFiles>(std::move(viewer)), options_.on_source_changed},
-                     std::move(catalog), ForHandlers(options_, options_.max_locations)),
-        io_(IoThreadCount(options_.io_threads)),
+                     std::move(catalog), ForHandlers(options_.config, options_.config.max_locations)),
+        io_(options_.config.io_threads),
         signals_(io_.first()) {}
 
   ~Impl() {
@@ -101,9 +97,10 @@ class Server::Impl {
   }
 
   Result<void> Start() {
+    const config::ListenAddress& listen = options_.config.listen;
     Result<std::shared_ptr<Listener>> listener = options_.listen_socket >= 0
                                                      ? Listener::Adopt(io_, options_.listen_socket, Context())
-                                                     : Listener::Open(io_, options_.host, options_.port, Context());
+                                                     : Listener::Open(io_, listen.host, listen.port, Context());
     if (!listener) return tl::unexpected(listener.error());
     listener_ = std::move(*listener);
     WatchSignals();
@@ -115,9 +112,9 @@ class Server::Impl {
     return {};
   }
 
-  void Replace(CatalogPtr catalog, const ServerOptions& options) {
-    tiles_.SetCacheBytes(options.cache_bytes);
-    const bool is_first = application_.Replace(catalog, ForHandlers(options, options_.max_locations));
+  void Replace(CatalogPtr catalog, const config::Config& config) {
+    tiles_.SetCacheBytes(config.cache_bytes);
+    const bool is_first = application_.Replace(catalog, ForHandlers(config, options_.config.max_locations));
     if (is_first && options_.listen_socket >= 0) listener_->Start();
     tiles_.RetainTilesOf(*catalog);
     metrics_.RetainDatasets(catalog->datasets);
@@ -158,7 +155,7 @@ class Server::Impl {
   }
 
   bool Stop() {
-    const auto until = std::chrono::steady_clock::now() + options_.drain_timeout;
+    const auto until = std::chrono::steady_clock::now() + options_.config.drain_timeout;
     edge_->connections.Drain();
     edge_->connections.WaitUntilEmpty(DrainGrace());
     listener_->Close();
@@ -179,12 +176,12 @@ class Server::Impl {
       spdlog::info("stopped: every request was answered");
     } else {
       spdlog::warn("stopped: some requests were not answered within the drain timeout of {} s",
-                   std::chrono::duration<double>(options_.drain_timeout).count());
+                   std::chrono::duration<double>(options_.config.drain_timeout).count());
     }
     return drained;
   }
 
-  std::chrono::milliseconds DrainGrace() const { return std::min(options_.drain_grace, options_.drain_timeout); }
+  std::chrono::milliseconds DrainGrace() const { return std::min(options_.drain_grace, options_.config.drain_timeout); }
 
   void WatchSignals() {
     if (options_.stop_on_signals) {
@@ -232,10 +229,11 @@ class Server::Impl {
   }
 
   std::shared_ptr<const SessionContext> Context() {
+    const config::Config& config = options_.config;
     auto context = std::make_shared<SessionContext>();
-    context->options.read = {options_.header_timeout, options_.idle_timeout, options_.min_read_rate};
-    context->options.write_timeout = options_.write_timeout;
-    context->options.min_rate = options_.min_read_rate;
+    context->options.read = {config.header_timeout, config.idle_timeout, config.min_read_rate};
+    context->options.write_timeout = config.write_timeout;
+    context->options.min_rate = config.min_read_rate;
     context->options.drain_grace = DrainGrace();
     context->application = &application_;
     context->connections = &edge_->connections;
@@ -268,29 +266,30 @@ class Server::Impl {
 Server::Server(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Server::~Server() = default;
 
-std::vector<Error> Server::TryFiles(const ServerOptions& options) {
+std::vector<Error> Server::TryFiles(const config::Config& config) {
   std::vector<Error> errors;
   const auto note = [&](const auto& opened) {
     if (!opened) errors.push_back(opened.error());
   };
-  note(StaticFiles::Load(options.viewer_dir));
-  note(AccessLog::Try(options.access_log, options.access_log_file));
-  note(Edge::Open(options.edge));
+  note(StaticFiles::Load(config.viewer.directory));
+  note(AccessLog::Try(config.access_log, config.access_log_file));
+  note(Edge::Open(config));
   return errors;
 }
 
-Result<void> Server::TryAddress(const ServerOptions& options) {
-  return Listener::TryAddress(options.host, options.port);
+Result<void> Server::TryAddress(const config::Config& config) {
+  return Listener::TryAddress(config.listen.host, config.listen.port);
 }
 
 Result<std::unique_ptr<Server>> Server::Start(CatalogPtr catalog, ServerOptions options) {
   const Result<void> named = catalog ? CheckNames(catalog->datasets) : Result<void>();
   if (!named) return tl::unexpected(named.error());
-  Result<StaticFiles> viewer = StaticFiles::Load(options.viewer_dir);
+  const config::Config& config = options.config;
+  Result<StaticFiles> viewer = StaticFiles::Load(config.viewer.directory);
   if (!viewer) return tl::unexpected(viewer.error());
-  Result<AccessLog> access_log = AccessLog::Open(options.access_log, options.access_log_file);
+  Result<AccessLog> access_log = AccessLog::Open(config.access_log, config.access_log_file);
   if (!access_log) return tl::unexpected(access_log.error());
-  Result<std::unique_ptr<Edge>> edge = Edge::Open(options.edge);
+  Result<std::unique_ptr<Edge>> edge = Edge::Open(config);
   if (!edge) return tl::unexpected(edge.error());
   auto impl = std::make_unique<Impl>(std::move(catalog), std::move(*viewer), std::move(*access_log), *std::move(edge),
                                      std::move(options));
@@ -298,9 +297,9 @@ Result<std::unique_ptr<Server>> Server::Start(CatalogPtr catalog, ServerOptions 
   return std::unique_ptr<Server>(new Server(std::move(impl)));
 }
 
-Result<void> Server::Replace(CatalogPtr catalog, const ServerOptions& options) {
+Result<void> Server::Replace(CatalogPtr catalog, const config::Config& config) {
   if (const Result<void> named = CheckNames(catalog->datasets); !named) return tl::unexpected(named.error());
-  impl_->Replace(std::move(catalog), options);
+  impl_->Replace(std::move(catalog), config);
   return {};
 }
 

@@ -8,43 +8,25 @@
 
 #include <chrono>
 #include <cstdint>
-#include <filesystem>
 #include <functional>
 #include <map>
 #include <memory>
 #include <string>
 
+#include "config/config.h"
 #include "engine/core/result.h"
-#include "server/api/edge_options.h"
-#include "server/telemetry/access_log.h"
 #include "server/tiles/catalog.h"
 #include "server/tiles/tile_service.h"
 
 namespace terrace::server {
 
+// The configuration, and what the program that runs the server adds to it.
 struct ServerOptions {
-  std::string host = "127.0.0.1";
-  std::uint16_t port = 8080;                                // 0: any that is free
-  int listen_socket = -1;                                   // instead of both: one that somebody else holds as well
-  unsigned io_threads = 0;                                  // 0: a quarter of the processors, at least one
-  unsigned worker_threads = 0;                              // 0: as many as processors
-  std::size_t queue_length = 10'000;                        // jobs that wait for a worker, of all clients
-  std::size_t cache_bytes = std::size_t{256} << 20;         // of finished tiles; 0: none
-  std::shared_ptr<DiskCache> disk_cache;                    // of finished tiles, below memory; may be null
+  config::Config config;
+  int listen_socket = -1;                 // instead of config.listen: one that somebody else holds as well
+  std::shared_ptr<DiskCache> disk_cache;  // of finished tiles, below memory; may be null
   std::function<tiler::ByteCacheStats()> refinement_stats;  // of what tiles are made from; may be empty
-  std::size_t max_locations = 10'000;                       // in one request for heights
-  EdgeOptions edge;                                         // limits of clients, tokens, proxies, TLS
-  std::string cache_control = "public, max-age=3600";       // of tiles and layer.json
   std::chrono::milliseconds metrics_age{1'000};             // for which a text of /metrics serves
-  AccessLogForm access_log = AccessLogForm::kLog;
-  std::filesystem::path access_log_file;  // of some forms; empty: stderr
-  std::filesystem::path viewer_dir;       // empty or missing: a plain page instead
-  std::chrono::milliseconds header_timeout{5'000};
-  std::chrono::milliseconds idle_timeout{30'000};
-  std::chrono::milliseconds write_timeout{20'000};
-  std::size_t min_read_rate = 4096;                    // bytes a second that a client has to take; 0: any
-  std::chrono::milliseconds request_deadline{30'000};  // of a tile, waiting for its build included
-  std::chrono::milliseconds drain_timeout{10'000};
   std::chrono::milliseconds drain_grace{500};  // for which connections are served on; part of drain_timeout
   bool stop_on_signals = false;  // SIGINT and SIGTERM act like RequestStop; the second ends the process with status 1
   // Called on an io thread for each of these signals: must not block.
@@ -66,15 +48,15 @@ class Server {
 
   // What a start needs besides its datasets: the viewer, the access log and keys of TLS can be read or written.
   // Opening datasets may take long, and whoever waits for that wants to know before: all that is wrong.
-  static std::vector<Error> TryFiles(const ServerOptions& options);
+  static std::vector<Error> TryFiles(const config::Config& config);
   // And the address is free.
-  static Result<void> TryAddress(const ServerOptions& options);
+  static Result<void> TryAddress(const config::Config& config);
 
   // Requests that come from now on are answered from `catalog`; those that have begun keep the one they began with.
-  // Cached tiles of datasets that stay in the same generation stay. Of `options`, cache_bytes, cache_control and
+  // Cached tiles of datasets that stay in the same generation stay. Of `config`, cache_bytes, cache_control and
   // request_deadline are taken over. kInvalidArgument as above: nothing has changed then. From any thread, one at a
   // time.
-  Result<void> Replace(CatalogPtr catalog, const ServerOptions& options);
+  Result<void> Replace(CatalogPtr catalog, const config::Config& config);
 
   // Stops and waits.
   ~Server();

@@ -16,7 +16,8 @@ import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 
-# core <- {geo, tin} <- {dem, proto} <- tiler <- server, and core <- config <- server. In the server, asio.h stands below
+# core <- {geo, tin} <- {dem, proto} <- tiler <- server, and core <- config <- server (config knows VALUES as
+# well). In the server, asio.h stands below
 # all, the files of the folder itself put the rooms together, and the command line is above all:
 # net <- http, which know no product; jobs; store, jobs <- tiles; {http, tiles} <- {telemetry, query} <- api <- documents
 # <- handlers <- server <- cli, and tiles <- reload <- cli.
@@ -31,6 +32,8 @@ DEM = ["engine/dem/dem_types.h", "engine/dem/common", "engine/dem/gdal", "engine
 DOORS = {"engine/dem/" + name for name in (
     "dem_types.h", "common/box_index.h", "crs/geodesic_path.h", "gdal/file_stamp.h", "gdal/gdal_settings.h", "gdal/source_policy.h",
     "image/imagery.h", "image/raster_colors.h", "image/water_raster.h", "sources/read_raster.h")}
+# Plain values that the configuration holds as they are: of these rooms config may include nothing else.
+VALUES = {"engine/dem/dem_types.h", "engine/tin/criterion.h", "proto/gltf/gltf_types.h"}
 API = ENGINE + ["server/jobs", "server/net", "server/http", "server/store", "server/tiles", "server/telemetry", "server/query"]
 SERVER = API + ["server/api", "server/documents", "server/handlers"]
 ROOMS = {
@@ -51,7 +54,7 @@ ROOMS = {
     "server/jobs": ["engine/core", "server/asio.h"],
     "server/net": ["engine/core", "server/asio.h"],
     "server/http": ["engine/core", "server/asio.h", "server/net"],
-    "server/store": ["engine/core", "tiler"],
+    "server/store": ["engine/core", "config", "tiler"],
     "server/tiles": ENGINE + ["server/jobs", "server/store"],
     "server/telemetry": ENGINE + ["server/net", "server/http", "server/tiles", "server/jobs", "server/store"],
     "server/query": ENGINE + ["server/http"],
@@ -165,7 +168,7 @@ class Tree:
             return None
         if quoted in DOORS and "engine/dem" in ROOMS[room]:
             other = "engine/dem"
-        if other not in ROOMS[room]:
+        if other not in ROOMS[room] and not (room == "config" and quoted in VALUES):
             return f'{room} may not know {other} ("{quoted}")'
         public = PUBLIC | ({"Boost"} if room.startswith("server") and other.startswith("server") else set())
         public |= {"GDAL", "Boost.Geometry"} if room.startswith("engine/dem") and other.startswith("engine/dem/") else set()
@@ -219,6 +222,12 @@ class SelfTest(unittest.TestCase):
                            ("server/tiles", "server")):
             with self.subTest(user=user, used=used):
                 self.assert_refused({f"{used}/b.h": "", f"{user}/a.cc": f'#include "{used}/b.h"\n'}, f"{user} may not know {used}")
+
+    def test_config_knows_plain_values_alone(self):
+        self.assert_clean({"proto/gltf/gltf_types.h": "", "config/a.h": '#include "proto/gltf/gltf_types.h"\n'})
+        self.assert_refused({"proto/gltf/glb_tile.h": "", "config/a.h": '#include "proto/gltf/glb_tile.h"\n'}, "config may not know proto")
+        self.assert_refused({"engine/dem/dem_types.h": "#include <gdal.h>\n", "config/a.h": '#include "engine/dem/dem_types.h"\n'},
+                            "shows GDAL to config")
 
     def test_line_is_named(self):
         self.assert_refused({"engine/geo/b.h": "", "engine/core/a.h": '// first\n\n#  include "engine/geo/b.h"\n'}, "engine/core/a.h:3:")

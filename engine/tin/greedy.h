@@ -16,6 +16,7 @@
 #include <stop_token>
 #include <vector>
 
+#include "engine/tin/criterion.h"
 #include "engine/tin/mesh/height_field.h"
 #include "engine/tin/mesh/tin_mesh.h"
 #include "engine/tin/refinement.h"
@@ -64,12 +65,6 @@ struct Curvature {
 struct SeedGrid {
   double below_error = 0;
   int step = 1;
-};
-
-// How the triangles around an inserted vertex are joined.
-enum class Criterion : std::uint8_t {
-  kDelaunay,
-  kDataDependent,  // section 3.4 of the paper: fewer vertices to the same error, thinner triangles, more time
 };
 
 // What data-dependent triangulation holds against a pair of triangles that could be cut along their other diagonal

@@ -8,18 +8,10 @@
 
 #include "engine/core/result.h"
 #include "proto/gltf/draco_mesh.h"
+#include "proto/gltf/gltf_types.h"
 #include "proto/mesh/grid_mesh.h"
 
 namespace terrace::proto {
-
-// All of them decode to the positions of the GridMesh, bit for bit.
-enum class GlbCompression : std::uint8_t {
-  kDraco,      // KHR_draco_mesh_compression
-  kNone,       // 32-bit floats
-  kQuantized,  // KHR_mesh_quantization: 16-bit positions and 8-bit normals; floats where a tile spans 2^16 steps or
-               // more
-  kMeshopt,    // EXT_meshopt_compression of what kQuantized holds
-};
 
 // The positions that suit the form: GridStep.
 constexpr PositionWidth WidthOf(GlbCompression compression) {

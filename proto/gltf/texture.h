@@ -7,14 +7,9 @@
 #include <string_view>
 
 #include "engine/core/result.h"
+#include "proto/gltf/gltf_types.h"
 
 namespace terrace::proto {
-
-enum class TextureFormat : std::uint8_t {
-  kNone,  // no texture
-  kJpeg,  // baseline, which every glTF client reads
-  kWebp,  // lossy; smaller at the same quality number, for readers of EXT_texture_webp
-};
 
 // "image/jpeg", "image/webp". Precondition: not kNone.
 std::string_view MediaTypeOf(TextureFormat format);

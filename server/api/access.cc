@@ -17,24 +17,24 @@ bool IsHash(std::string_view text) {
 
 }  // namespace
 
-Result<AccessPolicy> AccessPolicy::Make(const std::vector<TokenOptions>& tokens,
+Result<AccessPolicy> AccessPolicy::Make(const std::vector<config::TokenConfig>& tokens,
                                         const std::vector<std::string>& public_datasets) {
   AccessPolicy policy;
-  for (const TokenOptions& options : tokens) {
-    const std::string hash = options.sha256.empty() ? config::TokenHash(options.token) : Lower(options.sha256);
+  for (const config::TokenConfig& token : tokens) {
+    const std::string hash = Lower(token.sha256);
     if (!IsHash(hash)) {
       return MakeError(ErrorCode::kInvalidArgument,
-                       "token \"{}\": sha256 must be 64 hexadecimal digits, as sha256sum prints them", options.name);
+                       "token \"{}\": sha256 must be 64 hexadecimal digits, as sha256sum prints them", token.name);
     }
     Grant grant;
-    grant.name = options.name;
-    grant.sees_all = options.datasets.empty();
-    grant.datasets = {options.datasets.begin(), options.datasets.end()};
+    grant.name = token.name;
+    grant.sees_all = token.datasets.empty();
+    grant.datasets = {token.datasets.begin(), token.datasets.end()};
     grant.datasets.insert(public_datasets.begin(), public_datasets.end());
-    grant.requests_per_second = options.requests_per_second;
+    grant.requests_per_second = token.requests_per_second;
     if (!policy.grants_.emplace(hash, std::make_shared<const Grant>(std::move(grant))).second) {
       return MakeError(ErrorCode::kInvalidArgument, "token \"{}\": another token is the same; make a new one",
-                       options.name);
+                       token.name);
     }
   }
   Grant anonymous;

@@ -9,8 +9,8 @@
 #include <unordered_set>
 #include <vector>
 
+#include "config/config.h"
 #include "engine/core/result.h"
-#include "server/api/edge_options.h"
 
 namespace terrace::server {
 
@@ -30,7 +30,7 @@ class AccessPolicy {
  public:
   // Without tokens everybody sees everything. With tokens, `public_datasets` are seen by everybody.
   // kInvalidArgument: a hash that is none, or a token given twice.
-  static Result<AccessPolicy> Make(const std::vector<TokenOptions>& tokens,
+  static Result<AccessPolicy> Make(const std::vector<config::TokenConfig>& tokens,
                                    const std::vector<std::string>& public_datasets);
 
   bool has_tokens() const { return !grants_.empty(); }

@@ -68,9 +68,9 @@ Hop ParseForwarded(std::string_view element) {
   return hop;
 }
 
-std::vector<Hop> HopsOf(const Request& request, ForwardedHeader header) {
+std::vector<Hop> HopsOf(const Request& request, config::ForwardedHeader header) {
   std::vector<Hop> hops;
-  if (header == ForwardedHeader::kForwarded) {
+  if (header == config::ForwardedHeader::kForwarded) {
     for (const std::string_view element : Pieces(request.fields->forwarded)) hops.push_back(ParseForwarded(element));
     return hops;
   }

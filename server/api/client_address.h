@@ -6,8 +6,8 @@
 #include <string_view>
 #include <vector>
 
+#include "config/config.h"
 #include "engine/core/result.h"
-#include "server/api/edge_options.h"
 #include "server/asio.h"
 #include "server/http/request.h"
 #include "server/net/address.h"
@@ -36,7 +36,7 @@ class AddressRanges {
 // The proxies that are believed, and how they say whom they speak for.
 struct Proxies {
   AddressRanges trusted;
-  ForwardedHeader header = ForwardedHeader::kXForwarded;
+  config::ForwardedHeader header = config::ForwardedHeader::kXForwarded;
 };
 
 // Replaces the request's scheme and host by what a trusted proxy reports, and returns the client: the last address on

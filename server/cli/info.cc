@@ -23,9 +23,10 @@
 #include "server/cli/command.h"
 #include "server/cli/fail.h"
 #include "server/cli/mosaic_info.h"
-#include "server/cli/open_source.h"
+#include "server/cli/open_dataset.h"
 #include "server/cli/option_flags.h"
 #include "server/cli/progress.h"
+#include "server/cli/source_files.h"
 #include "server/cli/try_folder.h"
 
 namespace terrace::cli {

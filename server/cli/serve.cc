@@ -1,7 +1,6 @@
 // terrace serve: datasets from a config file and from the command line, over HTTP.
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
-#include <xxhash.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -29,11 +28,11 @@
 #include "server/cli/descriptor_plan.h"
 #include "server/cli/fail.h"
 #include "server/cli/log.h"
-#include "server/cli/open_layers.h"
-#include "server/cli/open_source.h"
+#include "server/cli/open_dataset.h"
 #include "server/cli/option_flags.h"
 #include "server/cli/progress.h"
 #include "server/cli/service_manager.h"
+#include "server/cli/source_files.h"
 #include "server/cli/stop_limit.h"
 #include "server/cli/try_start.h"
 #include "server/memory_trimmer.h"
@@ -131,63 +130,13 @@ config::Config MakeConfig(const ServeArguments& arguments, std::vector<config::C
   return config;
 }
 
-// Changes when the source or an option that changes bytes does. The file's identity is in the source's fingerprint.
-std::uint64_t GenerationOf(const config::DatasetConfig& dataset, const dem::DemSource& source,
-                           const std::string& layers) {
-  const std::string text = fmt::format(TERRACE_VERSION " {} {} {} {} {} {} {}", source.fingerprint(),
-                                       dataset.error_fraction, static_cast<int>(dataset.criterion), dataset.compact,
-                                       dataset.draco_speed, dataset.draco_normal_bits, layers);
-  return XXH3_64bits(text.data(), text.size());
-}
-
-tin::Criterion CriterionOf(config::Criterion criterion) {
-  return criterion == config::Criterion::kDataDependent ? tin::Criterion::kDataDependent : tin::Criterion::kDelaunay;
-}
-
-proto::GlbOptions GlbOptionsOf(const config::DatasetConfig& dataset) {
-  proto::GlbOptions options;
-  options.generator = "terrace " TERRACE_VERSION;
-  options.draco = {dataset.draco_speed, dataset.draco_normal_bits};
-  switch (dataset.glb_compression) {
-    case config::GlbCompression::kDraco:
-      options.compression = proto::GlbCompression::kDraco;
-      break;
-    case config::GlbCompression::kNone:
-      options.compression = proto::GlbCompression::kNone;
-      break;
-    case config::GlbCompression::kQuantized:
-      options.compression = proto::GlbCompression::kQuantized;
-      break;
-    case config::GlbCompression::kMeshopt:
-      options.compression = proto::GlbCompression::kMeshopt;
-      break;
-  }
-  return options;
-}
-
-Result<tiler::Dataset> OpenDataset(const config::DatasetConfig& wanted, const std::string& cache_dir,
-                                   const std::function<void(double)>& progress, std::stop_token stop) {
-  auto source = OpenSource(wanted, cache_dir, progress, std::move(stop));
-  if (!source) return tl::unexpected(source.error());
-  tiler::Dataset dataset;
-  dataset.name = wanted.name;
-  dataset.attribution = wanted.attribution;
-  dataset.error_fraction = wanted.error_fraction;
-  dataset.rules = {CriterionOf(wanted.criterion), wanted.compact};
-  dataset.glb = GlbOptionsOf(wanted);
-  dataset.source = *std::move(source);
-  if (const Result<void> layers = OpenLayers(wanted, dataset); !layers) return tl::unexpected(layers.error());
-  dataset.generation = GenerationOf(wanted, *dataset.source, LayersFingerprint(dataset));
-  return dataset;
-}
-
 // Opens every source; false if one could not be, after all of them had their message, or if it was stopped.
 bool OpenDatasets(const config::Config& config, const std::stop_token& stop, std::vector<tiler::Dataset>& datasets) {
   bool all_open = true;
   for (const config::DatasetConfig& wanted : config.datasets) {
     Progress progress((config.cache_dir.empty() ? "reading " : "preparing ") + NameOf(wanted.sources),
                       FileCount(wanted.sources));
-    Result<tiler::Dataset> dataset = OpenDataset(wanted, config.cache_dir, progress.Callback(), stop);
+    Result<tiler::Dataset> dataset = OpenDataset(wanted, config.cache_dir, TERRACE_VERSION, progress.Callback(), stop);
     if (stop.stop_requested()) return false;
     if (!dataset) {
       std::fprintf(stderr, "terrace: dataset %s: %s\n", wanted.name.c_str(), dataset.error().message.c_str());
@@ -200,74 +149,15 @@ bool OpenDatasets(const config::Config& config, const std::stop_token& stop, std
   return all_open;
 }
 
-server::AccessLogForm AccessLogFormOf(config::AccessLog form) {
-  switch (form) {
-    case config::AccessLog::kCombined:
-      return server::AccessLogForm::kCombined;
-    case config::AccessLog::kJson:
-      return server::AccessLogForm::kJson;
-    case config::AccessLog::kOff:
-      return server::AccessLogForm::kOff;
-    case config::AccessLog::kLog:
-      break;
-  }
-  return server::AccessLogForm::kLog;
-}
-
-server::EdgeOptions EdgeOf(const config::Config& config) {
-  server::EdgeOptions edge;
-  edge.max_connections = config.max_connections;
-  edge.max_connections_per_client = config.max_connections_per_client;
-  edge.requests_per_second = config.requests_per_second;
-  edge.request_burst = config.request_burst;
-  edge.transfer_bytes = config.transfer_bytes;
-  for (const config::TokenConfig& token : config.tokens) {
-    edge.tokens.push_back({token.name, "", token.sha256, token.datasets, token.requests_per_second});
-  }
-  for (const config::DatasetConfig& dataset : config.datasets) {
-    if (dataset.is_public) edge.public_datasets.push_back(dataset.name);
-  }
-  edge.cors_origins = config.cors_origins;
-  edge.trusted_proxies = config.trusted_proxies;
-  if (config.forwarded_header == config::ForwardedHeader::kForwarded) {
-    edge.forwarded_header = server::ForwardedHeader::kForwarded;
-  }
-  edge.tls_certificate = config.tls.certificate;
-  edge.tls_key = config.tls.key;
-  return edge;
-}
-
-server::ServerOptions OptionsOf(const config::Config& config) {
-  server::ServerOptions options;
-  options.host = config.listen.host;
-  options.port = config.listen.port;
-  options.io_threads = config.io_threads;
-  options.worker_threads = config.worker_threads;
-  options.queue_length = config.queue_length;
-  options.cache_bytes = config.cache_bytes;
-  options.max_locations = config.max_locations;
-  options.edge = EdgeOf(config);
-  options.cache_control = config.cache_control;
-  options.header_timeout = config.header_timeout;
-  options.idle_timeout = config.idle_timeout;
-  options.write_timeout = config.write_timeout;
-  options.min_read_rate = config.min_read_rate;
-  options.request_deadline = config.request_deadline;
-  options.drain_timeout = config.drain_timeout;
-  options.stop_on_signals = true;
-  options.access_log = AccessLogFormOf(config.access_log);
-  options.access_log_file = config.access_log_file;
-  if (config.viewer.enabled) {
-    options.viewer_dir = config.viewer.directory;
-    if (options.viewer_dir.empty()) {
-      // Installed beside the binary, else where it was built.
-      std::error_code ignored;
-      const std::filesystem::path binary = std::filesystem::read_symlink("/proc/self/exe", ignored);
-      options.viewer_dir = binary.parent_path().parent_path() / "share/terrace/viewer";
-      if (!std::filesystem::exists(options.viewer_dir, ignored)) options.viewer_dir = TERRACE_VIEWER_DIR;
-    }
-  }
-  return options;
+// What the server runs with: with the viewer that comes with the program, where that is wanted.
+config::Config WithViewer(config::Config config) {
+  if (!config.viewer.enabled || !config.viewer.directory.empty()) return config;
+  // Installed beside the binary, else where it was built.
+  std::error_code ignored;
+  const std::filesystem::path binary = std::filesystem::read_symlink("/proc/self/exe", ignored);
+  config.viewer.directory = binary.parent_path().parent_path() / "share/terrace/viewer";
+  if (!std::filesystem::exists(config.viewer.directory, ignored)) config.viewer.directory = TERRACE_VIEWER_DIR;
+  return config;
 }
 
 // What stopping may take beyond the drain timeout.
@@ -284,20 +174,8 @@ void MaskSignals(int how, const std::vector<int>& signals) {
   ::pthread_sigmask(how, &set, nullptr);
 }
 
-// Null where there is to be none.
-Result<std::shared_ptr<server::DiskCache>> OpenDiskCache(const config::DiskCacheConfig& config,
-                                                         std::size_t open_files) {
-  if (config.directory.empty()) return nullptr;
-  server::DiskCacheOptions options;
-  options.directory = config.directory;
-  options.tile_bytes = config.tile_bytes;
-  options.refinement_bytes = config.refinement_bytes;
-  options.open_files = open_files;
-  return server::DiskCache::Open(options);
-}
-
 int CheckConfig(const ServeArguments& arguments, const config::Config& config) {
-  if (const int exit_code = TryStart(config, OptionsOf(config), PlanDescriptors(config), /*tries_address=*/false);
+  if (const int exit_code = TryStart(config, WithViewer(config), PlanDescriptors(config), /*tries_address=*/false);
       exit_code != kExitOk)
     return exit_code;
   const std::size_t count = config.datasets.size();
@@ -330,18 +208,22 @@ int Serve(const ServeArguments& arguments) {
   // Until they are answered they would be the end, and who rotates logs does not ask how long sources take to open.
   MaskSignals(SIG_BLOCK, kAnsweredSignals);
   tiler::EncoderVersion();  // of the libraries there are, before GDAL or the system's resolver loads others
-  server::ServerOptions options = OptionsOf(config);
+  server::ServerOptions options;
+  options.config = WithViewer(config);
+  options.stop_on_signals = true;
   options.listen_socket = passed->value_or(-1);
   const bool tries_address = !passed->has_value();
   const Result<server::DescriptorBudget> budget = PlanDescriptors(config);
-  if (const int exit_code = TryStart(config, options, budget, tries_address); exit_code != kExitOk) return exit_code;
+  if (const int exit_code = TryStart(config, options.config, budget, tries_address); exit_code != kExitOk)
+    return exit_code;
   WarnAboutFewDescriptors(config, *budget);
-  options.edge.max_connections = budget->connections;
+  options.config.max_connections = budget->connections;
   dem::SetGdalCache(config.gdal_cache_bytes);
   dem::SetOpenSources(budget->open_sources, budget->vrt_parts);
 
   StopLimit stop_limit;  // first, as it bounds how long the others take to end
-  Result<std::shared_ptr<server::DiskCache>> disk = OpenDiskCache(config.disk_cache, budget->store_files);
+  Result<std::shared_ptr<server::DiskCache>> disk(nullptr);
+  if (!config.disk_cache.directory.empty()) disk = server::DiskCache::Open(config.disk_cache, budget->store_files);
   if (!disk) return Fail(disk.error());
   const auto refinements = std::make_shared<tiler::RefinementCache>(
       config.refinement_cache_bytes,
@@ -395,12 +277,12 @@ int Serve(const ServeArguments& arguments) {
   hooks.load = [&watch] { return watch.Load(); };
   hooks.may_have_changed = [&watch] { return watch.MayHaveChanged(); };
   hooks.open = [cache_dir = config.cache_dir](const config::DatasetConfig& wanted, std::stop_token stop) {
-    return OpenDataset(wanted, cache_dir, {}, std::move(stop));
+    return OpenDataset(wanted, cache_dir, TERRACE_VERSION, {}, std::move(stop));
   };
   hooks.publish = [&](const std::vector<tiler::Dataset>& served, const config::Config& now) {
     if (level->exchange(now.log_level) != now.log_level) SetLogLevel(now.log_level);
     refinements->SetCapacity(now.refinement_cache_bytes);
-    if (const Result<void> replaced = server->Replace(catalog_of(served, now), OptionsOf(now)); !replaced) {
+    if (const Result<void> replaced = server->Replace(catalog_of(served, now), now); !replaced) {
       spdlog::error("the new configuration cannot be served: {}", replaced.error().message);
     } else {
       count = served.size();
@@ -415,7 +297,7 @@ int Serve(const ServeArguments& arguments) {
   };
   hooks.tell = [&](const std::map<std::string, std::string>& troubles) { server->SetTroubles(troubles); };
   reloader = std::make_unique<server::Reloader>(config, datasets, std::move(hooks));
-  if (const Result<void> served = server->Replace(catalog_of(datasets, config), options); !served) {
+  if (const Result<void> served = server->Replace(catalog_of(datasets, config), config); !served) {
     return Fail(served.error());
   }
   datasets.clear();  // what is replaced must not stay open

@@ -7,14 +7,15 @@
 
 #include "engine/dem/gdal/source_policy.h"
 #include "server/cli/command.h"
-#include "server/cli/open_source.h"
+#include "server/cli/source_files.h"
 #include "server/cli/try_folder.h"
+#include "server/server.h"
 
 namespace terrace::cli {
 
-int TryStart(const config::Config& config, const server::ServerOptions& options,
+int TryStart(const config::Config& config, const config::Config& served,
              const Result<server::DescriptorBudget>& descriptors, bool tries_address) {
-  std::vector<Error> errors = server::Server::TryFiles(options);
+  std::vector<Error> errors = server::Server::TryFiles(served);
   const auto note = [&](const Result<void>& result) {
     if (!result) errors.push_back(result.error());
   };
@@ -32,7 +33,7 @@ int TryStart(const config::Config& config, const server::ServerOptions& options,
     }
   }
   if (!descriptors) errors.push_back(descriptors.error());
-  if (tries_address) note(server::Server::TryAddress(options));
+  if (tries_address) note(server::Server::TryAddress(served));
   const Result<void> policy =
       dem::SetSourcePolicy({config.data_roots, config.allowed_prefixes, config.allowed_drivers});
   note(policy);

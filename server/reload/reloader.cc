@@ -4,7 +4,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <exception>
 #include <string_view>
@@ -27,16 +26,11 @@ constexpr std::chrono::milliseconds kMinPause{50};
 // Each takes a processor for a while, and some handles.
 constexpr std::ptrdiff_t kMaxOpenings = 2;
 
-// What is taken over from a new configuration without a restart.
-constexpr std::array<std::string_view, 7> kLiveOptions = {
-    "datasets",         "cache_bytes", "refinement_cache_bytes", "cache_control", "request_deadline_s",
-    "max_mesh_samples", "log_level"};
-
 // `started`: what the server runs with.
 void WarnOfRestart(const config::Config& started, const config::Config& now, const config::Config& next) {
   const std::vector<std::string> differ = config::ChangedServerOptions(started, next);
   for (const std::string& key : config::ChangedServerOptions(now, next)) {
-    if (std::ranges::find(kLiveOptions, key) != kLiveOptions.end()) continue;
+    if (!config::TakesRestart(key)) continue;
     if (std::ranges::find(differ, key) == differ.end()) continue;  // back to what it was at the start
     spdlog::warn("configuration: {} has changed, which takes a restart; until then the old value holds", key);
   }

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -52,17 +53,15 @@ Result<int> LockDirectory(const std::filesystem::path& directory) {
   return file;
 }
 
-DiskStoreOptions OptionsOf(const DiskCacheOptions& cache, std::size_t bytes, const char* name, bool compress,
-                           bool anew) {
+DiskStoreOptions OptionsOf(const std::filesystem::path& directory, std::size_t bytes, std::size_t open_files,
+                           const char* name, bool compress, bool anew) {
   DiskStoreOptions options;
-  options.db.directory = cache.directory / name;
+  options.db.directory = directory / name;
   options.db.capacity_bytes = std::max(bytes, RecordDb::kMinCapacity);
   options.db.compress = compress;
-  options.db.open_files = cache.open_files;
-  options.db.env = cache.env;
+  options.db.open_files = open_files;
   options.name = name;
   if (anew) static_cast<void>(RecordDb::Destroy(options.db));  // opening says what is wrong
-  options.retry_after = cache.retry_after;
   return options;
 }
 
@@ -112,43 +111,45 @@ class DiskCache::Tier : public tiler::Store<Key, Value> {
   DiskStore store_;
 };
 
-Result<std::shared_ptr<DiskCache>> DiskCache::Open(const DiskCacheOptions& options) {
+Result<std::shared_ptr<DiskCache>> DiskCache::Open(const config::DiskCacheConfig& config, std::size_t open_files) {
   tiler::EncoderVersion();  // taken before sources are opened, for which GDAL may load libraries
   std::error_code failed;
-  std::filesystem::create_directories(options.directory, failed);
+  std::filesystem::create_directories(config.directory, failed);
   if (failed) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "disk_cache: {} cannot be made: {}; name a directory that the server may write to",
-                     options.directory.string(), failed.message());
+                     config.directory, failed.message());
   }
-  const Result<int> lock = LockDirectory(options.directory);
+  const Result<int> lock = LockDirectory(config.directory);
   if (!lock) return tl::unexpected(lock.error());
-  return std::shared_ptr<DiskCache>(new DiskCache(options, *lock));
+  return std::shared_ptr<DiskCache>(new DiskCache(config, open_files, *lock));
 }
 
-DiskCache::DiskCache(const DiskCacheOptions& options, int lock) : lock_(lock) { OpenStores(options); }
+DiskCache::DiskCache(const config::DiskCacheConfig& config, std::size_t open_files, int lock) : lock_(lock) {
+  OpenStores(config, open_files);
+}
 
 // RocksDB as Debian builds it asserts, and so ends the process, on some damage to what it reads while it opens a store.
 // The lock file counts openings that have not come to their end: after two, the stores are thrown away. Nothing else
 // is: whoever names a directory in which other files lie must not lose them.
-void DiskCache::OpenStores(const DiskCacheOptions& options) {
+void DiskCache::OpenStores(const config::DiskCacheConfig& config, std::size_t open_files) {
   constexpr off_t kMaxUnfinished = 2;
   struct stat status {};
   off_t unfinished = fstat(lock_, &status) == 0 ? status.st_size : 0;
   const bool anew = unfinished >= kMaxUnfinished;
   if (anew) {
-    spdlog::warn("disk cache in {}: {} starts ended while it was opened; begun anew, check the disk",
-                 options.directory.string(), unfinished);
+    spdlog::warn("disk cache in {}: {} starts ended while it was opened; begun anew, check the disk", config.directory,
+                 unfinished);
     unfinished = 0;
   }
   SetSize(lock_, unfinished + 1);
-  if (options.tile_bytes > 0) {  // compressed already, or refuse to be
+  if (config.tile_bytes > 0) {  // compressed already, or refuse to be
     tiles_ = std::make_unique<Tier<tiler::CacheKey, tiler::EncodedTile>>(
-        OptionsOf(options, options.tile_bytes, kTiles, false, anew));
+        OptionsOf(config.directory, config.tile_bytes, open_files, kTiles, false, anew));
   }
-  if (options.refinement_bytes > 0) {
+  if (config.refinement_bytes > 0) {
     refinements_ = std::make_unique<Tier<tiler::RefinedTileKey, tiler::RefinedTile>>(
-        OptionsOf(options, options.refinement_bytes, kRefinements, true, anew));
+        OptionsOf(config.directory, config.refinement_bytes, open_files, kRefinements, true, anew));
   }
   SetSize(lock_, 0);
 }

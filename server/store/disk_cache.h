@@ -5,23 +5,15 @@
 // checksum holds: what the disk damaged, lost or kept for too long is built again.
 #pragma once
 
-#include <filesystem>
+#include <cstddef>
 #include <memory>
 
+#include "config/config.h"
 #include "engine/core/result.h"
 #include "server/store/disk_store.h"
 #include "tiler/store/tile_store.h"
 
 namespace terrace::server {
-
-struct DiskCacheOptions {
-  std::filesystem::path directory;   // made if it is missing
-  std::size_t tile_bytes = 0;        // of files with encoded tiles, RecordDb::kMinCapacity at least; 0: none
-  std::size_t refinement_bytes = 0;  // of files with refinements, likewise
-  std::size_t open_files = RecordDbOptions().open_files;  // of each store
-  rocksdb::Env* env = nullptr;                            // RecordDbOptions::env
-  std::chrono::milliseconds retry_after = DiskStoreOptions().retry_after;
-};
 
 struct DiskCacheStats {
   DiskStoreStats tiles, refinements;
@@ -29,11 +21,12 @@ struct DiskCacheStats {
 
 class DiskCache {
  public:
-  // kInvalidArgument: the directory cannot be made or locked, or another process uses it. Messages name the remedy.
-  static Result<std::shared_ptr<DiskCache>> Open(const DiskCacheOptions& options);
+  // `open_files`: of each store (RecordDbOptions). kInvalidArgument: the directory cannot be made or locked, or
+  // another process uses it. Messages name the remedy.
+  static Result<std::shared_ptr<DiskCache>> Open(const config::DiskCacheConfig& config, std::size_t open_files);
   ~DiskCache();
 
-  // Null where the options give them no bytes. They live as long as this.
+  // Null where the configuration gives them no bytes. They live as long as this.
   tiler::TileStore* tiles();
   tiler::RefinementStore* refinements();
 
@@ -49,8 +42,8 @@ class DiskCache {
   template <typename Key, typename Value>
   class Tier;
 
-  DiskCache(const DiskCacheOptions& options, int lock);
-  void OpenStores(const DiskCacheOptions& options);
+  DiskCache(const config::DiskCacheConfig& config, std::size_t open_files, int lock);
+  void OpenStores(const config::DiskCacheConfig& config, std::size_t open_files);
 
   const int lock_;                                                                // a file descriptor
   std::unique_ptr<Tier<tiler::CacheKey, tiler::EncodedTile>> tiles_;              // null: none

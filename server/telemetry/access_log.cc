@@ -75,8 +75,8 @@ int OpenToAppend(const std::filesystem::path& file, int create = O_CREAT) {
   return ::open(file.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC | O_NONBLOCK | create, 0640);
 }
 
-bool IsOfFile(AccessLogForm form, const std::filesystem::path& file) {
-  return (form == AccessLogForm::kCombined || form == AccessLogForm::kJson) && !file.empty();
+bool IsOfFile(config::AccessLogForm form, const std::filesystem::path& file) {
+  return (form == config::AccessLogForm::kCombined || form == config::AccessLogForm::kJson) && !file.empty();
 }
 
 // By errno.
@@ -129,7 +129,7 @@ std::string FormatJsonLine(const ReplyRecord& record, SystemClock::time_point no
   return line.dump(-1, ' ', /*ensure_ascii=*/true);
 }
 
-AccessLog::AccessLog(AccessLogForm form, std::filesystem::path file, int descriptor)
+AccessLog::AccessLog(config::AccessLogForm form, std::filesystem::path file, int descriptor)
     : form_(form),
       file_(std::move(file)),
       descriptor_(descriptor),
@@ -145,7 +145,7 @@ AccessLog::~AccessLog() {
   if (!file_.empty() && descriptor_ >= 0) ::close(descriptor_);
 }
 
-Result<void> AccessLog::Try(AccessLogForm form, const std::filesystem::path& file) {
+Result<void> AccessLog::Try(config::AccessLogForm form, const std::filesystem::path& file) {
   if (!IsOfFile(form, file)) return {};
   struct stat status {};
   if (::stat(file.c_str(), &status) == 0 && S_ISFIFO(status.st_mode)) {
@@ -168,7 +168,7 @@ Result<void> AccessLog::Try(AccessLogForm form, const std::filesystem::path& fil
   return CannotOpen(file);
 }
 
-Result<AccessLog> AccessLog::Open(AccessLogForm form, std::filesystem::path file) {
+Result<AccessLog> AccessLog::Open(config::AccessLogForm form, std::filesystem::path file) {
   if (!IsOfFile(form, file)) return AccessLog(form, {}, STDERR_FILENO);
   const int descriptor = OpenToAppend(file);
   if (descriptor < 0) return CannotOpen(file);
@@ -176,14 +176,14 @@ Result<AccessLog> AccessLog::Open(AccessLogForm form, std::filesystem::path file
 }
 
 void AccessLog::Write(const ReplyRecord& record) {
-  if (form_ == AccessLogForm::kOff) return;
-  if (form_ == AccessLogForm::kLog) {
+  if (form_ == config::AccessLogForm::kOff) return;
+  if (form_ == config::AccessLogForm::kLog) {
     if (spdlog::should_log(spdlog::level::info)) spdlog::info("{}", FormatAccessLine(record));
     return;
   }
   const auto now = SystemClock::now();
   const std::string line =
-      (form_ == AccessLogForm::kJson ? FormatJsonLine(record, now) : FormatCombinedLine(record, now)) + '\n';
+      (form_ == config::AccessLogForm::kJson ? FormatJsonLine(record, now) : FormatCombinedLine(record, now)) + '\n';
   std::uint64_t missed = 0;
   {
     const std::lock_guard lock(mutex_);

@@ -10,6 +10,7 @@
 #include <string>
 #include <string_view>
 
+#include "config/config.h"
 #include "engine/core/result.h"
 #include "server/telemetry/line_writer.h"
 
@@ -49,15 +50,13 @@ std::string FormatCombinedLine(const ReplyRecord& record, std::chrono::system_cl
 // {"time":"2026-11-21T06:00:06.123Z","client":...}
 std::string FormatJsonLine(const ReplyRecord& record, std::chrono::system_clock::time_point now);
 
-enum class AccessLogForm : std::uint8_t { kLog, kCombined, kJson, kOff };
-
 // Where requests are told of. Thread-safe.
 class AccessLog {
  public:
   // `file`: of kCombined and kJson; empty: stderr. kUnavailable: it cannot be written.
-  static Result<AccessLog> Open(AccessLogForm form, std::filesystem::path file);
+  static Result<AccessLog> Open(config::AccessLogForm form, std::filesystem::path file);
   // Whether Open could, without making the file, which would belong to whoever asks. `file` is absolute.
-  static Result<void> Try(AccessLogForm form, const std::filesystem::path& file);
+  static Result<void> Try(config::AccessLogForm form, const std::filesystem::path& file);
   AccessLog(AccessLog&& other) noexcept;  // before the first Write
   AccessLog& operator=(AccessLog&&) = delete;
   ~AccessLog();
@@ -69,10 +68,10 @@ class AccessLog {
   void Reopen();
 
  private:
-  AccessLog(AccessLogForm form, std::filesystem::path file, int descriptor);
+  AccessLog(config::AccessLogForm form, std::filesystem::path file, int descriptor);
   std::string name() const { return file_.empty() ? "stderr" : "access log " + file_.string(); }
 
-  const AccessLogForm form_;
+  const config::AccessLogForm form_;
   const std::filesystem::path file_;
   std::mutex mutex_;
   int descriptor_;                      // guarded by mutex_

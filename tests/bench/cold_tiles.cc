@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "config/parse.h"
-#include "server/cli/open_source.h"
+#include "server/cli/open_dataset.h"
 #include "tiler/tile_pipeline.h"
 
 namespace terrace::bench {
@@ -50,13 +50,9 @@ Result<std::vector<tiler::Dataset>> Open(const Arguments& arguments) {
   if (!config) return MakeError(ErrorCode::kInvalidArgument, "{}: {}", arguments.config, config.error()[0].message);
   for (const config::DatasetConfig& wanted : config->datasets) {
     if (wanted.name != arguments.dataset) continue;
-    auto source = cli::OpenSource(wanted, config->cache_dir, {});
-    if (!source) return tl::unexpected(source.error());
-    std::vector<tiler::Dataset> datasets(1);
-    datasets[0].name = wanted.name;
-    datasets[0].error_fraction = wanted.error_fraction;
-    datasets[0].source = *std::move(source);
-    return datasets;
+    auto dataset = cli::OpenDataset(wanted, config->cache_dir, "bench");
+    if (!dataset) return tl::unexpected(dataset.error());
+    return std::vector<tiler::Dataset>{*std::move(dataset)};
   }
   return MakeError(ErrorCode::kInvalidArgument, "{} has no dataset {}", arguments.config, arguments.dataset);
 }

@@ -168,5 +168,10 @@ TEST(ChangedServerOptions, NamesWhatDiffers) {
   EXPECT_EQ(ChangedServerOptions(a, b), (std::vector<std::string>{"datasets", "cache_bytes"}));
 }
 
+TEST(TakesRestart, KnowsWhatIsTakenOverWhileServing) {
+  EXPECT_FALSE(TakesRestart("datasets") || TakesRestart("cache_bytes") || TakesRestart("log_level"));
+  EXPECT_TRUE(TakesRestart("listen") && TakesRestart("tokens") && TakesRestart("io_threads"));
+}
+
 }  // namespace
 }  // namespace terrace::config

@@ -45,10 +45,10 @@ TEST(ParseConfig, SetsWhatTheTextSaysAndNothingElse) {
   maui.error_fraction = 0.25;
   maui.floor = -12.5;
   maui.max_void_gap = 0;
-  maui.voids = HoleFill::kFloor;
-  maui.criterion = Criterion::kDataDependent;
+  maui.voids = dem::HoleFill::kFloor;
+  maui.criterion = tin::Criterion::kDataDependent;
   maui.compact = true;
-  maui.glb_compression = GlbCompression::kQuantized;
+  maui.glb_compression = proto::GlbCompression::kQuantized;
   maui.draco_speed = 3;
   maui.draco_normal_bits = 10;
   expected.datasets = {maui};

@@ -1,14 +1,13 @@
-// The schema, the examples and the manual say what the parser does.
-#include <fmt/format.h>
+// The schema and the manual are made of the option tables; the examples and cases.json are what the parser takes.
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <string>
 
 #include "config/json_text.h"
+#include "config/option_docs.h"
 #include "config/options.h"
 #include "tests/config/errors.h"
 #include "tests/support/source_dir.h"
@@ -24,72 +23,46 @@ std::string ReadText(const fs::path& path) {
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
-Json ServerSchema() { return Json::parse(ReadText("config/config.schema.json")).at("properties"); }
-Json DatasetSchema() {
-  return Json::parse(ReadText("config/config.schema.json")).at("/$defs/dataset/properties"_json_pointer);
+TEST(Schema, IsNotStale) {
+  EXPECT_EQ(ReadText("config/config.schema.json"), SchemaText())
+      << "config/config.schema.json differs from the option tables; run make docs";
 }
 
-Json ServerText(const std::string& key, const Json& value) { return Json{{key, value}}; }
-Json DatasetText(const std::string& key, const Json& value) {
-  Json dataset = {{"name", "a"}, {"sources", {"a.tif"}}};
-  dataset[key] = value;
-  return Json{{"datasets", Json::array({dataset})}};
+TEST(Manual, IsNotStale) {
+  const std::string manual = ReadText("docs/configuration.md");
+  const Result<std::string> updated = UpdateManual(manual);
+  ASSERT_TRUE(updated) << updated.error().message;
+  EXPECT_EQ(manual, *updated) << "docs/configuration.md differs from the option tables; run make docs";
 }
 
-void ExpectDescribed(const std::vector<OptionInfo>& options, Json schema,
-                     Json (*text)(const std::string&, const Json&)) {
-  schema.erase("$schema");
-  EXPECT_EQ(schema.size(), options.size()) << "the schema has a key that is no option";
+TEST(Manual, NeedsOneMarkerForEveryTable) {
+  const std::string manual = ReadText("docs/configuration.md");
+  const std::string marker = "<!-- options: log -->\n", end = "<!-- end of options -->\n";
+  const std::size_t at = manual.find(marker), end_at = manual.find(end, at) + end.size();
+  ASSERT_NE(at, std::string::npos);
+  const std::string table = manual.substr(at, end_at - at);
+  const auto fails = [](const std::string& text, const std::string& part) {
+    const Result<std::string> updated = UpdateManual(text);
+    return !updated && updated.error().message.find(part) != std::string::npos;
+  };
+  EXPECT_TRUE(fails(manual.substr(0, at) + manual.substr(end_at), "log: no marker")) << "a table is missing";
+  EXPECT_TRUE(fails(manual + table, "log: no such table, two of it")) << "a table stands twice";
+  EXPECT_TRUE(fails(manual + "<!-- options: logs -->\n" + end, "logs: no such table")) << "of no option";
+  EXPECT_TRUE(fails(manual.substr(0, end_at - end.size()), "log: no such table, two of it, or no end")) << "no end";
+}
+
+// Help, schema and manual continue or quote these texts.
+void ExpectOneSentence(const std::vector<OptionInfo>& options) {
   for (const OptionInfo& option : options) {
-    const std::string key(option.key);
-    ASSERT_TRUE(schema.contains(key)) << key;
-    EXPECT_FALSE(schema[key].value("description", "").empty()) << key;
-    EXPECT_EQ(schema[key].contains("default") ? schema[key]["default"].dump() : "", option.default_value) << key;
-    if (schema[key].contains("default")) {
-      EXPECT_THAT(ErrorsOf(text(key, schema[key]["default"]).dump()), testing::IsEmpty()) << key;
-    }
+    EXPECT_FALSE(option.help.empty() || option.help.ends_with('.')) << option.key;
+    EXPECT_EQ(option.help.find('\n'), std::string_view::npos) << option.key;
+    EXPECT_EQ(option.help.find(". "), std::string_view::npos) << option.key << ": details go into the reference";
   }
 }
 
-TEST(Schema, DescribesEveryOptionWithItsDefault) {
-  ExpectDescribed(ServerOptions(), ServerSchema(), ServerText);
-  ExpectDescribed(DatasetOptions(), DatasetSchema(), DatasetText);
-}
-
-// Every range in the schema, one step beyond its ends, and its ends.
-void ExpectSameRanges(const Json& schema, Json (*text)(const std::string&, const Json&)) {
-  for (const auto& [key, property] : schema.items()) {
-    Json range = property;
-    if (property.contains("anyOf")) range = property["anyOf"][0];
-    if (!range.contains("minimum")) continue;
-    const double step = range["type"] == "integer" ? 1 : 1e-6;
-    const double min = range["minimum"].get<double>(), max = range["maximum"].get<double>();
-    for (const double inside : {min, max}) {
-      EXPECT_THAT(ErrorsOf(text(key, inside).dump()), testing::IsEmpty()) << key << ' ' << inside;
-    }
-    for (const double outside : {min - step, max + step}) {
-      EXPECT_EQ(ErrorsOf(text(key, outside).dump()).size(), 1u) << key << ' ' << outside;
-    }
-  }
-}
-
-TEST(Schema, HasTheRangesOfTheParser) {
-  ExpectSameRanges(ServerSchema(), ServerText);
-  ExpectSameRanges(DatasetSchema(), DatasetText);
-}
-
-void ExpectWordsTaken(const Json& schema, Json (*text)(const std::string&, const Json&)) {
-  for (const auto& [key, property] : schema.items()) {
-    if (!property.contains("enum")) continue;
-    for (const Json& word : property["enum"]) {
-      EXPECT_THAT(ErrorsOf(text(key, word).dump()), testing::IsEmpty()) << key << ' ' << word;
-    }
-  }
-}
-
-TEST(Schema, ListsTheWordsThatTheParserTakes) {
-  ExpectWordsTaken(ServerSchema(), ServerText);
-  ExpectWordsTaken(DatasetSchema(), DatasetText);
+TEST(Help, IsOneSentenceForEveryOption) {
+  ExpectOneSentence(ServerOptions());
+  ExpectOneSentence(DatasetOptions());
 }
 
 TEST(Parser, TellsTheCasesApart) {
@@ -110,19 +83,6 @@ TEST(Examples, AreAccepted) {
   for (const fs::path& file : files) {
     const ConfigResult loaded = LoadConfig(file);
     EXPECT_TRUE(loaded) << file << ": " << (loaded ? "" : loaded.error().front().message);
-  }
-}
-
-// The manual has one table row for each option: | `key` | `--flag` | default | ...
-TEST(Manual, ListsEveryOptionWithFlagAndDefault) {
-  const std::string manual = ReadText("docs/configuration.md");
-  for (const auto& options : {ServerOptions(), DatasetOptions()}) {
-    for (const OptionInfo& option : options) {
-      const std::string row = fmt::format("\n| `{}` | {} | {} | ", option.key,
-                                          option.has_flag ? fmt::format("`{}`", option.Flag()) : "none",
-                                          option.default_value.empty() ? "none" : "`" + option.default_value + "`");
-      EXPECT_NE(manual.find(row), std::string::npos) << "docs/configuration.md lacks the row" << row;
-    }
   }
 }
 

@@ -29,8 +29,8 @@ TEST(ToJson, ComesBackWithEveryOptionSet) {
   Config config;
   config.listen = {"2001:db8::1", 0};
   DatasetConfig dataset{
-      "a", {"/data/a.tif"},  "egm96", NodataConfig{false, {-9999, 0.5}}, "© \"ét\\é\"", 0.1, 1e-3, -0.3,
-      7,   HoleFill::kFloor, 12.5,    Criterion::kDataDependent,         true};
+      "a", {"/data/a.tif"},       "egm96", NodataConfig{false, {-9999, 0.5}}, "© \"ét\\é\"", 0.1, 1e-3, -0.3,
+      7,   dem::HoleFill::kFloor, 12.5,    tin::Criterion::kDataDependent,    true};
   dataset.sources.front().vertical = "EPSG:5703";
   dataset.sources.front().nodata = NodataConfig{false, {}};
   dataset.water.sea_level = -1.25;
@@ -38,7 +38,7 @@ TEST(ToJson, ComesBackWithEveryOptionSet) {
   dataset.is_public = true;
   config.datasets = {dataset, Dataset("b")};
   config.datasets[1].water.mask = "/data/water.tif";
-  config.datasets[1].imagery = {"/data/photo.tif", "© \"é\"", Texture::kWebp, 64, 99};
+  config.datasets[1].imagery = {"/data/photo.tif", "© \"é\"", proto::TextureFormat::kWebp, 64, 99};
   config.viewer = {true, "/srv/page"};
   config.cache_control = "no-cache";
   config.io_threads = 64;
@@ -72,7 +72,7 @@ TEST(ToJson, ComesBackWithEveryOptionSet) {
   config.drain_timeout = std::chrono::milliseconds(0);
   config.log_level = LogLevel::kOff;
   config.log_format = LogFormat::kJson;
-  config.access_log = AccessLog::kCombined;
+  config.access_log = AccessLogForm::kCombined;
   config.access_log_file = "/var/log/terrace/access.log";
   config.watch = false;
   ExpectComesBack(config);

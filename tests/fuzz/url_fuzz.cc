@@ -121,8 +121,8 @@ void TryHeaders(const std::string& text) {
   (void)WantedExtensions(text, {text});
   (void)MatchesEtag(text, "\"0123456789abcdef\"");
   static const Proxies kProxies[] = {
-      {AddressRanges::Parse({"10.0.0.0/8", "::1", "fd00::/8"}).value(), ForwardedHeader::kXForwarded},
-      {AddressRanges::Parse({"0.0.0.0/0", "::/0"}).value(), ForwardedHeader::kForwarded}};
+      {AddressRanges::Parse({"10.0.0.0/8", "::1", "fd00::/8"}).value(), config::ForwardedHeader::kXForwarded},
+      {AddressRanges::Parse({"0.0.0.0/0", "::/0"}).value(), config::ForwardedHeader::kForwarded}};
   for (const Proxies& proxies : kProxies) {
     Request request;
     RequestFields fields;
@@ -134,7 +134,7 @@ void TryHeaders(const std::string& text) {
     Request stranger = request;
     stranger.fields.Set(&RequestFields::host, "a");
     const auto peer = asio::ip::make_address("2001:db8::1");
-    if (proxies.header == ForwardedHeader::kXForwarded) {
+    if (proxies.header == config::ForwardedHeader::kXForwarded) {
       TERRACE_CHECK(ResolveClient(stranger, peer, proxies) == peer && stranger.fields->host == "a");
     }
   }

@@ -82,7 +82,7 @@ TEST_F(FailingAllocations, CostOneAnswerFromTheCacheAtMost) { TryAll(Get("/maui/
 
 TEST_F(FailingAllocations, CostOneBuildAtMost) {
   ServerOptions options;
-  options.cache_bytes = 0;
+  options.config.cache_bytes = 0;
   TryAll(Get("/maui/1/1/1.terrain?error=1000"), {200, 503}, options);
 }
 

@@ -28,7 +28,7 @@ TEST_F(Connections, AClientThatEndsItsSendingGetsItsTile) {
 
 TEST_F(Connections, NewcomersTakeThePlacesOfUnfinishedHeads) {
   ServerOptions options;
-  options.edge.max_connections = 20;
+  options.config.max_connections = 20;
   Start(options);
   std::vector<std::unique_ptr<RawClient>> slow;
   for (int i = 0; i < 60; ++i) {
@@ -41,7 +41,7 @@ TEST_F(Connections, NewcomersTakeThePlacesOfUnfinishedHeads) {
 TEST_F(Connections, ARequestThatIsServedKeepsItsPlace) {
   build_ms_ = 500;
   ServerOptions options;
-  options.edge.max_connections = 4;
+  options.config.max_connections = 4;
   Start(options);
   RawClient served(port());
   served.Send(Get("/maui/0/0/0.terrain"));
@@ -60,7 +60,7 @@ TEST_F(Connections, ARequestThatIsServedKeepsItsPlace) {
 TEST_F(Connections, NewcomersTakeThePlacesOfUnfinishedBodiesAndOfBusyFloods) {
   build_ms_ = 3000;
   ServerOptions options;
-  options.edge.max_connections = 20;
+  options.config.max_connections = 20;
   Start(options);
   std::vector<std::unique_ptr<RawClient>> flood;
   const auto send = [&](const std::string& message) {

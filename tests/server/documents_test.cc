@@ -6,6 +6,7 @@
 #include <condition_variable>
 #include <mutex>
 
+#include "config/token_hash.h"
 #include "proto/compress.h"
 #include "server/documents/document.h"
 #include "tests/server/server_fixture.h"
@@ -35,8 +36,8 @@ class DocumentsTest : public ServerFixture {
 
   static ServerOptions OneWorker() {
     ServerOptions options;
-    options.worker_threads = 1;
-    options.request_deadline = 400ms;
+    options.config.worker_threads = 1;
+    options.config.request_deadline = 400ms;
     return options;
   }
   // "blocks" has long documents, "maui" short ones.
@@ -152,8 +153,8 @@ TEST_F(DocumentsTest, ListsOfWhatATokenSeesAreMadeOnWorkersWhereTheyAreLong) {
     more_datasets_.push_back(view);
   }
   ServerOptions options = OneWorker();
-  options.edge.tokens = {{"one", "secret-of-one", "", {"dataset7"}, 0}};
-  options.edge.public_datasets = {"maui"};
+  options.config.tokens = {{"one", config::TokenHash("secret-of-one"), {"dataset7"}, 0}};
+  options.config.datasets = {PublicDataset("maui")};
   Start(std::move(options));
   const std::string token = "Authorization: Bearer secret-of-one\r\n";
   const Reply list = Fetch(port(), "/datasets", token), page = Fetch(port(), "/", token);

@@ -18,7 +18,7 @@ class Drain : public ServerFixture {};
 TEST_F(Drain, CutsNoReplyShortUnderLoad) {
   build_ms_ = 3;
   ServerOptions options;
-  options.cache_bytes = 0;
+  options.config.cache_bytes = 0;
   Start(options);
   std::atomic<int> answered{0}, cut{0}, failed{0};
   std::vector<std::thread> clients;
@@ -62,7 +62,7 @@ TEST_F(Drain, FinishesTheBuildThatAClientWaitsFor) {
 TEST_F(Drain, CancelsWhatDoesNotFinishInTime) {
   build_ms_ = 60'000;
   ServerOptions options;
-  options.drain_timeout = 200ms;
+  options.config.drain_timeout = 200ms;
   Start(options);
   RawClient client(port());
   client.Send(Get("/maui/0/0/0.terrain"));
@@ -83,7 +83,7 @@ void WaitUntilDraining(std::uint16_t port) {
 
 TEST_F(Drain, AnswersAnotherRequestOnIdleConnectionsAndTheFirstOfNewOnes) {
   ServerOptions options;
-  options.drain_timeout = options.drain_grace = 60s;  // no more is needed: each connection ends with its reply
+  options.config.drain_timeout = options.drain_grace = 60s;  // no more is needed: each connection ends with its reply
   Start(options);
   RawClient idle(port()), unused(port());
   idle.Send(Get("/livez"));

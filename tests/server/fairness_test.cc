@@ -43,9 +43,9 @@ class Fairness : public ServerFixture {
       Begin("heights " + std::to_string(static_cast<int>(points[0].latitude)), stop);
       return std::vector<float>(points.size());
     };
-    options.request_deadline = 1h;
-    options.edge.trusted_proxies = {"127.0.0.1"};
-    options.edge.max_connections = 4000;
+    options.config.request_deadline = 1h;
+    options.config.trusted_proxies = {"127.0.0.1"};
+    options.config.max_connections = 4000;
     Start(options);
   }
   void TearDown() override {
@@ -225,7 +225,7 @@ class Uploads : public Fairness {
 
 TEST_F(Uploads, ThatAreOnlyAnnouncedTakeNothing) {
   ServerOptions options;
-  options.header_timeout = 1h;
+  options.config.header_timeout = 1h;
   StartHeld(options);
   LetAllGo();
   for (int i = 0; i < 60; ++i) Send(Begun(1, From("192.0.2.1")));
@@ -235,7 +235,7 @@ TEST_F(Uploads, ThatAreOnlyAnnouncedTakeNothing) {
 
 TEST_F(Uploads, OfAFloodMakeRoomForAnothers) {
   ServerOptions options;
-  options.header_timeout = 1h;
+  options.config.header_timeout = 1h;
   StartHeld(options);
   LetAllGo();
   for (int i = 0; i < 60; ++i) Send(Begun(20'000, From("192.0.2.1")));
@@ -246,8 +246,8 @@ TEST_F(Uploads, OfAFloodMakeRoomForAnothers) {
 
 TEST_F(Uploads, ThatAreDisplacedAreTold) {
   ServerOptions options;
-  options.header_timeout = 1h;
-  options.edge.transfer_bytes = std::size_t{6} << 20;  // two uploads
+  options.config.header_timeout = 1h;
+  options.config.transfer_bytes = std::size_t{6} << 20;  // two uploads
   StartHeld(options);
   RawClient& answered = Send(Large(From("192.0.2.1")));
   ASSERT_TRUE(Eventually([&] { return Fairness::Begun().size() == 1; }));
@@ -289,8 +289,8 @@ TEST_F(Uploads, HaveTheirRoomUntilTheJobHasEnded) {
 
 TEST_F(Uploads, OfSlowClientsAreReadToTheirEnd) {
   ServerOptions options;
-  options.header_timeout = 300ms;
-  options.min_read_rate = 4096;
+  options.config.header_timeout = 300ms;
+  options.config.min_read_rate = 4096;
   StartHeld(options);
   LetAllGo();
   std::string body = R"({"locations": "1,7"})";

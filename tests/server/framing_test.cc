@@ -112,7 +112,7 @@ TEST_F(Framing, FortyMegabytesOfHeaderCostNothing) {
 
 TEST_F(Framing, ClosesSlowSendersWhateverTheyTrickle) {
   ServerOptions options;
-  options.header_timeout = 300ms;
+  options.config.header_timeout = 300ms;
   Start(options);
   const auto begun = std::chrono::steady_clock::now();
   RawClient client(port());
@@ -129,8 +129,8 @@ TEST_F(Framing, ClosesSlowSendersWhateverTheyTrickle) {
 
 TEST_F(Framing, ClosesIdleConnectionsLater) {
   ServerOptions options;
-  options.header_timeout = 200ms;
-  options.idle_timeout = 700ms;
+  options.config.header_timeout = 200ms;
+  options.config.idle_timeout = 700ms;
   Start(options);
   RawClient client(port());
   client.Send(Get("/livez"));
@@ -143,7 +143,7 @@ TEST_F(Framing, ClosesIdleConnectionsLater) {
 
 TEST_F(Framing, ClosesReadersThatTakeNothing) {
   ServerOptions options;
-  options.write_timeout = 300ms;
+  options.config.write_timeout = 300ms;
   builder_ = [](const tiler::TileRequest&, std::stop_token) -> Result<tiler::EncodedTile> {
     tiler::EncodedTile tile;
     tile.bytes.assign(std::size_t{32} << 20, 'x');
@@ -160,7 +160,7 @@ TEST_F(Framing, ClosesReadersThatTakeNothing) {
 TEST_F(Framing, ServesAtTheCapAgainWhenAConnectionLeaves) {
   build_ms_ = 1000;
   ServerOptions options;
-  options.edge.max_connections = 3;
+  options.config.max_connections = 3;
   Start(options);
   std::vector<std::unique_ptr<RawClient>> busy;
   for (int i = 0; i < 3; ++i) {
@@ -177,7 +177,7 @@ TEST_F(Framing, ServesAtTheCapAgainWhenAConnectionLeaves) {
 
 TEST_F(Framing, GivesTheRoomOfIdleConnectionsToNewOnes) {
   ServerOptions options;
-  options.edge.max_connections = 3;
+  options.config.max_connections = 3;
   Start(options);
   std::vector<std::unique_ptr<RawClient>> idle;
   for (int i = 0; i < 3; ++i) {

@@ -145,7 +145,7 @@ TEST_F(HeightsTest, SaysThatTheBodyMayCome) {
 
 TEST_F(HeightsTest, RefusesBodiesThatAreTooLarge) {
   ServerOptions options;
-  options.max_locations = 10;
+  options.config.max_locations = 10;
   StartHeights(options);
   for (const char* length : {"4737", "100000000000", "999999999999999"}) {
     RawClient client(port());
@@ -187,7 +187,7 @@ TEST_F(HeightsTest, RefusesBodiesWhereverElse) {
 
 TEST_F(HeightsTest, ClosesSlowBodies) {
   ServerOptions options;
-  options.header_timeout = 300ms;
+  options.config.header_timeout = 300ms;
   StartHeights(options);
   const auto begun = std::chrono::steady_clock::now();
   RawClient client(port());
@@ -204,7 +204,7 @@ TEST_F(HeightsTest, ClosesSlowBodies) {
 
 TEST_F(HeightsTest, GivesUpAtTheDeadlineAndStopsReading) {
   ServerOptions options;
-  options.request_deadline = 200ms;
+  options.config.request_deadline = 200ms;
   read_ms_ = 60'000;
   StartHeights(options);
   const Reply reply = Fetch(port(), "/maui/heights?locations=5,7");
@@ -227,8 +227,8 @@ TEST_F(HeightsTest, StopsReadingWhenTheClientLeaves) {
 
 TEST_F(HeightsTest, RequestsAreNotJoinedButBounded) {
   ServerOptions options;
-  options.worker_threads = 1;
-  options.queue_length = 1;
+  options.config.worker_threads = 1;
+  options.config.queue_length = 1;
   read_ms_ = 300;
   StartHeights(options);
   std::atomic<int> good{0}, refused{0};

@@ -5,6 +5,7 @@
 #include <thread>
 #include <vector>
 
+#include "config/token_hash.h"
 #include "tests/server/resident_memory.h"
 #include "tests/server/server_fixture.h"
 
@@ -43,9 +44,9 @@ class Limits : public ServerFixture {
 TEST_F(Limits, FiveHundredSlowReadersHoldABoundedPart) {
   MakeTilesLarge();
   ServerOptions options;
-  options.cache_bytes = 0;
-  options.edge.max_connections = 2000;
-  options.edge.trusted_proxies = {"127.0.0.1"};
+  options.config.cache_bytes = 0;
+  options.config.max_connections = 2000;
+  options.config.trusted_proxies = {"127.0.0.1"};
   Start(options);
   Fetch(port(), "/livez");
   const long before = ResidentKib();
@@ -80,7 +81,7 @@ TEST_F(Limits, FiveHundredSlowReadersHoldABoundedPart) {
 TEST_F(Limits, SlowReadersOfOneClientAreAllServedInTheEnd) {
   MakeTilesLarge();
   ServerOptions options;
-  options.edge.transfer_bytes = std::size_t{8} << 20;  // two for replies of this size
+  options.config.transfer_bytes = std::size_t{8} << 20;  // two for replies of this size
   Start(options);
   std::vector<std::unique_ptr<RawClient>> readers;
   for (int i = 0; i < 30; ++i) {
@@ -107,8 +108,8 @@ TEST_F(Limits, SlowReadersOfOneClientAreAllServedInTheEnd) {
 TEST_F(Limits, AnOversizedReplyThatIsNotTakenMakesRoomForAnothers) {
   MakeTilesLarge(std::size_t{16} << 20);  // the kernel takes some of it
   ServerOptions options;
-  options.edge.transfer_bytes = std::size_t{2} << 20;
-  options.edge.trusted_proxies = {"127.0.0.1"};
+  options.config.transfer_bytes = std::size_t{2} << 20;
+  options.config.trusted_proxies = {"127.0.0.1"};
   Start(options);
   RawClient slow(port(), 4096);
   slow.Send(Get("/maui/3/0/0.terrain", "X-Forwarded-For: 192.0.2.1\r\n"));
@@ -120,7 +121,7 @@ TEST_F(Limits, AnOversizedReplyThatIsNotTakenMakesRoomForAnothers) {
 TEST_F(Limits, ManyReadersOfOneTileCountOnce) {
   MakeTilesLarge();
   ServerOptions options;
-  options.edge.transfer_bytes = std::size_t{2} << 20;
+  options.config.transfer_bytes = std::size_t{2} << 20;
   Start(options);
   std::vector<std::unique_ptr<RawClient>> readers;
   for (int i = 0; i < 50; ++i) {
@@ -136,8 +137,8 @@ TEST_F(Limits, ManyReadersOfOneTileCountOnce) {
 TEST_F(Limits, CutsReadersThatTakeTooLittleInTheLongRun) {
   MakeTilesLarge(std::size_t{8} << 20);
   ServerOptions options;
-  options.write_timeout = 300ms;
-  options.min_read_rate = 100'000'000;
+  options.config.write_timeout = 300ms;
+  options.config.min_read_rate = 100'000'000;
   Start(options);
   RawClient reader(port(), 4096);
   reader.Send(Get("/maui/0/0/0.terrain"));
@@ -148,7 +149,7 @@ TEST_F(Limits, CutsReadersThatTakeTooLittleInTheLongRun) {
 
 TEST_F(Limits, TellsSlowSendersOfBodies) {
   ServerOptions options;
-  options.header_timeout = 200ms;
+  options.config.header_timeout = 200ms;
   Start(options);
   RawClient client(port());
   client.Send(
@@ -166,8 +167,8 @@ TEST_F(Limits, TellsSlowSendersOfBodies) {
 
 TEST_F(Limits, WhoAsksTooOftenWaits) {
   ServerOptions options;
-  options.edge.requests_per_second = 20;
-  options.edge.request_burst = 5;
+  options.config.requests_per_second = 20;
+  options.config.request_burst = 5;
   Start(options);
   RawClient client(port());
   const auto begun = std::chrono::steady_clock::now();
@@ -178,9 +179,9 @@ TEST_F(Limits, WhoAsksTooOftenWaits) {
 
 TEST_F(Limits, RefusesWhoAsksTooOftenToWait) {
   ServerOptions options;
-  options.request_deadline = 100ms;
-  options.edge.requests_per_second = 0.5;
-  options.edge.request_burst = 5;
+  options.config.request_deadline = 100ms;
+  options.config.requests_per_second = 0.5;
+  options.config.request_burst = 5;
   Start(options);
   RawClient client(port());
   for (int i = 0; i < 6; ++i) client.Send(Get("/maui/layer.json"));
@@ -197,8 +198,8 @@ TEST_F(Limits, RefusesWhoAsksTooOftenToWait) {
 
 TEST_F(Limits, SlowsDownWhateverIsAsked) {
   ServerOptions options;
-  options.edge.requests_per_second = 0.001;
-  options.edge.request_burst = 3;
+  options.config.requests_per_second = 0.001;
+  options.config.request_burst = 3;
   Start(options);
   const auto status_of = [&](const std::string& request) {
     RawClient client(port());
@@ -216,9 +217,9 @@ TEST_F(Limits, SlowsDownWhateverIsAsked) {
 
 TEST_F(Limits, ATokensOwnRateHasABurstOfItsOwn) {
   ServerOptions options;
-  options.request_deadline = 100ms;
-  options.edge.requests_per_second = 1000;
-  options.edge.tokens = {{"slow", kAll, "", {}, 2}};
+  options.config.request_deadline = 100ms;
+  options.config.requests_per_second = 1000;
+  options.config.tokens = {{"slow", config::TokenHash(kAll), {}, 2}};
   Start(options);
   const std::string bearer = std::string("Authorization: Bearer ") + kAll + "\r\n";
   int good = 0;
@@ -229,7 +230,7 @@ TEST_F(Limits, ATokensOwnRateHasABurstOfItsOwn) {
 
 TEST_F(Limits, NamesDatasetsInTroubleToThoseWhoMaySeeThem) {
   ServerOptions options;
-  options.edge.tokens = {{"everybody", kAll, "", {}, 0}};
+  options.config.tokens = {{"everybody", config::TokenHash(kAll), {}, 0}};
   Start(options);
   server_->SetTroubles({{"maui", "/secret/maui.tif is gone"}});
   EXPECT_EQ(Fetch(port(), "/readyz").body, "degraded\ndataset: its source cannot be opened as it is now\n");
@@ -239,9 +240,9 @@ TEST_F(Limits, NamesDatasetsInTroubleToThoseWhoMaySeeThem) {
 
 TEST_F(Limits, CountsTheClientsBehindAProxyEachByItself) {
   ServerOptions options;
-  options.edge.requests_per_second = 0.001;
-  options.edge.request_burst = 1;
-  options.edge.trusted_proxies = {"127.0.0.0/8"};
+  options.config.requests_per_second = 0.001;
+  options.config.request_burst = 1;
+  options.config.trusted_proxies = {"127.0.0.0/8"};
   Start(options);
   const auto from = [&](const std::string& client) {
     return Fetch(port(), "/maui/layer.json", "X-Forwarded-For: " + client + "\r\n").status;
@@ -256,7 +257,7 @@ TEST_F(Limits, CountsTheClientsBehindAProxyEachByItself) {
 
 TEST_F(Limits, RefusesTooManyConnectionsOfOneClient) {
   ServerOptions options;
-  options.edge.max_connections_per_client = 2;
+  options.config.max_connections_per_client = 2;
   Start(options);
   RawClient first(port());
   auto second = std::make_unique<RawClient>(port());
@@ -278,8 +279,9 @@ TEST_F(Limits, ShowsDatasetsToWhomTheyBelong) {
   oahu.available = open.available = {{{0, 0, 1, 0}}};
   more_datasets_ = {oahu, open};
   ServerOptions options;
-  options.edge.tokens = {{"everybody", kAll, "", {}, 0}, {"oahu-team", kOahu, "", {"oahu"}, 0}};
-  options.edge.public_datasets = {"open"};
+  options.config.tokens = {{"everybody", config::TokenHash(kAll), {}, 0},
+                           {"oahu-team", config::TokenHash(kOahu), {"oahu"}, 0}};
+  options.config.datasets = {PublicDataset("open")};
   Start(options);
   const auto bearer = [](const std::string& token) { return "Authorization: Bearer " + token + "\r\n"; };
   const struct {
@@ -329,8 +331,8 @@ TEST_F(Limits, ShowsDatasetsToWhomTheyBelong) {
 
 TEST_F(Limits, ATokenInTheQueryGoesIntoTemplates) {
   ServerOptions options;
-  options.edge.tokens = {{"a", kAll, "", {}, 0}};
-  options.edge.public_datasets = {"maui"};
+  options.config.tokens = {{"a", config::TokenHash(kAll), {}, 0}};
+  options.config.datasets = {PublicDataset("maui")};
   Start(options);
   const std::string token = std::string("token=") + kAll;
   const auto contains = [](const Reply& reply, const std::string& text) {
@@ -357,7 +359,7 @@ TEST_F(Limits, ATokenInTheQueryGoesIntoTemplates) {
 
 TEST_F(Limits, ATokenChangesNoTile) {
   ServerOptions options;
-  options.edge.tokens = {{"a", kAll, "", {}, 0}, {"b", kOahu, "", {"maui"}, 0}};
+  options.config.tokens = {{"a", config::TokenHash(kAll), {}, 0}, {"b", config::TokenHash(kOahu), {"maui"}, 0}};
   Start(options);
   const Reply one = Fetch(port(), "/maui/0/0/0.terrain?token=" + std::string(kAll));
   const Reply other = Fetch(port(), "/maui/0/0/0.terrain?token=" + std::string(kOahu));
@@ -376,7 +378,7 @@ TEST_F(Limits, TokensAreIgnoredWhereThereAreNone) {
 
 TEST_F(Limits, LetsTheConfiguredPagesReadReplies) {
   ServerOptions options;
-  options.edge.cors_origins = {"https://maps.example", "http://localhost:3000"};
+  options.config.cors_origins = {"https://maps.example", "http://localhost:3000"};
   Start(options);
   const Reply known = Fetch(port(), "/maui/layer.json", "Origin: https://maps.example\r\n");
   EXPECT_EQ(known.Field("access-control-allow-origin"), "https://maps.example");
@@ -396,7 +398,7 @@ TEST_F(Limits, BelievesTrustedProxiesAlone) {
   EXPECT_NE(Fetch(port(), "/maui/tiles.json", said).body.find("\"http://localhost/maui/"), std::string::npos);
   server_.reset();
   ServerOptions options;
-  options.edge.trusted_proxies = {"127.0.0.1"};
+  options.config.trusted_proxies = {"127.0.0.1"};
   Start(options);
   const Reply reply = Fetch(port(), "/maui/tiles.json", said);
   EXPECT_NE(reply.body.find("\"https://maps.example/maui/"), std::string::npos) << reply.body;
@@ -421,13 +423,13 @@ TEST_F(Limits, TheHostOfATargetCountsBeforeHost) {
 
 TEST_F(Limits, RefusesOptionsThatMakeNoSense) {
   ServerOptions options;
-  options.edge.trusted_proxies = {"proxy.example"};
+  options.config.trusted_proxies = {"proxy.example"};
   EXPECT_FALSE(Server::Start(std::make_shared<const Catalog>(), options));
   options = {};
-  options.edge.tokens = {{"a", kAll, "", {}, 0}, {"b", kAll, "", {}, 0}};
+  options.config.tokens = {{"a", config::TokenHash(kAll), {}, 0}, {"b", config::TokenHash(kAll), {}, 0}};
   EXPECT_FALSE(Server::Start(std::make_shared<const Catalog>(), options)) << "one token with two names";
   options = {};
-  options.edge.tls_certificate = options.edge.tls_key = "/nowhere.pem";
+  options.config.tls.certificate = options.config.tls.key = "/nowhere.pem";
   const auto server = Server::Start(std::make_shared<const Catalog>(), options);
   ASSERT_FALSE(server);
   EXPECT_NE(server.error().message.find("/nowhere.pem"), std::string::npos);

@@ -42,7 +42,7 @@ TEST_F(Opening, AnswersProbesAndMetricsAndLetsOthersWait) {
 
 TEST_F(Opening, TellsWhoWaitsUntilItsDeadlineToAskAgain) {
   ServerOptions options;
-  options.request_deadline = 100ms;
+  options.config.request_deadline = 100ms;
   Listen(options);
   const Reply reply = Fetch(port(), "/maui/0/0/0.terrain");
   EXPECT_EQ(reply.status, 503);

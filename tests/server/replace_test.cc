@@ -39,8 +39,8 @@ TileBuilder FindsItsSourceChanged() {
 class Replace : public testing::Test {
  protected:
   void Start(CatalogPtr catalog) {
-    options_.port = 0;
-    options_.io_threads = 2;
+    options_.config.listen.port = 0;
+    options_.config.io_threads = 2;
     options_.metrics_age = std::chrono::milliseconds(0);
     auto server = Server::Start(std::move(catalog), options_);
     ASSERT_TRUE(server) << server.error().message;
@@ -55,9 +55,9 @@ class Replace : public testing::Test {
 TEST_F(Replace, AnswersFromTheNextCatalog) {
   Start(CatalogOf(1, Says("old")));
   EXPECT_EQ(Tile().body, "old");
-  ASSERT_TRUE(server_->Replace(CatalogOf(2, Says("new")), options_));
+  ASSERT_TRUE(server_->Replace(CatalogOf(2, Says("new")), options_.config));
   EXPECT_EQ(Tile().body, "new");
-  ASSERT_TRUE(server_->Replace(CatalogOf(2, Says("new"), "oahu"), options_));
+  ASSERT_TRUE(server_->Replace(CatalogOf(2, Says("new"), "oahu"), options_.config));
   EXPECT_EQ(Tile().status, 404);
   EXPECT_EQ(Tile("/oahu/0/0/0.terrain").body, "new");
   EXPECT_EQ(Tile("/oahu/0/0/0.terrain").Field("server-timing"), "cache;desc=hit");
@@ -73,12 +73,12 @@ TEST_F(Replace, ForgetsWhatWasCountedOfDatasetsThatAreGone) {
   const char* const once = R"(terrace_http_requests_total{dataset="maui",route="tile",status="200"} 1)";
   Tile();
   ASSERT_TRUE(Eventually([&] { return tells(once); })) << "a reply is counted when it is sent";
-  ASSERT_TRUE(server_->Replace(CatalogOf(2, Says("new")), options_));
+  ASSERT_TRUE(server_->Replace(CatalogOf(2, Says("new")), options_.config));
   EXPECT_TRUE(tells(once));
   EXPECT_TRUE(tells(R"(terrace_tile_builds_total{dataset="maui")"));
-  ASSERT_TRUE(server_->Replace(CatalogOf(2, Says("new"), "oahu"), options_));
+  ASSERT_TRUE(server_->Replace(CatalogOf(2, Says("new"), "oahu"), options_.config));
   EXPECT_FALSE(tells(R"(dataset="maui")"));
-  ASSERT_TRUE(server_->Replace(CatalogOf(3, Says("new")), options_));
+  ASSERT_TRUE(server_->Replace(CatalogOf(3, Says("new")), options_.config));
   Tile();
   EXPECT_TRUE(Eventually([&] { return tells(once); }));
 }
@@ -95,7 +95,7 @@ TEST_F(Replace, KeepsRequestsWithTheCatalogTheyBeganWith) {
   RawClient early(server_->port());
   early.Send(Get("/maui/0/0/0.terrain"));
   ASSERT_TRUE(Eventually([&] { return begun.load(); }));
-  ASSERT_TRUE(server_->Replace(CatalogOf(2, Says("new")), options_));
+  ASSERT_TRUE(server_->Replace(CatalogOf(2, Says("new")), options_.config));
   EXPECT_EQ(Tile().body, "new");
   go_on = true;
   const auto reply = early.Read();
@@ -106,7 +106,7 @@ TEST_F(Replace, KeepsRequestsWithTheCatalogTheyBeganWith) {
 
 TEST_F(Replace, RefusesACatalogThatCannotBeServed) {
   Start(CatalogOf(1, Says("old")));
-  EXPECT_FALSE(server_->Replace(CatalogOf(2, Says("new"), "metrics"), options_));
+  EXPECT_FALSE(server_->Replace(CatalogOf(2, Says("new"), "metrics"), options_.config));
   EXPECT_EQ(Tile().body, "old");
 }
 
@@ -116,7 +116,7 @@ TEST_F(Replace, WaitsForTheNextCatalogWhereTheSourceHasChanged) {
   Start(CatalogOf(1, FindsItsSourceChanged()));
   std::thread reopening([&] {
     EXPECT_TRUE(Eventually([&] { return told > 0; }));
-    EXPECT_TRUE(server_->Replace(CatalogOf(2, Says("new")), options_));
+    EXPECT_TRUE(server_->Replace(CatalogOf(2, Says("new")), options_.config));
   });
   EXPECT_EQ(Tile().body, "new");
   reopening.join();
@@ -139,7 +139,7 @@ TEST_F(Replace, WaitsOutATroubleThatPasses) {
   std::thread reopening([&] {
     EXPECT_TRUE(Eventually([&] { return told > 0; }));
     std::this_thread::sleep_for(100ms);
-    EXPECT_TRUE(server_->Replace(CatalogOf(2, Says("new")), options_));
+    EXPECT_TRUE(server_->Replace(CatalogOf(2, Says("new")), options_.config));
   });
   EXPECT_EQ(Tile().body, "new");
   reopening.join();
@@ -156,7 +156,7 @@ TEST_F(Replace, DoesNotWaitForADatasetInTrouble) {
   std::thread reopening([&] {  // whoever waited would meet this
     EXPECT_TRUE(Eventually([&] { return told > 0; }));
     std::this_thread::sleep_for(1500ms);
-    EXPECT_TRUE(server_->Replace(CatalogOf(2, Says("new")), options_));
+    EXPECT_TRUE(server_->Replace(CatalogOf(2, Says("new")), options_.config));
   });
   EXPECT_EQ(Tile().status, 503);
   reopening.join();
@@ -169,9 +169,9 @@ TEST_F(Replace, DoesNotWaitForADatasetInTrouble) {
 TEST_F(Replace, TakesOverTheOptionsThatMayChange) {
   Start(CatalogOf(1, Says("old")));
   EXPECT_EQ(Tile().Field("cache-control"), "public, max-age=3600");
-  options_.cache_control = "no-cache";
-  options_.cache_bytes = 0;
-  ASSERT_TRUE(server_->Replace(CatalogOf(1, Says("old")), options_));
+  options_.config.cache_control = "no-cache";
+  options_.config.cache_bytes = 0;
+  ASSERT_TRUE(server_->Replace(CatalogOf(1, Says("old")), options_.config));
   EXPECT_EQ(Tile().Field("cache-control"), "no-cache");
   EXPECT_TRUE(Tile().Field("server-timing").starts_with("cache;desc=miss")) << "the cache is off now";
 }

@@ -15,6 +15,7 @@
 #include <string>
 #include <vector>
 
+#include "config/token_hash.h"
 #include "tests/server/server_fixture.h"
 
 namespace terrace::server {
@@ -148,16 +149,16 @@ class Secrets : public ServerFixture {
     std::filesystem::remove_all(folder_);
   }
 
-  void StartWith(AccessLogForm form, bool with_tokens) {
+  void StartWith(config::AccessLogForm form, bool with_tokens) {
     ServerOptions options;
-    options.access_log = form;
-    if (form != AccessLogForm::kLog) options.access_log_file = folder_ / "access.log";
-    if (with_tokens) options.edge.tokens = {{"team", kSecret, "", {"maui"}, 0}};
+    options.config.access_log = form;
+    if (form != config::AccessLogForm::kLog) options.config.access_log_file = folder_ / "access.log";
+    if (with_tokens) options.config.tokens = {{"team", config::TokenHash(kSecret), {"maui"}, 0}};
     DatasetView open;
     open.name = "open";
     open.available = {{{0, 0, 1, 0}}};
     more_datasets_ = {open};
-    options.edge.public_datasets = {"open"};
+    options.config.datasets = {PublicDataset("open")};
     Start(options);
   }
 
@@ -205,7 +206,7 @@ class Secrets : public ServerFixture {
 };
 
 TEST_F(Secrets, AreInNoLogAndNoSharedReplyHoweverTheyAreSpelled) {
-  StartWith(AccessLogForm::kLog, /*with_tokens=*/true);
+  StartWith(config::AccessLogForm::kLog, /*with_tokens=*/true);
   for (const char* path : {"/maui/0/0/0.terrain", "/open/0/0/0.terrain", "/open/layer.json", "/open/tileset.json",
                            "/open/tiles.json", "/open/heights", "/datasets", "/", "/livez", "/nothing/here"}) {
     for (const std::string& request : Requests(path)) Ask(request);
@@ -220,7 +221,7 @@ TEST_F(Secrets, AreInNoLogAndNoSharedReplyHoweverTheyAreSpelled) {
 }
 
 TEST_F(Secrets, AreInNoOtherFormOfTheAccessLog) {
-  for (const AccessLogForm form : {AccessLogForm::kCombined, AccessLogForm::kJson}) {
+  for (const config::AccessLogForm form : {config::AccessLogForm::kCombined, config::AccessLogForm::kJson}) {
     StartWith(form, /*with_tokens=*/true);
     for (const char* path : {"/open/layer.json", "/nothing/here"}) {
       for (const std::string& request : Requests(path)) Ask(request);
@@ -231,7 +232,7 @@ TEST_F(Secrets, AreInNoOtherFormOfTheAccessLog) {
 }
 
 TEST_F(Secrets, AreKeptWhereNobodyNeedsThem) {
-  StartWith(AccessLogForm::kLog, /*with_tokens=*/false);
+  StartWith(config::AccessLogForm::kLog, /*with_tokens=*/false);
   for (const char* path : {"/maui/0/0/0.terrain", "/maui/layer.json", "/", "/metrics"}) {
     for (const std::string& request : Requests(path)) Ask(request);
   }
@@ -239,7 +240,7 @@ TEST_F(Secrets, AreKeptWhereNobodyNeedsThem) {
 }
 
 TEST_F(Secrets, EncodedNamesAreRefused) {
-  StartWith(AccessLogForm::kOff, /*with_tokens=*/true);
+  StartWith(config::AccessLogForm::kOff, /*with_tokens=*/true);
   for (const char* path : {"/maui/0/0/0.terrain", "/open/layer.json", "/open/tileset.json", "/open/tiles.json",
                            "/open/heights", "/open/mesh", "/datasets", "/livez", "/readyz", "/metrics"}) {
     for (const char* query : {"%54oken=", "%74oken=", "tok%65n=", "token%3D", "token%3d",
@@ -251,7 +252,7 @@ TEST_F(Secrets, EncodedNamesAreRefused) {
 
 // What has no secret in it stays with those who share it.
 TEST_F(Secrets, PlainRepliesStayPublic) {
-  StartWith(AccessLogForm::kOff, /*with_tokens=*/true);
+  StartWith(config::AccessLogForm::kOff, /*with_tokens=*/true);
   for (const char* target :
        {"/open/0/0/0.terrain", "/open/0/0/0.terrain?v=1.0.0&error=5&atleast=1", "/open/layer.json",
         "/open/0/0/0.terrain?extensions=octvertexnormals-metadata", "/open/tileset.json?error=50"}) {

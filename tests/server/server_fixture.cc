@@ -32,15 +32,15 @@ ServerFixture::ServerFixture() {
 void ServerFixture::Start(ServerOptions options) {
   Listen(options);
   ASSERT_TRUE(server_);
-  const Result<void> served = server_->Replace(MakeCatalog(), options);
+  const Result<void> served = server_->Replace(MakeCatalog(), options.config);
   ASSERT_TRUE(served) << served.error().message;
 }
 
 void ServerFixture::Listen(ServerOptions options) {
-  options.port = 0;
-  options.io_threads = 2;
+  options.config.listen.port = 0;
+  options.config.io_threads = 2;
   options.metrics_age = std::chrono::milliseconds(0);  // tests look for what they have just done
-  if (options.worker_threads == 0) options.worker_threads = 2;
+  if (options.config.worker_threads == 0) options.config.worker_threads = 2;
   auto server = Server::Start(nullptr, options);
   ASSERT_TRUE(server) << server.error().message;
   server_ = std::move(*server);
@@ -60,6 +60,13 @@ std::string ServerFixture::BodyOf(const tiler::TileRequest& request) {
                                  request.error_step, static_cast<int>(request.coding), request.normals);
   body.append(2000, '.');
   return body;
+}
+
+config::DatasetConfig PublicDataset(std::string name) {
+  config::DatasetConfig dataset;
+  dataset.name = std::move(name);
+  dataset.is_public = true;
+  return dataset;
 }
 
 bool Eventually(const std::function<bool()>& done) {

@@ -8,6 +8,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <string>
 #include <vector>
 
 #include "server/server.h"
@@ -39,6 +40,9 @@ class ServerFixture : public testing::Test {
   std::vector<DatasetView> more_datasets_;  // beside "maui"
   std::unique_ptr<Server> server_;
 };
+
+// One that is seen without a token.
+config::DatasetConfig PublicDataset(std::string name);
 
 // Sleeps until `done` or ten seconds have passed; then false.
 bool Eventually(const std::function<bool()>& done);

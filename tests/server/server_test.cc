@@ -280,8 +280,8 @@ TEST_F(ServerTest, TellsEveryWaiterThatTheBuildFailed) {
 TEST_F(ServerTest, RefusesWhatItsQueueCannotHold) {
   build_ms_ = 500;
   ServerOptions options;
-  options.worker_threads = 1;
-  options.queue_length = 1;
+  options.config.worker_threads = 1;
+  options.config.queue_length = 1;
   Start(options);
   std::vector<std::unique_ptr<RawClient>> clients;
   for (int x = 0; x < 8; ++x) {
@@ -302,7 +302,7 @@ TEST_F(ServerTest, RefusesWhatItsQueueCannotHold) {
 TEST_F(ServerTest, GivesUpAtTheDeadline) {
   build_ms_ = 5'000;
   ServerOptions options;
-  options.request_deadline = 150ms;
+  options.config.request_deadline = 150ms;
   Start(options);
   const auto begun = std::chrono::steady_clock::now();
   const Reply reply = Fetch(port(), "/maui/0/0/0.terrain");
@@ -361,7 +361,7 @@ TEST_F(ServerTest, AnswersQuickRequestsOfClientsThatCloseTheirDirection) {
 TEST_F(ServerTest, SaysWhatToDoAboutATakenPort) {
   Start();
   ServerOptions options;
-  options.port = port();
+  options.config.listen.port = port();
   const auto second = Server::Start(std::make_shared<const Catalog>(), options);
   ASSERT_FALSE(second);
   EXPECT_NE(second.error().message.find("127.0.0.1:" + std::to_string(port())), std::string::npos);

@@ -29,8 +29,8 @@ class Tls : public ServerFixture {
     std::filesystem::remove_all(directory_);
   }
   void StartTls(ServerOptions options = {}) {
-    options.edge.tls_certificate = certificate_;
-    options.edge.tls_key = key_;
+    options.config.tls.certificate = certificate_;
+    options.config.tls.key = key_;
     Start(options);
   }
 
@@ -75,7 +75,7 @@ TEST_F(Tls, RefusesWhatIsOld) {
 
 TEST_F(Tls, ClosesWhoDoesNotSpeakIt) {
   ServerOptions options;
-  options.header_timeout = 300ms;
+  options.config.header_timeout = 300ms;
   StartTls(options);
   RawClient plain(port());
   plain.Send(Get("/livez"));
@@ -112,13 +112,13 @@ TEST_F(Tls, TakesANewCertificateAndKeepsTheOldWhereTheNewIsWrong) {
 TEST_F(Tls, SaysWhichFileIsWrong) {
   WriteCertificate("other.example", directory_ + "/other.pem", directory_ + "/other.key");
   ServerOptions options;
-  options.edge.tls_certificate = certificate_;
-  options.edge.tls_key = directory_ + "/other.key";
+  options.config.tls.certificate = certificate_;
+  options.config.tls.key = directory_ + "/other.key";
   const auto mismatched = Server::Start(std::make_shared<const Catalog>(), options);
   ASSERT_FALSE(mismatched);
   EXPECT_EQ(mismatched.error().message,
             directory_ + "/other.key: is not the key of the certificate in " + certificate_);
-  options.edge.tls_certificate = key_;
+  options.config.tls.certificate = key_;
   const auto swapped = Server::Start(std::make_shared<const Catalog>(), options);
   ASSERT_FALSE(swapped);
   EXPECT_NE(swapped.error().message.find("server.key"), std::string::npos) << swapped.error().message;

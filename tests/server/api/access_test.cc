@@ -6,6 +6,8 @@
 #include <cctype>
 #include <string>
 
+#include "config/token_hash.h"
+
 namespace terrace::server {
 namespace {
 
@@ -13,8 +15,8 @@ constexpr const char* kToken = "0123456789abcdef";
 // As `printf 0123456789abcdef | sha256sum` prints it.
 const std::string kHash = "9f9f5111f7b27a781f1f1ddde5ebc2dd2b796bfc7365c9c28b548e564176929f";
 
-TokenOptions Hashed(std::string sha256, std::string name = "field team") {
-  TokenOptions options;
+config::TokenConfig Hashed(std::string sha256, std::string name = "field team") {
+  config::TokenConfig options;
   options.name = std::move(name);
   options.sha256 = std::move(sha256);
   options.datasets = {"maui"};
@@ -46,11 +48,8 @@ TEST(AccessPolicy, RefusesWhatIsNoHash) {
   }
 }
 
-TEST(AccessPolicy, RefusesOneTokenInTwoForms) {
-  TokenOptions plain;
-  plain.name = "plain";
-  plain.token = kToken;
-  const auto policy = AccessPolicy::Make({plain, Hashed(kHash)}, {});
+TEST(AccessPolicy, RefusesTheSameTokenTwice) {
+  const auto policy = AccessPolicy::Make({Hashed(config::TokenHash(kToken), "plain"), Hashed(kHash)}, {});
   ASSERT_FALSE(policy);
   EXPECT_NE(policy.error().message.find("another token is the same"), std::string::npos) << policy.error().message;
 }

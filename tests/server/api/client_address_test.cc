@@ -7,7 +7,8 @@ namespace {
 
 asio::ip::address At(const char* text) { return asio::ip::make_address(text); }
 
-Proxies Trusting(const std::vector<std::string>& ranges, ForwardedHeader header = ForwardedHeader::kXForwarded) {
+Proxies Trusting(const std::vector<std::string>& ranges,
+                 config::ForwardedHeader header = config::ForwardedHeader::kXForwarded) {
   return {*AddressRanges::Parse(ranges), header};
 }
 
@@ -85,7 +86,7 @@ TEST(ResolveClient, TakesSchemeAndHostFromTheNearestProxy) {
 }
 
 TEST(ResolveClient, ReadsForwardedWhereThatIsWhatProxiesWrite) {
-  const Proxies proxies = Trusting({"10.0.0.0/8"}, ForwardedHeader::kForwarded);
+  const Proxies proxies = Trusting({"10.0.0.0/8"}, config::ForwardedHeader::kForwarded);
   Request request;
   request.fields.Set(&RequestFields::forwarded_for, "203.0.113.99");
   request.fields.Set(

@@ -4,12 +4,13 @@
 
 #include <string>
 
+#include "config/token_hash.h"
 #include "server/routes.h"
 
 namespace terrace::server {
 namespace {
 
-Gate GateWith(const std::vector<TokenOptions>& tokens, const std::vector<std::string>& open = {}) {
+Gate GateWith(const std::vector<config::TokenConfig>& tokens, const std::vector<std::string>& open = {}) {
   GateOptions options;
   options.access = *AccessPolicy::Make(tokens, open);
   return Gate(std::move(options));
@@ -37,10 +38,10 @@ RequestFields Bearing(const std::string& token) {
   return fields;
 }
 
-TokenOptions TokenOf(const std::string& name, const std::string& token, std::vector<std::string> datasets) {
-  TokenOptions options;
+config::TokenConfig TokenOf(const std::string& name, const std::string& token, std::vector<std::string> datasets) {
+  config::TokenConfig options;
   options.name = name;
-  options.token = token;
+  options.sha256 = config::TokenHash(token);
   options.datasets = std::move(datasets);
   return options;
 }

@@ -108,10 +108,10 @@ TEST(AccessLog, AppendsToItsFileAndFollowsARotation) {
       std::filesystem::path(testing::TempDir()) / ("access_log_" + std::to_string(::getpid()));
   std::filesystem::remove_all(folder);
   std::filesystem::create_directories(folder);
-  EXPECT_TRUE(AccessLog::Try(AccessLogForm::kCombined, folder / "access.log"));
+  EXPECT_TRUE(AccessLog::Try(config::AccessLogForm::kCombined, folder / "access.log"));
   EXPECT_TRUE(std::filesystem::is_empty(folder));
-  EXPECT_FALSE(AccessLog::Try(AccessLogForm::kCombined, folder));
-  auto log = AccessLog::Open(AccessLogForm::kCombined, folder / "access.log");
+  EXPECT_FALSE(AccessLog::Try(config::AccessLogForm::kCombined, folder));
+  auto log = AccessLog::Open(config::AccessLogForm::kCombined, folder / "access.log");
   ASSERT_TRUE(log) << log.error().message;
   log->Write(Record());
   std::filesystem::rename(folder / "access.log", folder / "access.log.1");
@@ -124,8 +124,8 @@ TEST(AccessLog, AppendsToItsFileAndFollowsARotation) {
   std::filesystem::remove_all(folder);
   log->Reopen();  // nowhere to go: the old file stays in use
   log->Write(Record());
-  EXPECT_FALSE(AccessLog::Try(AccessLogForm::kJson, folder / "nothing" / "access.log"));
-  EXPECT_FALSE(AccessLog::Open(AccessLogForm::kJson, folder / "nothing" / "access.log"));
+  EXPECT_FALSE(AccessLog::Try(config::AccessLogForm::kJson, folder / "nothing" / "access.log"));
+  EXPECT_FALSE(AccessLog::Open(config::AccessLogForm::kJson, folder / "nothing" / "access.log"));
 }
 
 // A reader of a pipe takes the first writer's end for the end of all.
@@ -138,17 +138,17 @@ TEST(AccessLog, IsTriedWithoutATrace) {
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
   const int reader = ::open(pipe.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
   ASSERT_GE(reader, 0);
-  EXPECT_TRUE(AccessLog::Try(AccessLogForm::kJson, pipe));
+  EXPECT_TRUE(AccessLog::Try(config::AccessLogForm::kJson, pipe));
   pollfd end{reader, POLLIN, 0};
   EXPECT_EQ(::poll(&end, 1, 0), 0) << end.revents;
-  EXPECT_TRUE(AccessLog::Open(AccessLogForm::kJson, pipe));
+  EXPECT_TRUE(AccessLog::Open(config::AccessLogForm::kJson, pipe));
   ::close(reader);
 
   std::filesystem::create_symlink("there.log", folder / "here");
-  EXPECT_TRUE(AccessLog::Try(AccessLogForm::kJson, folder / "here"));
+  EXPECT_TRUE(AccessLog::Try(config::AccessLogForm::kJson, folder / "here"));
   EXPECT_FALSE(std::filesystem::exists(folder / "there.log"));
   std::filesystem::create_symlink(folder / "nothing" / "access.log", folder / "astray");
-  EXPECT_FALSE(AccessLog::Try(AccessLogForm::kJson, folder / "astray"));
+  EXPECT_FALSE(AccessLog::Try(config::AccessLogForm::kJson, folder / "astray"));
   std::filesystem::remove_all(folder);
 }
 

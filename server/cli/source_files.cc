@@ -1,40 +1,14 @@
-#include "server/cli/open_source.h"
+#include "server/cli/source_files.h"
 
 #include <fmt/format.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <system_error>
-#include <utility>
 
 #include "engine/dem/gdal/source_policy.h"
 
 namespace terrace::cli {
-
-namespace {
-
-// What the dataset says and its source does not contradict.
-dem::SourceOptions OptionsOf(const config::DatasetConfig& dataset, const config::SourceConfig& source) {
-  const config::NodataConfig nodata = source.nodata.value_or(dataset.nodata);
-  dem::SourceOptions options;
-  options.vertical = source.vertical.value_or(dataset.vertical);
-  options.find_voids = nodata.detect;
-  options.nodata = nodata.values;
-  return options;
-}
-
-}  // namespace
-
-std::vector<dem::DemFile> FilesOf(const config::DatasetConfig& dataset) {
-  const std::vector<config::SourceConfig>& sources = dataset.sources;
-  std::vector<dem::DemFile> files;
-  for (std::size_t rank = 0; rank < sources.size(); ++rank) {
-    for (const std::string& file : sources[rank].files) {
-      files.push_back({file, static_cast<int>(rank), sources[rank].is_folder, OptionsOf(dataset, sources[rank])});
-    }
-  }
-  return files;
-}
 
 std::size_t FileCount(const std::vector<config::SourceConfig>& sources) {
   std::size_t count = 0;
@@ -82,23 +56,6 @@ Result<void> TryPolicy(const config::DatasetConfig& dataset) {
     if (const Result<void> allowed = dem::CheckSourceName(*layer); !allowed) return checked(allowed);
   }
   return {};
-}
-
-Result<std::unique_ptr<dem::DemSource>> OpenSource(const config::DatasetConfig& wanted, const std::string& cache_dir,
-                                                   const std::function<void(double)>& progress, std::stop_token stop,
-                                                   std::function<void(const Error&)> fault) {
-  dem::DemOptions options;
-  options.error_fraction = wanted.error_fraction;
-  options.finest_error = wanted.finest_error;
-  options.floor = wanted.floor;
-  options.max_void_gap = wanted.max_void_gap;
-  options.voids = wanted.voids == config::HoleFill::kSmooth ? dem::HoleFill::kSmooth : dem::HoleFill::kFloor;
-  options.cache_dir = cache_dir;
-  options.feather = wanted.feather;
-  options.progress = progress;
-  options.stop = std::move(stop);
-  options.fault = std::move(fault);
-  return dem::DemSource::Open(FilesOf(wanted), options);
 }
 
 }  // namespace terrace::cli

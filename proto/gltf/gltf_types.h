@@ -1,0 +1,24 @@
+// Plain values that GLB tiles are described with.
+#pragma once
+
+#include <cstdint>
+
+namespace terrace::proto {
+
+// How the mesh of a GLB tile is stored. All of them decode to the positions of the GridMesh, bit for bit.
+enum class GlbCompression : std::uint8_t {
+  kDraco,      // KHR_draco_mesh_compression
+  kNone,       // 32-bit floats
+  kQuantized,  // KHR_mesh_quantization: 16-bit positions and 8-bit normals; floats where a tile spans 2^16 steps or
+               // more
+  kMeshopt,    // EXT_meshopt_compression of what kQuantized holds
+};
+
+// How the texture of a GLB tile is stored.
+enum class TextureFormat : std::uint8_t {
+  kNone,  // no texture
+  kJpeg,  // baseline, which every glTF client reads
+  kWebp,  // lossy; smaller at the same quality number, for readers of EXT_texture_webp
+};
+
+}  // namespace terrace::proto
