@@ -28,9 +28,19 @@ TEST(ToJson, ComesBackAsTheDefaults) { ExpectComesBack(Config{}); }
 TEST(ToJson, ComesBackWithEveryOptionSet) {
   Config config;
   config.listen = {"2001:db8::1", 0};
-  DatasetConfig dataset{
-      "a", {"/data/a.tif"},       "egm96", NodataConfig{false, {-9999, 0.5}}, "© \"ét\\é\"", 0.1, 1e-3, -0.3,
-      7,   dem::HoleFill::kFloor, 12.5,    tin::Criterion::kDataDependent,    true};
+  DatasetConfig dataset = Dataset("a");
+  dataset.sources = {"/data/a.tif"};
+  dataset.vertical = "egm96";
+  dataset.nodata = {false, {-9999, 0.5}};
+  dataset.attribution = "© \"ét\\é\"";
+  dataset.error_fraction = 0.1;
+  dataset.finest_error = 1e-3;
+  dataset.floor = -0.3;
+  dataset.max_void_gap = 7;
+  dataset.voids = dem::HoleFill::kFloor;
+  dataset.feather = 12.5;
+  dataset.criterion = tin::Criterion::kDataDependent;
+  dataset.compact = true;
   dataset.sources.front().vertical = "EPSG:5703";
   dataset.sources.front().nodata = NodataConfig{false, {}};
   dataset.water.sea_level = -1.25;

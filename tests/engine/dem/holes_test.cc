@@ -160,7 +160,9 @@ TEST(Holes, ShowTheFloorWhereTheOwnerWantsThat) {
   ASSERT_TRUE(source && smooth);
   EXPECT_NE(source->fingerprint(), smooth->fingerprint());
   ForNodes(*source, kLevel, [&](const TileHeights& tile, int i, int j, const Place& at) {
-    if (at.IsIn(170, 170, 230, 230)) EXPECT_EQ(tile.At(i, j), kFloor);
+    if (at.IsIn(170, 170, 230, 230)) {
+      EXPECT_EQ(tile.At(i, j), kFloor);
+    }
   });
   const GeoPosition middle = DegreesOf(200, 200);
   const auto point = source->ReadPoints({&middle, 1});
@@ -257,8 +259,12 @@ TEST(Holes, GoAcrossRastersOfASheet) {
           ASSERT_TRUE(IsSame(a->At(i, j), b->At(i, j))) << geo::ToString(key) << ", node " << i << ", " << j;
           ASSERT_TRUE(b->At(i, j) >= bound.min && b->At(i, j) <= bound.max);
           const Place at = PlaceOf(*a, key, i, j);
-          if (at.IsIn(240, 140, 254, 180)) EXPECT_EQ(c->At(i, j), kFloor);
-          if (at.IsIn(230, 140, 320, 180)) EXPECT_GT(a->At(i, j), 400);
+          if (at.IsIn(240, 140, 254, 180)) {
+            EXPECT_EQ(c->At(i, j), kFloor);
+          }
+          if (at.IsIn(230, 140, 320, 180)) {
+            EXPECT_GT(a->At(i, j), 400);
+          }
         }
       }
     }
@@ -285,8 +291,12 @@ TEST(Holes, ShowASourceBelow) {
   EXPECT_NEAR((*heights)[2], Plane(31, 30), 0.01);
   EXPECT_EQ(filled, (std::vector<std::uint8_t>{0, 1, 0}));
   ForNodes(*source, kLevel, [&](const TileHeights& tile, int i, int j, const Place& at) {
-    if (at.IsIn(170, 170, 230, 230)) EXPECT_EQ(tile.At(i, j), -3000);
-    if (at.IsIn(25, 25, 35, 35)) EXPECT_NEAR(tile.At(i, j), Plane(at.x, at.y), 0.01);
+    if (at.IsIn(170, 170, 230, 230)) {
+      EXPECT_EQ(tile.At(i, j), -3000);
+    }
+    if (at.IsIn(25, 25, 35, 35)) {
+      EXPECT_NEAR(tile.At(i, j), Plane(at.x, at.y), 0.01);
+    }
   });
 }
 
@@ -464,7 +474,9 @@ TEST(RimVoids, AreThoseThatAFloodFromTheRimFinds) {
     }
     EXPECT_EQ(wrong_rims, 0);
     EXPECT_EQ(wrong_holes, 0);
-    if (percent == 100) EXPECT_EQ(rim.regions(), 1u);
+    if (percent == 100) {
+      EXPECT_EQ(rim.regions(), 1u);
+    }
   }
 }
 
