@@ -16,8 +16,8 @@ bool IsPlainTarget(std::string_view target);
 
 // The plain part of the target: the path up to what is not plain ("..." stands for the rest), known parameters, and how
 // many others there are: "/maui/heights?locations=1,2&+1". Of absolute targets without scheme and host. The value of
-// `v`, which may be anything, is left out, and so is the whole of `token`. `is_known`: the path names something that the
-// server has. Of others, which anything may stand in, a part between slashes that is as long as a token is "..." as
+// `v`, which may be anything, is left out, and so is the whole of `token`. `is_known`: the path names something that
+// the server has. Of others, which anything may stand in, a part between slashes that is as long as a token is "..." as
 // well.
 std::string ShownTarget(std::string_view target, bool is_known);
 
