@@ -37,7 +37,11 @@ int main(int count, char** arguments) {
     std::fprintf(stderr, "embed: %s\n", tile.error().message.c_str());
     return 1;
   }
-  std::ofstream(arguments[6], std::ios::binary) << tile->bytes;
+  std::ofstream out(arguments[6], std::ios::binary);
+  if (!(out << tile->bytes) || !out.flush()) {
+    std::fprintf(stderr, "embed: %s cannot be written\n", arguments[6]);
+    return 1;
+  }
   std::printf("%u triangles, at most %.3g m from the samples of the tile and %.3g m from those of the source\n",
               tile->triangles, tile->max_error_m, *tile->certified_error_m);
   return 0;

@@ -155,12 +155,12 @@ Result<Route> RouteTable::Match(std::string_view target) const {
 
   Route route;
   for (const Entry& entry : entries_) {
-    if (!Fits(entry, *segments) || (entry.row->read != nullptr && !entry.row->read(*segments, route))) continue;
+    if (!Fits(entry, *segments)) continue;
+    route = Route();
+    if (entry.pattern.size() > 1 && entry.pattern.front().empty()) route.dataset = (*segments)[0];
+    if (IsReserved(route.dataset)) continue;  // "viewer" is no dataset, whatever its files are called
+    if (entry.row->read != nullptr && !entry.row->read(*segments, route)) continue;
     route.row = entry.row;
-    if (entry.pattern.size() > 1 && entry.pattern.front().empty()) {
-      route.dataset = (*segments)[0];
-      if (IsReserved(route.dataset)) return NotFound();
-    }
     break;
   }
   if (route.row == nullptr) return NotFound();

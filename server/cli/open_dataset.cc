@@ -66,12 +66,13 @@ std::uint64_t GenerationOf(const config::DatasetConfig& wanted, const tiler::Dat
                            const std::string& version) {
   const tiler::WaterRules& water = dataset.water;
   const tiler::ImageryRules& imagery = dataset.imagery;
-  const std::string text = fmt::format(
-      "{} {} {} {} {} {} {} {} {} {} {} {} {} {} {}", version, dataset.source->fingerprint(), dataset.error_fraction,
-      static_cast<int>(dataset.rules.criterion), dataset.rules.compact, wanted.draco_speed, wanted.draco_normal_bits,
-      water.mask ? water.mask->fingerprint() : 0, water.sea_level_m ? fmt::format("{}", *water.sea_level_m) : "none",
-      dataset.metadata_levels, imagery.image ? imagery.image->fingerprint() : 0, imagery.side, imagery.quality,
-      imagery.attribution, dataset.attribution);
+  const std::string text =
+      fmt::format("{} {} {} {} {} {} {} {} {} {} {} {} {} {}:{} {}:{}", version, dataset.source->fingerprint(),
+                  dataset.error_fraction, static_cast<int>(dataset.rules.criterion), dataset.rules.compact,
+                  wanted.draco_speed, wanted.draco_normal_bits, water.mask ? water.mask->fingerprint() : 0,
+                  water.sea_level_m ? fmt::format("{}", *water.sea_level_m) : "none", dataset.metadata_levels,
+                  imagery.image ? imagery.image->fingerprint() : 0, imagery.side, imagery.quality,
+                  imagery.attribution.size(), imagery.attribution, dataset.attribution.size(), dataset.attribution);
   return XXH3_64bits(text.data(), text.size());
 }
 

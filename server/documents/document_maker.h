@@ -25,8 +25,8 @@
 namespace terrace::server {
 
 struct DocumentPlan {
-  // On any thread; refers to nothing but the catalog and what it holds itself. Asks the stop token as it writes, and
-  // what it gives after a stop is of no use.
+  // On any thread; refers to nothing but the catalog and what it holds itself. What is long asks the stop token
+  // as it writes; what it gives after a stop is of no use.
   using Write = std::function<std::string(const std::stop_token&)>;
 
   std::string key;                 // of one catalog's documents, equal for equal ones alone; holds no token

@@ -18,7 +18,7 @@ class LayerHandler {
   // `datasets` must outlive this.
   LayerHandler(std::span<const DatasetView> datasets, std::string cache_control);
 
-  // Precondition: a kLayer call.route. `?error=E` and `?fraction=F` go into the tile template.
+  // Precondition: a route of layer.json. `?error=E` and `?fraction=F` go into the tile template.
   Described Handle(const Call& call) const;
 
  private:

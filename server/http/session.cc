@@ -97,9 +97,9 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
     asio::dispatch(stream_.socket().get_executor(), [self = shared_from_this(), step] { ((*self).*step)(); });
   }
   void EvictHere() {
-    if (phase() == Phase::kServes) return;
     hurried_ = true;
     reader_.Close();
+    if (phase() == Phase::kServes) return;                    // a request has come meanwhile
     if (!reader_.waiting() || served_ == 0) stream_.Reset();  // an unfinished head or handshake
   }
   void DrainHere() { reader_.Close(context_->options.drain_grace); }
@@ -110,9 +110,9 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
 
   // Its reply is under way, or its body has no room: then there is nothing to give up.
   void DisplaceHere() {
-    if (!has_upload_) return;
-    displaced_ = true;
-    if (is_receiving_) stream_.Cancel();
+    if (!has_upload_ && !is_receiving_) return;
+    displaced_ = true;  // also between the moment its body got room and the one in which it hears of that
+    if (is_receiving_ && has_upload_) stream_.Cancel();
     displacement_.cancel();
   }
 
@@ -217,10 +217,7 @@ asio::awaitable<bool> Session::ServeOne() {
     if (!response) co_return co_await GiveUp();
     answer = *std::move(response);
   }
-  has_upload_ = false;
-  const bool keep = co_await Reply(std::get<Response>(answer), /*can_respond_again=*/true);
-  request.body = RequestBody();  // nothing of it is held while the connection waits
-  co_return keep;
+  co_return co_await Reply(std::get<Response>(answer), /*can_respond_again=*/true);
 }
 
 // False, as nobody waits for the answer: the client is gone, or the request's room goes to others.
@@ -240,7 +237,7 @@ asio::awaitable<bool> Session::GiveUp() {
 // whole once more than kFreeBytes of it have come: whoever only announces one takes nothing.
 asio::awaitable<bool> Session::ReceiveBody() {
   Request& request = exchange_.request;
-  const auto body = std::make_shared<HeldBody>();
+  auto body = std::make_shared<HeldBody>();
   phase_.store(Phase::kReceives, std::memory_order_relaxed);
   is_receiving_ = true;
   const std::size_t first = std::min(request.content_length, TransferBudget::kFreeBytes);
@@ -259,11 +256,16 @@ asio::awaitable<bool> Session::ReceiveBody() {
     }
     body->room = *std::move(room);
     has_upload_ = true;
-    body->text.reserve(request.content_length);
-    read = co_await reader_.ReadBody(request, body->text, request.content_length);
+    if (!displaced_) {
+      body->text.reserve(request.content_length);
+      read = co_await reader_.ReadBody(request, body->text, request.content_length);
+    }
   }
   is_receiving_ = false;
-  if (displaced_) co_await RefuseUpload();
+  if (displaced_) {
+    body.reset();  // its room is waited for
+    co_await RefuseUpload();
+  }
   if (!read && !displaced_ && read.error().status > 0) co_await RefuseMessage(read.error());
   if (!read || displaced_) co_return false;
   phase_.store(Phase::kServes, std::memory_order_relaxed);
@@ -349,6 +351,7 @@ TransferBudget::Ask Session::AskFor(const Response& response) const {
 // Lets go of the reply's body, waits for room for it, and makes the reply again, mostly from a cache: what waits must
 // not take the memory that it waits for. Nothing: there was none before the deadline, or the client is gone.
 asio::awaitable<std::optional<TransferBudget::Hold>> Session::RoomLater(Response& response) {
+  using asio::experimental::awaitable_operators::operator||;
   for (;;) {
     TransferBudget::Ask ask = AskFor(response);
     const std::size_t bytes = ask.bytes;
@@ -356,9 +359,11 @@ asio::awaitable<std::optional<TransferBudget::Hold>> Session::RoomLater(Response
     Response bare;  // its lines refer to the body's owner too
     bare.labels = std::move(response.labels);
     response = std::move(bare);
-    std::optional<TransferBudget::Hold> room =
-        co_await HoldWhileConnected(stream_, *context_->transfers, std::move(ask), Deadline());
-    if (!room) co_return room;
+    stream_.ExpiresNever();
+    std::variant<std::optional<TransferBudget::Hold>, std::monostate> first =
+        co_await (context_->transfers->HoldWhenRoom(std::move(ask), Deadline()) || Interrupted());
+    if (first.index() == 1 || !std::get<0>(first)) co_return std::nullopt;
+    std::optional<TransferBudget::Hold> room = std::move(std::get<0>(first));
     Answer again = Handle();
     if (auto* later = std::get_if<asio::awaitable<Response>>(&again)) {
       std::optional<Response> made = co_await WhileConnected(std::move(*later));
@@ -392,6 +397,8 @@ asio::awaitable<bool> Session::Reply(Response& response, bool can_respond_again)
     room.emplace();
     co_await DelayRefusal();
   }
+  has_upload_ = false;
+  exchange_.request.body = RequestBody();  // nothing of it is held while the client takes its time
   HeadOptions options;
   options.version = request.version;
   options.keep_alive = request.keep_alive && !response.close && !reader_.closing();

@@ -4,6 +4,7 @@
 #include <netinet/tcp.h>
 #include <sys/socket.h>
 
+#include <boost/asio/redirect_error.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/this_coro.hpp>
 #include <boost/asio/use_awaitable.hpp>
@@ -45,7 +46,10 @@ asio::awaitable<void> ClientLeft(Stream& stream) {
   asio::ip::tcp::socket& socket = stream.socket();
   asio::steady_timer timer(co_await asio::this_coro::executor, kPatience);
   co_await timer.async_wait(asio::use_awaitable);
-  co_await socket.async_wait(asio::ip::tcp::socket::wait_read, asio::use_awaitable);
+  // An error: the socket was closed here, and the client has been sent away.
+  boost::system::error_code closed;
+  co_await socket.async_wait(asio::ip::tcp::socket::wait_read, asio::redirect_error(asio::use_awaitable, closed));
+  if (closed) co_return;
   while (IsOpen(stream)) {
     timer.expires_after(kInterval);
     co_await timer.async_wait(asio::use_awaitable);

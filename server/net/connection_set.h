@@ -28,7 +28,7 @@ class Connection {
   };
   virtual Phase phase() const = 0;
 
-  // Close, unless it serves a request.
+  // Close; where a request is being served, after its reply.
   virtual void Evict() = 0;
   // Finish the request that has begun, or one that begins in a moment, and close.
   virtual void Drain() = 0;

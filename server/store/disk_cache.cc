@@ -89,14 +89,14 @@ class DiskCache::Tier : public tiler::Store<Key, Value> {
  public:
   explicit Tier(DiskStoreOptions options) : store_(std::move(options)) {}
 
-  std::shared_ptr<const Value> Find(const Key& key) override {
+  std::optional<Value> Find(const Key& key) override {
     const std::string store_key = StoreKey(key);
     const std::optional<std::string> bytes = store_.Find(store_key);
-    if (!bytes) return nullptr;
+    if (!bytes) return std::nullopt;
     Result<Value> value = Parse(key, *bytes);
-    if (value) return std::make_shared<const Value>(*std::move(value));
+    if (value) return *std::move(value);
     store_.Forget(store_key);
-    return nullptr;
+    return std::nullopt;
   }
 
   void Insert(const Key& key, std::shared_ptr<const Value> value) override {

@@ -79,10 +79,9 @@ Result<tiler::TilePtr> TileService::BuildAndKeep(const Catalog& catalog, const t
   // Between the look into the cache and the start of this flight an earlier flight may have landed.
   if (tiler::TilePtr tile = cache_.Find(key)) return tile;
   tiler::TileStore* const disk = disk_ ? disk_->tiles() : nullptr;
-  if (const tiler::TilePtr kept = disk != nullptr ? disk->Find(key) : nullptr) {
-    tiler::EncodedTile copy = *kept;
-    copy.from_disk = true;
-    tiler::TilePtr tile = Finish(request, std::move(copy));
+  if (std::optional<tiler::EncodedTile> kept = disk != nullptr ? disk->Find(key) : std::nullopt) {
+    kept->from_disk = true;
+    tiler::TilePtr tile = Finish(request, *std::move(kept));
     cache_.Insert(key, tile);
     return tile;
   }

@@ -3,7 +3,7 @@
 //
 // Thread-safe. How a tile is built is the catalog's business: this class knows neither elevation models nor codecs.
 // Tiles outlive the catalog they came from: the next one finds those of datasets that it has in the same generation.
-// The pool also runs what is made for one request alone (heights, meshes of areas, long documents).
+// The pool also runs what is made for one request alone (heights, meshes of areas, documents).
 #pragma once
 
 #include <atomic>

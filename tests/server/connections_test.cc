@@ -73,6 +73,26 @@ TEST_F(Connections, NewcomersTakeThePlacesOfUnfinishedBodiesAndOfBusyFloods) {
   EXPECT_EQ(Fetch(port(), "/livez").status, 200) << "beside tiles";
 }
 
+TEST_F(Connections, TheBuildOfOneThatIsSentAwayStops) {
+  std::atomic<int> begun = 0, stopped = 0;
+  builder_ = [&](const tiler::TileRequest&, std::stop_token stop) -> Result<tiler::EncodedTile> {
+    ++begun;
+    while (!stop.stop_requested()) std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    ++stopped;
+    return MakeError(ErrorCode::kCancelled, "nobody waits");
+  };
+  ServerOptions options;
+  options.config.max_connections = 2;
+  options.config.worker_threads = 2;
+  Start(options);
+  RawClient first(port(), 0, "127.0.0.2"), second(port(), 0, "127.0.0.2");
+  first.Send(Get("/maui/1/0/0.terrain"));
+  second.Send(Get("/maui/1/1/0.terrain"));
+  ASSERT_TRUE(Eventually([&] { return begun == 2; }));
+  EXPECT_EQ(Fetch(port(), "/livez").status, 200);
+  EXPECT_TRUE(Eventually([&] { return stopped == 1; }));
+}
+
 // RFC 9110, section 9.3.2: not even an error has a body then.
 TEST_F(Connections, ARefusedHeadRequestGetsNoBody) {
   Start();

@@ -145,7 +145,7 @@ TEST_F(DocumentsTest, AreTheSameWhereverTheyAreMade) {
   }
 }
 
-TEST_F(DocumentsTest, ListsOfWhatATokenSeesAreMadeOnWorkersWhereTheyAreLong) {
+TEST_F(DocumentsTest, ListsOfWhatATokenSeesAreMadeOnWorkers) {
   for (int i = 0; i < 100; ++i) {
     DatasetView view;
     view.name = "dataset" + std::to_string(i);

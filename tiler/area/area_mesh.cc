@@ -188,12 +188,13 @@ Result<EncodedTile> BuildAreaMesh(const dem::DemSource& source, const AreaPlan& 
   start = Clock::now();
   std::optional<Frame> frame;
   if (area.coordinates == AreaCoordinates::kEnu) frame = Frame::At(plan.centre);
-  const Result<PlacedMesh> placed = area.coordinates == AreaCoordinates::kGeographic
-                                        ? PlaceFlat(*field, mesh, surface, stop)
-                                        : PlaceInSpace(*field, mesh, surface, frame, bound_m, stop);
+  Result<PlacedMesh> placed = area.coordinates == AreaCoordinates::kGeographic
+                                  ? PlaceFlat(*field, mesh, surface, stop)
+                                  : PlaceInSpace(*field, mesh, surface, frame, bound_m, stop);
   if (!placed || stop.stop_requested()) return cancelled();
   std::ostringstream out;
-  if (auto written = proto::WriteMesh(out, area.format, placed->vertices, mesh.triangles, {}, {}, stop); !written) {
+  if (auto written = proto::WriteMesh(out, area.format, std::move(placed->vertices), mesh.triangles, {}, {}, stop);
+      !written) {
     return tl::unexpected(std::move(written).error());
   }
   encoded.bytes = std::move(out).str();

@@ -11,8 +11,10 @@ RefinedTilePtr RefinementCache::Find(const RefinedTileKey& key) {
   }
   misses_.fetch_add(1, std::memory_order_relaxed);
   if (!below_) return nullptr;
-  RefinedTilePtr tile = below_->Find(key);
-  if (tile) memory_.Insert(key, tile);
+  std::optional<RefinedTile> found = below_->Find(key);
+  if (!found) return nullptr;
+  auto tile = std::make_shared<const RefinedTile>(*std::move(found));
+  memory_.Insert(key, tile);
   return tile;
 }
 

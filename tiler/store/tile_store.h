@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "tiler/store/refined_tile.h"
@@ -17,8 +18,8 @@ class Store {
  public:
   virtual ~Store() = default;
 
-  // Null when it is not there.
-  virtual std::shared_ptr<const Value> Find(const Key& key) = 0;
+  // A copy of the caller's own; nothing when it is not there.
+  virtual std::optional<Value> Find(const Key& key) = 0;
 
   // Later values of a key replace earlier ones.
   virtual void Insert(const Key& key, std::shared_ptr<const Value> value) = 0;

@@ -19,7 +19,6 @@
 
 namespace terrace::dem {
 
-// Thread-safe: every call borrows a PROJ context of its own.
 // Degrees; west > east: across the antimeridian. As it begins: the whole Earth.
 struct AreaOfUse {
   double west = -180, south = -90, east = 180, north = 90;
@@ -28,6 +27,7 @@ struct AreaOfUse {
   bool Covers(Position degrees) const;
 };
 
+// Thread-safe: every call borrows a PROJ context of its own.
 class Geoid {
  public:
   // `vertical_crs`: what PROJ reads as a vertical or compound reference system, such as "EPSG:5773" or WKT; of a

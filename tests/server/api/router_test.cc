@@ -18,6 +18,9 @@ TEST(Router, FindsEveryUrl) {
       {"/?dataset=maui", "viewer"},
       {"/viewer/", "viewer"},
       {"/viewer/app.js", "viewer"},
+      {"/viewer/tiles.json", "viewer"},  // named as URLs of datasets are
+      {"/viewer/heights", "viewer"},
+      {"/viewer/3/4/5.png", "viewer"},
       {"/datasets", "datasets"},
       {"/livez", "livez"},
       {"/readyz", "readyz"},
