@@ -37,6 +37,10 @@ std::optional<std::uint16_t> ParsePort(std::string_view text) {
 }  // namespace
 
 Result<ListenAddress> ParseListenAddress(std::string_view text) {
+  if (!text.empty() && text.find_first_not_of("0123456789") == std::string_view::npos) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "has no host; write 127.0.0.1:{} for this machine, 0.0.0.0:{} for every interface", text, text);
+  }
   const std::size_t colon = text.rfind(':');
   if (colon == std::string_view::npos || text.ends_with(']')) {
     return MakeError(ErrorCode::kInvalidArgument, "has no port; write {}", kExamples);

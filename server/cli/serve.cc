@@ -55,8 +55,10 @@ struct ServeArguments {
 };
 
 int Report(const std::vector<config::ConfigError>& errors, const std::string& file) {
-  std::fprintf(stderr, "terrace: %zu %s in the configuration%s%s:\n", errors.size(),
-               errors.size() == 1 ? "thing is wrong" : "things are wrong", file.empty() ? "" : " ", file.c_str());
+  const bool in_flags = std::ranges::all_of(errors, [](const auto& error) { return error.path.starts_with("--"); });
+  const std::string place = file.empty() || in_flags ? "command" : "configuration " + file;
+  std::fprintf(stderr, "terrace: %zu %s in the %s:\n", errors.size(),
+               errors.size() == 1 ? "thing is wrong" : "things are wrong", place.c_str());
   for (const config::ConfigError& error : errors) {
     std::fprintf(stderr, "  %s%s%s\n", error.path.c_str(), error.path.empty() ? "" : ": ", error.message.c_str());
   }
@@ -104,6 +106,10 @@ config::Config MakeConfig(const ServeArguments& arguments, std::vector<config::C
   for (const std::string& written : arguments.dems) {
     if (written.empty()) {
       errors.push_back({"", "a DEM on the command line has an empty name"});
+      continue;
+    }
+    if (written.ends_with(".json")) {
+      errors.push_back({"", fmt::format("{} looks like a configuration: terrace serve --config {}", written, written)});
       continue;
     }
     const std::string dem = config::FromWorkingDirectory(arguments.directory, written);

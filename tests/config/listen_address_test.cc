@@ -31,7 +31,7 @@ void ExpectRefused(const char* text, const std::string& part) {
 
 TEST(ParseListenAddress, SaysWhatWouldBeRight) {
   ExpectRefused("", "has no port; write HOST:PORT such as 127.0.0.1:8080");
-  ExpectRefused("8080", "has no port");
+  ExpectRefused("8080", "has no host; write 127.0.0.1:8080");
   ExpectRefused("::1:8080", "must stand in brackets, as in [::1]:8080");
   ExpectRefused("::1", "must stand in brackets");
   ExpectRefused("[::1]", "has no port");
