@@ -23,6 +23,16 @@ Dataset OpenSample(const std::string& name) {
   return OpenDataset(name, test_support::SourceDir() / "config/samples" / (name + ".tif"));
 }
 
+const TilePipeline& SamplePipeline() {
+  static const TilePipeline* const pipeline = [] {
+    std::vector<Dataset> datasets;
+    datasets.push_back(OpenSample("etopo5"));
+    datasets.push_back(OpenSample("jacksboro"));
+    return new TilePipeline(std::move(datasets));
+  }();
+  return *pipeline;
+}
+
 FetchedTile FetchTile(const TilePipeline& pipeline, TileRequest request) {
   request.normals = true;
   auto encoded = pipeline.Build(request, {});

@@ -19,6 +19,9 @@ Dataset OpenDataset(const std::string& name, const std::string& path);
 // config/samples/NAME.tif
 Dataset OpenSample(const std::string& name);
 
+// "etopo5" and "jacksboro", opened once.
+const TilePipeline& SamplePipeline();
+
 struct FetchedTile {
   proto::DecodedTile mesh;
   EncodedTile encoded;

@@ -23,17 +23,7 @@ namespace {
 using proto::Corner;
 using proto::GlbCompression;
 
-const TilePipeline& Samples() {
-  static const TilePipeline* const pipeline = [] {
-    std::vector<Dataset> datasets;
-    datasets.push_back(OpenSample("etopo5"));
-    datasets.push_back(OpenSample("jacksboro"));
-    return new TilePipeline(std::move(datasets));
-  }();
-  return *pipeline;
-}
-
-const dem::DemSource& Source(std::uint32_t dataset) { return *Samples().datasets()[dataset].source; }
+const dem::DemSource& Source(std::uint32_t dataset) { return *SamplePipeline().datasets()[dataset].source; }
 
 geo::TileKey MiddleTile(std::uint32_t dataset, int level) {
   const geo::TileRange& range = Source(dataset).Available(level).front();
@@ -52,7 +42,7 @@ TileRequest GlbRequest(std::uint32_t dataset, geo::TileKey key, int step,
 }
 
 EncodedTile Build(const TileRequest& request) {
-  const auto tile = Samples().Build(request, {});
+  const auto tile = SamplePipeline().Build(request, {});
   EXPECT_TRUE(tile.has_value()) << (tile ? "" : tile.error().message);
   return tile.value_or(EncodedTile{});
 }

@@ -20,41 +20,31 @@
 namespace terrace::tiler {
 namespace {
 
-const TilePipeline& Samples() {
-  static const TilePipeline* const pipeline = [] {
-    std::vector<Dataset> datasets;
-    datasets.push_back(OpenSample("etopo5"));
-    datasets.push_back(OpenSample("jacksboro"));
-    return new TilePipeline(std::move(datasets));
-  }();
-  return *pipeline;
-}
-
 FetchedTile Fetch(std::uint32_t dataset, geo::TileKey key, int step) {
   TileRequest request;
   request.dataset = dataset;
   request.key = key;
   request.error_step = step;
-  return FetchTile(Samples(), request);
+  return FetchTile(SamplePipeline(), request);
 }
 
 geo::TileKey MiddleTile(std::uint32_t dataset, int level) {
-  const geo::TileRange& range = Samples().datasets()[dataset].source->Available(level).front();
+  const geo::TileRange& range = SamplePipeline().datasets()[dataset].source->Available(level).front();
   return {level, (range.start_x + range.end_x) / 2, (range.start_y + range.end_y) / 2};
 }
 
 TEST(TilePipeline, NeighboursDecodeTheSameEdges) {
   for (const std::uint32_t dataset : {0u, 1u}) {
     for (const int step : {-8, 0, 6, 12, 24}) {
-      for (int level = 1; level <= Samples().datasets()[dataset].source->max_level(); level += 2) {
+      for (int level = 1; level <= SamplePipeline().datasets()[dataset].source->max_level(); level += 2) {
         const geo::TileKey key = MiddleTile(dataset, level);
         const FetchedTile tile = Fetch(dataset, key, step);
         const geo::TileKey east = geo::Neighbour(key, 1, 0), north = geo::Neighbour(key, 0, 1);
-        if (Samples().datasets()[dataset].source->IsAvailable(east)) {
+        if (SamplePipeline().datasets()[dataset].source->IsAvailable(east)) {
           EXPECT_EQ(EdgeOf(tile, true, 32767), EdgeOf(Fetch(dataset, east, step), true, 0))
               << geo::ToString(key) << " step " << step;
         }
-        if (Samples().datasets()[dataset].source->IsAvailable(north)) {
+        if (SamplePipeline().datasets()[dataset].source->IsAvailable(north)) {
           EXPECT_EQ(EdgeOf(tile, false, 32767), EdgeOf(Fetch(dataset, north, step), false, 0))
               << geo::ToString(key) << " step " << step;
         }
@@ -75,7 +65,7 @@ TEST(TilePipeline, MatchesAcrossTheAntimeridianAndAtThePoles) {
 TEST(TilePipeline, ReachesTheLadderError) {
   for (const std::uint32_t dataset : {0u, 1u}) {
     for (const int step : {-8, 0, 8}) {
-      for (int level = 0; level <= Samples().datasets()[dataset].source->max_level(); ++level) {
+      for (int level = 0; level <= SamplePipeline().datasets()[dataset].source->max_level(); ++level) {
         const FetchedTile tile = Fetch(dataset, MiddleTile(dataset, level), step);
         // Of heights that are rounded to 2^-10 m: the ground may be half of that further off.
         EXPECT_LE(tile.encoded.max_error_m + 0x1p-11, geo::LadderError(level, step))
@@ -138,7 +128,7 @@ TEST(TilePipeline, GivesTheSameBytesFromScratchFromReplayAndContinued) {
   };
   const auto scratch = open(0), cached = open(std::size_t{64} << 20);
   for (const std::uint32_t dataset : {0u, 1u}) {
-    for (int level = 0; level <= Samples().datasets()[dataset].source->max_level(); level += 3) {
+    for (int level = 0; level <= SamplePipeline().datasets()[dataset].source->max_level(); level += 3) {
       TileRequest request;
       request.dataset = dataset;
       request.key = MiddleTile(dataset, level);
@@ -212,10 +202,10 @@ TEST(TilePipeline, MatchesEdgesOfTilesThatTheFormatCannotHold) {
 TEST(TilePipeline, RefusesWhatIsNotThere) {
   TileRequest request;
   request.dataset = 7;
-  EXPECT_EQ(Samples().Build(request, {}).error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(SamplePipeline().Build(request, {}).error().code, ErrorCode::kNotFound);
   request.dataset = 1;
   request.key = {13, 0, 0};
-  EXPECT_EQ(Samples().Build(request, {}).error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(SamplePipeline().Build(request, {}).error().code, ErrorCode::kNotFound);
 }
 
 TEST(TilePipeline, StopsWhenNobodyWaits) {
@@ -224,7 +214,7 @@ TEST(TilePipeline, StopsWhenNobodyWaits) {
   TileRequest request;
   request.dataset = 1;
   request.key = MiddleTile(1, 10);
-  EXPECT_EQ(Samples().Build(request, stop.get_token()).error().code, ErrorCode::kCancelled);
+  EXPECT_EQ(SamplePipeline().Build(request, stop.get_token()).error().code, ErrorCode::kCancelled);
 }
 
 }  // namespace

@@ -20,6 +20,14 @@ TempDir::TempDir() {
 }
 TempDir::~TempDir() { std::filesystem::remove_all(path_); }
 
+RasterSpec FlatSquare(double west, double north, int side, double pixel, double height) {
+  RasterSpec spec;
+  spec.width = spec.height = side;
+  spec.geo_transform = {west, pixel, 0, north, 0, -pixel};
+  spec.value = [height](int, int) { return height; };
+  return spec;
+}
+
 std::string WriteRaster(const TempDir& dir, const RasterSpec& spec, const std::string& name) {
   GDALAllRegister();
   const std::string path = dir.File(name);

@@ -43,6 +43,9 @@ struct RasterSpec {
   std::function<double(int, int)> value = [](int, int) { return 0.0; };
 };
 
+// A square of `side` pixels of one height; west, north and pixel in degrees.
+RasterSpec FlatSquare(double west, double north, int side, double pixel, double height);
+
 // Writes a GeoTIFF and returns its path.
 std::string WriteRaster(const TempDir& dir, const RasterSpec& spec, const std::string& name = "dem.tif");
 

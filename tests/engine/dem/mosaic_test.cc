@@ -1,4 +1,4 @@
-// Several rasters as one dataset: priorities, joints, availability and bounds.
+// Several rasters as one dataset: priorities, joints and bounds.
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -172,14 +172,6 @@ TEST(Mosaic, PiecesGiveTheRastersPointsAndMercatorPixels) {
   }
 }
 
-RasterSpec Flat(double west, double north, int side, double pixel, double height) {
-  RasterSpec spec;
-  spec.width = spec.height = side;
-  spec.geo_transform = {west, pixel, 0, north, 0, -pixel};
-  spec.value = [height](int, int) { return height; };
-  return spec;
-}
-
 float HeightAt(const DemSource& source, double longitude, double latitude) {
   const GeoPosition point{longitude, latitude};
   const auto height = source.ReadPoints({&point, 1});
@@ -199,12 +191,12 @@ float NodeAt(const DemSource& source, int level, double longitude, double latitu
 
 TEST(Mosaic, FirstSourceWinsWhereItHasAHeight) {
   const TempDir dir;
-  RasterSpec holed = Flat(10, 50, 200, 0.01, 100);
+  RasterSpec holed = FlatSquare(10, 50, 200, 0.01, 100);
   holed.nodata = -1;
   holed.value = [](int c, int r) { return c >= 100 && r >= 100 ? -1.0 : 100.0; };
   const std::string first = WriteRaster(dir, holed, "first.tif");
-  const std::string second = WriteRaster(dir, Flat(9, 51, 400, 0.01, 200), "second.tif");
-  const std::string base = WriteRaster(dir, Flat(0, 60, 30, 1, 300), "base.tif");
+  const std::string second = WriteRaster(dir, FlatSquare(9, 51, 400, 0.01, 200), "second.tif");
+  const std::string base = WriteRaster(dir, FlatSquare(0, 60, 30, 1, 300), "base.tif");
   const auto source = OpenOrFail({{first, 0}, {second, 1}, {base, 2}});
   ASSERT_NE(source, nullptr);
   ASSERT_EQ(source->info().sources.size(), 3u);
@@ -232,9 +224,10 @@ TEST(Mosaic, FirstSourceWinsWhereItHasAHeight) {
 
 TEST(Mosaic, OfOneRankTheFinerSourceWinsThenTheName) {
   const TempDir dir;
-  const std::string coarse = WriteRaster(dir, Flat(0, 10, 10, 1, 1), "a.tif");
-  const std::string fine = WriteRaster(dir, Flat(3, 7, 40, 0.1, 2), "b.tif");
-  const std::string beside = WriteRaster(dir, Flat(3.05, 7, 40, 0.1, 3), "c.tif");  // half a pixel off: a sheet apart
+  const std::string coarse = WriteRaster(dir, FlatSquare(0, 10, 10, 1, 1), "a.tif");
+  const std::string fine = WriteRaster(dir, FlatSquare(3, 7, 40, 0.1, 2), "b.tif");
+  const std::string beside =
+      WriteRaster(dir, FlatSquare(3.05, 7, 40, 0.1, 3), "c.tif");  // half a pixel off: a sheet apart
   const auto source = OpenOrFail({{coarse}, {beside}, {fine}});
   EXPECT_EQ(HeightAt(*source, 5, 5), 2);
   EXPECT_EQ(HeightAt(*source, 7.03, 5), 3);  // of `beside` alone
@@ -243,7 +236,7 @@ TEST(Mosaic, OfOneRankTheFinerSourceWinsThenTheName) {
 
 TEST(Mosaic, OverlappingPiecesOfAGridFillEachOthersVoids) {
   const TempDir dir;
-  RasterSpec a = Flat(0, 10, 20, 0.5, 10), b = Flat(5, 10, 20, 0.5, 20);
+  RasterSpec a = FlatSquare(0, 10, 20, 0.5, 10), b = FlatSquare(5, 10, 20, 0.5, 20);
   a.nodata = -1;
   a.value = [](int c, int) { return c >= 15 ? -1.0 : 10.0; };
   const auto source = OpenOrFail({{WriteRaster(dir, a, "a.tif")}, {WriteRaster(dir, b, "b.tif")}});
@@ -251,72 +244,12 @@ TEST(Mosaic, OverlappingPiecesOfAGridFillEachOthersVoids) {
   EXPECT_EQ(HeightAt(*source, 9.1, 5), 20);
 }
 
-TEST(Mosaic, DeepTilesLieOnlyWhereAFineSourceDoes) {
-  const TempDir dir;
-  const std::string base = WriteRaster(dir, Flat(-180, 90, 90, 2, 5), "base.tif");  // half the Earth
-  const std::string fine = WriteRaster(dir, Flat(-99.99, 50, 100, 0.001, 50), "fine.tif");
-  const auto source = OpenOrFail({{fine, 0}, {base, 1}});
-  const auto alone = OpenOrFail(base);
-  const auto finest = OpenOrFail(fine);
-  ASSERT_TRUE(source && alone && finest);
-  ASSERT_EQ(source->max_level(), finest->max_level());
-  ASSERT_LT(alone->max_level() + 4, finest->max_level());
-  for (int level = 0; level <= source->max_level(); ++level) {
-    const auto& ranges = source->Available(level);
-    for (const geo::TileRange& range : finest->Available(level)) {
-      for (const auto& [x, y] : {std::pair(range.start_x, range.start_y), {range.end_x, range.end_y}}) {
-        EXPECT_TRUE(source->IsAvailable({level, x, y}));
-      }
-    }
-    std::int64_t tiles = 0;
-    for (const geo::TileRange& range : ranges) {
-      tiles += (range.end_x - range.start_x + 1) * (range.end_y - range.start_y + 1);
-      if (level == 0) continue;
-      for (std::int64_t y = range.start_y; y <= std::min(range.end_y, range.start_y + 40); ++y) {
-        for (std::int64_t x = range.start_x; x <= std::min(range.end_x, range.start_x + 40); ++x) {
-          EXPECT_TRUE(source->IsAvailable({level - 1, x / 2, y / 2}));
-        }
-      }
-    }
-    if (level > alone->max_level()) {
-      std::int64_t fine_tiles = 0;
-      for (const geo::TileRange& r : finest->Available(level)) {
-        fine_tiles += (r.end_x - r.start_x + 3) * (r.end_y - r.start_y + 3);
-      }
-      EXPECT_LE(tiles, fine_tiles) << level;
-    }
-  }
-  EXPECT_FALSE(source->IsAvailable({source->max_level(), 5, 5}));
-}
-
-// 3D Tiles clients replace a tile by its children: a missing one is a hole.
-TEST(Mosaic, ATileHasFourChildrenOrNoneWhereACellIsMissing) {
-  const TempDir dir;
-  std::vector<DemFile> files;
-  for (const auto& [west, north] : {std::pair(10, 50), {11, 50}, {10, 51}}) {  // three of four cells
-    files.push_back({WriteRaster(dir, Flat(west, north, 100, 0.01, 5), std::to_string(west + 100 * north) + ".tif")});
-  }
-  const auto source = OpenOrFail(files);
-  ASSERT_NE(source, nullptr);
-  for (int level = 1; level <= source->max_level(); ++level) {
-    for (const geo::TileRange& range : source->Available(level)) {
-      for (std::int64_t y = range.start_y; y <= range.end_y; ++y) {
-        for (std::int64_t x = range.start_x; x <= range.end_x; ++x) {
-          for (const std::int64_t child : {0, 1, 2, 3}) {
-            ASSERT_TRUE(source->IsAvailable({level, x / 2 * 2 + child % 2, y / 2 * 2 + child / 2})) << level;
-          }
-        }
-      }
-    }
-  }
-}
-
 TEST(Mosaic, DescriptionOfManyScatteredSourcesStaysSmall) {
   const TempDir dir;
   std::vector<DemFile> files;
   for (int i = 0; i < 400; ++i) {
     const double west = -170 + i % 20 * 17.03, north = 80 - i / 20 * 8.03;
-    files.push_back({WriteRaster(dir, Flat(west, north, 4, 0.0001, i), std::to_string(i) + ".tif")});
+    files.push_back({WriteRaster(dir, FlatSquare(west, north, 4, 0.0001, i), std::to_string(i) + ".tif")});
   }
   const auto source = OpenOrFail(files);
   std::size_t blocks = 0;
@@ -333,7 +266,7 @@ TEST(Mosaic, HeightsLieWithinTheBoundOfTheirTile) {
     const TempDir dir;
     std::vector<DemFile> files = WritePieces(dir, cut);
     files.pop_back();  // one corner shows what lies below
-    files.push_back({WriteRaster(dir, Flat(-180, 90, 18, 10, -500), "base.tif"), 1});
+    files.push_back({WriteRaster(dir, FlatSquare(-180, 90, 18, 10, -500), "base.tif"), 1});
     const auto source = OpenOrFail(files);
     ASSERT_NE(source, nullptr);
     for (int level = 0; level <= source->max_level(); ++level) {
@@ -381,8 +314,8 @@ TEST(Mosaic, NeighboursShareTheirBordersAcrossSources) {
 
 TEST(Mosaic, FeatherBlendsWhatIsConverted) {
   const TempDir dir;
-  const std::string over = WriteRaster(dir, Flat(10, 50, 200, 0.01, 100), "over.tif");
-  const std::string base = WriteRaster(dir, Flat(0, 60, 30, 1, 300), "base.tif");
+  const std::string over = WriteRaster(dir, FlatSquare(10, 50, 200, 0.01, 100), "over.tif");
+  const std::string base = WriteRaster(dir, FlatSquare(0, 60, 30, 1, 300), "base.tif");
   const DemOptions options{.feather = 20'000};
   const auto raw = OpenOrFail({{over, 0}, {base, 1}}, options);
   const auto mixed = OpenOrFail(
@@ -417,11 +350,11 @@ TEST(Mosaic, FeatherBlendsWhatIsConverted) {
 
 TEST(Mosaic, FeatherLeadsFromOneSourceToTheNext) {
   const TempDir dir;
-  RasterSpec upper = Flat(10, 50, 200, 0.01, 100);  // a void of 20 samples a side in its middle
+  RasterSpec upper = FlatSquare(10, 50, 200, 0.01, 100);  // a void of 20 samples a side in its middle
   upper.nodata = -1;
   upper.value = [](int c, int r) { return c >= 90 && c < 110 && r >= 90 && r < 110 ? -1.0 : 100.0; };
   const std::string over = WriteRaster(dir, upper, "over.tif");
-  const std::string base = WriteRaster(dir, Flat(0, 60, 30, 1, 300), "base.tif");
+  const std::string base = WriteRaster(dir, FlatSquare(0, 60, 30, 1, 300), "base.tif");
   DemOptions options;
   options.max_void_gap = 0;
   const auto hard = OpenOrFail({{over, 0}, {base, 1}}, options);
@@ -465,7 +398,7 @@ TEST(Mosaic, KeepsFewFilesOpen) {
   const TempDir dir;
   std::vector<DemFile> files;
   for (int i = 0; i < 60; ++i) {
-    files.push_back({WriteRaster(dir, Flat(i % 10 * 4, 40 - i / 10 * 4, 8, 0.5, i), std::to_string(i) + ".tif")});
+    files.push_back({WriteRaster(dir, FlatSquare(i % 10 * 4, 40 - i / 10 * 4, 8, 0.5, i), std::to_string(i) + ".tif")});
   }
   SetMostIdle(5);
   const auto source = OpenOrFail(files), other = OpenOrFail(std::vector<DemFile>(files.begin(), files.begin() + 30));
@@ -488,7 +421,7 @@ TEST(Mosaic, KeepsFewFilesOpen) {
 
 TEST(Mosaic, FilesOfAFolderThatAreNoRastersAreLeftOut) {
   const TempDir dir;
-  const std::string raster = WriteRaster(dir, Flat(0, 10, 10, 1, 1), "a.tif");
+  const std::string raster = WriteRaster(dir, FlatSquare(0, 10, 10, 1, 1), "a.tif");
   std::ofstream(dir.File("readme.txt")) << "no raster\n";
   std::ofstream(dir.File("broken.tif")) << "II*";
   const auto source = DemSource::Open({{raster, 0, true}, {dir.File("readme.txt"), 0, true}});
