@@ -91,7 +91,7 @@ Result<void> TilePipeline::EncodeQuantizedMesh(const TileRequest& request, const
   encoded.times.refine += measured->replayed;
   encoded.times.encode = MicrosecondsSince(start) - measured->replayed;
   encoded.max_error_m = measured->max_error_m;
-  encoded.certified_error_m = measured->surface_error_m + refined.heights.source_gap_m;
+  encoded.certified_error_m = measured->surface_error_m + refined.heights.source_error_m;
   encoded.vertices = static_cast<std::uint32_t>(measured->tile.u.size());
   encoded.triangles = static_cast<std::uint32_t>(measured->tile.triangles.size());
   return {};
@@ -112,7 +112,7 @@ Result<void> TilePipeline::EncodeGlb(const TileRequest& request, const RefinedTi
   options.compression = request.compression;
   options.copyright = dataset.attribution;
   options.max_error_m = meshed->max_error_m;
-  options.certified_error_m = meshed->surface_error_m + refined.heights.source_gap_m;
+  options.certified_error_m = meshed->surface_error_m + refined.heights.source_error_m;
   if (const Result<void> added = AddTexture(dataset.imagery, request, options, stop); !added) {
     return tl::unexpected(added.error());
   }

@@ -1,4 +1,4 @@
-// Little-endian byte writer and reader. Every wire format and record of terrace is little-endian.
+// Little-endian byte writer and reader. All binary formats of terrace are little-endian.
 #pragma once
 
 #include <bit>
@@ -11,7 +11,7 @@
 
 namespace terrace {
 
-static_assert(std::endian::native == std::endian::little, "the wire formats are written by memcpy");
+static_assert(std::endian::native == std::endian::little, "binary formats are written by memcpy");
 
 class ByteWriter {
  public:

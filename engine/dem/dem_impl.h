@@ -7,22 +7,23 @@
 #include <vector>
 
 #include "engine/dem/dem_source.h"
-#include "engine/dem/mosaic/sheet.h"
+#include "engine/dem/mosaic/raster_grid.h"
 
 namespace terrace::dem {
 
 // What Fill noted of a window, or of a part of it; then without positions.
 struct PartTrace {
   std::optional<NodeWindow> part = {};
-  SheetTrace trace = {};
+  GridTrace trace = {};
 };
 
 class DemSource::Impl {
  public:
-  // `what` is read, for messages. `traces`, unless it is null, gets those of the sheets that were read, in their order.
-  Result<std::vector<float>> ReadNodes(int level, const NodeWindow& window, Counting counting, const std::string& what,
+  // `what` is read, for messages. `traces`, unless it is null, gets those of the raster grids that were read, in their
+  // order.
+  Result<std::vector<float>> ReadNodes(int level, const NodeWindow& window, HeightDatum datum, const std::string& what,
                                        const std::stop_token& stop, std::vector<PartTrace>* traces = nullptr) const;
-  Result<TileHeights> Read(const geo::TileKey& key, Counting counting, const std::stop_token& stop) const;
+  Result<TileHeights> Read(const geo::TileKey& key, HeightDatum datum, const std::stop_token& stop) const;
   Result<std::vector<float>> ReadMercator(int depth, const NodeWindow& window, const std::stop_token& stop) const;
   Result<std::vector<float>> ReadPoints(std::span<const GeoPosition> points, HeightDatum datum,
                                         std::span<std::uint8_t> filled, const std::stop_token& stop) const;
@@ -30,28 +31,29 @@ class DemSource::Impl {
 
   const geo::Lattice& LatticeOf(int level) const;  // 0 .. geo::kMaxLevel, also beyond the deepest level served
 
-  template <typename Grid>
-  Result<std::vector<float>> ReadSheets(const Grid& grid, const NodeWindow& window, Counting counting,
-                                        const std::string& what, const std::stop_token& stop,
-                                        std::vector<PartTrace>* traces) const;
-  Result<double> GapOf(const TileHeights& tile, const NodeWindow& window, std::vector<PartTrace> traces,
-                       const std::stop_token& stop) const;
+  template <typename Nodes>
+  Result<std::vector<float>> ReadGrids(const Nodes& all_nodes, const NodeWindow& window, HeightDatum datum,
+                                       const std::string& what, const std::stop_token& stop,
+                                       std::vector<PartTrace>* traces) const;
+  Result<double> BoundError(const TileHeights& tile, const NodeWindow& window, std::vector<PartTrace> traces,
+                            const std::stop_token& stop) const;
   // Those that can have heights there, in their order.
-  std::vector<std::size_t> SheetsAt(const Box& degrees) const;
+  std::vector<std::size_t> GridsAt(const Box& degrees) const;
 
-  std::vector<Sheet> sheets;  // the first that has a height at a place gives it
-  BoxIndex index;             // of the sheets, by degrees (IndexOf)
+  std::vector<RasterGrid> grids;  // the first that has a height at a place gives it
+  BoxIndex index;                 // of the raster grids, by degrees (IndexOf)
   std::vector<geo::Lattice> lattices;
   std::vector<std::vector<geo::TileRange>> available;
-  float floor = 0;                                       // above the ellipsoid
-  std::shared_ptr<const Undulations> floor_undulations;  // all over the Earth, of the last sheet above a geoid; or null
+  float floor = 0;  // above the ellipsoid
+  std::shared_ptr<const Undulations>
+      floor_undulations;  // all over the Earth, of the last raster grid above a geoid; or null
   bool has_feather = false;
   DemInfo info;
   std::uint64_t fingerprint = 0;
 };
 
-// Sheets by the longitudes and latitudes where they can have heights; longitudes from -540 to 540, each turn of a sheet
-// that begins there.
-BoxIndex IndexOf(const std::vector<Sheet>& sheets);
+// RasterGrids by the longitudes and latitudes where they can have heights; longitudes from -540 to 540, each turn of a
+// raster grid that begins there.
+BoxIndex IndexOf(const std::vector<RasterGrid>& grids);
 
 }  // namespace terrace::dem

@@ -1,4 +1,4 @@
-// Heights of a dataset: each node takes the first sheet that has one there, then the floor.
+// Heights of a dataset: each node takes the first raster grid that has one there, then the floor.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "engine/core/check.h"
-#include "engine/dem/bound/source_gap.h"
+#include "engine/dem/bound/source_error_bound.h"
 #include "engine/dem/crs/node_positions.h"
 #include "engine/dem/dem_impl.h"
 
@@ -15,28 +15,30 @@ namespace {
 
 bool IsVoid(float height) { return std::isnan(height); }
 
-Result<void> FillFrom(const Sheet& sheet, const geo::Lattice& lattice, const NodeWindow& window, Counting counting,
-                      const NodeHeights& nodes, const std::stop_token& stop, SheetTrace* trace) {
-  return sheet.Fill(lattice, window, counting, nodes, stop, trace);
+Result<void> FillFrom(const RasterGrid& grid, const geo::Lattice& lattice, const NodeWindow& window, HeightDatum datum,
+                      const NodeHeights& nodes, const std::stop_token& stop, GridTrace* trace) {
+  return grid.Fill(lattice, window, datum, nodes, stop, trace);
 }
-Result<void> FillFrom(const Sheet& sheet, const geo::MercatorGrid& grid, const NodeWindow& window, Counting,
-                      const NodeHeights& nodes, const std::stop_token& stop, SheetTrace*) {
-  return sheet.Fill(grid, window, nodes, stop);
+Result<void> FillFrom(const RasterGrid& grid, const geo::MercatorGrid& all_nodes, const NodeWindow& window, HeightDatum,
+                      const NodeHeights& nodes, const std::stop_token& stop, GridTrace*) {
+  return grid.Fill(all_nodes, window, nodes, stop);
 }
 
 // Around the nodes of a window. Their longitudes begin between -180 and 180, and go on eastwards.
-template <typename Grid>
-Box BoxOf(const Grid& grid, const NodeWindow& window) {
+template <typename Nodes>
+Box BoxOf(const Nodes& all_nodes, const NodeWindow& window) {
   constexpr double kSlack = 1e-9;
-  const double west = grid.Longitude(window.column);
-  const auto [south, north] = std::minmax({grid.Latitude(window.row), grid.Latitude(window.row + window.rows - 1)});
-  return {west - kSlack, south - kSlack, west + (window.columns - 1) * grid.StepDegrees() + kSlack, north + kSlack};
+  const double west = all_nodes.Longitude(window.column);
+  const auto [south, north] =
+      std::minmax({all_nodes.Latitude(window.row), all_nodes.Latitude(window.row + window.rows - 1)});
+  return {west - kSlack, south - kSlack, west + (window.columns - 1) * all_nodes.StepDegrees() + kSlack,
+          north + kSlack};
 }
 
-// Up to so many sheets are asked about whole windows.
-constexpr std::size_t kFewSheets = 8;
-// Nodes around a sheet's reach whose positions are asked for: those of groups that touch it, and one more.
-constexpr int kAround = SourceGap::kGroup + 1;
+// Up to so many raster grids are asked about whole windows.
+constexpr std::size_t kFewGrids = 8;
+// Nodes around a raster grid's reach whose positions are asked for: those of groups that touch it, and one more.
+constexpr int kAround = SourceErrorBound::kGroup + 1;
 
 // A range of steps of an axis, as nodes.
 struct NodeRange {
@@ -48,21 +50,22 @@ struct NodeRange {
   }
 };
 
-// The nodes of a window that a sheet may give heights to; `around`: and so many more on each side. Never none, since
-// its files are looked at in any case.
-template <typename Grid>
-NodeWindow PartOf(const Sheet& sheet, const Grid& grid, const NodeWindow& window, int around) {
-  const Footprint& reach = sheet.reach();
-  const bool is_polar = sheet.pole_heights()[0] || sheet.pole_heights()[1];
+// The nodes of a window that a raster grid may give heights to; `around`: and so many more on each side. Never none,
+// since its files are looked at in any case.
+template <typename Nodes>
+NodeWindow PartOf(const RasterGrid& grid, const Nodes& all_nodes, const NodeWindow& window, int around) {
+  const Footprint& reach = grid.reach();
+  const bool is_polar = grid.pole_heights()[0] || grid.pole_heights()[1];
   if (is_polar || reach.south <= -90 || reach.north >= 90 || reach.all_longitudes()) return window;
   if (window.rows < 2 || window.columns < 2) return window;
   NodeRange rows, columns;
   for (int j = 0; j + 1 < window.rows; ++j) {
-    const auto [south, north] = std::minmax({grid.Latitude(window.row + j), grid.Latitude(window.row + j + 1)});
+    const auto [south, north] =
+        std::minmax({all_nodes.Latitude(window.row + j), all_nodes.Latitude(window.row + j + 1)});
     if (north >= reach.south && south <= reach.north) rows.AddStep(j);
   }
   for (int i = 0; i + 1 < window.columns; ++i) {
-    const double west = grid.Longitude(window.column + i), east = west + grid.StepDegrees();
+    const double west = all_nodes.Longitude(window.column + i), east = west + all_nodes.StepDegrees();
     for (const int turn : {-360, 0, 360}) {
       if (east + turn >= reach.west && west + turn <= reach.east) columns.AddStep(i);
     }
@@ -88,14 +91,14 @@ void ForPart(const NodeWindow& part, const NodeWindow& window, Visit&& visit) {
   }
 }
 
-// FillFrom, where there are many sheets for the part of the window alone that this one reaches: thousands of small ones
-// may lie in a shallow tile, and what they note waits until all heights are known.
-template <typename Grid>
-Result<void> FillAny(const Sheet& sheet, const Grid& grid, const NodeWindow& window, std::size_t sheets,
-                     Counting counting, const NodeHeights& nodes, const std::stop_token& stop, PartTrace* traced) {
-  SheetTrace* const trace = traced != nullptr ? &traced->trace : nullptr;
-  if (sheets <= kFewSheets) return FillFrom(sheet, grid, window, counting, nodes, stop, trace);
-  const NodeWindow part = PartOf(sheet, grid, window, 0);
+// FillFrom, where there are many raster grids for the part of the window alone that this one reaches: thousands of
+// small ones may lie in a shallow tile, and what they note waits until all heights are known.
+template <typename Nodes>
+Result<void> FillAny(const RasterGrid& grid, const Nodes& all_nodes, const NodeWindow& window, std::size_t grids,
+                     HeightDatum datum, const NodeHeights& nodes, const std::stop_token& stop, PartTrace* traced) {
+  GridTrace* const trace = traced != nullptr ? &traced->trace : nullptr;
+  if (grids <= kFewGrids) return FillFrom(grid, all_nodes, window, datum, nodes, stop, trace);
+  const NodeWindow part = PartOf(grid, all_nodes, window, 0);
   const auto copy = [&](std::span<const float> all) {
     std::vector<float> some(all.empty() ? 0
                                         : static_cast<std::size_t>(part.columns) * static_cast<std::size_t>(part.rows));
@@ -106,7 +109,7 @@ Result<void> FillAny(const Sheet& sheet, const Grid& grid, const NodeWindow& win
     if (!all.empty()) ForPart(part, window, [&](std::size_t from, std::size_t to) { all[to] = some[from]; });
   };
   std::vector<float> heights = copy(nodes.heights), weights = copy(nodes.weights), smooth = copy(nodes.smooth);
-  const auto filled = FillFrom(sheet, grid, part, counting, {heights, weights, smooth}, stop, trace);
+  const auto filled = FillFrom(grid, all_nodes, part, datum, {heights, weights, smooth}, stop, trace);
   if (!filled) return filled;
   copy_back(heights, nodes.heights);
   copy_back(weights, nodes.weights);
@@ -118,10 +121,10 @@ Result<void> FillAny(const Sheet& sheet, const Grid& grid, const NodeWindow& win
   return filled;
 }
 
-// A trace of a part as one of the window. Positions are known as far as the sheet reaches and a little further.
-SheetTrace Widened(PartTrace&& of_part, const Sheet& sheet, const geo::Lattice& lattice, const NodeWindow& window) {
+// A trace of a part as one of the window. Positions are known as far as the raster grid reaches and a little further.
+GridTrace Widened(PartTrace&& of_part, const RasterGrid& grid, const geo::Lattice& lattice, const NodeWindow& window) {
   if (!of_part.part) return std::move(of_part.trace);
-  SheetTrace trace = std::move(of_part.trace);
+  GridTrace trace = std::move(of_part.trace);
   trace.is_part = true;
   const std::size_t nodes = static_cast<std::size_t>(window.columns) * static_cast<std::size_t>(window.rows);
   std::vector<std::int32_t> cell_of_node(nodes, -1);
@@ -132,12 +135,12 @@ SheetTrace Widened(PartTrace&& of_part, const Sheet& sheet, const geo::Lattice& 
   });
   trace.cell_of_node = std::move(cell_of_node);
   trace.heights = std::move(heights);
-  const NodeWindow around = PartOf(sheet, lattice, window, kAround);
-  const std::vector<Position> positions = sheet.PositionsOf(lattice, around, trace.factor);
+  const NodeWindow around = PartOf(grid, lattice, window, kAround);
+  const std::vector<Position> positions = grid.PositionsOf(lattice, around, trace.factor);
   trace.positions.assign(nodes, kNowhere);
   ForPart(around, window, [&](std::size_t from, std::size_t to) { trace.positions[to] = positions[from]; });
   if (!trace.undulations.empty()) {
-    auto undulations = sheet.undulations()->At(lattice, window);
+    auto undulations = grid.undulations()->At(lattice, window);
     constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();  // and so is the bound then
     trace.undulations = undulations ? *std::move(undulations) : std::vector<double>(nodes, kUnknown);
   }
@@ -146,24 +149,24 @@ SheetTrace Widened(PartTrace&& of_part, const Sheet& sheet, const geo::Lattice& 
 
 }  // namespace
 
-BoxIndex IndexOf(const std::vector<Sheet>& sheets) {
+BoxIndex IndexOf(const std::vector<RasterGrid>& grids) {
   std::vector<BoxIndex::Entry> entries;
-  for (std::size_t i = 0; i < sheets.size(); ++i) {
-    const Footprint& reach = sheets[i].reach();
+  for (std::size_t i = 0; i < grids.size(); ++i) {
+    const Footprint& reach = grids[i].reach();
     for (const int turn : {-360, 0, 360}) {
       entries.push_back({{reach.west + turn, reach.south, reach.east + turn, reach.north}, i});
     }
     for (const std::size_t pole : {0, 1}) {  // its height counts on every meridian
       const double latitude = pole == 0 ? -90 : 90;
-      if (sheets[i].pole_heights()[pole]) entries.push_back({{-540, latitude, 540, latitude}, i});
+      if (grids[i].pole_heights()[pole]) entries.push_back({{-540, latitude, 540, latitude}, i});
     }
   }
   return BoxIndex(entries);
 }
 
-// Heights of sheets over each other. Without a feather a sheet's height is the last word; with one it counts by its
-// weight, and what lies below it has the rest. Where nothing lies below, the weight changes nothing: nothing is blended
-// with the floor.
+// Heights of raster grids over each other. Without a feather a raster grid's height is the last word; with one it
+// counts by its weight, and what lies below it has the rest. Where nothing lies below, the weight changes nothing:
+// nothing is blended with the floor.
 class Blend {
  public:
   explicit Blend(std::size_t nodes) : sums_(nodes), open_(nodes, 1) {}
@@ -196,16 +199,17 @@ class Blend {
 
  private:
   std::vector<double> sums_;
-  std::vector<double> open_;  // share that sheets further down have
+  std::vector<double> open_;  // share that raster grids further down have
 };
 
-template <typename Grid>
-Result<std::vector<float>> DemSource::Impl::ReadSheets(const Grid& grid, const NodeWindow& window, Counting counting,
-                                                       const std::string& what, const std::stop_token& stop,
-                                                       std::vector<PartTrace>* traces) const {
+template <typename Nodes>
+Result<std::vector<float>> DemSource::Impl::ReadGrids(const Nodes& all_nodes, const NodeWindow& window,
+                                                      HeightDatum datum, const std::string& what,
+                                                      const std::stop_token& stop,
+                                                      std::vector<PartTrace>* traces) const {
   const std::size_t nodes = static_cast<std::size_t>(window.columns) * static_cast<std::size_t>(window.rows);
   std::vector<float> heights(nodes, SampleRules::kVoid), smooth = heights;
-  const std::vector<std::size_t> order = SheetsAt(BoxOf(grid, window));
+  const std::vector<std::size_t> order = GridsAt(BoxOf(all_nodes, window));
   const bool feathers = has_feather && order.size() > 1;
   Blend blend(feathers ? nodes : 0);
   for (const std::size_t i : order) {
@@ -216,7 +220,7 @@ Result<std::vector<float>> DemSource::Impl::ReadSheets(const Grid& grid, const N
     }
     PartTrace* const trace = traces != nullptr ? &traces->emplace_back() : nullptr;
     const auto filled =
-        FillAny(sheets[i], grid, window, order.size(), counting, {heights, weights, smooth}, stop, trace);
+        FillAny(grids[i], all_nodes, window, order.size(), datum, {heights, weights, smooth}, stop, trace);
     if (!filled) {
       return MakeError(filled.error().code, "{}: {}", what, filled.error().message);
     }
@@ -231,9 +235,9 @@ Result<std::vector<float>> DemSource::Impl::ReadSheets(const Grid& grid, const N
   return heights;
 }
 
-std::vector<std::size_t> DemSource::Impl::SheetsAt(const Box& box) const {
+std::vector<std::size_t> DemSource::Impl::GridsAt(const Box& box) const {
   // A tile of floor must not outlive a dataset's only source: it is looked at in any case.
-  return sheets.size() == 1 ? std::vector<std::size_t>{0} : index.Find(box);
+  return grids.size() == 1 ? std::vector<std::size_t>{0} : index.Find(box);
 }
 
 const geo::Lattice& DemSource::Impl::LatticeOf(int level) const {
@@ -241,13 +245,13 @@ const geo::Lattice& DemSource::Impl::LatticeOf(int level) const {
   return lattices[static_cast<std::size_t>(level)];
 }
 
-Result<std::vector<float>> DemSource::Impl::ReadNodes(int level, const NodeWindow& window, Counting counting,
+Result<std::vector<float>> DemSource::Impl::ReadNodes(int level, const NodeWindow& window, HeightDatum datum,
                                                       const std::string& what, const std::stop_token& stop,
                                                       std::vector<PartTrace>* traces) const {
   const geo::Lattice& lattice = LatticeOf(level);
-  auto heights = ReadSheets(lattice, window, counting, what, stop, traces);
+  auto heights = ReadGrids(lattice, window, datum, what, stop, traces);
   if (!heights || std::ranges::none_of(*heights, IsVoid)) return heights;
-  if (counting == Counting::kEllipsoid || floor_undulations == nullptr) {
+  if (datum == HeightDatum::kEllipsoid || floor_undulations == nullptr) {
     std::ranges::replace_if(*heights, IsVoid, floor);
     return heights;
   }
@@ -260,51 +264,51 @@ Result<std::vector<float>> DemSource::Impl::ReadNodes(int level, const NodeWindo
   return heights;
 }
 
-Result<TileHeights> DemSource::Impl::Read(const geo::TileKey& key, Counting counting,
+Result<TileHeights> DemSource::Impl::Read(const geo::TileKey& key, HeightDatum datum,
                                           const std::stop_token& stop) const {
   const geo::Lattice& lattice = LatticeOf(key.level);
   const NodeWindow window = WindowOfTile(lattice, key);
   const std::string what = "tile " + geo::ToString(key);
-  const bool is_certified = counting == Counting::kEllipsoid;
+  const bool is_certified = datum == HeightDatum::kEllipsoid;
   std::vector<PartTrace> traces;
-  auto heights = ReadNodes(key.level, window, counting, what, stop, is_certified ? &traces : nullptr);
+  auto heights = ReadNodes(key.level, window, datum, what, stop, is_certified ? &traces : nullptr);
   if (!heights) return tl::unexpected(std::move(heights).error());
   TileHeights tile{lattice, lattice.cells + 3, *std::move(heights)};
   if (!is_certified) return tile;
-  const auto gap = GapOf(tile, window, std::move(traces), stop);
-  if (!gap) return MakeError(gap.error().code, "{}: {}", what, gap.error().message);
-  tile.source_gap_m = *gap;
+  const auto bound = BoundError(tile, window, std::move(traces), stop);
+  if (!bound) return MakeError(bound.error().code, "{}: {}", what, bound.error().message);
+  tile.source_error_m = *bound;
   return tile;
 }
 
-// `traces`: of the sheets that were read for the heights, the first of the tile's.
-Result<double> DemSource::Impl::GapOf(const TileHeights& tile, const NodeWindow& window, std::vector<PartTrace> traces,
-                                      const std::stop_token& stop) const {
-  const std::vector<std::size_t> order = SheetsAt(BoxOf(tile.lattice, window));
-  SourceGap gap(tile.lattice, window, tile.heights, has_feather && order.size() > 1);
+// `traces`: of the raster grids that were read for the heights, the first of the tile's.
+Result<double> DemSource::Impl::BoundError(const TileHeights& tile, const NodeWindow& window,
+                                           std::vector<PartTrace> traces, const std::stop_token& stop) const {
+  const std::vector<std::size_t> order = GridsAt(BoxOf(tile.lattice, window));
+  SourceErrorBound bound(tile.lattice, window, tile.heights, has_feather && order.size() > 1);
   for (std::size_t k = 0; k < traces.size(); ++k) {
-    const Sheet& sheet = sheets[order[k]];
-    const SheetTrace trace = Widened(std::move(traces[k]), sheet, tile.lattice, window);
-    if (const auto added = gap.Add(sheet, trace, stop); !added) return tl::unexpected(added.error());
+    const RasterGrid& grid = grids[order[k]];
+    const GridTrace trace = Widened(std::move(traces[k]), grid, tile.lattice, window);
+    if (const auto added = bound.Add(grid, trace, stop); !added) return tl::unexpected(added.error());
   }
-  // All nodes have their height; samples of further sheets may still show between them.
+  // All nodes have their height; samples of further raster grids may still show between them.
   std::vector<float> none_wanted = tile.heights;
-  for (std::size_t k = traces.size(); k < order.size() && !gap.is_covered(); ++k) {
-    const Sheet& sheet = sheets[order[k]];
+  for (std::size_t k = traces.size(); k < order.size() && !bound.is_covered(); ++k) {
+    const RasterGrid& grid = grids[order[k]];
     PartTrace traced;
     const auto filled =
-        FillAny(sheet, tile.lattice, window, order.size(), Counting::kEllipsoid, {none_wanted}, stop, &traced);
+        FillAny(grid, tile.lattice, window, order.size(), HeightDatum::kEllipsoid, {none_wanted}, stop, &traced);
     if (!filled) return tl::unexpected(filled.error());
-    const SheetTrace trace = Widened(std::move(traced), sheet, tile.lattice, window);
-    if (const auto added = gap.Add(sheet, trace, stop); !added) return tl::unexpected(added.error());
+    const GridTrace trace = Widened(std::move(traced), grid, tile.lattice, window);
+    if (const auto added = bound.Add(grid, trace, stop); !added) return tl::unexpected(added.error());
   }
-  return gap.bound();
+  return bound.bound();
 }
 
 Result<std::vector<float>> DemSource::Impl::ReadMercator(int depth, const NodeWindow& window,
                                                          const std::stop_token& stop) const {
-  auto heights = ReadSheets(geo::MercatorGrid{depth}, window, Counting::kEllipsoid,
-                            fmt::format("Mercator pixels of depth {}", depth), stop, nullptr);
+  auto heights = ReadGrids(geo::MercatorGrid{depth}, window, HeightDatum::kEllipsoid,
+                           fmt::format("Mercator pixels of depth {}", depth), stop, nullptr);
   if (heights) std::ranges::replace_if(*heights, IsVoid, floor);
   return heights;
 }
@@ -313,22 +317,22 @@ Result<std::vector<float>> DemSource::Impl::ReadPoints(std::span<const GeoPositi
                                                        std::span<std::uint8_t> filled,
                                                        const std::stop_token& stop) const {
   std::vector<float> heights(points.size(), SampleRules::kVoid), smooth = heights;
-  std::map<std::size_t, std::vector<std::size_t>> wanted;  // points by the sheets that may have them
+  std::map<std::size_t, std::vector<std::size_t>> wanted;  // points by the raster grids that may have them
   for (std::size_t i = 0; i < points.size(); ++i) {
     const double x = std::remainder(points[i].longitude, 360), y = points[i].latitude;
-    for (const std::size_t sheet : SheetsAt({x, y, x, y})) wanted[sheet].push_back(i);
+    for (const std::size_t grid : GridsAt({x, y, x, y})) wanted[grid].push_back(i);
   }
   std::vector<GeoPosition> missing;
   std::vector<float> found, found_smooth;
   std::vector<std::uint8_t> found_filled;
-  for (auto& [sheet, those] : wanted) {
+  for (auto& [grid, those] : wanted) {
     std::erase_if(those, [&](std::size_t i) { return !std::isnan(heights[i]); });
     missing.clear();
     for (const std::size_t i : those) missing.push_back(points[i]);
     found.assign(those.size(), SampleRules::kVoid);
     found_smooth = found;
     found_filled.assign(those.size(), 0);
-    const auto read = sheets[sheet].FillPoints(missing, datum, {found, {}, found_smooth}, found_filled, stop);
+    const auto read = grids[grid].FillPoints(missing, datum, {found, {}, found_smooth}, found_filled, stop);
     if (!read) return tl::unexpected(read.error());
     for (std::size_t k = 0; k < those.size(); ++k) {
       heights[those[k]] = found[k];
@@ -348,8 +352,8 @@ HeightRange DemSource::Impl::RangeBound(const geo::TileKey& key) const {
   BlockRange blocks;
   bool floor_shows = true;
   const geo::Lattice& lattice = LatticeOf(key.level);
-  for (const std::size_t i : SheetsAt(BoxOf(lattice, WindowOfTile(lattice, key)))) {
-    const SheetRange range = sheets[i].RangeOf(lattice, key);
+  for (const std::size_t i : GridsAt(BoxOf(lattice, WindowOfTile(lattice, key)))) {
+    const GridRange range = grids[i].RangeOf(lattice, key);
     blocks.Add(range.blocks);
     floor_shows = range.shows_others;
     if (!floor_shows) break;  // whatever comes after it is hidden

@@ -50,22 +50,22 @@ Result<void> CheckOptions(const DemOptions& options) {
   return {};
 }
 
-std::uint64_t FingerprintOf(const std::vector<Sheet>& sheets, const DemOptions& options, double floor) {
+std::uint64_t FingerprintOf(const std::vector<RasterGrid>& grids, const DemOptions& options, double floor) {
   // Changes whenever the same files and options would give other heights than before.
   constexpr std::uint32_t kResamplingVersion = 3;
   ByteWriter writer;
   writer.Put(kResamplingVersion);
-  for (const Sheet& sheet : sheets) {
-    if (&sheet != &sheets.front()) writer.Put(std::uint32_t{0});  // which rasters make one sheet counts, too
-    for (const SheetMember& member : sheet.members()) {
+  for (const RasterGrid& grid : grids) {
+    if (&grid != &grids.front()) writer.Put(std::uint32_t{0});  // which rasters make one raster grid counts, too
+    for (const GridMember& member : grid.members()) {
       writer.Put(FingerprintOf(member.raster->files(), member.raster->georeference()));
       // What was found or stated of voids decides heights as well.
-      if (const SampleRules& rules = member.raster->layout().rules; !rules.marks.empty() || rules.rim > 0) {
-        for (const double mark : rules.marks) writer.Put(mark);
+      if (const SampleRules& rules = member.raster->layout().rules; !rules.extra_nodata.empty() || rules.rim > 0) {
+        for (const double value : rules.extra_nodata) writer.Put(value);
         for (const double bound : {rules.lowest, rules.highest, double(rules.rim)}) writer.Put(bound);
       }
     }
-    if (const auto& geoid = sheet.vertical().geoid) {
+    if (const auto& geoid = grid.vertical().geoid) {
       writer.Put(geoid->files().fingerprint());
       writer.PutBytes(geoid->pipeline());
     }
@@ -87,28 +87,28 @@ int ResolutionStep(const RasterSource& raster) {
   return geo::NearestOctave(power);
 }
 
-// By rank, then by what the sheets of a rank have: finer ones first, then by path.
-Result<std::vector<Sheet>> SheetsOf(const std::vector<DemFile>& files, const Rasters& rasters,
-                                    const SheetOptions& options) {
+// By rank, then by what the raster grids of a rank have: finer ones first, then by path.
+Result<std::vector<RasterGrid>> GridsOf(const std::vector<DemFile>& files, const Rasters& rasters,
+                                        const GridOptions& options) {
   std::map<int, Rasters> ranks;
   for (std::size_t i = 0; i < files.size(); ++i) ranks[files[i].rank].push_back(rasters[i]);
-  std::vector<SheetPlan> plans;
+  std::vector<GridPlan> plans;
   for (auto& [rank, those] : ranks) {
     std::ranges::sort(those, {},
                       [](const auto& raster) { return std::pair(ResolutionStep(*raster), raster->info().path); });
-    std::ranges::move(PlanSheets(those), std::back_inserter(plans));
+    std::ranges::move(PlanGrids(those), std::back_inserter(plans));
   }
-  std::vector<std::optional<Result<Sheet>>> made(plans.size());
+  std::vector<std::optional<Result<RasterGrid>>> made(plans.size());
   ForEachOnAllCores(plans.size(), [&](std::size_t i) {
-    made[i] = Sheet::Make(std::move(plans[i]), options);
+    made[i] = RasterGrid::Make(std::move(plans[i]), options);
     return made[i]->has_value();
   });
-  std::vector<Sheet> sheets;
-  for (auto& sheet : made) {
-    if (!*sheet) return tl::unexpected(sheet->error());  // those after the first that failed may be missing
-    sheets.push_back(**std::move(sheet));
+  std::vector<RasterGrid> grids;
+  for (auto& grid : made) {
+    if (!*grid) return tl::unexpected(grid->error());  // those after the first that failed may be missing
+    grids.push_back(**std::move(grid));
   }
-  return sheets;
+  return grids;
 }
 
 // The smallest box that holds all footprints.
@@ -138,39 +138,39 @@ GeoBounds BoundsOf(const Rasters& rasters) {
   return {west, hull.south, east > 180 ? east - 360 : east, hull.north};
 }
 
-DemInfo InfoOf(const std::vector<Sheet>& sheets, const Rasters& rasters, const DemOptions& options) {
+DemInfo InfoOf(const std::vector<RasterGrid>& grids, const Rasters& rasters, const DemOptions& options) {
   DemInfo info;
-  std::vector<HeightRange> ranges(sheets.size());
-  ForEachOnAllCores(sheets.size(), [&](std::size_t i) {
-    ranges[i] = sheets[i].EllipsoidalRange();
+  std::vector<HeightRange> ranges(grids.size());
+  ForEachOnAllCores(grids.size(), [&](std::size_t i) {
+    ranges[i] = grids[i].EllipsoidalRange();
     return true;
   });
   info.heights = ranges.front();
   info.bounds = BoundsOf(rasters);
-  for (const Sheet& sheet : sheets) {
-    const HeightRange& ellipsoidal = ranges[static_cast<std::size_t>(&sheet - sheets.data())];
+  for (const RasterGrid& grid : grids) {
+    const HeightRange& ellipsoidal = ranges[static_cast<std::size_t>(&grid - grids.data())];
     info.heights.min = std::min(info.heights.min, ellipsoidal.min);
     info.heights.max = std::max(info.heights.max, ellipsoidal.max);
-    for (const SheetMember& member : sheet.members()) {
+    for (const GridMember& member : grid.members()) {
       info.sources.push_back(member.raster->info());
       info.sources.back().ellipsoidal = ellipsoidal;
     }
-    info.max_mercator_depth = std::max(info.max_mercator_depth, DeepestMercator(sheet.spacing()));
+    info.max_mercator_depth = std::max(info.max_mercator_depth, DeepestMercator(grid.spacing()));
   }
   info.floor = RoundHeight(options.floor.value_or(info.heights.min));
   return info;
 }
 
-std::vector<Reach> ReachesOf(const std::vector<Sheet>& sheets, const DemOptions& options) {
+std::vector<Reach> ReachesOf(const std::vector<RasterGrid>& grids, const DemOptions& options) {
   const double finest =
-      std::ranges::min_element(sheets, {}, [](const Sheet& s) { return s.spacing().finer; })->spacing().finer;
+      std::ranges::min_element(grids, {}, [](const RasterGrid& s) { return s.spacing().finer; })->spacing().finer;
   std::vector<Reach> reaches;
-  for (const Sheet& sheet : sheets) {
-    // An error that the operator wishes for is for the finest source; it is worth as many levels more to the others.
+  for (const RasterGrid& grid : grids) {
+    // An error that the operator requests applies to the finest source; other sources get as many more levels.
     const auto goal =
-        options.finest_error ? std::optional(*options.finest_error * (sheet.spacing().finer / finest)) : std::nullopt;
-    const int depth = DeepestLevel(sheet.spacing(), options.error_fraction, goal);
-    for (const SheetMember& member : sheet.members()) reaches.push_back({member.raster->footprint(), depth});
+        options.finest_error ? std::optional(*options.finest_error * (grid.spacing().finer / finest)) : std::nullopt;
+    const int depth = DeepestLevel(grid.spacing(), options.error_fraction, goal);
+    for (const GridMember& member : grid.members()) reaches.push_back({member.raster->footprint(), depth});
   }
   return reaches;
 }
@@ -191,28 +191,28 @@ Result<std::unique_ptr<DemSource>> DemSource::Open(std::vector<DemFile> files, c
   std::vector<std::string> left_out;
   const auto rasters = OpenRasters(files, options, left_out);
   if (!rasters) return tl::unexpected(rasters.error());
-  auto sheets = SheetsOf(files, *rasters, {options.max_void_gap, options.voids, options.feather});
-  if (!sheets) return tl::unexpected(sheets.error());
+  auto grids = GridsOf(files, *rasters, {options.max_void_gap, options.voids, options.feather});
+  if (!grids) return tl::unexpected(grids.error());
 
   auto impl = std::make_unique<Impl>();
-  impl->sheets = *std::move(sheets);
+  impl->grids = *std::move(grids);
   impl->has_feather = options.feather > 0;
-  impl->index = IndexOf(impl->sheets);
-  const auto finest = std::ranges::min_element(impl->sheets, {}, [](const Sheet& s) { return s.spacing().finer; });
+  impl->index = IndexOf(impl->grids);
+  const auto finest = std::ranges::min_element(impl->grids, {}, [](const RasterGrid& s) { return s.spacing().finer; });
   impl->lattices = PlanLattices(finest->spacing());
-  impl->info = InfoOf(impl->sheets, *rasters, options);
+  impl->info = InfoOf(impl->grids, *rasters, options);
   impl->info.left_out = std::move(left_out);
-  impl->available = AvailableTiles(ReachesOf(impl->sheets, options));
+  impl->available = AvailableTiles(ReachesOf(impl->grids, options));
   impl->info.max_level = static_cast<int>(impl->available.size()) - 1;
   impl->floor = static_cast<float>(impl->info.floor);
-  for (const Sheet& sheet : impl->sheets) {
-    if (const auto& geoid = sheet.vertical().geoid) {
+  for (const RasterGrid& grid : impl->grids) {
+    if (const auto& geoid = grid.vertical().geoid) {
       auto undulations = Undulations::OfEarth(geoid);
       if (!undulations) return tl::unexpected(undulations.error());
       impl->floor_undulations = *std::move(undulations);
     }
   }
-  impl->fingerprint = FingerprintOf(impl->sheets, options, impl->floor);
+  impl->fingerprint = FingerprintOf(impl->grids, options, impl->floor);
   return std::unique_ptr<DemSource>(new DemSource(std::move(impl)));
 }
 
@@ -224,10 +224,10 @@ std::uint64_t DemSource::fingerprint() const { return impl_->fingerprint; }
 StampedFiles DemSource::files() const {
   StampedFiles all;
   std::set<const Geoid*> geoids;
-  for (const Sheet& sheet : impl_->sheets) {
-    for (const SheetMember& member : sheet.members()) all.Append(member.raster->files());
-    // Sheets mostly share one.
-    const auto& geoid = sheet.vertical().geoid;
+  for (const RasterGrid& grid : impl_->grids) {
+    for (const GridMember& member : grid.members()) all.Append(member.raster->files());
+    // RasterGrids mostly share one.
+    const auto& geoid = grid.vertical().geoid;
     if (geoid && geoids.insert(geoid.get()).second) all.Append(geoid->files());
   }
   return all;
@@ -253,18 +253,18 @@ HeightRange DemSource::RangeBound(const geo::TileKey& key) const {
 
 Result<TileHeights> DemSource::Read(const geo::TileKey& key, std::stop_token stop) const {
   TERRACE_CHECK(geo::IsValid(key));
-  return impl_->Read(key, Counting::kEllipsoid, stop);
+  return impl_->Read(key, HeightDatum::kEllipsoid, stop);
 }
 
 Result<TileHeights> DemSource::ReadAsCounted(const geo::TileKey& key, std::stop_token stop) const {
   TERRACE_CHECK(geo::IsValid(key));
-  return impl_->Read(key, Counting::kAsSource, stop);
+  return impl_->Read(key, HeightDatum::kSource, stop);
 }
 
 SampleCounts DemSource::CountSamples() const {
   SampleCounts sum;
-  for (const Sheet& sheet : impl_->sheets) {
-    const SampleCounts counts = sheet.CountSamples();
+  for (const RasterGrid& grid : impl_->grids) {
+    const SampleCounts counts = grid.CountSamples();
     sum.measured += counts.measured;
     sum.filled += counts.filled;
     sum.voids += counts.voids;
@@ -281,7 +281,7 @@ bool DemSource::converts() const { return impl_->floor_undulations != nullptr; }
 Result<std::vector<float>> DemSource::ReadNodes(int level, const NodeWindow& window, std::stop_token stop) const {
   TERRACE_CHECK(level >= 0 && level <= geo::kMaxLevel && window.columns > 0 && window.rows > 0);
   TERRACE_CHECK(window.row >= 0 && window.row + window.rows - 1 <= LatticeOf(level).rows());
-  return impl_->ReadNodes(level, window, Counting::kEllipsoid, fmt::format("an area of level {}", level), stop);
+  return impl_->ReadNodes(level, window, HeightDatum::kEllipsoid, fmt::format("an area of level {}", level), stop);
 }
 
 Result<std::vector<float>> DemSource::ReadMercator(int depth, const NodeWindow& window, std::stop_token stop) const {

@@ -20,7 +20,7 @@ struct SourceOptions {
   // What its heights count from: "crs" (what its reference system states), "unknown", "ellipsoid", "egm96", "egm2008",
   // a vertical reference system ("EPSG:5703"), or the path of a grid of undulations.
   std::string vertical = "crs";
-  bool find_voids = true;           // undeclared marks are looked for (void_marks.h)
+  bool find_voids = true;           // detects undeclared nodata values (undeclared_nodata.h)
   std::vector<double> nodata = {};  // raw values that are voids, beside the declared one
 
   friend bool operator==(const SourceOptions&, const SourceOptions&) = default;
@@ -37,6 +37,7 @@ enum class HoleFill : std::uint8_t {
 enum class HeightDatum : std::uint8_t {
   kEllipsoid,    // that of WGS 84, as in tiles
   kOrthometric,  // the geoid that the source counts from; EGM96 where it counts from the ellipsoid
+  kSource,       // that of the source's samples
 };
 
 struct DemOptions {
@@ -152,7 +153,7 @@ struct TileHeights {
   // Metres, of Read alone: no valid sample of a source, at its full resolution and above the ellipsoid, lies farther
   // from the surface that is bilinear between the tile's own samples; nor does what sources are blended to, where a
   // feather blends them. The halo does not count.
-  double source_gap_m = std::numeric_limits<double>::infinity();
+  double source_error_m = std::numeric_limits<double>::infinity();
 
   // i, j in -1 .. cells + 1: columns from the west, rows from the SOUTH.
   float At(int i, int j) const {

@@ -3,7 +3,7 @@
 // Clients assume a level error of 77,067.34 m / 2^level for EPSG:4326 terrain (CesiumJS TerrainProvider,
 // getEstimatedLevelZeroGeometricErrorForAHeightmap: radius * 2 pi * 0.25 / (65 * 2 roots)). The default error of a
 // level is a fraction (0.5) of it. Around each default lies a ladder of 41 errors, a quarter of an octave apart, so
-// that any number of clients' wishes makes at most 41 variants of a tile.
+// that any number of requested errors makes at most 41 variants of a tile.
 #pragma once
 
 namespace terrace::geo {

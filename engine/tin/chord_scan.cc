@@ -24,7 +24,7 @@ ChordMisfit ScanChord(const Chord& chord, const BorderOptions& options) {
   const auto a = all(chord.a), b = all(chord.b), h_a = all(chord.h_a), h_b = all(chord.h_b);
   const auto length = all(chord.b - chord.a), sagitta = all(options.sagitta_m);
   const auto padding = all(options.padding_m), weight = all(options.weight), step = all(options.step_m);
-  const auto scale = all(options.scale), most_weight = all(kMostBorderWeight);
+  const auto scale = all(options.scale), most_weight = all(kMaxBorderWeight);
   const auto lanes = static_cast<int>(hn::Lanes(doubles));
 
   const auto last = hn::Set(ints, chord.b - chord.a - 1), stride = hn::Set(ints, chord.stride);

@@ -17,7 +17,7 @@ DataDependentCriterion::DataDependentCriterion(const HeightField& field, const S
       kept_further_out_below_(std::sqrt(std::sqrt(options.qthresh))),
       fit_errors_(field, sagitta, options.measure) {
   TERRACE_CHECK(options_.qthresh >= 0 && options_.qthresh <= 1);
-  pairs_.ring.Grow(3 * kMostPairs);
+  pairs_.ring.Grow(3 * kMaxPairs);
 }
 
 const Star& DataDependentCriterion::Insert(Triangulation::Vertex vertex, TriangleId triangle) {
@@ -102,7 +102,7 @@ void DataDependentCriterion::FitOutline(Star& star) {
     suspect.beyond = triangulation_->BeyondOf(suspect.outside, vertex_.position);
     triangulation_->PrefetchAcross(suspect.beyond.uw);
     triangulation_->PrefetchAcross(suspect.beyond.wv);
-    if (end > Star::kMostLeftOut || !fit_errors_.are_maxima()) continue;
+    if (end > Star::kMaxLeftOut || !fit_errors_.are_maxima()) continue;
     star.left_out |= 1U << (end - 1);
     end = PutPair(star, end, {star.ring[suspect.edge], star.ring[suspect.edge + 1]}, suspect.beyond);
     ++together;
@@ -149,8 +149,8 @@ void DataDependentCriterion::FitSuspects(const Star& star, std::size_t first) {
   pairs_.y = star.y;
   pairs_.height = star.height;
   pairs_.left_out = kBetweenPairs;
-  for (; first < suspect_count_; first += kMostPairs) {
-    const std::size_t pairs = std::min(suspect_count_ - first, kMostPairs);
+  for (; first < suspect_count_; first += kMaxPairs) {
+    const std::size_t pairs = std::min(suspect_count_ - first, kMaxPairs);
     pairs_.has_border = star.has_border;
     std::size_t end = 0;
     for (std::size_t i = 0; i < pairs; ++i) {
@@ -250,7 +250,7 @@ void DataDependentCriterion::SuspectEdge(Star& star, std::uint32_t index) {
   const Triangulation::Beyond beyond = triangulation_->BeyondOf(edge.outside, vertex_.position);
   const Quadrilateral q{edge.u, edges_[edge.next].u, beyond.w, vertex_.height};
   const ShapeQuality quality = QualityOf(q);
-  // Whether it is one cannot be foretold: not a branch.
+  // Whether it is one cannot be predicted: not a branch.
   const bool is_suspect = Sees(q.u, q.v, q.w) & !(quality.pw < kept_further_out_below_ * quality.uv);
   suspects_[suspect_count_] = {index, edge.outside, quality.uv < taken_below_ * quality.pw, quality, beyond};
   suspect_count_ += is_suspect;

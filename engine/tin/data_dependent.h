@@ -63,7 +63,7 @@ class DataDependentCriterion {
   static constexpr double kUnknown = -1;
   static constexpr std::size_t kLikelyEdges = 64;  // of an outline
   static constexpr std::size_t kSpareSlots = std::size_t{1} << 10;
-  static constexpr std::size_t kMostPairs = (Star::kMostLeftOut + 1) / 3;  // in a scan of nothing else
+  static constexpr std::size_t kMaxPairs = (Star::kMaxLeftOut + 1) / 3;  // in a scan of nothing else
   static constexpr std::uint32_t kBetweenPairs = 0b100'100'100'100'100'100'100'100'100'100;
 
   // Of a triangle with p.
@@ -136,8 +136,8 @@ class DataDependentCriterion {
   std::size_t suspect_count_ = 0, flip_count_ = 0;
   std::size_t edge_count_ = 0;  // 0 as long as the outline is the star's
   Star pairs_;
-  std::vector<PlaneMisfit> pair_misfits_ = std::vector<PlaneMisfit>(3 * kMostPairs + FitErrors::kPadding);
-  std::vector<double> pair_errors_ = std::vector<double>(3 * kMostPairs + FitErrors::kPadding);
+  std::vector<PlaneMisfit> pair_misfits_ = std::vector<PlaneMisfit>(3 * kMaxPairs + FitErrors::kPadding);
+  std::vector<double> pair_errors_ = std::vector<double>(3 * kMaxPairs + FitErrors::kPadding);
 
   // Of the last star.
   VertexId centre_ = 0;

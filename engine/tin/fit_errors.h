@@ -40,7 +40,7 @@ class FitErrors {
     scan_star_(*field_, star, misfits);
     if (star.has_border || !sagitta_->is_flat()) [[unlikely]]
       return AddBordersAndSagitta(star, misfits, errors);
-    // Eight together, since how many there are cannot be foretold.
+    // Eight together, since how many there are cannot be predicted.
     for (std::size_t i = 0; i < star.count; i += kPadding) {
 #pragma GCC unroll 8
       for (std::size_t k = i; k < i + kPadding; ++k) errors[k] = DistanceOrZero(misfits[k]);

@@ -34,7 +34,7 @@ enum class Side : std::uint8_t {
 // How samples on one border are judged. A border sample k between the border's vertices a < b misses by
 //   m = |(h_a (b - k) + h_b (k - a)) / (b - a) - h_k| + sagitta_m (k - a) (b - k)
 // evaluated in double in exactly this form, a < b counted along increasing x or y, and its error is
-//   scale min(max((m + padding_m) weight, m + padding_m + step_m), kMostBorderWeight m):
+//   scale min(max((m + padding_m) weight, m + padding_m + step_m), kMaxBorderWeight m):
 // what a vertex on the border loses to a rounding that grows with the error (weight), to rounding by fixed amounts
 // (padding_m, step_m), with a limit so that a border full of cliffs does not take every sample for nothing. This is a
 // function of that border's own samples. Two fields that share a border with equal heights and options therefore insert
@@ -46,7 +46,7 @@ struct BorderOptions {
   double sagitta_m = 0;  // half the second difference of the ground that the border's chord cuts off
   double scale = 1;      // the error counts so many times: a border threshold of E / scale in a run to the error E
 };
-inline constexpr double kMostBorderWeight = 4;
+inline constexpr double kMaxBorderWeight = 4;
 
 // The ground under the field is curved: a flat triangle with corners (dx, dy) samples apart cuts below it by up to its
 // sagitta. Squared lengths are q = dx^2 east_m2[row] + dy^2 north_m2, with the largest east_m2 of the triangle's rows;

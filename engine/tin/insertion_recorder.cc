@@ -21,7 +21,7 @@ void CopyFew(const std::uint32_t* from, std::size_t count, std::uint32_t* to) {
   for (std::size_t i = 0; i < count; i += kFewest) std::memcpy(to + i, from + i, kFewest * sizeof *to);
 }
 
-// Where the smallest of them is, without a branch that cannot be foretold.
+// Where the smallest of them is, without a branch that cannot be predicted.
 std::size_t SmallestOf(const std::uint32_t* values, std::size_t count) {
   std::uint64_t smallest = std::numeric_limits<std::uint64_t>::max();
   for (std::size_t i = 0; i < count; ++i) smallest = std::min(smallest, std::uint64_t{values[i]} << 32 | i);

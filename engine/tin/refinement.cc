@@ -20,7 +20,7 @@ using Wide = InsertionRecord<std::uint32_t>;
 using Narrow = InsertionRecord<std::uint16_t>;
 
 constexpr std::string_view kMagic = "terrace refinement 1\n";
-constexpr std::uint32_t kMostSide = 1U << 16;  // of SamplePosition
+constexpr std::uint32_t kMaxSide = 1U << 16;  // of SamplePosition
 
 template <typename T>
 void PutArray(ByteWriter& writer, const std::vector<T>& values) {
@@ -155,7 +155,7 @@ Result<Refinement> Refinement::Parse(std::string_view bytes) {
   Refinement refinement;
   if (reader.GetBytes(kMagic.size()) != kMagic) return damaged();
   const auto width = reader.Get<std::uint32_t>(), height = reader.Get<std::uint32_t>();
-  if (width < 2 || height < 2 || width > kMostSide || height > kMostSide) return damaged();
+  if (width < 2 || height < 2 || width > kMaxSide || height > kMaxSide) return damaged();
   refinement.width_ = static_cast<int>(width);
   refinement.height_ = static_cast<int>(height);
   const auto index_bytes = reader.Get<std::uint32_t>();

@@ -15,7 +15,7 @@ namespace {
 namespace hn = hwy::HWY_NAMESPACE;
 
 // A star of eight triangles and fewer, as nearly all are, is one step: how many there are, and which of them stand,
-// cannot be foretold.
+// cannot be predicted.
 using Corners = hn::CappedTag<std::uint32_t, 8>;
 
 template <typename Index>
@@ -97,8 +97,8 @@ HWY_EXPORT(CollectWide);
 // A triangulation of v vertices has fewer than 2 v triangles; more take what is written beyond the last.
 template <typename Record, typename Collect>
 std::vector<std::array<std::uint32_t, 3>> Collected(const Record& record, std::size_t insertions, Collect&& collect) {
-  constexpr std::size_t kMostLanes = 8;
-  std::vector<std::array<std::uint32_t, 3>> triangles(2 * (insertions + 4) + kMostLanes);
+  constexpr std::size_t kMaxLanes = 8;
+  std::vector<std::array<std::uint32_t, 3>> triangles(2 * (insertions + 4) + kMaxLanes);
   triangles.resize(collect(record, insertions, triangles.data()));
   return triangles;
 }

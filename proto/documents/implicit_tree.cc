@@ -30,7 +30,7 @@ std::vector<geo::TileKey> TilesOf(Availability available, int level) {
   return tiles;
 }
 
-// Whether they are few, and nothing lies beside them: a survey in a mosaic with the globe is not all of it.
+// Whether they are few, and nothing lies beside them: a local raster in a mosaic with the globe is not all of it.
 bool CanBeRoots(Availability available, int level) {
   if (Count(available[static_cast<std::size_t>(level)]) > kMaxImplicitRoots) return false;
   const std::vector<geo::TileKey> tiles = TilesOf(available, level);

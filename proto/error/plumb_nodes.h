@@ -77,8 +77,8 @@ class PlumbNodes {
     const double sagitta = 1.1 * geo::kSemiMajorAxis / 6 * (width2 + height2);
     if (narrowest_ < 1e-3 || width > 0.5 || height > 0.5) return {kUnknownShift, sagitta};
     const double x =
-        width * (height * per_narrowest_ + 2 * tilt_ + width2 / 8) + beside_m / kLeastRadius * per_narrowest_;
-    const double y = width2 / 8 + height * (tilt_ + 0.02 * height + height2) + beside_m / kLeastRadius;
+        width * (height * per_narrowest_ + 2 * tilt_ + width2 / 8) + beside_m / kMinRadius * per_narrowest_;
+    const double y = width2 / 8 + height * (tilt_ + 0.02 * height + height2) + beside_m / kMinRadius;
     return {{x * per_step_ + 1e-9, y * per_step_ + 1e-9}, sagitta};
   }
 
@@ -108,7 +108,7 @@ class PlumbNodes {
   friend class PlumbFootprint;
 
   // The smallest radius of curvature there is, a meridian's at the equator, 100 km below the ellipsoid.
-  static constexpr double kLeastRadius = geo::kSemiMinorAxis * geo::kSemiMinorAxis / geo::kSemiMajorAxis - 1e5;
+  static constexpr double kMinRadius = geo::kSemiMinorAxis * geo::kSemiMinorAxis / geo::kSemiMajorAxis - 1e5;
   static constexpr Shift kUnknownShift = {std::numeric_limits<double>::infinity(),
                                           std::numeric_limits<double>::infinity()};
 

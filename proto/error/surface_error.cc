@@ -21,11 +21,13 @@ constexpr double kSmallestRadius = geo::kSemiMinorAxis * geo::kSemiMinorAxis / g
 constexpr double kHeights = 1.02;
 
 // Lattice columns and rows, from the tile's south-western sample.
-struct Place {
+struct LatticePoint {
   double x = 0, y = 0;
 };
 
-Place Between(Place a, Place b, double t) { return {a.x + t * (b.x - a.x), a.y + t * (b.y - a.y)}; }
+LatticePoint Between(LatticePoint a, LatticePoint b, double t) {
+  return {a.x + t * (b.x - a.x), a.y + t * (b.y - a.y)};
+}
 
 // The tile's ground about a place, cheaper than sines: exact at lattice nodes, and from the nearest one by series that
 // end at the fifth power of half a cell, which is below 3e-9 for the widest cells there are.
@@ -39,35 +41,35 @@ class Ground {
         narrowest_(std::min(angles_.rows.front().cos, angles_.rows.back().cos) - step_) {}
 
   // Metres above the ellipsoid of a point near the place, along the normal there.
-  double HeightOf(const geo::Vec3& point, Place place) const {
+  double HeightOf(const geo::Vec3& point, LatticePoint place) const {
     const geo::SinCos longitude = Turn(angles_.columns, place.x), latitude = Turn(angles_.rows, place.y);
     const double surface = geo::kSemiMajorAxis * std::sqrt(1 - geo::kEccentricitySquared * latitude.sin * latitude.sin);
     return latitude.cos * (point.x * longitude.cos + point.y * longitude.sin) + point.z * latitude.sin - surface;
   }
 
   // Metres along a row and along a column, at most.
-  Place WidestStep() const {
+  LatticePoint WidestStep() const {
     double widest = 0;
     for (const geo::SinCos& row : angles_.rows) widest = std::max(widest, row.cos);
     constexpr double kLargestRadius = geo::kSemiMajorAxis * geo::kSemiMajorAxis / geo::kSemiMinorAxis;
     return {widest * step_ * kLargestRadius, step_ * kLargestRadius};
   }
   // The same, at least; not above zero where a pole is.
-  Place NarrowestStep() const {
+  LatticePoint NarrowestStep() const {
     double narrowest = 1;
     for (const geo::SinCos& row : angles_.rows) narrowest = std::min(narrowest, row.cos);
     return {std::max(narrowest, 1e-12) * step_ * kSmallestRadius * 0.98, step_ * kSmallestRadius * 0.98};
   }
   // Metres, at most.
   double WidestDiagonal() const {
-    const Place step = WidestStep();
+    const LatticePoint step = WidestStep();
     return std::hypot(step.x, step.y);
   }
   double step_radians() const { return step_; }
 
   // Where the plumb line through the point meets the ellipsoid (Bowring, "Transformation from spatial to geographical
   // coordinates", Survey Review 1976). `near`: a place within half a turn.
-  Place PlaceOf(const geo::Vec3& point, Place near) const {
+  LatticePoint PlaceOf(const geo::Vec3& point, LatticePoint near) const {
     constexpr double kSecond = geo::kEccentricitySquared / (1 - geo::kEccentricitySquared);
     const double radius = std::hypot(point.x, point.y);
     const double reduced = std::atan2(point.z * geo::kSemiMajorAxis, radius * geo::kSemiMinorAxis);
@@ -84,7 +86,7 @@ class Ground {
   // Lattice steps by which the points of a chord may lie beside the line between the places of its ends: it is nearer
   // to the axis than they are, its longitude is the mean of theirs weighted with the distances from the axis, and its
   // latitude the mean weighted with the radii of curvature. Infinite where no bound is known.
-  Place Shift(Place a, Place b, double rise_m) const {
+  LatticePoint Shift(LatticePoint a, LatticePoint b, double rise_m) const {
     constexpr double kUnknown = std::numeric_limits<double>::infinity();
     const double width = std::abs(a.x - b.x) * step_, height = std::abs(a.y - b.y) * step_;
     if (width > 0.5) return {kUnknown, kUnknown};
@@ -158,7 +160,7 @@ class EdgeMeter {
   }
 
   // Metres by which the lattice surface changes over these steps, at most.
-  double LargestChange(Place steps) const {
+  double LargestChange(LatticePoint steps) const {
     if (!std::isfinite(steps.x) || !std::isfinite(steps.y)) return Relief();
     const double change = steps.x * steepest_.x + steps.y * steepest_.y;
     return change <= std::max(steepest_.x, steepest_.y) ? change : std::min(change, Relief());
@@ -166,7 +168,7 @@ class EdgeMeter {
 
   // Every piece of the edge a - b between places where it leaves a cell, in order: visit(piece).
   template <typename Visit>
-  void ForEachPiece(Place a, Place b, const Visit& visit) const {
+  void ForEachPiece(LatticePoint a, LatticePoint b, const Visit& visit) const {
     Lines columns(a.x, b.x), rows(a.y, b.y);
     const double turn = (b.x - a.x) * (b.y - a.y);
     for (double begin = 0; begin < 1;) {
@@ -174,7 +176,7 @@ class EdgeMeter {
       if (columns.at <= end) columns.Next();
       if (rows.at <= end) rows.Next();
       if (!(end > begin)) continue;
-      const Place centre = Between(a, b, (begin + end) / 2), last = Between(a, b, end);
+      const LatticePoint centre = Between(a, b, (begin + end) / 2), last = Between(a, b, end);
       const int i = CellOf(centre.x), j = CellOf(centre.y);
       const double south_west = lattice_.At(i, j), along = lattice_.At(i + 1, j) - south_west;
       const double across = lattice_.At(i, j + 1) - south_west;
@@ -185,7 +187,7 @@ class EdgeMeter {
     }
   }
 
-  double SampleAt(Place place) const {
+  double SampleAt(LatticePoint place) const {
     const int i = CellOf(place.x), j = CellOf(place.y);
     const double x = place.x - i, y = place.y - j;
     const double south = lattice_.At(i, j) + x * (double{lattice_.At(i + 1, j)} - lattice_.At(i, j));
@@ -193,7 +195,7 @@ class EdgeMeter {
     return south + y * (north - south);
   }
 
-  bool IsRim(Place a, Place b) const {
+  bool IsRim(LatticePoint a, LatticePoint b) const {
     return (a.x == b.x && (a.x == 0 || a.x == cells_)) || (a.y == b.y && (a.y == 0 || a.y == cells_));
   }
 
@@ -232,13 +234,13 @@ class EdgeMeter {
 
   const LatticeView& lattice_;
   const int cells_;
-  Place steepest_;  // metres between neighbouring samples of a row and of a column
+  LatticePoint steepest_;  // metres between neighbouring samples of a row and of a column
   mutable double relief_ = -1;
 };
 
 // Every edge once: those inside the tile belong to two triangles with opposite directions.
 template <typename Visit>
-void ForEachEdge(const std::vector<std::array<std::uint32_t, 3>>& triangles, const std::vector<Place>& places,
+void ForEachEdge(const std::vector<std::array<std::uint32_t, 3>>& triangles, const std::vector<LatticePoint>& places,
                  const EdgeMeter& meter, const Visit& visit) {
   for (const auto& triangle : triangles) {
     for (std::size_t k = 0; k < 3; ++k) {
@@ -249,11 +251,11 @@ void ForEachEdge(const std::vector<std::array<std::uint32_t, 3>>& triangles, con
 }
 
 // Lattice steps along both axes together.
-double SpanOf(Place a, Place b) { return std::abs(a.x - b.x) + std::abs(a.y - b.y); }
+double SpanOf(LatticePoint a, LatticePoint b) { return std::abs(a.x - b.x) + std::abs(a.y - b.y); }
 
 // A point of a flat triangle's edge.
 struct End {
-  Place place;  // where its plumb line meets the ellipsoid
+  LatticePoint place;  // where its plumb line meets the ellipsoid
   geo::Vec3 point;
   double height = 0;  // above the ellipsoid, metres
 };
@@ -289,7 +291,7 @@ Chord ChordOf(const Ground& ground, const End& a, const End& b) {
 
 // The larger of `known` and the largest difference from the lattice surface along the line between two places, of a
 // height that is linear along it.
-double LargestOfLine(const EdgeMeter& meter, Place a, Place b, double first, double last, double known) {
+double LargestOfLine(const EdgeMeter& meter, LatticePoint a, LatticePoint b, double first, double last, double known) {
   double before = first - meter.SampleAt(a);
   meter.ForEachPiece(a, b, [&](const Piece& piece) {
     // The surface is subtracted, and so is its bend.
@@ -305,7 +307,7 @@ double LargestOfLine(const EdgeMeter& meter, Place a, Place b, double first, dou
 
 // The same of a chord whose points lie off the line by `shift` at most. Its heights between the ends of pieces are for
 // the caller to bound where they are no quadratics.
-double LargestOfChord(const EdgeMeter& meter, const Ground& ground, const End& a, const End& b, Place shift,
+double LargestOfChord(const EdgeMeter& meter, const Ground& ground, const End& a, const End& b, LatticePoint shift,
                       double known) {
   const Chord chord = ChordOf(ground, a, b);
   const double slack = chord.slack + meter.LargestChange(shift);
@@ -325,7 +327,7 @@ double LargestOfHalves(const EdgeMeter& meter, const Ground& ground, const End& 
                        double known) {
   constexpr double kSmall = 1e-3;  // of a lattice step
   constexpr int kDeepest = 8;
-  const Place shift = ground.Shift(a.place, b.place, a.height - b.height);
+  const LatticePoint shift = ground.Shift(a.place, b.place, a.height - b.height);
   if ((shift.x <= kSmall && shift.y <= kSmall) || depth == kDeepest) {
     return LargestOfChord(meter, ground, a, b, shift, known);
   }
@@ -339,18 +341,18 @@ double LargestOfHalves(const EdgeMeter& meter, const Ground& ground, const End& 
 
 // Between the ends of pieces, and on the triangles between edges, the height of a chord strays from a linear one by at
 // most this. `steps`: the largest span of an edge.
-double Stray(const Ground& ground, double steps) {
+double ChordDeviation(const Ground& ground, double steps) {
   const double diagonal = ground.WidestDiagonal(), span = steps * ground.step_radians();
   return kHeights * (0.75 * diagonal * diagonal / kSmallestRadius + span * span / 8 * diagonal);
 }
 
-// The largest difference along edges from the lattice surface, metres, with Stray. `heights`: by vertex, of the reading
-// in longitude and latitude; empty: it is not measured. `ecef`: by vertex, of the flat triangles, which lie `beside_m`
-// beside their places at most.
+// The largest difference along edges from the lattice surface, metres, with ChordDeviation. `heights`: by vertex, of
+// the reading in longitude and latitude; empty: it is not measured. `ecef`: by vertex, of the flat triangles, which lie
+// `beside_m` beside their places at most.
 //
 // A chord is at most its sagitta below the line between its ends, and the lattice surface changes little over its
 // shift. So most chords are known to matter less than what was found already, without a look at them.
-double MeasureEdges(const EdgeMeter& meter, const Ground& ground, const std::vector<Place>& places,
+double MeasureEdges(const EdgeMeter& meter, const Ground& ground, const std::vector<LatticePoint>& places,
                     const std::vector<double>& heights, const std::vector<geo::Vec3>& ecef, double beside_m,
                     const std::vector<std::array<std::uint32_t, 3>>& triangles) {
   std::vector<End> ends(places.size());
@@ -358,25 +360,26 @@ double MeasureEdges(const EdgeMeter& meter, const Ground& ground, const std::vec
   double span = 0;
   ForEachEdge(triangles, places, meter,
               [&](std::uint32_t a, std::uint32_t b) { span = std::max(span, SpanOf(places[a], places[b])); });
-  const Place step = ground.WidestStep(), narrowest = ground.NarrowestStep();
-  const double stray = Stray(ground, span) + meter.LargestChange({beside_m / narrowest.x, beside_m / narrowest.y});
-  double largest = stray;
+  const LatticePoint step = ground.WidestStep(), narrowest = ground.NarrowestStep();
+  const double deviation =
+      ChordDeviation(ground, span) + meter.LargestChange({beside_m / narrowest.x, beside_m / narrowest.y});
+  double largest = deviation;
   ForEachEdge(triangles, places, meter, [&](std::uint32_t a, std::uint32_t b) {
     const double x = (places[a].x - places[b].x) * step.x, y = (places[a].y - places[b].y) * step.y;
     const double sagitta = kHeights * (x * x + y * y) / (8 * kSmallestRadius);
-    const Place shift = ground.Shift(places[a], places[b], ends[a].height - ends[b].height);
+    const LatticePoint shift = ground.Shift(places[a], places[b], ends[a].height - ends[b].height);
     // Heights of the two readings differ by their rounding too where both are measured.
     double rounding = 0;
     if (!heights.empty())
       rounding = std::max(std::abs(heights[a] - ends[a].height), std::abs(heights[b] - ends[b].height));
-    const double beyond = sagitta + meter.LargestChange(shift) + rounding + stray;
+    const double beyond = sagitta + meter.LargestChange(shift) + rounding + deviation;
     const double first = heights.empty() ? ends[a].height : heights[a],
                  last = heights.empty() ? ends[b].height : heights[b];
     const double known = std::max(largest - beyond, 0.0);
     const double linear = LargestOfLine(meter, places[a], places[b], first, last, known);
     if (linear <= known && known + beyond <= largest) return;
     if (!heights.empty() && linear > known) largest = std::max(largest, linear);
-    largest = LargestOfHalves(meter, ground, ends[a], ends[b], 0, largest - stray) + stray;
+    largest = LargestOfHalves(meter, ground, ends[a], ends[b], 0, largest - deviation) + deviation;
   });
   return largest;
 }
@@ -384,7 +387,7 @@ double MeasureEdges(const EdgeMeter& meter, const Ground& ground, const std::vec
 }  // namespace
 
 double MeasureEdgeError(const LatticeView& lattice, const QuantizedTile& tile) {
-  std::vector<Place> places;
+  std::vector<LatticePoint> places;
   std::vector<double> heights;
   const double scale = static_cast<double>(lattice.cells()) / kQuantizedMax;
   for (std::size_t k = 0; k < tile.u.size(); ++k) {
@@ -396,7 +399,7 @@ double MeasureEdgeError(const LatticeView& lattice, const QuantizedTile& tile) {
 
 double MeasureFlatEdgeError(const LatticeView& lattice, const tin::TinMesh& mesh,
                             const std::vector<geo::Vec3>& positions) {
-  std::vector<Place> places;
+  std::vector<LatticePoint> places;
   for (const tin::SamplePosition p : mesh.vertices) {
     places.push_back({static_cast<double>(p.x), static_cast<double>(p.y)});
   }

@@ -29,9 +29,9 @@ double NeededStep(double min_height, double max_height) {
 
 EdgeSteps MakeEdgeSteps(double error_m, const std::array<std::array<double, 3>, 3>& needed, double pole_step,
                         bool at_south_pole, bool at_north_pole) {
-  const double wished = std::max(PowerOfTwoAtMost(error_m / 8), kHeightResolution);
+  const double requested = std::max(PowerOfTwoAtMost(error_m / 8), kHeightResolution);
   const auto over = [&](int row_from, int row_to, int column_from, int column_to) {
-    double step = wished;
+    double step = requested;
     for (int row = row_from; row <= row_to; ++row) {
       if ((row == 0 && at_south_pole) || (row == 2 && at_north_pole)) {
         step = std::max(step, pole_step);
@@ -47,7 +47,7 @@ EdgeSteps MakeEdgeSteps(double error_m, const std::array<std::array<double, 3>, 
   steps.side = {over(0, 1, 1, 1), over(1, 1, 1, 2), over(1, 2, 1, 1), over(1, 1, 0, 1)};
   steps.corner = {over(0, 1, 0, 1), over(0, 1, 1, 2), over(1, 2, 1, 2), over(1, 2, 0, 1)};
   // A pole is one point: every sample on it, in every tile, lies on one and the same grid.
-  const double pole = std::max(wished, pole_step);
+  const double pole = std::max(requested, pole_step);
   if (at_south_pole) steps.side[0] = steps.corner[0] = steps.corner[1] = pole;
   if (at_north_pole) steps.side[2] = steps.corner[2] = steps.corner[3] = pole;
   return steps;

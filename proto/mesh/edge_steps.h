@@ -11,10 +11,10 @@
 //   corner step   = the same over the four tiles that meet; on a pole, over the whole dataset
 //
 // Proof that a tile's own step divides: it is a power of two, so it only has to be at most every edge's step. Let w be
-// the step wished for the error, m the tile's NeededStep, S the coarsest step of its edges. Rounding widens the relief
-// to at most 16384 m + S, and every edge's step is at least M = max(m, w). If S = M, that is 16385 M, less than 32767
-// M. Else S is the NeededStep of a neighbour, at most 2 m for any relief on Earth (below 32 km), and 16384 M + 2 <=
-// 32767 M holds since M >= 2^-10 m.
+// the step requested for the error, m the tile's NeededStep, S the coarsest step of its edges. Rounding widens the
+// relief to at most 16384 m + S, and every edge's step is at least M = max(m, w). If S = M, that is 16385 M, less than
+// 32767 M. Else S is the NeededStep of a neighbour, at most 2 m for any relief on Earth (below 32 km), and 16384 M + 2
+// <= 32767 M holds since M >= 2^-10 m.
 #pragma once
 
 #include <array>

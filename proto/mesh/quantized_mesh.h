@@ -15,7 +15,7 @@ inline constexpr int kQuantizedMax = 32767;  // u, v and heights have 15 bits
 inline constexpr std::size_t kMaxTileVertices =
     65534;  // CesiumJS misreads exactly 65536; below that indices are 16 bits
 
-// A tile as the wire will carry it: integers, and the two header heights that give them meaning.
+// A quantized tile: integers, and the two header heights that give them meaning.
 struct QuantizedTile {
   geo::TileKey key;
   std::vector<std::uint16_t> u;                         // 0 west .. 32767 east

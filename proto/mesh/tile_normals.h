@@ -13,7 +13,7 @@
 
 namespace terrace::proto {
 
-// Unit normals in ECEF, one per vertex of `mesh`, whose vertices the wire puts at `positions` (ECEF).
+// Unit normals in ECEF, one per vertex of `mesh`, whose quantized vertices lie at `positions` (ECEF).
 //
 // On the edges the gradient of the heights, by central differences over one lattice step on each side, each within 13
 // degrees of the limited difference (van Leer, "Towards the ultimate conservative difference scheme. II", 1974): a

@@ -121,13 +121,13 @@ void PrintMosaic(const std::string& name, const dem::DemInfo& info) {
   const auto line = [](const char* what, const std::string& value) { fmt::print("  {:<14}{}\n", what, value); };
   fmt::print("{}\n", name);
   line("sources", fmt::format("{}, in the order in which they count", info.sources.size()));
-  constexpr std::size_t kMostListed = 40;
-  for (std::size_t i = 0; i < std::min(info.sources.size(), kMostListed); ++i) {
+  constexpr std::size_t kMaxListed = 40;
+  for (std::size_t i = 0; i < std::min(info.sources.size(), kMaxListed); ++i) {
     const dem::RasterInfo& source = info.sources[i];
     line("", fmt::format("{}: {} x {}, {:.3g} m, {}", source.path, source.width, source.height, source.spacing_m,
                          source.crs));
   }
-  if (info.sources.size() > kMostListed) line("", fmt::format("and {} more", info.sources.size() - kMostListed));
+  if (info.sources.size() > kMaxListed) line("", fmt::format("and {} more", info.sources.size() - kMaxListed));
   line("overlaps", fmt::format("under one before them, in part at least: {}", Sources(CountOverlapped(info.sources))));
   line("bounds", fmt::format("west {:.6g}, south {:.6g}, east {:.6g}, north {:.6g}", info.bounds.west,
                              info.bounds.south, info.bounds.east, info.bounds.north));

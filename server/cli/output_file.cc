@@ -19,8 +19,8 @@ fs::path TargetOf(const fs::path& path) {
   fs::path target = fs::canonical(path, failed);
   if (!failed) return target;
   target = path;  // which leads to a file that is yet to be
-  constexpr int kMostLinks = 40;
-  for (int links = 0; links < kMostLinks && fs::is_symlink(target, failed); ++links) {
+  constexpr int kMaxLinks = 40;
+  for (int links = 0; links < kMaxLinks && fs::is_symlink(target, failed); ++links) {
     target = target.parent_path() / fs::read_symlink(target, failed);
   }
   return target;

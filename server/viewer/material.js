@@ -17,7 +17,7 @@ const kShallowestSeaFloor = -200;
 // the dataset comes down to the sea at all.
 const kWaterShare = 0.025;
 const kHighestSea = 50;
-const kLeastRelief = 300;
+const kMinRelief = 300;
 
 function colourAt(stops, t) {
   const next = Math.max(1, stops.findIndex((stop) => stop[0] >= t));
@@ -34,7 +34,7 @@ export function heightColour(height, { min, max }) {
 }
 
 function waterline({ min, max }) {
-  const coastal = min > kShallowestSeaFloor && min < kHighestSea && max - min > kLeastRelief;
+  const coastal = min > kShallowestSeaFloor && min < kHighestSea && max - min > kMinRelief;
   return coastal ? min + kWaterShare * (max - min) : -1e5;
 }
 

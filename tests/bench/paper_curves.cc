@@ -75,7 +75,7 @@ std::optional<std::pair<double, double>> FirstWith(const Series& series, std::si
 
 }  // namespace
 
-void ParallelInsertions(Findings& findings) {
+void ParallelInsertions(Results& results) {
   const tin::HeightField crater = Model("crater.tif");
   Figure figure{"parallel", "Crater: one and many insertions per pass (figure 12)", "vertices", "RMS error, m", {}};
   Table table("parallel",
@@ -104,11 +104,11 @@ void ParallelInsertions(Findings& findings) {
     table.Add(std::move(cells));
     figure.series.push_back(std::move(curve));
   }
-  findings.figures.push_back(std::move(figure));
-  findings.tables.push_back(std::move(table));
+  results.figures.push_back(std::move(figure));
+  results.tables.push_back(std::move(table));
 }
 
-void CraterQuality(Findings& findings) {
+void CraterQuality(Results& results) {
   const tin::HeightField crater = Model("crater.tif");
   Table table("crater", "Crater: RMS and maximum error in m at m vertices, beside Scape's",
               {"m", "RMS", "Scape's", "difference", "maximum", "Scape's maximum", "grid nodes", "uniform grid RMS",
@@ -123,10 +123,10 @@ void CraterQuality(Findings& findings) {
                Count(grid.vertices.size()), Number(tin::MeasureError(crater, grid).rms, 5),
                Number(row.uniform_rms, 5)});
   }
-  findings.tables.push_back(std::move(table));
+  results.tables.push_back(std::move(table));
 }
 
-void QualityOverVertices(Findings& findings) {
+void QualityOverVertices(Results& results) {
   const tin::HeightField ashby = Model("ashby.tif");
   Table table("ashby", "Ashby: RMS error in m at m vertices, Scape's in brackets (figure 15)",
               {"m", "Delaunay", "data-dependent", "uniform grid"});
@@ -142,7 +142,7 @@ void QualityOverVertices(Findings& findings) {
                {fmt::format("{:.4g} [{:.4g}]", fitted, row.data_dependent_rms), fitted},
                {fmt::format("{:.4g} [{:.4g}]", grid, row.uniform_rms), grid}});
   }
-  findings.tables.push_back(std::move(table));
+  results.tables.push_back(std::move(table));
   for (const auto& [id, title] : {std::pair{"ashby", "Ashby (figure 15)"},
                                   {"crater", "Crater"},
                                   {"westUS", "West US"},
@@ -156,7 +156,7 @@ void QualityOverVertices(Findings& findings) {
                   {GreedyCurve(field, kDelaunayName, {}), GreedyCurve(field, kDataDependentName, DataDependent()),
                    UniformCurve(field)}};
     AddScapeMarks(id, figure);
-    findings.figures.push_back(std::move(figure));
+    results.figures.push_back(std::move(figure));
   }
 }
 

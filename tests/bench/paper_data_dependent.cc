@@ -84,23 +84,23 @@ Series ErrorOverTime(const tin::HeightField& field, const std::string& name, con
 
 }  // namespace
 
-void DataDependentQuality(Findings& findings) {
+void DataDependentQuality(Results& results) {
   const tin::HeightField crater = Model("crater.tif");
-  findings.tables.push_back(Measures(crater));
-  findings.tables.push_back(Maxima(crater));
+  results.tables.push_back(Measures(crater));
+  results.tables.push_back(Maxima(crater));
   Series delaunay{"Scape, Delaunay", {}, true}, data_dependent{"Scape, data-dependent", {}, true};
   for (const reference::CraterRow& row : reference::kCrater) {
     delaunay.points.emplace_back(row.points, row.delaunay_rms);
     data_dependent.points.emplace_back(row.points, row.sum_max_rms);
   }
-  findings.figures.push_back(
+  results.figures.push_back(
       {"data-dependent",
        "Crater: Delaunay and data-dependent (figure 13)",
        "vertices",
        "RMS error, m",
        {GreedyCurve(crater, kDelaunayName, {}), GreedyCurve(crater, kDataDependentName, DataDependent()),
         std::move(delaunay), std::move(data_dependent)}});
-  findings.figures.push_back(
+  results.figures.push_back(
       {"time-error",
        "Crater: error over time (figure 14)",
        "seconds",

@@ -15,17 +15,17 @@ namespace {
 void Repeat(const std::string& folder) {
   std::filesystem::create_directories(folder);
   const nlohmann::ordered_json context = MachineContext();  // first: later the load would be our own
-  Findings findings;
+  Results results;
   for (const auto& experiment :
        {CraterQuality, DataDependentQuality, ParallelInsertions, QualityOverVertices, TimeOverVertices}) {
-    experiment(findings);
+    experiment(results);
   }
   nlohmann::ordered_json json{{"context", context}};
-  for (const Table& table : findings.tables) {
+  for (const Table& table : results.tables) {
     table.Print(std::cout);
     json["tables"].push_back(table.Json());
   }
-  for (const Figure& figure : findings.figures) json["figures"].push_back(figure.Json());
+  for (const Figure& figure : results.figures) json["figures"].push_back(figure.Json());
   std::ofstream out(folder + "/paper.json");
   out << json.dump(2) << '\n';
   out.close();

@@ -73,7 +73,7 @@ Fit FitCost(const std::vector<Timing>& timings) {
 
 }  // namespace
 
-void TimeOverVertices(Findings& findings) {
+void TimeOverVertices(Results& results) {
   Figure figure{"time", "West US: CPU time of greedy insertion (figure 3)", "vertices", "seconds", {}};
   std::vector<Timing> all;
   Series naive;
@@ -102,8 +102,8 @@ void TimeOverVertices(Findings& findings) {
   Table table("time", "time = a n log2 m + b m log2 m, fitted to all points",
               {"a, ns", "b, ns", "furthest point", "West US at 50,000 vertices, s"});
   table.Add({Number(fit.a * 1e9, 3), Number(fit.b * 1e9, 3), Ratio(worst), Number(fit.At(1024.0 * 1024, 50000), 3)});
-  findings.figures.push_back(std::move(figure));
-  findings.tables.push_back(std::move(table));
+  results.figures.push_back(std::move(figure));
+  results.tables.push_back(std::move(table));
 }
 
 }  // namespace terrace::bench

@@ -77,14 +77,14 @@ TEST(SetServerOption, ReadsNumbersSwitchesAndText) {
 TEST(SetServerOption, ResolvesPathsAgainstTheDirectoryItIsGiven) {
   Config config;
   EXPECT_THAT(Set("viewer", "page", config), IsEmpty());
-  EXPECT_THAT(Set("cache_dir", "surveys", config), IsEmpty());
+  EXPECT_THAT(Set("cache_dir", "cache", config), IsEmpty());
   EXPECT_THAT(Set("disk_cache", "../tiles", config), IsEmpty());
   EXPECT_THAT(Set("access_log_file", "a.log", config), IsEmpty());
   EXPECT_THAT(Set("tls", "a.pem,/b.key", config), IsEmpty());
   EXPECT_THAT(Set("data_roots", "/dems,more", config), IsEmpty());
   EXPECT_THAT(Set("allowed_prefixes", "/vsis3/bucket/", config), IsEmpty());
   EXPECT_EQ(config.viewer.directory, "/start/page");
-  EXPECT_EQ(config.cache_dir, "/start/surveys");
+  EXPECT_EQ(config.cache_dir, "/start/cache");
   EXPECT_EQ(config.disk_cache.directory, "/tiles");
   EXPECT_EQ(config.access_log_file, "/start/a.log");
   EXPECT_EQ(config.tls, (TlsConfig{"/start/a.pem", "/b.key"}));
@@ -113,10 +113,10 @@ TEST(FromWorkingDirectory, TakesOffWhatAPathGoesUp) {
 TEST(SetServerOption, RefusesRelativePathsWhereThereIsNoDirectory) {
   Config config;
   std::vector<ConfigError> errors;
-  SetServerOption("cache_dir", "/surveys", "", config, errors);
+  SetServerOption("cache_dir", "/cache", "", config, errors);
   SetServerOption("io_threads", "3", "", config, errors);
   EXPECT_THAT(errors, IsEmpty());
-  SetServerOption("cache_dir", "surveys", "", config, errors);
+  SetServerOption("cache_dir", "cache", "", config, errors);
   EXPECT_THAT(errors, ElementsAre(IsError("--cache-dir", "cannot be named; give the path in full")));
 }
 

@@ -156,7 +156,7 @@ for (const dataset of ['jacksboro', 'earth']) {
       }
     });
 
-    it('carry wishes down to the contents', async () => {
+    it('carry request parameters down to the contents', async () => {
       const { uri } = rootsOf(await json(`${base}?error=20&compression=none`))[0].content;
       assert.match(uri, /\?error=20&atleast=1&compression=none$/);
       const glb = await request(new URL(fill(uri, 0, 0, 0), base));

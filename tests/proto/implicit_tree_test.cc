@@ -63,7 +63,7 @@ TEST(LevelsUnder, ReachAsDeepAsTheTreesOwnTiles) {
   EXPECT_EQ(LevelsUnder(available, {8, 100, 60}), 1);
 }
 
-TEST(ImplicitRoots, HoldTheGlobeUnderASmallSurvey) {
+TEST(ImplicitRoots, HoldTheGlobeUnderASmallRaster) {
   Levels available = Above({{1000, 700, 1001, 701}}, 9);
   available[1] = {{0, 0, 3, 1}};
   available[2] = {{0, 0, 7, 3}};

@@ -292,7 +292,7 @@ def tiles_of(dataset, level):
 
 def row_16(_, test_binary, __):
     kept, _, recorded, _ = tests(binary_of(test_binary, "http/server_http_test"), "Negotiate.ComesToFortyOneErrorsAtMost")
-    return kept, f"{recorded.get('wishes', 0):,} errors come to {recorded.get('steps', 0)} a tile and format"
+    return kept, f"{recorded.get('errors', 0):,} errors come to {recorded.get('steps', 0)} a tile and format"
 
 
 def row_17(_, test_binary, __):

@@ -25,7 +25,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 // Flat triangles that are farther off than this are those that go half around the Earth and collapse into a line.
-constexpr double kMostSag_m = 1e6;
+constexpr double kMaxSag_m = 1e6;
 
 // The part of the area inside the source's bounds; of two parts the wider one. Nothing where they do not meet.
 std::optional<AreaRequest> Clip(const AreaRequest& area, const dem::GeoBounds& bounds) {
@@ -178,7 +178,7 @@ Result<EncodedTile> BuildAreaMesh(const dem::DemSource& source, const AreaPlan& 
   if (area.coordinates != AreaCoordinates::kGeographic) surface.AddCurvature(options);
   tin::GreedyTriangulation greedy(*field, std::move(options));
   const double bound_m =
-      area.coordinates == AreaCoordinates::kGeographic ? area.error_m : std::min(area.error_m, kMostSag_m);
+      area.coordinates == AreaCoordinates::kGeographic ? area.error_m : std::min(area.error_m, kMaxSag_m);
   tin::GreedyGoal goal;
   goal.max_error = bound_m;
   if (!greedy.Run(goal, stop)) return cancelled();

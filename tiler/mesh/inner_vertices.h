@@ -6,7 +6,7 @@
 
 namespace terrace::tiler {
 
-// The normals of an edge are those of its own samples, which the neighbour shares. Beside the end of a survey they know
+// The normals of an edge are those of its own samples, which the neighbour shares. Beside the end of the data they know
 // nothing of the cliff that the tile's few triangles span, and light falls on the wrong sides. Where that is so for
 // half of the vertices, as many are inserted on a grid of lattice nodes: their normals follow the triangles
 // (docs/decisions/0003-normals-inside-follow-the-mesh.md). Edges stay as they are.

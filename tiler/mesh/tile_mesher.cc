@@ -41,7 +41,7 @@ proto::EdgeSteps EdgeStepsOf(const dem::DemSource& source, const geo::TileKey& k
   return proto::MakeEdgeSteps(error_m, needed, pole_step, key.y == 0, key.y == rows - 1);
 }
 
-// Quantized, with what the wire's rounding pushed over the bound inserted.
+// Quantizes, and inserts the samples that quantization pushed over the bound.
 Result<MeshedTile> Finish(tin::TinMesh mesh, const proto::LatticeView& lattice, const proto::EdgeSteps& steps,
                           double error_m, const std::stop_token& stop) {
   proto::TileMeter meter(lattice, error_m);
@@ -79,17 +79,17 @@ Result<tin::TinMesh> RefineWithinFormat(const tin::HeightField& field, const tin
   }
 }
 
-// The drop pass spends the whole bound it is given; what the wire's rounding then pushes over it would have to be
+// The drop pass spends the whole bound it is given; what quantization then pushes over it would have to be
 // inserted again. A 32nd is kept for that.
 Result<tin::TinMesh> Compact(const tin::HeightField& field, const tin::TinMesh& mesh, const tin::GreedyOptions& plan,
                              double error_m, const std::stop_token& stop) {
-  std::vector<std::uint16_t> wire;
-  for (int i = 0; i < field.width(); ++i) wire.push_back(proto::QuantizedPosition(i, field.width() - 1));
+  std::vector<std::uint16_t> quantized;
+  for (int i = 0; i < field.width(); ++i) quantized.push_back(proto::QuantizedPosition(i, field.width() - 1));
   tin::DropOptions options;
   options.max_error = error_m * 31 / 32;
   options.curvature = plan.curvature;
-  options.wire_columns = wire;
-  options.wire_rows = wire;
+  options.quantized_columns = quantized;
+  options.quantized_rows = quantized;
   std::optional<tin::TinMesh> dropped = tin::DropVertices(field, mesh, options, stop);
   if (!dropped) return Cancelled();
   return *std::move(dropped);

@@ -1,4 +1,4 @@
-// From heights and their refinement to the mesh of a tile as it goes on the wire.
+// From heights and their refinement to the quantized mesh of a tile.
 #pragma once
 
 #include <chrono>
@@ -43,14 +43,14 @@ tin::HeightField FieldOf(const proto::LatticeView& lattice);
 // How the tile is refined, for every error at once (refine_plan.h).
 tin::GreedyOptions PlanOf(const dem::DemSource& source, const proto::LatticeView& lattice, tin::Criterion criterion);
 
-// The tile's mesh to the error before any wire rounds it: replayed, and dropped where the rules say so. `refinement` is
+// The tile's mesh to the error before it is quantized: replayed, and dropped where the rules say so. `refinement` is
 // as for MeshTile. kCancelled: stopped.
 Result<StartedMesh> StartMesh(const dem::DemSource& source, const proto::LatticeView& lattice,
                               const tin::Refinement& refinement, const MeshRules& rules, double wanted_error_m,
                               const std::stop_token& stop);
 
 // The tile's mesh to the error: replayed, dropped where the rules say so, quantized, measured, and mended where the
-// wire's rounding pushed a sample over the bound. `refinement` is PlanOf's run to this error or a finer one, or one
+// quantization pushed a sample over the bound. `refinement` is PlanOf's run to this error or a finer one, or one
 // that ended above the format's number of vertices: then the inside is coarser, the edges are not. A tile with a
 // triangle that rounding would turn over is meshed by the plain rules. kCancelled: stopped.
 Result<MeshedTile> MeshTile(const dem::DemSource& source, const proto::LatticeView& lattice,

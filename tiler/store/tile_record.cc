@@ -8,7 +8,7 @@
 namespace terrace::tiler {
 namespace {
 
-constexpr std::int32_t kMostCells = 256;  // of geo::Lattice
+constexpr std::int32_t kMaxCells = 256;  // of geo::Lattice
 
 tl::unexpected<Error> NotARecord() { return MakeError(ErrorCode::kInvalidArgument, "not a cache record"); }
 
@@ -100,7 +100,7 @@ std::string SerializeRefinedTile(const RefinedTile& tile) {
   writer.Put(static_cast<std::int32_t>(heights.lattice.level));
   writer.Put(static_cast<std::int32_t>(heights.lattice.cells));
   writer.Put(static_cast<std::int32_t>(heights.stride));
-  writer.Put(heights.source_gap_m);
+  writer.Put(heights.source_error_m);
   PutText(writer, {reinterpret_cast<const char*>(heights.heights.data()), heights.heights.size() * sizeof(float)});
   PutText(writer, tile.refinement.Serialize());
   return writer.Take();
@@ -113,11 +113,11 @@ Result<RefinedTile> ParseRefinedTile(std::string_view bytes) {
   heights.lattice.level = reader.Get<std::int32_t>();
   heights.lattice.cells = reader.Get<std::int32_t>();
   heights.stride = reader.Get<std::int32_t>();
-  heights.source_gap_m = reader.Get<double>();
+  heights.source_error_m = reader.Get<double>();
   const std::string_view raw = GetText(reader);
   const std::string_view record = GetText(reader);
   if (!reader.ok() || reader.remaining() > 0) return NotARecord();
-  if (heights.lattice.cells < 1 || heights.lattice.cells > kMostCells) return NotARecord();
+  if (heights.lattice.cells < 1 || heights.lattice.cells > kMaxCells) return NotARecord();
   const auto side = static_cast<std::size_t>(heights.lattice.cells) + 3;
   if (heights.stride != heights.lattice.cells + 3 || raw.size() != side * side * sizeof(float)) return NotARecord();
   heights.heights.resize(side * side);

@@ -11,7 +11,7 @@ CellSurface::CellSurface(const std::array<Position, 4>& corners, bool is_separab
       east_{corners[1].x - origin_.x, corners[1].y - origin_.y},
       north_{corners[2].x - origin_.x, corners[2].y - origin_.y},
       twist_{corners[3].x - corners[1].x - north_.x, corners[3].y - corners[1].y - north_.y} {
-  // Lines between nodes stray from straight ones by far less than that part of the cell.
+  // Lines between nodes deviate from straight ones by far less than that fraction of the cell.
   constexpr double kBulge = 1.0 / 32;
   const double bulge = is_separable ? 0 : kBulge;
   const auto extent = [](double east, double north, double twist) {

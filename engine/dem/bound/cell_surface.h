@@ -18,7 +18,7 @@ class CellSurface {
 
   void SetHeight(std::size_t corner, double height) { heights_[corner] = height; }
   // Heights of samples are known to this much less.
-  void Widen(double gap) { widened_ += gap; }
+  void Widen(double error) { widened_ += error; }
 
   // How far a sample at a place is from the surface, at most; 0 where the place is outside the cell.
   double Apart(const Position& at, double sample) const;

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "engine/core/result.h"
-#include "engine/dem/bound/cell_gap.h"
+#include "engine/dem/bound/cell_error_bound.h"
 
 namespace terrace::dem {
 
@@ -17,13 +17,13 @@ class LooseCells {
   static bool MayRead(int factor) { return factor > 1 && factor <= 16; }
 
   // What these refer to outlives it.
-  LooseCells(const Sheet& sheet, const CellGap& single) : sheet_(sheet), single_(single) {}
+  LooseCells(const RasterGrid& grid, const CellErrorBound& single) : grid_(grid), single_(single) {}
 
   // Cells of a group lie beside each other: their samples are read together.
   void BeginGroup() { groups_.emplace_back(); }
 
-  // `gap`: what is known. Precondition: a group has begun.
-  void Add(const TileCell& cell, const CellGap::Place& place, double gap);
+  // `error`: what is known. Precondition: a group has begun.
+  void Add(const TileCell& cell, const CellErrorBound::CellSamples& place, double error);
 
   // Raises `bound` to that of all cells, reading no more than that needs and no more than a bounded number of samples.
   // kUnavailable: a raster cannot be read now. kCancelled: stopped.
@@ -32,16 +32,16 @@ class LooseCells {
  private:
   struct Cell {
     TileCell cell;
-    CellGap::Place place;
-    double gap;
+    CellErrorBound::CellSamples place;
+    double error;
   };
   struct Group {
     std::vector<Cell> cells;
-    double gap = 0;
+    double error = 0;
   };
 
-  const Sheet& sheet_;
-  const CellGap& single_;
+  const RasterGrid& grid_;
+  const CellErrorBound& single_;
   std::vector<Group> groups_;
 };
 

@@ -119,9 +119,9 @@ std::optional<BlockRange> RangeTable::TryQuery(double west, double north, double
   };
   int x0 = pixel(west, width_) / kBlock, x1 = pixel(east, width_) / kBlock;
   int y0 = pixel(north, height_) / kBlock, y1 = pixel(south, height_) / kBlock;
-  constexpr int kMostBlocksPerAxis = 12;
+  constexpr int kMaxBlocksPerAxis = 12;
   std::size_t level = 0;
-  while (std::max(x1 - x0, y1 - y0) >= kMostBlocksPerAxis && level + 1 < levels_.size()) {
+  while (std::max(x1 - x0, y1 - y0) >= kMaxBlocksPerAxis && level + 1 < levels_.size()) {
     ++level;
     x0 /= 2;
     x1 /= 2;

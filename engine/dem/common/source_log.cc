@@ -33,15 +33,15 @@ void SourceLog::Write(Level level, std::string_view kind, const std::string& pat
 bool SourceLog::Admits(Level level, std::string_view kind, const std::string& text) {
   const std::lock_guard lock(mutex_);
   Lines& lines = lines_[{level, std::string(kind)}];
-  if (++lines.count > kMostLines) return false;
+  if (++lines.count > kMaxLines) return false;
   lines.example = text;
   return true;
 }
 
 SourceLog::~SourceLog() {
   for (const auto& [kind, lines] : lines_) {
-    if (lines.count <= kMostLines) continue;
-    spdlog::log(LevelOf(kind.first), "{} more sources have lines like this one: {}", lines.count - kMostLines,
+    if (lines.count <= kMaxLines) continue;
+    spdlog::log(LevelOf(kind.first), "{} more sources have lines like this one: {}", lines.count - kMaxLines,
                 lines.example);
   }
 }

@@ -18,7 +18,7 @@ namespace terrace::dem {
 class SourceLog {
  public:
   enum class Level : std::uint8_t { kDebug, kInfo, kWarn };
-  static constexpr std::size_t kMostLines = 5;  // of a kind
+  static constexpr std::size_t kMaxLines = 5;  // of a kind
 
   SourceLog() = default;
   // Writes how many lines of each kind were left out.

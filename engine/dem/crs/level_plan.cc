@@ -44,14 +44,14 @@ int CellsOf(int level, const SourceSpacing& spacing) {
 // Around a pole meridians meet: the centre of a polar map says nothing about grid cells elsewhere in it. In a
 // geographic source its columns meet as well.
 double RepresentativeLatitude(const SourceSpacing& spacing) {
-  constexpr double kMostPolar = 75;
-  return spacing.geographic ? spacing.latitude : std::clamp(spacing.latitude, -kMostPolar, kMostPolar);
+  constexpr double kMaxPolar = 75;
+  return spacing.geographic ? spacing.latitude : std::clamp(spacing.latitude, -kMaxPolar, kMaxPolar);
 }
 
 // Metres on the ground from one Web Mercator pixel to the next, the same in both axes but for the Earth's flattening.
 double MercatorStep(int depth, const SourceSpacing& spacing) {
-  constexpr double kMostPolar = geo::kMercatorLatitude;
-  const double latitude = std::clamp(RepresentativeLatitude(spacing), -kMostPolar, kMostPolar);
+  constexpr double kMaxPolar = geo::kMercatorLatitude;
+  const double latitude = std::clamp(RepresentativeLatitude(spacing), -kMaxPolar, kMaxPolar);
   return geo::MercatorGrid{depth}.StepDegrees() * geo::MetresPerDegreeEast(latitude);
 }
 

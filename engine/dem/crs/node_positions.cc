@@ -17,7 +17,7 @@ struct Cell {
 
 // Cells are interpolated from kKnots x kKnots of their positions, the outermost on their edges.
 constexpr int kKnots = 5;
-constexpr int kLeastCell = 2 * (kKnots - 1);  // smaller ones have hardly more nodes than that
+constexpr int kMinCell = 2 * (kKnots - 1);  // smaller ones have hardly more nodes than that
 
 // Lagrange's weights of the knots, `step` nodes from a cell's edge.
 std::array<double, kKnots> Weights(double step, int size) {
@@ -114,7 +114,7 @@ class GridNodes {
   void Fill(const Cell& cell) {
     const Part part = Inside(cell);
     if (part.empty() || !Touches(cell)) return;
-    if (cell.size < kLeastCell) {
+    if (cell.size < kMinCell) {
       FillExactly(part.west, part.south, part.east - part.west, part.north - part.south);
     } else if (!Interpolate(cell, part)) {
       const int half = cell.size / 2;

@@ -14,11 +14,11 @@ constexpr double kUnknownUndulation = std::numeric_limits<double>::quiet_NaN();
 // Boxes of the bounds are no wider than the cells of the finest grid that the geoid reads, as far as there are not too
 // many of them.
 constexpr double kBoxDegrees = 0.125;
-constexpr int kFewestBoxes = 8, kMostBoxes = 512;  // along a side
+constexpr int kMinBoxes = 8, kMaxBoxes = 512;  // along a side
 
 int BoxesAlong(double degrees, double finest_cell) {
   const double box = finest_cell > 0 ? std::min(kBoxDegrees, finest_cell) : kBoxDegrees;
-  return static_cast<int>(std::clamp(std::ceil(degrees / box), double{kFewestBoxes}, double{kMostBoxes}));
+  return static_cast<int>(std::clamp(std::ceil(degrees / box), double{kMinBoxes}, double{kMaxBoxes}));
 }
 
 bool IsAtPole(const geo::Lattice& lattice, std::int64_t row) { return row <= 0 || row >= lattice.rows(); }
@@ -233,7 +233,7 @@ HeightRange Undulations::RangeOf(double west, double south, double width, double
 // By the grid's nodes, in strips of rows.
 template <typename Grid>
 Result<void> Undulations::Interpolate(const Grid& grid, const NodeWindow& window, std::vector<double>& out) const {
-  constexpr std::int64_t kMostNodes = 1 << 18;
+  constexpr std::int64_t kMaxNodes = 1 << 18;
   const UndulationGrid& nodes = *geoid_->grid();
   std::vector<NodePlace> columns, rows;
   for (std::int64_t c = window.column; c < window.column + window.columns; ++c) {
@@ -251,7 +251,7 @@ Result<void> Undulations::Interpolate(const Grid& grid, const NodeWindow& window
     const auto strip = [&] { return std::span(rows).subspan(first, count); };
     while (first + count < rows.size()) {
       ++count;
-      if (UndulationPatch::CountNodes(columns, strip()) <= kMostNodes) continue;
+      if (UndulationPatch::CountNodes(columns, strip()) <= kMaxNodes) continue;
       --count;
       break;
     }

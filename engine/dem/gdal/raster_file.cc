@@ -24,7 +24,7 @@ constexpr int kMaxSide = 1 << 22;
 constexpr std::int64_t kMaxSamples = std::int64_t{1} << 36;
 // GDAL decodes whole storage blocks, whatever its cache is allowed: a small file can claim a block of gigabytes.
 constexpr std::int64_t kMaxBlockBytes = std::int64_t{128} << 20;
-constexpr int kMostBands = 4096;  // hyperspectral images have hundreds
+constexpr int kMaxBands = 4096;  // hyperspectral images have hundreds
 
 constexpr unsigned kOpenFlags = GDAL_OF_RASTER | GDAL_OF_READONLY | GDAL_OF_VERBOSE_ERROR;
 
@@ -85,7 +85,7 @@ Result<void> CheckShape(GDALDataset& dataset, const std::string& path) {
                      "-srcwin or coarsen it with `gdalwarp -tr`",
                      path, width, height, kMaxSide, kMaxSamples);
   }
-  if (dataset.GetRasterCount() > kMostBands) {
+  if (dataset.GetRasterCount() > kMaxBands) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "{}: has {} bands; take the one with heights out with "
                      "`gdal_translate -b 1 in out.tif`",
@@ -121,7 +121,7 @@ class BlockEnds {
     band.GetBlockSize(&width, &height);
     const int columns = (band.GetXSize() - 1) / width + 1, rows = (band.GetYSize() - 1) / height + 1;
     for (int row = 0; row < rows; ++row) {
-      for (int column = 0; column < columns && looked_at_ < kMostBlocks; ++column, ++looked_at_) {
+      for (int column = 0; column < columns && looked_at_ < kMaxBlocks; ++column, ++looked_at_) {
         const std::uint64_t offset = Tell(band, "BLOCK_OFFSET", column, row);
         if (offset == 0) continue;  // it has none: zeros
         std::uint64_t bytes = Tell(band, "BLOCK_SIZE", column, row);
@@ -135,7 +135,7 @@ class BlockEnds {
   }
 
  private:
-  static constexpr std::int64_t kMostBlocks = std::int64_t{1} << 20;  // half a second
+  static constexpr std::int64_t kMaxBlocks = std::int64_t{1} << 20;  // half a second
 
   static std::uint64_t Tell(GDALRasterBand& band, const char* what, int column, int row) {
     const char* const text = band.GetMetadataItem(fmt::format("{}_{}_{}", what, column, row).c_str(), "TIFF");
@@ -161,13 +161,13 @@ class BlockEnds {
 
 Result<void> CheckSizeToMesh(const std::string& path, int width, int height) {
   // Two gigabytes of floats: what is meshed in one piece must fit in memory several times over.
-  constexpr std::int64_t kMostSamples = std::int64_t{1} << 29;
-  constexpr int kMostPerSide = 1 << 15;  // the mesher's coordinates have 15 bits
-  if (std::int64_t{width} * height <= kMostSamples && std::max(width, height) <= kMostPerSide) return {};
+  constexpr std::int64_t kMaxSamples = std::int64_t{1} << 29;
+  constexpr int kMaxPerSide = 1 << 15;  // the mesher's coordinates have 15 bits
+  if (std::int64_t{width} * height <= kMaxSamples && std::max(width, height) <= kMaxPerSide) return {};
   return MakeError(ErrorCode::kInvalidArgument,
                    "{}: {} x {} samples are too many to mesh in one piece (at most {} in all and {} a side); cut it "
                    "with gdal_translate -srcwin",
-                   path, width, height, kMostSamples, kMostPerSide);
+                   path, width, height, kMaxSamples, kMaxPerSide);
 }
 
 void ForgetRemote(const std::string& path) {

@@ -125,19 +125,19 @@ SampleRules SampleRules::Of(GDALRasterBand& band, const std::string& crs_unit) {
 
 namespace {
 
-// One mark of voids at most and nothing else to look out for: what most bands are.
-bool IsPlain(const SampleRules& rules) { return !rules.has_mask && !rules.is_indicator && rules.marks.empty(); }
+// At most one nodata value and no other rule: most bands.
+bool IsPlain(const SampleRules& rules) { return !rules.has_mask && !rules.is_indicator && rules.extra_nodata.empty(); }
 
 // As ToHeight, without its questions.
 void ToPlainHeights(const SampleRules& rules, const std::vector<double>& raw, std::size_t count, float* out) {
-  double mark = rules.nodata.value_or(std::numeric_limits<double>::quiet_NaN());  // equal to nothing
-  // Samples of Float32 bands are float32 numbers: equal as such are those that equal the rounded mark.
-  if (rules.compare_as_float) mark = static_cast<float>(mark);
+  double nodata = rules.nodata.value_or(std::numeric_limits<double>::quiet_NaN());  // equal to nothing
+  // Samples of Float32 bands are float32 numbers: equal as such are those that equal the rounded value.
+  if (rules.compare_as_float) nodata = static_cast<float>(nodata);
   const double scale = rules.scale, offset = rules.offset, unit = rules.metres_per_unit;
   const double lowest = rules.lowest, highest = rules.highest;
   for (std::size_t i = 0; i < count; ++i) {
     const double height = (raw[i] * scale + offset) * unit;
-    const bool is_valid = (raw[i] != mark) & (height >= lowest) & (height <= highest);
+    const bool is_valid = (raw[i] != nodata) & (height >= lowest) & (height <= highest);
     out[i] = is_valid ? static_cast<float>(height) : SampleRules::kVoid;
   }
 }

@@ -14,16 +14,16 @@
 
 namespace terrace::dem {
 
-// Nothing on Earth is higher or deeper; larger values are undeclared nodata marks (1.7e38, -99999).
+// Nothing on Earth is higher or deeper; larger values are undeclared nodata values (1.7e38, -99999).
 inline constexpr double kMaxAbsHeight = 99998.0;
 
 struct SampleRules {
-  std::optional<double> nodata;   // in raw values
-  bool compare_as_float = false;  // nodata of Float32 bands may be stated with more digits than the samples have
-  std::vector<double> marks;      // further raw values that are voids: stated by the owner, or found
+  std::optional<double> nodata;      // in raw values
+  bool compare_as_float = false;     // nodata of Float32 bands may be stated with more digits than the samples have
+  std::vector<double> extra_nodata;  // further raw values that are voids: stated by the owner, or found
   double lowest = -kMaxAbsHeight, highest = kMaxAbsHeight;  // metres; heights beyond are voids
-  // Samples this near to a void, in either axis, are voids too: the edges of voids were mixed with their marks. Only at
-  // full resolution.
+  // Samples this near to a void, in either axis, are voids too: the edges of voids were mixed with nodata values. Only
+  // at full resolution.
   int rim = 0;
   bool has_mask = false;         // a mask band says which samples are valid
   bool is_signed_byte = false;   // bytes above 127 are negative: GDAL before 3.7 leaves that to its users
@@ -37,7 +37,7 @@ struct SampleRules {
 
   bool IsNodata(double raw) const {
     if (nodata && IsSame(raw, *nodata)) return true;
-    return !marks.empty() && std::ranges::any_of(marks, [&](double mark) { return IsSame(raw, mark); });
+    return !extra_nodata.empty() && std::ranges::any_of(extra_nodata, [&](double value) { return IsSame(raw, value); });
   }
   bool IsSame(double raw, double value) const {
     return raw == value || (compare_as_float && static_cast<float>(raw) == static_cast<float>(value));

@@ -21,7 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 
 // gdalbuildvrt of a country's tiles: some 700 bytes each.
-constexpr std::uintmax_t kMostBytes = std::uintmax_t{64} << 20;
+constexpr std::uintmax_t kMaxBytes = std::uintmax_t{64} << 20;
 constexpr int kDeepestNesting = 4;  // VRTs within VRTs
 
 // What gdalbuildvrt and `gdal_translate -of VRT` write. None of it names a file but SourceFilename.
@@ -91,7 +91,7 @@ class Checker {
 
   Result<void> Check(const fs::path& vrt, int depth) {
     std::error_code ignored;
-    if (depth > kDeepestNesting || fs::file_size(vrt, ignored) > kMostBytes) {
+    if (depth > kDeepestNesting || fs::file_size(vrt, ignored) > kMaxBytes) {
       return MakeError(ErrorCode::kInvalidArgument, "{}: is too large or nested too deeply for a VRT", vrt.string());
     }
     const std::unique_ptr<CPLXMLNode, FreeXml> tree(CPLParseXMLFile(vrt.c_str()));

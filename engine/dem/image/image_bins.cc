@@ -8,7 +8,7 @@
 namespace terrace::dem {
 namespace {
 
-constexpr std::int64_t kMostBins = std::int64_t{1} << 26;  // a gigabyte
+constexpr std::int64_t kMaxBins = std::int64_t{1} << 26;  // a gigabyte
 constexpr int kPixelsAtOnce = 1 << 22;
 
 }  // namespace
@@ -40,7 +40,7 @@ Result<ImageBins> ImageBins::Read(ImageFile& image, int side, const std::vector<
   bins.first_row_ = north;
   bins.cols_ = east - west + 1;
   bins.rows_ = south - north + 1;
-  if (std::int64_t{bins.cols_} * bins.rows_ > kMostBins) {
+  if (std::int64_t{bins.cols_} * bins.rows_ > kMaxBins) {
     return MakeError(
         ErrorCode::kInvalidArgument,
         "{}: {} x {} of its pixels are needed at once; cut it to the DEM, and to the DEM's resolution, with "

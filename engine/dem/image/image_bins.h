@@ -16,7 +16,7 @@ namespace terrace::dem {
 class ImageBins {
  public:
   // A side of a square, in pixels: sums of its levels stay below 2^32.
-  static constexpr int kMostPixels = 4096;
+  static constexpr int kMaxPixels = 4096;
 
   // Reads the squares, `side` pixels wide and counted from the image's first pixel, that interpolation at these pixel
   // positions needs; NaNs need none. kInvalidArgument: more than fit in memory. kUnavailable: the image cannot be read.

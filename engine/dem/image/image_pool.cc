@@ -30,7 +30,7 @@ ImagePool::ImagePool(ImageFile image, StampedFiles files) : path_(image.path()),
   full.Keep(std::move(first));
 }
 
-int ImagePool::MostAveraged() const { return sizes_.back()->factor * ImageBins::kMostPixels; }
+int ImagePool::MostAveraged() const { return sizes_.back()->factor * ImageBins::kMaxPixels; }
 
 Result<ImagePool::Handle> ImagePool::Borrow(int factor) {
   std::size_t i = 0;

@@ -20,7 +20,7 @@ namespace {
 
 // In pixels of the averaged image: far below what shows in 8 bits a channel.
 constexpr double kPositionTolerance = 1e-3;
-constexpr int kLeastSideOfCoarseImages = 256;  // below, the seams between interpolated tiles would show
+constexpr int kMinSideOfCoarseImages = 256;  // below, the seams between interpolated tiles would show
 
 bool IsSide(int side) {
   return side >= Imagery::kMinSide && side <= Imagery::kMaxSide && std::has_single_bit(static_cast<unsigned>(side));
@@ -87,8 +87,8 @@ Result<std::unique_ptr<Imagery>> Imagery::Open(const std::string& path, const Ge
   const auto before = StampOf(path);
   auto image = ImageFile::Open(path);
   if (!image) return tl::unexpected(image.error());
-  constexpr int kMostBands = 4;  // red, green, blue and alpha
-  if (auto complete = CheckComplete(image->dataset(), path, kMostBands); !complete) {
+  constexpr int kMaxBands = 4;  // red, green, blue and alpha
+  if (auto complete = CheckComplete(image->dataset(), path, kMaxBands); !complete) {
     return tl::unexpected(complete.error());
   }
   auto files = StampedFiles::OfOpened(FilesOf(image->dataset(), path), before);
@@ -109,7 +109,7 @@ int Imagery::SideOf(int level, int most) const {
   TERRACE_CHECK(IsSide(most));
   constexpr double kSlack = 1.01;  // what is as fine as the image is fine enough, however its spacing was measured
   int side = most;
-  while (side > kLeastSideOfCoarseImages && SamplesPerCell({level, side / 2}, impl_->spacing) <= kSlack) side /= 2;
+  while (side > kMinSideOfCoarseImages && SamplesPerCell({level, side / 2}, impl_->spacing) <= kSlack) side /= 2;
   return side;
 }
 

@@ -10,7 +10,7 @@ namespace {
 using Ranges = std::vector<geo::TileRange>;
 
 // Sixty bytes each in layer.json, which clients read before their first tile.
-constexpr std::size_t kMostBlocks = 2000;
+constexpr std::size_t kMaxBlocks = 2000;
 
 Ranges Up(const Ranges& ranges, int levels) {
   Ranges up;
@@ -53,7 +53,7 @@ std::vector<Ranges> AvailableTiles(std::span<const Reach> sources) {
     here = Up(wanted, up);
     if (level < deepest) here = Merged(std::move(here), Up(levels[static_cast<std::size_t>(level) + 1], 1));
     here = Down(Up(here, 1), 1);
-    for (int coarser = 1; here.size() > kMostBlocks && coarser <= level; ++coarser) {
+    for (int coarser = 1; here.size() > kMaxBlocks && coarser <= level; ++coarser) {
       here = geo::Disjoint(Down(Up(here, coarser), coarser));
     }
   }

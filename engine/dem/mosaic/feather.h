@@ -1,4 +1,4 @@
-// How much a sheet counts near its edge, where it is blended with what lies below it.
+// How much a raster grid counts near its edge, where it is blended with what lies below it.
 #pragma once
 
 #include <vector>

@@ -61,10 +61,10 @@ std::vector<std::size_t> GridFinder::Candidates(const Family& family, const Geor
   return grids;
 }
 
-GridFinder::Place GridFinder::Add(const PlacedRaster& raster) {
+GridFinder::Membership GridFinder::Add(const PlacedRaster& raster) {
   const Georeference& where = *raster.where;
   Kind& kind = KindOf(raster);
-  std::optional<Place> first;
+  std::optional<Membership> first;
   for (const Family& family : kind.families) {
     // Families are in the order of their first grids.
     if (first && family.grids.front() > first->grid) break;
@@ -72,7 +72,7 @@ GridFinder::Place GridFinder::Add(const PlacedRaster& raster) {
     for (const std::size_t grid : Candidates(family, where)) {
       if (first && grid > first->grid) break;
       if (const auto offset = grids_[grid]->OffsetOf(where)) {
-        first = Place{grid, *offset};
+        first = Membership{grid, *offset};
         break;
       }
     }

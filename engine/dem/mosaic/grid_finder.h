@@ -25,13 +25,13 @@ struct PlacedRaster {
 // pixel sizes are equal to the bit, else a time that grows with the number of different pixel sizes.
 class GridFinder {
  public:
-  struct Place {
+  struct Membership {
     std::size_t grid = 0;  // grids are numbered from 0; the next number is a new grid
     PixelOffset offset;    // of the raster's first pixel from that of the grid's first raster
   };
 
   // The raster's grid. One that fits none begins a new one.
-  Place Add(const PlacedRaster& raster);
+  Membership Add(const PlacedRaster& raster);
 
  private:
   // Bucket of an offset's fraction of a pixel.

@@ -24,13 +24,13 @@ struct VoidGrid {
 // Unknown samples that hang together by their sides.
 struct VoidRegion {
   // Along an axis: those of up to so many are solved, larger ones need a guess from a coarser grid.
-  static constexpr std::int64_t kMostSolved = 128;
+  static constexpr std::int64_t kMaxSolved = 128;
 
   std::vector<std::size_t> samples;  // of the grid, ascending
   GridWindow box;                    // around them
   bool is_cut = false;               // they reach a side of the grid behind which it goes on
 
-  bool is_large() const { return box.columns > kMostSolved || box.rows > kMostSolved; }
+  bool is_large() const { return box.columns > kMaxSolved || box.rows > kMaxSolved; }
   // More must be seen of it to know whether it is large.
   bool is_open() const { return is_cut && !is_large(); }
 };

@@ -40,7 +40,7 @@ inline void CopyRows(std::span<const float> samples, std::int64_t columns, float
 
 // Of a row of blocks of block x block samples. A block is summed row by row, whatever lies beside it; one of more than
 // kLargestPlain samples a side by blocks of that size, each of them row by row: so large averages can be made from
-// parts of a raster that fit into memory (raster_survey.h), bit for bit.
+// parts of a raster that fit into memory (raster_statistics.h), bit for bit.
 class BlockAverages {
  public:
   static constexpr int kLargestPlain = 1024;

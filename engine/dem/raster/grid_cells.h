@@ -33,7 +33,7 @@ class CellFinder {
  private:
   struct Found {
     double position = std::numeric_limits<double>::quiet_NaN();  // equal to none
-    GridAxis::Place place{};
+    GridAxis::Location place{};
   };
 
   const GridAxis columns_, rows_;

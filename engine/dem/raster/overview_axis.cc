@@ -22,7 +22,7 @@ double PixelsPerSample(GDALDataset& dataset, int factor, int pixels, int samples
   return HasOwnOverviews(dataset) ? factor : static_cast<double>(pixels) / samples;
 }
 
-GridAxis::Place OverviewAxis::Around(std::int64_t block) const {
+GridAxis::Location OverviewAxis::Around(std::int64_t block) const {
   if (is_own_) return {block, 0};
   // In halves of pixels, so that all is whole: centre * samples / pixels - 1/2.
   const auto centre = static_cast<std::int64_t>(2 * blocks_.Center(block));

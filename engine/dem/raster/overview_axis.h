@@ -28,7 +28,7 @@ class OverviewAxis {
 
   // Of the block's centre; beyond the outermost samples' centres these count. The sample behind the last one is the
   // first, a turn on.
-  GridAxis::Place Around(std::int64_t block) const;
+  GridAxis::Location Around(std::int64_t block) const;
 
   std::int64_t samples() const { return samples_; }
 

@@ -70,9 +70,9 @@ Result<std::vector<float>> ReadSamples(const Level& level, const SampleRules& ru
 // Blocks of level.start between the overview's samples. The window does not wrap.
 Result<void> InterpolateBlocks(const Level& level, const SampleRules& rules, const GridWindow& window, float* out,
                                const std::stop_token& stop) {
-  std::vector<GridAxis::Place> columns;
+  std::vector<GridAxis::Location> columns;
   for (std::int64_t c = 0; c < window.columns; ++c) columns.push_back(level.x.Around(window.column + c));
-  const auto end = [](const GridAxis::Place& place) { return place.index + (place.weight > 0 ? 2 : 1); };
+  const auto end = [](const GridAxis::Location& place) { return place.index + (place.weight > 0 ? 2 : 1); };
   GridWindow around{columns.front().index, level.y.Around(window.row).index, 0, 0};
   around.columns = end(columns.back()) - around.column;
   around.rows = end(level.y.Around(window.row + window.rows - 1)) - around.row;
@@ -80,11 +80,11 @@ Result<void> InterpolateBlocks(const Level& level, const SampleRules& rules, con
   if (!samples) return tl::unexpected(samples.error());
   std::vector<double> line(static_cast<std::size_t>(around.columns));
   for (std::int64_t r = 0; r < window.rows; ++r) {
-    const GridAxis::Place y = level.y.Around(window.row + r);
+    const GridAxis::Location y = level.y.Around(window.row + r);
     const float* const upper = samples->data() + (y.index - around.row) * around.columns;
     const float* const lower = y.weight > 0 ? upper + around.columns : upper;
     for (std::size_t i = 0; i < line.size(); ++i) line[i] = upper[i] * (1 - y.weight) + lower[i] * y.weight;
-    for (const GridAxis::Place& x : columns) {
+    for (const GridAxis::Location& x : columns) {
       const double* const at = line.data() + (x.index - around.column);
       double height = x.weight > 0 ? at[0] + x.weight * (at[1] - at[0]) : at[0];
       if (std::isnan(height)) {
@@ -152,7 +152,7 @@ double GridAxis::Center(std::int64_t index) const {
   return static_cast<double>(begin + end) / 2 + static_cast<double>(turns * samples_);
 }
 
-GridAxis::Place GridAxis::Locate(double position) const {
+GridAxis::Location GridAxis::Locate(double position) const {
   // floor, without a call: processors without SSE 4.1 have no instruction for it.
   const double place = position / factor_ - 0.5;
   auto index = static_cast<std::int64_t>(place);

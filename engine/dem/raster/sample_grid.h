@@ -28,11 +28,11 @@ class GridAxis {
   GridAxis(int samples, int factor, bool wraps)
       : samples_(samples), factor_(factor), count_((samples + factor - 1) / factor), wraps_(wraps) {}
 
-  struct Place {
+  struct Location {
     std::int64_t index;  // of the sample at or before the position; with wrapping it may be -1
     double weight;       // of the next sample; 0 beyond the outermost centres
   };
-  Place Locate(double position) const;
+  Location Locate(double position) const;
 
   std::int64_t count() const { return count_; }
   bool wraps() const { return wraps_; }

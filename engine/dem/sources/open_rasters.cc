@@ -52,11 +52,11 @@ std::optional<LeftOut> LeftOutOf(const DemFile& file) {
 }
 
 void TellLeftOut(spdlog::level::level_enum level, const std::vector<std::string>& names) {
-  constexpr std::size_t kMostNamed = 5;
+  constexpr std::size_t kMaxNamed = 5;
   if (names.empty()) return;
-  const auto end = names.begin() + static_cast<std::ptrdiff_t>(std::min(names.size(), kMostNamed));
+  const auto end = names.begin() + static_cast<std::ptrdiff_t>(std::min(names.size(), kMaxNamed));
   spdlog::log(level, "left out of a folder: {}{}", fmt::join(names.begin(), end, ", "),
-              names.size() > kMostNamed ? fmt::format(" and {} more", names.size() - kMostNamed) : "");
+              names.size() > kMaxNamed ? fmt::format(" and {} more", names.size() - kMaxNamed) : "");
 }
 
 // Those files of folders that are no rasters go away. Which of them look like some, and why they are none.
@@ -115,7 +115,7 @@ class Opening {
     return goes_on;
   }
 
-  // Surveys that were cut into files have some without a height.
+  // Datasets that were cut into files have some without a height.
   bool IsNothing(std::size_t i, const Opened& opened) const {
     return !opened && opened.error().code == ErrorCode::kNotFound && files_[i].may_be_other;
   }
@@ -138,7 +138,7 @@ class Opening {
 
   const std::vector<DemFile>& files_;
   const DemOptions& options_;
-  const std::shared_ptr<SurveyPages> pages_ = std::make_shared<SurveyPages>(kKeptTables, kPagedTables);
+  const std::shared_ptr<StatisticsPages> pages_ = std::make_shared<StatisticsPages>(kKeptTables, kPagedTables);
   SourceLog log_;
   std::mutex mutex_;
   std::map<std::size_t, std::stop_source> running_;  // guarded by mutex_, as are these

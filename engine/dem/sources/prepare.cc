@@ -14,12 +14,12 @@
 namespace terrace::dem {
 namespace {
 
-// Changes whenever blocks are read otherwise from the same overviews: a survey compares samples with them.
+// Changes whenever blocks are read otherwise from the same overviews: the statistics compare samples with them.
 constexpr std::uint32_t kOverviewReading = 2;
-// Changes whenever other voids are found in the same raster (void_marks.h).
-constexpr std::uint32_t kVoidFinding = 2;
+// Changes whenever other voids are found in the same raster (undeclared_nodata.h).
+constexpr std::uint32_t kNodataDetection = 2;
 
-// Everything that decides what a survey says of a raster, and is known before.
+// Everything that decides the statistics of a raster and is known before.
 std::uint64_t KeyOf(const RasterLayout& layout, bool find_voids, const std::string& path, const StampedFiles& files) {
   ByteWriter writer;
   writer.PutBytes(path);
@@ -35,17 +35,17 @@ std::uint64_t KeyOf(const RasterLayout& layout, bool find_voids, const std::stri
        {rules.scale, rules.offset, rules.metres_per_unit, rules.lowest, rules.highest, double(rules.rim)}) {
     writer.Put(rule);
   }
-  writer.Put(static_cast<std::uint32_t>(rules.marks.size()));
-  for (const double mark : rules.marks) writer.Put(mark);
+  writer.Put(static_cast<std::uint32_t>(rules.extra_nodata.size()));
+  for (const double value : rules.extra_nodata) writer.Put(value);
   for (const int factor : layout.overview_factors) writer.Put(factor);
   if (!layout.overview_factors.empty()) writer.Put(kOverviewReading);
-  if (find_voids) writer.Put(kVoidFinding);
+  if (find_voids) writer.Put(kNodataDetection);
   writer.Put(layout.coast_step_m);
   const std::string bytes = writer.Take();
   return XXH3_64bits(bytes.data(), bytes.size());
 }
 
-// One raster's way to its survey. Without a record everything is kept in memory alone.
+// One raster's way to its statistics. Without a record everything is kept in memory alone.
 class Preparer {
  public:
   Preparer(GDALDataset& dataset, const RasterLayout& layout, const std::string& path, const StampedFiles& files,
@@ -57,8 +57,8 @@ class Preparer {
         shape_{layout, KeyOf(layout, options.find_voids, path, files), {}},
         chunks_(layout.width, layout.height) {
     if (!options.cache_dir.empty()) {
-      record_ =
-          RecordPath(options.cache_dir, path, layout.rules.marks, options.find_voids, !layout.overview_factors.empty());
+      record_ = StatisticsPath(options.cache_dir, path, layout.rules.extra_nodata, options.find_voids,
+                               !layout.overview_factors.empty());
     }
     prepared_.preparation.parts = chunks_.count();
   }
@@ -69,12 +69,13 @@ class Preparer {
       if (auto opened = OpenWriter(); !opened) return tl::unexpected(opened.error());
       if (!writer_ && Load()) return std::move(prepared_);
     }
-    auto survey = Survey();
-    if (survey && options_.find_voids && !shape_.findings.any()) survey = WithoutFoundVoids(*std::move(survey));
-    if (!survey) return Named(survey.error());
-    prepared_.findings = shape_.findings;
-    prepared_.survey = *std::move(survey);
-    FinishRecord();
+    auto statistics = ReadStatistics();
+    if (statistics && options_.find_voids && !shape_.detected.any())
+      statistics = WithoutFoundVoids(*std::move(statistics));
+    if (!statistics) return Named(statistics.error());
+    prepared_.detected = shape_.detected;
+    prepared_.statistics = *std::move(statistics);
+    FinishCache();
     return std::move(prepared_);
   }
 
@@ -84,10 +85,10 @@ class Preparer {
   }
 
   bool Load() {
-    auto known = LoadRecord(record_, shape_);
+    auto known = LoadStatistics(record_, shape_);
     if (!known) return false;
-    prepared_.findings = std::move(known->findings);
-    prepared_.survey = std::move(known->survey);
+    prepared_.detected = std::move(known->detected);
+    prepared_.statistics = std::move(known->statistics);
     prepared_.averages = std::move(known->averages);
     prepared_.record = record_;
     prepared_.shape = shape_;
@@ -95,7 +96,7 @@ class Preparer {
     return true;
   }
 
-  void GiveUpRecord(const Error& error) {
+  void GiveUpCache(const Error& error) {
     LogSource(SourceLog::Level::kWarn, path_, "what is learnt of it is not kept: {}", error.message);
     writer_.reset();
   }
@@ -104,62 +105,63 @@ class Preparer {
   Result<void> OpenWriter() {
     std::error_code failed;
     std::filesystem::create_directories(options_.cache_dir, failed);
-    auto writer = RecordWriter::Open(record_, shape_, options_.stop);
+    auto writer = StatisticsCacheWriter::Open(record_, shape_, options_.stop);
     if (writer) {
       writer_ = *std::move(writer);
       if (writer_) shape_ = writer_->shape();
       return {};
     }
     if (writer.error().code == ErrorCode::kCancelled) return tl::unexpected(writer.error());
-    GiveUpRecord(writer.error());
+    GiveUpCache(writer.error());
     return {};
   }
 
   // One pass through the raster, behind what was done of it before.
-  Result<RasterSurvey> Survey() {
+  Result<RasterStatistics> ReadStatistics() {
     const RasterLayout layout = shape_.EffectiveLayout();
-    SurveyAssembler assembler(layout);
+    StatisticsAssembler assembler(layout);
     int done = 0;
     if (writer_) {
-      auto resumed = writer_->Resume([&](const ChunkSurvey& part) { assembler.Add(chunks_.At(done++), part); });
-      if (!resumed) GiveUpRecord(resumed.error());
-      prepared_.preparation.parts_kept += done;
+      auto resumed = writer_->Resume([&](const ChunkStatistics& part) { assembler.Add(chunks_.At(done++), part); });
+      if (!resumed) GiveUpCache(resumed.error());
+      prepared_.preparation.chunks_kept += done;
       if (done > 0)
         LogSource(SourceLog::Level::kInfo, path_, "{} of {} parts were prepared before", done, chunks_.count());
     }
     for (; done < chunks_.count(); ++done) {
       const auto part =
-          SurveyChunk(dataset_, layout, chunks_.At(done), prepared_.preparation.parts_read, options_.stop);
+          ReadChunkStatistics(dataset_, layout, chunks_.At(done), prepared_.preparation.chunks_read, options_.stop);
       if (!part) return tl::unexpected(part.error());
       assembler.Add(chunks_.At(done), *part);
       if (writer_) {
-        if (auto added = writer_->Add(*part); !added) GiveUpRecord(added.error());
+        if (auto added = writer_->Add(*part); !added) GiveUpCache(added.error());
       }
       if (options_.progress) options_.progress((done + 1.0) / chunks_.count());
     }
     return assembler.Finish(dataset_, options_.stop);
   }
 
-  // The survey, or another one under the rules that it calls for.
-  Result<RasterSurvey> WithoutFoundVoids(RasterSurvey survey) {
+  // The statistics, or another one under the rules that it calls for.
+  Result<RasterStatistics> WithoutFoundVoids(RasterStatistics statistics) {
     const SampleRules& rules = shape_.layout.rules;
-    const bool has_collar = survey.zeros.IsCollar(shape_.layout.width, shape_.layout.height);
-    if (!MayHideVoids(rules, survey.lowest, survey.highest, survey.voids > 0, has_collar)) return survey;
-    auto findings = FindVoids(*dataset_.GetRasterBand(1), rules, has_collar, shape_.layout.coast_step_m, options_.stop);
-    if (!findings) return tl::unexpected(findings.error());
-    if (!findings->any()) return survey;
-    shape_.findings = *std::move(findings);
+    const bool has_collar = statistics.zeros.IsCollar(shape_.layout.width, shape_.layout.height);
+    if (!MayHideVoids(rules, statistics.lowest, statistics.highest, statistics.voids > 0, has_collar))
+      return statistics;
+    auto detected = FindVoids(*dataset_.GetRasterBand(1), rules, has_collar, shape_.layout.coast_step_m, options_.stop);
+    if (!detected) return tl::unexpected(detected.error());
+    if (!detected->any()) return statistics;
+    shape_.detected = *std::move(detected);
     if (writer_) {
-      if (auto restarted = writer_->Restart(shape_.findings); !restarted) GiveUpRecord(restarted.error());
+      if (auto restarted = writer_->Restart(shape_.detected); !restarted) GiveUpCache(restarted.error());
     }
-    return Survey();
+    return ReadStatistics();
   }
 
-  void FinishRecord() {
+  void FinishCache() {
     // A file that changed meanwhile is a mixture, which its caller will refuse.
     if (!writer_ || files_.FirstChanged()) return;
-    if (auto finished = writer_->Finish(prepared_.survey); !finished) return GiveUpRecord(finished.error());
-    auto known = LoadRecord(record_, shape_);
+    if (auto finished = writer_->Finish(prepared_.statistics); !finished) return GiveUpCache(finished.error());
+    auto known = LoadStatistics(record_, shape_);
     if (!known) return;
     prepared_.averages = std::move(known->averages);
     prepared_.record = record_;
@@ -170,28 +172,28 @@ class Preparer {
   const std::string& path_;
   const StampedFiles& files_;
   const PrepareOptions& options_;
-  RecordShape shape_;
+  StatisticsShape shape_;
   const ChunkGrid chunks_;
   std::string record_;  // its path; empty: none
-  std::optional<RecordWriter> writer_;
+  std::optional<StatisticsCacheWriter> writer_;
   PreparedRaster prepared_;
 };
 
 }  // namespace
 
-std::string RecordPath(const std::string& cache_dir, const std::string& path, const std::vector<double>& marks,
-                       bool find_voids, bool has_overviews) {
+std::string StatisticsPath(const std::string& cache_dir, const std::string& path,
+                           const std::vector<double>& extra_nodata, bool find_voids, bool has_overviews) {
   std::error_code unresolved;
   std::filesystem::path whole = std::filesystem::weakly_canonical(path, unresolved);
   if (unresolved) whole = path;
   ByteWriter writer;
   writer.PutBytes(whole.string());
-  for (const double mark : marks) writer.Put(mark);
+  for (const double value : extra_nodata) writer.Put(value);
   if (!find_voids) writer.Put<std::uint8_t>(0);
   if (has_overviews) writer.Put<std::uint8_t>(1);
   const std::string bytes = writer.Take();
   return (std::filesystem::path(cache_dir) /
-          fmt::format("{}-{:016x}.survey", whole.filename().string(), XXH3_64bits(bytes.data(), bytes.size())))
+          fmt::format("{}-{:016x}.statistics", whole.filename().string(), XXH3_64bits(bytes.data(), bytes.size())))
       .string();
 }
 

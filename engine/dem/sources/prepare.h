@@ -1,4 +1,4 @@
-// A raster's survey, from the cache folder where it was made before, else made now and kept there.
+// A raster's statistics, from the cache folder where it was made before, else made now and kept there.
 #pragma once
 
 #include <gdal_priv.h>
@@ -11,8 +11,8 @@
 
 #include "engine/core/result.h"
 #include "engine/dem/gdal/file_stamp.h"
-#include "engine/dem/statistics/raster_survey.h"
-#include "engine/dem/statistics/survey_record.h"
+#include "engine/dem/statistics/raster_statistics.h"
+#include "engine/dem/statistics/statistics_cache.h"
 
 namespace terrace::dem {
 
@@ -23,20 +23,20 @@ struct PrepareOptions {
   std::stop_token stop = {};
 };
 
-// How a survey came about.
+// How the statistics were made.
 struct Preparation {
   bool from_record = false;
-  int parts = 0;       // of the raster
-  int parts_kept = 0;  // of an interrupted run
-  std::int64_t parts_read = 0;
+  int parts = 0;        // of the raster
+  int chunks_kept = 0;  // of an interrupted run
+  std::int64_t chunks_read = 0;
 };
 
 struct PreparedRaster {
-  VoidFindings findings;  // undeclared voids; the survey is one without them
-  RasterSurvey survey;
-  std::shared_ptr<const RecordedAverages> averages;  // null: there are none
-  std::string record;                                // where the survey is kept; empty: nowhere
-  RecordShape shape;                                 // the record's
+  DetectedNodata detected;  // undeclared voids; the statistics is one without them
+  RasterStatistics statistics;
+  std::shared_ptr<const CachedAverages> averages;  // null: there are none
+  std::string record;                              // where the statistics is kept; empty: nowhere
+  StatisticsShape shape;                           // the record's
   Preparation preparation;
 };
 
@@ -48,7 +48,8 @@ Result<PreparedRaster> PrepareRaster(GDALDataset& dataset, const RasterLayout& l
 // The record of a raster: named after its file and a hash of its whole path, of what its owner says of its voids, as
 // two datasets may have one file and think differently of it, and of whether overviews are used: where they turn out to
 // be made of voids it takes two records, one to know that and one without them, and both are found again.
-std::string RecordPath(const std::string& cache_dir, const std::string& path, const std::vector<double>& marks = {},
-                       bool find_voids = true, bool has_overviews = false);
+std::string StatisticsPath(const std::string& cache_dir, const std::string& path,
+                           const std::vector<double>& extra_nodata = {}, bool find_voids = true,
+                           bool has_overviews = false);
 
 }  // namespace terrace::dem

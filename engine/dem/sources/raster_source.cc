@@ -125,7 +125,7 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
                                                          const std::string& cache_dir,
                                                          const std::function<void(double)>& progress,
                                                          const std::stop_token& stop,
-                                                         std::shared_ptr<SurveyPages> pages) {
+                                                         std::shared_ptr<StatisticsPages> pages) {
   const auto start = std::chrono::steady_clock::now();
   if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "{}: opening it was stopped", path);
   ForgetRemote(path);
@@ -153,23 +153,23 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
         path, scale);
   }
   source->layout_.coast_step_m = ZeroEdges::CoastStep(spacing->finer);
-  source->layout_.rules.marks = options.nodata;
+  source->layout_.rules.extra_nodata = options.nodata;
   std::string overviews_unused = DropMisleadingOverviews(**dataset, source->layout_);
   const PrepareOptions prepare{cache_dir, options.find_voids, progress, stop};
   auto prepared = PrepareRaster(**dataset, source->layout_, path, source->files(), prepare);
-  if (prepared && !prepared->findings.any()) {
-    const std::string why = DropMisleadingOverviews(**dataset, prepared->survey, source->layout_);
+  if (prepared && !prepared->detected.any()) {
+    const std::string why = DropMisleadingOverviews(**dataset, prepared->statistics, source->layout_);
     if (!why.empty()) {
       overviews_unused = why;
       prepared = PrepareRaster(**dataset, source->layout_, path, source->files(), prepare);
     }
   }
   if (!prepared) return tl::unexpected(prepared.error());
-  source->layout_ = WithFindings(std::move(source->layout_), prepared->findings);
+  source->layout_ = WithDetectedNodata(std::move(source->layout_), prepared->detected);
   source->averages_ = prepared->averages;
   source->preparation_ = prepared->preparation;
-  const RasterSurvey& survey = prepared->survey;
-  const std::string& found_voids = prepared->findings.text;
+  const RasterStatistics& statistics = prepared->statistics;
+  const std::string& found_voids = prepared->detected.text;
 
   source->footprint_ = Footprint::Of(source->georeference_);
   source->spacing_ = *spacing;
@@ -183,18 +183,18 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
   if (source->vertical_.geoid) source->info_.vertical_operation = source->vertical_.geoid->description();
   source->info_.spacing_m = spacing->finer;
   source->info_.bounds = source->footprint_.Bounds();
-  source->info_.heights = {survey.lowest, survey.highest};
+  source->info_.heights = {statistics.lowest, statistics.highest};
   source->info_.heights_doubted = DoubtsOf(source->info_.heights);
-  source->info_.valid_samples = survey.valid;
-  source->info_.void_samples = survey.voids;
-  source->info_.hole_samples = survey.hole_samples;
+  source->info_.valid_samples = statistics.valid;
+  source->info_.void_samples = statistics.voids;
+  source->info_.hole_samples = statistics.hole_samples;
   LogWhatMatters(**dataset, source->info_, source->georeference_, source->layout_);
   LogVertical(path, source->vertical_, source->layout_.rules.unit);
   if (!found_voids.empty()) {
     LogSource(SourceLog::Level::kWarn, path,
               "voids that it does not declare: {}; `nodata` of the configuration decides otherwise", found_voids);
   }
-  if (survey.rim_voids.is_everything()) {
+  if (statistics.rim_voids.is_everything()) {
     spdlog::warn(
         "{}: its voids are too ragged to tell holes from collars around the data: none of them is smoothed over", path);
   }
@@ -209,42 +209,42 @@ RasterSource::~RasterSource() {
 
 // Of a dataset of thousands of rasters tables take more memory than anything else.
 void RasterSource::KeepTables(PreparedRaster prepared, const PrepareOptions& prepare,
-                              std::shared_ptr<SurveyPages> pages) {
-  constexpr std::size_t kMostCoarse = 64;  // blocks of a level
-  RasterSurvey& survey = prepared.survey;
-  edge_row_means_ = survey.edge_row_means;
-  rim_voids_ = std::move(survey.rim_voids);
-  if (pages == nullptr || prepared.record.empty() || pages->Admit(survey.bytes())) {
-    kept_ = std::make_shared<const RasterSurvey>(std::move(survey));
+                              std::shared_ptr<StatisticsPages> pages) {
+  constexpr std::size_t kMaxCoarse = 64;  // blocks of a level
+  RasterStatistics& statistics = prepared.statistics;
+  edge_row_means_ = statistics.edge_row_means;
+  rim_voids_ = std::move(statistics.rim_voids);
+  if (pages == nullptr || prepared.record.empty() || pages->Admit(statistics.bytes())) {
+    kept_ = std::make_shared<const RasterStatistics>(std::move(statistics));
     return;
   }
   paging_ = std::make_unique<const Paging>(Paging{std::move(pages),
-                                                  survey.table.Coarse(kMostCoarse),
-                                                  !survey.coarse.grids.empty(),
+                                                  statistics.table.Coarse(kMaxCoarse),
+                                                  !statistics.coarse.grids.empty(),
                                                   std::move(prepared.record),
                                                   std::move(prepared.shape),
                                                   {prepare.cache_dir, prepare.find_voids, {}, {}}});
 }
 
-SurveyPages::Tables RasterSource::tables() const {
+StatisticsPages::Tables RasterSource::tables() const {
   if (kept_) return kept_;
   if (auto known = paging_->pages->Find(this)) return known;
-  auto survey = ReadTables();
-  if (!survey) throw std::runtime_error(survey.error().message);
-  auto tables = std::make_shared<const RasterSurvey>(*std::move(survey));
+  auto statistics = ReadTables();
+  if (!statistics) throw std::runtime_error(statistics.error().message);
+  auto tables = std::make_shared<const RasterStatistics>(*std::move(statistics));
   paging_->pages->Add(this, tables);
   return tables;
 }
 
-Result<RasterSurvey> RasterSource::ReadTables() const {
-  if (auto known = LoadRecord(paging_->record, paging_->shape)) return std::move(known->survey);
+Result<RasterStatistics> RasterSource::ReadTables() const {
+  if (auto known = LoadStatistics(paging_->record, paging_->shape)) return std::move(known->statistics);
   spdlog::warn("{}: {} is gone or damaged; the source is prepared anew", info_.path, paging_->record);
   auto handle = handles_.Borrow();
   if (!handle) return tl::unexpected(handle.error());
   auto prepared = PrepareRaster(**handle, paging_->shape.layout, info_.path, files(), paging_->prepare);
   if (auto unchanged = handles_.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
   if (!prepared) return tl::unexpected(prepared.error());
-  return std::move(prepared->survey);
+  return std::move(prepared->statistics);
 }
 
 BlockRange RasterSource::RangeIn(double west, double north, double east, double south) const {
@@ -258,7 +258,7 @@ Result<std::vector<float>> RasterSource::ReadBlocks(int factor, const GridWindow
   // From memory and from the record only while the files are those that were prepared.
   if (factor >= kLargestDirect && (kept_ ? !kept_->coarse.grids.empty() : paging_->has_coarse_averages)) {
     if (auto unchanged = handles_.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
-    if (const SurveyPages::Tables known = tables(); known->coarse.Has(factor))
+    if (const StatisticsPages::Tables known = tables(); known->coarse.Has(factor))
       return known->coarse.Read(factor, window);
   }
   if (averages_ && averages_->Has(factor) && !averages_damaged_) {

@@ -21,8 +21,8 @@
 #include "engine/dem/gdal/gdal_handle.h"
 #include "engine/dem/raster/sample_grid.h"
 #include "engine/dem/sources/prepare.h"
-#include "engine/dem/statistics/raster_survey.h"
-#include "engine/dem/statistics/survey_pages.h"
+#include "engine/dem/statistics/raster_statistics.h"
+#include "engine/dem/statistics/statistics_pages.h"
 
 namespace terrace::dem {
 
@@ -35,7 +35,7 @@ class RasterSource {
                                                     const std::string& cache_dir = {},
                                                     const std::function<void(double)>& progress = {},
                                                     const std::stop_token& stop = {},
-                                                    std::shared_ptr<SurveyPages> pages = nullptr);
+                                                    std::shared_ptr<StatisticsPages> pages = nullptr);
   ~RasterSource();
 
   const RasterInfo& info() const { return info_; }
@@ -49,15 +49,15 @@ class RasterSource {
   // Of the valid samples of the first and the last row.
   const std::array<std::optional<double>, 2>& edge_row_means() const { return edge_row_means_; }
 
-  // Its survey's tables, which may have to be read anew: whoever asks often keeps them. Throws std::runtime_error where
-  // they can be neither read nor made again, as when the file is gone.
-  SurveyPages::Tables tables() const;
+  // Its statistics's tables, which may have to be read anew: whoever asks often keeps them. Throws std::runtime_error
+  // where they can be neither read nor made again, as when the file is gone.
+  StatisticsPages::Tables tables() const;
   // What they say of a box of pixels (RangeTable::Query). Of large boxes that is known without them.
   BlockRange RangeIn(double west, double north, double east, double south) const;
   const StampedFiles& files() const { return handles_.files(); }
 
   // In its record; null: there are none.
-  const RecordedAverages* averages() const { return averages_.get(); }
+  const CachedAverages* averages() const { return averages_.get(); }
 
   // How opening went.
   const Preparation& preparation() const { return preparation_; }
@@ -70,8 +70,8 @@ class RasterSource {
   Result<void> CheckUnchanged() const { return handles_.CheckUnchanged(); }
 
  private:
-  void KeepTables(PreparedRaster prepared, const PrepareOptions& prepare, std::shared_ptr<SurveyPages> pages);
-  Result<RasterSurvey> ReadTables() const;
+  void KeepTables(PreparedRaster prepared, const PrepareOptions& prepare, std::shared_ptr<StatisticsPages> pages);
+  Result<RasterStatistics> ReadTables() const;
 
   RasterSource(std::string path, StampedFiles files, Georeference where)
       : handles_(std::move(path), std::move(files)), georeference_(std::move(where)) {}
@@ -84,18 +84,18 @@ class RasterSource {
   SourceSpacing spacing_;
   std::array<std::optional<double>, 2> edge_row_means_;
   RimVoids rim_voids_;
-  SurveyPages::Tables kept_;  // null: they are paged
+  StatisticsPages::Tables kept_;  // null: they are paged
   // Of paged tables.
   struct Paging {
-    std::shared_ptr<SurveyPages> pages;
+    std::shared_ptr<StatisticsPages> pages;
     RangeTable ranges;  // the coarse ones
     bool has_coarse_averages;
     std::string record;
-    RecordShape shape;
+    StatisticsShape shape;
     PrepareOptions prepare;
   };
   std::unique_ptr<const Paging> paging_;
-  std::shared_ptr<const RecordedAverages> averages_;  // null: none
+  std::shared_ptr<const CachedAverages> averages_;  // null: none
   mutable std::atomic<bool> averages_damaged_{false};
   Preparation preparation_;
   RasterInfo info_;

@@ -12,7 +12,7 @@
 #include "engine/dem/gdal/raster_file.h"
 #include "engine/dem/gdal/sample_rules.h"
 #include "engine/dem/statistics/raster_chunk.h"
-#include "engine/dem/statistics/void_marks.h"
+#include "engine/dem/statistics/undeclared_nodata.h"
 
 namespace terrace::dem {
 namespace {
@@ -30,9 +30,9 @@ Result<void> ReadAll(GDALRasterBand& band, const SampleRules& rules, const std::
   return {};
 }
 
-// What a survey of a raster that is served looks at (raster_survey.h), of one that is in memory.
-Result<VoidFindings> FindVoidsOf(const RasterHeights& raster, GDALRasterBand& band, const SampleRules& rules,
-                                 double spacing_m) {
+// Undeclared voids of a raster in memory, by the rules that apply to served rasters (raster_statistics.h).
+Result<DetectedNodata> FindVoidsOf(const RasterHeights& raster, GDALRasterBand& band, const SampleRules& rules,
+                                   double spacing_m) {
   float lowest = std::numeric_limits<float>::infinity(), highest = -lowest;
   bool has_voids = false;
   for (const float height : raster.heights) {
@@ -46,7 +46,7 @@ Result<VoidFindings> FindVoidsOf(const RasterHeights& raster, GDALRasterBand& ba
             coast_step_m);
   const bool has_collar = zeros.IsCollar(raster.width, raster.height);
   const bool is_empty = !(lowest <= highest);
-  if (is_empty || !MayHideVoids(rules, lowest, highest, has_voids, has_collar)) return VoidFindings{};
+  if (is_empty || !MayHideVoids(rules, lowest, highest, has_voids, has_collar)) return DetectedNodata{};
   return FindVoids(band, rules, has_collar, coast_step_m);
 }
 
@@ -71,7 +71,7 @@ Result<RasterHeights> ReadRaster(const std::string& path, const ReadOptions& opt
   const OGRSpatialReference* const crs = (*dataset)->GetSpatialRef();
   raster.in_angles = raster.georeferenced && crs != nullptr && crs->IsGeographic() != 0;
   SampleRules rules = SampleRules::Of(band, georeference ? georeference->vertical_unit() : "");
-  rules.marks = options.nodata;
+  rules.extra_nodata = options.nodata;
   // With room for a mesher to lay rows further apart (tin::HeightField) without a second copy of all.
   constexpr std::size_t kRoomOfRow = 32;
   raster.heights.reserve((static_cast<std::size_t>(raster.width) + kRoomOfRow) *
@@ -83,11 +83,11 @@ Result<RasterHeights> ReadRaster(const std::string& path, const ReadOptions& opt
   };
   if (auto read = ReadAll(band, rules, options.progress, raster); !read) return damaged(read.error());
   if (!options.find_voids) return raster;
-  const auto findings = FindVoidsOf(raster, band, rules, spacing ? spacing->finer : 0);
-  if (!findings) return damaged(findings.error());
-  if (!findings->any()) return raster;
-  raster.found_voids = findings->text;
-  findings->AddTo(rules);
+  const auto detected = FindVoidsOf(raster, band, rules, spacing ? spacing->finer : 0);
+  if (!detected) return damaged(detected.error());
+  if (!detected->any()) return raster;
+  raster.found_voids = detected->text;
+  detected->AddTo(rules);
   if (auto read = ReadAll(band, rules, {}, raster); !read) return damaged(read.error());
   return raster;
 }

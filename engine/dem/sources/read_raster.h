@@ -11,7 +11,7 @@
 namespace terrace::dem {
 
 struct ReadOptions {
-  bool find_voids = true;           // undeclared marks are looked for (void_marks.h)
+  bool find_voids = true;           // detects undeclared nodata values (undeclared_nodata.h)
   std::vector<double> nodata = {};  // further raw values that are voids
   std::function<void(double)> progress = {};
 };

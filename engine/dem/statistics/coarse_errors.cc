@@ -11,7 +11,7 @@ namespace {
 // Where lines of either grid lie along one axis, and between which of a grid's averages each is.
 struct Line {
   double position = 0;
-  GridAxis::Place fine, coarse;
+  GridAxis::Location fine, coarse;
 };
 
 std::vector<Line> LinesOf(const GridAxis& fine, const GridAxis& coarse) {
@@ -37,13 +37,13 @@ class Surface {
     bool empty() const { return lowest > highest; }
   };
 
-  double At(const GridAxis::Place& x, const GridAxis::Place& y) const {
+  double At(const GridAxis::Location& x, const GridAxis::Location& y) const {
     const double upper = Along(x, y.index);
     return y.weight > 0 ? upper + y.weight * (Along(x, y.index + 1) - upper) : upper;
   }
 
   // Of the averages between which a cell of lines lies that starts at this place.
-  Corners Around(const GridAxis::Place& x, const GridAxis::Place& y) const {
+  Corners Around(const GridAxis::Location& x, const GridAxis::Location& y) const {
     Corners corners;
     for (const std::int64_t row : {y.index, std::min(y.index + 1, grid_.rows - 1)}) {
       for (const std::int64_t column : {x.index, wraps_ ? x.index + 1 : std::min(x.index + 1, grid_.columns - 1)}) {
@@ -62,7 +62,7 @@ class Surface {
     const std::int64_t wrapped = (column % grid_.columns + grid_.columns) % grid_.columns;
     return grid_.heights[static_cast<std::size_t>(row * grid_.columns + wrapped)];
   }
-  double Along(const GridAxis::Place& x, std::int64_t row) const {
+  double Along(const GridAxis::Location& x, std::int64_t row) const {
     const double first = Height(x.index, row);
     return x.weight > 0 ? first + x.weight * (Height(x.index + 1, row) - first) : first;
   }

@@ -3,7 +3,7 @@
 
 #include "engine/dem/raster/sample_grid.h"
 #include "engine/dem/statistics/averaging_errors.h"
-#include "engine/dem/statistics/raster_survey.h"
+#include "engine/dem/statistics/raster_statistics.h"
 
 namespace terrace::dem {
 

@@ -13,8 +13,8 @@ namespace {
 // By what the file and its owner state.
 std::string WhyMisleading(GDALDataset& dataset, const SampleRules& rules) {
   GDALRasterBand& band = HeightBand(dataset);
-  const auto is_declared = [&](double mark) { return rules.nodata && rules.IsSame(mark, *rules.nodata); };
-  if (!std::ranges::all_of(rules.marks, is_declared)) {
+  const auto is_declared = [&](double value) { return rules.nodata && rules.IsSame(value, *rules.nodata); };
+  if (!std::ranges::all_of(rules.extra_nodata, is_declared)) {
     return "they were made of samples too that `nodata` of the configuration calls voids; declare them in a copy with "
            "`gdal_translate -a_nodata VALUE in out` and make its overviews";
   }
@@ -54,21 +54,21 @@ std::string DropMisleadingOverviews(GDALDataset& dataset, RasterLayout& layout) 
   return why;
 }
 
-std::string DropMisleadingOverviews(GDALDataset& dataset, const RasterSurvey& survey, RasterLayout& layout) {
+std::string DropMisleadingOverviews(GDALDataset& dataset, const RasterStatistics& statistics, RasterLayout& layout) {
   if (layout.overview_factors.empty()) return {};
   int is_declared = 0;
   HeightBand(dataset).GetNoDataValue(&is_declared);
-  const BlockRange all = survey.table.Whole();
+  const BlockRange all = statistics.table.Whole();
   // Cubic and Lanczos kernels go beyond the heights they are given, by less than this.
-  const double overshoot = 0.02 * (static_cast<double>(survey.highest) - static_cast<double>(survey.lowest));
+  const double overshoot = 0.02 * (static_cast<double>(statistics.highest) - static_cast<double>(statistics.lowest));
   std::string why;
   if (layout.rules.has_mask) {
-    if (all.min < survey.lowest - overshoot || all.max > survey.highest + overshoot) {
+    if (all.min < statistics.lowest - overshoot || all.max > statistics.highest + overshoot) {
       why =
           "they have heights that the raster has not, as if they were made without its mask; copy it with "
           "`gdal_translate --config GDAL_TIFF_INTERNAL_MASK YES in out` and make the copy's overviews";
     }
-  } else if (layout.rules.nodata && is_declared == 0 && survey.voids > 0) {
+  } else if (layout.rules.nodata && is_declared == 0 && statistics.voids > 0) {
     why =
         "they were made of voids too, which are not declared; declare them in a copy with "
         "`gdal_translate -a_nodata -32768 in out` and make its overviews";

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "engine/dem/raster/sample_grid.h"
-#include "engine/dem/statistics/raster_survey.h"
+#include "engine/dem/statistics/raster_statistics.h"
 
 namespace terrace::dem {
 
@@ -15,7 +15,7 @@ namespace terrace::dem {
 // stay, or there are none.
 std::string DropMisleadingOverviews(GDALDataset& dataset, RasterLayout& layout);
 
-// The same by what the survey of the raster and its overviews has found.
-std::string DropMisleadingOverviews(GDALDataset& dataset, const RasterSurvey& survey, RasterLayout& layout);
+// The same by what the statistics of the raster and its overviews has found.
+std::string DropMisleadingOverviews(GDALDataset& dataset, const RasterStatistics& statistics, RasterLayout& layout);
 
 }  // namespace terrace::dem

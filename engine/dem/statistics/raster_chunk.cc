@@ -58,25 +58,25 @@ void AddVoidRuns(const float* row, int r, int used, std::vector<VoidRun>& runs) 
   }
 }
 
-void CountSamples(const Samples& samples, const Chunk& chunk, const RasterLayout& layout, ChunkSurvey& survey) {
-  survey.zeros.Add(samples.Row(chunk.row) + (chunk.col - samples.box.col), samples.box.cols, chunk, layout.width,
-                   layout.height, layout.coast_step_m);
+void CountSamples(const Samples& samples, const Chunk& chunk, const RasterLayout& layout, ChunkStatistics& statistics) {
+  statistics.zeros.Add(samples.Row(chunk.row) + (chunk.col - samples.box.col), samples.box.cols, chunk, layout.width,
+                       layout.height, layout.coast_step_m);
   const int columns = DivideUp(chunk.cols, RangeTable::kBlock);
   for (int r = 0; r < chunk.rows; ++r) {
     const float* row = samples.Row(chunk.row + r) + (chunk.col - samples.box.col);
-    BlockRange* ranges = survey.ranges.data() + std::ptrdiff_t{r / RangeTable::kBlock} * columns;
-    const std::int64_t before = survey.valid;
+    BlockRange* ranges = statistics.ranges.data() + std::ptrdiff_t{r / RangeTable::kBlock} * columns;
+    const std::int64_t before = statistics.valid;
     for (int c = 0; c < chunk.cols; ++c) {
       ranges[c / RangeTable::kBlock].Add(row[c]);
-      survey.valid += std::isnan(row[c]) ? 0 : 1;
+      statistics.valid += std::isnan(row[c]) ? 0 : 1;
     }
     const int used = std::clamp(layout.columns - chunk.col, 0, chunk.cols);
-    if (survey.valid - before < chunk.cols) AddVoidRuns(row, r, used, survey.voids);
+    if (statistics.valid - before < chunk.cols) AddVoidRuns(row, r, used, statistics.voids);
     const auto add = [&](BlockSum& sum) {
       for (int c = 0; c < used; ++c) sum.Add(row[c]);
     };
-    if (chunk.row + r == 0) add(survey.first_row);
-    if (chunk.row + r == layout.height - 1) add(survey.last_row);
+    if (chunk.row + r == 0) add(statistics.first_row);
+    if (chunk.row + r == layout.height - 1) add(statistics.last_row);
   }
 }
 
@@ -160,7 +160,7 @@ class RowErrors {
     const GridAxis columns(layout.columns, factor, layout.wraps);
     const int used = std::min(chunk.cols, layout.columns - chunk.col);
     for (int c = 0; c < used; ++c) {
-      GridAxis::Place place = columns.Locate(chunk.col + c + 0.5);
+      GridAxis::Location place = columns.Locate(chunk.col + c + 0.5);
       place.index -= averages.window.column;
       // One past the end with no weight reads its neighbour instead.
       if (place.index + 1 >= averages.window.columns) place = {averages.window.columns - 2, 1};
@@ -170,7 +170,7 @@ class RowErrors {
   }
 
   void Add(const float* samples, int row, int block, float* errors) {
-    const GridAxis::Place place = rows_.Locate(row + 0.5);
+    const GridAxis::Location place = rows_.Locate(row + 0.5);
     const float* upper = averages_.Row(place.index);
     const float* lower = place.weight > 0 ? averages_.Row(place.index + 1) : upper;
     bool has_voids = false;
@@ -230,14 +230,14 @@ class RowErrors {
 
   const Averages& averages_;
   const GridAxis rows_;
-  std::vector<GridAxis::Place> places_;  // by column of the part, within the window
+  std::vector<GridAxis::Location> places_;  // by column of the part, within the window
   std::vector<double> line_;
 };
 
 Result<void> CompareAverages(GDALDataset& dataset, const RasterLayout& layout, const Samples& samples,
-                             const Chunk& chunk, const std::stop_token& stop, ChunkSurvey& survey) {
+                             const Chunk& chunk, const std::stop_token& stop, ChunkStatistics& statistics) {
   if (chunk.col >= layout.columns) return {};
-  survey.averages.clear();
+  statistics.averages.clear();
   Result<void> result;
   ForEachFactor(layout, 2, kLargestDirect, [&](int factor) {
     if (!result) return;
@@ -247,19 +247,19 @@ Result<void> CompareAverages(GDALDataset& dataset, const RasterLayout& layout, c
       return;
     }
     const int pixels = AveragingErrors::BlockPixels(factor), columns = DivideUp(chunk.cols, pixels);
-    std::vector<float>& errors = survey.errors[survey.averages.size()];
+    std::vector<float>& errors = statistics.errors[statistics.averages.size()];
     RowErrors rows(*averages, chunk, layout, factor);
     for (int r = 0; r < chunk.rows; ++r) {
       rows.Add(samples.Row(chunk.row + r) + (chunk.col - samples.box.col), chunk.row + r, pixels,
                errors.data() + std::ptrdiff_t{r / pixels} * columns);
     }
-    survey.averages.emplace_back();
+    statistics.averages.emplace_back();
     if (StartingFactor(layout, factor) > 1) return;
     const int used = std::min(chunk.cols, layout.columns - chunk.col);
     const std::int64_t first = chunk.col / factor, top = chunk.row / factor;
     for (std::int64_t r = 0; r < DivideUp(chunk.rows, factor); ++r) {
       const float* row = averages->Row(top + r) + (first - averages->window.column);
-      survey.averages.back().insert(survey.averages.back().end(), row, row + DivideUp(used, factor));
+      statistics.averages.back().insert(statistics.averages.back().end(), row, row + DivideUp(used, factor));
     }
   });
   return result;
@@ -272,21 +272,21 @@ Chunk ChunkGrid::At(int index) const {
   return {col, row, std::min(kSide, width_ - col), std::min(kSide, height_ - row)};
 }
 
-ChunkSurvey VoidSurvey(const Chunk& chunk, const RasterLayout& layout) {
-  ChunkSurvey survey;
+ChunkStatistics VoidStatistics(const Chunk& chunk, const RasterLayout& layout) {
+  ChunkStatistics statistics;
   const auto blocks = [&](int pixels) {
     return static_cast<std::size_t>(DivideUp(chunk.cols, pixels)) *
            static_cast<std::size_t>(DivideUp(chunk.rows, pixels));
   };
   BlockRange voids;
   voids.has_voids = true;
-  survey.ranges.assign(blocks(RangeTable::kBlock), voids);
+  statistics.ranges.assign(blocks(RangeTable::kBlock), voids);
   ForEachFactor(layout, 2, kLargestDirect, [&](int factor) {
-    survey.errors.emplace_back(blocks(AveragingErrors::BlockPixels(factor)));
-    survey.averages.emplace_back();
+    statistics.errors.emplace_back(blocks(AveragingErrors::BlockPixels(factor)));
+    statistics.averages.emplace_back();
   });
-  ForEachFactor(layout, 2 * kLargestDirect, ChunkGrid::kSide, [&](int) { survey.sums.emplace_back(); });
-  return survey;
+  ForEachFactor(layout, 2 * kLargestDirect, ChunkGrid::kSide, [&](int) { statistics.sums.emplace_back(); });
+  return statistics;
 }
 
 std::size_t AveragesIn(const Chunk& chunk, const RasterLayout& layout, int factor) {
@@ -296,11 +296,11 @@ std::size_t AveragesIn(const Chunk& chunk, const RasterLayout& layout, int facto
          static_cast<std::size_t>(DivideUp(chunk.rows, factor));
 }
 
-Result<ChunkSurvey> SurveyChunk(GDALDataset& dataset, const RasterLayout& layout, const Chunk& chunk,
-                                std::int64_t& read, const std::stop_token& stop) {
+Result<ChunkStatistics> ReadChunkStatistics(GDALDataset& dataset, const RasterLayout& layout, const Chunk& chunk,
+                                            std::int64_t& read, const std::stop_token& stop) {
   GDALRasterBand& band = *dataset.GetRasterBand(1);
-  ChunkSurvey survey = VoidSurvey(chunk, layout);
-  if (!MayHaveSamples(band, layout, chunk)) return survey;
+  ChunkStatistics statistics = VoidStatistics(chunk, layout);
+  if (!MayHaveSamples(band, layout, chunk)) return statistics;
   ++read;
   Samples samples{WithHalo(chunk, layout), {}};
   const Chunk& box = samples.box;
@@ -309,20 +309,20 @@ Result<ChunkSurvey> SurveyChunk(GDALDataset& dataset, const RasterLayout& layout
       !done) {
     return tl::unexpected(done.error());
   }
-  for (BlockRange& range : survey.ranges) range = {};
-  CountSamples(samples, chunk, layout, survey);
-  if (survey.is_void()) return VoidSurvey(chunk, layout);
-  if (auto compared = CompareAverages(dataset, layout, samples, chunk, stop, survey); !compared) {
+  for (BlockRange& range : statistics.ranges) range = {};
+  CountSamples(samples, chunk, layout, statistics);
+  if (statistics.is_void()) return VoidStatistics(chunk, layout);
+  if (auto compared = CompareAverages(dataset, layout, samples, chunk, stop, statistics); !compared) {
     return tl::unexpected(compared.error());
   }
   Chunk used = chunk;
   used.cols = std::min(chunk.cols, layout.columns - chunk.col);
-  survey.sums.clear();
+  statistics.sums.clear();
   ForEachFactor(layout, 2 * kLargestDirect, ChunkGrid::kSide, [&](int factor) {
-    survey.sums.push_back(used.cols > 0 && StartingFactor(layout, factor) == 1 ? SumsOf(samples, used, factor)
-                                                                               : std::vector<BlockSum>());
+    statistics.sums.push_back(used.cols > 0 && StartingFactor(layout, factor) == 1 ? SumsOf(samples, used, factor)
+                                                                                   : std::vector<BlockSum>());
   });
-  return survey;
+  return statistics;
 }
 
 }  // namespace terrace::dem

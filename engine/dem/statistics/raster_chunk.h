@@ -1,7 +1,7 @@
 // A raster part by part: what is learnt from one part of 1024 x 1024 samples, on its own.
 //
 // What a part says depends on the raster alone, never on which parts were looked at before: they can be kept, and a
-// survey that was interrupted goes on behind the last one (survey_record.h).
+// statistics that was interrupted goes on behind the last one (statistics_cache.h).
 #pragma once
 
 #include <gdal_priv.h>
@@ -14,7 +14,7 @@
 #include "engine/dem/common/range_table.h"
 #include "engine/dem/raster/block_averages.h"
 #include "engine/dem/raster/sample_grid.h"
-#include "engine/dem/statistics/void_marks.h"
+#include "engine/dem/statistics/undeclared_nodata.h"
 
 namespace terrace::dem {
 
@@ -51,7 +51,7 @@ struct VoidRun {
   friend bool operator==(const VoidRun&, const VoidRun&) = default;
 };
 
-struct ChunkSurvey {
+struct ChunkStatistics {
   std::int64_t valid = 0;  // samples
   ZeroEdges zeros;
   BlockSum first_row, last_row;    // the part of the raster's outermost rows that lies here
@@ -65,15 +65,15 @@ struct ChunkSurvey {
   bool is_void() const { return valid == 0; }
 };
 
-// A void part's survey. It has no averages and no sums: theirs are voids.
-ChunkSurvey VoidSurvey(const Chunk& chunk, const RasterLayout& layout);
+// A void part's statistics. It has no averages and no sums: theirs are voids.
+ChunkStatistics VoidStatistics(const Chunk& chunk, const RasterLayout& layout);
 
 // How many averages of that factor a part that is not void has; 0 where an overview gives them.
 std::size_t AveragesIn(const Chunk& chunk, const RasterLayout& layout, int factor);
 
 // kUnavailable: it cannot be read. kCancelled: stopped. `read` counts the parts whose samples were read: those that the
 // file does not store are known to be void without.
-Result<ChunkSurvey> SurveyChunk(GDALDataset& dataset, const RasterLayout& layout, const Chunk& chunk,
-                                std::int64_t& read, const std::stop_token& stop = {});
+Result<ChunkStatistics> ReadChunkStatistics(GDALDataset& dataset, const RasterLayout& layout, const Chunk& chunk,
+                                            std::int64_t& read, const std::stop_token& stop = {});
 
 }  // namespace terrace::dem

@@ -120,7 +120,7 @@ void RimVoidFinder::AddRun(int chunk_row, std::int32_t first, std::int32_t last)
   ++band_runs_;
 }
 
-void RimVoidFinder::Add(const Chunk& chunk, const ChunkSurvey& part) {
+void RimVoidFinder::Add(const Chunk& chunk, const ChunkStatistics& part) {
   if (has_given_up_) return;
   const int used = std::min(chunk.cols, columns_ - chunk.col);
   if (chunk.row != top_) {

@@ -69,20 +69,20 @@ class RimVoids {
   bool is_everything_ = false;
 };
 
-// Finds them while a raster is surveyed, in one pass over the runs of its voids. Memory: the runs of one row of parts,
-// of voids that touch the rim, and of those that may still come to touch it.
+// Finds them while the statistics of a raster are read, in one pass over the runs of its voids. Memory: the runs of one
+// row of parts, of voids that touch the rim, and of those that may still come to touch it.
 class RimVoidFinder {
  public:
   // Runs that are kept, 16 bytes each; a raster that needs more is RimVoids::Everything.
-  static constexpr std::size_t kMostRuns = std::size_t{1} << 22;
+  static constexpr std::size_t kMaxRuns = std::size_t{1} << 22;
 
   // Of the columns in use; the first column is at the rim even where the raster goes around the Earth. `hole` is told
   // the runs of holes: row, first and last sample, and how many samples the hole has.
   using Hole = std::function<void(std::int32_t, std::int32_t, std::int32_t, std::int64_t)>;
-  RimVoidFinder(int columns, int rows, Hole hole, std::size_t most_runs = kMostRuns);
+  RimVoidFinder(int columns, int rows, Hole hole, std::size_t most_runs = kMaxRuns);
 
   // All parts in the order of ChunkGrid.
-  void Add(const Chunk& chunk, const ChunkSurvey& part);
+  void Add(const Chunk& chunk, const ChunkStatistics& part);
   // After the last part.
   RimVoids Finish();
 

@@ -32,8 +32,8 @@ void CheckOptions(const HeightField& field, const DropOptions& options) {
   TERRACE_CHECK(options.max_error >= 0);
   const auto width = static_cast<std::size_t>(field.width()), height = static_cast<std::size_t>(field.height());
   TERRACE_CHECK(options.curvature.east_m2.empty() || options.curvature.east_m2.size() == height);
-  if (options.wire_columns.empty() && options.wire_rows.empty()) return;
-  TERRACE_CHECK(options.wire_columns.size() == width && options.wire_rows.size() == height);
+  if (options.quantized_columns.empty() && options.quantized_rows.empty()) return;
+  TERRACE_CHECK(options.quantized_columns.size() == width && options.quantized_rows.size() == height);
 }
 
 // Together, for the sake of the cache: visits jump across the mesh.
@@ -149,11 +149,11 @@ bool DropPass::Fits(std::size_t apex) const {
 }
 
 bool DropPass::TurnsOnWire(SamplePosition a, SamplePosition b, SamplePosition c) const {
-  if (options_.wire_columns.empty()) return true;
-  const auto on_wire = [&](SamplePosition p) {
-    return SamplePosition{options_.wire_columns[p.x], options_.wire_rows[p.y]};
+  if (options_.quantized_columns.empty()) return true;
+  const auto quantized = [&](SamplePosition p) {
+    return SamplePosition{options_.quantized_columns[p.x], options_.quantized_rows[p.y]};
   };
-  return Orientation(on_wire(a), on_wire(b), on_wire(c)) > 0;
+  return Orientation(quantized(a), quantized(b), quantized(c)) > 0;
 }
 
 TinMesh DropPass::Mesh() const {

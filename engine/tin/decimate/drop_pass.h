@@ -27,10 +27,10 @@ struct DropOptions {
   double max_error = 0;   // metres, >= 0: no sample of a new triangle is further off
   Curvature curvature{};  // a new triangle's sagitta counts into the error of its samples
 
-  // Where a column and a row end up on the wire, 0 to 32767, by column and by row. New triangles turn counter-clockwise
+  // Quantized positions, 0 to 32767, by column and by row. New triangles turn counter-clockwise
   // there too: rounding can turn a sliver over. Empty, both: not tested.
-  std::span<const std::uint16_t> wire_columns{};
-  std::span<const std::uint16_t> wire_rows{};
+  std::span<const std::uint16_t> quantized_columns{};
+  std::span<const std::uint16_t> quantized_rows{};
 };
 
 // `mesh` is a triangulation of `field` as TinMesh promises, by whatever criterion. The vertices that stay keep their

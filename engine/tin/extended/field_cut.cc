@@ -19,14 +19,14 @@ constexpr int kSmallestBlockCells = 256;
 constexpr BorderOptions kSharedBorder{.weight = 1.5};
 
 // A cut is good while the vertices on its borders are below this share of those estimated for the whole field.
-constexpr double kMostSharedVertices = 0.05;
+constexpr double kMaxSharedVertices = 0.05;
 
 // No cut is good where fewer are estimated, a third of what it will be: there, where the first of them lie changes the
 // count by more than the borders add, and the whole field is meshed in little time.
-constexpr double kFewestVertices = 4000;
+constexpr double kMinVertices = 4000;
 
 // Nor where heights and triangles of the whole field take less: they fit the processor's second cache, or nearly.
-constexpr double kFewestBytes = 2 << 20, kBytesOfSample = 4, kBytesOfEstimatedVertex = 48;
+constexpr double kMinBytes = 2 << 20, kBytesOfSample = 4, kBytesOfEstimatedVertex = 48;
 
 // Where blocks begin along a side of so many samples, and its last sample.
 std::vector<int> CutSide(int samples, int block_cells) {
@@ -85,7 +85,7 @@ VertexEstimate EstimateVertices(const FieldCut& cut, const HeightField& field, d
 
 bool IsWorthACut(const HeightField& field, double vertices) {
   const double samples = static_cast<double>(field.width()) * static_cast<double>(field.height());
-  return vertices >= kFewestVertices && kBytesOfSample * samples + kBytesOfEstimatedVertex * vertices >= kFewestBytes;
+  return vertices >= kMinVertices && kBytesOfSample * samples + kBytesOfEstimatedVertex * vertices >= kMinBytes;
 }
 
 // The samples of a block as a field of its own. Its corners are vertices of the joined mesh and need the height that
@@ -128,7 +128,7 @@ FieldCut FieldCut::For(const HeightField& field, double max_error_m) {
   VertexEstimate estimate = EstimateVertices(cut, field, max_error_m);
   const double vertices = estimate.in_blocks;
   if (!IsWorthACut(field, vertices)) return {field.width(), field.height(), HeightField::kMaxSide};
-  while (estimate.shared > kMostSharedVertices * vertices) {  // ends at the latest when nothing is shared
+  while (estimate.shared > kMaxSharedVertices * vertices) {  // ends at the latest when nothing is shared
     cells *= 2;
     cut = FieldCut(field.width(), field.height(), cells);
     estimate = EstimateVertices(cut, field, max_error_m);

@@ -20,7 +20,7 @@ namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-constexpr std::size_t kMostLanes = 16;
+constexpr std::size_t kMaxLanes = 16;
 
 }  // namespace
 
@@ -39,9 +39,9 @@ float Largest(const float* errors, std::size_t count) {
 // Sorts different words into `sorted`, the largest first: a word comes after as many others as are larger. Reads up to
 // a vector beyond the words.
 void SortFew(const std::uint64_t* words, std::size_t count, std::uint64_t* sorted) {
-  const hn::CappedTag<std::uint64_t, kMostLanes> tag;
+  const hn::CappedTag<std::uint64_t, kMaxLanes> tag;
   const std::size_t lanes = hn::Lanes(tag);
-  HWY_ALIGN std::array<std::uint64_t, kMostLanes> places;
+  HWY_ALIGN std::array<std::uint64_t, kMaxLanes> places;
   for (std::size_t first = 0; first < count; first += lanes) {
     const auto block = hn::LoadU(tag, words + first);
     auto larger = hn::Zero(tag);
@@ -57,7 +57,7 @@ void SortFew(const std::uint64_t* words, std::size_t count, std::uint64_t* sorte
 #if HWY_TARGET <= HWY_AVX3
 // Without a branch, where there is an instruction for it: one in a hundred errors is, anywhere.
 std::size_t Sweep(const float* errors, std::size_t count, float threshold, std::uint32_t* found) {
-  const hn::CappedTag<float, kMostLanes> floats;
+  const hn::CappedTag<float, kMaxLanes> floats;
   const hn::RebindToUnsigned<decltype(floats)> slots;
   const std::size_t lanes = hn::Lanes(floats);
   const auto least = hn::Set(floats, threshold);
@@ -78,7 +78,7 @@ std::size_t Sweep(const float* errors, std::size_t count, float threshold, std::
 }
 #else
 std::size_t Sweep(const float* errors, std::size_t count, float threshold, std::uint32_t* found) {
-  const hn::CappedTag<float, kMostLanes> floats;
+  const hn::CappedTag<float, kMaxLanes> floats;
   const std::size_t lanes = hn::Lanes(floats);
   const auto least = hn::Set(floats, threshold);
   std::size_t n = 0;
@@ -140,7 +140,7 @@ bool CandidateQueue::Refill() {
   if (entered_ > 2 * wanted_) step_ = std::sqrt(step_);
   if (entered_ < wanted_ / 2) step_ = std::max(step_ * step_, 0.25);
   // A sweep costs a cycle for every 16 slots or so, an entry one for every few that it is put before.
-  wanted_ = std::max(kLeastWanted, static_cast<std::size_t>(3 * std::sqrt(static_cast<double>(errors_.size()))));
+  wanted_ = std::max(kMinWanted, static_cast<std::size_t>(3 * std::sqrt(static_cast<double>(errors_.size()))));
   entered_ = 0;
   // What is left lies below the threshold, most often just below.
   if (SweepFrom(threshold_)) return true;

@@ -37,7 +37,7 @@ class CandidateQueue {
   // The same for many slots, each of them once: Set(slots[i], candidate(i)). Precondition: there is room for them all.
   template <typename CandidateOf>
   void SetAll(const std::uint32_t* slots, std::size_t count, CandidateOf&& candidate) {
-    // Which of them belong into the run is collected without a branch, for it cannot be foretold.
+    // Which of them belong into the run is collected without a branch, for it cannot be predicted.
     std::array<std::uint32_t, 64> foremost;
     for (std::size_t first = 0; first < count; first += foremost.size()) {
       std::size_t found = 0;
@@ -72,7 +72,7 @@ class CandidateQueue {
   }
 
  private:
-  static constexpr std::size_t kLeastWanted = 48;
+  static constexpr std::size_t kMinWanted = 48;
 
   struct Entry {
     std::uint64_t order;  // non-negative floats compare like their bits: those, then the complement of the sample
@@ -102,10 +102,10 @@ class CandidateQueue {
   double step_ = 0.9;                  // the next threshold as a fraction of the largest error
   std::vector<Entry> run_;             // foremost first, from run_begin_ on
   std::size_t run_begin_ = 0;
-  std::vector<std::uint32_t> swept_;   // slots that the last sweep found, ascending
-  std::vector<std::uint64_t> words_;   // of SortSwept, and room for a vector beyond them
-  std::size_t wanted_ = kLeastWanted;  // entries between two sweeps
-  std::size_t entered_ = 0;            // since the last one
+  std::vector<std::uint32_t> swept_;  // slots that the last sweep found, ascending
+  std::vector<std::uint64_t> words_;  // of SortSwept, and room for a vector beyond them
+  std::size_t wanted_ = kMinWanted;   // entries between two sweeps
+  std::size_t entered_ = 0;           // since the last one
 };
 
 }  // namespace terrace::tin

@@ -17,12 +17,12 @@ namespace {
 // triangle of more rows would push out its own samples. An odd number of cache lines spreads them. Rows of tiles are
 // shorter, and lie without gaps.
 std::size_t StrideFor(int width) {
-  constexpr std::size_t kSamplesOfLine = 16, kShortRow = 512, kSets = 64, kMostRowsOfSet = 4;
+  constexpr std::size_t kSamplesOfLine = 16, kShortRow = 512, kSets = 64, kMaxRowsOfSet = 4;
   const auto samples = static_cast<std::size_t>(width);
   if (samples < kShortRow) return samples;
   std::array<std::size_t, kSets> rows_of_set{};
   for (std::size_t y = 0; y < kSets; ++y) ++rows_of_set[y * samples / kSamplesOfLine % kSets];
-  if (*std::max_element(rows_of_set.begin(), rows_of_set.end()) <= kMostRowsOfSet) return samples;
+  if (*std::max_element(rows_of_set.begin(), rows_of_set.end()) <= kMaxRowsOfSet) return samples;
   return ((samples + kSamplesOfLine - 1) / kSamplesOfLine | 1) * kSamplesOfLine;
 }
 
@@ -57,11 +57,11 @@ HeightField::HeightField(int width, int height, std::vector<float> heights, bool
       heights_(std::move(heights)),
       patches_along_x_((width - 1) / kPatchSide + 1),
       patches_along_y_((height - 1) / kPatchSide + 1) {
-  constexpr double kMostQuanta = 0x1p22, kMostNumerator = 0x1p31 - 1;
+  constexpr double kMaxQuanta = 0x1p22, kMaxNumerator = 0x1p31 - 1;
   const double relief = relief_m / static_cast<double>(quantum_);
   // Whole metres are exact in single precision up to triangles so large that few are, and it is quicker.
-  if (quantum_ > 0 && quantum_ < 1 && !has_voids_ && relief < kMostQuanta) {
-    most_area_in_integers_ = static_cast<float>(std::floor(kMostNumerator / std::max(relief, 0x1p8)));
+  if (quantum_ > 0 && quantum_ < 1 && !has_voids_ && relief < kMaxQuanta) {
+    most_area_in_integers_ = static_cast<float>(std::floor(kMaxNumerator / std::max(relief, 0x1p8)));
   }
   LayOut();
   if (!has_voids_) return;

@@ -32,7 +32,7 @@ struct ShapeQuality {
 
 // Four times the diameters of (u, w, p), (w, v, p), (u, v, p) and (v, u, w), all at once: coordinates stay below 2^15,
 // so that offsets and extents fit 16 bits. One by one, some of the many comparisons would be branches that nothing
-// could foretell.
+// could predict.
 using ShortVector = std::int16_t __attribute__((vector_size(16)));
 using IntVector = std::int32_t __attribute__((vector_size(16)));
 inline IntVector QuadrupleDiameters(const RingVertex& u_vertex, const RingVertex& v_vertex,

@@ -46,7 +46,7 @@ namespace {
 
 HWY_EXPORT(CountMultiples);
 
-// Whole metres, the server's own rounding, and what 32-bit surveys of low ground come in.
+// Whole metres, the server's own rounding, and the steps of 32-bit data of low ground.
 constexpr std::array<float, 3> kQuanta = {1, 0x1p-10F, 0x1p-14F};
 
 }  // namespace

@@ -31,7 +31,7 @@ namespace {
 // A block's size stands in the line before it; the line after it is nobody's.
 constexpr std::size_t kLine = 64;
 constexpr std::size_t kPage = 4096;
-constexpr std::size_t kMostBlocks = 16;
+constexpr std::size_t kMaxBlocks = 16;
 
 std::size_t SizeOf(const void* block) {
   std::size_t size = 0;
@@ -99,8 +99,8 @@ class Store {
   }
   void Put(void* block) noexcept {
     const std::size_t size = SizeOf(block);
-    if (size > kMostSpareBytes) return DeleteBlock(block);
-    while (count_ == kMostBlocks || bytes_ + size > kMostSpareBytes) DeleteBlock(Remove(0));
+    if (size > kMaxSpareBytes) return DeleteBlock(block);
+    while (count_ == kMaxBlocks || bytes_ + size > kMaxSpareBytes) DeleteBlock(Remove(0));
     blocks_[count_++] = block;
     bytes_ += size;
   }
@@ -117,7 +117,7 @@ class Store {
     return block;
   }
 
-  std::array<void*, kMostBlocks> blocks_{};
+  std::array<void*, kMaxBlocks> blocks_{};
   std::size_t count_ = 0, bytes_ = 0;
 };
 

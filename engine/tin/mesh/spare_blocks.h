@@ -17,7 +17,7 @@
 namespace terrace::tin {
 
 // What a thread keeps at most, by size.
-inline constexpr std::size_t kMostSpareBytes = std::size_t{8} << 20;
+inline constexpr std::size_t kMaxSpareBytes = std::size_t{8} << 20;
 
 // A block of at least so many bytes, aligned to a cache line; throws std::bad_alloc.
 void* TakeBlock(std::size_t bytes);
@@ -62,7 +62,7 @@ class LargeArray {
 
   void reserve(std::size_t capacity) {
     if (capacity <= capacity_) return;
-    capacity = std::max(capacity, kLeastBytes / sizeof(T));
+    capacity = std::max(capacity, kMinBytes / sizeof(T));
     if (capacity > std::numeric_limits<std::size_t>::max() / 2 / sizeof(T)) throw std::bad_array_new_length();
     values_ = static_cast<T*>(values_ == nullptr ? TakeBlock(capacity * sizeof(T))
                                                  : GrowBlock(values_, size_ * sizeof(T), capacity * sizeof(T)));
@@ -99,7 +99,7 @@ class LargeArray {
   }
 
  private:
-  static constexpr std::size_t kLeastBytes = std::size_t{16} << 10;
+  static constexpr std::size_t kMinBytes = std::size_t{16} << 10;
 
   void Swap(LargeArray& other) noexcept {
     std::swap(values_, other.values_);

@@ -55,9 +55,9 @@ struct Star {
   bool is_closed = true;
   bool has_border = false;  // some triangle may have an edge on the border
   std::size_t count = 0;
-  // By bits, of the first kMostLeftOut triangles: those that scans skip. So a ring may hold several fans; what joins
+  // By bits, of the first kMaxLeftOut triangles: those that scans skip. So a ring may hold several fans; what joins
   // two of them is no triangle.
-  static constexpr std::size_t kMostLeftOut = 32;
+  static constexpr std::size_t kMaxLeftOut = 32;
   std::uint32_t left_out = 0;
   // Of an open one: the edge of the walk's outline that holds the centre. The ring begins after it.
   std::size_t gap = 0;
@@ -66,7 +66,7 @@ struct Star {
   std::vector<HalfEdgeId> outside;    // by triangle: the twin of the ring's edge
   std::size_t removed_count = 0;      // the first slots of `triangles` are those of triangles that were removed
 
-  bool IsLeftOut(std::size_t i) const { return i < kMostLeftOut && (left_out >> i & 1) != 0; }
+  bool IsLeftOut(std::size_t i) const { return i < kMaxLeftOut && (left_out >> i & 1) != 0; }
 };
 
 inline void Ring::Grow(std::size_t capacity) {

@@ -20,13 +20,13 @@ namespace terrace::tin {
 
 inline constexpr std::uint32_t kNoEdge = 0xFFFFFFFF;
 
-// 0 -> 1 -> 2 -> 0 from tables of two bits each: a comparison would be a branch that cannot be foretold.
+// 0 -> 1 -> 2 -> 0 from tables of two bits each: a comparison would be a branch that cannot be predicted.
 constexpr unsigned NextCorner(unsigned i) { return (0b001001U >> (2 * i)) & 3; }
 constexpr unsigned PreviousCorner(unsigned i) { return (0b010010U >> (2 * i)) & 3; }
 
 class NarrowTriangles {
  public:
-  static constexpr std::size_t kMostVertices = std::size_t{1} << 16;
+  static constexpr std::size_t kMaxVertices = std::size_t{1} << 16;
   static constexpr unsigned kTwinBits = 21;
   static constexpr HalfEdgeId kNone = (HalfEdgeId{1} << kTwinBits) - 1;
 

@@ -25,12 +25,12 @@ Triangulation::Triangulation(const HeightField& field)
 
 std::size_t Triangulation::LikelyVertices(const HeightField& field) {
   const std::size_t samples = static_cast<std::size_t>(field.width()) * static_cast<std::size_t>(field.height());
-  return std::min(samples, NarrowTriangles::kMostVertices);
+  return std::min(samples, NarrowTriangles::kMaxVertices);
 }
 
 Triangulation::Triangulation(const std::vector<Vertex>& vertices,
                              const std::vector<std::array<std::uint32_t, 3>>& triangles)
-    : is_wide_(vertices.size() > NarrowTriangles::kMostVertices) {
+    : is_wide_(vertices.size() > NarrowTriangles::kMaxVertices) {
   vertices_.Append(vertices);
   is_wide_ ? Join(wide_, triangles) : Join(narrow_, triangles);
   Grow();
@@ -52,7 +52,7 @@ void Triangulation::Join(Triangles& triangles, const std::vector<std::array<std:
   for (const auto& [a, b, c] : corners) {
     triangles.slots.push_back(Triangles::Triangle::Of(a, b, c, Triangles::kNone, Triangles::kNone, Triangles::kNone));
   }
-  // Without a branch: which way an edge goes cannot be foretold.
+  // Without a branch: which way an edge goes cannot be predicted.
   std::vector<std::uint32_t> ends(vertices_.size() + 1, 0);
   for_each_edge([&](VertexId a, VertexId b, HalfEdgeId) { ends[a + std::size_t{1}] += a < b ? 1 : 0; });
   for (std::size_t vertex = 0; vertex < vertices_.size(); ++vertex) ends[vertex + 1] += ends[vertex];

@@ -214,7 +214,7 @@ Star& Triangulation::Outline(const Vertex& vertex, TriangleId triangle, Absorbs&
   star_.y = vertex.position.y;
   star_.height = vertex.height;
   vertices_.push_back(vertex);
-  if (!is_wide_ && vertices_.size() > NarrowTriangles::kMostVertices) Widen();
+  if (!is_wide_ && vertices_.size() > NarrowTriangles::kMaxVertices) Widen();
   is_wide_ ? Replace(wide_, vertex.position, triangle, absorbs, keeps)
            : Replace(narrow_, vertex.position, triangle, absorbs, keeps);
   return star_;

@@ -25,11 +25,11 @@ namespace HWY_NAMESPACE {
 namespace {
 
 // Blocks of kSide x kSide samples, a few rows to a vector.
-constexpr int kMostLanes = 16;
-HWY_ALIGN constexpr float kColumnsBy4[kMostLanes] = {0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3};
-HWY_ALIGN constexpr float kRowsBy4[kMostLanes] = {0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3};
-HWY_ALIGN constexpr float kColumnsBy8[kMostLanes] = {0, 1, 2, 3, 4, 5, 6, 7, 0, 1, 2, 3, 4, 5, 6, 7};
-HWY_ALIGN constexpr float kRowsBy8[kMostLanes] = {0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1};
+constexpr int kMaxLanes = 16;
+HWY_ALIGN constexpr float kColumnsBy4[kMaxLanes] = {0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3};
+HWY_ALIGN constexpr float kRowsBy4[kMaxLanes] = {0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3};
+HWY_ALIGN constexpr float kColumnsBy8[kMaxLanes] = {0, 1, 2, 3, 4, 5, 6, 7, 0, 1, 2, 3, 4, 5, 6, 7};
+HWY_ALIGN constexpr float kRowsBy8[kMaxLanes] = {0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1};
 
 #if HWY_MAX_BYTES >= 32
 constexpr int kLargeSide = 8;
@@ -55,9 +55,9 @@ HWY_INLINE Floats RowsFrom(const float* from, int stride) {
 }
 
 // Doubled areas, and what barycentric coordinates are computed from, stay below 2^24.
-constexpr int kMostExtent = 2048;
+constexpr int kMaxExtent = 2048;
 // Beyond it single precision may overflow.
-constexpr float kMostMagnitude = 0x1p100F;
+constexpr float kMaxMagnitude = 0x1p100F;
 
 // All bits where one of the barycentric coordinates has a sign: NaN, which no comparison holds for. None is zero, as
 // they lie halfway between integers.
@@ -124,10 +124,10 @@ struct StarPlanes {
     hn::Store(hn::Add(hn::Add(of_x, of_y), most_plane), kFloats, largest);
     hn::Store(of_magnitude, kFloats, magnitude);
 
-    const auto is_exact = hn::RebindMask(kFloats, hn::Lt(extent, All(kInts, kMostExtent + 1)));  // as of_d is
+    const auto is_exact = hn::RebindMask(kFloats, hn::Lt(extent, All(kInts, kMaxExtent + 1)));  // as of_d is
     // Pick's theorem: with 1, none but its corners.
     const auto has_samples = hn::Or(hn::Ne(of_d, All(kFloats, 1)), hn::Not(is_exact));
-    const auto is_tame = hn::And(hn::Lt(of_magnitude, All(kFloats, kMostMagnitude)), is_exact);
+    const auto is_tame = hn::And(hn::Lt(of_magnitude, All(kFloats, kMaxMagnitude)), is_exact);
     const std::uint32_t lanes = BitsOf(kFloats, has_samples), tame = lanes & BitsOf(kFloats, is_tame);
     small = tame & BitsOf(kFloats, hn::RebindMask(kFloats, is_small));
     medium = tame & BitsOf(kFloats, hn::RebindMask(kFloats, is_block)) & ~small;
@@ -185,7 +185,7 @@ HWY_INLINE float LeastInDoubt(float most, float largest, float magnitude, float 
 }
 
 // One block, from (west, south) relative to p: the largest numerator, negative if there is no sample, and which samples
-// are as large as that or may be, row by row. No branch, as which triangle lies where in its block cannot be foretold,
+// are as large as that or may be, row by row. No branch, as which triangle lies where in its block cannot be predicted,
 // but for doubts, which come in runs or are rare.
 struct BlockFind {
   float most;

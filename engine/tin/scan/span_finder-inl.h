@@ -47,7 +47,7 @@ class SpanFinder {
     const Number ys[4] = {0, static_cast<Number>(t.uy), static_cast<Number>(t.vy), 0};
     std::size_t easts = 0, wests = 0;
     for (std::size_t i = 0; i < 3; ++i) {
-      // Counter-clockwise: up on the east side, down on the west. Which edge is which cannot be foretold.
+      // Counter-clockwise: up on the east side, down on the west. Which edge is which cannot be predicted.
       const Number dx = xs[i + 1] - xs[i], dy = ys[i + 1] - ys[i], n = xs[i] * dy - ys[i] * dx;
       east_[easts] = {dx, dy, n};
       west_[wests] = {-dx, -dy, -n};

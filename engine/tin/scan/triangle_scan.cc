@@ -38,7 +38,7 @@ HWY_NOINLINE PlaneMisfit MisfitInDoubt(const HeightField& field, const Star& sta
                                        std::size_t i, std::size_t first, const BlockFind& find) {
   const int west = planes.west[i], south = planes.south[i];
   const ExactPlane t = ExactPlaneOf(field, star, first + i);
-  if (!(find.most < kMostMagnitude) || MayBeACorner(find.most, planes.magnitude[i], kDoubtInBlocks)) {
+  if (!(find.most < kMaxMagnitude) || MayBeACorner(find.most, planes.magnitude[i], kDoubtInBlocks)) {
     return ScanExactly(field, t);
   }
   double most = -1;
@@ -115,7 +115,7 @@ HWY_NOINLINE PlaneMisfit ScanDoubtfully(const HeightField& field, const Star& st
   if (single == 0 && planes.magnitude[i] == 0) return OnPlane(field, star, first + i);
   const ExactPlane t = ExactPlaneOf(field, star, first + i);
   const float least = LeastInDoubt(single, planes.largest[i], planes.magnitude[i], most_exact, kDoubt);
-  if (!(single < kMostMagnitude) || MayBeACorner(single, planes.magnitude[i], kDoubt) || two.runner_up() >= least) {
+  if (!(single < kMaxMagnitude) || MayBeACorner(single, planes.magnitude[i], kDoubt) || two.runner_up() >= least) {
     return ScanExactly(field, t);
   }
   HWY_ALIGN std::int32_t samples[hn::MaxLanes(kFloats)];
@@ -182,7 +182,7 @@ HWY_INLINE PlaneMisfit ScanLarge(const HeightField& field, const Star& star, con
   return ScanDoubtfully(field, star, planes, i, first, most_exact);
 }
 
-// Class by class, not triangle by triangle: what a triangle takes cannot be foretold.
+// Class by class, not triangle by triangle: what a triangle takes cannot be predicted.
 HWY_INLINE void ScanTogether(const HeightField& field, const Star& star, const StarPlanes& planes, std::size_t first,
                              std::uint32_t lanes, float most_exact, PlaneMisfit* misfits) {
   const auto lane = [](std::uint32_t bits) { return static_cast<std::size_t>(std::countr_zero(bits)); };
@@ -221,7 +221,7 @@ void ScanStar(const HeightField& field, const Star& star, PlaneMisfit* misfits) 
   for (std::size_t first = 0; first < star.count; first += lanes) {
     planes.Work(field, star, first);
     const std::size_t count = std::min(lanes, star.count - first);
-    const std::uint32_t left_out = first < Star::kMostLeftOut ? star.left_out >> first : 0;
+    const std::uint32_t left_out = first < Star::kMaxLeftOut ? star.left_out >> first : 0;
     ScanTogether(field, star, planes, first, ((1U << count) - 1) & ~left_out, most_exact, misfits + first);
   }
 #endif

@@ -27,7 +27,7 @@ struct PlaneMisfit {
 };
 
 // Its distance, or 0 where there are no samples. By its sign: a maximum becomes a branch, and whether a triangle has
-// samples cannot be foretold.
+// samples cannot be predicted.
 inline double DistanceOrZero(const PlaneMisfit& misfit) {
   const auto bits = std::bit_cast<std::int64_t>(misfit.distance);
   return std::bit_cast<double>(bits & ~(bits >> 63));

@@ -263,7 +263,7 @@ HWY_INLINE Furthest<DoublesTag> ScanColumnsInDouble(const HeightField& field, co
 }
 
 // Up to so many vectors of columns the box is quicker than its spans.
-constexpr int kMostBoxVectors = 3;
+constexpr int kMaxBoxVectors = 3;
 
 template <typename Found>
 HWY_INLINE Found ScanColumns(const HeightField& field, const PlaneFor<Found>& t, int column) {
@@ -279,7 +279,7 @@ HWY_INLINE Found ScanBox(const HeightField& field, const PlaneFor<Found>& t) {
   constexpr bool kIsPaired = kColumnsInPairs && !std::is_same_v<typename Found::Tag, DoublesTag>;
   const int lanes = LanesOf<typename Found::Tag>();
   if constexpr (kIsPaired) {
-    static_assert(kMostBoxVectors == 3);
+    static_assert(kMaxBoxVectors == 3);
     const int second = t.west + lanes, third = second + lanes;
     if (second > t.east) return ScanColumns<Found>(field, t, t.west);
     Found furthest = ScanColumnPairIn32Bits<Found>(field, t, t.west);
@@ -392,8 +392,8 @@ HWY_INLINE ExactPlane ExactPlaneOf(const HeightField& field, const Star& star, s
 
 template <typename Found>
 HWY_INLINE Found ScanWide(const HeightField& field, const PlaneFor<Found>& t) {
-  return t.east - t.west < kMostBoxVectors * LanesOf<typename Found::Tag>() ? ScanBox<Found>(field, t)
-                                                                            : ScanSpans<Found>(field, t);
+  return t.east - t.west < kMaxBoxVectors * LanesOf<typename Found::Tag>() ? ScanBox<Found>(field, t)
+                                                                           : ScanSpans<Found>(field, t);
 }
 
 HWY_NOINLINE PlaneMisfit ScanExactly(const HeightField& field, const ExactPlane& t) {

@@ -23,7 +23,7 @@ constexpr bool kSanitized = false;
 #endif
 constexpr int kFiles = kSanitized ? 60 : 500;  // under a sanitizer a process takes long to begin
 constexpr unsigned kSeconds = 20;              // the target is 5 on an idle machine
-constexpr long kMostKib = 512 << 10;
+constexpr long kMaxKib = 512 << 10;
 
 std::string ReadFile(const std::string& path) {
   std::ostringstream text;
@@ -104,7 +104,7 @@ TEST(DamagedFiles, CrashHangAndSwellNothing) {
     int status = 0;
     rusage used{};
     ASSERT_EQ(::wait4(child, &status, 0, &used), child);
-    const bool fine = WIFEXITED(status) && WEXITSTATUS(status) == 0 && used.ru_maxrss < kMostKib;
+    const bool fine = WIFEXITED(status) && WEXITSTATUS(status) == 0 && used.ru_maxrss < kMaxKib;
     EXPECT_TRUE(fine) << "file " << i << " from " << name << ": status " << status << ", " << used.ru_maxrss << " KiB";
     opened_badly += !fine;
     ASSERT_LT(opened_badly, 5) << "enough seen";

@@ -234,7 +234,7 @@ TEST(Holes, AreTheSameInEveryTile) {
 }
 
 // A hole that two rasters share is one; where the second raster is missing it is a collar.
-TEST(Holes, GoAcrossRastersOfASheet) {
+TEST(Holes, GoAcrossRastersOfAGrid) {
   const VoidAt is_void = Box(200, 100, 150, 120);
   for (const int shared : {0, 1}) {
     SCOPED_TRACE(shared);
@@ -377,13 +377,13 @@ TEST(Holes, OfAPlaneCostNoCertifiedError) {
     ASSERT_TRUE(tile);
     const Place a = PlaceOf(*tile, key, 0, tile->lattice.cells), b = PlaceOf(*tile, key, tile->lattice.cells, 0);
     if (a.x < 4 || a.y < 4 || b.x > 395 || b.y > 395) continue;
-    EXPECT_LT(tile->source_gap_m, 1) << geo::ToString(key);
+    EXPECT_LT(tile->source_error_m, 1) << geo::ToString(key);
     ++tiles;
   }
   EXPECT_GT(tiles, 4);
 }
 
-TEST(Holes, AreKnownFromTheRecord) {
+TEST(Holes, AreKnownFromTheCache) {
   const TempDir dir;
   const VoidAt is_void = [](int c, int r) { return Box(900, 80, 300, 90)(c, r) || Box(0, 0, 50, 20)(c, r); };
   const std::string path = WriteRaster(dir, Raster(1400, 300, Rough, is_void));

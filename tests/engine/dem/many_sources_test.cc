@@ -13,10 +13,10 @@
 #include <thread>
 #include <utility>
 
-#include "engine/dem/bound/sheet_tables.h"
+#include "engine/dem/bound/grid_tables.h"
 #include "engine/dem/common/all_cores.h"
-#include "engine/dem/mosaic/sheet.h"
-#include "engine/dem/mosaic/sheet_voids.h"
+#include "engine/dem/mosaic/grid_voids.h"
+#include "engine/dem/mosaic/raster_grid.h"
 #include "engine/dem/sources/raster_source.h"
 #include "tests/engine/dem/dem_fixture.h"
 
@@ -29,9 +29,9 @@ std::shared_ptr<const RasterSource> OpenRasterOrFail(const std::string& path) {
   return raster ? *std::move(raster) : nullptr;
 }
 
-// One sheet of columns x rows rasters of side x side samples, each at its own height.
-Sheet MakeSheet(const TempDir& dir, const std::array<double, 6>& first, const std::string& crs, int columns, int rows,
-                int side) {
+// One raster grid of columns x rows rasters of side x side samples, each at its own height.
+RasterGrid MakeGrid(const TempDir& dir, const std::array<double, 6>& first, const std::string& crs, int columns,
+                    int rows, int side) {
   std::vector<std::shared_ptr<const RasterSource>> rasters;
   for (int y = 0; y < rows; ++y) {
     for (int x = 0; x < columns; ++x) {
@@ -45,27 +45,27 @@ Sheet MakeSheet(const TempDir& dir, const std::array<double, 6>& first, const st
       rasters.push_back(OpenRasterOrFail(WriteRaster(dir, spec, std::to_string(y) + "-" + std::to_string(x) + ".tif")));
     }
   }
-  std::vector<SheetPlan> plans = PlanSheets(rasters);
+  std::vector<GridPlan> plans = PlanGrids(rasters);
   EXPECT_EQ(plans.size(), 1U);
-  auto sheet = Sheet::Make(std::move(plans.front()), {.max_void_gap = 64});
-  EXPECT_TRUE(sheet.has_value());
-  return *std::move(sheet);
+  auto grid = RasterGrid::Make(std::move(plans.front()), {.max_void_gap = 64});
+  EXPECT_TRUE(grid.has_value());
+  return *std::move(grid);
 }
 
-SheetTrace TraceOf(const Sheet& sheet, const geo::Lattice& lattice, const geo::TileKey& key) {
+GridTrace TraceOf(const RasterGrid& grid, const geo::Lattice& lattice, const geo::TileKey& key) {
   const NodeWindow window{lattice.FirstColumn(key) - 1, lattice.FirstRow(key) - 1, lattice.cells + 3,
                           lattice.cells + 3};
   std::vector<float> heights(static_cast<std::size_t>(window.columns) * static_cast<std::size_t>(window.rows),
                              SampleRules::kVoid);
-  SheetTrace trace;
-  EXPECT_TRUE(sheet.Fill(lattice, window, Counting::kEllipsoid, {heights}, {}, &trace));
+  GridTrace trace;
+  EXPECT_TRUE(grid.Fill(lattice, window, HeightDatum::kEllipsoid, {heights}, {}, &trace));
   return trace;
 }
 
 // What the tables of all members say of a box.
-BlockRange OfAllMembers(const Sheet& sheet, double west, double north, double east, double south) {
+BlockRange OfAllMembers(const RasterGrid& grid, double west, double north, double east, double south) {
   BlockRange range;
-  for (const SheetMember& member : sheet.members()) {
+  for (const GridMember& member : grid.members()) {
     const auto x = static_cast<double>(member.column), y = static_cast<double>(member.row);
     range.Add(member.raster->tables()->table.Query(west - x, north - y, east - x, south - y));
   }
@@ -73,32 +73,32 @@ BlockRange OfAllMembers(const Sheet& sheet, double west, double north, double ea
 }
 
 // Asks for a box around every position of a trace. How many members were looked at, of one box at most and for all.
-std::pair<std::size_t, std::size_t> LookAround(const Sheet& sheet, const SheetTrace& trace, std::size_t stride) {
-  const SheetTables tables(sheet, trace, stride);
+std::pair<std::size_t, std::size_t> LookAround(const RasterGrid& grid, const GridTrace& trace, std::size_t stride) {
+  const GridTables tables(grid, trace, stride);
   std::size_t most = 0;
   for (const Position& p : trace.positions) {
     if (!std::isfinite(p.x) || !std::isfinite(p.y)) continue;
     const std::size_t before = tables.members_visited();
     const BlockRange found = tables.Ranges(p.x - 1, p.y - 1, p.x + 1, p.y + 1);
     most = std::max(most, tables.members_visited() - before);
-    const BlockRange expected = OfAllMembers(sheet, p.x - 1, p.y - 1, p.x + 1, p.y + 1);
+    const BlockRange expected = OfAllMembers(grid, p.x - 1, p.y - 1, p.x + 1, p.y + 1);
     EXPECT_EQ(found.min, expected.min) << p.x << ' ' << p.y;
     EXPECT_EQ(found.max, expected.max) << p.x << ' ' << p.y;
   }
   return {most, tables.members_visited()};
 }
 
-// Columns of a sheet around the Earth begin anew at one meridian: a tile there has pixels at both ends.
+// Columns of a raster grid around the Earth begin anew at one meridian: a tile there has pixels at both ends.
 TEST(ManySources, AroundTheEarthATileLooksAtItsOwnSources) {
   const TempDir dir;
-  const Sheet sheet = MakeSheet(dir, {-180, 0.5, 0, 85, 0, -0.5}, "EPSG:4326", 36, 4, 20);
-  ASSERT_TRUE(sheet.wraps());
-  ASSERT_EQ(sheet.members().size(), 144U);
+  const RasterGrid grid = MakeGrid(dir, {-180, 0.5, 0, 85, 0, -0.5}, "EPSG:4326", 36, 4, 20);
+  ASSERT_TRUE(grid.wraps());
+  ASSERT_EQ(grid.members().size(), 144U);
   const geo::Lattice lattice{5, 32};
   const std::int64_t columns = 1 << 6;
   for (const std::int64_t x : {std::int64_t{0}, std::int64_t{7}, columns - 1}) {
-    const SheetTrace trace = TraceOf(sheet, lattice, {5, x, 27});
-    const auto [most, all] = LookAround(sheet, trace, static_cast<std::size_t>(lattice.cells) + 3);
+    const GridTrace trace = TraceOf(grid, lattice, {5, x, 27});
+    const auto [most, all] = LookAround(grid, trace, static_cast<std::size_t>(lattice.cells) + 3);
     EXPECT_LE(most, 4U) << "a tile of 5.6 degrees among sources of 10, column " << x;
     EXPECT_GT(all, 0U);
   }
@@ -107,26 +107,26 @@ TEST(ManySources, AroundTheEarthATileLooksAtItsOwnSources) {
 // A shallow tile of many sources: the index tells which of them a box meets.
 TEST(ManySources, AShallowTileLooksAtTheSourcesOfEachBox) {
   const TempDir dir;
-  const Sheet sheet = MakeSheet(dir, {-180, 0.5, 0, 85, 0, -0.5}, "EPSG:4326", 36, 4, 20);
+  const RasterGrid grid = MakeGrid(dir, {-180, 0.5, 0, 85, 0, -0.5}, "EPSG:4326", 36, 4, 20);
   const geo::Lattice lattice{0, 32};
-  const SheetTrace trace = TraceOf(sheet, lattice, {0, 0, 0});
-  const auto [most, all] = LookAround(sheet, trace, static_cast<std::size_t>(lattice.cells) + 3);
+  const GridTrace trace = TraceOf(grid, lattice, {0, 0, 0});
+  const auto [most, all] = LookAround(grid, trace, static_cast<std::size_t>(lattice.cells) + 3);
   EXPECT_LE(most, 4U);
 }
 
-// Nodes beyond a projected sheet have no positions; they must not make the tile look at all sources.
+// Nodes beyond a projected raster grid have no positions; they must not make the tile look at all sources.
 TEST(ManySources, AtTheRimOfAProjectionATileLooksAtItsOwnSources) {
   const TempDir dir;
-  const Sheet sheet = MakeSheet(dir, {300'000, 100, 0, 5'000'000, 0, -100}, "EPSG:32632", 12, 12, 20);
+  const RasterGrid grid = MakeGrid(dir, {300'000, 100, 0, 5'000'000, 0, -100}, "EPSG:32632", 12, 12, 20);
   const geo::Lattice lattice{11, 32};
-  const auto [west, north] = std::pair(sheet.reach().west, sheet.reach().north);
+  const auto [west, north] = std::pair(grid.reach().west, grid.reach().north);
   const double tile = 180.0 / (1 << 11);
   const geo::TileKey corner{11, static_cast<std::int64_t>((west + 0.02 + 180) / tile),
                             static_cast<std::int64_t>((north - 0.02 + 90) / tile)};
-  SheetTrace trace = TraceOf(sheet, lattice, corner);
-  // As nodes far from a sheet and outside its projection have it.
+  GridTrace trace = TraceOf(grid, lattice, corner);
+  // As nodes far from a raster grid and outside its projection have it.
   for (std::size_t i = 0; i < 40; ++i) trace.positions[i] = {std::nan(""), std::nan("")};
-  const auto [most, all] = LookAround(sheet, trace, static_cast<std::size_t>(lattice.cells) + 3);
+  const auto [most, all] = LookAround(grid, trace, static_cast<std::size_t>(lattice.cells) + 3);
   EXPECT_GT(all, 0U);
   EXPECT_LE(most, 8U);
 }
@@ -136,9 +136,9 @@ constexpr int kSide = 40, kAcross = 4, kShift = 13, kStride = kAcross * kSide + 
 
 // Rasters of kSide x kSide samples, kAcross x kAcross of them without those of `missing`, beside each other or, with
 // `shared` rows and columns, over each other's edges.
-std::vector<SheetMember> MakeMembers(const TempDir& dir, const std::vector<std::uint8_t>& missing, int shared,
-                                     const std::vector<std::uint8_t>& voids) {
-  std::vector<SheetMember> members;
+std::vector<GridMember> MakeMembers(const TempDir& dir, const std::vector<std::uint8_t>& missing, int shared,
+                                    const std::vector<std::uint8_t>& voids) {
+  std::vector<GridMember> members;
   for (int k = 0; k < kAcross * kAcross; ++k) {
     if (missing[static_cast<std::size_t>(k)] != 0) continue;
     const int left = k % kAcross * (kSide - shared) + k / kAcross % 2 * kShift, top = k / kAcross * (kSide - shared);
@@ -154,7 +154,7 @@ std::vector<SheetMember> MakeMembers(const TempDir& dir, const std::vector<std::
   return members;
 }
 
-BoxIndex IndexOfMembers(const std::vector<SheetMember>& members) {
+BoxIndex IndexOfMembers(const std::vector<GridMember>& members) {
   std::vector<BoxIndex::Entry> entries;
   for (std::size_t i = 0; i < members.size(); ++i) {
     const geo::TileRange at = members[i].pixels();
@@ -164,11 +164,11 @@ BoxIndex IndexOfMembers(const std::vector<SheetMember>& members) {
 }
 
 // Voids of all members that a flood from the places without a raster does not reach.
-std::vector<std::uint8_t> HolesByFlood(const std::vector<SheetMember>& members, const std::vector<std::uint8_t>& voids,
+std::vector<std::uint8_t> HolesByFlood(const std::vector<GridMember>& members, const std::vector<std::uint8_t>& voids,
                                        int side) {
   std::vector<std::uint8_t> holes(voids.size());
   std::vector<std::uint8_t> has(voids.size());
-  for (const SheetMember& member : members) {
+  for (const GridMember& member : members) {
     for (std::int64_t y = member.row; y < member.row + kSide; ++y) {
       for (std::int64_t x = member.column; x < member.column + kSide; ++x)
         has[static_cast<std::size_t>(y * side + x)] = 1;
@@ -209,12 +209,12 @@ TEST(ManySources, VoidsThatGoOnInANeighbourAreThoseThatAFloodFinds) {
       const int x = static_cast<int>(random() % (kStride - 20)), y = static_cast<int>(random() % (kStride - 20));
       for (int r = y; r < y + 15; ++r) std::fill_n(&voids[static_cast<std::size_t>(r * kStride + x)], random() % 20, 1);
     }
-    const std::vector<SheetMember> members = MakeMembers(dir, missing, shared, voids);
+    const std::vector<GridMember> members = MakeMembers(dir, missing, shared, voids);
     const BoxIndex index = IndexOfMembers(members);
-    const SheetVoids sheet(members, index, 0);
+    const GridVoids grid(members, index, 0);
     std::vector<float> heights(voids.size());
     for (std::size_t i = 0; i < voids.size(); ++i) heights[i] = voids[i] != 0 ? SampleRules::kVoid : 0;
-    const auto found = sheet.HolesIn(members, index, 1, {0, 0, kStride, kStride}, kStride, heights);
+    const auto found = grid.HolesIn(members, index, 1, {0, 0, kStride, kStride}, kStride, heights);
     const auto expected = HolesByFlood(members, voids, kStride);
     int wrong = 0;
     for (std::size_t i = 0; i < voids.size(); ++i) wrong += found[i] != expected[i];
@@ -230,9 +230,9 @@ TEST(ManySources, VoidsAreComparedAsOftenAsSomethingChangesAlongTheRims) {
     for (int x = 0; x < kAcross * kSide; x += kSide) voids[static_cast<std::size_t>((y + 17) * kStride + x + 17)] = 0;
   }
   const auto members = MakeMembers(dir, std::vector<std::uint8_t>(kAcross * kAcross), 0, voids);
-  const SheetVoids sheet(members, IndexOfMembers(members), 0);
-  EXPECT_GT(sheet.looks(), 0u);
-  EXPECT_LE(sheet.looks(), members.size() * 40) << "160 pixels of a rim, with a neighbour each";
+  const GridVoids grid(members, IndexOfMembers(members), 0);
+  EXPECT_GT(grid.looks(), 0u);
+  EXPECT_LE(grid.looks(), members.size() * 40) << "160 pixels of a rim, with a neighbour each";
 }
 
 RasterSpec Rough(int side) {
@@ -249,7 +249,7 @@ TEST(ManySources, PagedTablesSayWhatKeptOnesDo) {
   const TempDir dir, cache;
   const std::string path = WriteRaster(dir, Rough(1500));
   const auto kept = OpenRasterOrFail(path);
-  const auto pages = std::make_shared<SurveyPages>(0, 1);
+  const auto pages = std::make_shared<StatisticsPages>(0, 1);
   auto opened = RasterSource::Open(path, {}, cache.path().string(), {}, {}, pages);
   ASSERT_TRUE(opened.has_value()) << opened.error().message;
   const RasterSource& paged = **opened;
@@ -301,10 +301,10 @@ TEST(ManySources, ShallowTilesReadKeptAveragesOfASource) {
   EXPECT_EQ((*read_whole)->averages(), nullptr);
 }
 
-TEST(ManySources, PagedTablesOfALostRecordAreMadeAgain) {
+TEST(ManySources, PagedTablesOfALostFileAreMadeAgain) {
   const TempDir dir, cache;
   const std::string path = WriteRaster(dir, Rough(1100));
-  const auto pages = std::make_shared<SurveyPages>(0, 1);
+  const auto pages = std::make_shared<StatisticsPages>(0, 1);
   auto opened = RasterSource::Open(path, {}, cache.path().string(), {}, {}, pages);
   ASSERT_TRUE(opened.has_value());
   const RasterSource& raster = **opened;
@@ -323,13 +323,13 @@ TEST(ManySources, PagedTablesOfALostRecordAreMadeAgain) {
 
 TEST(ManySources, PagesGoThatWereUsedLongestAgo) {
   const auto tables = [] {
-    RasterSurvey survey;
-    survey.table = RangeTable(1000, 1000);
-    survey.table.Finish();
-    return std::make_shared<const RasterSurvey>(std::move(survey));
+    RasterStatistics statistics;
+    statistics.table = RangeTable(1000, 1000);
+    statistics.table.Finish();
+    return std::make_shared<const RasterStatistics>(std::move(statistics));
   };
   const std::size_t bytes = tables()->bytes();
-  SurveyPages pages(0, 2 * bytes);
+  StatisticsPages pages(0, 2 * bytes);
   const int a = 0, b = 0, c = 0;
   pages.Add(&a, tables());
   pages.Add(&b, tables());

@@ -227,7 +227,7 @@ TEST(Mosaic, OfOneRankTheFinerSourceWinsThenTheName) {
   const std::string coarse = WriteRaster(dir, FlatSquare(0, 10, 10, 1, 1), "a.tif");
   const std::string fine = WriteRaster(dir, FlatSquare(3, 7, 40, 0.1, 2), "b.tif");
   const std::string beside =
-      WriteRaster(dir, FlatSquare(3.05, 7, 40, 0.1, 3), "c.tif");  // half a pixel off: a sheet apart
+      WriteRaster(dir, FlatSquare(3.05, 7, 40, 0.1, 3), "c.tif");  // half a pixel off: a raster grid apart
   const auto source = OpenOrFail({{coarse}, {beside}, {fine}});
   EXPECT_EQ(HeightAt(*source, 5, 5), 2);
   EXPECT_EQ(HeightAt(*source, 7.03, 5), 3);  // of `beside` alone

@@ -1,4 +1,4 @@
-// Surveys of rasters and their records: equal heights with and without, resumed, shared, and never believed when
+// Statistics of rasters and their cache: equal heights with and without, resumed, shared, and never believed when
 // damaged.
 #include "engine/dem/sources/prepare.h"
 
@@ -57,7 +57,7 @@ std::string WriteLargeRaster(const TempDir& dir, const std::string& name = "larg
   return path;
 }
 
-std::unique_ptr<RasterSource> OpenRecorded(const std::string& path, const std::string& cache_dir) {
+std::unique_ptr<RasterSource> OpenWithCache(const std::string& path, const std::string& cache_dir) {
   auto source = RasterSource::Open(path, {}, cache_dir);
   EXPECT_TRUE(source.has_value()) << source.error().message;
   return source ? *std::move(source) : nullptr;
@@ -84,23 +84,23 @@ void ExpectSameAverages(const std::string& path, const RasterSource& source) {
   }
 }
 
-TEST(Prepare, AveragesFromARecordAreThoseOfTheSamplesBitForBit) {
+TEST(Prepare, AveragesFromTheCacheAreThoseOfTheSamplesBitForBit) {
   const TempDir dir;
   const std::string path = WriteLargeRaster(dir), cache = dir.File("cache");
-  const auto first = OpenRecorded(path, cache);
+  const auto first = OpenWithCache(path, cache);
   EXPECT_FALSE(first->preparation().from_record);
-  EXPECT_LT(first->preparation().parts_read, first->preparation().parts) << "what is not stored is not read";
+  EXPECT_LT(first->preparation().chunks_read, first->preparation().parts) << "what is not stored is not read";
   ExpectSameAverages(path, *first);
-  const auto second = OpenRecorded(path, cache);
+  const auto second = OpenWithCache(path, cache);
   EXPECT_TRUE(second->preparation().from_record);
-  EXPECT_EQ(second->preparation().parts_read, 0);
+  EXPECT_EQ(second->preparation().chunks_read, 0);
   ExpectSameAverages(path, *second);
   EXPECT_EQ(second->info().heights.min, first->info().heights.min);
   EXPECT_EQ(second->info().heights.max, first->info().heights.max);
   EXPECT_EQ(second->info().valid_samples, 3u * (700 * 600 - 39 * 149));
 }
 
-TEST(Prepare, TilesAreTheSameWithAndWithoutARecord) {
+TEST(Prepare, TilesAreTheSameWithAndWithoutACache) {
   const TempDir dir;
   const std::string path = WriteLargeRaster(dir);
   DemOptions options;
@@ -115,7 +115,7 @@ TEST(Prepare, TilesAreTheSameWithAndWithoutARecord) {
       ASSERT_TRUE(expected && first && second);
       EXPECT_EQ(expected->heights, first->heights) << geo::ToString(key);
       EXPECT_EQ(expected->heights, second->heights) << geo::ToString(key);
-      EXPECT_EQ(expected->source_gap_m, second->source_gap_m) << geo::ToString(key);
+      EXPECT_EQ(expected->source_error_m, second->source_error_m) << geo::ToString(key);
       const HeightRange a = plain->RangeBound(key), b = loaded->RangeBound(key);
       EXPECT_EQ(a.min, b.min);
       EXPECT_EQ(a.max, b.max);
@@ -125,7 +125,7 @@ TEST(Prepare, TilesAreTheSameWithAndWithoutARecord) {
 
 // Every sample against the surface between averages, by reading both anew.
 void ExpectErrorsHold(const std::string& path) {
-  const auto source = OpenRecorded(path, {});
+  const auto source = OpenWithCache(path, {});
   const auto dataset = OpenRaster(path);
   ASSERT_TRUE(source && dataset);
   const RasterLayout& layout = source->layout();
@@ -206,33 +206,33 @@ TEST(Prepare, GoesOnWhereItWasKilled) {
   const std::string path = WriteLargeRaster(dir), cache = dir.File("cache");
   ASSERT_TRUE(KilledAfter(path, cache, .3));
   ASSERT_TRUE(KilledAfter(path, cache, .6)) << "twice";
-  const auto source = OpenRecorded(path, cache);
+  const auto source = OpenWithCache(path, cache);
   const Preparation& preparation = source->preparation();
   EXPECT_FALSE(preparation.from_record);
   EXPECT_EQ(preparation.parts, 35);
-  EXPECT_EQ(preparation.parts_kept, 21);
+  EXPECT_EQ(preparation.chunks_kept, 21);
   const TempDir other;
-  EXPECT_LT(preparation.parts_read, OpenRecorded(path, other.path().string())->preparation().parts_read);
+  EXPECT_LT(preparation.chunks_read, OpenWithCache(path, other.path().string())->preparation().chunks_read);
   ExpectSameAverages(path, *source);
-  EXPECT_TRUE(OpenRecorded(path, cache)->preparation().from_record);
+  EXPECT_TRUE(OpenWithCache(path, cache)->preparation().from_record);
 }
 
 TEST(Prepare, ThrowsAwayATornPart) {
   const TempDir dir;
   const std::string path = WriteLargeRaster(dir), cache = dir.File("cache");
   ASSERT_TRUE(KilledAfter(path, cache, .6));
-  const std::string partial = RecordPath(cache, path) + ".partial";
+  const std::string partial = StatisticsPath(cache, path) + ".partial";
   const auto size = std::filesystem::file_size(partial);
   for (const int cut : {1, 33, 5000}) {
     std::filesystem::resize_file(partial, size - static_cast<std::uintmax_t>(cut));
     ASSERT_TRUE(KilledAfter(path, cache, .65));
   }
-  const auto source = OpenRecorded(path, cache);
-  EXPECT_GT(source->preparation().parts_kept, 0);
+  const auto source = OpenWithCache(path, cache);
+  EXPECT_GT(source->preparation().chunks_kept, 0);
   ExpectSameAverages(path, *source);
 }
 
-TEST(Prepare, TwoProcessesShareOneRecord) {
+TEST(Prepare, TwoProcessesShareOneCache) {
   const TempDir dir;
   const std::string path = WriteLargeRaster(dir), cache = dir.File("cache");
   std::array<pid_t, 3> children{};
@@ -248,17 +248,17 @@ TEST(Prepare, TwoProcessesShareOneRecord) {
     ::waitpid(child, &status, 0);
     EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0);
   }
-  const auto source = OpenRecorded(path, cache);
+  const auto source = OpenWithCache(path, cache);
   EXPECT_TRUE(source->preparation().from_record);
   ExpectSameAverages(path, *source);
-  EXPECT_FALSE(std::filesystem::exists(RecordPath(cache, path) + ".partial"));
+  EXPECT_FALSE(std::filesystem::exists(StatisticsPath(cache, path) + ".partial"));
 }
 
-TEST(Prepare, KeepsNoRecordOpenAndDoesWithoutOneThatIsGone) {
+TEST(Prepare, KeepsNoFileOpenAndDoesWithoutOneThatIsGone) {
   const TempDir dir;
   const std::string path = WriteLargeRaster(dir), cache = dir.File("cache");
-  OpenRecorded(path, cache);
-  const auto source = OpenRecorded(path, cache);
+  OpenWithCache(path, cache);
+  const auto source = OpenWithCache(path, cache);
   EXPECT_TRUE(source->preparation().from_record);
   const auto before = source->ReadBlocks(8, {300, 200, 100, 100}, {});
   for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) {
@@ -285,22 +285,22 @@ TEST(Prepare, RastersWhoseOverviewsMisleadAreLookedAtOnce) {
     }
     return written;
   };
-  const auto source = OpenRecorded(path, cache);
+  const auto source = OpenWithCache(path, cache);
   EXPECT_FALSE(source->info().overviews_unused.empty());
   const Times made = times();
   EXPECT_EQ(made.size(), 2u);
-  const auto again = OpenRecorded(path, cache);
+  const auto again = OpenWithCache(path, cache);
   EXPECT_TRUE(again->preparation().from_record);
   EXPECT_EQ(again->info().overviews_unused, source->info().overviews_unused);
   EXPECT_EQ(times(), made);
   ExpectSameAverages(path, *again);
 }
 
-TEST(Prepare, NeverBelievesADamagedRecord) {
+TEST(Prepare, NeverBelievesADamagedFile) {
   const TempDir dir;
   const std::string path = WriteLargeRaster(dir), cache = dir.File("cache");
-  OpenRecorded(path, cache);
-  const std::string record = RecordPath(cache, path);
+  OpenWithCache(path, cache);
+  const std::string record = StatisticsPath(cache, path);
   std::ifstream file(record, std::ios::binary);
   const std::string good((std::istreambuf_iterator<char>(file)), {});
   const auto write = [&](const std::string& bytes) { std::ofstream(record, std::ios::binary) << bytes; };
@@ -310,14 +310,14 @@ TEST(Prepare, NeverBelievesADamagedRecord) {
     if (i % 4 == 0) {
       bad.resize(random() % bad.size());
     } else {
-      // The header, the survey at the end, and anywhere.
+      // The header, the statistics at the end, and anywhere.
       const std::size_t at = i % 4 == 1   ? random() % 40
                              : i % 4 == 2 ? bad.size() - 1 - random() % 40000
                                           : random() % bad.size();
       bad[at] = static_cast<char>(bad[at] ^ (1 << random() % 8));
     }
     write(bad);
-    const auto source = OpenRecorded(path, cache);
+    const auto source = OpenWithCache(path, cache);
     ASSERT_NE(source, nullptr);
     if (i % 4 == 3) {
       ExpectSameAverages(path, *source);
@@ -326,14 +326,14 @@ TEST(Prepare, NeverBelievesADamagedRecord) {
     }
   }
   write(good);
-  EXPECT_TRUE(OpenRecorded(path, cache)->preparation().from_record);
+  EXPECT_TRUE(OpenWithCache(path, cache)->preparation().from_record);
 }
 
 TEST(Prepare, DamagedAveragesAreReadFromTheSourceAndMadeAnew) {
   const TempDir dir;
   const std::string path = WriteLargeRaster(dir), cache = dir.File("cache");
-  const auto source = OpenRecorded(path, cache);
-  const std::string record = RecordPath(cache, path);
+  const auto source = OpenWithCache(path, cache);
+  const std::string record = StatisticsPath(cache, path);
   // Averages are most of the file: this hits them all.
   std::fstream file(record, std::ios::binary | std::ios::in | std::ios::out);
   const auto size = std::filesystem::file_size(record);
@@ -343,32 +343,32 @@ TEST(Prepare, DamagedAveragesAreReadFromTheSourceAndMadeAnew) {
   }
   file.close();
   ExpectSameAverages(path, *source);
-  EXPECT_FALSE(OpenRecorded(path, cache)->preparation().from_record);
-  EXPECT_TRUE(OpenRecorded(path, cache)->preparation().from_record);
+  EXPECT_FALSE(OpenWithCache(path, cache)->preparation().from_record);
+  EXPECT_TRUE(OpenWithCache(path, cache)->preparation().from_record);
 }
 
 TEST(Prepare, AChangedSourceIsPreparedAnew) {
   const TempDir dir;
   const std::string path = WriteRaster(dir, {}), cache = dir.File("cache");
-  OpenRecorded(path, cache);
-  EXPECT_TRUE(OpenRecorded(path, cache)->preparation().from_record);
+  OpenWithCache(path, cache);
+  EXPECT_TRUE(OpenWithCache(path, cache)->preparation().from_record);
   std::filesystem::rename(WriteRaster(dir, {.value = [](int, int) { return 5.0; }}, "new.tif"), path);
-  const auto source = OpenRecorded(path, cache);
+  const auto source = OpenWithCache(path, cache);
   EXPECT_FALSE(source->preparation().from_record);
   EXPECT_EQ(source->info().heights.max, 5);
 }
 
-TEST(Prepare, AFolderThatCannotBeWrittenToCostsNothingButTheRecord) {
+TEST(Prepare, AFolderThatCannotBeWrittenToCostsNothingButTheCache) {
   const TempDir dir;
   const std::string path = WriteRaster(dir, {});
   std::ofstream(dir.File("file")) << "x";
-  const auto source = OpenRecorded(path, dir.File("file") + "/cache");
+  const auto source = OpenWithCache(path, dir.File("file") + "/cache");
   ASSERT_NE(source, nullptr);
   EXPECT_FALSE(source->preparation().from_record);
 }
 
-// Several parts, overviews that are worth nothing, and marks that it does not declare.
-std::string WriteMarkedRaster(const TempDir& dir, const std::string& name = "marked.tif") {
+// Several chunks, overviews that are worth nothing, and undeclared nodata values.
+std::string WriteRasterWithUndeclaredNodata(const TempDir& dir, const std::string& name = "marked.tif") {
   RasterSpec spec;
   spec.width = spec.height = 2100;
   spec.geo_transform = {8, .001, 0, 47, 0, -.001};
@@ -378,32 +378,32 @@ std::string WriteMarkedRaster(const TempDir& dir, const std::string& name = "mar
   return WriteRaster(dir, spec, name);
 }
 
-void ExpectMarksAreVoids(const RasterSource& source) {
+void ExpectNodataIsVoid(const RasterSource& source) {
   EXPECT_NE(source.info().found_voids, "");
   EXPECT_EQ(source.info().void_samples, 49u);
   EXPECT_GT(source.info().heights.min, 0);
-  EXPECT_TRUE(source.layout().overview_factors.empty()) << "they were averaged from marks";
+  EXPECT_TRUE(source.layout().overview_factors.empty()) << "they were averaged from nodata values";
 }
 
-TEST(Prepare, FoundVoidsArePartOfTheRecord) {
+TEST(Prepare, FoundVoidsArePartOfTheFile) {
   const TempDir dir;
-  const std::string path = WriteMarkedRaster(dir), cache = dir.File("cache");
-  const auto plain = OpenRecorded(path, {}), made = OpenRecorded(path, cache), loaded = OpenRecorded(path, cache);
+  const std::string path = WriteRasterWithUndeclaredNodata(dir), cache = dir.File("cache");
+  const auto plain = OpenWithCache(path, {}), made = OpenWithCache(path, cache), loaded = OpenWithCache(path, cache);
   EXPECT_FALSE(made->preparation().from_record);
   EXPECT_TRUE(loaded->preparation().from_record);
-  EXPECT_EQ(loaded->preparation().parts_read, 0);
+  EXPECT_EQ(loaded->preparation().chunks_read, 0);
   for (const auto& source : {plain.get(), made.get(), loaded.get()}) {
-    ExpectMarksAreVoids(*source);
+    ExpectNodataIsVoid(*source);
     EXPECT_EQ(source->info().found_voids, plain->info().found_voids);
     EXPECT_EQ(source->info().heights.min, plain->info().heights.min);
     ExpectSameAverages(path, *source);
   }
 }
 
-TEST(Prepare, ARecordIsNotUsedForOtherRules) {
+TEST(Prepare, AFileIsNotUsedForOtherRules) {
   const TempDir dir;
-  const std::string path = WriteMarkedRaster(dir), cache = dir.File("cache");
-  OpenRecorded(path, cache);
+  const std::string path = WriteRasterWithUndeclaredNodata(dir), cache = dir.File("cache");
+  OpenWithCache(path, cache);
   const auto with = [&](SourceOptions options) {
     auto source = RasterSource::Open(path, options, cache);
     EXPECT_TRUE(source.has_value());
@@ -422,7 +422,7 @@ TEST(Prepare, ARecordIsNotUsedForOtherRules) {
 
 TEST(Prepare, GoesOnInTheSecondPass) {
   const TempDir dir;
-  const std::string path = WriteMarkedRaster(dir), cache = dir.File("cache");
+  const std::string path = WriteRasterWithUndeclaredNodata(dir), cache = dir.File("cache");
   const pid_t child = ::fork();
   if (child == 0) {
     double last = 0;
@@ -437,11 +437,11 @@ TEST(Prepare, GoesOnInTheSecondPass) {
   int status = 0;
   ::waitpid(child, &status, 0);
   ASSERT_TRUE(WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL);
-  const auto source = OpenRecorded(path, cache);
+  const auto source = OpenWithCache(path, cache);
   EXPECT_EQ(source->preparation().parts, 9);
-  EXPECT_EQ(source->preparation().parts_kept, 5);
-  EXPECT_EQ(source->preparation().parts_read, 4) << "the first pass is over, and its findings are kept";
-  ExpectMarksAreVoids(*source);
+  EXPECT_EQ(source->preparation().chunks_kept, 5);
+  EXPECT_EQ(source->preparation().chunks_read, 4) << "the first pass is over, and the detected nodata is kept";
+  ExpectNodataIsVoid(*source);
   ExpectSameAverages(path, *source);
 }
 
@@ -457,10 +457,10 @@ TEST(Prepare, StopsWhenToldAndGoesOnNextTime) {
       stop.get_token());
   ASSERT_FALSE(stopped.has_value());
   EXPECT_EQ(stopped.error().code, ErrorCode::kCancelled);
-  const auto source = OpenRecorded(path, cache);
+  const auto source = OpenWithCache(path, cache);
   EXPECT_FALSE(source->preparation().from_record);
-  EXPECT_GE(source->preparation().parts_kept, 11);
-  EXPECT_LT(source->preparation().parts_kept, 35);
+  EXPECT_GE(source->preparation().chunks_kept, 11);
+  EXPECT_LT(source->preparation().chunks_kept, 35);
   ExpectSameAverages(path, *source);
 }
 

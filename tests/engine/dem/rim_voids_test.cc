@@ -15,7 +15,7 @@
 namespace terrace::dem {
 namespace {
 
-// Parts of a raster as a survey makes them.
+// Chunks of a raster as the statistics pass makes them.
 RimVoids FindRimVoids(int width, int height, const std::vector<std::uint8_t>& voids, std::size_t most_runs,
                       std::vector<std::uint8_t>& holes) {
   holes.assign(voids.size(), 0);
@@ -31,7 +31,7 @@ RimVoids FindRimVoids(int width, int height, const std::vector<std::uint8_t>& vo
   const ChunkGrid chunks(width, height);
   for (int index = 0; index < chunks.count(); ++index) {
     const Chunk chunk = chunks.At(index);
-    ChunkSurvey part;
+    ChunkStatistics part;
     for (int r = 0; r < chunk.rows; ++r) {
       for (int c = 0; c < chunk.cols; ++c) {
         if (voids[at(chunk.col + c, chunk.row + r)] == 0) {
@@ -72,7 +72,7 @@ TEST(RimVoids, AreThoseThatAFloodFromTheRimFinds) {
       const auto [c, r] = queue[i];
       reach(c - 1, r), reach(c + 1, r), reach(c, r - 1), reach(c, r + 1);
     }
-    const RimVoids rim = FindRimVoids(kWidth, kHeight, voids, RimVoidFinder::kMostRuns, holes);
+    const RimVoids rim = FindRimVoids(kWidth, kHeight, voids, RimVoidFinder::kMaxRuns, holes);
     const std::vector<RimVoids::Run> runs = rim.Runs();
     EXPECT_EQ(RimVoids(runs, rim.regions()).Runs(), runs);
     int wrong_rims = 0, wrong_holes = 0;
@@ -131,7 +131,7 @@ TEST(RimVoids, SayHowFarTheyStayTheSame) {
 TEST(RimVoids, TakeMemoryForRowsThatDiffer) {
   std::vector<std::uint8_t> voids(3600 * 3600, 1), holes;
   for (std::size_t row = 2000; row < 2128; ++row) std::fill_n(&voids[row * 3600 + 1000], 128, 0);
-  const RimVoids rim = FindRimVoids(3600, 3600, voids, RimVoidFinder::kMostRuns, holes);
+  const RimVoids rim = FindRimVoids(3600, 3600, voids, RimVoidFinder::kMaxRuns, holes);
   EXPECT_EQ(rim.Runs().size(), 3600u + 128u);
   EXPECT_LT(rim.bytes(), 200u);
   EXPECT_TRUE(rim.At(999, 2100) && rim.At(1128, 2100) && rim.At(1000, 1999) && rim.At(1000, 2128));

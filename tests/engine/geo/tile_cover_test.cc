@@ -28,7 +28,7 @@ std::int64_t Count(const std::vector<TileRange>& ranges) {
   return count;
 }
 
-std::vector<TileRange> Drawn(std::mt19937& random, int count) {
+std::vector<TileRange> RandomRanges(std::mt19937& random, int count) {
   std::vector<TileRange> ranges;
   for (int i = 0; i < count; ++i) {
     const auto x = static_cast<std::int64_t>(random() % 20), y = static_cast<std::int64_t>(random() % 20);
@@ -40,7 +40,7 @@ std::vector<TileRange> Drawn(std::mt19937& random, int count) {
 TEST(TileCover, HoldsEveryCellOnceInOrder) {
   std::mt19937 random(1);
   for (int round = 0; round < 500; ++round) {
-    const std::vector<TileRange> ranges = Drawn(random, round % 12);
+    const std::vector<TileRange> ranges = RandomRanges(random, round % 12);
     const std::vector<TileRange> cover = Disjoint(ranges);
     ASSERT_EQ(CellsOf(cover), CellsOf(ranges)) << round;
     ASSERT_EQ(Count(cover), static_cast<std::int64_t>(CellsOf(ranges).size())) << "overlap in round " << round;

@@ -34,7 +34,7 @@ TEST(Border, JudgesASampleByItsChord) {
   EXPECT_EQ(WorstBorderSample(field, west, east, options), (Candidate{23, 2}));
   options.step_m = 50;
   options.scale = 2;
-  EXPECT_EQ(WorstBorderSample(field, west, east, options), (Candidate{48, 2}));  // kMostBorderWeight
+  EXPECT_EQ(WorstBorderSample(field, west, east, options), (Candidate{48, 2}));  // kMaxBorderWeight
   EXPECT_EQ(SquaredBorderDistances(field, west, east), 9 + 16 + 9);
 }
 

@@ -197,7 +197,7 @@ TEST(DropVertices, CountsTheSagitta) {
   }
 }
 
-TEST(DropVertices, TurnsNewTrianglesCounterClockwiseOnTheWire) {
+TEST(DropVertices, TurnsNewTrianglesCounterClockwiseWhenQuantized) {
   constexpr int kSide = 65;
   const HeightField field = HillField(kSide, kSide, 11);
   const TinMesh greedy = GreedyMesh(field, 10);
@@ -211,8 +211,8 @@ TEST(DropVertices, TurnsNewTrianglesCounterClockwiseOnTheWire) {
     std::set<std::array<int, 6>> corners;
     for (const auto& [a, b, c] : mesh.triangles) {
       const SamplePosition p = mesh.vertices[a], q = mesh.vertices[b], r = mesh.vertices[c];
-      const auto on_wire = [&](SamplePosition s) { return SamplePosition{columns[s.x], rows[s.y]}; };
-      if (Orientation(on_wire(p), on_wire(q), on_wire(r)) > 0) continue;
+      const auto quantized = [&](SamplePosition s) { return SamplePosition{columns[s.x], rows[s.y]}; };
+      if (Orientation(quantized(p), quantized(q), quantized(r)) > 0) continue;
       const std::array<Corner, 3> s = SortedByRow({Corner{p.x, p.y, 0}, {q.x, q.y, 0}, {r.x, r.y, 0}});
       corners.insert({s[0].x, s[0].y, s[1].x, s[1].y, s[2].x, s[2].y});
     }
@@ -220,7 +220,8 @@ TEST(DropVertices, TurnsNewTrianglesCounterClockwiseOnTheWire) {
   };
   const auto before = turned(greedy), blind = turned(Dropped(field, greedy, {.max_error = 10}));
   EXPECT_FALSE(std::includes(before.begin(), before.end(), blind.begin(), blind.end()));
-  const TinMesh dropped = Dropped(field, greedy, {.max_error = 10, .wire_columns = columns, .wire_rows = rows});
+  const TinMesh dropped =
+      Dropped(field, greedy, {.max_error = 10, .quantized_columns = columns, .quantized_rows = rows});
   const auto after = turned(dropped);
   EXPECT_TRUE(std::includes(before.begin(), before.end(), after.begin(), after.end()));
   EXPECT_LT(dropped.vertices.size(), greedy.vertices.size());

@@ -94,7 +94,7 @@ class NaivePass {
 double BorderError(double misfit_m, const BorderOptions& options) {
   const double padded = misfit_m + options.padding_m;
   return options.scale *
-         std::min(std::max(padded * options.weight, padded + options.step_m), kMostBorderWeight * misfit_m);
+         std::min(std::max(padded * options.weight, padded + options.step_m), kMaxBorderWeight * misfit_m);
 }
 
 TinMesh NaiveGreedy(const HeightField& field, const std::array<BorderOptions, 4>& borders, const GreedyGoal& goal) {

@@ -30,7 +30,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr std::int64_t kMostSamples = 1'500'000;
+constexpr std::int64_t kMaxSamples = 1'500'000;
 constexpr int kWindow = 1201;
 constexpr int kBlock = 256;
 
@@ -80,7 +80,7 @@ bool AreLongTestsWanted() {
 }
 
 Result<HeightField> Read(const Dem& dem) {
-  const bool is_whole = std::int64_t{dem.width} * dem.height <= kMostSamples || AreLongTestsWanted();
+  const bool is_whole = std::int64_t{dem.width} * dem.height <= kMaxSamples || AreLongTestsWanted();
   const int width = is_whole ? dem.width : std::min(kWindow, dem.width);
   const int height = is_whole ? dem.height : std::min(kWindow, dem.height);
   auto raster =

@@ -86,7 +86,7 @@ TEST(TriangleScan, TellsApartWhatStepsOfPlanesBlur) {
 }
 
 // The plane rises to a spike from two zeros; the sample on the edge between those lies on it. Its distance is 0, and
-// what rounding leaves in doubt is 2^-20 of the spike: below what marks a sample outside.
+// what rounding leaves in doubt is 2^-20 of the spike: below the limit for a sample outside.
 TEST(TriangleScan, TakesNoSampleFromOutsideWhereDoubtsAreLarge) {
   for (const int reach : {2, 6, 40}) {
     const HeightField field = MakeField(2 * reach + 5, reach + 4, [&](int x, int y) {

@@ -37,12 +37,12 @@ TEST_F(SpareBlocks, KeepsABlockForTheNextThatFits) {
 
 TEST_F(SpareBlocks, KeepsNoMoreThanTheMost) {
   std::vector<void*> blocks;
-  for (std::size_t i = 0; i < 3; ++i) blocks.push_back(TakeBlock(kMostSpareBytes / 2));
-  blocks.push_back(TakeBlock(kMostSpareBytes + 1));
+  for (std::size_t i = 0; i < 3; ++i) blocks.push_back(TakeBlock(kMaxSpareBytes / 2));
+  blocks.push_back(TakeBlock(kMaxSpareBytes + 1));
   for (std::size_t i = 0; i < 100; ++i) blocks.push_back(TakeBlock(kBytes));
   for (void* const block : blocks) {
     GiveBlock(block);
-    EXPECT_LE(SpareBytes(), kMostSpareBytes);
+    EXPECT_LE(SpareBytes(), kMaxSpareBytes);
   }
   EXPECT_GT(SpareBytes(), 0u);
   ReleaseSpareBlocks();

@@ -241,7 +241,7 @@ TEST(TriangleScan, LeavesOutWhatIsNoTriangle) {
     const SamplePosition p = RandomSample(random, field);
     std::vector<SamplePosition> ring = {RandomSample(random, field)};
     std::uint32_t left_out = 0;
-    for (int i = random.Below(static_cast<int>(Star::kMostLeftOut)); i >= 0; --i) {
+    for (int i = random.Below(static_cast<int>(Star::kMaxLeftOut)); i >= 0; --i) {
       const SamplePosition next = RandomSample(random, field);
       const bool is_left_out = Orientation(p, ring.back(), next) <= 0 || random.Below(4) == 0;
       left_out |= std::uint32_t{is_left_out} << (ring.size() - 1);

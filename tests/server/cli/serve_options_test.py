@@ -274,7 +274,7 @@ class WorkingDirectory(unittest.TestCase):
 
     def test_may_be_removed(self):
         self.dataset = "beside"
-        flags = ("--config", "../terrace.json", "--cache-dir", "../surveys", "--data-roots", "..")
+        flags = ("--config", "../terrace.json", "--cache-dir", "../cache", "--data-roots", "..")
         self.assertEqual(self.outlive(self.remove, *flags, "../beside.tif"), [b"ready", b"ready"])
 
     def test_may_be_removed_with_the_sources(self):
@@ -296,12 +296,12 @@ class WorkingDirectory(unittest.TestCase):
             return subprocess.run(["sh", "-c", 'cd "$1" && rmdir "$1" && shift && exec "$@"', "sh", self.folder / "run", BINARY,
                                    "serve", "--print-config", *arguments], capture_output=True, text=True, timeout=60)
 
-        result = start("dem.tif", "--cache-dir", "surveys")
+        result = start("dem.tif", "--cache-dir", "cache")
         self.assertEqual(result.returncode, 2, result.stderr)
         self.assertRegex(result.stderr, r"(?m)^  dem\.tif: .*cannot be named; give the path in full$")
         self.assertRegex(result.stderr, r"(?m)^  --cache-dir: .*cannot be named; give the path in full$")
         (self.folder / "run").mkdir()
-        self.assertEqual(start(DEM, "--cache-dir", "/surveys").returncode, 0)
+        self.assertEqual(start(DEM, "--cache-dir", "/cache").returncode, 0)
 
 
 class Info(unittest.TestCase):

@@ -47,7 +47,7 @@ std::size_t Misfits(const proto::LatticeView& lattice, const tin::TinMesh& mesh)
 }
 
 // The last column of a tile is the end of a survey, level and 1,300 m above everything else.
-TEST(InnerVertices, LightFitsATileThatHasTheRimOfASurveyAlone) {
+TEST(InnerVertices, LightFitsATileThatHasTheRimOfARasterAlone) {
   const Ground ground([](int i, int) { return i >= kCells ? 1300.0F : 0.0F; });
   const proto::LatticeView lattice = ground.view();
   const tin::TinMesh mesh = MeshOf(lattice, 1400);

@@ -27,7 +27,7 @@ RefinedTile Refined() {
   dem::TileHeights heights;
   heights.lattice = {5, kCells};
   heights.stride = kCells + 3;
-  heights.source_gap_m = 1.5;
+  heights.source_error_m = 1.5;
   for (int i = 0; i < (kCells + 3) * (kCells + 3); ++i) heights.heights.push_back(static_cast<float>(i * i % 37));
   std::vector<float> inside;
   for (int j = 0; j <= kCells; ++j) {
@@ -65,7 +65,7 @@ TEST(TileRecord, KeepsRefinements) {
   EXPECT_EQ(again->heights.lattice.level, 5);
   EXPECT_EQ(again->heights.lattice.cells, tile.heights.lattice.cells);
   EXPECT_EQ(again->heights.stride, tile.heights.stride);
-  EXPECT_EQ(again->heights.source_gap_m, tile.heights.source_gap_m);
+  EXPECT_EQ(again->heights.source_error_m, tile.heights.source_error_m);
   EXPECT_EQ(again->heights.heights, tile.heights.heights);
   EXPECT_EQ(again->refinement, tile.refinement);
 }

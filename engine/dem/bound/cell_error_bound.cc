@@ -1,0 +1,241 @@
+#include "engine/dem/bound/cell_error_bound.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace terrace::dem {
+namespace {
+
+// Samples whose centres lie in a box of pixels, `shift` columns on.
+SampleBox CentresIn(const PixelBounds& box, double shift) {
+  const auto first = [](double pixel) { return static_cast<std::int64_t>(std::ceil(pixel - 0.5)); };
+  const auto last = [](double pixel) { return static_cast<std::int64_t>(std::floor(pixel - 0.5)); };
+  return {first(box.west + shift), first(box.north), last(box.east + shift), last(box.south)};
+}
+
+}  // namespace
+
+SampleBox CellErrorBound::Clipped(SampleBox box) const {
+  if (!grid_.wraps()) {
+    box.west = std::max<std::int64_t>(box.west, 0);
+    box.east = std::min<std::int64_t>(box.east, grid_.columns() - 1);
+  }
+  box.north = std::max<std::int64_t>(box.north, 0);
+  box.south = std::min<std::int64_t>(box.south, grid_.rows() - 1);
+  return box;
+}
+
+// The heights served in a cell, as the raster grid's samples count.
+CellSurface CellErrorBound::SurfaceOf(const TileCell& cell, const std::array<Position, 4>& corners) const {
+  constexpr double kPosition = 4e-5;  // of averages: NodePositions is exact to a hundred-thousandth
+  const Position& off = tables_.misplacement();
+  const double slack = kPosition * trace_.factor;
+  const bool is_separable = grid_.georeference().is_geographic_grid() && grid_.georeference().is_affine();
+  CellSurface surface(corners, is_separable, {off.x + slack, off.y + slack});
+  const double geoid_error = geoid_.Over(cell.box());
+  const bool is_known = std::isfinite(geoid_error);
+  const HeightRange range = is_known ? HeightRange{0, 0} : geoid_.RangeOf(cell.box());
+  for (std::size_t k = 0; k < 4; ++k) {
+    const bool is_added = is_known && geoid_.is_added();
+    const double geoid = is_added ? geoid_.AddedAt(cell.nodes[k]) : (range.min + range.max) / 2;
+    surface.SetHeight(k, double{tile_.heights[cell.nodes[k]]} - geoid);
+  }
+  surface.Widen(is_known ? geoid_error : (range.max - range.min) / 2);
+  return surface;
+}
+
+// Between the heights served at a cell's nodes and the raster grid's heights within these bounds, which count as its
+// samples do.
+double CellErrorBound::Apart(const TileCell& cell, double lowest, double highest) const {
+  double error = 0, geoid_error = geoid_.Over(cell.box());
+  std::array<double, 4> geoid{};
+  if (!std::isfinite(geoid_error)) {  // not known at all of the nodes
+    const HeightRange range = geoid_.RangeOf(cell.box());
+    lowest += range.min, highest += range.max;
+    geoid_error = 0;
+  } else if (geoid_.is_added()) {
+    for (std::size_t k = 0; k < 4; ++k) geoid[k] = geoid_.AddedAt(cell.nodes[k]);
+  }
+  for (std::size_t k = 0; k < 4; ++k) {
+    const double height = double{tile_.heights[cell.nodes[k]]} - geoid[k];
+    error = std::max({error, highest - height, height - lowest});
+  }
+  return error + geoid_error;
+}
+
+double CellErrorBound::OfAverages(const TileCell& cell, bool& has_voids) const {
+  // Samples of the cell may count as others beside it where members are misplaced. The last average of an axis is up to
+  // twice as near.
+  const Position& off = tables_.misplacement();
+  const double off_x = 2 * off.x / trace_.factor, off_y = 2 * off.y / trace_.factor;
+  const auto below = [](double weight) { return static_cast<std::int64_t>(std::floor(weight)); };
+  const auto above = [](double weight) {
+    return std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(weight)));
+  };
+  SampleBox around;
+  for (const std::size_t node : cell.nodes) {
+    const GridCell& at = trace_.cells[static_cast<std::size_t>(trace_.cell_of_node[node])];
+    SampleBox near{at.column, at.row, at.column + 1, at.row + 1};
+    if (off_x > 0 || off_y > 0) {
+      near = {at.column + below(at.x - off_x), at.row + below(at.y - off_y), at.column + above(at.x + off_x),
+              at.row + above(at.y + off_y)};
+    }
+    around = around.Around(near);
+  }
+  if (!grid_.wraps()) {
+    around.west = std::max<std::int64_t>(around.west, 0);
+    around.east = std::min(around.east, columns_ - 1);
+  }
+  around.north = std::max<std::int64_t>(around.north, 0);
+  around.south = std::min(around.south, rows_ - 1);
+  const GridWindow& window = trace_.window;
+  const SampleBox read = {std::max(around.west, window.column), std::max(around.north, window.row),
+                          std::min(around.east, window.column + window.columns - 1),
+                          std::min(around.south, window.row + window.rows - 1)};
+  const double error = OfBox(cell, read, has_voids);
+  return read == around ? error : kUnknownError;
+}
+
+// By averages in a box of the window.
+double CellErrorBound::OfBox(const TileCell& cell, const SampleBox& averages, bool& has_voids) const {
+  const GridWindow& window = trace_.window;
+  double lowest = kUnknownError, highest = -lowest;
+  for (std::int64_t row = averages.north; row <= averages.south; ++row) {
+    const float* const line = trace_.samples.data() + (row - window.row) * window.columns - window.column;
+    for (std::int64_t column = averages.west; column <= averages.east; ++column) {
+      const float average = line[column];
+      has_voids |= std::isnan(average);
+      if (std::isnan(average)) continue;
+      lowest = std::min(lowest, double{average});
+      highest = std::max(highest, double{average});
+    }
+  }
+  const float averaging =
+      tables_.AveragingError(static_cast<double>(averages.west), static_cast<double>(averages.north),
+                             static_cast<double>(averages.east), static_cast<double>(averages.south));
+  if (lowest > highest) return averaging > 0 ? kUnknownError : 0;
+  return Apart(cell, lowest, highest) + averaging;
+}
+
+// By the averages that samples in a box of pixels are near to; infinite where not all of them were read.
+double CellErrorBound::OfAveragesNear(const TileCell& cell, const PixelBounds& box) const {
+  const auto index = [&](double pixel) { return static_cast<std::int64_t>(std::floor(pixel / trace_.factor - 0.5)); };
+  std::int64_t left = index(box.west), right = index(box.east) + 1;
+  // The last average of an axis may stand for fewer pixels, and lie nearer: one more.
+  const std::int64_t top = std::clamp<std::int64_t>(index(box.north), 0, rows_ - 1);
+  const std::int64_t bottom = std::clamp<std::int64_t>(index(box.south) + 2, 0, rows_ - 1);
+  if (!grid_.wraps()) {
+    left = std::clamp<std::int64_t>(left, 0, columns_ - 1);
+    right = std::clamp<std::int64_t>(right + 1, 0, columns_ - 1);
+  } else if (grid_.columns() % trace_.factor != 0) {
+    return kUnknownError;
+  }
+  const GridWindow& window = trace_.window;
+  if (top < window.row || bottom >= window.row + window.rows) return kUnknownError;
+  for (const int turn : {0, -1, 1}) {
+    const std::int64_t shift = turn * columns_;
+    if (turn != 0 && !grid_.wraps()) continue;
+    if (left + shift < window.column || right + shift >= window.column + window.columns) continue;
+    bool has_voids = false;
+    return OfBox(cell, {left + shift, top, right + shift, bottom}, has_voids);
+  }
+  return kUnknownError;
+}
+
+// In pixels; nothing where a place cannot be told.
+std::optional<std::array<Position, 4>> CellErrorBound::CornersOf(const TileCell& cell) const {
+  std::array<Position, 4> corners;
+  for (std::size_t k = 0; k < 4; ++k) {
+    corners[k] = trace_.positions[cell.nodes[k]];
+    if (grid_.georeference().is_geographic_grid()) {
+      // All of a pole's nodes have one position: their columns are those of the row beside it.
+      const std::int64_t row = tile_.window.row + 1 + cell.j + (k < 2 ? 0 : 1);
+      if (row == 0) corners[k].x = trace_.positions[cell.nodes[k] + tile_.stride()].x;
+      if (row == tile_.lattice.rows()) corners[k].x = trace_.positions[cell.nodes[k] - tile_.stride()].x;
+      const double turn = grid_.georeference().period(), near = k == 0 ? grid_.columns() / 2.0 : corners[0].x;
+      corners[k].x += turn * std::round((near - corners[k].x) / turn);
+    }
+    if (!std::isfinite(corners[k].x) || !std::isfinite(corners[k].y)) return std::nullopt;
+  }
+  return corners;
+}
+
+// Of raster grids that nearly go around the Earth: a box may meet their last columns, or a turn on the first ones, or
+// both.
+bool CellErrorBound::IsOnBothEnds(const PixelBounds& box) const {
+  const double turn = grid_.georeference().period(), columns = grid_.columns();
+  if (grid_.wraps() || !(turn > 0)) return false;
+  const auto meets = [&](double shift) { return box.east + shift >= 0 && box.west + shift <= columns; };
+  return meets(turn) || meets(-turn);
+}
+
+double CellErrorBound::OfSurroundings(const TileCell& cell, bool gives_way, bool fills,
+                                      std::optional<CellSamples>& place) const {
+  const HeightRange& all = tables_.heights();
+  const auto corners = CornersOf(cell);
+  if (!corners) return Apart(cell, all.min, all.max);
+  PixelBounds box;
+  for (const Position& corner : *corners) box.Add(corner.x, corner.y);
+  // Edges of cells bulge by far less. The samples are at the pixels' centres.
+  constexpr double kBulge = 1.0 / 32;
+  const double halo = gives_way ? 1 : 0;
+  const Position& off = tables_.misplacement();
+  box.Grow((box.east - box.west) * kBulge + halo + off.x, (box.south - box.north) * kBulge + halo + off.y);
+  if (fills) {
+    const double reach = grid_.options().max_void_gap + trace_.factor;
+    PixelBounds wide = box;
+    wide.Grow(reach, reach);
+    fills = grid_.Ranges({wide.west, wide.north, wide.east, wide.south}).has_voids;
+    if (fills) box = wide;
+  }
+  if (IsOnBothEnds(box)) return Apart(cell, all.min, all.max);
+
+  BlockRange range;
+  for (const int turn : {0, -1, 1}) {
+    if (turn != 0 && !grid_.wraps()) continue;
+    const SampleBox in = CentresIn(box, turn * static_cast<double>(grid_.columns()));
+    if (in.empty()) return 0;  // as are those of other turns
+    range.Add(tables_.Ranges(static_cast<double>(in.west), static_cast<double>(in.north), static_cast<double>(in.east),
+                             static_cast<double>(in.south)));
+  }
+  if (range.min > range.max) return 0;
+  double error = Apart(cell, range.min, range.max);
+  if (fills) return error;
+  error = std::min(error, OfAveragesNear(cell, box));
+  place = CellSamples{*corners, Clipped(CentresIn(box, 0)), gives_way};
+  if (trace_.factor > 1) return error;
+  for (const int turn : {0, -1, 1}) {
+    if (turn != 0 && !grid_.wraps()) continue;
+    error = std::min(error, OfSamples(cell, *place, trace_.window, trace_.samples,
+                                      turn * static_cast<std::int64_t>(grid_.columns())));
+  }
+  return error;
+}
+
+double CellErrorBound::OfSamples(const TileCell& cell, const CellSamples& place, const GridWindow& window,
+                                 const std::vector<float>& samples, std::int64_t turn) const {
+  const SampleBox& in = place.samples;
+  if (in.empty()) return 0;
+  if (in.west + turn < window.column || in.east + turn >= window.column + window.columns || in.north < window.row ||
+      in.south >= window.row + window.rows) {
+    return kUnknownError;
+  }
+  const CellSurface surface = SurfaceOf(cell, place.corners);
+  double error = 0, lowest = kUnknownError, highest = -lowest;
+  for (std::int64_t row = in.north; row <= in.south; ++row) {
+    const float* const line = samples.data() + (row - window.row) * window.columns + (turn - window.column);
+    for (std::int64_t column = in.west; column <= in.east; ++column) {
+      const double sample = line[column];
+      if (std::isnan(sample)) continue;
+      lowest = std::min(lowest, sample), highest = std::max(highest, sample);
+      if (place.between) continue;
+      error =
+          std::max(error, surface.Apart({static_cast<double>(column) + 0.5, static_cast<double>(row) + 0.5}, sample));
+    }
+  }
+  if (place.between && lowest <= highest) error = Apart(cell, lowest, highest);
+  return error;
+}
+
+}  // namespace terrace::dem

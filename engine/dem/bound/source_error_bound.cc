@@ -1,0 +1,181 @@
+#include "engine/dem/bound/source_error_bound.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "engine/dem/bound/cell_error_bound.h"
+#include "engine/dem/bound/geoid_error_bound.h"
+#include "engine/dem/bound/grid_tables.h"
+#include "engine/dem/bound/loose_cells.h"
+#include "engine/dem/bound/smooth_error_bound.h"
+
+namespace terrace::dem {
+
+// One raster grid's part: groups of cells, and the cells of groups where something is in the way.
+class GridErrorBound {
+ public:
+  GridErrorBound(SourceErrorBound& tile, const RasterGrid& grid, const GridTrace& trace)
+      : tile_(tile),
+        nodes_{tile.lattice_, tile.window_, tile.heights_},
+        grid_(grid),
+        trace_(trace),
+        tables_(grid, trace, nodes_.stride()),
+        geoid_(nodes_, grid.undulations(), trace.undulations),
+        smooth_(nodes_, grid, trace, tables_, geoid_, tile.blends_),
+        single_(nodes_, grid, trace, tables_, geoid_),
+        loose_(grid, single_) {}
+
+  Result<void> Add(const std::stop_token& stop) {
+    constexpr int kGroup = SourceErrorBound::kGroup;
+    const int cells = nodes_.cells();
+    for (int south = 0; south < cells; south += kGroup) {
+      for (int west = 0; west < cells; west += kGroup) {
+        AddGroup({west, south, std::min(west + kGroup, cells), std::min(south + kGroup, cells)});
+      }
+    }
+    return loose_.Read(tile_.bound_, stop);
+  }
+
+ private:
+  std::size_t CellIndex(int i, int j) const {
+    return static_cast<std::size_t>(j) * static_cast<std::size_t>(nodes_.cells()) + static_cast<std::size_t>(i);
+  }
+  bool Touches(const CellBox& box) const {
+    return grid_.reach().Touches(nodes_.West(box), nodes_.South(box), nodes_.Width(box), nodes_.Height(box));
+  }
+  void Raise(double error) { tile_.bound_ = std::max(tile_.bound_, error); }
+
+  // Where raster grids are blended every raster grid that may count is judged on its own: what they are blended to lies
+  // between them. Heights that were filled in count as well.
+  bool GivesWay(const CellBox& box) const {
+    if (!tile_.blends_) return false;
+    const PixelBounds at = smooth_.BoundsOf(box);
+    const double factor = trace_.factor;
+    if (!(at.west <= at.east)) return true;
+    if (trace_.includes_filled && CountInFull(at)) return false;
+    return grid_.GivesWay({at.west * factor, at.north * factor, (at.east + 1) * factor, (at.south + 1) * factor},
+                          trace_.factor);
+  }
+
+  // All samples around a box. Weights are rounded to 2^-10.
+  bool CountInFull(const PixelBounds& at) const {
+    if (trace_.weights.empty()) return true;
+    const GridWindow& window = trace_.window;
+    const auto west = static_cast<std::int64_t>(std::floor(at.west)) - 1;
+    const auto east = static_cast<std::int64_t>(std::floor(at.east)) + 2;
+    const auto north = static_cast<std::int64_t>(std::floor(at.north)) - 1;
+    const auto south = static_cast<std::int64_t>(std::floor(at.south)) + 2;
+    if (west < window.column || east >= window.column + window.columns || north < window.row ||
+        south >= window.row + window.rows) {
+      return false;
+    }
+    for (std::int64_t row = north; row <= south; ++row) {
+      const auto first = trace_.weights.begin() + (row - window.row) * window.columns + (west - window.column);
+      if (std::any_of(first, first + (east - west + 1), [](float weight) { return weight < 1; })) return false;
+    }
+    return true;
+  }
+
+  // Whether something may be filled in there that the trace does not have.
+  bool MayBeFilled(const CellBox& box) const {
+    if (trace_.includes_filled) return false;
+    const PixelBounds at = smooth_.BoundsOf(box);
+    const double factor = trace_.factor;
+    const auto has_voids = [&] {
+      return grid_
+          .Ranges({(at.west - 1) * factor, (at.north - 1) * factor, (at.east + 2) * factor, (at.south + 2) * factor})
+          .has_voids;
+    };
+    return !(at.west <= at.east) || has_voids();
+  }
+
+  bool IsPartlyCovered(const CellBox& box) const {
+    for (int j = box.south; j < box.north; ++j) {
+      const auto first = tile_.covered_.begin() + static_cast<std::ptrdiff_t>(CellIndex(box.west, j));
+      if (std::any_of(first, first + (box.east - box.west), [](std::uint8_t covered) { return covered != 0; })) {
+        return true;
+      }
+    }
+    return false;
+  }
+
+  void AddGroup(const CellBox& box) {
+    if (!Touches(box)) return;
+    const bool gives_way = GivesWay(box), is_filled = gives_way && MayBeFilled(box);
+    const bool is_partly_hidden = tile_.blends_ && IsPartlyCovered(box);
+    if (const double error = is_filled || is_partly_hidden ? kUnknownError : smooth_.Over(box); std::isfinite(error)) {
+      Raise(error);
+      if (gives_way) return;
+      for (int j = box.south; j < box.north; ++j) {
+        const auto first = tile_.covered_.begin() + static_cast<std::ptrdiff_t>(CellIndex(box.west, j));
+        std::fill_n(first, box.east - box.west, 1);
+      }
+      return;
+    }
+    loose_.BeginGroup();
+    for (int j = box.south; j < box.north; ++j) {
+      for (int i = box.west; i < box.east; ++i) {
+        if (tile_.covered_[CellIndex(i, j)] == 0) AddCell(i, j, gives_way && GivesWay({i, j, i + 1, j + 1}));
+      }
+    }
+  }
+
+  void AddCell(int i, int j, bool gives_way) {
+    const bool fills = gives_way && !trace_.includes_filled;
+    const TileCell cell = nodes_.Cell(i, j);
+    if (std::ranges::any_of(cell.nodes, [&](std::size_t node) { return trace_.cell_of_node[node] < 0; })) {
+      if (Touches(cell.box())) AddUneven(cell, gives_way, fills, kUnknownError);
+      return;
+    }
+    bool has_voids = false;
+    double error = single_.OfAverages(cell, has_voids);
+    if (fills && (has_voids || MayBeFilled(cell.box()))) return AddUneven(cell, true, true, kUnknownError);
+    double smooth = kUnknownError;
+    if (!has_voids) {
+      if (!gives_way) tile_.covered_[CellIndex(i, j)] = 1;
+      smooth = smooth_.Over(cell.box());
+      if (smooth < error) error = smooth;
+    }
+    if (std::isfinite(smooth)) return Raise(error);
+    AddUneven(cell, gives_way, fills, error);
+  }
+
+  // `known`: a bound.
+  void AddUneven(const TileCell& cell, bool gives_way, bool fills, double known) {
+    if (known <= tile_.bound_) return;
+    std::optional<CellErrorBound::CellSamples> place;
+    const double error = std::min(known, single_.OfSurroundings(cell, gives_way, fills, place));
+    if (error <= tile_.bound_) return;
+    if (place && LooseCells::MayRead(trace_.factor)) return loose_.Add(cell, *place, error);
+    Raise(error);
+  }
+
+  SourceErrorBound& tile_;
+  const TileNodes nodes_;
+  const RasterGrid& grid_;
+  const GridTrace& trace_;
+  const GridTables tables_;
+  const GeoidErrorBound geoid_;
+  const SmoothErrorBound smooth_;
+  const CellErrorBound single_;
+  LooseCells loose_;
+};
+
+SourceErrorBound::SourceErrorBound(const geo::Lattice& lattice, const NodeWindow& window,
+                                   std::span<const float> heights, bool blends)
+    : lattice_(lattice),
+      window_(window),
+      heights_(heights),
+      blends_(blends),
+      covered_(static_cast<std::size_t>(lattice.cells) * static_cast<std::size_t>(lattice.cells)) {}
+
+Result<void> SourceErrorBound::Add(const RasterGrid& grid, const GridTrace& trace, const std::stop_token& stop) {
+  return GridErrorBound(*this, grid, trace).Add(stop);
+}
+
+bool SourceErrorBound::is_covered() const {
+  return std::ranges::all_of(covered_, [](std::uint8_t covered) { return covered != 0; });
+}
+
+}  // namespace terrace::dem

@@ -1,0 +1,66 @@
+// Words that bounds on a tile's error share: its cells and nodes, and boxes of pixels (source_error_bound.h).
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <limits>
+#include <span>
+
+#include "engine/dem/dem_types.h"
+#include "engine/geo/lattice.h"
+
+namespace terrace::dem {
+
+inline constexpr double kUnknownError = std::numeric_limits<double>::infinity();
+
+// Half-open, in cells of the tile.
+struct CellBox {
+  int west = 0, south = 0, east = 0, north = 0;
+};
+
+// A cell of the tile by its column and row, with its nodes: the south-western, south-eastern, north-western,
+// north-eastern one.
+struct TileCell {
+  int i, j;
+  std::array<std::size_t, 4> nodes;
+
+  CellBox box() const { return {i, j, i + 1, j + 1}; }
+};
+
+// Columns and rows of pixels or of averages, between which a function's values lie; west > east: none.
+struct PixelBounds {
+  double west = std::numeric_limits<double>::infinity(), east = -west, north = west, south = -west;
+
+  void Add(double x, double y) {
+    west = std::min(west, x), east = std::max(east, x);
+    north = std::min(north, y), south = std::max(south, y);
+  }
+  void Grow(double x, double y) { west -= x, east += x, north -= y, south += y; }
+};
+
+// A tile's samples and one more on each side, as they are served. What it refers to outlives it.
+struct TileNodes {
+  const geo::Lattice& lattice;
+  const NodeWindow& window;
+  std::span<const float> heights;
+
+  int cells() const { return lattice.cells; }
+  std::size_t stride() const { return static_cast<std::size_t>(window.columns); }
+  // Of the south-western node of a cell.
+  std::size_t NodeOf(int i, int j) const {
+    return static_cast<std::size_t>(j + 1) * stride() + static_cast<std::size_t>(i + 1);
+  }
+  TileCell Cell(int i, int j) const {
+    const std::size_t n = NodeOf(i, j);
+    return {i, j, {n, n + 1, n + stride(), n + stride() + 1}};
+  }
+
+  // Degrees.
+  double West(const CellBox& box) const { return lattice.Longitude(window.column + 1 + box.west); }
+  double South(const CellBox& box) const { return lattice.Latitude(window.row + 1 + box.south); }
+  double Width(const CellBox& box) const { return lattice.StepDegrees() * (box.east - box.west); }
+  double Height(const CellBox& box) const { return lattice.StepDegrees() * (box.north - box.south); }
+};
+
+}  // namespace terrace::dem

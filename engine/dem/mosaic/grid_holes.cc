@@ -1,0 +1,146 @@
+// Smooth surfaces in the holes of a raster grid (docs/decisions/0015-voids.md). A height is a function of the factor
+// and the global sample: windows grow until what they must know of a hole lies in them.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "engine/dem/mosaic/raster_grid.h"
+
+namespace terrace::dem {
+namespace {
+
+std::vector<float> Cut(const VoidGrid& grid, const GridWindow& window) {
+  std::vector<float> heights;
+  heights.reserve(static_cast<std::size_t>(window.columns * window.rows));
+  for (std::int64_t row = window.row; row < window.row + window.rows; ++row) {
+    const auto first = grid.heights.begin() + static_cast<std::ptrdiff_t>(grid.At(window.column, row));
+    heights.insert(heights.end(), first, first + window.columns);
+  }
+  return heights;
+}
+
+// Averages beside a hole may be of a part of their block alone, and lie elsewhere than at its centre: a guess does
+// without them, so that it goes on with a plane. Where nothing lies behind them they count.
+void WidenHoles(const GridWindow& wide, const std::vector<float>& heights, const std::vector<std::uint8_t>& holes,
+                std::int64_t columns, std::int64_t rows, bool wraps, VoidGrid& grid) {
+  const VoidGrid around{wide, {}, {}};
+  const GridWindow& window = grid.window;
+  for (std::int64_t row = window.row; row < window.row + window.rows; ++row) {
+    for (std::int64_t column = window.column; column < window.column + window.columns; ++column) {
+      if (std::isnan(heights[around.At(column, row)])) continue;
+      bool is_beside = false, is_last = row == 0 || row == rows - 1;
+      if (!wraps) is_last |= column == 0 || column == columns - 1;
+      for (std::int64_t y = row - 1; y <= row + 1 && !is_last; ++y) {
+        for (std::int64_t x = column - 1; x <= column + 1; ++x) {
+          const std::size_t at = around.At(x, y);
+          is_beside |= holes[at] != 0;
+          is_last |= std::isnan(heights[at]) && holes[at] == 0;
+        }
+      }
+      if (is_beside && !is_last) grid.unknown[grid.At(column, row)] = 1;
+    }
+  }
+}
+
+}  // namespace
+
+Result<VoidGrid> RasterGrid::ReadVoids(int factor, const GridWindow& window, bool is_guess,
+                                       const std::stop_token& stop) const {
+  const auto holes_in = [&](const GridWindow& in, const std::vector<float>& heights) {
+    return voids_.HolesIn(members_, member_index_, factor, in, Columns(factor).count(), heights);
+  };
+  if (!is_guess) {
+    auto bridged = ReadBridged(factor, window, stop);
+    if (!bridged) return tl::unexpected(bridged.error());
+    auto holes = holes_in(window, bridged->heights);
+    return VoidGrid{window, std::move(bridged->heights), std::move(holes)};
+  }
+  const GridWindow wide = Grown(window, 1, factor);
+  const auto heights = ReadBlocks(factor, wide, stop);
+  if (!heights) return tl::unexpected(heights.error());
+  const auto holes = holes_in(wide, *heights);
+  VoidGrid grid{window, {}, {}};
+  const VoidGrid around{wide, *heights, {}};
+  grid.heights = Cut(around, window);
+  for (std::int64_t row = window.row; row < window.row + window.rows; ++row) {
+    const auto first = holes.begin() + static_cast<std::ptrdiff_t>(around.At(window.column, row));
+    grid.unknown.insert(grid.unknown.end(), first, first + window.columns);
+  }
+  WidenHoles(wide, *heights, holes, Columns(factor).count(), Rows(factor).count(), wraps_, grid);
+  return grid;
+}
+
+// Large regions in a window, from the same holes by twice the factor. The guess is then made to fit what lies around.
+Result<void> RasterGrid::GuessLarge(int factor, const GridWindow& window, const std::vector<VoidRegion>& regions,
+                                    VoidGrid& grid, const std::stop_token& stop) const {
+  const GridWindow near = Grown(window, kSweeps, factor);
+  const GridAxis columns = Columns(factor), rows = Rows(factor);
+  const GridAxis coarse_columns = Columns(2 * factor), coarse_rows = Rows(2 * factor);
+  std::vector<std::size_t> samples;
+  std::vector<GridCell> cells;
+  for (const VoidRegion& region : regions) {
+    if (!region.is_large()) continue;
+    for (const std::size_t sample : region.samples) {
+      const auto at = static_cast<std::int64_t>(sample);
+      const std::int64_t column = grid.window.column + at % grid.window.columns;
+      const std::int64_t row = grid.window.row + at / grid.window.columns;
+      if (column < near.column || column >= near.column + near.columns || row < near.row ||
+          row >= near.row + near.rows) {
+        continue;
+      }
+      const GridAxis::Location x = coarse_columns.Locate(columns.Center(column)),
+                               y = coarse_rows.Locate(rows.Center(row));
+      samples.push_back(sample);
+      cells.push_back({x.index, y.index, x.weight, y.weight});
+    }
+  }
+  if (samples.empty()) return {};
+  GridWindow coarse{std::numeric_limits<std::int64_t>::max(), std::numeric_limits<std::int64_t>::max(), 0, 0};
+  std::int64_t east = std::numeric_limits<std::int64_t>::min(), south = east;
+  for (const GridCell& cell : cells) {
+    coarse.column = std::min(coarse.column, cell.column), east = std::max(east, cell.column + 1);
+    coarse.row = std::min(coarse.row, cell.row), south = std::max(south, cell.row + 1);
+  }
+  if (!wraps_) east = std::min(east, coarse_columns.count() - 1);
+  south = std::min(south, coarse_rows.count() - 1);
+  coarse.columns = east - coarse.column + 1, coarse.rows = south - coarse.row + 1;
+  const auto guess = ReadSmooth(2 * factor, coarse, true, stop);
+  if (!guess) return tl::unexpected(guess.error());
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const auto height = Interpolate(*guess, coarse, cells[i]);
+    grid.heights[samples[i]] = height ? static_cast<float>(*height) : SampleRules::kVoid;
+  }
+  Relax(samples, grid);
+  return {};
+}
+
+Result<std::vector<float>> RasterGrid::ReadSmooth(int factor, const GridWindow& window, bool is_guess,
+                                                  const std::stop_token& stop) const {
+  for (int halo = kSweeps + 1;; halo *= 2) {
+    if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "reading was stopped");
+    const GridWindow wide = Grown(window, halo, factor);
+    auto grid = ReadVoids(factor, wide, is_guess, stop);
+    if (!grid) return tl::unexpected(grid.error());
+    const OpenSides open{wraps_ || wide.column > 0, wide.row > 0,
+                         wraps_ || wide.column + wide.columns < Columns(factor).count(),
+                         wide.row + wide.rows < Rows(factor).count()};
+    const std::vector<VoidRegion> regions = RegionsIn(*grid, window, open);
+    if (std::ranges::any_of(regions, &VoidRegion::is_open)) continue;
+    for (const VoidRegion& region : regions) {
+      if (!region.is_large()) Solve(region, *grid);
+    }
+    const auto guessed = GuessLarge(factor, window, regions, *grid, stop);
+    if (!guessed) return tl::unexpected(guessed.error());
+    return Cut(*grid, window);
+  }
+}
+
+Result<std::vector<float>> RasterGrid::FillHoles(int factor, const GridWindow& window, const Bridged& bridged,
+                                                 const std::stop_token& stop) const {
+  if (options_.voids != HoleFill::kSmooth || bridged.voids == 0) return std::vector<float>();
+  const auto holes = voids_.HolesIn(members_, member_index_, factor, window, Columns(factor).count(), bridged.heights);
+  if (std::ranges::none_of(holes, [](std::uint8_t is_hole) { return is_hole != 0; })) return std::vector<float>();
+  return ReadSmooth(factor, window, false, stop);
+}
+
+}  // namespace terrace::dem

@@ -1,0 +1,218 @@
+// The bound on what a tile can take from a raster grid, from the block table alone.
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "engine/dem/mosaic/raster_grid.h"
+#include "engine/geo/tile_cover.h"
+
+namespace terrace::dem {
+namespace {
+
+// Up to this level a tile is so large that its outline in the source's CRS cannot be told from a few positions.
+constexpr int kLastWholeLevel = 4;
+
+struct PixelBox {
+  double west, north, east, south;
+
+  void Grow(double x, double y) {
+    west -= x;
+    east += x;
+    north -= y;
+    south += y;
+  }
+};
+
+// Pixels of a tile in a geographic grid: the part found going east from its western edge, and what lies a turn before
+// it.
+std::vector<PixelBox> GeographicBoxes(const Georeference& georeference, const geo::Lattice& lattice,
+                                      const geo::TileKey& key) {
+  std::array<Position, 2> corners = {
+      {{lattice.Longitude(lattice.FirstColumn(key)), lattice.Latitude(lattice.FirstRow(key))},
+       {0, lattice.Latitude(lattice.FirstRow(key) + lattice.cells)}}};
+  georeference.ToPixels(corners);
+  const double columns = lattice.cells * lattice.StepDegrees() / 360 * georeference.period();
+  const double west = georeference.columns_run_east() ? corners[0].x : corners[0].x - columns;
+  const auto [north, south] = std::minmax(corners[0].y, corners[1].y);
+  std::vector<PixelBox> boxes;
+  for (int turn = -1; turn <= 1; ++turn) {
+    const double shifted = west + turn * georeference.period();
+    boxes.push_back({shifted, north, shifted + columns, south});
+  }
+  return boxes;
+}
+
+// A box around a tile's pixels in any CRS; nothing where it cannot be told.
+std::optional<PixelBox> ProjectedBox(const Georeference& georeference, const geo::Lattice& lattice,
+                                     const geo::TileKey& key) {
+  if (key.level <= kLastWholeLevel) return std::nullopt;
+  constexpr int kSteps = 4;
+  std::array<Position, (kSteps + 1) * (kSteps + 1)> nodes;
+  for (int i = 0; i < static_cast<int>(nodes.size()); ++i) {
+    nodes[static_cast<std::size_t>(i)] = {
+        lattice.Longitude(lattice.FirstColumn(key) + i % (kSteps + 1) * lattice.cells / kSteps),
+        lattice.Latitude(lattice.FirstRow(key) + i / (kSteps + 1) * lattice.cells / kSteps)};
+  }
+  georeference.ToPixels(nodes);
+  PixelBox box{nodes[0].x, nodes[0].y, nodes[0].x, nodes[0].y};
+  for (const Position& node : nodes) {
+    if (std::isnan(node.x)) return std::nullopt;
+    box.west = std::min(box.west, node.x);
+    box.east = std::max(box.east, node.x);
+    box.north = std::min(box.north, node.y);
+    box.south = std::max(box.south, node.y);
+  }
+  // Between nodes a quarter of the tile apart its edges bulge by less than an eighth of it, down from level 5.
+  box.Grow((box.east - box.west) / 8, (box.south - box.north) / 8);
+  return box;
+}
+
+}  // namespace
+
+BlockRange RasterGrid::Ranges(const Box& pixels) const {
+  if (members_.size() == 1) {
+    return members_.front().raster->RangeIn(pixels.west, pixels.south, pixels.east, pixels.north);
+  }
+  BlockRange range;
+  const double turn = wraps_ ? columns_ : 0;
+  for (const std::size_t i : member_index_.Find(pixels)) {
+    for (const double shift : {0.0, -turn, turn}) {
+      const double x = static_cast<double>(members_[i].column) + shift, y = static_cast<double>(members_[i].row);
+      range.Add(members_[i].raster->RangeIn(pixels.west - x, pixels.south - y, pixels.east - x, pixels.north - y));
+      if (turn == 0) break;
+    }
+  }
+  const auto pixel = [](double position, int count) {
+    return static_cast<std::int64_t>(std::clamp(std::floor(position), 0.0, count - 1.0));
+  };
+  const geo::TileRange wanted{pixel(pixels.west, width_), pixel(pixels.south, height_), pixel(pixels.east, width_),
+                              pixel(pixels.north, height_)};
+  std::int64_t covered = 0;
+  for (const std::size_t i : cover_index_.Find(pixels)) covered += geo::Cells(geo::Common(cover_[i], wanted));
+  range.has_voids |= covered < geo::Cells(wanted);
+  return range;
+}
+
+BlockRange RasterGrid::RangeAroundHoles(const Box& pixels, int factor) const {
+  PixelBox box{pixels.west, pixels.south, pixels.east, pixels.north};
+  const auto has_holes = [&](double west, double north, double east, double south) {
+    const double halo = 2.0 * factor;  // an average by overviews may be void beside a hole
+    const Box wide{west - halo, north - halo, east + halo, south + halo};
+    return Ranges(wide).has_holes || voids_.SharesHole(wide);
+  };
+  if (options_.voids != HoleFill::kSmooth || !has_holes(box.west, box.north, box.east, box.south)) return {};
+  // The holes end where a band around them has none.
+  const auto grow = [&](double& side, double end, double step, bool holes) {
+    if (!holes || (step < 0 ? side <= end : side >= end)) return false;
+    side += step;
+    return true;
+  };
+  const double west = wraps_ ? -columns_ : 0, east = wraps_ ? 2.0 * columns_ : width_;
+  for (bool grown = true; grown;) {
+    const double x = RangeTable::kBlock + (box.east - box.west) / 4,
+                 y = RangeTable::kBlock + (box.south - box.north) / 4;
+    const bool at_west = has_holes(box.west - x, box.north - y, box.west, box.south + y);
+    const bool at_east = has_holes(box.east, box.north - y, box.east + x, box.south + y);
+    const bool at_north = has_holes(box.west - x, box.north - y, box.east + x, box.north);
+    const bool at_south = has_holes(box.west - x, box.south, box.east + x, box.south + y);
+    grown = grow(box.west, west, -x, at_west);
+    grown |= grow(box.east, east, x, at_east);
+    grown |= grow(box.north, 0, -y, at_north);
+    grown |= grow(box.south, height_, y, at_south);
+  }
+  // Heights beside a hole count, of averages by the factor at least, and of large holes by factors up to a sixtieth of
+  // their size; some averages off, and what small voids beside it are filled from.
+  const double size = std::max(box.east - box.west, box.south - box.north);
+  const double reach = 4 * std::max<double>(factor, size / 32) + options_.max_void_gap;
+  box.Grow(reach, reach);
+  return Ranges({box.west, box.north, box.east, box.south});
+}
+
+bool RasterGrid::GivesWay(const Box& pixels, int factor) const {
+  PixelBox wide{pixels.west, pixels.south, pixels.east, pixels.north};
+  wide.Grow(Feather(factor) / spacing_.east + 2 * factor, Feather(factor) / spacing_.north + 2 * factor);
+  return wide.north < 0 || wide.south > height_ || (!wraps_ && (wide.west < 0 || wide.east > width_)) ||
+         Ranges({wide.west, wide.north, wide.east, wide.south}).has_voids;
+}
+
+GridRange RasterGrid::RangeOf(const geo::Lattice& lattice, const geo::TileKey& key) const {
+  const double extent = lattice.cells * lattice.StepDegrees();
+  const std::int64_t south_row = lattice.FirstRow(key), north_row = south_row + lattice.cells;
+  GridRange range;
+  bool leaves = false;
+  for (const std::int64_t row : {south_row, north_row}) {
+    if (row > 0 && row < lattice.rows()) continue;
+    const auto pole = PoleHeight(row <= 0 ? 0 : 1, HeightDatum::kEllipsoid);
+    if (pole) range.blocks.Add(*pole);
+    leaves |= georeference_.is_geographic_grid() && !pole;
+  }
+  if (!reach_.Touches(lattice.Longitude(lattice.FirstColumn(key)), lattice.Latitude(south_row), extent, extent)) {
+    return range;
+  }
+  const int factor = AveragingFactor(SamplesPerCell(lattice, spacing_));
+  std::vector<PixelBox> boxes;
+  if (georeference_.is_geographic_grid() && georeference_.is_affine()) {
+    boxes = GeographicBoxes(georeference_, lattice, key);
+    leaves |= !wraps_ &&
+              std::ranges::none_of(boxes, [&](const PixelBox& box) { return box.west >= 0 && box.east <= width_; });
+  } else if (const auto box = ProjectedBox(georeference_, lattice, key)) {
+    boxes = {*box};
+    leaves |= box->west < 0 || box->east > width_;
+  } else {
+    boxes = {{0, 0, static_cast<double>(width_), static_cast<double>(height_)}};
+    leaves = true;
+  }
+  BlockRange blocks;
+  bool blends = false;
+  for (PixelBox& box : boxes) {
+    leaves |= box.north < 0 || box.south > height_;
+    if (options_.feather_m > 0) {
+      blends |= GivesWay({box.west, box.north, box.east, box.south}, factor);
+    }
+    // Bilinear interpolation reaches one and a half samples of the grid.
+    box.Grow(1.5 * factor + 1, 1.5 * factor + 1);
+    BlockRange here = Ranges({box.west, box.north, box.east, box.south});
+    if (here.has_voids) {
+      here.Add(RangeAroundHoles({box.west, box.north, box.east, box.south}, factor));
+      box.Grow(options_.max_void_gap + factor, options_.max_void_gap + factor);
+      here.Add(Ranges({box.west, box.north, box.east, box.south}));
+    }
+    blocks.Add(here);
+  }
+  range.shows_others = leaves || blends || blocks.has_voids || (undulations_ && !undulations_->is_complete());
+  if (undulations_ && blocks.min <= blocks.max) {
+    const HeightRange shift =
+        undulations_->RangeOf(lattice.Longitude(lattice.FirstColumn(key)), lattice.Latitude(south_row), extent, extent);
+    // Sums are rounded to float.
+    constexpr double kRounding = 0.01;
+    blocks.min = static_cast<float>(blocks.min + shift.min - kRounding);
+    blocks.max = static_cast<float>(blocks.max + shift.max + kRounding);
+  }
+  range.blocks.Add(blocks);
+  return range;
+}
+
+HeightRange RasterGrid::EllipsoidalRange() const {
+  if (!undulations_) return heights_;
+  // Tile by tile: the geoid's range over a large raster grid says little about any place in it.
+  constexpr std::int64_t kMaxTiles = 1024;
+  constexpr int kDeepest = 12;
+  const auto count = [&](int level) {
+    std::int64_t sum = 0;
+    for (const geo::TileRange& range : TilesTouching(reach_, level)) sum += geo::Cells(range);
+    return sum;
+  };
+  int level = 0;
+  while (level < kDeepest && count(level + 1) <= kMaxTiles) ++level;
+  BlockRange blocks;
+  for (const geo::TileRange& range : TilesTouching(reach_, level)) {
+    for (std::int64_t y = range.start_y; y <= range.end_y; ++y) {
+      for (std::int64_t x = range.start_x; x <= range.end_x; ++x) {
+        blocks.Add(RangeOf(geo::Lattice{level, 64}, {level, x, y}).blocks);
+      }
+    }
+  }
+  return blocks.min <= blocks.max ? HeightRange{blocks.min, blocks.max} : heights_;
+}
+
+}  // namespace terrace::dem

@@ -1,0 +1,82 @@
+// What terrace must know of a raster before it serves from it: its range of heights, its voids, its outermost rows, its
+// coarsest averages, and how far averages are from samples. One pass through the raster, part by part.
+#pragma once
+
+#include <gdal_priv.h>
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <stop_token>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "engine/dem/common/range_table.h"
+#include "engine/dem/raster/sample_grid.h"
+#include "engine/dem/statistics/averaging_errors.h"
+#include "engine/dem/statistics/raster_chunk.h"
+#include "engine/dem/statistics/rim_voids.h"
+#include "engine/dem/statistics/undeclared_nodata.h"
+
+namespace terrace::dem {
+
+// Averages of factors from kLargestDirect on, all of them: a 4096th of the raster and less. None of a raster with
+// overviews.
+class CoarseAverages {
+ public:
+  struct Grid {
+    std::int64_t columns = 0, rows = 0;
+    std::vector<float> heights;
+  };
+
+  // Grids of voids, in the shape that a raster's have.
+  static CoarseAverages ShapedFor(const RasterLayout& layout);
+
+  bool Has(int factor) const;
+  // What ReadGrid gives. Precondition: Has(factor).
+  std::vector<float> Read(int factor, const GridWindow& window) const;
+
+  std::vector<Grid> grids;  // of factor kLargestDirect, twice that, ..
+};
+
+struct RasterStatistics {
+  RangeTable table;               // overviews that are read count too: their resampling may overshoot the samples
+  float lowest = 0, highest = 0;  // of the samples
+  std::uint64_t valid = 0, voids = 0;
+  RimVoids rim_voids;
+  std::uint64_t hole_samples = 0;  // voids that do not touch the rim; 0 where they are too many to tell
+  ZeroEdges zeros;
+  std::array<std::optional<double>, 2> edge_row_means;  // of the first and the last row's valid samples
+  AveragingErrors errors;
+  CoarseAverages coarse;
+
+  // Of the tables, in memory.
+  std::size_t bytes() const;
+};
+
+// Puts a raster's parts together, in the order of ChunkGrid.
+class StatisticsAssembler {
+ public:
+  explicit StatisticsAssembler(const RasterLayout& layout);
+  StatisticsAssembler(const StatisticsAssembler&) = delete;
+  StatisticsAssembler& operator=(const StatisticsAssembler&) = delete;
+
+  void Add(const Chunk& chunk, const ChunkStatistics& part);
+
+  // Reads overviews where the raster has some. kUnavailable: they cannot be read. kInvalidArgument: nothing but voids.
+  // kCancelled: stopped. Errors do not name the file.
+  Result<RasterStatistics> Finish(GDALDataset& dataset, const std::stop_token& stop);
+
+ private:
+  void AddSums(const Chunk& chunk, const ChunkStatistics& part);
+  Result<void> FinishCoarse(GDALDataset& dataset, const std::stop_token& stop);
+  Result<void> AddOverviews(GDALDataset& dataset, const std::stop_token& stop);
+
+  const RasterLayout layout_;
+  RasterStatistics statistics_;
+  RimVoidFinder voids_;
+  BlockSum first_row_, last_row_;
+  std::vector<BlockSum> largest_sums_;  // of factor ChunkGrid::kSide
+};
+
+}  // namespace terrace::dem
