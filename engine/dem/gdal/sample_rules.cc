@@ -4,8 +4,10 @@
 #include <array>
 #include <cctype>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -128,10 +130,47 @@ namespace {
 // At most one nodata value and no other rule: most bands.
 bool IsPlain(const SampleRules& rules) { return !rules.has_mask && !rules.is_indicator && rules.extra_nodata.empty(); }
 
-// As ToHeight, without its questions.
-void ToPlainHeights(const SampleRules& rules, const std::vector<double>& raw, std::size_t count, float* out) {
-  double nodata = rules.nodata.value_or(std::numeric_limits<double>::quiet_NaN());  // equal to nothing
-  // Samples of Float32 bands are float32 numbers: equal as such are those that equal the rounded value.
+// Raw samples are heights in metres as they are, which a float has without rounding.
+bool IsInMetres(const SampleRules& rules) {
+  return rules.scale == 1 && rules.offset == 0 && rules.metres_per_unit == 1 && !rules.is_signed_byte;
+}
+
+// The raw type in which a band is read; double wherever the loops below would have to ask more of a sample than its
+// value.
+GDALDataType RawTypeOf(GDALRasterBand& band, const SampleRules& rules) {
+  const GDALDataType type = band.GetRasterDataType();
+  const bool is_exact = type == GDT_Byte || type == GDT_Int16 || type == GDT_UInt16 || type == GDT_Float32;
+  return is_exact && IsPlain(rules) && IsInMetres(rules) ? type : GDT_Float64;
+}
+
+// The largest float at most, the smallest at least a number.
+float FloatAtMost(double value) {
+  const auto rounded = static_cast<float>(value);
+  return rounded > value ? std::nextafter(rounded, -std::numeric_limits<float>::infinity()) : rounded;
+}
+float FloatAtLeast(double value) { return -FloatAtMost(-value); }
+
+// As ToHeight, of plain rules in metres and raw types that float has without rounding: no branch, no double.
+template <typename Raw>
+void ToHeights(const SampleRules& rules, const Raw* raw, std::size_t count, float* out) {
+  float nodata = std::numeric_limits<float>::quiet_NaN();  // equal to nothing
+  if (rules.nodata) {
+    const auto rounded = static_cast<float>(*rules.nodata);
+    // Samples of Float32 bands equal a nodata value that is stated with more digits than they have.
+    if (rules.compare_as_float || static_cast<double>(rounded) == *rules.nodata) nodata = rounded;
+  }
+  const float lowest = FloatAtLeast(rules.lowest), highest = FloatAtMost(rules.highest);
+  for (std::size_t i = 0; i < count; ++i) {
+    const float height = static_cast<float>(raw[i]) + 0.0f;  // one zero, as of raw * scale + offset
+    const bool is_valid = (height != nodata) & (height >= lowest) & (height <= highest);
+    out[i] = is_valid ? height : SampleRules::kVoid;
+  }
+}
+
+// As ToHeight of plain rules.
+template <>
+void ToHeights(const SampleRules& rules, const double* raw, std::size_t count, float* out) {
+  double nodata = rules.nodata.value_or(std::numeric_limits<double>::quiet_NaN());
   if (rules.compare_as_float) nodata = static_cast<float>(nodata);
   const double scale = rules.scale, offset = rules.offset, unit = rules.metres_per_unit;
   const double lowest = rules.lowest, highest = rules.highest;
@@ -142,17 +181,35 @@ void ToPlainHeights(const SampleRules& rules, const std::vector<double>& raw, st
   }
 }
 
+void ConvertPlain(const SampleRules& rules, GDALDataType type, const std::byte* raw, std::size_t count, float* out) {
+  switch (type) {
+    case GDT_Byte:
+      return ToHeights(rules, reinterpret_cast<const std::uint8_t*>(raw), count, out);
+    case GDT_Int16:
+      return ToHeights(rules, reinterpret_cast<const std::int16_t*>(raw), count, out);
+    case GDT_UInt16:
+      return ToHeights(rules, reinterpret_cast<const std::uint16_t*>(raw), count, out);
+    case GDT_Float32:
+      return ToHeights(rules, reinterpret_cast<const float*>(raw), count, out);
+    default:
+      return ToHeights(rules, reinterpret_cast<const double*>(raw), count, out);
+  }
+}
+
 Result<void> ReadSamples(GDALRasterBand& band, const SampleRules& rules, int col, int row, int cols, int rows,
                          float* out, const std::stop_token& stop) {
   const int rows_at_once = std::clamp(kSamplesPerRead / cols, 1, rows);
-  std::vector<double> raw(static_cast<std::size_t>(cols) * static_cast<std::size_t>(rows_at_once));
-  std::vector<std::uint8_t> mask(rules.has_mask ? raw.size() : 0);
+  const std::size_t most = static_cast<std::size_t>(cols) * static_cast<std::size_t>(rows_at_once);
+  const GDALDataType type = RawTypeOf(band, rules);
+  // Written before it is read: filling it with zeros took longer than the conversion.
+  const auto raw =
+      std::make_unique_for_overwrite<std::byte[]>(most * static_cast<std::size_t>(GDALGetDataTypeSizeBytes(type)));
+  std::vector<std::uint8_t> mask(rules.has_mask ? most : 0);
   for (int done = 0; done < rows; done += rows_at_once) {
     if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "reading heights was stopped");
     const int count = std::min(rows_at_once, rows - done);
     ForgetGdalError();
-    CPLErr status =
-        band.RasterIO(GF_Read, col, row + done, cols, count, raw.data(), cols, count, GDT_Float64, 0, 0, nullptr);
+    CPLErr status = band.RasterIO(GF_Read, col, row + done, cols, count, raw.get(), cols, count, type, 0, 0, nullptr);
     if (status == CE_None && rules.has_mask) {
       GDALRasterBand* const valid = MaskOf(band);
       status = valid == nullptr ? CE_Failure
@@ -164,14 +221,15 @@ Result<void> ReadSamples(GDALRasterBand& band, const SampleRules& rules, int col
                        TakeGdalError());
     }
     const std::size_t samples = static_cast<std::size_t>(cols) * static_cast<std::size_t>(count);
+    auto* const doubles = reinterpret_cast<double*>(raw.get());  // where that is the type
     if (rules.is_signed_byte) {
-      for (std::size_t i = 0; i < samples; ++i) raw[i] -= raw[i] > 127 ? 256 : 0;
+      for (std::size_t i = 0; i < samples; ++i) doubles[i] -= doubles[i] > 127 ? 256 : 0;
     }
     if (IsPlain(rules)) {
-      ToPlainHeights(rules, raw, samples, out);
+      ConvertPlain(rules, type, raw.get(), samples, out);
     } else {
       for (std::size_t i = 0; i < samples; ++i) {
-        out[i] = rules.has_mask && mask[i] == 0 ? rules.Hidden() : rules.ToHeight(raw[i]);
+        out[i] = rules.has_mask && mask[i] == 0 ? rules.Hidden() : rules.ToHeight(doubles[i]);
       }
     }
     out += samples;

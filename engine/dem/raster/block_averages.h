@@ -53,13 +53,11 @@ class BlockAverages {
 
   // Each sample counts `weight` times, the last of the row `last` times of that: it may stand for fewer pixels.
   void AddRow(const float* samples, std::int64_t count, double weight = 1, double last = 1) {
-    BlockSum* block = inner_.data();
-    for (std::int64_t first = 0; first < count; first += plain_, ++block) {
-      const std::int64_t end = std::min<std::int64_t>(first + plain_, count);
-      BlockSum sum = *block;
-      for (std::int64_t i = first; i < end; ++i) sum.Add(samples[i], i + 1 == count ? weight * last : weight);
-      *block = sum;
-    }
+    // All but the block of the last sample.
+    const std::int64_t whole = (count - 1) / plain_;
+    AddWhole(samples, whole, weight);
+    BlockSum& end = inner_[static_cast<std::size_t>(whole)];
+    for (std::int64_t i = whole * plain_; i < count; ++i) end.Add(samples[i], i + 1 == count ? weight * last : weight);
     if (parts_ > 1 && ++rows_ == kLargestPlain) Gather();
   }
 
@@ -73,6 +71,33 @@ class BlockAverages {
   }
 
  private:
+  void AddWhole(const float* samples, std::int64_t blocks, double weight) {
+    if (plain_ == 2) return AddBlocks<2>(samples, blocks, weight);
+    if (plain_ == 4) return AddBlocks<4>(samples, blocks, weight);
+    if (plain_ == 8) return AddBlocks<8>(samples, blocks, weight);
+    for (std::int64_t i = 0; i < blocks; ++i, samples += plain_) {
+      BlockSum sum = inner_[static_cast<std::size_t>(i)];
+      for (int k = 0; k < plain_; ++k) sum.Add(samples[k], weight);
+      inner_[static_cast<std::size_t>(i)] = sum;
+    }
+  }
+
+  // The same without a branch: a void adds 0, which changes no bit of a sum.
+  template <int kBlock>
+  void AddBlocks(const float* samples, std::int64_t blocks, double weight) {
+    BlockSum* const sums = inner_.data();
+    for (std::int64_t i = 0; i < blocks; ++i) {
+      double sum = sums[i].sum, weights = sums[i].weight;
+      for (int k = 0; k < kBlock; ++k) {
+        const double sample = samples[i * kBlock + k];
+        const bool is_void = sample != sample;
+        sum += is_void ? 0.0 : weight * sample;
+        weights += is_void ? 0.0 : weight;
+      }
+      sums[i] = {sum, weights};
+    }
+  }
+
   void Gather() {
     for (std::size_t i = 0; i < inner_.size(); ++i) {
       outer_[i / static_cast<std::size_t>(parts_)].Add(inner_[i]);
