@@ -63,7 +63,9 @@ class GridNodes {
         positions_(static_cast<std::size_t>(window.columns) * static_cast<std::size_t>(window.rows), kNowhere) {}
 
   std::vector<Position> Compute() && {
-    if (georeference_.is_affine()) {
+    if (georeference_.is_affine() && georeference_.is_geographic_grid()) {
+      FillGeographic();
+    } else if (georeference_.is_affine()) {
       FillExactly(window_.column, window_.row, window_.columns, window_.rows);
     } else {
       const std::int64_t last_row = std::min(window_.row + window_.rows - 1, grid_.rows() - 1);
@@ -103,6 +105,24 @@ class GridNodes {
     for (std::int64_t r = row; r < row + rows; ++r) {
       for (std::int64_t c = column; c < column + columns; ++c) *At(c, r) = Degrees(c, r);
       georeference_.ToPixels({At(column, r), static_cast<std::size_t>(columns)});
+    }
+  }
+
+  // Meridians are the source's columns and parallels its rows: a node has the x of its column and the y of its row.
+  void FillGeographic() {
+    std::vector<Position> columns(static_cast<std::size_t>(window_.columns)),
+        rows(static_cast<std::size_t>(window_.rows));
+    for (std::size_t c = 0; c < columns.size(); ++c) {
+      columns[c] = Degrees(window_.column + static_cast<std::int64_t>(c), window_.row);
+    }
+    for (std::size_t r = 0; r < rows.size(); ++r) {
+      rows[r] = Degrees(window_.column, window_.row + static_cast<std::int64_t>(r));
+    }
+    georeference_.ToPixels(columns);
+    georeference_.ToPixels(rows);
+    positions_.clear();
+    for (const Position& row : rows) {
+      for (const Position& column : columns) positions_.push_back({column.x, row.y});
     }
   }
 
