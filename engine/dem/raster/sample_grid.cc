@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <span>
 
 #include "engine/dem/raster/block_averages.h"
@@ -107,22 +108,22 @@ Result<void> ReadBlocks(const Level& level, const SampleRules& rules, const Grid
   // In sample rows: a row of blocks can be the whole raster.
   const std::int64_t strip = std::max<std::int64_t>(1, kSamplesPerStrip / count);
   const bool is_plain = level.block == 1 && count == window.columns;
-  std::vector<float> samples;
+  // Written before it is read, and not filled with zeros before that.
+  const auto samples = std::make_unique_for_overwrite<float[]>(static_cast<std::size_t>(count * std::min(strip, rows)));
   BlockAverages averages(is_plain ? 0 : window.columns, level.block);
   for (std::int64_t done = 0; done < rows; done += strip) {
     const GridWindow here{first, top + done, count, std::min(strip, rows - done)};
-    samples.resize(static_cast<std::size_t>(here.columns * here.rows));
     auto read = level.is_band
                     ? ReadHeights(*level.band, rules, static_cast<int>(here.column), static_cast<int>(here.row),
-                                  static_cast<int>(here.columns), static_cast<int>(here.rows), samples.data(), stop)
-                    : InterpolateBlocks(level, rules, here, samples.data(), stop);
+                                  static_cast<int>(here.columns), static_cast<int>(here.rows), samples.get(), stop)
+                    : InterpolateBlocks(level, rules, here, samples.get(), stop);
     if (!read) return read;
     if (is_plain) {
-      CopyRows(samples, count, out + done * stride, stride);
+      CopyRows({samples.get(), static_cast<std::size_t>(here.columns * here.rows)}, count, out + done * stride, stride);
       continue;
     }
     for (std::int64_t r = 0; r < here.rows; ++r) {
-      averages.AddRow(samples.data() + r * count, count, level.RowShare(here.row + r),
+      averages.AddRow(samples.get() + r * count, count, level.RowShare(here.row + r),
                       level.ColumnShare(first + count - 1));
       const std::int64_t at = done + r;
       if ((at + 1) % level.block == 0 || at + 1 == rows) averages.Take(out + at / level.block * stride);
