@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "config/listen_address.h"
+#include "config/common/listen_address.h"
 #include "engine/dem/dem_types.h"
 #include "engine/tin/criterion.h"
 #include "proto/gltf/gltf_types.h"

@@ -7,7 +7,7 @@
 #include <cstdlib>
 #include <iterator>
 
-#include "config/source_paths.h"
+#include "config/input/source_paths.h"
 
 namespace terrace::config {
 namespace {

@@ -9,9 +9,9 @@
 #include <cerrno>
 #include <system_error>
 
-#include "config/json_text.h"
-#include "config/option_table.h"
-#include "config/source_paths.h"
+#include "config/input/json_text.h"
+#include "config/options/option_table.h"
+#include "config/input/source_paths.h"
 
 namespace terrace::config {
 namespace {

@@ -17,21 +17,25 @@ import unittest
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 
 # core <- {geo, tin} <- {dem, proto} <- tiler <- server, and core <- config <- server (config knows VALUES as
-# well). In the server, asio.h stands below
-# all, the files of the folder itself put the rooms together, and the command line is above all:
+# well). In the server, asio.h stands below all, the files of the folder itself put the rooms together, and the command
+# line is above all:
 # net <- http, which know no product; jobs; store, jobs <- tiles; {http, tiles} <- {telemetry, query} <- api <- documents
-# <- handlers <- server <- cli, and tiles <- reload <- cli.
+# <- handlers <- server <- cli, and tiles <- reload <- cli. In the command line common <- {serve, mesh, info} <- cli.
 TIN = ["engine/tin/mesh", "engine/tin/scan", "engine/tin", "engine/tin/extended", "engine/tin/decimate"]
 GEOMETRY = ["engine/core", "engine/geo"] + TIN
 PROTO = ["proto", "proto/mesh", "proto/error", "proto/gltf", "proto/documents"]
+CONFIG = ["config/common", "config/config.h", "config/input", "config/options", "config"]
 ENGINE = GEOMETRY + ["engine/dem"] + PROTO + ["config", "tiler", "server/asio.h"]
 # Of elevation models, each may know those before it.
 DEM = ["engine/dem/dem_types.h", "engine/dem/common", "engine/dem/gdal", "engine/dem/crs", "engine/dem/raster", "engine/dem/statistics",
        "engine/dem/sources", "engine/dem/mosaic", "engine/dem/bound", "engine/dem/image"]
-# Of their headers, whoever may know engine/dem may include these.
-DOORS = {"engine/dem/" + name for name in (
-    "dem_types.h", "common/box_index.h", "crs/geodesic_path.h", "gdal/file_stamp.h", "gdal/gdal_settings.h", "gdal/source_policy.h",
-    "image/imagery.h", "image/raster_colors.h", "image/water_raster.h", "sources/read_raster.h")}
+# Headers of rooms below a front room: whoever may know the front room may include these.
+DOORS = {front + "/" + name: front for front, names in {
+    "engine/dem": ("dem_types.h", "common/box_index.h", "crs/geodesic_path.h", "gdal/file_stamp.h", "gdal/gdal_settings.h",
+                   "gdal/source_policy.h", "image/imagery.h", "image/raster_colors.h", "image/water_raster.h", "sources/read_raster.h"),
+    "config": ("config.h", "common/listen_address.h", "common/nearest_name.h", "common/token_hash.h", "common/working_directory.h",
+               "options/options.h"),
+}.items() for name in names}
 # Plain values that the configuration holds as they are: of these rooms config may include nothing else.
 VALUES = {"engine/dem/dem_types.h", "engine/tin/criterion.h", "proto/gltf/gltf_types.h"}
 API = ENGINE + ["server/jobs", "server/net", "server/http", "server/store", "server/tiles", "server/telemetry", "server/query"]
@@ -48,7 +52,7 @@ ROOMS = {
     "engine/dem": ["engine/core", "engine/geo"] + DEM,
     "proto": GEOMETRY,
     **{room: GEOMETRY + PROTO[:i] for i, room in enumerate(PROTO) if i > 0},
-    "config": ["engine/core"],
+    **{room: ["engine/core"] + CONFIG[:i] for i, room in enumerate(CONFIG)},
     "tiler": GEOMETRY + ["engine/dem"] + PROTO,
     "server/asio.h": [],
     "server/jobs": ["engine/core", "server/asio.h"],
@@ -63,7 +67,9 @@ ROOMS = {
     "server/handlers": API + ["server/api", "server/documents"],
     "server/reload": ENGINE + ["server/tiles"],
     "server": SERVER,
-    "server/cli": SERVER + ["server", "server/reload"],
+    "server/cli/common": SERVER + ["server", "server/reload"],
+    **{"server/cli/" + command: SERVER + ["server", "server/reload", "server/cli/common"] for command in ("serve", "mesh", "info")},
+    "server/cli": SERVER + ["server", "server/cli/common", "server/cli/serve", "server/cli/mesh", "server/cli/info"],
 }
 
 # Library: which headers are its own, and which files may name them (regular expressions on paths). The first match counts.
@@ -86,7 +92,7 @@ LIBRARIES = [
     Library("xxHash", r"xxhash\.h", r"(engine/dem|engine/tin|proto|tiler|server)/.*\.cc"),
     Library("spdlog", r"spdlog/.*", r"(engine/dem|server)/.*\.cc"),
     Library("Beast", r"boost/beast.*", r"server/http/request\.cc"),
-    Library("OpenSSL", r"openssl/.*|boost/asio/ssl.*", r"(config/token_hash|server/net/.*)\.cc"),
+    Library("OpenSSL", r"openssl/.*|boost/asio/ssl.*", r"(config/common/token_hash|server/net/.*)\.cc"),
     Library("Boost.Geometry", r"boost/geometry/.*", r"engine/dem/.*\.cc"),
     Library("Boost.JSON", r"boost/json.*", r"server/query/json_parameters\.cc"),
     Library("Boost", r"boost/.*", r"server/"),
@@ -104,7 +110,7 @@ LIBRARIES = [
 ]
 
 # May show in a header that another room includes; inside the server Boost may, too (awaitable results), and between the
-# rooms of engine/dem GDAL.
+# rooms of engine/dem GDAL, between those of config JSON.
 PUBLIC = {"expected", "fmt", "the standard library", "threads", "clocks", "files"}
 
 INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*(?:<([^>\n]+)>|"([^"\n]+)")', re.MULTILINE)
@@ -166,12 +172,13 @@ class Tree:
             return f'"{quoted}": {path if room is None else quoted} lies in no room; add its folder to ROOMS'
         if room == other:
             return None
-        if quoted in DOORS and "engine/dem" in ROOMS[room]:
-            other = "engine/dem"
-        if other not in ROOMS[room] and not (room == "config" and quoted in VALUES):
+        if DOORS.get(quoted) in ROOMS[room]:
+            other = DOORS[quoted]
+        if other not in ROOMS[room] and not (room in CONFIG and quoted in VALUES):
             return f'{room} may not know {other} ("{quoted}")'
         public = PUBLIC | ({"Boost"} if room.startswith("server") and other.startswith("server") else set())
         public |= {"GDAL", "Boost.Geometry"} if room.startswith("engine/dem") and other.startswith("engine/dem/") else set()
+        public |= {"nlohmann_json"} if room in CONFIG and other in CONFIG else set()
         hidden = self.libraries_behind(quoted) - public
         if hidden:
             return f'"{quoted}" shows {", ".join(sorted(hidden))} to {room}: keep it in .cc files or in headers of {other} alone'
@@ -228,6 +235,13 @@ class SelfTest(unittest.TestCase):
         self.assert_refused({"proto/gltf/glb_tile.h": "", "config/a.h": '#include "proto/gltf/glb_tile.h"\n'}, "config may not know proto")
         self.assert_refused({"engine/dem/dem_types.h": "#include <gdal.h>\n", "config/a.h": '#include "engine/dem/dem_types.h"\n'},
                             "shows GDAL to config")
+
+    def test_front_room_shows_its_doors_alone(self):
+        self.assert_clean({"config/options/options.h": "", "server/cli/serve/a.cc": '#include "config/options/options.h"\n'})
+        self.assert_refused({"config/input/place.h": "", "server/cli/serve/a.cc": '#include "config/input/place.h"\n'},
+                            "server/cli/serve may not know config/input")
+        self.assert_refused({"server/cli/serve/log.h": "", "server/cli/mesh/a.cc": '#include "server/cli/serve/log.h"\n'},
+                            "server/cli/mesh may not know server/cli/serve")
 
     def test_line_is_named(self):
         self.assert_refused({"engine/geo/b.h": "", "engine/core/a.h": '// first\n\n#  include "engine/geo/b.h"\n'}, "engine/core/a.h:3:")

@@ -4,7 +4,7 @@
 #include <string>
 #include <utility>
 
-#include "config/token_hash.h"
+#include "config/common/token_hash.h"
 #include "server/http/text.h"
 #include "server/query/query.h"
 

@@ -9,9 +9,9 @@
 #include <string_view>
 #include <vector>
 
-#include "config/nearest_name.h"
+#include "config/common/nearest_name.h"
 #include "engine/dem/gdal/source_policy.h"
-#include "server/cli/command.h"
+#include "server/cli/common/command.h"
 
 namespace terrace::cli {
 namespace {

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <utility>
 
-#include "config/options.h"
+#include "config/options/options.h"
 
 namespace terrace::server {
 namespace {

@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "config/parse.h"
-#include "server/cli/open_dataset.h"
+#include "server/cli/common/open_dataset.h"
 #include "tiler/tile_pipeline.h"
 
 namespace terrace::bench {

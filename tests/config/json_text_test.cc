@@ -1,4 +1,4 @@
-#include "config/json_text.h"
+#include "config/input/json_text.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "config/listen_address.h"
+#include "config/common/listen_address.h"
 
 #include <gtest/gtest.h>
 

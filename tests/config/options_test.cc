@@ -1,8 +1,8 @@
-#include "config/options.h"
+#include "config/options/options.h"
 
 #include <gtest/gtest.h>
 
-#include "config/working_directory.h"
+#include "config/common/working_directory.h"
 #include "tests/config/errors.h"
 
 namespace terrace::config {

@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "config/option_codec.h"
+#include "config/options/option_codec.h"
 #include "tests/config/errors.h"
 
 namespace terrace::config {

@@ -6,9 +6,9 @@
 #include <iterator>
 #include <string>
 
-#include "config/json_text.h"
-#include "config/option_docs.h"
-#include "config/options.h"
+#include "config/input/json_text.h"
+#include "config/options/option_docs.h"
+#include "config/options/options.h"
 #include "tests/config/errors.h"
 #include "tests/support/source_dir.h"
 

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "config/option_table.h"
+#include "config/options/option_table.h"
 #include "config/parse.h"
 
 namespace terrace::config {

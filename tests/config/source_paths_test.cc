@@ -1,4 +1,4 @@
-#include "config/source_paths.h"
+#include "config/input/source_paths.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>

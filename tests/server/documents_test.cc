@@ -6,7 +6,7 @@
 #include <condition_variable>
 #include <mutex>
 
-#include "config/token_hash.h"
+#include "config/common/token_hash.h"
 #include "proto/compress.h"
 #include "server/documents/document.h"
 #include "tests/server/server_fixture.h"

@@ -5,7 +5,7 @@
 #include <thread>
 #include <vector>
 
-#include "config/token_hash.h"
+#include "config/common/token_hash.h"
 #include "tests/server/resident_memory.h"
 #include "tests/server/server_fixture.h"
 

@@ -15,7 +15,7 @@
 #include <string>
 #include <vector>
 
-#include "config/token_hash.h"
+#include "config/common/token_hash.h"
 #include "tests/server/server_fixture.h"
 
 namespace terrace::server {

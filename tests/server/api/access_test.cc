@@ -6,7 +6,7 @@
 #include <cctype>
 #include <string>
 
-#include "config/token_hash.h"
+#include "config/common/token_hash.h"
 
 namespace terrace::server {
 namespace {

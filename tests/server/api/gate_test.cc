@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "config/token_hash.h"
+#include "config/common/token_hash.h"
 #include "server/routes.h"
 
 namespace terrace::server {

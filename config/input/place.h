@@ -1,0 +1,60 @@
+// Where in the configuration a value was read: what it is relative to, and where its errors go. Used inside this room
+// only.
+//
+// No message quotes a value, nor a key that resembles no known one: a token may stand in any place by mistake, and
+// messages go into logs.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "config/config.h"
+#include "config/input/json_text.h"
+#include "config/common/working_directory.h"
+
+namespace terrace::config {
+
+class Place {
+ public:
+  // `errors` must outlive this and every place made from it.
+  Place(std::filesystem::path directory, std::string path, std::vector<ConfigError>& errors)
+      : directory_(std::move(directory)), path_(std::move(path)), errors_(&errors) {}
+  // Of the command line; an empty directory is one that cannot be named.
+  static Place InWorkingDirectory(std::filesystem::path directory, std::vector<ConfigError>& errors) {
+    Place place(std::move(directory), "", errors);
+    place.is_command_line_ = true;
+    return place;
+  }
+
+  Place At(std::string_view key) const {
+    Place place = *this;
+    place.path_ = AppendKey(path_, key);
+    return place;
+  }
+  Place At(std::size_t index) const { return At(std::to_string(index)); }
+
+  void Fail(std::string message) const {
+    if (!has_failed_often()) errors_->push_back({path_, std::move(message)});
+  }
+  bool has_failed_often() const { return errors_->size() >= kMaxConfigErrors; }
+  void Expected(std::string_view what) const { Fail("must be " + std::string(what)); }
+
+  // What relative paths are relative to.
+  const std::filesystem::path& directory() const { return directory_; }
+  // A path in full, as it is used from then on.
+  std::string Resolve(const std::filesystem::path& path) const {
+    if (!is_command_line_) return (directory_ / path).string();
+    if (directory_.empty() && path.is_relative()) Fail(kNoWorkingDirectory);
+    return FromWorkingDirectory(directory_, path);
+  }
+
+ private:
+  std::filesystem::path directory_;
+  std::string path_;
+  std::vector<ConfigError>* errors_;
+  bool is_command_line_ = false;
+};
+
+}  // namespace terrace::config

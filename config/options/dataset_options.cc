@@ -1,0 +1,144 @@
+// The table of options of one dataset.
+#include "config/options/dataset_name.h"
+#include "config/options/layer_options.h"
+#include "config/options/option_table.h"
+#include "config/options/source_options.h"
+
+namespace terrace::config {
+namespace {
+
+// Names that URLs can hold, but for those that the server answers itself.
+Json NameSchema() {
+  Json taken = Json::array({".", ".."});
+  for (const std::string_view name : ReservedDatasetNames()) taken.push_back(name);
+  return {{"type", "string"}, {"pattern", kNamePattern}, {"not", {{"enum", std::move(taken)}}}};
+}
+
+}  // namespace
+
+const std::vector<Option<DatasetConfig>>& DatasetOptionTable() {
+  static const std::vector<Option<DatasetConfig>> table = {
+      {.key = "name",
+       .value = "NAME",
+       .help = "Name of the dataset in URLs; by default that of the file",
+       .details = "1 to 64 letters, digits, `.`, `_` or `-`; not `.`, `..`, `datasets`, `viewer`, `livez`, `readyz` or "
+                  "`metrics`. A DEM of the command line is named after its file; other characters become `-`",
+       .codec = Text(&DatasetConfig::name, CheckDatasetName, NameSchema()),
+       .missing = "; every dataset needs one"},
+      {.key = "sources",
+       .help = "Files, globs and folders of rasters, in order of priority",
+       .details = "The first that has a height at a place gives it: [mosaics](#mosaics). Globs have `*`, `?` and "
+                  "`[...]`; a folder stands for all rasters in it, not in folders below. Relative to the folder of the "
+                  "file. Each is a text, or an object such as `{\"path\": \"srtm/\", \"vertical\": \"egm96\", "
+                  "\"nodata\": -9999}` for what differs from the dataset",
+       .codec = SourcesCodec(),
+       .missing = "; every dataset needs one"},
+      {.key = "vertical",
+       .value = "DATUM",
+       .help = "What the heights count from: crs (as the source states), unknown, ellipsoid, egm96, egm2008, EPSG:N or "
+               "a grid",
+       .details = "`EPSG:5703` is a vertical reference system. A grid of undulations is a path (`.gtx`, `.tif`), "
+                  "relative to the folder of the file. [More](#heights)",
+       .codec = VerticalCodec()},
+      {.key = "nodata",
+       .value = "VALUE",
+       .help = "Voids: auto finds undeclared ones, declared trusts the source, a number is one more",
+       .details = "`auto` finds them beside those that the source declares. A number or a list of numbers (raw values) "
+                  "are voids beside the declared one. [More](#voids)",
+       .codec = NodataCodec()},
+      {.key = "attribution",
+       .value = "TEXT",
+       .help = "Attribution shown by clients",
+       .details = "On one line",
+       .codec = OneLine(&DatasetConfig::attribution)},
+      {.key = "error_fraction",
+       .value = "SHARE",
+       .help = "Default error of a level as a share of the error that clients assume there",
+       .details = "They assume 77,067 m / 2^level",
+       .codec = Number(&DatasetConfig::error_fraction, 0.05, 1)},
+      {.key = "finest_error",
+       .value = "METRES",
+       .help = "Go as deep as needed for this default error; by default a tenth of the source's spacing",
+       .details = "The deepest level is the first whose default error is at most this. The spacing is that of the "
+                  "finest source's samples",
+       .codec = Number(&DatasetConfig::finest_error, 0.001, 100'000)},
+      {.key = "floor",
+       .value = "METRES",
+       .help = "Height outside the sources and in voids that nothing fills; by default their lowest height",
+       .details = "Above the WGS 84 ellipsoid",
+       .codec = Number(&DatasetConfig::floor, -kMaxHeight, kMaxHeight)},
+      {.key = "max_void_gap",
+       .value = "SAMPLES",
+       .help = "Voids narrower than this many source samples are filled from their edges",
+       .codec = Integer(&DatasetConfig::max_void_gap, 0, 4096)},
+      {.key = "voids",
+       .value = "NAME",
+       .help = "What larger voids with data all around them show: smooth (a surface between their edges) or floor",
+       .details = "Where no other source has a height. [More](#voids)",
+       .codec = Choice(&DatasetConfig::voids, {{"smooth", dem::HoleFill::kSmooth}, {"floor", dem::HoleFill::kFloor}})},
+      {.key = "feather",
+       .value = "METRES",
+       .help = "Blend a source of a mosaic with what lies below it so far from its edges and voids; 0 is a hard edge",
+       .details = "At most 256 of its samples. [More](#mosaics)",
+       .codec = Number(&DatasetConfig::feather, 0, 1'000'000)},
+      {.key = "criterion",
+       .value = "NAME",
+       .help = "How triangles are joined: delaunay, or data-dependent: smaller tiles, more time to build",
+       .details = "`delaunay` avoids thin triangles; `data-dependent` fits them to the heights: an eighth to a fifth "
+                  "fewer vertices for the same error, which is kept either way, but thinner triangles and about twice "
+                  "the time to refine",
+       .codec = Choice(&DatasetConfig::criterion,
+                       {{"delaunay", tin::Criterion::kDelaunay}, {"data-dependent", tin::Criterion::kDataDependent}})},
+      {.key = "compact",
+       .value = "true|false",
+       .help = "Drop the vertices that a tile's error does not need: smaller tiles, more time to build",
+       .details = "About a third fewer inside a tile at the same error, for about a third more time to build it; edges "
+                  "stay as they are",
+       .codec = Switch(&DatasetConfig::compact)},
+      {.key = "glb_compression",
+       .value = "NAME",
+       .help = "Compression of GLB tiles whose requests name none: draco, none, quantized or meshopt",
+       .details = "[Which client takes which](formats/glb.md#compression)",
+       .codec = Choice(&DatasetConfig::glb_compression, {{"draco", proto::GlbCompression::kDraco},
+                                                         {"none", proto::GlbCompression::kNone},
+                                                         {"quantized", proto::GlbCompression::kQuantized},
+                                                         {"meshopt", proto::GlbCompression::kMeshopt}})},
+      {.key = "draco_speed",
+       .value = "N",
+       .help = "Draco's effort for GLB tiles: 0 is smallest, 10 is fastest",
+       .details = "3 makes large tiles 8 % smaller for half as much encoding time again or more; 10 codes each "
+                  "triangle by itself, and tiles are three times as large",
+       .codec = Integer(&DatasetConfig::draco_speed, 0, 10)},
+      {.key = "draco_normal_bits",
+       .value = "N",
+       .help = "Bits of each of the two coordinates of a normal in Draco tiles",
+       .details = "With 8, as in quantized-mesh, a normal is less than a degree off",
+       .codec = Integer(&DatasetConfig::draco_normal_bits, 4, 16)},
+      {.key = "water",
+       .value = "METRES|FILE",
+       .help = "Water masks: a sea level, or a raster that is not zero on water",
+       .details = "For clients that ask for them. In the file `{\"sea_level\": 0}`: metres, -20,000 to 20,000; the "
+                  "dataset's heights at or below it are water. Or `{\"mask\": \"water.tif\"}`: a raster, relative to "
+                  "the folder of the file. As a flag a number is a sea level and other text a raster. [More](#water)",
+       .codec = WaterCodec()},
+      {.key = "imagery",
+       .value = "FILE",
+       .help = "An image that the textures of GLB tiles are cut from",
+       .details = "In the file `{\"image\": \"photo.tif\"}`, relative to its folder; as a flag the path alone. "
+                  "[More](#imagery)",
+       .codec = ImageryCodec()},
+      {.key = "public",
+       .value = "true|false",
+       .help = "Seen without a token, where there are tokens",
+       .details = "[More](#tokens)",
+       .codec = Switch(&DatasetConfig::is_public)},
+      {.key = "metadata_availability",
+       .value = "LEVELS",
+       .help = "Tiles of every so many levels tell which tiles are below them; 0: none do",
+       .details = "With 0 `layer.json` alone tells clients. [More](#where-tiles-are)",
+       .codec = Integer(&DatasetConfig::metadata_availability, 0, 24)},
+  };
+  return table;
+}
+
+}  // namespace terrace::config

@@ -1,0 +1,71 @@
+#include "config/options/disk_cache_option.h"
+
+namespace terrace::config {
+namespace {
+
+constexpr std::int64_t kMaxBytes = std::int64_t{1} << 40;
+constexpr std::size_t kMinBytes = std::size_t{16} << 20;  // what a store of records needs to have several files
+
+Codec<DiskCacheConfig> Directory() {
+  return {[](const Json& value, const Place& place, DiskCacheConfig& cache) {
+            if (!value.is_string() || value.get_ref<const std::string&>().empty()) {
+              return place.Expected("the path of a directory");
+            }
+            cache.directory = place.Resolve(value.get<std::string>());
+          },
+          [](const DiskCacheConfig& cache) { return Json(cache.directory); }, TextToJson, Json::parse(kNonEmptyText)};
+}
+
+Codec<DiskCacheConfig> FileBytes(std::size_t DiskCacheConfig::*member) {
+  Codec<DiskCacheConfig> codec = Bytes(member, kMaxBytes);
+  codec.read = [read_bytes = codec.read, member](const Json& value, const Place& place, DiskCacheConfig& cache) {
+    read_bytes(value, place, cache);
+    if (cache.*member > 0 && cache.*member < kMinBytes) {
+      place.Fail(fmt::format("must be 0, which keeps none, or at least {} (16 MiB)", kMinBytes));
+    }
+  };
+  return codec;
+}
+
+}  // namespace
+
+const std::vector<Option<DiskCacheConfig>>& DiskCacheOptionTable() {
+  static const std::vector<Option<DiskCacheConfig>> table = {
+      {.key = "directory",
+       .value = "DIR",
+       .help = "Directory of the cache; one server at a time uses it",
+       .details = "Made if it is missing; best one that holds nothing else. A second server that names it does not "
+                  "start",
+       .codec = Directory(),
+       .missing = ": where the cache is kept"},
+      {.key = "tile_bytes",
+       .value = "BYTES",
+       .help = "Disk for finished tiles; 0 keeps none",
+       .details = "At least 16 MiB, or 0",
+       .codec = FileBytes(&DiskCacheConfig::tile_bytes)},
+      {.key = "refinement_bytes",
+       .value = "BYTES",
+       .help = "Disk for the refinements that tiles are made from; 0 keeps none",
+       .details = "At least 16 MiB, or 0: about 50 kB a tile at default errors. They make another error, format or "
+                  "coding of a tile cheap after a restart as well",
+       .codec = FileBytes(&DiskCacheConfig::refinement_bytes)},
+  };
+  return table;
+}
+
+Codec<Config> DiskCacheOption() {
+  return {[](const Json& value, const Place& place, Config& config) {
+            if (!value.is_object()) return place.Expected(R"({"directory": "/var/cache/terrace"})");
+            ReadObject(value, place, DiskCacheOptionTable(), config.disk_cache);
+          },
+          [](const Config& config) {
+            return config.disk_cache.directory.empty() ? Json()
+                                                       : WriteObject(config.disk_cache, DiskCacheOptionTable());
+          },
+          [](const std::string& text) {
+            return Json{{"directory", text}};
+          },
+          ObjectSchema(DiskCacheOptionTable())};
+}
+
+}  // namespace terrace::config

@@ -1,0 +1,171 @@
+// How the value of an option is read from JSON and written back. Used inside this room only.
+//
+// A codec is made for one member of Config or DatasetConfig. `read` either sets the member or reports to the place what
+// the value must be; `write` gives a value that `read` takes; `from_text` turns the text of a flag into such a value;
+// `schema` describes, in JSON Schema, the values that `read` takes.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cmath>
+#include <functional>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "config/input/json_text.h"
+#include "config/input/place.h"
+
+namespace terrace::config {
+
+template <typename Target>
+struct Codec {
+  std::function<void(const Json&, const Place&, Target&)> read;
+  std::function<Json(const Target&)> write;
+  Json (*from_text)(const std::string&) = nullptr;  // none: the option has no flag
+  Json schema = {};
+};
+
+inline Json TextToJson(const std::string& text) { return text; }
+
+// "12" and "1e3" become numbers; everything else stays text and is refused, or understood, by the codec.
+Json NumberToJson(const std::string& text);
+// "true" and "false" become what they say.
+Json SwitchToJson(const std::string& text);
+
+// Schemas.
+inline constexpr const char* kNonEmptyText = R"({"type": "string", "minLength": 1})";
+inline constexpr const char* kOneLinePattern = R"(^[^\u0000-\u001f\u007f]*$)";
+inline constexpr const char* kBytesPattern = R"(^(0|[1-9][0-9]*)(\.[0-9]+)? *(B|kB|KB|MB|GB|TB|KiB|MiB|GiB|TiB)?$)";
+inline constexpr const char* kNamePattern = "^[A-Za-z0-9._-]{1,64}$";
+inline Json TextLike(const char* pattern) { return {{"type", "string"}, {"pattern", pattern}}; }
+inline Json ListOf(Json items) { return {{"type", "array"}, {"items", std::move(items)}}; }
+inline Json InRange(const char* type, Json min, Json max) {
+  return {{"type", type}, {"minimum", std::move(min)}, {"maximum", std::move(max)}};
+}
+
+inline constexpr double kMaxHeight = 20'000;  // metres, up and down
+
+bool HasControlCharacter(const std::string& text);
+// For Text: "must be text on one line", or nothing.
+std::string CheckOneLine(const std::string& text);
+
+// A whole number below 2^53, which JSON keeps exactly. 1e3 and 1000.0 are whole.
+std::optional<std::int64_t> WholeNumber(const Json& value);
+// 268435456, "512MB", "1GiB", "64 MiB"
+std::optional<std::int64_t> ByteCount(const Json& value);
+// Whole values without a fraction: 30, not 30.0.
+Json NumberOut(double value);
+
+template <typename Target, typename Member>
+Codec<Target> Integer(Member Target::*member, std::int64_t min, std::int64_t max) {
+  return {[=](const Json& value, const Place& place, Target& target) {
+            const std::optional<std::int64_t> number = WholeNumber(value);
+            if (!number || *number < min || *number > max) {
+              return place.Expected(fmt::format("a whole number from {} to {}", min, max));
+            }
+            target.*member = static_cast<Member>(*number);
+          },
+          [=](const Target& target) { return Json(target.*member); }, NumberToJson, InRange("integer", min, max)};
+}
+
+template <typename Target>
+Codec<Target> Bytes(std::size_t Target::*member, std::int64_t max) {
+  return {
+      [=](const Json& value, const Place& place, Target& target) {
+        const std::optional<std::int64_t> number = ByteCount(value);
+        if (!number || *number < 0 || *number > max) {
+          return place.Expected(fmt::format("a number of bytes up to {}, or text such as \"512MB\" or \"1GiB\"", max));
+        }
+        target.*member = static_cast<std::size_t>(*number);
+      },
+      [=](const Target& target) { return Json(target.*member); }, NumberToJson,
+      Json{{"anyOf", Json::array({InRange("integer", 0, max), TextLike(kBytesPattern)})},
+           {"examples", Json::array({"512MB", "1GiB"})}}};
+}
+
+// Both ends belong to the range.
+template <typename Target, typename Member>
+Codec<Target> Number(Member Target::*member, double min, double max) {
+  return {[=](const Json& value, const Place& place, Target& target) {
+            const double number = value.is_number() ? value.get<double>() : std::nan("");
+            if (!(number >= min && number <= max)) {
+              return place.Expected(fmt::format("a number from {} to {}", min, max));
+            }
+            target.*member = number;
+          },
+          [=](const Target& target) {
+            const std::optional<double> number = target.*member;
+            return number ? NumberOut(*number) : Json();
+          },
+          NumberToJson, InRange("number", NumberOut(min), NumberOut(max))};
+}
+
+template <typename Target>
+Codec<Target> Switch(bool Target::*member) {
+  return {[=](const Json& value, const Place& place, Target& target) {
+            if (!value.is_boolean()) return place.Expected("true or false");
+            target.*member = value.get<bool>();
+          },
+          [=](const Target& target) { return Json(target.*member); }, SwitchToJson, Json{{"type", "boolean"}}};
+}
+
+template <typename Target>
+Codec<Target> Seconds(std::chrono::milliseconds Target::*member, double min, double max) {
+  return {[=](const Json& value, const Place& place, Target& target) {
+            const double seconds = value.is_number() ? value.get<double>() : std::nan("");
+            if (!(seconds >= min && seconds <= max)) {
+              return place.Expected(fmt::format("a number of seconds from {} to {}", min, max));
+            }
+            target.*member = std::chrono::milliseconds(std::llround(seconds * 1000));
+          },
+          [=](const Target& target) { return NumberOut(static_cast<double>((target.*member).count()) / 1000); },
+          NumberToJson, InRange("number", NumberOut(min), NumberOut(max))};
+}
+
+// One of a few words or numbers.
+template <typename Target, typename Member>
+Codec<Target> Choice(Member Target::*member, std::vector<std::pair<Json, Member>> words) {
+  Json schema = {{"enum", Json::array()}};
+  for (const auto& [word, meaning] : words) schema["enum"].push_back(word);
+  return {[=](const Json& value, const Place& place, Target& target) {
+            std::string allowed;
+            for (const auto& [word, meaning] : words) {
+              if (value == word) {
+                target.*member = meaning;
+                return;
+              }
+              allowed += (allowed.empty() ? "" : " or ") + word.dump();
+            }
+            place.Expected(allowed);
+          },
+          [=](const Target& target) {
+            for (const auto& [word, meaning] : words) {
+              if (meaning == target.*member) return word;
+            }
+            return Json();
+          },
+          TextToJson, std::move(schema)};
+}
+
+// Text that `check` likes: it returns "must be ...", or nothing.
+template <typename Target>
+Codec<Target> Text(std::string Target::*member, const std::function<std::string(const std::string&)>& check,
+                   Json schema) {
+  return {[=](const Json& value, const Place& place, Target& target) {
+            if (!value.is_string()) return place.Expected("text");
+            const std::string problem = check(value.get_ref<const std::string&>());
+            if (!problem.empty()) return place.Fail(problem);
+            target.*member = value.get<std::string>();
+          },
+          [=](const Target& target) { return Json(target.*member); }, TextToJson, std::move(schema)};
+}
+
+template <typename Target>
+Codec<Target> OneLine(std::string Target::*member) {
+  return Text(member, CheckOneLine, TextLike(kOneLinePattern));
+}
+
+}  // namespace terrace::config

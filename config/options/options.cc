@@ -1,0 +1,62 @@
+#include "config/options/options.h"
+
+#include <algorithm>
+
+#include "config/options/option_table.h"
+#include "engine/core/check.h"
+
+namespace terrace::config {
+namespace {
+
+template <typename Target>
+std::vector<OptionInfo> Infos(const std::vector<Option<Target>>& table) {
+  std::vector<OptionInfo> infos;
+  for (const Option<Target>& option : table) {
+    infos.push_back({option.key, option.value, option.help, option.codec.from_text != nullptr, DefaultOf(option)});
+  }
+  return infos;
+}
+
+template <typename Target>
+void SetFromText(const std::vector<Option<Target>>& table, std::string_view key, const std::string& text,
+                 const std::filesystem::path& directory, Target& target, std::vector<ConfigError>& errors) {
+  const auto option =
+      std::find_if(table.begin(), table.end(), [&](const Option<Target>& candidate) { return candidate.key == key; });
+  TERRACE_CHECK(option != table.end() && option->codec.from_text != nullptr);
+  std::vector<ConfigError> found;
+  option->codec.read(option->codec.from_text(text), Place::InWorkingDirectory(directory, found), target);
+  for (const ConfigError& error : found) errors.push_back({FlagOf(key), error.message});
+}
+
+}  // namespace
+
+std::string OptionInfo::Flag() const { return FlagOf(key); }
+
+std::vector<OptionInfo> ServerOptions() { return Infos(ServerOptionTable()); }
+std::vector<OptionInfo> DatasetOptions() { return Infos(DatasetOptionTable()); }
+
+bool TakesRestart(std::string_view key) {
+  const auto& table = ServerOptionTable();
+  return std::none_of(table.begin(), table.end(),
+                      [&](const Option<Config>& option) { return option.key == key && option.is_live; });
+}
+
+std::vector<std::string> ChangedServerOptions(const Config& a, const Config& b) {
+  std::vector<std::string> keys;
+  for (const Option<Config>& option : ServerOptionTable()) {
+    if (option.codec.write(a) != option.codec.write(b)) keys.emplace_back(option.key);
+  }
+  return keys;
+}
+
+void SetServerOption(std::string_view key, const std::string& text, const std::filesystem::path& directory,
+                     Config& config, std::vector<ConfigError>& errors) {
+  SetFromText(ServerOptionTable(), key, text, directory, config, errors);
+}
+
+void SetDatasetOption(std::string_view key, const std::string& text, const std::filesystem::path& directory,
+                      DatasetConfig& dataset, std::vector<ConfigError>& errors) {
+  SetFromText(DatasetOptionTable(), key, text, directory, dataset, errors);
+}
+
+}  // namespace terrace::config

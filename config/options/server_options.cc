@@ -1,0 +1,377 @@
+// The table of options at the top of the configuration file.
+#include <algorithm>
+
+#include "config/options/disk_cache_option.h"
+#include "config/options/edge_options.h"
+#include "config/options/option_table.h"
+#include "config/options/source_options.h"
+
+namespace terrace::config {
+namespace {
+
+constexpr std::int64_t kMaxCacheBytes = std::int64_t{1} << 40;
+
+// The value goes into a response header as it is: a line break there would let it add headers.
+std::string CheckCacheControl(const std::string& text) {
+  const bool ascii = std::all_of(text.begin(), text.end(), [](char c) { return static_cast<unsigned char>(c) < 0x7f; });
+  if (ascii && !text.empty() && !HasControlCharacter(text)) return {};
+  return "must be the value of a Cache-Control header in ASCII, such as \"public, max-age=3600\" or \"no-cache\"";
+}
+
+constexpr const char* kCacheControlSchema = R"({
+  "type": "string", "pattern": "^[ -~]+$",
+  "examples": ["no-cache", "public, max-age=86400, stale-while-revalidate=604800"]
+})";
+
+// Port numbers up to 65535, with or without leading zeros.
+constexpr const char* kListenSchema = R"({
+  "type": "string",
+  "pattern": "^(\\[[0-9A-Fa-f:.]+\\]|[A-Za-z0-9][A-Za-z0-9.-]{0,252}):0*([0-9]{1,4}|[1-5][0-9]{4}|6[0-4][0-9]{3}|65[0-4][0-9]{2}|655[0-2][0-9]|6553[0-5])$",
+  "examples": ["0.0.0.0:8080", "[::1]:8080", "localhost:0"]
+})";
+
+Codec<Config> Listen() {
+  return {[](const Json& value, const Place& place, Config& config) {
+            if (!value.is_string()) return place.Expected("text such as \"127.0.0.1:8080\"");
+            Result<ListenAddress> address = ParseListenAddress(value.get_ref<const std::string&>());
+            if (!address) return place.Fail(address.error().message);
+            config.listen = *std::move(address);
+          },
+          [](const Config& config) { return Json(ToString(config.listen)); }, TextToJson, Json::parse(kListenSchema)};
+}
+
+Codec<Config> Viewer() {
+  return {[](const Json& value, const Place& place, Config& config) {
+            if (value.is_boolean()) {
+              config.viewer = {value.get<bool>(), {}};
+            } else if (value.is_string() && !value.get_ref<const std::string&>().empty()) {
+              config.viewer = {true, place.Resolve(value.get<std::string>())};
+            } else {
+              place.Expected("the folder of a viewer, true (the viewer that comes with terrace) or false (none)");
+            }
+          },
+          [](const Config& config) {
+            return config.viewer.directory.empty() ? Json(config.viewer.enabled)
+                                                   : Json(config.viewer.directory.string());
+          },
+          SwitchToJson, Json::parse(R"({"anyOf": [{"type": "boolean"}, {"type": "string", "minLength": 1}]})")};
+}
+
+Codec<Config> CacheDir() {
+  return {[](const Json& value, const Place& place, Config& config) {
+            if (!value.is_string()) return place.Expected("the path of a folder");
+            const auto& path = value.get_ref<const std::string&>();
+            config.cache_dir = path.empty() ? path : place.Resolve(path);
+          },
+          [](const Config& config) { return Json(config.cache_dir); }, TextToJson,
+          Json::parse(R"({"type": "string", "examples": ["/var/cache/terrace/sources"]})")};
+}
+
+Codec<Config> AccessLogFile() {
+  return {[](const Json& value, const Place& place, Config& config) {
+            if (!value.is_string() || value.get_ref<const std::string&>().empty()) {
+              return place.Expected("the path of a file");
+            }
+            config.access_log_file = place.Resolve(value.get<std::string>());
+          },
+          [](const Config& config) { return config.access_log_file.empty() ? Json() : Json(config.access_log_file); },
+          TextToJson, Json::parse(kNonEmptyText)};
+}
+
+Codec<Config> Datasets() {
+  return {[](const Json& value, const Place& place, Config& config) {
+            if (!value.is_array()) return place.Expected("a list of datasets");
+            for (std::size_t i = 0; i < value.size() && !place.has_failed_often(); ++i) {
+              ReadObject(value[i], place.At(i), DatasetOptionTable(), config.datasets.emplace_back());
+            }
+          },
+          [](const Config& config) {
+            Json list = Json::array();
+            for (const DatasetConfig& dataset : config.datasets) {
+              list.push_back(WriteObject(dataset, DatasetOptionTable()));
+            }
+            return list;
+          },
+          nullptr, ListOf(ObjectSchema(DatasetOptionTable()))};
+}
+
+}  // namespace
+
+const std::vector<Option<Config>>& ServerOptionTable() {
+  static const std::vector<Option<Config>> table = {
+      {.key = "listen",
+       .value = "HOST:PORT",
+       .section = "listening",
+       .help = "Address and port to listen on; port 0 picks a free one",
+       .details = "IPv6 in brackets: `[::1]:8080`; every interface: `0.0.0.0:8080` or `[::]:8080`. The line that the "
+                  "server prints names the port",
+       .codec = Listen()},
+      {.key = "datasets",
+       .section = "datasets",
+       .help = "Datasets to serve",
+       .details = "A list of objects with the keys below. Each DEM on the command line is appended as one more dataset",
+       .codec = Datasets(),
+       .is_live = true},
+      {.key = "viewer",
+       .value = "DIR|false",
+       .section = "listening",
+       .help = "Folder of the web page at /; true is the page that comes with terrace, false is none",
+       .details = "Without one, `/` is a plain list of datasets. The folder's `index.html` is the page; all of its "
+                  "files are below `/viewer/`, so links to them begin with `viewer/` in that page. They are read once, "
+                  "at the start; symbolic links to files are followed, those to folders are not",
+       .codec = Viewer()},
+      {.key = "cache_control",
+       .value = "TEXT",
+       .section = "listening",
+       .help = "Cache-Control header of tiles and layer.json",
+       .details = "One line of ASCII",
+       .codec = Text(&Config::cache_control, CheckCacheControl, Json::parse(kCacheControlSchema)),
+       .is_live = true},
+      {.key = "io_threads",
+       .value = "N",
+       .section = "load",
+       .help = "Threads that talk to clients",
+       .details = "They only move bytes; one or two serve most machines",
+       .codec = Integer(&Config::io_threads, 1, 64)},
+      {.key = "worker_threads",
+       .value = "N",
+       .section = "load",
+       .help = "Threads that build tiles; 0 is one per processor",
+       .codec = Integer(&Config::worker_threads, 0, 1024)},
+      {.key = "cache_dir",
+       .value = "DIR",
+       .section = "listening",
+       .help = "Folder for statistics of sources, so that a second start needs no scan; empty is none",
+       .details = "It holds the ranges of sources, the errors of their averages and, of sources with more than 4096 x "
+                  "4096 samples and no overviews, the averages that shallow tiles are made of: about 1.4 bytes for "
+                  "each such sample, and 0.1 for each of smaller sources of at least 1024 x 1024 samples without "
+                  "overviews, of which coarse averages are kept. It is made with progress and continued where it was "
+                  "interrupted. Sources are told "
+                  "apart by path, size and times: a replaced one is prepared anew. Several servers may share the "
+                  "folder. Without it, the shallow tiles of such a source read it whole. Relative to the folder of the "
+                  "file",
+       .codec = CacheDir()},
+      {.key = "queue_length",
+       .value = "N",
+       .section = "load",
+       .help = "Builds that may wait for a worker; more are refused with 503",
+       .details = "A bound of memory, and more than one connection ever has waiting. Beyond it the newest build of the "
+                  "client that has most waiting gets 503 with `Retry-After`. A client is a token or an address (the "
+                  "/64 of an IPv6 one). The client that has used least of the workers' time is served next; of its own "
+                  "builds shallow tiles go first, a level counting as a tenth of a second of waiting",
+       .codec = Integer(&Config::queue_length, 1, 1'000'000)},
+      {.key = "cache_bytes",
+       .value = "BYTES",
+       .section = "load",
+       .help = "Memory for finished tiles, such as 512MB or 1GiB; 0 is no cache",
+       .details = "Bytes, or text with B, kB, MB, GB, TB, KiB, MiB, GiB or TiB, as in all options in bytes",
+       .codec = Bytes(&Config::cache_bytes, kMaxCacheBytes),
+       .is_live = true},
+      {.key = "refinement_cache_bytes",
+       .value = "BYTES",
+       .section = "load",
+       .help = "Memory for the refinements that tiles are made from; 0 is no cache",
+       .details = "About half a megabyte a tile. Another error, format or coding of a tile then costs a fraction of "
+                  "the first one",
+       .codec = Bytes(&Config::refinement_cache_bytes, kMaxCacheBytes),
+       .is_live = true},
+      {.key = "disk_cache",
+       .value = "DIR",
+       .section = "load",
+       .help = "Directory that keeps finished tiles and refinements across restarts",
+       .details = "In the file an object, `{\"directory\": \"/var/cache/terrace\"}`; as a flag the directory alone. "
+                  "Relative to the folder of the file. [More](#disk-cache)",
+       .codec = DiskCacheOption()},
+      {.key = "gdal_cache_bytes",
+       .value = "BYTES",
+       .section = "load",
+       .help = "Memory for blocks of the sources, as GDAL reads them",
+       .details = "In all threads together. `/metrics` tells how much is in use",
+       .codec = Bytes(&Config::gdal_cache_bytes, kMaxCacheBytes)},
+      {.key = "max_open_sources",
+       .value = "N",
+       .section = "load",
+       .help = "Files of sources, of all datasets, that are kept open between reads",
+       .details = "Rasters, images, grids of PROJ. Those used longest ago are closed; those in use come on top, one "
+                  "for each thread. Fewer where [descriptors](operations.md#descriptors) are scarce",
+       .codec = Integer(&Config::max_open_sources, 0, 100'000)},
+      {.key = "max_connections",
+       .value = "N",
+       .section = "load",
+       .help = "Connections at a time; above it one of the client that has most is closed",
+       .details = "A new one takes its place, idle ones going first. A new one of that client itself gets 503 with "
+                  "`Retry-After` where it has none to give up; with `tls` it is closed during the handshake. Fewer "
+                  "where [descriptors](operations.md#descriptors) are scarce",
+       .codec = Integer(&Config::max_connections, 1, 1'000'000)},
+      {.key = "max_connections_per_client",
+       .value = "N",
+       .section = "load",
+       .help = "Connections of one client at a time; 0 is no limit of its own",
+       .details = "A client is an IPv4 address, or the /64 of an IPv6 address. More get 429; with `tls` they are "
+                  "closed during the handshake. [Trusted proxies](#behind-a-proxy) do not count",
+       .codec = Integer(&Config::max_connections_per_client, 0, 1'000'000)},
+      {.key = "transfer_bytes",
+       .value = "BYTES",
+       .section = "load",
+       .help = "Memory for replies that clients have not taken yet, and for request bodies",
+       .details = "[Bodies on their way](operations.md#bodies-on-their-way): half for replies of up to a sixteenth of "
+                  "it, a quarter for larger ones, a quarter for request bodies. Bodies up to 16 KiB do not count",
+       .codec = Bytes(&Config::transfer_bytes, kMaxCacheBytes)},
+      {.key = "requests_per_second",
+       .value = "N",
+       .section = "load",
+       .help = "Requests of one client or token in the long run; more wait, or get 429; 0 is any number",
+       .details = "A request waits for its turn, and gets 429 with `Retry-After` where that comes after "
+                  "`request_deadline_s`. `/livez` and `/readyz` do not count; all others do, also those that are "
+                  "answered with 404 or 405",
+       .codec = Number(&Config::requests_per_second, 0, 1'000'000)},
+      {.key = "request_burst",
+       .value = "N",
+       .section = "load",
+       .help = "Requests of one client or token at once; 0 is twice requests_per_second",
+       .details = "A viewer asks for some hundreds of tiles when it starts",
+       .codec = Number(&Config::request_burst, 0, 1'000'000)},
+      {.key = "tokens",
+       .section = "access",
+       .help = "Tokens, and the datasets that each may see; without any, everybody sees everything",
+       .details = "[More](#tokens)",
+       .codec = TokensCodec()},
+      {.key = "cors_origins",
+       .value = "ORIGIN[,ORIGIN]",
+       .section = "access",
+       .help = "Web pages that may read replies; * is any, an empty list none",
+       .details = "As browsers send them in `Origin`: `[\"https://maps.example\"]`. As a flag with commas between them",
+       .codec = OriginsCodec()},
+      {.key = "trusted_proxies",
+       .value = "ADDRESS[,ADDRESS]",
+       .section = "access",
+       .help = "Addresses and ranges of proxies whose word on the client counts",
+       .details = "`[\"127.0.0.1\", \"10.0.0.0/8\"]`; as a flag with commas between them. [More](#behind-a-proxy)",
+       .codec = ProxiesCodec()},
+      {.key = "forwarded_header",
+       .value = "NAME",
+       .section = "access",
+       .help = "Header that trusted proxies write: x-forwarded (-For, -Proto, -Host) or forwarded (RFC 7239)",
+       .details = "The other one is ignored: a proxy passes it on as the client sent it",
+       .codec = Choice(&Config::forwarded_header,
+                       {{"x-forwarded", ForwardedHeader::kXForwarded}, {"forwarded", ForwardedHeader::kForwarded}})},
+      {.key = "tls",
+       .value = "CERT,KEY",
+       .section = "access",
+       .help = "PEM files of a certificate and its key, for HTTPS; without them the server speaks plain HTTP",
+       .details = "In the file `{\"certificate\": \"server.pem\", \"key\": \"server.key\"}`, relative to its folder; "
+                  "as a flag the two paths with a comma between them. [More](#tls)",
+       .codec = TlsCodec()},
+      {.key = "max_locations",
+       .value = "N",
+       .section = "load",
+       .help = "Points that one request for heights, or one profile, may have",
+       .details = "More get 400. Bodies of such requests may have 4096 bytes and 64 for each of these points; larger "
+                  "ones get 413",
+       .codec = Integer(&Config::max_locations, 1, 1'000'000)},
+      {.key = "max_mesh_samples",
+       .value = "N",
+       .section = "load",
+       .help = "Height samples that one mesh of an area may be made from",
+       .details = "Larger areas get 400. A worker takes up to 300 bytes a sample while it meshes",
+       .codec = Integer(&Config::max_mesh_samples, 4, 100'000'000),
+       .is_live = true},
+      {.key = "request_deadline_s",
+       .value = "SECONDS",
+       .section = "limits",
+       .help = "A request that takes longer gets 503",
+       .codec = Seconds(&Config::request_deadline, 0.1, 3600),
+       .is_live = true},
+      {.key = "header_timeout_s",
+       .value = "SECONDS",
+       .section = "limits",
+       .help = "Time for a client to send the head of a request",
+       .details = "Of a body: time without a single byte, and before `min_read_rate` counts",
+       .codec = Seconds(&Config::header_timeout, 0.1, 3600)},
+      {.key = "idle_timeout_s",
+       .value = "SECONDS",
+       .section = "limits",
+       .help = "Time that a connection without requests is kept open",
+       .codec = Seconds(&Config::idle_timeout, 0.1, 3600)},
+      {.key = "write_timeout_s",
+       .value = "SECONDS",
+       .section = "limits",
+       .help = "Time for which a client may take none of a response",
+       .codec = Seconds(&Config::write_timeout, 0.1, 3600)},
+      {.key = "min_read_rate",
+       .value = "BYTES",
+       .section = "limits",
+       .help = "Bytes a second that a client must take of a response or send of a body; 0 is any",
+       .details = "Of a response counted from `write_timeout_s` on, of a body from `header_timeout_s` on",
+       .codec = Integer(&Config::min_read_rate, 0, 1'000'000'000)},
+      {.key = "drain_timeout_s",
+       .value = "SECONDS",
+       .section = "limits",
+       .help = "Time for open requests to finish when the server stops",
+       .details = "After SIGTERM or SIGINT",
+       .codec = Seconds(&Config::drain_timeout, 0, 3600)},
+      {.key = "data_roots",
+       .value = "DIR[,DIR]",
+       .section = "sources",
+       .help = "Folders that hold every source; by default any folder may",
+       .details = "They hold every water mask, image and grid of undulations as well. A source must be a regular file; "
+                  "symbolic links count where they lead. Relative to the folder of the file; as a flag with commas "
+                  "between them",
+       .codec = TextList(&Config::data_roots, "a list of folders", true)},
+      {.key = "allowed_prefixes",
+       .value = "PREFIX[,PREFIX]",
+       .section = "sources",
+       .help = "Beginnings of remote sources, such as /vsis3/bucket/; by default there are none",
+       .details = "`/vsicurl/https://example.org/dems/` is another. By default GDAL's ways to the network are closed. "
+                  "Remote files are not watched: a changed one is seen at the next start, and should get another name",
+       .codec = TextList(&Config::allowed_prefixes, "a list of prefixes such as [\"/vsis3/bucket/\"]", false)},
+      {.key = "allowed_drivers",
+       .value = "NAME[,NAME]",
+       .section = "sources",
+       .help = "Formats that sources may have, by GDAL's short names",
+       .details = "`gdalinfo --formats` lists them. They replace the usual ones",
+       .codec = TextList(&Config::allowed_drivers, "a list of formats such as [\"GTiff\", \"VRT\"]", false)},
+      {.key = "watch",
+       .value = "true|false",
+       .section = "changes",
+       .help = "Take over changes of sources and of the configuration file while serving",
+       .details = "They are looked at every second, and so are the files that globs stand for "
+                  "([operations](operations.md#changing-data-and-configuration)). Without it SIGHUP does",
+       .codec = Switch(&Config::watch)},
+      {.key = "log_level",
+       .value = "LEVEL",
+       .section = "log",
+       .help = "Least important messages to log: debug, info, warn, error or off",
+       .details = "Requests are logged at `info`",
+       .codec = Choice(&Config::log_level, {{"debug", LogLevel::kDebug},
+                                            {"info", LogLevel::kInfo},
+                                            {"warn", LogLevel::kWarn},
+                                            {"error", LogLevel::kError},
+                                            {"off", LogLevel::kOff}}),
+       .is_live = true},
+      {.key = "log_format",
+       .value = "FORMAT",
+       .section = "log",
+       .help = "text for people, json for machines (one object a line); both go to stderr",
+       .codec = Choice(&Config::log_format, {{"text", LogFormat::kText}, {"json", LogFormat::kJson}})},
+      {.key = "access_log",
+       .value = "FORM",
+       .section = "log",
+       .help = "Form of the access log: log (lines of the log), combined, json or off",
+       .details = "`combined` is the form of Apache and nginx; `json` is one object a line "
+                  "([operations](operations.md#logs))",
+       .codec = Choice(&Config::access_log, {{"log", AccessLogForm::kLog},
+                                             {"combined", AccessLogForm::kCombined},
+                                             {"json", AccessLogForm::kJson},
+                                             {"off", AccessLogForm::kOff}})},
+      {.key = "access_log_file",
+       .value = "FILE",
+       .section = "log",
+       .help = "File that a combined or json access log is appended to; by default stderr",
+       .details = "Relative to the folder of the configuration file. SIGHUP opens it anew",
+       .codec = AccessLogFile()},
+  };
+  return table;
+}
+
+}  // namespace terrace::config

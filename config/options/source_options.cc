@@ -1,0 +1,207 @@
+#include "config/options/source_options.h"
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+
+#include "config/input/source_paths.h"
+
+namespace terrace::config {
+namespace {
+
+constexpr const char* kVerticalExpected =
+    "\"crs\", \"unknown\", \"ellipsoid\", \"egm96\", \"egm2008\", a vertical reference system such as \"EPSG:5703\", "
+    "or the "
+    "path of a grid (.gtx, .tif)";
+constexpr const char* kNodataExpected = "\"auto\", \"declared\", a number or a list of numbers";
+
+bool IsGrid(const std::string& text) {
+  const std::string extension = std::filesystem::path(text).extension().string();
+  return extension == ".gtx" || extension == ".tif" || extension == ".tiff";
+}
+
+bool IsVerticalName(const std::string& text) {
+  constexpr std::array<std::string_view, 5> kWords = {"crs", "unknown", "ellipsoid", "egm96", "egm2008"};
+  if (std::find(kWords.begin(), kWords.end(), text) != kWords.end()) return true;
+  constexpr std::string_view kEpsg = "EPSG:";
+  return text.starts_with(kEpsg) && text.size() > kEpsg.size() && text.size() < kEpsg.size() + 7 &&
+         text.find_first_not_of("0123456789", kEpsg.size()) == std::string::npos;
+}
+
+// Nothing, after a report, where the value is none.
+std::optional<std::string> ReadVertical(const Json& value, const Place& place) {
+  const std::string text = value.is_string() ? value.get<std::string>() : "";
+  if (IsVerticalName(text)) return text;
+  if (IsGrid(text) && !HasControlCharacter(text)) return place.Resolve(text);
+  place.Expected(kVerticalExpected);
+  return std::nullopt;
+}
+
+std::optional<NodataConfig> ReadNodata(const Json& value, const Place& place) {
+  if (value == "auto") return NodataConfig{};
+  NodataConfig nodata{false, {}};
+  if (value == "declared") return nodata;
+  const Json list = value.is_array() ? value : Json::array({value});
+  for (const Json& number : list) {
+    if (!number.is_number()) {
+      place.Expected(kNodataExpected);
+      return std::nullopt;
+    }
+    nodata.values.push_back(number.get<double>());
+  }
+  return nodata;
+}
+
+Json WriteNodata(const NodataConfig& nodata) {
+  if (nodata.detect) return "auto";
+  if (nodata.values.empty()) return "declared";
+  if (nodata.values.size() == 1) return NumberOut(nodata.values.front());
+  Json list = Json::array();
+  for (const double value : nodata.values) list.push_back(NumberOut(value));
+  return list;
+}
+
+Codec<SourceConfig> SourcePath() {
+  return {[](const Json& value, const Place& place, SourceConfig& source) {
+            if (!value.is_string() || value.get_ref<const std::string&>().empty()) {
+              return place.Expected("a path, a glob or a folder");
+            }
+            source.written = value.get<std::string>();
+          },
+          [](const SourceConfig& source) { return Json(source.written); }, nullptr, Json::parse(kNonEmptyText)};
+}
+
+constexpr const char* kVerticalSchema = R"({
+  "anyOf": [
+    {"enum": ["crs", "unknown", "ellipsoid", "egm96", "egm2008"]},
+    {"type": "string", "pattern": "^EPSG:[0-9]{1,6}$"},
+    {"type": "string", "pattern": "^[^\\u0000-\\u001f\\u007f]*\\.(gtx|tif|tiff)$"}
+  ]
+})";
+constexpr const char* kNodataSchema = R"({
+  "anyOf": [{"enum": ["auto", "declared"]}, {"type": "number"}, {"type": "array", "items": {"type": "number"}}]
+})";
+
+Codec<SourceConfig> SourceVertical() {
+  return {
+      [](const Json& value, const Place& place, SourceConfig& source) { source.vertical = ReadVertical(value, place); },
+      [](const SourceConfig& source) { return source.vertical ? Json(*source.vertical) : Json(); }, nullptr,
+      Json::parse(kVerticalSchema)};
+}
+
+Codec<SourceConfig> SourceNodata() {
+  return {[](const Json& value, const Place& place, SourceConfig& source) { source.nodata = ReadNodata(value, place); },
+          [](const SourceConfig& source) { return source.nodata ? WriteNodata(*source.nodata) : Json(); }, nullptr,
+          Json::parse(kNodataSchema)};
+}
+
+void ReadSource(const Json& value, const Place& place, DatasetConfig& dataset) {
+  SourceConfig source;
+  const bool is_object = value.is_object();
+  if (!is_object) {
+    SourcePath().read(value, place, source);
+  } else {
+    ReadObject(value, place, SourceOptionTable(), source);
+  }
+  if (source.written.empty()) return;
+  Result<SourceConfig> expanded = ExpandSource(source.written, place.directory());
+  if (!expanded) {
+    return (is_object ? place.At("path") : place)
+        .Fail(expanded.error().message + "; correct the path, which counts from " + place.directory().string());
+  }
+  expanded->vertical = std::move(source.vertical);
+  expanded->nodata = std::move(source.nodata);
+  dataset.sources.push_back(*std::move(expanded));
+}
+
+Json SourcesSchema() {
+  Json schema = ListOf({{"anyOf", Json::array({Json::parse(kNonEmptyText), ObjectSchema(SourceOptionTable())})}});
+  schema["minItems"] = 1;
+  return schema;
+}
+
+}  // namespace
+
+const std::vector<Option<SourceConfig>>& SourceOptionTable() {
+  static const std::vector<Option<SourceConfig>> table = {
+      {.key = "path",
+       .value = "PATH",
+       .help = "A file, a glob or a folder",
+       .codec = SourcePath(),
+       .missing = ": a path, a glob or a folder"},
+      {.key = "vertical",
+       .value = "DATUM",
+       .help = "What the heights of these files count from; by default as in the dataset",
+       .codec = SourceVertical()},
+      {.key = "nodata",
+       .value = "VALUE",
+       .help = "Which of their samples are voids; by default as in the dataset",
+       .codec = SourceNodata()},
+  };
+  return table;
+}
+
+Codec<DatasetConfig> SourcesCodec() {
+  return {[](const Json& value, const Place& place, DatasetConfig& dataset) {
+            if (!value.is_array() || value.empty()) {
+              return place.Expected("a list of paths such as [\"lidar/*.tif\", \"base.tif\"]");
+            }
+            for (std::size_t i = 0; i < value.size(); ++i) ReadSource(value[i], place.At(i), dataset);
+          },
+          [](const DatasetConfig& dataset) {
+            Json list = Json::array();
+            for (const SourceConfig& source : dataset.sources) {
+              const bool is_plain = !source.vertical && !source.nodata;
+              list.push_back(is_plain ? Json(source.written) : WriteObject(source, SourceOptionTable()));
+            }
+            return list;
+          },
+          nullptr, SourcesSchema()};
+}
+
+Codec<DatasetConfig> VerticalCodec() {
+  return {[](const Json& value, const Place& place, DatasetConfig& dataset) {
+            if (auto vertical = ReadVertical(value, place)) dataset.vertical = *std::move(vertical);
+          },
+          [](const DatasetConfig& dataset) { return Json(dataset.vertical); }, TextToJson,
+          Json::parse(kVerticalSchema)};
+}
+
+Codec<DatasetConfig> NodataCodec() {
+  return {[](const Json& value, const Place& place, DatasetConfig& dataset) {
+            if (auto nodata = ReadNodata(value, place)) dataset.nodata = *std::move(nodata);
+          },
+          [](const DatasetConfig& dataset) { return WriteNodata(dataset.nodata); }, NumberToJson,
+          Json::parse(kNodataSchema)};
+}
+
+Codec<Config> TextList(std::vector<std::string> Config::*member, const char* expected, bool is_path) {
+  Json text_schema = Json::parse(kNonEmptyText);
+  text_schema["pattern"] = kOneLinePattern;
+  Json schema = {{"anyOf", Json::array({text_schema, ListOf(text_schema)})}};
+  return {[=](const Json& value, const Place& place, Config& config) {
+            std::vector<std::string> texts;
+            for (const Json& item : value.is_array() ? value : Json::array({value})) {
+              if (!item.is_string() || item.get_ref<const std::string&>().empty() ||
+                  HasControlCharacter(item.get<std::string>())) {
+                return place.Expected(expected);
+              }
+              const auto text = item.get<std::string>();
+              texts.push_back(is_path ? place.Resolve(text) : text);
+            }
+            config.*member = std::move(texts);
+          },
+          [=](const Config& config) { return (config.*member).empty() ? Json() : Json(config.*member); },
+          [](const std::string& text) {
+            Json list = Json::array();
+            for (std::size_t start = 0; start <= text.size();) {
+              const std::size_t comma = std::min(text.find(',', start), text.size());
+              list.push_back(text.substr(start, comma - start));
+              start = comma + 1;
+            }
+            return list;
+          },
+          std::move(schema)};
+}
+
+}  // namespace terrace::config

@@ -1,0 +1,124 @@
+#include "server/cli/common/open_dataset.h"
+
+#include <fmt/format.h>
+#include <xxhash.h>
+
+#include <filesystem>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+namespace terrace::cli {
+namespace {
+
+// What a source states itself comes before what its dataset states.
+dem::SourceOptions SourceOptionsOf(const config::DatasetConfig& dataset, const config::SourceConfig& source) {
+  const config::NodataConfig nodata = source.nodata.value_or(dataset.nodata);
+  dem::SourceOptions options;
+  options.vertical = source.vertical.value_or(dataset.vertical);
+  options.find_voids = nodata.detect;
+  options.nodata = nodata.values;
+  return options;
+}
+
+// All files of the sources, each entry one rank.
+std::vector<dem::DemFile> FilesOf(const config::DatasetConfig& dataset) {
+  const std::vector<config::SourceConfig>& sources = dataset.sources;
+  std::vector<dem::DemFile> files;
+  for (std::size_t rank = 0; rank < sources.size(); ++rank) {
+    for (const std::string& file : sources[rank].files) {
+      files.push_back({file, static_cast<int>(rank), sources[rank].is_folder, SourceOptionsOf(dataset, sources[rank])});
+    }
+  }
+  return files;
+}
+
+Result<tiler::WaterRules> OpenWater(const config::WaterConfig& wanted, const dem::GeoBounds& bounds) {
+  tiler::WaterRules water;
+  water.sea_level_m = wanted.sea_level;
+  if (wanted.mask.empty()) return water;
+  auto mask = dem::WaterRaster::Open(wanted.mask, bounds);
+  if (!mask) {
+    std::error_code unreadable;
+    const bool exists = std::filesystem::exists(wanted.mask, unreadable);
+    return MakeError(mask.error().code, "water mask {}{}", mask.error().message,
+                     exists ? "" : ", or for a sea level a number of metres");
+  }
+  water.mask = *std::move(mask);
+  return water;
+}
+
+Result<tiler::ImageryRules> OpenImagery(const config::ImageryConfig& wanted, const dem::GeoBounds& bounds) {
+  tiler::ImageryRules imagery;
+  if (wanted.image.empty()) return imagery;
+  auto image = dem::Imagery::Open(wanted.image, bounds);
+  if (!image) return MakeError(image.error().code, "imagery {}", image.error().message);
+  imagery.image = *std::move(image);
+  imagery.texture = wanted.texture;
+  imagery.side = wanted.size;
+  imagery.quality = wanted.quality;
+  imagery.attribution = wanted.attribution;
+  return imagery;
+}
+
+// Changes when the source, a layer, or an option that changes bytes does. The files' identity is in the fingerprints.
+std::uint64_t GenerationOf(const config::DatasetConfig& wanted, const tiler::Dataset& dataset,
+                           const std::string& version) {
+  const tiler::WaterRules& water = dataset.water;
+  const tiler::ImageryRules& imagery = dataset.imagery;
+  const std::string text =
+      fmt::format("{} {} {} {} {} {} {} {} {} {} {} {} {} {}:{} {}:{}", version, dataset.source->fingerprint(),
+                  dataset.error_fraction, static_cast<int>(dataset.rules.criterion), dataset.rules.compact,
+                  wanted.draco_speed, wanted.draco_normal_bits, water.mask ? water.mask->fingerprint() : 0,
+                  water.sea_level_m ? fmt::format("{}", *water.sea_level_m) : "none", dataset.metadata_levels,
+                  imagery.image ? imagery.image->fingerprint() : 0, imagery.side, imagery.quality,
+                  imagery.attribution.size(), imagery.attribution, dataset.attribution.size(), dataset.attribution);
+  return XXH3_64bits(text.data(), text.size());
+}
+
+}  // namespace
+
+Result<std::unique_ptr<dem::DemSource>> OpenSource(const config::DatasetConfig& wanted, const std::string& cache_dir,
+                                                   const std::function<void(double)>& progress, std::stop_token stop,
+                                                   std::function<void(const Error&)> fault) {
+  dem::DemOptions options;
+  options.error_fraction = wanted.error_fraction;
+  options.finest_error = wanted.finest_error;
+  options.floor = wanted.floor;
+  options.max_void_gap = wanted.max_void_gap;
+  options.voids = wanted.voids;
+  options.cache_dir = cache_dir;
+  options.feather = wanted.feather;
+  options.progress = progress;
+  options.stop = std::move(stop);
+  options.fault = std::move(fault);
+  return dem::DemSource::Open(FilesOf(wanted), options);
+}
+
+Result<tiler::Dataset> OpenDataset(const config::DatasetConfig& wanted, const std::string& cache_dir,
+                                   const std::string& version, const std::function<void(double)>& progress,
+                                   std::stop_token stop) {
+  auto source = OpenSource(wanted, cache_dir, progress, std::move(stop));
+  if (!source) return tl::unexpected(source.error());
+  const dem::GeoBounds bounds = (*source)->info().bounds;
+  auto water = OpenWater(wanted.water, bounds);
+  if (!water) return tl::unexpected(water.error());
+  auto imagery = OpenImagery(wanted.imagery, bounds);
+  if (!imagery) return tl::unexpected(imagery.error());
+  tiler::Dataset dataset;
+  dataset.name = wanted.name;
+  dataset.attribution = wanted.attribution;
+  dataset.error_fraction = wanted.error_fraction;
+  dataset.rules = {wanted.criterion, wanted.compact};
+  dataset.glb.compression = wanted.glb_compression;
+  dataset.glb.draco = {wanted.draco_speed, wanted.draco_normal_bits};
+  dataset.glb.generator = "terrace " + version;
+  dataset.source = *std::move(source);
+  dataset.water = *std::move(water);
+  dataset.imagery = *std::move(imagery);
+  dataset.metadata_levels = wanted.metadata_availability;
+  dataset.generation = GenerationOf(wanted, dataset, version);
+  return dataset;
+}
+
+}  // namespace terrace::cli

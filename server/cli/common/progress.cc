@@ -1,0 +1,69 @@
+#include "server/cli/common/progress.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <string>
+#include <utility>
+
+namespace terrace::cli {
+
+using Clock = std::chrono::steady_clock;
+
+namespace {
+
+std::string Grouped(std::size_t number) {
+  std::string text = std::to_string(number);
+  for (auto at = static_cast<std::ptrdiff_t>(text.size()) - 3; at > 0; at -= 3) {
+    text.insert(static_cast<std::size_t>(at), ",");
+  }
+  return text;
+}
+
+}  // namespace
+
+Progress::Progress(std::string what, std::size_t count)
+    : what_(std::move(what)),
+      count_(count),
+      terminal_(isatty(STDERR_FILENO) != 0),
+      start_(Clock::now()),
+      last_(start_) {}
+
+Progress::~Progress() {
+  if (shown_ && terminal_) std::fputs("\r\033[K", stderr);
+}
+
+// By the pace since the first share that was told: work that was done in an earlier run took no time in this one.
+std::string Progress::TimeLeft(Clock::time_point now) const {
+  const double seconds = std::chrono::duration<double>(now - start_).count();
+  if (!(share_ > first_share_)) return {};
+  const double left = seconds * (1 - share_) / (share_ - first_share_);
+  if (left < 1) return {};
+  if (left < 60) return ", " + std::to_string(std::lround(left)) + " s left";
+  if (left < 90 * 60) return ", " + std::to_string(std::lround(left / 60)) + " min left";
+  return ", " + std::to_string(std::lround(left / 3600)) + " h left";
+}
+
+void Progress::Update(double share) {
+  if (share_ == 0) first_share_ = share;
+  share_ = std::max(share_, share);
+  const Clock::time_point now = Clock::now();
+  const auto pause = std::chrono::milliseconds(!terminal_ ? 10'000 : shown_ ? 100 : 1'000);
+  if (now - last_ < pause) return;
+  const std::string done =
+      count_ > 1 ? Grouped(static_cast<std::size_t>(share_ * static_cast<double>(count_))) + " of " + Grouped(count_)
+                 : std::to_string(std::lround(share_ * 100)) + " %";
+  std::fprintf(stderr, terminal_ ? "\r\033[Kterrace: %s %s%s" : "terrace: %s %s%s\n", what_.c_str(), done.c_str(),
+               TimeLeft(now).c_str());
+  std::fflush(stderr);
+  shown_ = true;
+  last_ = now;
+}
+
+std::function<void(double)> Progress::Callback() {
+  return [this](double share) { Update(share); };
+}
+
+}  // namespace terrace::cli

@@ -1,0 +1,61 @@
+#include "server/cli/common/source_files.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <system_error>
+
+#include "engine/dem/gdal/source_policy.h"
+
+namespace terrace::cli {
+
+std::size_t FileCount(const std::vector<config::SourceConfig>& sources) {
+  std::size_t count = 0;
+  for (const config::SourceConfig& source : sources) count += source.files.size();
+  return count;
+}
+
+std::string NameOf(const std::vector<config::SourceConfig>& sources) {
+  if (sources.size() == 1) return sources.front().written;
+  return fmt::format("{} and {} more source{}", sources.front().written, sources.size() - 1,
+                     sources.size() == 2 ? "" : "s");
+}
+
+Result<void> TryReading(const config::DatasetConfig& dataset) {
+  const auto read = [&](const std::string& path, const char* remedy) -> Result<void> {
+    // Other names are GDAL's to resolve.
+    if (!path.starts_with('/') || path.starts_with("/vsi") || ::access(path.c_str(), R_OK) == 0) return {};
+    return MakeError(ErrorCode::kNotFound, "dataset {}: {}: {}; give the path of a raster file on this machine{}",
+                     dataset.name, path, std::generic_category().message(errno), remedy);
+  };
+  for (const config::SourceConfig& source : dataset.sources) {
+    for (const std::string& file : source.files) {
+      if (Result<void> readable = read(file, ""); !readable) return readable;
+    }
+  }
+  if (Result<void> readable = read(dataset.imagery.image, ""); !readable) return readable;
+  return read(dataset.water.mask, ", or for a sea level a number of metres");
+}
+
+Result<void> TryPolicy(const config::DatasetConfig& dataset) {
+  const auto checked = [&](const Result<void>& allowed) -> Result<void> {
+    if (allowed) return {};
+    return MakeError(allowed.error().code, "dataset {}: {}", dataset.name, allowed.error().message);
+  };
+  for (const config::SourceConfig& source : dataset.sources) {
+    for (const std::string& file : source.files) {
+      if (source.is_folder && !dem::IsOneLine(file)) continue;  // left out, and told
+      // What a folder has besides rasters is left out when it is opened, whatever it is.
+      const Result<void> allowed = source.is_folder ? dem::CheckPlainFile(file) : dem::CheckSourceName(file);
+      if (!allowed) return checked(allowed);
+    }
+  }
+  for (const std::string* layer : {&dataset.imagery.image, &dataset.water.mask}) {
+    if (layer->empty()) continue;
+    if (const Result<void> allowed = dem::CheckSourceName(*layer); !allowed) return checked(allowed);
+  }
+  return {};
+}
+
+}  // namespace terrace::cli

@@ -1,0 +1,259 @@
+// terrace info: what a raster holds, how deep it can be served, and what its owner should mend.
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <system_error>
+#include <vector>
+
+#include "config/config.h"
+#include "config/options/options.h"
+#include "config/parse.h"
+#include "engine/dem/dem_source.h"
+#include "engine/dem/gdal/source_policy.h"
+#include "engine/geo/error_ladder.h"
+#include "server/cli/common/command.h"
+#include "server/cli/common/fail.h"
+#include "server/cli/info/mosaic_info.h"
+#include "server/cli/common/open_dataset.h"
+#include "server/cli/common/option_flags.h"
+#include "server/cli/common/progress.h"
+#include "server/cli/common/source_files.h"
+#include "server/cli/common/try_folder.h"
+
+namespace terrace::cli {
+namespace {
+
+// Averages of half, a quarter .. of the samples take a third of them, in floats.
+constexpr double kAveragesBytesPerSample = 4.0 / 3;
+
+std::string NoOverviewsAdvice(const dem::RasterInfo& info) {
+  if (info.prepared) return "no overviews: their place is taken by averages in the cache folder";
+  if (!info.overviews_unused.empty()) {
+    return fmt::format(
+        "overviews not used: {}; or serve with a cache_dir: averages are then prepared there once, about {:.0f} MB in "
+        "about {:.0f} s",
+        info.overviews_unused, std::ceil(static_cast<double>(info.valid_samples) * kAveragesBytesPerSample / 1e6),
+        std::ceil(info.seconds_to_open));
+  }
+  return fmt::format(
+      "no overviews: shallow tiles read the whole raster; run 'gdaladdo -r average {}', or serve with a cache_dir: its "
+      "averages are then prepared there once, about {:.0f} MB in about {:.0f} s",
+      info.path, std::ceil(static_cast<double>(info.valid_samples) * kAveragesBytesPerSample / 1e6),
+      std::ceil(info.seconds_to_open));
+}
+
+// What a user should do about this raster; empty when nothing.
+std::vector<std::string> AdviceFor(const dem::RasterInfo& info, double floor) {
+  std::vector<std::string> advice;
+  if (info.needs_averages) {
+    advice.push_back(NoOverviewsAdvice(info));
+  } else if (!info.overviews_unused.empty()) {
+    advice.push_back("overviews not used: " + info.overviews_unused);
+  }
+  if (info.counts_from.empty()) {
+    advice.push_back(
+        "no vertical datum stated: heights are taken as metres above the WGS 84 ellipsoid as they are; heights above "
+        "mean sea level will be off by the geoid, up to 100 m: say so with --vertical egm96, or another");
+  }
+  if (!info.knows_height_unit) {
+    advice.push_back(
+        fmt::format("height unit \"{}\" is not known, heights are taken as metres: state metres a unit with "
+                    "`gdal_translate -a_scale FACTOR in out`",
+                    info.height_unit));
+  }
+  if (!info.heights_doubted.empty()) advice.push_back(info.heights_doubted);
+  if (info.driver == "VRT") {
+    advice.push_back(
+        "a VRT, which names other files: 'terrace serve' takes it where allowed_drivers of its configuration lists "
+        "\"VRT\"");
+  }
+  if (!info.picture_part.empty()) {
+    advice.push_back(fmt::format(
+        "band 1 says that it is the \"{}\" of a picture: its values are taken for heights, which they hardly "
+        "are; serve the elevation model that belongs to it",
+        info.picture_part));
+  }
+  if (!info.found_voids.empty()) {
+    advice.push_back(
+        fmt::format("undeclared voids: {}; mend the file, or state `nodata` in the configuration", info.found_voids));
+  }
+  if (info.void_samples > 0) {
+    advice.push_back(
+        fmt::format("voids: those with data all around them are filled from their edges, those that touch the rim of "
+                    "the raster show the floor of {:g} m",
+                    floor));
+  }
+  return advice;
+}
+
+std::string Percent(std::uint64_t part, std::uint64_t whole) {
+  return fmt::format("{:.2g} %", whole > 0 ? 100.0 * static_cast<double>(part) / static_cast<double>(whole) : 0.0);
+}
+
+void PrintText(const dem::DemInfo& dataset) {
+  const dem::RasterInfo& info = dataset.sources.front();
+  const auto line = [](const char* what, const std::string& value) { fmt::print("  {:<14}{}\n", what, value); };
+  fmt::print("{}\n", info.path);
+  line("raster", fmt::format("{} x {}, {}, {}", info.width, info.height, info.data_type, info.driver));
+  line("CRS", info.crs);
+  line("pixel", fmt::format("{:g} x {:g} {}, {:.3g} m on the ground", info.pixel_width, info.pixel_height,
+                            info.pixel_unit, info.spacing_m));
+  line("bounds", fmt::format("west {:.6g}, south {:.6g}, east {:.6g}, north {:.6g}", info.bounds.west,
+                             info.bounds.south, info.bounds.east, info.bounds.north));
+  line("heights", fmt::format("{:g} to {:g} m{}", info.heights.min, info.heights.max,
+                              info.height_unit.empty() ? "" : ", unit " + info.height_unit));
+  line("datum", info.counts_from.empty() ? "not stated" : info.counts_from);
+  if (!info.vertical_operation.empty()) {
+    line("converted", fmt::format("by {}: {:.2f} to {:.2f} m above the ellipsoid, or less", info.vertical_operation,
+                                  info.ellipsoidal.min, info.ellipsoidal.max));
+  }
+  line("voids",
+       info.void_samples == 0
+           ? "none"
+           : fmt::format("{} samples, {}; {} of them with data all around", info.void_samples,
+                         Percent(info.void_samples, info.valid_samples + info.void_samples), info.hole_samples));
+  line("overviews",
+       info.overview_factors.empty() ? "none" : fmt::format("1/{}", fmt::join(info.overview_factors, ", 1/")));
+  line("floor", fmt::format("{:g} m outside the raster and in voids that touch its rim", dataset.floor));
+  line("levels", fmt::format("0 to {}, default error {:.3g} m at the deepest", dataset.max_level,
+                             geo::DefaultError(dataset.max_level)));
+  if (!info.transform.empty()) line("transform", info.transform);
+  for (const std::string& advice : AdviceFor(info, dataset.floor)) line("note", advice);
+}
+
+nlohmann::json ToJson(const dem::DemInfo& dataset) {
+  const dem::RasterInfo& info = dataset.sources.front();
+  return {{"path", info.path},
+          {"driver", info.driver},
+          {"width", info.width},
+          {"height", info.height},
+          {"data_type", info.data_type},
+          {"crs", info.crs},
+          {"vertical_datum", info.vertical_datum},
+          {"counts_from", info.counts_from},
+          {"vertical_operation", info.vertical_operation},
+          {"ellipsoidal_heights", {{"min", info.ellipsoidal.min}, {"max", info.ellipsoidal.max}}},
+          {"found_voids", info.found_voids},
+          {"pixel", {{"width", info.pixel_width}, {"height", info.pixel_height}, {"unit", info.pixel_unit}}},
+          {"spacing_m", info.spacing_m},
+          {"bounds", {info.bounds.west, info.bounds.south, info.bounds.east, info.bounds.north}},
+          {"heights", {{"min", info.heights.min}, {"max", info.heights.max}}},
+          {"valid_samples", info.valid_samples},
+          {"void_samples", info.void_samples},
+          {"hole_samples", info.hole_samples},
+          {"overviews", info.overview_factors},
+          {"floor", dataset.floor},
+          {"levels", {0, dataset.max_level}},
+          {"transform", info.transform},
+          {"advice", AdviceFor(info, dataset.floor)}};
+}
+
+// Each DEM is a dataset, or all of them are one.
+std::vector<std::vector<config::SourceConfig>> Datasets(const std::vector<std::string>& dems, bool mosaic,
+                                                        int& exit_code) {
+  std::vector<std::vector<config::SourceConfig>> datasets;
+  for (const std::string& dem : dems) {
+    Result<config::SourceConfig> source = config::SourceAt(dem);
+    if (!source) {
+      std::fprintf(stderr, "terrace: %s\n", source.error().message.c_str());
+      exit_code = kExitFailure;
+    } else if (mosaic && !datasets.empty()) {
+      datasets.front().push_back(*std::move(source));
+    } else {
+      datasets.push_back({*std::move(source)});
+    }
+  }
+  return datasets;
+}
+
+struct InfoArguments {
+  std::vector<std::string> dems;
+  std::map<std::string, std::string> dataset_flags;  // by option key
+  std::string cache_dir;
+  bool json = false, mosaic = false;
+};
+
+int Info(const InfoArguments& arguments) {
+  spdlog::set_level(spdlog::level::err);  // what opening logs is printed below
+  const auto& [dems, dataset_flags, cache_dir, json, mosaic] = arguments;
+  config::DatasetConfig flags;
+  std::vector<config::ConfigError> wrong;
+  std::error_code unnamed;
+  const std::filesystem::path directory = std::filesystem::current_path(unnamed);
+  for (const auto& [key, text] : dataset_flags) config::SetDatasetOption(key, text, directory, flags, wrong);
+  for (const config::ConfigError& error : wrong) Fail(error.path + ": " + error.message, kExitUsage);
+  if (!wrong.empty()) return kExitUsage;
+  int exit_code = dem::AllowVrts() ? kExitOk : kExitFailure;
+  if (!cache_dir.empty()) {
+    if (const auto folder = TryFolder(cache_dir); !folder) {
+      std::fprintf(stderr, "terrace: --cache-dir: %s; what is learnt anew is not kept\n",
+                   folder.error().message.c_str());
+    }
+  }
+  nlohmann::json all = nlohmann::json::array();
+  for (const auto& sources : Datasets(dems, mosaic, exit_code)) {
+    const std::string name = NameOf(sources);
+    Progress progress((cache_dir.empty() ? "reading " : "preparing ") + name, FileCount(sources));
+    config::DatasetConfig dataset = flags;
+    dataset.sources = sources;
+    std::vector<Error> faults;  // of files, all of them
+    const auto source = OpenSource(dataset, cache_dir, progress.Callback(), {},
+                                   [&faults](const Error& fault) { faults.push_back(fault); });
+    if (!source) {
+      if (faults.empty()) faults.push_back(source.error());
+      for (const Error& fault : faults) exit_code = Fail(fault.message, kExitFailure);
+      continue;
+    }
+    const dem::DemInfo& info = (*source)->info();
+    const bool is_one = info.sources.size() == 1;
+    if (json) {
+      all.push_back(is_one ? ToJson(info) : nlohmann::json::parse(MosaicJson(name, info)));
+      all.back()["left_out"] = info.left_out;
+    } else {
+      is_one ? PrintText(info) : PrintMosaic(name, info);
+      for (const std::string& file : info.left_out) fmt::print("  {:<14}{}\n", "left out", file);
+    }
+  }
+  if (json) fmt::print("{}\n", all.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
+  return exit_code;
+}
+
+}  // namespace
+
+void AddInfo(CLI::App& app, int& exit_code) {
+  auto arguments = std::make_shared<InfoArguments>();
+  CLI::App* command =
+      app.add_subcommand("info", "Tells what rasters hold, the levels they can serve, and what to mend");
+  command->footer(
+      "Examples:\n"
+      "  terrace info alps.tif andes.tif\n"
+      "  terrace info alps.tif --json\n"
+      "  terrace info --mosaic lidar/ base.tif\n\n"
+      "A raster that cannot be served is told on stderr with the reason and the remedy; the others are\n"
+      "still shown, but for those of the same folder or mosaic: with it none of them can be served.");
+  command->add_option("DEM", arguments->dems, "Rasters that GDAL can read, or folders of them")->required();
+  command->add_flag("--json", arguments->json, "One JSON array instead of text");
+  command->add_flag("--mosaic", arguments->mosaic, "Takes all of them for one dataset, the first counting most");
+  std::vector<config::OptionInfo> about_heights = config::DatasetOptions();  // the others are about serving
+  about_heights.erase(
+      std::remove_if(about_heights.begin(), about_heights.end(),
+                     [](const auto& option) { return option.key != "vertical" && option.key != "nodata"; }),
+      about_heights.end());
+  AddFlags(*command, about_heights, "Heights, as in a configuration", arguments->dataset_flags);
+  command
+      ->add_option("--cache-dir", arguments->cache_dir,
+                   "Keeps what is learnt in this folder, for 'terrace serve --cache-dir'")
+      ->type_name("DIR");
+  command->callback([arguments, &exit_code] { exit_code = FinishOutput(Info(*arguments)); });
+}
+
+}  // namespace terrace::cli

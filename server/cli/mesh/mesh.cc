@@ -1,0 +1,280 @@
+// terrace mesh: one TIN of a whole raster, to a file.
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+#include <sys/resource.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <cstdio>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "engine/dem/dem_source.h"
+#include "engine/dem/gdal/source_policy.h"
+#include "engine/dem/sources/read_raster.h"
+#include "engine/tin/decimate/drop_pass.h"
+#include "engine/tin/extended/field_cut.h"
+#include "engine/tin/greedy.h"
+#include "engine/tin/mesh_error.h"
+#include "proto/gltf/mesh_file.h"
+#include "server/cli/common/command.h"
+#include "server/cli/common/fail.h"
+#include "server/cli/mesh/mesh_blocks.h"
+#include "server/cli/mesh/mesh_color.h"
+#include "server/cli/mesh/mesh_input.h"
+#include "server/cli/mesh/mesh_output.h"
+#include "server/cli/mesh/mesh_placement.h"
+#include "server/cli/common/progress.h"
+
+namespace terrace::cli {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr const char* kDataDependent = "data-dependent";
+
+// Names of --measure, in the order of tin::FitMeasure.
+const std::vector<std::string> kMeasures = {"sum-max", "sum-squares", "max-max", "normals"};
+
+struct MeshArguments {
+  std::string dem, nodata = "auto", out, criterion = "delaunay", measure, coordinates;
+  double max_error = -1, rms = -1, qthresh = -1;
+  std::size_t points = 0;
+  int threads = 1;
+  bool compact = false, json = false;
+  ColorArguments color;
+};
+
+// What is wrong with the arguments, or nothing.
+std::string Complain(const MeshArguments& arguments) {
+  const int goals = (arguments.max_error >= 0) + (arguments.points > 0) + (arguments.rms >= 0);
+  if (goals != 1) return "mesh needs exactly one goal: --max-error METRES, --points N or --rms METRES";
+  if (arguments.criterion != kDataDependent && (!arguments.measure.empty() || arguments.qthresh >= 0))
+    return "--measure and --qthresh belong to --criterion data-dependent";
+  if (arguments.compact && arguments.max_error < 0)
+    return "--compact drops what an error bound does not need; give that bound with --max-error METRES";
+  if (arguments.color.is_image && arguments.nodata != "auto")
+    return "--nodata is about heights; leave it out with --image";
+  if (arguments.color.IsUsed() && arguments.rms >= 0)
+    return "--rms is a goal for heights alone; with colours use --max-error or --points";
+  if (arguments.color.IsUsed() && arguments.compact)
+    return "--compact drops vertices by their heights alone; leave it out with colours";
+  if (arguments.color.IsUsed() && arguments.criterion == kDataDependent)
+    return "--criterion data-dependent joins triangles by their heights alone; leave it out with colours";
+  return {};
+}
+
+tin::GreedyOptions OptionsOf(const MeshArguments& arguments) {
+  tin::GreedyOptions options;
+  if (arguments.criterion != kDataDependent) return options;
+  options.criterion = tin::Criterion::kDataDependent;
+  const auto measure = std::find(kMeasures.begin(), kMeasures.end(), arguments.measure);
+  if (measure != kMeasures.end()) {
+    options.data_dependent.measure = static_cast<tin::FitMeasure>(measure - kMeasures.begin());
+  }
+  if (arguments.qthresh >= 0) options.data_dependent.qthresh = arguments.qthresh;
+  return options;
+}
+
+// Runs towards the goal in steps, so that progress can be shown: the error falls about as 1 / vertices.
+void RunTo(const tin::GreedyGoal& goal, std::size_t samples, tin::GreedyTriangulation& greedy) {
+  Progress progress("meshing");
+  const std::size_t step = std::max<std::size_t>(10'000, samples / 200);
+  for (;;) {
+    tin::GreedyGoal part = goal;
+    part.max_points = std::min(goal.max_points, greedy.vertex_count() + step);
+    const std::size_t before = greedy.vertex_count();
+    greedy.Run(part);
+    if (greedy.vertex_count() < part.max_points || part.max_points == goal.max_points ||
+        greedy.vertex_count() == before)
+      return;
+    const double share = goal.max_points < samples
+                             ? static_cast<double>(greedy.vertex_count()) / static_cast<double>(goal.max_points)
+                             : std::min(1.0, goal.max_error / greedy.CurrentError());
+    progress.Update(share);
+  }
+}
+
+// Only an error can be asked of every block alone; the other goals are about the whole raster.
+tin::TinMesh Triangulate(const MeshArguments& arguments, const tin::HeightField& field) {
+  if (arguments.max_error >= 0) {
+    const tin::FieldCut cut = tin::FieldCut::For(field, arguments.max_error);
+    if (cut.size() > 1) return MeshBlocks(field, cut, arguments.max_error, OptionsOf(arguments), arguments.threads);
+  }
+  tin::GreedyGoal goal;
+  if (arguments.max_error >= 0) goal.max_error = arguments.max_error;
+  if (arguments.points > 0) goal.max_points = arguments.points;
+  if (arguments.rms >= 0) goal.rms_error = arguments.rms;
+  tin::GreedyTriangulation greedy(field, OptionsOf(arguments));
+  RunTo(goal, static_cast<std::size_t>(field.width()) * static_cast<std::size_t>(field.height()), greedy);
+  return greedy.Mesh();
+}
+
+void Print(const MeshArguments& arguments, const tin::HeightField& field, const tin::TinMesh& mesh,
+           const tin::MeshError& error, const MeshSeconds& seconds) {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  const std::size_t voids = VoidsOf(field, error.samples);
+  if (arguments.json) {
+    const nlohmann::ordered_json statistics = {
+        {"input", {{"path", arguments.dem}, {"width", field.width()}, {"height", field.height()}, {"voids", voids}}},
+        {"criterion", arguments.criterion},
+        {"compact", arguments.compact},
+        {"points", mesh.vertices.size()},
+        {"triangles", mesh.triangles.size()},
+        {"max_error", error.max},
+        {"rms_error", error.rms},
+        {"seconds", {{"read", seconds.read}, {"triangulate", seconds.triangulate}, {"write", seconds.write}}},
+        {"peak_rss_bytes", static_cast<std::int64_t>(usage.ru_maxrss) * 1024}};
+    fmt::print("{}\n", statistics.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
+    return;
+  }
+  fmt::print(
+      "{}: {} vertices, {} triangles of {} samples{}; largest error {:.4g} m, RMS {:.4g} m; read {:.2f} s, mesh {:.2f} "
+      "s, write {:.2f} s\n",
+      arguments.out, mesh.vertices.size(), mesh.triangles.size(), error.samples, TextOfVoids(voids), error.max,
+      error.rms, seconds.read, seconds.triangulate, seconds.write);
+}
+
+// Checks of arguments; what they say is read after the name of the option. Their own descriptions stay out of the help.
+CLI::Validator NumberFrom(double min, double max, const std::string& what) {
+  const auto check = [=](const std::string& text) {
+    double number = 0;
+    const bool valid = CLI::detail::lexical_cast(text, number) && number >= min && number <= max;
+    return valid ? std::string() : fmt::format("must be {}, not \"{}\"", what, text);
+  };
+  return CLI::Validator(check, "");
+}
+
+CLI::Validator Metres() { return NumberFrom(0, 1e6, "a number of metres from 0 to 1000000"); }
+
+CLI::Validator OneOf(const std::vector<std::string>& words) {
+  const auto check = [=](const std::string& text) {
+    const bool valid = std::find(words.begin(), words.end(), text) != words.end();
+    return valid ? std::string() : fmt::format("must be {}, not \"{}\"", fmt::join(words, " or "), text);
+  };
+  return CLI::Validator(check, "");
+}
+
+int Mesh(const MeshArguments& arguments) {
+  spdlog::set_level(spdlog::level::err);
+  if (const std::string complaint = Complain(arguments); !complaint.empty()) return Fail(complaint, kExitUsage);
+  if (const auto allowed = dem::AllowVrts(); !allowed) return Fail(allowed.error().message, kExitFailure);
+  if (arguments.color.IsUsed()) {
+    tin::ExtendedGoal goal;
+    if (arguments.max_error >= 0) goal.max_error = arguments.max_error;
+    if (arguments.points > 0) goal.max_points = arguments.points;
+    return MeshColored(
+        {arguments.dem, arguments.nodata, arguments.out, arguments.coordinates, goal, arguments.color, arguments.json});
+  }
+  Result<MeshOutput> output = MeshOutput::Open(arguments.out, {arguments.dem});
+  if (!output) {
+    const bool is_usage = output.error().code == ErrorCode::kInvalidArgument;
+    return Fail(output.error().message, is_usage ? kExitUsage : kExitFailure);
+  }
+
+  MeshSeconds seconds;
+  Clock::time_point start = Clock::now();
+  Result<dem::RasterHeights> raster = [&] {
+    Progress progress("reading " + arguments.dem);
+    return dem::ReadRaster(arguments.dem, ReadOptionsOf(arguments.nodata, progress.Callback()));
+  }();
+  if (!raster) return Fail(raster.error().message, kExitFailure);
+  WarnOf(arguments.dem, *raster, arguments.coordinates, arguments.out);
+  const auto placement =
+      PlacementOf(arguments.dem, raster->georeferenced, raster->geo_transform, arguments.coordinates);
+  if (!placement) return Fail(placement.error().message, kExitUsage);
+  const auto field = tin::HeightField::Make(raster->width, raster->height, std::move(raster->heights));
+  if (!field) return Fail(arguments.dem + ": " + field.error().message, kExitFailure);
+  seconds.read = SecondsSince(start);
+
+  start = Clock::now();
+  tin::TinMesh mesh = Triangulate(arguments, *field);
+  // Nobody stops it.
+  if (arguments.compact) mesh = *tin::DropVertices(*field, mesh, {.max_error = arguments.max_error});
+  seconds.triangulate = SecondsSince(start);
+
+  start = Clock::now();
+  const Result<void> written =
+      output->Write(VerticesOf(mesh, *field, *placement), TrianglesOf(mesh, *placement), placement->grid);
+  if (!written) return Fail(written.error().message, kExitFailure);
+  seconds.write = SecondsSince(start);
+  Print(arguments, *field, mesh, tin::MeasureError(*field, mesh), seconds);
+  TellOfUnused(arguments.dem, arguments.points, mesh.vertices.size());
+  return kExitOk;
+}
+
+}  // namespace
+
+void AddMesh(CLI::App& app, int& exit_code) {
+  auto arguments = std::make_shared<MeshArguments>();
+  CLI::App* command =
+      app.add_subcommand("mesh", "Meshes a whole raster with greedy insertion into one .obj, .ply or .glb file");
+  command->footer(
+      "Examples:\n"
+      "  terrace mesh alps.tif --out alps.obj --max-error 5\n"
+      "  terrace mesh alps.tif --out alps.glb --points 50000 --json\n"
+      "  terrace mesh alps.tif --out alps.glb --max-error 10 --color photo.tif\n"
+      "  terrace mesh photo.png --image --out photo.glb --points 4000\n\n"
+      "Errors are measured over every valid sample by a separate pass. Voids count for none, and triangles go on\n"
+      "across them: how many there are is told. Triangles are counter-clockwise in the file's own x and y.");
+  command->add_option("DEM", arguments->dem, "A raster that GDAL can read; a georeference is not needed")->required();
+  command->add_option("-o,--out", arguments->out, "The file to write; its extension is the format")
+      ->type_name("FILE")
+      ->required();
+  command->add_option("--max-error", arguments->max_error, "No sample is further off than this")
+      ->type_name("METRES")
+      ->check(Metres())
+      ->group("Goal, exactly one of");
+  command->add_option("--points", arguments->points, "Vertices, corners included")
+      ->type_name("N")
+      ->check(NumberFrom(4, 1e9, "a number from 4, the corners of the raster, on"))
+      ->group("Goal, exactly one of");
+  command->add_option("--rms", arguments->rms, "Root mean square error over all samples")
+      ->type_name("METRES")
+      ->check(Metres())
+      ->group("Goal, exactly one of");
+  AddNodataOption(*command, arguments->nodata);
+  command
+      ->add_option("--coordinates", arguments->coordinates,
+                   "pixel: x = column, y = row (from the top), z = height; crs: pixel centres in the raster's CRS "
+                   "(default where it has one)")
+      ->check(OneOf({"pixel", "crs"}))
+      ->type_name("pixel|crs");
+  command
+      ->add_option("--criterion", arguments->criterion,
+                   "How triangles are joined: delaunay, or data-dependent: fewer vertices for the same error, thinner "
+                   "triangles, about twice the time to mesh")
+      ->check(OneOf({"delaunay", kDataDependent}))
+      ->type_name("NAME")
+      ->capture_default_str();
+  command
+      ->add_option("--measure", arguments->measure,
+                   "What data-dependent triangles are compared by: sum-max (default), sum-squares, max-max or normals")
+      ->check(OneOf(kMeasures))
+      ->type_name("NAME");
+  command
+      ->add_option(
+          "--qthresh", arguments->qthresh,
+          "Data-dependent: 0 looks at the fit alone, 1 at the shape of triangles wherever it differs (default 0.5)")
+      ->check(NumberFrom(0, 1, "a number from 0 to 1"))
+      ->type_name("SHARE");
+  command->add_option("--threads", arguments->threads, "Threads to use at most; the mesh does not depend on it")
+      ->check(NumberFrom(1, 256, "a number from 1 to 256"))
+      ->type_name("N")
+      ->capture_default_str();
+  command->add_flag("--compact", arguments->compact,
+                    "Drops vertices that the bound does not need; with --max-error only");
+  AddColorOptions(*command, arguments->color);
+  command->add_flag("--json", arguments->json, "Statistics as JSON on stdout");
+  command->callback([arguments, &exit_code] { exit_code = FinishOutput(Mesh(*arguments)); });
+}
+
+}  // namespace terrace::cli

@@ -1,0 +1,212 @@
+#include "server/cli/mesh/mesh_color.h"
+
+#include <fmt/format.h>
+#include <sys/resource.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "engine/dem/image/raster_colors.h"
+#include "engine/dem/sources/read_raster.h"
+#include "engine/tin/extended/extended_error.h"
+#include "engine/tin/extended/extended_field.h"
+#include "proto/gltf/mesh_file.h"
+#include "server/cli/common/command.h"
+#include "server/cli/common/fail.h"
+#include "server/cli/mesh/mesh_input.h"
+#include "server/cli/mesh/mesh_output.h"
+#include "server/cli/mesh/mesh_placement.h"
+#include "server/cli/common/progress.h"
+
+namespace terrace::cli {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+struct Source {
+  tin::ExtendedField field;
+  bool georeferenced = false;
+  std::array<double, 6> geo_transform{};
+};
+
+Result<Source> MakeSource(const std::string& path, tin::HeightField heights, std::vector<dem::ColorSample> colors,
+                          double weight, bool georeferenced, const std::array<double, 6>& geo_transform) {
+  auto field = tin::ExtendedField::Make(std::move(heights), std::move(colors), weight);
+  if (!field) return MakeError(field.error().code, "{}: {}", path, field.error().message);
+  return Source{*std::move(field), georeferenced, geo_transform};
+}
+
+Result<Source> ReadDem(const ColoredMeshArguments& arguments) {
+  std::optional<Progress> progress(std::in_place, "reading " + arguments.raster + " and " + arguments.color.image);
+  auto raster = dem::ReadRaster(arguments.raster,
+                                ReadOptionsOf(arguments.nodata, [&](double share) { progress->Update(share / 2); }));
+  if (!raster) return tl::unexpected(raster.error());
+  auto colors = dem::ReadColors(arguments.color.image, arguments.raster, *raster,
+                                [&](double share) { progress->Update(0.5 + share / 2); });
+  if (!colors) return tl::unexpected(colors.error());
+  auto heights = tin::HeightField::Make(raster->width, raster->height, std::move(raster->heights));
+  if (!heights) return MakeError(heights.error().code, "{}: {}", arguments.raster, heights.error().message);
+  progress.reset();
+  WarnOf(arguments.raster, *raster, arguments.coordinates, arguments.out);
+  return MakeSource(arguments.color.image, *std::move(heights), *std::move(colors), arguments.color.weight,
+                    raster->georeferenced, raster->geo_transform);
+}
+
+// A flat field.
+Result<Source> ReadPicture(const ColoredMeshArguments& arguments) {
+  Progress progress("reading " + arguments.raster);
+  auto image = dem::ReadImage(arguments.raster, progress.Callback());
+  if (!image) return tl::unexpected(image.error());
+  auto heights = tin::HeightField::Make(image->width, image->height, std::vector<float>(image->colors.size(), 0.0F));
+  if (!heights) return MakeError(heights.error().code, "{}: {}", arguments.raster, heights.error().message);
+  return MakeSource(arguments.raster, *std::move(heights), std::move(image->colors), 1, image->georeferenced,
+                    image->geo_transform);
+}
+
+// An image without a place of its own is upright: y counts from the lowest row of pixels.
+Result<Placement> PlacementFor(const ColoredMeshArguments& arguments, const Source& source) {
+  auto placement = PlacementOf(arguments.raster, source.georeferenced, source.geo_transform, arguments.coordinates);
+  if (!placement || source.georeferenced || !arguments.color.is_image || !arguments.coordinates.empty())
+    return placement;
+  return Placement{0.5, {-0.5, 1, 0, source.field.heights().height() - 0.5, 0, -1}};
+}
+
+// In steps, so that progress can be shown: the error falls about as 1 / vertices.
+tin::ColoredMesh Triangulate(const tin::ExtendedField& field, const tin::ExtendedGoal& goal) {
+  constexpr std::size_t kStep = 10'000, kNoLimit = tin::ExtendedGoal{}.max_points;
+  Progress progress("meshing");
+  tin::ExtendedGreedy greedy(field);
+  tin::ExtendedGoal part = goal;
+  do {
+    part.max_points = std::min(goal.max_points, greedy.vertex_count() + kStep);
+    greedy.Run(part);
+    progress.Update(goal.max_points != kNoLimit
+                        ? static_cast<double>(greedy.vertex_count()) / static_cast<double>(goal.max_points)
+                        : std::min(1.0, goal.max_error / greedy.CurrentError()));
+  } while (greedy.vertex_count() == part.max_points && part.max_points != goal.max_points);
+  return greedy.Mesh();
+}
+
+nlohmann::ordered_json Statistics(const ColoredMeshArguments& arguments, const tin::ExtendedField& field,
+                                  const tin::ColoredMesh& mesh, const tin::ExtendedError& error,
+                                  const MeshSeconds& seconds) {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  const bool is_image = arguments.color.is_image;
+  return {{"input",
+           {{"path", arguments.raster},
+            {"width", field.width()},
+            {"height", field.height()},
+            {"voids", VoidsOf(field.heights(), error.height.samples)}}},
+          {"criterion", "delaunay"},
+          {"points", mesh.tin.vertices.size()},
+          {"triangles", mesh.tin.triangles.size()},
+          {"max_error", error.height.max},
+          {"rms_error", error.height.rms},
+          {"color",
+           {{"path", is_image ? arguments.raster : arguments.color.image},
+            {"weight", field.color_weight()},
+            {"max_combined_error", error.max_combined},
+            {"rms_error", error.color_rms},
+            {"samples", error.color_samples}}},
+          {"seconds", {{"read", seconds.read}, {"triangulate", seconds.triangulate}, {"write", seconds.write}}},
+          {"peak_rss_bytes", static_cast<std::int64_t>(usage.ru_maxrss) * 1024}};
+}
+
+void Print(const ColoredMeshArguments& arguments, const tin::ExtendedField& field, const tin::ColoredMesh& mesh,
+           const tin::ExtendedError& error, const MeshSeconds& seconds) {
+  if (arguments.json) {
+    fmt::print("{}\n", Statistics(arguments, field, mesh, error, seconds)
+                           .dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
+    return;
+  }
+  fmt::print("{}: {} vertices, {} triangles of {} samples{}; ", arguments.out, mesh.tin.vertices.size(),
+             mesh.tin.triangles.size(), error.height.samples,
+             TextOfVoids(VoidsOf(field.heights(), error.height.samples)));
+  if (arguments.color.is_image) {
+    fmt::print("largest error {:.4g} of the range of colours, RMS {:.4g}", error.max_combined, error.color_rms);
+  } else {
+    fmt::print("largest error {:.4g} m with colours, {:.4g} m of heights alone; RMS {:.4g} m, colours {:.4g}",
+               error.max_combined, error.height.max, error.height.rms, error.color_rms);
+  }
+  fmt::print("; read {:.2f} s, mesh {:.2f} s, write {:.2f} s\n", seconds.read, seconds.triangulate, seconds.write);
+}
+
+}  // namespace
+
+int MeshColored(const ColoredMeshArguments& arguments) {
+  std::vector<std::string> inputs = {arguments.raster};
+  if (!arguments.color.is_image) inputs.push_back(arguments.color.image);
+  Result<MeshOutput> output = MeshOutput::Open(arguments.out, inputs);
+  if (!output) {
+    const bool is_usage = output.error().code == ErrorCode::kInvalidArgument;
+    return Fail(output.error().message, is_usage ? kExitUsage : kExitFailure);
+  }
+
+  MeshSeconds seconds;
+  Clock::time_point start = Clock::now();
+  const Result<Source> source = arguments.color.is_image ? ReadPicture(arguments) : ReadDem(arguments);
+  if (!source) return Fail(source.error().message, kExitFailure);
+  const Result<Placement> placement = PlacementFor(arguments, *source);
+  if (!placement) return Fail(placement.error().message, kExitUsage);
+  seconds.read = SecondsSince(start);
+
+  start = Clock::now();
+  const tin::ColoredMesh mesh = Triangulate(source->field, arguments.goal);
+  seconds.triangulate = SecondsSince(start);
+
+  start = Clock::now();
+  const Result<void> written = output->Write(VerticesOf(mesh.tin, source->field.heights(), *placement),
+                                             TrianglesOf(mesh.tin, *placement), placement->grid, mesh.colors);
+  if (!written) return Fail(written.error().message, kExitFailure);
+  seconds.write = SecondsSince(start);
+  Print(arguments, source->field, mesh, tin::MeasureExtendedError(source->field, mesh), seconds);
+  if (arguments.goal.max_points != tin::ExtendedGoal{}.max_points) {
+    TellOfUnused(arguments.raster, arguments.goal.max_points, mesh.tin.vertices.size());
+  }
+  return kExitOk;
+}
+
+void AddColorOptions(CLI::App& command, ColorArguments& arguments) {
+  constexpr const char* kGroup = "Colours";
+  const auto is_weight = [](const std::string& text) {
+    double number = 0;
+    const bool valid = CLI::detail::lexical_cast(text, number) && number >= 0 && number <= 1;
+    return valid ? std::string() : fmt::format("must be a number from 0 to 1, not \"{}\"", text);
+  };
+  CLI::Option* const image =
+      command
+          .add_option(
+              "--color", arguments.image,
+              "An image that covers the DEM: grey, RGB, RGBA or a palette. Placed by its georeference, else pixel "
+              "by sample. Vertices get its colours, and triangles follow them")
+          ->type_name("IMAGE")
+          ->group(kGroup);
+  command
+      .add_option(
+          "--color-weight", arguments.weight,
+          "W: a sample that is dz metres and dr, dg, db of the range of colours off has the error "
+          "(1 - W) dz + W M/3 (dr + dg + db), M the range of the heights. So --max-error E keeps heights within "
+          "E / (1 - W); with W = 0 triangles follow heights alone")
+      ->check(CLI::Validator(is_weight, ""))
+      ->type_name("W")
+      ->capture_default_str()
+      ->needs(image)
+      ->group(kGroup);
+  command
+      .add_flag(
+          "--image", arguments.is_image,
+          "DEM is an image: its colours are meshed on flat ground, z = 0, y upwards; --max-error is a share of the "
+          "range of colours, 0 to 1")
+      ->excludes(image)
+      ->group(kGroup);
+}
+
+}  // namespace terrace::cli

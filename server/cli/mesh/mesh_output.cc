@@ -1,0 +1,42 @@
+#include "server/cli/mesh/mesh_output.h"
+
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <system_error>
+#include <utility>
+
+namespace terrace::cli {
+
+Result<MeshOutput> MeshOutput::Open(const std::string& path, const std::vector<std::string>& inputs) {
+  for (const std::string& input : inputs) {
+    std::error_code ignored;
+    if (!std::filesystem::equivalent(path, input, ignored)) continue;
+    return MakeError(ErrorCode::kInvalidArgument, "--out: {} is the file that is read; give the mesh another name",
+                     path);
+  }
+  const auto format = proto::MeshFileFormatOf(path);
+  if (!format) return tl::unexpected(format.error());
+  Result<OutputFile> file = OutputFile::Open(path);
+  if (!file) return tl::unexpected(std::move(file).error());
+  return MeshOutput(*format, *std::move(file));
+}
+
+Result<void> MeshOutput::Write(std::vector<proto::MeshVertex> vertices,
+                               const std::vector<std::array<std::uint32_t, 3>>& triangles,
+                               const proto::GridPlacement& placement, const std::vector<proto::VertexColor>& colors) {
+  Result<void> written = proto::WriteMesh(file_.stream(), format_, std::move(vertices), triangles, colors, placement);
+  return written ? file_.Commit() : written;
+}
+
+std::string TextOfVoids(std::size_t voids) {
+  return voids == 0 ? "" : fmt::format(" and across {} void{}", voids, voids == 1 ? "" : "s");
+}
+
+void TellOfUnused(const std::string& input, std::size_t points, std::size_t vertices) {
+  if (vertices >= points) return;
+  fmt::print(stderr, "terrace: {}: {} vertices meet every sample; there is no use for {}\n", input, vertices, points);
+}
+
+}  // namespace terrace::cli

@@ -1,0 +1,61 @@
+#include "server/cli/serve/descriptor_plan.h"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <string>
+#include <thread>
+
+#include "server/store/record_db.h"
+
+namespace terrace::cli {
+namespace {
+
+bool HasVrt(const config::DatasetConfig& dataset) {
+  const auto is_vrt = [](const std::string& file) { return file.ends_with(".vrt") || file.ends_with(".VRT"); };
+  return is_vrt(dataset.imagery.image) || is_vrt(dataset.water.mask) ||
+         std::ranges::any_of(dataset.sources, [&](const config::SourceConfig& source) {
+           return std::ranges::any_of(source.files, is_vrt);
+         });
+}
+
+server::DescriptorDemand DemandOf(const config::Config& config) {
+  server::DescriptorDemand demand;
+  demand.io_threads = config.io_threads;
+  demand.worker_threads =
+      config.worker_threads > 0 ? config.worker_threads : std::max(1u, std::thread::hardware_concurrency());
+  demand.access_log_file = !config.access_log_file.empty();
+  demand.open_sources = config.max_open_sources;
+  demand.has_vrts = std::ranges::any_of(config.datasets, HasVrt);
+  demand.connections = config.max_connections;
+  if (config.disk_cache.directory.empty()) return demand;
+  for (const std::size_t bytes : {config.disk_cache.tile_bytes, config.disk_cache.refinement_bytes}) {
+    if (bytes == 0) continue;
+    ++demand.stores;
+    demand.store_files = std::max(demand.store_files, server::RecordDb::FilesOf(bytes));
+  }
+  return demand;
+}
+
+}  // namespace
+
+Result<server::DescriptorBudget> PlanDescriptors(const config::Config& config) {
+  const std::size_t limit = server::RaiseDescriptorLimit();
+  return server::SplitDescriptors(DemandOf(config), limit, server::CountOpenDescriptors());
+}
+
+void WarnAboutFewDescriptors(const config::Config& config, const server::DescriptorBudget& budget) {
+  const server::DescriptorDemand demand = DemandOf(config);
+  const bool is_enough = budget.connections == demand.connections && budget.open_sources == demand.open_sources &&
+                         (demand.stores == 0 || budget.store_files >= demand.store_files);
+  if (is_enough) return;
+  spdlog::warn(
+      "the limit on open files leaves room for {} connections of {}, {} files of sources of {}{}; raise it "
+      "(ulimit -n, LimitNOFILE= of systemd)",
+      budget.connections, demand.connections, budget.open_sources, demand.open_sources,
+      demand.stores == 0
+          ? ""
+          : fmt::format(", {} files of {} in each store of the disk cache", budget.store_files, demand.store_files));
+}
+
+}  // namespace terrace::cli

@@ -1,0 +1,96 @@
+#include "server/cli/serve/log.h"
+
+#include <fmt/format.h>
+#include <spdlog/pattern_formatter.h>
+#include <spdlog/sinks/base_sink.h>
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "server/telemetry/line_writer.h"
+
+namespace terrace::cli {
+namespace {
+
+// %* : the message as a JSON string.
+class JsonMessage final : public spdlog::custom_flag_formatter {
+ public:
+  void format(const spdlog::details::log_msg& message, const std::tm&, spdlog::memory_buf_t& out) override {
+    const std::string text(message.payload.data(), message.payload.size());
+    const std::string quoted = nlohmann::json(text).dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
+    out.append(quoted.data(), quoted.data() + quoted.size());
+  }
+  std::unique_ptr<custom_flag_formatter> clone() const override { return std::make_unique<JsonMessage>(); }
+};
+
+// Lines that a reader who stalls has kept out are told of once he goes on.
+class StderrSink final : public spdlog::sinks::base_sink<std::mutex> {
+ protected:
+  void sink_it_(const spdlog::details::log_msg& message) override {
+    if (!Put(message)) return;
+    const std::uint64_t missed = server::LineWriter::Stderr().TakeMissed();
+    if (missed == 0) return;
+    const std::string note = fmt::format("{} lines before the last one are missing: nobody took them", missed);
+    Put({message.logger_name, spdlog::level::warn, note});
+  }
+  void flush_() override {}
+
+ private:
+  bool Put(const spdlog::details::log_msg& message) {
+    spdlog::memory_buf_t line;
+    formatter_->format(message, line);
+    return server::LineWriter::Stderr().Write({line.data(), line.size()});
+  }
+};
+
+// A terminal has colours, and somebody before it.
+std::shared_ptr<spdlog::logger> MakeLogger(const std::string& name) {
+  if (::isatty(STDERR_FILENO) != 0) return spdlog::stderr_color_mt(name);
+  return std::make_shared<spdlog::logger>(name, std::make_shared<StderrSink>());
+}
+
+spdlog::level::level_enum LevelOf(config::LogLevel level) {
+  switch (level) {
+    case config::LogLevel::kDebug:
+      return spdlog::level::debug;
+    case config::LogLevel::kInfo:
+      return spdlog::level::info;
+    case config::LogLevel::kWarn:
+      return spdlog::level::warn;
+    case config::LogLevel::kError:
+      return spdlog::level::err;
+    case config::LogLevel::kOff:
+      return spdlog::level::off;
+  }
+  return spdlog::level::info;
+}
+
+}  // namespace
+
+void SetLogLevel(config::LogLevel level) {
+  spdlog::default_logger_raw()->set_level(LevelOf(level));
+  spdlog::log(LevelOf(level), "log level: {}", spdlog::level::to_string_view(LevelOf(level)));
+}
+
+void SetUpLog(config::LogLevel level, config::LogFormat format) {
+  auto logger = MakeLogger("terrace");
+  logger->set_level(LevelOf(level));
+  if (format == config::LogFormat::kJson) {
+    auto formatter = std::make_unique<spdlog::pattern_formatter>();
+    formatter->add_flag<JsonMessage>('*').set_pattern(R"({"time":"%Y-%m-%dT%H:%M:%S.%e%z","level":"%l","message":%*})");
+    logger->set_formatter(std::move(formatter));
+  } else {
+    logger->set_pattern("%Y-%m-%d %H:%M:%S.%e %^[%l]%$ %v");
+  }
+  spdlog::set_default_logger(std::move(logger));
+}
+
+}  // namespace terrace::cli

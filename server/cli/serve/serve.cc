@@ -1,0 +1,352 @@
+// terrace serve: datasets from a config file and from the command line, over HTTP.
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "config/config.h"
+#include "config/config_watch.h"
+#include "config/options/options.h"
+#include "config/parse.h"
+#include "config/common/working_directory.h"
+#include "engine/dem/gdal/gdal_settings.h"
+#include "server/cli/common/command.h"
+#include "server/cli/serve/descriptor_plan.h"
+#include "server/cli/common/fail.h"
+#include "server/cli/serve/log.h"
+#include "server/cli/common/open_dataset.h"
+#include "server/cli/common/option_flags.h"
+#include "server/cli/common/progress.h"
+#include "server/cli/serve/service_manager.h"
+#include "server/cli/common/source_files.h"
+#include "server/cli/serve/stop_limit.h"
+#include "server/cli/serve/try_start.h"
+#include "server/memory_trimmer.h"
+#include "server/reload/reloader.h"
+#include "server/server.h"
+#include "server/store/disk_cache.h"
+#include "server/tiles/pipeline_catalog.h"
+#include "tiler/encoder_version.h"
+#include "tiler/tile_pipeline.h"
+
+namespace terrace::cli {
+namespace {
+
+struct ServeArguments {
+  std::filesystem::path directory;  // the working directory at the start; empty: it cannot be named
+  std::vector<std::string> dems;
+  std::string config_file, config_path;  // as it was given, and in full
+  bool print_config = false, check_config = false;
+  std::map<std::string, std::string> server_flags, dataset_flags;  // by option key
+};
+
+int Report(const std::vector<config::ConfigError>& errors, const std::string& file) {
+  const bool in_flags = std::ranges::all_of(errors, [](const auto& error) { return error.path.starts_with("--"); });
+  const std::string place = file.empty() || in_flags ? "command" : "configuration " + file;
+  std::fprintf(stderr, "terrace: %zu %s in the %s:\n", errors.size(),
+               errors.size() == 1 ? "thing is wrong" : "things are wrong", place.c_str());
+  for (const config::ConfigError& error : errors) {
+    std::fprintf(stderr, "  %s%s%s\n", error.path.c_str(), error.path.empty() ? "" : ": ", error.message.c_str());
+  }
+  return kExitUsage;
+}
+
+// A folder keeps what looks like an extension, and a trailing slash changes nothing.
+std::string StemOf(const std::string& dem) {
+  std::error_code ignored;
+  const std::filesystem::path path = std::filesystem::path(dem).lexically_normal();
+  if (!std::filesystem::is_directory(path, ignored)) return path.stem().string();
+  return path.has_filename() ? path.filename().string() : path.parent_path().filename().string();
+}
+
+// Something that can be read once, or without end.
+bool IsPipe(const std::string& path) {
+  std::error_code ignored;
+  return std::filesystem::is_other(path, ignored);
+}
+
+// The file's options, then the flags, then a dataset per DEM of the command line. Everything wrong is collected.
+config::Config MakeConfig(const ServeArguments& arguments, std::vector<config::ConfigError>& errors) {
+  config::Config config;
+  if (!arguments.config_file.empty()) {
+    config::ConfigResult loaded = config::LoadConfig(arguments.config_path);
+    if (loaded)
+      config = *std::move(loaded);
+    else
+      errors = std::move(loaded).error();
+  }
+  for (const auto& [key, text] : arguments.server_flags) {
+    config::SetServerOption(key, text, arguments.directory, config, errors);
+  }
+  if (arguments.dems.empty() && !arguments.dataset_flags.empty()) {
+    errors.push_back(
+        {"", "options of a dataset need a DEM on the command line; in a config file they stand in its dataset"});
+  }
+  if (arguments.dems.size() > 1 && arguments.dataset_flags.contains("name")) {
+    errors.push_back({"--name", "names one dataset; give one DEM, or a config file with a name for each"});
+  }
+  config::DatasetConfig flags;  // checked once, however many DEMs they apply to
+  for (const auto& [key, text] : arguments.dataset_flags) {
+    config::SetDatasetOption(key, text, arguments.directory, flags, errors);
+  }
+  for (const std::string& written : arguments.dems) {
+    if (written.empty()) {
+      errors.push_back({"", "a DEM on the command line has an empty name"});
+      continue;
+    }
+    if (written.ends_with(".json")) {
+      errors.push_back({"", fmt::format("{} looks like a configuration: terrace serve --config {}", written, written)});
+      continue;
+    }
+    const std::string dem = config::FromWorkingDirectory(arguments.directory, written);
+    if (std::filesystem::path(dem).is_relative()) {
+      errors.push_back({written, config::kNoWorkingDirectory});
+      continue;
+    }
+    config::DatasetConfig& dataset = config.datasets.emplace_back(flags);
+    if (dataset.name.empty()) dataset.name = config::SanitizeDatasetName(StemOf(dem));
+    Result<config::SourceConfig> source = config::SourceAt(dem);
+    if (source)
+      dataset.sources = {*std::move(source)};
+    else
+      errors.push_back({written, source.error().message});
+  }
+  const std::vector<config::ConfigError> duplicates = config::FindDuplicateNames(config.datasets);
+  if (errors.empty()) errors = duplicates;
+  if (errors.empty() && config.datasets.empty() && !arguments.print_config) {
+    errors.push_back(
+        {"", arguments.config_file.empty()
+                 ? "there is nothing to serve; name a DEM ('terrace serve dem.tif') or a config file (--config)"
+                 : "there is nothing to serve; it needs an entry in \"datasets\""});
+  }
+  return config;
+}
+
+// Opens every source; false if one could not be, after all of them had their message, or if it was stopped.
+bool OpenDatasets(const config::Config& config, const std::stop_token& stop, std::vector<tiler::Dataset>& datasets) {
+  bool all_open = true;
+  for (const config::DatasetConfig& wanted : config.datasets) {
+    Progress progress((config.cache_dir.empty() ? "reading " : "preparing ") + NameOf(wanted.sources),
+                      FileCount(wanted.sources));
+    Result<tiler::Dataset> dataset = OpenDataset(wanted, config.cache_dir, TERRACE_VERSION, progress.Callback(), stop);
+    if (stop.stop_requested()) return false;
+    if (!dataset) {
+      std::fprintf(stderr, "terrace: dataset %s: %s\n", wanted.name.c_str(), dataset.error().message.c_str());
+      all_open = false;
+      continue;
+    }
+    spdlog::info("dataset {}: {}, levels 0 to {}", dataset->name, NameOf(wanted.sources), dataset->source->max_level());
+    datasets.push_back(*std::move(dataset));
+  }
+  return all_open;
+}
+
+// What the server runs with: with the viewer that comes with the program, where that is wanted.
+config::Config WithViewer(config::Config config) {
+  if (!config.viewer.enabled || !config.viewer.directory.empty()) return config;
+  // Installed beside the binary, else where it was built.
+  std::error_code ignored;
+  const std::filesystem::path binary = std::filesystem::read_symlink("/proc/self/exe", ignored);
+  config.viewer.directory = binary.parent_path().parent_path() / "share/terrace/viewer";
+  if (!std::filesystem::exists(config.viewer.directory, ignored)) config.viewer.directory = TERRACE_VIEWER_DIR;
+  return config;
+}
+
+// What stopping may take beyond the drain timeout.
+constexpr std::chrono::seconds kStopTime{1};
+
+// Signals that mean something to the running server, besides those that end it.
+const std::vector<int> kAnsweredSignals = {SIGUSR1, SIGUSR2, SIGHUP};
+
+// `how`: SIG_BLOCK or SIG_UNBLOCK. For this thread and those that it begins.
+void MaskSignals(int how, const std::vector<int>& signals) {
+  sigset_t set;
+  ::sigemptyset(&set);
+  for (const int signal : signals) ::sigaddset(&set, signal);
+  ::pthread_sigmask(how, &set, nullptr);
+}
+
+int CheckConfig(const ServeArguments& arguments, const config::Config& config) {
+  if (const int exit_code = TryStart(config, WithViewer(config), PlanDescriptors(config), /*tries_address=*/false);
+      exit_code != kExitOk)
+    return exit_code;
+  const std::size_t count = config.datasets.size();
+  fmt::print(
+      "terrace: the configuration{}{} is fine: {} dataset{}; rasters were not opened, 'terrace info' does that\n",
+      arguments.config_file.empty() ? "" : " ", arguments.config_file, count, count == 1 ? "" : "s");
+  return FinishOutput(kExitOk);
+}
+
+int Fail(const Error& error) {
+  std::fprintf(stderr, "terrace: %s\n", error.message.c_str());
+  return kExitFailure;
+}
+
+int Serve(const ServeArguments& arguments) {
+  std::signal(SIGPIPE, SIG_IGN);  // whoever reads the log may go away; the server stays
+  std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow fails to be written, as on a full disk
+  std::vector<config::ConfigError> errors;
+  const bool is_read_once = IsPipe(arguments.config_path);
+  const config::Config config = MakeConfig(arguments, errors);
+  if (!errors.empty()) return Report(errors, arguments.config_file);
+  if (arguments.print_config) {
+    std::fputs(config::ToJson(config).c_str(), stdout);
+    return FinishOutput(kExitOk);
+  }
+  SetUpLog(config.log_level, config.log_format);
+  if (arguments.check_config) return CheckConfig(arguments, config);
+  const Result<std::optional<int>> passed = TakeListenSocket();
+  if (!passed) return Fail(passed.error());
+  // Until they are answered they would be the end, and who rotates logs does not ask how long sources take to open.
+  MaskSignals(SIG_BLOCK, kAnsweredSignals);
+  tiler::EncoderVersion();  // of the libraries there are, before GDAL or the system's resolver loads others
+  server::ServerOptions options;
+  options.config = WithViewer(config);
+  options.stop_on_signals = true;
+  options.listen_socket = passed->value_or(-1);
+  const bool tries_address = !passed->has_value();
+  const Result<server::DescriptorBudget> budget = PlanDescriptors(config);
+  if (const int exit_code = TryStart(config, options.config, budget, tries_address); exit_code != kExitOk)
+    return exit_code;
+  WarnAboutFewDescriptors(config, *budget);
+  options.config.max_connections = budget->connections;
+  dem::SetGdalCache(config.gdal_cache_bytes);
+  dem::SetOpenSources(budget->open_sources, budget->vrt_parts);
+
+  StopLimit stop_limit;  // first, as it bounds how long the others take to end
+  Result<std::shared_ptr<server::DiskCache>> disk(nullptr);
+  if (!config.disk_cache.directory.empty()) disk = server::DiskCache::Open(config.disk_cache, budget->store_files);
+  if (!disk) return Fail(disk.error());
+  const auto refinements = std::make_shared<tiler::RefinementCache>(
+      config.refinement_cache_bytes,
+      *disk ? std::shared_ptr<tiler::RefinementStore>(*disk, (*disk)->refinements()) : nullptr);
+  options.disk_cache = *std::move(disk);
+  options.refinement_stats = [refinements] { return refinements->stats(); };
+  std::unique_ptr<server::Reloader> reloader;  // once there is something to look after
+  options.on_source_changed = config.watch ? std::function<void()>([&reloader] { reloader->Look(); }) : nullptr;
+  options.on_signal[SIGHUP] = [&reloader] {
+    NotifyReloading();
+    reloader->Reload();
+  };
+  std::stop_source stop_opening;
+  options.on_stop = [&stop_limit, &stop_opening, limit = config.drain_timeout + kStopTime] {
+    stop_limit.Begin(limit);
+    stop_opening.request_stop();
+    NotifyStopping();
+  };
+  const auto level = std::make_shared<std::atomic<config::LogLevel>>(config.log_level);  // the configured one
+  options.on_signal[SIGUSR1] = [] { SetLogLevel(config::LogLevel::kDebug); };
+  options.on_signal[SIGUSR2] = [level] { SetLogLevel(*level); };
+  // Before sources are opened, which may take long: who asks meanwhile waits.
+  auto started = server::Server::Start(nullptr, options);
+  if (!started) return Fail(started.error());
+  const std::unique_ptr<server::Server> server = *std::move(started);
+  NotifyOpening();
+
+  std::vector<tiler::Dataset> datasets;
+  const bool are_open = OpenDatasets(config, stop_opening.get_token(), datasets);
+  if (stop_opening.stop_requested()) return server->Wait() ? kExitOk : kExitFailure;
+  if (!are_open) return kExitFailure;
+  std::atomic<std::size_t> count = datasets.size();
+  const auto catalog_of = [refinements](const std::vector<tiler::Dataset>& served, const config::Config& now) {
+    return server::MakeCatalog(std::make_shared<const tiler::TilePipeline>(served, refinements), now.max_mesh_samples);
+  };
+  const auto served_text = [&] {
+    const std::size_t datasets_served = count;
+    return fmt::format("{} dataset{} at {}", datasets_served, datasets_served == 1 ? "" : "s", server->url());
+  };
+  config::ConfigWatch watch(arguments.config_path, [&arguments, config, is_read_once]() -> config::ConfigResult {
+    if (is_read_once) return config;
+    if (IsPipe(arguments.config_path)) {
+      return tl::unexpected(std::vector<config::ConfigError>{{"", "has become a pipe or device; make it a file"}});
+    }
+    std::vector<config::ConfigError> wrong;
+    config::Config loaded = MakeConfig(arguments, wrong);
+    if (!wrong.empty()) return tl::unexpected(std::move(wrong));
+    return loaded;
+  });
+  server::Reloader::Hooks hooks;
+  hooks.load = [&watch] { return watch.Load(); };
+  hooks.may_have_changed = [&watch] { return watch.MayHaveChanged(); };
+  hooks.open = [cache_dir = config.cache_dir](const config::DatasetConfig& wanted, std::stop_token stop) {
+    return OpenDataset(wanted, cache_dir, TERRACE_VERSION, {}, std::move(stop));
+  };
+  hooks.publish = [&](const std::vector<tiler::Dataset>& served, const config::Config& now) {
+    if (level->exchange(now.log_level) != now.log_level) SetLogLevel(now.log_level);
+    refinements->SetCapacity(now.refinement_cache_bytes);
+    if (const Result<void> replaced = server->Replace(catalog_of(served, now), now); !replaced) {
+      spdlog::error("the new configuration cannot be served: {}", replaced.error().message);
+    } else {
+      count = served.size();
+    }
+    std::vector<std::uint64_t> generations;
+    for (const tiler::Dataset& dataset : served) generations.push_back(dataset.generation);
+    refinements->Retain(generations);
+  };
+  hooks.reloaded = [&] {
+    server->ReopenAccessLog();
+    NotifyReady(served_text());
+  };
+  hooks.tell = [&](const std::map<std::string, std::string>& troubles) { server->SetTroubles(troubles); };
+  reloader = std::make_unique<server::Reloader>(config, datasets, std::move(hooks));
+  if (const Result<void> served = server->Replace(catalog_of(datasets, config), config); !served) {
+    return Fail(served.error());
+  }
+  datasets.clear();  // what is replaced must not stay open
+  reloader->Start(config.watch);
+  fmt::print("terrace: serving {}\n", served_text());
+  std::fflush(stdout);
+  NotifyReady(served_text());
+  MaskSignals(SIG_UNBLOCK, kAnsweredSignals);
+  const server::MemoryTrimmer trimmer;
+  const bool drained = server->Wait();
+  reloader->Stop();
+  return drained ? kExitOk : kExitFailure;
+}
+
+}  // namespace
+
+void AddServe(CLI::App& app, int& exit_code) {
+  auto arguments = std::make_shared<ServeArguments>();
+  CLI::App* command = app.add_subcommand("serve", "Serves DEMs as terrain tiles over HTTP, with a viewer at /");
+  command->footer(
+      "Examples:\n"
+      "  terrace serve alps.tif andes.tif\n"
+      "  terrace serve --config terrace.json --listen 0.0.0.0:8080\n\n"
+      "Each DEM becomes a dataset named after its file; a folder of DEMs becomes one dataset. Flags override the "
+      "config file. Prints one line with\n"
+      "the URL when it is ready; logs go to stderr; SIGTERM and SIGINT end it after open requests are answered, a "
+      "second one at once.");
+  command->add_option("DEM", arguments->dems, "Rasters that GDAL can read, or folders of them, one dataset each");
+  command->add_option("--config", arguments->config_file, "Configuration in JSON (config/config.schema.json)")
+      ->type_name("FILE");
+  command->add_flag("--print-config", arguments->print_config, "Prints the configuration in force as JSON and ends");
+  command->add_flag("--check-config", arguments->check_config,
+                    "Says whether the server could start, without opening rasters or listening, and ends");
+  AddFlags(*command, config::ServerOptions(), "Server", arguments->server_flags);
+  AddFlags(*command, config::DatasetOptions(), "Datasets of the command line", arguments->dataset_flags);
+  command->callback([arguments, &exit_code] {
+    std::error_code unnamed;
+    arguments->directory = std::filesystem::current_path(unnamed);
+    if (!arguments->config_file.empty()) {
+      arguments->config_path = config::FromWorkingDirectory(arguments->directory, arguments->config_file);
+    }
+    exit_code = Serve(*arguments);
+  });
+}
+
+}  // namespace terrace::cli

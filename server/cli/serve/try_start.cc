@@ -1,0 +1,49 @@
+#include "server/cli/serve/try_start.h"
+
+#include <cstdio>
+#include <filesystem>
+#include <system_error>
+#include <vector>
+
+#include "engine/dem/gdal/source_policy.h"
+#include "server/cli/common/command.h"
+#include "server/cli/common/source_files.h"
+#include "server/cli/common/try_folder.h"
+#include "server/server.h"
+
+namespace terrace::cli {
+
+int TryStart(const config::Config& config, const config::Config& served,
+             const Result<server::DescriptorBudget>& descriptors, bool tries_address) {
+  std::vector<Error> errors = server::Server::TryFiles(served);
+  const auto note = [&](const Result<void>& result) {
+    if (!result) errors.push_back(result.error());
+  };
+  std::error_code ignored;
+  if (const auto& viewer = config.viewer.directory;
+      !viewer.empty() && !std::filesystem::is_directory(viewer, ignored)) {
+    note(MakeError(ErrorCode::kNotFound, "viewer {}: is no folder; name one with a web page, or true or false",
+                   viewer.string()));
+  }
+  // One that is there is opened even where its disk has become read-only: a cache is no reason not to start.
+  const std::filesystem::path cache = config.disk_cache.directory;
+  if (!cache.empty() && !std::filesystem::exists(cache / "lock", ignored)) {
+    if (const auto folder = TryFolder(cache); !folder) {
+      note(MakeError(folder.error().code, "disk_cache: {}", folder.error().message));
+    }
+  }
+  if (!descriptors) errors.push_back(descriptors.error());
+  if (tries_address) note(server::Server::TryAddress(served));
+  const Result<void> policy =
+      dem::SetSourcePolicy({config.data_roots, config.allowed_prefixes, config.allowed_drivers});
+  note(policy);
+  for (const config::DatasetConfig& dataset : config.datasets) {
+    const Result<void> readable = TryReading(dataset);
+    note(readable && policy ? TryPolicy(dataset) : readable);
+  }
+  for (const Error& error : errors) std::fprintf(stderr, "terrace: %s\n", error.message.c_str());
+  if (!policy) return kExitUsage;
+  return errors.empty() ? kExitOk : kExitFailure;
+}
+
+}  // namespace terrace::cli
