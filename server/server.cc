@@ -173,7 +173,7 @@ class Server::Impl {
     metrics_page_.Stop();
     tiles_.Shutdown();
     if (drained) {
-      spdlog::info("stopped: every request was answered");
+      spdlog::info("stopped; no request is left unanswered");
     } else {
       spdlog::warn("stopped: some requests were not answered within the drain timeout of {} s",
                    std::chrono::duration<double>(options_.config.drain_timeout).count());

@@ -35,6 +35,14 @@ std::size_t EditDistance(std::string_view a, std::string_view b) {
   return above[b.size()];
 }
 
+// Whether a name has the word as one of its parts: "max_error" has "error".
+bool HasPart(std::string_view name, std::string_view word) {
+  const std::size_t at = name.find(word);
+  if (at == std::string_view::npos || word.empty()) return false;
+  const std::size_t end = at + word.size();
+  return (at == 0 || name[at - 1] == '_') && (end == name.size() || name[end] == '_');
+}
+
 }  // namespace
 
 std::string_view NearestName(std::string_view word, std::span<const std::string_view> candidates) {
@@ -51,7 +59,11 @@ std::string_view NearestName(std::string_view word, std::span<const std::string_
     smallest = distance;
     nearest = candidate;
   }
-  return nearest;
+  if (!nearest.empty()) return nearest;
+  const std::string_view part = std::string_view(folded).substr(std::min(folded.find_first_not_of('_'), folded.size()));
+  const auto has_part = [&](std::string_view candidate) { return HasPart(Fold(candidate), part); };
+  if (std::ranges::count_if(candidates, has_part) != 1) return {};
+  return *std::ranges::find_if(candidates, has_part);
 }
 
 }  // namespace terrace::config

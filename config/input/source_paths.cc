@@ -31,8 +31,9 @@ Result<SourceConfig> FilesIn(const std::string& folder) {
     std::error_code ignored;
     if (!name.starts_with('.') && it->is_regular_file(ignored)) source.files.push_back(it->path().string());
   }
-  if (error) return MakeError(ErrorCode::kUnavailable, "the folder cannot be read");
-  if (source.files.empty()) return MakeError(ErrorCode::kNotFound, "the folder holds no file");
+  if (error) return MakeError(ErrorCode::kUnavailable, "the folder {} cannot be read", folder);
+  if (source.files.empty())
+    return MakeError(ErrorCode::kNotFound, "the folder {} holds no file; put rasters there or name another", folder);
   std::sort(source.files.begin(), source.files.end());
   return source;
 }

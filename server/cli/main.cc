@@ -7,6 +7,7 @@
 #include <exception>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "config/common/nearest_name.h"
@@ -81,11 +82,17 @@ int Run(int argc, char** argv) {
     std::fputs(app.help().c_str(), stderr);
     return kExitUsage;
   }
+  std::vector<std::string> arguments(argv + 1, argv + argc);
+  if (arguments.front() == "help") {  // terrace help COMMAND
+    arguments.erase(arguments.begin());
+    arguments.emplace_back("--help");
+  }
+  std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());  // CLI11 takes them from the back
   try {
-    app.parse(argc, argv);
+    app.parse(std::move(reversed));
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
-    return ReportUsage(app, error, {argv + 1, argv + argc});
+    return ReportUsage(app, error, arguments);
   }
   return exit_code;
 }

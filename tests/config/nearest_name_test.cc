@@ -20,6 +20,15 @@ TEST(NearestName, FindsWhatWasMeant) {
   EXPECT_EQ(NearestName("workers_threads", kKeys), "worker_threads");
 }
 
+TEST(NearestName, FindsTheOnlyNameWithThatPart) {
+  EXPECT_EQ(NearestName("cache", kKeys), "cache_bytes");
+  EXPECT_EQ(NearestName("--io", kKeys), "io_threads");
+  const std::vector<std::string_view> two = {"finest_error", "max_error_m"};
+  EXPECT_EQ(NearestName("error", two), "") << "two names have it";
+  EXPECT_EQ(NearestName("ach", kKeys), "") << "no whole part";
+  EXPECT_EQ(NearestName("__", kKeys), "");
+}
+
 TEST(NearestName, IsEmptyWhenNothingIsNear) {
   EXPECT_EQ(NearestName("colour", kKeys), "");
   EXPECT_EQ(NearestName("", kKeys), "");

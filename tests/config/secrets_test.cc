@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
+#include "config/common/token_hash.h"
 #include "config/input/json_text.h"
 #include "config/options/options.h"
 #include "config/parse.h"
-#include "config/common/token_hash.h"
 #include "tests/config/errors.h"
 #include "tests/support/source_dir.h"
 

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <filesystem>
 #include <map>
 #include <mutex>
 #include <optional>
@@ -151,12 +152,11 @@ class Opening {
 
 Result<Rasters> OpenRasters(std::vector<DemFile>& files, const DemOptions& options,
                             std::vector<std::string>& left_out) {
-  const std::string first = EscapeControls(files.front().path);
+  const std::string folder = EscapeControls(std::filesystem::path(files.front().path).parent_path().string());
   left_out = LeaveOutOthers(files);
   if (files.empty()) {
-    return MakeError(
-        ErrorCode::kNotFound,
-        "{} and its like: none of the files in this folder is a raster; name a folder of rasters or a raster", first);
+    return MakeError(ErrorCode::kNotFound,
+                     "{}: none of the files in this folder is a raster; name a folder of rasters or a raster", folder);
   }
   Opening opening(files, options);
   ForEachOnAllCores(files.size(), [&opening](std::size_t i) { return opening.Open(i); });

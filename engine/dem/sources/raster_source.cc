@@ -96,7 +96,10 @@ void LogWhatMatters(GDALDataset& dataset, const RasterInfo& info, const Georefer
 
 void LogVertical(const std::string& path, const VerticalDatum& vertical, const std::string& unit) {
   if (!vertical.is_known()) {
-    LogSource(SourceLog::Level::kWarn, path, "no vertical datum stated, heights pass through as given");
+    LogSource(
+        SourceLog::Level::kWarn, path,
+        "no vertical datum stated, heights pass through as given; if they count from a geoid, name it with `vertical` "
+        "(egm96, EPSG:5773, ..)");
   } else if (vertical.geoid) {
     LogSource(SourceLog::Level::kInfo, path, "heights count from {}, made ellipsoidal by PROJ operation \"{}\"",
               vertical.name, vertical.geoid->description());

@@ -187,7 +187,7 @@ int Mesh(const MeshArguments& arguments) {
     return dem::ReadRaster(arguments.dem, ReadOptionsOf(arguments.nodata, progress.Callback()));
   }();
   if (!raster) return Fail(raster.error().message, kExitFailure);
-  WarnOf(arguments.dem, *raster, arguments.coordinates, arguments.out);
+  WarnAbout(arguments.dem, *raster, arguments.coordinates, arguments.out);
   const auto placement =
       PlacementOf(arguments.dem, raster->georeferenced, raster->geo_transform, arguments.coordinates);
   if (!placement) return Fail(placement.error().message, kExitUsage);
@@ -207,7 +207,7 @@ int Mesh(const MeshArguments& arguments) {
   if (!written) return Fail(written.error().message, kExitFailure);
   seconds.write = SecondsSince(start);
   Print(arguments, *field, mesh, tin::MeasureError(*field, mesh), seconds);
-  TellOfUnused(arguments.dem, arguments.points, mesh.vertices.size());
+  ReportUnused(arguments.dem, arguments.points, mesh.vertices.size());
   return kExitOk;
 }
 

@@ -54,7 +54,7 @@ Result<Source> ReadDem(const ColoredMeshArguments& arguments) {
   auto heights = tin::HeightField::Make(raster->width, raster->height, std::move(raster->heights));
   if (!heights) return MakeError(heights.error().code, "{}: {}", arguments.raster, heights.error().message);
   progress.reset();
-  WarnOf(arguments.raster, *raster, arguments.coordinates, arguments.out);
+  WarnAbout(arguments.raster, *raster, arguments.coordinates, arguments.out);
   return MakeSource(arguments.color.image, *std::move(heights), *std::move(colors), arguments.color.weight,
                     raster->georeferenced, raster->geo_transform);
 }
@@ -169,7 +169,7 @@ int MeshColored(const ColoredMeshArguments& arguments) {
   seconds.write = SecondsSince(start);
   Print(arguments, source->field, mesh, tin::MeasureExtendedError(source->field, mesh), seconds);
   if (arguments.goal.max_points != tin::ExtendedGoal{}.max_points) {
-    TellOfUnused(arguments.raster, arguments.goal.max_points, mesh.tin.vertices.size());
+    ReportUnused(arguments.raster, arguments.goal.max_points, mesh.tin.vertices.size());
   }
   return kExitOk;
 }

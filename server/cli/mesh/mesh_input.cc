@@ -45,13 +45,13 @@ dem::ReadOptions ReadOptionsOf(const std::string& nodata, std::function<void(dou
   return options;
 }
 
-void WarnOf(const std::string& path, const dem::RasterHeights& raster, const std::string& coordinates,
+void WarnAbout(const std::string& path, const dem::RasterHeights& raster, const std::string& coordinates,
             const std::string& out) {
   if (raster.in_angles && coordinates != "pixel" && proto::MeshFileFormatOf(out) == proto::MeshFileFormat::kGlb) {
     fmt::print(stderr,
                "terrace: {}: x and y of the mesh are angles, heights metres, and glTF takes all of them for metres: "
                "viewers will show a needle; for metres throughout, project it first with `gdalwarp -t_srs EPSG:XXXX -r "
-               "bilinear in out`, or give --coordinates pixel\n",
+               "bilinear in out`\n",
                path);
   }
   if (!raster.coordinate_unit.empty() && coordinates != "pixel") {

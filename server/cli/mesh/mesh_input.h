@@ -20,7 +20,7 @@ void AddNodataOption(CLI::App& command, std::string& nodata);
 dem::ReadOptions ReadOptionsOf(const std::string& nodata, std::function<void(double)> progress);
 
 // On stderr, what a mesh of the raster in these coordinates (--coordinates), in the file `out`, may surprise by.
-void WarnOf(const std::string& path, const dem::RasterHeights& raster, const std::string& coordinates,
+void WarnAbout(const std::string& path, const dem::RasterHeights& raster, const std::string& coordinates,
             const std::string& out);
 
 }  // namespace terrace::cli

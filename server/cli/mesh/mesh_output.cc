@@ -34,7 +34,7 @@ std::string TextOfVoids(std::size_t voids) {
   return voids == 0 ? "" : fmt::format(" and across {} void{}", voids, voids == 1 ? "" : "s");
 }
 
-void TellOfUnused(const std::string& input, std::size_t points, std::size_t vertices) {
+void ReportUnused(const std::string& input, std::size_t points, std::size_t vertices) {
   if (vertices >= points) return;
   fmt::print(stderr, "terrace: {}: {} vertices meet every sample; there is no use for {}\n", input, vertices, points);
 }

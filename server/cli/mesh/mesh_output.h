@@ -44,7 +44,7 @@ inline std::size_t VoidsOf(const tin::HeightField& field, std::size_t measured) 
 std::string TextOfVoids(std::size_t voids);  // empty where there are none
 
 // On stderr, where fewer vertices meet every sample than were asked for. 0: no number was.
-void TellOfUnused(const std::string& input, std::size_t points, std::size_t vertices);
+void ReportUnused(const std::string& input, std::size_t points, std::size_t vertices);
 
 inline double SecondsSince(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

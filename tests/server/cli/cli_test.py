@@ -28,6 +28,11 @@ class Help(unittest.TestCase):
             self.assertEqual((result.returncode, result.stderr), (0, ""), command)
             self.assertIn("Usage: terrace", result.stdout)
 
+    def test_help_is_a_command_too(self):
+        for arguments, same in ((["help"], ["--help"]), (["help", "mesh"], ["mesh", "--help"])):
+            result, expected = run(*arguments), run(*same)
+            self.assertEqual((result.returncode, result.stdout), (0, expected.stdout), arguments)
+
     def test_version_is_the_projects(self):
         version = re.search(r"project\(.*?VERSION\s+([0-9.]+)", (SOURCE_DIR / "CMakeLists.txt").read_text(), re.S)
         result = run("--version")
@@ -49,7 +54,8 @@ class Usage(unittest.TestCase):
     def test_typos_are_told_with_the_nearest_name(self):
         for arguments, word, nearest in ((["serv"], "command serv", "serve"), (["--versoin"], "option --versoin", "--version"),
                                          (["serve", "--cach-bytes=5"], "option --cach-bytes", "--cache-bytes"),
-                                         (["mesh", "--max-eror", "5"], "option --max-eror", "--max-error")):
+                                         (["mesh", "--max-eror", "5"], "option --max-eror", "--max-error"),
+                                         (["mesh", "--error", "5"], "option --error", "--max-error")):
             self.assertIn(f"terrace: unknown {word}; did you mean {nearest}?\n", run(*arguments).stderr, arguments)
 
     def test_stdout_that_takes_nothing_is_a_failure(self):
