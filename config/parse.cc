@@ -10,8 +10,8 @@
 #include <system_error>
 
 #include "config/input/json_text.h"
-#include "config/options/option_table.h"
 #include "config/input/source_paths.h"
+#include "config/options/option_table.h"
 
 namespace terrace::config {
 namespace {

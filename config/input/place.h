@@ -10,9 +10,9 @@
 #include <string_view>
 #include <vector>
 
+#include "config/common/working_directory.h"
 #include "config/config.h"
 #include "config/input/json_text.h"
-#include "config/common/working_directory.h"
 
 namespace terrace::config {
 

@@ -104,7 +104,10 @@ CertifiedCase Feathered(double feather, const std::string& vertical) {
     return source;
   };
   // Most of these tiles lie in a feather, where the bound of each raster is computed on its own: the wider, the looser.
-  return {fmt::format("feather {:.0f} m, {}", feather, vertical), make, feather == 0 ? 3.0 : feather < 1000 ? 8.0 : 40.0};
+  return {fmt::format("feather {:.0f} m, {}", feather, vertical), make,
+          feather == 0     ? 3.0
+          : feather < 1000 ? 8.0
+                           : 40.0};
 }
 
 // Slopes of 80 m a pixel along columns and of 40 along rows, up and down: even between creases that are far apart, so

@@ -22,12 +22,12 @@
 #include "engine/geo/error_ladder.h"
 #include "server/cli/common/command.h"
 #include "server/cli/common/fail.h"
-#include "server/cli/info/mosaic_info.h"
 #include "server/cli/common/open_dataset.h"
 #include "server/cli/common/option_flags.h"
 #include "server/cli/common/progress.h"
 #include "server/cli/common/source_files.h"
 #include "server/cli/common/try_folder.h"
+#include "server/cli/info/mosaic_info.h"
 
 namespace terrace::cli {
 namespace {

@@ -26,12 +26,12 @@
 #include "proto/gltf/mesh_file.h"
 #include "server/cli/common/command.h"
 #include "server/cli/common/fail.h"
+#include "server/cli/common/progress.h"
 #include "server/cli/mesh/mesh_blocks.h"
 #include "server/cli/mesh/mesh_color.h"
 #include "server/cli/mesh/mesh_input.h"
 #include "server/cli/mesh/mesh_output.h"
 #include "server/cli/mesh/mesh_placement.h"
-#include "server/cli/common/progress.h"
 
 namespace terrace::cli {
 namespace {

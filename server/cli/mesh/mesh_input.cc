@@ -46,7 +46,7 @@ dem::ReadOptions ReadOptionsOf(const std::string& nodata, std::function<void(dou
 }
 
 void WarnAbout(const std::string& path, const dem::RasterHeights& raster, const std::string& coordinates,
-            const std::string& out) {
+               const std::string& out) {
   if (raster.in_angles && coordinates != "pixel" && proto::MeshFileFormatOf(out) == proto::MeshFileFormat::kGlb) {
     fmt::print(stderr,
                "terrace: {}: x and y of the mesh are angles, heights metres, and glTF takes all of them for metres: "

@@ -21,6 +21,6 @@ dem::ReadOptions ReadOptionsOf(const std::string& nodata, std::function<void(dou
 
 // On stderr, what a mesh of the raster in these coordinates (--coordinates), in the file `out`, may surprise by.
 void WarnAbout(const std::string& path, const dem::RasterHeights& raster, const std::string& coordinates,
-            const std::string& out);
+               const std::string& out);
 
 }  // namespace terrace::cli
