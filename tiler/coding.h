@@ -11,18 +11,18 @@ namespace terrace::tiler {
 
 enum class Coding : std::uint8_t { kIdentity, kGzip, kBrotli, kZstd };
 
-// What bodies that are made for a request may be compressed with, the smallest first: of 206 tiles (23 KB each) brotli
-// leaves 63.3 %, gzip 65.8 % and zstd 66.0 %, in 0.39, 0.30 and 0.26 ms a tile.
+// Codings of bodies that are built on request, in order of preference. Measured over 206 tiles of 23 KB: brotli 63.3 %
+// of the size in 0.39 ms, gzip 65.8 % in 0.30 ms, zstd 66.0 % in 0.26 ms.
 inline constexpr std::array<Coding, 3> kCodings = {Coding::kBrotli, Coding::kGzip, Coding::kZstd};
 
-// What bodies that are compressed once at the start come in.
+// Codings of bodies that are compressed once at start.
 inline constexpr std::array<Coding, 1> kGzipOnly = {Coding::kGzip};
 
 // As Content-Encoding names it: "br". Empty for identity.
 std::string_view NameOf(Coding coding);
 
-// Deterministic: equal bytes are compressed to equal bytes. Empty, where `coding` is none of kIdentity, if a stop was
-// requested (proto/compress.h).
+// Deterministic: equal bytes give equal bytes. Returns an empty string if a stop was requested and `coding` is not
+// kIdentity (proto/compress.h).
 std::string Compress(std::string bytes, Coding coding, const std::stop_token& stop = {});
 
 }  // namespace terrace::tiler

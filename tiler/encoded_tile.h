@@ -1,4 +1,4 @@
-// A finished tile, ready to leave: immutable and shared between the cache and every response that sends it.
+// An encoded tile. Immutable, and shared by the cache and all responses that send it.
 #pragma once
 
 #include <chrono>
@@ -10,9 +10,9 @@
 
 namespace terrace::tiler {
 
-// Where the time of a build went. Zero where a step did not run.
+// Durations of the stages of a build. Zero for a stage that did not run.
 struct StageTimes {
-  std::chrono::microseconds queue{0};  // before a worker took it up
+  std::chrono::microseconds queue{0};  // until a worker started
   std::chrono::microseconds read{0}, refine{0}, encode{0}, compress{0};
 };
 
@@ -20,28 +20,28 @@ inline std::chrono::microseconds MicrosecondsSince(std::chrono::steady_clock::ti
   return std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::steady_clock::now() - start);
 }
 
-// What a build found of its tile's refinement; kNone where the format has no mesh.
+// How a build used the refinement cache. kNone: the format has no mesh.
 enum class RefinementUse : std::uint8_t { kMade, kContinued, kReplayed, kNone };
 
-// Lines of a reply's head, each with its CR LF, that depend on the body alone: neither on who asks nor on the
-// configuration.
+// Header lines of a response that depend on the body alone, not on the request or the configuration. Each ends with
+// CR LF.
 struct HeadLines {
   std::string text;
-  std::size_t of_body = 0;  // so many bytes at its front describe the body: a reply without one leaves them away
+  std::size_t of_body = 0;  // leading bytes of `text` that describe the body; responses without a body omit them
 };
 
 struct EncodedTile {
   std::string bytes;       // the body in its content coding
   std::string etag;        // strong, with the quotes
   double max_error_m = 0;  // measured on the encoded integers: the Terrain-Max-Error header
-  // Metres, at least the distance from every sample of the sources: the Terrain-Certified-Error header. Nothing where
-  // the format has no surface.
+  // Metres, an upper bound of the distance to every sample of the sources: the Terrain-Certified-Error header. Empty
+  // for formats without a surface.
   std::optional<double> certified_error_m = {};
   std::uint32_t vertices = 0;
   std::uint32_t triangles = 0;
-  StageTimes times;  // of the build that made it
+  StageTimes times;  // of the build
   RefinementUse refinement = RefinementUse::kMade;
-  bool from_disk = false;  // read from the disk tier, not built
+  bool from_disk = false;  // read from the disk cache
   HeadLines head;          // see MakeTileHead
 };
 

@@ -10,9 +10,9 @@
 
 namespace terrace::tiler {
 
-// One pixel per node of the Web Mercator grid, none of them shared with a neighbour: clients fetch their borders
-// themselves. EncodedTile::max_error_m is what the colours' steps lose, measured. kNotFound: deeper than the source
-// warrants. kUnavailable, kCancelled: as DemSource. Precondition: a kHeightPng request.
+// One pixel for each node of the Web Mercator grid. Tiles share no pixels with neighbours. EncodedTile::max_error_m is
+// the measured rounding error of the colours. kNotFound: deeper than max_mercator_depth. kUnavailable, kCancelled: as
+// DemSource. Precondition: a kHeightPng request.
 Result<EncodedTile> BuildHeightTile(const dem::DemSource& source, const TileRequest& request, std::stop_token stop);
 
 }  // namespace terrace::tiler

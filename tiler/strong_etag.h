@@ -1,4 +1,4 @@
-// ETags, the one place that makes them: strong, with their quotes, a hash of 128 bits.
+// Strong ETags: hashes of 128 bits, with quotes.
 #pragma once
 
 #include <cstdint>
@@ -9,11 +9,11 @@
 
 namespace terrace::tiler {
 
-// Of bytes that the server made.
+// Of a body.
 std::string StrongETag(std::string_view bytes);
 
-// Of bytes that need not be made to know that a client has them: what `kind` of reply it is, the dataset's generation
-// and the request's text decide about them. Different texts of one request have different ETags.
+// Of a response whose body is determined by its `kind`, the dataset's generation and the text of the request, so that a
+// conditional request needs no body. Different texts of one request have different ETags.
 std::string RequestETag(std::string_view kind, std::string_view dataset, std::uint64_t generation,
                         std::string_view query, Coding coding);
 

@@ -1,4 +1,4 @@
-// From a request to bytes, as one plain blocking function: used as it is by the server, tests and benchmarks.
+// Builds a tile: from a request to bytes, in one blocking function. The server, tests and benchmarks use it.
 #pragma once
 
 #include <cstdint>
@@ -21,47 +21,47 @@
 
 namespace terrace::tiler {
 
-// Where a dataset's water comes from: one of both, or neither, and it has none.
+// The source of a dataset's water: a mask, a sea level, or none. At most one is set.
 struct WaterRules {
   std::shared_ptr<const dem::WaterRaster> mask;
-  std::optional<double> sea_level_m;  // in what the source's heights count from
+  std::optional<double> sea_level_m;  // in the source's vertical datum
 
   bool any() const { return mask != nullptr || sea_level_m.has_value(); }
 };
 
-// What textures of GLB tiles are cut from.
+// The source and encoding of textures of GLB tiles.
 struct ImageryRules {
   std::shared_ptr<const dem::Imagery> image;                   // null: none
-  proto::TextureFormat texture = proto::TextureFormat::kJpeg;  // what requests get that name none
+  proto::TextureFormat texture = proto::TextureFormat::kJpeg;  // for requests that name none
   int side = 512;                                              // pixels along a tile's edge, at most
   int quality = 80;                                            // of EncodePicture
   std::string attribution;
 };
 
-// One served dataset: a name, a source and what its users should read. Copies share what they read from, which is
-// immutable: a dataset that has not changed goes on in the next catalog.
+// One served dataset. Copies share the source, water and imagery, which are immutable: a reload keeps a dataset that
+// has not changed.
 struct Dataset {
   std::string name;
   std::string attribution;
   double error_fraction = 0.5;
   MeshRules rules;
-  proto::GlbOptions glb;  // compression: what GLB requests get that name none
+  proto::GlbOptions glb;  // compression: for GLB requests that name none
   std::shared_ptr<const dem::DemSource> source;
   WaterRules water;
   ImageryRules imagery;
-  int metadata_levels = 0;       // tiles of every so many levels tell what is below them; 0: none
-  std::uint64_t generation = 0;  // hash of the source's fingerprint and every option that changes bytes
+  int metadata_levels = 0;       // tiles at multiples of this level have availability metadata; 0: none
+  std::uint64_t generation = 0;  // hash of the source's fingerprint and all options that change bytes
 };
 
 // Thread-safe: Build may run on any number of threads at once.
 //
-// What a tile is made from is kept between builds, as much as `refinement_cache_bytes` allows: another error, format or
-// coding of it costs a replay and an encoding. The bytes do not depend on it.
+// Keeps heights and refinements of tiles between builds, up to `refinement_cache_bytes`. Another error, format or
+// coding of a kept tile costs a replay and an encoding. The bytes of a tile do not depend on the cache.
 class TilePipeline {
  public:
   explicit TilePipeline(std::vector<Dataset> datasets,
                         std::size_t refinement_cache_bytes = kDefaultRefinementCacheBytes);
-  // The same with a cache that others share: one that outlives the catalog.
+  // Uses a shared cache, which may outlive the catalog.
   TilePipeline(std::vector<Dataset> datasets, std::shared_ptr<RefinementCache> refinements);
   static constexpr std::size_t kDefaultRefinementCacheBytes = std::size_t{128} << 20;
 

@@ -1,4 +1,4 @@
-// What one tile request asks for, in canonical form: everything that changes the bytes and nothing else.
+// A tile request in canonical form: all parameters that change the bytes, and nothing else.
 #pragma once
 
 #include <array>
@@ -26,7 +26,7 @@ struct TileRequest {
   proto::GlbCompression compression = proto::GlbCompression::kDraco;  // kGlb only
   proto::TextureFormat texture = proto::TextureFormat::kNone;         // kGlb only
   Coding coding = Coding::kIdentity;
-  // Extensions of quantized-mesh, each only where the client asks for it and the tile has it. GLB tiles always have
+  // Extensions of quantized-mesh, included if the client asks for them and the tile has them. GLB tiles always have
   // normals.
   bool normals = false;
   bool water_mask = false;

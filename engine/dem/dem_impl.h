@@ -1,4 +1,4 @@
-// What a DemSource holds. Everything is settled by Open.
+// The state of a DemSource. Immutable after Open.
 #pragma once
 
 #include <optional>
@@ -11,7 +11,7 @@
 
 namespace terrace::dem {
 
-// What Fill noted of a window, or of a part of it; then without positions.
+// The trace of RasterGrid::Fill for a window, or for `part` of it; then it has no positions.
 struct PartTrace {
   std::optional<NodeWindow> part = {};
   GridTrace trace = {};
@@ -19,8 +19,8 @@ struct PartTrace {
 
 class DemSource::Impl {
  public:
-  // `what` is read, for messages. `traces`, unless it is null, gets those of the raster grids that were read, in their
-  // order.
+  // `what`: names the request in messages. `traces`, unless null, receives the traces of the raster grids that were
+  // read, in order.
   Result<std::vector<float>> ReadNodes(int level, const NodeWindow& window, HeightDatum datum, const std::string& what,
                                        const std::stop_token& stop, std::vector<PartTrace>* traces = nullptr) const;
   Result<TileHeights> Read(const geo::TileKey& key, HeightDatum datum, const std::stop_token& stop) const;
@@ -37,10 +37,10 @@ class DemSource::Impl {
                                        std::vector<PartTrace>* traces) const;
   Result<double> BoundError(const TileHeights& tile, const NodeWindow& window, std::vector<PartTrace> traces,
                             const std::stop_token& stop) const;
-  // Those that can have heights there, in their order.
+  // The raster grids that may have heights in the box, in order of precedence.
   std::vector<std::size_t> GridsAt(const Box& degrees) const;
 
-  std::vector<RasterGrid> grids;  // the first that has a height at a place gives it
+  std::vector<RasterGrid> grids;  // in order of precedence
   BoxIndex index;                 // of the raster grids, by degrees (IndexOf)
   std::vector<geo::Lattice> lattices;
   std::vector<std::vector<geo::TileRange>> available;
@@ -52,8 +52,8 @@ class DemSource::Impl {
   std::uint64_t fingerprint = 0;
 };
 
-// RasterGrids by the longitudes and latitudes where they can have heights; longitudes from -540 to 540, each turn of a
-// raster grid that begins there.
+// An index of raster grids by the box in degrees where they may have heights. Longitudes from -540 to 540, with one
+// entry for each turn around the Earth that begins there.
 BoxIndex IndexOf(const std::vector<RasterGrid>& grids);
 
 }  // namespace terrace::dem

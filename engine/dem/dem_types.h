@@ -1,4 +1,4 @@
-// Plain values that elevation models are described with: options, files, extents, heights of tiles.
+// Plain values of elevation models: options, files, extents, heights of tiles.
 #pragma once
 
 #include <cstddef>
@@ -15,63 +15,62 @@
 
 namespace terrace::dem {
 
-// How the samples of a source are to be understood.
+// How to interpret the samples of a source.
 struct SourceOptions {
-  // What its heights count from: "crs" (what its reference system states), "unknown", "ellipsoid", "egm96", "egm2008",
-  // a vertical reference system ("EPSG:5703"), or the path of a grid of undulations.
+  // The vertical datum: "crs" (as the file states it), "unknown", "ellipsoid", "egm96", "egm2008", a vertical reference
+  // system ("EPSG:5703"), or the path of a geoid grid.
   std::string vertical = "crs";
   bool find_voids = true;           // detects undeclared nodata values (undeclared_nodata.h)
-  std::vector<double> nodata = {};  // raw values that are voids, beside the declared one
+  std::vector<double> nodata = {};  // further raw values that mean void
 
   friend bool operator==(const SourceOptions&, const SourceOptions&) = default;
 };
 
-// What is drawn in a hole, a large void with data all around it, where no source has a height. Voids that touch the rim
-// of their source are collars, and show the floor in any case (docs/decisions/0015-voids.md).
+// The surface in a hole. A hole is a large void with data all around it and no height from any source. Voids that touch
+// the rim of their source are collars; they always show the floor (docs/decisions/0015-voids.md).
 enum class HoleFill : std::uint8_t {
-  kSmooth,  // a smooth surface between the heights around it
+  kSmooth,  // a harmonic surface between the surrounding heights
   kFloor,
 };
 
-// What heights are to count from.
+// The vertical datum of heights.
 enum class HeightDatum : std::uint8_t {
-  kEllipsoid,    // that of WGS 84, as in tiles
-  kOrthometric,  // the geoid that the source counts from; EGM96 where it counts from the ellipsoid
-  kSource,       // that of the source's samples
+  kEllipsoid,    // the WGS 84 ellipsoid, as in tiles
+  kOrthometric,  // the source's geoid; EGM96 where the source refers to the ellipsoid
+  kSource,       // the source's own
 };
 
 struct DemOptions {
-  SourceOptions source = {};    // of files that have none of their own
-  double error_fraction = 0.5;  // default error of a level, as a share of the clients' level error
+  SourceOptions source = {};    // for files without options of their own
+  double error_fraction = 0.5;  // default error of a level, as a share of the level error that clients assume
   std::optional<double> finest_error =
       {};                            // metres: the deepest level is the first whose default error is at most this
-  std::optional<double> floor = {};  // metres above the ellipsoid, outside the source and in collars; default: the
-                                     // lowest height, at most
+  std::optional<double> floor = {};  // metres above the ellipsoid, used outside the sources and in collars; default:
+                                     // a height at or below the lowest one
   HoleFill voids = HoleFill::kSmooth;
-  int max_void_gap = 64;  // source samples: voids narrower than this along a row, column or diagonal are filled
-  // A folder for what is learnt of sources once (docs/configuration.md). Empty: nothing is kept.
+  int max_void_gap = 64;  // samples: voids narrower than this along a row, column or diagonal are bridged
+  // The folder of the statistics cache (docs/configuration.md). Empty: no cache.
   std::string cache_dir = {};
-  // Metres, of a mosaic: so far from its edges and voids a source begins to give way to what lies below it. 0: at them.
+  // Mosaics, metres: within this distance of its edges and voids a source is blended with the sources below. 0: hard
+  // edges.
   double feather = 0;
-  // Called now and then while Open scans the sources, with the share done, 0..1: files count alike. May be empty.
+  // Called while Open reads the sources, with the share done, 0 .. 1; files have equal shares. May be empty.
   std::function<void(double)> progress = {};
-  std::stop_token stop = {};  // Open gives up (kCancelled)
-  // Told of every file that cannot be opened, after which Open looks at the others too before it fails. Empty: it fails
-  // at the first.
+  std::stop_token stop = {};  // makes Open return kCancelled
+  // Called for every file that cannot be opened; Open checks all files before it fails. Empty: Open fails at the first.
   std::function<void(const Error&)> fault = {};
 };
 
 // One raster of a dataset.
 struct DemFile {
   std::string path;
-  // Where several sources have a height the one of the lowest rank counts; of equal ranks the finer one, then the one
-  // whose path sorts first.
+  // Where several sources have a height, the lowest rank wins, then the finer source, then the first path in order.
   int rank = 0;
-  bool may_be_other = false;                  // it stands in a folder: if it is no raster at all it is left out
-  std::optional<SourceOptions> options = {};  // of this file; else those of DemOptions
+  bool may_be_other = false;                  // found in a folder: skipped if it is no raster
+  std::optional<SourceOptions> options = {};  // default: DemOptions::source
 };
 
-// Metres above the ellipsoid (or whatever the source counts from where no datum is stated).
+// Metres above the ellipsoid, or in the source's datum where that is unknown.
 struct HeightRange {
   double min = 0;
   double max = 0;
@@ -87,13 +86,13 @@ struct GeoPosition {
   double longitude = 0, latitude = 0;
 };
 
-// A block of a grid of nodes: first column and row, and how many of each.
+// A rectangle of nodes: first column and row, and their numbers.
 struct NodeWindow {
   std::int64_t column = 0, row = 0;
   int columns = 0, rows = 0;
 };
 
-// What `terrace info` prints of one raster.
+// One raster, as `terrace info` prints it.
 struct RasterInfo {
   std::string path;
   std::string driver;  // GDAL's short name: "GTiff"
@@ -101,58 +100,58 @@ struct RasterInfo {
   std::string data_type;                     // "Int16"
   std::string crs;                           // name and code: "WGS 84 / UTM zone 11N (EPSG:32611)"
   std::string vertical_datum;                // as stated by the CRS; empty: not stated
-  std::string counts_from;                   // what heights are taken to count from; empty: not known
-  std::string vertical_operation;            // the PROJ operation that makes them ellipsoidal; empty: none needed
+  std::string counts_from;                   // the vertical datum in use; empty: unknown
+  std::string vertical_operation;            // PROJ operation to ellipsoidal heights; empty: none needed
   std::string height_unit;                   // as stated by the band; empty: metres assumed
-  bool knows_height_unit = true;             // else heights are taken as metres
-  std::string picture_part;                  // what of a picture the band says it is, "red"; empty: of none
+  bool knows_height_unit = true;             // false: metres assumed
+  std::string picture_part;                  // colour interpretation of a picture's band, "red"; empty: none
   double pixel_width = 0, pixel_height = 0;  // in units of the CRS
   std::string pixel_unit;                    // "degree", "metre"
-  double spacing_m = 0;                      // finer ground axis at the centre, true metres
+  double spacing_m = 0;                      // along the finer axis at the centre, metres on the ground
   GeoBounds bounds;                          // of the pixels' area
-  HeightRange heights;                       // of all valid samples, as the source counts them
-  std::string heights_doubted;               // why they are hardly metres, with a way out; empty: they may be
-  HeightRange ellipsoidal;                   // at least as wide as they are once converted
+  HeightRange heights;                       // of all valid samples, in the source's datum
+  std::string heights_doubted;               // why they may not be metres, with the remedy; empty: plausible
+  HeightRange ellipsoidal;                   // contains all ellipsoidal heights
   std::uint64_t valid_samples = 0, void_samples = 0;
-  std::uint64_t hole_samples = 0;  // of the voids, those that do not touch its rim
+  std::uint64_t hole_samples = 0;  // voids that do not touch the rim
   std::optional<double> nodata;
-  std::string found_voids;  // what find_voids found, for people; empty: nothing
+  std::string found_voids;  // detected nodata values, for people; empty: none
   std::vector<int> overview_factors;
-  std::string overviews_unused;  // why those that it has are not, with a way out; empty: they are, or there are none
-  std::string transform;         // the PROJ operation from EPSG:4326 to the source, for the log; empty: none needed
+  std::string overviews_unused;  // why overviews are ignored, with the remedy; empty: none are
+  std::string transform;         // PROJ operation from EPSG:4326 to the source, for the log; empty: none needed
   bool needs_averages = false;   // large, and without overviews
-  bool prepared = false;         // it has averages in the cache folder
+  bool prepared = false;         // averages are in the statistics cache
   double seconds_to_open = 0;
 };
 
-// What `terrace info` prints and `/datasets` tells of a dataset.
+// A dataset, as `terrace info` prints it and `/datasets` returns it.
 struct DemInfo {
-  std::vector<RasterInfo> sources;  // sorted: the first that has a height at a place gives it
+  std::vector<RasterInfo> sources;  // in order of precedence
   GeoBounds bounds;
-  HeightRange heights;  // above the ellipsoid, at least as wide as those of all valid samples
+  HeightRange heights;  // contains all valid samples, metres above the ellipsoid
   double floor = 0;
   int max_level = 0;
   int max_mercator_depth = 1;
-  // Files of folders that have no part in it though they look like rasters, each with the reason.
+  // Files of folders that look like rasters and are not used, each with the reason.
   std::vector<std::string> left_out;
 };
 
-// Samples read for tiles, at the resolution they were read at.
+// Numbers of samples read for tiles, at the resolution that they were read at.
 struct SampleCounts {
   std::uint64_t measured = 0;
-  std::uint64_t filled = 0;  // voids, from the heights around them
-  std::uint64_t voids = 0;   // other sources or the floor show there
+  std::uint64_t filled = 0;  // voids filled from the heights around them
+  std::uint64_t voids = 0;   // left to other sources or the floor
 };
 
-// Height samples of a tile with one more sample on each side, row by row from the south-western halo sample. Every
-// value is finite. The same global node has the same bits in every tile.
+// Height samples of a tile and a halo of one sample on each side, row by row from the south-western halo sample. All
+// values are finite. A global node has the same bits in every tile.
 struct TileHeights {
   geo::Lattice lattice;
   int stride = 0;              // cells + 3
   std::vector<float> heights;  // stride * stride
-  // Metres, of Read alone: no valid sample of a source, at its full resolution and above the ellipsoid, lies farther
-  // from the surface that is bilinear between the tile's own samples; nor does what sources are blended to, where a
-  // feather blends them. The halo does not count.
+  // Set by Read, metres: an upper bound of the vertical distance between the surface that is bilinear between the
+  // tile's samples, without the halo, and every valid full-resolution sample of the sources. Where sources are blended,
+  // also of the blended heights.
   double source_error_m = std::numeric_limits<double>::infinity();
 
   // i, j in -1 .. cells + 1: columns from the west, rows from the SOUTH.

@@ -1,4 +1,4 @@
-// Vertices inside of tiles that are hardly more than their edges.
+// Adds vertices inside tiles that have few besides those of their edges.
 #pragma once
 
 #include "engine/tin/mesh/tin_mesh.h"
@@ -6,10 +6,10 @@
 
 namespace terrace::tiler {
 
-// The normals of an edge are those of its own samples, which the neighbour shares. Beside the end of the data they know
-// nothing of the cliff that the tile's few triangles span, and light falls on the wrong sides. Where that is so for
-// half of the vertices, as many are inserted on a grid of lattice nodes: their normals follow the triangles
-// (docs/decisions/0003-normals-inside-follow-the-mesh.md). Edges stay as they are.
+// Normals on an edge come from the edge's own samples, which the neighbour shares. At the rim of the data they ignore
+// the cliff that the tile's few triangles span, and shading is wrong. If that holds for half of the vertices, this
+// inserts as many vertices on a grid of lattice nodes; their normals follow the triangles
+// (docs/decisions/0003-normals-inside-follow-the-mesh.md). Edges do not change.
 tin::TinMesh WithInnerVertices(const proto::LatticeView& lattice, tin::TinMesh mesh);
 
 }  // namespace terrace::tiler

@@ -1,4 +1,4 @@
-// Keeping the error of a mesh after the rounding of its vertices.
+// Restores the error bound of a mesh after its vertices were rounded.
 #pragma once
 
 #include <cstddef>
@@ -11,16 +11,16 @@
 
 namespace terrace::tiler {
 
-// Rounds the vertices of a mesh as its format does, and measures what clients will decode.
+// Rounds the vertices of a mesh as its format does, and measures the decoded mesh.
 using MeasureMesh = std::function<proto::TileError(const tin::TinMesh&)>;
 
-// Inserts samples inside the mesh until none of them misses the bound of `measure`, and returns the last measurement,
-// which is of the mesh as it then is. Its largest error is above the bound only
-// - at vertices whose rounded positions lie beside their samples, all of whose neighbours are vertices too: by the
-//   steps between these samples, as far as the positions are off;
-// - by what the format's own rounding of heights takes;
-// - on the tile's edges, where nothing may be inserted;
-// - if the mesh would get more than `max_vertices`.
+// Inserts samples inside the mesh until all keep the bound of `measure`. Returns the measurement of the final mesh. The
+// largest error exceeds the bound only
+// - at vertices whose rounded positions lie beside their samples and whose neighbours are all vertices: by the height
+//   differences between these samples over the offset of the positions;
+// - by the format's rounding of heights;
+// - on the tile's edges, which do not change;
+// - if the mesh would need more than `max_vertices`.
 // kCancelled: stopped.
 Result<proto::TileError> MendMesh(tin::TinMesh& mesh, const MeasureMesh& measure, std::size_t max_vertices,
                                   const std::stop_token& stop);

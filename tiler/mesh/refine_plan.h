@@ -1,6 +1,6 @@
-// How a tile is refined so that it keeps any error and matches its neighbours: derived from its level, its own border
-// samples, and for the edges' height grid from height ranges of the neighbours. Not from the error: a refinement serves
-// every error (engine/tin/refinement.h).
+// Options of a tile's refinement, such that the tile keeps any error and its edges match its neighbours. They depend on
+// the level, the tile's own border samples, and the height ranges of the neighbours. They do not depend on the error: a
+// refinement serves every error (engine/tin/refinement.h).
 #pragma once
 
 #include "engine/tin/greedy.h"
@@ -9,8 +9,8 @@
 
 namespace terrace::tiler {
 
-// Everything that decides the edges is a function of the level and of the edge's own samples and steps.
-// `needed`: the steps that the edges' heights need at any error, MakeEdgeSteps for the smallest one.
+// The edges depend on the level and on their own samples and steps alone.
+// `needed`: height steps of the edges for the smallest error (MakeEdgeSteps).
 tin::GreedyOptions MakeRefinePlan(const proto::LatticeView& lattice, const proto::EdgeSteps& needed);
 
 }  // namespace terrace::tiler

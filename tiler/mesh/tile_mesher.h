@@ -15,44 +15,44 @@
 
 namespace terrace::tiler {
 
-// How a dataset wants its tiles meshed.
+// Meshing options of a dataset.
 struct MeshRules {
   tin::Criterion criterion = tin::Criterion::kDelaunay;
-  bool compact = false;  // with the drop pass (engine/tin/decimate/drop_pass.h)
+  bool compact = false;  // runs the drop pass (engine/tin/decimate/drop_pass.h)
 };
 
 struct MeshedTile {
   tin::TinMesh mesh;
   proto::QuantizedTile tile;
   double max_error_m = 0;                // measured on the encoded integers
-  double surface_error_m = 0;            // the same everywhere, not at the lattice's samples alone
-  std::chrono::microseconds replayed{};  // time until the mesh stood; quantizing and measuring came after it
+  double surface_error_m = 0;            // also between the lattice's samples
+  std::chrono::microseconds replayed{};  // time until the mesh was replayed, before quantizing and measuring
 };
 
 struct StartedMesh {
   tin::TinMesh mesh;
-  double error_m = 0;  // what its inside holds; more than was wanted where the vertices would not fit the format
+  double error_m = 0;  // kept inside the tile; above the requested error if the format's vertex limit was reached
 };
 
-// What a build ends with when it was stopped.
+// The error of a stopped build.
 tl::unexpected<Error> Cancelled();
 
 // The samples of a tile without the halo.
 tin::HeightField FieldOf(const proto::LatticeView& lattice);
 
-// How the tile is refined, for every error at once (refine_plan.h).
+// Options of the tile's refinement, which serves every error (refine_plan.h).
 tin::GreedyOptions PlanOf(const dem::DemSource& source, const proto::LatticeView& lattice, tin::Criterion criterion);
 
-// The tile's mesh to the error before it is quantized: replayed, and dropped where the rules say so. `refinement` is
-// as for MeshTile. kCancelled: stopped.
+// Replays the refinement to the error and runs the drop pass if the rules ask for it. The mesh is not yet quantized.
+// `refinement` as for MeshTile. kCancelled: stopped.
 Result<StartedMesh> StartMesh(const dem::DemSource& source, const proto::LatticeView& lattice,
                               const tin::Refinement& refinement, const MeshRules& rules, double wanted_error_m,
                               const std::stop_token& stop);
 
-// The tile's mesh to the error: replayed, dropped where the rules say so, quantized, measured, and mended where the
-// quantization pushed a sample over the bound. `refinement` is PlanOf's run to this error or a finer one, or one
-// that ended above the format's number of vertices: then the inside is coarser, the edges are not. A tile with a
-// triangle that rounding would turn over is meshed by the plain rules. kCancelled: stopped.
+// StartMesh, then quantizes, measures, and inserts samples that quantization pushed over the bound. `refinement` was
+// run with PlanOf to this error or a finer one, or until the format's vertex limit; in that case the inside is coarser
+// than requested and the edges are not. If quantization would flip a triangle, the tile is meshed with the default
+// rules. kCancelled: stopped.
 Result<MeshedTile> MeshTile(const dem::DemSource& source, const proto::LatticeView& lattice,
                             const tin::Refinement& refinement, const MeshRules& rules, double wanted_error_m,
                             const std::stop_token& stop);

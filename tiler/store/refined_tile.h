@@ -1,4 +1,4 @@
-// A tile as the engine leaves it: what every error, format and coding of it is made from without reading it again.
+// Heights and refinement of a tile. Every error, format and coding of it is made from these without reading the source.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@ namespace terrace::tiler {
 struct RefinedTile {
   dem::TileHeights heights;
   tin::Refinement refinement;
-  double error_m = 0;  // the refinement holds the mesh to this error and to every larger one
+  double error_m = 0;  // the smallest error that the refinement serves
 };
 
 inline std::size_t BytesOf(const RefinedTile& tile) {
@@ -25,7 +25,7 @@ inline std::size_t BytesOf(const RefinedTile& tile) {
 using RefinedTilePtr = std::shared_ptr<const RefinedTile>;
 
 struct RefinedTileKey {
-  std::uint64_t generation = 0;  // of the dataset, which it stands for
+  std::uint64_t generation = 0;  // identifies the dataset
   geo::TileKey key;
 
   friend bool operator==(const RefinedTileKey&, const RefinedTileKey&) = default;

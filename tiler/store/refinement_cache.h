@@ -1,4 +1,4 @@
-// Refinements in memory, and in a slower store below that.
+// Refinements in memory, with an optional slower store below.
 //
 // Thread-safe.
 #pragma once
@@ -14,20 +14,20 @@ namespace terrace::tiler {
 
 class RefinementCache {
  public:
-  // 0 bytes: none in memory. `below` may be null.
+  // `memory_bytes` 0: keeps none in memory. `below` may be null.
   explicit RefinementCache(std::size_t memory_bytes, std::shared_ptr<RefinementStore> below = nullptr)
       : memory_(memory_bytes), below_(std::move(below)) {}
 
-  // Null when it is not there. Blocks where the store below does.
+  // Null if absent. Blocks if the store below blocks.
   RefinedTilePtr Find(const RefinedTileKey& key);
   RefinedTilePtr FindInMemory(const RefinedTileKey& key) { return memory_.Find(key); }
 
   void Insert(const RefinedTileKey& key, RefinedTilePtr tile);
 
-  // ByteCache's, of what is in memory.
+  // As of ByteCache, for the memory tier.
   void Retain(const std::vector<std::uint64_t>& generations) { memory_.Retain(generations); }
   void SetCapacity(std::size_t memory_bytes) { memory_.SetCapacity(memory_bytes); }
-  // Of what is in memory.
+  // Of the memory tier.
   ByteCacheStats stats() const;
 
  private:

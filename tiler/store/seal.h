@@ -1,4 +1,4 @@
-// Values of a store with a checksum over key and value: what does not check out was not written for this key.
+// Values of a store with a checksum over key and value, so that a damaged or misplaced value is detected.
 #pragma once
 
 #include <optional>
@@ -9,7 +9,7 @@ namespace terrace::tiler {
 
 std::string Seal(std::string_view key, std::string value);
 
-// The value within `sealed`; nothing if a bit of it, its length or its key is another one (but for one case in 2^64).
+// The value within `sealed`, or nothing if its bits, length or key differ (with a probability of 1 - 2^-64).
 std::optional<std::string_view> Unseal(std::string_view key, std::string_view sealed);
 
 }  // namespace terrace::tiler

@@ -1,4 +1,4 @@
-// The encoded tiles that were built last.
+// The memory tier of encoded tiles.
 #pragma once
 
 #include <cstdint>
@@ -9,8 +9,8 @@
 
 namespace terrace::tiler {
 
-// A request, and the generation of the dataset it is about: a replaced source never meets tiles of the old one. The
-// generation names the dataset, so that the key holds while other datasets come and go.
+// A request and the generation of its dataset, so that a replaced source never gets tiles of the old one. The
+// generation identifies the dataset: keys stay valid while other datasets are added or removed.
 struct CacheKey {
   TileRequest request;  // its `dataset` is 0
   std::uint64_t generation = 0;

@@ -1,7 +1,7 @@
-// Cached things as bytes, for a store that outlives the process: keys, encoded tiles, refined tiles.
+// Serialization for stores that outlive the process: keys, encoded tiles, refined tiles.
 //
-// A key holds everything its value depends on within one build of the program: the dataset's generation, which stands
-// for the dataset, and the request. The values are as trustworthy as the store: seal.h finds damage, not malice.
+// A key holds everything that its value depends on within one build of the program: the dataset's generation, which
+// identifies the dataset, and the request. seal.h detects damage, not forgery: trust the store.
 #pragma once
 
 #include <string>
@@ -14,16 +14,16 @@
 
 namespace terrace::tiler {
 
-// Different keys have different bytes. TileRequest::dataset is not in them.
+// Different keys have different bytes. TileRequest::dataset is not part of them.
 std::string RecordKey(const CacheKey& key);
 std::string RecordKey(const RefinedTileKey& key);
 
 std::string SerializeTile(const EncodedTile& tile);
-// Without the times of the build. kInvalidArgument: not what SerializeTile writes.
+// The times of the build are zero. kInvalidArgument: not written by SerializeTile.
 Result<EncodedTile> ParseTile(std::string_view bytes);
 
 std::string SerializeRefinedTile(const RefinedTile& tile);
-// kInvalidArgument: not what SerializeRefinedTile writes.
+// kInvalidArgument: not written by SerializeRefinedTile.
 Result<RefinedTile> ParseRefinedTile(std::string_view bytes);
 
 }  // namespace terrace::tiler

@@ -1,6 +1,6 @@
-// Where what the pipeline made is kept between requests: the interface that each tier of a cache implements.
+// The interface of a cache tier for tiles and refinements.
 //
-// Implementations are thread-safe. Find may block, where a tier is a disk or a network; Insert returns at once.
+// Implementations are thread-safe. Find may block on a disk or a network. Insert returns at once.
 #pragma once
 
 #include <cstdint>
@@ -18,10 +18,10 @@ class Store {
  public:
   virtual ~Store() = default;
 
-  // A copy of the caller's own; nothing when it is not there.
+  // Returns a copy, or nothing if the key is absent.
   virtual std::optional<Value> Find(const Key& key) = 0;
 
-  // Later values of a key replace earlier ones.
+  // Replaces the value of an existing key.
   virtual void Insert(const Key& key, std::shared_ptr<const Value> value) = 0;
 };
 

@@ -1,4 +1,4 @@
-// The surface of one lattice cell, measured at places that are told in a raster's pixels.
+// The surface of one lattice cell, evaluated at positions in pixels of a raster.
 #pragma once
 
 #include <array>
@@ -8,19 +8,19 @@
 
 namespace terrace::dem {
 
-// The surface that is bilinear between the heights at a cell's nodes: south-western, south-eastern, north-western,
-// north-eastern.
+// The bilinear surface through the heights at a cell's nodes, in the order south-west, south-east, north-west,
+// north-east.
 class CellSurface {
  public:
-  // `corners`: the nodes' places in pixels, known to that slack beside places of samples. `is_separable`: columns are
-  // meridians and rows are parallels, evenly spaced.
+  // `corners`: positions of the nodes in pixels, with an uncertainty of `slack` against positions of samples.
+  // `is_separable`: columns are meridians and rows are parallels, evenly spaced.
   CellSurface(const std::array<Position, 4>& corners, bool is_separable, const Position& slack);
 
   void SetHeight(std::size_t corner, double height) { heights_[corner] = height; }
-  // Heights of samples are known to this much less.
+  // Adds to the uncertainty of the samples' heights, in metres.
   void Widen(double error) { widened_ += error; }
 
-  // How far a sample at a place is from the surface, at most; 0 where the place is outside the cell.
+  // An upper bound of the distance between a sample and the surface; 0 if the position is outside the cell.
   double Apart(const Position& at, double sample) const;
 
  private:

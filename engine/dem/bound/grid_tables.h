@@ -1,4 +1,4 @@
-// What the tables of a raster grid's rasters tell of the pixels around a tile. For one thread.
+// Statistics of a raster grid's members around a tile. Not thread-safe.
 #pragma once
 
 #include <cstddef>
@@ -10,30 +10,30 @@ namespace terrace::dem {
 
 class GridTables {
  public:
-  // What `raster grid` and `trace` refer to outlives it. `stride`: nodes in a row of the trace.
+  // `grid` and `trace` must outlive this. `stride`: nodes in a row of the trace.
   GridTables(const RasterGrid& grid, const GridTrace& trace, std::size_t stride);
 
-  // Of all of the raster grid.
+  // Of the whole raster grid.
   const HeightRange& heights() const { return grid_.heights(); }
 
-  // So far, for all that was asked. A box is to cost what it meets, not what the raster grid holds.
+  // Members visited by all queries so far. For tests: a query visits the members that its box meets.
   std::size_t members_visited() const { return members_visited_; }
 
-  // Pixels by which samples of the rasters around the tile lie off the raster grid's, the most on each axis.
+  // The largest offset of samples of the rasters around the tile from the raster grid on each axis, in pixels.
   const Position& misplacement() const { return misplacement_; }
 
-  // At least the range of pixels in a box, clipped to the raster grid.
+  // A range that contains all samples in a box, in pixels. Clips the box to the raster grid.
   BlockRange Ranges(double west, double north, double east, double south) const;
 
-  // How far samples are from the surface between averages of the trace's factor (averaging_errors.h), in a box of them
-  // by column and row, ends included. Infinite where that surface is not one raster's own.
+  // The largest distance of samples from the surface between averages of the trace's factor (averaging_errors.h). The
+  // box is in averages, ends included. Infinite where several rasters contribute to that surface.
   float AveragingError(double west, double north, double east, double south) const;
 
  private:
   Box BoxAround(std::size_t stride) const;
   std::vector<std::size_t> MembersAround() const;
   bool IsAround(const Box& pixels) const;
-  // Calls visit(member, its tables) for at least the members that meet a box. Null tables: they are not at hand.
+  // Calls visit(member, tables) for all members that meet a box, and perhaps others. Null tables: not in memory.
   template <typename Visit>
   void ForMembersAt(const Box& pixels, const Visit& visit) const;
   float ErrorOfAverages(double west, double north, double east, double south) const;  // of pixels

@@ -1,5 +1,4 @@
-// Cells whose bound, told from averages and tables, may be improved by reading their samples: at the joints of averaged
-// rasters, at rims and beside voids.
+// Cells with a loose bound, at joints of averaged rasters, at rims and beside voids. Reading their samples tightens it.
 #pragma once
 
 #include <cstdint>
@@ -13,19 +12,19 @@ namespace terrace::dem {
 
 class LooseCells {
  public:
-  // Averages of more samples are judged by tables, whose blocks are as fine.
+  // For larger factors the blocks of the statistics are as fine as the cells.
   static bool MayRead(int factor) { return factor > 1 && factor <= 16; }
 
-  // What these refer to outlives it.
+  // The arguments must outlive this.
   LooseCells(const RasterGrid& grid, const CellErrorBound& single) : grid_(grid), single_(single) {}
 
-  // Cells of a group lie beside each other: their samples are read together.
+  // Cells of a group are adjacent; their samples are read together.
   void BeginGroup() { groups_.emplace_back(); }
 
-  // `error`: what is known. Precondition: a group has begun.
+  // `error`: the known bound of the cell. Precondition: a group has begun.
   void Add(const TileCell& cell, const CellErrorBound::CellSamples& place, double error);
 
-  // Raises `bound` to that of all cells, reading no more than that needs and no more than a bounded number of samples.
+  // Raises `bound` to the bound of all cells. Reads only groups that could raise it, and a bounded number of samples.
   // kUnavailable: a raster cannot be read now. kCancelled: stopped.
   Result<void> Read(double& bound, const std::stop_token& stop);
 

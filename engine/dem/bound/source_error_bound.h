@@ -1,5 +1,5 @@
-// How far the surface between a tile's samples is from the samples of its sources:
-// docs/decisions/0011-certified-error.md.
+// An upper bound of the distance between the surface through a tile's samples and the samples of its sources
+// (docs/decisions/0011-certified-error.md).
 #pragma once
 
 #include <cstdint>
@@ -14,24 +14,24 @@
 
 namespace terrace::dem {
 
-// Measures one tile: one Add for each raster grid, in their order.
+// The bound of one tile. Call Add for each raster grid, in order of precedence.
 class SourceErrorBound {
  public:
-  // Cells per axis that are judged together where nothing is in the way.
+  // Cells along a side of a group. Groups without voids, rims or blending are bounded as a whole.
   static constexpr int kGroup = 16;
 
-  // `window` and `heights`: the tile's samples and one more on each side, as they are served. `blends`: raster grids
-  // are blended where one gives way to the next.
+  // `window` and `heights`: the tile's samples with a halo of one, as served. `blends`: raster grids are blended at
+  // their edges.
   SourceErrorBound(const geo::Lattice& lattice, const NodeWindow& window, std::span<const float> heights, bool blends);
 
-  // `trace`: what RasterGrid::Fill noted of this window, for heights above the ellipsoid. Samples may be read where
-  // nothing else tells enough. kUnavailable: a raster cannot be read now. kCancelled: stopped.
+  // `trace`: of RasterGrid::Fill for this window, with heights above the ellipsoid. Reads samples where statistics and
+  // averages give no tight bound. kUnavailable: a raster cannot be read now. kCancelled: stopped.
   Result<void> Add(const RasterGrid& grid, const GridTrace& trace, const std::stop_token& stop);
 
-  // No sample of a further raster grid shows anywhere.
+  // Whether the raster grids added so far hide all others.
   bool is_covered() const;
 
-  // Metres; infinite only where a source's overviews hide samples of unknown height.
+  // Metres. Infinite only if a source's overviews hide samples of unknown height.
   double bound() const { return bound_ + kRounding; }
 
  private:

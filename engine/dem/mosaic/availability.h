@@ -1,4 +1,4 @@
-// Which tiles a dataset of many sources has: deep ones only where a fine source lies.
+// Availability of tiles in a dataset of many sources: deep tiles exist only where a fine source is.
 #pragma once
 
 #include <span>
@@ -9,18 +9,20 @@
 
 namespace terrace::dem {
 
-// A source's place, not padded, and the deepest level that it is worth.
+// A source's footprint, without padding, and the deepest level that its resolution justifies.
 struct Reach {
   Footprint footprint;
   int depth = 0;
 };
 
-// Per level 0 .. the deepest: blocks without overlap, sorted by row, then column, that hold
-// - every tile that a source touches which is worth this level;
+// For each level from 0 to the deepest: ranges of tiles without overlap, sorted by row, then column, that contain
+// - every tile that touches a source of at least this depth;
 // - every ancestor of such a tile, and both roots;
-// - all four children of a tile that has any: 3D Tiles clients replace a tile by its children, so a missing child is a
-// hole. A level of more blocks than its description may grow to is made of larger ones, with tiles outside all sources.
-// Precondition: not empty.
+// - all four children of a tile that has any, because 3D Tiles clients replace a tile by its children and a missing
+// child
+//   is a hole.
+// A level with too many ranges for its documents gets fewer and larger ones, which include tiles outside all sources.
+// Precondition: `sources` is not empty.
 std::vector<std::vector<geo::TileRange>> AvailableTiles(std::span<const Reach> sources);
 
 }  // namespace terrace::dem

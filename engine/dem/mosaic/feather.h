@@ -1,4 +1,4 @@
-// How much a raster grid counts near its edge, where it is blended with what lies below it.
+// Blending weights of a raster grid near its edges and voids.
 #pragma once
 
 #include <vector>
@@ -7,10 +7,9 @@
 
 namespace terrace::dem {
 
-// For each sample of `core` its distance to the nearest void of `wide`, or to the outside of it, as a share of
-// `length`, at most 1; voids have 0. Distances are those between centres; `column_step` and `row_step` are the
-// distances of neighbours. Exact where `wide` exceeds `core` by length / step samples on every side, or ends where the
-// raster ends.
+// For each sample of `core`: the distance to the nearest void of `wide`, or to the outside of `wide`, divided by
+// `length`, at most 1; 0 for voids. Distances are between sample centres, `column_step` and `row_step` apart. Exact if
+// `wide` exceeds `core` by length / step samples on every side, or ends where the raster ends.
 std::vector<float> FeatherWeights(const std::vector<float>& wide_heights, const GridWindow& wide,
                                   const GridWindow& core, double column_step, double row_step, double length);
 

@@ -1,4 +1,4 @@
-// Which rasters lie on one pixel grid and touch each other, and where in the whole that they make.
+// Groups rasters that lie on one pixel grid and touch each other.
 #pragma once
 
 #include <cstddef>
@@ -11,19 +11,19 @@
 namespace terrace::dem {
 
 struct LaidRaster {
-  std::size_t raster = 0;            // its number among those given
-  std::int64_t column = 0, row = 0;  // of its first pixel
+  std::size_t raster = 0;            // index into the input
+  std::int64_t column = 0, row = 0;  // of its first pixel in the group
 };
 
-// Members ascend by their numbers. Pixels are counted from the north-western corner of all; from the westernmost raster
-// where they go all around the Earth.
+// Members in ascending order. The origin of pixels is the north-western corner of the group; for a group around the
+// whole Earth, the westernmost raster.
 struct GridLayout {
   std::vector<LaidRaster> members;
   int width = 0, height = 0;
 };
 
-// Every raster is in one of the layouts; layouts come in the order of their first members. Takes n log n time, unless
-// rasters pile up or pixel sizes nearly agree (GridFinder).
+// Puts every raster into one layout. Layouts are ordered by their first members. Takes O(n log n) time, unless many
+// rasters overlap or pixel sizes nearly agree (GridFinder).
 std::vector<GridLayout> LayOutGrids(std::span<const PlacedRaster> rasters);
 
 }  // namespace terrace::dem

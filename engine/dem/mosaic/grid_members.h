@@ -1,7 +1,8 @@
-// Which rasters make one raster grid: those whose pixels lie on one grid and touch each other.
+// The rasters of a raster grid: their pixels lie on one grid, they touch each other, and they share a vertical datum,
+// as the tiles of one product do.
 //
-// Tiles of one product are cut from one grid, and count from one datum. Read as one raster they have no joints:
-// averages, bridges over voids and interpolation go across, and a row or column that neighbours share counts once.
+// Reading them as one raster leaves no seams: averages, void filling and interpolation cross the joints, and a row or
+// column that neighbours share counts once.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +17,7 @@ namespace terrace::dem {
 struct GridMember {
   std::shared_ptr<const RasterSource> raster;
   std::int64_t column = 0, row = 0;  // of its first pixel in the raster grid
-  // Pixels by which its samples lie off those of the raster grid, the most on each axis. Set by the raster grid.
+  // The largest offset of its samples from the raster grid on each axis, in pixels. Set by the raster grid.
   Position misplacement = {0, 0};
 
   geo::TileRange pixels() const {  // y is the row, downwards
@@ -24,13 +25,13 @@ struct GridMember {
   }
 };
 
-// Members in the order given, their pixels counted from the north-western corner of all.
+// Members in input order. The origin of pixels is the north-western corner of all.
 struct GridPlan {
   std::vector<GridMember> members;
   int width = 0, height = 0;
 };
 
-// Every raster is in one of the plans; plans come in the order of their first members.
+// Puts every raster into one plan. Plans are ordered by their first members.
 std::vector<GridPlan> PlanGrids(const std::vector<std::shared_ptr<const RasterSource>>& rasters);
 
 }  // namespace terrace::dem

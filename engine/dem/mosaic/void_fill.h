@@ -1,4 +1,4 @@
-// Small voids, bridged from their rims.
+// Fills small voids by interpolation across them.
 #pragma once
 
 #include <vector>
@@ -7,13 +7,13 @@
 
 namespace terrace::dem {
 
-// Along the row, the column and both diagonals of a void the nearest valid samples on both sides make a pair, if at
-// most `max_gap` steps lie between the two. The void becomes the mean of the pairs' linear interpolations, weighted by
-// one over the squared distance of the pair; without a pair it stays NaN. Filled samples never serve as rims: the
-// result is a function of the samples within `max_gap` alone.
+// Along the row, the column and both diagonals through a void, the nearest valid samples on both sides form a pair if
+// they are at most `max_gap` steps apart. The void becomes the mean of the linear interpolations between the pairs,
+// weighted by the inverse squared distance of each pair. Without a pair it stays NaN. Filled samples are never used for
+// other voids, so the result depends on the samples within `max_gap` alone.
 //
-// `heights` fill the window `wide`; returned are those of the window `core` inside it. Exact if `wide` exceeds `core`
-// by max_gap on every side, or ends where the raster ends.
+// `heights`: the window `wide`. Returns the window `core` inside it. Exact if `wide` exceeds `core` by `max_gap` on
+// every side, or ends where the raster ends.
 std::vector<float> FillVoids(const std::vector<float>& heights, const GridWindow& wide, const GridWindow& core,
                              int max_gap);
 

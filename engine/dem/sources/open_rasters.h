@@ -1,4 +1,4 @@
-// The files of a dataset, opened on all cores.
+// Opens the files of a dataset on all cores.
 #pragma once
 
 #include <memory>
@@ -13,9 +13,9 @@ namespace terrace::dem {
 
 using Rasters = std::vector<std::shared_ptr<const RasterSource>>;
 
-// The rasters of `files`, in their order. What stands in a folder and is no raster, or has no height, leaves `files`;
-// `left_out` says which of these look like rasters, and why they are none. Errors are those of RasterSource::Open; of
-// several the one of the first file.
+// Returns the rasters of `files`, in order. Removes from `files` the files of folders that are no rasters or have no
+// heights; `left_out` lists those that look like rasters, with the reasons. Errors as of RasterSource::Open, of the
+// first file that fails.
 Result<Rasters> OpenRasters(std::vector<DemFile>& files, const DemOptions& options, std::vector<std::string>& left_out);
 
 }  // namespace terrace::dem

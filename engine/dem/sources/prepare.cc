@@ -57,14 +57,14 @@ class Preparer {
         shape_{layout, KeyOf(layout, options.find_voids, path, files), {}},
         chunks_(layout.width, layout.height) {
     if (!options.cache_dir.empty()) {
-      record_ = StatisticsPath(options.cache_dir, path, layout.rules.extra_nodata, options.find_voids,
-                               !layout.overview_factors.empty());
+      cache_file_ = StatisticsPath(options.cache_dir, path, layout.rules.extra_nodata, options.find_voids,
+                                   !layout.overview_factors.empty());
     }
-    prepared_.preparation.parts = chunks_.count();
+    prepared_.preparation.chunks = chunks_.count();
   }
 
   Result<PreparedRaster> Run() {
-    if (!record_.empty()) {
+    if (!cache_file_.empty()) {
       if (Load()) return std::move(prepared_);
       if (auto opened = OpenWriter(); !opened) return tl::unexpected(opened.error());
       if (!writer_ && Load()) return std::move(prepared_);
@@ -85,14 +85,14 @@ class Preparer {
   }
 
   bool Load() {
-    auto known = LoadStatistics(record_, shape_);
+    auto known = LoadStatistics(cache_file_, shape_);
     if (!known) return false;
     prepared_.detected = std::move(known->detected);
     prepared_.statistics = std::move(known->statistics);
     prepared_.averages = std::move(known->averages);
-    prepared_.record = record_;
+    prepared_.cache_file = cache_file_;
     prepared_.shape = shape_;
-    prepared_.preparation.from_record = true;
+    prepared_.preparation.from_cache = true;
     return true;
   }
 
@@ -105,7 +105,7 @@ class Preparer {
   Result<void> OpenWriter() {
     std::error_code failed;
     std::filesystem::create_directories(options_.cache_dir, failed);
-    auto writer = StatisticsCacheWriter::Open(record_, shape_, options_.stop);
+    auto writer = StatisticsCacheWriter::Open(cache_file_, shape_, options_.stop);
     if (writer) {
       writer_ = *std::move(writer);
       if (writer_) shape_ = writer_->shape();
@@ -161,10 +161,10 @@ class Preparer {
     // A file that changed meanwhile is a mixture, which its caller will refuse.
     if (!writer_ || files_.FirstChanged()) return;
     if (auto finished = writer_->Finish(prepared_.statistics); !finished) return GiveUpCache(finished.error());
-    auto known = LoadStatistics(record_, shape_);
+    auto known = LoadStatistics(cache_file_, shape_);
     if (!known) return;
     prepared_.averages = std::move(known->averages);
-    prepared_.record = record_;
+    prepared_.cache_file = cache_file_;
     prepared_.shape = shape_;
   }
 
@@ -174,7 +174,7 @@ class Preparer {
   const PrepareOptions& options_;
   StatisticsShape shape_;
   const ChunkGrid chunks_;
-  std::string record_;  // its path; empty: none
+  std::string cache_file_;  // its path; empty: none
   std::optional<StatisticsCacheWriter> writer_;
   PreparedRaster prepared_;
 };

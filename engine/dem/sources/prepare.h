@@ -1,4 +1,4 @@
-// A raster's statistics, from the cache folder where it was made before, else made now and kept there.
+// The statistics of a raster: loaded from the statistics cache, or read from the raster and stored there.
 #pragma once
 
 #include <gdal_priv.h>
@@ -17,37 +17,37 @@
 namespace terrace::dem {
 
 struct PrepareOptions {
-  std::string cache_dir;  // empty: none
+  std::string cache_dir;  // empty: no cache
   bool find_voids = true;
-  std::function<void(double)> progress = {};  // of each pass, 0..1
+  std::function<void(double)> progress = {};  // share done of each pass, 0 .. 1
   std::stop_token stop = {};
 };
 
 // How the statistics were made.
 struct Preparation {
-  bool from_record = false;
-  int parts = 0;        // of the raster
-  int chunks_kept = 0;  // of an interrupted run
+  bool from_cache = false;
+  int chunks = 0;       // of the raster
+  int chunks_kept = 0;  // from an interrupted run
   std::int64_t chunks_read = 0;
 };
 
 struct PreparedRaster {
-  DetectedNodata detected;  // undeclared voids; the statistics is one without them
+  DetectedNodata detected;  // undeclared nodata; the statistics exclude it
   RasterStatistics statistics;
-  std::shared_ptr<const CachedAverages> averages;  // null: there are none
-  std::string record;                              // where the statistics is kept; empty: nowhere
-  StatisticsShape shape;                           // the record's
+  std::shared_ptr<const CachedAverages> averages;  // null: none
+  std::string cache_file;                          // empty: not stored
+  StatisticsShape shape;                           // of the cache file
   Preparation preparation;
 };
 
-// `layout`: as the raster and its owner state it. A folder that cannot be written to costs a warning, never the
-// dataset. Errors name the file. kCancelled: stopped; what was done by then is kept.
+// `layout`: as the file and the configuration state it. If the cache folder is not writable, this logs a warning and
+// goes on without the cache. Errors name the file. kCancelled: stopped; finished chunks stay in the cache.
 Result<PreparedRaster> PrepareRaster(GDALDataset& dataset, const RasterLayout& layout, const std::string& path,
                                      const StampedFiles& files, const PrepareOptions& options);
 
-// The record of a raster: named after its file and a hash of its whole path, of what its owner says of its voids, as
-// two datasets may have one file and think differently of it, and of whether overviews are used: where they turn out to
-// be made of voids it takes two records, one to know that and one without them, and both are found again.
+// The cache file of a raster: named after the raster, with a hash of its full path, of its configured nodata values,
+// because two datasets may configure one file differently, and of the use of overviews. A raster whose overviews turn
+// out to contain voids has two cache files: one that says so, and one made without the overviews.
 std::string StatisticsPath(const std::string& cache_dir, const std::string& path,
                            const std::vector<double>& extra_nodata = {}, bool find_voids = true,
                            bool has_overviews = false);

@@ -217,14 +217,14 @@ void RasterSource::KeepTables(PreparedRaster prepared, const PrepareOptions& pre
   RasterStatistics& statistics = prepared.statistics;
   edge_row_means_ = statistics.edge_row_means;
   rim_voids_ = std::move(statistics.rim_voids);
-  if (pages == nullptr || prepared.record.empty() || pages->Admit(statistics.bytes())) {
+  if (pages == nullptr || prepared.cache_file.empty() || pages->Admit(statistics.bytes())) {
     kept_ = std::make_shared<const RasterStatistics>(std::move(statistics));
     return;
   }
   paging_ = std::make_unique<const Paging>(Paging{std::move(pages),
                                                   statistics.table.Coarse(kMaxCoarse),
                                                   !statistics.coarse.grids.empty(),
-                                                  std::move(prepared.record),
+                                                  std::move(prepared.cache_file),
                                                   std::move(prepared.shape),
                                                   {prepare.cache_dir, prepare.find_voids, {}, {}}});
 }
@@ -240,8 +240,8 @@ StatisticsPages::Tables RasterSource::tables() const {
 }
 
 Result<RasterStatistics> RasterSource::ReadTables() const {
-  if (auto known = LoadStatistics(paging_->record, paging_->shape)) return std::move(known->statistics);
-  spdlog::warn("{}: {} is gone or damaged; the source is prepared anew", info_.path, paging_->record);
+  if (auto known = LoadStatistics(paging_->cache_file, paging_->shape)) return std::move(known->statistics);
+  spdlog::warn("{}: {} is gone or damaged; the source is prepared anew", info_.path, paging_->cache_file);
   auto handle = handles_.Borrow();
   if (!handle) return tl::unexpected(handle.error());
   auto prepared = PrepareRaster(**handle, paging_->shape.layout, info_.path, files(), paging_->prepare);

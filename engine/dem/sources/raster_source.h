@@ -90,7 +90,7 @@ class RasterSource {
     std::shared_ptr<StatisticsPages> pages;
     RangeTable ranges;  // the coarse ones
     bool has_coarse_averages;
-    std::string record;
+    std::string cache_file;
     StatisticsShape shape;
     PrepareOptions prepare;
   };

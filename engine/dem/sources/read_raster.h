@@ -1,4 +1,4 @@
-// A raster's samples as they lie in the file.
+// Reads all samples of a raster, for `terrace mesh`.
 #pragma once
 
 #include <array>
@@ -12,21 +12,20 @@ namespace terrace::dem {
 
 struct ReadOptions {
   bool find_voids = true;           // detects undeclared nodata values (undeclared_nodata.h)
-  std::vector<double> nodata = {};  // further raw values that are voids
+  std::vector<double> nodata = {};  // further raw values that mean void
   std::function<void(double)> progress = {};
 };
 
-// A raster's samples as they lie in the file, for `terrace mesh`: row 0 in the north, voids NaN, no georeference
-// needed.
+// The samples of a raster in the order of the file: row 0 is the first row, voids are NaN. Needs no georeference.
 struct RasterHeights {
   int width = 0, height = 0;
   std::vector<float> heights;
   bool georeferenced = false;
   std::array<double, 6> geo_transform{};  // GDAL's order: x0, dx/dcol, dx/drow, y0, dy/dcol, dy/drow (pixel corners)
-  std::string coordinate_unit;            // in feet, kilometres ..: their name; empty: metres, degrees, or not known
+  std::string coordinate_unit;            // "US survey foot"; empty: metres, degrees or unknown
   bool in_angles = false;                 // x and y are longitudes and latitudes
-  std::string found_voids;                // what find_voids found, for people; empty: nothing
-  std::string picture_part;               // as RasterInfo has it
+  std::string found_voids;                // detected nodata values, for people; empty: none
+  std::string picture_part;               // as RasterInfo::picture_part
 };
 Result<RasterHeights> ReadRaster(const std::string& path, const ReadOptions& options = {});
 

@@ -1,4 +1,4 @@
-// How far averages of large factors are from the samples, told from smaller averages.
+// Errors of averages of large factors, computed from smaller averages.
 #pragma once
 
 #include "engine/dem/raster/sample_grid.h"
@@ -7,9 +7,9 @@
 
 namespace terrace::dem {
 
-// Raises the errors of factors above kLargestDirect. The surface between averages of such a factor is compared with the
-// one between averages of kLargestDirect samples, whose own errors are known and are added. Both surfaces are bilinear
-// between lines, so their difference is largest where lines of either cross: all crossings are looked at.
+// Raises the errors of factors above kLargestDirect. Compares the surface between averages of such a factor with the
+// surface between averages of kLargestDirect samples, and adds the known errors of the latter. Both surfaces are
+// bilinear between grid lines, so the difference is largest where grid lines cross. Evaluates all crossings.
 void AddCoarseErrors(const RasterLayout& layout, const CoarseAverages& coarse, AveragingErrors& errors);
 
 }  // namespace terrace::dem

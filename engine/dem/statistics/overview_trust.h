@@ -1,4 +1,4 @@
-// Whether a raster's overviews are averages of its heights alone: many were made of what is no height as well.
+// Detects overviews that are not averages of valid heights alone: many contain averaged nodata values.
 #pragma once
 
 #include <gdal_priv.h>
@@ -10,12 +10,12 @@
 
 namespace terrace::dem {
 
-// Takes overviews that must not be read from the layout: those that were made of voids, by what the file and its owner
-// state, and those with other sides than a grid of averages has. Why, for people, with a way out; empty: all of them
-// stay, or there are none.
+// Removes from the layout the overviews that must not be read: those that include voids, by the nodata values of the
+// file and the configuration, and those whose size is not that of a grid of averages. Returns the reason, with the
+// remedy, for people; empty if nothing was removed.
 std::string DropMisleadingOverviews(GDALDataset& dataset, RasterLayout& layout);
 
-// The same by what the statistics of the raster and its overviews has found.
+// The same, based on the statistics of the raster and its overviews.
 std::string DropMisleadingOverviews(GDALDataset& dataset, const RasterStatistics& statistics, RasterLayout& layout);
 
 }  // namespace terrace::dem

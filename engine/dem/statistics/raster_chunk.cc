@@ -11,7 +11,7 @@
 namespace terrace::dem {
 namespace {
 
-// Averages of the largest factor that is compared directly reach this far out of a part.
+// Averages of the largest factor that is compared directly reach this far out of a of_chunk.
 constexpr int kHalo = kLargestDirect;
 
 // Factors of the raster up to `most`, from `least` on.
@@ -97,7 +97,7 @@ std::vector<BlockSum> SumsOf(const Samples& samples, const Chunk& box, int facto
   return sums;
 }
 
-// Averages around a part: every one that the surface over its samples is interpolated from.
+// Averages around a chunk: every one that the surface over its samples is interpolated from.
 struct Averages {
   GridWindow window;
   std::vector<float> heights;
@@ -230,7 +230,7 @@ class RowErrors {
 
   const Averages& averages_;
   const GridAxis rows_;
-  std::vector<GridAxis::Location> places_;  // by column of the part, within the window
+  std::vector<GridAxis::Location> places_;  // by column of the of_chunk, within the window
   std::vector<double> line_;
 };
 

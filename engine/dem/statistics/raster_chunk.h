@@ -1,7 +1,7 @@
-// A raster part by part: what is learnt from one part of 1024 x 1024 samples, on its own.
+// Statistics of one chunk of a raster, 1024 x 1024 samples.
 //
-// What a part says depends on the raster alone, never on which parts were looked at before: they can be kept, and a
-// statistics that was interrupted goes on behind the last one (statistics_cache.h).
+// They depend on the raster alone, not on the chunks read before. So they can be cached, and an interrupted pass
+// resumes after the last cached chunk (statistics_cache.h).
 #pragma once
 
 #include <gdal_priv.h>
@@ -24,7 +24,7 @@ struct Chunk {
 
 constexpr int DivideUp(int a, int b) { return (a + b - 1) / b; }
 
-// The parts of a raster, by rows from the north-west.
+// The chunks of a raster, row by row from the north-west.
 class ChunkGrid {
  public:
   static constexpr int kSide = 1024;
@@ -41,10 +41,10 @@ class ChunkGrid {
   int width_ = 0, height_ = 0, columns_ = 0, rows_ = 0;
 };
 
-// Factors whose averages are compared with the samples themselves: 2, 4, .. kLargestDirect.
+// Averages of factors 2, 4, .. kLargestDirect are compared with the samples directly.
 inline constexpr int kLargestDirect = 64;
 
-// Voids first .. last of a row, counted from a part's first sample.
+// Voids first .. last of a row, relative to the chunk's first sample.
 struct VoidRun {
   std::uint16_t row, first, last;
 
@@ -54,25 +54,25 @@ struct VoidRun {
 struct ChunkStatistics {
   std::int64_t valid = 0;  // samples
   ZeroEdges zeros;
-  BlockSum first_row, last_row;    // the part of the raster's outermost rows that lies here
-  std::vector<BlockRange> ranges;  // of its RangeTable blocks, by rows
-  std::vector<VoidRun> voids;      // among the columns in use, by rows; empty where all of it is void
+  BlockSum first_row, last_row;    // of the raster's first and last row within the chunk
+  std::vector<BlockRange> ranges;  // by RangeTable block, row by row
+  std::vector<VoidRun> voids;      // in the columns in use, row by row; empty if the whole chunk is void
   // By factor 2, 4, .. kLargestDirect, as far as the raster has them:
-  std::vector<std::vector<float>> errors;    // of its AveragingErrors blocks, or its part of one
-  std::vector<std::vector<float>> averages;  // its own, by rows; empty where an overview gives them
+  std::vector<std::vector<float>> errors;    // by AveragingErrors block, or for the share of a block
+  std::vector<std::vector<float>> averages;  // row by row; empty if an overview has them
   std::vector<std::vector<BlockSum>> sums;   // of factors 128 .. 1024, as the averages
 
   bool is_void() const { return valid == 0; }
 };
 
-// A void part's statistics. It has no averages and no sums: theirs are voids.
+// Statistics of a void chunk. It has no averages and no sums.
 ChunkStatistics VoidStatistics(const Chunk& chunk, const RasterLayout& layout);
 
-// How many averages of that factor a part that is not void has; 0 where an overview gives them.
+// Number of averages of a factor in a chunk that is not void; 0 if an overview has them.
 std::size_t AveragesIn(const Chunk& chunk, const RasterLayout& layout, int factor);
 
-// kUnavailable: it cannot be read. kCancelled: stopped. `read` counts the parts whose samples were read: those that the
-// file does not store are known to be void without.
+// Increments `read` if samples were read; chunks that a sparse file does not store are void without reading.
+// kUnavailable: the raster cannot be read. kCancelled: stopped.
 Result<ChunkStatistics> ReadChunkStatistics(GDALDataset& dataset, const RasterLayout& layout, const Chunk& chunk,
                                             std::int64_t& read, const std::stop_token& stop = {});
 

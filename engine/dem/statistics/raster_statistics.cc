@@ -70,25 +70,25 @@ StatisticsAssembler::StatisticsAssembler(const RasterLayout& layout)
                        static_cast<std::size_t>(DivideUp(layout.height, ChunkGrid::kSide)));
 }
 
-void StatisticsAssembler::Add(const Chunk& chunk, const ChunkStatistics& part) {
+void StatisticsAssembler::Add(const Chunk& chunk, const ChunkStatistics& of_chunk) {
   statistics_.table.AddBlocks(chunk.col / RangeTable::kBlock, chunk.row / RangeTable::kBlock,
-                              DivideUp(chunk.cols, RangeTable::kBlock), part.ranges);
-  statistics_.valid += static_cast<std::uint64_t>(part.valid);
-  statistics_.zeros.Add(part.zeros);
-  voids_.Add(chunk, part);
-  first_row_.Add(part.first_row);
-  last_row_.Add(part.last_row);
-  for (std::size_t k = 0; k < part.errors.size(); ++k) {
+                              DivideUp(chunk.cols, RangeTable::kBlock), of_chunk.ranges);
+  statistics_.valid += static_cast<std::uint64_t>(of_chunk.valid);
+  statistics_.zeros.Add(of_chunk.zeros);
+  voids_.Add(chunk, of_chunk);
+  first_row_.Add(of_chunk.first_row);
+  last_row_.Add(of_chunk.last_row);
+  for (std::size_t k = 0; k < of_chunk.errors.size(); ++k) {
     const int factor = 2 << k, pixels = AveragingErrors::BlockPixels(factor), columns = DivideUp(chunk.cols, pixels);
-    for (std::size_t i = 0; i < part.errors[k].size(); ++i) {
+    for (std::size_t i = 0; i < of_chunk.errors[k].size(); ++i) {
       statistics_.errors.Raise(factor, chunk.col / pixels + static_cast<int>(i) % columns,
-                               chunk.row / pixels + static_cast<int>(i) / columns, part.errors[k][i]);
+                               chunk.row / pixels + static_cast<int>(i) / columns, of_chunk.errors[k][i]);
     }
   }
-  if (layout_.overview_factors.empty() && chunk.col < layout_.columns) AddSums(chunk, part);
+  if (layout_.overview_factors.empty() && chunk.col < layout_.columns) AddSums(chunk, of_chunk);
 }
 
-void StatisticsAssembler::AddSums(const Chunk& chunk, const ChunkStatistics& part) {
+void StatisticsAssembler::AddSums(const Chunk& chunk, const ChunkStatistics& of_chunk) {
   const int used = std::min(chunk.cols, layout_.columns - chunk.col);
   const auto place = [&](int factor, const auto& values, const auto& put) {
     const int columns = DivideUp(used, factor);
@@ -102,11 +102,11 @@ void StatisticsAssembler::AddSums(const Chunk& chunk, const ChunkStatistics& par
     const int factor = kLargestDirect << k;
     CoarseAverages::Grid& grid = statistics_.coarse.grids[k];
     if (k == 0) {
-      place(factor, part.averages.back(), [&](std::int64_t column, std::int64_t row, float height) {
+      place(factor, of_chunk.averages.back(), [&](std::int64_t column, std::int64_t row, float height) {
         grid.heights[static_cast<std::size_t>(row * grid.columns + column)] = height;
       });
-    } else if (k - 1 < part.sums.size()) {
-      place(factor, part.sums[k - 1], [&](std::int64_t column, std::int64_t row, const BlockSum& sum) {
+    } else if (k - 1 < of_chunk.sums.size()) {
+      place(factor, of_chunk.sums[k - 1], [&](std::int64_t column, std::int64_t row, const BlockSum& sum) {
         grid.heights[static_cast<std::size_t>(row * grid.columns + column)] = sum.Mean();
         if (factor != ChunkGrid::kSide) return;
         largest_sums_[static_cast<std::size_t>(row * DivideUp(layout_.columns, factor) + column)] = sum;
@@ -118,16 +118,16 @@ void StatisticsAssembler::AddSums(const Chunk& chunk, const ChunkStatistics& par
 Result<void> StatisticsAssembler::FinishCoarse(GDALDataset& dataset, const std::stop_token& stop) {
   CoarseAverages& coarse = statistics_.coarse;
   if (!coarse.grids.empty()) {
-    // Sums of parts, by rows: BlockAverages' order.
+    // Sums of chunks, by rows: BlockAverages' order.
     const int columns = DivideUp(layout_.columns, ChunkGrid::kSide), rows = DivideUp(layout_.height, ChunkGrid::kSide);
     for (std::size_t k = 0; k < coarse.grids.size(); ++k) {
-      const int parts = (kLargestDirect << k) / ChunkGrid::kSide;
-      if (parts < 2) continue;
+      const int chunks = (kLargestDirect << k) / ChunkGrid::kSide;
+      if (chunks < 2) continue;
       CoarseAverages::Grid& grid = coarse.grids[k];
       std::vector<BlockSum> sums(grid.heights.size());
       for (int r = 0; r < rows; ++r) {
         for (int c = 0; c < columns; ++c) {
-          sums[static_cast<std::size_t>(r / parts * grid.columns + c / parts)].Add(
+          sums[static_cast<std::size_t>(r / chunks * grid.columns + c / chunks)].Add(
               largest_sums_[static_cast<std::size_t>(r * columns + c)]);
         }
       }

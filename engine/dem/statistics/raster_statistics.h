@@ -1,5 +1,5 @@
 // What terrace must know of a raster before it serves from it: its range of heights, its voids, its outermost rows, its
-// coarsest averages, and how far averages are from samples. One pass through the raster, part by part.
+// coarsest averages, and how far averages are from samples. One pass through the raster, part by of_chunk.
 #pragma once
 
 #include <gdal_priv.h>
@@ -54,21 +54,21 @@ struct RasterStatistics {
   std::size_t bytes() const;
 };
 
-// Puts a raster's parts together, in the order of ChunkGrid.
+// Puts a raster's chunks together, in the order of ChunkGrid.
 class StatisticsAssembler {
  public:
   explicit StatisticsAssembler(const RasterLayout& layout);
   StatisticsAssembler(const StatisticsAssembler&) = delete;
   StatisticsAssembler& operator=(const StatisticsAssembler&) = delete;
 
-  void Add(const Chunk& chunk, const ChunkStatistics& part);
+  void Add(const Chunk& chunk, const ChunkStatistics& of_chunk);
 
   // Reads overviews where the raster has some. kUnavailable: they cannot be read. kInvalidArgument: nothing but voids.
   // kCancelled: stopped. Errors do not name the file.
   Result<RasterStatistics> Finish(GDALDataset& dataset, const std::stop_token& stop);
 
  private:
-  void AddSums(const Chunk& chunk, const ChunkStatistics& part);
+  void AddSums(const Chunk& chunk, const ChunkStatistics& of_chunk);
   Result<void> FinishCoarse(GDALDataset& dataset, const std::stop_token& stop);
   Result<void> AddOverviews(GDALDataset& dataset, const std::stop_token& stop);
 

@@ -112,7 +112,7 @@ void RimVoidFinder::GiveUp() {
 
 void RimVoidFinder::AddRun(int chunk_row, std::int32_t first, std::int32_t last) {
   std::vector<Run>& row = band_[static_cast<std::size_t>(chunk_row)];
-  if (!row.empty() && row.back().last + 1 == first) {  // goes on from the part before
+  if (!row.empty() && row.back().last + 1 == first) {  // goes on from the chunk before
     row.back().last = last;
     return;
   }
@@ -120,7 +120,7 @@ void RimVoidFinder::AddRun(int chunk_row, std::int32_t first, std::int32_t last)
   ++band_runs_;
 }
 
-void RimVoidFinder::Add(const Chunk& chunk, const ChunkStatistics& part) {
+void RimVoidFinder::Add(const Chunk& chunk, const ChunkStatistics& of_chunk) {
   if (has_given_up_) return;
   const int used = std::min(chunk.cols, columns_ - chunk.col);
   if (chunk.row != top_) {
@@ -128,10 +128,10 @@ void RimVoidFinder::Add(const Chunk& chunk, const ChunkStatistics& part) {
     top_ = chunk.row;
   }
   if (has_given_up_ || used <= 0) return;
-  if (part.is_void()) {
+  if (of_chunk.is_void()) {
     for (int r = 0; r < chunk.rows; ++r) AddRun(r, chunk.col, chunk.col + used - 1);
   } else {
-    for (const VoidRun& run : part.voids) AddRun(run.row, chunk.col + run.first, chunk.col + run.last);
+    for (const VoidRun& run : of_chunk.voids) AddRun(run.row, chunk.col + run.first, chunk.col + run.last);
   }
   if (band_runs_ > most_runs_) GiveUp();
 }

@@ -1,5 +1,5 @@
-// Voids of a raster that touch its rim: collars around the data, and voids that the raster's edge cuts. All others are
-// holes, with data all around them. Voids that share a side make one region.
+// Voids of a raster that touch its rim: collars around the data, and voids cut by the raster's edge. All other voids
+// are holes, with data all around them. Voids that share a side form one region.
 #pragma once
 
 #include <cstddef>
@@ -14,8 +14,8 @@
 
 namespace terrace::dem {
 
-// Immutable and thread-safe. By default there are none. Takes memory for rows that differ from the row above alone:
-// collars and missing blocks, which thousands of rasters of a dataset may have, have few of these.
+// Immutable and thread-safe. A default-constructed object has no voids. Stores only rows that differ from the row
+// above: collars and missing blocks, common in datasets of thousands of rasters, have few of these.
 class RimVoids {
  public:
   // Samples first .. last of a row.
@@ -29,7 +29,7 @@ class RimVoids {
   RimVoids() = default;
   // Runs by row and column. Regions are numbered from 0.
   RimVoids(std::span<const Run> runs, std::uint32_t regions);
-  // Of a raster whose voids are too ragged to be told apart: all of them are one region that touches the rim.
+  // For a raster with too many runs to classify: all voids are one region that touches the rim.
   static RimVoids Everything();
 
   std::uint32_t regions() const { return regions_; }
@@ -38,10 +38,10 @@ class RimVoids {
   std::vector<Run> Runs() const;
   std::size_t bytes() const { return spans_.size() * sizeof(Span) + bands_.size() * sizeof(Band); }
 
-  // The region of a void; none for a hole. Of a valid sample: none, or 0 where is_everything().
+  // The region of a void, or nothing for a hole. For a valid sample: nothing, or 0 if is_everything().
   std::optional<std::uint32_t> At(std::int64_t column, std::int64_t row) const { return StretchAt(column, row).region; }
 
-  // What At says, and how far it says the same: along the row up to last_column, along the column up to last_row.
+  // The result of At, and how far it stays the same: along the row to last_column, along the column to last_row.
   struct Stretch {
     std::optional<std::uint32_t> region = {};
     std::int64_t last_column = std::numeric_limits<std::int64_t>::max(), last_row = last_column;
@@ -69,30 +69,30 @@ class RimVoids {
   bool is_everything_ = false;
 };
 
-// Finds them while the statistics of a raster are read, in one pass over the runs of its voids. Memory: the runs of one
-// row of parts, of voids that touch the rim, and of those that may still come to touch it.
+// Finds the voids that touch the rim in one pass over the runs of all voids. Holds the runs of one row of chunks, of
+// voids that touch the rim, and of voids that may still connect to the rim.
 class RimVoidFinder {
  public:
-  // Runs that are kept, 16 bytes each; a raster that needs more is RimVoids::Everything.
+  // Limit of stored runs, 16 bytes each. A raster that needs more becomes RimVoids::Everything.
   static constexpr std::size_t kMaxRuns = std::size_t{1} << 22;
 
-  // Of the columns in use; the first column is at the rim even where the raster goes around the Earth. `hole` is told
-  // the runs of holes: row, first and last sample, and how many samples the hole has.
+  // `columns`: those in use. The first column is part of the rim even if the raster wraps around the Earth. Calls
+  // `hole` for each run of a hole with row, first sample, last sample, and the number of samples of the hole.
   using Hole = std::function<void(std::int32_t, std::int32_t, std::int32_t, std::int64_t)>;
   RimVoidFinder(int columns, int rows, Hole hole, std::size_t most_runs = kMaxRuns);
 
-  // All parts in the order of ChunkGrid.
-  void Add(const Chunk& chunk, const ChunkStatistics& part);
-  // After the last part.
+  // Adds all chunks in the order of ChunkGrid.
+  void Add(const Chunk& chunk, const ChunkStatistics& of_chunk);
+  // Call after the last chunk.
   RimVoids Finish();
 
  private:
   using Run = RimVoids::Run;
 
   void AddRun(int chunk_row, std::int32_t first, std::int32_t last);
-  void Sweep();  // the rows of a row of parts
+  void Sweep();  // the rows of a row of chunks
   void SweepRow(std::int32_t row, std::vector<Run>& runs);
-  void Settle();  // what cannot come to touch the rim any more is a hole
+  void Settle();  // regions that cannot reach the rim any more are holes
   void Renumber();
   void GiveUp();
 
@@ -103,11 +103,11 @@ class RimVoidFinder {
   const int columns_, rows_;
   const Hole hole_;
   const std::size_t most_runs_;
-  std::int32_t top_ = 0;                // first row of the row of parts at hand
+  std::int32_t top_ = 0;                // first row of the current row of chunks
   std::vector<std::vector<Run>> band_;  // its runs, by row
   std::size_t band_runs_ = 0;
   std::vector<Run> frontier_;           // of the row above
-  std::vector<Run> rim_, open_;         // touch the rim; may come to
+  std::vector<Run> rim_, open_;         // runs that touch the rim; runs that may
   std::vector<std::uint32_t> parents_;  // of regions, up to their roots
   std::vector<std::uint8_t> touches_;   // of roots
   bool has_given_up_ = false;

@@ -29,7 +29,7 @@ constexpr std::uint64_t kHeaderMagic = 0x31'53'54'41'54'53'52'54;  // "TRSTATS1"
 constexpr std::uint64_t kFooterMagic = 0x44'4e'45'59'56'52'55'53;  // "SURVYEND"
 constexpr std::uint32_t kPartMagic = 0x54'52'41'50;                // "PART"
 constexpr std::size_t kHeaderBytes = 36, kPartHeaderBytes = 32, kFooterBytes = 24;
-constexpr int kMaxUnsynced = 64;                    // parts: a few seconds of work
+constexpr int kMaxUnsynced = 64;                    // chunks: a few seconds of work
 constexpr std::uint64_t kMaxHeaderBytes = 1 << 16;  // detected are a few numbers and a line of text
 
 constexpr int CeilingOf(int a, int b) { return (a + b - 1) / b; }
@@ -79,7 +79,7 @@ std::uint64_t SizeOf(int file) {
   return ::fstat(file, &status) == 0 ? static_cast<std::uint64_t>(status.st_size) : 0;
 }
 
-// Averages of a part: how many of each factor, and where they lie behind one another, each after its checksum.
+// Averages of a chunk: how many of each factor, and where they lie behind one another, each after its checksum.
 struct AveragesPlace {
   std::uint64_t offset = 0;
   int columns = 0, rows = 0;
@@ -139,14 +139,14 @@ struct PartHeader {
   }
 };
 
-std::string EncodeCachedChunk(std::uint32_t index, const ChunkStatistics& part, int least_kept) {
-  const std::string statistics = part.is_void() ? std::string() : EncodeChunk(part);
+std::string EncodeCachedChunk(std::uint32_t index, const ChunkStatistics& of_chunk, int least_kept) {
+  const std::string statistics = of_chunk.is_void() ? std::string() : EncodeChunk(of_chunk);
   ByteWriter averages;
-  if (!part.is_void()) {
+  if (!of_chunk.is_void()) {
     for (std::size_t k = 0; (2 << k) < kLargestDirect; ++k) {
       if ((2 << k) < least_kept) continue;
-      const std::string_view floats(reinterpret_cast<const char*>(part.averages[k].data()),
-                                    part.averages[k].size() * sizeof(float));
+      const std::string_view floats(reinterpret_cast<const char*>(of_chunk.averages[k].data()),
+                                    of_chunk.averages[k].size() * sizeof(float));
       averages.Put(HashOf(floats));
       averages.PutBytes(floats);
     }
@@ -231,24 +231,24 @@ Result<OpenFile> CachedAverages::Open() const {
   return file;
 }
 
-// The window does not wrap here: columns of the part lie at `window.column` + multiples of the grid's width.
-Result<void> CachedAverages::CopyChunk(const OpenFile& file, int factor, int part, const GridWindow& window,
+// The window does not wrap here: columns of the chunk lie at `window.column` + multiples of the grid's width.
+Result<void> CachedAverages::CopyChunk(const OpenFile& file, int factor, int index, const GridWindow& window,
                                        float* out) const {
-  const Chunk chunk = chunks_.At(part);
+  const Chunk chunk = chunks_.At(index);
   const AveragesPlace place = PlaceOf(chunk, layout_, factor);
   const std::int64_t left = chunk.col / factor, top = chunk.row / factor;
   const std::int64_t west = std::max(left, window.column),
                      east = std::min(left + place.columns, window.column + window.columns);
   const std::int64_t north = std::max(top, window.row), south = std::min(top + place.rows, window.row + window.rows);
-  if (west >= east || north >= south || offsets_[static_cast<std::size_t>(part)] == 0) return {};
+  if (west >= east || north >= south || offsets_[static_cast<std::size_t>(index)] == 0) return {};
   std::string bytes(sizeof(std::uint64_t) + place.bytes(), '\0');
   std::uint64_t checksum = 0;
   const bool read =
-      ReadAt(file.get(), offsets_[static_cast<std::size_t>(part)] + place.offset, bytes.data(), bytes.size());
+      ReadAt(file.get(), offsets_[static_cast<std::size_t>(index)] + place.offset, bytes.data(), bytes.size());
   std::memcpy(&checksum, bytes.data(), sizeof checksum);
   const char* floats = bytes.data() + sizeof checksum;
   if (!read || XXH3_64bits(floats, place.bytes()) != checksum) {
-    return MakeError(ErrorCode::kInvalidArgument, "{}: the averages of part {} by factor {} are damaged", path_, part,
+    return MakeError(ErrorCode::kInvalidArgument, "{}: the averages of chunk {} by factor {} are damaged", path_, index,
                      factor);
   }
   bytes_read_ += bytes.size();
@@ -402,10 +402,10 @@ void StatisticsCacheWriter::KeepWholeParts(const std::function<void(const ChunkS
       return;
     }
     const Chunk chunk = chunks_.At(static_cast<int>(offsets_.size()));
-    const std::optional<ChunkStatistics> part =
+    const std::optional<ChunkStatistics> of_chunk =
         statistics->empty() ? VoidStatistics(chunk, layout_) : DecodeChunk(*statistics, chunk, layout_);
-    if (!part) return;
-    keep(*part);
+    if (!of_chunk) return;
+    keep(*of_chunk);
     offsets_.push_back(header.averages_bytes > 0 ? averages : 0);
     end_ = averages + header.averages_bytes;
   }
@@ -426,10 +426,10 @@ Result<void> StatisticsCacheWriter::Write(std::string_view bytes) {
   return {};
 }
 
-Result<void> StatisticsCacheWriter::Add(const ChunkStatistics& part) {
+Result<void> StatisticsCacheWriter::Add(const ChunkStatistics& of_chunk) {
   const std::uint64_t begin = end_;
   const std::string bytes =
-      EncodeCachedChunk(static_cast<std::uint32_t>(offsets_.size()), part, LeastKeptFactor(layout_));
+      EncodeCachedChunk(static_cast<std::uint32_t>(offsets_.size()), of_chunk, LeastKeptFactor(layout_));
   if (auto written = Write(bytes); !written) return written;
   const PartHeader header = PartHeader::Of(bytes);
   offsets_.push_back(header.averages_bytes > 0 ? begin + kPartHeaderBytes + header.statistics_bytes : 0);

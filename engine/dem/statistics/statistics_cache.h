@@ -1,6 +1,6 @@
 // A raster's statistics in a file of the cache folder, so that it is made once: docs/formats/statistics-cache.md.
 //
-// While it is made the file is a list of parts, and what was interrupted goes on behind the last whole one. Finished,
+// While it is made the file is a list of chunks, and what was interrupted goes on behind the last whole one. Finished,
 // the file gets its real name. Everything is checksummed: what does not fit is reported, thrown away and made anew.
 #pragma once
 
@@ -88,14 +88,14 @@ class CachedAverages {
 
  private:
   Result<OpenFile> Open() const;
-  Result<void> CopyChunk(const OpenFile& file, int factor, int part, const GridWindow& window, float* out) const;
+  Result<void> CopyChunk(const OpenFile& file, int factor, int index, const GridWindow& window, float* out) const;
 
   FileIdentity identity_;
   std::string path_;
   RasterLayout layout_;
   int least_;  // factor
   ChunkGrid chunks_;
-  std::vector<std::uint64_t> offsets_;  // by part, of its averages; 0: void
+  std::vector<std::uint64_t> offsets_;  // by chunk, of its averages; 0: void
   mutable std::atomic<std::uint64_t> bytes_read_{0};
 };
 
@@ -120,14 +120,14 @@ class StatisticsCacheWriter {
   // With the detected of an interrupted run.
   const StatisticsShape& shape() const { return shape_; }
 
-  // Calls `keep` for every part that an interrupted run left, from the first on. Once, before the first Add.
+  // Calls `keep` for every chunk that an interrupted run left, from the first on. Once, before the first Add.
   Result<void> Resume(const std::function<void(const ChunkStatistics&)>& keep);
 
-  // Throws all parts away: they were made without these detected.
+  // Throws all chunks away: they were made without these detected.
   Result<void> Restart(const DetectedNodata& detected);
 
-  // The next part. kUnavailable: it cannot be written; the file is removed then, and nothing more is written.
-  Result<void> Add(const ChunkStatistics& part);
+  // The next of_chunk. kUnavailable: it cannot be written; the file is removed then, and nothing more is written.
+  Result<void> Add(const ChunkStatistics& of_chunk);
 
   // Gives the file its name. From then on LoadStatistics finds it.
   Result<void> Finish(const RasterStatistics& statistics);

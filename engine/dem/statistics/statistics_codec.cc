@@ -98,20 +98,20 @@ BlockSum GetSum(ByteReader& reader) {
 
 }  // namespace
 
-std::string EncodeChunk(const ChunkStatistics& part) {
+std::string EncodeChunk(const ChunkStatistics& of_chunk) {
   ByteWriter writer;
-  writer.Put(part.valid);
-  Put(writer, part.zeros);
-  Put(writer, part.first_row);
-  Put(writer, part.last_row);
-  PutRanges(writer, part.ranges);
-  writer.Put(static_cast<std::uint32_t>(part.voids.size()));
-  for (const VoidRun& run : part.voids) {
+  writer.Put(of_chunk.valid);
+  Put(writer, of_chunk.zeros);
+  Put(writer, of_chunk.first_row);
+  Put(writer, of_chunk.last_row);
+  PutRanges(writer, of_chunk.ranges);
+  writer.Put(static_cast<std::uint32_t>(of_chunk.voids.size()));
+  for (const VoidRun& run : of_chunk.voids) {
     for (const std::uint16_t place : {run.row, run.first, run.last}) writer.Put(place);
   }
-  for (const auto& errors : part.errors) PutFloats(writer, errors);
-  if (!part.averages.empty()) PutFloats(writer, part.averages.back());
-  for (const auto& sums : part.sums) {
+  for (const auto& errors : of_chunk.errors) PutFloats(writer, errors);
+  if (!of_chunk.averages.empty()) PutFloats(writer, of_chunk.averages.back());
+  for (const auto& sums : of_chunk.sums) {
     for (const BlockSum& sum : sums) Put(writer, sum);
   }
   return writer.Take();
@@ -119,31 +119,31 @@ std::string EncodeChunk(const ChunkStatistics& part) {
 
 std::optional<ChunkStatistics> DecodeChunk(std::string_view bytes, const Chunk& chunk, const RasterLayout& layout) {
   ByteReader reader(bytes);
-  ChunkStatistics part = VoidStatistics(chunk, layout);
-  if (!part.averages.empty()) {
-    part.averages.back().resize(AveragesIn(chunk, layout, 1 << part.averages.size()));
+  ChunkStatistics of_chunk = VoidStatistics(chunk, layout);
+  if (!of_chunk.averages.empty()) {
+    of_chunk.averages.back().resize(AveragesIn(chunk, layout, 1 << of_chunk.averages.size()));
   }
-  for (std::size_t k = 0; k < part.sums.size(); ++k) {
-    part.sums[k].resize(AveragesIn(chunk, layout, kLargestDirect << (k + 1)));
+  for (std::size_t k = 0; k < of_chunk.sums.size(); ++k) {
+    of_chunk.sums[k].resize(AveragesIn(chunk, layout, kLargestDirect << (k + 1)));
   }
-  part.valid = reader.Get<std::int64_t>();
-  part.zeros = GetZeros(reader);
-  part.first_row = GetSum(reader);
-  part.last_row = GetSum(reader);
-  GetRanges(reader, part.ranges);
+  of_chunk.valid = reader.Get<std::int64_t>();
+  of_chunk.zeros = GetZeros(reader);
+  of_chunk.first_row = GetSum(reader);
+  of_chunk.last_row = GetSum(reader);
+  GetRanges(reader, of_chunk.ranges);
   const auto runs = GetCount(reader, sizeof(VoidRun));
   if (!runs) return std::nullopt;
-  part.voids.resize(*runs);
-  for (VoidRun& run : part.voids) {
+  of_chunk.voids.resize(*runs);
+  for (VoidRun& run : of_chunk.voids) {
     for (std::uint16_t* place : {&run.row, &run.first, &run.last}) *place = reader.Get<std::uint16_t>();
   }
-  for (auto& errors : part.errors) GetFloats(reader, errors);
-  if (!part.averages.empty()) GetFloats(reader, part.averages.back());
-  for (auto& sums : part.sums) {
+  for (auto& errors : of_chunk.errors) GetFloats(reader, errors);
+  if (!of_chunk.averages.empty()) GetFloats(reader, of_chunk.averages.back());
+  for (auto& sums : of_chunk.sums) {
     for (BlockSum& sum : sums) sum = GetSum(reader);
   }
   if (!reader.ok() || reader.remaining() > 0) return std::nullopt;
-  return part;
+  return of_chunk;
 }
 
 std::string EncodeStatistics(const RasterStatistics& statistics) {

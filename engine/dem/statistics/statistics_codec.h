@@ -1,5 +1,5 @@
-// Statistics as bytes: what the statistics cache (statistics_cache.h) keeps of the chunks of a raster and of the whole.
-// Without checksums.
+// Serialization of statistics for the statistics cache (statistics_cache.h), of chunks and of whole rasters. No
+// checksums.
 #pragma once
 
 #include <optional>
@@ -11,15 +11,15 @@
 
 namespace terrace::dem {
 
-// A part without the averages of factors below kLargestDirect, which a record keeps apart.
-std::string EncodeChunk(const ChunkStatistics& part);
-// Nothing where the bytes are no part of this shape.
+// Without averages of factors below kLargestDirect, which the cache stores separately.
+std::string EncodeChunk(const ChunkStatistics& of_chunk);
+// Nothing if the bytes are not a chunk of this shape.
 std::optional<ChunkStatistics> DecodeChunk(std::string_view bytes, const Chunk& chunk, const RasterLayout& layout);
 
 std::string EncodeStatistics(const RasterStatistics& statistics);
 std::optional<RasterStatistics> DecodeStatistics(std::string_view bytes, const RasterLayout& layout);
 
-// Empty where nothing was found.
+// Empty if nothing was detected.
 std::string EncodeDetectedNodata(const DetectedNodata& detected);
 std::optional<DetectedNodata> DecodeDetectedNodata(std::string_view bytes);
 

@@ -1,5 +1,5 @@
-// The tables of rasters' statistics, where there are more of them than memory is for: they are taken from their records
-// when they are wanted.
+// Memory budget for the statistics of a dataset's rasters. Statistics beyond it are read from the statistics cache on
+// demand.
 #pragma once
 
 #include <cstddef>
@@ -12,18 +12,18 @@
 
 namespace terrace::dem {
 
-// Bytes of tables of one dataset: what is kept as long as its raster, and what comes and goes, used longest ago first.
-// Thread-safe.
+// Two budgets of bytes: for tables that stay in memory with their raster, and for tables that are paged, evicted least
+// recently used first. Thread-safe.
 class StatisticsPages {
  public:
   using Tables = std::shared_ptr<const RasterStatistics>;
 
   StatisticsPages(std::size_t kept_bytes, std::size_t paged_bytes) : kept_left_(kept_bytes), most_paged_(paged_bytes) {}
 
-  // Whether tables of this size are to be kept. They count from then on.
+  // Whether tables of this size fit the first budget. If so, they are charged to it.
   bool Admit(std::size_t bytes);
 
-  // Null: they are not here.
+  // Null: not in memory.
   Tables Find(const void* raster);
   void Add(const void* raster, Tables tables);
   void Forget(const void* raster);
@@ -42,7 +42,7 @@ class StatisticsPages {
   std::size_t kept_left_;  // guarded by mutex_, as are these
   const std::size_t most_paged_;
   std::size_t paged_ = 0;
-  std::list<Page> pages_;  // the one used last comes first
+  std::list<Page> pages_;  // most recently used first
   std::unordered_map<const void*, std::list<Page>::iterator> by_raster_;
 };
 

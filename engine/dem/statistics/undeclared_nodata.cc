@@ -145,10 +145,10 @@ class BandScanner {
 
 }  // namespace
 
-void ZeroEdges::Add(const float* heights, std::ptrdiff_t stride, const Chunk& part, int raster_width, int raster_height,
-                    double step_m) {
-  const int cols = part.cols, rows = part.rows;
-  const bool left = part.col == 0, right = part.col + cols == raster_width;
+void ZeroEdges::Add(const float* heights, std::ptrdiff_t stride, const Chunk& chunk, int raster_width,
+                    int raster_height, double step_m) {
+  const int cols = chunk.cols, rows = chunk.rows;
+  const bool left = chunk.col == 0, right = chunk.col + cols == raster_width;
   const auto pair = [this, step = static_cast<float>(step_m)](float a, float b) {
     if ((a == 0) == (b == 0)) return;
     const float other = std::abs(a + b);
@@ -166,9 +166,9 @@ void ZeroEdges::Add(const float* heights, std::ptrdiff_t stride, const Chunk& pa
     }
     zeros += std::count(row, row + cols, 0.0f);
     at_border += (left && row[0] == 0) + (right && row[cols - 1] == 0);
-    const int raster_row = part.row + r;
+    const int raster_row = chunk.row + r;
     if (raster_row == 0 || raster_row + 1 == raster_height) at_border += std::count(row, row + cols, 0.0f);
-    AddGround(row, cols, part.col, raster_row);
+    AddGround(row, cols, chunk.col, raster_row);
   }
 }
 

@@ -32,8 +32,8 @@ struct ZeroEdges {
   // ten.
   static double CoastStep(double spacing_m) { return std::max(100.0, spacing_m / 10); }
 
-  // Heights of a part of a raster of that size; `stride` values lie from one row to the next.
-  void Add(const float* heights, std::ptrdiff_t stride, const Chunk& part, int raster_width, int raster_height,
+  // Heights of a chunk of a raster of that size; `stride` values lie from one row to the next.
+  void Add(const float* heights, std::ptrdiff_t stride, const Chunk& chunk, int raster_width, int raster_height,
            double step_m);
   void Add(const ZeroEdges& other);
 

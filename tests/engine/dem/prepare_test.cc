@@ -88,11 +88,11 @@ TEST(Prepare, AveragesFromTheCacheAreThoseOfTheSamplesBitForBit) {
   const TempDir dir;
   const std::string path = WriteLargeRaster(dir), cache = dir.File("cache");
   const auto first = OpenWithCache(path, cache);
-  EXPECT_FALSE(first->preparation().from_record);
-  EXPECT_LT(first->preparation().chunks_read, first->preparation().parts) << "what is not stored is not read";
+  EXPECT_FALSE(first->preparation().from_cache);
+  EXPECT_LT(first->preparation().chunks_read, first->preparation().chunks) << "what is not stored is not read";
   ExpectSameAverages(path, *first);
   const auto second = OpenWithCache(path, cache);
-  EXPECT_TRUE(second->preparation().from_record);
+  EXPECT_TRUE(second->preparation().from_cache);
   EXPECT_EQ(second->preparation().chunks_read, 0);
   ExpectSameAverages(path, *second);
   EXPECT_EQ(second->info().heights.min, first->info().heights.min);
@@ -208,13 +208,13 @@ TEST(Prepare, GoesOnWhereItWasKilled) {
   ASSERT_TRUE(KilledAfter(path, cache, .6)) << "twice";
   const auto source = OpenWithCache(path, cache);
   const Preparation& preparation = source->preparation();
-  EXPECT_FALSE(preparation.from_record);
-  EXPECT_EQ(preparation.parts, 35);
+  EXPECT_FALSE(preparation.from_cache);
+  EXPECT_EQ(preparation.chunks, 35);
   EXPECT_EQ(preparation.chunks_kept, 21);
   const TempDir other;
   EXPECT_LT(preparation.chunks_read, OpenWithCache(path, other.path().string())->preparation().chunks_read);
   ExpectSameAverages(path, *source);
-  EXPECT_TRUE(OpenWithCache(path, cache)->preparation().from_record);
+  EXPECT_TRUE(OpenWithCache(path, cache)->preparation().from_cache);
 }
 
 TEST(Prepare, ThrowsAwayATornPart) {
@@ -249,7 +249,7 @@ TEST(Prepare, TwoProcessesShareOneCache) {
     EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0);
   }
   const auto source = OpenWithCache(path, cache);
-  EXPECT_TRUE(source->preparation().from_record);
+  EXPECT_TRUE(source->preparation().from_cache);
   ExpectSameAverages(path, *source);
   EXPECT_FALSE(std::filesystem::exists(StatisticsPath(cache, path) + ".partial"));
 }
@@ -259,7 +259,7 @@ TEST(Prepare, KeepsNoFileOpenAndDoesWithoutOneThatIsGone) {
   const std::string path = WriteLargeRaster(dir), cache = dir.File("cache");
   OpenWithCache(path, cache);
   const auto source = OpenWithCache(path, cache);
-  EXPECT_TRUE(source->preparation().from_record);
+  EXPECT_TRUE(source->preparation().from_cache);
   const auto before = source->ReadBlocks(8, {300, 200, 100, 100}, {});
   for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) {
     std::error_code gone;
@@ -290,7 +290,7 @@ TEST(Prepare, RastersWhoseOverviewsMisleadAreLookedAtOnce) {
   const Times made = times();
   EXPECT_EQ(made.size(), 2u);
   const auto again = OpenWithCache(path, cache);
-  EXPECT_TRUE(again->preparation().from_record);
+  EXPECT_TRUE(again->preparation().from_cache);
   EXPECT_EQ(again->info().overviews_unused, source->info().overviews_unused);
   EXPECT_EQ(times(), made);
   ExpectSameAverages(path, *again);
@@ -322,11 +322,11 @@ TEST(Prepare, NeverBelievesADamagedFile) {
     if (i % 4 == 3) {
       ExpectSameAverages(path, *source);
     } else {
-      EXPECT_FALSE(source->preparation().from_record) << i;
+      EXPECT_FALSE(source->preparation().from_cache) << i;
     }
   }
   write(good);
-  EXPECT_TRUE(OpenWithCache(path, cache)->preparation().from_record);
+  EXPECT_TRUE(OpenWithCache(path, cache)->preparation().from_cache);
 }
 
 TEST(Prepare, DamagedAveragesAreReadFromTheSourceAndMadeAnew) {
@@ -343,18 +343,18 @@ TEST(Prepare, DamagedAveragesAreReadFromTheSourceAndMadeAnew) {
   }
   file.close();
   ExpectSameAverages(path, *source);
-  EXPECT_FALSE(OpenWithCache(path, cache)->preparation().from_record);
-  EXPECT_TRUE(OpenWithCache(path, cache)->preparation().from_record);
+  EXPECT_FALSE(OpenWithCache(path, cache)->preparation().from_cache);
+  EXPECT_TRUE(OpenWithCache(path, cache)->preparation().from_cache);
 }
 
 TEST(Prepare, AChangedSourceIsPreparedAnew) {
   const TempDir dir;
   const std::string path = WriteRaster(dir, {}), cache = dir.File("cache");
   OpenWithCache(path, cache);
-  EXPECT_TRUE(OpenWithCache(path, cache)->preparation().from_record);
+  EXPECT_TRUE(OpenWithCache(path, cache)->preparation().from_cache);
   std::filesystem::rename(WriteRaster(dir, {.value = [](int, int) { return 5.0; }}, "new.tif"), path);
   const auto source = OpenWithCache(path, cache);
-  EXPECT_FALSE(source->preparation().from_record);
+  EXPECT_FALSE(source->preparation().from_cache);
   EXPECT_EQ(source->info().heights.max, 5);
 }
 
@@ -364,7 +364,7 @@ TEST(Prepare, AFolderThatCannotBeWrittenToCostsNothingButTheCache) {
   std::ofstream(dir.File("file")) << "x";
   const auto source = OpenWithCache(path, dir.File("file") + "/cache");
   ASSERT_NE(source, nullptr);
-  EXPECT_FALSE(source->preparation().from_record);
+  EXPECT_FALSE(source->preparation().from_cache);
 }
 
 // Several chunks, overviews that are worth nothing, and undeclared nodata values.
@@ -389,8 +389,8 @@ TEST(Prepare, FoundVoidsArePartOfTheFile) {
   const TempDir dir;
   const std::string path = WriteRasterWithUndeclaredNodata(dir), cache = dir.File("cache");
   const auto plain = OpenWithCache(path, {}), made = OpenWithCache(path, cache), loaded = OpenWithCache(path, cache);
-  EXPECT_FALSE(made->preparation().from_record);
-  EXPECT_TRUE(loaded->preparation().from_record);
+  EXPECT_FALSE(made->preparation().from_cache);
+  EXPECT_TRUE(loaded->preparation().from_cache);
   EXPECT_EQ(loaded->preparation().chunks_read, 0);
   for (const auto& source : {plain.get(), made.get(), loaded.get()}) {
     ExpectNodataIsVoid(*source);
@@ -410,13 +410,13 @@ TEST(Prepare, AFileIsNotUsedForOtherRules) {
     return *std::move(source);
   };
   const SourceOptions trusted{.find_voids = false}, stated{.find_voids = false, .nodata = {-32768}};
-  EXPECT_FALSE(with(trusted)->preparation().from_record);
+  EXPECT_FALSE(with(trusted)->preparation().from_cache);
   EXPECT_EQ(with(trusted)->info().void_samples, 0u);
   EXPECT_EQ(with(trusted)->info().heights.min, -32768);
-  EXPECT_FALSE(with(stated)->preparation().from_record);
+  EXPECT_FALSE(with(stated)->preparation().from_cache);
   EXPECT_EQ(with(stated)->info().void_samples, 49u);
   for (const SourceOptions& options : {trusted, stated, SourceOptions{}}) {
-    EXPECT_TRUE(with(options)->preparation().from_record) << "each way of reading a file has its record";
+    EXPECT_TRUE(with(options)->preparation().from_cache) << "each way of reading a file has its record";
   }
 }
 
@@ -438,7 +438,7 @@ TEST(Prepare, GoesOnInTheSecondPass) {
   ::waitpid(child, &status, 0);
   ASSERT_TRUE(WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL);
   const auto source = OpenWithCache(path, cache);
-  EXPECT_EQ(source->preparation().parts, 9);
+  EXPECT_EQ(source->preparation().chunks, 9);
   EXPECT_EQ(source->preparation().chunks_kept, 5);
   EXPECT_EQ(source->preparation().chunks_read, 4) << "the first pass is over, and the detected nodata is kept";
   ExpectNodataIsVoid(*source);
@@ -458,7 +458,7 @@ TEST(Prepare, StopsWhenToldAndGoesOnNextTime) {
   ASSERT_FALSE(stopped.has_value());
   EXPECT_EQ(stopped.error().code, ErrorCode::kCancelled);
   const auto source = OpenWithCache(path, cache);
-  EXPECT_FALSE(source->preparation().from_record);
+  EXPECT_FALSE(source->preparation().from_cache);
   EXPECT_GE(source->preparation().chunks_kept, 11);
   EXPECT_LT(source->preparation().chunks_kept, 35);
   ExpectSameAverages(path, *source);
