@@ -1,5 +1,5 @@
-// Where a tile's nodes lie evenly on a raster grid's grid: the surface between nodes and the one between averages
-// differ by no more than either bends.
+// Error bound for tile cells whose nodes are evenly spaced on the raster grid. The bound follows from the second
+// differences of the samples: they limit how far the surface between nodes departs from the one between samples.
 #pragma once
 
 #include <cstdint>
@@ -14,31 +14,32 @@ namespace terrace::dem {
 
 class SmoothErrorBound {
  public:
-  // `blends`: raster grids are blended where one gives way to the next. What the others refer to outlives it.
+  // `blends`: raster grids are blended where one gives way to the next. The other arguments must outlive this object.
   SmoothErrorBound(const TileNodes& tile, const RasterGrid& grid, const GridTrace& trace, const GridTables& tables,
                    const GeoidErrorBound& geoid, bool blends);
 
-  // Between the heights served and the raster grid's samples; NaN or infinity where the box is no such place.
+  // Returns a bound in metres on the difference between served heights and the raster grid's samples. NaN or infinity:
+  // no bound is known, because a node is not evenly spaced, a sample is void or the geoid is not known.
   double Over(const CellBox& box) const;
 
-  // Of the nodes of a box, in averages; none where one of them is away from the even part.
+  // Returns the bounds of the box's nodes, in averages; empty if one of them is not evenly spaced.
   PixelBounds BoundsOf(const CellBox& box) const;
 
  private:
-  // How much a surface between samples can bend, from the samples of a box: largest differences.
+  // Largest first (x, y) and second (xx, yy, xy) differences of the samples in a box, in metres.
   struct Bends {
     double x = 0, y = 0, xx = 0, yy = 0, xy = 0;
   };
-  // What the node positions of a box of cells say: how far it is from one node to the next, in samples, and how far
-  // a place may be from where even steps have it.
+  // Largest steps between neighbouring nodes of a box (east_*, north_*), and largest deviation of a position from even
+  // steps (bend_*). In samples.
   struct Steps {
     double east_x = 0, east_y = 0, north_x = 0, north_y = 0, bend_x = 0, bend_y = 0;
   };
 
   void PlaceNodes(const RasterGrid& grid);
-  // False where a node is not placed.
+  // Returns false if a node or a neighbour of one is not evenly spaced.
   bool Measure(const CellBox& box, Steps& steps, PixelBounds& at) const;
-  // Of samples left .. right, top .. bottom, which surround the box; false where one of them is void.
+  // Measures samples left .. right, top .. bottom, ends included. Returns false if one of them is void.
   bool Measure(std::int64_t left, std::int64_t top, std::int64_t right, std::int64_t bottom, Bends& bends) const;
   static double Largest(const Bends& bends, const Steps& steps);
   double LargestBlend(const CellBox& box) const;
@@ -49,7 +50,7 @@ class SmoothErrorBound {
   const GeoidErrorBound& geoid_;
   const bool blends_;
   const Position misplacement_;  // of samples, in averages
-  std::vector<double> x_, y_;    // by node, in samples of the grid; NaN away from its even part
+  std::vector<double> x_, y_;    // per node, in averages; NaN if not evenly spaced
 };
 
 }  // namespace terrace::dem

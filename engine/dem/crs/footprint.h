@@ -16,29 +16,32 @@ namespace terrace::dem {
 struct Footprint {
   double west = -180, south = -90, east = 180, north = 90;
 
-  // Of the pixels' area. Where positions of the raster's edge cannot be computed: the whole Earth.
+  // Returns the footprint of the raster's pixel area; the whole Earth if a position on its edge cannot be computed.
   static Footprint Of(const Georeference& georeference);
 
   bool all_longitudes() const { return east - west >= 360; }
   GeoBounds Bounds() const;
 
-  // A little larger on every side: what lies outside this box lies outside the raster, whatever the curvature of its
-  // edges.
+  // Returns the footprint grown by 1% plus 1e-6 degrees on every side. It contains the raster although edges between
+  // the sampled points are curved.
   Footprint Padded() const;
 
-  // Of a box in degrees.
+  // Converts a box in degrees; west > east crosses the antimeridian.
   static Footprint Of(const GeoBounds& bounds);
 
   bool Touches(const Footprint& other) const;
 
-  // Whether it touches the box from (west, south), `width` by `height` degrees large; west counts modulo 360.
+  // Returns true if it meets or touches the box with south-western corner (box_west, box_south), `box_width` by
+  // `box_height` degrees; box_west modulo 360.
   bool Touches(double box_west, double box_south, double box_width, double box_height) const;
 };
 
-// kInvalidArgument, with both boxes, where `path`, which covers `footprint`, lies nowhere in `around`.
+// Checks that `path`, which covers `footprint`, meets `around`. kInvalidArgument: it does not; the message has both
+// boxes.
 Result<void> CheckOverlap(const Footprint& footprint, const GeoBounds& around, const std::string& path);
 
-// The tiles of a level that the footprint touches, as one block or two: a tile that shares but an edge is not touched.
+// Returns the tiles of a level that overlap the footprint, as one range, or two across the antimeridian. Sharing only
+// an edge is no overlap.
 std::vector<geo::TileRange> TilesTouching(const Footprint& footprint, int level);
 
 }  // namespace terrace::dem

@@ -1,4 +1,4 @@
-// What tells one state of a file from another: device, inode, size, times of modification and of change of status.
+// Identifies the state of a file by device, inode, size, times of modification and of change of status.
 #pragma once
 
 #include <cstddef>
@@ -13,8 +13,8 @@ namespace terrace::dem {
 
 struct FileStamp {
   std::uint64_t device = 0, inode = 0, size = 0, modified_ns = 0;
-  // When any of it changed last, which nobody can set back. It tells apart what is kept for the next start. Files in
-  // use are not compared by it: a change of their permissions would be one.
+  // Time of the last status change (ctime), which a program cannot set back. Part of the fingerprint that cached files
+  // are keyed by. Not compared by ==: a change of permissions must not count as a change of an open file.
   std::uint64_t status_changed_ns = 0;
 
   friend bool operator==(const FileStamp& a, const FileStamp& b) {
@@ -22,10 +22,10 @@ struct FileStamp {
   }
 };
 
-// Nothing when there is no regular file of that name.
+// Returns the file's stamp; nullopt if `path` is not a regular file.
 std::optional<FileStamp> StampOf(const std::string& path);
 
-// Of `path`, for people: it is not the file that was opened.
+// Returns kChanged with the message that `path` is no longer the file that was opened.
 Error ChangedError(const std::string& path);
 
 // The files a raster is made of (the file itself, overviews and masks beside it, the parts of a mosaic) as they were
@@ -33,34 +33,34 @@ Error ChangedError(const std::string& path);
 class StampedFiles {
  public:
   StampedFiles() = default;
-  // What is no regular file cannot be watched. Of a remote one and of a member of an archive the fingerprint tells
-  // size, time and what its server calls its version; where none of these says more than a name, it is another one at
-  // each start.
+  // Stamps regular files. GDAL paths (/vsi: remote files, archive members) are not watched; their fingerprint covers
+  // path, size, modification time and ETag. Without modification time and ETag it differs at each start. Other paths
+  // are ignored.
   explicit StampedFiles(const std::vector<std::string>& paths);
 
-  // For files that have just been opened. kChanged: the first of them is not what it was before that (`before`), so
-  // that nobody knows which of both was opened.
+  // Stamps files that have just been opened. `before` is the stamp of the first file before it was opened. kChanged:
+  // the first file differs from `before`, so it may have been replaced during the opening.
   static Result<StampedFiles> OfOpened(const std::vector<std::string>& paths, const std::optional<FileStamp>& before);
 
-  // The first file that has changed or gone since; nothing when all are as they were.
+  // Returns the first file that was changed or removed since; nullopt if there is none.
   std::optional<std::string> FirstChanged() const;
 
-  // kChanged: FirstChanged finds one. `path`: of the raster, for the message.
+  // kChanged: FirstChanged finds a file. `path`: the raster's, for the message.
   Result<void> CheckUnchanged(const std::string& path) const;
 
-  // File by file, for those who look at many of them.
+  // Access to single watched files, i < size().
   std::size_t size() const { return paths_.size(); }
   bool HasChanged(std::size_t i) const { return StampOf(paths_[i]) != stamps_[i]; }
   const std::string& path(std::size_t i) const { return paths_[i]; }
   void Append(const StampedFiles& more);
 
-  // A hash of what all of them were.
+  // Returns a hash of all stamps and GDAL paths.
   std::uint64_t fingerprint() const;
 
  private:
   std::vector<std::string> paths_;
   std::vector<FileStamp> stamps_;
-  std::vector<std::uint64_t> others_;  // fingerprints of what cannot be watched
+  std::vector<std::uint64_t> others_;  // fingerprints of GDAL paths, which are not watched
 };
 
 }  // namespace terrace::dem

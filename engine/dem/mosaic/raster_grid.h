@@ -1,8 +1,10 @@
-// Rasters on one pixel grid, read as if they were one, at the nodes of any grid: positions, averaging, voids,
-// interpolation. Where they have nothing, nothing is said: other raster grids and the floor are the dataset's business.
+// Rasters on one pixel grid, read as one raster at the nodes of any grid: positions, averaging, void filling,
+// interpolation. Nodes without data stay NaN; the dataset fills them from other raster grids or the floor.
 //
-// Averages are those of blocks of pixels counted from the raster grid's north-western corner. Of rasters that overlap
-// the first has its say; where it is void, the next. Immutable and safe to use from many threads.
+// Averages are taken over blocks of factor x factor pixels, counted from the raster grid's north-western corner. Where
+// members overlap, a block of min(factor, alignment()) pixels is taken from the member with the most pixels in it,
+// among equals from the first in members(). Members whose block is void are skipped. Immutable; safe to use from many
+// threads.
 #pragma once
 
 #include <array>
@@ -32,21 +34,22 @@ struct GridRange {
   bool shows_others = true;  // part of the tile may lie outside the raster grid or in its voids
 };
 
-// What Fill saw of a window, for whoever wants to know how far its heights are from the samples.
+// What Fill read for a window. The error bounds compare served heights with these samples. Heights in metres.
 struct GridTrace {
-  std::vector<Position> positions;  // by node, in pixels; NaN where there is none
-  bool is_part = false;             // nodes far from the raster grid were not asked about: NaN as well
-  // In `cells`; -1: the raster grid has no interpolated height for the node. Where raster grids are blended, nodes that
-  // others fill have theirs too, as far as what was read tells it.
+  std::vector<Position> positions;  // per node, in pixels; NaN where the node has none
+  bool is_part = false;             // true: positions of nodes far from the raster grid were not computed, and are NaN
+  // Per node, an index into `cells`; -1: the raster grid has no interpolated height for the node. With blending, nodes
+  // that other raster grids filled also have a cell, if it lies in `window` and has a sample.
   std::vector<std::int32_t> cell_of_node;
-  std::vector<float> heights;       // by node: the raster grid's own, whatever it counts; NaN where it has none
-  std::vector<double> undulations;  // by node, part of the heights; empty where they count as the samples do
+  std::vector<float> heights;       // per node, the raster grid's height before blending; NaN where it has none
+  std::vector<double> undulations;  // per node, metres, included in `heights`; empty: no geoid was applied
   std::vector<GridCell> cells;
   GridWindow window;
-  // Of the window, averages by the factor, before voids were filled; small ones are where `includes_filled`.
+  // Averages of the window by `factor`, row by row from the north, NaN for voids. Narrow voids are filled only if
+  // `includes_filled`.
   std::vector<float> samples;
-  bool includes_filled = false;  // where raster grids are blended at the full resolution what was bridged has its share
-  std::vector<float> weights;    // then, of the samples; empty: all count in full
+  bool includes_filled = false;  // true when raster grids are blended at factor 1
+  std::vector<float> weights;    // blend weights of `samples`, 0 to 1, if `includes_filled`; empty: all are 1
   int factor = 1;
 };
 
@@ -54,15 +57,16 @@ struct GridOptions {
   int max_void_gap = 0;  // samples: narrower voids are filled
   HoleFill voids = HoleFill::kSmooth;
   double feather_m =
-      0;  // how far from its edges and voids a raster grid begins to give way to what lies below; 0: at them
+      0;  // width in metres of the blend into the raster grids below, inwards from edges and voids; 0: no blend
 };
 
-// Heights of a window's nodes, one each, while raster grids fill them in.
+// Heights of a window's nodes in metres, one per node. Raster grids fill them in turn.
 struct NodeHeights {
-  std::span<float> heights;  // NaN: still wanted
-  // What those that are filled in count beside what lies below, over 0 to 1. Empty: in full.
+  std::span<float> heights;  // NaN: not filled yet
+  // Blend weights of the heights filled in, greater than 0, up to 1; the raster grids below have the rest. Empty:
+  // all 1.
   std::span<float> weights = {};
-  // What is drawn in holes that no raster grid has a height for. NaN: not known so far. Empty: not wanted.
+  // Smooth surface for holes where no raster grid has a height. NaN: not filled yet. Empty: not wanted.
   std::span<float> smooth = {};
 };
 
@@ -72,65 +76,67 @@ class RasterGrid {
   static Result<RasterGrid> Make(GridPlan plan, const GridOptions& options);
 
   const std::vector<GridMember>& members() const { return members_; }
-  // Those that meet a box of pixels; Box::south is its first row.
+  // Returns the indices of the members that meet a box of pixels, ascending. Box::south is its first row.
   std::vector<std::size_t> MembersAt(const Box& pixels) const { return member_index_.Find(pixels); }
   const Georeference& georeference() const { return georeference_; }
-  // Of its pixels; columns without the duplicates of a raster grid that goes all around the Earth.
+  // Size in pixels. A raster grid that spans 360 degrees counts duplicated columns once.
   int columns() const { return columns_; }
   int rows() const { return height_; }
   bool wraps() const { return wraps_; }
-  // The largest power of two at whose multiples all members begin.
+  // Largest power of two up to 2^22, in pixels, that divides the first column and row of every member, and columns()
+  // if the raster grid wraps.
   int alignment() const { return alignment_; }
   const SourceSpacing& spacing() const { return spacing_; }
-  // Padded: outside it there is nothing.
+  // Padded footprint in degrees. The raster grid has no pixels outside it.
   const Footprint& reach() const { return reach_; }
-  // South, north: heights at the poles, of raster grids whose columns are meridians and that reach them.
-  const std::array<std::optional<float>, 2>& pole_heights() const { return pole_heights_; }  // as counted
-  // What its samples count from.
+  // Heights in metres at the south and the north pole, in vertical(). Set only if columns are meridians and reach it.
+  const std::array<std::optional<float>, 2>& pole_heights() const { return pole_heights_; }
+  // Vertical datum of the samples.
   const VerticalDatum& vertical() const { return members_.front().raster->vertical(); }
-  const Undulations* undulations() const { return undulations_.get(); }  // null: none are added
+  const Undulations* undulations() const { return undulations_.get(); }  // null: no geoid is applied
   const GridOptions& options() const { return options_; }
 
   SampleCounts CountSamples() const { return {counts_->measured, counts_->filled, counts_->voids}; }
 
-  // Of all its samples, as they count.
+  // Range of all samples, metres in vertical().
   const HeightRange& heights() const { return heights_; }
-  // At least the ellipsoidal heights of all its samples.
+  // Returns bounds on the ellipsoidal heights of all samples, in metres.
   HeightRange EllipsoidalRange() const;
 
-  // These replace the NaN among the heights of a window's nodes by the raster grid's, as far as it has some. A height
-  // is a function of the node alone. kUnavailable: a raster cannot be read now. kCancelled: stopped. `trace` is filled
-  // in, unless it is null.
+  // Replaces NaN among the window's heights by the raster grid's heights, where it has them. A height depends on the
+  // node alone, not on the window. Fills in `trace` unless it is null. Errors: kUnavailable (a raster cannot be read
+  // now), kChanged (a file was changed, replaced or removed), kCancelled (stopped).
   Result<void> Fill(const geo::Lattice& lattice, const NodeWindow& window, HeightDatum datum, const NodeHeights& nodes,
                     const std::stop_token& stop, GridTrace* trace = nullptr) const;
   Result<void> Fill(const geo::MercatorGrid& grid, const NodeWindow& window, const NodeHeights& nodes,
                     const std::stop_token& stop) const;
 
-  // Pixel positions of the window's nodes as Fill finds them for averages by `factor`.
+  // Returns the pixel positions of the window's nodes that Fill uses for averages by `factor`.
   std::vector<Position> PositionsOf(const geo::Lattice& lattice, const NodeWindow& window, int factor) const;
 
-  // The same at single points, of the full resolution. `filled`, one for each of them: becomes 1 where the sample whose
-  // pixel holds the point is void.
+  // Fill for single points, at full resolution. `filled`, one per point, becomes 1 where the point's pixel is void, for
+  // points that get a height. Precondition: `nodes.smooth` has one entry per point. Errors: those of Fill and of the
+  // geoid for `datum`.
   Result<void> FillPoints(std::span<const GeoPosition> points, HeightDatum datum, const NodeHeights& nodes,
                           std::span<std::uint8_t> filled, const std::stop_token& stop) const;
 
-  // As measured, NaN for voids, row by row from the north. Columns outside the raster grid are a turn on, of raster
-  // grids that wrap.
+  // Returns the samples of a window, metres in vertical(), NaN for voids, row by row from the north. On a raster grid
+  // that wraps, columns are taken modulo columns(). Errors: those of Fill.
   Result<std::vector<float>> ReadSamples(const GridWindow& window, const std::stop_token& stop) const {
     return ReadBlocks(1, window, stop);
   }
 
-  // Whether its samples in a box of pixels may count less than in full when they are averaged by this factor or a
-  // smaller one: an edge or a void is as near as the feather is wide.
+  // Returns true if samples in a box of pixels may have a blend weight below 1, averaged by this factor or a smaller
+  // one: an edge or a void lies within the feather width of the box.
   bool GivesWay(const Box& pixels, int factor) const;
 
-  // Of the pixels in a box; what no member covers counts as void.
+  // Returns the range of the pixels in a box. Pixels that no member covers are voids.
   BlockRange Ranges(const Box& pixels) const;
 
-  // Of the pixels around the holes that meet a box, from which those are filled; nothing where there are none.
+  // Returns the range of the pixels from which the holes that meet a box are filled; an empty range without holes.
   BlockRange RangeAroundHoles(const Box& pixels, int factor) const;
 
-  // At least the heights that Fill gives to nodes of the tile, its edges included.
+  // Returns bounds on the ellipsoidal heights that Fill gives to the tile's nodes, edges included, in metres.
   GridRange RangeOf(const geo::Lattice& lattice, const geo::TileKey& key) const;
 
  private:
@@ -142,7 +148,7 @@ class RasterGrid {
   void MeasureMembers();
   void FindPoleHeights();
 
-  // A cell for each position inside the raster grid whose height is NaN, and which it is.
+  // Cells of the positions inside the raster grid whose height is NaN, and the node index of each.
   struct Cells {
     std::vector<GridCell> cells;
     std::vector<std::size_t> nodes;
@@ -182,9 +188,9 @@ class RasterGrid {
   void TraceOthers(const Cells& others, const std::vector<float>& bridged, const std::vector<float>& filled,
                    std::span<const double> undulations, GridTrace& trace) const;
   std::optional<float> PoleHeight(int pole, HeightDatum datum) const;  // 0 south, 1 north
-  // What each sample of the window counts; empty: all count in full.
+  // Returns the blend weight of each sample in the window, 0 to 1; empty: all are 1.
   Result<std::vector<float>> ReadWeights(int factor, const GridWindow& window, const std::stop_token& stop) const;
-  // Metres: no more than a bounded number of samples.
+  // Feather width in metres, at most 256 samples by `factor`.
   double Feather(int factor) const;
   Result<void> CheckUnread() const;
 
@@ -196,7 +202,7 @@ class RasterGrid {
   std::shared_ptr<const Undulations> undulations_;  // null: heights are ellipsoidal, or taken as such
   std::shared_ptr<Counts> counts_ = std::make_shared<Counts>();
   int width_ = 0, height_ = 0;
-  int columns_ = 0;  // of them in use: without the duplicates of a raster that goes all around the Earth
+  int columns_ = 0;  // without the duplicated columns of a raster grid that spans 360 degrees
   bool wraps_ = false;
   SourceSpacing spacing_;
   Footprint reach_;
@@ -206,7 +212,7 @@ class RasterGrid {
 
   std::vector<GridMember> members_;
   HeightRange heights_;
-  BoxIndex member_index_;              // by pixels; of raster grids that wrap also a turn before and after
+  BoxIndex member_index_;              // by pixels; with wrapping also one turn west and one turn east
   std::vector<geo::TileRange> cover_;  // pixels that members have, without overlap
   BoxIndex cover_index_;
   int alignment_ = 1;  // the largest power of two at whose multiples all members begin

@@ -1,4 +1,4 @@
-// Averages of blocks of samples, as the rows of the samples come in: in the one order that decides their last bits.
+// Averages of blocks of samples, accumulated row by row. The order of summation is fixed, so results are bit-identical.
 #pragma once
 
 #include <algorithm>
@@ -26,21 +26,23 @@ struct BlockSum {
   float Mean() const { return weight == 0 ? SampleRules::kVoid : static_cast<float>(sum / weight); }
 };
 
-// How much of a block of `step` samples lies on an axis of `size` samples: the last one may stick out.
+// Returns the fraction of a block of `step` samples that lies on an axis of `size` samples; below 1 for a partial last
+// block.
 inline double ShareOf(std::int64_t block, int step, std::int64_t size) {
   return static_cast<double>(std::min<std::int64_t>(step, size - block * step)) / step;
 }
 
-// Blocks of a single sample: the averages are the samples, with one zero, `columns` to a row.
+// Copies averages of 1 x 1 blocks: the samples, `columns` per row, with -0 replaced by 0. `stride`: of `out`, in
+// samples.
 inline void CopyRows(std::span<const float> samples, std::int64_t columns, float* out, std::int64_t stride) {
   for (; !samples.empty(); samples = samples.subspan(static_cast<std::size_t>(columns)), out += stride) {
     for (std::int64_t i = 0; i < columns; ++i) out[i] = samples[static_cast<std::size_t>(i)] + 0.0f;
   }
 }
 
-// Of a row of blocks of block x block samples. A block is summed row by row, whatever lies beside it; one of more than
-// kLargestPlain samples a side by blocks of that size, each of them row by row: so large averages can be made from
-// parts of a raster that fit into memory (raster_statistics.h), bit for bit.
+// Averages of one row of blocks of block x block samples. Each block is summed row by row, independently of its
+// neighbours. Blocks of more than kLargestPlain samples a side are summed from blocks of that size, so averages
+// computed from parts of a raster that fit into memory (raster_statistics.h) have the same bits.
 class BlockAverages {
  public:
   static constexpr int kLargestPlain = 1024;
@@ -51,7 +53,7 @@ class BlockAverages {
         inner_(static_cast<std::size_t>(blocks * parts_)),
         outer_(parts_ > 1 ? static_cast<std::size_t>(blocks) : 0) {}
 
-  // Each sample counts `weight` times, the last of the row `last` times of that: it may stand for fewer pixels.
+  // Adds a row of samples with weight `weight`. The last sample has `weight` * `last`: it may cover fewer pixels.
   void AddRow(const float* samples, std::int64_t count, double weight = 1, double last = 1) {
     // All but the block of the last sample.
     const std::int64_t whole = (count - 1) / plain_;
@@ -61,7 +63,7 @@ class BlockAverages {
     if (parts_ > 1 && ++rows_ == kLargestPlain) Gather();
   }
 
-  // NaN for a block without a valid sample. The next row of blocks begins.
+  // Writes one average per block, NaN for a block without a valid sample, and starts the next row of blocks.
   void Take(float* out) {
     if (parts_ > 1 && rows_ > 0) Gather();
     for (BlockSum& sum : parts_ > 1 ? outer_ : inner_) {

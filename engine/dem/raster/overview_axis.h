@@ -1,8 +1,8 @@
-// Which pixels of a raster its overviews stand for.
+// The pixels of a raster that each overview sample covers.
 //
-// GDAL makes n samples of W pixels for factor f, and each stands for W / n of them: n is W / f, rounded up by gdaladdo
-// and down in cloud-optimized GeoTIFFs, so where f does not divide W that is less or more than f. Samples drift away
-// from the blocks of f pixels of their number, by up to f pixels at the far end of the axis.
+// For factor f, GDAL reduces W pixels to n samples of W / n pixels each. gdaladdo rounds n = W / f up, cloud-optimized
+// GeoTIFFs round it down. If f does not divide W, sample i is not centred on block i of f pixels: the offset grows to
+// up to f pixels at the end of the axis.
 #pragma once
 
 #include <gdal_priv.h>
@@ -13,21 +13,22 @@
 
 namespace terrace::dem {
 
-// True where overviews are the format's own, such as those of wavelets, and each sample stands for a whole block.
+// Returns true if the overviews are the format's own (JPEG, JPEG 2000) and each sample covers a block of exactly
+// `factor` pixels. False with an .ovr file, which GDAL prefers.
 bool HasOwnOverviews(GDALDataset& dataset);
 
-// Pixels that a sample of an overview stands for, along an axis of the raster.
+// Returns the number of pixels that an overview sample covers along an axis of `pixels` pixels and `samples` samples.
 double PixelsPerSample(GDALDataset& dataset, int factor, int pixels, int samples);
 
-// One axis of an overview: where the blocks of a grid lie between its samples.
+// One axis of an overview. Locates the blocks of a grid between overview samples.
 class OverviewAxis {
  public:
-  // `pixels` of the file, of which the grid may leave out some at the end (RasterLayout::columns).
+  // `pixels`: of the file; the grid may leave out some at the end (RasterLayout::columns).
   OverviewAxis(const GridAxis& blocks, int pixels, int samples, bool is_own)
       : blocks_(blocks), pixels_(pixels), samples_(samples), is_own_(is_own) {}
 
-  // Of the block's centre; beyond the outermost samples' centres these count. The sample behind the last one is the
-  // first, a turn on.
+  // Returns the location of the block's centre, clamped to the outermost samples' centres. If the axis wraps, the
+  // sample after the last one is the first.
   GridAxis::Location Around(std::int64_t block) const;
 
   std::int64_t samples() const { return samples_; }

@@ -62,11 +62,11 @@ class RasterSource {
   // How opening went.
   const Preparation& preparation() const { return preparation_; }
 
-  // ReadGrid of this raster, from what was prepared where it can be. kUnavailable: a file of it is gone, was replaced
-  // or cannot be read. Errors name the file.
+  // ReadGrid of this raster, from prepared averages where possible. kChanged: a file was changed, replaced or removed.
+  // kUnavailable: a file cannot be read. kCancelled: stopped. Errors name the file.
   Result<std::vector<float>> ReadBlocks(int factor, const GridWindow& window, const std::stop_token& stop) const;
 
-  // Whether the files are still those that were opened.
+  // kChanged: a file was changed, replaced or removed since it was opened.
   Result<void> CheckUnchanged() const { return handles_.CheckUnchanged(); }
 
  private:
