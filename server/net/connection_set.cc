@@ -10,8 +10,9 @@ void ConnectionSet::Add(const std::shared_ptr<Connection>& connection, const std
   bool draining = false;
   {
     const std::lock_guard lock(mutex_);
+    auto& count = of_client_[client];  // first: a member without its count could not be removed
     connections_.emplace(connection.get(), Member{connection, client, ++last_number_});
-    ++of_client_[client];
+    ++count;
     draining = draining_;
   }
   if (draining) connection->Drain();
