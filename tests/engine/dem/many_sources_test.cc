@@ -459,6 +459,26 @@ TEST(ManySources, TheLogSaysTheSameOfManySourcesAFewTimes) {
   EXPECT_NE(log.find("25 more sources have lines like this one: no vertical datum stated"), std::string::npos) << log;
 }
 
+// The grid closes on whole columns. What is left of the turn lies between its last column and its first, where a bound
+// on the error must count it.
+TEST(OneSource, WhatIsLeftOfAFullTurnCountsAsMisplacement) {
+  for (const double left : {0.0, -0.0095, 0.0095}) {  // columns
+    const TempDir dir;
+    const double pixel = 360 / (720 + left);
+    const auto raster = OpenRasterOrFail(WriteRaster(dir, {.width = 720,
+                                                           .height = 4,
+                                                           .geo_transform = {-180, pixel, 0, 1, 0, -pixel},
+                                                           .value = [](int col, int row) { return col + row; }}));
+    std::vector<GridPlan> plans = PlanGrids({raster});
+    ASSERT_EQ(plans.size(), 1U);
+    const auto grid = RasterGrid::Make(std::move(plans.front()), {.max_void_gap = 64});
+    ASSERT_TRUE(grid);
+    EXPECT_TRUE(grid->wraps());
+    EXPECT_GE(grid->members().front().misplacement.x, std::abs(left) * 0.999);
+    EXPECT_LE(grid->members().front().misplacement.x, std::abs(left) * 3 + 1e-6);
+  }
+}
+
 TEST(OneSource, TheLogTellsOfColumnsBeyondAFullTurn) {
   for (const int width : {360, 361, 540}) {  // pixels, nodes at -180 and 180 degrees, one and a half turns
     const TempDir dir;

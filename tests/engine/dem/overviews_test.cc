@@ -310,6 +310,7 @@ TEST(Overviews, OfRealGroundChangeLittle) {
   const std::string copy = dir.File("copy.tif");
   std::filesystem::copy_file(path, copy);
   std::filesystem::permissions(copy, std::filesystem::perms::owner_write, std::filesystem::perm_options::add);
+  GDALAllRegister();  // nothing was opened yet where this test runs alone
   {
     const GDALDatasetUniquePtr dataset(GDALDataset::Open(copy.c_str(), GDAL_OF_RASTER | GDAL_OF_UPDATE));
     ASSERT_NE(dataset, nullptr);
