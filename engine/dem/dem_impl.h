@@ -31,8 +31,8 @@ class DemSource::Impl {
 
   const geo::Lattice& LatticeOf(int level) const;  // 0 .. geo::kMaxLevel, also beyond the deepest level served
 
-  template <typename Nodes>
-  Result<std::vector<float>> ReadGrids(const Nodes& all_nodes, const NodeWindow& window, HeightDatum datum,
+  template <typename NodeGrid>
+  Result<std::vector<float>> ReadGrids(const NodeGrid& node_grid, const NodeWindow& window, HeightDatum datum,
                                        const std::string& what, const std::stop_token& stop,
                                        std::vector<PartTrace>* traces) const;
   Result<double> BoundError(const TileHeights& tile, const NodeWindow& window, std::vector<PartTrace> traces,

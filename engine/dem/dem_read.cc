@@ -19,19 +19,19 @@ Result<void> FillFrom(const RasterGrid& grid, const geo::Lattice& lattice, const
                       const NodeHeights& nodes, const std::stop_token& stop, GridTrace* trace) {
   return grid.Fill(lattice, window, datum, nodes, stop, trace);
 }
-Result<void> FillFrom(const RasterGrid& grid, const geo::MercatorGrid& all_nodes, const NodeWindow& window, HeightDatum,
+Result<void> FillFrom(const RasterGrid& grid, const geo::MercatorGrid& node_grid, const NodeWindow& window, HeightDatum,
                       const NodeHeights& nodes, const std::stop_token& stop, GridTrace*) {
-  return grid.Fill(all_nodes, window, nodes, stop);
+  return grid.Fill(node_grid, window, nodes, stop);
 }
 
 // Around the nodes of a window. Their longitudes begin between -180 and 180, and go on eastwards.
-template <typename Nodes>
-Box BoxOf(const Nodes& all_nodes, const NodeWindow& window) {
+template <typename NodeGrid>
+Box BoxOf(const NodeGrid& node_grid, const NodeWindow& window) {
   constexpr double kSlack = 1e-9;
-  const double west = all_nodes.Longitude(window.column);
+  const double west = node_grid.Longitude(window.column);
   const auto [south, north] =
-      std::minmax({all_nodes.Latitude(window.row), all_nodes.Latitude(window.row + window.rows - 1)});
-  return {west - kSlack, south - kSlack, west + (window.columns - 1) * all_nodes.StepDegrees() + kSlack,
+      std::minmax({node_grid.Latitude(window.row), node_grid.Latitude(window.row + window.rows - 1)});
+  return {west - kSlack, south - kSlack, west + (window.columns - 1) * node_grid.StepDegrees() + kSlack,
           north + kSlack};
 }
 
@@ -52,8 +52,8 @@ struct NodeRange {
 
 // The nodes of a window that a raster grid may give heights to; `around`: and so many more on each side. Never none,
 // since its files are looked at in any case.
-template <typename Nodes>
-NodeWindow PartOf(const RasterGrid& grid, const Nodes& all_nodes, const NodeWindow& window, int around) {
+template <typename NodeGrid>
+NodeWindow PartOf(const RasterGrid& grid, const NodeGrid& node_grid, const NodeWindow& window, int around) {
   const Footprint& reach = grid.reach();
   const bool is_polar = grid.pole_heights()[0] || grid.pole_heights()[1];
   if (is_polar || reach.south <= -90 || reach.north >= 90 || reach.all_longitudes()) return window;
@@ -61,11 +61,11 @@ NodeWindow PartOf(const RasterGrid& grid, const Nodes& all_nodes, const NodeWind
   NodeRange rows, columns;
   for (int j = 0; j + 1 < window.rows; ++j) {
     const auto [south, north] =
-        std::minmax({all_nodes.Latitude(window.row + j), all_nodes.Latitude(window.row + j + 1)});
+        std::minmax({node_grid.Latitude(window.row + j), node_grid.Latitude(window.row + j + 1)});
     if (north >= reach.south && south <= reach.north) rows.AddStep(j);
   }
   for (int i = 0; i + 1 < window.columns; ++i) {
-    const double west = all_nodes.Longitude(window.column + i), east = west + all_nodes.StepDegrees();
+    const double west = node_grid.Longitude(window.column + i), east = west + node_grid.StepDegrees();
     for (const int turn : {-360, 0, 360}) {
       if (east + turn >= reach.west && west + turn <= reach.east) columns.AddStep(i);
     }
@@ -93,12 +93,12 @@ void ForPart(const NodeWindow& part, const NodeWindow& window, Visit&& visit) {
 
 // FillFrom, where there are many raster grids for the part of the window alone that this one reaches: thousands of
 // small ones may lie in a shallow tile, and what they note waits until all heights are known.
-template <typename Nodes>
-Result<void> FillAny(const RasterGrid& grid, const Nodes& all_nodes, const NodeWindow& window, std::size_t grids,
+template <typename NodeGrid>
+Result<void> FillAny(const RasterGrid& grid, const NodeGrid& node_grid, const NodeWindow& window, std::size_t grids,
                      HeightDatum datum, const NodeHeights& nodes, const std::stop_token& stop, PartTrace* traced) {
   GridTrace* const trace = traced != nullptr ? &traced->trace : nullptr;
-  if (grids <= kFewGrids) return FillFrom(grid, all_nodes, window, datum, nodes, stop, trace);
-  const NodeWindow part = PartOf(grid, all_nodes, window, 0);
+  if (grids <= kFewGrids) return FillFrom(grid, node_grid, window, datum, nodes, stop, trace);
+  const NodeWindow part = PartOf(grid, node_grid, window, 0);
   const auto copy = [&](std::span<const float> all) {
     std::vector<float> some(all.empty() ? 0
                                         : static_cast<std::size_t>(part.columns) * static_cast<std::size_t>(part.rows));
@@ -109,7 +109,7 @@ Result<void> FillAny(const RasterGrid& grid, const Nodes& all_nodes, const NodeW
     if (!all.empty()) ForPart(part, window, [&](std::size_t from, std::size_t to) { all[to] = some[from]; });
   };
   std::vector<float> heights = copy(nodes.heights), weights = copy(nodes.weights), smooth = copy(nodes.smooth);
-  const auto filled = FillFrom(grid, all_nodes, part, datum, {heights, weights, smooth}, stop, trace);
+  const auto filled = FillFrom(grid, node_grid, part, datum, {heights, weights, smooth}, stop, trace);
   if (!filled) return filled;
   copy_back(heights, nodes.heights);
   copy_back(weights, nodes.weights);
@@ -202,14 +202,14 @@ class Blend {
   std::vector<double> open_;  // share that raster grids further down have
 };
 
-template <typename Nodes>
-Result<std::vector<float>> DemSource::Impl::ReadGrids(const Nodes& all_nodes, const NodeWindow& window,
+template <typename NodeGrid>
+Result<std::vector<float>> DemSource::Impl::ReadGrids(const NodeGrid& node_grid, const NodeWindow& window,
                                                       HeightDatum datum, const std::string& what,
                                                       const std::stop_token& stop,
                                                       std::vector<PartTrace>* traces) const {
   const std::size_t nodes = static_cast<std::size_t>(window.columns) * static_cast<std::size_t>(window.rows);
   std::vector<float> heights(nodes, SampleRules::kVoid), smooth = heights;
-  const std::vector<std::size_t> order = GridsAt(BoxOf(all_nodes, window));
+  const std::vector<std::size_t> order = GridsAt(BoxOf(node_grid, window));
   const bool feathers = has_feather && order.size() > 1;
   Blend blend(feathers ? nodes : 0);
   for (const std::size_t i : order) {
@@ -220,7 +220,7 @@ Result<std::vector<float>> DemSource::Impl::ReadGrids(const Nodes& all_nodes, co
     }
     PartTrace* const trace = traces != nullptr ? &traces->emplace_back() : nullptr;
     const auto filled =
-        FillAny(grids[i], all_nodes, window, order.size(), datum, {heights, weights, smooth}, stop, trace);
+        FillAny(grids[i], node_grid, window, order.size(), datum, {heights, weights, smooth}, stop, trace);
     if (!filled) {
       return MakeError(filled.error().code, "{}: {}", what, filled.error().message);
     }

@@ -226,7 +226,7 @@ StampedFiles DemSource::files() const {
   std::set<const Geoid*> geoids;
   for (const RasterGrid& grid : impl_->grids) {
     for (const GridMember& member : grid.members()) all.Append(member.raster->files());
-    // RasterGrids mostly share one.
+    // Most raster grids share one geoid.
     const auto& geoid = grid.vertical().geoid;
     if (geoid && geoids.insert(geoid.get()).second) all.Append(geoid->files());
   }

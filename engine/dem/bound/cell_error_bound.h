@@ -1,4 +1,4 @@
-// Where a tile's nodes do not lie evenly on a raster grid's grid: single cells, between the heights served and the
+// Where a tile's nodes do not lie evenly on a raster grid: single cells, between the heights served and the
 // raster grid's samples.
 #pragma once
 

@@ -40,7 +40,7 @@ class GridTables {
 
   const RasterGrid& grid_;
   const GridTrace& trace_;
-  const double turn_;              // columns; 0: the raster grid's grid is not one around the Earth
+  const double turn_;              // columns; 0: the raster grid does not wrap around the Earth
   Box around_;                     // the tile's pixels, and some more
   std::vector<std::size_t> near_;  // members that meet it, in any turn
   mutable std::size_t members_visited_ = 0;

@@ -18,9 +18,8 @@ struct Reach {
 // For each level from 0 to the deepest: ranges of tiles without overlap, sorted by row, then column, that contain
 // - every tile that touches a source of at least this depth;
 // - every ancestor of such a tile, and both roots;
-// - all four children of a tile that has any, because 3D Tiles clients replace a tile by its children and a missing
-// child
-//   is a hole.
+// - all four children of a tile that has any: 3D Tiles clients replace a tile by its children, and a missing child is a
+//   hole.
 // A level with too many ranges for its documents gets fewer and larger ones, which include tiles outside all sources.
 // Precondition: `sources` is not empty.
 std::vector<std::vector<geo::TileRange>> AvailableTiles(std::span<const Reach> sources);

@@ -45,7 +45,7 @@ std::uint64_t KeyOf(const RasterLayout& layout, bool find_voids, const std::stri
   return XXH3_64bits(bytes.data(), bytes.size());
 }
 
-// One raster's way to its statistics. Without a record everything is kept in memory alone.
+// Loads or reads the statistics of one raster. Without a cache file they stay in memory alone.
 class Preparer {
  public:
   Preparer(GDALDataset& dataset, const RasterLayout& layout, const std::string& path, const StampedFiles& files,
@@ -141,7 +141,7 @@ class Preparer {
     return assembler.Finish(dataset_, options_.stop);
   }
 
-  // The statistics, or another one under the rules that it calls for.
+  // The statistics, or those of another pass if nodata was detected.
   Result<RasterStatistics> WithoutFoundVoids(RasterStatistics statistics) {
     const SampleRules& rules = shape_.layout.rules;
     const bool has_collar = statistics.zeros.IsCollar(shape_.layout.width, shape_.layout.height);

@@ -96,10 +96,9 @@ void LogWhatMatters(GDALDataset& dataset, const RasterInfo& info, const Georefer
 
 void LogVertical(const std::string& path, const VerticalDatum& vertical, const std::string& unit) {
   if (!vertical.is_known()) {
-    LogSource(
-        SourceLog::Level::kWarn, path,
-        "no vertical datum stated, heights pass through as given; if they count from a geoid, name it with `vertical` "
-        "(egm96, EPSG:5773, ..)");
+    LogSource(SourceLog::Level::kWarn, path,
+              "no vertical datum stated, heights pass through as given; if they refer to a geoid, set `vertical` "
+              "(egm96, EPSG:5773 and others)");
   } else if (vertical.geoid) {
     LogSource(SourceLog::Level::kInfo, path, "heights count from {}, made ellipsoidal by PROJ operation \"{}\"",
               vertical.name, vertical.geoid->description());
@@ -258,7 +257,7 @@ BlockRange RasterSource::RangeIn(double west, double north, double east, double 
 
 Result<std::vector<float>> RasterSource::ReadBlocks(int factor, const GridWindow& window,
                                                     const std::stop_token& stop) const {
-  // From memory and from the record only while the files are those that were prepared.
+  // From memory and from the cache file only while the files are those that were prepared.
   if (factor >= kLargestDirect && (kept_ ? !kept_->coarse.grids.empty() : paging_->has_coarse_averages)) {
     if (auto unchanged = handles_.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
     if (const StatisticsPages::Tables known = tables(); known->coarse.Has(factor))

@@ -49,14 +49,14 @@ class RasterSource {
   // Of the valid samples of the first and the last row.
   const std::array<std::optional<double>, 2>& edge_row_means() const { return edge_row_means_; }
 
-  // Its statistics's tables, which may have to be read anew: whoever asks often keeps them. Throws std::runtime_error
-  // where they can be neither read nor made again, as when the file is gone.
+  // The raster's statistics. May read them from the cache file; keep the result for repeated use. Throws
+  // std::runtime_error if they can be neither read nor made again, as when the file is gone.
   StatisticsPages::Tables tables() const;
-  // What they say of a box of pixels (RangeTable::Query). Of large boxes that is known without them.
+  // The range of a box of pixels (RangeTable::Query). Large boxes need no read.
   BlockRange RangeIn(double west, double north, double east, double south) const;
   const StampedFiles& files() const { return handles_.files(); }
 
-  // In its record; null: there are none.
+  // In the cache file; null: none.
   const CachedAverages* averages() const { return averages_.get(); }
 
   // How opening went.

@@ -11,7 +11,7 @@
 namespace terrace::dem {
 namespace {
 
-// Averages of the largest factor that is compared directly reach this far out of a of_chunk.
+// Averages of the largest factor that is compared directly reach this far out of a chunk.
 constexpr int kHalo = kLargestDirect;
 
 // Factors of the raster up to `most`, from `least` on.
@@ -230,7 +230,7 @@ class RowErrors {
 
   const Averages& averages_;
   const GridAxis rows_;
-  std::vector<GridAxis::Location> places_;  // by column of the of_chunk, within the window
+  std::vector<GridAxis::Location> places_;  // by column of the chunk, within the window
   std::vector<double> line_;
 };
 

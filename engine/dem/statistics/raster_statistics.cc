@@ -70,25 +70,25 @@ StatisticsAssembler::StatisticsAssembler(const RasterLayout& layout)
                        static_cast<std::size_t>(DivideUp(layout.height, ChunkGrid::kSide)));
 }
 
-void StatisticsAssembler::Add(const Chunk& chunk, const ChunkStatistics& of_chunk) {
+void StatisticsAssembler::Add(const Chunk& chunk, const ChunkStatistics& chunk_statistics) {
   statistics_.table.AddBlocks(chunk.col / RangeTable::kBlock, chunk.row / RangeTable::kBlock,
-                              DivideUp(chunk.cols, RangeTable::kBlock), of_chunk.ranges);
-  statistics_.valid += static_cast<std::uint64_t>(of_chunk.valid);
-  statistics_.zeros.Add(of_chunk.zeros);
-  voids_.Add(chunk, of_chunk);
-  first_row_.Add(of_chunk.first_row);
-  last_row_.Add(of_chunk.last_row);
-  for (std::size_t k = 0; k < of_chunk.errors.size(); ++k) {
+                              DivideUp(chunk.cols, RangeTable::kBlock), chunk_statistics.ranges);
+  statistics_.valid += static_cast<std::uint64_t>(chunk_statistics.valid);
+  statistics_.zeros.Add(chunk_statistics.zeros);
+  voids_.Add(chunk, chunk_statistics);
+  first_row_.Add(chunk_statistics.first_row);
+  last_row_.Add(chunk_statistics.last_row);
+  for (std::size_t k = 0; k < chunk_statistics.errors.size(); ++k) {
     const int factor = 2 << k, pixels = AveragingErrors::BlockPixels(factor), columns = DivideUp(chunk.cols, pixels);
-    for (std::size_t i = 0; i < of_chunk.errors[k].size(); ++i) {
+    for (std::size_t i = 0; i < chunk_statistics.errors[k].size(); ++i) {
       statistics_.errors.Raise(factor, chunk.col / pixels + static_cast<int>(i) % columns,
-                               chunk.row / pixels + static_cast<int>(i) / columns, of_chunk.errors[k][i]);
+                               chunk.row / pixels + static_cast<int>(i) / columns, chunk_statistics.errors[k][i]);
     }
   }
-  if (layout_.overview_factors.empty() && chunk.col < layout_.columns) AddSums(chunk, of_chunk);
+  if (layout_.overview_factors.empty() && chunk.col < layout_.columns) AddSums(chunk, chunk_statistics);
 }
 
-void StatisticsAssembler::AddSums(const Chunk& chunk, const ChunkStatistics& of_chunk) {
+void StatisticsAssembler::AddSums(const Chunk& chunk, const ChunkStatistics& chunk_statistics) {
   const int used = std::min(chunk.cols, layout_.columns - chunk.col);
   const auto place = [&](int factor, const auto& values, const auto& put) {
     const int columns = DivideUp(used, factor);
@@ -102,11 +102,11 @@ void StatisticsAssembler::AddSums(const Chunk& chunk, const ChunkStatistics& of_
     const int factor = kLargestDirect << k;
     CoarseAverages::Grid& grid = statistics_.coarse.grids[k];
     if (k == 0) {
-      place(factor, of_chunk.averages.back(), [&](std::int64_t column, std::int64_t row, float height) {
+      place(factor, chunk_statistics.averages.back(), [&](std::int64_t column, std::int64_t row, float height) {
         grid.heights[static_cast<std::size_t>(row * grid.columns + column)] = height;
       });
-    } else if (k - 1 < of_chunk.sums.size()) {
-      place(factor, of_chunk.sums[k - 1], [&](std::int64_t column, std::int64_t row, const BlockSum& sum) {
+    } else if (k - 1 < chunk_statistics.sums.size()) {
+      place(factor, chunk_statistics.sums[k - 1], [&](std::int64_t column, std::int64_t row, const BlockSum& sum) {
         grid.heights[static_cast<std::size_t>(row * grid.columns + column)] = sum.Mean();
         if (factor != ChunkGrid::kSide) return;
         largest_sums_[static_cast<std::size_t>(row * DivideUp(layout_.columns, factor) + column)] = sum;

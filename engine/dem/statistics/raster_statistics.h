@@ -1,5 +1,5 @@
-// What terrace must know of a raster before it serves from it: its range of heights, its voids, its outermost rows, its
-// coarsest averages, and how far averages are from samples. One pass through the raster, part by of_chunk.
+// Statistics of a raster, read once before it is served: ranges of heights, voids, means of the outermost rows, coarse
+// averages, and the errors of averages. One pass over the raster, chunk by chunk.
 #pragma once
 
 #include <gdal_priv.h>
@@ -20,7 +20,7 @@
 
 namespace terrace::dem {
 
-// Averages of factors from kLargestDirect on, all of them: a 4096th of the raster and less. None of a raster with
+// All averages of factors kLargestDirect and above: at most a 4096th of the raster's samples. Empty for a raster with
 // overviews.
 class CoarseAverages {
  public:
@@ -61,14 +61,14 @@ class StatisticsAssembler {
   StatisticsAssembler(const StatisticsAssembler&) = delete;
   StatisticsAssembler& operator=(const StatisticsAssembler&) = delete;
 
-  void Add(const Chunk& chunk, const ChunkStatistics& of_chunk);
+  void Add(const Chunk& chunk, const ChunkStatistics& chunk_statistics);
 
   // Reads overviews where the raster has some. kUnavailable: they cannot be read. kInvalidArgument: nothing but voids.
   // kCancelled: stopped. Errors do not name the file.
   Result<RasterStatistics> Finish(GDALDataset& dataset, const std::stop_token& stop);
 
  private:
-  void AddSums(const Chunk& chunk, const ChunkStatistics& of_chunk);
+  void AddSums(const Chunk& chunk, const ChunkStatistics& chunk_statistics);
   Result<void> FinishCoarse(GDALDataset& dataset, const std::stop_token& stop);
   Result<void> AddOverviews(GDALDataset& dataset, const std::stop_token& stop);
 

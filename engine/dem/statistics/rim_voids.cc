@@ -120,7 +120,7 @@ void RimVoidFinder::AddRun(int chunk_row, std::int32_t first, std::int32_t last)
   ++band_runs_;
 }
 
-void RimVoidFinder::Add(const Chunk& chunk, const ChunkStatistics& of_chunk) {
+void RimVoidFinder::Add(const Chunk& chunk, const ChunkStatistics& chunk_statistics) {
   if (has_given_up_) return;
   const int used = std::min(chunk.cols, columns_ - chunk.col);
   if (chunk.row != top_) {
@@ -128,10 +128,10 @@ void RimVoidFinder::Add(const Chunk& chunk, const ChunkStatistics& of_chunk) {
     top_ = chunk.row;
   }
   if (has_given_up_ || used <= 0) return;
-  if (of_chunk.is_void()) {
+  if (chunk_statistics.is_void()) {
     for (int r = 0; r < chunk.rows; ++r) AddRun(r, chunk.col, chunk.col + used - 1);
   } else {
-    for (const VoidRun& run : of_chunk.voids) AddRun(run.row, chunk.col + run.first, chunk.col + run.last);
+    for (const VoidRun& run : chunk_statistics.voids) AddRun(run.row, chunk.col + run.first, chunk.col + run.last);
   }
   if (band_runs_ > most_runs_) GiveUp();
 }

@@ -82,7 +82,7 @@ class RimVoidFinder {
   RimVoidFinder(int columns, int rows, Hole hole, std::size_t most_runs = kMaxRuns);
 
   // Adds all chunks in the order of ChunkGrid.
-  void Add(const Chunk& chunk, const ChunkStatistics& of_chunk);
+  void Add(const Chunk& chunk, const ChunkStatistics& chunk_statistics);
   // Call after the last chunk.
   RimVoids Finish();
 

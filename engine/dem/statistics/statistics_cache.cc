@@ -23,14 +23,14 @@
 namespace terrace::dem {
 namespace {
 
-// Changes with every change of what a record holds or means.
+// Increases with every change of the format or its meaning.
 constexpr std::uint32_t kCacheVersion = 3;
 constexpr std::uint64_t kHeaderMagic = 0x31'53'54'41'54'53'52'54;  // "TRSTATS1"
-constexpr std::uint64_t kFooterMagic = 0x44'4e'45'59'56'52'55'53;  // "SURVYEND"
-constexpr std::uint32_t kPartMagic = 0x54'52'41'50;                // "PART"
-constexpr std::size_t kHeaderBytes = 36, kPartHeaderBytes = 32, kFooterBytes = 24;
+constexpr std::uint64_t kFooterMagic = 0x44'4e'45'53'54'41'54'53;  // "STATSEND"
+constexpr std::uint32_t kChunkMagic = 0x4b'4e'48'43;               // "CHNK"
+constexpr std::size_t kHeaderBytes = 36, kChunkHeaderBytes = 32, kFooterBytes = 24;
 constexpr int kMaxUnsynced = 64;                    // chunks: a few seconds of work
-constexpr std::uint64_t kMaxHeaderBytes = 1 << 16;  // detected are a few numbers and a line of text
+constexpr std::uint64_t kMaxHeaderBytes = 1 << 16;  // a few numbers and a line of text
 
 constexpr int CeilingOf(int a, int b) { return (a + b - 1) / b; }
 
@@ -79,7 +79,7 @@ std::uint64_t SizeOf(int file) {
   return ::fstat(file, &status) == 0 ? static_cast<std::uint64_t>(status.st_size) : 0;
 }
 
-// Averages of a chunk: how many of each factor, and where they lie behind one another, each after its checksum.
+// The averages of a chunk of one factor: their numbers and their offset. Each factor follows its checksum.
 struct AveragesPlace {
   std::uint64_t offset = 0;
   int columns = 0, rows = 0;
@@ -98,8 +98,7 @@ AveragesPlace PlaceOf(const Chunk& chunk, const RasterLayout& layout, int factor
   }
 }
 
-// Whether a file begins with the header of a record, and whether that is the wanted one; then `shape` gets its
-// detected.
+// Whether a file begins with a header, and with that of the shape. Then sets the detected nodata of `shape`.
 enum class HeaderState { kDamaged, kOther, kSame };
 HeaderState ReadHeader(int file, StatisticsShape& shape, std::uint64_t& bytes) {
   const std::uint64_t size = SizeOf(file);
@@ -122,14 +121,14 @@ HeaderState ReadHeader(int file, StatisticsShape& shape, std::uint64_t& bytes) {
   return HeaderState::kSame;
 }
 
-struct PartHeader {
+struct ChunkHeader {
   std::uint32_t index = 0, statistics_bytes = 0;
   std::uint64_t averages_bytes = 0, checksum = 0;  // of the header before it and the statistics
 
-  static PartHeader Of(std::string_view bytes) {
+  static ChunkHeader Of(std::string_view bytes) {
     ByteReader reader(bytes);
-    PartHeader header;
-    if (reader.Get<std::uint32_t>() != kPartMagic) return header;
+    ChunkHeader header;
+    if (reader.Get<std::uint32_t>() != kChunkMagic) return header;
     header.index = reader.Get<std::uint32_t>();
     header.statistics_bytes = reader.Get<std::uint32_t>();
     reader.Get<std::uint32_t>();
@@ -139,20 +138,20 @@ struct PartHeader {
   }
 };
 
-std::string EncodeCachedChunk(std::uint32_t index, const ChunkStatistics& of_chunk, int least_kept) {
-  const std::string statistics = of_chunk.is_void() ? std::string() : EncodeChunk(of_chunk);
+std::string EncodeCachedChunk(std::uint32_t index, const ChunkStatistics& chunk_statistics, int least_kept) {
+  const std::string statistics = chunk_statistics.is_void() ? std::string() : EncodeChunk(chunk_statistics);
   ByteWriter averages;
-  if (!of_chunk.is_void()) {
+  if (!chunk_statistics.is_void()) {
     for (std::size_t k = 0; (2 << k) < kLargestDirect; ++k) {
       if ((2 << k) < least_kept) continue;
-      const std::string_view floats(reinterpret_cast<const char*>(of_chunk.averages[k].data()),
-                                    of_chunk.averages[k].size() * sizeof(float));
+      const std::string_view floats(reinterpret_cast<const char*>(chunk_statistics.averages[k].data()),
+                                    chunk_statistics.averages[k].size() * sizeof(float));
       averages.Put(HashOf(floats));
       averages.PutBytes(floats);
     }
   }
   ByteWriter writer;
-  writer.Put(kPartMagic);
+  writer.Put(kChunkMagic);
   writer.Put(index);
   writer.Put(static_cast<std::uint32_t>(statistics.size()));
   writer.Put<std::uint32_t>(0);
@@ -321,11 +320,11 @@ std::optional<CachedStatistics> LoadStatistics(const std::string& path, const St
   for (std::uint64_t& at : offsets) at = whole.Get<std::uint64_t>();
   auto statistics = DecodeStatistics(whole.GetBytes(whole.remaining()), layout);
   if (!statistics) return damaged("its statistics");
-  CachedStatistics record{std::move(shape.detected), *std::move(statistics), nullptr};
+  CachedStatistics cached{std::move(shape.detected), *std::move(statistics), nullptr};
   if (LeastKeptFactor(layout) < kLargestDirect) {
-    record.averages = std::make_shared<const CachedAverages>(file, path, layout, std::move(offsets));
+    cached.averages = std::make_shared<const CachedAverages>(file, path, layout, std::move(offsets));
   }
-  return record;
+  return cached;
 }
 
 StatisticsCacheWriter::StatisticsCacheWriter(OpenFile file, std::string path, const StatisticsShape& shape)
@@ -385,27 +384,27 @@ Result<void> StatisticsCacheWriter::Cut() {
 }
 
 Result<void> StatisticsCacheWriter::Resume(const std::function<void(const ChunkStatistics&)>& keep) {
-  KeepWholeParts(keep);
+  KeepWholeChunks(keep);
   return Cut();
 }
 
-void StatisticsCacheWriter::KeepWholeParts(const std::function<void(const ChunkStatistics&)>& keep) {
+void StatisticsCacheWriter::KeepWholeChunks(const std::function<void(const ChunkStatistics&)>& keep) {
   const std::uint64_t size = SizeOf(file_.get());
   while (static_cast<int>(offsets_.size()) < chunks_.count()) {
-    const auto head = ReadAt(file_.get(), end_, kPartHeaderBytes, size);
+    const auto head = ReadAt(file_.get(), end_, kChunkHeaderBytes, size);
     if (!head) return;
-    const PartHeader header = PartHeader::Of(*head);
-    const auto statistics = ReadAt(file_.get(), end_ + kPartHeaderBytes, header.statistics_bytes, size);
-    const std::uint64_t averages = end_ + kPartHeaderBytes + header.statistics_bytes;
+    const ChunkHeader header = ChunkHeader::Of(*head);
+    const auto statistics = ReadAt(file_.get(), end_ + kChunkHeaderBytes, header.statistics_bytes, size);
+    const std::uint64_t averages = end_ + kChunkHeaderBytes + header.statistics_bytes;
     if (!statistics || averages > size || header.averages_bytes > size - averages || header.index != offsets_.size() ||
-        HashOf(head->substr(0, kPartHeaderBytes - 8) + *statistics) != header.checksum) {
+        HashOf(head->substr(0, kChunkHeaderBytes - 8) + *statistics) != header.checksum) {
       return;
     }
     const Chunk chunk = chunks_.At(static_cast<int>(offsets_.size()));
-    const std::optional<ChunkStatistics> of_chunk =
+    const std::optional<ChunkStatistics> chunk_statistics =
         statistics->empty() ? VoidStatistics(chunk, layout_) : DecodeChunk(*statistics, chunk, layout_);
-    if (!of_chunk) return;
-    keep(*of_chunk);
+    if (!chunk_statistics) return;
+    keep(*chunk_statistics);
     offsets_.push_back(header.averages_bytes > 0 ? averages : 0);
     end_ = averages + header.averages_bytes;
   }
@@ -426,13 +425,13 @@ Result<void> StatisticsCacheWriter::Write(std::string_view bytes) {
   return {};
 }
 
-Result<void> StatisticsCacheWriter::Add(const ChunkStatistics& of_chunk) {
+Result<void> StatisticsCacheWriter::Add(const ChunkStatistics& chunk_statistics) {
   const std::uint64_t begin = end_;
   const std::string bytes =
-      EncodeCachedChunk(static_cast<std::uint32_t>(offsets_.size()), of_chunk, LeastKeptFactor(layout_));
+      EncodeCachedChunk(static_cast<std::uint32_t>(offsets_.size()), chunk_statistics, LeastKeptFactor(layout_));
   if (auto written = Write(bytes); !written) return written;
-  const PartHeader header = PartHeader::Of(bytes);
-  offsets_.push_back(header.averages_bytes > 0 ? begin + kPartHeaderBytes + header.statistics_bytes : 0);
+  const ChunkHeader header = ChunkHeader::Of(bytes);
+  offsets_.push_back(header.averages_bytes > 0 ? begin + kChunkHeaderBytes + header.statistics_bytes : 0);
   return {};
 }
 
@@ -447,7 +446,7 @@ Result<void> StatisticsCacheWriter::Finish(const RasterStatistics& statistics) {
   footer.Put(kFooterMagic);
   if (auto written = Write(bytes); !written) return written;
   if (auto written = Write(footer.Take()); !written) return written;
-  // A record that a power cut has damaged is found and made anew. Where that is quick the disk is not waited for: of
+  // A file that a power cut has damaged is found and made anew. Where that is quick the disk is not waited for: of
   // tens of thousands of sources that would be most of the time.
   const bool is_waited_for = chunks_.count() > kMaxUnsynced;
   if ((is_waited_for && ::fsync(file_.get()) != 0) || ::rename((path_ + ".partial").c_str(), path_.c_str()) != 0) {

@@ -1,7 +1,7 @@
-// A raster's statistics in a file of the cache folder, so that it is made once: docs/formats/statistics-cache.md.
+// A raster's statistics in a file of the cache folder, so that they are read once (docs/formats/statistics-cache.md).
 //
-// While it is made the file is a list of chunks, and what was interrupted goes on behind the last whole one. Finished,
-// the file gets its real name. Everything is checksummed: what does not fit is reported, thrown away and made anew.
+// A partial file is a list of chunks; an interrupted pass resumes after the last whole chunk. A finished file gets its
+// final name. Everything has checksums. A file that does not match is reported in the log and made again.
 #pragma once
 
 #include <atomic>
@@ -20,7 +20,7 @@
 
 namespace terrace::dem {
 
-// A file descriptor that is closed.
+// Owns a file descriptor.
 class OpenFile {
  public:
   explicit OpenFile(int descriptor = -1) : descriptor_(descriptor) {}
@@ -37,53 +37,52 @@ class OpenFile {
   int descriptor_;
 };
 
-// What tells a file from others while it is there, whatever is written to it.
+// Identifies a file as long as it exists, whatever its content.
 struct FileIdentity {
   std::uint64_t device = 0, inode = 0;
 
   friend bool operator==(const FileIdentity&, const FileIdentity&) = default;
 };
 
-// Rasters with more samples than this and no overviews get averages in the cache folder: the first shallow tile of any
-// other reads at most as many.
+// Rasters with more samples than this and without overviews get averages in the cache. So no tile reads more samples.
 inline constexpr std::int64_t kMaxSamplesWithoutAverages = std::int64_t{4096} * 4096;
 bool NeedsAverages(const RasterLayout& layout);
 
-// The least factor of averages in a record; kLargestDirect: none are, as the statistics has those from there on.
-// Rasters of a mosaic mostly begin at multiples of 8 or 16 pixels of each other, so that a shallow tile reads averages
-// by so many of each of hundreds of rasters: those of 1024 x 1024 samples and more keep these, a 50th of what they
-// have.
+// The smallest factor of averages in a cache file. kLargestDirect: none, because the statistics have the averages from
+// that factor on. Rasters of a mosaic mostly begin at multiples of 8 or 16 pixels of each other, and a shallow tile
+// reads averages by these factors from hundreds of rasters. So rasters of 1024 x 1024 samples and more keep them; they
+// take a fiftieth of the samples.
 int LeastKeptFactor(const RasterLayout& layout);
 
-// How a raster is read once its undeclared voids are known.
+// The layout with the rules for detected nodata, and without overviews if there is any.
 RasterLayout WithDetectedNodata(RasterLayout layout, const DetectedNodata& detected);
 
-// What a record is of.
+// The raster and rules that a cache file belongs to.
 struct StatisticsShape {
-  RasterLayout layout;      // its samples' rules without undeclared voids
-  std::uint64_t key = 0;    // of everything the statistics depend on and the raster or its owner states
-  DetectedNodata detected;  // undeclared voids, which the record itself knows
+  RasterLayout layout;      // without the rules for detected nodata
+  std::uint64_t key = 0;    // hash of the raster's files and of all options that the statistics depend on
+  DetectedNodata detected;  // stored in the file
 
   RasterLayout EffectiveLayout() const { return WithDetectedNodata(layout, detected); }
   int least_kept_factor() const { return LeastKeptFactor(EffectiveLayout()); }
 };
 
-// Averages of factors from LeastKeptFactor up to kLargestDirect / 2 in a finished record. Thread-safe. The file is open
-// only while it is read: a dataset may have thousands of them.
+// Averages of factors LeastKeptFactor .. kLargestDirect / 2 in a finished cache file. Thread-safe. Opens the file for
+// each read, because a dataset may have thousands of them.
 class CachedAverages {
  public:
-  // `file`: the record, which `path` names.
+  // `file`: the open cache file at `path`.
   CachedAverages(const OpenFile& file, std::string path, RasterLayout layout, std::vector<std::uint64_t> offsets);
 
   bool Has(int factor) const { return factor >= least_ && factor < kLargestDirect; }
-  // What ReadGrid gives. kInvalidArgument: the record is damaged, or gone. kUnavailable: it cannot be opened now.
+  // The same values as ReadGrid. kInvalidArgument: the file is damaged or gone. kUnavailable: it cannot be opened now.
   // Precondition: Has(factor).
   Result<std::vector<float>> Read(int factor, const GridWindow& window) const;
 
-  // Removes the record's name, if it still has it: it is of no use any more.
+  // Removes the file, unless another one has replaced it.
   void Discard() const;
 
-  // So far, by all readers.
+  // By all reads so far.
   std::uint64_t bytes_read() const { return bytes_read_; }
 
  private:
@@ -105,37 +104,37 @@ struct CachedStatistics {
   std::shared_ptr<const CachedAverages> averages;  // null where they are not kept
 };
 
-// Nothing where there is no such file, or one of other samples; a damaged one is reported in the log first. Whatever
-// the shape's detected are, the record's own count.
+// Nothing if there is no file, or one of another raster or other rules. Reports a damaged file in the log. Ignores
+// `shape.detected`; the file has its own.
 std::optional<CachedStatistics> LoadStatistics(const std::string& path, const StatisticsShape& shape);
 
-// A record that is being made, under `path`.partial. One process at a time has it.
+// Writes a cache file, as `path`.partial until it is finished. Locked: one process at a time.
 class StatisticsCacheWriter {
  public:
-  // Waits while somebody else makes the record; nothing when that one has finished it. kUnavailable: the folder cannot
-  // be written to. kCancelled: stopped.
+  // Waits while another process writes the file; returns nothing if that one has finished it. kUnavailable: the folder
+  // is not writable. kCancelled: stopped.
   static Result<std::optional<StatisticsCacheWriter>> Open(const std::string& path, const StatisticsShape& shape,
                                                            const std::stop_token& stop);
 
-  // With the detected of an interrupted run.
+  // Includes the detected nodata of an interrupted run.
   const StatisticsShape& shape() const { return shape_; }
 
-  // Calls `keep` for every chunk that an interrupted run left, from the first on. Once, before the first Add.
+  // Calls `keep` for every chunk of an interrupted run, in order. Call it once, before the first Add.
   Result<void> Resume(const std::function<void(const ChunkStatistics&)>& keep);
 
-  // Throws all chunks away: they were made without these detected.
+  // Discards all chunks, which were made without this detected nodata.
   Result<void> Restart(const DetectedNodata& detected);
 
-  // The next of_chunk. kUnavailable: it cannot be written; the file is removed then, and nothing more is written.
-  Result<void> Add(const ChunkStatistics& of_chunk);
+  // Appends the next chunk. kUnavailable: it cannot be written; the file is removed, and later calls write nothing.
+  Result<void> Add(const ChunkStatistics& chunk_statistics);
 
-  // Gives the file its name. From then on LoadStatistics finds it.
+  // Renames the file to its final name, under which LoadStatistics finds it.
   Result<void> Finish(const RasterStatistics& statistics);
 
  private:
   StatisticsCacheWriter(OpenFile file, std::string path, const StatisticsShape& shape);
   Result<void> Begin();
-  void KeepWholeParts(const std::function<void(const ChunkStatistics&)>& keep);
+  void KeepWholeChunks(const std::function<void(const ChunkStatistics&)>& keep);
   Result<void> Cut();
   Result<void> Write(std::string_view bytes);
 

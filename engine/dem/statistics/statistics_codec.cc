@@ -98,20 +98,20 @@ BlockSum GetSum(ByteReader& reader) {
 
 }  // namespace
 
-std::string EncodeChunk(const ChunkStatistics& of_chunk) {
+std::string EncodeChunk(const ChunkStatistics& chunk_statistics) {
   ByteWriter writer;
-  writer.Put(of_chunk.valid);
-  Put(writer, of_chunk.zeros);
-  Put(writer, of_chunk.first_row);
-  Put(writer, of_chunk.last_row);
-  PutRanges(writer, of_chunk.ranges);
-  writer.Put(static_cast<std::uint32_t>(of_chunk.voids.size()));
-  for (const VoidRun& run : of_chunk.voids) {
+  writer.Put(chunk_statistics.valid);
+  Put(writer, chunk_statistics.zeros);
+  Put(writer, chunk_statistics.first_row);
+  Put(writer, chunk_statistics.last_row);
+  PutRanges(writer, chunk_statistics.ranges);
+  writer.Put(static_cast<std::uint32_t>(chunk_statistics.voids.size()));
+  for (const VoidRun& run : chunk_statistics.voids) {
     for (const std::uint16_t place : {run.row, run.first, run.last}) writer.Put(place);
   }
-  for (const auto& errors : of_chunk.errors) PutFloats(writer, errors);
-  if (!of_chunk.averages.empty()) PutFloats(writer, of_chunk.averages.back());
-  for (const auto& sums : of_chunk.sums) {
+  for (const auto& errors : chunk_statistics.errors) PutFloats(writer, errors);
+  if (!chunk_statistics.averages.empty()) PutFloats(writer, chunk_statistics.averages.back());
+  for (const auto& sums : chunk_statistics.sums) {
     for (const BlockSum& sum : sums) Put(writer, sum);
   }
   return writer.Take();
@@ -119,31 +119,31 @@ std::string EncodeChunk(const ChunkStatistics& of_chunk) {
 
 std::optional<ChunkStatistics> DecodeChunk(std::string_view bytes, const Chunk& chunk, const RasterLayout& layout) {
   ByteReader reader(bytes);
-  ChunkStatistics of_chunk = VoidStatistics(chunk, layout);
-  if (!of_chunk.averages.empty()) {
-    of_chunk.averages.back().resize(AveragesIn(chunk, layout, 1 << of_chunk.averages.size()));
+  ChunkStatistics chunk_statistics = VoidStatistics(chunk, layout);
+  if (!chunk_statistics.averages.empty()) {
+    chunk_statistics.averages.back().resize(AveragesIn(chunk, layout, 1 << chunk_statistics.averages.size()));
   }
-  for (std::size_t k = 0; k < of_chunk.sums.size(); ++k) {
-    of_chunk.sums[k].resize(AveragesIn(chunk, layout, kLargestDirect << (k + 1)));
+  for (std::size_t k = 0; k < chunk_statistics.sums.size(); ++k) {
+    chunk_statistics.sums[k].resize(AveragesIn(chunk, layout, kLargestDirect << (k + 1)));
   }
-  of_chunk.valid = reader.Get<std::int64_t>();
-  of_chunk.zeros = GetZeros(reader);
-  of_chunk.first_row = GetSum(reader);
-  of_chunk.last_row = GetSum(reader);
-  GetRanges(reader, of_chunk.ranges);
+  chunk_statistics.valid = reader.Get<std::int64_t>();
+  chunk_statistics.zeros = GetZeros(reader);
+  chunk_statistics.first_row = GetSum(reader);
+  chunk_statistics.last_row = GetSum(reader);
+  GetRanges(reader, chunk_statistics.ranges);
   const auto runs = GetCount(reader, sizeof(VoidRun));
   if (!runs) return std::nullopt;
-  of_chunk.voids.resize(*runs);
-  for (VoidRun& run : of_chunk.voids) {
+  chunk_statistics.voids.resize(*runs);
+  for (VoidRun& run : chunk_statistics.voids) {
     for (std::uint16_t* place : {&run.row, &run.first, &run.last}) *place = reader.Get<std::uint16_t>();
   }
-  for (auto& errors : of_chunk.errors) GetFloats(reader, errors);
-  if (!of_chunk.averages.empty()) GetFloats(reader, of_chunk.averages.back());
-  for (auto& sums : of_chunk.sums) {
+  for (auto& errors : chunk_statistics.errors) GetFloats(reader, errors);
+  if (!chunk_statistics.averages.empty()) GetFloats(reader, chunk_statistics.averages.back());
+  for (auto& sums : chunk_statistics.sums) {
     for (BlockSum& sum : sums) sum = GetSum(reader);
   }
   if (!reader.ok() || reader.remaining() > 0) return std::nullopt;
-  return of_chunk;
+  return chunk_statistics;
 }
 
 std::string EncodeStatistics(const RasterStatistics& statistics) {

@@ -300,10 +300,10 @@ TEST(Prepare, NeverBelievesADamagedFile) {
   const TempDir dir;
   const std::string path = WriteLargeRaster(dir), cache = dir.File("cache");
   OpenWithCache(path, cache);
-  const std::string record = StatisticsPath(cache, path);
-  std::ifstream file(record, std::ios::binary);
+  const std::string cache_file = StatisticsPath(cache, path);
+  std::ifstream file(cache_file, std::ios::binary);
   const std::string good((std::istreambuf_iterator<char>(file)), {});
-  const auto write = [&](const std::string& bytes) { std::ofstream(record, std::ios::binary) << bytes; };
+  const auto write = [&](const std::string& bytes) { std::ofstream(cache_file, std::ios::binary) << bytes; };
   std::mt19937 random(3);
   for (int i = 0; i < 12; ++i) {
     std::string bad = good;
@@ -333,10 +333,10 @@ TEST(Prepare, DamagedAveragesAreReadFromTheSourceAndMadeAnew) {
   const TempDir dir;
   const std::string path = WriteLargeRaster(dir), cache = dir.File("cache");
   const auto source = OpenWithCache(path, cache);
-  const std::string record = StatisticsPath(cache, path);
+  const std::string cache_file = StatisticsPath(cache, path);
   // Averages are most of the file: this hits them all.
-  std::fstream file(record, std::ios::binary | std::ios::in | std::ios::out);
-  const auto size = std::filesystem::file_size(record);
+  std::fstream file(cache_file, std::ios::binary | std::ios::in | std::ios::out);
+  const auto size = std::filesystem::file_size(cache_file);
   for (std::uintmax_t at = 40; at < size * 9 / 10; at += 997) {
     file.seekp(static_cast<std::streamoff>(at));
     file.put('\x5a');
@@ -416,7 +416,7 @@ TEST(Prepare, AFileIsNotUsedForOtherRules) {
   EXPECT_FALSE(with(stated)->preparation().from_cache);
   EXPECT_EQ(with(stated)->info().void_samples, 49u);
   for (const SourceOptions& options : {trusted, stated, SourceOptions{}}) {
-    EXPECT_TRUE(with(options)->preparation().from_cache) << "each way of reading a file has its record";
+    EXPECT_TRUE(with(options)->preparation().from_cache) << "each way of reading a file has its file";
   }
 }
 
