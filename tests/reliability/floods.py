@@ -47,18 +47,19 @@ def status_of(port, message, timeout=120):
         return 0
 
 
-def patient(port, connections, targets):
-    """As many connections at once, one cold tile each: {status: count} and the slowest in seconds."""
+def patient(port, connections, tiles_each, targets):
+    """As many connections at once, each with so many cold tiles one after the other: {status: count} and the slowest in seconds."""
     statuses, lock, slowest = {}, threading.Lock(), [0]
 
-    def run(target):
-        begun = time.monotonic()
-        status = status_of(port, get(target, POLITE))
-        with lock:
-            statuses[status] = statuses.get(status, 0) + 1
-            slowest[0] = max(slowest[0], time.monotonic() - begun)
+    def run(targets):
+        for target in targets:
+            begun = time.monotonic()
+            status = status_of(port, get(target, POLITE))
+            with lock:
+                statuses[status] = statuses.get(status, 0) + 1
+                slowest[0] = max(slowest[0], time.monotonic() - begun)
 
-    threads = [threading.Thread(target=run, args=(target,)) for target in itertools.islice(targets, connections)]
+    threads = [threading.Thread(target=run, args=(list(itertools.islice(targets, tiles_each)),)) for _ in range(connections)]
     for thread in threads:
         thread.start()
     for thread in threads:

@@ -71,6 +71,7 @@ GridFinder::Membership GridFinder::Add(const PlacedRaster& raster) {
     if (!family.first->MayAlign(where)) continue;
     for (const std::size_t grid : Candidates(family, where)) {
       if (first && grid > first->grid) break;
+      ++grids_compared_;
       if (const auto offset = grids_[grid]->OffsetOf(where)) {
         first = Membership{grid, *offset};
         break;

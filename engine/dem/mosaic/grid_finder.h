@@ -33,6 +33,9 @@ class GridFinder {
   // The raster's grid. One that fits none begins a new one.
   Membership Add(const PlacedRaster& raster);
 
+  // Grids that rasters were compared with so far. For tests: this grows linearly with the number of rasters.
+  std::size_t grids_compared() const { return grids_compared_; }
+
  private:
   // Bucket of an offset's fraction of a pixel.
   using Phase = std::uint32_t;
@@ -57,6 +60,7 @@ class GridFinder {
 
   std::vector<const Georeference*> grids_;                         // their first rasters
   std::unordered_map<std::string_view, std::vector<Kind>> kinds_;  // by the reference system
+  std::size_t grids_compared_ = 0;
 };
 
 }  // namespace terrace::dem

@@ -27,7 +27,7 @@ struct Member {
   geo::TileRange pixels() const { return {column, row, column + where->width() - 1, row + where->height() - 1}; }
 };
 
-std::vector<std::vector<Member>> GridsOf(std::span<const PlacedRaster> rasters) {
+std::vector<std::vector<Member>> GridsOf(std::span<const PlacedRaster> rasters, std::size_t& pairs) {
   std::vector<std::vector<Member>> grids;
   GridFinder finder;
   for (std::size_t i = 0; i < rasters.size(); ++i) {
@@ -35,6 +35,7 @@ std::vector<std::vector<Member>> GridsOf(std::span<const PlacedRaster> rasters) 
     if (place.grid == grids.size()) grids.emplace_back();
     grids[place.grid].push_back({i, rasters[i].where, place.offset.column, place.offset.row});
   }
+  pairs += finder.grids_compared();
   return grids;
 }
 
@@ -126,7 +127,7 @@ class Ungrouped {
 };
 
 // Groups of members that touch, by their numbers. A member's column becomes the one beside those that it touches.
-std::vector<std::vector<std::size_t>> GroupsOf(std::vector<Member>& members, std::int64_t turn) {
+std::vector<std::vector<std::size_t>> GroupsOf(std::vector<Member>& members, std::int64_t turn, std::size_t& pairs) {
   std::vector<std::vector<std::size_t>> groups;
   std::vector<bool> taken(members.size());
   Ungrouped ungrouped(members, turn);
@@ -138,6 +139,7 @@ std::vector<std::vector<std::size_t>> GroupsOf(std::vector<Member>& members, std
     for (std::size_t done = 0; done < group.size(); ++done) {
       const geo::TileRange pixels = members[group[done]].pixels();
       for (const std::size_t i : ungrouped.Near(pixels)) {
+        ++pairs;
         const auto column = ColumnBeside(pixels, members[i], turn);
         if (!column) continue;
         ungrouped.Remove(members[i], i);
@@ -176,17 +178,19 @@ GridLayout LayoutOf(const std::vector<Member>& members, std::int64_t turn) {
 
 }  // namespace
 
-std::vector<GridLayout> LayOutGrids(std::span<const PlacedRaster> rasters) {
+std::vector<GridLayout> LayOutGrids(std::span<const PlacedRaster> rasters, std::size_t* pairs) {
   std::vector<GridLayout> layouts;
-  for (std::vector<Member>& grid : GridsOf(rasters)) {
+  std::size_t compared = 0;
+  for (std::vector<Member>& grid : GridsOf(rasters, compared)) {
     const std::int64_t turn = TurnOf(*grid.front().where);
-    for (const std::vector<std::size_t>& group : GroupsOf(grid, turn)) {
+    for (const std::vector<std::size_t>& group : GroupsOf(grid, turn, compared)) {
       std::vector<Member> members;
       for (const std::size_t i : group) members.push_back(grid[i]);
       layouts.push_back(LayoutOf(members, turn));
     }
   }
   std::ranges::sort(layouts, {}, [](const GridLayout& layout) { return layout.members.front().raster; });
+  if (pairs != nullptr) *pairs = compared;
   return layouts;
 }
 

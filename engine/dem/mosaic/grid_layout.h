@@ -23,7 +23,8 @@ struct GridLayout {
 };
 
 // Puts every raster into one layout. Layouts are ordered by their first members. Takes O(n log n) time, unless many
-// rasters overlap or pixel sizes nearly agree (GridFinder).
-std::vector<GridLayout> LayOutGrids(std::span<const PlacedRaster> rasters);
+// rasters overlap or pixel sizes nearly agree (GridFinder). Sets `pairs`, where given, to the number of pairs of
+// rasters that were compared; tests count them.
+std::vector<GridLayout> LayOutGrids(std::span<const PlacedRaster> rasters, std::size_t* pairs = nullptr);
 
 }  // namespace terrace::dem

@@ -1,4 +1,4 @@
-// Which rasters make one raster grid: many at once give what trying all pairs gives.
+// Which rasters make one raster grid: many at once give what trying all pairs gives, and compare few pairs.
 #include "engine/dem/mosaic/grid_layout.h"
 
 #include <gdal_priv.h>
@@ -222,6 +222,32 @@ TEST(GridLayout, ManyRastersMakeTheGridsThatAllPairsMake) {
   EXPECT_GT(joined, 40);
   EXPECT_GT(apart, 150);
   EXPECT_GT(around, 4);
+}
+
+// Cells of one degree that touch, and as many of the same pixel size of which each lies on a grid of its own.
+TEST(GridLayout, RastersAreComparedWithFewOthers) {
+  const auto pairs_per_raster = [](int across) {
+    std::vector<Georeference> places;
+    for (int k = 0; k < 2 * across * across; ++k) {
+      const int column = k / 2 % across, row = k / 2 / across;
+      const double pixel = 1.0 / 60;
+      const auto off = [&](int cell) { return k % 2 == 0 ? 0 : pixel * (0.02 + 0.96 * cell / across); };
+      RasterSpec spec;
+      spec.width = spec.height = 60;
+      spec.geo_transform = {-170.0 + column + off(column), pixel, 0, 80.0 - row + off(row), 0, -pixel};
+      places.push_back(PlaceOf(spec));
+    }
+    const VerticalDatum vertical{"", nullptr};
+    std::vector<PlacedRaster> rasters;
+    for (const Georeference& place : places) rasters.push_back({&place, &vertical});
+    std::size_t pairs = 0;
+    EXPECT_EQ(LayOutGrids(rasters, &pairs).size(), rasters.size() / 2 + 1);
+    return static_cast<double>(pairs) / static_cast<double>(rasters.size());
+  };
+  const double few = pairs_per_raster(8), many = pairs_per_raster(32);
+  EXPECT_GT(few, 0.5);
+  EXPECT_LT(many, 4) << "all pairs would be 1,024 a raster";
+  EXPECT_LT(many, 2 * few);
 }
 
 }  // namespace
