@@ -116,7 +116,8 @@ Result<void> FillAny(const RasterGrid& grid, const NodeGrid& node_grid, const No
   copy_back(smooth, nodes.smooth);
   if (traced != nullptr) {
     traced->part = part;
-    trace->positions = {};  // can be found again
+    trace->positions = {};  // can be found again, as can cells
+    trace->cells = {};
   }
   return filled;
 }
@@ -125,20 +126,12 @@ Result<void> FillAny(const RasterGrid& grid, const NodeGrid& node_grid, const No
 GridTrace Widened(PartTrace&& of_part, const RasterGrid& grid, const geo::Lattice& lattice, const NodeWindow& window) {
   if (!of_part.part) return std::move(of_part.trace);
   GridTrace trace = std::move(of_part.trace);
-  trace.is_part = true;
   const std::size_t nodes = static_cast<std::size_t>(window.columns) * static_cast<std::size_t>(window.rows);
-  std::vector<std::int32_t> cell_of_node(nodes, -1);
   std::vector<float> heights(nodes, SampleRules::kVoid);
-  ForPart(*of_part.part, window, [&](std::size_t from, std::size_t to) {
-    cell_of_node[to] = trace.cell_of_node[from];
-    heights[to] = trace.heights[from];
-  });
-  trace.cell_of_node = std::move(cell_of_node);
+  ForPart(*of_part.part, window, [&](std::size_t from, std::size_t to) { heights[to] = trace.heights[from]; });
   trace.heights = std::move(heights);
-  const NodeWindow around = PartOf(grid, lattice, window, kAround);
-  const std::vector<Position> positions = grid.PositionsOf(lattice, around, trace.factor);
-  trace.positions.assign(nodes, kNowhere);
-  ForPart(around, window, [&](std::size_t from, std::size_t to) { trace.positions[to] = positions[from]; });
+  trace.positions = grid.PositionsOf(lattice, PartOf(grid, lattice, window, kAround), trace.factor);
+  trace.cells = grid.CellsOf(trace.positions, trace.factor, trace.window);
   if (!trace.undulations.empty()) {
     auto undulations = grid.undulations()->At(lattice, window);
     constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();  // and so is the bound then

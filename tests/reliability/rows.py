@@ -600,7 +600,7 @@ def row_38(binary, test_binary, long):
 
 def row_42(binary, _, long):
     """Clients that never retry: as many connections at once as a crowd of them has, each with cold tiles one after the other."""
-    connections, tiles_each = 480, 6
+    connections, tiles_each = 480, 2
     with Server(binary, "--worker-threads", "2", "--cache-bytes", "0", "--refinement-cache-bytes", "0") as server:
         told, kept = [], True
         for _ in range(5 if long else 1):

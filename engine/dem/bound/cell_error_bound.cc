@@ -74,8 +74,9 @@ double CellErrorBound::OfAverages(const TileCell& cell, bool& has_voids) const {
     return std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(weight)));
   };
   SampleBox around;
-  for (const std::size_t node : cell.nodes) {
-    const GridCell& at = trace_.cells[static_cast<std::size_t>(trace_.cell_of_node[node])];
+  for (std::size_t k = 0; k < 4; ++k) {
+    const auto [node_column, node_row] = tile_.NodeAt(cell, k);
+    const GridCell at = trace_.cells.OfNode(node_column, node_row);
     SampleBox near{at.column, at.row, at.column + 1, at.row + 1};
     if (off_x > 0 || off_y > 0) {
       near = {at.column + below(at.x - off_x), at.row + below(at.y - off_y), at.column + above(at.x + off_x),
@@ -147,12 +148,12 @@ double CellErrorBound::OfAveragesNear(const TileCell& cell, const PixelBounds& b
 std::optional<std::array<Position, 4>> CellErrorBound::CornersOf(const TileCell& cell) const {
   std::array<Position, 4> corners;
   for (std::size_t k = 0; k < 4; ++k) {
-    corners[k] = trace_.positions[cell.nodes[k]];
+    const auto [column, row] = tile_.NodeAt(cell, k);
+    corners[k] = trace_.positions.OfNode(column, row);
     if (grid_.georeference().is_geographic_grid()) {
-      // All of a pole's nodes have one position: their columns are those of the row beside it.
-      const std::int64_t row = tile_.window.row + 1 + cell.j + (k < 2 ? 0 : 1);
-      if (row == 0) corners[k].x = trace_.positions[cell.nodes[k] + tile_.stride()].x;
-      if (row == tile_.lattice.rows()) corners[k].x = trace_.positions[cell.nodes[k] - tile_.stride()].x;
+      // All of a pole's nodes may have one position: their columns are those of the row beside it.
+      if (row == 0) corners[k].x = trace_.positions.OfNode(column, row + 1).x;
+      if (row == tile_.lattice.rows()) corners[k].x = trace_.positions.OfNode(column, row - 1).x;
       const double turn = grid_.georeference().period(), near = k == 0 ? grid_.columns() / 2.0 : corners[0].x;
       corners[k].x += turn * std::round((near - corners[k].x) / turn);
     }

@@ -12,12 +12,8 @@ constexpr std::size_t kFewMembers = 8;
 
 }  // namespace
 
-GridTables::GridTables(const RasterGrid& grid, const GridTrace& trace, std::size_t stride)
-    : grid_(grid),
-      trace_(trace),
-      turn_(grid.georeference().period()),
-      around_(BoxAround(stride)),
-      near_(MembersAround()) {
+GridTables::GridTables(const RasterGrid& grid, const GridTrace& trace)
+    : grid_(grid), trace_(trace), turn_(grid.georeference().period()), around_(BoxAround()), near_(MembersAround()) {
   for (const std::size_t i : near_) {
     const Position& off = grid.members()[i].misplacement;
     misplacement_ = {std::max(misplacement_.x, off.x), std::max(misplacement_.y, off.y)};
@@ -28,19 +24,22 @@ GridTables::GridTables(const RasterGrid& grid, const GridTrace& trace, std::size
 
 // Columns of grids around the Earth begin anew somewhere: they are followed from node to node, which are less than half
 // a turn apart. Nodes without a position, as far away from the raster grid, need no table.
-Box GridTables::BoxAround(std::size_t stride) const {
+Box GridTables::BoxAround() const {
   Box hull{1e300, 1e300, -1e300, -1e300};
   if (grid_.members().size() == 1) return hull;  // nobody asks which members are near
-  double of_row = grid_.columns() / 2.0, last = of_row;
-  for (std::size_t n = 0; n < trace_.positions.size(); ++n) {
-    if (n % stride == 0) last = of_row;
-    const Position& p = trace_.positions[n];
-    if (!std::isfinite(p.x) || !std::isfinite(p.y)) continue;
-    double x = p.x;
-    if (std::abs(x - last) > turn_ / 2 && turn_ > 0) x += turn_ * std::round((last - x) / turn_);
-    if (n % stride == 0) of_row = x;
-    last = x;
-    hull = {std::min(hull.west, x), std::min(hull.south, p.y), std::max(hull.east, x), std::max(hull.north, p.y)};
+  const NodePositions& positions = trace_.positions;
+  double of_row = grid_.columns() / 2.0;
+  for (std::size_t j = 0; j < positions.rows(); ++j) {
+    double last = of_row;
+    for (std::size_t i = 0; i < positions.columns(); ++i) {
+      const Position p = positions.At(i, j);
+      if (!std::isfinite(p.x) || !std::isfinite(p.y)) continue;
+      double x = p.x;
+      if (std::abs(x - last) > turn_ / 2 && turn_ > 0) x += turn_ * std::round((last - x) / turn_);
+      if (i == 0) of_row = x;
+      last = x;
+      hull = {std::min(hull.west, x), std::min(hull.south, p.y), std::max(hull.east, x), std::max(hull.north, p.y)};
+    }
   }
   const double halo = 4.0 * trace_.factor;
   return {hull.west - halo, hull.south - halo, hull.east + halo, hull.north + halo};

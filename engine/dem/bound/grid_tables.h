@@ -10,8 +10,8 @@ namespace terrace::dem {
 
 class GridTables {
  public:
-  // `grid` and `trace` must outlive this. `stride`: nodes in a row of the trace.
-  GridTables(const RasterGrid& grid, const GridTrace& trace, std::size_t stride);
+  // `grid` and `trace` must outlive this.
+  GridTables(const RasterGrid& grid, const GridTrace& trace);
 
   // Of the whole raster grid.
   const HeightRange& heights() const { return grid_.heights(); }
@@ -30,7 +30,7 @@ class GridTables {
   float AveragingError(double west, double north, double east, double south) const;
 
  private:
-  Box BoxAround(std::size_t stride) const;
+  Box BoxAround() const;
   std::vector<std::size_t> MembersAround() const;
   bool IsAround(const Box& pixels) const;
   // Calls visit(member, tables) for all members that meet a box, and perhaps others. Null tables: not in memory.

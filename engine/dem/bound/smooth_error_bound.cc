@@ -13,6 +13,8 @@ namespace {
 // `length` samples by at most this: at most one kink on less than a sample; (length^2 + 1) / 8 with more.
 double ChordError(double length) { return length < 1 ? length / 4 : (length * length + 1) / 8; }
 
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+
 // Several running values instead of one: no step waits for the one before it, and the compiler puts them side by side.
 class Lanes {
  public:
@@ -62,26 +64,59 @@ SmoothErrorBound::SmoothErrorBound(const TileNodes& tile, const RasterGrid& grid
 // Nodes that took their height from this raster grid, away from its rim: where the surface ends, and where the last
 // average of an axis stands for fewer samples, it is no even grid.
 void SmoothErrorBound::PlaceNodes(const RasterGrid& grid) {
-  constexpr double kNowhereNear = std::numeric_limits<double>::quiet_NaN();
-  x_.assign(trace_.positions.size(), kNowhereNear);
-  y_ = x_;
   const GridAxis columns(grid.columns(), trace_.factor, grid.wraps()), rows(grid.rows(), trace_.factor, false);
   const auto last = [&](const GridAxis& axis, int samples) {
     return static_cast<double>(axis.count() - (samples % trace_.factor == 0 ? 1 : 2));
   };
   const double last_x = last(columns, grid.columns()) - misplacement_.x;
   const double last_y = last(rows, grid.rows()) - misplacement_.y;
-  for (std::size_t n = 0; n < x_.size(); ++n) {
-    const std::int32_t at = trace_.cell_of_node[n];
-    if (at < 0) continue;
-    const GridCell& cell = trace_.cells[static_cast<std::size_t>(at)];
-    const double x = static_cast<double>(cell.column) + cell.x, y = static_cast<double>(cell.row) + cell.y;
-    const bool even_x =
+  const auto of_column = [&](std::int64_t column, double weight) {
+    const double x = static_cast<double>(column) + weight;
+    const bool is_even =
         grid.wraps() ? grid.columns() % trace_.factor == 0 || (x >= 0 && x <= last_x) : x > 0 && x < last_x;
-    if (!even_x || !(y > 0 && y < last_y)) continue;
-    x_[n] = x;
-    y_[n] = y;
+    return is_even ? x : kUnknown;
+  };
+  const auto of_row = [&](std::int64_t row, double weight) {
+    const double y = static_cast<double>(row) + weight;
+    return y > 0 && y < last_y ? y : kUnknown;
+  };
+  const NodeCells& cells = trace_.cells;
+  const NodeWindow& part = cells.window();  // nodes beyond it have no height of this raster grid
+  const auto west = static_cast<std::size_t>(part.column - tile_.window.column);
+  const auto south = static_cast<std::size_t>(part.row - tile_.window.row);
+  is_separable_ = cells.is_separable();
+  if (is_separable_) {
+    x_.assign(tile_.stride(), kUnknown);
+    y_.assign(static_cast<std::size_t>(tile_.window.rows), kUnknown);
+    for (std::size_t i = 0; i < cells.columns().size(); ++i) {
+      x_[west + i] = of_column(cells.columns()[i].index, cells.columns()[i].weight);
+    }
+    for (std::size_t j = 0; j < cells.rows().size(); ++j) {
+      y_[south + j] = of_row(cells.rows()[j].index, cells.rows()[j].weight);
+    }
+    return;
   }
+  x_.assign(trace_.heights.size(), kUnknown);
+  y_ = x_;
+  for (std::size_t j = 0; j < static_cast<std::size_t>(part.rows); ++j) {
+    std::size_t n = (south + j) * tile_.stride() + west;
+    for (std::size_t i = 0; i < static_cast<std::size_t>(part.columns); ++i, ++n) {
+      if (std::isnan(trace_.heights[n])) continue;
+      const GridCell cell = cells.At(i, j);
+      const double x = of_column(cell.column, cell.x), y = of_row(cell.row, cell.y);
+      if (std::isnan(x) || std::isnan(y)) continue;
+      x_[n] = x;
+      y_[n] = y;
+    }
+  }
+}
+
+// False: the raster grid gave no height to one of these nodes, `first` to `end` of a row of the tile's window.
+bool SmoothErrorBound::GaveHeights(std::size_t row, std::size_t first, std::size_t end) const {
+  const float* const heights = trace_.heights.data() + row * tile_.stride();
+  Lanes sum;
+  sum.Add(end - first, [&](std::size_t i) { return heights[first + i]; });
+  return std::isfinite(sum.Sum());
 }
 
 PixelBounds SmoothErrorBound::BoundsOf(const CellBox& box) const {
@@ -89,8 +124,10 @@ PixelBounds SmoothErrorBound::BoundsOf(const CellBox& box) const {
   for (int j = box.south; j <= box.north; ++j) {
     for (int i = box.west; i <= box.east; ++i) {
       const std::size_t n = tile_.NodeOf(i, j);
-      if (std::isnan(x_[n])) return {};
-      bounds.Add(x_[n], y_[n]);
+      const double x = is_separable_ ? x_[static_cast<std::size_t>(i + 1)] : x_[n];
+      const double y = is_separable_ ? y_[static_cast<std::size_t>(j + 1)] : y_[n];
+      if (std::isnan(x + y) || std::isnan(trace_.heights[n])) return {};
+      bounds.Add(x, y);
     }
   }
   return bounds;
@@ -118,6 +155,43 @@ double SmoothErrorBound::LargestBlend(const CellBox& box) const {
 }
 
 bool SmoothErrorBound::Measure(const CellBox& box, Steps& steps, PixelBounds& at) const {
+  if (!(is_separable_ ? MeasureAxes(box, steps, at) : MeasureNodes(box, steps, at))) return false;
+  // A line that bends by b per step is off its chord by b / 8; half as much again for how the bend itself changes, in
+  // both directions. Positions are known to a hundred-thousandth, those of samples to their misplacement.
+  constexpr double kOffChord = 1.5 * 2 / 8, kPosition = 4e-5;
+  steps.bend_x = steps.bend_x * kOffChord + kPosition + misplacement_.x;
+  steps.bend_y = steps.bend_y * kOffChord + kPosition + misplacement_.y;
+  at.Grow(misplacement_.x, misplacement_.y);
+  return true;
+}
+
+// Columns and rows of nodes are those of samples: steps are of one axis each.
+bool SmoothErrorBound::MeasureAxes(const CellBox& box, Steps& steps, PixelBounds& at) const {
+  const auto west = static_cast<std::size_t>(box.west + 1), south = static_cast<std::size_t>(box.south + 1);
+  const auto east = static_cast<std::size_t>(box.east + 1), north = static_cast<std::size_t>(box.north + 1);
+  // A node's neighbours count as well.
+  if (!GaveHeights(south - 1, west, east + 1) || !GaveHeights(north + 1, west, east + 1)) return false;
+  for (std::size_t j = south; j <= north; ++j) {
+    if (!GaveHeights(j, west - 1, east + 2)) return false;
+  }
+  double finite = 0;  // becomes NaN with any place
+  const auto measure = [&](const std::vector<double>& places, std::size_t first, std::size_t last, double& step,
+                           double& bend) {
+    for (std::size_t k = first; k <= last; ++k) {
+      const double after = places[k + 1] - places[k], before = places[k] - places[k - 1];
+      finite += after + before;
+      if (k < last) step = std::max(step, std::abs(after));
+      bend = std::max(bend, std::abs(after - before));
+    }
+  };
+  measure(x_, west, east, steps.east_x, steps.bend_x);
+  measure(y_, south, north, steps.north_y, steps.bend_y);
+  at.Add(x_[west], y_[south]);
+  at.Add(x_[east], y_[north]);
+  return std::isfinite(finite);
+}
+
+bool SmoothErrorBound::MeasureNodes(const CellBox& box, Steps& steps, PixelBounds& at) const {
   const std::size_t stride = tile_.stride();
   double finite = 0;  // becomes NaN with any position
   const auto raise = [](double& largest, double value) { largest = std::max(largest, std::abs(value)); };
@@ -139,27 +213,19 @@ bool SmoothErrorBound::Measure(const CellBox& box, Steps& steps, PixelBounds& at
       at.Add(x, y);
     }
   }
-  if (!std::isfinite(finite)) return false;
-  // A line that bends by b per step is off its chord by b / 8; half as much again for how the bend itself changes, in
-  // both directions. Positions are known to a hundred-thousandth, those of samples to their misplacement.
-  constexpr double kOffChord = 1.5 * 2 / 8, kPosition = 4e-5;
-  steps.bend_x = steps.bend_x * kOffChord + kPosition + misplacement_.x;
-  steps.bend_y = steps.bend_y * kOffChord + kPosition + misplacement_.y;
-  at.Grow(misplacement_.x, misplacement_.y);
-  return true;
+  return std::isfinite(finite);
 }
 
 double SmoothErrorBound::Over(const CellBox& box) const {
-  constexpr double kNowhere = std::numeric_limits<double>::quiet_NaN();
   Steps steps;
   PixelBounds at;
-  if (!Measure(box, steps, at)) return kNowhere;
+  if (!Measure(box, steps, at)) return kUnknown;
   Bends bends;
   const auto left = static_cast<std::int64_t>(std::floor(at.west)),
              right = static_cast<std::int64_t>(std::floor(at.east)) + 1;
   const auto top = static_cast<std::int64_t>(std::floor(at.north)),
              bottom = static_cast<std::int64_t>(std::floor(at.south)) + 1;
-  if (!Measure(left, top, right, bottom, bends)) return kNowhere;
+  if (!Measure(left, top, right, bottom, bends)) return kUnknown;
   return Largest(bends, steps) + geoid_.Over(box) + LargestBlend(box) +
          tables_.AveragingError(static_cast<double>(left), static_cast<double>(top), static_cast<double>(right),
                                 static_cast<double>(bottom));

@@ -2,6 +2,7 @@
 // differences of the samples: they limit how far the surface between nodes departs from the one between samples.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -37,6 +38,9 @@ class SmoothErrorBound {
   };
 
   void PlaceNodes(const RasterGrid& grid);
+  bool GaveHeights(std::size_t row, std::size_t first, std::size_t end) const;
+  bool MeasureAxes(const CellBox& box, Steps& steps, PixelBounds& at) const;
+  bool MeasureNodes(const CellBox& box, Steps& steps, PixelBounds& at) const;
   // Returns false if a node or a neighbour of one is not evenly spaced.
   bool Measure(const CellBox& box, Steps& steps, PixelBounds& at) const;
   // Measures samples left .. right, top .. bottom, ends included. Returns false if one of them is void.
@@ -50,7 +54,9 @@ class SmoothErrorBound {
   const GeoidErrorBound& geoid_;
   const bool blends_;
   const Position misplacement_;  // of samples, in averages
-  std::vector<double> x_, y_;    // per node, in averages; NaN if not evenly spaced
+  // In averages; NaN where not evenly spaced: per column and per row of the tile's window if separable, else per node.
+  std::vector<double> x_, y_;
+  bool is_separable_ = false;
 };
 
 }  // namespace terrace::dem

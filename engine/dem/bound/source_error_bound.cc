@@ -20,7 +20,7 @@ class GridErrorBound {
         nodes_{tile.lattice_, tile.window_, tile.heights_},
         grid_(grid),
         trace_(trace),
-        tables_(grid, trace, nodes_.stride()),
+        tables_(grid, trace),
         geoid_(nodes_, grid.undulations(), trace.undulations),
         smooth_(nodes_, grid, trace, tables_, geoid_, tile.blends_),
         single_(nodes_, grid, trace, tables_, geoid_),
@@ -124,7 +124,7 @@ class GridErrorBound {
   void AddCell(int i, int j, bool gives_way) {
     const bool fills = gives_way && !trace_.includes_filled;
     const TileCell cell = nodes_.Cell(i, j);
-    if (std::ranges::any_of(cell.nodes, [&](std::size_t node) { return trace_.cell_of_node[node] < 0; })) {
+    if (std::ranges::any_of(cell.nodes, [&](std::size_t node) { return std::isnan(trace_.heights[node]); })) {
       if (Touches(cell.box())) AddUneven(cell, gives_way, fills, kUnknownError);
       return;
     }

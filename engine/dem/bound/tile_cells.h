@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <span>
+#include <utility>
 
 #include "engine/dem/dem_types.h"
 #include "engine/geo/lattice.h"
@@ -54,6 +56,11 @@ struct TileNodes {
   TileCell Cell(int i, int j) const {
     const std::size_t n = NodeOf(i, j);
     return {i, j, {n, n + 1, n + stride(), n + stride() + 1}};
+  }
+
+  // Global column and row of a cell's node, 0 to 3.
+  std::pair<std::int64_t, std::int64_t> NodeAt(const TileCell& cell, std::size_t k) const {
+    return {window.column + 1 + cell.i + (k % 2 == 0 ? 0 : 1), window.row + 1 + cell.j + (k < 2 ? 0 : 1)};
   }
 
   // Degrees.

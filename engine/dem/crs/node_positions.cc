@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 namespace terrace::dem {
 namespace {
@@ -55,17 +56,18 @@ class GridNodes {
  public:
   GridNodes(const Georeference& georeference, const Footprint& footprint, const Grid& grid, const NodeWindow& window,
             double tolerance)
-      : georeference_(georeference),
-        footprint_(footprint),
-        grid_(grid),
-        window_(window),
-        tolerance_(tolerance),
-        positions_(static_cast<std::size_t>(window.columns) * static_cast<std::size_t>(window.rows), kNowhere) {}
+      : georeference_(georeference), footprint_(footprint), grid_(grid), window_(window), tolerance_(tolerance) {}
 
-  std::vector<Position> Compute() && {
-    if (georeference_.is_affine() && georeference_.is_geographic_grid()) {
-      FillGeographic();
-    } else if (georeference_.is_affine()) {
+  NodePositions Compute() && {
+    if (georeference_.is_affine() && georeference_.is_geographic_grid()) return ColumnsAndRows();
+    positions_.assign(static_cast<std::size_t>(window_.columns) * static_cast<std::size_t>(window_.rows), kNowhere);
+    FillNodes();
+    return {window_, std::move(positions_)};
+  }
+
+ private:
+  void FillNodes() {
+    if (georeference_.is_affine()) {
       FillExactly(window_.column, window_.row, window_.columns, window_.rows);
     } else {
       const std::int64_t last_row = std::min(window_.row + window_.rows - 1, grid_.rows() - 1);
@@ -77,10 +79,8 @@ class GridNodes {
       }
     }
     FillPoleRows();
-    return std::move(positions_);
   }
 
- private:
   static std::int64_t FloorCell(std::int64_t node) { return node - (node % kCellNodes + kCellNodes) % kCellNodes; }
 
   Position Degrees(std::int64_t column, std::int64_t row) const {
@@ -108,8 +108,7 @@ class GridNodes {
     }
   }
 
-  // Meridians are the source's columns and parallels its rows: a node has the x of its column and the y of its row.
-  void FillGeographic() {
+  NodePositions ColumnsAndRows() const {
     std::vector<Position> columns(static_cast<std::size_t>(window_.columns)),
         rows(static_cast<std::size_t>(window_.rows));
     for (std::size_t c = 0; c < columns.size(); ++c) {
@@ -120,10 +119,10 @@ class GridNodes {
     }
     georeference_.ToPixels(columns);
     georeference_.ToPixels(rows);
-    positions_.clear();
-    for (const Position& row : rows) {
-      for (const Position& column : columns) positions_.push_back({column.x, row.y});
-    }
+    std::vector<double> x, y;
+    for (const Position& column : columns) x.push_back(column.x);
+    for (const Position& row : rows) y.push_back(row.y);
+    return {window_, std::move(x), std::move(y)};
   }
 
   bool Touches(const Cell& cell) const {
@@ -222,20 +221,26 @@ NodeWindow WindowOfTile(const geo::Lattice& lattice, const geo::TileKey& key) {
   return {lattice.FirstColumn(key) - 1, lattice.FirstRow(key) - 1, lattice.cells + 3, lattice.cells + 3};
 }
 
-std::vector<Position> NodePositions(const Georeference& georeference, const Footprint& footprint,
-                                    const geo::Lattice& lattice, const NodeWindow& window, double tolerance) {
+NodePositions NodePositions::Of(const Georeference& georeference, const Footprint& footprint,
+                                const geo::Lattice& lattice, const NodeWindow& window, double tolerance) {
   return GridNodes(georeference, footprint, lattice, window, tolerance).Compute();
 }
 
-std::vector<Position> NodePositions(const Georeference& georeference, const Footprint& footprint,
-                                    const geo::MercatorGrid& grid, const NodeWindow& window, double tolerance) {
+NodePositions NodePositions::Of(const Georeference& georeference, const Footprint& footprint,
+                                const geo::MercatorGrid& grid, const NodeWindow& window, double tolerance) {
   return GridNodes(georeference, footprint, grid, window, tolerance).Compute();
 }
 
 std::vector<Position> CellCentrePositions(const Georeference& georeference, const Footprint& footprint,
                                           const geo::Lattice& lattice, const geo::TileKey& key, double tolerance) {
   const NodeWindow window{lattice.FirstColumn(key), lattice.FirstRow(key), lattice.cells, lattice.cells};
-  return GridNodes(georeference, footprint, CellCentres(lattice), window, tolerance).Compute();
+  const NodePositions found = GridNodes(georeference, footprint, CellCentres(lattice), window, tolerance).Compute();
+  std::vector<Position> centres;
+  centres.reserve(found.columns() * found.rows());
+  for (std::size_t j = 0; j < found.rows(); ++j) {
+    for (std::size_t i = 0; i < found.columns(); ++i) centres.push_back(found.At(i, j));
+  }
+  return centres;
 }
 
 }  // namespace terrace::dem

@@ -65,13 +65,13 @@ Result<std::vector<std::uint8_t>> WaterRaster::Impl::Read(const geo::TileKey& ke
 
   const std::vector<Position> positions =
       CellCentrePositions(georeference, footprint, lattice, key, kWaterPositionTolerance * factor);
-  const GridAxis columns(layout.columns, factor, layout.wraps), rows(layout.height, factor, false);
-  CellFinder finder(columns, rows, layout.width, layout.height, kSide);
+  const GridAxes axes{
+      {layout.columns, factor, layout.wraps}, {layout.height, factor, false}, layout.width, layout.height};
   std::vector<GridCell> cells;
   std::vector<std::size_t> targets;  // pixel of each cell
   for (std::size_t i = 0; i < positions.size(); ++i) {
     if (!IsInside(positions[i])) continue;
-    cells.push_back(finder.At(positions[i], i));
+    cells.push_back(axes.CellAt(positions[i]));
     const std::size_t row_from_south = i / kSide;
     targets.push_back((kSide - 1 - row_from_south) * kSide + i % kSide);
   }
@@ -79,7 +79,7 @@ Result<std::vector<std::uint8_t>> WaterRaster::Impl::Read(const geo::TileKey& ke
   auto handle = handles.Borrow();
   if (!handle) return tl::unexpected(handle.error());
   if (cells.empty()) return pixels;
-  const GridWindow window = WindowOf(cells, columns, rows);
+  const GridWindow window = WindowOf(cells, axes);
   const auto shares = ReadGrid(**handle, layout, factor, window, stop);
   if (auto unchanged = handles.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
   if (!shares) {

@@ -58,7 +58,7 @@ Result<void> RasterGrid::FillPoints(std::span<const GeoPosition> points, HeightD
   const std::span<float> heights = nodes.heights;
   const auto converted = Conversion::For(vertical(), datum);
   if (!converted) return tl::unexpected(converted.error());
-  const GridAxis columns = Columns(1), rows = Rows(1);
+  const GridAxes axes = Axes(1);
   std::vector<PointCell> found;
   std::vector<Position> batch;
   for (std::size_t done = 0; done < points.size(); done += batch.size()) {
@@ -68,10 +68,11 @@ Result<void> RasterGrid::FillPoints(std::span<const GeoPosition> points, HeightD
       batch.push_back({point.longitude, point.latitude});
     }
     georeference_.ToPixels(batch);
-    const Cells here = CellsAt(batch, 1, heights.subspan(done, batch.size()), 1);
-    for (std::size_t i = 0; i < here.cells.size(); ++i) {
-      const GridCell& cell = here.cells[i];
-      found.push_back({done + here.nodes[i], (cell.column + kBlock) / kBlock, cell.row / kBlock, cell});
+    const std::vector<std::uint8_t> inside = cover_.Inside(batch);
+    for (std::size_t i = 0; i < batch.size(); ++i) {
+      if (inside[i] == 0 || !std::isnan(heights[done + i])) continue;
+      const GridCell cell = axes.CellAt(batch[i]);
+      found.push_back({done + i, (cell.column + kBlock) / kBlock, cell.row / kBlock, cell});
     }
   }
   if (found.empty()) return CheckUnread();
@@ -84,7 +85,7 @@ Result<void> RasterGrid::FillPoints(std::span<const GeoPosition> points, HeightD
     });
     cells.clear();
     for (auto p = first; p != end; ++p) cells.push_back(p->cell);
-    const GridWindow window = WindowOf(cells, columns, rows);
+    const GridWindow window = WindowOf(cells, axes);
     std::vector<float> measured;
     const auto bridged = ReadBridged(1, window, stop, &measured);
     if (!bridged) return tl::unexpected(bridged.error());

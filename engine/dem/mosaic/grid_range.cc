@@ -87,9 +87,7 @@ BlockRange RasterGrid::Ranges(const Box& pixels) const {
   };
   const geo::TileRange wanted{pixel(pixels.west, width_), pixel(pixels.south, height_), pixel(pixels.east, width_),
                               pixel(pixels.north, height_)};
-  std::int64_t covered = 0;
-  for (const std::size_t i : cover_index_.Find(pixels)) covered += geo::Cells(geo::Common(cover_[i], wanted));
-  range.has_voids |= covered < geo::Cells(wanted);
+  range.has_voids |= !cover_.Covers(wanted);
   return range;
 }
 

@@ -10,7 +10,6 @@
 #include "engine/dem/mosaic/feather.h"
 #include "engine/dem/mosaic/void_fill.h"
 #include "engine/dem/raster/grid_cells.h"
-#include "engine/geo/tile_cover.h"
 
 namespace terrace::dem {
 namespace {
@@ -18,71 +17,10 @@ namespace {
 // Interpolated positions are this close to exact ones, in samples of the grid they are read from: a slope of 45 degrees
 // at 30 m turns it into 0.3 mm.
 constexpr double kGridPositionTolerance = 1e-5;
-// Positions this close to the raster's edge, in pixels, are on it.
-constexpr double kGridEdgeTolerance = 1e-6;
-
-// Pixels that the members have, columns of raster grids that wrap counted from 0 to `turn`; without overlap.
-std::vector<geo::TileRange> CoverOf(const std::vector<GridMember>& members, std::int64_t turn) {
-  std::vector<geo::TileRange> ranges;
-  for (const GridMember& member : members) {
-    const geo::TileRange pixels = member.pixels();
-    ranges.push_back(pixels);
-    if (turn > 0 && pixels.end_x >= turn) {
-      ranges.push_back({0, pixels.start_y, std::min(pixels.end_x, 2 * turn - 1) - turn, pixels.end_y});
-    }
-  }
-  return geo::Disjoint(std::move(ranges));
-}
-
 Box BoxOf(const geo::TileRange& pixels) {
   return {static_cast<double>(pixels.start_x), static_cast<double>(pixels.start_y),
           static_cast<double>(pixels.end_x + 1), static_cast<double>(pixels.end_y + 1)};
 }
-
-// Whether positions lie in one of the boxes that pixels are covered by. For one thread.
-class InsideTest {
- public:
-  // `hull`: of all positions that are asked about. What these refer to outlives it.
-  InsideTest(const std::vector<geo::TileRange>& cover, const BoxIndex& index, const Box& hull)
-      : cover_(cover), index_(index), near_(index.Find(Grown(hull))) {}
-
-  bool operator()(const Position& p) const {
-    // Neighbours mostly lie in one box.
-    if (Holds(last_, p)) return true;
-    if (std::isnan(p.x) || std::isnan(p.y)) return false;
-    // Boxes reach farther than by the tolerance here: Holds decides.
-    if (near_.size() <= kFewBoxes) return HoldsAny(near_, p);
-    return HoldsAny(index_.Find(Grown({p.x, p.y, p.x, p.y})), p);
-  }
-
- private:
-  // Up to so many are asked in turn; of more the index tells which.
-  static constexpr std::size_t kFewBoxes = 8;
-
-  static Box Grown(const Box& box) {
-    constexpr double kHalo = 2 * kGridEdgeTolerance;
-    return {box.west - kHalo, box.south - kHalo, box.east + kHalo, box.north + kHalo};
-  }
-  static bool Holds(const Box& box, const Position& p) {
-    return p.x >= box.west && p.x <= box.east && p.y >= box.south && p.y <= box.north;
-  }
-  bool HoldsAny(const std::vector<std::size_t>& blocks, const Position& p) const {
-    for (const std::size_t block : blocks) {
-      const Box box = BoxOf(cover_[block]);
-      const Box reach{box.west - kGridEdgeTolerance, box.south - kGridEdgeTolerance, box.east + kGridEdgeTolerance,
-                      box.north + kGridEdgeTolerance};
-      if (!Holds(reach, p)) continue;
-      last_ = reach;
-      return true;
-    }
-    return false;
-  }
-
-  const std::vector<geo::TileRange>& cover_;
-  const BoxIndex& index_;
-  const std::vector<std::size_t> near_;
-  mutable Box last_{1, 1, 0, 0};  // as it begins: none
-};
 
 Result<Georeference> GeoreferenceOf(const GridPlan& plan) {
   if (plan.members.size() == 1) return plan.members.front().raster->georeference();
@@ -96,9 +34,41 @@ Result<Georeference> GeoreferenceOf(const GridPlan& plan) {
 
 bool IsVoid(float height) { return std::isnan(height); }
 
-}  // namespace
+// Whole rows at a time: heights of nodes that are wanted, where the samples around them give one.
+void FillRows(const std::vector<float>& samples, const GridWindow& window, const NodeCells& cells,
+              std::span<const std::uint8_t> wanted, std::span<const double> undulations, std::span<float> heights) {
+  const std::size_t stride = cells.columns().size(), rows = cells.rows().size();
+  std::vector<std::uint8_t> of_column(stride);
+  for (std::size_t n = 0; n < wanted.size(); n += stride) {
+    for (std::size_t i = 0; i < stride; ++i) of_column[i] |= wanted[n + i];
+  }
+  const auto first = static_cast<std::size_t>(std::ranges::find(of_column, std::uint8_t{1}) - of_column.begin());
+  std::size_t end = stride;
+  while (of_column[end - 1] == 0) --end;
+  NodeRows lines(samples, window, cells, first, end);
+  std::vector<float> rounded(end - first);
+  for (std::size_t j = 0; j < rows; ++j) {
+    const std::size_t of_row = j * stride + first;
+    const auto row = wanted.subspan(of_row, rounded.size());
+    if (std::ranges::find(row, std::uint8_t{1}) == row.end()) continue;
+    const std::span<const double> line = lines.Row(j);
+    if (undulations.empty()) {
+      for (std::size_t i = 0; i < line.size(); ++i) rounded[i] = RoundHeight(line[i]);
+    } else {
+      for (std::size_t i = 0; i < line.size(); ++i) rounded[i] = RoundHeight(line[i] + undulations[of_row + i]);
+    }
+    for (std::size_t i = 0; i < row.size(); ++i) {
+      if (row[i] == 0) continue;
+      heights[of_row + i] = rounded[i];
+      if (!std::isnan(rounded[i]) || (!undulations.empty() && std::isnan(undulations[of_row + i]))) continue;
+      const auto height = Interpolate(samples, window, cells.At(first + i, j));  // without the voids
+      if (!height) continue;
+      heights[of_row + i] = RoundHeight(undulations.empty() ? *height : *height + undulations[of_row + i]);
+    }
+  }
+}
 
-float RoundHeight(double metres) { return static_cast<float>(std::nearbyint(metres * 1024) / 1024); }
+}  // namespace
 
 Result<RasterGrid> RasterGrid::Make(GridPlan plan, const GridOptions& options) {
   auto where = GeoreferenceOf(plan);
@@ -132,7 +102,7 @@ void RasterGrid::IndexMembers() {
   const std::int64_t turn = wraps_ ? columns_ : 0;
   alignment_ = 1 << 22;  // AveragingFactor's largest
   heights_ = members_.front().raster->info().heights;
-  std::vector<BoxIndex::Entry> entries, blocks;
+  std::vector<BoxIndex::Entry> entries;
   for (std::size_t i = 0; i < members_.size(); ++i) {
     const GridMember& member = members_[i];
     const HeightRange& heights = member.raster->info().heights;
@@ -147,10 +117,8 @@ void RasterGrid::IndexMembers() {
       if (turn == 0) break;
     }
   }
-  cover_ = CoverOf(members_, turn);
-  for (std::size_t i = 0; i < cover_.size(); ++i) blocks.push_back({BoxOf(cover_[i]), i});
   member_index_ = BoxIndex(entries);
-  cover_index_ = BoxIndex(blocks);
+  cover_ = GridCover(members_, turn);
 }
 
 // Rasters are joined that lie a little off one grid. They are read as if they were on it; the bound on a tile's error
@@ -174,7 +142,7 @@ void RasterGrid::FindPoleHeights() {
   for (const int pole : {0, 1}) {
     Position position{0, pole == 0 ? -90.0 : 90.0};
     georeference_.ToPixels({&position, 1});
-    if (!(position.y >= -kGridEdgeTolerance && position.y <= height_ + kGridEdgeTolerance)) continue;
+    if (!(position.y >= -GridCover::kEdgeTolerance && position.y <= height_ + GridCover::kEdgeTolerance)) continue;
     const bool first_row = position.y < height_ / 2.0;
     double sum = 0, weights = 0;
     for (const GridMember& member : members_) {
@@ -188,28 +156,6 @@ void RasterGrid::FindPoleHeights() {
     }
     if (weights > 0) pole_heights_[static_cast<std::size_t>(pole)] = RoundHeight(sum / weights);
   }
-}
-
-RasterGrid::Cells RasterGrid::CellsAt(std::span<const Position> positions, std::size_t stride,
-                                      std::span<const float> heights, int factor) const {
-  Box hull{1e300, 1e300, -1e300, -1e300};
-  for (std::size_t i = 0; i < positions.size(); ++i) {
-    const auto [x, y] = positions[i];
-    if (std::isnan(x) || !std::isnan(heights[i])) continue;
-    hull = {std::min(hull.west, x), std::min(hull.south, y), std::max(hull.east, x), std::max(hull.north, y)};
-  }
-  Cells found;
-  if (hull.west > hull.east) return found;
-  const InsideTest is_inside(cover_, cover_index_, hull);
-  CellFinder finder(Columns(factor), Rows(factor), width_, height_, stride);
-  found.cells.reserve(positions.size());
-  found.nodes.reserve(positions.size());
-  for (std::size_t i = 0; i < positions.size(); ++i) {
-    if (!std::isnan(heights[i]) || !is_inside(positions[i])) continue;
-    found.cells.push_back(finder.At(positions[i], i));
-    found.nodes.push_back(i);
-  }
-  return found;
 }
 
 // Files are looked at even where nothing must be read: a tile of floor must not outlive its source. What lies between
@@ -277,19 +223,23 @@ Result<std::vector<float>> RasterGrid::ReadWeights(int factor, const GridWindow&
   return FeatherWeights(bridged->heights, wide, window, column_step, row_step, feather);
 }
 
-Result<void> RasterGrid::FillAt(std::span<const Position> positions, std::size_t stride,
+Result<void> RasterGrid::FillAt(NodePositions positions, std::span<const std::uint8_t> inside,
                                 std::span<const double> undulations, int factor, const NodeHeights& nodes,
                                 const std::stop_token& stop, GridTrace* trace) const {
   const auto [heights, weights, smooth] = nodes;
-  Cells found = CellsAt(positions, stride, heights, factor), others;
-  if (trace != nullptr && !weights.empty()) {
-    std::vector<float> known(heights.size(), 0);
-    for (std::size_t i = 0; i < known.size(); ++i) known[i] = std::isnan(heights[i]) ? 0 : SampleRules::kVoid;
-    others = CellsAt(positions, stride, known, factor);
+  const bool traces_others = trace != nullptr && !weights.empty();
+  std::vector<std::uint8_t> wanted(inside.size());
+  bool is_any_wanted = false;
+  for (std::size_t n = 0; n < wanted.size(); ++n) {
+    wanted[n] = inside[n] & static_cast<std::uint8_t>(IsVoid(heights[n]));
+    is_any_wanted |= wanted[n] != 0;
   }
+  NodeCells cells;
+  if (is_any_wanted) cells = NodeCells(positions, Axes(factor), traces_others ? inside : wanted);
+  if (trace != nullptr) trace->positions = std::move(positions);
   if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "reading was stopped");
-  if (found.cells.empty()) return CheckUnread();
-  GridWindow window = WindowOf(found.cells, Columns(factor), Rows(factor));
+  if (!is_any_wanted) return CheckUnread();
+  GridWindow window = cells.Cover(Axes(factor), wanted);
   // Samples between the outermost nodes and the rim are wanted too.
   constexpr int kRim = 3;
   if (trace != nullptr) window = Grown(window, kRim, factor);
@@ -303,7 +253,7 @@ Result<void> RasterGrid::FillAt(std::span<const Position> positions, std::size_t
   counts_->measured += samples.size() - bridged->voids;
   counts_->filled += bridged->voids - left;
   counts_->voids += left;
-  if (trace != nullptr && !weights.empty() && factor == 1) {
+  if (traces_others && factor == 1) {
     trace->samples = bridged->heights;
     trace->includes_filled = true;
   }
@@ -314,46 +264,59 @@ Result<void> RasterGrid::FillAt(std::span<const Position> positions, std::size_t
     counts = *std::move(read);
     if (trace != nullptr && trace->includes_filled) trace->weights = counts;
   }
-  for (std::size_t i = 0; i < found.cells.size(); ++i) {
-    const std::size_t node = found.nodes[i];
-    const auto height = Interpolate(samples, window, found.cells[i]);
+  const auto take = [&](std::size_t node, const GridCell& cell) {
+    const auto height = Interpolate(samples, window, cell);
     // Where the geoid is not known a height means nothing.
-    if (!height || (!undulations.empty() && std::isnan(undulations[node]))) continue;
+    if (!height || (!undulations.empty() && std::isnan(undulations[node]))) return;
     const float rounded = RoundHeight(undulations.empty() ? *height : *height + undulations[node]);
-    if (has_holes &&
-        !HasSample(bridged->heights, window, found.cells[i])) {  // in a hole: another raster grid may know better
+    if (has_holes && !HasSample(bridged->heights, window, cell)) {  // in a hole: another raster grid may know better
       if (!smooth.empty() && std::isnan(smooth[node])) smooth[node] = rounded;
-      continue;
+      return;
     }
     heights[node] = rounded;
-    if (trace != nullptr) {
-      trace->cell_of_node[node] = static_cast<std::int32_t>(i);
-      trace->heights[node] = heights[node];
-    }
-    if (weights.empty()) continue;
+    if (trace != nullptr) trace->heights[node] = rounded;
+    if (weights.empty()) return;
     // Every sample has a weight, so this is plain bilinear. What counts nothing would still hide the floor.
     constexpr double kLeast = 0x1p-10;
-    const double weight = counts.empty() ? 1 : Interpolate(counts, window, found.cells[i]).value_or(1);
+    const double weight = counts.empty() ? 1 : Interpolate(counts, window, cell).value_or(1);
     weights[node] = static_cast<float>(std::max(kLeast, std::nearbyint(weight * 1024) / 1024));
+  };
+  if (cells.is_separable() && !has_holes && weights.empty()) {
+    FillRows(samples, window, cells, wanted, undulations, heights);
+    if (trace != nullptr) {
+      for (std::size_t n = 0; n < wanted.size(); ++n) {
+        if (wanted[n] != 0) trace->heights[n] = heights[n];
+      }
+    }
+  } else {
+    const auto stride = static_cast<std::size_t>(cells.window().columns);
+    std::size_t node = 0;
+    for (std::size_t j = 0; node < wanted.size(); ++j) {
+      for (std::size_t i = 0; i < stride; ++i, ++node) {
+        if (wanted[node] != 0) take(node, cells.At(i, j));
+      }
+    }
   }
-  if (trace != nullptr) {
-    trace->window = window;
-    trace->cells = std::move(found.cells);
+  if (trace == nullptr) return {};
+  trace->window = window;
+  trace->cells = std::move(cells);
+  if (traces_others) {
+    std::vector<std::uint8_t> others(inside.size());
+    for (std::size_t n = 0; n < others.size(); ++n) others[n] = inside[n] & (wanted[n] ^ std::uint8_t{1});
     TraceOthers(others, bridged->heights, samples, undulations, *trace);
   }
   return {};
 }
 
 // Nodes whose height others gave, as far as what was read tells the raster grid's own.
-void RasterGrid::TraceOthers(const Cells& others, const std::vector<float>& bridged, const std::vector<float>& filled,
-                             std::span<const double> undulations, GridTrace& trace) const {
+void RasterGrid::TraceOthers(std::span<const std::uint8_t> others, const std::vector<float>& bridged,
+                             const std::vector<float>& filled, std::span<const double> undulations,
+                             GridTrace& trace) const {
   const GridWindow& window = trace.window;
-  const std::int64_t turn = wraps_ ? Columns(trace.factor).count() : 0;
-  for (std::size_t i = 0; i < others.cells.size(); ++i) {
-    GridCell cell = others.cells[i];
-    const std::size_t node = others.nodes[i];
-    if (cell.column < window.column) cell.column += turn;
-    if (cell.column + 1 >= window.column + window.columns) cell.column -= turn;
+  const auto stride = static_cast<std::size_t>(trace.cells.window().columns);
+  for (std::size_t node = 0; node < others.size(); ++node) {
+    if (others[node] == 0) continue;
+    const GridCell cell = trace.cells.At(node % stride, node / stride);
     if (cell.column < window.column || cell.column + 1 >= window.column + window.columns || cell.row < window.row ||
         cell.row + 1 >= window.row + window.rows) {
       continue;
@@ -361,36 +324,38 @@ void RasterGrid::TraceOthers(const Cells& others, const std::vector<float>& brid
     const auto height = Interpolate(filled, window, cell);
     if (!height || !HasSample(bridged, window, cell)) continue;
     if (!undulations.empty() && std::isnan(undulations[node])) continue;
-    trace.cell_of_node[node] = static_cast<std::int32_t>(trace.cells.size());
     trace.heights[node] = RoundHeight(undulations.empty() ? *height : *height + undulations[node]);
-    trace.cells.push_back(cell);
   }
 }
 
-std::vector<Position> RasterGrid::PositionsOf(const geo::Lattice& lattice, const NodeWindow& window, int factor) const {
-  return NodePositions(georeference_, reach_, lattice, window, kGridPositionTolerance * factor);
+NodeCells RasterGrid::CellsOf(const NodePositions& positions, int factor, const GridWindow& window) const {
+  const std::vector<std::uint8_t> inside = cover_.Inside(positions);
+  NodeCells cells(positions, Axes(factor), inside);
+  cells.MoveNear(window.column + window.columns / 2, Columns(factor));
+  return cells;
+}
+
+NodePositions RasterGrid::PositionsOf(const geo::Lattice& lattice, const NodeWindow& window, int factor) const {
+  return NodePositions::Of(georeference_, reach_, lattice, window, kGridPositionTolerance * factor);
 }
 
 Result<void> RasterGrid::Fill(const geo::Lattice& lattice, const NodeWindow& window, HeightDatum datum,
                               const NodeHeights& nodes, const std::stop_token& stop, GridTrace* trace) const {
   const int factor = AveragingFactor(SamplesPerCell(lattice, spacing_));
-  auto positions = PositionsOf(lattice, window, factor);
+  NodePositions positions = PositionsOf(lattice, window, factor);
+  std::vector<std::uint8_t> inside = cover_.Inside(positions);
   if (trace != nullptr) {
-    trace->positions = positions;
-    trace->cell_of_node.assign(positions.size(), -1);
-    trace->heights.assign(positions.size(), SampleRules::kVoid);
+    trace->heights.assign(inside.size(), SampleRules::kVoid);
     trace->factor = factor;
   }
   for (int row = 0; row < window.rows && georeference_.is_geographic_grid(); ++row) {
     const std::int64_t global = window.row + row;
     if (global > 0 && global < lattice.rows()) continue;
     // Where columns are meridians they meet in one value.
-    const auto first = static_cast<std::size_t>(row) * static_cast<std::size_t>(window.columns);
-    std::fill_n(positions.begin() + static_cast<std::ptrdiff_t>(first), window.columns, kNowhere);
+    const auto first = static_cast<std::size_t>(row) * positions.columns();
+    std::fill_n(inside.begin() + static_cast<std::ptrdiff_t>(first), window.columns, std::uint8_t{0});
     if (const auto pole = PoleHeight(global <= 0 ? 0 : 1, datum)) {
-      std::ranges::replace_if(
-          nodes.heights.subspan(first, static_cast<std::size_t>(window.columns)),
-          [](float height) { return std::isnan(height); }, *pole);
+      std::ranges::replace_if(nodes.heights.subspan(first, positions.columns()), IsVoid, *pole);
     }
   }
   std::vector<double> undulations;
@@ -400,7 +365,7 @@ Result<void> RasterGrid::Fill(const geo::Lattice& lattice, const NodeWindow& win
     undulations = *std::move(found);
   }
   if (trace != nullptr) trace->undulations = undulations;
-  return FillAt(positions, static_cast<std::size_t>(window.columns), undulations, factor, nodes, stop, trace);
+  return FillAt(std::move(positions), inside, undulations, factor, nodes, stop, trace);
 }
 
 Result<void> RasterGrid::Fill(const geo::MercatorGrid& grid, const NodeWindow& window, const NodeHeights& nodes,
@@ -412,8 +377,9 @@ Result<void> RasterGrid::Fill(const geo::MercatorGrid& grid, const NodeWindow& w
     if (!found) return tl::unexpected(found.error());
     undulations = *std::move(found);
   }
-  return FillAt(NodePositions(georeference_, reach_, grid, window, kGridPositionTolerance * factor),
-                static_cast<std::size_t>(window.columns), undulations, factor, nodes, stop);
+  NodePositions positions = NodePositions::Of(georeference_, reach_, grid, window, kGridPositionTolerance * factor);
+  const std::vector<std::uint8_t> inside = cover_.Inside(positions);
+  return FillAt(std::move(positions), inside, undulations, factor, nodes, stop);
 }
 
 }  // namespace terrace::dem

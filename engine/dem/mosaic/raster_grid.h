@@ -18,8 +18,10 @@
 
 #include "engine/core/result.h"
 #include "engine/dem/common/box_index.h"
+#include "engine/dem/common/round_height.h"
 #include "engine/dem/crs/undulations.h"
 #include "engine/dem/dem_types.h"
+#include "engine/dem/mosaic/grid_cover.h"
 #include "engine/dem/mosaic/grid_members.h"
 #include "engine/dem/mosaic/grid_voids.h"
 #include "engine/dem/mosaic/membrane.h"
@@ -36,14 +38,14 @@ struct GridRange {
 
 // What Fill read for a window. The error bounds compare served heights with these samples. Heights in metres.
 struct GridTrace {
-  std::vector<Position> positions;  // per node, in pixels; NaN where the node has none
-  bool is_part = false;             // true: positions of nodes far from the raster grid were not computed, and are NaN
-  // Per node, an index into `cells`; -1: the raster grid has no interpolated height for the node. With blending, nodes
-  // that other raster grids filled also have a cell, if it lies in `window` and has a sample.
-  std::vector<std::int32_t> cell_of_node;
-  std::vector<float> heights;       // per node, the raster grid's height before blending; NaN where it has none
+  // In pixels. Nodes far from the raster grid may have none.
+  NodePositions positions;
+  // Between averages by `factor`. Valid for nodes that have one of `heights`.
+  NodeCells cells;
+  // Per node, the raster grid's interpolated height before blending; NaN where it has none. With blending, nodes that
+  // other raster grids filled have one too, if their cell lies in `window` and has a sample.
+  std::vector<float> heights;
   std::vector<double> undulations;  // per node, metres, included in `heights`; empty: no geoid was applied
-  std::vector<GridCell> cells;
   GridWindow window;
   // Averages of the window by `factor`, row by row from the north, NaN for voids. Narrow voids are filled only if
   // `includes_filled`.
@@ -112,7 +114,9 @@ class RasterGrid {
                     const std::stop_token& stop) const;
 
   // Returns the pixel positions of the window's nodes that Fill uses for averages by `factor`.
-  std::vector<Position> PositionsOf(const geo::Lattice& lattice, const NodeWindow& window, int factor) const;
+  NodePositions PositionsOf(const geo::Lattice& lattice, const NodeWindow& window, int factor) const;
+  // Returns the cells of nodes, as a trace with this window has them.
+  NodeCells CellsOf(const NodePositions& positions, int factor, const GridWindow& window) const;
 
   // Fill for single points, at full resolution. `filled`, one per point, becomes 1 where the point's pixel is void, for
   // points that get a height. Precondition: `nodes.smooth` has one entry per point. Errors: those of Fill and of the
@@ -144,17 +148,10 @@ class RasterGrid {
 
   GridAxis Columns(int factor) const { return {columns_, factor, wraps_}; }
   GridAxis Rows(int factor) const { return {height_, factor, false}; }
+  GridAxes Axes(int factor) const { return {Columns(factor), Rows(factor), width_, height_}; }
   void IndexMembers();
   void MeasureMembers();
   void FindPoleHeights();
-
-  // Cells of the positions inside the raster grid whose height is NaN, and the node index of each.
-  struct Cells {
-    std::vector<GridCell> cells;
-    std::vector<std::size_t> nodes;
-  };
-  Cells CellsAt(std::span<const Position> positions, std::size_t stride, std::span<const float> heights,
-                int factor) const;
 
   // Averages of the valid samples of each block; NaN where there is none.
   Result<std::vector<float>> ReadBlocks(int factor, const GridWindow& window, const std::stop_token& stop) const;
@@ -181,12 +178,13 @@ class RasterGrid {
                           const std::stop_token& stop) const;
   GridWindow Grown(const GridWindow& window, int halo, int factor) const;
 
-  // `undulations`: of the same nodes, added to heights; empty: none are.
-  Result<void> FillAt(std::span<const Position> positions, std::size_t stride, std::span<const double> undulations,
-                      int factor, const NodeHeights& nodes, const std::stop_token& stop,
-                      GridTrace* trace = nullptr) const;
-  void TraceOthers(const Cells& others, const std::vector<float>& bridged, const std::vector<float>& filled,
-                   std::span<const double> undulations, GridTrace& trace) const;
+  // `inside`: one entry per node, 0 where it is not to be filled. `undulations`: one per node, added to heights; empty:
+  // none are.
+  Result<void> FillAt(NodePositions positions, std::span<const std::uint8_t> inside,
+                      std::span<const double> undulations, int factor, const NodeHeights& nodes,
+                      const std::stop_token& stop, GridTrace* trace = nullptr) const;
+  void TraceOthers(std::span<const std::uint8_t> others, const std::vector<float>& bridged,
+                   const std::vector<float>& filled, std::span<const double> undulations, GridTrace& trace) const;
   std::optional<float> PoleHeight(int pole, HeightDatum datum) const;  // 0 south, 1 north
   // Returns the blend weight of each sample in the window, 0 to 1; empty: all are 1.
   Result<std::vector<float>> ReadWeights(int factor, const GridWindow& window, const std::stop_token& stop) const;
@@ -212,13 +210,9 @@ class RasterGrid {
 
   std::vector<GridMember> members_;
   HeightRange heights_;
-  BoxIndex member_index_;              // by pixels; with wrapping also one turn west and one turn east
-  std::vector<geo::TileRange> cover_;  // pixels that members have, without overlap
-  BoxIndex cover_index_;
+  BoxIndex member_index_;  // by pixels; with wrapping also one turn west and one turn east
+  GridCover cover_;
   int alignment_ = 1;  // the largest power of two at whose multiples all members begin
 };
-
-// Heights are multiples of 2^-10 m: libm's last bits, which differ between processors, end here.
-float RoundHeight(double metres);
 
 }  // namespace terrace::dem

@@ -11,57 +11,127 @@ float SampleAt(const std::vector<float>& heights, const GridWindow& window, std:
   return heights[static_cast<std::size_t>((row - window.row) * window.columns + column - window.column)];
 }
 
-}  // namespace
+double Between(double first, double second, double weight) { return first + weight * (second - first); }
 
-GridCell CellFinder::At(const Position& position, std::size_t index) {
-  Found& column = above_[index % above_.size()];
-  if (column.position != position.x) {
-    const double x = columns_.wraps() ? position.x : std::clamp(position.x, 0.0, static_cast<double>(width_));
-    column = {position.x, columns_.Locate(x)};
-  }
-  if (row_.position != position.y) {
-    row_ = {position.y, rows_.Locate(std::clamp(position.y, 0.0, static_cast<double>(height_)))};
-  }
-  return {column.place.index, row_.place.index, column.place.weight, row_.place.weight};
+// The column or the same one a turn on or back, within half a turn of `around`.
+std::int64_t NearestTurn(std::int64_t column, std::int64_t around, const GridAxis& columns) {
+  if (!columns.wraps()) return column;
+  const std::int64_t turn = columns.count();
+  if (column - around > turn / 2) column -= turn;
+  if (around - column > turn / 2) column += turn;
+  return column;
 }
 
-GridWindow WindowOf(std::span<GridCell> cells, const GridAxis& columns, const GridAxis& rows) {
-  const std::int64_t around = cells[cells.size() / 2].column, turn = columns.count();
-  std::int64_t west = std::numeric_limits<std::int64_t>::max(), east = std::numeric_limits<std::int64_t>::min();
-  std::int64_t north = west, south = east;
-  for (GridCell& cell : cells) {
-    if (columns.wraps()) {
-      if (cell.column - around > turn / 2) cell.column -= turn;
-      if (around - cell.column > turn / 2) cell.column += turn;
-    }
-    west = std::min(west, cell.column);
-    east = std::max(east, cell.column + 1);
-    north = std::min(north, cell.row);
-    south = std::max(south, cell.row + 1);
+// The columns and rows of cells.
+class CellHull {
+ public:
+  void AddColumn(std::int64_t column) { west_ = std::min(west_, column), east_ = std::max(east_, column + 1); }
+  void AddRow(std::int64_t row) { north_ = std::min(north_, row), south_ = std::max(south_, row + 1); }
+
+  GridWindow Window(const GridAxes& axes) const {
+    const std::int64_t east = axes.columns.wraps() ? east_ : std::min(east_, axes.columns.count() - 1);
+    const std::int64_t south = std::min(south_, axes.rows.count() - 1);
+    return {west_, north_, east - west_ + 1, south - north_ + 1};
   }
-  if (!columns.wraps()) east = std::min(east, columns.count() - 1);
-  south = std::min(south, rows.count() - 1);
-  return {west, north, east - west + 1, south - north + 1};
+
+ private:
+  std::int64_t west_ = std::numeric_limits<std::int64_t>::max(), east_ = std::numeric_limits<std::int64_t>::min();
+  std::int64_t north_ = west_, south_ = east_;
+};
+
+}  // namespace
+
+GridAxis::Location GridAxes::Column(double x) const {
+  return columns.Locate(columns.wraps() ? x : std::clamp(x, 0.0, static_cast<double>(width)));
+}
+
+GridAxis::Location GridAxes::Row(double y) const {
+  return rows.Locate(std::clamp(y, 0.0, static_cast<double>(height)));
+}
+
+GridCell GridAxes::CellAt(const Position& position) const {
+  const GridAxis::Location column = Column(position.x), row = Row(position.y);
+  return {column.index, row.index, column.weight, row.weight};
+}
+
+NodeCells::NodeCells(const NodePositions& positions, const GridAxes& axes, std::span<const std::uint8_t> inside)
+    : window_(positions.window()) {
+  if (positions.is_separable()) {
+    for (const double x : positions.x()) {
+      columns_.push_back(std::isnan(x) ? GridAxis::Location{} : axes.Column(x));
+    }
+    for (const double y : positions.y()) rows_.push_back(std::isnan(y) ? GridAxis::Location{} : axes.Row(y));
+    return;
+  }
+  const std::span<const Position> nodes = positions.nodes();
+  cells_.resize(nodes.size());
+  for (std::size_t n = 0; n < nodes.size(); ++n) {
+    if (inside[n] != 0) cells_[n] = axes.CellAt(nodes[n]);
+  }
+}
+
+void NodeCells::MoveNear(std::int64_t column, const GridAxis& columns) {
+  if (!columns.wraps()) return;
+  for (GridAxis::Location& place : columns_) place.index = NearestTurn(place.index, column, columns);
+  for (GridCell& cell : cells_) cell.column = NearestTurn(cell.column, column, columns);
+}
+
+GridWindow NodeCells::Cover(const GridAxes& axes, std::span<const std::uint8_t> wanted) {
+  const auto stride = static_cast<std::size_t>(window_.columns);
+  auto left = std::ranges::count(wanted, std::uint8_t{1}) / 2;
+  std::size_t middle = 0;  // of the wanted nodes
+  while (wanted[middle] == 0 || left-- > 0) ++middle;
+  MoveNear(At(middle % stride, middle / stride).column, axes.columns);
+  CellHull hull;
+  if (!is_separable()) {
+    for (std::size_t n = 0; n < cells_.size(); ++n) {
+      if (wanted[n] == 0) continue;
+      hull.AddColumn(cells_[n].column);
+      hull.AddRow(cells_[n].row);
+    }
+    return hull.Window(axes);
+  }
+  std::vector<std::uint8_t> of_column(stride);
+  for (std::size_t j = 0; j < rows_.size(); ++j) {
+    std::uint8_t of_row = 0;
+    for (std::size_t i = 0; i < stride; ++i) {
+      of_row |= wanted[j * stride + i];
+      of_column[i] |= wanted[j * stride + i];
+    }
+    if (of_row != 0) hull.AddRow(rows_[j].index);
+  }
+  for (std::size_t i = 0; i < stride; ++i) {
+    if (of_column[i] != 0) hull.AddColumn(columns_[i].index);
+  }
+  return hull.Window(axes);
+}
+
+GridWindow WindowOf(std::span<GridCell> cells, const GridAxes& axes) {
+  const std::int64_t around = cells[cells.size() / 2].column;
+  CellHull hull;
+  for (GridCell& cell : cells) {
+    cell.column = NearestTurn(cell.column, around, axes.columns);
+    hull.AddColumn(cell.column);
+    hull.AddRow(cell.row);
+  }
+  return hull.Window(axes);
 }
 
 std::optional<double> Interpolate(const std::vector<float>& heights, const GridWindow& window, const GridCell& cell) {
+  // Samples that count nothing may not be there.
+  const std::int64_t dx = cell.x > 0 ? 1 : 0, dy = cell.y > 0 ? 1 : 0;
+  const double height = Between(Between(SampleAt(heights, window, cell.column, cell.row),
+                                        SampleAt(heights, window, cell.column + dx, cell.row), cell.x),
+                                Between(SampleAt(heights, window, cell.column, cell.row + dy),
+                                        SampleAt(heights, window, cell.column + dx, cell.row + dy), cell.x),
+                                cell.y);
+  if (!std::isnan(height)) return height;
   double sum = 0, weights = 0;
-  if (cell.x > 0 && cell.y > 0 && cell.x < 1 && cell.y < 1) {
-    // Four samples that count, as nearly everywhere. In the order of what follows: the same bits.
-    const float* const north =
-        &heights[static_cast<std::size_t>((cell.row - window.row) * window.columns + cell.column - window.column)];
-    const float* const south = north + window.columns;
-    const double nw = (1 - cell.x) * (1 - cell.y), ne = cell.x * (1 - cell.y);
-    const double sw = (1 - cell.x) * cell.y, se = cell.x * cell.y;
-    sum = sum + nw * north[0] + ne * north[1] + sw * south[0] + se * south[1];
-    if (!std::isnan(sum) && nw > 0 && ne > 0 && sw > 0 && se > 0) return sum / (nw + ne + sw + se);
-    sum = 0;
-  }
-  const auto add = [&](std::int64_t dx, std::int64_t dy, double weight) {
+  const auto add = [&](std::int64_t x, std::int64_t y, double weight) {
     if (weight <= 0) return;
-    const float height = SampleAt(heights, window, cell.column + dx, cell.row + dy);
-    if (std::isnan(height)) return;
-    sum += weight * height;
+    const float sample = SampleAt(heights, window, cell.column + x, cell.row + y);
+    if (std::isnan(sample)) return;
+    sum += weight * sample;
     weights += weight;
   };
   add(0, 0, (1 - cell.x) * (1 - cell.y));
@@ -70,6 +140,39 @@ std::optional<double> Interpolate(const std::vector<float>& heights, const GridW
   add(1, 1, cell.x * cell.y);
   if (weights == 0) return std::nullopt;
   return sum / weights;
+}
+
+NodeRows::NodeRows(const std::vector<float>& samples, const GridWindow& window, const NodeCells& cells,
+                   std::size_t first, std::size_t end)
+    : samples_(samples), window_(window), cells_(cells), heights_(end - first) {
+  for (const GridAxis::Location& place : cells.columns().subspan(first, end - first)) {
+    west_.push_back(static_cast<std::int32_t>(place.index - window.column));
+    east_.push_back(west_.back() + (place.weight > 0 ? 1 : 0));
+    weights_.push_back(place.weight);
+  }
+  for (Line& line : lines_) line.heights.resize(heights_.size());
+}
+
+const NodeRows::Line& NodeRows::LineOf(std::int64_t row) {
+  Line& line = lines_[static_cast<std::size_t>(row % 2)];
+  if (line.row == row) return line;
+  line.row = row;
+  const float* const samples = samples_.data() + (row - window_.row) * window_.columns;
+  for (std::size_t i = 0; i < weights_.size(); ++i) {
+    line.heights[i] = Between(samples[west_[i]], samples[east_[i]], weights_[i]);
+  }
+  return line;
+}
+
+std::span<const double> NodeRows::Row(std::size_t j) {
+  const GridAxis::Location& place = cells_.rows()[j];
+  const Line& north = LineOf(place.index);
+  if (place.weight <= 0) return north.heights;
+  const Line& south = LineOf(place.index + 1);
+  for (std::size_t i = 0; i < heights_.size(); ++i) {
+    heights_[i] = Between(north.heights[i], south.heights[i], place.weight);
+  }
+  return heights_;
 }
 
 bool HasSample(const std::vector<float>& heights, const GridWindow& window, const GridCell& cell) {

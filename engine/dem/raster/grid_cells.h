@@ -1,14 +1,14 @@
 // Bilinear interpolation on the grid of a factor: cells of four samples, the window that holds them, heights in them.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <optional>
 #include <span>
 #include <vector>
 
-#include "engine/dem/crs/projector.h"
+#include "engine/dem/crs/node_positions.h"
 #include "engine/dem/raster/sample_grid.h"
 
 namespace terrace::dem {
@@ -19,35 +19,86 @@ struct GridCell {
   double x = 0, y = 0;
 };
 
-// Finds cells of positions in source pixels, which come row by row, `stride` to a row. Those a little outside `width`
-// by `height` count as on the edge. Where meridians are the raster's columns and parallels its rows, a position shares
-// its x with the one above and its y with the one before: nothing is to be found anew.
-class CellFinder {
- public:
-  CellFinder(const GridAxis& columns, const GridAxis& rows, int width, int height, std::size_t stride)
-      : columns_(columns), rows_(rows), width_(width), height_(height), above_(stride) {}
+// The grid of a factor, and the size of the raster in pixels.
+struct GridAxes {
+  GridAxis columns, rows;
+  int width = 0, height = 0;
 
-  // `index`: of the position, counted from the window's first.
-  GridCell At(const Position& position, std::size_t index);
+  // Positions are in source pixels. Those outside the raster count as on its edge; NaN is no position.
+  GridAxis::Location Column(double x) const;
+  GridAxis::Location Row(double y) const;
+  GridCell CellAt(const Position& position) const;
+};
+
+// The cells of a window's nodes. Where positions are separable, nothing is stored per node.
+class NodeCells {
+ public:
+  NodeCells() = default;
+  // Nodes have cells where `inside`, one entry per node, is not 0.
+  NodeCells(const NodePositions& positions, const GridAxes& axes, std::span<const std::uint8_t> inside);
+
+  const NodeWindow& window() const { return window_; }
+  bool is_separable() const { return cells_.empty(); }
+  // Of the window's columns and rows. Precondition: is_separable().
+  std::span<const GridAxis::Location> columns() const { return columns_; }
+  std::span<const GridAxis::Location> rows() const { return rows_; }
+
+  GridCell At(std::size_t i, std::size_t j) const {
+    if (!is_separable()) return cells_[j * static_cast<std::size_t>(window_.columns) + i];
+    return {columns_[i].index, rows_[j].index, columns_[i].weight, rows_[j].weight};
+  }
+  // By a node's global column and row, inside the window.
+  GridCell OfNode(std::int64_t column, std::int64_t row) const {
+    return At(static_cast<std::size_t>(column - window_.column), static_cast<std::size_t>(row - window_.row));
+  }
+
+  // The smallest window of averages with the cells of the nodes that are `wanted`, one entry per node. Where columns
+  // wrap, moves all cells to within half a turn of one of them. Precondition: a node is wanted, and has a cell.
+  GridWindow Cover(const GridAxes& axes, std::span<const std::uint8_t> wanted);
+  // Moves cells to within half a turn of a column.
+  void MoveNear(std::int64_t column, const GridAxis& columns);
 
  private:
-  struct Found {
-    double position = std::numeric_limits<double>::quiet_NaN();  // equal to none
-    GridAxis::Location place{};
-  };
-
-  const GridAxis columns_, rows_;
-  const int width_, height_;
-  std::vector<Found> above_;  // by column of the window
-  Found row_;
+  NodeWindow window_;
+  std::vector<GridAxis::Location> columns_, rows_;
+  std::vector<GridCell> cells_;
 };
 
 // The smallest window with every cell, its columns counted from near one of them where the axis wraps. Moves the cells
 // there. Precondition: not empty.
-GridWindow WindowOf(std::span<GridCell> cells, const GridAxis& columns, const GridAxis& rows);
+GridWindow WindowOf(std::span<GridCell> cells, const GridAxes& axes);
 
 // Bilinear, weights renormalized over valid samples; nothing where there is none.
 std::optional<double> Interpolate(const std::vector<float>& heights, const GridWindow& window, const GridCell& cell);
+
+// Heights along rows of nodes between the samples of a window, where cells are separable. Bit for bit what Interpolate
+// gives.
+class NodeRows {
+ public:
+  // Nodes `first` to `end` of each row. What these refer to outlives it. Precondition: `cells` are separable, those of
+  // the nodes lie in the window.
+  NodeRows(const std::vector<float>& samples, const GridWindow& window, const NodeCells& cells, std::size_t first,
+           std::size_t end);
+
+  // One height per node from `first` on; NaN where a sample that counts is void. Valid until the next call.
+  std::span<const double> Row(std::size_t j);
+
+ private:
+  struct Line {
+    std::int64_t row = -1;  // of the samples between which the heights are interpolated
+    std::vector<double> heights;
+  };
+
+  const Line& LineOf(std::int64_t row);
+
+  const std::vector<float>& samples_;
+  const GridWindow window_;
+  const NodeCells& cells_;
+  std::vector<std::int32_t> west_, east_;  // by node, the columns of its samples in the window
+  std::vector<double> weights_;            // of the eastern ones
+  std::array<Line, 2> lines_;
+  std::vector<double> heights_;
+};
 
 // Whether one of the four samples that count is valid.
 bool HasSample(const std::vector<float>& heights, const GridWindow& window, const GridCell& cell);

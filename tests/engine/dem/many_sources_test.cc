@@ -73,10 +73,11 @@ BlockRange OfAllMembers(const RasterGrid& grid, double west, double north, doubl
 }
 
 // Asks for a box around every position of a trace. How many members were looked at, of one box at most and for all.
-std::pair<std::size_t, std::size_t> LookAround(const RasterGrid& grid, const GridTrace& trace, std::size_t stride) {
-  const GridTables tables(grid, trace, stride);
+std::pair<std::size_t, std::size_t> LookAround(const RasterGrid& grid, const GridTrace& trace) {
+  const GridTables tables(grid, trace);
   std::size_t most = 0;
-  for (const Position& p : trace.positions) {
+  for (std::size_t n = 0; n < trace.positions.columns() * trace.positions.rows(); ++n) {
+    const Position p = trace.positions.At(n % trace.positions.columns(), n / trace.positions.columns());
     if (!std::isfinite(p.x) || !std::isfinite(p.y)) continue;
     const std::size_t before = tables.members_visited();
     const BlockRange found = tables.Ranges(p.x - 1, p.y - 1, p.x + 1, p.y + 1);
@@ -98,7 +99,7 @@ TEST(ManySources, AroundTheEarthATileLooksAtItsOwnSources) {
   const std::int64_t columns = 1 << 6;
   for (const std::int64_t x : {std::int64_t{0}, std::int64_t{7}, columns - 1}) {
     const GridTrace trace = TraceOf(grid, lattice, {5, x, 27});
-    const auto [most, all] = LookAround(grid, trace, static_cast<std::size_t>(lattice.cells) + 3);
+    const auto [most, all] = LookAround(grid, trace);
     EXPECT_LE(most, 4U) << "a tile of 5.6 degrees among sources of 10, column " << x;
     EXPECT_GT(all, 0U);
   }
@@ -110,7 +111,7 @@ TEST(ManySources, AShallowTileLooksAtTheSourcesOfEachBox) {
   const RasterGrid grid = MakeGrid(dir, {-180, 0.5, 0, 85, 0, -0.5}, "EPSG:4326", 36, 4, 20);
   const geo::Lattice lattice{0, 32};
   const GridTrace trace = TraceOf(grid, lattice, {0, 0, 0});
-  const auto [most, all] = LookAround(grid, trace, static_cast<std::size_t>(lattice.cells) + 3);
+  const auto [most, all] = LookAround(grid, trace);
   EXPECT_LE(most, 4U);
 }
 
@@ -125,8 +126,10 @@ TEST(ManySources, AtTheRimOfAProjectionATileLooksAtItsOwnSources) {
                             static_cast<std::int64_t>((north - 0.02 + 90) / tile)};
   GridTrace trace = TraceOf(grid, lattice, corner);
   // As nodes far from a raster grid and outside its projection have it.
-  for (std::size_t i = 0; i < 40; ++i) trace.positions[i] = {std::nan(""), std::nan("")};
-  const auto [most, all] = LookAround(grid, trace, static_cast<std::size_t>(lattice.cells) + 3);
+  std::vector<Position> nodes(trace.positions.nodes().begin(), trace.positions.nodes().end());
+  std::fill_n(nodes.begin(), 40, kNowhere);
+  trace.positions = NodePositions(trace.positions.window(), std::move(nodes));
+  const auto [most, all] = LookAround(grid, trace);
   EXPECT_GT(all, 0U);
   EXPECT_LE(most, 8U);
 }

@@ -143,7 +143,7 @@ void ExpectErrorsHold(const std::string& path) {
         const float sample = (*samples)[static_cast<std::size_t>(r) * static_cast<std::size_t>(layout.columns) +
                                         static_cast<std::size_t>(c)];
         if (std::isnan(sample)) continue;
-        const GridCell cell = CellFinder(columns, rows, layout.width, layout.height, 1).At({c + .5, r + .5}, 0);
+        const GridCell cell = GridAxes{columns, rows, layout.width, layout.height}.CellAt({c + .5, r + .5});
         const auto height = Interpolate(*averages, all, cell);
         if (height) truth.Raise(factor, c / pixels, r / pixels, static_cast<float>(std::abs(*height - sample)));
       }

@@ -1,0 +1,112 @@
+#include "engine/dem/mosaic/grid_cover.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+
+#include "engine/geo/tile_cover.h"
+
+namespace terrace::dem {
+namespace {
+
+constexpr Box kNowhereBox{1e300, 1e300, -1e300, -1e300};
+
+Box BoxOf(const geo::TileRange& pixels) {
+  return {static_cast<double>(pixels.start_x), static_cast<double>(pixels.start_y),
+          static_cast<double>(pixels.end_x + 1), static_cast<double>(pixels.end_y + 1)};
+}
+
+Box Grown(const Box& box, double by) { return {box.west - by, box.south - by, box.east + by, box.north + by}; }
+
+bool Holds(const Box& box, const Position& p) {
+  return p.x >= box.west && p.x <= box.east && p.y >= box.south && p.y <= box.north;
+}
+
+// Without those that are not known.
+Box HullOf(std::span<const Position> positions) {
+  Box hull = kNowhereBox;
+  for (const auto& [x, y] : positions) {
+    if (std::isnan(x) || std::isnan(y)) continue;
+    hull = {std::min(hull.west, x), std::min(hull.south, y), std::max(hull.east, x), std::max(hull.north, y)};
+  }
+  return hull;
+}
+
+}  // namespace
+
+GridCover::GridCover(const std::vector<GridMember>& members, std::int64_t turn) {
+  std::vector<geo::TileRange> ranges;
+  for (const GridMember& member : members) {
+    const geo::TileRange pixels = member.pixels();
+    ranges.push_back(pixels);
+    if (turn > 0 && pixels.end_x >= turn) {
+      ranges.push_back({0, pixels.start_y, std::min(pixels.end_x, 2 * turn - 1) - turn, pixels.end_y});
+    }
+  }
+  boxes_ = geo::Disjoint(std::move(ranges));
+  std::vector<BoxIndex::Entry> entries;
+  for (std::size_t i = 0; i < boxes_.size(); ++i) entries.push_back({BoxOf(boxes_[i]), i});
+  index_ = BoxIndex(entries);
+}
+
+bool GridCover::Covers(const geo::TileRange& pixels) const {
+  std::int64_t covered = 0;
+  for (const std::size_t i : index_.Find(BoxOf(pixels))) covered += geo::Cells(geo::Common(boxes_[i], pixels));
+  return covered == geo::Cells(pixels);
+}
+
+std::vector<std::uint8_t> GridCover::Inside(const NodePositions& positions) const {
+  return positions.is_separable() ? InsideOfAxes(positions) : Inside(positions.nodes());
+}
+
+// A box has a rectangle of nodes, or two of them where columns begin anew.
+std::vector<std::uint8_t> GridCover::InsideOfAxes(const NodePositions& positions) const {
+  std::vector<std::uint8_t> inside(positions.columns() * positions.rows());
+  Box hull = kNowhereBox;
+  for (const double x : positions.x()) hull.west = std::min(hull.west, x), hull.east = std::max(hull.east, x);
+  for (const double y : positions.y()) hull.south = std::min(hull.south, y), hull.north = std::max(hull.north, y);
+  std::vector<std::uint8_t> columns(positions.columns());
+  for (const std::size_t i : index_.Find(Grown(hull, 2 * kEdgeTolerance))) {
+    const Box box = Grown(BoxOf(boxes_[i]), kEdgeTolerance);
+    std::ranges::transform(positions.x(), columns.begin(),
+                           [&](double x) { return std::uint8_t{x >= box.west && x <= box.east}; });
+    for (std::size_t j = 0; j < positions.rows(); ++j) {
+      if (!(positions.y()[j] >= box.south && positions.y()[j] <= box.north)) continue;
+      std::uint8_t* const row = inside.data() + j * columns.size();
+      for (std::size_t c = 0; c < columns.size(); ++c) row[c] |= columns[c];
+    }
+  }
+  return inside;
+}
+
+std::vector<std::uint8_t> GridCover::Inside(std::span<const Position> positions) const {
+  // Up to so many boxes are asked in turn; of more the index tells which.
+  constexpr std::size_t kFewBoxes = 8;
+  std::vector<std::uint8_t> inside(positions.size());
+  const Box hull = HullOf(positions);
+  if (hull.west > hull.east) return inside;
+  const std::vector<std::size_t> near = index_.Find(Grown(hull, 2 * kEdgeTolerance));
+  Box last = kNowhereBox;
+  const auto holds_any = [&](const std::vector<std::size_t>& boxes, const Position& p) {
+    for (const std::size_t i : boxes) {
+      const Box box = Grown(BoxOf(boxes_[i]), kEdgeTolerance);
+      if (!Holds(box, p)) continue;
+      last = box;
+      return true;
+    }
+    return false;
+  };
+  for (std::size_t n = 0; n < positions.size(); ++n) {
+    const Position& p = positions[n];
+    if (std::isnan(p.x) || std::isnan(p.y)) continue;
+    const bool holds =
+        Holds(last, p) ||  // neighbours mostly lie in one box
+        (near.size() <= kFewBoxes ? holds_any(near, p)
+                                  : holds_any(index_.Find(Grown({p.x, p.y, p.x, p.y}, 2 * kEdgeTolerance)), p));
+    inside[n] = holds ? 1 : 0;
+  }
+  return inside;
+}
+
+}  // namespace terrace::dem
