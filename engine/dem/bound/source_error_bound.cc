@@ -31,7 +31,8 @@ class GridErrorBound {
     const int cells = nodes_.cells();
     for (int south = 0; south < cells; south += kGroup) {
       for (int west = 0; west < cells; west += kGroup) {
-        AddGroup({west, south, std::min(west + kGroup, cells), std::min(south + kGroup, cells)});
+        loose_.BeginGroup();
+        AddBox({west, south, std::min(west + kGroup, cells), std::min(south + kGroup, cells)});
       }
     }
     return loose_.Read(tile_.bound_, stop);
@@ -100,24 +101,47 @@ class GridErrorBound {
     return false;
   }
 
-  void AddGroup(const CellBox& box) {
+  bool IsCovered(const CellBox& box) const {
+    for (int j = box.south; j < box.north; ++j) {
+      const auto first = tile_.covered_.begin() + static_cast<std::ptrdiff_t>(CellIndex(box.west, j));
+      if (std::any_of(first, first + (box.east - box.west), [](std::uint8_t covered) { return covered == 0; })) {
+        return false;
+      }
+    }
+    return true;
+  }
+
+  // Bounds the box as a whole if it can; else its quarters, and single cells in the end.
+  void AddBox(const CellBox& box) {
     if (!Touches(box)) return;
     const bool gives_way = GivesWay(box), is_filled = gives_way && MayBeFilled(box);
     const bool is_partly_hidden = tile_.blends_ && IsPartlyCovered(box);
-    if (const double error = is_filled || is_partly_hidden ? kUnknownError : smooth_.Over(box); std::isfinite(error)) {
-      Raise(error);
-      if (gives_way) return;
+    const double error = is_filled || is_partly_hidden ? kUnknownError : smooth_.Over(box);
+    if (!std::isfinite(error)) return Divide(box, gives_way);
+    Raise(error);
+    if (gives_way) return;
+    for (int j = box.south; j < box.north; ++j) {
+      const auto first = tile_.covered_.begin() + static_cast<std::ptrdiff_t>(CellIndex(box.west, j));
+      std::fill_n(first, box.east - box.west, 1);
+    }
+  }
+
+  void Divide(const CellBox& box, bool gives_way) {
+    constexpr int kSmallest = 2;
+    if (box.east - box.west <= kSmallest) {
       for (int j = box.south; j < box.north; ++j) {
-        const auto first = tile_.covered_.begin() + static_cast<std::ptrdiff_t>(CellIndex(box.west, j));
-        std::fill_n(first, box.east - box.west, 1);
+        for (int i = box.west; i < box.east; ++i) {
+          if (tile_.covered_[CellIndex(i, j)] == 0) AddCell(i, j, gives_way && GivesWay({i, j, i + 1, j + 1}));
+        }
       }
       return;
     }
-    loose_.BeginGroup();
-    for (int j = box.south; j < box.north; ++j) {
-      for (int i = box.west; i < box.east; ++i) {
-        if (tile_.covered_[CellIndex(i, j)] == 0) AddCell(i, j, gives_way && GivesWay({i, j, i + 1, j + 1}));
-      }
+    const int middle_x = (box.west + box.east) / 2, middle_y = (box.south + box.north) / 2;
+    for (const CellBox& quarter : {CellBox{box.west, box.south, middle_x, middle_y},
+                                   CellBox{middle_x, box.south, box.east, middle_y},
+                                   CellBox{box.west, middle_y, middle_x, box.north},
+                                   CellBox{middle_x, middle_y, box.east, box.north}}) {
+      if (!IsCovered(quarter)) AddBox(quarter);
     }
   }
 
