@@ -221,45 +221,110 @@ double SmoothErrorBound::Over(const CellBox& box) const {
   PixelBounds at;
   if (!Measure(box, steps, at)) return kUnknown;
   Bends bends;
-  const auto left = static_cast<std::int64_t>(std::floor(at.west)),
-             right = static_cast<std::int64_t>(std::floor(at.east)) + 1;
-  const auto top = static_cast<std::int64_t>(std::floor(at.north)),
-             bottom = static_cast<std::int64_t>(std::floor(at.south)) + 1;
-  if (!Measure(left, top, right, bottom, bends)) return kUnknown;
+  const SampleRange range = RangeOf(at);
+  if (!Measure(range, bends)) return kUnknown;
   return Largest(bends, steps) + geoid_.Over(box) + LargestBlend(box) +
-         tables_.AveragingError(static_cast<double>(left), static_cast<double>(top), static_cast<double>(right),
-                                static_cast<double>(bottom));
+         tables_.AveragingError(static_cast<double>(range.left), static_cast<double>(range.top),
+                                static_cast<double>(range.right), static_cast<double>(range.bottom));
 }
 
-bool SmoothErrorBound::Measure(std::int64_t left, std::int64_t top, std::int64_t right, std::int64_t bottom,
-                               Bends& bends) const {
+SmoothErrorBound::SampleRange SmoothErrorBound::RangeOf(const PixelBounds& at) const {
+  const auto first = [](double place) { return static_cast<std::int64_t>(std::floor(place)); };
+  return {first(at.west), first(at.north), first(at.east) + 1, first(at.south) + 1};
+}
+
+// Beyond the outermost averages the surface goes on as it ends.
+SmoothErrorBound::SampleRange SmoothErrorBound::Clipped(SampleRange range) const {
   const GridWindow& window = trace_.window;
-  // Beyond the outermost averages the surface goes on as it ends.
-  left = std::max(left, window.column);
-  top = std::max(top, window.row);
-  right = std::min(right, window.column + window.columns - 1);
-  bottom = std::min(bottom, window.row + window.rows - 1);
-  const auto columns = static_cast<std::size_t>(right - left + 1);
-  const auto stride = static_cast<std::size_t>(window.columns);
+  return {std::max(range.left, window.column), std::max(range.top, window.row),
+          std::min(range.right, window.column + window.columns - 1),
+          std::min(range.bottom, window.row + window.rows - 1)};
+}
+
+bool SmoothErrorBound::Measure(const SampleRange& range, Bends& bends) const {
+  const SampleRange in = Clipped(range);
+  constexpr double kUp = 1 + 1e-6;  // of differences of floats
+  if (in.top == band_.top && in.bottom == band_.bottom) {
+    const auto first = static_cast<std::size_t>(in.left - trace_.window.column);
+    const auto columns = static_cast<std::size_t>(in.right - in.left + 1);
+    const auto largest = [&](const std::vector<float>& of_column, std::size_t count) {
+      Lanes lanes;
+      lanes.Raise(count, [&](std::size_t c) { return of_column[first + c]; });
+      return lanes.Largest() * kUp;
+    };
+    Lanes sum;
+    sum.Add(columns, [&](std::size_t c) { return band_.sum[first + c]; });
+    bends = {largest(band_.x, columns - 1), largest(band_.y, columns),
+             largest(band_.xx, columns > 2 ? columns - 2 : 0), largest(band_.yy, columns),
+             largest(band_.xy, columns - 1)};
+    return std::isfinite(sum.Sum());
+  }
+  const auto columns = static_cast<std::size_t>(in.right - in.left + 1);
   Lanes x, y, xx, yy, xy, sum;
-  for (std::int64_t row = top; row <= bottom; ++row) {
-    const float* here = trace_.samples.data() + (row - window.row) * window.columns + (left - window.column);
+  ForRows(in, [&](const float* above, const float* here, const float* below) {
     sum.Add(columns, [&](std::size_t c) { return here[c]; });
     x.Raise(columns - 1, [&](std::size_t c) { return here[c + 1] - here[c]; });
     if (columns > 2) {
       xx.Raise(columns - 2, [&](std::size_t c) { return here[c + 2] - here[c + 1] - (here[c + 1] - here[c]); });
     }
-    if (row == bottom) break;
-    const float* below = here + stride;
+    if (below == nullptr) return;
     y.Raise(columns, [&](std::size_t c) { return below[c] - here[c]; });
     xy.Raise(columns - 1, [&](std::size_t c) { return here[c + 1] - here[c] - (below[c + 1] - below[c]); });
-    if (row == top) continue;
-    const float* above = here - stride;
+    if (above == nullptr) return;
     yy.Raise(columns, [&](std::size_t c) { return below[c] - here[c] - (here[c] - above[c]); });
-  }
-  constexpr double kUp = 1 + 1e-6;  // of differences of floats
+  });
   bends = {x.Largest() * kUp, y.Largest() * kUp, xx.Largest() * kUp, yy.Largest() * kUp, xy.Largest() * kUp};
   return std::isfinite(sum.Sum());
+}
+
+// Calls step(row above, row, row below) for all rows of the range; null where the neighbour lies outside it.
+template <typename Step>
+void SmoothErrorBound::ForRows(const SampleRange& range, const Step& step) const {
+  const GridWindow& window = trace_.window;
+  for (std::int64_t row = range.top; row <= range.bottom; ++row) {
+    const float* const here =
+        trace_.samples.data() + (row - window.row) * window.columns + (range.left - window.column);
+    step(row == range.top ? nullptr : here - window.columns, here, row == range.bottom ? nullptr : here + window.columns);
+  }
+}
+
+// All boxes of the row have the same rows of samples: differences are taken once for all of them, along whole rows.
+void SmoothErrorBound::BeginRow(int south, int north) {
+  band_ = {};
+  if (!is_separable_ || trace_.samples.empty()) return;
+  const double y0 = y_[static_cast<std::size_t>(south + 1)], y1 = y_[static_cast<std::size_t>(north + 1)];
+  if (std::isnan(y0 + y1)) return;
+  PixelBounds at;
+  at.Add(0, y0);
+  at.Add(0, y1);
+  at.Grow(0, misplacement_.y);
+  const GridWindow& window = trace_.window;
+  SampleRange range = RangeOf(at);
+  range.left = window.column, range.right = window.column + window.columns - 1;
+  range = Clipped(range);
+  const auto columns = static_cast<std::size_t>(window.columns);
+  band_.top = range.top, band_.bottom = range.bottom;
+  for (std::vector<float>* of_column : {&band_.x, &band_.y, &band_.xx, &band_.yy, &band_.xy, &band_.sum}) {
+    of_column->assign(columns, 0);
+  }
+  const auto raise = [](std::vector<float>& largest, std::size_t count, const auto& value) {
+    float* const out = largest.data();
+    for (std::size_t c = 0; c < count; ++c) {
+      const float size = std::abs(value(c));
+      out[c] = size > out[c] ? size : out[c];
+    }
+  };
+  ForRows(range, [&](const float* above, const float* here, const float* below) {
+    for (std::size_t c = 0; c < columns; ++c) band_.sum[c] += here[c];
+    raise(band_.x, columns - 1, [&](std::size_t c) { return here[c + 1] - here[c]; });
+    raise(band_.xx, columns > 2 ? columns - 2 : 0,
+          [&](std::size_t c) { return here[c + 2] - here[c + 1] - (here[c + 1] - here[c]); });
+    if (below == nullptr) return;
+    raise(band_.y, columns, [&](std::size_t c) { return below[c] - here[c]; });
+    raise(band_.xy, columns - 1, [&](std::size_t c) { return here[c + 1] - here[c] - (below[c + 1] - below[c]); });
+    if (above == nullptr) return;
+    raise(band_.yy, columns, [&](std::size_t c) { return below[c] - here[c] - (here[c] - above[c]); });
+  });
 }
 
 }  // namespace terrace::dem

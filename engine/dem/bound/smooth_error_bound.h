@@ -19,6 +19,9 @@ class SmoothErrorBound {
   SmoothErrorBound(const TileNodes& tile, const RasterGrid& grid, const GridTrace& trace, const GridTables& tables,
                    const GeoidErrorBound& geoid, bool blends);
 
+  // Prepares Over for boxes that reach from cell row `south` to `north`; others may be asked for as well.
+  void BeginRow(int south, int north);
+
   // Returns a bound in metres on the difference between served heights and the raster grid's samples. NaN or infinity:
   // no bound is known, because a node is not evenly spaced, a sample is void or the geoid is not known.
   double Over(const CellBox& box) const;
@@ -43,8 +46,16 @@ class SmoothErrorBound {
   bool MeasureNodes(const CellBox& box, Steps& steps, PixelBounds& at) const;
   // Returns false if a node or a neighbour of one is not evenly spaced.
   bool Measure(const CellBox& box, Steps& steps, PixelBounds& at) const;
-  // Measures samples left .. right, top .. bottom, ends included. Returns false if one of them is void.
-  bool Measure(std::int64_t left, std::int64_t top, std::int64_t right, std::int64_t bottom, Bends& bends) const;
+  // Columns and rows of averages, ends included.
+  struct SampleRange {
+    std::int64_t left = 0, top = 0, right = -1, bottom = -1;
+  };
+  SampleRange RangeOf(const PixelBounds& at) const;
+  SampleRange Clipped(SampleRange range) const;
+  // Returns false if one of the averages is void.
+  bool Measure(const SampleRange& range, Bends& bends) const;
+  template <typename Step>
+  void ForRows(const SampleRange& range, const Step& step) const;
   static double Largest(const Bends& bends, const Steps& steps);
   double LargestBlend(const CellBox& box) const;
 
@@ -57,6 +68,14 @@ class SmoothErrorBound {
   // In averages; NaN where not evenly spaced: per column and per row of the tile's window if separable, else per node.
   std::vector<double> x_, y_;
   bool is_separable_ = false;
+
+  // Of rows `top` to `bottom` of the averages, by column of the trace's window: the largest differences, as in Bends,
+  // between this average and the next ones to the east and to the south; and the sum, NaN if one of them is void.
+  struct Band {
+    std::int64_t top = 0, bottom = -1;
+    std::vector<float> x, y, xx, yy, xy, sum;
+  };
+  Band band_;
 };
 
 }  // namespace terrace::dem

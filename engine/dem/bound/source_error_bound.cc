@@ -30,6 +30,7 @@ class GridErrorBound {
     constexpr int kGroup = SourceErrorBound::kGroup;
     const int cells = nodes_.cells();
     for (int south = 0; south < cells; south += kGroup) {
+      smooth_.BeginRow(south, std::min(south + kGroup, cells));
       for (int west = 0; west < cells; west += kGroup) {
         loose_.BeginGroup();
         AddBox({west, south, std::min(west + kGroup, cells), std::min(south + kGroup, cells)});
@@ -181,7 +182,7 @@ class GridErrorBound {
   const GridTrace& trace_;
   const GridTables tables_;
   const GeoidErrorBound geoid_;
-  const SmoothErrorBound smooth_;
+  SmoothErrorBound smooth_;
   const CellErrorBound single_;
   LooseCells loose_;
 };
