@@ -43,6 +43,32 @@ PlumbNodes::Plane::Plane(const std::array<Vec3, 3>& corners) {
   is_line = geo::Dot(normal, normal) <= kNarrowest_m * kNarrowest_m * longest;
 }
 
+double PlumbNodes::LargestOfRow(const Plane& plane, int j, std::int64_t first, std::int64_t last,
+                                const float* samples) const {
+  // Several running values, which the compiler makes vectors of. A plane that stands too steep for a height at one of
+  // the nodes is found by the smallest of all.
+  constexpr std::int64_t kLanes = 4;
+  std::array<double, kLanes> largest{}, steepest;
+  steepest.fill(std::numeric_limits<double>::infinity());
+  const Parallel& row = rows_[static_cast<std::size_t>(j)];
+  const double rest = plane.offset - row.z * plane.normal.z, north = row.sin * plane.normal.z;
+  const auto measure = [&](std::int64_t i, std::size_t lane) {
+    const geo::SinCos& column = columns_[static_cast<std::size_t>(i)];
+    const double across = column.cos * plane.normal.x + column.sin * plane.normal.y;
+    const double up = row.cos * across + north;
+    const double error = std::abs((rest - row.radius * across) / up - samples[i]);
+    largest[lane] = error > largest[lane] ? error : largest[lane];
+    steepest[lane] = std::abs(up) < steepest[lane] ? std::abs(up) : steepest[lane];
+  };
+  std::int64_t i = first;
+  for (; i + kLanes <= last + 1; i += kLanes) {
+    for (std::size_t lane = 0; lane < kLanes; ++lane) measure(i + static_cast<std::int64_t>(lane), lane);
+  }
+  for (; i <= last; ++i) measure(i, 0);
+  if (*std::ranges::min_element(steepest) <= plane.least) return std::numeric_limits<double>::infinity();
+  return *std::ranges::max_element(largest);
+}
+
 bool PlumbNodes::Meets(const std::array<Vec3, 3>& corners, int i, int j) const {
   constexpr double kBeside_m = 1e-6;  // positions are rounded to a nanometre, directions to 6e-14
   const geo::SinCos& column = columns_[static_cast<std::size_t>(i)];

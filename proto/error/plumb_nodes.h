@@ -44,6 +44,10 @@ class PlumbNodes {
     return (plane.offset - row.z * plane.normal.z - row.radius * across) / up;
   }
 
+  // The largest difference of HeightOn from the samples of a row's nodes `first` to `last`, at least. `samples`: from
+  // node 0. Where a height cannot be told it is as large as may be.
+  double LargestOfRow(const Plane& plane, int j, std::int64_t first, std::int64_t last, const float* samples) const;
+
   // Whether the node's plumb line passes through the triangle. Up to a micrometre beside its rim counts.
   bool Meets(const std::array<geo::Vec3, 3>& corners, int i, int j) const;
 

@@ -32,6 +32,28 @@ struct Surface {
   double beside_m = 0;    // by which the vertices lie beside the plumb lines of their points, at most
 };
 
+// The largest difference of `count` samples of a row from a plane, of which the first lies at (x, y) and each next one
+// `unit` further. Several running values: no step waits for the one before it, and the compiler makes vectors of them.
+double LargestOfRow(const Linear& plane, double x, double y, double unit, const float* samples, std::int64_t count) {
+  constexpr std::int64_t kLanes = 4;
+  std::array<double, kLanes> largest{};
+  const double up = plane.dy * y;
+  const auto error = [&](std::int64_t i) {
+    const double height = plane.origin + plane.dx * (x + unit * static_cast<double>(static_cast<std::int32_t>(i))) + up;
+    return std::abs(height - samples[i]);
+  };
+  std::int64_t i = 0;
+  for (; i + kLanes <= count; i += kLanes) {
+    for (std::int64_t lane = 0; lane < kLanes; ++lane) {
+      const double at = error(i + lane);
+      double& value = largest[static_cast<std::size_t>(lane)];
+      value = at > value ? at : value;
+    }
+  }
+  for (; i < count; ++i) largest[0] = std::max(largest[0], error(i));
+  return std::max(std::max(largest[0], largest[1]), std::max(largest[2], largest[3]));
+}
+
 template <typename Value>
 bool StartsWith(const std::vector<Value>& values, const std::vector<Value>& first) {
   return values.size() >= first.size() && std::equal(first.begin(), first.end(), values.begin());
@@ -181,22 +203,25 @@ class TileMeter::Impl {
            std::ranges::all_of(NeighboursOf(vertex.at), [&](tin::SamplePosition at) { return IsVertex(at); });
   }
 
-  // visit(i, j, error) for nodes, of the height that is linear in longitude and latitude: `edges` are those of the
-  // triangle, clip(edge, row, first, last) narrows the columns. The rows are those of [low, high].
+  // visit(j, first, last, largest) for rows of nodes with the largest error of the height that is linear in longitude
+  // and latitude: clip(row, first, last) narrows the columns. The rows are those of [low, high].
   template <typename Clip, typename Visit>
-  void VisitNodes(const Linear& plane, const NodePoint& corner, std::int64_t low, std::int64_t high, const Clip& clip,
-                  const Visit& visit) const {
+  void VisitRows(const Linear& plane, const NodePoint& corner, std::int64_t low, std::int64_t high, const Clip& clip,
+                 const Visit& visit) const {
     const std::int64_t unit = surface_.unit, last_row = std::min<std::int64_t>(high / unit, cells_);
     for (std::int64_t j = low > 0 ? (low + unit - 1) / unit : 0; j <= last_row; ++j) {
       std::int64_t first = 0, last = cells_;
       clip(j * unit, first, last);
-      const double dy = static_cast<double>(j * unit - corner.y);
-      for (std::int64_t i = first; i <= last; ++i) {
-        const double height = plane.At(static_cast<double>(i * unit - corner.x), dy);
-        const double sample = lattice_.At(static_cast<int>(i), static_cast<int>(j));
-        visit(static_cast<int>(i), static_cast<int>(j), std::abs(height - sample));
-      }
+      if (first > last) continue;
+      visit(static_cast<int>(j), static_cast<int>(first), static_cast<int>(last),
+            LargestOfRow(plane, static_cast<double>(first * unit - corner.x), static_cast<double>(j * unit - corner.y),
+                         static_cast<double>(unit), RowOf(static_cast<int>(j)) + first, last - first + 1));
     }
+  }
+
+  // Samples of a row, from its first node inside the tile.
+  const float* RowOf(int j) const {
+    return lattice_.heights.data() + static_cast<std::ptrdiff_t>(j + 1) * (cells_ + 3) + 1;
   }
 
   // The flat triangle is at most its sagitta off the linear one, at a place that is off by the shift.
@@ -215,12 +240,12 @@ class TileMeter::Impl {
     const auto [low, high] = std::minmax({p[0].y, p[1].y, p[2].y});
     const auto up = static_cast<std::int64_t>(y) + 1;
     double most = 0;
-    VisitNodes(
+    VisitRows(
         plane, p[0], low - up, high + up,
         [&](std::int64_t row, std::int64_t& first, std::int64_t& last) {
           for (std::size_t k = 0; k < 3; ++k) edges[k].ClipMoved(row, moves[k], first, last);
         },
-        [&](int, int, double error) { most = std::max(most, error); });
+        [&](int, int, int, double largest) { most = std::max(most, largest); });
     return {most + bounds.sagitta_m + std::abs(plane.dx) * x + std::abs(plane.dy) * y, false};
   }
 
@@ -232,12 +257,21 @@ class TileMeter::Impl {
     if (surface_.is_planar && area > 0) {
       const std::array<EdgeRows, 3> edges = EdgesOf(p);
       const auto [low, high] = std::minmax({p[0].y, p[1].y, p[2].y});
-      VisitNodes(
-          PlaneOf(t, p, area), p[0], low, high,
+      const Linear plane = PlaneOf(t, p, area);
+      VisitRows(
+          plane, p[0], low, high,
           [&](std::int64_t row, std::int64_t& first, std::int64_t& last) {
             for (const EdgeRows& edge : edges) edge.Clip(row, first, last);
           },
-          [&](int i, int j, double error) { Take(error, i, j, found); });
+          [&](int j, int first, int last, double largest) {
+            found.largest = std::max(found.largest, largest);
+            if (largest <= bound_) return;  // nothing of the row is missed
+            const double y = static_cast<double>(j * surface_.unit - p[0].y);
+            for (int i = first; i <= last; ++i) {
+              const double height = plane.At(static_cast<double>(i * surface_.unit - p[0].x), y);
+              Take(std::abs(height - lattice_.At(i, j)), i, j, found);
+            }
+          });
     }
     MeasureFlat(surface_.triangles[t], p, found);
     if (found.sample.error > bound_) samples.push_back(found.sample.at);
@@ -268,6 +302,9 @@ class TileMeter::Impl {
     const PlumbFootprint footprint(p, surface_.unit, surface_.beside_m, plumb_);
     for (int j = footprint.first_row(); j <= footprint.last_row(); ++j) {
       const PlumbFootprint::Columns columns = footprint.ColumnsOf(j);
+      if (columns.first > columns.last) continue;
+      const double largest = plumb_.LargestOfRow(plane, j, columns.first, columns.last, RowOf(j));
+      if (largest <= found.largest && largest <= bound_) continue;
       for (int i = static_cast<int>(columns.first); i <= columns.last; ++i) {
         const double error = std::abs(plumb_.HeightOn(plane, i, j) - lattice_.At(i, j));
         const bool counts = error > found.largest || (error > bound_ && error > MissOf(i, j, found).error);
