@@ -20,15 +20,15 @@ Box BoxOf(const geo::TileRange& pixels) {
 Box Grown(const Box& box, double by) { return {box.west - by, box.south - by, box.east + by, box.north + by}; }
 
 bool Holds(const Box& box, const Position& p) {
-  return p.x >= box.west && p.x <= box.east && p.y >= box.south && p.y <= box.north;
+  return (p.x >= box.west) & (p.x <= box.east) & (p.y >= box.south) & (p.y <= box.north);
 }
 
-// Without those that are not known.
+// Without those that are not known: comparisons with NaN are false.
 Box HullOf(std::span<const Position> positions) {
   Box hull = kNowhereBox;
   for (const auto& [x, y] : positions) {
-    if (std::isnan(x) || std::isnan(y)) continue;
-    hull = {std::min(hull.west, x), std::min(hull.south, y), std::max(hull.east, x), std::max(hull.north, y)};
+    hull = {x < hull.west ? x : hull.west, y < hull.south ? y : hull.south, x > hull.east ? x : hull.east,
+            y > hull.north ? y : hull.north};
   }
   return hull;
 }
@@ -87,6 +87,11 @@ std::vector<std::uint8_t> GridCover::Inside(std::span<const Position> positions)
   const Box hull = HullOf(positions);
   if (hull.west > hull.east) return inside;
   const std::vector<std::size_t> near = index_.Find(Grown(hull, 2 * kEdgeTolerance));
+  if (near.size() == 1) {
+    const Box box = Grown(BoxOf(boxes_[near.front()]), kEdgeTolerance);
+    std::ranges::transform(positions, inside.begin(), [&](const Position& p) { return std::uint8_t{Holds(box, p)}; });
+    return inside;
+  }
   Box last = kNowhereBox;
   const auto holds_any = [&](const std::vector<std::size_t>& boxes, const Position& p) {
     for (const std::size_t i : boxes) {

@@ -57,10 +57,15 @@ void FillRows(const std::vector<float>& samples, const GridWindow& window, const
     } else {
       for (std::size_t i = 0; i < line.size(); ++i) rounded[i] = RoundHeight(line[i] + undulations[of_row + i]);
     }
+    bool has_voids = false;
     for (std::size_t i = 0; i < row.size(); ++i) {
-      if (row[i] == 0) continue;
-      heights[of_row + i] = rounded[i];
-      if (!std::isnan(rounded[i]) || (!undulations.empty() && std::isnan(undulations[of_row + i]))) continue;
+      float& height = heights[of_row + i];
+      height = row[i] != 0 ? rounded[i] : height;
+      has_voids |= std::isnan(height);
+    }
+    for (std::size_t i = 0; has_voids && i < row.size(); ++i) {
+      if (row[i] == 0 || !IsVoid(rounded[i])) continue;
+      if (!undulations.empty() && std::isnan(undulations[of_row + i])) continue;
       const auto height = Interpolate(samples, window, cells.At(first + i, j));  // without the voids
       if (!height) continue;
       heights[of_row + i] = RoundHeight(undulations.empty() ? *height : *height + undulations[of_row + i]);
@@ -285,7 +290,7 @@ Result<void> RasterGrid::FillAt(NodePositions positions, std::span<const std::ui
     FillRows(samples, window, cells, wanted, undulations, heights);
     if (trace != nullptr) {
       for (std::size_t n = 0; n < wanted.size(); ++n) {
-        if (wanted[n] != 0) trace->heights[n] = heights[n];
+        trace->heights[n] = wanted[n] != 0 ? heights[n] : SampleRules::kVoid;
       }
     }
   } else {

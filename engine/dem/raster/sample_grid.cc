@@ -153,11 +153,8 @@ double GridAxis::Center(std::int64_t index) const {
   return static_cast<double>(begin + end) / 2 + static_cast<double>(turns * samples_);
 }
 
-GridAxis::Location GridAxis::Locate(double position) const {
-  // floor, without a call: processors without SSE 4.1 have no instruction for it.
-  const double place = position / factor_ - 0.5;
-  auto index = static_cast<std::int64_t>(place);
-  if (static_cast<double>(index) > place) --index;
+GridAxis::Location GridAxis::LocateNearEnd(double position) const {
+  auto index = static_cast<std::int64_t>(std::floor(position * per_factor_ - 0.5));
   // The last block's centre may lie nearer than a factor.
   if ((wraps_ || index + 1 < count_) && position >= Center(index + 1)) ++index;
   if (!wraps_) {

@@ -25,14 +25,26 @@ struct RasterLayout {
 // One axis of the averaged grid. Positions are in source pixels.
 class GridAxis {
  public:
+  // `factor`: a power of two.
   GridAxis(int samples, int factor, bool wraps)
-      : samples_(samples), factor_(factor), count_((samples + factor - 1) / factor), wraps_(wraps) {}
+      : samples_(samples),
+        factor_(factor),
+        per_factor_(1.0 / factor),
+        count_((samples + factor - 1) / factor),
+        wraps_(wraps) {}
 
   struct Location {
-    std::int64_t index;  // of the sample at or before the position; with wrapping it may be -1
-    double weight;       // of the next sample; 0 beyond the outermost centres
+    std::int64_t index = 0;  // of the sample at or before the position; with wrapping it may be -1
+    double weight = 0;       // of the next sample; 0 beyond the outermost centres
   };
-  Location Locate(double position) const;
+  Location Locate(double position) const {
+    const double place = position * per_factor_ - 0.5;
+    const auto index = static_cast<std::int64_t>(place);
+    if (!(place >= 0 && index + 2 < count_)) return LocateNearEnd(position);
+    // Both samples are of whole blocks.
+    const double here = (static_cast<double>(index) + 0.5) * factor_;
+    return {index, (position - here) * per_factor_};
+  }
 
   std::int64_t count() const { return count_; }
   bool wraps() const { return wraps_; }
@@ -41,7 +53,10 @@ class GridAxis {
   double Center(std::int64_t index) const;
 
  private:
+  Location LocateNearEnd(double position) const;
+
   int samples_, factor_;
+  double per_factor_;
   std::int64_t count_;
   bool wraps_;
 };
