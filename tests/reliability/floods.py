@@ -154,10 +154,19 @@ def beside(flood, polite, port, times):
     return statuses
 
 
-def leave(port, count):
-    """Uploads of 600 kB that are sent whole, and whose clients leave at once."""
-    message = post(" " * 600_000, FLOOD)
-    for _ in range(count):
-        with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", port), 2) as connection:
-            connection.settimeout(1)
-            connection.sendall(message)
+def leave(port, count, at_once):
+    """Uploads of 600 kB that are sent whole, and whose clients leave at once. Each asks for as many heights as a worker takes a while for."""
+    body = json.dumps({"locations": "|".join(f"{36.2 + i * 2e-5:.5f},{-84.4 + i * 3e-5:.5f}" for i in range(9000))})
+    message = post(body + " " * (600_000 - len(body)), FLOOD)
+
+    def run():
+        for _ in range(count // at_once):
+            with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", port), 2) as connection:
+                connection.settimeout(1)
+                connection.sendall(message)
+
+    threads = [threading.Thread(target=run) for _ in range(at_once)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()

@@ -82,7 +82,9 @@ TEST(SampleConversion, OfAnyTypeIsThatOfTheSingleSample) {
         voids += std::isnan(heights[i]) ? 1 : 0;
       }
       EXPECT_LT(voids, kSide * kSide);
-      if (lowest > 0) EXPECT_GT(voids, 0);
+      if (lowest > 0) {
+        EXPECT_GT(voids, 0);
+      }
     }
   }
 }
