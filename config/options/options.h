@@ -15,7 +15,8 @@ struct OptionInfo {
   std::string_view value;  // what stands for the value in help texts: "BYTES"
   std::string_view help;   // one line
   bool has_flag = false;
-  std::string default_value;  // as JSON; empty: there is none
+  std::string default_value;          // as JSON; empty: there is none
+  std::string_view other_words = {};  // what others call it (config/common/nearest_name.h)
 
   // "--cache-bytes"
   std::string Flag() const;

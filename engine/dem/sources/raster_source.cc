@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "engine/core/plain_number.h"
 #include "engine/dem/common/source_log.h"
 #include "engine/dem/gdal/gdal_runtime.h"
 #include "engine/dem/gdal/raster_file.h"
@@ -57,9 +58,9 @@ std::string DoubtsOf(const HeightRange& heights) {
   constexpr double kHighest = 9000, kDeepest = -11500;
   if (heights.max <= kHighest && heights.min >= kDeepest) return "";
   return fmt::format(
-      "heights from {:g} to {:g} m are hardly metres (Earth has -10,935 to 8,849), and those beyond {:g} count as "
+      "heights from {} to {} m are hardly metres (Earth has -10,935 to 8,849), and those beyond {} count as "
       "voids: state the metres a unit has with `gdal_translate -a_scale FACTOR in out`, 0.01 for centimetres",
-      heights.min, heights.max, kMaxAbsHeight);
+      PlainNumber(heights.min), PlainNumber(heights.max), PlainNumber(kMaxAbsHeight));
 }
 
 void LogWhatMatters(GDALDataset& dataset, const RasterInfo& info, const Georeference& georeference,

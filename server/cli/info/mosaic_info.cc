@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "engine/core/plain_number.h"
 #include "engine/dem/common/box_index.h"
 #include "engine/geo/error_ladder.h"
 
@@ -109,13 +110,18 @@ std::vector<std::string> AdviceFor(const dem::DemInfo& info) {
   if (voids > 0) {
     advice.push_back(fmt::format(
         "with voids: {}; small ones are filled from their edges, larger ones show the next source; then those with "
-        "data all around them are filled from their edges, and those that touch the rim show the floor of {:g} m",
-        Sources(voids), info.floor));
+        "data all around them are filled from their edges, and those that touch the rim show the floor of {} m",
+        Sources(voids), PlainNumber(info.floor)));
   }
   return advice;
 }
 
 }  // namespace
+
+std::string TextOfBounds(const dem::GeoBounds& bounds) {
+  return fmt::format("west {}, south {}, east {}, north {}", PlainNumber(bounds.west), PlainNumber(bounds.south),
+                     PlainNumber(bounds.east), PlainNumber(bounds.north));
+}
 
 void PrintMosaic(const std::string& name, const dem::DemInfo& info) {
   const auto line = [](const char* what, const std::string& value) { fmt::print("  {:<14}{}\n", what, value); };
@@ -124,17 +130,16 @@ void PrintMosaic(const std::string& name, const dem::DemInfo& info) {
   constexpr std::size_t kMaxListed = 40;
   for (std::size_t i = 0; i < std::min(info.sources.size(), kMaxListed); ++i) {
     const dem::RasterInfo& source = info.sources[i];
-    line("", fmt::format("{}: {} x {}, {:.3g} m, {}", source.path, source.width, source.height, source.spacing_m,
-                         source.crs));
+    line("", fmt::format("{}: {} x {}, {} m, {}", source.path, source.width, source.height,
+                         PlainNumber(source.spacing_m, 3), source.crs));
   }
   if (info.sources.size() > kMaxListed) line("", fmt::format("and {} more", info.sources.size() - kMaxListed));
   line("overlaps", fmt::format("under one before them, in part at least: {}", Sources(CountOverlapped(info.sources))));
-  line("bounds", fmt::format("west {:.6g}, south {:.6g}, east {:.6g}, north {:.6g}", info.bounds.west,
-                             info.bounds.south, info.bounds.east, info.bounds.north));
-  line("heights", fmt::format("{:g} to {:g} m", info.heights.min, info.heights.max));
-  line("floor", fmt::format("{:g} m where no source has a height", info.floor));
-  line("levels", fmt::format("0 to {}, default error {:.3g} m at the deepest, which lies where the finest source does",
-                             info.max_level, geo::DefaultError(info.max_level)));
+  line("bounds", TextOfBounds(info.bounds));
+  line("heights", fmt::format("{} to {} m", PlainNumber(info.heights.min), PlainNumber(info.heights.max)));
+  line("floor", fmt::format("{} m where no source has a height", PlainNumber(info.floor)));
+  line("levels", fmt::format("0 to {}, default error {} m at the deepest, which lies where the finest source does",
+                             info.max_level, PlainNumber(geo::DefaultError(info.max_level), 3)));
   for (const std::string& advice : AdviceFor(info)) line("note", advice);
 }
 

@@ -16,6 +16,7 @@
 #include <utility>
 #include <vector>
 
+#include "engine/core/plain_number.h"
 #include "engine/dem/dem_source.h"
 #include "engine/dem/gdal/source_policy.h"
 #include "engine/dem/sources/read_raster.h"
@@ -137,10 +138,10 @@ void Print(const MeshArguments& arguments, const tin::HeightField& field, const 
     return;
   }
   fmt::print(
-      "{}: {} vertices, {} triangles of {} samples{}; largest error {:.4g} m, RMS {:.4g} m; read {:.2f} s, mesh {:.2f} "
+      "{}: {} vertices, {} triangles of {} samples{}; largest error {} m, RMS {} m; read {:.2f} s, mesh {:.2f} "
       "s, write {:.2f} s\n",
-      arguments.out, mesh.vertices.size(), mesh.triangles.size(), error.samples, TextOfVoids(voids), error.max,
-      error.rms, seconds.read, seconds.triangulate, seconds.write);
+      arguments.out, mesh.vertices.size(), mesh.triangles.size(), error.samples, TextOfVoids(voids),
+      PlainNumber(error.max, 4), PlainNumber(error.rms, 4), seconds.read, seconds.triangulate, seconds.write);
 }
 
 // Checks of arguments; what they say is read after the name of the option. Their own descriptions stay out of the help.

@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "engine/core/plain_number.h"
 #include "engine/dem/image/raster_colors.h"
 #include "engine/dem/sources/read_raster.h"
 #include "engine/tin/extended/extended_error.h"
@@ -131,10 +132,12 @@ void Print(const ColoredMeshArguments& arguments, const tin::ExtendedField& fiel
              mesh.tin.triangles.size(), error.height.samples,
              TextOfVoids(VoidsOf(field.heights(), error.height.samples)));
   if (arguments.color.is_image) {
-    fmt::print("largest error {:.4g} of the range of colours, RMS {:.4g}", error.max_combined, error.color_rms);
+    fmt::print("largest error {} of the range of colours, RMS {}", PlainNumber(error.max_combined, 4),
+               PlainNumber(error.color_rms, 4));
   } else {
-    fmt::print("largest error {:.4g} m with colours, {:.4g} m of heights alone; RMS {:.4g} m, colours {:.4g}",
-               error.max_combined, error.height.max, error.height.rms, error.color_rms);
+    fmt::print("largest error {} m with colours, {} m of heights alone; RMS {} m, colours {}",
+               PlainNumber(error.max_combined, 4), PlainNumber(error.height.max, 4), PlainNumber(error.height.rms, 4),
+               PlainNumber(error.color_rms, 4));
   }
   fmt::print("; read {:.2f} s, mesh {:.2f} s, write {:.2f} s\n", seconds.read, seconds.triangulate, seconds.write);
 }

@@ -53,10 +53,25 @@ class Usage(unittest.TestCase):
 
     def test_typos_are_told_with_the_nearest_name(self):
         for arguments, word, nearest in ((["serv"], "command serv", "serve"), (["--versoin"], "option --versoin", "--version"),
-                                         (["serve", "--cach-bytes=5"], "option --cach-bytes", "--cache-bytes"),
-                                         (["mesh", "--max-eror", "5"], "option --max-eror", "--max-error"),
-                                         (["mesh", "--error", "5"], "option --error", "--max-error")):
+                                         (["serve", "--cach-bytes=5"], "option --cach-bytes", "--cache-bytes BYTES"),
+                                         (["mesh", "--max-eror", "5"], "option --max-eror", "--max-error METRES"),
+                                         (["mesh", "--jsn"], "option --jsn", "--json"),
+                                         (["mesh", "--output", "a.obj"], "option --output", "--out FILE"),
+                                         (["mesh", "--error", "5"], "option --error", "--max-error METRES"),
+                                         (["serve", "--error", "5"], "option --error", "--error-fraction SHARE or --finest-error METRES")):
             self.assertIn(f"terrace: unknown {word}; did you mean {nearest}?\n", run(*arguments).stderr, arguments)
+
+    def test_words_of_other_servers_lead_to_the_option(self):
+        for flag in ("--port", "--host", "--address", "--bind"):
+            self.assertIn(f"terrace: unknown option {flag}; did you mean --listen HOST:PORT?\n", run("serve", "a.tif", flag, "80").stderr)
+
+    def test_options_of_another_command_are_told_with_it(self):
+        for arguments, message in ((["mesh", "a.tif", "--listen", "a:1"], "--listen; it is one of 'terrace serve'"),
+                                   (["serve", "a.tif", "--points=5"], "--points; it is one of 'terrace mesh'"),
+                                   (["--listen=a:1", "serve"], "--listen before the command; it is one of 'terrace serve'"),
+                                   (["mesh", "--port", "80"], "--port; did you mean --listen HOST:PORT of 'terrace serve'?"),
+                                   (["serve", "--tokens=abc"], '--tokens; "tokens" stands in the configuration alone')):
+            self.assertIn(f"terrace: unknown option {message}", run(*arguments).stderr, arguments)
 
     def test_stdout_that_takes_nothing_is_a_failure(self):
         with open("/dev/full", "w", encoding="utf-8") as full:
