@@ -20,7 +20,7 @@ const std::vector<Option<DatasetConfig>>& DatasetOptionTable() {
   static const std::vector<Option<DatasetConfig>> table = {
       {.key = "name",
        .value = "NAME",
-       .help = "Name of the dataset in URLs; by default that of the file",
+       .help = "Name of the dataset in URLs; by default the name of the file without its extension",
        .details = "1 to 64 letters, digits, `.`, `_` or `-`; not `.`, `..`, `datasets`, `viewer`, `livez`, `readyz` or "
                   "`metrics`. A DEM of the command line is named after its file; other characters become `-`",
        .codec = Text(&DatasetConfig::name, CheckDatasetName, NameSchema()),
@@ -37,17 +37,19 @@ const std::vector<Option<DatasetConfig>>& DatasetOptionTable() {
        .missing = "; every dataset needs one"},
       {.key = "vertical",
        .value = "DATUM",
-       .help = "What the heights count from: crs (as the source states), unknown, ellipsoid, egm96, egm2008, EPSG:N or "
-               "a grid",
+       .help =
+           "Vertical datum of the heights: crs (as the source states), unknown, ellipsoid, egm96, egm2008, EPSG:N or "
+           "the path of a grid",
        .details = "`EPSG:5703` is a vertical reference system. A grid of undulations is a path (`.gtx`, `.tif`), "
                   "relative to the folder of the file. [More](#heights)",
        .codec = VerticalCodec(),
        .other_words = "datum geoid"},
       {.key = "nodata",
        .value = "VALUE",
-       .help = "Voids: auto finds undeclared ones, declared trusts the source, a number is one more",
-       .details = "`auto` finds them beside those that the source declares. A number or a list of numbers (raw values) "
-                  "are voids beside the declared one. [More](#voids)",
+       .help = "Which samples are voids: auto (declared and detected nodata values), declared, or a number (one more)",
+       .details =
+           "`auto` detects undeclared values beside the declared one. A number or a list of numbers (raw values) "
+           "are voids beside the declared one. [More](#voids)",
        .codec = NodataCodec()},
       {.key = "attribution",
        .value = "TEXT",
@@ -63,7 +65,7 @@ const std::vector<Option<DatasetConfig>>& DatasetOptionTable() {
        .other_words = "max_error"},
       {.key = "finest_error",
        .value = "METRES",
-       .help = "Go as deep as needed for this default error; by default a tenth of the source's spacing",
+       .help = "Largest default error of the deepest level; by default a tenth of the source's spacing",
        .details = "The deepest level is the first whose default error is at most this. The spacing is that of the "
                   "finest source's samples",
        .codec = Number(&DatasetConfig::finest_error, 0.001, 100'000),
@@ -85,7 +87,7 @@ const std::vector<Option<DatasetConfig>>& DatasetOptionTable() {
        .other_words = "holes"},
       {.key = "feather",
        .value = "METRES",
-       .help = "Blend a source of a mosaic with what lies below it so far from its edges and voids; 0 is a hard edge",
+       .help = "Distance from edges and voids over which a source blends into the sources below; 0 is a hard edge",
        .details = "At most 256 of its samples. [More](#mosaics)",
        .codec = Number(&DatasetConfig::feather, 0, 1'000'000),
        .other_words = "blend blending"},
@@ -113,7 +115,7 @@ const std::vector<Option<DatasetConfig>>& DatasetOptionTable() {
                                                          {"meshopt", proto::GlbCompression::kMeshopt}})},
       {.key = "draco_speed",
        .value = "N",
-       .help = "Draco's effort for GLB tiles: 0 is smallest, 10 is fastest",
+       .help = "Speed of Draco for GLB tiles: 0 makes the smallest tiles, 10 is fastest",
        .details = "3 makes large tiles 8 % smaller for half as much encoding time again or more; 10 codes each "
                   "triangle by itself, and tiles are three times as large",
        .codec = Integer(&DatasetConfig::draco_speed, 0, 10)},
@@ -131,20 +133,20 @@ const std::vector<Option<DatasetConfig>>& DatasetOptionTable() {
        .codec = WaterCodec()},
       {.key = "imagery",
        .value = "FILE",
-       .help = "An image that the textures of GLB tiles are cut from",
+       .help = "Image that the textures of GLB tiles are cut from",
        .details = "In the file `{\"image\": \"photo.tif\"}`, relative to its folder; as a flag the path alone. "
                   "[More](#imagery)",
        .codec = ImageryCodec(),
        .other_words = "photo ortho orthophoto"},
       {.key = "public",
        .value = "true|false",
-       .help = "Seen without a token, where there are tokens",
+       .help = "Served without a token, where the server has tokens",
        .details = "[More](#tokens)",
        .codec = Switch(&DatasetConfig::is_public),
        .other_words = "open anonymous"},
       {.key = "metadata_availability",
        .value = "LEVELS",
-       .help = "Tiles of every so many levels tell which tiles are below them; 0: none do",
+       .help = "Interval of levels at which tiles list the tiles below them; 0 is none",
        .details = "With 0 `layer.json` alone tells clients. [More](#where-tiles-are)",
        .codec = Integer(&DatasetConfig::metadata_availability, 0, 24)},
   };

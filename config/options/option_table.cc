@@ -6,12 +6,6 @@
 
 namespace terrace::config {
 
-std::string FlagOf(std::string_view key) {
-  std::string flag = "--" + std::string(key);
-  std::replace(flag.begin(), flag.end(), '_', '-');
-  return flag;
-}
-
 template <typename Target>
 void ReadObject(const Json& object, const Place& place, const std::vector<Option<Target>>& table, Target& target) {
   if (!object.is_object())

@@ -39,9 +39,6 @@ std::vector<KnownName> KnownNames(const std::vector<Option<Target>>& table) {
 const std::vector<Option<Config>>& ServerOptionTable();
 const std::vector<Option<DatasetConfig>>& DatasetOptionTable();
 
-// "--cache-bytes" of "cache_bytes".
-std::string FlagOf(std::string_view key);
-
 // As JSON; empty: there is none.
 template <typename Target>
 std::string DefaultOf(const Option<Target>& option) {

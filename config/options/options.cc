@@ -31,6 +31,12 @@ void SetFromText(const std::vector<Option<Target>>& table, std::string_view key,
 
 }  // namespace
 
+std::string FlagOf(std::string_view key) {
+  std::string flag = "--" + std::string(key);
+  std::replace(flag.begin(), flag.end(), '_', '-');
+  return flag;
+}
+
 std::string OptionInfo::Flag() const { return FlagOf(key); }
 
 std::vector<OptionInfo> ServerOptions() { return Infos(ServerOptionTable()); }

@@ -10,6 +10,9 @@
 
 namespace terrace::config {
 
+// "--cache-bytes" of "cache_bytes".
+std::string FlagOf(std::string_view key);
+
 struct OptionInfo {
   std::string_view key;    // in the JSON file: "cache_bytes"
   std::string_view value;  // what stands for the value in help texts: "BYTES"

@@ -146,7 +146,7 @@ const std::vector<Option<Config>>& ServerOptionTable() {
       {.key = "cache_dir",
        .value = "DIR",
        .section = "listening",
-       .help = "Folder for statistics of sources, so that a second start needs no scan; empty is none",
+       .help = "Folder for statistics of sources, so that the next start needs no scan; by default none",
        .details = "It holds the ranges of sources, the errors of their averages and, of sources with more than 4096 x "
                   "4096 samples and no overviews, the averages that shallow tiles are made of: about 1.4 bytes for "
                   "each such sample, and 0.1 for each of smaller sources of at least 1024 x 1024 samples without "
@@ -205,7 +205,7 @@ const std::vector<Option<Config>>& ServerOptionTable() {
       {.key = "max_connections",
        .value = "N",
        .section = "load",
-       .help = "Connections at a time; above it one of the client that has most is closed",
+       .help = "Connections at a time; for one more, one of the client that has most is closed",
        .details = "A new one takes its place, idle ones going first. A new one of that client itself gets 503 with "
                   "`Retry-After` where it has none to give up; with `tls` it is closed during the handshake. Fewer "
                   "where [descriptors](operations.md#descriptors) are scarce",
@@ -213,7 +213,7 @@ const std::vector<Option<Config>>& ServerOptionTable() {
       {.key = "max_connections_per_client",
        .value = "N",
        .section = "load",
-       .help = "Connections of one client at a time; 0 is no limit of its own",
+       .help = "Connections of one client at a time; 0 is no limit",
        .details = "A client is an IPv4 address, or the /64 of an IPv6 address. More get 429; with `tls` they are "
                   "closed during the handshake. [Trusted proxies](#behind-a-proxy) do not count",
        .codec = Integer(&Config::max_connections_per_client, 0, 1'000'000)},
@@ -227,7 +227,7 @@ const std::vector<Option<Config>>& ServerOptionTable() {
       {.key = "requests_per_second",
        .value = "N",
        .section = "load",
-       .help = "Requests of one client or token in the long run; more wait, or get 429; 0 is any number",
+       .help = "Requests of one client or token a second, on average; more wait, or get 429; 0 is no limit",
        .details = "A request waits for its turn, and gets 429 with `Retry-After` where that comes after "
                   "`request_deadline_s`. `/livez` and `/readyz` do not count; all others do, also those that are "
                   "answered with 404 or 405",
@@ -255,7 +255,7 @@ const std::vector<Option<Config>>& ServerOptionTable() {
       {.key = "trusted_proxies",
        .value = "ADDRESS[,ADDRESS]",
        .section = "access",
-       .help = "Addresses and ranges of proxies whose word on the client counts",
+       .help = "Addresses and ranges of proxies that may state the client's address in a header",
        .details = "`[\"127.0.0.1\", \"10.0.0.0/8\"]`; as a flag with commas between them. [More](#behind-a-proxy)",
        .codec = ProxiesCodec(),
        .other_words = "proxy"},
@@ -309,12 +309,12 @@ const std::vector<Option<Config>>& ServerOptionTable() {
       {.key = "write_timeout_s",
        .value = "SECONDS",
        .section = "limits",
-       .help = "Time for which a client may take none of a response",
+       .help = "Time that a client may go without taking a byte of a response",
        .codec = Seconds(&Config::write_timeout, 0.1, 3600)},
       {.key = "min_read_rate",
        .value = "BYTES",
        .section = "limits",
-       .help = "Bytes a second that a client must take of a response or send of a body; 0 is any",
+       .help = "Bytes a second that a client must take of a response, or send of a body; 0 is no limit",
        .details = "Of a response counted from `write_timeout_s` on, of a body from `header_timeout_s` on",
        .codec = Integer(&Config::min_read_rate, 0, 1'000'000'000)},
       {.key = "drain_timeout_s",
@@ -326,7 +326,7 @@ const std::vector<Option<Config>>& ServerOptionTable() {
       {.key = "data_roots",
        .value = "DIR[,DIR]",
        .section = "sources",
-       .help = "Folders that hold every source; by default any folder may",
+       .help = "Folders that must hold every source; by default sources may lie anywhere",
        .details = "They hold every water mask, image and grid of undulations as well. A source must be a regular file; "
                   "symbolic links count where they lead. Relative to the folder of the file; as a flag with commas "
                   "between them",
@@ -342,14 +342,14 @@ const std::vector<Option<Config>>& ServerOptionTable() {
       {.key = "allowed_drivers",
        .value = "NAME[,NAME]",
        .section = "sources",
-       .help = "Formats that sources may have, by GDAL's short names",
-       .details = "`gdalinfo --formats` lists them. They replace the usual ones",
+       .help = "Formats that sources may have, by GDAL's short names; by default the usual ones",
+       .details = "`gdalinfo --formats` lists the names. Those given replace the usual ones",
        .codec = TextList(&Config::allowed_drivers, "a list of formats such as [\"GTiff\", \"VRT\"]", false),
        .other_words = "formats"},
       {.key = "watch",
        .value = "true|false",
        .section = "changes",
-       .help = "Take over changes of sources and of the configuration file while serving",
+       .help = "Follow changes of sources and of the configuration file while serving",
        .details = "They are looked at every second, and so are the files that globs stand for "
                   "([operations](operations.md#changing-data-and-configuration)). Without it SIGHUP does",
        .codec = Switch(&Config::watch),
@@ -374,7 +374,7 @@ const std::vector<Option<Config>>& ServerOptionTable() {
       {.key = "access_log",
        .value = "FORM",
        .section = "log",
-       .help = "Form of the access log: log (lines of the log), combined, json or off",
+       .help = "Form of the access log: log (lines among those of the log), combined, json or off",
        .details = "`combined` is the form of Apache and nginx; `json` is one object a line "
                   "([operations](operations.md#logs))",
        .codec = Choice(&Config::access_log, {{"log", AccessLogForm::kLog},

@@ -11,6 +11,7 @@
 
 #include "engine/dem/gdal/source_policy.h"
 #include "server/cli/common/command.h"
+#include "server/cli/common/help_format.h"
 #include "server/cli/common/usage_error.h"
 
 namespace terrace::cli {
@@ -26,11 +27,13 @@ int ReportUsage(const CLI::App& program, const CLI::ParseError& error, const std
 
 int Run(int argc, char** argv) {
   CLI::App app{"Terrain from elevation models, meshed on demand at the error a client asks for.", "terrace"};
+  SetHelpFormat(app);
   app.footer(
+      "'terrace COMMAND --help' lists the options of a command.\n\n"
       "Examples:\n"
       "  terrace serve alps.tif                               tiles and a viewer at http://127.0.0.1:8080/\n"
       "  terrace mesh alps.tif --out alps.obj --max-error 5   one mesh of the whole raster\n"
-      "  terrace info alps.tif                                what a raster holds and how deep it can be served");
+      "  terrace info alps.tif                                the raster, and the levels that it can serve");
   app.set_version_flag("--version", "terrace " TERRACE_VERSION);
   app.require_subcommand(1);
   int exit_code = kExitOk;
@@ -50,7 +53,8 @@ int Run(int argc, char** argv) {
   try {
     app.parse(std::move(reversed));
   } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
+    const bool is_help = error.get_exit_code() == 0;  // or --version
+    if (is_help && !HasUnknownCommand(app, arguments)) return app.exit(error);
     return ReportUsage(app, error, arguments);
   }
   return exit_code;

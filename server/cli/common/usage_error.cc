@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <map>
 #include <string_view>
 
@@ -93,7 +94,27 @@ std::string ExplainFlag(const CLI::App& command, const CLI::App& program, const 
   return unknown + DidYouMean(elsewhere);
 }
 
+// "-5" is a number.
+bool IsFlag(const std::string& word) {
+  return word.size() > 1 && word.front() == '-' && (word[1] < '0' || word[1] > '9') && word[1] != '.';
+}
+
+// "--listen: 1 required HOST:PORT missing", "--listen: At Most 1 required but received 2"
+std::string ExplainMismatch(const CLI::App& command, const std::string& what) {
+  const std::string flag = what.substr(0, what.find(':'));
+  const CLI::Option* const option = command.get_option_no_throw(flag);
+  if (option == nullptr) return what;
+  if (what.find("received") != std::string::npos) return flag + " is given more than once";
+  return fmt::format("{} needs a value: {}", flag, WithValue(*option, flag));
+}
+
 }  // namespace
+
+bool HasUnknownCommand(const CLI::App& program, const std::vector<std::string>& arguments) {
+  if (arguments.empty() || arguments.front().starts_with('-')) return false;
+  return std::ranges::none_of(program.get_subcommands({}),
+                              [&](const CLI::App* command) { return command->get_name() == arguments.front(); });
+}
 
 std::string ExplainUsage(const CLI::App& program, const CLI::ParseError& error,
                          const std::vector<std::string>& arguments) {
@@ -102,16 +123,20 @@ std::string ExplainUsage(const CLI::App& program, const CLI::ParseError& error,
   const auto explain = [&](const CLI::App& parsed_by, const std::string& word) {
     return ExplainFlag(parsed_by, program, word.substr(0, word.find('=')));
   };
+  if (HasUnknownCommand(program, arguments)) return ExplainCommand(program, arguments.front());
   if (dynamic_cast<const CLI::RequiredError*>(&error) != nullptr && chosen.empty()) {
-    const std::string& word = arguments.front();
-    return word.starts_with('-') ? explain(program, word) : ExplainCommand(program, word);
+    return explain(program, arguments.front());
   }
   // A mistyped option often lacks as well.
   for (const CLI::App* parsed_by : {&program, &command}) {
     for (const std::string& word : parsed_by->remaining()) {
-      if (word.starts_with("--")) return explain(*parsed_by, word);
+      if (IsFlag(word)) return explain(*parsed_by, word);
     }
   }
+  if (const std::vector<std::string> words = command.remaining(); !words.empty()) {
+    return fmt::format("{} is one argument too many", words.front());
+  }
+  if (dynamic_cast<const CLI::ArgumentMismatch*>(&error) != nullptr) return ExplainMismatch(command, error.what());
   const std::string what = error.what();
   // "Could not convert: --flag = value"
   if (dynamic_cast<const CLI::ConversionError*>(&error) != nullptr) return what.substr(0, what.find(" = "));

@@ -232,26 +232,28 @@ int Info(const InfoArguments& arguments) {
 void AddInfo(CLI::App& app, int& exit_code) {
   auto arguments = std::make_shared<InfoArguments>();
   CLI::App* command =
-      app.add_subcommand("info", "Tells what rasters hold, the levels they can serve, and what to mend");
+      app.add_subcommand("info", "Describes rasters, the levels they can serve, and what to improve")->group(kCommands);
   command->footer(
       "Examples:\n"
       "  terrace info alps.tif andes.tif\n"
       "  terrace info alps.tif --json\n"
       "  terrace info --mosaic lidar/ base.tif\n\n"
-      "A raster that cannot be served is told on stderr with the reason and the remedy; the others are\n"
-      "still shown, but for those of the same folder or mosaic: with it none of them can be served.");
+      "A raster that cannot be served is reported on stderr, with the reason and the remedy, and the others\n"
+      "are described. A folder or a mosaic with such a raster in it is not described at all: as a dataset\n"
+      "it could not be served.");
   command->add_option("DEM", arguments->dems, "Rasters that GDAL can read, or folders of them")->required();
-  command->add_flag("--json", arguments->json, "One JSON array instead of text");
-  command->add_flag("--mosaic", arguments->mosaic, "Takes all of them for one dataset, the first counting most");
+  command->add_flag("--json", arguments->json, "Prints one JSON array instead of text");
+  command->add_flag("--mosaic", arguments->mosaic,
+                    "Describes all DEMs as one dataset; where they overlap, the first that has a height counts");
   std::vector<config::OptionInfo> about_heights = config::DatasetOptions();  // the others are about serving
   about_heights.erase(
       std::remove_if(about_heights.begin(), about_heights.end(),
                      [](const auto& option) { return option.key != "vertical" && option.key != "nodata"; }),
       about_heights.end());
-  AddFlags(*command, about_heights, "Heights, as in a configuration", arguments->dataset_flags);
+  AddFlags(*command, about_heights, "Heights, as for terrace serve", arguments->dataset_flags);
   command
       ->add_option("--cache-dir", arguments->cache_dir,
-                   "Keeps what is learnt in this folder, for 'terrace serve --cache-dir'")
+                   "Folder to keep statistics of the rasters in, for 'terrace serve --cache-dir'")
       ->type_name("DIR");
   command->callback([arguments, &exit_code] { exit_code = FinishOutput(Info(*arguments)); });
 }

@@ -119,8 +119,8 @@ std::vector<std::string> AdviceFor(const dem::DemInfo& info) {
 }  // namespace
 
 std::string TextOfBounds(const dem::GeoBounds& bounds) {
-  return fmt::format("west {}, south {}, east {}, north {}", PlainNumber(bounds.west), PlainNumber(bounds.south),
-                     PlainNumber(bounds.east), PlainNumber(bounds.north));
+  return fmt::format("west {}, south {}, east {}, north {}", PlainNumber(bounds.west, 9), PlainNumber(bounds.south, 9),
+                     PlainNumber(bounds.east, 9), PlainNumber(bounds.north, 9));
 }
 
 void PrintMosaic(const std::string& name, const dem::DemInfo& info) {

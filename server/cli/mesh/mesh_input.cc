@@ -27,8 +27,10 @@ void AddNodataOption(CLI::App& command, std::string& nodata) {
                : fmt::format("must be auto, declared or a number, not \"{}\"", text);
   };
   command
-      .add_option("--nodata", nodata,
-                  "Voids: auto finds undeclared ones, declared trusts the raster, a number is one more")
+      .add_option(
+          "--nodata", nodata,
+          "Which samples are voids: auto: declared and detected nodata values; declared: declared ones alone; a "
+          "number: declared ones and this value")
       ->check(CLI::Validator(check, ""))
       ->type_name("VALUE")
       ->capture_default_str();
