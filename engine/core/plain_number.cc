@@ -9,12 +9,10 @@
 namespace terrace {
 namespace {
 
-constexpr int kMaxDecimals = 20;
-
 int DecimalsFor(double value, int digits) {
   if (value == 0 || !std::isfinite(value)) return 0;
   const int exponent = static_cast<int>(std::floor(std::log10(std::abs(value))));
-  return std::clamp(digits - 1 - exponent, 0, kMaxDecimals);
+  return std::max(digits - 1 - exponent, 0);
 }
 
 std::string WithDecimals(double value, int decimals) {

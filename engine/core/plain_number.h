@@ -5,8 +5,8 @@
 
 namespace terrace {
 
-// So many significant digits behind the point, all before it, and no zeros at the end: with six digits "0.000277778",
-// "12.5", "1000000". What is nearer to 0 than half of 1e-20 is "0".
+// So many significant digits, but all of those before the point, and no zeros at the end: with six digits
+// "0.000277778", "12.5", "1234567".
 std::string PlainNumber(double value, int digits = 6);
 
 // The same, never below `value`: for bounds that have to hold as they are printed.

@@ -47,7 +47,7 @@ std::optional<double> NumberOf(std::string_view text) { return FiniteNumber(Trim
 
 tl::unexpected<Error> TooManyPoints(const char* parameter, std::size_t max_locations) {
   return MakeError(ErrorCode::kInvalidArgument,
-                   "{}: more points than max_locations of this server ({}); ask for fewer at once", parameter,
+                   "{}: more than {} points, which is max_locations of this server; ask for fewer at once", parameter,
                    max_locations);
 }
 

@@ -27,7 +27,7 @@ TEST(PlainNumber, HasSoManySignificantDigitsAndNoZerosAtTheEnd) {
   EXPECT_EQ(PlainNumber(99.96, 3), "100");
   EXPECT_EQ(PlainNumber(0), "0");
   EXPECT_EQ(PlainNumber(-0.0), "0");
-  EXPECT_EQ(PlainNumber(-1e-30), "0");
+  EXPECT_EQ(PlainNumber(-1e-30), "-0.000000000000000000000000000001");
   EXPECT_EQ(PlainNumber(std::nan("")), "nan");
 }
 
