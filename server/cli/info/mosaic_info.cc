@@ -34,6 +34,7 @@ bool Covers(const dem::GeoBounds& outer, const dem::GeoBounds& inner) {
 }
 
 std::string Sources(std::ptrdiff_t count) { return fmt::format("{} source{}", count, count == 1 ? "" : "s"); }
+std::string SourcesLie(std::ptrdiff_t count) { return Sources(count) + (count == 1 ? " lies" : " lie"); }
 
 // Sources by their bounds.
 class BoundsIndex {
@@ -91,13 +92,13 @@ std::vector<std::string> AdviceFor(const dem::DemInfo& info) {
   std::vector<std::string> advice;
   if (const std::ptrdiff_t hidden = CountHidden(info.sources); hidden > 0) {
     advice.push_back(fmt::format(
-        "{} {} within the bounds of a coarser one that comes first, and {} where that has voids alone: name finer ones "
-        "first",
-        Sources(hidden), hidden == 1 ? "lies" : "lie", hidden == 1 ? "shows" : "show"));
+        "{} within the bounds of a coarser one that comes before, and finer heights show only in its voids: name finer "
+        "sources first",
+        SourcesLie(hidden)));
   }
   if (large > 0) {
     advice.push_back(fmt::format(
-        "large and without overviews: {}, all of which shallow tiles read; run 'gdaladdo -r average' on each",
+        "large and without overviews: {}; shallow tiles read all of their samples: run 'gdaladdo -r average' on each",
         Sources(large)));
   }
   if (no_datum > 0) {
@@ -134,7 +135,8 @@ void PrintMosaic(const std::string& name, const dem::DemInfo& info) {
                          PlainNumber(source.spacing_m, 3), source.crs));
   }
   if (info.sources.size() > kMaxListed) line("", fmt::format("and {} more", info.sources.size() - kMaxListed));
-  line("overlaps", fmt::format("under one before them, in part at least: {}", Sources(CountOverlapped(info.sources))));
+  line("overlaps",
+       fmt::format("{} at least partly under one that comes before", SourcesLie(CountOverlapped(info.sources))));
   line("bounds", TextOfBounds(info.bounds));
   line("heights", fmt::format("{} to {} m", PlainNumber(info.heights.min), PlainNumber(info.heights.max)));
   line("floor", fmt::format("{} m where no source has a height", PlainNumber(info.floor)));

@@ -65,7 +65,8 @@ void WarnAbout(const std::string& path, const dem::RasterHeights& raster, const 
   }
   if (!raster.found_voids.empty()) {
     fmt::print(stderr,
-               "terrace: {}: undeclared voids, which are no samples: {}; --nodata declared takes them for heights\n",
+               "terrace: {}: samples taken for voids, though the file does not declare them: {}; --nodata declared "
+               "takes them for heights\n",
                path, raster.found_voids);
   }
   if (!raster.picture_part.empty()) {

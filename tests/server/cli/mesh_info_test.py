@@ -304,7 +304,7 @@ class Mesh(InFolder):
         dem = self.write("dem.asc", grid(heights, "xllcorner 100\nyllcorner 200\ncellsize 2"))
         out = self.folder / "dem.obj"
         found = run("mesh", dem, "-o", out, "--max-error", 1)
-        self.assertIn("undeclared voids, which are no samples: 20 samples of -9999; --nodata declared", found.stderr)
+        self.assertIn("samples taken for voids, though the file does not declare them: 20 samples of -9999; --nodata declared", found.stderr)
         self.assertIn("and across 20 voids;", found.stdout)
         self.assertGreaterEqual(min(z for _, _, z in read_obj(out)[0]), 500)
         for nodata, least in (("declared", -9999), ("500", -9999), ("-9999", 500)):
@@ -410,7 +410,7 @@ class InfoOfFiles(InFolder):
 
     def test_a_coarse_source_before_a_fine_one_is_told(self):
         fine, coarse = self.place("fine", 10, 0.01), self.place("coarse", 9, 0.1)
-        told = "1 source lies within the bounds of a coarser one that comes first, and shows where that has voids alone"
+        told = "1 source lies within the bounds of a coarser one that comes before, and finer heights show only in its voids"
         self.assertIn(told, run("info", "--mosaic", coarse, fine).stdout)
         self.assertNotIn("within the bounds", run("info", "--mosaic", fine, coarse).stdout)
 
@@ -422,7 +422,7 @@ class InfoOfFiles(InFolder):
         result = run("info", self.folder)
         self.assertEqual((result.returncode, result.stderr), (0, ""))
         for part in (f"{self.folder}\n", "3, in the order in which they count",
-                     "under one before them, in part at least: 1 source\n", "west 9,", "east 13,", "with voids: 1 source; small ones"):
+                     "1 source lies at least partly under one that comes before\n", "west 9,", "east 13,", "with voids: 1 source; small ones"):
             self.assertIn(part, result.stdout)
         self.assertLess(result.stdout.index("a.asc"), result.stdout.index("b.asc"))
         self.assertLess(result.stdout.index("b.asc"), result.stdout.index("coarse.asc"))
