@@ -172,10 +172,11 @@ class Server::Impl {
     io_.Stop();
     metrics_page_.Stop();
     tiles_.Shutdown();
+    const char* const stopped = application_.opening() ? "stopped before any dataset was served" : "stopped";
     if (drained) {
-      spdlog::info("stopped; no request is left unanswered");
+      spdlog::info("{}; no request is left unanswered", stopped);
     } else {
-      spdlog::warn("stopped: some requests were not answered within the drain timeout of {} s",
+      spdlog::warn("{}; some requests were not answered within the drain timeout of {} s", stopped,
                    std::chrono::duration<double>(options_.config.drain_timeout).count());
     }
     return drained;
@@ -198,7 +199,7 @@ class Server::Impl {
       if (const auto known = options_.on_signal.find(signal); known != options_.on_signal.end()) {
         known->second();
       } else {
-        spdlog::info("stopping: signal {}; a second one ends the server at once", signal);
+        spdlog::info("stopping: {}; a second one ends the server at once", signal == SIGINT ? "SIGINT" : "SIGTERM");
         for (const int end : {SIGINT, SIGTERM}) {
           signals_.remove(end);
           std::signal(end, [](int) { ::_exit(1); });

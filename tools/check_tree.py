@@ -37,6 +37,8 @@ RULES += [(re.compile(pattern), f"is a word of our own: the field says {word}") 
     (r"\bforeto" r"ld\b|\bforete" r"ll", "predicted"),
     (r"\b(?:GoO" r"n|She" r"d|HoldBa" r"ck|Loo" r"ker|Stra" r"y|Count" r"ing::)\b", "what it is"),
 )]
+# Of the product's own code; headers and documents of proto state numbers as JSON does.
+EXPONENT = re.compile(r"^(?!proto/|tests/).*\.(?:cc|h)$"), re.compile(r"\{\w*:[^{}\" ]*[eg]\}")
 
 
 def files():
@@ -57,6 +59,8 @@ def findings(name, text):
         for pattern, message in RULES:
             if match := pattern.search(line):
                 yield f"{name}:{number}: '{match[0].strip()}' {message}"
+        if EXPONENT[0].match(name) and (match := EXPONENT[1].search(line)):
+            yield f"{name}:{number}: '{match[0]}' prints exponents such as 1e+06: use PlainNumber"
     if name.endswith("-inl.h"):  # included once for each set of instructions
         if "HWY_TARGET_TOGGLE" not in text:
             yield f"{name}:1: a header of instruction sets without the guard of HWY_TARGET_TOGGLE"
@@ -72,6 +76,8 @@ class SelfTest(unittest.TestCase):
                      "// TO" "DO: later\n", "blank \n", "no line feed"):
             with self.subTest(text=text):
                 self.assertEqual(len(list(findings("a.cc", text))), 1)
+        for text in ('Format("{:.3g} m", error_m);\n', 'Format("{0:g}", x);\n'):
+            self.assertEqual([len(list(findings(name, text))) for name in ("server/a.cc", "proto/a.cc", "a.md")], [1, 0, 0], text)
         self.assertEqual(len(list(findings("a.h", "int a;\n"))), 1)
         self.assertEqual(len(list(findings("a-inl.h", "#pragma once\n"))), 1)
 

@@ -9,12 +9,21 @@ namespace terrace::config {
 namespace {
 
 std::string Fold(std::string_view name) {
-  std::string folded(name);
+  std::string folded(name.substr(std::min(name.find_first_not_of("-_"), name.size())));
   for (char& c : folded) {
     if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
     if (c == '-') c = '_';
   }
   return folded;
+}
+
+bool HasWord(std::string_view words, std::string_view word) {
+  while (!words.empty()) {
+    const std::size_t end = std::min(words.find(' '), words.size());
+    if (words.substr(0, end) == word) return true;
+    words.remove_prefix(std::min(end + 1, words.size()));
+  }
+  return false;
 }
 
 // Optimal string alignment: insertions, deletions, substitutions and swaps of neighbours count one each.
@@ -43,27 +52,57 @@ bool HasPart(std::string_view name, std::string_view word) {
   return (at == 0 || name[at - 1] == '_') && (end == name.size() || name[end] == '_');
 }
 
-}  // namespace
-
-std::string_view NearestName(std::string_view word, std::span<const std::string_view> candidates) {
-  constexpr std::size_t kLongestWord =
-      64;  // nothing that people mistype is longer, and the distance takes quadratic time
-  if (word.size() > kLongestWord) return {};
-  const std::string folded = Fold(word);
-  std::string_view nearest;
-  std::size_t smallest = kLongestWord;
-  for (const std::string_view candidate : candidates) {
-    const std::size_t distance = EditDistance(folded, Fold(candidate));
-    const std::size_t limit = std::max<std::size_t>(1, std::max(word.size(), candidate.size()) / 3);
+// The first of those with the smallest distance that is small enough.
+std::vector<std::string_view> ByDistance(const std::string& word, std::span<const KnownName> known) {
+  std::vector<std::string_view> nearest;
+  std::size_t smallest = word.size() + 1;
+  for (const KnownName& candidate : known) {
+    const std::string name = Fold(candidate.name);
+    const std::size_t distance = EditDistance(word, name);
+    const std::size_t limit = std::max<std::size_t>(1, std::max(word.size(), name.size()) / 3);
     if (distance > limit || distance >= smallest) continue;
     smallest = distance;
-    nearest = candidate;
+    nearest = {candidate.name};
   }
-  if (!nearest.empty()) return nearest;
-  const std::string_view part = std::string_view(folded).substr(std::min(folded.find_first_not_of('_'), folded.size()));
-  const auto has_part = [&](std::string_view candidate) { return HasPart(Fold(candidate), part); };
-  if (std::ranges::count_if(candidates, has_part) != 1) return {};
-  return *std::ranges::find_if(candidates, has_part);
+  return nearest;
+}
+
+}  // namespace
+
+std::vector<std::string_view> NearestNames(std::string_view word, std::span<const KnownName> known) {
+  constexpr std::size_t kMaxNames = 4, kMinBeginning = 3, kMaxRest = 8;
+  // Nothing that people mistype is longer, and the distance takes quadratic time.
+  constexpr std::size_t kLongestWord = 64;
+  const std::string folded = word.size() > kLongestWord ? "" : Fold(word);
+  if (folded.empty()) return {};
+  const auto where = [&](auto&& fits) {
+    std::vector<std::string_view> names;
+    for (const KnownName& candidate : known) {
+      if (fits(candidate)) names.push_back(candidate.name);
+    }
+    return names;
+  };
+  std::vector<std::string_view> names =
+      where([&](const KnownName& candidate) { return HasWord(candidate.other_words, folded); });
+  if (names.empty()) names = ByDistance(folded, known);
+  if (names.empty()) {
+    names = where([&](const KnownName& candidate) {
+      const std::string name = Fold(candidate.name);
+      const bool is_beginning = folded.starts_with(name) && name.size() >= kMinBeginning;
+      return HasPart(name, folded) || (is_beginning && folded.size() - name.size() <= kMaxRest);
+    });
+  }
+  return names.size() > kMaxNames ? std::vector<std::string_view>() : names;
+}
+
+bool IsSameName(std::string_view a, std::string_view b) { return Fold(a) == Fold(b); }
+
+std::string Alternatives(std::span<const std::string> names) {
+  std::string text;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    text += (i == 0 ? "" : i + 1 == names.size() ? " or " : ", ") + names[i];
+  }
+  return text;
 }
 
 }  // namespace terrace::config

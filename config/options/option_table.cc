@@ -2,15 +2,9 @@
 
 #include <algorithm>
 
-#include "config/common/nearest_name.h"
+#include "config/options/unknown_key.h"
 
 namespace terrace::config {
-
-std::string FlagOf(std::string_view key) {
-  std::string flag = "--" + std::string(key);
-  std::replace(flag.begin(), flag.end(), '_', '-');
-  return flag;
-}
 
 template <typename Target>
 void ReadObject(const Json& object, const Place& place, const std::vector<Option<Target>>& table, Target& target) {
@@ -27,11 +21,10 @@ void ReadObject(const Json& object, const Place& place, const std::vector<Option
       table[static_cast<std::size_t>(found - keys.begin())].codec.read(value, place.At(key), target);
       continue;
     }
-    const std::string_view nearest = NearestName(key, keys);
-    if (nearest.empty()) {
+    if (const std::string problem = ExplainKey(key, KnownNames(table)); problem.empty()) {
       place.Fail(fmt::format("key {} of this object is unknown; known are {}", number, fmt::join(keys, ", ")));
     } else {
-      place.At(key).Fail(fmt::format("unknown key; did you mean \"{}\"?", nearest));
+      place.At(key).Fail(problem);
     }
   }
   for (const Option<Target>& option : table) {

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "config/common/nearest_name.h"
 #include "config/config.h"
 #include "config/options/option_codec.h"
 
@@ -23,15 +24,20 @@ struct Option {
   std::string_view help;          // one line without a final stop: --help, the schema, and the reference begin with it
   std::string_view details = {};  // Markdown that the reference adds to it, without a final stop
   Codec<Target> codec;
-  std::string_view missing = {};  // of a key that every object needs: what follows `"key" is missing` in the error
-  bool is_live = false;           // a change takes no restart; of options at the top of the file alone
+  std::string_view other_words = {};  // what others call it, for "did you mean": "port host"
+  std::string_view missing = {};      // of a key that every object needs: what follows `"key" is missing` in the error
+  bool is_live = false;               // a change takes no restart; of options at the top of the file alone
 };
+
+template <typename Target>
+std::vector<KnownName> KnownNames(const std::vector<Option<Target>>& table) {
+  std::vector<KnownName> names;
+  for (const Option<Target>& option : table) names.push_back({option.key, option.other_words});
+  return names;
+}
 
 const std::vector<Option<Config>>& ServerOptionTable();
 const std::vector<Option<DatasetConfig>>& DatasetOptionTable();
-
-// "--cache-bytes" of "cache_bytes".
-std::string FlagOf(std::string_view key);
 
 // As JSON; empty: there is none.
 template <typename Target>
@@ -41,7 +47,7 @@ std::string DefaultOf(const Option<Target>& option) {
 }
 
 // Reads every key of `object` by the table. Missing keys that every object needs are errors, and so are unknown ones:
-// these are told by their number, and by their name where that resembles a known one.
+// these are told by their number, and by their name where that resembles a known one, of this object or of another.
 template <typename Target>
 void ReadObject(const Json& object, const Place& place, const std::vector<Option<Target>>& table, Target& target);
 

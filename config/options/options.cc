@@ -12,7 +12,8 @@ template <typename Target>
 std::vector<OptionInfo> Infos(const std::vector<Option<Target>>& table) {
   std::vector<OptionInfo> infos;
   for (const Option<Target>& option : table) {
-    infos.push_back({option.key, option.value, option.help, option.codec.from_text != nullptr, DefaultOf(option)});
+    infos.push_back({option.key, option.value, option.help, option.codec.from_text != nullptr, DefaultOf(option),
+                     option.other_words});
   }
   return infos;
 }
@@ -29,6 +30,12 @@ void SetFromText(const std::vector<Option<Target>>& table, std::string_view key,
 }
 
 }  // namespace
+
+std::string FlagOf(std::string_view key) {
+  std::string flag = "--" + std::string(key);
+  std::replace(flag.begin(), flag.end(), '_', '-');
+  return flag;
+}
 
 std::string OptionInfo::Flag() const { return FlagOf(key); }
 

@@ -10,12 +10,16 @@
 
 namespace terrace::config {
 
+// "--cache-bytes" of "cache_bytes".
+std::string FlagOf(std::string_view key);
+
 struct OptionInfo {
   std::string_view key;    // in the JSON file: "cache_bytes"
   std::string_view value;  // what stands for the value in help texts: "BYTES"
   std::string_view help;   // one line
   bool has_flag = false;
-  std::string default_value;  // as JSON; empty: there is none
+  std::string default_value;          // as JSON; empty: there is none
+  std::string_view other_words = {};  // what others call it (config/common/nearest_name.h)
 
   // "--cache-bytes"
   std::string Flag() const;

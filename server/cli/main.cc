@@ -6,72 +6,34 @@
 #include <cstdio>
 #include <exception>
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
-#include "config/common/nearest_name.h"
 #include "engine/dem/gdal/source_policy.h"
 #include "server/cli/common/command.h"
+#include "server/cli/common/help_format.h"
+#include "server/cli/common/usage_error.h"
 
 namespace terrace::cli {
 namespace {
 
-std::string DidYouMean(std::string_view word, const std::vector<std::string>& known) {
-  const std::vector<std::string_view> candidates(known.begin(), known.end());
-  const std::string_view nearest = config::NearestName(word, candidates);
-  return nearest.empty() ? std::string() : "; did you mean " + std::string(nearest) + "?";
-}
-
-std::vector<std::string> CommandNames(const CLI::App& app) {
-  std::vector<std::string> names;
-  for (const CLI::App* command : app.get_subcommands({})) names.push_back(command->get_name());
-  return names;
-}
-
-std::vector<std::string> FlagNames(const CLI::App& app) {
-  std::vector<std::string> names;
-  for (const CLI::Option* option : app.get_options()) {
-    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
-  }
-  return names;
-}
-
-// What is wrong with the arguments that `error` stands for. `app` is the chosen command, or the program without one.
-std::string Explain(const CLI::App& app, const CLI::ParseError& error, const std::vector<std::string>& arguments) {
-  if (dynamic_cast<const CLI::RequiredError*>(&error) != nullptr && !CommandNames(app).empty()) {
-    const std::string& word = arguments.front();
-    if (word.starts_with('-')) return "unknown option " + word + DidYouMean(word, FlagNames(app));
-    return "unknown command " + word + DidYouMean(word, CommandNames(app));
-  }
-  // A mistyped option often lacks as well: say what was typed, not what is missing.
-  for (const std::string& word : app.remaining(/*recurse=*/true)) {
-    if (!word.starts_with("--")) continue;
-    const std::string flag = word.substr(0, word.find('='));
-    return "unknown option " + flag + DidYouMean(flag, FlagNames(app));
-  }
-  const std::string what = error.what();
-  // "Could not convert: --flag = value": a secret may stand there by mistake.
-  if (dynamic_cast<const CLI::ConversionError*>(&error) != nullptr) return what.substr(0, what.find(" = "));
-  return what;
-}
-
-int ReportUsage(const CLI::App& app, const CLI::ParseError& error, const std::vector<std::string>& arguments) {
-  const std::vector<CLI::App*> chosen = app.get_subcommands();
-  const CLI::App& command = chosen.empty() ? app : *chosen.front();
-  const std::string name = chosen.empty() ? "" : command.get_name() + ' ';
+int ReportUsage(const CLI::App& program, const CLI::ParseError& error, const std::vector<std::string>& arguments) {
+  const std::vector<CLI::App*> chosen = program.get_subcommands();
+  const std::string name = chosen.empty() ? "" : chosen.front()->get_name() + ' ';
   std::fprintf(stderr, "terrace: %s\nRun 'terrace %s--help' for what is accepted.\n",
-               Explain(command, error, arguments).c_str(), name.c_str());
+               ExplainUsage(program, error, arguments).c_str(), name.c_str());
   return kExitUsage;
 }
 
 int Run(int argc, char** argv) {
   CLI::App app{"Terrain from elevation models, meshed on demand at the error a client asks for.", "terrace"};
+  SetHelpFormat(app);
   app.footer(
+      "'terrace COMMAND --help' lists the options of a command.\n\n"
       "Examples:\n"
       "  terrace serve alps.tif                               tiles and a viewer at http://127.0.0.1:8080/\n"
       "  terrace mesh alps.tif --out alps.obj --max-error 5   one mesh of the whole raster\n"
-      "  terrace info alps.tif                                what a raster holds and how deep it can be served");
+      "  terrace info alps.tif                                the raster, and the levels that it can serve");
   app.set_version_flag("--version", "terrace " TERRACE_VERSION);
   app.require_subcommand(1);
   int exit_code = kExitOk;
@@ -91,7 +53,8 @@ int Run(int argc, char** argv) {
   try {
     app.parse(std::move(reversed));
   } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
+    const bool is_help = error.get_exit_code() == 0;  // or --version
+    if (is_help && !HasUnknownCommand(app, arguments)) return app.exit(error);
     return ReportUsage(app, error, arguments);
   }
   return exit_code;

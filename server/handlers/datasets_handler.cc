@@ -51,12 +51,14 @@ std::string DatasetsJson(std::span<const DatasetView> datasets, const IsSeen& is
   Json list = Json::array();
   for (const DatasetView& dataset : datasets) {
     if (stop.stop_requested()) return {};
-    if (!is_seen(dataset)) continue;
+    if (is_seen && !is_seen(dataset)) continue;
     const std::string base = fmt::format("/{}", PercentEncode(dataset.name));
     Json entry;
     entry["name"] = dataset.name;
     entry["attribution"] = dataset.attribution;
     entry["bounds"] = {dataset.west, dataset.south, dataset.east, dataset.north};
+    const dem::GeoBounds finest = FinestBounds(dataset);
+    entry["finest_bounds"] = {finest.west, finest.south, finest.east, finest.north};
     entry["sources"] = dataset.sources;
     entry["min_level"] = 0;
     entry["max_level"] = dataset.max_level();
@@ -72,6 +74,7 @@ std::string DatasetsJson(std::span<const DatasetView> datasets, const IsSeen& is
   }
   Json document;
   document["datasets"] = std::move(list);
+  if (is_seen) document["more_with_token"] = true;
   // An attribution is the operator's text: bytes that are not UTF-8 must not take the whole list away.
   return document.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
@@ -80,7 +83,7 @@ std::string IndexHtml(std::span<const DatasetView> datasets, const IsSeen& is_se
   std::string items;
   for (const DatasetView& dataset : datasets) {
     if (stop.stop_requested()) return {};
-    if (!is_seen(dataset)) continue;
+    if (is_seen && !is_seen(dataset)) continue;
     fmt::format_to(std::back_inserter(items),
                    "<li>{1}: <a href=\"/{0}/layer.json\">layer.json</a>, "
                    "<a href=\"/{0}/tileset.json\">tileset.json</a>, <a href=\"/{0}/tiles.json\">tiles.json</a></li>\n",

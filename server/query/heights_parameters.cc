@@ -47,7 +47,8 @@ std::optional<double> NumberOf(std::string_view text) { return FiniteNumber(Trim
 
 tl::unexpected<Error> TooManyPoints(const char* parameter, std::size_t max_locations) {
   return MakeError(ErrorCode::kInvalidArgument,
-                   "{}: more than {} points, which is the most this server answers at once", parameter, max_locations);
+                   "{}: more than {} points, which is max_locations of this server; ask for fewer at once", parameter,
+                   max_locations);
 }
 
 Result<void> HeightsParameters::AddToName(std::string_view part) {

@@ -4,6 +4,7 @@
 #include <string>
 #include <utility>
 
+#include "engine/core/plain_number.h"
 #include "engine/dem/crs/geodesic_path.h"
 #include "engine/geo/tile_key.h"
 #include "server/http/text.h"
@@ -39,10 +40,11 @@ Result<std::vector<dem::PathPoint>> Along(const dem::GeodesicPath& path, const H
     const std::optional<double> step_m = NumberOf(*step);
     if (!step_m || *step_m <= 0) return MakeError(ErrorCode::kInvalidArgument, "step must be a finite number above 0");
     if (path.StepCount(*step_m) > static_cast<double>(max_locations)) {
-      return MakeError(ErrorCode::kInvalidArgument,
-                       "path: {:.0f} m in steps of {} m are more than {} points, which is the most this server answers "
-                       "at once",
-                       path.length_m(), *step_m, max_locations);
+      return MakeError(
+          ErrorCode::kInvalidArgument,
+          "path: {:.0f} m in steps of {} m have more than {} points, which is max_locations of this server; "
+          "ask for a longer step or a shorter path",
+          path.length_m(), PlainNumber(*step_m), max_locations);
     }
     return path.Walk(*step_m);
   }

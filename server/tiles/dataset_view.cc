@@ -6,6 +6,75 @@
 
 namespace terrace::server {
 
+namespace {
+
+// Columns count on beyond the last one, or from below 0.
+bool Touches(const geo::TileRange& a, const geo::TileRange& b) {
+  return a.start_x <= b.end_x + 1 && b.start_x <= a.end_x + 1 && a.start_y <= b.end_y + 1 && b.start_y <= a.end_y + 1;
+}
+
+geo::TileRange Union(const geo::TileRange& a, const geo::TileRange& b) {
+  return {std::min(a.start_x, b.start_x), std::min(a.start_y, b.start_y), std::max(a.end_x, b.end_x),
+          std::max(a.end_y, b.end_y)};
+}
+
+// Grows `box` by the ranges that touch it, all around the Earth.
+geo::TileRange Grown(geo::TileRange box, const std::vector<geo::TileRange>& ranges, std::int64_t columns) {
+  constexpr int kMaxPasses = 8;  // ranges are sorted: further ones would hardly find any more
+  for (int pass = 0; pass < kMaxPasses; ++pass) {
+    const geo::TileRange before = box;
+    for (const geo::TileRange& range : ranges) {
+      for (const std::int64_t turn : {-columns, std::int64_t{0}, columns}) {
+        const geo::TileRange turned{range.start_x + turn, range.start_y, range.end_x + turn, range.end_y};
+        if (Touches(box, turned) && box.end_x - box.start_x < columns) box = Union(box, turned);
+      }
+    }
+    if (box == before) break;
+  }
+  return box;
+}
+
+double WrappedLongitude(double degrees) {
+  return degrees > 180 ? degrees - 360 : degrees < -180 ? degrees + 360 : degrees;
+}
+
+}  // namespace
+
+dem::GeoBounds FinestBounds(const DatasetView& dataset) {
+  const dem::GeoBounds all{dataset.west, dataset.south, dataset.east, dataset.north};
+  if (dataset.available.empty() || dataset.available.back().empty()) return all;
+  const std::vector<geo::TileRange>& ranges = dataset.available.back();
+  const auto size = [](const geo::TileRange& range) {
+    return (range.end_x - range.start_x + 1) * (range.end_y - range.start_y + 1);
+  };
+  const auto largest = std::ranges::max_element(ranges, {}, size);
+  const std::int64_t columns = geo::TileColumns(dataset.max_level());
+  const geo::TileRange box = Grown(*largest, ranges, columns);
+  const double step = 360.0 / static_cast<double>(columns);
+  const auto degrees = [step](std::int64_t tiles) { return static_cast<double>(tiles) * step; };
+  const double south = std::max(all.south, degrees(box.start_y) - 90);
+  const double north = std::min(all.north, degrees(box.end_y + 1) - 90);
+  dem::GeoBounds best{degrees(box.start_x) - 180, south, degrees(box.end_x + 1) - 180, north};
+  // Of the tiles that the edges of the data lie in, the part with data.
+  const double all_east = all.east < all.west ? all.east + 360 : all.east;
+  if (box.end_x - box.start_x + 1 >= columns) {
+    best.west = all.west;
+    best.east = all.east;
+  } else if (all_east - all.west < 360) {
+    const double west = best.west, east = best.east;
+    best.west = best.east = 0;
+    for (const double turn : {-360.0, 0.0, 360.0}) {
+      const double first = std::max(all.west, west + turn), last = std::min(all_east, east + turn);
+      if (last - first <= best.east - best.west) continue;
+      best.west = first;
+      best.east = last;
+    }
+  }
+  best.west = WrappedLongitude(best.west);
+  best.east = WrappedLongitude(best.east);
+  return best;
+}
+
 bool IsAvailable(const DatasetView& dataset, const geo::TileKey& key) {
   if (!geo::IsValid(key) || key.level > dataset.max_level()) return false;
   const auto& ranges = dataset.available[static_cast<std::size_t>(key.level)];

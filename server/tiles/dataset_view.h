@@ -45,6 +45,10 @@ struct DatasetView {
 // False as well for keys outside the tiling scheme.
 bool IsAvailable(const DatasetView& dataset, const geo::TileKey& key);
 
+// Where the deepest tiles lie, within the dataset's bounds: around the largest of their ranges and those that touch it.
+// Degrees; west > east: across the antimeridian.
+dem::GeoBounds FinestBounds(const DatasetView& dataset);
+
 // Web Mercator tiles of `size` pixels: levels 0 .. MaxHeightLevel, wherever they meet the dataset's bounds. False as
 // well for keys outside the scheme.
 bool IsHeightTileAvailable(const DatasetView& dataset, const geo::TileKey& key, int size);

@@ -15,6 +15,20 @@ export function isGlobal(dataset) {
   return boxOf(dataset.bounds).width > kGlobalWidth;
 }
 
+// The share of the Earth that [west, south, east, north] cover.
+function shareOfEarth(bounds) {
+  const sine = (degrees) => Math.sin(CesiumMath.toRadians(degrees));
+  return (boxOf(bounds).width / 360) * ((sine(bounds[3]) - sine(bounds[1])) / 2);
+}
+
+// What a first view of a dataset frames: all of it, or, of one of the whole Earth, the region with the finest data if
+// that is a small part of it. `isPart` tells which.
+export function firstRegion(dataset) {
+  const finest = { ...dataset, bounds: dataset.finest_bounds ?? dataset.bounds };
+  const isPart = isGlobal(dataset) && shareOfEarth(finest.bounds) < shareOfEarth(dataset.bounds) / 4;
+  return { ...(isPart ? finest : dataset), isPart };
+}
+
 // Diagonal of the dataset, metres.
 export function extent(dataset) {
   const { latitude, width, height } = boxOf(dataset.bounds);

@@ -1,7 +1,8 @@
 // The CesiumJS side of the page: the widget, the terrain in it, the camera, picking, and what is being drawn.
 import {
   BoundingSphere, CameraEventType, Cartesian3, Cartographic, CesiumTerrainProvider, CesiumWidget, Color,
-  HeadingPitchRange, Math as CesiumMath, PointPrimitiveCollection, ScreenSpaceEventHandler, ScreenSpaceEventType,
+  HeadingPitchRange, Math as CesiumMath, PointPrimitiveCollection, Resource, ScreenSpaceEventHandler,
+  ScreenSpaceEventType,
 } from "/viewer/cesium/index.js";
 import { boxOf, extent, isGlobal, kGlobalDistance, pixelTolerance, viewDistance } from "/viewer/framing.js";
 import { steerByKeyboard } from "/viewer/keyboard.js";
@@ -59,12 +60,12 @@ export class Globe {
     return names ? gl.getParameter(names.UNMASKED_RENDERER_WEBGL) : "";
   }
 
-  // Shows `dataset` at `fraction` of the level error, its 3D Tiles too if `compare`. Throws a readable message if the
-  // server does not describe it.
-  async show(dataset, fraction, compare) {
+  // Shows `dataset` at `fraction` of the level error, its 3D Tiles too if `compare`. `headers` go with every request.
+  // Throws a readable message if the server does not describe it.
+  async show(dataset, fraction, compare, headers) {
     const url = `${dataset.urls.layer.replace(/layer\.json.*$/, "")}?fraction=${fraction}`;
     const turn = ++this.#latest;
-    const provider = await CesiumTerrainProvider.fromUrl(url, { requestVertexNormals: true });
+    const provider = await CesiumTerrainProvider.fromUrl(new Resource({ url, headers }), { requestVertexNormals: true });
     // CesiumJS takes a missing layer.json for an ancient server of height maps.
     if (!provider.availability) throw new Error(`${url} does not describe any terrain`);
     if (turn !== this.#latest) return;
@@ -78,14 +79,15 @@ export class Globe {
     this.material.uniforms.shading = provider.hasVertexNormals ? 1 : 0;
     this.widget.terrainProvider = provider;
     this.adaptToCamera();
-    await this.compare(compare ? `${dataset.urls.tileset}?fraction=${fraction}` : undefined);
+    const tileset = `${dataset.urls.tileset}?fraction=${fraction}`;
+    await this.compare(compare ? new Resource({ url: tileset, headers }) : undefined);
   }
 
-  // 3D Tiles from this URL to the right of the splitter; without one, terrain everywhere.
-  async compare(url) {
-    this.material.uniforms.split = url ? 1 : 0;
+  // 3D Tiles from this resource to the right of the splitter; without one, terrain everywhere.
+  async compare(tileset) {
+    this.material.uniforms.split = tileset ? 1 : 0;
     this.#hideAir();
-    if (url) await this.tiles3d.show(url, this.onError);
+    if (tileset) await this.tiles3d.show(tileset, this.onError);
     else this.tiles3d.hide();
     this.scene.requestRender();
   }
@@ -126,23 +128,25 @@ export class Globe {
     stop.push(camera.moveStart.addEventListener(lift));
   }
 
-  // A regional dataset from the south-west, low enough to see its relief; a global one as a whole planet.
-  lookAt(dataset, seconds) {
+  // A region from the south-west, low enough to see its relief; a global dataset as a whole planet. `region`: a dataset,
+  // or a part of it with `ground`, the height of its middle.
+  lookAt(region, seconds) {
     const { camera } = this.scene;
-    const { longitude, latitude, width, height } = boxOf(dataset.bounds);
+    const { longitude, latitude, width, height } = boxOf(region.bounds);
     const narrow = Math.max(1, 0.8 * this.scene.canvas.clientHeight / this.scene.canvas.clientWidth);
-    if (isGlobal(dataset)) {
+    if (isGlobal(region)) {
       const eastward = width > 350 ? kWorldMiddle[0] : longitude;
       const northward = width > 350 && height > 100 ? kWorldMiddle[1] : latitude;  // not of what lies around a pole
       const destination = Cartesian3.fromDegrees(eastward, northward, kGlobalDistance * narrow);
       return seconds > 0 ? camera.flyTo({ destination, duration: seconds }) : camera.setView({ destination });
     }
-    const size = extent(dataset);
+    const size = extent(region);
     const pitch = -28 - 45 * Math.min(1, size / 5e6);
-    const ground = Math.max(0, dataset.heights.min) * 0.6 + Math.max(0, dataset.heights.max) * 0.2;
+    const { min, max } = region.heights;
+    const ground = region.ground ?? Math.max(0, min) * 0.6 + Math.max(0, max) * 0.2;
     const sphere = new BoundingSphere(Cartesian3.fromDegrees(longitude, latitude, ground), size / 2);
     const [heading, tilt] = [32, pitch].map(CesiumMath.toRadians);
-    const offset = new HeadingPitchRange(heading, tilt, viewDistance(dataset) * narrow);
+    const offset = new HeadingPitchRange(heading, tilt, viewDistance(region) * narrow);
     camera.flyToBoundingSphere(sphere, { offset, duration: seconds });
   }
 

@@ -36,11 +36,13 @@ function formatPosition({ longitude, latitude, height }) {
 }
 
 export class Panel {
-  // `actions`: dataset(name), home(), fraction(value), exaggeration(value), contours(on), wireframe(on),
+  // `actions`: dataset(name), home(), whole(), token(), fraction(value), exaggeration(value), contours(on), wireframe(on),
   // tiles3d(on), split(share).
   constructor(actions) {
     byId("dataset").addEventListener("change", (event) => actions.dataset(event.target.value));
     byId("home").addEventListener("click", actions.home);
+    byId("whole").addEventListener("click", actions.whole);
+    byId("use-token").addEventListener("click", actions.token);
     Object.assign(byId("fraction"), { min: kCoarsest, max: kFinest, step: 1 });
     let settle;
     byId("fraction").addEventListener("input", (event) => {
@@ -60,12 +62,16 @@ export class Panel {
     if (matchMedia("(max-width: 560px)").matches) byId("panel").open = false;
   }
 
-  setDatasets(datasets) {
+  // `moreWithToken`: there may be others for who has a token.
+  setDatasets(datasets, moreWithToken) {
     byId("dataset").replaceChildren(...datasets.map(({ name }) => new Option(name, name)));
+    byId("use-token").hidden = !moreWithToken;
   }
 
-  setDataset({ name, heights, attribution }) {
+  // `hasPart`: the first view is of a part of it.
+  setDataset({ name, heights, attribution }, hasPart) {
     byId("dataset").value = name;
+    byId("whole").hidden = !hasPart;
     document.title = `${name} · terrace`;
     drawRamp(byId("ramp"), heights);
     byId("lowest").textContent = formatMetres(heights.min);

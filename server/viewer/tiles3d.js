@@ -59,13 +59,13 @@ export class Tiles3d {
     scene.preUpdate.addEventListener(() => this.tileset && this.#follow());
   }
 
-  // Throws what CesiumJS throws if the tileset cannot be read. `onError` gets a sentence for each tile that fails.
-  async show(url, onError) {
+  // `resource`: of tileset.json. Throws what CesiumJS throws if it cannot be read. `onError` gets a sentence for each tile that fails.
+  async show(resource, onError) {
     const turn = ++this.#latest;
     this.pending = true;
     try {
       const shader = makeShader();
-      const tileset = await Cesium3DTileset.fromUrl(url, {
+      const tileset = await Cesium3DTileset.fromUrl(resource, {
         customShader: shader, splitDirection: SplitDirection.RIGHT, enableDebugWireframe: true, shadows: 0,
       });
       if (turn !== this.#latest) return tileset.destroy();

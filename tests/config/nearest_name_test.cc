@@ -1,5 +1,6 @@
 #include "config/common/nearest_name.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <string>
@@ -8,37 +9,76 @@
 namespace terrace::config {
 namespace {
 
-const std::vector<std::string_view> kKeys = {"listen", "datasets", "cache_bytes", "io_threads", "worker_threads"};
+using testing::ElementsAre;
+using testing::IsEmpty;
 
-TEST(NearestName, FindsWhatWasMeant) {
-  EXPECT_EQ(NearestName("listen", kKeys), "listen");
-  EXPECT_EQ(NearestName("lisetn", kKeys), "listen");  // a swap counts one
-  EXPECT_EQ(NearestName("Listen", kKeys), "listen");
-  EXPECT_EQ(NearestName("dataset", kKeys), "datasets");
-  EXPECT_EQ(NearestName("cache-bytes", kKeys), "cache_bytes");
-  EXPECT_EQ(NearestName("cachebytes", kKeys), "cache_bytes");
-  EXPECT_EQ(NearestName("workers_threads", kKeys), "worker_threads");
+const std::vector<KnownName> kKeys = {{"listen", "port host"}, {"datasets"},      {"cache_bytes", "cache"},
+                                      {"disk_cache", "cache"}, {"io_threads"},    {"worker_threads"},
+                                      {"header_timeout_s"},    {"idle_timeout_s"}};
+const std::vector<KnownName> kFlags = {{"--out"}, {"--max-error"}, {"--threads"}, {"--json"}};
+
+TEST(NearestNames, FindWhatWasMeant) {
+  EXPECT_THAT(NearestNames("listen", kKeys), ElementsAre("listen"));
+  EXPECT_THAT(NearestNames("lisetn", kKeys), ElementsAre("listen"));  // a swap counts one
+  EXPECT_THAT(NearestNames("Listen", kKeys), ElementsAre("listen"));
+  EXPECT_THAT(NearestNames("dataset", kKeys), ElementsAre("datasets"));
+  EXPECT_THAT(NearestNames("cache-bytes", kKeys), ElementsAre("cache_bytes"));
+  EXPECT_THAT(NearestNames("cachebytes", kKeys), ElementsAre("cache_bytes"));
+  EXPECT_THAT(NearestNames("workers_threads", kKeys), ElementsAre("worker_threads"));
 }
 
-TEST(NearestName, FindsTheOnlyNameWithThatPart) {
-  EXPECT_EQ(NearestName("cache", kKeys), "cache_bytes");
-  EXPECT_EQ(NearestName("--io", kKeys), "io_threads");
-  const std::vector<std::string_view> two = {"finest_error", "max_error_m"};
-  EXPECT_EQ(NearestName("error", two), "") << "two names have it";
-  EXPECT_EQ(NearestName("ach", kKeys), "") << "no whole part";
-  EXPECT_EQ(NearestName("__", kKeys), "");
+TEST(NearestNames, KnowWhatOthersCallIt) {
+  for (const char* word : {"port", "host", "Port", "--port", "--host"}) {
+    EXPECT_THAT(NearestNames(word, kKeys), ElementsAre("listen")) << word;
+  }
+  EXPECT_THAT(NearestNames("cache", kKeys), ElementsAre("cache_bytes", "disk_cache"));
+  EXPECT_THAT(NearestNames("ort", kKeys), IsEmpty()) << "no whole word";
+  EXPECT_THAT(NearestNames("port host", kKeys), IsEmpty());
 }
 
-TEST(NearestName, IsEmptyWhenNothingIsNear) {
-  EXPECT_EQ(NearestName("colour", kKeys), "");
-  EXPECT_EQ(NearestName("", kKeys), "");
-  EXPECT_EQ(NearestName("listen", {}), "");
-  EXPECT_EQ(NearestName(std::string(1'000'000, 'x'), kKeys), "");
+TEST(NearestNames, AreAllThatHaveThatPart) {
+  EXPECT_THAT(NearestNames("--io", kKeys), ElementsAre("io_threads"));
+  EXPECT_THAT(NearestNames("timeout", kKeys), ElementsAre("header_timeout_s", "idle_timeout_s"));
+  EXPECT_THAT(NearestNames("error", kFlags), ElementsAre("--max-error"));
+  EXPECT_THAT(NearestNames("ach", kKeys), IsEmpty()) << "no whole part";
+  EXPECT_THAT(NearestNames("__", kKeys), IsEmpty());
+  const std::vector<KnownName> many = {{"a_x"}, {"b_x"}, {"c_x"}, {"d_x"}, {"e_x"}};
+  EXPECT_THAT(NearestNames("x", many), IsEmpty()) << "which of five?";
 }
 
-TEST(NearestName, PrefersTheFirstOfEquals) {
-  const std::vector<std::string_view> names = {"abcd", "abce"};
-  EXPECT_EQ(NearestName("abcx", names), "abcd");
+TEST(NearestNames, MayBeTheBeginningOfTheWord) {
+  EXPECT_THAT(NearestNames("--output", kFlags), ElementsAre("--out"));
+  EXPECT_THAT(NearestNames("listen_address", kKeys), ElementsAre("listen"));
+  EXPECT_THAT(NearestNames("listenVk3tSecretMarker42xyz", kKeys), IsEmpty()) << "the rest may be a secret";
+}
+
+TEST(NearestNames, CountNoDashesAtTheBeginning) {
+  EXPECT_THAT(NearestNames("--port", kFlags), IsEmpty()) << "--out has two other letters of three";
+}
+
+TEST(NearestNames, AreEmptyWhenNothingIsNear) {
+  EXPECT_THAT(NearestNames("colour", kKeys), IsEmpty());
+  EXPECT_THAT(NearestNames("", kKeys), IsEmpty());
+  EXPECT_THAT(NearestNames("listen", {}), IsEmpty());
+  EXPECT_THAT(NearestNames(std::string(1'000'000, 'x'), kKeys), IsEmpty());
+}
+
+TEST(NearestNames, PreferTheFirstOfEquals) {
+  const std::vector<KnownName> names = {{"abcd"}, {"abce"}};
+  EXPECT_THAT(NearestNames("abcx", names), ElementsAre("abcd"));
+}
+
+TEST(IsSameName, IgnoresCaseAndDashes) {
+  EXPECT_TRUE(IsSameName("--Cache-Bytes", "cache_bytes"));
+  EXPECT_FALSE(IsSameName("cachebytes", "cache_bytes"));
+}
+
+TEST(Alternatives, AreJoinedByOr) {
+  const std::vector<std::string> three = {"a", "b", "c"};
+  EXPECT_EQ(Alternatives(three), "a, b or c");
+  EXPECT_EQ(Alternatives(std::span(three).first(2)), "a or b");
+  EXPECT_EQ(Alternatives(std::span(three).first(1)), "a");
+  EXPECT_EQ(Alternatives({}), "");
 }
 
 }  // namespace

@@ -97,6 +97,36 @@ TEST(ParseConfig, SuggestsTheNearestKeyAndListsAllWhenNoneIsNear) {
                           IsError("/datasets/0", "\"sources\" is missing")));
 }
 
+TEST(ParseConfig, KnowsWhatOthersCallAKey) {
+  for (const std::string key : {"port", "host", "address", "bind"}) {
+    EXPECT_THAT(ErrorsOf("{\"" + key + "\": 8080}"), ElementsAre(IsError("/" + key, "did you mean \"listen\"?")));
+  }
+  EXPECT_THAT(ErrorsOf(R"({"datasets": [{"name": "a", "files": ["a.tif"]}]})"),
+              ElementsAre(IsError("/datasets/0/files", "did you mean \"sources\"?"),
+                          IsError("/datasets/0", "\"sources\" is missing")));
+  EXPECT_THAT(ErrorsOf(R"({"cache": 1})"),
+              ElementsAre(IsError("/cache", "did you mean \"cache_bytes\" or \"disk_cache\"?")));
+}
+
+TEST(ParseConfig, SaysWhereAMisplacedKeyBelongs) {
+  EXPECT_THAT(ErrorsOf(R"({"floor": 0, "error": 5, "vertical": "egm96", "tile_bytes": 0, "certificate": "a.pem"})"),
+              ElementsAre(IsError("/floor", "is no key of this object; \"floor\" belongs in an object of \"datasets\""),
+                          IsError("/error",
+                                  "is no key of this object; did you mean \"error_fraction\" or \"finest_error\" in "
+                                  "an object of \"datasets\"?"),
+                          IsError("/vertical",
+                                  "\"vertical\" belongs in an object of \"datasets\" or in an object of a dataset's "
+                                  "\"sources\""),
+                          IsError("/tile_bytes", "\"tile_bytes\" belongs in \"disk_cache\""),
+                          IsError("/certificate", "\"certificate\" belongs in \"tls\"")));
+  EXPECT_THAT(ErrorsOf(R"({"datasets": [{"name": "a", "sources": [{"path": "a.tif", "feather": 5}], "Listen": "a:1",
+                           "sea_level": 0, "texture": "webp"}]})"),
+              ElementsAre(IsError("/datasets/0/sources/0/feather", "belongs in an object of \"datasets\""),
+                          IsError("/datasets/0/Listen", "\"listen\" belongs at the top of the file"),
+                          IsError("/datasets/0/sea_level", "\"sea_level\" belongs in a dataset's \"water\""),
+                          IsError("/datasets/0/texture", "\"texture\" belongs in a dataset's \"imagery\"")));
+}
+
 TEST(ParseConfig, ShowsTheFormOfLayers) {
   EXPECT_THAT(ErrorsOf(R"({"datasets": [{"name": "a", "sources": ["a.tif"], "imagery": "a.tif", "water": true}]})"),
               ElementsAre(IsError("/datasets/0/imagery", "must be {\"image\": \"photo.tif\"}"),

@@ -1,4 +1,5 @@
 // The schema and the manual are made of the option tables; the examples and cases.json are what the parser takes.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -49,6 +50,19 @@ TEST(Manual, NeedsOneMarkerForEveryTable) {
   EXPECT_TRUE(fails(manual + table, "log: no such table, two of it")) << "a table stands twice";
   EXPECT_TRUE(fails(manual + "<!-- options: logs -->\n" + end, "logs: no such table")) << "of no option";
   EXPECT_TRUE(fails(manual.substr(0, end_at - end.size()), "log: no such table, two of it, or no end")) << "no end";
+}
+
+// A word that is an option itself would never be asked for.
+TEST(Options, HaveOtherWordsThatAreNoOptions) {
+  for (const auto& options : {ServerOptions(), DatasetOptions()}) {
+    for (const OptionInfo& option : options) {
+      const std::string words = fmt::format(" {} ", option.other_words);
+      EXPECT_EQ(words.find("  ") == std::string::npos, !option.other_words.empty()) << words;
+      for (const OptionInfo& other : options) {
+        EXPECT_EQ(words.find(fmt::format(" {} ", other.key)), std::string::npos) << option.key << ": " << other.key;
+      }
+    }
+  }
 }
 
 // Help, schema and manual continue or quote these texts.

@@ -80,6 +80,7 @@ class Opening(unittest.TestCase):
                 log = process.communicate(timeout=60)[1]
             self.assertEqual(process.returncode, 1, log)  # the open that cannot be given up
             self.assertIn("look whether a source can be read", log)
+            self.assertIn("stopped before any dataset was served", log)
 
 
 class Descriptors(unittest.TestCase):

@@ -2,6 +2,7 @@
 // TERRACE_URL names a running server; otherwise TERRACE_BINARY is started with TERRACE_CONFIG.
 import assert from 'node:assert/strict';
 import fs from 'node:fs';
+import os from 'node:os';
 import path from 'node:path';
 import { after, before, describe, it } from 'node:test';
 import { chromium } from 'playwright-core';
@@ -208,6 +209,13 @@ describe('the viewer', () => {
     await phone.close();
   });
 
+  it('says that a dataset is not there', async () => {
+    const lost = await openPage(browser, `${url}/#dataset=nowhere`);
+    await lost.locator('#message').waitFor({ timeout: kSettleMs });
+    assert.match(await lost.locator('#message').innerText(), /no dataset nowhere on this server; this is /);
+    await lost.close();
+  });
+
   it('says in the page what failed', async () => {
     const broken = await browser.newPage();
     await broken.route('**/datasets', (route) => route.fulfill({ status: 503, body: '' }));
@@ -220,5 +228,111 @@ describe('the viewer', () => {
     await broken.locator('#message').waitFor();
     assert.match(await broken.locator('#message').innerText(), /could not be loaded/);
     await broken.close();
+  });
+});
+
+// A server of its own for each: `config` besides the address.
+async function serveConfig(config) {
+  const folder = fs.mkdtempSync(path.join(os.tmpdir(), 'viewer-'));
+  fs.writeFileSync(path.join(folder, 'terrace.json'), JSON.stringify(config));
+  const server = await serve('--config', path.join(folder, 'terrace.json'));
+  return { ...server, url: server.url.replace(/\/$/, ''), stop: () => server.stop().finally(() => fs.rmSync(folder, { recursive: true })) };
+}
+
+const earth = path.join(samples, 'etopo5.tif'), hills = path.join(samples, 'jacksboro.tif');
+
+describe('a region of fine data on a globe', { skip: process.env.TERRACE_URL ? 'needs a server of its own' : false }, () => {
+  let server, browser, page;
+
+  before(async () => {
+    server = await serveConfig({ datasets: [{ name: 'mosaic', sources: [hills, earth] }, { name: 'earth', sources: [earth] }] });
+    browser = await chromium.launch({ executablePath: kChromium, args: kFlags });
+    page = await openPage(browser, server.url);
+  });
+
+  after(async () => {
+    await browser?.close();
+    await server?.stop();
+  });
+
+  const camera = () => page.evaluate(() => terrace.globe.camera);
+
+  it('is what the first view shows', async () => {
+    await settle(page);
+    const [longitude, latitude, height] = await camera();
+    assert.ok(Math.hypot(longitude + 84.25, latitude - 36.3) < 0.5, `at ${longitude}, ${latitude}`);
+    assert.ok(height > 2000 && height < 60000, `${height} m`);
+    assert.ok(await page.evaluate(() => terrace.globe.drawn().deepest) > 9, 'the fine tiles are drawn');
+  });
+
+  it('is left for the whole globe, and found again', async () => {
+    await page.locator('#whole').click();
+    await page.waitForFunction(() => terrace.globe.camera[2] > 1e7, undefined, { timeout: kSettleMs });
+    await page.locator('#home').click();
+    await page.waitForFunction(() => terrace.globe.camera[2] < 60000, undefined, { timeout: kSettleMs });
+    await page.locator('#dataset').selectOption('earth');
+    await page.waitForFunction(() => terrace.globe.camera[2] > 1e7, undefined, { timeout: kSettleMs });
+    assert.ok(await page.locator('#whole').isHidden(), 'all of this dataset is of one kind');
+    assert.deepEqual(page.wrongs, []);
+  });
+});
+
+describe('datasets that need a token', { skip: process.env.TERRACE_URL ? 'needs a server of its own' : false }, () => {
+  const token = 'a-token-of-some-length';
+  const tokens = [{ name: 'team', token }];
+  const hidden = { name: 'hills', sources: [hills] };
+  let browser, server;
+
+  before(async () => {
+    server = await serveConfig({ tokens, datasets: [{ name: 'earth', sources: [earth], public: true }, hidden] });
+    browser = await chromium.launch({ executablePath: kChromium, args: kFlags });
+  });
+
+  after(async () => {
+    await browser?.close();
+    await server?.stop();
+  });
+
+  it('are asked for and shown', async () => {
+    const page = await openPage(browser, `${server.url}/#dataset=hills`);
+    const unauthorized = [];
+    page.on('request', (request) => {
+      const needs = new URL(request.url()).pathname.startsWith('/hills/');
+      if (needs && request.headers().authorization !== `Bearer ${token}`) unauthorized.push(request.url());
+    });
+    await page.locator('#token-card').waitFor({ timeout: kSettleMs });
+    assert.match(await page.locator('#token-reason').innerText(), /hills needs a token/);
+    assert.ok(await page.locator('#token-cancel').isVisible(), 'there is something to see without');
+    assert.match(page.url(), /#dataset=hills$/, 'a reload asks again');
+
+    await page.locator('#token').fill('another-token-of-the-kind');
+    await page.keyboard.press('Enter');
+    await page.getByText('The server does not know this token.').waitFor({ timeout: kSettleMs });
+    await page.locator('#token').fill(token);
+    await page.keyboard.press('Enter');
+    await page.waitForFunction(() => terrace.state.dataset.name === 'hills', undefined, { timeout: kSettleMs });
+    const drawn = await settle(page);
+    assert.ok(drawn.deepest > 9 && await page.locator('#token-card').isHidden());
+    await page.locator('#tiles3d').check();
+    await page.waitForFunction(() => terrace.globe.tiles3d.drawn().tiles > 1, undefined, { timeout: kSettleMs });
+
+    await page.reload();
+    await settle(page);
+    assert.equal(await page.evaluate(() => terrace.state.dataset.name), 'hills', 'the tab keeps the token');
+    assert.deepEqual(unauthorized, []);
+    assert.ok(!page.requested.some((url) => url.includes(token)), 'no URL holds the token');
+    await page.close();
+  });
+
+  it('are told where there are no others', async () => {
+    const closed = await serveConfig({ tokens, datasets: [hidden] });
+    const page = await openPage(browser, closed.url);
+    await page.locator('#token-card').waitFor({ timeout: kSettleMs });
+    assert.match(await page.locator('#token-reason').innerText(), /datasets of this server need a token/);
+    assert.ok(await page.locator('#token-cancel').isHidden(), 'there is nothing else to see');
+    await page.locator('#home').click();
+    assert.deepEqual(page.wrongs, []);
+    await page.close();
+    await closed.stop();
   });
 });

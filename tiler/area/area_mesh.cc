@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "engine/core/check.h"
+#include "engine/core/plain_number.h"
 #include "engine/geo/ellipsoid.h"
 #include "engine/geo/error_ladder.h"
 #include "engine/tin/greedy.h"
@@ -45,7 +46,15 @@ std::optional<AreaRequest> Clip(const AreaRequest& area, const dem::GeoBounds& b
   return best;
 }
 
-dem::NodeWindow WindowAt(const geo::Lattice& lattice, const AreaRequest& area) {
+// What a window is made of; finer levels than those that can be meshed have counts that no int holds.
+struct NodeCounts {
+  std::int64_t west = 0, south = 0, columns = 0, rows = 0;
+
+  std::int64_t samples() const { return columns * rows; }
+  dem::NodeWindow Window() const { return {west, south, static_cast<int>(columns), static_cast<int>(rows)}; }
+};
+
+NodeCounts NodesAt(const geo::Lattice& lattice, const AreaRequest& area) {
   const double step = lattice.StepDegrees();
   // A node that lies on the area's edge but for the last bits is its edge.
   constexpr double kSlack = 1e-6;
@@ -54,34 +63,37 @@ dem::NodeWindow WindowAt(const geo::Lattice& lattice, const AreaRequest& area) {
   const std::int64_t west = first(area.west + 180), east = std::max(last(area.east + 180), west + 1);
   const std::int64_t south = std::clamp<std::int64_t>(first(area.south + 90), 0, lattice.rows() - 1);
   const std::int64_t north = std::clamp<std::int64_t>(last(area.north + 90), south + 1, lattice.rows());
-  // Counts that an int does not hold are far above every limit.
-  const auto count = [](std::int64_t from, std::int64_t to) {
-    return static_cast<int>(std::min<std::int64_t>(to - from + 1, 1 << 30));
-  };
-  return {west, south, count(west, east), count(south, north)};
+  return {west, south, east - west + 1, north - south + 1};
 }
 
-double SamplesOf(const dem::NodeWindow& window) { return static_cast<double>(window.columns) * window.rows; }
-
-bool Fits(const dem::NodeWindow& window, std::size_t max_samples) {
-  return SamplesOf(window) <= static_cast<double>(max_samples) &&
-         std::max(window.columns, window.rows) <= tin::HeightField::kMaxSide;
+// The limits that so many nodes exceed, for a message; empty: none.
+std::string ExceededLimits(const NodeCounts& nodes, std::size_t max_samples) {
+  std::string limits;
+  if (nodes.samples() > static_cast<std::int64_t>(max_samples)) {
+    limits = fmt::format("more than max_mesh_samples of this server ({})", max_samples);
+  }
+  if (std::max(nodes.columns, nodes.rows) > tin::HeightField::kMaxSide) {
+    limits += fmt::format("{}more than the {} that a mesh may have on a side", limits.empty() ? "" : ", and ",
+                          tin::HeightField::kMaxSide);
+  }
+  return limits;
 }
 
-tl::unexpected<Error> TooLarge(const dem::DemSource& source, double error_fraction, const AreaRequest& area,
-                               const AreaPlan& plan, std::size_t max_samples) {
-  for (int level = plan.level - 1; level >= 0; --level) {
-    if (!Fits(WindowAt(source.LatticeOf(level), area), max_samples)) continue;
-    return MakeError(ErrorCode::kInvalidArgument,
-                     "at an error of {} m this area has {} x {} samples, more than the {} that are meshed at once; ask "
-                     "for a smaller area, or for an error of {:.0f} m or more",
-                     area.error_m, plan.window.columns, plan.window.rows, max_samples,
-                     std::ceil(geo::DefaultError(level, error_fraction)));
+// `level`: the one that was asked for. Names the first error from which the area can be meshed, if there is one.
+tl::unexpected<Error> TooLarge(const dem::DemSource& source, double error_fraction, const AreaRequest& area, int level,
+                               std::size_t max_samples) {
+  const auto nodes_at = [&](int at) { return NodesAt(source.LatticeOf(at), area); };
+  int fitting = level - 1;
+  while (fitting >= 0 && !ExceededLimits(nodes_at(fitting), max_samples).empty()) --fitting;
+  const NodeCounts nodes = nodes_at(fitting >= 0 ? level : 0);
+  const std::string size = fmt::format("this area has {} x {} = {} samples, {}", nodes.columns, nodes.rows,
+                                       nodes.samples(), ExceededLimits(nodes, max_samples));
+  if (fitting < 0) {
+    return MakeError(ErrorCode::kInvalidArgument, "even at the largest error {}; ask for a smaller bbox", size);
   }
   return MakeError(ErrorCode::kInvalidArgument,
-                   "this area has more than the {} samples that are meshed at once, whatever the error; ask for a "
-                   "smaller area",
-                   max_samples);
+                   "at an error of {} m {}; ask for a smaller bbox, or for an error of {} m or more",
+                   PlainNumber(area.error_m), size, PlainNumberUp(geo::DefaultError(fitting, error_fraction), 3));
 }
 
 struct Frame {
@@ -154,9 +166,12 @@ Result<AreaPlan> PlanArea(const dem::DemSource& source, double error_fraction, c
   }
   AreaPlan plan;
   while (plan.level < source.max_level() && geo::DefaultError(plan.level, error_fraction) > area.error_m) ++plan.level;
-  plan.window = WindowAt(source.LatticeOf(plan.level), *clipped);
+  const NodeCounts nodes = NodesAt(source.LatticeOf(plan.level), *clipped);
+  if (!ExceededLimits(nodes, max_samples).empty()) {
+    return TooLarge(source, error_fraction, *clipped, plan.level, max_samples);
+  }
+  plan.window = nodes.Window();
   plan.centre = {(clipped->west + clipped->east) / 2, (clipped->south + clipped->north) / 2};
-  if (!Fits(plan.window, max_samples)) return TooLarge(source, error_fraction, *clipped, plan, max_samples);
   return plan;
 }
 

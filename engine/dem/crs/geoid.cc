@@ -11,6 +11,7 @@
 #include <sstream>
 #include <system_error>
 
+#include "engine/core/plain_number.h"
 #include "engine/dem/gdal/proj_grids.h"
 #include "engine/dem/gdal/proj_handle.h"
 
@@ -252,8 +253,8 @@ Result<std::shared_ptr<const Geoid>> Geoid::Checked(std::shared_ptr<const Geoid>
   const double base = HeightAt(*operation, centre, 0), above = HeightAt(*operation, centre, 1);
   if (std::isnan(base)) {
     return MakeError(ErrorCode::kInvalidArgument,
-                     "{} is not known at the centre of the source, {:.6g} degrees east and {:.6g} north", geoid->name_,
-                     centre.x, centre.y);
+                     "{} is not known at the centre of the source, {} degrees east and {} north", geoid->name_,
+                     PlainNumber(centre.x), PlainNumber(centre.y));
   }
   if (above < base) {
     return MakeError(ErrorCode::kInvalidArgument,

@@ -26,7 +26,8 @@ Result<void> CheckNames(const std::vector<std::string>& names) {
     const bool retired = std::ranges::any_of(Retired(), [&](GDALDriver* d) { return name == d->GetDescription(); });
     if (retired || GetGDALDriverManager()->GetDriverByName(name.c_str()) != nullptr) continue;
     return MakeError(ErrorCode::kInvalidArgument,
-                     "\"{}\" is no format of GDAL's here; `gdalinfo --formats` lists their short names", name);
+                     "allowed_drivers: \"{}\" is no format that GDAL reads here; `gdalinfo --formats` lists them",
+                     name);
   }
   return {};
 }

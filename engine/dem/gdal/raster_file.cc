@@ -60,6 +60,22 @@ Result<void> CheckBlocks(GDALDataset& dataset, GDALRasterBand& band, const std::
                    path, width, height, bytes >> 20);
 }
 
+struct SizeLimits {
+  std::int64_t side = 0, samples = 0;
+  const char* of_what = "";
+};
+
+// Names the limit that is exceeded alone.
+Result<void> CheckSize(const std::string& path, std::int64_t width, std::int64_t height, const SizeLimits& limits) {
+  const bool is_too_long = std::max(width, height) > limits.side;
+  if (!is_too_long && width * height <= limits.samples) return {};
+  return MakeError(ErrorCode::kInvalidArgument,
+                   "{}: {} x {} samples; {} may have {} {} at most: cut it with `gdal_translate -srcwin` or coarsen it "
+                   "with `gdalwarp -tr`",
+                   path, width, height, limits.of_what, is_too_long ? limits.side : limits.samples,
+                   is_too_long ? "on a side" : "in all");
+}
+
 Result<void> CheckShape(GDALDataset& dataset, const std::string& path) {
   if (dataset.GetRasterCount() < 1) {
     return MakeError(ErrorCode::kInvalidArgument,
@@ -79,12 +95,8 @@ Result<void> CheckShape(GDALDataset& dataset, const std::string& path) {
     return MakeError(ErrorCode::kInvalidArgument, "{}: {} x {} samples are no surface; at least 2 x 2 are needed", path,
                      width, height);
   }
-  if (width > kMaxSide || height > kMaxSide || width * height > kMaxSamples) {
-    return MakeError(ErrorCode::kInvalidArgument,
-                     "{}: {} x {} samples; at most {} a side and {} in all can be served: cut it with gdal_translate "
-                     "-srcwin or coarsen it with `gdalwarp -tr`",
-                     path, width, height, kMaxSide, kMaxSamples);
-  }
+  if (auto fits = CheckSize(path, width, height, {kMaxSide, kMaxSamples, "a raster that is served"}); !fits)
+    return fits;
   if (dataset.GetRasterCount() > kMaxBands) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "{}: has {} bands; take the one with heights out with "
@@ -163,11 +175,7 @@ Result<void> CheckSizeToMesh(const std::string& path, int width, int height) {
   // Two gigabytes of floats: what is meshed in one piece must fit in memory several times over.
   constexpr std::int64_t kMaxSamples = std::int64_t{1} << 29;
   constexpr int kMaxPerSide = 1 << 15;  // the mesher's coordinates have 15 bits
-  if (std::int64_t{width} * height <= kMaxSamples && std::max(width, height) <= kMaxPerSide) return {};
-  return MakeError(ErrorCode::kInvalidArgument,
-                   "{}: {} x {} samples are too many to mesh in one piece (at most {} in all and {} a side); cut it "
-                   "with gdal_translate -srcwin",
-                   path, width, height, kMaxSamples, kMaxPerSide);
+  return CheckSize(path, width, height, {kMaxPerSide, kMaxSamples, "a mesh"});
 }
 
 void ForgetRemote(const std::string& path) {

@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "engine/core/plain_number.h"
 #include "engine/dem/common/source_log.h"
 #include "engine/dem/gdal/gdal_runtime.h"
 #include "engine/dem/gdal/raster_file.h"
@@ -57,9 +58,9 @@ std::string DoubtsOf(const HeightRange& heights) {
   constexpr double kHighest = 9000, kDeepest = -11500;
   if (heights.max <= kHighest && heights.min >= kDeepest) return "";
   return fmt::format(
-      "heights from {:g} to {:g} m are hardly metres (Earth has -10,935 to 8,849), and those beyond {:g} count as "
+      "heights from {} to {} m are hardly metres (Earth has -10,935 to 8,849), and those beyond {} count as "
       "voids: state the metres a unit has with `gdal_translate -a_scale FACTOR in out`, 0.01 for centimetres",
-      heights.min, heights.max, kMaxAbsHeight);
+      PlainNumber(heights.min), PlainNumber(heights.max), PlainNumber(kMaxAbsHeight));
 }
 
 void LogWhatMatters(GDALDataset& dataset, const RasterInfo& info, const Georeference& georeference,
@@ -86,7 +87,9 @@ void LogWhatMatters(GDALDataset& dataset, const RasterInfo& info, const Georefer
   }
   if (!info.picture_part.empty()) {
     LogSource(SourceLog::Level::kWarn, info.path,
-              "is a picture (its band 1 is \"{}\"), whose values are taken for heights", info.picture_part);
+              "is a picture (its band 1 is \"{}\"), whose values are taken for heights; serve the elevation model "
+              "that belongs to it",
+              info.picture_part);
   }
   if (!info.transform.empty()) {
     LogSource(SourceLog::Level::kDebug, info.path, "placed by PROJ operation \"{}\": {}", info.transform,
@@ -96,9 +99,10 @@ void LogWhatMatters(GDALDataset& dataset, const RasterInfo& info, const Georefer
 
 void LogVertical(const std::string& path, const VerticalDatum& vertical, const std::string& unit) {
   if (!vertical.is_known()) {
-    LogSource(SourceLog::Level::kWarn, path,
-              "no vertical datum stated, heights pass through as given; if they refer to a geoid, set `vertical` "
-              "(egm96, EPSG:5773 and others)");
+    LogSource(
+        SourceLog::Level::kWarn, path,
+        "no vertical datum stated: heights are taken as metres above the WGS 84 ellipsoid; if they are above mean "
+        "sea level, set `vertical`, as in --vertical egm96");
   } else if (vertical.geoid) {
     LogSource(SourceLog::Level::kInfo, path, "heights count from {}, made ellipsoidal by PROJ operation \"{}\"",
               vertical.name, vertical.geoid->description());

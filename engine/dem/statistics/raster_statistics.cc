@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "engine/core/plain_number.h"
 #include "engine/dem/statistics/coarse_errors.h"
 
 namespace terrace::dem {
@@ -171,9 +172,9 @@ Result<RasterStatistics> StatisticsAssembler::Finish(GDALDataset& dataset, const
     return MakeError(
         ErrorCode::kNotFound,
         "has no valid sample, only voids; check its nodata value with gdalinfo and correct it with "
-        "`gdal_translate -a_nodata VALUE in out`; heights beyond {:g} m are voids too: those in another unit "
+        "`gdal_translate -a_nodata VALUE in out`; heights beyond {} m are voids too: those in another unit "
         "need `-a_scale FACTOR`, the metres of one{}",
-        kMaxAbsHeight,
+        PlainNumber(kMaxAbsHeight),
         layout_.rules.extra_nodata.empty() && layout_.rules.rim <= 0
             ? ""
             : "; heights that the file does not declare to be voids were taken for such: with --nodata declared (in a "

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 
+#include "engine/core/plain_number.h"
 #include "engine/dem/statistics/raster_chunk.h"
 
 namespace terrace::dem {
@@ -243,7 +244,7 @@ Result<DetectedNodata> FindVoids(GDALRasterBand& band, const SampleRules& rules,
   for (std::size_t i = 0; i < kUsualNodata.size(); ++i) {
     if (evidence.at_value[i] == 0 || evidence.near_value[i] * 4 > evidence.at_value[i]) continue;
     detected.values.push_back(kUsualNodata[i]);
-    say(fmt::format("{} samples of {:g}", evidence.at_value[i], kUsualNodata[i]));
+    say(fmt::format("{} samples of {}", evidence.at_value[i], PlainNumber(kUsualNodata[i])));
   }
   if (has_collar) {
     detected.values.push_back((0 / rules.metres_per_unit - rules.offset) / rules.scale);
@@ -259,7 +260,8 @@ Result<DetectedNodata> FindVoids(GDALRasterBand& band, const SampleRules& rules,
   if (has_collar && evidence.IsDense()) detected.rim = kCollarRim;
   const auto mixed = [&](const Beyond& beyond_it, double bound) {
     if (!evidence.AreMixtures(beyond_it)) return false;
-    say(fmt::format("{} samples {} {:g} m at their edges", beyond_it.all, bound < 0 ? "below" : "above", bound));
+    say(fmt::format("{} samples {} {} m at their edges", beyond_it.all, bound < 0 ? "below" : "above",
+                    PlainNumber(bound)));
     if (beyond_it.all * kMixed >= evidence.near_void) detected.rim = kMixedRim;
     return true;
   };

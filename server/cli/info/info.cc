@@ -17,6 +17,7 @@
 #include "config/config.h"
 #include "config/options/options.h"
 #include "config/parse.h"
+#include "engine/core/plain_number.h"
 #include "engine/dem/dem_source.h"
 #include "engine/dem/gdal/source_policy.h"
 #include "engine/geo/error_ladder.h"
@@ -89,14 +90,14 @@ std::vector<std::string> AdviceFor(const dem::RasterInfo& info, double floor) {
   if (info.void_samples > 0) {
     advice.push_back(
         fmt::format("voids: those with data all around them are filled from their edges, those that touch the rim of "
-                    "the raster show the floor of {:g} m",
-                    floor));
+                    "the raster show the floor of {} m",
+                    PlainNumber(floor)));
   }
   return advice;
 }
 
 std::string Percent(std::uint64_t part, std::uint64_t whole) {
-  return fmt::format("{:.2g} %", whole > 0 ? 100.0 * static_cast<double>(part) / static_cast<double>(whole) : 0.0);
+  return PlainNumber(whole > 0 ? 100.0 * static_cast<double>(part) / static_cast<double>(whole) : 0.0, 2) + " %";
 }
 
 void PrintText(const dem::DemInfo& dataset) {
@@ -105,11 +106,10 @@ void PrintText(const dem::DemInfo& dataset) {
   fmt::print("{}\n", info.path);
   line("raster", fmt::format("{} x {}, {}, {}", info.width, info.height, info.data_type, info.driver));
   line("CRS", info.crs);
-  line("pixel", fmt::format("{:g} x {:g} {}, {:.3g} m on the ground", info.pixel_width, info.pixel_height,
-                            info.pixel_unit, info.spacing_m));
-  line("bounds", fmt::format("west {:.6g}, south {:.6g}, east {:.6g}, north {:.6g}", info.bounds.west,
-                             info.bounds.south, info.bounds.east, info.bounds.north));
-  line("heights", fmt::format("{:g} to {:g} m{}", info.heights.min, info.heights.max,
+  line("pixel", fmt::format("{} x {} {}, {} m on the ground", PlainNumber(info.pixel_width),
+                            PlainNumber(info.pixel_height), info.pixel_unit, PlainNumber(info.spacing_m, 3)));
+  line("bounds", TextOfBounds(info.bounds));
+  line("heights", fmt::format("{} to {} m{}", PlainNumber(info.heights.min), PlainNumber(info.heights.max),
                               info.height_unit.empty() ? "" : ", unit " + info.height_unit));
   line("datum", info.counts_from.empty() ? "not stated" : info.counts_from);
   if (!info.vertical_operation.empty()) {
@@ -123,9 +123,9 @@ void PrintText(const dem::DemInfo& dataset) {
                          Percent(info.void_samples, info.valid_samples + info.void_samples), info.hole_samples));
   line("overviews",
        info.overview_factors.empty() ? "none" : fmt::format("1/{}", fmt::join(info.overview_factors, ", 1/")));
-  line("floor", fmt::format("{:g} m outside the raster and in voids that touch its rim", dataset.floor));
-  line("levels", fmt::format("0 to {}, default error {:.3g} m at the deepest", dataset.max_level,
-                             geo::DefaultError(dataset.max_level)));
+  line("floor", fmt::format("{} m outside the raster and in voids that touch its rim", PlainNumber(dataset.floor)));
+  line("levels", fmt::format("0 to {}, default error {} m at the deepest", dataset.max_level,
+                             PlainNumber(geo::DefaultError(dataset.max_level), 3)));
   if (!info.transform.empty()) line("transform", info.transform);
   for (const std::string& advice : AdviceFor(info, dataset.floor)) line("note", advice);
 }
@@ -232,26 +232,28 @@ int Info(const InfoArguments& arguments) {
 void AddInfo(CLI::App& app, int& exit_code) {
   auto arguments = std::make_shared<InfoArguments>();
   CLI::App* command =
-      app.add_subcommand("info", "Tells what rasters hold, the levels they can serve, and what to mend");
+      app.add_subcommand("info", "Describes rasters, the levels they can serve, and what to improve")->group(kCommands);
   command->footer(
       "Examples:\n"
       "  terrace info alps.tif andes.tif\n"
       "  terrace info alps.tif --json\n"
       "  terrace info --mosaic lidar/ base.tif\n\n"
-      "A raster that cannot be served is told on stderr with the reason and the remedy; the others are\n"
-      "still shown, but for those of the same folder or mosaic: with it none of them can be served.");
+      "A raster that cannot be served is reported on stderr, with the reason and the remedy, and the others\n"
+      "are described. A folder or a mosaic with such a raster in it is not described at all: as a dataset\n"
+      "it could not be served.");
   command->add_option("DEM", arguments->dems, "Rasters that GDAL can read, or folders of them")->required();
-  command->add_flag("--json", arguments->json, "One JSON array instead of text");
-  command->add_flag("--mosaic", arguments->mosaic, "Takes all of them for one dataset, the first counting most");
+  command->add_flag("--json", arguments->json, "Prints one JSON array instead of text");
+  command->add_flag("--mosaic", arguments->mosaic,
+                    "Describes all DEMs as one dataset; where they overlap, the first that has a height counts");
   std::vector<config::OptionInfo> about_heights = config::DatasetOptions();  // the others are about serving
   about_heights.erase(
       std::remove_if(about_heights.begin(), about_heights.end(),
                      [](const auto& option) { return option.key != "vertical" && option.key != "nodata"; }),
       about_heights.end());
-  AddFlags(*command, about_heights, "Heights, as in a configuration", arguments->dataset_flags);
+  AddFlags(*command, about_heights, "Heights, as for terrace serve", arguments->dataset_flags);
   command
       ->add_option("--cache-dir", arguments->cache_dir,
-                   "Keeps what is learnt in this folder, for 'terrace serve --cache-dir'")
+                   "Folder to keep statistics of the rasters in, for 'terrace serve --cache-dir'")
       ->type_name("DIR");
   command->callback([arguments, &exit_code] { exit_code = FinishOutput(Info(*arguments)); });
 }

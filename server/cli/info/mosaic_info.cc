@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "engine/core/plain_number.h"
 #include "engine/dem/common/box_index.h"
 #include "engine/geo/error_ladder.h"
 
@@ -33,6 +34,7 @@ bool Covers(const dem::GeoBounds& outer, const dem::GeoBounds& inner) {
 }
 
 std::string Sources(std::ptrdiff_t count) { return fmt::format("{} source{}", count, count == 1 ? "" : "s"); }
+std::string SourcesLie(std::ptrdiff_t count) { return Sources(count) + (count == 1 ? " lies" : " lie"); }
 
 // Sources by their bounds.
 class BoundsIndex {
@@ -90,13 +92,13 @@ std::vector<std::string> AdviceFor(const dem::DemInfo& info) {
   std::vector<std::string> advice;
   if (const std::ptrdiff_t hidden = CountHidden(info.sources); hidden > 0) {
     advice.push_back(fmt::format(
-        "{} {} within the bounds of a coarser one that comes first, and {} where that has voids alone: name finer ones "
-        "first",
-        Sources(hidden), hidden == 1 ? "lies" : "lie", hidden == 1 ? "shows" : "show"));
+        "{} within the bounds of a coarser one that comes before, and finer heights show only in its voids: name finer "
+        "sources first",
+        SourcesLie(hidden)));
   }
   if (large > 0) {
     advice.push_back(fmt::format(
-        "large and without overviews: {}, all of which shallow tiles read; run 'gdaladdo -r average' on each",
+        "large and without overviews: {}; shallow tiles read all of their samples: run 'gdaladdo -r average' on each",
         Sources(large)));
   }
   if (no_datum > 0) {
@@ -109,13 +111,18 @@ std::vector<std::string> AdviceFor(const dem::DemInfo& info) {
   if (voids > 0) {
     advice.push_back(fmt::format(
         "with voids: {}; small ones are filled from their edges, larger ones show the next source; then those with "
-        "data all around them are filled from their edges, and those that touch the rim show the floor of {:g} m",
-        Sources(voids), info.floor));
+        "data all around them are filled from their edges, and those that touch the rim show the floor of {} m",
+        Sources(voids), PlainNumber(info.floor)));
   }
   return advice;
 }
 
 }  // namespace
+
+std::string TextOfBounds(const dem::GeoBounds& bounds) {
+  return fmt::format("west {}, south {}, east {}, north {}", PlainNumber(bounds.west, 9), PlainNumber(bounds.south, 9),
+                     PlainNumber(bounds.east, 9), PlainNumber(bounds.north, 9));
+}
 
 void PrintMosaic(const std::string& name, const dem::DemInfo& info) {
   const auto line = [](const char* what, const std::string& value) { fmt::print("  {:<14}{}\n", what, value); };
@@ -124,17 +131,17 @@ void PrintMosaic(const std::string& name, const dem::DemInfo& info) {
   constexpr std::size_t kMaxListed = 40;
   for (std::size_t i = 0; i < std::min(info.sources.size(), kMaxListed); ++i) {
     const dem::RasterInfo& source = info.sources[i];
-    line("", fmt::format("{}: {} x {}, {:.3g} m, {}", source.path, source.width, source.height, source.spacing_m,
-                         source.crs));
+    line("", fmt::format("{}: {} x {}, {} m, {}", source.path, source.width, source.height,
+                         PlainNumber(source.spacing_m, 3), source.crs));
   }
   if (info.sources.size() > kMaxListed) line("", fmt::format("and {} more", info.sources.size() - kMaxListed));
-  line("overlaps", fmt::format("under one before them, in part at least: {}", Sources(CountOverlapped(info.sources))));
-  line("bounds", fmt::format("west {:.6g}, south {:.6g}, east {:.6g}, north {:.6g}", info.bounds.west,
-                             info.bounds.south, info.bounds.east, info.bounds.north));
-  line("heights", fmt::format("{:g} to {:g} m", info.heights.min, info.heights.max));
-  line("floor", fmt::format("{:g} m where no source has a height", info.floor));
-  line("levels", fmt::format("0 to {}, default error {:.3g} m at the deepest, which lies where the finest source does",
-                             info.max_level, geo::DefaultError(info.max_level)));
+  line("overlaps",
+       fmt::format("{} at least partly under one that comes before", SourcesLie(CountOverlapped(info.sources))));
+  line("bounds", TextOfBounds(info.bounds));
+  line("heights", fmt::format("{} to {} m", PlainNumber(info.heights.min), PlainNumber(info.heights.max)));
+  line("floor", fmt::format("{} m where no source has a height", PlainNumber(info.floor)));
+  line("levels", fmt::format("0 to {}, default error {} m at the deepest, which lies where the finest source does",
+                             info.max_level, PlainNumber(geo::DefaultError(info.max_level), 3)));
   for (const std::string& advice : AdviceFor(info)) line("note", advice);
 }
 

@@ -7,6 +7,8 @@
 
 namespace terrace::cli {
 
+std::string TextOfBounds(const dem::GeoBounds& bounds);
+
 void PrintMosaic(const std::string& name, const dem::DemInfo& info);
 // One JSON object, as text.
 std::string MosaicJson(const std::string& name, const dem::DemInfo& info);

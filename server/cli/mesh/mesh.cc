@@ -16,6 +16,7 @@
 #include <utility>
 #include <vector>
 
+#include "engine/core/plain_number.h"
 #include "engine/dem/dem_source.h"
 #include "engine/dem/gdal/source_policy.h"
 #include "engine/dem/sources/read_raster.h"
@@ -137,10 +138,10 @@ void Print(const MeshArguments& arguments, const tin::HeightField& field, const 
     return;
   }
   fmt::print(
-      "{}: {} vertices, {} triangles of {} samples{}; largest error {:.4g} m, RMS {:.4g} m; read {:.2f} s, mesh {:.2f} "
+      "{}: {} vertices, {} triangles of {} samples{}; largest error {} m, RMS {} m; read {:.2f} s, mesh {:.2f} "
       "s, write {:.2f} s\n",
-      arguments.out, mesh.vertices.size(), mesh.triangles.size(), error.samples, TextOfVoids(voids), error.max,
-      error.rms, seconds.read, seconds.triangulate, seconds.write);
+      arguments.out, mesh.vertices.size(), mesh.triangles.size(), error.samples, TextOfVoids(voids),
+      PlainNumber(error.max, 4), PlainNumber(error.rms, 4), seconds.read, seconds.triangulate, seconds.write);
 }
 
 // Checks of arguments; what they say is read after the name of the option. Their own descriptions stay out of the help.
@@ -214,38 +215,40 @@ int Mesh(const MeshArguments& arguments) {
 }  // namespace
 
 void AddMesh(CLI::App& app, int& exit_code) {
+  constexpr const char* kGoal = "Goal, exactly one of";
   auto arguments = std::make_shared<MeshArguments>();
   CLI::App* command =
-      app.add_subcommand("mesh", "Meshes a whole raster with greedy insertion into one .obj, .ply or .glb file");
+      app.add_subcommand("mesh", "Meshes a whole raster into one .obj, .ply or .glb file")->group(kCommands);
   command->footer(
       "Examples:\n"
       "  terrace mesh alps.tif --out alps.obj --max-error 5\n"
       "  terrace mesh alps.tif --out alps.glb --points 50000 --json\n"
       "  terrace mesh alps.tif --out alps.glb --max-error 10 --color photo.tif\n"
       "  terrace mesh photo.png --image --out photo.glb --points 4000\n\n"
-      "Errors are measured over every valid sample by a separate pass. Voids count for none, and triangles go on\n"
-      "across them: how many there are is told. Triangles are counter-clockwise in the file's own x and y.");
+      "The printed errors are measured at every valid sample of the finished mesh. Voids do not count;\n"
+      "triangles span them, and their number is printed. Triangles are counter-clockwise in the x and y\n"
+      "of the file.");
   command->add_option("DEM", arguments->dem, "A raster that GDAL can read; a georeference is not needed")->required();
-  command->add_option("-o,--out", arguments->out, "The file to write; its extension is the format")
+  command->add_option("-o,--out", arguments->out, "The file to write; its extension, .obj, .ply or .glb, is the format")
       ->type_name("FILE")
       ->required();
-  command->add_option("--max-error", arguments->max_error, "No sample is further off than this")
+  command->add_option("--max-error", arguments->max_error, "No sample is farther from the mesh than this")
       ->type_name("METRES")
       ->check(Metres())
-      ->group("Goal, exactly one of");
-  command->add_option("--points", arguments->points, "Vertices, corners included")
+      ->group(kGoal);
+  command->add_option("--points", arguments->points, "Number of vertices, the four corners included")
       ->type_name("N")
-      ->check(NumberFrom(4, 1e9, "a number from 4, the corners of the raster, on"))
-      ->group("Goal, exactly one of");
+      ->check(NumberFrom(4, 1e9, "a whole number from 4 (the corners of the raster) to 1000000000"))
+      ->group(kGoal);
   command->add_option("--rms", arguments->rms, "Root mean square error over all samples")
       ->type_name("METRES")
       ->check(Metres())
-      ->group("Goal, exactly one of");
+      ->group(kGoal);
   AddNodataOption(*command, arguments->nodata);
   command
       ->add_option("--coordinates", arguments->coordinates,
-                   "pixel: x = column, y = row (from the top), z = height; crs: pixel centres in the raster's CRS "
-                   "(default where it has one)")
+                   "pixel: x = column, y = row (from the top), z = height; crs: pixel centres in the raster's CRS; "
+                   "by default crs where it has one")
       ->check(OneOf({"pixel", "crs"}))
       ->type_name("pixel|crs");
   command
@@ -257,23 +260,25 @@ void AddMesh(CLI::App& app, int& exit_code) {
       ->capture_default_str();
   command
       ->add_option("--measure", arguments->measure,
-                   "What data-dependent triangles are compared by: sum-max (default), sum-squares, max-max or normals")
+                   "With data-dependent: how the fit of two triangles is measured: sum-max, sum-squares, max-max or "
+                   "normals; by default sum-max")
       ->check(OneOf(kMeasures))
       ->type_name("NAME");
   command
       ->add_option(
           "--qthresh", arguments->qthresh,
-          "Data-dependent: 0 looks at the fit alone, 1 at the shape of triangles wherever it differs (default 0.5)")
+          "With data-dependent: how much the shape of triangles counts beside their fit: 0 is the fit alone, 1 the "
+          "shape wherever it differs; by default 0.5")
       ->check(NumberFrom(0, 1, "a number from 0 to 1"))
       ->type_name("SHARE");
-  command->add_option("--threads", arguments->threads, "Threads to use at most; the mesh does not depend on it")
+  command->add_option("--threads", arguments->threads, "Threads to use at most; the mesh is the same with any number")
       ->check(NumberFrom(1, 256, "a number from 1 to 256"))
       ->type_name("N")
       ->capture_default_str();
   command->add_flag("--compact", arguments->compact,
-                    "Drops vertices that the bound does not need; with --max-error only");
+                    "Drops vertices that the error bound does not need; with --max-error only");
   AddColorOptions(*command, arguments->color);
-  command->add_flag("--json", arguments->json, "Statistics as JSON on stdout");
+  command->add_flag("--json", arguments->json, "Prints the statistics as JSON");
   command->callback([arguments, &exit_code] { exit_code = FinishOutput(Mesh(*arguments)); });
 }
 

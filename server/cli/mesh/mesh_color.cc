@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "engine/core/plain_number.h"
 #include "engine/dem/image/raster_colors.h"
 #include "engine/dem/sources/read_raster.h"
 #include "engine/tin/extended/extended_error.h"
@@ -131,10 +132,12 @@ void Print(const ColoredMeshArguments& arguments, const tin::ExtendedField& fiel
              mesh.tin.triangles.size(), error.height.samples,
              TextOfVoids(VoidsOf(field.heights(), error.height.samples)));
   if (arguments.color.is_image) {
-    fmt::print("largest error {:.4g} of the range of colours, RMS {:.4g}", error.max_combined, error.color_rms);
+    fmt::print("largest error {} of the range of colours, RMS {}", PlainNumber(error.max_combined, 4),
+               PlainNumber(error.color_rms, 4));
   } else {
-    fmt::print("largest error {:.4g} m with colours, {:.4g} m of heights alone; RMS {:.4g} m, colours {:.4g}",
-               error.max_combined, error.height.max, error.height.rms, error.color_rms);
+    fmt::print("largest error {} m with colours, {} m of heights alone; RMS {} m, colours {}",
+               PlainNumber(error.max_combined, 4), PlainNumber(error.height.max, 4), PlainNumber(error.height.rms, 4),
+               PlainNumber(error.color_rms, 4));
   }
   fmt::print("; read {:.2f} s, mesh {:.2f} s, write {:.2f} s\n", seconds.read, seconds.triangulate, seconds.write);
 }
@@ -185,16 +188,16 @@ void AddColorOptions(CLI::App& command, ColorArguments& arguments) {
       command
           .add_option(
               "--color", arguments.image,
-              "An image that covers the DEM: grey, RGB, RGBA or a palette. Placed by its georeference, else pixel "
-              "by sample. Vertices get its colours, and triangles follow them")
+              "Image that covers the DEM: grey, RGB, RGBA or a palette, placed by its georeference, else pixel by "
+              "sample. Vertices get its colours, and triangles follow them")
           ->type_name("IMAGE")
           ->group(kGroup);
   command
       .add_option(
           "--color-weight", arguments.weight,
-          "W: a sample that is dz metres and dr, dg, db of the range of colours off has the error "
-          "(1 - W) dz + W M/3 (dr + dg + db), M the range of the heights. So --max-error E keeps heights within "
-          "E / (1 - W); with W = 0 triangles follow heights alone")
+          "How much colours count beside heights, 0 to 1. The error of a sample is (1 - W) dz + W M/3 (dr + dg + "
+          "db): dz metres of height, dr, dg, db shares of the range of colours, M the range of the heights. So "
+          "--max-error E keeps heights within E / (1 - W); with W = 0 triangles follow heights alone")
       ->check(CLI::Validator(is_weight, ""))
       ->type_name("W")
       ->capture_default_str()
@@ -203,8 +206,8 @@ void AddColorOptions(CLI::App& command, ColorArguments& arguments) {
   command
       .add_flag(
           "--image", arguments.is_image,
-          "DEM is an image: its colours are meshed on flat ground, z = 0, y upwards; --max-error is a share of the "
-          "range of colours, 0 to 1")
+          "DEM is an image: its colours are meshed on flat ground, z = 0, y upwards, and --max-error is a share of "
+          "the range of colours, 0 to 1")
       ->excludes(image)
       ->group(kGroup);
 }

@@ -27,8 +27,10 @@ void AddNodataOption(CLI::App& command, std::string& nodata) {
                : fmt::format("must be auto, declared or a number, not \"{}\"", text);
   };
   command
-      .add_option("--nodata", nodata,
-                  "Voids: auto finds undeclared ones, declared trusts the raster, a number is one more")
+      .add_option(
+          "--nodata", nodata,
+          "Which samples are voids: auto: declared and detected nodata values; declared: declared ones alone; a "
+          "number: declared ones and this value")
       ->check(CLI::Validator(check, ""))
       ->type_name("VALUE")
       ->capture_default_str();
@@ -63,7 +65,8 @@ void WarnAbout(const std::string& path, const dem::RasterHeights& raster, const 
   }
   if (!raster.found_voids.empty()) {
     fmt::print(stderr,
-               "terrace: {}: undeclared voids, which are no samples: {}; --nodata declared takes them for heights\n",
+               "terrace: {}: samples taken for voids, though the file does not declare them: {}; --nodata declared "
+               "takes them for heights\n",
                path, raster.found_voids);
   }
   if (!raster.picture_part.empty()) {

@@ -50,12 +50,12 @@ void WarnAboutFewDescriptors(const config::Config& config, const server::Descrip
                          (demand.stores == 0 || budget.store_files >= demand.store_files);
   if (is_enough) return;
   spdlog::warn(
-      "the limit on open files leaves room for {} connections of {}, {} files of sources of {}{}; raise it "
-      "(ulimit -n, LimitNOFILE= of systemd)",
+      "the limit on open files leaves room for {} of {} connections and {} of {} files of sources{}; raise it (ulimit "
+      "-n, LimitNOFILE= of systemd)",
       budget.connections, demand.connections, budget.open_sources, demand.open_sources,
       demand.stores == 0
           ? ""
-          : fmt::format(", {} files of {} in each store of the disk cache", budget.store_files, demand.store_files));
+          : fmt::format(" and {} of {} files in each store of the disk cache", budget.store_files, demand.store_files));
 }
 
 }  // namespace terrace::cli

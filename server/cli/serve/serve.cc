@@ -15,6 +15,7 @@
 #include <optional>
 #include <stop_token>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -79,6 +80,32 @@ bool IsPipe(const std::string& path) {
   return std::filesystem::is_other(path, ignored);
 }
 
+// DEMs of the command line are the last datasets of `config`; `dems`: as they are written there. Each is named after
+// its file, so that two may have one name.
+std::vector<config::ConfigError> FindSameNames(const config::Config& config, const std::vector<std::string>& dems) {
+  const std::size_t configured = config.datasets.size() - dems.size();
+  std::map<std::string_view, std::size_t> first_of;
+  std::vector<config::ConfigError> errors;
+  for (std::size_t i = 0; i < config.datasets.size(); ++i) {
+    const config::DatasetConfig& dataset = config.datasets[i];
+    const auto [first, is_new] = first_of.emplace(dataset.name, i);
+    if (is_new) continue;
+    const std::string& dem = dems[i - configured];
+    if (first->second < configured) {
+      errors.push_back({dem, fmt::format("would be dataset \"{}\", as one of the configuration is; {}", dataset.name,
+                                         dems.size() == 1 ? "give it another name with --name NAME"
+                                                          : "add it to the configuration with a name of its own")});
+    } else if (config.datasets[first->second].sources == dataset.sources) {
+      errors.push_back({dem, "is given twice; leave one out"});
+    } else {
+      errors.push_back({"", fmt::format("{} and {} would both be dataset \"{}\", as DEMs are named after their files; "
+                                        "rename one, or name both in a configuration (--config)",
+                                        dems[first->second - configured], dem, dataset.name)});
+    }
+  }
+  return errors;
+}
+
 // The file's options, then the flags, then a dataset per DEM of the command line. Everything wrong is collected.
 config::Config MakeConfig(const ServeArguments& arguments, std::vector<config::ConfigError>& errors) {
   config::Config config;
@@ -92,9 +119,12 @@ config::Config MakeConfig(const ServeArguments& arguments, std::vector<config::C
   for (const auto& [key, text] : arguments.server_flags) {
     config::SetServerOption(key, text, arguments.directory, config, errors);
   }
-  if (arguments.dems.empty() && !arguments.dataset_flags.empty()) {
-    errors.push_back(
-        {"", "options of a dataset need a DEM on the command line; in a config file they stand in its dataset"});
+  for (const auto& [key, text] : arguments.dataset_flags) {
+    if (!arguments.dems.empty()) break;
+    errors.push_back({config::FlagOf(key),
+                      fmt::format("is for DEMs of the command line, of which there are none; for a dataset of the "
+                                  "configuration write \"{}\" there",
+                                  key)});
   }
   if (arguments.dems.size() > 1 && arguments.dataset_flags.contains("name")) {
     errors.push_back({"--name", "names one dataset; give one DEM, or a config file with a name for each"});
@@ -103,6 +133,7 @@ config::Config MakeConfig(const ServeArguments& arguments, std::vector<config::C
   for (const auto& [key, text] : arguments.dataset_flags) {
     config::SetDatasetOption(key, text, arguments.directory, flags, errors);
   }
+  std::vector<std::string> taken;  // of the DEMs, those that are datasets now
   for (const std::string& written : arguments.dems) {
     if (written.empty()) {
       errors.push_back({"", "a DEM on the command line has an empty name"});
@@ -117,6 +148,7 @@ config::Config MakeConfig(const ServeArguments& arguments, std::vector<config::C
       errors.push_back({written, config::kNoWorkingDirectory});
       continue;
     }
+    taken.push_back(written);
     config::DatasetConfig& dataset = config.datasets.emplace_back(flags);
     if (dataset.name.empty()) dataset.name = config::SanitizeDatasetName(StemOf(dem));
     Result<config::SourceConfig> source = config::SourceAt(dem);
@@ -125,8 +157,7 @@ config::Config MakeConfig(const ServeArguments& arguments, std::vector<config::C
     else
       errors.push_back({written, source.error().message});
   }
-  const std::vector<config::ConfigError> duplicates = config::FindDuplicateNames(config.datasets);
-  if (errors.empty()) errors = duplicates;
+  if (errors.empty()) errors = FindSameNames(config, taken);
   if (errors.empty() && config.datasets.empty() && !arguments.print_config) {
     errors.push_back(
         {"", arguments.config_file.empty()
@@ -322,23 +353,25 @@ int Serve(const ServeArguments& arguments) {
 
 void AddServe(CLI::App& app, int& exit_code) {
   auto arguments = std::make_shared<ServeArguments>();
-  CLI::App* command = app.add_subcommand("serve", "Serves DEMs as terrain tiles over HTTP, with a viewer at /");
+  CLI::App* command =
+      app.add_subcommand("serve", "Serves DEMs as terrain tiles over HTTP, with a viewer at /")->group(kCommands);
   command->footer(
       "Examples:\n"
       "  terrace serve alps.tif andes.tif\n"
       "  terrace serve --config terrace.json --listen 0.0.0.0:8080\n\n"
-      "Each DEM becomes a dataset named after its file; a folder of DEMs becomes one dataset. Flags override the "
-      "config file. Prints one line with\n"
-      "the URL when it is ready; logs go to stderr; SIGTERM and SIGINT end it after open requests are answered, a "
-      "second one at once.");
-  command->add_option("DEM", arguments->dems, "Rasters that GDAL can read, or folders of them, one dataset each");
-  command->add_option("--config", arguments->config_file, "Configuration in JSON (config/config.schema.json)")
+      "Each DEM becomes a dataset named after its file; a folder of DEMs becomes one dataset. Options of\n"
+      "the command line override those of the configuration. One line on stdout tells the URL when the\n"
+      "server is ready; the log goes to stderr. SIGTERM and SIGINT end the server after open requests are\n"
+      "answered, a second signal at once.");
+  command->add_option("DEM", arguments->dems, "Rasters that GDAL can read, or folders of them; each is one dataset");
+  command->add_option("--config", arguments->config_file, "Configuration in JSON; docs/configuration.md describes it")
       ->type_name("FILE");
-  command->add_flag("--print-config", arguments->print_config, "Prints the configuration in force as JSON and ends");
+  command->add_flag("--print-config", arguments->print_config,
+                    "Prints the configuration with all defaults and options as JSON, and ends");
   command->add_flag("--check-config", arguments->check_config,
-                    "Says whether the server could start, without opening rasters or listening, and ends");
+                    "Checks whether the server could start, without opening rasters or listening, and ends");
   AddFlags(*command, config::ServerOptions(), "Server", arguments->server_flags);
-  AddFlags(*command, config::DatasetOptions(), "Datasets of the command line", arguments->dataset_flags);
+  AddFlags(*command, config::DatasetOptions(), "Datasets of the DEMs on the command line", arguments->dataset_flags);
   command->callback([arguments, &exit_code] {
     std::error_code unnamed;
     arguments->directory = std::filesystem::current_path(unnamed);

@@ -17,8 +17,9 @@ void StopLimit::Begin(std::chrono::milliseconds limit) {
     std::unique_lock lock(mutex);
     std::condition_variable_any().wait_for(lock, stop, limit, [] { return false; });
     if (stop.stop_requested()) return;
-    spdlog::error("stopped: threads still work {} s after the signal and are ended; look whether a source can be read",
-                  std::chrono::duration<double>(limit).count());
+    spdlog::error(
+        "stopped: threads that still worked {} s after the signal were cut off; look whether a source can be read",
+        std::chrono::duration<double>(limit).count());
     spdlog::default_logger()->flush();
     std::_Exit(kExitFailure);
   });

@@ -33,6 +33,23 @@ class Help(unittest.TestCase):
             result, expected = run(*arguments), run(*same)
             self.assertEqual((result.returncode, result.stdout), (0, expected.stdout), arguments)
 
+    def test_help_of_no_command_is_an_error(self):
+        for arguments in (["help", "serv"], ["serv", "--help"]):
+            result = run(*arguments)
+            self.assertEqual((result.returncode, result.stdout), (2, ""), arguments)
+            self.assertIn("terrace: unknown command serv; did you mean serve?\n", result.stderr)
+
+    def test_lines_fit_a_terminal(self):
+        for command in ([], ["serve"], ["mesh"], ["info"]):
+            for line in run(*command, "--help").stdout.splitlines():
+                self.assertLessEqual(len(line), 100, line)
+
+    def test_defaults_are_what_the_flag_takes(self):
+        text = " ".join(run("serve", "--help").stdout.split())
+        for default in ("[127.0.0.1:8080]", "[256MiB]", "[public, max-age=3600]", "[*]", "[true]", "[crs]", "[10000]"):
+            self.assertIn(default, text)
+        self.assertNotIn('"', text)
+
     def test_version_is_the_projects(self):
         version = re.search(r"project\(.*?VERSION\s+([0-9.]+)", (SOURCE_DIR / "CMakeLists.txt").read_text(), re.S)
         result = run("--version")
@@ -51,12 +68,35 @@ class Usage(unittest.TestCase):
             self.assertEqual((result.returncode, result.stdout), (2, ""), arguments)
             self.assertRegex(result.stderr, r"^terrace: .+\nRun 'terrace .*--help' for what is accepted\.\n$")
 
+    def test_what_the_parser_says_is_said_plainly(self):
+        for arguments, message in ((["serve", "--listen"], "--listen needs a value: --listen HOST:PORT"),
+                                   (["serve", "a.tif", "--name", "a", "--name", "b"], "--name is given more than once"),
+                                   (["mesh", "a.tif", "b.tif", "--out", "c.obj"], "b.tif is one argument too many"),
+                                   (["mesh", "a.tif", "-p", "4", "--out", "c.obj"], "unknown option -p"),
+                                   (["mesh", "a.tif", "--points", "x", "--out", "c.obj"], '--points: must be a whole number from 4 (the corners of the raster) to 1000000000, not "x"')):
+            self.assertEqual(run(*arguments).stderr.splitlines()[0], f"terrace: {message}", arguments)
+
     def test_typos_are_told_with_the_nearest_name(self):
         for arguments, word, nearest in ((["serv"], "command serv", "serve"), (["--versoin"], "option --versoin", "--version"),
-                                         (["serve", "--cach-bytes=5"], "option --cach-bytes", "--cache-bytes"),
-                                         (["mesh", "--max-eror", "5"], "option --max-eror", "--max-error"),
-                                         (["mesh", "--error", "5"], "option --error", "--max-error")):
+                                         (["serve", "--cach-bytes=5"], "option --cach-bytes", "--cache-bytes BYTES"),
+                                         (["mesh", "--max-eror", "5"], "option --max-eror", "--max-error METRES"),
+                                         (["mesh", "--jsn"], "option --jsn", "--json"),
+                                         (["mesh", "--output", "a.obj"], "option --output", "--out FILE"),
+                                         (["mesh", "--error", "5"], "option --error", "--max-error METRES"),
+                                         (["serve", "--error", "5"], "option --error", "--error-fraction SHARE or --finest-error METRES")):
             self.assertIn(f"terrace: unknown {word}; did you mean {nearest}?\n", run(*arguments).stderr, arguments)
+
+    def test_words_of_other_servers_lead_to_the_option(self):
+        for flag in ("--port", "--host", "--address", "--bind"):
+            self.assertIn(f"terrace: unknown option {flag}; did you mean --listen HOST:PORT?\n", run("serve", "a.tif", flag, "80").stderr)
+
+    def test_options_of_another_command_are_told_with_it(self):
+        for arguments, message in ((["mesh", "a.tif", "--listen", "a:1"], "--listen; it is one of 'terrace serve'"),
+                                   (["serve", "a.tif", "--points=5"], "--points; it is one of 'terrace mesh'"),
+                                   (["--listen=a:1", "serve"], "--listen before the command; it is one of 'terrace serve'"),
+                                   (["mesh", "--port", "80"], "--port; did you mean --listen HOST:PORT of 'terrace serve'?"),
+                                   (["serve", "--tokens=abc"], '--tokens; "tokens" stands in the configuration alone')):
+            self.assertIn(f"terrace: unknown option {message}", run(*arguments).stderr, arguments)
 
     def test_stdout_that_takes_nothing_is_a_failure(self):
         with open("/dev/full", "w", encoding="utf-8") as full:
@@ -224,12 +264,25 @@ class Config(unittest.TestCase):
         result = run("serve", "--config", "terrace.json", "--io-threads", "0", cwd=self.folder)
         self.assertEqual((result.returncode, result.stdout, result.stderr), (2, "", output))
 
+    def test_dems_of_one_name_are_told_with_both_paths_and_the_remedy(self):
+        config = self.write(json.dumps({"datasets": [{"name": "x", "sources": ["/c/y.tif"]}]}))
+        for arguments, message in ((["/a/x.tif", "/b/x.tif"], '/a/x.tif and /b/x.tif would both be dataset "x", as DEMs are named after their files; '
+                                                              "rename one, or name both in a configuration (--config)"),
+                                   (["a b.tif", "q.tif", "a-b.tif"], 'a b.tif and a-b.tif would both be dataset "a-b"'),
+                                   (["x.tif", "x.tif"], "x.tif: is given twice; leave one out"),
+                                   (["./x.tif", "x.tif"], "x.tif: is given twice; leave one out"),
+                                   (["x.tif", "--config", config], 'x.tif: would be dataset "x", as one of the configuration is; give it another name with --name NAME'),
+                                   (["x.tif", "y.tif", "--config", config], 'x.tif: would be dataset "x", as one of the configuration is; add it to the configuration')):
+            result = run("serve", *arguments, "--check-config")
+            self.assertEqual((result.returncode, result.stdout), (2, ""), arguments)
+            self.assertIn(f"  {message}", result.stderr)
+        self.assertEqual(run("serve", "x.tif", "--name", "z", "--config", config, "--print-config").returncode, 0)
+
     def test_wrong_configurations_give_code_2(self):
         for arguments, part in ((["/nowhere.tif", "--listen", "foo"], "--listen: has no port"),
                                 (["--config", "/nowhere.json"], "cannot be read"),
                                 (["--config", self.write("{,")], "line 1, column 2"),
-                                (["/a/x.tif", "/b/x.tif"], "is the name of /datasets/0 too"),
-                                (["--floor", "0"], "options of a dataset need a DEM"),
+                                (["--floor", "0"], '--floor: is for DEMs of the command line, of which there are none; for a dataset of the configuration write "floor"'),
                                 ([], "there is nothing to serve")):
             result = run("serve", *arguments)
             self.assertEqual((result.returncode, result.stdout), (2, ""), arguments)

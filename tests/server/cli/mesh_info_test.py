@@ -2,6 +2,7 @@
 import html
 import json
 import math
+import os
 import pathlib
 import random
 import re
@@ -122,6 +123,31 @@ class Mesh(InFolder):
         self.assertEqual({v[:2] for v in vertices}, {(101, 201), (179, 201), (101, 259), (179, 259)})
         top_left = next(v for v in vertices if v[:2] == (101, 259))
         self.assertAlmostEqual(top_left[2], BUMPS[0][0], places=3)
+
+    def raster_of_zeros(self, name, columns, rows):
+        path = self.write(name + ".img", b"")
+        os.truncate(path, columns * rows)  # takes no space on the disk
+        self.write(name + ".hdr", f"ENVI\nsamples = {columns}\nlines = {rows}\nbands = 1\ndata type = 1\ninterleave = bsq\nbyte order = 0\n")
+        return path
+
+    def test_a_raster_that_is_too_large_is_refused_by_the_limit_that_it_exceeds(self):
+        for columns, rows, limit in ((40000, 2, "32768 on a side"), (2, 40000, "32768 on a side"), (30000, 30000, "536870912 in all")):
+            path = self.raster_of_zeros("large", columns, rows)
+            self.assert_refused(1, [f"{path}: {columns} x {rows} samples; a mesh may have {limit} at most: cut it with"],
+                                "mesh", path, "--out", self.folder / "a.obj", "--points", 4)
+
+    def test_prints_no_exponents(self):
+        heights = [98765.4, 0, 0, 12345.6, 0, 0, 0, 0, 0]
+        steep = self.write("steep.img", struct.pack("<9f", *heights))
+        self.write("steep.hdr", "ENVI\nsamples = 3\nlines = 3\nbands = 1\ndata type = 4\ninterleave = bsq\nbyte order = 0\n"
+                                "map info = {Geographic Lat/Lon, 1, 1, 10, 20, 0.00001, 0.00001, WGS-84}\n")
+        mesh = run("mesh", steep, "--out", self.folder / "a.obj", "--points", 4)
+        self.assertRegex(mesh.stdout, r"largest error \d+ m")
+        info = run("info", steep)
+        self.assertIn("0.00001 x 0.00001 degree", info.stdout)
+        for result in (mesh, info):
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertNotRegex(result.stdout + result.stderr, r"\de[+-]\d")
 
     def test_tells_of_more_vertices_than_there_is_use_for(self):
         result = run("mesh", self.write("flat.asc", grid([[5] * 4] * 3, PLACE)), "--out", self.folder / "a.obj", "--points", 9)
@@ -278,7 +304,7 @@ class Mesh(InFolder):
         dem = self.write("dem.asc", grid(heights, "xllcorner 100\nyllcorner 200\ncellsize 2"))
         out = self.folder / "dem.obj"
         found = run("mesh", dem, "-o", out, "--max-error", 1)
-        self.assertIn("undeclared voids, which are no samples: 20 samples of -9999; --nodata declared", found.stderr)
+        self.assertIn("samples taken for voids, though the file does not declare them: 20 samples of -9999; --nodata declared", found.stderr)
         self.assertIn("and across 20 voids;", found.stdout)
         self.assertGreaterEqual(min(z for _, _, z in read_obj(out)[0]), 500)
         for nodata, least in (("declared", -9999), ("500", -9999), ("-9999", 500)):
@@ -384,7 +410,7 @@ class InfoOfFiles(InFolder):
 
     def test_a_coarse_source_before_a_fine_one_is_told(self):
         fine, coarse = self.place("fine", 10, 0.01), self.place("coarse", 9, 0.1)
-        told = "1 source lies within the bounds of a coarser one that comes first, and shows where that has voids alone"
+        told = "1 source lies within the bounds of a coarser one that comes before, and finer heights show only in its voids"
         self.assertIn(told, run("info", "--mosaic", coarse, fine).stdout)
         self.assertNotIn("within the bounds", run("info", "--mosaic", fine, coarse).stdout)
 
@@ -396,7 +422,7 @@ class InfoOfFiles(InFolder):
         result = run("info", self.folder)
         self.assertEqual((result.returncode, result.stderr), (0, ""))
         for part in (f"{self.folder}\n", "3, in the order in which they count",
-                     "under one before them, in part at least: 1 source\n", "west 9,", "east 13,", "with voids: 1 source; small ones"):
+                     "1 source lies at least partly under one that comes before\n", "west 9,", "east 13,", "with voids: 1 source; small ones"):
             self.assertIn(part, result.stdout)
         self.assertLess(result.stdout.index("a.asc"), result.stdout.index("b.asc"))
         self.assertLess(result.stdout.index("b.asc"), result.stdout.index("coarse.asc"))

@@ -201,6 +201,15 @@ class Stopping(unittest.TestCase):
                 return
         self.fail(f"the log ended without {text!r}")
 
+    def test_says_which_signal_it_was(self):
+        for number in (signal.SIGTERM, signal.SIGINT):
+            process, _ = self.start(DEM)
+            process.send_signal(number)
+            log = process.communicate(timeout=60)[1]
+            self.assertEqual(process.returncode, 0, log)
+            self.assertIn(f"stopping: {number.name}; a second one", log)
+            self.assertIn(" stopped; no request is left unanswered", log)
+
     def test_a_second_signal_ends_it_at_once(self):
         process, port = self.start("--drain-timeout-s", "3600", "--header-timeout-s", "600", DEM)
         with socket.create_connection(("127.0.0.1", port)) as unfinished:

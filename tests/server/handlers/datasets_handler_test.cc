@@ -42,6 +42,26 @@ TEST(DatasetsHandler, ListsWhatAClientNeeds) {
                                              {"mesh", base + "/mesh"}}));
 }
 
+TEST(DatasetsHandler, TellsWhereTheDeepestTilesLie) {
+  std::array<DatasetView, 1> datasets = Datasets();
+  datasets[0].west = -180;
+  datasets[0].south = -90;
+  datasets[0].east = 180;
+  datasets[0].north = 90;
+  datasets[0].available[2] = {{3, 1, 3, 2}};
+  const auto list = nlohmann::json::parse(DatasetsJson(datasets));
+  EXPECT_EQ(list["datasets"][0]["finest_bounds"], nlohmann::json::parse("[-45.0, -45.0, 0.0, 45.0]"));
+}
+
+TEST(DatasetsHandler, TellsWhoDoesNotSeeAllThatATokenMayShowMore) {
+  EXPECT_FALSE(nlohmann::json::parse(DatasetsJson(Datasets())).contains("more_with_token"));
+  for (const bool is_seen : {false, true}) {
+    const auto list = nlohmann::json::parse(DatasetsJson(Datasets(), [&](const DatasetView&) { return is_seen; }));
+    EXPECT_EQ(list["datasets"].size(), is_seen ? 1u : 0u);
+    EXPECT_TRUE(list.value("more_with_token", false)) << "whether or not there is more";
+  }
+}
+
 TEST(DatasetsHandler, EscapesNamesInThePlainPage) {
   const std::string page = IndexHtml(Datasets());
   EXPECT_NE(page.find("a &lt;b&gt;"), std::string::npos);

@@ -40,12 +40,12 @@ TEST(StoppedJobs, ListsOfDatasetsEnd) {
   const std::vector<DatasetView> views = Views(10'000);
   {
     const StopAtAllocation stop(kMiddle / 4);
-    EXPECT_EQ(DatasetsJson(views, SeeAll, stop.token()), "");
+    EXPECT_EQ(DatasetsJson(views, {}, stop.token()), "");
     EXPECT_TRUE(stop.happened());
     EXPECT_LE(stop.largest_after(), kMiddle / 2) << "its tree is taken down with a list of its own";
   }
   const StopAtAllocation stop(kMiddle);
-  EXPECT_EQ(IndexHtml(views, SeeAll, stop.token()), "");
+  EXPECT_EQ(IndexHtml(views, {}, stop.token()), "");
   EXPECT_TRUE(stop.happened());
   EXPECT_LE(stop.largest_after(), kMiddle);
 }

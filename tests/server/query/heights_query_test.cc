@@ -112,7 +112,9 @@ TEST(HeightsQuery, NamesTheItemThatIsWrong) {
 
 TEST(HeightsQuery, TakesAsManyAsItMayAndNoMore) {
   EXPECT_TRUE(Parse("locations=1,2|1,2|1,2", 3));
-  EXPECT_NE(Refusal("locations=1,2|1,2|1,2|1,2", 3).find("more than 3 points"), std::string::npos);
+  EXPECT_NE(Refusal("locations=1,2|1,2|1,2|1,2", 3)
+                .find("more than 3 points, which is max_locations of this server; ask for fewer"),
+            std::string::npos);
   EXPECT_TRUE(Parse("path=0,0|0,1&samples=3", 3));
   EXPECT_TRUE(Parse("path=0,0|0,1&step=60000", 3));
   EXPECT_NE(Refusal("path=0,0|0,1&step=50000", 3).find("in steps of 50000 m"), std::string::npos);

@@ -1,6 +1,7 @@
 // Meshes of areas: what is in the file, and what is refused before anything is read.
 #include "tiler/area/area_mesh.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -241,10 +242,8 @@ TEST_F(AreaMeshTest, ClipsToTheDataset) {
   }
 }
 
-TEST_F(AreaMeshTest, RefusesWhatItCannotMesh) {
+TEST_F(AreaMeshTest, RefusesAreasBesideTheDataset) {
   AreaRequest area = area_;
-  EXPECT_NE(Refusal(area, 100).find("an error of"), std::string::npos) << "names the remedy";
-  EXPECT_NE(Refusal(area, 3).find("whatever the error"), std::string::npos);
   area.west = 10;
   area.east = 11;
   EXPECT_NE(Refusal(area).find("outside the dataset"), std::string::npos);
@@ -254,6 +253,51 @@ TEST_F(AreaMeshTest, RefusesWhatItCannotMesh) {
   EXPECT_NE(Refusal(area).find("outside the dataset"), std::string::npos);
 }
 
+TEST_F(AreaMeshTest, ARefusalNamesTheLimitThatIsExceeded) {
+  const auto plan = PlanArea(*source_, 0.5, area_, kMany);
+  ASSERT_TRUE(plan);
+  const int columns = plan->window.columns, rows = plan->window.rows;
+  EXPECT_EQ(Refusal(area_, 500).substr(0, Refusal(area_, 500).find(';')),
+            fmt::format("at an error of 5 m this area has {} x {} = {} samples, more than max_mesh_samples of this "
+                        "server (500)",
+                        columns, rows, columns * rows));
+  const std::string tiny = Refusal(area_, 3);
+  EXPECT_TRUE(
+      tiny.starts_with("even at the largest error this area has 2 x 2 = 4 samples, more than max_mesh_samples "
+                       "of this server (3); ask for a smaller bbox"))
+      << tiny;
+  EXPECT_EQ(tiny.find("or for an error"), std::string::npos) << "no error helps";
+}
+
+// Long and narrow: the samples are few.
+TEST_F(AreaMeshTest, ARefusalForALongSideIsNotAboutSamples) {
+  dem::DemOptions deep;
+  deep.finest_error = 0.01;
+  const auto source = dem::DemSource::Open(test_support::SourceDir() / "config/samples/jacksboro.tif", deep);
+  ASSERT_TRUE(source) << source.error().message;
+  AreaRequest area = area_;
+  area.west = -84.2;
+  area.east = -84.1;
+  area.north = area.south + 1e-5;
+  area.error_m = 0.01;
+  const auto refused = PlanArea(**source, 0.5, area, kMany);
+  ASSERT_FALSE(refused);
+  const std::string& message = refused.error().message;
+  EXPECT_NE(message.find("more than the 32768 that a mesh may have on a side; ask for a smaller bbox, or for an error"),
+            std::string::npos)
+      << message;
+  EXPECT_EQ(message.find("max_mesh_samples"), std::string::npos) << message;
+  area.error_m = std::stod(message.substr(message.find("or for an error of ") + 19));
+  EXPECT_TRUE(PlanArea(**source, 0.5, area, kMany)) << message;
+  area.error_m = 0.01;
+  area.north = area.south + 1e-2;
+  const auto both = PlanArea(**source, 0.5, area, kMany);
+  ASSERT_FALSE(both);
+  EXPECT_NE(both.error().message.find("max_mesh_samples of this server (1000000), and more than the 32768"),
+            std::string::npos)
+      << both.error().message;
+}
+
 // The error that a refusal names is one that works.
 TEST_F(AreaMeshTest, ItsRemedyIsOne) {
   const std::string refusal = Refusal(area_, 500);
@@ -261,6 +305,7 @@ TEST_F(AreaMeshTest, ItsRemedyIsOne) {
   ASSERT_NE(at, std::string::npos) << refusal;
   AreaRequest area = area_;
   area.error_m = std::stod(refusal.substr(at + 16));
+  EXPECT_LT(area.error_m, 500) << "not just any large one";
   EXPECT_TRUE(PlanArea(*source_, 0.5, area, 500)) << refusal;
 }
 

@@ -1,0 +1,69 @@
+#include "config/options/unknown_key.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <vector>
+
+#include "config/options/disk_cache_option.h"
+#include "config/options/edge_options.h"
+#include "config/options/layer_options.h"
+#include "config/options/option_table.h"
+#include "config/options/source_options.h"
+
+namespace terrace::config {
+namespace {
+
+// A kind of object in the file.
+struct Kind {
+  std::string_view place;  // "in an object of ..."
+  std::vector<KnownName> keys;
+};
+
+const std::array<Kind, 8>& Kinds() {
+  static const std::array<Kind, 8> kinds = {
+      {{"at the top of the file", KnownNames(ServerOptionTable())},
+       {"in an object of \"datasets\"", KnownNames(DatasetOptionTable())},
+       {"in an object of a dataset's \"sources\"", KnownNames(SourceOptionTable())},
+       {"in a dataset's \"imagery\"", KnownNames(ImageryOptionTable())},
+       {"in \"disk_cache\"", KnownNames(DiskCacheOptionTable())},
+       {"in an object of \"tokens\"", KnownNames(TokenOptionTable())},
+       {"in a dataset's \"water\"", {{"mask"}, {"sea_level"}}},
+       {"in \"tls\"", {{"certificate"}, {"key"}}}}};
+  return kinds;
+}
+
+std::vector<std::string> Quoted(const std::vector<std::string_view>& names) {
+  std::vector<std::string> quoted;
+  for (const std::string_view name : names) quoted.push_back(fmt::format("\"{}\"", name));
+  return quoted;
+}
+
+}  // namespace
+
+// The object itself is among the kinds, but has no key of this name, and is asked before the others what is near.
+std::string ExplainKey(std::string_view key, std::span<const KnownName> known) {
+  std::string name;
+  std::vector<std::string> places;
+  for (const Kind& kind : Kinds()) {
+    for (const KnownName& other : kind.keys) {
+      if (!IsSameName(other.name, key)) continue;
+      name = other.name;
+      places.emplace_back(kind.place);
+    }
+  }
+  const std::vector<std::string_view> here = NearestNames(key, known);
+  const bool is_here = !here.empty() && IsSameName(here.front(), key);  // but for a dash or a capital
+  if (!places.empty() && !is_here) {
+    return fmt::format("is no key of this object; \"{}\" belongs {}", name, Alternatives(places));
+  }
+  if (!here.empty()) return fmt::format("unknown key; did you mean {}?", Alternatives(Quoted(here)));
+  std::vector<std::string> elsewhere;
+  for (const Kind& kind : Kinds()) {
+    const std::vector<std::string> names = Quoted(NearestNames(key, kind.keys));
+    if (!names.empty()) elsewhere.push_back(fmt::format("{} {}", Alternatives(names), kind.place));
+  }
+  return elsewhere.empty() ? "" : fmt::format("is no key of this object; did you mean {}?", Alternatives(elsewhere));
+}
+
+}  // namespace terrace::config

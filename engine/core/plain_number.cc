@@ -1,0 +1,38 @@
+#include "engine/core/plain_number.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
+namespace terrace {
+namespace {
+
+int DecimalsFor(double value, int digits) {
+  if (value == 0 || !std::isfinite(value)) return 0;
+  const int exponent = static_cast<int>(std::floor(std::log10(std::abs(value))));
+  return std::max(digits - 1 - exponent, 0);
+}
+
+std::string WithDecimals(double value, int decimals) {
+  std::string text = fmt::format("{:.{}f}", value, decimals);
+  if (text.find('.') != std::string::npos) {
+    text.erase(text.find_last_not_of('0') + 1);
+    if (text.back() == '.') text.pop_back();
+  }
+  return text == "-0" ? "0" : text;
+}
+
+}  // namespace
+
+std::string PlainNumber(double value, int digits) { return WithDecimals(value, DecimalsFor(value, digits)); }
+
+std::string PlainNumberUp(double value, int digits) {
+  const int decimals = DecimalsFor(value, digits);
+  const std::string text = WithDecimals(value, decimals);
+  const double printed = std::strtod(text.c_str(), nullptr);
+  return printed < value ? WithDecimals(printed + std::pow(10.0, -decimals), decimals) : text;
+}
+
+}  // namespace terrace

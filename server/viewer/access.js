@@ -1,0 +1,69 @@
+// What the server shows to this page: the datasets, and the token with which it is asked for them. The token is kept
+// until the tab is closed, and goes into headers alone: no address that somebody copies has it.
+const kKey = "terrace.token";
+
+// The server knows no such token.
+export class UnknownToken extends Error {}
+
+// A browser may forbid pages to keep anything.
+function stored(act) {
+  try {
+    return act(sessionStorage);
+  } catch {
+    return undefined;
+  }
+}
+
+export class Access {
+  #token = stored((storage) => storage.getItem(kKey)) ?? "";
+
+  // For every request.
+  get headers() {
+    return headersOf(this.#token);
+  }
+
+  // From now on. Empty: none.
+  set token(token) {
+    this.#token = token;
+    stored((storage) => (token ? storage.setItem(kKey, token) : storage.removeItem(kKey)));
+  }
+
+  // {datasets, moreWithToken}: what is shown to who has this token.
+  async list(token = this.#token) {
+    if (!/^[\w.~+/=-]*$/.test(token)) throw new UnknownToken();
+    const response = await fetch("/datasets", { headers: headersOf(token) });
+    if (response.status === 401) throw new UnknownToken();
+    if (!response.ok) throw new Error(`the server answered ${response.status} to /datasets`);
+    const { datasets, more_with_token: moreWithToken = false } = await response.json();
+    return { datasets: datasets.map(withDefaults), moreWithToken };
+  }
+
+  // Whether the server refuses what this URL names to the token in use.
+  async isRefused(url) {
+    return [401, 403].includes((await fetch(url, { headers: this.headers })).status);
+  }
+
+  // Metres above the ellipsoid; undefined where the server does not tell.
+  async heightAt(dataset, longitude, latitude) {
+    try {
+      const reply = await fetch(`${dataset.urls.heights}?locations=${latitude},${longitude}`, { headers: this.headers });
+      return reply.ok ? (await reply.json()).results[0].elevation ?? undefined : undefined;
+    } catch {
+      return undefined;
+    }
+  }
+}
+
+function headersOf(token) {
+  return token ? { Authorization: `Bearer ${token}` } : {};
+}
+
+function withDefaults(dataset) {
+  const base = `/${encodeURIComponent(dataset.name)}`;
+  return {
+    ...dataset,
+    bounds: dataset.bounds ?? [-180, -90, 180, 90],
+    heights: { min: dataset.heights?.min ?? 0, max: dataset.heights?.max ?? 4000 },
+    urls: { layer: `${base}/layer.json`, tileset: `${base}/tileset.json`, heights: `${base}/heights`, ...dataset.urls },
+  };
+}

@@ -1,0 +1,27 @@
+// Asks for a token, in front of the globe.
+const byId = (id) => document.getElementById(id);
+
+export class TokenCard {
+  // `use`: called with the token.
+  constructor(use) {
+    byId("token-card").addEventListener("submit", (event) => {
+      event.preventDefault();
+      use(byId("token").value.trim());
+    });
+    byId("token-cancel").addEventListener("click", () => this.close());
+  }
+
+  // `reason`: a sentence. `isOptional`: there is something to see without a token.
+  ask(reason, isOptional) {
+    byId("token-reason").textContent = reason;
+    byId("token-cancel").hidden = !isOptional;
+    byId("token-card").hidden = false;
+    byId("token").select();
+    byId("token").focus();
+  }
+
+  close() {
+    byId("token").value = "";
+    byId("token-card").hidden = true;
+  }
+}

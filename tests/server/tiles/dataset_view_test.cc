@@ -1,0 +1,56 @@
+#include "server/tiles/dataset_view.h"
+
+#include <gtest/gtest.h>
+
+namespace terrace::server {
+namespace {
+
+// Of the whole Earth, with these tiles at level 3, whose tiles are 22.5 degrees wide: 16 columns, 8 rows.
+DatasetView Earth(std::vector<geo::TileRange> deepest) {
+  DatasetView dataset;
+  dataset.available = {{{0, 0, 1, 0}}, {{0, 0, 3, 1}}, {{0, 0, 7, 3}}, std::move(deepest)};
+  return dataset;
+}
+
+void ExpectBounds(const DatasetView& dataset, const dem::GeoBounds& expected) {
+  const dem::GeoBounds bounds = FinestBounds(dataset);
+  EXPECT_DOUBLE_EQ(bounds.west, expected.west);
+  EXPECT_DOUBLE_EQ(bounds.south, expected.south);
+  EXPECT_DOUBLE_EQ(bounds.east, expected.east);
+  EXPECT_DOUBLE_EQ(bounds.north, expected.north);
+}
+
+TEST(FinestBounds, AreThoseOfTheDeepestTiles) {
+  ExpectBounds(Earth({{8, 4, 9, 4}}), {0, 0, 45, 22.5});
+  ExpectBounds(Earth({{0, 0, 15, 7}}), {-180, -90, 180, 90});
+  DatasetView none;
+  ExpectBounds(none, {-180, -90, 180, 90});
+}
+
+TEST(FinestBounds, HoldWhatTouchesTheLargestRangeAlone) {
+  ExpectBounds(Earth({{1, 1, 1, 1}, {8, 4, 9, 4}, {9, 5, 10, 5}, {13, 4, 13, 4}}), {0, 0, 67.5, 45});
+  ExpectBounds(Earth({{6, 3, 6, 3}, {7, 4, 7, 4}, {8, 5, 9, 5}}), {-45, -22.5, 45, 45});
+}
+
+TEST(FinestBounds, CrossTheAntimeridian) {
+  ExpectBounds(Earth({{0, 4, 1, 4}, {14, 4, 15, 4}}), {135, 0, -135, 22.5});
+  ExpectBounds(Earth({{0, 4, 15, 4}}), {-180, 0, 180, 22.5});
+}
+
+TEST(FinestBounds, LieWithinTheData) {
+  DatasetView dataset = Earth({{8, 4, 8, 4}});
+  dataset.west = 5;
+  dataset.south = 4;
+  dataset.east = 6;
+  dataset.north = 7;
+  ExpectBounds(dataset, {5, 4, 6, 7});
+  dataset = Earth({{0, 4, 0, 4}, {15, 4, 15, 4}});
+  dataset.west = 179;
+  dataset.south = 4;
+  dataset.east = -178;
+  dataset.north = 7;
+  ExpectBounds(dataset, {179, 4, -178, 7});
+}
+
+}  // namespace
+}  // namespace terrace::server
