@@ -197,7 +197,7 @@ bool NeedsAverages(const RasterLayout& layout) {
 
 int LeastKeptFactor(const RasterLayout& layout) {
   constexpr std::int64_t kMaxReadWhole = std::int64_t{1024} * 1024;
-  constexpr int kMinOfSmall = 8;
+  constexpr int kMinOfSmall = 4;
   if (NeedsAverages(layout)) return 2;
   const bool is_small = std::int64_t{layout.width} * layout.height < kMaxReadWhole;
   return layout.overview_factors.empty() && !is_small ? kMinOfSmall : kLargestDirect;
