@@ -1,0 +1,155 @@
+// Nodes whose positions are those of their columns and rows are read by lines of samples; what comes out is what each
+// node gives on its own.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <span>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "engine/dem/raster/grid_cells.h"
+
+namespace terrace::dem {
+namespace {
+
+// A raster, a window of nodes over it, and the nodes that are wanted.
+class Case {
+ public:
+  explicit Case(unsigned seed) : random_(seed) {
+    factor_ = 1 << Pick(4);
+    wraps_ = Pick(3) == 0;
+    width_ = wraps_ ? 64 * (1 + Pick(4)) : 5 + Pick(200);
+    height_ = 5 + Pick(200);
+    nodes_ = {0, 0, 2 + Pick(40), 2 + Pick(40)};
+    const double step = (0.2 + Pick(30) * 0.1) * factor_;
+    const double west = Pick(width_ + 40) - 20, north = Pick(height_ + 40) - 20;
+    for (int i = 0; i < nodes_.columns; ++i) x_.push_back(Placed(west + i * step));
+    for (int j = 0; j < nodes_.rows; ++j) y_.push_back(north + (nodes_.rows - 1 - j) * step);
+    for (const double y : y_) {
+      for (const double x : x_) {
+        const bool is_inside = y >= 0 && y <= height_ && (wraps_ || (x >= 0 && x <= width_));
+        wanted_.push_back(is_inside && Pick(20) != 0 ? 1 : 0);
+      }
+    }
+  }
+
+  GridAxes axes() const { return {{width_, factor_, wraps_}, {height_, factor_, false}, width_, height_}; }
+  NodePositions ByAxes() const { return {nodes_, x_, y_}; }
+  NodePositions ByNodes() const {
+    std::vector<Position> nodes;
+    for (const double y : y_) {
+      for (const double x : x_) nodes.push_back({x, y});
+    }
+    return {nodes_, std::move(nodes)};
+  }
+  const std::vector<std::uint8_t>& wanted() const { return wanted_; }
+  bool is_any_wanted() const { return std::ranges::count(wanted_, std::uint8_t{1}) > 0; }
+  const NodeWindow& nodes() const { return nodes_; }
+
+  // Heights that take all bits of a float, one in twelve void.
+  std::vector<float> Samples(const GridWindow& window) {
+    std::vector<float> samples(static_cast<std::size_t>(window.columns * window.rows));
+    std::uniform_real_distribution<float> height(-500, 9000);
+    for (float& sample : samples) sample = Pick(12) == 0 ? std::numeric_limits<float>::quiet_NaN() : height(random_);
+    return samples;
+  }
+
+ private:
+  int Pick(int count) { return static_cast<int>(random_() % static_cast<unsigned>(count)); }
+  // As Georeference::ToPixels gives columns: inside the raster where it wraps.
+  double Placed(double x) const { return wraps_ ? x - std::floor(x / width_) * width_ : x; }
+
+  std::mt19937 random_;
+  int factor_ = 1, width_ = 0, height_ = 0;
+  bool wraps_ = false;
+  NodeWindow nodes_;
+  std::vector<double> x_, y_;
+  std::vector<std::uint8_t> wanted_;
+};
+
+TEST(NodeCells, OfAxesAreThoseOfSingleNodes) {
+  int tried = 0, around = 0;
+  for (unsigned seed = 0; seed < 2000; ++seed) {
+    Case one(seed);
+    if (!one.is_any_wanted()) continue;
+    ++tried;
+    NodeCells by_axes(one.ByAxes(), one.axes(), one.wanted()), by_nodes(one.ByNodes(), one.axes(), one.wanted());
+    ASSERT_TRUE(by_axes.is_separable());
+    ASSERT_FALSE(by_nodes.is_separable());
+    const GridWindow window = by_axes.Cover(one.axes(), one.wanted());
+    const GridWindow of_nodes = by_nodes.Cover(one.axes(), one.wanted());
+    ASSERT_EQ(std::tuple(window.column, window.row, window.columns, window.rows),
+              std::tuple(of_nodes.column, of_nodes.row, of_nodes.columns, of_nodes.rows))
+        << seed;
+    around += window.column < 0 || window.column + window.columns > one.axes().columns.count() ? 1 : 0;
+    const auto columns = static_cast<std::size_t>(one.nodes().columns);
+    for (std::size_t n = 0; n < one.wanted().size(); ++n) {
+      if (one.wanted()[n] == 0) continue;
+      const GridCell a = by_axes.At(n % columns, n / columns), b = by_nodes.At(n % columns, n / columns);
+      ASSERT_EQ(std::tuple(a.column, a.row, a.x, a.y), std::tuple(b.column, b.row, b.x, b.y)) << seed;
+      // The cell lies in the window, as far as its samples count.
+      ASSERT_GE(a.column, window.column);
+      ASSERT_LT(a.column + (a.x > 0 ? 1 : 0), window.column + window.columns) << seed;
+      ASSERT_GE(a.row, window.row);
+      ASSERT_LT(a.row + (a.y > 0 ? 1 : 0), window.row + window.rows) << seed;
+    }
+  }
+  EXPECT_GT(tried, 1000);
+  EXPECT_GT(around, 50);
+}
+
+TEST(NodeRows, AreBitForBitWhatEachNodeGives) {
+  int compared = 0, voids = 0;
+  for (unsigned seed = 0; seed < 2000; ++seed) {
+    Case one(seed);
+    if (!one.is_any_wanted()) continue;
+    NodeCells cells(one.ByAxes(), one.axes(), one.wanted());
+    const GridWindow window = cells.Cover(one.axes(), one.wanted());
+    const std::vector<float> samples = one.Samples(window);
+    const auto columns = static_cast<std::size_t>(one.nodes().columns);
+    std::size_t first = columns, end = 0;
+    for (std::size_t n = 0; n < one.wanted().size(); ++n) {
+      if (one.wanted()[n] != 0) first = std::min(first, n % columns), end = std::max(end, n % columns + 1);
+    }
+    NodeRows rows(samples, window, cells, first, end);
+    for (std::size_t j = 0; j < static_cast<std::size_t>(one.nodes().rows); ++j) {
+      const auto row = std::span(one.wanted()).subspan(j * columns, columns);
+      if (std::ranges::count(row, std::uint8_t{1}) == 0) continue;
+      const std::span<const double> heights = rows.Row(j);
+      ASSERT_EQ(heights.size(), end - first);
+      for (std::size_t i = first; i < end; ++i) {
+        if (row[i] == 0) continue;
+        const auto expected = Interpolate(samples, window, cells.At(i, j));
+        const double height = heights[i - first];
+        if (std::isnan(height)) {  // one of its samples is void; what the others give is for Interpolate
+          ++voids;
+          continue;
+        }
+        ASSERT_TRUE(expected);
+        ASSERT_EQ(std::bit_cast<std::uint64_t>(height), std::bit_cast<std::uint64_t>(*expected)) << seed;
+        ++compared;
+      }
+    }
+  }
+  EXPECT_GT(compared, 100'000);
+  EXPECT_GT(voids, 10'000);
+}
+
+// Between four samples the surface is bilinear; of voids it takes those that are there by their weights.
+TEST(Interpolate, IsBilinearAndLeavesVoidsOut) {
+  const GridWindow window{10, 20, 2, 2};
+  const float none = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_EQ(Interpolate({0, 8, 16, 24}, window, {10, 20, 0.25, 0.5}), 10);
+  EXPECT_EQ(Interpolate({0, 8, 16, none}, window, {10, 20, 0.5, 0.5}), 8);
+  EXPECT_EQ(Interpolate({none, none, none, 3}, window, {10, 20, 0.25, 0.5}), 3);
+  EXPECT_EQ(Interpolate({none, none, none, none}, window, {10, 20, 0.25, 0.5}), std::nullopt);
+  EXPECT_EQ(Interpolate({7, none, none, none}, window, {10, 20, 0, 0}), 7) << "samples without a weight may be void";
+}
+
+}  // namespace
+}  // namespace terrace::dem
