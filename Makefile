@@ -3,14 +3,14 @@ JOBS ?= $(shell nproc)
 CONFIG ?= config/samples/samples.json
 # Address of `make run`, HOST:PORT; empty: what CONFIG says.
 LISTEN ?=
-# Options of `make bench`, for instance BENCH="--peer 'COMMAND' --filter 'T1 '": see docs/performance.md.
+# Options of `make bench` and `make bench-serve`, for instance BENCH="--peer 'COMMAND' --filter 'T1 '": see docs/performance.md.
 BENCH ?=
 
 SOURCES = git ls-files '*.h' '*.cc'
 TERRACE = build/release/server/cli/terrace
 
 .DEFAULT_GOAL := help
-.PHONY: help deps test-deps build run test sanitize coverage reliability reliability-long bench paper docs format lint tidy clean
+.PHONY: help deps test-deps build run test sanitize coverage reliability reliability-long bench bench-serve paper docs format lint tidy clean
 
 help:  ## list these targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-16s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -50,6 +50,9 @@ reliability-long: test-deps  ## the same, each row as often as the scorecard say
 
 bench: test-deps  ## build and run the benchmarks; JSON results in build/bench/results
 	@tools/run_benchmarks.sh $(JOBS) $(BENCH)
+
+bench-serve: build  ## tiles end to end by level and stage, data from ../shared/data; BENCH="BEFORE/terrace": beside another build
+	@tests/load/bench_serve.py $(BENCH) $(TERRACE)
 
 paper: test-deps  ## repeat the experiments of the paper (docs/engine.md) into build/paper
 	@tools/run_paper.sh $(JOBS)
