@@ -1,15 +1,15 @@
 #!/usr/bin/env python3
 """Asks a terrace server for heights, then decodes the quantized-mesh tile at each place and reads the height off it.
 
-    examples/heights.py [--server URL] [--dataset NAME] [LAT,LON ...]      needs numpy
+    examples/heights.py [--server URL] [--dataset NAME] [LAT,LON ...]
 """
 import argparse
 import json
+import struct
 import sys
 import urllib.error
 import urllib.request
-
-import numpy as np
+from itertools import accumulate
 
 
 def fetch(url):
@@ -18,30 +18,36 @@ def fetch(url):
 
 
 def decode(tile):
-    """Vertices as u, v and height, and triangles as rows of three indices. u and v are 0 to 1 from west and from south."""
-    low, high = np.frombuffer(tile, "<f4", 2, 24)
-    vertices = int(np.frombuffer(tile, "<u4", 1, 88)[0])
-    deltas = np.frombuffer(tile, "<u2", 3 * vertices, 92).reshape(3, vertices).astype(np.int64)
-    u, v, height = np.cumsum((deltas >> 1) ^ -(deltas & 1), axis=1) / 32767  # zigzag, each from the one before
-    at = 92 + 6 * vertices
-    index = "<u2"
-    if vertices > 65536:
-        index, at = "<u4", (at + 3) & ~3
-    triangles = int(np.frombuffer(tile, "<u4", 1, at)[0])
-    codes = np.frombuffer(tile, index, 3 * triangles, at + 4).astype(np.int64)
-    is_new = codes == 0  # a code counts back from the next vertex that no triangle has had yet
-    indices = np.cumsum(is_new) - is_new - codes
-    return np.stack([u, v, low + height * (high - low)]), indices.reshape(-1, 3)
+    """Vertices as (u, v, height), u and v from 0 in the south-west to 1, and triangles as three indices each."""
+    low, high = struct.unpack_from("<2f", tile, 24)
+    count, = struct.unpack_from("<I", tile, 88)
+    codes = struct.unpack_from(f"<{3 * count}H", tile, 92)
+
+    def numbers(first):  # zigzag, each number from the one before
+        return (value / 32767 for value in accumulate((code >> 1) ^ -(code & 1) for code in codes[first:first + count]))
+
+    vertices = [(u, v, low + h * (high - low)) for u, v, h in zip(numbers(0), numbers(count), numbers(2 * count))]
+    at, letter = 92 + 6 * count, "H"
+    if count > 65536:
+        at, letter = (at + 3) & ~3, "I"
+    triangles, = struct.unpack_from("<I", tile, at)
+    indices, unused = [], 0  # a code counts back from the first vertex that no triangle has had yet
+    for code in struct.unpack_from(f"<{3 * triangles}{letter}", tile, at + 4):
+        indices.append(unused - code)
+        unused += code == 0
+    return vertices, list(zip(indices[::3], indices[1::3], indices[2::3]))
 
 
 def height_at(vertices, triangles, u, v):
     """Of the triangle that holds the place, by its barycentric coordinates."""
-    (ax, ay, az), (bx, by, bz), (cx, cy, cz) = (vertices[:, corner] for corner in triangles.T)
-    area = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
-    b = ((u - ax) * (cy - ay) - (cx - ax) * (v - ay)) / area
-    c = ((bx - ax) * (v - ay) - (u - ax) * (by - ay)) / area
-    inside = np.argmax(np.min([1 - b - c, b, c], axis=0))
-    return (az + b * (bz - az) + c * (cz - az))[inside]
+    for triangle in triangles:
+        (ax, ay, az), (bx, by, bz), (cx, cy, cz) = (vertices[index] for index in triangle)
+        area = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
+        b = ((u - ax) * (cy - ay) - (cx - ax) * (v - ay)) / area
+        c = ((bx - ax) * (v - ay) - (u - ax) * (by - ay)) / area
+        if min(b, c, 1 - b - c) >= -1e-12:
+            return az + b * (bz - az) + c * (cz - az)
+    raise ValueError("no triangle holds the place")
 
 
 def main():
@@ -69,7 +75,7 @@ def main():
         vertices, triangles = decode(tile)
         span = 180 / 2**level  # degrees; columns count from 180 W, rows from the South Pole
         drawn = height_at(vertices, triangles, (longitude + 180) / span - column, (latitude + 90) / span - row)
-        print(f"{latitude}, {longitude}: {result['elevation']} m in {name}; tile {result['tile']} with {vertices.shape[1]} vertices and "
+        print(f"{latitude}, {longitude}: {result['elevation']} m in {name}; tile {result['tile']} with {len(vertices)} vertices and "
               f"{len(triangles)} triangles has {drawn:.2f} m, and is at most {headers['Terrain-Certified-Error']} m off anywhere")
 
 
