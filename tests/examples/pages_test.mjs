@@ -19,7 +19,7 @@ const kChromium = process.env.TERRACE_CHROMIUM ?? '/usr/bin/chromium';
 const kFlags = ['--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist',
                 '--disable-background-networking', '--no-first-run'];
 const kTypes = { '.js': 'text/javascript', '.css': 'text/css', '.json': 'application/json', '.html': 'text/html' };
-const kSize = { width: 390, height: 260 };
+const kSize = { width: 330, height: 220 };
 const kSettleMs = 40000;
 const run = promisify(execFile);
 
@@ -153,25 +153,25 @@ describe('the pages of examples/', () => {
     assert.ok(height >= low && height <= high, `${what}: ${height} m is not between ${low} and ${high} m`);
   }
 
-  // Height and place of two clicks, each against what `allowed` says of it.
-  async function clicks(page, what, allowed) {
-    for (const [x, y] of [[0.5, 0.55], [0.42, 0.65]]) {
+  // Height and place of clicks, each against what `allowed` says of it.
+  async function clicks(page, client, dataset, allowed) {
+    for (const [x, y] of dataset === 'earth' ? [[0.46, 0.6]] : [[0.5, 0.55], [0.42, 0.65]]) {
       const place = await click(page, x, y);
-      within(place.height, await allowed(place), `${what} at ${place.latitude}, ${place.longitude}`);
+      within(place.height, await allowed(place), `${client}, ${dataset} at ${place.latitude}, ${place.longitude}`);
     }
   }
 
   const pages = {
     'cesium-terrain': {
-      ready: 'window.widget?.scene.globe.tilesLoaded && widget.scene.globe.pick(widget.camera.getPickRay({x: 195, y: 160}), widget.scene)',
-      check: (page, dataset) => clicks(page, `cesium-terrain, ${dataset}`, async (place) => {
+      ready: 'window.widget?.scene.globe.tilesLoaded && widget.scene.globe.pick(widget.camera.getPickRay({x: 165, y: 135}), widget.scene)',
+      check: (page, dataset) => clicks(page, 'cesium-terrain', dataset, async (place) => {
         const { height, error } = await truth(dataset, place);
         return [height - error, height + error];
       }),
     },
     'cesium-3dtiles': {
-      ready: 'window.tileset?.tilesLoaded && widget.scene.pickPosition({x: 195, y: 160})',
-      check: (page, dataset) => clicks(page, `cesium-3dtiles, ${dataset}`, async (place) => {
+      ready: 'window.tileset?.tilesLoaded && widget.scene.pickPosition({x: 165, y: 135})',
+      check: (page, dataset) => clicks(page, 'cesium-3dtiles', dataset, async (place) => {
         const { height, tile } = await truth(dataset, place);
         const error = await certified(`${server.url}/${dataset}/${tile}.glb${dataset === 'earth' ? '?fraction=0.05' : ''}`);
         return [height - error, height + error];
@@ -179,7 +179,7 @@ describe('the pages of examples/', () => {
     },
     three: {
       ready: 'window.example?.tiles.visibleTiles.size > 0 && !Object.entries(example.tiles.stats).some(([name, n]) => /queued|downloading|parsing/.test(name) && n > 0)',
-      check: (page, dataset) => clicks(page, `three, ${dataset}`, async (place) => {
+      check: (page, dataset) => clicks(page, 'three', dataset, async (place) => {
         // The smallest of the drawn tiles that hold the place.
         const uri = await page.evaluate(({ latitude, longitude }) => {
           const [y, x] = [latitude, longitude].map((degrees) => degrees * Math.PI / 180);
@@ -247,6 +247,16 @@ describe('the pages of examples/', () => {
       });
     }
   }
+
+  it('a page says what is wrong', async () => {
+    for (const [query, said] of [[`server=${server.url}&dataset=mars`, /no dataset mars; it has earth, jacksboro/],
+                                 ['server=http://127.0.0.1:9', /^http:\/\/127.0.0.1:9: Failed to fetch/]]) {
+      const page = await openPage(browser, `file://${kExamples}/maplibre.html?${query}`);
+      await settle(page, 'true');
+      assert.match(await line(page), said);
+      await page.close();
+    }
+  });
 
   it('heights.py reads off the tile what the server says, within the tile\'s error', async () => {
     const places = ['36.3,-84.2', '36.42,-84.11', '10,10'];
