@@ -106,4 +106,7 @@ install_packages
 if $runtime_only; then exit 0; fi
 install_boost
 install_node_modules server/viewer
-if $with_tests; then install_node_modules tests/e2e; fi
+if $with_tests; then
+  install_node_modules tests/e2e
+  install_node_modules tests/examples
+fi

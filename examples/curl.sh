@@ -1,0 +1,45 @@
+#!/bin/sh
+# What terrace serves, asked for with curl. Files go into a new folder, listed at the end.
+#
+#     examples/curl.sh [http://HOST:PORT] [DATASET]
+set -eu
+server=${1:-http://127.0.0.1:8080}
+dataset=${2:-$(curl -fsS "$server/datasets" | sed 's/[^[]*\[{"name":"\([^"]*\)".*/\1/')}
+folder=$(mktemp -d)
+
+# Prints the command and runs it.
+get() {
+  printf '\n$ curl'
+  for word in "$@"; do
+    case $word in *[!A-Za-z0-9:/._,=-]*) printf " '%s'" "$word" ;; *) printf ' %s' "$word" ;; esac
+  done
+  echo && curl -fsS "$@" && echo
+}
+
+get "$server/datasets"
+get "$server/$dataset/layer.json"
+get "$server/$dataset/tiles.json"
+
+# The height in the middle of the dataset, and which tile of the deepest level is there.
+bounds=$(curl -fsS "$server/$dataset/tiles.json" | sed 's/.*"bounds":\[\([^]]*\)\].*/\1/')
+middle=$(echo "$bounds" | awk -F, '{ printf "%.6f,%.6f", ($2 + $4) / 2, ($1 + $3) / 2 }')
+get "$server/$dataset/heights?locations=$middle&certify=deepest"
+tile=$(curl -fsS "$server/$dataset/heights?locations=$middle&certify=deepest" | sed 's/.*"tile":"\([^"]*\)".*/\1/')
+
+# That tile as quantized-mesh with normals, and as glTF. The headers tell its error and how long each step took.
+get -D - -o "$folder/tile.terrain" --compressed -H 'Accept: application/vnd.quantized-mesh;extensions=octvertexnormals' "$server/$dataset/$tile.terrain"
+get -D - -o "$folder/tile.glb" "$server/$dataset/$tile.glb?compression=none"
+
+# Asked for again with the ETag of the first reply it is not sent again: 304.
+etag=$(curl -fsS -o "$folder/plain.terrain" -D - "$server/$dataset/$tile.terrain" | tr -d '\r' | sed -n 's/^ETag: //p')
+get -o "$folder/not_sent" -w '%{http_code}' -H "If-None-Match: $etag" "$server/$dataset/$tile.terrain"
+
+# Heights along a line of 1 km to the north, by POST as a form.
+north=$(echo "$middle" | awk -F, '{ printf "%.6f,%.6f", $1 + 0.009, $2 }')
+get --data-urlencode "path=$middle|$north" --data-urlencode samples=5 "$server/$dataset/heights"
+
+# One mesh of 0.05 x 0.05 degrees, as Wavefront OBJ.
+box=$(echo "$middle" | awk -F, '{ printf "%.6f,%.6f,%.6f,%.6f", $2 - 0.025, $1 - 0.025, $2 + 0.025, $1 + 0.025 }')
+get -D - -o "$folder/area.obj" "$server/$dataset/mesh?bbox=$box&error=20&format=obj"
+
+ls -l "$folder"/*

@@ -1,0 +1,291 @@
+// Each page and script of examples/, as its reader gets it: the page in a real browser, its library from node_modules in
+// place of the CDN, the server the real one with the sample data. What a client says of a height is compared with /heights.
+import assert from 'node:assert/strict';
+import { execFile } from 'node:child_process';
+import fs from 'node:fs';
+import http from 'node:http';
+import os from 'node:os';
+import path from 'node:path';
+import { after, before, describe, it } from 'node:test';
+import { fileURLToPath } from 'node:url';
+import { promisify } from 'node:util';
+import { chromium } from '../e2e/node_modules/playwright-core/index.mjs';
+import { json, request, samples, serve } from '../e2e/harness.mjs';
+
+const kHere = path.dirname(fileURLToPath(import.meta.url));
+const kExamples = path.join(kHere, '../../examples');
+const kModules = [path.join(kHere, 'node_modules'), path.join(kHere, '../../server/viewer/node_modules')];
+const kChromium = process.env.TERRACE_CHROMIUM ?? '/usr/bin/chromium';
+const kFlags = ['--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist',
+                '--disable-background-networking', '--no-first-run'];
+const kTypes = { '.js': 'text/javascript', '.css': 'text/css', '.json': 'application/json', '.html': 'text/html' };
+const kSize = { width: 330, height: 220 };
+const kSettleMs = 40000;
+const run = promisify(execFile);
+
+// The file of node_modules that a URL of the CDN names; its version has to be the installed one.
+function fileOf(url) {
+  const [, name, version, file] = url.match(/^https:\/\/cdn\.jsdelivr\.net\/npm\/((?:@[^/]+\/)?[^@/]+)@([\d.]+)\/([^?#]+)/) ?? [];
+  const folder = name && kModules.map((modules) => path.join(modules, name)).find((folder) => fs.existsSync(folder));
+  if (!folder || JSON.parse(fs.readFileSync(path.join(folder, 'package.json'))).version !== version) return undefined;
+  return fs.existsSync(path.join(folder, file)) ? path.join(folder, file) : undefined;
+}
+
+async function openPage(browser, url) {
+  const page = await browser.newPage({ viewport: kSize });
+  page.wrongs = [];
+  page.on('console', (message) => message.type() === 'error' && page.wrongs.push(`console: ${message.text()}`));
+  page.on('pageerror', (error) => page.wrongs.push(`exception: ${error}`));
+  page.on('response', (response) => response.status() >= 400 && page.wrongs.push(`${response.status()} ${response.url()}`));
+  await page.context().route(/^https:/, (route) => {
+    const file = fileOf(route.request().url());
+    if (!file) page.wrongs.push(`not in node_modules: ${route.request().url()}`);
+    const headers = { 'Access-Control-Allow-Origin': '*' };
+    const contentType = kTypes[path.extname(file ?? '')] ?? 'application/octet-stream';
+    return file ? route.fulfill({ body: fs.readFileSync(file), contentType, headers }) : route.abort();
+  });
+  await page.goto(url);
+  return page;
+}
+
+const line = (page) => page.locator('#line').innerText();
+
+// Waits until `ready`, an expression of the page, has been true for half a second.
+async function settle(page, ready) {
+  await page.waitForFunction((expression) => {
+    const fine = !document.getElementById('line').textContent.startsWith('Loading') && (0, eval)(expression);
+    window.calmSince = fine ? window.calmSince ?? performance.now() : undefined;
+    return fine && performance.now() - window.calmSince > 500;
+  }, ready, { timeout: kSettleMs, polling: 100 }).catch(async (error) => {
+    throw new Error(`${error.message.split('\n')[0]}: ${await line(page)} ${page.wrongs.join('; ')}`);
+  });
+}
+
+// Clicks there and reads place and height from the page's line.
+async function click(page, x, y) {
+  const before = await line(page);
+  await page.mouse.click(x * kSize.width, y * kSize.height);
+  await page.waitForFunction((text) => document.getElementById('line').innerText !== text, before, { timeout: kSettleMs });
+  const found = (await line(page)).match(/\n(-?[\d.]+), (-?[\d.]+): (-?[\d.]+) m/);
+  assert.ok(found, await line(page));
+  const [latitude, longitude, height] = found.slice(1).map(Number);
+  return { latitude, longitude, height };
+}
+
+// How many colours, at 5 bits a channel, the picture below the line has.
+async function colours(page) {
+  const clip = { x: 0, y: 80, width: kSize.width, height: kSize.height - 80 };
+  const png = (await page.screenshot({ clip, timeout: kSettleMs })).toString('base64');
+  return page.evaluate(async (base64) => {
+    const bytes = Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
+    const image = await createImageBitmap(new Blob([bytes], { type: 'image/png' }));
+    const context = new OffscreenCanvas(image.width, image.height).getContext('2d');
+    context.drawImage(image, 0, 0);
+    const { data } = context.getImageData(0, 0, image.width, image.height);
+    return new Set(Array.from({ length: data.length / 4 }, (_, i) =>
+      ((data[4 * i] >> 3) << 10) | ((data[4 * i + 1] >> 3) << 5) | (data[4 * i + 2] >> 3))).size;
+  }, png);
+}
+
+// Metres of a pixel of a Web Mercator tile.
+const pixelMetres = (latitude, zoom, size) => 40075016 * Math.cos(latitude * Math.PI / 180) / size / 2 ** zoom;
+
+// Runs in the page of deck.gl: height and level of the deepest mesh at a place.
+function meshHeight({ longitude, latitude }) {
+  const x = 512 * (longitude + 180) / 360, y = 256 + 256 / Math.PI * Math.asinh(Math.tan(latitude * Math.PI / 180));
+  const level = ({ id }) => Number(id.split('-').at(-1));
+  const layers = example.layerManager.getLayers().filter(({ props }) => props.mesh?.attributes).sort((a, b) => level(b) - level(a));
+  for (const layer of layers) {
+    const { mesh } = layer.props;
+    const at = mesh.attributes.POSITION.value;
+    const { value: corners } = mesh.indices;
+    for (let i = 0; i < corners.length; i += 3) {
+      const [a, b, c] = [corners[i] * 3, corners[i + 1] * 3, corners[i + 2] * 3];
+      const area = (at[b] - at[a]) * (at[c + 1] - at[a + 1]) - (at[c] - at[a]) * (at[b + 1] - at[a + 1]);
+      const v = ((x - at[a]) * (at[c + 1] - at[a + 1]) - (at[c] - at[a]) * (y - at[a + 1])) / area;
+      const w = ((at[b] - at[a]) * (y - at[a + 1]) - (x - at[a]) * (at[b + 1] - at[a + 1])) / area;
+      if (v >= 0 && w >= 0 && v + w <= 1) {
+        return { height: at[a + 2] + v * (at[b + 2] - at[a + 2]) + w * (at[c + 2] - at[a + 2]), zoom: level(layer) };
+      }
+    }
+  }
+  return undefined;
+}
+
+describe('the pages of examples/', () => {
+  let server, files, browser;
+
+  before(async () => {
+    server = await serve('--config', path.join(samples, 'samples.json'));
+    files = http.createServer((asked, reply) => {
+      const file = path.join(kExamples, path.basename(new URL(asked.url, 'http://host').pathname));
+      reply.writeHead(fs.existsSync(file) ? 200 : 404, { 'Content-Type': kTypes[path.extname(file)] ?? 'text/plain' });
+      reply.end(fs.existsSync(file) ? fs.readFileSync(file) : '');
+    });
+    await new Promise((resolve) => files.listen(0, '127.0.0.1', resolve));
+    browser = await chromium.launch({ executablePath: kChromium, args: kFlags });
+  });
+  after(async () => {
+    await browser?.close();
+    files?.close();
+    await server?.stop();
+  });
+
+  // The server's height there, the deepest tile, and how far that may be from the height.
+  async function truth(dataset, { latitude, longitude }) {
+    const url = `${server.url}/${dataset}/heights?certify=deepest&locations=${latitude},${longitude}`;
+    const { results: [{ elevation, certified_error: error, tile }] } = await json(url);
+    return { height: elevation, error, tile };
+  }
+  const certified = async (url) => Number((await request(url, { method: 'HEAD' })).headers['terrain-certified-error']);
+
+  // The lowest and the highest of the server's heights within `metres` of a place.
+  async function range(dataset, { latitude, longitude }, metres) {
+    const steps = [-1, -0.5, 0, 0.5, 1].map((share) => share * metres / 111320);
+    const points = steps.flatMap((y) => steps.map((x) => `${latitude + y},${longitude + x / Math.cos(latitude * Math.PI / 180)}`));
+    const { results } = await json(`${server.url}/${dataset}/heights?locations=${points.join('|')}`);
+    const heights = results.map(({ elevation }) => elevation);
+    return [Math.min(...heights), Math.max(...heights)];
+  }
+
+  function within(height, [low, high], what) {
+    console.log(`${what}: ${height.toFixed(2)} m, ${low.toFixed(2)} to ${high.toFixed(2)} m allowed`);
+    assert.ok(height >= low && height <= high, `${what}: ${height} m is not between ${low} and ${high} m`);
+  }
+
+  // Height and place of clicks, each against what `allowed` says of it.
+  async function clicks(page, client, dataset, allowed) {
+    for (const [x, y] of dataset === 'earth' ? [[0.46, 0.6]] : [[0.5, 0.55], [0.42, 0.65]]) {
+      const place = await click(page, x, y);
+      within(place.height, await allowed(place), `${client}, ${dataset} at ${place.latitude}, ${place.longitude}`);
+    }
+  }
+
+  const pages = {
+    'cesium-terrain': {
+      ready: 'window.widget?.scene.globe.tilesLoaded && widget.scene.globe.pick(widget.camera.getPickRay({x: 165, y: 135}), widget.scene)',
+      check: (page, dataset) => clicks(page, 'cesium-terrain', dataset, async (place) => {
+        const { height, error } = await truth(dataset, place);
+        return [height - error, height + error];
+      }),
+    },
+    'cesium-3dtiles': {
+      ready: 'window.tileset?.tilesLoaded && widget.scene.pickPosition({x: 165, y: 135})',
+      check: (page, dataset) => clicks(page, 'cesium-3dtiles', dataset, async (place) => {
+        const { height, tile } = await truth(dataset, place);
+        const error = await certified(`${server.url}/${dataset}/${tile}.glb${dataset === 'earth' ? '?fraction=0.05' : ''}`);
+        return [height - error, height + error];
+      }),
+    },
+    three: {
+      ready: 'window.example?.tiles.visibleTiles.size > 0 && !Object.entries(example.tiles.stats).some(([name, n]) => /queued|downloading|parsing/.test(name) && n > 0)',
+      check: (page, dataset) => clicks(page, 'three', dataset, async (place) => {
+        // The smallest of the drawn tiles that hold the place.
+        const uri = await page.evaluate(({ latitude, longitude }) => {
+          const [y, x] = [latitude, longitude].map((degrees) => degrees * Math.PI / 180);
+          return [...example.tiles.visibleTiles].filter(({ boundingVolume: { region } }) =>
+            region && x >= region[0] && x <= region[2] && y >= region[1] && y <= region[3])
+            .sort((a, b) => a.geometricError - b.geometricError)[0].content.uri;
+        }, place);
+        const { height } = await truth(dataset, place);
+        const error = await certified(`${server.url}/${dataset}/${uri}`);
+        return [height - error, height + error];
+      }),
+    },
+    deck: {
+      ready: "window.example?.layerManager?.getLayers({layerIds: ['terrain']})[0]?.isLoaded",
+      check: async (page, dataset) => {
+        const place = await click(page, 0.5, 0.55);
+        const { height } = await truth(dataset, place);
+        within(place.height, [height - 0.01, height + 0.01], `deck, ${dataset}, as asked from the server`);
+        // The mesh that is drawn there from near by.
+        const { maxzoom } = await json(`${server.url}/${dataset}/tiles.json?size=512`);
+        await page.evaluate(({ longitude, latitude, zoom }) => example.setProps({ initialViewState: { longitude, latitude, zoom } }),
+                            { ...place, zoom: maxzoom + 1 });
+        await settle(page, `${pages.deck.ready} && (${meshHeight})(${JSON.stringify(place)})?.zoom === ${maxzoom}`);
+        const drawn = await page.evaluate(meshHeight, place);
+        const [times, base] = dataset === 'earth' ? [25, 0] : [1, 236];  // the page draws so that it can be seen
+        // deck.gl draws pixels up to 1.5 beside their places; the page lets its meshes be off by a 400th of the relief.
+        const { datasets } = await json(`${server.url}/datasets`), { heights } = datasets.find(({ name }) => name === dataset);
+        const error = (heights.max - heights.min) / 400 + 0.1;
+        const [low, high] = await range(dataset, place, 1.5 * pixelMetres(place.latitude, maxzoom, 512));
+        within(drawn.height / times + base, [low - error, high + error], `deck, ${dataset} at ${place.latitude}, ${place.longitude}`);
+      },
+    },
+    maplibre: {
+      ready: 'window.map?.loaded() && map.areTilesLoaded()',
+      check: async (page, dataset) => {
+        const { maxzoom } = await json(`${server.url}/${dataset}/tiles.json`);
+        const place = await click(page, 0.5, 0.55);
+        await page.evaluate(({ place, zoom }) => map.jumpTo({ center: [place.longitude, place.latitude], zoom, pitch: 0 }), { place, zoom: maxzoom + 2 });
+        await settle(page, 'map.loaded() && map.areTilesLoaded()');
+        for (const there of [place, await click(page, 0.4, 0.7)]) {
+          // MapLibre takes a pixel's height for that of its corner.
+          const height = await page.evaluate(({ longitude, latitude }) => map.queryTerrainElevation([longitude, latitude]), there);
+          const [low, high] = await range(dataset, there, 1.5 * pixelMetres(there.latitude, maxzoom, 256));
+          within(height, [low - 0.1, high + 0.1], `maplibre, ${dataset} at ${there.latitude}, ${there.longitude}`);
+        }
+      },
+    },
+  };
+
+  for (const dataset of ['jacksboro', 'earth']) {
+    for (const [name, { ready, check }] of Object.entries(pages)) {
+      const how = dataset === 'earth' ? 'by http' : 'as a file';
+      it(`${name} draws ${dataset}, opened ${how}`, async () => {
+        const folder = dataset === 'earth' ? `http://127.0.0.1:${files.address().port}` : `file://${kExamples}`;
+        const page = await openPage(browser, `${folder}/${name}.html?server=${server.url}&dataset=${dataset}`);
+        await settle(page, 'true');
+        await page.evaluate(() => { if (window.widget) widget.scene.msaaSamples = 1; });  // a software renderer
+        await settle(page, ready);
+        assert.match(await line(page), new RegExp(`^${dataset} of ${server.url} as `));
+        const count = await colours(page);
+        assert.ok(count > 100, `${count} colours`);
+        await check(page, dataset);
+        assert.deepEqual(page.wrongs, []);
+        await page.close();
+      });
+    }
+  }
+
+  it('a page says what is wrong', async () => {
+    for (const [query, said] of [[`server=${server.url}&dataset=mars`, /no dataset mars; it has earth, jacksboro/],
+                                 ['server=http://127.0.0.1:9', /^http:\/\/127.0.0.1:9: Failed to fetch/]]) {
+      const page = await openPage(browser, `file://${kExamples}/maplibre.html?${query}`);
+      await settle(page, 'true');
+      assert.match(await line(page), said);
+      await page.close();
+    }
+  });
+
+  it('heights.py reads off the tile what the server says, within the tile\'s error', async () => {
+    const places = ['36.3,-84.2', '36.42,-84.11', '10,10'];
+    const { stdout } = await run(path.join(kExamples, 'heights.py'), ['--server', server.url, '--dataset', 'jacksboro', ...places]);
+    const said = stdout.trim().split('\n');
+    assert.equal(said.length, 3);
+    assert.equal(said[2], '10, 10: outside jacksboro');
+    for (const line of said.slice(0, 2)) {
+      const [, height, tile, drawn, error] = line.match(/: ([\d.]+) m in jacksboro; tile (\S+) with .* has ([\d.]+) m, and is at most ([\d.]+) m/);
+      assert.equal(Number(error), await certified(`${server.url}/jacksboro/${tile}.terrain`));
+      within(Number(drawn), [height - error, Number(height) + Number(error)], `heights.py, ${line.split(':')[0]}`);
+    }
+    await assert.rejects(run(path.join(kExamples, 'heights.py'), ['--server', server.url, '--dataset', 'mars']), /it has earth, jacksboro/);
+  });
+
+  it('curl.sh fetches one of each', async () => {
+    const folder = fs.mkdtempSync(path.join(os.tmpdir(), 'terrace-curl-'));
+    try {
+      const { stdout } = await run(path.join(kExamples, 'curl.sh'), [server.url, 'jacksboro'], { env: { ...process.env, TMPDIR: folder } });
+      assert.match(stdout, /\$ curl \S+\/datasets\n\{"datasets":/);
+      assert.match(stdout, /Content-Type: application\/vnd.quantized-mesh;extensions=octvertexnormals\r\n/);
+      assert.match(stdout, /If-None-Match.*\n304\n/);
+      assert.equal(stdout.match(/"distance":/g).length, 5);
+      const [made] = fs.readdirSync(folder), read = (name) => fs.readFileSync(path.join(folder, made, name));
+      assert.equal(read('tile.glb').subarray(0, 4).toString(), 'glTF');
+      assert.match(read('area.obj').toString(), /^v -?\d/m);
+      assert.ok(read('tile.terrain').length > read('plain.terrain').length);
+    } finally {
+      fs.rmSync(folder, { recursive: true });
+    }
+  });
+});
