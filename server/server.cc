@@ -57,7 +57,10 @@ TileServiceOptions ServiceOptions(const ServerOptions& options) {
   service.worker_threads = options.config.worker_threads;
   service.queue_length = options.config.queue_length;
   service.cache_bytes = options.config.cache_bytes;
-  service.disk = options.disk_cache;
+  service.stores = options.tile_stores;
+  if (options.disk_cache && options.disk_cache->tiles() != nullptr) {
+    service.stores.emplace(service.stores.begin(), options.disk_cache, options.disk_cache->tiles());
+  }
   service.write_head = MakeTileHead;
   return service;
 }
@@ -212,6 +215,7 @@ class Server::Impl {
 
   Metrics::ServerState CurrentState() const {
     Metrics::ServerState state;
+    if (options_.disk_cache) state.disk = options_.disk_cache->stats();
     state.connections = edge_->connections.size();
     state.refused_connections = edge_->connections.refused();
     state.transfers = edge_->transfers.stats();

@@ -12,9 +12,11 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "config/config.h"
 #include "engine/core/result.h"
+#include "server/store/disk_cache.h"
 #include "server/tiles/catalog.h"
 #include "server/tiles/tile_service.h"
 
@@ -25,8 +27,9 @@ struct ServerOptions {
   config::Config config;
   int listen_socket = -1;                 // instead of config.listen: one that somebody else holds as well
   std::shared_ptr<DiskCache> disk_cache;  // of finished tiles, below memory; may be null
-  std::function<tiler::ByteCacheStats()> refinement_stats;  // of what tiles are made from; may be empty
-  std::chrono::milliseconds metrics_age{1'000};             // for which a text of /metrics serves
+  std::vector<std::shared_ptr<tiler::TileStore>> tile_stores = {};  // further tiers, below the disk
+  std::function<tiler::ByteCacheStats()> refinement_stats;          // of what tiles are made from; may be empty
+  std::chrono::milliseconds metrics_age{1'000};                     // for which a text of /metrics serves
   std::chrono::milliseconds drain_grace{500};  // for which connections are served on; part of drain_timeout
   bool stop_on_signals = false;  // SIGINT and SIGTERM act like RequestStop; the second ends the process with status 1
   // Called on an io thread for each of these signals: must not block.

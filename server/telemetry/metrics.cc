@@ -67,14 +67,14 @@ class CacheFamily {
 };
 
 void AddCaches(const TileService::Stats& tiles, const tiler::ByteCacheStats& refinements,
-               std::vector<prometheus::MetricFamily>& all) {
+               const std::optional<DiskCacheStats>& disk_cache, std::vector<prometheus::MetricFamily>& all) {
   constexpr auto kCounter = prometheus::MetricType::Counter;
   constexpr auto kGauge = prometheus::MetricType::Gauge;
   const auto both_tiers = [&](prometheus::MetricType type, const char* name, const char* help, auto memory, auto disk) {
     CacheFamily family(type, name, help);
     family.Add("memory", "tiles", tiles.cache.*memory).Add("memory", "refinements", refinements.*memory);
-    if (tiles.disk) {
-      family.Add("disk", "tiles", tiles.disk->tiles.*disk).Add("disk", "refinements", tiles.disk->refinements.*disk);
+    if (disk_cache) {
+      family.Add("disk", "tiles", disk_cache->tiles.*disk).Add("disk", "refinements", disk_cache->refinements.*disk);
     }
     all.push_back(family.Take());
   };
@@ -86,11 +86,11 @@ void AddCaches(const TileService::Stats& tiles, const tiler::ByteCacheStats& ref
              &DiskStoreStats::entries);
   both_tiers(kGauge, "terrace_cache_bytes", "Bytes charged to a cache; on disk those of its files",
              &tiler::ByteCacheStats::bytes, &DiskStoreStats::bytes);
-  if (!tiles.disk) return;
+  if (!disk_cache) return;
   const auto disk_tier = [&](prometheus::MetricType type, const char* name, const char* help, auto member) {
     all.push_back(CacheFamily(type, name, help)
-                      .Add("disk", "tiles", tiles.disk->tiles.*member)
-                      .Add("disk", "refinements", tiles.disk->refinements.*member)
+                      .Add("disk", "tiles", disk_cache->tiles.*member)
+                      .Add("disk", "refinements", disk_cache->refinements.*member)
                       .Take());
   };
   disk_tier(kCounter, "terrace_cache_errors_total", "Reads and writes of a cache that the disk failed",
@@ -302,7 +302,7 @@ std::string Metrics::Text(const TileService::Stats& tiles, const tiler::ByteCach
   const auto add = [&all](prometheus::MetricType type, const char* name, const char* help, auto value) {
     all.push_back(Value(type, name, help, static_cast<double>(value)));
   };
-  AddCaches(tiles, refinements, all);
+  AddCaches(tiles, refinements, state.disk, all);
   add(kCounter, "terrace_flights_joined_total", "Tile requests that waited for a build already under way",
       tiles.joined);
   add(kGauge, "terrace_flights", "Builds under way or waiting", tiles.in_flight);

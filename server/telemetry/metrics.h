@@ -4,10 +4,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "server/net/transfer_budget.h"
+#include "server/store/disk_cache.h"
 #include "server/telemetry/access_log.h"
 #include "server/tiles/dataset_view.h"
 #include "server/tiles/tile_service.h"
@@ -31,7 +33,8 @@ class Metrics {
     std::uint64_t refused_connections = 0;
     TransferBudget::Stats transfers;
     std::size_t datasets = 0, troubles = 0;
-    std::uint64_t catalogs = 0;  // that have replaced one another
+    std::uint64_t catalogs = 0;               // that have replaced one another
+    std::optional<DiskCacheStats> disk = {};  // nothing: there is none
   };
   // Everything counted so far and the state given.
   std::string Text(const TileService::Stats& tiles, const tiler::ByteCacheStats& refinements,

@@ -33,7 +33,7 @@ TileService::TileService(TileServiceOptions options, BuildObserver observer)
     : observer_(std::move(observer)),
       write_head_(options.write_head),
       cache_(options.cache_bytes),
-      disk_(std::move(options.disk)),
+      stores_(std::move(options.stores)),
       pool_(options.worker_threads, options.queue_length),
       flights_(pool_) {}
 
@@ -78,8 +78,9 @@ Result<tiler::TilePtr> TileService::BuildAndKeep(const Catalog& catalog, const t
   const std::chrono::microseconds queued = tiler::MicrosecondsSince(asked);
   // Between the look into the cache and the start of this flight an earlier flight may have landed.
   if (tiler::TilePtr tile = cache_.Find(key)) return tile;
-  tiler::TileStore* const disk = disk_ ? disk_->tiles() : nullptr;
-  if (std::optional<tiler::EncodedTile> kept = disk != nullptr ? disk->Find(key) : std::nullopt) {
+  for (const auto& store : stores_) {
+    std::optional<tiler::EncodedTile> kept = store->Find(key);
+    if (!kept) continue;
     kept->from_disk = true;
     tiler::TilePtr tile = Finish(request, *std::move(kept));
     cache_.Insert(key, tile);
@@ -92,7 +93,7 @@ Result<tiler::TilePtr> TileService::BuildAndKeep(const Catalog& catalog, const t
     built->times.queue = queued;
     tile = Finish(request, *std::move(built));
     cache_.Insert(key, *tile);
-    if (disk != nullptr) disk->Insert(key, *tile);
+    for (const auto& store : stores_) store->Insert(key, *tile);
   } else {
     tile = tl::unexpected(std::move(built.error()));
   }
@@ -126,7 +127,6 @@ TileService::Stats TileService::stats() const {
   stats.cache = cache_.stats();
   stats.cache.hits = stats.hits;
   stats.cache.misses = stats.misses;
-  if (disk_) stats.disk = disk_->stats();
   return stats;
 }
 

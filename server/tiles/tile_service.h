@@ -12,15 +12,16 @@
 #include <memory>
 #include <optional>
 #include <stop_token>
+#include <vector>
 
 #include "engine/core/result.h"
 #include "server/asio.h"
 #include "server/jobs/single_flight.h"
 #include "server/jobs/worker_pool.h"
-#include "server/store/disk_cache.h"
 #include "server/tiles/catalog.h"
 #include "tiler/encoded_tile.h"
 #include "tiler/store/tile_cache.h"
+#include "tiler/store/tile_store.h"
 #include "tiler/tile_request.h"
 
 namespace terrace::server {
@@ -35,8 +36,9 @@ struct TileServiceOptions {
   unsigned worker_threads = 0;                       // 0: as many as the machine has processors
   std::size_t queue_length = 10'000;                 // jobs that wait for a worker, of all clients
   std::size_t cache_bytes = std::size_t{256} << 20;  // 0: no cache
-  std::shared_ptr<DiskCache> disk;                   // null: none
-  HeadWriter write_head = nullptr;                   // null: heads are left empty
+  // Tiers below memory, the first asked first. Each gets every tile that is built.
+  std::vector<std::shared_ptr<tiler::TileStore>> stores = {};
+  HeadWriter write_head = nullptr;  // null: heads are left empty
 };
 
 enum class CacheStatus { kHit, kDisk, kMiss, kJoined };
@@ -87,7 +89,6 @@ class TileService {
     std::uint64_t hits = 0, misses = 0, joined = 0;
     std::size_t queued = 0, in_flight = 0;
     tiler::ByteCacheStats cache;
-    std::optional<DiskCacheStats> disk;  // nothing: there is none
   };
   Stats stats() const;
 
@@ -100,7 +101,7 @@ class TileService {
   const BuildObserver observer_;
   const HeadWriter write_head_;
   tiler::TileCache cache_;
-  const std::shared_ptr<DiskCache> disk_;
+  const std::vector<std::shared_ptr<tiler::TileStore>> stores_;
   WorkerPool pool_;
   SingleFlight<tiler::CacheKey, tiler::TilePtr, tiler::CacheKeyHash> flights_;
   std::atomic<std::uint64_t> hits_{0}, misses_{0};
