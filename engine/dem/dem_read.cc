@@ -131,7 +131,7 @@ GridTrace Widened(PartTrace&& of_part, const RasterGrid& grid, const geo::Lattic
   ForPart(*of_part.part, window, [&](std::size_t from, std::size_t to) { heights[to] = trace.heights[from]; });
   trace.heights = std::move(heights);
   trace.positions = grid.PositionsOf(lattice, PartOf(grid, lattice, window, kAround), trace.factor);
-  trace.cells = grid.CellsOf(trace.positions, trace.factor, trace.window);
+  if (!trace.samples.empty()) trace.cells = grid.CellsOf(trace.positions, trace.factor, trace.window);
   if (!trace.undulations.empty()) {
     auto undulations = grid.undulations()->At(lattice, window);
     constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();  // and so is the bound then

@@ -44,8 +44,8 @@ class PlumbNodes {
     return (plane.offset - row.z * plane.normal.z - row.radius * across) / up;
   }
 
-  // The largest difference of HeightOn from the samples of a row's nodes `first` to `last`, at least. `samples`: from
-  // node 0. Where a height cannot be told it is as large as may be.
+  // An upper bound of |HeightOn - sample| over the nodes `first` to `last` of a row; infinite if HeightOn is NaN at one
+  // of them. `samples`: of the row's nodes from 0 on.
   double LargestOfRow(const Plane& plane, int j, std::int64_t first, std::int64_t last, const float* samples) const;
 
   // Whether the node's plumb line passes through the triangle. Up to a micrometre beside its rim counts.

@@ -38,6 +38,7 @@ double LargestOfRow(const Linear& plane, double x, double y, double unit, const 
   constexpr std::int64_t kLanes = 4;
   std::array<double, kLanes> largest{};
   const double up = plane.dy * y;
+  // Of 32 bits: SSE2 converts no others to doubles in vectors.
   const auto error = [&](std::int64_t i) {
     const double height = plane.origin + plane.dx * (x + unit * static_cast<double>(static_cast<std::int32_t>(i))) + up;
     return std::abs(height - samples[i]);
@@ -215,13 +216,8 @@ class TileMeter::Impl {
       if (first > last) continue;
       visit(static_cast<int>(j), static_cast<int>(first), static_cast<int>(last),
             LargestOfRow(plane, static_cast<double>(first * unit - corner.x), static_cast<double>(j * unit - corner.y),
-                         static_cast<double>(unit), RowOf(static_cast<int>(j)) + first, last - first + 1));
+                         static_cast<double>(unit), lattice_.Row(static_cast<int>(j)) + first, last - first + 1));
     }
-  }
-
-  // Samples of a row, from its first node inside the tile.
-  const float* RowOf(int j) const {
-    return lattice_.heights.data() + static_cast<std::ptrdiff_t>(j + 1) * (cells_ + 3) + 1;
   }
 
   // The flat triangle is at most its sagitta off the linear one, at a place that is off by the shift.
@@ -303,7 +299,7 @@ class TileMeter::Impl {
     for (int j = footprint.first_row(); j <= footprint.last_row(); ++j) {
       const PlumbFootprint::Columns columns = footprint.ColumnsOf(j);
       if (columns.first > columns.last) continue;
-      const double largest = plumb_.LargestOfRow(plane, j, columns.first, columns.last, RowOf(j));
+      const double largest = plumb_.LargestOfRow(plane, j, columns.first, columns.last, lattice_.Row(j));
       if (largest <= found.largest && largest <= bound_) continue;
       for (int i = static_cast<int>(columns.first); i <= columns.last; ++i) {
         const double error = std::abs(plumb_.HeightOn(plane, i, j) - lattice_.At(i, j));

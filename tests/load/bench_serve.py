@@ -6,8 +6,8 @@
 Each BINARY serves each dataset with one worker, without caches, and is asked for the same tiles of each level, one
 after the other. Binaries take turns within each round: what else the machine does hits all of them. Printed per level:
 the processor time of a cold tile in the best and in the median round, the ratio of the best to that of the first binary,
-and the medians of the last binary's stages. Then the processor time of a warm tile (another error of a refinement that
-is kept) over all levels, of the start, first and with statistics kept, and the peak of memory.
+and the medians of the last binary's stages. Before that, the processor time of the first start and of one with statistics
+kept; after it, the peak of memory and the processor time of a warm tile (another error of a refinement that is kept).
 
 `--peer COMMAND` runs a shell command in each round as well, which writes the same levels of the same source to
 {folder}/{z}/{x}/{y}; {source}, {first} and {last} are replaced too. Its processor time a tile is printed beside.
@@ -142,7 +142,7 @@ def bench(name, sources, levels, arguments):
             servers = [stack.enter_context(Server(binary, sources, cache, ("--refinement-cache-bytes", "0")))
                        for binary, cache in zip(arguments.binaries, caches)]
             available = servers[0].layer()["available"]
-            tiles = {level: draw(available[level], arguments.tiles) for level in levels if level < len(available)}
+            tiles = {level: draw(available[level], arguments.tiles) for level in levels if level < len(available) and available[level]}
             print("  | level | tiles | ms a cold tile: best / median of each | ratios | stages of the last |" + (" peer |" if arguments.peer else ""))
             for level in tiles:
                 cold_level(servers, level, tiles[level], sources, arguments)

@@ -28,10 +28,12 @@ Box GridTables::BoxAround() const {
   Box hull{1e300, 1e300, -1e300, -1e300};
   if (grid_.members().size() == 1) return hull;  // nobody asks which members are near
   const NodePositions& positions = trace_.positions;
+  // The first row and the first column of separable nodes are like all others.
+  const bool is_separable = positions.is_separable();
   double of_row = grid_.columns() / 2.0;
   for (std::size_t j = 0; j < positions.rows(); ++j) {
     double last = of_row;
-    for (std::size_t i = 0; i < positions.columns(); ++i) {
+    for (std::size_t i = 0; i < positions.columns() && (i == 0 || j == 0 || !is_separable); ++i) {
       const Position p = positions.At(i, j);
       if (!std::isfinite(p.x) || !std::isfinite(p.y)) continue;
       double x = p.x;

@@ -165,7 +165,7 @@ bool SmoothErrorBound::Measure(const CellBox& box, Steps& steps, PixelBounds& at
   return true;
 }
 
-// Columns and rows of nodes are those of samples: steps are of one axis each.
+// Columns of nodes run along columns of samples, rows along rows: steps are of one axis each.
 bool SmoothErrorBound::MeasureAxes(const CellBox& box, Steps& steps, PixelBounds& at) const {
   const auto west = static_cast<std::size_t>(box.west + 1), south = static_cast<std::size_t>(box.south + 1);
   const auto east = static_cast<std::size_t>(box.east + 1), north = static_cast<std::size_t>(box.north + 1);
@@ -186,8 +186,8 @@ bool SmoothErrorBound::MeasureAxes(const CellBox& box, Steps& steps, PixelBounds
   };
   measure(x_, west, east, steps.east_x, steps.bend_x);
   measure(y_, south, north, steps.north_y, steps.bend_y);
-  at.Add(x_[west], y_[south]);
-  at.Add(x_[east], y_[north]);
+  for (std::size_t i = west; i <= east; ++i) at.Add(x_[i], y_[south]);
+  for (std::size_t j = south; j <= north; ++j) at.Add(x_[west], y_[j]);
   return std::isfinite(finite);
 }
 
@@ -254,9 +254,8 @@ bool SmoothErrorBound::Measure(const SampleRange& range, Bends& bends) const {
     };
     Lanes sum;
     sum.Add(columns, [&](std::size_t c) { return band_.sum[first + c]; });
-    bends = {largest(band_.x, columns - 1), largest(band_.y, columns),
-             largest(band_.xx, columns > 2 ? columns - 2 : 0), largest(band_.yy, columns),
-             largest(band_.xy, columns - 1)};
+    bends = {largest(band_.x, columns - 1), largest(band_.y, columns), largest(band_.xx, columns > 2 ? columns - 2 : 0),
+             largest(band_.yy, columns), largest(band_.xy, columns - 1)};
     return std::isfinite(sum.Sum());
   }
   const auto columns = static_cast<std::size_t>(in.right - in.left + 1);
@@ -284,12 +283,13 @@ void SmoothErrorBound::ForRows(const SampleRange& range, const Step& step) const
   for (std::int64_t row = range.top; row <= range.bottom; ++row) {
     const float* const here =
         trace_.samples.data() + (row - window.row) * window.columns + (range.left - window.column);
-    step(row == range.top ? nullptr : here - window.columns, here, row == range.bottom ? nullptr : here + window.columns);
+    step(row == range.top ? nullptr : here - window.columns, here,
+         row == range.bottom ? nullptr : here + window.columns);
   }
 }
 
 // All boxes of the row have the same rows of samples: differences are taken once for all of them, along whole rows.
-void SmoothErrorBound::BeginRow(int south, int north) {
+void SmoothErrorBound::PrepareRows(int south, int north) {
   band_ = {};
   if (!is_separable_ || trace_.samples.empty()) return;
   const double y0 = y_[static_cast<std::size_t>(south + 1)], y1 = y_[static_cast<std::size_t>(north + 1)];

@@ -19,8 +19,8 @@ class SmoothErrorBound {
   SmoothErrorBound(const TileNodes& tile, const RasterGrid& grid, const GridTrace& trace, const GridTables& tables,
                    const GeoidErrorBound& geoid, bool blends);
 
-  // Prepares Over for boxes that reach from cell row `south` to `north`; others may be asked for as well.
-  void BeginRow(int south, int north);
+  // Makes Over faster for boxes of cell rows `south` to `north`. Results do not depend on it.
+  void PrepareRows(int south, int north);
 
   // Returns a bound in metres on the difference between served heights and the raster grid's samples. NaN or infinity:
   // no bound is known, because a node is not evenly spaced, a sample is void or the geoid is not known.

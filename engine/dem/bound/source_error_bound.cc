@@ -30,10 +30,8 @@ class GridErrorBound {
     constexpr int kGroup = SourceErrorBound::kGroup;
     const int cells = nodes_.cells();
     for (int south = 0; south < cells; south += kGroup) {
-      smooth_.BeginRow(south, std::min(south + kGroup, cells));
       for (int west = 0; west < cells; west += kGroup) {
-        loose_.BeginGroup();
-        AddBox({west, south, std::min(west + kGroup, cells), std::min(south + kGroup, cells)});
+        AddGroup({west, south, std::min(west + kGroup, cells), std::min(south + kGroup, cells)});
       }
     }
     return loose_.Read(tile_.bound_, stop);
@@ -112,10 +110,19 @@ class GridErrorBound {
     return true;
   }
 
-  // Bounds the box as a whole if it can; else its quarters, and single cells in the end.
-  void AddBox(const CellBox& box) {
+  void AddGroup(const CellBox& box) {
+    if (IsCovered(box) || !Touches(box)) return;
+    if (prepared_south_ != box.south) smooth_.PrepareRows(box.south, box.north);
+    prepared_south_ = box.south;
+    has_loose_group_ = false;
+    AddBox(box, true);
+  }
+
+  // Bounds the box as a whole if it can; else its quarters, and single cells in the end. `may_give_way`: what it is a
+  // quarter of gives way.
+  void AddBox(const CellBox& box, bool may_give_way) {
     if (!Touches(box)) return;
-    const bool gives_way = GivesWay(box), is_filled = gives_way && MayBeFilled(box);
+    const bool gives_way = may_give_way && GivesWay(box), is_filled = gives_way && MayBeFilled(box);
     const bool is_partly_hidden = tile_.blends_ && IsPartlyCovered(box);
     const double error = is_filled || is_partly_hidden ? kUnknownError : smooth_.Over(box);
     if (!std::isfinite(error)) return Divide(box, gives_way);
@@ -138,11 +145,10 @@ class GridErrorBound {
       return;
     }
     const int middle_x = (box.west + box.east) / 2, middle_y = (box.south + box.north) / 2;
-    for (const CellBox& quarter : {CellBox{box.west, box.south, middle_x, middle_y},
-                                   CellBox{middle_x, box.south, box.east, middle_y},
-                                   CellBox{box.west, middle_y, middle_x, box.north},
-                                   CellBox{middle_x, middle_y, box.east, box.north}}) {
-      if (!IsCovered(quarter)) AddBox(quarter);
+    for (const CellBox& quarter :
+         {CellBox{box.west, box.south, middle_x, middle_y}, CellBox{middle_x, box.south, box.east, middle_y},
+          CellBox{box.west, middle_y, middle_x, box.north}, CellBox{middle_x, middle_y, box.east, box.north}}) {
+      if (!IsCovered(quarter)) AddBox(quarter, gives_way);
     }
   }
 
@@ -172,8 +178,10 @@ class GridErrorBound {
     std::optional<CellErrorBound::CellSamples> place;
     const double error = std::min(known, single_.OfSurroundings(cell, gives_way, fills, place));
     if (error <= tile_.bound_) return;
-    if (place && LooseCells::MayRead(trace_.factor)) return loose_.Add(cell, *place, error);
-    Raise(error);
+    if (!place || !LooseCells::MayRead(trace_.factor)) return Raise(error);
+    if (!has_loose_group_) loose_.BeginGroup();
+    has_loose_group_ = true;
+    loose_.Add(cell, *place, error);
   }
 
   SourceErrorBound& tile_;
@@ -185,6 +193,8 @@ class GridErrorBound {
   SmoothErrorBound smooth_;
   const CellErrorBound single_;
   LooseCells loose_;
+  int prepared_south_ = -1;       // of smooth_
+  bool has_loose_group_ = false;  // the group that is being added
 };
 
 SourceErrorBound::SourceErrorBound(const geo::Lattice& lattice, const NodeWindow& window,

@@ -24,7 +24,8 @@ inline constexpr Position kNowhere{std::numeric_limits<double>::quiet_NaN(), std
 NodeWindow WindowOfTile(const geo::Lattice& lattice, const geo::TileKey& key);
 
 // Pixel positions of a window's nodes. A position is a function of the global node alone: whichever window asks gets
-// the same bits. Nodes are rows from the south, each from the west.
+// the same bits. Nodes come by rows of the grid, lattices from the south and Mercator from the north, each from the
+// west.
 //
 // Positions are exact for sources in WGS 84 degrees. Others are transformed at 5 x 5 nodes of global cells of 32 x 32
 // nodes and interpolated with the fourth degree within `tolerance` pixels; cells where that does not hold are divided.
@@ -50,7 +51,7 @@ class NodePositions {
   // True where meridians are the source's columns and parallels its rows: all nodes of a column have one x, all of a
   // row one y.
   bool is_separable() const { return nodes_.empty(); }
-  // One per column and one per row. Precondition: is_separable().
+  // One per column and one per row, never NaN. Precondition: is_separable().
   std::span<const double> x() const { return x_; }
   std::span<const double> y() const { return y_; }
   // One per node. Precondition: !is_separable().

@@ -12,11 +12,6 @@ namespace {
 
 constexpr Box kNowhereBox{1e300, 1e300, -1e300, -1e300};
 
-Box BoxOf(const geo::TileRange& pixels) {
-  return {static_cast<double>(pixels.start_x), static_cast<double>(pixels.start_y),
-          static_cast<double>(pixels.end_x + 1), static_cast<double>(pixels.end_y + 1)};
-}
-
 Box Grown(const Box& box, double by) { return {box.west - by, box.south - by, box.east + by, box.north + by}; }
 
 bool Holds(const Box& box, const Position& p) {
@@ -34,6 +29,11 @@ Box HullOf(std::span<const Position> positions) {
 }
 
 }  // namespace
+
+Box BoxOf(const geo::TileRange& pixels) {
+  return {static_cast<double>(pixels.start_x), static_cast<double>(pixels.start_y),
+          static_cast<double>(pixels.end_x + 1), static_cast<double>(pixels.end_y + 1)};
+}
 
 GridCover::GridCover(const std::vector<GridMember>& members, std::int64_t turn) {
   std::vector<geo::TileRange> ranges;
@@ -69,12 +69,16 @@ std::vector<std::uint8_t> GridCover::InsideOfAxes(const NodePositions& positions
   std::vector<std::uint8_t> columns(positions.columns());
   for (const std::size_t i : index_.Find(Grown(hull, 2 * kEdgeTolerance))) {
     const Box box = Grown(BoxOf(boxes_[i]), kEdgeTolerance);
-    std::ranges::transform(positions.x(), columns.begin(),
-                           [&](double x) { return std::uint8_t{x >= box.west && x <= box.east}; });
-    for (std::size_t j = 0; j < positions.rows(); ++j) {
+    std::size_t first = columns.size(), end = 0;
+    for (std::size_t c = 0; c < columns.size(); ++c) {
+      const double x = positions.x()[c];
+      columns[c] = x >= box.west && x <= box.east ? 1 : 0;
+      if (columns[c] != 0) first = std::min(first, c), end = c + 1;
+    }
+    for (std::size_t j = 0; j < positions.rows() && first < end; ++j) {
       if (!(positions.y()[j] >= box.south && positions.y()[j] <= box.north)) continue;
       std::uint8_t* const row = inside.data() + j * columns.size();
-      for (std::size_t c = 0; c < columns.size(); ++c) row[c] |= columns[c];
+      for (std::size_t c = first; c < end; ++c) row[c] |= columns[c];
     }
   }
   return inside;

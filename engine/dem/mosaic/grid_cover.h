@@ -12,6 +12,9 @@
 
 namespace terrace::dem {
 
+// Of columns and rows of pixels, ends included.
+Box BoxOf(const geo::TileRange& pixels);
+
 // Immutable and thread-safe. Positions within 10^-6 pixels of a raster count as inside it.
 class GridCover {
  public:

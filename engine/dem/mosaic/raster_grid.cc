@@ -17,10 +17,6 @@ namespace {
 // Interpolated positions are this close to exact ones, in samples of the grid they are read from: a slope of 45 degrees
 // at 30 m turns it into 0.3 mm.
 constexpr double kGridPositionTolerance = 1e-5;
-Box BoxOf(const geo::TileRange& pixels) {
-  return {static_cast<double>(pixels.start_x), static_cast<double>(pixels.start_y),
-          static_cast<double>(pixels.end_x + 1), static_cast<double>(pixels.end_y + 1)};
-}
 
 Result<Georeference> GeoreferenceOf(const GridPlan& plan) {
   if (plan.members.size() == 1) return plan.members.front().raster->georeference();
@@ -61,7 +57,7 @@ void FillRows(const std::vector<float>& samples, const GridWindow& window, const
     for (std::size_t i = 0; i < row.size(); ++i) {
       float& height = heights[of_row + i];
       height = row[i] != 0 ? rounded[i] : height;
-      has_voids |= std::isnan(height);
+      has_voids |= row[i] != 0 && std::isnan(height);
     }
     for (std::size_t i = 0; has_voids && i < row.size(); ++i) {
       if (row[i] == 0 || !IsVoid(rounded[i])) continue;
@@ -231,7 +227,7 @@ Result<std::vector<float>> RasterGrid::ReadWeights(int factor, const GridWindow&
 Result<void> RasterGrid::FillAt(NodePositions positions, std::span<const std::uint8_t> inside,
                                 std::span<const double> undulations, int factor, const NodeHeights& nodes,
                                 const std::stop_token& stop, GridTrace* trace) const {
-  const auto [heights, weights, smooth] = nodes;
+  const std::span<float> heights = nodes.heights, weights = nodes.weights, smooth = nodes.smooth;
   const bool traces_others = trace != nullptr && !weights.empty();
   std::vector<std::uint8_t> wanted(inside.size());
   bool is_any_wanted = false;
@@ -244,7 +240,7 @@ Result<void> RasterGrid::FillAt(NodePositions positions, std::span<const std::ui
   if (trace != nullptr) trace->positions = std::move(positions);
   if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "reading was stopped");
   if (!is_any_wanted) return CheckUnread();
-  GridWindow window = cells.Cover(Axes(factor), wanted);
+  GridWindow window = cells.MoveIntoWindow(Axes(factor), wanted);
   // Samples between the outermost nodes and the rim are wanted too.
   constexpr int kRim = 3;
   if (trace != nullptr) window = Grown(window, kRim, factor);

@@ -40,7 +40,7 @@ struct GridRange {
 struct GridTrace {
   // In pixels. Nodes far from the raster grid may have none.
   NodePositions positions;
-  // Between averages by `factor`. Valid for nodes that have one of `heights`.
+  // Between averages by `factor`. Valid where `heights` is not NaN.
   NodeCells cells;
   // Per node, the raster grid's interpolated height before blending; NaN where it has none. With blending, nodes that
   // other raster grids filled have one too, if their cell lies in `window` and has a sample.
@@ -115,7 +115,7 @@ class RasterGrid {
 
   // Returns the pixel positions of the window's nodes that Fill uses for averages by `factor`.
   NodePositions PositionsOf(const geo::Lattice& lattice, const NodeWindow& window, int factor) const;
-  // Returns the cells of nodes, as a trace with this window has them.
+  // Returns the cells of nodes, their columns near those of a trace's window.
   NodeCells CellsOf(const NodePositions& positions, int factor, const GridWindow& window) const;
 
   // Fill for single points, at full resolution. `filled`, one per point, becomes 1 where the point's pixel is void, for

@@ -57,10 +57,8 @@ GridCell GridAxes::CellAt(const Position& position) const {
 NodeCells::NodeCells(const NodePositions& positions, const GridAxes& axes, std::span<const std::uint8_t> inside)
     : window_(positions.window()) {
   if (positions.is_separable()) {
-    for (const double x : positions.x()) {
-      columns_.push_back(std::isnan(x) ? GridAxis::Location{} : axes.Column(x));
-    }
-    for (const double y : positions.y()) rows_.push_back(std::isnan(y) ? GridAxis::Location{} : axes.Row(y));
+    for (const double x : positions.x()) columns_.push_back(axes.Column(x));
+    for (const double y : positions.y()) rows_.push_back(axes.Row(y));
     return;
   }
   const std::span<const Position> nodes = positions.nodes();
@@ -76,12 +74,17 @@ void NodeCells::MoveNear(std::int64_t column, const GridAxis& columns) {
   for (GridCell& cell : cells_) cell.column = NearestTurn(cell.column, column, columns);
 }
 
-GridWindow NodeCells::Cover(const GridAxes& axes, std::span<const std::uint8_t> wanted) {
+GridWindow NodeCells::MoveIntoWindow(const GridAxes& axes, std::span<const std::uint8_t> wanted) {
   const auto stride = static_cast<std::size_t>(window_.columns);
-  auto left = std::ranges::count(wanted, std::uint8_t{1}) / 2;
-  std::size_t middle = 0;  // of the wanted nodes
-  while (wanted[middle] == 0 || left-- > 0) ++middle;
-  MoveNear(At(middle % stride, middle / stride).column, axes.columns);
+  if (axes.columns.wraps()) {
+    // The middle column, so that columns of half a turn stay in order; else that of the wanted node nearest to it.
+    std::size_t nearest = wanted.size();
+    const auto distance = [&](std::size_t n) { return std::abs(static_cast<std::ptrdiff_t>(n % stride - stride / 2)); };
+    for (std::size_t n = 0; n < wanted.size() && !is_separable(); ++n) {
+      if (wanted[n] != 0 && (nearest == wanted.size() || distance(n) < distance(nearest))) nearest = n;
+    }
+    MoveNear(is_separable() ? columns_[stride / 2].index : cells_[nearest].column, axes.columns);
+  }
   CellHull hull;
   if (!is_separable()) {
     for (std::size_t n = 0; n < cells_.size(); ++n) {
@@ -146,8 +149,10 @@ NodeRows::NodeRows(const std::vector<float>& samples, const GridWindow& window, 
                    std::size_t first, std::size_t end)
     : samples_(samples), window_(window), cells_(cells), heights_(end - first) {
   for (const GridAxis::Location& place : cells.columns().subspan(first, end - first)) {
-    west_.push_back(static_cast<std::int32_t>(place.index - window.column));
-    east_.push_back(west_.back() + (place.weight > 0 ? 1 : 0));
+    // Columns that nobody wants may lie outside.
+    const std::int64_t last = window.columns - 1, west = std::clamp<std::int64_t>(place.index - window.column, 0, last);
+    west_.push_back(static_cast<std::int32_t>(west));
+    east_.push_back(static_cast<std::int32_t>(std::min(west + (place.weight > 0 ? 1 : 0), last)));
     weights_.push_back(place.weight);
   }
   for (Line& line : lines_) line.heights.resize(heights_.size());

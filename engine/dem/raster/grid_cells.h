@@ -24,7 +24,8 @@ struct GridAxes {
   GridAxis columns, rows;
   int width = 0, height = 0;
 
-  // Positions are in source pixels. Those outside the raster count as on its edge; NaN is no position.
+  // Positions are in source pixels. Those outside the raster count as on its edge, but for columns that wrap.
+  // Precondition: not NaN.
   GridAxis::Location Column(double x) const;
   GridAxis::Location Row(double y) const;
   GridCell CellAt(const Position& position) const;
@@ -52,9 +53,10 @@ class NodeCells {
     return At(static_cast<std::size_t>(column - window_.column), static_cast<std::size_t>(row - window_.row));
   }
 
-  // The smallest window of averages with the cells of the nodes that are `wanted`, one entry per node. Where columns
-  // wrap, moves all cells to within half a turn of one of them. Precondition: a node is wanted, and has a cell.
-  GridWindow Cover(const GridAxes& axes, std::span<const std::uint8_t> wanted);
+  // Returns the smallest window of averages with the cells of the nodes that are `wanted`, one entry per node. Where
+  // columns wrap, moves all cells to within half a turn of the one in the middle. Precondition: a node is wanted, and
+  // those that are have a cell.
+  GridWindow MoveIntoWindow(const GridAxes& axes, std::span<const std::uint8_t> wanted);
   // Moves cells to within half a turn of a column.
   void MoveNear(std::int64_t column, const GridAxis& columns);
 
@@ -75,12 +77,12 @@ std::optional<double> Interpolate(const std::vector<float>& heights, const GridW
 // gives.
 class NodeRows {
  public:
-  // Nodes `first` to `end` of each row. What these refer to outlives it. Precondition: `cells` are separable, those of
-  // the nodes lie in the window.
+  // Nodes `first` to `end` of each row. What these refer to outlives it. Precondition: `cells` are separable.
   NodeRows(const std::vector<float>& samples, const GridWindow& window, const NodeCells& cells, std::size_t first,
            std::size_t end);
 
-  // One height per node from `first` on; NaN where a sample that counts is void. Valid until the next call.
+  // One height per node from `first` on; NaN where a sample that counts is void, of no meaning where the node's column
+  // lies outside the window. Valid until the next call. Precondition: the row's cells lie in the window's rows.
   std::span<const double> Row(std::size_t j);
 
  private:

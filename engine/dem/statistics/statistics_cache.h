@@ -49,9 +49,9 @@ inline constexpr std::int64_t kMaxSamplesWithoutAverages = std::int64_t{4096} * 
 bool NeedsAverages(const RasterLayout& layout);
 
 // The smallest factor of averages in a cache file. kLargestDirect: none, because the statistics have the averages from
-// that factor on. Rasters of 1024 x 1024 samples and more without overviews keep the averages by 4, so that a tile
-// reads at most about four samples per node. They take a third of a byte per sample; the averages by 2 would take four
-// times as much and save a tenth of the tiles that read them (docs/performance.md).
+// that factor on. Rasters that need averages keep those by 2. Others of 1024 x 1024 samples and more without overviews
+// keep those by 4, so that a tile reads at most about four samples per node. They take a third of a byte per sample;
+// the averages by 2 would take four times as much and save a tenth of the tiles that read them (docs/performance.md).
 int LeastKeptFactor(const RasterLayout& layout);
 
 // The layout with the rules for detected nodata, and without overviews if there is any.

@@ -98,5 +98,44 @@ TEST(ManyGrids, ManySmallGridsLieWhereTheyDo) {
   EXPECT_GT(found, 500);
 }
 
+// A raster of half the Earth over one of all of it, whose columns begin anew under the first or at its edge: what is
+// wanted of the second lies at both ends of a shallow tile, and nothing between.
+TEST(ManyGrids, WhatIsWantedOfTheEarthMayLieAtBothEndsOfATile) {
+  for (const double west : {-180.0, -90.0, -60.0, 20.0}) {
+    const TempDir dir;
+    RasterSpec half, earth;
+    half.width = 95, half.height = 90;
+    half.geo_transform = {west, 180.0 / 95, 0, 90, 0, -2};
+    half.value = [](int column, int row) { return 5000 + column + row; };
+    earth.width = 360, earth.height = 180;
+    earth.geo_transform = {-180, 1, 0, 90, 0, -1};
+    earth.value = [](int column, int row) { return -column - 0.5 * row; };
+    const std::string over = WriteRaster(dir, half, "half.tif"), under = WriteRaster(dir, earth, "earth.tif");
+    const auto both = OpenOrFail(std::vector<DemFile>{{over}, {under}}), alone = OpenOrFail(under);
+    ASSERT_TRUE(both && alone);
+    for (const geo::TileKey& key : {geo::TileKey{0, 0, 0}, geo::TileKey{0, 1, 0}, geo::TileKey{1, 1, 0}}) {
+      const auto tile = both->Read(key), below = alone->Read(key);
+      ASSERT_TRUE(tile && below);
+      int of_earth = 0;
+      for (std::size_t n = 0; n < tile->heights.size(); ++n) {
+        if (tile->heights[n] >= 5000) continue;
+        ++of_earth;
+        ASSERT_EQ(tile->heights[n], below->heights[n]) << west << ' ' << geo::ToString(key) << ' ' << n;
+      }
+      EXPECT_TRUE(of_earth > 0 || west == -180 || west == 20) << west;
+      EXPECT_TRUE(std::isfinite(tile->source_error_m));
+    }
+    const auto pixels = both->ReadMercator(0, {0, 0, 256, 256}), below = alone->ReadMercator(0, {0, 0, 256, 256});
+    ASSERT_TRUE(pixels && below);
+    int of_earth = 0;
+    for (std::size_t n = 0; n < pixels->size(); ++n) {
+      if ((*pixels)[n] >= 5000) continue;
+      ++of_earth;
+      ASSERT_EQ((*pixels)[n], (*below)[n]) << west << ' ' << n;
+    }
+    EXPECT_GT(of_earth, 1000);
+  }
+}
+
 }  // namespace
 }  // namespace terrace::dem
