@@ -1,7 +1,7 @@
 // Deterministic compression of response bodies and of what lies inside them.
 //
-// Up to kCompressedAtOnce bytes are compressed in one go. Of more the stop token is asked before each
-// kCompressedAtOnce: a function returns nothing, the empty text, once a stop was requested.
+// Up to kCompressedAtOnce bytes are compressed in one call. Larger texts are compressed in parts of kCompressedAtOnce,
+// and the stop token is checked before each part. A function returns the empty text if a stop was requested.
 #pragma once
 
 #include <cstddef>
@@ -11,10 +11,10 @@
 
 namespace terrace::proto {
 
-// Defaults: a tenth of a tile's build, and most of what there is to save.
+// Default levels: they take a tenth of a tile's build and reach most of the possible compression.
 inline constexpr int kGzipLevel = 6, kBrotliQuality = 4, kZstdLevel = 6;
 
-// Ten milliseconds' worth.
+// Takes about ten milliseconds.
 inline constexpr std::size_t kCompressedAtOnce = std::size_t{1} << 20;
 
 // RFC 1952 gzip, one member: no time stamp, no name, so that equal bytes compress to equal bytes. By libdeflate up to

@@ -1,11 +1,11 @@
-// Errors as headers and documents state them.
+// The text of errors in headers and documents.
 #pragma once
 
 #include <string>
 
 namespace terrace::proto {
 
-// Metres with six significant digits, never below `error_m`. A number in JSON too.
+// Metres with six significant digits, rounded up: never below `error_m`. Also valid as a JSON number.
 std::string FormatErrorUp(double error_m);
 
 }  // namespace terrace::proto

@@ -1,11 +1,11 @@
-// How far tiles reach up and down: what bounding volumes are made of.
+// The vertical extent of tiles, for bounding volumes.
 #pragma once
 
 #include <algorithm>
 
 namespace terrace::proto {
 
-// Metres above the ellipsoid that no vertex leaves, feet of skirts included.
+// Heights above the ellipsoid, in metres, that contain all vertices, including the lower edges of skirts.
 struct HeightSpan {
   double min_m = 0, max_m = 0;
 

@@ -1,4 +1,4 @@
-// The sines and cosines of a tile's meridians and parallels: thousands of places of a tile lie on a few hundred of
+// The sines and cosines of a tile's meridians and parallels. Thousands of positions of a tile share a few hundred of
 // them.
 #pragma once
 

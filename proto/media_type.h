@@ -1,5 +1,5 @@
-// What HTTP headers say about representations: content types and extensions of quantized-mesh.
-// Pure functions of header texts; thread-safe; malformed input never fails, it asks for nothing.
+// HTTP content types and extensions of quantized-mesh. Pure functions of header texts; thread-safe. Malformed input is
+// no error; it requests nothing.
 #pragma once
 
 #include <string_view>
@@ -28,8 +28,8 @@ struct TileExtensions {
 // ignored.
 TileExtensions ParseExtensions(std::string_view names);
 
-// The `extensions` parameter of an Accept header, whichever media range it hangs off: CesiumJS writes it behind
-// application/vnd.quantized-mesh, 3DTilesRendererJS behind application/octet-stream.
+// The extensions in the `extensions` parameter of an Accept header, for any media range: CesiumJS adds it to
+// application/vnd.quantized-mesh, 3DTilesRendererJS to application/octet-stream.
 TileExtensions ExtensionsInAccept(std::string_view accept);
 
 // The Content-Type of a quantized-mesh tile with these extensions: a literal.

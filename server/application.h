@@ -1,5 +1,5 @@
-// What the server does behind HTTP: admits requests, finds who answers them, answers from what is served at the moment,
-// and reports every reply to the log and the metrics.
+// The application behind HTTP: admits requests, passes them to their handlers, answers from the current catalog, and
+// reports every reply to the log and the metrics.
 #pragma once
 
 #include <atomic>
@@ -27,7 +27,7 @@
 
 namespace terrace::server {
 
-// Where requests are answered from and told about; outlives the application.
+// What the application uses to answer and report requests; outlives it.
 struct ApplicationParts {
   Edge& edge;
   TileService& tiles;
@@ -35,20 +35,20 @@ struct ApplicationParts {
   MetricsPage& metrics_page;
   AccessLog& access_log;
   std::shared_ptr<const StaticFiles> viewer;
-  // Told that a source is not the one that was opened any more; on io threads, must not block. Empty: nobody will open
-  // it anew.
+  // Called when a source is no longer the file that was opened; on io threads, must not block. Empty: nothing reopens
+  // sources.
   std::function<void()> on_source_changed;
 };
 
 class TerrainApplication final : public Application, public ProcessState {
  public:
-  // Without a catalog (null) requests wait for the first Replace, all but those about the process.
+  // Without a catalog (null) requests wait for the first Replace, except those about the process.
   TerrainApplication(ApplicationParts parts, CatalogPtr catalog, HandlerOptions options);
 
   std::unique_ptr<ConnectionHandler> Connect(const asio::ip::address& peer) override;
   std::string ClientOf(const asio::ip::address& peer) const override;
 
-  // Requests that come from now on are answered from `catalog`. True: it is the first.
+  // New requests are answered from `catalog`. Returns true for the first one.
   bool Replace(CatalogPtr catalog, HandlerOptions options);
 
   // By dataset; "" is the configuration.

@@ -1,7 +1,7 @@
-// One budget of file descriptors: what the limit on open files leaves for connections, sources and the disk cache.
+// The budget of file descriptors: divides the limit on open files between connections, sources and the disk cache.
 //
-// It is split once, at the start, and every part keeps to its share for as long as the process runs: a dataset that
-// comes with a reload shares what there is for sources.
+// It is divided once, at the start, and each part keeps its share while the process runs: a dataset that is added by a
+// reload uses the share for sources.
 #pragma once
 
 #include <cstddef>
@@ -11,7 +11,7 @@
 
 namespace terrace::server {
 
-// What a configuration would take if there were any number.
+// The descriptors that a configuration would use without a limit.
 struct DescriptorDemand {
   unsigned io_threads = 1, worker_threads = 1;
   bool access_log_file = false;
@@ -29,9 +29,9 @@ struct DescriptorBudget {
   std::size_t connections = 0;
 };
 
-// `limit`: of the process. `in_use`: descriptors that are open before the server opens any. Everybody gets his least;
-// then the threads that use sources get what they may need for overviews and parts of VRTs; what is left is shared out
-// in proportion to what is wanted. kUnavailable: not even the least is there; the message says what it is made of.
+// `limit`: of the process. `in_use`: descriptors that are open before the server opens any. Each part gets its minimum.
+// Then the threads that read sources get the descriptors that overviews and parts of VRTs may need. The rest is divided
+// in proportion to the demand. kUnavailable: the limit is below the sum of the minimums; the message lists them.
 Result<DescriptorBudget> SplitDescriptors(const DescriptorDemand& demand, std::size_t limit, std::size_t in_use);
 
 // The limit on open files, after raising it as far as this process may.

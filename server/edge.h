@@ -1,5 +1,5 @@
-// The border between clients and the server as one object: who is let in, what they may ask for, and how much of it is
-// under way at a time.
+// The server's limits towards clients as one object: who is admitted, what they may request, and how many connections
+// and bytes may be in use at a time.
 #pragma once
 
 #include <memory>
@@ -16,7 +16,7 @@
 namespace terrace::server {
 
 struct Edge {
-  // Errors name the option's text, or the file.
+  // Errors quote the option's value, or name the file.
   static Result<std::unique_ptr<Edge>> Open(const config::Config& config);
 
   Edge(const config::Config& config, GateOptions gate_options);

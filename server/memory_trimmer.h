@@ -1,10 +1,10 @@
-// Gives memory that is free back to the system, as long as the process works.
+// Returns free memory to the system, regularly while the process computes.
 //
-// The allocator keeps what builds have freed, most of it between what lives on. One build in Draco takes two buffers of
-// up to four bytes for each value that a coordinate's step can have, 20 MB and more, and frees them; the next finds the
-// hole broken by a tile that was put into the cache, and takes new memory. Without this the server's size climbs by
-// such steps for hours. A thread of its own; a trim takes about a millisecond, and what is taken again about 5 ms for
-// 20 MB.
+// The allocator keeps the memory that builds have freed, most of it between blocks that are still in use. One build
+// with Draco uses two buffers of up to four bytes per possible step of a coordinate, 20 MB and more, and frees them.
+// The next build finds this gap split by a tile that was cached in between, and takes new memory. Without trimming, the
+// server would grow in such steps for hours. Trimming runs on its own thread and takes about a millisecond; taking 20
+// MB again costs about 5 ms.
 #pragma once
 
 #include <chrono>
@@ -16,8 +16,8 @@ namespace terrace::server {
 
 class MemoryTrimmer {
  public:
-  // Trims once in every period in which the process has computed anything worth it. Does nothing where the C library
-  // has no way to.
+  // Trims at most once per period, if the process has done enough computing in it. Does nothing if the C library has no
+  // function for it.
   explicit MemoryTrimmer(std::chrono::milliseconds period = std::chrono::seconds(3));
   ~MemoryTrimmer();
   MemoryTrimmer(const MemoryTrimmer&) = delete;

@@ -1,4 +1,4 @@
-// Every URL of the server, and who answers it.
+// All URLs of the server, and their handlers.
 #pragma once
 
 #include <memory>
@@ -20,7 +20,7 @@
 
 namespace terrace::server {
 
-// What answers from one catalog. Thread-safe. Whoever waits for an answer keeps this alive.
+// The handlers of one catalog. Thread-safe. A request keeps them alive until it is answered.
 struct Handlers {
   // `tile_service` and `process` must outlive this.
   Handlers(CatalogPtr c, TileService& tile_service, std::shared_ptr<const StaticFiles> files,

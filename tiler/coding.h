@@ -11,14 +11,14 @@ namespace terrace::tiler {
 
 enum class Coding : std::uint8_t { kIdentity, kGzip, kBrotli, kZstd };
 
-// Codings of bodies that are built on request, in order of preference. Measured over 206 tiles of 23 KB: brotli 63.3 %
-// of the size in 0.39 ms, gzip 65.8 % in 0.30 ms, zstd 66.0 % in 0.26 ms.
+// Codings of bodies that are built on request, in order of preference. Measured on 206 tiles of 23 KB: brotli 63.3 % of
+// the size in 0.39 ms, gzip 65.8 % in 0.30 ms, zstd 66.0 % in 0.26 ms.
 inline constexpr std::array<Coding, 3> kCodings = {Coding::kBrotli, Coding::kGzip, Coding::kZstd};
 
 // Codings of bodies that are compressed once at start.
 inline constexpr std::array<Coding, 1> kGzipOnly = {Coding::kGzip};
 
-// As Content-Encoding names it: "br". Empty for identity.
+// The name in Content-Encoding, such as "br"; empty for identity.
 std::string_view NameOf(Coding coding);
 
 // Deterministic: equal bytes give equal bytes. Returns an empty string if a stop was requested and `coding` is not

@@ -1,13 +1,14 @@
-// Which program makes the bytes: two processes with the same number make the same tile from the same dataset.
+// Identifies the program that makes the bytes: two processes with the same number make equal tiles from equal datasets.
 #pragma once
 
 #include <cstdint>
 
 namespace terrace::tiler {
 
-// A hash of the build ids (of the program and of every shared library that it was linked to), so that tiles kept on
-// disk do not outlive an update of the encoders, of GDAL or of the compressor. Libraries without a build id count by
-// name, size and time of their file. To be called before libraries are loaded on the way; later calls give the same.
+// A hash of the build ids of the program and of every shared library that it was linked to, so that tiles on disk are
+// not used after an update of the encoders, of GDAL or of a compressor. Libraries without a build id count by name,
+// size and time of their file. The first call must precede the loading of further libraries; later calls return the
+// same value.
 std::uint64_t EncoderVersion();
 
 }  // namespace terrace::tiler

@@ -1,7 +1,7 @@
-// One-dimensional simplification of a field's borders: how samples between two neighbouring border vertices are judged.
+// One-dimensional simplification of a field's borders: the error of samples between two neighbouring border vertices.
 //
-// Everything here is a function of the border's own samples and vertices (BorderOptions in greedy.h states the rule),
-// so that two fields with a border in common choose the same vertices on it. Safe to call from many threads at once.
+// Everything here depends on the samples and vertices of one border alone (BorderOptions in greedy.h states the rule),
+// so that two fields that share a border choose the same vertices on it. Safe to call from many threads at once.
 #pragma once
 
 #include <cstdint>
@@ -13,14 +13,14 @@
 
 namespace terrace::tin {
 
-// The side that both ends lie on. Precondition: they are different and share a border.
+// The side that both corners lie on. Precondition: they are different and on one border.
 Side SideOf(const HeightField& field, const Corner& a, const Corner& b);
 
 // The worst valid sample strictly between two neighbouring border vertices, given in any order, by the rule of
 // BorderOptions.
 Candidate WorstBorderSample(const HeightField& field, const Corner& a, const Corner& b, const BorderOptions& options);
 
-// Sum of the squared vertical distances of those samples from the chord: no weight, no sagitta.
+// Sum of the squared vertical distances of the same samples from the chord, without weight and sagitta.
 double SquaredBorderDistances(const HeightField& field, const Corner& a, const Corner& b);
 
 }  // namespace terrace::tin

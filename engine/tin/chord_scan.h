@@ -1,4 +1,4 @@
-// The worst sample beneath or above a chord: the loop of WorstBorderSample (border.h), in vectors.
+// The sample of a border edge with the largest error: the vectorized loop of WorstBorderSample (border.h).
 #pragma once
 
 #include "engine/tin/greedy.h"
@@ -15,11 +15,11 @@ struct Chord {
 
 struct ChordMisfit {
   double error = 0;  // 0: no sample is off
-  int at = 0;        // where, if one is; the first of equals
+  int at = 0;        // the sample with this error; the first of equals
 };
 
-// Of the samples strictly between the ends, which alone are read: the rule of BorderOptions in exactly its form,
-// without fused operations, the same on every processor, bit for bit.
+// The worst sample strictly between the ends by the rule of BorderOptions, in exactly its form and without fused
+// operations. Other samples are not read. The result is bit-equal on every processor.
 //
 // Safe to call from many threads at once.
 ChordMisfit WorstOfChord(const Chord& chord, const BorderOptions& options);

@@ -1,4 +1,4 @@
-// How the triangles of a mesh are joined.
+// The criterion by which the vertices of a mesh are joined.
 #pragma once
 
 #include <cstdint>

@@ -9,22 +9,22 @@
 //                        u-v is kept where S(p-w) < q^(5/4) S(u-v), and already where S(p-w) < q^(1/4) S(u-v) if a cut
 //                        by its fit, or one that came after it, has brought the edge into the outline,
 //                        else that with less E^2 / S; equal ones by the shape; equal in both: p-w.
-// With the angle between normals, S is squared once more, and what is further out is no different. With q = 0 the fit
-// alone decides, as in the paper. That compares E alone, and has one threshold. A cut that makes the shape worse is
-// seldom the better one in the end, the less so the further out it is, and takes two triangles more to scan: hence
-// three thresholds. All together it is 3 to 6 % fewer vertices (docs/decisions/0007).
+// For the angle between normals, S is squared once more, and the thresholds do not depend on how the edge came into the
+// outline. With q = 0 the fit alone decides, as in the paper. The paper compares E alone and has one threshold. A cut
+// that makes the shape worse rarely pays in the end, more rarely still further out, and adds two triangles to scan.
+// Hence there are three thresholds. All of this together saves 3 to 6 % of the vertices (docs/decisions/0007).
 //
-// Each test is a function of its quadrilateral, of which corner beyond is the youngest, and of how its edge came into
-// the outline, so that the cavity does not depend on the order of the tests, on the triangle that the insertion starts
-// from, or on slots.
+// A test depends on its quadrilateral, on which of the corners beyond the edge is the youngest, and on how its edge
+// came into the outline. The cavity therefore does not depend on the order of the tests, on the triangle that the
+// insertion starts from, or on slots.
 //
-// So tests may wait for each other. The walk around p takes what the shape decides; then one scan fits the triangles of
-// the outline it has found and both of the other cut wherever the fit decides; edges that have come into the outline
-// are the next round. A scan costs more to begin than its triangles do, and what it finds of the final ones is not
-// looked for again: they are scanned once.
+// Tests can therefore be done in groups. The walk around p absorbs the triangles that the shape decides on. One scan
+// then measures the triangles of the outline it has found, and both triangles of the other cut wherever the fit
+// decides. The edges that come into the outline are tested in the next round. Starting a scan costs more than its
+// triangles do, and what a scan finds for the final triangles is reused: they are scanned once.
 //
-// Whatever is chosen here, candidates are the exact worst samples of the final triangles: the bound is kept as with any
-// other criterion.
+// Candidates are the exact worst samples of the final triangles, whatever is chosen here: the error bound holds as with
+// any other criterion.
 //
 // Not thread-safe; different objects are independent.
 #pragma once
@@ -47,16 +47,16 @@ namespace terrace::tin {
 
 class DataDependentCriterion {
  public:
-  // What it works on belongs to the run and must outlive this object.
+  // The arguments belong to the run and must outlive this object.
   DataDependentCriterion(const HeightField& field, const Sagitta& sagitta, Triangulation& triangulation,
                          DataDependentOptions options);
 
-  // Triangulation::Insert by this criterion. The vertex by value, in a register: in memory it has just been put
-  // together field by field, and to read it as a whole would wait for that.
+  // Triangulation::Insert by this criterion. The vertex is passed by value, in registers: the caller has just written
+  // it field by field, and a load of the whole vertex would stall.
   const Star& Insert(Triangulation::Vertex vertex, TriangleId triangle);
 
-  // What a StarScan finds, for the star of the last insertion or a triangle as a star of its own. Valid until the next
-  // call of anything.
+  // The same result as a StarScan of the last insertion's star, or of a single triangle given as a star. Valid until
+  // the next call.
   const PlaneMisfit* Scan(const Star& star);
 
  private:
@@ -81,16 +81,16 @@ class DataDependentCriterion {
     Triangulation::Beyond beyond;
   };
 
-  // One that is cut the other way: u-w and w-v take its place. It points into the arrays of the round that decided it,
-  // which stay as they are until its edges are replaced: `suspects_` is swapped before it is written to again, and fits
-  // are not looked for meanwhile.
+  // A suspect edge that is cut the other way: u-w and w-v replace it. The pointers refer to the arrays of the round
+  // that decided it. These arrays do not change until the edges are replaced: `suspects_` is swapped before it is
+  // written to again, and no scan runs in between.
   struct Flip {
     const Suspect* suspect = nullptr;
     const PlaneMisfit* misfits = nullptr;  // of (u, w, p) and (w, v, p)
     const double* errors = nullptr;
   };
 
-  // Of an outline that is being changed, linked in its order: from u to the next one's.
+  // An edge of an outline that is being changed, from its u to the u of the next edge. Edges are linked in order.
   struct Edge {
     RingVertex u;
     HalfEdgeId outside = 0;
@@ -123,12 +123,12 @@ class DataDependentCriterion {
 
   Triangulation* triangulation_;
   DataDependentOptions options_;
-  // Ratios of squared qualities, the one cut's over the other's, below which the shape decides.
+  // Thresholds on the ratio of the squared shape qualities of the two cuts: below them the shape decides.
   double taken_below_, kept_below_, kept_further_out_below_;
   FitErrors fit_errors_;
   LargeArray<double> errors_by_slot_;
 
-  // Of the insertion at work.
+  // State of the current insertion.
   Triangulation::Vertex vertex_;
   std::vector<Suspect> suspects_ = std::vector<Suspect>(kLikelyEdges), decided_ = suspects_;
   std::vector<Flip> flips_ = std::vector<Flip>(kLikelyEdges);
@@ -139,7 +139,7 @@ class DataDependentCriterion {
   std::vector<PlaneMisfit> pair_misfits_ = std::vector<PlaneMisfit>(3 * kMaxPairs + FitErrors::kPadding);
   std::vector<double> pair_errors_ = std::vector<double>(3 * kMaxPairs + FitErrors::kPadding);
 
-  // Of the last star.
+  // State of the last star.
   VertexId centre_ = 0;
   std::size_t count_ = 0;
   std::vector<PlaneMisfit> misfits_;

@@ -1,6 +1,6 @@
-// How badly triangles fit the samples, by the measures that data-dependent triangulation compares them by: Garland and
-// Heckbert (1997), section 3.4.1. Metres, or square metres by FitMeasure::kSumSquares. The angle between normals needs
-// none of this (quadrilateral.h).
+// The misfit between triangles and samples, by the measures of data-dependent triangulation: Garland and Heckbert
+// (1997), section 3.4.1. In metres; in square metres for FitMeasure::kSumSquares. FitMeasure::kNormals does not use
+// this class (quadrilateral.h).
 //
 // Not thread-safe; different objects are independent.
 #pragma once
@@ -19,38 +19,38 @@ namespace terrace::tin {
 
 class FitErrors {
  public:
-  // Values that arrays for `Scan` must have beyond those of the star.
+  // Elements beyond the star's triangles that the arrays of `Scan` must have.
   static constexpr std::size_t kPadding = 8;
 
   // The field and the sagitta must outlive this object.
   FitErrors(const HeightField& field, const Sagitta& sagitta, FitMeasure measure);
 
-  // By the largest distance of a triangle, which scans find.
+  // Whether the misfit of a triangle is its largest distance, which scans find.
   bool are_maxima() const { return measure_ == FitMeasure::kSumMax || measure_ == FitMeasure::kMaxMax; }
 
-  // Of two triangles, squared: square metres by every measure.
+  // The squared misfit of two triangles, in square metres for every measure.
   double CombinedSquare(double a, double b) const {
     if (measure_ == FitMeasure::kSumSquares) return a + b;
     const double combined = measure_ == FitMeasure::kMaxMax ? std::max(a, b) : a + b;
     return combined * combined;
   }
 
-  // What a StarScan finds, and errors by maxima: of a triangle that is left out, anything.
+  // The result of a StarScan, and the misfits if are_maxima(). Values of triangles that are left out are undefined.
   void Scan(const Star& star, PlaneMisfit* misfits, double* errors) const {
     scan_star_(*field_, star, misfits);
     if (star.has_border || !sagitta_->is_flat()) [[unlikely]]
       return AddBordersAndSagitta(star, misfits, errors);
-    // Eight together, since how many there are cannot be predicted.
+    // Blocks of eight: branches on the number of triangles would be mispredicted.
     for (std::size_t i = 0; i < star.count; i += kPadding) {
 #pragma GCC unroll 8
       for (std::size_t k = i; k < i + kPadding; ++k) errors[k] = DistanceOrZero(misfits[k]);
     }
   }
 
-  // Of one triangle (u, v, p), u and v seen from p; equal bit for bit to what is found of it as part of a star of p.
+  // The misfit of the triangle (u, v, p), u and v relative to p. Bit-equal to its misfit as a part of a star of p.
   double Of(const Triangulation::Vertex& p, const RingVertex& u, const RingVertex& v);
 
-  // By maxima, from what a scan has found.
+  // The same if are_maxima(), from the result of a scan.
   double Of(const PlaneMisfit& misfit, const Triangulation::Vertex& p, const RingVertex& u, const RingVertex& v) const;
 
  private:

@@ -1,9 +1,9 @@
-// Greedy insertion of height samples into a triangulation: Delaunay, or chosen by how well it fits the samples.
+// Greedy insertion of height samples into a triangulation, which is Delaunay or data-dependent.
 //
 // Garland and Heckbert, "Fast Triangular Approximation of Terrains and Height Fields" (1997), section 3.3, algorithm
-// III: every triangle keeps its worst sample as a candidate, a queue yields the worst of all, and only the triangles
-// that an insertion changed are scanned again. The result is a function of the field and the options alone: predicates
-// are exact, and equal errors are ordered by their samples, row by row.
+// III: every triangle keeps its worst sample as a candidate, a queue yields the worst candidate of all, and only the
+// triangles that an insertion changed are scanned again. The result depends on the field and the options alone:
+// predicates are exact, and samples with equal errors are ordered row by row.
 //
 // Not thread-safe; different objects are independent.
 #pragma once
@@ -31,30 +31,31 @@ enum class Side : std::uint8_t {
   kWest = 3 /* x = 0 */
 };
 
-// How samples on one border are judged. A border sample k between the border's vertices a < b misses by
+// The error of samples on one border. Let a < b be two neighbouring vertices on the border, counted along increasing x
+// or y, and k a sample between them. Its distance from the chord is
 //   m = |(h_a (b - k) + h_b (k - a)) / (b - a) - h_k| + sagitta_m (k - a) (b - k)
-// evaluated in double in exactly this form, a < b counted along increasing x or y, and its error is
-//   scale min(max((m + padding_m) weight, m + padding_m + step_m), kMaxBorderWeight m):
-// what a vertex on the border loses to a rounding that grows with the error (weight), to rounding by fixed amounts
-// (padding_m, step_m), with a limit so that a border full of cliffs does not take every sample for nothing. This is a
-// function of that border's own samples. Two fields that share a border with equal heights and options therefore insert
-// the same border vertices, whatever their insides look like.
+// evaluated in double in exactly this form. Its error is
+//   scale min(max((m + padding_m) weight, m + padding_m + step_m), kMaxBorderWeight m).
+// `weight` makes room for rounding that grows with the error, `padding_m` and `step_m` for rounding by fixed amounts.
+// The limit kMaxBorderWeight keeps a border with many cliffs from taking every sample. The error depends on the samples
+// of this border alone: two fields that share a border with equal heights and options insert the same border vertices,
+// whatever their interiors are.
 struct BorderOptions {
   double weight = 1;
   double padding_m = 0;
   double step_m = 0;
-  double sagitta_m = 0;  // half the second difference of the ground that the border's chord cuts off
-  double scale = 1;      // the error counts so many times: a border threshold of E / scale in a run to the error E
+  double sagitta_m = 0;  // half the second difference of the curved ground along the border
+  double scale = 1;      // factor on the error: in a run to the error E the border is refined to E / scale
 };
 inline constexpr double kMaxBorderWeight = 4;
 
-// The ground under the field is curved: a flat triangle with corners (dx, dy) samples apart cuts below it by up to its
-// sagitta. Squared lengths are q = dx^2 east_m2[row] + dy^2 north_m2, with the largest east_m2 of the triangle's rows;
-// the sagitta bound is (largest distance from a corner within the triangle)^2 / (2 radius): the squared circumradius
-// for acute triangles, else a quarter of the longest side squared. It is added to the error of every sample of the
-// triangle.
+// The ground under the field is curved: a flat triangle cuts below it by at most the triangle's sagitta. The squared
+// distance between positions (dx, dy) samples apart is q = dx^2 east_m2[row] + dy^2 north_m2, with the largest east_m2
+// of the triangle's rows. The bound on the sagitta is d / (2 radius_m). d is the squared circumradius of an acute
+// triangle, and a quarter of the squared longest side of any other. The bound is added to the error of every sample of
+// the triangle.
 struct Curvature {
-  // Per row: squared metres per column step; empty: flat ground. Rising up to some row, falling after it.
+  // Per row: squared metres per column step; empty: flat ground. Increases up to some row and decreases after it.
   std::vector<double> east_m2;
   double north_m2 = 0;  // squared metres per row step
   double radius_m = 0;
@@ -67,20 +68,20 @@ struct SeedGrid {
   int step = 1;
 };
 
-// What data-dependent triangulation holds against a pair of triangles that could be cut along their other diagonal
+// The misfit by which data-dependent triangulation compares the two ways to divide a quadrilateral into triangles
 // (section 3.4.1).
 enum class FitMeasure : std::uint8_t {
   kSumMax,      // the sum of their largest errors
   kSumSquares,  // the sum of all squared distances
   kMaxMax,      // the larger of their largest errors
-  kNormals,     // the angle between their normals, metres over samples: looks at no sample but the corners
+  kNormals,     // the angle between their normals, in metres per sample; uses the corners alone
 };
 
 struct DataDependentOptions {
   FitMeasure measure = FitMeasure::kSumMax;
-  // From 0 to 1 (section 3.4.2): how far the shapes of two cuts may be apart for their fit to count (data_dependent.h).
-  // 0 looks at the fit alone, 1 at the shape wherever it differs. Between them errors are held against the quality of
-  // the shape, which the paper does not.
+  // From 0 to 1 (section 3.4.2). The lower it is, the more the shapes of the two ways may differ before the shape
+  // decides instead of the misfit (data_dependent.h). At 0 the misfit alone decides; at 1 the shape decides wherever it
+  // differs. In between, misfits are weighted by the quality of the shape, which the paper does not do.
   double qthresh = 0.5;
 };
 
@@ -105,18 +106,19 @@ class GreedyTriangulation {
   // Starts with the two triangles of the field's corners. `field` must outlive this object.
   explicit GreedyTriangulation(const HeightField& field, GreedyOptions options = {});
 
-  // Goes on where a refinement of the same field with the same options has ended. Precondition: its run met an error
-  // or there are no seeds; one that ended inside a seed grid goes on with another order of insertions.
+  // Continues where a refinement of the same field with the same options ended. Precondition: its run reached its error
+  // goal, or there are no seeds. A run that ended inside a seed grid would continue with another order of insertions.
   GreedyTriangulation(const HeightField& field, GreedyOptions options, const Refinement& refinement);
   ~GreedyTriangulation();
   GreedyTriangulation(GreedyTriangulation&&) noexcept;
   GreedyTriangulation& operator=(GreedyTriangulation&&) noexcept;
 
-  // Inserts samples, worst first, until a goal is met. A later call with a tighter goal goes on from there and ends in
-  // the mesh that one call with that goal would have made. False if stopped; the mesh is then valid but unfinished.
+  // Inserts samples, worst first, until a goal is met. A later call with a tighter goal continues from there; the mesh
+  // is the one that a single call with that goal would have made. Returns false if stopped; the mesh is then valid but
+  // unfinished.
   bool Run(const GreedyGoal& goal, std::stop_token stop = {});
 
-  // The largest error that the next insertion would mend; 0 when every sample is met.
+  // The largest error of a candidate; 0 if there is none.
   double CurrentError() const;
   std::size_t vertex_count() const;
 

@@ -1,4 +1,4 @@
-// Samples inserted into a finished mesh.
+// Inserts samples into a finished mesh.
 #pragma once
 
 #include <optional>
@@ -9,23 +9,24 @@
 
 namespace terrace::tin {
 
-// Inserts into one mesh again and again: which triangles are neighbours is found out once.
+// Inserts into one mesh repeatedly. The adjacency of its triangles is computed once.
 class SampleInserter {
  public:
-  // Joins each sample to the triangles whose circle it lies in, as far as it sees them: what was Delaunay stays so, and
-  // any other mesh stays a mesh. Samples that are vertices already are skipped; border samples are refused
-  // (TERRACE_CHECK): borders are a function of their own samples. Preconditions: the mesh covers a rectangle once, its
-  // corners first; from the second call on, it is what the call before has left.
+  // Replaces the triangles whose circumcircle contains the sample, as far as they are visible from it. A Delaunay mesh
+  // stays Delaunay; any other mesh stays a valid mesh. Samples that are vertices already are skipped. Border samples
+  // fail a TERRACE_CHECK, because border vertices depend on the border's own samples alone. Preconditions: the mesh
+  // covers a rectangle once, and its first four vertices are the corners; from the second call on, it is the result of
+  // the call before.
   void InsertInto(TinMesh& mesh, std::span<const SamplePosition> samples);
 
  private:
   std::optional<Triangulation> triangulation_;  // from the first call on
 };
 
-// The same, once.
+// A single InsertInto.
 TinMesh InsertSamples(TinMesh mesh, std::span<const SamplePosition> samples);
 
-// The Delaunay triangulation of the vertices of a mesh, those on its border too. Preconditions: as above.
+// The Delaunay triangulation of a mesh's vertices, border vertices included. Preconditions: those of InsertInto.
 TinMesh DelaunayOf(const TinMesh& mesh);
 
 }  // namespace terrace::tin

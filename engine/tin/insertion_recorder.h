@@ -1,8 +1,7 @@
-// Writes down a run of insertions as it goes: what a Refinement is made of.
+// Records a run of insertions, from which a Refinement is made.
 //
-// While the run goes on, all that is written is a log, from one end to the other. Which triangle was removed by which
-// insertion is found out when a refinement is asked for: that jumps about, and beside the run it would push the mesh
-// out of the cache.
+// During the run a log is only appended to. Make finds out which insertion removed which triangle. That takes random
+// access to the record, which would evict the mesh from the cache during the run.
 #pragma once
 
 #include <cstddef>
@@ -17,13 +16,13 @@ namespace terrace::tin {
 
 class InsertionRecorder {
  public:
-  // Room is made for so many insertions. There may be more.
+  // Reserves memory for this number of insertions. More are possible.
   explicit InsertionRecorder(std::size_t likely_insertions);
 
-  // Goes on with a refinement whose mesh is in the triangulation, its triangles in the order of MeshOf.
+  // Continues a refinement. Precondition: the triangulation holds its mesh, with the triangles in the order of MeshOf.
   explicit InsertionRecorder(const Refinement& refinement);
 
-  // The star is that of sample `inserted`, whose insertion mended `error_before`.
+  // `star`: of the sample `inserted`. `error_before`: the error before its insertion.
   void Append(SamplePosition inserted, float error_before, const Star& star);
 
   Refinement Make(int width, int height) const;
@@ -37,13 +36,13 @@ class InsertionRecorder {
   LargeArray<SamplePosition> inserted_;
   LargeArray<float> errors_before_;
 
-  // Before the log begins: the record, and by slot which of its triangles is there.
+  // The record before the log, and for each slot the index of the triangle in it.
   InsertionRecord<std::uint32_t> begun_;
   std::vector<std::uint32_t> made_in_slot_;
 
-  // By insertion: triangles made, with InsertionRecord::kOpen; the ring of vertices; the slots of the triangles
-  // removed, two fewer than made, one fewer in an open star. The first triangles made are in these slots, the others in
-  // new ones.
+  // For each insertion: the number of triangles made, with InsertionRecord::kOpen; the ring of vertices; the slots of
+  // the triangles removed. These are two fewer than the triangles made, one fewer in an open star. The first triangles
+  // made take these slots, the others new ones.
   LargeArray<Word> log_;
   std::size_t made_ = 0, most_made_ = 0;  // triangles, in all and by one insertion
   std::size_t corners_ = 0;               // of all rings

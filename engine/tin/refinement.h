@@ -1,10 +1,10 @@
-// The recorded order of a greedy run: every coarser mesh of a field without its samples.
+// The recorded order of a greedy run. It yields every coarser mesh of the field without reading samples.
 //
-// Greedy insertion is progressive: the mesh to any error is what stood before the first insertion made at or below it.
-// So the whole pyramid of meshes is one list of insertions. For each one it holds the sample, the error before it, the
-// ring of vertices that it was joined to, and for each of the triangles made that way the insertion that removed it
-// again. The mesh after n insertions is every triangle made by one of the first n and removed by none of them: a
-// filter, no geometry.
+// Greedy insertion is progressive: the mesh for an error is the state before the first insertion made at or below that
+// error. All meshes of a field are therefore one list of insertions. An insertion is recorded with its sample, the
+// error before it, the ring of vertices that the sample was joined to, and, for each triangle it made, the later
+// insertion that removed this triangle. The mesh after n insertions consists of the triangles made by one of the first
+// n insertions and removed by none of them. Finding them takes no geometry.
 //
 // Immutable; safe to read from many threads at once.
 #pragma once
@@ -26,10 +26,10 @@ class Refinement {
  public:
   using Record = std::variant<InsertionRecord<std::uint16_t>, InsertionRecord<std::uint32_t>>;
 
-  // Whether the record has indices of 16 bits, half of the memory: it has them wherever they suffice.
+  // Whether a record of this size has 16-bit indices, which take half of the memory. Used wherever they suffice.
   static bool IsNarrow(std::size_t vertices, std::size_t most_triangles_made);
 
-  // `errors_before` and the record have one entry an insertion.
+  // `errors_before` and the record have one entry per insertion.
   Refinement(int width, int height, std::vector<SamplePosition> inserted, std::vector<float> errors_before,
              Record record);
 
@@ -38,25 +38,25 @@ class Refinement {
 
   std::size_t vertex_count() const { return 4 + inserted_.size(); }
 
-  // Vertices of the mesh that a run to this error makes. Precondition: the recorded run went at least as far.
+  // The number of vertices of the mesh for this error. Precondition: the recorded run reached this error.
   std::size_t PointsAt(double max_error) const;
 
   // The mesh of the first `points` vertices, 4 <= points <= vertex_count(). Triangles in the order they were made.
   TinMesh MeshOf(std::size_t points) const;
   TinMesh MeshAt(double max_error) const { return MeshOf(PointsAt(max_error)); }
 
-  // Memory taken.
+  // Memory in use.
   std::size_t bytes() const;
 
   // Little-endian, with a version and a checksum.
   std::string Serialize() const;
-  // kInvalidArgument for what was damaged or cannot be a record. Whatever is accepted has meshes of vertices it has;
-  // that they are triangulations is up to whoever wrote it, so go on only with what Serialize has written.
+  // kInvalidArgument: the bytes are damaged or cannot be a record. An accepted record has valid indices in all of its
+  // meshes. It is not checked that these are triangulations: continue a run only from bytes that Serialize has written.
   static Result<Refinement> Parse(std::string_view bytes);
 
   const std::vector<SamplePosition>& inserted() const { return inserted_; }
   const std::vector<float>& errors_before() const { return errors_before_; }
-  // The record with the widest indices, to go on with.
+  // The record with 32-bit indices, to continue a run with.
   InsertionRecord<std::uint32_t> WideRecord() const;
 
   friend bool operator==(const Refinement&, const Refinement&) = default;

@@ -1,4 +1,4 @@
-// How far a flat triangle cuts below curved ground: the bound that Curvature in greedy.h states.
+// How far a flat triangle cuts below curved ground: computes the bound that Curvature in greedy.h defines.
 #pragma once
 
 #include <vector>
@@ -10,7 +10,7 @@ namespace terrace::tin {
 
 class Sagitta {
  public:
-  // TERRACE_CHECKs what Curvature promises for a field of `rows` rows.
+  // Fails a TERRACE_CHECK if `curvature` is not valid for a field of `rows` rows.
   Sagitta(Curvature curvature, int rows);
 
   bool is_flat() const { return east_m2_.empty(); }

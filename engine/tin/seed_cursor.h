@@ -1,4 +1,4 @@
-// Where a run is in its seed grids: which samples are due, in which order.
+// The position of a run within its seed grids: the samples that are due, in order.
 #pragma once
 
 #include <cstddef>
@@ -12,15 +12,16 @@ namespace terrace::tin {
 
 class SeedCursor {
  public:
-  // TERRACE_CHECKs what SeedGrid promises: steps that divide both sides, in order of decreasing below_error.
+  // Fails a TERRACE_CHECK if a step does not divide both sides, or if the grids are not in order of decreasing
+  // below_error.
   SeedCursor(const HeightField& field, std::vector<SeedGrid> grids);
 
-  // A grid that has been begun is taken to its end, whatever the error becomes meanwhile.
+  // Whether a grid is unfinished. Its remaining samples are inserted at any error.
   bool InGrid() const { return begun_; }
   bool HasGrid() const { return grid_ < grids_.size(); }
   // Whether the next grid must be in every mesh with this error. Precondition: HasGrid.
   bool IsDue(double error) const { return static_cast<double>(below_error()) > error; }
-  // Of the grid that the next sample is from, rounded up.
+  // The below_error of the grid that holds the next sample, rounded up to a float.
   float below_error() const { return CandidateQueue::RoundUp(grids_[grid_].below_error); }
 
   // The next sample, row by row. Precondition: HasGrid.

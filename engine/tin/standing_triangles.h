@@ -1,4 +1,4 @@
-// The triangles that stand after so many insertions of a record: what a replay draws (refinement.h).
+// The triangles that exist after a number of insertions of a record (refinement.h).
 #pragma once
 
 #include <array>
@@ -10,8 +10,8 @@
 
 namespace terrace::tin {
 
-// In the order in which they were made; corners are vertices, the four of the field first. The record must be sound
-// and have at least `insertions`.
+// Triangles in the order in which they were made. Their corners are vertex indices; 0 to 3 are the corners of the
+// field. Precondition: the record is sound and has at least `insertions` insertions.
 std::vector<std::array<std::uint32_t, 3>> StandingTriangles(const InsertionRecord<std::uint16_t>& record,
                                                             std::size_t insertions);
 std::vector<std::array<std::uint32_t, 3>> StandingTriangles(const InsertionRecord<std::uint32_t>& record,

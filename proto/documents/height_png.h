@@ -1,7 +1,7 @@
 // Heights as the colours of PNG images: the "raster-dem" tiles of MapLibre, Mapbox and deck.gl.
 //
-// PNG (ISO/IEC 15948) with 8 bits of red, green and blue, neither alpha nor colour profile: browsers hand the very
-// bytes on. Deterministic: filters are chosen by sums of integers, and the compressor is libdeflate.
+// PNG (ISO/IEC 15948) with 8 bits of red, green and blue, without alpha and colour profile, so that browsers pass the
+// stored bytes on unchanged. Deterministic: filters are chosen by sums of integers, and the compressor is libdeflate.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@ enum class HeightEncoding : std::uint8_t {
   kTerrarium  // R * 256 + G + B / 256 - 32768 metres
 };
 
-// The nearest code of a height; what no code reaches is the first or the last one. Precondition: finite.
+// The code nearest to a height, clamped to the first and the last code. Precondition: finite.
 std::uint32_t EncodeHeight(double metres, HeightEncoding encoding);
 double DecodeHeight(std::uint32_t code, HeightEncoding encoding);
 

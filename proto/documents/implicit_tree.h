@@ -1,8 +1,8 @@
 // The tiles of a dataset as implicit quadtrees of 3D Tiles 1.1 (OGC 22-025r4, "Implicit Tiling"): where the trees are
 // rooted, and what lies in a subtree of them. Pure functions, thread-safe.
 //
-// A tree is rooted at a TMS tile. Inside it a tile has the level, column and row that it has under that root: level 0
-// is the root, x counts from the west and y from the SOUTH, as in TMS, so that the numbers differ by a shift alone.
+// A tree is rooted at a TMS tile. A tile's level, column and row in the tree are relative to the root: level 0 is the
+// root, x counts from the west and y from the SOUTH, as in TMS.
 #pragma once
 
 #include <cstdint>
@@ -19,8 +19,9 @@ using Availability = std::span<const std::vector<geo::TileRange>>;
 
 inline constexpr std::int64_t kMaxImplicitRoots = 4;
 
-// Tiles of 45 degrees. Roots of a larger part of the Earth are of this level, 32 of them at most: descendants inherit
-// the skirts of a root, and loaders.gl cannot bound larger regions (docs/decisions/0009-implicit-roots.md).
+// Level of tiles of 45 degrees. If the data cover too much of the Earth for deeper roots, the roots are at this level,
+// at most 32 of them: descendants inherit the skirts of a root, and loaders.gl cannot bound larger regions
+// (docs/decisions/0009-implicit-roots.md).
 inline constexpr int kShallowestRoots = 2;
 
 // All tiles of the deepest level that has at most kMaxImplicitRoots of them and under which everything lies, or of
@@ -28,41 +29,41 @@ inline constexpr int kShallowestRoots = 2;
 // Precondition: level 0 is not empty.
 std::vector<geo::TileKey> ImplicitRoots(Availability available);
 
-// Levels from the root down to the deepest available tile under it, the root counted: of a mosaic, trees over its fine
-// sources are deeper than others. Precondition: the root is available.
+// The number of levels from the root to the deepest available tile below it, both included. In a mosaic, trees over
+// fine sources have more levels than others. Precondition: the root is available.
 int LevelsUnder(Availability available, const geo::TileKey& root);
 
-// More would cost CesiumJS frames: it makes an object for each of the 5,461 tiles of a full subtree as soon as the file
-// is there.
+// More levels would cost CesiumJS frames: it creates an object for each of the 5,461 tiles of a full subtree when the
+// file arrives.
 inline constexpr int kTallestSubtree = 7;
 
-// Levels of each .subtree of a tree of `levels` levels: as few subtrees one above the other as can be, of equal height.
-// A low last one is what must not be: loaders.gl fetches all subtrees of a tree one after the other before it draws,
-// and those that begin at the tree's last level are as many as its tiles.
+// The number of levels of each .subtree in a tree of `levels` levels: as few subtrees above each other as possible, of
+// equal height. The last one must not be low: loaders.gl fetches all subtrees of a tree one by one before it draws, and
+// there are as many subtrees as tiles on the level where they begin.
 int SubtreeLevels(int levels);
 
 struct TreeRoot {
   geo::TileKey tile;
   int levels = 1;  // of the tree, its root counted
-  // Not empty: no tree is rooted at `tile`, which is a tile of its own, but at each of these below it.
+  // If not empty, `tile` is a single tile without a tree, and trees are rooted at these tiles below it.
   std::vector<TreeRoot> below = {};
 };
 
-// Tiles that a tileset.json names one by one, roots of trees included: 350 bytes each, 20 to 30 compressed.
+// Limit of the tiles that a tileset.json lists explicitly, roots included. Each takes 350 bytes, compressed 20 to 30.
 inline constexpr std::size_t kMaxNamedTiles = 1024;
 
-// The roots with what is below them. Two kinds of trees are rooted deeper, under tiles with regions of their own:
-// - those beside the poles, by a level: of a region whose corner is a pole loaders.gl makes a box without width, and
-//   deck.gl then draws nothing of Europe from near;
-// - those of more levels than a subtree, as deep as kMaxNamedTiles allows, trees of most levels first. Descendants
-//   inherit the root's range of heights and skirts, which six levels below it are 8 % of the distance from which they
-//   are looked at, and twice that with each further level.
+// The roots, with the roots below them. Two kinds of trees are rooted deeper, below tiles with their own regions:
+// - trees beside a pole, by one level: for a region with a corner at a pole loaders.gl makes a box without width, and
+//   deck.gl then draws nothing of Europe from nearby;
+// - trees with more levels than a subtree, as deep as kMaxNamedTiles allows, those with the most levels first.
+//   Descendants inherit the root's height range and skirts. Six levels below the root these are 8 % of the viewing
+//   distance, and twice as much with each further level.
 std::vector<TreeRoot> ImplicitTrees(Availability available, const std::vector<geo::TileKey>& roots);
 
-// How a root is called in URLs: "9-272-359", level, column and row.
+// The name of a root in URLs: level, column and row, as in "9-272-359".
 std::string RootName(const geo::TileKey& root);
 
-// The tile `level` levels under the root, in the tree's own numbering.
+// The tile at a tree's own level, column and row.
 constexpr geo::TileKey TileUnder(const geo::TileKey& root, int level, std::int64_t x, std::int64_t y) {
   return {root.level + level, (root.x << level) + x, (root.y << level) + y};
 }

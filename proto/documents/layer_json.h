@@ -17,14 +17,14 @@ struct LayerDescription {
   // Degrees. west > east, or east > 180, is a box across the antimeridian: layer.json then spans all longitudes,
   // because its readers know only boxes with west < east.
   double west = -180, south = -90, east = 180, north = 90;
-  bool water_mask = false;  // tiles have it for those who ask
-  int metadata_levels = 0;  // tiles of every so many levels have metadata for those who ask; 0: none
+  bool water_mask = false;  // tiles have it on request
+  int metadata_levels = 0;  // tiles at multiples of this level have metadata on request; 0: none
   std::string tile_query;   // appended to the tile template, without '?': "error=5&atleast=1"; may be empty
 };
 
-// UTF-8 JSON. `available` must be complete: from both roots down, every ancestor of an available tile included. It is
-// written whatever `metadata_levels` is: CesiumJS and cesium-native then ignore it for the metadata of tiles, others
-// read nothing else. Empty: a stop was requested. Precondition: available is not empty.
+// UTF-8 JSON; empty if a stop was requested. `available` must be complete: it contains both roots and every ancestor of
+// an available tile. It is written for any `metadata_levels`: CesiumJS and cesium-native ignore it if tiles have
+// metadata, and other clients read nothing else. Precondition: available is not empty.
 std::string EncodeLayerJson(const LayerDescription& layer, const std::stop_token& stop = {});
 
 }  // namespace terrace::proto

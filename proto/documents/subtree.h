@@ -14,7 +14,7 @@
 
 namespace terrace::proto {
 
-inline constexpr int kMaxSubtreeLevels = 10;  // 350,000 tiles; clients make an object for each at once
+inline constexpr int kMaxSubtreeLevels = 10;  // 350,000 tiles; clients create an object for each when the file arrives
 
 // Of the metadata in a subtree: the class and its properties in the tileset's schema.
 inline constexpr const char* kTileClass = "tile";

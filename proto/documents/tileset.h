@@ -1,5 +1,4 @@
-// tileset.json of 3D Tiles 1.1: implicit quadtrees over TMS tiles (OGC 22-025r4). Knows nothing of what a tile
-// contains.
+// tileset.json of 3D Tiles 1.1: implicit quadtrees over TMS tiles (OGC 22-025r4). Independent of the tiles' content.
 #pragma once
 
 #include <functional>
@@ -21,9 +20,9 @@ struct TilesetDescription {
   std::string content_query;  // likewise to the contents: "error=5&atleast=1"
 };
 
-// Metres. 3D Tiles clients go a level deeper where a tile's geometric error comes to more than 16 pixels, terrain
-// clients where the level error that they assume comes to more than 2. With 8 times that level error both choose the
-// same tiles (cesium-native turns layer.json into 3D Tiles by the same factor).
+// Metres. 3D Tiles clients refine a tile if its geometric error is more than 16 pixels on the screen; terrain clients
+// refine if the level error that they assume is more than 2 pixels. With 8 times that level error both choose the same
+// tiles (cesium-native converts layer.json to 3D Tiles by the same factor).
 double GeometricError(int level);
 
 // UTF-8 JSON. Templates are relative to the tileset: 3dtiles/{RootName}/{level}/{x}/{y}.glb and

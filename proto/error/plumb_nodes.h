@@ -1,8 +1,8 @@
-// Flat triangles along the plumb lines of lattice nodes: what a client that draws a triangle shows at a longitude and a
-// latitude. The plumb line of a place is the ellipsoid's normal there.
+// Flat triangles on the plumb lines of lattice nodes: the height that a client draws at a longitude and latitude. The
+// plumb line of a position is the ellipsoid's normal there.
 //
-// The point of a flat triangle with barycentric coordinates w has nearly, but not quite, the place that w gives in
-// longitude and latitude: on a triangle of a degree at 60 degrees north it lies up to a hundred metres beside it, and
+// The point of a flat triangle with barycentric coordinates w is close to the position that w gives in longitude and
+// latitude, but not equal to it: in a triangle of one degree at 60 degrees north the offset is up to a hundred metres,
 // near a pole kilometres.
 #pragma once
 
@@ -28,9 +28,9 @@ class PlumbNodes {
     explicit Plane(const std::array<geo::Vec3, 3>& corners);
     geo::Vec3 normal;   // of any length
     double offset = 0;  // dot(normal, point) of its points
-    double least = 0;   // dot(normal, plumb line) of planes that stand too steep to tell a height
-    // The corners are so close to one line that rounding decides what the plane is: what the triangle shows is shown by
-    // its neighbours' edges.
+    double least = 0;   // least dot(normal, plumb line): steeper planes have no defined height
+    // The corners are so close to one line that rounding determines the plane. The edges of the neighbouring triangles
+    // show what this triangle shows.
     bool is_line = false;
   };
 
@@ -44,22 +44,22 @@ class PlumbNodes {
     return (plane.offset - row.z * plane.normal.z - row.radius * across) / up;
   }
 
-  // An upper bound of |HeightOn - sample| over the nodes `first` to `last` of a row; infinite if HeightOn is NaN at one
-  // of them. `samples`: of the row's nodes from 0 on.
+  // At least the largest difference between HeightOn and the samples of nodes `first` to `last` of a row. `samples`:
+  // from node 0 on. A node whose height is not defined has the largest difference possible.
   double LargestOfRow(const Plane& plane, int j, std::int64_t first, std::int64_t last, const float* samples) const;
 
-  // Whether the node's plumb line passes through the triangle. Up to a micrometre beside its rim counts.
+  // Whether the node's plumb line passes through the triangle, or at most a micrometre outside of it.
   bool Meets(const std::array<geo::Vec3, 3>& corners, int i, int j) const;
 
-  // Of a point near the node's plumb line: metres above the ellipsoid, and metres beside the line.
+  // The position of a point near the node's plumb line: metres above the ellipsoid, and metres from the line.
   struct Position {
     double height_m = 0, beside_m = 0;
   };
   Position PositionOf(const geo::Vec3& point, int i, int j) const;
 
-  // Lattice steps by which a point of a triangle may lie beside the place that its barycentric coordinates give.
-  // `unit`: of the corners' coordinates, from one node to the next. `beside_m`: by which the corners may lie beside
-  // their plumb lines. Infinite where no bound is known: about a pole, and over more than half a radian.
+  // A bound, in lattice steps, on the offset of a triangle's point from the position that its barycentric coordinates
+  // give. `unit`: distance between nodes, in the unit of the corners' coordinates. `beside_m`: bound on the distance of
+  // the corners from their plumb lines. Infinite if no bound is known: around a pole, and over more than half a radian.
   struct Shift {
     double x = 0, y = 0;
   };
@@ -86,8 +86,8 @@ class PlumbNodes {
     return {{x * per_step_ + 1e-9, y * per_step_ + 1e-9}, sagitta};
   }
 
-  // First and last row that points of a triangle may reach, whatever BoundsOf says. Their columns are those of the
-  // corners: a wedge between two meridians is convex.
+  // The first and last row that points of a triangle can reach, also if BoundsOf is infinite. Their columns are those
+  // of the corners, because a wedge between two meridians is convex.
   std::array<int, 2> RowsReached(double columns, double low_row, double high_row) const;
 
   int cells() const { return cells_; }

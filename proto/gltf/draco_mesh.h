@@ -1,8 +1,7 @@
 // A GridMesh as the bytes of KHR_draco_mesh_compression.
 //
-// Positions are quantized on the mesh's own grid: Draco is told the grid (explicit quantization), so that what a client
-// decodes is the grid point, not something near it. Both of Draco's connectivity coders may reorder triangles and
-// points.
+// Positions are quantized on the mesh's own grid: Draco is given the grid (explicit quantization), so that clients
+// decode the exact grid points. Both of Draco's connectivity coders may reorder triangles and points.
 #pragma once
 
 #include <array>
@@ -28,9 +27,9 @@ struct DracoMesh {
   std::array<double, 3> min{}, max{};  // metres from the mesh's origin
 };
 
-// Encodes, decodes again and compares: every triangle must come back on its grid points, with its lattice nodes in the
-// picture where these are encoded. kInternal where Draco fails or
-// something else comes back: a broken tile is never returned.
+// Encodes, decodes the result and compares it: every triangle must have its grid points and, if picture coordinates are
+// encoded, its lattice nodes in the picture. kInternal: Draco failed, or the comparison did. A broken tile is never
+// returned.
 Result<DracoMesh> EncodeDraco(const GridMesh& mesh, const DracoOptions& options);
 
 }  // namespace terrace::proto

@@ -1,11 +1,11 @@
-// Plain values that GLB tiles are described with.
+// Enumerations that describe GLB tiles.
 #pragma once
 
 #include <cstdint>
 
 namespace terrace::proto {
 
-// How the mesh of a GLB tile is stored. All of them decode to the positions of the GridMesh, bit for bit.
+// How the mesh of a GLB tile is stored. Every form decodes to the positions of the GridMesh, bit for bit.
 enum class GlbCompression : std::uint8_t {
   kDraco,      // KHR_draco_mesh_compression
   kNone,       // 32-bit floats

@@ -1,15 +1,15 @@
 // Meshes as files that other programs open: Wavefront OBJ, PLY and binary glTF, with a colour at every vertex or none.
 //
-// OBJ is text whose numbers read back to the same doubles; PLY is binary little-endian doubles. Both hold x, y, z
-// themselves. GLB has 32-bit floats and a matrix in double precision in its node. Where the vertices lie on a raster's
-// grid the floats are columns, rows and heights, exact, and the matrix places the grid; else they are relative to the
-// centre of the mesh's box, and rounded. glTF is y-up: a point (x, y, z) with z up is stored as (x, z, -y), a rotation,
-// so that viewers show the terrain upright and triangles keep their sense.
+// OBJ is text; its numbers read back to the same doubles. PLY is binary little-endian doubles. Both store x, y, z
+// directly. GLB has 32-bit floats and a double-precision matrix in its node. If the vertices lie on a raster's grid,
+// the floats are columns, rows and heights, exact, and the matrix places the grid. Otherwise they are rounded offsets
+// from the centre of the mesh's box. glTF is y-up: a point (x, y, z) with z up is stored as (x, z, -y). This is a
+// rotation, so that viewers show the terrain upright and triangles keep their orientation.
 //
-// Colours are sRGB, as images have them. PLY holds them as bytes; OBJ as shares of 1 behind the coordinates, with
-// digits enough to give the same bytes again. glTF wants vertex colours linear: GLB has COLOR_0 as normalized 16-bit
-// integers, since 8 linear bits are too few for dark colours, and a material that is no metal, which the default would
-// be.
+// Colours are sRGB, as in images. PLY stores them as bytes; OBJ stores them after the coordinates as numbers from 0 to
+// 1, with enough digits to restore the bytes. glTF requires linear vertex colours: GLB has COLOR_0 as normalized 16-bit
+// integers, because 8 linear bits are too few for dark colours, and a non-metallic material, because the default
+// material is metallic.
 #pragma once
 
 #include <array>

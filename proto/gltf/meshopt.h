@@ -21,7 +21,7 @@ MeshoptOrder OrderForMeshopt(const std::vector<std::array<std::uint32_t, 3>>& tr
 // Mode ATTRIBUTES: `count` records of `stride` bytes, a multiple of 4 up to 256.
 std::string EncodeMeshoptVertices(std::string_view records, std::size_t count, std::size_t stride);
 
-// Mode TRIANGLES. Decodes to the same triangles in the same order, each perhaps begun at another corner.
+// Mode TRIANGLES. Decodes to the same triangles in the same order. A triangle may begin at another corner.
 std::string EncodeMeshoptTriangles(const std::vector<std::array<std::uint32_t, 3>>& triangles,
                                    std::size_t vertex_count);
 

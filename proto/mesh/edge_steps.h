@@ -1,10 +1,10 @@
-// On which grid of heights the vertices of a tile's edges lie, so that neighbours decode the same numbers.
+// The height steps of a tile's edges, chosen so that neighbours decode equal heights.
 //
 // quantized-mesh stores a height as a 15-bit multiple of the tile's own step. Two tiles agree on an edge bit for bit if
-// the heights there are multiples of a step that both tiles' own steps divide. All steps here are powers of two, and a
-// tile's own step (tile_mesh.h) is the finest that its relief allows, so it is enough that an edge's step is at least
-// what either side needs. What a tile needs is bounded from outside, by RangeBound of its heights, because the
-// neighbour that computes the same edge has not read the tile:
+// the heights there are multiples of a step that the steps of both tiles divide. All steps here are powers of two. A
+// tile's own step (tile_mesh.h) is the finest that its relief allows, so an edge's step only has to be at least what
+// either tile needs. The need of a tile is derived from the RangeBound of its heights and not from its samples, because
+// the neighbour that computes the same edge has not read them:
 //
 //   NeededStep(T) = smallest 2^k >= range(T) / 16384      half of the format's 32767 steps; the rest is for rounding up
 //   edge step     = max(largest 2^k <= error / 8, NeededStep of both tiles)
@@ -23,7 +23,7 @@
 
 namespace terrace::proto {
 
-// Heights come in multiples of 2^-10 m; no edge needs a finer grid.
+// Heights are multiples of 2^-10 m, so no edge needs a finer step.
 inline constexpr double kHeightResolution = 1.0 / 1024;
 
 // Corners in the order south-west, south-east, north-east, north-west.

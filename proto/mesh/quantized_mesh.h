@@ -15,7 +15,7 @@ inline constexpr int kQuantizedMax = 32767;  // u, v and heights have 15 bits
 inline constexpr std::size_t kMaxTileVertices =
     65534;  // CesiumJS misreads exactly 65536; below that indices are 16 bits
 
-// A quantized tile: integers, and the two header heights that give them meaning.
+// A quantized tile: integers, and the two heights of the header that scale them.
 struct QuantizedTile {
   geo::TileKey key;
   std::vector<std::uint16_t> u;                         // 0 west .. 32767 east
@@ -35,10 +35,9 @@ struct QuantizedMeshOptions {
   bool metadata = false;    // extension 4, metadata
 };
 
-// Renumbers the vertices in order of first use (high-water-mark coding needs it), lists the edges, computes centre,
-// bounding sphere and horizon occlusion point from the decoded vertices, and writes the bytes.
-// Preconditions: at least 2 triangles, at most kMaxTileVertices vertices, all four edges complete, and what the options
-// name is in the tile.
+// Renumbers the vertices in order of first use, as high-water-mark coding requires, and lists the edges. Computes
+// centre, bounding sphere and horizon occlusion point from the decoded vertices. Preconditions: at least 2 triangles,
+// at most kMaxTileVertices vertices, all four edges complete; the tile has the extensions that the options name.
 std::string EncodeQuantizedMesh(const QuantizedTile& tile, const QuantizedMeshOptions& options);
 
 }  // namespace terrace::proto

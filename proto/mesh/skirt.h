@@ -1,18 +1,18 @@
-// How deep the skirts of a GLB tile hang, so that no gap shows where tiles of different levels meet.
+// The depth of the skirts of a GLB tile, which hide gaps between tiles of different levels.
 #pragma once
 
 namespace terrace::proto {
 
-// Metres along the ellipsoid's normal: the tile's error, that of its parent at the same request, and what the edge's
-// chords cut off the curved ground. A function of level and error alone, so that both sides of an edge agree, and what
-// a tileset's root region must reach below the lowest height.
+// Metres along the ellipsoid's normal: the sum of the tile's error, its parent's error for the same request, and the
+// sagitta of the edge's chords on the curved ground. It depends on level and error alone, so that both sides of an edge
+// agree. A tileset's root region must reach this far below the lowest height.
 //
-// The parent's error is taken as twice the tile's: at one `fraction` it is that, and at one `error` it is at most that,
-// whichever end of the ladder clamps (engine/geo/error_ladder.h). `error_m` is SkirtError of the request.
+// The parent's error is taken as twice the tile's. That is exact for requests by `fraction`; for requests by `error` it
+// is an upper bound, wherever the ladder clamps (engine/geo/error_ladder.h). `error_m`: SkirtError of the request.
 double SkirtDepth(int level, double error_m);
 
-// Metres: the error that a tile's skirts are made for, the ladder error of its step. At a dataset's deepest level it is
-// at least the default error: `error=E&atleast=1` gives E there and the parent its default.
+// The error that a tile's skirts are made for, in metres: the ladder error of its step. On a dataset's deepest level it
+// is at least the default error, because with `error=E&atleast=1` the deepest tile has E and its parent the default.
 double SkirtError(int level, int step, bool is_deepest, double error_fraction);
 
 }  // namespace terrace::proto

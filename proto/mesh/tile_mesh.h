@@ -1,4 +1,4 @@
-// From a mesh over a tile's lattice to the integers of a quantized-mesh tile.
+// Quantizes the mesh over a tile's lattice to the integers of a quantized-mesh tile.
 #pragma once
 
 #include <array>
@@ -17,9 +17,10 @@ constexpr std::uint16_t QuantizedPosition(int i, int cells) {
   return static_cast<std::uint16_t>((2 * i * kQuantizedMax + cells) / (2 * cells));
 }
 
-// Snaps edge heights to `steps`, chooses the tile's own height step, the smallest power of two that holds the relief in
-// 32767 steps and whose multiples are exact in float32 there, and rounds the other heights to it. The header is at most
-// twice the relief wide, or 32767 units of float32 at that height. Normals are left empty.
+// Rounds edge heights to `steps`, chooses the tile's own height step, and rounds the other heights to it. The step is
+// the smallest power of two that covers the relief in 32767 steps and whose multiples are exact in float32 at these
+// heights. The height range of the header is at most twice the relief, or 32767 units of float32 at that height.
+// Normals are left empty.
 QuantizedTile QuantizeTile(const LatticeView& lattice, const tin::TinMesh& mesh, const EdgeSteps& steps);
 
 }  // namespace terrace::proto

@@ -1,5 +1,5 @@
-// The metadata of a tile (quantized-mesh extension 4): which tiles there are below it, for clients that do not read all
-// of layer.json's `available`.
+// The metadata of a tile (quantized-mesh extension 4): the tiles that exist below it, for clients that do not read the
+// whole `available` of layer.json.
 #pragma once
 
 #include <string>
@@ -9,12 +9,12 @@
 
 namespace terrace::proto {
 
-// Whether a tile carries metadata where every `metadata_levels`-th level does (layer.json's metadataAvailability):
-// those of levels 0, N, 2N ..., save on the deepest level. 0: none does.
+// Whether a tile has metadata: on levels 0, N, 2N and so on for N = `metadata_levels`, except the deepest level
+// (layer.json's metadataAvailability). 0: no tile has.
 bool CarriesMetadata(int level, int metadata_levels, int max_level);
 
-// {"available":[[ranges of the next level], [of the one after it], ...]}: what `available`, by level from 0, has below
-// the tile, down to `metadata_levels` levels deeper. Columns and rows are those of the whole level, from the south.
+// {"available":[[ranges of the next level], [of the one after it], ...]}: the part of `available` below the tile, for
+// `metadata_levels` levels. `available` is by level, from 0. Columns and rows are global, from the south.
 std::string EncodeTileMetadata(const geo::TileKey& key, const std::vector<std::vector<geo::TileRange>>& available,
                                int metadata_levels);
 

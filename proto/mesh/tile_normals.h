@@ -15,16 +15,17 @@ namespace terrace::proto {
 
 // Unit normals in ECEF, one per vertex of `mesh`, whose quantized vertices lie at `positions` (ECEF).
 //
-// On the edges the gradient of the heights, by central differences over one lattice step on each side, each within 13
-// degrees of the limited difference (van Leer, "Towards the ultimate conservative difference scheme. II", 1974): a
-// function of the global node and so equal in every tile that shares it; on a pole the ellipsoid's normal. Inside the
-// plain gradient, turned to within 13 degrees of the mesh's own area-weighted normal: where the mesh drops relief that
-// the lattice has, and at cliffs, light must still fit the triangles that it falls on.
+// On edges, the normal is that of the gradient of the heights, by central differences over one lattice step on each
+// side, limited to within 13 degrees of the limited difference (van Leer, "Towards the ultimate conservative difference
+// scheme. II", 1974). It depends on the global node alone and is therefore equal in every tile that shares it. On a
+// pole it is the ellipsoid's normal. Inside, it is the plain gradient, turned to within 13 degrees of the mesh's
+// area-weighted normal: where the mesh lacks relief of the lattice, and at cliffs, shading must still fit the
+// triangles.
 std::vector<geo::Vec3> VertexNormals(const LatticeView& lattice, const tin::TinMesh& mesh,
                                      const std::vector<geo::Vec3>& positions);
 
-// How many of these normals are more than 13.5 degrees from the area-weighted normals of the triangles around their
-// vertices.
+// The number of normals that are more than 13.5 degrees from the area-weighted normal of the triangles around their
+// vertex.
 std::size_t CountMisfits(const tin::TinMesh& mesh, const std::vector<geo::Vec3>& positions,
                          const std::vector<geo::Vec3>& normals);
 

@@ -1,7 +1,7 @@
-// The water mask of a tile (quantized-mesh extension 2): which of its pixels clients draw as water.
+// The water mask of a tile (quantized-mesh extension 2): the pixels that clients draw as water.
 //
-// A mask is one value where the whole tile has it, else kWaterMaskSide x kWaterMaskSide of them, row by row from the
-// NORTH-western pixel: 0 is land, 255 water, and between them how much of a pixel on the coast is water.
+// A mask is a single value if the whole tile has it, else kWaterMaskSide x kWaterMaskSide values, row by row from the
+// NORTH-western pixel: 0 is land, 255 water. Values in between are the share of water in a pixel on the coast.
 #pragma once
 
 #include <cstdint>
@@ -20,7 +20,7 @@ using WaterMask = std::vector<std::uint8_t>;
 // lattice's cells; the halo is not looked at.
 WaterMask SeaLevelMask(const LatticeView& lattice, double sea_level_m);
 
-// One value for a mask whose pixels are all alike.
+// Reduces a mask of equal pixels to a single value.
 WaterMask Shortest(WaterMask mask);
 
 }  // namespace terrace::proto

@@ -1,4 +1,4 @@
-// Who may see which dataset: tokens, and datasets that need none.
+// Access to datasets: tokens, and datasets that are public.
 #pragma once
 
 #include <memory>
@@ -14,9 +14,9 @@
 
 namespace terrace::server {
 
-// What the bearer of a token may see. Immutable.
+// What a request with a certain token may see. Immutable.
 struct Grant {
-  std::string name;  // empty: of those without a token
+  std::string name;  // empty: the grant of requests without a token
   bool sees_all = false;
   std::unordered_set<std::string> datasets;
   double requests_per_second = 0;
@@ -25,20 +25,20 @@ struct Grant {
 };
 using GrantPtr = std::shared_ptr<const Grant>;
 
-// Immutable. Tokens are kept and compared as hashes: how long a comparison takes tells nothing about a token.
+// Immutable. Tokens are stored and compared as hashes, so that the time of a comparison reveals nothing about a token.
 class AccessPolicy {
  public:
-  // Without tokens everybody sees everything. With tokens, `public_datasets` are seen by everybody.
-  // kInvalidArgument: a hash that is none, or a token given twice.
+  // Without tokens every dataset is public. With tokens only `public_datasets` are. kInvalidArgument: a text is not a
+  // hash, or a token occurs twice.
   static Result<AccessPolicy> Make(const std::vector<config::TokenConfig>& tokens,
                                    const std::vector<std::string>& public_datasets);
 
   bool has_tokens() const { return !grants_.empty(); }
 
-  // What is seen without a token.
+  // The grant of requests without a token.
   const GrantPtr& anonymous() const { return anonymous_; }
 
-  // Null: nobody has such a token.
+  // Returns null if the token is unknown.
   GrantPtr Find(std::string_view token) const;
 
  private:
@@ -46,9 +46,10 @@ class AccessPolicy {
   GrantPtr anonymous_;
 };
 
-// Cuts every `token` parameter out of the query of `target` and returns its value, decoded; nothing where there is
-// none. Clients append it on their own, as often as they follow a link; different values are none that fits. Other
-// spellings of the name stay, and are refused with the request (RouteTable::Match) or ignored.
+// Removes every `token` parameter from the query of `target` and returns its decoded value; nothing if there is none.
+// Clients append the parameter each time they follow a link, so it may be repeated; if the values differ, the result is
+// a token that does not exist. Other spellings of the name are kept; they are refused with the request
+// (RouteTable::Match) or ignored.
 std::optional<std::string> TakeToken(std::string& target);
 
 }  // namespace terrace::server

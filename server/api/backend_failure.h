@@ -1,4 +1,4 @@
-// The reply to a request whose work failed behind the HTTP side.
+// The reply to a request that failed after admission, in the work behind HTTP.
 #pragma once
 
 #include <chrono>

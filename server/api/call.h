@@ -1,4 +1,4 @@
-// One request on its way to a handler: what was sent, what its URL names, and what its sender may see.
+// One request for a handler: the request, the meaning of its URL, and what its client may see.
 #pragma once
 
 #include <string>
@@ -13,8 +13,8 @@ namespace terrace::server {
 struct Call {
   const Request* request = nullptr;  // never null in a handler
   Route route;
-  std::string token;            // of the Authorization header, else of the query; a secret: never logged, never a key
-  bool token_in_query = false;  // and not in the header
+  std::string token;            // from the Authorization header, else from the query; secret: never logged or cached
+  bool token_in_query = false;  // the token came in the query
   GrantPtr grant;               // what the client may see; null: everything
   bool has_bad_token = false;
 

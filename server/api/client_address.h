@@ -1,4 +1,4 @@
-// Who a request comes from, where proxies may stand between: addresses, ranges of them, and what proxies report.
+// The address of a request's client, behind proxies: addresses, address ranges, and the headers that proxies send.
 #pragma once
 
 #include <boost/asio/ip/address.hpp>
@@ -14,7 +14,7 @@
 
 namespace terrace::server {
 
-// What counts as one client: an IPv4 address, or the 64 bits that an IPv6 network hands to one of its customers.
+// The block of addresses that counts as one client: an IPv4 address, or an IPv6 /64 network.
 std::string ClientBlock(const asio::ip::address& address);
 
 class AddressRanges {
@@ -33,15 +33,15 @@ class AddressRanges {
   std::vector<Range> ranges_;
 };
 
-// The proxies that are believed, and how they say whom they speak for.
+// The trusted proxies, and the headers in which they report the client.
 struct Proxies {
   AddressRanges trusted;
   config::ForwardedHeader header = config::ForwardedHeader::kXForwarded;
 };
 
-// Replaces the request's scheme and host by what a trusted proxy reports, and returns the client: the last address on
-// the way here that is no trusted proxy. Nothing is believed of a peer that is not trusted. `peer`: the connection's
-// other end.
+// Replaces the request's scheme and host by those that a trusted proxy reports, and returns the client's address: the
+// last one in the chain of proxies that is not a trusted proxy. Headers from a peer that is not trusted are ignored.
+// `peer`: the remote address of the connection.
 asio::ip::address ResolveClient(Request& request, const asio::ip::address& peer, const Proxies& proxies);
 
 }  // namespace terrace::server

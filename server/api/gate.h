@@ -1,4 +1,4 @@
-// What is decided about a request before anything is done for it: who asks, how often, and what they may see.
+// Decides on a request before any work is done for it: who sent it, at which rate, and what it may see.
 //
 // Thread-safe.
 #pragma once
@@ -39,20 +39,21 @@ class Gate {
  public:
   explicit Gate(GateOptions options) : options_(std::move(options)) {}
 
-  // Who sent the request, behind the proxies. Takes the token out of the request's target into `call`, with what its
-  // bearer may see; sets the request's scheme, host, `is_private` and `client`. `peer`: the connection's other end.
+  // Returns the client that sent the request, behind the proxies. Moves the token from the request's target to `call`,
+  // with its grant. Sets the request's scheme, host, `is_private` and `client`. `peer`: the remote end of the
+  // connection.
   Caller Identify(Request& request, const Caller& peer, Call& call) const;
 
-  // When the request may go on, at most after `longest_wait`: clients that ask too often wait. All but probes count,
-  // those to URLs that do not exist among them.
+  // When the request may continue, at most after `longest_wait`: clients that exceed their rate wait. All requests
+  // count but probes, also those with unknown URLs.
   RateLimiter::Turn TakeTurn(const Call& call, const Caller& caller, std::chrono::milliseconds longest_wait);
-  // 429, to whom no turn was granted.
+  // 429, for a request whose turn was not granted.
   static Response TooManyRequests(const RateLimiter::Turn& turn, const Call& call);
 
-  // 401 or 403; nothing where the request may go on.
+  // 401 or 403; nothing if the request may continue.
   std::optional<Response> Refuse(const Call& call) const;
 
-  // Whether the reply is one that another token would not get.
+  // Whether the reply depends on the request's token.
   bool IsForGrant(const Call& call) const;
 
   const Proxies& proxies() const { return options_.proxies; }

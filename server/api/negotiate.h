@@ -22,17 +22,17 @@ Result<tiler::TileRequest> Negotiate(const Call& call, std::span<const DatasetVi
 // The dataset's index, or kNotFound.
 Result<std::uint32_t> FindDataset(std::string_view name, std::span<const DatasetView> datasets);
 
-// The coding in `offered` of the highest quality, if that is at least identity's; the first of several.
-// Without Accept-Encoding: identity.
+// The coding in `offered` with the highest quality, if that is at least the quality of identity; among equals the
+// first. Without Accept-Encoding: identity.
 tiler::Coding NegotiateCoding(std::string_view accept_encoding,
                               std::span<const tiler::Coding> offered = tiler::kCodings);
 
-// What `extensions=a-b` parameters anywhere in Accept, and the query's values, name together. Names nobody knows are
-// ignored. 3DTilesRendererJS hangs the parameter on application/octet-stream.
+// The extensions named by `extensions=a-b` parameters anywhere in Accept and by the query's values. Unknown names are
+// ignored. 3DTilesRendererJS adds the parameter to application/octet-stream.
 proto::TileExtensions WantedExtensions(std::string_view accept, const std::vector<std::string>& query_extensions);
 
-// The step on the level's ladder that a requested error comes to; 0 where none is. `is_deepest`: the level is the
-// dataset's last one. No finer level follows it, so `atleast` does not hold its tiles back to their default error.
+// The step on the level's ladder for a requested error; 0 if none is requested. `is_deepest`: the level is the deepest
+// of the dataset. No finer level follows it, so `atleast` does not limit its tiles to their default error.
 int ErrorStep(const RequestedError& requested, int level, bool is_deepest, double error_fraction);
 
 }  // namespace terrace::server

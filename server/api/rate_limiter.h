@@ -1,7 +1,7 @@
-// How many requests a client may make: a token bucket for each.
+// Limits how many requests a client may make: one token bucket per client.
 //
-// Thread-safe, and of a fixed size whatever the number of clients: a table of sets with a few places each. Where a set
-// is full, the client whose bucket is fullest, and who so has the least to be remembered for, is forgotten.
+// Thread-safe. The size is fixed, whatever the number of clients: a table of sets with a few places each. If a set is
+// full, the client with the fullest bucket is removed, because it loses the least.
 #pragma once
 
 #include <chrono>
@@ -25,10 +25,10 @@ class RateLimiter {
 
   struct Turn {
     bool granted = true;
-    std::chrono::milliseconds wait{0};  // until the request may go on, or until the next one would be granted
+    std::chrono::milliseconds wait{0};  // until the request may continue, or until the next one would be granted
   };
 
-  // Takes one request from the client's bucket, also one that will only be there in `longest_wait` or before.
+  // Takes one request from the client's bucket. Grants it also if the bucket will hold one within `longest_wait`.
   Turn Take(std::string_view client, Rate rate, Clock::time_point now, std::chrono::milliseconds longest_wait);
 
  private:
@@ -37,13 +37,13 @@ class RateLimiter {
   struct Bucket {
     std::uint64_t client = 0;  // a keyed hash; 0: free
     Clock::time_point filled_at{};
-    float level = 0;  // at `filled_at`; below 0: requests wait for it
+    float level = 0;  // at `filled_at`; below 0: requests are waiting
     float rate = 0, burst = 0;
 
     double LevelAt(Clock::time_point now) const;
   };
 
-  const std::uint64_t seed_;  // so that nobody can choose whom to share a set with
+  const std::uint64_t seed_;  // random, so that clients cannot choose their set
   std::vector<Bucket> buckets_;
   std::vector<std::mutex> locks_;
 };

@@ -1,4 +1,4 @@
-// From a request target to its row in the table of URLs, and what it names. Pure; knows no dataset.
+// Finds the row of the URL table for a request target, and reads what the target names. Pure; knows no dataset.
 #pragma once
 
 #include <cstddef>
@@ -14,10 +14,10 @@
 
 namespace terrace::server {
 
-// The decoded segments of a path; an encoded '/' does not separate.
+// The decoded segments of a path. An encoded '/' does not separate segments.
 class Segments {
  public:
-  // Nothing: malformed percent-encoding. `path` has to outlive the segments.
+  // Returns nothing if percent-encoding is malformed. `path` must outlive the segments.
   static std::optional<Segments> Of(std::string_view path);
 
   std::size_t size() const { return pieces_.size(); }
@@ -25,21 +25,22 @@ class Segments {
 
  private:
   std::vector<std::string_view> pieces_;
-  std::forward_list<std::string> decoded_;  // of pieces that had to be; their places do not change
+  std::forward_list<std::string> decoded_;  // decoded copies, where needed; a list: they must not move
 };
 
 // Immutable.
 class RouteTable {
  public:
-  // `rows` must outlive this; of two that fit, the first counts.
+  // `rows` must outlive this object. The first row that matches is used.
   explicit RouteTable(std::span<const RouteRow> rows);
 
   // `target` in origin form ("/maui/0/0/0.terrain?error=5") or absolute form ("http://host/...").
-  // kInvalidArgument: neither form, malformed percent-encoding, or a parameter whose name has any. kNotFound: no such
-  // URL; tile numbers that are not plain decimal numbers, or lie outside the tiling scheme, name no tile.
+  // kInvalidArgument: neither form, malformed percent-encoding, or percent-encoding in the name of a parameter.
+  // kNotFound: not a URL of the server. A tile number that is not a plain decimal number, or that is outside the tiling
+  // scheme, names no tile.
   Result<Route> Match(std::string_view target) const;
 
-  // True for the first segments of URLs that begin with no dataset. No dataset may have such a name.
+  // True for the first segments of URLs that do not begin with a dataset. No dataset may have such a name.
   bool IsReserved(std::string_view name) const;
 
  private:
@@ -54,8 +55,8 @@ class RouteTable {
   std::vector<Entry> entries_;
 };
 
-// What rows read: /{dataset}/{z}/{x}/{y}.terrain, .glb and so on;
-// /{dataset}/3dtiles/{root}/{level}/{x}/{y}.glb and .{levels}.subtree, counted from the root; and the viewer's files.
+// RouteRow::read of tiles: /{dataset}/{z}/{x}/{y}.terrain, .glb and so on; of implicit tiles and subtrees:
+// /{dataset}/3dtiles/{root}/{level}/{x}/{y}.glb and .{levels}.subtree, counted from the root; of the viewer's files.
 bool ReadTile(const Segments& segments, Route& route);
 bool ReadImplicitTile(const Segments& segments, Route& route);
 bool ReadSubtree(const Segments& segments, Route& route);

@@ -1,5 +1,5 @@
-// The formats that tiles are served in: one row each. How a tile of a format is built and encoded is
-// tiler::TilePipeline's business, which the row's `format` chooses by.
+// The tile formats: one row each. tiler::TilePipeline builds and encodes tiles; it selects the encoder by the row's
+// `format`.
 #pragma once
 
 #include <string_view>
@@ -17,15 +17,16 @@ struct TileFormat {
   bool is_mercator;         // counted in Web Mercator's XYZ scheme; else in TMS geodetic
   bool varies;              // by Accept and Accept-Encoding
   std::string_view (*media_type)(const tiler::TileRequest& tile);
-  // Reads the parameters of a URL. Sets what else the tile is, of its dataset, key and format; kNotFound: the dataset
-  // has no such tile; kInvalidArgument: see ParseTileParameters and ParseHeightTileParameters.
+  // Reads the parameters of a URL and sets the rest of the request; its dataset, key and format are set. kNotFound: the
+  // dataset has no such tile. kInvalidArgument: see ParseTileParameters and ParseHeightTileParameters.
   Result<void> (*read)(std::string_view query, const RequestFields& fields, const DatasetView& dataset,
                        tiler::TileRequest& tile);
 };
 
 const TileFormat& RowOf(tiler::TileFormat format);
 
-// Cuts the suffix of a tile's URL off its last segment; null where it has none of them.
+// Removes the suffix of a tile's URL from its last segment, and returns the row of the format; null if no suffix
+// matches.
 const TileFormat* CutSuffix(std::string_view& name);
 
 }  // namespace terrace::server

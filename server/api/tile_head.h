@@ -1,4 +1,4 @@
-// What a reply's head says of the tile in its body: written once, and kept with the tile.
+// The header lines of a reply that describe its tile: written once, and kept with the tile.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// The program behind the HTTP side, as sessions and the listener see it. They know nothing else of it.
+// The interface between HTTP and the program that answers requests. Sessions and the listener use nothing else of it.
 #pragma once
 
 #include <boost/asio/ip/address.hpp>
@@ -17,26 +17,26 @@
 
 namespace terrace::server {
 
-// What is decided from a request's head alone.
+// The decision made from a request's head alone.
 struct Admission {
-  std::chrono::milliseconds wait{0};     // before the request goes on, or before the next one would
-  std::optional<Response> refusal = {};  // sent in place of an answer; a body that follows is not read
-  bool delays_refusal = false;           // its client asks too often, and would ask again at once
-  std::size_t max_body_bytes = 0;        // of a POST that is taken
-  bool for_grant = false;                // another token, or none, would be answered otherwise
+  std::chrono::milliseconds wait{0};     // before the request continues, or until the next one would be granted
+  std::optional<Response> refusal = {};  // sent instead of an answer; the request's body is not read
+  bool delays_refusal = false;           // the client exceeds its rate; an immediate refusal would be retried at once
+  std::size_t max_body_bytes = 0;        // limit of a POST's body
+  bool for_grant = false;                // the reply depends on the request's token
 };
 
-// A reply, or what has to be awaited for one.
+// A reply, or a coroutine that makes one.
 using Answer = std::variant<Response, asio::awaitable<Response>>;
 
-// Of a reply whose last byte was handed to the kernel. Valid during the call only.
+// A reply whose last byte was passed to the kernel. Valid only during the call.
 struct SentReply {
   const Request& request;
   const Response& response;
   std::size_t body_bytes = 0;
   std::chrono::microseconds duration{0};  // from the end of the request's head
   std::string_view peer;                  // address and port
-  bool is_admitted = false;               // false: what came was no request, and nobody was asked about it
+  bool is_admitted = false;               // false: the bytes were not a valid request, and Admit was not called
 };
 
 // Serves the requests of one connection, one after the other, on the connection's thread.
@@ -44,13 +44,14 @@ class ConnectionHandler {
  public:
   virtual ~ConnectionHandler() = default;
 
-  // The request's head has arrived, its body has not. Sets `client` and `is_private`, replaces the host and scheme by
-  // what a trusted proxy says, and takes secrets out of the target. `longest_wait`: of Admission::wait.
+  // Called when the request's head has arrived, before its body. Sets `client` and `is_private`, replaces host and
+  // scheme by those that a trusted proxy reports, and removes secrets from the target. `longest_wait`: limit of
+  // Admission::wait.
   virtual Admission Admit(Request& request, std::chrono::milliseconds longest_wait) = 0;
 
-  // Answers the request that was admitted last, whose body has arrived. Called again where the reply had to be let go
-  // before it could be sent. This and `request` outlive the answer. What is awaited runs on the connection's thread,
-  // and is cancelled when the client leaves. Both may throw exceptions of the standard library.
+  // Answers the last admitted request, whose body has arrived. Called again if the reply had to be released before it
+  // could be sent. This object and `request` outlive the answer. A coroutine runs on the connection's thread, and is
+  // cancelled when the client leaves. Both may throw exceptions of the standard library.
   virtual Answer Handle(const Request& request) = 0;
 
   virtual void Report(const SentReply& reply) = 0;
@@ -64,7 +65,7 @@ class Application {
   // `peer`: the connection's other end.
   virtual std::unique_ptr<ConnectionHandler> Connect(const asio::ip::address& peer) = 0;
 
-  // The client that a connection counts for; empty: nobody.
+  // The client whose limit a connection counts against; empty: none.
   virtual std::string ClientOf(const asio::ip::address& peer) const = 0;
 };
 

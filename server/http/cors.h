@@ -1,4 +1,4 @@
-// Which web pages may read replies: the Access-Control-Allow-Origin and Timing-Allow-Origin of every reply.
+// Cross-origin rules: Access-Control-Allow-Origin and Timing-Allow-Origin of every reply.
 #pragma once
 
 #include <string>
@@ -11,12 +11,13 @@ namespace terrace::server {
 // Immutable.
 class CorsPolicy {
  public:
-  // Any page.
+  // Allows every origin.
   CorsPolicy() : CorsPolicy(std::vector<std::string>{"*"}) {}
-  // "https://maps.example" and so on; "*" is any; none: no page of another origin.
+  // Allows these origins, such as "https://maps.example". "*" allows every origin; an empty list allows no other
+  // origin.
   explicit CorsPolicy(const std::vector<std::string>& origins);
 
-  // Header lines for a request from `origin`. They are the configuration's text: nothing of the request's is sent back.
+  // The header lines for a request from `origin`. Their text is that of the configuration, never that of the request.
   std::string_view HeadersFor(std::string_view origin) const;
 
   // Whether the reply depends on the request's Origin.

@@ -1,5 +1,5 @@
-// Failures as clients see them: application/problem+json (RFC 9457) with fixed text and the request's id. What really
-// happened goes to the log under the same id.
+// Errors in the form that clients see: application/problem+json (RFC 9457) with a fixed text and the request's id. The
+// actual cause is logged under the same id.
 #pragma once
 
 #include <string_view>
@@ -10,13 +10,13 @@
 
 namespace terrace::server {
 
-// The one table from kinds of failure to HTTP. Whatever is not the client's doing is 503: trying again may help.
+// Maps kinds of error to HTTP status. Errors that the client did not cause are 503: a retry may succeed.
 int StatusOf(ErrorCode code);
 
-// `detail` is sent as it is: text that the server wrote, never the path or the message of a library.
+// `detail` is sent verbatim. It is text that the server wrote, never a path or a library's message.
 Response ProblemResponse(int status, std::string_view detail, std::string_view request_id);
 
-// 405, naming the methods of a URL; what follows such a request may be a body of any form, so the connection closes.
+// 405 with the methods of the URL. Closes the connection: the refused request may be followed by a body of any form.
 Response NoSuchMethodResponse(bool takes_post, std::string_view request_id);
 
 // For errors of Match and Negotiate, whose messages are written for clients.

@@ -1,8 +1,8 @@
-// The listening socket: accepts connections while there is room for them.
+// The listening socket: accepts connections up to a limit.
 //
-// At the cap, a newcomer takes the place of another connection (ConnectionSet::EvictOne), or is told 503 and closed: a
-// client that waits in the kernel's queue does not know whether to try elsewhere. Running out of file descriptors is
-// treated the same way, with one that is kept for that purpose.
+// At the limit, a new connection takes the place of another one (ConnectionSet::EvictOne), or is answered 503 and
+// closed. Left in the kernel's queue, its client could not know that it should try elsewhere. A shortage of file
+// descriptors is handled in the same way, with a spare descriptor that is kept for this purpose.
 #pragma once
 
 #include <boost/asio/ip/tcp.hpp>
@@ -27,22 +27,22 @@ class Listener : public std::enable_shared_from_this<Listener> {
   static Result<std::shared_ptr<Listener>> Open(IoThreads& io, const std::string& host, std::uint16_t port,
                                                 std::shared_ptr<const SessionContext> context);
 
-  // On a TCP socket that listens already and that somebody else goes on holding: who is not accepted here waits for the
-  // next process. Takes over the descriptor.
+  // Uses a TCP socket that is listening already and that another holder keeps open: connections that are not accepted
+  // here wait for the next process. Takes ownership of the descriptor.
   static Result<std::shared_ptr<Listener>> Adopt(IoThreads& io, int socket,
                                                  std::shared_ptr<const SessionContext> context);
 
-  // Whether Open could have the address now. It is not listened on meanwhile: nobody can connect.
+  // Whether Open could use the address now. The socket does not listen: nobody can connect meanwhile.
   static Result<void> TryAddress(const std::string& host, std::uint16_t port);
 
-  const std::string& host() const { return host_; }  // an adopted socket's address
+  const std::string& host() const { return host_; }  // of an adopted socket: its address
   std::uint16_t port() const { return port_; }
 
-  // Begins to accept, unless Close came first. Call once.
+  // Begins to accept connections, unless Close was called before. Call once.
   void Start();
 
-  // Accepts what already waits in the kernel's queue, unless somebody else holds the socket, then closes. Blocks until
-  // that is done and every accepted connection has its session: not from an io thread. Call once.
+  // Accepts the connections that wait in the kernel's queue, unless the socket has another holder, then closes. Blocks
+  // until this is done and every accepted connection has its session: do not call it on an io thread. Call once.
   void Close();
 
  private:
@@ -68,7 +68,7 @@ class Listener : public std::enable_shared_from_this<Listener> {
   std::uint16_t port_ = 0;
   bool started_ = false, closing_ = false;  // for the acceptor's thread
   std::promise<void> closed_;
-  std::optional<asio::posix::stream_descriptor> spare_;  // given up for a moment when there are no descriptors left
+  std::optional<asio::posix::stream_descriptor> spare_;  // released briefly when no descriptors are left
   bool crowded_ = false;
 };
 

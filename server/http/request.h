@@ -1,8 +1,8 @@
-// One HTTP request, and the only way to get its head out of bytes from the network.
+// One HTTP request. ParseHead is the only way to obtain its head from the network.
 //
-// Stricter than RFC 9112 wherever two readers of the same bytes could disagree about where a message ends: only a POST
-// may announce a body, by one Content-Length in plain decimals; any other message that announces one is refused before
-// another byte is read.
+// Parsing is stricter than RFC 9112 wherever two readers could disagree about the end of a message: only a POST may
+// announce a body, by a single Content-Length in plain decimals. Any other message that announces a body is refused
+// before further bytes are read.
 #pragma once
 
 #include <array>
@@ -22,14 +22,14 @@ inline constexpr std::size_t kMaxTargetBytes = 8 * 1024;
 
 enum class Method { kGet, kHead, kOptions, kPost, kOther };
 
-// What the header of a request says, but for its framing.
+// The header fields of a request, without those of its framing.
 struct RequestFields {
-  std::string accept;  // several fields joined with ", ", here and below
+  std::string accept;  // several fields are joined with ", ", here and below
   std::string accept_encoding;
   std::string if_none_match;
   std::string host;  // host and port: letters, digits and "-._~%!$&'()*+,;=:[]"; may be empty
   std::string origin;
-  // What a proxy before the server may have written, or the client.
+  // Written by a proxy in front of the server, or by the client.
   std::string forwarded, forwarded_for, forwarded_host, forwarded_proto;
   std::string referer, user_agent;    // for the log
   bool has_authorization = false;     // of whatever scheme
@@ -40,7 +40,7 @@ struct RequestFields {
   friend bool operator==(const RequestFields&, const RequestFields&) = default;
 };
 
-// Shared by the requests of a connection that say the same, as nearly all do.
+// Shared by a connection's requests with equal fields. Most requests of a connection are alike.
 class SharedFields {
  public:
   SharedFields();  // empty ones
@@ -48,18 +48,18 @@ class SharedFields {
 
   const RequestFields& operator*() const { return *fields_; }
   const RequestFields* operator->() const { return fields_.get(); }
-  // The others keep theirs.
+  // Changes this request's fields only.
   void Set(std::string RequestFields::*field, std::string value);
 
  private:
   std::shared_ptr<const RequestFields> fields_;  // never null
 };
 
-// Sixteen hexadecimal digits that name a request in the log and in what its client is told; empty until it is given.
+// Sixteen hexadecimal digits that identify a request in the log and to its client; empty until assigned.
 class RequestId {
  public:
   RequestId() = default;
-  static RequestId Next();  // another one at every call, of every process
+  static RequestId Next();  // unique across calls and processes
 
   operator std::string_view() const { return {digits_.data(), size_}; }  // NOLINT(google-explicit-constructor)
   bool empty() const { return size_ == 0; }
@@ -69,8 +69,8 @@ class RequestId {
   std::size_t size_ = 0;
 };
 
-// The body of a request, shared by the request's copies and by jobs that read it. What its memory counts against is
-// told when the last of them is gone.
+// The body of a request, shared by copies of the request and by jobs that read it. Its memory counts against the budget
+// until the last of them is gone.
 class RequestBody {
  public:
   RequestBody() = default;
@@ -100,45 +100,44 @@ struct Request {
   bool expects_continue = false;   // the client waits for a 100 before it sends the body
   RequestBody body;                // of a POST, once the session has read it
 
-  // Given by the server.
+  // Assigned by the server.
   RequestId id;
   bool is_https = false;     // how the client speaks to this server, or to the proxy before it
-  bool is_private = true;    // the reply is for its sender alone
-  std::uint64_t client = 0;  // who takes turns with others
+  bool is_private = true;    // shared caches must not keep the reply
+  std::uint64_t client = 0;  // identifies the client to the fair queue and to memory limits
 };
 
-// Why bytes are not a request. The connection is of no use afterwards: its framing cannot be trusted.
+// Why bytes are not a request. The connection cannot be used afterwards, because its framing cannot be trusted.
 struct BadRequest {
   int status = 400;         // 400, 408, 414 or 431
   std::string_view detail;  // for the client; a literal
 };
 
-// Where the head in `bytes` ends (just past the empty line), 0 if it is not complete yet, or why it never can be.
-// `scanned` bytes were looked at by an earlier call with the same beginning.
+// Returns the end of the head in `bytes` (just past the empty line), 0 if the head is incomplete, or why it can never
+// be a head. The first `scanned` bytes were examined by an earlier call.
 tl::expected<std::size_t, BadRequest> FindHeadEnd(std::string_view bytes, std::size_t scanned);
 
-// What the first line of `bytes` says of a message that is refused, for the log and for the form of the reply: its
-// method and the beginning of its target, as far as they can be told; kOther and nothing else where they cannot.
-// Nothing of it is answered.
+// The method and the beginning of the target from the first line of a message that is refused, as far as they can be
+// read; kOther and no target if they cannot. For the log and for the form of the reply. The request is not served.
 Request FirstLineOf(std::string_view bytes);
 
-// The header of a connection's last request without a body, byte by byte: the next one that repeats it needs no parsing
-// but of its first line.
+// The header of a connection's last request without a body, as bytes. For a next request with the same header only the
+// first line is parsed.
 struct HeadMemo {
-  std::string bytes;  // all behind the first line; empty: nothing to repeat
+  std::string bytes;  // all after the first line; empty: none
   bool keep_alive = true;
   SharedFields fields;
 };
 
-// `head` ends with its empty line. Sets everything but `body` and what is given by the server. What of it the next
-// request may repeat is left in `memo`, which may be null.
+// `head` ends with its empty line. Sets everything but `body` and the members assigned by the server. Stores the header
+// in `memo`, which may be null, if the next request may repeat it.
 tl::expected<Request, BadRequest> ParseHead(std::string_view head, HeadMemo* memo = nullptr);
 
-// Where `bytes` begin with a whole head that repeats `memo`: its size, and the request that ParseHead would make of it.
-// 0: FindHeadEnd and ParseHead have to look.
+// If `bytes` begin with a complete head with the header of `memo`: returns its size, and sets the request to the result
+// of ParseHead. Otherwise returns 0; call FindHeadEnd and ParseHead then.
 std::size_t TakeRepeated(std::string_view bytes, const HeadMemo& memo, Request& request);
 
-// Whether it is a host and port after RFC 3986, or empty, which is what a client sends whose URI has no authority.
+// Whether it is a host and port by RFC 3986, or empty. Clients whose URI has no authority send an empty value.
 bool IsHostValue(std::string_view value);
 
 }  // namespace terrace::server

@@ -1,6 +1,6 @@
-// Requests out of a stream's bytes: one head after the other, and the bodies of those that have one.
+// Reads requests from a stream: heads one after the other, and bodies.
 //
-// For one thread. Holds one buffer of at most kMaxHeadBytes, and what has arrived of a body.
+// For use on one thread. Memory: one buffer of at most kMaxHeadBytes, and the part of a body that has arrived.
 #pragma once
 
 #include <chrono>
@@ -17,33 +17,33 @@
 namespace terrace::server {
 
 struct ReadTimeouts {
-  std::chrono::milliseconds message{5'000};  // from a request's first byte to its empty line; of a body, without a
-                                             // single byte, and before min_rate counts
+  std::chrono::milliseconds message{5'000};  // from a request's first byte to its empty line; in a body, without a
+                                             // single byte, and before min_rate applies
   std::chrono::milliseconds idle{30'000};    // between a reply and the next request
-  std::size_t min_rate = 4096;               // bytes a second of a body in the long run; 0: any
+  std::size_t min_rate = 4096;               // average bytes per second of a body; 0: any
 };
 
 class RequestReader {
  public:
   RequestReader(Stream& stream, ReadTimeouts timeouts);
 
-  // Nothing: the connection ended, was idle for too long, or is closing and no request came in time. `now`: the
-  // present, or shortly before.
+  // Returns nothing if the connection has ended, was idle for too long, or is closing and no request came in time.
+  // `now`: the current time, or shortly before.
   using Head = std::optional<tl::expected<void, BadRequest>>;
   asio::awaitable<Head> ReadHead(Request& request, Stream::Clock::time_point now);
 
-  // Reads the request's body until `text`, which has its beginning, has `size` bytes of it. What went wrong: `status` 0
-  // says that the client left, or that the stream was cancelled.
+  // Reads the request's body until `text`, which holds its beginning, has `size` bytes. On errors, `status` 0 means
+  // that the client left or the stream was cancelled.
   asio::awaitable<tl::expected<void, BadRequest>> ReadBody(const Request& request, std::string& text, std::size_t size);
 
-  // The next request is the last one, and is waited for only until `grace` has passed from now; one that has begun by
-  // then is read.
+  // Makes the next request the last one. It is waited for until `grace` has passed from now; a request that has begun
+  // by then is read.
   void Close(std::chrono::milliseconds grace = std::chrono::milliseconds(0));
-  bool has_unread() const { return begin_ < end_; }  // of a further request, or of its beginning
+  bool has_unread() const { return begin_ < end_; }  // a further request, or part of one
   bool closing() const { return closing_; }
   bool waiting() const { return waiting_; }  // for the first byte of a request
 
-  // Forgets what was read, then reads and forgets on, until the client ends or `most` bytes have come.
+  // Discards what was read, then reads and discards until the client ends its sending or `most` bytes have come.
   asio::awaitable<void> Discard(std::size_t most);
 
  private:
@@ -55,9 +55,9 @@ class RequestReader {
 
   Stream& stream_;
   const ReadTimeouts timeouts_;
-  std::string buffer_;  // grows, and is not cleared: filling it with zeros takes as long as parsing
+  std::string buffer_;  // grows, and is not cleared: that would take as long as parsing
   std::size_t begin_ = 0,
-              end_ = 0;  // of what was read and not consumed: the next requests of a client that does not wait
+              end_ = 0;  // bytes read and not consumed: pipelined requests
   HeadMemo memo_;
   bool is_first_ = true;
   bool waiting_ = false;

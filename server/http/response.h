@@ -1,7 +1,6 @@
 // One HTTP reply, and the bytes of its head.
 //
-// Nothing of a request's text ever becomes a header: names are literals and values are numbers, literals or ETags that
-// the server made.
+// No header contains text of a request: names are literals; values are numbers, literals or ETags that the server made.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +14,7 @@
 
 namespace terrace::server {
 
-// Shared with whoever else holds it; a tile's body is never copied.
+// Shared, so that a tile's body is never copied.
 using Body = std::shared_ptr<const std::string>;
 
 struct Response {
@@ -27,9 +26,9 @@ struct Response {
   std::string cache_control;          // may be empty
   bool vary = false;                  // the reply depends on Accept and Accept-Encoding
   std::string_view vary_too;          // a literal: further headers it depends on; may be empty
-  bool for_grant = false;             // another token, or none, would be answered otherwise
+  bool for_grant = false;             // the reply depends on the request's token
   bool close = false;                 // end the connection after this reply
-  bool is_vital = false;              // tells how the server is: goes out where other replies find no room
+  bool is_vital = false;              // reports the server's state: may use memory beyond the limits of other replies
 
   struct Header {
     Header(std::string_view n, std::string v) : name(n), value(std::move(v)) {}
@@ -39,41 +38,39 @@ struct Response {
   };
   std::vector<Header> headers;
 
-  // Lines that were made beforehand, each with its CR LF, in place of content_type, content_encoding and etag; null:
-  // none.
+  // Prepared header lines, each with its CR LF. They replace content_type, content_encoding and etag. Null: none.
   std::shared_ptr<const std::string> lines;
-  std::size_t lines_of_body =
-      0;                        // so many bytes at their front describe the body: a reply without one leaves them away
-  std::string_view more_lines;  // a literal: further ones, each with its CR LF
+  std::size_t lines_of_body = 0;  // leading bytes of `lines` that describe the body; replies without a body omit them
+  std::string_view more_lines;    // a literal: further header lines, each with its CR LF
 
-  bool try_again = false;  // a 503 that another try, a moment later, may turn into an answer
+  bool try_again = false;  // a 503 that may succeed if it is retried shortly after
 
-  // What the application's log and metrics call the reply; HTTP hands it on unread.
+  // Labels for the application's log and metrics. HTTP passes them on unread.
   struct Labels {
     std::string_view route = "none";  // literals
     std::string_view cache = "-";
-    std::string subject;  // what was asked about, if there is such
+    std::string subject;  // the dataset of the request; empty: none
   } labels;
 };
 
-// What a reply's head says beyond the response itself.
+// What a reply's head depends on besides the response.
 struct HeadOptions {
-  unsigned version = 11;  // the request's: an HTTP/1.0 client that is told 1.1 waits for ever
+  unsigned version = 11;  // the request's: an HTTP/1.0 client would wait forever for the end of a 1.1 reply
   bool keep_alive = false;
-  bool is_private = false;           // the request may hold a secret: caches that others share must not keep the reply
+  bool is_private = false;           // the request may contain a secret: shared caches must not keep the reply
   const CorsPolicy* cors = nullptr;  // null: any page may read the reply
   std::string_view origin = {};      // the request's
 };
 
 std::string SerializeHead(const Response& response, const HeadOptions& options);
 
-// Cache-Control of a reply for one client alone: otherwise as configured.
+// Cache-Control of a reply for one client alone, made from the configured value.
 std::string PrivateCacheControl(std::string_view configured);
 
-// 204 to an OPTIONS request: what a browser asks before it sends a request with headers of its own.
+// 204: the reply to an OPTIONS request, which a browser sends before a request with headers of its own.
 Response PreflightResponse(bool takes_post);
 
-// As the Allow header lists them.
+// The value of the Allow header.
 std::string MethodsOf(bool takes_post);
 
 // Turns a 200 into a 304 where the request's If-None-Match names its ETag.

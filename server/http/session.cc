@@ -31,8 +31,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// How long, and for how much, a closed connection is read so that the last reply arrives: bytes left unread would make
-// the kernel send a reset, which destroys what the client has not read yet.
+// How long, and for how many bytes, a closed connection is still read. Bytes left unread would make the kernel send a
+// reset, which destroys the part of the last reply that the client has not read yet.
 constexpr std::chrono::milliseconds kLingerTime{500};
 constexpr std::size_t kLingerBytes = std::size_t{64} << 20;
 constexpr int kClientLeft = 499;

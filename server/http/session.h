@@ -1,9 +1,9 @@
-// One connection: reads requests, has them answered in order, writes the replies.
+// One connection: reads requests, passes them to the application one after the other, and writes the replies.
 //
-// Everything of a session happens on one thread. What a client can make it hold is bounded: one read buffer of
-// kMaxHeadBytes, one request with a body of at most what its admission says, one reply; bodies count in a budget that
-// all sessions share. Where there is no room, or requests come faster than they may, the session waits; it refuses when
-// the request's deadline comes.
+// A session runs on one thread. The memory that a client can use is bounded: one read buffer of kMaxHeadBytes, one
+// request with a body of at most the size that its admission allows, and one reply. Bodies count against a budget that
+// all sessions share. If the budget is used up, or if requests come faster than the client's rate, the session waits.
+// At the request's deadline it refuses the request.
 #pragma once
 
 #include <atomic>
@@ -25,11 +25,11 @@ namespace terrace::server {
 
 struct SessionOptions {
   ReadTimeouts read;
-  std::chrono::milliseconds write_timeout{
-      20'000};                                   // without the client taking a single byte, and before min_rate counts
-  std::size_t min_rate = 4096;                   // bytes a second that a client has to take in the long run; 0: any
-  std::chrono::milliseconds refusal_delay{200};  // before a 429: who is refused at once asks again at once
-  std::chrono::milliseconds drain_grace{0};      // for which a draining connection waits for one more request
+  // In which the client takes no byte, and before min_rate applies.
+  std::chrono::milliseconds write_timeout{20'000};
+  std::size_t min_rate = 4096;                   // average bytes per second that a client must take; 0: any
+  std::chrono::milliseconds refusal_delay{200};  // before a 429: clients refused at once retry at once
+  std::chrono::milliseconds drain_grace{0};      // how long a draining connection waits for another request
 };
 
 // Shared by all sessions, outlives them all. What the pointers refer to must outlive the sessions too.
@@ -38,13 +38,13 @@ struct SessionContext {
   Application* application = nullptr;
   ConnectionSet* connections = nullptr;
   TransferBudget* transfers = nullptr;
-  const std::atomic<std::chrono::milliseconds>* deadline = nullptr;  // of a request, since its head
+  const std::atomic<std::chrono::milliseconds>* deadline = nullptr;  // of a request, counted from its head
   CorsPolicy cors;
   const TlsContext* tls = nullptr;  // null: plain HTTP
 };
 
-// Takes over an accepted socket, of an io_context that one thread runs. `client`: whom it counts for among the
-// connections.
+// Takes over an accepted socket of an io_context that one thread runs. `client`: the client whose limit on connections
+// it counts against.
 void StartSession(asio::ip::tcp::socket socket, std::shared_ptr<const SessionContext> context,
                   const std::string& client);
 

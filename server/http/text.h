@@ -1,4 +1,4 @@
-// Small readings of text that requests are made of. ASCII throughout; none of them depends on a locale.
+// Small parsers for the text in requests. ASCII only, independent of the locale.
 #pragma once
 
 #include <cstdint>
@@ -17,17 +17,18 @@ bool EqualsIgnoringCase(std::string_view a, std::string_view b);
 // What follows "http://" or "https://", in any case; nothing where the text begins with neither.
 std::optional<std::string_view> AfterScheme(std::string_view text);
 
-// Cuts the piece before the next `separator` off `rest`, and that separator; trimmed of `blanks`.
+// Removes from `rest` the piece before the next `separator`, and the separator. Returns the piece, trimmed of `blanks`.
 std::string_view NextPiece(std::string_view& rest, char separator, std::string_view blanks = " \t");
 
 // 0 to 15, or -1.
 int HexDigit(char c);
 
-// The whole text as a finite number; numbers that overflow or underflow a double are none.
+// The whole text as a finite number. Nothing if the number overflows or underflows a double.
 std::optional<double> FiniteNumber(std::string_view text);
 std::optional<double> PositiveNumber(std::string_view text);
 
-// Plain decimal: no sign, no leading zero, 1 to `max_digits` (at most 18) digits. One number has one text.
+// A plain decimal number without sign and leading zeros, of 1 to `max_digits` (at most 18) digits. Every number has
+// exactly one text.
 std::optional<std::int64_t> PlainDecimal(std::string_view text, std::size_t max_digits);
 
 }  // namespace terrace::server

@@ -1,9 +1,10 @@
-// The order in which the jobs of many clients are run: fair queueing by measured time.
+// The order in which the jobs of many clients run: fair queueing by measured time.
 //
-// The client that has used the least of the workers' time is served next. Time is virtual, as in A. Demers, S. Keshav
+// The next job belongs to the client that has used the least worker time. Time is virtual, as in A. Demers, S. Keshav
 // and S. Shenker, "Analysis and simulation of a fair queueing algorithm", SIGCOMM 1989: it advances by the time of each
-// job divided by the number of clients that have jobs, and a client that had none starts at the present, so that being
-// idle earns nothing. Jobs cannot be interrupted, so a client's share is exact only over several of its jobs.
+// job divided by the number of clients that have jobs. A client that had no jobs starts at the current virtual time, so
+// that idle time gives no advantage. Jobs cannot be interrupted, so a client's share is exact only over several of its
+// jobs.
 //
 // Not thread-safe.
 #pragma once
@@ -23,9 +24,9 @@ using JobClock = std::chrono::steady_clock;
 
 struct JobOrder {
   std::uint64_t client = 0;
-  int level = 0;  // of the client's jobs a lower one goes first, if it comes soon after: shallow tiles cover what
-                  // deep ones refine, but must not keep them waiting for ever
-  bool is_long = false;  // takes seconds: a bounded number of these runs at a time
+  int level = 0;  // of the client's jobs the lower level runs first, even if it comes shortly after: shallow tiles
+                  // cover what deep tiles refine. Deep tiles are not delayed indefinitely
+  bool is_long = false;  // takes seconds; a bounded number of long jobs runs at a time
   JobClock::time_point deadline = JobClock::time_point::max();  // of the wait
   std::uint64_t kind = 0;                                       // jobs of one kind take about the same time
 };
@@ -33,14 +34,14 @@ struct JobOrder {
 // A job that waits or runs. Its functions must not throw.
 struct PoolJob {
   std::function<void()> run;
-  std::function<void()> displaced;  // called instead of `run` where the job has to make room for others'; may be empty
+  std::function<void()> displaced;  // called instead of `run` if the job is removed for others; may be empty
   JobOrder order;
 
  private:
   friend class FairQueue;
   enum class State : std::uint8_t { kNew, kWaiting, kRunning, kDone };
   State state = State::kNew;
-  JobClock::time_point key{};      // among the client's jobs
+  JobClock::time_point key{};      // orders the client's jobs
   JobClock::time_point started{};  // once it runs
   std::uint64_t number = 0;        // in the order of arrival
   double expected_s = 0;
@@ -49,27 +50,27 @@ using PoolJobPtr = std::shared_ptr<PoolJob>;
 
 class FairQueue {
  public:
-  // `threads` run the jobs, at least 1. Of several, one is kept from long jobs.
+  // `threads`: how many run the jobs, at least 1. If there are several, one never runs long jobs.
   explicit FairQueue(unsigned threads);
 
   void Push(PoolJobPtr job, JobClock::time_point now);
 
-  // The next job, which runs from now on. Null: there is none, or only long ones that have to wait for others to end.
-  // `all`: nothing has to wait.
+  // Takes the next job, which counts as running from now on. Returns null if there is none, or only long jobs that must
+  // wait for others to end. `all`: long jobs need not wait.
   PoolJobPtr Take(JobClock::time_point now, bool all = false);
   bool HasNext(bool all = false) const;
 
-  // A job of Take has ended.
+  // Call this when a job from Take has ended.
   void Finish(const PoolJobPtr& job, JobClock::time_point now);
 
-  // False: it does not wait (any more).
+  // Returns false if the job is not waiting.
   bool Remove(const PoolJobPtr& job);
 
-  // Removes the newest job of the client that has most waiting. Null: none waits.
+  // Removes the newest job of the client with the most waiting jobs. Returns null if no job waits.
   PoolJobPtr RemoveNewestOfLargest();
 
-  // How long a new job of this order would wait for those before it, by the mean time that jobs of their kind took: its
-  // client's own, and as much work of each other client. What runs already is not counted, nor a kind that never ran.
+  // Expected wait of a new job: the mean times of the jobs before it, by kind. These are its client's own jobs, and as
+  // much work of each other client. Running jobs are not counted, nor kinds that have never run.
   std::chrono::duration<double> ExpectedWait(const JobOrder& order, JobClock::time_point now) const;
 
   std::size_t size() const { return size_; }
@@ -93,7 +94,7 @@ class FairQueue {
     unsigned samples = 0;
   };
 
-  static constexpr std::size_t kKinds = 1024;  // that are told apart: others share a mean
+  static constexpr std::size_t kKinds = 1024;  // kinds with equal remainders share a mean
 
   const Mean& MeanOf(const JobOrder& order) const { return means_[order.kind % kKinds]; }
   static Length LengthOf(const PoolJob& job) { return job.order.is_long ? kLong : kShort; }
@@ -103,7 +104,7 @@ class FairQueue {
   void Leave(Clients::iterator client);
 
   const unsigned threads_, max_long_;
-  Clients clients_;  // those with jobs, and those that have used more than the present
+  Clients clients_;  // those with jobs, and those ahead of the current virtual time
   std::array<Mean, kKinds> means_{};
   double now_s_ = 0;  // virtual time
   std::size_t size_ = 0, long_waiting_ = 0;

@@ -1,15 +1,14 @@
-// One build per key, however many ask at once.
+// One build per key, however many requests ask for it at the same time.
 //
-// The first who asks for a key starts its flight: a job on the worker pool. Whoever asks while it is under way waits
-// for the same outcome. Outcomes, failures too, go to everybody who waits and are forgotten here; keeping the good ones
-// is a cache's work.
+// The first request for a key starts a flight: a job on the worker pool. Requests that come during the flight wait for
+// its outcome. All waiters get the outcome, also if it is an error. Outcomes are not kept here; that is a cache's task.
 //
-// Each client that waits for a flight has a job for it in the pool's queue, and the first whose turn comes builds:
-// nobody waits longer because somebody else asked before.
+// Each client that waits for a flight has a job for it in the pool's queue. The first of these jobs whose turn comes
+// does the build: no request waits longer because another client asked before.
 //
-// A flight is told to stop when its last waiter leaves, which each does at its own deadline at the latest, or when the
-// pool is cancelled; its jobs leave the queue then. A stopped flight takes no more passengers; the next request starts
-// a new one.
+// A flight is stopped when its last waiter leaves, which is at its deadline at the latest, or when the pool is
+// cancelled. Its jobs are then removed from the queue. A stopped flight accepts no further waiters; the next request
+// starts a new one.
 //
 // Thread-safe, with one condition: a coroutine that waits in Join runs on a single thread (or a strand).
 #pragma once
@@ -34,7 +33,7 @@
 
 namespace terrace::server {
 
-// Values are copied to everybody who waits.
+// Each waiter gets a copy of the value.
 template <typename Key, typename Value, typename Hash = std::hash<Key>>
 class SingleFlight {
  public:
@@ -48,15 +47,15 @@ class SingleFlight {
     bool joined = false;  // false: this call started the flight
   };
 
-  // `pool` must outlive this, and must be shut down before this is destroyed: its jobs refer to it.
+  // `pool` must outlive this object and must be shut down before its destruction, because jobs refer to it.
   explicit SingleFlight(WorkerPool& pool) : pool_(pool) {}
   SingleFlight(const SingleFlight&) = delete;
   SingleFlight& operator=(const SingleFlight&) = delete;
 
-  // Waits for the flight of `key`, which runs `build` in its `order` if it has to be started. `name` is for messages.
-  // An exception of `build` counts as kUnavailable. kOverloaded: the pool has refused or displaced the flight's job.
-  // kCancelled: the order's deadline passed, or the awaiting coroutine was cancelled. kUnavailable: the pool is
-  // cancelled. Otherwise whatever `build` returned.
+  // Waits for the flight of `key`. If there is none, starts one, which runs `build` with the given `order`. `name` is
+  // for messages. An exception of `build` counts as kUnavailable. kOverloaded: the pool refused or displaced the
+  // flight's job. kCancelled: the order's deadline passed, or the awaiting coroutine was cancelled. kUnavailable: the
+  // pool is cancelled. Otherwise the result of `build`.
   asio::awaitable<Landing> Join(Key key, std::string name, Build build, JobOrder order);
 
   std::size_t in_flight() const {
@@ -78,7 +77,7 @@ class SingleFlight {
 
   WorkerPool& pool_;
   mutable std::mutex mutex_;
-  std::unordered_map<Key, FlightPtr, Hash> flights_;  // those that take passengers
+  std::unordered_map<Key, FlightPtr, Hash> flights_;  // those that accept waiters
   std::atomic<std::uint64_t> joined_total_{0};
 };
 
@@ -93,13 +92,13 @@ struct SingleFlight<Key, Value, Hash>::Flight {
   std::stop_source stop;
   const std::stop_callback<std::function<void()>> at_cancel;
   bool begun = false;
-  std::vector<std::weak_ptr<PoolJob>> jobs;  // one of each client, until one of them runs; the pool owns them
+  std::vector<std::weak_ptr<PoolJob>> jobs;  // one per client, until one of them runs; owned by the pool
   std::vector<WaiterPtr> waiters;
   std::optional<Result<Value>> outcome;
 };
 
-// Holds one waiter's place; giving it back may stop the flight and withdraw its jobs. Lives in Join's frame, so that
-// the place is given back however the coroutine ends.
+// One waiter's place in a flight. Its destruction may stop the flight and withdraw its jobs. It is a local object of
+// Join, so that the place is released however the coroutine ends.
 template <typename Key, typename Value, typename Hash>
 class SingleFlight<Key, Value, Hash>::Seat {
  public:
@@ -182,7 +181,7 @@ void SingleFlight<Key, Value, Hash>::Launch(const FlightPtr& flight, Build build
   if (!submitted) Fail(flight, job.get(), std::move(submitted.error()));
 }
 
-// `job` will not run. Those who wait share the failure unless another client's job is to build for them.
+// `job` will not run. The error is the outcome of the flight, unless another client's job can still build.
 template <typename Key, typename Value, typename Hash>
 void SingleFlight<Key, Value, Hash>::Fail(const FlightPtr& flight, const PoolJob* job, Error error) {
   {

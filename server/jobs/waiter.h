@@ -1,4 +1,4 @@
-// Lets a coroutine wait for what another thread brings.
+// Lets a coroutine wait for a result of another thread.
 #pragma once
 
 #include <boost/asio/steady_timer.hpp>
@@ -8,8 +8,7 @@
 
 namespace terrace::server {
 
-// Waits until its time, which is the waiter's deadline, and is cancelled by Wake. A timer belongs to the thread of its
-// executor.
+// A timer that expires at the waiter's deadline and is cancelled by Wake. It belongs to the thread of its executor.
 using WaiterPtr = std::shared_ptr<asio::steady_timer>;
 
 // Ends the wait, on the waiter's own thread. The coroutine suspends in its wait before its thread runs anything else,

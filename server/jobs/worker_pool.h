@@ -1,10 +1,9 @@
-// The threads that compute and read files, behind one queue in which clients take turns (FairQueue).
+// The threads that compute and read files, with one queue in which clients take turns (FairQueue).
 //
-// A job waits; it is refused only where it would have to wait past its deadline, or where more wait than the bound, and
-// then it is the newest job of the client that has most waiting. Whoever has nothing to wait for any more withdraws its
-// job.
+// Jobs wait in the queue. A job is refused if it would have to wait past its deadline. If the queue is full, the newest
+// job of the client with the most waiting jobs is dropped. A caller that no longer waits withdraws its job.
 //
-// Thread-safe. A job that was taken is run, also during shutdown.
+// Thread-safe. A job that was accepted is run, also during shutdown.
 #pragma once
 
 #include <atomic>
@@ -31,16 +30,16 @@
 
 namespace terrace::server {
 
-// Blocks on a worker. Asked to stop once nobody waits for its result.
+// Runs on a worker and may block. Its stop token is stopped when nobody waits for the result.
 template <typename T>
 using Work = std::function<Result<T>(std::stop_token)>;
 
-// kUnavailable, and what was thrown in the work that is called `name`. Never throws.
+// kUnavailable, with what the work `name` has thrown. Never throws.
 Error FailureOf(std::string_view name, const std::exception& thrown);
-// kOverloaded: the job of the work that is called `name` had to make room. Never throws.
+// kOverloaded: the job of the work `name` was dropped for others. Never throws.
 Error DisplacedError(std::string_view name);
 
-// What the work returns; an exception counts as kUnavailable. Never throws: on a worker that would end the program.
+// The result of the work; an exception counts as kUnavailable. Never throws: on a worker that would end the program.
 template <typename T>
 Result<T> Outcome(std::string_view name, const Work<T>& work, std::stop_token stop) {
   try {
@@ -62,23 +61,23 @@ class WorkerPool {
   WorkerPool& operator=(const WorkerPool&) = delete;
 
   // Runs `work` on a worker for one caller, who waits for its result. Errors: those of `work` and Submit; kCancelled:
-  // the order's deadline passed, or the awaiting coroutine was cancelled. The coroutine has to run on a single thread.
+  // the order's deadline passed, or the awaiting coroutine was cancelled. The coroutine must run on a single thread.
   template <typename T>
   asio::awaitable<Result<T>> Run(Work<T> work, JobOrder order);
 
-  // kOverloaded: the job cannot begin before its deadline, or there is no place for it. kUnavailable: the pool takes no
-  // more jobs. It will not run then. May call another job's `displaced`.
+  // On an error the job does not run. kOverloaded: it cannot start before its deadline, or the queue is full.
+  // kUnavailable: the pool accepts no more jobs. May call another job's `displaced`.
   Result<void> Submit(PoolJobPtr job);
 
-  // A job that still waits never runs. Null: nothing to do.
+  // Removes a job that still waits; it never runs. Null: does nothing.
   void Withdraw(const PoolJobPtr& job);
 
-  // Takes no more jobs, and asks the work of Run and of flights to stop.
+  // Accepts no more jobs, and requests that the work of Run and of flights stops.
   void Cancel();
-  // Requested by Cancel.
+  // The stop token of Cancel.
   std::stop_token cancelled() const { return cancel_.get_token(); }
 
-  // Cancels, runs the jobs that were taken and joins the threads. May be called twice; not from a job.
+  // Cancels, runs the accepted jobs and joins the threads. May be called twice; not from a job.
   void Shutdown();
 
   std::size_t queued() const;

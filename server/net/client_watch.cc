@@ -14,10 +14,10 @@
 namespace terrace::server {
 namespace {
 
-// A request that takes longer than this is worth asking whether its client is still there.
+// Time after which it is worth checking whether the client of a request is still there.
 constexpr std::chrono::milliseconds kPatience{100};
-// Where bytes that nobody reads yet, another request or the end of what the client sends, hide whether the connection
-// stands, the kernel is asked so often.
+// Interval of asking the kernel, if unread bytes (another request, or the end of the client's sending) hide the state
+// of the connection.
 constexpr std::chrono::milliseconds kInterval{250};
 
 // What every reply begins with; RFC 9112, section 4.

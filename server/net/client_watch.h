@@ -1,4 +1,4 @@
-// Whether a client still waits for its answer.
+// Detects that a client no longer waits for its answer.
 #pragma once
 
 #include "server/asio.h"
@@ -6,11 +6,11 @@
 
 namespace terrace::server {
 
-// Returns when the client has closed or reset the connection, a while after the call at the earliest. A client that has
-// only ended its own sending still waits for its reply; one that has closed altogether looks the same until bytes are
-// sent to it, so that it is sent the first bytes of its reply (Stream::SendAhead). Over TLS the end of sending counts
-// as the end: there it is sent on closing only. To be cancelled by whoever does not need to know any more; reads
-// nothing.
+// Returns when the client has closed or reset the connection, at the earliest a while after the call. A client that has
+// closed only its sending direction still waits for its reply. A client that has closed the connection looks the same
+// until it is sent bytes; therefore the first bytes of the reply are sent ahead (Stream::SendAhead). TLS clients end
+// their sending only when they close, so there it counts as closing. Cancel it when the result is no longer needed.
+// Reads nothing.
 asio::awaitable<void> ClientLeft(Stream& stream);
 
 }  // namespace terrace::server

@@ -1,4 +1,4 @@
-// The connections that are open: their cap, and their orderly end.
+// The open connections: their limits, and their orderly end.
 //
 // Thread-safe. A connection is in the set from its construction to its destruction.
 #pragma once
@@ -16,7 +16,7 @@
 
 namespace terrace::server {
 
-// What the set may ask and tell a connection, from any thread.
+// The calls that the set makes to a connection, from any thread.
 class Connection {
  public:
   virtual ~Connection() = default;
@@ -28,22 +28,22 @@ class Connection {
   };
   virtual Phase phase() const = 0;
 
-  // Close; where a request is being served, after its reply.
+  // Closes the connection. A request that is being served gets its reply first.
   virtual void Evict() = 0;
-  // Finish the request that has begun, or one that begins in a moment, and close.
+  // Finishes the request that has begun, or that begins shortly, and closes.
   virtual void Drain() = 0;
   virtual void Abort() = 0;
-  // Refuse the request whose body takes room that is needed.
+  // Refuses the current request, because others need the memory of its body.
   virtual void Displace() { Abort(); }
 };
 
 class ConnectionSet {
  public:
-  // `most_of_one`: connections of one client at a time; 0: as many as there may be in all.
+  // `most_of_one`: limit on the connections of one client; 0: none but the limit on all connections.
   explicit ConnectionSet(std::size_t capacity, std::size_t most_of_one = 0)
       : capacity_(capacity), most_of_one_(most_of_one) {}
 
-  // A connection that comes while the set drains is told so. `client` is whom it counts for; empty: nobody.
+  // A connection added while the set drains is drained at once. `client`: whose limit it counts against; empty: none.
   void Add(const std::shared_ptr<Connection>& connection, const std::string& client = "");
   void Remove(const Connection* connection);
 
@@ -56,18 +56,18 @@ class ConnectionSet {
   std::uint64_t refused() const { return refused_.load(std::memory_order_relaxed); }
   bool draining() const;
 
-  // Makes room for a connection of `newcomer`: tells another one to close. It is one of the client that has most
-  // connections, the newcomer's counted, and of no client that has fewer than the newcomer's. Of that client the oldest
-  // idle one goes first, then the oldest without a complete request; last, if it is another client than the newcomer's
-  // and has more, its newest, whatever that is at. A connection of nobody ("") counts as a client of its own.
-  // False: all others have to stay.
+  // Makes room for a connection of `newcomer`: closes another connection. Chooses the client with the most connections,
+  // counting the new one, but none with fewer than the newcomer. Of this client, the oldest idle connection is closed,
+  // else the oldest without a complete request, else its newest in any phase; the last only if it is another client
+  // than the newcomer and has more connections. A connection without a client ("") counts as a client of its own.
+  // Returns false if no connection can be closed.
   bool EvictOne(const std::string& newcomer);
 
-  // From now on every connection ends after the request it is at.
+  // From now on every connection ends after its current request.
   void Drain();
   void AbortAll();
 
-  // False when connections are left after `timeout`.
+  // Returns false if connections are left after `timeout`.
   bool WaitUntilEmpty(std::chrono::milliseconds timeout);
 
  private:

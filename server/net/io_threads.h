@@ -1,5 +1,5 @@
-// The threads that move bytes, each with an io_context of its own: what runs in one context runs on one thread, and
-// needs neither strands nor locks.
+// The threads for network I/O. Each has its own io_context: everything in a context runs on one thread, without strands
+// or locks.
 #pragma once
 
 #include <atomic>

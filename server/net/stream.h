@@ -1,6 +1,6 @@
-// The two ends of a connection's bytes: a socket, or TLS on top of one; with a deadline for whatever is under way.
+// A connection's byte stream: a socket, or TLS over one, with a deadline for its operations.
 //
-// For one thread. Operations end in an error of the system or of TLS; end of file is one.
+// For use on one thread. Operations fail with an error of the system or of TLS; end of file is an error too.
 #pragma once
 
 #include <array>
@@ -24,7 +24,7 @@ namespace terrace::server {
 using Transfer = tl::expected<std::size_t, boost::system::error_code>;  // bytes
 using BufferPair = std::array<asio::const_buffer, 2>;
 
-// Takes `bytes` off the front of what is to be sent.
+// Removes the first `bytes` from `buffers`.
 void Skip(std::size_t bytes, BufferPair& buffers);
 
 class Stream {
@@ -40,37 +40,37 @@ class Stream {
   asio::ip::tcp::socket& socket();
   bool is_tls() const;
 
-  // The operation under way when `time` has passed, and every one begun later, fails. Until the next call of this.
+  // Sets the deadline, until the next call: after it, the current operation and every later one fail.
   void ExpiresAfter(std::chrono::milliseconds time);
   void ExpiresAt(Clock::time_point deadline);
   void ExpiresNever();
   Clock::time_point deadline() const;
   bool expired() const;
 
-  // Of TLS; nothing to do for others.
+  // The TLS handshake; does nothing on a plain stream.
   asio::awaitable<Transfer> Handshake();
   // At least one byte.
   asio::awaitable<Transfer> ReadSome(asio::mutable_buffer buffer);
   asio::awaitable<Transfer> WriteSome(BufferPair buffers);
-  // What is there already, without waiting; 0 bytes if nothing, and always for TLS.
+  // Reads without waiting. Returns 0 bytes if none have arrived, and always for TLS.
   Transfer ReadReady(asio::mutable_buffer buffer);
 
-  // What can be sent without waiting; 0 bytes if nothing, and always for TLS.
+  // Writes without waiting. Returns 0 bytes if none can be sent, and always for TLS.
   Transfer WriteReady(BufferPair buffers);
 
-  // Sends `bytes`, with which the next message will begin, ahead of it, once for each message. A peer that has closed
-  // the connection altogether answers with a reset; one that has closed its own direction alone (RFC 9293, section 3.6)
-  // takes them. Does nothing for TLS.
+  // Sends `bytes`, the beginning of the next message, ahead of it; once for each message. A peer that has closed the
+  // connection answers with a reset. A peer that has closed only its sending direction (RFC 9293, section 3.6) accepts
+  // them. Does nothing for TLS.
   void SendAhead(std::string_view bytes);
-  // How many bytes of the message that begins now were sent ahead.
+  // The number of bytes of the next message that were sent ahead.
   std::size_t TakeAhead();
 
-  // Ends the operation under way.
+  // Cancels the current operation.
   void Cancel();
-  // Says that nothing more will be sent.
+  // Closes the sending direction.
   asio::awaitable<void> FinishWriting();
   void Close();
-  // Closes, and the kernel forgets what the client has not taken yet.
+  // Closes with a reset: the kernel drops bytes that were not sent yet.
   void Reset();
 
  private:

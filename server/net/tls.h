@@ -19,14 +19,14 @@ namespace terrace::server {
 
 class TlsContext {
  public:
-  // PEM files; the certificate's may hold the chain above it. kInvalidArgument, kUnavailable: a file cannot be read, is
-  // no PEM, or the two do not belong together.
+  // PEM files; the certificate's file may contain its chain. kInvalidArgument, kUnavailable: a file cannot be read or
+  // is not PEM, or key and certificate do not belong together.
   static Result<std::unique_ptr<TlsContext>> Open(std::filesystem::path certificate, std::filesystem::path key);
 
   std::shared_ptr<asio::ssl::context> Current() const;
 
-  // Looks whether the files have changed, and takes the new certificate if they are sound. True: it did. On an error
-  // the old one stays; the same files are not tried again.
+  // Checks whether the files have changed, and uses the new certificate if it is valid; returns true then. On an error
+  // the old certificate stays in use, and the same files are not tried again.
   Result<bool> ReloadIfChanged();
 
  private:

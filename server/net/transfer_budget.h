@@ -1,21 +1,23 @@
-// The memory of bodies on their way: replies that clients have not taken yet, and bodies of requests that are not
-// answered.
+// The memory limit for bodies in transfer: replies that clients have not taken yet, and bodies of requests that are not
+// answered yet.
 //
-// It is divided into rooms that take nothing from one another: half for small replies, which are up to an eighth of
-// their room, a quarter for larger ones, a quarter for uploads. What is larger than its room is under way one at a time
-// beside it, as a room of its own. The same holds in each room:
+// The memory is divided into separate rooms: half for small replies, which are up to an eighth of their room, a quarter
+// for larger replies, a quarter for uploads. A body that is larger than its room is transferred outside of it, one at a
+// time, as if in a room of its own. The same rules hold in each room:
 // - A body that many replies share counts once.
-// - Bodies that find no room wait for it (HoldWhenRoom). Next is a body of the client that has used the room least
-//   lately, in bytes times seconds, what it holds now included; of those alike the oldest.
-// - One client gets two thirds of what is for replies, or one reply: there is room for the next client.
-// - Who waits takes from others. A client has kGrace to take a reply that is on offer, and gets a second back for each
-//   kRate bytes that it takes: it is late once it lags kGrace behind that rate. Late replies are cut off, those of the
-//   client that holds most, if that is more than the client of the one who waits. Of uploads the newest one of the
-//   client that holds most is displaced, if that client holds more than the one who waits would; and those of others
-//   that have not arrived whole in kGrace and a second for each kRate bytes. A client's own bodies wait for one
-//   another.
+// - Bodies that do not fit wait (HoldWhenRoom). The next body is one of the client with the least recent use of the
+//   room, in bytes times seconds, with what it holds now included; among equals, the oldest.
+// - One client may hold two thirds of the memory for replies that others do not use, or one reply. This leaves memory
+//   for the next client.
+// - Waiting bodies take memory from others. A client has kGrace to take a reply that is being sent, and gains one
+//   second per kRate bytes that it takes: its reply is late once it lags kGrace behind this rate. If a body waits, the
+//   late replies of the client that holds most are cut off, if this client holds more than the waiting one. If an
+//   upload waits, the newest upload of the client that holds most is displaced, if this client holds more than the
+//   waiting one would; so are uploads of other clients that have not arrived within kGrace plus one second per kRate
+//   bytes. Bodies of one client wait for one another.
 //
-// What tells operators how the server is may go beyond all rooms by kReserve: it is wanted most when there is no room.
+// Replies about the server's state, for operators, may exceed all rooms by kReserve: they matter most when memory is
+// short.
 //
 // Thread-safe.
 #pragma once
@@ -48,12 +50,12 @@ class TransferBudget {
   static constexpr std::chrono::seconds kGrace{2};
   static constexpr std::size_t kRate = std::size_t{1} << 20;
   static constexpr std::size_t kReserve = std::size_t{1} << 20;
-  static constexpr std::size_t kShare = 2;  // a client's, of what is free: room is left for the next one
+  static constexpr std::size_t kShare = 2;  // bytes that a client may hold, as a multiple of those left free
 
-  // `now`: what the time is.
+  // `now`: the clock.
   explicit TransferBudget(std::size_t capacity, std::function<Clock::time_point()> now = Clock::now);
 
-  // Gives its room back when it ends, on whatever thread.
+  // Memory in use. Released when the object is destroyed, on any thread.
   class Hold;
 
   enum class Kind : std::uint8_t { kReply, kVitalReply, kUpload };
@@ -61,22 +63,22 @@ class TransferBudget {
   struct Ask {
     Kind kind = Kind::kReply;
     std::size_t bytes = 0;
-    std::shared_ptr<const std::string> body;  // lives as long as it is counted; null: memory that nobody shares
-    std::uint64_t client = 0;                 // who it counts against
-    std::weak_ptr<Connection> holder;         // who would be cut off or displaced
+    std::shared_ptr<const std::string> body;  // kept alive while it counts; null: memory that is not shared
+    std::uint64_t client = 0;                 // the client whose share it counts against
+    std::weak_ptr<Connection> holder;         // the connection that may be cut off or displaced
   };
 
-  // Room until the hold ends. Nothing: there is none now.
+  // Takes memory until the hold is destroyed. Returns nothing if there is none now.
   std::optional<Hold> TryHold(const Ask& ask);
 
-  // Waits for room, at most until `deadline`; nothing then. Give no body: what waits must not take the memory that it
-  // waits for. The coroutine has to run on a single thread.
+  // Waits for memory until `deadline`; returns nothing then. `ask` should have no body, because a waiting body would
+  // itself take memory. The coroutine must run on a single thread.
   asio::awaitable<std::optional<Hold>> HoldWhenRoom(Ask ask, Clock::time_point deadline);
 
   struct Stats {
     std::size_t held_bytes = 0;
     std::size_t waiting = 0;
-    std::uint64_t refused = 0;  // whose deadline came before there was room
+    std::uint64_t refused = 0;  // by their deadline, while they waited
     std::uint64_t cut = 0;      // cut off or displaced
   };
   Stats stats() const;
@@ -99,10 +101,10 @@ class TransferBudget {
   enum RoomNumber : std::size_t { kSmall, kLarge, kOversized, kUploads, kOversizedUpload, kRooms };
 
   struct Entry {
-    const void* charge;  // what it is counted under: the body, or the entry itself where nobody shares it
+    const void* charge;  // key of its charge: the body, or the entry itself if it is not shared
     std::size_t room = 0;
-    Clock::time_point late_at;         // max: it is not the client's turn
-    std::weak_ptr<Connection> holder;  // not told to make room yet
+    Clock::time_point late_at;         // max: its time has not begun
+    std::weak_ptr<Connection> holder;  // empty once it was told to make room
     std::uint64_t client = 0;
   };
   using Entries = std::list<Entry>;
@@ -161,18 +163,18 @@ class TransferBudget::Hold {
     if (budget_) budget_->Release(entry_);
   }
 
-  // The client has taken so many more bytes of the reply. Its time begins with the first call: until then the reply is
-  // being made.
+  // Call this when the client has taken further bytes of the reply. Its time begins with the first call: before that
+  // the reply is being made.
   void Took(std::size_t bytes) {
     if (budget_) budget_->Took(entry_, bytes);
   }
 
-  // The upload is complete, and counts until the end, but is late no more.
+  // Call this when the upload is complete. It still counts until the hold is destroyed, but can no longer be late.
   void Settle() {
     if (budget_) budget_->Settle(entry_);
   }
 
-  // Of a hold without one: lives as long as it is counted.
+  // Keeps `body` alive as long as the hold. For holds without a body.
   void Keep(std::shared_ptr<const std::string> body) { body_ = std::move(body); }
 
  private:

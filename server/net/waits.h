@@ -10,10 +10,10 @@
 
 namespace terrace::server {
 
-// False: the client is gone.
+// Returns false if the client is gone.
 asio::awaitable<bool> SleepWhileConnected(Stream& stream, std::chrono::milliseconds time);
 
-// Nothing: the deadline has come, or the client is gone.
+// Returns nothing if the deadline has passed or the client is gone.
 asio::awaitable<std::optional<TransferBudget::Hold>> HoldWhileConnected(Stream& stream, TransferBudget& transfers,
                                                                         TransferBudget::Ask ask,
                                                                         TransferBudget::Clock::time_point deadline);

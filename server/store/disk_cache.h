@@ -1,8 +1,8 @@
-// The tier below memory: encoded tiles and refinements on disk, where they outlive the process.
+// The cache tier below memory: encoded tiles and refinements on disk, which outlive the process.
 //
-// Thread-safe. Looked into on a worker, before a build; written off the request's path. A record is found only by the
-// program that wrote it (EncoderVersion) and for the dataset's generation that it was made from, and only if its
-// checksum holds: what the disk damaged, lost or kept for too long is built again.
+// Thread-safe. Read on a worker, before a build; written in the background. A record is found only by the program that
+// wrote it (EncoderVersion), only for the generation of the dataset that it was made from, and only if its checksum is
+// right. Records that are damaged, lost or outdated are built again.
 #pragma once
 
 #include <cstddef>
@@ -26,14 +26,14 @@ class DiskCache {
   static Result<std::shared_ptr<DiskCache>> Open(const config::DiskCacheConfig& config, std::size_t open_files);
   ~DiskCache();
 
-  // Null where the configuration gives them no bytes. They live as long as this.
+  // Null if the configuration gives them no bytes. Valid as long as this object.
   tiler::TileStore* tiles();
   tiler::RefinementStore* refinements();
 
   // Returns when everything that was kept before the call is written or dropped.
   void Flush();
 
-  // Drops what waits to be written, and keeps nothing more.
+  // Drops values that wait to be written, and accepts no more.
   void Abandon();
 
   DiskCacheStats stats() const;

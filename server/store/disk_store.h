@@ -1,8 +1,8 @@
-// Values by key on a disk that may fail: what is read back is what was written, or nothing.
+// A key-value store on a disk that may fail: a read returns the value that was written, or nothing.
 //
-// Thread-safe. Find blocks for a read; Keep returns at once, a thread of the store writes. No failure reaches the
-// caller. After one the store leaves the disk alone and tries again every `retry_after`: after a failed write it
-// goes on reading, after a failed read it finds nothing. Log and stats say so.
+// Thread-safe. Find blocks for a read; Keep returns at once, and a thread of the store writes. Errors do not reach the
+// caller. After an error the store stops using the disk and tries again every `retry_after`: after a failed write it
+// continues to read, after a failed read it finds nothing. Log and statistics report this.
 #pragma once
 
 #include <atomic>
@@ -41,22 +41,22 @@ struct DiskStoreStats {
 
 class DiskStore {
  public:
-  // A disk that does not answer is no error: the store begins switched off.
+  // A disk that does not respond is no error: the store is switched off until it does.
   explicit DiskStore(DiskStoreOptions options);
   // Writes what waits, unless the disk fails.
   ~DiskStore();
 
-  // From now on nothing is kept, and what waits is dropped but for the values that are being written, kBatchBytes: for
-  // who has no time to wait for the disk.
+  // From now on no value is accepted, and waiting values are dropped, except those being written (kBatchBytes). For
+  // callers that have no time to wait for the disk.
   void Abandon();
 
-  // Nothing if it is not there, or was damaged, or the disk failed.
+  // Returns nothing if the value is absent or damaged, or the disk failed.
   std::optional<std::string> Find(const std::string& key);
 
-  // `value` is called by the store's thread. `charge`: the memory that it keeps until then, about.
+  // `value` is called on the store's thread. `charge`: about the memory that it holds until then.
   void Keep(std::string key, std::function<std::string()> value, std::size_t charge);
 
-  // For a value that Find gave and that turned out to be no such value after all.
+  // Removes a value that Find returned and that could not be parsed.
   void Forget(const std::string& key);
 
   // Returns when everything that was kept before the call is written or dropped.

@@ -1,7 +1,7 @@
-// Everything that is served at one moment: the datasets, and how answers about them are made.
+// What is served at one moment: the datasets, and the functions that make answers from them.
 //
-// Immutable. A request works with the catalog it began with, to its end, and so does the build it starts: what replaces
-// a catalog meanwhile is never mixed into an answer.
+// Immutable. A request uses the catalog it began with until its end, and so does a build that it starts: answers never
+// mix two catalogs.
 #pragma once
 
 #include <cstdint>
@@ -30,7 +30,7 @@ using TileBuilder = std::function<Result<tiler::EncodedTile>(const tiler::TileRe
 // Heights of a dataset at points, NaN where it has none.
 struct PointHeights {
   PointHeights() = default;
-  // All of them measured. Implicit: heights are such.
+  // Heights of which none was filled in. Implicit on purpose.
   PointHeights(std::vector<float> measured) : heights(std::move(measured)) {}  // NOLINT(google-explicit-constructor)
 
   std::vector<float> heights;
@@ -41,14 +41,14 @@ struct PointHeights {
 using PointReader = std::function<Result<PointHeights>(std::uint32_t dataset, std::span<const dem::GeoPosition> points,
                                                        dem::HeightDatum, std::stop_token)>;
 
-// What sources were read for: GDAL's numbers since the start, those of datasets, by name, since they were opened.
+// Statistics of reading sources: GDAL's since the start; those of datasets, by name, since they were opened.
 struct SourceStats {
   std::vector<std::pair<std::string, dem::SampleCounts>> samples;
   dem::GdalCounts gdal;
 };
 
-// Meshes of areas, by the dataset's index: `plan` refuses what is too large, at once and without reading; `build`
-// blocks. Both are called on many threads at once.
+// Makes meshes of areas, by the dataset's index. `plan` refuses areas that are too large; it reads nothing and returns
+// at once. `build` blocks. Both are called on many threads at once.
 struct AreaMesher {
   std::function<Result<tiler::AreaPlan>(std::uint32_t dataset, const tiler::AreaRequest&)> plan;
   std::function<Result<tiler::EncodedTile>(std::uint32_t dataset, const tiler::AreaPlan&, const tiler::AreaRequest&,

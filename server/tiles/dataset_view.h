@@ -1,4 +1,5 @@
-// What the HTTP side knows of a dataset: its name, its extent and which tiles exist; never how tiles are made.
+// The HTTP side's view of a dataset: its name, its extent and the tiles that exist. It does not know how tiles are
+// made.
 //
 // Immutable as a part of a catalog, so any thread reads it without a lock. A dataset's index in the catalog's list is
 // TileRequest::dataset.
@@ -32,11 +33,11 @@ struct DatasetView {
   double floor_m = 0;                                       // height where there is no data
   // DemSource::RangeBound: heights that no sample of a tile leaves. Reads no raster; on any thread. Empty: those above.
   std::function<dem::HeightRange(const geo::TileKey&)> range_bound = {};
-  bool has_datum = true;                        // it is known what its heights count from
+  bool has_datum = true;                        // the vertical datum of its heights is known
   std::size_t sources = 1;                      // rasters that the heights come from
   bool has_water = false;                       // tiles have a water mask
   std::optional<proto::TextureFormat> texture;  // of GLB tiles, for requests that name none; nothing: no imagery
-  int metadata_levels = 0;                      // tiles of every so many levels tell what is below them; 0: none
+  int metadata_levels = 0;                      // tiles at multiples of this level have metadata; 0: none
   int max_mercator_depth = 1;                   // the deepest geo::MercatorGrid that height tiles are cut from
 
   int max_level() const { return static_cast<int>(available.size()) - 1; }

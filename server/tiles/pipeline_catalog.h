@@ -1,4 +1,4 @@
-// A catalog on top of the real tile pipeline.
+// Makes a catalog from a tile pipeline.
 #pragma once
 
 #include <cstddef>
@@ -9,7 +9,7 @@
 
 namespace terrace::server {
 
-// `max_mesh_samples`: of one mesh of an area.
+// `max_mesh_samples`: limit for one mesh of an area.
 CatalogPtr MakeCatalog(std::shared_ptr<const tiler::TilePipeline> pipeline, std::size_t max_mesh_samples);
 
 }  // namespace terrace::server

@@ -1,4 +1,4 @@
-// One mesh of an area of interest, as a file that other programs open.
+// One mesh of a requested area, as a file for other programs.
 #pragma once
 
 #include <cstdint>
@@ -27,14 +27,15 @@ struct AreaRequest {
 };
 
 // The samples that an area is meshed from: nodes of the lattice of the first level whose default error is at most the
-// one asked for, or of the deepest level; the area is clipped to the source's bounds, then widened to whole cells.
+// requested error, or of the deepest level. The area is clipped to the source's bounds, then extended to whole cells.
 struct AreaPlan {
   int level = 0;
   dem::NodeWindow window;
   dem::GeoPosition centre;  // of the clipped area: the origin of kEnu
 };
 
-// kInvalidArgument, with a message for the client: the area does not meet the source, or needs more than `max_samples`.
+// kInvalidArgument, with a message for the client: the area does not intersect the source, or needs more than
+// `max_samples`.
 Result<AreaPlan> PlanArea(const dem::DemSource& source, double error_fraction, const AreaRequest& area,
                           std::size_t max_samples);
 

@@ -1,4 +1,4 @@
-// Where the samples of an area lie in space, and how far flat triangles between them are from the ground.
+// Positions of an area's samples in space, and the distance of flat triangles between them from the ground.
 #pragma once
 
 #include <stop_token>
@@ -25,7 +25,7 @@ class AreaSurface {
   // Metres, ECEF.
   geo::Vec3 Ecef(int column, int row, double height_m) const;
 
-  // What the curved Earth takes from flat triangles, for the run that makes the mesh.
+  // Adds the curvature of the Earth to the options of the run that makes the mesh.
   void AddCurvature(tin::GreedyOptions& options) const;
 
   // Vertical distances between the samples and the flat triangles with corners in `ecef`, the mesh's vertices. Misses

@@ -1,13 +1,14 @@
-// What is used most lately, as much as fits into a budget of bytes; a scan does not drive out what is asked for often.
+// A cache of recently used values with a budget in bytes. A scan of many values does not evict the frequently used
+// ones.
 //
-// Thread-safe. The cache is cut into shards with a lock each; a key lives in the shard its hash names.
+// Thread-safe. The cache is divided into shards with a lock each; the hash of a key selects its shard.
 //
-// A shard is a segmented LRU (Karedla, Love and Wherry, Computer 27(3), 1994): what is inserted is on probation, what
-// is found there becomes protected, and the least recently used on probation leaves first. So what is asked for once,
-// as a crawler asks, passes through a fifth of the shard, however much of it there is. What falls out of the protected
-// part is on probation again. Of what left lately the keys stay for a while, as ghosts (2Q: Johnson and Shasha, VLDB
-// 1994): what comes back meanwhile is protected at once, so that a new hot set gets in that is larger than the
-// probation.
+// A shard is a segmented LRU (Karedla, Love and Wherry, Computer 27(3), 1994). A new entry is on probation; if it is
+// found again, it becomes protected. The least recently used entry on probation is evicted first. Values that are
+// requested only once, as by a crawler, thus pass through a fifth of the shard, however many there are. Entries that
+// leave the protected part are on probation again. The keys of recently evicted entries are kept for a while as ghosts
+// (2Q: Johnson and Shasha, VLDB 1994): an entry that returns meanwhile is protected at once, so that a new working set
+// larger than the probation part can enter.
 //
 // Invariants of a shard, whenever its lock is free:
 //   1. Every entry is in one segment once, most recently used first, and in the index once, pointing at its list node.
@@ -37,18 +38,18 @@ struct ByteCacheStats {
   std::uint64_t hits = 0, misses = 0;  // where the owner counts them; the cache does not know what counts as a request
 };
 
-// BytesOf(value), found beside the type of the values, says what a value takes. Key::generation says what an entry is
-// made from.
+// BytesOf(value) returns the size of a value and is found by argument-dependent lookup. Key::generation identifies the
+// source that an entry was made from.
 template <typename Key, typename Hash, typename Value>
 class ByteCache {
  public:
   using ValuePtr = std::shared_ptr<const Value>;
 
-  // Bytes that an entry costs beyond what it is charged: list node, index node and bucket, control block, and half of a
-  // ghost's nodes.
+  // Bytes of an entry in addition to its charge: list node, index node and bucket, control block, and half of a ghost's
+  // nodes.
   static constexpr std::size_t kEntryOverheadBytes = 640;
 
-  // 0 bytes: off, nothing is ever found. A value must fit into one shard; the largest are about 2 MB.
+  // 0 bytes: off; Find never finds anything. A value must fit into one shard; the largest are about 2 MB.
   explicit ByteCache(std::size_t capacity_bytes) {
     const std::size_t count = capacity_bytes >= kMinShardedBytes ? kShards : 1;
     shards_.reserve(count);
@@ -58,7 +59,7 @@ class ByteCache {
     }
   }
 
-  // Null when it is not there. A value that is found becomes protected, and the most recently used one of its shard.
+  // Null if absent. A value that is found becomes protected, and the most recently used entry of its shard.
   ValuePtr Find(const Key& key) {
     Shard& shard = ShardOf(key);
     const std::lock_guard lock(shard.mutex);
@@ -90,7 +91,7 @@ class ByteCache {
     shard.TrimGhosts(gone);
   }
 
-  // Entries of other generations leave, and are not taken from now on.
+  // Removes entries of other generations, and refuses such entries from now on.
   void Retain(const std::vector<std::uint64_t>& generations) {
     for (const auto& shard : shards_) {
       std::list<Entry> gone;
@@ -106,7 +107,7 @@ class ByteCache {
     }
   }
 
-  // The number of shards stays: a cache that was made small goes on with one lock.
+  // The number of shards stays the same: a cache that was created small keeps its single lock.
   void SetCapacity(std::size_t capacity_bytes) {
     for (const auto& shard : shards_) {
       std::list<Entry> gone;

@@ -1,4 +1,4 @@
-// Work on many things at once.
+// Runs work in parallel.
 #pragma once
 
 #include <cstddef>
@@ -6,9 +6,9 @@
 
 namespace terrace::dem {
 
-// Calls work(0), work(1) .. work(count - 1) on as many threads as there are cores, this one among them. They begin in
-// that order; once one has given false no other begins. Returns when all that began have ended, and throws what the
-// first of them threw. Threads that cannot be had are done without.
+// Calls work(0), work(1) .. work(count - 1) on as many threads as there are cores, including this one. Calls begin in
+// this order; after one returns false, no other begins. Returns when all calls that began have ended, and rethrows the
+// first exception. If threads cannot be created, uses fewer.
 void ForEachOnAllCores(std::size_t count, const std::function<bool(std::size_t)>& work);
 
 }  // namespace terrace::dem

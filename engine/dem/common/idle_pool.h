@@ -1,8 +1,8 @@
-// What keeps files open between uses: GDAL datasets, images, PROJ operations with their grids.
+// A pool that keeps unused file handles open: GDAL datasets, images, PROJ operations with their grids.
 //
-// Each is used by one thread at a time and kept in the pool it came from. All pools of the process share one list with
-// a limit: those used longest ago are let go, whosever they are. What is in use does not count; that is bounded by the
-// number of threads. Thread-safe.
+// Each object is used by one thread at a time and returns to its pool. All pools of the process share one list with a
+// limit: the objects unused for longest are closed, whichever pool they belong to. Objects in use do not count; the
+// number of threads bounds them. Thread-safe.
 #pragma once
 
 #include <cstddef>

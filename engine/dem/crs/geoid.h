@@ -1,9 +1,9 @@
-// What heights count from, and how far that is above the WGS 84 ellipsoid: geoid models and national height systems,
-// through one pinned PROJ operation.
+// Vertical datums: the height of a geoid or national height system above the WGS 84 ellipsoid, by one pinned PROJ
+// operation.
 //
-// Heights above a geoid become ellipsoidal by adding its undulation, which depends on the place alone. As with
-// positions (projector.h) the operation is chosen once, for the source's own area; PROJ's network is off, so the choice
-// depends on the grids that are installed.
+// A height above a geoid becomes ellipsoidal by adding the undulation, which depends on the position alone. As for
+// positions (projector.h), the operation is chosen once, for the source's own area. PROJ's network access is off, so
+// the choice depends on the installed grids.
 #pragma once
 
 #include <memory>

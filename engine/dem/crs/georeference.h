@@ -1,4 +1,4 @@
-// Where a raster lies on the globe: geographic positions to pixel positions and back.
+// The position of a raster on the globe: converts geographic positions to pixel positions and back.
 //
 // Pixel positions are GDAL's: (0, 0) is the outer corner of the first pixel, (.5, .5) its centre; columns to the right,
 // rows downwards in the file.
@@ -49,8 +49,8 @@ class Georeference {
   // That of `width` x `height` pixels of the same grid from `first` on. `name` stands for them in errors.
   Result<Georeference> Moved(const PixelOffset& first, int width, int height, const std::string& name) const;
 
-  // Degrees to pixels, in place; NaN where the CRS has no such position. Longitudes of geographic sources are counted
-  // modulo 360 degrees: the column is the one inside the raster if there is one.
+  // Converts degrees to pixels, in place; NaN if the CRS has no such position. Longitudes of geographic sources are
+  // taken modulo 360 degrees: the column is the one inside the raster, if there is one.
   void ToPixels(std::span<Position> positions) const;
 
   // Pixels to degrees, in place; longitudes may lie beyond +-180.

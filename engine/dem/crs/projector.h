@@ -1,8 +1,7 @@
 // Positions on the globe to positions in a CRS and back, through one pinned PROJ operation.
 //
-// GDAL's own transformation picks, where several operations exist, the one that suits the mean of the points it is
-// handed: the same node could land elsewhere in another batch. Here the operation is chosen once, for the source's own
-// area.
+// If several operations exist, GDAL's own transformation chooses one by the mean of the points of a call: the same node
+// could get another position in another batch. Here the operation is chosen once, for the source's own area.
 #pragma once
 
 #include <memory>

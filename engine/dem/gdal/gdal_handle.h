@@ -1,6 +1,7 @@
 // GDAL datasets of one raster for many threads: each is used by one thread at a time.
 //
-// A GDALDataset shared by threads crashes; one per thread does not. What is not in use is kept as IdlePool says.
+// A GDALDataset must not be shared by threads; with one per thread there is no conflict. Unused datasets are kept as
+// described in IdlePool.
 #pragma once
 
 #include <gdal_priv.h>
@@ -41,9 +42,9 @@ class HandlePool {
   // kChanged: a file of the raster is gone or was replaced. kUnavailable: it cannot be opened.
   Result<Handle> Borrow();
 
-  // Whether the files are still the ones that were opened; asked again after a read, as they may be overwritten
-  // meanwhile. Where they are not, no dataset that is open now is used again: it may hold another file than the stamps
-  // tell of, should the old one come back.
+  // Whether the files are still the ones that were opened. Ask again after a read, because files may be overwritten
+  // during it. If they are not, no dataset that is open now is used again: it may hold another file than the stamps
+  // describe, should the old file come back.
   Result<void> CheckUnchanged();
 
   const StampedFiles& files() const { return files_; }

@@ -9,9 +9,8 @@ namespace terrace::dem {
 // Registers drivers and settles the configuration, once per process. Thread-safe; cheap when done.
 void InitGdal();
 
-// The last failure GDAL or PROJ reported on this thread since the last call; "no further detail" when there was none.
-// Library calls that can fail are preceded by ForgetGdalError, so that an older message cannot answer for a newer
-// failure.
+// The last error of GDAL or PROJ on this thread since the previous call; "no further detail" if there was none. Call
+// ForgetGdalError before library calls that can fail, so that an older message is not reported for a newer error.
 std::string TakeGdalError();
 void ForgetGdalError();
 

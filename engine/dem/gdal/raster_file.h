@@ -19,16 +19,14 @@ Result<GDALDatasetUniquePtr> OpenRaster(const std::string& path, int overview = 
 // that they are read as they are now and not as they once were.
 void ForgetRemote(const std::string& path);
 
-// Whether a driver takes the file for one of its own, by name and first bytes. Overviews and masks beside a raster are
-// none.
+// Whether a GDAL driver accepts the file, by name and first bytes. Overviews and masks beside a raster do not count.
 bool IsRaster(const std::string& path);
 
 // The same without the checks, for further handles on a file that passed them; null when it cannot be opened.
 GDALDatasetUniquePtr ReopenRaster(const std::string& path, int overview = -1);
 
-// Refuses (kUnavailable) a GeoTIFF that ends before the samples, overviews or mask of its first bands do: one that a
-// copy left unfinished opens all the same, and would fail in the tiles of what is not there. Remote files are not
-// looked at.
+// Refuses (kUnavailable) a GeoTIFF that ends before the samples, overviews or mask of its first bands do. An incomplete
+// copy can be opened, but reading the missing part would fail later, in single tiles. Remote files are not checked.
 Result<void> CheckComplete(GDALDataset& dataset, const std::string& path, int bands = 1);
 
 // The file, and those that GDAL reads with it: overviews, masks, the parts of a mosaic with theirs. Some may not exist.
@@ -41,8 +39,8 @@ Result<void> CheckSizeToMesh(const std::string& path, int width, int height);
 // takes for one. A nodata value is none.
 bool HasMaskBand(GDALRasterBand& band);
 
-// What of a picture a band is, as GDAL calls it; empty where it may be heights, as a grey one well may. Indices into a
-// palette may not.
+// The part of a picture that a band is, as GDAL names it; empty if the band may contain heights, as a grey band may. A
+// band of palette indices may not.
 std::string PicturePartOf(GDALRasterBand& band);
 
 // Band 1: the heights. Precondition: the dataset came from OpenRaster or ReopenRaster.

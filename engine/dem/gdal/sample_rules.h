@@ -1,4 +1,4 @@
-// What a raster band's raw values mean as heights: which are voids, and how the others become metres.
+// The meaning of a raster band's raw values: which are voids, and how the others are converted to metres.
 #pragma once
 
 #include <gdal_priv.h>
@@ -22,11 +22,11 @@ struct SampleRules {
   bool compare_as_float = false;     // nodata of Float32 bands may be stated with more digits than the samples have
   std::vector<double> extra_nodata;  // further raw values that are voids: stated by the owner, or found
   double lowest = -kMaxAbsHeight, highest = kMaxAbsHeight;  // metres; heights beyond are voids
-  // Samples this near to a void, in either axis, are voids too: the edges of voids were mixed with nodata values. Only
-  // at full resolution.
+  // Samples within this distance of a void, along either axis, are voids too, because they were mixed with nodata
+  // values. Only at full resolution.
   int rim = 0;
   bool has_mask = false;         // a mask band says which samples are valid
-  bool is_signed_byte = false;   // bytes above 127 are negative: GDAL before 3.7 leaves that to its users
+  bool is_signed_byte = false;   // bytes above 127 are negative: GDAL before 3.7 does not convert them
   bool is_indicator = false;     // samples become 1 where they are there and not zero, else 0
   double scale = 1, offset = 0;  // raw * scale + offset is in the band's unit
   double metres_per_unit = 1;

@@ -1,9 +1,9 @@
 // Which names may become open files, and which formats may read them.
 //
 // To GDAL a file name is a program: inline XML, URLs, addresses in memory. Here a name stands for one regular file,
-// under the data roots where there are some, or for something below a remote prefix that the operator allowed; formats
-// that are not listed do not exist; and what files name in turn (the parts of a VRT, overviews elsewhere) is held to
-// the same before it is opened.
+// below the data roots if there are any, or for a name below a remote prefix that the operator allowed. Formats that
+// are not listed do not exist. Names inside files (the parts of a VRT, external overviews) are checked by the same
+// rules before they are opened.
 #pragma once
 
 #include <string>
@@ -36,7 +36,7 @@ Result<void> AllowVrts();
 // kNotFound, kInvalidArgument, with the remedy.
 Result<void> CheckSourceName(const std::string& path);
 
-// Whether what was opened leads elsewhere. To be asked before overviews are.
+// Whether a file that was opened refers to others that are not allowed. Call it before overviews are used.
 Result<void> CheckLinks(GDALDataset& dataset, const std::string& path);
 
 // The part of it that any regular file must pass, whatever is in it: for files that no raster driver reads.
@@ -53,8 +53,8 @@ bool AllowsRemote();
 // A name that CheckSourceName finds below an allowed remote prefix.
 bool IsRemote(const std::string& path);
 
-// Removes what GDAL, OGR and PROJ would read from the environment, but for where their data lies: settings come from
-// the configuration. Returns the names removed. Call from main, before there are threads.
+// Removes what GDAL, OGR and PROJ would read from the environment, except the location of their data: settings come
+// from the configuration. Returns the names removed. Call it from main, before there are threads.
 std::vector<std::string> ClearGdalEnvironment();
 
 }  // namespace terrace::dem

@@ -197,10 +197,10 @@ bool NeedsAverages(const RasterLayout& layout) {
 
 int LeastKeptFactor(const RasterLayout& layout) {
   constexpr std::int64_t kMaxReadWhole = std::int64_t{1024} * 1024;
-  constexpr int kLeastOfOthers = 4;
+  constexpr int kMinOfOthers = 4;
   if (NeedsAverages(layout)) return 2;
   const bool is_small = std::int64_t{layout.width} * layout.height < kMaxReadWhole;
-  return layout.overview_factors.empty() && !is_small ? kLeastOfOthers : kLargestDirect;
+  return layout.overview_factors.empty() && !is_small ? kMinOfOthers : kLargestDirect;
 }
 
 RasterLayout WithDetectedNodata(RasterLayout layout, const DetectedNodata& detected) {

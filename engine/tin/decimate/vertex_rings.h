@@ -1,8 +1,8 @@
-// A triangulation as the ring of neighbours around each vertex: what the removal of vertices needs.
+// A triangulation stored as the ring of neighbours around each vertex, for the removal of vertices.
 //
 // The ring of an inner vertex is closed and counter-clockwise: its triangles are (v, ring[i], ring[i + 1]), cyclic. The
-// ring of a vertex on the border is open: it runs counter-clockwise from one border neighbour to the other. Reading a
-// star is reading one short array, and there are no triangles to keep in step.
+// ring of a border vertex is open: it runs counter-clockwise from one border neighbour to the other. A star is one
+// short array, and no list of triangles has to be updated.
 //
 // Not thread-safe; different objects are independent.
 #pragma once
@@ -29,8 +29,8 @@ class VertexRings {
     return {pool_.data() + ring.begin, ring.size};
   }
 
-  // Removes a vertex with a closed ring and fills its hole with the fan of triangles from ring[apex]. That these are
-  // counter-clockwise is the caller's business.
+  // Removes a vertex with a closed ring and fills its hole with the fan of triangles from ring[apex]. Precondition:
+  // these triangles are counter-clockwise.
   void Remove(std::uint32_t vertex, std::size_t apex);
 
   // The triangles that are left, each from its smallest vertex, ordered by it: a function of the rings alone.

@@ -1,4 +1,4 @@
-// The meshes of a cut's blocks (field_cut.h), joined to one mesh of the field.
+// Joins the meshes of a field's blocks (field_cut.h) to one mesh.
 #pragma once
 
 #include <cstddef>
@@ -10,15 +10,16 @@
 
 namespace terrace::tin {
 
-// Takes the blocks in the cut's order; none is needed any more once it was added. Vertices: the field's corners first,
-// as in every TinMesh, then block by block those that no earlier block had, in the block's order. Triangles block by
-// block. Holds the mesh and one id per column and row of the field. Not thread-safe.
+// Takes the blocks' meshes in the order of the cut. A block's mesh may be freed once it was added. Vertices of the
+// result: first the field's corners, as in every TinMesh, then for each block the vertices that no earlier block had,
+// in the block's order. Triangles: block by block. Memory: the mesh, and one id per column and row of the field. Not
+// thread-safe.
 class BlockJoiner {
  public:
   // `cut` must outlive this object.
   explicit BlockJoiner(const FieldCut& cut);
 
-  // Precondition: MeshBlock's mesh of block number added(), to the same error as the others.
+  // Precondition: `block_mesh` is MeshBlock's mesh of block number added(). All blocks are meshed to the same error.
   void Add(const TinMesh& block_mesh);
 
   std::size_t added() const { return added_; }

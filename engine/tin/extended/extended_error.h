@@ -1,5 +1,4 @@
-// How far a coloured mesh is from its extended field, measured afresh: nothing is taken from the run that made the
-// mesh.
+// The distance between a coloured mesh and its extended field, measured independently of the run that made the mesh.
 #pragma once
 
 #include <cstddef>

@@ -1,12 +1,12 @@
-// An extended height field, H(x, y) = (z, r, g, b): every sample has a height and a colour, and one error measures
+// An extended height field, H(x, y) = (z, r, g, b): every sample has a height and a colour, and one error combines
 // both.
 //
-// Garland and Heckbert, "Fast Triangular Approximation of Terrains and Height Fields" (1997), section 3.5. A sample
-// that a surface misses by dz metres and by dr, dg and db, colours from 0 to 1, has the error
+// Garland and Heckbert, "Fast Triangular Approximation of Terrains and Height Fields" (1997), section 3.5. Let a sample
+// differ from the surface by dz metres and by dr, dg and db, with colours from 0 to 1. Its error is
 //   (1 - w) |dz| + w (M / 3) (|dr| + |dg| + |db|)  metres,
-// with the weight w of colour, 0 to 1, and the range M of the valid heights: the whole range of colours weighs what the
-// whole range of heights does. Where all heights are the same the paper's M leaves nothing; there it is 1, so that a
-// flat field with w = 1 is an image, and its error the share of the range of colours.
+// with the weight w of colour, 0 to 1, and the range M of the valid heights: the full range of colours counts as much
+// as the full range of heights. If all heights are equal, the paper's M is 0; here it is 1 then, so that a flat field
+// with w = 1 is an image, with its error as a share of the range of colours.
 //
 // Immutable after Make: safe to use from many threads at once.
 #pragma once
@@ -30,9 +30,9 @@ using ColorSample = std::array<std::uint8_t, 4>;
 
 class ExtendedField {
  public:
-  // `colors` has as many samples as `heights`, in the same order. A sample without a height is a void, whatever its
-  // colour. One without a colour is judged by its height alone. Refuses another number of colours, a weight that is not
-  // from 0 to 1, and colours none of which is known.
+  // `colors` has one element per height, in the same order. A sample without a height is a void, whatever its colour.
+  // The error of a sample without a colour is that of its height alone. Refuses a wrong number of colours, a weight
+  // outside 0 to 1, and colours of which none is known.
   static Result<ExtendedField> Make(HeightField heights, std::vector<ColorSample> colors, double color_weight);
 
   const HeightField& heights() const { return heights_; }
@@ -44,11 +44,11 @@ class ExtendedField {
   }
   static bool IsKnown(const ColorSample& color) { return color[3] != 0; }
 
-  // The known colour nearest to a position, ties to the smaller row, then column. Looks at all samples.
+  // The known colour nearest to a position; ties go to the smaller row, then column. Searches all samples.
   Color NearestColor(int x, int y) const;
 
-  // The error of a sample that is missed by so many metres, and by so many 255ths of the range in the sum of its
-  // colours.
+  // The combined error for a height difference in metres and the sum of the differences in red, green and blue, in
+  // 255ths of the range.
   double Error(double metres, double levels) const { return height_weight_ * metres + level_weight_ * levels; }
   double color_weight() const { return color_weight_; }
 

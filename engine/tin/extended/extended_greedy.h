@@ -1,10 +1,10 @@
 // Greedy insertion over an extended height field: triangles that follow heights and colours at once.
 //
-// Garland and Heckbert (1997), section 3.5, with algorithm III of section 3.3: every triangle is four planes, of z, r,
-// g and b, and its candidate is the sample with the largest combined error (extended_field.h). The triangulation is
-// Delaunay. Every valid sample counts by this one formula, those on the border included: two fields with a border in
-// common need not choose the same vertices on it. The result is a function of the field alone; equal errors are ordered
-// by their samples, row by row.
+// Garland and Heckbert (1997), section 3.5, with algorithm III of section 3.3: a triangle has four planes, of z, r, g
+// and b, and its candidate is the sample with the largest combined error (extended_field.h). The triangulation is
+// Delaunay. All valid samples have this one error, those on the border included: two fields that share a border need
+// not choose the same vertices on it. The result depends on the field alone; samples with equal errors are ordered row
+// by row.
 //
 // Not thread-safe; different objects are independent.
 #pragma once
@@ -31,8 +31,8 @@ struct ExtendedGoal {
 
 struct ColoredMesh {
   TinMesh tin;
-  // By vertex: the sample's. One without a known colour took, to the nearest level, what the mesh showed there when it
-  // was inserted; a corner takes the nearest known colour.
+  // By vertex: the colour of its sample. If that is not known: the colour of the mesh at this position when the vertex
+  // was inserted, rounded to 8 bits; at a corner of the field, the nearest known colour.
   std::vector<Color> colors;
 };
 
@@ -41,8 +41,9 @@ class ExtendedGreedy {
   // Starts with the two triangles of the field's corners. `field` must outlive this object.
   explicit ExtendedGreedy(const ExtendedField& field);
 
-  // Inserts samples, worst first, until a goal is met. A later call with a tighter goal goes on from there and ends in
-  // the mesh that one call with that goal would have made. False if stopped; the mesh is then valid but unfinished.
+  // Inserts samples, worst first, until a goal is met. A later call with a tighter goal continues from there; the mesh
+  // is the one that a single call with that goal would have made. Returns false if stopped; the mesh is then valid but
+  // unfinished.
   bool Run(const ExtendedGoal& goal, std::stop_token stop = {});
 
   // The largest combined error of all samples, rounded up to a float.

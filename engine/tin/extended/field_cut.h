@@ -1,11 +1,10 @@
-// One mesh of a large field from many small ones: the field is cut into blocks that share a row or column of samples,
-// each block is triangulated on its own, and the meshes are joined (block_joiner.h).
+// One mesh of a large field from many small ones. The field is cut into blocks that share a row or column of samples.
+// Each block is triangulated on its own, and the meshes are joined (block_joiner.h).
 //
-// A small block stays in the processor's second cache, and blocks can be meshed on as many threads as there are. Their
-// edges match vertex by vertex because the vertices on a border are a function of the border's samples alone
-// (greedy.h). Where a field is cut depends on the field and the error, never on threads, and so does the joined mesh.
-// It keeps the bound and is Delaunay within every block. The price are vertices along the borders that a run on the
-// whole field would not have needed.
+// A small block fits the processor's second-level cache, and blocks can be meshed on many threads. The edges of blocks
+// match vertex by vertex, because the vertices on a border depend on the border's samples alone (greedy.h). The cut
+// depends on the field and the error, never on threads, and so does the joined mesh. The mesh keeps the error bound and
+// is Delaunay within every block. The cost is vertices along the borders that a run on the whole field would not need.
 #pragma once
 
 #include <cstddef>
@@ -30,13 +29,13 @@ struct FieldBlock {
 // Where a field is cut. Immutable: safe to read from many threads at once.
 class FieldCut {
  public:
-  // Into blocks as equal as they can be, of block_cells samples a side give or take a third; a side shorter than that
-  // is not cut. Precondition: sides of 2 to HeightField::kMaxSide, block_cells >= 1.
+  // Cuts into blocks of about equal size, block_cells samples a side within a third. A shorter side is not cut.
+  // Precondition: sides of 2 to HeightField::kMaxSide, block_cells >= 1.
   FieldCut(int width, int height, int block_cells);
 
   // The smallest blocks, from about 257 samples a side up, with few enough vertices on their borders for a mesh to
-  // max_error_m; the whole field as one block where no cut has, where the mesh will be small, and where heights and
-  // mesh fit the processor's cache as they are. Reads the samples along the cuts only.
+  // max_error_m. The whole field is one block if no cut has few enough, if the mesh will be small, or if heights and
+  // mesh fit the processor's cache uncut. Reads only the samples along the cuts.
   static FieldCut For(const HeightField& field, double max_error_m);
 
   // Blocks lie row by row, along x first.
@@ -52,10 +51,10 @@ class FieldCut {
   std::vector<int> columns_, rows_;  // where blocks begin, and the last sample
 };
 
-// The mesh of one block to an error, in the block's own coordinates; nothing when stopped. Corners that are void have
-// the height that HeightField::VertexHeight gives them in the whole field, so that neighbours agree on it. Copies the
-// block's samples, unless the block is the field. Of the options the criterion counts; borders inside the field have
-// their own. Safe to call from many threads at once.
+// The mesh of one block to an error, in the block's own coordinates; nothing if stopped. Void corners have the height
+// that HeightField::VertexHeight gives them in the whole field, so that neighbours agree on it. Copies the block's
+// samples, unless the block is the field. Of the options only the criterion is used; borders inside the field have
+// their own options. Safe to call from many threads at once.
 std::optional<TinMesh> MeshBlock(const HeightField& field, const FieldBlock& block, double max_error_m,
                                  GreedyOptions options = {}, std::stop_token stop = {});
 

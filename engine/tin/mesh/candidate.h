@@ -7,7 +7,7 @@ namespace terrace::tin {
 
 inline constexpr std::uint32_t kNoSample = 0xFFFFFFFF;
 
-// The default is "none": every real candidate comes before it.
+// The default value means "no candidate". Every real candidate precedes it.
 struct Candidate {
   double error = 0;                  // metres, weighted; > 0 unless there is none
   std::uint32_t sample = kNoSample;  // its number (SampleNumber)

@@ -1,14 +1,14 @@
-// The queue of greedy insertion: one candidate per triangle slot, and which one comes first.
+// The queue of greedy insertion: one candidate per triangle slot, and the first candidate of all.
 //
-// Most candidates are replaced before their turn comes, so only the foremost are kept in order: those at or above a
-// threshold, in a short sorted array, the run. One sweep over all errors finds and sorts them; what comes to the
-// threshold later is put where it belongs. What stays below costs one store, and an entry whose slot has changed since
-// is dropped when its turn comes. When none is left, the next sweep lowers the threshold; when there are too many, the
-// threshold rises. No back pointers from the slots, and the order is exact: larger error first, then smaller number of
-// the sample, then, where a sample on an edge is the worst of both of its triangles, the larger slot.
+// Most candidates are replaced before their turn. Therefore only the candidates with errors at or above a threshold are
+// kept in order, in a short sorted array, the run. A sweep over all errors finds and sorts them. A later candidate at
+// or above the threshold is inserted into the run; one below it costs a single store. An entry whose slot has changed
+// since is dropped when its turn comes. If the run is empty, the next sweep lowers the threshold; if it is too long,
+// the threshold rises. Slots need no back pointers. The order is exact: larger error first, then the smaller sample
+// number, then the larger slot, if a sample on an edge is the worst of both of its triangles.
 //
-// Errors are kept as floats, rounded up: the largest is never understated, and errors that differ by less are ordered
-// by their samples.
+// Errors are kept as floats, rounded up: the largest error is never understated. Errors that round to the same float
+// are ordered by their samples.
 #pragma once
 
 #include <algorithm>
@@ -34,10 +34,10 @@ class CandidateQueue {
     Reserve(slot + std::size_t{1});
     if (Put(slot, candidate)) Insert(slot);
   }
-  // The same for many slots, each of them once: Set(slots[i], candidate(i)). Precondition: there is room for them all.
+  // Set(slots[i], candidate(i)) for all i. Preconditions: the slots are distinct and reserved.
   template <typename CandidateOf>
   void SetAll(const std::uint32_t* slots, std::size_t count, CandidateOf&& candidate) {
-    // Which of them belong into the run is collected without a branch, for it cannot be predicted.
+    // Collects the slots that belong into the run without a branch, which would be mispredicted.
     std::array<std::uint32_t, 64> foremost;
     for (std::size_t first = 0; first < count; first += foremost.size()) {
       std::size_t found = 0;
@@ -57,7 +57,7 @@ class CandidateQueue {
 
   // The slot whose candidate precedes all others; kNoSlot when there is no candidate at all.
   std::uint32_t Winner();
-  // A slot whose candidate is likely to win after `ahead` others; kNoSlot if unknown.
+  // The slot whose turn is likely to come after `ahead` others; kNoSlot if unknown.
   std::uint32_t Upcoming(std::size_t ahead) const {
     return run_begin_ + ahead < run_.size() ? run_[run_begin_ + ahead].slot : kNoSlot;
   }
@@ -67,7 +67,7 @@ class CandidateQueue {
   // The smallest float that is not below a non-negative error.
   static float RoundUp(double error) {
     const auto nearest = static_cast<float>(error);
-    const std::uint32_t above = static_cast<double>(nearest) < error ? 1 : 0;  // added: a branch would be a coin toss
+    const std::uint32_t above = static_cast<double>(nearest) < error ? 1 : 0;  // no branch: mispredicted
     return std::bit_cast<float>(std::bit_cast<std::uint32_t>(nearest) + above);
   }
 

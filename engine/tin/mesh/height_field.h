@@ -1,8 +1,8 @@
-// A rectangular grid of height samples: what the mesher approximates.
+// A rectangular grid of height samples: the input of the mesher.
 //
 // Coordinates: x is the column, y the row; a sample is (x, y) with 0 <= x < width, 0 <= y < height, stored row by row.
-// Counter-clockwise means counter-clockwise in these axes. Whether row 0 lies in the north or in the south is the
-// caller's business: tiles put row 0 in the SOUTH, rasters read from files put it in the NORTH.
+// Counter-clockwise means counter-clockwise in these axes. The caller decides where row 0 is: in tiles it is in the
+// SOUTH, in rasters read from files in the NORTH.
 #pragma once
 
 #include <cmath>
@@ -20,10 +20,10 @@ class HeightField {
   // Coordinates stay below 2^15, which keeps the in-circle predicate inside 64 bits (predicates.h).
   static constexpr int kMaxSide = 1 << 15;
 
-  // `heights` has width * height values in metres, row by row; with a capacity of 32 more a row they are not copied,
-  // unless there are fewer than 8 rows. NaN, infinities and whatever the caller turned into NaN are voids: they count
-  // in no error and lend their value to no vertex. Refuses fields smaller than 2 x 2, larger than kMaxSide a side, with
-  // a wrong number of values, or without a single valid sample.
+  // `heights` has width * height values in metres, row by row. It is not copied if it has at least 8 rows and a
+  // capacity for 32 more values per row. NaN and infinities are voids. Voids count in no error, and no vertex takes its
+  // height from one. Refuses fields that are smaller than 2 x 2 or larger than kMaxSide on a side, that have a wrong
+  // number of values, or no valid sample.
   static Result<HeightField> Make(int width, int height, std::vector<float> heights);
 
   int width() const { return width_; }
@@ -35,21 +35,22 @@ class HeightField {
   float At(SamplePosition sample) const { return At(sample.x, sample.y); }
   const float* Row(int y) const { return heights_.data() + static_cast<std::size_t>(y) * stride_; }
 
-  // Samples from one row to the next. Scans load whole vectors: 16 samples may be read from any sample that is not in
-  // the first or last row, and from fields below 16 x 8 eight rows more than there are. What lies beyond is any value.
+  // Distance between rows, in samples. Scans load whole vectors: they may read 16 samples from any sample that is not
+  // in the first or last row, and in fields below 16 x 8 eight rows more than the field has. The values read there are
+  // arbitrary.
   int stride() const { return static_cast<int>(stride_); }
 
-  // A power of two that all heights are multiples of, metres; 0 if none is known. Sums of heights, and products by
-  // integers, are exact in single precision as long as they stay below 2^24 of it.
+  // A power of two, in metres; all heights are multiples of it. 0 if none is known. Sums of heights and their products
+  // with integers are exact in single precision while they stay below 2^24 quanta.
   float quantum() const { return quantum_; }
 
-  // Doubled areas of triangles up to this one, times how far a sample inside is from the plane of three samples, are
-  // below 2^31 quanta, and differences of heights below 2^22: scans may count in integers. 0 if they may not, or need
-  // not.
+  // The largest doubled area of triangles that scans may process in integers: its product with the distance of a sample
+  // from the triangle's plane is below 2^31 quanta, and differences of heights are below 2^22. 0 if scans cannot use
+  // integers or have no need to.
   float most_area_in_integers() const { return most_area_in_integers_; }
 
-  // The height a vertex at (x, y) gets: the sample, or where that is void (only corners and seeds can be) the height of
-  // the nearest valid sample, ties to the smaller row, then column.
+  // The height of a vertex at (x, y): the sample, or the nearest valid sample if that is void, which only corners and
+  // seeds can be. Ties go to the smaller row, then column.
   float VertexHeight(int x, int y) const {
     const float own = At(x, y);
     return std::isnan(own) ? NearestHeight(x, y) : own;

@@ -1,8 +1,9 @@
-// The hole that an inner vertex leaves: a polygon that sees the vertex from every side, and the fans that can fill it.
+// The hole that the removal of an inner vertex leaves, and the fans of triangles that can fill it. The hole is a
+// polygon, star-shaped around the vertex.
 //
-// A fan has an apex among the corners of the hole and joins it to all others: apex, apex + i + 1, apex + i + 2 is its
-// triangle i, cyclic. Once all of them turn counter-clockwise, they cover the hole exactly once: their signed areas add
-// up to its winding number, which is one inside.
+// A fan has an apex among the corners of the hole and joins it to all others. Its triangle i is (apex, apex + i + 1,
+// apex + i + 2), cyclic. If all triangles are counter-clockwise, they cover the hole exactly once: their signed areas
+// add up to its winding number, which is 1 inside.
 //
 // Not thread-safe; different objects are independent.
 #pragma once
@@ -19,9 +20,9 @@ namespace terrace::tin {
 
 class Hole {
  public:
-  // Larger holes are left alone: about six sides are usual, and the fans of a hole take the square of its sides to try.
-  // Not critical: with 16 or 64 instead, two of the paper's DEMs end within one vertex of the same count at 1, 5 and
-  // 20 m.
+  // Larger holes are not filled: a hole usually has six sides, and trying all of its fans takes time quadratic in the
+  // number of sides. The value is not critical: with 16 or 64, two of the paper's DEMs end within one vertex of the
+  // same count at 1, 5 and 20 m.
   static constexpr std::size_t kMaxSides = 32;
 
   // `height` is the vertex's sample, NaN where that is void. Then the corners, counter-clockwise, at most kMaxSides.
@@ -44,8 +45,8 @@ class Hole {
   Corner corner(std::size_t i) const { return {positions_[i].x, positions_[i].y, heights_[i]}; }
   SamplePosition position(std::size_t i) const { return positions_[i]; }
 
-  // The apexes of all different fans that turn counter-clockwise and are at most `max_error` off at the vertex, nearest
-  // there first, ties to the earlier apex. Valid until the next call.
+  // The apexes of the distinct fans that are counter-clockwise and have an error of at most `max_error` at the vertex.
+  // Ordered by this error, ties by apex. Valid until the next call.
   std::span<const std::size_t> Fans(double max_error);
 
  private:

@@ -1,4 +1,4 @@
-// What is recorded of a run of insertions (refinement.h).
+// The record of a run of insertions (refinement.h).
 #pragma once
 
 #include <algorithm>
@@ -7,20 +7,20 @@
 
 namespace terrace::tin {
 
-// Index: a vertex, an insertion or the size of a ring.
+// Index: an integer that holds vertices, insertions and sizes of rings.
 template <typename Index>
 struct InsertionRecord {
   static constexpr Index kNever = static_cast<Index>(-1);
   static constexpr Index kOpen = static_cast<Index>(Index{1} << (8 * sizeof(Index) - 1));
 
-  std::vector<Index> sizes;    // by insertion: triangles made; with kOpen: the ring is open and has one vertex more
+  std::vector<Index> sizes;    // by insertion: triangles made; kOpen added: an open ring, with one vertex more
   std::vector<Index> rings;    // the rings, one after the other; vertex 4 + i is that of insertion i
-  std::vector<Index> removed;  // by triangle, the first two those of the field's corners: the insertion that removed it
+  std::vector<Index> removed;  // by triangle, those of the field's corners first: the insertion that removed it
 
   friend bool operator==(const InsertionRecord&, const InsertionRecord&) = default;
 };
 
-// The same record with other indices, which must suffice.
+// The same record with another type of index. Precondition: all values fit.
 template <typename To, typename From>
 InsertionRecord<To> ConvertTo(const InsertionRecord<From>& record) {
   using Source = InsertionRecord<From>;

@@ -1,4 +1,4 @@
-// The samples of a height field before it is made: which are voids, and between what heights the others lie.
+// Voids and the range of heights of samples, before a height field is made of them.
 #pragma once
 
 #include <cstddef>
@@ -6,11 +6,12 @@
 namespace terrace::tin {
 
 struct ValidHeights {
-  float lowest = 0, highest = 0;  // metres; of no valid sample: lowest > highest
+  float lowest = 0, highest = 0;  // metres; no valid sample: lowest > highest
   std::size_t voids = 0;
 };
 
-// Makes a void, NaN, of all that is not finite, and tells of the rest. Safe to call from many threads at once.
+// Replaces values that are not finite by NaN, which means a void, and returns the range of the others. Safe to call
+// from many threads at once.
 ValidHeights MarkVoids(float* heights, std::size_t count);
 
 }  // namespace terrace::tin

@@ -12,8 +12,8 @@ struct Corner {
   double z = 0;
 };
 
-// Sorted by row, then column: makes everything that is computed from a triangle a function of its corners alone, in
-// whatever order a triangulation stores them.
+// Sorts corners by row, then column. What is computed from sorted corners depends on the triangle alone, not on the
+// order in which a triangulation stores its corners.
 constexpr std::array<Corner, 3> SortedByRow(std::array<Corner, 3> corners) {
   const auto before = [](const Corner& a, const Corner& b) { return a.y < b.y || (a.y == b.y && a.x < b.x); };
   if (before(corners[1], corners[0])) std::swap(corners[0], corners[1]);
@@ -22,9 +22,9 @@ constexpr std::array<Corner, 3> SortedByRow(std::array<Corner, 3> corners) {
   return corners;
 }
 
-// Evaluated at every sample from the same closed form, never stepped: rounding does not depend on the way there. With
-// float heights the products below stay far from overflow (2^128 * 2^15), and integer heights below 2^22 make all
-// numerators exact.
+// A plane is evaluated at every sample from the same closed form, never by steps, so that rounding does not depend on
+// the order of evaluation. Float heights keep the products below far from overflow (2^128 * 2^15); with integer heights
+// below 2^22 all numerators are exact.
 struct Plane {
   explicit constexpr Plane(const std::array<Corner, 3>& sorted) : origin(sorted[0]) {
     const double dx1 = sorted[1].x - origin.x, dy1 = sorted[1].y - origin.y, dz1 = sorted[1].z - origin.z;

@@ -1,4 +1,4 @@
-// The two ways to cut a convex quadrilateral into triangles: their shape and their bend.
+// The two ways to divide a convex quadrilateral into two triangles: their shape quality and their bend.
 //
 //        w           The quadrilateral (p, u, w, v), counter-clockwise, seen from the point p that is being inserted.
 //       / \          It is cut by u-v into (u, v, p) and (v, u, w), or by p-w into (u, w, p) and (w, v, p).
@@ -22,17 +22,17 @@ struct Quadrilateral {
   float height = 0;  // of p, metres
 };
 
-// Of each cut the squared quality, times one number for both. Larger is better. The quality is the geometric mean, over
-// the two triangles, of area over diameter: the root of the paper's SHAPE_QUALITY (section 4.3). Scape's diameter is
-// the longer side of the bounding box; this one is a quarter of the shorter side more: the diagonal within 12 %.
+// The squared quality of each way, times a common factor. Larger is better. The quality is the geometric mean of area
+// over diameter of the two triangles, the root of the paper's SHAPE_QUALITY (section 4.3). Scape's diameter is the
+// longer side of the bounding box. This one adds a quarter of the shorter side, which is within 12 % of the diagonal.
 struct ShapeQuality {
   double uv = 0;
   double pw = 0;
 };
 
-// Four times the diameters of (u, w, p), (w, v, p), (u, v, p) and (v, u, w), all at once: coordinates stay below 2^15,
-// so that offsets and extents fit 16 bits. One by one, some of the many comparisons would be branches that nothing
-// could predict.
+// Four times the diameters of (u, w, p), (w, v, p), (u, v, p) and (v, u, w), computed together: coordinates are below
+// 2^15, so that offsets and extents fit 16 bits. Computed separately, some of the comparisons would be branches that
+// are mispredicted.
 using ShortVector = std::int16_t __attribute__((vector_size(16)));
 using IntVector = std::int32_t __attribute__((vector_size(16)));
 inline IntVector QuadrupleDiameters(const RingVertex& u_vertex, const RingVertex& v_vertex,
@@ -57,7 +57,7 @@ inline IntVector QuadrupleDiameters(const RingVertex& u_vertex, const RingVertex
 inline ShapeQuality ShapeQualityOf(const Quadrilateral& q) {
   const double uvp = Cross(q.u, q.v), uwp = Cross(q.u, q.w), wvp = Cross(q.w, q.v);
   const IntVector diameters = QuadrupleDiameters(q.u, q.v, q.w);
-  // Instead of a division by the one, a multiplication by the other. Below 2^36.
+  // Multiplies by the other diameter instead of dividing by the own one. Below 2^36.
   const auto of_pw = static_cast<double>(std::int64_t{diameters[0]} * diameters[1]);
   const auto of_uv = static_cast<double>(std::int64_t{diameters[2]} * diameters[3]);
   return {uvp * (uwp + wvp - uvp) * of_pw, uwp * wvp * of_uv};
@@ -80,16 +80,16 @@ inline double CosineBetween(const Normal& a, const Normal& b) {
   return (a.x * b.x + a.y * b.y + 1) / std::sqrt((a.x * a.x + a.y * a.y + 1) * (b.x * b.x + b.y * b.y + 1));
 }
 
-// How far the two triangles of each cut are from one plane: twice the squared sine of half the angle between their
-// normals (Dyn, Levin and Rippa, "Data Dependent Triangulations for Piecewise Linear Interpolation", 1990), across the
-// diagonal alone.
+// The angle between the two triangles of each way, across the diagonal alone: twice the squared sine of half the angle
+// between their normals (Dyn, Levin and Rippa, "Data Dependent Triangulations for Piecewise Linear Interpolation",
+// 1990).
 struct Bends {
   double uv = 0;
   double pw = 0;
 };
 inline Bends BendsOf(const Quadrilateral& q) {
   const RingVertex p{0, 0, 0, q.height};
-  // Rounding may take a cosine beyond 1.
+  // Rounding may make a cosine larger than 1.
   const auto bend = [](const Normal& a, const Normal& b) { return std::max(0.0, 1 - CosineBetween(a, b)); };
   return {bend(Normal(q.u, q.v, p), Normal(q.v, q.u, q.w)), bend(Normal(q.u, q.w, p), Normal(q.w, q.v, p))};
 }

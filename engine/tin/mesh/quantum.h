@@ -1,12 +1,12 @@
-// What heights are multiples of: where sums of them are exact in single precision, scans need no other.
+// The quantum of heights: a common divisor of all samples. It decides where single precision is exact in scans.
 #pragma once
 
 #include <cstddef>
 
 namespace terrace::tin {
 
-// A power of two, metres, that all of the heights are multiples of: 1, 2^-10 or 2^-14, the largest that fits; 0 if none
-// does. NaN is a multiple of anything.
+// The largest of 1, 2^-10 and 2^-14 metres that all heights are multiples of; 0 if none is. NaN is a multiple of
+// anything.
 float QuantumOf(const float* heights, std::size_t count);
 
 }  // namespace terrace::tin

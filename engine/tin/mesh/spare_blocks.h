@@ -1,9 +1,8 @@
-// Memory for the large arrays of a run: it grows without being copied, takes no more than what was written to, and is
-// kept by the thread for its next run. Pages that the system hands out anew, and clears, cost a small run more than its
-// queue does.
+// Memory for the large arrays of a run. It grows without copies, occupies only what was written to, and is kept by the
+// thread for its next run. New pages must be cleared by the system, which costs a small run more than its queue does.
 //
-// Blocks come from the system (mmap), so that room which is never used is an address and no memory. They may be given
-// back by another thread than the one that took them, which then keeps them.
+// Blocks come from the system (mmap): room that is never used takes addresses and no memory. A block may be given back
+// by another thread than the one that took it; that thread then keeps it.
 #pragma once
 
 #include <algorithm>
@@ -21,18 +20,19 @@ inline constexpr std::size_t kMaxSpareBytes = std::size_t{8} << 20;
 
 // A block of at least so many bytes, aligned to a cache line; throws std::bad_alloc.
 void* TakeBlock(std::size_t bytes);
-// One with the first `used` bytes of `block`, which is given back or becomes that block.
+// Returns a block of the new size with the first `used` bytes of `block`: `block` itself, grown, or another one in its
+// place.
 void* GrowBlock(void* block, std::size_t used, std::size_t bytes);
 void GiveBlock(void* block) noexcept;
-// The same, but nobody keeps it: the system has its memory at once.
+// The same, but the thread does not keep it: its memory goes back to the system at once.
 void ReleaseBlock(void* block) noexcept;
 
-// What this thread keeps, and an end to it: to measure what a run takes.
+// The bytes that this thread keeps, and their release. For measurements of a run's memory.
 std::size_t SpareBytes();
 void ReleaseSpareBlocks();
 
-// An array of plain values in such a block. Room to reserve is cheap, so reserve for the largest likely size: runs of
-// fields of one size then find the blocks of the run before.
+// An array of plain values in such a block. Reserving is cheap: reserve for the largest likely size. Runs of fields of
+// one size then find blocks that fit.
 template <typename T>
 class LargeArray {
   static_assert(std::is_trivially_copyable_v<T> && std::is_trivially_destructible_v<T>);
@@ -68,19 +68,19 @@ class LargeArray {
                                                  : GrowBlock(values_, size_ * sizeof(T), capacity * sizeof(T)));
     capacity_ = capacity;
   }
-  // Values that are added are whatever the memory held.
+  // Values that are added are uninitialized.
   void GrowBy(std::size_t count) {
     if (count > capacity_ - size_) [[unlikely]]
       reserve(std::max(size_ + count, 2 * capacity_));
     size_ += count;
   }
-  // The same for a size that is not smaller than the present one, with a value for those added.
+  // Grows to a size, which is not smaller than the present one, and sets the values that are added.
   void GrowTo(std::size_t size, const T& value) {
     const std::size_t before = size_;
     GrowBy(size - before);
     std::fill(values_ + before, values_ + size, value);
   }
-  // Empties the array, whose memory goes back to the system and not to the thread: for one that a large run has
+  // Empties the array and gives its memory back to the system, not to the thread. For an array that a large run has
   // outgrown.
   void Release() {
     if (values_ != nullptr) ReleaseBlock(values_);

@@ -45,9 +45,9 @@ class Ring {
   std::vector<float> heights = std::vector<float>(kPadding);                    // metres
 };
 
-// Triangle i, 0 <= i < count, joins ring[i], ring[i + 1] and the centre, counter-clockwise, and is stored with its
-// corners in that order. Closed: ring[count] repeats ring[0]. Open, when the centre lies on the border: the ring begins
-// and ends on that border.
+// The star of a vertex. Triangle i, 0 <= i < count, has the corners ring[i], ring[i + 1] and the centre,
+// counter-clockwise and stored in this order. The ring of a closed star has ring[count] equal to ring[0]. A star whose
+// centre lies on the border is open: its ring begins and ends on that border.
 struct Star {
   VertexId centre = 0;
   std::int32_t x = 0, y = 0;  // of the centre
@@ -55,16 +55,16 @@ struct Star {
   bool is_closed = true;
   bool has_border = false;  // some triangle may have an edge on the border
   std::size_t count = 0;
-  // By bits, of the first kMaxLeftOut triangles: those that scans skip. So a ring may hold several fans; what joins
-  // two of them is no triangle.
+  // A bit for each of the first kMaxLeftOut triangles: set for those that scans skip. A ring may thus hold several
+  // fans; the triangle between the end of one and the beginning of the next is left out.
   static constexpr std::size_t kMaxLeftOut = 32;
   std::uint32_t left_out = 0;
-  // Of an open one: the edge of the walk's outline that holds the centre. The ring begins after it.
+  // Open stars: the edge of the walk's outline that contains the centre. The ring begins after it.
   std::size_t gap = 0;
   Ring ring;
-  std::vector<TriangleId> triangles;  // `count` of them are valid; those of an insertion are padded as a ring is
+  std::vector<TriangleId> triangles;  // the first `count` are valid; padded after an insertion, as a ring is
   std::vector<HalfEdgeId> outside;    // by triangle: the twin of the ring's edge
-  std::size_t removed_count = 0;      // the first slots of `triangles` are those of triangles that were removed
+  std::size_t removed_count = 0;      // the first slots in `triangles`: those of removed triangles
 
   bool IsLeftOut(std::size_t i) const { return i < kMaxLeftOut && (left_out >> i & 1) != 0; }
 };

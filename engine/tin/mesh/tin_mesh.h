@@ -14,7 +14,7 @@ struct SamplePosition {
   friend bool operator==(SamplePosition, SamplePosition) = default;
 };
 
-// A sample's number: ordered by rows like a row-major index, but its position is known without a division.
+// A sample's number. Numbers are ordered as row-major indices are, and their position is found without a division.
 constexpr std::uint32_t SampleNumber(int x, int y) {
   return static_cast<std::uint32_t>(y) << 16 | static_cast<std::uint32_t>(x);
 }

@@ -1,11 +1,13 @@
-// The triangles of a triangulation, by slot, as small as they go: insertions jump about in them, and what does not fit
-// the processor's second cache makes them wait.
+// The triangles of a triangulation, by slot, stored as compactly as possible: insertions access them at random, and
+// misses of the second-level cache are slow.
 //
-// Two forms with the same calls, each with its own half-edge for none. Narrow, while all vertex ids are below 2^16: 16
-// bytes a triangle,
-//   corners: 4 x 16 bits of the first word, the last one first as well, so that the corner across from half-edge i is
-//   the i-th; twins: 3 x 21 bits of the second (half-edge 4t + i).
-// A triangulation of 2^16 vertices has fewer than 2^17 triangles, whose half-edges take 19 bits. Wide: 24 bytes.
+// There are two forms with the same functions. Each has its own value for "no half-edge". The narrow form takes 16
+// bytes per triangle and serves while all vertex ids are below 2^16:
+//   corners: 4 x 16 bits of the first word. The last corner is also stored first, so that the corner across from
+//   half-edge i is the i-th.
+//   twins: 3 x 21 bits of the second word (half-edge 4t + i).
+// A triangulation of 2^16 vertices has fewer than 2^17 triangles, whose half-edges take 19 bits. The wide form takes 24
+// bytes.
 #pragma once
 
 #include <array>
@@ -20,7 +22,7 @@ namespace terrace::tin {
 
 inline constexpr std::uint32_t kNoEdge = 0xFFFFFFFF;
 
-// 0 -> 1 -> 2 -> 0 from tables of two bits each: a comparison would be a branch that cannot be predicted.
+// 0 -> 1 -> 2 -> 0, from tables of two bits each: a comparison would be a mispredicted branch.
 constexpr unsigned NextCorner(unsigned i) { return (0b001001U >> (2 * i)) & 3; }
 constexpr unsigned PreviousCorner(unsigned i) { return (0b010010U >> (2 * i)) & 3; }
 

@@ -1,14 +1,14 @@
-// The topology of a triangulation of a rectangle of samples: insert a point, get the star of triangles around it.
+// The topology of a triangulation of a rectangle of samples. Inserting a point returns the star of triangles around it.
 //
-// Triangle t owns the half-edges 4t, 4t+1, 4t+2, counter-clockwise: half-edge 4t+i runs from its corner i to the next
-// one, and its twin is the same edge seen from the neighbour, kNone on the border of the rectangle. Slots are never
-// freed: an insertion reuses those of the triangles that it removes, and appends one or two.
+// Triangle t has the half-edges 4t, 4t+1, 4t+2, counter-clockwise. Half-edge 4t+i runs from corner i to the next
+// corner. Its twin is the same edge in the neighbouring triangle, kNone on the border of the rectangle. Slots are never
+// freed: an insertion reuses the slots of the triangles that it removes, and appends one or two.
 //
-// An insertion removes a cavity, all triangles that the new point replaces, and joins the cavity's outline to the
-// point. Where the cavity ends is the caller's criterion: by the in-circle test the result is Delaunay (Bowyer 1981,
-// Watson 1981; the same triangles as Lawson's flips), by a test of errors it is data-dependent. Four points on one
-// circle keep the diagonal they have. Everything is decided in integers: the triangulation is a function of the
-// sequence of insertions and of the criterion alone.
+// An insertion removes a cavity, the set of triangles that the new point replaces, and joins the cavity's outline to
+// the point. The caller's criterion decides which triangles belong to the cavity. With the in-circle test the result is
+// Delaunay (Bowyer 1981, Watson 1981; the same triangles as Lawson's flips); with a test of errors it is
+// data-dependent. Four points on one circle keep their diagonal. All decisions are made in integers: the triangulation
+// depends on the sequence of insertions and on the criterion alone.
 //
 // Not thread-safe; different objects are independent.
 #pragma once
@@ -42,10 +42,12 @@ class Triangulation {
     return {{static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)}, field.VertexHeight(x, y)};
   }
 
-  // Room to be made for a mesh of the field: for all of its samples if it is a tile. There may be more.
+  // The number of vertices to reserve for a mesh of the field: all samples if the field is a tile. A mesh may have
+  // more.
   static std::size_t LikelyVertices(const HeightField& field);
 
-  // Two triangles over a rectangle. `corners` are vertices 0 to 3, counter-clockwise from its smallest x and y.
+  // Two triangles over a rectangle. `corners` become vertices 0 to 3: counter-clockwise, the one with the smallest x
+  // and y first.
   explicit Triangulation(const std::array<Vertex, 4>& corners);
 
   // Two triangles over the field.
@@ -54,12 +56,12 @@ class Triangulation {
   // Triangles in the order given. Precondition: they cover a rectangle once, counter-clockwise.
   Triangulation(const std::vector<Vertex>& vertices, const std::vector<std::array<std::uint32_t, 3>>& triangles);
 
-  // Inserts a vertex into `triangle`, which must contain the point inside or on an edge; it must not be a vertex yet.
-  // `absorbs(u, v, w, back)` says whether the triangle (v, u, w) is removed as well: it lies beyond the
-  // outline's edge from u to v, and `back` is that edge seen from there. It must say yes where the point lies on the
-  // edge, and only where w lies strictly between u and v as seen from the point (Sees). `keeps(edge)` is told of every
-  // edge that stays, those on the border too, which are not asked about; they are numbered in their order. The star is
-  // valid until the next insertion.
+  // Inserts a vertex into `triangle`, which must contain the point inside or on an edge. The point must not be a vertex
+  // yet. `absorbs(u, v, w, back)` decides whether the triangle (v, u, w) is removed as well. It lies beyond the edge
+  // u-v of the outline, and `back` is its half-edge for this edge. `absorbs` must return true if the point lies on the
+  // edge, and otherwise only if w lies strictly between u and v as seen from the point (Sees). `keeps(edge)` is called
+  // for every edge that stays, with consecutive numbers, also for border edges, for which `absorbs` is not called. The
+  // star is valid until the next insertion.
   template <typename Absorbs, typename Keeps>
   const Star& Insert(const Vertex& vertex, TriangleId triangle, Absorbs&& absorbs, Keeps&& keeps);
   template <typename Absorbs>
@@ -69,10 +71,10 @@ class Triangulation {
 
   const Star& InsertDelaunay(const Vertex& vertex, TriangleId triangle);
 
-  // The same in steps, for a criterion that asks about several edges at once. First the outline of what `absorbs` takes
-  // alone: the star without its triangles. Whoever calls may then replace edges of it by the two others of the triangle
-  // beyond, which Remove is told of: in the ring, with its last vertex, in `outside`, `count` and `has_border`. At last
-  // the star is filled.
+  // Insert in steps, for a criterion that tests several edges at once. Outline returns the star without its triangles:
+  // the outline of the triangles that `absorbs` accepts. The caller may then replace an edge of it by the other two
+  // edges of the triangle beyond: it calls Remove for this triangle and updates the ring, including its last vertex,
+  // `outside`, `count` and `has_border`. Fill then makes the triangles.
   template <typename Absorbs, typename Keeps>
   Star& Outline(const Vertex& vertex, TriangleId triangle, Absorbs&& absorbs, Keeps&& keeps);
   void Remove(TriangleId t);
@@ -91,18 +93,18 @@ class Triangulation {
     return is_wide_ ? BeyondOf(wide_, outside, point) : BeyondOf(narrow_, outside, point);
   }
 
-  // A triangle that contains the point, inside, on an edge or as a corner, found by a walk from `start`; should the
-  // walk turn in circles, which it can where triangles are not Delaunay, by looking at all of them.
+  // A triangle that contains the point inside, on an edge or as a corner. Found by a walk from `start`. If the walk
+  // cycles, which is possible if the triangles are not Delaunay, all triangles are searched.
   TriangleId Locate(SamplePosition point, TriangleId start) const;
 
   bool IsCorner(SamplePosition point, TriangleId triangle) const;
 
-  // Bring closer to the processor what an insertion into the triangle reads first, and what it reads next, which is
-  // found in what the first has brought.
+  // Prefetch what an insertion into the triangle reads first, and what it reads next. The addresses for the second are
+  // found in the data of the first.
   void PrefetchAround(TriangleId t) const;
   void PrefetchBeyond(TriangleId t) const;
-  // What BeyondOf reads first. Of an edge on the border it is some address, which does no harm. Inline by order: to g++
-  // a function that only prefetches has no effect, and calls of it are left out.
+  // Prefetches what BeyondOf reads first. For a border edge the address is arbitrary, which is harmless. always_inline,
+  // because g++ takes a function that only prefetches for one without effect and drops its calls.
   [[gnu::always_inline]] void PrefetchAcross(HalfEdgeId outside) const {
     const std::size_t t = outside / 4;
     const auto address =
@@ -119,7 +121,7 @@ class Triangulation {
   float height(VertexId vertex) const { return vertices_[vertex].height; }
   std::array<VertexId, 3> triangle(TriangleId t) const { return {corner(4 * t), corner(4 * t + 1), corner(4 * t + 2)}; }
 
-  // The vertex as part of a ring around `from`.
+  // The vertex relative to `from`, as in a ring.
   RingVertex Seen(VertexId vertex, SamplePosition from) const { return Relative(vertices_.data(), vertex, from); }
 
   // The corner where a half-edge starts, and its twin.
@@ -131,7 +133,7 @@ class Triangulation {
   static constexpr HalfEdgeId Next(HalfEdgeId edge) { return (edge & ~HalfEdgeId{3}) + NextCorner(edge % 4); }
 
  private:
-  // An edge of the outline that has not been looked across yet; it starts where the one before it ends.
+  // An edge of the outline that has not been tested yet. It starts at the end of the edge before it.
   struct PendingEdge {
     HalfEdgeId back;
     RingVertex end;

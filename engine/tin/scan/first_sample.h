@@ -1,4 +1,4 @@
-// The first sample of a triangle: what its scan yields where all of them lie on its plane.
+// The first sample of a triangle: the result of its scan if all samples lie on its plane.
 #pragma once
 
 #include <cstddef>

@@ -1,4 +1,4 @@
-// How far the samples of one triangle are from it in the mean: what the root-mean-square goal adds up.
+// Sums of squared distances between samples and a triangle, for the root-mean-square goal.
 #pragma once
 
 #include <array>
@@ -8,9 +8,8 @@
 
 namespace terrace::tin {
 
-// Sum of the squared vertical distances, in square metres, of the samples that ForEachInnerSpan visits. Those on an
-// edge count one half: their other half is in the triangle across. Voids are skipped. Safe to call from many threads at
-// once.
+// Sum of the squared vertical distances, in square metres, of the samples that ForEachInnerSpan visits. Samples on an
+// edge count one half in each of the two triangles. Voids are skipped. Safe to call from many threads at once.
 double SquaredDistances(const HeightField& field, const std::array<Corner, 3>& corners);
 
 }  // namespace terrace::tin

@@ -1,4 +1,4 @@
-// The total of squared errors of a triangulation, kept while triangles change: the root-mean-square goal.
+// The total squared error of a triangulation, updated while triangles change. For the root-mean-square goal.
 #pragma once
 
 #include <cmath>
@@ -8,8 +8,8 @@
 
 namespace terrace::tin {
 
-// Neumaier's compensated summation: millions of additions and removals do not drift, so that the total depends on the
-// triangles there are and not on those there were.
+// Neumaier's compensated summation: the sum does not drift over millions of additions and subtractions, so that the
+// total depends on the present triangles and not on earlier ones.
 class CompensatedSum {
  public:
   void Add(double value) {

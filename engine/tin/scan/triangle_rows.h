@@ -14,9 +14,9 @@ constexpr std::int64_t FloorDivide(std::int64_t n, std::int64_t d) {
 }
 constexpr std::int64_t CeilDivide(std::int64_t n, std::int64_t d) { return -FloorDivide(-n, d); }
 
-// Calls visit(y, first, last) for the rows of a counter-clockwise triangle, ascending, with the columns inside it; none
-// where first > last. A sample on an edge is visited from both sides. In the rows of corners, those are the first or
-// the last column.
+// Calls visit(y, first, last) for each row of a counter-clockwise triangle, ascending, with the first and last column
+// inside it. first > last if the row has none. A sample on an edge is visited for both triangles. In rows of corners,
+// the corners are the first or the last column.
 //
 // Each edge p -> q allows the half-line where
 //   Orientation(p, q, (x, y)) = (q.x - p.x)(y - p.y) - (q.y - p.y)(x - p.x) >= 0.

@@ -1,13 +1,13 @@
 // The worst sample of each triangle of a star: the inner loop of greedy insertion.
 //
-// A triangle's samples are those in its inside and on its edges that may still become vertices: neither its corners,
-// besides which a triangle has no vertices, nor voids, nor the field's border, which is judged by a rule of its own
-// (border.h). With p the triangle's last corner, u and v the others relative to it, D twice its area,
-// A = v_y dz_u - u_y dz_v and B = u_x dz_v - v_x dz_u, the distance of a sample is
+// The samples of a triangle are those inside it and on its edges that may still become vertices. Corners, voids and
+// samples on the field's border are not among them; the border has a rule of its own (border.h). Let p be the
+// triangle's last corner, u and v the other two relative to p, D twice its area, A = v_y dz_u - u_y dz_v and B = u_x
+// dz_v - v_x dz_u. The distance of a sample is
 //   |D (h - z_p) - (A (x - x_p) + B (y - y_p))| / D
-// in double in exactly this form, never stepped, without fused operations, or in single precision or integers where
-// those are known to give the same numbers. The result is the same on every processor, bit for bit, whatever vectors it
-// has; Highway picks the widest at run time. Floats as heights stay far from overflow (2^128 * 2^32).
+// in double in exactly this form, without steps and fused operations. Single precision and integers are used where they
+// give the same result. The result is bit-equal on every processor, whatever its vectors; Highway chooses the widest at
+// run time. Float heights stay far from overflow (2^128 * 2^32).
 //
 // Safe to call from many threads at once.
 #pragma once
@@ -26,15 +26,15 @@ struct PlaneMisfit {
   std::uint32_t sample = kNoSample;  // its number; the smallest of equally distant samples
 };
 
-// Its distance, or 0 where there are no samples. By its sign: a maximum becomes a branch, and whether a triangle has
-// samples cannot be predicted.
+// The distance, or 0 if there are no samples. Computed from the sign: a maximum would become a branch that is
+// mispredicted.
 inline double DistanceOrZero(const PlaneMisfit& misfit) {
   const auto bits = std::bit_cast<std::int64_t>(misfit.distance);
   return std::bit_cast<double>(bits & ~(bits >> 63));
 }
 
-// misfits[i] is that of triangle i of the star; of one that is left out it is anything. Precondition: vertices have the
-// heights of the field, or any where that is void.
+// Sets misfits[i] for each triangle i of the star. Values of triangles that are left out are undefined. Precondition:
+// vertices have the heights of the field's samples, or any height at voids.
 using StarScan = void (*)(const HeightField& field, const Star& star, PlaneMisfit* misfits);
 
 // The scan for this processor.

@@ -1,4 +1,4 @@
-// Which samples a triangle is scanned for: exact integer spans, row by row.
+// The samples that a triangle is scanned for: exact integer spans, row by row.
 #pragma once
 
 #include <algorithm>
@@ -8,11 +8,11 @@
 
 namespace terrace::tin {
 
-// Where an edge that is not horizontal crosses the rows: x = n / dy with integers n = x0 dy + (y - y0) dx and dy > 0.
+// Where an edge that is not horizontal crosses rows: at x = n / dy with integers n = x0 dy + (y - y0) dx and dy > 0.
 //
-// Floor and Ceil are exact with one multiplication. 0 <= n < 2^30 and dy < 2^15, so n * (1 / dy) is off by less than
-// 2^-36. A quotient that is no integer lies at least 2^-15 below the next one: adding 2^-17 lifts an integer that was
-// rounded down above itself, and lifts nothing else over an integer.
+// Floor and Ceil are exact with one multiplication. 0 <= n < 2^30 and dy < 2^15, so the error of n * (1 / dy) is less
+// than 2^-36. A quotient that is not an integer is at least 2^-15 below the next integer. Adding 2^-17 therefore
+// corrects an integer that was rounded down, and moves no other quotient past an integer.
 class EdgeCrossing {
  public:
   EdgeCrossing(const Corner& low, const Corner& high)
@@ -28,9 +28,9 @@ class EdgeCrossing {
   double inverse_;
 };
 
-// Calls visit(y, first, last), rows ascending, for the samples of the closed triangle that are neither its corners nor
-// on the border of a field of `width` columns and `height` rows; first <= last. Samples on an edge are visited from
-// both sides.
+// Calls visit(y, first, last), rows ascending, for the samples of the closed triangle without its corners and without
+// the border of a field of `width` columns and `height` rows; first <= last. Samples on an edge are visited for both
+// triangles.
 template <typename Visit>
 void ForEachInnerSpan(const std::array<Corner, 3>& sorted, double doubled_area, int width, int height, Visit&& visit) {
   const auto& [low, middle, high] = sorted;
