@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "engine/geo/mercator_grid.h"
+#include "engine/geo/tile_cover.h"
 
 namespace terrace::server {
 
@@ -10,12 +11,7 @@ namespace {
 
 // Columns count on beyond the last one, or from below 0.
 bool Touches(const geo::TileRange& a, const geo::TileRange& b) {
-  return a.start_x <= b.end_x + 1 && b.start_x <= a.end_x + 1 && a.start_y <= b.end_y + 1 && b.start_y <= a.end_y + 1;
-}
-
-geo::TileRange Union(const geo::TileRange& a, const geo::TileRange& b) {
-  return {std::min(a.start_x, b.start_x), std::min(a.start_y, b.start_y), std::max(a.end_x, b.end_x),
-          std::max(a.end_y, b.end_y)};
+  return !geo::IsEmpty(geo::Common({a.start_x - 1, a.start_y - 1, a.end_x + 1, a.end_y + 1}, b));
 }
 
 // Grows `box` by the ranges that touch it, all around the Earth.
@@ -26,7 +22,7 @@ geo::TileRange Grown(geo::TileRange box, const std::vector<geo::TileRange>& rang
     for (const geo::TileRange& range : ranges) {
       for (const std::int64_t turn : {-columns, std::int64_t{0}, columns}) {
         const geo::TileRange turned{range.start_x + turn, range.start_y, range.end_x + turn, range.end_y};
-        if (Touches(box, turned) && box.end_x - box.start_x < columns) box = Union(box, turned);
+        if (Touches(box, turned) && box.end_x - box.start_x < columns) box = geo::Hull(box, turned);
       }
     }
     if (box == before) break;

@@ -4,8 +4,8 @@
 #include <thread>
 #include <vector>
 
-#include "tests/server/resident_memory.h"
 #include "tests/server/server_fixture.h"
+#include "tests/support/resident_memory.h"
 
 namespace terrace::server {
 namespace {
@@ -97,7 +97,7 @@ TEST_F(Framing, FortyMegabytesOfHeaderCostNothing) {
   Start();
   Fetch(port(), "/livez");
   const std::string piece(1 << 20, 'b');
-  const long before = ResidentKib();
+  const long before = test_support::ResidentKib();
   RawClient client(port());
   client.Send("GET /livez HTTP/1.1\r\nHost: x\r\nA: ");
   for (int i = 0; i < 40 && client.Send(piece); ++i) {
@@ -105,8 +105,8 @@ TEST_F(Framing, FortyMegabytesOfHeaderCostNothing) {
   const auto reply = client.Read();
   ASSERT_TRUE(reply);
   EXPECT_EQ(reply->status, 431);
-  if (!kSanitized) {
-    EXPECT_LT(ResidentKib() - before, 2048);
+  if (!test_support::kSanitized) {
+    EXPECT_LT(test_support::ResidentKib() - before, 2048);
   }
 }
 

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "config/common/token_hash.h"
-#include "tests/server/resident_memory.h"
 #include "tests/server/server_fixture.h"
+#include "tests/support/resident_memory.h"
 
 namespace terrace::server {
 namespace {
@@ -49,7 +49,7 @@ TEST_F(Limits, FiveHundredSlowReadersHoldABoundedPart) {
   options.config.trusted_proxies = {"127.0.0.1"};
   Start(options);
   Fetch(port(), "/livez");
-  const long before = ResidentKib();
+  const long before = test_support::ResidentKib();
   std::vector<std::unique_ptr<RawClient>> readers;
   for (int i = 0; i < 500; ++i) {
     readers.push_back(std::make_unique<RawClient>(port(), 4096));
@@ -68,10 +68,10 @@ TEST_F(Limits, FiveHundredSlowReadersHoldABoundedPart) {
   for (int look = 0; look < 4 && grown >= kMost; ++look) {
     std::this_thread::sleep_for(1s);
     malloc_trim(0);
-    grown = ResidentKib() - before;
+    grown = test_support::ResidentKib() - before;
   }
   RecordProperty("resident_kib", static_cast<int>(grown));
-  if (!kSanitized) {
+  if (!test_support::kSanitized) {
     EXPECT_LT(grown, kMost);
   }
   // They have had their time: another client that comes now is served.

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "tests/server/resident_memory.h"
+#include "tests/support/resident_memory.h"
 
 namespace terrace::server {
 namespace {
@@ -40,15 +40,15 @@ void Compute() {
 }
 
 TEST(MemoryTrimmer, GivesHolesBack) {
-  if (kSanitized) GTEST_SKIP() << "sanitizers have an allocator of their own";
+  if (test_support::kSanitized) GTEST_SKIP() << "sanitizers have an allocator of their own";
   const Holes holes;
-  const long before = ResidentKib();
+  const long before = test_support::ResidentKib();
   const MemoryTrimmer trimmer(10ms);
-  for (int i = 0; i < 300 && ResidentKib() > before - (24 << 10); ++i) {
+  for (int i = 0; i < 300 && test_support::ResidentKib() > before - (24 << 10); ++i) {
     Compute();
     std::this_thread::sleep_for(10ms);
   }
-  EXPECT_LE(ResidentKib(), before - (24 << 10));
+  EXPECT_LE(test_support::ResidentKib(), before - (24 << 10));
 }
 
 TEST(MemoryTrimmer, EndsAtOnce) {

@@ -15,6 +15,18 @@ double ChordError(double length) { return length < 1 ? length / 4 : (length * le
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
+// A row of averages with its neighbours, null where they lie outside the range. First and second differences of the
+// average in column c, to the east (X) and to the south (Y).
+struct Row {
+  const float *above, *here, *below;
+
+  float X(std::size_t c) const { return here[c + 1] - here[c]; }
+  float XX(std::size_t c) const { return here[c + 2] - here[c + 1] - (here[c + 1] - here[c]); }
+  float Y(std::size_t c) const { return below[c] - here[c]; }
+  float YY(std::size_t c) const { return below[c] - here[c] - (here[c] - above[c]); }
+  float XY(std::size_t c) const { return here[c + 1] - here[c] - (below[c + 1] - below[c]); }
+};
+
 // Several running values instead of one: no step waits for the one before it, and the compiler puts them side by side.
 class Lanes {
  public:
@@ -260,31 +272,28 @@ bool SmoothErrorBound::Measure(const SampleRange& range, Bends& bends) const {
   }
   const auto columns = static_cast<std::size_t>(in.right - in.left + 1);
   Lanes x, y, xx, yy, xy, sum;
-  ForRows(in, [&](const float* above, const float* here, const float* below) {
-    sum.Add(columns, [&](std::size_t c) { return here[c]; });
-    x.Raise(columns - 1, [&](std::size_t c) { return here[c + 1] - here[c]; });
-    if (columns > 2) {
-      xx.Raise(columns - 2, [&](std::size_t c) { return here[c + 2] - here[c + 1] - (here[c + 1] - here[c]); });
-    }
-    if (below == nullptr) return;
-    y.Raise(columns, [&](std::size_t c) { return below[c] - here[c]; });
-    xy.Raise(columns - 1, [&](std::size_t c) { return here[c + 1] - here[c] - (below[c + 1] - below[c]); });
-    if (above == nullptr) return;
-    yy.Raise(columns, [&](std::size_t c) { return below[c] - here[c] - (here[c] - above[c]); });
+  ForRows(in, [&](const Row& row) {
+    sum.Add(columns, [&](std::size_t c) { return row.here[c]; });
+    x.Raise(columns - 1, [&](std::size_t c) { return row.X(c); });
+    if (columns > 2) xx.Raise(columns - 2, [&](std::size_t c) { return row.XX(c); });
+    if (row.below == nullptr) return;
+    y.Raise(columns, [&](std::size_t c) { return row.Y(c); });
+    xy.Raise(columns - 1, [&](std::size_t c) { return row.XY(c); });
+    if (row.above != nullptr) yy.Raise(columns, [&](std::size_t c) { return row.YY(c); });
   });
   bends = {x.Largest() * kUp, y.Largest() * kUp, xx.Largest() * kUp, yy.Largest() * kUp, xy.Largest() * kUp};
   return std::isfinite(sum.Sum());
 }
 
-// Calls step(row above, row, row below) for all rows of the range; null where the neighbour lies outside it.
+// Calls step(row) for all rows of the range.
 template <typename Step>
 void SmoothErrorBound::ForRows(const SampleRange& range, const Step& step) const {
   const GridWindow& window = trace_.window;
   for (std::int64_t row = range.top; row <= range.bottom; ++row) {
     const float* const here =
         trace_.samples.data() + (row - window.row) * window.columns + (range.left - window.column);
-    step(row == range.top ? nullptr : here - window.columns, here,
-         row == range.bottom ? nullptr : here + window.columns);
+    step(Row{row == range.top ? nullptr : here - window.columns, here,
+             row == range.bottom ? nullptr : here + window.columns});
   }
 }
 
@@ -314,16 +323,14 @@ void SmoothErrorBound::PrepareRows(int south, int north) {
       out[c] = size > out[c] ? size : out[c];
     }
   };
-  ForRows(range, [&](const float* above, const float* here, const float* below) {
-    for (std::size_t c = 0; c < columns; ++c) band_.sum[c] += here[c];
-    raise(band_.x, columns - 1, [&](std::size_t c) { return here[c + 1] - here[c]; });
-    raise(band_.xx, columns > 2 ? columns - 2 : 0,
-          [&](std::size_t c) { return here[c + 2] - here[c + 1] - (here[c + 1] - here[c]); });
-    if (below == nullptr) return;
-    raise(band_.y, columns, [&](std::size_t c) { return below[c] - here[c]; });
-    raise(band_.xy, columns - 1, [&](std::size_t c) { return here[c + 1] - here[c] - (below[c + 1] - below[c]); });
-    if (above == nullptr) return;
-    raise(band_.yy, columns, [&](std::size_t c) { return below[c] - here[c] - (here[c] - above[c]); });
+  ForRows(range, [&](const Row& row) {
+    for (std::size_t c = 0; c < columns; ++c) band_.sum[c] += row.here[c];
+    raise(band_.x, columns - 1, [&](std::size_t c) { return row.X(c); });
+    raise(band_.xx, columns > 2 ? columns - 2 : 0, [&](std::size_t c) { return row.XX(c); });
+    if (row.below == nullptr) return;
+    raise(band_.y, columns, [&](std::size_t c) { return row.Y(c); });
+    raise(band_.xy, columns - 1, [&](std::size_t c) { return row.XY(c); });
+    if (row.above != nullptr) raise(band_.yy, columns, [&](std::size_t c) { return row.YY(c); });
   });
 }
 

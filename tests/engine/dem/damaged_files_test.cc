@@ -12,26 +12,15 @@
 
 #include "engine/dem/image/water_raster.h"
 #include "tests/engine/dem/dem_fixture.h"
+#include "tests/support/resident_memory.h"
 
 namespace terrace::dem {
 namespace {
 
-#if defined(__has_feature)
-constexpr bool kSanitized = __has_feature(address_sanitizer) || __has_feature(thread_sanitizer);
-#else
-constexpr bool kSanitized = false;
-#endif
-constexpr int kFiles = kSanitized ? 60 : 500;  // under a sanitizer a process takes long to begin
-constexpr unsigned kSeconds = 20;              // the target is 5 on an idle machine
-constexpr long kMaxKib =
-    512 << 10;  // beyond what the process has that forks: sanitizers keep what tests before have freed
-
-long ResidentKib() {
-  std::ifstream statm("/proc/self/statm");
-  long size = 0, resident = 0;
-  statm >> size >> resident;
-  return resident * (::sysconf(_SC_PAGESIZE) / 1024);
-}
+constexpr int kFiles = test_support::kSanitized ? 60 : 500;  // under a sanitizer a process takes long to begin
+constexpr unsigned kSeconds = 20;                            // the target is 5 on an idle machine
+// Beyond the parent's own: sanitizers keep the memory that earlier tests have freed.
+constexpr long kMaxKib = 512 << 10;
 
 std::string ReadFile(const std::string& path) {
   std::ostringstream text;
@@ -106,7 +95,7 @@ TEST(DamagedFiles, CrashHangAndSwellNothing) {
     const auto& [name, bytes] = seeds[static_cast<std::size_t>(i) % seeds.size()];
     const std::string path = dir.File("damaged_" + name);
     std::ofstream(path, std::ios::binary) << Damaged(bytes, random);
-    const long before = ResidentKib();
+    const long before = test_support::ResidentKib();
     const pid_t child = ::fork();
     ASSERT_GE(child, 0);
     if (child == 0) OpenAndRead(path);

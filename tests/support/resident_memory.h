@@ -5,7 +5,7 @@
 
 #include <fstream>
 
-namespace terrace::server {
+namespace terrace::test_support {
 
 // Sanitizers keep freed memory and shadow it: resident memory says nothing there.
 #if defined(__has_feature)
@@ -21,4 +21,4 @@ inline long ResidentKib() {
   return resident * (::sysconf(_SC_PAGESIZE) / 1024);
 }
 
-}  // namespace terrace::server
+}  // namespace terrace::test_support
