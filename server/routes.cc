@@ -89,9 +89,9 @@ Handlers::Handlers(CatalogPtr c, TileService& tile_service, std::shared_ptr<cons
       tiles(catalog, tile_service, options),
       heights(catalog, tile_service, options),
       areas(catalog, tile_service, options),
-      layers(catalog->datasets, options.cache_control),
+      layers(catalog->datasets),
       tilesets(catalog->datasets, options.cache_control),
-      tile_json(catalog->datasets, options.cache_control),
+      tile_json(catalog->datasets, options.origin_headers),
       viewer(catalog->datasets, std::move(files)),
       state(process),
       documents(catalog, tile_service, options) {}

@@ -68,6 +68,11 @@ TileServiceOptions ServiceOptions(const ServerOptions& options) {
 HandlerOptions ForHandlers(const config::Config& config, std::size_t max_locations) {
   HandlerOptions handlers;
   handlers.cache_control = config.cache_control;
+  if (!config.trusted_proxies.empty()) {
+    handlers.origin_headers = config.forwarded_header == config::ForwardedHeader::kForwarded
+                                  ? "Forwarded"
+                                  : "X-Forwarded-Host, X-Forwarded-Proto";
+  }
   handlers.deadline = config.request_deadline;
   handlers.max_locations = max_locations;
   return handlers;
@@ -219,7 +224,9 @@ class Server::Impl {
     state.connections = edge_->connections.size();
     state.refused_connections = edge_->connections.refused();
     state.transfers = edge_->transfers.stats();
-    state.datasets = application_.catalog()->datasets.size();
+    const CatalogPtr catalog = application_.catalog();
+    state.datasets = catalog->datasets.size();
+    for (const DatasetView& dataset : catalog->datasets) state.versions.emplace_back(dataset.name, dataset.version());
     state.troubles = application_.troubles().size();
     state.catalogs = application_.replaced();
     return state;

@@ -1,68 +1,38 @@
 #include "tiler/encoder_version.h"
 
-#include <elf.h>
 #include <fmt/format.h>
-#include <link.h>
-#include <sys/stat.h>
-#include <xxhash.h>
 
-#include <algorithm>
-#include <cstring>
-#include <string>
-#include <string_view>
-#include <vector>
+#include <array>
+
+#include "engine/dem/gdal/gdal_settings.h"
+#include "proto/library_versions.h"
 
 namespace terrace::tiler {
 namespace {
 
-// The notes of a segment: name size, description size and type, 32 bits each; name; description; both padded to four.
-std::string_view BuildIdIn(std::string_view notes) {
-  const auto padded = [](std::size_t size) { return (size + 3) & ~std::size_t{3}; };
-  ElfW(Nhdr) head;
-  while (notes.size() >= sizeof(head)) {
-    std::memcpy(&head, notes.data(), sizeof(head));
-    const std::size_t name = padded(head.n_namesz), description = padded(head.n_descsz);
-    if (notes.size() < sizeof(head) + name + description) break;
-    if (head.n_type == NT_GNU_BUILD_ID && notes.substr(sizeof(head), 4) == std::string_view("GNU", 4)) {
-      return notes.substr(sizeof(head) + name, head.n_descsz);
-    }
-    notes.remove_prefix(sizeof(head) + name + description);
-  }
-  return {};
-}
+constexpr std::size_t kDigits = 12;
 
-std::string FileIdentity(const char* path) {
-  struct stat status {};
-  if (stat(*path != '\0' ? path : "/proc/self/exe", &status) != 0) return path;
-  return fmt::format("{} {} {}.{}", path, status.st_size, status.st_mtim.tv_sec, status.st_mtim.tv_nsec);
-}
-
-int Collect(dl_phdr_info* object, std::size_t, void* to) {
-  const std::string_view name = object->dlpi_name;
-  if (name.starts_with("linux-vdso")) return 0;  // the kernel's, which makes no tiles
-  std::string_view id;
-  for (int i = 0; i < object->dlpi_phnum && id.empty(); ++i) {
-    const ElfW(Phdr)& segment = object->dlpi_phdr[i];
-    if (segment.p_type != PT_NOTE) continue;
-    // Mapped, read-only and there as long as the library is.
-    id = BuildIdIn({reinterpret_cast<const char*>(object->dlpi_addr + segment.p_vaddr), segment.p_memsz});
-  }
-  static_cast<std::vector<std::string>*>(to)->push_back(id.empty() ? FileIdentity(object->dlpi_name) : std::string(id));
-  return 0;
+std::array<char, kDigits> DigitsOf(std::uint64_t generation) {
+  constexpr std::string_view kHexDigits = "0123456789abcdef";
+  std::array<char, kDigits> digits{};
+  for (std::size_t i = 0; i < kDigits; ++i) digits[i] = kHexDigits[generation >> (60 - 4 * i) & 15];
+  return digits;
 }
 
 }  // namespace
 
-std::uint64_t EncoderVersion() {
-  static const std::uint64_t version = [] {
-    std::vector<std::string> objects;
-    dl_iterate_phdr(Collect, &objects);
-    std::sort(objects.begin(), objects.end());
-    std::string all;
-    for (const std::string& object : objects) all += object + '\n';
-    return XXH3_64bits(all.data(), all.size());
-  }();
-  return version;
+std::string EncoderText() {
+  return fmt::format("encoder {}, {}, {}", kEncoderVersion, dem::LibraryVersions(), proto::LibraryVersions());
+}
+
+std::string VersionText(std::uint64_t generation) {
+  const std::array<char, kDigits> digits = DigitsOf(generation);
+  return {digits.data(), digits.size()};
+}
+
+bool IsVersionOf(std::string_view text, std::uint64_t generation) {
+  const std::array<char, kDigits> digits = DigitsOf(generation);
+  return text == std::string_view(digits.data(), digits.size());
 }
 
 }  // namespace terrace::tiler

@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 #include <xxhash.h>
 
-#include "tiler/encoder_version.h"
+#include "tiler/build_id.h"
 
 namespace terrace::tiler {
 
@@ -14,7 +14,7 @@ std::string StrongETag(std::string_view bytes) {
 
 std::string RequestETag(std::string_view kind, std::string_view dataset, std::uint64_t generation,
                         std::string_view query, Coding coding) {
-  return StrongETag(fmt::format("{} {} {:016x} {:016x} {} {}", kind, dataset, generation, EncoderVersion(),
+  return StrongETag(fmt::format("{} {} {:016x} {:016x} {} {}", kind, dataset, generation, BuildId(),
                                 static_cast<int>(coding), query));
 }
 

@@ -50,7 +50,7 @@ struct Dataset {
   WaterRules water;
   ImageryRules imagery;
   int metadata_levels = 0;       // tiles at multiples of this level have availability metadata; 0: none
-  std::uint64_t generation = 0;  // hash of the source's fingerprint and all options that change bytes
+  std::uint64_t generation = 0;  // hash of contents, of all options that change bytes, and of the encoders
 };
 
 // Thread-safe: Build may run on any number of threads at once.

@@ -31,8 +31,8 @@ DEM = ["engine/dem/dem_types.h", "engine/dem/common", "engine/dem/gdal", "engine
        "engine/dem/sources", "engine/dem/mosaic", "engine/dem/bound", "engine/dem/image"]
 # Headers of rooms below a front room: whoever may know the front room may include these.
 DOORS = {front + "/" + name: front for front, names in {
-    "engine/dem": ("dem_types.h", "common/box_index.h", "crs/geodesic_path.h", "gdal/file_stamp.h", "gdal/gdal_settings.h",
-                   "gdal/source_policy.h", "image/imagery.h", "image/raster_colors.h", "image/water_raster.h", "sources/read_raster.h"),
+    "engine/dem": ("dem_types.h", "common/box_index.h", "crs/geodesic_path.h", "gdal/file_content.h", "gdal/file_stamp.h",
+                   "gdal/gdal_settings.h", "gdal/source_policy.h", "image/imagery.h", "image/raster_colors.h", "image/water_raster.h", "sources/read_raster.h"),
     "config": ("config.h", "common/listen_address.h", "common/nearest_name.h", "common/token_hash.h", "common/working_directory.h",
                "options/options.h"),
 }.items() for name in names}
@@ -83,7 +83,7 @@ LIBRARIES = [
     Library("libdeflate", r"libdeflate\.h", r"proto/.*\.cc"),
     Library("brotli", r"brotli/.*", r"proto/.*\.cc"),
     Library("zstd", r"zstd\.h", r"proto/.*\.cc"),
-    Library("zlib", r"zlib\.h", r"proto/compress\.cc"),
+    Library("zlib", r"zlib\.h", r"proto/(compress|library_versions)\.cc"),
     Library("Draco", r"draco/.*", r"proto/.*\.cc"),
     Library("libjpeg", r"jpeglib\.h", r"proto/.*\.cc"),
     Library("libwebp", r"webp/.*", r"proto/.*\.cc"),

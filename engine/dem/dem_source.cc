@@ -1,7 +1,6 @@
 #include "engine/dem/dem_source.h"
 
 #include <fmt/format.h>
-#include <xxhash.h>
 
 #include <algorithm>
 #include <cmath>
@@ -11,9 +10,9 @@
 #include <set>
 #include <utility>
 
-#include "engine/core/bytes.h"
 #include "engine/core/check.h"
 #include "engine/dem/common/all_cores.h"
+#include "engine/dem/common/content_hash.h"
 #include "engine/dem/crs/footprint.h"
 #include "engine/dem/crs/level_plan.h"
 #include "engine/dem/dem_impl.h"
@@ -50,34 +49,43 @@ Result<void> CheckOptions(const DemOptions& options) {
   return {};
 }
 
-std::uint64_t FingerprintOf(const std::vector<RasterGrid>& grids, const DemOptions& options, double floor) {
-  // Changes whenever the same files and options would give other heights than before.
-  constexpr std::uint32_t kResamplingVersion = 3;
-  ByteWriter writer;
-  writer.Put(kResamplingVersion);
+// What decides the heights of a raster besides those of its samples.
+Result<void> AddRaster(ContentHasher& hasher, const RasterSource& raster, const FileContentOptions& options) {
+  hasher.Add(raster.content());
+  if (auto placed = raster.georeference().AddTo(hasher, options); !placed) return placed;
+  const SampleRules& rules = raster.layout().rules;
+  hasher.Add(rules.nodata.has_value());
+  hasher.Add(rules.nodata.value_or(0));
+  for (const double number : {rules.scale, rules.offset, rules.metres_per_unit, rules.lowest, rules.highest}) {
+    hasher.Add(number);
+  }
+  // What was found or stated of voids.
+  hasher.Add(rules.rim);
+  hasher.Add(std::uint64_t{rules.extra_nodata.size()});
+  for (const double value : rules.extra_nodata) hasher.Add(value);
+  return {};
+}
+
+Result<std::uint64_t> FingerprintOf(const std::vector<RasterGrid>& grids, const DemOptions& options, double floor) {
+  const FileContentOptions content{options.cache_dir, options.stop};
+  ContentHasher hasher;
   for (const RasterGrid& grid : grids) {
-    if (&grid != &grids.front()) writer.Put(std::uint32_t{0});  // which rasters make one raster grid counts, too
+    hasher.Add(std::uint64_t{grid.members().size()});  // which rasters make one raster grid counts, too
     for (const GridMember& member : grid.members()) {
-      writer.Put(FingerprintOf(member.raster->files(), member.raster->georeference()));
-      // What was found or stated of voids decides heights as well.
-      if (const SampleRules& rules = member.raster->layout().rules; !rules.extra_nodata.empty() || rules.rim > 0) {
-        for (const double value : rules.extra_nodata) writer.Put(value);
-        for (const double bound : {rules.lowest, rules.highest, double(rules.rim)}) writer.Put(bound);
-      }
+      if (auto added = AddRaster(hasher, *member.raster, content); !added) return tl::unexpected(added.error());
     }
+    hasher.Add(grid.vertical().is_known());
+    hasher.Add(grid.vertical().geoid != nullptr);
     if (const auto& geoid = grid.vertical().geoid) {
-      writer.Put(geoid->files().fingerprint());
-      writer.PutBytes(geoid->pipeline());
+      if (auto added = geoid->AddTo(hasher, content); !added) return tl::unexpected(added.error());
     }
   }
-  writer.Put(options.error_fraction);
-  writer.Put(options.finest_error.value_or(0));
-  writer.Put(floor);
-  writer.Put(options.max_void_gap);
-  writer.Put(static_cast<std::uint8_t>(options.voids));
-  if (options.feather > 0) writer.Put(options.feather);
-  const std::string bytes = writer.Take();
-  return XXH3_64bits(bytes.data(), bytes.size());
+  for (const double number : {options.error_fraction, options.finest_error.value_or(0), floor, options.feather}) {
+    hasher.Add(number);
+  }
+  hasher.Add(options.max_void_gap);
+  hasher.Add(static_cast<std::uint8_t>(options.voids));
+  return hasher.Hash().low;
 }
 
 // A sixteenth of an octave: tiles of one product differ by less, as meridians converge.
@@ -212,7 +220,9 @@ Result<std::unique_ptr<DemSource>> DemSource::Open(std::vector<DemFile> files, c
       impl->floor_undulations = *std::move(undulations);
     }
   }
-  impl->fingerprint = FingerprintOf(impl->grids, options, impl->floor);
+  const auto fingerprint = FingerprintOf(impl->grids, options, impl->floor);
+  if (!fingerprint) return tl::unexpected(fingerprint.error());
+  impl->fingerprint = *fingerprint;
   return std::unique_ptr<DemSource>(new DemSource(std::move(impl)));
 }
 

@@ -81,8 +81,8 @@ class DemSource {
   // Samples read since Open, by all threads. For metrics.
   SampleCounts CountSamples() const;
 
-  // A hash of content and options: device, inode, size, mtime and ctime of all files in order, and every option that
-  // changes heights.
+  // A hash of all that decides heights, the same of every copy of the files: their samples as they are read, in order
+  // of precedence, where they lie and what they count from, and every option that changes heights.
   std::uint64_t fingerprint() const;
 
   // The files of all sources with their stamps at Open.

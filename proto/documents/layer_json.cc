@@ -48,7 +48,8 @@ Json Bounds(const LayerDescription& layer) {
 std::string EncodeLayerJson(const LayerDescription& layer, const std::stop_token& stop) {
   TERRACE_CHECK(!layer.available.empty());
   // One template only: cesium-native and 3DTilesRendererJS read no other than the first.
-  std::string tile_template = "{z}/{x}/{y}.terrain?v={version}";
+  // The version stands in it as it is: 3DTilesRendererJS writes 1 for {version}.
+  std::string tile_template = "{z}/{x}/{y}.terrain?v=" + layer.version;
   if (!layer.tile_query.empty()) tile_template += "&" + layer.tile_query;
 
   Json json;

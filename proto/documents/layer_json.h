@@ -12,14 +12,14 @@ namespace terrace::proto {
 struct LayerDescription {
   std::string name;
   std::string attribution;
-  std::string version = "1.0.0";
+  std::string version;                                 // of the tiles: what the template asks for, [0-9A-Za-z._~-]
   std::vector<std::vector<geo::TileRange>> available;  // by level, from 0
   // Degrees. west > east, or east > 180, is a box across the antimeridian: layer.json then spans all longitudes,
   // because its readers know only boxes with west < east.
   double west = -180, south = -90, east = 180, north = 90;
   bool water_mask = false;  // tiles have it on request
   int metadata_levels = 0;  // tiles at multiples of this level have metadata on request; 0: none
-  std::string tile_query;   // appended to the tile template, without '?': "error=5&atleast=1"; may be empty
+  std::string tile_query;   // appended to the tile template's query: "error=5&atleast=1"; may be empty
 };
 
 // UTF-8 JSON; empty if a stop was requested. `available` must be complete: it contains both roots and every ancestor of

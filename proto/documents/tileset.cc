@@ -34,7 +34,12 @@ Json Region(const HeightSpan& heights, int level, const geo::TileRange& block) {
             edge(block.end_y + 1, -90), heights.min_m, heights.max_m}}};
 }
 
-std::string Query(const std::string& parameters) { return parameters.empty() ? "" : "?" + parameters; }
+std::string Query(const TilesetDescription& tileset, const std::string& parameters) {
+  std::string query = tileset.version.empty() ? "" : "v=" + tileset.version;
+  if (!query.empty() && !parameters.empty()) query += '&';
+  query += parameters;
+  return query.empty() ? "" : "?" + query;
+}
 
 // `place`: which tile or tiles of the tree the content is of.
 Json Tile(const TilesetDescription& tileset, const geo::TileKey& root, Json bounds, const char* place) {
@@ -42,7 +47,8 @@ Json Tile(const TilesetDescription& tileset, const geo::TileKey& root, Json boun
   json["boundingVolume"] = std::move(bounds);
   json["geometricError"] = GeometricError(root.level);
   json["refine"] = "REPLACE";
-  json["content"]["uri"] = fmt::format("3dtiles/{}/{}.glb{}", RootName(root), place, Query(tileset.content_query));
+  json["content"]["uri"] =
+      fmt::format("3dtiles/{}/{}.glb{}", RootName(root), place, Query(tileset, tileset.content_query));
   return json;
 }
 
@@ -55,7 +61,7 @@ Json ImplicitRoot(const TilesetDescription& tileset, const TreeRoot& tree, const
   tiling["availableLevels"] = tree.levels;
   tiling["subtreeLevels"] = subtree_levels;
   tiling["subtrees"]["uri"] = fmt::format("3dtiles/{}/{{level}}/{{x}}/{{y}}.{}.subtree{}", RootName(root),
-                                          subtree_levels, Query(tileset.subtree_query));
+                                          subtree_levels, Query(tileset, tileset.subtree_query));
   return json;
 }
 
@@ -212,6 +218,7 @@ std::string EncodeTileset(const TilesetDescription& tileset) {
   TERRACE_CHECK(!tileset.roots.empty());
   Json json;
   json["asset"]["version"] = "1.1";
+  if (!tileset.version.empty()) json["asset"]["tilesetVersion"] = tileset.version;
   if (!tileset.attribution.empty()) {
     // The schema has no place for a credit; this is where CesiumJS looks for one.
     json["asset"]["extras"]["cesium"]["credits"] = Json::array({{{"html", EscapeHtml(tileset.attribution)}}});

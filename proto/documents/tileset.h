@@ -11,6 +11,7 @@
 namespace terrace::proto {
 
 struct TilesetDescription {
+  std::string version;  // of the tiles, [0-9A-Za-z._~-]: the first parameter of every URL; empty: none
   std::string attribution;
   std::vector<TreeRoot> roots;  // tiles of one level (ImplicitTrees)
   // Of a tile and, where a tree is rooted at it, of all its descendants: clients hand the range of a root down. What is

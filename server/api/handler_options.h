@@ -4,11 +4,14 @@
 #include <chrono>
 #include <cstddef>
 #include <string>
+#include <string_view>
 
 namespace terrace::server {
 
 struct HandlerOptions {
-  std::string cache_control = "public, max-age=3600";
+  std::string cache_control = "public, max-age=3600";  // of replies that are asked for without a version
+  // A literal: the headers in which a trusted proxy tells the origin that clients ask; empty: no proxy is trusted.
+  std::string_view origin_headers = {};
   std::chrono::milliseconds deadline{30'000};  // of an answer that has to be made
   // Delay of a refusal for overload. A client that is refused at once retries at once, and answering tens of thousands
   // of refusals a second would take time from the workers.

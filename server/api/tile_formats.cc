@@ -37,6 +37,9 @@ Result<void> ReadQuantizedMesh(std::string_view query, const RequestFields& fiel
   return {};
 }
 
+// Draco ends in an entropy coder; meshopt leaves that to the transport.
+bool CodingHelps(const TileRequest& glb) { return glb.compression != proto::GlbCompression::kDraco; }
+
 Result<void> ReadGlb(std::string_view query, const RequestFields& fields, const DatasetView& dataset,
                      TileRequest& tile) {
   const Result<TileParameters> parameters =
@@ -46,9 +49,7 @@ Result<void> ReadGlb(std::string_view query, const RequestFields& fields, const 
   SetError(parameters->requested, dataset, tile);
   tile.compression = parameters->compression.value_or(dataset.glb_compression);
   if (dataset.texture) tile.texture = parameters->texture.value_or(*dataset.texture);
-  // Draco ends in an entropy coder; meshopt leaves that to the transport.
-  const bool coding_helps = tile.compression != proto::GlbCompression::kDraco;
-  if (coding_helps) tile.coding = NegotiateCoding(fields.accept_encoding);
+  if (CodingHelps(tile)) tile.coding = NegotiateCoding(fields.accept_encoding);
   return {};
 }
 
@@ -72,11 +73,16 @@ std::string_view QuantizedMeshType(const TileRequest& tile) {
 std::string_view GlbType(const TileRequest&) { return "model/gltf-binary"; }
 std::string_view PngType(const TileRequest&) { return "image/png"; }
 
+// Accept asks for extensions.
+std::string_view QuantizedMeshVary(const TileRequest&) { return "Accept, Accept-Encoding"; }
+std::string_view GlbVary(const TileRequest& tile) { return CodingHelps(tile) ? "Accept-Encoding" : ""; }
+std::string_view PngVary(const TileRequest&) { return ""; }
+
 constexpr TileFormat kFormats[] = {
-    {tiler::TileFormat::kQuantizedMesh, ".terrain", /*is_mercator=*/false, /*varies=*/true, QuantizedMeshType,
+    {tiler::TileFormat::kQuantizedMesh, ".terrain", /*is_mercator=*/false, QuantizedMeshType, QuantizedMeshVary,
      ReadQuantizedMesh},
-    {tiler::TileFormat::kGlb, ".glb", /*is_mercator=*/false, /*varies=*/true, GlbType, ReadGlb},
-    {tiler::TileFormat::kHeightPng, ".png", /*is_mercator=*/true, /*varies=*/false, PngType, ReadHeightPng},
+    {tiler::TileFormat::kGlb, ".glb", /*is_mercator=*/false, GlbType, GlbVary, ReadGlb},
+    {tiler::TileFormat::kHeightPng, ".png", /*is_mercator=*/true, PngType, PngVary, ReadHeightPng},
 };
 
 }  // namespace

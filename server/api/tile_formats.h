@@ -15,8 +15,8 @@ struct TileFormat {
   tiler::TileFormat format;
   std::string_view suffix;  // of the URL: ".terrain"
   bool is_mercator;         // counted in Web Mercator's XYZ scheme; else in TMS geodetic
-  bool varies;              // by Accept and Accept-Encoding
   std::string_view (*media_type)(const tiler::TileRequest& tile);
+  std::string_view (*vary)(const tiler::TileRequest& tile);  // the headers that a reply depends on, as in Response
   // Reads the parameters of a URL and sets the rest of the request; its dataset, key and format are set. kNotFound: the
   // dataset has no such tile. kInvalidArgument: see ParseTileParameters and ParseHeightTileParameters.
   Result<void> (*read)(std::string_view query, const RequestFields& fields, const DatasetView& dataset,

@@ -28,7 +28,7 @@ Response Serve(const Document& document, const Request& request, std::string_vie
   response.body = gzip ? document.gzip : document.identity;
   response.etag = gzip ? document.gzip_etag : document.identity_etag;
   response.cache_control = cache_control;
-  response.vary = true;
+  if (document.gzip) response.vary = "Accept-Encoding";
   return Conditional(std::move(response), request);
 }
 

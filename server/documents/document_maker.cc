@@ -39,7 +39,7 @@ Response Serve(const MadeDocument& made, const DocumentPlan& plan, const Request
   response.body = made.body;
   response.etag = made.etag;
   response.cache_control = plan.cache_control;
-  response.vary = true;
+  response.vary = "Accept-Encoding";
   response.for_grant = plan.for_grant;
   return Conditional(std::move(response), request);
 }

@@ -11,6 +11,7 @@
 
 #include "proto/error_text.h"
 #include "server/api/backend_failure.h"
+#include "server/api/caching.h"
 #include "server/api/negotiate.h"
 #include "server/api/tile_head.h"
 #include "server/handlers/tile_handler.h"
@@ -144,8 +145,8 @@ Answer AreaHandler::Handle(const Call& call) const {
   response.content_type = ContentTypeOf(area->format);
   response.content_encoding = tiler::NameOf(coding);
   response.etag = tiler::RequestETag("mesh", view.name, view.generation, call.route.query, coding);
-  response.cache_control = options_.cache_control;
-  response.vary = true;
+  response.cache_control = CacheControlOf(call.route.query, view, options_.cache_control);
+  response.vary = "Accept-Encoding";
   if (MatchesEtag(request.fields->if_none_match, response.etag)) return Conditional(std::move(response), request);
   return Build(call, *dataset, *area, *plan, coding, std::move(response));
 }

@@ -55,6 +55,7 @@ std::string DatasetsJson(std::span<const DatasetView> datasets, const IsSeen& is
     const std::string base = fmt::format("/{}", PercentEncode(dataset.name));
     Json entry;
     entry["name"] = dataset.name;
+    entry["version"] = dataset.version();
     entry["attribution"] = dataset.attribution;
     entry["bounds"] = {dataset.west, dataset.south, dataset.east, dataset.north};
     const dem::GeoBounds finest = FinestBounds(dataset);
@@ -66,7 +67,7 @@ std::string DatasetsJson(std::span<const DatasetView> datasets, const IsSeen& is
     entry["heights"]["max"] = dataset.max_height_m;
     entry["urls"]["layer"] = base + "/layer.json";
     entry["urls"]["tileset"] = base + "/tileset.json";
-    entry["urls"]["tiles"] = base + "/{z}/{x}/{y}.terrain";
+    entry["urls"]["tiles"] = base + "/{z}/{x}/{y}.terrain?v=" + dataset.version();
     entry["urls"]["tiles_json"] = base + "/tiles.json";
     entry["urls"]["heights"] = base + "/heights";
     entry["urls"]["mesh"] = base + "/mesh";

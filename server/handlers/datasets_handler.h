@@ -13,7 +13,7 @@ namespace terrace::server {
 // Whether a dataset is listed for who asks. Empty: all are.
 using IsSeen = std::function<bool(const DatasetView&)>;
 
-// {"datasets":[{"name","attribution","bounds":[w,s,e,n],"finest_bounds":[w,s,e,n],"min_level","max_level",
+// {"datasets":[{"name","version","attribution","bounds":[w,s,e,n],"finest_bounds":[w,s,e,n],"min_level","max_level",
 //   "heights":{"min","max"},"urls":{"layer","tileset","tiles","tiles_json","heights","mesh"}}],"more_with_token":true}
 // Degrees, west > east across the antimeridian; metres; URLs are absolute paths on this server. `more_with_token` is
 // there for whoever does not see everything, whether or not there is more: that is not for them to know.

@@ -10,6 +10,7 @@
 
 #include "proto/error_text.h"
 #include "server/api/backend_failure.h"
+#include "server/api/caching.h"
 #include "server/api/negotiate.h"
 #include "server/handlers/tile_handler.h"
 #include "server/http/http_error.h"
@@ -83,10 +84,13 @@ asio::awaitable<Response> HeightsHandler::Read(const Call& call, std::uint32_t d
   Response response;
   response.content_type = "application/json";
   response.content_encoding = tiler::NameOf(coding);
-  response.vary = true;
+  response.vary = "Accept-Encoding";
   response.cache_control = "no-store";
   if (request.method != Method::kPost) {
-    response.cache_control = options_.cache_control;
+    // The version does not say which grid makes orthometric heights of ellipsoidal ones, nor what was certified.
+    const bool is_versioned = !parsed->certify_level && parsed->datum == dem::HeightDatum::kEllipsoid;
+    response.cache_control =
+        is_versioned ? CacheControlOf(call.route.query, view, options_.cache_control) : options_.cache_control;
     // Certified errors are the program's, not only the data's.
     if (!parsed->certify_level) {
       response.etag = tiler::RequestETag("heights", view.name, view.generation, call.route.query, coding);

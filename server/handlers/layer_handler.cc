@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "proto/documents/layer_json.h"
+#include "server/api/caching.h"
 #include "server/api/negotiate.h"
 #include "server/handlers/datasets_handler.h"
 #include "server/http/http_error.h"
@@ -23,6 +24,7 @@ std::string Print(double value) {
 std::string WriteLayer(const DatasetView& dataset, std::string tile_query, const std::stop_token& stop = {}) {
   proto::LayerDescription layer;
   layer.name = dataset.name;
+  layer.version = dataset.version();
   layer.attribution = dataset.attribution;
   layer.available = dataset.available;
   layer.west = dataset.west;
@@ -53,8 +55,7 @@ std::string WithToken(std::string query, const Call& call) {
   return query + (query.empty() ? "" : "&") + "token=" + PercentEncode(call.token);
 }
 
-LayerHandler::LayerHandler(std::span<const DatasetView> datasets, std::string cache_control)
-    : datasets_(datasets), cache_control_(std::move(cache_control)) {
+LayerHandler::LayerHandler(std::span<const DatasetView> datasets) : datasets_(datasets) {
   for (const DatasetView& dataset : datasets_) plain_.push_back(Document::Make(WriteLayer(dataset, ""), kJson));
 }
 
@@ -64,11 +65,11 @@ Described LayerHandler::Handle(const Call& call) const {
   const Result<TileParameters> parameters = ParseTileParameters(call.route.query, /*allow_at_least=*/false);
   if (!parameters) return ClientErrorResponse(parameters.error(), call.request->id);
   std::string tile_query = WithToken(TileQuery(parameters->requested), call);
-  if (tile_query.empty()) return Serve(plain_[*dataset], *call.request, cache_control_);
+  if (tile_query.empty()) return Serve(plain_[*dataset], *call.request, kRevalidate);
   DocumentPlan plan;
   plan.key = fmt::format("layer {} {} {}", *dataset, TileQuery(parameters->requested), fmt::ptr(GrantInQuery(call)));
   plan.content_type = kJson;
-  plan.cache_control = cache_control_;
+  plan.cache_control = kRevalidate;
   plan.write = [&view = datasets_[*dataset], tile_query = std::move(tile_query)](const std::stop_token& stop) {
     return WriteLayer(view, tile_query, stop);
   };

@@ -16,14 +16,13 @@ namespace terrace::server {
 class LayerHandler {
  public:
   // `datasets` must outlive this.
-  LayerHandler(std::span<const DatasetView> datasets, std::string cache_control);
+  explicit LayerHandler(std::span<const DatasetView> datasets);
 
   // Precondition: a route of layer.json. `?error=E` and `?fraction=F` go into the tile template.
   Described Handle(const Call& call) const;
 
  private:
   const std::span<const DatasetView> datasets_;
-  const std::string cache_control_;
   std::vector<Document> plain_;  // one per dataset: what is served where no error is requested
 };
 

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "server/api/backend_failure.h"
+#include "server/api/caching.h"
 #include "server/api/negotiate.h"
 #include "server/http/http_error.h"
 
@@ -36,23 +37,23 @@ TileHandler::TileHandler(CatalogPtr catalog, TileService& tiles, HandlerOptions 
 Answer TileHandler::Handle(const Call& call) const {
   const Result<tiler::TileRequest> tile = Negotiate(call, catalog_->datasets);
   if (!tile) return ClientErrorResponse(tile.error(), call.request->id);
-  if (const std::optional<ServedTile> found = tiles_.Find(*catalog_, *tile)) return Reply(*found, call);
+  if (const std::optional<ServedTile> found = tiles_.Find(*catalog_, *tile)) return Reply(*tile, *found, call);
   return Build(call, *tile);
 }
 
 asio::awaitable<Response> TileHandler::Build(const Call& call, tiler::TileRequest tile) const {
   const auto deadline = TileService::Clock::now() + options_.deadline;
   const Result<ServedTile> served = co_await tiles_.Build(catalog_, tile, deadline, call.request->client);
-  if (served) co_return Reply(*served, call);
+  if (served) co_return Reply(tile, *served, call);
   co_return co_await BackendFailure(served.error(), call.request->id, options_.refusal_delay);
 }
 
-Response TileHandler::Reply(const ServedTile& served, const Call& call) const {
+Response TileHandler::Reply(const tiler::TileRequest& tile, const ServedTile& served, const Call& call) const {
   Response response;
   response.lines = std::shared_ptr<const std::string>(served.tile, &served.tile->head.text);
   response.lines_of_body = served.tile->head.of_body;
-  response.cache_control = options_.cache_control;
-  response.vary = call.route.format->varies;
+  response.cache_control = CacheControlOf(call.route.query, catalog_->datasets[tile.dataset], options_.cache_control);
+  response.vary = call.route.format->vary(tile);
   if (served.cache == CacheStatus::kHit) {
     response.more_lines = "Server-Timing: cache;desc=hit\r\n";
   } else {

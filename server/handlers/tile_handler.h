@@ -22,7 +22,7 @@ class TileHandler {
 
  private:
   asio::awaitable<Response> Build(const Call& call, tiler::TileRequest tile) const;
-  Response Reply(const ServedTile& served, const Call& call) const;
+  Response Reply(const tiler::TileRequest& tile, const ServedTile& served, const Call& call) const;
 
   const CatalogPtr catalog_;
   TileService& tiles_;

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "proto/documents/tile_json.h"
+#include "server/api/caching.h"
 #include "server/api/negotiate.h"
 #include "server/documents/document.h"
 #include "server/handlers/datasets_handler.h"
@@ -16,9 +17,9 @@ namespace terrace::server {
 namespace {
 
 // Defaults are left away, so that a tile is cached under one URL.
-std::string HeightTileQuery(const HeightTileParameters& parameters) {
-  std::string query;
-  const auto add = [&query](std::string text) { query += (query.empty() ? "" : "&") + std::move(text); };
+std::string HeightTileQuery(const DatasetView& dataset, const HeightTileParameters& parameters) {
+  std::string query = "v=" + dataset.version();
+  const auto add = [&query](const std::string& text) { query += "&" + text; };
   const HeightTileParameters defaults;
   if (parameters.encoding != defaults.encoding) add(fmt::format("encoding={}", proto::ToString(parameters.encoding)));
   if (parameters.size != defaults.size) add(fmt::format("size={}", parameters.size));
@@ -27,8 +28,8 @@ std::string HeightTileQuery(const HeightTileParameters& parameters) {
 
 }  // namespace
 
-TileJsonHandler::TileJsonHandler(std::span<const DatasetView> datasets, std::string cache_control)
-    : datasets_(datasets), cache_control_(std::move(cache_control)) {}
+TileJsonHandler::TileJsonHandler(std::span<const DatasetView> datasets, std::string_view origin_headers)
+    : datasets_(datasets), origin_headers_(origin_headers) {}
 
 Response TileJsonHandler::Handle(const Call& call) const {
   const Result<std::uint32_t> index = FindDataset(call.route.dataset, datasets_);
@@ -39,9 +40,9 @@ Response TileJsonHandler::Handle(const Call& call) const {
   proto::TileJsonDescription tiles;
   tiles.name = dataset.name;
   tiles.attribution = dataset.attribution;
-  const std::string query = WithToken(HeightTileQuery(*parameters), call);
-  tiles.tile_template = fmt::format("{}/{}/{{z}}/{{x}}/{{y}}.png{}{}", OriginOf(*call.request),
-                                    PercentEncode(dataset.name), query.empty() ? "" : "?", query);
+  tiles.tile_template =
+      fmt::format("{}/{}/{{z}}/{{x}}/{{y}}.png?{}", OriginOf(*call.request), PercentEncode(dataset.name),
+                  WithToken(HeightTileQuery(dataset, *parameters), call));
   tiles.max_zoom = MaxHeightLevel(dataset, parameters->size);
   tiles.tile_size = parameters->size;
   tiles.encoding = parameters->encoding;
@@ -50,8 +51,8 @@ Response TileJsonHandler::Handle(const Call& call) const {
   tiles.east = dataset.east;
   tiles.north = dataset.north;
   Response response =
-      Serve(Document::Make(proto::EncodeTileJson(tiles), "application/json"), *call.request, cache_control_);
-  response.vary_too = "Forwarded, X-Forwarded-Host, X-Forwarded-Proto";  // what a proxy may say of the origin
+      Serve(Document::Make(proto::EncodeTileJson(tiles), "application/json"), *call.request, kRevalidate);
+  response.vary_too = origin_headers_;
   return response;
 }
 

@@ -3,6 +3,7 @@
 
 #include <span>
 #include <string>
+#include <string_view>
 
 #include "server/api/call.h"
 #include "server/http/request.h"
@@ -14,14 +15,15 @@ namespace terrace::server {
 class TileJsonHandler {
  public:
   // `datasets` must outlive this.
-  TileJsonHandler(std::span<const DatasetView> datasets, std::string cache_control);
+  // `origin_headers`: HandlerOptions.
+  TileJsonHandler(std::span<const DatasetView> datasets, std::string_view origin_headers);
 
   // Precondition: a kTileJson call.route. `?encoding` and `?size` go into the tile template.
   Response Handle(const Call& call) const;
 
  private:
   const std::span<const DatasetView> datasets_;
-  const std::string cache_control_;
+  const std::string_view origin_headers_;
 };
 
 // "http://host:port" as the client addressed this server or the proxy before it; empty without a Host.

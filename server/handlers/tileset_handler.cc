@@ -10,6 +10,7 @@
 #include "proto/documents/implicit_tree.h"
 #include "proto/documents/subtree.h"
 #include "proto/documents/tileset.h"
+#include "server/api/caching.h"
 #include "server/api/negotiate.h"
 #include "server/handlers/layer_handler.h"
 #include "server/handlers/tile_heights.h"
@@ -63,6 +64,7 @@ std::string WriteTileset(const DatasetView& dataset, const std::vector<proto::Tr
                          RequestedError requested, std::string content_query, std::string subtree_query) {
   requested.at_least = requested.error_m.has_value();  // as TileQuery writes it into the templates
   proto::TilesetDescription tileset;
+  tileset.version = dataset.version();
   tileset.attribution = dataset.attribution;
   tileset.roots = roots;
   tileset.heights = [&](const geo::TileKey& key) { return HeightsOfTile(dataset, requested, key); };
@@ -102,12 +104,12 @@ Described TilesetHandler::Handle(const Call& call) const {
   if (!parameters) return ClientErrorResponse(parameters.error(), call.request->id);
   const std::string content_parameters = ContentQuery(parameters->requested, call.route.query);
   std::string content_query = WithToken(content_parameters, call);
-  if (content_query.empty()) return Serve(plain_[*dataset], *call.request, cache_control_);
+  if (content_query.empty()) return Serve(plain_[*dataset], *call.request, kRevalidate);
   std::string subtree_query = WithToken(TileQuery(parameters->requested), call);
   DocumentPlan plan;
   plan.key = fmt::format("tileset {} {} {}", *dataset, content_parameters, fmt::ptr(GrantInQuery(call)));
   plan.content_type = kJsonType;
-  plan.cache_control = cache_control_;
+  plan.cache_control = kRevalidate;
   plan.write = [&view = datasets_[*dataset], roots = roots_[*dataset], requested = parameters->requested,
                 content_query = std::move(content_query),
                 subtree_query = std::move(subtree_query)](const std::stop_token&) {
@@ -133,7 +135,7 @@ Described TilesetHandler::HandleSubtree(const Call& call) const {
   plan.key = fmt::format("subtree {} {} {} {}{}", *index, geo::ToString(call.route.key), call.route.subtree_levels,
                          TileQuery(requested), requested.at_least ? "" : " alone");
   plan.content_type = "application/octet-stream";
-  plan.cache_control = cache_control_;
+  plan.cache_control = CacheControlOf(call.route.query, dataset, cache_control_);
   plan.write = [&dataset, requested, top = call.route.key, levels = call.route.subtree_levels](const std::stop_token&) {
     return WriteSubtree(dataset, requested, top, levels);
   };

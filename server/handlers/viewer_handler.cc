@@ -4,16 +4,11 @@
 
 #include <utility>
 
+#include "server/api/caching.h"
 #include "server/http/http_error.h"
 #include "server/query/query.h"
 
 namespace terrace::server {
-namespace {
-
-// Files of the viewer change with the server: clients ask again, and usually hear 304.
-constexpr std::string_view kRevalidate = "no-cache";
-
-}  // namespace
 
 ViewerHandler::ViewerHandler(std::span<const DatasetView> datasets, std::shared_ptr<const StaticFiles> files)
     : datasets_(datasets),

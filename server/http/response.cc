@@ -95,7 +95,7 @@ void PutCacheControl(std::string& head, const Response& response, bool is_privat
 void PutVary(std::string& head, const Response& response, const CorsPolicy& cors) {
   std::string_view before = "Vary: ";
   const auto add = [&](std::string_view names) { head.append(std::exchange(before, ", ")).append(names); };
-  if (response.vary) add("Accept, Accept-Encoding");
+  if (!response.vary.empty()) add(response.vary);
   if (!response.vary_too.empty()) add(response.vary_too);
   if (response.for_grant) add("Authorization");
   if (cors.varies()) add("Origin");

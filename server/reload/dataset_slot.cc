@@ -10,6 +10,8 @@
 #include <system_error>
 #include <utility>
 
+#include "tiler/encoder_version.h"
+
 namespace terrace::server {
 namespace {
 
@@ -154,8 +156,8 @@ bool DatasetSlot::TakeOpened() {
     return false;
   }
   const auto took = stale_since_ ? Clock::now() - *stale_since_ : Clock::duration(0);
-  spdlog::info("dataset {}: {} is served now, generation {:016x}, {} after the change was seen", wanted_.name,
-               wanted_.sources.front().written, opened->generation,
+  spdlog::info("dataset {}: {} is served now, version {}, {} after the change was seen", wanted_.name,
+               wanted_.sources.front().written, tiler::VersionText(opened->generation),
                std::chrono::duration_cast<std::chrono::milliseconds>(took));
   serving_ = *std::move(opened);
   files_ = FilesOf(*serving_);

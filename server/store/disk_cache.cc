@@ -15,7 +15,7 @@
 #include <system_error>
 #include <utility>
 
-#include "tiler/encoder_version.h"
+#include "tiler/build_id.h"
 #include "tiler/store/tile_record.h"
 
 namespace terrace::server {
@@ -67,7 +67,7 @@ DiskStoreOptions OptionsOf(const std::filesystem::path& directory, std::size_t b
 
 template <typename Key>
 std::string StoreKey(const Key& key) {
-  const std::uint64_t version = tiler::EncoderVersion();
+  const std::uint64_t version = tiler::BuildId();
   std::string text(reinterpret_cast<const char*>(&version), sizeof(version));
   return text + tiler::RecordKey(key);
 }
@@ -112,7 +112,7 @@ class DiskCache::Tier : public tiler::Store<Key, Value> {
 };
 
 Result<std::shared_ptr<DiskCache>> DiskCache::Open(const config::DiskCacheConfig& config, std::size_t open_files) {
-  tiler::EncoderVersion();  // taken before sources are opened, for which GDAL may load libraries
+  tiler::BuildId();  // taken before sources are opened, for which GDAL may load libraries
   std::error_code failed;
   std::filesystem::create_directories(config.directory, failed);
   if (failed) {

@@ -1,7 +1,7 @@
 // The cache tier below memory: encoded tiles and refinements on disk, which outlive the process.
 //
 // Thread-safe. Read on a worker, before a build; written in the background. A record is found only by the program that
-// wrote it (EncoderVersion), only for the generation of the dataset that it was made from, and only if its checksum is
+// wrote it (BuildId), only for the generation of the dataset that it was made from, and only if its checksum is
 // right. Records that are damaged, lost or outdated are built again.
 #pragma once
 

@@ -122,6 +122,19 @@ prometheus::MetricFamily Samples(const std::vector<std::pair<std::string, dem::S
   return family;
 }
 
+prometheus::MetricFamily Versions(const std::vector<std::pair<std::string, std::string>>& datasets) {
+  prometheus::MetricFamily family;
+  family.name = "terrace_dataset_info";
+  family.help = "1 for each dataset, with the version that it is served in";
+  family.type = prometheus::MetricType::Gauge;
+  for (const auto& [dataset, version] : datasets) {
+    prometheus::ClientMetric& metric = family.metric.emplace_back();
+    metric.label = {{"dataset", dataset}, {"version", version}};
+    metric.gauge.value = 1;
+  }
+  return family;
+}
+
 }  // namespace
 
 struct Metrics::Families {
@@ -322,6 +335,7 @@ std::string Metrics::Text(const TileService::Stats& tiles, const tiler::ByteCach
   add(kCounter, "terrace_gdal_warnings_total", "Warnings that GDAL reported", sources.gdal.warnings);
   add(kGauge, "terrace_gdal_cache_bytes", "Blocks of sources in GDAL's cache", sources.gdal.cache_bytes);
   all.push_back(Samples(sources.samples));
+  all.push_back(Versions(state.versions));
   return prometheus::TextSerializer().Serialize(all);
 }
 

@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "server/net/transfer_budget.h"
@@ -33,8 +34,9 @@ class Metrics {
     std::uint64_t refused_connections = 0;
     TransferBudget::Stats transfers;
     std::size_t datasets = 0, troubles = 0;
-    std::uint64_t catalogs = 0;               // that have replaced one another
-    std::optional<DiskCacheStats> disk = {};  // nothing: there is none
+    std::vector<std::pair<std::string, std::string>> versions = {};  // name and version of each dataset
+    std::uint64_t catalogs = 0;                                      // that have replaced one another
+    std::optional<DiskCacheStats> disk = {};                         // nothing: there is none
   };
   // Everything counted so far and the state given.
   std::string Text(const TileService::Stats& tiles, const tiler::ByteCacheStats& refinements,

@@ -18,6 +18,7 @@
 #include "engine/geo/tile_key.h"
 #include "proto/gltf/glb_tile.h"
 #include "proto/gltf/texture.h"
+#include "tiler/encoder_version.h"
 
 namespace terrace::server {
 
@@ -40,6 +41,8 @@ struct DatasetView {
   int metadata_levels = 0;                      // tiles at multiples of this level have metadata; 0: none
   int max_mercator_depth = 1;                   // the deepest geo::MercatorGrid that height tiles are cut from
 
+  // As it stands in URLs, changes with the generation.
+  std::string version() const { return tiler::VersionText(generation); }
   int max_level() const { return static_cast<int>(available.size()) - 1; }
 };
 

@@ -235,12 +235,21 @@ Result<std::shared_ptr<const Geoid>> Geoid::OfGrid(const std::string& path, Posi
   geoid->name_ = std::filesystem::path(path).filename().string();
   geoid->description_ = "undulations of " + path;
   geoid->files_ = StampedFiles({path});
+  geoid->is_of_file_ = true;
   geoid->operations_.set_pipeline(
       fmt::format("+proj=pipeline +step +proj=unitconvert +xy_in=deg +xy_out=rad +step +proj=vgridshift +grids=\"{}\" "
                   "+multiplier=1 +step +proj=unitconvert +xy_in=rad +xy_out=deg",
                   std::filesystem::absolute(path, ignored).string()));
   geoid->FindGrid();
   return Checked(geoid, centre);
+}
+
+Result<void> Geoid::AddTo(ContentHasher& hasher, const FileContentOptions& options) const {
+  const auto grids = HashFiles(files_, options);
+  if (!grids) return tl::unexpected(grids.error());
+  hasher.AddText(is_of_file_ ? "a grid" : pipeline());
+  hasher.Add(*grids);
+  return {};
 }
 
 // What cannot be evaluated, and what counts downwards, is found here and not in a tile.

@@ -14,7 +14,7 @@
 #include "engine/core/result.h"
 #include "engine/dem/crs/projector.h"
 #include "engine/dem/crs/undulation_grid.h"
-#include "engine/dem/gdal/file_stamp.h"
+#include "engine/dem/gdal/file_content.h"
 #include "engine/dem/gdal/operation_pool.h"
 
 namespace terrace::dem {
@@ -62,6 +62,8 @@ class Geoid {
   const std::string& pipeline() const { return operations_.pipeline(); }  // as PROJ runs it
   // What the operation reads, as it was when it was set up.
   const StampedFiles& files() const { return files_; }
+  // Adds the operation and its grids' bytes; where a grid lies makes no difference. Errors: those of HashFiles.
+  Result<void> AddTo(ContentHasher& hasher, const FileContentOptions& options) const;
   // Where the operation is bilinear interpolation in one grid and nothing else: that grid. Else null.
   const UndulationGrid* grid() const { return grid_.get(); }
   // Degrees, the smaller side of a cell of the finest grid that the operation reads; 0 where that is not known.
@@ -75,6 +77,7 @@ class Geoid {
 
   AreaOfUse area_;
   std::string name_, unit_, description_;
+  bool is_of_file_ = false;  // OfGrid: the pipeline names a file by its path
   StampedFiles files_;
   std::shared_ptr<const UndulationGrid> grid_;
   double finest_cell_ = 0;

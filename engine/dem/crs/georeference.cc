@@ -2,7 +2,6 @@
 
 #include <cpl_conv.h>
 #include <ogr_spatialref.h>
-#include <xxhash.h>
 
 #include <algorithm>
 #include <array>
@@ -11,7 +10,6 @@
 #include <numbers>
 #include <vector>
 
-#include "engine/core/bytes.h"
 #include "engine/dem/gdal/gdal_runtime.h"
 #include "engine/dem/gdal/sample_rules.h"
 
@@ -313,15 +311,29 @@ void Georeference::ToDegrees(std::span<Position> positions) const {
 double Georeference::pixel_width() const { return std::hypot(to_crs_[1], to_crs_[4]); }
 double Georeference::pixel_height() const { return std::hypot(to_crs_[2], to_crs_[5]); }
 
-std::uint64_t FingerprintOf(const StampedFiles& files, const Georeference& where) {
-  ByteWriter writer;
-  writer.Put(files.fingerprint());
-  if (const Projector* const projector = where.projector()) {
-    writer.PutBytes(projector->pipeline());
-    writer.Put(projector->grids().fingerprint());
-  }
-  const std::string bytes = writer.Take();
-  return XXH3_64bits(bytes.data(), bytes.size());
+Result<void> Georeference::AddTo(ContentHasher& hasher, const FileContentOptions& options) const {
+  hasher.Add(width_);
+  hasher.Add(height_);
+  for (const double number : to_crs_) hasher.Add(number);
+  hasher.Add(full_circle_);
+  hasher.Add(period_);
+  hasher.Add(wrap_columns_);
+  hasher.AddText(pipeline());
+  if (projector_ == nullptr) return {};
+  const auto grids = HashFiles(projector_->grids(), options);
+  if (!grids) return tl::unexpected(grids.error());
+  hasher.Add(*grids);
+  return {};
+}
+
+Result<std::uint64_t> Georeference::FingerprintWith(const StampedFiles& files,
+                                                    const FileContentOptions& options) const {
+  const auto bytes = HashFiles(files, options);
+  if (!bytes) return tl::unexpected(bytes.error());
+  ContentHasher hasher;
+  hasher.Add(*bytes);
+  if (auto placed = AddTo(hasher, options); !placed) return tl::unexpected(placed.error());
+  return hasher.Hash().low;
 }
 
 }  // namespace terrace::dem

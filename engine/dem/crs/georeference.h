@@ -15,7 +15,7 @@
 
 #include "engine/core/result.h"
 #include "engine/dem/crs/projector.h"
-#include "engine/dem/gdal/file_stamp.h"
+#include "engine/dem/gdal/file_content.h"
 
 namespace terrace::dem {
 
@@ -86,6 +86,12 @@ class Georeference {
   std::string transform() const { return projector_ == nullptr ? "" : projector_->description(); }
   std::string pipeline() const { return projector_ == nullptr ? "" : projector_->pipeline(); }
 
+  // Adds all that decides where pixels lie. Which operation of PROJ places them, and by which grids, depends on what is
+  // installed. Errors: those of HashFiles.
+  Result<void> AddTo(ContentHasher& hasher, const FileContentOptions& options) const;
+  // Identifies the bytes of the files of a raster that lies there. Errors: those of HashFiles.
+  Result<std::uint64_t> FingerprintWith(const StampedFiles& files, const FileContentOptions& options) const;
+
  private:
   Result<void> SetAffine(const std::string& path);
   Result<void> ReadCrs(const OGRSpatialReference& srs, const std::string& path);
@@ -106,9 +112,5 @@ class Georeference {
   std::string wkt_, horizontal_wkt_;            // of the CRS as stated, and without what heights count from
   std::string crs_, vertical_datum_, vertical_unit_, vertical_crs_, pixel_unit_;
 };
-
-// Identifies what is in the files of a raster and where it lies: which operation of PROJ places it, and by which grids,
-// depends on what is installed.
-std::uint64_t FingerprintOf(const StampedFiles& files, const Georeference& where);
 
 }  // namespace terrace::dem

@@ -34,8 +34,8 @@ class StampedFiles {
  public:
   StampedFiles() = default;
   // Stamps regular files. GDAL paths (/vsi: remote files, archive members) are not watched; their fingerprint covers
-  // path, size, modification time and ETag. Without modification time and ETag it differs at each start. Other paths
-  // are ignored.
+  // path, size and ETag, or the modification time where there is no ETag. Without both it differs at each start. Other
+  // paths are ignored.
   explicit StampedFiles(const std::vector<std::string>& paths);
 
   // Stamps files that have just been opened. `before` is the stamp of the first file before it was opened. kChanged:
@@ -52,10 +52,13 @@ class StampedFiles {
   std::size_t size() const { return paths_.size(); }
   bool HasChanged(std::size_t i) const { return StampOf(paths_[i]) != stamps_[i]; }
   const std::string& path(std::size_t i) const { return paths_[i]; }
+  const FileStamp& stamp(std::size_t i) const { return stamps_[i]; }
   void Append(const StampedFiles& more);
 
   // Returns a hash of all stamps and GDAL paths.
   std::uint64_t fingerprint() const;
+  // Of the GDAL paths alone, in order.
+  const std::vector<std::uint64_t>& other_fingerprints() const { return others_; }
 
  private:
   std::vector<std::string> paths_;

@@ -2,8 +2,10 @@
 
 #include <cpl_conv.h>
 #include <cpl_error.h>
+#include <fmt/format.h>
 #include <gdal.h>
 #include <ogr_srs_api.h>
+#include <proj.h>
 
 #include <atomic>
 #include <mutex>
@@ -56,6 +58,10 @@ void InitOnce() {
 void InitGdal() {
   static std::once_flag once;
   std::call_once(once, InitOnce);
+}
+
+std::string LibraryVersions() {
+  return fmt::format("GDAL {}, PROJ {}", GDALVersionInfo("RELEASE_NAME"), proj_info().version);
 }
 
 void SetGdalCache(std::size_t bytes) {

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <string>
 
 namespace terrace::dem {
 
@@ -12,6 +13,9 @@ struct GdalCounts {
   std::uint64_t cache_bytes = 0;  // of blocks, now
 };
 GdalCounts CountGdalErrors();
+
+// "GDAL 3.6.2, PROJ 9.1.1": those in use. Another version of one may read or place samples otherwise.
+std::string LibraryVersions();
 
 // How much memory blocks of rasters may take, in all threads together.
 void SetGdalCache(std::size_t bytes);

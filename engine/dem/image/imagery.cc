@@ -38,6 +38,7 @@ class Imagery::Impl {
   const Georeference georeference;
   SourceSpacing spacing;
   Footprint footprint;  // padded: outside it there is no picture
+  std::uint64_t fingerprint = 0;
 };
 
 Result<std::optional<TilePicture>> Imagery::Impl::Read(const geo::TileKey& key, int side, const std::stop_token& stop) {
@@ -82,7 +83,8 @@ Result<std::optional<TilePicture>> Imagery::Impl::Read(const geo::TileKey& key, 
 Imagery::Imagery(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Imagery::~Imagery() = default;
 
-Result<std::unique_ptr<Imagery>> Imagery::Open(const std::string& path, const GeoBounds& around) {
+Result<std::unique_ptr<Imagery>> Imagery::Open(const std::string& path, const GeoBounds& around,
+                                               const FileContentOptions& content) {
   ForgetRemote(path);
   const auto before = StampOf(path);
   auto image = ImageFile::Open(path);
@@ -102,6 +104,9 @@ Result<std::unique_ptr<Imagery>> Imagery::Open(const std::string& path, const Ge
   auto impl = std::make_unique<Impl>(ImagePool(*std::move(image), *std::move(files)), *std::move(georeference));
   impl->spacing = *spacing;
   impl->footprint = footprint.Padded();
+  const auto fingerprint = impl->georeference.FingerprintWith(impl->pool.files(), content);
+  if (!fingerprint) return tl::unexpected(fingerprint.error());
+  impl->fingerprint = *fingerprint;
   return std::unique_ptr<Imagery>(new Imagery(std::move(impl)));
 }
 
@@ -118,7 +123,7 @@ Result<std::optional<TilePicture>> Imagery::Read(const geo::TileKey& key, int si
   return impl_->Read(key, side, stop);
 }
 
-std::uint64_t Imagery::fingerprint() const { return FingerprintOf(impl_->pool.files(), impl_->georeference); }
+std::uint64_t Imagery::fingerprint() const { return impl_->fingerprint; }
 const StampedFiles& Imagery::files() const { return impl_->pool.files(); }
 
 }  // namespace terrace::dem

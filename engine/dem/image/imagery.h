@@ -13,6 +13,7 @@
 
 #include "engine/core/result.h"
 #include "engine/dem/dem_types.h"
+#include "engine/dem/gdal/file_content.h"
 #include "engine/dem/gdal/file_stamp.h"
 #include "engine/geo/tile_key.h"
 
@@ -32,7 +33,8 @@ class Imagery {
 
   // What raster_colors.h reads, with a georeference. kInvalidArgument, with the remedy: what OpenRaster and
   // Georeference refuse, bands that are no colours, and an image that lies nowhere in `around`.
-  static Result<std::unique_ptr<Imagery>> Open(const std::string& path, const GeoBounds& around);
+  static Result<std::unique_ptr<Imagery>> Open(const std::string& path, const GeoBounds& around,
+                                               const FileContentOptions& content = {});
   ~Imagery();
 
   // Pixels along the edge of a level's tiles: `most`, or half of it again and again, down to 256, as long as that is
@@ -46,7 +48,7 @@ class Imagery {
   // Preconditions: a valid key; side as above. kUnavailable: the image cannot be read now. kCancelled: stopped.
   Result<std::optional<TilePicture>> Read(const geo::TileKey& key, int side, std::stop_token stop = {}) const;
 
-  // Identifies the content: device, inode, size, mtime and ctime of its files.
+  // Identifies the content: the bytes of its files, and where they lie on the Earth. The same of every copy.
   std::uint64_t fingerprint() const;
 
   // What it is read from, as it was when it was opened.

@@ -47,6 +47,7 @@ class WaterRaster::Impl {
   SourceSpacing spacing;
   RasterLayout layout;
   Footprint footprint;  // padded: outside it there is no water
+  std::uint64_t fingerprint = 0;
 
  private:
   bool IsInside(const Position& position) const {  // false for NaN
@@ -96,7 +97,8 @@ Result<std::vector<std::uint8_t>> WaterRaster::Impl::Read(const geo::TileKey& ke
 WaterRaster::WaterRaster(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 WaterRaster::~WaterRaster() = default;
 
-Result<std::unique_ptr<WaterRaster>> WaterRaster::Open(const std::string& path, const GeoBounds& around) {
+Result<std::unique_ptr<WaterRaster>> WaterRaster::Open(const std::string& path, const GeoBounds& around,
+                                                       const FileContentOptions& content) {
   ForgetRemote(path);
   const auto before = StampOf(path);
   auto dataset = OpenRaster(path);
@@ -115,6 +117,9 @@ Result<std::unique_ptr<WaterRaster>> WaterRaster::Open(const std::string& path, 
   impl->spacing = *spacing;
   impl->layout = LayoutOf(**dataset, impl->georeference);
   impl->footprint = footprint.Padded();
+  const auto fingerprint = impl->georeference.FingerprintWith(impl->handles.files(), content);
+  if (!fingerprint) return tl::unexpected(fingerprint.error());
+  impl->fingerprint = *fingerprint;
   if (auto unchanged = impl->handles.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
   return std::unique_ptr<WaterRaster>(new WaterRaster(std::move(impl)));
 }
@@ -124,7 +129,7 @@ Result<std::vector<std::uint8_t>> WaterRaster::Read(const geo::TileKey& key, std
   return impl_->Read(key, stop);
 }
 
-std::uint64_t WaterRaster::fingerprint() const { return FingerprintOf(impl_->handles.files(), impl_->georeference); }
+std::uint64_t WaterRaster::fingerprint() const { return impl_->fingerprint; }
 const StampedFiles& WaterRaster::files() const { return impl_->handles.files(); }
 
 }  // namespace terrace::dem

@@ -11,6 +11,7 @@
 
 #include "engine/core/result.h"
 #include "engine/dem/dem_types.h"
+#include "engine/dem/gdal/file_content.h"
 #include "engine/dem/gdal/file_stamp.h"
 #include "engine/geo/tile_key.h"
 
@@ -22,7 +23,8 @@ class WaterRaster {
 
   // Band 1 of any raster that GDAL reads and that is georeferenced. kInvalidArgument, with the remedy: what OpenRaster
   // and Georeference refuse, and a raster that lies nowhere in `around`.
-  static Result<std::unique_ptr<WaterRaster>> Open(const std::string& path, const GeoBounds& around);
+  static Result<std::unique_ptr<WaterRaster>> Open(const std::string& path, const GeoBounds& around,
+                                                   const FileContentOptions& content = {});
   ~WaterRaster();
 
   // kSide x kSide pixels of a tile, row by row from the NORTH-western one: 0 land .. 255 water; in between, how much of
@@ -36,7 +38,7 @@ class WaterRaster {
   // Any valid key. kUnavailable: the raster cannot be read now. kCancelled: stopped.
   Result<std::vector<std::uint8_t>> Read(const geo::TileKey& key, std::stop_token stop = {}) const;
 
-  // Identifies the content: device, inode, size, mtime and ctime of its files.
+  // Identifies the content: the bytes of its files, and where they lie on the Earth. The same of every copy.
   std::uint64_t fingerprint() const;
 
   // What it is read from, as it was when it was opened.

@@ -218,6 +218,7 @@ void RasterSource::KeepTables(PreparedRaster prepared, const PrepareOptions& pre
                               std::shared_ptr<StatisticsPages> pages) {
   constexpr std::size_t kMaxCoarse = 64;  // blocks of a level
   RasterStatistics& statistics = prepared.statistics;
+  content_ = statistics.content;
   edge_row_means_ = statistics.edge_row_means;
   rim_voids_ = std::move(statistics.rim_voids);
   if (pages == nullptr || prepared.cache_file.empty() || pages->Admit(statistics.bytes())) {

@@ -46,6 +46,8 @@ class RasterSource {
   const Footprint& footprint() const { return footprint_; }
   const SourceSpacing& spacing() const { return spacing_; }
   const RimVoids& rim_voids() const { return rim_voids_; }
+  // Of its heights, in metres as they are read: a copy of the file has the same.
+  const ContentHash& content() const { return content_; }
   // Of the valid samples of the first and the last row.
   const std::array<std::optional<double>, 2>& edge_row_means() const { return edge_row_means_; }
 
@@ -82,6 +84,7 @@ class RasterSource {
   RasterLayout layout_;
   Footprint footprint_;
   SourceSpacing spacing_;
+  ContentHash content_;
   std::array<std::optional<double>, 2> edge_row_means_;
   RimVoids rim_voids_;
   StatisticsPages::Tables kept_;  // null: they are paged

@@ -80,6 +80,15 @@ void CountSamples(const Samples& samples, const Chunk& chunk, const RasterLayout
   }
 }
 
+ContentHash HashOf(const Samples& samples, const Chunk& chunk) {
+  ContentHasher hasher;
+  for (int r = 0; r < chunk.rows; ++r) {
+    const float* row = samples.Row(chunk.row + r) + (chunk.col - samples.box.col);
+    hasher.AddBytes(row, static_cast<std::size_t>(chunk.cols) * sizeof(float));
+  }
+  return hasher.Hash();
+}
+
 // Sums of the blocks of a box of samples that starts where a block does and ends with a block or the raster.
 std::vector<BlockSum> SumsOf(const Samples& samples, const Chunk& box, int factor) {
   const int columns = DivideUp(box.cols, factor);
@@ -312,6 +321,7 @@ Result<ChunkStatistics> ReadChunkStatistics(GDALDataset& dataset, const RasterLa
   for (BlockRange& range : statistics.ranges) range = {};
   CountSamples(samples, chunk, layout, statistics);
   if (statistics.is_void()) return VoidStatistics(chunk, layout);
+  statistics.content = HashOf(samples, chunk);
   if (auto compared = CompareAverages(dataset, layout, samples, chunk, stop, statistics); !compared) {
     return tl::unexpected(compared.error());
   }

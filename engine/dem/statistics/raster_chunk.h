@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "engine/core/result.h"
+#include "engine/dem/common/content_hash.h"
 #include "engine/dem/common/range_table.h"
 #include "engine/dem/raster/block_averages.h"
 #include "engine/dem/raster/sample_grid.h"
@@ -52,6 +53,7 @@ struct VoidRun {
 };
 
 struct ChunkStatistics {
+  ContentHash content;     // of the heights, row by row; zero of a void chunk
   std::int64_t valid = 0;  // samples
   ZeroEdges zeros;
   BlockSum first_row, last_row;    // of the raster's first and last row within the chunk

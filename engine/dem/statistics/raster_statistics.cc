@@ -63,6 +63,8 @@ StatisticsAssembler::StatisticsAssembler(const RasterLayout& layout)
         if (samples > 1) statistics_.table.MarkHole(row, first, last);
         statistics_.hole_samples += static_cast<std::uint64_t>(last - first + 1);
       }) {
+  content_.Add(layout.width);
+  content_.Add(layout.height);
   statistics_.table = RangeTable(layout.width, layout.height);
   statistics_.errors = AveragingErrors(layout.width, layout.height);
   if (!layout.overview_factors.empty()) return;
@@ -72,6 +74,7 @@ StatisticsAssembler::StatisticsAssembler(const RasterLayout& layout)
 }
 
 void StatisticsAssembler::Add(const Chunk& chunk, const ChunkStatistics& chunk_statistics) {
+  content_.Add(chunk_statistics.content);
   statistics_.table.AddBlocks(chunk.col / RangeTable::kBlock, chunk.row / RangeTable::kBlock,
                               DivideUp(chunk.cols, RangeTable::kBlock), chunk_statistics.ranges);
   statistics_.valid += static_cast<std::uint64_t>(chunk_statistics.valid);
@@ -152,12 +155,14 @@ Result<void> StatisticsAssembler::FinishCoarse(GDALDataset& dataset, const std::
 
 Result<void> StatisticsAssembler::AddOverviews(GDALDataset& dataset, const std::stop_token& stop) {
   for (const int factor : layout_.overview_factors) {
+    content_.Add(factor);
     const int columns = DivideUp(layout_.columns, factor), rows = DivideUp(layout_.height, factor);
     for (int row = 0; row < rows; row += kStripRows) {
       for (int column = 0; column < columns; column += kStripColumns) {
         const Chunk box{column, row, std::min(kStripColumns, columns - column), std::min(kStripRows, rows - row)};
         const auto heights = ReadGrid(dataset, layout_, factor, {box.col, box.row, box.cols, box.rows}, stop);
         if (!heights) return tl::unexpected(heights.error());
+        content_.AddBytes(heights->data(), heights->size() * sizeof(float));
         statistics_.table.AddWindow(box.col, box.row, box.cols, box.rows, heights->data(), factor);
       }
     }
@@ -189,6 +194,7 @@ Result<RasterStatistics> StatisticsAssembler::Finish(GDALDataset& dataset, const
   if (auto coarse = FinishCoarse(dataset, stop); !coarse) return tl::unexpected(coarse.error());
   if (auto overviews = AddOverviews(dataset, stop); !overviews) return tl::unexpected(overviews.error());
   statistics_.table.Finish();
+  statistics_.content = content_.Hash();
   return std::move(statistics_);
 }
 

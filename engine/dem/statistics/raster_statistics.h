@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "engine/core/result.h"
+#include "engine/dem/common/content_hash.h"
 #include "engine/dem/common/range_table.h"
 #include "engine/dem/raster/sample_grid.h"
 #include "engine/dem/statistics/averaging_errors.h"
@@ -40,6 +41,7 @@ class CoarseAverages {
 };
 
 struct RasterStatistics {
+  ContentHash content;            // of all heights, those of overviews that are read included
   RangeTable table;               // overviews that are read count too: their resampling may overshoot the samples
   float lowest = 0, highest = 0;  // of the samples
   std::uint64_t valid = 0, voids = 0;
@@ -74,6 +76,7 @@ class StatisticsAssembler {
 
   const RasterLayout layout_;
   RasterStatistics statistics_;
+  ContentHasher content_;
   RimVoidFinder voids_;
   BlockSum first_row_, last_row_;
   std::vector<BlockSum> largest_sums_;  // of factor ChunkGrid::kSide

@@ -59,6 +59,15 @@ ZeroEdges GetZeros(ByteReader& reader) {
   return zeros;
 }
 
+void Put(ByteWriter& writer, const ContentHash& hash) {
+  writer.Put(hash.high);
+  writer.Put(hash.low);
+}
+ContentHash GetHash(ByteReader& reader) {
+  const auto high = reader.Get<std::uint64_t>();
+  return {high, reader.Get<std::uint64_t>()};
+}
+
 // Nothing where the bytes hold fewer than they say.
 std::optional<std::uint32_t> GetCount(ByteReader& reader, std::size_t bytes_each) {
   const auto count = reader.Get<std::uint32_t>();
@@ -100,6 +109,7 @@ BlockSum GetSum(ByteReader& reader) {
 
 std::string EncodeChunk(const ChunkStatistics& chunk_statistics) {
   ByteWriter writer;
+  Put(writer, chunk_statistics.content);
   writer.Put(chunk_statistics.valid);
   Put(writer, chunk_statistics.zeros);
   Put(writer, chunk_statistics.first_row);
@@ -126,6 +136,7 @@ std::optional<ChunkStatistics> DecodeChunk(std::string_view bytes, const Chunk& 
   for (std::size_t k = 0; k < chunk_statistics.sums.size(); ++k) {
     chunk_statistics.sums[k].resize(AveragesIn(chunk, layout, kLargestDirect << (k + 1)));
   }
+  chunk_statistics.content = GetHash(reader);
   chunk_statistics.valid = reader.Get<std::int64_t>();
   chunk_statistics.zeros = GetZeros(reader);
   chunk_statistics.first_row = GetSum(reader);
@@ -148,6 +159,7 @@ std::optional<ChunkStatistics> DecodeChunk(std::string_view bytes, const Chunk& 
 
 std::string EncodeStatistics(const RasterStatistics& statistics) {
   ByteWriter writer;
+  Put(writer, statistics.content);
   writer.Put(statistics.lowest);
   writer.Put(statistics.highest);
   writer.Put(statistics.valid);
@@ -169,6 +181,7 @@ std::string EncodeStatistics(const RasterStatistics& statistics) {
 std::optional<RasterStatistics> DecodeStatistics(std::string_view bytes, const RasterLayout& layout) {
   ByteReader reader(bytes);
   RasterStatistics statistics;
+  statistics.content = GetHash(reader);
   statistics.lowest = reader.Get<float>();
   statistics.highest = reader.Get<float>();
   statistics.valid = reader.Get<std::uint64_t>();

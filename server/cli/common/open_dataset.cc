@@ -8,6 +8,9 @@
 #include <utility>
 #include <vector>
 
+#include "engine/dem/gdal/file_content.h"
+#include "tiler/encoder_version.h"
+
 namespace terrace::cli {
 namespace {
 
@@ -33,11 +36,12 @@ std::vector<dem::DemFile> FilesOf(const config::DatasetConfig& dataset) {
   return files;
 }
 
-Result<tiler::WaterRules> OpenWater(const config::WaterConfig& wanted, const dem::GeoBounds& bounds) {
+Result<tiler::WaterRules> OpenWater(const config::WaterConfig& wanted, const dem::GeoBounds& bounds,
+                                    const dem::FileContentOptions& content) {
   tiler::WaterRules water;
   water.sea_level_m = wanted.sea_level;
   if (wanted.mask.empty()) return water;
-  auto mask = dem::WaterRaster::Open(wanted.mask, bounds);
+  auto mask = dem::WaterRaster::Open(wanted.mask, bounds, content);
   if (!mask) {
     std::error_code unreadable;
     const bool exists = std::filesystem::exists(wanted.mask, unreadable);
@@ -48,10 +52,11 @@ Result<tiler::WaterRules> OpenWater(const config::WaterConfig& wanted, const dem
   return water;
 }
 
-Result<tiler::ImageryRules> OpenImagery(const config::ImageryConfig& wanted, const dem::GeoBounds& bounds) {
+Result<tiler::ImageryRules> OpenImagery(const config::ImageryConfig& wanted, const dem::GeoBounds& bounds,
+                                        const dem::FileContentOptions& content) {
   tiler::ImageryRules imagery;
   if (wanted.image.empty()) return imagery;
-  auto image = dem::Imagery::Open(wanted.image, bounds);
+  auto image = dem::Imagery::Open(wanted.image, bounds, content);
   if (!image) return MakeError(image.error().code, "imagery {}", image.error().message);
   imagery.image = *std::move(image);
   imagery.texture = wanted.texture;
@@ -61,18 +66,20 @@ Result<tiler::ImageryRules> OpenImagery(const config::ImageryConfig& wanted, con
   return imagery;
 }
 
-// Changes when the source, a layer, or an option that changes bytes does. The files' identity is in the fingerprints.
+// Changes when a source, a layer, or an option that changes bytes does, and with the encoders; equal for equal
+// contents, wherever they lie. What decides heights is in the fingerprint of the source.
 std::uint64_t GenerationOf(const config::DatasetConfig& wanted, const tiler::Dataset& dataset,
                            const std::string& version) {
   const tiler::WaterRules& water = dataset.water;
   const tiler::ImageryRules& imagery = dataset.imagery;
-  const std::string text =
-      fmt::format("{} {} {} {} {} {} {} {} {} {} {} {} {} {}:{} {}:{}", version, dataset.source->fingerprint(),
-                  dataset.error_fraction, static_cast<int>(dataset.rules.criterion), dataset.rules.compact,
-                  wanted.draco_speed, wanted.draco_normal_bits, water.mask ? water.mask->fingerprint() : 0,
-                  water.sea_level_m ? fmt::format("{}", *water.sea_level_m) : "none", dataset.metadata_levels,
-                  imagery.image ? imagery.image->fingerprint() : 0, imagery.side, imagery.quality,
-                  imagery.attribution.size(), imagery.attribution, dataset.attribution.size(), dataset.attribution);
+  const std::string text = fmt::format(
+      "{} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {}:{} {}:{}", version, tiler::EncoderText(),
+      dataset.source->fingerprint(), dataset.error_fraction, static_cast<int>(dataset.rules.criterion),
+      dataset.rules.compact, static_cast<int>(wanted.glb_compression), wanted.draco_speed, wanted.draco_normal_bits,
+      water.mask ? water.mask->fingerprint() : 0, water.sea_level_m ? fmt::format("{}", *water.sea_level_m) : "none",
+      dataset.metadata_levels, imagery.image ? imagery.image->fingerprint() : 0, static_cast<int>(imagery.texture),
+      imagery.side, imagery.quality, imagery.attribution.size(), imagery.attribution, dataset.attribution.size(),
+      dataset.attribution);
   return XXH3_64bits(text.data(), text.size());
 }
 
@@ -95,15 +102,13 @@ Result<std::unique_ptr<dem::DemSource>> OpenSource(const config::DatasetConfig& 
   return dem::DemSource::Open(FilesOf(wanted), options);
 }
 
-Result<tiler::Dataset> OpenDataset(const config::DatasetConfig& wanted, const std::string& cache_dir,
-                                   const std::string& version, const std::function<void(double)>& progress,
-                                   std::stop_token stop) {
-  auto source = OpenSource(wanted, cache_dir, progress, std::move(stop));
-  if (!source) return tl::unexpected(source.error());
-  const dem::GeoBounds bounds = (*source)->info().bounds;
-  auto water = OpenWater(wanted.water, bounds);
+Result<tiler::Dataset> MakeDataset(const config::DatasetConfig& wanted, std::shared_ptr<const dem::DemSource> source,
+                                   const std::string& cache_dir, const std::string& version, std::stop_token stop) {
+  const dem::GeoBounds bounds = source->info().bounds;
+  const dem::FileContentOptions content{cache_dir, std::move(stop)};
+  auto water = OpenWater(wanted.water, bounds, content);
   if (!water) return tl::unexpected(water.error());
-  auto imagery = OpenImagery(wanted.imagery, bounds);
+  auto imagery = OpenImagery(wanted.imagery, bounds, content);
   if (!imagery) return tl::unexpected(imagery.error());
   tiler::Dataset dataset;
   dataset.name = wanted.name;
@@ -113,12 +118,20 @@ Result<tiler::Dataset> OpenDataset(const config::DatasetConfig& wanted, const st
   dataset.glb.compression = wanted.glb_compression;
   dataset.glb.draco = {wanted.draco_speed, wanted.draco_normal_bits};
   dataset.glb.generator = "terrace " + version;
-  dataset.source = *std::move(source);
+  dataset.source = std::move(source);
   dataset.water = *std::move(water);
   dataset.imagery = *std::move(imagery);
   dataset.metadata_levels = wanted.metadata_availability;
   dataset.generation = GenerationOf(wanted, dataset, version);
   return dataset;
+}
+
+Result<tiler::Dataset> OpenDataset(const config::DatasetConfig& wanted, const std::string& cache_dir,
+                                   const std::string& version, const std::function<void(double)>& progress,
+                                   std::stop_token stop) {
+  auto source = OpenSource(wanted, cache_dir, progress, stop);
+  if (!source) return tl::unexpected(source.error());
+  return MakeDataset(wanted, *std::move(source), cache_dir, version, std::move(stop));
 }
 
 }  // namespace terrace::cli

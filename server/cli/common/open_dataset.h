@@ -20,8 +20,12 @@ Result<std::unique_ptr<dem::DemSource>> OpenSource(const config::DatasetConfig& 
                                                    std::stop_token stop = {},
                                                    std::function<void(const Error&)> fault = {});
 
-// The same with its water mask and its imagery, ready to be served. `version`: of this program; it stands in
-// tiles, and another one is another generation.
+// A dataset of an open source, with its water mask and its imagery, ready to be served. `version`: of this program; it
+// stands in tiles, and another one is another generation.
+Result<tiler::Dataset> MakeDataset(const config::DatasetConfig& wanted, std::shared_ptr<const dem::DemSource> source,
+                                   const std::string& cache_dir, const std::string& version, std::stop_token stop = {});
+
+// OpenSource and MakeDataset.
 Result<tiler::Dataset> OpenDataset(const config::DatasetConfig& wanted, const std::string& cache_dir,
                                    const std::string& version, const std::function<void(double)>& progress = {},
                                    std::stop_token stop = {});

@@ -29,6 +29,7 @@
 #include "server/cli/common/source_files.h"
 #include "server/cli/common/try_folder.h"
 #include "server/cli/info/mosaic_info.h"
+#include "tiler/encoder_version.h"
 
 namespace terrace::cli {
 namespace {
@@ -206,20 +207,29 @@ int Info(const InfoArguments& arguments) {
     config::DatasetConfig dataset = flags;
     dataset.sources = sources;
     std::vector<Error> faults;  // of files, all of them
-    const auto source = OpenSource(dataset, cache_dir, progress.Callback(), {},
-                                   [&faults](const Error& fault) { faults.push_back(fault); });
-    if (!source) {
-      if (faults.empty()) faults.push_back(source.error());
+    auto opened = OpenSource(dataset, cache_dir, progress.Callback(), {},
+                             [&faults](const Error& fault) { faults.push_back(fault); });
+    if (!opened) {
+      if (faults.empty()) faults.push_back(opened.error());
       for (const Error& fault : faults) exit_code = Fail(fault.message, kExitFailure);
       continue;
     }
-    const dem::DemInfo& info = (*source)->info();
+    const std::shared_ptr<const dem::DemSource> source = *std::move(opened);
+    const dem::DemInfo& info = source->info();
     const bool is_one = info.sources.size() == 1;
+    const auto served = MakeDataset(dataset, source, cache_dir, TERRACE_VERSION);
+    if (!served) {
+      exit_code = Fail(served.error().message, kExitFailure);
+      continue;
+    }
+    const std::string version = tiler::VersionText(served->generation);
     if (json) {
       all.push_back(is_one ? ToJson(info) : nlohmann::json::parse(MosaicJson(name, info)));
       all.back()["left_out"] = info.left_out;
+      all.back()["version"] = version;
     } else {
       is_one ? PrintText(info) : PrintMosaic(name, info);
+      fmt::print("  {:<14}{}\n", "version", version);
       for (const std::string& file : info.left_out) fmt::print("  {:<14}{}\n", "left out", file);
     }
   }

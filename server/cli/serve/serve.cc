@@ -41,6 +41,7 @@
 #include "server/server.h"
 #include "server/store/disk_cache.h"
 #include "server/tiles/pipeline_catalog.h"
+#include "tiler/build_id.h"
 #include "tiler/encoder_version.h"
 #include "tiler/tile_pipeline.h"
 
@@ -180,7 +181,8 @@ bool OpenDatasets(const config::Config& config, const std::stop_token& stop, std
       all_open = false;
       continue;
     }
-    spdlog::info("dataset {}: {}, levels 0 to {}", dataset->name, NameOf(wanted.sources), dataset->source->max_level());
+    spdlog::info("dataset {}: {}, levels 0 to {}, version {}", dataset->name, NameOf(wanted.sources),
+                 dataset->source->max_level(), tiler::VersionText(dataset->generation));
     datasets.push_back(*std::move(dataset));
   }
   return all_open;
@@ -244,7 +246,7 @@ int Serve(const ServeArguments& arguments) {
   if (!passed) return Fail(passed.error());
   // Until they are answered they would be the end, and who rotates logs does not ask how long sources take to open.
   MaskSignals(SIG_BLOCK, kAnsweredSignals);
-  tiler::EncoderVersion();  // of the libraries there are, before GDAL or the system's resolver loads others
+  tiler::BuildId();  // of the libraries there are, before GDAL or the system's resolver loads others
   server::ServerOptions options;
   options.config = WithViewer(config);
   options.stop_on_signals = true;
