@@ -59,10 +59,10 @@ TEST(LayerJson, NamesTheExtensionsThatTilesHave) {
 
 TEST(LayerJson, OneTemplateCarriesVersionAndQuery) {
   LayerDescription layer = Maui();
-  EXPECT_EQ(Json::parse(EncodeLayerJson(layer)).at("tiles"), Json::array({"{z}/{x}/{y}.terrain?v={version}"}));
+  EXPECT_EQ(Json::parse(EncodeLayerJson(layer)).at("tiles"), Json::array({"{z}/{x}/{y}.terrain?v=7"}));
   layer.tile_query = "error=5&atleast=1";
   EXPECT_EQ(Json::parse(EncodeLayerJson(layer)).at("tiles"),
-            Json::array({"{z}/{x}/{y}.terrain?v={version}&error=5&atleast=1"}));
+            Json::array({"{z}/{x}/{y}.terrain?v=7&error=5&atleast=1"}));
 }
 
 TEST(LayerJson, BoxAcrossTheAntimeridianSpansAllLongitudes) {

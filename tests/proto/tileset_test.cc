@@ -37,6 +37,25 @@ TEST(Tileset, OneRootIsTheImplicitRootItself) {
   EXPECT_FALSE(root.at("content").contains("boundingVolume"));
 }
 
+TEST(Tileset, EveryUrlCarriesTheVersionFirst) {
+  TilesetDescription tileset = Maui();
+  tileset.version = "0a1b2c3d4e5f";
+  Json json = Json::parse(EncodeTileset(tileset));
+  EXPECT_EQ(json.at("asset").at("tilesetVersion"), "0a1b2c3d4e5f");
+  const auto uris = [&json] {
+    const Json& root = json.at("root");
+    return std::pair(root.at("content").at("uri").get<std::string>(),
+                     root.at("implicitTiling").at("subtrees").at("uri").get<std::string>());
+  };
+  EXPECT_EQ(uris(), std::pair(std::string("3dtiles/7-16-78/{level}/{x}/{y}.glb?v=0a1b2c3d4e5f"),
+                              std::string("3dtiles/7-16-78/{level}/{x}/{y}.4.subtree?v=0a1b2c3d4e5f")));
+  tileset.content_query = "compression=none";
+  tileset.subtree_query = "error=5";
+  json = Json::parse(EncodeTileset(tileset));
+  EXPECT_EQ(uris(), std::pair(std::string("3dtiles/7-16-78/{level}/{x}/{y}.glb?v=0a1b2c3d4e5f&compression=none"),
+                              std::string("3dtiles/7-16-78/{level}/{x}/{y}.4.subtree?v=0a1b2c3d4e5f&error=5")));
+}
+
 TEST(Tileset, RegionIsTheRootTileInRadians) {
   const Json json = Json::parse(EncodeTileset(Maui()));
   const Json& region = json.at("root").at("boundingVolume").at("region");

@@ -50,6 +50,15 @@ TEST_F(AreaTest, TellsItsErrorAndOrigin) {
   EXPECT_TRUE(reply.Field("server-timing").starts_with("cache;desc=miss, ")) << reply.Field("server-timing");
 }
 
+TEST_F(AreaTest, AreKeptForGoodWithTheirVersion) {
+  StartAreas();
+  const auto kept = [&](const std::string& query) { return Fetch(port(), kArea + query).Field("cache-control"); };
+  EXPECT_EQ(kept(std::string("&v=") + kMauiVersion), "public, max-age=31536000, immutable");
+  EXPECT_EQ(kept("&v=0"), "no-store");
+  EXPECT_EQ(kept(""), "public, max-age=3600");
+  EXPECT_EQ(Fetch(port(), kArea).Field("vary"), "Accept-Encoding");
+}
+
 TEST_F(AreaTest, TypesAreThoseOfFormats) {
   StartAreas();
   EXPECT_EQ(Fetch(port(), std::string(kArea) + "&format=obj").Field("content-type"), "model/obj");

@@ -139,7 +139,7 @@ TEST_F(DocumentsTest, AreTheSameWhereverTheyAreMade) {
       EXPECT_EQ(gzip.Field("content-encoding"), "gzip");
       for (const Reply* reply : {&plain, &gzip}) {
         EXPECT_EQ(reply->Field("vary"), Fetch(port(), "/blocks/layer.json").Field("vary"));
-        EXPECT_EQ(reply->Field("cache-control"), "public, max-age=3600");
+        EXPECT_EQ(reply->Field("cache-control"), "no-cache");
       }
     }
   }

@@ -253,11 +253,18 @@ TEST_F(Secrets, EncodedNamesAreRefused) {
 // What has no secret in it stays with those who share it.
 TEST_F(Secrets, PlainRepliesStayPublic) {
   StartWith(config::AccessLogForm::kOff, /*with_tokens=*/true);
-  for (const char* target :
-       {"/open/0/0/0.terrain", "/open/0/0/0.terrain?v=1.0.0&error=5&atleast=1", "/open/layer.json",
-        "/open/0/0/0.terrain?extensions=octvertexnormals-metadata", "/open/tileset.json?error=50"}) {
+  const std::string tile = "/open/0/0/0.terrain", version = "v=" + tiler::VersionText(0);
+  for (const std::string& target :
+       {tile, tile + "?error=5&atleast=1", tile + "?extensions=octvertexnormals-metadata"}) {
     EXPECT_EQ(Fetch(port(), target).Field("cache-control"), "public, max-age=3600") << target;
   }
+  for (const std::string& target : {tile + "?" + version, tile + "?" + version + "&error=5&atleast=1"}) {
+    EXPECT_EQ(Fetch(port(), target).Field("cache-control"), "public, max-age=31536000, immutable") << target;
+  }
+  for (const char* target : {"/open/layer.json", "/open/tileset.json?error=50"}) {
+    EXPECT_EQ(Fetch(port(), target).Field("cache-control"), "no-cache") << target;
+  }
+  EXPECT_EQ(Fetch(port(), tile + "?v=1.0.0").Field("cache-control"), "no-store");
 }
 
 }  // namespace

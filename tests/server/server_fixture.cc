@@ -49,6 +49,7 @@ void ServerFixture::Listen(ServerOptions options) {
 CatalogPtr ServerFixture::MakeCatalog() const {
   DatasetView maui;
   maui.name = "maui";
+  maui.generation = 0x0a1b2c3d4e5f6789;
   maui.available = {{{0, 0, 1, 0}}, {{0, 0, 3, 1}}, {{0, 0, 7, 3}}, {{0, 0, 15, 7}}};
   std::vector<DatasetView> datasets = more_datasets_;
   datasets.insert(datasets.begin(), maui);

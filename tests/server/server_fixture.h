@@ -41,6 +41,9 @@ class ServerFixture : public testing::Test {
   std::unique_ptr<Server> server_;
 };
 
+// Of "maui", as it stands in URLs.
+inline constexpr const char* kMauiVersion = "0a1b2c3d4e5f";
+
 // One that is seen without a token.
 config::DatasetConfig PublicDataset(std::string name);
 

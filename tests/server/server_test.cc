@@ -38,6 +38,72 @@ TEST_F(ServerTest, ServesATileWithEverythingClientsRead) {
   EXPECT_EQ(Fetch(port(), "/maui/1/2/1.terrain").Field("server-timing"), "cache;desc=hit");
 }
 
+// A URL with the version of a dataset never means other bytes; what is asked for with another one is not kept.
+TEST_F(ServerTest, TellsHowLongRepliesMayBeKept) {
+  more_datasets_.emplace_back().name = "oahu";
+  more_datasets_.back().available = {{{0, 0, 1, 0}}};
+  read_points_ = [](std::uint32_t, std::span<const dem::GeoPosition> points, dem::HeightDatum, std::stop_token) {
+    return Result<PointHeights>(std::vector<float>(points.size(), 7.0f));
+  };
+  Start();
+  const std::string v = std::string("v=") + kMauiVersion, other = "v=0a1b2c3d4e50";
+  constexpr const char* kForGood = "public, max-age=31536000, immutable";
+  const struct {
+    std::string target;
+    const char* cache_control;
+    const char* vary;
+  } cases[] = {
+      {"/maui/0/0/0.terrain?" + v, kForGood, "Accept, Accept-Encoding"},
+      {"/maui/0/0/0.terrain?error=5&atleast=1&" + v, kForGood, "Accept, Accept-Encoding"},
+      {"/maui/0/0/0.terrain?" + v + "&" + other, kForGood, "Accept, Accept-Encoding"},
+      {"/maui/0/0/0.terrain?" + other + "&" + v, "no-store", "Accept, Accept-Encoding"},
+      {"/maui/0/0/0.terrain?" + other, "no-store", "Accept, Accept-Encoding"},
+      {"/maui/0/0/0.terrain?v", "no-store", "Accept, Accept-Encoding"},
+      {"/maui/0/0/0.terrain", "public, max-age=3600", "Accept, Accept-Encoding"},
+      {"/oahu/0/0/0.terrain?" + v, "no-store", "Accept, Accept-Encoding"},
+      {"/maui/0/0/0.glb?" + v, kForGood, ""},
+      {"/maui/0/0/0.glb?compression=meshopt&" + v, kForGood, "Accept-Encoding"},
+      {"/maui/0/0/0.png?" + v, kForGood, ""},
+      {"/maui/3dtiles/0-0-0/0/0/0.4.subtree?" + v, kForGood, "Accept-Encoding"},
+      {"/maui/3dtiles/0-0-0/0/0/0.4.subtree?" + other, "no-store", "Accept-Encoding"},
+      {"/maui/3dtiles/0-0-0/0/0/0.4.subtree", "public, max-age=3600", "Accept-Encoding"},
+      {"/maui/heights?locations=1,2&" + v, kForGood, "Accept-Encoding"},
+      {"/maui/heights?locations=1,2&" + other, "no-store", "Accept-Encoding"},
+      {"/maui/heights?locations=1,2", "public, max-age=3600", "Accept-Encoding"},
+      {"/maui/heights?locations=1,2&datum=orthometric&" + v, "public, max-age=3600", "Accept-Encoding"},
+      {"/maui/layer.json?" + v, "no-cache", "Accept-Encoding"},
+      {"/maui/tileset.json", "no-cache", "Accept-Encoding"},
+      {"/maui/tiles.json?" + other, "no-cache", "Accept-Encoding"},
+      {"/datasets", "no-cache", "Accept-Encoding"},
+  };
+  for (const auto& c : cases) {
+    const Reply reply = Fetch(port(), c.target);
+    ASSERT_EQ(reply.status, 200) << c.target;
+    EXPECT_EQ(reply.Field("cache-control"), c.cache_control) << c.target;
+    EXPECT_EQ(reply.Field("vary"), c.vary) << c.target;
+    const std::string etag = reply.Field("etag");
+    ASSERT_FALSE(etag.empty()) << c.target;
+    const Reply same = Fetch(port(), c.target, "If-None-Match: " + etag + "\r\n");
+    EXPECT_EQ(same.status, 304) << c.target;
+    EXPECT_EQ(same.Field("cache-control"), c.cache_control) << c.target;
+    EXPECT_EQ(same.Field("vary"), c.vary) << c.target;
+    EXPECT_EQ(same.Field("etag"), etag);
+  }
+  for (const std::string& target :
+       {"/maui/9/0/0.terrain?" + v, "/maui/0/0/0.terrain?error=0&" + v, "/nope/0/0/0.glb?" + v}) {
+    EXPECT_EQ(Fetch(port(), target).Field("cache-control"), "no-store") << target;
+  }
+}
+
+TEST_F(ServerTest, TellsTheVersionsOfItsDatasets) {
+  Start();
+  EXPECT_NE(Fetch(port(), "/datasets").body.find(std::string(R"("version":")") + kMauiVersion + '"'),
+            std::string::npos);
+  const std::string metrics = Fetch(port(), "/metrics").body;
+  const std::string line = std::string(R"(terrace_dataset_info{dataset="maui",version=")") + kMauiVersion + "\"} 1\n";
+  EXPECT_NE(metrics.find(line), std::string::npos) << metrics;
+}
+
 TEST_F(ServerTest, NegotiatesCodingAndExtensions) {
   Start();
   const Reply gzip = Fetch(port(), "/maui/0/0/0.terrain", "Accept-Encoding: gzip\r\n");

@@ -137,15 +137,17 @@ TEST(DemSource, ReportsProgressToTheEnd) {
   EXPECT_EQ(last, 1);
 }
 
-TEST(DemSource, FingerprintFollowsFileAndOptions) {
+TEST(DemSource, FingerprintFollowsOptions) {
   const TempDir dir;
   const std::string path = WriteRaster(dir, {});
   const std::uint64_t before = OpenOrFail(path)->fingerprint();
   EXPECT_EQ(OpenOrFail(path)->fingerprint(), before);
   EXPECT_NE(OpenOrFail(path, {.floor = 7})->fingerprint(), before);
   EXPECT_NE(OpenOrFail(path, {.max_void_gap = 3})->fingerprint(), before);
-  std::filesystem::last_write_time(path, std::filesystem::last_write_time(path) + std::chrono::seconds(2));
-  EXPECT_NE(OpenOrFail(path)->fingerprint(), before);
+  EXPECT_NE(OpenOrFail(path, {.error_fraction = 0.4})->fingerprint(), before);
+  EXPECT_NE(OpenOrFail(path, {.finest_error = 3})->fingerprint(), before);
+  EXPECT_NE(OpenOrFail(path, {.voids = HoleFill::kFloor})->fingerprint(), before);
+  EXPECT_NE(OpenOrFail(path, {.feather = 30})->fingerprint(), before);
 }
 
 TEST(DemSource, LeavesNoFilesBesideTheSource) {

@@ -111,7 +111,7 @@ TEST(SourceChanges, ChangedPartOfAMosaicInAMosaicIsTold) {
   EXPECT_EQ(source->files().size(), 4U);
   ASSERT_TRUE(source->Read(kInside));
   const std::uint64_t before = source->fingerprint();
-  std::filesystem::rename(WriteRaster(dir, {}, "new.tif"), dir.File("part.tif"));
+  std::filesystem::rename(WriteRaster(dir, {.value = [](int, int) { return 5.0; }}, "new.tif"), dir.File("part.tif"));
   const auto tile = source->Read(kInside);
   const auto again = OpenOrFail(dir.File("dem.vrt"));
   ASSERT_TRUE(SetSourcePolicy({}));

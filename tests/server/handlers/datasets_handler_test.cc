@@ -11,6 +11,7 @@ namespace {
 std::array<DatasetView, 1> Datasets() {
   std::array<DatasetView, 1> datasets;
   datasets[0].name = "a <b>";
+  datasets[0].generation = 0x0a1b2c3d4e5f6789;
   datasets[0].attribution = "\xff not UTF-8";
   datasets[0].available.resize(3);
   datasets[0].west = 177;
@@ -27,6 +28,7 @@ TEST(DatasetsHandler, ListsWhatAClientNeeds) {
   ASSERT_EQ(list["datasets"].size(), 1u);
   const auto& dataset = list["datasets"][0];
   EXPECT_EQ(dataset["name"], "a <b>");
+  EXPECT_EQ(dataset["version"], "0a1b2c3d4e5f");
   EXPECT_EQ(dataset["bounds"], nlohmann::json::parse("[177.0, -20.0, -178.0, -15.0]"));
   EXPECT_EQ(dataset["sources"], 1);
   EXPECT_EQ(dataset["min_level"], 0);
@@ -36,7 +38,7 @@ TEST(DatasetsHandler, ListsWhatAClientNeeds) {
   const std::string base = "/a%20%3Cb%3E";
   EXPECT_EQ(dataset["urls"], (nlohmann::json{{"layer", base + "/layer.json"},
                                              {"tileset", base + "/tileset.json"},
-                                             {"tiles", base + "/{z}/{x}/{y}.terrain"},
+                                             {"tiles", base + "/{z}/{x}/{y}.terrain?v=0a1b2c3d4e5f"},
                                              {"tiles_json", base + "/tiles.json"},
                                              {"heights", base + "/heights"},
                                              {"mesh", base + "/mesh"}}));

@@ -14,11 +14,12 @@ class LayerHandlerTest : public testing::Test {
  protected:
   LayerHandlerTest() {
     datasets_[0].name = "maui";
+    datasets_[0].generation = 0x0a1b2c3d4e5f6789;
     datasets_[0].attribution = "USGS";
     datasets_[0].available = {{{0, 0, 1, 0}}, {{0, 1, 0, 1}}};
     datasets_[0].west = 170;
     datasets_[0].east = -170;
-    handler_.emplace(datasets_, "max-age=1");
+    handler_.emplace(datasets_);
   }
   Response Get(const char* target, const char* accept_encoding = "") {
     Request request;
@@ -34,8 +35,10 @@ TEST_F(LayerHandlerTest, DescribesTheDataset) {
   const Response response = Get("/maui/layer.json");
   EXPECT_EQ(response.status, 200);
   EXPECT_EQ(response.content_type, "application/json");
-  EXPECT_EQ(response.cache_control, "max-age=1");
+  EXPECT_EQ(response.cache_control, "no-cache");
   const auto layer = nlohmann::json::parse(*response.body);
+  EXPECT_EQ(layer["version"], "0a1b2c3d4e5f");
+  EXPECT_EQ(layer["tiles"][0], "{z}/{x}/{y}.terrain?v=0a1b2c3d4e5f");
   EXPECT_EQ(layer["maxzoom"], 1);
   EXPECT_EQ(layer["available"].size(), 2u);
   EXPECT_EQ(layer["bounds"][0], -180) << "across the antimeridian: the whole turn";
@@ -63,6 +66,7 @@ TEST_F(LayerHandlerTest, CompressesOnRequest) {
   EXPECT_EQ(gzip.content_encoding, "gzip");
   EXPECT_NE(gzip.etag, plain.etag);
   EXPECT_LT(gzip.body->size(), plain.body->size());
+  EXPECT_EQ(plain.vary, "Accept-Encoding") << "no document depends on Accept";
 }
 
 TEST(TileQuery, PrintsNumbersThatSurviveUrls) {

@@ -15,13 +15,14 @@ class TileJsonHandlerTest : public testing::Test {
  protected:
   TileJsonHandlerTest() {
     datasets_[0].name = "a b";
+    datasets_[0].generation = 0x0a1b2c3d4e5f6789;
     datasets_[0].max_mercator_depth = 12;
   }
   Response Get(const char* target, const char* host = "example.test:8080", bool is_https = false) {
     Request request;
     request.fields.Set(&RequestFields::host, host);
     request.is_https = is_https;
-    return TileJsonHandler(datasets_, "max-age=1").Handle(TestCall(target, request).call);
+    return TileJsonHandler(datasets_, "Forwarded").Handle(TestCall(target, request).call);
   }
   static nlohmann::json Parse(const Response& response) { return nlohmann::json::parse(*response.body); }
 
@@ -32,22 +33,23 @@ TEST_F(TileJsonHandlerTest, NamesTilesAsTheClientCanAskForThem) {
   const Response response = Get("/a%20b/tiles.json");
   EXPECT_EQ(response.status, 200);
   EXPECT_EQ(response.content_type, "application/json");
-  EXPECT_EQ(response.cache_control, "max-age=1");
-  EXPECT_EQ(Parse(response)["tiles"][0], "http://example.test:8080/a%20b/{z}/{x}/{y}.png");
+  EXPECT_EQ(response.cache_control, "no-cache");
+  EXPECT_EQ(Parse(response)["tiles"][0], "http://example.test:8080/a%20b/{z}/{x}/{y}.png?v=0a1b2c3d4e5f");
   EXPECT_EQ(Parse(response)["maxzoom"], 12);
-  EXPECT_EQ(Parse(Get("/a%20b/tiles.json", ""))["tiles"][0], "/a%20b/{z}/{x}/{y}.png");
-  EXPECT_EQ(Parse(Get("/a%20b/tiles.json", "h", true))["tiles"][0], "https://h/a%20b/{z}/{x}/{y}.png");
-  EXPECT_EQ(response.vary_too, "Forwarded, X-Forwarded-Host, X-Forwarded-Proto");
+  EXPECT_EQ(Parse(Get("/a%20b/tiles.json", ""))["tiles"][0], "/a%20b/{z}/{x}/{y}.png?v=0a1b2c3d4e5f");
+  EXPECT_EQ(Parse(Get("/a%20b/tiles.json", "h", true))["tiles"][0], "https://h/a%20b/{z}/{x}/{y}.png?v=0a1b2c3d4e5f");
+  EXPECT_EQ(response.vary_too, "Forwarded");
 }
 
 TEST_F(TileJsonHandlerTest, WritesParametersIntoTheTemplate) {
   const auto json = Parse(Get("/a%20b/tiles.json?size=512&encoding=terrarium&v=3"));
-  EXPECT_EQ(json["tiles"][0], "http://example.test:8080/a%20b/{z}/{x}/{y}.png?encoding=terrarium&size=512");
+  EXPECT_EQ(json["tiles"][0],
+            "http://example.test:8080/a%20b/{z}/{x}/{y}.png?v=0a1b2c3d4e5f&encoding=terrarium&size=512");
   EXPECT_EQ(json["maxzoom"], 11);
   EXPECT_EQ(json["tileSize"], 512);
   EXPECT_EQ(json["encoding"], "terrarium");
   EXPECT_EQ(Parse(Get("/a%20b/tiles.json?size=256&encoding=mapbox"))["tiles"][0],
-            "http://example.test:8080/a%20b/{z}/{x}/{y}.png");
+            "http://example.test:8080/a%20b/{z}/{x}/{y}.png?v=0a1b2c3d4e5f");
 }
 
 TEST_F(TileJsonHandlerTest, RefusesWhatItCannotServe) {

@@ -23,6 +23,7 @@ class TilesetHandlerTest : public testing::Test {
     DatasetView& maui = datasets_[0];
     maui.name = "maui";
     maui.attribution = "USGS";
+    maui.generation = 0x0a1b2c3d4e5f6789;
     maui.min_height_m = 100;
     maui.max_height_m = 3000;
     maui.floor_m = -20;
@@ -51,7 +52,10 @@ TEST_F(TilesetHandlerTest, RootsTheTreesWhereTheDataIs) {
   const Json root = Tileset().at("root");
   ASSERT_EQ(root.at("children").size(), 2u);
   const Json& west = root.at("children")[0];
-  EXPECT_EQ(west.at("content").at("uri"), "3dtiles/7-16-32/{level}/{x}/{y}.glb");
+  EXPECT_EQ(west.at("content").at("uri"), "3dtiles/7-16-32/{level}/{x}/{y}.glb?v=0a1b2c3d4e5f");
+  EXPECT_EQ(Tileset().at("asset").at("tilesetVersion"), "0a1b2c3d4e5f");
+  EXPECT_EQ(Get("/maui/tileset.json").cache_control, "no-cache");
+  EXPECT_EQ(Get("/maui/tileset.json?error=5").cache_control, "no-cache");
   EXPECT_EQ(west.at("implicitTiling").at("availableLevels"), 6);
   EXPECT_EQ(west.at("implicitTiling").at("subtreeLevels"), 6);
 }
@@ -75,8 +79,8 @@ TEST_F(TilesetHandlerTest, RootsTheTreesWhereTheDataIsAmongTilesThatAreThereToMa
     for (const Json& tree : root.at("children")) uris.push_back(tree.at("content").at("uri"));
     return uris;
   };
-  const std::vector<std::string> expected = {"3dtiles/7-16-32/{level}/{x}/{y}.glb",
-                                             "3dtiles/7-17-32/{level}/{x}/{y}.glb"};
+  const std::vector<std::string> expected = {"3dtiles/7-16-32/{level}/{x}/{y}.glb?v=0a1b2c3d4e5f",
+                                             "3dtiles/7-17-32/{level}/{x}/{y}.glb?v=0a1b2c3d4e5f"};
   EXPECT_EQ(roots(), expected);
 
   // The same across the antimeridian.
@@ -89,8 +93,8 @@ TEST_F(TilesetHandlerTest, RootsTheTreesWhereTheDataIsAmongTilesThatAreThereToMa
   }
   maui.west = 180 - 31 * tile;
   maui.east = -180 + 7 * tile;
-  EXPECT_EQ(roots(),
-            (std::vector<std::string>{"3dtiles/7-0-32/{level}/{x}/{y}.glb", "3dtiles/7-255-32/{level}/{x}/{y}.glb"}));
+  EXPECT_EQ(roots(), (std::vector<std::string>{"3dtiles/7-0-32/{level}/{x}/{y}.glb?v=0a1b2c3d4e5f",
+                                               "3dtiles/7-255-32/{level}/{x}/{y}.glb?v=0a1b2c3d4e5f"}));
 }
 
 TEST_F(TilesetHandlerTest, RegionHoldsDataFloorAndSkirtsOfTheErrorAskedFor) {
@@ -117,13 +121,13 @@ TEST_F(TilesetHandlerTest, WritesParametersIntoTheContentTemplates) {
   const auto content = [&](const char* query) {
     return Tileset(query).at("root").at("children")[1].at("content").at("uri").get<std::string>();
   };
-  EXPECT_EQ(content("?error=5.00"), "3dtiles/7-17-32/{level}/{x}/{y}.glb?error=5&atleast=1");
+  EXPECT_EQ(content("?error=5.00"), "3dtiles/7-17-32/{level}/{x}/{y}.glb?v=0a1b2c3d4e5f&error=5&atleast=1");
   EXPECT_EQ(content("?fraction=.250&compression=none"),
-            "3dtiles/7-17-32/{level}/{x}/{y}.glb?fraction=0.25&compression=none");
-  EXPECT_EQ(content("?compression=meshopt"), "3dtiles/7-17-32/{level}/{x}/{y}.glb?compression=meshopt");
+            "3dtiles/7-17-32/{level}/{x}/{y}.glb?v=0a1b2c3d4e5f&fraction=0.25&compression=none");
+  EXPECT_EQ(content("?compression=meshopt"), "3dtiles/7-17-32/{level}/{x}/{y}.glb?v=0a1b2c3d4e5f&compression=meshopt");
   EXPECT_EQ(content("?texture=webp&compression=none&texture=webp"),
-            "3dtiles/7-17-32/{level}/{x}/{y}.glb?compression=none&texture=webp");
-  EXPECT_EQ(content("?v=1"), "3dtiles/7-17-32/{level}/{x}/{y}.glb");
+            "3dtiles/7-17-32/{level}/{x}/{y}.glb?v=0a1b2c3d4e5f&compression=none&texture=webp");
+  EXPECT_EQ(content("?v=1"), "3dtiles/7-17-32/{level}/{x}/{y}.glb?v=0a1b2c3d4e5f");
 }
 
 // Skirts, and with them the heights in subtrees, depend on the error.
@@ -132,9 +136,10 @@ TEST_F(TilesetHandlerTest, WritesParametersForErrorsIntoTheSubtreeTemplates) {
     const Json tree = Tileset(query).at("root").at("children")[1];
     return tree.at("implicitTiling").at("subtrees").at("uri").get<std::string>();
   };
-  EXPECT_EQ(subtrees(""), "3dtiles/7-17-32/{level}/{x}/{y}.6.subtree");
-  EXPECT_EQ(subtrees("?error=5.00"), "3dtiles/7-17-32/{level}/{x}/{y}.6.subtree?error=5&atleast=1");
-  EXPECT_EQ(subtrees("?fraction=.250&compression=none"), "3dtiles/7-17-32/{level}/{x}/{y}.6.subtree?fraction=0.25");
+  EXPECT_EQ(subtrees(""), "3dtiles/7-17-32/{level}/{x}/{y}.6.subtree?v=0a1b2c3d4e5f");
+  EXPECT_EQ(subtrees("?error=5.00"), "3dtiles/7-17-32/{level}/{x}/{y}.6.subtree?v=0a1b2c3d4e5f&error=5&atleast=1");
+  EXPECT_EQ(subtrees("?fraction=.250&compression=none"),
+            "3dtiles/7-17-32/{level}/{x}/{y}.6.subtree?v=0a1b2c3d4e5f&fraction=0.25");
 }
 
 TEST_F(TilesetHandlerTest, EveryRootHasTheHeightsOfItsOwnTile) {
@@ -203,6 +208,16 @@ TEST_F(TilesetHandlerTest, SubtreesGoOnWhereTheFirstOnesEnd) {
   const Result<proto::ReadSubtree> read = proto::ParseSubtree(*deepest.body, 6);
   ASSERT_TRUE(read) << read.error().message;
   EXPECT_EQ(std::count(read->tiles.begin(), read->tiles.end(), true), 1);
+}
+
+TEST_F(TilesetHandlerTest, SubtreesOfTheCurrentVersionAreKeptForGood) {
+  const auto kept = [&](const char* query) {
+    return Get(std::string("/maui/3dtiles/7-16-32/0/0/0.6.subtree") + query).cache_control;
+  };
+  EXPECT_EQ(kept("?v=0a1b2c3d4e5f"), "public, max-age=31536000, immutable");
+  EXPECT_EQ(kept("?error=5&atleast=1&v=0a1b2c3d4e5f&v=1"), "public, max-age=31536000, immutable");
+  EXPECT_EQ(kept("?v=0a1b2c3d4e5e"), "no-store");
+  EXPECT_EQ(kept("?error=5&atleast=1"), "max-age=1");
 }
 
 TEST_F(TilesetHandlerTest, IsNotThereWhereNoSubtreeBegins) {

@@ -27,7 +27,7 @@ TEST(Response, CarriesCorsAndALength) {
   response.body = std::make_shared<const std::string>("hello");
   response.content_encoding = "gzip";
   response.etag = "\"e\"";
-  response.vary = true;
+  response.vary = "Accept, Accept-Encoding";
   const std::string head = SerializeHead(response, {});
   for (const char* line :
        {"\r\nContent-Length: 5\r\n", "\r\nContent-Encoding: gzip\r\n", "\r\nETag: \"e\"\r\n",
@@ -87,7 +87,7 @@ TEST(Response, MatchesEtagsAsListsWeakAndStar) {
 TEST(Response, IsForItsReaderAloneWhereATokenDecides) {
   Response response;
   response.cache_control = "public, max-age=3600, s-maxage=9";
-  response.vary = true;
+  response.vary = "Accept, Accept-Encoding";
   response.for_grant = true;
   const std::string head = SerializeHead(response, {});
   EXPECT_NE(head.find("\r\nCache-Control: private, max-age=3600\r\n"), std::string::npos) << head;

@@ -1,0 +1,118 @@
+// Clients and CDNs keep bytes by the version in their URL: other bytes need another version.
+#include "tiler/encoder_version.h"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "proto/error_text.h"
+#include "tests/tiler/fetched_tile.h"
+#include "tiler/area/area_mesh.h"
+#include "tiler/strong_etag.h"
+
+namespace terrace::tiler {
+namespace {
+
+// What the sample datasets gave. Where bytes change on purpose: raise kEncoderVersion, and write down here what the
+// test says.
+constexpr int kRecordedVersion = 1;
+constexpr const char* kRecordedWith = "RECORDED_WITH";
+constexpr const char* kRecordedBytes = "RECORDED_BYTES";
+constexpr const char* kRecordedFingerprints = "RECORDED_FINGERPRINTS";
+
+// Of one tile near the middle of the data on some levels of both samples, in every form.
+std::string TilesText(const TilePipeline& pipeline) {
+  std::string text;
+  const auto add = [&](const Result<EncodedTile>& tile) {
+    ASSERT_TRUE(tile) << tile.error().message;
+    text += fmt::format("{} {} {}\n", StrongETag(tile->bytes), proto::FormatErrorUp(tile->max_error_m),
+                        proto::FormatErrorUp(tile->certified_error_m.value_or(0)));
+  };
+  for (std::uint32_t dataset = 0; dataset < pipeline.datasets().size(); ++dataset) {
+    const dem::DemSource& source = *pipeline.datasets()[dataset].source;
+    for (int level = 0; level <= source.max_level(); level += 3) {
+      TileRequest request;
+      request.dataset = dataset;
+      const geo::TileRange& range = source.Available(level).front();
+      request.key = {level, (range.start_x + range.end_x) / 2, (range.start_y + range.end_y) / 2};
+      for (const int step : {-4, 0, 3}) {
+        request.error_step = step;
+        request.format = TileFormat::kQuantizedMesh;
+        for (const bool normals : {false, true}) {
+          request.normals = normals;
+          add(pipeline.Build(request, {}));
+        }
+        request.format = TileFormat::kGlb;
+        for (const auto compression : {proto::GlbCompression::kDraco, proto::GlbCompression::kNone,
+                                       proto::GlbCompression::kQuantized, proto::GlbCompression::kMeshopt}) {
+          request.compression = compression;
+          add(pipeline.Build(request, {}));
+        }
+      }
+      request.format = TileFormat::kQuantizedMesh;
+      for (const Coding coding : kCodings) {
+        request.coding = coding;
+        add(pipeline.Build(request, {}));
+      }
+      const dem::HeightRange bound = source.RangeBound(request.key);
+      text += fmt::format("{} {}\n", bound.min, bound.max);
+    }
+    TileRequest heights;
+    heights.dataset = dataset;
+    heights.format = TileFormat::kHeightPng;
+    for (const auto encoding : {proto::HeightEncoding::kMapbox, proto::HeightEncoding::kTerrarium}) {
+      heights.height_encoding = encoding;
+      add(pipeline.Build(heights, {}));
+    }
+  }
+  const dem::DemSource& source = *pipeline.datasets().back().source;
+  const AreaRequest area{-84.25, 36.25, -84.2, 36.29, 5};
+  const auto plan = PlanArea(source, 0.5, area, 1'000'000);
+  EXPECT_TRUE(plan);
+  if (plan) add(BuildAreaMesh(source, *plan, area, {}));
+  const auto points = source.ReadPoints(std::vector<dem::GeoPosition>{{-84.2, 36.3}, {-84.217, 36.3181}});
+  EXPECT_TRUE(points);
+  if (points) text += fmt::format("{}\n", fmt::join(*points, " "));
+  return text;
+}
+
+TEST(EncoderVersion, IsRaisedWithTheBytes) {
+  const TilePipeline& pipeline = SamplePipeline();
+  const std::string bytes = StrongETag(TilesText(pipeline));
+  ASSERT_EQ(kEncoderVersion, kRecordedVersion)
+      << "write down here what this version gives: " << kEncoderVersion << ", " << EncoderText() << ", " << bytes;
+  if (EncoderText() != kRecordedWith) {
+    GTEST_SKIP() << "SKIPPED, recorded with other libraries, which count by themselves: " << EncoderText() << ", "
+                 << bytes;
+  }
+  EXPECT_EQ(bytes, kRecordedBytes) << "other bytes need another version: raise kEncoderVersion";
+}
+
+// Else every deployment would throw away what its CDN has.
+TEST(EncoderVersion, FingerprintsOfUnchangedSourcesStay) {
+  std::string text;
+  for (const Dataset& dataset : SamplePipeline().datasets()) {
+    text += fmt::format("{:016x} ", dataset.source->fingerprint());
+  }
+  EXPECT_EQ(text, kRecordedFingerprints);
+}
+
+TEST(EncoderVersion, NamesTheLibrariesThatDecideBytes) {
+  for (const char* library :
+       {"GDAL ", "PROJ ", "Draco ", "meshoptimizer ", "libjpeg ", "libdeflate ", "brotli ", "zstd "}) {
+    EXPECT_NE(EncoderText().find(library), std::string::npos) << EncoderText();
+  }
+}
+
+TEST(EncoderVersion, TheTextOfAGenerationIsItsFirstTwelveDigits) {
+  EXPECT_EQ(VersionText(0x0a1b2c3d4e5f6789), "0a1b2c3d4e5f");
+  EXPECT_EQ(VersionText(0), "000000000000");
+  EXPECT_TRUE(IsVersionOf("0a1b2c3d4e5f", 0x0a1b2c3d4e5f6789));
+  for (const char* other : {"", "0", "0a1b2c3d4e5e", "0A1B2C3D4E5F", "0a1b2c3d4e5f6789", "a1b2c3d4e5f"}) {
+    EXPECT_FALSE(IsVersionOf(other, 0x0a1b2c3d4e5f6789)) << other;
+  }
+}
+
+}  // namespace
+}  // namespace terrace::tiler
