@@ -186,9 +186,9 @@ class Versions(unittest.TestCase):
         dem = self.copy(self.dem)
         with Server(self.config(dem), self.folder) as server:
             def tile_of(layer):
-                middle = layer["available"][11][0]
-                return "/alps/" + (layer["tiles"][0].replace("{z}", "11").replace("{x}", str(middle["startX"]))
-                                   .replace("{y}", str(middle["startY"])))
+                tiles = layer["available"][11][0]
+                x, y = (tiles["startX"] + tiles["endX"]) // 2, (tiles["startY"] + tiles["endY"]) // 2
+                return "/alps/" + layer["tiles"][0].replace("{z}", "11").replace("{x}", str(x)).replace("{y}", str(y))
             old_layer, old_tag = server.json("/alps/layer.json"), server.get("/alps/layer.json")[1]["ETag"]
             old = server.get(tile_of(old_layer))
             self.assertEqual(old[1]["Cache-Control"], FOR_GOOD)
