@@ -126,8 +126,10 @@ const std::vector<Option<Config>>& ServerOptionTable() {
       {.key = "cache_control",
        .value = "TEXT",
        .section = "listening",
-       .help = "Cache-Control header of tiles and layer.json",
-       .details = "One line of ASCII",
+       .help = "Cache-Control header of tiles that are asked for without their version",
+       .details =
+           "One line of ASCII. Tiles with their version, as in the URLs of all documents, are kept for a year, and "
+           "documents are asked for again each time",
        .codec = Text(&Config::cache_control, CheckCacheControl, Json::parse(kCacheControlSchema)),
        .other_words = "max_age",
        .is_live = true},

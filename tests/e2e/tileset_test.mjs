@@ -77,12 +77,14 @@ for (const dataset of ['jacksboro', 'earth']) {
 
     it('are listed among the datasets', async () => {
       const { datasets } = await json(`${server.url}/datasets`);
-      assert.equal(datasets.find(({ name }) => name === dataset).urls.tileset, `/${dataset}/tileset.json`);
+      const { urls, version } = datasets.find(({ name }) => name === dataset);
+      assert.equal(urls.tileset, `/${dataset}/tileset.json`);
+      assert.equal(tileset.asset.tilesetVersion, version);
     });
 
     it('hold exactly the tiles that layer.json lists from their roots down', async () => {
       const roots = rootsOf(tileset);
-      const above = contentsAbove(tileset.root).map((uri) => /3dtiles\/(\d+-\d+-\d+)\/0\/0\/0\.glb$/.exec(uri)[1].replaceAll('-', '/'));
+      const above = contentsAbove(tileset.root).map((uri) => /3dtiles\/(\d+-\d+-\d+)\/0\/0\/0\.glb\?v=[0-9a-f]{12}$/.exec(uri)[1].replaceAll('-', '/'));
       const top = Math.min(...roots.map(({ content }) => Number(/3dtiles\/(\d+)-/.exec(content.uri)[1])), ...above.map((key) => Number(key.split('/')[0])));
       const listed = layer.available.flatMap((ranges, z) => (z < top ? [] : ranges.flatMap((r) => {
         const keys = [];
@@ -158,7 +160,7 @@ for (const dataset of ['jacksboro', 'earth']) {
 
     it('carry request parameters down to the contents', async () => {
       const { uri } = rootsOf(await json(`${base}?error=20&compression=none`))[0].content;
-      assert.match(uri, /\?error=20&atleast=1&compression=none$/);
+      assert.match(uri, /\.glb\?v=[0-9a-f]{12}&error=20&atleast=1&compression=none$/);
       const glb = await request(new URL(fill(uri, 0, 0, 0), base));
       assert.equal(glb.status, 200);
       assert.doesNotMatch(glb.body.toString('latin1'), /KHR_draco/);

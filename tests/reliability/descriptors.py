@@ -114,7 +114,9 @@ def serve_with_few(binary, source_dir, folder, limit):
     def write(count):
         beside = folder / "beside.json"
         beside.write_text(json.dumps({
-            "datasets": [{"name": name, "sources": [f"{name}.tif"]} for name in names[:count]], "worker_threads": 2, "cache_bytes": 0,
+            # Datasets that are the same but for their names would share their tiles.
+            "datasets": [{"name": name, "sources": [f"{name}.tif"], "attribution": name} for name in names[:count]],
+            "worker_threads": 2, "cache_bytes": 0,
             "refinement_cache_bytes": 0, "log_level": "warn",
             "disk_cache": {"directory": "cache", "tile_bytes": 256 * MB, "refinement_bytes": 256 * MB}}))
         beside.rename(config)

@@ -68,7 +68,7 @@ class ReloaderTest : public testing::Test {
     tiler::Dataset dataset;
     dataset.name = wanted.name;
     dataset.source = *std::move(source);
-    dataset.generation = dataset.source->fingerprint();
+    dataset.generation = dataset.source->files().fingerprint();  // of this opening of these files, whatever is in them
     return dataset;
   }
 
