@@ -46,14 +46,10 @@ class Geoid {
   class Reader {
    public:
     explicit Reader(const Geoid& geoid);
-    ~Reader();
-    Reader(const Reader&) = delete;
-    Reader& operator=(const Reader&) = delete;
     double At(Position degrees) const;
 
    private:
-    const Geoid& geoid_;
-    std::shared_ptr<ProjOperation> operation_;
+    IdlePool<ProjOperation>::Handle operation_;
   };
 
   const std::string& name() const { return name_; }                       // "EGM96 height"
