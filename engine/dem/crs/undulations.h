@@ -7,14 +7,39 @@
 #include <utility>
 #include <vector>
 
+#include "engine/core/result.h"
+#include "engine/dem/common/range_table.h"
 #include "engine/dem/crs/footprint.h"
 #include "engine/dem/crs/geoid.h"
-#include "engine/dem/crs/undulation_ranges.h"
+#include "engine/dem/crs/undulation_grid.h"
 #include "engine/dem/dem_types.h"
 #include "engine/geo/lattice.h"
 #include "engine/geo/mercator_grid.h"
 
 namespace terrace::dem {
+
+// Bounds on a grid of undulations over boxes, from the grid's own nodes. Immutable and thread-safe.
+class UndulationRanges {
+ public:
+  // Reads the nodes in and around the area once.
+  static Result<UndulationRanges> Of(const UndulationGrid& grid, const Footprint& area);
+
+  // No undulation in the box and the area leaves it: from (west, south), degrees, `width` by `height` large; west
+  // counts modulo 360. min > max: the box misses the area, or nothing is known there.
+  HeightRange Query(double west, double south, double width, double height) const;
+
+  HeightRange whole() const { return whole_; }
+  bool is_complete() const { return is_complete_; }  // known all over the area
+
+ private:
+  explicit UndulationRanges(const UndulationGrid& grid) : grid_(&grid) {}
+
+  const UndulationGrid* grid_;  // outlives this
+  int first_column_ = 0, first_row_ = 0;
+  RangeTable table_;
+  HeightRange whole_;
+  bool is_complete_ = false;
+};
 
 // Immutable after construction and thread-safe.
 //

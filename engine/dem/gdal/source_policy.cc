@@ -18,7 +18,6 @@
 
 #include "engine/dem/gdal/driver_list.h"
 #include "engine/dem/gdal/gdal_runtime.h"
-#include "engine/dem/gdal/network_guard.h"
 #include "engine/dem/gdal/vrt_check.h"
 
 namespace terrace::dem {

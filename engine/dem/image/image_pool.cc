@@ -4,7 +4,6 @@
 
 #include "engine/dem/gdal/raster_file.h"
 #include "engine/dem/image/image_bins.h"
-#include "engine/dem/raster/overview_axis.h"
 #include "engine/dem/raster/sample_grid.h"
 
 namespace terrace::dem {

@@ -18,7 +18,6 @@
 
 #include "engine/core/result.h"
 #include "engine/dem/common/box_index.h"
-#include "engine/dem/common/round_height.h"
 #include "engine/dem/crs/undulations.h"
 #include "engine/dem/dem_types.h"
 #include "engine/dem/mosaic/grid_cover.h"
