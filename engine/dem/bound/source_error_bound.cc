@@ -11,6 +11,7 @@
 #include "engine/dem/bound/geoid_error_bound.h"
 #include "engine/dem/bound/grid_tables.h"
 #include "engine/dem/bound/smooth_error_bound.h"
+#include "engine/dem/dem_types.h"
 
 namespace terrace::dem {
 namespace {
@@ -108,9 +109,7 @@ class GridErrorBound {
   }
 
  private:
-  std::size_t CellIndex(int i, int j) const {
-    return static_cast<std::size_t>(j) * static_cast<std::size_t>(nodes_.cells()) + static_cast<std::size_t>(i);
-  }
+  std::size_t CellIndex(int i, int j) const { return Area(j, nodes_.cells()) + static_cast<std::size_t>(i); }
   bool Touches(const CellBox& box) const {
     return grid_.reach().Touches(nodes_.West(box), nodes_.South(box), nodes_.Width(box), nodes_.Height(box));
   }
@@ -273,7 +272,7 @@ SourceErrorBound::SourceErrorBound(const geo::Lattice& lattice, const NodeWindow
       window_(window),
       heights_(heights),
       blends_(blends),
-      covered_(static_cast<std::size_t>(lattice.cells) * static_cast<std::size_t>(lattice.cells)) {}
+      covered_(Area(lattice.cells, lattice.cells)) {}
 
 Result<void> SourceErrorBound::Add(const RasterGrid& grid, const GridTrace& trace, const std::stop_token& stop) {
   return GridErrorBound(*this, grid, trace).Add(stop);

@@ -7,9 +7,7 @@
 #pragma once
 
 #include <memory>
-#include <mutex>
 #include <string>
-#include <vector>
 
 #include "engine/core/result.h"
 #include "engine/dem/crs/projector.h"

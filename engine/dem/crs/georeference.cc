@@ -9,7 +9,6 @@
 #include <cmath>
 #include <cstdlib>
 #include <numbers>
-#include <vector>
 
 #include "engine/core/bytes.h"
 #include "engine/dem/gdal/gdal_runtime.h"

@@ -46,11 +46,6 @@ struct CellCentres {
   geo::Lattice halves;
 };
 
-// Pole rows, and what lies beyond them, are one position each; Web Mercator and the centres of cells have none.
-bool IsPoleRow(const geo::Lattice& lattice, std::int64_t row) { return row <= 0 || row >= lattice.rows(); }
-bool IsPoleRow(const geo::MercatorGrid&, std::int64_t) { return false; }
-bool IsPoleRow(const CellCentres&, std::int64_t) { return false; }
-
 template <typename Grid>
 class GridNodes {
  public:
@@ -60,7 +55,7 @@ class GridNodes {
 
   NodePositions Compute() && {
     if (georeference_.is_affine() && georeference_.is_geographic_grid()) return ColumnsAndRows();
-    positions_.assign(static_cast<std::size_t>(window_.columns) * static_cast<std::size_t>(window_.rows), kNowhere);
+    positions_.assign(Area(window_.columns, window_.rows), kNowhere);
     FillNodes();
     return {window_, std::move(positions_)};
   }

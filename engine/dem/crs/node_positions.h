@@ -20,6 +20,13 @@ namespace terrace::dem {
 // Of nodes that have no place in a raster: NaN.
 inline constexpr Position kNowhere{std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::quiet_NaN()};
 
+// Pole rows, and what lies beyond them, are one position each; other grids have none.
+inline bool IsPoleRow(const geo::Lattice& lattice, std::int64_t row) { return row <= 0 || row >= lattice.rows(); }
+template <typename Grid>
+bool IsPoleRow(const Grid&, std::int64_t) {
+  return false;
+}
+
 // The window of a tile: its samples and one more on each side.
 NodeWindow WindowOfTile(const geo::Lattice& lattice, const geo::TileKey& key);
 

@@ -6,6 +6,8 @@
 #include <limits>
 #include <utility>
 
+#include "engine/dem/crs/node_positions.h"
+
 namespace terrace::dem {
 namespace {
 
@@ -20,9 +22,6 @@ int BoxesAlong(double degrees, double finest_cell) {
   const double box = finest_cell > 0 ? std::min(kBoxDegrees, finest_cell) : kBoxDegrees;
   return static_cast<int>(std::clamp(std::ceil(degrees / box), double{kMinBoxes}, double{kMaxBoxes}));
 }
-
-bool IsAtPole(const geo::Lattice& lattice, std::int64_t row) { return row <= 0 || row >= lattice.rows(); }
-bool IsAtPole(const geo::MercatorGrid&, std::int64_t) { return false; }
 
 // One global cell of nodes, filled from its corners inwards; every node is evaluated at most once.
 template <typename Grid>
@@ -99,8 +98,6 @@ class NodeCell {
   std::array<double, std::size_t{kStride} * kStride> known_{}, filled_{};
   std::array<bool, std::size_t{kStride} * kStride> is_known_{};
 };
-
-std::int64_t FloorMod(std::int64_t value, std::int64_t modulus) { return (value % modulus + modulus) % modulus; }
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
@@ -217,7 +214,7 @@ void Undulations::FillBoxes() {
   const double finest = geoid_->finest_cell();
   columns_ = BoxesAlong(area_.east - area_.west, finest);
   rows_ = BoxesAlong(area_.north - area_.south, finest);
-  boxes_.resize(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_));
+  boxes_.resize(Area(columns_, rows_));
   bounds_geoid_ = (area_.east - area_.west) / columns_ <= finest && (area_.north - area_.south) / rows_ <= finest;
   const int stride = 2 * columns_ + 1;
   std::vector<Position> positions;
@@ -379,15 +376,14 @@ void Undulations::Ask(const Grid& grid, const NodeWindow& window, std::vector<do
 
 template <typename Grid>
 Result<std::vector<double>> Undulations::AtNodes(const Grid& grid, const NodeWindow& window) const {
-  std::vector<double> out(static_cast<std::size_t>(window.columns) * static_cast<std::size_t>(window.rows),
-                          kUnknownUndulation);
+  std::vector<double> out(Area(window.columns, window.rows), kUnknownUndulation);
   if (geoid_->grid() == nullptr) {
     Ask(grid, window, out);
   } else if (auto done = Interpolate(grid, window, out); !done) {
     return tl::unexpected(done.error());
   }
   for (int row = 0; row < window.rows; ++row) {
-    if (!IsAtPole(grid, window.row + row)) continue;
+    if (!IsPoleRow(grid, window.row + row)) continue;
     std::fill_n(out.begin() + std::ptrdiff_t{row} * window.columns, window.columns,
                 poles_[window.row + row <= 0 ? 0 : 1]);
   }

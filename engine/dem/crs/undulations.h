@@ -1,7 +1,6 @@
 // The undulation of a source's geoid at the nodes of lattices and grids, and bounds on it.
 #pragma once
 
-#include <cstdint>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -85,10 +84,7 @@ class Undulations {
   double EastOfArea(double longitude) const;  // degrees, 0 .. 360
   bool IsInside(double longitude, double latitude) const;
   const HeightRange& BoxAt(double longitude, double latitude) const;
-  HeightRange& Box(int column, int row) {
-    return boxes_[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
-                  static_cast<std::size_t>(column)];
-  }
+  HeightRange& Box(int column, int row) { return boxes_[Area(row, columns_) + static_cast<std::size_t>(column)]; }
   const HeightRange& Box(int column, int row) const { return const_cast<Undulations&>(*this).Box(column, row); }
   void FillBoxes();
 

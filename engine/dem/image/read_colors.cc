@@ -12,6 +12,7 @@
 #include "engine/core/result.h"
 #include "engine/dem/crs/georeference.h"
 #include "engine/dem/crs/projector.h"
+#include "engine/dem/dem_types.h"
 #include "engine/dem/gdal/raster_file.h"
 #include "engine/dem/image/image_bins.h"
 #include "engine/dem/image/image_file.h"
@@ -173,11 +174,10 @@ Result<RasterColors> ReadImage(const std::string& path, const std::function<void
   raster.height = image->height();
   if (auto fits = CheckSizeToMesh(path, raster.width, raster.height); !fits) return tl::unexpected(fits.error());
   raster.georeferenced = image->dataset().GetGeoTransform(raster.geo_transform.data()) == CE_None;
-  raster.colors.resize(static_cast<std::size_t>(raster.width) * static_cast<std::size_t>(raster.height));
+  raster.colors.resize(Area(raster.width, raster.height));
   for (int row = 0; row < raster.height; row += kImageRowsAtOnce) {
     const int rows = std::min(kImageRowsAtOnce, raster.height - row);
-    ColorSample* const out =
-        raster.colors.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(raster.width);
+    ColorSample* const out = raster.colors.data() + Area(row, raster.width);
     if (auto read = image->Read(0, row, raster.width, rows, out); !read) return tl::unexpected(read.error());
     if (progress) progress(static_cast<double>(row + rows) / raster.height);
   }

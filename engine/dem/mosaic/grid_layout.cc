@@ -201,8 +201,6 @@ std::optional<std::int64_t> ColumnBeside(const geo::TileRange& pixels, Member me
   return std::nullopt;
 }
 
-std::int64_t FloorMod(std::int64_t value, std::int64_t modulus) { return (value % modulus + modulus) % modulus; }
-
 // The members of a grid that are in no group yet, by their pixels.
 class Ungrouped {
  public:

@@ -156,9 +156,7 @@ class RasterGrid {
   Result<std::vector<float>> ReadBlocks(int factor, const GridWindow& window, const std::stop_token& stop) const;
   // Averages of `step` x `step` samples each, into rows of `out` that are `window.columns` wide. Precondition: every
   // member begins at a block; the window does not wrap.
-  Result<void> Compose(int step, const GridWindow& window, std::span<float> out, const std::stop_token& stop) const;
-  Result<void> Average(int factor, const GridWindow& window, float* out, std::int64_t stride,
-                       const std::stop_token& stop) const;
+  Result<void> Compose(int step, const GridWindow& window, float* out, const std::stop_token& stop) const;
   // Small voids filled in. `measured`: becomes what was there before, unless it is null.
   struct Bridged {
     std::vector<float> heights;

@@ -79,6 +79,8 @@ class NodeCells {
 // The smallest window with every cell, its columns counted from near one of them where the axis wraps. Moves the cells
 // there. Precondition: not empty.
 GridWindow WindowOf(std::span<GridCell> cells, const GridAxes& axes);
+// The same with cells as they are.
+GridWindow HullOf(std::span<const GridCell> cells, const GridAxes& axes);
 
 // Bilinear, weights renormalized over valid samples; nothing where there is none.
 std::optional<double> Interpolate(const std::vector<float>& heights, const GridWindow& window, const GridCell& cell);

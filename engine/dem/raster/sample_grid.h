@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "engine/core/result.h"
+#include "engine/dem/dem_types.h"
 #include "engine/dem/gdal/sample_rules.h"
 
 namespace terrace::dem {

@@ -68,8 +68,7 @@ class Surface {
 
  private:
   float Height(std::int64_t column, std::int64_t row) const {
-    const std::int64_t wrapped = (column % grid_.columns + grid_.columns) % grid_.columns;
-    return grid_.heights[static_cast<std::size_t>(row * grid_.columns + wrapped)];
+    return grid_.heights[static_cast<std::size_t>(row * grid_.columns + FloorMod(column, grid_.columns))];
   }
   double Along(const GridAxis::Location& x, std::int64_t row) const {
     const double first = Height(x.index, row);
@@ -175,8 +174,7 @@ std::vector<float> CoarseAverages::Read(int factor, const GridWindow& window) co
   heights.reserve(static_cast<std::size_t>(window.columns * window.rows));
   for (std::int64_t r = window.row; r < window.row + window.rows; ++r) {
     for (std::int64_t c = window.column; c < window.column + window.columns; ++c) {
-      const std::int64_t column = (c % grid.columns + grid.columns) % grid.columns;
-      heights.push_back(grid.heights[static_cast<std::size_t>(r * grid.columns + column)]);
+      heights.push_back(grid.heights[static_cast<std::size_t>(r * grid.columns + FloorMod(c, grid.columns))]);
     }
   }
   return heights;
@@ -200,8 +198,7 @@ StatisticsAssembler::StatisticsAssembler(const RasterLayout& layout)
   statistics_.errors = AveragingErrors(layout.width, layout.height);
   if (!layout.overview_factors.empty()) return;
   statistics_.coarse = CoarseAverages::ShapedFor(layout);
-  largest_sums_.resize(static_cast<std::size_t>(DivideUp(layout.columns, ChunkGrid::kSide)) *
-                       static_cast<std::size_t>(DivideUp(layout.height, ChunkGrid::kSide)));
+  largest_sums_.resize(Area(DivideUp(layout.columns, ChunkGrid::kSide), DivideUp(layout.height, ChunkGrid::kSide)));
 }
 
 void StatisticsAssembler::Add(const Chunk& chunk, const ChunkStatistics& chunk_statistics) {
