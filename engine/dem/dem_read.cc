@@ -15,15 +15,6 @@ namespace {
 
 bool IsVoid(float height) { return std::isnan(height); }
 
-Result<void> FillFrom(const RasterGrid& grid, const geo::Lattice& lattice, const NodeWindow& window, HeightDatum datum,
-                      const NodeHeights& nodes, const std::stop_token& stop, GridTrace* trace) {
-  return grid.Fill(lattice, window, datum, nodes, stop, trace);
-}
-Result<void> FillFrom(const RasterGrid& grid, const geo::MercatorGrid& node_grid, const NodeWindow& window, HeightDatum,
-                      const NodeHeights& nodes, const std::stop_token& stop, GridTrace*) {
-  return grid.Fill(node_grid, window, nodes, stop);
-}
-
 // Around the nodes of a window. Their longitudes begin between -180 and 180, and go on eastwards.
 template <typename NodeGrid>
 Box BoxOf(const NodeGrid& node_grid, const NodeWindow& window) {
@@ -91,13 +82,13 @@ void ForPart(const NodeWindow& part, const NodeWindow& window, Visit&& visit) {
   }
 }
 
-// FillFrom, where there are many raster grids for the part of the window alone that this one reaches: thousands of
-// small ones may lie in a shallow tile, and what they note waits until all heights are known.
+// RasterGrid::Fill, where there are many raster grids for the part of the window alone that this one reaches: thousands
+// of small ones may lie in a shallow tile, and what they note waits until all heights are known.
 template <typename NodeGrid>
 Result<void> FillAny(const RasterGrid& grid, const NodeGrid& node_grid, const NodeWindow& window, std::size_t grids,
                      HeightDatum datum, const NodeHeights& nodes, const std::stop_token& stop, PartTrace* traced) {
   GridTrace* const trace = traced != nullptr ? &traced->trace : nullptr;
-  if (grids <= kFewGrids) return FillFrom(grid, node_grid, window, datum, nodes, stop, trace);
+  if (grids <= kFewGrids) return grid.Fill(node_grid, window, datum, nodes, stop, trace);
   const NodeWindow part = PartOf(grid, node_grid, window, 0);
   const auto copy = [&](std::span<const float> all) {
     std::vector<float> some(all.empty() ? 0 : Area(part.columns, part.rows));
@@ -108,7 +99,7 @@ Result<void> FillAny(const RasterGrid& grid, const NodeGrid& node_grid, const No
     if (!all.empty()) ForPart(part, window, [&](std::size_t from, std::size_t to) { all[to] = some[from]; });
   };
   std::vector<float> heights = copy(nodes.heights), weights = copy(nodes.weights), smooth = copy(nodes.smooth);
-  const auto filled = FillFrom(grid, node_grid, part, datum, {heights, weights, smooth}, stop, trace);
+  const auto filled = grid.Fill(node_grid, part, datum, {heights, weights, smooth}, stop, trace);
   if (!filled) return filled;
   copy_back(heights, nodes.heights);
   copy_back(weights, nodes.weights);

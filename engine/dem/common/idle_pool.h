@@ -35,8 +35,7 @@ class AnyIdlePool {
   void KeepAny(Lease lease) noexcept;
 
  private:
-  friend class IdleList;
-  std::uint64_t epoch_ = 0;  // counts calls of Clear; guarded by the list's mutex
+  std::uint64_t epoch_ = 0;  // counts calls of Clear; guarded by the mutex of the process's list
 };
 
 template <typename T>

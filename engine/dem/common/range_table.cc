@@ -42,8 +42,7 @@ void RangeTable::AddWindow(int col, int row, int cols, int rows, const float* he
       const std::int64_t right =
           std::min<std::int64_t>(((std::int64_t{col + c} + 1) * pixel_step - 1) / kBlock, finest.columns - 1);
       for (std::int64_t y = top; y <= bottom; ++y) {
-        for (std::int64_t x = left; x <= right; ++x)
-          finest.blocks[static_cast<std::size_t>(y * finest.columns + x)].Add(height);
+        for (std::int64_t x = left; x <= right; ++x) finest.At(x, y).Add(height);
       }
     }
   }
@@ -53,14 +52,14 @@ void RangeTable::AddBlocks(int block_column, int block_row, int columns, const s
   Level& finest = levels_.front();
   for (std::size_t i = 0; i < ranges.size(); ++i) {
     const int column = block_column + static_cast<int>(i) % columns, row = block_row + static_cast<int>(i) / columns;
-    finest.blocks[Area(row, finest.columns) + static_cast<std::size_t>(column)].Add(ranges[i]);
+    finest.At(column, row).Add(ranges[i]);
   }
 }
 
 void RangeTable::MarkHole(int row, int first, int last) {
   Level& finest = levels_.front();
   for (int x = first / kBlock; x <= last / kBlock; ++x) {
-    finest.blocks[Area(row / kBlock, finest.columns) + static_cast<std::size_t>(x)].has_holes = true;
+    finest.At(x, row / kBlock).has_holes = true;
   }
 }
 
@@ -77,8 +76,7 @@ void RangeTable::Finish() {
     coarse.blocks.resize(Area(coarse.columns, coarse.rows));
     for (int y = 0; y < fine.rows; ++y) {
       for (int x = 0; x < fine.columns; ++x) {
-        coarse.blocks[Area(y / 2, coarse.columns) + static_cast<std::size_t>(x / 2)].Add(
-            fine.blocks[Area(y, fine.columns) + static_cast<std::size_t>(x)]);
+        coarse.At(x / 2, y / 2).Add(fine.At(x, y));
       }
     }
     levels_.push_back(std::move(coarse));
@@ -123,9 +121,8 @@ std::optional<BlockRange> RangeTable::TryQuery(double west, double north, double
   const Level& blocks = levels_[level];
   if (blocks.blocks.empty()) return std::nullopt;
   for (int y = y0; y <= y1; ++y) {
-    for (int x = x0; x <= x1; ++x) {
-      range.Add(blocks.blocks[Area(y, blocks.columns) + static_cast<std::size_t>(x)]);
-    }
+    const BlockRange* const row = &blocks.At(x0, y);
+    for (int x = 0; x <= x1 - x0; ++x) range.Add(row[x]);
   }
   return range;
 }

@@ -201,9 +201,7 @@ Result<void> Georeference::ReadCrs(const OGRSpatialReference& srs, const std::st
   wkt_ = Wkt(srs);
   std::tie(vertical_datum_, vertical_unit_) = VerticalPart(srs);
   if (srs.IsCompound() != 0 && !vertical_datum_.empty()) vertical_crs_ = Wkt(srs);
-  OGRSpatialReference horizontal(srs);
-  if (horizontal.IsCompound() != 0) horizontal.StripVertical();
-  if (horizontal.GetAxesCount() == 3) horizontal.DemoteTo2D(nullptr);
+  const OGRSpatialReference horizontal = HorizontalPart(srs);
   horizontal_wkt_ = CanonicalWkt(horizontal);
   crs_ = NameAndCode(vertical_datum_.empty() ? horizontal : srs);
   if (horizontal.IsGeographic() == 0 && horizontal.IsProjected() == 0) {
@@ -311,6 +309,13 @@ void Georeference::ToDegrees(std::span<Position> positions) const {
 
 double Georeference::pixel_width() const { return std::hypot(to_crs_[1], to_crs_[4]); }
 double Georeference::pixel_height() const { return std::hypot(to_crs_[2], to_crs_[5]); }
+
+OGRSpatialReference HorizontalPart(const OGRSpatialReference& srs) {
+  OGRSpatialReference horizontal(srs);
+  if (horizontal.IsCompound() != 0) horizontal.StripVertical();
+  if (horizontal.GetAxesCount() == 3) horizontal.DemoteTo2D(nullptr);
+  return horizontal;
+}
 
 std::uint64_t FingerprintOf(const StampedFiles& files, const Georeference& where) {
   ByteWriter writer;

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <gdal_priv.h>
+#include <ogr_spatialref.h>
 
 #include <array>
 #include <cstdint>
@@ -106,6 +107,9 @@ class Georeference {
   std::string wkt_, horizontal_wkt_;            // of the CRS as stated, and without what heights count from
   std::string crs_, vertical_datum_, vertical_unit_, vertical_crs_, pixel_unit_;
 };
+
+// A reference system without what heights count from.
+OGRSpatialReference HorizontalPart(const OGRSpatialReference& srs);
 
 // Identifies what is in the files of a raster and where it lies: which operation of PROJ places it, and by which grids,
 // depends on what is installed.

@@ -216,20 +216,20 @@ NodeWindow WindowOfTile(const geo::Lattice& lattice, const geo::TileKey& key) {
   return {lattice.FirstColumn(key) - 1, lattice.FirstRow(key) - 1, lattice.cells + 3, lattice.cells + 3};
 }
 
-NodePositions NodePositions::Of(const Georeference& georeference, const Footprint& footprint,
-                                const geo::Lattice& lattice, const NodeWindow& window, double tolerance) {
-  return GridNodes(georeference, footprint, lattice, window, tolerance).Compute();
-}
-
-NodePositions NodePositions::Of(const Georeference& georeference, const Footprint& footprint,
-                                const geo::MercatorGrid& grid, const NodeWindow& window, double tolerance) {
+template <typename Grid>
+NodePositions NodePositions::Of(const Georeference& georeference, const Footprint& footprint, const Grid& grid,
+                                const NodeWindow& window, double tolerance) {
   return GridNodes(georeference, footprint, grid, window, tolerance).Compute();
 }
+template NodePositions NodePositions::Of(const Georeference&, const Footprint&, const geo::Lattice&, const NodeWindow&,
+                                         double);
+template NodePositions NodePositions::Of(const Georeference&, const Footprint&, const geo::MercatorGrid&,
+                                         const NodeWindow&, double);
 
 std::vector<Position> CellCentrePositions(const Georeference& georeference, const Footprint& footprint,
                                           const geo::Lattice& lattice, const geo::TileKey& key, double tolerance) {
   const NodeWindow window{lattice.FirstColumn(key), lattice.FirstRow(key), lattice.cells, lattice.cells};
-  const NodePositions found = GridNodes(georeference, footprint, CellCentres(lattice), window, tolerance).Compute();
+  const NodePositions found = NodePositions::Of(georeference, footprint, CellCentres(lattice), window, tolerance);
   std::vector<Position> centres;
   centres.reserve(found.columns() * found.rows());
   for (std::size_t j = 0; j < found.rows(); ++j) {

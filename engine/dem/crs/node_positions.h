@@ -45,10 +45,9 @@ class NodePositions {
   NodePositions(const NodeWindow& window, std::vector<Position> nodes) : window_(window), nodes_(std::move(nodes)) {}
   // Of nodes of a lattice. NaN where the source's CRS has no position, and outside `footprint`. Nodes of a pole row
   // share one position unless columns are meridians.
-  static NodePositions Of(const Georeference& georeference, const Footprint& footprint, const geo::Lattice& lattice,
-                          const NodeWindow& window, double tolerance);
-  // Of pixel centres of Web Mercator tiles.
-  static NodePositions Of(const Georeference& georeference, const Footprint& footprint, const geo::MercatorGrid& grid,
+  // `Grid`: geo::Lattice, or geo::MercatorGrid of pixel centres.
+  template <typename Grid>
+  static NodePositions Of(const Georeference& georeference, const Footprint& footprint, const Grid& grid,
                           const NodeWindow& window, double tolerance);
 
   const NodeWindow& window() const { return window_; }

@@ -375,7 +375,7 @@ void Undulations::Ask(const Grid& grid, const NodeWindow& window, std::vector<do
 }
 
 template <typename Grid>
-Result<std::vector<double>> Undulations::AtNodes(const Grid& grid, const NodeWindow& window) const {
+Result<std::vector<double>> Undulations::At(const Grid& grid, const NodeWindow& window) const {
   std::vector<double> out(Area(window.columns, window.rows), kUnknownUndulation);
   if (geoid_->grid() == nullptr) {
     Ask(grid, window, out);
@@ -390,12 +390,7 @@ Result<std::vector<double>> Undulations::AtNodes(const Grid& grid, const NodeWin
   return out;
 }
 
-Result<std::vector<double>> Undulations::At(const geo::Lattice& lattice, const NodeWindow& window) const {
-  return AtNodes(lattice, window);
-}
-
-Result<std::vector<double>> Undulations::At(const geo::MercatorGrid& grid, const NodeWindow& window) const {
-  return AtNodes(grid, window);
-}
+template Result<std::vector<double>> Undulations::At(const geo::Lattice&, const NodeWindow&) const;
+template Result<std::vector<double>> Undulations::At(const geo::MercatorGrid&, const NodeWindow&) const;
 
 }  // namespace terrace::dem

@@ -57,8 +57,9 @@ class Undulations {
 
   // Of the window's nodes, row by row from its first; NaN outside the area and where the geoid is not known. A function
   // of the global node alone: whichever window asks gets the same bits; pole rows are one value.
-  Result<std::vector<double>> At(const geo::Lattice& lattice, const NodeWindow& window) const;
-  Result<std::vector<double>> At(const geo::MercatorGrid& grid, const NodeWindow& window) const;
+  // `Grid`: geo::Lattice or geo::MercatorGrid.
+  template <typename Grid>
+  Result<std::vector<double>> At(const Grid& grid, const NodeWindow& window) const;
 
   // No value of At within the box leaves it: from (west, south), degrees, `width` by `height` large; west counts modulo
   // 360. Of a box that misses the area: of the whole area.
@@ -75,8 +76,6 @@ class Undulations {
  private:
   Undulations(std::shared_ptr<const Geoid> geoid, const Footprint& area) : geoid_(std::move(geoid)), area_(area) {}
   Result<void> FindPoles();
-  template <typename Grid>
-  Result<std::vector<double>> AtNodes(const Grid& grid, const NodeWindow& window) const;
   template <typename Grid>
   void Ask(const Grid& grid, const NodeWindow& window, std::vector<double>& out) const;
   template <typename Grid>

@@ -27,19 +27,12 @@ constexpr double kBeyondEdge = 0.5;  // pixels
 
 bool HasCrs(const OGRSpatialReference* srs) { return srs != nullptr && !srs->IsEmpty(); }
 
-// Heights may count from another datum than the image states, if it states any.
-OGRSpatialReference Horizontal(const OGRSpatialReference& srs) {
-  OGRSpatialReference horizontal(srs);
-  if (horizontal.IsCompound() != 0) horizontal.StripVertical();
-  if (horizontal.GetAxesCount() == 3) horizontal.DemoteTo2D(nullptr);
-  return horizontal;
-}
-
-// Whether positions in one are positions in the other. Not said of degrees, which differ by full circles.
+// Whether positions in one are positions in the other, whatever heights count from. Not said of degrees, which differ
+// by full circles.
 bool ShareCoordinates(const OGRSpatialReference* a, const OGRSpatialReference* b) {
   if (!HasCrs(a) && !HasCrs(b)) return true;
   if (!HasCrs(a) || !HasCrs(b)) return false;
-  const OGRSpatialReference horizontal_a = Horizontal(*a), horizontal_b = Horizontal(*b);
+  const OGRSpatialReference horizontal_a = HorizontalPart(*a), horizontal_b = HorizontalPart(*b);
   const char* const options[] = {"IGNORE_DATA_AXIS_TO_SRS_AXIS_MAPPING=YES", nullptr};
   return horizontal_a.IsGeographic() == 0 && horizontal_a.IsSame(&horizontal_b, options) != 0;
 }

@@ -29,6 +29,13 @@ Result<Georeference> GeoreferenceOf(const GridPlan& plan) {
 
 bool IsVoid(float height) { return std::isnan(height); }
 
+int FactorOf(const geo::Lattice& lattice, const SourceSpacing& spacing) {
+  return AveragingFactor(SamplesPerCell(lattice, spacing));
+}
+int FactorOf(const geo::MercatorGrid& grid, const SourceSpacing& spacing) {
+  return MercatorFactor(grid.depth, spacing);
+}
+
 // Rows from each sample to the nearest void in its column, at most `most` + 1. One void row lies above and below all.
 std::vector<int> RowsToVoid(const std::vector<float>& heights, std::int64_t columns, std::int64_t rows, int most) {
   std::vector<int> steps(heights.size());
@@ -380,14 +387,17 @@ NodeCells RasterGrid::CellsOf(const NodePositions& positions, int factor, const 
   return cells;
 }
 
-NodePositions RasterGrid::PositionsOf(const geo::Lattice& lattice, const NodeWindow& window, int factor) const {
-  return NodePositions::Of(georeference_, reach_, lattice, window, kGridPositionTolerance * factor);
+template <typename NodeGrid>
+NodePositions RasterGrid::PositionsOf(const NodeGrid& node_grid, const NodeWindow& window, int factor) const {
+  return NodePositions::Of(georeference_, reach_, node_grid, window, kGridPositionTolerance * factor);
 }
+template NodePositions RasterGrid::PositionsOf(const geo::Lattice&, const NodeWindow&, int) const;
 
-Result<void> RasterGrid::Fill(const geo::Lattice& lattice, const NodeWindow& window, HeightDatum datum,
+template <typename NodeGrid>
+Result<void> RasterGrid::Fill(const NodeGrid& node_grid, const NodeWindow& window, HeightDatum datum,
                               const NodeHeights& nodes, const std::stop_token& stop, GridTrace* trace) const {
-  const int factor = AveragingFactor(SamplesPerCell(lattice, spacing_));
-  NodePositions positions = PositionsOf(lattice, window, factor);
+  const int factor = FactorOf(node_grid, spacing_);
+  NodePositions positions = PositionsOf(node_grid, window, factor);
   std::vector<std::uint8_t> inside = cover_.Inside(positions);
   if (trace != nullptr) {
     trace->heights.assign(inside.size(), SampleRules::kVoid);
@@ -395,7 +405,7 @@ Result<void> RasterGrid::Fill(const geo::Lattice& lattice, const NodeWindow& win
   }
   for (int row = 0; row < window.rows && georeference_.is_geographic_grid(); ++row) {
     const std::int64_t global = window.row + row;
-    if (global > 0 && global < lattice.rows()) continue;
+    if (!IsPoleRow(node_grid, global)) continue;
     // Where columns are meridians they meet in one value.
     const auto first = static_cast<std::size_t>(row) * positions.columns();
     std::fill_n(inside.begin() + static_cast<std::ptrdiff_t>(first), window.columns, std::uint8_t{0});
@@ -405,7 +415,7 @@ Result<void> RasterGrid::Fill(const geo::Lattice& lattice, const NodeWindow& win
   }
   std::vector<double> undulations;
   if (undulations_ && datum == HeightDatum::kEllipsoid) {
-    auto found = undulations_->At(lattice, window);
+    auto found = undulations_->At(node_grid, window);
     if (!found) return tl::unexpected(found.error());
     undulations = *std::move(found);
   }
@@ -413,18 +423,9 @@ Result<void> RasterGrid::Fill(const geo::Lattice& lattice, const NodeWindow& win
   return FillAt(std::move(positions), inside, undulations, factor, nodes, stop, trace);
 }
 
-Result<void> RasterGrid::Fill(const geo::MercatorGrid& grid, const NodeWindow& window, const NodeHeights& nodes,
-                              const std::stop_token& stop) const {
-  const int factor = MercatorFactor(grid.depth, spacing_);
-  std::vector<double> undulations;
-  if (undulations_) {
-    auto found = undulations_->At(grid, window);
-    if (!found) return tl::unexpected(found.error());
-    undulations = *std::move(found);
-  }
-  NodePositions positions = NodePositions::Of(georeference_, reach_, grid, window, kGridPositionTolerance * factor);
-  const std::vector<std::uint8_t> inside = cover_.Inside(positions);
-  return FillAt(std::move(positions), inside, undulations, factor, nodes, stop);
-}
+template Result<void> RasterGrid::Fill(const geo::Lattice&, const NodeWindow&, HeightDatum, const NodeHeights&,
+                                       const std::stop_token&, GridTrace*) const;
+template Result<void> RasterGrid::Fill(const geo::MercatorGrid&, const NodeWindow&, HeightDatum, const NodeHeights&,
+                                       const std::stop_token&, GridTrace*) const;
 
 }  // namespace terrace::dem

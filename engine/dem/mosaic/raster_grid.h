@@ -107,13 +107,14 @@ class RasterGrid {
   // Replaces NaN among the window's heights by the raster grid's heights, where it has them. A height depends on the
   // node alone, not on the window. Fills in `trace` unless it is null. Errors: kUnavailable (a raster cannot be read
   // now), kChanged (a file was changed, replaced or removed), kCancelled (stopped).
-  Result<void> Fill(const geo::Lattice& lattice, const NodeWindow& window, HeightDatum datum, const NodeHeights& nodes,
+  // `NodeGrid`: geo::Lattice or geo::MercatorGrid.
+  template <typename NodeGrid>
+  Result<void> Fill(const NodeGrid& node_grid, const NodeWindow& window, HeightDatum datum, const NodeHeights& nodes,
                     const std::stop_token& stop, GridTrace* trace = nullptr) const;
-  Result<void> Fill(const geo::MercatorGrid& grid, const NodeWindow& window, const NodeHeights& nodes,
-                    const std::stop_token& stop) const;
 
   // Returns the pixel positions of the window's nodes that Fill uses for averages by `factor`.
-  NodePositions PositionsOf(const geo::Lattice& lattice, const NodeWindow& window, int factor) const;
+  template <typename NodeGrid>
+  NodePositions PositionsOf(const NodeGrid& node_grid, const NodeWindow& window, int factor) const;
   // Returns the cells of nodes, their columns near those of a trace's window.
   NodeCells CellsOf(const NodePositions& positions, int factor, const GridWindow& window) const;
 

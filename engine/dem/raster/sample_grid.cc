@@ -1,13 +1,12 @@
 #include "engine/dem/raster/sample_grid.h"
 
-#include <cpl_string.h>
-
 #include <algorithm>
 #include <cmath>
 #include <memory>
 #include <span>
 #include <string_view>
 
+#include "engine/dem/gdal/raster_file.h"
 #include "engine/dem/raster/block_averages.h"
 #include "engine/dem/raster/grid_cells.h"
 
@@ -97,15 +96,21 @@ Result<void> InterpolateBlocks(const Level& level, const SampleRules& rules, con
 
 }  // namespace
 
+RasterLayout RasterLayout::Of(GDALDataset& dataset, const Georeference& georeference, const std::string& crs_unit) {
+  RasterLayout layout;
+  layout.width = georeference.width();
+  layout.height = georeference.height();
+  layout.wraps = georeference.wrap_columns() > 0;
+  layout.columns = layout.wraps ? georeference.wrap_columns() : layout.width;
+  layout.rules = SampleRules::Of(HeightBand(dataset), crs_unit);
+  layout.overview_factors = OverviewFactors(HeightBand(dataset));
+  return layout;
+}
+
 bool HasOwnOverviews(GDALDataset& dataset) {
   const std::string_view driver = dataset.GetDriverName();
   if (driver != "JPEG" && !driver.starts_with("JP2")) return false;
-  // GDAL's go before the format's.
-  char** const files = dataset.GetFileList();
-  const bool is_beside = std::any_of(files, files + CSLCount(files),
-                                     [](const char* file) { return std::string_view(file).ends_with(".ovr"); });
-  CSLDestroy(files);
-  return !is_beside;
+  return !HasFileEndingWith(dataset, ".ovr");  // GDAL's go before the format's
 }
 
 double PixelsPerSample(GDALDataset& dataset, int factor, int pixels, int samples) {

@@ -5,9 +5,11 @@
 
 #include <cstdint>
 #include <stop_token>
+#include <string>
 #include <vector>
 
 #include "engine/core/result.h"
+#include "engine/dem/crs/georeference.h"
 #include "engine/dem/dem_types.h"
 #include "engine/dem/gdal/sample_rules.h"
 
@@ -15,6 +17,9 @@ namespace terrace::dem {
 
 // How a raster is stored, as far as reading it goes. Immutable after Open.
 struct RasterLayout {
+  // `crs_unit`: SampleRules::Of's.
+  static RasterLayout Of(GDALDataset& dataset, const Georeference& georeference, const std::string& crs_unit);
+
   int width = 0, height = 0;  // of the file
   int columns = 0;            // of them in use: without the duplicates of a raster that goes all around the Earth
   bool wraps = false;         // column `columns` is column 0 again

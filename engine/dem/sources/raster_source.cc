@@ -1,12 +1,12 @@
 #include "engine/dem/sources/raster_source.h"
 
-#include <cpl_string.h>
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <iterator>
 #include <stdexcept>
 #include <string_view>
 #include <utility>
@@ -18,20 +18,6 @@
 
 namespace terrace::dem {
 namespace {
-
-RasterLayout LayoutOf(GDALDataset& dataset, const Georeference& georeference, const VerticalDatum& vertical) {
-  RasterLayout layout;
-  layout.width = georeference.width();
-  layout.height = georeference.height();
-  layout.wraps = georeference.wrap_columns() > 0;
-  layout.columns = layout.wraps ? georeference.wrap_columns() : layout.width;
-  // Where the file names no unit, the reference system does that its owner says the heights are in.
-  const std::string& stated = georeference.vertical_unit();
-  layout.rules = SampleRules::Of(HeightBand(dataset),
-                                 stated.empty() && vertical.geoid != nullptr ? vertical.geoid->unit() : stated);
-  layout.overview_factors = OverviewFactors(HeightBand(dataset));
-  return layout;
-}
 
 // Why overviews are not averages of valid heights alone, as many have averaged nodata values in them: by what the file
 // and its owner state.
@@ -49,11 +35,9 @@ std::string WhyMisleading(GDALDataset& dataset, const SampleRules& rules) {
     return "they were made without regard to an alpha band of this type, which GDAL takes for no mask; make it one of "
            "bytes, and the overviews anew";
   }
-  char** const files = dataset.GetFileList();
-  const bool is_external = std::any_of(files, files + CSLCount(files),
-                                       [](const char* file) { return std::string_view(file).ends_with(".msk"); });
-  CSLDestroy(files);
-  if (is_external) return std::string("they were made without regard to the mask in a file of its own") + kOwnMask;
+  if (HasFileEndingWith(dataset, ".msk")) {
+    return std::string("they were made without regard to the mask in a file of its own") + kOwnMask;
+  }
   for (int i = 0; i < band.GetOverviewCount(); ++i) {
     GDALRasterBand* const overview = band.GetOverview(i);
     if (overview == nullptr) continue;
@@ -222,7 +206,11 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
   auto vertical = ResolveVertical(options.vertical, source->georeference_, CentreOf(source->georeference_));
   if (!vertical) return MakeError(vertical.error().code, "{}: {}", path, vertical.error().message);
   source->vertical_ = *std::move(vertical);
-  source->layout_ = LayoutOf(**dataset, source->georeference_, source->vertical_);
+  // Where the file names no unit, the reference system does that its owner says the heights are in.
+  const std::string& stated = source->georeference_.vertical_unit();
+  const auto& geoid = source->vertical_.geoid;
+  source->layout_ =
+      RasterLayout::Of(**dataset, source->georeference_, stated.empty() && geoid != nullptr ? geoid->unit() : stated);
   if (const double scale = source->layout_.rules.scale; !std::isfinite(scale) || scale == 0) {
     return MakeError(
         ErrorCode::kInvalidArgument,
@@ -279,6 +267,47 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
   if (auto unchanged = source->CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
   source->KeepTables(*std::move(prepared), prepare, std::move(pages));
   return source;
+}
+
+bool StatisticsPages::Admit(std::size_t bytes) {
+  const std::lock_guard lock(mutex_);
+  if (bytes > kept_left_) return false;
+  kept_left_ -= bytes;
+  return true;
+}
+
+StatisticsPages::Tables StatisticsPages::Find(const void* raster) {
+  const std::lock_guard lock(mutex_);
+  const auto found = by_raster_.find(raster);
+  if (found == by_raster_.end()) return nullptr;
+  pages_.splice(pages_.begin(), pages_, found->second);
+  return found->second->tables;
+}
+
+void StatisticsPages::Add(const void* raster, Tables tables) {
+  const std::size_t bytes = tables->bytes();
+  const std::lock_guard lock(mutex_);
+  if (by_raster_.contains(raster)) return;  // by another thread meanwhile
+  pages_.push_front({raster, std::move(tables), bytes});
+  by_raster_.emplace(raster, pages_.begin());
+  paged_ += bytes;
+  while (paged_ > most_paged_ && pages_.size() > 1) Remove(std::prev(pages_.end()));
+}
+
+void StatisticsPages::Forget(const void* raster) {
+  const std::lock_guard lock(mutex_);
+  if (const auto found = by_raster_.find(raster); found != by_raster_.end()) Remove(found->second);
+}
+
+std::size_t StatisticsPages::paged_bytes() const {
+  const std::lock_guard lock(mutex_);
+  return paged_;
+}
+
+void StatisticsPages::Remove(std::list<Page>::iterator page) {
+  paged_ -= page->bytes;
+  by_raster_.erase(page->raster);
+  pages_.erase(page);
 }
 
 RasterSource::~RasterSource() {
