@@ -4,7 +4,7 @@
 
 #include <array>
 
-#include "engine/dem/gdal/gdal_settings.h"
+#include "engine/dem/gdal/gdal_runtime.h"
 #include "proto/library_versions.h"
 
 namespace terrace::tiler {

@@ -24,10 +24,6 @@ class DemSource::Impl {
   Result<std::vector<float>> ReadNodes(int level, const NodeWindow& window, HeightDatum datum, const std::string& what,
                                        const std::stop_token& stop, std::vector<PartTrace>* traces = nullptr) const;
   Result<TileHeights> Read(const geo::TileKey& key, HeightDatum datum, const std::stop_token& stop) const;
-  Result<std::vector<float>> ReadMercator(int depth, const NodeWindow& window, const std::stop_token& stop) const;
-  Result<std::vector<float>> ReadPoints(std::span<const GeoPosition> points, HeightDatum datum,
-                                        std::span<std::uint8_t> filled, const std::stop_token& stop) const;
-  HeightRange RangeBound(const geo::TileKey& key) const;
 
   const geo::Lattice& LatticeOf(int level) const;  // 0 .. geo::kMaxLevel, also beyond the deepest level served
 

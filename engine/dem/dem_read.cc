@@ -15,15 +15,6 @@ namespace {
 
 bool IsVoid(float height) { return std::isnan(height); }
 
-Result<void> FillFrom(const RasterGrid& grid, const geo::Lattice& lattice, const NodeWindow& window, HeightDatum datum,
-                      const NodeHeights& nodes, const std::stop_token& stop, GridTrace* trace) {
-  return grid.Fill(lattice, window, datum, nodes, stop, trace);
-}
-Result<void> FillFrom(const RasterGrid& grid, const geo::MercatorGrid& node_grid, const NodeWindow& window, HeightDatum,
-                      const NodeHeights& nodes, const std::stop_token& stop, GridTrace*) {
-  return grid.Fill(node_grid, window, nodes, stop);
-}
-
 // Around the nodes of a window. Their longitudes begin between -180 and 180, and go on eastwards.
 template <typename NodeGrid>
 Box BoxOf(const NodeGrid& node_grid, const NodeWindow& window) {
@@ -91,17 +82,16 @@ void ForPart(const NodeWindow& part, const NodeWindow& window, Visit&& visit) {
   }
 }
 
-// FillFrom, where there are many raster grids for the part of the window alone that this one reaches: thousands of
-// small ones may lie in a shallow tile, and what they note waits until all heights are known.
+// RasterGrid::Fill, where there are many raster grids for the part of the window alone that this one reaches: thousands
+// of small ones may lie in a shallow tile, and what they note waits until all heights are known.
 template <typename NodeGrid>
 Result<void> FillAny(const RasterGrid& grid, const NodeGrid& node_grid, const NodeWindow& window, std::size_t grids,
                      HeightDatum datum, const NodeHeights& nodes, const std::stop_token& stop, PartTrace* traced) {
   GridTrace* const trace = traced != nullptr ? &traced->trace : nullptr;
-  if (grids <= kFewGrids) return FillFrom(grid, node_grid, window, datum, nodes, stop, trace);
+  if (grids <= kFewGrids) return grid.Fill(node_grid, window, datum, nodes, stop, trace);
   const NodeWindow part = PartOf(grid, node_grid, window, 0);
   const auto copy = [&](std::span<const float> all) {
-    std::vector<float> some(all.empty() ? 0
-                                        : static_cast<std::size_t>(part.columns) * static_cast<std::size_t>(part.rows));
+    std::vector<float> some(all.empty() ? 0 : Area(part.columns, part.rows));
     if (!all.empty()) ForPart(part, window, [&](std::size_t to, std::size_t from) { some[to] = all[from]; });
     return some;
   };
@@ -109,7 +99,7 @@ Result<void> FillAny(const RasterGrid& grid, const NodeGrid& node_grid, const No
     if (!all.empty()) ForPart(part, window, [&](std::size_t from, std::size_t to) { all[to] = some[from]; });
   };
   std::vector<float> heights = copy(nodes.heights), weights = copy(nodes.weights), smooth = copy(nodes.smooth);
-  const auto filled = FillFrom(grid, node_grid, part, datum, {heights, weights, smooth}, stop, trace);
+  const auto filled = grid.Fill(node_grid, part, datum, {heights, weights, smooth}, stop, trace);
   if (!filled) return filled;
   copy_back(heights, nodes.heights);
   copy_back(weights, nodes.weights);
@@ -126,7 +116,7 @@ Result<void> FillAny(const RasterGrid& grid, const NodeGrid& node_grid, const No
 GridTrace Widened(PartTrace&& of_part, const RasterGrid& grid, const geo::Lattice& lattice, const NodeWindow& window) {
   if (!of_part.part) return std::move(of_part.trace);
   GridTrace trace = std::move(of_part.trace);
-  const std::size_t nodes = static_cast<std::size_t>(window.columns) * static_cast<std::size_t>(window.rows);
+  const std::size_t nodes = Area(window.columns, window.rows);
   std::vector<float> heights(nodes, SampleRules::kVoid);
   ForPart(*of_part.part, window, [&](std::size_t from, std::size_t to) { heights[to] = trace.heights[from]; });
   trace.heights = std::move(heights);
@@ -200,7 +190,7 @@ Result<std::vector<float>> DemSource::Impl::ReadGrids(const NodeGrid& node_grid,
                                                       HeightDatum datum, const std::string& what,
                                                       const std::stop_token& stop,
                                                       std::vector<PartTrace>* traces) const {
-  const std::size_t nodes = static_cast<std::size_t>(window.columns) * static_cast<std::size_t>(window.rows);
+  const std::size_t nodes = Area(window.columns, window.rows);
   std::vector<float> heights(nodes, SampleRules::kVoid), smooth = heights;
   const std::vector<std::size_t> order = GridsAt(BoxOf(node_grid, window));
   const bool feathers = has_feather && order.size() > 1;
@@ -298,22 +288,23 @@ Result<double> DemSource::Impl::BoundError(const TileHeights& tile, const NodeWi
   return bound.bound();
 }
 
-Result<std::vector<float>> DemSource::Impl::ReadMercator(int depth, const NodeWindow& window,
-                                                         const std::stop_token& stop) const {
-  auto heights = ReadGrids(geo::MercatorGrid{depth}, window, HeightDatum::kEllipsoid,
-                           fmt::format("Mercator pixels of depth {}", depth), stop, nullptr);
-  if (heights) std::ranges::replace_if(*heights, IsVoid, floor);
+Result<std::vector<float>> DemSource::ReadMercator(int depth, const NodeWindow& window, std::stop_token stop) const {
+  TERRACE_CHECK(depth >= 0 && depth <= geo::kMaxLevel && window.columns > 0 && window.rows > 0);
+  TERRACE_CHECK(window.row >= 0 && window.row + window.rows <= geo::MercatorGrid{depth}.rows());
+  auto heights = impl_->ReadGrids(geo::MercatorGrid{depth}, window, HeightDatum::kEllipsoid,
+                                  fmt::format("Mercator pixels of depth {}", depth), stop, nullptr);
+  if (heights) std::ranges::replace_if(*heights, IsVoid, impl_->floor);
   return heights;
 }
 
-Result<std::vector<float>> DemSource::Impl::ReadPoints(std::span<const GeoPosition> points, HeightDatum datum,
-                                                       std::span<std::uint8_t> filled,
-                                                       const std::stop_token& stop) const {
+Result<std::vector<float>> DemSource::ReadPoints(std::span<const GeoPosition> points, HeightDatum datum,
+                                                 std::stop_token stop, std::span<std::uint8_t> filled) const {
+  TERRACE_CHECK(filled.empty() || filled.size() == points.size());
   std::vector<float> heights(points.size(), SampleRules::kVoid), smooth = heights;
   std::map<std::size_t, std::vector<std::size_t>> wanted;  // points by the raster grids that may have them
   for (std::size_t i = 0; i < points.size(); ++i) {
     const double x = std::remainder(points[i].longitude, 360), y = points[i].latitude;
-    for (const std::size_t grid : GridsAt({x, y, x, y})) wanted[grid].push_back(i);
+    for (const std::size_t grid : impl_->GridsAt({x, y, x, y})) wanted[grid].push_back(i);
   }
   std::vector<GeoPosition> missing;
   std::vector<float> found, found_smooth;
@@ -325,7 +316,7 @@ Result<std::vector<float>> DemSource::Impl::ReadPoints(std::span<const GeoPositi
     found.assign(those.size(), SampleRules::kVoid);
     found_smooth = found;
     found_filled.assign(those.size(), 0);
-    const auto read = grids[grid].FillPoints(missing, datum, {found, {}, found_smooth}, found_filled, stop);
+    const auto read = impl_->grids[grid].FillPoints(missing, datum, {found, {}, found_smooth}, found_filled, stop);
     if (!read) return tl::unexpected(read.error());
     for (std::size_t k = 0; k < those.size(); ++k) {
       heights[those[k]] = found[k];
@@ -341,12 +332,14 @@ Result<std::vector<float>> DemSource::Impl::ReadPoints(std::span<const GeoPositi
   return heights;
 }
 
-HeightRange DemSource::Impl::RangeBound(const geo::TileKey& key) const {
+HeightRange DemSource::RangeBound(const geo::TileKey& key) const {
+  TERRACE_CHECK(geo::IsValid(key));
   BlockRange blocks;
   bool floor_shows = true;
-  const geo::Lattice& lattice = LatticeOf(key.level);
-  for (const std::size_t i : GridsAt(BoxOf(lattice, WindowOfTile(lattice, key)))) {
-    const GridRange range = grids[i].RangeOf(lattice, key);
+  const float floor = impl_->floor;
+  const geo::Lattice& lattice = impl_->LatticeOf(key.level);
+  for (const std::size_t i : impl_->GridsAt(BoxOf(lattice, WindowOfTile(lattice, key)))) {
+    const GridRange range = impl_->grids[i].RangeOf(lattice, key);
     blocks.Add(range.blocks);
     floor_shows = range.shows_others;
     if (!floor_shows) break;  // whatever comes after it is hidden

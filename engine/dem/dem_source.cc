@@ -256,11 +256,6 @@ bool DemSource::IsAvailable(const geo::TileKey& key) const {
          std::ranges::any_of(Available(key.level), [&](const geo::TileRange& range) { return range.Contains(key); });
 }
 
-HeightRange DemSource::RangeBound(const geo::TileKey& key) const {
-  TERRACE_CHECK(geo::IsValid(key));
-  return impl_->RangeBound(key);
-}
-
 Result<TileHeights> DemSource::Read(const geo::TileKey& key, std::stop_token stop) const {
   TERRACE_CHECK(geo::IsValid(key));
   return impl_->Read(key, HeightDatum::kEllipsoid, stop);
@@ -292,18 +287,6 @@ Result<std::vector<float>> DemSource::ReadNodes(int level, const NodeWindow& win
   TERRACE_CHECK(level >= 0 && level <= geo::kMaxLevel && window.columns > 0 && window.rows > 0);
   TERRACE_CHECK(window.row >= 0 && window.row + window.rows - 1 <= LatticeOf(level).rows());
   return impl_->ReadNodes(level, window, HeightDatum::kEllipsoid, fmt::format("an area of level {}", level), stop);
-}
-
-Result<std::vector<float>> DemSource::ReadMercator(int depth, const NodeWindow& window, std::stop_token stop) const {
-  TERRACE_CHECK(depth >= 0 && depth <= geo::kMaxLevel && window.columns > 0 && window.rows > 0);
-  TERRACE_CHECK(window.row >= 0 && window.row + window.rows <= geo::MercatorGrid{depth}.rows());
-  return impl_->ReadMercator(depth, window, stop);
-}
-
-Result<std::vector<float>> DemSource::ReadPoints(std::span<const GeoPosition> points, HeightDatum datum,
-                                                 std::stop_token stop, std::span<std::uint8_t> filled) const {
-  TERRACE_CHECK(filled.empty() || filled.size() == points.size());
-  return impl_->ReadPoints(points, datum, filled, stop);
 }
 
 }  // namespace terrace::dem

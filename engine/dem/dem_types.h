@@ -92,6 +92,16 @@ struct NodeWindow {
   int columns = 0, rows = 0;
 };
 
+// Elements of a grid of so many columns and rows, or before a row.
+constexpr std::size_t Area(std::int64_t columns, std::int64_t rows) {
+  return static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);
+}
+
+// 0 .. modulus - 1, as of columns around the Earth.
+constexpr std::int64_t FloorMod(std::int64_t value, std::int64_t modulus) {
+  return (value % modulus + modulus) % modulus;
+}
+
 // One raster, as `terrace info` prints it.
 struct RasterInfo {
   std::string path;
@@ -155,10 +165,7 @@ struct TileHeights {
   double source_error_m = std::numeric_limits<double>::infinity();
 
   // i, j in -1 .. cells + 1: columns from the west, rows from the SOUTH.
-  float At(int i, int j) const {
-    return heights[static_cast<std::size_t>(j + 1) * static_cast<std::size_t>(stride) +
-                   static_cast<std::size_t>(i + 1)];
-  }
+  float At(int i, int j) const { return heights[Area(j + 1, stride) + static_cast<std::size_t>(i + 1)]; }
 };
 
 }  // namespace terrace::dem

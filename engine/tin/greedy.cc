@@ -15,10 +15,55 @@
 #include "engine/tin/scan/squared_distances.h"
 #include "engine/tin/scan/squared_errors.h"
 #include "engine/tin/scan/triangle_scan.h"
-#include "engine/tin/seed_cursor.h"
 
 namespace terrace::tin {
 namespace {
+
+// The position of a run within its seed grids: the samples that are due, in order.
+class SeedCursor {
+ public:
+  // Fails a TERRACE_CHECK if a step does not divide both sides, or if the grids are not in order of decreasing
+  // below_error.
+  SeedCursor(const HeightField& field, std::vector<SeedGrid> grids)
+      : width_(field.width()), height_(field.height()), grids_(std::move(grids)) {
+    for (std::size_t i = 0; i < grids_.size(); ++i) {
+      const int step = grids_[i].step;
+      TERRACE_CHECK(step > 0 && (width_ - 1) % step == 0 && (height_ - 1) % step == 0);
+      TERRACE_CHECK(i == 0 || grids_[i - 1].below_error >= grids_[i].below_error);
+    }
+  }
+
+  // Whether a grid is unfinished. Its remaining samples are inserted at any error.
+  bool InGrid() const { return begun_; }
+  bool HasGrid() const { return grid_ < grids_.size(); }
+  // Whether the next grid must be in every mesh with this error. Precondition: HasGrid.
+  bool IsDue(double error) const { return static_cast<double>(below_error()) > error; }
+  // The below_error of the grid that holds the next sample, rounded up to a float.
+  float below_error() const { return CandidateQueue::RoundUp(grids_[grid_].below_error); }
+
+  // The next sample, row by row. Precondition: HasGrid.
+  SamplePosition Take() {
+    const SamplePosition sample{static_cast<std::uint16_t>(x_), static_cast<std::uint16_t>(y_)};
+    const int step = grids_[grid_].step;
+    begun_ = true;
+    x_ += step;
+    if (x_ < width_) return sample;
+    x_ = 0;
+    y_ += step;
+    if (y_ < height_) return sample;
+    y_ = 0;
+    begun_ = false;
+    ++grid_;
+    return sample;
+  }
+
+ private:
+  int width_, height_;
+  std::vector<SeedGrid> grids_;
+  std::size_t grid_ = 0;
+  bool begun_ = false;
+  int x_ = 0, y_ = 0;
+};
 
 // Insertions between two looks at the stop token: about a twentieth of a millisecond.
 constexpr std::size_t kStopPeriod = 256;

@@ -15,7 +15,7 @@
 
 #include "engine/core/result.h"
 #include "engine/dem/dem_source.h"
-#include "engine/dem/gdal/gdal_settings.h"
+#include "engine/dem/gdal/gdal_runtime.h"
 #include "server/tiles/dataset_view.h"
 #include "tiler/area/area_mesh.h"
 #include "tiler/encoded_tile.h"

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "engine/dem/gdal/gdal_settings.h"
+#include "engine/dem/gdal/gdal_runtime.h"
 
 namespace terrace::server {
 namespace {

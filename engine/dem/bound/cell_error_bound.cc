@@ -14,6 +14,70 @@ SampleBox CentresIn(const PixelBounds& box, double shift) {
   return {first(box.west + shift), first(box.north), last(box.east + shift), last(box.south)};
 }
 
+// The bilinear surface through the heights at a cell's nodes, in the order south-west, south-east, north-west,
+// north-east, at positions in pixels of a raster.
+class CellSurface {
+ public:
+  // `corners`: positions of the nodes in pixels, with an uncertainty of `slack` against positions of samples.
+  // `is_separable`: columns are meridians and rows are parallels, evenly spaced.
+  CellSurface(const std::array<Position, 4>& corners, bool is_separable, const Position& slack)
+      : origin_(corners[0]),
+        east_{corners[1].x - origin_.x, corners[1].y - origin_.y},
+        north_{corners[2].x - origin_.x, corners[2].y - origin_.y},
+        twist_{corners[3].x - corners[1].x - north_.x, corners[3].y - corners[1].y - north_.y} {
+    // Lines between nodes deviate from straight ones by far less than that fraction of the cell.
+    constexpr double kBulge = 1.0 / 32;
+    const double bulge = is_separable ? 0 : kBulge;
+    const auto extent = [](double east, double north, double twist) {
+      return std::abs(east) + std::abs(north) + std::abs(twist);
+    };
+    slack_x_ = bulge * extent(east_.x, north_.x, twist_.x) + slack.x;
+    slack_y_ = bulge * extent(east_.y, north_.y, twist_.y) + slack.y;
+  }
+
+  void SetHeight(std::size_t corner, double height) { heights_[corner] = height; }
+  // Adds to the uncertainty of the samples' heights, in metres.
+  void Widen(double error) { widened_ += error; }
+
+  // An upper bound of the distance between a sample and the surface; 0 if the position is outside the cell.
+  double Apart(const Position& at, double sample) const {
+    double u = 0.5, v = 0.5, u_slack = std::numeric_limits<double>::infinity(), v_slack = u_slack;
+    constexpr int kSteps = 4;
+    for (int step = 0; step < kSteps; ++step) {
+      const double right_x = at.x - origin_.x - u * east_.x - v * north_.x - u * v * twist_.x;
+      const double right_y = at.y - origin_.y - u * east_.y - v * north_.y - u * v * twist_.y;
+      const double ux = east_.x + v * twist_.x, uy = east_.y + v * twist_.y;
+      const double vx = north_.x + u * twist_.x, vy = north_.y + u * twist_.y;
+      const double scale = 1 / std::abs(ux * vy - uy * vx);
+      const double sign = ux * vy - uy * vx < 0 ? -scale : scale;
+      u += (right_x * vy - right_y * vx) * sign;
+      v += (ux * right_y - uy * right_x) * sign;
+      // What is left after this step is far below what the last one moved.
+      const double x = slack_x_ + (step + 1 < kSteps ? 0 : std::abs(right_x));
+      const double y = slack_y_ + (step + 1 < kSteps ? 0 : std::abs(right_y));
+      u_slack = (std::abs(vy) * x + std::abs(vx) * y) * scale;
+      v_slack = (std::abs(uy) * x + std::abs(ux) * y) * scale;
+    }
+    const auto [lowest, highest] = std::minmax_element(heights_.begin(), heights_.end());
+    const double anywhere = std::max(*highest - sample, sample - *lowest) + widened_;
+    if (!(u_slack < 1 && v_slack < 1)) return anywhere;  // also where it did not converge
+    if (u < -u_slack || u > 1 + u_slack || v < -v_slack || v > 1 + v_slack) return 0;
+    const double south = heights_[0] + u * (heights_[1] - heights_[0]);
+    const double north = heights_[2] + u * (heights_[3] - heights_[2]);
+    const double along = std::max(std::abs(heights_[1] - heights_[0]), std::abs(heights_[3] - heights_[2]));
+    const double across = std::max(std::abs(heights_[2] - heights_[0]), std::abs(heights_[3] - heights_[1]));
+    // Outside the cell by no more than the slack the slopes are the cell's, but for the twist: twice is enough.
+    const double here = std::abs(south + v * (north - south) - sample) + 2 * (u_slack * along + v_slack * across);
+    return std::min(anywhere, here + widened_);
+  }
+
+ private:
+  Position origin_, east_, north_, twist_;
+  double slack_x_ = 0, slack_y_ = 0;
+  std::array<double, 4> heights_{};
+  double widened_ = 0;
+};
+
 }  // namespace
 
 SampleBox CellErrorBound::Clipped(SampleBox box) const {
@@ -24,25 +88,6 @@ SampleBox CellErrorBound::Clipped(SampleBox box) const {
   box.north = std::max<std::int64_t>(box.north, 0);
   box.south = std::min<std::int64_t>(box.south, grid_.rows() - 1);
   return box;
-}
-
-// The heights served in a cell, as the raster grid's samples count.
-CellSurface CellErrorBound::SurfaceOf(const TileCell& cell, const std::array<Position, 4>& corners) const {
-  constexpr double kPosition = 4e-5;  // of averages: NodePositions is exact to a hundred-thousandth
-  const Position& off = tables_.misplacement();
-  const double slack = kPosition * trace_.factor;
-  const bool is_separable = grid_.georeference().is_geographic_grid() && grid_.georeference().is_affine();
-  CellSurface surface(corners, is_separable, {off.x + slack, off.y + slack});
-  const double geoid_error = geoid_.Over(cell.box());
-  const bool is_known = std::isfinite(geoid_error);
-  const HeightRange range = is_known ? HeightRange{0, 0} : geoid_.RangeOf(cell.box());
-  for (std::size_t k = 0; k < 4; ++k) {
-    const bool is_added = is_known && geoid_.is_added();
-    const double geoid = is_added ? geoid_.AddedAt(cell.nodes[k]) : (range.min + range.max) / 2;
-    surface.SetHeight(k, double{tile_.heights[cell.nodes[k]]} - geoid);
-  }
-  surface.Widen(is_known ? geoid_error : (range.max - range.min) / 2);
-  return surface;
 }
 
 // Between the heights served at a cell's nodes and the raster grid's heights within these bounds, which count as its
@@ -222,7 +267,21 @@ double CellErrorBound::OfSamples(const TileCell& cell, const CellSamples& place,
       in.south >= window.row + window.rows) {
     return kUnknownError;
   }
-  const CellSurface surface = SurfaceOf(cell, place.corners);
+  // The heights served in a cell, as the raster grid's samples count.
+  constexpr double kPosition = 4e-5;  // of averages: NodePositions is exact to a hundred-thousandth
+  const Position& off = tables_.misplacement();
+  const double slack = kPosition * trace_.factor;
+  const bool is_separable = grid_.georeference().is_geographic_grid() && grid_.georeference().is_affine();
+  CellSurface surface(place.corners, is_separable, {off.x + slack, off.y + slack});
+  const double geoid_error = geoid_.Over(cell.box());
+  const bool is_known = std::isfinite(geoid_error);
+  const HeightRange range = is_known ? HeightRange{0, 0} : geoid_.RangeOf(cell.box());
+  for (std::size_t k = 0; k < 4; ++k) {
+    const bool is_added = is_known && geoid_.is_added();
+    const double geoid = is_added ? geoid_.AddedAt(cell.nodes[k]) : (range.min + range.max) / 2;
+    surface.SetHeight(k, double{tile_.heights[cell.nodes[k]]} - geoid);
+  }
+  surface.Widen(is_known ? geoid_error : (range.max - range.min) / 2);
   double error = 0, lowest = kUnknownError, highest = -lowest;
   for (std::int64_t row = in.north; row <= in.south; ++row) {
     const float* const line = samples.data() + (row - window.row) * window.columns + (turn - window.column);

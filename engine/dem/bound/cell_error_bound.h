@@ -8,7 +8,6 @@
 #include <optional>
 #include <vector>
 
-#include "engine/dem/bound/cell_surface.h"
 #include "engine/dem/bound/geoid_error_bound.h"
 #include "engine/dem/bound/grid_tables.h"
 #include "engine/dem/bound/tile_cells.h"
@@ -72,7 +71,6 @@ class CellErrorBound {
   std::optional<std::array<Position, 4>> CornersOf(const TileCell& cell) const;
   bool IsOnBothEnds(const PixelBounds& box) const;
   SampleBox Clipped(SampleBox box) const;
-  CellSurface SurfaceOf(const TileCell& cell, const std::array<Position, 4>& corners) const;
   double Apart(const TileCell& cell, double lowest, double highest) const;
   double OfBox(const TileCell& cell, const SampleBox& averages, bool& has_voids) const;
   double OfAveragesNear(const TileCell& cell, const PixelBounds& box) const;

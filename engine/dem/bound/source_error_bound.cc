@@ -2,15 +2,86 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <functional>
 #include <optional>
+#include <vector>
 
 #include "engine/dem/bound/cell_error_bound.h"
 #include "engine/dem/bound/geoid_error_bound.h"
 #include "engine/dem/bound/grid_tables.h"
-#include "engine/dem/bound/loose_cells.h"
 #include "engine/dem/bound/smooth_error_bound.h"
+#include "engine/dem/dem_types.h"
 
 namespace terrace::dem {
+namespace {
+
+// Cells with a loose bound, at joints of averaged rasters, at rims and beside voids. Reading their samples tightens it.
+class LooseCells {
+ public:
+  // For larger factors the blocks of the statistics are as fine as the cells.
+  static bool MayRead(int factor) { return factor > 1 && factor <= 16; }
+
+  // The arguments must outlive this.
+  LooseCells(const RasterGrid& grid, const CellErrorBound& single) : grid_(grid), single_(single) {}
+
+  // Cells of a group are adjacent; their samples are read together.
+  void BeginGroup() { groups_.emplace_back(); }
+
+  // `error`: the known bound of the cell. Precondition: a group has begun.
+  void Add(const TileCell& cell, const CellErrorBound::CellSamples& place, double error) {
+    groups_.back().cells.push_back({cell, place, error});
+    groups_.back().error = std::max(groups_.back().error, error);
+  }
+
+  // Raises `bound` to the bound of all cells. Reads only groups that could raise it, and a bounded number of samples.
+  Result<void> Read(double& bound, const std::stop_token& stop) {
+    // For one tile and raster grid: about as many as its own heights are averaged from at the largest factor of
+    // MayRead.
+    constexpr std::int64_t kMaxSamples = std::int64_t{1} << 20;
+    // The largest first: what they come to makes others not worth looking at.
+    std::ranges::stable_sort(groups_, std::ranges::greater(), &Group::error);
+    std::int64_t left = kMaxSamples;
+    for (const Group& group : groups_) {
+      if (group.error <= bound) return {};
+      SampleBox all;
+      for (const Cell& loose : group.cells) {
+        if (loose.error > bound && !loose.place.samples.empty()) all = all.Around(loose.place.samples);
+      }
+      if (all.empty()) continue;
+      if (all.columns() > left || all.rows() > left || all.columns() * all.rows() > left) {
+        bound = group.error;
+        return {};
+      }
+      left -= all.columns() * all.rows();
+      const GridWindow window{all.west, all.north, all.columns(), all.rows()};
+      const auto samples = grid_.ReadSamples(window, stop);
+      if (!samples) return tl::unexpected(samples.error());
+      for (const Cell& loose : group.cells) {
+        if (loose.error <= bound) continue;
+        bound = std::max(bound, std::min(loose.error, single_.OfSamples(loose.cell, loose.place, window, *samples, 0)));
+      }
+    }
+    return {};
+  }
+
+ private:
+  struct Cell {
+    TileCell cell;
+    CellErrorBound::CellSamples place;
+    double error;
+  };
+  struct Group {
+    std::vector<Cell> cells;
+    double error = 0;
+  };
+
+  const RasterGrid& grid_;
+  const CellErrorBound& single_;
+  std::vector<Group> groups_;
+};
+
+}  // namespace
 
 // One raster grid's part: groups of cells, and the cells of groups where something is in the way.
 class GridErrorBound {
@@ -38,9 +109,7 @@ class GridErrorBound {
   }
 
  private:
-  std::size_t CellIndex(int i, int j) const {
-    return static_cast<std::size_t>(j) * static_cast<std::size_t>(nodes_.cells()) + static_cast<std::size_t>(i);
-  }
+  std::size_t CellIndex(int i, int j) const { return Area(j, nodes_.cells()) + static_cast<std::size_t>(i); }
   bool Touches(const CellBox& box) const {
     return grid_.reach().Touches(nodes_.West(box), nodes_.South(box), nodes_.Width(box), nodes_.Height(box));
   }
@@ -203,7 +272,7 @@ SourceErrorBound::SourceErrorBound(const geo::Lattice& lattice, const NodeWindow
       window_(window),
       heights_(heights),
       blends_(blends),
-      covered_(static_cast<std::size_t>(lattice.cells) * static_cast<std::size_t>(lattice.cells)) {}
+      covered_(Area(lattice.cells, lattice.cells)) {}
 
 Result<void> SourceErrorBound::Add(const RasterGrid& grid, const GridTrace& trace, const std::stop_token& stop) {
   return GridErrorBound(*this, grid, trace).Add(stop);

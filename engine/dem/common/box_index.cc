@@ -5,7 +5,6 @@
 #include <boost/geometry/geometries/point.hpp>
 #include <boost/geometry/index/rtree.hpp>
 #include <boost/geometry/strategies/relate/cartesian.hpp>
-#include <iterator>
 #include <utility>
 
 namespace terrace::dem {

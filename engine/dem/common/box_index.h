@@ -8,7 +8,9 @@
 namespace terrace::dem {
 
 struct Box {
-  double west = 0, south = 0, east = 0, north = 0;
+  double west = 0, south = 0, east = 0, north = 0;  // of pixels: south is the first row
+
+  void Grow(double x, double y) { west -= x, east += x, south -= y, north += y; }
 };
 
 // An R-tree. Immutable and thread-safe; an empty index finds nothing.

@@ -9,82 +9,79 @@
 
 namespace terrace::dem {
 
-class IdleList {
- public:
-  // Never destroyed: pools of static lifetime may outlive any order.
-  static IdleList& OfProcess() {
-    static IdleList& list = *new IdleList;
-    return list;
-  }
+namespace {
 
-  void SetLimit(std::size_t count) {
-    Items gone;  // closed after the lock, here as below: closing a file may take long
-    const std::lock_guard lock(mutex_);
-    limit_ = count;
-    Shrink(gone);
-  }
+struct Item {
+  const AnyIdlePool* pool;
+  std::shared_ptr<void> item;
+};
+using Items = std::list<Item>;
 
-  AnyIdlePool::Lease Take(const AnyIdlePool& pool) {
-    const std::lock_guard lock(mutex_);
-    const auto of_pool = by_pool_.find(&pool);
-    if (of_pool == by_pool_.end() || of_pool->second.empty()) return {nullptr, pool.epoch_};
-    const Items::iterator last_used = of_pool->second.back();
-    AnyIdlePool::Lease lease{std::move(last_used->item), pool.epoch_};
-    items_.erase(last_used);
-    of_pool->second.pop_back();
-    return lease;
-  }
-
-  void Keep(const AnyIdlePool& pool, AnyIdlePool::Lease lease) {
-    Items gone, added;
-    added.push_back({&pool, std::move(lease.item)});
-    const std::lock_guard lock(mutex_);
-    if (lease.epoch != pool.epoch_) return;
-    by_pool_[&pool].push_back(added.begin());
-    items_.splice(items_.begin(), added);
-    Shrink(gone);
-  }
-
-  void Clear(AnyIdlePool& pool) {
-    Items gone;
-    const std::lock_guard lock(mutex_);
-    ++pool.epoch_;
-    const auto of_pool = by_pool_.find(&pool);
-    if (of_pool == by_pool_.end()) return;
-    for (const Items::iterator item : of_pool->second) gone.splice(gone.end(), items_, item);
-    by_pool_.erase(of_pool);
-  }
-
- private:
-  struct Item {
-    const AnyIdlePool* pool;
-    std::shared_ptr<void> item;
-  };
-  using Items = std::list<Item>;
+// What all pools keep.
+struct IdleList {
+  std::mutex mutex;  // guards what follows, and the pools' epochs
+  std::size_t limit = 256;
+  Items items;  // the one used last comes first
+  std::unordered_map<const AnyIdlePool*, std::vector<Items::iterator>> by_pool;
 
   void Shrink(Items& gone) {
-    while (items_.size() > limit_) {
-      const auto of_pool = by_pool_.find(items_.back().pool);
+    while (items.size() > limit) {
+      const auto of_pool = by_pool.find(items.back().pool);
       of_pool->second.erase(of_pool->second.begin());  // of a pool the one used longest ago comes first
-      gone.splice(gone.end(), items_, std::prev(items_.end()));
+      gone.splice(gone.end(), items, std::prev(items.end()));
     }
   }
-
-  std::mutex mutex_;  // guards what follows, and the pools' epochs
-  std::size_t limit_ = 256;
-  Items items_;  // the one used last comes first
-  std::unordered_map<const AnyIdlePool*, std::vector<Items::iterator>> by_pool_;
 };
 
-void SetMostIdle(std::size_t count) { IdleList::OfProcess().SetLimit(count); }
+// Never destroyed: pools of static lifetime may outlive any order.
+IdleList& OfProcess() {
+  static IdleList& list = *new IdleList;
+  return list;
+}
 
-void AnyIdlePool::Clear() noexcept { IdleList::OfProcess().Clear(*this); }
+}  // namespace
 
-AnyIdlePool::Lease AnyIdlePool::TakeAny() { return IdleList::OfProcess().Take(*this); }
+void SetMostIdle(std::size_t count) {
+  Items gone;  // closed after the lock, here as below: closing a file may take long
+  IdleList& list = OfProcess();
+  const std::lock_guard lock(list.mutex);
+  list.limit = count;
+  list.Shrink(gone);
+}
+
+void AnyIdlePool::Clear() noexcept {
+  Items gone;
+  IdleList& list = OfProcess();
+  const std::lock_guard lock(list.mutex);
+  ++epoch_;
+  const auto of_pool = list.by_pool.find(this);
+  if (of_pool == list.by_pool.end()) return;
+  for (const Items::iterator item : of_pool->second) gone.splice(gone.end(), list.items, item);
+  list.by_pool.erase(of_pool);
+}
+
+AnyIdlePool::Lease AnyIdlePool::TakeAny() {
+  IdleList& list = OfProcess();
+  const std::lock_guard lock(list.mutex);
+  const auto of_pool = list.by_pool.find(this);
+  if (of_pool == list.by_pool.end() || of_pool->second.empty()) return {nullptr, epoch_};
+  const Items::iterator last_used = of_pool->second.back();
+  Lease lease{std::move(last_used->item), epoch_};
+  list.items.erase(last_used);
+  of_pool->second.pop_back();
+  return lease;
+}
 
 void AnyIdlePool::KeepAny(Lease lease) noexcept {
+  Items gone, added;
   try {
-    IdleList::OfProcess().Keep(*this, std::move(lease));
+    added.push_back({this, std::move(lease.item)});
+    IdleList& list = OfProcess();
+    const std::lock_guard lock(list.mutex);
+    if (lease.epoch != epoch_) return;
+    list.by_pool[this].push_back(added.begin());
+    list.items.splice(list.items.begin(), added);
+    list.Shrink(gone);
   } catch (const std::bad_alloc&) {
     // It is closed, and opened anew when it is wanted.
   }

@@ -35,25 +35,35 @@ class AnyIdlePool {
   void KeepAny(Lease lease) noexcept;
 
  private:
-  friend class IdleList;
-  std::uint64_t epoch_ = 0;  // counts calls of Clear; guarded by the list's mutex
+  std::uint64_t epoch_ = 0;  // counts calls of Clear; guarded by the mutex of the process's list
 };
 
 template <typename T>
 class IdlePool : public AnyIdlePool {
  public:
-  // What was taken, or made in place of it. `epoch` tells whether Clear was called since.
-  struct Taken {
-    std::shared_ptr<T> item;
-    std::uint64_t epoch = 0;
+  // Belongs to the holder until it goes out of scope; then its pool, which outlives it, keeps the object.
+  class Handle {
+   public:
+    Handle(IdlePool& pool, Lease lease)
+        : pool_(&pool), item_(std::static_pointer_cast<T>(std::move(lease.item))), epoch_(lease.epoch) {}
+    Handle(Handle&&) = default;
+    Handle& operator=(Handle&&) = delete;
+    ~Handle() {
+      if (item_ != nullptr) pool_->KeepAny({std::move(item_), epoch_});
+    }
+    explicit operator bool() const { return item_ != nullptr; }
+    void Set(std::shared_ptr<T> item) { item_ = std::move(item); }
+    T& operator*() const { return *item_; }
+    T* operator->() const { return item_.get(); }
+
+   private:
+    IdlePool* pool_;
+    std::shared_ptr<T> item_;
+    std::uint64_t epoch_;  // tells whether Clear was called since
   };
 
-  // The one used last; null: none is idle, and the caller makes one.
-  Taken Take() {
-    Lease lease = TakeAny();
-    return {std::static_pointer_cast<T>(std::move(lease.item)), lease.epoch};
-  }
-  void Keep(Taken taken) noexcept { KeepAny({std::move(taken.item), taken.epoch}); }
+  // The one used last; false: none is idle, and the caller makes one (Set).
+  Handle Take() { return Handle(*this, TakeAny()); }
 };
 
 }  // namespace terrace::dem

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/dem/dem_types.h"
+
 namespace terrace::dem {
 
 void BlockRange::Add(float height) {
@@ -23,7 +25,7 @@ void BlockRange::Add(const BlockRange& other) {
 
 RangeTable::RangeTable(int width, int height) : width_(width), height_(height) {
   Level finest{(width + kBlock - 1) / kBlock, (height + kBlock - 1) / kBlock, {}};
-  finest.blocks.resize(static_cast<std::size_t>(finest.columns) * static_cast<std::size_t>(finest.rows));
+  finest.blocks.resize(Area(finest.columns, finest.rows));
   levels_.push_back(std::move(finest));
 }
 
@@ -35,14 +37,12 @@ void RangeTable::AddWindow(int col, int row, int cols, int rows, const float* he
     const std::int64_t bottom =
         std::min<std::int64_t>(((std::int64_t{row + r} + 1) * pixel_step - 1) / kBlock, finest.rows - 1);
     for (int c = 0; c < cols; ++c) {
-      const float height =
-          heights[static_cast<std::size_t>(r) * static_cast<std::size_t>(cols) + static_cast<std::size_t>(c)];
+      const float height = heights[Area(r, cols) + static_cast<std::size_t>(c)];
       const std::int64_t left = std::int64_t{col + c} * pixel_step / kBlock;
       const std::int64_t right =
           std::min<std::int64_t>(((std::int64_t{col + c} + 1) * pixel_step - 1) / kBlock, finest.columns - 1);
       for (std::int64_t y = top; y <= bottom; ++y) {
-        for (std::int64_t x = left; x <= right; ++x)
-          finest.blocks[static_cast<std::size_t>(y * finest.columns + x)].Add(height);
+        for (std::int64_t x = left; x <= right; ++x) finest.At(x, y).Add(height);
       }
     }
   }
@@ -52,20 +52,14 @@ void RangeTable::AddBlocks(int block_column, int block_row, int columns, const s
   Level& finest = levels_.front();
   for (std::size_t i = 0; i < ranges.size(); ++i) {
     const int column = block_column + static_cast<int>(i) % columns, row = block_row + static_cast<int>(i) / columns;
-    finest
-        .blocks[static_cast<std::size_t>(row) * static_cast<std::size_t>(finest.columns) +
-                static_cast<std::size_t>(column)]
-        .Add(ranges[i]);
+    finest.At(column, row).Add(ranges[i]);
   }
 }
 
 void RangeTable::MarkHole(int row, int first, int last) {
   Level& finest = levels_.front();
   for (int x = first / kBlock; x <= last / kBlock; ++x) {
-    finest
-        .blocks[static_cast<std::size_t>(row / kBlock) * static_cast<std::size_t>(finest.columns) +
-                static_cast<std::size_t>(x)]
-        .has_holes = true;
+    finest.At(x, row / kBlock).has_holes = true;
   }
 }
 
@@ -79,14 +73,10 @@ void RangeTable::Finish() {
   while (levels_.back().blocks.size() > 1) {
     const Level& fine = levels_.back();
     Level coarse{(fine.columns + 1) / 2, (fine.rows + 1) / 2, {}};
-    coarse.blocks.resize(static_cast<std::size_t>(coarse.columns) * static_cast<std::size_t>(coarse.rows));
+    coarse.blocks.resize(Area(coarse.columns, coarse.rows));
     for (int y = 0; y < fine.rows; ++y) {
       for (int x = 0; x < fine.columns; ++x) {
-        coarse
-            .blocks[static_cast<std::size_t>(y / 2) * static_cast<std::size_t>(coarse.columns) +
-                    static_cast<std::size_t>(x / 2)]
-            .Add(fine.blocks[static_cast<std::size_t>(y) * static_cast<std::size_t>(fine.columns) +
-                             static_cast<std::size_t>(x)]);
+        coarse.At(x / 2, y / 2).Add(fine.At(x, y));
       }
     }
     levels_.push_back(std::move(coarse));
@@ -131,10 +121,8 @@ std::optional<BlockRange> RangeTable::TryQuery(double west, double north, double
   const Level& blocks = levels_[level];
   if (blocks.blocks.empty()) return std::nullopt;
   for (int y = y0; y <= y1; ++y) {
-    for (int x = x0; x <= x1; ++x) {
-      range.Add(blocks.blocks[static_cast<std::size_t>(y) * static_cast<std::size_t>(blocks.columns) +
-                              static_cast<std::size_t>(x)]);
-    }
+    const BlockRange* const row = &blocks.At(x0, y);
+    for (int x = 0; x <= x1 - x0; ++x) range.Add(row[x]);
   }
   return range;
 }

@@ -62,6 +62,13 @@ class RangeTable {
   struct Level {
     int columns = 0, rows = 0;
     std::vector<BlockRange> blocks;
+
+    BlockRange& At(std::int64_t column, std::int64_t row) {
+      return blocks[static_cast<std::size_t>(row * columns + column)];
+    }
+    const BlockRange& At(std::int64_t column, std::int64_t row) const {
+      return blocks[static_cast<std::size_t>(row * columns + column)];
+    }
   };
   int width_ = 0, height_ = 0;
   std::vector<Level> levels_;

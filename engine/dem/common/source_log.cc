@@ -8,15 +8,9 @@ namespace {
 thread_local SourceLog* in_use = nullptr;
 
 spdlog::level::level_enum LevelOf(SourceLog::Level level) {
-  switch (level) {
-    case SourceLog::Level::kDebug:
-      return spdlog::level::debug;
-    case SourceLog::Level::kInfo:
-      return spdlog::level::info;
-    case SourceLog::Level::kWarn:
-      break;
-  }
-  return spdlog::level::warn;
+  return level == SourceLog::Level::kDebug  ? spdlog::level::debug
+         : level == SourceLog::Level::kInfo ? spdlog::level::info
+                                            : spdlog::level::warn;
 }
 
 }  // namespace

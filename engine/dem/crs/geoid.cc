@@ -12,7 +12,6 @@
 #include <system_error>
 
 #include "engine/core/plain_number.h"
-#include "engine/dem/gdal/proj_grids.h"
 #include "engine/dem/gdal/proj_handle.h"
 
 namespace terrace::dem {
@@ -157,13 +156,12 @@ void Geoid::FindGrid() {
   for (std::size_t i = 0; i < files_.size(); ++i) finest_cell_ = std::min(finest_cell_, CellOf(files_.path(i)));
   if (files_.size() != 1 || !IsShiftByOneGrid(pipeline())) return;
   std::shared_ptr<const UndulationGrid> grid = UndulationGrid::Open(files_.path(0));
-  std::shared_ptr<ProjOperation> operation = operations_.Borrow();
-  if (operation == nullptr) return;
+  const IdlePool<ProjOperation>::Handle operation = operations_.Borrow();
+  if (!operation) return;
   if (grid != nullptr && Agrees(*grid, *operation)) {
     finest_cell_ = std::min(grid->column_step(), grid->row_step());
     grid_ = std::move(grid);
   }
-  operations_.Return(std::move(operation));
 }
 
 // Most height systems have one operation for the whole Earth: thousands of sources share it, and looking it up takes
@@ -254,8 +252,8 @@ Result<void> Geoid::AddTo(ContentHasher& hasher, const FileContentOptions& optio
 
 // What cannot be evaluated, and what counts downwards, is found here and not in a tile.
 Result<std::shared_ptr<const Geoid>> Geoid::Checked(std::shared_ptr<const Geoid> geoid, Position centre) {
-  std::shared_ptr<ProjOperation> operation = geoid->operations_.Borrow();
-  if (operation == nullptr) {
+  const IdlePool<ProjOperation>::Handle operation = geoid->operations_.Borrow();
+  if (!operation) {
     return MakeError(ErrorCode::kInvalidArgument, "{}: PROJ cannot read its grid ({}); check it with `gdalinfo {}`",
                      geoid->name_, geoid->description_, geoid->files_.size() == 0 ? "" : geoid->files_.path(0));
   }
@@ -270,16 +268,13 @@ Result<std::shared_ptr<const Geoid>> Geoid::Checked(std::shared_ptr<const Geoid>
                      "{} counts downwards; make heights of the depths, for instance with `gdal_calc.py --calc=-A`",
                      geoid->name_);
   }
-  geoid->operations_.Return(std::move(operation));
   return geoid;
 }
 
-Geoid::Reader::Reader(const Geoid& geoid) : geoid_(geoid), operation_(geoid.operations_.Borrow()) {
+Geoid::Reader::Reader(const Geoid& geoid) : operation_(geoid.operations_.Borrow()) {
   // It was set up once; what is missing now is memory or descriptors, and the caller's read fails.
-  if (operation_ == nullptr) throw std::bad_alloc();
+  if (!operation_) throw std::bad_alloc();
 }
-
-Geoid::Reader::~Reader() { geoid_.operations_.Return(std::move(operation_)); }
 
 double Geoid::Reader::At(Position degrees) const { return HeightAt(*operation_, degrees, 0); }
 

@@ -7,9 +7,7 @@
 #pragma once
 
 #include <memory>
-#include <mutex>
 #include <string>
-#include <vector>
 
 #include "engine/core/result.h"
 #include "engine/dem/crs/projector.h"
@@ -46,14 +44,10 @@ class Geoid {
   class Reader {
    public:
     explicit Reader(const Geoid& geoid);
-    ~Reader();
-    Reader(const Reader&) = delete;
-    Reader& operator=(const Reader&) = delete;
     double At(Position degrees) const;
 
    private:
-    const Geoid& geoid_;
-    std::shared_ptr<ProjOperation> operation_;
+    IdlePool<ProjOperation>::Handle operation_;
   };
 
   const std::string& name() const { return name_; }                       // "EGM96 height"

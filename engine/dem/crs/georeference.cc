@@ -8,7 +8,6 @@
 #include <cmath>
 #include <cstdlib>
 #include <numbers>
-#include <vector>
 
 #include "engine/dem/gdal/gdal_runtime.h"
 #include "engine/dem/gdal/sample_rules.h"
@@ -200,9 +199,7 @@ Result<void> Georeference::ReadCrs(const OGRSpatialReference& srs, const std::st
   wkt_ = Wkt(srs);
   std::tie(vertical_datum_, vertical_unit_) = VerticalPart(srs);
   if (srs.IsCompound() != 0 && !vertical_datum_.empty()) vertical_crs_ = Wkt(srs);
-  OGRSpatialReference horizontal(srs);
-  if (horizontal.IsCompound() != 0) horizontal.StripVertical();
-  if (horizontal.GetAxesCount() == 3) horizontal.DemoteTo2D(nullptr);
+  const OGRSpatialReference horizontal = HorizontalPart(srs);
   horizontal_wkt_ = CanonicalWkt(horizontal);
   crs_ = NameAndCode(vertical_datum_.empty() ? horizontal : srs);
   if (horizontal.IsGeographic() == 0 && horizontal.IsProjected() == 0) {
@@ -334,6 +331,13 @@ Result<std::uint64_t> Georeference::FingerprintWith(const StampedFiles& files,
   hasher.Add(*bytes);
   if (auto placed = AddTo(hasher, options); !placed) return tl::unexpected(placed.error());
   return hasher.Hash().low;
+}
+
+OGRSpatialReference HorizontalPart(const OGRSpatialReference& srs) {
+  OGRSpatialReference horizontal(srs);
+  if (horizontal.IsCompound() != 0) horizontal.StripVertical();
+  if (horizontal.GetAxesCount() == 3) horizontal.DemoteTo2D(nullptr);
+  return horizontal;
 }
 
 }  // namespace terrace::dem

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <gdal_priv.h>
+#include <ogr_spatialref.h>
 
 #include <array>
 #include <cstdint>
@@ -112,5 +113,8 @@ class Georeference {
   std::string wkt_, horizontal_wkt_;            // of the CRS as stated, and without what heights count from
   std::string crs_, vertical_datum_, vertical_unit_, vertical_crs_, pixel_unit_;
 };
+
+// A reference system without what heights count from.
+OGRSpatialReference HorizontalPart(const OGRSpatialReference& srs);
 
 }  // namespace terrace::dem

@@ -46,11 +46,6 @@ struct CellCentres {
   geo::Lattice halves;
 };
 
-// Pole rows, and what lies beyond them, are one position each; Web Mercator and the centres of cells have none.
-bool IsPoleRow(const geo::Lattice& lattice, std::int64_t row) { return row <= 0 || row >= lattice.rows(); }
-bool IsPoleRow(const geo::MercatorGrid&, std::int64_t) { return false; }
-bool IsPoleRow(const CellCentres&, std::int64_t) { return false; }
-
 template <typename Grid>
 class GridNodes {
  public:
@@ -60,7 +55,7 @@ class GridNodes {
 
   NodePositions Compute() && {
     if (georeference_.is_affine() && georeference_.is_geographic_grid()) return ColumnsAndRows();
-    positions_.assign(static_cast<std::size_t>(window_.columns) * static_cast<std::size_t>(window_.rows), kNowhere);
+    positions_.assign(Area(window_.columns, window_.rows), kNowhere);
     FillNodes();
     return {window_, std::move(positions_)};
   }
@@ -221,20 +216,20 @@ NodeWindow WindowOfTile(const geo::Lattice& lattice, const geo::TileKey& key) {
   return {lattice.FirstColumn(key) - 1, lattice.FirstRow(key) - 1, lattice.cells + 3, lattice.cells + 3};
 }
 
-NodePositions NodePositions::Of(const Georeference& georeference, const Footprint& footprint,
-                                const geo::Lattice& lattice, const NodeWindow& window, double tolerance) {
-  return GridNodes(georeference, footprint, lattice, window, tolerance).Compute();
-}
-
-NodePositions NodePositions::Of(const Georeference& georeference, const Footprint& footprint,
-                                const geo::MercatorGrid& grid, const NodeWindow& window, double tolerance) {
+template <typename Grid>
+NodePositions NodePositions::Of(const Georeference& georeference, const Footprint& footprint, const Grid& grid,
+                                const NodeWindow& window, double tolerance) {
   return GridNodes(georeference, footprint, grid, window, tolerance).Compute();
 }
+template NodePositions NodePositions::Of(const Georeference&, const Footprint&, const geo::Lattice&, const NodeWindow&,
+                                         double);
+template NodePositions NodePositions::Of(const Georeference&, const Footprint&, const geo::MercatorGrid&,
+                                         const NodeWindow&, double);
 
 std::vector<Position> CellCentrePositions(const Georeference& georeference, const Footprint& footprint,
                                           const geo::Lattice& lattice, const geo::TileKey& key, double tolerance) {
   const NodeWindow window{lattice.FirstColumn(key), lattice.FirstRow(key), lattice.cells, lattice.cells};
-  const NodePositions found = GridNodes(georeference, footprint, CellCentres(lattice), window, tolerance).Compute();
+  const NodePositions found = NodePositions::Of(georeference, footprint, CellCentres(lattice), window, tolerance);
   std::vector<Position> centres;
   centres.reserve(found.columns() * found.rows());
   for (std::size_t j = 0; j < found.rows(); ++j) {

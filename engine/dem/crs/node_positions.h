@@ -20,6 +20,13 @@ namespace terrace::dem {
 // Of nodes that have no place in a raster: NaN.
 inline constexpr Position kNowhere{std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::quiet_NaN()};
 
+// Pole rows, and what lies beyond them, are one position each; other grids have none.
+inline bool IsPoleRow(const geo::Lattice& lattice, std::int64_t row) { return row <= 0 || row >= lattice.rows(); }
+template <typename Grid>
+bool IsPoleRow(const Grid&, std::int64_t) {
+  return false;
+}
+
 // The window of a tile: its samples and one more on each side.
 NodeWindow WindowOfTile(const geo::Lattice& lattice, const geo::TileKey& key);
 
@@ -38,10 +45,9 @@ class NodePositions {
   NodePositions(const NodeWindow& window, std::vector<Position> nodes) : window_(window), nodes_(std::move(nodes)) {}
   // Of nodes of a lattice. NaN where the source's CRS has no position, and outside `footprint`. Nodes of a pole row
   // share one position unless columns are meridians.
-  static NodePositions Of(const Georeference& georeference, const Footprint& footprint, const geo::Lattice& lattice,
-                          const NodeWindow& window, double tolerance);
-  // Of pixel centres of Web Mercator tiles.
-  static NodePositions Of(const Georeference& georeference, const Footprint& footprint, const geo::MercatorGrid& grid,
+  // `Grid`: geo::Lattice, or geo::MercatorGrid of pixel centres.
+  template <typename Grid>
+  static NodePositions Of(const Georeference& georeference, const Footprint& footprint, const Grid& grid,
                           const NodeWindow& window, double tolerance);
 
   const NodeWindow& window() const { return window_; }

@@ -8,7 +8,6 @@
 #include <utility>
 #include <vector>
 
-#include "engine/dem/gdal/proj_grids.h"
 #include "engine/dem/gdal/proj_handle.h"
 
 namespace terrace::dem {
@@ -63,20 +62,18 @@ Result<std::shared_ptr<const Projector>> Projector::Make(const std::string& wkt,
   std::vector<std::string> files;
   for (const ProjGrid& grid : GridsOf(context.get(), operation.get())) files.push_back(grid.file);
   projector->grids_ = StampedFiles(files);
-  std::shared_ptr<ProjOperation> first = projector->operations_.Borrow();
-  if (first == nullptr) {
+  if (!projector->operations_.Borrow()) {
     return MakeError(ErrorCode::kInvalidArgument, "the transformation from WGS 84 cannot be set up: {}",
                      projector->pipeline());
   }
-  projector->operations_.Return(std::move(first));
   return is_only ? FindShared(wkt, projector) : projector;
 }
 
 void Projector::Transform(std::span<Position> positions, bool forward) const {
-  std::shared_ptr<ProjOperation> operation = operations_.Borrow();
+  const IdlePool<ProjOperation>::Handle operation = operations_.Borrow();
   // The same string was set up once in Make. Where it cannot be now, for want of memory or of descriptors for its
   // grids, no position is known; the caller's read fails.
-  if (operation == nullptr) throw std::bad_alloc();
+  if (!operation) throw std::bad_alloc();
   for (Position& position : positions) {
     const PJ_COORD result = proj_trans(operation->operation.get(), forward ? PJ_FWD : PJ_INV,
                                        proj_coord(position.x, position.y, 0, HUGE_VAL));
@@ -84,7 +81,6 @@ void Projector::Transform(std::span<Position> positions, bool forward) const {
     constexpr double kNowhere = std::numeric_limits<double>::quiet_NaN();
     position = found ? Position{result.xy.x, result.xy.y} : Position{kNowhere, kNowhere};
   }
-  operations_.Return(std::move(operation));
 }
 
 void Projector::Forward(std::span<Position> positions) const { Transform(positions, true); }

@@ -8,6 +8,7 @@
 #include <limits>
 #include <utility>
 
+#include "engine/dem/dem_types.h"
 #include "engine/dem/gdal/driver_list.h"
 #include "engine/dem/gdal/gdal_runtime.h"
 
@@ -102,7 +103,7 @@ NodePlace UndulationGrid::AtRow(double row) const {
 }
 
 Result<std::vector<float>> UndulationGrid::Read(int column, int row, int columns, int rows) const {
-  std::vector<float> heights(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
+  std::vector<float> heights(Area(columns, rows));
   {
     const std::lock_guard lock(mutex_);
     ForgetGdalError();
@@ -144,8 +145,7 @@ Result<UndulationPatch> UndulationPatch::Read(const UndulationGrid& grid, std::s
 
 std::array<double, 4> UndulationPatch::Around(const NodePlace& column, const NodePlace& row) const {
   const auto node = [&](int c, int r) {
-    return double{heights_[static_cast<std::size_t>(r - first_row_) * static_cast<std::size_t>(columns_) +
-                           static_cast<std::size_t>(c - first_column_)]};
+    return double{heights_[Area(r - first_row_, columns_) + static_cast<std::size_t>(c - first_column_)]};
   };
   return {node(column.node, row.node), node(column.next, row.node), node(column.node, row.next),
           node(column.next, row.next)};

@@ -1,20 +1,44 @@
 // The undulation of a source's geoid at the nodes of lattices and grids, and bounds on it.
 #pragma once
 
-#include <cstdint>
 #include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
 
+#include "engine/core/result.h"
+#include "engine/dem/common/range_table.h"
 #include "engine/dem/crs/footprint.h"
 #include "engine/dem/crs/geoid.h"
-#include "engine/dem/crs/undulation_ranges.h"
+#include "engine/dem/crs/undulation_grid.h"
 #include "engine/dem/dem_types.h"
 #include "engine/geo/lattice.h"
 #include "engine/geo/mercator_grid.h"
 
 namespace terrace::dem {
+
+// Bounds on a grid of undulations over boxes, from the grid's own nodes. Immutable and thread-safe.
+class UndulationRanges {
+ public:
+  // Reads the nodes in and around the area once.
+  static Result<UndulationRanges> Of(const UndulationGrid& grid, const Footprint& area);
+
+  // No undulation in the box and the area leaves it: from (west, south), degrees, `width` by `height` large; west
+  // counts modulo 360. min > max: the box misses the area, or nothing is known there.
+  HeightRange Query(double west, double south, double width, double height) const;
+
+  HeightRange whole() const { return whole_; }
+  bool is_complete() const { return is_complete_; }  // known all over the area
+
+ private:
+  explicit UndulationRanges(const UndulationGrid& grid) : grid_(&grid) {}
+
+  const UndulationGrid* grid_;  // outlives this
+  int first_column_ = 0, first_row_ = 0;
+  RangeTable table_;
+  HeightRange whole_;
+  bool is_complete_ = false;
+};
 
 // Immutable after construction and thread-safe.
 //
@@ -33,8 +57,9 @@ class Undulations {
 
   // Of the window's nodes, row by row from its first; NaN outside the area and where the geoid is not known. A function
   // of the global node alone: whichever window asks gets the same bits; pole rows are one value.
-  Result<std::vector<double>> At(const geo::Lattice& lattice, const NodeWindow& window) const;
-  Result<std::vector<double>> At(const geo::MercatorGrid& grid, const NodeWindow& window) const;
+  // `Grid`: geo::Lattice or geo::MercatorGrid.
+  template <typename Grid>
+  Result<std::vector<double>> At(const Grid& grid, const NodeWindow& window) const;
 
   // No value of At within the box leaves it: from (west, south), degrees, `width` by `height` large; west counts modulo
   // 360. Of a box that misses the area: of the whole area.
@@ -52,18 +77,13 @@ class Undulations {
   Undulations(std::shared_ptr<const Geoid> geoid, const Footprint& area) : geoid_(std::move(geoid)), area_(area) {}
   Result<void> FindPoles();
   template <typename Grid>
-  Result<std::vector<double>> AtNodes(const Grid& grid, const NodeWindow& window) const;
-  template <typename Grid>
   void Ask(const Grid& grid, const NodeWindow& window, std::vector<double>& out) const;
   template <typename Grid>
   Result<void> Interpolate(const Grid& grid, const NodeWindow& window, std::vector<double>& out) const;
   double EastOfArea(double longitude) const;  // degrees, 0 .. 360
   bool IsInside(double longitude, double latitude) const;
   const HeightRange& BoxAt(double longitude, double latitude) const;
-  HeightRange& Box(int column, int row) {
-    return boxes_[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
-                  static_cast<std::size_t>(column)];
-  }
+  HeightRange& Box(int column, int row) { return boxes_[Area(row, columns_) + static_cast<std::size_t>(column)]; }
   const HeightRange& Box(int column, int row) const { return const_cast<Undulations&>(*this).Box(column, row); }
   void FillBoxes();
 

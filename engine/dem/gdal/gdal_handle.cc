@@ -5,18 +5,18 @@
 
 namespace terrace::dem {
 
-Result<HandlePool::Handle> HandlePool::Borrow() {
+Result<IdlePool<GDALDataset>::Handle> HandlePool::Borrow() {
   if (auto unchanged = CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
-  IdlePool<GDALDataset>::Taken dataset = idle_.Take();
-  if (dataset.item != nullptr) return Handle(idle_, std::move(dataset));
-  dataset.item = ReopenRaster(path_);
-  const std::string why = dataset.item == nullptr ? TakeGdalError() : "";
+  IdlePool<GDALDataset>::Handle dataset = idle_.Take();
+  if (dataset) return dataset;
+  dataset.Set(ReopenRaster(path_));
+  const std::string why = dataset ? "" : TakeGdalError();
   // It may have been replaced or removed between the look at it and the opening, which may have failed for that.
   if (auto unchanged = CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
-  if (dataset.item == nullptr) {
+  if (!dataset) {
     return MakeError(ErrorCode::kUnavailable, "{}: cannot be opened any more ({}); restore the file", path_, why);
   }
-  return Handle(idle_, std::move(dataset));
+  return dataset;
 }
 
 Result<void> HandlePool::CheckUnchanged() {

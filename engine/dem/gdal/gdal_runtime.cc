@@ -2,22 +2,27 @@
 
 #include <cpl_conv.h>
 #include <cpl_error.h>
+#include <cpl_string.h>
+#include <cpl_vsi_virtual.h>
 #include <fmt/format.h>
 #include <gdal.h>
 #include <ogr_srs_api.h>
 #include <proj.h>
 
+#include <algorithm>
+#include <array>
 #include <atomic>
+#include <cerrno>
+#include <map>
 #include <mutex>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "engine/core/check.h"
 #include "engine/dem/common/idle_pool.h"
 #include "engine/dem/dem_types.h"
 #include "engine/dem/gdal/driver_list.h"
-#include "engine/dem/gdal/gdal_settings.h"
-#include "engine/dem/gdal/network_guard.h"
 
 namespace terrace::dem {
 namespace {
@@ -35,6 +40,24 @@ void CPL_STDCALL KeepLastError(CPLErr severity, CPLErrorNum, const char* message
   ++errors;
   last_error = message;
 }
+
+// Memory, and files within files: these lead nowhere else.
+constexpr std::array<std::string_view, 12> kLocal = {
+    "/vsimem/",     "/vsizip/",    "/vsigzip/",   "/vsitar/",   "/vsi7z/",     "/vsirar/",
+    "/vsisubfile/", "/vsisparse/", "/vsicached?", "/vsicrypt/", "/vsistdout/", "/vsistdout_redirect/"};
+
+class Closed : public VSIFilesystemHandler {
+ public:
+  using VSIFilesystemHandler::Open;
+  VSIVirtualHandle* Open(const char*, const char*, bool, CSLConstList) override {
+    errno = ENOENT;
+    return nullptr;
+  }
+  int Stat(const char*, VSIStatBufL*, int) override {
+    errno = ENOENT;
+    return -1;
+  }
+};
 
 void InitOnce() {
   CPLSetErrorHandler(KeepLastError);
@@ -62,6 +85,28 @@ void InitGdal() {
 
 std::string LibraryVersions() {
   return fmt::format("GDAL {}, PROJ {}", GDALVersionInfo("RELEASE_NAME"), proj_info().version);
+}
+
+void GuardNetwork(const std::vector<std::string>& allowed_prefixes) {
+  // As GDAL made them, and what stands in for them; GDAL frees those it has at the end.
+  static auto& doors = *new std::map<std::string, VSIFilesystemHandler*>;
+  static auto& closed = *new std::map<std::string, Closed*>;
+  char** prefixes = VSIFileManager::GetPrefixes();
+  for (char** name = prefixes; name != nullptr && *name != nullptr; ++name) {
+    const std::string prefix = *name;
+    if (std::ranges::find(kLocal, prefix) != kLocal.end()) continue;
+    doors.try_emplace(prefix, VSIFileManager::GetHandler((prefix + "x").c_str()));
+    const bool open =
+        std::ranges::any_of(allowed_prefixes, [&](const std::string& allowed) { return allowed.starts_with(prefix); });
+    VSIFilesystemHandler* handler = doors[prefix];
+    if (!open) {
+      Closed*& shut = closed.try_emplace(prefix, nullptr).first->second;
+      if (shut == nullptr) shut = new Closed;
+      handler = shut;
+    }
+    VSIFileManager::InstallHandler(prefix, handler);
+  }
+  CSLDestroy(prefixes);
 }
 
 void SetGdalCache(std::size_t bytes) {

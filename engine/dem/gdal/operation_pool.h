@@ -2,7 +2,6 @@
 // not in use is kept as IdlePool says, for a copy holds the files of its grids open.
 #pragma once
 
-#include <memory>
 #include <string>
 #include <utility>
 
@@ -18,10 +17,8 @@ class OperationPool {
   void set_pipeline(std::string pipeline) { pipeline_ = std::move(pipeline); }
   const std::string& pipeline() const { return pipeline_; }
 
-  // Null: PROJ cannot set it up. Where it could before, memory or descriptors for its grids are short.
-  std::shared_ptr<ProjOperation> Borrow() const;
-  // Forgets PROJ's error of the last use.
-  void Return(std::shared_ptr<ProjOperation> operation) const;
+  // False: PROJ cannot set it up. Where it could before, memory or descriptors for its grids are short.
+  IdlePool<ProjOperation>::Handle Borrow() const;
 
  private:
   std::string pipeline_;

@@ -4,6 +4,8 @@
 #include <proj.h>
 
 #include <memory>
+#include <string>
+#include <vector>
 
 namespace terrace::dem {
 
@@ -20,6 +22,14 @@ using ProjFactoryPtr = std::unique_ptr<PJ_OPERATION_FACTORY_CONTEXT, ProjDestroy
 
 // Silent, and without the network: what an operation gives must not depend on it.
 ProjContextPtr MakeProjContext();
+
+// A file of numbers that an operation reads.
+struct ProjGrid {
+  std::string name;
+  std::string file;  // empty: it is not installed
+  std::string url;   // empty: nobody offers it
+};
+std::vector<ProjGrid> GridsOf(PJ_CONTEXT* context, const PJ* operation);
 
 // For one thread at a time.
 struct ProjOperation {

@@ -262,13 +262,18 @@ std::string PicturePartOf(GDALRasterBand& band) {
   return is_picture ? GDALGetColorInterpretationName(part) : "";
 }
 
+bool HasFileEndingWith(GDALDataset& dataset, std::string_view ending) {
+  const CPLStringList files(dataset.GetFileList());
+  return std::any_of(files.List(), files.List() + files.Count(),
+                     [&](const char* file) { return std::string_view(file).ends_with(ending); });
+}
+
 std::vector<std::string> FilesOf(GDALDataset& dataset, const std::string& path) {
   std::vector<std::string> files = {path};
-  char** list = dataset.GetFileList();
-  for (char** name = list; name != nullptr && *name != nullptr; ++name) {
-    if (path != *name) files.emplace_back(*name);
+  const CPLStringList list(dataset.GetFileList());
+  for (int i = 0; i < list.Count(); ++i) {
+    if (path != list[i]) files.emplace_back(list[i]);
   }
-  CSLDestroy(list);
   if (IsRemote(path) || !LooksLikeVrt(path)) return files;
   std::set<std::string> known(files.begin(), files.end());
   for (const std::string& part : PartsOfVrt(path)) {

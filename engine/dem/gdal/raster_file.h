@@ -4,6 +4,7 @@
 #include <gdal_priv.h>
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "engine/core/result.h"
@@ -31,6 +32,9 @@ Result<void> CheckComplete(GDALDataset& dataset, const std::string& path, int ba
 
 // The file, and those that GDAL reads with it: overviews, masks, the parts of a mosaic with theirs. Some may not exist.
 std::vector<std::string> FilesOf(GDALDataset& dataset, const std::string& path);
+
+// Whether GDAL reads a file with that ending beside or as the raster.
+bool HasFileEndingWith(GDALDataset& dataset, std::string_view ending);
 
 // Refuses what is too large to mesh in one piece.
 Result<void> CheckSizeToMesh(const std::string& path, int width, int height);

@@ -1,7 +1,6 @@
 #include "engine/dem/gdal/sample_rules.h"
 
 #include <algorithm>
-#include <array>
 #include <cctype>
 #include <cmath>
 #include <cstddef>
@@ -9,9 +8,9 @@
 #include <limits>
 #include <memory>
 #include <string_view>
-#include <utility>
 #include <vector>
 
+#include "engine/dem/dem_types.h"
 #include "engine/dem/gdal/gdal_runtime.h"
 #include "engine/dem/gdal/raster_file.h"
 
@@ -67,46 +66,23 @@ std::optional<double> MetresPerUnit(const std::string& unit) {
       name += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   }
   constexpr double kFoot = 0.3048, kSurveyFoot = 1200.0 / 3937.0;
-  constexpr std::array<std::pair<std::string_view, double>, 36> kUnits = {{
-      {"", 1},
-      {"m", 1},
-      {"metre", 1},
-      {"metres", 1},
-      {"meter", 1},
-      {"meters", 1},
-      {"cm", .01},
-      {"mm", .001},
-      {"km", 1000},
-      {"centimetre", .01},
-      {"decimetre", .1},
-      {"ft", kFoot},
-      {"foot", kFoot},
-      {"feet", kFoot},
-      {"internationalfoot", kFoot},
-      {"ussurveyfoot", kSurveyFoot},
-      {"footussurvey", kSurveyFoot},
-      {"ftus", kSurveyFoot},
-      {"usft", kSurveyFoot},
-      {"ussurveyfeet", kSurveyFoot},
-      {"footus", kSurveyFoot},
-      {"surveyfoot", kSurveyFoot},
-      {"feetus", kSurveyFoot},
-      {"usfeet", kSurveyFoot},
-      {"usfoot", kSurveyFoot},
-      {"yard", 3 * kFoot},
-      {"yards", 3 * kFoot},
-      {"fathom", 6 * kFoot},
-      {"fathoms", 6 * kFoot},
-      {"dm", .1},
-      {"decimeter", .1},
-      {"centimeter", .01},
-      {"millimetre", .001},
-      {"millimeter", .001},
-      {"kilometre", 1000},
-      {"kilometer", 1000},
-  }};
-  for (const auto& [known, metres] : kUnits) {
-    if (known == name) return metres;
+  struct Unit {
+    double metres;
+    std::string_view names;
+  };
+  constexpr Unit kUnits[] = {
+      {1, "  m metre metres meter meters "},
+      {.01, " cm centimetre centimeter "},
+      {.001, " mm millimetre millimeter "},
+      {1000, " km kilometre kilometer "},
+      {.1, " decimetre dm decimeter "},
+      {kFoot, " ft foot feet internationalfoot "},
+      {kSurveyFoot, " ussurveyfoot footussurvey ftus usft ussurveyfeet footus surveyfoot feetus usfeet usfoot "},
+      {3 * kFoot, " yard yards "},
+      {6 * kFoot, " fathom fathoms "},
+  };
+  for (const Unit& unit_of : kUnits) {
+    if (unit_of.names.find(" " + name + " ") != std::string_view::npos) return unit_of.metres;
   }
   return std::nullopt;
 }
@@ -199,7 +175,7 @@ void ConvertPlain(const SampleRules& rules, GDALDataType type, const std::byte* 
 Result<void> ReadSamples(GDALRasterBand& band, const SampleRules& rules, int col, int row, int cols, int rows,
                          float* out, const std::stop_token& stop) {
   const int rows_at_once = std::clamp(kSamplesPerRead / cols, 1, rows);
-  const std::size_t most = static_cast<std::size_t>(cols) * static_cast<std::size_t>(rows_at_once);
+  const std::size_t most = Area(cols, rows_at_once);
   const GDALDataType type = RawTypeOf(band, rules);
   // Written before it is read: filling it with zeros took longer than the conversion.
   const auto raw =
@@ -220,7 +196,7 @@ Result<void> ReadSamples(GDALRasterBand& band, const SampleRules& rules, int col
       return MakeError(ErrorCode::kUnavailable, "rows {}..{} cannot be read ({})", row + done, row + done + count - 1,
                        TakeGdalError());
     }
-    const std::size_t samples = static_cast<std::size_t>(cols) * static_cast<std::size_t>(count);
+    const std::size_t samples = Area(cols, count);
     auto* const doubles = reinterpret_cast<double*>(raw.get());  // where that is the type
     if (rules.is_signed_byte) {
       for (std::size_t i = 0; i < samples; ++i) doubles[i] -= doubles[i] > 127 ? 256 : 0;
@@ -258,7 +234,7 @@ Result<void> ReadHeights(GDALRasterBand& band, const SampleRules& rules, int col
   const int left = std::max(col - rules.rim, 0), top = std::max(row - rules.rim, 0);
   const int wide = std::min(col + cols + rules.rim, band.GetXSize()) - left;
   const int high = std::min(row + rows + rules.rim, band.GetYSize()) - top;
-  std::vector<float> around(static_cast<std::size_t>(wide) * static_cast<std::size_t>(high));
+  std::vector<float> around(Area(wide, high));
   if (auto read = ReadSamples(band, rules, left, top, wide, high, around.data(), stop); !read) return read;
   std::vector<char> near;
   for (int r = 0; r < high; ++r) WidenVoids(&around[static_cast<std::size_t>(r) * wide], wide, 1, rules.rim, near);

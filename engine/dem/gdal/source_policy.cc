@@ -7,8 +7,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
-#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <memory>
@@ -18,7 +16,6 @@
 
 #include "engine/dem/gdal/driver_list.h"
 #include "engine/dem/gdal/gdal_runtime.h"
-#include "engine/dem/gdal/network_guard.h"
 #include "engine/dem/gdal/vrt_check.h"
 
 namespace terrace::dem {
@@ -65,12 +62,11 @@ bool IsAllowedRemote(const SourcePolicy& policy, const std::string& path) {
 }
 
 Result<std::string> RealPath(const std::string& path) {
-  const std::unique_ptr<char, void (*)(void*)> real(::realpath(path.c_str(), nullptr), std::free);
-  if (real == nullptr) {
-    return MakeError(ErrorCode::kNotFound, "{}: {}; give the path of a raster file on this machine", path,
-                     std::generic_category().message(errno));
-  }
-  return std::string(real.get());
+  std::error_code error;
+  const fs::path real = fs::canonical(path, error);
+  if (!error) return real.string();
+  return MakeError(ErrorCode::kNotFound, "{}: {}; give the path of a raster file on this machine", path,
+                   error.message());
 }
 
 Result<void> CheckRoots(const SourcePolicy& policy, const std::string& path, const std::string& real) {

@@ -2,10 +2,10 @@
 
 #include <cpl_minixml.h>
 #include <cpl_string.h>
+#include <fmt/format.h>
 #include <gdal.h>
 
 #include <algorithm>
-#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
@@ -25,50 +25,14 @@ constexpr std::uintmax_t kMaxBytes = std::uintmax_t{64} << 20;
 constexpr int kDeepestNesting = 4;  // VRTs within VRTs
 
 // What gdalbuildvrt and `gdal_translate -of VRT` write. None of it names a file but SourceFilename.
-constexpr std::array<std::string_view, 37> kElements = {"VRTDataset",
-                                                        "SRS",
-                                                        "GeoTransform",
-                                                        "Metadata",
-                                                        "MDI",
-                                                        "OverviewList",
-                                                        "BlockXSize",
-                                                        "BlockYSize",
-                                                        "VRTRasterBand",
-                                                        "MaskBand",
-                                                        "NoDataValue",
-                                                        "NodataValue",
-                                                        "HideNoDataValue",
-                                                        "ColorInterp",
-                                                        "ColorTable",
-                                                        "Entry",
-                                                        "CategoryNames",
-                                                        "Category",
-                                                        "Description",
-                                                        "UnitType",
-                                                        "Offset",
-                                                        "Scale",
-                                                        "Histograms",
-                                                        "HistItem",
-                                                        "HistMin",
-                                                        "HistMax",
-                                                        "BucketCount",
-                                                        "IncludeOutOfRange",
-                                                        "Approximate",
-                                                        "HistCounts",
-                                                        "SimpleSource",
-                                                        "ComplexSource",
-                                                        "AveragedSource",
-                                                        "SourceFilename",
-                                                        "SourceBand",
-                                                        "SourceProperties",
-                                                        "SrcRect"};
-constexpr std::array<std::string_view, 8> kMoreElements = {"DstRect",    "NODATA", "UseMaskBand",         "ScaleOffset",
-                                                           "ScaleRatio", "LUT",    "ColorTableComponent", "Exponent"};
+constexpr std::string_view kElements =
+    " VRTDataset SRS GeoTransform Metadata MDI OverviewList BlockXSize BlockYSize VRTRasterBand MaskBand"
+    " NoDataValue NodataValue HideNoDataValue ColorInterp ColorTable Entry CategoryNames Category Description"
+    " UnitType Offset Scale Histograms HistItem HistMin HistMax BucketCount IncludeOutOfRange Approximate"
+    " HistCounts SimpleSource ComplexSource AveragedSource SourceFilename SourceBand SourceProperties SrcRect"
+    " DstRect NODATA UseMaskBand ScaleOffset ScaleRatio LUT ColorTableComponent Exponent ";
 
-bool IsKnown(std::string_view name) {
-  return std::ranges::find(kElements, name) != kElements.end() ||
-         std::ranges::find(kMoreElements, name) != kMoreElements.end();
-}
+bool IsKnown(std::string_view name) { return kElements.find(fmt::format(" {} ", name)) != std::string_view::npos; }
 
 struct FreeXml {
   void operator()(CPLXMLNode* node) const { CPLDestroyXMLNode(node); }

@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <limits>
 
+#include "engine/dem/dem_types.h"
+
 namespace terrace::dem {
 namespace {
 
@@ -47,7 +49,7 @@ Result<ImageBins> ImageBins::Read(ImageFile& image, int side, const std::vector<
         "gdalwarp -te -tr",
         image.path(), bins.cols_, bins.rows_);
   }
-  bins.bins_.resize(static_cast<std::size_t>(bins.cols_) * static_cast<std::size_t>(bins.rows_));
+  bins.bins_.resize(Area(bins.cols_, bins.rows_));
   if (auto filled = bins.Fill(image, stop); !filled) return tl::unexpected(filled.error());
   return bins;
 }
@@ -57,7 +59,7 @@ Result<void> ImageBins::Fill(ImageFile& image, const std::stop_token& stop) {
   const int east = std::min((first_col_ + cols_) * side_, image.width()),
             south = std::min((first_row_ + rows_) * side_, image.height());
   const int width = east - west, rows_at_once = std::clamp(kPixelsAtOnce / width, 1, south - north);
-  std::vector<ColorSample> pixels(static_cast<std::size_t>(width) * static_cast<std::size_t>(rows_at_once));
+  std::vector<ColorSample> pixels(Area(width, rows_at_once));
   for (int row = north; row < south; row += rows_at_once) {
     if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "{}: reading it was stopped", image.path());
     const int rows = std::min(rows_at_once, south - row);
@@ -82,8 +84,7 @@ ColorSample ImageBins::At(Position position) const {
   std::array<double, 3> sums{};
   double whole = 0;
   const auto add = [&](int col, int row, double share) {
-    const Bin& bin = bins_[static_cast<std::size_t>(row - first_row_) * static_cast<std::size_t>(cols_) +
-                           static_cast<std::size_t>(col - first_col_)];
+    const Bin& bin = bins_[Area(row - first_row_, cols_) + static_cast<std::size_t>(col - first_col_)];
     if (bin.count == 0 || share == 0) return;
     for (std::size_t i = 0; i < 3; ++i) sums[i] += share * bin.sums[i] / bin.count;
     whole += share;

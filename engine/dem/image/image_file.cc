@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <utility>
 
+#include "engine/dem/dem_types.h"
 #include "engine/dem/gdal/gdal_runtime.h"
 #include "engine/dem/gdal/raster_file.h"
 
@@ -77,7 +78,7 @@ void ImageFile::FindMasks() {
 
 Result<void> ImageFile::Read(int col, int row, int cols, int rows, ColorSample* out) {
   ForgetGdalError();
-  const std::size_t pixels = static_cast<std::size_t>(cols) * static_cast<std::size_t>(rows);
+  const std::size_t pixels = Area(cols, rows);
   levels_.resize(pixels);
   bool is_read = ReadMasks(col, row, cols, rows, out);
   const int channels = bands_[0] == bands_[1] ? 1 : 3;

@@ -4,7 +4,6 @@
 
 #include "engine/dem/gdal/raster_file.h"
 #include "engine/dem/image/image_bins.h"
-#include "engine/dem/raster/overview_axis.h"
 #include "engine/dem/raster/sample_grid.h"
 
 namespace terrace::dem {
@@ -24,25 +23,22 @@ ImagePool::ImagePool(ImageFile image, StampedFiles files) : path_(image.path()),
       break;
     }
   }
-  IdlePool<ImageFile>& full = sizes_[0]->idle;
-  IdlePool<ImageFile>::Taken first = full.Take();
-  first.item = std::make_shared<ImageFile>(std::move(image));
-  full.Keep(std::move(first));
+  sizes_[0]->idle.Take().Set(std::make_shared<ImageFile>(std::move(image)));
 }
 
 int ImagePool::MostAveraged() const { return sizes_.back()->factor * ImageBins::kMaxPixels; }
 
-Result<ImagePool::Handle> ImagePool::Borrow(int factor) {
+Result<ImagePool::Borrowed> ImagePool::Borrow(int factor) {
   std::size_t i = 0;
   while (i + 1 < sizes_.size() && sizes_[i + 1]->factor <= factor) ++i;
   Size& size = *sizes_[i];
-  IdlePool<ImageFile>::Taken image = size.idle.Take();
-  if (image.item != nullptr) return Handle(size, std::move(image));
+  Borrowed borrowed{&size, size.idle.Take()};
+  if (borrowed.image) return borrowed;
   auto opened = ImageFile::Open(path_, size.overview);
   if (auto unchanged = CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
   if (!opened) return MakeError(ErrorCode::kUnavailable, "{}", opened.error().message);
-  image.item = std::make_shared<ImageFile>(*std::move(opened));
-  return Handle(size, std::move(image));
+  borrowed.image.Set(std::make_shared<ImageFile>(*std::move(opened)));
+  return borrowed;
 }
 
 Result<void> ImagePool::CheckUnchanged() {

@@ -4,7 +4,6 @@
 
 #include <memory>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "engine/core/result.h"
@@ -16,34 +15,23 @@ namespace terrace::dem {
 
 // Thread-safe.
 class ImagePool {
-  struct Size;
-
  public:
-  // An image that belongs to the holder until it goes out of scope.
-  class Handle {
-   public:
-    Handle(Size& size, IdlePool<ImageFile>::Taken image) : size_(&size), image_(std::move(image)) {}
-    Handle(Handle&&) = default;
-    Handle& operator=(Handle&&) = delete;
-    ~Handle() {
-      if (image_.item != nullptr) size_->idle.Keep(std::move(image_));
-    }
-    ImageFile& operator*() const { return *image_.item; }
-    int factor() const { return size_->factor; }
-    // Pixels of the full image in one of this: the factor, or a little less.
-    double pixels_across() const { return size_->across; }
-    double pixels_down() const { return size_->down; }
-
-   private:
-    Size* size_;
-    IdlePool<ImageFile>::Taken image_;
+  struct Size {
+    int factor = 1;
+    int overview = -1;            // GDAL's number of it; -1: the full image
+    double across = 1, down = 1;  // pixels of the full image in one of this: the factor, or a little less
+    IdlePool<ImageFile> idle = {};
+  };
+  struct Borrowed {
+    const Size* size;
+    IdlePool<ImageFile>::Handle image;
   };
 
   ImagePool(ImageFile image, StampedFiles files);
 
   // The smallest of the overviews whose factor divides `factor`, a power of two, or the full image.
   // kChanged: a file of the image is gone or was replaced. kUnavailable: it cannot be opened.
-  Result<Handle> Borrow(int factor);
+  Result<Borrowed> Borrow(int factor);
 
   // The largest factor that ImageBins can average to from what is there.
   int MostAveraged() const;
@@ -53,13 +41,6 @@ class ImagePool {
   const StampedFiles& files() const { return files_; }
 
  private:
-  struct Size {
-    int factor = 1;
-    int overview = -1;            // GDAL's number of it; -1: the full image
-    double across = 1, down = 1;  // Handle::pixels_across, pixels_down
-    IdlePool<ImageFile> idle = {};
-  };
-
   std::string path_;
   StampedFiles files_;
   std::vector<std::unique_ptr<Size>> sizes_;  // by factor, ascending

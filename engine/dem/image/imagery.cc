@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "engine/core/check.h"
@@ -59,10 +58,10 @@ Result<std::optional<TilePicture>> Imagery::Impl::Read(const geo::TileKey& key, 
   for (Position& p : positions) {
     const bool is_inside = p.x >= 0 && p.x <= georeference.width() && p.y >= 0 && p.y <= georeference.height();
     is_there = is_there || is_inside;
-    p = is_inside ? Position{p.x / image->pixels_across(), p.y / image->pixels_down()} : Position{NAN, NAN};
+    p = is_inside ? Position{p.x / image->size->across, p.y / image->size->down} : Position{NAN, NAN};
   }
   if (!is_there) return std::nullopt;
-  const auto bins = ImageBins::Read(**image, factor / image->factor(), positions, stop);
+  const auto bins = ImageBins::Read(*image->image, factor / image->size->factor, positions, stop);
   if (!bins) return MakeError(bins.error().code, "tile {}: {}", geo::ToString(key), bins.error().message);
   if (auto unchanged = pool.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
 

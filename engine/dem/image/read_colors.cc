@@ -1,10 +1,21 @@
-#include <algorithm>
-#include <cmath>
+#include <gdal_priv.h>
+#include <ogr_spatialref.h>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+
+#include "engine/core/result.h"
+#include "engine/dem/crs/georeference.h"
+#include "engine/dem/crs/projector.h"
+#include "engine/dem/dem_types.h"
 #include "engine/dem/gdal/raster_file.h"
 #include "engine/dem/image/image_bins.h"
 #include "engine/dem/image/image_file.h"
-#include "engine/dem/image/image_placement.h"
 #include "engine/dem/image/raster_colors.h"
 #include "engine/dem/sources/read_raster.h"
 
@@ -13,6 +24,78 @@ namespace {
 
 constexpr int kRowsAtOnce = 64;      // of the DEM: bounds what is kept of a much finer image
 constexpr double kBeyondEdge = 0.5;  // pixels
+
+bool HasCrs(const OGRSpatialReference* srs) { return srs != nullptr && !srs->IsEmpty(); }
+
+// Whether positions in one are positions in the other, whatever heights count from. Not said of degrees, which differ
+// by full circles.
+bool ShareCoordinates(const OGRSpatialReference* a, const OGRSpatialReference* b) {
+  if (!HasCrs(a) && !HasCrs(b)) return true;
+  if (!HasCrs(a) || !HasCrs(b)) return false;
+  const OGRSpatialReference horizontal_a = HorizontalPart(*a), horizontal_b = HorizontalPart(*b);
+  const char* const options[] = {"IGNORE_DATA_AXIS_TO_SRS_AXIS_MAPPING=YES", nullptr};
+  return horizontal_a.IsGeographic() == 0 && horizontal_a.IsSame(&horizontal_b, options) != 0;
+}
+
+// Which pixel of an image lies under a sample of a DEM.
+class ImagePlacement {
+ public:
+  // By the georeferences of both files, or one to one where they have the same size and not both have one; errors say
+  // which file lacks what.
+  static Result<ImagePlacement> Of(GDALDataset& dem, const std::string& dem_path, GDALDataset& image,
+                                   const std::string& image_path) {
+    ImagePlacement placement;
+    std::array<double, 6> dem_to_crs{}, image_to_crs{}, crs_to_image{};
+    const bool is_dem_placed = dem.GetGeoTransform(dem_to_crs.data()) == CE_None,
+               is_image_placed = image.GetGeoTransform(image_to_crs.data()) == CE_None;
+    if (!is_dem_placed || !is_image_placed) {
+      const int dem_width = dem.GetRasterXSize(), dem_height = dem.GetRasterYSize();
+      if (image.GetRasterXSize() != dem_width || image.GetRasterYSize() != dem_height) {
+        return MakeError(
+            ErrorCode::kInvalidArgument,
+            "{} has {} x {} pixels and {} has {} x {} samples, and {} has no georeference to place one on the "
+            "other; bring the image to the same area and size with `gdal_translate -outsize {} {} in out.tif` "
+            "or add what is missing with `gdal_translate -a_srs EPSG:XXXX -a_ullr west north east south in "
+            "out.tif`",
+            image_path, image.GetRasterXSize(), image.GetRasterYSize(), dem_path, dem_width, dem_height,
+            is_dem_placed ? image_path : dem_path, dem_width, dem_height);
+      }
+      placement.affine_ = {0, 1, 0, 0, 0, 1};
+      return placement;
+    }
+    if (ShareCoordinates(dem.GetSpatialRef(), image.GetSpatialRef()) &&
+        GDALInvGeoTransform(image_to_crs.data(), crs_to_image.data()) != 0) {
+      GDALComposeGeoTransforms(dem_to_crs.data(), crs_to_image.data(), placement.affine_.data());
+      return placement;
+    }
+    auto of_dem = Georeference::Of(dem, dem_path);
+    if (!of_dem) return tl::unexpected(of_dem.error());
+    auto of_image = Georeference::Of(image, image_path);
+    if (!of_image) return tl::unexpected(of_image.error());
+    placement.georeferences_ = {*std::move(of_dem), *std::move(of_image)};
+    return placement;
+  }
+
+  // Pixel positions of the DEM to pixel positions of the image (georeference.h), in place; NaN where there is none.
+  void ToImage(std::span<Position> positions) const {
+    if (georeferences_) {
+      georeferences_->dem.ToDegrees(positions);
+      georeferences_->image.ToPixels(positions);
+      return;
+    }
+    for (Position& p : positions) {
+      p = {affine_[0] + p.x * affine_[1] + p.y * affine_[2], affine_[3] + p.x * affine_[4] + p.y * affine_[5]};
+    }
+  }
+
+ private:
+  struct Georeferences {
+    Georeference dem, image;
+  };
+
+  std::array<double, 6> affine_{};              // DEM to image, where a projected reference system is the same or none
+  std::optional<Georeferences> georeferences_;  // else
+};
 
 // As many pixels as fit between two samples in the middle of the DEM, on the axis where they fit less often.
 int PixelsPerSample(const ImagePlacement& placement, const RasterHeights& dem) {
@@ -84,11 +167,10 @@ Result<RasterColors> ReadImage(const std::string& path, const std::function<void
   raster.height = image->height();
   if (auto fits = CheckSizeToMesh(path, raster.width, raster.height); !fits) return tl::unexpected(fits.error());
   raster.georeferenced = image->dataset().GetGeoTransform(raster.geo_transform.data()) == CE_None;
-  raster.colors.resize(static_cast<std::size_t>(raster.width) * static_cast<std::size_t>(raster.height));
+  raster.colors.resize(Area(raster.width, raster.height));
   for (int row = 0; row < raster.height; row += kImageRowsAtOnce) {
     const int rows = std::min(kImageRowsAtOnce, raster.height - row);
-    ColorSample* const out =
-        raster.colors.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(raster.width);
+    ColorSample* const out = raster.colors.data() + Area(row, raster.width);
     if (auto read = image->Read(0, row, raster.width, rows, out); !read) return tl::unexpected(read.error());
     if (progress) progress(static_cast<double>(row + rows) / raster.height);
   }

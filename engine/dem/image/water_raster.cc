@@ -20,18 +20,6 @@ namespace {
 // In samples of the grid that is read: far below what shows in 8 bits.
 constexpr double kWaterPositionTolerance = 1e-3;
 
-RasterLayout LayoutOf(GDALDataset& dataset, const Georeference& georeference) {
-  RasterLayout layout;
-  layout.width = georeference.width();
-  layout.height = georeference.height();
-  layout.wraps = georeference.wrap_columns() > 0;
-  layout.columns = layout.wraps ? georeference.wrap_columns() : layout.width;
-  layout.rules = SampleRules::Of(HeightBand(dataset), "");
-  layout.rules.is_indicator = true;
-  layout.overview_factors = OverviewFactors(HeightBand(dataset));
-  return layout;
-}
-
 }  // namespace
 
 class WaterRaster::Impl {
@@ -115,7 +103,8 @@ Result<std::unique_ptr<WaterRaster>> WaterRaster::Open(const std::string& path, 
 
   auto impl = std::make_unique<Impl>(path, *std::move(files), *std::move(georeference));
   impl->spacing = *spacing;
-  impl->layout = LayoutOf(**dataset, impl->georeference);
+  impl->layout = RasterLayout::Of(**dataset, impl->georeference, "");
+  impl->layout.rules.is_indicator = true;
   impl->footprint = footprint.Padded();
   const auto fingerprint = impl->georeference.FingerprintWith(impl->handles.files(), content);
   if (!fingerprint) return tl::unexpected(fingerprint.error());

@@ -9,10 +9,6 @@
 namespace terrace::dem {
 namespace {
 
-constexpr std::int64_t kSamplesPerStrip = std::int64_t{1} << 20;
-
-std::int64_t FloorMod(std::int64_t value, std::int64_t modulus) { return (value % modulus + modulus) % modulus; }
-
 // Blocks of a member along one axis: the first, how many, and how many of its samples the last one has.
 struct BlockSpan {
   std::int64_t first, count, last_samples;
@@ -29,9 +25,12 @@ struct BlockSpan {
 // samples counts: at a member's edge the neighbour has the rest of them. Of equals the first counts.
 class Patchwork {
  public:
-  Patchwork(int step, const GridWindow& window, std::span<float> blocks)
-      : step_(step), window_(window), blocks_(blocks), samples_(blocks.size()) {
-    std::ranges::fill(blocks_, SampleRules::kVoid);
+  Patchwork(int step, const GridWindow& window, float* blocks)
+      : step_(step),
+        window_(window),
+        blocks_(blocks),
+        samples_(static_cast<std::size_t>(window.columns * window.rows)) {
+    std::fill_n(blocks_, samples_.size(), SampleRules::kVoid);
   }
 
   // The part of a member in the window, if it can add anything there; else empty.
@@ -69,14 +68,13 @@ class Patchwork {
 
   const int step_;
   const GridWindow window_;
-  std::span<float> blocks_;
+  float* const blocks_;
   std::vector<std::int64_t> samples_;  // of each block, in the member that gave it
 };
 
 }  // namespace
 
-Result<void> RasterGrid::Compose(int step, const GridWindow& window, std::span<float> out,
-                                 const std::stop_token& stop) const {
+Result<void> RasterGrid::Compose(int step, const GridWindow& window, float* out, const std::stop_token& stop) const {
   Patchwork patchwork(step, window, out);
   const auto pixels = [step](std::int64_t blocks) { return static_cast<double>(blocks * step); };
   const Box box{pixels(window.column), pixels(window.row), pixels(window.column + window.columns),
@@ -98,49 +96,12 @@ Result<void> RasterGrid::Compose(int step, const GridWindow& window, std::span<f
   return {};
 }
 
-Result<void> RasterGrid::Average(int factor, const GridWindow& window, float* out, std::int64_t stride,
-                                 const std::stop_token& stop) const {
-  const int step = std::min(alignment_, factor), block = factor / step;
-  const std::int64_t first = window.column * block, top = window.row * block;
-  const std::int64_t columns = std::min(Columns(step).count() - first, window.columns * block);
-  const std::int64_t rows = std::min(Rows(step).count() - top, window.rows * block);
-  const std::int64_t strip = std::max<std::int64_t>(1, kSamplesPerStrip / columns);
-  const bool is_plain = block == 1 && columns == window.columns;
-  std::vector<float> samples;
-  BlockAverages averages(is_plain ? 0 : window.columns, block);
-  for (std::int64_t done = 0; done < rows; done += strip) {
-    const std::int64_t here = std::min(strip, rows - done);
-    samples.resize(static_cast<std::size_t>(columns * here));
-    if (auto read = Compose(step, {first, top + done, columns, here}, samples, stop); !read) return read;
-    if (is_plain) {
-      CopyRows(samples, columns, out + done * stride, stride);
-      continue;
-    }
-    for (std::int64_t r = 0; r < here; ++r) {
-      const std::int64_t at = done + r;
-      averages.AddRow(samples.data() + r * columns, columns, ShareOf(top + at, step, height_),
-                      ShareOf(first + columns - 1, step, columns_));
-      if ((at + 1) % block == 0 || at + 1 == rows) averages.Take(out + at / block * stride);
-    }
-  }
-  return {};
-}
-
 Result<std::vector<float>> RasterGrid::ReadBlocks(int factor, const GridWindow& window,
                                                   const std::stop_token& stop) const {
   if (members_.size() == 1) return members_.front().raster->ReadBlocks(factor, window, stop);
-  const std::int64_t count = Columns(factor).count();
-  std::vector<float> heights(static_cast<std::size_t>(window.columns * window.rows));
-  for (std::int64_t done = 0; done < window.columns;) {
-    GridWindow part = window;
-    part.column = FloorMod(window.column + done, count);
-    part.columns = std::min(window.columns - done, count - part.column);
-    if (auto read = Average(factor, part, heights.data() + done, window.columns, stop); !read) {
-      return tl::unexpected(read.error());
-    }
-    done += part.columns;
-  }
-  return heights;
+  const int step = std::min(alignment_, factor);
+  return AverageBlocks(Columns(step), Rows(step), step, factor / step, window,
+                       [&](const GridWindow& blocks, float* out) { return Compose(step, blocks, out, stop); });
 }
 
 }  // namespace terrace::dem

@@ -2,7 +2,6 @@
 // and the global sample: windows grow until what they must know of a hole lies in them.
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "engine/dem/mosaic/raster_grid.h"
 
@@ -95,15 +94,7 @@ Result<void> RasterGrid::GuessLarge(int factor, const GridWindow& window, const 
     }
   }
   if (samples.empty()) return {};
-  GridWindow coarse{std::numeric_limits<std::int64_t>::max(), std::numeric_limits<std::int64_t>::max(), 0, 0};
-  std::int64_t east = std::numeric_limits<std::int64_t>::min(), south = east;
-  for (const GridCell& cell : cells) {
-    coarse.column = std::min(coarse.column, cell.column), east = std::max(east, cell.column + 1);
-    coarse.row = std::min(coarse.row, cell.row), south = std::max(south, cell.row + 1);
-  }
-  if (!wraps_) east = std::min(east, coarse_columns.count() - 1);
-  south = std::min(south, coarse_rows.count() - 1);
-  coarse.columns = east - coarse.column + 1, coarse.rows = south - coarse.row + 1;
+  const GridWindow coarse = HullOf(cells, Axes(2 * factor));
   const auto guess = ReadSmooth(2 * factor, coarse, true, stop);
   if (!guess) return tl::unexpected(guess.error());
   for (std::size_t i = 0; i < samples.size(); ++i) {

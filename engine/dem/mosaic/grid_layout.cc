@@ -1,6 +1,7 @@
 #include "engine/dem/mosaic/grid_layout.h"
 
 #include <algorithm>
+#include <array>
 #include <boost/geometry/algorithms/covered_by.hpp>
 #include <boost/geometry/algorithms/equals.hpp>
 #include <boost/geometry/geometries/box.hpp>
@@ -9,14 +10,152 @@
 #include <boost/geometry/strategies/index/cartesian.hpp>
 #include <boost/geometry/strategies/relate/cartesian.hpp>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <iterator>
+#include <map>
 #include <optional>
+#include <string_view>
+#include <unordered_map>
 #include <utility>
+#include <vector>
 
+#include "engine/dem/crs/georeference.h"
+#include "engine/dem/crs/vertical_datum.h"
+#include "engine/dem/mosaic/grid_members.h"
 #include "engine/geo/tile_cover.h"
 
 namespace terrace::dem {
 namespace {
+
+// Buckets per axis. Offsets that OffsetOf counts as equal are less than a bucket apart, so that they lie in one bucket
+// or in neighbours.
+constexpr int kBuckets = 64;
+static_assert(Georeference::kOffsetTolerance < 0.9 / kBuckets);
+
+std::array<double, 4> PixelOf(const Georeference& where) {
+  const std::array<double, 6>& affine = where.to_crs();
+  return {affine[1], affine[2], affine[4], affine[5]};
+}
+
+struct Bucket {
+  int x = 0, y = 0;
+
+  std::uint32_t key() const {
+    const auto wrapped = [](int index) { return static_cast<std::uint32_t>((index + kBuckets) % kBuckets); };
+    return wrapped(x) * kBuckets + wrapped(y);
+  }
+};
+
+// Nothing where a raster is so far away that the fraction of a pixel is lost.
+std::optional<Bucket> BucketOf(const Georeference& first, const Georeference& where) {
+  const Position offset = first.CornerOf(where);
+  if (!(std::max(std::abs(offset.x), std::abs(offset.y)) < Georeference::kFarthestPixel)) return std::nullopt;
+  const auto index = [](double pixels) {
+    return std::min(static_cast<int>((pixels - std::floor(pixels)) * kBuckets), kBuckets - 1);
+  };
+  return Bucket{index(offset.x), index(offset.y)};
+}
+
+// Which rasters lie on one pixel grid, among many: by reference system, vertical datum, pixel size and offset.
+//
+// A raster may fit several grids, as offsets within a tolerance count as whole pixels (Georeference::OffsetOf): it
+// belongs to the first one that it fits, in the order in which grids were met. A look-up takes constant time where
+// pixel sizes are equal to the bit, else a time that grows with the number of different pixel sizes.
+class GridFinder {
+ public:
+  struct Membership {
+    std::size_t grid = 0;  // grids are numbered from 0; the next number is a new grid
+    PixelOffset offset;    // of the raster's first pixel from that of the grid's first raster
+  };
+
+  // The raster's grid. One that fits none begins a new one.
+  Membership Add(const PlacedRaster& raster);
+
+  // Grids that rasters were compared with so far. For tests: this grows linearly with the number of rasters.
+  std::size_t grids_compared() const { return grids_compared_; }
+
+ private:
+  // Bucket of an offset's fraction of a pixel.
+  using Phase = std::uint32_t;
+
+  // Grids whose pixels are equal to the bit, apart from their offset. Numbers of grids are ascending.
+  struct Family {
+    const Georeference* first = nullptr;
+    std::vector<std::size_t> grids;
+    std::unordered_map<Phase, std::vector<std::size_t>> by_phase;
+    std::vector<std::size_t> far;  // too far away for a phase
+  };
+  // Families of one reference system and vertical datum, in the order in which they were met.
+  struct Kind {
+    const VerticalDatum* vertical = nullptr;
+    std::vector<Family> families;
+    std::map<std::array<double, 4>, std::size_t> by_pixel;
+  };
+
+  Kind& KindOf(const PlacedRaster& raster);
+  std::vector<std::size_t> Candidates(const Family& family, const Georeference& where) const;
+  void Keep(Kind& kind, const Georeference& where, std::size_t grid);
+
+  std::vector<const Georeference*> grids_;                         // their first rasters
+  std::unordered_map<std::string_view, std::vector<Kind>> kinds_;  // by the reference system
+  std::size_t grids_compared_ = 0;
+};
+
+GridFinder::Kind& GridFinder::KindOf(const PlacedRaster& raster) {
+  std::vector<Kind>& kinds = kinds_[raster.where->horizontal_wkt()];
+  const auto known =
+      std::ranges::find_if(kinds, [&](const Kind& kind) { return kind.vertical->IsSame(*raster.vertical); });
+  if (known != kinds.end()) return *known;
+  return kinds.emplace_back(Kind{raster.vertical, {}, {}});
+}
+
+// At least the grids of the family that the raster fits.
+std::vector<std::size_t> GridFinder::Candidates(const Family& family, const Georeference& where) const {
+  const auto bucket = BucketOf(*family.first, where);
+  if (!bucket) return family.grids;
+  std::vector<std::size_t> grids = family.far;
+  for (int x = bucket->x - 1; x <= bucket->x + 1; ++x) {
+    for (int y = bucket->y - 1; y <= bucket->y + 1; ++y) {
+      const auto found = family.by_phase.find(Bucket{x, y}.key());
+      if (found != family.by_phase.end()) grids.insert(grids.end(), found->second.begin(), found->second.end());
+    }
+  }
+  std::ranges::sort(grids);
+  return grids;
+}
+
+GridFinder::Membership GridFinder::Add(const PlacedRaster& raster) {
+  const Georeference& where = *raster.where;
+  Kind& kind = KindOf(raster);
+  std::optional<Membership> first;
+  for (const Family& family : kind.families) {
+    // Families are in the order of their first grids.
+    if (first && family.grids.front() > first->grid) break;
+    if (!family.first->MayAlign(where)) continue;
+    for (const std::size_t grid : Candidates(family, where)) {
+      if (first && grid > first->grid) break;
+      ++grids_compared_;
+      if (const auto offset = grids_[grid]->OffsetOf(where)) {
+        first = Membership{grid, *offset};
+        break;
+      }
+    }
+  }
+  if (first) return *first;
+  Keep(kind, where, grids_.size());
+  grids_.push_back(&where);
+  return {grids_.size() - 1, {}};
+}
+
+void GridFinder::Keep(Kind& kind, const Georeference& where, std::size_t grid) {
+  const auto [known, is_new] = kind.by_pixel.try_emplace(PixelOf(where), kind.families.size());
+  if (is_new) kind.families.push_back(Family{&where, {}, {}, {}});
+  Family& family = kind.families[known->second];
+  family.grids.push_back(grid);
+  const auto bucket = BucketOf(*family.first, where);
+  (bucket ? family.by_phase[bucket->key()] : family.far).push_back(grid);
+}
 
 // A raster on its grid, counted from the first pixel of the grid's first raster.
 struct Member {
@@ -61,8 +200,6 @@ std::optional<std::int64_t> ColumnBeside(const geo::TileRange& pixels, Member me
   }
   return std::nullopt;
 }
-
-std::int64_t FloorMod(std::int64_t value, std::int64_t modulus) { return (value % modulus + modulus) % modulus; }
 
 // The members of a grid that are in no group yet, by their pixels.
 class Ungrouped {
@@ -192,6 +329,19 @@ std::vector<GridLayout> LayOutGrids(std::span<const PlacedRaster> rasters, std::
   std::ranges::sort(layouts, {}, [](const GridLayout& layout) { return layout.members.front().raster; });
   if (pairs != nullptr) *pairs = compared;
   return layouts;
+}
+
+std::vector<GridPlan> PlanGrids(const std::vector<std::shared_ptr<const RasterSource>>& rasters) {
+  std::vector<PlacedRaster> placed;
+  for (const auto& raster : rasters) placed.push_back({&raster->georeference(), &raster->vertical()});
+  std::vector<GridPlan> plans;
+  for (const GridLayout& layout : LayOutGrids(placed)) {
+    GridPlan& plan = plans.emplace_back(GridPlan{{}, layout.width, layout.height});
+    for (const LaidRaster& member : layout.members) {
+      plan.members.push_back({rasters[member.raster], member.column, member.row});
+    }
+  }
+  return plans;
 }
 
 }  // namespace terrace::dem

@@ -6,9 +6,16 @@
 #include <span>
 #include <vector>
 
-#include "engine/dem/mosaic/grid_finder.h"
+#include "engine/dem/crs/georeference.h"
+#include "engine/dem/crs/vertical_datum.h"
 
 namespace terrace::dem {
+
+// Where a raster lies and what it counts from. What these point to outlives their users.
+struct PlacedRaster {
+  const Georeference* where = nullptr;
+  const VerticalDatum* vertical = nullptr;
+};
 
 struct LaidRaster {
   std::size_t raster = 0;            // index into the input

@@ -12,21 +12,10 @@ namespace {
 // Up to this level a tile is so large that its outline in the source's CRS cannot be told from a few positions.
 constexpr int kLastWholeLevel = 4;
 
-struct PixelBox {
-  double west, north, east, south;
-
-  void Grow(double x, double y) {
-    west -= x;
-    east += x;
-    north -= y;
-    south += y;
-  }
-};
-
 // Pixels of a tile in a geographic grid: the part found going east from its western edge, and what lies a turn before
 // it.
-std::vector<PixelBox> GeographicBoxes(const Georeference& georeference, const geo::Lattice& lattice,
-                                      const geo::TileKey& key) {
+std::vector<Box> GeographicBoxes(const Georeference& georeference, const geo::Lattice& lattice,
+                                 const geo::TileKey& key) {
   std::array<Position, 2> corners = {
       {{lattice.Longitude(lattice.FirstColumn(key)), lattice.Latitude(lattice.FirstRow(key))},
        {0, lattice.Latitude(lattice.FirstRow(key) + lattice.cells)}}};
@@ -34,7 +23,7 @@ std::vector<PixelBox> GeographicBoxes(const Georeference& georeference, const ge
   const double columns = lattice.cells * lattice.StepDegrees() / 360 * georeference.period();
   const double west = georeference.columns_run_east() ? corners[0].x : corners[0].x - columns;
   const auto [north, south] = std::minmax(corners[0].y, corners[1].y);
-  std::vector<PixelBox> boxes;
+  std::vector<Box> boxes;
   for (int turn = -1; turn <= 1; ++turn) {
     const double shifted = west + turn * georeference.period();
     boxes.push_back({shifted, north, shifted + columns, south});
@@ -43,8 +32,8 @@ std::vector<PixelBox> GeographicBoxes(const Georeference& georeference, const ge
 }
 
 // A box around a tile's pixels in any CRS; nothing where it cannot be told.
-std::optional<PixelBox> ProjectedBox(const Georeference& georeference, const geo::Lattice& lattice,
-                                     const geo::TileKey& key) {
+std::optional<Box> ProjectedBox(const Georeference& georeference, const geo::Lattice& lattice,
+                                const geo::TileKey& key) {
   if (key.level <= kLastWholeLevel) return std::nullopt;
   constexpr int kSteps = 4;
   std::array<Position, (kSteps + 1) * (kSteps + 1)> nodes;
@@ -54,16 +43,16 @@ std::optional<PixelBox> ProjectedBox(const Georeference& georeference, const geo
         lattice.Latitude(lattice.FirstRow(key) + i / (kSteps + 1) * lattice.cells / kSteps)};
   }
   georeference.ToPixels(nodes);
-  PixelBox box{nodes[0].x, nodes[0].y, nodes[0].x, nodes[0].y};
+  Box box{nodes[0].x, nodes[0].y, nodes[0].x, nodes[0].y};
   for (const Position& node : nodes) {
     if (std::isnan(node.x)) return std::nullopt;
     box.west = std::min(box.west, node.x);
     box.east = std::max(box.east, node.x);
-    box.north = std::min(box.north, node.y);
-    box.south = std::max(box.south, node.y);
+    box.south = std::min(box.south, node.y);
+    box.north = std::max(box.north, node.y);
   }
   // Between nodes a quarter of the tile apart its edges bulge by less than an eighth of it, down from level 5.
-  box.Grow((box.east - box.west) / 8, (box.south - box.north) / 8);
+  box.Grow((box.east - box.west) / 8, (box.north - box.south) / 8);
   return box;
 }
 
@@ -92,13 +81,13 @@ BlockRange RasterGrid::Ranges(const Box& pixels) const {
 }
 
 BlockRange RasterGrid::RangeAroundHoles(const Box& pixels, int factor) const {
-  PixelBox box{pixels.west, pixels.south, pixels.east, pixels.north};
+  Box box = pixels;
   const auto has_holes = [&](double west, double north, double east, double south) {
     const double halo = 2.0 * factor;  // an average by overviews may be void beside a hole
     const Box wide{west - halo, north - halo, east + halo, south + halo};
     return Ranges(wide).has_holes || voids_.SharesHole(wide);
   };
-  if (options_.voids != HoleFill::kSmooth || !has_holes(box.west, box.north, box.east, box.south)) return {};
+  if (options_.voids != HoleFill::kSmooth || !has_holes(box.west, box.south, box.east, box.north)) return {};
   // The holes end where a band around them has none.
   const auto grow = [&](double& side, double end, double step, bool holes) {
     if (!holes || (step < 0 ? side <= end : side >= end)) return false;
@@ -108,29 +97,29 @@ BlockRange RasterGrid::RangeAroundHoles(const Box& pixels, int factor) const {
   const double west = wraps_ ? -columns_ : 0, east = wraps_ ? 2.0 * columns_ : width_;
   for (bool grown = true; grown;) {
     const double x = RangeTable::kBlock + (box.east - box.west) / 4,
-                 y = RangeTable::kBlock + (box.south - box.north) / 4;
-    const bool at_west = has_holes(box.west - x, box.north - y, box.west, box.south + y);
-    const bool at_east = has_holes(box.east, box.north - y, box.east + x, box.south + y);
-    const bool at_north = has_holes(box.west - x, box.north - y, box.east + x, box.north);
-    const bool at_south = has_holes(box.west - x, box.south, box.east + x, box.south + y);
+                 y = RangeTable::kBlock + (box.north - box.south) / 4;
+    const bool at_west = has_holes(box.west - x, box.south - y, box.west, box.north + y);
+    const bool at_east = has_holes(box.east, box.south - y, box.east + x, box.north + y);
+    const bool at_north = has_holes(box.west - x, box.south - y, box.east + x, box.south);
+    const bool at_south = has_holes(box.west - x, box.north, box.east + x, box.north + y);
     grown = grow(box.west, west, -x, at_west);
     grown |= grow(box.east, east, x, at_east);
-    grown |= grow(box.north, 0, -y, at_north);
-    grown |= grow(box.south, height_, y, at_south);
+    grown |= grow(box.south, 0, -y, at_north);
+    grown |= grow(box.north, height_, y, at_south);
   }
   // Heights beside a hole count, of averages by the factor at least, and of large holes by factors up to a sixtieth of
   // their size; some averages off, and what small voids beside it are filled from.
-  const double size = std::max(box.east - box.west, box.south - box.north);
+  const double size = std::max(box.east - box.west, box.north - box.south);
   const double reach = 4 * std::max<double>(factor, size / 32) + options_.max_void_gap;
   box.Grow(reach, reach);
-  return Ranges({box.west, box.north, box.east, box.south});
+  return Ranges(box);
 }
 
 bool RasterGrid::GivesWay(const Box& pixels, int factor) const {
-  PixelBox wide{pixels.west, pixels.south, pixels.east, pixels.north};
+  Box wide = pixels;
   wide.Grow(Feather(factor) / spacing_.east + 2 * factor, Feather(factor) / spacing_.north + 2 * factor);
-  return wide.north < 0 || wide.south > height_ || (!wraps_ && (wide.west < 0 || wide.east > width_)) ||
-         Ranges({wide.west, wide.north, wide.east, wide.south}).has_voids;
+  return wide.south < 0 || wide.north > height_ || (!wraps_ && (wide.west < 0 || wide.east > width_)) ||
+         Ranges(wide).has_voids;
 }
 
 GridRange RasterGrid::RangeOf(const geo::Lattice& lattice, const geo::TileKey& key) const {
@@ -148,11 +137,11 @@ GridRange RasterGrid::RangeOf(const geo::Lattice& lattice, const geo::TileKey& k
     return range;
   }
   const int factor = AveragingFactor(SamplesPerCell(lattice, spacing_));
-  std::vector<PixelBox> boxes;
+  std::vector<Box> boxes;
   if (georeference_.is_geographic_grid() && georeference_.is_affine()) {
     boxes = GeographicBoxes(georeference_, lattice, key);
-    leaves |= !wraps_ &&
-              std::ranges::none_of(boxes, [&](const PixelBox& box) { return box.west >= 0 && box.east <= width_; });
+    leaves |=
+        !wraps_ && std::ranges::none_of(boxes, [&](const Box& box) { return box.west >= 0 && box.east <= width_; });
   } else if (const auto box = ProjectedBox(georeference_, lattice, key)) {
     boxes = {*box};
     leaves |= box->west < 0 || box->east > width_;
@@ -162,18 +151,18 @@ GridRange RasterGrid::RangeOf(const geo::Lattice& lattice, const geo::TileKey& k
   }
   BlockRange blocks;
   bool blends = false;
-  for (PixelBox& box : boxes) {
-    leaves |= box.north < 0 || box.south > height_;
+  for (Box& box : boxes) {
+    leaves |= box.south < 0 || box.north > height_;
     if (options_.feather_m > 0) {
-      blends |= GivesWay({box.west, box.north, box.east, box.south}, factor);
+      blends |= GivesWay(box, factor);
     }
     // Bilinear interpolation reaches one and a half samples of the grid.
     box.Grow(1.5 * factor + 1, 1.5 * factor + 1);
-    BlockRange here = Ranges({box.west, box.north, box.east, box.south});
+    BlockRange here = Ranges(box);
     if (here.has_voids) {
-      here.Add(RangeAroundHoles({box.west, box.north, box.east, box.south}, factor));
+      here.Add(RangeAroundHoles(box, factor));
       box.Grow(options_.max_void_gap + factor, options_.max_void_gap + factor);
-      here.Add(Ranges({box.west, box.north, box.east, box.south}));
+      here.Add(Ranges(box));
     }
     blocks.Add(here);
   }

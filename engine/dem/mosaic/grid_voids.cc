@@ -198,7 +198,7 @@ std::vector<std::uint8_t> GridVoids::HolesIn(const std::vector<GridMember>& memb
   for (std::int64_t row = window.row; row < window.row + window.rows; ++row) {
     for (std::int64_t column = window.column; column < window.column + window.columns; ++column, ++i) {
       if (!std::isnan(heights[i])) continue;
-      const std::int64_t canonical = turn_ > 0 ? (column % columns + columns) % columns : column;
+      const std::int64_t canonical = turn_ > 0 ? FloorMod(column, columns) : column;
       const std::int64_t x = canonical * factor, y = row * factor;
       const auto look = [&](const std::vector<Placed>& placed) {
         for (const Placed& p : placed) {

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "engine/dem/crs/node_positions.h"
-#include "engine/dem/mosaic/feather.h"
 #include "engine/dem/mosaic/void_fill.h"
 #include "engine/dem/raster/grid_cells.h"
 
@@ -29,6 +28,58 @@ Result<Georeference> GeoreferenceOf(const GridPlan& plan) {
 }
 
 bool IsVoid(float height) { return std::isnan(height); }
+
+int FactorOf(const geo::Lattice& lattice, const SourceSpacing& spacing) {
+  return AveragingFactor(SamplesPerCell(lattice, spacing));
+}
+int FactorOf(const geo::MercatorGrid& grid, const SourceSpacing& spacing) {
+  return MercatorFactor(grid.depth, spacing);
+}
+
+// Rows from each sample to the nearest void in its column, at most `most` + 1. One void row lies above and below all.
+std::vector<int> RowsToVoid(const std::vector<float>& heights, std::int64_t columns, std::int64_t rows, int most) {
+  std::vector<int> steps(heights.size());
+  for (std::int64_t c = 0; c < columns; ++c) {
+    const auto at = [&](std::int64_t r) { return static_cast<std::size_t>(r * columns + c); };
+    int here = 0;
+    for (std::int64_t r = 0; r < rows; ++r) {
+      here = std::isnan(heights[at(r)]) ? 0 : std::min(here + 1, most + 1);
+      steps[at(r)] = here;
+    }
+    here = 0;
+    for (std::int64_t r = rows - 1; r >= 0; --r) {
+      here = std::isnan(heights[at(r)]) ? 0 : std::min(here + 1, most + 1);
+      steps[at(r)] = std::min(steps[at(r)], here);
+    }
+  }
+  return steps;
+}
+
+// For each sample of `core`: the distance to the nearest void of `wide`, or to the outside of `wide`, divided by
+// `length`, at most 1; 0 for voids. Distances are between sample centres, `column_step` and `row_step` apart. Exact if
+// `wide` exceeds `core` by length / step samples on every side, or ends where the raster ends.
+std::vector<float> FeatherWeights(const std::vector<float>& wide_heights, const GridWindow& wide,
+                                  const GridWindow& core, double column_step, double row_step, double length) {
+  const int most_columns = static_cast<int>(std::ceil(length / column_step));
+  const int most_rows = static_cast<int>(std::ceil(length / row_step));
+  const std::vector<int> rows = RowsToVoid(wide_heights, wide.columns, wide.rows, most_rows);
+  std::vector<float> weights;
+  weights.reserve(static_cast<std::size_t>(core.columns * core.rows));
+  for (std::int64_t r = core.row - wide.row; r < core.row - wide.row + core.rows; ++r) {
+    const int* const row = rows.data() + r * wide.columns;
+    for (std::int64_t c = core.column - wide.column; c < core.column - wide.column + core.columns; ++c) {
+      double nearest = length * length;
+      for (int dx = -most_columns; dx <= most_columns; ++dx) {
+        const std::int64_t column = c + dx;
+        const double x = dx * column_step;
+        const double y = column < 0 || column >= wide.columns ? 0 : row[column] * row_step;
+        nearest = std::min(nearest, x * x + y * y);
+      }
+      weights.push_back(static_cast<float>(std::sqrt(nearest) / length));
+    }
+  }
+  return weights;
+}
 
 // Whole rows at a time: heights of nodes that are wanted, where the samples around them give one.
 void FillRows(const std::vector<float>& samples, const GridWindow& window, const NodeCells& cells,
@@ -336,14 +387,17 @@ NodeCells RasterGrid::CellsOf(const NodePositions& positions, int factor, const 
   return cells;
 }
 
-NodePositions RasterGrid::PositionsOf(const geo::Lattice& lattice, const NodeWindow& window, int factor) const {
-  return NodePositions::Of(georeference_, reach_, lattice, window, kGridPositionTolerance * factor);
+template <typename NodeGrid>
+NodePositions RasterGrid::PositionsOf(const NodeGrid& node_grid, const NodeWindow& window, int factor) const {
+  return NodePositions::Of(georeference_, reach_, node_grid, window, kGridPositionTolerance * factor);
 }
+template NodePositions RasterGrid::PositionsOf(const geo::Lattice&, const NodeWindow&, int) const;
 
-Result<void> RasterGrid::Fill(const geo::Lattice& lattice, const NodeWindow& window, HeightDatum datum,
+template <typename NodeGrid>
+Result<void> RasterGrid::Fill(const NodeGrid& node_grid, const NodeWindow& window, HeightDatum datum,
                               const NodeHeights& nodes, const std::stop_token& stop, GridTrace* trace) const {
-  const int factor = AveragingFactor(SamplesPerCell(lattice, spacing_));
-  NodePositions positions = PositionsOf(lattice, window, factor);
+  const int factor = FactorOf(node_grid, spacing_);
+  NodePositions positions = PositionsOf(node_grid, window, factor);
   std::vector<std::uint8_t> inside = cover_.Inside(positions);
   if (trace != nullptr) {
     trace->heights.assign(inside.size(), SampleRules::kVoid);
@@ -351,7 +405,7 @@ Result<void> RasterGrid::Fill(const geo::Lattice& lattice, const NodeWindow& win
   }
   for (int row = 0; row < window.rows && georeference_.is_geographic_grid(); ++row) {
     const std::int64_t global = window.row + row;
-    if (global > 0 && global < lattice.rows()) continue;
+    if (!IsPoleRow(node_grid, global)) continue;
     // Where columns are meridians they meet in one value.
     const auto first = static_cast<std::size_t>(row) * positions.columns();
     std::fill_n(inside.begin() + static_cast<std::ptrdiff_t>(first), window.columns, std::uint8_t{0});
@@ -361,7 +415,7 @@ Result<void> RasterGrid::Fill(const geo::Lattice& lattice, const NodeWindow& win
   }
   std::vector<double> undulations;
   if (undulations_ && datum == HeightDatum::kEllipsoid) {
-    auto found = undulations_->At(lattice, window);
+    auto found = undulations_->At(node_grid, window);
     if (!found) return tl::unexpected(found.error());
     undulations = *std::move(found);
   }
@@ -369,18 +423,9 @@ Result<void> RasterGrid::Fill(const geo::Lattice& lattice, const NodeWindow& win
   return FillAt(std::move(positions), inside, undulations, factor, nodes, stop, trace);
 }
 
-Result<void> RasterGrid::Fill(const geo::MercatorGrid& grid, const NodeWindow& window, const NodeHeights& nodes,
-                              const std::stop_token& stop) const {
-  const int factor = MercatorFactor(grid.depth, spacing_);
-  std::vector<double> undulations;
-  if (undulations_) {
-    auto found = undulations_->At(grid, window);
-    if (!found) return tl::unexpected(found.error());
-    undulations = *std::move(found);
-  }
-  NodePositions positions = NodePositions::Of(georeference_, reach_, grid, window, kGridPositionTolerance * factor);
-  const std::vector<std::uint8_t> inside = cover_.Inside(positions);
-  return FillAt(std::move(positions), inside, undulations, factor, nodes, stop);
-}
+template Result<void> RasterGrid::Fill(const geo::Lattice&, const NodeWindow&, HeightDatum, const NodeHeights&,
+                                       const std::stop_token&, GridTrace*) const;
+template Result<void> RasterGrid::Fill(const geo::MercatorGrid&, const NodeWindow&, HeightDatum, const NodeHeights&,
+                                       const std::stop_token&, GridTrace*) const;
 
 }  // namespace terrace::dem

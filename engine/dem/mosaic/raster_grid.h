@@ -18,7 +18,6 @@
 
 #include "engine/core/result.h"
 #include "engine/dem/common/box_index.h"
-#include "engine/dem/common/round_height.h"
 #include "engine/dem/crs/undulations.h"
 #include "engine/dem/dem_types.h"
 #include "engine/dem/mosaic/grid_cover.h"
@@ -108,13 +107,14 @@ class RasterGrid {
   // Replaces NaN among the window's heights by the raster grid's heights, where it has them. A height depends on the
   // node alone, not on the window. Fills in `trace` unless it is null. Errors: kUnavailable (a raster cannot be read
   // now), kChanged (a file was changed, replaced or removed), kCancelled (stopped).
-  Result<void> Fill(const geo::Lattice& lattice, const NodeWindow& window, HeightDatum datum, const NodeHeights& nodes,
+  // `NodeGrid`: geo::Lattice or geo::MercatorGrid.
+  template <typename NodeGrid>
+  Result<void> Fill(const NodeGrid& node_grid, const NodeWindow& window, HeightDatum datum, const NodeHeights& nodes,
                     const std::stop_token& stop, GridTrace* trace = nullptr) const;
-  Result<void> Fill(const geo::MercatorGrid& grid, const NodeWindow& window, const NodeHeights& nodes,
-                    const std::stop_token& stop) const;
 
   // Returns the pixel positions of the window's nodes that Fill uses for averages by `factor`.
-  NodePositions PositionsOf(const geo::Lattice& lattice, const NodeWindow& window, int factor) const;
+  template <typename NodeGrid>
+  NodePositions PositionsOf(const NodeGrid& node_grid, const NodeWindow& window, int factor) const;
   // Returns the cells of nodes, their columns near those of a trace's window.
   NodeCells CellsOf(const NodePositions& positions, int factor, const GridWindow& window) const;
 
@@ -157,9 +157,7 @@ class RasterGrid {
   Result<std::vector<float>> ReadBlocks(int factor, const GridWindow& window, const std::stop_token& stop) const;
   // Averages of `step` x `step` samples each, into rows of `out` that are `window.columns` wide. Precondition: every
   // member begins at a block; the window does not wrap.
-  Result<void> Compose(int step, const GridWindow& window, std::span<float> out, const std::stop_token& stop) const;
-  Result<void> Average(int factor, const GridWindow& window, float* out, std::int64_t stride,
-                       const std::stop_token& stop) const;
+  Result<void> Compose(int step, const GridWindow& window, float* out, const std::stop_token& stop) const;
   // Small voids filled in. `measured`: becomes what was there before, unless it is null.
   struct Bridged {
     std::vector<float> heights;

@@ -4,10 +4,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
+#include "engine/core/result.h"
 #include "engine/dem/gdal/sample_rules.h"
+#include "engine/dem/raster/sample_grid.h"
 
 namespace terrace::dem {
 
@@ -113,5 +116,46 @@ class BlockAverages {
   std::vector<BlockSum> inner_;  // of blocks, or of their parts
   std::vector<BlockSum> outer_;
 };
+
+// A window of averages of block x block values each. The values stand for blocks of `step` samples; `columns` and
+// `rows` are their axes. Calls read(window, out) for windows of values that do not wrap.
+template <typename Read>
+Result<std::vector<float>> AverageBlocks(const GridAxis& columns, const GridAxis& rows, int step, int block,
+                                         const GridWindow& window, const Read& read) {
+  constexpr std::int64_t kValuesPerStrip = std::int64_t{1} << 20;
+  const std::int64_t turn = (columns.count() + block - 1) / block;
+  const std::int64_t top = window.row * block, height = std::min(rows.count() - top, window.rows * block);
+  std::vector<float> heights(static_cast<std::size_t>(window.columns * window.rows));
+  for (std::int64_t column = 0; column < window.columns;) {
+    float* const out = heights.data() + column;
+    const std::int64_t first = FloorMod(window.column + column, turn) * block;
+    const std::int64_t blocks = std::min(window.columns - column, turn - first / block);
+    const std::int64_t width = std::min(columns.count() - first, blocks * block);
+    // In rows: a row of blocks can be the whole raster.
+    const std::int64_t strip = std::max<std::int64_t>(1, kValuesPerStrip / width);
+    const bool is_plain = block == 1 && width == blocks;
+    // Written before it is read, and not filled with zeros before that.
+    const auto values =
+        std::make_unique_for_overwrite<float[]>(static_cast<std::size_t>(width * std::min(strip, height)));
+    BlockAverages averages(is_plain ? 0 : blocks, block);
+    for (std::int64_t done = 0; done < height; done += strip) {
+      const GridWindow here{first, top + done, width, std::min(strip, height - done)};
+      if (auto filled = read(here, values.get()); !filled) return tl::unexpected(filled.error());
+      if (is_plain) {
+        CopyRows({values.get(), static_cast<std::size_t>(width * here.rows)}, width, out + done * window.columns,
+                 window.columns);
+        continue;
+      }
+      for (std::int64_t r = 0; r < here.rows; ++r) {
+        averages.AddRow(values.get() + r * width, width, ShareOf(here.row + r, step, rows.samples()),
+                        ShareOf(first + width - 1, step, columns.samples()));
+        const std::int64_t at = done + r;
+        if ((at + 1) % block == 0 || at + 1 == height) averages.Take(out + at / block * window.columns);
+      }
+    }
+    column += blocks;
+  }
+  return heights;
+}
 
 }  // namespace terrace::dem

@@ -111,9 +111,13 @@ GridWindow NodeCells::MoveIntoWindow(const GridAxes& axes, std::span<const std::
 
 GridWindow WindowOf(std::span<GridCell> cells, const GridAxes& axes) {
   const std::int64_t around = cells[cells.size() / 2].column;
+  for (GridCell& cell : cells) cell.column = NearestTurn(cell.column, around, axes.columns);
+  return HullOf(cells, axes);
+}
+
+GridWindow HullOf(std::span<const GridCell> cells, const GridAxes& axes) {
   CellHull hull;
-  for (GridCell& cell : cells) {
-    cell.column = NearestTurn(cell.column, around, axes.columns);
+  for (const GridCell& cell : cells) {
     hull.AddColumn(cell.column);
     hull.AddRow(cell.row);
   }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -12,6 +13,15 @@
 #include "engine/dem/raster/sample_grid.h"
 
 namespace terrace::dem {
+
+// Heights are multiples of 2^-10 m: libm's last bits, which differ between processors, end here. Halves go to the even
+// multiple. Precondition: below 2^42 m.
+inline float RoundHeight(double metres) {
+  // std::nearbyint without a call, so that loops become vectors: at 2^52 a double has no bits below one.
+  constexpr double kNoFraction = 0x1p52;
+  const double scaled = metres * 1024;
+  return static_cast<float>(std::copysign((std::abs(scaled) + kNoFraction) - kNoFraction, scaled) / 1024);
+}
 
 // Four samples of the grid around a position, and how far it is from the first to the next, 0..1.
 struct GridCell {
@@ -69,6 +79,8 @@ class NodeCells {
 // The smallest window with every cell, its columns counted from near one of them where the axis wraps. Moves the cells
 // there. Precondition: not empty.
 GridWindow WindowOf(std::span<GridCell> cells, const GridAxes& axes);
+// The same with cells as they are.
+GridWindow HullOf(std::span<const GridCell> cells, const GridAxes& axes);
 
 // Bilinear, weights renormalized over valid samples; nothing where there is none.
 std::optional<double> Interpolate(const std::vector<float>& heights, const GridWindow& window, const GridCell& cell);

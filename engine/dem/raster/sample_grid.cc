@@ -4,29 +4,22 @@
 #include <cmath>
 #include <memory>
 #include <span>
+#include <string_view>
 
+#include "engine/dem/gdal/raster_file.h"
 #include "engine/dem/raster/block_averages.h"
 #include "engine/dem/raster/grid_cells.h"
-#include "engine/dem/raster/overview_axis.h"
 
 namespace terrace::dem {
 namespace {
-
-constexpr std::int64_t kSamplesPerStrip = std::int64_t{1} << 20;
-
-std::int64_t FloorMod(std::int64_t value, std::int64_t modulus) { return (value % modulus + modulus) % modulus; }
 
 // What a grid is averaged from: the samples, or blocks of `start` x `start` of them as an overview gives them.
 struct Level {
   GDALRasterBand* band;
   int start;
-  int block;               // how many of those blocks, per axis, make one of the grid
   GridAxis columns, rows;  // of blocks of `start`
   OverviewAxis x, y;
   bool is_band;  // a block is the band's sample of its number
-
-  double ColumnShare(std::int64_t column) const { return ShareOf(column, start, columns.samples()); }
-  double RowShare(std::int64_t row) const { return ShareOf(row, start, rows.samples()); }
 };
 
 Result<Level> StartingLevel(GDALDataset& dataset, const RasterLayout& layout, int factor) {
@@ -41,7 +34,6 @@ Result<Level> StartingLevel(GDALDataset& dataset, const RasterLayout& layout, in
   const bool is_own = !is_whole && HasOwnOverviews(dataset);
   return Level{band,
                start,
-               factor / start,
                columns,
                rows,
                {columns, layout.width, band->GetXSize(), is_own},
@@ -49,13 +41,18 @@ Result<Level> StartingLevel(GDALDataset& dataset, const RasterLayout& layout, in
                is_whole || is_own};
 }
 
+Result<void> ReadWindow(GDALRasterBand& band, const SampleRules& rules, const GridWindow& window, float* out,
+                        const std::stop_token& stop) {
+  return ReadHeights(band, rules, static_cast<int>(window.column), static_cast<int>(window.row),
+                     static_cast<int>(window.columns), static_cast<int>(window.rows), out, stop);
+}
+
 // Samples of an overview; the column behind the last one is the first.
 Result<std::vector<float>> ReadSamples(const Level& level, const SampleRules& rules, const GridWindow& window,
                                        const std::stop_token& stop) {
   std::vector<float> samples(static_cast<std::size_t>(window.columns * window.rows));
   const auto read = [&](std::int64_t column, std::int64_t columns, float* out) {
-    return ReadHeights(*level.band, rules, static_cast<int>(column), static_cast<int>(window.row),
-                       static_cast<int>(columns), static_cast<int>(window.rows), out, stop);
+    return ReadWindow(*level.band, rules, {column, window.row, columns, window.rows}, out, stop);
   };
   const std::int64_t here = std::min(window.columns, level.x.samples() - window.column);
   if (auto done = read(window.column, here, samples.data()); !done) return tl::unexpected(done.error());
@@ -97,42 +94,43 @@ Result<void> InterpolateBlocks(const Level& level, const SampleRules& rules, con
   return {};
 }
 
-// Blocks `column` .. `column + columns` without wrapping, all rows of the window, into columns of `out` that is
-// `stride` wide.
-Result<void> ReadBlocks(const Level& level, const SampleRules& rules, const GridWindow& window, float* out,
-                        std::int64_t stride, const std::stop_token& stop) {
-  const std::int64_t first = window.column * level.block;
-  const std::int64_t count = std::min<std::int64_t>(level.columns.count() - first, window.columns * level.block);
-  const std::int64_t top = window.row * level.block;
-  const std::int64_t rows = std::min<std::int64_t>(level.rows.count() - top, window.rows * level.block);
-  // In sample rows: a row of blocks can be the whole raster.
-  const std::int64_t strip = std::max<std::int64_t>(1, kSamplesPerStrip / count);
-  const bool is_plain = level.block == 1 && count == window.columns;
-  // Written before it is read, and not filled with zeros before that.
-  const auto samples = std::make_unique_for_overwrite<float[]>(static_cast<std::size_t>(count * std::min(strip, rows)));
-  BlockAverages averages(is_plain ? 0 : window.columns, level.block);
-  for (std::int64_t done = 0; done < rows; done += strip) {
-    const GridWindow here{first, top + done, count, std::min(strip, rows - done)};
-    auto read = level.is_band
-                    ? ReadHeights(*level.band, rules, static_cast<int>(here.column), static_cast<int>(here.row),
-                                  static_cast<int>(here.columns), static_cast<int>(here.rows), samples.get(), stop)
-                    : InterpolateBlocks(level, rules, here, samples.get(), stop);
-    if (!read) return read;
-    if (is_plain) {
-      CopyRows({samples.get(), static_cast<std::size_t>(here.columns * here.rows)}, count, out + done * stride, stride);
-      continue;
-    }
-    for (std::int64_t r = 0; r < here.rows; ++r) {
-      averages.AddRow(samples.get() + r * count, count, level.RowShare(here.row + r),
-                      level.ColumnShare(first + count - 1));
-      const std::int64_t at = done + r;
-      if ((at + 1) % level.block == 0 || at + 1 == rows) averages.Take(out + at / level.block * stride);
-    }
-  }
-  return {};
+}  // namespace
+
+RasterLayout RasterLayout::Of(GDALDataset& dataset, const Georeference& georeference, const std::string& crs_unit) {
+  RasterLayout layout;
+  layout.width = georeference.width();
+  layout.height = georeference.height();
+  layout.wraps = georeference.wrap_columns() > 0;
+  layout.columns = layout.wraps ? georeference.wrap_columns() : layout.width;
+  layout.rules = SampleRules::Of(HeightBand(dataset), crs_unit);
+  layout.overview_factors = OverviewFactors(HeightBand(dataset));
+  return layout;
 }
 
-}  // namespace
+bool HasOwnOverviews(GDALDataset& dataset) {
+  const std::string_view driver = dataset.GetDriverName();
+  if (driver != "JPEG" && !driver.starts_with("JP2")) return false;
+  return !HasFileEndingWith(dataset, ".ovr");  // GDAL's go before the format's
+}
+
+double PixelsPerSample(GDALDataset& dataset, int factor, int pixels, int samples) {
+  return HasOwnOverviews(dataset) ? factor : static_cast<double>(pixels) / samples;
+}
+
+GridAxis::Location OverviewAxis::Around(std::int64_t block) const {
+  if (is_own_) return {block, 0};
+  // In halves of pixels, so that all is whole: centre * samples / pixels - 1/2.
+  const auto centre = static_cast<std::int64_t>(2 * blocks_.Center(block));
+  const std::int64_t place = centre * samples_ - pixels_, unit = 2 * pixels_;
+  if (place < 0) return {0, 0};
+  const std::int64_t index = place / unit;
+  if (index < samples_ - 1) return {index, static_cast<double>(place % unit) / static_cast<double>(unit)};
+  if (!blocks_.wraps()) return {samples_ - 1, 0};
+  const double size = static_cast<double>(pixels_) / static_cast<double>(samples_);
+  const double last = static_cast<double>(pixels_) - size / 2, first = blocks_.samples() + size / 2;
+  if (!(first > last)) return {samples_ - 1, 0};
+  return {samples_ - 1, std::clamp((blocks_.Center(block) - last) / (first - last), 0.0, 1.0)};
+}
 
 int StartingFactor(const RasterLayout& layout, int factor) {
   int start = 1;
@@ -192,18 +190,11 @@ Result<std::vector<float>> ReadGrid(GDALDataset& dataset, const RasterLayout& la
                                     const GridWindow& window, const std::stop_token& stop) {
   const auto level = StartingLevel(dataset, layout, factor);
   if (!level) return tl::unexpected(level.error());
-  const std::int64_t count = GridAxis(layout.columns, factor, layout.wraps).count();
-  std::vector<float> heights(static_cast<std::size_t>(window.columns * window.rows));
-  for (std::int64_t done = 0; done < window.columns;) {
-    GridWindow part = window;
-    part.column = FloorMod(window.column + done, count);
-    part.columns = std::min(window.columns - done, count - part.column);
-    if (auto read = ReadBlocks(*level, layout.rules, part, heights.data() + done, window.columns, stop); !read) {
-      return tl::unexpected(read.error());
-    }
-    done += part.columns;
-  }
-  return heights;
+  return AverageBlocks(level->columns, level->rows, level->start, factor / level->start, window,
+                       [&](const GridWindow& blocks, float* out) {
+                         return level->is_band ? ReadWindow(*level->band, layout.rules, blocks, out, stop)
+                                               : InterpolateBlocks(*level, layout.rules, blocks, out, stop);
+                       });
 }
 
 }  // namespace terrace::dem

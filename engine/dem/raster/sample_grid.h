@@ -5,15 +5,21 @@
 
 #include <cstdint>
 #include <stop_token>
+#include <string>
 #include <vector>
 
 #include "engine/core/result.h"
+#include "engine/dem/crs/georeference.h"
+#include "engine/dem/dem_types.h"
 #include "engine/dem/gdal/sample_rules.h"
 
 namespace terrace::dem {
 
 // How a raster is stored, as far as reading it goes. Immutable after Open.
 struct RasterLayout {
+  // `crs_unit`: SampleRules::Of's.
+  static RasterLayout Of(GDALDataset& dataset, const Georeference& georeference, const std::string& crs_unit);
+
   int width = 0, height = 0;  // of the file
   int columns = 0;            // of them in use: without the duplicates of a raster that goes all around the Earth
   bool wraps = false;         // column `columns` is column 0 again
@@ -61,6 +67,29 @@ class GridAxis {
   bool wraps_;
 };
 
+// One axis of an overview. Locates the blocks of a grid between overview samples.
+//
+// For factor f, GDAL reduces W pixels to n samples of W / n pixels each. gdaladdo rounds n = W / f up, cloud-optimized
+// GeoTIFFs round it down. If f does not divide W, sample i is not centred on block i of f pixels: the offset grows to
+// up to f pixels at the end of the axis.
+class OverviewAxis {
+ public:
+  // `pixels`: of the file; the grid may leave out some at the end (RasterLayout::columns).
+  OverviewAxis(const GridAxis& blocks, int pixels, int samples, bool is_own)
+      : blocks_(blocks), pixels_(pixels), samples_(samples), is_own_(is_own) {}
+
+  // Returns the location of the block's centre, clamped to the outermost samples' centres. If the axis wraps, the
+  // sample after the last one is the first.
+  GridAxis::Location Around(std::int64_t block) const;
+
+  std::int64_t samples() const { return samples_; }
+
+ private:
+  GridAxis blocks_;
+  std::int64_t pixels_, samples_;
+  bool is_own_;
+};
+
 struct GridWindow {
   std::int64_t column = 0, row = 0;  // columns may lie outside 0 .. count where the axis wraps
   std::int64_t columns = 0, rows = 0;
@@ -74,6 +103,13 @@ Result<std::vector<float>> ReadGrid(GDALDataset& dataset, const RasterLayout& la
 
 // The factor of the overview that ReadGrid starts from; 1: the samples themselves.
 int StartingFactor(const RasterLayout& layout, int factor);
+
+// Returns true if the overviews are the format's own (JPEG, JPEG 2000) and each sample covers a block of exactly
+// `factor` pixels. False with an .ovr file, which GDAL prefers.
+bool HasOwnOverviews(GDALDataset& dataset);
+
+// Returns the number of pixels that an overview sample covers along an axis of `pixels` pixels and `samples` samples.
+double PixelsPerSample(GDALDataset& dataset, int factor, int pixels, int samples);
 
 // The overview of that factor: its sides are the band's divided by it, each rounded up, as gdaladdo makes them, or
 // down, as in cloud-optimized GeoTIFFs. Null when there is none (any more).

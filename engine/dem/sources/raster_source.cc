@@ -3,32 +3,88 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <iterator>
 #include <stdexcept>
+#include <string_view>
 #include <utility>
 
 #include "engine/core/plain_number.h"
 #include "engine/dem/common/source_log.h"
 #include "engine/dem/gdal/gdal_runtime.h"
 #include "engine/dem/gdal/raster_file.h"
-#include "engine/dem/statistics/overview_trust.h"
 
 namespace terrace::dem {
 namespace {
 
-RasterLayout LayoutOf(GDALDataset& dataset, const Georeference& georeference, const VerticalDatum& vertical) {
-  RasterLayout layout;
-  layout.width = georeference.width();
-  layout.height = georeference.height();
-  layout.wraps = georeference.wrap_columns() > 0;
-  layout.columns = layout.wraps ? georeference.wrap_columns() : layout.width;
-  // Where the file names no unit, the reference system does that its owner says the heights are in.
-  const std::string& stated = georeference.vertical_unit();
-  layout.rules = SampleRules::Of(HeightBand(dataset),
-                                 stated.empty() && vertical.geoid != nullptr ? vertical.geoid->unit() : stated);
-  layout.overview_factors = OverviewFactors(HeightBand(dataset));
-  return layout;
+// Why overviews are not averages of valid heights alone, as many have averaged nodata values in them: by what the file
+// and its owner state.
+std::string WhyMisleading(GDALDataset& dataset, const SampleRules& rules) {
+  GDALRasterBand& band = HeightBand(dataset);
+  const auto is_declared = [&](double value) { return rules.nodata && rules.IsSame(value, *rules.nodata); };
+  if (!std::ranges::all_of(rules.extra_nodata, is_declared)) {
+    return "they were made of samples too that `nodata` of the configuration calls voids; declare them in a copy with "
+           "`gdal_translate -a_nodata VALUE in out` and make its overviews";
+  }
+  if (!rules.has_mask) return {};
+  constexpr const char* kOwnMask =
+      "; copy it with `gdal_translate --config GDAL_TIFF_INTERNAL_MASK YES in out` and make the copy's overviews";
+  if (!HasMaskBand(band)) {
+    return "they were made without regard to an alpha band of this type, which GDAL takes for no mask; make it one of "
+           "bytes, and the overviews anew";
+  }
+  if (HasFileEndingWith(dataset, ".msk")) {
+    return std::string("they were made without regard to the mask in a file of its own") + kOwnMask;
+  }
+  for (int i = 0; i < band.GetOverviewCount(); ++i) {
+    GDALRasterBand* const overview = band.GetOverview(i);
+    if (overview == nullptr) continue;
+    GDALRasterBand* const mask = overview->GetMaskBand();
+    const bool has_mask = HasMaskBand(*overview) && mask != nullptr && mask->GetXSize() == overview->GetXSize() &&
+                          mask->GetYSize() == overview->GetYSize();
+    if (!has_mask) return std::string("they have no masks, as the raster has") + kOwnMask;
+  }
+  return {};
+}
+
+// Removes from the layout the overviews that must not be read: those that include voids, by the nodata values of the
+// file and the configuration, and those whose size is not that of a grid of averages. Returns the reason, with the
+// remedy, for people; empty if nothing was removed.
+std::string DropMisleadingOverviews(GDALDataset& dataset, RasterLayout& layout) {
+  if (HeightBand(dataset).GetOverviewCount() == 0) return {};
+  if (layout.overview_factors.empty()) {
+    return "their sides are not those of the raster by 2, 4, 8 .., rounded up or down; `gdal_translate in out` without "
+           "them and `gdaladdo -r average out` make such ones";
+  }
+  std::string why = WhyMisleading(dataset, layout.rules);
+  if (!why.empty()) layout.overview_factors.clear();
+  return why;
+}
+
+// The same, based on the statistics of the raster and its overviews.
+std::string DropMisleadingOverviews(GDALDataset& dataset, const RasterStatistics& statistics, RasterLayout& layout) {
+  if (layout.overview_factors.empty()) return {};
+  int is_declared = 0;
+  HeightBand(dataset).GetNoDataValue(&is_declared);
+  const BlockRange all = statistics.table.Whole();
+  // Cubic and Lanczos kernels go beyond the heights they are given, by less than this.
+  const double overshoot = 0.02 * (static_cast<double>(statistics.highest) - static_cast<double>(statistics.lowest));
+  std::string why;
+  if (layout.rules.has_mask) {
+    if (all.min < statistics.lowest - overshoot || all.max > statistics.highest + overshoot) {
+      why =
+          "they have heights that the raster has not, as if they were made without its mask; copy it with "
+          "`gdal_translate --config GDAL_TIFF_INTERNAL_MASK YES in out` and make the copy's overviews";
+    }
+  } else if (layout.rules.nodata && is_declared == 0 && statistics.voids > 0) {
+    why =
+        "they were made of voids too, which are not declared; declare them in a copy with "
+        "`gdal_translate -a_nodata -32768 in out` and make its overviews";
+  }
+  if (!why.empty()) layout.overview_factors.clear();
+  return why;
 }
 
 RasterInfo Describe(GDALDataset& dataset, const std::string& path, const Georeference& georeference,
@@ -150,7 +206,11 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
   auto vertical = ResolveVertical(options.vertical, source->georeference_, CentreOf(source->georeference_));
   if (!vertical) return MakeError(vertical.error().code, "{}: {}", path, vertical.error().message);
   source->vertical_ = *std::move(vertical);
-  source->layout_ = LayoutOf(**dataset, source->georeference_, source->vertical_);
+  // Where the file names no unit, the reference system does that its owner says the heights are in.
+  const std::string& stated = source->georeference_.vertical_unit();
+  const auto& geoid = source->vertical_.geoid;
+  source->layout_ =
+      RasterLayout::Of(**dataset, source->georeference_, stated.empty() && geoid != nullptr ? geoid->unit() : stated);
   if (const double scale = source->layout_.rules.scale; !std::isfinite(scale) || scale == 0) {
     return MakeError(
         ErrorCode::kInvalidArgument,
@@ -207,6 +267,47 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
   if (auto unchanged = source->CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
   source->KeepTables(*std::move(prepared), prepare, std::move(pages));
   return source;
+}
+
+bool StatisticsPages::Admit(std::size_t bytes) {
+  const std::lock_guard lock(mutex_);
+  if (bytes > kept_left_) return false;
+  kept_left_ -= bytes;
+  return true;
+}
+
+StatisticsPages::Tables StatisticsPages::Find(const void* raster) {
+  const std::lock_guard lock(mutex_);
+  const auto found = by_raster_.find(raster);
+  if (found == by_raster_.end()) return nullptr;
+  pages_.splice(pages_.begin(), pages_, found->second);
+  return found->second->tables;
+}
+
+void StatisticsPages::Add(const void* raster, Tables tables) {
+  const std::size_t bytes = tables->bytes();
+  const std::lock_guard lock(mutex_);
+  if (by_raster_.contains(raster)) return;  // by another thread meanwhile
+  pages_.push_front({raster, std::move(tables), bytes});
+  by_raster_.emplace(raster, pages_.begin());
+  paged_ += bytes;
+  while (paged_ > most_paged_ && pages_.size() > 1) Remove(std::prev(pages_.end()));
+}
+
+void StatisticsPages::Forget(const void* raster) {
+  const std::lock_guard lock(mutex_);
+  if (const auto found = by_raster_.find(raster); found != by_raster_.end()) Remove(found->second);
+}
+
+std::size_t StatisticsPages::paged_bytes() const {
+  const std::lock_guard lock(mutex_);
+  return paged_;
+}
+
+void StatisticsPages::Remove(std::list<Page>::iterator page) {
+  paged_ -= page->bytes;
+  by_raster_.erase(page->raster);
+  pages_.erase(page);
 }
 
 RasterSource::~RasterSource() {

@@ -23,7 +23,7 @@ Result<void> ReadAll(GDALRasterBand& band, const SampleRules& rules, const std::
   constexpr int kRowsAtOnce = 256;
   for (int row = 0; row < raster.height; row += kRowsAtOnce) {
     const int rows = std::min(kRowsAtOnce, raster.height - row);
-    float* out = raster.heights.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(raster.width);
+    float* out = raster.heights.data() + Area(row, raster.width);
     if (auto read = ReadHeights(band, rules, 0, row, raster.width, rows, out, {}); !read) return read;
     if (progress) progress(static_cast<double>(row + rows) / raster.height);
   }
@@ -76,7 +76,7 @@ Result<RasterHeights> ReadRaster(const std::string& path, const ReadOptions& opt
   constexpr std::size_t kRoomOfRow = 32;
   raster.heights.reserve((static_cast<std::size_t>(raster.width) + kRoomOfRow) *
                          static_cast<std::size_t>(raster.height));
-  raster.heights.resize(static_cast<std::size_t>(raster.width) * static_cast<std::size_t>(raster.height));
+  raster.heights.resize(Area(raster.width, raster.height));
   const auto damaged = [&](const Error& error) {
     return MakeError(error.code, "{}: {}; the file may be damaged: check it with gdalinfo -checksum", path,
                      error.message);

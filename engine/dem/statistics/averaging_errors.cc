@@ -4,13 +4,15 @@
 #include <bit>
 #include <cmath>
 
+#include "engine/dem/dem_types.h"
+
 namespace terrace::dem {
 
 AveragingErrors::AveragingErrors(int width, int height) {
   for (int factor = 2;; factor *= 2) {
     const auto blocks = [&](int pixels) { return (pixels + BlockPixels(factor) - 1) / BlockPixels(factor); };
     Level level{blocks(width), blocks(height), {}};
-    level.errors.resize(static_cast<std::size_t>(level.columns) * static_cast<std::size_t>(level.rows));
+    level.errors.resize(Area(level.columns, level.rows));
     levels_.push_back(std::move(level));
     if (factor >= std::max(width, height)) return;
   }
@@ -32,8 +34,7 @@ float AveragingErrors::Largest(int factor, double west, double north, double eas
   float largest = 0;
   for (int row = block(north, level.rows); row <= block(south, level.rows); ++row) {
     for (int column = block(west, level.columns); column <= block(east, level.columns); ++column) {
-      largest = std::max(largest, level.errors[static_cast<std::size_t>(row) * static_cast<std::size_t>(level.columns) +
-                                               static_cast<std::size_t>(column)]);
+      largest = std::max(largest, level.errors[Area(row, level.columns) + static_cast<std::size_t>(column)]);
     }
   }
   return largest;

@@ -8,6 +8,8 @@
 #include <cstddef>
 #include <vector>
 
+#include "engine/dem/dem_types.h"
+
 namespace terrace::dem {
 
 // Filled by one thread, then immutable and thread-safe.
@@ -31,8 +33,7 @@ class AveragingErrors {
 
   void Raise(int factor, int block_column, int block_row, float error) {
     Level& level = levels_[IndexOf(factor)];
-    float& known = level.errors[static_cast<std::size_t>(block_row) * static_cast<std::size_t>(level.columns) +
-                                static_cast<std::size_t>(block_column)];
+    float& known = level.errors[Area(block_row, level.columns) + static_cast<std::size_t>(block_column)];
     if (error > known) known = error;
   }
 

@@ -5,6 +5,7 @@
 #include <limits>
 #include <utility>
 
+#include "engine/dem/dem_types.h"
 #include "engine/dem/raster/grid_cells.h"
 #include "engine/dem/statistics/averaging_errors.h"
 
@@ -28,9 +29,7 @@ struct Samples {
   Chunk box;
   std::vector<float> heights;
 
-  const float* Row(int row) const {
-    return heights.data() + static_cast<std::size_t>(row - box.row) * static_cast<std::size_t>(box.cols);
-  }
+  const float* Row(int row) const { return heights.data() + Area(row - box.row, box.cols); }
 };
 
 // False where the file stores nothing there and what GDAL puts in its place is a void.
@@ -92,7 +91,7 @@ ContentHash HashOf(const Samples& samples, const Chunk& chunk) {
 // Sums of the blocks of a box of samples that starts where a block does and ends with a block or the raster.
 std::vector<BlockSum> SumsOf(const Samples& samples, const Chunk& box, int factor) {
   const int columns = DivideUp(box.cols, factor);
-  std::vector<BlockSum> sums(static_cast<std::size_t>(columns) * static_cast<std::size_t>(DivideUp(box.rows, factor)));
+  std::vector<BlockSum> sums(Area(columns, DivideUp(box.rows, factor)));
   for (int r = 0; r < box.rows; ++r) {
     const float* row = samples.Row(box.row + r) + (box.col - samples.box.col);
     BlockSum* to = sums.data() + std::ptrdiff_t{r / factor} * columns;
@@ -283,10 +282,7 @@ Chunk ChunkGrid::At(int index) const {
 
 ChunkStatistics VoidStatistics(const Chunk& chunk, const RasterLayout& layout) {
   ChunkStatistics statistics;
-  const auto blocks = [&](int pixels) {
-    return static_cast<std::size_t>(DivideUp(chunk.cols, pixels)) *
-           static_cast<std::size_t>(DivideUp(chunk.rows, pixels));
-  };
+  const auto blocks = [&](int pixels) { return Area(DivideUp(chunk.cols, pixels), DivideUp(chunk.rows, pixels)); };
   BlockRange voids;
   voids.has_voids = true;
   statistics.ranges.assign(blocks(RangeTable::kBlock), voids);
@@ -313,7 +309,7 @@ Result<ChunkStatistics> ReadChunkStatistics(GDALDataset& dataset, const RasterLa
   ++read;
   Samples samples{WithHalo(chunk, layout), {}};
   const Chunk& box = samples.box;
-  samples.heights.resize(static_cast<std::size_t>(box.cols) * static_cast<std::size_t>(box.rows));
+  samples.heights.resize(Area(box.cols, box.rows));
   if (auto done = ReadHeights(band, layout.rules, box.col, box.row, box.cols, box.rows, samples.heights.data(), stop);
       !done) {
     return tl::unexpected(done.error());

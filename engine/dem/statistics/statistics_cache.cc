@@ -18,6 +18,7 @@
 
 #include "engine/core/bytes.h"
 #include "engine/dem/common/source_log.h"
+#include "engine/dem/dem_types.h"
 #include "engine/dem/statistics/statistics_codec.h"
 
 namespace terrace::dem {
@@ -83,9 +84,7 @@ std::uint64_t SizeOf(int file) {
 struct AveragesPlace {
   std::uint64_t offset = 0;
   int columns = 0, rows = 0;
-  std::size_t bytes() const {
-    return static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows) * sizeof(float);
-  }
+  std::size_t bytes() const { return Area(columns, rows) * sizeof(float); }
 };
 AveragesPlace PlaceOf(const Chunk& chunk, const RasterLayout& layout, int factor) {
   AveragesPlace place;

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "engine/core/plain_number.h"
+#include "engine/dem/dem_types.h"
 #include "engine/dem/statistics/raster_chunk.h"
 
 namespace terrace::dem {
@@ -59,7 +60,7 @@ class BandScanner {
         top_ = std::max(row - kReach, 0);
         wide_ = std::min(col + kChunk + kReach, band_.GetXSize()) - left_;
         high_ = std::min(row + kChunk + kReach, band_.GetYSize()) - top_;
-        samples_.resize(static_cast<std::size_t>(wide_) * static_cast<std::size_t>(high_));
+        samples_.resize(Area(wide_, high_));
         auto read = ReadHeights(band_, rules_, left_, top_, wide_, high_, samples_.data(), stop_);
         if (!read) return read;
         FindVoidsInRows();
@@ -104,9 +105,7 @@ class BandScanner {
   }
 
  private:
-  std::size_t Index(int c, int r) const {
-    return static_cast<std::size_t>(r) * static_cast<std::size_t>(wide_) + static_cast<std::size_t>(c);
-  }
+  std::size_t Index(int c, int r) const { return Area(r, wide_) + static_cast<std::size_t>(c); }
 
   void FindVoidsInRows() {
     void_in_row_.assign(samples_.size(), 0);

@@ -24,7 +24,7 @@
 #include "config/config_watch.h"
 #include "config/options/options.h"
 #include "config/parse.h"
-#include "engine/dem/gdal/gdal_settings.h"
+#include "engine/dem/gdal/gdal_runtime.h"
 #include "server/cli/common/command.h"
 #include "server/cli/common/fail.h"
 #include "server/cli/common/open_dataset.h"

@@ -21,6 +21,16 @@ struct Thing {
   static inline std::atomic<int> alive{0};
 };
 
+// As if it had been in use.
+void Keep(IdlePool<Thing>& pool, std::vector<int> numbers) {
+  std::vector<IdlePool<Thing>::Handle> handles;
+  for (const int number : numbers) {
+    handles.push_back(pool.Take());
+    handles.back().Set(std::make_shared<Thing>(number));
+  }
+  for (auto& handle : handles) auto done = std::move(handle);
+}
+
 class IdlePools : public testing::Test {
  protected:
   ~IdlePools() override { SetMostIdle(std::numeric_limits<std::size_t>::max()); }
@@ -28,46 +38,46 @@ class IdlePools : public testing::Test {
 
 TEST_F(IdlePools, GiveBackTheOneUsedLast) {
   IdlePool<Thing> pool;
-  EXPECT_EQ(pool.Take().item, nullptr);
-  pool.Keep({std::make_shared<Thing>(1), 0});
-  pool.Keep({std::make_shared<Thing>(2), 0});
+  EXPECT_FALSE(pool.Take());
+  Keep(pool, {1, 2});
   const auto last = pool.Take();
-  ASSERT_NE(last.item, nullptr);
-  EXPECT_EQ(last.item->number, 2);
+  ASSERT_TRUE(last);
+  EXPECT_EQ(last->number, 2);
 }
 
 TEST_F(IdlePools, LetGoOfThoseUsedLongestAgoWhosesoeverTheyAre) {
   SetMostIdle(3);
   IdlePool<Thing> one, other;
-  for (int i = 0; i < 3; ++i) one.Keep({std::make_shared<Thing>(i), 0});
-  one.Keep(one.Take());
-  for (int i = 10; i < 12; ++i) other.Keep({std::make_shared<Thing>(i), 0});
+  Keep(one, {0, 1, 2});
+  EXPECT_TRUE(one.Take());
+  Keep(other, {10, 11});
   EXPECT_EQ(Thing::alive, 3);
   const auto kept = one.Take();
-  ASSERT_NE(kept.item, nullptr);
-  EXPECT_EQ(kept.item->number, 2);
-  EXPECT_EQ(one.Take().item, nullptr);
+  ASSERT_TRUE(kept);
+  EXPECT_EQ(kept->number, 2);
+  EXPECT_FALSE(one.Take());
   SetMostIdle(1);
   EXPECT_EQ(Thing::alive, 2) << "what is in use does not count";
 }
 
 TEST_F(IdlePools, DoNotTakeBackWhatWasInUseWhenTheyWereCleared) {
   IdlePool<Thing> pool;
-  pool.Keep({std::make_shared<Thing>(1), 0});
-  auto in_use = pool.Take();
-  pool.Clear();
-  pool.Keep(std::move(in_use));
+  Keep(pool, {1});
+  {
+    const auto in_use = pool.Take();
+    EXPECT_TRUE(in_use);
+    pool.Clear();
+  }
   EXPECT_EQ(Thing::alive, 0);
-  const auto none = pool.Take();
-  EXPECT_EQ(none.item, nullptr);
-  pool.Keep({std::make_shared<Thing>(2), none.epoch});
-  EXPECT_NE(pool.Take().item, nullptr);
+  EXPECT_FALSE(pool.Take());
+  Keep(pool, {2});
+  EXPECT_TRUE(pool.Take());
 }
 
 TEST_F(IdlePools, TakeWhatTheyHaveWithThem) {
   {
     IdlePool<Thing> pool;
-    pool.Keep({std::make_shared<Thing>(1), 0});
+    Keep(pool, {1});
   }
   EXPECT_EQ(Thing::alive, 0);
 }
@@ -81,9 +91,8 @@ TEST_F(IdlePools, AreForManyThreads) {
       for (int i = 0; i < 2000; ++i) {
         IdlePool<Thing>& pool = pools[(t + i) % 3];
         auto taken = pool.Take();
-        if (taken.item == nullptr) taken.item = std::make_shared<Thing>(i);
+        if (!taken) taken.Set(std::make_shared<Thing>(i));
         if (i % 100 == 0) pool.Clear();
-        pool.Keep(std::move(taken));
       }
     });
   }

@@ -7,7 +7,7 @@
 #include <filesystem>
 
 #include "engine/dem/crs/level_plan.h"
-#include "engine/dem/raster/overview_axis.h"
+#include "engine/dem/raster/sample_grid.h"
 #include "engine/dem/sources/raster_source.h"
 #include "tests/engine/dem/dem_fixture.h"
 
