@@ -8,62 +8,39 @@
 #include <vector>
 
 namespace terrace::dem {
-namespace {
-
-class Queue {
- public:
-  Queue(std::size_t count, const std::function<bool(std::size_t)>& work) : count_(count), work_(work) {}
-
-  void Run() noexcept {
-    for (std::size_t i = Take(true); i < count_;) {
-      bool goes_on = false;
-      try {
-        goes_on = work_(i);
-      } catch (...) {
-        const std::lock_guard lock(mutex_);
-        if (thrown_ == nullptr || i < thrower_) {
-          thrown_ = std::current_exception();
-          thrower_ = i;
-        }
-      }
-      i = Take(goes_on);
-    }
-  }
-
-  void Rethrow() const {
-    if (thrown_ != nullptr) std::rethrow_exception(thrown_);
-  }
-
- private:
-  std::size_t Take(bool goes_on) {
-    const std::lock_guard lock(mutex_);
-    if (!goes_on) next_ = count_;
-    return next_ < count_ ? next_++ : count_;
-  }
-
-  const std::size_t count_;
-  const std::function<bool(std::size_t)>& work_;
-  std::mutex mutex_;
-  std::size_t next_ = 0;  // guarded by mutex_, as are these
-  std::size_t thrower_ = 0;
-  std::exception_ptr thrown_;  // what work(thrower_) threw
-};
-
-}  // namespace
 
 void ForEachOnAllCores(std::size_t count, const std::function<bool(std::size_t)>& work) {
-  Queue queue(count, work);
+  std::mutex mutex;  // guards what follows
+  std::size_t next = 0, thrower = 0;
+  std::exception_ptr thrown;  // what work(thrower) threw
+  const auto take = [&](bool goes_on) {
+    const std::lock_guard lock(mutex);
+    if (!goes_on) next = count;
+    return next < count ? next++ : count;
+  };
+  const auto run = [&]() noexcept {
+    for (std::size_t i = take(true); i < count;) {
+      bool goes_on = false;
+      try {
+        goes_on = work(i);
+      } catch (...) {
+        const std::lock_guard lock(mutex);
+        if (thrown == nullptr || i < thrower) thrown = std::current_exception(), thrower = i;
+      }
+      i = take(goes_on);
+    }
+  };
   std::vector<std::jthread> threads;
   const std::size_t cores = std::max(1U, std::thread::hardware_concurrency());
   try {
     threads.reserve(cores);
-    while (threads.size() + 1 < std::min(cores, count)) threads.emplace_back([&queue] { queue.Run(); });
+    while (threads.size() + 1 < std::min(cores, count)) threads.emplace_back(run);
   } catch (const std::system_error&) {
     // Those that there are do it.
   }
-  queue.Run();
+  run();
   threads.clear();
-  queue.Rethrow();
+  if (thrown != nullptr) std::rethrow_exception(thrown);
 }
 
 }  // namespace terrace::dem

@@ -31,53 +31,12 @@ class Imagery::Impl {
  public:
   Impl(ImagePool images, Georeference where) : pool(std::move(images)), georeference(std::move(where)) {}
 
-  Result<std::optional<TilePicture>> Read(const geo::TileKey& key, int side, const std::stop_token& stop);
-
   ImagePool pool;
   const Georeference georeference;
   SourceSpacing spacing;
   Footprint footprint;  // padded: outside it there is no picture
   std::uint64_t fingerprint = 0;
 };
-
-Result<std::optional<TilePicture>> Imagery::Impl::Read(const geo::TileKey& key, int side, const std::stop_token& stop) {
-  if (auto unchanged = pool.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
-  const geo::Lattice lattice{key.level, side};
-  const double extent = lattice.cells * lattice.StepDegrees();
-  if (!footprint.Touches(lattice.Longitude(lattice.FirstColumn(key)), lattice.Latitude(lattice.FirstRow(key)), extent,
-                         extent)) {
-    return std::nullopt;
-  }
-  const int factor = std::min(AveragingFactor(SamplesPerCell(lattice, spacing)), pool.MostAveraged());
-  auto image = pool.Borrow(factor);
-  if (!image) return tl::unexpected(image.error());
-
-  std::vector<Position> positions =
-      CellCentrePositions(georeference, footprint, lattice, key, kPositionTolerance * factor);
-  bool is_there = false;
-  for (Position& p : positions) {
-    const bool is_inside = p.x >= 0 && p.x <= georeference.width() && p.y >= 0 && p.y <= georeference.height();
-    is_there = is_there || is_inside;
-    p = is_inside ? Position{p.x / image->size->across, p.y / image->size->down} : Position{NAN, NAN};
-  }
-  if (!is_there) return std::nullopt;
-  const auto bins = ImageBins::Read(*image->image, factor / image->size->factor, positions, stop);
-  if (!bins) return MakeError(bins.error().code, "tile {}: {}", geo::ToString(key), bins.error().message);
-  if (auto unchanged = pool.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
-
-  TilePicture picture;
-  picture.side = side;
-  picture.rgb.resize(3 * positions.size());
-  is_there = false;
-  for (std::size_t i = 0; i < positions.size(); ++i) {
-    const ColorSample color = bins->At(positions[i]);
-    is_there = is_there || color[3] != 0;
-    const auto pixels = static_cast<std::size_t>(side);
-    std::uint8_t* const out = picture.rgb.data() + 3 * ((pixels - 1 - i / pixels) * pixels + i % pixels);
-    std::copy_n(color[3] != 0 ? color.data() : kNoPicture.data(), 3, out);
-  }
-  return is_there ? std::optional(std::move(picture)) : std::nullopt;
-}
 
 Imagery::Imagery(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Imagery::~Imagery() = default;
@@ -119,7 +78,43 @@ int Imagery::SideOf(int level, int most) const {
 
 Result<std::optional<TilePicture>> Imagery::Read(const geo::TileKey& key, int side, std::stop_token stop) const {
   TERRACE_CHECK(geo::IsValid(key) && IsSide(side));
-  return impl_->Read(key, side, stop);
+  auto& [pool, georeference, spacing, footprint, _] = *impl_;
+  if (auto unchanged = pool.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
+  const geo::Lattice lattice{key.level, side};
+  const double extent = lattice.cells * lattice.StepDegrees();
+  if (!footprint.Touches(lattice.Longitude(lattice.FirstColumn(key)), lattice.Latitude(lattice.FirstRow(key)), extent,
+                         extent)) {
+    return std::nullopt;
+  }
+  const int factor = std::min(AveragingFactor(SamplesPerCell(lattice, spacing)), pool.MostAveraged());
+  auto image = pool.Borrow(factor);
+  if (!image) return tl::unexpected(image.error());
+
+  std::vector<Position> positions =
+      CellCentrePositions(georeference, footprint, lattice, key, kPositionTolerance * factor);
+  bool is_there = false;
+  for (Position& p : positions) {
+    const bool is_inside = p.x >= 0 && p.x <= georeference.width() && p.y >= 0 && p.y <= georeference.height();
+    is_there = is_there || is_inside;
+    p = is_inside ? Position{p.x / image->size->across, p.y / image->size->down} : Position{NAN, NAN};
+  }
+  if (!is_there) return std::nullopt;
+  const auto bins = ImageBins::Read(*image->image, factor / image->size->factor, positions, stop);
+  if (!bins) return MakeError(bins.error().code, "tile {}: {}", geo::ToString(key), bins.error().message);
+  if (auto unchanged = pool.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
+
+  TilePicture picture;
+  picture.side = side;
+  picture.rgb.resize(3 * positions.size());
+  is_there = false;
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    const ColorSample color = bins->At(positions[i]);
+    is_there = is_there || color[3] != 0;
+    const auto pixels = static_cast<std::size_t>(side);
+    std::uint8_t* const out = picture.rgb.data() + 3 * ((pixels - 1 - i / pixels) * pixels + i % pixels);
+    std::copy_n(color[3] != 0 ? color.data() : kNoPicture.data(), 3, out);
+  }
+  return is_there ? std::optional(std::move(picture)) : std::nullopt;
 }
 
 std::uint64_t Imagery::fingerprint() const { return impl_->fingerprint; }

@@ -27,8 +27,6 @@ class WaterRaster::Impl {
   Impl(std::string path_of_file, StampedFiles files, Georeference where)
       : path(std::move(path_of_file)), handles(path, std::move(files)), georeference(std::move(where)) {}
 
-  Result<std::vector<std::uint8_t>> Read(const geo::TileKey& key, const std::stop_token& stop);
-
   const std::string path;
   HandlePool handles;
   const Georeference georeference;
@@ -37,50 +35,11 @@ class WaterRaster::Impl {
   Footprint footprint;  // padded: outside it there is no water
   std::uint64_t fingerprint = 0;
 
- private:
   bool IsInside(const Position& position) const {  // false for NaN
     const bool row = position.y >= 0 && position.y <= layout.height;
     return row && (layout.wraps ? !std::isnan(position.x) : position.x >= 0 && position.x <= layout.width);
   }
 };
-
-Result<std::vector<std::uint8_t>> WaterRaster::Impl::Read(const geo::TileKey& key, const std::stop_token& stop) {
-  std::vector<std::uint8_t> pixels(std::size_t{kSide} * kSide, 0);
-  const geo::Lattice lattice{key.level, kSide};
-  const double samples_per_pixel = SamplesPerCell(lattice, spacing);
-  const int factor = AveragingFactor(samples_per_pixel);
-  // From all land to all water in one pixel, however far apart the samples are.
-  const double sharpness = std::max(1.0, factor / samples_per_pixel);
-
-  const std::vector<Position> positions =
-      CellCentrePositions(georeference, footprint, lattice, key, kWaterPositionTolerance * factor);
-  const GridAxes axes{
-      {layout.columns, factor, layout.wraps}, {layout.height, factor, false}, layout.width, layout.height};
-  std::vector<GridCell> cells;
-  std::vector<std::size_t> targets;  // pixel of each cell
-  for (std::size_t i = 0; i < positions.size(); ++i) {
-    if (!IsInside(positions[i])) continue;
-    cells.push_back(axes.CellAt(positions[i]));
-    const std::size_t row_from_south = i / kSide;
-    targets.push_back((kSide - 1 - row_from_south) * kSide + i % kSide);
-  }
-  // Files are looked at even where nothing must be read: no tile may outlive its mask.
-  auto handle = handles.Borrow();
-  if (!handle) return tl::unexpected(handle.error());
-  if (cells.empty()) return pixels;
-  const GridWindow window = WindowOf(cells, axes);
-  const auto shares = ReadGrid(**handle, layout, factor, window, stop);
-  if (auto unchanged = handles.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
-  if (!shares) {
-    return MakeError(shares.error().code, "{}: tile {}: {}", path, geo::ToString(key), shares.error().message);
-  }
-  for (std::size_t i = 0; i < cells.size(); ++i) {
-    const double share = Interpolate(*shares, window, cells[i]).value_or(0);
-    const double sharp = std::clamp(0.5 + (share - 0.5) * sharpness, 0.0, 1.0);
-    pixels[targets[i]] = static_cast<std::uint8_t>(std::lround(255 * sharp));
-  }
-  return pixels;
-}
 
 WaterRaster::WaterRaster(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 WaterRaster::~WaterRaster() = default;
@@ -115,7 +74,42 @@ Result<std::unique_ptr<WaterRaster>> WaterRaster::Open(const std::string& path, 
 
 Result<std::vector<std::uint8_t>> WaterRaster::Read(const geo::TileKey& key, std::stop_token stop) const {
   TERRACE_CHECK(geo::IsValid(key));
-  return impl_->Read(key, stop);
+  auto& [path, handles, georeference, spacing, layout, footprint, _] = *impl_;
+  std::vector<std::uint8_t> pixels(std::size_t{kSide} * kSide, 0);
+  const geo::Lattice lattice{key.level, kSide};
+  const double samples_per_pixel = SamplesPerCell(lattice, spacing);
+  const int factor = AveragingFactor(samples_per_pixel);
+  // From all land to all water in one pixel, however far apart the samples are.
+  const double sharpness = std::max(1.0, factor / samples_per_pixel);
+
+  const std::vector<Position> positions =
+      CellCentrePositions(georeference, footprint, lattice, key, kWaterPositionTolerance * factor);
+  const GridAxes axes{
+      {layout.columns, factor, layout.wraps}, {layout.height, factor, false}, layout.width, layout.height};
+  std::vector<GridCell> cells;
+  std::vector<std::size_t> targets;  // pixel of each cell
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    if (!impl_->IsInside(positions[i])) continue;
+    cells.push_back(axes.CellAt(positions[i]));
+    const std::size_t row_from_south = i / kSide;
+    targets.push_back((kSide - 1 - row_from_south) * kSide + i % kSide);
+  }
+  // Files are looked at even where nothing must be read: no tile may outlive its mask.
+  auto handle = handles.Borrow();
+  if (!handle) return tl::unexpected(handle.error());
+  if (cells.empty()) return pixels;
+  const GridWindow window = WindowOf(cells, axes);
+  const auto shares = ReadGrid(**handle, layout, factor, window, stop);
+  if (auto unchanged = handles.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
+  if (!shares) {
+    return MakeError(shares.error().code, "{}: tile {}: {}", path, geo::ToString(key), shares.error().message);
+  }
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    const double share = Interpolate(*shares, window, cells[i]).value_or(0);
+    const double sharp = std::clamp(0.5 + (share - 0.5) * sharpness, 0.0, 1.0);
+    pixels[targets[i]] = static_cast<std::uint8_t>(std::lround(255 * sharp));
+  }
+  return pixels;
 }
 
 std::uint64_t WaterRaster::fingerprint() const { return impl_->fingerprint; }

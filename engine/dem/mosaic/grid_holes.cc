@@ -8,14 +8,16 @@
 namespace terrace::dem {
 namespace {
 
-std::vector<float> Cut(const VoidGrid& grid, const GridWindow& window) {
-  std::vector<float> heights;
-  heights.reserve(static_cast<std::size_t>(window.columns * window.rows));
+// Those of `all`, the values of a grid, that lie in a window.
+template <typename T>
+std::vector<T> Cut(const VoidGrid& grid, const std::vector<T>& all, const GridWindow& window) {
+  std::vector<T> values;
+  values.reserve(static_cast<std::size_t>(window.columns * window.rows));
   for (std::int64_t row = window.row; row < window.row + window.rows; ++row) {
-    const auto first = grid.heights.begin() + static_cast<std::ptrdiff_t>(grid.At(window.column, row));
-    heights.insert(heights.end(), first, first + window.columns);
+    const auto first = all.begin() + static_cast<std::ptrdiff_t>(grid.At(window.column, row));
+    values.insert(values.end(), first, first + window.columns);
   }
-  return heights;
+  return values;
 }
 
 // Averages beside a hole may be of a part of their block alone, and lie elsewhere than at its centre: a guess does
@@ -58,13 +60,8 @@ Result<VoidGrid> RasterGrid::ReadVoids(int factor, const GridWindow& window, boo
   const auto heights = ReadBlocks(factor, wide, stop);
   if (!heights) return tl::unexpected(heights.error());
   const auto holes = holes_in(wide, *heights);
-  VoidGrid grid{window, {}, {}};
-  const VoidGrid around{wide, *heights, {}};
-  grid.heights = Cut(around, window);
-  for (std::int64_t row = window.row; row < window.row + window.rows; ++row) {
-    const auto first = holes.begin() + static_cast<std::ptrdiff_t>(around.At(window.column, row));
-    grid.unknown.insert(grid.unknown.end(), first, first + window.columns);
-  }
+  const VoidGrid around{wide, {}, {}};
+  VoidGrid grid{window, Cut(around, *heights, window), Cut(around, holes, window)};
   WidenHoles(wide, *heights, holes, Columns(factor).count(), Rows(factor).count(), wraps_, grid);
   return grid;
 }
@@ -122,7 +119,7 @@ Result<std::vector<float>> RasterGrid::ReadSmooth(int factor, const GridWindow& 
     }
     const auto guessed = GuessLarge(factor, window, regions, *grid, stop);
     if (!guessed) return tl::unexpected(guessed.error());
-    return Cut(*grid, window);
+    return Cut(*grid, grid->heights, window);
   }
 }
 
