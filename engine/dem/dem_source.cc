@@ -221,6 +221,12 @@ int DemSource::max_level() const { return impl_->info.max_level; }
 geo::Lattice DemSource::LatticeOf(int level) const { return impl_->LatticeOf(level); }
 std::uint64_t DemSource::fingerprint() const { return impl_->fingerprint; }
 
+bool DemSource::has_lost_cache() const {
+  return std::ranges::any_of(impl_->grids, [](const RasterGrid& grid) {
+    return std::ranges::any_of(grid.members(), [](const GridMember& member) { return member.raster->has_lost_cache(); });
+  });
+}
+
 StampedFiles DemSource::files() const {
   StampedFiles all;
   std::set<const Geoid*> geoids;
