@@ -78,7 +78,7 @@ std::uint64_t GenerationOf(const config::DatasetConfig& wanted, const tiler::Dat
 
 }  // namespace
 
-Result<std::unique_ptr<dem::DemSource>> OpenSource(const config::DatasetConfig& wanted, const std::string& cache_dir,
+Result<std::unique_ptr<dem::DemSource>> OpenSource(const config::DatasetConfig& wanted, const dem::RasterCache& cache,
                                                    const std::function<void(double)>& progress, std::stop_token stop,
                                                    std::function<void(const Error&)> fault) {
   dem::DemOptions options;
@@ -87,7 +87,7 @@ Result<std::unique_ptr<dem::DemSource>> OpenSource(const config::DatasetConfig& 
   options.floor = wanted.floor;
   options.max_void_gap = wanted.max_void_gap;
   options.voids = wanted.voids;
-  options.cache_dir = cache_dir;
+  options.cache = cache;
   options.feather = wanted.feather;
   options.progress = progress;
   options.stop = std::move(stop);
@@ -95,10 +95,10 @@ Result<std::unique_ptr<dem::DemSource>> OpenSource(const config::DatasetConfig& 
   return dem::DemSource::Open(FilesOf(wanted), options);
 }
 
-Result<tiler::Dataset> OpenDataset(const config::DatasetConfig& wanted, const std::string& cache_dir,
+Result<tiler::Dataset> OpenDataset(const config::DatasetConfig& wanted, const dem::RasterCache& cache,
                                    const std::string& version, const std::function<void(double)>& progress,
                                    std::stop_token stop) {
-  auto source = OpenSource(wanted, cache_dir, progress, std::move(stop));
+  auto source = OpenSource(wanted, cache, progress, std::move(stop));
   if (!source) return tl::unexpected(source.error());
   const dem::GeoBounds bounds = (*source)->info().bounds;
   auto water = OpenWater(wanted.water, bounds);

@@ -10,6 +10,7 @@
 #include <iostream>
 
 #include "engine/geo/tile_cover.h"
+#include "engine/dem/statistics/cache_folder.h"
 #include "tests/support/source_dir.h"
 
 namespace terrace::dem {
@@ -126,5 +127,7 @@ std::vector<std::string> RealRasters() {
           "SainteHelens.dem",
           "n43e007.dt0"};
 }
+
+RasterCache CacheIn(const std::string& folder) { return {std::make_shared<CacheFolder>(folder), nullptr}; }
 
 }  // namespace terrace::dem
