@@ -33,7 +33,7 @@ DEM = ["engine/dem/dem_types.h", "engine/dem/common", "engine/dem/gdal", "engine
 DOORS = {front + "/" + name: front for front, names in {
     "engine/dem": ("dem_types.h", "common/box_index.h", "crs/geodesic_path.h", "gdal/file_stamp.h", "gdal/gdal_settings.h",
                    "gdal/source_policy.h", "image/imagery.h", "image/raster_colors.h", "image/water_raster.h", "sources/read_raster.h",
-                   "statistics/cache_folder.h", "statistics/memory_averages.h"),
+                   "statistics/averages_budget.h", "statistics/cache_folder.h"),
     "config": ("config.h", "common/cache_place.h", "common/listen_address.h", "common/nearest_name.h", "common/token_hash.h", "common/working_directory.h",
                "options/options.h"),
 }.items() for name in names}

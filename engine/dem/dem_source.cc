@@ -223,7 +223,8 @@ std::uint64_t DemSource::fingerprint() const { return impl_->fingerprint; }
 
 bool DemSource::has_lost_cache() const {
   return std::ranges::any_of(impl_->grids, [](const RasterGrid& grid) {
-    return std::ranges::any_of(grid.members(), [](const GridMember& member) { return member.raster->has_lost_cache(); });
+    return std::ranges::any_of(grid.members(),
+                               [](const GridMember& member) { return member.raster->has_lost_cache(); });
   });
 }
 

@@ -41,12 +41,13 @@ struct PreparedRaster {
   std::shared_ptr<const MemoryAverages> memory_averages;  // where the file is not stored; null: none
   std::string cache_file;                                 // empty: not stored
   std::shared_ptr<const CacheFolder::Use> use;            // of the cache file, stored or not; null: no cache folder
-  StatisticsShape shape;                           // of the cache file
+  StatisticsShape shape;                                  // of the cache file
   Preparation preparation;
 };
 
 // `layout`: as the file and the configuration state it. Where the cache folder cannot keep the statistics, or there is
-// none, averages are kept in memory as far as they fit. Errors name the file. kCancelled: stopped; finished chunks stay in the cache.
+// none, averages are kept in memory as far as they fit. Errors name the file. kCancelled: stopped; finished chunks stay
+// in the cache.
 Result<PreparedRaster> PrepareRaster(GDALDataset& dataset, const RasterLayout& layout, const std::string& path,
                                      const StampedFiles& files, const PrepareOptions& options);
 

@@ -90,8 +90,8 @@ void CacheFolder::Use::Fail(const std::string& reason) const {
   const bool is_first = folder_->troubles_.empty();
   folder_->troubles_[this] = reason;
   if (is_first) {
-    spdlog::warn("cache_dir {}: {}: {}; averages of such sources are kept in memory as far as they fit",
-                 folder_->path_, name_, reason);
+    spdlog::warn("cache_dir {}: {}: {}; averages of such sources are kept in memory as far as they fit", folder_->path_,
+                 name_, reason);
   }
 }
 

@@ -2,8 +2,8 @@
 //
 // Several processes may share it. Before a file grows, those that were not used for longest are removed until there is
 // room. A file counts as used when it is loaded, and once an hour while averages are read from it; its time of
-// modification tells when. Files in use by this process stay. What terrace did not write is neither counted nor removed:
-// a file is known by its name and by its first bytes.
+// modification tells when. Files in use by this process stay. What terrace did not write is neither counted nor
+// removed: a file is known by its name and by its first bytes.
 #pragma once
 
 #include <chrono>
@@ -70,9 +70,9 @@ class CacheFolder {
   const std::string path_;
   const std::uint64_t max_bytes_;
   mutable std::mutex mutex_;
-  std::multiset<std::string> in_use_;              // names; guarded by mutex_, as are these
-  std::map<const Use*, std::string> troubles_;     // reasons
-  std::uint64_t bytes_ = 0, since_scan_ = 0;       // of all files, as far as known; reserved since the last scan
+  std::multiset<std::string> in_use_;           // names; guarded by mutex_, as are these
+  std::map<const Use*, std::string> troubles_;  // reasons
+  std::uint64_t bytes_ = 0, since_scan_ = 0;    // of all files, as far as known; reserved since the last scan
   std::optional<std::chrono::steady_clock::time_point> scanned_at_;
   std::multimap<std::int64_t, File> oldest_first_;  // files that are not in use, of the last scan, by their time
 };

@@ -37,7 +37,6 @@ AveragesPlace PlaceOf(const Chunk& chunk, const RasterLayout& layout, int factor
   }
 }
 
-
 }  // namespace
 
 CachedAverages::CachedAverages(const OpenFile& file, std::string path, RasterLayout layout,

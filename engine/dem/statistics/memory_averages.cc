@@ -7,14 +7,6 @@
 
 namespace terrace::dem {
 
-bool AveragesBudget::Take(std::size_t bytes) {
-  std::size_t left = left_;
-  while (left >= bytes) {
-    if (left_.compare_exchange_weak(left, left - bytes)) return true;
-  }
-  return false;
-}
-
 MemoryAverages::MemoryAverages(std::shared_ptr<AveragesBudget> budget, std::vector<Level> levels, std::size_t bytes)
     : budget_(std::move(budget)), levels_(std::move(levels)), bytes_(bytes) {}
 

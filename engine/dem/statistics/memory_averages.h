@@ -1,31 +1,15 @@
 // Averages of a raster in memory, where no cache folder keeps them.
 #pragma once
 
-#include <atomic>
 #include <cstddef>
 #include <memory>
 #include <vector>
 
+#include "engine/dem/statistics/averages_budget.h"
 #include "engine/dem/statistics/raster_chunk.h"
 #include "engine/dem/statistics/raster_statistics.h"
 
 namespace terrace::dem {
-
-// Bytes for averages of all rasters of a process. Thread-safe.
-class AveragesBudget {
- public:
-  static constexpr std::size_t kDefaultBytes = std::size_t{128} << 20;
-
-  explicit AveragesBudget(std::size_t bytes = kDefaultBytes) : left_(bytes) {}
-
-  std::size_t left() const { return left_; }
-  // False: there are not so many left.
-  bool Take(std::size_t bytes);
-  void Give(std::size_t bytes) { left_ += bytes; }
-
- private:
-  std::atomic<std::size_t> left_;
-};
 
 // Those of KeptFactors from the least factor on that fits. Filled by one thread, then immutable and thread-safe.
 class MemoryAverages {

@@ -63,7 +63,8 @@ struct ChunkStatistics {
   std::vector<std::vector<BlockSum>> sums;   // of factors 128 .. 1024, as the averages
 
   bool is_void() const { return valid == 0; }
-  // Of any of these factors (KeptFactors), and then of all of them. A void chunk has some where an overview has heights.
+  // Of any of these factors (KeptFactors), and then of all of them. A void chunk has some where an overview has
+  // heights.
   bool has_averages(unsigned factors) const;
 };
 

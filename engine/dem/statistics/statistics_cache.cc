@@ -149,7 +149,8 @@ std::optional<CachedStatistics> LoadStatistics(const std::string& path, const St
     case HeaderState::kDamaged:
       return damaged("its header");
     case HeaderState::kOther:
-      LogSource(SourceLog::Level::kInfo, path, "was made from another state of the source, or by another version; the source is prepared anew");
+      LogSource(SourceLog::Level::kInfo, path,
+                "was made from another state of the source, or by another version; the source is prepared anew");
       return std::nullopt;
     case HeaderState::kSame:
       break;

@@ -8,8 +8,8 @@
 #include <system_error>
 
 #include "config/common/cache_place.h"
+#include "engine/dem/statistics/averages_budget.h"
 #include "engine/dem/statistics/cache_folder.h"
-#include "engine/dem/statistics/memory_averages.h"
 #include "server/cli/common/try_folder.h"
 
 namespace terrace::cli {

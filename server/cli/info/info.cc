@@ -198,8 +198,8 @@ int Info(const InfoArguments& arguments) {
     config::DatasetConfig dataset = flags;
     dataset.sources = sources;
     std::vector<Error> faults;  // of files, all of them
-    const auto source = OpenSource(dataset, cache, progress.Callback(), {},
-                                   [&faults](const Error& fault) { faults.push_back(fault); });
+    const auto source =
+        OpenSource(dataset, cache, progress.Callback(), {}, [&faults](const Error& fault) { faults.push_back(fault); });
     if (!source) {
       if (faults.empty()) faults.push_back(source.error());
       for (const Error& fault : faults) exit_code = Fail(fault.message, kExitFailure);

@@ -174,8 +174,7 @@ bool OpenDatasets(const config::Config& config, const dem::RasterCache& cache, c
                   std::vector<tiler::Dataset>& datasets) {
   bool all_open = true;
   for (const config::DatasetConfig& wanted : config.datasets) {
-    Progress progress((cache.folder ? "preparing " : "reading ") + NameOf(wanted.sources),
-                      FileCount(wanted.sources));
+    Progress progress((cache.folder ? "preparing " : "reading ") + NameOf(wanted.sources), FileCount(wanted.sources));
     Result<tiler::Dataset> dataset = OpenDataset(wanted, cache, TERRACE_VERSION, progress.Callback(), stop);
     if (stop.stop_requested()) return false;
     if (!dataset) {

@@ -137,9 +137,9 @@ TEST(CacheFolder, LeavesAloneWhatItDidNotWrite) {
   const std::string mine = "TRSTATS1" + big;
   const std::vector<std::pair<std::string, std::string>> foreign = {
       {"notes.txt", big},
-      {"a.tif-0123456789abcdef.statistics", big},     // the name alone
+      {"a.tif-0123456789abcdef.statistics", big},  // the name alone
       {"a.tif-0123456789abcdef.statistics.partial", big},
-      {"a.tif-0123456789abcdeg.statistics", mine},    // the first bytes alone
+      {"a.tif-0123456789abcdeg.statistics", mine},  // the first bytes alone
       {"0123456789abcdef.statistics", mine},
       {"a.tif-0123456789abcdef.statistics.old", mine},
   };
@@ -149,7 +149,8 @@ TEST(CacheFolder, LeavesAloneWhatItDidNotWrite) {
   }
   fs::create_symlink(dir.File("cache/notes.txt"), folder + "/b.tif-0123456789abcdef.statistics");
   // Of terrace, and of no use to anybody any more.
-  const std::vector<std::string> old = {"/c.tif-0123456789abcdef.statistics", "/c.tif-1123456789abcdef.statistics.partial"};
+  const std::vector<std::string> old = {"/c.tif-0123456789abcdef.statistics",
+                                        "/c.tif-1123456789abcdef.statistics.partial"};
   for (const std::string& name : old) {
     std::ofstream(folder + name, std::ios::binary) << mine;
     UsedAgo(folder + name, std::chrono::hours(10));
@@ -314,9 +315,12 @@ TEST(CacheFolder, FilesThatDoNotFitAreMadeAnewAndSaidOnce) {
     return content;
   };
   const std::vector<std::pair<std::string, std::string>> bad = {
-      {"torn", good.substr(0, good.size() / 2)}, {"empty", ""},
-      {"foreign", std::string(5000, 'x')},       {"of an older version", with_header(8, 3)},
-      {"of a newer version", with_header(8, 9)}, {"of other averages", with_header(12, 64)},
+      {"torn", good.substr(0, good.size() / 2)},
+      {"empty", ""},
+      {"foreign", std::string(5000, 'x')},
+      {"of an older version", with_header(8, 3)},
+      {"of a newer version", with_header(8, 9)},
+      {"of other averages", with_header(12, 64)},
       {"of another raster", with_header(16, static_cast<char>(good[16] ^ 1))},
   };
   for (const auto& [what, content] : bad) {
