@@ -196,8 +196,11 @@ void TerrainApplication::SetTroubles(std::map<std::string, std::string> troubles
 }
 
 std::map<std::string, std::string> TerrainApplication::troubles() const {
+  const std::string cache = parts_.cache_trouble ? parts_.cache_trouble() : std::string();
   const std::lock_guard lock(mutex_);
-  return troubles_;
+  std::map<std::string, std::string> all = troubles_;
+  if (!cache.empty()) all.emplace(kCacheTrouble, cache);
+  return all;
 }
 
 std::uint64_t TerrainApplication::replaced() const {

@@ -93,7 +93,8 @@ class Server::Impl {
             [this] { return metrics_.Text(tiles_.stats(), RefinementStats(), SourceNumbers(), CurrentState()); },
             options_.metrics_age),
         application_({*edge_, tiles_, metrics_, metrics_page_, access_log_,
-                      std::make_shared<const StaticFiles>(std::move(viewer)), options_.on_source_changed},
+                      std::make_shared<const StaticFiles>(std::move(viewer)), options_.on_source_changed,
+                      options_.cache_trouble},
                      std::move(catalog), ForHandlers(options_.config, options_.config.max_locations)),
         io_(options_.config.io_threads),
         signals_(io_.first()) {}

@@ -29,6 +29,7 @@ struct ServerOptions {
   std::shared_ptr<DiskCache> disk_cache;  // of finished tiles, below memory; may be null
   std::vector<std::shared_ptr<tiler::TileStore>> tile_stores = {};  // further tiers, below the disk
   std::function<tiler::ByteCacheStats()> refinement_stats;          // of what tiles are made from; may be empty
+  std::function<std::string()> cache_trouble = {};  // why sources are not kept in cache_dir, "": they are; thread-safe
   std::chrono::milliseconds metrics_age{1'000};                     // for which a text of /metrics serves
   std::chrono::milliseconds drain_grace{500};  // for which connections are served on; part of drain_timeout
   bool stop_on_signals = false;  // SIGINT and SIGTERM act like RequestStop; the second ends the process with status 1
@@ -67,7 +68,7 @@ class Server {
   // After a rotation.
   void ReopenAccessLog();
 
-  // What /readyz calls degraded: troubles by dataset, "" is the configuration. Nobody waits for a source in trouble.
+  // What /readyz calls degraded besides cache_trouble: troubles by dataset, "" is the configuration. Nobody waits for a source in trouble.
   void SetTroubles(std::map<std::string, std::string> troubles);
 
   std::uint16_t port() const;

@@ -57,14 +57,17 @@ Codec<Config> Viewer() {
           SwitchToJson, Json::parse(R"({"anyOf": [{"type": "boolean"}, {"type": "string", "minLength": 1}]})")};
 }
 
+// "default" and "none" are words, everything else is a path.
 Codec<Config> CacheDir() {
-  return {[](const Json& value, const Place& place, Config& config) {
-            if (!value.is_string()) return place.Expected("the path of a folder");
+  constexpr const char* kNone = "none";
+  return {[=](const Json& value, const Place& place, Config& config) {
+            if (!value.is_string()) return place.Expected("the path of a folder, \"default\" or \"none\"");
             const auto& path = value.get_ref<const std::string&>();
-            config.cache_dir = path.empty() ? path : place.Resolve(path);
+            const bool is_off = path.empty() || path == kNone;
+            config.cache_dir = is_off ? "" : path == kDefaultCacheDir ? path : place.Resolve(path);
           },
-          [](const Config& config) { return Json(config.cache_dir); }, TextToJson,
-          Json::parse(R"({"type": "string", "examples": ["/var/cache/terrace/sources"]})")};
+          [=](const Config& config) { return Json(config.cache_dir.empty() ? kNone : config.cache_dir); }, TextToJson,
+          Json::parse(R"({"type": "string", "examples": ["/var/cache/terrace/sources", "default", "none"]})")};
 }
 
 Codec<Config> AccessLogFile() {
@@ -146,18 +149,29 @@ const std::vector<Option<Config>>& ServerOptionTable() {
        .codec = Integer(&Config::worker_threads, 0, 1024),
        .other_words = "workers jobs"},
       {.key = "cache_dir",
-       .value = "DIR",
+       .value = "DIR|none",
        .section = "listening",
-       .help = "Folder for statistics of sources, so that the next start needs no scan; by default none",
-       .details = "It holds the ranges of sources, the errors of their averages and, of sources with more than 4096 x "
-                  "4096 samples and no overviews, the averages that shallow tiles are made of: about 1.4 bytes for "
-                  "each such sample, and 0.1 for each of smaller sources of at least 1024 x 1024 samples without "
-                  "overviews, of which coarse averages are kept. It is made with progress and continued where it was "
+       .help = "Folder for statistics and averages of sources, so that the next start needs no scan; none is no folder",
+       .details = "By default `$CACHE_DIRECTORY`, which systemd sets, else `$XDG_CACHE_HOME/terrace`, else "
+                  "`~/.cache/terrace`; a line of the log says where it is. An empty text is `none`, and a folder of "
+                  "one of these two names is `./default` or `./none`. It holds the ranges of "
+                  "sources, the errors of their averages and the averages that shallow tiles are made of, where "
+                  "overviews of the source do not have them: about 0.4 bytes for each sample, and 1.4 of sources with "
+                  "more than 4096 x 4096. It is made with progress and continued where it was "
                   "interrupted. Sources are told "
                   "apart by path, size and times: a replaced one is prepared anew. Several servers may share the "
-                  "folder. Without it, the shallow tiles of such a source read it whole. Relative to the folder of the "
-                  "file",
+                  "folder. Without it, or where it fails, averages are [kept in memory](operations.md#cache_dir) as "
+                  "far as they fit. Relative to the folder of the file",
        .codec = CacheDir()},
+      {.key = "cache_dir_bytes",
+       .value = "BYTES",
+       .section = "listening",
+       .help = "Size of the files in cache_dir; 0 is no folder",
+       .details = "Before it is exceeded, files that were not used for longest are removed, but none that this server "
+                  "uses, and nothing that terrace did not write. What finds no room is kept in memory as far as it "
+                  "fits, and `/readyz` says `degraded`",
+       .codec = Bytes(&Config::cache_dir_bytes, kMaxCacheBytes),
+       .other_words = "cache_size"},
       {.key = "queue_length",
        .value = "N",
        .section = "load",

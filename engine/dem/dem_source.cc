@@ -19,6 +19,7 @@
 #include "engine/dem/mosaic/availability.h"
 #include "engine/dem/sources/open_rasters.h"
 #include "engine/dem/sources/raster_source.h"
+#include "engine/dem/statistics/cache_folder.h"
 #include "engine/geo/octave.h"
 
 namespace terrace::dem {
@@ -67,7 +68,7 @@ Result<void> AddRaster(ContentHasher& hasher, const RasterSource& raster, const 
 }
 
 Result<std::uint64_t> FingerprintOf(const std::vector<RasterGrid>& grids, const DemOptions& options, double floor) {
-  const FileContentOptions content{options.cache_dir, options.stop};
+  const FileContentOptions content{options.cache.folder ? options.cache.folder->path() : std::string(), options.stop};
   ContentHasher hasher;
   for (const RasterGrid& grid : grids) {
     hasher.Add(std::uint64_t{grid.members().size()});  // which rasters make one raster grid counts, too
@@ -230,6 +231,13 @@ const DemInfo& DemSource::info() const { return impl_->info; }
 int DemSource::max_level() const { return impl_->info.max_level; }
 geo::Lattice DemSource::LatticeOf(int level) const { return impl_->LatticeOf(level); }
 std::uint64_t DemSource::fingerprint() const { return impl_->fingerprint; }
+
+bool DemSource::has_lost_cache() const {
+  return std::ranges::any_of(impl_->grids, [](const RasterGrid& grid) {
+    return std::ranges::any_of(grid.members(),
+                               [](const GridMember& member) { return member.raster->has_lost_cache(); });
+  });
+}
 
 StampedFiles DemSource::files() const {
   StampedFiles all;

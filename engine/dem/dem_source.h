@@ -84,6 +84,10 @@ class DemSource {
   // of precedence, where they lie and what they count from, and every option that changes heights.
   std::uint64_t fingerprint() const;
 
+  // What was kept of a source in the cache folder cannot be read any more. Its tiles take longer until it is opened
+  // anew.
+  bool has_lost_cache() const;
+
   // The files of all sources with their stamps at Open.
   StampedFiles files() const;
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <stop_token>
 #include <string>
@@ -40,6 +41,15 @@ enum class HeightDatum : std::uint8_t {
   kSource,       // the source's own
 };
 
+class AveragesBudget;
+class CacheFolder;
+
+// Where statistics and averages of rasters are kept, so that no raster is read whole twice.
+struct RasterCache {
+  std::shared_ptr<CacheFolder> folder = {};     // the statistics cache (statistics/cache_folder.h); null: none
+  std::shared_ptr<AveragesBudget> memory = {};  // for averages that the folder does not keep; null: none
+};
+
 struct DemOptions {
   SourceOptions source = {};    // for files without options of their own
   double error_fraction = 0.5;  // default error of a level, as a share of the level error that clients assume
@@ -49,8 +59,7 @@ struct DemOptions {
                                      // a height at or below the lowest one
   HoleFill voids = HoleFill::kSmooth;
   int max_void_gap = 64;  // samples: voids narrower than this along a row, column or diagonal are bridged
-  // The folder of the statistics cache (docs/configuration.md). Empty: no cache.
-  std::string cache_dir = {};
+  RasterCache cache = {};
   // Mosaics, metres: within this distance of its edges and voids a source is blended with the sources below. 0: hard
   // edges.
   double feather = 0;
@@ -130,7 +139,8 @@ struct RasterInfo {
   std::string overviews_unused;  // why overviews are ignored, with the remedy; empty: none are
   std::string transform;         // PROJ operation from EPSG:4326 to the source, for the log; empty: none needed
   bool needs_averages = false;   // large, and without overviews
-  bool prepared = false;         // averages are in the statistics cache
+  int least_kept_factor = 0;     // of averages that are kept; 0: none are
+  bool is_in_folder = false;     // they are in the statistics cache; false: in memory
   double seconds_to_open = 0;
 };
 

@@ -45,9 +45,15 @@ Response StateHandler::Ready(const Call& call) const {
   const std::map<std::string, std::string> troubles = state_.troubles();
   std::string text = troubles.empty() ? "ready\n" : "degraded\n";
   for (const auto& [dataset, reason] : troubles) {
-    text += dataset.empty() ? "the configuration file is wrong, the last good one is in force\n"
-                            : fmt::format("dataset{}: its source cannot be opened as it is now\n",
-                                          call.sees_all() ? " " + dataset : "");
+    if (dataset == kCacheTrouble) {
+      // It names no file.
+      text += fmt::format("cache_dir: {}; averages of sources are kept in memory as far as they fit\n", reason);
+    } else if (dataset.empty()) {
+      text += "the configuration file is wrong, the last good one is in force\n";
+    } else {
+      text += fmt::format("dataset{}: its source cannot be opened as it is now\n",
+                          call.sees_all() ? " " + dataset : "");
+    }
   }
   return PlainState(200, std::move(text));
 }

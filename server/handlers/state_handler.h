@@ -11,13 +11,16 @@
 
 namespace terrace::server {
 
+// Stands among troubles for the folder of what is learnt of sources. No dataset has such a name.
+inline constexpr const char* kCacheTrouble = "/cache_dir";
+
 // The process as it is now. Thread-safe.
 class ProcessState {
  public:
   virtual ~ProcessState() = default;
   virtual bool draining() const = 0;
   virtual bool opening() const = 0;  // what is served has not been opened yet
-  // By dataset; "" is the configuration.
+  // By dataset; "" is the configuration, and kCacheTrouble what it says.
   virtual std::map<std::string, std::string> troubles() const = 0;
   virtual asio::awaitable<std::shared_ptr<const std::string>> MetricsText() const = 0;
 };

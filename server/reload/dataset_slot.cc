@@ -19,6 +19,8 @@ namespace {
 constexpr std::chrono::nanoseconds kSettleTime = std::chrono::seconds(1);
 // Between attempts at files that stay as they are; doubled each time.
 constexpr std::chrono::seconds kFirstRetry{1}, kLastRetry{60};
+// Between openings for what the cache folder has lost; doubled each time. Whatever removes its files may do it again.
+constexpr std::chrono::minutes kFirstRecovery{1}, kLastRecovery{60};
 // What takes longer than this to be replaced is a trouble to tell of.
 constexpr std::chrono::seconds kPatience{10};
 // Tiles come first: opening a large source takes a processor for a while.
@@ -86,6 +88,11 @@ void DatasetSlot::Want(config::DatasetConfig wanted) {
 
 std::size_t DatasetSlot::LookAtFiles(std::size_t most) {
   if (!serving_ || stale_since_) return 0;
+  if (HasToRecoverCache()) {
+    spdlog::info("dataset {}: what was kept of its sources in cache_dir is gone; it is opened anew", wanted_.name);
+    MarkStale();
+    return 0;
+  }
   const std::size_t count = std::min(most, files_.size());
   for (std::size_t i = 0; i < count; ++i) {
     const std::size_t file = next_file_;
@@ -97,6 +104,13 @@ std::size_t DatasetSlot::LookAtFiles(std::size_t most) {
     return i + 1;
   }
   return count;
+}
+
+bool DatasetSlot::HasToRecoverCache() {
+  if (Clock::now() < recover_at_ || !serving_->source->has_lost_cache()) return false;
+  recover_delay_ = std::clamp<Clock::duration>(2 * recover_delay_, kFirstRecovery, kLastRecovery);
+  recover_at_ = Clock::now() + recover_delay_;
+  return true;
 }
 
 // True as well for a time in the future, which tells nothing.

@@ -61,6 +61,7 @@ class DatasetSlot {
   bool IsSettled();
   void Fail(const Error& error);
   void MarkStale();
+  bool HasToRecoverCache();
 
   config::DatasetConfig wanted_;
   std::optional<tiler::Dataset> serving_;
@@ -73,6 +74,8 @@ class DatasetSlot {
   bool reopen_ = false;                               // what is being opened is not what is wanted any more
   std::string problem_;                               // of the last attempt
   std::vector<std::optional<dem::FileStamp>> tried_;  // the named files at the last attempt that failed
+  Clock::time_point recover_at_;        // when to open it anew next for what the cache folder has lost
+  Clock::duration recover_delay_{0};
   Clock::time_point retry_at_;
   Clock::duration retry_delay_{0};
   bool said_unsettled_ = false;

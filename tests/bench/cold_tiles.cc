@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "config/parse.h"
+#include "server/cli/common/open_cache.h"
 #include "server/cli/common/open_dataset.h"
 #include "tiler/tile_pipeline.h"
 
@@ -50,7 +51,7 @@ Result<std::vector<tiler::Dataset>> Open(const Arguments& arguments) {
   if (!config) return MakeError(ErrorCode::kInvalidArgument, "{}: {}", arguments.config, config.error()[0].message);
   for (const config::DatasetConfig& wanted : config->datasets) {
     if (wanted.name != arguments.dataset) continue;
-    auto dataset = cli::OpenDataset(wanted, config->cache_dir, "bench");
+    auto dataset = cli::OpenDataset(wanted, cli::OpenCache(*config), "bench");
     if (!dataset) return tl::unexpected(dataset.error());
     return std::vector<tiler::Dataset>{*std::move(dataset)};
   }

@@ -2,6 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdlib>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "config/common/cache_place.h"
 #include "config/common/working_directory.h"
 #include "tests/config/errors.h"
 
@@ -98,6 +105,60 @@ TEST(SetServerOption, ResolvesPathsAgainstTheDirectoryItIsGiven) {
   EXPECT_EQ(dataset.water.mask, "/start/sea.tif");
   EXPECT_EQ(dataset.imagery.image, "/start/photo.tif");
   EXPECT_EQ(dataset.vertical, "/start/grid.gtx");
+}
+
+TEST(SetServerOption, KnowsTheWordsOfCacheDir) {
+  Config config;
+  EXPECT_EQ(config.cache_dir, kDefaultCacheDir);
+  for (const char* off : {"none", ""}) {
+    EXPECT_THAT(Set("cache_dir", "cache", config), IsEmpty());
+    EXPECT_THAT(Set("cache_dir", off, config), IsEmpty());
+    EXPECT_EQ(config.cache_dir, "");
+  }
+  EXPECT_THAT(Set("cache_dir", "./none", config), IsEmpty());
+  EXPECT_EQ(config.cache_dir, "/start/none");
+  EXPECT_THAT(Set("cache_dir", "default", config), IsEmpty());
+  EXPECT_EQ(config.cache_dir, kDefaultCacheDir);
+  EXPECT_THAT(Set("cache_dir_bytes", "1GiB", config), IsEmpty());
+  EXPECT_EQ(config.cache_dir_bytes, std::size_t{1} << 30);
+}
+
+// Variables of the environment for as long as this lives.
+class Environment {
+ public:
+  Environment() {
+    for (const char* name : kNames) {
+      const char* const value = std::getenv(name);
+      before_.emplace_back(name, value != nullptr ? std::optional<std::string>(value) : std::nullopt);
+      ::unsetenv(name);
+    }
+  }
+  ~Environment() {
+    for (const auto& [name, value] : before_) value ? ::setenv(name, value->c_str(), 1) : ::unsetenv(name);
+  }
+  Environment(const Environment&) = delete;
+  Environment& operator=(const Environment&) = delete;
+
+ private:
+  static constexpr const char* kNames[] = {"CACHE_DIRECTORY", "XDG_CACHE_HOME", "HOME"};
+  std::vector<std::pair<const char*, std::optional<std::string>>> before_;
+};
+
+TEST(DefaultCachePlace, IsTheFirstThatTheEnvironmentNames) {
+  const Environment environment;
+  EXPECT_EQ(DefaultCachePlace(), "");
+  ::setenv("HOME", "/users/me", 1);
+  EXPECT_EQ(DefaultCachePlace(), "/users/me/.cache/terrace");
+  ::setenv("XDG_CACHE_HOME", "/caches", 1);
+  EXPECT_EQ(DefaultCachePlace(), "/caches/terrace");
+  ::setenv("XDG_CACHE_HOME", "relative", 1);
+  EXPECT_EQ(DefaultCachePlace(), "/users/me/.cache/terrace") << "as the XDG specification says";
+  ::setenv("CACHE_DIRECTORY", "/var/cache/terrace", 1);
+  EXPECT_EQ(DefaultCachePlace(), "/var/cache/terrace");
+  ::setenv("CACHE_DIRECTORY", "/var/cache/terrace:/var/cache/other", 1);
+  EXPECT_EQ(DefaultCachePlace(), "/var/cache/terrace");
+  ::setenv("CACHE_DIRECTORY", "", 1);
+  EXPECT_EQ(DefaultCachePlace(), "/users/me/.cache/terrace");
 }
 
 TEST(FromWorkingDirectory, TakesOffWhatAPathGoesUp) {

@@ -1,9 +1,13 @@
 // Starts the real binary on a free port and talks to it, for the end-to-end tests.
 import { spawn, spawnSync } from 'node:child_process';
 import http from 'node:http';
+import os from 'node:os';
 import path from 'node:path';
 import { fileURLToPath } from 'node:url';
 import zlib from 'node:zlib';
+
+// Run by hand, too, a test writes nothing into the home of whoever runs it.
+process.env.XDG_CACHE_HOME ??= path.join(os.tmpdir(), 'terrace-tests');
 
 const root = path.resolve(path.dirname(fileURLToPath(import.meta.url)), '../..');
 export const binary = process.env.TERRACE_BINARY ?? path.join(root, 'build/release/server/cli/terrace');

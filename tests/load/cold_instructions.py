@@ -26,7 +26,8 @@ def start(binary, dem, profile):
     process = subprocess.Popen(
         ["valgrind", "--tool=callgrind", f"--callgrind-out-file={profile}", "--instr-atstart=no", binary, "serve", str(dem),
          "--listen", f"127.0.0.1:{port}", "--io-threads", "1", "--worker-threads", "1", "--cache-bytes", "0",
-         "--refinement-cache-bytes", "0", "--request-deadline-s", "3600", "--log-level", "warn", "--access-log", "off"],
+         "--refinement-cache-bytes", "0", "--cache-dir", f"{profile}.cache",
+         "--request-deadline-s", "3600", "--log-level", "warn", "--access-log", "off"],
         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     return process, port
 

@@ -82,7 +82,8 @@ def main():
     parser.add_argument("--build", type=pathlib.Path, default=HERE.parents[1] / "build/release")
     arguments = parser.parse_args()
     runs = {"pipeline": [], "server": []}
-    with tempfile.NamedTemporaryFile("w", suffix=".txt") as walk:
+    with tempfile.NamedTemporaryFile("w", suffix=".txt") as walk, tempfile.TemporaryDirectory() as caches:
+        os.environ["XDG_CACHE_HOME"] = caches  # not the home of whoever runs this
         walk.write("\n".join(paths(arguments.dataset, arguments.level, arguments.box, arguments.tiles)) + "\n")
         walk.flush()
         for _ in range(arguments.turns):

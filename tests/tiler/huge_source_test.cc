@@ -77,7 +77,7 @@ double Since(std::chrono::steady_clock::time_point start) {
 std::unique_ptr<dem::DemSource> Open(const std::string& path, const std::string& cache,
                                      const std::function<void(double)>& progress = {}) {
   dem::DemOptions options;
-  options.cache_dir = cache;
+  options.cache.folder = std::make_shared<dem::CacheFolder>(cache);
   options.progress = progress;
   auto source = dem::DemSource::Open(path, options);
   EXPECT_TRUE(source.has_value()) << source.error().message;

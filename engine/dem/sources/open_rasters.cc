@@ -103,7 +103,7 @@ class Opening {
       const std::lock_guard lock(mutex_);
       running_.emplace(i, stop);
     }
-    Opened opened = RasterSource::Open(files_[i].path, files_[i].options.value_or(options_.source), options_.cache_dir,
+    Opened opened = RasterSource::Open(files_[i].path, files_[i].options.value_or(options_.source), options_.cache,
                                        ProgressOf(i), stop.get_token(), pages_);
     if (options_.progress) AddProgress(i, 1);
     const bool goes_on = opened || IsNothing(i, opened) || (options_.fault && !options_.stop.stop_requested());

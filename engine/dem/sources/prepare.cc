@@ -4,6 +4,7 @@
 #include <xxhash.h>
 
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <system_error>
 #include <utility>
@@ -56,9 +57,10 @@ class Preparer {
         options_(options),
         shape_{layout, KeyOf(layout, options.find_voids, path, files), {}},
         chunks_(layout.width, layout.height) {
-    if (!options.cache_dir.empty()) {
-      cache_file_ = StatisticsPath(options.cache_dir, path, layout.rules.extra_nodata, options.find_voids,
+    if (options.cache.folder) {
+      cache_file_ = StatisticsPath(options.cache.folder->path(), path, layout.rules.extra_nodata, options.find_voids,
                                    !layout.overview_factors.empty());
+      prepared_.use = std::make_shared<const CacheFolder::Use>(options.cache.folder, cache_file_);
     }
     prepared_.preparation.chunks = chunks_.count();
   }
@@ -70,6 +72,7 @@ class Preparer {
       if (!writer_ && Load()) return std::move(prepared_);
     }
     auto statistics = ReadStatistics();
+    if (statistics && LacksChunks()) statistics = ReadStatistics();
     if (statistics && options_.find_voids && !shape_.detected.any())
       statistics = WithoutFoundVoids(*std::move(statistics));
     if (!statistics) return Named(statistics.error());
@@ -93,19 +96,24 @@ class Preparer {
     prepared_.cache_file = cache_file_;
     prepared_.shape = shape_;
     prepared_.preparation.from_cache = true;
+    prepared_.use->Succeed();
     return true;
   }
 
+  // The folder tells the first failure in the log.
   void GiveUpCache(const Error& error) {
-    LogSource(SourceLog::Level::kWarn, path_, "what is learnt of it is not kept: {}", error.message);
+    LogSource(SourceLog::Level::kDebug, path_, "what is learnt of it is not kept: {}", error.message);
+    const std::size_t at = error.message.starts_with(cache_file_) ? error.message.find(": ", cache_file_.size()) : 0;
+    prepared_.use->Fail(at == 0 || at == std::string::npos ? error.message : error.message.substr(at + 2));
     writer_.reset();
   }
 
+  // The averages of chunks that an interrupted run has read are in its file alone, and that is gone now.
+  bool LacksChunks() const { return !writer_ && averages_ != nullptr && !averages_are_whole_; }
+
   // kCancelled: stopped.
   Result<void> OpenWriter() {
-    std::error_code failed;
-    std::filesystem::create_directories(options_.cache_dir, failed);
-    auto writer = StatisticsCacheWriter::Open(cache_file_, shape_, options_.stop);
+    auto writer = StatisticsCacheWriter::Open(options_.cache.folder, cache_file_, shape_, options_.stop);
     if (writer) {
       writer_ = *std::move(writer);
       if (writer_) shape_ = writer_->shape();
@@ -120,6 +128,8 @@ class Preparer {
   Result<RasterStatistics> ReadStatistics() {
     const RasterLayout layout = shape_.EffectiveLayout();
     StatisticsAssembler assembler(layout);
+    averages_.reset();  // before others take their place
+    if (options_.cache.memory) averages_ = MemoryAverages::Make(layout, options_.cache.memory);
     int done = 0;
     if (writer_) {
       auto resumed = writer_->Resume([&](const ChunkStatistics& part) { assembler.Add(chunks_.At(done++), part); });
@@ -128,11 +138,13 @@ class Preparer {
       if (done > 0)
         LogSource(SourceLog::Level::kInfo, path_, "{} of {} parts were prepared before", done, chunks_.count());
     }
+    averages_are_whole_ = done == 0;
     for (; done < chunks_.count(); ++done) {
       const auto part =
           ReadChunkStatistics(dataset_, layout, chunks_.At(done), prepared_.preparation.chunks_read, options_.stop);
       if (!part) return tl::unexpected(part.error());
       assembler.Add(chunks_.At(done), *part);
+      if (averages_) averages_->Add(chunks_.At(done), *part);
       if (writer_) {
         if (auto added = writer_->Add(*part); !added) GiveUpCache(added.error());
       }
@@ -157,15 +169,21 @@ class Preparer {
     return ReadStatistics();
   }
 
+  // In the folder, or where that fails in memory.
   void FinishCache() {
     // A file that changed meanwhile is a mixture, which its caller will refuse.
-    if (!writer_ || files_.FirstChanged()) return;
-    if (auto finished = writer_->Finish(prepared_.statistics); !finished) return GiveUpCache(finished.error());
-    auto known = LoadStatistics(cache_file_, shape_);
-    if (!known) return;
-    prepared_.averages = std::move(known->averages);
-    prepared_.cache_file = cache_file_;
-    prepared_.shape = shape_;
+    if (files_.FirstChanged()) return;
+    if (writer_) {
+      if (auto finished = writer_->Finish(prepared_.statistics); !finished) GiveUpCache(finished.error());
+    }
+    if (auto known = writer_ ? LoadStatistics(cache_file_, shape_) : std::nullopt) {
+      prepared_.averages = std::move(known->averages);
+      prepared_.cache_file = cache_file_;
+      prepared_.shape = shape_;
+      prepared_.use->Succeed();
+    } else if (averages_are_whole_) {
+      prepared_.memory_averages = std::move(averages_);
+    }
   }
 
   GDALDataset& dataset_;
@@ -176,6 +194,8 @@ class Preparer {
   const ChunkGrid chunks_;
   std::string cache_file_;  // its path; empty: none
   std::optional<StatisticsCacheWriter> writer_;
+  std::unique_ptr<MemoryAverages> averages_;  // for the case that the file cannot be kept; null: they do not fit
+  bool averages_are_whole_ = true;            // have all chunks
   PreparedRaster prepared_;
 };
 

@@ -10,14 +10,17 @@
 #include <vector>
 
 #include "engine/core/result.h"
+#include "engine/dem/dem_types.h"
 #include "engine/dem/gdal/file_stamp.h"
+#include "engine/dem/statistics/cache_folder.h"
+#include "engine/dem/statistics/memory_averages.h"
 #include "engine/dem/statistics/raster_statistics.h"
 #include "engine/dem/statistics/statistics_cache.h"
 
 namespace terrace::dem {
 
 struct PrepareOptions {
-  std::string cache_dir;  // empty: no cache
+  RasterCache cache;
   bool find_voids = true;
   std::function<void(double)> progress = {};  // share done of each pass, 0 .. 1
   std::stop_token stop = {};
@@ -34,14 +37,17 @@ struct Preparation {
 struct PreparedRaster {
   DetectedNodata detected;  // undeclared nodata; the statistics exclude it
   RasterStatistics statistics;
-  std::shared_ptr<const CachedAverages> averages;  // null: none
-  std::string cache_file;                          // empty: not stored
-  StatisticsShape shape;                           // of the cache file
+  std::shared_ptr<const CachedAverages> averages;         // null: none
+  std::shared_ptr<const MemoryAverages> memory_averages;  // where the file is not stored; null: none
+  std::string cache_file;                                 // empty: not stored
+  std::shared_ptr<const CacheFolder::Use> use;            // of the cache file, stored or not; null: no cache folder
+  StatisticsShape shape;                                  // of the cache file
   Preparation preparation;
 };
 
-// `layout`: as the file and the configuration state it. If the cache folder is not writable, this logs a warning and
-// goes on without the cache. Errors name the file. kCancelled: stopped; finished chunks stay in the cache.
+// `layout`: as the file and the configuration state it. Where the cache folder cannot keep the statistics, or there is
+// none, averages are kept in memory as far as they fit. Errors name the file. kCancelled: stopped; finished chunks stay
+// in the cache.
 Result<PreparedRaster> PrepareRaster(GDALDataset& dataset, const RasterLayout& layout, const std::string& path,
                                      const StampedFiles& files, const PrepareOptions& options);
 

@@ -175,6 +175,8 @@ void LogVertical(const std::string& path, const VerticalDatum& vertical, const s
   }
 }
 
+constexpr const char* kGone = "a file is gone or cannot be read";
+
 Position CentreOf(const Georeference& georeference) {
   Position centre{georeference.width() / 2.0, georeference.height() / 2.0};
   georeference.ToDegrees({&centre, 1});
@@ -184,7 +186,7 @@ Position CentreOf(const Georeference& georeference) {
 }  // namespace
 
 Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path, const SourceOptions& options,
-                                                         const std::string& cache_dir,
+                                                         const RasterCache& cache,
                                                          const std::function<void(double)>& progress,
                                                          const std::stop_token& stop,
                                                          std::shared_ptr<StatisticsPages> pages) {
@@ -221,7 +223,7 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
   source->layout_.coast_step_m = ZeroEdges::CoastStep(spacing->finer);
   source->layout_.rules.extra_nodata = options.nodata;
   std::string overviews_unused = DropMisleadingOverviews(**dataset, source->layout_);
-  const PrepareOptions prepare{cache_dir, options.find_voids, progress, stop};
+  const PrepareOptions prepare{cache, options.find_voids, progress, stop};
   auto prepared = PrepareRaster(**dataset, source->layout_, path, source->files(), prepare);
   if (prepared && !prepared->detected.any()) {
     const std::string why = DropMisleadingOverviews(**dataset, prepared->statistics, source->layout_);
@@ -233,6 +235,8 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
   if (!prepared) return tl::unexpected(prepared.error());
   source->layout_ = WithDetectedNodata(std::move(source->layout_), prepared->detected);
   source->averages_ = prepared->averages;
+  source->memory_averages_ = prepared->memory_averages;
+  source->use_ = prepared->use;
   source->preparation_ = prepared->preparation;
   const RasterStatistics& statistics = prepared->statistics;
   const std::string& found_voids = prepared->detected.text;
@@ -242,7 +246,9 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
   source->info_ = Describe(**dataset, path, source->georeference_, source->layout_);
   source->info_.overviews_unused = std::move(overviews_unused);
   source->info_.needs_averages = NeedsAverages(source->layout_);
-  source->info_.prepared = source->info_.needs_averages && source->averages_ != nullptr;
+  source->info_.is_in_folder = source->averages_ != nullptr;
+  if (source->averages_) source->info_.least_kept_factor = source->averages_->least_factor();
+  if (source->memory_averages_) source->info_.least_kept_factor = source->memory_averages_->least_factor();
   source->info_.seconds_to_open = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   source->info_.found_voids = found_voids;
   source->info_.counts_from = source->vertical_.name;
@@ -331,7 +337,7 @@ void RasterSource::KeepTables(PreparedRaster prepared, const PrepareOptions& pre
                                                   !statistics.coarse.grids.empty(),
                                                   std::move(prepared.cache_file),
                                                   std::move(prepared.shape),
-                                                  {prepare.cache_dir, prepare.find_voids, {}, {}}});
+                                                  {{prepare.cache.folder, nullptr}, prepare.find_voids, {}, {}}});
 }
 
 StatisticsPages::Tables RasterSource::tables() const {
@@ -346,12 +352,15 @@ StatisticsPages::Tables RasterSource::tables() const {
 
 Result<RasterStatistics> RasterSource::ReadTables() const {
   if (auto known = LoadStatistics(paging_->cache_file, paging_->shape)) return std::move(known->statistics);
-  spdlog::warn("{}: {} is gone or damaged; the source is prepared anew", info_.path, paging_->cache_file);
+  LogSource(SourceLog::Level::kWarn, info_.path, "{} is gone or damaged; the source is prepared anew",
+            paging_->cache_file);
   auto handle = handles_.Borrow();
   if (!handle) return tl::unexpected(handle.error());
   auto prepared = PrepareRaster(**handle, paging_->shape.layout, info_.path, files(), paging_->prepare);
   if (auto unchanged = handles_.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
   if (!prepared) return tl::unexpected(prepared.error());
+  // The next time would cost as much.
+  if (prepared->cache_file.empty() && !has_lost_cache_.exchange(true)) use_->Fail(kGone);
   return std::move(prepared->statistics);
 }
 
@@ -359,6 +368,17 @@ BlockRange RasterSource::RangeIn(double west, double north, double east, double 
   if (kept_) return kept_->table.Query(west, north, east, south);
   if (const auto known = paging_->ranges.TryQuery(west, north, east, south)) return *known;
   return tables()->table.Query(west, north, east, south);
+}
+
+// Until the raster is opened anew it is read at its full resolution.
+void RasterSource::LoseCache(const Error& error) const {
+  if (has_lost_cache_.exchange(true)) return;
+  if (error.code == ErrorCode::kNotFound) {
+    use_->Fail(kGone);
+    return;
+  }
+  averages_->Discard();
+  LogSource(SourceLog::Level::kWarn, info_.path, "{}; it is prepared anew when it is next opened", error.message);
 }
 
 Result<std::vector<float>> RasterSource::ReadBlocks(int factor, const GridWindow& window,
@@ -369,14 +389,15 @@ Result<std::vector<float>> RasterSource::ReadBlocks(int factor, const GridWindow
     if (const StatisticsPages::Tables known = tables(); known->coarse.Has(factor))
       return known->coarse.Read(factor, window);
   }
-  if (averages_ && averages_->Has(factor) && !averages_damaged_) {
+  if (memory_averages_ && memory_averages_->Has(factor)) {
+    if (auto unchanged = handles_.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
+    return memory_averages_->Read(factor, window);
+  }
+  if (averages_ && averages_->Has(factor) && !has_lost_cache_) {
     if (auto unchanged = handles_.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
     auto averages = averages_->Read(factor, window);
     if (averages || averages.error().code == ErrorCode::kUnavailable) return averages;
-    averages_damaged_ = true;
-    averages_->Discard();
-    spdlog::error("{}; {} is read at its full resolution instead, and prepared anew when it is next opened",
-                  averages.error().message, info_.path);
+    LoseCache(averages.error());
   }
   auto handle = handles_.Borrow();
   if (!handle) return tl::unexpected(handle.error());

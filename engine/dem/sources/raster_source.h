@@ -69,10 +69,10 @@ class StatisticsPages {
 class RasterSource {
  public:
   // Opens a raster, checks it, and scans it once for its heights. Errors name the file, what is wrong and the remedy.
-  // What is learnt is kept in `cache_dir`, or taken from there; empty for none. `pages` bounds
-  // the memory of the tables of this and other rasters; null: nothing does. kCancelled: stopped.
+  // What is learnt is kept in `cache`, or taken from there. `pages` bounds the memory of the tables of this and other
+  // rasters; null: nothing does. kCancelled: stopped.
   static Result<std::unique_ptr<RasterSource>> Open(const std::string& path, const SourceOptions& options = {},
-                                                    const std::string& cache_dir = {},
+                                                    const RasterCache& cache = {},
                                                     const std::function<void(double)>& progress = {},
                                                     const std::stop_token& stop = {},
                                                     std::shared_ptr<StatisticsPages> pages = nullptr);
@@ -100,6 +100,10 @@ class RasterSource {
 
   // In the cache file; null: none.
   const CachedAverages* averages() const { return averages_.get(); }
+  // Null: none.
+  const MemoryAverages* memory_averages() const { return memory_averages_.get(); }
+  // What was in the cache file cannot be read any more: opened anew, the raster has it again, or averages in memory.
+  bool has_lost_cache() const { return has_lost_cache_; }
 
   // How opening went.
   const Preparation& preparation() const { return preparation_; }
@@ -114,6 +118,7 @@ class RasterSource {
  private:
   void KeepTables(PreparedRaster prepared, const PrepareOptions& prepare, std::shared_ptr<StatisticsPages> pages);
   Result<RasterStatistics> ReadTables() const;
+  void LoseCache(const Error& error) const;
 
   RasterSource(std::string path, StampedFiles files, Georeference where)
       : handles_(std::move(path), std::move(files)), georeference_(std::move(where)) {}
@@ -138,8 +143,10 @@ class RasterSource {
     PrepareOptions prepare;
   };
   std::unique_ptr<const Paging> paging_;
-  std::shared_ptr<const CachedAverages> averages_;  // null: none
-  mutable std::atomic<bool> averages_damaged_{false};
+  std::shared_ptr<const CachedAverages> averages_;         // null: none
+  std::shared_ptr<const MemoryAverages> memory_averages_;  // null: none
+  std::shared_ptr<const CacheFolder::Use> use_;            // of the cache file; null: no cache folder
+  mutable std::atomic<bool> has_lost_cache_{false};
   Preparation preparation_;
   RasterInfo info_;
 };

@@ -8,6 +8,7 @@
 #include "engine/dem/dem_types.h"
 #include "engine/dem/raster/grid_cells.h"
 #include "engine/dem/statistics/averaging_errors.h"
+#include "engine/dem/statistics/kept_factors.h"
 
 namespace terrace::dem {
 namespace {
@@ -246,6 +247,7 @@ Result<void> CompareAverages(GDALDataset& dataset, const RasterLayout& layout, c
                              const Chunk& chunk, const std::stop_token& stop, ChunkStatistics& statistics) {
   if (chunk.col >= layout.columns) return {};
   statistics.averages.clear();
+  const unsigned kept = KeptFactors(layout);
   Result<void> result;
   ForEachFactor(layout, 2, kLargestDirect, [&](int factor) {
     if (!result) return;
@@ -262,7 +264,7 @@ Result<void> CompareAverages(GDALDataset& dataset, const RasterLayout& layout, c
                errors.data() + std::ptrdiff_t{r / pixels} * columns);
     }
     statistics.averages.emplace_back();
-    if (StartingFactor(layout, factor) > 1) return;
+    if (StartingFactor(layout, factor) > 1 && (kept & static_cast<unsigned>(factor)) == 0) return;
     const int used = std::min(chunk.cols, layout.columns - chunk.col);
     const std::int64_t first = chunk.col / factor, top = chunk.row / factor;
     for (std::int64_t r = 0; r < DivideUp(chunk.rows, factor); ++r) {
@@ -273,7 +275,39 @@ Result<void> CompareAverages(GDALDataset& dataset, const RasterLayout& layout, c
   return result;
 }
 
+// A chunk without a valid sample. Overviews are interpolated, so that their averages may have heights there.
+Result<ChunkStatistics> VoidOrOverviews(GDALDataset& dataset, const RasterLayout& layout, const Chunk& chunk,
+                                        const std::stop_token& stop) {
+  ChunkStatistics statistics = VoidStatistics(chunk, layout);
+  const unsigned kept = KeptFactors(layout);
+  const int used = std::min(chunk.cols, layout.columns - chunk.col);
+  bool has_heights = false;
+  for (std::size_t k = 0; (kept >> k) > 1 && used > 0; ++k) {
+    const int factor = 2 << k;
+    if ((kept & static_cast<unsigned>(factor)) == 0) continue;
+    std::vector<float>& averages = statistics.averages[k];
+    const GridWindow window{chunk.col / factor, chunk.row / factor, DivideUp(used, factor),
+                            DivideUp(chunk.rows, factor)};
+    if (StartingFactor(layout, factor) == 1) {
+      averages.assign(static_cast<std::size_t>(window.columns * window.rows), SampleRules::kVoid);
+      continue;
+    }
+    auto read = ReadGrid(dataset, layout, factor, window, stop);
+    if (!read) return tl::unexpected(read.error());
+    averages = *std::move(read);
+    has_heights |= !std::ranges::all_of(averages, [](float height) { return std::isnan(height); });
+  }
+  return has_heights ? statistics : VoidStatistics(chunk, layout);
+}
+
 }  // namespace
+
+bool ChunkStatistics::has_averages(unsigned factors) const {
+  for (std::size_t k = 0; k < averages.size(); ++k) {
+    if ((factors & (2U << k)) != 0 && !averages[k].empty()) return true;
+  }
+  return false;
+}
 
 Chunk ChunkGrid::At(int index) const {
   const int col = index % columns_ * kSide, row = index / columns_ * kSide;
@@ -305,7 +339,7 @@ Result<ChunkStatistics> ReadChunkStatistics(GDALDataset& dataset, const RasterLa
                                             std::int64_t& read, const std::stop_token& stop) {
   GDALRasterBand& band = *dataset.GetRasterBand(1);
   ChunkStatistics statistics = VoidStatistics(chunk, layout);
-  if (!MayHaveSamples(band, layout, chunk)) return statistics;
+  if (!MayHaveSamples(band, layout, chunk)) return VoidOrOverviews(dataset, layout, chunk, stop);
   ++read;
   Samples samples{WithHalo(chunk, layout), {}};
   const Chunk& box = samples.box;
@@ -316,7 +350,7 @@ Result<ChunkStatistics> ReadChunkStatistics(GDALDataset& dataset, const RasterLa
   }
   for (BlockRange& range : statistics.ranges) range = {};
   CountSamples(samples, chunk, layout, statistics);
-  if (statistics.is_void()) return VoidStatistics(chunk, layout);
+  if (statistics.is_void()) return VoidOrOverviews(dataset, layout, chunk, stop);
   statistics.content = HashOf(samples, chunk);
   if (auto compared = CompareAverages(dataset, layout, samples, chunk, stop, statistics); !compared) {
     return tl::unexpected(compared.error());

@@ -61,13 +61,16 @@ struct ChunkStatistics {
   std::vector<VoidRun> voids;      // in the columns in use, row by row; empty if the whole chunk is void
   // By factor 2, 4, .. kLargestDirect, as far as the raster has them:
   std::vector<std::vector<float>> errors;    // by AveragingErrors block, or for the share of a block
-  std::vector<std::vector<float>> averages;  // row by row; empty if an overview has them
+  std::vector<std::vector<float>> averages;  // row by row; empty if an overview has them and they are not kept
   std::vector<std::vector<BlockSum>> sums;   // of factors 128 .. 1024, as the averages
 
   bool is_void() const { return valid == 0; }
+  // Of any of these factors (KeptFactors), and then of all of them. A void chunk has some where an overview has
+  // heights.
+  bool has_averages(unsigned factors) const;
 };
 
-// Statistics of a void chunk. It has no averages and no sums.
+// Statistics of a void chunk, without averages and sums.
 ChunkStatistics VoidStatistics(const Chunk& chunk, const RasterLayout& layout);
 
 // Number of averages of a factor in a chunk that is not void; 0 if an overview has them.

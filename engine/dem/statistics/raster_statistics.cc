@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "engine/core/plain_number.h"
+#include "engine/dem/statistics/kept_factors.h"
 
 namespace terrace::dem {
 namespace {
@@ -169,15 +170,18 @@ bool CoarseAverages::Has(int factor) const {
 std::vector<float> CoarseAverages::Read(int factor, const GridWindow& window) const {
   std::size_t index = 0;
   while (index + 1 < grids.size() && (kLargestDirect << index) < factor) ++index;
-  const Grid& grid = grids[index];
-  std::vector<float> heights;
-  heights.reserve(static_cast<std::size_t>(window.columns * window.rows));
+  return grids[index].Read(window);
+}
+
+std::vector<float> AveragesGrid::Read(const GridWindow& window) const {
+  std::vector<float> read;
+  read.reserve(static_cast<std::size_t>(window.columns * window.rows));
   for (std::int64_t r = window.row; r < window.row + window.rows; ++r) {
     for (std::int64_t c = window.column; c < window.column + window.columns; ++c) {
-      heights.push_back(grid.heights[static_cast<std::size_t>(r * grid.columns + FloorMod(c, grid.columns))]);
+      read.push_back(heights[static_cast<std::size_t>(r * columns + FloorMod(c, columns))]);
     }
   }
-  return heights;
+  return read;
 }
 
 std::size_t RasterStatistics::bytes() const {
@@ -270,7 +274,7 @@ Result<void> StatisticsAssembler::FinishCoarse(GDALDataset& dataset, const std::
     AddCoarseErrors(layout_, coarse, statistics_.errors);
     return {};
   }
-  if (statistics_.errors.largest_factor() <= kLargestDirect) return {};
+  if (statistics_.errors.largest_factor() <= kLargestDirect && !KeepsCoarse(layout_)) return {};
   CoarseAverages overviews = CoarseAverages::ShapedFor(layout_);
   int factor = kLargestDirect;
   for (CoarseAverages::Grid& grid : overviews.grids) {
@@ -280,6 +284,7 @@ Result<void> StatisticsAssembler::FinishCoarse(GDALDataset& dataset, const std::
     factor *= 2;
   }
   AddCoarseErrors(layout_, overviews, statistics_.errors);
+  if (KeepsCoarse(layout_)) coarse = std::move(overviews);
   return {};
 }
 

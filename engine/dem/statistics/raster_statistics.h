@@ -21,14 +21,20 @@
 
 namespace terrace::dem {
 
-// All averages of factors kLargestDirect and above: at most a 4096th of the raster's samples. Empty for a raster with
-// overviews.
+// All averages of a raster by one factor, row by row.
+struct AveragesGrid {
+  std::int64_t columns = 0, rows = 0;
+  std::vector<float> heights;
+
+  // What ReadGrid gives: columns may lie around the Earth.
+  std::vector<float> Read(const GridWindow& window) const;
+};
+
+// All averages of factors kLargestDirect and above: at most a 4096th of the raster's samples. Empty for a raster whose
+// overviews have them (KeepsCoarse).
 class CoarseAverages {
  public:
-  struct Grid {
-    std::int64_t columns = 0, rows = 0;
-    std::vector<float> heights;
-  };
+  using Grid = AveragesGrid;
 
   // Grids of voids, in the shape that a raster's have.
   static CoarseAverages ShapedFor(const RasterLayout& layout);

@@ -4,7 +4,6 @@
 // final name. Everything has checksums. A file that does not match is reported in the log and made again.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -12,47 +11,15 @@
 #include <stop_token>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include "engine/core/result.h"
+#include "engine/dem/statistics/cache_folder.h"
+#include "engine/dem/statistics/cached_averages.h"
+#include "engine/dem/statistics/open_file.h"
 #include "engine/dem/statistics/raster_statistics.h"
 
 namespace terrace::dem {
-
-// Owns a file descriptor.
-class OpenFile {
- public:
-  explicit OpenFile(int descriptor = -1) : descriptor_(descriptor) {}
-  OpenFile(OpenFile&& other) noexcept : descriptor_(std::exchange(other.descriptor_, -1)) {}
-  OpenFile& operator=(OpenFile&& other) noexcept {
-    std::swap(descriptor_, other.descriptor_);
-    return *this;
-  }
-  ~OpenFile();
-  int get() const { return descriptor_; }
-  bool is_open() const { return descriptor_ >= 0; }
-
- private:
-  int descriptor_;
-};
-
-// Identifies a file as long as it exists, whatever its content.
-struct FileIdentity {
-  std::uint64_t device = 0, inode = 0;
-
-  friend bool operator==(const FileIdentity&, const FileIdentity&) = default;
-};
-
-// Rasters with more samples than this and without overviews get averages in the cache. So no tile reads more samples.
-inline constexpr std::int64_t kMaxSamplesWithoutAverages = std::int64_t{4096} * 4096;
-bool NeedsAverages(const RasterLayout& layout);
-
-// The smallest factor of averages in a cache file. kLargestDirect: none, because the statistics have the averages from
-// that factor on. Rasters that need averages keep those by 2. Others of 1024 x 1024 samples and more without overviews
-// keep those by 4, so that a tile reads at most about four samples per node. They take a third of a byte per sample;
-// the averages by 2 would take four times as much and save a tenth of the tiles that read them (docs/performance.md).
-int LeastKeptFactor(const RasterLayout& layout);
 
 // The layout with the rules for detected nodata, and without overviews if there is any.
 RasterLayout WithDetectedNodata(RasterLayout layout, const DetectedNodata& detected);
@@ -64,38 +31,7 @@ struct StatisticsShape {
   DetectedNodata detected;  // stored in the file
 
   RasterLayout EffectiveLayout() const { return WithDetectedNodata(layout, detected); }
-  int least_kept_factor() const { return LeastKeptFactor(EffectiveLayout()); }
-};
-
-// Averages of factors LeastKeptFactor .. kLargestDirect / 2 in a finished cache file. Thread-safe. Opens the file for
-// each read, because a dataset may have thousands of them.
-class CachedAverages {
- public:
-  // `file`: the open cache file at `path`.
-  CachedAverages(const OpenFile& file, std::string path, RasterLayout layout, std::vector<std::uint64_t> offsets);
-
-  bool Has(int factor) const { return factor >= least_ && factor < kLargestDirect; }
-  // The same values as ReadGrid. kInvalidArgument: the file is damaged or gone. kUnavailable: it cannot be opened now.
-  // Precondition: Has(factor).
-  Result<std::vector<float>> Read(int factor, const GridWindow& window) const;
-
-  // Removes the file, unless another one has replaced it.
-  void Discard() const;
-
-  // By all reads so far.
-  std::uint64_t bytes_read() const { return bytes_read_; }
-
- private:
-  Result<OpenFile> Open() const;
-  Result<void> CopyChunk(const OpenFile& file, int factor, int index, const GridWindow& window, float* out) const;
-
-  FileIdentity identity_;
-  std::string path_;
-  RasterLayout layout_;
-  int least_;  // factor
-  ChunkGrid chunks_;
-  std::vector<std::uint64_t> offsets_;  // by chunk, of its averages; 0: void
-  mutable std::atomic<std::uint64_t> bytes_read_{0};
+  unsigned kept_factors() const { return KeptFactors(EffectiveLayout()); }
 };
 
 struct CachedStatistics {
@@ -112,9 +48,9 @@ std::optional<CachedStatistics> LoadStatistics(const std::string& path, const St
 class StatisticsCacheWriter {
  public:
   // Waits while another process writes the file; returns nothing if that one has finished it. kUnavailable: the folder
-  // is not writable. kCancelled: stopped.
-  static Result<std::optional<StatisticsCacheWriter>> Open(const std::string& path, const StatisticsShape& shape,
-                                                           const std::stop_token& stop);
+  // is not writable, or files in use take its budget. kCancelled: stopped.
+  static Result<std::optional<StatisticsCacheWriter>> Open(std::shared_ptr<CacheFolder> folder, const std::string& path,
+                                                           const StatisticsShape& shape, const std::stop_token& stop);
 
   // Includes the detected nodata of an interrupted run.
   const StatisticsShape& shape() const { return shape_; }
@@ -132,18 +68,22 @@ class StatisticsCacheWriter {
   Result<void> Finish(const RasterStatistics& statistics);
 
  private:
-  StatisticsCacheWriter(OpenFile file, std::string path, const StatisticsShape& shape);
+  StatisticsCacheWriter(std::shared_ptr<CacheFolder> folder, OpenFile file, std::string path,
+                        const StatisticsShape& shape);
   Result<void> Begin();
   void KeepWholeChunks(const std::function<void(const ChunkStatistics&)>& keep);
   Result<void> Cut();
   Result<void> Write(std::string_view bytes);
+  void Remove();
 
+  std::shared_ptr<CacheFolder> folder_;
   OpenFile file_;
   std::string path_;
   StatisticsShape shape_;
   RasterLayout layout_;  // the effective one
   ChunkGrid chunks_;
   std::uint64_t end_ = 0;
+  std::uint64_t reserved_ = 0;  // bytes
   std::vector<std::uint64_t> offsets_;
 };
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "engine/dem/gdal/file_content.h"
+#include "engine/dem/statistics/cache_folder.h"
 #include "tiler/encoder_version.h"
 
 namespace terrace::cli {
@@ -85,7 +86,7 @@ std::uint64_t GenerationOf(const config::DatasetConfig& wanted, const tiler::Dat
 
 }  // namespace
 
-Result<std::unique_ptr<dem::DemSource>> OpenSource(const config::DatasetConfig& wanted, const std::string& cache_dir,
+Result<std::unique_ptr<dem::DemSource>> OpenSource(const config::DatasetConfig& wanted, const dem::RasterCache& cache,
                                                    const std::function<void(double)>& progress, std::stop_token stop,
                                                    std::function<void(const Error&)> fault) {
   dem::DemOptions options;
@@ -94,7 +95,7 @@ Result<std::unique_ptr<dem::DemSource>> OpenSource(const config::DatasetConfig& 
   options.floor = wanted.floor;
   options.max_void_gap = wanted.max_void_gap;
   options.voids = wanted.voids;
-  options.cache_dir = cache_dir;
+  options.cache = cache;
   options.feather = wanted.feather;
   options.progress = progress;
   options.stop = std::move(stop);
@@ -103,9 +104,9 @@ Result<std::unique_ptr<dem::DemSource>> OpenSource(const config::DatasetConfig& 
 }
 
 Result<tiler::Dataset> MakeDataset(const config::DatasetConfig& wanted, std::shared_ptr<const dem::DemSource> source,
-                                   const std::string& cache_dir, const std::string& version, std::stop_token stop) {
+                                   const dem::RasterCache& cache, const std::string& version, std::stop_token stop) {
   const dem::GeoBounds bounds = source->info().bounds;
-  const dem::FileContentOptions content{cache_dir, std::move(stop)};
+  const dem::FileContentOptions content{cache.folder ? cache.folder->path() : std::string(), std::move(stop)};
   auto water = OpenWater(wanted.water, bounds, content);
   if (!water) return tl::unexpected(water.error());
   auto imagery = OpenImagery(wanted.imagery, bounds, content);
@@ -126,12 +127,12 @@ Result<tiler::Dataset> MakeDataset(const config::DatasetConfig& wanted, std::sha
   return dataset;
 }
 
-Result<tiler::Dataset> OpenDataset(const config::DatasetConfig& wanted, const std::string& cache_dir,
+Result<tiler::Dataset> OpenDataset(const config::DatasetConfig& wanted, const dem::RasterCache& cache,
                                    const std::string& version, const std::function<void(double)>& progress,
                                    std::stop_token stop) {
-  auto source = OpenSource(wanted, cache_dir, progress, stop);
+  auto source = OpenSource(wanted, cache, progress, stop);
   if (!source) return tl::unexpected(source.error());
-  return MakeDataset(wanted, *std::move(source), cache_dir, version, std::move(stop));
+  return MakeDataset(wanted, *std::move(source), cache, version, std::move(stop));
 }
 
 }  // namespace terrace::cli

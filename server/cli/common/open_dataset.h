@@ -13,9 +13,9 @@
 
 namespace terrace::cli {
 
-// Opens and scans all files of the dataset; statistics are kept in `cache_dir`, if it is not empty. Errors name the
-// file and the remedy. `fault`: dem::DemOptions.
-Result<std::unique_ptr<dem::DemSource>> OpenSource(const config::DatasetConfig& wanted, const std::string& cache_dir,
+// Opens and scans all files of the dataset; statistics are kept in `cache`. Errors name the file and the remedy.
+// `fault`: dem::DemOptions.
+Result<std::unique_ptr<dem::DemSource>> OpenSource(const config::DatasetConfig& wanted, const dem::RasterCache& cache,
                                                    const std::function<void(double)>& progress,
                                                    std::stop_token stop = {},
                                                    std::function<void(const Error&)> fault = {});
@@ -23,10 +23,10 @@ Result<std::unique_ptr<dem::DemSource>> OpenSource(const config::DatasetConfig& 
 // A dataset of an open source, with its water mask and its imagery, ready to be served. `version`: of this program; it
 // stands in tiles, and another one is another generation.
 Result<tiler::Dataset> MakeDataset(const config::DatasetConfig& wanted, std::shared_ptr<const dem::DemSource> source,
-                                   const std::string& cache_dir, const std::string& version, std::stop_token stop = {});
+                                   const dem::RasterCache& cache, const std::string& version, std::stop_token stop = {});
 
 // OpenSource and MakeDataset.
-Result<tiler::Dataset> OpenDataset(const config::DatasetConfig& wanted, const std::string& cache_dir,
+Result<tiler::Dataset> OpenDataset(const config::DatasetConfig& wanted, const dem::RasterCache& cache,
                                    const std::string& version, const std::function<void(double)>& progress = {},
                                    std::stop_token stop = {});
 

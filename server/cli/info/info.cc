@@ -20,37 +20,32 @@
 #include "engine/core/plain_number.h"
 #include "engine/dem/dem_source.h"
 #include "engine/dem/gdal/source_policy.h"
+#include "engine/dem/statistics/cache_folder.h"
 #include "engine/geo/error_ladder.h"
 #include "server/cli/common/command.h"
 #include "server/cli/common/fail.h"
+#include "server/cli/common/open_cache.h"
 #include "server/cli/common/open_dataset.h"
 #include "server/cli/common/option_flags.h"
 #include "server/cli/common/progress.h"
 #include "server/cli/common/source_files.h"
-#include "server/cli/common/try_folder.h"
 #include "server/cli/info/mosaic_info.h"
 #include "tiler/encoder_version.h"
 
 namespace terrace::cli {
 namespace {
 
-// Averages of half, a quarter .. of the samples take a third of them, in floats.
-constexpr double kAveragesBytesPerSample = 4.0 / 3;
-
+// Why shallow tiles are quick all the same, or how to make them so.
 std::string NoOverviewsAdvice(const dem::RasterInfo& info) {
-  if (info.prepared) return "no overviews: their place is taken by averages in the cache folder";
-  if (!info.overviews_unused.empty()) {
-    return fmt::format(
-        "overviews not used: {}; or serve with a cache_dir: averages are then prepared there once, about {:.0f} MB in "
-        "about {:.0f} s",
-        info.overviews_unused, std::ceil(static_cast<double>(info.valid_samples) * kAveragesBytesPerSample / 1e6),
-        std::ceil(info.seconds_to_open));
+  constexpr int kQuick = 4;
+  const std::string what =
+      info.overviews_unused.empty() ? "no overviews" : fmt::format("overviews not used: {}", info.overviews_unused);
+  if (info.is_in_folder) return what + "; their place is taken by averages in the cache folder";
+  if (info.least_kept_factor > 0 && info.least_kept_factor <= kQuick) {
+    return what + "; their place is taken by averages in memory, made at every start: a cache_dir would keep them";
   }
-  return fmt::format(
-      "no overviews: shallow tiles read the whole raster; run 'gdaladdo -r average {}', or serve with a cache_dir: its "
-      "averages are then prepared there once, about {:.0f} MB in about {:.0f} s",
-      info.path, std::ceil(static_cast<double>(info.valid_samples) * kAveragesBytesPerSample / 1e6),
-      std::ceil(info.seconds_to_open));
+  return fmt::format("{}; shallow tiles read {}: give terrace a cache_dir with room, or run 'gdaladdo -r average {}'",
+                     what, info.least_kept_factor > 0 ? "many samples" : "the whole raster", info.path);
 }
 
 // What a user should do about this raster; empty when nothing.
@@ -178,46 +173,44 @@ std::vector<std::vector<config::SourceConfig>> Datasets(const std::vector<std::s
 
 struct InfoArguments {
   std::vector<std::string> dems;
-  std::map<std::string, std::string> dataset_flags;  // by option key
-  std::string cache_dir;
+  std::map<std::string, std::string> dataset_flags, cache_flags;  // by option key
   bool json = false, mosaic = false;
 };
 
 int Info(const InfoArguments& arguments) {
   spdlog::set_level(spdlog::level::err);  // what opening logs is printed below
-  const auto& [dems, dataset_flags, cache_dir, json, mosaic] = arguments;
+  const auto& [dems, dataset_flags, cache_flags, json, mosaic] = arguments;
   config::DatasetConfig flags;
+  config::Config config;
   std::vector<config::ConfigError> wrong;
   std::error_code unnamed;
   const std::filesystem::path directory = std::filesystem::current_path(unnamed);
   for (const auto& [key, text] : dataset_flags) config::SetDatasetOption(key, text, directory, flags, wrong);
+  for (const auto& [key, text] : cache_flags) config::SetServerOption(key, text, directory, config, wrong);
   for (const config::ConfigError& error : wrong) Fail(error.path + ": " + error.message, kExitUsage);
   if (!wrong.empty()) return kExitUsage;
   int exit_code = dem::AllowVrts() ? kExitOk : kExitFailure;
-  if (!cache_dir.empty()) {
-    if (const auto folder = TryFolder(cache_dir); !folder) {
-      std::fprintf(stderr, "terrace: --cache-dir: %s; what is learnt anew is not kept\n",
-                   folder.error().message.c_str());
-    }
-  }
+  const dem::RasterCache cache = OpenCache(config);
+  std::string trouble;
   nlohmann::json all = nlohmann::json::array();
   for (const auto& sources : Datasets(dems, mosaic, exit_code)) {
     const std::string name = NameOf(sources);
-    Progress progress((cache_dir.empty() ? "reading " : "preparing ") + name, FileCount(sources));
+    Progress progress((cache.folder ? "preparing " : "reading ") + name, FileCount(sources));
     config::DatasetConfig dataset = flags;
     dataset.sources = sources;
     std::vector<Error> faults;  // of files, all of them
-    auto opened = OpenSource(dataset, cache_dir, progress.Callback(), {},
+    auto opened = OpenSource(dataset, cache, progress.Callback(), {},
                              [&faults](const Error& fault) { faults.push_back(fault); });
     if (!opened) {
       if (faults.empty()) faults.push_back(opened.error());
       for (const Error& fault : faults) exit_code = Fail(fault.message, kExitFailure);
       continue;
     }
+    if (cache.folder && trouble.empty()) trouble = cache.folder->trouble();
     const std::shared_ptr<const dem::DemSource> source = *std::move(opened);
     const dem::DemInfo& info = source->info();
     const bool is_one = info.sources.size() == 1;
-    const auto served = MakeDataset(dataset, source, cache_dir, TERRACE_VERSION);
+    const auto served = MakeDataset(dataset, source, cache, TERRACE_VERSION);
     if (!served) {
       exit_code = Fail(served.error().message, kExitFailure);
       continue;
@@ -233,6 +226,11 @@ int Info(const InfoArguments& arguments) {
       for (const std::string& file : info.left_out) fmt::print("  {:<14}{}\n", "left out", file);
     }
   }
+  if (!trouble.empty()) {
+    std::fprintf(stderr, "terrace: cache_dir %s: %s; what is learnt anew is not kept there\n",
+                 cache.folder->path().c_str(), trouble.c_str());
+  }
+  if (cache.folder) cache.folder->Trim();
   if (json) fmt::print("{}\n", all.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
   return exit_code;
 }
@@ -261,10 +259,9 @@ void AddInfo(CLI::App& app, int& exit_code) {
                      [](const auto& option) { return option.key != "vertical" && option.key != "nodata"; }),
       about_heights.end());
   AddFlags(*command, about_heights, "Heights, as for terrace serve", arguments->dataset_flags);
-  command
-      ->add_option("--cache-dir", arguments->cache_dir,
-                   "Folder to keep statistics of the rasters in, for 'terrace serve --cache-dir'")
-      ->type_name("DIR");
+  std::vector<config::OptionInfo> about_cache = config::ServerOptions();
+  std::erase_if(about_cache, [](const auto& option) { return !option.key.starts_with("cache_dir"); });
+  AddFlags(*command, about_cache, "What is learnt of the rasters, as for terrace serve", arguments->cache_flags);
   command->callback([arguments, &exit_code] { exit_code = FinishOutput(Info(*arguments)); });
 }
 

@@ -25,8 +25,10 @@
 #include "config/options/options.h"
 #include "config/parse.h"
 #include "engine/dem/gdal/gdal_runtime.h"
+#include "engine/dem/statistics/cache_folder.h"
 #include "server/cli/common/command.h"
 #include "server/cli/common/fail.h"
+#include "server/cli/common/open_cache.h"
 #include "server/cli/common/open_dataset.h"
 #include "server/cli/common/option_flags.h"
 #include "server/cli/common/progress.h"
@@ -169,12 +171,12 @@ config::Config MakeConfig(const ServeArguments& arguments, std::vector<config::C
 }
 
 // Opens every source; false if one could not be, after all of them had their message, or if it was stopped.
-bool OpenDatasets(const config::Config& config, const std::stop_token& stop, std::vector<tiler::Dataset>& datasets) {
+bool OpenDatasets(const config::Config& config, const dem::RasterCache& cache, const std::stop_token& stop,
+                  std::vector<tiler::Dataset>& datasets) {
   bool all_open = true;
   for (const config::DatasetConfig& wanted : config.datasets) {
-    Progress progress((config.cache_dir.empty() ? "reading " : "preparing ") + NameOf(wanted.sources),
-                      FileCount(wanted.sources));
-    Result<tiler::Dataset> dataset = OpenDataset(wanted, config.cache_dir, TERRACE_VERSION, progress.Callback(), stop);
+    Progress progress((cache.folder ? "preparing " : "reading ") + NameOf(wanted.sources), FileCount(wanted.sources));
+    Result<tiler::Dataset> dataset = OpenDataset(wanted, cache, TERRACE_VERSION, progress.Callback(), stop);
     if (stop.stop_requested()) return false;
     if (!dataset) {
       std::fprintf(stderr, "terrace: dataset %s: %s\n", wanted.name.c_str(), dataset.error().message.c_str());
@@ -269,6 +271,8 @@ int Serve(const ServeArguments& arguments) {
       *disk ? std::shared_ptr<tiler::RefinementStore>(*disk, (*disk)->refinements()) : nullptr);
   options.disk_cache = *std::move(disk);
   options.refinement_stats = [refinements] { return refinements->stats(); };
+  const dem::RasterCache cache = OpenCache(config);
+  options.cache_trouble = [folder = cache.folder] { return folder ? folder->trouble() : std::string(); };
   std::unique_ptr<server::Reloader> reloader;  // once there is something to look after
   options.on_source_changed = config.watch ? std::function<void()>([&reloader] { reloader->Look(); }) : nullptr;
   options.on_signal[SIGHUP] = [&reloader] {
@@ -291,9 +295,10 @@ int Serve(const ServeArguments& arguments) {
   NotifyOpening();
 
   std::vector<tiler::Dataset> datasets;
-  const bool are_open = OpenDatasets(config, stop_opening.get_token(), datasets);
+  const bool are_open = OpenDatasets(config, cache, stop_opening.get_token(), datasets);
   if (stop_opening.stop_requested()) return server->Wait() ? kExitOk : kExitFailure;
   if (!are_open) return kExitFailure;
+  if (cache.folder) cache.folder->Trim();  // not before: what is wanted now stays
   std::atomic<std::size_t> count = datasets.size();
   const auto catalog_of = [refinements](const std::vector<tiler::Dataset>& served, const config::Config& now) {
     return server::MakeCatalog(std::make_shared<const tiler::TilePipeline>(served, refinements), now.max_mesh_samples);
@@ -315,8 +320,8 @@ int Serve(const ServeArguments& arguments) {
   server::Reloader::Hooks hooks;
   hooks.load = [&watch] { return watch.Load(); };
   hooks.may_have_changed = [&watch] { return watch.MayHaveChanged(); };
-  hooks.open = [cache_dir = config.cache_dir](const config::DatasetConfig& wanted, std::stop_token stop) {
-    return OpenDataset(wanted, cache_dir, TERRACE_VERSION, {}, std::move(stop));
+  hooks.open = [cache](const config::DatasetConfig& wanted, std::stop_token stop) {
+    return OpenDataset(wanted, cache, TERRACE_VERSION, {}, std::move(stop));
   };
   hooks.publish = [&](const std::vector<tiler::Dataset>& served, const config::Config& now) {
     if (level->exchange(now.log_level) != now.log_level) SetLogLevel(now.log_level);

@@ -59,7 +59,7 @@ TEST(Content, ACopyHasTheSameWithAndWithoutACache) {
   const std::string path = WriteRaster(here, Ground()), copy = CopyOf(path, there);
   const std::uint64_t expected = Fingerprint(path);
   EXPECT_EQ(Fingerprint(copy), expected);
-  for (int i = 0; i < 2; ++i) EXPECT_EQ(Fingerprint(copy, {.cache_dir = there.File("cache")}), expected) << i;
+  for (int i = 0; i < 2; ++i) EXPECT_EQ(Fingerprint(copy, {.cache = CacheIn(there.File("cache"))}), expected) << i;
 }
 
 TEST(Content, StorageOfTheFileMakesNoDifference) {

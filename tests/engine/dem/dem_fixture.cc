@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <iostream>
 
+#include "engine/dem/statistics/cache_folder.h"
 #include "engine/geo/tile_cover.h"
 #include "tests/support/source_dir.h"
 
@@ -126,5 +127,7 @@ std::vector<std::string> RealRasters() {
           "SainteHelens.dem",
           "n43e007.dt0"};
 }
+
+RasterCache CacheIn(const std::string& folder) { return {std::make_shared<CacheFolder>(folder), nullptr}; }
 
 }  // namespace terrace::dem

@@ -60,6 +60,9 @@ std::unique_ptr<DemSource> OpenOrFail(const std::vector<DemFile>& files, const D
 // of them where the bounds cross the antimeridian.
 std::vector<geo::TileRange> TilesWithData(const DemSource& source, int level);
 
+// Statistics in files of this folder, without a bound, and no averages in memory.
+RasterCache CacheIn(const std::string& folder);
+
 // Tiles across these, at most about `count`.
 std::vector<geo::TileKey> SomeTiles(const DemSource& source, int level, int count);
 

@@ -387,7 +387,7 @@ TEST(Holes, AreKnownFromTheCache) {
   const TempDir dir;
   const VoidAt is_void = [](int c, int r) { return Box(900, 80, 300, 90)(c, r) || Box(0, 0, 50, 20)(c, r); };
   const std::string path = WriteRaster(dir, Raster(1400, 300, Rough, is_void));
-  const DemOptions options{.floor = kFloor, .cache_dir = dir.File("cache")};
+  const DemOptions options{.floor = kFloor, .cache = CacheIn(dir.File("cache"))};
   const auto first = OpenOrFail(path, options), second = OpenOrFail(path, options),
              none = OpenOrFail(path, {.floor = kFloor});
   ASSERT_TRUE(first && second && none);

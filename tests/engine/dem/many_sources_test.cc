@@ -253,7 +253,7 @@ TEST(ManySources, PagedTablesSayWhatKeptOnesDo) {
   const std::string path = WriteRaster(dir, Rough(1500));
   const auto kept = OpenRasterOrFail(path);
   const auto pages = std::make_shared<StatisticsPages>(0, 1);
-  auto opened = RasterSource::Open(path, {}, cache.path().string(), {}, {}, pages);
+  auto opened = RasterSource::Open(path, {}, CacheIn(cache.path().string()), {}, {}, pages);
   ASSERT_TRUE(opened.has_value()) << opened.error().message;
   const RasterSource& paged = **opened;
   EXPECT_EQ(pages->paged_bytes(), 0U) << "nothing was asked for yet";
@@ -278,11 +278,11 @@ TEST(ManySources, PagedTablesSayWhatKeptOnesDo) {
 // A shallow tile takes a few averages of each of hundreds of sources; their samples would take a minute.
 TEST(ManySources, ShallowTilesReadKeptAveragesOfASource) {
   const TempDir dir, cache;
-  const std::string path = WriteRaster(dir, Rough(1500)), small = WriteRaster(dir, Rough(900), "small.tif");
+  const std::string path = WriteRaster(dir, Rough(1500)), small = WriteRaster(dir, Rough(500), "small.tif");
   const auto whole = OpenRasterOrFail(path);
   for (const bool is_known : {false, true}) {
     SCOPED_TRACE(is_known);
-    const auto kept = RasterSource::Open(path, {}, cache.path().string());
+    const auto kept = RasterSource::Open(path, {}, CacheIn(cache.path().string()));
     ASSERT_TRUE(kept.has_value()) << kept.error().message;
     ASSERT_NE((*kept)->averages(), nullptr);
     for (const int factor : {2, 4, 8, 16, 32, 64}) {
@@ -299,7 +299,7 @@ TEST(ManySources, ShallowTilesReadKeptAveragesOfASource) {
       }
     }
   }
-  const auto read_whole = RasterSource::Open(small, {}, cache.path().string());
+  const auto read_whole = RasterSource::Open(small, {}, CacheIn(cache.path().string()));
   ASSERT_TRUE(read_whole.has_value());
   EXPECT_EQ((*read_whole)->averages(), nullptr);
 }
@@ -308,7 +308,7 @@ TEST(ManySources, PagedTablesOfALostFileAreMadeAgain) {
   const TempDir dir, cache;
   const std::string path = WriteRaster(dir, Rough(1100));
   const auto pages = std::make_shared<StatisticsPages>(0, 1);
-  auto opened = RasterSource::Open(path, {}, cache.path().string(), {}, {}, pages);
+  auto opened = RasterSource::Open(path, {}, CacheIn(cache.path().string()), {}, {}, pages);
   ASSERT_TRUE(opened.has_value());
   const RasterSource& raster = **opened;
   const auto drop = [&] {

@@ -56,8 +56,7 @@ TEST(SourceChanges, OneOverwrittenInPlaceWithItsTimesKeptIsAnother) {
                                         "other.tif");  // as low as the first
   ASSERT_EQ(std::filesystem::file_size(path), std::filesystem::file_size(other));
   const auto time = std::filesystem::last_write_time(path);
-  const std::string cache = dir.File("cache");
-  const DemOptions options{.cache_dir = cache};
+  const DemOptions options{.cache = CacheIn(dir.File("cache"))};
   const auto before = OpenOrFail(path, options);
   ASSERT_NE(before, nullptr);
   std::this_thread::sleep_for(std::chrono::milliseconds(20));  // clocks of file systems tick every 4 ms or so

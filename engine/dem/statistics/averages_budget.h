@@ -1,0 +1,31 @@
+// The memory of averages that no cache folder keeps (memory_averages.h).
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+
+namespace terrace::dem {
+
+// Bytes for averages of all rasters of a process. Thread-safe.
+class AveragesBudget {
+ public:
+  static constexpr std::size_t kDefaultBytes = std::size_t{128} << 20;
+
+  explicit AveragesBudget(std::size_t bytes = kDefaultBytes) : left_(bytes) {}
+
+  std::size_t left() const { return left_; }
+  // False: there are not so many left.
+  bool Take(std::size_t bytes) {
+    std::size_t left = left_;
+    while (left >= bytes) {
+      if (left_.compare_exchange_weak(left, left - bytes)) return true;
+    }
+    return false;
+  }
+  void Give(std::size_t bytes) { left_ += bytes; }
+
+ private:
+  std::atomic<std::size_t> left_;
+};
+
+}  // namespace terrace::dem

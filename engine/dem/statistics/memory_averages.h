@@ -1,0 +1,44 @@
+// Averages of a raster in memory, where no cache folder keeps them.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+#include "engine/dem/statistics/averages_budget.h"
+#include "engine/dem/statistics/raster_chunk.h"
+#include "engine/dem/statistics/raster_statistics.h"
+
+namespace terrace::dem {
+
+// Those of KeptFactors from the least factor on that fits. Filled by one thread, then immutable and thread-safe.
+class MemoryAverages {
+ public:
+  // Null: the raster needs none, or none fit. One raster takes at most an eighth of what is left, so that each of many
+  // gets coarse ones at least.
+  static std::unique_ptr<MemoryAverages> Make(const RasterLayout& layout, std::shared_ptr<AveragesBudget> budget);
+  ~MemoryAverages();
+  MemoryAverages(const MemoryAverages&) = delete;
+  MemoryAverages& operator=(const MemoryAverages&) = delete;
+
+  void Add(const Chunk& chunk, const ChunkStatistics& chunk_statistics);
+
+  bool Has(int factor) const;
+  // The same values as ReadGrid. Precondition: Has(factor).
+  std::vector<float> Read(int factor, const GridWindow& window) const;
+  int least_factor() const { return levels_.front().factor; }
+  std::size_t bytes() const { return bytes_; }
+
+ private:
+  struct Level {
+    int factor = 0;
+    AveragesGrid grid;
+  };
+  MemoryAverages(std::shared_ptr<AveragesBudget> budget, std::vector<Level> levels, std::size_t bytes);
+
+  const std::shared_ptr<AveragesBudget> budget_;
+  std::vector<Level> levels_;  // by factor
+  const std::size_t bytes_;
+};
+
+}  // namespace terrace::dem

@@ -1,0 +1,53 @@
+// Files of the cache folder: descriptors, identities, reads of whole ranges.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+
+namespace terrace::dem {
+
+// Owns a file descriptor.
+class OpenFile {
+ public:
+  explicit OpenFile(int descriptor = -1) : descriptor_(descriptor) {}
+  OpenFile(OpenFile&& other) noexcept : descriptor_(std::exchange(other.descriptor_, -1)) {}
+  OpenFile& operator=(OpenFile&& other) noexcept {
+    std::swap(descriptor_, other.descriptor_);
+    return *this;
+  }
+  ~OpenFile();
+  int get() const { return descriptor_; }
+  bool is_open() const { return descriptor_ >= 0; }
+
+ private:
+  int descriptor_;
+};
+
+// Identifies a file as long as it exists, whatever its content.
+struct FileIdentity {
+  std::uint64_t device = 0, inode = 0;
+
+  friend bool operator==(const FileIdentity&, const FileIdentity&) = default;
+};
+
+std::optional<FileIdentity> IdentityOf(int file);
+std::optional<FileIdentity> IdentityOf(const std::string& path);
+
+// 0 if it cannot be told.
+std::uint64_t SizeOf(int file);
+
+// All of it, or false.
+bool ReadAt(int file, std::uint64_t offset, void* to, std::size_t bytes);
+// Nothing where the file, of `file_bytes`, ends before.
+std::optional<std::string> ReadAt(int file, std::uint64_t offset, std::uint64_t bytes, std::uint64_t file_bytes);
+
+// The file counts as used now (CacheFolder). Quietly does nothing where it may not.
+void Touch(int file);
+
+// errno in words.
+std::string ErrorText();
+
+}  // namespace terrace::dem
