@@ -73,6 +73,8 @@ struct CacheFolder::File {
 
 CacheFolder::CacheFolder(std::string path, std::uint64_t max_bytes) : path_(std::move(path)), max_bytes_(max_bytes) {}
 
+CacheFolder::~CacheFolder() = default;
+
 CacheFolder::Use::Use(std::shared_ptr<CacheFolder> folder, const std::string& file)
     : folder_(std::move(folder)), name_(std::filesystem::path(file).filename().string()) {
   const std::lock_guard lock(folder_->mutex_);

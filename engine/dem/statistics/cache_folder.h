@@ -29,6 +29,9 @@ class CacheFolder {
   static constexpr std::uint64_t kMagic = 0x31'53'54'41'54'53'52'54;  // "TRSTATS1", the first bytes of each file
 
   explicit CacheFolder(std::string path, std::uint64_t max_bytes = kUnbounded);
+  ~CacheFolder();
+  CacheFolder(const CacheFolder&) = delete;
+  CacheFolder& operator=(const CacheFolder&) = delete;
 
   const std::string& path() const { return path_; }
   std::uint64_t max_bytes() const { return max_bytes_; }
