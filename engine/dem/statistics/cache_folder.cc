@@ -13,8 +13,6 @@
 #include <optional>
 #include <utility>
 
-#include "engine/dem/statistics/open_file.h"
-
 namespace terrace::dem {
 namespace {
 
@@ -64,14 +62,9 @@ std::optional<Found> LookAt(int folder, const char* name) {
 
 }  // namespace
 
-struct CacheFolder::File {
-  std::string name;  // in the folder
-  FileIdentity identity;
-  std::uint64_t bytes = 0;
-  std::int64_t modified_ns = 0;
-};
-
 CacheFolder::CacheFolder(std::string path, std::uint64_t max_bytes) : path_(std::move(path)), max_bytes_(max_bytes) {}
+
+CacheFolder::~CacheFolder() = default;
 
 CacheFolder::Use::Use(std::shared_ptr<CacheFolder> folder, const std::string& file)
     : folder_(std::move(folder)), name_(std::filesystem::path(file).filename().string()) {

@@ -17,6 +17,7 @@
 #include <string_view>
 
 #include "engine/core/result.h"
+#include "engine/dem/statistics/open_file.h"
 
 namespace terrace::dem {
 
@@ -29,6 +30,9 @@ class CacheFolder {
   static constexpr std::uint64_t kMagic = 0x31'53'54'41'54'53'52'54;  // "TRSTATS1", the first bytes of each file
 
   explicit CacheFolder(std::string path, std::uint64_t max_bytes = kUnbounded);
+  ~CacheFolder();
+  CacheFolder(const CacheFolder&) = delete;
+  CacheFolder& operator=(const CacheFolder&) = delete;
 
   const std::string& path() const { return path_; }
   std::uint64_t max_bytes() const { return max_bytes_; }
@@ -62,7 +66,12 @@ class CacheFolder {
   std::string trouble() const;
 
  private:
-  struct File;
+  struct File {
+    std::string name;  // in the folder
+    FileIdentity identity;
+    std::uint64_t bytes = 0;
+    std::int64_t modified_ns = 0;
+  };
   void Scan();
   void Evict(std::uint64_t bytes);
   bool IsInUse(const std::string& name) const;
