@@ -218,7 +218,7 @@ bool CellErrorBound::IsOnBothEnds(const PixelBounds& box) const {
 
 double CellErrorBound::OfSurroundings(const TileCell& cell, bool gives_way, bool fills,
                                       std::optional<CellSamples>& place) const {
-  const HeightRange& all = tables_.heights();
+  const HeightRange& all = grid_.heights();
   const auto corners = CornersOf(cell);
   if (!corners) return Apart(cell, all.min, all.max);
   PixelBounds box;
