@@ -33,8 +33,6 @@ constexpr std::size_t kHeaderBytes = 36, kChunkHeaderBytes = 32, kFooterBytes = 
 constexpr int kMaxUnsynced = 64;                    // chunks: a few seconds of work
 constexpr std::uint64_t kMaxHeaderBytes = 1 << 16;  // a few numbers and a line of text
 
-constexpr int CeilingOf(int a, int b) { return (a + b - 1) / b; }
-
 std::uint64_t HashOf(std::string_view bytes) { return XXH3_64bits(bytes.data(), bytes.size()); }
 std::string ErrorText() { return std::generic_category().message(errno); }
 
@@ -90,8 +88,8 @@ AveragesPlace PlaceOf(const Chunk& chunk, const RasterLayout& layout, int factor
   AveragesPlace place;
   const int used = std::clamp(layout.columns - chunk.col, 0, chunk.cols);
   for (int f = LeastKeptFactor(layout);; f *= 2) {
-    place.columns = CeilingOf(used, f);
-    place.rows = CeilingOf(chunk.rows, f);
+    place.columns = DivideUp(used, f);
+    place.rows = DivideUp(chunk.rows, f);
     if (f == factor) return place;
     place.offset += sizeof(std::uint64_t) + place.bytes();
   }
@@ -169,19 +167,13 @@ void SyncFolderOf(const std::string& path) {
 
 std::optional<FileIdentity> IdentityOf(int file) {
   struct stat status {};
-  if (::fstat(file, &status) != 0) return std::nullopt;
-  return FileIdentity{status.st_dev, status.st_ino};
+  return ::fstat(file, &status) == 0 ? std::optional<FileIdentity>({status.st_dev, status.st_ino}) : std::nullopt;
 }
 
 std::optional<FileIdentity> IdentityOf(const std::string& path) {
   struct stat status {};
-  if (::stat(path.c_str(), &status) != 0) return std::nullopt;
-  return FileIdentity{status.st_dev, status.st_ino};
-}
-
-bool IsSameFile(int file, const std::string& path) {
-  const auto opened = IdentityOf(file);
-  return opened && opened == IdentityOf(path);
+  return ::stat(path.c_str(), &status) == 0 ? std::optional<FileIdentity>({status.st_dev, status.st_ino})
+                                            : std::nullopt;
 }
 
 }  // namespace
@@ -262,7 +254,7 @@ Result<std::vector<float>> CachedAverages::Read(int factor, const GridWindow& wi
   const Result<OpenFile> file = Open();
   if (!file) return tl::unexpected(file.error());
   std::vector<float> heights(static_cast<std::size_t>(window.columns * window.rows), SampleRules::kVoid);
-  const std::int64_t count = CeilingOf(layout_.columns, factor), side = ChunkGrid::kSide / factor;
+  const std::int64_t count = DivideUp(layout_.columns, factor), side = ChunkGrid::kSide / factor;
   const auto turn = [&](std::int64_t column) { return column >= 0 ? column / count : -((count - 1 - column) / count); };
   for (std::int64_t t = turn(window.column); t <= turn(window.column + window.columns - 1); ++t) {
     GridWindow here = window;
@@ -351,7 +343,7 @@ Result<std::optional<StatisticsCacheWriter>> StatisticsCacheWriter::Open(const s
       continue;
     }
     // Whoever had the lock before may have renamed the file, or removed it.
-    if (!IsSameFile(file.get(), partial)) continue;
+    if (const auto opened = IdentityOf(file.get()); !opened || opened != IdentityOf(partial)) continue;
     if (waiting && LoadStatistics(path, shape)) {
       ::unlink(partial.c_str());
       return std::nullopt;
