@@ -12,9 +12,9 @@
 #include "engine/tin/mesh/candidate_queue.h"
 #include "engine/tin/mesh/triangulation.h"
 #include "engine/tin/sagitta.h"
-#include "engine/tin/scan/squared_distances.h"
 #include "engine/tin/scan/squared_errors.h"
 #include "engine/tin/scan/triangle_scan.h"
+#include "engine/tin/scan/triangle_spans.h"
 
 namespace terrace::tin {
 namespace {

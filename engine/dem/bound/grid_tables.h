@@ -13,9 +13,6 @@ class GridTables {
   // `grid` and `trace` must outlive this.
   GridTables(const RasterGrid& grid, const GridTrace& trace);
 
-  // Of the whole raster grid.
-  const HeightRange& heights() const { return grid_.heights(); }
-
   // Members visited by all queries so far. For tests: a query visits the members that its box meets.
   std::size_t members_visited() const { return members_visited_; }
 

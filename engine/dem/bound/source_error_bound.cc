@@ -159,25 +159,16 @@ class GridErrorBound {
     return !(at.west <= at.east) || has_voids();
   }
 
-  bool IsPartlyCovered(const CellBox& box) const {
+  bool HasCell(const CellBox& box, std::uint8_t covered) const {
     for (int j = box.south; j < box.north; ++j) {
       const auto first = tile_.covered_.begin() + static_cast<std::ptrdiff_t>(CellIndex(box.west, j));
-      if (std::any_of(first, first + (box.east - box.west), [](std::uint8_t covered) { return covered != 0; })) {
-        return true;
-      }
+      const auto end = first + (box.east - box.west);
+      if (std::find(first, end, covered) != end) return true;
     }
     return false;
   }
-
-  bool IsCovered(const CellBox& box) const {
-    for (int j = box.south; j < box.north; ++j) {
-      const auto first = tile_.covered_.begin() + static_cast<std::ptrdiff_t>(CellIndex(box.west, j));
-      if (std::any_of(first, first + (box.east - box.west), [](std::uint8_t covered) { return covered == 0; })) {
-        return false;
-      }
-    }
-    return true;
-  }
+  bool IsPartlyCovered(const CellBox& box) const { return HasCell(box, 1); }
+  bool IsCovered(const CellBox& box) const { return !HasCell(box, 0); }
 
   void AddGroup(const CellBox& box) {
     if (IsCovered(box) || !Touches(box)) return;

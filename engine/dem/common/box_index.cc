@@ -1,9 +1,12 @@
 #include "engine/dem/common/box_index.h"
 
 #include <algorithm>
+#include <boost/geometry/algorithms/covered_by.hpp>
+#include <boost/geometry/algorithms/equals.hpp>
 #include <boost/geometry/geometries/box.hpp>
 #include <boost/geometry/geometries/point.hpp>
 #include <boost/geometry/index/rtree.hpp>
+#include <boost/geometry/strategies/index/cartesian.hpp>
 #include <boost/geometry/strategies/relate/cartesian.hpp>
 #include <utility>
 
@@ -16,10 +19,12 @@ using Value = std::pair<Rectangle, std::size_t>;
 
 Rectangle RectangleOf(const Box& box) { return {{box.west, box.south}, {box.east, box.north}}; }
 
+Value ValueOf(const BoxIndex::Entry& entry) { return {RectangleOf(entry.box), entry.value}; }
+
 std::vector<Value> ValuesOf(const std::vector<BoxIndex::Entry>& entries) {
   std::vector<Value> values;
   values.reserve(entries.size());
-  for (const BoxIndex::Entry& entry : entries) values.emplace_back(RectangleOf(entry.box), entry.value);
+  for (const BoxIndex::Entry& entry : entries) values.push_back(ValueOf(entry));
   return values;
 }
 
@@ -28,14 +33,16 @@ std::vector<Value> ValuesOf(const std::vector<BoxIndex::Entry>& entries) {
 struct BoxIndex::Tree {
   explicit Tree(const std::vector<Value>& values) : tree(values) {}
 
-  boost::geometry::index::rtree<Value, boost::geometry::index::rstar<16>> tree;
+  boost::geometry::index::rtree<Value, boost::geometry::index::quadratic<16>> tree;
 };
 
 BoxIndex::BoxIndex() = default;
-BoxIndex::BoxIndex(const std::vector<Entry>& entries) : tree_(std::make_unique<const Tree>(ValuesOf(entries))) {}
+BoxIndex::BoxIndex(const std::vector<Entry>& entries) : tree_(std::make_unique<Tree>(ValuesOf(entries))) {}
 BoxIndex::BoxIndex(BoxIndex&&) noexcept = default;
 BoxIndex& BoxIndex::operator=(BoxIndex&&) noexcept = default;
 BoxIndex::~BoxIndex() = default;
+
+void BoxIndex::Remove(const Entry& entry) { tree_->tree.remove(ValueOf(entry)); }
 
 std::vector<std::size_t> BoxIndex::Find(const Box& box) const {
   std::vector<std::size_t> found;

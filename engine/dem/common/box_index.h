@@ -13,7 +13,7 @@ struct Box {
   void Grow(double x, double y) { west -= x, east += x, south -= y, north += y; }
 };
 
-// An R-tree. Immutable and thread-safe; an empty index finds nothing.
+// An R-tree. Thread-safe unless entries are removed; an empty index finds nothing.
 class BoxIndex {
  public:
   struct Entry {
@@ -30,9 +30,12 @@ class BoxIndex {
   // The values of the entries that meet the box, edges included; ascending, each once.
   std::vector<std::size_t> Find(const Box& box) const;
 
+  // Precondition: the index was made with this entry.
+  void Remove(const Entry& entry);
+
  private:
   struct Tree;
-  std::unique_ptr<const Tree> tree_;
+  std::unique_ptr<Tree> tree_;
 };
 
 }  // namespace terrace::dem

@@ -205,7 +205,8 @@ Result<void> ReadSamples(GDALRasterBand& band, const SampleRules& rules, int col
       ConvertPlain(rules, type, raw.get(), samples, out);
     } else {
       for (std::size_t i = 0; i < samples; ++i) {
-        out[i] = rules.has_mask && mask[i] == 0 ? rules.Hidden() : rules.ToHeight(doubles[i]);
+        const bool is_hidden = rules.has_mask && mask[i] == 0;
+        out[i] = !is_hidden ? rules.ToHeight(doubles[i]) : rules.is_indicator ? 0.0f : SampleRules::kVoid;
       }
     }
     out += samples;

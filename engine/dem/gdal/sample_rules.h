@@ -53,9 +53,6 @@ struct SampleRules {
 
   double Metres(double raw) const { return (raw * scale + offset) * metres_per_unit; }
 
-  // What a sample that a mask band hides becomes.
-  float Hidden() const { return is_indicator ? 0.0f : kVoid; }
-
   static constexpr float kVoid = __builtin_nanf("");
 };
 

@@ -2,13 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <boost/geometry/algorithms/covered_by.hpp>
-#include <boost/geometry/algorithms/equals.hpp>
-#include <boost/geometry/geometries/box.hpp>
-#include <boost/geometry/geometries/point.hpp>
-#include <boost/geometry/index/rtree.hpp>
-#include <boost/geometry/strategies/index/cartesian.hpp>
-#include <boost/geometry/strategies/relate/cartesian.hpp>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -20,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "engine/dem/common/box_index.h"
 #include "engine/dem/crs/georeference.h"
 #include "engine/dem/crs/vertical_datum.h"
 #include "engine/dem/mosaic/grid_members.h"
@@ -204,33 +198,22 @@ std::optional<std::int64_t> ColumnBeside(const geo::TileRange& pixels, Member me
 // The members of a grid that are in no group yet, by their pixels.
 class Ungrouped {
  public:
-  Ungrouped(const std::vector<Member>& members, std::int64_t turn) : turn_(turn), tree_(EntriesOf(members)) {}
+  Ungrouped(const std::vector<Member>& members, std::int64_t turn) : turn_(turn), index_(EntriesOf(members)) {}
 
   // At least those that touch `pixels`, ascending; the grid repeats itself.
   std::vector<std::size_t> Near(const geo::TileRange& pixels) const {
-    std::vector<std::size_t> found;
-    const geo::TileRange wide = Canonical({pixels.start_x - 1, pixels.start_y - 1, pixels.end_x + 1, pixels.end_y + 1});
-    for (auto it = tree_.qbegin(boost::geometry::index::intersects(BoxOf(wide))); it != tree_.qend(); ++it) {
-      found.push_back(it->second);
-    }
-    std::ranges::sort(found);
-    found.erase(std::unique(found.begin(), found.end()), found.end());
-    return found;
+    return index_.Find(BoxOf(Canonical({pixels.start_x - 1, pixels.start_y - 1, pixels.end_x + 1, pixels.end_y + 1})));
   }
 
   // As it was when the index was made.
   void Remove(const Member& member, std::size_t number) {
-    for (const Entry& entry : EntriesOf(member, number)) tree_.remove(entry);
+    for (const BoxIndex::Entry& entry : EntriesOf(member, number)) index_.Remove(entry);
   }
 
  private:
-  using Point = boost::geometry::model::point<double, 2, boost::geometry::cs::cartesian>;
-  using Rectangle = boost::geometry::model::box<Point>;
-  using Entry = std::pair<Rectangle, std::size_t>;
-
-  static Rectangle BoxOf(const geo::TileRange& pixels) {
+  static Box BoxOf(const geo::TileRange& pixels) {
     const auto at = [](std::int64_t pixel) { return static_cast<double>(pixel); };
-    return {{at(pixels.start_x), at(pixels.start_y)}, {at(pixels.end_x), at(pixels.end_y)}};
+    return {at(pixels.start_x), at(pixels.start_y), at(pixels.end_x), at(pixels.end_y)};
   }
 
   // From the first turn on; of all columns where it goes around or nearly so.
@@ -242,25 +225,26 @@ class Ungrouped {
     return pixels;
   }
 
-  std::vector<Entry> EntriesOf(const Member& member, std::size_t number) const {
-    std::vector<Entry> entries;
+  std::vector<BoxIndex::Entry> EntriesOf(const Member& member, std::size_t number) const {
+    std::vector<BoxIndex::Entry> entries;
     const geo::TileRange pixels = Canonical(member.pixels());
     for (const std::int64_t turns : {0, -1, 1}) {
-      entries.emplace_back(
-          BoxOf({pixels.start_x + turns * turn_, pixels.start_y, pixels.end_x + turns * turn_, pixels.end_y}), number);
+      entries.push_back(
+          {BoxOf({pixels.start_x + turns * turn_, pixels.start_y, pixels.end_x + turns * turn_, pixels.end_y}),
+           number});
       if (turn_ == 0) break;
     }
     return entries;
   }
-  std::vector<Entry> EntriesOf(const std::vector<Member>& members) const {
-    std::vector<Entry> all;
+  std::vector<BoxIndex::Entry> EntriesOf(const std::vector<Member>& members) const {
+    std::vector<BoxIndex::Entry> all;
     for (std::size_t i = 0; i < members.size(); ++i)
       std::ranges::copy(EntriesOf(members[i], i), std::back_inserter(all));
     return all;
   }
 
   const std::int64_t turn_;
-  boost::geometry::index::rtree<Entry, boost::geometry::index::quadratic<16>> tree_;
+  BoxIndex index_;
 };
 
 // Groups of members that touch, by their numbers. A member's column becomes the one beside those that it touches.

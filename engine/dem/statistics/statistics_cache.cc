@@ -209,7 +209,7 @@ Result<std::optional<StatisticsCacheWriter>> StatisticsCacheWriter::Open(std::sh
       continue;
     }
     // Whoever had the lock before may have renamed the file, or removed it.
-    if (!IsSameFile(file.get(), partial)) continue;
+    if (const auto opened = IdentityOf(file.get()); !opened || opened != IdentityOf(partial)) continue;
     if (waiting && LoadStatistics(path, shape)) {
       ::unlink(partial.c_str());
       return std::nullopt;

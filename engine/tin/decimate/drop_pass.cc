@@ -15,7 +15,7 @@
 #include "engine/tin/mesh/hole.h"
 #include "engine/tin/mesh/predicates.h"
 #include "engine/tin/sagitta.h"
-#include "engine/tin/scan/triangle_fit.h"
+#include "engine/tin/scan/triangle_spans.h"
 
 namespace terrace::tin {
 namespace {

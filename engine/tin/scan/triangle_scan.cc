@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "engine/tin/scan/first_sample.h"
+#include "engine/tin/scan/triangle_spans.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "engine/tin/scan/triangle_scan.cc"

@@ -1,10 +1,14 @@
-// The samples that a triangle is scanned for: exact integer spans, row by row.
+// The samples that a triangle is scanned for: exact integer spans, row by row, and what loops over them find.
 #pragma once
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
+#include <cstdint>
 
+#include "engine/tin/mesh/height_field.h"
 #include "engine/tin/mesh/plane.h"
+#include "engine/tin/mesh/star.h"
 
 namespace terrace::tin {
 
@@ -61,5 +65,18 @@ void ForEachInnerSpan(const std::array<Corner, 3>& sorted, double doubled_area, 
   }
   if (middle.y == high.y && high.y < height - 1) clipped(high.y, middle.x + 1, high.x - 1);
 }
+
+// Sum of the squared vertical distances, in square metres, of the samples that ForEachInnerSpan visits. Samples on an
+// edge count one half in each of the two triangles. Voids are skipped. Safe to call from many threads at once.
+double SquaredDistances(const HeightField& field, const std::array<Corner, 3>& corners);
+
+// Whether no valid sample of the triangle is more than `bound` metres from its plane, vertically. The samples are those
+// of ForEachInnerSpan: of the closed triangle, without its corners and the field's border. A negative bound asks
+// whether there are no valid samples. Corners in any order, not on one line. Safe to call from many threads at once.
+bool SamplesAreWithin(const HeightField& field, const std::array<Corner, 3>& corners, double bound);
+
+// Number of the first sample of the star's triangle i that a scan looks at (triangle_scan.h); kNoSample if
+// there is none.
+std::uint32_t FirstSample(const HeightField& field, const Star& star, std::size_t i);
 
 }  // namespace terrace::tin

@@ -8,7 +8,6 @@
 #include <limits>
 #include <vector>
 
-#include "engine/tin/chord_scan.h"
 #include "engine/tin/greedy.h"
 #include "tests/engine/tin/instruction_sets.h"
 #include "tests/engine/tin/mesh_laws.h"

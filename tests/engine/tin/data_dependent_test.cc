@@ -19,7 +19,7 @@
 #include "engine/tin/mesh/quadrilateral.h"
 #include "engine/tin/mesh_error.h"
 #include "engine/tin/sagitta.h"
-#include "engine/tin/scan/squared_distances.h"
+#include "engine/tin/scan/triangle_spans.h"
 #include "tests/engine/tin/mesh_laws.h"
 #include "tests/engine/tin/test_fields.h"
 #include "tests/support/test_data.h"

@@ -19,7 +19,7 @@
 #include "engine/tin/mesh/predicates.h"
 #include "engine/tin/mesh_error.h"
 #include "engine/tin/sagitta.h"
-#include "engine/tin/scan/triangle_fit.h"
+#include "engine/tin/scan/triangle_spans.h"
 #include "tests/engine/tin/mesh_laws.h"
 #include "tests/engine/tin/test_fields.h"
 #include "tests/support/test_data.h"

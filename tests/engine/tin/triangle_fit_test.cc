@@ -1,5 +1,3 @@
-#include "engine/tin/scan/triangle_fit.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "engine/tin/mesh/predicates.h"
-#include "engine/tin/scan/squared_distances.h"
 #include "tests/engine/tin/test_fields.h"
 
 namespace terrace::tin {
