@@ -121,11 +121,6 @@ void SyncFolderOf(const std::string& path) {
   if (opened.is_open()) ::fsync(opened.get());
 }
 
-bool IsSameFile(int file, const std::string& path) {
-  const auto opened = IdentityOf(file);
-  return opened && opened == IdentityOf(path);
-}
-
 }  // namespace
 
 RasterLayout WithDetectedNodata(RasterLayout layout, const DetectedNodata& detected) {
