@@ -80,14 +80,13 @@ class CellSurface {
 
 }  // namespace
 
-// Without what lies beyond the raster grid, which has so many columns and rows.
-SampleBox CellErrorBound::Clipped(SampleBox box, std::int64_t columns, std::int64_t rows) const {
+SampleBox CellErrorBound::Clipped(SampleBox box) const {
   if (!grid_.wraps()) {
     box.west = std::max<std::int64_t>(box.west, 0);
-    box.east = std::min(box.east, columns - 1);
+    box.east = std::min<std::int64_t>(box.east, grid_.columns() - 1);
   }
   box.north = std::max<std::int64_t>(box.north, 0);
-  box.south = std::min(box.south, rows - 1);
+  box.south = std::min<std::int64_t>(box.south, grid_.rows() - 1);
   return box;
 }
 
@@ -130,7 +129,12 @@ double CellErrorBound::OfAverages(const TileCell& cell, bool& has_voids) const {
     }
     around = around.Around(near);
   }
-  around = Clipped(around, columns_, rows_);
+  if (!grid_.wraps()) {
+    around.west = std::max<std::int64_t>(around.west, 0);
+    around.east = std::min(around.east, columns_ - 1);
+  }
+  around.north = std::max<std::int64_t>(around.north, 0);
+  around.south = std::min(around.south, rows_ - 1);
   const GridWindow& window = trace_.window;
   const SampleBox read = {std::max(around.west, window.column), std::max(around.north, window.row),
                           std::min(around.east, window.column + window.columns - 1),
@@ -245,7 +249,7 @@ double CellErrorBound::OfSurroundings(const TileCell& cell, bool gives_way, bool
   double error = Apart(cell, range.min, range.max);
   if (fills) return error;
   error = std::min(error, OfAveragesNear(cell, box));
-  place = CellSamples{*corners, Clipped(CentresIn(box, 0), grid_.columns(), grid_.rows()), gives_way};
+  place = CellSamples{*corners, Clipped(CentresIn(box, 0)), gives_way};
   if (trace_.factor > 1) return error;
   for (const int turn : {0, -1, 1}) {
     if (turn != 0 && !grid_.wraps()) continue;

@@ -70,7 +70,7 @@ class CellErrorBound {
  private:
   std::optional<std::array<Position, 4>> CornersOf(const TileCell& cell) const;
   bool IsOnBothEnds(const PixelBounds& box) const;
-  SampleBox Clipped(SampleBox box, std::int64_t columns, std::int64_t rows) const;
+  SampleBox Clipped(SampleBox box) const;
   double Apart(const TileCell& cell, double lowest, double highest) const;
   double OfBox(const TileCell& cell, const SampleBox& averages, bool& has_voids) const;
   double OfAveragesNear(const TileCell& cell, const PixelBounds& box) const;

@@ -81,11 +81,10 @@ std::vector<float> FeatherWeights(const std::vector<float>& wide_heights, const 
   return weights;
 }
 
-// Whole rows at a time: heights of nodes that are wanted. False: some have none, as a sample around them is void or
-// the geoid is not known there.
-bool FillRows(const std::vector<float>& samples, const GridWindow& window, const NodeCells& cells,
+// Whole rows at a time: heights of nodes that are wanted, where the samples around them give one.
+void FillRows(const std::vector<float>& samples, const GridWindow& window, const NodeCells& cells,
               std::span<const std::uint8_t> wanted, std::span<const double> undulations, std::span<float> heights) {
-  const std::size_t stride = cells.columns().size();
+  const std::size_t stride = cells.columns().size(), rows = cells.rows().size();
   std::vector<std::uint8_t> of_column(stride);
   for (std::size_t n = 0; n < wanted.size(); n += stride) {
     for (std::size_t i = 0; i < stride; ++i) of_column[i] |= wanted[n + i];
@@ -95,24 +94,30 @@ bool FillRows(const std::vector<float>& samples, const GridWindow& window, const
   while (of_column[end - 1] == 0) --end;
   NodeRows lines(samples, window, cells, first, end);
   std::vector<float> rounded(end - first);
-  bool has_voids = false;
-  for (std::size_t j = 0; j < cells.rows().size(); ++j) {
+  for (std::size_t j = 0; j < rows; ++j) {
     const std::size_t of_row = j * stride + first;
     const auto row = wanted.subspan(of_row, rounded.size());
     if (std::ranges::find(row, std::uint8_t{1}) == row.end()) continue;
     const std::span<const double> line = lines.Row(j);
     if (undulations.empty()) {
-      for (std::size_t i = 0; i < row.size(); ++i) rounded[i] = RoundHeight(line[i]);
+      for (std::size_t i = 0; i < line.size(); ++i) rounded[i] = RoundHeight(line[i]);
     } else {
-      for (std::size_t i = 0; i < row.size(); ++i) rounded[i] = RoundHeight(line[i] + undulations[of_row + i]);
+      for (std::size_t i = 0; i < line.size(); ++i) rounded[i] = RoundHeight(line[i] + undulations[of_row + i]);
     }
+    bool has_voids = false;
     for (std::size_t i = 0; i < row.size(); ++i) {
       float& height = heights[of_row + i];
       height = row[i] != 0 ? rounded[i] : height;
       has_voids |= row[i] != 0 && std::isnan(height);
     }
+    for (std::size_t i = 0; has_voids && i < row.size(); ++i) {
+      if (row[i] == 0 || !IsVoid(rounded[i])) continue;
+      if (!undulations.empty() && std::isnan(undulations[of_row + i])) continue;
+      const auto height = Interpolate(samples, window, cells.At(first + i, j));  // without the voids
+      if (!height) continue;
+      heights[of_row + i] = RoundHeight(undulations.empty() ? *height : *height + undulations[of_row + i]);
+    }
   }
-  return !has_voids;
 }
 
 }  // namespace
@@ -321,26 +326,30 @@ Result<void> RasterGrid::FillAt(NodePositions positions, std::span<const std::ui
       return;
     }
     heights[node] = rounded;
+    if (trace != nullptr) trace->heights[node] = rounded;
     if (weights.empty()) return;
     // Every sample has a weight, so this is plain bilinear. What counts nothing would still hide the floor.
     constexpr double kLeast = 0x1p-10;
     const double weight = counts.empty() ? 1 : Interpolate(counts, window, cell).value_or(1);
     weights[node] = static_cast<float>(std::max(kLeast, std::nearbyint(weight * 1024) / 1024));
   };
-  const bool is_plain = cells.is_separable() && !has_holes && weights.empty();
-  if (!is_plain || !FillRows(samples, window, cells, wanted, undulations, heights)) {
+  if (cells.is_separable() && !has_holes && weights.empty()) {
+    FillRows(samples, window, cells, wanted, undulations, heights);
+    if (trace != nullptr) {
+      for (std::size_t n = 0; n < wanted.size(); ++n) {
+        trace->heights[n] = wanted[n] != 0 ? heights[n] : SampleRules::kVoid;
+      }
+    }
+  } else {
     const auto stride = static_cast<std::size_t>(cells.window().columns);
     std::size_t node = 0;
     for (std::size_t j = 0; node < wanted.size(); ++j) {
       for (std::size_t i = 0; i < stride; ++i, ++node) {
-        if (wanted[node] != 0 && IsVoid(heights[node])) take(node, cells.At(i, j));
+        if (wanted[node] != 0) take(node, cells.At(i, j));
       }
     }
   }
   if (trace == nullptr) return {};
-  for (std::size_t n = 0; n < wanted.size(); ++n) {
-    trace->heights[n] = wanted[n] != 0 ? heights[n] : SampleRules::kVoid;
-  }
   trace->window = window;
   trace->cells = std::move(cells);
   if (traces_others) {
