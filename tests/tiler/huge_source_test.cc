@@ -19,6 +19,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/dem/statistics/cache_folder.h"
 #include "tests/tiler/fetched_tile.h"
 #include "tiler/tile_pipeline.h"
 

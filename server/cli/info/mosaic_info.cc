@@ -85,8 +85,10 @@ std::ptrdiff_t CountHidden(const std::vector<dem::RasterInfo>& sources) {
 
 std::vector<std::string> AdviceFor(const dem::DemInfo& info) {
   const auto count = [&](auto is_so) { return std::ranges::count_if(info.sources, is_so); };
-  const auto large =
-      count([](const dem::RasterInfo& s) { return std::max(s.width, s.height) > 4096 && s.overview_factors.empty(); });
+  const auto large = count([](const dem::RasterInfo& s) {
+    const bool has_averages = s.least_kept_factor > 0 && s.least_kept_factor <= 4;
+    return std::max(s.width, s.height) > 4096 && s.overview_factors.empty() && !has_averages;
+  });
   const auto no_datum = count([](const dem::RasterInfo& s) { return s.counts_from.empty(); });
   const auto voids = count([](const dem::RasterInfo& s) { return s.void_samples > 0; });
   std::vector<std::string> advice;
@@ -98,7 +100,8 @@ std::vector<std::string> AdviceFor(const dem::DemInfo& info) {
   }
   if (large > 0) {
     advice.push_back(fmt::format(
-        "large and without overviews: {}; shallow tiles read all of their samples: run 'gdaladdo -r average' on each",
+        "large, without overviews, and their averages are not kept: {}; shallow tiles read many of their samples: give "
+        "terrace a cache_dir with room, or run 'gdaladdo -r average' on each",
         Sources(large)));
   }
   if (no_datum > 0) {

@@ -260,9 +260,7 @@ TEST(CacheFolder, AFolderThatMayNotBeWrittenToIsReadAllTheSame) {
 }
 
 // A limit on the size of files stands for a disk that fills up in the middle of one.
-TEST(CacheFolder, AFullDiskInMidFileCostsNoAverage) {
-  const TempDir dir;
-  const std::string path = WriteRaster(dir, Hills(2100, 1100)), folder = dir.File("cache");
+void ExpectFullDiskCostsNoAverage(const std::string& path, const std::string& folder) {
   const pid_t child = ::fork();
   if (child == 0) {
     std::signal(SIGXFSZ, SIG_IGN);
@@ -279,6 +277,29 @@ TEST(CacheFolder, AFullDiskInMidFileCostsNoAverage) {
   ::waitpid(child, &status, 0);
   EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0);
   EXPECT_TRUE(fs::is_empty(folder)) << "what is not whole takes no room";
+}
+
+TEST(CacheFolder, AFullDiskInMidFileCostsNoAverage) {
+  const TempDir dir;
+  ExpectFullDiskCostsNoAverage(WriteRaster(dir, Hills(2100, 1100)), dir.File("cache"));
+}
+
+// Averages of the chunks that it has read are in the file that is given up.
+TEST(CacheFolder, AFullDiskAfterAnInterruptedRunCostsNoAverage) {
+  const TempDir dir;
+  const std::string path = WriteRaster(dir, Hills(2100, 1100)), folder = dir.File("cache");
+  const pid_t child = ::fork();
+  if (child == 0) {
+    (void)RasterSource::Open(path, {}, CacheIn(folder), [](double done) {
+      if (done > .4) ::raise(SIGKILL);
+    });
+    ::_exit(0);
+  }
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  ASSERT_TRUE(WIFSIGNALED(status));
+  ASSERT_GT(BytesIn(folder), 0U);
+  ExpectFullDiskCostsNoAverage(path, folder);
 }
 
 TEST(CacheFolder, WhatVanishesIsReadFromTheSourceUntilItIsOpenedAnew) {
@@ -362,8 +383,8 @@ TEST(KeptFactors, WhatOverviewsLackIsKeptBitForBit) {
     RasterSpec spec = Hills(2301, 1203);
     spec.overviews = overviews;
     const auto value = spec.value;
-    // A chunk of nothing but voids among them.
-    spec.value = [value](int c, int r) { return c >= 1000 && c < 2060 ? -9999 : value(c, r); };
+    // A chunk of nothing but voids among them. Samples of the overview of an odd width lie across its edge.
+    spec.value = [value](int c, int r) { return c >= 1024 && c < 2048 ? -9999 : value(c, r); };
     const std::string path = WriteRaster(dir, spec);
     const auto in_folder = OpenIn(path, CacheIn(dir.File("cache")));
     ASSERT_NE(in_folder->averages(), nullptr);

@@ -379,7 +379,7 @@ class Info(unittest.TestCase):
         with tempfile.NamedTemporaryFile() as file:
             result = run("info", "--cache-dir", file.name, SAMPLE)
         self.assertEqual(result.returncode, 0)
-        self.assertIn("--cache-dir: ", result.stderr)
+        self.assertIn("cache_dir ", result.stderr)
         self.assertIn("403 x 344", result.stdout)
 
     def test_shows_the_others_when_one_fails(self):
