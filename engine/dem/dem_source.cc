@@ -52,7 +52,7 @@ Result<void> CheckOptions(const DemOptions& options) {
 
 std::uint64_t FingerprintOf(const std::vector<RasterGrid>& grids, const DemOptions& options, double floor) {
   // Changes whenever the same files and options would give other heights than before.
-  constexpr std::uint32_t kResamplingVersion = 3;
+  constexpr std::uint32_t kResamplingVersion = 4;
   ByteWriter writer;
   writer.Put(kResamplingVersion);
   for (const RasterGrid& grid : grids) {
@@ -199,11 +199,11 @@ Result<std::unique_ptr<DemSource>> DemSource::Open(std::vector<DemFile> files, c
   impl->has_feather = options.feather > 0;
   impl->index = IndexOf(impl->grids);
   const auto finest = std::ranges::min_element(impl->grids, {}, [](const RasterGrid& s) { return s.spacing().finer; });
-  impl->lattices = PlanLattices(finest->spacing());
   impl->info = InfoOf(impl->grids, *rasters, options);
   impl->info.left_out = std::move(left_out);
   impl->available = AvailableTiles(ReachesOf(impl->grids, options));
   impl->info.max_level = static_cast<int>(impl->available.size()) - 1;
+  impl->lattices = PlanLattices(finest->spacing(), impl->info.max_level);
   impl->floor = static_cast<float>(impl->info.floor);
   for (const RasterGrid& grid : impl->grids) {
     if (const auto& geoid = grid.vertical().geoid) {
