@@ -40,11 +40,12 @@ struct Arguments {
   std::vector<int> levels;
   std::vector<int> steps = {0, 12};
   int tiles = 40, runs = 3;
+  bool rim = false;
 };
 
 // The best of all runs, seconds.
 struct Cost {
-  double cpu = kNever, read = kNever, refine = kNever, encode = kNever, compress = kNever;
+  double cpu = kNever, warm = kNever, read = kNever, refine = kNever, encode = kNever, compress = kNever;
 };
 
 struct Tile {
@@ -56,7 +57,7 @@ struct Tile {
 
 // Tiles of a level and an error, meshed in one way.
 struct Sampling {
-  std::shared_ptr<const tiler::TilePipeline> pipeline;
+  std::shared_ptr<const tiler::TilePipeline> cold, warm;  // without refinements, and with those of the tiles
   std::string mesh;
   double error_m = 0;
   std::vector<Tile> tiles;
@@ -89,9 +90,10 @@ bool IsInside(const tiler::SampleIndex& samples, const geo::TileKey& key) {
   return true;
 }
 
-// Random tiles of the level, each as likely as another: those inside the source, or where there are none, those that
-// have samples of it.
-std::vector<geo::TileKey> Draw(const dem::DemSource& source, const tiler::SampleIndex& samples, int level, int count) {
+// Random tiles of the level with samples of the source, each as likely as another: those inside it, or those at its
+// rim. Where there are no such tiles, the others.
+std::vector<geo::TileKey> Draw(const dem::DemSource& source, const tiler::SampleIndex& samples, int level,
+                               const Arguments& arguments) {
   std::vector<geo::TileKey> keys;
   for (const geo::TileRange& range : source.Available(level)) {
     for (std::int64_t y = range.start_y; y <= range.end_y; ++y) {
@@ -99,14 +101,18 @@ std::vector<geo::TileKey> Draw(const dem::DemSource& source, const tiler::Sample
     }
   }
   std::ranges::shuffle(keys, std::mt19937_64(7));
-  std::vector<geo::TileKey> inside, touching;
+  const auto count = static_cast<std::size_t>(arguments.tiles);
+  std::vector<geo::TileKey> wanted, others;
   for (const geo::TileKey& key : keys) {
-    if (inside.size() == static_cast<std::size_t>(count)) break;
+    if (wanted.size() == count) break;
     if (!HasSamples(samples, key)) continue;
-    if (touching.size() < static_cast<std::size_t>(count)) touching.push_back(key);
-    if (IsInside(samples, key)) inside.push_back(key);
+    if (IsInside(samples, key) != arguments.rim) {
+      wanted.push_back(key);
+    } else if (others.size() < count) {
+      others.push_back(key);
+    }
   }
-  return inside.empty() ? touching : inside;
+  return wanted.empty() ? others : wanted;
 }
 
 double SquareKilometres(const geo::TileKey& key) {
@@ -115,34 +121,37 @@ double SquareKilometres(const geo::TileKey& key) {
   return side * geo::MetresPerDegreeEast(latitude) * side * geo::MetresPerDegreeNorth(latitude) / 1e6;
 }
 
-Result<std::shared_ptr<tiler::TilePipeline>> Open(const std::string& dem, bool compact) {
-  auto source = dem::DemSource::Open(dem);
-  if (!source) return tl::unexpected(source.error());
+std::shared_ptr<const tiler::TilePipeline> PipelineOf(const std::shared_ptr<const dem::DemSource>& source, bool compact,
+                                                      std::size_t refinement_bytes) {
   std::vector<tiler::Dataset> datasets(1);
-  datasets[0].source = *std::move(source);
+  datasets[0].source = source;
   datasets[0].rules.compact = compact;
-  return std::make_shared<tiler::TilePipeline>(std::move(datasets), std::size_t{0});
+  return std::make_shared<const tiler::TilePipeline>(std::move(datasets), refinement_bytes);
 }
 
-// Cold, in the calling thread.
-Result<tiler::EncodedTile> Build(const tiler::TilePipeline& pipeline, Tile& tile) {
-  const double start = ThreadSeconds();
-  Result<tiler::EncodedTile> encoded = pipeline.Build(tile.request, {});
-  if (!encoded) return encoded;
+// In the calling thread.
+Result<void> Build(const Sampling& sampling, Tile& tile) {
+  double start = ThreadSeconds();
+  const Result<tiler::EncodedTile> cold = sampling.cold->Build(tile.request, {});
+  if (!cold) return tl::unexpected(cold.error());
   Cost& cost = tile.cost;
   cost.cpu = std::min(cost.cpu, ThreadSeconds() - start);
   const auto least = [](double& best, std::chrono::microseconds now) {
     best = std::min(best, std::chrono::duration<double>(now).count());
   };
-  least(cost.read, encoded->times.read);
-  least(cost.refine, encoded->times.refine);
-  least(cost.encode, encoded->times.encode);
-  least(cost.compress, encoded->times.compress);
-  return encoded;
+  least(cost.read, cold->times.read);
+  least(cost.refine, cold->times.refine);
+  least(cost.encode, cold->times.encode);
+  least(cost.compress, cold->times.compress);
+  start = ThreadSeconds();
+  const Result<tiler::EncodedTile> warm = sampling.warm->Build(tile.request, {});
+  if (!warm) return tl::unexpected(warm.error());
+  cost.warm = std::min(cost.warm, ThreadSeconds() - start);
+  return {};
 }
 
-Result<void> Measure(const tiler::TilePipeline& pipeline, const tiler::SampleIndex& samples, Tile& tile) {
-  Result<tiler::EncodedTile> encoded = pipeline.Build(tile.request, {});
+Result<void> Measure(const Sampling& sampling, const tiler::SampleIndex& samples, Tile& tile) {
+  Result<tiler::EncodedTile> encoded = sampling.warm->Build(tile.request, {});
   if (!encoded) return tl::unexpected(encoded.error());
   tile.bytes = encoded->bytes.size();
   tile.vertices = encoded->vertices;
@@ -150,7 +159,7 @@ Result<void> Measure(const tiler::TilePipeline& pipeline, const tiler::SampleInd
   tile.certified = encoded->certified_error_m.value_or(kNever);
   tiler::TileRequest plain = tile.request;
   plain.coding = tiler::Coding::kIdentity;
-  encoded = pipeline.Build(plain, {});
+  encoded = sampling.warm->Build(plain, {});
   if (!encoded) return tl::unexpected(encoded.error());
   const auto mesh = proto::DecodeQuantizedMesh(encoded->bytes);
   if (!mesh) return MakeError(ErrorCode::kInternal, "{}: cannot be decoded", geo::ToString(plain.key));
@@ -169,15 +178,16 @@ Result<void> Measure(const tiler::TilePipeline& pipeline, const tiler::SampleInd
 std::vector<Cell> RowOf(const Sampling& sampling) {
   const double count = static_cast<double>(sampling.tiles.size());
   const int level = sampling.tiles.front().request.key.level;
-  const dem::DemSource& source = *sampling.pipeline->datasets().front().source;
+  const dem::DemSource& source = *sampling.cold->datasets().front().source;
   Tile sum;
-  sum.cost = {0, 0, 0, 0, 0};
+  sum.cost = {0, 0, 0, 0, 0, 0};
   double square_km = 0, most_certified = 0;
   for (const Tile& tile : sampling.tiles) {
     sum.bytes += tile.bytes, sum.vertices += tile.vertices, sum.samples += tile.samples, sum.squares += tile.squares;
     sum.stated += tile.stated, sum.certified += tile.certified, square_km += SquareKilometres(tile.request.key);
     sum.largest = std::max(sum.largest, tile.largest), most_certified = std::max(most_certified, tile.certified);
-    sum.cost.cpu += tile.cost.cpu, sum.cost.read += tile.cost.read, sum.cost.refine += tile.cost.refine;
+    sum.cost.cpu += tile.cost.cpu, sum.cost.warm += tile.cost.warm, sum.cost.read += tile.cost.read,
+        sum.cost.refine += tile.cost.refine;
     sum.cost.encode += tile.cost.encode, sum.cost.compress += tile.cost.compress;
   }
   std::int64_t of_level = 0;
@@ -197,6 +207,7 @@ std::vector<Cell> RowOf(const Sampling& sampling) {
           Count(sum.bytes / sampling.tiles.size()),
           Number(static_cast<double>(sum.bytes) / 1000 / square_km, 3),
           each(sum.cost.cpu),
+          each(sum.cost.warm),
           each(sum.cost.read),
           each(sum.cost.refine),
           each(sum.cost.encode),
@@ -208,13 +219,13 @@ std::vector<Cell> RowOf(const Sampling& sampling) {
 Result<void> Try(std::vector<Sampling>& meshes, const tiler::SampleIndex& samples, int runs) {
   for (Sampling& sampling : meshes) {
     for (Tile& tile : sampling.tiles) {
-      if (const Result<void> done = Measure(*sampling.pipeline, samples, tile); !done) return done;
+      if (const Result<void> done = Measure(sampling, samples, tile); !done) return done;
     }
   }
   for (int run = 0; run < runs; ++run) {
     for (std::size_t i = 0; i < meshes.front().tiles.size(); ++i) {
       for (Sampling& sampling : meshes) {
-        if (const auto tile = Build(*sampling.pipeline, sampling.tiles[i]); !tile) return tl::unexpected(tile.error());
+        if (const Result<void> done = Build(sampling, sampling.tiles[i]); !done) return done;
       }
     }
   }
@@ -222,23 +233,28 @@ Result<void> Try(std::vector<Sampling>& meshes, const tiler::SampleIndex& sample
 }
 
 Result<void> Run(const Arguments& arguments) {
-  const auto plain = Open(arguments.dem, false), compact = Open(arguments.dem, true);
-  if (!plain || !compact) return tl::unexpected((plain ? compact : plain).error());
-  const dem::DemSource& source = *(*plain)->datasets().front().source;
+  auto opened = dem::DemSource::Open(arguments.dem);
+  if (!opened) return tl::unexpected(opened.error());
+  const std::shared_ptr<const dem::DemSource> source = *std::move(opened);
   const tiler::SampleIndex samples(tiler::SamplesOf(arguments.dem));
   Table table("tile_accuracy", std::filesystem::path(arguments.dem).filename().string(),
-              {"level", "nodes", "error, m", "mesh", "tiles", "RMS, m", "largest, m", "stated, m", "certified, m",
-               "most certified, m", "vertices", "bytes", "kB/km2", "CPU, ms", "read", "refine", "encode", "compress",
-               "tiles of the level"});
+              {"level",    "nodes",      "error, m",  "mesh",         "tiles",
+               "RMS, m",   "largest, m", "stated, m", "certified, m", "most certified, m",
+               "vertices", "bytes",      "kB/km2",    "cold, ms",     "warm, ms",
+               "read",     "refine",     "encode",    "compress",     "tiles of the level"});
   std::vector<int> levels = arguments.levels;
-  if (levels.empty()) levels = {source.max_level(), source.max_level() - 1};
+  if (levels.empty()) levels = {source->max_level(), source->max_level() - 1};
   for (const int level : levels) {
-    const std::vector<geo::TileKey> keys = Draw(source, samples, level, arguments.tiles);
+    const std::vector<geo::TileKey> keys = Draw(*source, samples, level, arguments);
     if (keys.empty()) return MakeError(ErrorCode::kInvalidArgument, "no tiles with samples at level {}", level);
     for (const int step : arguments.steps) {
       std::vector<Sampling> meshes;
-      for (const auto& [name, pipeline] : {std::pair("greedy", *plain), {"compact", *compact}}) {
-        Sampling& sampling = meshes.emplace_back(Sampling{pipeline, name, geo::LadderError(level, step), {}});
+      for (const bool compact : {false, true}) {
+        Sampling& sampling = meshes.emplace_back();
+        sampling.cold = PipelineOf(source, compact, 0);
+        sampling.warm = PipelineOf(source, compact, std::size_t{1} << 30);
+        sampling.mesh = compact ? "compact" : "greedy";
+        sampling.error_m = geo::LadderError(level, step);
         for (const geo::TileKey& key : keys) {
           Tile& tile = sampling.tiles.emplace_back();
           tile.request.key = key;
@@ -268,6 +284,7 @@ int main(int argc, char** argv) {
   app.add_option("--steps", arguments.steps, "Ladder steps of the error, from -16 (coarse) to 24; by default 0 and 12")
       ->delimiter(',')
       ->check(CLI::Range(-16, 24));
+  app.add_flag("--rim", arguments.rim, "Tiles at the source's rim in place of those inside it");
   app.add_option("--tiles", arguments.tiles, "How many tiles of a level, at most")->check(CLI::PositiveNumber);
   app.add_option("--runs", arguments.runs, "Runs; the fastest of each tile counts")->check(CLI::PositiveNumber);
   CLI11_PARSE(app, argc, argv);
