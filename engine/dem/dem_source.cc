@@ -208,11 +208,11 @@ Result<std::unique_ptr<DemSource>> DemSource::Open(std::vector<DemFile> files, c
   impl->has_feather = options.feather > 0;
   impl->index = IndexOf(impl->grids);
   const auto finest = std::ranges::min_element(impl->grids, {}, [](const RasterGrid& s) { return s.spacing().finer; });
-  impl->lattices = PlanLattices(finest->spacing());
   impl->info = InfoOf(impl->grids, *rasters, options);
   impl->info.left_out = std::move(left_out);
   impl->available = AvailableTiles(ReachesOf(impl->grids, options));
   impl->info.max_level = static_cast<int>(impl->available.size()) - 1;
+  impl->lattices = PlanLattices(finest->spacing(), impl->info.max_level);
   impl->floor = static_cast<float>(impl->info.floor);
   for (const RasterGrid& grid : impl->grids) {
     if (const auto& geoid = grid.vertical().geoid) {

@@ -27,12 +27,13 @@ Step GroundStep(Position from, Position to, Position centre) {
 // std::hypot is not the same to the last bit everywhere; metres do not overflow.
 double LengthOf(double east, double north) { return std::sqrt(east * east + north * north); }
 
-int CellsOf(int level, const SourceSpacing& spacing) {
+// The coarsest lattice with at least `nodes` nodes a sample of the source on both axes, or the finest there is.
+int CellsOf(int level, const SourceSpacing& spacing, int nodes) {
   constexpr int kCoarsest = 32, kFinest = 256;
-  // A lattice that equals the source's grid is fine enough, whatever the last bits of its pixel size.
+  // A lattice that equals what is wanted is fine enough, whatever the last bits of the pixel size.
   constexpr double kSlack = 1 + 1e-9;
   for (int cells = kCoarsest; cells < kFinest; cells *= 2) {
-    const double step = geo::Lattice{level, cells}.StepDegrees();
+    const double step = geo::Lattice{level, cells}.StepDegrees() * nodes;
     if (step * geo::MetresPerDegreeEast(spacing.latitude) <= spacing.east * kSlack &&
         step * geo::MetresPerDegreeNorth(spacing.latitude) <= spacing.north * kSlack) {
       return cells;
@@ -100,9 +101,15 @@ int AveragingFactor(double samples_per_cell) {
   return 1 << std::clamp(geo::NearestOctave(samples_per_cell), 0, kMost);
 }
 
-std::vector<geo::Lattice> PlanLattices(const SourceSpacing& finest) {
+std::vector<geo::Lattice> PlanLattices(const SourceSpacing& finest, int max_level) {
+  // Nodes fall between samples and cut their peaks. Above these levels a finer level follows, which cuts less. Two
+  // levels, because sources whose spacings differ by less than a factor of two end at most a level apart.
+  constexpr int kDeepest = 2, kNodesThere = 2;
   std::vector<geo::Lattice> lattices;
-  for (int level = 0; level <= geo::kMaxLevel; ++level) lattices.push_back({level, CellsOf(level, finest)});
+  for (int level = 0; level <= geo::kMaxLevel; ++level) {
+    const bool is_deep = level > max_level - kDeepest;
+    lattices.push_back({level, CellsOf(level, finest, is_deep ? kNodesThere : 1)});
+  }
   return lattices;
 }
 

@@ -28,8 +28,9 @@ double SamplesPerCell(const geo::Lattice& lattice, const SourceSpacing& spacing)
 // The nearest power of two, at least 1: how many samples per axis are averaged into one.
 int AveragingFactor(double samples_per_cell);
 
-// Lattices of levels 0 .. geo::kMaxLevel for a dataset whose finest source is this one.
-std::vector<geo::Lattice> PlanLattices(const SourceSpacing& finest);
+// Lattices of levels 0 .. geo::kMaxLevel for a dataset whose finest source is this one: at least as fine as the source,
+// from the level above `max_level`, the deepest one served, at least twice as fine; at most 257 nodes a side.
+std::vector<geo::Lattice> PlanLattices(const SourceSpacing& finest, int max_level);
 
 // The first depth of Web Mercator's pixels that is at least as fine as the source at its centre, 1 .. geo::kMaxLevel.
 int DeepestMercator(const SourceSpacing& spacing);

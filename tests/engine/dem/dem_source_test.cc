@@ -39,7 +39,35 @@ TEST(DemSource, LatticeIsTheCoarsestThatIsAsFineAsTheSource) {
   EXPECT_EQ(source->LatticeOf(0).cells, 256);
   EXPECT_EQ(source->LatticeOf(10).cells, 256);  // 2.47", the level above has 4.9"
   EXPECT_EQ(source->LatticeOf(11).cells, 128);
-  EXPECT_EQ(source->LatticeOf(13).cells, 32);
+}
+
+TEST(DemSource, LatticesOfTheTwoDeepestLevelsAreTwiceAsFineAsTheSource) {
+  TERRACE_REQUIRE_DATA(path, "srtm3_S33W071_andes.tif");
+  const auto source = OpenOrFail(path);
+  ASSERT_NE(source, nullptr);
+  ASSERT_EQ(source->max_level(), 13);
+  EXPECT_EQ(source->LatticeOf(12).cells, 128);  // 1.24"
+  EXPECT_EQ(source->LatticeOf(13).cells, 64);
+  const auto deeper = OpenOrFail(path, {.finest_error = 0.6});
+  ASSERT_NE(deeper, nullptr);
+  ASSERT_EQ(deeper->max_level(), 16);
+  EXPECT_EQ(deeper->LatticeOf(12).cells, 64);
+  EXPECT_EQ(deeper->LatticeOf(16).cells, 32);  // 0.31", though nothing was added
+}
+
+// Whichever of its sources a tile shows, and however the depths of the two fall.
+TEST(DemSource, EverySourceOfAMosaicHasALatticeTwiceAsFineAtItsOwnDeepestLevel) {
+  const TempDir dir;
+  constexpr double kFine = 0.65 / 3600;  // nodes are 0.62" apart where nothing is added
+  const std::string fine = WriteRaster(dir, FlatSquare(10, 50, 20, kFine, 5), "fine.tif");
+  for (const double times : {1.0, 1.1, 1.5, 1.85, 2.0, 2.5, 3.0, 5.0}) {
+    const std::string coarse =
+        WriteRaster(dir, FlatSquare(10, 50, 20, kFine * times, 5), "coarse" + std::to_string(times) + ".tif");
+    const auto alone = OpenOrFail(coarse), both = OpenOrFail({{fine, 0}, {coarse, 1}});
+    ASSERT_TRUE(alone && both);
+    EXPECT_LE(both->LatticeOf(alone->max_level()).StepDegrees(), kFine * times / 2) << times;
+    EXPECT_LE(both->LatticeOf(both->max_level()).StepDegrees(), kFine / 2);
+  }
 }
 
 TEST(DemSource, InfoTellsWhatTheFileSays) {

@@ -154,7 +154,7 @@ TEST_F(AreaMeshTest, LargeTrianglesDoNotCutThroughTheEarth) {
   auto opened = dem::DemSource::Open(test_support::SourceDir() / "config/samples/etopo5.tif");
   ASSERT_TRUE(opened) << opened.error().message;
   source_ = *std::move(opened);
-  AreaRequest area{-30, 20, 30, 60, 2000, proto::MeshFileFormat::kGlb, AreaCoordinates::kEcef};
+  AreaRequest area{-20, 20, 30, 56, 2000, proto::MeshFileFormat::kGlb, AreaCoordinates::kEcef};
   const EncodedTile encoded = Build(area);
   EXPECT_LE(encoded.max_error_m, 2000.1);
   EXPECT_GT(encoded.vertices, 100u);
