@@ -13,7 +13,7 @@ class GridTables {
   // `grid` and `trace` must outlive this.
   GridTables(const RasterGrid& grid, const GridTrace& trace);
 
-  // Of the whole raster grid.
+  // The range of the whole raster grid.
   const HeightRange& heights() const { return grid_.heights(); }
 
   // Members visited by all queries so far. For tests: a query visits the members that its box meets.

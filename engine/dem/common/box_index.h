@@ -1,4 +1,4 @@
-// Which of many boxes meet a given one.
+// An index of boxes: finds the boxes that intersect a given one.
 #pragma once
 
 #include <cstddef>
@@ -11,7 +11,7 @@ struct Box {
   double west = 0, south = 0, east = 0, north = 0;
 };
 
-// An R-tree. Immutable and thread-safe; an empty index finds nothing.
+// An R-tree. Immutable and thread-safe. An empty index finds nothing.
 class BoxIndex {
  public:
   struct Entry {
@@ -25,7 +25,7 @@ class BoxIndex {
   BoxIndex& operator=(BoxIndex&&) noexcept;
   ~BoxIndex();
 
-  // The values of the entries that meet the box, edges included; ascending, each once.
+  // Returns the values of the entries that intersect or touch the box, ascending, without duplicates.
   std::vector<std::size_t> Find(const Box& box) const;
 
  private:

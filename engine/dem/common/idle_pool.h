@@ -12,7 +12,7 @@
 
 namespace terrace::dem {
 
-// How many the pools of the process keep together. Until the first call: 256.
+// Sets the limit of idle objects in all pools of the process. The default is 256.
 void SetMostIdle(std::size_t count);
 
 class AnyIdlePool {
@@ -22,7 +22,7 @@ class AnyIdlePool {
   AnyIdlePool& operator=(const AnyIdlePool&) = delete;
   ~AnyIdlePool() { Clear(); }
 
-  // Lets go of all that is idle, and of what is in use when it comes back.
+  // Closes all idle objects, and objects in use when they are returned.
   void Clear() noexcept;
 
  protected:
@@ -31,7 +31,7 @@ class AnyIdlePool {
     std::uint64_t epoch = 0;
   };
   Lease TakeAny();
-  // Where there is no memory to keep it, it is let go.
+  // Closes the object if there is no memory to keep it.
   void KeepAny(Lease lease) noexcept;
 
  private:
@@ -42,13 +42,13 @@ class AnyIdlePool {
 template <typename T>
 class IdlePool : public AnyIdlePool {
  public:
-  // What was taken, or made in place of it. `epoch` tells whether Clear was called since.
+  // An object from the pool, or one that the caller made instead. `epoch`: detects calls of Clear since then.
   struct Taken {
     std::shared_ptr<T> item;
     std::uint64_t epoch = 0;
   };
 
-  // The one used last; null: none is idle, and the caller makes one.
+  // Takes the most recently used object. Null: none is idle; the caller makes one.
   Taken Take() {
     Lease lease = TakeAny();
     return {std::static_pointer_cast<T>(std::move(lease.item)), lease.epoch};

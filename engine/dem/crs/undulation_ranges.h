@@ -1,4 +1,4 @@
-// Bounds on a grid of undulations over boxes, from the grid's own nodes.
+// Bounds on the undulations of a grid over boxes, computed from the grid's nodes.
 #pragma once
 
 #include "engine/core/result.h"
@@ -12,15 +12,16 @@ namespace terrace::dem {
 // Immutable and thread-safe.
 class UndulationRanges {
  public:
-  // Reads the nodes in and around the area once.
+  // Reads the nodes in and around the area.
   static Result<UndulationRanges> Of(const UndulationGrid& grid, const Footprint& area);
 
-  // No undulation in the box and the area leaves it: from (west, south), degrees, `width` by `height` large; west
-  // counts modulo 360. min > max: the box misses the area, or nothing is known there.
+  // Returns a range that contains all undulations in the intersection of the area and a box with south-western corner
+  // (west, south), `width` by `height` degrees; west counts modulo 360. min > max: the box does not meet the area, or
+  // nothing is known there.
   HeightRange Query(double west, double south, double width, double height) const;
 
   HeightRange whole() const { return whole_; }
-  bool is_complete() const { return is_complete_; }  // known all over the area
+  bool is_complete() const { return is_complete_; }  // known in the whole area
 
  private:
   explicit UndulationRanges(const UndulationGrid& grid) : grid_(&grid) {}
