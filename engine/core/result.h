@@ -17,8 +17,7 @@ enum class ErrorCode {
   kInvalidArgument,  // the request makes no sense
   kNotFound,         // it does not exist
   kUnavailable,      // a source or a resource does not respond now; a retry may succeed
-  kChanged,          // a source file was
-                     // changed or replaced since it was opened; reopening it may succeed
+  kChanged,          // a source file has changed since it was opened; reopening it may succeed
   kOverloaded,       // a bounded queue is full
   kCancelled,        // nobody waits for the result any more, or the deadline has passed
   kInternal,         // a library failed unexpectedly

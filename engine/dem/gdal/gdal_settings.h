@@ -1,4 +1,4 @@
-// What a process sets and counts of GDAL as a whole. Thread-safe.
+// Process-wide settings and counters of GDAL. Thread-safe.
 #pragma once
 
 #include <cstddef>
@@ -6,19 +6,19 @@
 
 namespace terrace::dem {
 
-// Of GDAL, since the start, in all threads; for metrics.
+// GDAL's counts since the start, in all threads; for metrics.
 struct GdalCounts {
   std::uint64_t errors = 0, warnings = 0;
-  std::uint64_t cache_bytes = 0;  // of blocks, now
+  std::uint64_t cache_bytes = 0;  // current size of the block cache
 };
 GdalCounts CountGdalErrors();
 
-// How much memory blocks of rasters may take, in all threads together.
+// Sets the size of GDAL's block cache, for all threads together.
 void SetGdalCache(std::size_t bytes);
 
-// How many files of sources are kept open between reads, those of all datasets together: rasters, images, grids of
-// PROJ. What is in use comes on top, one a thread. `vrt_parts`: how many parts of VRTs GDAL keeps open, in use or not;
-// 2 to 1000. Until the first call 256 and 100. Before the first source is opened.
+// Sets how many idle source files of all datasets (rasters, images, PROJ grids) stay open. Files in use do not count;
+// there is at most one per thread. `vrt_parts`: how many parts of VRTs GDAL keeps open, in use or idle; 2 to 1000. The
+// defaults are 256 and 100. Call before the first source is opened.
 void SetOpenSources(std::size_t idle, std::size_t vrt_parts);
 
 }  // namespace terrace::dem

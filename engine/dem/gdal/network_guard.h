@@ -1,4 +1,4 @@
-// Closes GDAL's doors to the network, other processes' output and whatever else its file names reach beyond files.
+// Blocks GDAL's virtual file systems for the network, for output of other processes, and for anything else but files.
 #pragma once
 
 #include <string>
@@ -6,9 +6,9 @@
 
 namespace terrace::dem {
 
-// File systems of GDAL that are not local ("/vsicurl/", "/vsis3/" and their kin) answer every name with "no such file",
-// but for those that an allowed prefix begins with, and so do names within names. Not thread-safe: before sources are
-// opened.
+// Makes GDAL's remote file systems ("/vsicurl/", "/vsis3/" and similar) answer "no such file" for every name, also for
+// names nested in other names. File systems named at the beginning of an allowed prefix stay available. Not
+// thread-safe: call before sources are opened.
 void GuardNetwork(const std::vector<std::string>& allowed_prefixes);
 
 }  // namespace terrace::dem

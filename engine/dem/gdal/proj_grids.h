@@ -1,4 +1,4 @@
-// The files of numbers that an operation of PROJ reads.
+// The grid files that a PROJ operation reads.
 #pragma once
 
 #include <string>
@@ -10,8 +10,8 @@ namespace terrace::dem {
 
 struct ProjGrid {
   std::string name;
-  std::string file;  // empty: it is not installed
-  std::string url;   // empty: nobody offers it
+  std::string file;  // empty: not installed
+  std::string url;   // empty: no known download
 };
 
 std::vector<ProjGrid> GridsOf(PJ_CONTEXT* context, const PJ* operation);

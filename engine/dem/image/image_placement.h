@@ -1,4 +1,4 @@
-// Which pixel of an image lies under a sample of a DEM.
+// Maps samples of a DEM to pixels of an image.
 #pragma once
 
 #include <gdal_priv.h>
@@ -17,12 +17,13 @@ namespace terrace::dem {
 // Immutable and thread-safe.
 class ImagePlacement {
  public:
-  // By the georeferences of both files, or one to one where they have the same size and not both have one; errors say
-  // which file lacks what.
+  // Uses the georeferences of both files. If one of them has none, both must have the same size, and pixels map to
+  // samples one to one. Error messages say which file lacks what.
   static Result<ImagePlacement> Of(GDALDataset& dem, const std::string& dem_path, GDALDataset& image,
                                    const std::string& image_path);
 
-  // Pixel positions of the DEM to pixel positions of the image (georeference.h), in place; NaN where there is none.
+  // Converts pixel positions of the DEM to pixel positions of the image (georeference.h), in place; NaN if there is
+  // none.
   void ToImage(std::span<Position> positions) const;
 
   bool is_one_to_one() const { return is_one_to_one_; }
@@ -33,8 +34,8 @@ class ImagePlacement {
   };
 
   bool is_one_to_one_ = false;
-  std::array<double, 6> affine_{};              // DEM to image, where a projected reference system is the same or none
-  std::optional<Georeferences> georeferences_;  // else
+  std::array<double, 6> affine_{};  // DEM to image, if both have the same projected reference system or none
+  std::optional<Georeferences> georeferences_;  // in all other cases
 };
 
 }  // namespace terrace::dem

@@ -1,4 +1,4 @@
-// Which rasters lie on one pixel grid, among many: by reference system, vertical datum, pixel size and offset.
+// Finds rasters that lie on one pixel grid, by reference system, vertical datum, pixel size and offset.
 #pragma once
 
 #include <array>
@@ -14,15 +14,15 @@
 
 namespace terrace::dem {
 
-// Where a raster lies and what it counts from. What these point to outlives their users.
+// The georeference and vertical datum of a raster. Both must outlive the users of this struct.
 struct PlacedRaster {
   const Georeference* where = nullptr;
   const VerticalDatum* vertical = nullptr;
 };
 
-// A raster may fit several grids, as offsets within a tolerance count as whole pixels (Georeference::OffsetOf): it
-// belongs to the first one that it fits, in the order in which grids were met. A look-up takes constant time where
-// pixel sizes are equal to the bit, else a time that grows with the number of different pixel sizes.
+// Offsets within a tolerance count as whole pixels (Georeference::OffsetOf), so a raster may fit several grids. It then
+// belongs to the first of them, in the order in which grids were added. A look-up takes constant time if pixel sizes
+// are bit-equal; else its time grows with the number of different pixel sizes.
 class GridFinder {
  public:
   struct Membership {
@@ -30,7 +30,7 @@ class GridFinder {
     PixelOffset offset;    // of the raster's first pixel from that of the grid's first raster
   };
 
-  // The raster's grid. One that fits none begins a new one.
+  // Returns the raster's grid. A raster that fits no grid begins a new one.
   Membership Add(const PlacedRaster& raster);
 
   // Grids that rasters were compared with so far. For tests: this grows linearly with the number of rasters.
@@ -40,14 +40,14 @@ class GridFinder {
   // Bucket of an offset's fraction of a pixel.
   using Phase = std::uint32_t;
 
-  // Grids whose pixels are equal to the bit, apart from their offset. Numbers of grids are ascending.
+  // Grids whose pixels are bit-equal except for the offset. Their numbers are ascending.
   struct Family {
     const Georeference* first = nullptr;
     std::vector<std::size_t> grids;
     std::unordered_map<Phase, std::vector<std::size_t>> by_phase;
     std::vector<std::size_t> far;  // too far away for a phase
   };
-  // Families of one reference system and vertical datum, in the order in which they were met.
+  // Families with the same reference system and vertical datum, in the order in which they were added.
   struct Kind {
     const VerticalDatum* vertical = nullptr;
     std::vector<Family> families;
