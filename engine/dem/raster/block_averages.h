@@ -109,8 +109,8 @@ class BlockAverages {
   }
 
   int parts_, plain_;
-  int rows_ = 0;                 // in inner_, where it is gathered
-  std::vector<BlockSum> inner_;  // of blocks, or of their parts
+  int rows_ = 0;                 // of samples in inner_ that are not gathered yet
+  std::vector<BlockSum> inner_;  // of blocks, or of parts of blocks
   std::vector<BlockSum> outer_;
 };
 

@@ -1,6 +1,5 @@
-// One raster file of a dataset: where it lies, how it is stored, what its heights range over, and its samples.
-//
-// Immutable after Open and safe to use from many threads. Knows nothing of levels, floors or other rasters.
+// One raster file of a dataset: its georeference, layout, height statistics and samples. Independent of levels, floors
+// and other rasters. Immutable after Open, thread-safe.
 #pragma once
 
 #include <array>
@@ -28,9 +27,9 @@ namespace terrace::dem {
 
 class RasterSource {
  public:
-  // Opens a raster, checks it, and scans it once for its heights. Errors name the file, what is wrong and the remedy.
-  // What is learnt is kept in `cache_dir`, or taken from there; empty for none. `pages` bounds
-  // the memory of the tables of this and other rasters; null: nothing does. kCancelled: stopped.
+  // Opens and checks a raster, and reads it once for its statistics. Errors name the file, the fault and the remedy.
+  // `cache_dir`: the folder of the statistics cache; empty: no cache. `pages`: limits the memory of the statistics of
+  // this and other rasters; null: no limit. kCancelled: stopped.
   static Result<std::unique_ptr<RasterSource>> Open(const std::string& path, const SourceOptions& options = {},
                                                     const std::string& cache_dir = {},
                                                     const std::function<void(double)>& progress = {},
@@ -40,26 +39,26 @@ class RasterSource {
 
   const RasterInfo& info() const { return info_; }
   const Georeference& georeference() const { return georeference_; }
-  // What its samples count from; they are not converted here.
+  // The vertical datum of the samples. They are not converted here.
   const VerticalDatum& vertical() const { return vertical_; }
   const RasterLayout& layout() const { return layout_; }
   const Footprint& footprint() const { return footprint_; }
   const SourceSpacing& spacing() const { return spacing_; }
   const RimVoids& rim_voids() const { return rim_voids_; }
-  // Of the valid samples of the first and the last row.
+  // Means of the valid samples of the first and the last row.
   const std::array<std::optional<double>, 2>& edge_row_means() const { return edge_row_means_; }
 
   // The raster's statistics. May read them from the cache file; keep the result for repeated use. Throws
-  // std::runtime_error if they can be neither read nor made again, as when the file is gone.
+  // std::runtime_error if they can be neither read nor computed again, for example because the raster was removed.
   StatisticsPages::Tables tables() const;
-  // The range of a box of pixels (RangeTable::Query). Large boxes need no read.
+  // The range of a box of pixels (RangeTable::Query). Large boxes need no read of the cache file.
   BlockRange RangeIn(double west, double north, double east, double south) const;
   const StampedFiles& files() const { return handles_.files(); }
 
-  // In the cache file; null: none.
+  // The averages in the cache file; null: none.
   const CachedAverages* averages() const { return averages_.get(); }
 
-  // How opening went.
+  // How the statistics were made.
   const Preparation& preparation() const { return preparation_; }
 
   // ReadGrid of this raster, from prepared averages where possible. kChanged: a file was changed, replaced or removed.
@@ -84,11 +83,11 @@ class RasterSource {
   SourceSpacing spacing_;
   std::array<std::optional<double>, 2> edge_row_means_;
   RimVoids rim_voids_;
-  StatisticsPages::Tables kept_;  // null: they are paged
-  // Of paged tables.
+  StatisticsPages::Tables kept_;  // null: the statistics are paged
+  // Set if the statistics are paged.
   struct Paging {
     std::shared_ptr<StatisticsPages> pages;
-    RangeTable ranges;  // the coarse ones
+    RangeTable ranges;  // of coarse blocks
     bool has_coarse_averages;
     std::string cache_file;
     StatisticsShape shape;

@@ -1,4 +1,4 @@
-// A dataset as its configuration describes it: the one place that makes engine options of a DatasetConfig.
+// Opens a dataset from its configuration. Only this file converts a DatasetConfig to engine options.
 #pragma once
 
 #include <functional>
@@ -13,15 +13,15 @@
 
 namespace terrace::cli {
 
-// Opens and scans all files of the dataset; statistics are kept in `cache_dir`, if it is not empty. Errors name the
-// file and the remedy. `fault`: dem::DemOptions.
+// Opens all files of the dataset and reads their statistics, which are stored in `cache_dir` unless it is empty. Errors
+// name the file and the remedy. `fault`: as in dem::DemOptions.
 Result<std::unique_ptr<dem::DemSource>> OpenSource(const config::DatasetConfig& wanted, const std::string& cache_dir,
                                                    const std::function<void(double)>& progress,
                                                    std::stop_token stop = {},
                                                    std::function<void(const Error&)> fault = {});
 
-// The same with its water mask and its imagery, ready to be served. `version`: of this program; it stands in
-// tiles, and another one is another generation.
+// Opens the dataset with its water mask and imagery. `version`: of this program. Tiles contain it, so a new version is
+// a new generation.
 Result<tiler::Dataset> OpenDataset(const config::DatasetConfig& wanted, const std::string& cache_dir,
                                    const std::string& version, const std::function<void(double)>& progress = {},
                                    std::stop_token stop = {});
