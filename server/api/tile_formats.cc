@@ -46,13 +46,13 @@ Result<void> ReadGlb(std::string_view query, const RequestFields& fields, const 
   SetError(parameters->requested, dataset, tile);
   tile.compression = parameters->compression.value_or(dataset.glb_compression);
   if (dataset.texture) tile.texture = parameters->texture.value_or(*dataset.texture);
-  // Draco ends in an entropy coder; meshopt leaves that to the transport.
+  // Draco output is entropy-coded already; meshopt output is not.
   const bool coding_helps = tile.compression != proto::GlbCompression::kDraco;
   if (coding_helps) tile.coding = NegotiateCoding(fields.accept_encoding);
   return {};
 }
 
-// PNG is compressed already: whatever the client accepts, it is sent as it is.
+// PNG is compressed already, so it is sent unchanged whatever the client accepts.
 Result<void> ReadHeightPng(std::string_view query, const RequestFields&, const DatasetView& dataset,
                            TileRequest& tile) {
   const Result<HeightTileParameters> parameters = ParseHeightTileParameters(query);

@@ -15,7 +15,7 @@
 namespace terrace::server {
 namespace {
 
-// Defaults are left away, so that a tile is cached under one URL.
+// Default parameters are omitted, so that a tile has one URL.
 std::string HeightTileQuery(const HeightTileParameters& parameters) {
   std::string query;
   const auto add = [&query](std::string text) { query += (query.empty() ? "" : "&") + std::move(text); };
@@ -51,7 +51,8 @@ Response TileJsonHandler::Handle(const Call& call) const {
   tiles.north = dataset.north;
   Response response =
       Serve(Document::Make(proto::EncodeTileJson(tiles), "application/json"), *call.request, cache_control_);
-  response.vary_too = "Forwarded, X-Forwarded-Host, X-Forwarded-Proto";  // what a proxy may say of the origin
+  response.vary_too =
+      "Forwarded, X-Forwarded-Host, X-Forwarded-Proto";  // headers by which a proxy may change the origin
   return response;
 }
 

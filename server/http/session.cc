@@ -31,8 +31,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// How long, and for how many bytes, a closed connection is still read. Bytes left unread would make the kernel send a
-// reset, which destroys the part of the last reply that the client has not read yet.
+// How long, and how many bytes of, a closing connection are still read. Unread bytes would make the kernel send a
+// reset, which discards the part of the last reply that the client has not read yet.
 constexpr std::chrono::milliseconds kLingerTime{500};
 constexpr std::size_t kLingerBytes = std::size_t{64} << 20;
 constexpr int kClientLeft = 499;
@@ -43,7 +43,7 @@ Response Overloaded(std::string_view detail, std::string_view request_id) {
   return response;
 }
 
-// Asked before a body is read: nothing if it may come.
+// Checked before a body is read: nothing if it may be sent.
 std::optional<Response> WhyNoBody(const Request& request, std::size_t max_body_bytes) {
   if (request.content_length > max_body_bytes) {
     return ProblemResponse(413, "the request body is too large", request.id);
@@ -56,7 +56,7 @@ std::optional<Response> WhyNoBody(const Request& request, std::size_t max_body_b
   return std::nullopt;
 }
 
-// A request's body and its room.
+// A request's body and its hold on the transfer budget.
 struct HeldBody {
   TransferBudget::Hold room;
   std::string text;
@@ -85,12 +85,12 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   void Displace() override { Post(&Session::DisplaceHere); }
 
  private:
-  // The request that the session is at.
+  // The current request.
   struct Exchange {
     Request request;
     Admission admission;
     bool is_admitted = false;
-    Clock::time_point begun;  // at the end of its head
+    Clock::time_point begun;  // time at the end of its head
   };
 
   void Post(void (Session::*step)()) {
@@ -99,7 +99,7 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   void EvictHere() {
     hurried_ = true;
     reader_.Close();
-    if (phase() == Phase::kServes) return;                    // a request has come meanwhile
+    if (phase() == Phase::kServes) return;                    // a request has arrived meanwhile
     if (!reader_.waiting() || served_ == 0) stream_.Reset();  // an unfinished head or handshake
   }
   void DrainHere() { reader_.Close(context_->options.drain_grace); }
@@ -108,10 +108,10 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
     stream_.Reset();
   }
 
-  // Its reply is under way, or its body has no room: then there is nothing to give up.
+  // If its reply is being sent, or its body has no memory, there is nothing to release.
   void DisplaceHere() {
     if (!has_upload_ && !is_receiving_) return;
-    displaced_ = true;  // also between the moment its body got room and the one in which it hears of that
+    displaced_ = true;  // also between the moment its body got memory and the moment it is woken
     if (is_receiving_ && has_upload_) stream_.Cancel();
     displacement_.cancel();
   }
@@ -143,14 +143,15 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   std::unique_ptr<ConnectionHandler> handler_;
   std::string peer_text_ = "-";
   Exchange exchange_;
-  Clock::time_point replied_;  // when the last reply was told about: the present, once the next request is waited for
+  Clock::time_point
+      replied_;  // when the last reply was reported; about the current time when the next request is awaited
   std::uint64_t served_ = 0;
   std::atomic<Phase> phase_ = Phase::kReceives;  // written on the session's own thread
-  bool hurried_ = false;                         // others wait for this connection's place
+  bool hurried_ = false;                         // another connection needs this one's place
   asio::steady_timer displacement_;              // never expires; cancelled when displaced_ is set
-  bool has_upload_ = false;                      // the request's body has room that others may need
+  bool has_upload_ = false;                      // the request's body holds memory that others may need
   bool is_receiving_ = false;                    // the body is being read
-  bool displaced_ = false;                       // others need the room of the request's body
+  bool displaced_ = false;                       // others need the memory of the request's body
 };
 
 asio::awaitable<void> Session::ServeAll() {
@@ -163,7 +164,7 @@ asio::awaitable<void> Session::ServeAll() {
   replied_ = Clock::now();
   for (bool keep = true; keep;) {
     if (served_ > 0) phase_.store(Phase::kIdle, std::memory_order_relaxed);
-    // Requests that were sent without waiting for replies take turns with those of other connections.
+    // Pipelined requests take turns with requests of other connections.
     if (served_ > 0 && reader_.has_unread()) {
       co_await asio::post(stream_.socket().get_executor(), asio::use_awaitable);
     }
@@ -182,7 +183,7 @@ asio::awaitable<void> Session::ServeAll() {
   co_await CloseGently();
 }
 
-// What follows cannot be trusted to be a request.
+// The following bytes may not be a request.
 asio::awaitable<void> Session::RefuseMessage(BadRequest why) {
   if (exchange_.request.id.empty()) exchange_.request.id = RequestId::Next();
   Response response = ProblemResponse(why.status, why.detail, exchange_.request.id);
@@ -190,7 +191,7 @@ asio::awaitable<void> Session::RefuseMessage(BadRequest why) {
   co_await Reply(response);
 }
 
-// False: the connection is to be closed.
+// Returns false if the connection must be closed.
 asio::awaitable<bool> Session::ServeOne() {
   Request& request = exchange_.request;
   request.id = RequestId::Next();

@@ -11,7 +11,7 @@
 namespace terrace::cli {
 namespace {
 
-// What a source states itself comes before what its dataset states.
+// A source's own options override those of its dataset.
 dem::SourceOptions SourceOptionsOf(const config::DatasetConfig& dataset, const config::SourceConfig& source) {
   const config::NodataConfig nodata = source.nodata.value_or(dataset.nodata);
   dem::SourceOptions options;
@@ -21,7 +21,7 @@ dem::SourceOptions SourceOptionsOf(const config::DatasetConfig& dataset, const c
   return options;
 }
 
-// All files of the sources, each entry one rank.
+// All files of the sources. Each entry has its own rank.
 std::vector<dem::DemFile> FilesOf(const config::DatasetConfig& dataset) {
   const std::vector<config::SourceConfig>& sources = dataset.sources;
   std::vector<dem::DemFile> files;
@@ -61,7 +61,7 @@ Result<tiler::ImageryRules> OpenImagery(const config::ImageryConfig& wanted, con
   return imagery;
 }
 
-// Changes when the source, a layer, or an option that changes bytes does. The files' identity is in the fingerprints.
+// A hash of the source, the layers and all options that change bytes. The fingerprints contain the files' identity.
 std::uint64_t GenerationOf(const config::DatasetConfig& wanted, const tiler::Dataset& dataset,
                            const std::string& version) {
   const tiler::WaterRules& water = dataset.water;

@@ -1,4 +1,4 @@
-// terrace info: what a raster holds, how deep it can be served, and what its owner should mend.
+// terrace info: the properties of a raster, its deepest level, and what to improve.
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
@@ -33,7 +33,7 @@
 namespace terrace::cli {
 namespace {
 
-// Averages of half, a quarter .. of the samples take a third of them, in floats.
+// Averages by 2, 4, .. are a third of the samples in total, stored as floats.
 constexpr double kAveragesBytesPerSample = 4.0 / 3;
 
 std::string NoOverviewsAdvice(const dem::RasterInfo& info) {
@@ -52,7 +52,7 @@ std::string NoOverviewsAdvice(const dem::RasterInfo& info) {
       std::ceil(info.seconds_to_open));
 }
 
-// What a user should do about this raster; empty when nothing.
+// Advice about this raster; empty: none.
 std::vector<std::string> AdviceFor(const dem::RasterInfo& info, double floor) {
   std::vector<std::string> advice;
   if (info.needs_averages) {
@@ -183,7 +183,7 @@ struct InfoArguments {
 };
 
 int Info(const InfoArguments& arguments) {
-  spdlog::set_level(spdlog::level::err);  // what opening logs is printed below
+  spdlog::set_level(spdlog::level::err);  // what opening would log is printed below
   const auto& [dems, dataset_flags, cache_dir, json, mosaic] = arguments;
   config::DatasetConfig flags;
   std::vector<config::ConfigError> wrong;
@@ -205,7 +205,7 @@ int Info(const InfoArguments& arguments) {
     Progress progress((cache_dir.empty() ? "reading " : "preparing ") + name, FileCount(sources));
     config::DatasetConfig dataset = flags;
     dataset.sources = sources;
-    std::vector<Error> faults;  // of files, all of them
+    std::vector<Error> faults;  // of all files
     const auto source = OpenSource(dataset, cache_dir, progress.Callback(), {},
                                    [&faults](const Error& fault) { faults.push_back(fault); });
     if (!source) {
