@@ -221,7 +221,7 @@ asio::awaitable<bool> Session::ServeOne() {
   co_return co_await Reply(std::get<Response>(answer), /*can_respond_again=*/true);
 }
 
-// False, as nobody waits for the answer: the client is gone, or the request's room goes to others.
+// Returns false if nobody waits for the answer: the client is gone, or others get the request's memory.
 asio::awaitable<bool> Session::GiveUp() {
   if (displaced_) {
     co_await RefuseUpload();
@@ -234,8 +234,8 @@ asio::awaitable<bool> Session::GiveUp() {
   co_return false;
 }
 
-// False: it did not come, what was to be said has been said, and the connection is to be closed. A body has room as a
-// whole once more than kFreeBytes of it have come: whoever only announces one takes nothing.
+// Returns false if the body did not arrive; the client has been told, and the connection must be closed. Memory for the
+// whole body is taken once more than kFreeBytes of it have arrived: announcing a body takes no memory.
 asio::awaitable<bool> Session::ReceiveBody() {
   Request& request = exchange_.request;
   auto body = std::make_shared<HeldBody>();
@@ -264,18 +264,18 @@ asio::awaitable<bool> Session::ReceiveBody() {
   }
   is_receiving_ = false;
   if (displaced_) {
-    body.reset();  // its room is waited for
+    body.reset();  // release its memory while waiting
     co_await RefuseUpload();
   }
   if (!read && !displaced_ && read.error().status > 0) co_await RefuseMessage(read.error());
   if (!read || displaced_) co_return false;
   phase_.store(Phase::kServes, std::memory_order_relaxed);
-  body->room.Settle();  // it is the server's turn
+  body->room.Settle();  // from now on, the server determines the duration
   request.body = RequestBody(std::shared_ptr<const std::string>(body, &body->text));
   co_return true;
 }
 
-// Its room goes to others: nothing of it is kept.
+// Others get its memory: release the body.
 asio::awaitable<void> Session::RefuseUpload() {
   exchange_.request.body = RequestBody();
   has_upload_ = is_receiving_ = false;
@@ -291,11 +291,11 @@ asio::awaitable<void> Session::DelayRefusal() {
   co_await delay.async_wait(asio::use_awaitable);
 }
 
-// Nothing: the client is gone, or the request's room goes to others. Most answers need not be waited for, and then
-// neither a timer nor a second coroutine watches the client.
+// Returns nothing if the client is gone, or if others get the request's memory. Most answers are ready at once, and
+// then neither a timer nor a second coroutine watches the client.
 asio::awaitable<std::optional<Response>> Session::WhileConnected(asio::awaitable<Response> answer) {
   using asio::experimental::awaitable_operators::operator||;
-  stream_.ExpiresNever();  // handlers have deadlines of their own
+  stream_.ExpiresNever();  // handlers have their own deadlines
   std::variant<Response, std::monostate> first = co_await (Await(std::move(answer)) || Interrupted());
   if (first.index() == 1) co_return std::nullopt;
   co_return std::move(std::get<0>(first));
@@ -304,7 +304,7 @@ asio::awaitable<std::optional<Response>> Session::WhileConnected(asio::awaitable
 asio::awaitable<void> Session::Interrupted() {
   using asio::experimental::awaitable_operators::operator||;
   if (!has_upload_) co_return co_await ClientLeft(stream_);
-  boost::system::error_code ignored;  // cancelled, which is what is waited for
+  boost::system::error_code ignored;  // the expected cancellation
   auto displaced = asio::redirect_error(asio::use_awaitable, ignored);
   if (!displaced_) co_await (ClientLeft(stream_) || displacement_.async_wait(std::move(displaced)));
 }
@@ -328,7 +328,7 @@ asio::awaitable<Response> Session::Await(asio::awaitable<Response> answer) {
 
 Response Session::Failed(const std::exception& exception) const {
   const auto* const of_system = dynamic_cast<const boost::system::system_error*>(&exception);
-  // The client has left, which nobody needs to be told.
+  // The client has left: nothing to send.
   if (of_system != nullptr && of_system->code() == asio::error::operation_aborted) {
     return ProblemResponse(503, "cancelled", exchange_.request.id);
   }
@@ -349,15 +349,16 @@ TransferBudget::Ask Session::AskFor(const Response& response) const {
   return ask;
 }
 
-// Lets go of the reply's body, waits for room for it, and makes the reply again, mostly from a cache: what waits must
-// not take the memory that it waits for. Nothing: there was none before the deadline, or the client is gone.
+// Releases the reply's body, waits for memory, and makes the reply again, usually from a cache: a waiting body must not
+// occupy the memory that it waits for. Returns nothing if there was no memory before the deadline, or if the client is
+// gone.
 asio::awaitable<std::optional<TransferBudget::Hold>> Session::RoomLater(Response& response) {
   using asio::experimental::awaitable_operators::operator||;
   for (;;) {
     TransferBudget::Ask ask = AskFor(response);
     const std::size_t bytes = ask.bytes;
     ask.body = nullptr;
-    Response bare;  // its lines refer to the body's owner too
+    Response bare;  // its lines share ownership with the body
     bare.labels = std::move(response.labels);
     response = std::move(bare);
     stream_.ExpiresNever();
@@ -373,13 +374,14 @@ asio::awaitable<std::optional<TransferBudget::Hold>> Session::RoomLater(Response
     }
     response = std::get<Response>(std::move(again));
     response.for_grant = response.for_grant || exchange_.admission.for_grant;
-    if (SendsBody(response) && response.body->size() > bytes) continue;  // of another dataset than before
+    if (SendsBody(response) && response.body->size() > bytes) continue;  // the dataset may have changed
     room->Keep(response.body);
     co_return room;
   }
 }
 
-// False: the connection is to be closed. `response` has to live as long, and may be let go where it can be made again.
+// Returns false if the connection must be closed. `response` must outlive the call, and may be released if it can be
+// made again.
 asio::awaitable<bool> Session::Reply(Response& response, bool can_respond_again) {
   const Request& request = exchange_.request;
   if (can_respond_again) response.for_grant = response.for_grant || exchange_.admission.for_grant;
@@ -399,7 +401,7 @@ asio::awaitable<bool> Session::Reply(Response& response, bool can_respond_again)
     co_await DelayRefusal();
   }
   has_upload_ = false;
-  exchange_.request.body = RequestBody();  // nothing of it is held while the client takes its time
+  exchange_.request.body = RequestBody();  // small replies hold no memory while the client reads them
   HeadOptions options;
   options.version = request.version;
   options.keep_alive = request.keep_alive && !response.close && !reader_.closing();
@@ -411,7 +413,7 @@ asio::awaitable<bool> Session::Reply(Response& response, bool can_respond_again)
 
   BufferPair left = {asio::buffer(head), body_bytes > 0 ? asio::buffer(*response.body) : asio::const_buffer()};
   Skip(stream_.TakeAhead(), left);
-  // What the kernel takes at once needs no deadline. An error shows again when the rest is written.
+  // What the kernel accepts at once needs no deadline. An error occurs again when the rest is written.
   const std::size_t taken = stream_.WriteReady(left).value_or(0);
   Skip(taken, left);
   const bool written = asio::buffer_size(left) == 0 || co_await WriteRest(left, taken, *room);
@@ -419,8 +421,8 @@ asio::awaitable<bool> Session::Reply(Response& response, bool can_respond_again)
   co_return options.keep_alive&& written;
 }
 
-// False: the client is gone, took nothing for too long, or takes too little in the long run. `total`: bytes of the
-// reply that were written before, which tells nothing of the client: the kernel took them.
+// Returns false if the client is gone, has read nothing for too long, or reads too slowly on average. `total`: bytes of
+// the reply that were written before. They say nothing about the client, because the kernel buffers them.
 asio::awaitable<bool> Session::WriteRest(BufferPair left, std::size_t total, TransferBudget::Hold& room) {
   const SessionOptions& options = context_->options;
   room.Took(0);
