@@ -401,7 +401,7 @@ asio::awaitable<bool> Session::Reply(Response& response, bool can_respond_again)
     co_await DelayRefusal();
   }
   has_upload_ = false;
-  exchange_.request.body = RequestBody();  // small replies hold no memory while the client reads them
+  exchange_.request.body = RequestBody();  // released before the client reads the reply
   HeadOptions options;
   options.version = request.version;
   options.keep_alive = request.keep_alive && !response.close && !reader_.closing();
