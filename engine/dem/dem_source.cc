@@ -51,15 +51,15 @@ Result<void> CheckOptions(const DemOptions& options) {
 }
 
 std::uint64_t FingerprintOf(const std::vector<RasterGrid>& grids, const DemOptions& options, double floor) {
-  // Changes whenever the same files and options would give other heights than before.
+  // Incremented whenever the same files and options give other heights than before.
   constexpr std::uint32_t kResamplingVersion = 3;
   ByteWriter writer;
   writer.Put(kResamplingVersion);
   for (const RasterGrid& grid : grids) {
-    if (&grid != &grids.front()) writer.Put(std::uint32_t{0});  // which rasters make one raster grid counts, too
+    if (&grid != &grids.front()) writer.Put(std::uint32_t{0});  // includes which rasters form a raster grid
     for (const GridMember& member : grid.members()) {
       writer.Put(FingerprintOf(member.raster->files(), member.raster->georeference()));
-      // What was found or stated of voids decides heights as well.
+      // Detected and configured nodata values affect heights, too.
       if (const SampleRules& rules = member.raster->layout().rules; !rules.extra_nodata.empty() || rules.rim > 0) {
         for (const double value : rules.extra_nodata) writer.Put(value);
         for (const double bound : {rules.lowest, rules.highest, double(rules.rim)}) writer.Put(bound);
@@ -87,7 +87,7 @@ int ResolutionStep(const RasterSource& raster) {
   return geo::NearestOctave(power);
 }
 
-// By rank, then by what the raster grids of a rank have: finer ones first, then by path.
+// Orders raster grids by rank, then by resolution, finer first, then by path.
 Result<std::vector<RasterGrid>> GridsOf(const std::vector<DemFile>& files, const Rasters& rasters,
                                         const GridOptions& options) {
   std::map<int, Rasters> ranks;
@@ -105,20 +105,20 @@ Result<std::vector<RasterGrid>> GridsOf(const std::vector<DemFile>& files, const
   });
   std::vector<RasterGrid> grids;
   for (auto& grid : made) {
-    if (!*grid) return tl::unexpected(grid->error());  // those after the first that failed may be missing
+    if (!*grid) return tl::unexpected(grid->error());  // after the first failure, rasters may be missing
     grids.push_back(**std::move(grid));
   }
   return grids;
 }
 
-// The smallest box that holds all footprints.
+// The smallest box that contains all footprints.
 GeoBounds BoundsOf(const Rasters& rasters) {
   if (rasters.size() == 1) return rasters.front()->info().bounds;
   std::vector<Footprint> boxes;
   for (const auto& raster : rasters) boxes.push_back(raster->footprint());
   std::ranges::sort(boxes, {}, &Footprint::west);
   Footprint hull = boxes.front();
-  // What lies beyond the antimeridian comes first in the order of longitudes.
+  // Parts beyond the antimeridian come first in the order of longitudes.
   const double beyond = std::ranges::max_element(boxes, {}, &Footprint::east)->east - 360;
   double covered = std::max(hull.east, beyond), gap = 0, gap_end = hull.west;  // the widest gap ends at gap_end
   for (const Footprint& box : boxes) {
@@ -131,7 +131,7 @@ GeoBounds BoundsOf(const Rasters& rasters) {
     covered = std::max(covered, box.east);
   }
   const double last_gap = boxes.front().west + 360 - covered;
-  constexpr double kNoGap = 1e-9;  // pieces of one grid meet as exactly as their corners are rounded
+  constexpr double kNoGap = 1e-9;  // pieces of one grid meet up to the rounding of their corners
   if (std::max(gap, last_gap) <= kNoGap) return {-180, hull.south, 180, hull.north};
   const double west = last_gap >= gap ? boxes.front().west : gap_end;
   const double east = west + 360 - std::max(gap, last_gap);
@@ -166,7 +166,7 @@ std::vector<Reach> ReachesOf(const std::vector<RasterGrid>& grids, const DemOpti
       std::ranges::min_element(grids, {}, [](const RasterGrid& s) { return s.spacing().finer; })->spacing().finer;
   std::vector<Reach> reaches;
   for (const RasterGrid& grid : grids) {
-    // An error that the operator requests applies to the finest source; other sources get as many more levels.
+    // `finest_error` applies to the finest source; for the other sources it is scaled by their spacing.
     const auto goal =
         options.finest_error ? std::optional(*options.finest_error * (grid.spacing().finer / finest)) : std::nullopt;
     const int depth = DeepestLevel(grid.spacing(), options.error_fraction, goal);

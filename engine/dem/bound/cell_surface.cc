@@ -11,7 +11,7 @@ CellSurface::CellSurface(const std::array<Position, 4>& corners, bool is_separab
       east_{corners[1].x - origin_.x, corners[1].y - origin_.y},
       north_{corners[2].x - origin_.x, corners[2].y - origin_.y},
       twist_{corners[3].x - corners[1].x - north_.x, corners[3].y - corners[1].y - north_.y} {
-  // Lines between nodes deviate from straight ones by far less than that fraction of the cell.
+  // Lines between nodes deviate from straight lines by much less than this fraction of the cell.
   constexpr double kBulge = 1.0 / 32;
   const double bulge = is_separable ? 0 : kBulge;
   const auto extent = [](double east, double north, double twist) {
@@ -33,7 +33,7 @@ double CellSurface::Apart(const Position& at, double sample) const {
     const double sign = ux * vy - uy * vx < 0 ? -scale : scale;
     u += (right_x * vy - right_y * vx) * sign;
     v += (ux * right_y - uy * right_x) * sign;
-    // What is left after this step is far below what the last one moved.
+    // The remaining error is much smaller than the last step.
     const double x = slack_x_ + (step + 1 < kSteps ? 0 : std::abs(right_x));
     const double y = slack_y_ + (step + 1 < kSteps ? 0 : std::abs(right_y));
     u_slack = (std::abs(vy) * x + std::abs(vx) * y) * scale;
@@ -47,7 +47,7 @@ double CellSurface::Apart(const Position& at, double sample) const {
   const double north = heights_[2] + u * (heights_[3] - heights_[2]);
   const double along = std::max(std::abs(heights_[1] - heights_[0]), std::abs(heights_[3] - heights_[2]));
   const double across = std::max(std::abs(heights_[2] - heights_[0]), std::abs(heights_[3] - heights_[1]));
-  // Outside the cell by no more than the slack the slopes are the cell's, but for the twist: twice is enough.
+  // Within the slack outside the cell, slopes differ from the cell's only by the twist: twice the slope is enough.
   const double here = std::abs(south + v * (north - south) - sample) + 2 * (u_slack * along + v_slack * across);
   return std::min(anywhere, here + widened_);
 }

@@ -6,7 +6,8 @@
 namespace terrace::dem {
 namespace {
 
-// For one tile and raster grid: about as many as its own heights are averaged from at the largest factor of MayRead.
+// Limit of samples for one tile and raster grid: about as many as the tile's heights are averaged from at the largest
+// factor of MayRead.
 constexpr std::int64_t kMaxSamples = std::int64_t{1} << 20;
 
 }  // namespace
@@ -17,7 +18,7 @@ void LooseCells::Add(const TileCell& cell, const CellErrorBound::CellSamples& pl
 }
 
 Result<void> LooseCells::Read(double& bound, const std::stop_token& stop) {
-  // The largest first: what they come to makes others not worth looking at.
+  // Largest bounds first: their results make reads of smaller ones unnecessary.
   std::ranges::stable_sort(groups_, std::ranges::greater(), &Group::error);
   std::int64_t left = kMaxSamples;
   for (const Group& group : groups_) {

@@ -46,7 +46,7 @@ class Queue {
   std::mutex mutex_;
   std::size_t next_ = 0;  // guarded by mutex_, as are these
   std::size_t thrower_ = 0;
-  std::exception_ptr thrown_;  // what work(thrower_) threw
+  std::exception_ptr thrown_;  // exception of work(thrower_)
 };
 
 }  // namespace
@@ -59,7 +59,7 @@ void ForEachOnAllCores(std::size_t count, const std::function<bool(std::size_t)>
     threads.reserve(cores);
     while (threads.size() + 1 < std::min(cores, count)) threads.emplace_back([&queue] { queue.Run(); });
   } catch (const std::system_error&) {
-    // Those that there are do it.
+    // If a thread cannot be created, the existing ones do the work.
   }
   queue.Run();
   threads.clear();

@@ -11,14 +11,14 @@ namespace terrace::dem {
 
 class IdleList {
  public:
-  // Never destroyed: pools of static lifetime may outlive any order.
+  // Never destroyed, because pools of static lifetime may be destroyed later.
   static IdleList& OfProcess() {
     static IdleList& list = *new IdleList;
     return list;
   }
 
   void SetLimit(std::size_t count) {
-    Items gone;  // closed after the lock, here as below: closing a file may take long
+    Items gone;  // closed after the lock is released, here and below: closing a file may take long
     const std::lock_guard lock(mutex_);
     limit_ = count;
     Shrink(gone);
@@ -65,14 +65,14 @@ class IdleList {
   void Shrink(Items& gone) {
     while (items_.size() > limit_) {
       const auto of_pool = by_pool_.find(items_.back().pool);
-      of_pool->second.erase(of_pool->second.begin());  // of a pool the one used longest ago comes first
+      of_pool->second.erase(of_pool->second.begin());  // least recently used first, also within a pool
       gone.splice(gone.end(), items_, std::prev(items_.end()));
     }
   }
 
   std::mutex mutex_;  // guards what follows, and the pools' epochs
   std::size_t limit_ = 256;
-  Items items_;  // the one used last comes first
+  Items items_;  // most recently used first
   std::unordered_map<const AnyIdlePool*, std::vector<Items::iterator>> by_pool_;
 };
 
@@ -86,7 +86,7 @@ void AnyIdlePool::KeepAny(Lease lease) noexcept {
   try {
     IdleList::OfProcess().Keep(*this, std::move(lease));
   } catch (const std::bad_alloc&) {
-    // It is closed, and opened anew when it is wanted.
+    // The object is closed, and opened again when needed.
   }
 }
 

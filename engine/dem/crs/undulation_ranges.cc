@@ -9,10 +9,10 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// The table keeps a range for 64 of its pixels: here for 8 nodes along a side.
+// The table has a range for 64 of its pixels: here for 8 nodes along a side.
 constexpr int kPixelsPerNode = 8;
 
-// Positions are computed in other orders elsewhere: steps of the grid.
+// A margin for rounding in other computations of positions, in steps of the grid.
 constexpr double kSlack = 1e-6;
 
 struct IndexRange {

@@ -11,7 +11,8 @@ Result<HandlePool::Handle> HandlePool::Borrow() {
   if (dataset.item != nullptr) return Handle(idle_, std::move(dataset));
   dataset.item = ReopenRaster(path_);
   const std::string why = dataset.item == nullptr ? TakeGdalError() : "";
-  // It may have been replaced or removed between the look at it and the opening, which may have failed for that.
+  // The file may have been replaced or removed between the check and the opening, which may have failed for this
+  // reason.
   if (auto unchanged = CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
   if (dataset.item == nullptr) {
     return MakeError(ErrorCode::kUnavailable, "{}: cannot be opened any more ({}); restore the file", path_, why);

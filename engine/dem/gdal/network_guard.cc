@@ -12,7 +12,7 @@
 namespace terrace::dem {
 namespace {
 
-// Memory, and files within files: these lead nowhere else.
+// File systems for memory and for files within files, which have no other access.
 constexpr std::array<std::string_view, 12> kLocal = {
     "/vsimem/",     "/vsizip/",    "/vsigzip/",   "/vsitar/",   "/vsi7z/",     "/vsirar/",
     "/vsisubfile/", "/vsisparse/", "/vsicached?", "/vsicrypt/", "/vsistdout/", "/vsistdout_redirect/"};
@@ -33,7 +33,7 @@ class Closed : public VSIFilesystemHandler {
 }  // namespace
 
 void GuardNetwork(const std::vector<std::string>& allowed_prefixes) {
-  // As GDAL made them, and what stands in for them; GDAL frees those it has at the end.
+  // GDAL's original file systems and their replacements. GDAL frees the ones that are installed at the end.
   static auto& doors = *new std::map<std::string, VSIFilesystemHandler*>;
   static auto& closed = *new std::map<std::string, Closed*>;
   char** prefixes = VSIFileManager::GetPrefixes();

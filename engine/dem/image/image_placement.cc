@@ -9,7 +9,7 @@ namespace {
 
 bool HasCrs(const OGRSpatialReference* srs) { return srs != nullptr && !srs->IsEmpty(); }
 
-// Heights may count from another datum than the image states, if it states any.
+// Compares horizontal systems only: the vertical datum does not matter for an image.
 OGRSpatialReference Horizontal(const OGRSpatialReference& srs) {
   OGRSpatialReference horizontal(srs);
   if (horizontal.IsCompound() != 0) horizontal.StripVertical();
@@ -17,7 +17,7 @@ OGRSpatialReference Horizontal(const OGRSpatialReference& srs) {
   return horizontal;
 }
 
-// Whether positions in one are positions in the other. Not said of degrees, which differ by full circles.
+// Whether positions in one system are positions in the other. False for degrees, which may differ by full circles.
 bool ShareCoordinates(const OGRSpatialReference* a, const OGRSpatialReference* b) {
   if (!HasCrs(a) && !HasCrs(b)) return true;
   if (!HasCrs(a) || !HasCrs(b)) return false;

@@ -11,10 +11,10 @@
 namespace terrace::dem {
 namespace {
 
-constexpr int kRowsAtOnce = 64;      // of the DEM: bounds what is kept of a much finer image
+constexpr int kRowsAtOnce = 64;      // of the DEM: limits the memory for a much finer image
 constexpr double kBeyondEdge = 0.5;  // pixels
 
-// As many pixels as fit between two samples in the middle of the DEM, on the axis where they fit less often.
+// The number of pixels between two samples in the middle of the DEM, on the axis with fewer.
 int PixelsPerSample(const ImagePlacement& placement, const RasterHeights& dem) {
   const double x = dem.width / 2.0, y = dem.height / 2.0;
   std::array<Position, 3> positions = {{{x, y}, {x + 1, y}, {x, y + 1}}};

@@ -7,8 +7,8 @@
 namespace terrace::dem {
 namespace {
 
-// Buckets per axis. Offsets that OffsetOf counts as equal are less than a bucket apart, so that they lie in one bucket
-// or in neighbours.
+// Buckets per axis. Offsets that OffsetOf treats as equal differ by less than a bucket, so they lie in the same or in
+// adjacent buckets.
 constexpr int kBuckets = 64;
 static_assert(Georeference::kOffsetTolerance < 0.9 / kBuckets);
 
@@ -26,7 +26,7 @@ struct Bucket {
   }
 };
 
-// Nothing where a raster is so far away that the fraction of a pixel is lost.
+// Returns nothing if the raster is so far away that the fraction of a pixel is lost.
 std::optional<Bucket> BucketOf(const Georeference& first, const Georeference& where) {
   const Position offset = first.CornerOf(where);
   if (!(std::max(std::abs(offset.x), std::abs(offset.y)) < Georeference::kFarthestPixel)) return std::nullopt;
@@ -46,7 +46,7 @@ GridFinder::Kind& GridFinder::KindOf(const PlacedRaster& raster) {
   return kinds.emplace_back(Kind{raster.vertical, {}, {}});
 }
 
-// At least the grids of the family that the raster fits.
+// Includes all grids of the family that the raster fits.
 std::vector<std::size_t> GridFinder::Candidates(const Family& family, const Georeference& where) const {
   const auto bucket = BucketOf(*family.first, where);
   if (!bucket) return family.grids;

@@ -18,7 +18,7 @@
 namespace terrace::dem {
 namespace {
 
-// A raster on its grid, counted from the first pixel of the grid's first raster.
+// A raster's position on its grid, relative to the first pixel of the grid's first raster.
 struct Member {
   std::size_t raster = 0;
   const Georeference* where = nullptr;
@@ -39,7 +39,7 @@ std::vector<std::vector<Member>> GridsOf(std::span<const PlacedRaster> rasters, 
   return grids;
 }
 
-// Columns after which a grid repeats itself; 0: it does not.
+// The number of columns after which a grid repeats itself; 0: it does not.
 std::int64_t TurnOf(const Georeference& where) {
   const double whole = std::round(where.period());
   return where.period() > 0 && std::abs(where.period() - whole) < 0.01 ? static_cast<std::int64_t>(whole) : 0;
@@ -49,7 +49,7 @@ bool Touch(const geo::TileRange& a, const geo::TileRange& b) {
   return !geo::IsEmpty(geo::Common({a.start_x - 1, a.start_y - 1, a.end_x + 1, a.end_y + 1}, b));
 }
 
-// The member's column, some turns on, where it touches `pixels`; nothing if it does nowhere.
+// Returns the member's column, moved by whole turns, at which it touches `pixels`; nothing if there is none.
 std::optional<std::int64_t> ColumnBeside(const geo::TileRange& pixels, Member member, std::int64_t turn) {
   const std::int64_t canonical = member.column;
   const auto nearest =
@@ -64,12 +64,12 @@ std::optional<std::int64_t> ColumnBeside(const geo::TileRange& pixels, Member me
 
 std::int64_t FloorMod(std::int64_t value, std::int64_t modulus) { return (value % modulus + modulus) % modulus; }
 
-// The members of a grid that are in no group yet, by their pixels.
+// An index of the grid's members without a group, by their pixels.
 class Ungrouped {
  public:
   Ungrouped(const std::vector<Member>& members, std::int64_t turn) : turn_(turn), tree_(EntriesOf(members)) {}
 
-  // At least those that touch `pixels`, ascending; the grid repeats itself.
+  // Returns all members that touch `pixels`, and perhaps others, ascending. The grid may repeat itself.
   std::vector<std::size_t> Near(const geo::TileRange& pixels) const {
     std::vector<std::size_t> found;
     const geo::TileRange wide = Canonical({pixels.start_x - 1, pixels.start_y - 1, pixels.end_x + 1, pixels.end_y + 1});
@@ -81,7 +81,7 @@ class Ungrouped {
     return found;
   }
 
-  // As it was when the index was made.
+  // State at the time when the index was made.
   void Remove(const Member& member, std::size_t number) {
     for (const Entry& entry : EntriesOf(member, number)) tree_.remove(entry);
   }
@@ -96,7 +96,7 @@ class Ungrouped {
     return {{at(pixels.start_x), at(pixels.start_y)}, {at(pixels.end_x), at(pixels.end_y)}};
   }
 
-  // From the first turn on; of all columns where it goes around or nearly so.
+  // Within the first turn; all columns for a grid that spans the whole Earth or nearly so.
   geo::TileRange Canonical(geo::TileRange pixels) const {
     if (turn_ == 0) return pixels;
     const std::int64_t columns = pixels.end_x - pixels.start_x;
@@ -126,7 +126,8 @@ class Ungrouped {
   boost::geometry::index::rtree<Entry, boost::geometry::index::quadratic<16>> tree_;
 };
 
-// Groups of members that touch, by their numbers. A member's column becomes the one beside those that it touches.
+// Returns groups of members that touch. Moves the columns of members by whole turns, so that they are adjacent to those
+// that they touch.
 std::vector<std::vector<std::size_t>> GroupsOf(std::vector<Member>& members, std::int64_t turn, std::size_t& pairs) {
   std::vector<std::vector<std::size_t>> groups;
   std::vector<bool> taken(members.size());
@@ -153,7 +154,8 @@ std::vector<std::vector<std::size_t>> GroupsOf(std::vector<Member>& members, std
   return groups;
 }
 
-// Counts pixels from the north-western corner of all; from the westernmost raster where they go all around the Earth.
+// Moves the origin of pixels to the north-western corner of all; for a group around the whole Earth, to the westernmost
+// raster.
 GridLayout LayoutOf(const std::vector<Member>& members, std::int64_t turn) {
   geo::TileRange hull = members.front().pixels();
   for (const Member& member : members) hull = geo::Hull(hull, member.pixels());

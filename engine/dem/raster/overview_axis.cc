@@ -10,7 +10,7 @@ namespace terrace::dem {
 bool HasOwnOverviews(GDALDataset& dataset) {
   const std::string_view driver = dataset.GetDriverName();
   if (driver != "JPEG" && !driver.starts_with("JP2")) return false;
-  // GDAL's go before the format's.
+  // GDAL prefers its own overviews to the format's.
   char** const files = dataset.GetFileList();
   const bool is_beside = std::any_of(files, files + CSLCount(files),
                                      [](const char* file) { return std::string_view(file).ends_with(".ovr"); });
@@ -24,7 +24,7 @@ double PixelsPerSample(GDALDataset& dataset, int factor, int pixels, int samples
 
 GridAxis::Location OverviewAxis::Around(std::int64_t block) const {
   if (is_own_) return {block, 0};
-  // In halves of pixels, so that all is whole: centre * samples / pixels - 1/2.
+  // In halves of pixels, to stay in integers: centre * samples / pixels - 1/2.
   const auto centre = static_cast<std::int64_t>(2 * blocks_.Center(block));
   const std::int64_t place = centre * samples_ - pixels_, unit = 2 * pixels_;
   if (place < 0) return {0, 0};

@@ -16,14 +16,14 @@ constexpr std::int64_t kSamplesPerStrip = std::int64_t{1} << 20;
 
 std::int64_t FloorMod(std::int64_t value, std::int64_t modulus) { return (value % modulus + modulus) % modulus; }
 
-// What a grid is averaged from: the samples, or blocks of `start` x `start` of them as an overview gives them.
+// The input of averaging: the samples, or an overview with blocks of `start` x `start` samples.
 struct Level {
   GDALRasterBand* band;
   int start;
-  int block;               // how many of those blocks, per axis, make one of the grid
+  int block;               // number of these blocks, per axis, in a block of the grid
   GridAxis columns, rows;  // of blocks of `start`
   OverviewAxis x, y;
-  bool is_band;  // a block is the band's sample of its number
+  bool is_band;  // block i is sample i of the band
 
   double ColumnShare(std::int64_t column) const { return ShareOf(column, start, columns.samples()); }
   double RowShare(std::int64_t row) const { return ShareOf(row, start, rows.samples()); }
@@ -49,7 +49,7 @@ Result<Level> StartingLevel(GDALDataset& dataset, const RasterLayout& layout, in
                is_whole || is_own};
 }
 
-// Samples of an overview; the column behind the last one is the first.
+// Reads samples of an overview; the column after the last one is the first.
 Result<std::vector<float>> ReadSamples(const Level& level, const SampleRules& rules, const GridWindow& window,
                                        const std::stop_token& stop) {
   std::vector<float> samples(static_cast<std::size_t>(window.columns * window.rows));
@@ -68,7 +68,7 @@ Result<std::vector<float>> ReadSamples(const Level& level, const SampleRules& ru
   return both;
 }
 
-// Blocks of level.start between the overview's samples. The window does not wrap.
+// Interpolates blocks of level.start between the overview's samples. Precondition: the window does not wrap.
 Result<void> InterpolateBlocks(const Level& level, const SampleRules& rules, const GridWindow& window, float* out,
                                const std::stop_token& stop) {
   std::vector<GridAxis::Location> columns;
@@ -105,10 +105,10 @@ Result<void> ReadBlocks(const Level& level, const SampleRules& rules, const Grid
   const std::int64_t count = std::min<std::int64_t>(level.columns.count() - first, window.columns * level.block);
   const std::int64_t top = window.row * level.block;
   const std::int64_t rows = std::min<std::int64_t>(level.rows.count() - top, window.rows * level.block);
-  // In sample rows: a row of blocks can be the whole raster.
+  // Reads a limited number of sample rows at a time, because a row of blocks can be the whole raster.
   const std::int64_t strip = std::max<std::int64_t>(1, kSamplesPerStrip / count);
   const bool is_plain = level.block == 1 && count == window.columns;
-  // Written before it is read, and not filled with zeros before that.
+  // Not initialized, because it is written before it is read.
   const auto samples = std::make_unique_for_overwrite<float[]>(static_cast<std::size_t>(count * std::min(strip, rows)));
   BlockAverages averages(is_plain ? 0 : window.columns, level.block);
   for (std::int64_t done = 0; done < rows; done += strip) {
@@ -155,7 +155,7 @@ double GridAxis::Center(std::int64_t index) const {
 
 GridAxis::Location GridAxis::LocateNearEnd(double position) const {
   auto index = static_cast<std::int64_t>(std::floor(position * per_factor_ - 0.5));
-  // The last block's centre may lie nearer than a factor.
+  // The centre of the last block may be nearer than a whole factor.
   if ((wraps_ || index + 1 < count_) && position >= Center(index + 1)) ++index;
   if (!wraps_) {
     if (index < 0) return {0, 0};
