@@ -28,7 +28,7 @@ bool IsBorderEdge(const HeightField& field, SamplePosition a, SamplePosition b) 
 FitErrors::FitErrors(const HeightField& field, const Sagitta& sagitta, FitMeasure measure)
     : field_(&field), sagitta_(&sagitta), measure_(measure) {
   lone_star_.count = 1;
-  lone_star_.has_border = true;  // or not: it is looked for
+  lone_star_.has_border = true;  // perhaps; borders are checked
   lone_star_.ring.Grow(2);
 }
 
@@ -62,8 +62,8 @@ double FitErrors::Of(const PlaneMisfit& misfit, const Triangulation::Vertex& p, 
   return error;
 }
 
-// Of the triangle's border samples, by their plain distances: a weight would favour one cut over the other only for
-// being at the border, and what is decided here is not the bound.
+// The worst border sample of the triangle, by unweighted distance: a weight would favour one cut only because it is at
+// the border, and the bound is not decided here.
 double FitErrors::WorstOnBorders(const Triangulation::Vertex& p, const RingVertex& u, const RingVertex& v) const {
   const std::array<Triangulation::Vertex, 3> corners = {p, Around(p.position, u), Around(p.position, v)};
   double worst = 0;

@@ -9,7 +9,7 @@ namespace {
 
 bool HasCrs(const OGRSpatialReference* srs) { return srs != nullptr && !srs->IsEmpty(); }
 
-// Compares horizontal systems only: the vertical datum does not matter for an image.
+// Returns the horizontal part: the vertical datum does not matter for an image.
 OGRSpatialReference Horizontal(const OGRSpatialReference& srs) {
   OGRSpatialReference horizontal(srs);
   if (horizontal.IsCompound() != 0) horizontal.StripVertical();

@@ -8,7 +8,7 @@
 namespace terrace::dem {
 namespace {
 
-// Where lines of either grid lie along one axis, and between which of a grid's averages each is.
+// The lines of both grids along one axis, and the averages of each grid around each line.
 struct Line {
   double position = 0;
   GridAxis::Location fine, coarse;
@@ -26,7 +26,7 @@ std::vector<Line> LinesOf(const GridAxis& fine, const GridAxis& coarse) {
   return lines;
 }
 
-// The surface between averages, with weights renormalized over valid ones; and the extremes of those around.
+// The surface between averages, with weights renormalized over valid averages, and the extremes of the averages around.
 class Surface {
  public:
   Surface(const CoarseAverages::Grid& grid, bool wraps) : grid_(grid), wraps_(wraps) {}
@@ -42,7 +42,7 @@ class Surface {
     return y.weight > 0 ? upper + y.weight * (Along(x, y.index + 1) - upper) : upper;
   }
 
-  // Of the averages between which a cell of lines lies that starts at this place.
+  // Extremes of the averages around the cell of lines that begins here.
   Corners Around(const GridAxis::Location& x, const GridAxis::Location& y) const {
     Corners corners;
     for (const std::int64_t row : {y.index, std::min(y.index + 1, grid_.rows - 1)}) {
@@ -104,7 +104,7 @@ void AddFactor(const RasterLayout& layout, const CoarseAverages& coarse, int fac
   const auto block = [&](double position, int count) {
     return std::clamp(static_cast<int>(std::floor(position / pixels)), 0, count - 1);
   };
-  // One line alone: the surfaces are constant along that axis.
+  // With a single line, the surfaces are constant along this axis.
   const auto steps = [](const std::vector<Line>& lines) { return std::max<std::size_t>(lines.size() - 1, 1); };
   const auto padded = [](std::vector<Line> lines) {
     if (lines.size() == 1) lines.push_back(lines.front());

@@ -10,7 +10,7 @@
 namespace terrace::dem {
 namespace {
 
-// By what the file and its owner state.
+// By the nodata values of the file and the configuration.
 std::string WhyMisleading(GDALDataset& dataset, const SampleRules& rules) {
   GDALRasterBand& band = HeightBand(dataset);
   const auto is_declared = [&](double value) { return rules.nodata && rules.IsSame(value, *rules.nodata); };
@@ -59,7 +59,7 @@ std::string DropMisleadingOverviews(GDALDataset& dataset, const RasterStatistics
   int is_declared = 0;
   HeightBand(dataset).GetNoDataValue(&is_declared);
   const BlockRange all = statistics.table.Whole();
-  // Cubic and Lanczos kernels go beyond the heights they are given, by less than this.
+  // Cubic and Lanczos kernels overshoot their input by less than this.
   const double overshoot = 0.02 * (static_cast<double>(statistics.highest) - static_cast<double>(statistics.lowest));
   std::string why;
   if (layout.rules.has_mask) {

@@ -10,7 +10,7 @@
 namespace terrace::dem {
 namespace {
 
-// Of an overview that are read at once: multiples of the usual storage blocks, so that each is decoded once.
+// Samples per side of one read of an overview: a multiple of the usual storage blocks, so that each is decoded once.
 constexpr int kStripRows = 256, kStripColumns = 4096;
 
 std::optional<double> MeanOf(const BlockSum& sum) {
@@ -59,7 +59,8 @@ std::size_t RasterStatistics::bytes() const {
 StatisticsAssembler::StatisticsAssembler(const RasterLayout& layout)
     : layout_(layout),
       voids_(layout.columns, layout.height, [this](int row, int first, int last, std::int64_t samples) {
-        // A single sample is filled from its neighbours, which are within the ranges of any box that it counts in.
+        // A hole of one sample is filled from its neighbours, whose heights are in the ranges of every box with this
+        // sample.
         if (samples > 1) statistics_.table.MarkHole(row, first, last);
         statistics_.hole_samples += static_cast<std::uint64_t>(last - first + 1);
       }) {
@@ -119,7 +120,7 @@ void StatisticsAssembler::AddSums(const Chunk& chunk, const ChunkStatistics& chu
 Result<void> StatisticsAssembler::FinishCoarse(GDALDataset& dataset, const std::stop_token& stop) {
   CoarseAverages& coarse = statistics_.coarse;
   if (!coarse.grids.empty()) {
-    // Sums of chunks, by rows: BlockAverages' order.
+    // Adds sums of chunks row by row, in the order of BlockAverages.
     const int columns = DivideUp(layout_.columns, ChunkGrid::kSide), rows = DivideUp(layout_.height, ChunkGrid::kSide);
     for (std::size_t k = 0; k < coarse.grids.size(); ++k) {
       const int chunks = (kLargestDirect << k) / ChunkGrid::kSide;

@@ -29,7 +29,7 @@ constexpr std::uint64_t kHeaderMagic = 0x31'53'54'41'54'53'52'54;  // "TRSTATS1"
 constexpr std::uint64_t kFooterMagic = 0x44'4e'45'53'54'41'54'53;  // "STATSEND"
 constexpr std::uint32_t kChunkMagic = 0x4b'4e'48'43;               // "CHNK"
 constexpr std::size_t kHeaderBytes = 36, kChunkHeaderBytes = 32, kFooterBytes = 24;
-constexpr int kMaxUnsynced = 64;                    // chunks: a few seconds of work
+constexpr int kMaxUnsynced = 64;                    // chunks: a few seconds
 constexpr std::uint64_t kMaxHeaderBytes = 1 << 16;  // a few numbers and a line of text
 
 constexpr int CeilingOf(int a, int b) { return (a + b - 1) / b; }
@@ -54,7 +54,7 @@ std::string HeaderOf(const StatisticsShape& shape) {
   return bytes + sum.Take();
 }
 
-// All of it, or false.
+// Reads all bytes, or returns false.
 bool ReadAt(int file, std::uint64_t offset, void* to, std::size_t bytes) {
   auto* at = static_cast<char*>(to);
   while (bytes > 0) {
@@ -79,7 +79,7 @@ std::uint64_t SizeOf(int file) {
   return ::fstat(file, &status) == 0 ? static_cast<std::uint64_t>(status.st_size) : 0;
 }
 
-// The averages of a chunk of one factor: their numbers and their offset. Each factor follows its checksum.
+// Size and offset of a chunk's averages of one factor. Each factor is preceded by its checksum.
 struct AveragesPlace {
   std::uint64_t offset = 0;
   int columns = 0, rows = 0;
@@ -98,7 +98,7 @@ AveragesPlace PlaceOf(const Chunk& chunk, const RasterLayout& layout, int factor
   }
 }
 
-// Whether a file begins with a header, and with that of the shape. Then sets the detected nodata of `shape`.
+// Whether a file begins with the header of this shape. If so, sets the detected nodata of `shape`.
 enum class HeaderState { kDamaged, kOther, kSame };
 HeaderState ReadHeader(int file, StatisticsShape& shape, std::uint64_t& bytes) {
   const std::uint64_t size = SizeOf(file);
@@ -123,7 +123,7 @@ HeaderState ReadHeader(int file, StatisticsShape& shape, std::uint64_t& bytes) {
 
 struct ChunkHeader {
   std::uint32_t index = 0, statistics_bytes = 0;
-  std::uint64_t averages_bytes = 0, checksum = 0;  // of the header before it and the statistics
+  std::uint64_t averages_bytes = 0, checksum = 0;  // of the preceding header and the statistics
 
   static ChunkHeader Of(std::string_view bytes) {
     ByteReader reader(bytes);
@@ -205,7 +205,7 @@ int LeastKeptFactor(const RasterLayout& layout) {
 
 RasterLayout WithDetectedNodata(RasterLayout layout, const DetectedNodata& detected) {
   detected.AddTo(layout.rules);
-  // They were averaged from heights and nodata values.
+  // The overviews were averaged from heights and nodata values.
   if (detected.any()) layout.overview_factors.clear();
   return layout;
 }
@@ -351,7 +351,7 @@ Result<std::optional<StatisticsCacheWriter>> StatisticsCacheWriter::Open(const s
       std::this_thread::sleep_for(std::chrono::milliseconds(100));
       continue;
     }
-    // Whoever had the lock before may have renamed the file, or removed it.
+    // The previous owner of the lock may have renamed or removed the file.
     if (!IsSameFile(file.get(), partial)) continue;
     if (waiting && LoadStatistics(path, shape)) {
       ::unlink(partial.c_str());
@@ -416,7 +416,7 @@ Result<void> StatisticsCacheWriter::Write(std::string_view bytes) {
     if (written < 0 && errno == EINTR) continue;
     if (written <= 0) {
       const std::string why = ErrorText();
-      ::unlink((path_ + ".partial").c_str());  // whole or not, it takes room that is missing
+      ::unlink((path_ + ".partial").c_str());  // complete or not, it takes disk space that is needed
       return MakeError(ErrorCode::kUnavailable, "{}.partial: cannot be written: {}", path_, why);
     }
     end_ += static_cast<std::uint64_t>(written);
@@ -446,8 +446,8 @@ Result<void> StatisticsCacheWriter::Finish(const RasterStatistics& statistics) {
   footer.Put(kFooterMagic);
   if (auto written = Write(bytes); !written) return written;
   if (auto written = Write(footer.Take()); !written) return written;
-  // A file that a power cut has damaged is found and made anew. Where that is quick the disk is not waited for: of
-  // tens of thousands of sources that would be most of the time.
+  // Files damaged by a power failure are detected and made again. If that is quick, the file is not synced: for tens of
+  // thousands of sources, syncing would take most of the time.
   const bool is_waited_for = chunks_.count() > kMaxUnsynced;
   if ((is_waited_for && ::fsync(file_.get()) != 0) || ::rename((path_ + ".partial").c_str(), path_.c_str()) != 0) {
     return MakeError(ErrorCode::kUnavailable, "{}: cannot be finished: {}", path_, ErrorText());

@@ -19,7 +19,7 @@ void PutRanges(ByteWriter& writer, const std::vector<BlockRange>& ranges) {
   }
 }
 
-// Vectors have the size that the raster's shape gives them: it is not stored.
+// The sizes of vectors are not stored, because they follow from the raster's shape.
 void GetRanges(ByteReader& reader, std::vector<BlockRange>& ranges) {
   for (BlockRange& range : ranges) {
     range.min = reader.Get<float>();
@@ -59,7 +59,7 @@ ZeroEdges GetZeros(ByteReader& reader) {
   return zeros;
 }
 
-// Nothing where the bytes hold fewer than they say.
+// Returns nothing if there are fewer bytes than stated.
 std::optional<std::uint32_t> GetCount(ByteReader& reader, std::size_t bytes_each) {
   const auto count = reader.Get<std::uint32_t>();
   return count <= reader.remaining() / bytes_each ? std::optional(count) : std::nullopt;

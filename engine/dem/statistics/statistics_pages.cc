@@ -23,7 +23,7 @@ StatisticsPages::Tables StatisticsPages::Find(const void* raster) {
 void StatisticsPages::Add(const void* raster, Tables tables) {
   const std::size_t bytes = tables->bytes();
   const std::lock_guard lock(mutex_);
-  if (by_raster_.contains(raster)) return;  // by another thread meanwhile
+  if (by_raster_.contains(raster)) return;  // added by another thread meanwhile
   pages_.push_front({raster, std::move(tables), bytes});
   by_raster_.emplace(raster, pages_.begin());
   paged_ += bytes;
