@@ -1,7 +1,5 @@
-// What a terrace server can be told, with its defaults: plain values, checked by parse.h or options.h before they get
-// here.
-//
-// A Config is made once at the start and never changed afterwards; threads share it without locks.
+// The configuration of a server, with its defaults: plain values that parse.h or options.h have checked.
+// A Config does not change after the start; threads share it without locks.
 #pragma once
 
 #include <chrono>
@@ -21,25 +19,26 @@
 
 namespace terrace::config {
 
-// Which samples of a source are voids, beside those that a mask hides.
+// The samples of a source that are voids, in addition to those that a mask hides.
 struct NodataConfig {
-  bool detect = true;               // undeclared marks are found as well as those that the file declares
-  std::vector<double> values = {};  // raw values that are voids, beside the declared one
+  bool detect = true;               // detects undeclared nodata values
+  std::vector<double> values = {};  // further raw values that are voids
 
   friend bool operator==(const NodataConfig&, const NodataConfig&) = default;
 };
 
-// Which header trusted proxies write. A proxy passes the other one on as the client sent it, so only one may count.
+// The header that trusted proxies write. Only one is used, because a proxy forwards the other one as the client sent
+// it.
 enum class ForwardedHeader : std::uint8_t { kXForwarded, kForwarded };
 enum class LogLevel : std::uint8_t { kDebug, kInfo, kWarn, kError, kOff };
 enum class LogFormat : std::uint8_t { kText, kJson };
-// Where and how requests are logged.
+// The destination and format of the access log.
 enum class AccessLogForm : std::uint8_t { kLog, kCombined, kJson, kOff };
 
-// Where the water of a dataset's water mask comes from: one of both, or neither.
+// The source of a dataset's water mask: a raster, a sea level, or none.
 struct WaterConfig {
   std::string mask;                 // a raster that is not zero on water; empty: none
-  std::optional<double> sea_level;  // metres in what the source counts from; heights at or below it are water
+  std::optional<double> sea_level;  // metres in the source's vertical datum; heights at or below it are water
 
   bool any() const { return !mask.empty() || sea_level.has_value(); }
   friend bool operator==(const WaterConfig&, const WaterConfig&) = default;
@@ -49,8 +48,8 @@ struct WaterConfig {
 struct ImageryConfig {
   std::string image;  // empty: none
   std::string attribution;
-  proto::TextureFormat texture = proto::TextureFormat::kJpeg;  // of tiles whose requests name none
-  int size = 512;                                              // pixels along the edge of a tile, at most
+  proto::TextureFormat texture = proto::TextureFormat::kJpeg;  // for requests that name none
+  int size = 512;                                              // limit of pixels along the edge of a tile
   int quality = 80;
 
   friend bool operator==(const ImageryConfig&, const ImageryConfig&) = default;
@@ -59,14 +58,14 @@ struct ImageryConfig {
 // One entry of a dataset's sources: a file, a glob or a folder. Its files are of equal rank.
 struct SourceConfig {
   SourceConfig() = default;
-  // One file. Implicit: a path is a source.
+  // One file. Implicit, because a path is a source.
   SourceConfig(std::string file) : written(std::move(file)), files{written} {}  // NOLINT(google-explicit-constructor)
   SourceConfig(const char* file) : SourceConfig(std::string(file)) {}           // NOLINT(google-explicit-constructor)
 
   std::string written;             // path or pattern, absolute
-  std::vector<std::string> files;  // what it stands for
-  bool is_folder = false;          // what is no raster among them is left out
-  // What it does not say itself its dataset does.
+  std::vector<std::string> files;  // the files that it stands for
+  bool is_folder = false;          // files that are no rasters are left out
+  // Default: the option of the dataset.
   std::optional<std::string> vertical = {};
   std::optional<NodataConfig> nodata = {};
 
@@ -75,30 +74,30 @@ struct SourceConfig {
 
 struct DatasetConfig {
   std::string name;                   // the first part of its URLs: [A-Za-z0-9._-]{1,64}
-  std::vector<SourceConfig> sources;  // the first that has a height at a place gives it
-  std::string vertical = "crs";       // what heights count from: a word, "EPSG:5703", or the path of a grid
+  std::vector<SourceConfig> sources;  // where several have a height, the first one is used
+  std::string vertical = "crs";       // vertical datum: a keyword, "EPSG:5703", or the path of a grid
   NodataConfig nodata;
   std::string attribution;
   double error_fraction = 0.5;         // default error of a level, as a share of the error that clients assume there
   std::optional<double> finest_error;  // metres; decides the deepest level
   std::optional<double> floor;         // metres; height outside the source and in collars
   int max_void_gap = 64;               // source samples; narrower voids are filled
-  dem::HoleFill voids = dem::HoleFill::kSmooth;  // of larger ones with data all around them
-  double feather = 0;                            // metres: how far from its edges a source gives way to the next
+  dem::HoleFill voids = dem::HoleFill::kSmooth;  // surface in larger voids with data all around them
+  double feather = 0;  // metres: width of the blend between a source and the next one, inwards from its edges
   tin::Criterion criterion = tin::Criterion::kDelaunay;
   bool compact = false;                                                   // tiles go through the drop pass
-  proto::GlbCompression glb_compression = proto::GlbCompression::kDraco;  // of requests that name none
+  proto::GlbCompression glb_compression = proto::GlbCompression::kDraco;  // for requests that name none
   int draco_speed = 7;                                                    // 0 smallest tiles .. 10 fastest
   int draco_normal_bits = 8;                                              // of each of the two coordinates of a normal
   WaterConfig water;
   ImageryConfig imagery;
-  bool is_public = false;         // seen without a token, where there are tokens
-  int metadata_availability = 0;  // levels; tiles of every so many tell what is below them, 0: none
+  bool is_public = false;         // visible without a token even if there are tokens
+  int metadata_availability = 0;  // levels; tiles at multiples of this level list the tiles below them; 0: none
 
   friend bool operator==(const DatasetConfig&, const DatasetConfig&) = default;
 };
 
-// The page at "/". An empty directory stands for the one that is installed with the program.
+// The page at "/". Empty directory: the viewer that is installed with the program.
 struct ViewerConfig {
   bool enabled = true;
   std::filesystem::path directory;
@@ -106,7 +105,7 @@ struct ViewerConfig {
   friend bool operator==(const ViewerConfig&, const ViewerConfig&) = default;
 };
 
-// Finished tiles and refinements on disk, where they outlive the server.
+// A cache of tiles and refinements on disk, which outlives the process.
 struct DiskCacheConfig {
   std::string directory;                                // empty: none
   std::size_t tile_bytes = std::size_t{8} << 30;        // of files; 0: no tiles
@@ -115,12 +114,12 @@ struct DiskCacheConfig {
   friend bool operator==(const DiskCacheConfig&, const DiskCacheConfig&) = default;
 };
 
-// What opens datasets to whoever shows it.
+// A token that gives access to datasets.
 struct TokenConfig {
   std::string name;                   // in the log
-  std::string sha256;                 // TokenHash: the token itself is kept nowhere
+  std::string sha256;                 // TokenHash of the token, which is not stored
   std::vector<std::string> datasets;  // empty: all
-  double requests_per_second = 0;     // 0: as everybody
+  double requests_per_second = 0;     // 0: the server's limit
 
   friend bool operator==(const TokenConfig&, const TokenConfig&) = default;
 };
@@ -152,14 +151,14 @@ struct Config {
   std::size_t gdal_cache_bytes = std::size_t{256} << 20;  // blocks of sources
   std::size_t max_open_sources = 256;                     // files of all datasets kept open between reads
   std::size_t max_connections = 1024;
-  std::size_t max_connections_per_client = 0;          // 0: as many as there may be in all
-  std::size_t transfer_bytes = std::size_t{32} << 20;  // of bodies on their way
-  double requests_per_second = 0;                      // of each client or token; 0: any
+  std::size_t max_connections_per_client = 0;          // 0: no limit per client
+  std::size_t transfer_bytes = std::size_t{32} << 20;  // memory for bodies in transfer
+  double requests_per_second = 0;                      // of each client or token; 0: no limit
   double request_burst = 0;                            // 0: two seconds' worth
   std::size_t max_mesh_samples = 1'000'000;
   std::size_t max_locations = 10'000;  // in one request for heights
 
-  std::vector<TokenConfig> tokens;  // none: everybody sees everything
+  std::vector<TokenConfig> tokens;  // none: all datasets are public
   std::vector<std::string> cors_origins = {"*"};
   std::vector<std::string> trusted_proxies;  // addresses and ranges
   ForwardedHeader forwarded_header = ForwardedHeader::kXForwarded;
@@ -169,14 +168,14 @@ struct Config {
   std::chrono::milliseconds header_timeout{5'000};
   std::chrono::milliseconds idle_timeout{30'000};
   std::chrono::milliseconds write_timeout{20'000};
-  std::size_t min_read_rate = 4096;  // bytes a second; 0: any
+  std::size_t min_read_rate = 4096;  // bytes per second; 0: no limit
   std::chrono::milliseconds drain_timeout{10'000};
 
   std::vector<std::string> data_roots;        // folders that hold every source; none: any folder
   std::vector<std::string> allowed_prefixes;  // of remote sources; none: no remote sources
-  std::vector<std::string> allowed_drivers;   // GDAL's names of formats; none: the usual ones
+  std::vector<std::string> allowed_drivers;   // GDAL's short names of drivers; none: the default drivers
 
-  bool watch = true;  // look for changes of sources and of the file that this came from
+  bool watch = true;  // watch sources and the configuration file for changes
 
   LogLevel log_level = LogLevel::kInfo;
   LogFormat log_format = LogFormat::kText;
@@ -186,21 +185,21 @@ struct Config {
   friend bool operator==(const Config&, const Config&) = default;
 };
 
-// One thing that is wrong. Config errors are collected and shown all together.
+// One error in the configuration. All errors are collected and shown together.
 struct ConfigError {
   std::string path;     // JSON Pointer (RFC 6901) such as "/datasets/0/sources/1", or a flag such as "--listen"
-  std::string message;  // what is wrong and what would be right
+  std::string message;  // what is wrong and how to correct it
 
   friend bool operator==(const ConfigError&, const ConfigError&) = default;
 };
 
-// Empty if `name` can name a dataset, else what is wrong with it.
+// Returns what is wrong with the name of a dataset; empty: nothing.
 std::string CheckDatasetName(const std::string& name);
 
-// Turns any text, a file's stem for instance, into a valid dataset name: other characters become '-'.
+// Converts any text, such as a file's stem, to a valid dataset name: invalid characters become '-'.
 std::string SanitizeDatasetName(const std::string& text);
 
-// Names that more than one dataset has, each reported at the later dataset.
+// Finds names that several datasets have. Each is reported at the later dataset.
 std::vector<ConfigError> FindDuplicateNames(const std::vector<DatasetConfig>& datasets);
 
 }  // namespace terrace::config

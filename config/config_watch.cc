@@ -12,8 +12,8 @@
 namespace terrace::config {
 namespace {
 
-// Times of files advance in ticks, of 10 ms at most, and in seconds on old file systems: what was read within this time
-// of a change may have changed once more without another stamp.
+// File times advance in ticks of up to 10 ms, or of a second on old file systems: a file that was read within this time
+// after a change may have changed again without a new stamp.
 constexpr std::int64_t kFreshNs = 2'000'000'000;
 
 std::int64_t InNanoseconds(const timespec& time) { return std::int64_t{time.tv_sec} * 1'000'000'000 + time.tv_nsec; }
@@ -33,7 +33,7 @@ std::optional<ConfigWatch::Stamp> ConfigWatch::StampOf(const std::filesystem::pa
 }
 
 ConfigResult ConfigWatch::Load() {
-  // Before the file is read: a change meanwhile shows at the next look.
+  // Taken before the file is read, so that the next check notices a change during the read.
   stamp_ = StampOf(file_);
   is_fresh_ = stamp_ && std::abs(now_ns_() - stamp_->status_changed_ns) < kFreshNs;
   is_loaded_ = false;

@@ -1,4 +1,4 @@
-// Whether a configuration may be another one than when it was loaded, found out without parsing it.
+// Detects that a configuration may have changed since it was loaded, without parsing it.
 #pragma once
 
 #include <cstdint>
@@ -13,11 +13,11 @@
 
 namespace terrace::config {
 
-// Of one thread.
+// Not thread-safe.
 class ConfigWatch {
  public:
-  // `file`: the configuration's; empty: there is none. `load` makes the configuration from it and from what else there
-  // is. `now_ns`: nanoseconds since the epoch, as the times of files have them.
+  // `file`: the configuration file; empty: none. `load`: makes the configuration from the file, flags and folders.
+  // `now_ns`: nanoseconds since the epoch, on the clock of file times.
   ConfigWatch(std::filesystem::path file, std::function<ConfigResult()> load,
               std::function<std::int64_t()> now_ns = SystemTimeNs)
       : file_(std::move(file)), load_(std::move(load)), now_ns_(std::move(now_ns)) {}
@@ -26,8 +26,9 @@ class ConfigWatch {
 
   ConfigResult Load();
 
-  // False: the file has the device, inode, size and times that it had before the last Load, had them for a while, and
-  // folders and globs among the sources hold the files that they held. True as well after a Load that failed.
+  // Returns false if the file has had the same device, inode, size and times since before the last Load and was not
+  // written to shortly before it, and folders and globs among the sources contain the same files. Returns true after a
+  // failed Load.
   bool MayHaveChanged() const;
 
  private:
@@ -43,8 +44,8 @@ class ConfigWatch {
   const std::function<ConfigResult()> load_;
   const std::function<std::int64_t()> now_ns_;
   bool is_loaded_ = false;
-  std::optional<Stamp> stamp_;            // nothing: no regular file
-  bool is_fresh_ = false;                 // the file was written to a moment before it was read
+  std::optional<Stamp> stamp_;            // nothing: not a regular file
+  bool is_fresh_ = false;                 // the file was written to shortly before it was read
   std::vector<SourceConfig> expandable_;  // folders and globs
 };
 

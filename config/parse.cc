@@ -25,7 +25,7 @@ std::string TooLarge(const std::filesystem::path& file) {
                      file.string(), kMaxConfigBytes >> 20);
 }
 
-// Of a file, or a pipe to its end; the error says why not. What is too large is not read.
+// Reads a file, or a pipe to its end. The error says why that failed. Files that are too large are not read.
 tl::expected<std::string, std::string> ReadText(int descriptor, const std::filesystem::path& file) {
   struct stat status {};
   if (::fstat(descriptor, &status) == 0) {

@@ -1,4 +1,4 @@
-// The configuration file: JSON text to Config and back. config.schema.json describes it to editors.
+// Converts the JSON text of a configuration file to a Config and back. Editors use config.schema.json.
 #pragma once
 
 #include <cstddef>
@@ -13,23 +13,25 @@
 
 namespace terrace::config {
 
-// Everything that is wrong, in the order of the text. After a syntax error there is nothing but that.
+// A Config, or all errors in the order of the text. A syntax error is the only error.
 using ConfigResult = tl::expected<Config, std::vector<ConfigError>>;
 
-// `directory` is where relative paths in `text` start; globs in `sources` are looked up there.
+// `directory`: the folder that relative paths and globs in `text` are relative to.
 ConfigResult ParseConfig(std::string_view text, const std::filesystem::path& directory);
 
-// Of a file; a larger one is refused unread.
+// Larger files are refused without reading them.
 inline constexpr std::size_t kMaxConfigBytes = std::size_t{16} << 20;
 
-// Reads and parses a file; its folder is the directory. A file that cannot be read is one error with the path "".
+// Reads and parses a file. Relative paths are relative to its folder. If the file cannot be read, returns one error
+// with the path "".
 ConfigResult LoadConfig(const std::filesystem::path& file);
 
-// All options as JSON with two spaces of indentation and a final newline. ParseConfig reads it back to an equal Config.
+// Writes all options as JSON with two spaces of indentation and a final newline. ParseConfig converts it back to an
+// equal Config.
 std::string ToJson(const Config& config);
 
-// What a path of the command line stands for: a file or a folder, never a glob (the shell has expanded those).
-// kNotFound, kUnavailable: a folder without files, or one that cannot be read.
+// Returns the source for a path on the command line: a file or a folder, never a glob, because the shell expands globs.
+// kNotFound: the folder has no files. kUnavailable: the folder cannot be read.
 Result<SourceConfig> SourceAt(const std::string& path);
 
 }  // namespace terrace::config

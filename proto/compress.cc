@@ -28,12 +28,13 @@ std::string CompressWith(Bound bound, Compress compress, std::string_view bytes,
   if (compressor == nullptr) throw std::bad_alloc();  // levels are those that there are
   std::string out(bound(compressor.get(), bytes.size()), '\0');
   const std::size_t size = compress(compressor.get(), bytes.data(), bytes.size(), out.data(), out.size());
-  TERRACE_CHECK(size > 0);  // zero only if the bound were too small
+  TERRACE_CHECK(size > 0);  // zero would mean that the bound was too small
   out.resize(size);
   return out;
 }
 
-// Hands `bytes` on in pieces of kCompressedAtOnce; `take` is told which is the last one. False: a stop was requested.
+// Passes `bytes` to `take` in pieces of kCompressedAtOnce, with a flag for the last one. Returns false if a stop was
+// requested.
 bool InPieces(std::string_view bytes, const std::stop_token& stop, const auto& take) {
   do {
     if (stop.stop_requested()) return false;
@@ -75,7 +76,7 @@ std::string Gzip(std::string_view bytes, int level, const std::stop_token& stop)
   return CompressWith(libdeflate_gzip_compress_bound, libdeflate_gzip_compress, bytes, level);
 }
 
-// The same bytes as of BrotliEncoderCompress: its blocks do not depend on how the text is cut.
+// The result is equal to that of BrotliEncoderCompress, because blocks do not depend on the division of the input.
 std::string Brotli(std::string_view bytes, int quality, const std::stop_token& stop) {
   if (bytes.empty()) return "\x06";
   const std::unique_ptr<BrotliEncoderState, void (*)(BrotliEncoderState*)> encoder(

@@ -17,9 +17,9 @@ inline constexpr int kGzipLevel = 6, kBrotliQuality = 4, kZstdLevel = 6;
 // Takes about ten milliseconds.
 inline constexpr std::size_t kCompressedAtOnce = std::size_t{1} << 20;
 
-// RFC 1952 gzip, one member: no time stamp, no name, so that equal bytes compress to equal bytes. By libdeflate up to
-// kCompressedAtOnce bytes, as it takes a text as a whole, by zlib above. Thread-safe. Precondition: 0 <= level <= 12;
-// 0 stores, 12 is slowest and smallest (zlib ends at 9).
+// RFC 1952 gzip, one member, without time stamp and name, so that equal bytes compress to equal bytes. Uses libdeflate
+// up to kCompressedAtOnce bytes, and zlib above, because libdeflate cannot be interrupted. Thread-safe. Precondition: 0
+// <= level <= 12; 0 stores, 12 is slowest and smallest (zlib's maximum is 9).
 std::string Gzip(std::string_view bytes, int level = kGzipLevel, const std::stop_token& stop = {});
 
 // RFC 7932 brotli. Thread-safe. Precondition: 2 <= quality <= 9. From 5 on it takes twice the time of 4 and saves a
@@ -29,7 +29,7 @@ std::string Brotli(std::string_view bytes, int quality = kBrotliQuality, const s
 // RFC 8878 zstd, one frame, without a checksum. Thread-safe. Precondition: 1 <= level <= 19.
 std::string Zstd(std::string_view bytes, int level = kZstdLevel, const std::stop_token& stop = {});
 
-// RFC 1950 zlib, as PNG holds it: by libdeflate, in one go. Thread-safe. Precondition: as of Gzip.
+// RFC 1950 zlib, as in PNG, by libdeflate in one call. Thread-safe. Precondition: as for Gzip.
 std::string Zlib(std::string_view bytes, int level = 6);
 
 }  // namespace terrace::proto

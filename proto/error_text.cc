@@ -11,8 +11,8 @@ std::string FormatErrorUp(double error_m) {
   double printed = 0;
   std::from_chars(text.data(), text.data() + text.size(), printed);
   if (printed >= error_m) return text;
-  // Rounding went down by less than half a unit of the last digit: one unit more rounds to the next number up.
-  // The unit is read from text as well: powers of ten of the C library may differ between processors.
+  // The text was rounded down by less than half a unit of the last digit, so adding one unit gives the next number. The
+  // unit is parsed from text, because powers of ten of the C library may differ between processors.
   const std::string digits = fmt::format("{:.5e}", error_m);
   int exponent = 0;
   const std::size_t mark = digits.find('e') + 1, sign = digits[mark] == '+' ? 1 : 0;

@@ -21,7 +21,7 @@ struct LatticeView {
     const auto stride = static_cast<std::size_t>(lattice.cells) + 3;
     return heights[static_cast<std::size_t>(j + 1) * stride + static_cast<std::size_t>(i + 1)];
   }
-  // The row's samples from column 0 on; the ones before it and behind the last belong to it as well.
+  // The row's samples from column 0 on. The halo samples lie before and after them.
   const float* Row(int j) const { return heights.data() + static_cast<std::ptrdiff_t>(j + 1) * (cells() + 3) + 1; }
   double Longitude(int i) const { return lattice.Longitude(lattice.FirstColumn(key) + i); }
   double Latitude(int j) const { return lattice.Latitude(lattice.FirstRow(key) + j); }

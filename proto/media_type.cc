@@ -17,7 +17,7 @@ std::string_view Trimmed(std::string_view text) {
   return text.substr(first, text.find_last_not_of(" \t") - first + 1);
 }
 
-// Takes what stands before the first `separator` outside of double quotes off `rest`.
+// Removes from `rest` the text before the first `separator` outside of double quotes, and returns it.
 std::string_view TakePart(std::string_view& rest, char separator) {
   bool quoted = false;
   std::size_t at = 0;

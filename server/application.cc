@@ -13,10 +13,10 @@ namespace {
 
 using Clock = TileService::Clock;
 
-// How long a request waits for a source that was replaced, and how often it looks.
+// How long a request waits for a replaced source, and how often it checks.
 constexpr std::chrono::milliseconds kReplaceTime{3'000}, kReplacePeriod{20};
-// A source that is replaced again while it is opened cannot be opened for a moment; one that still cannot after this
-// time waits for a person.
+// A source may be replaced again while it is being opened. If opening still fails after this time, somebody has to
+// repair it, and requests do not wait.
 constexpr std::chrono::milliseconds kPassingTrouble{1'500};
 
 asio::awaitable<void> Pause() {
@@ -24,7 +24,7 @@ asio::awaitable<void> Pause() {
   co_await timer.async_wait(asio::use_awaitable);
 }
 
-// Names that nobody serves must not become labels of the metrics.
+// Unknown names must not become labels of metrics.
 void SetLabels(const Call& call, const Handlers& handlers, Response& response) {
   response.labels.route = call.route.row->label;
   const std::string& dataset = call.route.dataset;
@@ -75,7 +75,7 @@ class TerrainApplication::Handler final : public ConnectionHandler {
   void Report(const SentReply& reply) override;
 
  private:
-  // Preflights come before access: they carry no token.
+  // Preflight requests are answered before access is checked, because they have no token.
   std::optional<Response> RefuseMethod(bool takes_post) const {
     const Request& request = *call_.request;
     if (request.method == Method::kOptions) return PreflightResponse(takes_post);
@@ -117,7 +117,7 @@ asio::awaitable<Response> TerrainApplication::Handler::AfterOpening() {
   co_return co_await std::get<asio::awaitable<Response>>(std::move(answer));
 }
 
-// Keeps what it is answered from. Where that turns out to be gone, the next catalog answers.
+// Keeps the handlers alive until the answer is ready. If a source turns out to be replaced, the next catalog answers.
 asio::awaitable<Response> TerrainApplication::Handler::Finish(HandlersPtr handlers, asio::awaitable<Response> answer) {
   const auto give_up = Clock::now() + kReplaceTime;
   for (Answer next = std::move(answer);;) {
@@ -177,7 +177,7 @@ std::string TerrainApplication::ClientOf(const asio::ip::address& peer) const {
 }
 
 bool TerrainApplication::Replace(CatalogPtr catalog, HandlerOptions options) {
-  // The old ones end after the lock.
+  // The old handlers are destroyed after the lock is released.
   auto handlers = std::make_shared<const Handlers>(std::move(catalog), parts_.tiles, parts_.viewer, options, *this);
   deadline_.store(options.deadline, std::memory_order_relaxed);
   const std::lock_guard lock(mutex_);
@@ -219,7 +219,7 @@ bool TerrainApplication::HasLastingTrouble(const std::string& dataset) const {
   return since != trouble_since_.end() && Clock::now() - since->second >= kPassingTrouble;
 }
 
-// False: there was none in time, or will be none.
+// Returns false if there was none in time, or if there will be none.
 asio::awaitable<bool> TerrainApplication::FirstCatalog() const {
   const auto give_up = Clock::now() + deadline_.load(std::memory_order_relaxed);
   while (opening()) {
@@ -229,7 +229,7 @@ asio::awaitable<bool> TerrainApplication::FirstCatalog() const {
   co_return true;
 }
 
-// False: none comes in time.
+// Returns false if none comes in time.
 asio::awaitable<bool> TerrainApplication::NextCatalog(HandlersPtr now, std::string dataset,
                                                       Clock::time_point give_up) const {
   while (Current() == now) {

@@ -52,7 +52,7 @@ class TerrainApplication final : public Application, public ProcessState {
   // New requests are answered from `catalog`. Returns true for the first one.
   bool Replace(CatalogPtr catalog, HandlerOptions options);
 
-  // By dataset; "" is the configuration.
+  // Problems by dataset; "" is the configuration.
   void SetTroubles(std::map<std::string, std::string> troubles);
 
   const std::atomic<std::chrono::milliseconds>& deadline() const { return deadline_; }  // of a request

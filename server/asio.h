@@ -1,8 +1,7 @@
-// The one way into Boost.Asio: names, and proof that the build found the right Boost. Debian's default 1.74 sits in the
-// system's include path and compiles silently where a target forgets Boost::headers, but lacks what sessions rely on.
-//
-// Two rules for coroutines, both from double destructions seen with g++ 12: no capturing lambda as a coroutine, and no
-// braced aggregate as a temporary in an expression that holds a co_await. Parameters of coroutines are taken by value.
+// Includes Boost.Asio and checks its version. Debian's default Boost 1.74 is in the system's include path: a target
+// that does not link Boost::headers would compile with it, but it lacks functions that sessions need. Two rules for
+// coroutines, because g++ 12 destroys some objects twice: no capturing lambda as a coroutine, and no braced aggregate
+// as a temporary in an expression with a co_await. Coroutines take parameters by value.
 #pragma once
 
 #include <boost/asio/awaitable.hpp>

@@ -15,18 +15,18 @@ namespace {
 
 // An event queue, a timer and a way to wake it up.
 constexpr std::size_t kOfIoThread = 3;
-// The listening socket, one that is kept back to refuse connections, signals (two), PROJ's database, and one for what
-// is opened in passing: the configuration, certificates, a message to systemd.
+// The listening socket, a spare to refuse connections, signals (two), PROJ's database, and one for short uses: the
+// configuration, certificates, a message to systemd.
 constexpr std::size_t kOfServer = 6;
 constexpr std::size_t kMinConnections = 4;
-// Datasets that are opened beside what is served (Reloader).
+// Datasets that the Reloader opens while the old ones are served.
 constexpr std::size_t kOpeners = 2;
 // A raster and its overviews, or a grid.
 constexpr std::size_t kOfSource = 2;
 // GDAL's own default.
 constexpr std::size_t kMaxVrtParts = 100;
 
-// How many parts of VRTs: each thread may use one, or two where a VRT is made of VRTs, and fails without.
+// The number of open parts of VRTs: each thread needs one, or two if a VRT consists of VRTs.
 std::size_t VrtParts(std::size_t open_sources, std::size_t threads) {
   return std::max(std::min(open_sources, kMaxVrtParts), 2 * threads);
 }
@@ -34,7 +34,7 @@ std::size_t VrtParts(std::size_t open_sources, std::size_t threads) {
 }  // namespace
 
 Result<DescriptorBudget> SplitDescriptors(const DescriptorDemand& demand, std::size_t limit, std::size_t in_use) {
-  const std::size_t threads = demand.worker_threads + kOpeners;  // that may use a source at the same time
+  const std::size_t threads = demand.worker_threads + kOpeners;  // threads that may use a source at the same time
   const std::size_t server =
       kOfServer + kOfIoThread * demand.io_threads + (demand.access_log_file ? 1 : 0) + (demand.stores > 0 ? 1 : 0);
   const std::size_t of_stores = demand.stores * (RecordDb::kOtherDescriptors + RecordDb::kMinOpenFiles);
@@ -46,7 +46,7 @@ Result<DescriptorBudget> SplitDescriptors(const DescriptorDemand& demand, std::s
                      "raise it (ulimit -n, LimitNOFILE= of systemd), or take fewer threads or no disk_cache",
                      limit, least, in_use, server, of_stores, threads, kMinConnections);
   }
-  // A source's second descriptor, and the parts of VRTs without which a thread fails.
+  // A second descriptor per source, and the parts of VRTs that threads need.
   const std::size_t beside = (kOfSource - 1) * threads + (demand.has_vrts ? VrtParts(0, threads) : 0);
   const std::size_t left = limit - least - std::min(limit - least, beside);
   const std::size_t of_open_source = kOfSource + (demand.has_vrts ? 1 : 0);
@@ -66,7 +66,7 @@ Result<DescriptorBudget> SplitDescriptors(const DescriptorDemand& demand, std::s
 
 std::size_t RaiseDescriptorLimit() {
   rlimit limit{};
-  if (::getrlimit(RLIMIT_NOFILE, &limit) != 0) return 1024;  // POSIX gives no reason why it should
+  if (::getrlimit(RLIMIT_NOFILE, &limit) != 0) return 1024;  // POSIX names no reason for a failure
   const rlim_t before = limit.rlim_cur;
   limit.rlim_cur = limit.rlim_max;  // raising to the hard limit needs no privilege
   return ::setrlimit(RLIMIT_NOFILE, &limit) == 0 ? limit.rlim_cur : before;
@@ -76,7 +76,8 @@ std::size_t CountOpenDescriptors() {
   std::error_code error;
   const std::filesystem::directory_iterator open("/proc/self/fd", error);
   if (error) return 8;
-  return static_cast<std::size_t>(std::distance(begin(open), end(open))) - 1;  // that of the folder itself
+  return static_cast<std::size_t>(std::distance(begin(open), end(open))) -
+         1;  // without the descriptor of the folder itself
 }
 
 }  // namespace terrace::server

@@ -7,7 +7,7 @@
 namespace terrace::server {
 namespace {
 
-// Of the process, all threads together. A build takes milliseconds; an idle server does less in three seconds.
+// Processor time of all threads. A build takes milliseconds; an idle server uses less in three seconds.
 constexpr std::clock_t kWorthIt = CLOCKS_PER_SEC / 200;
 
 void Trim() {

@@ -5,11 +5,11 @@
 namespace terrace::server {
 namespace {
 
-// Of a list of locations: so many bytes, and so many for each that it may name: two numbers with all their digits, a
-// form's three bytes for each separator.
+// Limit of a body with a list of locations: a fixed number of bytes, and this number per location: two numbers with all
+// digits, and three bytes per separator in a form.
 std::size_t MaxLocationsBytes(std::size_t max_locations) { return 4096 + 64 * max_locations; }
 
-// The most frequent first.
+// Most frequent routes first.
 constexpr RouteRow kRows[] = {
     {.label = "tile",
      .pattern = "/{dataset}/{z}/{x}/{y}.{suffix}",

@@ -31,8 +31,8 @@
 namespace terrace::server {
 namespace {
 
-// For replies to requests whose builds were just cancelled, and again for sockets that were just aborted.
-// Twice this is less than the second that stopping may take beyond the drain timeout.
+// Time for replies to requests whose builds were just cancelled, and again for sockets that were just aborted. Twice
+// this is less than the second that stopping may take beyond the drain timeout.
 constexpr std::chrono::milliseconds kLastWords{400};
 
 Result<void> CheckNames(const std::vector<DatasetView>& datasets) {
@@ -113,7 +113,8 @@ class Server::Impl {
     if (!listener) return tl::unexpected(listener.error());
     listener_ = std::move(*listener);
     WatchSignals();
-    // On a held socket who comes before there is something to serve waits in its queue: a stop then loses nobody.
+    // On an inherited socket, connections wait in its queue until there is something to serve: a stop before that loses
+    // none.
     if (!application_.opening() || options_.listen_socket < 0) listener_->Start();
     if (edge_->tls) asio::co_spawn(io_.first(), WatchCertificate(edge_->tls.get()), asio::detached);
     io_.Start();
@@ -150,7 +151,7 @@ class Server::Impl {
   }
 
  private:
-  // On a thread of its own, because stopping blocks and joins the others.
+  // On a separate thread, because stopping blocks and joins the others.
   void StopWhenAsked() {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [this] { return stop_requested_; });
@@ -171,7 +172,7 @@ class Server::Impl {
     const bool drained = edge_->connections.WaitUntilEmpty(std::chrono::duration_cast<std::chrono::milliseconds>(
         std::max(until - std::chrono::steady_clock::now(), std::chrono::steady_clock::duration(0))));
     tiles_.CancelBuilds();
-    // What stopping may take beyond the drain timeout is not for the disk.
+    // The time beyond the drain timeout is too short to wait for the disk.
     if (!drained && options_.disk_cache) options_.disk_cache->Abandon();
     if (!drained && !edge_->connections.WaitUntilEmpty(kLastWords)) {
       spdlog::warn("{} connections are cut off: the drain timeout has passed", edge_->connections.size());

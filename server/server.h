@@ -1,9 +1,8 @@
-// The server as one object: start it, ask it to stop, wait until it has.
-//
-// Threads: a few for the network, a bounded pool for building tiles. Stopping goes in this order: /readyz says
-// draining, and every connection ends with its next reply; after drain_grace, or when there is none left, idle
-// connections close and no new ones are taken; requests that have begun are answered (bounded by drain_timeout); builds
-// are cancelled; threads are joined.
+// The server as one object: start it, request a stop, wait for the end.
+// Threads: a few for the network, and a bounded pool for building tiles. A stop has these steps: /readyz reports
+// "draining", and every connection closes after its next reply. After drain_grace, or when no connection is left, idle
+// connections are closed and no new ones are accepted. Requests that have begun are answered, within drain_timeout.
+// Builds are cancelled. Threads are joined.
 #pragma once
 
 #include <chrono>
@@ -25,60 +24,60 @@ namespace terrace::server {
 // The configuration, and what the program that runs the server adds to it.
 struct ServerOptions {
   config::Config config;
-  int listen_socket = -1;                 // instead of config.listen: one that somebody else holds as well
-  std::shared_ptr<DiskCache> disk_cache;  // of finished tiles, below memory; may be null
+  int listen_socket = -1;  // used instead of config.listen: a socket that another process keeps open as well
+  std::shared_ptr<DiskCache> disk_cache;                            // of finished tiles, below memory; may be null
   std::vector<std::shared_ptr<tiler::TileStore>> tile_stores = {};  // further tiers, below the disk
-  std::function<tiler::ByteCacheStats()> refinement_stats;          // of what tiles are made from; may be empty
+  std::function<tiler::ByteCacheStats()> refinement_stats;          // of the refinement cache; may be empty
   std::function<std::string()> cache_trouble = {};  // why sources are not kept in cache_dir, "": they are; thread-safe
-  std::chrono::milliseconds metrics_age{1'000};                     // for which a text of /metrics serves
-  std::chrono::milliseconds drain_grace{500};  // for which connections are served on; part of drain_timeout
+  std::chrono::milliseconds metrics_age{1'000};     // how long a text of /metrics is reused
+  std::chrono::milliseconds drain_grace{
+      500};                      // how long new requests are still served after a stop; part of drain_timeout
   bool stop_on_signals = false;  // SIGINT and SIGTERM act like RequestStop; the second ends the process with status 1
-  // Called on an io thread for each of these signals: must not block.
+  // Called on an io thread when one of these signals arrives; must not block.
   std::map<int, std::function<void()>> on_signal;
   std::function<void()> on_stop;  // called once, when stopping begins; may be empty
-  // Told that a source is not the one that was opened any more; on io threads, must not block. The request waits a
-  // moment for Replace then. Empty: nobody will open it anew, and nobody waits.
+  // Called on io threads when a source file was found changed; must not block. The request then waits a moment for
+  // Replace. Empty: sources are not reopened, and requests do not wait.
   std::function<void()> on_source_changed;
 };
 
 class Server {
  public:
-  // Listens when it returns. The catalog's functions are called on worker threads. Without a catalog (null) requests
-  // wait for the first Replace, for request_deadline at most, while /livez, /metrics and /readyz ("opening") answer.
-  // kInvalidArgument: a dataset's name is reserved, empty or used twice. kUnavailable: the address cannot be listened
-  // on, the viewer cannot be read, or the access log
-  // cannot be written. Messages name the remedy.
+  // Returns when the server is listening. Calls the catalog's functions on worker threads. Without a catalog (null),
+  // requests wait for the first Replace, at most for request_deadline; /livez, /metrics and /readyz ("opening") answer
+  // meanwhile. kInvalidArgument: a dataset's name is reserved, empty or used twice. kUnavailable: the server cannot
+  // listen on the address, read the viewer or write the access log. Messages name the remedy.
   static Result<std::unique_ptr<Server>> Start(CatalogPtr catalog, ServerOptions options);
 
-  // What a start needs besides its datasets: the viewer, the access log and keys of TLS can be read or written.
-  // Opening datasets may take long, and whoever waits for that wants to know before: all that is wrong.
+  // Checks the files that a start needs besides datasets: the viewer, the access log, certificate and key. Returns all
+  // errors. Call it before datasets are opened, which may take long.
   static std::vector<Error> TryFiles(const config::Config& config);
-  // And the address is free.
+  // Checks that the address is free.
   static Result<void> TryAddress(const config::Config& config);
 
-  // Requests that come from now on are answered from `catalog`; those that have begun keep the one they began with.
-  // Cached tiles of datasets that stay in the same generation stay. Of `config`, cache_bytes, cache_control and
-  // request_deadline are taken over. kInvalidArgument as above: nothing has changed then. From any thread, one at a
-  // time.
+  // Answers new requests from `catalog`; requests that have begun keep their catalog. Tiles stay cached if their
+  // dataset stays in the same generation. Applies cache_bytes, cache_control and request_deadline of `config`.
+  // kInvalidArgument: as above; nothing changes. May be called on any thread, but not concurrently.
   Result<void> Replace(CatalogPtr catalog, const config::Config& config);
 
-  // Stops and waits.
+  // Requests a stop and waits for it.
   ~Server();
 
-  // After a rotation.
+  // Call it after a rotation of logs.
   void ReopenAccessLog();
 
-  // What /readyz calls degraded besides cache_trouble: troubles by dataset, "" is the configuration. Nobody waits for a source in trouble.
+  // What /readyz calls degraded besides cache_trouble: troubles by dataset, "" is the configuration. Nobody waits for a
+  // source in trouble.
   void SetTroubles(std::map<std::string, std::string> troubles);
 
   std::uint16_t port() const;
   std::string url() const;  // "http://127.0.0.1:8080/"; https with a certificate
 
-  // Begins to stop and returns at once. From any thread, any number of times; not from a signal handler.
+  // Begins to stop and returns at once. Thread-safe, may be called repeatedly; not from a signal handler.
   void RequestStop();
 
-  // Blocks until somebody asks to stop and the server has: at least until the running jobs have ended, for a read of a
-  // source cannot be cancelled. False: requests were cut off because drain_timeout passed.
+  // Blocks until a stop was requested and the server has stopped. Running jobs must end first, because a read of a
+  // source cannot be cancelled. Returns false if requests were cut off because drain_timeout passed.
   bool Wait();
 
  private:

@@ -39,12 +39,12 @@ std::string FileIdentity(const char* path) {
 
 int Collect(dl_phdr_info* object, std::size_t, void* to) {
   const std::string_view name = object->dlpi_name;
-  if (name.starts_with("linux-vdso")) return 0;  // the kernel's, which makes no tiles
+  if (name.starts_with("linux-vdso")) return 0;  // the kernel's vDSO, which does not affect tiles
   std::string_view id;
   for (int i = 0; i < object->dlpi_phnum && id.empty(); ++i) {
     const ElfW(Phdr)& segment = object->dlpi_phdr[i];
     if (segment.p_type != PT_NOTE) continue;
-    // Mapped, read-only and there as long as the library is.
+    // Mapped read-only, as long as the library is loaded.
     id = BuildIdIn({reinterpret_cast<const char*>(object->dlpi_addr + segment.p_vaddr), segment.p_memsz});
   }
   static_cast<std::vector<std::string>*>(to)->push_back(id.empty() ? FileIdentity(object->dlpi_name) : std::string(id));

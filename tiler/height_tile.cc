@@ -14,7 +14,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// Heights beyond the code's range are far off, not only rounded.
+// Heights beyond the code's range are clamped, so their error is larger than rounding.
 double LargestLoss(const std::vector<float>& heights, proto::HeightEncoding encoding) {
   double largest = 0;
   for (const double height : heights) {
@@ -29,7 +29,7 @@ double LargestLoss(const std::vector<float>& heights, proto::HeightEncoding enco
 Result<EncodedTile> BuildHeightTile(const dem::DemSource& source, const TileRequest& request, std::stop_token stop) {
   TERRACE_CHECK(request.format == TileFormat::kHeightPng);
   const int size = request.height_size;
-  // A tile of 512 pixels has those of the four tiles of 256 below it.
+  // A tile of 512 pixels has the pixels of the four tiles of 256 below it.
   const int depth = request.key.level + (size == 512 ? 1 : 0);
   if (depth > source.info().max_mercator_depth) {
     return MakeError(ErrorCode::kNotFound, "{}: no such tile", geo::ToString(request.key));

@@ -9,11 +9,12 @@
 
 namespace terrace::tiler {
 
-// Of a body.
+// The ETag of a body.
 std::string StrongETag(std::string_view bytes);
 
-// Of a response whose body is determined by its `kind`, the dataset's generation and the text of the request, so that a
-// conditional request needs no body. Different texts of one request have different ETags.
+// The ETag of a response whose body depends only on its `kind`, the dataset's generation and the text of the request. A
+// conditional request can be answered without making the body. Equivalent requests with different texts have different
+// ETags.
 std::string RequestETag(std::string_view kind, std::string_view dataset, std::uint64_t generation,
                         std::string_view query, Coding coding);
 

@@ -11,7 +11,7 @@ namespace {
 
 static_assert(dem::WaterRaster::kSide == proto::kWaterMaskSide);
 
-// A sea level is in what the source's heights count from: they are read once more where tiles have others.
+// A sea level is in the source's vertical datum: if tiles have another datum, heights are read again in the source's.
 Result<proto::WaterMask> SeaMaskOf(const Dataset& dataset, const proto::LatticeView& lattice,
                                    const std::stop_token& stop) {
   const double sea_level_m = *dataset.water.sea_level_m;

@@ -1,4 +1,4 @@
-// What a quantized-mesh tile carries besides its mesh.
+// The extensions of a quantized-mesh tile.
 #pragma once
 
 #include <stop_token>
@@ -11,9 +11,8 @@
 
 namespace terrace::tiler {
 
-// Puts the water mask and the metadata that `request` asks for, as far as the dataset has them, into `tile`. What comes
-// back names every extension that the tile is to be encoded with, normals included.
-// kUnavailable: the water raster cannot be read now. kCancelled: stopped.
+// Adds the water mask and the metadata to `tile`, if `request` asks for them and the dataset has them. Returns the
+// extensions to encode, including normals. kUnavailable: the water raster cannot be read now. kCancelled: stopped.
 Result<proto::QuantizedMeshOptions> AddExtensions(const Dataset& dataset, const TileRequest& request,
                                                   const proto::LatticeView& lattice, proto::QuantizedTile& tile,
                                                   const std::stop_token& stop);

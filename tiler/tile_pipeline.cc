@@ -20,8 +20,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// What a tile's mesh is held to, so that it keeps `error_m` to the ground: heights at nodes are rounded to 2^-10 m, and
-// their positions are a little off as well.
+// The error bound of a tile's mesh that keeps `error_m` to the ground: heights at nodes are rounded to 2^-10 m, and
+// their positions are inexact.
 double MeshError(double error_m) {
   constexpr double kRounding = 0x1p-11 + 0x1p-14;
   return std::max(error_m - kRounding, error_m / 2);
@@ -35,7 +35,7 @@ TilePipeline::TilePipeline(std::vector<Dataset> datasets, std::size_t refinement
 TilePipeline::TilePipeline(std::vector<Dataset> datasets, std::shared_ptr<RefinementCache> refinements)
     : datasets_(std::move(datasets)), refinements_(std::move(refinements)) {}
 
-// From the cache where it goes as far as is asked; else read or continued, and kept.
+// Returns the cached refinement if it reaches the error; else reads or continues it, and caches the result.
 Result<RefinedTilePtr> TilePipeline::Refine(const Dataset& dataset, const geo::TileKey& key, double error_m,
                                             EncodedTile& encoded, const std::stop_token& stop) const {
   const RefinedTileKey cache_key{dataset.generation, key};
@@ -68,8 +68,8 @@ Result<RefinedTilePtr> TilePipeline::Refine(const Dataset& dataset, const geo::T
   if (!greedy.Run(goal, stop)) return Cancelled();
   auto refined = std::make_shared<RefinedTile>(RefinedTile{std::move(heights), greedy.MakeRefinement(), error_m});
   encoded.times.refine = MicrosecondsSince(start);
-  // One that ended at the format's number of vertices holds no mesh to this error. Another build may have gone further
-  // meanwhile.
+  // A refinement that ended at the format's limit of vertices does not reach the error. Another build may have stored a
+  // longer one meanwhile.
   const RefinedTilePtr other = refinements_->FindInMemory(cache_key);
   if (refined->refinement.vertex_count() <= proto::kMaxTileVertices && !(other && other->error_m <= error_m)) {
     refinements_->Insert(cache_key, refined);

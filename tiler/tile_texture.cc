@@ -15,7 +15,7 @@ Result<void> AddTexture(const ImageryRules& imagery, const TileRequest& request,
   Result<std::string> bytes = proto::EncodePicture((*picture)->rgb, side, side, request.texture, imagery.quality);
   if (!bytes) return tl::unexpected(std::move(bytes).error());
   options.texture = proto::GlbTexture{*std::move(bytes), proto::MediaTypeOf(request.texture)};
-  // Clients take parts between semicolons for credits of their own (CesiumJS, cesium-native).
+  // Clients split credits at semicolons (CesiumJS, cesium-native).
   if (!options.copyright.empty() && !imagery.attribution.empty()) options.copyright += "; ";
   options.copyright += imagery.attribution;
   return {};

@@ -10,9 +10,8 @@
 
 namespace terrace::tiler {
 
-// Cuts the picture of the tile that `request` asks for out of the imagery and puts it into `options`; nothing where
-// none is wanted or the image shows no part of the tile. kUnavailable: the image cannot be read now. kCancelled:
-// stopped.
+// Cuts the texture of the requested tile from the imagery and adds it to `options`. Does nothing if no texture is
+// requested or the image shows no part of the tile. kUnavailable: the image cannot be read now. kCancelled: stopped.
 Result<void> AddTexture(const ImageryRules& imagery, const TileRequest& request, proto::GlbOptions& options,
                         const std::stop_token& stop);
 

@@ -1,4 +1,4 @@
-// Where the server listens: "127.0.0.1:8080", "[::1]:8080", "localhost:0".
+// The address that the server listens on: "127.0.0.1:8080", "[::1]:8080", "localhost:0".
 #pragma once
 
 #include <cstdint>
@@ -16,10 +16,10 @@ struct ListenAddress {
   friend bool operator==(const ListenAddress&, const ListenAddress&) = default;
 };
 
-// kInvalidArgument says what is wrong with the text and what would be right.
+// kInvalidArgument: the message says what is wrong and how to correct it.
 Result<ListenAddress> ParseListenAddress(std::string_view text);
 
-// The form that ParseListenAddress reads and that URLs use: IPv6 in brackets.
+// Formats an address for ParseListenAddress and for URLs: IPv6 in brackets.
 std::string ToString(const ListenAddress& address);
 
 }  // namespace terrace::config

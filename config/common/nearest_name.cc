@@ -44,7 +44,7 @@ std::size_t EditDistance(std::string_view a, std::string_view b) {
   return above[b.size()];
 }
 
-// Whether a name has the word as one of its parts: "max_error" has "error".
+// Whether the word is one of the name's parts: "max_error" has "error".
 bool HasPart(std::string_view name, std::string_view word) {
   const std::size_t at = name.find(word);
   if (at == std::string_view::npos || word.empty()) return false;
@@ -52,7 +52,7 @@ bool HasPart(std::string_view name, std::string_view word) {
   return (at == 0 || name[at - 1] == '_') && (end == name.size() || name[end] == '_');
 }
 
-// The first of those with the smallest distance that is small enough.
+// The first name with the smallest distance, if that is small enough.
 std::vector<std::string_view> ByDistance(const std::string& word, std::span<const KnownName> known) {
   std::vector<std::string_view> nearest;
   std::size_t smallest = word.size() + 1;
@@ -71,7 +71,7 @@ std::vector<std::string_view> ByDistance(const std::string& word, std::span<cons
 
 std::vector<std::string_view> NearestNames(std::string_view word, std::span<const KnownName> known) {
   constexpr std::size_t kMaxNames = 4, kMinBeginning = 3, kMaxRest = 8;
-  // Nothing that people mistype is longer, and the distance takes quadratic time.
+  // Mistyped names are shorter, and the distance takes quadratic time.
   constexpr std::size_t kLongestWord = 64;
   const std::string folded = word.size() > kLongestWord ? "" : Fold(word);
   if (folded.empty()) return {};

@@ -1,4 +1,4 @@
-// "Did you mean ...?": the known names that an unknown one may stand for.
+// Suggestions for unknown names: "Did you mean ...?".
 #pragma once
 
 #include <span>
@@ -10,19 +10,20 @@ namespace terrace::config {
 
 struct KnownName {
   std::string_view name;              // "cache_bytes" or "--cache-bytes"
-  std::string_view other_words = {};  // what others call it, with blanks between them: "port host"
+  std::string_view other_words = {};  // names that other programs use, separated by blanks: "port host"
 };
 
-// What `word` may stand for, in the order of `known`; empty: nothing that is known, or more than four names. The first
-// of these rules that finds any counts. Letter case, '-' against '_' and dashes at the beginning are ignored.
+// Returns the known names that `word` may mean, in the order of `known`; empty if there are none, or more than four.
+// Uses the first of these rules that finds a name. Ignores letter case, the difference between '-' and '_', and leading
+// dashes.
 //   - Names that have `word` among their other words.
 //   - The name with the smallest edit distance, the first of equals, if at most a third of the longer one has to
 //   change.
-//   - Names that have `word` as a part ("error" in "max_error"), and names of which `word` is the beginning and little
-//     more ("output" of "out"): what it is told with may be a secret in the wrong place.
+//   - Names that contain `word` ("error" in "max_error"), and names that `word` extends by only a few letters ("out"
+//   for "output"). A longer extension could be a secret in the wrong place, which must not be quoted.
 std::vector<std::string_view> NearestNames(std::string_view word, std::span<const KnownName> known);
 
-// Whether the two are one name, but for what NearestNames ignores.
+// Whether two names are equal apart from the differences that NearestNames ignores.
 bool IsSameName(std::string_view a, std::string_view b);
 
 // "a", "a or b", "a, b or c".

@@ -1,4 +1,4 @@
-// What is kept of a token. Who has the hash cannot ask for anything with it.
+// Hashes of tokens. The server stores only the hash, which gives no access.
 #pragma once
 
 #include <string>

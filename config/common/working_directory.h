@@ -1,4 +1,5 @@
-// Names on the command line, in full: they count from the working directory at the start, whatever becomes of that.
+// Makes paths on the command line absolute: relative to the working directory at the start, even if that is renamed or
+// removed later.
 #pragma once
 
 #include <filesystem>
@@ -6,12 +7,13 @@
 
 namespace terrace::config {
 
-// What is wrong with a relative path where there is no such directory.
+// The error for a relative path if the working directory has no name.
 inline constexpr const char* kNoWorkingDirectory =
     "is relative to the working directory, which cannot be named; give the path in full";
 
-// `directory` is a working directory as the system names it, so there are no symbolic links in it: what `path` goes up
-// is taken off, and the name holds after the folders gone up from are removed. Empty: `path` stays as it is.
+// `directory`: the working directory as the system names it, without symbolic links; empty: `path` is returned
+// unchanged. Each ".." in `path` removes a folder from the name, so the result stays valid even if that folder is
+// removed.
 std::string FromWorkingDirectory(std::filesystem::path directory, const std::filesystem::path& path);
 
 }  // namespace terrace::config

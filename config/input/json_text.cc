@@ -12,9 +12,9 @@ namespace terrace::config {
 namespace {
 
 constexpr std::size_t kMaxKeys = 1000;  // of one object
-constexpr std::size_t kMaxDepth = 100;  // of lists and objects in one another
+constexpr std::size_t kMaxDepth = 100;  // nesting of lists and objects
 
-// Reads a text and tells how far it has come.
+// Reads a text and counts the bytes read.
 class CountingIterator {
  public:
   using iterator_category = std::input_iterator_tag;
@@ -40,12 +40,12 @@ class CountingIterator {
   std::size_t* at_;
 };
 
-// Line and column of ever later places, in one pass through the text.
+// Computes line and column of ascending positions, in one pass through the text.
 class LineCounter {
  public:
   explicit LineCounter(std::string_view text) : text_(text) {}
 
-  // Precondition: `at` is not before the last one.
+  // Precondition: `at` is not before the previous one.
   std::string PlaceOf(std::size_t at) {
     for (; at_ < std::min(at, text_.size()); ++at_) {
       if (text_[at_] != '\n') continue;
@@ -60,12 +60,11 @@ class LineCounter {
   std::size_t at_ = 0, line_ = 1, line_start_ = 0;
 };
 
-// Makes the value as the library does, and reports keys that an object has twice, of which the library silently keeps
-// the last. Not by the library's callback: to take values away that a callback refuses, that looks through the whole
-// list at the end of each object in it.
+// Builds the value as the library does, and reports duplicate keys, of which the library silently keeps the last. Does
+// not use the library's callback, which searches the whole list at the end of each object to remove refused values.
 class DuplicateKeyFinder : public nlohmann::detail::json_sax_dom_parser<Json> {
  public:
-  // `at`: how far the text was read.
+  // `at`: number of bytes read.
   DuplicateKeyFinder(std::string_view text, const std::size_t& at, Json& value, std::vector<ConfigError>& errors)
       : json_sax_dom_parser(value), at_(at), lines_(text), errors_(errors) {}
 
@@ -79,11 +78,11 @@ class DuplicateKeyFinder : public nlohmann::detail::json_sax_dom_parser<Json> {
     return json_sax_dom_parser::end_array();
   }
   bool key(std::string& key) {
-    // The value keeps the order of keys, and so looks through all of them for each one.
+    // The value keeps the order of keys, so each look-up takes linear time.
     if (seen_.back().size() >= kMaxKeys) {
       return Refuse(fmt::format("an object with more than {} keys, which none of a configuration has", kMaxKeys));
     }
-    // By its place, as any text may stand there.
+    // Named by its position, because the key may be any text.
     if (!seen_.back().insert(key).second && errors_.size() < kMaxConfigErrors) {
       errors_.push_back(
           {"", lines_.PlaceOf(at_ - 1) + ": the key that ends here stands twice in its object; keep one"});
@@ -97,7 +96,7 @@ class DuplicateKeyFinder : public nlohmann::detail::json_sax_dom_parser<Json> {
   }
 
   bool parse_error(std::size_t position, const std::string&, const nlohmann::detail::exception& error) {
-    // It counts from 1 and is one past the end where the text stops too early.
+    // The library counts from 1, and one past the end if the text is truncated.
     fault_at_ = position == 0 ? 0 : position - 1;
     fault_ = error.what();
     return false;
@@ -126,8 +125,8 @@ class DuplicateKeyFinder : public nlohmann::detail::json_sax_dom_parser<Json> {
   std::string fault_;
 };
 
-// What the library says without its own names: "[json.exception.parse_error.101] parse error at line 3, column 5: what"
-// and "[json.exception.out_of_range.406] what" become "what". Nor does it quote the text: a token may stand there.
+// The library's message without its prefixes: "[json.exception.parse_error.101] parse error at line 3, column 5: what"
+// and "[json.exception.out_of_range.406] what" become "what". Also without quoted text, which may be a token.
 std::string Reason(std::string_view message) {
   message = message.substr(0, message.find("; last read"));
   message = message.substr(0, message.find(" parsing '"));  // a number that is too large
@@ -142,7 +141,7 @@ bool IsUtf16(std::string_view text) {
   return starts('\xFF', '\xFE') || starts('\xFE', '\xFF') || starts('{', '\0') || starts('\0', '{');
 }
 
-// What most often makes the parser stop at a place, said in other words than the parser's.
+// An explanation of the most frequent syntax errors.
 std::string HintOf(std::string_view text, std::size_t at, std::string_view reason) {
   if (IsUtf16(text)) return "; this is UTF-16: save it as UTF-8";
   const std::string_view before = text.substr(0, at), rest = text.substr(at);
@@ -152,7 +151,7 @@ std::string HintOf(std::string_view text, std::size_t at, std::string_view reaso
   const std::size_t last = before.find_last_not_of(" \t\r\n");
   if ((follows("}") || follows("]")) && last != std::string_view::npos && before[last] == ',')
     return "; take away the comma before it";
-  const std::size_t first = text.find_first_not_of(" \t\r\n\xEF\xBB\xBF");  // a byte order mark is no fault
+  const std::size_t first = text.find_first_not_of(" \t\r\n\xEF\xBB\xBF");  // a byte order mark is allowed
   if (first != std::string_view::npos && text[first] != '{')
     return "; a configuration begins with {, and a DEM is served without --config (terrace serve dem.tif)";
   return {};
@@ -165,7 +164,7 @@ std::string DescribeFault(std::string_view text, std::size_t at, const std::stri
 }  // namespace
 
 Json ParseJsonText(std::string_view text, std::vector<ConfigError>& errors) {
-  // To the parser it is the end of the text, whatever follows.
+  // The parser takes a null byte for the end of the text.
   if (const std::size_t zero = text.find('\0'); zero != std::string_view::npos) {
     errors.push_back({"", DescribeFault(text, zero, "a byte of zero, which no text has")});
     return Json(Json::value_t::discarded);

@@ -1,6 +1,6 @@
-// JSON text to a JSON value, stricter than the library: a key that appears twice is an error, and syntax errors tell
-// the line and the column. An object has 1000 keys at most, and 100
-// lists and objects may stand in one another. No error quotes the text. Used inside this room only.
+// Parses JSON text, more strictly than the library: duplicate keys are errors, objects have at most 1000 keys, and
+// lists and objects are nested at most 100 deep. Syntax errors state line and column. No error quotes the text. For
+// this module only.
 #pragma once
 
 #include <cstddef>
@@ -13,13 +13,13 @@
 
 namespace terrace::config {
 
-// Keeps the order of keys, so that errors come in the order of the file.
+// Keeps the order of keys, so that errors are in the order of the file.
 using Json = nlohmann::ordered_json;
 
-// Enough errors to work on; further ones are not told, as a file of another kind may be wrong in millions of places.
+// Limit of reported errors: a file of another kind may have millions.
 inline constexpr std::size_t kMaxConfigErrors = 100;
 
-// The value; errors are appended. After a syntax error (path "") the value is discarded (Json::is_discarded).
+// Returns the value and appends errors. After a syntax error (path "") the value is discarded (Json::is_discarded).
 Json ParseJsonText(std::string_view text, std::vector<ConfigError>& errors);
 
 // `path` + "/" + `key`, escaped after RFC 6901.

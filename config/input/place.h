@@ -1,8 +1,6 @@
-// Where in the configuration a value was read: what it is relative to, and where its errors go. Used inside this room
-// only.
-//
-// No message quotes a value, nor a key that resembles no known one: a token may stand in any place by mistake, and
-// messages go into logs.
+// The location of a value in the configuration: the folder that its paths are relative to, and the list that its errors
+// go to. For this module only. Messages go into logs, and any value may be a token by mistake. Therefore no message
+// quotes a value, or a key that does not resemble a known one.
 #pragma once
 
 #include <filesystem>
@@ -21,7 +19,7 @@ class Place {
   // `errors` must outlive this and every place made from it.
   Place(std::filesystem::path directory, std::string path, std::vector<ConfigError>& errors)
       : directory_(std::move(directory)), path_(std::move(path)), errors_(&errors) {}
-  // Of the command line; an empty directory is one that cannot be named.
+  // The command line. Empty directory: the working directory has no name.
   static Place InWorkingDirectory(std::filesystem::path directory, std::vector<ConfigError>& errors) {
     Place place(std::move(directory), "", errors);
     place.is_command_line_ = true;
@@ -41,9 +39,9 @@ class Place {
   bool has_failed_often() const { return errors_->size() >= kMaxConfigErrors; }
   void Expected(std::string_view what) const { Fail("must be " + std::string(what)); }
 
-  // What relative paths are relative to.
+  // The folder that relative paths are relative to.
   const std::filesystem::path& directory() const { return directory_; }
-  // A path in full, as it is used from then on.
+  // Makes a path absolute.
   std::string Resolve(const std::filesystem::path& path) const {
     if (!is_command_line_) return (directory_ / path).string();
     if (directory_.empty() && path.is_relative()) Fail(kNoWorkingDirectory);

@@ -1,4 +1,4 @@
-// The `sources` of a dataset: paths, globs and folders as people write them, to files. Used inside this room only.
+// Expands the `sources` of a dataset: paths, globs and folders, to files. For this module only.
 #pragma once
 
 #include <filesystem>
@@ -9,15 +9,15 @@
 
 namespace terrace::config {
 
-// A relative path counts from `directory`. A path without *, ? and [, or one that exists as it is written, stands for
-// itself, whether or not the file exists: opening it tells more than a lookup. A glob becomes the files that match it,
-// a folder the files in it, but for hidden ones; both in byte order. kNotFound: nothing matches, or the folder is
-// empty. kUnavailable: a folder is missing or cannot be read.
+// Relative paths are relative to `directory`. A path without *, ? and [, or a path that exists literally, is one file.
+// It need not exist: the error of opening it will be more specific. A glob becomes the files that match it, and a
+// folder the files in it except hidden ones, in byte order. kNotFound: nothing matches, or the folder is empty.
+// kUnavailable: a folder is missing or cannot be read.
 Result<SourceConfig> ExpandSource(const std::string& written, const std::filesystem::path& directory);
 
-// Whether ExpandSource made it of a folder or a glob; else it stands for itself.
+// Whether the source is a folder or a glob, not a single file.
 bool IsExpanded(const SourceConfig& source);
-// Of one that is: whether it holds other files by now.
+// Whether an expanded source now has other files. Precondition: IsExpanded.
 bool HoldsOtherFiles(const SourceConfig& source);
 
 }  // namespace terrace::config

@@ -25,7 +25,7 @@ bool IsReserved(std::string_view name) {
   return std::find(kReservedNames.begin(), kReservedNames.end(), name) != kReservedNames.end();
 }
 
-// URL parsers fold these two away before a request is sent (RFC 3986, section 5.2.4).
+// URL parsers remove these two before a request is sent (RFC 3986, section 5.2.4).
 bool IsDotSegment(std::string_view name) { return name == "." || name == ".."; }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Names that datasets cannot have. Used inside this room only.
+// Names that datasets cannot have. For this module only.
 #pragma once
 
 #include <span>
@@ -6,7 +6,7 @@
 
 namespace terrace::config {
 
-// First path segments that the server itself answers.
+// First path segments of the server's own URLs.
 std::span<const std::string_view> ReservedDatasetNames();
 
 }  // namespace terrace::config

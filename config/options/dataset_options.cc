@@ -7,7 +7,7 @@
 namespace terrace::config {
 namespace {
 
-// Names that URLs can hold, but for those that the server answers itself.
+// Names that are valid in URLs, except the server's own.
 Json NameSchema() {
   Json taken = Json::array({".", ".."});
   for (const std::string_view name : ReservedDatasetNames()) taken.push_back(name);

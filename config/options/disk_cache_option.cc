@@ -4,7 +4,7 @@ namespace terrace::config {
 namespace {
 
 constexpr std::int64_t kMaxBytes = std::int64_t{1} << 40;
-constexpr std::size_t kMinBytes = std::size_t{16} << 20;  // what a store of records needs to have several files
+constexpr std::size_t kMinBytes = std::size_t{16} << 20;  // the smallest size for which a store has several files
 
 Codec<DiskCacheConfig> Directory() {
   return {[](const Json& value, const Place& place, DiskCacheConfig& cache) {

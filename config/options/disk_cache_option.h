@@ -1,4 +1,4 @@
-// The option `disk_cache`: an object with keys of its own. Used inside this room only.
+// The option `disk_cache`: an object with its own keys. For this module only.
 #pragma once
 
 #include <vector>
@@ -7,7 +7,7 @@
 
 namespace terrace::config {
 
-// {"directory": "/var/cache/terrace", "tile_bytes": ..., ...}. As a flag the directory alone.
+// {"directory": "/var/cache/terrace", "tile_bytes": ..., ...}. As a flag: only the directory.
 Codec<Config> DiskCacheOption();
 
 const std::vector<Option<DiskCacheConfig>>& DiskCacheOptionTable();

@@ -73,7 +73,7 @@ std::string CheckRange(const std::string& text) {
               : "must be an address or a range of addresses, such as \"127.0.0.1\", \"10.0.0.0/8\" or \"fd00::/8\"";
 }
 
-// "a,b", or a list as it stands in the file.
+// "a,b", or a list as in the file.
 Json ListToJson(const std::string& text) {
   if (text.starts_with('[')) {
     const Json parsed = Json::parse(text, nullptr, /*allow_exceptions=*/false);
@@ -88,7 +88,7 @@ Json ListToJson(const std::string& text) {
   return list;
 }
 
-// Texts that `check` likes: it returns "must be ...", or nothing.
+// Texts that pass `check`, which returns "must be ..." or an empty string.
 template <typename Target>
 Codec<Target> List(std::vector<std::string> Target::*member, std::string (*check)(const std::string&),
                    const char* example, Json schema) {
@@ -109,7 +109,7 @@ Codec<Target> List(std::vector<std::string> Target::*member, std::string (*check
           [=](const Target& target) { return Json(target.*member); }, ListToJson, std::move(schema)};
 }
 
-// Its hash is kept and written.
+// Only its hash is stored and written.
 Codec<TokenConfig> TokenText() {
   return {[](const Json& value, const Place& place, TokenConfig& token) {
             if (!value.is_string()) return place.Expected("text");
@@ -130,7 +130,7 @@ Codec<TokenConfig> TokenHashText() {
   return codec;
 }
 
-// What one token has in common with those before it.
+// Checks a token for duplicates of earlier ones.
 void CompareToken(const std::vector<TokenConfig>& tokens, std::size_t i, const Place& place) {
   const TokenConfig& token = tokens[i];
   for (std::size_t j = 0; j < i; ++j) {
@@ -171,7 +171,7 @@ Json TlsToJson(const std::string& text) {
   return Json{{"certificate", text.substr(0, comma)}, {"key", text.substr(comma + 1)}};
 }
 
-// Not a key itself, of which the text of a file that is not found would be logged.
+// Refuses a key as text: the log would contain it as the name of a missing file.
 bool IsPathOfFile(const std::string& text) {
   return !text.empty() && !HasControlCharacter(text) && text.find("-----BEGIN") == std::string::npos;
 }

@@ -1,4 +1,4 @@
-// The options about clients: tokens, proxies, web pages, TLS. Used inside this room only.
+// The options about clients: tokens, proxies, web origins, TLS. For this module only.
 #pragma once
 
 #include <vector>
@@ -7,13 +7,12 @@
 
 namespace terrace::config {
 
-// [{"name": "field-team", "sha256": "9f86d0...", "datasets": ["maui"]}]. No flag: command lines are no place for
-// secrets.
+// [{"name": "field-team", "sha256": "9f86d0...", "datasets": ["maui"]}]. No flag, because command lines are not secret.
 Codec<Config> TokensCodec();
 
 const std::vector<Option<TokenConfig>>& TokenOptionTable();
 
-// {"certificate": "server.pem", "key": "server.key"}. As a flag the two paths with a comma between them.
+// {"certificate": "server.pem", "key": "server.key"}. As a flag: the two paths, separated by a comma.
 Codec<Config> TlsCodec();
 
 // ["https://maps.example"], ["*"] or []. As a flag: with commas between them.

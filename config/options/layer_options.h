@@ -1,4 +1,4 @@
-// The options `water` and `imagery` of a dataset: objects with keys of their own. Used inside this room only.
+// The options `water` and `imagery` of a dataset: objects with their own keys. For this module only.
 #pragma once
 
 #include <vector>
@@ -7,10 +7,10 @@
 
 namespace terrace::config {
 
-// {"mask": "water.tif"} or {"sea_level": 0}. As a flag a number is a sea level and everything else the path of a mask.
+// {"mask": "water.tif"} or {"sea_level": 0}. As a flag: a number is a sea level, any other text the path of a mask.
 Codec<DatasetConfig> WaterCodec();
 
-// {"image": "photo.tif", "attribution": ..., ...}. As a flag the path alone.
+// {"image": "photo.tif", "attribution": ..., ...}. As a flag: only the path.
 Codec<DatasetConfig> ImageryCodec();
 
 const std::vector<Option<ImageryConfig>>& ImageryOptionTable();

@@ -1,8 +1,7 @@
-// How the value of an option is read from JSON and written back. Used inside this room only.
-//
-// A codec is made for one member of Config or DatasetConfig. `read` either sets the member or reports to the place what
-// the value must be; `write` gives a value that `read` takes; `from_text` turns the text of a flag into such a value;
-// `schema` describes, in JSON Schema, the values that `read` takes.
+// Reads the values of options from JSON and writes them back. For this module only.
+// A codec belongs to one member of Config or DatasetConfig. `read` sets the member, or reports what the value must be.
+// `write` returns a value that `read` accepts. `from_text` converts the text of a flag to such a value. `schema` is the
+// JSON Schema of the values that `read` accepts.
 #pragma once
 
 #include <fmt/format.h>
@@ -24,15 +23,15 @@ template <typename Target>
 struct Codec {
   std::function<void(const Json&, const Place&, Target&)> read;
   std::function<Json(const Target&)> write;
-  Json (*from_text)(const std::string&) = nullptr;  // none: the option has no flag
+  Json (*from_text)(const std::string&) = nullptr;  // null: the option has no flag
   Json schema = {};
 };
 
 inline Json TextToJson(const std::string& text) { return text; }
 
-// "12" and "1e3" become numbers; everything else stays text and is refused, or understood, by the codec.
+// Converts "12" and "1e3" to numbers; other text stays text, which the codec accepts or refuses.
 Json NumberToJson(const std::string& text);
-// "true" and "false" become what they say.
+// Converts "true" and "false" to booleans; other text stays text.
 Json SwitchToJson(const std::string& text);
 
 // Schemas.
@@ -49,14 +48,14 @@ inline Json InRange(const char* type, Json min, Json max) {
 inline constexpr double kMaxHeight = 20'000;  // metres, up and down
 
 bool HasControlCharacter(const std::string& text);
-// For Text: "must be text on one line", or nothing.
+// A check for Text: returns "must be text on one line", or an empty string.
 std::string CheckOneLine(const std::string& text);
 
-// A whole number below 2^53, which JSON keeps exactly. 1e3 and 1000.0 are whole.
+// A whole number below 2^53, which JSON represents exactly. 1e3 and 1000.0 are whole.
 std::optional<std::int64_t> WholeNumber(const Json& value);
 // 268435456, "512MB", "1GiB", "64 MiB"
 std::optional<std::int64_t> ByteCount(const Json& value);
-// Whole values without a fraction: 30, not 30.0.
+// Writes whole values without a fraction: 30, not 30.0.
 Json NumberOut(double value);
 
 template <typename Target, typename Member>
@@ -150,7 +149,7 @@ Codec<Target> Choice(Member Target::*member, std::vector<std::pair<Json, Member>
           TextToJson, std::move(schema)};
 }
 
-// Text that `check` likes: it returns "must be ...", or nothing.
+// Text that passes `check`, which returns "must be ..." or an empty string.
 template <typename Target>
 Codec<Target> Text(std::string Target::*member, const std::function<std::string(const std::string&)>& check,
                    Json schema) {

@@ -63,7 +63,7 @@ std::string Alternatives(std::vector<std::string> values) {
   return fmt::format("{} or {}", fmt::join(values, ", "), last);
 }
 
-// What stands for the value in the help tells its unit.
+// The placeholder of the value in the help states its unit.
 std::string UnitOf(std::string_view value) {
   constexpr std::array<std::pair<std::string_view, std::string_view>, 2> kUnits = {
       {{"METRES", " metres"}, {"SECONDS", " seconds"}}};
@@ -106,7 +106,7 @@ std::string TableOf(const std::vector<Option<Target>>& options, const std::strin
   return table;
 }
 
-// By name; those of options at the top of the file are named after their sections.
+// Tables by name. Tables of top-level options are named after their sections.
 std::map<std::string, std::string, std::less<>> Tables() {
   std::map<std::string, std::string, std::less<>> tables;
   for (const Option<Config>& option : ServerOptionTable()) {

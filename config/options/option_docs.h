@@ -1,4 +1,4 @@
-// What the option tables say to editors and readers: the JSON schema of the file, and the tables of
+// Generates documents from the option tables: the JSON schema of the configuration file, and the tables of
 // docs/configuration.md. `make docs` writes both.
 #pragma once
 
@@ -12,10 +12,10 @@ namespace terrace::config {
 // config/config.schema.json (JSON Schema 2020-12), with a final newline.
 std::string SchemaText();
 
-// `manual` with its tables of options as the tables are now. A table stands between two lines:
+// Returns `manual` with current tables of options. Each table is between two lines:
 //   <!-- options: NAME -->
 //   <!-- end of options -->
-// kInvalidArgument: a marker without its end, of no table, or twice, or a table without a marker.
+// kInvalidArgument: a marker has no end, names no table or occurs twice, or a table has no marker.
 Result<std::string> UpdateManual(std::string_view manual);
 
 }  // namespace terrace::config

@@ -28,7 +28,7 @@ bool IsVerticalName(const std::string& text) {
          text.find_first_not_of("0123456789", kEpsg.size()) == std::string::npos;
 }
 
-// Nothing, after a report, where the value is none.
+// Returns nothing, after reporting an error, if the value is invalid.
 std::optional<std::string> ReadVertical(const Json& value, const Place& place) {
   const std::string text = value.is_string() ? value.get<std::string>() : "";
   if (IsVerticalName(text)) return text;

@@ -41,7 +41,7 @@ std::vector<std::string> Quoted(const std::vector<std::string_view>& names) {
 
 }  // namespace
 
-// The object itself is among the kinds, but has no key of this name, and is asked before the others what is near.
+// The object itself is one of the kinds. It has no key of this name, and its similar keys come first.
 std::string ExplainKey(std::string_view key, std::span<const KnownName> known) {
   std::string name;
   std::vector<std::string> places;
@@ -53,7 +53,7 @@ std::string ExplainKey(std::string_view key, std::span<const KnownName> known) {
     }
   }
   const std::vector<std::string_view> here = NearestNames(key, known);
-  const bool is_here = !here.empty() && IsSameName(here.front(), key);  // but for a dash or a capital
+  const bool is_here = !here.empty() && IsSameName(here.front(), key);  // apart from a dash or a capital letter
   if (!places.empty() && !is_here) {
     return fmt::format("is no key of this object; \"{}\" belongs {}", name, Alternatives(places));
   }

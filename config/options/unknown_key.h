@@ -1,4 +1,4 @@
-// What a key that an object of the configuration does not have was meant to be. Used inside this room only.
+// Suggestions for unknown keys of the configuration. For this module only.
 #pragma once
 
 #include <span>
@@ -9,8 +9,9 @@
 
 namespace terrace::config {
 
-// For an error at the key; `known`: the keys that its object may have. Names where the key belongs if another kind of
-// object has it, else what it resembles, here or there. Empty: it resembles nothing, and no message may quote it.
+// Returns a sentence for the error at the key. `known`: the keys of its object. If another kind of object has the key,
+// the sentence says where it belongs; else it names similar keys. Empty: the key resembles no known one, and no message
+// may quote it.
 std::string ExplainKey(std::string_view key, std::span<const KnownName> known);
 
 }  // namespace terrace::config

@@ -1,9 +1,9 @@
-// TERRACE_CHECK: conditions that only a mistake in this program can break. Active in every build.
+// TERRACE_CHECK: aborts if a condition is false. Only a programming error can make it false. Active in every build.
 #pragma once
 
 namespace terrace {
 
-// Prints the condition and its place on stderr and aborts.
+// Prints the condition and its source location on stderr and aborts.
 [[noreturn]] void CheckFailed(const char* condition, const char* file, int line);
 
 }  // namespace terrace

@@ -1,7 +1,6 @@
 // Result<T>: a value, or an Error that says what went wrong, where, and what would be right.
-//
-// Foreseeable failures (input, disk, network, load) travel as Result. Mistakes of the program are TERRACE_CHECKs.
-// Exceptions of libraries are caught in the file that calls the library.
+// Functions return foreseeable failures (input, disk, network, load) as Result. TERRACE_CHECK aborts on programming
+// errors. The file that calls a library catches its exceptions.
 #pragma once
 
 #include <fmt/format.h>
@@ -13,15 +12,15 @@
 
 namespace terrace {
 
-// What kind of failure it is; server/http/http_error.cc holds the one table from here to HTTP status codes.
+// The kind of a failure. server/http/http_error.cc maps it to HTTP status codes.
 enum class ErrorCode {
-  kInvalidArgument,  // the caller asked for something that has no meaning
+  kInvalidArgument,  // the request makes no sense
   kNotFound,         // it does not exist
-  kUnavailable,      // a source or a resource does not answer now; asking again later may work
-  kChanged,          // a source is not the one that was opened any more; whoever opens it anew gets an answer
+  kUnavailable,      // a source or a resource does not respond now; a retry may succeed
+  kChanged,          // a source file has changed since it was opened; reopening it may succeed
   kOverloaded,       // a bounded queue is full
-  kCancelled,        // nobody waits for the answer any more, or the time is up
-  kInternal,         // a library failed in a way nobody foresaw
+  kCancelled,        // nobody waits for the result any more, or the deadline has passed
+  kInternal,         // a library failed unexpectedly
 };
 
 // A stable lower-case name for logs: "invalid_argument", "not_found", ...

@@ -42,7 +42,7 @@ class DemSource::Impl {
   std::vector<std::vector<geo::TileRange>> available;
   float floor = 0;  // above the ellipsoid
   std::shared_ptr<const Undulations>
-      floor_undulations;  // all over the Earth, of the last raster grid above a geoid; or null
+      floor_undulations;  // for the whole Earth, of the last raster grid that refers to a geoid; or null
   bool has_feather = false;
   DemInfo info;
   std::uint64_t fingerprint = 0;

@@ -1,4 +1,4 @@
-// Heights of a dataset: each node takes the first raster grid that has one there, then the floor.
+// Reads heights of a dataset: each node takes its height from the first raster grid that has one, else the floor.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -15,7 +15,7 @@ namespace {
 
 bool IsVoid(float height) { return std::isnan(height); }
 
-// Around the nodes of a window. Their longitudes begin between -180 and 180, and go on eastwards.
+// A box around the nodes of a window. Its longitudes begin between -180 and 180 and continue eastwards.
 template <typename NodeGrid>
 Box BoxOf(const NodeGrid& node_grid, const NodeWindow& window) {
   constexpr double kSlack = 1e-9;
@@ -26,9 +26,9 @@ Box BoxOf(const NodeGrid& node_grid, const NodeWindow& window) {
           north + kSlack};
 }
 
-// Up to so many raster grids are asked about whole windows.
+// Up to this number of raster grids, each is asked for the whole window.
 constexpr std::size_t kFewGrids = 8;
-// Nodes around a raster grid's reach whose positions are asked for: those of groups that touch it, and one more.
+// Nodes around a raster grid's footprint whose positions are computed: those of groups that touch it, and one more.
 constexpr int kAround = SourceErrorBound::kGroup + 1;
 
 // A range of steps of an axis, as nodes.
@@ -41,8 +41,8 @@ struct NodeRange {
   }
 };
 
-// The nodes of a window that a raster grid may give heights to; `around`: and so many more on each side. Never none,
-// since its files are looked at in any case.
+// The nodes of a window that may get heights from a raster grid, plus `around` more on each side. Never empty, because
+// the grid's files are checked in any case.
 template <typename NodeGrid>
 NodeWindow PartOf(const RasterGrid& grid, const NodeGrid& node_grid, const NodeWindow& window, int around) {
   const Footprint& reach = grid.reach();
@@ -106,13 +106,14 @@ Result<void> FillAny(const RasterGrid& grid, const NodeGrid& node_grid, const No
   copy_back(smooth, nodes.smooth);
   if (traced != nullptr) {
     traced->part = part;
-    trace->positions = {};  // can be found again, as can cells
+    trace->positions = {};  // can be computed again, like cells
     trace->cells = {};
   }
   return filled;
 }
 
-// A trace of a part as one of the window. Positions are known as far as the raster grid reaches and a little further.
+// Converts a trace of a part to one of the window. Positions are known within the raster grid's footprint plus a
+// margin.
 GridTrace Widened(PartTrace&& of_part, const RasterGrid& grid, const geo::Lattice& lattice, const NodeWindow& window) {
   if (!of_part.part) return std::move(of_part.trace);
   GridTrace trace = std::move(of_part.trace);
@@ -124,7 +125,7 @@ GridTrace Widened(PartTrace&& of_part, const RasterGrid& grid, const geo::Lattic
   if (!trace.samples.empty()) trace.cells = grid.CellsOf(trace.positions, trace.factor, trace.window);
   if (!trace.undulations.empty()) {
     auto undulations = grid.undulations()->At(lattice, window);
-    constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();  // and so is the bound then
+    constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();  // then the bound is infinite, too
     trace.undulations = undulations ? *std::move(undulations) : std::vector<double>(nodes, kUnknown);
   }
   return trace;
@@ -139,7 +140,7 @@ BoxIndex IndexOf(const std::vector<RasterGrid>& grids) {
     for (const int turn : {-360, 0, 360}) {
       entries.push_back({{reach.west + turn, reach.south, reach.east + turn, reach.north}, i});
     }
-    for (const std::size_t pole : {0, 1}) {  // its height counts on every meridian
+    for (const std::size_t pole : {0, 1}) {  // its height applies to every meridian
       const double latitude = pole == 0 ? -90 : 90;
       if (grids[i].pole_heights()[pole]) entries.push_back({{-540, latitude, 540, latitude}, i});
     }
@@ -147,14 +148,14 @@ BoxIndex IndexOf(const std::vector<RasterGrid>& grids) {
   return BoxIndex(entries);
 }
 
-// Heights of raster grids over each other. Without a feather a raster grid's height is the last word; with one it
-// counts by its weight, and what lies below it has the rest. Where nothing lies below, the weight changes nothing:
-// nothing is blended with the floor.
+// Combines the heights of raster grids. Without a feather, the first height is final. With a feather, heights are
+// weighted, and the raster grids below get the rest. If there is no raster grid below, weights have no effect: nothing
+// is blended with the floor.
 class Blend {
  public:
   explicit Blend(std::size_t nodes) : sums_(nodes), open_(nodes, 1) {}
 
-  // NaN where more is wanted.
+  // NaN at nodes that need further raster grids.
   std::vector<float> Wanted() const {
     std::vector<float> heights(sums_.size(), 0);
     for (std::size_t i = 0; i < heights.size(); ++i) {
@@ -182,7 +183,7 @@ class Blend {
 
  private:
   std::vector<double> sums_;
-  std::vector<double> open_;  // share that raster grids further down have
+  std::vector<double> open_;  // weight left for raster grids further down
 };
 
 template <typename NodeGrid>
@@ -211,7 +212,7 @@ Result<std::vector<float>> DemSource::Impl::ReadGrids(const NodeGrid& node_grid,
     if (feathers ? blend.is_done() : std::ranges::none_of(heights, IsVoid)) break;
   }
   if (feathers) heights = blend.Heights();
-  // What is measured coarsely in a hole is better than what is measured around it.
+  // A coarse measurement in a hole is better than a surface between the heights around it.
   for (std::size_t i = 0; i < nodes; ++i) {
     if (std::isnan(heights[i])) heights[i] = smooth[i];
   }
@@ -219,7 +220,7 @@ Result<std::vector<float>> DemSource::Impl::ReadGrids(const NodeGrid& node_grid,
 }
 
 std::vector<std::size_t> DemSource::Impl::GridsAt(const Box& box) const {
-  // A tile of floor must not outlive a dataset's only source: it is looked at in any case.
+  // The files are checked in any case, so that a tile of floor does not outlive the dataset's only source.
   return grids.size() == 1 ? std::vector<std::size_t>{0} : index.Find(box);
 }
 
@@ -264,7 +265,7 @@ Result<TileHeights> DemSource::Impl::Read(const geo::TileKey& key, HeightDatum d
   return tile;
 }
 
-// `traces`: of the raster grids that were read for the heights, the first of the tile's.
+// `traces`: of the raster grids that were read for the heights, in order of precedence.
 Result<double> DemSource::Impl::BoundError(const TileHeights& tile, const NodeWindow& window,
                                            std::vector<PartTrace> traces, const std::stop_token& stop) const {
   const std::vector<std::size_t> order = GridsAt(BoxOf(tile.lattice, window));
@@ -274,7 +275,7 @@ Result<double> DemSource::Impl::BoundError(const TileHeights& tile, const NodeWi
     const GridTrace trace = Widened(std::move(traces[k]), grid, tile.lattice, window);
     if (const auto added = bound.Add(grid, trace, stop); !added) return tl::unexpected(added.error());
   }
-  // All nodes have their height; samples of further raster grids may still show between them.
+  // All nodes have a height, but samples of further raster grids may still be visible between them.
   std::vector<float> none_wanted = tile.heights;
   for (std::size_t k = traces.size(); k < order.size() && !bound.is_covered(); ++k) {
     const RasterGrid& grid = grids[order[k]];
@@ -301,7 +302,7 @@ Result<std::vector<float>> DemSource::ReadPoints(std::span<const GeoPosition> po
                                                  std::stop_token stop, std::span<std::uint8_t> filled) const {
   TERRACE_CHECK(filled.empty() || filled.size() == points.size());
   std::vector<float> heights(points.size(), SampleRules::kVoid), smooth = heights;
-  std::map<std::size_t, std::vector<std::size_t>> wanted;  // points by the raster grids that may have them
+  std::map<std::size_t, std::vector<std::size_t>> wanted;  // points by the raster grids that may have heights for them
   for (std::size_t i = 0; i < points.size(); ++i) {
     const double x = std::remainder(points[i].longitude, 360), y = points[i].latitude;
     for (const std::size_t grid : impl_->GridsAt({x, y, x, y})) wanted[grid].push_back(i);
@@ -342,10 +343,10 @@ HeightRange DemSource::RangeBound(const geo::TileKey& key) const {
     const GridRange range = impl_->grids[i].RangeOf(lattice, key);
     blocks.Add(range.blocks);
     floor_shows = range.shows_others;
-    if (!floor_shows) break;  // whatever comes after it is hidden
+    if (!floor_shows) break;  // all later ones are hidden
   }
   if (blocks.min > blocks.max) return {floor, floor};
-  // Rounding to 2^-10 m stays within these.
+  // Multiples of 2^-10 m: rounding stays within these.
   HeightRange bound{std::floor(blocks.min * 1024.0) / 1024, std::ceil(blocks.max * 1024.0) / 1024};
   if (floor_shows) bound = {std::min<double>(bound.min, floor), std::max<double>(bound.max, floor)};
   return bound;

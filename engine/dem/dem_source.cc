@@ -71,7 +71,7 @@ Result<std::uint64_t> FingerprintOf(const std::vector<RasterGrid>& grids, const 
   const FileContentOptions content{options.cache.folder ? options.cache.folder->path() : std::string(), options.stop};
   ContentHasher hasher;
   for (const RasterGrid& grid : grids) {
-    hasher.Add(std::uint64_t{grid.members().size()});  // which rasters make one raster grid counts, too
+    hasher.Add(std::uint64_t{grid.members().size()});  // includes which rasters form a raster grid
     for (const GridMember& member : grid.members()) {
       if (auto added = AddRaster(hasher, *member.raster, content); !added) return tl::unexpected(added.error());
     }
@@ -96,7 +96,7 @@ int ResolutionStep(const RasterSource& raster) {
   return geo::NearestOctave(power);
 }
 
-// By rank, then by what the raster grids of a rank have: finer ones first, then by path.
+// Orders raster grids by rank, then by resolution, finer first, then by path.
 Result<std::vector<RasterGrid>> GridsOf(const std::vector<DemFile>& files, const Rasters& rasters,
                                         const GridOptions& options) {
   std::map<int, Rasters> ranks;
@@ -114,20 +114,20 @@ Result<std::vector<RasterGrid>> GridsOf(const std::vector<DemFile>& files, const
   });
   std::vector<RasterGrid> grids;
   for (auto& grid : made) {
-    if (!*grid) return tl::unexpected(grid->error());  // those after the first that failed may be missing
+    if (!*grid) return tl::unexpected(grid->error());  // after the first failure, rasters may be missing
     grids.push_back(**std::move(grid));
   }
   return grids;
 }
 
-// The smallest box that holds all footprints.
+// The smallest box that contains all footprints.
 GeoBounds BoundsOf(const Rasters& rasters) {
   if (rasters.size() == 1) return rasters.front()->info().bounds;
   std::vector<Footprint> boxes;
   for (const auto& raster : rasters) boxes.push_back(raster->footprint());
   std::ranges::sort(boxes, {}, &Footprint::west);
   Footprint hull = boxes.front();
-  // What lies beyond the antimeridian comes first in the order of longitudes.
+  // Parts beyond the antimeridian come first in the order of longitudes.
   const double beyond = std::ranges::max_element(boxes, {}, &Footprint::east)->east - 360;
   double covered = std::max(hull.east, beyond), gap = 0, gap_end = hull.west;  // the widest gap ends at gap_end
   for (const Footprint& box : boxes) {
@@ -140,7 +140,7 @@ GeoBounds BoundsOf(const Rasters& rasters) {
     covered = std::max(covered, box.east);
   }
   const double last_gap = boxes.front().west + 360 - covered;
-  constexpr double kNoGap = 1e-9;  // pieces of one grid meet as exactly as their corners are rounded
+  constexpr double kNoGap = 1e-9;  // pieces of one grid meet up to the rounding of their corners
   if (std::max(gap, last_gap) <= kNoGap) return {-180, hull.south, 180, hull.north};
   const double west = last_gap >= gap ? boxes.front().west : gap_end;
   const double east = west + 360 - std::max(gap, last_gap);
@@ -175,7 +175,7 @@ std::vector<Reach> ReachesOf(const std::vector<RasterGrid>& grids, const DemOpti
       std::ranges::min_element(grids, {}, [](const RasterGrid& s) { return s.spacing().finer; })->spacing().finer;
   std::vector<Reach> reaches;
   for (const RasterGrid& grid : grids) {
-    // An error that the operator requests applies to the finest source; other sources get as many more levels.
+    // `finest_error` applies to the finest source; for the other sources it is scaled by their spacing.
     const auto goal =
         options.finest_error ? std::optional(*options.finest_error * (grid.spacing().finer / finest)) : std::nullopt;
     const int depth = DeepestLevel(grid.spacing(), options.error_fraction, goal);

@@ -1,6 +1,6 @@
 // Numbers of about 106 bits: unevaluated sums of two doubles (T. J. Dekker, "A floating-point technique for extending
-// the available precision", 1971). Made of additions and multiplications of doubles alone, which IEEE 754 rounds
-// equally on every processor; -ffp-contract=off keeps compilers from fusing them.
+// the available precision", 1971). Uses only additions and multiplications of doubles, which IEEE 754 rounds equally on
+// every processor; -ffp-contract=off keeps compilers from fusing them.
 #pragma once
 
 namespace terrace::geo {

@@ -10,7 +10,7 @@
 namespace terrace::geo {
 namespace {
 
-// 2^(-k/4) for k = 0..3, spelt out so that no libm decides a ladder value.
+// 2^(-k/4) for k = 0..3 as literals, so that ladder values do not depend on libm.
 constexpr std::array<double, 4> kQuarterOctave = {1.0, 0.84089641525371454, 0.70710678118654752, 0.59460355750136054};
 
 }  // namespace

@@ -8,7 +8,7 @@ double Lattice::StepDegrees() const { return 180.0 / static_cast<double>(rows())
 
 double Lattice::Longitude(std::int64_t column) const {
   const std::int64_t wrapped = (column % columns() + columns()) % columns();
-  // One division of exact integers: below 2^53 for every level, so the result is the correctly rounded longitude.
+  // A single division of integers below 2^53 on every level: the result is the correctly rounded longitude.
   return 180.0 * static_cast<double>(wrapped) / static_cast<double>(rows()) - 180.0;
 }
 

@@ -1,4 +1,4 @@
-// The sample lattice of a level: where the height samples of its tiles lie on the globe.
+// The sample lattice of a level: the positions on the globe of its tiles' height samples.
 //
 // A tile has cells x cells lattice cells, cells + 1 samples along an edge; neighbours share their edge samples. Global
 // columns count eastwards from -180 degrees, modulo 360 degrees; global rows count northwards from -90 degrees.
@@ -14,18 +14,18 @@ struct Lattice {
   int level = 0;
   int cells = 256;  // per tile edge: 256, 128, 64 or 32
 
-  // Global samples around the Earth, and from pole to pole less one.
+  // The number of samples around the Earth, and of cells from pole to pole.
   std::int64_t columns() const { return TileColumns(level) * cells; }
   std::int64_t rows() const { return TileRows(level) * cells; }
 
   double StepDegrees() const;  // between samples, in both axes
 
-  // Degrees of a global column, wrapped into -180 (inclusive) .. 180; of a global row, clamped to the poles. The same
-  // column gives the same bits whichever tile asks.
+  // Degrees of a global column, wrapped into -180 (inclusive) .. 180; degrees of a global row, clamped to the poles.
+  // Results for the same column or row are bit-equal.
   double Longitude(std::int64_t column) const;
   double Latitude(std::int64_t row) const;
 
-  // Global column and row of a tile's south-western sample.
+  // The global column and row of a tile's south-western sample.
   std::int64_t FirstColumn(const TileKey& key) const { return key.x * cells; }
   std::int64_t FirstRow(const TileKey& key) const { return key.y * cells; }
 };

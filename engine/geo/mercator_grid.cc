@@ -11,7 +11,7 @@ constexpr double kPi = 3.14159265358979323846;
 
 // e^x for x in 0 .. pi: Taylor's series at x / 32, at most 0.1, squared five times.
 double Exp(double x) {
-  constexpr int kTerms = 14;  // 0.1^14 / 14! is far below half a unit of the last place
+  constexpr int kTerms = 14;  // 0.1^14 / 14! is much less than half a unit in the last place
   const double small = x / 32;
   double sum = 1;
   for (int k = kTerms; k > 0; --k) sum = 1 + sum * small / k;
@@ -31,7 +31,7 @@ double Atan(double t) {
 }  // namespace
 
 double MercatorLatitude(double y) {
-  // The Gudermannian of pi (1 - 2 y): twice the arc tangent of tanh of half of it.
+  // The Gudermannian of x = pi (1 - 2 y): 2 atan(tanh(x / 2)).
   const double angle = kPi * std::abs(1 - 2 * y), power = Exp(angle);
   const double latitude = ToDegrees(2 * Atan((power - 1) / (power + 1)));
   return y > 0.5 ? -latitude : latitude;

@@ -1,11 +1,11 @@
-// Powers of two, without the C library's logarithms: those may differ in the last bit between processors.
+// Nearest powers of two, without the C library's logarithms, whose last bits may differ between processors.
 #pragma once
 
 #include <cmath>
 
 namespace terrace::geo {
 
-// The integer nearest to the binary logarithm of `value`. Precondition: positive and finite.
+// Returns the integer nearest to the binary logarithm of `value`. Precondition: positive and finite.
 inline int NearestOctave(double value) {
   int exponent = 0;
   const double fraction = std::frexp(value, &exponent);  // 0.5 .. 1, exact

@@ -17,7 +17,7 @@ constexpr std::array<DoubleDouble, kTerms> InverseFactorials() {
   std::array<DoubleDouble, kTerms> inverses;
   inverses[0] = 1;
   for (int n = 1; n < kTerms; ++n) {
-    // Long division: what is left of the quotient of doubles gives the next 53 bits.
+    // Long division: the remainder of the quotient of doubles gives the next 53 bits.
     const DoubleDouble before = inverses[static_cast<unsigned>(n - 1)];
     const double quotient = before.high / n;
     const DoubleDouble rest = before + -DoubleDouble::ProductOf(quotient, n);
@@ -26,7 +26,7 @@ constexpr std::array<DoubleDouble, kTerms> InverseFactorials() {
   return inverses;
 }
 
-// Up to pi / 4 the first term left out is below 2^-92.
+// Up to pi / 4 the first omitted term is below 2^-92.
 constexpr int kTerms = 26;
 constexpr auto kInverse = InverseFactorials<kTerms>();
 
@@ -46,10 +46,10 @@ Number Series(Number square, int first, int terms) {
   return sum;
 }
 
-// A number of doubles' precision decides unless it is nearly between two multiples of the grid.
+// Double precision decides, unless the value is nearly halfway between two multiples of the grid.
 template <int kFirst>
 double Rounded(double degrees) {
-  // Terms up to t^17 leave out less than 2^-58. All roundings together stay below 2^-52, a 256th of the grid.
+  // Terms beyond t^17 are less than 2^-58. All rounding errors together stay below 2^-52, a 256th of the grid.
   constexpr int kShortTerms = 18;
   constexpr double kDoubt = 1.0 / 128;
   const double radians = degrees * kRadian.high;
@@ -67,10 +67,10 @@ double Rounded(double degrees) {
 }  // namespace
 
 SinCos RoundedSinCos(double degrees) {
-  // Exact: a multiple of the last place of `degrees`, and not above 45 but for a little.
+  // Exact: a multiple of the last place of `degrees`, and at most slightly above 45.
   const double quarter = std::nearbyint(degrees / 90), angle = degrees - 90 * quarter;
   const double sine = Rounded<1>(angle), cosine = Rounded<0>(angle);
-  // Subtracted from 0, as there is a zero with a sign.
+  // Subtracted from 0 to avoid -0.
   switch (static_cast<long>(quarter) & 3) {
     case 0:
       return {0 + sine, cosine};

@@ -1,5 +1,5 @@
-// Sine and cosine with the same bits on every processor. Those of the C library differ in the last bit between
-// processors that have fused multiply-add and those that have not.
+// Sine and cosine with the same bits on every processor. Results of the C library differ in the last bit between
+// processors with and without fused multiply-add.
 #pragma once
 
 namespace terrace::geo {
@@ -8,9 +8,9 @@ struct SinCos {
   double sin = 0, cos = 1;
 };
 
-// Rounded to the nearest multiple of 2^-44 (0.4 micrometres on the ground); exact at multiples of 30 and 90 degrees
-// that have exact ones. Precondition: |degrees| <= 2^20. What has many positions on few meridians and parallels finds
-// them out once: it takes some 30 ns.
+// Rounded to the nearest multiple of 2^-44 (0.4 micrometres on the ground). Exact at multiples of 30 degrees whose sine
+// or cosine is a multiple of one half. Takes about 30 ns: compute it once for positions on the same meridian or
+// parallel. Precondition: |degrees| <= 2^20.
 SinCos RoundedSinCos(double degrees);
 
 }  // namespace terrace::geo

@@ -9,7 +9,7 @@ namespace {
 // Columns without gaps, ends included.
 struct Run {
   std::int64_t start, end;
-  std::int64_t since;  // the row where it began to stand like this
+  std::int64_t since;  // first row of the current band
 };
 
 std::vector<Run> RunsOf(std::vector<TileRange>& active, std::int64_t row) {

@@ -1,4 +1,4 @@
-// Areas made of rectangles of whole cells: of tiles, or of the pixels of a raster.
+// Areas as sets of rectangles of tiles or pixels.
 #pragma once
 
 #include <vector>
@@ -7,14 +7,14 @@
 
 namespace terrace::geo {
 
-// Rectangles without overlap that cover what `ranges` cover, sorted by start_y, then start_x. What lies side by side
-// is one rectangle, and so is what lies on top of each other with the same columns.
+// Returns rectangles without overlap that cover the same cells as `ranges`, sorted by start_y, then start_x. Merges
+// rectangles that are adjacent in a row, and rectangles above each other with the same columns.
 std::vector<TileRange> Disjoint(std::vector<TileRange> ranges);
 
-// The smallest range that holds both ranges.
+// Returns the smallest range that contains both ranges.
 TileRange Hull(const TileRange& a, const TileRange& b);
 
-// Empty (end before start) where they do not meet.
+// Returns the intersection; empty (end before start) if there is none.
 TileRange Common(const TileRange& a, const TileRange& b);
 constexpr bool IsEmpty(const TileRange& range) { return range.end_x < range.start_x || range.end_y < range.start_y; }
 constexpr std::int64_t Cells(const TileRange& range) {

@@ -1,6 +1,5 @@
 // The quadtree of the TMS "global-geodetic" scheme (EPSG:4326): two roots, 180 degrees wide.
-//
-// Axis order, stated once: x counts from the WEST (-180), y counts from the SOUTH (-90). Level z has 2^(z+1) columns
+// Axis order: x counts from the WEST (-180), y counts from the SOUTH (-90). Level z has 2^(z+1) columns
 // and 2^z rows of tiles that are 180 / 2^z degrees wide and high.
 #pragma once
 
@@ -29,7 +28,8 @@ constexpr bool IsValid(const TileKey& key) {
          key.y < TileRows(key.level);
 }
 
-// The tile `dx` columns to the east, counted modulo 360 degrees, and `dy` rows to the north; y may leave the level.
+// Returns the tile `dx` columns to the east (modulo 360 degrees) and `dy` rows to the north; y may lie outside the
+// level.
 TileKey Neighbour(const TileKey& key, int dx, int dy);
 
 // "9/533/388"

@@ -20,7 +20,7 @@ ChordMisfit ScanChord(const Chord& chord, const BorderOptions& options) {
   const hn::Rebind<float, decltype(doubles)> floats;
   const hn::Rebind<std::int32_t, decltype(doubles)> ints;
   const auto all = [&](double value) HWY_ATTR { return hn::Set(doubles, value); };
-  // Of numbers that may be NaN, as std::max and std::min choose: the instructions of processors differ.
+  // Equal to std::max and std::min for NaN; the instructions of processors differ.
   const auto larger = [](auto x, auto y) HWY_ATTR { return hn::IfThenElse(hn::Lt(x, y), y, x); };
   const auto smaller = [](auto x, auto y) HWY_ATTR { return hn::IfThenElse(hn::Lt(y, x), y, x); };
   const auto a = all(chord.a), b = all(chord.b), h_a = all(chord.h_a), h_b = all(chord.h_b);

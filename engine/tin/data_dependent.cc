@@ -32,7 +32,7 @@ bool IsBorderEdge(const HeightField& field, SamplePosition a, SamplePosition b) 
 FitErrors::FitErrors(const HeightField& field, const Sagitta& sagitta, FitMeasure measure)
     : field_(&field), sagitta_(&sagitta), measure_(measure) {
   lone_star_.count = 1;
-  lone_star_.has_border = true;  // or not: it is looked for
+  lone_star_.has_border = true;  // perhaps; borders are checked
   lone_star_.ring.Grow(2);
 }
 
@@ -66,8 +66,8 @@ double FitErrors::Of(const PlaneMisfit& misfit, const Triangulation::Vertex& p, 
   return error;
 }
 
-// Of the triangle's border samples, by their plain distances: a weight would favour one cut over the other only for
-// being at the border, and what is decided here is not the bound.
+// The worst border sample of the triangle, by unweighted distance: a weight would favour one cut only because it is at
+// the border, and the bound is not decided here.
 double FitErrors::WorstOnBorders(const Triangulation::Vertex& p, const RingVertex& u, const RingVertex& v) const {
   const std::array<Triangulation::Vertex, 3> corners = {p, Around(p.position, u), Around(p.position, v)};
   double worst = 0;
@@ -113,7 +113,7 @@ const Star& DataDependentCriterion::Insert(Triangulation::Vertex vertex, Triangl
   return star;
 }
 
-// Leaves the edges whose fit decides as suspects: none where normals do, which takes no scan.
+// Collects as suspects the edges that the fit decides; none if normals decide, which needs no scan.
 Star& DataDependentCriterion::OutlineByShape(const Triangulation::Vertex& vertex, TriangleId triangle) {
   bool is_suspect = false;
   Suspect* suspect = suspects_.data();
@@ -154,7 +154,7 @@ Star& DataDependentCriterion::OutlineByShape(const Triangulation::Vertex& vertex
   return star;
 }
 
-// An angle says less about the fit than a distance does: with normals the quality counts twice.
+// An angle is weaker evidence for the fit than a distance: with normals the quality is squared once more.
 [[gnu::always_inline]] inline ShapeQuality DataDependentCriterion::QualityOf(const Quadrilateral& q) const {
   const ShapeQuality quality = ShapeQualityOf(q);
   if (options_.measure != FitMeasure::kNormals) [[likely]]
@@ -162,14 +162,15 @@ Star& DataDependentCriterion::OutlineByShape(const Triangulation::Vertex& vertex
   return {quality.uv * quality.uv, quality.pw * quality.pw};
 }
 
-// Of squares of how badly the two cuts fit, each over its squared quality. Equal: by the shape alone.
+// Compares the squared misfits of the two cuts, each divided by its squared quality. If they are equal, the shape
+// decides.
 inline bool DataDependentCriterion::IsBetterAlongPw(double now, double then, const ShapeQuality& quality) const {
   const bool is_pure = options_.qthresh == 0;
   const double of_uv = now * (is_pure ? 1 : quality.pw), of_pw = then * (is_pure ? 1 : quality.uv);
   return (of_pw < of_uv) | ((of_pw == of_uv) & (quality.pw >= quality.uv));
 }
 
-// The outline's triangles and, in the same scan, as many pairs of the suspects as it can take.
+// Scans the outline's triangles and, in the same scan, as many pairs of the suspects as fit.
 void DataDependentCriterion::FitOutline(Star& star) {
   MakeRoom(star);
   const std::size_t count = star.count;
@@ -201,8 +202,8 @@ void DataDependentCriterion::FitOutline(Star& star) {
     FitSuspects(star, together);
 }
 
-// Behind a ring of `end` vertices: u, w and v, between which are the two triangles. What is between v and the next u is
-// none. Returns where it ends now.
+// Appends u, w and v to a ring of `end` vertices; the two triangles lie between them. The triangle between v and the
+// next u is left out. Returns the new end.
 inline std::size_t DataDependentCriterion::PutPair(Star& star, std::size_t end, const Ends& ends,
                                                    const Triangulation::Beyond& beyond) const {
   const auto put = [&star](std::size_t at, const RingVertex& vertex) {
@@ -256,7 +257,7 @@ void DataDependentCriterion::FitOneByOne(const Star& star, std::size_t index) {
   Decide(suspect, &pair_misfits_[3 * index], errors);
 }
 
-// By the fits of (u, w, p) and (w, v, p).
+// Decides by the fits of (u, w, p) and (w, v, p).
 inline void DataDependentCriterion::Decide(const Suspect& suspect, const PlaneMisfit* misfits, const double* errors) {
   const double now = fit_errors_.CombinedSquare(NearError(suspect.edge), ErrorBeyond(suspect.outside / 4));
   const double then = fit_errors_.CombinedSquare(errors[0], errors[1]);
@@ -271,7 +272,7 @@ DataDependentCriterion::Ends DataDependentCriterion::EndsOf(const Star& star, st
   return {edges_[edge].u, edges_[edges_[edge].next].u};
 }
 
-// Round by round; the outline is put back into the star.
+// Replaces edges round by round, and writes the outline back to the star.
 void DataDependentCriterion::ReplaceEdges(Star& star) {
   const auto last = static_cast<std::uint32_t>(star.count);
   if (edges_.size() < last + 2) [[unlikely]]
@@ -282,7 +283,7 @@ void DataDependentCriterion::ReplaceEdges(Star& star) {
   edges_[last].u = star.ring[last];
   edge_count_ = last + 1;
   while (flip_count_ > 0) {
-    // Those of the round before are still read.
+    // The suspects of the previous round are still read.
     suspects_.swap(decided_);
     suspect_count_ = 0;
     for (std::size_t i = 0; i < flip_count_; ++i) ReplaceEdge(star, flips_[i]);
@@ -318,7 +319,7 @@ void DataDependentCriterion::ReplaceEdge(Star& star, const Flip& flip) {
   SuspectEdge(star, made);
 }
 
-// One that has just come into the outline, if its shape does not keep it there.
+// Adds a new edge of the outline as a suspect, unless its shape decides that it stays.
 void DataDependentCriterion::SuspectEdge(Star& star, std::uint32_t index) {
   const Edge& edge = edges_[index];
   if (triangulation_->IsBorder(edge.outside)) [[unlikely]] {
@@ -328,7 +329,7 @@ void DataDependentCriterion::SuspectEdge(Star& star, std::uint32_t index) {
   const Triangulation::Beyond beyond = triangulation_->BeyondOf(edge.outside, vertex_.position);
   const Quadrilateral q{edge.u, edges_[edge.next].u, beyond.w, vertex_.height};
   const ShapeQuality quality = QualityOf(q);
-  // Whether it is one cannot be predicted: not a branch.
+  // No branch, which would be mispredicted.
   const bool is_suspect = Sees(q.u, q.v, q.w) & !(quality.pw < kept_further_out_below_ * quality.uv);
   suspects_[suspect_count_] = {index, edge.outside, quality.uv < taken_below_ * quality.pw, quality, beyond};
   suspect_count_ += is_suspect;
@@ -340,7 +341,7 @@ void DataDependentCriterion::SuspectEdge(Star& star, std::uint32_t index) {
   }
 }
 
-// From the triangle's last corner, as when it was made: rounding is that of the scan of its star.
+// Relative to the triangle's last corner, as in the scan of its star, so that rounding is equal.
 inline double DataDependentCriterion::ErrorBeyond(TriangleId t) {
   if (errors_by_slot_[t] == kUnknown) [[unlikely]] {
     const auto [a, b, c] = triangulation_->triangle(t);
@@ -351,7 +352,7 @@ inline double DataDependentCriterion::ErrorBeyond(TriangleId t) {
   return errors_by_slot_[t];
 }
 
-// Beyond the border it is some address, which does no harm.
+// At the border the address is arbitrary, which is harmless.
 [[gnu::always_inline]] inline void DataDependentCriterion::PrefetchError(TriangleId t) const {
   const auto errors = reinterpret_cast<std::uintptr_t>(errors_by_slot_.data());
   __builtin_prefetch(reinterpret_cast<const void*>(errors + sizeof(double) * t));

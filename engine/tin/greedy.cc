@@ -65,7 +65,7 @@ class SeedCursor {
   int x_ = 0, y_ = 0;
 };
 
-// Insertions between two looks at the stop token: about a twentieth of a millisecond.
+// Insertions between two checks of the stop token: about a twentieth of a millisecond.
 constexpr std::size_t kStopPeriod = 256;
 
 void CheckOptions(const GreedyOptions& options) {
@@ -135,16 +135,16 @@ class GreedyTriangulation::Impl {
   std::optional<DataDependentCriterion> data_dependent_;
   std::optional<InsertionRecorder> recorder_;
 
-  // Triangles whose candidates are out of date. Seeds pile them up: a triangle is scanned once it stays.
+  // Triangles with outdated candidates. While seeds are inserted, they accumulate and are scanned only if they remain.
   std::vector<TriangleId> awaiting_scan_;
   std::vector<std::uint8_t> awaits_scan_;  // by triangle
 
-  // The worst sample of each border edge, by side and the position where the edge begins. All zeros at first, which
-  // is quicker written than candidates are: that was a twentieth of the time of a tile of four vertices.
+  // The worst sample of each border edge, by side and the first position of the edge. Initialized to zeros, which is
+  // faster than candidates: that took a twentieth of the time of a tile of four vertices.
   struct BorderWorst {
     double error;
     std::uint32_t sample;
-    std::uint32_t end;  // of the edge that this is about; 0: of none
+    std::uint32_t end;  // of the edge; 0: none
   };
   std::array<std::unique_ptr<BorderWorst[]>, 4> border_worst_;
 
@@ -188,8 +188,8 @@ GreedyTriangulation::Impl::Impl(const HeightField& field, GreedyOptions options,
     vertices.push_back(VertexOf(sample));
   }
   triangulation_ = Triangulation(std::move(vertices), mesh.triangles);
-  // The seeds start again: a grid that is in the mesh was due above the error that was met, so it is due at once, and
-  // all of its samples are vertices already.
+  // Seeds start from the first grid: grids in the mesh are due at once, because they were due above the reached error,
+  // and all of their samples are vertices already.
   if (recorder_) recorder_.emplace(refinement);
   for (TriangleId t = 0; t < triangulation_.triangle_count(); ++t) AwaitScan(t);
 }
@@ -203,8 +203,8 @@ bool GreedyTriangulation::Impl::Run(const GreedyGoal& goal, const std::stop_toke
   }
 }
 
-// Depends on the mesh alone until the goal is met: a run to a coarser error is a prefix of a run to a finer one. Hence
-// seeds are due at the larger of the current and the wanted error, and not only when a sample is to be inserted.
+// Until the goal is met, this depends only on the mesh: a run to a coarser error is a prefix of a run to a finer one.
+// Therefore seeds are due at the larger of the current and the requested error, not only when a sample is inserted.
 std::optional<GreedyTriangulation::Impl::Insertion> GreedyTriangulation::Impl::NextInsertion(const GreedyGoal& goal) {
   if (IsMet(goal)) return std::nullopt;
   if (seeds_.HasGrid()) {
@@ -219,8 +219,8 @@ std::optional<GreedyTriangulation::Impl::Insertion> GreedyTriangulation::Impl::N
   return Insertion{PositionOf(candidates_.sample(worst)), worst, error, false};
 }
 
-// What is inserted next lies anywhere: fetched while this one is at work. In two steps, the second of which reads what
-// the first has fetched; in one as long as most of the triangles are in the second cache anyhow.
+// The next insertion may be anywhere in memory: prefetches it during this one. In two steps, because the second reads
+// data of the first; in one step as long as most triangles are in the second-level cache.
 void GreedyTriangulation::Impl::PrefetchUpcoming() const {
   constexpr std::size_t kFewTriangles = std::size_t{1} << 14;
   const auto upcoming = [this](std::size_t ahead, auto&& prefetch) {
@@ -333,7 +333,7 @@ void GreedyTriangulation::Impl::MakeStar(TriangleId t, Star& star) const {
   star.y = centre.y;
   star.height = triangulation_.height(p);
   star.is_closed = false;
-  star.has_border = true;  // or not: it is looked for
+  star.has_border = true;  // perhaps; borders are checked
   star.count = 1;
   if (star.triangles.empty()) {
     star.ring.Grow(2);

@@ -9,19 +9,19 @@ namespace {
 
 using Wide = InsertionRecord<std::uint32_t>;
 
-// Six triangles an insertion, a ring of as many, four slots.
+// Words of a typical insertion: six triangles, a ring of six vertices, four slots.
 constexpr std::size_t kLikelyWords = 11;
 
-// What is copied in one go: all of what most insertions have.
+// The number copied in one step: enough for most insertions.
 constexpr std::size_t kFewest = 8;
 static_assert(kFewest <= Ring::kPadding);
 
-// Most often a single step: std::copy would be a call that has to find out how little there is.
+// Usually a single step; std::copy would be a function call.
 void CopyFew(const std::uint32_t* from, std::size_t count, std::uint32_t* to) {
   for (std::size_t i = 0; i < count; i += kFewest) std::memcpy(to + i, from + i, kFewest * sizeof *to);
 }
 
-// Where the smallest of them is, without a branch that cannot be predicted.
+// The position of the smallest value, without branches, which would be mispredicted.
 std::size_t SmallestOf(const std::uint32_t* values, std::size_t count) {
   std::uint64_t smallest = std::numeric_limits<std::uint64_t>::max();
   for (std::size_t i = 0; i < count; ++i) smallest = std::min(smallest, std::uint64_t{values[i]} << 32 | i);
@@ -97,7 +97,7 @@ InsertionRecord<Index> InsertionRecorder::Finish() const {
     corners += static_cast<std::size_t>(ring_end - ring);
     word = ring_end;
     for (std::size_t i = 0; i < removed; ++i) record.removed[made_in_slot[word[i]]] = static_cast<Index>(insertion);
-    // Triangle i of the star is the one `turn` before it in the record.
+    // Triangle i of the star is triangle i - turn, modulo count, of the record.
     for (std::size_t i = 0; i < count; ++i) {
       const std::size_t slot = i < removed ? word[i] : slots++;
       made_in_slot[slot] = static_cast<std::uint32_t>(made + i + (i >= turn ? 0 : count) - turn);

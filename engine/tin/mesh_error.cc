@@ -50,7 +50,7 @@ MeshError MeasureError(const HeightField& field, const TinMesh& mesh, std::stop_
         const float sample_height = field.At(x, y);
         if (std::isnan(sample_height)) continue;
         const SamplePosition p{static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)};
-        // Relative to one corner's height: exact at the corners, and no cancellation of large common heights.
+        // Relative to one corner's height: exact at the corners, without cancellation of large heights.
         const auto weight_b = static_cast<double>(Orientation(c, a, p)),
                    weight_c = static_cast<double>(Orientation(a, b, p));
         const double surface = z_a + (weight_b * (z_b - z_a) + weight_c * (z_c - z_a)) / doubled_area;

@@ -39,8 +39,8 @@ bool GetArray(ByteReader& reader, std::vector<T>& values) {
   return true;
 }
 
-// Rings of earlier vertices, as many as the sizes say; every insertion removes two triangles fewer than it makes, one
-// fewer on the border.
+// Checks that rings consist of earlier vertices and have the stated sizes, and that every insertion removes two
+// triangles fewer than it makes, one fewer on the border.
 template <typename Index>
 bool IsSoundRecord(const InsertionRecord<Index>& record, std::size_t insertions) {
   if (record.sizes.size() != insertions || record.removed.size() < 2) return false;
@@ -119,8 +119,8 @@ InsertionRecord<std::uint32_t> Refinement::WideRecord() const {
   return std::visit([](const auto& record) { return ConvertTo<std::uint32_t>(record); }, record_);
 }
 
-// The form: kMagic, width, height, bytes of an index, then five arrays, each with its length in front, then the hash of
-// all that. Numbers are 32 bits but for the elements of arrays.
+// Format: kMagic, width, height, bytes of an index, then five arrays, each preceded by its length, then the hash of all
+// that. All numbers have 32 bits, except the elements of arrays.
 std::string Refinement::Serialize() const {
   ByteWriter writer;
   writer.Reserve(bytes() + 64);
@@ -175,7 +175,7 @@ Result<Refinement> Refinement::Parse(std::string_view bytes) {
   return refinement;
 }
 
-// What MeshOf relies on, whoever wrote the bytes.
+// The conditions that MeshOf relies on.
 bool Refinement::IsSound() const {
   for (const SamplePosition sample : inserted_) {
     if (sample.x >= width_ || sample.y >= height_) return false;

@@ -14,8 +14,7 @@ namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// A star of eight triangles and fewer, as nearly all are, is one step: how many there are, and which of them stand,
-// cannot be predicted.
+// Stars of up to eight triangles, which are nearly all, take one step without branches, which would be mispredicted.
 using Corners = hn::CappedTag<std::uint32_t, 8>;
 
 template <typename Index>
@@ -29,7 +28,7 @@ HWY_INLINE hn::Vec<Corners> LoadIndices(const Index* from) {
 
 }  // namespace
 
-// Writes to `triangles`, and up to a vector of them beyond; returns how many stand.
+// Writes to `triangles`, and up to a vector beyond; returns the number of triangles that exist.
 template <typename Index>
 std::size_t CollectStanding(const InsertionRecord<Index>& record, std::size_t insertions,
                             std::array<std::uint32_t, 3>* triangles) {
@@ -94,7 +93,7 @@ namespace {
 HWY_EXPORT(CollectNarrow);
 HWY_EXPORT(CollectWide);
 
-// A triangulation of v vertices has fewer than 2 v triangles; more take what is written beyond the last.
+// A triangulation of v vertices has fewer than 2 v triangles; the rest is padding for writes beyond the last.
 template <typename Record, typename Collect>
 std::vector<std::array<std::uint32_t, 3>> Collected(const Record& record, std::size_t insertions, Collect&& collect) {
   constexpr std::size_t kMaxLanes = 8;

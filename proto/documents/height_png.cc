@@ -32,7 +32,8 @@ void PutChunk(std::string& out, std::string_view type, std::string_view data) {
   PutBigEndian(out, libdeflate_crc32(0, out.data() + begin, out.size() - begin));
 }
 
-// PNG, section 9.4: of the bytes to the left, above, and above to the left, the one nearest to a + b - c.
+// PNG, section 9.4: the Paeth predictor. Of the bytes to the left (a), above (b) and above to the left (c), returns the
+// one nearest to a + b - c.
 int Paeth(int a, int b, int c) {
   const int to_a = std::abs(b - c), to_b = std::abs(a - c), to_c = std::abs(a + b - 2 * c);
   if (to_a <= to_b && to_a <= to_c) return a;
@@ -50,7 +51,8 @@ void Filter(int type, const Row& row, const Row& above, Row& out) {
   }
 }
 
-// The filter whose output is nearest to zero, each byte taken as signed: the heuristic of PNG, section 12.7.
+// The filter with the smallest sum of absolute output values, bytes taken as signed: the heuristic of PNG, section
+// 12.7.
 const Row& BestFilter(const Row& row, const Row& above, std::array<Row, 5>& candidates) {
   std::size_t best = 0;
   std::uint64_t least = ~std::uint64_t{0};

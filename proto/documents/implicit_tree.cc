@@ -30,7 +30,7 @@ std::vector<geo::TileKey> TilesOf(Availability available, int level) {
   return tiles;
 }
 
-// Whether they are few, and nothing lies beside them: a local raster in a mosaic with the globe is not all of it.
+// Whether the tiles are few and contain all data: a local raster in a mosaic with the globe does not.
 bool CanBeRoots(Availability available, int level) {
   if (Count(available[static_cast<std::size_t>(level)]) > kMaxImplicitRoots) return false;
   const std::vector<geo::TileKey> tiles = TilesOf(available, level);
@@ -53,7 +53,7 @@ geo::TileRange PartUnder(const geo::TileRange& range, const geo::TileKey& top, i
 
 bool IsEmpty(const geo::TileRange& range) { return range.start_x > range.end_x || range.start_y > range.end_y; }
 
-// The blocks that reach under `top`, whole; levels above it are empty.
+// The blocks that intersect the area of `top`, not clipped. Levels above `top` are empty.
 std::vector<std::vector<geo::TileRange>> BlocksThatReachUnder(Availability available, const geo::TileKey& top) {
   std::vector<std::vector<geo::TileRange>> blocks(available.size());
   for (auto level = static_cast<std::size_t>(top.level); level < available.size(); ++level) {
@@ -64,7 +64,7 @@ std::vector<std::vector<geo::TileRange>> BlocksThatReachUnder(Availability avail
   return blocks;
 }
 
-// The children of a tile as roots of trees; none where it has no children.
+// The children of a tile as roots of trees; empty if it has none.
 std::vector<TreeRoot> TreesBelow(Availability available, const geo::TileKey& tile) {
   const std::vector<std::vector<geo::TileRange>> here = BlocksThatReachUnder(available, tile);
   const std::vector<std::vector<geo::TileRange>> blocks = BlocksBelow(here, tile, 1);
@@ -86,7 +86,7 @@ std::size_t CountTiles(const std::vector<TreeRoot>& trees) {
   return count;
 }
 
-// Pointers stay good while nothing is added to a vector that holds one of them.
+// Pointers stay valid as long as nothing is added to the vectors that contain their targets.
 void FindTrees(std::vector<TreeRoot>& trees, int levels, std::vector<TreeRoot*>& found) {
   for (TreeRoot& tree : trees) {
     if (!tree.below.empty()) {
@@ -97,7 +97,7 @@ void FindTrees(std::vector<TreeRoot>& trees, int levels, std::vector<TreeRoot*>&
   }
 }
 
-// Trees of as many levels are split together or not at all, so that neighbours are alike.
+// Trees with the same number of levels are split together, so that neighbours are treated alike.
 void SplitTallTrees(Availability available, std::vector<TreeRoot>& trees) {
   std::size_t named = CountTiles(trees);
   for (int levels = static_cast<int>(available.size()); levels > kTallestSubtree; --levels) {

@@ -14,7 +14,7 @@
 
 namespace terrace::proto {
 
-// By level, from 0: what dem::DemSource::Available gives, every ancestor of an available tile included.
+// The result of dem::DemSource::Available by level, from 0. Includes every ancestor of an available tile.
 using Availability = std::span<const std::vector<geo::TileRange>>;
 
 inline constexpr std::int64_t kMaxImplicitRoots = 4;
@@ -24,9 +24,9 @@ inline constexpr std::int64_t kMaxImplicitRoots = 4;
 // (docs/decisions/0009-implicit-roots.md).
 inline constexpr int kShallowestRoots = 2;
 
-// All tiles of the deepest level that has at most kMaxImplicitRoots of them and under which everything lies, or of
-// level kShallowestRoots, or of the deepest level, if that comes first; from west to east, then from south to north.
-// Precondition: level 0 is not empty.
+// Returns all tiles of one level, from west to east, then from south to north. It is the deepest level with at most
+// kMaxImplicitRoots tiles that together contain all deeper tiles; but at least kShallowestRoots, and at most the
+// deepest level. Precondition: level 0 is not empty.
 std::vector<geo::TileKey> ImplicitRoots(Availability available);
 
 // The number of levels from the root to the deepest available tile below it, both included. In a mosaic, trees over

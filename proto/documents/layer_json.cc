@@ -14,11 +14,11 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// Ranges between two looks at the stop token: a tenth of a millisecond's worth.
+// Ranges between two checks of the stop token: about a tenth of a millisecond.
 constexpr std::size_t kStopPeriod = 1024;
 
-// Of a mosaic of scattered sources there are megabytes: they are written without a tree of them. False: a stop was
-// requested.
+// A mosaic of scattered sources has megabytes of ranges, so they are written directly, without a JSON tree. Returns
+// false if a stop was requested.
 bool AppendAvailable(const std::vector<std::vector<geo::TileRange>>& levels, const std::stop_token& stop,
                      std::string& json) {
   std::size_t count = 0;
@@ -47,8 +47,8 @@ Json Bounds(const LayerDescription& layer) {
 
 std::string EncodeLayerJson(const LayerDescription& layer, const std::stop_token& stop) {
   TERRACE_CHECK(!layer.available.empty());
-  // One template only: cesium-native and 3DTilesRendererJS read no other than the first.
-  // The version stands in it as it is: 3DTilesRendererJS writes 1 for {version}.
+  // Only one template: cesium-native and 3DTilesRendererJS use only the first. The version stands in it as it is:
+  // 3DTilesRendererJS writes 1 for {version}.
   std::string tile_template = "{z}/{x}/{y}.terrain?v=" + layer.version;
   if (!layer.tile_query.empty()) tile_template += "&" + layer.tile_query;
 
@@ -72,7 +72,7 @@ std::string EncodeLayerJson(const LayerDescription& layer, const std::stop_token
   }
   // Names and attributions come from files: bytes that are not UTF-8 become U+FFFD instead of an exception.
   std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace);
-  text.back() = ',';  // instead of the end of the object
+  text.back() = ',';  // replaces the end of the object
   text += R"("available":)";
   if (!AppendAvailable(layer.available, stop, text)) return {};
   return text + '}';

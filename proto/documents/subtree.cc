@@ -14,7 +14,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::size_t kAlignment = 8;  // of both chunks and of every buffer view
 
-// Bits that all levels above `level` take: 1 + 4 + 16 + ...
+// Number of bits of all levels above `level`: 1 + 4 + 16 + ...
 constexpr std::size_t FirstBit(int level) { return ((std::size_t{1} << (2 * level)) - 1) / 3; }
 
 class Bits {
@@ -46,7 +46,7 @@ class Bits {
   std::string bytes_;
 };
 
-// The binary chunk and the JSON that tells what is where in it.
+// The binary chunk and the JSON that describes it.
 class Buffer {
  public:
   // An availability object; its bitstream goes into the buffer unless all bits are equal.
@@ -54,7 +54,7 @@ class Buffer {
     if (bits.uniform()) return {{"constant", bits.set() > 0 ? 1 : 0}};
     return {{"bitstream", AddView(bits.bytes())}, {"availableCount", bits.set()}};
   }
-  // The number of the buffer view.
+  // Returns the number of the buffer view.
   std::size_t AddView(std::string_view bytes) {
     views_.push_back({{"buffer", 0}, {"byteOffset", bytes_.size()}, {"byteLength", bytes.size()}});
     bytes_.PutBytes(bytes);
@@ -81,8 +81,8 @@ std::uint32_t EveryOther(std::uint32_t bits) {
   return (bits | bits >> 8) & 0x0000ffff;
 }
 
-// One for each bit; of those that are not set it says nothing. A tile's children are the four bits from 4 times its
-// own, plus 1.
+// One range per bit, undefined for bits that are not set. The children of the tile at bit i are at bits 4 i + 1 to 4 i
+// + 4.
 std::vector<HeightSpan> HeightsOf(const Subtree& subtree, const Bits& tiles) {
   std::vector<HeightSpan> heights(tiles.count());
   for (int level = subtree.levels - 1; level >= 0; --level) {

@@ -16,7 +16,7 @@ namespace terrace::proto {
 
 inline constexpr int kMaxSubtreeLevels = 10;  // 350,000 tiles; clients create an object for each when the file arrives
 
-// Of the metadata in a subtree: the class and its properties in the tileset's schema.
+// Names of the metadata in a subtree: the class and its properties in the tileset's schema.
 inline constexpr const char* kTileClass = "tile";
 inline constexpr const char* kMinHeightProperty = "min_height";
 inline constexpr const char* kMaxHeightProperty = "max_height";
@@ -26,8 +26,9 @@ struct Subtree {
   // Entry k, 0 .. levels: blocks without overlap of the available tiles k levels below the subtree's root, numbered
   // from its south-western corner. Entry `levels` holds the roots of child subtrees.
   std::vector<std::vector<geo::TileRange>> tiles;
-  // Of a tile k levels below the root, numbered likewise, {k, x, y}: whole numbers of 2^-8 m, less than 2^16 m, which
-  // floats hold exactly. Each is widened to hold those of the tiles below it in this subtree. Empty: no metadata.
+  // The heights of the tile {k, x, y}, k levels below the root, numbered in the same way. They are multiples of 2^-8 m
+  // below 2^16 m, which floats represent exactly. Each range is widened to contain those of the tiles below it in this
+  // subtree. Empty: no metadata.
   std::function<HeightSpan(const geo::TileKey&)> heights;
 };
 
@@ -36,7 +37,7 @@ struct Subtree {
 // so is the parent of every available tile.
 std::string EncodeSubtree(const Subtree& subtree);
 
-// Where tile (x, y) of a level stands in Morton order. x and y below 2^16.
+// Returns the index of tile (x, y) in the Morton order of its level. Precondition: x and y are below 2^16.
 std::uint32_t MortonIndex(std::uint32_t x, std::uint32_t y);
 
 }  // namespace terrace::proto

@@ -20,8 +20,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// Metres. What is missing while nothing is drawn: CesiumJS asks for nothing at all while this comes to 16 pixels or
-// less, so it must be large enough for any distance from which the Earth is looked at.
+// Metres: the geometric error of the tileset, while nothing is drawn. CesiumJS requests nothing while this is at most
+// 16 pixels, so it must be large enough for every viewing distance.
 constexpr double kNothingDrawn = 1e7;
 
 Json Region(const HeightSpan& heights, int level, const geo::TileRange& block) {
@@ -41,7 +41,7 @@ std::string Query(const TilesetDescription& tileset, const std::string& paramete
   return query.empty() ? "" : "?" + query;
 }
 
-// `place`: which tile or tiles of the tree the content is of.
+// `place`: the tile of the tree, or the template, that the content belongs to.
 Json Tile(const TilesetDescription& tileset, const geo::TileKey& root, Json bounds, const char* place) {
   Json json;
   json["boundingVolume"] = std::move(bounds);
@@ -65,7 +65,7 @@ Json ImplicitRoot(const TilesetDescription& tileset, const TreeRoot& tree, const
   return json;
 }
 
-// Columns counted eastwards from the far side of the widest gap between roots: `end_x` may lie beyond the level's last
+// Columns are counted eastwards from the end of the widest gap between roots. `end_x` may lie beyond the level's last
 // column, across the antimeridian.
 geo::TileRange BlockOf(const std::vector<TreeRoot>& roots) {
   const std::int64_t columns = geo::TileColumns(roots.front().tile.level);
@@ -87,10 +87,9 @@ geo::TileRange BlockOf(const std::vector<TreeRoot>& roots) {
   return block;
 }
 
-// About the middle of the block, as far as half its width and half its height along the ground, and its whole range of
-// heights, take one together; but never farther than the other side of the Earth.
-// A block all around a pole has its middle there, and reaches to the equator: clients look at the sphere as a whole,
-// and from nearer by, past the pole, a map of it is a flat disc.
+// A sphere around the middle of the block. Its radius is half the block's width plus half its height along the ground
+// plus the range of heights, at most to the other side of the Earth. A block around a pole has its middle at the pole
+// and extends to the equator.
 Json Sphere(const HeightSpan& heights, int level, const geo::TileRange& block) {
   const double tile = std::ldexp(180, -level);
   const double width = static_cast<double>(block.end_x + 1 - block.start_x) * tile;
@@ -112,7 +111,8 @@ Json Sphere(const HeightSpan& heights, int level, const geo::TileRange& block) {
   return {{"sphere", {middle.x, middle.y, middle.z, radius}}};
 }
 
-// About the middle of a tile of 45 degrees beside a pole, as far as the corners away from it: they are the farthest.
+// A sphere around the middle of a tile of 45 degrees beside a pole. It reaches the corners away from the pole, which
+// are the farthest.
 Json TileSphere(const HeightSpan& heights, const geo::TileKey& key) {
   const double tile = std::ldexp(180, -key.level);
   const auto point = [&](double columns, double rows, double height) {
@@ -127,9 +127,9 @@ Json TileSphere(const HeightSpan& heights, const geo::TileKey& key) {
   return {{"sphere", {middle.x, middle.y, middle.z, radius}}};
 }
 
-// 3DTilesRendererJS reads a region whose west is greater than its east as lying on the other side of the Earth,
-// CesiumJS none that goes beyond 180 degrees, and the box that loaders.gl makes of a region of hemispheres misses most
-// of it.
+// 3DTilesRendererJS interprets a region with west > east as the other side of the Earth, CesiumJS does not support
+// longitudes beyond 180 degrees, and the box that loaders.gl makes of a hemisphere's region does not contain most of
+// it.
 Json BoundsOf(const std::vector<TreeRoot>& roots, const HeightSpan& heights) {
   const int level = roots.front().tile.level;
   const geo::TileRange block = BlockOf(roots);
@@ -140,7 +140,7 @@ Json BoundsOf(const std::vector<TreeRoot>& roots, const HeightSpan& heights) {
 
 struct NamedTile {
   Json json;
-  HeightSpan heights;  // those of all tiles below it included
+  HeightSpan heights;  // including those of all tiles below it
 };
 
 NamedTile TreeOrTile(const TilesetDescription& tileset, const TreeRoot& tree) {
@@ -180,7 +180,7 @@ Json Root(const TilesetDescription& tileset) {
   return json;
 }
 
-// Of the numbers that subtrees hold for each tile (OGC 22-025r4, "3D Metadata Semantics"). CesiumJS reads them.
+// The schema of the metadata in subtrees (OGC 22-025r4, "3D Metadata Semantics"). CesiumJS reads it.
 Json Schema() {
   Json properties;
   for (const auto& [name, semantic] :

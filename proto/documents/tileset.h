@@ -14,8 +14,8 @@ struct TilesetDescription {
   std::string version;  // of the tiles, [0-9A-Za-z._~-]: the first parameter of every URL; empty: none
   std::string attribution;
   std::vector<TreeRoot> roots;  // tiles of one level (ImplicitTrees)
-  // Of a tile and, where a tree is rooted at it, of all its descendants: clients hand the range of a root down. What is
-  // written of a tile holds those of the tiles below it as well.
+  // The range of a tile and, if a tree is rooted at it, of all its descendants, because clients apply a root's range to
+  // them. The written range of a tile also contains those of the tiles below it.
   std::function<HeightSpan(const geo::TileKey&)> heights;
   std::string subtree_query;  // appended to the subtree templates, without '?'; may be empty
   std::string content_query;  // likewise to the contents: "error=5&atleast=1"

@@ -45,8 +45,8 @@ PlumbNodes::Plane::Plane(const std::array<Vec3, 3>& corners) {
 
 double PlumbNodes::LargestOfRow(const Plane& plane, int j, std::int64_t first, std::int64_t last,
                                 const float* samples) const {
-  // Several running values, which the compiler makes vectors of. A plane that stands too steep for a height at one of
-  // the nodes is found by the smallest of all.
+  // Several running maxima, which the compiler vectorizes. The smallest |up| of all shows whether the plane is too
+  // steep for a height at some node.
   constexpr std::int64_t kLanes = 4;
   std::array<double, kLanes> largest{}, steepest;
   steepest.fill(std::numeric_limits<double>::infinity());
@@ -77,7 +77,7 @@ bool PlumbNodes::Meets(const std::array<Vec3, 3>& corners, int i, int j) const {
   const Vec3 foot{row.radius * column.cos, row.radius * column.sin, row.z};
   std::array<Vec3, 3> from_foot;
   for (std::size_t k = 0; k < 3; ++k) from_foot[k] = corners[k] - foot;
-  // Seen along the plumb line the triangle may be turned over, so either sense will do.
+  // Seen along the plumb line the triangle may be flipped, so both orientations are accepted.
   bool left_of_all = true, right_of_all = true;
   for (std::size_t k = 0; k < 3; ++k) {
     const Vec3 &a = from_foot[k], &b = from_foot[(k + 1) % 3];
@@ -97,9 +97,9 @@ PlumbNodes::Position PlumbNodes::PositionOf(const Vec3& point, int i, int j) con
   return {height, geo::Length(from_foot - up * height)};
 }
 
-// What lies to the north of a northern parallel is a cone, so convex, and no point of the triangle lies south of its
-// southernmost corner. North of its northernmost one it lies since a chord between meridians is nearer to the axis, by
-// at most the cosine of half of the angle between them.
+// The region north of a northern parallel is a cone and convex, so no point of the triangle lies south of its
+// southernmost corner. Points may lie north of the northernmost corner, because a chord between meridians is nearer to
+// the axis, at most by the cosine of half the angle between them.
 std::array<int, 2> PlumbNodes::RowsReached(double columns, double low_row, double high_row) const {
   const double half = std::min(columns * step_ / 2, std::numbers::pi / 2);
   const double nearer = std::cos(half) > 1e-3 ? 1 / std::cos(half) - 1 : 1e3;
@@ -134,7 +134,7 @@ PlumbFootprint::PlumbFootprint(const std::array<NodePoint, 3>& corners, std::int
     first_row_ = rows[0];
     last_row_ = rows[1];
   }
-  // A triangle that has no area in longitude and latitude may well have one on the ground.
+  // A triangle without area in longitude and latitude may have an area on the ground.
   is_bounded_ = is_bounded_ && TwiceArea(corners) > 0;
   for (std::size_t k = 0; k < 3; ++k) {
     edges_[k] = EdgeRows(corners[k], corners[(k + 1) % 3], unit);

@@ -23,14 +23,14 @@ class PlumbNodes {
  public:
   explicit PlumbNodes(const LatticeView& lattice);
 
-  // Through three points in ECEF.
+  // The plane through three points in ECEF.
   struct Plane {
     explicit Plane(const std::array<geo::Vec3, 3>& corners);
     geo::Vec3 normal;   // of any length
     double offset = 0;  // dot(normal, point) of its points
     double least = 0;   // least dot(normal, plumb line): steeper planes have no defined height
-    // The corners are so close to one line that rounding determines the plane. The edges of the neighbouring triangles
-    // show what this triangle shows.
+    // The corners are so close to one line that rounding determines the plane. The triangle is ignored, because its
+    // neighbours' edges cover it.
     bool is_line = false;
   };
 
@@ -126,16 +126,17 @@ class PlumbNodes {
   std::vector<Parallel> rows_;
 };
 
-// The nodes whose plumb lines may pass through a triangle.
+// The set of nodes whose plumb lines may pass through a triangle.
 class PlumbFootprint {
  public:
-  // `unit`: of the corners' coordinates, from one node to the next.
+  // `unit`: distance between nodes, in the unit of the corners' coordinates.
   PlumbFootprint(const std::array<NodePoint, 3>& corners, std::int64_t unit, double beside_m, const PlumbNodes& nodes);
 
   int first_row() const { return first_row_; }
   int last_row() const { return last_row_; }
 
-  // Of a row: those that may meet the triangle, and among them those that do. Empty: the last before the first.
+  // The columns of a row whose plumb lines may meet the triangle, and among them those that certainly do (inner_*).
+  // Empty if the last is before the first.
   struct Columns {
     std::int64_t first = 0, last = -1, inner_first = 0, inner_last = -1;
   };
@@ -143,7 +144,7 @@ class PlumbFootprint {
 
  private:
   std::array<EdgeRows, 3> edges_;
-  std::array<double, 3> moves_{};  // of the edges, by the shift
+  std::array<double, 3> moves_{};  // displacement of each edge by the shift
   std::int64_t unit_ = 1;
   bool is_bounded_ = true;  // the shift
   int first_row_ = 0, last_row_ = -1, first_column_ = 0, last_column_ = -1;

@@ -14,10 +14,10 @@
 namespace terrace::proto {
 namespace {
 
-// The smallest radius of curvature there is: a meridian's at the equator.
+// The smallest radius of curvature: that of a meridian at the equator.
 constexpr double kSmallestRadius = geo::kSemiMinorAxis * geo::kSemiMinorAxis / geo::kSemiMajorAxis;
 
-// Ground up to 100 km from the ellipsoid turns by that much more of a step than the ellipsoid does.
+// The relative difference in curvature between the ellipsoid and ground up to 100 km from it.
 constexpr double kHeights = 1.02;
 
 // Lattice columns and rows, from the tile's south-western sample.
@@ -29,8 +29,8 @@ LatticePoint Between(LatticePoint a, LatticePoint b, double t) {
   return {a.x + t * (b.x - a.x), a.y + t * (b.y - a.y)};
 }
 
-// The tile's ground about a place, cheaper than sines: exact at lattice nodes, and from the nearest one by series that
-// end at the fifth power of half a cell, which is below 3e-9 for the widest cells there are.
+// Positions and normals of the tile's ground, without sines: exact at lattice nodes, and in between by series around
+// the nearest node. The first omitted term is the fifth power of half a cell, below 3e-9 for the widest cells.
 class Ground {
  public:
   explicit Ground(const LatticeView& lattice)
@@ -47,20 +47,20 @@ class Ground {
     return latitude.cos * (point.x * longitude.cos + point.y * longitude.sin) + point.z * latitude.sin - surface;
   }
 
-  // Metres along a row and along a column, at most.
+  // Upper bounds of the metres along a row and along a column.
   LatticePoint WidestStep() const {
     double widest = 0;
     for (const geo::SinCos& row : angles_.rows) widest = std::max(widest, row.cos);
     constexpr double kLargestRadius = geo::kSemiMajorAxis * geo::kSemiMajorAxis / geo::kSemiMinorAxis;
     return {widest * step_ * kLargestRadius, step_ * kLargestRadius};
   }
-  // The same, at least; not above zero where a pole is.
+  // Lower bounds of the same; not positive at a pole.
   LatticePoint NarrowestStep() const {
     double narrowest = 1;
     for (const geo::SinCos& row : angles_.rows) narrowest = std::min(narrowest, row.cos);
     return {std::max(narrowest, 1e-12) * step_ * kSmallestRadius * 0.98, step_ * kSmallestRadius * 0.98};
   }
-  // Metres, at most.
+  // Metres, an upper bound.
   double WidestDiagonal() const {
     const LatticePoint step = WidestStep();
     return std::hypot(step.x, step.y);
@@ -83,9 +83,10 @@ class Ground {
     return {x, (latitude - south_) / step_};
   }
 
-  // Lattice steps by which the points of a chord may lie beside the line between the places of its ends: it is nearer
-  // to the axis than they are, its longitude is the mean of theirs weighted with the distances from the axis, and its
-  // latitude the mean weighted with the radii of curvature. Infinite where no bound is known.
+  // A bound, in lattice steps, on the distance between the points of a chord and the line between the positions of its
+  // ends. The chord is nearer to the axis than its ends. Its longitude is the mean of theirs weighted with the
+  // distances from the axis, and its latitude the mean weighted with the radii of curvature. Infinite if no bound is
+  // known.
   LatticePoint Shift(LatticePoint a, LatticePoint b, double rise_m) const {
     constexpr double kUnknown = std::numeric_limits<double>::infinity();
     const double width = std::abs(a.x - b.x) * step_, height = std::abs(a.y - b.y) * step_;
@@ -93,7 +94,7 @@ class Ground {
     const double heights = std::abs(rise_m) / kSmallestRadius;
     const double y = width * width / 16 + height * (heights / 4 + height * (0.005 + height));
     if (width == 0) return {0, y / step_};
-    // Of the tile where that will do, else of the chord's rows.
+    // For the whole tile if that is tight enough, else for the chord's rows.
     const double least = narrowest_ > 0.1 ? narrowest_ : std::min(RowNear(a.y).cos, RowNear(b.y).cos) - step_ / 2;
     if (least < height / 8 + 1e-9) return {kUnknown, kUnknown};  // about a pole
     return {width * (height / least / 4 + heights / 2 + width * width / 16) / step_, y / step_};
@@ -125,13 +126,14 @@ struct Piece {
   double end_sample = 0;      // of the lattice surface at the end
 };
 
-// Whether LargestOn may be more than `known`: a quadratic leaves the line between its ends by a quarter of its bend.
+// Whether LargestOn may exceed `known`: a quadratic deviates from the line between its ends by at most a quarter of its
+// bend.
 inline bool IsLarger(double length, double edge_bend, double first, double last, double known) {
   return std::max(std::abs(first), std::abs(last)) + std::abs(edge_bend) * length * length / 4 > known;
 }
 
-// The larger of `known` and the largest |value| of the quadratic with these values at the ends of a piece of that
-// length. `edge_bend`: its leading coefficient along the whole edge.
+// Returns the larger of `known` and the largest |value| of a quadratic on a piece of the given length. The quadratic
+// has the given values at the ends of the piece. `edge_bend`: its leading coefficient along the whole edge.
 double LargestOn(double length, double edge_bend, double first, double last, double known) {
   const double ends = std::max({std::abs(first), std::abs(last), known});
   const double bend = edge_bend * length * length;
@@ -144,7 +146,7 @@ double LargestOn(double length, double edge_bend, double first, double last, dou
 
 class EdgeMeter {
  public:
-  // Differences of floats are exact here: heights are multiples of 2^-10 m, and steps between them below 2^14 m.
+  // Differences of these floats are exact: heights are multiples of 2^-10 m, and differences are below 2^14 m.
   explicit EdgeMeter(const LatticeView& lattice) : lattice_(lattice), cells_(lattice.cells()) {
     const auto row_of = [&](int j) { return lattice.heights.data() + (j + 1) * (cells_ + 3) + 1; };
     float east = 0, north = 0;
@@ -159,14 +161,14 @@ class EdgeMeter {
     steepest_ = {static_cast<double>(east), static_cast<double>(north)};
   }
 
-  // Metres by which the lattice surface changes over these steps, at most.
+  // An upper bound, in metres, on the change of the lattice surface over these steps.
   double LargestChange(LatticePoint steps) const {
     if (!std::isfinite(steps.x) || !std::isfinite(steps.y)) return Relief();
     const double change = steps.x * steepest_.x + steps.y * steepest_.y;
     return change <= std::max(steepest_.x, steepest_.y) ? change : std::min(change, Relief());
   }
 
-  // Every piece of the edge a - b between places where it leaves a cell, in order: visit(piece).
+  // Calls visit(piece) for every piece of the edge a - b within one cell, in order.
   template <typename Visit>
   void ForEachPiece(LatticePoint a, LatticePoint b, const Visit& visit) const {
     Lines columns(a.x, b.x), rows(a.y, b.y);
@@ -200,7 +202,7 @@ class EdgeMeter {
   }
 
  private:
-  // Between the lowest and the highest node, metres. Few tiles ask for it.
+  // Metres between the lowest and the highest node. Computed on demand, because few tiles need it.
   double Relief() const {
     if (relief_ < 0) {
       double lowest = lattice_.At(0, 0), highest = lowest;
@@ -218,7 +220,8 @@ class EdgeMeter {
 
   int CellOf(double at) const { return std::clamp(static_cast<int>(at), 0, cells_ - 1); }
 
-  // Where an edge crosses the lattice's lines of one direction, as parts of the edge; infinity after the last.
+  // The crossings of an edge with the lattice lines of one direction, as fractions of the edge; infinity after the
+  // last.
   struct Lines {
     Lines(double from, double to)
         : first(from), last(to), inverse(1 / (to - from)), line(from < to ? std::floor(from) : std::ceil(from)) {
@@ -238,7 +241,7 @@ class EdgeMeter {
   mutable double relief_ = -1;
 };
 
-// Every edge once: those inside the tile belong to two triangles with opposite directions.
+// Visits every edge once: inner edges belong to two triangles, with opposite directions.
 template <typename Visit>
 void ForEachEdge(const std::vector<std::array<std::uint32_t, 3>>& triangles, const std::vector<LatticePoint>& places,
                  const EdgeMeter& meter, const Visit& visit) {
@@ -264,7 +267,7 @@ struct End {
 // coefficient, but for `slack`.
 struct Chord {
   double first = 0, last = 0, bend = 0, slack = 0;
-  bool is_quadratic = true;  // else it is to be told at every place
+  bool is_quadratic = true;  // else it must be evaluated at every position
 
   double At(double t) const { return first + t * (last - first) + bend * t * (t - 1); }
 };
@@ -294,7 +297,7 @@ Chord ChordOf(const Ground& ground, const End& a, const End& b) {
 double LargestOfLine(const EdgeMeter& meter, LatticePoint a, LatticePoint b, double first, double last, double known) {
   double before = first - meter.SampleAt(a);
   meter.ForEachPiece(a, b, [&](const Piece& piece) {
-    // The surface is subtracted, and so is its bend.
+    // Subtracts the surface and its bend.
     const double length = piece.end - piece.begin;
     const double at_end = first + piece.end * (last - first) - piece.end_sample;
     if (IsLarger(length, -piece.bend, before, at_end, known)) {
@@ -305,8 +308,8 @@ double LargestOfLine(const EdgeMeter& meter, LatticePoint a, LatticePoint b, dou
   return known;
 }
 
-// The same of a chord whose points lie off the line by `shift` at most. Its heights between the ends of pieces are for
-// the caller to bound where they are no quadratics.
+// The same for a chord whose points deviate from the line by at most `shift`. If its heights between the ends of pieces
+// are no quadratics, the caller bounds them.
 double LargestOfChord(const EdgeMeter& meter, const Ground& ground, const End& a, const End& b, LatticePoint shift,
                       double known) {
   const Chord chord = ChordOf(ground, a, b);
@@ -322,7 +325,7 @@ double LargestOfChord(const EdgeMeter& meter, const Ground& ground, const End& a
   return std::max(known, most + slack);
 }
 
-// A chord whose points lie beside the line between its ends' places is halved until they hardly do.
+// Chords that deviate from the line between the positions of their ends are halved until the deviation is small.
 double LargestOfHalves(const EdgeMeter& meter, const Ground& ground, const End& a, const End& b, int depth,
                        double known) {
   constexpr double kSmall = 1e-3;  // of a lattice step
@@ -339,8 +342,8 @@ double LargestOfHalves(const EdgeMeter& meter, const Ground& ground, const End& 
   return LargestOfHalves(meter, ground, middle, b, depth + 1, known);
 }
 
-// Between the ends of pieces, and on the triangles between edges, the height of a chord strays from a linear one by at
-// most this. `steps`: the largest span of an edge.
+// A bound on the deviation of a chord's height from a linear one, between the ends of pieces and on the triangles
+// between edges. `steps`: the largest span of an edge.
 double ChordDeviation(const Ground& ground, double steps) {
   const double diagonal = ground.WidestDiagonal(), span = steps * ground.step_radians();
   return kHeights * (0.75 * diagonal * diagonal / kSmallestRadius + span * span / 8 * diagonal);
@@ -368,7 +371,7 @@ double MeasureEdges(const EdgeMeter& meter, const Ground& ground, const std::vec
     const double x = (places[a].x - places[b].x) * step.x, y = (places[a].y - places[b].y) * step.y;
     const double sagitta = kHeights * (x * x + y * y) / (8 * kSmallestRadius);
     const LatticePoint shift = ground.Shift(places[a], places[b], ends[a].height - ends[b].height);
-    // Heights of the two readings differ by their rounding too where both are measured.
+    // If both surfaces are measured, their heights also differ by rounding.
     double rounding = 0;
     if (!heights.empty())
       rounding = std::max(std::abs(heights[a] - ends[a].height), std::abs(heights[b] - ends[b].height));

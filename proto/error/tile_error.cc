@@ -21,7 +21,7 @@ struct Linear {
   double At(double x, double y) const { return origin + dx * x + dy * y; }
 };
 
-// What the meter needs to know of a mesh.
+// The mesh that is measured.
 struct Surface {
   std::int64_t unit = 1;          // from one lattice node to the next
   std::vector<NodePoint> points;  // by vertex
@@ -32,13 +32,13 @@ struct Surface {
   double beside_m = 0;    // by which the vertices lie beside the plumb lines of their points, at most
 };
 
-// The largest difference of `count` samples of a row from a plane, of which the first lies at (x, y) and each next one
-// `unit` further. Several running values: no step waits for the one before it, and the compiler makes vectors of them.
+// The largest difference between `count` samples of a row and a plane. The first sample lies at (x, y), each further
+// one `unit` to the east. Several running maxima, which are independent, so that the compiler can vectorize.
 double LargestOfRow(const Linear& plane, double x, double y, double unit, const float* samples, std::int64_t count) {
   constexpr std::int64_t kLanes = 4;
   std::array<double, kLanes> largest{};
   const double up = plane.dy * y;
-  // Of 32 bits: SSE2 converts no others to doubles in vectors.
+  // 32 bits, because SSE2 can convert only these to doubles in vectors.
   const auto error = [&](std::int64_t i) {
     const double height = plane.origin + plane.dx * (x + unit * static_cast<double>(static_cast<std::int32_t>(i))) + up;
     return std::abs(height - samples[i]);
@@ -60,13 +60,13 @@ bool StartsWith(const std::vector<Value>& values, const std::vector<Value>& firs
   return values.size() >= first.size() && std::equal(first.begin(), first.end(), values.begin());
 }
 
-// Whether `b` has the vertices of `a`, all in the same place on the grid and in height, and perhaps more.
+// Whether `b` has all vertices of `a` at the same grid positions and heights, and possibly more.
 bool HasVerticesOf(const Surface& a, const Surface& b) {
   return a.unit == b.unit && StartsWith(b.points, a.points) && StartsWith(b.heights, a.heights) &&
          (b.ecef.empty() || StartsWith(b.ecef, a.ecef));
 }
 
-// Whether a triangle lies in the same place in both. `of_same_vertices`: it does if it has the same corners.
+// Whether a triangle is unchanged. `of_same_vertices`: comparing the indices of its corners is enough.
 bool IsSame(const Surface& a, const Surface& b, std::size_t t, bool of_same_vertices) {
   if (t >= a.triangles.size() || t >= b.triangles.size() || a.triangles[t] != b.triangles[t]) return false;
   return of_same_vertices || std::ranges::all_of(a.triangles[t], [&](std::uint32_t k) {
@@ -85,8 +85,8 @@ class TileMeter::Impl {
   const Surface& surface() const { return surface_; }
   const PlumbNodes& plumb() const { return plumb_; }
 
-  // Measures the reading in longitude and latitude of every triangle, and what the flat triangle can be at most; then
-  // the flat triangles that may be the worst or miss the bound.
+  // Measures the height interpolated in longitude and latitude of every triangle, and bounds the error of the flat
+  // triangle. Then measures the flat triangles that may be the worst or exceed the bound.
   TileError Measure(Surface surface) {
     const Surface before = std::exchange(surface_, std::move(surface));
     const bool is_alike =
@@ -98,7 +98,7 @@ class TileMeter::Impl {
     std::size_t worst = 0;
     for (std::size_t t = 0; t < readings_.size(); ++t) {
       Reading& reading = readings_[t];
-      // What misses the bound is told again: what can be done about it changes.
+      // Triangles that exceed the bound are reported again, because the samples that can be inserted change.
       if (!is_alike || reading.most_m > bound_ || !IsSame(before, surface_, t, of_same_vertices))
         reading = ReadLinear(t);
       if (reading.most_m > readings_[worst].most_m) worst = t;
@@ -121,7 +121,7 @@ class TileMeter::Impl {
   }
 
  private:
-  // Of a triangle: the error that is to be stated, at most or exactly.
+  // The error of a triangle: an upper bound or exact.
   struct Reading {
     double most_m = std::numeric_limits<double>::infinity();
     bool is_exact = false;
@@ -152,7 +152,7 @@ class TileMeter::Impl {
     double error = 0;
     tin::SamplePosition at;
   };
-  // Of a triangle: the worst of all, of the samples that are no vertices, and of those that are.
+  // The worst errors of a triangle: of all samples, of samples that are not vertices, and of vertices.
   struct Found {
     explicit Found(double bound) : sample{bound, {}}, vertex{bound, {}} {}
     double largest = 0;
@@ -173,10 +173,10 @@ class TileMeter::Impl {
 
   struct MissedVertex {
     tin::SamplePosition at;
-    std::size_t triangle = 0;  // the one that misses it
+    std::size_t triangle = 0;  // the vertex that exceeds the bound
   };
 
-  // In the row and the column of a node inside the tile.
+  // The neighbours in the row and the column of a node inside the tile.
   static std::array<tin::SamplePosition, 4> NeighboursOf(tin::SamplePosition p) {
     const auto at = [&](int dx, int dy) {
       return tin::SamplePosition{static_cast<std::uint16_t>(p.x + dx), static_cast<std::uint16_t>(p.y + dy)};
@@ -184,7 +184,7 @@ class TileMeter::Impl {
     return {at(-1, 0), at(1, 0), at(0, -1), at(0, 1)};
   }
 
-  // Those inside the tile that are no vertices themselves.
+  // The neighbours inside the tile that are not vertices.
   std::vector<tin::SamplePosition> NeighboursOf(const std::vector<MissedVertex>& vertices) const {
     std::vector<tin::SamplePosition> samples;
     for (const MissedVertex& vertex : vertices) {
@@ -220,7 +220,8 @@ class TileMeter::Impl {
     }
   }
 
-  // The flat triangle is at most its sagitta off the linear one, at a place that is off by the shift.
+  // The flat triangle differs from the linear one by at most its sagitta, at a position that differs by at most the
+  // shift.
   Reading ReadLinear(std::size_t t) const {
     constexpr Reading kUnknown;
     const std::array<NodePoint, 3> p = CornersOf(t);
@@ -261,7 +262,7 @@ class TileMeter::Impl {
           },
           [&](int j, int first, int last, double largest) {
             found.largest = std::max(found.largest, largest);
-            if (largest <= bound_) return;  // nothing of the row is missed
+            if (largest <= bound_) return;  // no samples of the row are skipped
             const double y = static_cast<double>(j * surface_.unit - p[0].y);
             for (int i = first; i <= last; ++i) {
               const double height = plane.At(static_cast<double>(i * surface_.unit - p[0].x), y);
@@ -285,12 +286,11 @@ class TileMeter::Impl {
                    [&](std::size_t k) { return surface_.heights[surface_.triangles[t][k]]; });
   }
 
-  // Where the plumb lines of the nodes pass through the flat triangle. The place of a point of the triangle is not
-  // quite the mean of its corners' places, so nodes near the rim are asked (PlumbNodes::Meets), but only those that
-  // count.
+  // The intersections of the nodes' plumb lines with the flat triangle. The position of a point of the triangle is not
+  // exactly the mean of its corners' positions, so nodes near the rim are tested (PlumbNodes::Meets) if they matter.
   void MeasureFlat(const std::array<std::uint32_t, 3>& triangle, const std::array<NodePoint, 3>& p,
                    Found& found) const {
-    constexpr double kNothing_m = 0.0005;  // less is stated without a question
+    constexpr double kNothing_m = 0.0005;  // smaller errors need no test
     const std::array<geo::Vec3, 3> corners = {surface_.ecef[triangle[0]], surface_.ecef[triangle[1]],
                                               surface_.ecef[triangle[2]]};
     const PlumbNodes::Plane plane(corners);
@@ -304,7 +304,7 @@ class TileMeter::Impl {
       for (int i = static_cast<int>(columns.first); i <= columns.last; ++i) {
         const double error = std::abs(plumb_.HeightOn(plane, i, j) - lattice_.At(i, j));
         const bool counts = error > found.largest || (error > bound_ && error > MissOf(i, j, found).error);
-        if (!counts) continue;  // NaN is no height
+        if (!counts) continue;  // NaN: no height
         const bool meets =
             (i >= columns.inner_first && i <= columns.inner_last) || error <= kNothing_m || plumb_.Meets(corners, i, j);
         if (meets) Take(error, i, j, found);
@@ -318,7 +318,7 @@ class TileMeter::Impl {
   const int cells_;
   const double bound_;
 
-  // Of the mesh that is measured.
+  // State of the mesh that is measured.
   Surface surface_;
   std::vector<bool> is_vertex_;    // by node
   std::vector<Reading> readings_;  // by triangle

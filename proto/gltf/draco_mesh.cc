@@ -18,15 +18,15 @@ namespace {
 
 using Position = std::array<std::int32_t, 3>;
 
-// What Draco is told of the grid.
+// The grid as passed to Draco.
 struct Quantization {
   Position origin{};  // in steps
   int bits = 1;
 };
 
-// The library passes origin and range on as text with six decimals, so both must be numbers that survive this: the
-// origin is on whole metres, and the range at least 16 m, where floats are more than 10^-6 apart. Neither moves a grid
-// point; the range costs bits that are always 0.
+// The library passes origin and range as text with six decimals, so both must be exact in this form. The origin is in
+// whole metres, and the range is at least 16 m, where floats are more than 10^-6 apart. Neither moves a grid point; the
+// larger range adds bits that are always 0.
 Quantization QuantizationOf(const GridMesh& mesh) {
   constexpr double kMinRangeMetres = 16;
   const auto whole = static_cast<std::int32_t>(std::max(1.0, 1 / mesh.step_m));
@@ -56,7 +56,7 @@ int AddAttribute(draco::Mesh& mesh, draco::GeometryAttribute::Type type, std::si
                            static_cast<draco::AttributeValueIndex::ValueType>(count));
 }
 
-// A multiple of the step, below 2^24 of them: exact.
+// Exact: a multiple of the step below 2^24 steps.
 float Metres(std::int32_t steps, double step_m) { return static_cast<float>(steps * step_m); }
 
 std::unique_ptr<draco::Mesh> ToDraco(const GridMesh& grid, int& position_attribute, int& normal_attribute) {
@@ -83,7 +83,7 @@ std::unique_ptr<draco::Mesh> ToDraco(const GridMesh& grid, int& position_attribu
   return mesh;
 }
 
-// Of each texture coordinate. A 4095th of the picture's edge is an eighth of a pixel of 512.
+// Bits of each texture coordinate. A 4095th of the picture's edge is an eighth of a pixel of 512.
 constexpr int kUvBits = 12;
 
 int AddTextureCoordinates(const GridMesh& grid, draco::Mesh& mesh) {
@@ -110,7 +110,7 @@ std::uint64_t HashOf(const Position& p) {
 
 std::uint64_t HashOf(const std::array<std::uint16_t, 2>& uv) { return Mix(std::uint64_t{uv[0]} << 32 | uv[1]); }
 
-// A sum over the triangles that neither their order nor their first corner changes; their sense does.
+// A checksum of the triangles that does not depend on their order or first corners, but on their orientation.
 class TriangleSum {
  public:
   void Add(std::uint64_t a, std::uint64_t b, std::uint64_t c) {
@@ -135,7 +135,7 @@ TriangleSum SumOf(const GridMesh& grid, bool uv) {
 
 tl::unexpected<Error> Failed(const char* what) { return MakeError(ErrorCode::kInternal, "Draco: {}", what); }
 
-// Fills in what the bytes decode to.
+// Sets the members that describe the decoded mesh.
 Result<void> ReadBack(const GridMesh& grid, const DracoOptions& options, DracoMesh& encoded) {
   draco::DecoderBuffer buffer;
   buffer.Init(encoded.bytes.data(), encoded.bytes.size());
@@ -197,10 +197,11 @@ Result<void> ReadBack(const GridMesh& grid, const DracoOptions& options, DracoMe
 
 Result<DracoMesh> EncodeDraco(const GridMesh& grid, const DracoOptions& options) {
   TERRACE_CHECK(!grid.triangles.empty());
-  constexpr int kMaxBits = 24;  // FitsFloats leaves room for the origin's rounding
+  constexpr int kMaxBits = 24;  // FitsFloats has a margin for the origin's rounding
   const Quantization quantization = QuantizationOf(grid);
   if (quantization.bits > kMaxBits) return Failed("the grid is too fine for 32-bit floats");
-  // Dividing by the range in floats gives 1 / step exactly: it is a power of two times 2^bits - 1, which a float holds.
+  // The quotient by the range is exactly 1 / step in floats: the range is a power of two times 2^bits - 1, which a
+  // float represents exactly.
   std::array<float, 3> origin{};
   for (std::size_t axis = 0; axis < 3; ++axis) origin[axis] = Metres(quantization.origin[axis], grid.step_m);
   const auto range = static_cast<float>(std::ldexp(1.0, quantization.bits) - 1) * static_cast<float>(grid.step_m);

@@ -22,7 +22,7 @@ struct DracoOptions {
 struct DracoMesh {
   std::string bytes;
   unsigned position_id = 0, normal_id = 0, uv_id = 0;  // Draco's unique ids
-  // Of what the bytes decode to.
+  // Of the decoded mesh.
   std::size_t points = 0, triangles = 0;
   std::array<double, 3> min{}, max{};  // metres from the mesh's origin
 };

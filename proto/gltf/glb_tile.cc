@@ -22,7 +22,7 @@ using Position = std::array<std::int32_t, 3>;
 // 65535 as a 16-bit index means "restart" in glTF.
 constexpr std::size_t kMaxNarrowVertices = 65535;
 
-// Bare ground: neither metal nor gloss.
+// Bare ground: not metallic, not glossy.
 constexpr std::array<double, 4> kGroundColor{0.5, 0.5, 0.5, 1};
 
 // Stored positions are ECEF: times `scale` they are metres from `origin`. Clients turn y-up content by
@@ -215,7 +215,7 @@ std::size_t AddMeshoptView(GltfMesh& gltf, ByteWriter& buffer, std::string_view 
   return view;
 }
 
-// The last of the views, so that a texture moves no other.
+// The last view, so that a texture does not move others.
 void AddTexture(const std::optional<GlbTexture>& texture, GltfMesh& gltf, ByteWriter& buffer) {
   if (!texture) return;
   gltf.texture = {AddView(gltf, buffer, texture->bytes, 0, GltfTarget::kNone), texture->media_type};

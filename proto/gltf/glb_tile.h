@@ -13,13 +13,13 @@
 
 namespace terrace::proto {
 
-// The positions that suit the form: GridStep.
+// The width of positions for a form (see GridStep).
 constexpr PositionWidth WidthOf(GlbCompression compression) {
   const bool narrow = compression == GlbCompression::kQuantized || compression == GlbCompression::kMeshopt;
   return narrow ? PositionWidth::k16Bits : PositionWidth::kFloat;
 }
 
-// A picture of the tile: an image file, whose edges are the tile's.
+// A picture of the tile as an image file. The image's edges are the tile's edges.
 struct GlbTexture {
   std::string bytes;
   std::string_view media_type;  // a literal: "image/jpeg", "image/webp"
@@ -31,13 +31,13 @@ struct GlbOptions {
   std::string generator = "terrace";       // asset.generator
   std::optional<GlbTexture> texture = {};  // none: the ground is plain grey
   std::string copyright = {};              // asset.copyright (glTF 2.0, 3.2); empty: none
-  // Metres, of the tile at its finest reading: extras of the scene, each where it is known and finite.
+  // Metres: written to the scene's extras if known and finite.
   std::optional<double> max_error_m = {}, certified_error_m = {};
 };
 
 struct GlbTile {
   std::string bytes;
-  // Of what the bytes decode to, skirts included.
+  // Of the decoded mesh, including skirts.
   std::uint32_t vertices = 0;
   std::uint32_t triangles = 0;
 };

@@ -74,7 +74,7 @@ Json PrimitiveJson(const GltfMesh& mesh) {
   return json;
 }
 
-// glTF itself knows JPEG and PNG.
+// glTF supports only JPEG and PNG without extensions.
 void PutTexture(const GltfTexture& texture, Json& json) {
   constexpr int kLinear = 9729, kLinearMipmapLinear = 9987, kClampToEdge = 33071;
   Json source = {{"sampler", 0}};
@@ -121,7 +121,7 @@ std::string GltfJson(const GltfMesh& mesh) {
   if (fallback.bytes > 0) {
     json["buffers"].push_back({{"byteLength", fallback.bytes}, {"extensions", {{kMeshopt, {{"fallback", true}}}}}});
   }
-  // A copyright is the operator's text: bytes that are not UTF-8 become U+FFFD.
+  // The copyright is the operator's text: invalid UTF-8 becomes U+FFFD.
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 

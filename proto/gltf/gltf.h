@@ -1,4 +1,4 @@
-// The glTF 2.0 around a single mesh: the JSON that describes its arrays, and the GLB container of both.
+// glTF 2.0 for a single mesh: the JSON that describes its arrays, and the GLB container.
 //
 // One buffer, one primitive of triangles, one node that carries the mesh's place in double precision as a matrix. That
 // node is scene.nodes[0] and has a `matrix`, not a translation: loaders.gl keeps double precision for no other form.
@@ -25,7 +25,7 @@ struct GltfMeshopt {
 };
 
 // A part of the buffer. With `meshopt` the bytes in the buffer are compressed (EXT_meshopt_compression), and stride and
-// count describe what they decode to.
+// count describe the decoded data.
 struct GltfView {
   std::size_t offset = 0, length = 0;
   std::size_t stride = 0;  // 0: not stated, tightly packed
@@ -77,9 +77,9 @@ struct GltfMesh {
 // UTF-8 JSON, not padded.
 std::string GltfJson(const GltfMesh& mesh);
 
-// Everything of a .glb file in front of its buffer: header, JSON chunk, header of the binary chunk. Exactly
-// `buffer_bytes` bytes must follow. Empty where the file would exceed the format's 4 GiB. Precondition: buffer_bytes is
-// a multiple of 4.
+// Returns the part of a .glb file before its buffer: header, JSON chunk, header of the binary chunk. Exactly
+// `buffer_bytes` bytes must follow. Empty if the file would exceed the format's limit of 4 GiB. Precondition:
+// buffer_bytes is a multiple of 4.
 std::string GlbHead(std::string json, std::size_t buffer_bytes);
 
 }  // namespace terrace::proto

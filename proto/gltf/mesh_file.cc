@@ -43,7 +43,7 @@ class BufferedText {
   fmt::memory_buffer buffer_;
 };
 
-// Asks the stop token at every so many vertices or triangles: a tenth of a millisecond's worth.
+// Checks the stop token after this many vertices or triangles: about a tenth of a millisecond.
 class StopPoll {
  public:
   explicit StopPoll(const std::stop_token& stop) : stop_(stop) {}
@@ -136,8 +136,8 @@ Box BoundsOf(const std::vector<MeshVertex>& vertices) {
 
 using NodeMatrix = std::array<double, 16>;  // column by column
 
-// The rows of a north-up raster go south: they are stored from the north-west corner on, and the matrix mirrors
-// nothing.
+// The rows of a north-up raster run south: they are stored from the north-west corner on, so that the matrix does not
+// mirror.
 double RowSign(const GridPlacement& t) { return t[1] * t[5] - t[2] * t[4] < 0 ? -1 : 1; }
 
 NodeMatrix MatrixOf(const GridPlacement& t) {
@@ -145,7 +145,7 @@ NodeMatrix MatrixOf(const GridPlacement& t) {
   return {t[1], 0, -t[4], 0, 0, 1, 0, 0, -sign * t[2], 0, sign * t[5], 0, t[0], 0, -t[3], 1};
 }
 
-// glTF wants matrices that are a translation, a rotation and a scale.
+// glTF requires matrices that consist of a translation, a rotation and a scale.
 bool IsNodeMatrix(const GridPlacement& t) {
   const double column = std::hypot(t[1], t[4]), row = std::hypot(t[2], t[5]);
   return column > 0 && row > 0 && std::isfinite(t[0] + t[3]) &&
@@ -156,7 +156,7 @@ void Place(const GridPlacement& t, std::vector<MeshVertex>& vertices) {
   for (MeshVertex& v : vertices) v = {t[0] + v.x * t[1] + v.y * t[2], t[3] + v.x * t[4] + v.y * t[5], v.z};
 }
 
-// Colours are aligned to 4 bytes, as glTF wants all vertex attributes.
+// Colours are aligned to 4 bytes, as glTF requires of vertex attributes.
 constexpr std::size_t kGlbColorBytes = 4 * sizeof(std::uint16_t);
 
 // Accessors over one buffer: positions, indices, and colours if there are any. 65535 as a 16-bit index means "restart"
@@ -176,14 +176,14 @@ struct GlbLayout {
   std::size_t buffer_bytes() const { return color_offset() + color_bytes(); }
 };
 
-// `matrix`: of the grid that the vertices lie on; else they are stored relative to their centre.
+// `matrix`: of the grid that the vertices lie on; nothing: vertices are stored relative to their centre.
 GlbLayout MakeGlbLayout(const std::vector<MeshVertex>& vertices, std::size_t indices, bool has_colors,
                         const std::optional<NodeMatrix>& matrix) {
   const Box box = BoundsOf(vertices);
   GlbLayout layout{vertices.size(), indices, has_colors, matrix.value_or(GltfMesh{}.matrix), {}, {}, {}};
   for (std::size_t i = 0; i < 3; ++i) {
     if (!matrix) layout.matrix[12 + i] = layout.center[i] = box.min[i] + (box.max[i] - box.min[i]) / 2;
-    // Subtraction and rounding to float are monotonic: the extremes of the doubles give those of the floats.
+    // Subtraction and rounding to float are monotonic, so the extremes of the doubles map to those of the floats.
     layout.min[i] = static_cast<float>(box.min[i] - layout.center[i]);
     layout.max[i] = static_cast<float>(box.max[i] - layout.center[i]);
   }
@@ -218,8 +218,8 @@ GltfMesh GltfOf(const GlbLayout& layout) {
   return mesh;
 }
 
-// IEC 61966-2-1, to 16 bits. No entry comes closer than 2^-10 to the middle between two integers: whatever a CPU's pow
-// makes of the last bit, the table is the same.
+// IEC 61966-2-1, to 16 bits. No entry is closer than 2^-10 to the middle between two integers, so the table does not
+// depend on the last bit of pow.
 std::array<std::uint16_t, 256> LinearLevels() {
   std::array<std::uint16_t, 256> levels{};
   for (std::size_t i = 0; i < levels.size(); ++i) {
@@ -230,7 +230,7 @@ std::array<std::uint16_t, 256> LinearLevels() {
   return levels;
 }
 
-// Empty: a stop was requested.
+// Returns an empty text if a stop was requested.
 std::string GlbBuffer(const GlbLayout& layout, const std::vector<MeshVertex>& vertices,
                       const std::vector<Triangle>& triangles, const std::vector<VertexColor>& colors, StopPoll poll) {
   ByteWriter buffer;

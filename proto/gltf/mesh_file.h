@@ -26,7 +26,7 @@ namespace terrace::proto {
 
 enum class MeshFileFormat { kObj, kPly, kGlb };
 
-// By the extension of a file name, in either case. kInvalidArgument for others.
+// Selects the format by the extension of a file name, ignoring case. kInvalidArgument: unknown extension.
 Result<MeshFileFormat> MeshFileFormatOf(std::string_view file_name);
 
 struct MeshVertex {
@@ -41,11 +41,11 @@ using GridPlacement = std::array<double, 6>;
 using VertexColor = std::array<std::uint8_t, 3>;
 
 // Appends the whole file to `out`, which must be in binary mode. With `placement`, x and y of the vertices are columns
-// and rows, and they and z are 32-bit floats: a GLB has them as they are, unless the raster is sheared, which no glTF
-// node may be. kInvalidArgument: a mesh without triangles, a coordinate that is not finite, or more than the format can
-// hold; nothing is written then. kUnavailable: `out` failed, a full disk. kCancelled: a stop was requested; part of the
-// file may be written. Preconditions: every index is below vertices.size(); `colors` is empty or has one entry a
-// vertex.
+// and rows, and x, y and z are representable as 32-bit floats: a GLB stores them exactly, unless the raster is sheared,
+// which glTF nodes cannot express. kInvalidArgument: the mesh has no triangles, a coordinate is not finite, or the mesh
+// exceeds the format's limits; nothing is written. kUnavailable: writing failed, for example because the disk is full.
+// kCancelled: a stop was requested; part of the file may be written. Preconditions: every index is below
+// vertices.size(); `colors` is empty or has one entry per vertex.
 Result<void> WriteMesh(std::ostream& out, MeshFileFormat format, std::vector<MeshVertex> vertices,
                        const std::vector<std::array<std::uint32_t, 3>>& triangles,
                        const std::vector<VertexColor>& colors = {},

@@ -38,7 +38,8 @@ std::string EncodeMeshoptVertices(std::string_view records, std::size_t count, s
 
 std::string EncodeMeshoptTriangles(const std::vector<Triangle>& triangles, std::size_t vertex_count) {
   TERRACE_CHECK(!triangles.empty());
-  // The extension wants version 1 of the index codec. The version is a global of the library, set once before its use.
+  // The extension requires version 1 of the index codec. The version is a global of the library, set once before its
+  // use.
   static const bool version_set = (meshopt_encodeIndexVersion(1), true);
   static_cast<void>(version_set);
   const std::size_t count = 3 * triangles.size();

@@ -16,15 +16,15 @@
 namespace terrace::proto {
 namespace {
 
-// libjpeg leaves by longjmp where it fails; its own handler would end the process.
+// On errors, leaves libjpeg by longjmp; the default handler would end the process.
 struct JpegErrors {
-  jpeg_error_mgr base;  // first: libjpeg knows no more of this
+  jpeg_error_mgr base;  // first, because libjpeg sees only this member
   std::jmp_buf leave;
 };
 
 [[noreturn]] void LeaveJpeg(j_common_ptr jpeg) { std::longjmp(reinterpret_cast<JpegErrors*>(jpeg->err)->leave, 1); }
 
-// Nothing here needs a destructor, so that longjmp skips none. False: it failed. `bytes` is malloc's.
+// Uses no objects with destructors, which longjmp would skip. Returns false on errors. `bytes` is allocated by malloc.
 bool CompressJpeg(const std::uint8_t* rgb, int width, int height, int quality, unsigned char** bytes,
                   unsigned long* size) {
   jpeg_compress_struct jpeg;
@@ -33,7 +33,7 @@ bool CompressJpeg(const std::uint8_t* rgb, int width, int height, int quality, u
   errors.base.error_exit = LeaveJpeg;
   if (setjmp(errors.leave) != 0) {
     jpeg_destroy_compress(&jpeg);
-    *bytes = nullptr;  // while it grows, the buffer may be one that is freed already
+    *bytes = nullptr;  // after an error during growth, the pointer may be dangling
     return false;
   }
   jpeg_create_compress(&jpeg);

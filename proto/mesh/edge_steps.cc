@@ -46,7 +46,7 @@ EdgeSteps MakeEdgeSteps(double error_m, const std::array<std::array<double, 3>, 
   EdgeSteps steps;
   steps.side = {over(0, 1, 1, 1), over(1, 1, 1, 2), over(1, 2, 1, 1), over(1, 1, 0, 1)};
   steps.corner = {over(0, 1, 0, 1), over(0, 1, 1, 2), over(1, 2, 1, 2), over(1, 2, 0, 1)};
-  // A pole is one point: every sample on it, in every tile, lies on one and the same grid.
+  // A pole is one point: its samples in all tiles have the same step.
   const double pole = std::max(requested, pole_step);
   if (at_south_pole) steps.side[0] = steps.corner[0] = steps.corner[1] = pole;
   if (at_north_pole) steps.side[2] = steps.corner[2] = steps.corner[3] = pole;

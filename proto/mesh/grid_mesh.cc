@@ -84,7 +84,7 @@ bool HasMergedCorners(const Triangle& t, const std::vector<GridPoint>& points) {
   return points[t[0]] == points[t[1]] || points[t[1]] == points[t[2]] || points[t[2]] == points[t[0]];
 }
 
-// Gives vertices that agree in position and normal one number, the lowest of theirs.
+// Merges vertices with equal position and normal to the lowest of their numbers.
 void Weld(const std::vector<GridPoint>& points, const std::vector<geo::Vec3>& normals,
           std::vector<Triangle>& triangles) {
   std::map<std::tuple<GridPoint, double, double, double>, std::uint32_t> first;

@@ -18,7 +18,7 @@
 
 namespace terrace::proto {
 
-// What a client is given a position in.
+// The number type of positions.
 enum class PositionWidth : std::uint8_t { k16Bits, kFloat };
 
 // Metres, a power of two. At most a 32nd of the error, so that rounding takes at most 3 % of it on level ground. At
@@ -40,10 +40,10 @@ using GridPoint = std::array<std::int64_t, 3>;
 // micrometre, so two processors can differ here only if a coordinate is within a micrometre of a tie.
 std::vector<GridPoint> SnapVertices(const LatticeView& lattice, const tin::TinMesh& mesh, double step_m);
 
-// Whether decoders that compute in 32-bit floats find every point, and the feet of skirts of this depth: the tile spans
-// less than 2^23 steps, a bit less than a float has, since Draco adds a half on the way. False where a cliff is
-// higher than a deep and fine tile can say: hundreds of metres within a few. Then the tile takes a step twice as
-// coarse, until it fits, and its edges are off by up to half of that step.
+// Whether decoders that compute in 32-bit floats decode every point exactly, and the lower rim of skirts of this depth:
+// the tile spans less than 2^23 steps. A float has one bit more, but Draco adds one half. False for very high cliffs in
+// deep tiles with small errors: hundreds of metres within a few. The caller then doubles the step until the tile fits,
+// and its edges are off by up to half of that step.
 bool FitsFloats(const std::vector<GridPoint>& points, double step_m, double skirt_depth_m);
 
 // Metres.

@@ -60,7 +60,7 @@ void PutHeader(ByteWriter& out, const QuantizedTile& tile) {
   TERRACE_CHECK(out.size() == kHeaderBytes);
 }
 
-// Differences fit 16 bits with their sign: values have 15.
+// Values have 15 bits, so their differences fit into 16 bits with sign.
 void PutZigZagDeltas(ByteWriter& out, const std::vector<std::uint16_t>& values) {
   int previous = 0;
   for (std::uint16_t value : values) {
@@ -70,7 +70,8 @@ void PutZigZagDeltas(ByteWriter& out, const std::vector<std::uint16_t>& values) 
   }
 }
 
-// Each index as its distance below the number of vertices seen so far; zero is a new vertex.
+// High-water-mark coding: each index is stored as its distance below the number of vertices so far; zero is a new
+// vertex.
 void PutTriangles(ByteWriter& out, const std::vector<std::array<std::uint32_t, 3>>& triangles) {
   out.Put(static_cast<std::uint32_t>(triangles.size()));
   std::uint32_t high_water_mark = 0;
@@ -111,7 +112,7 @@ void PutWaterMask(ByteWriter& out, const WaterMask& mask) {
   out.PutBytes({reinterpret_cast<const char*>(mask.data()), mask.size()});
 }
 
-// Its JSON has a length of its own inside the extension's.
+// The extension contains the length of its JSON.
 void PutMetadata(ByteWriter& out, const std::string& json) {
   out.Put(kMetadata);
   out.Put(static_cast<std::uint32_t>(sizeof(std::uint32_t) + json.size()));

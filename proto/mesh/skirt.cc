@@ -11,7 +11,8 @@ namespace terrace::proto {
 double SkirtDepth(int level, double error_m) {
   constexpr double kSmallestRadius = geo::kSemiMinorAxis * geo::kSemiMinorAxis / geo::kSemiMajorAxis;
   const double edge = std::ldexp(geo::kSemiMajorAxis * geo::ToRadians(180), -level);
-  // A chord over the whole edge; but an edge's error counts what its chords cut off, so that none cuts off more.
+  // The sagitta of a chord over the whole edge; but at most the error, because an edge's error includes the sagitta of
+  // its chords.
   const double sagitta = std::min(edge * edge / (8 * kSmallestRadius), error_m);
   return error_m + 2 * error_m + sagitta;
 }

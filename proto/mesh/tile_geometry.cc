@@ -22,7 +22,7 @@ constexpr double kHorizonPad = 1e-8;
 constexpr double kMaxHorizonMagnitude = 100;
 
 double AlongAxis(std::int64_t tile, std::uint16_t quantized, int level) {
-  // The product is below 2^49 and therefore exact: the one rounding is the division's.
+  // The product is below 2^49 and therefore exact; only the division rounds.
   const double steps = static_cast<double>((tile * kQuantizedMax + quantized) * 180);
   return steps / static_cast<double>(geo::TileRows(level) * kQuantizedMax);
 }
@@ -64,8 +64,7 @@ double FarthestFrom(geo::Vec3 center, const std::vector<geo::Vec3>& positions) {
   return std::sqrt(squared);
 }
 
-// Sines and cosines at the coordinates that are asked for, each worked out once: thousands of vertices share a few
-// hundred.
+// Caches sines and cosines: thousands of vertices share a few hundred coordinates.
 template <typename Degrees>
 class Angles {
  public:
@@ -82,7 +81,7 @@ class Angles {
 
  private:
   const Degrees degrees_;
-  std::vector<std::uint16_t> index_;  // into those known, from 1 on; 0: not known yet
+  std::vector<std::uint16_t> index_;  // index of the known value, from 1 on; 0: not known yet
   std::vector<geo::SinCos> known_;
 };
 
@@ -141,7 +140,7 @@ BoundingSphere EnclosingSphere(const std::vector<geo::Vec3>& positions) {
   const geo::Vec3 low{axes[0].min.x, axes[1].min.y, axes[2].min.z}, high{axes[0].max.x, axes[1].max.y, axes[2].max.z};
   BoundingSphere box{(low + high) * 0.5, 0};
   BoundingSphere ritter = RitterSphere(positions, axes);
-  // Ritter's radius grows as its centre moves; measured afterwards it is smaller and certain.
+  // Ritter's radius grows while its centre moves. The radius is measured afterwards, which is smaller and exact.
   box.radius = FarthestFrom(box.center, positions);
   ritter.radius = FarthestFrom(ritter.center, positions);
   BoundingSphere sphere = ritter.radius < box.radius ? ritter : box;
@@ -159,7 +158,7 @@ geo::Vec3 HorizonOcclusionPoint(const std::vector<geo::Vec3>& positions, geo::Ve
   for (const geo::Vec3& p : positions) {
     const double plain = TangentReach(Scaled(p, 0), ray);
     const double shrunk = shrink > 0 ? TangentReach(Scaled(p, shrink), ray) : plain;
-    // Also false for the NaN of a direction or position at the Earth's centre.
+    // Also false for NaN, which a direction or position at the Earth's centre gives.
     const bool exists = plain > 0 && plain <= kMaxHorizonMagnitude && shrunk > 0 && shrunk <= kMaxHorizonMagnitude;
     if (!exists) return kNeverCulled;
     reach = std::max({reach, plain, shrunk});

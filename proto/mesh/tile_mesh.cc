@@ -15,7 +15,8 @@ struct HeightScale {
   double step = 0;  // 0: all heights are equal
 };
 
-// Smallest power of two whose 32767 multiples, counted from a multiple of itself, hold [low, high] exactly in float32.
+// The smallest power of two for which 32767 steps, from a multiple of it, cover [low, high], and whose multiples are
+// exact in float32.
 HeightScale ChooseScale(double low, double high) {
   if (low == high) return {low, 0};
   double step = std::ldexp(1.0, std::ilogb((high - low) / kQuantizedMax));
@@ -26,7 +27,7 @@ HeightScale ChooseScale(double low, double high) {
   }
 }
 
-// The grid a vertex's height must lie on: that of its edge or corner; none inside.
+// The height step of a vertex: that of its edge or corner; none inside the tile.
 double StepAt(const EdgeSteps& steps, int x, int y, int cells) {
   const bool south = y == 0, east = x == cells, north = y == cells, west = x == 0;
   if (south && west) return steps.corner[0];

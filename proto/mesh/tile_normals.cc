@@ -12,8 +12,8 @@
 namespace terrace::proto {
 namespace {
 
-// Steeper slopes are drawn as this one (88 degrees): the two bytes of a normal are up to 1 degree off and must not
-// point into the ground.
+// Steeper slopes are limited to this one (88 degrees): encoded normals are up to 1 degree off and must not point into
+// the ground.
 constexpr double kSteepestSlope = 28;
 constexpr double kLowestUp = 0.035;
 // 13 degrees.
@@ -30,8 +30,9 @@ LocalFrame FrameOf(geo::SinCos longitude, geo::SinCos latitude) {
           {latitude.cos * longitude.cos, latitude.cos * longitude.sin, latitude.sin}};
 }
 
-// A central difference at most kWidestTurn from van Leer's limited one, which is level where one of two steps is: at
-// the foot and at the head of a cliff one step wide. `before` and `after`: the slopes of the two steps.
+// The central difference, limited to within kWidestTurn of van Leer's limited difference, which is zero if one of the
+// two steps is level, as at the foot and at the top of a cliff that is one step wide. `before` and `after`: the slopes
+// of the two steps.
 double Limited(double central, double before, double after) {
   constexpr double kTangent = kSinWidestTurn / kCosWidestTurn;
   const double limited = before * after > 0 ? 2 / (1 / before + 1 / after) : 0, turned = limited * kTangent;
@@ -73,8 +74,8 @@ std::vector<geo::Vec3> AreaWeightedNormals(const std::vector<std::array<std::uin
   return normals;
 }
 
-// `normal`, turned towards `goal` until they are at most kWidestTurn apart. Both are unit vectors; the goal may be
-// zero, of triangles without an area beside a pole: then there is none.
+// Turns `normal` towards `goal` until they are at most kWidestTurn apart. Both are unit vectors. The goal is zero for
+// triangles without area beside a pole; then `normal` is not turned.
 geo::Vec3 TurnTowards(geo::Vec3 normal, geo::Vec3 goal) {
   const double cosine = geo::Dot(normal, goal);
   if (cosine >= kCosWidestTurn || (goal.x == 0 && goal.y == 0 && goal.z == 0)) return normal;

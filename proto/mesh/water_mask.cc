@@ -20,8 +20,8 @@ struct Corners {
   }
 };
 
-// The share of a pixel at or below the sea, of 4 x 4 points in it. `x`, `y`, `size`: the pixel in its cell, from the
-// south-west.
+// The share of a pixel at or below sea level, from 4 x 4 points in it. `x`, `y`, `size`: the pixel in its cell, from
+// the south-west.
 std::uint8_t Share(const Corners& corners, double x, double y, double size, double sea_level) {
   constexpr int kPoints = 4;
   int wet = 0;
@@ -47,7 +47,7 @@ WaterMask SeaLevelMask(const LatticeView& lattice, double sea_level_m) {
                             static_cast<double>(lattice.At(i, j + 1)), static_cast<double>(lattice.At(i + 1, j + 1))};
       const auto [lowest, highest] =
           std::minmax({corners.south_west, corners.south_east, corners.north_west, corners.north_east});
-      // Between its corners a cell never leaves their heights.
+      // The surface in a cell lies between the lowest and the highest corner.
       const bool is_wet = highest <= sea_level_m, is_dry = lowest > sea_level_m;
       for (int y = 0; y < pixels; ++y) {
         const int row = kWaterMaskSide - 1 - (j * pixels + y);

@@ -1,6 +1,5 @@
 // The water mask of a tile (quantized-mesh extension 2): the pixels that clients draw as water.
-//
-// A mask is a single value if the whole tile has it, else kWaterMaskSide x kWaterMaskSide values, row by row from the
+// A mask has a single value if all pixels are equal, else kWaterMaskSide x kWaterMaskSide values, row by row from the
 // NORTH-western pixel: 0 is land, 255 water. Values in between are the share of water in a pixel on the coast.
 #pragma once
 
@@ -15,9 +14,9 @@ inline constexpr int kWaterMaskSide = 256;
 
 using WaterMask = std::vector<std::uint8_t>;
 
-// Water is where the surface through the lattice's samples, bilinear between them, lies at `sea_level_m` or below.
-// A pixel is a function of its level and global position alone. Preconditions: kWaterMaskSide is a multiple of the
-// lattice's cells; the halo is not looked at.
+// A place is water if the bilinear surface through the lattice's samples lies at or below `sea_level_m`. A pixel
+// depends only on its level and global position. The halo is not used. Precondition: kWaterMaskSide is a multiple of
+// the lattice's cells.
 WaterMask SeaLevelMask(const LatticeView& lattice, double sea_level_m);
 
 // Reduces a mask of equal pixels to a single value.

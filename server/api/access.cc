@@ -62,7 +62,7 @@ std::optional<std::string> TakeToken(std::string& target) {
     const std::size_t equals = std::min(piece.find('='), piece.size());
     if (piece.substr(0, equals) == "token") {
       std::string value = PercentDecode(piece.substr(std::min(equals + 1, piece.size()))).value_or("");
-      // No token has a blank in it.
+      // Tokens contain no blanks.
       token = !token || *token == value ? std::move(value) : *token + " " + value;
     } else {
       kept.append(kept.empty() ? 0 : 1, '&').append(piece);

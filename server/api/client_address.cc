@@ -37,7 +37,7 @@ std::optional<address> ParseNode(std::string_view text) {
   return ParseAddress(text);
 }
 
-// One proxy's word: whom it spoke to, and what it was asked for.
+// What one proxy reports: its client's address, and the requested scheme and host.
 struct Hop {
   std::string_view node, host, scheme;
 };
@@ -53,7 +53,7 @@ std::string_view LastPiece(std::string_view list) {
   return pieces.empty() ? std::string_view() : pieces.back();
 }
 
-// RFC 7239: for=192.0.2.60;proto=http;host=example.test, one element a proxy, the nearest one last.
+// RFC 7239: for=192.0.2.60;proto=http;host=example.test, one element per proxy, the nearest one last.
 Hop ParseForwarded(std::string_view element) {
   Hop hop;
   while (!element.empty()) {
@@ -120,17 +120,18 @@ bool AddressRanges::Contains(const address& any) const {
 address ResolveClient(Request& request, const address& peer, const Proxies& proxies) {
   address client = Canonical(peer);
   if (proxies.trusted.empty() || !proxies.trusted.Contains(client)) return client;
-  const SharedFields said = request.fields;  // what the hops point into
+  const SharedFields said = request.fields;  // the text that the hops refer to
   const std::vector<Hop> hops = HopsOf(request, proxies.header);
   if (hops.empty()) return client;
-  // The nearest proxy's word about what it was asked for.
+  // The scheme and host that the nearest proxy reports.
   if (IsHostValue(hops.back().host) && !hops.back().host.empty()) {
     request.fields.Set(&RequestFields::host, std::string(hops.back().host));
   }
   request.is_https = hops.back().scheme.empty() ? request.is_https : EqualsIgnoringCase(hops.back().scheme, "https");
   for (auto hop = hops.rbegin(); hop != hops.rend() && proxies.trusted.Contains(client); ++hop) {
     const std::optional<address> node = ParseNode(hop->node);
-    if (!node) break;  // "unknown", an obfuscated name, or nonsense: whoever said so is the last that is known
+    if (!node)
+      break;  // "unknown", an obfuscated name, or nonsense: the proxy that reported it is the last known address
     client = *node;
   }
   return client;

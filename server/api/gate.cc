@@ -28,8 +28,8 @@ bool NeedsGrant(const Route& route, const Grant& grant) {
 
 bool HasName(const Call& call) { return call.grant && !call.grant->name.empty(); }
 
-// What counts as one client, among those who share the server: a token's name behind a slash, which no address begins
-// with, or the block of the address.
+// The key of a client for rate limits: a token's name after a slash, with which no address begins, or the block of the
+// address.
 std::string Who(const Call& call, const Caller& caller) {
   return HasName(call) ? "/" + call.grant->name : caller.block;
 }
@@ -48,7 +48,8 @@ Response Unauthorized(bool has_token, std::string_view request_id) {
 Caller Gate::Identify(Request& request, const Caller& peer, Call& call) const {
   std::optional<std::string> in_query = TakeToken(request.target);
   const RequestFields& fields = *request.fields;
-  // False: there is neither an Authorization header, nor a token in the query, nor what may be one in another spelling.
+  // Returns false if the request has no Authorization header, no token in the query, and nothing that may be a token in
+  // another spelling.
   request.is_private = fields.has_authorization || in_query || !IsPlainTarget(request.target);
   call.token_in_query = !fields.bearer && in_query.has_value();
   call.token = fields.bearer ? *fields.bearer : std::move(in_query).value_or("");
@@ -89,7 +90,7 @@ std::optional<Response> Gate::Refuse(const Call& call) const {
   if (!options_.access.has_tokens() || !ShowsDatasets(call)) return std::nullopt;
   if (call.has_bad_token) return Unauthorized(true, call.request->id);
   if (!NeedsGrant(call.route, *call.grant)) return std::nullopt;
-  // Whether there is such a dataset is none of the asker's business.
+  // The reply must not reveal whether the dataset exists.
   if (call.grant->name.empty()) return Unauthorized(false, call.request->id);
   return ProblemResponse(403, "this token is for other datasets", call.request->id);
 }

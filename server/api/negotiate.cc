@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::string_view kBlanksAndQuotes = " \t\"";
 
-// The coding of a name, or nothing of those nobody here speaks.
+// The coding of a name; nothing if it is not supported.
 std::optional<tiler::Coding> CodingOf(std::string_view name) {
   if (EqualsIgnoringCase(name, "identity")) return tiler::Coding::kIdentity;
   if (EqualsIgnoringCase(name, "x-gzip")) return tiler::Coding::kGzip;
@@ -25,7 +25,7 @@ std::optional<tiler::Coding> CodingOf(std::string_view name) {
   return std::nullopt;
 }
 
-// A quality outside 0..1 or unreadable counts as 0: what a client says badly it does not get.
+// A malformed quality, or one outside 0 .. 1, counts as 0.
 double Quality(std::string_view parameters) {
   while (!parameters.empty()) {
     const std::string_view parameter = NextPiece(parameters, ';', kBlanksAndQuotes);
@@ -55,7 +55,7 @@ tiler::Coding NegotiateCoding(std::string_view accept_encoding, std::span<const 
       known = std::max(known.value_or(0), quality);
     }
   }
-  // An identity that is not mentioned is acceptable, but only if nothing else is.
+  // Identity is acceptable if it is not mentioned, but only if no other coding is.
   tiler::Coding best = tiler::Coding::kIdentity;
   double most = named[static_cast<std::size_t>(tiler::Coding::kIdentity)].value_or(0);
   for (const tiler::Coding coding : offered) {
@@ -75,7 +75,7 @@ proto::TileExtensions WantedExtensions(std::string_view accept, const std::vecto
 
 int ErrorStep(const RequestedError& requested, int level, bool is_deepest, double error_fraction) {
   if (requested.fraction) {
-    // The product may leave the doubles; the ladder's ends are far inside.
+    // The product may overflow or underflow; the ladder's ends lie far inside the range of doubles.
     const double error_m = std::clamp(*requested.fraction * geo::LevelError(level), std::numeric_limits<double>::min(),
                                       std::numeric_limits<double>::max());
     return geo::SnapToLadder(level, error_m, error_fraction);

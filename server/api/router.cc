@@ -49,7 +49,8 @@ std::optional<geo::TileKey> ParseRoot(std::string_view name) {
                       /*is_mercator=*/false);
 }
 
-// Cuts ".7.subtree" off the last segment of a subtree's URL, and gives the 7; nothing where it is not there.
+// Removes ".7.subtree" from the last segment of a subtree's URL and returns 7; nothing if the segment does not end like
+// this.
 std::optional<int> CutSubtreeLevels(std::string_view& row) {
   constexpr std::string_view kSuffix = ".subtree";
   if (!row.ends_with(kSuffix)) return std::nullopt;
@@ -62,7 +63,7 @@ std::optional<int> CutSubtreeLevels(std::string_view& row) {
   return static_cast<int>(*levels);
 }
 
-// A tile of the tree of segment 2, counted from its root; `row`: segment 5 without its suffix.
+// Reads a tile of the tree in segment 2, counted from the tree's root. `row`: segment 5 without its suffix.
 bool ReadInTree(const Segments& segments, std::string_view row, Route& route) {
   const auto root = ParseRoot(segments[2]);
   const auto level = TileNumber(segments[3]), x = TileNumber(segments[4]), y = TileNumber(row);
@@ -74,8 +75,8 @@ bool ReadInTree(const Segments& segments, std::string_view row, Route& route) {
   return true;
 }
 
-// No parameter's name needs it, and who does not undo it does not know the parameter: in token%3D or %74oken= a token
-// would be told to everybody who reads the URL.
+// No parameter's name needs percent-encoding, and readers that do not decode it do not recognize the parameter: with
+// token%3D or %74oken=, logs and caches would store the token.
 bool HasEncodedName(std::string_view query) {
   if (query.find('%') == std::string_view::npos) return false;
   while (!query.empty()) {
@@ -85,7 +86,7 @@ bool HasEncodedName(std::string_view query) {
   return false;
 }
 
-// Of a pattern's segment; empty: any.
+// The text that a pattern's segment requires; empty: any.
 std::string_view LiteralOf(std::string_view segment) {
   return segment.find('{') == std::string_view::npos ? segment : std::string_view();
 }
@@ -158,7 +159,7 @@ Result<Route> RouteTable::Match(std::string_view target) const {
     if (!Fits(entry, *segments)) continue;
     route = Route();
     if (entry.pattern.size() > 1 && entry.pattern.front().empty()) route.dataset = (*segments)[0];
-    if (IsReserved(route.dataset)) continue;  // "viewer" is no dataset, whatever its files are called
+    if (IsReserved(route.dataset)) continue;  // "viewer" is not a dataset
     if (entry.row->read != nullptr && !entry.row->read(*segments, route)) continue;
     route.row = entry.row;
     break;

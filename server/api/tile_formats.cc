@@ -37,7 +37,7 @@ Result<void> ReadQuantizedMesh(std::string_view query, const RequestFields& fiel
   return {};
 }
 
-// Draco ends in an entropy coder; meshopt leaves that to the transport.
+// Draco output is entropy-coded already; meshopt output is not.
 bool CodingHelps(const TileRequest& glb) { return glb.compression != proto::GlbCompression::kDraco; }
 
 Result<void> ReadGlb(std::string_view query, const RequestFields& fields, const DatasetView& dataset,
@@ -53,7 +53,7 @@ Result<void> ReadGlb(std::string_view query, const RequestFields& fields, const 
   return {};
 }
 
-// PNG is compressed already: whatever the client accepts, it is sent as it is.
+// PNG is compressed already, so it is sent unchanged whatever the client accepts.
 Result<void> ReadHeightPng(std::string_view query, const RequestFields&, const DatasetView& dataset,
                            TileRequest& tile) {
   const Result<HeightTileParameters> parameters = ParseHeightTileParameters(query);

@@ -1,4 +1,4 @@
-// terrace: one binary, one subcommand per job.
+// terrace: one binary with subcommands.
 #include <fcntl.h>
 #include <unistd.h>
 
@@ -49,7 +49,7 @@ int Run(int argc, char** argv) {
     arguments.erase(arguments.begin());
     arguments.emplace_back("--help");
   }
-  std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());  // CLI11 takes them from the back
+  std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());  // CLI11 expects them in reverse order
   try {
     app.parse(std::move(reversed));
   } catch (const CLI::ParseError& error) {
@@ -64,7 +64,7 @@ int Run(int argc, char** argv) {
 }  // namespace terrace::cli
 
 int main(int argc, char** argv) {
-  // Where a standard stream is closed, the next file that is opened would be one, and get what is meant for it.
+  // If a standard stream is closed, the next opened file would take its descriptor and receive its output.
   while (true) {
     const int opened = ::open("/dev/null", O_RDWR);
     if (opened > STDERR_FILENO) ::close(opened);

@@ -1,4 +1,4 @@
-// A text that is served whole, in both codings, with its ETags: layer.json, /datasets, the viewer's files.
+// A document that is prepared in advance, in both codings, with its ETags: layer.json, /datasets, the viewer's files.
 #pragma once
 
 #include <optional>
@@ -12,7 +12,7 @@ namespace terrace::server {
 
 struct Document {
   std::string_view content_type;  // a literal
-  Body identity, gzip;            // gzip is null where it would not be smaller
+  Body identity, gzip;            // gzip is null if it would not be smaller
   std::string identity_etag, gzip_etag;
 
   // `gzipped`: the same bytes, compressed beforehand.
@@ -20,7 +20,7 @@ struct Document {
                        std::optional<std::string> gzipped = std::nullopt);
 };
 
-// In the coding that the request prefers; 304 where the client has it.
+// Returns the document in the coding that the request prefers; 304 if the client already has it.
 Response Serve(const Document& document, const Request& request, std::string_view cache_control);
 
 }  // namespace terrace::server

@@ -56,7 +56,7 @@ Answer DocumentMaker::Make(Described described, const Call& call) const {
 }
 
 asio::awaitable<Response> DocumentMaker::MakeAside(DocumentPlan plan, tiler::Coding coding, const Call& call) const {
-  // Whoever waits may leave before the worker does.
+  // The waiting request may end before the worker does.
   Work<MadeDocument> work = [catalog = catalog_, write = plan.write, coding](const std::stop_token& stop) {
     return MakeDocument(write, coding, stop);
   };

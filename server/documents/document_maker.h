@@ -1,5 +1,5 @@
-// Documents that depend on a request's parameters: made on a worker, since even short ones may take longer than a
-// cached tile (a subtree looks at the heights of hundreds of tiles), and kept for a while.
+// Makes documents that depend on a request's parameters. They are made on a worker, because even short ones may take
+// longer than a cached tile (a subtree needs the heights of hundreds of tiles), and cached for a while.
 #pragma once
 
 #include <cstddef>
@@ -25,21 +25,21 @@
 namespace terrace::server {
 
 struct DocumentPlan {
-  // On any thread; refers to nothing but the catalog and what it holds itself. What is long asks the stop token
-  // as it writes; what it gives after a stop is of no use.
+  // Called on any thread. Refers only to the catalog and to its own captures. Long writers check the stop token; the
+  // result is discarded after a stop.
   using Write = std::function<std::string(const std::stop_token&)>;
 
-  std::string key;                 // of one catalog's documents, equal for equal ones alone; holds no token
+  std::string key;                 // equal only for equal documents of one catalog; contains no token
   std::string_view content_type;   // a literal
   std::string_view cache_control;  // outlives the request
   bool for_grant = false;          // as in Response
   Write write;
 };
 
-// What a handler of documents says: the reply, or what it takes to make it.
+// The result of a handler of documents: a reply, or a plan to make one.
 using Described = std::variant<Response, DocumentPlan>;
 
-// In the one coding that was asked for.
+// A document in one coding.
 struct MadeDocument {
   Body body;
   tiler::Coding coding = tiler::Coding::kIdentity;
@@ -47,30 +47,30 @@ struct MadeDocument {
 };
 inline std::size_t BytesOf(const MadeDocument& made) { return made.body->size() + made.etag.size(); }
 
-// `coding`: kGzip gives identity where that is not larger. Bytes and ETag are those of a Document of the same text.
-// kCancelled: a stop was requested.
+// `coding`: kGzip falls back to identity if that is not larger. Bytes and ETag are equal to those of a Document with
+// the same text. kCancelled: a stop was requested.
 Result<MadeDocument> MakeDocument(const DocumentPlan::Write& write, tiler::Coding coding, const std::stop_token& stop);
 
-// As Serve of a Document.
+// Like Serve for a Document.
 Response Serve(const MadeDocument& made, const DocumentPlan& plan, const Request& request);
 
 // Thread-safe.
 class DocumentMaker {
  public:
-  // Of those kept, least recently asked for leave first.
+  // Size of the cache. The least recently used documents are evicted first.
   static constexpr std::size_t kKeptBytes = std::size_t{8} << 20;
 
-  // `workers` must outlive this. Plans are about `catalog`.
+  // `workers` must outlive this object. All plans refer to `catalog`.
   DocumentMaker(CatalogPtr catalog, TileService& workers, HandlerOptions options);
 
-  // At once what was kept. This and `call` outlive the answer.
+  // Returns cached documents at once. This object and `call` must outlive the answer.
   Answer Make(Described described, const Call& call) const;
 
  private:
   struct Key {
     std::string text;
     tiler::Coding coding = tiler::Coding::kIdentity;
-    std::uint64_t generation = 0;  // of one catalog all are
+    std::uint64_t generation = 0;  // all documents belong to one catalog
 
     friend bool operator==(const Key&, const Key&) = default;
   };

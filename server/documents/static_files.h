@@ -1,4 +1,4 @@
-// The viewer's files, held in memory from the start: no request ever opens a file.
+// The viewer's files, loaded into memory at the start: no request opens a file.
 #pragma once
 
 #include <filesystem>
@@ -13,14 +13,15 @@ namespace terrace::server {
 
 class StaticFiles {
  public:
-  // No files at all.
+  // An empty set.
   StaticFiles() = default;
 
-  // Every regular file below `directory`. `a.js.gz` beside `a.js` is what clients get that take gzip; it must hold the
-  // same bytes. A directory that does not exist gives no files; one that cannot be read is an error.
+  // Loads every regular file below `directory`. If `a.js.gz` exists beside `a.js`, clients that accept gzip get it; it
+  // must contain the same bytes. A directory that does not exist gives an empty set; one that cannot be read is an
+  // error.
   static Result<StaticFiles> Load(const std::filesystem::path& directory);
 
-  // `path` relative to the directory, with '/'. Null when there is no such file.
+  // `path`: relative to the directory, with '/'. Null: there is no such file.
   const Document* Find(std::string_view path) const;
   bool empty() const { return files_.empty(); }
 
@@ -28,7 +29,7 @@ class StaticFiles {
   std::map<std::string, Document, std::less<>> files_;
 };
 
-// By the file's extension; application/octet-stream where it says nothing.
+// By the file's extension; application/octet-stream for unknown ones.
 std::string_view MediaTypeOf(std::string_view path);
 
 }  // namespace terrace::server

@@ -46,7 +46,7 @@ Result<void> SetBox(tiler::AreaRequest& area, std::string_view text) {
   area.south = south;
   area.east = east < west ? east + 360 : east;
   area.north = north;
-  if (area.west == area.east) {  // 180 and -180 are the same as well
+  if (area.west == area.east) {  // 180 and -180 are equal, too
     return MakeError(ErrorCode::kInvalidArgument, "bbox is empty: west and east are the same");
   }
   return {};
@@ -93,7 +93,7 @@ std::string_view ContentTypeOf(proto::MeshFileFormat format) {
   return "application/octet-stream";
 }
 
-// Where (0, 0, 0) of the file lies: latitude, longitude, metres above the ellipsoid.
+// The position of (0, 0, 0) of the file: latitude, longitude, metres above the ellipsoid.
 std::string FormatOrigin(const dem::GeoPosition& centre) {
   const double longitude = centre.longitude > 180 ? centre.longitude - 360 : centre.longitude;
   return fmt::format("{},{},0", centre.latitude, longitude);
@@ -151,7 +151,7 @@ Answer AreaHandler::Handle(const Call& call) const {
   return Build(call, *dataset, *area, *plan, coding, std::move(response));
 }
 
-// `response`: all but what the mesh says.
+// `response`: complete except for what depends on the mesh.
 asio::awaitable<Response> AreaHandler::Build(const Call& call, std::uint32_t dataset, tiler::AreaRequest area,
                                              tiler::AreaPlan plan, tiler::Coding coding, Response response) const {
   Work<tiler::EncodedTile> work = [catalog = catalog_, dataset, area, plan, coding, asked = TileService::Clock::now()](

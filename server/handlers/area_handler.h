@@ -18,7 +18,7 @@ namespace terrace::server {
 
 class AreaHandler {
  public:
-  // `tiles`, whose workers mesh the areas, must outlive this.
+  // `tiles`: its workers mesh the areas; must outlive this object.
   AreaHandler(CatalogPtr catalog, TileService& tiles, HandlerOptions options);
 
   Answer Handle(const Call& call) const;
@@ -32,9 +32,9 @@ class AreaHandler {
   const HandlerOptions options_;
 };
 
-// `bbox=west,south,east,north` and `error=METRES`, both needed; `format=glb|obj|ply`,
-// `coordinates=enu|ecef|geographic`; `v` may come any number of times. west > east is a box across the antimeridian.
-// kInvalidArgument, with a message for the client.
+// Reads `bbox=west,south,east,north` and `error=METRES`, both required; `format=glb|obj|ply`,
+// `coordinates=enu|ecef|geographic`; `v` may be repeated. west > east: the box crosses the antimeridian.
+// kInvalidArgument: the message is for the client.
 Result<tiler::AreaRequest> ParseAreaRequest(std::string_view query);
 
 }  // namespace terrace::server

@@ -6,7 +6,7 @@
 namespace terrace::server {
 namespace {
 
-// A point on the line between two tiles counts to the eastern and to the northern one.
+// A point on the edge between two tiles belongs to the eastern and to the northern tile.
 geo::TileKey TileAt(const dem::GeoPosition& point, int level) {
   const double side = 180.0 / static_cast<double>(geo::TileRows(level));
   const auto number = [side](double degrees, std::int64_t count) {

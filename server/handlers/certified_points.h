@@ -1,4 +1,4 @@
-// Which tiles tell how far the served surface is from the sources at given points. Pure.
+// Selects the tiles whose certified errors hold at given points. Pure.
 #pragma once
 
 #include <cstddef>
@@ -14,17 +14,17 @@
 
 namespace terrace::server {
 
-// Each is built where no cache has it.
+// Limit of tiles per request: each must be built if it is not cached.
 inline constexpr std::size_t kMaxCertifiedTiles = 64;
 
 struct CertifiedPoints {
-  std::vector<geo::TileKey> tiles;              // each once
-  std::vector<std::size_t> tile_of_point;       // in `tiles`
-  std::vector<std::optional<double>> errors_m;  // by tile, as they become known; nothing: the tile states none
+  std::vector<geo::TileKey> tiles;              // without duplicates
+  std::vector<std::size_t> tile_of_point;       // index into `tiles`
+  std::vector<std::optional<double>> errors_m;  // by tile; nothing: the tile states none
 };
 
-// Of each point the deepest tile that there is, down to `deepest`. kInvalidArgument, with a message for the client:
-// more than kMaxCertifiedTiles. kCancelled: a stop was requested.
+// Returns the deepest available tile of each point, down to level `deepest`. kInvalidArgument, with a message for the
+// client: more than kMaxCertifiedTiles. kCancelled: a stop was requested.
 Result<CertifiedPoints> TilesOf(const DatasetView& dataset, std::span<const dem::GeoPosition> points, int deepest,
                                 const std::stop_token& stop = {});
 

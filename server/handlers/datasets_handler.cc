@@ -76,7 +76,7 @@ std::string DatasetsJson(std::span<const DatasetView> datasets, const IsSeen& is
   Json document;
   document["datasets"] = std::move(list);
   if (is_seen) document["more_with_token"] = true;
-  // An attribution is the operator's text: bytes that are not UTF-8 must not take the whole list away.
+  // Attributions are the operator's text: invalid UTF-8 must not make the whole list fail.
   return document.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 

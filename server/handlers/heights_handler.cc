@@ -19,14 +19,15 @@
 namespace terrace::server {
 namespace {
 
-// Thousands of points, and geodesics between them, take a tenth of a second: not on the thread that serves everybody
-// else. A query of so many bytes holds a few points and is read in microseconds.
+// Thousands of points, and geodesics between them, take a tenth of a second, which would block the io thread. A query
+// of at most this many bytes has a few points and is parsed in microseconds.
 constexpr std::size_t kQuickQuery = 256;
 
-// Points that are read as long work, for which not all workers may be taken: each may lie in a block of its own.
+// From this number of points on, reading is long work, which never occupies all workers: each point may lie in another
+// block.
 constexpr std::size_t kShortList = 1000;
 
-// Points that are written between two looks at the stop token.
+// Points written between two checks of the stop token.
 constexpr std::size_t kStopPeriod = 1024;
 
 }  // namespace
@@ -50,7 +51,7 @@ asio::awaitable<Result<HeightsQuery>> HeightsHandler::ParseAside(const Call& cal
   const Request& request = *call.request;
   const std::string& query = call.route.query;
   const bool is_post = request.method == Method::kPost;
-  // Two corners of a path may have thousands of points between them.
+  // A path of two corners may have thousands of points.
   const bool may_be_path = query.find("path") != std::string::npos;
   if (!is_post && query.size() <= kQuickQuery && !may_be_path) {
     const HeightsInput input{query, {}, {}};
@@ -91,7 +92,7 @@ asio::awaitable<Response> HeightsHandler::Read(const Call& call, std::uint32_t d
     const bool is_versioned = !parsed->certify_level && parsed->datum == dem::HeightDatum::kEllipsoid;
     response.cache_control =
         is_versioned ? CacheControlOf(call.route.query, view, options_.cache_control) : options_.cache_control;
-    // Certified errors are the program's, not only the data's.
+    // Certified errors depend on the program, not only on the data.
     if (!parsed->certify_level) {
       response.etag = tiler::RequestETag("heights", view.name, view.generation, call.route.query, coding);
     }
@@ -132,7 +133,7 @@ asio::awaitable<Response> HeightsHandler::Read(const Call& call, std::uint32_t d
 asio::awaitable<Result<CertifiedPoints>> HeightsHandler::Certify(std::uint32_t dataset, const HeightsQuery& query,
                                                                  TileService::Clock::time_point deadline,
                                                                  std::uint64_t client) const {
-  // On a worker: of a mosaic with thousands of blocks it takes time to find the tiles of thousands of points.
+  // On a worker, because finding the tiles of thousands of points in a large mosaic takes time.
   Work<CertifiedPoints> find = [catalog = catalog_, dataset, wanted = query.points,
                                 level = *query.certify_level](const std::stop_token& stop) {
     return TilesOf(catalog->datasets[dataset], wanted, level, stop);
@@ -143,7 +144,7 @@ asio::awaitable<Result<CertifiedPoints>> HeightsHandler::Certify(std::uint32_t d
     tiler::TileRequest tile;
     tile.dataset = dataset;
     tile.key = points->tiles[i];
-    tile.coding = tiler::Coding::kGzip;  // the form that a cache most probably has
+    tile.coding = tiler::Coding::kGzip;  // the format that is most probably cached
     const Result<ServedTile> served = co_await TileOf(tile, deadline, client);
     if (!served) co_return tl::unexpected(served.error());
     points->errors_m[i] = served->tile->certified_error_m;
@@ -180,7 +181,7 @@ std::string HeightsJson(const HeightsQuery& query, const PointHeights& known, st
     if (certified != nullptr && !std::isnan(heights[i])) {
       const std::size_t tile = certified->tile_of_point[i];
       const std::optional<double>& error_m = certified->errors_m[tile];
-      // Of what was never measured nobody knows how far it is from the ground.
+      // Filled voids have no certified error.
       const bool is_bounded = error_m && std::isfinite(*error_m) && !is_filled;
       fmt::format_to(out, ",\"certified_error\":{},\"tile\":\"{}\"",
                      is_bounded ? proto::FormatErrorUp(*error_m) : "null", geo::ToString(certified->tiles[tile]));

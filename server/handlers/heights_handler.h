@@ -21,22 +21,22 @@ namespace terrace::server {
 
 class HeightsHandler {
  public:
-  // `tiles`, whose workers read the heights, must outlive this.
+  // `tiles`: its workers read the heights; must outlive this object.
   HeightsHandler(CatalogPtr catalog, TileService& tiles, HandlerOptions options);
 
   Answer Handle(const Call& call) const;
 
  private:
-  // One job's answer.
+  // The result of a job.
   struct Made {
-    std::string bytes;  // in its coding
+    std::string bytes;  // in the reply's coding
     tiler::StageTimes times;
   };
 
   asio::awaitable<Response> Read(const Call& call, std::uint32_t dataset) const;
-  // On a worker, unless it is certain to be quick.
+  // Parses on a worker, unless the input is small.
   asio::awaitable<Result<HeightsQuery>> ParseAside(const Call& call, TileService::Clock::time_point deadline) const;
-  // The errors of the points' tiles, one after the other, from the cache or by building them.
+  // Gets the certified errors of the points' tiles one after the other, from the cache or by building the tiles.
   asio::awaitable<Result<CertifiedPoints>> Certify(std::uint32_t dataset, const HeightsQuery& query,
                                                    TileService::Clock::time_point deadline, std::uint64_t client) const;
   asio::awaitable<Result<ServedTile>> TileOf(tiler::TileRequest tile, TileService::Clock::time_point deadline,
@@ -47,11 +47,10 @@ class HeightsHandler {
   const HandlerOptions options_;
 };
 
-// {"results":[{"elevation","location":{"lat","lng"},"dataset"}],"status":"OK"}, as Open Topo Data replies; points of a
-// path have their "distance" as well. Metres; null where there is no height, and "filled": true where a void was filled
-// in. Orthometric ones say so: "datum".
-// `certified`, unless it is null: "certified_error" and "tile" of each point that has a height. Empty: a stop was
-// requested.
+// {"results":[{"elevation","location":{"lat","lng"},"dataset"}],"status":"OK"}, the format of Open Topo Data. Points of
+// a path also have "distance". Metres; null if there is no height; "filled": true if a void was filled. Orthometric
+// heights have "datum". `certified`: adds "certified_error" and "tile" to each point with a height; null: nothing is
+// added. Returns an empty string if a stop was requested.
 std::string HeightsJson(const HeightsQuery& query, const PointHeights& known, std::string_view dataset,
                         const CertifiedPoints* certified = nullptr, const std::stop_token& stop = {});
 

@@ -23,19 +23,19 @@ class LayerHandler {
 
  private:
   const std::span<const DatasetView> datasets_;
-  std::vector<Document> plain_;  // one per dataset: what is served where no error is requested
+  std::vector<Document> plain_;  // one per dataset, for requests without an error
 };
 
-// What the tile template carries for a requested error: "error=5&atleast=1", "fraction=0.25" or nothing. Numbers are
-// printed anew, shortest form, and without '+', which CesiumJS would turn into a space.
+// The query of the tile template for a requested error: "error=5&atleast=1", "fraction=0.25" or empty. Numbers are
+// printed in their shortest form and without '+', which CesiumJS would convert to a space.
 std::string TileQuery(const RequestedError& requested);
 
-// The query of a template, with the request's token where that came in a query: clients that send it so send templates
-// as they are.
+// Adds the request's token to the query of a template if the token came in the query: such clients use templates
+// unchanged.
 std::string WithToken(std::string query, const Call& call);
 
-// Stands for that token where it must not be kept itself: there is one grant of each, for as long as the server runs.
-// Null: WithToken adds none.
+// Identifies that token in cache keys, which must not contain the token itself: each token has one Grant as long as the
+// server runs. Null: WithToken adds none.
 const Grant* GrantInQuery(const Call& call);
 
 }  // namespace terrace::server

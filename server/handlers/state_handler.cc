@@ -31,8 +31,8 @@ Response StateHandler::Live(const Call& call) const {
   return none ? PlainState(200, "ok\n") : ClientErrorResponse(none.error(), call.request->id);
 }
 
-// The first word is the state. A degraded server goes on answering, so it is not to be taken out of service. Reasons
-// name files: they are for the log. Datasets are named to those who may see them all.
+// The first word is the state. A degraded server still answers, so it should stay in service. Reasons contain file
+// names and go only to the log. Datasets are named only to clients that may see all of them.
 Response StateHandler::Ready(const Call& call) const {
   if (const Result<void> none = RefuseParameters(call.route.query); !none) {
     return ClientErrorResponse(none.error(), call.request->id);
@@ -51,8 +51,8 @@ Response StateHandler::Ready(const Call& call) const {
     } else if (dataset.empty()) {
       text += "the configuration file is wrong, the last good one is in force\n";
     } else {
-      text += fmt::format("dataset{}: its source cannot be opened as it is now\n",
-                          call.sees_all() ? " " + dataset : "");
+      text +=
+          fmt::format("dataset{}: its source cannot be opened as it is now\n", call.sees_all() ? " " + dataset : "");
     }
   }
   return PlainState(200, std::move(text));

@@ -1,4 +1,4 @@
-// GET /livez, /readyz and /metrics: what whoever operates the server asks it.
+// GET /livez, /readyz and /metrics: for operators of the server.
 #pragma once
 
 #include <map>
@@ -14,12 +14,12 @@ namespace terrace::server {
 // Stands among troubles for the folder of what is learnt of sources. No dataset has such a name.
 inline constexpr const char* kCacheTrouble = "/cache_dir";
 
-// The process as it is now. Thread-safe.
+// The current state of the process. Thread-safe.
 class ProcessState {
  public:
   virtual ~ProcessState() = default;
   virtual bool draining() const = 0;
-  virtual bool opening() const = 0;  // what is served has not been opened yet
+  virtual bool opening() const = 0;  // the first catalog has not been opened yet
   // By dataset; "" is the configuration, and kCacheTrouble what it says.
   virtual std::map<std::string, std::string> troubles() const = 0;
   virtual asio::awaitable<std::shared_ptr<const std::string>> MetricsText() const = 0;

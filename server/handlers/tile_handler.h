@@ -17,7 +17,7 @@ class TileHandler {
   // `tiles` must outlive this.
   TileHandler(CatalogPtr catalog, TileService& tiles, HandlerOptions options);
 
-  // At once what needs no build: refusals, and tiles in the cache. Precondition: the route has a format.
+  // Replies that need no build (refusals and cached tiles) are returned at once. Precondition: the route has a format.
   Answer Handle(const Call& call) const;
 
  private:
@@ -29,7 +29,7 @@ class TileHandler {
   const HandlerOptions options_;
 };
 
-// "cache;desc=miss, queue;dur=0.021, read;dur=1.234, ...": milliseconds, the steps of the build that was waited for.
+// "cache;desc=miss, queue;dur=0.021, read;dur=1.234, ...": milliseconds of the stages of the build.
 std::string FormatServerTiming(CacheStatus cache, const tiler::StageTimes& times);
 
 }  // namespace terrace::server

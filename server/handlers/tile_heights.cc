@@ -27,10 +27,10 @@ proto::HeightSpan HeightsOfTile(const DatasetView& dataset, const RequestedError
   const bool is_deepest = key.level == dataset.max_level();
   const int step = ErrorStep(requested, key.level, is_deepest, dataset.error_fraction);
   const double error_m = geo::LadderError(key.level, step, dataset.error_fraction);
-  // From level to level skirts grow shorter, but for those of the deepest level at a small `fraction`.
+  // Skirts are shorter on each deeper level, except on the deepest level at a small `fraction`.
   const double skirt_m =
       std::max(SkirtDepth(dataset, requested, key.level), SkirtDepth(dataset, requested, dataset.max_level()));
-  // Positions are rounded to a grid of at most a 32nd of the error, the feet of skirts a second time.
+  // Positions are rounded to a grid of at most a 32nd of the error; the lower rims of skirts are rounded twice.
   const double rounding_m = error_m / 32;
   const dem::HeightRange range = RangeOf(dataset, key);
   constexpr int kFinestStep = -6;

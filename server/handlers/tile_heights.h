@@ -1,4 +1,4 @@
-// How far a GLB tile reaches up and down, known before it is made: what tilesets say of it.
+// Bounds on the heights of a GLB tile, for tilesets. Known before the tile is built.
 #pragma once
 
 #include "engine/geo/tile_key.h"
@@ -8,10 +8,10 @@
 
 namespace terrace::server {
 
-// Heights that no vertex of the tile and of any below it leaves at this error, feet of skirts included: the bound on
-// the tile's samples, widened by skirts and rounding, and outwards to whole steps of a power of two, at most a quarter
-// of the error and at least 2^-6 m: they make short numbers, and many equal ones. Reads no raster. Any valid key;
-// thread-safe.
+// Returns a range that contains the heights of all vertices, including skirts, of the tile and its descendants at this
+// error. It is the bound on the tile's samples, widened by skirts and rounding, and then outwards to multiples of a
+// power of two, which is at most a quarter of the error and at least 2^-6 m: such numbers are short and often equal.
+// Reads no raster. Thread-safe. Precondition: a valid key.
 proto::HeightSpan HeightsOfTile(const DatasetView& dataset, const RequestedError& requested, const geo::TileKey& key);
 
 }  // namespace terrace::server

@@ -16,7 +16,7 @@
 namespace terrace::server {
 namespace {
 
-// Defaults are left away, so that a tile is cached under one URL.
+// Default parameters are omitted, so that a tile has one URL.
 std::string HeightTileQuery(const DatasetView& dataset, const HeightTileParameters& parameters) {
   std::string query = "v=" + dataset.version();
   const auto add = [&query](const std::string& text) { query += "&" + text; };

@@ -18,7 +18,7 @@ class TileJsonHandler {
   // `origin_headers`: HandlerOptions.
   TileJsonHandler(std::span<const DatasetView> datasets, std::string_view origin_headers);
 
-  // Precondition: a kTileJson call.route. `?encoding` and `?size` go into the tile template.
+  // Precondition: a route of tiles.json. `?encoding` and `?size` go into the tile template.
   Response Handle(const Call& call) const;
 
  private:
@@ -26,7 +26,8 @@ class TileJsonHandler {
   const std::string_view origin_headers_;
 };
 
-// "http://host:port" as the client addressed this server or the proxy before it; empty without a Host.
+// "http://host:port" under which the client addressed this server or the proxy in front of it; empty without a Host
+// header.
 std::string OriginOf(const Request& request);
 
 }  // namespace terrace::server

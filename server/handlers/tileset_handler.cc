@@ -21,7 +21,7 @@ namespace {
 
 constexpr std::string_view kJsonType = "application/json";
 
-// What the content templates carry for a request. The values of `compression` and `texture` have been checked.
+// The query of the content templates for a request. The values of `compression` and `texture` have been checked.
 std::string ContentQuery(const RequestedError& requested, std::string_view query) {
   std::string content = TileQuery(requested);
   const QueryParameters parameters = ParseQuery(query).value_or(QueryParameters());
@@ -32,7 +32,7 @@ std::string ContentQuery(const RequestedError& requested, std::string_view query
   return content;
 }
 
-// Those of one level that touch columns west .. east, degrees, and the dataset's rows.
+// The ranges of one level that touch the columns west .. east, in degrees, and the dataset's rows.
 std::vector<geo::TileRange> TilesWithin(const DatasetView& dataset, int level, double west, double east) {
   const double tile = std::ldexp(180, -level);
   const auto first = [&](double degrees) { return static_cast<std::int64_t>(std::floor(degrees / tile)); };
@@ -47,7 +47,8 @@ std::vector<geo::TileRange> TilesWithin(const DatasetView& dataset, int level, d
   return tiles;
 }
 
-// The available tiles that touch the dataset's bounds. Others only make four children of those that a tile has.
+// The available tiles that touch the dataset's bounds. Other tiles are available only so that parents have four
+// children.
 std::vector<std::vector<geo::TileRange>> TilesWithData(const DatasetView& dataset) {
   std::vector<std::vector<geo::TileRange>> levels;
   const bool crosses = dataset.west > dataset.east;

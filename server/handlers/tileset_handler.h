@@ -25,15 +25,14 @@ class TilesetHandler {
   // `?error=E` and `?fraction=F` go into the templates.
   Described Handle(const Call& call) const;
 
-  // Any available tile may be the root, so that a tileset.json which a client has kept
-  // from an earlier day stays good. The requested error decides how deep skirts hang, and so the heights in
-  // it. 404 where no subtree begins.
+  // Any available tile may be the root, so that an older tileset.json that a client has cached stays valid. The heights
+  // in a subtree depend on the requested error, because skirts do. 404: no subtree begins at this tile.
   Described HandleSubtree(const Call& call) const;
 
  private:
   const std::span<const DatasetView> datasets_;
   const std::string cache_control_;
-  // One per dataset: where its trees are rooted, and what is served where no error is requested.
+  // One per dataset: the roots of its trees, and the document for requests without an error.
   std::vector<std::shared_ptr<const std::vector<proto::TreeRoot>>> roots_;
   std::vector<Document> plain_;
 };

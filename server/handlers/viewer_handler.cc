@@ -24,7 +24,7 @@ Described ViewerHandler::Datasets(const Call& call) const {
   return PlanOfSeen(list_, call, DatasetsJson);
 }
 
-// Pages keep their state in the query, so any query goes.
+// Pages keep their state in the query, so any query is allowed.
 Described ViewerHandler::File(const Call& call) const {
   if (const Document* file = files_->Find(call.route.file)) return Serve(*file, *call.request, kRevalidate);
   if (files_->empty() && call.route.file == "index.html") {
@@ -40,10 +40,10 @@ Described ViewerHandler::File(const Call& call) const {
   return ProblemResponse(404, "no such URL; /datasets lists those of each dataset", call.request->id);
 }
 
-// What `write` makes of the datasets that the request may see; `all`: the same of all datasets.
+// A plan to call `write` for the datasets that the client may see. `all`: the document of all datasets.
 DocumentPlan ViewerHandler::PlanOfSeen(const Document& all, const Call& call, WriteDatasets write) const {
   DocumentPlan plan;
-  // There is one grant of each token, for as long as the server runs.
+  // Each token has one Grant as long as the server runs.
   plan.key = fmt::format("{} {}", all.identity_etag, fmt::ptr(call.grant.get()));
   plan.content_type = all.content_type;
   plan.cache_control = kRevalidate;

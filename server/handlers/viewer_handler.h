@@ -1,4 +1,4 @@
-// GET /, /viewer/{file} and /datasets: the page and the list of what is served.
+// GET /, /viewer/{file} and /datasets: the viewer and the list of datasets.
 #pragma once
 
 #include <memory>
@@ -23,7 +23,7 @@ class ViewerHandler {
   // The list of datasets that the request may see.
   Described Datasets(const Call& call) const;
 
-  // A file of the page. Without a page, `/` is a plain list of datasets.
+  // A file of the viewer. Without a viewer, `/` is a plain list of datasets.
   Described File(const Call& call) const;
 
  private:
@@ -33,7 +33,7 @@ class ViewerHandler {
   const std::span<const DatasetView> datasets_;
   const std::shared_ptr<const StaticFiles> files_;
   const Document list_;   // of all datasets
-  const Document index_;  // for `/` without a page
+  const Document index_;  // for `/` without a viewer
 };
 
 }  // namespace terrace::server

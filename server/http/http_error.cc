@@ -57,14 +57,14 @@ std::string_view FixedDetail(ErrorCode code) {
   return "the answer cannot be built now";
 }
 
-// Seconds. A full queue drains quickly, and a source that was replaced is opened anew; one that cannot be read usually
-// waits for a person.
+// Seconds. A full queue drains quickly, and a replaced source is reopened soon; a source that cannot be read usually
+// has to be repaired.
 const char* RetryAfter(ErrorCode code) {
   return code == ErrorCode::kOverloaded || code == ErrorCode::kChanged ? "1" : "5";
 }
 
-// For a string in JSON. Not by a library of JSON: the one used elsewhere asserts where it finds no memory, and that is
-// one of the things to be told.
+// Escapes a string for JSON. Does not use the JSON library, which asserts if memory is exhausted, because this case
+// must be reported, too.
 std::string EscapedForJson(std::string_view text) {
   std::string escaped;
   for (const char c : text) {
@@ -123,12 +123,12 @@ Response ClientErrorResponse(const Error& error, std::string_view request_id) {
 }
 
 Response BackendErrorResponse(const Error& error, std::string_view request_id) {
-  // Refusals under load come by the thousand, and so do requests for a dataset whose source was replaced: the access
-  // log counts them.
+  // Refusals under load, and requests for a dataset whose source was replaced, are too many for the log; the access log
+  // has them.
   const bool is_usual = error.code == ErrorCode::kOverloaded || error.code == ErrorCode::kChanged;
   const auto level = is_usual ? spdlog::level::debug : spdlog::level::warn;
   spdlog::log(level, "request {} failed ({}): {}", request_id, ToString(error.code), error.message);
-  // The request has passed every check by now: what is wrong here is the server's.
+  // The request has passed every check, so this is an error of the server.
   const ErrorCode code = error.code == ErrorCode::kInvalidArgument ? ErrorCode::kInternal : error.code;
   const int status = StatusOf(code);
   Response response = ProblemResponse(status, FixedDetail(code), request_id);

@@ -19,7 +19,7 @@ Response ProblemResponse(int status, std::string_view detail, std::string_view r
 // 405 with the methods of the URL. Closes the connection: the refused request may be followed by a body of any form.
 Response NoSuchMethodResponse(bool takes_post, std::string_view request_id);
 
-// For errors of Match and Negotiate, whose messages are written for clients.
+// For errors of routing and negotiation, whose messages are written for clients.
 Response ClientErrorResponse(const Error& error, std::string_view request_id);
 
 // For failures behind the HTTP side: fixed text for the client, the message for the log.

@@ -29,7 +29,7 @@ constexpr std::chrono::milliseconds kMoment{100};
 constexpr int kRejectedAtOnce = 1000;
 
 Result<tcp::endpoint> Resolve(asio::io_context& io, const std::string& host, std::uint16_t port) {
-  const bool bracketed = host.size() > 2 && host.front() == '[' && host.back() == ']';  // as IPv6 stands in URLs
+  const bool bracketed = host.size() > 2 && host.front() == '[' && host.back() == ']';  // the notation of IPv6 in URLs
   error_code error;
   const asio::ip::address address = asio::ip::make_address(bracketed ? host.substr(1, host.size() - 2) : host, error);
   if (!error) return tcp::endpoint(address, port);
@@ -61,7 +61,7 @@ void OpenSpare(const asio::any_io_executor& executor, std::optional<asio::posix:
   if (descriptor >= 0) spare.emplace(executor, descriptor);
 }
 
-// Once until a connection was taken again.
+// Logged once until the next connection is accepted.
 void Warn(bool& crowded, const std::string& why) {
   if (!crowded) spdlog::warn("turning connections away for now: {}", why);
   crowded = true;
@@ -133,8 +133,8 @@ void Listener::Start() {
 
 void Listener::Spawn() { asio::co_spawn(acceptor_.get_executor(), Run(shared_from_this()), asio::detached); }
 
-// Ends with the coroutine that accepts. Where there was no memory for one connection, the coroutine ends by an
-// exception, or by being destroyed; others will find some.
+// Its destructor restarts the accepting coroutine, which ends by an exception or is destroyed if there is no memory for
+// a connection. Later connections may find memory.
 class Listener::Resume {
  public:
   explicit Resume(std::shared_ptr<Listener> listener) : listener_(std::move(listener)) {}
@@ -153,7 +153,7 @@ class Listener::Resume {
     });
   }
 
-  // Nothing else can be done meanwhile, and without this nobody would ever be let in again.
+  // Without the restart, no connection would ever be accepted again.
   template <typename Action>
   static void UntilThereIsMemory(Action action) {
     for (;;) {
@@ -207,8 +207,8 @@ asio::awaitable<void> Listener::Pause(std::chrono::milliseconds time) {
 
 std::string Listener::ClientOf(const asio::ip::address& peer) const { return context_->application->ClientOf(peer); }
 
-// Where there is no room, another connection gives way, or one may end in a moment. Once somebody was refused the next
-// ones are not kept waiting.
+// At the limit, evicts another connection or waits a moment for one to end. After a refusal, the next connections do
+// not wait.
 asio::awaitable<void> Listener::Admit(tcp::socket socket) {
   error_code error;
   const auto peer = socket.remote_endpoint(error);
@@ -220,11 +220,11 @@ asio::awaitable<void> Listener::Admit(tcp::socket socket) {
   const auto until = std::chrono::steady_clock::now() + (evicts || !crowded_ ? kMoment : kBackOff);
   while (connections.full() && std::chrono::steady_clock::now() < until) co_await Pause(kBackOff);
   if (connections.full() && !evicts) co_return Refuse(socket, 503);
-  crowded_ = crowded_ && evicts;  // who takes another's place does not end the crowd
+  crowded_ = crowded_ && evicts;  // replacing a connection does not end the overload
   StartSession(std::move(socket), context_, client);
 }
 
-// Turns away those who wait, a bounded number of them.
+// Refuses a limited number of waiting connections.
 void Listener::RejectPending() {
   error_code error;
   spare_.reset();
@@ -238,7 +238,7 @@ void Listener::RejectPending() {
   OpenSpare(acceptor_.get_executor(), spare_);
 }
 
-// Says why, if that can be done without waiting, and closes.
+// Sends the reason if that does not block, and closes.
 void Listener::Refuse(tcp::socket& socket, int status) {
   context_->connections->CountRefused();
   if (status == 503) Warn(crowded_, "as many connections as configured are open");
@@ -250,13 +250,13 @@ void Listener::Refuse(tcp::socket& socket, int status) {
   head.cors = &context_->cors;
   const std::string bytes = SerializeHead(response, head) + *response.body;
   socket.send(asio::buffer(bytes), 0, ignored);
-  // Bytes left unread would make the kernel send a reset, which destroys what the client has not read yet.
+  // Unread bytes would make the kernel send a reset, which discards what the client has not read yet.
   std::array<char, 4096> request;
   socket.receive(asio::buffer(request), 0, ignored);
   socket.shutdown(tcp::socket::shutdown_send, ignored);
 }
 
-// The coroutine that accepts ends itself: it may hold a connection that has no session yet.
+// The accepting coroutine ends itself, because it may own a connection that has no session yet.
 void Listener::Close() {
   asio::post(acceptor_.get_executor(), [this] {
     closing_ = true;

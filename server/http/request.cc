@@ -37,7 +37,7 @@ std::string Joined(const Fields& fields, Name name) {
   return joined;
 }
 
-// RFC 9112, section 9.3; Beast's own answer knows the first Connection field alone.
+// RFC 9112, section 9.3. Beast considers only the first Connection field.
 bool WantsKeepAlive(const Fields& fields) {
   const std::string options = Joined(fields, http::field::connection);
   http::token_list tokens(options);
@@ -60,14 +60,15 @@ Method ToMethod(http::verb verb) {
   }
 }
 
-// 0 without the field.
+// 0 if the field is absent.
 std::optional<std::int64_t> PlainLength(const Fields& fields) {
   if (fields.count(http::field::content_length) == 0) return 0;
   return PlainDecimal(fields[http::field::content_length], /*max_digits=*/15);
 }
 
-// Null when the message ends with its head or, of a POST, so many bytes after it. Beast reads a GET with
-// `Transfer-Encoding: gzip` as body-less and takes what follows for another request; this is where that ends.
+// Returns null if the message ends with its head, or for a POST with Content-Length bytes after it. Beast treats a GET
+// with `Transfer-Encoding: gzip` as having no body and parses the following bytes as another request; this check
+// prevents that.
 const char* FramingProblem(const Fields& fields) {
   if (fields.count(http::field::transfer_encoding) > 0) return "Transfer-Encoding is not accepted";
   const auto lengths = fields.count(http::field::content_length);
@@ -113,7 +114,7 @@ RequestFields FieldsOf(const Fields& sent) {
   return fields;
 }
 
-// Lines that no two readers understand differently; any other goes through the whole parser.
+// Accepts only unambiguous lines; others go through the full parser.
 struct PlainLine {
   Method method;
   std::string_view name, target;
@@ -180,9 +181,9 @@ bool IsHostValue(std::string_view value) {
 }
 
 tl::expected<std::size_t, BadRequest> FindHeadEnd(std::string_view bytes, std::size_t scanned) {
-  const std::size_t from = std::max<std::size_t>(scanned, 3) - 3;  // the end may lie across two reads
+  const std::size_t from = std::max<std::size_t>(scanned, 3) - 3;  // the end may be split between two reads
   const std::size_t end = bytes.find("\r\n\r\n", from);
-  const std::string_view head = bytes.substr(0, end);  // all of it when there is no end
+  const std::string_view head = bytes.substr(0, end);  // all of it if there is no end
   // The longest method that is answered, two spaces and " HTTP/1.1" around the target.
   const std::size_t first_line = head.find("\r\n");
   if (std::min(first_line, head.size()) > kMaxTargetBytes + 18) return Bad(414, "the request target is too long");
@@ -227,7 +228,7 @@ Request FirstLineOf(std::string_view bytes) {
 }
 
 tl::expected<Request, BadRequest> ParseHead(std::string_view head, HeadMemo* memo) {
-  // Beast unfolds continued lines; another reader may see a field there.
+  // Beast unfolds continued lines; another parser may see a field there.
   if (head.find("\r\n ") != std::string_view::npos || head.find("\r\n\t") != std::string_view::npos) {
     return Bad(400, "folded header lines are not accepted");
   }
@@ -249,7 +250,7 @@ tl::expected<Request, BadRequest> ParseHead(std::string_view head, HeadMemo* mem
   request.keep_alive = WantsKeepAlive(fields);
   request.method_name = std::string(fields.method_string());
   RequestFields said = FieldsOf(fields);
-  // RFC 9112, section 3.2.2: whatever Host says. Remember takes no such target.
+  // RFC 9112, section 3.2.2: overrides Host. Remember does not accept such targets.
   if (const std::optional<std::string_view> rest = AfterScheme(fields.target())) {
     said.host = std::string(rest->substr(0, rest->find_first_of("/?#")));
     if (said.host.empty() || !IsHostValue(said.host)) return Bad(400, "malformed host in the request target");
@@ -257,7 +258,7 @@ tl::expected<Request, BadRequest> ParseHead(std::string_view head, HeadMemo* mem
   request.fields = SharedFields(std::move(said));
   request.target = std::string(fields.target());
   request.content_length = static_cast<std::size_t>(*PlainLength(fields));
-  // RFC 9110, section 10.1.1: HTTP/1.0 knows no interim replies.
+  // RFC 9110, section 10.1.1: HTTP/1.0 has no interim replies.
   request.expects_continue =
       fields.version() >= 11 && boost::beast::iequals(fields[http::field::expect], "100-continue");
   if (memo != nullptr) Remember(head, request, *memo);

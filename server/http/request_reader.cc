@@ -33,7 +33,7 @@ asio::awaitable<RequestReader::Head> RequestReader::ReadHead(Request& request, S
   stream_.ExpiresAt(begun ? timeout : std::min(timeout, close_at_));
   is_first_ = false;
   for (;;) {
-    // RFC 9112, section 2.2: empty lines before a request are to be ignored.
+    // RFC 9112, section 2.2: empty lines before a request are ignored.
     while (Unread().starts_with("\r\n")) {
       Consume(2);
       scanned = 0;
@@ -68,11 +68,11 @@ asio::awaitable<RequestReader::Head> RequestReader::ReadHead(Request& request, S
     if (got) continue;
     if (stream_.expired() && begun) co_return refused(TooSlow());
     if (!stream_.expired() || !stream_.socket().is_open()) co_return std::nullopt;
-    Close();  // the wait is over, and a request may have arrived in this very moment
+    Close();  // the wait is over, but a request may have arrived at the same time
   }
 }
 
-// For so many bytes behind the unread ones.
+// A buffer for `bytes` bytes after the unread ones.
 asio::mutable_buffer RequestReader::Room(std::size_t bytes) {
   std::copy(buffer_.begin() + begin_, buffer_.begin() + end_, buffer_.begin());
   end_ -= std::exchange(begin_, 0);
@@ -86,7 +86,7 @@ asio::awaitable<Transfer> RequestReader::Fill(std::size_t room) {
   co_return got;
 }
 
-// False: there was nothing.
+// Returns false if no bytes had arrived.
 bool RequestReader::FillWithWhatArrived() {
   const std::size_t got = stream_.ReadReady(Room(kMaxHeadBytes - Unread().size())).value_or(0);
   end_ += got;

@@ -60,7 +60,7 @@ void PutStatus(std::string& head, unsigned version, int status) {
   head.append(" ").append(ReasonPhrase(status)).append("\r\n");
 }
 
-// The Date header of now. Every thread keeps the line of its last second.
+// The current Date header. Every thread caches the line of the last second.
 void PutDate(std::string& head) {
   thread_local std::time_t second = 0;
   thread_local std::string line;
@@ -73,7 +73,7 @@ void PutDate(std::string& head) {
 
 bool HasBody(int status) { return status != 204 && status != 304; }
 
-// What the reply says of its body.
+// The header lines that describe the body.
 void PutContent(std::string& head, const Response& response) {
   if (response.lines) {
     head += std::string_view(*response.lines).substr(HasBody(response.status) ? 0 : response.lines_of_body);
@@ -131,7 +131,7 @@ std::string SerializeHead(const Response& response, const HeadOptions& options) 
   for (const Response::Header& header : response.headers) Put(head, header.name, header.value);
   head += cors.HeadersFor(options.origin);
   head += "X-Content-Type-Options: nosniff\r\n";
-  // RFC 9112, section 9.3: since HTTP/1.1 a connection stays open unless somebody says otherwise.
+  // RFC 9112, section 9.3: in HTTP/1.1 a connection stays open by default.
   if (!options.keep_alive) head += "Connection: close\r\n";
   if (options.keep_alive && options.version == 10) head += "Connection: keep-alive\r\n";
   head += "\r\n";
@@ -161,12 +161,12 @@ Response Conditional(Response response, const Request& request) {
 }
 
 bool MatchesEtag(std::string_view if_none_match, std::string_view etag) {
-  if (etag.empty()) return false;  // not even "*": there is nothing that the client could have
+  if (etag.empty()) return false;  // not even "*", because there is no representation
   std::string_view rest = Trim(if_none_match);
   if (rest == "*") return true;
   while (!rest.empty()) {
     if (rest.starts_with("W/")) rest.remove_prefix(2);
-    if (!rest.starts_with('"')) return false;  // not a list of ETags: as if it were absent
+    if (!rest.starts_with('"')) return false;  // not a list of ETags: treated as absent
     const std::size_t close = rest.find('"', 1);
     if (close == std::string_view::npos) return false;
     if (rest.substr(0, close + 1) == etag) return true;

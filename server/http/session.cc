@@ -31,8 +31,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// How long, and for how many bytes, a closed connection is still read. Bytes left unread would make the kernel send a
-// reset, which destroys the part of the last reply that the client has not read yet.
+// How long, and how many bytes of, a closing connection are still read. Unread bytes would make the kernel send a
+// reset, which discards the part of the last reply that the client has not read yet.
 constexpr std::chrono::milliseconds kLingerTime{500};
 constexpr std::size_t kLingerBytes = std::size_t{64} << 20;
 constexpr int kClientLeft = 499;
@@ -43,7 +43,7 @@ Response Overloaded(std::string_view detail, std::string_view request_id) {
   return response;
 }
 
-// Asked before a body is read: nothing if it may come.
+// Checked before a body is read: nothing if it may be sent.
 std::optional<Response> WhyNoBody(const Request& request, std::size_t max_body_bytes) {
   if (request.content_length > max_body_bytes) {
     return ProblemResponse(413, "the request body is too large", request.id);
@@ -56,7 +56,7 @@ std::optional<Response> WhyNoBody(const Request& request, std::size_t max_body_b
   return std::nullopt;
 }
 
-// A request's body and its room.
+// A request's body and its hold on the transfer budget.
 struct HeldBody {
   TransferBudget::Hold room;
   std::string text;
@@ -85,12 +85,12 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   void Displace() override { Post(&Session::DisplaceHere); }
 
  private:
-  // The request that the session is at.
+  // The current request.
   struct Exchange {
     Request request;
     Admission admission;
     bool is_admitted = false;
-    Clock::time_point begun;  // at the end of its head
+    Clock::time_point begun;  // time at the end of its head
   };
 
   void Post(void (Session::*step)()) {
@@ -99,7 +99,7 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   void EvictHere() {
     hurried_ = true;
     reader_.Close();
-    if (phase() == Phase::kServes) return;                    // a request has come meanwhile
+    if (phase() == Phase::kServes) return;                    // a request has arrived meanwhile
     if (!reader_.waiting() || served_ == 0) stream_.Reset();  // an unfinished head or handshake
   }
   void DrainHere() { reader_.Close(context_->options.drain_grace); }
@@ -108,10 +108,10 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
     stream_.Reset();
   }
 
-  // Its reply is under way, or its body has no room: then there is nothing to give up.
+  // If its reply is being sent, or its body has no memory, there is nothing to release.
   void DisplaceHere() {
     if (!has_upload_ && !is_receiving_) return;
-    displaced_ = true;  // also between the moment its body got room and the one in which it hears of that
+    displaced_ = true;  // also between the moment its body got memory and the moment it is woken
     if (is_receiving_ && has_upload_) stream_.Cancel();
     displacement_.cancel();
   }
@@ -143,14 +143,15 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   std::unique_ptr<ConnectionHandler> handler_;
   std::string peer_text_ = "-";
   Exchange exchange_;
-  Clock::time_point replied_;  // when the last reply was told about: the present, once the next request is waited for
+  Clock::time_point
+      replied_;  // when the last reply was reported; about the current time when the next request is awaited
   std::uint64_t served_ = 0;
   std::atomic<Phase> phase_ = Phase::kReceives;  // written on the session's own thread
-  bool hurried_ = false;                         // others wait for this connection's place
+  bool hurried_ = false;                         // another connection needs this one's place
   asio::steady_timer displacement_;              // never expires; cancelled when displaced_ is set
-  bool has_upload_ = false;                      // the request's body has room that others may need
+  bool has_upload_ = false;                      // the request's body holds memory that others may need
   bool is_receiving_ = false;                    // the body is being read
-  bool displaced_ = false;                       // others need the room of the request's body
+  bool displaced_ = false;                       // others need the memory of the request's body
 };
 
 asio::awaitable<void> Session::ServeAll() {
@@ -163,7 +164,7 @@ asio::awaitable<void> Session::ServeAll() {
   replied_ = Clock::now();
   for (bool keep = true; keep;) {
     if (served_ > 0) phase_.store(Phase::kIdle, std::memory_order_relaxed);
-    // Requests that were sent without waiting for replies take turns with those of other connections.
+    // Pipelined requests take turns with requests of other connections.
     if (served_ > 0 && reader_.has_unread()) {
       co_await asio::post(stream_.socket().get_executor(), asio::use_awaitable);
     }
@@ -182,7 +183,7 @@ asio::awaitable<void> Session::ServeAll() {
   co_await CloseGently();
 }
 
-// What follows cannot be trusted to be a request.
+// The following bytes may not be a request.
 asio::awaitable<void> Session::RefuseMessage(BadRequest why) {
   if (exchange_.request.id.empty()) exchange_.request.id = RequestId::Next();
   Response response = ProblemResponse(why.status, why.detail, exchange_.request.id);
@@ -190,7 +191,7 @@ asio::awaitable<void> Session::RefuseMessage(BadRequest why) {
   co_await Reply(response);
 }
 
-// False: the connection is to be closed.
+// Returns false if the connection must be closed.
 asio::awaitable<bool> Session::ServeOne() {
   Request& request = exchange_.request;
   request.id = RequestId::Next();
@@ -220,7 +221,7 @@ asio::awaitable<bool> Session::ServeOne() {
   co_return co_await Reply(std::get<Response>(answer), /*can_respond_again=*/true);
 }
 
-// False, as nobody waits for the answer: the client is gone, or the request's room goes to others.
+// Returns false if nobody waits for the answer: the client is gone, or others get the request's memory.
 asio::awaitable<bool> Session::GiveUp() {
   if (displaced_) {
     co_await RefuseUpload();
@@ -233,8 +234,8 @@ asio::awaitable<bool> Session::GiveUp() {
   co_return false;
 }
 
-// False: it did not come, what was to be said has been said, and the connection is to be closed. A body has room as a
-// whole once more than kFreeBytes of it have come: whoever only announces one takes nothing.
+// Returns false if the body did not arrive; the client has been told, and the connection must be closed. Memory for the
+// whole body is taken once more than kFreeBytes of it have arrived: announcing a body takes no memory.
 asio::awaitable<bool> Session::ReceiveBody() {
   Request& request = exchange_.request;
   auto body = std::make_shared<HeldBody>();
@@ -263,18 +264,18 @@ asio::awaitable<bool> Session::ReceiveBody() {
   }
   is_receiving_ = false;
   if (displaced_) {
-    body.reset();  // its room is waited for
+    body.reset();  // release its memory while waiting
     co_await RefuseUpload();
   }
   if (!read && !displaced_ && read.error().status > 0) co_await RefuseMessage(read.error());
   if (!read || displaced_) co_return false;
   phase_.store(Phase::kServes, std::memory_order_relaxed);
-  body->room.Settle();  // it is the server's turn
+  body->room.Settle();  // from now on, the server determines the duration
   request.body = RequestBody(std::shared_ptr<const std::string>(body, &body->text));
   co_return true;
 }
 
-// Its room goes to others: nothing of it is kept.
+// Others get its memory: release the body.
 asio::awaitable<void> Session::RefuseUpload() {
   exchange_.request.body = RequestBody();
   has_upload_ = is_receiving_ = false;
@@ -290,11 +291,11 @@ asio::awaitable<void> Session::DelayRefusal() {
   co_await delay.async_wait(asio::use_awaitable);
 }
 
-// Nothing: the client is gone, or the request's room goes to others. Most answers need not be waited for, and then
-// neither a timer nor a second coroutine watches the client.
+// Returns nothing if the client is gone, or if others get the request's memory. Most answers are ready at once, and
+// then neither a timer nor a second coroutine watches the client.
 asio::awaitable<std::optional<Response>> Session::WhileConnected(asio::awaitable<Response> answer) {
   using asio::experimental::awaitable_operators::operator||;
-  stream_.ExpiresNever();  // handlers have deadlines of their own
+  stream_.ExpiresNever();  // handlers have their own deadlines
   std::variant<Response, std::monostate> first = co_await (Await(std::move(answer)) || Interrupted());
   if (first.index() == 1) co_return std::nullopt;
   co_return std::move(std::get<0>(first));
@@ -303,7 +304,7 @@ asio::awaitable<std::optional<Response>> Session::WhileConnected(asio::awaitable
 asio::awaitable<void> Session::Interrupted() {
   using asio::experimental::awaitable_operators::operator||;
   if (!has_upload_) co_return co_await ClientLeft(stream_);
-  boost::system::error_code ignored;  // cancelled, which is what is waited for
+  boost::system::error_code ignored;  // the expected cancellation
   auto displaced = asio::redirect_error(asio::use_awaitable, ignored);
   if (!displaced_) co_await (ClientLeft(stream_) || displacement_.async_wait(std::move(displaced)));
 }
@@ -327,7 +328,7 @@ asio::awaitable<Response> Session::Await(asio::awaitable<Response> answer) {
 
 Response Session::Failed(const std::exception& exception) const {
   const auto* const of_system = dynamic_cast<const boost::system::system_error*>(&exception);
-  // The client has left, which nobody needs to be told.
+  // The client has left: nothing to send.
   if (of_system != nullptr && of_system->code() == asio::error::operation_aborted) {
     return ProblemResponse(503, "cancelled", exchange_.request.id);
   }
@@ -348,15 +349,16 @@ TransferBudget::Ask Session::AskFor(const Response& response) const {
   return ask;
 }
 
-// Lets go of the reply's body, waits for room for it, and makes the reply again, mostly from a cache: what waits must
-// not take the memory that it waits for. Nothing: there was none before the deadline, or the client is gone.
+// Releases the reply's body, waits for memory, and makes the reply again, usually from a cache: a waiting body must not
+// occupy the memory that it waits for. Returns nothing if there was no memory before the deadline, or if the client is
+// gone.
 asio::awaitable<std::optional<TransferBudget::Hold>> Session::RoomLater(Response& response) {
   using asio::experimental::awaitable_operators::operator||;
   for (;;) {
     TransferBudget::Ask ask = AskFor(response);
     const std::size_t bytes = ask.bytes;
     ask.body = nullptr;
-    Response bare;  // its lines refer to the body's owner too
+    Response bare;  // its lines share ownership with the body
     bare.labels = std::move(response.labels);
     response = std::move(bare);
     stream_.ExpiresNever();
@@ -372,13 +374,14 @@ asio::awaitable<std::optional<TransferBudget::Hold>> Session::RoomLater(Response
     }
     response = std::get<Response>(std::move(again));
     response.for_grant = response.for_grant || exchange_.admission.for_grant;
-    if (SendsBody(response) && response.body->size() > bytes) continue;  // of another dataset than before
+    if (SendsBody(response) && response.body->size() > bytes) continue;  // the dataset may have changed
     room->Keep(response.body);
     co_return room;
   }
 }
 
-// False: the connection is to be closed. `response` has to live as long, and may be let go where it can be made again.
+// Returns false if the connection must be closed. `response` must outlive the call, and may be released if it can be
+// made again.
 asio::awaitable<bool> Session::Reply(Response& response, bool can_respond_again) {
   const Request& request = exchange_.request;
   if (can_respond_again) response.for_grant = response.for_grant || exchange_.admission.for_grant;
@@ -398,7 +401,7 @@ asio::awaitable<bool> Session::Reply(Response& response, bool can_respond_again)
     co_await DelayRefusal();
   }
   has_upload_ = false;
-  exchange_.request.body = RequestBody();  // nothing of it is held while the client takes its time
+  exchange_.request.body = RequestBody();  // released before the client reads the reply
   HeadOptions options;
   options.version = request.version;
   options.keep_alive = request.keep_alive && !response.close && !reader_.closing();
@@ -410,7 +413,7 @@ asio::awaitable<bool> Session::Reply(Response& response, bool can_respond_again)
 
   BufferPair left = {asio::buffer(head), body_bytes > 0 ? asio::buffer(*response.body) : asio::const_buffer()};
   Skip(stream_.TakeAhead(), left);
-  // What the kernel takes at once needs no deadline. An error shows again when the rest is written.
+  // What the kernel accepts at once needs no deadline. An error occurs again when the rest is written.
   const std::size_t taken = stream_.WriteReady(left).value_or(0);
   Skip(taken, left);
   const bool written = asio::buffer_size(left) == 0 || co_await WriteRest(left, taken, *room);
@@ -418,8 +421,8 @@ asio::awaitable<bool> Session::Reply(Response& response, bool can_respond_again)
   co_return options.keep_alive&& written;
 }
 
-// False: the client is gone, took nothing for too long, or takes too little in the long run. `total`: bytes of the
-// reply that were written before, which tells nothing of the client: the kernel took them.
+// Returns false if the client is gone, has read nothing for too long, or reads too slowly on average. `total`: bytes of
+// the reply that were written before. They say nothing about the client, because the kernel buffers them.
 asio::awaitable<bool> Session::WriteRest(BufferPair left, std::size_t total, TransferBudget::Hold& room) {
   const SessionOptions& options = context_->options;
   room.Took(0);

@@ -8,13 +8,13 @@
 
 namespace terrace::server {
 
-// Without `blanks` at either end.
+// Removes `blanks` from both ends.
 std::string_view Trim(std::string_view text, std::string_view blanks = " \t");
 
 std::string Lower(std::string_view text);
 bool EqualsIgnoringCase(std::string_view a, std::string_view b);
 
-// What follows "http://" or "https://", in any case; nothing where the text begins with neither.
+// Returns the text after "http://" or "https://", in upper or lower case; nothing if the text begins with neither.
 std::optional<std::string_view> AfterScheme(std::string_view text);
 
 // Removes from `rest` the piece before the next `separator`, and the separator. Returns the piece, trimmed of `blanks`.

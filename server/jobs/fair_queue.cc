@@ -11,10 +11,10 @@ using Seconds = std::chrono::duration<double>;
 // A job goes before one of the next deeper level that has waited for this long.
 constexpr std::chrono::milliseconds kAgeOfLevel{100};
 
-// A mean follows the last jobs of its kind, about so many.
+// A mean covers about this number of the last jobs of its kind.
 constexpr unsigned kMeanSamples = 32;
 
-// Clients without jobs that are remembered. Where there are more, all of them start at the present again.
+// The limit of clients without jobs whose use is remembered. If there are more, all of them are forgotten.
 constexpr std::size_t kMaxIdle = 4096;
 
 JobClock::time_point KeyOf(const JobOrder& order, JobClock::time_point now) { return now + order.level * kAgeOfLevel; }
@@ -36,7 +36,7 @@ void FairQueue::Push(PoolJobPtr job, JobClock::time_point now) {
   job->key = KeyOf(job->order, now);
   job->number = next_number_++;
   job->expected_s = MeanOf(job->order).seconds;
-  // What may fail for want of memory comes first; Take must not.
+  // Allocations come first, because they may fail; Take must not fail.
   client.started.reserve(threads_);
   client.waiting[length].emplace(job->key, job);
   job->state = PoolJob::State::kWaiting;
@@ -51,7 +51,7 @@ void FairQueue::Push(PoolJobPtr job, JobClock::time_point now) {
 
 bool FairQueue::HasNext(bool all) const { return size_ > long_waiting_ || (size_ > 0 && MayRunLong(all)); }
 
-// Null: none that may run.
+// Returns null if no job may run.
 PoolJobPtr* FairQueue::FirstOf(Client& client, bool all) const {
   Waiting &shorter = client.waiting[kShort], &longer = client.waiting[kLong];
   const bool may_long = !longer.empty() && MayRunLong(all);
@@ -140,7 +140,7 @@ Seconds FairQueue::ExpectedWait(const JobOrder& order, JobClock::time_point now)
   return Seconds(ahead / (length == kLong ? max_long_ : threads_));
 }
 
-// Of those that wait.
+// Removes a waiting job.
 void FairQueue::Erase(Client& client, const PoolJobPtr& job) {
   const Length length = LengthOf(*job);
   Waiting& waiting = client.waiting[length];
@@ -152,11 +152,11 @@ void FairQueue::Erase(Client& client, const PoolJobPtr& job) {
   if (length == kLong) --long_waiting_;
 }
 
-// It has no jobs any more.
+// The client has no jobs any more.
 void FairQueue::Leave(Clients::iterator client) {
   if (client->second.used_s <= now_s_) clients_.erase(client);
   if (--active_ == 0) {
-    clients_.clear();  // nobody was kept waiting, so nobody owes anything
+    clients_.clear();  // no client has waited, so all start equal again
     now_s_ = 0;
   } else if (clients_.size() - active_ > kMaxIdle) {
     std::erase_if(clients_, [](const auto& known) { return !known.second.active(); });

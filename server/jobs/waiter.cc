@@ -11,12 +11,12 @@ namespace terrace::server {
 void Wake(WaiterPtr waiter) {
   if (!waiter) return;
   const auto executor = waiter->get_executor();
-  // Nothing of it may be left here once it is posted there.
+  // The waiter's thread may run at once: keep no reference here.
   const std::weak_ptr<asio::steady_timer> timer = std::exchange(waiter, nullptr);
   while (WaiterPtr here = timer.lock()) {
     try {
       return asio::post(executor, [waiter = std::move(here)] { waiter->cancel(); });
-    } catch (const std::exception&) {  // no memory; without waking it would wait to its deadline
+    } catch (const std::exception&) {  // no memory; the waiter then waits until its deadline
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }
   }

@@ -10,7 +10,7 @@ Error FailureOf(std::string_view name, const std::exception& thrown) {
   try {
     return Error{ErrorCode::kUnavailable, std::string(name) + ": " + thrown.what()};
   } catch (const std::exception&) {
-    return Error{ErrorCode::kUnavailable, "no memory"};  // for a longer message neither
+    return Error{ErrorCode::kUnavailable, "no memory"};  // no memory for a longer message either
   }
 }
 
@@ -40,7 +40,7 @@ Result<void> WorkerPool::Submit(PoolJobPtr job) {
     const std::lock_guard lock(mutex_);
     if (cancel_.stop_requested()) return MakeError(ErrorCode::kUnavailable, "the server is shutting down");
     const JobClock::time_point now = now_();
-    // Compared as seconds: a deadline may be the last time there is.
+    // Compared in seconds, because a deadline may be time_point::max().
     if (queue_.ExpectedWait(job->order, now) > std::chrono::duration<double>(job->order.deadline - now)) {
       return MakeError(ErrorCode::kOverloaded, "too much work is waiting to begin with this before its deadline");
     }
@@ -88,7 +88,7 @@ void WorkerPool::Serve() {
     --idle_;
     lock.unlock();
     job->run();
-    job->run = nullptr;  // what it holds is released outside the lock
+    job->run = nullptr;  // its captures are released outside the lock
     job->displaced = nullptr;
     lock.lock();
     ++idle_;

@@ -1,4 +1,4 @@
-// Addresses of connections' ends.
+// IP addresses of connections.
 #pragma once
 
 #include <boost/asio/ip/address.hpp>
@@ -7,7 +7,7 @@
 
 namespace terrace::server {
 
-// IPv4 in its own form, also where it came as ::ffff:192.0.2.1.
+// Converts IPv4-mapped IPv6 addresses (::ffff:192.0.2.1) to IPv4.
 asio::ip::address Canonical(const asio::ip::address& address);
 
 }  // namespace terrace::server

@@ -20,10 +20,10 @@ constexpr std::chrono::milliseconds kPatience{100};
 // of the connection.
 constexpr std::chrono::milliseconds kInterval{250};
 
-// What every reply begins with; RFC 9112, section 4.
+// The beginning of every reply; RFC 9112, section 4.
 constexpr std::string_view kReplyBegin = "HTTP/1.";
 
-// As the kernel has it: TCP_ESTABLISHED, TCP_CLOSE_WAIT once the client has ended its sending, ...
+// The kernel's state: TCP_ESTABLISHED, TCP_CLOSE_WAIT once the client has closed its sending direction, ...
 int StateOf(asio::ip::tcp::socket& socket) {
   tcp_info info{};
   socklen_t size = sizeof info;
@@ -46,7 +46,7 @@ asio::awaitable<void> ClientLeft(Stream& stream) {
   asio::ip::tcp::socket& socket = stream.socket();
   asio::steady_timer timer(co_await asio::this_coro::executor, kPatience);
   co_await timer.async_wait(asio::use_awaitable);
-  // An error: the socket was closed here, and the client has been sent away.
+  // On an error the socket was closed here, so the client is gone.
   boost::system::error_code closed;
   co_await socket.async_wait(asio::ip::tcp::socket::wait_read, asio::redirect_error(asio::use_awaitable, closed));
   if (closed) co_return;

@@ -48,7 +48,7 @@ bool ConnectionSet::draining() const {
   return draining_;
 }
 
-// Connections are told without the lock: the last reference to one may end here, and it then removes itself.
+// Connections are called without the lock: the last reference to one may end here, and its destructor calls Remove.
 std::vector<std::shared_ptr<Connection>> ConnectionSet::Snapshot() const {
   std::vector<std::shared_ptr<Connection>> connections;
   const std::lock_guard lock(mutex_);

@@ -10,8 +10,7 @@ namespace terrace::server {
 
 namespace {
 
-// What throws here is what a handler could not catch: there was no memory to go on. It has ended one thing; the others
-// go on.
+// Exceptions arrive here if memory is exhausted. They end one operation; the others continue.
 void RunAll(asio::io_context& io) {
   for (;;) {
     try {

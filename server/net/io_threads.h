@@ -15,18 +15,18 @@ namespace terrace::server {
 
 class IoThreads {
  public:
-  // Precondition: at least one.
+  // Precondition: `count` is at least 1.
   explicit IoThreads(unsigned count);
   ~IoThreads() { Stop(); }
 
   void Start();
 
-  // Returns when every thread has ended; what still waits never runs. Not from one of the threads.
+  // Stops and joins all threads; pending work never runs. Do not call it from one of the threads.
   void Stop();
 
   asio::io_context& first() { return threads_.front()->io; }
 
-  // Takes turns. From any thread.
+  // Returns the contexts in turn. Thread-safe.
   asio::io_context& Next() { return threads_[turn_.fetch_add(1, std::memory_order_relaxed) % threads_.size()]->io; }
 
  private:

@@ -19,8 +19,7 @@ using boost::system::error_code;
 using Clock = Stream::Clock;
 using NotSentLowWater = asio::detail::socket_option::integer<IPPROTO_TCP, TCP_NOTSENT_LOWAT>;
 
-// Bytes of a reply that the kernel takes before the client does. The kernel's own bound grows to megabytes, for each of
-// the clients that read slowly.
+// Limit of the kernel's send buffer. The kernel's default grows to megabytes for each slow client.
 constexpr int kUnsentBytes = 128 * 1024;
 
 }  // namespace
@@ -37,7 +36,7 @@ struct Stream::State : std::enable_shared_from_this<State> {
     if (context) tls.emplace(socket, *context);
   }
 
-  // A wait is only replaced where it would end too late: a busy connection hardly ever touches its timer.
+  // The timer is only changed if it would expire too late: a busy connection rarely changes it.
   void Watch() {
     if (watching && timer.expiry() <= deadline) return;
     watching = true;

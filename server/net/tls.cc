@@ -14,11 +14,11 @@ namespace {
 
 namespace ssl = asio::ssl;
 
-// For TLS 1.2, whose list also has ciphers without forward secrecy or authentication of each record; every suite of 1.3
-// has both.
+// For TLS 1.2, which also has ciphers without forward secrecy or authenticated encryption; every suite of TLS 1.3 has
+// both.
 constexpr const char* kCiphers = "ECDHE+AESGCM:ECDHE+CHACHA20";
 
-// ALPN: clients that would rather speak HTTP/2 are told that this is HTTP/1.1.
+// ALPN: selects HTTP/1.1 for clients that prefer HTTP/2.
 int ChooseProtocol(SSL*, const unsigned char** out, unsigned char* out_size, const unsigned char* in, unsigned in_size,
                    void*) {
   static constexpr unsigned char kOurs[] = "\x08http/1.1";
@@ -47,7 +47,7 @@ Result<std::shared_ptr<ssl::context>> Load(const std::filesystem::path& certific
     ::SSL_CTX_set_alpn_select_cb(native, ChooseProtocol, nullptr);
     context->use_certificate_chain_file(certificate.string());
     file = &key;
-    context->use_private_key_file(key.string(), ssl::context::pem);  // throws where another key of its kind is due
+    context->use_private_key_file(key.string(), ssl::context::pem);  // throws if a key of another type is required
     if (::SSL_CTX_check_private_key(native) != 1) return mismatch();
     return context;
   } catch (const boost::system::system_error& error) {

@@ -12,23 +12,21 @@
 namespace terrace::server {
 namespace {
 
-// Who waits looks so often whether others have had their time, and whether it was overlooked when there was no memory
-// to wake it.
+// How often a waiter checks for late holders, and whether it could not be woken because memory was exhausted.
 constexpr std::chrono::milliseconds kLook{250};
 
 // Parts of the memory.
 constexpr std::size_t kRepliesPart = 2, kLargePart = 4, kUploadsPart = 4;
-// A small reply, of its room.
+// The largest small reply, as a part of its room.
 constexpr std::size_t kSmallPart = 8;
 
-// What a client has used is compared in steps of an eighth of its room for a second: less does not take its place in
-// the line from it.
+// Use is compared in steps of an eighth of the room for a second: smaller differences do not change the order.
 constexpr double kClaimSteps = 8;
 constexpr std::chrono::duration<double> kHalfLife{10};
 
 }  // namespace
 
-// In waiters_ while it lives, which is in a frame of HoldWhenRoom.
+// A local object of HoldWhenRoom; in waiters_ during its lifetime.
 class TransferBudget::Waiter {
  public:
   Waiter(TransferBudget& owner, const Ask& asked, const asio::any_io_executor& executor)
@@ -91,7 +89,7 @@ asio::awaitable<std::optional<TransferBudget::Hold>> TransferBudget::HoldWhenRoo
     for (const auto& connection : victims.cut) connection->Abort();
     for (const auto& connection : victims.displaced) connection->Displace();
     waiter.timer->expires_after(std::min<Clock::duration>(deadline - now, kLook));
-    boost::system::error_code ignored;  // woken, or time to look
+    boost::system::error_code ignored;  // woken, or time for a check
     co_await waiter.timer->async_wait(asio::redirect_error(asio::use_awaitable, ignored));
   }
 }
@@ -101,7 +99,7 @@ std::size_t TransferBudget::HeldBy(std::uint64_t client, const Room& room) {
   return own == room.shares.end() ? 0 : own->second.bytes;
 }
 
-// Use grows by `bytes` a second and is forgotten by half each kHalfLife, which has a limit for constant `bytes`.
+// Use grows by `bytes` per second and decays by half every kHalfLife. For constant `bytes` it converges.
 void TransferBudget::Age(Share& share, Clock::time_point now) {
   const double life = kHalfLife.count() / std::log(2.0);
   const double limit = static_cast<double>(share.bytes) * life;
@@ -110,7 +108,7 @@ void TransferBudget::Age(Share& share, Clock::time_point now) {
   share.as_of = now;
 }
 
-// The room that it has used lately or may use before it is late, in steps.
+// The client's recent use plus what it may use before it is late, in steps.
 std::uint64_t TransferBudget::Claim(std::uint64_t client, const Room& room, Clock::time_point now) {
   const auto own = room.shares.find(client);
   if (own == room.shares.end()) return 0;
@@ -121,7 +119,7 @@ std::uint64_t TransferBudget::Claim(std::uint64_t client, const Room& room, Cloc
   return static_cast<std::uint64_t>((share.used + coming) / step);
 }
 
-// Aged. Those of clients that are as if they had never come are dropped from time to time.
+// Returns the aged share. From time to time, drops shares that have decayed to nothing.
 TransferBudget::Share& TransferBudget::ShareOf(std::uint64_t client, Room& room, Clock::time_point now) {
   if (room.shares.size() >= room.sweep_at) {
     std::erase_if(room.shares,
@@ -133,7 +131,7 @@ TransferBudget::Share& TransferBudget::ShareOf(std::uint64_t client, Room& room,
   return share;
 }
 
-// `waiter`: whose place in the line it is; null: the last.
+// `waiter`: the waiter that asks; null: a new request, which is last in the order.
 bool TransferBudget::MayTake(const Ask& ask, Clock::time_point now, const Waiter* waiter) const {
   const std::size_t number = RoomOf(ask);
   const Room& room = rooms_[number];
@@ -145,7 +143,7 @@ bool TransferBudget::MayTake(const Ask& ask, Clock::time_point now, const Waiter
   return Claim(ask.client, room, now) < Claim(next->ask.client, room, now);
 }
 
-// Whoever waits.
+// Any waiter.
 bool TransferBudget::HasRoom(const Ask& ask) const {
   const std::size_t number = RoomOf(ask);
   const Room& room = rooms_[number];
@@ -155,7 +153,7 @@ bool TransferBudget::HasRoom(const Ask& ask) const {
   return number == kUploads || own == 0 || own + ask.bytes <= kShare * (room.capacity - room.held - ask.bytes);
 }
 
-// The oldest of the client that claims least.
+// The oldest waiter of the client with the smallest claim.
 TransferBudget::Waiter* TransferBudget::NextWaiter(std::size_t room, Clock::time_point now) const {
   Waiter* next = nullptr;
   std::uint64_t least = 0;
@@ -178,7 +176,7 @@ std::optional<TransferBudget::Hold> TransferBudget::Take(const Ask& ask, Clock::
   Room& room = rooms_[number];
   auto late_at = Clock::time_point::max();
   if (ask.kind == Kind::kUpload) late_at = now + kGrace + std::chrono::milliseconds(ask.bytes * 1000 / kRate);
-  // What may fail for want of memory comes first.
+  // Allocations come first, because they may fail.
   Entries made;
   made.push_back({ask.body.get(), number, late_at, ask.holder, ask.client});
   if (!ask.body) made.front().charge = &made.front();
@@ -192,11 +190,11 @@ std::optional<TransferBudget::Hold> TransferBudget::Take(const Ask& ask, Clock::
     (is_beyond ? reserve_held_ : room.held) += ask.bytes;
     own.bytes += ask.bytes;
   }
-  if (waiter != nullptr) WakeNext(number, now);  // there may be room for the next one too
+  if (waiter != nullptr) WakeNext(number, now);  // there may be memory for the next one too
   return Hold(this, entry, ask.body);
 }
 
-// Each is told once; its room comes back when its connection has ended, or its request was let go.
+// Each connection is told once. Its memory is released when it has ended, or its request was refused.
 bool TransferBudget::Tell(Entry& entry, std::vector<std::shared_ptr<Connection>>& whom) {
   auto connection = entry.holder.lock();
   entry.holder.reset();
@@ -206,8 +204,8 @@ bool TransferBudget::Tell(Entry& entry, std::vector<std::shared_ptr<Connection>>
   return true;
 }
 
-// All late replies of the client that holds most, also where they were told before and have not ended yet. Vital ones
-// take from the asker too.
+// Chooses all late replies of the client that holds most, including those that were told before and have not ended yet.
+// Vital replies may also take memory from their own client.
 void TransferBudget::ChooseLate(const Ask& ask, Clock::time_point now, Victims& victims) {
   const std::size_t number = RoomOf(ask);
   const Room& room = rooms_[number];
@@ -235,7 +233,7 @@ void TransferBudget::ChooseUploads(const Ask& ask, Clock::time_point now, Victim
   std::uint64_t largest = ask.client;
   for (const auto& [client, share] : room.shares) {
     const std::size_t most = HeldBy(largest, room);
-    // A tie is broken by number, so that it does not depend on the table's order.
+    // Ties are broken by the client's number, so that the order of the table does not matter.
     if (share.bytes > most || (share.bytes == most && client < largest)) largest = client;
   }
   if (HeldBy(largest, room) > HeldBy(ask.client, room) + ask.bytes) {
@@ -248,7 +246,7 @@ void TransferBudget::ChooseUploads(const Ask& ask, Clock::time_point now, Victim
   }
 }
 
-// It belongs to its coroutine's thread: nothing of it may be left here once it is posted there.
+// The waiter belongs to its coroutine's thread, which may run at once: keep no reference here.
 void TransferBudget::WakeNext(std::size_t room, Clock::time_point now) {
   Waiter* next = NextWaiter(room, now);
   if (next == nullptr) return;
@@ -257,7 +255,7 @@ void TransferBudget::WakeNext(std::size_t room, Clock::time_point now) {
     asio::post(next->timer->get_executor(), [timer] {
       if (const auto here = timer.lock()) here->cancel();
     });
-  } catch (const std::exception&) {  // no memory: it looks by itself
+  } catch (const std::exception&) {  // no memory: the waiter's periodic check finds it
   }
 }
 
@@ -278,7 +276,7 @@ void TransferBudget::Release(Entries::iterator entry) {
     own.bytes -= charge.bytes;
     charges_.erase(found);
   } else if (charge.client == client) {
-    // From now on it counts against one of those who still read it.
+    // The body now counts against another client that still reads it.
     const auto heir = std::ranges::find_if(entries_, [&](const Entry& other) { return other.charge == found->first; });
     own.bytes -= charge.bytes;
     charge.client = heir->client;

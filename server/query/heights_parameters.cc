@@ -23,7 +23,7 @@ tl::unexpected<Error> Repeated(const char* name) {
   return MakeError(ErrorCode::kInvalidArgument, "{} is given more than once", name);
 }
 
-// Items are named by their number: their text is the client's, and nothing of it comes back.
+// Messages name items by their number, because they must not quote the client's text.
 Result<dem::GeoPosition> ParseLocation(std::string_view item, const char* name, std::size_t number) {
   const std::size_t comma = item.find(',');
   if (comma == std::string_view::npos) {
@@ -72,7 +72,7 @@ Result<void> HeightsParameters::EndName() {
     points_of_ = is_path ? "path" : "locations";
     is_path_ = is_path;
     target_ = Target::kPoints;
-    // A point takes 8 bytes of text, if not less, and 16 here.
+    // A point usually takes at least 8 bytes of text, and 16 bytes of memory.
     points_.reserve(std::min(max_locations_, text_bytes_ / 8));
     return {};
   }

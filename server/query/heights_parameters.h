@@ -1,5 +1,5 @@
-// The parameters of a request for heights, read from a query, a form or JSON as they arrive: points are understood one
-// by one, so that a list is read to its first fault or to the limit and is never held as text.
+// Parses the parameters of a height request from a query, a form or JSON in a streaming way: points are parsed one by
+// one, so that a list is read only up to its first error or to the limit, and is never stored as text.
 #pragma once
 
 #include <array>
@@ -15,16 +15,16 @@
 
 namespace terrace::server {
 
-// Each parameter at most once, except `v`, which is ignored. Errors are kInvalidArgument with a message for the client
-// that names the parameter and the item, and has nothing of the client's text in it.
+// Each parameter may occur once; `v` is ignored. Errors are kInvalidArgument. The message is for the client; it names
+// the parameter and the item, and quotes no text of the client.
 class HeightsParameters final : public ParameterSink {
  public:
   enum Text { kStep, kSamples, kDatum, kCertify, kTexts };
 
-  // Longest text of one point, and of any value but a list; two numbers with all their digits take 50.
+  // Limit for the text of one point, and of any value that is not a list. Two numbers with all digits take 50 bytes.
   static constexpr std::size_t kMaxItemBytes = 1000;
 
-  // `text_bytes`: about how much there is to read, for the memory of points.
+  // `text_bytes`: approximate size of the input, to reserve memory for points.
   HeightsParameters(std::size_t max_locations, std::size_t text_bytes)
       : max_locations_(max_locations), text_bytes_(text_bytes) {}
 
@@ -33,7 +33,7 @@ class HeightsParameters final : public ParameterSink {
   Result<void> AddToValue(std::string_view part) override;
   Result<void> EndValue() override;
 
-  // `locations`, or the corners of `path`; never both. Taken once.
+  // The points of `locations` or the corners of `path`; never both. TakePoints may be called once.
   bool has_points() const { return points_of_ != nullptr; }
   bool is_path() const { return is_path_; }
   std::vector<dem::GeoPosition> TakePoints() { return std::move(points_); }
@@ -49,14 +49,14 @@ class HeightsParameters final : public ParameterSink {
   std::string name_;
   Target target_ = Target::kNone;  // of the current value
   Text text_ = kStep;              // which, of a kText
-  std::string item_;               // of the current value: a point, or the whole of a short text
+  std::string item_;               // of the current value: a point, or a whole short text
   const char* points_of_ = nullptr;
   bool is_path_ = false;
   std::vector<dem::GeoPosition> points_;
   std::array<std::optional<std::string>, kTexts> texts_;
 };
 
-// The whole text, but for blanks, as a finite number.
+// Parses the whole text, apart from blanks, as a finite number.
 std::optional<double> NumberOf(std::string_view text);
 
 // kInvalidArgument: more points than one request may have.

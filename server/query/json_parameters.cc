@@ -1,5 +1,5 @@
 #include <boost/json/basic_parser_impl.hpp>
-#include <boost/json/src.hpp>  // the library, which has no other source here
+#include <boost/json/src.hpp>  // the library's implementation, compiled here
 #include <boost/system/errc.hpp>
 #include <limits>
 #include <utility>
@@ -11,11 +11,11 @@ namespace {
 
 using boost::system::error_code;
 
-// What Boost.JSON's parser calls. It hands texts on in parts, so that nothing here grows with the text.
+// The handler of Boost.JSON's parser. The parser passes texts in parts, so that memory does not grow with the text.
 class ObjectHandler {
  public:
   static constexpr std::size_t kUnlimited = std::numeric_limits<std::size_t>::max();
-  // The names are the library's.
+  // The library requires these names.
   static constexpr std::size_t max_object_size = kUnlimited, max_array_size = kUnlimited, max_key_size = kUnlimited,
                                max_string_size = kUnlimited;
 

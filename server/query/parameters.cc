@@ -15,7 +15,7 @@ class FormReader {
   // `at`: advances with the bytes read.
   Result<void> Read(std::string_view part, std::size_t& at) {
     const std::size_t begin = at;
-    std::size_t plain = 0;  // where the bytes begin that were not handed on yet; they stand for themselves
+    std::size_t plain = 0;  // beginning of the bytes that were not passed on yet; they need no decoding
     for (std::size_t i = 0; i < part.size(); ++i) {
       at = begin + i + 1;
       const char c = part[i];
@@ -83,7 +83,7 @@ class FormReader {
 
   const PlusSign plus_;
   ParameterSink& sink_;
-  bool in_name_ = true;     // of a piece; else in its value
+  bool in_name_ = true;     // in the name of a piece; else in its value
   bool has_begun_ = false;  // the piece is not empty
   int digits_left_ = 0, byte_ = 0;
 };

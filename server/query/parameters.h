@@ -1,7 +1,6 @@
 // Readers of named parameters: a URL's query or a form (application/x-www-form-urlencoded), and a flat JSON object.
-//
-// They go through the text once, part by part, and keep nothing of it: what a name or a value is worth, and how long it
-// may be, is the sink's business, and its error ends the reading at once.
+// They parse the text once, part by part, and store nothing. The sink interprets names and values and limits their
+// length; an error of the sink ends parsing at once.
 #pragma once
 
 #include <cstddef>
@@ -15,13 +14,14 @@ namespace terrace::server {
 
 inline constexpr std::size_t kPartBytes = std::size_t{64} << 10;
 
-// The next part of a text, at most kPartBytes; empty at its end. An error ends the reading.
+// Returns the next part of a text, at most kPartBytes; empty at its end. An error ends parsing.
 using TextParts = std::function<Result<std::string_view>()>;
 
-// Parts of `text`, which has to outlive them. kCancelled: a stop was requested before a part.
+// Divides `text`, which must outlive the parts. kCancelled: a stop was requested.
 TextParts PartsOf(std::string_view text, std::stop_token stop);
 
-// Takes one parameter after the other. Names and values come decoded, in parts of any size; either may have none.
+// Receives the parameters one after the other. Names and values are decoded and arrive in any number of parts, also
+// none.
 class ParameterSink {
  public:
   virtual ~ParameterSink() = default;
@@ -33,15 +33,13 @@ class ParameterSink {
 
 enum class PlusSign { kIsPlus, kIsBlank };
 
-// Reads name=value pieces with '&' between them. A piece without '=' has an empty value; empty pieces are skipped.
-// Percent-encoding is undone in values. kInvalidArgument: it is malformed, or encodes a control character; or there is
-// a
-// '%' in a name, as no name here needs one, and other readers on the way would not know the parameter.
-// `at`: so many bytes were read when it ended.
+// Parses name=value pairs separated by '&'. A piece without '=' has an empty value; empty pieces are skipped.
+// Percent-encoding in values is decoded. kInvalidArgument: it is malformed or encodes a control character, or a name
+// contains '%': no name here needs it, and proxies would not recognize the parameter. `at`: the number of bytes parsed.
 Result<void> ReadForm(const TextParts& next, PlusSign plus, ParameterSink& sink, std::size_t& at);
 
-// Reads a JSON object (RFC 8259) of texts and numbers; numbers come as they are written. kInvalidArgument: it is not
-// that; ends at the first byte that says so. A byte order mark before it is skipped. `at` as above.
+// Parses a JSON object (RFC 8259) of texts and numbers; numbers are passed on as text. Skips a byte order mark.
+// kInvalidArgument: the text is something else; parsing ends at the first wrong byte. `at`: as above.
 Result<void> ReadJsonObject(const TextParts& next, ParameterSink& sink, std::size_t& at);
 
 }  // namespace terrace::server

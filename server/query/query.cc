@@ -8,7 +8,7 @@
 namespace terrace::server {
 namespace {
 
-// A value that is there already may come again where `repeatable`, but no other.
+// If `repeatable`, a parameter may be repeated with the same value.
 template <typename T>
 Result<void> SetOnce(std::optional<T>& to, T value, const char* name, bool repeatable) {
   if (to && !(repeatable && *to == value)) {

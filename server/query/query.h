@@ -1,4 +1,4 @@
-// The query part of a URL, and numbers in it.
+// The query part of a URL and its parameters.
 #pragma once
 
 #include <optional>
@@ -14,21 +14,21 @@
 
 namespace terrace::server {
 
-// Undoes percent-encoding once; nothing where a '%' is not followed by two hexadecimal digits, or encodes a control
+// Decodes percent-encoding once. Nothing if a '%' is not followed by two hexadecimal digits or encodes a control
 // character. '+' stays '+'.
 std::optional<std::string> PercentDecode(std::string_view text);
 
-// name -> value in the order sent, as ReadForm tells them.
+// Names and values in the order sent, as decoded by ReadForm.
 using QueryParameters = std::vector<std::pair<std::string, std::string>>;
 
-// Of a URL, which is short. Errors: those of ReadForm.
+// Parses the query of a URL. Errors: those of ReadForm.
 Result<QueryParameters> ParseQuery(std::string_view query);
 
-// What a client may say about the geometric error, all of it optional.
+// The geometric error that a client requests; all members are optional.
 struct RequestedError {
   std::optional<double> error_m;   // finite, > 0
   std::optional<double> fraction;  // of the level's error; finite, > 0
-  bool at_least = false;           // error_m is a floor under the default errors
+  bool at_least = false;           // error_m is the minimum of the default errors
 };
 
 struct TileParameters {
@@ -38,11 +38,11 @@ struct TileParameters {
   std::optional<proto::TextureFormat> texture;
 };
 
-// The parameters of tile URLs (`allow_at_least`), among them those of .glb (`allow_compression`), and of layer.json.
-// `v` and `extensions` may come any number of times: clients append them on their own. deck.gl appends the query of
-// tileset.json to every URL under it, so error, fraction, compression and texture may come again there with the same
-// value. kInvalidArgument, with a message for the client: an unknown or repeated parameter, error and fraction
-// together, atleast without error, or a value that is not what the parameter takes.
+// Parses the parameters of URLs of tiles (`allow_at_least`), of .glb tiles (`allow_compression`) and of layer.json. `v`
+// and `extensions` may be repeated, because clients append them. deck.gl appends the query of tileset.json to every URL
+// below it, so error, fraction, compression and texture may be repeated there with the same value. kInvalidArgument,
+// with a message for the client: an unknown or repeated parameter, error and fraction together, atleast without error,
+// or an invalid value.
 Result<TileParameters> ParseTileParameters(std::string_view query, bool allow_at_least, bool allow_compression = false);
 
 struct HeightTileParameters {
@@ -50,10 +50,10 @@ struct HeightTileParameters {
   int size = tiler::kHeightSizes[0];
 };
 
-// `encoding` and `size`, of height tiles and of the TileJSON that describes them. `v` may come any number of times.
+// Parses `encoding` and `size` of height tiles and of their TileJSON. `v` may be repeated.
 Result<HeightTileParameters> ParseHeightTileParameters(std::string_view query);
 
-// For URLs that take no parameters but `v`.
+// For URLs that have no parameters except `v`.
 Result<void> RefuseParameters(std::string_view query);
 
 }  // namespace terrace::server

@@ -15,15 +15,15 @@
 namespace terrace::server {
 namespace {
 
-// A file that was written to later than this ago may not be complete.
+// A file that was written to within this time may be incomplete.
 constexpr std::chrono::nanoseconds kSettleTime = std::chrono::seconds(1);
-// Between attempts at files that stay as they are; doubled each time.
+// Delay between attempts at unchanged files; doubled each time.
 constexpr std::chrono::seconds kFirstRetry{1}, kLastRetry{60};
 // Between openings for what the cache folder has lost; doubled each time. Whatever removes its files may do it again.
 constexpr std::chrono::minutes kFirstRecovery{1}, kLastRecovery{60};
-// What takes longer than this to be replaced is a trouble to tell of.
+// A replacement that takes longer than this is reported as a problem.
 constexpr std::chrono::seconds kPatience{10};
-// Tiles come first: opening a large source takes a processor for a while.
+// Opening a large source keeps a processor busy: building tiles has priority.
 constexpr int kNiceness = 10;
 
 dem::StampedFiles FilesOf(const tiler::Dataset& dataset) {
@@ -33,7 +33,7 @@ dem::StampedFiles FilesOf(const tiler::Dataset& dataset) {
   return files;
 }
 
-// The files that the configuration names; what GDAL reads beside them is not known before they are open.
+// The files that the configuration names. Other files that GDAL reads are not known before the source is open.
 std::vector<std::string> NamedFiles(const config::DatasetConfig& dataset) {
   std::vector<std::string> files;
   for (const config::SourceConfig& source : dataset.sources) {
@@ -52,7 +52,7 @@ std::vector<std::optional<dem::FileStamp>> StampsOf(const std::vector<std::strin
 
 Result<tiler::Dataset> OpenQuietly(const DatasetOpener& open, const config::DatasetConfig& wanted,
                                    std::stop_token stop) {
-  ::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kNiceness);  // on Linux, of this thread alone
+  ::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kNiceness);  // on Linux, only of this thread
   try {
     return open(wanted, std::move(stop));
   } catch (const std::exception& exception) {
@@ -113,12 +113,12 @@ bool DatasetSlot::HasToRecoverCache() {
   return true;
 }
 
-// True as well for a time in the future, which tells nothing.
+// Also true for times in the future, which say nothing.
 bool DatasetSlot::IsSettled() {
   for (const std::string& file : NamedFiles(wanted_)) {
     const auto stamp = dem::StampOf(file);
     if (!stamp) continue;
-    // After the stamp: a file written to in between would have a time in the future.
+    // Read after the stamp: otherwise a file written to in between would have a time in the future.
     const auto now = std::chrono::system_clock::now().time_since_epoch();
     const auto age = now - std::chrono::nanoseconds(stamp->modified_ns);
     if (age < std::chrono::nanoseconds(0) || age >= kSettleTime) continue;
@@ -161,7 +161,7 @@ bool DatasetSlot::TakeOpened() {
   const bool is_unwanted = std::exchange(reopen_, false) || (!opened && opened.error().code == ErrorCode::kCancelled);
   if (is_unwanted) return false;
   if (!opened) {
-    // Replaced once more meanwhile: the next attempt is due at once.
+    // The file was replaced again: try again at once.
     if (opened.error().code == ErrorCode::kChanged) {
       tried_.clear();
     } else {

@@ -1,6 +1,5 @@
-// One dataset of the configuration, and how far what is served has come to what is wanted.
-//
-// Belongs to one thread, the reloader's. Opening runs on a thread of its own.
+// One dataset of the configuration: the configuration that is wanted, the dataset that is served, and the state of
+// opening it. Used only by the reloader's thread. Opening runs on a separate thread.
 #pragma once
 
 #include <chrono>
@@ -26,35 +25,35 @@ class DatasetSlot {
  public:
   using Clock = std::chrono::steady_clock;
 
-  // Serves nothing yet; opens as soon as it may.
+  // Serves nothing yet; opens as soon as possible.
   explicit DatasetSlot(config::DatasetConfig wanted) : wanted_(std::move(wanted)) {}
   // Serves `serving`, opened from `wanted`.
   DatasetSlot(config::DatasetConfig wanted, tiler::Dataset serving);
   DatasetSlot(DatasetSlot&&) = default;
   DatasetSlot& operator=(DatasetSlot&&) = default;
-  ~DatasetSlot();  // stops an opening that is under way, and waits for it
+  ~DatasetSlot();  // stops an opening in progress, and waits for it
 
   const config::DatasetConfig& wanted() const { return wanted_; }
   const std::optional<tiler::Dataset>& serving() const { return serving_; }
   bool is_opening() const { return opening_.valid(); }
-  // Or given up for now.
+  // Whether nothing is left to open: the wanted dataset is served, or opening it has failed for now.
   bool is_current() const { return serving_ ? !stale_since_ || !problem_.empty() : !problem_.empty(); }
 
-  // For people; empty: nothing is wrong, or not for long yet.
+  // The problem, for people; empty: there is none, or it is too recent.
   std::string Trouble() const;
 
-  // What is served goes on until the new one is there.
+  // Changes the wanted configuration. The old dataset is served until the new one is open.
   void Want(config::DatasetConfig wanted);
 
-  // Looks at files from the one where the last call ended, at `most` of them; how many it looked at.
+  // Checks up to `most` files for changes, beginning where the last call ended. Returns the number of files checked.
   std::size_t LookAtFiles(std::size_t most);
 
-  // Begins to open what is wanted where that is due: a file must not have been written to for a moment.
+  // Begins to open the wanted dataset if that is due. Waits until its files have not been written to for a moment.
   void OpenIfDue(const DatasetOpener& open);
 
   void StopOpening() { stop_opening_.request_stop(); }
 
-  // True: there is something new to serve.
+  // Takes over an opened dataset. Returns true if there is a new one to serve.
   bool TakeOpened();
 
  private:
@@ -66,15 +65,15 @@ class DatasetSlot {
   config::DatasetConfig wanted_;
   std::optional<tiler::Dataset> serving_;
   dem::StampedFiles files_;                       // of serving_
-  std::size_t next_file_ = 0;                     // to look at
-  std::optional<Clock::time_point> stale_since_;  // when serving_ was found not to be what is wanted
+  std::size_t next_file_ = 0;                     // to check
+  std::optional<Clock::time_point> stale_since_;  // since when serving_ differs from what is wanted
 
   std::future<Result<tiler::Dataset>> opening_;
   std::stop_source stop_opening_;
-  bool reopen_ = false;                               // what is being opened is not what is wanted any more
+  bool reopen_ = false;                               // the dataset being opened is no longer the wanted one
   std::string problem_;                               // of the last attempt
   std::vector<std::optional<dem::FileStamp>> tried_;  // the named files at the last attempt that failed
-  Clock::time_point recover_at_;        // when to open it anew next for what the cache folder has lost
+  Clock::time_point recover_at_;                      // when to open it anew next for what the cache folder has lost
   Clock::duration recover_delay_{0};
   Clock::time_point retry_at_;
   Clock::duration retry_delay_{0};

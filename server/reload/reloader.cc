@@ -17,16 +17,16 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds kPeriod{1'000};
-// While something is under way.
+// Interval while datasets are being opened.
 constexpr std::chrono::milliseconds kBusyPeriod{100};
-// A configuration counts when it is found the same after this time: it may have been met half written.
+// A configuration is used if it is unchanged after this time: the file may have been read half written.
 constexpr std::chrono::milliseconds kConfigSettleTime{300};
-// At least so long between looks, however often they are asked for.
+// Minimum interval between checks, however often they are requested.
 constexpr std::chrono::milliseconds kMinPause{50};
-// Each takes a processor for a while, and some handles.
+// Limit of datasets opened at a time: each needs a processor and some handles.
 constexpr std::ptrdiff_t kMaxOpenings = 2;
 
-// `started`: what the server runs with.
+// `started`: the configuration at the start.
 void WarnOfRestart(const config::Config& started, const config::Config& now, const config::Config& next) {
   const std::vector<std::string> differ = config::ChangedServerOptions(started, next);
   for (const std::string& key : config::ChangedServerOptions(now, next)) {
@@ -43,8 +43,7 @@ std::map<std::string_view, bool> PublicByName(const config::Config& config) {
   return by_name;
 }
 
-// Who may see a dataset is settled at the start, by its name: one that comes under a name that was public then is seen
-// by everybody, whatever was between them.
+// Access to a dataset is determined at the start by its name: a new dataset with a name that was public then is public.
 void WarnOfAccess(const config::Config& started, const config::Config& now, const config::Config& next) {
   if (started.tokens.empty()) return;
   const auto at_start = PublicByName(started), until_now = PublicByName(now);
@@ -52,7 +51,7 @@ void WarnOfAccess(const config::Config& started, const config::Config& now, cons
     const auto first = at_start.find(dataset.name), before = until_now.find(dataset.name);
     const bool is_seen = first != at_start.end() && first->second;
     if (dataset.is_public == is_seen) continue;
-    if (before != until_now.end() && before->second == dataset.is_public) continue;  // told already
+    if (before != until_now.end() && before->second == dataset.is_public) continue;  // reported already
     spdlog::warn("configuration: \"public\" of dataset {} has changed, which takes a restart; until then {}",
                  dataset.name, is_seen ? "everybody sees it" : "it takes a token to see it");
   }
@@ -145,7 +144,7 @@ bool Reloader::IsBusy() const {
          });
 }
 
-// An exception tells nothing of the configuration. Nothing has been changed yet, so the next look may try again.
+// An exception says nothing about the configuration. Nothing has changed yet, so the next check tries again.
 config::ConfigResult Reloader::Load() const {
   try {
     return hooks_.load();
@@ -176,7 +175,7 @@ void Reloader::LookAtConfig(bool asked) {
   }
 }
 
-// Datasets that are described as before go on; the others go on with what they have until that is replaced.
+// Datasets with an unchanged configuration are kept. The others serve their old data until the new is open.
 void Reloader::Apply(config::Config next) {
   WarnOfRestart(started_, config_, next);
   const bool is_rewritten = AsWritten(config_) != AsWritten(next);
@@ -215,7 +214,7 @@ void Reloader::LookAtFiles() {
   }
 }
 
-// True: there is something new to publish.
+// Returns true if there is something new to publish.
 bool Reloader::StepOpenings() {
   std::erase_if(leaving_, [](DatasetSlot& slot) { return slot.TakeOpened() || !slot.is_opening(); });
   bool is_new = false;

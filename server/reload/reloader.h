@@ -1,8 +1,7 @@
-// Keeps what is served in step with the configuration and with the files that it names.
-//
-// A thread looks at them every second: at the configuration, globs and folders in it included, and at the files of each
-// dataset, kMaxLooks of them a time. What has changed is opened anew beside what is served, at low priority, and
-// published when it is complete; a configuration that is wrong changes nothing. Everything is told in the log.
+// Reopens datasets when the configuration or their files change.
+// Every second, a thread checks the configuration, including its globs and folders, and up to kMaxLooks files of
+// datasets. It reopens changed datasets at low priority while the old ones are served, and publishes them when they are
+// complete. An invalid configuration changes nothing. All changes are logged.
 #pragma once
 
 #include <condition_variable>
@@ -21,35 +20,35 @@ namespace terrace::server {
 
 class Reloader {
  public:
-  // Files looked at in one second. Of more, each is looked at every few seconds.
+  // Files checked per second. If there are more, each is checked every few seconds.
   static constexpr std::size_t kMaxLooks = 10'000;
 
   struct Hooks {
-    // The configuration as it would be if the server started now.
+    // Loads the configuration as at a start of the server.
     std::function<config::ConfigResult()> load;
-    // False: `load` would give what it gave last. May be empty: it may always give another.
+    // Returns false if `load` would return the same as last time. Empty: always true.
     std::function<bool()> may_have_changed = {};
     DatasetOpener open;
-    // Serve these from now on, under these options. On the reloader's thread.
+    // Serves these datasets with these options from now on. Called on the reloader's thread.
     std::function<void(const std::vector<tiler::Dataset>&, const config::Config&)> publish;
-    // A Reload was looked after; what has to be opened is not open yet. On the reloader's thread; may be empty.
+    // Called on the reloader's thread after a Reload was processed; changed datasets may not be open yet. May be empty.
     std::function<void()> reloaded = {};
-    // What is wrong, by dataset; "" is the configuration. Called when it changes, on the reloader's thread.
+    // Receives the problems by dataset; "" is the configuration. Called on the reloader's thread when they change.
     std::function<void(const std::map<std::string, std::string>&)> tell;
   };
 
-  // `datasets` are what is served, opened from `config.datasets` in the same order.
+  // `datasets`: the served datasets, opened from `config.datasets` in the same order.
   Reloader(config::Config config, std::vector<tiler::Dataset> datasets, Hooks hooks);
   ~Reloader();  // Stop
 
-  // Begins to look; `watch` false: only when it is asked to.
+  // Starts the thread. `watch` false: checks only on request.
   void Start(bool watch);
   // Waits for the thread. May be called twice.
   void Stop();
 
-  // At once instead of at the next second. From any thread.
+  // Checks at once instead of at the next second. Thread-safe.
   void Look();
-  // Look, and load the configuration even where it is not known to have settled.
+  // Like Look, and loads the configuration even if its file may still be changing.
   void Reload();
 
  private:
@@ -66,13 +65,13 @@ class Reloader {
   const Hooks hooks_;
   bool watch_ = false;
   config::Config config_;
-  const config::Config started_;      // what takes a restart is still as it says
-  std::vector<DatasetSlot> slots_;    // one a dataset, in the configuration's order
-  std::vector<DatasetSlot> leaving_;  // not wanted any more, but still opening
-  std::size_t next_slot_ = 0;         // whose files to look at
+  const config::Config started_;  // the configuration at the start; options that need a restart still have these values
+  std::vector<DatasetSlot> slots_;    // one per dataset, in the configuration's order
+  std::vector<DatasetSlot> leaving_;  // no longer wanted, but still opening
+  std::size_t next_slot_ = 0;         // whose files are checked next
   std::string config_problem_;
-  config::ConfigResult seen_;    // at the last look, good or bad
-  bool config_settles_ = false;  // it was another one at the look before
+  config::ConfigResult seen_;    // at the last check, valid or not
+  bool config_settles_ = false;  // it had changed at the check before
   std::map<std::string, std::string> told_;
 
   std::mutex mutex_;

@@ -25,10 +25,10 @@ constexpr const char *kTiles = "tiles", *kRefinements = "refinements";  // the s
 
 std::string SystemMessage() { return std::system_category().message(errno); }
 
-// False where the disk does not take it.
+// Returns false if the disk does not accept it.
 bool SetSize(int file, off_t size) { return ftruncate(file, size) == 0; }
 
-// The lock goes with the process, however that ends.
+// The lock ends with the process, however it ends.
 Result<int> LockDirectory(const std::filesystem::path& directory) {
   const std::filesystem::path path = directory / "lock";
   int file = open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
@@ -61,7 +61,7 @@ DiskStoreOptions OptionsOf(const std::filesystem::path& directory, std::size_t b
   options.db.compress = compress;
   options.db.open_files = open_files;
   options.name = name;
-  if (anew) static_cast<void>(RecordDb::Destroy(options.db));  // opening says what is wrong
+  if (anew) static_cast<void>(RecordDb::Destroy(options.db));  // opening reports what is wrong
   return options;
 }
 
@@ -129,9 +129,8 @@ DiskCache::DiskCache(const config::DiskCacheConfig& config, std::size_t open_fil
   OpenStores(config, open_files);
 }
 
-// RocksDB as Debian builds it asserts, and so ends the process, on some damage to what it reads while it opens a store.
-// The lock file counts openings that have not come to their end: after two, the stores are thrown away. Nothing else
-// is: whoever names a directory in which other files lie must not lose them.
+// Debian's build of RocksDB asserts, and so ends the process, on some kinds of damage when it opens a store. The lock
+// file counts unfinished openings: after two, the stores are deleted. Other files in the directory are never deleted.
 void DiskCache::OpenStores(const config::DiskCacheConfig& config, std::size_t open_files) {
   constexpr off_t kMaxUnfinished = 2;
   struct stat status {};
@@ -143,7 +142,7 @@ void DiskCache::OpenStores(const config::DiskCacheConfig& config, std::size_t op
     unfinished = 0;
   }
   SetSize(lock_, unfinished + 1);
-  if (config.tile_bytes > 0) {  // compressed already, or refuse to be
+  if (config.tile_bytes > 0) {  // compressed already, or not compressible
     tiles_ = std::make_unique<Tier<tiler::CacheKey, tiler::EncodedTile>>(
         OptionsOf(config.directory, config.tile_bytes, open_files, kTiles, false, anew));
   }

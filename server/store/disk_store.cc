@@ -13,7 +13,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr std::size_t kJobBytes = 256;  // a job beside its value
+constexpr std::size_t kJobBytes = 256;  // overhead of a job
 
 }  // namespace
 
@@ -57,7 +57,7 @@ std::optional<std::string> DiskStore::Find(const std::string& key) {
   if (record && *record) {
     if (const auto value = tiler::Unseal(key, **record)) {
       hits_.fetch_add(1, std::memory_order_relaxed);
-      (*record)->resize(value->size());  // the seal is behind the value
+      (*record)->resize(value->size());  // the checksum is after the value
       return *std::move(record);
     }
     Forget(key);
@@ -125,7 +125,7 @@ void DiskStore::Run() {
       lock.unlock();
       Write(std::move(jobs));
       lock.lock();
-      queued_bytes_ -= bytes;  // what is being written is memory as well
+      queued_bytes_ -= bytes;  // values being written count, too
       busy_ = false;
       changed_.notify_all();
     } else if (stop_) {
@@ -162,11 +162,11 @@ void DiskStore::Write(std::list<Job> jobs) {
   (done ? written_ : dropped_).fetch_add(jobs.size(), std::memory_order_relaxed);
 }
 
-// Reading goes on after a failed write: what a full disk holds is as good as before.
+// Reading continues after a failed write: data on a full disk is still valid.
 void DiskStore::SwitchOff(const std::string& why, bool reading) {
   bool was_on = false;
   std::list<Job> waiting;
-  std::shared_ptr<RecordDb> closed;  // after the lock
+  std::shared_ptr<RecordDb> closed;  // destroyed after the lock is released
   {
     const std::lock_guard lock(mutex_);
     was_on = writing_;
@@ -184,8 +184,8 @@ void DiskStore::SwitchOff(const std::string& why, bool reading) {
   }
 }
 
-// On the store's thread. A database that has failed a write takes no more until it is opened again, and it cannot be
-// opened twice: it is given up only when the disk takes a file again.
+// Called on the store's thread. After a failed write, a database accepts no more writes until it is reopened, and it
+// cannot be opened twice. So it is closed only when the disk accepts a file again.
 void DiskStore::Reopen() {
   if (const Result<void> writable = RecordDb::CheckWritable(options_.db); !writable) {
     const std::lock_guard lock(mutex_);
@@ -197,7 +197,7 @@ void DiskStore::Reopen() {
     const std::lock_guard lock(mutex_);
     old.swap(db_);
   }
-  while (old.use_count() > 1) {  // reads under way, which may never end
+  while (old.use_count() > 1) {  // reads in progress, which may never end
     {
       const std::lock_guard lock(mutex_);
       if (stop_) return;

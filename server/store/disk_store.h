@@ -31,19 +31,19 @@ struct DiskStoreOptions {
 
 struct DiskStoreStats {
   std::uint64_t hits = 0, misses = 0;
-  std::uint64_t errors = 0;   // reads and writes that the disk failed
-  std::uint64_t damaged = 0;  // records that did not check out, and were erased
+  std::uint64_t errors = 0;   // reads and writes that failed
+  std::uint64_t damaged = 0;  // records with a wrong checksum, which were erased
   std::uint64_t written = 0;
-  std::uint64_t dropped = 0;           // values not written, as the disk failed or was behind
-  std::size_t entries = 0, bytes = 0;  // about, when something was written last
+  std::uint64_t dropped = 0;           // values not written because the disk failed or the queue was full
+  std::size_t entries = 0, bytes = 0;  // approximate, as of the last write
   bool on = false;                     // both reading and writing
 };
 
 class DiskStore {
  public:
-  // A disk that does not respond is no error: the store is switched off until it does.
+  // If the disk does not respond, the store is switched off until it does; this is no error.
   explicit DiskStore(DiskStoreOptions options);
-  // Writes what waits, unless the disk fails.
+  // Writes waiting values, unless the disk fails.
   ~DiskStore();
 
   // From now on no value is accepted, and waiting values are dropped, except those being written (kBatchBytes). For
@@ -88,9 +88,9 @@ class DiskStore {
   std::shared_ptr<RecordDb> db_;  // null: nothing is read
   bool writing_ = false;
   std::chrono::steady_clock::time_point retry_at_;  // while not writing
-  std::list<Job> queue_;                            // whose jobs move without memory being asked for
+  std::list<Job> queue_;                            // a list, because its jobs can be moved without allocating memory
   std::size_t queued_bytes_ = 0;
-  bool busy_ = false;  // jobs have left the queue and are not done
+  bool busy_ = false;  // jobs have left the queue and are being written
   bool stop_ = false;
   bool abandoned_ = false;
 

@@ -23,8 +23,8 @@ tl::unexpected<Error> Fail(const rocksdb::Status& status) {
   return MakeError(damaged ? ErrorCode::kInvalidArgument : ErrorCode::kUnavailable, "{}", status.ToString());
 }
 
-// Records leave with the file they are in, so that a file is a small part of the capacity; more files make a look-up
-// slower, which asks the filter of each of them.
+// Records are deleted with their file, so a file should be a small part of the capacity. More files make look-ups
+// slower, because a look-up checks the filter of each file.
 std::size_t FileBytes(std::size_t capacity_bytes) { return std::clamp(capacity_bytes / 256, kMiB, 64 * kMiB); }
 
 rocksdb::Options OptionsOf(const RecordDbOptions& options) {
@@ -37,17 +37,17 @@ rocksdb::Options OptionsOf(const RecordDbOptions& options) {
   db.periodic_compaction_seconds = 0;
   db.write_buffer_size = FileBytes(options.capacity_bytes);
   db.max_write_buffer_number = 2;
-  // Two buffers may be full, and their logs beside the file that is written of them; logs are allocated ahead. A file
-  // more is there until the oldest one is gone.
+  // Reserve: two full buffers with their logs, the file that is written from them, preallocated logs, and one file more
+  // until the oldest is deleted.
   db.compaction_options_fifo.max_table_files_size = options.capacity_bytes - 6 * db.write_buffer_size;
   db.compression = options.compress ? rocksdb::kLZ4Compression : rocksdb::kNoCompression;
-  // RocksDB keeps ten of them for its other files. In one shard: the cache of files in 64 would hold up to 64 more.
+  // RocksDB reserves ten of them for its other files. One shard: a file cache with 64 shards would hold up to 64 more.
   db.max_open_files =
       static_cast<int>(std::clamp<std::size_t>(options.open_files, RecordDb::kMinOpenFiles, 1 << 20)) + 10;
   db.table_cache_numshardbits = 0;
   // A log that ends in the middle of a record, or has a damaged one, loses that record and not the store.
   db.wal_recovery_mode = rocksdb::WALRecoveryMode::kSkipAnyCorruptedRecords;
-  db.avoid_flush_during_shutdown = true;  // the log has it
+  db.avoid_flush_during_shutdown = true;  // the log contains the reason
   db.info_log_level = rocksdb::WARN_LEVEL;
   db.max_log_file_size = kMiB;
   db.keep_log_file_num = 2;
@@ -55,7 +55,7 @@ rocksdb::Options OptionsOf(const RecordDbOptions& options) {
   db.stats_dump_period_sec = 0;
   db.stats_persist_period_sec = 0;
   rocksdb::BlockBasedTableOptions table;
-  table.no_block_cache = true;  // what is asked for often is in the memory tier
+  table.no_block_cache = true;  // frequent records are in the memory tier
   table.filter_policy.reset(rocksdb::NewBloomFilterPolicy(10));
   table.checksum = rocksdb::kXXH3;
   table.format_version = 5;
@@ -63,7 +63,7 @@ rocksdb::Options OptionsOf(const RecordDbOptions& options) {
   return db;
 }
 
-// Damage that opening again does not mend; a disk that fails may be better later.
+// Damage that reopening does not repair. A failing disk may recover.
 bool IsDamaged(const rocksdb::Status& status) {
   return status.IsCorruption() || status.IsInvalidArgument() || status.IsNotSupported() || status.IsNotFound() ||
          status.IsPathNotFound();
@@ -71,8 +71,7 @@ bool IsDamaged(const rocksdb::Status& status) {
 
 }  // namespace
 
-// Asked for in turn by look-ups, files beyond those that may be open would drive each other out, so that there is none
-// that is found open.
+// If look-ups cycle through more files than may be open, an LRU cache would always evict the file needed next.
 std::size_t RecordDb::FilesOf(std::size_t capacity_bytes) { return 4 * (capacity_bytes / FileBytes(capacity_bytes)); }
 
 class RecordDb::Impl {
@@ -84,12 +83,12 @@ class RecordDb::Impl {
   }
 
   const std::unique_ptr<rocksdb::DB> db;
-  std::atomic<bool> failed{false};  // a write was
+  std::atomic<bool> failed{false};  // a write has failed
 };
 
 RecordDb::RecordDb(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
-// After a failed write the log is beyond repair: RocksDB as Debian builds it aborts where it is touched again.
+// After a failed write, Debian's build of RocksDB aborts when the log is used again.
 RecordDb::~RecordDb() {
   if (!impl_->failed) static_cast<void>(impl_->db->SyncWAL());
 }

@@ -1,8 +1,7 @@
-// A bounded file store of records by key: RocksDB, behind the few calls that a cache makes of it.
-//
-// When the records take more than the capacity, the ones written first go, a file of them at a time. What was written
-// survives the process at once; a power cut may take what was written last. Thread-safe. RocksDB's types stay
-// behind this header.
+// A key-value store on disk with a bounded size: a wrapper of RocksDB with the functions that a cache needs.
+// If the records exceed the capacity, the oldest are deleted, one file of them at a time. Written records survive the
+// end of the process; a power failure may lose the most recent ones. Thread-safe. No RocksDB type appears in this
+// header.
 #pragma once
 
 #include <cstdint>
@@ -26,10 +25,10 @@ struct RecordDbOptions {
   std::filesystem::path directory;  // made if it is missing; its parent exists
   std::size_t capacity_bytes = 0;   // of its files, kMinCapacity at least
   bool compress = false;            // LZ4
-  // Record files open at a time, kMinOpenFiles at least. With fewer than FilesOf(capacity_bytes) a look-up may have to
+  // Limit of open record files, at least kMinOpenFiles. With fewer than FilesOf(capacity_bytes), a look-up may have to
   // open files first.
   std::size_t open_files = 1024;
-  rocksdb::Env* env = nullptr;  // what stands for the disk, in tests; null: the disk. Outlives the store
+  rocksdb::Env* env = nullptr;  // replaces the disk in tests; null: the disk. Must outlive the store
 };
 
 class RecordDb {
@@ -37,37 +36,39 @@ class RecordDb {
   static constexpr std::size_t kMinCapacity = std::size_t{16} << 20;
   static constexpr std::size_t kMinOpenFiles = 10;  // RocksDB's
 
-  // Descriptors of a store beside those of record files: its lock, log, directories, manifests, write-ahead logs, and
-  // the file that is being written.
+  // File descriptors of a store in addition to record files: its lock, log, directories, manifests, write-ahead logs,
+  // and the file that is being written.
   static constexpr std::size_t kOtherDescriptors = 10;
 
-  // As many record files as a store of this capacity may come to; mostly a quarter, but more where they are compressed.
+  // The largest number of record files of a store of this capacity. Most stores have a quarter of it; compressed ones
+  // have more.
   static std::size_t FilesOf(std::size_t capacity_bytes);
 
-  // A store that is too damaged to be opened is emptied, and `*discarded` says so. kUnavailable: the disk does not
-  // answer, or the store is open already.
+  // Empties a store that is too damaged to be opened, and then sets `*discarded`. kUnavailable: the disk does not
+  // respond, or the store is open already.
   static Result<std::unique_ptr<RecordDb>> Open(const RecordDbOptions& options, bool* discarded);
-  // Closes quickly: nothing is rewritten.
+  // Closes without compaction.
   ~RecordDb();
 
-  // Erases the files of a store that is not open, unread; what else lies in its directory stays.
+  // Erases the files of a store that is not open, without reading them. Other files in its directory stay.
   static Result<void> Destroy(const RecordDbOptions& options);
 
-  // Nothing if there is no such record. kInvalidArgument: it is damaged. kUnavailable: the disk does not answer.
+  // Nothing if there is no such record. kInvalidArgument: the record is damaged. kUnavailable: the disk does not
+  // respond.
   Result<std::optional<std::string>> Get(std::string_view key) const;
 
   struct Change {
     std::string key;
     std::optional<std::string> value;  // nothing: erased
   };
-  // All or none of them. kUnavailable: the disk does not answer, or is full.
+  // Writes all changes or none. kUnavailable: the disk does not respond, or is full.
   Result<void> Write(std::span<const Change> changes);
 
-  // About.
+  // Approximate.
   std::size_t bytes() const;
   std::size_t entries() const;
 
-  // Whether a file of 1 MiB can be written beside the store's.
+  // Checks that a file of 1 MiB can be written to the store's directory.
   static Result<void> CheckWritable(const RecordDbOptions& options);
 
  private:

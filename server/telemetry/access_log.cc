@@ -20,7 +20,7 @@ namespace {
 
 using SystemClock = std::chrono::system_clock;
 
-// Blanks as well where `blanks` says so: they separate fields of a line.
+// `blanks`: also escapes blanks, because they separate the fields of a line.
 std::string Escaped(std::string_view text, bool blanks = true) {
   std::string escaped;
   for (const char c : text.substr(0, kMaxLoggedTargetBytes)) {
@@ -36,7 +36,7 @@ std::string Escaped(std::string_view text, bool blanks = true) {
 
 std::string EscapedOrDash(std::string_view text) { return text.empty() ? "-" : Escaped(text, /*blanks=*/false); }
 
-// Bytes above ASCII as the characters of Latin-1: JSON knows no bytes.
+// Bytes above ASCII become Latin-1 characters, because JSON has no bytes.
 std::string Latin1(std::string_view text) {
   std::string utf8;
   for (const char c : text.substr(0, kMaxLoggedTargetBytes)) {
@@ -52,24 +52,24 @@ std::string Latin1(std::string_view text) {
 }
 
 std::string TargetOf(const ReplyRecord& record) {
-  // A path of a known shape that names nothing may be anything, a token too.
+  // A path that matches no URL of the server may contain anything, even a token.
   const bool is_known = !record.dataset.empty() || (record.route == "viewer" && record.status < 400);
   return ShownTarget(record.target, is_known);
 }
 
-// Those of HTTP are shorter than a token.
+// HTTP's methods are shorter than tokens.
 std::string_view MethodOf(const ReplyRecord& record) {
   return record.method.size() < kMinTokenBytes ? record.method : "...";
 }
 
-// The peer without its port: IPv6 addresses have colons of their own.
+// The peer without its port. IPv6 addresses contain colons.
 std::string_view ClientOf(const ReplyRecord& record) {
   return record.client.empty() ? record.peer.substr(0, record.peer.rfind(':')) : record.client;
 }
 
 std::string_view ProtocolOf(const ReplyRecord& record) { return record.version == 10 ? "HTTP/1.0" : "HTTP/1.1"; }
 
-// `create`: O_CREAT or 0. -1: errno tells why not.
+// `create`: O_CREAT or 0. Returns -1 on errors and sets errno.
 int OpenToAppend(const std::filesystem::path& file, int create = O_CREAT) {
   // A pipe without a reader is refused, not waited for.
   return ::open(file.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC | O_NONBLOCK | create, 0640);
@@ -79,7 +79,7 @@ bool IsOfFile(config::AccessLogForm form, const std::filesystem::path& file) {
   return (form == config::AccessLogForm::kCombined || form == config::AccessLogForm::kJson) && !file.empty();
 }
 
-// By errno.
+// An error from errno.
 tl::unexpected<Error> CannotOpen(const std::filesystem::path& file) {
   if (errno == ENXIO) {
     return MakeError(ErrorCode::kUnavailable, "access log {}: is a pipe that nobody reads; start its reader first",
@@ -149,7 +149,7 @@ Result<void> AccessLog::Try(config::AccessLogForm form, const std::filesystem::p
   if (!IsOfFile(form, file)) return {};
   struct stat status {};
   if (::stat(file.c_str(), &status) == 0 && S_ISFIFO(status.st_mode)) {
-    // To open it and close it again would be the end of its reader, who is asked for by Open.
+    // Opening and closing a pipe here would end its reader; Open checks for a reader.
     if (::access(file.c_str(), W_OK) == 0) return {};
     return CannotOpen(file);
   }
@@ -158,7 +158,7 @@ Result<void> AccessLog::Try(config::AccessLogForm form, const std::filesystem::p
     ::close(descriptor);
     return {};
   }
-  // Open makes it, where a link leads if it is one.
+  // Open will create it, or the target of a symbolic link.
   const int why = errno;
   std::error_code ignored;
   const std::filesystem::path target = std::filesystem::read_symlink(file, ignored);

@@ -47,8 +47,8 @@ bool LineWriter::Put(std::string_view text) {
   return true;
 }
 
-// Asked before, as writing may well block: a descriptor that came from elsewhere cannot be told not to without telling
-// all who share it.
+// Checked before writing, because the write may block: setting O_NONBLOCK would affect all processes that share the
+// descriptor.
 bool LineWriter::IsReady() {
   if (takes_all_) return true;
   const auto poll_for = [&](Clock::duration time) {

@@ -1,4 +1,4 @@
-// Lines to a descriptor that somebody else reads, or does not: a log must not stop what it tells of.
+// Writes log lines to a file descriptor; drops them when the reader stalls, so that a log never blocks the server.
 #pragma once
 
 #include <chrono>
@@ -8,21 +8,21 @@
 
 namespace terrace::server {
 
-// Thread-safe. The descriptor stays the caller's.
+// Thread-safe. Does not own the descriptor.
 class LineWriter {
  public:
   explicit LineWriter(int descriptor);
 
-  // The one for the standard error stream: two would not know of each other what has just been written.
+  // The only writer for the standard error stream. Two writers would not share their state.
   static LineWriter& Stderr();
 
-  // Lines, each with its end; up to PIPE_BUF bytes in one piece, as others may write to the same file or pipe. Readers
-  // who are slow are waited for a second in all, and for a sixtieth of the time that goes by; only terminals as long as
-  // it takes. False where something is missing, for whatever reason, such as a full disk; a line that was cut is ended
-  // before the next one.
+  // Writes lines, each with its line feed; up to PIPE_BUF bytes in one write, because others may write to the same file
+  // or pipe. Waits for slow readers for one second in total, plus a sixtieth of the elapsed time; waits for terminals
+  // without a limit. Returns false if not everything was written, for example because the disk is full. An incomplete
+  // line is ended before the next one.
   bool Write(std::string_view lines);
 
-  // How many calls of Write have failed since the last call of this.
+  // Returns the number of calls of Write that have failed since the last call of TakeMissed.
   std::uint64_t TakeMissed();
 
  private:
@@ -36,9 +36,9 @@ class LineWriter {
   const int descriptor_;
   bool takes_all_ = false;  // a file, or a terminal
   std::mutex mutex_;
-  Clock::duration patience_ = kPatience;  // guarded by mutex_: what of it is left
-  Clock::time_point asked_;               // when that was so; likewise
-  bool is_cut_ = false;                   // the last line was; likewise
+  Clock::duration patience_ = kPatience;  // guarded by mutex_: the remaining waiting time
+  Clock::time_point asked_;               // when patience_ was updated; likewise
+  bool is_cut_ = false;                   // the last line is incomplete; likewise
   std::uint64_t missed_ = 0;              // likewise
 };
 

@@ -44,7 +44,7 @@ prometheus::MetricFamily Value(prometheus::MetricType type, const char* name, co
   return family;
 }
 
-// One family by tier and kind, a value for each cache that there is.
+// One family by tier and kind, with a value for each cache.
 class CacheFamily {
  public:
   CacheFamily(prometheus::MetricType type, const char* name, const char* help) {
@@ -180,8 +180,8 @@ struct Metrics::Families {
                                            .Help("Builds that failed because a source could not be read")
                                            .Register(registry)
                                            .Add({});
-  // What a reply counts in, found by its labels: looking a family up takes as long as answering from the cache. Route
-  // and cache are literals, and the dataset is one that exists.
+  // The counters of a reply, cached by labels: looking up a family takes as long as answering from the cache. Route and
+  // cache are literals, and the dataset exists.
   struct Reply {
     prometheus::Counter& count;
     prometheus::Histogram& duration;
@@ -198,7 +198,7 @@ struct Metrics::Families {
     bool operator()(const OwnedLabels& a, const ReplyLabels& b) const { return a.View() < b; }
     bool operator()(const ReplyLabels& a, const OwnedLabels& b) const { return a < b.View(); }
   };
-  // What has one dataset as a label.
+  // The metrics with a dataset as label.
   struct OfDataset {
     std::set<prometheus::Counter*> requests;
     std::map<std::string, prometheus::Counter*, std::less<>> builds;  // by result
@@ -207,9 +207,8 @@ struct Metrics::Families {
   void CountBuild(const std::string& dataset, std::string_view result);
   void Forget(const std::string& dataset, const OfDataset& metrics);
 
-  // Guards the maps and, held shared, keeps what they point at from being forgotten. Every reply asks for it, so it is
-  // held alone only to add or forget what has a label for the first or the last time: a family that is being collected
-  // makes that wait.
+  // Guards the maps. Holding it shared also keeps their targets alive. Every reply takes it, so it is held exclusively
+  // only to add or remove labels, which waits for a family that is being collected.
   std::shared_mutex mutex;
   std::map<OwnedLabels, Reply, ByLabels> replies;
   std::map<std::string, OfDataset, std::less<>> of_datasets;
@@ -292,11 +291,11 @@ void Metrics::CountBuild(const DatasetView& dataset, const Result<tiler::TilePtr
 }
 
 void Metrics::RetainDatasets(const std::vector<DatasetView>& datasets) {
-  std::set<std::string_view> served = {""};  // what has no dataset stays as well
+  std::set<std::string_view> served = {""};  // metrics without a dataset stay
   for (const DatasetView& dataset : datasets) served.insert(dataset.name);
-  std::string from;  // names before it have been looked at
+  std::string from;  // names before it have been checked
   for (;;) {
-    // One by one: every reply waits meanwhile, and to take a series out of a family is to look for it.
+    // One at a time, because replies wait meanwhile, and removing a series from a family is a search.
     const std::unique_lock lock(families_->mutex);
     auto gone = families_->of_datasets.lower_bound(from);
     while (gone != families_->of_datasets.end() && served.contains(gone->first)) ++gone;

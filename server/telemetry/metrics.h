@@ -1,4 +1,4 @@
-// What /metrics tells, in Prometheus' text format. Thread-safe.
+// The metrics of /metrics, in Prometheus' text format. Thread-safe.
 #pragma once
 
 #include <cstddef>
@@ -25,8 +25,8 @@ class Metrics {
   void CountReply(const ReplyRecord& record);
   void CountBuild(const DatasetView& dataset, const Result<tiler::TilePtr>& tile);
 
-  // Forgets what was counted of other datasets: names come and go for as long as the server runs. A reply that began
-  // before may still count for one that is gone, until the next call.
+  // Removes the counters of all other datasets, because datasets may be added and removed as long as the server runs. A
+  // reply that began earlier may still count for a removed dataset, until the next call.
   void RetainDatasets(const std::vector<DatasetView>& datasets);
 
   struct ServerState {
@@ -35,10 +35,10 @@ class Metrics {
     TransferBudget::Stats transfers;
     std::size_t datasets = 0, troubles = 0;
     std::vector<std::pair<std::string, std::string>> versions = {};  // name and version of each dataset
-    std::uint64_t catalogs = 0;                                      // that have replaced one another
-    std::optional<DiskCacheStats> disk = {};                         // nothing: there is none
+    std::uint64_t catalogs = 0;                                      // replaced so far
+    std::optional<DiskCacheStats> disk = {};                         // nothing: no disk cache
   };
-  // Everything counted so far and the state given.
+  // Returns the text of all counters and of the given state.
   std::string Text(const TileService::Stats& tiles, const tiler::ByteCacheStats& refinements,
                    const SourceStats& sources, const ServerState& state) const;
 

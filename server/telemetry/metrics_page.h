@@ -1,5 +1,5 @@
-// The text of /metrics, made on a thread of its own: threads that serve must not wait for it, and whoever watches the
-// server must not wait for workers. Scrapers that ask at about the same time share one text.
+// Makes the text of /metrics on a separate thread: io threads must not be blocked by it, and monitoring must not wait
+// for workers. Requests at about the same time share one text.
 #pragma once
 
 #include <boost/asio/thread_pool.hpp>
@@ -16,13 +16,13 @@ class MetricsPage {
  public:
   using Text = std::shared_ptr<const std::string>;
 
-  // `write` is called on that thread, one call at a time; a text serves for `age`.
+  // Calls `write` on that thread, one call at a time. A text is reused for `age`.
   MetricsPage(std::function<std::string()> write, std::chrono::milliseconds age);
 
-  // From any thread, until Stop.
+  // May be called on any thread, until Stop.
   asio::awaitable<Text> Get();
 
-  // Waits until whoever asked has been answered. The threads that asked may have stopped by then, but not be gone.
+  // Waits until all calls of Get have their results. The executors of the calls must still exist, but need not run.
   void Stop();
 
  private:
@@ -30,7 +30,7 @@ class MetricsPage {
 
   const std::function<std::string()> write_;
   const std::chrono::milliseconds age_;
-  // Of that thread alone.
+  // Used only by that thread.
   Text text_;
   std::chrono::steady_clock::time_point made_;
   asio::thread_pool thread_{1};

@@ -16,14 +16,14 @@ namespace {
 
 constexpr std::string_view kLeftOut = "...";
 constexpr std::string_view kVersion = "v";    // has any value
-constexpr std::string_view kToken = "token";  // left out, and not counted: of a request that is admitted it is cut out
+constexpr std::string_view kToken = "token";  // omitted and not counted: admission removes it from requests
 
-// Of all URLs; a test holds them to the manual's.
+// The parameters of all URLs; a test compares them with the manual.
 constexpr std::string_view kParameters[] = {
     "error", "fraction",  "atleast", "extensions", "compression", "texture", "encoding", "size",   "v",
     "path",  "locations", "step",    "samples",    "datum",       "certify", "bbox",     "format", "coordinates"};
 
-// Their values that are no numbers; several with '-' between them.
+// Their values that are not numbers; several are separated by '-'.
 constexpr std::string_view kWords[] = {"octvertexnormals",
                                        "watermask",
                                        "metadata",
@@ -98,7 +98,7 @@ struct Parameter {
   std::string_view name, value;
 };
 
-// What is between a target's beginning, or its scheme and host, and its query.
+// The path of a target: after its scheme and host, if any, and before its query.
 struct Parts {
   explicit Parts(std::string_view target) {
     const std::size_t question = std::min(target.find('?'), target.size());

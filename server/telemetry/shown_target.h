@@ -1,8 +1,7 @@
-// What may be told of a request's target, in a log and to caches that others share.
-//
-// A token may stand in a target in spellings that no reader knows: Token=, ;token=, token%3D, or in a path. So nobody
-// looks for tokens here. Plain is a path of letters, digits and "-._~/", with parameters that the API has and values
-// that they may have; all else may be a secret.
+// Removes possible secrets from request targets, for logs and for shared caches.
+// A token may appear in a target in spellings that no parser recognizes: Token=, ;token=, token%3D, or in a path.
+// Therefore this code does not search for tokens. It defines what is plain: a path of letters, digits and "-._~/", and
+// known parameters with valid values. Everything else may be a secret.
 #pragma once
 
 #include <string>
@@ -10,21 +9,20 @@
 
 namespace terrace::server {
 
-// Whether nothing of the target may be a secret: it is in origin form, and plain. Of a target whose `token` was taken
-// out (TakeToken).
+// Whether no part of the target can be a secret: it is in origin form and plain. Precondition: TakeToken has removed
+// `token`.
 bool IsPlainTarget(std::string_view target);
 
-// The plain part of the target: the path up to what is not plain ("..." stands for the rest), known parameters, and how
-// many others there are: "/maui/heights?locations=1,2&+1". Of absolute targets without scheme and host. The value of
-// `v`, which may be anything, is left out, and so is the whole of `token`. `is_known`: the path names something that
-// the server has. Of others, which anything may stand in, a part between slashes that is as long as a token is "..." as
-// well.
+// Returns the plain part of the target: the path up to the first part that is not plain ("..." replaces the rest),
+// known parameters, and the number of other parameters: "/maui/heights?locations=1,2&+1". Removes scheme and host of
+// absolute targets, the value of `v`, which may be anything, and `token`. `is_known`: the path is a URL of the server.
+// In other paths, "..." also replaces segments that are long enough to be a token.
 std::string ShownTarget(std::string_view target, bool is_known);
 
-// The same of a Referer: scheme, host and the plain part of an unknown path; empty where it is no URL.
+// The same for a Referer: scheme, host and the plain part of an unknown path; empty if it is not a URL.
 std::string ShownReferer(std::string_view referer);
 
-// A token has so many characters at least.
+// The minimum length of a token.
 inline constexpr std::size_t kMinTokenBytes = 16;
 
 }  // namespace terrace::server

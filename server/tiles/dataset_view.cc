@@ -9,14 +9,14 @@ namespace terrace::server {
 
 namespace {
 
-// Columns count on beyond the last one, or from below 0.
+// Columns may continue beyond the last one or below 0.
 bool Touches(const geo::TileRange& a, const geo::TileRange& b) {
   return !geo::IsEmpty(geo::Common({a.start_x - 1, a.start_y - 1, a.end_x + 1, a.end_y + 1}, b));
 }
 
-// Grows `box` by the ranges that touch it, all around the Earth.
+// Extends `box` by the ranges that touch it, around the whole Earth.
 geo::TileRange Grown(geo::TileRange box, const std::vector<geo::TileRange>& ranges, std::int64_t columns) {
-  constexpr int kMaxPasses = 8;  // ranges are sorted: further ones would hardly find any more
+  constexpr int kMaxPasses = 8;  // ranges are sorted, so further passes would rarely find more
   for (int pass = 0; pass < kMaxPasses; ++pass) {
     const geo::TileRange before = box;
     for (const geo::TileRange& range : ranges) {
@@ -51,7 +51,7 @@ dem::GeoBounds FinestBounds(const DatasetView& dataset) {
   const double south = std::max(all.south, degrees(box.start_y) - 90);
   const double north = std::min(all.north, degrees(box.end_y + 1) - 90);
   dem::GeoBounds best{degrees(box.start_x) - 180, south, degrees(box.end_x + 1) - 180, north};
-  // Of the tiles that the edges of the data lie in, the part with data.
+  // Clips the outermost tiles to the part with data.
   const double all_east = all.east < all.west ? all.east + 360 : all.east;
   if (box.end_x - box.start_x + 1 >= columns) {
     best.west = all.west;

@@ -32,7 +32,8 @@ struct DatasetView {
   double west = -180, south = -90, east = 180, north = 90;  // degrees; west > east: across the antimeridian
   double min_height_m = 0, max_height_m = 0;                // of the data
   double floor_m = 0;                                       // height where there is no data
-  // DemSource::RangeBound: heights that no sample of a tile leaves. Reads no raster; on any thread. Empty: those above.
+  // DemSource::RangeBound: a range that contains all samples of a tile. Reads no raster; thread-safe. Empty: the range
+  // above holds for all tiles.
   std::function<dem::HeightRange(const geo::TileKey&)> range_bound = {};
   bool has_datum = true;                        // the vertical datum of its heights is known
   std::size_t sources = 1;                      // rasters that the heights come from
@@ -46,15 +47,15 @@ struct DatasetView {
   int max_level() const { return static_cast<int>(available.size()) - 1; }
 };
 
-// False as well for keys outside the tiling scheme.
+// Also false for keys outside the tiling scheme.
 bool IsAvailable(const DatasetView& dataset, const geo::TileKey& key);
 
-// Where the deepest tiles lie, within the dataset's bounds: around the largest of their ranges and those that touch it.
+// Returns the bounds of the largest connected group of ranges of the deepest tiles, clipped to the dataset's bounds.
 // Degrees; west > east: across the antimeridian.
 dem::GeoBounds FinestBounds(const DatasetView& dataset);
 
-// Web Mercator tiles of `size` pixels: levels 0 .. MaxHeightLevel, wherever they meet the dataset's bounds. False as
-// well for keys outside the scheme.
+// Whether a Web Mercator tile of `size` pixels exists: its level is 0 .. MaxHeightLevel, and it intersects the
+// dataset's bounds. Also false for keys outside the scheme.
 bool IsHeightTileAvailable(const DatasetView& dataset, const geo::TileKey& key, int size);
 int MaxHeightLevel(const DatasetView& dataset, int size);
 

@@ -12,7 +12,7 @@ using Clock = TileService::Clock;
 
 constexpr int kAfterTiles = 40;  // deeper than any
 
-// Of jobs (JobOrder): tiles of a dataset and level, and work for one request.
+// Kinds of jobs (JobOrder): tiles of a dataset and level, and work for one request.
 std::uint64_t KindOfTile(const tiler::CacheKey& key) {
   return key.generation * 64 + static_cast<std::uint64_t>(key.request.key.level);
 }
@@ -20,7 +20,7 @@ constexpr std::uint64_t kShortKind = 62, kLongKind = 63;  // no level
 
 std::string NameOf(const tiler::TileRequest& request) { return "tile " + geo::ToString(request.key); }
 
-// The generation stands for the dataset, whose index may be another one in the next catalog.
+// The generation identifies the dataset, because its index may differ in the next catalog.
 tiler::CacheKey KeyOf(const Catalog& catalog, tiler::TileRequest request) {
   const std::uint64_t generation = catalog.datasets[request.dataset].generation;
   request.dataset = 0;
@@ -66,7 +66,7 @@ asio::awaitable<Result<ServedTile>> TileService::Build(CatalogPtr catalog, tiler
   co_return ServedTile(std::move(*landing.value), landing.joined ? CacheStatus::kJoined : found);
 }
 
-// What is cached and sent.
+// The tile as it is cached and sent.
 tiler::TilePtr TileService::Finish(const tiler::TileRequest& request, tiler::EncodedTile tile) const {
   if (write_head_ != nullptr) tile.head = write_head_(request, tile);
   return std::make_shared<const tiler::EncodedTile>(std::move(tile));
@@ -76,7 +76,7 @@ Result<tiler::TilePtr> TileService::BuildAndKeep(const Catalog& catalog, const t
                                                  const tiler::CacheKey& key, Clock::time_point asked,
                                                  std::stop_token stop) {
   const std::chrono::microseconds queued = tiler::MicrosecondsSince(asked);
-  // Between the look into the cache and the start of this flight an earlier flight may have landed.
+  // An earlier flight may have ended between the look-up in the cache and the start of this one.
   if (tiler::TilePtr tile = cache_.Find(key)) return tile;
   for (const auto& store : stores_) {
     std::optional<tiler::EncodedTile> kept = store->Find(key);

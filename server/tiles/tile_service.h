@@ -1,9 +1,7 @@
-// Tiles for requests: from memory, from a flight that is under way, or on the worker pool from disk or from a new
-// build.
-//
-// Thread-safe. How a tile is built is the catalog's business: this class knows neither elevation models nor codecs.
-// Tiles outlive the catalog they came from: the next one finds those of datasets that it has in the same generation.
-// The pool also runs what is made for one request alone (heights, meshes of areas, documents).
+// Gets tiles for requests: from memory, from a build in progress, or on the worker pool from disk or a new build.
+// Thread-safe. The catalog builds tiles; this class depends on neither elevation models nor codecs. Cached tiles
+// outlive their catalog: a new catalog finds the tiles of datasets that stay in the same generation. The pool also runs
+// work for single requests (heights, meshes of areas, documents).
 #pragma once
 
 #include <atomic>
@@ -26,10 +24,11 @@
 
 namespace terrace::server {
 
-// Told about every build on the thread that ran it.
+// Called after every build, on the thread that ran it.
 using BuildObserver = std::function<void(const DatasetView&, const Result<tiler::TilePtr>&)>;
 
-// Writes what a reply's head says of a tile in its body. Called once a tile, on a worker; kept with the tile.
+// Writes the header lines of replies that describe the tile. Called once per tile, on a worker; the lines are cached
+// with the tile.
 using HeadWriter = tiler::HeadLines (*)(const tiler::TileRequest&, const tiler::EncodedTile&);
 
 struct TileServiceOptions {
@@ -58,28 +57,28 @@ class TileService {
   explicit TileService(TileServiceOptions options, BuildObserver observer = nullptr);
   ~TileService();
 
-  // The tile if it is in the cache; counts as a hit then. From any thread.
+  // Returns the tile if it is in the cache, and counts a hit. May be called on any thread.
   std::optional<ServedTile> Find(const Catalog& catalog, const tiler::TileRequest& request);
 
-  // What Find has not found: joins its flight, or starts one. Errors: those of the catalog's builder, and kOverloaded,
-  // kCancelled, kUnavailable of SingleFlight::Join. The coroutine has to run on a single thread. Only successes are
-  // kept. `client`: whose turn it takes (JobOrder). Precondition: the request names one of the datasets.
+  // For tiles that Find has not found: joins a flight, or starts one. Errors: those of the catalog's builder, and
+  // kOverloaded, kCancelled, kUnavailable of SingleFlight::Join. Errors are not cached. The coroutine must run on a
+  // single thread. `client`: as in JobOrder. Precondition: the request names one of the datasets.
   asio::awaitable<Result<ServedTile>> Build(CatalogPtr catalog, tiler::TileRequest request, Clock::time_point deadline,
                                             std::uint64_t client = 0);
 
-  // Runs `work` on a worker for this caller alone: nothing is shared or kept. Errors and conditions: WorkerPool::Run.
-  // Long work has at most all workers but one, of several, and waits until it may: tiles go on being served beside it.
+  // Runs `work` on a worker for this caller; the result is neither shared nor cached. Errors and conditions:
+  // WorkerPool::Run. If there are several workers, long work never occupies all of them, so that tiles are still built.
   enum class Length { kShort, kLong };
   template <typename T>
   asio::awaitable<Result<T>> Run(Work<T> work, Length length, Clock::time_point deadline, std::uint64_t client = 0) {
     return pool_.Run<T>(std::move(work), OrderOf(length, deadline, client));
   }
 
-  // Tiles of datasets that are not in `catalog` leave the cache, and builds of them that land later stay out of it.
+  // Removes the tiles of datasets that are not in `catalog` from the cache, and refuses such tiles from now on.
   void RetainTilesOf(const Catalog& catalog);
   void SetCacheBytes(std::size_t capacity) { cache_.SetCapacity(capacity); }
 
-  // Makes every Build and Run that waits fail soon, and every later one at once; the cache keeps answering.
+  // Cancels waiting calls of Build and Run; later calls fail at once. Find still works.
   void CancelBuilds() { pool_.Cancel(); }
 
   // CancelBuilds, then waits for the workers to end.

@@ -25,10 +25,10 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// Flat triangles that are farther off than this are those that go half around the Earth and collapse into a line.
+// Larger distances occur only for triangles that span half of the Earth and collapse into a line.
 constexpr double kMaxSag_m = 1e6;
 
-// The part of the area inside the source's bounds; of two parts the wider one. Nothing where they do not meet.
+// The intersection of the area and the source's bounds; of two parts, the wider one. Nothing if it is empty.
 std::optional<AreaRequest> Clip(const AreaRequest& area, const dem::GeoBounds& bounds) {
   const double bounds_east = bounds.east < bounds.west ? bounds.east + 360 : bounds.east;
   AreaRequest best = area;
@@ -46,7 +46,7 @@ std::optional<AreaRequest> Clip(const AreaRequest& area, const dem::GeoBounds& b
   return best;
 }
 
-// What a window is made of; finer levels than those that can be meshed have counts that no int holds.
+// The size of a window in 64 bits: levels too fine for meshing have counts beyond int.
 struct NodeCounts {
   std::int64_t west = 0, south = 0, columns = 0, rows = 0;
 
@@ -56,7 +56,7 @@ struct NodeCounts {
 
 NodeCounts NodesAt(const geo::Lattice& lattice, const AreaRequest& area) {
   const double step = lattice.StepDegrees();
-  // A node that lies on the area's edge but for the last bits is its edge.
+  // A node within rounding of the area's edge lies on the edge.
   constexpr double kSlack = 1e-6;
   const auto first = [&](double degrees) { return static_cast<std::int64_t>(std::floor(degrees / step + kSlack)); };
   const auto last = [&](double degrees) { return static_cast<std::int64_t>(std::ceil(degrees / step - kSlack)); };
@@ -66,7 +66,7 @@ NodeCounts NodesAt(const geo::Lattice& lattice, const AreaRequest& area) {
   return {west, south, east - west + 1, north - south + 1};
 }
 
-// The limits that so many nodes exceed, for a message; empty: none.
+// The limits that a number of nodes exceeds, for a message; empty: none.
 std::string ExceededLimits(const NodeCounts& nodes, std::size_t max_samples) {
   std::string limits;
   if (nodes.samples() > static_cast<std::int64_t>(max_samples)) {
@@ -79,7 +79,7 @@ std::string ExceededLimits(const NodeCounts& nodes, std::size_t max_samples) {
   return limits;
 }
 
-// `level`: the one that was asked for. Names the first error from which the area can be meshed, if there is one.
+// `level`: the requested level. Names the smallest error for which the area can be meshed, if there is one.
 tl::unexpected<Error> TooLarge(const dem::DemSource& source, double error_fraction, const AreaRequest& area, int level,
                                std::size_t max_samples) {
   const auto nodes_at = [&](int at) { return NodesAt(source.LatticeOf(at), area); };
@@ -128,12 +128,12 @@ PlacedMesh PlaceFlat(const tin::HeightField& field, const tin::TinMesh& mesh, co
   return placed;
 }
 
-// The mesh was refined in longitude and latitude. In space its triangles lie beside where they were drawn, by the
-// curvature of the parallels: little, but at a cliff or next to a pole that can be more than the bound. Inserts what is
-// over it.
+// The mesh was refined in longitude and latitude. In space its triangles are displaced by the curvature of parallels.
+// The displacement is small, but at a cliff or near a pole the error can exceed the bound. Inserts samples that exceed
+// it.
 Result<PlacedMesh> PlaceInSpace(const tin::HeightField& field, tin::TinMesh& mesh, const AreaSurface& surface,
                                 const std::optional<Frame>& frame, double bound_m, const std::stop_token& stop) {
-  constexpr double kRounding_m = 0x1p-8;  // what RoundPosition may take on a steep slope: no vertex mends that
+  constexpr double kRounding_m = 0x1p-8;  // the error of RoundPosition on a steep slope, which vertices cannot reduce
   PlacedMesh placed;
   const auto measure = [&](const tin::TinMesh& rounded_mesh) {
     placed.vertices.clear();

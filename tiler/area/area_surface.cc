@@ -17,7 +17,7 @@ constexpr double kSmallestRadius = geo::kSemiMinorAxis * geo::kSemiMinorAxis / g
 constexpr double kLargestRadius = geo::kSemiMajorAxis * geo::kSemiMajorAxis / geo::kSemiMinorAxis;
 constexpr std::size_t kStopPeriod = 1024;  // triangles
 
-// Rotated from longitude 0 to that of the equatorial unit vector.
+// Rotates from longitude 0 to the longitude of the equatorial unit vector.
 geo::Vec3 Turned(geo::Vec3 at_zero, geo::Vec3 equatorial) {
   return {at_zero.x * equatorial.x, at_zero.x * equatorial.y, at_zero.z};
 }
@@ -29,13 +29,13 @@ double DistanceToSegment(geo::Vec3 point, geo::Vec3 a, geo::Vec3 b) {
   return geo::Length(to_point - along * share);
 }
 
-// In space.
+// A triangle in space.
 class FlatTriangle {
  public:
   FlatTriangle(geo::Vec3 a, geo::Vec3 b, geo::Vec3 c) : a_(a), b_(b), c_(c), plane_(geo::Cross(b - a, c - a)) {}
 
-  // How far a point is from the plane, along `up`. At a pole, where meridians meet, a triangle can shrink to a line
-  // that no vertical meets: then how far the point is from that.
+  // The distance of a point from the plane along `up`. At a pole, a triangle can shrink to a line that no vertical
+  // meets; then the distance from the line.
   double Off(geo::Vec3 point, geo::Vec3 up) const {
     const double off = std::abs(geo::Dot(a_ - point, plane_) / geo::Dot(up, plane_));
     if (std::isfinite(off)) return off;
@@ -81,8 +81,8 @@ void AreaSurface::AddCurvature(tin::GreedyOptions& options) const {
     const double metres = geo::MetresPerDegreeEast(At(0, j).latitude) * step;
     east.push_back(metres * metres);
   }
-  // Near the equator neighbouring rows differ by less than the rounding of their sines; Curvature wants them to rise to
-  // the widest and fall from there.
+  // Near the equator neighbouring rows differ by less than the rounding of their sines; Curvature requires them to
+  // increase up to the widest row and decrease after it.
   const auto wider = [](double a, double b) { return std::max(a, b); };
   const auto widest = std::max_element(east.begin(), east.end());
   std::inclusive_scan(east.begin(), widest, east.begin(), wider);

@@ -1,4 +1,4 @@
-// Positions of an area's samples in space, and the distance of flat triangles between them from the ground.
+// The positions of an area's samples in space, and the distance between flat triangles and the samples.
 #pragma once
 
 #include <stop_token>
@@ -28,9 +28,9 @@ class AreaSurface {
   // Adds the curvature of the Earth to the options of the run that makes the mesh.
   void AddCurvature(tin::GreedyOptions& options) const;
 
-  // Vertical distances between the samples and the flat triangles with corners in `ecef`, the mesh's vertices. Misses
-  // are the worst sample of each triangle over the bound that can be inserted. When `stop` is requested, what was
-  // measured until then.
+  // Vertical distances between the samples and the flat triangles with corners in `ecef`, the mesh's vertices. The
+  // misses are, for each triangle that exceeds the bound, the worst sample that can be inserted. If `stop` is
+  // requested, returns what was measured until then.
   proto::TileError MeasureError(const tin::HeightField& field, const tin::TinMesh& mesh,
                                 const std::vector<geo::Vec3>& ecef, double bound_m, const std::stop_token& stop) const;
 
@@ -42,11 +42,12 @@ class AreaSurface {
 
   const geo::Lattice lattice_;
   const dem::NodeWindow window_;
-  std::vector<geo::Vec3> column_normals_, row_normals_;  // at the equator; at longitude 0
+  std::vector<geo::Vec3> column_normals_, row_normals_;  // of columns, at the equator; of rows, at longitude 0
   std::vector<geo::Vec3> row_feet_;                      // ECEF at longitude 0, height 0
 };
 
-// Positions are multiples of 2^-10 m: libm's last bits, which differ between processors, end here.
+// Rounds a position to multiples of 2^-10 m, which removes the last bits of libm's results, which differ between
+// processors.
 geo::Vec3 RoundPosition(geo::Vec3 metres);
 
 }  // namespace terrace::tiler

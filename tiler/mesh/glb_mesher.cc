@@ -16,7 +16,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// Far coarser than what processors differ by, far finer than light can show: 0.003 degrees.
+// 0.003 degrees: much larger than differences between processors, much smaller than visible in shading.
 double RoundNormal(double component) {
   constexpr double kGrid = 16384;
   return std::floor(component * kGrid + 0.5) / kGrid;

@@ -20,8 +20,8 @@ Result<proto::TileError> InsertMisses(tin::TinMesh& mesh, const MeasureMesh& mea
 
 }  // namespace
 
-// Four neighbours that are vertices hem in a vertex of a Delaunay triangulation, since nothing lies in the circle over
-// the edge to any of them. In other triangulations an edge may pass between.
+// In a Delaunay triangulation, a vertex is joined to its four neighbours if they are vertices, because the circle over
+// each of these edges is empty. In other triangulations an edge may pass between.
 Result<proto::TileError> MendMesh(tin::TinMesh& mesh, const MeasureMesh& measure, std::size_t max_vertices,
                                   const std::stop_token& stop) {
   Result<proto::TileError> error = InsertMisses(mesh, measure, max_vertices, stop);

@@ -17,8 +17,9 @@ constexpr double kSmallestCurvatureRadius =
 constexpr double kLargestCurvatureRadius =
     geo::kSemiMajorAxis * geo::kSemiMajorAxis / geo::kSemiMinorAxis;  // at the poles
 
-// Metres that the right triangles of a grid of `divisions` x `divisions` over a tile of this level can sag. The same
-// for every tile of the level, so that neighbours start from the same grid: tiles are taken as wide as at the equator.
+// A bound in metres on the sagitta of the right triangles of a grid of `divisions` x `divisions` over a tile of this
+// level. Tiles count as wide as at the equator, so that all tiles of a level, and therefore neighbours, use the same
+// grids.
 double GridSagitta(int level, int divisions) {
   const double side = std::ldexp(geo::kSemiMajorAxis * geo::ToRadians(180), -level) / divisions;
   return side * side / (4 * kSmallestCurvatureRadius);
@@ -31,8 +32,8 @@ tin::Curvature MakeCurvature(const proto::LatticeView& lattice) {
     const double east = geo::MetresPerDegreeEast(lattice.Latitude(j)) * step;
     curvature.east_m2.push_back(east * east);
   }
-  // Near the equator neighbouring rows differ by less than the rounding of their sines: rows towards the widest one are
-  // at least as wide as those before, as Curvature promises.
+  // Near the equator neighbouring rows differ by less than the rounding of their sines. Makes widths increase up to the
+  // widest row and decrease after it, as Curvature requires.
   const auto wider = [](double a, double b) { return std::max(a, b); };
   const auto begin = curvature.east_m2.begin(), widest = std::max_element(begin, curvature.east_m2.end());
   std::inclusive_scan(begin, widest, begin, wider);
@@ -44,8 +45,9 @@ tin::Curvature MakeCurvature(const proto::LatticeView& lattice) {
   return curvature;
 }
 
-// Triangles that sag more than half of the error leave too little of it to the relief: from twice their sagitta on, the
-// next finer grid is due. The insertion then has triangles small enough to place samples by relief alone.
+// Triangles with a sagitta above half of the error leave too little of the error for relief. Therefore the next finer
+// grid is due when the error falls below twice their sagitta. Insertion then has triangles that are small enough to
+// select samples by relief.
 std::vector<tin::SeedGrid> MakeSeedGrids(const proto::LatticeView& lattice) {
   std::vector<tin::SeedGrid> grids;
   for (int divisions = 2; divisions <= lattice.cells() / 2; divisions *= 2) {
@@ -63,7 +65,7 @@ double BorderSagitta(const proto::LatticeView& lattice, tin::Side side) {
   return step * step * geo::PrimeVerticalRadius(latitude) * cosine * cosine / 2;
 }
 
-// What an edge loses to the rounding of positions: half a unit of them times its steepest slope.
+// The error of an edge from the rounding of positions: half a unit times its steepest slope.
 double PositionRounding(const proto::LatticeView& lattice, tin::Side side) {
   const int cells = lattice.cells();
   const bool along_x = side == tin::Side::kSouth || side == tin::Side::kNorth;
@@ -79,8 +81,9 @@ double PositionRounding(const proto::LatticeView& lattice, tin::Side side) {
 
 }  // namespace
 
-// An edge's heights are rounded by half of its step, which is at most half of the larger of an eighth of the error and
-// what the edge needs at any error: the first is the border's weight, the second its step.
+// Rounding changes an edge's heights by up to half of its step. The step is at most the larger of an eighth of the
+// error and the step that the edge needs at any error. The border's weight accounts for the first, its step for the
+// second.
 tin::GreedyOptions MakeRefinePlan(const proto::LatticeView& lattice, const proto::EdgeSteps& needed) {
   tin::GreedyOptions options;
   options.curvature = MakeCurvature(lattice);

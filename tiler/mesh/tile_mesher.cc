@@ -58,9 +58,9 @@ Result<MeshedTile> Finish(tin::TinMesh mesh, const proto::LatticeView& lattice, 
   return meshed;
 }
 
-// A mesh within the format's number of vertices: `coarser` times the error inside the tile, more where that is not
-// enough. The edges never depend on the inside: they keep the threshold of the error that was asked for and the seeds
-// that are due at it, exactly, since scaling by a power of two rounds nothing. Sets the error that was reached.
+// Makes a mesh within the format's limit of vertices, with `coarser` times the error inside the tile, or more if that
+// is not enough. Edges do not depend on the inside: they keep the threshold of the requested error and its seeds
+// exactly, because scaling by a power of two is exact. Sets the error that was reached.
 Result<tin::TinMesh> RefineWithinFormat(const tin::HeightField& field, const tin::GreedyOptions& plan, double coarser,
                                         double& error_m, const std::stop_token& stop) {
   for (;; coarser *= 2) {
@@ -79,8 +79,8 @@ Result<tin::TinMesh> RefineWithinFormat(const tin::HeightField& field, const tin
   }
 }
 
-// The drop pass spends the whole bound it is given; what quantization then pushes over it would have to be
-// inserted again. A 32nd is kept for that.
+// The drop pass uses its whole bound, and samples that quantization pushes over it would be inserted again. Therefore a
+// 32nd of the bound is reserved for quantization.
 Result<tin::TinMesh> Compact(const tin::HeightField& field, const tin::TinMesh& mesh, const tin::GreedyOptions& plan,
                              double error_m, const std::stop_token& stop) {
   std::vector<std::uint16_t> quantized;

@@ -1,4 +1,4 @@
-// From heights and their refinement to the quantized mesh of a tile.
+// Makes the quantized mesh of a tile from heights and their refinement.
 #pragma once
 
 #include <chrono>
@@ -31,10 +31,11 @@ struct MeshedTile {
 
 struct StartedMesh {
   tin::TinMesh mesh;
-  double error_m = 0;  // kept inside the tile; above the requested error if the format's vertex limit was reached
+  double error_m =
+      0;  // bound that holds inside the tile; larger than requested if the format's vertex limit was reached
 };
 
-// The error of a stopped build.
+// The error value of a stopped build.
 tl::unexpected<Error> Cancelled();
 
 // The samples of a tile without the halo.

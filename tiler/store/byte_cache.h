@@ -73,7 +73,7 @@ class ByteCache {
   void Insert(const Key& key, ValuePtr value) {
     const std::size_t charge = BytesOf(*value) + kEntryOverheadBytes;
     Shard& shard = ShardOf(key);
-    std::list<Entry> gone;  // freed after the lock: giving back a large body takes time
+    std::list<Entry> gone;  // freed after the lock is released: freeing a large body takes time
     std::vector<ValuePtr> evicted;
     const std::lock_guard lock(shard.mutex);
     if (charge > shard.budget || !shard.Retains(key)) return;
@@ -159,7 +159,7 @@ class ByteCache {
     bool Retains(const Key& key) const {
       return !retained || std::find(retained->begin(), retained->end(), key.generation) != retained->end();
     }
-    // To the front of `to`; the entry's node stays.
+    // Moves an entry to the front of `to` without copying its node.
     void Move(Place entry, Segment& to) {
       Segment& from = *entry->segment;
       from.charged -= entry->charge;
@@ -171,8 +171,8 @@ class ByteCache {
       Move(entry, protection);
       Demote();
     }
-    // Four fifths are protected: a larger part keeps more of what was found twice, and leaves what is new less time to
-    // be found again.
+    // At most four fifths are protected. A larger part would keep more values that were found twice, but new values
+    // would have less time to be found again.
     void Demote() {
       while (protection.charged > budget / 5 * 4) Move(std::prev(protection.entries.end()), probation);
     }
@@ -182,7 +182,7 @@ class ByteCache {
       index.erase(entry->key);
       to.splice(to.end(), from.entries, entry);
     }
-    // What leaves stays as a ghost.
+    // Evicts entries until `most` bytes are left. They become ghosts.
     void EvictTo(std::size_t most, std::vector<ValuePtr>& evicted) {
       while (charged() > most) {
         Segment& from = probation.entries.empty() ? protection : probation;

@@ -24,7 +24,7 @@ class RefinementCache {
 
   void Insert(const RefinedTileKey& key, RefinedTilePtr tile);
 
-  // As of ByteCache, for the memory tier.
+  // As ByteCache::Retain, for the memory tier.
   void Retain(const std::vector<std::uint64_t>& generations) { memory_.Retain(generations); }
   void SetCapacity(std::size_t memory_bytes) { memory_.SetCapacity(memory_bytes); }
   // Of the memory tier.

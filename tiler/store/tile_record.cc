@@ -31,13 +31,13 @@ std::string_view GetText(ByteReader& reader) {
 
 }  // namespace
 
-// Every member is named, so that one more does not compile before it has its place here: a key without it would find
+// All members are named, so that a new member fails to compile until it is added here: a key without it would find
 // tiles of other requests.
 std::string RecordKey(const CacheKey& key) {
   const auto& [request, generation] = key;
   const auto& [dataset, tile, error_step, format, compression, texture, coding, normals, water_mask, metadata,
                height_encoding, height_size] = request;
-  static_cast<void>(dataset);  // the generation stands for it
+  static_cast<void>(dataset);  // the generation identifies it
   ByteWriter writer;
   writer.Put(generation);
   Put(writer, tile);
@@ -80,7 +80,7 @@ Result<EncodedTile> ParseTile(std::string_view bytes) {
   tile.max_error_m = reader.Get<double>();
   const auto is_certified = reader.Get<std::uint8_t>();
   const auto certified_error_m = reader.Get<double>();
-  // One tile has one record.
+  // One record per tile.
   if (is_certified > 1 || (is_certified == 0 && std::bit_cast<std::uint64_t>(certified_error_m) != 0))
     return NotARecord();
   if (is_certified == 1) tile.certified_error_m = certified_error_m;

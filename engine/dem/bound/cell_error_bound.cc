@@ -7,7 +7,7 @@
 namespace terrace::dem {
 namespace {
 
-// Samples whose centres lie in a box of pixels, `shift` columns on.
+// The samples whose centres lie in a box of pixels, moved by `shift` columns.
 SampleBox CentresIn(const PixelBounds& box, double shift) {
   const auto first = [](double pixel) { return static_cast<std::int64_t>(std::ceil(pixel - 0.5)); };
   const auto last = [](double pixel) { return static_cast<std::int64_t>(std::floor(pixel - 0.5)); };
@@ -25,7 +25,7 @@ class CellSurface {
         east_{corners[1].x - origin_.x, corners[1].y - origin_.y},
         north_{corners[2].x - origin_.x, corners[2].y - origin_.y},
         twist_{corners[3].x - corners[1].x - north_.x, corners[3].y - corners[1].y - north_.y} {
-    // Lines between nodes deviate from straight ones by far less than that fraction of the cell.
+    // Lines between nodes deviate from straight lines by much less than this fraction of the cell.
     constexpr double kBulge = 1.0 / 32;
     const double bulge = is_separable ? 0 : kBulge;
     const auto extent = [](double east, double north, double twist) {
@@ -52,7 +52,7 @@ class CellSurface {
       const double sign = ux * vy - uy * vx < 0 ? -scale : scale;
       u += (right_x * vy - right_y * vx) * sign;
       v += (ux * right_y - uy * right_x) * sign;
-      // What is left after this step is far below what the last one moved.
+      // The remaining error is much smaller than the last step.
       const double x = slack_x_ + (step + 1 < kSteps ? 0 : std::abs(right_x));
       const double y = slack_y_ + (step + 1 < kSteps ? 0 : std::abs(right_y));
       u_slack = (std::abs(vy) * x + std::abs(vx) * y) * scale;
@@ -66,7 +66,7 @@ class CellSurface {
     const double north = heights_[2] + u * (heights_[3] - heights_[2]);
     const double along = std::max(std::abs(heights_[1] - heights_[0]), std::abs(heights_[3] - heights_[2]));
     const double across = std::max(std::abs(heights_[2] - heights_[0]), std::abs(heights_[3] - heights_[1]));
-    // Outside the cell by no more than the slack the slopes are the cell's, but for the twist: twice is enough.
+    // Within the slack outside the cell, slopes differ from the cell's only by the twist: twice the slope is enough.
     const double here = std::abs(south + v * (north - south) - sample) + 2 * (u_slack * along + v_slack * across);
     return std::min(anywhere, here + widened_);
   }
@@ -90,12 +90,12 @@ SampleBox CellErrorBound::Clipped(SampleBox box) const {
   return box;
 }
 
-// Between the heights served at a cell's nodes and the raster grid's heights within these bounds, which count as its
-// samples do.
+// The largest distance between the heights served at a cell's nodes and heights of the raster grid within these bounds,
+// in its vertical datum.
 double CellErrorBound::Apart(const TileCell& cell, double lowest, double highest) const {
   double error = 0, geoid_error = geoid_.Over(cell.box());
   std::array<double, 4> geoid{};
-  if (!std::isfinite(geoid_error)) {  // not known at all of the nodes
+  if (!std::isfinite(geoid_error)) {  // not known at some node
     const HeightRange range = geoid_.RangeOf(cell.box());
     lowest += range.min, highest += range.max;
     geoid_error = 0;
@@ -110,8 +110,8 @@ double CellErrorBound::Apart(const TileCell& cell, double lowest, double highest
 }
 
 double CellErrorBound::OfAverages(const TileCell& cell, bool& has_voids) const {
-  // Samples of the cell may count as others beside it where members are misplaced. The last average of an axis is up to
-  // twice as near.
+  // If members are misplaced, samples of the cell may count as neighbouring ones. The last average of an axis may be up
+  // to twice as near.
   const Position& off = tables_.misplacement();
   const double off_x = 2 * off.x / trace_.factor, off_y = 2 * off.y / trace_.factor;
   const auto below = [](double weight) { return static_cast<std::int64_t>(std::floor(weight)); };
@@ -143,7 +143,7 @@ double CellErrorBound::OfAverages(const TileCell& cell, bool& has_voids) const {
   return read == around ? error : kUnknownError;
 }
 
-// By averages in a box of the window.
+// A bound from the averages in a box of the window.
 double CellErrorBound::OfBox(const TileCell& cell, const SampleBox& averages, bool& has_voids) const {
   const GridWindow& window = trace_.window;
   double lowest = kUnknownError, highest = -lowest;
@@ -164,11 +164,11 @@ double CellErrorBound::OfBox(const TileCell& cell, const SampleBox& averages, bo
   return Apart(cell, lowest, highest) + averaging;
 }
 
-// By the averages that samples in a box of pixels are near to; infinite where not all of them were read.
+// A bound from the averages near the samples in a box of pixels; infinite if some were not read.
 double CellErrorBound::OfAveragesNear(const TileCell& cell, const PixelBounds& box) const {
   const auto index = [&](double pixel) { return static_cast<std::int64_t>(std::floor(pixel / trace_.factor - 0.5)); };
   std::int64_t left = index(box.west), right = index(box.east) + 1;
-  // The last average of an axis may stand for fewer pixels, and lie nearer: one more.
+  // One average more, because the last average of an axis may cover fewer pixels and lie nearer.
   const std::int64_t top = std::clamp<std::int64_t>(index(box.north), 0, rows_ - 1);
   const std::int64_t bottom = std::clamp<std::int64_t>(index(box.south) + 2, 0, rows_ - 1);
   if (!grid_.wraps()) {
@@ -189,14 +189,14 @@ double CellErrorBound::OfAveragesNear(const TileCell& cell, const PixelBounds& b
   return kUnknownError;
 }
 
-// In pixels; nothing where a place cannot be told.
+// Positions of the nodes in pixels; nothing if one of them is unknown.
 std::optional<std::array<Position, 4>> CellErrorBound::CornersOf(const TileCell& cell) const {
   std::array<Position, 4> corners;
   for (std::size_t k = 0; k < 4; ++k) {
     const auto [column, row] = tile_.NodeAt(cell, k);
     corners[k] = trace_.positions.OfNode(column, row);
     if (grid_.georeference().is_geographic_grid()) {
-      // All of a pole's nodes may have one position: their columns are those of the row beside it.
+      // The nodes of a pole may share one position: use the columns of the row beside it.
       if (row == 0) corners[k].x = trace_.positions.OfNode(column, row + 1).x;
       if (row == tile_.lattice.rows()) corners[k].x = trace_.positions.OfNode(column, row - 1).x;
       const double turn = grid_.georeference().period(), near = k == 0 ? grid_.columns() / 2.0 : corners[0].x;
@@ -207,8 +207,8 @@ std::optional<std::array<Position, 4>> CellErrorBound::CornersOf(const TileCell&
   return corners;
 }
 
-// Of raster grids that nearly go around the Earth: a box may meet their last columns, or a turn on the first ones, or
-// both.
+// For raster grids that span nearly the whole Earth: a box may meet the last columns, the first columns one turn
+// further on, or both.
 bool CellErrorBound::IsOnBothEnds(const PixelBounds& box) const {
   const double turn = grid_.georeference().period(), columns = grid_.columns();
   if (grid_.wraps() || !(turn > 0)) return false;
@@ -223,7 +223,7 @@ double CellErrorBound::OfSurroundings(const TileCell& cell, bool gives_way, bool
   if (!corners) return Apart(cell, all.min, all.max);
   PixelBounds box;
   for (const Position& corner : *corners) box.Add(corner.x, corner.y);
-  // Edges of cells bulge by far less. The samples are at the pixels' centres.
+  // A margin that exceeds the curvature of the cell's edges. Samples are at the pixels' centres.
   constexpr double kBulge = 1.0 / 32;
   const double halo = gives_way ? 1 : 0;
   const Position& off = tables_.misplacement();
@@ -241,7 +241,7 @@ double CellErrorBound::OfSurroundings(const TileCell& cell, bool gives_way, bool
   for (const int turn : {0, -1, 1}) {
     if (turn != 0 && !grid_.wraps()) continue;
     const SampleBox in = CentresIn(box, turn * static_cast<double>(grid_.columns()));
-    if (in.empty()) return 0;  // as are those of other turns
+    if (in.empty()) return 0;  // like those of other turns
     range.Add(tables_.Ranges(static_cast<double>(in.west), static_cast<double>(in.north), static_cast<double>(in.east),
                              static_cast<double>(in.south)));
   }
@@ -267,7 +267,7 @@ double CellErrorBound::OfSamples(const TileCell& cell, const CellSamples& place,
       in.south >= window.row + window.rows) {
     return kUnknownError;
   }
-  // The heights served in a cell, as the raster grid's samples count.
+  // The range of heights served in a cell, in the raster grid's vertical datum.
   constexpr double kPosition = 4e-5;  // of averages: NodePositions is exact to a hundred-thousandth
   const Position& off = tables_.misplacement();
   const double slack = kPosition * trace_.factor;

@@ -1,5 +1,5 @@
-// Where a tile's nodes do not lie evenly on a raster grid: single cells, between the heights served and the
-// raster grid's samples.
+// Error bound for single tile cells, for nodes that are not evenly spaced on the raster grid: the largest difference
+// between served heights and the raster grid's samples.
 #pragma once
 
 #include <algorithm>
@@ -15,7 +15,7 @@
 
 namespace terrace::dem {
 
-// Columns and rows of a raster grid's samples, ends included; columns of raster grids that wrap may lie a turn on.
+// A box of samples of a raster grid, ends included. If the raster grid wraps, columns may lie one turn further on.
 struct SampleBox {
   std::int64_t west = 0, north = 0, east = -1, south = -1;
 
@@ -34,7 +34,7 @@ struct SampleBox {
 
 class CellErrorBound {
  public:
-  // What these refer to outlives it.
+  // The arguments must outlive this object.
   CellErrorBound(const TileNodes& tile, const RasterGrid& grid, const GridTrace& trace, const GridTables& tables,
                  const GeoidErrorBound& geoid)
       : tile_(tile),
@@ -45,25 +45,25 @@ class CellErrorBound {
         columns_(GridAxis(grid.columns(), trace.factor, grid.wraps()).count()),
         rows_(GridAxis(grid.rows(), trace.factor, false).count()) {}
 
-  // By the averages that the cell's nodes are interpolated from: the surface is between them, and the samples that
-  // they stand for within their error of it. `has_voids`: not all of them are there. Precondition: all of the cell's
-  // nodes took their height from the raster grid.
+  // Returns a bound from the averages that the cell's nodes are interpolated from: the surface lies between the
+  // averages, and the samples lie within the averaging error of it. Sets `has_voids` if some averages are void.
+  // Precondition: all nodes of the cell took their height from the raster grid.
   double OfAverages(const TileCell& cell, bool& has_voids) const;
 
-  // A cell's nodes in pixels, and the samples that may lie in it.
+  // The positions of a cell's nodes in pixels, and the samples that may lie in the cell.
   struct CellSamples {
     std::array<Position, 4> corners;
     SampleBox samples;
     bool between = false;  // heights between samples count as well
   };
 
-  // By what tables, averages and samples say that were read, of any cell. `gives_way`: the raster grid is blended
-  // there, and its height between samples counts as they do. `fills`: what is filled in counts too. `place`: set where
-  // OfSamples may tell more, of samples that are read for that.
+  // Returns a bound for any cell from the tables, averages and samples that were read. `gives_way`: the raster grid is
+  // blended in the cell, so heights between samples count like samples. `fills`: filled voids count too. Sets `place`
+  // if OfSamples can give a tighter bound from samples that have not been read.
   double OfSurroundings(const TileCell& cell, bool gives_way, bool fills, std::optional<CellSamples>& place) const;
 
-  // By the samples in the cell themselves; infinite where not all of them are in the window. `turn`: how many columns
-  // on the window's samples are.
+  // Returns a bound from the samples in the cell. Infinite if some of them lie outside the window. `turn`: offset of
+  // the window's columns against the cell's, in columns.
   double OfSamples(const TileCell& cell, const CellSamples& place, const GridWindow& window,
                    const std::vector<float>& samples, std::int64_t turn) const;
 

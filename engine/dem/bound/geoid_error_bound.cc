@@ -10,12 +10,12 @@
 namespace terrace::dem {
 namespace {
 
-constexpr double kRounding = 1e-6;  // metres: of positions on the grid
+constexpr double kRounding = 1e-6;  // metres: error from positions on the grid
 
-// Steps of a geoid's grid in a step of the tile: up to here its nodes are looked at one by one.
+// Up to this ratio of a tile's step to the geoid grid's step, grid nodes are evaluated one by one.
 constexpr double kDense = 1.5;
 
-// The ends of a step, and the lines of the grid between them.
+// The ends of a step and the grid lines between them.
 struct Stops {
   explicit Stops(double from, double to) {
     Add(from);
@@ -41,7 +41,7 @@ GeoidErrorBound::GeoidErrorBound(const TileNodes& tile, const Undulations* geoid
   for (int k = 0; k <= tile_.cells(); ++k) {
     columns_.push_back(grid.ColumnOf(tile_.lattice.Longitude(tile_.window.column + 1 + k)));
     rows_.push_back(grid.RowOf(tile_.lattice.Latitude(tile_.window.row + 1 + k)));
-    // A little around as well: of a node on a line of the grid both sides count.
+    // With a margin: for a node on a grid line, both sides count.
     constexpr double kAround = 0.01;
     for (const double offset : {-kAround, kAround}) {
       columns.push_back(grid.AtColumn(columns_.back() + offset));
@@ -60,8 +60,8 @@ double GeoidErrorBound::Over(const CellBox& box) const {
   return geoid_->bounds_geoid() ? OverCoarse(box) : kUnknownError;
 }
 
-// Between the lines of its grid a geoid is bilinear, and so is the surface between a tile's nodes: they are furthest
-// apart where lines of the grid cross each other or the cell's edges.
+// The geoid is bilinear between its grid lines, and the surface is bilinear between the tile's nodes. Their difference
+// is largest where grid lines cross each other or the cell's edges.
 double GeoidErrorBound::OverNodes(const CellBox& box) const {
   double error = 0;
   for (int j = box.south; j < box.north; ++j) {
@@ -81,8 +81,8 @@ double GeoidErrorBound::OverNodes(const TileCell& cell) const {
   const double south = rows_[j], north = rows_[j + 1];  // rows of the grid count southwards
   const Stops columns(west, west + width), rows(north, south);
   const std::int64_t row = tile_.window.row + 1 + cell.j;
-  const bool at_pole = row <= 0 || row + 1 >= tile_.lattice.rows();  // whose nodes have one undulation
-  // Beside nodes without a value it is not bilinear.
+  const bool at_pole = row <= 0 || row + 1 >= tile_.lattice.rows();  // whose nodes share one undulation
+  // Next to nodes without a value the geoid is not bilinear.
   for (const double r : rows.all().first(rows.all().size() - 1)) {
     for (const double c : columns.all().first(columns.all().size() - 1)) {
       if (!patch_->IsWhole(grid.AtColumn(c), grid.AtRow(r))) return OverCoarse(cell.box());
@@ -103,10 +103,10 @@ double GeoidErrorBound::OverNodes(const TileCell& cell) const {
   return error;
 }
 
-// Where the lattice is finer than any grid that the geoid reads, a step between nodes crosses one line of each at most.
-// There the chord is off by at most a quarter of the step times the change of slope, and the larger second difference
-// at the ends of the step is at least half of that product: half a second difference for each axis. The whole is taken,
-// as the change of slope varies along the line.
+// If the lattice is finer than all grids that the geoid reads, a step between nodes crosses at most one line of each.
+// There the error of the chord is at most a quarter of the step times the change of slope, and the larger second
+// difference at the ends of the step is at least half of that product. So half a second difference per axis is a bound;
+// the whole is used, because the change of slope varies along the line.
 double GeoidErrorBound::OverSmooth(const CellBox& box) const {
   const auto at = [&](int i, int j) { return added_[tile_.NodeOf(i, j)]; };
   double xx = 0, yy = 0, xy = 0, sum = 0;
@@ -125,7 +125,7 @@ double GeoidErrorBound::OverSmooth(const CellBox& box) const {
   return 2 * Undulations::kTolerance + xx + yy + xy;
 }
 
-// By bounds on the geoid around each cell.
+// From bounds on the geoid around each cell.
 double GeoidErrorBound::OverCoarse(const CellBox& box) const {
   double error = 0;
   for (int j = box.south; j < box.north; ++j) {

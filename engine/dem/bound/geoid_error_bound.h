@@ -1,4 +1,5 @@
-// How far a geoid is from what a tile adds of it.
+// A bound on the difference between a geoid and the bilinear surface between the undulations that were added at a
+// tile's nodes.
 #pragma once
 
 #include <cstddef>
@@ -13,17 +14,16 @@ namespace terrace::dem {
 
 class GeoidErrorBound {
  public:
-  // `geoid`: null where none is added. `added`: by node of the tile. What these refer to outlives it.
+  // `geoid`: null if none is added. `added`: undulation per node of the tile. The arguments must outlive this object.
   GeoidErrorBound(const TileNodes& tile, const Undulations* geoid, std::span<const double> added);
 
   bool is_added() const { return geoid_ != nullptr; }
   double AddedAt(std::size_t node) const { return added_[node]; }
 
-  // How far the geoid is from the surface that is bilinear between its undulations at nodes; 0 where none are added,
-  // infinite where they are not known.
+  // Returns the bound for a box. 0 if no geoid is added; infinite if undulations are not known there.
   double Over(const CellBox& box) const;
 
-  // At least that of the geoid in a box. Precondition: is_added().
+  // Returns a range that contains all undulations in a box. Precondition: is_added().
   HeightRange RangeOf(const CellBox& box) const {
     return geoid_->RangeOf(tile_.West(box), tile_.South(box), tile_.Width(box), tile_.Height(box));
   }
@@ -38,8 +38,8 @@ class GeoidErrorBound {
   const Undulations* const geoid_;
   const std::span<const double> added_;
 
-  // Of a geoid that is a grid: where the tile's columns and rows of nodes lie on it, in its steps, and the grid's own
-  // nodes around them. None where the grid's are much denser.
+  // For a geoid that is a grid: the positions of the tile's columns and rows on the grid, in grid steps, and the grid
+  // nodes around them. Empty if the grid is much denser than the tile.
   std::vector<double> columns_, rows_;
   std::optional<UndulationPatch> patch_;
 };

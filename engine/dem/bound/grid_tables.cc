@@ -7,7 +7,7 @@
 namespace terrace::dem {
 namespace {
 
-// Up to so many members are asked in turn; of more the index tells which.
+// Up to this number, members are checked one by one; for more, the index is used.
 constexpr std::size_t kFewMembers = 8;
 
 }  // namespace
@@ -22,13 +22,13 @@ GridTables::GridTables(const RasterGrid& grid, const GridTrace& trace)
   for (const std::size_t i : near_) tables_.push_back(grid.members()[i].raster->tables());
 }
 
-// Columns of grids around the Earth begin anew somewhere: they are followed from node to node, which are less than half
-// a turn apart. Nodes without a position, as far away from the raster grid, need no table.
+// Columns of grids around the Earth jump by one turn somewhere. They are followed from node to node, which are less
+// than half a turn apart. Nodes without a position are far from the raster grid and need no table.
 Box GridTables::BoxAround() const {
   Box hull{1e300, 1e300, -1e300, -1e300};
-  if (grid_.members().size() == 1) return hull;  // nobody asks which members are near
+  if (grid_.members().size() == 1) return hull;  // near members are not needed
   const NodePositions& positions = trace_.positions;
-  // The first row and the first column of separable nodes are like all others.
+  // For separable nodes, the first row and the first column represent all others.
   const bool is_separable = positions.is_separable();
   double of_row = grid_.columns() / 2.0;
   for (std::size_t j = 0; j < positions.rows(); ++j) {

@@ -9,8 +9,9 @@
 namespace terrace::dem {
 namespace {
 
-// A function that is linear between samples one apart, with second differences of at most 1, strays from its chord over
-// `length` samples by at most this: at most one kink on less than a sample; (length^2 + 1) / 8 with more.
+// A bound on the deviation from its chord over `length` samples of a function that is linear between samples and has
+// second differences of at most 1. A chord of less than one sample has at most one kink; longer ones deviate by
+// (length^2 + 1) / 8.
 double ChordError(double length) { return length < 1 ? length / 4 : (length * length + 1) / 8; }
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
@@ -27,10 +28,10 @@ struct Row {
   float XY(std::size_t c) const { return here[c + 1] - here[c] - (below[c + 1] - below[c]); }
 };
 
-// Several running values instead of one: no step waits for the one before it, and the compiler puts them side by side.
+// Several independent running maxima, so that the compiler can vectorize.
 class Lanes {
  public:
-  // The largest |value(i)| for i in 0 .. count - 1; NaN is left out.
+  // The largest |value(i)| for i in 0 .. count - 1; ignores NaN.
   template <typename Value>
   void Raise(std::size_t count, const Value& value) {
     ForEach(count, [&](std::size_t lane, std::size_t i) {
@@ -73,8 +74,8 @@ SmoothErrorBound::SmoothErrorBound(const TileNodes& tile, const RasterGrid& grid
   PlaceNodes(grid);
 }
 
-// Nodes that took their height from this raster grid, away from its rim: where the surface ends, and where the last
-// average of an axis stands for fewer samples, it is no even grid.
+// Nodes that took their height from this raster grid, away from its rim: averages are not evenly spaced at the end of
+// the surface, where the last average of an axis covers fewer samples.
 void SmoothErrorBound::PlaceNodes(const RasterGrid& grid) {
   const GridAxis columns(grid.columns(), trace_.factor, grid.wraps()), rows(grid.rows(), trace_.factor, false);
   const auto last = [&](const GridAxis& axis, int samples) {
@@ -93,7 +94,7 @@ void SmoothErrorBound::PlaceNodes(const RasterGrid& grid) {
     return y > 0 && y < last_y ? y : kUnknown;
   };
   const NodeCells& cells = trace_.cells;
-  const NodeWindow& part = cells.window();  // nodes beyond it have no height of this raster grid
+  const NodeWindow& part = cells.window();  // nodes beyond have no height from this raster grid
   const auto west = static_cast<std::size_t>(part.column - tile_.window.column);
   const auto south = static_cast<std::size_t>(part.row - tile_.window.row);
   is_separable_ = cells.is_separable();
@@ -123,7 +124,7 @@ void SmoothErrorBound::PlaceNodes(const RasterGrid& grid) {
   }
 }
 
-// False: the raster grid gave no height to one of these nodes, `first` to `end` of a row of the tile's window.
+// Returns false if one of the nodes `first` to `end` of a row of the tile's window has no height from this raster grid.
 bool SmoothErrorBound::GaveHeights(std::size_t row, std::size_t first, std::size_t end) const {
   const float* const heights = trace_.heights.data() + row * tile_.stride();
   Lanes sum;
@@ -153,7 +154,7 @@ double SmoothErrorBound::Largest(const Bends& bends, const Steps& steps) {
          steps.bend_y * bends.y;
 }
 
-// Between the heights served and the raster grid's own, at the nodes of a box.
+// The largest difference between served heights and the raster grid's own, at the nodes of a box.
 double SmoothErrorBound::LargestBlend(const CellBox& box) const {
   if (!blends_) return 0;
   float largest = 0;
@@ -168,8 +169,8 @@ double SmoothErrorBound::LargestBlend(const CellBox& box) const {
 
 bool SmoothErrorBound::Measure(const CellBox& box, Steps& steps, PixelBounds& at) const {
   if (!(is_separable_ ? MeasureAxes(box, steps, at) : MeasureNodes(box, steps, at))) return false;
-  // A line that bends by b per step is off its chord by b / 8; half as much again for how the bend itself changes, in
-  // both directions. Positions are known to a hundred-thousandth, those of samples to their misplacement.
+  // A line with second difference b deviates from its chord by b / 8; half as much again covers changes of b in both
+  // directions. Positions are exact to a hundred-thousandth, those of samples to their misplacement.
   constexpr double kOffChord = 1.5 * 2 / 8, kPosition = 4e-5;
   steps.bend_x = steps.bend_x * kOffChord + kPosition + misplacement_.x;
   steps.bend_y = steps.bend_y * kOffChord + kPosition + misplacement_.y;
@@ -177,7 +178,7 @@ bool SmoothErrorBound::Measure(const CellBox& box, Steps& steps, PixelBounds& at
   return true;
 }
 
-// Columns of nodes run along columns of samples, rows along rows: steps are of one axis each.
+// Columns of nodes run along columns of samples, rows along rows: each step has one axis.
 bool SmoothErrorBound::MeasureAxes(const CellBox& box, Steps& steps, PixelBounds& at) const {
   const auto west = static_cast<std::size_t>(box.west + 1), south = static_cast<std::size_t>(box.south + 1);
   const auto east = static_cast<std::size_t>(box.east + 1), north = static_cast<std::size_t>(box.north + 1);
@@ -245,7 +246,7 @@ SmoothErrorBound::SampleRange SmoothErrorBound::RangeOf(const PixelBounds& at) c
   return {first(at.west), first(at.north), first(at.east) + 1, first(at.south) + 1};
 }
 
-// Beyond the outermost averages the surface goes on as it ends.
+// Beyond the outermost averages the surface is constant.
 SmoothErrorBound::SampleRange SmoothErrorBound::Clipped(SampleRange range) const {
   const GridWindow& window = trace_.window;
   return {std::max(range.left, window.column), std::max(range.top, window.row),
@@ -255,7 +256,7 @@ SmoothErrorBound::SampleRange SmoothErrorBound::Clipped(SampleRange range) const
 
 bool SmoothErrorBound::Measure(const SampleRange& range, Bends& bends) const {
   const SampleRange in = Clipped(range);
-  constexpr double kUp = 1 + 1e-6;  // of differences of floats
+  constexpr double kUp = 1 + 1e-6;  // rounding of differences of floats
   if (in.top == band_.top && in.bottom == band_.bottom) {
     const auto first = static_cast<std::size_t>(in.left - trace_.window.column);
     const auto columns = static_cast<std::size_t>(in.right - in.left + 1);
@@ -297,7 +298,7 @@ void SmoothErrorBound::ForRows(const SampleRange& range, const Step& step) const
   }
 }
 
-// All boxes of the row have the same rows of samples: differences are taken once for all of them, along whole rows.
+// All boxes of a row of cells use the same rows of samples: differences are computed once for all, along whole rows.
 void SmoothErrorBound::PrepareRows(int south, int north) {
   band_ = {};
   if (!is_separable_ || trace_.samples.empty()) return;

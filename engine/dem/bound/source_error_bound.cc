@@ -36,10 +36,10 @@ class LooseCells {
 
   // Raises `bound` to the bound of all cells. Reads only groups that could raise it, and a bounded number of samples.
   Result<void> Read(double& bound, const std::stop_token& stop) {
-    // For one tile and raster grid: about as many as its own heights are averaged from at the largest factor of
-    // MayRead.
+    // Limit of samples for one tile and raster grid: about as many as the tile's heights are averaged from at the
+    // largest factor of MayRead.
     constexpr std::int64_t kMaxSamples = std::int64_t{1} << 20;
-    // The largest first: what they come to makes others not worth looking at.
+    // Largest bounds first: their results make reads of smaller ones unnecessary.
     std::ranges::stable_sort(groups_, std::ranges::greater(), &Group::error);
     std::int64_t left = kMaxSamples;
     for (const Group& group : groups_) {
@@ -83,7 +83,7 @@ class LooseCells {
 
 }  // namespace
 
-// One raster grid's part: groups of cells, and the cells of groups where something is in the way.
+// The bound for one raster grid: by groups of cells, and by single cells of groups that cannot be bounded as a whole.
 class GridErrorBound {
  public:
   GridErrorBound(SourceErrorBound& tile, const RasterGrid& grid, const GridTrace& trace)
@@ -115,8 +115,8 @@ class GridErrorBound {
   }
   void Raise(double error) { tile_.bound_ = std::max(tile_.bound_, error); }
 
-  // Where raster grids are blended every raster grid that may count is judged on its own: what they are blended to lies
-  // between them. Heights that were filled in count as well.
+  // If raster grids are blended, every contributing raster grid is bounded separately, because blended heights lie
+  // between them. Filled heights count, too.
   bool GivesWay(const CellBox& box) const {
     if (!tile_.blends_) return false;
     const PixelBounds at = smooth_.BoundsOf(box);
@@ -127,7 +127,7 @@ class GridErrorBound {
                           trace_.factor);
   }
 
-  // All samples around a box. Weights are rounded to 2^-10.
+  // Checks all samples around a box. Weights are rounded to 2^-10.
   bool CountInFull(const PixelBounds& at) const {
     if (trace_.weights.empty()) return true;
     const GridWindow& window = trace_.window;
@@ -146,7 +146,7 @@ class GridErrorBound {
     return true;
   }
 
-  // Whether something may be filled in there that the trace does not have.
+  // Whether the box may have filled heights that the trace does not contain.
   bool MayBeFilled(const CellBox& box) const {
     if (trace_.includes_filled) return false;
     const PixelBounds at = smooth_.BoundsOf(box);
@@ -178,8 +178,8 @@ class GridErrorBound {
     AddBox(box, true);
   }
 
-  // Bounds the box as a whole if it can; else its quarters, and single cells in the end. `may_give_way`: what it is a
-  // quarter of gives way.
+  // Bounds the box as a whole if possible; else its quarters, down to single cells. `may_give_way`: the box that this
+  // is a quarter of is blended.
   void AddBox(const CellBox& box, bool may_give_way) {
     if (!Touches(box)) return;
     const bool gives_way = may_give_way && GivesWay(box), is_filled = gives_way && MayBeFilled(box);
@@ -232,7 +232,7 @@ class GridErrorBound {
     AddUneven(cell, gives_way, fills, error);
   }
 
-  // `known`: a bound.
+  // `known`: a bound known so far.
   void AddUneven(const TileCell& cell, bool gives_way, bool fills, double known) {
     if (known <= tile_.bound_) return;
     std::optional<CellErrorBound::CellSamples> place;
@@ -254,7 +254,7 @@ class GridErrorBound {
   const CellErrorBound single_;
   LooseCells loose_;
   int prepared_south_ = -1;       // of smooth_
-  bool has_loose_group_ = false;  // the group that is being added
+  bool has_loose_group_ = false;  // the current group
 };
 
 SourceErrorBound::SourceErrorBound(const geo::Lattice& lattice, const NodeWindow& window,

@@ -1,4 +1,4 @@
-// Words that bounds on a tile's error share: its cells and nodes, and boxes of pixels (source_error_bound.h).
+// Types shared by the error bounds of a tile (source_error_bound.h): cells, nodes, boxes of pixels.
 #pragma once
 
 #include <algorithm>
@@ -16,13 +16,13 @@ namespace terrace::dem {
 
 inline constexpr double kUnknownError = std::numeric_limits<double>::infinity();
 
-// Half-open, in cells of the tile.
+// A half-open box of cells of the tile.
 struct CellBox {
   int west = 0, south = 0, east = 0, north = 0;
 };
 
-// A cell of the tile by its column and row, with its nodes: the south-western, south-eastern, north-western,
-// north-eastern one.
+// A cell of the tile at column i and row j. `nodes`: the south-western, south-eastern, north-western and north-eastern
+// node.
 struct TileCell {
   int i, j;
   std::array<std::size_t, 4> nodes;
@@ -30,7 +30,7 @@ struct TileCell {
   CellBox box() const { return {i, j, i + 1, j + 1}; }
 };
 
-// Columns and rows of pixels or of averages, between which a function's values lie; west > east: none.
+// A box in columns and rows of pixels or averages; empty if west > east.
 struct PixelBounds {
   double west = std::numeric_limits<double>::infinity(), east = -west, north = west, south = -west;
 
@@ -41,7 +41,7 @@ struct PixelBounds {
   void Grow(double x, double y) { west -= x, east += x, north -= y, south += y; }
 };
 
-// A tile's samples and one more on each side, as they are served. What it refers to outlives it.
+// A tile's served samples with a halo of one. The members must outlive this object.
 struct TileNodes {
   const geo::Lattice& lattice;
   const NodeWindow& window;
@@ -49,7 +49,7 @@ struct TileNodes {
 
   int cells() const { return lattice.cells; }
   std::size_t stride() const { return static_cast<std::size_t>(window.columns); }
-  // Of the south-western node of a cell.
+  // Index of the south-western node of a cell.
   std::size_t NodeOf(int i, int j) const {
     return static_cast<std::size_t>(j + 1) * stride() + static_cast<std::size_t>(i + 1);
   }

@@ -36,7 +36,7 @@ void ForEachOnAllCores(std::size_t count, const std::function<bool(std::size_t)>
     threads.reserve(cores);
     while (threads.size() + 1 < std::min(cores, count)) threads.emplace_back(run);
   } catch (const std::system_error&) {
-    // Those that there are do it.
+    // If a thread cannot be created, the existing ones do the work.
   }
   run();
   threads.clear();

@@ -1,4 +1,4 @@
-// Which of many boxes meet a given one.
+// An index of boxes: finds the boxes that intersect a given one.
 #pragma once
 
 #include <cstddef>
@@ -27,7 +27,7 @@ class BoxIndex {
   BoxIndex& operator=(BoxIndex&&) noexcept;
   ~BoxIndex();
 
-  // The values of the entries that meet the box, edges included; ascending, each once.
+  // Returns the values of the entries that intersect or touch the box, ascending, without duplicates.
   std::vector<std::size_t> Find(const Box& box) const;
 
   // Precondition: the index was made with this entry.

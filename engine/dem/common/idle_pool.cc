@@ -21,19 +21,19 @@ using Items = std::list<Item>;
 struct IdleList {
   std::mutex mutex;  // guards what follows, and the pools' epochs
   std::size_t limit = 256;
-  Items items;  // the one used last comes first
+  Items items;  // most recently used first
   std::unordered_map<const AnyIdlePool*, std::vector<Items::iterator>> by_pool;
 
   void Shrink(Items& gone) {
     while (items.size() > limit) {
       const auto of_pool = by_pool.find(items.back().pool);
-      of_pool->second.erase(of_pool->second.begin());  // of a pool the one used longest ago comes first
+      of_pool->second.erase(of_pool->second.begin());  // least recently used first, also within a pool
       gone.splice(gone.end(), items, std::prev(items.end()));
     }
   }
 };
 
-// Never destroyed: pools of static lifetime may outlive any order.
+// Never destroyed, because pools of static lifetime may be destroyed later.
 IdleList& OfProcess() {
   static IdleList& list = *new IdleList;
   return list;
@@ -42,7 +42,7 @@ IdleList& OfProcess() {
 }  // namespace
 
 void SetMostIdle(std::size_t count) {
-  Items gone;  // closed after the lock, here as below: closing a file may take long
+  Items gone;  // closed after the lock is released, here and below: closing a file may take long
   IdleList& list = OfProcess();
   const std::lock_guard lock(list.mutex);
   list.limit = count;
@@ -83,7 +83,7 @@ void AnyIdlePool::KeepAny(Lease lease) noexcept {
     list.items.splice(list.items.begin(), added);
     list.Shrink(gone);
   } catch (const std::bad_alloc&) {
-    // It is closed, and opened anew when it is wanted.
+    // The object is closed, and opened again when needed.
   }
 }
 

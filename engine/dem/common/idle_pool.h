@@ -12,7 +12,7 @@
 
 namespace terrace::dem {
 
-// How many the pools of the process keep together. Until the first call: 256.
+// Sets the limit of idle objects in all pools of the process. The default is 256.
 void SetMostIdle(std::size_t count);
 
 class AnyIdlePool {
@@ -22,7 +22,7 @@ class AnyIdlePool {
   AnyIdlePool& operator=(const AnyIdlePool&) = delete;
   ~AnyIdlePool() { Clear(); }
 
-  // Lets go of all that is idle, and of what is in use when it comes back.
+  // Closes all idle objects, and objects in use when they are returned.
   void Clear() noexcept;
 
  protected:
@@ -31,7 +31,7 @@ class AnyIdlePool {
     std::uint64_t epoch = 0;
   };
   Lease TakeAny();
-  // Where there is no memory to keep it, it is let go.
+  // Closes the object if there is no memory to keep it.
   void KeepAny(Lease lease) noexcept;
 
  private:

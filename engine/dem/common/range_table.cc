@@ -31,7 +31,7 @@ RangeTable::RangeTable(int width, int height) : width_(width), height_(height) {
 
 void RangeTable::AddWindow(int col, int row, int cols, int rows, const float* heights, int pixel_step) {
   Level& finest = levels_.front();
-  // An average may stand for pixels of two blocks where its factor exceeds a block.
+  // If the factor exceeds a block, an average covers pixels of several blocks.
   for (int r = 0; r < rows; ++r) {
     const std::int64_t top = std::int64_t{row + r} * pixel_step / kBlock;
     const std::int64_t bottom =

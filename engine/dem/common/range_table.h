@@ -1,4 +1,5 @@
-// Lowest and highest height, voids and holes per block of 64 x 64 source pixels, and of ever larger blocks above.
+// The lowest and highest height, voids and holes of each block of 64 x 64 source pixels, and of blocks of blocks on
+// coarser levels.
 #pragma once
 
 #include <cstddef>
@@ -13,7 +14,7 @@ struct BlockRange {
   float min = std::numeric_limits<float>::infinity();  // min > max: nothing but voids
   float max = -std::numeric_limits<float>::infinity();
   bool has_voids = false;
-  bool has_holes = false;  // voids with data all around them: they do not touch the raster's rim
+  bool has_holes = false;  // voids with data all around them, which do not touch the raster's rim
 
   void Add(float height);  // NaN: a void
   void Add(const BlockRange& other);
@@ -27,35 +28,34 @@ class RangeTable {
   RangeTable() = default;
   RangeTable(int width, int height);
 
-  // Adds the heights of a pixel window; `pixel_step` source pixels lie between them (1, or the factor of
-  // averages).
+  // Adds the heights of a pixel window. `pixel_step`: their spacing in source pixels (1, or the factor of averages).
   void AddWindow(int col, int row, int cols, int rows, const float* heights, int pixel_step = 1);
 
-  // Adds ranges of finest blocks, `columns` wide, from this block on.
+  // Adds ranges of finest blocks: a window `columns` wide that begins at the given block.
   void AddBlocks(int block_column, int block_row, int columns, const std::vector<BlockRange>& ranges);
 
-  // Samples first .. last of a row are voids of a hole.
+  // Marks samples first .. last of a row as voids of a hole.
   void MarkHole(int row, int first, int last);
 
-  // Of all finest blocks so far.
+  // The range of all finest blocks so far.
   BlockRange OfFinest() const;
   const std::vector<BlockRange>& finest() const { return levels_.front().blocks; }
 
   // Makes the coarser levels. Call once after the last AddWindow and before the first Query.
   void Finish();
 
-  // At least the range of all pixels within the box (columns and rows, ends included, clipped to the raster). Cheap
-  // whatever the box's size: coarse blocks answer for large boxes.
+  // Returns a range that contains all pixels in the box (columns and rows, ends included, clipped to the raster). Takes
+  // constant time: coarse blocks answer for large boxes.
   BlockRange Query(double west, double north, double east, double south) const;
 
   BlockRange Whole() const { return levels_.back().blocks.front(); }
 
-  // Of the blocks.
+  // Memory of the blocks.
   std::size_t bytes() const;
 
-  // The same without levels of more than `most` blocks: it answers for large boxes alone (TryQuery).
+  // Returns a copy without the levels of more than `most` blocks. It answers queries of large boxes only (TryQuery).
   RangeTable Coarse(std::size_t most) const;
-  // Query; nothing where that takes a level which is not here.
+  // Query, or nothing if that needs a level that this table does not have.
   std::optional<BlockRange> TryQuery(double west, double north, double east, double south) const;
 
  private:

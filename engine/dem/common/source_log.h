@@ -1,5 +1,5 @@
-// Log lines about the sources of a dataset, of which there may be tens of thousands: of each kind the first few are
-// written, the others are counted.
+// Log lines about the sources of a dataset. A dataset may have tens of thousands of sources: the first few lines of
+// each kind are written, the others are counted.
 #pragma once
 
 #include <fmt/format.h>
@@ -14,11 +14,11 @@
 
 namespace terrace::dem {
 
-// Counts the lines of threads that have it in use (Use). Thread-safe.
+// Collects the lines of all threads that have attached it (Use). Thread-safe.
 class SourceLog {
  public:
   enum class Level : std::uint8_t { kDebug, kInfo, kWarn };
-  static constexpr std::size_t kMaxLines = 5;  // of a kind
+  static constexpr std::size_t kMaxLines = 5;  // per kind
 
   SourceLog() = default;
   // Writes how many lines of each kind were left out.
@@ -26,7 +26,7 @@ class SourceLog {
   SourceLog(const SourceLog&) = delete;
   SourceLog& operator=(const SourceLog&) = delete;
 
-  // For the lines of this thread, until the end of the scope.
+  // Attaches the log to this thread until the end of the scope.
   class Use {
    public:
     explicit Use(SourceLog& log);
@@ -38,8 +38,8 @@ class SourceLog {
     SourceLog* const before_;
   };
 
-  static bool IsWritten(Level level);  // by the log's own level
-  // "PATH: TEXT". Without a log in use every line is written.
+  static bool IsWritten(Level level);  // depends on the level of the process's log
+  // Writes "PATH: TEXT". If no SourceLog is attached, writes every line.
   static void Write(Level level, std::string_view kind, const std::string& path, const std::string& text);
 
  private:
@@ -53,7 +53,7 @@ class SourceLog {
   std::map<std::pair<Level, std::string>, Lines> lines_;  // guarded by mutex_
 };
 
-// Lines of one format are of one kind.
+// The format string is the kind of the line.
 template <typename... Arguments>
 void LogSource(SourceLog::Level level, const std::string& path, fmt::format_string<Arguments...> format,
                Arguments&&... arguments) {

@@ -27,7 +27,7 @@ bool HoldsPole(const Georeference& georeference, double latitude) {
 
 double WrappedTurn(double degrees) { return degrees - 360 * std::round(degrees / 360); }
 
-// West into -180 .. 180, at most once around, poles respected.
+// Normalizes west to -180 .. 180, limits the width to 360 degrees, and clamps to the poles.
 Footprint Normalized(Footprint box) {
   box.south = std::clamp(box.south, -90.0, 90.0);
   box.north = std::clamp(box.north, -90.0, 90.0);
@@ -48,12 +48,12 @@ Footprint Footprint::Of(const Georeference& georeference) {
   std::vector<Position> outline = Outline(georeference.width(), georeference.height());
   georeference.ToDegrees(outline);
   Footprint box{1e9, 1e9, -1e9, -1e9};
-  double longitude = outline.front().x;  // followed around the edge without jumps at the antimeridian
+  double longitude = outline.front().x;  // continuous around the edge, without jumps at the antimeridian
   double turn = 0;
   for (std::size_t i = 0; i <= outline.size(); ++i) {
     const Position& point = outline[i % outline.size()];
     if (!std::isfinite(point.x) || !std::isfinite(point.y)) return {};
-    // Affine longitudes do not jump, and one step along a global raster may exceed half a turn.
+    // Affine longitudes have no jumps, and one step along a global raster may exceed half a turn.
     const double step = georeference.is_affine() ? point.x - longitude : WrappedTurn(point.x - longitude);
     longitude += step;
     turn += step;
@@ -83,7 +83,8 @@ bool Footprint::Touches(const Footprint& other) const {
 GeoBounds Footprint::Bounds() const { return {west, south, east > 180 ? east - 360 : east, north}; }
 
 Footprint Footprint::Padded() const {
-  // The edge between two of the outline's points bulges by less than a 64th of its chord, a 4096th of the side.
+  // Between two points of the outline, the edge deviates by less than a 64th of its chord, which is a 4096th of the
+  // side.
   constexpr double kShare = 0.01, kLeast = 1e-6;
   const double x = (east - west) * kShare + kLeast, y = (north - south) * kShare + kLeast;
   return Normalized({west - x, south - y, east + x, north + y});

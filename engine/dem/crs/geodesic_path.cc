@@ -12,7 +12,7 @@
 namespace terrace::dem {
 namespace {
 
-// A last step shorter than this is the rounding of the division, not a step.
+// A last step shorter than this is a rounding error of the division.
 constexpr double kNoStepM = 1e-6;
 
 geod_geodesic Ellipsoid() {
@@ -21,7 +21,7 @@ geod_geodesic Ellipsoid() {
   return ellipsoid;
 }
 
-// How many geodesics are solved between two looks at the stop token: a millisecond's worth.
+// Geodesics solved between two checks of the stop token: about a millisecond.
 constexpr std::size_t kStopStride = 512;
 
 double RoundTo(double value, double parts) { return std::round(value * parts) / parts; }

@@ -15,25 +15,25 @@ struct PathPoint {
   double distance_m = 0;  // from the path's beginning, along the ellipsoid
 };
 
-// Immutable and thread-safe. Positions it gives are rounded to 1e-9 degrees (0.1 mm), distances to 1 mm: the geodesics'
-// last bits differ between machines.
+// Immutable and thread-safe. Rounds positions to 1e-9 degrees (0.1 mm) and distances to 1 mm, because the last bits of
+// geodesic computations differ between machines.
 class GeodesicPath {
  public:
-  // Once a stop is requested the path is of no more use: its length is wrong, and it has no points.
+  // If a stop is requested, the length is wrong and there are no points.
   // Precondition: at least two corners, latitudes in -90 .. 90, longitudes finite.
   explicit GeodesicPath(std::vector<GeoPosition> corners, std::stop_token stop = {});
 
   double length_m() const { return ends_m_.back(); }
 
-  // `count` points at equal distances, the first and the last corner included. Corners between them are passed by.
-  // Precondition: count >= 2.
+  // Returns `count` equidistant points, including the first and the last corner. Other corners are generally not among
+  // them. Precondition: count >= 2.
   std::vector<PathPoint> Divide(std::size_t count) const;
 
-  // Points every `step_m` metres from the first corner, and the last corner. Precondition: step_m > 0 and
-  // StepCount(step_m) fits the memory.
+  // Returns points every `step_m` metres from the first corner on, and the last corner. Precondition: step_m > 0 and
+  // StepCount(step_m) points fit into memory.
   std::vector<PathPoint> Walk(double step_m) const;
 
-  // How many points Walk gives; a double, because a small step can make more than any integer holds.
+  // Returns the number of points of Walk. A double, because it can exceed every integer type.
   double StepCount(double step_m) const;
 
  private:

@@ -19,7 +19,7 @@ namespace {
 
 constexpr double kNoAnswer = std::numeric_limits<double>::quiet_NaN();
 
-// The vertical part of a reference system; null: it has none.
+// The vertical part of a reference system; null: none.
 ProjObjectPtr VerticalPart(PJ_CONTEXT* context, const std::string& text) {
   ProjObjectPtr crs(proj_create(context, text.c_str()));
   if (crs != nullptr && proj_get_type(crs.get()) == PJ_TYPE_COMPOUND_CRS) {
@@ -46,8 +46,8 @@ std::string Wkt(PJ_CONTEXT* context, const PJ* crs) {
   return text == nullptr ? "" : text;
 }
 
-// Operations from heights of that system, at WGS 84 positions, to ellipsoidal heights: the best first, without those
-// that only pretend (ballpark).
+// Operations from heights of that system, at WGS 84 positions, to ellipsoidal heights: the best first, without ballpark
+// operations.
 ProjListPtr OperationsFrom(PJ_CONTEXT* context, const PJ* vertical) {
   const ProjObjectPtr wgs84(proj_create(context, "EPSG:4326")), ellipsoidal(proj_create(context, "EPSG:4979"));
   const std::string text =
@@ -62,7 +62,7 @@ ProjListPtr OperationsFrom(PJ_CONTEXT* context, const PJ* vertical) {
   return ProjListPtr(proj_create_operations(context, compound.get(), ellipsoidal.get(), factory.get()));
 }
 
-// The same place in -180 .. 180, as areas of use and PROJ's arithmetic have it.
+// The longitude in -180 .. 180, as areas of use and PROJ require.
 double WithinOneTurn(double longitude) { return longitude - 360 * std::floor((longitude + 180) / 360); }
 
 AreaOfUse AreaOf(PJ_CONTEXT* context, const PJ* operation) {
@@ -75,7 +75,7 @@ AreaOfUse AreaOf(PJ_CONTEXT* context, const PJ* operation) {
 }
 
 std::string HowToGet(const ProjGrid& grid) {
-  // The name is EPSG's then, and no file by that name would be found.
+  // The name is EPSG's, not that of a file.
   if (grid.url.empty()) return fmt::format("its grid {} is none that PROJ has a file for", grid.name);
   return fmt::format(
       "its grid {} is not installed: get {} and put it into a folder of PROJ's (/usr/share/proj, or one "
@@ -90,14 +90,14 @@ std::string PipelineOf(PJ_CONTEXT* context, const PJ* operation) {
   return text == nullptr ? "" : text;
 }
 
-// Metres above the ellipsoid of what lies `height` above the geoid.
+// Converts a height above the geoid to a height above the ellipsoid.
 double HeightAt(const ProjOperation& operation, Position degrees, double height) {
   const PJ_COORD at = proj_coord(WithinOneTurn(degrees.x), degrees.y, height, HUGE_VAL);
   const PJ_COORD result = proj_trans(operation.operation.get(), PJ_FWD, at);
   return std::isfinite(result.xyz.z) ? result.xyz.z : kNoAnswer;
 }
 
-// Whether a pipeline shifts heights by one grid, and changes units and the order of axes besides.
+// Whether a pipeline only shifts heights by one grid and changes units and the order of axes.
 bool IsShiftByOneGrid(const std::string& pipeline) {
   std::istringstream words(pipeline);
   int shifts = 0;
@@ -113,7 +113,8 @@ bool IsShiftByOneGrid(const std::string& pipeline) {
   return shifts == 1;
 }
 
-// PROJ decides what a grid's numbers mean: both are compared in cells of every edge and corner and in others.
+// Compares the grid with PROJ in cells at all edges and corners and in others, because PROJ defines what the grid's
+// numbers mean.
 bool Agrees(const UndulationGrid& grid, const ProjOperation& operation) {
   constexpr int kCells = 96;
   constexpr double kTolerance = 1e-6;  // metres
@@ -136,7 +137,7 @@ bool Agrees(const UndulationGrid& grid, const ProjOperation& operation) {
   return known > 0;
 }
 
-// 0: it is not known.
+// Returns 0 if unknown.
 double CellOf(const std::string& file) {
   const PJ_GRID_INFO info = proj_grid_info(file.c_str());
   const double cell = std::min(info.cs_lon, info.cs_lat) * 180 / std::numbers::pi;
@@ -164,15 +165,15 @@ void Geoid::FindGrid() {
   }
 }
 
-// Most height systems have one operation for the whole Earth: thousands of sources share it, and looking it up takes
-// PROJ some 20 ms. Failures are not kept: the missing grid may be there the next time.
+// Most height systems have one operation for the whole Earth, which thousands of sources share; PROJ takes about 20 ms
+// to look it up. Failures are not cached, because a missing grid may be installed later.
 std::shared_ptr<const Geoid> Geoid::FindShared(const std::string& vertical_crs, std::shared_ptr<const Geoid> made) {
   static std::mutex mutex;
   static std::map<std::string, std::shared_ptr<const Geoid>> shared;
   const std::lock_guard lock(mutex);
   if (made != nullptr) return shared.insert_or_assign(vertical_crs, std::move(made)).first->second;
   const auto found = shared.find(vertical_crs);
-  // A grid that was replaced is read anew.
+  // A replaced grid is read again.
   return found == shared.end() || found->second->files_.FirstChanged() ? nullptr : found->second;
 }
 
@@ -192,7 +193,7 @@ Result<std::shared_ptr<const Geoid>> Geoid::OfCrs(const std::string& vertical_cr
   geoid->unit_ = UnitOf(context.get(), vertical.get());
   const ProjListPtr operations = OperationsFrom(context.get(), vertical.get());
   const int count = operations == nullptr ? 0 : proj_list_get_count(operations.get());
-  std::string missing;  // of the best operation that cannot run
+  std::string missing;  // of the best operation that is not available
   for (int i = 0; i < count; ++i) {
     const ProjObjectPtr operation(proj_list_get(context.get(), operations.get(), i));
     geoid->area_ = AreaOf(context.get(), operation.get());
@@ -250,7 +251,7 @@ Result<void> Geoid::AddTo(ContentHasher& hasher, const FileContentOptions& optio
   return {};
 }
 
-// What cannot be evaluated, and what counts downwards, is found here and not in a tile.
+// Operations that cannot be evaluated, and systems of depths, are found here, not while a tile is built.
 Result<std::shared_ptr<const Geoid>> Geoid::Checked(std::shared_ptr<const Geoid> geoid, Position centre) {
   const IdlePool<ProjOperation>::Handle operation = geoid->operations_.Borrow();
   if (!operation) {
@@ -272,7 +273,7 @@ Result<std::shared_ptr<const Geoid>> Geoid::Checked(std::shared_ptr<const Geoid>
 }
 
 Geoid::Reader::Reader(const Geoid& geoid) : operation_(geoid.operations_.Borrow()) {
-  // It was set up once; what is missing now is memory or descriptors, and the caller's read fails.
+  // The operation was created before, so memory or descriptors have run out; the caller's read fails.
   if (!operation_) throw std::bad_alloc();
 }
 

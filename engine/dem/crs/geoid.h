@@ -17,30 +17,30 @@
 
 namespace terrace::dem {
 
-// Degrees; west > east: across the antimeridian. As it begins: the whole Earth.
+// Degrees. west > east: the area crosses the antimeridian. The default is the whole Earth.
 struct AreaOfUse {
   double west = -180, south = -90, east = 180, north = 90;
 
-  // Longitudes a full turn apart are one place.
+  // Longitudes count modulo 360 degrees.
   bool Covers(Position degrees) const;
 };
 
 // Thread-safe: every call borrows a PROJ context of its own.
 class Geoid {
  public:
-  // `vertical_crs`: what PROJ reads as a vertical or compound reference system, such as "EPSG:5773" or WKT; of a
-  // compound one the vertical part counts. `centre`: degrees (WGS 84), where the operation must be at its best.
-  // kInvalidArgument names the grid that is missing and where to get it, or says that PROJ knows no way.
+  // `vertical_crs`: a vertical or compound reference system in a form that PROJ reads, such as "EPSG:5773" or WKT; of a
+  // compound system the vertical part is used. `centre`: the position in WGS 84 degrees for which PROJ selects the best
+  // operation. kInvalidArgument: a grid is missing, and the message says where to get it; or PROJ has no operation.
   static Result<std::shared_ptr<const Geoid>> OfCrs(const std::string& vertical_crs, Position centre);
 
-  // A file of undulations above the WGS 84 ellipsoid that PROJ reads: .gtx, or GeoTIFF as on cdn.proj.org.
+  // Opens a file of undulations above the WGS 84 ellipsoid: .gtx, or GeoTIFF as on cdn.proj.org.
   static Result<std::shared_ptr<const Geoid>> OfGrid(const std::string& path, Position centre);
 
-  // Metres above the ellipsoid at positions in degrees, longitude first; NaN where the geoid is not known. A value is a
-  // function of its position alone, the same at longitudes a full turn apart.
+  // Returns the geoid's height above the ellipsoid in metres; NaN where the geoid is not known. The result depends only
+  // on the position, longitudes modulo 360 degrees.
   double Undulation(Position degrees) const { return Reader(*this).At(degrees); }
 
-  // Evaluates for one thread; holds a context of PROJ meanwhile.
+  // Evaluates the geoid on one thread. Holds a PROJ context.
   class Reader {
    public:
     explicit Reader(const Geoid& geoid);
@@ -51,16 +51,16 @@ class Geoid {
   };
 
   const std::string& name() const { return name_; }                       // "EGM96 height"
-  const std::string& unit() const { return unit_; }                       // of its heights; empty: that is not stated
+  const std::string& unit() const { return unit_; }                       // of its heights; empty: not stated
   const std::string& description() const { return description_; }         // of the operation, for people
   const std::string& pipeline() const { return operations_.pipeline(); }  // as PROJ runs it
-  // What the operation reads, as it was when it was set up.
+  // The files that the operation reads, as they were when it was set up.
   const StampedFiles& files() const { return files_; }
   // Adds the operation and its grids' bytes; where a grid lies makes no difference. Errors: those of HashFiles.
   Result<void> AddTo(ContentHasher& hasher, const FileContentOptions& options) const;
-  // Where the operation is bilinear interpolation in one grid and nothing else: that grid. Else null.
+  // The grid, if the operation is only bilinear interpolation in one grid; else null.
   const UndulationGrid* grid() const { return grid_.get(); }
-  // Degrees, the smaller side of a cell of the finest grid that the operation reads; 0 where that is not known.
+  // Degrees: the smaller side of a cell of the finest grid that the operation reads; 0 if not known.
   double finest_cell() const { return finest_cell_; }
 
  private:

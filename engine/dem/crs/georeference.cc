@@ -15,7 +15,8 @@
 namespace terrace::dem {
 namespace {
 
-// Positions this close to the raster's western edge, in pixels, are on it: SRTM's corners are not dyadic numbers.
+// Positions within this distance of the raster's western edge, in pixels, count as on it: SRTM's corners are not exact
+// in binary.
 constexpr double kEdgeTolerance = 1e-6;
 
 Position Apply(const std::array<double, 6>& affine, Position p) {
@@ -48,7 +49,7 @@ std::string Wkt(const OGRSpatialReference& srs) {
   return wkt;
 }
 
-// Of a CRS with three axes, which tells how many metres it is, but not its name.
+// The unit of a CRS with three axes, which states its size in metres but not its name.
 std::string UnitOfHeightAxis(const OGRSpatialReference& srs) {
   constexpr double kTolerance = 1e-9;  // the two feet are 6e-7 apart
   double metres = 1;
@@ -56,10 +57,10 @@ std::string UnitOfHeightAxis(const OGRSpatialReference& srs) {
   for (const char* name : {"metre", "foot", "US survey foot"}) {
     if (std::abs(metres - *MetresPerUnit(name)) < kTolerance) return name;
   }
-  return fmt::format("{} m a unit", metres);  // known to no table: a warning says so
+  return fmt::format("{} m a unit", metres);  // unknown unit: logged as a warning
 }
 
-// Nothing: it cannot be written so.
+// Returns nothing if the CRS cannot be written as WKT.
 std::optional<std::string> Proj4(const OGRSpatialReference& srs) {
   char* text = nullptr;
   const bool written = srs.exportToProj4(&text) == OGRERR_NONE;
@@ -69,16 +70,16 @@ std::optional<std::string> Proj4(const OGRSpatialReference& srs) {
   return proj4;
 }
 
-// By its EPSG code where it has one. The text that GDAL has of a file's CRS is not always the same: a compound CRS
-// without its vertical part has lost the details of its code, and what a thread has read before decides whether the
-// datum of WGS 84 is written as an ensemble. Rasters whose texts differ would not be read as one.
+// Uses the EPSG code if there is one. GDAL's text of a file's CRS varies: a compound CRS without its vertical part has
+// lost the details of its code, and earlier reads of a thread determine whether the datum of WGS 84 is written as an
+// ensemble. Rasters with different texts would not be combined.
 std::string CanonicalWkt(const OGRSpatialReference& horizontal) {
   const char* authority = horizontal.GetAuthorityName(nullptr);
   const char* code = horizontal.GetAuthorityCode(nullptr);
   if (authority != nullptr && code != nullptr && EQUAL(authority, "EPSG")) {
     OGRSpatialReference registered;
     registered.SetAxisMappingStrategy(OAMS_TRADITIONAL_GIS_ORDER);
-    // IsSame tells an ensemble from its datum; their projections do not differ.
+    // IsSame distinguishes an ensemble from its datum, but their projections are equal.
     if (registered.importFromEPSG(std::atoi(code)) == OGRERR_NONE &&
         (registered.IsSame(&horizontal) != 0 || (Proj4(registered) && Proj4(registered) == Proj4(horizontal)))) {
       if (std::string wkt = EpsgWkt(code); !wkt.empty()) return wkt;
@@ -87,13 +88,13 @@ std::string CanonicalWkt(const OGRSpatialReference& horizontal) {
   return Wkt(horizontal);
 }
 
-// Name and unit of what heights count from, as far as the CRS says.
+// Name and unit of the vertical datum, if the CRS states them.
 std::pair<std::string, std::string> VerticalPart(const OGRSpatialReference& srs) {
   if (srs.IsCompound() != 0) {
     const char* name = srs.GetAttrValue("COMPD_CS|VERT_CS|VERT_DATUM");
     const char* unit = srs.GetAttrValue("COMPD_CS|VERT_CS|UNIT");
-    // Of a GeoTIFF that states the unit of its heights, or says in words what they are, and no more GDAL makes a
-    // vertical part with a datum by that name.
+    // If a GeoTIFF states only the unit of its heights, or describes them in words, GDAL makes a vertical datum with
+    // that text as name.
     const bool is_unknown = name != nullptr && EQUAL(name, "unknown");
     return {is_unknown ? "" : name == nullptr ? "unnamed" : name, unit == nullptr ? "" : unit};
   }
@@ -138,7 +139,7 @@ Result<void> Georeference::SetAffine(const std::string& path) {
                    path, to_crs_[1], to_crs_[5]);
 }
 
-// Over a raster of `side` pixels a grid with pixels of `other` may not leave this one by more than the tolerance.
+// Whether pixel sizes are so equal that over `side` pixels the two grids differ by less than the tolerance.
 bool Georeference::HasPixelsOf(const Georeference& other, int side) const {
   const double pixel = std::min(pixel_width(), pixel_height());
   return std::ranges::none_of(std::array<std::size_t, 4>{1, 2, 4, 5}, [&](std::size_t i) {
@@ -240,9 +241,10 @@ Result<void> Georeference::ReadCrs(const OGRSpatialReference& srs, const std::st
   return {};
 }
 
-// A cylindrical projection whose eastings go on beyond the antimeridian: they come back a whole turn less. Looked at
-// are the outermost pixels' centres, which a raster of the whole Earth has on this side of it: of a rotated raster any
-// corner may be beyond, and the first and last rows may lie beyond the poles, where there is no place to come back to.
+// Detects a cylindrical projection whose eastings continue beyond the antimeridian: they return from degrees a whole
+// turn less. Tests the centres of the outermost pixels, which a raster of the whole Earth has within the antimeridian.
+// Corners of a rotated raster may lie beyond, and the first and last rows may lie beyond the poles, where there are no
+// degrees.
 void Georeference::FindTurn() {
   const double pixel_size = std::max(pixel_width(), pixel_height());
   const double right = width_ - 0.5, middle = height_ / 2.0, bottom = height_ - 0.5;
@@ -254,7 +256,8 @@ void Georeference::FindTurn() {
     projector_->Forward(back);
     const double turn = back[0].x - there.x;
     if (!(std::abs(turn) > pixel_size) || !(std::abs(back[0].y - there.y) < 1e-3 * pixel_size)) continue;
-    // The same in other rows: outside its outline, a projection that is not cylindrical has a turn for each of them.
+    // The turn must be equal in other rows: outside its outline, a projection that is not cylindrical has another turn
+    // in each row.
     std::array<Position, 6> pairs;
     for (std::size_t k = 0; k < 3; ++k) {
       pairs[2 * k] = Apply(to_crs_, {pixel.x, height_ * (0.3 * static_cast<double>(k) + 0.1)});
@@ -277,13 +280,13 @@ void Georeference::FindPeriod(const OGRSpatialReference& srs) {
   if (to_crs_[2] != 0 || to_crs_[4] != 0) return;
   period_ = std::abs(full_circle_ / to_crs_[1]);
   const double whole = std::round(period_);
-  // A pixel size of 0.008333333333 is meant to be 1/120: a hundredth of a pixel around the Earth is no gap.
+  // A pixel size of 0.008333333333 means 1/120: up to a hundredth of a pixel around the Earth counts as no gap.
   if (std::abs(period_ - whole) < 0.01 && width_ >= whole) wrap_columns_ = static_cast<int>(whole);
 }
 
 double Georeference::CanonicalColumn(double column) const {
   const double wrapped = column - period_ * std::floor(column / period_);
-  // No place is between the last column and the first.
+  // Positions between the last column and the first belong to the raster.
   if (wrap_columns_ > 0 && wrapped >= wrap_columns_) return wrapped - wrap_columns_;
   return wrapped > period_ - kEdgeTolerance ? wrapped - period_ : wrapped;
 }
@@ -292,7 +295,7 @@ void Georeference::ToPixels(std::span<Position> positions) const {
   if (projector_ != nullptr) projector_->Forward(positions);
   for (Position& position : positions) {
     if (full_circle_ > 0 && period_ == 0) {
-      // A rotated or projected grid has no columns to wrap: its longitudes are those nearest to its centre.
+      // Columns of a rotated or projected grid do not wrap: longitudes nearest to its centre are used.
       position.x -= full_circle_ * std::round((position.x - centre_x_) / full_circle_);
     }
     position = Apply(to_pixel_, position);

@@ -20,7 +20,7 @@
 
 namespace terrace::dem {
 
-// A pixel of another raster on the same grid, counted in the pixels of this one.
+// Offset of another raster's first pixel on the same grid, in pixels.
 struct PixelOffset {
   std::int64_t column = 0, row = 0;
 };
@@ -28,26 +28,30 @@ struct PixelOffset {
 // Immutable and thread-safe.
 class Georeference {
  public:
-  // Errors say what is missing and the command that adds it.
+  // Reads the georeference of a dataset. Error messages say what is missing and which command adds it.
   static Result<Georeference> Of(GDALDataset& dataset, const std::string& path);
 
-  // Where the first pixel of `other` lies, if both have one CRS and their pixels lie on one grid; else nothing. Columns
-  // around the Earth are not wrapped.
+  // Returns the position of the first pixel of `other` if both have the same CRS and pixel grid; else nothing. Columns
+  // are not wrapped around the Earth.
   std::optional<PixelOffset> OffsetOf(const Georeference& other) const;
-  // A hundredth of a pixel off is on the grid, as around the Earth (FindPeriod): corners are written with few digits.
+  // Offsets within a hundredth of a pixel count as on the grid, because files state corners with few digits. FindPeriod
+  // has the same tolerance.
   static constexpr double kOffsetTolerance = 0.01;
-  static constexpr double kFarthestPixel = 1LL << 40;  // no raster on the grid begins farther from another one
+  static constexpr double kFarthestPixel = 1LL << 40;  // rasters farther apart count as on different grids
 
-  // False: OffsetOf gives nothing, whatever the offsets of both are.
+  // Returns false if OffsetOf returns nothing for any offset of the two rasters.
   bool MayAlign(const Georeference& other) const;
-  // The outer corner of `other`'s first pixel, in pixels of this one. Precondition: both have one CRS.
+  // Returns the outer corner of the first pixel of `other`, in pixels of this raster. Precondition: both have the same
+  // CRS.
   Position CornerOf(const Georeference& other) const;
 
-  // Pixels by which those of `other` lie off the pixels of this grid that they count as, `first` its first one: the
-  // most on each axis. Columns of geographic grids are counted modulo 360 degrees.
+  // Returns the largest offset, on each axis and in pixels, between the pixels of `other` and the pixels of this grid
+  // that they are matched with. `first`: the match of its first pixel. Columns of geographic grids count modulo 360
+  // degrees.
   Position LargestMisplacement(const Georeference& other, const PixelOffset& first) const;
 
-  // That of `width` x `height` pixels of the same grid from `first` on. `name` stands for them in errors.
+  // Returns the georeference of a window of this grid that begins at `first`. `name`: the window's name in error
+  // messages.
   Result<Georeference> Moved(const PixelOffset& first, int width, int height, const std::string& name) const;
 
   // Converts degrees to pixels, in place; NaN if the CRS has no such position. Longitudes of geographic sources are
@@ -57,15 +61,15 @@ class Georeference {
   // Pixels to degrees, in place; longitudes may lie beyond +-180.
   void ToDegrees(std::span<Position> positions) const;
 
-  // Positions are an affine function of degrees: no PROJ, no interpolation.
+  // Whether pixel positions are an affine function of degrees; then neither PROJ nor interpolation is needed.
   bool is_affine() const { return projector_ == nullptr; }
-  // North is up and columns follow meridians, in degrees.
+  // Whether the CRS is in degrees, north is up and columns follow meridians.
   bool is_geographic_grid() const { return period_ > 0; }
   bool columns_run_east() const { return to_crs_[1] > 0; }
-  // Columns in 360 degrees, of a geographic grid; else 0.
+  // The number of columns in 360 degrees; 0 if this is not a geographic grid.
   double period() const { return period_; }
-  // Columns after which the raster repeats itself, if it goes all around the Earth; else 0. Columns beyond are
-  // duplicates.
+  // The number of columns after which a raster around the whole Earth repeats itself; 0 for other rasters. Further
+  // columns are duplicates.
   int wrap_columns() const { return wrap_columns_; }
 
   int width() const { return width_; }
@@ -73,15 +77,16 @@ class Georeference {
 
   const std::string& crs() const { return crs_; }
   const std::string& vertical_datum() const { return vertical_datum_; }
-  // The compound reference system with the heights' own, WKT; empty where heights are ellipsoidal or nothing is stated.
+  // The compound reference system including the vertical one, as WKT; empty if heights are ellipsoidal or no vertical
+  // system is stated.
   const std::string& vertical_crs() const { return vertical_crs_; }
   const std::string& vertical_unit() const { return vertical_unit_; }
   const std::string& pixel_unit() const { return pixel_unit_; }
   double pixel_width() const;
   double pixel_height() const;
-  // Pixels to the CRS, in GDAL's order.
+  // The geotransform from pixels to the CRS, in GDAL's order.
   const std::array<double, 6>& to_crs() const { return to_crs_; }
-  // The CRS without what heights count from, WKT. Empty: it has none.
+  // The horizontal part of the CRS as WKT; empty: none.
   const std::string& horizontal_wkt() const { return horizontal_wkt_; }
   const Projector* projector() const { return projector_.get(); }  // null where is_affine()
   std::string transform() const { return projector_ == nullptr ? "" : projector_->description(); }
@@ -104,13 +109,13 @@ class Georeference {
   int width_ = 0, height_ = 0;
   std::array<double, 6> to_crs_{};    // pixels -> CRS, GDAL's order
   std::array<double, 6> to_pixel_{};  // CRS -> pixels
-  // 360 degrees in units of the CRS, if it is geographic or goes on beyond the antimeridian; else 0.
+  // 360 degrees in units of the CRS, if the CRS is geographic or continues beyond the antimeridian; else 0.
   double full_circle_ = 0;
   double centre_x_ = 0;  // of the raster, in the same units
   double period_ = 0;
   int wrap_columns_ = 0;
   std::shared_ptr<const Projector> projector_;  // null: the CRS is WGS 84 longitude and latitude
-  std::string wkt_, horizontal_wkt_;            // of the CRS as stated, and without what heights count from
+  std::string wkt_, horizontal_wkt_;            // of the CRS as stated, and of its horizontal part
   std::string crs_, vertical_datum_, vertical_unit_, vertical_crs_, pixel_unit_;
 };
 

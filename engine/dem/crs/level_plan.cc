@@ -15,7 +15,8 @@ struct Step {
   double east = 0, north = 0;  // metres
 };
 
-// Differences are taken in ECEF: at a pole longitudes a pixel apart can differ by half a turn.
+// Differences are computed in ECEF, because near a pole the longitudes of neighbouring pixels can differ by half a
+// turn.
 Step GroundStep(Position from, Position to, Position centre) {
   const geo::Vec3 chord = geo::ToEcef(to.x, to.y, 0) - geo::ToEcef(from.x, from.y, 0);
   const geo::Vec3 up = geo::SurfaceNormal(centre.x, centre.y);
@@ -24,7 +25,7 @@ Step GroundStep(Position from, Position to, Position centre) {
   return {geo::Dot(chord, east), geo::Dot(chord, geo::Cross(up, east))};
 }
 
-// std::hypot is not the same to the last bit everywhere; metres do not overflow.
+// std::hypot differs in the last bit between platforms; metres do not overflow.
 double LengthOf(double east, double north) { return std::sqrt(east * east + north * north); }
 
 // The coarsest lattice with at least `nodes` nodes a sample of the source on both axes, or the finest there is.
@@ -42,14 +43,14 @@ int CellsOf(int level, const SourceSpacing& spacing, int nodes) {
   return kFinest;
 }
 
-// Around a pole meridians meet: the centre of a polar map says nothing about grid cells elsewhere in it. In a
-// geographic source its columns meet as well.
+// Meridians meet at a pole: the centre of a polar map does not represent cells elsewhere. In a geographic source its
+// columns meet as well.
 double RepresentativeLatitude(const SourceSpacing& spacing) {
   constexpr double kMaxPolar = 75;
   return spacing.geographic ? spacing.latitude : std::clamp(spacing.latitude, -kMaxPolar, kMaxPolar);
 }
 
-// Metres on the ground from one Web Mercator pixel to the next, the same in both axes but for the Earth's flattening.
+// Metres on the ground between Web Mercator pixels, equal on both axes except for the Earth's flattening.
 double MercatorStep(int depth, const SourceSpacing& spacing) {
   constexpr double kMaxPolar = geo::kMercatorLatitude;
   const double latitude = std::clamp(RepresentativeLatitude(spacing), -kMaxPolar, kMaxPolar);
@@ -77,7 +78,7 @@ Result<SourceSpacing> SourceSpacing::Of(const Georeference& georeference, const 
   spacing.latitude = cross[0].y;
   spacing.geographic = georeference.is_geographic_grid();
   spacing.finer = std::min(LengthOf(column.east, column.north), LengthOf(row.east, row.north));
-  // Rows of the inverse of (column, row): pixels passed per metre east, per metre north.
+  // Rows of the inverse matrix: pixels per metre east, per metre north.
   spacing.east = std::abs(area) / LengthOf(row.north, column.north);
   spacing.north = std::abs(area) / LengthOf(row.east, column.east);
   if (!(spacing.finer > 0) || !std::isfinite(spacing.east) || !std::isfinite(spacing.north) || area == 0) {
@@ -97,7 +98,7 @@ double SamplesPerCell(const geo::Lattice& lattice, const SourceSpacing& spacing)
 }
 
 int AveragingFactor(double samples_per_cell) {
-  constexpr int kMost = 22;  // one block then holds the largest raster (raster_file.cc, kMaxSide)
+  constexpr int kMost = 22;  // one block then contains the largest raster (raster_file.cc, kMaxSide)
   return 1 << std::clamp(geo::NearestOctave(samples_per_cell), 0, kMost);
 }
 

@@ -1,5 +1,5 @@
-// How deep a source is served, and which lattice and averaging factor each level uses: functions of source and level
-// alone.
+// The deepest level of a source, and the lattice and averaging factor of each level. All are functions of the source
+// and the level alone.
 #pragma once
 
 #include <optional>
@@ -12,9 +12,9 @@
 
 namespace terrace::dem {
 
-// Distances between samples on the ground at the source's centre, in true metres.
+// Distances between samples at the source's centre, in metres on the ground.
 struct SourceSpacing {
-  double east = 0, north = 0;  // one sample on, going east; going north
+  double east = 0, north = 0;  // to the next sample to the east; to the north
   double finer = 0;            // the shorter of a column step and a row step
   double latitude = 0;         // of the centre, degrees
   bool geographic = false;     // columns follow meridians
@@ -22,23 +22,24 @@ struct SourceSpacing {
   static Result<SourceSpacing> Of(const Georeference& georeference, const std::string& path);
 };
 
-// Samples of the source along the edge of a lattice cell, the geometric mean of both axes.
+// Returns the number of source samples along the edge of a lattice cell (geometric mean of both axes).
 double SamplesPerCell(const geo::Lattice& lattice, const SourceSpacing& spacing);
 
-// The nearest power of two, at least 1: how many samples per axis are averaged into one.
+// Returns the number of samples per axis that are averaged into one: the nearest power of two, at least 1.
 int AveragingFactor(double samples_per_cell);
 
 // Lattices of levels 0 .. geo::kMaxLevel for a dataset whose finest source is this one: at least as fine as the source,
 // from the level above `max_level`, the deepest one served, at least twice as fine; at most 257 nodes a side.
 std::vector<geo::Lattice> PlanLattices(const SourceSpacing& finest, int max_level);
 
-// The first depth of Web Mercator's pixels that is at least as fine as the source at its centre, 1 .. geo::kMaxLevel.
+// Returns the first depth of Web Mercator whose pixels are at least as fine as the source at its centre, 1 ..
+// geo::kMaxLevel.
 int DeepestMercator(const SourceSpacing& spacing);
 
-// The averaging factor of a depth of Web Mercator.
+// Returns the averaging factor for a depth of Web Mercator.
 int MercatorFactor(int depth, const SourceSpacing& spacing);
 
-// The first level whose default error is at most a tenth of the finer spacing, or at most `finest_error`.
+// Returns the first level whose default error is at most a tenth of the finer spacing, or at most `finest_error`.
 int DeepestLevel(const SourceSpacing& spacing, double error_fraction, std::optional<double> finest_error);
 
 }  // namespace terrace::dem

@@ -8,7 +8,7 @@
 namespace terrace::dem {
 namespace {
 
-constexpr int kCellNodes = 32;  // grids have a multiple of it, so cells never cross the antimeridian or a pole
+constexpr int kCellNodes = 32;  // divides the size of all grids, so cells never cross the antimeridian or a pole
 
 // A square of `size` x `size` nodes; it owns the nodes on its western and southern edges.
 struct Cell {
@@ -16,11 +16,11 @@ struct Cell {
   int size;
 };
 
-// Cells are interpolated from kKnots x kKnots of their positions, the outermost on their edges.
+// Cells are interpolated from kKnots x kKnots positions, the outermost on their edges.
 constexpr int kKnots = 5;
 constexpr int kMinCell = 2 * (kKnots - 1);  // smaller ones have hardly more nodes than that
 
-// Lagrange's weights of the knots, `step` nodes from a cell's edge.
+// Lagrange weights of the knots at `step` nodes from a cell's edge.
 std::array<double, kKnots> Weights(double step, int size) {
   const double t = step * (kKnots - 1) / size;
   std::array<double, kKnots> weights;
@@ -140,7 +140,7 @@ class GridNodes {
   }
 
   bool Interpolate(const Cell& cell, const Part& part) {
-    // The knots, and four nodes where a term of one degree more in one of the axes is near its largest.
+    // The knots, and four nodes where a polynomial term of the next degree is near its maximum.
     constexpr std::size_t kTried = 4;
     const int spacing = cell.size / (kKnots - 1), half = cell.size / 2, near = cell.size / 8;
     const std::array<std::array<int, 2>, kTried> tried = {
@@ -154,7 +154,7 @@ class GridNodes {
     }
     georeference_.ToPixels(known);
     if (std::ranges::any_of(known, [](const Position& p) { return std::isnan(p.x); })) return false;
-    // The knots' columns at one row; then any node of that row.
+    // Interpolates the knots' columns at one row, then any node of that row.
     const auto row_at = [&](std::int64_t row) {
       const auto y = Weights(static_cast<double>(row - cell.row), cell.size);
       std::array<Position, kKnots> sums;

@@ -13,8 +13,7 @@
 namespace terrace::dem {
 namespace {
 
-// Of all operations between WGS 84 and the CRS, the one PROJ uses at `centre`.
-// `is_only`: it is the same everywhere.
+// Returns the operation between WGS 84 and the CRS that PROJ uses at `centre`. `is_only`: it is the only one.
 ProjObjectPtr OperationAt(PJ_CONTEXT* context, const std::string& wkt, Position centre, bool& is_only) {
   const ProjObjectPtr any(proj_create_crs_to_crs(context, "EPSG:4326", wkt.c_str(), nullptr));
   if (any == nullptr) return nullptr;
@@ -27,15 +26,15 @@ ProjObjectPtr OperationAt(PJ_CONTEXT* context, const std::string& wkt, Position 
   return used != nullptr ? std::move(used) : std::move(ordered);
 }
 
-// Most reference systems have one operation, wherever a source lies: thousands of sources share it, and looking it up
-// takes PROJ milliseconds.
+// Most reference systems have only one operation, which thousands of sources share; PROJ takes milliseconds to look it
+// up.
 std::shared_ptr<const Projector> FindShared(const std::string& wkt, std::shared_ptr<const Projector> made) {
   static std::mutex mutex;
   static std::map<std::string, std::shared_ptr<const Projector>> shared;
   const std::lock_guard lock(mutex);
   if (made != nullptr) return shared.insert_or_assign(wkt, std::move(made)).first->second;
   const auto found = shared.find(wkt);
-  // A grid that was replaced is read anew.
+  // A replaced grid is read again.
   return found == shared.end() || found->second->grids().FirstChanged() ? nullptr : found->second;
 }
 
@@ -55,7 +54,7 @@ Result<std::shared_ptr<const Projector>> Projector::Make(const std::string& wkt,
                      error == 0 ? "none known" : proj_context_errno_string(context.get(), error));
   }
   const std::shared_ptr<Projector> projector(new Projector);
-  // "+proj=noop" or "proj=noop", as the PROJ version likes it.
+  // "+proj=noop" or "proj=noop", depending on the version of PROJ.
   projector->operations_.set_pipeline(*pipeline == '+' ? pipeline + 1 : pipeline);
   const PJ_PROJ_INFO info = proj_pj_info(operation.get());
   projector->description_ = info.description == nullptr ? projector->pipeline() : info.description;
@@ -71,8 +70,8 @@ Result<std::shared_ptr<const Projector>> Projector::Make(const std::string& wkt,
 
 void Projector::Transform(std::span<Position> positions, bool forward) const {
   const IdlePool<ProjOperation>::Handle operation = operations_.Borrow();
-  // The same string was set up once in Make. Where it cannot be now, for want of memory or of descriptors for its
-  // grids, no position is known; the caller's read fails.
+  // Make has created the operation before, so memory or descriptors for its grids have run out. No position is known;
+  // the caller's read fails.
   if (!operation) throw std::bad_alloc();
   for (Position& position : positions) {
     const PJ_COORD result = proj_trans(operation->operation.get(), forward ? PJ_FWD : PJ_INV,

@@ -1,7 +1,6 @@
-// Positions on the globe to positions in a CRS and back, through one pinned PROJ operation.
-//
-// If several operations exist, GDAL's own transformation chooses one by the mean of the points of a call: the same node
-// could get another position in another batch. Here the operation is chosen once, for the source's own area.
+// Transforms positions on the globe to a CRS and back, through one pinned PROJ operation.
+// If several operations exist, GDAL chooses one by the mean of the points of a call: the same node could get different
+// positions in different calls. Here the operation is chosen once, for the source's area.
 #pragma once
 
 #include <memory>
@@ -21,8 +20,8 @@ struct Position {
 // Thread-safe: every call borrows a PROJ context of its own.
 class Projector {
  public:
-  // Longitude and latitude (WGS 84, degrees) to the horizontal CRS `wkt`, in the order easting, northing.
-  // `centre` is a position in that CRS where the chosen operation must be at its best.
+  // From longitude and latitude (WGS 84, degrees) to the horizontal CRS `wkt`, in the order easting, northing.
+  // `centre`: the position in that CRS for which PROJ selects the best operation.
   static Result<std::shared_ptr<const Projector>> Make(const std::string& wkt, Position centre);
 
   // Transforms in place. Positions outside the operation's domain become NaN.
@@ -43,8 +42,8 @@ class Projector {
   OperationPool operations_;
 };
 
-// The reference system of an EPSG code as WKT 2:2019, from PROJ's database: the same on every thread. Empty: there is
-// none.
+// Returns the reference system of an EPSG code as WKT 2:2019, from PROJ's database; empty if there is none. Every
+// thread gets the same text.
 std::string EpsgWkt(const std::string& code);
 
 }  // namespace terrace::dem

@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kNoUndulation = std::numeric_limits<double>::quiet_NaN();
 
-// PROJ takes positions this far outside for positions on the edge, in steps of the grid (REL_TOLERANCE_HGRIDSHIFT).
+// PROJ moves positions within this distance outside to the edge; in steps of the grid (REL_TOLERANCE_HGRIDSHIFT).
 constexpr double kGridEdgeTolerance = 1e-5;
 
 // PROJ finds the undulations among the samples of a GeoTIFF by their description.
@@ -29,7 +29,7 @@ int BandOfUndulations(GDALDataset& dataset) {
   return dataset.GetRasterCount() == 1 ? 1 : 0;
 }
 
-// The first and the last node that places lie between.
+// The first and the last node around places.
 std::pair<int, int> HullOf(std::span<const NodePlace> places) {
   std::pair<int, int> hull{std::numeric_limits<int>::max(), -1};
   for (const NodePlace& place : places) {

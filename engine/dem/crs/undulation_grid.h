@@ -1,6 +1,5 @@
-// A grid of undulations as PROJ's vgridshift reads it: heights at nodes on meridians and parallels, bilinear between
-// them. Where the grid is known, undulations are interpolated from the very nodes that PROJ interpolates from, and
-// bounds on them follow from these nodes.
+// A grid of undulations as PROJ's vgridshift reads it: heights at nodes on meridians and parallels, bilinear in
+// between. Undulations are interpolated from the same nodes that PROJ uses, and bounds on them follow from these nodes.
 #pragma once
 
 #include <gdal_priv.h>
@@ -19,7 +18,7 @@
 
 namespace terrace::dem {
 
-// A position along one axis of a grid: between two nodes. Outside of the grid there are none.
+// A position along one axis of a grid, between two nodes; no nodes outside the grid.
 struct NodePlace {
   int node = -1, next = -1;
   double weight = 0;  // of `next`, 0 .. 1
@@ -27,22 +26,22 @@ struct NodePlace {
   bool is_inside() const { return node >= 0; }
 };
 
-// Immutable and thread-safe: reads of its file wait for one another.
+// Immutable and thread-safe. Reads of its file are serialized.
 class UndulationGrid {
  public:
-  // A .gtx file, or a GeoTIFF as on cdn.proj.org. Null where GDAL cannot read it, or where there is more to it than one
-  // grid in degrees with north up.
+  // Opens a .gtx file, or a GeoTIFF as on cdn.proj.org. Null if GDAL cannot read it, or if it is not a single grid in
+  // degrees with north up.
   static std::shared_ptr<const UndulationGrid> Open(const std::string& path);
 
-  // Columns count eastwards from the western one, rows southwards from the northern one.
+  // Columns are counted from the west, rows from the north.
   int columns() const { return columns_; }
   int rows() const { return rows_; }
-  bool wraps() const { return wraps_; }                // its columns go all around the Earth
+  bool wraps() const { return wraps_; }                // its columns span the whole Earth
   double column_step() const { return column_step_; }  // degrees
   double row_step() const { return row_step_; }
 
-  // Longitudes count modulo 360 degrees. Of a grid that wraps: 0 .. columns(); of others the column nearest to the
-  // grid's middle.
+  // Longitudes count modulo 360 degrees. For a grid that wraps: 0 .. columns(); for others the equivalent column
+  // nearest to the grid's middle.
   double ColumnOf(double longitude) const;
   double RowOf(double latitude) const { return (north_ - latitude) / row_step_; }
   Position DegreesOf(double column, double row) const {
@@ -73,16 +72,16 @@ class UndulationGrid {
 // Part of a grid in memory.
 class UndulationPatch {
  public:
-  // What places lie between; others are ignored. Of a grid that wraps, all columns where the places lie on both sides
-  // of its seam.
+  // Reads the nodes around the given places; places outside the grid are ignored. Reads all columns if the grid wraps
+  // and the places lie on both sides of its seam.
   static Result<UndulationPatch> Read(const UndulationGrid& grid, std::span<const NodePlace> columns,
                                       std::span<const NodePlace> rows);
-  // How many nodes Read would read.
+  // Returns the number of nodes that Read would read.
   static std::int64_t CountNodes(std::span<const NodePlace> columns, std::span<const NodePlace> rows);
 
-  // Bilinear between the nodes that have values, as PROJ interpolates; NaN where none has, or outside of the grid.
+  // Interpolates bilinearly between the nodes that have values, as PROJ does; NaN if none has, or outside the grid.
   double At(const NodePlace& column, const NodePlace& row) const;
-  // All four nodes around have values.
+  // Whether all four nodes around the place have values.
   bool IsWhole(const NodePlace& column, const NodePlace& row) const;
 
  private:

@@ -13,8 +13,8 @@ namespace {
 
 constexpr double kUnknownUndulation = std::numeric_limits<double>::quiet_NaN();
 
-// Boxes of the bounds are no wider than the cells of the finest grid that the geoid reads, as far as there are not too
-// many of them.
+// Boxes of the bounds are not wider than the cells of the finest grid that the geoid reads, unless that gives too many
+// boxes.
 constexpr double kBoxDegrees = 0.125;
 constexpr int kMinBoxes = 8, kMaxBoxes = 512;  // along a side
 
@@ -23,7 +23,7 @@ int BoxesAlong(double degrees, double finest_cell) {
   return static_cast<int>(std::clamp(std::ceil(degrees / box), double{kMinBoxes}, double{kMaxBoxes}));
 }
 
-// One global cell of nodes, filled from its corners inwards; every node is evaluated at most once.
+// One global cell of nodes, filled from its corners inwards. Every node is evaluated at most once.
 template <typename Grid>
 class NodeCell {
  public:
@@ -76,9 +76,9 @@ class NodeCell {
       const double u = static_cast<double>(i) / size, v = static_cast<double>(j) / size;
       return (sw * (1 - u) + se * u) * (1 - v) + (nw * (1 - u) + ne * u) * v;
     };
-    // A cell no larger than the grid's own crosses one of its meridians and one of its parallels at most, and deviates
-    // by tents. Along an edge a tent is at most twice what it is in the middle, d; then in the cell, where the middle
-    // takes a quarter at least from the grid's node, at most 4 (d + 2 d / 2) = 8 d.
+    // A cell that is not larger than the grid's cells crosses at most one of its meridians and one of its parallels,
+    // and deviates by tent functions. Along an edge a tent is at most twice its value d in the middle. In the cell,
+    // where the middle takes at least a quarter from the grid's node, it is at most 4 (d + 2 d / 2) = 8 d.
     const int half = size / 2;
     constexpr std::array<std::pair<int, int>, 5> kMiddles = {{{1, 0}, {0, 1}, {1, 1}, {2, 1}, {1, 2}}};
     for (const auto& [i, j] : kMiddles) {
@@ -101,10 +101,10 @@ class NodeCell {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// The table keeps a range for 64 of its pixels: here for 8 nodes along a side.
+// The table has a range for 64 of its pixels: here for 8 nodes along a side.
 constexpr int kPixelsPerNode = 8;
 
-// Positions are computed in other orders elsewhere: steps of the grid.
+// A margin for rounding in other computations of positions, in steps of the grid.
 constexpr double kSlack = 1e-6;
 
 struct IndexRange {
@@ -208,8 +208,8 @@ Result<void> Undulations::FindPoles() {
   return {};
 }
 
-// From the corners and the middle of each box, and as much to spare as they differ: where these are no more than half a
-// cell apart, the middle of a tent is a quarter of a cell from one of them, which has half of its height.
+// Bounds from the corners and the middle of each box, widened by their difference. If these are at most half a cell
+// apart, the middle of a tent is at most a quarter of a cell from one of them, which has half of its height.
 void Undulations::FillBoxes() {
   const double finest = geoid_->finest_cell();
   columns_ = BoxesAlong(area_.east - area_.west, finest);
@@ -274,8 +274,8 @@ HeightRange Undulations::RangeOf(double west, double south, double width, double
   const auto index = [](double position, int count) {
     return static_cast<int>(std::clamp(std::floor(position), -1.0, static_cast<double>(count)));
   };
-  // One box more on every side: positions are computed in other orders elsewhere, and a node beside an edge counts in
-  // the box at that edge.
+  // One more box on every side: positions are rounded differently elsewhere, and a node beside an edge belongs to the
+  // box at that edge.
   const int bottom = std::max(index((south - area_.south) / box_height, rows_) - 1, 0);
   const int top = std::min(index((south + height - area_.south) / box_height, rows_) + 1, rows_ - 1);
   for (int turn = -1; turn <= 1 && !ranges_; ++turn) {
@@ -299,7 +299,7 @@ HeightRange Undulations::RangeOf(double west, double south, double width, double
   return range.min <= range.max ? range : whole;
 }
 
-// By the grid's nodes, in strips of rows.
+// From the grid's nodes, in strips of rows.
 template <typename Grid>
 Result<void> Undulations::Interpolate(const Grid& grid, const NodeWindow& window, std::vector<double>& out) const {
   constexpr std::int64_t kMaxNodes = 1 << 18;

@@ -17,14 +17,15 @@
 
 namespace terrace::dem {
 
-// Bounds on a grid of undulations over boxes, from the grid's own nodes. Immutable and thread-safe.
+// Bounds on the undulations of a grid over boxes, computed from the grid's nodes. Immutable and thread-safe.
 class UndulationRanges {
  public:
-  // Reads the nodes in and around the area once.
+  // Reads the nodes in and around the area.
   static Result<UndulationRanges> Of(const UndulationGrid& grid, const Footprint& area);
 
-  // No undulation in the box and the area leaves it: from (west, south), degrees, `width` by `height` large; west
-  // counts modulo 360. min > max: the box misses the area, or nothing is known there.
+  // Returns a range that contains all undulations in the intersection of the area and a box with south-western corner
+  // (west, south), `width` by `height` degrees; west counts modulo 360. min > max: the box does not meet the area, or
+  // nothing is known there.
   HeightRange Query(double west, double south, double width, double height) const;
 
   HeightRange whole() const { return whole_; }
@@ -41,34 +42,35 @@ class UndulationRanges {
 };
 
 // Immutable after construction and thread-safe.
-//
-// Where the geoid is a grid (geoid.h), undulations are interpolated between its nodes, as PROJ does, and bounds are the
-// lowest and highest of its nodes. Other operations of PROJ are asked themselves, at nodes or, where cells of nodes are
-// smaller than those of any grid they read, at a few of them and between these bilinearly, within kTolerance.
+// If the geoid is a grid (geoid.h), undulations are interpolated between its nodes, as PROJ does, and bounds are the
+// minimum and maximum of its nodes. Other PROJ operations are evaluated at every node. If lattice cells are smaller
+// than the cells of every grid that the operation reads, only a few nodes are evaluated, and the others are
+// interpolated bilinearly within kTolerance.
 class Undulations {
  public:
-  // Of undulations that are not those of a grid: metres from the geoid's own.
+  // Metres: the largest interpolation error for geoids that are not a grid.
   static constexpr double kTolerance = 0.002;
 
-  // `area`: where undulations will be asked for; the whole Earth is possible. kUnavailable: the grid cannot be read.
+  // `area`: where undulations will be evaluated, up to the whole Earth. kUnavailable: the grid cannot be read.
   static Result<std::shared_ptr<const Undulations>> Of(std::shared_ptr<const Geoid> geoid, const Footprint& area);
-  // All over the Earth, for At and AtPole alone: no bounds are looked for.
+  // For the whole Earth, without bounds: use only At and AtPole.
   static Result<std::shared_ptr<const Undulations>> OfEarth(std::shared_ptr<const Geoid> geoid);
 
-  // Of the window's nodes, row by row from its first; NaN outside the area and where the geoid is not known. A function
-  // of the global node alone: whichever window asks gets the same bits; pole rows are one value.
-  // `Grid`: geo::Lattice or geo::MercatorGrid.
+  // Returns the undulations of the window's nodes, row by row; NaN outside the area and where the geoid is not known. A
+  // value depends only on the global node and has the same bits in every window. All nodes of a pole row have the same
+  // value. `Grid`: geo::Lattice or geo::MercatorGrid.
   template <typename Grid>
   Result<std::vector<double>> At(const Grid& grid, const NodeWindow& window) const;
 
-  // No value of At within the box leaves it: from (west, south), degrees, `width` by `height` large; west counts modulo
-  // 360. Of a box that misses the area: of the whole area.
+  // Returns a range that contains all values of At in a box with south-western corner (west, south), `width` by
+  // `height` degrees; west counts modulo 360. If the box does not meet the area, the range of the whole area.
   HeightRange RangeOf(double west, double south, double width, double height) const;
 
   double AtPole(int pole) const { return poles_[pole]; }  // 0 south, 1 north; NaN where not known
-  // Whether the geoid is known all over the area.
+  // Whether the geoid is known in the whole area.
   bool is_complete() const { return ranges_ ? ranges_->is_complete() : is_complete_; }
-  // RangeOf bounds the geoid itself, and not just what At gives: it was looked at as closely as its grids can bend.
+  // Whether RangeOf bounds the geoid itself and not only the values of At: the geoid was evaluated at the resolution of
+  // its grids.
   bool bounds_geoid() const { return ranges_.has_value() || bounds_geoid_; }
 
   const Geoid& geoid() const { return *geoid_; }
@@ -90,9 +92,8 @@ class Undulations {
   std::shared_ptr<const Geoid> geoid_;
   Footprint area_;
   std::optional<UndulationRanges> ranges_;  // of a grid
-  // Of other geoids: bounds over equal boxes of the area, row by row from the south-western one. What At interpolates
-  // is held within them: they are bounds by construction, even should a geoid bulge unseen between the positions they
-  // were taken from.
+  // For other geoids: bounds over equal boxes of the area, row by row from the south-western box. At clamps its results
+  // to them, so they hold even if the geoid exceeds them between the evaluated positions.
   int columns_ = 0, rows_ = 0;
   std::vector<HeightRange> boxes_;
   HeightRange whole_;

@@ -1,4 +1,4 @@
-// Which of the ways to count heights a source uses: as its reference system states it, or as its owner says.
+// The vertical datum of a source: as its reference system states it, or as configured.
 #pragma once
 
 #include <memory>
@@ -12,21 +12,20 @@ namespace terrace::dem {
 
 struct VerticalDatum {
   std::string name;                    // for people: "EGM96 height", "ellipsoid"; empty: not known
-  std::shared_ptr<const Geoid> geoid;  // null: heights are ellipsoidal, or pass as if they were
+  std::shared_ptr<const Geoid> geoid;  // null: heights are ellipsoidal, or treated as such
 
   bool is_known() const { return !name.empty(); }
-  // Heights of both can be mixed.
+  // Whether heights of both datums can be mixed.
   bool IsSame(const VerticalDatum& other) const {
     return name == other.name && (geoid == nullptr) == (other.geoid == nullptr) &&
            (geoid == nullptr || geoid->pipeline() == other.geoid->pipeline());
   }
 };
 
-// `wanted`: "crs" (what the reference system states; unknown where it states nothing), "unknown", "ellipsoid", "egm96",
+// `wanted`: "crs" (as the reference system states it; unknown if it states none), "unknown", "ellipsoid", "egm96",
 // "egm2008", a vertical reference system such as "EPSG:5703", or the path of a grid of undulations. `centre`: of the
-// source, degrees. kInvalidArgument and kNotFound say what is missing and what to do; they do not name the source.
-//
-// Ellipsoidal heights above another ellipsoid than that of WGS 84 pass through.
+// source, degrees. kInvalidArgument, kNotFound: the message says what is missing and what to do, but does not name the
+// source. Heights above another ellipsoid than that of WGS 84 are used unchanged.
 Result<VerticalDatum> ResolveVertical(const std::string& wanted, const Georeference& stated, Position centre);
 
 }  // namespace terrace::dem

@@ -7,10 +7,10 @@
 namespace terrace::dem {
 namespace {
 
-// GDAL keeps rasters it works on in this one. Its names begin with "MEM:::", which are never files.
+// GDAL uses this driver for temporary rasters. Its names begin with "MEM:::", so they are never files.
 constexpr std::string_view kOwnUse = "MEM";
 
-// Taken out of GDAL's list, which then never frees them; nor does anybody else.
+// Removed from GDAL's list and never freed.
 std::vector<GDALDriver*>& Retired() {
   static auto& drivers = *new std::vector<GDALDriver*>;
   return drivers;
@@ -35,7 +35,7 @@ Result<void> CheckNames(const std::vector<std::string>& names) {
 }  // namespace
 
 const std::vector<std::string>& DefaultDrivers() {
-  // Those of them that this GDAL was built with.
+  // The subset that this build of GDAL has.
   static const std::vector<std::string> drivers = [] {
     std::vector<std::string> names;
     for (const char* name :
@@ -53,7 +53,7 @@ Result<void> UseDrivers(const std::vector<std::string>& names) {
   const std::lock_guard lock(RetiredMutex());
   if (auto known = CheckNames(names); !known) return known;
   GDALDriverManager& manager = *GetGDALDriverManager();
-  // Whoever registers all drivers anew makes others of the same names; the old ones wait on.
+  // If all drivers are registered again, new ones with the same names are created; the old ones stay here.
   std::erase_if(Retired(), [&manager](GDALDriver* driver) {
     if (manager.GetDriverByName(driver->GetDescription()) != nullptr) return false;
     manager.RegisterDriver(driver);

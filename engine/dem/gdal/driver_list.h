@@ -1,4 +1,4 @@
-// The formats that GDAL reads in this process.
+// The GDAL drivers of this process.
 #pragma once
 
 #include <gdal_priv.h>
@@ -11,20 +11,20 @@
 
 namespace terrace::dem {
 
-// The formats of elevation models and pictures that stand for themselves: none that fetches, runs or links others.
+// The default drivers: formats of elevation models and pictures that do not fetch, run or link other files.
 const std::vector<std::string>& DefaultDrivers();
 
-// Leaves GDAL with these drivers, by their short names: files inside files find no others either. May be called again
-// with others; meanwhile no source should be opened. kInvalidArgument: one that GDAL does not have; nothing changes
-// then. Precondition: GDAL's drivers are registered.
+// Restricts GDAL to these drivers (short names), also for files inside files. May be called again with other names,
+// while no source is being opened. kInvalidArgument: GDAL has no such driver; nothing changes. Precondition: GDAL's
+// drivers are registered.
 Result<void> UseDrivers(const std::vector<std::string>& names);
 
-// The format of a raster that UseDrivers left out, by GDAL's short name: what it would have been taken for. Looks at
-// its name and first bytes.
+// Returns the short name of the driver that would read the file but was removed by UseDrivers. Looks at the file's name
+// and first bytes.
 std::optional<std::string> LeftOutDriverOf(const std::string& path);
 
-// Opens a file of the program's own, such as PROJ's, with the driver of that short name, whether or not UseDrivers left
-// it out. Null: it is no such file, or GDAL has no such driver.
+// Opens a file of the installation, such as PROJ's grids, with a driver by its short name, even if UseDrivers removed
+// the driver. Null: the file has another format, or GDAL has no such driver.
 GDALDatasetUniquePtr OpenWithDriver(const std::string& name, const std::string& path);
 
 }  // namespace terrace::dem

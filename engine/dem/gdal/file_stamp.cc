@@ -20,7 +20,7 @@ std::uint64_t NumberOfThisStart() {
   return number;
 }
 
-// Of a name for GDAL's own file systems.
+// The fingerprint of a name in GDAL's virtual file systems.
 std::uint64_t OtherFingerprint(const std::string& path) {
   VSIStatBufL status{};
   const bool is_known = VSIStatExL(path.c_str(), &status, VSI_STAT_EXISTS_FLAG | VSI_STAT_SIZE_FLAG) == 0;

@@ -11,7 +11,8 @@ Result<IdlePool<GDALDataset>::Handle> HandlePool::Borrow() {
   if (dataset) return dataset;
   dataset.Set(ReopenRaster(path_));
   const std::string why = dataset ? "" : TakeGdalError();
-  // It may have been replaced or removed between the look at it and the opening, which may have failed for that.
+  // The file may have been replaced or removed between the check and the opening, which may have failed for this
+  // reason.
   if (auto unchanged = CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
   if (!dataset) {
     return MakeError(ErrorCode::kUnavailable, "{}: cannot be opened any more ({}); restore the file", path_, why);

@@ -33,7 +33,7 @@ std::atomic<std::uint64_t> errors{0}, warnings{0};
 
 thread_local std::string last_error;
 
-// GDAL's own handler goes silent after 1,000 messages and prints before that; ours keeps the last one, for our Errors.
+// GDAL's handler prints messages and stops after 1,000 of them; this one stores the last message for our Errors.
 void CPL_STDCALL KeepLastError(CPLErr severity, CPLErrorNum, const char* message) {
   if (severity == CE_Warning) ++warnings;
   if (severity < CE_Failure) return;
@@ -41,7 +41,7 @@ void CPL_STDCALL KeepLastError(CPLErr severity, CPLErrorNum, const char* message
   last_error = message;
 }
 
-// Memory, and files within files: these lead nowhere else.
+// File systems for memory and for files within files, which have no other access.
 constexpr std::array<std::string_view, 12> kLocal = {
     "/vsimem/",     "/vsizip/",    "/vsigzip/",   "/vsitar/",   "/vsi7z/",     "/vsirar/",
     "/vsisubfile/", "/vsisparse/", "/vsicached?", "/vsicrypt/", "/vsistdout/", "/vsistdout_redirect/"};
@@ -63,14 +63,14 @@ void InitOnce() {
   CPLSetErrorHandler(KeepLastError);
   CPLSetConfigOption("GDAL_VRT_ENABLE_PYTHON", "NO");
   CPLSetConfigOption("GDAL_DRIVER_PATH", "disable");
-  // What heights count from is left out of GeoTIFFs before version 1.1 otherwise.
+  // Without this setting, GDAL ignores the vertical datum of GeoTIFFs before version 1.1.
   CPLSetConfigOption("GTIFF_REPORT_COMPD_CS", "YES");
   OSRSetPROJEnableNetwork(0);
   GDALSetCacheMax64(kBlockCacheBytes);
-  // Settings come from terrace's configuration; GDAL would read its own files otherwise.
+  // Settings come from terrace's configuration, not from GDAL's own files.
   CPLSetConfigOption("GDAL_CONFIG_FILE", "/dev/null");
   GDALAllRegister();
-  // Unless the configuration says more: SetSourcePolicy.
+  // The default; SetSourcePolicy may change it.
   const Result<void> used = UseDrivers(DefaultDrivers());
   TERRACE_CHECK(used.has_value());
   GuardNetwork({});
@@ -88,7 +88,7 @@ std::string LibraryVersions() {
 }
 
 void GuardNetwork(const std::vector<std::string>& allowed_prefixes) {
-  // As GDAL made them, and what stands in for them; GDAL frees those it has at the end.
+  // GDAL's original file systems and their replacements. GDAL frees the ones that are installed at the end.
   static auto& doors = *new std::map<std::string, VSIFilesystemHandler*>;
   static auto& closed = *new std::map<std::string, Closed*>;
   char** prefixes = VSIFileManager::GetPrefixes();

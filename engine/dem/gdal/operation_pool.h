@@ -1,5 +1,5 @@
-// One pinned PROJ operation for many threads: each borrows a copy with a context of its own, and gives it back. What is
-// not in use is kept as IdlePool says, for a copy holds the files of its grids open.
+// One pinned PROJ operation for many threads: each thread borrows a copy with its own context and returns it. An
+// IdlePool keeps unused copies, because a copy holds the files of its grids open.
 #pragma once
 
 #include <string>
@@ -13,7 +13,7 @@ struct ProjOperation;
 
 class OperationPool {
  public:
-  // As PROJ writes it. Set once, before the first Borrow.
+  // The pipeline in PROJ's notation. Set it once, before the first Borrow.
   void set_pipeline(std::string pipeline) { pipeline_ = std::move(pipeline); }
   const std::string& pipeline() const { return pipeline_; }
 
@@ -22,7 +22,7 @@ class OperationPool {
 
  private:
   std::string pipeline_;
-  mutable IdlePool<ProjOperation> idle_;  // never cleared: grids are looked at by whoever uses the operation
+  mutable IdlePool<ProjOperation> idle_;  // never cleared: users of the operation check its grids
 };
 
 }  // namespace terrace::dem

@@ -1,4 +1,4 @@
-// PROJ's objects, freed with their owners. For sources that include PROJ: everybody else sees operation_pool.h.
+// Owning pointers to PROJ objects. For sources that use PROJ directly; others use operation_pool.h.
 #pragma once
 
 #include <proj.h>
@@ -20,18 +20,19 @@ using ProjObjectPtr = std::unique_ptr<PJ, ProjDestroy>;
 using ProjListPtr = std::unique_ptr<PJ_OBJ_LIST, ProjDestroy>;
 using ProjFactoryPtr = std::unique_ptr<PJ_OPERATION_FACTORY_CONTEXT, ProjDestroy>;
 
-// Silent, and without the network: what an operation gives must not depend on it.
+// Creates a context without log output and without network access, so that results of operations do not depend on the
+// network.
 ProjContextPtr MakeProjContext();
 
 // A file of numbers that an operation reads.
 struct ProjGrid {
   std::string name;
-  std::string file;  // empty: it is not installed
-  std::string url;   // empty: nobody offers it
+  std::string file;  // empty: not installed
+  std::string url;   // empty: no known download
 };
 std::vector<ProjGrid> GridsOf(PJ_CONTEXT* context, const PJ* operation);
 
-// For one thread at a time.
+// Used by one thread at a time.
 struct ProjOperation {
   ProjContextPtr context;  // outlives the operation made in it
   ProjObjectPtr operation;

@@ -22,14 +22,15 @@ namespace {
 // A one arc-second raster of the whole Earth has 1,296,000 columns.
 constexpr int kMaxSide = 1 << 22;
 constexpr std::int64_t kMaxSamples = std::int64_t{1} << 36;
-// GDAL decodes whole storage blocks, whatever its cache is allowed: a small file can claim a block of gigabytes.
+// GDAL decodes whole storage blocks, whatever the size of its cache: a small file can declare a block of gigabytes.
 constexpr std::int64_t kMaxBlockBytes = std::int64_t{128} << 20;
 constexpr int kMaxBands = 4096;  // hyperspectral images have hundreds
 
 constexpr unsigned kOpenFlags = GDAL_OF_RASTER | GDAL_OF_READONLY | GDAL_OF_VERBOSE_ERROR;
 
-// While it lives GDAL looks for files beside a raster by their names, instead of listing the folder at each opening: of
-// thousands of rasters in one folder that would be most of the work. Of remote folders a listing is one request.
+// During its lifetime, GDAL looks up files beside a raster by name, instead of listing the folder at each opening,
+// which would take most of the time for thousands of rasters in one folder. For remote folders a listing is one
+// request.
 class LookUpSidecars {
  public:
   explicit LookUpSidecars(const std::string& path) {
@@ -37,10 +38,10 @@ class LookUpSidecars {
   }
 
  private:
-  std::optional<CPLConfigOptionSetter> option_;  // of this thread
+  std::optional<CPLConfigOptionSetter> option_;  // for this thread
 };
 
-// What one read of a band decodes at least: a block, with those of the bands it is stored with.
+// The bytes that one read of a band decodes at least: a block, including interleaved bands.
 std::int64_t BytesPerBlock(GDALDataset& dataset, GDALRasterBand& band) {
   int width = 0, height = 0;
   band.GetBlockSize(&width, &height);
@@ -65,7 +66,7 @@ struct SizeLimits {
   const char* of_what = "";
 };
 
-// Names the limit that is exceeded alone.
+// The message names only the exceeded limit.
 Result<void> CheckSize(const std::string& path, std::int64_t width, std::int64_t height, const SizeLimits& limits) {
   const bool is_too_long = std::max(width, height) > limits.side;
   if (!is_too_long && width * height <= limits.samples) return {};
@@ -116,7 +117,7 @@ Result<void> CheckShape(GDALDataset& dataset, const std::string& path) {
   return {};
 }
 
-// Where the blocks of a GeoTIFF's bands end, at least, as its directory says.
+// A lower bound of the end of a GeoTIFF's blocks, according to its directory.
 class BlockEnds {
  public:
   explicit BlockEnds(GDALDataset& dataset) {
@@ -135,9 +136,10 @@ class BlockEnds {
     for (int row = 0; row < rows; ++row) {
       for (int column = 0; column < columns && looked_at_ < kMaxBlocks; ++column, ++looked_at_) {
         const std::uint64_t offset = Tell(band, "BLOCK_OFFSET", column, row);
-        if (offset == 0) continue;  // it has none: zeros
+        if (offset == 0) continue;  // a sparse block: zeros
         std::uint64_t bytes = Tell(band, "BLOCK_SIZE", column, row);
-        // The last strip may state those of a whole one, and is read by the rows that it has; a tile is read whole.
+        // The last strip may state the size of a whole strip, but is read only as far as its rows; tiles are read
+        // whole.
         const int strip_rows = std::min(height, band.GetYSize() - row * height);
         if (!is_compressed_)
           bytes = std::min(bytes, BytesOf(band, width, width == band.GetXSize() ? strip_rows : height));
@@ -154,7 +156,7 @@ class BlockEnds {
     return text == nullptr ? 0 : std::strtoull(text, nullptr, 10);
   }
 
-  // At least: bits of samples below a byte are not counted.
+  // A lower bound: samples of less than a byte count as nothing.
   std::uint64_t BytesOf(GDALRasterBand& band, int width, int rows) const {
     const char* const bits = band.GetMetadataItem("NBITS", "IMAGE_STRUCTURE");
     if (bits != nullptr) return 1;
@@ -172,7 +174,7 @@ class BlockEnds {
 }  // namespace
 
 Result<void> CheckSizeToMesh(const std::string& path, int width, int height) {
-  // Two gigabytes of floats: what is meshed in one piece must fit in memory several times over.
+  // Two gigabytes of floats: a raster that is meshed in one piece must fit into memory several times.
   constexpr std::int64_t kMaxSamples = std::int64_t{1} << 29;
   constexpr int kMaxPerSide = 1 << 15;  // the mesher's coordinates have 15 bits
   return CheckSize(path, width, height, {kMaxPerSide, kMaxSamples, "a mesh"});
@@ -188,13 +190,13 @@ void ForgetRemote(const std::string& path) {
 }
 
 bool IsRaster(const std::string& path) {
-  // GDAL's driver for ESRI's .hdr takes whatever lies beside one for the raster.
+  // GDAL's driver for ESRI's .hdr accepts any file beside a header as the raster.
   for (const char* sidecar : {"ovr", "msk", "aux", "rrd", "hdr", "prj", "qpj", "stx", "clr", "blw", "tfw", "wld"}) {
     if (EQUAL(CPLGetExtension(path.c_str()), sidecar)) return false;
   }
   if (path.ends_with(".aux.xml")) return false;
   InitGdal();
-  if (!CheckPlainFile(path)) return true;  // opening it says why not
+  if (!CheckPlainFile(path)) return true;  // opening it reports why not
   const LookUpSidecars looked_up(path);
   return GDALIdentifyDriverEx(path.c_str(), GDAL_OF_RASTER, nullptr, nullptr) != nullptr;
 }
@@ -279,7 +281,7 @@ std::vector<std::string> FilesOf(GDALDataset& dataset, const std::string& path) 
   for (const std::string& part : PartsOfVrt(path)) {
     for (const char* beside : {"", ".ovr", ".msk", ".aux.xml"}) {
       if (std::string name = part + beside; known.insert(name).second) files.push_back(std::move(name));
-      if (IsRemote(part)) break;  // what is beside it takes a request each to know
+      if (IsRemote(part)) break;  // each file beside it would take a request
     }
   }
   return files;

@@ -17,7 +17,7 @@
 namespace terrace::dem {
 namespace {
 
-// Raw samples converted at a time: bounds the scratch memory of a read (8 MiB) and how late a stop is noticed.
+// Raw samples converted at a time. Limits the scratch memory of a read (8 MiB) and the reaction time to a stop.
 constexpr int kSamplesPerRead = 1 << 20;
 
 std::optional<double> NodataOf(GDALRasterBand& band) {
@@ -35,13 +35,13 @@ std::optional<double> NodataOf(GDALRasterBand& band) {
       break;
   }
   if (has != 0) return value;
-  // Many 16-bit elevation files carry the SRTM void without declaring it; no place on Earth is there.
+  // Many 16-bit elevation files contain SRTM's void value without declaring it; no place on Earth has this height.
   if (band.GetRasterDataType() == GDT_Int16) return std::numeric_limits<std::int16_t>::min();
   return std::nullopt;
 }
 
-// The band that says which samples are valid: GDAL's mask, or alpha of a type that it does not take for one. Null: all
-// are.
+// The band that says which samples are valid: GDAL's mask, or an alpha band of a type that GDAL does not use as a mask.
+// Null: all are valid.
 GDALRasterBand* MaskOf(GDALRasterBand& band) {
   if (HasMaskBand(band)) return band.GetMaskBand();
   GDALDataset* const dataset = band.GetDataset();
@@ -103,47 +103,47 @@ SampleRules SampleRules::Of(GDALRasterBand& band, const std::string& crs_unit) {
 
 namespace {
 
-// At most one nodata value and no other rule: most bands.
+// Most bands have at most one nodata value and no other rules.
 bool IsPlain(const SampleRules& rules) { return !rules.has_mask && !rules.is_indicator && rules.extra_nodata.empty(); }
 
-// Raw samples are heights in metres as they are, which a float has without rounding.
+// Raw samples are heights in metres that a float represents exactly.
 bool IsInMetres(const SampleRules& rules) {
   return rules.scale == 1 && rules.offset == 0 && rules.metres_per_unit == 1 && !rules.is_signed_byte;
 }
 
-// The raw type in which a band is read; double wherever the loops below would have to ask more of a sample than its
-// value.
+// The type in which a band is read; double if more than a sample's value must be tested.
 GDALDataType RawTypeOf(GDALRasterBand& band, const SampleRules& rules) {
   const GDALDataType type = band.GetRasterDataType();
   const bool is_exact = type == GDT_Byte || type == GDT_Int16 || type == GDT_UInt16 || type == GDT_Float32;
   return is_exact && IsPlain(rules) && IsInMetres(rules) ? type : GDT_Float64;
 }
 
-// The largest float at most, the smallest at least a number.
+// The largest float that is at most a number; the smallest float that is at least a number.
 float FloatAtMost(double value) {
   const auto rounded = static_cast<float>(value);
   return rounded > value ? std::nextafter(rounded, -std::numeric_limits<float>::infinity()) : rounded;
 }
 float FloatAtLeast(double value) { return -FloatAtMost(-value); }
 
-// As ToHeight, of plain rules in metres and raw types that float has without rounding: no branch, no double.
+// Equivalent to ToHeight for plain rules in metres and raw types that float represents exactly, without branches and
+// doubles.
 template <typename Raw>
 void ToHeights(const SampleRules& rules, const Raw* raw, std::size_t count, float* out) {
   float nodata = std::numeric_limits<float>::quiet_NaN();  // equal to nothing
   if (rules.nodata) {
     const auto rounded = static_cast<float>(*rules.nodata);
-    // Samples of Float32 bands equal a nodata value that is stated with more digits than they have.
+    // Samples of Float32 bands may equal a nodata value that is stated with more digits than they have.
     if (rules.compare_as_float || static_cast<double>(rounded) == *rules.nodata) nodata = rounded;
   }
   const float lowest = FloatAtLeast(rules.lowest), highest = FloatAtMost(rules.highest);
   for (std::size_t i = 0; i < count; ++i) {
-    const float height = static_cast<float>(raw[i]) + 0.0f;  // one zero, as of raw * scale + offset
+    const float height = static_cast<float>(raw[i]) + 0.0f;  // turns -0 into 0, as raw * scale + offset does
     const bool is_valid = (height != nodata) & (height >= lowest) & (height <= highest);
     out[i] = is_valid ? height : SampleRules::kVoid;
   }
 }
 
-// As ToHeight of plain rules.
+// Equivalent to ToHeight for plain rules.
 template <>
 void ToHeights(const SampleRules& rules, const double* raw, std::size_t count, float* out) {
   double nodata = rules.nodata.value_or(std::numeric_limits<double>::quiet_NaN());
@@ -177,7 +177,8 @@ Result<void> ReadSamples(GDALRasterBand& band, const SampleRules& rules, int col
   const int rows_at_once = std::clamp(kSamplesPerRead / cols, 1, rows);
   const std::size_t most = Area(cols, rows_at_once);
   const GDALDataType type = RawTypeOf(band, rules);
-  // Written before it is read: filling it with zeros took longer than the conversion.
+  // Not initialized, because it is written before it is read, and filling it with zeros takes longer than the
+  // conversion.
   const auto raw =
       std::make_unique_for_overwrite<std::byte[]>(most * static_cast<std::size_t>(GDALGetDataTypeSizeBytes(type)));
   std::vector<std::uint8_t> mask(rules.has_mask ? most : 0);
@@ -197,7 +198,7 @@ Result<void> ReadSamples(GDALRasterBand& band, const SampleRules& rules, int col
                        TakeGdalError());
     }
     const std::size_t samples = Area(cols, count);
-    auto* const doubles = reinterpret_cast<double*>(raw.get());  // where that is the type
+    auto* const doubles = reinterpret_cast<double*>(raw.get());  // for this type
     if (rules.is_signed_byte) {
       for (std::size_t i = 0; i < samples; ++i) doubles[i] -= doubles[i] > 127 ? 256 : 0;
     }
@@ -214,7 +215,7 @@ Result<void> ReadSamples(GDALRasterBand& band, const SampleRules& rules, int col
   return {};
 }
 
-// Of `count` values `stride` apart: those at most `reach` from a void become voids.
+// Makes voids of the values within `reach` of a void, among `count` values that are `stride` apart.
 void WidenVoids(float* first, int count, std::ptrdiff_t stride, int reach, std::vector<char>& near) {
   near.assign(static_cast<std::size_t>(count), 0);
   for (int i = 0; i < count; ++i) {
@@ -231,7 +232,7 @@ void WidenVoids(float* first, int count, std::ptrdiff_t stride, int reach, std::
 Result<void> ReadHeights(GDALRasterBand& band, const SampleRules& rules, int col, int row, int cols, int rows,
                          float* out, const std::stop_token& stop) {
   if (rules.rim == 0) return ReadSamples(band, rules, col, row, cols, rows, out, stop);
-  // As far around as voids reach: a sample is a void or none whatever the window.
+  // Extends the window by the reach of voids, so that a void does not depend on the window.
   const int left = std::max(col - rules.rim, 0), top = std::max(row - rules.rim, 0);
   const int wide = std::min(col + cols + rules.rim, band.GetXSize()) - left;
   const int high = std::min(row + rows + rules.rim, band.GetYSize()) - top;

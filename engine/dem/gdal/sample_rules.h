@@ -14,20 +14,21 @@
 
 namespace terrace::dem {
 
-// Nothing on Earth is higher or deeper; larger values are undeclared nodata values (1.7e38, -99999).
+// Larger magnitudes are undeclared nodata values (1.7e38, -99999), not heights on Earth.
 inline constexpr double kMaxAbsHeight = 99998.0;
 
 struct SampleRules {
-  std::optional<double> nodata;      // in raw values
-  bool compare_as_float = false;     // nodata of Float32 bands may be stated with more digits than the samples have
-  std::vector<double> extra_nodata;  // further raw values that are voids: stated by the owner, or found
+  std::optional<double> nodata;  // in raw values
+  bool compare_as_float =
+      false;  // for Float32 bands, whose nodata value may be stated with more digits than samples have
+  std::vector<double> extra_nodata;                         // further raw values that are voids: configured or detected
   double lowest = -kMaxAbsHeight, highest = kMaxAbsHeight;  // metres; heights beyond are voids
-  // Samples within this distance of a void, along either axis, are voids too, because they were mixed with nodata
-  // values. Only at full resolution.
+  // Samples within this distance of a void, along either axis, are voids too, because resampling mixed them with nodata
+  // values. Applies only at full resolution.
   int rim = 0;
   bool has_mask = false;         // a mask band says which samples are valid
-  bool is_signed_byte = false;   // bytes above 127 are negative: GDAL before 3.7 does not convert them
-  bool is_indicator = false;     // samples become 1 where they are there and not zero, else 0
+  bool is_signed_byte = false;   // bytes above 127 are negative numbers; GDAL before 3.7 does not convert them
+  bool is_indicator = false;     // valid nonzero samples become 1, all others 0
   double scale = 1, offset = 0;  // raw * scale + offset is in the band's unit
   double metres_per_unit = 1;
   std::string unit;  // as stated; empty: none
@@ -43,7 +44,7 @@ struct SampleRules {
     return raw == value || (compare_as_float && static_cast<float>(raw) == static_cast<float>(value));
   }
 
-  // Metres, or NaN for a void; of an indicator 0 or 1.
+  // Returns metres, or NaN for a void; 0 or 1 if is_indicator.
   float ToHeight(double raw) const {
     if (is_indicator) return raw != 0 && !std::isnan(raw) && !IsNodata(raw) ? 1.0f : 0.0f;
     if (IsNodata(raw)) return kVoid;
@@ -56,10 +57,10 @@ struct SampleRules {
   static constexpr float kVoid = __builtin_nanf("");
 };
 
-// Metres per unit of a stated unit name; nothing when the name is unknown.
+// Returns metres per unit for a unit name; nothing if the name is unknown.
 std::optional<double> MetresPerUnit(const std::string& unit);
 
-// Heights of a pixel window of a band (or of one of its overviews), row by row into `out`, voids NaN.
+// Reads the heights of a pixel window of a band or of one of its overviews, row by row, into `out`; voids are NaN.
 // kUnavailable: the band cannot be read. kCancelled: stopped.
 Result<void> ReadHeights(GDALRasterBand& band, const SampleRules& rules, int col, int row, int cols, int rows,
                          float* out, const std::stop_token& stop);

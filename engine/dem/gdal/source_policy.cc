@@ -51,7 +51,7 @@ bool HasControlCharacter(const std::string& text) {
   return std::ranges::any_of(text, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; });
 }
 
-// Names below an allowed prefix that stay there: "..", options ("?") and names within names do not.
+// Accepts names that stay below an allowed prefix: no "..", options ("?") or nested names.
 bool IsAllowedRemote(const SourcePolicy& policy, const std::string& path) {
   return std::ranges::any_of(policy.prefixes, [&](const std::string& prefix) {
     if (!path.starts_with(prefix)) return false;
@@ -87,7 +87,7 @@ Result<void> CheckFile(const SourcePolicy& policy, const std::string& path) {
   return CheckRoots(policy, path, *real);
 }
 
-// Files that GDAL opens unasked beside a raster; one that is there must be allowed as well.
+// Files that GDAL opens automatically beside a raster. If they exist, they must be allowed, too.
 Result<void> CheckSidecars(const SourcePolicy& policy, const std::string& path) {
   if (policy.roots.empty()) return {};
   for (const char* suffix : {".ovr", ".msk", ".aux.xml", ".msk.ovr"}) {

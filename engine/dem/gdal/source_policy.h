@@ -1,9 +1,8 @@
-// Which names may become open files, and which formats may read them.
-//
-// To GDAL a file name is a program: inline XML, URLs, addresses in memory. Here a name stands for one regular file,
-// below the data roots if there are any, or for a name below a remote prefix that the operator allowed. Formats that
-// are not listed do not exist. Names inside files (the parts of a VRT, external overviews) are checked by the same
-// rules before they are opened.
+// The rules for names of sources: which files may be opened, and with which drivers.
+// GDAL accepts far more than file names: inline XML, URLs, addresses in memory. The policy allows only regular files,
+// below the data roots if any are set, and names below a remote prefix that the operator allowed. Only the listed
+// drivers are available. Names inside files (the parts of a VRT, external overviews) are checked by the same rules
+// before they are opened.
 #pragma once
 
 #include <string>
@@ -24,37 +23,37 @@ struct SourcePolicy {
   friend bool operator==(const SourcePolicy&, const SourcePolicy&) = default;
 };
 
-// For the whole process, from now on; before the first call an empty policy holds. Thread-safe, but sources should be
-// opened before or after: drivers come and go. kInvalidArgument: a root that is no folder, a prefix that is none, a
-// driver that GDAL does not have; the old policy then stays.
+// Sets the policy of the process. The default is an empty policy. Thread-safe, but no source should be opened during
+// the call, because it removes and restores drivers. kInvalidArgument: a root is no folder, a prefix is not remote, or
+// GDAL does not have a driver; the old policy stays in force.
 Result<void> SetSourcePolicy(const SourcePolicy& policy);
 
-// For commands that read what their user names: the default policy, with VRTs.
+// Sets the default policy with VRTs allowed, for commands that read files named by their user.
 Result<void> AllowVrts();
 
-// Whether a name may be handed to GDAL: nothing is opened but files that are allowed themselves.
-// kNotFound, kInvalidArgument, with the remedy.
+// Checks whether a name may be passed to GDAL. Opens no file that is not allowed. kNotFound, kInvalidArgument: the
+// message has the remedy.
 Result<void> CheckSourceName(const std::string& path);
 
-// Whether a file that was opened refers to others that are not allowed. Call it before overviews are used.
+// Checks whether an opened file refers to files that are not allowed. Call it before overviews are used.
 Result<void> CheckLinks(GDALDataset& dataset, const std::string& path);
 
-// The part of it that any regular file must pass, whatever is in it: for files that no raster driver reads.
+// The checks of CheckSourceName that do not depend on the file's format, for files that no raster driver reads.
 Result<void> CheckPlainFile(const std::string& path);
 
-// Whether a name has no control character, as a newline is; names that have some are refused. And a name with these
-// written as \x0a, for messages and logs.
+// Whether a name contains no control characters, such as newlines; names with control characters are refused.
+// EscapeControls writes them as \x0a, for messages and logs.
 bool IsOneLine(const std::string& path);
 std::string EscapeControls(const std::string& path);
 
 bool HasDataRoots();
 bool AllowsRemote();
 
-// A name that CheckSourceName finds below an allowed remote prefix.
+// Whether the name is below an allowed remote prefix.
 bool IsRemote(const std::string& path);
 
-// Removes what GDAL, OGR and PROJ would read from the environment, except the location of their data: settings come
-// from the configuration. Returns the names removed. Call it from main, before there are threads.
+// Removes the environment variables that GDAL, OGR and PROJ read, except the location of their data, because all
+// settings come from the configuration. Returns the removed names. Call it from main before threads are started.
 std::vector<std::string> ClearGdalEnvironment();
 
 }  // namespace terrace::dem

@@ -20,11 +20,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// gdalbuildvrt of a country's tiles: some 700 bytes each.
+// gdalbuildvrt writes about 700 bytes per tile: this is enough for a country.
 constexpr std::uintmax_t kMaxBytes = std::uintmax_t{64} << 20;
-constexpr int kDeepestNesting = 4;  // VRTs within VRTs
+constexpr int kDeepestNesting = 4;  // nesting of VRTs
 
-// What gdalbuildvrt and `gdal_translate -of VRT` write. None of it names a file but SourceFilename.
+// The elements that gdalbuildvrt and `gdal_translate -of VRT` write. Only SourceFilename names a file.
 constexpr std::string_view kElements =
     " VRTDataset SRS GeoTransform Metadata MDI OverviewList BlockXSize BlockYSize VRTRasterBand MaskBand"
     " NoDataValue NodataValue HideNoDataValue ColorInterp ColorTable Entry CategoryNames Category Description"
@@ -38,13 +38,13 @@ struct FreeXml {
   void operator()(CPLXMLNode* node) const { CPLDestroyXMLNode(node); }
 };
 
-// Both without links and dots.
+// Precondition: both paths have no links and dots.
 bool IsInside(const fs::path& file, const fs::path& folder) {
   const auto [in_file, in_folder] = std::ranges::mismatch(file, folder);
   return in_folder == folder.end();
 }
 
-// Made absolute first: a bare file name has no folder of its own.
+// Made absolute first, because a bare file name has no folder.
 fs::path FolderOf(const std::string& path, std::error_code& error) {
   return fs::canonical(fs::absolute(path, error).parent_path(), error);
 }

@@ -1,4 +1,4 @@
-// What a VRT leads to, found by reading its XML before GDAL does.
+// Checks VRT files by parsing their XML before GDAL does.
 #pragma once
 
 #include <string>
@@ -8,15 +8,15 @@
 
 namespace terrace::dem {
 
-// Whether GDAL would take the file for a VRT, whatever its name.
+// Whether GDAL would open the file as a VRT, whatever its name is.
 bool LooksLikeVrt(const std::string& path);
 
-// Allows plain mosaics of files, and nothing that computes, warps or takes options: every element is known, and every
-// file that is named is one that CheckSourceName allows. Without data roots files must lie below the VRT's own folder.
+// Accepts only plain mosaics of files: no elements that compute, warp or set options, and only files that
+// CheckSourceName allows. Without data roots, the files must lie below the VRT's folder.
 Result<void> CheckVrt(const std::string& path);
 
-// The names of all files that a VRT leads to, those of VRTs within it too: GDAL lists the outermost ones alone. Of one
-// that CheckVrt does not allow, as far as it goes.
+// Returns the names of all files that a VRT refers to, directly or through nested VRTs; GDAL lists only the direct
+// ones. For a VRT that CheckVrt refuses, the list may be incomplete.
 std::vector<std::string> PartsOfVrt(const std::string& path);
 
 }  // namespace terrace::dem

@@ -16,7 +16,7 @@ constexpr int kPixelsAtOnce = 1 << 22;
 }  // namespace
 
 ImageBins::Between ImageBins::Around(double position, int side, int last) {
-  // Between the centres of the first and the last square: beyond them the image's edge goes on.
+  // Clamped to the centres of the first and the last square: the edge's colour continues beyond them.
   const double at = std::clamp(position / side - 0.5, 0.0, static_cast<double>(last));
   const int lower = static_cast<int>(at);
   return {lower, std::min(lower + 1, last), at - lower};

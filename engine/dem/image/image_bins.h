@@ -1,4 +1,4 @@
-// A window of an image, averaged over squares of pixels: what colours are interpolated from.
+// A window of an image, averaged over squares of pixels. Colours are interpolated between these averages.
 #pragma once
 
 #include <array>
@@ -15,26 +15,26 @@ namespace terrace::dem {
 
 class ImageBins {
  public:
-  // A side of a square, in pixels: sums of its levels stay below 2^32.
+  // The largest side of a square in pixels: sums of its levels stay below 2^32.
   static constexpr int kMaxPixels = 4096;
 
-  // Reads the squares, `side` pixels wide and counted from the image's first pixel, that interpolation at these pixel
-  // positions needs; NaNs need none. kInvalidArgument: more than fit in memory. kUnavailable: the image cannot be read.
-  // kCancelled: stopped.
+  // Reads the squares that interpolation at these pixel positions needs. Squares are `side` pixels wide and aligned to
+  // the image's first pixel. NaN positions are ignored. kInvalidArgument: too many squares for the memory.
+  // kUnavailable: the image cannot be read. kCancelled: stopped.
   static Result<ImageBins> Read(ImageFile& image, int side, const std::vector<Position>& positions,
                                 const std::stop_token& stop = {});
 
-  // Bilinear between the averages of the nearest four squares, as far as they have a colour, and the image's own edge
-  // where it ends; no colour where none of them has one, or at a NaN.
+  // Interpolates bilinearly between the averages of the nearest four squares that have a colour. Beyond the image's
+  // edge the edge colour is used. Returns no colour if none of the squares has one, or for NaN.
   ColorSample At(Position position) const;
 
  private:
   struct Bin {
     std::array<std::uint32_t, 3> sums{};
-    std::uint32_t count = 0;  // of pixels that are there
+    std::uint32_t count = 0;  // of valid pixels
   };
 
-  // The squares to the lower side of a position on one axis, and to the upper; the share of the upper one.
+  // The squares below and above a position on one axis, and the weight of the upper one.
   struct Between {
     int lower, upper;
     double share;
@@ -44,8 +44,8 @@ class ImageBins {
   Result<void> Fill(ImageFile& image, const std::stop_token& stop);
 
   int side_ = 1;
-  int last_col_ = 0, last_row_ = 0;                          // of the image's squares
-  int first_col_ = 0, first_row_ = 0, cols_ = 0, rows_ = 0;  // of those here
+  int last_col_ = 0, last_row_ = 0;                          // last square of the image
+  int first_col_ = 0, first_row_ = 0, cols_ = 0, rows_ = 0;  // of the squares in bins_
   std::vector<Bin> bins_;
 };
 

@@ -64,7 +64,7 @@ Result<void> ImageFile::ReadPalette(const GDALColorTable& table) {
   return {};
 }
 
-// Black is a colour where a file calls 0 "no data" band by band: a pixel is missing only where all its bands are.
+// Files may declare 0 as nodata per band, but black is a colour: a pixel is missing only if all of its bands are.
 void ImageFile::FindMasks() {
   for (GDALRasterBand* const band : bands_) {
     if ((band->GetMaskFlags() & GMF_ALL_VALID) != 0) {
@@ -91,7 +91,7 @@ Result<void> ImageFile::Read(int col, int row, int cols, int rows, ColorSample* 
   return {};
 }
 
-// Into levels_, and from there into the pixels.
+// Reads into levels_, then copies to the pixels.
 bool ImageFile::ReadBand(int i, int col, int row, int cols, int rows, ColorSample* out) {
   GDALRasterBand& band = *bands_[static_cast<std::size_t>(i)];
   if (band.RasterIO(GF_Read, col, row, cols, rows, levels_.data(), cols, rows, GDT_UInt16, 0, 0, nullptr) != CE_None) {

@@ -1,4 +1,4 @@
-// An image file as red, green, blue and alpha, whatever its bands are.
+// An image file, read as red, green, blue and alpha whatever its bands are.
 #pragma once
 
 #include <gdal_priv.h>
@@ -16,8 +16,8 @@ namespace terrace::dem {
 // Not thread-safe: a GDAL dataset belongs to one thread at a time.
 class ImageFile {
  public:
-  // Refuses, with the remedy, what OpenRaster refuses and bands that are no colours.
-  // `overview`: the image as GDAL's overview of that number has it; -1: in full.
+  // Errors, with the remedy: those of OpenRaster, and bands that are no colours. `overview`: number of an overview to
+  // open instead of the full image; -1: the full image.
   static Result<ImageFile> Open(const std::string& path, int overview = -1);
 
   const std::string& path() const { return path_; }
@@ -25,7 +25,7 @@ class ImageFile {
   int width() const { return dataset_->GetRasterXSize(); }
   int height() const { return dataset_->GetRasterYSize(); }
 
-  // A window of the image, row by row into `out`. kUnavailable: it cannot be read.
+  // Reads a window of the image, row by row, into `out`. kUnavailable: it cannot be read.
   Result<void> Read(int col, int row, int cols, int rows, ColorSample* out);
 
  private:
@@ -39,9 +39,9 @@ class ImageFile {
 
   std::string path_;
   GDALDatasetUniquePtr dataset_;
-  std::array<GDALRasterBand*, 3> bands_{};  // three times the same: grey or palette
+  std::array<GDALRasterBand*, 3> bands_{};  // three equal pointers: grey or palette
   std::vector<ColorSample> palette_;        // by index; empty: no palette
-  std::vector<GDALRasterBand*> masks_;      // a pixel is there if one of them says so; empty: all are there
+  std::vector<GDALRasterBand*> masks_;      // a pixel is valid if one of them says so; empty: all are valid
   std::vector<std::uint16_t> levels_;       // of one band and window
 };
 

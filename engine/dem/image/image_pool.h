@@ -1,5 +1,5 @@
-// One image for many threads, at full size and by its overviews: each ImageFile is used by one thread at a time. What
-// is not in use is kept as IdlePool says.
+// One image for many threads, at full size and at the sizes of its overviews. Each ImageFile is used by one thread at a
+// time. IdlePool keeps unused ones.
 #pragma once
 
 #include <memory>
@@ -29,14 +29,14 @@ class ImagePool {
 
   ImagePool(ImageFile image, StampedFiles files);
 
-  // The smallest of the overviews whose factor divides `factor`, a power of two, or the full image.
-  // kChanged: a file of the image is gone or was replaced. kUnavailable: it cannot be opened.
+  // Borrows the smallest overview whose factor divides `factor`, a power of two; else the full image. kChanged: a file
+  // of the image was removed or replaced. kUnavailable: it cannot be opened.
   Result<Borrowed> Borrow(int factor);
 
-  // The largest factor that ImageBins can average to from what is there.
+  // The largest factor that ImageBins can average to from the available sizes.
   int MostAveraged() const;
 
-  // As HandlePool's.
+  // As HandlePool::CheckUnchanged.
   Result<void> CheckUnchanged();
   const StampedFiles& files() const { return files_; }
 

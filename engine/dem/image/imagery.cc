@@ -17,9 +17,9 @@
 namespace terrace::dem {
 namespace {
 
-// In pixels of the averaged image: far below what shows in 8 bits a channel.
+// In pixels of the averaged image: much less than is visible with 8 bits per channel.
 constexpr double kPositionTolerance = 1e-3;
-constexpr int kMinSideOfCoarseImages = 256;  // below, the seams between interpolated tiles would show
+constexpr int kMinSideOfCoarseImages = 256;  // with fewer, seams between interpolated tiles would be visible
 
 bool IsSide(int side) {
   return side >= Imagery::kMinSide && side <= Imagery::kMaxSide && std::has_single_bit(static_cast<unsigned>(side));
@@ -34,7 +34,7 @@ class Imagery::Impl {
   ImagePool pool;
   const Georeference georeference;
   SourceSpacing spacing;
-  Footprint footprint;  // padded: outside it there is no picture
+  Footprint footprint;  // padded; there is no picture outside
   std::uint64_t fingerprint = 0;
 };
 
@@ -70,7 +70,7 @@ Result<std::unique_ptr<Imagery>> Imagery::Open(const std::string& path, const Ge
 
 int Imagery::SideOf(int level, int most) const {
   TERRACE_CHECK(IsSide(most));
-  constexpr double kSlack = 1.01;  // what is as fine as the image is fine enough, however its spacing was measured
+  constexpr double kSlack = 1.01;  // pixels as fine as the image are fine enough, despite rounding of its spacing
   int side = most;
   while (side > kMinSideOfCoarseImages && SamplesPerCell({level, side / 2}, impl_->spacing) <= kSlack) side /= 2;
   return side;

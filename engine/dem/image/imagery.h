@@ -1,6 +1,5 @@
-// A picture of the ground, cut to tiles: what textures are made from.
-//
-// Imagery is immutable after Open and safe to use from many threads. GDAL's types stay behind this header.
+// A georeferenced image of the ground, from which the textures of tiles are cut.
+// Immutable after Open and thread-safe. No GDAL type appears in this header.
 #pragma once
 
 #include <array>
@@ -28,30 +27,30 @@ struct TilePicture {
 class Imagery {
  public:
   static constexpr int kMinSide = 64, kMaxSide = 1024;
-  // Where there is no picture of a part of a tile: a middle grey, as sRGB has it.
+  // The colour of parts of a tile that the image does not show: a middle grey in sRGB.
   static constexpr std::array<std::uint8_t, 3> kNoPicture = {188, 188, 188};
 
-  // What raster_colors.h reads, with a georeference. kInvalidArgument, with the remedy: what OpenRaster and
-  // Georeference refuse, bands that are no colours, and an image that lies nowhere in `around`.
+  // Opens an image as described in raster_colors.h, with a georeference. kInvalidArgument, with the remedy: errors of
+  // OpenRaster and Georeference, bands that are no colours, or an image outside `around`.
   static Result<std::unique_ptr<Imagery>> Open(const std::string& path, const GeoBounds& around,
                                                const FileContentOptions& content = {});
   ~Imagery();
 
-  // Pixels along the edge of a level's tiles: `most`, or half of it again and again, down to 256, as long as that is
-  // still as fine as the image. A function of image and level alone. Precondition: a power of two from kMinSide to
-  // kMaxSide.
+  // Returns the number of pixels along the edge of a level's tiles: `most`, halved down to 256 while the pixels are
+  // still as fine as the image. Depends only on image, level and `most`. Precondition: `most` is a power of two from
+  // kMinSide to kMaxSide.
   int SideOf(int level, int most) const;
 
-  // The picture of a tile, `side` x `side` pixels; nothing where the image shows no part of it. A pixel is the image at
-  // the pixel's centre, interpolated bilinearly; where the image is finer, between averages of its pixels. Overviews
-  // are used where they are fine enough. A pixel is a function of its level, `side` and global position alone.
-  // Preconditions: a valid key; side as above. kUnavailable: the image cannot be read now. kCancelled: stopped.
+  // Returns the picture of a tile, `side` x `side` pixels; nothing if the image shows no part of the tile. A pixel is
+  // interpolated bilinearly at its centre, between averages of image pixels if the image is finer. Uses overviews that
+  // are fine enough. A pixel depends only on its level, `side` and global position. Preconditions: a valid key; a side
+  // as above. kUnavailable: the image cannot be read now. kCancelled: stopped.
   Result<std::optional<TilePicture>> Read(const geo::TileKey& key, int side, std::stop_token stop = {}) const;
 
   // Identifies the content: the bytes of its files, and where they lie on the Earth. The same of every copy.
   std::uint64_t fingerprint() const;
 
-  // What it is read from, as it was when it was opened.
+  // The files of the image with their stamps at Open.
   const StampedFiles& files() const;
 
  private:

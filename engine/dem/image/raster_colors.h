@@ -1,8 +1,7 @@
-// Colours from images: for every sample of a DEM that an image covers, or for every pixel of an image itself.
-//
-// Images are what GDAL reads with 1 band (grey), 3 or 4 (red, green, blue and alpha or whatever else), or a palette; 8
-// or 16 bits a band. Colours come back as 8 bits each, red, green, blue and alpha: 255, or 0 where the image is
-// transparent or says that it has no data.
+// Reads colours from images: for the samples of a DEM that an image covers, or for the pixels of an image itself.
+// GDAL must read the image with 1 band (grey), 3 or 4 bands (red, green, blue, and alpha or anything else), or a
+// palette, in 8 or 16 bits per band. Colours are returned as 8-bit red, green, blue and alpha. Alpha is 255, or 0 for
+// pixels that are transparent or have no data.
 #pragma once
 
 #include <array>
@@ -19,17 +18,16 @@ namespace terrace::dem {
 
 using ColorSample = std::array<std::uint8_t, 4>;
 
-// The colours under the samples of `dem`, which ReadRaster has read from `dem_path`, in the same order.
-//
-// Where both files have a georeference, samples are placed by it, through PROJ where the reference systems differ, and
-// the image is interpolated bilinearly; where its pixels are finer than the samples, between averages of as many whole
-// pixels, k x k, as fit one sample's spacing in the middle of the DEM. Else both must have the same size, and pixel
-// belongs to sample. kInvalidArgument, with the remedy: they have not; the image has no colour bands that this can
-// read; it ends more than half a pixel before a sample that has a height.
+// Returns the colours at the samples of `dem`, which ReadRaster has read from `dem_path`, in the same order.
+// If both files have a georeference, samples are located by it, through PROJ if the reference systems differ, and the
+// image is interpolated bilinearly. If its pixels are finer than the samples, it is interpolated between averages of k
+// x k whole pixels, as many as fit the spacing of samples in the middle of the DEM. Otherwise both files must have the
+// same size, and pixels map to samples one to one. kInvalidArgument, with the remedy: the sizes differ; the image has
+// no readable colour bands; it ends more than half a pixel before a sample that has a height.
 Result<std::vector<ColorSample>> ReadColors(const std::string& image_path, const std::string& dem_path,
                                             const RasterHeights& dem, const std::function<void(double)>& progress = {});
 
-// An image as it lies in the file, row 0 on top, no georeference needed.
+// The pixels of an image in the order of the file, row 0 on top. Needs no georeference.
 struct RasterColors {
   int width = 0, height = 0;
   std::vector<ColorSample> colors;

@@ -22,7 +22,7 @@
 namespace terrace::dem {
 namespace {
 
-constexpr int kRowsAtOnce = 64;      // of the DEM: bounds what is kept of a much finer image
+constexpr int kRowsAtOnce = 64;      // of the DEM: limits the memory for a much finer image
 constexpr double kBeyondEdge = 0.5;  // pixels
 
 bool HasCrs(const OGRSpatialReference* srs) { return srs != nullptr && !srs->IsEmpty(); }
@@ -37,11 +37,11 @@ bool ShareCoordinates(const OGRSpatialReference* a, const OGRSpatialReference* b
   return horizontal_a.IsGeographic() == 0 && horizontal_a.IsSame(&horizontal_b, options) != 0;
 }
 
-// Which pixel of an image lies under a sample of a DEM.
+// Maps samples of a DEM to pixels of an image.
 class ImagePlacement {
  public:
-  // By the georeferences of both files, or one to one where they have the same size and not both have one; errors say
-  // which file lacks what.
+  // Uses the georeferences of both files. If one of them has none, both must have the same size, and pixels map to
+  // samples one to one. Error messages say which file lacks what.
   static Result<ImagePlacement> Of(GDALDataset& dem, const std::string& dem_path, GDALDataset& image,
                                    const std::string& image_path) {
     ImagePlacement placement;
@@ -76,7 +76,8 @@ class ImagePlacement {
     return placement;
   }
 
-  // Pixel positions of the DEM to pixel positions of the image (georeference.h), in place; NaN where there is none.
+  // Converts pixel positions of the DEM to pixel positions of the image (georeference.h), in place; NaN if there is
+  // none.
   void ToImage(std::span<Position> positions) const {
     if (georeferences_) {
       georeferences_->dem.ToDegrees(positions);
@@ -93,11 +94,11 @@ class ImagePlacement {
     Georeference dem, image;
   };
 
-  std::array<double, 6> affine_{};              // DEM to image, where a projected reference system is the same or none
+  std::array<double, 6> affine_{};  // DEM to image, if both have the same projected reference system or none
   std::optional<Georeferences> georeferences_;  // else
 };
 
-// As many pixels as fit between two samples in the middle of the DEM, on the axis where they fit less often.
+// The number of pixels between two samples in the middle of the DEM, on the axis with fewer.
 int PixelsPerSample(const ImagePlacement& placement, const RasterHeights& dem) {
   const double x = dem.width / 2.0, y = dem.height / 2.0;
   std::array<Position, 3> positions = {{{x, y}, {x + 1, y}, {x, y + 1}}};

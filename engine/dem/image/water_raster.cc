@@ -17,7 +17,7 @@
 namespace terrace::dem {
 namespace {
 
-// In samples of the grid that is read: far below what shows in 8 bits.
+// In samples of the grid that is read: much less than is visible with 8 bits.
 constexpr double kWaterPositionTolerance = 1e-3;
 
 }  // namespace
@@ -32,7 +32,7 @@ class WaterRaster::Impl {
   const Georeference georeference;
   SourceSpacing spacing;
   RasterLayout layout;
-  Footprint footprint;  // padded: outside it there is no water
+  Footprint footprint;  // padded; there is no water outside
   std::uint64_t fingerprint = 0;
 
   bool IsInside(const Position& position) const {  // false for NaN
@@ -79,7 +79,7 @@ Result<std::vector<std::uint8_t>> WaterRaster::Read(const geo::TileKey& key, std
   const geo::Lattice lattice{key.level, kSide};
   const double samples_per_pixel = SamplesPerCell(lattice, spacing);
   const int factor = AveragingFactor(samples_per_pixel);
-  // From all land to all water in one pixel, however far apart the samples are.
+  // The transition from land to water takes one pixel, whatever the spacing of samples is.
   const double sharpness = std::max(1.0, factor / samples_per_pixel);
 
   const std::vector<Position> positions =
@@ -94,7 +94,7 @@ Result<std::vector<std::uint8_t>> WaterRaster::Read(const geo::TileKey& key, std
     const std::size_t row_from_south = i / kSide;
     targets.push_back((kSide - 1 - row_from_south) * kSide + i % kSide);
   }
-  // Files are looked at even where nothing must be read: no tile may outlive its mask.
+  // Checks the files even if nothing is read, so that no tile outlives its mask.
   auto handle = handles.Borrow();
   if (!handle) return tl::unexpected(handle.error());
   if (cells.empty()) return pixels;

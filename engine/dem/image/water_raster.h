@@ -1,6 +1,5 @@
-// A raster that says where water is: a mask whose samples are not zero on water.
-//
-// WaterRaster is immutable after Open and safe to use from many threads. GDAL's types stay behind this header.
+// A water mask: a raster whose samples are not zero on water.
+// Immutable after Open and thread-safe. No GDAL type appears in this header.
 #pragma once
 
 #include <cstdint>
@@ -21,27 +20,24 @@ class WaterRaster {
  public:
   static constexpr int kSide = 256;  // pixels along a tile's edge
 
-  // Band 1 of any raster that GDAL reads and that is georeferenced. kInvalidArgument, with the remedy: what OpenRaster
-  // and Georeference refuse, and a raster that lies nowhere in `around`.
+  // Opens band 1 of a georeferenced raster. kInvalidArgument, with the remedy: errors of OpenRaster and Georeference,
+  // or a raster outside `around`.
   static Result<std::unique_ptr<WaterRaster>> Open(const std::string& path, const GeoBounds& around,
                                                    const FileContentOptions& content = {});
   ~WaterRaster();
 
-  // kSide x kSide pixels of a tile, row by row from the NORTH-western one: 0 land .. 255 water; in between, how much of
-  // a pixel on the coast is water. Outside the raster, and where it has no data, is land.
-  //
-  // A pixel is a function of its level and global position alone. Where the raster is finer than the pixels, its
-  // samples are averaged; where it is coarser, the coast is the line where half of the interpolated samples are water,
-  // drawn as sharp as the pixels allow. Overviews are read where the raster has them: they should be made with
-  // `gdaladdo -r nearest` or `-r mode`, as any sample but zero counts as water.
-  //
-  // Any valid key. kUnavailable: the raster cannot be read now. kCancelled: stopped.
+  // Returns kSide x kSide pixels of a tile, row by row from the NORTH-western one: 0 is land, 255 water, and values in
+  // between are the share of water in a pixel on the coast. Pixels outside the raster or without data are land. A pixel
+  // depends only on its level and global position. If the raster is finer than the pixels, its samples are averaged. If
+  // it is coarser, samples are interpolated, and the coast is the line where they are one half, as sharp as the pixels
+  // allow. Overviews are used. Make them with `gdaladdo -r nearest` or `-r mode`, because every nonzero sample counts
+  // as water. Precondition: a valid key. kUnavailable: the raster cannot be read now. kCancelled: stopped.
   Result<std::vector<std::uint8_t>> Read(const geo::TileKey& key, std::stop_token stop = {}) const;
 
   // Identifies the content: the bytes of its files, and where they lie on the Earth. The same of every copy.
   std::uint64_t fingerprint() const;
 
-  // What it is read from, as it was when it was opened.
+  // The files of the raster with their stamps at Open.
   const StampedFiles& files() const;
 
  private:

@@ -9,7 +9,7 @@ namespace {
 
 using Ranges = std::vector<geo::TileRange>;
 
-// Sixty bytes each in layer.json, which clients read before their first tile.
+// Limit of ranges: each takes sixty bytes in layer.json, which clients read before their first tile.
 constexpr std::size_t kMaxBlocks = 2000;
 
 Ranges Up(const Ranges& ranges, int levels) {
@@ -38,14 +38,14 @@ Ranges Merged(Ranges ranges, const Ranges& others) {
 std::vector<Ranges> AvailableTiles(std::span<const Reach> sources) {
   const int deepest = std::ranges::max_element(sources, {}, &Reach::depth)->depth;
   std::vector<Ranges> levels(static_cast<std::size_t>(deepest) + 1);
-  // Every level follows from the tiles of the deepest, so that no rounding can lose an ancestor.
+  // Every level is derived from the tiles of the deepest one, so that rounding cannot lose an ancestor.
   std::vector<Ranges> worth(levels.size());  // of the deepest level, by the depth of their source
   for (const Reach& source : sources) {
     const Ranges tiles = TilesTouching(source.footprint, deepest);
     Ranges& those = worth[static_cast<std::size_t>(source.depth)];
     those.insert(those.end(), tiles.begin(), tiles.end());
   }
-  Ranges wanted;  // of the deepest level: of sources worth the level at hand
+  Ranges wanted;  // of the deepest level: of sources that reach the current level
   for (int level = deepest; level > 0; --level) {
     const int up = deepest - level;
     Ranges& here = levels[static_cast<std::size_t>(level)];

@@ -1,4 +1,4 @@
-// The samples of a raster grid's members as one grid of averages.
+// Combines the samples of a raster grid's members into one grid of averages.
 #include <algorithm>
 #include <cmath>
 
@@ -9,7 +9,7 @@
 namespace terrace::dem {
 namespace {
 
-// Blocks of a member along one axis: the first, how many, and how many of its samples the last one has.
+// Blocks of a member along one axis: the first one, their number, and the number of samples in the last one.
 struct BlockSpan {
   std::int64_t first, count, last_samples;
 
@@ -21,8 +21,8 @@ struct BlockSpan {
   std::int64_t SamplesIn(std::int64_t block, int step) const { return block == end() ? last_samples : step; }
 };
 
-// A window whose blocks are filled by one member after the other. Where several have a block the one with most of its
-// samples counts: at a member's edge the neighbour has the rest of them. Of equals the first counts.
+// A window whose blocks are filled by one member after the other. If several members have a block, the one with the
+// most samples in it is used, the first among equals: at a member's edge the neighbour has the rest of the block.
 class Patchwork {
  public:
   Patchwork(int step, const GridWindow& window, float* blocks)
@@ -69,7 +69,7 @@ class Patchwork {
   const int step_;
   const GridWindow window_;
   float* const blocks_;
-  std::vector<std::int64_t> samples_;  // of each block, in the member that gave it
+  std::vector<std::int64_t> samples_;  // samples of each block, in the member that filled it
 };
 
 }  // namespace

@@ -18,7 +18,7 @@ bool Holds(const Box& box, const Position& p) {
   return (p.x >= box.west) & (p.x <= box.east) & (p.y >= box.south) & (p.y <= box.north);
 }
 
-// Without those that are not known: comparisons with NaN are false.
+// Skips unknown positions: comparisons with NaN are false.
 Box HullOf(std::span<const Position> positions) {
   Box hull = kNowhereBox;
   for (const auto& [x, y] : positions) {
@@ -60,7 +60,7 @@ std::vector<std::uint8_t> GridCover::Inside(const NodePositions& positions) cons
   return positions.is_separable() ? InsideOfAxes(positions) : Inside(positions.nodes());
 }
 
-// A box has a rectangle of nodes, or two of them where columns begin anew.
+// A box contains one rectangle of nodes, or two if the columns jump by one turn.
 std::vector<std::uint8_t> GridCover::InsideOfAxes(const NodePositions& positions) const {
   std::vector<std::uint8_t> inside(positions.columns() * positions.rows());
   Box hull = kNowhereBox;
@@ -85,7 +85,7 @@ std::vector<std::uint8_t> GridCover::InsideOfAxes(const NodePositions& positions
 }
 
 std::vector<std::uint8_t> GridCover::Inside(std::span<const Position> positions) const {
-  // Up to so many boxes are asked in turn; of more the index tells which.
+  // Up to this number, boxes are checked one by one; for more, the index is used.
   constexpr std::size_t kFewBoxes = 8;
   std::vector<std::uint8_t> inside(positions.size());
   const Box hull = HullOf(positions);
@@ -110,7 +110,7 @@ std::vector<std::uint8_t> GridCover::Inside(std::span<const Position> positions)
     const Position& p = positions[n];
     if (std::isnan(p.x) || std::isnan(p.y)) continue;
     const bool holds =
-        Holds(last, p) ||  // neighbours mostly lie in one box
+        Holds(last, p) ||  // neighbours are usually in the same box
         (near.size() <= kFewBoxes ? holds_any(near, p)
                                   : holds_any(index_.Find(Grown({p.x, p.y, p.x, p.y}, 2 * kEdgeTolerance)), p));
     inside[n] = holds ? 1 : 0;

@@ -1,4 +1,4 @@
-// The pixels that the rasters of a raster grid have.
+// The set of pixels that the rasters of a raster grid cover.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@
 
 namespace terrace::dem {
 
-// Of columns and rows of pixels, ends included.
+// Converts a range of pixels to a box, ends included.
 Box BoxOf(const geo::TileRange& pixels);
 
 // Immutable and thread-safe. Positions within 10^-6 pixels of a raster count as inside it.
@@ -29,7 +29,8 @@ class GridCover {
   // The same for single positions.
   std::vector<std::uint8_t> Inside(std::span<const Position> positions) const;
 
-  // True if rasters have all of these pixels. Precondition: not empty, inside the raster grid.
+  // Whether the rasters cover all of these pixels. Precondition: the range is not empty and lies inside the raster
+  // grid.
   bool Covers(const geo::TileRange& pixels) const;
 
  private:

@@ -1,5 +1,5 @@
-// Smooth surfaces in the holes of a raster grid (docs/decisions/0015-voids.md). A height is a function of the factor
-// and the global sample: windows grow until what they must know of a hole lies in them.
+// Smooth surfaces in the holes of a raster grid (docs/decisions/0015-voids.md). A height depends only on the factor and
+// the global sample: windows are extended until they contain all that is needed of a hole.
 #include <algorithm>
 #include <cmath>
 
@@ -20,8 +20,8 @@ std::vector<T> Cut(const VoidGrid& grid, const std::vector<T>& all, const GridWi
   return values;
 }
 
-// Averages beside a hole may be of a part of their block alone, and lie elsewhere than at its centre: a guess does
-// without them, so that it goes on with a plane. Where nothing lies behind them they count.
+// Averages beside a hole may cover only a part of their block, and so not its centre. The initial guess does not use
+// them, so that it continues a plane exactly. They are used if nothing lies behind them.
 void WidenHoles(const GridWindow& wide, const std::vector<float>& heights, const std::vector<std::uint8_t>& holes,
                 std::int64_t columns, std::int64_t rows, bool wraps, VoidGrid& grid) {
   const VoidGrid around{wide, {}, {}};
@@ -66,7 +66,8 @@ Result<VoidGrid> RasterGrid::ReadVoids(int factor, const GridWindow& window, boo
   return grid;
 }
 
-// Large regions in a window, from the same holes by twice the factor. The guess is then made to fit what lies around.
+// Initial guess for large regions, from the same holes by twice the factor. The guess is then adjusted to the heights
+// around.
 Result<void> RasterGrid::GuessLarge(int factor, const GridWindow& window, const std::vector<VoidRegion>& regions,
                                     VoidGrid& grid, const std::stop_token& stop) const {
   const GridWindow near = Grown(window, kSweeps, factor);

@@ -22,8 +22,8 @@
 namespace terrace::dem {
 namespace {
 
-// Buckets per axis. Offsets that OffsetOf counts as equal are less than a bucket apart, so that they lie in one bucket
-// or in neighbours.
+// Buckets per axis. Offsets that OffsetOf treats as equal differ by less than a bucket, so they lie in the same or in
+// adjacent buckets.
 constexpr int kBuckets = 64;
 static_assert(Georeference::kOffsetTolerance < 0.9 / kBuckets);
 
@@ -41,7 +41,7 @@ struct Bucket {
   }
 };
 
-// Nothing where a raster is so far away that the fraction of a pixel is lost.
+// Returns nothing if the raster is so far away that the fraction of a pixel is lost.
 std::optional<Bucket> BucketOf(const Georeference& first, const Georeference& where) {
   const Position offset = first.CornerOf(where);
   if (!(std::max(std::abs(offset.x), std::abs(offset.y)) < Georeference::kFarthestPixel)) return std::nullopt;
@@ -51,11 +51,10 @@ std::optional<Bucket> BucketOf(const Georeference& first, const Georeference& wh
   return Bucket{index(offset.x), index(offset.y)};
 }
 
-// Which rasters lie on one pixel grid, among many: by reference system, vertical datum, pixel size and offset.
-//
-// A raster may fit several grids, as offsets within a tolerance count as whole pixels (Georeference::OffsetOf): it
-// belongs to the first one that it fits, in the order in which grids were met. A look-up takes constant time where
-// pixel sizes are equal to the bit, else a time that grows with the number of different pixel sizes.
+// Finds rasters that lie on one pixel grid, by reference system, vertical datum, pixel size and offset.
+// Offsets within a tolerance count as whole pixels (Georeference::OffsetOf), so a raster may fit several grids. It then
+// belongs to the first of them, in the order in which grids were added. A look-up takes constant time if pixel sizes
+// are bit-equal; else its time grows with the number of different pixel sizes.
 class GridFinder {
  public:
   struct Membership {
@@ -63,7 +62,7 @@ class GridFinder {
     PixelOffset offset;    // of the raster's first pixel from that of the grid's first raster
   };
 
-  // The raster's grid. One that fits none begins a new one.
+  // Returns the raster's grid. A raster that fits no grid begins a new one.
   Membership Add(const PlacedRaster& raster);
 
   // Grids that rasters were compared with so far. For tests: this grows linearly with the number of rasters.
@@ -73,14 +72,14 @@ class GridFinder {
   // Bucket of an offset's fraction of a pixel.
   using Phase = std::uint32_t;
 
-  // Grids whose pixels are equal to the bit, apart from their offset. Numbers of grids are ascending.
+  // Grids whose pixels are bit-equal except for the offset. Their numbers are ascending.
   struct Family {
     const Georeference* first = nullptr;
     std::vector<std::size_t> grids;
     std::unordered_map<Phase, std::vector<std::size_t>> by_phase;
     std::vector<std::size_t> far;  // too far away for a phase
   };
-  // Families of one reference system and vertical datum, in the order in which they were met.
+  // Families with the same reference system and vertical datum, in the order in which they were added.
   struct Kind {
     const VerticalDatum* vertical = nullptr;
     std::vector<Family> families;
@@ -104,7 +103,7 @@ GridFinder::Kind& GridFinder::KindOf(const PlacedRaster& raster) {
   return kinds.emplace_back(Kind{raster.vertical, {}, {}});
 }
 
-// At least the grids of the family that the raster fits.
+// Includes all grids of the family that the raster fits.
 std::vector<std::size_t> GridFinder::Candidates(const Family& family, const Georeference& where) const {
   const auto bucket = BucketOf(*family.first, where);
   if (!bucket) return family.grids;
@@ -151,7 +150,7 @@ void GridFinder::Keep(Kind& kind, const Georeference& where, std::size_t grid) {
   (bucket ? family.by_phase[bucket->key()] : family.far).push_back(grid);
 }
 
-// A raster on its grid, counted from the first pixel of the grid's first raster.
+// A raster's position on its grid, relative to the first pixel of the grid's first raster.
 struct Member {
   std::size_t raster = 0;
   const Georeference* where = nullptr;
@@ -172,7 +171,7 @@ std::vector<std::vector<Member>> GridsOf(std::span<const PlacedRaster> rasters, 
   return grids;
 }
 
-// Columns after which a grid repeats itself; 0: it does not.
+// The number of columns after which a grid repeats itself; 0: it does not.
 std::int64_t TurnOf(const Georeference& where) {
   const double whole = std::round(where.period());
   return where.period() > 0 && std::abs(where.period() - whole) < 0.01 ? static_cast<std::int64_t>(whole) : 0;
@@ -182,7 +181,7 @@ bool Touch(const geo::TileRange& a, const geo::TileRange& b) {
   return !geo::IsEmpty(geo::Common({a.start_x - 1, a.start_y - 1, a.end_x + 1, a.end_y + 1}, b));
 }
 
-// The member's column, some turns on, where it touches `pixels`; nothing if it does nowhere.
+// Returns the member's column, moved by whole turns, at which it touches `pixels`; nothing if there is none.
 std::optional<std::int64_t> ColumnBeside(const geo::TileRange& pixels, Member member, std::int64_t turn) {
   const std::int64_t canonical = member.column;
   const auto nearest =
@@ -195,17 +194,17 @@ std::optional<std::int64_t> ColumnBeside(const geo::TileRange& pixels, Member me
   return std::nullopt;
 }
 
-// The members of a grid that are in no group yet, by their pixels.
+// An index of the grid's members without a group, by their pixels.
 class Ungrouped {
  public:
   Ungrouped(const std::vector<Member>& members, std::int64_t turn) : turn_(turn), index_(EntriesOf(members)) {}
 
-  // At least those that touch `pixels`, ascending; the grid repeats itself.
+  // Returns all members that touch `pixels`, and perhaps others, ascending. The grid may repeat itself.
   std::vector<std::size_t> Near(const geo::TileRange& pixels) const {
     return index_.Find(BoxOf(Canonical({pixels.start_x - 1, pixels.start_y - 1, pixels.end_x + 1, pixels.end_y + 1})));
   }
 
-  // As it was when the index was made.
+  // State at the time when the index was made.
   void Remove(const Member& member, std::size_t number) {
     for (const BoxIndex::Entry& entry : EntriesOf(member, number)) index_.Remove(entry);
   }
@@ -216,7 +215,7 @@ class Ungrouped {
     return {at(pixels.start_x), at(pixels.start_y), at(pixels.end_x), at(pixels.end_y)};
   }
 
-  // From the first turn on; of all columns where it goes around or nearly so.
+  // Within the first turn; all columns for a grid that spans the whole Earth or nearly so.
   geo::TileRange Canonical(geo::TileRange pixels) const {
     if (turn_ == 0) return pixels;
     const std::int64_t columns = pixels.end_x - pixels.start_x;
@@ -247,7 +246,8 @@ class Ungrouped {
   BoxIndex index_;
 };
 
-// Groups of members that touch, by their numbers. A member's column becomes the one beside those that it touches.
+// Returns groups of members that touch. Moves the columns of members by whole turns, so that they are adjacent to those
+// that they touch.
 std::vector<std::vector<std::size_t>> GroupsOf(std::vector<Member>& members, std::int64_t turn, std::size_t& pairs) {
   std::vector<std::vector<std::size_t>> groups;
   std::vector<bool> taken(members.size());
@@ -274,7 +274,8 @@ std::vector<std::vector<std::size_t>> GroupsOf(std::vector<Member>& members, std
   return groups;
 }
 
-// Counts pixels from the north-western corner of all; from the westernmost raster where they go all around the Earth.
+// Moves the origin of pixels to the north-western corner of all; for a group around the whole Earth, to the westernmost
+// raster.
 GridLayout LayoutOf(const std::vector<Member>& members, std::int64_t turn) {
   geo::TileRange hull = members.front().pixels();
   for (const Member& member : members) hull = geo::Hull(hull, member.pixels());

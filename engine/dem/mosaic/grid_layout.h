@@ -11,7 +11,7 @@
 
 namespace terrace::dem {
 
-// Where a raster lies and what it counts from. What these point to outlives their users.
+// The georeference and vertical datum of a raster. Both must outlive the users of this struct.
 struct PlacedRaster {
   const Georeference* where = nullptr;
   const VerticalDatum* vertical = nullptr;

@@ -1,6 +1,5 @@
-// Heights at single points, at the full resolution, voids filled as in tiles. Points are read in the order of the
-// source's blocks, whatever order they came in: neighbours share a read, and no block is decoded twice because others
-// were wanted in between.
+// Reads heights at single points, at full resolution, with voids filled as in tiles. Points are read in the order of
+// the source's blocks: neighbours share a read, and no block is decoded twice.
 #include <algorithm>
 #include <cmath>
 #include <tuple>
@@ -11,9 +10,9 @@
 namespace terrace::dem {
 namespace {
 
-// Samples per axis that are read at once.
+// Samples per axis in one read.
 constexpr std::int64_t kBlock = 256;
-// Points between two looks at whether anybody still waits.
+// Points between two checks of the stop token.
 constexpr std::size_t kBatch = 1024;
 
 struct PointCell {
@@ -22,7 +21,7 @@ struct PointCell {
   GridCell cell;
 };
 
-// From what a source counts from to what is asked for.
+// Converts from a source's vertical datum to the requested one.
 class Conversion {
  public:
   static Result<Conversion> For(const VerticalDatum& source, HeightDatum wanted) {
@@ -40,7 +39,7 @@ class Conversion {
     return conversion;
   }
 
-  // NaN where the geoid is not known.
+  // NaN if the geoid is not known.
   double Of(double height, const GeoPosition& point) const {
     return reader_ ? height + sign_ * reader_->At({point.longitude, point.latitude}) : height;
   }

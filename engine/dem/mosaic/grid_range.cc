@@ -1,4 +1,4 @@
-// The bound on what a tile can take from a raster grid, from the block table alone.
+// Bounds on the heights that a tile can take from a raster grid, from the block table only.
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -9,11 +9,10 @@
 namespace terrace::dem {
 namespace {
 
-// Up to this level a tile is so large that its outline in the source's CRS cannot be told from a few positions.
+// Up to this level, tiles are too large to bound their outline in the source's CRS from a few positions.
 constexpr int kLastWholeLevel = 4;
 
-// Pixels of a tile in a geographic grid: the part found going east from its western edge, and what lies a turn before
-// it.
+// The pixels of a tile in a geographic grid: eastwards from the grid's western edge, and one turn before.
 std::vector<Box> GeographicBoxes(const Georeference& georeference, const geo::Lattice& lattice,
                                  const geo::TileKey& key) {
   std::array<Position, 2> corners = {
@@ -31,7 +30,7 @@ std::vector<Box> GeographicBoxes(const Georeference& georeference, const geo::La
   return boxes;
 }
 
-// A box around a tile's pixels in any CRS; nothing where it cannot be told.
+// A box around a tile's pixels in any CRS; nothing if it is unknown.
 std::optional<Box> ProjectedBox(const Georeference& georeference, const geo::Lattice& lattice,
                                 const geo::TileKey& key) {
   if (key.level <= kLastWholeLevel) return std::nullopt;
@@ -51,7 +50,8 @@ std::optional<Box> ProjectedBox(const Georeference& georeference, const geo::Lat
     box.south = std::min(box.south, node.y);
     box.north = std::max(box.north, node.y);
   }
-  // Between nodes a quarter of the tile apart its edges bulge by less than an eighth of it, down from level 5.
+  // From level 5 down, the tile's edges deviate by less than an eighth of the tile between nodes that are a quarter of
+  // it apart.
   box.Grow((box.east - box.west) / 8, (box.north - box.south) / 8);
   return box;
 }
@@ -88,7 +88,7 @@ BlockRange RasterGrid::RangeAroundHoles(const Box& pixels, int factor) const {
     return Ranges(wide).has_holes || voids_.SharesHole(wide);
   };
   if (options_.voids != HoleFill::kSmooth || !has_holes(box.west, box.south, box.east, box.north)) return {};
-  // The holes end where a band around them has none.
+  // The holes end where a surrounding band has none.
   const auto grow = [&](double& side, double end, double step, bool holes) {
     if (!holes || (step < 0 ? side <= end : side >= end)) return false;
     side += step;
@@ -107,8 +107,8 @@ BlockRange RasterGrid::RangeAroundHoles(const Box& pixels, int factor) const {
     grown |= grow(box.south, 0, -y, at_north);
     grown |= grow(box.north, height_, y, at_south);
   }
-  // Heights beside a hole count, of averages by the factor at least, and of large holes by factors up to a sixtieth of
-  // their size; some averages off, and what small voids beside it are filled from.
+  // Holes are filled from averages beside them by at least the factor; large holes by factors up to a sixtieth of their
+  // size. Includes a margin of averages, and the samples from which small voids beside the hole are filled.
   const double size = std::max(box.east - box.west, box.north - box.south);
   const double reach = 4 * std::max<double>(factor, size / 32) + options_.max_void_gap;
   box.Grow(reach, reach);
@@ -170,7 +170,7 @@ GridRange RasterGrid::RangeOf(const geo::Lattice& lattice, const geo::TileKey& k
   if (undulations_ && blocks.min <= blocks.max) {
     const HeightRange shift =
         undulations_->RangeOf(lattice.Longitude(lattice.FirstColumn(key)), lattice.Latitude(south_row), extent, extent);
-    // Sums are rounded to float.
+    // Widened, because sums are rounded to float.
     constexpr double kRounding = 0.01;
     blocks.min = static_cast<float>(blocks.min + shift.min - kRounding);
     blocks.max = static_cast<float>(blocks.max + shift.max + kRounding);
@@ -181,7 +181,7 @@ GridRange RasterGrid::RangeOf(const geo::Lattice& lattice, const geo::TileKey& k
 
 HeightRange RasterGrid::EllipsoidalRange() const {
   if (!undulations_) return heights_;
-  // Tile by tile: the geoid's range over a large raster grid says little about any place in it.
+  // Per tile, because the geoid's range over a large raster grid is too wide.
   constexpr std::int64_t kMaxTiles = 1024;
   constexpr int kDeepest = 12;
   const auto count = [&](int level) {

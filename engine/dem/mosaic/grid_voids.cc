@@ -11,7 +11,7 @@
 namespace terrace::dem {
 namespace {
 
-// A member some turns on.
+// A member, moved by whole turns.
 struct Placed {
   const GridMember* member;
   std::size_t index;
@@ -21,8 +21,8 @@ struct Placed {
     const RasterLayout& layout = member->raster->layout();
     return x >= column && x < column + layout.columns && y >= member->row && y < member->row + layout.height;
   }
-  // `same`: becomes the number of pixels, along the row or the column, that it holds for.
-  // Precondition: Has(x, y).
+  // Sets `same` to the number of pixels along the row or the column for which the result is the same. Precondition:
+  // Has(x, y).
   std::optional<std::uint32_t> RegionAt(std::int64_t x, std::int64_t y, bool along_row, std::int64_t& same) const {
     const RasterLayout& layout = member->raster->layout();
     const std::int64_t own_x = x - column, own_y = y - member->row;
@@ -31,14 +31,15 @@ struct Placed {
                      : std::min<std::int64_t>(stretch.last_row, layout.height - 1) - own_y + 1;
     return stretch.region;
   }
-  // Pixels from x, y on, along the row or the column, before the member begins; as many as there are where it does not.
+  // The number of pixels from (x, y) on, along the row or the column, before the member begins; the maximum if it does
+  // not.
   std::int64_t Before(std::int64_t x, std::int64_t y, bool along_row) const {
     const std::int64_t before = along_row ? column - x : member->row - y;
     return before > 0 ? before : std::numeric_limits<std::int64_t>::max();
   }
 };
 
-// Members that meet a box of pixels, in their order.
+// Members that intersect a box of pixels, in order.
 std::vector<Placed> PlacedIn(const std::vector<GridMember>& members, const BoxIndex& index, std::int64_t turn,
                              const geo::TileRange& box) {
   std::vector<Placed> placed;
@@ -55,7 +56,7 @@ std::vector<Placed> PlacedIn(const std::vector<GridMember>& members, const BoxIn
   return placed;
 }
 
-// Joins regions of members where they meet, and notes which of them touch a place without a raster.
+// Joins adjacent regions of members, and marks those that touch a place without a raster.
 class Joints {
  public:
   Joints(const std::vector<GridMember>& members, const BoxIndex& index, std::int64_t turn)
@@ -95,8 +96,8 @@ class Joints {
   bool IsClosed(std::size_t member, std::uint32_t region) { return is_open_[RootOf(first_[member] + region)] == 0; }
 
  private:
-  // The pixel at x, y of a member's rim; beyond it lies that at x + dx, y + dy. Returns for how many pixels along the
-  // rim, to the east or to the south, the same holds: rims have many more pixels than changes.
+  // Examines the pixel (x, y) of a member's rim and the pixel (x + dx, y + dy) beyond it. Returns the number of pixels
+  // along the rim, to the east or south, for which the result is the same: rims have many more pixels than changes.
   std::int64_t Touch(const Placed& self, std::int64_t x, std::int64_t y, std::int64_t dx, std::int64_t dy) {
     const bool is_row = dx == 0;
     std::int64_t same = 0;
@@ -104,7 +105,7 @@ class Joints {
     ++looks_;
     if (!own) return same;
     const std::size_t region = first_[self.index] + *own;
-    // Another member may have a sample there, or a hole: then the raster grid has no void, or none that goes on.
+    // Another member may have a sample or a hole there: then the raster grid's void does not continue.
     bool goes_on = true, is_covered = false;
     const auto meet = [&](std::int64_t column, std::int64_t row) {
       for (const Placed& other : around_) {
@@ -150,15 +151,15 @@ class Joints {
   std::vector<std::size_t> first_;    // region of each member
   std::vector<std::size_t> parents_;  // of regions, up to their roots
   std::vector<std::uint8_t> is_open_;
-  std::vector<Placed> around_;  // the member at hand
-  std::size_t looks_ = 0;       // at voids of members
+  std::vector<Placed> around_;  // the current member
+  std::size_t looks_ = 0;       // number of look-ups of voids
 };
 
 }  // namespace
 
 GridVoids::GridVoids(const std::vector<GridMember>& members, const BoxIndex& index, std::int64_t turn)
     : turn_(turn), closed_(members.size()) {
-  // A single raster's own regions say it all, but where its first column is the neighbour of the last.
+  // A single raster's regions are sufficient, unless its first column is adjacent to the last.
   Joints joints(members, index, turn);
   for (std::size_t i = 0; i < members.size(); ++i) joints.Add(i);
   looks_ = joints.looks();
@@ -187,7 +188,7 @@ bool GridVoids::IsHole(const GridMember& member, std::size_t index, std::int64_t
 std::vector<std::uint8_t> GridVoids::HolesIn(const std::vector<GridMember>& members, const BoxIndex& index, int factor,
                                              const GridWindow& window, std::int64_t columns,
                                              std::span<const float> heights) const {
-  // A void average stands for voids alone, which hang together: the first says of what kind they are.
+  // A void average covers only voids, which are connected: the first one decides for all.
   std::vector<std::uint8_t> holes(heights.size());
   const std::vector<Placed> all =
       PlacedIn(members, index, turn_,
@@ -202,7 +203,7 @@ std::vector<std::uint8_t> GridVoids::HolesIn(const std::vector<GridMember>& memb
       const std::int64_t x = canonical * factor, y = row * factor;
       const auto look = [&](const std::vector<Placed>& placed) {
         for (const Placed& p : placed) {
-          // Of several any that has data around it will do.
+          // Of several members, one hole is enough.
           if (p.Has(x, y) && IsHole(*p.member, p.index, x - p.column, y - p.member->row)) return true;
         }
         return false;

@@ -1,5 +1,5 @@
-// Which voids of a raster grid are holes, with data all around them, and which are collars: those that touch a place
-// where the raster grid has no raster. A void that several rasters share is one.
+// Divides the voids of a raster grid into holes, with data all around them, and collars, which touch a place without a
+// raster. A void that extends over several rasters is one void.
 #pragma once
 
 #include <cstdint>
@@ -11,23 +11,24 @@
 
 namespace terrace::dem {
 
-// Immutable and thread-safe. By default there are no holes.
+// Immutable and thread-safe. A default-constructed object has no holes.
 class GridVoids {
  public:
   GridVoids() = default;
-  // `index`: of the members, by pixels. `turn`: columns after which the raster grid repeats itself; 0: it does not.
+  // `index`: the members' boxes in pixels. `turn`: number of columns after which the raster grid repeats itself; 0: it
+  // does not.
   GridVoids(const std::vector<GridMember>& members, const BoxIndex& index, std::int64_t turn);
 
-  // For each void of a window of averages, row by row: 1 if it is part of a hole; of others 0. `columns`: of the
-  // raster grid's averages. `members` and `index` as above.
+  // Returns, for each average of a window, row by row, 1 if it is a void in a hole, else 0. `columns`: the number of
+  // columns of the raster grid's averages. `members` and `index` as above.
   std::vector<std::uint8_t> HolesIn(const std::vector<GridMember>& members, const BoxIndex& index, int factor,
                                     const GridWindow& window, std::int64_t columns,
                                     std::span<const float> heights) const;
 
-  // Whether a hole that several members share may reach into a box of pixels; RangeTable knows of all others.
+  // Whether a hole that extends over several members may intersect a box of pixels. RangeTable knows all other holes.
   bool SharesHole(const Box& pixels) const;
 
-  // How often the constructor looked at voids of a member: as often as something changes along the rims of members.
+  // How often the constructor examined voids of a member: once for each change along the rims of members. For tests.
   std::size_t looks() const { return looks_; }
 
  private:
@@ -35,8 +36,8 @@ class GridVoids {
 
   std::int64_t turn_ = 0;
   std::size_t looks_ = 0;
-  std::vector<std::vector<std::uint8_t>> closed_;  // by member and region of its RimVoids: part of a hole
-  std::vector<geo::TileRange> shared_;             // pixels around those
+  std::vector<std::vector<std::uint8_t>> closed_;  // by member and region of its RimVoids: 1 if part of a hole
+  std::vector<geo::TileRange> shared_;             // boxes of pixels around them
 };
 
 }  // namespace terrace::dem

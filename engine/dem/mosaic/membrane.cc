@@ -8,7 +8,7 @@
 namespace terrace::dem {
 namespace {
 
-// Region and the ring of samples around it, in doubles.
+// The region and the samples around it, in doubles.
 class Patch {
  public:
   explicit Patch(const GridWindow& box)
@@ -92,7 +92,7 @@ void Solve(const VoidRegion& region, VoidGrid& grid) {
     inside.push_back(patch.At(window.column + at % window.columns, window.row + at / window.columns));
     is_inside[inside.back()] = 1;
   }
-  // Heights beside the region stay. Those that are no height, and what lies outside the grid, do not count.
+  // Heights beside the region are fixed. NaNs, and neighbours outside the grid, do not count.
   double sum = 0, known = 0;
   for (std::int64_t row = region.box.row - 1; row <= region.box.row + region.box.rows; ++row) {
     for (std::int64_t column = region.box.column - 1; column <= region.box.column + region.box.columns; ++column) {
@@ -121,8 +121,8 @@ void Solve(const VoidRegion& region, VoidGrid& grid) {
     return;
   }
   for (const std::size_t at : inside) patch.heights()[at] = sum / known;
-  // The best factor for a square of that size. Changes shrink by one in a few hundred a sweep at worst, so that what is
-  // left is a hundredth of what heights are rounded to.
+  // The best relaxation factor for a square of this size. At worst, changes decrease by one in a few hundred per sweep,
+  // so the remaining error is a hundredth of the rounding of heights.
   constexpr double kSmallest = 1e-7;
   const auto side = static_cast<double>(std::max(region.box.columns, region.box.rows));
   const double relaxation = 2 / (1 + std::numbers::pi / (side + 1));
@@ -136,7 +136,7 @@ void Solve(const VoidRegion& region, VoidGrid& grid) {
 
 void Relax(const std::vector<std::size_t>& samples, VoidGrid& grid) {
   const GridWindow& window = grid.window;
-  constexpr double kDamping = 0.8;  // what alternates from one sample to the next goes, too
+  constexpr double kDamping = 0.8;  // also damps errors that alternate between samples
   std::vector<double> before(samples.size());
   std::vector<double> heights(grid.heights.begin(), grid.heights.end());
   for (int sweep = 0; sweep < kSweeps; ++sweep) {

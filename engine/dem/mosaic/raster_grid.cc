@@ -1,5 +1,6 @@
-// From a window of nodes to heights: positions, window, voids, interpolation. Every step is a function of the global
-// node, the level and the raster grid; the window decides only what is read, never what comes out.
+// Computes the heights of a window of nodes: positions, window of samples, voids, interpolation. Every step depends
+// only on the global node, the level and the raster grid. The window of nodes determines what is read, but not the
+// results.
 #include "engine/dem/mosaic/raster_grid.h"
 
 #include <algorithm>
@@ -13,13 +14,13 @@
 namespace terrace::dem {
 namespace {
 
-// Interpolated positions are this close to exact ones, in samples of the grid they are read from: a slope of 45 degrees
-// at 30 m turns it into 0.3 mm.
+// The error of interpolated positions, in samples of the grid that is read: 0.3 mm of height on a slope of 45 degrees
+// at 30 m.
 constexpr double kGridPositionTolerance = 1e-5;
 
 Result<Georeference> GeoreferenceOf(const GridPlan& plan) {
   if (plan.members.size() == 1) return plan.members.front().raster->georeference();
-  // That of the member in the corner, if there is one, goes over as it is.
+  // The georeference of a member in the corner is used unchanged.
   const auto corner =
       std::ranges::find_if(plan.members, [](const GridMember& m) { return m.column == 0 && m.row == 0; });
   const GridMember& member = corner != plan.members.end() ? *corner : plan.members.front();
@@ -81,7 +82,7 @@ std::vector<float> FeatherWeights(const std::vector<float>& wide_heights, const 
   return weights;
 }
 
-// Whole rows at a time: heights of nodes that are wanted, where the samples around them give one.
+// Interpolates whole rows at a time, for requested nodes that have valid samples around them.
 void FillRows(const std::vector<float>& samples, const GridWindow& window, const NodeCells& cells,
               std::span<const std::uint8_t> wanted, std::span<const double> undulations, std::span<float> heights) {
   const std::size_t stride = cells.columns().size(), rows = cells.rows().size();
@@ -133,7 +134,7 @@ Result<RasterGrid> RasterGrid::Make(GridPlan plan, const GridOptions& options) {
   grid.wraps_ = grid.georeference_.wrap_columns() > 0;
   grid.columns_ = grid.wraps_ ? grid.georeference_.wrap_columns() : plan.width;
   const RasterSource& first = *grid.members_.front().raster;
-  // Members far apart may have nothing of the Earth half way between them.
+  // There may be no position on Earth half way between distant members.
   grid.spacing_ = SourceSpacing::Of(grid.georeference_, first.info().path).value_or(first.spacing());
   grid.reach_ = Footprint::Of(grid.georeference_).Padded();
   grid.IndexMembers();
@@ -173,11 +174,10 @@ void RasterGrid::IndexMembers() {
   cover_ = GridCover(members_, turn);
 }
 
-// Rasters are joined that lie a little off one grid. They are read as if they were on it; the bound on a tile's error
-// knows better.
+// Rasters that lie slightly off a grid are read as if they were on it; the error bounds account for the offset.
 void RasterGrid::MeasureMembers() {
-  // Around the Earth 360 degrees count as whole columns: where the raster grid closes its surface leaps by what is
-  // left, and columns beyond lie off by as much.
+  // 360 degrees count as a whole number of columns. The surface of a raster grid around the Earth jumps by the rest
+  // where it closes, and further columns are off by the rest.
   const double seam = wraps_ ? 2 * std::abs(georeference_.period() - columns_) : 0;
   for (GridMember& member : members_) {
     if (members_.size() > 1) {
@@ -188,7 +188,7 @@ void RasterGrid::MeasureMembers() {
   }
 }
 
-// The mean of the rows that lie at a pole, of members by their width.
+// The mean of the members' rows at a pole, weighted by width.
 void RasterGrid::FindPoleHeights() {
   if (!georeference_.is_geographic_grid()) return;
   for (const int pole : {0, 1}) {
@@ -210,8 +210,8 @@ void RasterGrid::FindPoleHeights() {
   }
 }
 
-// Files are looked at even where nothing must be read: a tile of floor must not outlive its source. What lies between
-// many sources depends on none of them.
+// Checks the files even if nothing is read, so that a tile of floor does not outlive its source. Tiles between many
+// sources depend on none of them.
 Result<void> RasterGrid::CheckUnread() const {
   return members_.size() == 1 ? members_.front().raster->CheckUnchanged() : Result<void>();
 }
@@ -253,7 +253,7 @@ std::optional<float> RasterGrid::PoleHeight(int pole, HeightDatum datum) const {
 }
 
 double RasterGrid::Feather(int factor) const {
-  // Of the coarser axis: what is read around a tile, and the time that weights take, stay bounded.
+  // On the coarser axis: limits the samples read around a tile, and the time for weights.
   constexpr int kMaxSamples = 256;
   return std::min(options_.feather_m, kMaxSamples * factor * std::min(spacing_.east, spacing_.north));
 }
@@ -292,7 +292,7 @@ Result<void> RasterGrid::FillAt(NodePositions positions, std::span<const std::ui
   if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "reading was stopped");
   if (!is_any_wanted) return CheckUnread();
   GridWindow window = cells.MoveIntoWindow(Axes(factor), wanted);
-  // Samples between the outermost nodes and the rim are wanted too.
+  // Samples between the outermost nodes and the rim are needed, too.
   constexpr int kRim = 3;
   if (trace != nullptr) window = Grown(window, kRim, factor);
   const auto bridged = ReadBridged(factor, window, stop, trace != nullptr ? &trace->samples : nullptr);
@@ -318,17 +318,18 @@ Result<void> RasterGrid::FillAt(NodePositions positions, std::span<const std::ui
   }
   const auto take = [&](std::size_t node, const GridCell& cell) {
     const auto height = Interpolate(samples, window, cell);
-    // Where the geoid is not known a height means nothing.
+    // Without the geoid a height has no meaning.
     if (!height || (!undulations.empty() && std::isnan(undulations[node]))) return;
     const float rounded = RoundHeight(undulations.empty() ? *height : *height + undulations[node]);
-    if (has_holes && !HasSample(bridged->heights, window, cell)) {  // in a hole: another raster grid may know better
+    if (has_holes && !HasSample(bridged->heights, window, cell)) {  // in a hole: another raster grid may have a height
       if (!smooth.empty() && std::isnan(smooth[node])) smooth[node] = rounded;
       return;
     }
     heights[node] = rounded;
     if (trace != nullptr) trace->heights[node] = rounded;
     if (weights.empty()) return;
-    // Every sample has a weight, so this is plain bilinear. What counts nothing would still hide the floor.
+    // All samples have weights, so this is plain bilinear interpolation. Nodes with weight 0 are left to the grids
+    // below, because they would hide the floor.
     constexpr double kLeast = 0x1p-10;
     const double weight = counts.empty() ? 1 : Interpolate(counts, window, cell).value_or(1);
     weights[node] = static_cast<float>(std::max(kLeast, std::nearbyint(weight * 1024) / 1024));
@@ -360,7 +361,7 @@ Result<void> RasterGrid::FillAt(NodePositions positions, std::span<const std::ui
   return {};
 }
 
-// Nodes whose height others gave, as far as what was read tells the raster grid's own.
+// Traces nodes whose heights came from other raster grids, as far as this raster grid's samples were read.
 void RasterGrid::TraceOthers(std::span<const std::uint8_t> others, const std::vector<float>& bridged,
                              const std::vector<float>& filled, std::span<const double> undulations,
                              GridTrace& trace) const {
@@ -406,7 +407,7 @@ Result<void> RasterGrid::Fill(const NodeGrid& node_grid, const NodeWindow& windo
   for (int row = 0; row < window.rows && georeference_.is_geographic_grid(); ++row) {
     const std::int64_t global = window.row + row;
     if (!IsPoleRow(node_grid, global)) continue;
-    // Where columns are meridians they meet in one value.
+    // If columns are meridians, all nodes of a pole have one value.
     const auto first = static_cast<std::size_t>(row) * positions.columns();
     std::fill_n(inside.begin() + static_cast<std::ptrdiff_t>(first), window.columns, std::uint8_t{0});
     if (const auto pole = PoleHeight(global <= 0 ? 0 : 1, datum)) {

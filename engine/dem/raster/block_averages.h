@@ -112,8 +112,8 @@ class BlockAverages {
   }
 
   int parts_, plain_;
-  int rows_ = 0;                 // in inner_, where it is gathered
-  std::vector<BlockSum> inner_;  // of blocks, or of their parts
+  int rows_ = 0;                 // of samples in inner_ that are not gathered yet
+  std::vector<BlockSum> inner_;  // of blocks, or of parts of blocks
   std::vector<BlockSum> outer_;
 };
 
@@ -134,7 +134,7 @@ Result<std::vector<float>> AverageBlocks(const GridAxis& columns, const GridAxis
     // In rows: a row of blocks can be the whole raster.
     const std::int64_t strip = std::max<std::int64_t>(1, kValuesPerStrip / width);
     const bool is_plain = block == 1 && width == blocks;
-    // Written before it is read, and not filled with zeros before that.
+    // Not initialized, because it is written before it is read.
     const auto values =
         std::make_unique_for_overwrite<float[]>(static_cast<std::size_t>(width * std::min(strip, height)));
     BlockAverages averages(is_plain ? 0 : blocks, block);

@@ -13,7 +13,7 @@ float SampleAt(const std::vector<float>& heights, const GridWindow& window, std:
 
 double Between(double first, double second, double weight) { return first + weight * (second - first); }
 
-// The column or the same one a turn on or back, within half a turn of `around`.
+// Moves a column by a turn, if needed, to within half a turn of `around`.
 std::int64_t NearestTurn(std::int64_t column, std::int64_t around, const GridAxis& columns) {
   if (!columns.wraps()) return column;
   const std::int64_t turn = columns.count();
@@ -77,7 +77,7 @@ void NodeCells::MoveNear(std::int64_t column, const GridAxis& columns) {
 GridWindow NodeCells::MoveIntoWindow(const GridAxes& axes, std::span<const std::uint8_t> wanted) {
   const auto stride = static_cast<std::size_t>(window_.columns);
   if (axes.columns.wraps()) {
-    // The middle column, so that columns of half a turn stay in order; else that of the wanted node nearest to it.
+    // The middle column, so that columns over half a turn stay in order; else the column of the nearest requested node.
     std::size_t nearest = wanted.size();
     const auto distance = [&](std::size_t n) { return std::abs(static_cast<std::ptrdiff_t>(n % stride - stride / 2)); };
     for (std::size_t n = 0; n < wanted.size() && !is_separable(); ++n) {
@@ -125,7 +125,7 @@ GridWindow HullOf(std::span<const GridCell> cells, const GridAxes& axes) {
 }
 
 std::optional<double> Interpolate(const std::vector<float>& heights, const GridWindow& window, const GridCell& cell) {
-  // Samples that count nothing may not be there.
+  // Samples with weight 0 may lie outside the window.
   const std::int64_t dx = cell.x > 0 ? 1 : 0, dy = cell.y > 0 ? 1 : 0;
   const double height = Between(Between(SampleAt(heights, window, cell.column, cell.row),
                                         SampleAt(heights, window, cell.column + dx, cell.row), cell.x),
@@ -153,7 +153,7 @@ NodeRows::NodeRows(const std::vector<float>& samples, const GridWindow& window, 
                    std::size_t first, std::size_t end)
     : samples_(samples), window_(window), cells_(cells), heights_(end - first) {
   for (const GridAxis::Location& place : cells.columns().subspan(first, end - first)) {
-    // Columns that nobody wants may lie outside.
+    // Columns of nodes that are not requested may lie outside.
     const std::int64_t last = window.columns - 1, west = std::clamp<std::int64_t>(place.index - window.column, 0, last);
     west_.push_back(static_cast<std::int32_t>(west));
     east_.push_back(static_cast<std::int32_t>(std::min(west + (place.weight > 0 ? 1 : 0), last)));

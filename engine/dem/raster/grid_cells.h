@@ -1,4 +1,5 @@
-// Bilinear interpolation on the grid of a factor: cells of four samples, the window that holds them, heights in them.
+// Bilinear interpolation on the grid of averages by a factor: cells of four samples, the window that contains them, and
+// heights in them.
 #pragma once
 
 #include <array>
@@ -14,34 +15,35 @@
 
 namespace terrace::dem {
 
-// Heights are multiples of 2^-10 m: libm's last bits, which differ between processors, end here. Halves go to the even
-// multiple. Precondition: below 2^42 m.
+// Rounds to the nearest multiple of 2^-10 m, ties to even. This removes the last bits of libm's results, which differ
+// between processors. Precondition: |metres| < 2^42.
 inline float RoundHeight(double metres) {
-  // std::nearbyint without a call, so that loops become vectors: at 2^52 a double has no bits below one.
+  // Like std::nearbyint, but without a call, so that compilers can vectorize loops: at 2^52 a double has no fraction
+  // bits.
   constexpr double kNoFraction = 0x1p52;
   const double scaled = metres * 1024;
   return static_cast<float>(std::copysign((std::abs(scaled) + kNoFraction) - kNoFraction, scaled) / 1024);
 }
 
-// Four samples of the grid around a position, and how far it is from the first to the next, 0..1.
+// The cell of four samples around a position, and the position's fraction of the way across it, 0 .. 1.
 struct GridCell {
   std::int64_t column = 0, row = 0;
   double x = 0, y = 0;
 };
 
-// The grid of a factor, and the size of the raster in pixels.
+// The axes of the grid of averages by a factor, and the size of the raster in pixels.
 struct GridAxes {
   GridAxis columns, rows;
   int width = 0, height = 0;
 
-  // Positions are in source pixels. Those outside the raster count as on its edge, but for columns that wrap.
+  // Positions are in source pixels. Positions outside the raster are clamped to its edge, except columns that wrap.
   // Precondition: not NaN.
   GridAxis::Location Column(double x) const;
   GridAxis::Location Row(double y) const;
   GridCell CellAt(const Position& position) const;
 };
 
-// The cells of a window's nodes. Where positions are separable, nothing is stored per node.
+// The cells of a window's nodes. If positions are separable, nothing is stored per node.
 class NodeCells {
  public:
   NodeCells() = default;
@@ -50,7 +52,7 @@ class NodeCells {
 
   const NodeWindow& window() const { return window_; }
   bool is_separable() const { return cells_.empty(); }
-  // Of the window's columns and rows. Precondition: is_separable().
+  // Locations of the window's columns and rows. Precondition: is_separable().
   std::span<const GridAxis::Location> columns() const { return columns_; }
   std::span<const GridAxis::Location> rows() const { return rows_; }
 
@@ -58,7 +60,7 @@ class NodeCells {
     if (!is_separable()) return cells_[j * static_cast<std::size_t>(window_.columns) + i];
     return {columns_[i].index, rows_[j].index, columns_[i].weight, rows_[j].weight};
   }
-  // By a node's global column and row, inside the window.
+  // The cell of the node at a global column and row inside the window.
   GridCell OfNode(std::int64_t column, std::int64_t row) const {
     return At(static_cast<std::size_t>(column - window_.column), static_cast<std::size_t>(row - window_.row));
   }
@@ -76,30 +78,30 @@ class NodeCells {
   std::vector<GridCell> cells_;
 };
 
-// The smallest window with every cell, its columns counted from near one of them where the axis wraps. Moves the cells
-// there. Precondition: not empty.
+// Returns the smallest window that contains all cells. If the axis wraps, moves the cells to columns near one of them.
+// Precondition: not empty.
 GridWindow WindowOf(std::span<GridCell> cells, const GridAxes& axes);
 // The same with cells as they are.
 GridWindow HullOf(std::span<const GridCell> cells, const GridAxes& axes);
 
-// Bilinear, weights renormalized over valid samples; nothing where there is none.
+// Interpolates bilinearly, with weights renormalized over valid samples; nothing if there is none.
 std::optional<double> Interpolate(const std::vector<float>& heights, const GridWindow& window, const GridCell& cell);
 
-// Heights along rows of nodes between the samples of a window, where cells are separable. Bit for bit what Interpolate
-// gives.
+// Interpolates along rows of nodes, for separable cells. Results are bit-equal to those of Interpolate.
 class NodeRows {
  public:
-  // Nodes `first` to `end` of each row. What these refer to outlives it. Precondition: `cells` are separable.
+  // For nodes `first` to `end` of each row. The arguments must outlive this object. Precondition: `cells` are
+  // separable.
   NodeRows(const std::vector<float>& samples, const GridWindow& window, const NodeCells& cells, std::size_t first,
            std::size_t end);
 
-  // One height per node from `first` on; NaN where a sample that counts is void, of no meaning where the node's column
-  // lies outside the window. Valid until the next call. Precondition: the row's cells lie in the window's rows.
+  // Returns one height per node from `first` on; NaN if a sample with a nonzero weight is void; undefined if the node's
+  // column lies outside the window. Valid until the next call. Precondition: the row's cells lie in the window's rows.
   std::span<const double> Row(std::size_t j);
 
  private:
   struct Line {
-    std::int64_t row = -1;  // of the samples between which the heights are interpolated
+    std::int64_t row = -1;  // of samples
     std::vector<double> heights;
   };
 
@@ -114,7 +116,7 @@ class NodeRows {
   std::vector<double> heights_;
 };
 
-// Whether one of the four samples that count is valid.
+// Whether one of the four samples has a nonzero weight and is valid.
 bool HasSample(const std::vector<float>& heights, const GridWindow& window, const GridCell& cell);
 
 // Whether the nearest of the four samples is valid.

@@ -13,13 +13,13 @@
 namespace terrace::dem {
 namespace {
 
-// What a grid is averaged from: the samples, or blocks of `start` x `start` of them as an overview gives them.
+// The input of averaging: the samples, or an overview with blocks of `start` x `start` samples.
 struct Level {
   GDALRasterBand* band;
   int start;
   GridAxis columns, rows;  // of blocks of `start`
   OverviewAxis x, y;
-  bool is_band;  // a block is the band's sample of its number
+  bool is_band;  // block i is sample i of the band
 };
 
 Result<Level> StartingLevel(GDALDataset& dataset, const RasterLayout& layout, int factor) {
@@ -47,7 +47,7 @@ Result<void> ReadWindow(GDALRasterBand& band, const SampleRules& rules, const Gr
                      static_cast<int>(window.columns), static_cast<int>(window.rows), out, stop);
 }
 
-// Samples of an overview; the column behind the last one is the first.
+// Reads samples of an overview; the column after the last one is the first.
 Result<std::vector<float>> ReadSamples(const Level& level, const SampleRules& rules, const GridWindow& window,
                                        const std::stop_token& stop) {
   std::vector<float> samples(static_cast<std::size_t>(window.columns * window.rows));
@@ -65,7 +65,7 @@ Result<std::vector<float>> ReadSamples(const Level& level, const SampleRules& ru
   return both;
 }
 
-// Blocks of level.start between the overview's samples. The window does not wrap.
+// Interpolates blocks of level.start between the overview's samples. Precondition: the window does not wrap.
 Result<void> InterpolateBlocks(const Level& level, const SampleRules& rules, const GridWindow& window, float* out,
                                const std::stop_token& stop) {
   std::vector<GridAxis::Location> columns;
@@ -119,7 +119,7 @@ double PixelsPerSample(GDALDataset& dataset, int factor, int pixels, int samples
 
 GridAxis::Location OverviewAxis::Around(std::int64_t block) const {
   if (is_own_) return {block, 0};
-  // In halves of pixels, so that all is whole: centre * samples / pixels - 1/2.
+  // In halves of pixels, to stay in integers: centre * samples / pixels - 1/2.
   const auto centre = static_cast<std::int64_t>(2 * blocks_.Center(block));
   const std::int64_t place = centre * samples_ - pixels_, unit = 2 * pixels_;
   if (place < 0) return {0, 0};
@@ -153,7 +153,7 @@ double GridAxis::Center(std::int64_t index) const {
 
 GridAxis::Location GridAxis::LocateNearEnd(double position) const {
   auto index = static_cast<std::int64_t>(std::floor(position * per_factor_ - 0.5));
-  // The last block's centre may lie nearer than a factor.
+  // The centre of the last block may be nearer than a whole factor.
   if ((wraps_ || index + 1 < count_) && position >= Center(index + 1)) ++index;
   if (!wraps_) {
     if (index < 0) return {0, 0};

@@ -1,4 +1,4 @@
-// The source at the resolution of a level: its samples, or averages of aligned blocks of factor x factor of them.
+// The source at the resolution of a level: its samples, or averages of aligned blocks of factor x factor samples.
 #pragma once
 
 #include <gdal_priv.h>
@@ -15,16 +15,16 @@
 
 namespace terrace::dem {
 
-// How a raster is stored, as far as reading it goes. Immutable after Open.
+// What must be known of a raster to read it. Immutable after Open.
 struct RasterLayout {
   // `crs_unit`: SampleRules::Of's.
   static RasterLayout Of(GDALDataset& dataset, const Georeference& georeference, const std::string& crs_unit);
 
   int width = 0, height = 0;  // of the file
-  int columns = 0;            // of them in use: without the duplicates of a raster that goes all around the Earth
+  int columns = 0;            // columns in use: without the duplicates of a raster around the whole Earth
   bool wraps = false;         // column `columns` is column 0 again
   SampleRules rules;
-  std::vector<int> overview_factors;  // powers of two, ascending; overviews of other factors are left alone
+  std::vector<int> overview_factors;  // powers of two, ascending; overviews of other factors are not used
   double coast_step_m = 100;          // ZeroEdges::CoastStep
 };
 
@@ -47,7 +47,7 @@ class GridAxis {
     const double place = position * per_factor_ - 0.5;
     const auto index = static_cast<std::int64_t>(place);
     if (!(place >= 0 && index + 2 < count_)) return LocateNearEnd(position);
-    // Both samples are of whole blocks.
+    // Both blocks are whole.
     const double here = (static_cast<double>(index) + 0.5) * factor_;
     return {index, (position - here) * per_factor_};
   }
@@ -55,7 +55,7 @@ class GridAxis {
   std::int64_t count() const { return count_; }
   bool wraps() const { return wraps_; }
   int samples() const { return samples_; }
-  // Centre of the block; the last block of an axis may be a smaller one.
+  // The centre of a block; the last block of an axis may be smaller.
   double Center(std::int64_t index) const;
 
  private:
@@ -91,17 +91,17 @@ class OverviewAxis {
 };
 
 struct GridWindow {
-  std::int64_t column = 0, row = 0;  // columns may lie outside 0 .. count where the axis wraps
+  std::int64_t column = 0, row = 0;  // columns may lie outside 0 .. count if the axis wraps
   std::int64_t columns = 0, rows = 0;
 };
 
-// Averages of the valid samples of each block in the window, NaN where there is none, row by row from the north. A
-// value is a function of its block alone. Starts from the coarsest overview that `factor` is a multiple of; where its
-// samples stand for other pixels than blocks of its factor do, blocks are interpolated between them.
+// Returns the averages of the valid samples of each block in the window, row by row from the north; NaN for blocks
+// without valid samples. A value depends only on its block. Starts from the coarsest overview whose factor divides
+// `factor`. If the overview's samples do not cover aligned blocks of pixels, blocks are interpolated between them.
 Result<std::vector<float>> ReadGrid(GDALDataset& dataset, const RasterLayout& layout, int factor,
                                     const GridWindow& window, const std::stop_token& stop);
 
-// The factor of the overview that ReadGrid starts from; 1: the samples themselves.
+// Returns the factor of the overview that ReadGrid starts from; 1: the full raster.
 int StartingFactor(const RasterLayout& layout, int factor);
 
 // Returns true if the overviews are the format's own (JPEG, JPEG 2000) and each sample covers a block of exactly
@@ -111,11 +111,11 @@ bool HasOwnOverviews(GDALDataset& dataset);
 // Returns the number of pixels that an overview sample covers along an axis of `pixels` pixels and `samples` samples.
 double PixelsPerSample(GDALDataset& dataset, int factor, int pixels, int samples);
 
-// The overview of that factor: its sides are the band's divided by it, each rounded up, as gdaladdo makes them, or
-// down, as in cloud-optimized GeoTIFFs. Null when there is none (any more).
+// Returns the overview of a factor. Its sides are those of the band divided by the factor, each rounded up, as by
+// gdaladdo, or down, as in cloud-optimized GeoTIFFs. Null: there is none, or it was removed.
 GDALRasterBand* FindOverview(GDALRasterBand& band, int factor);
 
-// The factors, powers of two, of the overviews that ReadGrid can use.
+// Returns the factors of the overviews that ReadGrid can use; all are powers of two.
 std::vector<int> OverviewFactors(GDALRasterBand& band);
 
 }  // namespace terrace::dem

@@ -21,7 +21,7 @@
 namespace terrace::dem {
 namespace {
 
-// Names that rasters have: a file of such a name that is none is damaged rather than something else.
+// File extensions of rasters: a file with one of these that is no raster is probably damaged.
 bool LooksLikeRaster(const std::string& path) {
   constexpr std::string_view kEndings[] = {".tif", ".tiff", ".hgt", ".hgt.zip", ".hgt.gz", ".dt0", ".dt1",
                                            ".dt2", ".dem",  ".asc", ".img",     ".bil",    ".flt", ".nc"};
@@ -30,13 +30,13 @@ bool LooksLikeRaster(const std::string& path) {
   return std::ranges::any_of(kEndings, [&](std::string_view ending) { return name.ends_with(ending); });
 }
 
-// Why a file of a folder is left out.
+// The reason why a file of a folder is left out.
 struct LeftOut {
   bool looks_like_raster = false;
   std::string text;
 };
 
-// Nothing: it is opened.
+// Nothing: the file is used.
 std::optional<LeftOut> LeftOutOf(const DemFile& file) {
   if (!file.may_be_other) return std::nullopt;
   if (!IsOneLine(file.path)) {
@@ -60,7 +60,7 @@ void TellLeftOut(spdlog::level::level_enum level, const std::vector<std::string>
               names.size() > kMaxNamed ? fmt::format(" and {} more", names.size() - kMaxNamed) : "");
 }
 
-// Those files of folders that are no rasters go away. Which of them look like some, and why they are none.
+// Removes files of folders that are no rasters. Returns those that look like rasters, with reasons.
 std::vector<std::string> LeaveOutOthers(std::vector<DemFile>& files) {
   std::vector<std::optional<LeftOut>> verdicts(files.size());
   ForEachOnAllCores(files.size(), [&](std::size_t i) {
@@ -82,8 +82,8 @@ std::vector<std::string> LeaveOutOthers(std::vector<DemFile>& files) {
   return missed;
 }
 
-// Bytes of tables of a dataset: kept in memory, and of those that are read when they are wanted. Of a raster of
-// 3600 x 3600 samples they take 70 to 90 KB.
+// Limits, in bytes, of a dataset's statistics: kept in memory, and paged. A raster of 3600 x 3600 samples takes 70 to
+// 90 KB.
 constexpr std::size_t kKeptTables = std::size_t{192} << 20, kPagedTables = std::size_t{64} << 20;
 
 // Opens files from several threads.
@@ -94,7 +94,8 @@ class Opening {
   Opening(const std::vector<DemFile>& files, const DemOptions& options)
       : files_(files), options_(options), shares_(files.size()), opened_(files.size()) {}
 
-  // False: there is an error that ends it all. Files before this one are opened nevertheless, as theirs would count.
+  // Returns false after a fatal error. Files before this one are still opened, because the error of the first file
+  // counts.
   bool Open(std::size_t i) {
     const SourceLog::Use use(log_);
     std::stop_source stop;
@@ -116,12 +117,12 @@ class Opening {
     return goes_on;
   }
 
-  // Datasets that were cut into files have some without a height.
+  // Datasets that are split into files may have files without a height.
   bool IsNothing(std::size_t i, const Opened& opened) const {
     return !opened && opened.error().code == ErrorCode::kNotFound && files_[i].may_be_other;
   }
 
-  // Nothing: it was not begun.
+  // Nothing: not begun.
   std::vector<std::optional<Opened>>& opened() { return opened_; }
 
  private:
@@ -130,7 +131,7 @@ class Opening {
     return [this, i](double share) { AddProgress(i, share); };
   }
 
-  // Passes over a file may begin anew.
+  // A pass over a file may restart.
   void AddProgress(std::size_t i, double share) {
     const std::lock_guard lock(mutex_);
     done_ += share - std::exchange(shares_[i], share);

@@ -15,12 +15,13 @@
 namespace terrace::dem {
 namespace {
 
-// Changes whenever blocks are read otherwise from the same overviews: the statistics compare samples with them.
+// Incremented whenever blocks are read differently from the same overviews, because the statistics compare samples with
+// blocks.
 constexpr std::uint32_t kOverviewReading = 2;
-// Changes whenever other voids are found in the same raster (undeclared_nodata.h).
+// Incremented whenever detection finds other voids in the same raster (undeclared_nodata.h).
 constexpr std::uint32_t kNodataDetection = 2;
 
-// Everything that decides the statistics of a raster and is known before.
+// A hash of everything that the statistics of a raster depend on and that is known in advance.
 std::uint64_t KeyOf(const RasterLayout& layout, bool find_voids, const std::string& path, const StampedFiles& files) {
   ByteWriter writer;
   writer.PutBytes(path);
@@ -46,7 +47,7 @@ std::uint64_t KeyOf(const RasterLayout& layout, bool find_voids, const std::stri
   return XXH3_64bits(bytes.data(), bytes.size());
 }
 
-// Loads or reads the statistics of one raster. Without a cache file they stay in memory alone.
+// Loads or computes the statistics of one raster. Without a cache file they stay only in memory.
 class Preparer {
  public:
   Preparer(GDALDataset& dataset, const RasterLayout& layout, const std::string& path, const StampedFiles& files,
@@ -124,7 +125,7 @@ class Preparer {
     return {};
   }
 
-  // One pass through the raster, behind what was done of it before.
+  // One pass through the raster, continued after the chunks of an earlier run.
   Result<RasterStatistics> ReadStatistics() {
     const RasterLayout layout = shape_.EffectiveLayout();
     StatisticsAssembler assembler(layout);
@@ -171,7 +172,7 @@ class Preparer {
 
   // In the folder, or where that fails in memory.
   void FinishCache() {
-    // A file that changed meanwhile is a mixture, which its caller will refuse.
+    // If a file changed meanwhile, the statistics are a mixture; the caller will refuse them.
     if (files_.FirstChanged()) return;
     if (writer_) {
       if (auto finished = writer_->Finish(prepared_.statistics); !finished) GiveUpCache(finished.error());

@@ -69,7 +69,7 @@ std::string DropMisleadingOverviews(GDALDataset& dataset, const RasterStatistics
   int is_declared = 0;
   HeightBand(dataset).GetNoDataValue(&is_declared);
   const BlockRange all = statistics.table.Whole();
-  // Cubic and Lanczos kernels go beyond the heights they are given, by less than this.
+  // Cubic and Lanczos kernels overshoot their input by less than this.
   const double overshoot = 0.02 * (static_cast<double>(statistics.highest) - static_cast<double>(statistics.lowest));
   std::string why;
   if (layout.rules.has_mask) {
@@ -109,7 +109,8 @@ RasterInfo Describe(GDALDataset& dataset, const std::string& path, const Georefe
   return info;
 }
 
-// Of heights in metres that no land or sea floor has, such as those of centimetres whose unit is not stated.
+// Doubts about heights in metres that no land or sea floor has, for example if they are in centimetres without a stated
+// unit.
 std::string DoubtsOf(const HeightRange& heights) {
   constexpr double kHighest = 9000, kDeepest = -11500;
   if (heights.max <= kHighest && heights.min >= kDeepest) return "";
@@ -133,7 +134,7 @@ void LogWhatMatters(GDALDataset& dataset, const RasterInfo& info, const Georefer
   if (!info.overviews_unused.empty()) {
     LogSource(SourceLog::Level::kWarn, info.path, "its overviews are not used: {}", info.overviews_unused);
   }
-  // One column more is that of a grid with nodes at -180 and at 180 degrees.
+  // One more column is allowed, for grids with nodes at -180 and at 180 degrees.
   if (const int beyond = layout.width - layout.columns; beyond > 1) {
     LogSource(
         SourceLog::Level::kWarn, info.path,
@@ -163,7 +164,7 @@ void LogVertical(const std::string& path, const VerticalDatum& vertical, const s
     LogSource(SourceLog::Level::kInfo, path, "heights count from {}, made ellipsoidal by PROJ operation \"{}\"",
               vertical.name, vertical.geoid->description());
     LogSource(SourceLog::Level::kDebug, path, "{}", vertical.geoid->pipeline());
-    // Programs write feet where GDAL does not read them.
+    // Some programs write feet in places that GDAL does not read.
     const auto stated = MetresPerUnit(unit), counted = MetresPerUnit(vertical.geoid->unit());
     if (!unit.empty() && !vertical.geoid->unit().empty() && stated && counted && *stated != *counted) {
       LogSource(SourceLog::Level::kWarn, path,
@@ -208,7 +209,7 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
   auto vertical = ResolveVertical(options.vertical, source->georeference_, CentreOf(source->georeference_));
   if (!vertical) return MakeError(vertical.error().code, "{}: {}", path, vertical.error().message);
   source->vertical_ = *std::move(vertical);
-  // Where the file names no unit, the reference system does that its owner says the heights are in.
+  // If the file names no unit, the configured vertical reference system does.
   const std::string& stated = source->georeference_.vertical_unit();
   const auto& geoid = source->vertical_.geoid;
   source->layout_ =
@@ -320,7 +321,7 @@ RasterSource::~RasterSource() {
   if (paging_) paging_->pages->Forget(this);
 }
 
-// Of a dataset of thousands of rasters tables take more memory than anything else.
+// In a dataset of thousands of rasters, these tables take most of the memory.
 void RasterSource::KeepTables(PreparedRaster prepared, const PrepareOptions& prepare,
                               std::shared_ptr<StatisticsPages> pages) {
   constexpr std::size_t kMaxCoarse = 64;  // blocks of a level
@@ -383,7 +384,7 @@ void RasterSource::LoseCache(const Error& error) const {
 
 Result<std::vector<float>> RasterSource::ReadBlocks(int factor, const GridWindow& window,
                                                     const std::stop_token& stop) const {
-  // From memory and from the cache file only while the files are those that were prepared.
+  // Uses memory and the cache file only if the files have not changed since they were prepared.
   if (factor >= kLargestDirect && (kept_ ? !kept_->coarse.grids.empty() : paging_->has_coarse_averages)) {
     if (auto unchanged = handles_.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
     if (const StatisticsPages::Tables known = tables(); known->coarse.Has(factor))
@@ -402,7 +403,7 @@ Result<std::vector<float>> RasterSource::ReadBlocks(int factor, const GridWindow
   auto handle = handles_.Borrow();
   if (!handle) return tl::unexpected(handle.error());
   auto heights = ReadGrid(**handle, layout_, factor, window, stop);
-  // Files may be overwritten while they are read: what was read is nothing then, and so is why it could not be.
+  // Files may be overwritten during a read: then both its result and its error are discarded.
   if (auto unchanged = handles_.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
   if (!heights) return MakeError(heights.error().code, "{}: {}", info_.path, heights.error().message);
   return heights;

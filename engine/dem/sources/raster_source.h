@@ -1,6 +1,5 @@
-// One raster file of a dataset: where it lies, how it is stored, what its heights range over, and its samples.
-//
-// Immutable after Open and safe to use from many threads. Knows nothing of levels, floors or other rasters.
+// One raster file of a dataset: its georeference, layout, height statistics and samples. Independent of levels, floors
+// and other rasters. Immutable after Open, thread-safe.
 #pragma once
 
 #include <array>
@@ -80,7 +79,7 @@ class RasterSource {
 
   const RasterInfo& info() const { return info_; }
   const Georeference& georeference() const { return georeference_; }
-  // What its samples count from; they are not converted here.
+  // The vertical datum of the samples. They are not converted here.
   const VerticalDatum& vertical() const { return vertical_; }
   const RasterLayout& layout() const { return layout_; }
   const Footprint& footprint() const { return footprint_; }
@@ -88,24 +87,24 @@ class RasterSource {
   const RimVoids& rim_voids() const { return rim_voids_; }
   // Of its heights, in metres as they are read: a copy of the file has the same.
   const ContentHash& content() const { return content_; }
-  // Of the valid samples of the first and the last row.
+  // Means of the valid samples of the first and the last row.
   const std::array<std::optional<double>, 2>& edge_row_means() const { return edge_row_means_; }
 
   // The raster's statistics. May read them from the cache file; keep the result for repeated use. Throws
-  // std::runtime_error if they can be neither read nor made again, as when the file is gone.
+  // std::runtime_error if they can be neither read nor computed again, for example because the raster was removed.
   StatisticsPages::Tables tables() const;
-  // The range of a box of pixels (RangeTable::Query). Large boxes need no read.
+  // The range of a box of pixels (RangeTable::Query). Large boxes need no read of the cache file.
   BlockRange RangeIn(double west, double north, double east, double south) const;
   const StampedFiles& files() const { return handles_.files(); }
 
-  // In the cache file; null: none.
+  // The averages in the cache file; null: none.
   const CachedAverages* averages() const { return averages_.get(); }
   // Null: none.
   const MemoryAverages* memory_averages() const { return memory_averages_.get(); }
   // What was in the cache file cannot be read any more: opened anew, the raster has it again, or averages in memory.
   bool has_lost_cache() const { return has_lost_cache_; }
 
-  // How opening went.
+  // How the statistics were made.
   const Preparation& preparation() const { return preparation_; }
 
   // ReadGrid of this raster, from prepared averages where possible. kChanged: a file was changed, replaced or removed.
@@ -132,11 +131,11 @@ class RasterSource {
   ContentHash content_;
   std::array<std::optional<double>, 2> edge_row_means_;
   RimVoids rim_voids_;
-  StatisticsPages::Tables kept_;  // null: they are paged
-  // Of paged tables.
+  StatisticsPages::Tables kept_;  // null: the statistics are paged
+  // Set if the statistics are paged.
   struct Paging {
     std::shared_ptr<StatisticsPages> pages;
-    RangeTable ranges;  // the coarse ones
+    RangeTable ranges;  // of coarse blocks
     bool has_coarse_averages;
     std::string cache_file;
     StatisticsShape shape;

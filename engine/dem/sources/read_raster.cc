@@ -17,7 +17,7 @@
 namespace terrace::dem {
 namespace {
 
-// Into what there is room for.
+// Reads into a vector with enough capacity.
 Result<void> ReadAll(GDALRasterBand& band, const SampleRules& rules, const std::function<void(double)>& progress,
                      RasterHeights& raster) {
   constexpr int kRowsAtOnce = 256;
@@ -30,13 +30,13 @@ Result<void> ReadAll(GDALRasterBand& band, const SampleRules& rules, const std::
   return {};
 }
 
-// Undeclared voids of a raster in memory, by the rules that apply to served rasters (raster_statistics.h).
+// Detects undeclared voids of a raster in memory, by the same rules as for served rasters (raster_statistics.h).
 Result<DetectedNodata> FindVoidsOf(const RasterHeights& raster, GDALRasterBand& band, const SampleRules& rules,
                                    double spacing_m) {
   float lowest = std::numeric_limits<float>::infinity(), highest = -lowest;
   bool has_voids = false;
   for (const float height : raster.heights) {
-    lowest = std::min(lowest, height);  // not of NaN, which comes second
+    lowest = std::min(lowest, height);  // ignores NaN, the second argument
     highest = std::max(highest, height);
     has_voids |= std::isnan(height);
   }
@@ -62,7 +62,7 @@ Result<RasterHeights> ReadRaster(const std::string& path, const ReadOptions& opt
   raster.georeferenced = (*dataset)->GetGeoTransform(raster.geo_transform.data()) == CE_None;
   GDALRasterBand& band = HeightBand(**dataset);
   raster.picture_part = PicturePartOf(band);
-  // What is served has a place on Earth, and its heights the unit of its CRS; what is meshed need not have one.
+  // Rasters that are only meshed need no georeference; if they have none, no CRS states the unit of heights.
   const auto georeference = Georeference::Of(**dataset, path);
   const auto spacing = georeference ? SourceSpacing::Of(*georeference, path) : SourceSpacing{};
   if (georeference && MetresPerUnit(georeference->pixel_unit()).value_or(1) != 1) {
@@ -72,7 +72,7 @@ Result<RasterHeights> ReadRaster(const std::string& path, const ReadOptions& opt
   raster.in_angles = raster.georeferenced && crs != nullptr && crs->IsGeographic() != 0;
   SampleRules rules = SampleRules::Of(band, georeference ? georeference->vertical_unit() : "");
   rules.extra_nodata = options.nodata;
-  // With room for a mesher to lay rows further apart (tin::HeightField) without a second copy of all.
+  // With spare capacity, so that tin::HeightField can increase the stride without a copy.
   constexpr std::size_t kRoomOfRow = 32;
   raster.heights.reserve((static_cast<std::size_t>(raster.width) + kRoomOfRow) *
                          static_cast<std::size_t>(raster.height));

@@ -25,7 +25,7 @@ class AveragingErrors {
   AveragingErrors() = default;
   AveragingErrors(int width, int height);
 
-  // 2, 4, .. until one average stands for the whole raster. Larger factors give that average too.
+  // The smallest power of two for which one average covers the whole raster. Larger factors give the same average.
   int largest_factor() const { return 1 << levels_.size(); }
 
   // Source pixels along a block's side.
@@ -37,8 +37,8 @@ class AveragingErrors {
     if (error > known) known = error;
   }
 
-  // The largest error of the blocks that the box touches; the box is in source pixels and clipped to the raster. 0 for
-  // factor 1. Infinite where samples lie that no average knows of.
+  // Returns the largest error of the blocks that the box touches; the box is in source pixels and clipped to the
+  // raster. 0 for factor 1. Infinite if the box has samples without an average.
   float Largest(int factor, double west, double north, double east, double south) const;
 
   const Level& level(int factor) const { return levels_[IndexOf(factor)]; }

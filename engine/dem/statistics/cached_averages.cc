@@ -17,7 +17,7 @@ std::int64_t SteadySeconds() {
   return std::chrono::duration_cast<std::chrono::seconds>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-// The averages of a chunk of one factor: their numbers and their offset. Each factor follows its checksum.
+// Size and offset of a chunk's averages of one factor. Each factor is preceded by its checksum.
 struct AveragesPlace {
   std::uint64_t offset = 0;
   int columns = 0, rows = 0;

@@ -13,10 +13,10 @@
 namespace terrace::dem {
 namespace {
 
-// Averages of the largest factor that is compared directly reach this far out of a chunk.
+// How far averages of the largest directly compared factor extend beyond a chunk.
 constexpr int kHalo = kLargestDirect;
 
-// Factors of the raster up to `most`, from `least` on.
+// The raster's factors from `least` to `most`.
 template <typename Visit>
 void ForEachFactor(const RasterLayout& layout, int least, int most, const Visit& visit) {
   for (int factor = 2; factor <= most; factor *= 2) {
@@ -33,7 +33,7 @@ struct Samples {
   const float* Row(int row) const { return heights.data() + Area(row - box.row, box.cols); }
 };
 
-// False where the file stores nothing there and what GDAL puts in its place is a void.
+// Returns false if the file stores nothing there and GDAL's replacement value is a void.
 bool MayHaveSamples(GDALRasterBand& band, const RasterLayout& layout, const Chunk& chunk) {
   const int status = band.GetDataCoverageStatus(chunk.col, chunk.row, chunk.cols, chunk.rows, 0, nullptr);
   if (status != GDAL_DATA_COVERAGE_STATUS_EMPTY || layout.rules.has_mask) return true;
@@ -48,7 +48,7 @@ Chunk WithHalo(const Chunk& chunk, const RasterLayout& layout) {
           std::min(layout.height, chunk.row + chunk.rows + kHalo) - north};
 }
 
-// Of one row, `used` samples of it.
+// Statistics of one row, of its first `used` samples.
 void AddVoidRuns(const float* row, int r, int used, std::vector<VoidRun>& runs) {
   for (int c = 0; c < used; ++c) {
     if (!std::isnan(row[c])) continue;
@@ -89,7 +89,7 @@ ContentHash HashOf(const Samples& samples, const Chunk& chunk) {
   return hasher.Hash();
 }
 
-// Sums of the blocks of a box of samples that starts where a block does and ends with a block or the raster.
+// Sums of the blocks of a box of samples. The box begins at a block and ends with a block or the raster.
 std::vector<BlockSum> SumsOf(const Samples& samples, const Chunk& box, int factor) {
   const int columns = DivideUp(box.cols, factor);
   std::vector<BlockSum> sums(Area(columns, DivideUp(box.rows, factor)));
@@ -106,7 +106,7 @@ std::vector<BlockSum> SumsOf(const Samples& samples, const Chunk& box, int facto
   return sums;
 }
 
-// Averages around a chunk: every one that the surface over its samples is interpolated from.
+// All averages that the surface over a chunk's samples is interpolated from.
 struct Averages {
   GridWindow window;
   std::vector<float> heights;
@@ -124,7 +124,7 @@ GridWindow AveragesAround(const Chunk& chunk, const RasterLayout& layout, int fa
   return {west, north, east - west + 1, south - north + 1};
 }
 
-// From the samples where no overview comes before them, else as everybody reads them.
+// Computed from the samples, or read by ReadGrid if there is an overview.
 Result<Averages> AverageAround(GDALDataset& dataset, const RasterLayout& layout, const Samples& samples,
                                const Chunk& chunk, int factor, const std::stop_token& stop) {
   Averages averages{AveragesAround(chunk, layout, factor), {}};
@@ -159,7 +159,7 @@ Result<Averages> AverageAround(GDALDataset& dataset, const RasterLayout& layout,
   return averages;
 }
 
-// Errors of one row of samples against the surface between averages, into its blocks.
+// Adds the differences between one row of samples and the surface between averages to its blocks.
 class RowErrors {
  public:
   RowErrors(const Averages& averages, const Chunk& chunk, const RasterLayout& layout, int factor)
@@ -171,7 +171,7 @@ class RowErrors {
     for (int c = 0; c < used; ++c) {
       GridAxis::Location place = columns.Locate(chunk.col + c + 0.5);
       place.index -= averages.window.column;
-      // One past the end with no weight reads its neighbour instead.
+      // An index past the end with weight 0 is replaced by its neighbour.
       if (place.index + 1 >= averages.window.columns) place = {averages.window.columns - 2, 1};
       if (averages.window.columns == 1) place = {0, 0};
       places_.push_back(place);

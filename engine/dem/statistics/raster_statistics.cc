@@ -11,14 +11,14 @@
 namespace terrace::dem {
 namespace {
 
-// Of an overview that are read at once: multiples of the usual storage blocks, so that each is decoded once.
+// Samples per side of one read of an overview: a multiple of the usual storage blocks, so that each is decoded once.
 constexpr int kStripRows = 256, kStripColumns = 4096;
 
 std::optional<double> MeanOf(const BlockSum& sum) {
   return sum.weight == 0 ? std::nullopt : std::optional(sum.sum / sum.weight);
 }
 
-// Where lines of either grid lie along one axis, and between which of a grid's averages each is.
+// The lines of both grids along one axis, and the averages of each grid around each line.
 struct Line {
   double position = 0;
   GridAxis::Location fine, coarse;
@@ -36,7 +36,7 @@ std::vector<Line> LinesOf(const GridAxis& fine, const GridAxis& coarse) {
   return lines;
 }
 
-// The surface between averages, with weights renormalized over valid ones; and the extremes of those around.
+// The surface between averages, with weights renormalized over valid averages, and the extremes of the averages around.
 class Surface {
  public:
   Surface(const CoarseAverages::Grid& grid, bool wraps) : grid_(grid), wraps_(wraps) {}
@@ -52,7 +52,7 @@ class Surface {
     return y.weight > 0 ? upper + y.weight * (Along(x, y.index + 1) - upper) : upper;
   }
 
-  // Of the averages between which a cell of lines lies that starts at this place.
+  // Extremes of the averages around the cell of lines that begins here.
   Corners Around(const GridAxis::Location& x, const GridAxis::Location& y) const {
     Corners corners;
     for (const std::int64_t row : {y.index, std::min(y.index + 1, grid_.rows - 1)}) {
@@ -113,7 +113,7 @@ void AddFactor(const RasterLayout& layout, const CoarseAverages& coarse, int fac
   const auto block = [&](double position, int count) {
     return std::clamp(static_cast<int>(std::floor(position / pixels)), 0, count - 1);
   };
-  // One line alone: the surfaces are constant along that axis.
+  // With a single line, the surfaces are constant along this axis.
   const auto steps = [](const std::vector<Line>& lines) { return std::max<std::size_t>(lines.size() - 1, 1); };
   const auto padded = [](std::vector<Line> lines) {
     if (lines.size() == 1) lines.push_back(lines.front());
@@ -194,7 +194,8 @@ std::size_t RasterStatistics::bytes() const {
 StatisticsAssembler::StatisticsAssembler(const RasterLayout& layout)
     : layout_(layout),
       voids_(layout.columns, layout.height, [this](int row, int first, int last, std::int64_t samples) {
-        // A single sample is filled from its neighbours, which are within the ranges of any box that it counts in.
+        // A hole of one sample is filled from its neighbours, whose heights are in the ranges of every box with this
+        // sample.
         if (samples > 1) statistics_.table.MarkHole(row, first, last);
         statistics_.hole_samples += static_cast<std::uint64_t>(last - first + 1);
       }) {
@@ -256,7 +257,7 @@ void StatisticsAssembler::AddSums(const Chunk& chunk, const ChunkStatistics& chu
 Result<void> StatisticsAssembler::FinishCoarse(GDALDataset& dataset, const std::stop_token& stop) {
   CoarseAverages& coarse = statistics_.coarse;
   if (!coarse.grids.empty()) {
-    // Sums of chunks, by rows: BlockAverages' order.
+    // Adds sums of chunks row by row, in the order of BlockAverages.
     const int columns = DivideUp(layout_.columns, ChunkGrid::kSide), rows = DivideUp(layout_.height, ChunkGrid::kSide);
     for (std::size_t k = 0; k < coarse.grids.size(); ++k) {
       const int chunks = (kLargestDirect << k) / ChunkGrid::kSide;

@@ -10,7 +10,7 @@ namespace terrace::dem {
 namespace {
 
 constexpr std::uint32_t kNoRegion = std::numeric_limits<std::uint32_t>::max();
-// Regions that are numbered before those that have gone are forgotten.
+// Number of regions before those that no longer exist are removed.
 constexpr std::size_t kManyRegions = std::size_t{1} << 20;
 
 }  // namespace
@@ -112,7 +112,7 @@ void RimVoidFinder::GiveUp() {
 
 void RimVoidFinder::AddRun(int chunk_row, std::int32_t first, std::int32_t last) {
   std::vector<Run>& row = band_[static_cast<std::size_t>(chunk_row)];
-  if (!row.empty() && row.back().last + 1 == first) {  // goes on from the chunk before
+  if (!row.empty() && row.back().last + 1 == first) {  // continues the run of the previous chunk
     row.back().last = last;
     return;
   }

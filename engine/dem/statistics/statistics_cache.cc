@@ -29,7 +29,7 @@ constexpr std::uint32_t kCacheVersion = 5;
 constexpr std::uint64_t kFooterMagic = 0x44'4e'45'53'54'41'54'53;  // "STATSEND"
 constexpr std::uint32_t kChunkMagic = 0x4b'4e'48'43;               // "CHNK"
 constexpr std::size_t kHeaderBytes = 36, kChunkHeaderBytes = 32, kFooterBytes = 24;
-constexpr int kMaxUnsynced = 64;                    // chunks: a few seconds of work
+constexpr int kMaxUnsynced = 64;                    // chunks: a few seconds
 constexpr std::uint64_t kMaxHeaderBytes = 1 << 16;  // a few numbers and a line of text
 
 std::uint64_t HashOf(std::string_view bytes) { return XXH3_64bits(bytes.data(), bytes.size()); }
@@ -51,7 +51,7 @@ std::string HeaderOf(const StatisticsShape& shape) {
   return bytes + sum.Take();
 }
 
-// Whether a file begins with a header, and with that of the shape. Then sets the detected nodata of `shape`.
+// Whether a file begins with the header of this shape. If so, sets the detected nodata of `shape`.
 enum class HeaderState { kDamaged, kOther, kSame };
 HeaderState ReadHeader(int file, StatisticsShape& shape, std::uint64_t& bytes) {
   const std::uint64_t size = SizeOf(file);
@@ -76,7 +76,7 @@ HeaderState ReadHeader(int file, StatisticsShape& shape, std::uint64_t& bytes) {
 
 struct ChunkHeader {
   std::uint32_t index = 0, statistics_bytes = 0;
-  std::uint64_t averages_bytes = 0, checksum = 0;  // of the header before it and the statistics
+  std::uint64_t averages_bytes = 0, checksum = 0;  // of the preceding header and the statistics
 
   static ChunkHeader Of(std::string_view bytes) {
     ByteReader reader(bytes);
@@ -125,7 +125,7 @@ void SyncFolderOf(const std::string& path) {
 
 RasterLayout WithDetectedNodata(RasterLayout layout, const DetectedNodata& detected) {
   detected.AddTo(layout.rules);
-  // They were averaged from heights and nodata values.
+  // The overviews were averaged from heights and nodata values.
   if (detected.any()) layout.overview_factors.clear();
   return layout;
 }
@@ -203,7 +203,7 @@ Result<std::optional<StatisticsCacheWriter>> StatisticsCacheWriter::Open(std::sh
       std::this_thread::sleep_for(std::chrono::milliseconds(100));
       continue;
     }
-    // Whoever had the lock before may have renamed the file, or removed it.
+    // The previous owner of the lock may have renamed or removed the file.
     if (const auto opened = IdentityOf(file.get()); !opened || opened != IdentityOf(partial)) continue;
     if (waiting && LoadStatistics(path, shape)) {
       ::unlink(partial.c_str());
@@ -310,8 +310,8 @@ Result<void> StatisticsCacheWriter::Finish(const RasterStatistics& statistics) {
   footer.Put(kFooterMagic);
   if (auto written = Write(bytes); !written) return written;
   if (auto written = Write(footer.Take()); !written) return written;
-  // A file that a power cut has damaged is found and made anew. Where that is quick the disk is not waited for: of
-  // tens of thousands of sources that would be most of the time.
+  // Files damaged by a power failure are detected and made again. If that is quick, the file is not synced: for tens of
+  // thousands of sources, syncing would take most of the time.
   const bool is_waited_for = chunks_.count() > kMaxUnsynced;
   if ((is_waited_for && ::fsync(file_.get()) != 0) || ::rename((path_ + ".partial").c_str(), path_.c_str()) != 0) {
     return MakeError(ErrorCode::kUnavailable, "{}: cannot be finished: {}", path_, ErrorText());

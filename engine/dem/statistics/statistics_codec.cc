@@ -46,7 +46,7 @@ class Reader {
     const std::string_view raw = bytes_.GetBytes(values.size() * sizeof(float));
     if (!raw.empty()) std::memcpy(values.data(), raw.data(), raw.size());
   }
-  // Nothing where the bytes hold fewer than they say.
+  // Returns nothing if there are fewer bytes than stated.
   template <typename T>
   void Size(std::vector<T>& values) {
     const auto count = bytes_.Get<std::uint32_t>();

@@ -18,20 +18,21 @@ constexpr double kAloneWithin = 1'000;  // metres
 // The shore of the Dead Sea is at -433 m, the summit of Mount Everest at 8,849 m, the deepest sea floor at -10,935 m.
 constexpr double kLowestLand = -500, kHighest = 9'000, kDeepest = -12'000;
 constexpr int kReach = 3;  // samples: kernels of resampling reach 2, rounded up for oblique ones
-// Voids say something about the samples near them only where most samples are not near any: one in four at most.
+// Voids are evidence about samples near them only if most samples are not near voids: at most one in four.
 constexpr std::int64_t kDense = 4;
 constexpr double kLeap = 1'000;  // metres between two samples; a nodata value is farther from the ground
-// Resampling mixes all around a void: one in eight of the samples within reach at least.
+// Resampling mixes values all around a void: at least one in eight of the samples within reach.
 constexpr std::int64_t kMixed = 8;
 constexpr int kMixedRim = 2, kCollarRim = 1;
 constexpr int kChunk = 1024;  // samples along a side
 
 // Heights beyond a bound.
 struct Beyond {
-  std::int64_t all = 0, alone = 0, leaps = 0;  // alone: no void nearby; leaps: a neighbour is far off
+  std::int64_t all = 0, alone = 0,
+               leaps = 0;  // alone: no void nearby; leaps: a neighbour differs by more than the leap
 };
 
-// What the second look at a raster counts.
+// Counts of the second pass over a raster.
 struct Evidence {
   std::array<std::int64_t, kUsualNodata.size()> at_value{}, near_value{};
   Beyond below_land, below_sea, above;
@@ -250,7 +251,7 @@ Result<DetectedNodata> FindVoids(GDALRasterBand& band, const SampleRules& rules,
     say("a collar of zeros");
   }
 
-  // What lies beside these voids, and beside the declared ones.
+  // Examines the samples beside these voids and beside declared ones.
   SampleRules found = rules;
   detected.AddTo(found);
   BandScanner beyond(band, found, leap, stop);

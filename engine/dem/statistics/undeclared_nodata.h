@@ -1,7 +1,6 @@
-// Voids that a file does not declare: nodata values left among the heights, values that resampling mixed from them at
-// the edges of voids, and collars of zeros around the data.
-//
-// Real terrain must not be lost: every rule looks at the whole raster, and one sample that speaks against it is enough.
+// Detects voids that a file does not declare: undeclared nodata values, values that resampling mixed from heights and
+// nodata values at the edges of voids, and collars of zeros around the data. Real terrain must not be lost: every rule
+// examines the whole raster and is dropped if a single sample contradicts it.
 #pragma once
 
 #include <algorithm>
@@ -18,32 +17,32 @@ namespace terrace::dem {
 
 struct Chunk;  // raster_chunk.h
 
-// How the zeros of a raster meet other heights, counted while it is scanned.
+// Counts of the zeros of a raster and of their neighbours.
 struct ZeroEdges {
-  std::int64_t high = 0, low = 0;  // pairs of neighbours, one zero and one farther from it than a step, or nearer
-  std::int64_t zeros = 0, at_border = 0;  // all, and those in the outermost rows and columns
-  // The ground, samples that are no zeros: the first and last columns and rows it lies in, and two of its heights that
-  // differ, if there are.
+  std::int64_t high = 0, low = 0;  // pairs of a zero and a nonzero neighbour that differ by more than the step; by less
+  std::int64_t zeros = 0, at_border = 0;  // all zeros; zeros in the outermost rows and columns
+  // The ground, which is all nonzero samples: its first and last columns and rows, and two different heights of it if
+  // there are any.
   std::int32_t west = std::numeric_limits<std::int32_t>::max(), east = -1, north = west, south = -1;
   float lowest = std::numeric_limits<float>::infinity(), highest = -lowest;
 
-  // Metres from a coast's last sea to its first land, at most: 100, and where samples lie far apart, a slope of one in
-  // ten.
+  // The largest height step of a coast in metres, from the last sample of sea to the first of land: 100, or a slope of
+  // one in ten if samples are far apart.
   static double CoastStep(double spacing_m) { return std::max(100.0, spacing_m / 10); }
 
-  // Heights of a chunk of a raster of that size; `stride` values lie from one row to the next.
+  // Adds the heights of a chunk of a raster. `stride`: number of values from one row to the next.
   void Add(const float* heights, std::ptrdiff_t stride, const Chunk& chunk, int raster_width, int raster_height,
            double step_m);
   void Add(const ZeroEdges& other);
 
-  // Zeros that reach the border of a raster of that size, beside nearly all of which the ground is more than a step
-  // off: no sea looks so. They lie in areas or along the border; those strewn over the raster are something else. What
-  // they surround is no single height, and reaches to all four sides of the raster or nearly: a raster is no larger
-  // than its data. A block or an island with cliffs on flat ground at 0 m does not.
+  // Whether the zeros are a collar of a raster of this size. All of these must hold: zeros reach the border; nearly all
+  // differences to neighbouring ground exceed the step, which excludes a sea; zeros form areas or lie along the border,
+  // and are not scattered; the ground has more than one height, and reaches all four sides or nearly, because a raster
+  // is no larger than its data. A block or an island with cliffs on flat ground at 0 m is thus no collar.
   bool IsCollar(int raster_width, int raster_height) const;
 
  private:
-  // Of one row, which begins at that column.
+  // Adds one row that begins at the given column.
   void AddGround(const float* heights, int cols, int raster_col, int raster_row);
 };
 
@@ -57,8 +56,8 @@ struct DetectedNodata {
   void AddTo(SampleRules& rules) const;
 };
 
-// Whether heights in this range, beside `voids` declared ones, may hide undeclared ones: else FindVoids need not look.
-// `has_collar`: ZeroEdges::IsCollar.
+// Whether a raster with this range of heights may have undeclared voids; if not, FindVoids need not be called.
+// `has_voids`: the raster has declared voids. `has_collar`: ZeroEdges::IsCollar.
 bool MayHideVoids(const SampleRules& rules, double lowest, double highest, bool has_voids, bool has_collar);
 
 // Reads the whole band twice more. `coast_step_m`: ZeroEdges::CoastStep of its spacing.
@@ -73,8 +72,7 @@ bool MayHideVoids(const SampleRules& rules, double lowest, double highest, bool 
 //   elsewhere too; there the bound is -12,000 m. If they are an eighth of the samples near voids or more, as after
 //   resampling, all voids grow by 2 samples.
 // - Zeros are voids where they are a collar; voids then grow by one sample, if at most a quarter of all lie near voids.
-//
-// So scattered voids, and voids between sparse data, take no sample beside them away.
+// The limits of a quarter keep the samples beside scattered voids, and sparse data between voids.
 Result<DetectedNodata> FindVoids(GDALRasterBand& band, const SampleRules& rules, bool has_collar, double coast_step_m,
                                  const std::stop_token& stop = {});
 

@@ -20,12 +20,12 @@
 namespace terrace::tin {
 namespace {
 
-// Visits between two looks at the stop token: about a quarter of a millisecond.
+// Visits between two checks of the stop token: about a quarter of a millisecond.
 constexpr std::size_t kPassStopPeriod = 256;
 
-// Samples a side of the blocks that visits finish one by one, so that what a visit touches is in the cache. A field of
-// 257 x 257 samples is one block, its last row and column being border; smaller blocks miss more where a few straight
-// lines are all there is to keep.
+// Samples along a side of a block. Blocks are finished one by one, so that visits stay in the cache. A field of 257 x
+// 257 samples is one block, because its last row and column are border. Smaller blocks drop fewer vertices in fields of
+// a few straight lines.
 constexpr int kPassBlock = 256;
 
 void CheckOptions(const HeightField& field, const DropOptions& options) {
@@ -36,7 +36,7 @@ void CheckOptions(const HeightField& field, const DropOptions& options) {
   TERRACE_CHECK(options.quantized_columns.size() == width && options.quantized_rows.size() == height);
 }
 
-// Together, for the sake of the cache: visits jump across the mesh.
+// Stored together for the cache, because visits jump across the mesh.
 struct Vertex {
   SamplePosition position;
   float height = 0;  // HeightField::VertexHeight
@@ -64,7 +64,7 @@ class DropPass {
   Sagitta sagitta_;
   std::vector<Vertex> vertices_;
   VertexRings rings_;
-  Hole hole_;                         // of the vertex at hand
+  Hole hole_;                         // of the current vertex
   std::vector<std::uint32_t> next_;   // vertices whose stars changed: the next sweep
   std::vector<std::uint8_t> awaits_;  // by vertex: in this sweep and not yet visited, or in next_
 };

@@ -8,14 +8,14 @@
 namespace terrace::tin {
 namespace {
 
-constexpr std::size_t kMaxPool = 0xFFFFFFFF;  // what Ring::begin can name
+constexpr std::size_t kMaxPool = 0xFFFFFFFF;  // limit of Ring::begin
 
 // The side of a triangle across from the vertex whose ring is being made.
 struct Link {
   std::uint32_t from, to;
 };
 
-// Where the chain of links starts: at the end of an open one, at the smallest vertex of a closed one.
+// The start of the chain of links: the end of an open chain, the smallest vertex of a closed one.
 std::size_t Head(std::span<const Link> links, bool closed) {
   std::size_t head = 0;
   for (std::size_t i = 0; i < links.size(); ++i) {
@@ -29,7 +29,7 @@ std::size_t Head(std::span<const Link> links, bool closed) {
 
 // Orders the links of one vertex head to tail and returns whether they close.
 bool Chain(std::span<Link> links) {
-  // Every vertex of a closed chain comes once as `from` and once as `to`; an open one has two that do not.
+  // Every vertex of a closed chain occurs once as `from` and once as `to`; an open chain has two exceptions.
   std::uint32_t unpaired = 0;
   for (const Link& link : links) unpaired ^= link.from ^ link.to;
   const bool closed = unpaired == 0;

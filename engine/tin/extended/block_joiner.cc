@@ -21,7 +21,7 @@ void BlockJoiner::Add(const TinMesh& block_mesh) {
   for (const SamplePosition vertex : block_mesh.vertices) ids_.push_back(IdOf(vertex, block));
   for (const auto& [a, b, c] : block_mesh.triangles) mesh_.triangles.push_back({ids_[a], ids_[b], ids_[c]});
 
-  // Not before all ids of the block are known: these places still held those of its near borders.
+  // Written only when all ids of the block are known, because these entries held the ids of its near borders.
   for (std::size_t i = 0; i < ids_.size(); ++i) {
     const SamplePosition vertex = block_mesh.vertices[i];
     if (vertex.y == block.height - 1) ids_by_x_[static_cast<std::size_t>(block.x) + vertex.x] = ids_[i];
@@ -32,7 +32,7 @@ void BlockJoiner::Add(const TinMesh& block_mesh) {
 std::uint32_t BlockJoiner::IdOf(SamplePosition vertex, const FieldBlock& block) {
   const SamplePosition position{static_cast<std::uint16_t>(block.x + vertex.x),
                                 static_cast<std::uint16_t>(block.y + vertex.y)};
-  // The corner of four blocks is on both; by x it has been replaced already.
+  // The corner of four blocks is in both arrays; the entry by x has been replaced already.
   const bool is_shared_by_y = vertex.x == 0 && block.x > 0, is_shared_by_x = vertex.y == 0 && block.y > 0;
   if (is_shared_by_y || is_shared_by_x) {
     const std::uint32_t id = is_shared_by_y ? ids_by_y_[position.y] : ids_by_x_[position.x];

@@ -9,12 +9,12 @@
 namespace terrace::tin {
 namespace {
 
-// Insertions between two looks at the stop token: well below a millisecond.
+// Insertions between two checks of the stop token: well below a millisecond.
 constexpr std::size_t kExtendedStopPeriod = 256;
 
-// A triangle as one plane for z, r, g and b each, relative to its last corner p and times D, twice its area: a sample
-// at (x, y) from p misses channel c by |D (c - c_p) - (a x + b y)| / D. With colours all of this is exact: D < 2^30,
-// |x|, |y| < 2^15, |a|, |b| < 2^24.
+// A triangle's planes of z, r, g and b, relative to its last corner p and multiplied by D, twice its area. A sample at
+// (x, y) from p differs from channel c by |D (c - c_p) - (a x + b y)| / D. For colours this is exact: D < 2^30, |x|,
+// |y| < 2^15, |a|, |b| < 2^24.
 class Planes {
  public:
   struct Corner {
@@ -130,14 +130,14 @@ void ExtendedGreedy::Scan(TriangleId t) {
   const Planes planes = PlanesOf(triangulation_, colors_, t);
   Candidate worst;
   ForEachRow(corners, [&](int y, int first, int last) {
-    // Vertices are no candidates: rounding may leave them an error, and they end the rows that they lie in.
+    // Vertices, which may have a rounding error, are no candidates. They are the ends of their rows.
     if (first <= last && is_corner(first, y)) ++first;
     if (first <= last && is_corner(last, y)) --last;
     const float* heights = field_->heights().Row(y);
     const ColorSample* colors = field_->ColorRow(y);
     for (int x = first; x <= last; ++x) {
       const double error = planes.Error(*field_, x - corners[2].x, y - corners[2].y, heights[x], colors[x]);
-      if (!(error > worst.error)) continue;  // also at a void; numbers ascend, so that the first of equals stays
+      if (!(error > worst.error)) continue;  // also at a void; numbers ascend, so the first of equals stays
       worst = {error, SampleNumber(x, y)};
     }
   });

@@ -13,22 +13,22 @@ namespace {
 
 constexpr int kSmallestBlockCells = 256;
 
-// How many times the errors on a border between blocks count. A line of samples keeps a bound with vertices three times
-// as far apart as those of a surface, and where a border has few, the fans of slivers along it take more vertices
-// inside the blocks than a denser border has of its own: the best weight lies between 1.3 and 2.
+// Weight of errors on a border between blocks. A line of samples keeps a bound with vertices three times as far apart
+// as a surface. If a border has few vertices, the fans of slivers along it need more vertices inside the blocks than a
+// denser border would have. The best weight lies between 1.3 and 2.
 constexpr BorderOptions kSharedBorder{.weight = 1.5};
 
-// A cut is good while the vertices on its borders are below this share of those estimated for the whole field.
+// A cut is good if the vertices on its borders are below this share of those estimated for the whole field.
 constexpr double kMaxSharedVertices = 0.05;
 
-// No cut is good where fewer are estimated, a third of what it will be: there, where the first of them lie changes the
-// count by more than the borders add, and the whole field is meshed in little time.
+// No cut is good if fewer vertices are estimated (the estimate is a third of the final number): then the position of
+// the first vertices changes the count by more than the borders add, and meshing the whole field takes little time.
 constexpr double kMinVertices = 4000;
 
-// Nor where heights and triangles of the whole field take less: they fit the processor's second cache, or nearly.
+// No cut is good if heights and triangles of the whole field take less: they nearly fit into the second-level cache.
 constexpr double kMinBytes = 2 << 20, kBytesOfSample = 4, kBytesOfEstimatedVertex = 48;
 
-// Where blocks begin along a side of so many samples, and its last sample.
+// The first samples of the blocks along a side, and the side's last sample.
 std::vector<int> CutSide(int samples, int block_cells) {
   const int cells = samples - 1, blocks = std::max(1, (cells + block_cells / 2) / block_cells);
   std::vector<int> cuts;
@@ -36,10 +36,10 @@ std::vector<int> CutSide(int samples, int block_cells) {
   return cuts;
 }
 
-// Vertices that a border between two corners of blocks takes, one of the corners included.
+// The number of vertices of a border between two corners of blocks, including one corner.
 double CountBorderVertices(const HeightField& field, Corner from, Corner to, double max_error_m) {
   double count = 0;
-  std::vector<Corner> ends{to};  // of the edges that are left, the nearest last
+  std::vector<Corner> ends{to};  // of the remaining edges, the nearest last
   while (!ends.empty()) {
     const Candidate worst = WorstBorderSample(field, from, ends.back(), kSharedBorder);
     if (worst.error > max_error_m) {
@@ -59,9 +59,9 @@ struct VertexEstimate {
   double in_blocks = 0;  // borders included
 };
 
-// Blocks count as grids whose lines have as many vertices as the block's borders. A surface needs 1.5 to 3 times that
-// if the blocks are small, the more the coarser; with larger ones, which may be land in a corner only, the estimate is
-// good for nothing.
+// Estimates blocks as grids whose lines have as many vertices as the block's borders. For small blocks, a surface needs
+// 1.5 to 3 times this number, more for coarser meshes. For larger blocks, which may have land only in a corner, the
+// estimate is useless.
 VertexEstimate EstimateVertices(const FieldCut& cut, const HeightField& field, double max_error_m) {
   const auto corner = [&](int x, int y) -> Corner { return {x, y, static_cast<double>(field.VertexHeight(x, y))}; };
   const auto count = [&](const Corner& a, const Corner& b) { return CountBorderVertices(field, a, b, max_error_m); };
@@ -88,8 +88,8 @@ bool IsWorthACut(const HeightField& field, double vertices) {
   return vertices >= kMinVertices && kBytesOfSample * samples + kBytesOfEstimatedVertex * vertices >= kMinBytes;
 }
 
-// The samples of a block as a field of its own. Its corners are vertices of the joined mesh and need the height that
-// they have there. With them a block of voids is a field like any other, which two triangles meet.
+// The samples of a block as a separate field. Its corners are vertices of the joined mesh and get their heights from
+// it. So even a block of voids is a valid field, of two triangles.
 HeightField CopyOf(const HeightField& field, const FieldBlock& block) {
   std::vector<float> heights;
   heights.reserve(static_cast<std::size_t>(block.width) * static_cast<std::size_t>(block.height));
@@ -128,7 +128,7 @@ FieldCut FieldCut::For(const HeightField& field, double max_error_m) {
   VertexEstimate estimate = EstimateVertices(cut, field, max_error_m);
   const double vertices = estimate.in_blocks;
   if (!IsWorthACut(field, vertices)) return {field.width(), field.height(), HeightField::kMaxSide};
-  while (estimate.shared > kMaxSharedVertices * vertices) {  // ends at the latest when nothing is shared
+  while (estimate.shared > kMaxSharedVertices * vertices) {  // ends at the latest when there is one block
     cells *= 2;
     cut = FieldCut(field.width(), field.height(), cells);
     estimate = EstimateVertices(cut, field, max_error_m);

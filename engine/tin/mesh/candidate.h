@@ -1,4 +1,4 @@
-// A sample that may become a vertex, and the order in which samples do.
+// A sample that may become a vertex, and the order in which samples are inserted.
 #pragma once
 
 #include <cstdint>

@@ -36,8 +36,8 @@ float Largest(const float* errors, std::size_t count) {
   return hn::GetLane(hn::MaxOfLanes(floats, hn::Max(most, also)));
 }
 
-// Sorts different words into `sorted`, the largest first: a word comes after as many others as are larger. Reads up to
-// a vector beyond the words.
+// Sorts distinct words into `sorted`, the largest first: the rank of a word is the number of larger ones. Reads up to a
+// vector beyond the words.
 void SortFew(const std::uint64_t* words, std::size_t count, std::uint64_t* sorted) {
   const hn::CappedTag<std::uint64_t, kMaxLanes> tag;
   const std::size_t lanes = hn::Lanes(tag);
@@ -55,7 +55,8 @@ void SortFew(const std::uint64_t* words, std::size_t count, std::uint64_t* sorte
 
 // Writes the indices of errors at or above the threshold, ascending, and up to a vector beyond; returns how many.
 #if HWY_TARGET <= HWY_AVX3
-// Without a branch, where there is an instruction for it: one in a hundred errors is, anywhere.
+// Without branches if the processor has an instruction for it: about one in a hundred errors qualifies, at random
+// positions.
 std::size_t Sweep(const float* errors, std::size_t count, float threshold, std::uint32_t* found) {
   const hn::CappedTag<float, kMaxLanes> floats;
   const hn::RebindToUnsigned<decltype(floats)> slots;
@@ -106,10 +107,10 @@ HWY_EXPORT(Largest);
 HWY_EXPORT(SortFew);
 HWY_EXPORT(Sweep);
 
-constexpr std::size_t kBlock = 64;    // slots: two vectors of the widest there are
+constexpr std::size_t kBlock = 64;    // slots: two vectors of the largest width
 constexpr std::size_t kSwept = 4096;  // slots swept in one go
-constexpr std::size_t kBeyond = 16;   // a vector of the widest: what is written beyond a sweep, read beyond words
-constexpr std::size_t kAhead = 8;     // entries: their slots are fetched so early
+constexpr std::size_t kBeyond = 16;   // a vector of the largest width: written beyond a sweep, read beyond words
+constexpr std::size_t kAhead = 8;     // entries: how early slots are prefetched
 constexpr std::ptrdiff_t kNear = 8;   // entries looked at one by one
 constexpr std::size_t kRoom = 32;     // entries that fit before those that a sweep found
 constexpr std::size_t kFew = 64;      // words: hwy::Sorter asks the system for random numbers, however few there are
@@ -139,10 +140,10 @@ std::uint32_t CandidateQueue::Winner() {
 bool CandidateQueue::Refill() {
   if (entered_ > 2 * wanted_) step_ = std::sqrt(step_);
   if (entered_ < wanted_ / 2) step_ = std::max(step_ * step_, 0.25);
-  // A sweep costs a cycle for every 16 slots or so, an entry one for every few that it is put before.
+  // A sweep costs about a cycle per 16 slots; inserting an entry costs about a cycle per few entries behind it.
   wanted_ = std::max(kMinWanted, static_cast<std::size_t>(3 * std::sqrt(static_cast<double>(errors_.size()))));
   entered_ = 0;
-  // What is left lies below the threshold, most often just below.
+  // The remaining candidates are below the threshold, usually just below.
   if (SweepFrom(threshold_)) return true;
   const float largest = HWY_DYNAMIC_DISPATCH(Largest)(errors_.data(), errors_.size());
   if (SweepFrom(std::min(largest, std::numeric_limits<float>::max()))) return true;
@@ -171,8 +172,8 @@ bool CandidateQueue::SweepFrom(float most) {
   return true;
 }
 
-// Appends what was swept to the run. Errors that are close to each other, samples of a tile and places among the swept
-// slots, which ascend, fit one word together, and twice as many words as pairs fit a vector.
+// Appends the swept slots to the run. If errors are close to each other, an error, a sample of a tile and the index of
+// a swept slot fit into one word, and a vector has twice as many words as pairs.
 void CandidateQueue::SortSwept() {
   const std::uint32_t least = std::bit_cast<std::uint32_t>(threshold_);
   std::uint32_t beyond = 0, samples = 0;
@@ -215,7 +216,7 @@ void CandidateQueue::SortPairs() {
 void CandidateQueue::Insert(std::uint32_t slot) {
   const Entry entry{OrderOf(slot), slot};
   const auto precedes = [&](const Entry& other) { return other.order > entry.order; };
-  // Two in three come before all others, nine in ten before all but a few.
+  // Two in three entries become the first, nine in ten are among the first few.
   const auto front = run_.begin() + static_cast<std::ptrdiff_t>(run_begin_);
   const auto near = front + std::min<std::ptrdiff_t>(run_.end() - front, kNear);
   auto place = std::find_if_not(front, near, precedes);
@@ -232,9 +233,8 @@ void CandidateQueue::Insert(std::uint32_t slot) {
   if (run_.size() - run_begin_ > 4 * wanted_) Shorten();
 }
 
-// Lets go of the hindmost half. Equal errors go or stay together: the threshold tells them apart from others only.
-// Where heights are whole metres, the hindmost half may well be equal throughout: that must not take a look at each of
-// them.
+// Drops the last half. Equal errors must stay or go together, because only the threshold separates them. If heights are
+// whole metres, all errors of the last half may be equal: finding their beginning must not take linear time.
 void CandidateQueue::Shorten() {
   const auto error_of = [](const Entry& entry) { return static_cast<std::uint32_t>(entry.order >> 32); };
   const std::uint32_t least = error_of(run_[run_begin_ + 2 * wanted_ - 1]);

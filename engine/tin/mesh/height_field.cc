@@ -13,9 +13,9 @@
 namespace terrace::tin {
 namespace {
 
-// Rows a page apart, or nearly, put a column into one set of the first cache, which has room for a dozen lines: a
-// triangle of more rows would push out its own samples. An odd number of cache lines spreads them. Rows of tiles are
-// shorter, and lie without gaps.
+// If rows are about a page apart, the samples of a column share one set of the first-level cache, which has about a
+// dozen lines: a triangle with more rows would evict its own samples. A stride of an odd number of cache lines avoids
+// this. Rows of tiles are shorter and stored without gaps.
 std::size_t StrideFor(int width) {
   constexpr std::size_t kSamplesOfLine = 16, kShortRow = 512, kSets = 64, kMaxRowsOfSet = 4;
   const auto samples = static_cast<std::size_t>(width);
@@ -59,7 +59,7 @@ HeightField::HeightField(int width, int height, std::vector<float> heights, bool
       patches_along_y_((height - 1) / kPatchSide + 1) {
   constexpr double kMaxQuanta = 0x1p22, kMaxNumerator = 0x1p31 - 1;
   const double relief = relief_m / static_cast<double>(quantum_);
-  // Whole metres are exact in single precision up to triangles so large that few are, and it is quicker.
+  // For whole metres, single precision is exact except for very large triangles, and faster.
   if (quantum_ > 0 && quantum_ < 1 && !has_voids_ && relief < kMaxQuanta) {
     most_area_in_integers_ = static_cast<float>(std::floor(kMaxNumerator / std::max(relief, 0x1p8)));
   }
@@ -78,7 +78,7 @@ HeightField::HeightField(int width, int height, std::vector<float> heights, bool
   }
 }
 
-// From rows without gaps to rows that are `stride_` apart, and what may be read beyond the last.
+// Moves rows without gaps to rows that are `stride_` apart, and adds padding after the last.
 void HeightField::LayOut() {
   constexpr std::size_t kSamplesOfVector = 16, kRowsOfBlock = 8;
   const float none = std::numeric_limits<float>::quiet_NaN();
@@ -98,7 +98,7 @@ void HeightField::LayOut() {
 
 float HeightField::NearestHeight(int x, int y) const {
   // Rings of growing Chebyshev distance r, in patches: every sample on ring r is at least (r - 1) kPatchSide + 1 away.
-  // What was found nearer than that cannot be beaten any more; what is just as far can still be tied.
+  // A sample that is nearer than that is final; one at exactly this distance may still be tied.
   Nearest nearest{std::numeric_limits<std::int64_t>::max(), 0, 0};
   const int own_column = x / kPatchSide, own_row = y / kPatchSide;
   for (int r = 0; r < std::max(patches_along_x_, patches_along_y_); ++r) {

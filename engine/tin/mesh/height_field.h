@@ -49,8 +49,8 @@ class HeightField {
   // integers or have no need to.
   float most_area_in_integers() const { return most_area_in_integers_; }
 
-  // The height of a vertex at (x, y): the sample, or the nearest valid sample if that is void, which only corners and
-  // seeds can be. Ties go to the smaller row, then column.
+  // The height of a vertex at (x, y): its sample, or the nearest valid sample if its sample is void. Only corners and
+  // seeds can be void. Ties go to the smaller row, then column.
   float VertexHeight(int x, int y) const {
     const float own = At(x, y);
     return std::isnan(own) ? NearestHeight(x, y) : own;
@@ -79,7 +79,7 @@ class HeightField {
   std::size_t stride_ = 0;
   std::vector<float> heights_;  // NaN between rows
   int patches_along_x_ = 0, patches_along_y_ = 0;
-  std::vector<bool> has_height_;  // by patch, row by row; empty where there are no voids
+  std::vector<bool> has_height_;  // by patch, row by row; empty if there are no voids
 };
 
 }  // namespace terrace::tin

@@ -7,7 +7,7 @@
 namespace terrace::tin {
 
 std::span<const std::size_t> Hole::Fans(double max_error) {
-  // All fans of a triangle are one, and opposite apexes of a quadrilateral have the same.
+  // All fans of a triangle are equal, and opposite apexes of a quadrilateral give equal fans.
   const std::size_t different = sides_ == 3 ? 1 : sides_ == 4 ? 2 : sides_;
   std::array<double, kMaxSides> errors;
   std::size_t count = 0;
@@ -34,7 +34,7 @@ bool Hole::IsCounterClockwise(std::size_t apex) const {
   return true;
 }
 
-// The vertex lies between the spokes to b and c of one triangle, on either at most.
+// The vertex lies in one triangle, between the spokes to b and c or on one of them.
 double Hole::ErrorAtVertex(std::size_t apex) const {
   if (std::isnan(height_)) return 0;
   std::size_t i = 0;

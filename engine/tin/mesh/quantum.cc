@@ -12,8 +12,9 @@ HWY_BEFORE_NAMESPACE();
 namespace terrace::tin {
 namespace HWY_NAMESPACE {
 
-// How many heights are multiples of the quantum before one is none. Voids count as multiples: of NaN alone it is not
-// true that it equals itself. Numbers from 2^30 steps on are none: their conversion to integers may be undefined.
+// The number of leading heights that are multiples of the quantum. Voids count as multiples: NaN is the only value that
+// does not equal itself. Numbers from 2^30 quanta on do not count, because their conversion to integers may be
+// undefined.
 std::size_t CountMultiples(const float* heights, std::size_t count, float quantum) {
   namespace hn = hwy::HWY_NAMESPACE;
   const hn::CappedTag<float, 16> floats;
@@ -46,7 +47,7 @@ namespace {
 
 HWY_EXPORT(CountMultiples);
 
-// Whole metres, the server's own rounding, and the steps of 32-bit data of low ground.
+// Whole metres, the server's rounding, and the steps of 32-bit data of low ground.
 constexpr std::array<float, 3> kQuanta = {1, 0x1p-10F, 0x1p-14F};
 
 }  // namespace

@@ -28,7 +28,7 @@
 namespace terrace::tin {
 namespace {
 
-// A block's size stands in the line before it; the line after it is nobody's.
+// A block's size is stored in the cache line before it; the line after it is unused.
 constexpr std::size_t kLine = 64;
 constexpr std::size_t kPage = 4096;
 constexpr std::size_t kMaxBlocks = 16;
@@ -41,7 +41,7 @@ std::size_t SizeOf(const void* block) {
 
 std::size_t MappedFor(std::size_t bytes) { return (bytes + 2 * kLine + kPage - 1) / kPage * kPage; }
 
-// Of a mapping, new or moved.
+// For a mapping, new or moved.
 void* BlockIn(void* mapping, std::size_t bytes) {
   if (mapping == MAP_FAILED) throw std::bad_alloc();
   auto* const line = static_cast<std::byte*>(mapping);
@@ -64,7 +64,7 @@ void DeleteBlock(void* block) noexcept {
 
 void* MoveBlock(void* block, std::size_t bytes) {
 #ifdef TERRACE_HAS_TSAN
-  // It sees mmap and munmap, but not that mremap leaves addresses to the next thread that asks.
+  // ThreadSanitizer tracks mmap and munmap, but not that mremap frees addresses for other threads.
   void* const moved = NewBlock(bytes);
   std::memcpy(moved, block, SizeOf(block));
   DeleteBlock(block);
@@ -77,7 +77,7 @@ void* MoveBlock(void* block, std::size_t bytes) {
 #endif
 }
 
-// Whether this thread's store is no more: what outlives it frees its arrays itself.
+// Whether this thread's store was destroyed: arrays that outlive it are freed directly.
 thread_local bool is_closed = false;
 
 // Oldest first.

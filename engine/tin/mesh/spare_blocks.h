@@ -1,8 +1,7 @@
-// Memory for the large arrays of a run. It grows without copies, occupies only what was written to, and is kept by the
-// thread for its next run. New pages must be cleared by the system, which costs a small run more than its queue does.
-//
-// Blocks come from the system (mmap): room that is never used takes addresses and no memory. A block may be given back
-// by another thread than the one that took it; that thread then keeps it.
+// Memory for the large arrays of a run. It grows without copies, occupies only the pages that were written to, and
+// stays with the thread for its next run. New pages must be cleared by the system, which costs a small run more time
+// than its queue does. Blocks come from the system (mmap): unused capacity takes addresses but no memory. A block may
+// be given back by another thread than the one that took it; it then stays with that thread.
 #pragma once
 
 #include <algorithm>
@@ -15,24 +14,24 @@
 
 namespace terrace::tin {
 
-// What a thread keeps at most, by size.
+// The largest total size of blocks that a thread keeps.
 inline constexpr std::size_t kMaxSpareBytes = std::size_t{8} << 20;
 
-// A block of at least so many bytes, aligned to a cache line; throws std::bad_alloc.
+// Returns a block of at least `bytes` bytes, aligned to a cache line. Throws std::bad_alloc.
 void* TakeBlock(std::size_t bytes);
-// Returns a block of the new size with the first `used` bytes of `block`: `block` itself, grown, or another one in its
-// place.
+// Returns a block of the new size with the first `used` bytes of `block`: `block` itself, grown, or a new block that
+// replaces it.
 void* GrowBlock(void* block, std::size_t used, std::size_t bytes);
 void GiveBlock(void* block) noexcept;
-// The same, but the thread does not keep it: its memory goes back to the system at once.
+// Like GiveBlock, but returns the memory to the system at once.
 void ReleaseBlock(void* block) noexcept;
 
-// The bytes that this thread keeps, and their release. For measurements of a run's memory.
+// The bytes that this thread keeps; and a function that releases them. For measurements of a run's memory.
 std::size_t SpareBytes();
 void ReleaseSpareBlocks();
 
-// An array of plain values in such a block. Reserving is cheap: reserve for the largest likely size. Runs of fields of
-// one size then find blocks that fit.
+// An array of trivially copyable values in such a block. Reserving is cheap: reserve the largest likely size, so that
+// later runs of the same size reuse the block.
 template <typename T>
 class LargeArray {
   static_assert(std::is_trivially_copyable_v<T> && std::is_trivially_destructible_v<T>);
@@ -74,14 +73,14 @@ class LargeArray {
       reserve(std::max(size_ + count, 2 * capacity_));
     size_ += count;
   }
-  // Grows to a size, which is not smaller than the present one, and sets the values that are added.
+  // Grows to `size` and sets the added values. Precondition: `size` is at least the current size.
   void GrowTo(std::size_t size, const T& value) {
     const std::size_t before = size_;
     GrowBy(size - before);
     std::fill(values_ + before, values_ + size, value);
   }
-  // Empties the array and gives its memory back to the system, not to the thread. For an array that a large run has
-  // outgrown.
+  // Empties the array and returns its memory to the system, not to the thread. For an array that is no longer needed at
+  // this size.
   void Release() {
     if (values_ != nullptr) ReleaseBlock(values_);
     values_ = nullptr;

@@ -36,8 +36,8 @@ Triangulation::Triangulation(const std::vector<Vertex>& vertices,
   Grow();
 }
 
-// Half-edges sorted by the corner they start from, those that go up in ids: the twin of (b, a) is found among the few
-// that start from a.
+// Half-edges to a larger id, sorted by the corner that they start from: the twin of (b, a) is among the few that start
+// from a.
 template <typename Triangles>
 void Triangulation::Join(Triangles& triangles, const std::vector<std::array<std::uint32_t, 3>>& corners) {
   const auto for_each_edge = [&](auto&& visit) {
@@ -52,7 +52,7 @@ void Triangulation::Join(Triangles& triangles, const std::vector<std::array<std:
   for (const auto& [a, b, c] : corners) {
     triangles.slots.push_back(Triangles::Triangle::Of(a, b, c, Triangles::kNone, Triangles::kNone, Triangles::kNone));
   }
-  // Without a branch: which way an edge goes cannot be predicted.
+  // Without branches: the direction of an edge would be mispredicted.
   std::vector<std::uint32_t> ends(vertices_.size() + 1, 0);
   for_each_edge([&](VertexId a, VertexId b, HalfEdgeId) { ends[a + std::size_t{1}] += a < b ? 1 : 0; });
   for (std::size_t vertex = 0; vertex < vertices_.size(); ++vertex) ends[vertex + 1] += ends[vertex];
@@ -62,7 +62,7 @@ void Triangulation::Join(Triangles& triangles, const std::vector<std::array<std:
   };
   const std::uint32_t unused = ends.back();
   std::vector<Rising> rising(unused + std::size_t{1});
-  // Where those of a vertex begin becomes where they end.
+  // The begin of each vertex's half-edges advances to their end.
   for_each_edge([&](VertexId a, VertexId b, HalfEdgeId edge) {
     rising[a < b ? ends[a] : unused] = {b, edge};
     ends[a] += a < b ? 1 : 0;
@@ -79,8 +79,8 @@ void Triangulation::Join(Triangles& triangles, const std::vector<std::array<std:
   });
 }
 
-// The in-circle test says yes where the point lies on the edge, which is inside the circle, and no where w is not seen:
-// a circle without vertices ends beyond the edge where the edge's own ends do.
+// The in-circle test is true if the point lies on the edge, which is inside the circle, and false if w is not visible:
+// an empty circle lies beyond the edge only between the edge's ends.
 const Star& Triangulation::InsertDelaunay(const Vertex& vertex, TriangleId triangle) {
   return Insert(vertex, triangle, [](const RingVertex& u, const RingVertex& v, const RingVertex& w, HalfEdgeId) {
     return IsInsideCircle(v, u, w);
@@ -96,7 +96,7 @@ void Triangulation::Grow() {
 }
 
 void Triangulation::Remove(TriangleId t) {
-  if (star_.removed_count + 5 > pending_.size()) Grow();  // as for the walk
+  if (star_.removed_count + 5 > pending_.size()) Grow();  // capacity as for the walk
   star_.triangles[star_.removed_count++] = t;
 }
 
@@ -110,7 +110,7 @@ void Triangulation::Widen() {
   is_wide_ = true;
 }
 
-// Inline by order: to g++ a function that only prefetches has no effect, and calls of it are left out.
+// always_inline, because g++ takes a function that only prefetches for one without effect and drops its calls.
 template <typename Triangles>
 [[gnu::always_inline]] inline void Triangulation::PrefetchAround(const Triangles& triangles, TriangleId t) const {
   const auto* const slots = triangles.slots.data();
@@ -142,7 +142,7 @@ void Triangulation::PrefetchBeyond(TriangleId t) const {
   is_wide_ ? PrefetchBeyond(wide_, t) : PrefetchBeyond(narrow_, t);
 }
 
-// Lets the ring begin after the edge that holds the centre.
+// Makes the ring begin after the edge that contains the centre.
 void Triangulation::OpenRing(std::size_t edges) {
   const auto first = static_cast<std::ptrdiff_t>(star_.gap + 1), count = static_cast<std::ptrdiff_t>(edges);
   const auto turn = [=](auto& values) { std::rotate(values.begin(), values.begin() + first, values.begin() + count); };

@@ -124,7 +124,7 @@ class Triangulation {
   // The vertex relative to `from`, as in a ring.
   RingVertex Seen(VertexId vertex, SamplePosition from) const { return Relative(vertices_.data(), vertex, from); }
 
-  // The corner where a half-edge starts, and its twin.
+  // The corner where a half-edge starts; the twin of a half-edge.
   VertexId corner(HalfEdgeId edge) const {
     return is_wide_ ? wide_.slots[edge / 4].corner(edge % 4) : narrow_.slots[edge / 4].corner(edge % 4);
   }
@@ -166,7 +166,7 @@ class Triangulation {
   void PrefetchBeyond(const Triangles& triangles, TriangleId t) const;
   template <typename Triangles>
   void Join(Triangles& triangles, const std::vector<std::array<std::uint32_t, 3>>& corners);
-  // The first edge of a triangle that has the point on its other side; none when the triangle contains it.
+  // The first edge of a triangle that has the point on its other side; none if the triangle contains the point.
   std::optional<HalfEdgeId> EdgeTowards(SamplePosition point, TriangleId t) const;
   void Widen();
   void Grow();
@@ -184,12 +184,11 @@ class Triangulation {
 constexpr std::int32_t Cross(const RingVertex& a, const RingVertex& b) { return a.dx * b.dy - a.dy * b.dx; }
 
 // Whether the point p that u, v and w are relative to lies strictly inside the circle through v, u and w, which turn
-// counter-clockwise: the in-circle test of predicates.h, its sum taken apart in another way. With the angles at p and
-// at w over the chord (u, v), the point is inside when they are more than a half turn together: when the sine of their
-// sum, times four lengths, is negative. Two of the four factors do not wait for w.
-//
-// Width: differences of coordinates are below S = 2^15, so each factor is below 2 S^2 = 2^31 in magnitude, by 2^17 or
-// so, and the sum of two products below 2^63.
+// counter-clockwise. This is the in-circle test of predicates.h in another form: p is inside if the angles at p and at
+// w over the chord (u, v) add up to more than half a turn, that is, if the sine of their sum, times four lengths, is
+// negative. Two of the four factors do not depend on w, so they are computed while w is loaded. Width: differences of
+// coordinates are below S = 2^15, so each factor is below 2 S^2 = 2^31 in magnitude, with a margin of about 2^17, and
+// the sum of two products is below 2^63.
 constexpr bool IsInsideCircle(const RingVertex& v, const RingVertex& u, const RingVertex& w) {
   const std::int32_t ax = u.dx - w.dx, ay = u.dy - w.dy, bx = v.dx - w.dx, by = v.dy - w.dy;
   const std::int32_t sine_at_p = u.dx * v.dy - u.dy * v.dx, cosine_at_p = u.dx * v.dx + u.dy * v.dy;
@@ -235,7 +234,7 @@ void Triangulation::Replace(Triangles& triangles, SamplePosition point, Triangle
   const Vertex* const vertices = vertices_.data();
   PendingEdge* const stack = pending_.data();
   std::size_t capacity = pending_.size();
-  // Of an edge on the border it is some address, which does no harm.
+  // For an edge on the border the address is arbitrary, which is harmless.
   const auto prefetch = [address = reinterpret_cast<std::uintptr_t>(slots)](HalfEdgeId across) {
     __builtin_prefetch(reinterpret_cast<const void*>(address + sizeof(slots[0]) * (across / 4)));
   };
@@ -248,7 +247,7 @@ void Triangulation::Replace(Triangles& triangles, SamplePosition point, Triangle
   // Inside or on one edge; on two edges it would be a corner.
   TERRACE_CHECK(sides[0] >= 0 && sides[1] >= 0 && sides[2] >= 0);
   TERRACE_CHECK((sides[0] == 0) + (sides[1] == 0) + (sides[2] == 0) <= 1);
-  // The walk waits for triangles from all over the memory: the three that it certainly visits together.
+  // Triangles are scattered in memory. Prefetches the three neighbours that the walk visits in any case.
   for (std::size_t i = 1; i <= 3; ++i) prefetch(stack[i].back);
 
   star_.is_closed = true;
@@ -262,7 +261,7 @@ void Triangulation::Replace(Triangles& triangles, SamplePosition point, Triangle
       const auto& beyond = slots[back / 4];
       const RingVertex w = Relative(vertices, beyond.opposite(back % 4), point);
       if (absorbs(u, top->end, w, back)) {
-        if (removed + 5 > capacity) {  // edges found and pending are two more than triangles removed
+        if (removed + 5 > capacity) {  // edges found and pending are at most the removed triangles plus two
           const auto pending = top - bottom;
           Grow();
           bottom = pending_.data();
@@ -277,7 +276,7 @@ void Triangulation::Replace(Triangles& triangles, SamplePosition point, Triangle
         top->back = across_wv;
         ++top;
         top->back = across_uw;
-        top->end = {w.id, w.dx, w.dy, w.height};  // as a whole it is put together in memory, absorbed or not
+        top->end = {w.id, w.dx, w.dy, w.height};  // a copy of w as a whole would go through memory, absorbed or not
         continue;
       }
     } else {
@@ -315,7 +314,7 @@ inline const Star& Triangulation::Fill() {
 template <typename Triangles>
 void Triangulation::FillCavity(Triangles& triangles) {
   const std::size_t edges = star_.count;
-  TriangleId* const made = star_.triangles.data();  // those of what was removed come first, and are there
+  TriangleId* const made = star_.triangles.data();  // the slots of removed triangles come first and are set already
   const auto appended = static_cast<TriangleId>(triangles.slots.size());
   TERRACE_CHECK(appended < kNone / 4 - 2);
   for (std::size_t i = star_.removed_count; i < edges; ++i) {
@@ -323,7 +322,7 @@ void Triangulation::FillCavity(Triangles& triangles) {
   }
   triangles.slots.GrowBy(edges - star_.removed_count);
 
-  made[edges] = made[0];  // what follows the last one
+  made[edges] = made[0];  // the triangle after the last one
 
   auto* const slots = triangles.slots.data();
   const VertexId* const ids = star_.ring.ids.data();

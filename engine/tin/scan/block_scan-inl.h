@@ -1,5 +1,5 @@
-// The scan of small triangles: a star's planes worked out together, then each triangle as a block of samples, a few
-// rows to a vector. Compiled once for each set of instructions; part of triangle_scan.cc.
+// The scan of small triangles: computes the planes of a star together, then scans each triangle as a block of samples
+// with a few rows per vector. Compiled once for each instruction set; part of triangle_scan.cc.
 #if defined(TERRACE_ENGINE_TIN_BLOCK_SCAN_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TERRACE_ENGINE_TIN_BLOCK_SCAN_INL_H_
 #undef TERRACE_ENGINE_TIN_BLOCK_SCAN_INL_H_
@@ -24,7 +24,7 @@ namespace terrace::tin {
 namespace HWY_NAMESPACE {
 namespace {
 
-// Blocks of kSide x kSide samples, a few rows to a vector.
+// Blocks of kSide x kSide samples, a few rows per vector.
 constexpr int kMaxLanes = 16;
 HWY_ALIGN constexpr float kColumnsBy4[kMaxLanes] = {0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3};
 HWY_ALIGN constexpr float kRowsBy4[kMaxLanes] = {0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3};
@@ -54,19 +54,19 @@ HWY_INLINE Floats RowsFrom(const float* from, int stride) {
   }
 }
 
-// Doubled areas, and what barycentric coordinates are computed from, stay below 2^24.
+// Keeps doubled areas, and the terms of barycentric coordinates, below 2^24.
 constexpr int kMaxExtent = 2048;
-// Beyond it single precision may overflow.
+// Above this, single precision may overflow.
 constexpr float kMaxMagnitude = 0x1p100F;
 
-// All bits where one of the barycentric coordinates has a sign: NaN, which no comparison holds for. None is zero, as
-// they lie halfway between integers.
+// Sets all bits, which is NaN, in lanes where one of the barycentric coordinates is negative; comparisons with NaN are
+// false. No coordinate is zero, because they lie halfway between integers.
 HWY_INLINE Floats NaNWhereNegative(Floats a, Floats b, Floats c) {
   const NumberTag<FloatsTag> ints;
   return hn::BitCast(kFloats, hn::ShiftRight<31>(hn::BitCast(ints, hn::Or3(a, b, c))));
 }
 
-// The triangles of a star, as many at once as there are lanes, in single precision.
+// The planes of as many triangles of a star as there are lanes, in single precision.
 struct StarPlanes {
   static constexpr std::size_t kMost = hn::MaxLanes(kFloats);
 
@@ -90,7 +90,7 @@ struct StarPlanes {
     const auto wide = hn::Sub(high_x, low_x), high = hn::Sub(high_y, low_y), extent = hn::Max(wide, high);
     const auto is_small = hn::Lt(extent, All(kInts, 4)), is_block = hn::Lt(extent, All(kInts, kLargeSide));
     auto from_x = low_x, from_y = low_y, reach_x = wide, reach_y = high;
-    // A block that would end beyond the field begins earlier.
+    // Moves blocks that would end beyond the field.
     if (star.x + kLargeSide > field.width() || star.y + kLargeSide > field.height()) {
       const auto side = hn::IfThenElse(is_small, All(kInts, 4), All(kInts, kLargeSide));
       const auto latest = [&](int at, int size)
@@ -116,7 +116,7 @@ struct StarPlanes {
     hn::Store(from_y, kInts, south);
     hn::Store(wide, kInts, width);
     hn::Store(high, kInts, height);
-    // No column or row of the triangle, nor where its block begins, is further from p.
+    // The largest distances from p of the triangle's columns and rows and of its block.
     const Floats across = hn::ConvertTo(kFloats, reach_x), up = hn::ConvertTo(kFloats, reach_y);
     const Floats of_x = hn::Add(hn::Abs(vy_uz), hn::Abs(uy_vz)), of_y = hn::Add(hn::Abs(ux_vz), hn::Abs(vx_uz));
     const Floats most_plane = hn::Add(hn::Mul(hn::Abs(of_a), across), hn::Mul(hn::Abs(of_b), up));
@@ -125,7 +125,7 @@ struct StarPlanes {
     hn::Store(of_magnitude, kFloats, magnitude);
 
     const auto is_exact = hn::RebindMask(kFloats, hn::Lt(extent, All(kInts, kMaxExtent + 1)));  // as of_d is
-    // Pick's theorem: with 1, none but its corners.
+    // Pick's theorem: a triangle of doubled area 1 has no samples but its corners.
     const auto has_samples = hn::Or(hn::Ne(of_d, All(kFloats, 1)), hn::Not(is_exact));
     const auto is_tame = hn::And(hn::Lt(of_magnitude, All(kFloats, kMaxMagnitude)), is_exact);
     const std::uint32_t lanes = BitsOf(kFloats, has_samples), tame = lanes & BitsOf(kFloats, is_tame);
@@ -136,17 +136,18 @@ struct StarPlanes {
   }
 
   HWY_ALIGN float ux[kMost], uy[kMost], vx[kMost], vy[kMost], d[kMost], a[kMost], b[kMost];
-  // Where the block begins, which for others is the south-west corner of the bounding box: barycentric coordinates of u
-  // and v, plus 1/2, and A x + B y. The sum is that of all three, plus 3/2. Less 1 for each edge on the border.
+  // At the first sample of the block, or of the bounding box for triangles that are no blocks: barycentric coordinates
+  // of u and v, plus 1/2, and A x + B y. `sum`: of all three coordinates, plus 3/2. Each edge on the border
+  // subtracts 1.
   HWY_ALIGN float u[kMost], v[kMost], sum[kMost], plane[kMost];
-  HWY_ALIGN float largest[kMost];                      // no product or sum of the planes' is larger
-  HWY_ALIGN float magnitude[kMost];                    // what rounding errors are relative to
-  HWY_ALIGN std::int32_t west[kMost], south[kMost];    // where the block or the bounding box begins
+  HWY_ALIGN float largest[kMost];                      // bound on all products and sums of the plane
+  HWY_ALIGN float magnitude[kMost];                    // the magnitude that rounding errors are relative to
+  HWY_ALIGN std::int32_t west[kMost], south[kMost];    // first column and row of the block or the bounding box
   HWY_ALIGN std::int32_t width[kMost], height[kMost];  // of the bounding box
   std::uint32_t small, medium, large, wild;            // sets of lanes
 
  private:
-  // Samples on an edge that lies on the field's border shall be outside.
+  // Makes samples on an edge along the field's border lie outside.
   HWY_INLINE void LeaveBorderOut(const HeightField& field, const Star& star, Ints u_x, Ints u_y, Ints v_x, Ints v_y) {
     const auto is_along = [](Ints a, Ints b, int at, int size) HWY_ATTR {
       const auto is_end = hn::Or(hn::Eq(a, All(kInts, -at)), hn::Eq(a, All(kInts, size - 1 - at)));
@@ -167,26 +168,27 @@ struct StarPlanes {
 };
 
 // Single precision against double. With u = 2^-24 and the numerator N = |D (h - z_p) - (A x + B y)|, two roundings are
-// relative to D (h - z_p), which is at most N + magnitude; four to A x and B y, five with their sum; one to N: all in
-// all 3 u N + 7 u magnitude, and double's own errors are nothing beside that. A sample that is the furthest in double
-// therefore is within 2^-20 (N + magnitude) of the furthest in single precision. Nothing underflows: every factor but
-// one is an integer.
+// relative to D (h - z_p), which is at most N + magnitude; five are relative to A x + B y and its terms; one to N. The
+// total is 3 u N + 7 u magnitude; the errors of double are negligible. A sample that is the furthest in double is
+// therefore within 2^-20 (N + magnitude) of the furthest in single precision. Nothing underflows: every factor but one
+// is an integer.
 constexpr float kDoubt = 0x1p-20F;
 
-// In blocks a plane begins at the box's corner, goes on to the lane, and steps from there, up to seven times: 3 u N and
-// less than 24 u magnitude, fused or not. Two samples that are compared may be off in opposite ways.
+// In blocks a plane is evaluated at the block's corner, then at the lane, and then stepped up to seven times. The error
+// is below 3 u N + 24 u magnitude, fused or not. Two samples that are compared may have errors of opposite sign.
 constexpr float kDoubtInBlocks = 0x1p-18F;
 
-// The smallest numerator that may be the largest one in double, once the largest in single precision is known. Where
-// that is exact, no other. Never negative, however large the heights: what is below zero is no sample of the triangle.
+// Given the largest numerator in single precision, returns the smallest numerator that may be the largest in double;
+// the same one if single precision is exact. Never negative, because negative numerators are not samples of the
+// triangle.
 HWY_INLINE float LeastInDoubt(float most, float largest, float magnitude, float most_exact, float doubt) {
   const float least = std::max(most - doubt * (most + magnitude), 0.0F);
   return most + largest < most_exact ? most : least;
 }
 
-// One block, from (west, south) relative to p: the largest numerator, negative if there is no sample, and which samples
-// are as large as that or may be, row by row. No branch, as which triangle lies where in its block cannot be predicted,
-// but for doubts, which come in runs or are rare.
+// Scans one block from (west, south) relative to p. `most`: the largest numerator, negative if there is no sample.
+// `found`: bits of the samples that have it, or may have it in double, row by row. Branches only for inexact results,
+// which come in runs or are rare; other branches would be mispredicted.
 struct BlockFind {
   float most;
   std::uint64_t found;

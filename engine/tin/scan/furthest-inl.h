@@ -1,5 +1,5 @@
-// The furthest sample of those that a scan visits, in vectors of doubles, floats or integers. Compiled once for each
-// set of instructions; part of triangle_scan.cc.
+// The furthest sample that a scan visits, in vectors of doubles, floats or integers. Compiled once for each instruction
+// set; part of triangle_scan.cc.
 #if defined(TERRACE_ENGINE_TIN_FURTHEST_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TERRACE_ENGINE_TIN_FURTHEST_INL_H_
 #undef TERRACE_ENGINE_TIN_FURTHEST_INL_H_
@@ -21,10 +21,10 @@ namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Everything is evaluated in double, in single precision or in integers, whichever is quickest and gives the same.
-// Single is as good as double for most triangles: all heights are multiples of a quantum (HeightField::quantum), so all
-// numbers that the formula adds and multiplies are, and every multiple up to 2^24 times the quantum is a float. Where
-// that may be exceeded, it is double, or integers.
+// Everything is evaluated in double, in single precision or in integers: the fastest of those that give the exact
+// result. Single precision is exact for most triangles: all heights are multiples of a quantum (HeightField::quantum),
+// so are all terms of the formula, and every multiple up to 2^24 quanta is a float. If terms may be larger, double or
+// integers are used.
 using DoublesTag = hn::CappedTag<double, 16>;
 using FloatsTag = hn::CappedTag<float, 16>;
 constexpr DoublesTag kDoubles;
@@ -47,7 +47,7 @@ HWY_INLINE hn::Vec<Tag> All(Tag tag, Value value) {
   return hn::Set(tag, static_cast<hn::TFromD<Tag>>(value));
 }
 
-// The numbers of the lanes, from memory: hn::Iota counts them anew each time, in a loop.
+// The numbers of the lanes, loaded from memory: hn::Iota computes them in a loop each time.
 template <typename T>
 struct LaneNumbers {
   HWY_ALIGN static constexpr T kValues[16] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
@@ -65,7 +65,7 @@ HWY_INLINE std::uint32_t BitsOf(Tag tag, hn::Mask<Tag> mask) {
   return static_cast<std::uint32_t>(bits);
 }
 
-// The larger or the smaller one; b where one is NaN.
+// The maximum and the minimum; b if one of them is NaN.
 HWY_INLINE Floats MaxOrSecond(Floats a, Floats b) {
 #if HWY_ARCH_X86
   return hn::Max(a, b);  // the instruction does just that
@@ -81,8 +81,8 @@ HWY_INLINE Floats MinOrSecond(Floats a, Floats b) {
 #endif
 }
 
-// The furthest sample so far, lane by lane. Each lane meets its samples in row-major order, so that ">" keeps the
-// first; no comparison with NaN holds.
+// The furthest sample so far in each lane. Each lane visits its samples in row-major order, so ">" keeps the first of
+// equals. Comparisons with NaN are false.
 template <typename TagOfNumerators>
 class Furthest {
  public:
@@ -97,7 +97,7 @@ class Furthest {
   HWY_INLINE void Visit(hn::Vec<Tag> numerator, Numbers number) {
     const auto is_further = hn::Gt(numerator, numerator_);
     if constexpr (std::is_same_v<Tag, FloatsTag>) {
-      numerator_ = MaxOrSecond(numerator, numerator_);  // the next sample waits for this one, and not for the mask
+      numerator_ = MaxOrSecond(numerator, numerator_);  // so that the next sample does not wait for the mask
     } else if constexpr (std::is_same_v<Tag, IntsTag>) {
       numerator_ = hn::Max(numerator, numerator_);
     } else {
@@ -106,9 +106,9 @@ class Furthest {
     number_ = hn::IfThenElse(hn::RebindMask(kNumbers, is_further), number, number_);
   }
 
-  // As if each sample had been visited so many columns further east.
+  // Adds `columns` to the columns of all visited samples.
   HWY_INLINE void MoveEast(int columns) { number_ = hn::Add(number_, All(kNumbers, columns)); }
-  // Of samples that were visited apart.
+  // Merges samples that were visited separately.
   HWY_INLINE void Merge(const Furthest& other) {
     const auto tied =
         hn::And(hn::Eq(other.numerator_, numerator_), hn::RebindMask(kTag, hn::Lt(other.number_, number_)));
@@ -119,8 +119,8 @@ class Furthest {
   HWY_INLINE Numbers numbers() const { return number_; }
   HWY_INLINE hn::TFromD<Tag> numerator() const { return hn::GetLane(hn::MaxOfLanes(kTag, numerator_)); }
 
-  // Precondition: numerator() is not negative. Most often a single lane has it; to find the smallest number of several
-  // is a chain of eight operations.
+  // Precondition: numerator() is not negative. Usually a single lane has the largest numerator; finding the smallest
+  // number of several lanes takes a chain of eight operations.
   HWY_INLINE std::uint32_t sample() const {
     const auto foremost = hn::RebindMask(kNumbers, hn::Eq(numerator_, hn::MaxOfLanes(kTag, numerator_)));
     const std::uint32_t lanes = BitsOf(kNumbers, foremost);
@@ -149,7 +149,7 @@ class Furthest {
   Numbers number_;
 };
 
-// The same where single precision leaves doubts: also how close to a lane's furthest sample another one of it comes.
+// Furthest for inexact single precision: also tracks the second largest numerator.
 class FurthestTwo {
  public:
   using Tag = FloatsTag;
@@ -182,7 +182,7 @@ class FurthestTwo {
 
 template <typename Found>
 inline constexpr bool kIsInteger = std::is_same_v<Found, Furthest<IntsTag>>;
-// Whether sums are exact where it is used: planes may be stepped then.
+// Whether sums are exact; then planes may be stepped.
 template <typename Found>
 inline constexpr bool kIsExact = std::is_same_v<Found, Furthest<FloatsTag>> || kIsInteger<Found>;
 

@@ -1,4 +1,4 @@
-// Where a triangle lies, and which samples of each row it has. Compiled once for each set of instructions; part of
+// The bounding box of a triangle, and its samples in each row. Compiled once for each instruction set; part of
 // triangle_scan.cc.
 #if defined(TERRACE_ENGINE_TIN_SPAN_FINDER_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TERRACE_ENGINE_TIN_SPAN_FINDER_INL_H_
@@ -20,23 +20,23 @@ namespace terrace::tin {
 namespace HWY_NAMESPACE {
 namespace {
 
-// Where a triangle lies, seen from its last corner p.
+// The position of a triangle, relative to its last corner p.
 struct TriangleBox {
   int px, py;
   int ux, uy, vx, vy;
   int west, east, south, north;  // bounding box without the field's border
 };
 
-// First or last columns of up to kRows rows, and what whole vectors spill.
+// First or last columns of up to kRows rows, with padding for whole vectors.
 constexpr int kRows = 64;
 using Columns = std::array<std::int32_t, kRows + 16>;
 
 // The exact spans of a triangle. Relative to p, an edge crosses row y at x = n / dy with an integer n = x0 dy + (y -
 // y0) dx, rounded up on the west side, down on the east. In single precision, where extents are at most 2^11, n is at
 // most 2^23 and so exact; the float nearest to a quotient of at most 2^11 is less than 2^-12 from it, and a quotient
-// that is no integer is at least 2^-11 from the next one. In double the same holds of extents up to 2^16. An outline is
-// convex: of two lines on a side the nearer one counts, and neither needs to end. Where one goes on beyond its edge its
-// quotient may be larger and rounded, but it stays the further one.
+// that is no integer is at least 2^-11 from the next one. In double the same holds of extents up to 2^16. A triangle is
+// convex: of two lines on one side the nearer one bounds the row, so lines need not end at corners. Beyond its edge a
+// line's quotient may be larger and rounded, but it stays the farther one.
 template <typename Tag>
 class SpanFinder {
  public:
@@ -47,7 +47,8 @@ class SpanFinder {
     const Number ys[4] = {0, static_cast<Number>(t.uy), static_cast<Number>(t.vy), 0};
     std::size_t easts = 0, wests = 0;
     for (std::size_t i = 0; i < 3; ++i) {
-      // Counter-clockwise: up on the east side, down on the west. Which edge is which cannot be predicted.
+      // Counter-clockwise edges run up on the east side and down on the west side. No branches: they would be
+      // mispredicted.
       const Number dx = xs[i + 1] - xs[i], dy = ys[i + 1] - ys[i], n = xs[i] * dy - ys[i] * dx;
       east_[easts] = {dx, dy, n};
       west_[wests] = {-dx, -dy, -n};
@@ -58,7 +59,8 @@ class SpanFinder {
     west_[wests] = west_[0];
   }
 
-  // Of some rows from `first_row` on, relative to p; columns are those of the field, without its border.
+  // Finds the spans of `rows` rows from `first_row` on, relative to p. Columns are those of the field, without its
+  // border.
   HWY_INLINE void Find(int first_row, int rows, Columns& firsts, Columns& lasts) const {
     constexpr Tag tag;
     constexpr hn::Rebind<std::int32_t, Tag> ints;

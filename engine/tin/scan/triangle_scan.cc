@@ -22,17 +22,17 @@ namespace {
 
 #if HWY_TARGET != HWY_SCALAR
 
-// A sample's numerator in double, as the header has it.
+// A sample's numerator in double, in the form of the header.
 HWY_INLINE double NumeratorAt(const HeightField& field, const ExactPlane& t, int x, int y) {
   const double height = static_cast<double>(field.Row(t.py + y)[t.px + x]);
   return std::abs(t.d * (height - t.pz) - (t.a * x + t.b * y));
 }
 
-// Whether a triangle's largest numerator may be the rounding error of one of its corners, all of which is relative to
-// the magnitude.
+// Whether a triangle's largest numerator may be only the rounding error of a corner, which is relative to the
+// magnitude.
 HWY_INLINE bool MayBeACorner(float most, float magnitude, float doubt) { return !(most > 4 * doubt * magnitude); }
 
-// What ScanBlock found where single precision is not exact.
+// The result of ScanBlock if single precision is not exact.
 template <int kSide>
 HWY_NOINLINE PlaneMisfit MisfitInDoubt(const HeightField& field, const Star& star, const StarPlanes& planes,
                                        std::size_t i, std::size_t first, const BlockFind& find) {
@@ -54,7 +54,7 @@ HWY_NOINLINE PlaneMisfit MisfitInDoubt(const HeightField& field, const Star& sta
   return {most / t.d, SampleNumber(column, row)};
 }
 
-// What ScanBlock found: most often a single sample.
+// The result of ScanBlock: usually a single sample.
 template <int kSide>
 HWY_INLINE PlaneMisfit MisfitOf(const HeightField& field, const Star& star, const StarPlanes& planes, std::size_t i,
                                 std::size_t first, const BlockFind& find, float most_exact) {
@@ -67,7 +67,7 @@ HWY_INLINE PlaneMisfit MisfitOf(const HeightField& field, const Star& star, cons
     if (find.most > 0) {
       return {static_cast<double>(find.most) / static_cast<double>(planes.d[i]), sample(std::countr_zero(find.found))};
     }
-    // All of them lie on the plane, the corners too.
+    // All samples lie on the plane, including the corners.
     const std::int32_t *dx = star.ring.dx.data() + first + i, *dy = star.ring.dy.data() + first + i;
     const auto bit = [&](int x, int y) { return std::uint64_t{1} << ((y - south) * kSide + x - west); };
     const std::uint64_t found = find.found & ~(bit(0, 0) | bit(dx[0], dy[0]) | bit(dx[1], dy[1]));
@@ -86,7 +86,7 @@ HWY_INLINE void SetBox(const HeightField& field, const Star& star, const StarPla
   LeaveBorderOut(field, t);
 }
 
-// In single precision: what StarPlanes::Work found.
+// The plane in single precision, from StarPlanes::Work.
 HWY_INLINE SinglePlane SinglePlaneOf(const HeightField& field, const Star& star, const StarPlanes& planes,
                                      std::size_t i, std::size_t first) {
   SinglePlane t;
@@ -96,7 +96,7 @@ HWY_INLINE SinglePlane SinglePlaneOf(const HeightField& field, const Star& star,
   return t;
 }
 
-// Where all samples lie on the triangle's plane: the first of them.
+// If all samples lie on the triangle's plane: the first one.
 HWY_NOINLINE PlaneMisfit OnPlane(const HeightField& field, const Star& star, std::size_t i) {
   const std::uint32_t sample = FirstSample(field, star, i);
   return sample == kNoSample ? PlaneMisfit{} : PlaneMisfit{0, sample};
@@ -106,7 +106,8 @@ HWY_NOINLINE PlaneMisfit ScanWild(const HeightField& field, const Star& star, st
   return ScanExactly(field, ExactPlaneOf(field, star, i));
 }
 
-// A larger triangle where single precision is not exact: no lane may hold two samples that are in doubt.
+// A larger triangle for which single precision is not exact. Usable only if no lane has two samples that may be the
+// furthest.
 HWY_NOINLINE PlaneMisfit ScanDoubtfully(const HeightField& field, const Star& star, const StarPlanes& planes,
                                         std::size_t i, std::size_t first, float most_exact) {
   const auto two = ScanWide<FurthestTwo>(field, SinglePlaneOf(field, star, planes, i, first));
@@ -156,7 +157,7 @@ HWY_INLINE IntegerPlane IntegerPlaneOf(const HeightField& field, const Star& sta
   return t;
 }
 
-// A larger triangle where integers hold all numerators: exact, and no lane is in doubt.
+// A larger triangle whose numerators fit into integers: exact.
 HWY_NOINLINE PlaneMisfit ScanInIntegers(const HeightField& field, const Star& star, const StarPlanes& planes,
                                         std::size_t i, std::size_t first) {
   const auto furthest = ScanWide<Furthest<IntsTag>>(field, IntegerPlaneOf(field, star, planes, i, first));
@@ -182,7 +183,7 @@ HWY_INLINE PlaneMisfit ScanLarge(const HeightField& field, const Star& star, con
   return ScanDoubtfully(field, star, planes, i, first, most_exact);
 }
 
-// Class by class, not triangle by triangle: what a triangle takes cannot be predicted.
+// Class by class, not triangle by triangle, because the class of a triangle would be mispredicted.
 HWY_INLINE void ScanTogether(const HeightField& field, const Star& star, const StarPlanes& planes, std::size_t first,
                              std::uint32_t lanes, float most_exact, PlaneMisfit* misfits) {
   const auto lane = [](std::uint32_t bits) { return static_cast<std::size_t>(std::countr_zero(bits)); };
@@ -237,7 +238,7 @@ namespace terrace::tin {
 HWY_EXPORT(ScanStar);
 
 StarScan BestStarScan() {
-  // Not at each call: the question traps where the processor is a virtual one.
+  // Once, not at each call: CPUID traps on virtual machines.
   if (!hwy::GetChosenTarget().IsInitialized()) hwy::GetChosenTarget().Update(hwy::SupportedTargets());
   return HWY_DYNAMIC_DISPATCH(ScanStar);
 }

@@ -38,8 +38,8 @@ double SquaredDistances(const HeightField& field, const std::array<Corner, 3>& c
   return sum;
 }
 
-// Multiplied by the doubled area, nothing is divided: heights that are multiples of a common power of two, in 53 bits
-// together with the squared extent, are judged exactly, however thin the triangle.
+// Everything is multiplied by the doubled area, so there is no division. If heights are multiples of a common power of
+// two and fit into 53 bits together with the squared extent, the test is exact even for thin triangles.
 bool SamplesAreWithin(const HeightField& field, const std::array<Corner, 3>& corners, double bound) {
   const std::array<Corner, 3> sorted = SortedByRow(corners);
   const Corner &a = sorted[0], &b = sorted[1], &c = sorted[2];

@@ -1,5 +1,5 @@
-// The scan of wide triangles, and of those that single precision cannot tell apart: row by row, or by vectors of
-// columns. Compiled once for each set of instructions; part of triangle_scan.cc.
+// The scan of wide triangles, and of triangles for which single precision is not enough: row by row, or by vectors of
+// columns. Compiled once for each instruction set; part of triangle_scan.cc.
 #if defined(TERRACE_ENGINE_TIN_WIDE_SCAN_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TERRACE_ENGINE_TIN_WIDE_SCAN_INL_H_
 #undef TERRACE_ENGINE_TIN_WIDE_SCAN_INL_H_
@@ -26,23 +26,23 @@ namespace terrace::tin {
 namespace HWY_NAMESPACE {
 namespace {
 
-// One triangle, its plane in one of the precisions.
+// A triangle and its plane in one of the precisions.
 template <typename Number>
 struct TrianglePlane : TriangleBox {
   Number pz;
-  Number d, a, b;  // D, A and B of the header
+  Number d, a, b;  // D, A and B of triangle_scan.h
 };
 using ExactPlane = TrianglePlane<double>;
 using SinglePlane = TrianglePlane<float>;
 
-// In quanta (HeightField::quantum), modulo 2^32: numerators are right if they are below 2^31, whatever became of the
-// products and sums on the way there. A height h less p's, plus `lift`, is a float whose last 23 bits count quanta; as
-// an integer, those of all of its bits that are beyond p's are the difference.
+// In quanta (HeightField::quantum), modulo 2^32: numerators below 2^31 are right even if intermediate products and sums
+// overflow. The float h - z + lift has a mantissa that counts quanta. The difference between its bits and those of p's
+// height, as integers, is the height difference in quanta.
 struct IntegerPlane : TrianglePlane<std::int32_t> {  // pz: D times p's bits
   float z, lift;
 };
 
-// The numbers of samples that are visited.
+// The type of plane for a kind of Furthest.
 template <typename Found>
 using PlaneFor = std::conditional_t<std::is_same_v<hn::TFromD<typename Found::Tag>, std::int32_t>, IntegerPlane,
                                     TrianglePlane<hn::TFromD<typename Found::Tag>>>;
@@ -51,8 +51,8 @@ HWY_INLINE hn::Vec<DoublesTag> HeightsAt(DoublesTag tag, const float* from) {
   return hn::PromoteTo(tag, hn::LoadU(hn::Rebind<float, DoublesTag>(), from));
 }
 
-// Barycentric coordinates times D of samples relative to p: integers, exact, also when stepped from row to row. Inside
-// and on the edges none is negative, and at a corner one of them is D.
+// Barycentric coordinates times D of samples relative to p. They are integers and exact, also if stepped from row to
+// row. None is negative inside and on the edges; at a corner one of them is D.
 class Barycentric {
  public:
   using Doubles = hn::Vec<DoublesTag>;
@@ -70,7 +70,7 @@ class Barycentric {
     return hn::And(hn::Ge(hn::Min(hn::Min(of_u_, of_v_), of_p_), hn::Zero(kDoubles)),
                    hn::Lt(hn::Max(hn::Max(of_u_, of_v_), of_p_), d_));
   }
-  // Two rows on.
+  // Moves two rows up.
   HWY_INLINE void Step() {
     of_u_ = hn::Sub(of_u_, step_u_);
     of_v_ = hn::Add(of_v_, step_v_);
@@ -88,28 +88,27 @@ HWY_INLINE V Numerator(V heights, V pz, V d, V plane) {
   return hn::Abs(hn::Sub(hn::Mul(d, hn::Sub(heights, pz)), plane));
 }
 
-// The same in single precision, whose sign does not matter and whose load is part of the subtraction that way round.
-// Fused where there are such operations: what is exact is exact either way, and where there are doubts they become
-// smaller.
+// The same in single precision. The sign does not matter, and in this order the load is part of the subtraction. Fused
+// if the processor can: exact results stay exact, and inexact ones get smaller errors.
 HWY_INLINE Floats NumeratorFrom(const float* heights, Floats pz, Floats d, Floats plane) {
   return hn::Abs(hn::MulAdd(d, hn::Sub(pz, hn::LoadU(kFloats, heights)), plane));
 }
 
-// And in integers.
+// The same in integers.
 HWY_INLINE Ints NumeratorFrom(const float* heights, Floats z, Floats lift, Ints d, Ints plane) {
   const Floats lifted = hn::Add(hn::Sub(hn::LoadU(kFloats, heights), z), lift);
   return hn::Abs(hn::Sub(hn::Mul(hn::BitCast(kInts, lifted), d), plane));
 }
 
-// A number for the columns of a box up to its last one, and NaN, which no comparison holds for, beyond: a triangle may
-// reach on to the field's border.
+// Returns `number` in the columns up to `last`, and NaN beyond, for which comparisons are false: the triangle may reach
+// beyond the box to the field's border.
 template <typename Tag>
 HWY_INLINE hn::Vec<Tag> UpToColumn(Tag tag, int last, hn::Vec<Tag> columns, hn::TFromD<Tag> number) {
   const hn::TFromD<Tag> none = std::numeric_limits<hn::TFromD<Tag>>::quiet_NaN();
   return hn::IfThenElse(hn::Le(columns, All(tag, last)), All(tag, number), All(tag, none));
 }
 
-// The numerators of some columns, from the first row of the box on. NaN beyond its last column, or negative.
+// The numerators of a vector of columns, from the first row of the box on. NaN or negative beyond the last column.
 template <typename Found>
 class ColumnsOfPlane {
  public:
@@ -156,8 +155,9 @@ class ColumnsOfPlane<Furthest<IntsTag>> {
   Ints d_, b_, beyond_, plane_;
 };
 
-// A vector of columns of the bounding box, row by row, in single precision or integers: no spans, no divisions, no
-// branches but the loop. Barycentric coordinates are integers, whose signs make what is outside NaN, or negative.
+// Scans a vector of columns of the bounding box row by row, in single precision or integers, without spans, divisions
+// or branches. The signs of integer barycentric coordinates turn samples outside the triangle into NaN or negative
+// numbers.
 template <typename Found>
 class ColumnsOfTriangle {
  public:
@@ -169,7 +169,7 @@ class ColumnsOfTriangle {
     of_p_ = hn::Sub(All(kInts, t.ux * t.vy - t.uy * t.vx), hn::Add(of_u_, of_v_));
   }
 
-  // The samples of a row from `heights` on, and then the next row.
+  // Visits the samples of a row from `heights` on, and moves to the next row.
   HWY_INLINE void Visit(const float* heights, Ints numbers) {
     const auto outside = hn::ShiftRight<31>(hn::Or3(of_u_, of_v_, of_p_));
     furthest_.Visit(hn::Or(plane_.Numerators(heights), hn::BitCast(typename Found::Tag(), outside)), numbers);
@@ -187,8 +187,8 @@ class ColumnsOfTriangle {
   Found furthest_;
 };
 
-// Calls visit(heights, numbers) for the rows of the box from a column on: where its samples are, and a vector of their
-// numbers.
+// Calls visit(heights, numbers) for each row of the box from a column on, with a pointer to its samples and a vector of
+// their numbers.
 template <typename Visit>
 HWY_INLINE void ForEachRow(const HeightField& field, const TriangleBox& t, int column, Visit&& visit) {
   const int stride = field.stride(), first_row = t.py + t.south;
@@ -209,8 +209,8 @@ HWY_INLINE Found ScanColumnsIn32Bits(const HeightField& field, const PlaneFor<Fo
   return columns.furthest();
 }
 
-// Two vectors of columns side by side: rows are counted once, and neither waits for the other. It takes more than
-// sixteen vector registers, which AVX2 has.
+// Two vectors of columns side by side: they share the row counter and are independent of each other. Needs more than
+// the sixteen vector registers of AVX2.
 #if (HWY_ARCH_X86 && HWY_TARGET > HWY_AVX3) || HWY_ARCH_ARM_V7
 constexpr bool kColumnsInPairs = false;
 #else
@@ -230,8 +230,8 @@ HWY_INLINE Found ScanColumnPairIn32Bits(const HeightField& field, const PlaneFor
   return furthest;
 }
 
-// The same in double, without the corners, two rows at a time, each for itself, since what is furthest so far is waited
-// for. After an odd number of rows the last one is looked at again.
+// The same in double, without the corners. Two rows at a time, independent of each other, to hide latency. If the
+// number of rows is odd, the last row is visited twice.
 HWY_INLINE Furthest<DoublesTag> ScanColumnsInDouble(const HeightField& field, const ExactPlane& t, int column) {
   constexpr DoublesTag tag;
   constexpr NumberTag<DoublesTag> numbers;
@@ -262,7 +262,7 @@ HWY_INLINE Furthest<DoublesTag> ScanColumnsInDouble(const HeightField& field, co
   return furthest;
 }
 
-// Up to so many vectors of columns the box is quicker than its spans.
+// Up to this many vectors of columns, scanning the box is faster than scanning spans.
 constexpr int kMaxBoxVectors = 3;
 
 template <typename Found>
@@ -293,7 +293,7 @@ HWY_INLINE Found ScanBox(const HeightField& field, const PlaneFor<Found>& t) {
   return furthest;
 }
 
-// Fused in single precision only.
+// Multiplies and adds; fused only in single precision.
 template <typename Found, typename V>
 HWY_INLINE V MulAddFor(V a, V b, V c) {
   if constexpr (std::is_same_v<typename Found::Tag, FloatsTag>) {
@@ -303,7 +303,7 @@ HWY_INLINE V MulAddFor(V a, V b, V c) {
   }
 }
 
-// Row by row, exact spans. In double without the corners.
+// Scans exact spans row by row. In double without the corners.
 template <typename Found>
 HWY_INLINE Found ScanSpans(const HeightField& field, const PlaneFor<Found>& t) {
   using Tag = typename Found::Tag;
@@ -316,7 +316,7 @@ HWY_INLINE Found ScanSpans(const HeightField& field, const PlaneFor<Found>& t) {
   [[maybe_unused]] const auto at_p = corner(0, 0), at_u = corner(t.ux, t.uy), at_v = corner(t.vx, t.vy);
   [[maybe_unused]] const auto a_on = hn::Mul(a, lanes_on);
   const auto numbers_on = All(numbers, lanes);
-  Found furthest, also, ends;  // apart, since what is furthest so far is waited for
+  Found furthest, also, ends;  // independent, to hide latency
   Columns firsts, lasts;
   const SpanFinder<std::conditional_t<kIsInteger<Found>, FloatsTag, Tag>> finder(t);
   for (int block = t.py + t.south; block <= last_row; block += kRows) {
@@ -371,12 +371,12 @@ HWY_INLINE void LeaveBorderOut(const HeightField& field, TriangleBox& t) {
   t.south = std::max(t.south, 1 - t.py), t.north = std::min(t.north, field.height() - 2 - t.py);
 }
 
-// In double: from the ring, one by one.
+// The plane of one triangle in double.
 HWY_INLINE ExactPlane ExactPlaneOf(const HeightField& field, const Star& star, std::size_t i) {
   ExactPlane t;
   t.px = star.x, t.py = star.y;
   t.ux = star.ring.dx[i], t.uy = star.ring.dy[i], t.vx = star.ring.dx[i + 1], t.vy = star.ring.dy[i + 1];
-  // Two by two: of a list they are found with branches.
+  // Pairwise: std::min of a list would branch.
   t.west = std::min(std::min(t.ux, t.vx), 0), t.east = std::max(std::max(t.ux, t.vx), 0);
   t.south = std::min(std::min(t.uy, t.vy), 0), t.north = std::max(std::max(t.uy, t.vy), 0);
   LeaveBorderOut(field, t);

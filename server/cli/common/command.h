@@ -7,15 +7,15 @@ class App;
 
 namespace terrace::cli {
 
-// What the process ends with.
+// Exit codes of the process.
 inline constexpr int kExitOk = 0;
 inline constexpr int kExitFailure = 1;  // the work could not be done
 inline constexpr int kExitUsage = 2;    // the command line or the configuration is wrong
 
 inline constexpr const char* kCommands = "Commands";  // heading in the help
 
-// Each adds its subcommand to `app`; when the user chose it, its work runs from the parser's callback, and the exit
-// code is stored in `exit_code`.
+// Each adds its subcommand to `app`. If the user selects it, the parser's callback runs it and stores the exit code in
+// `exit_code`.
 void AddServe(CLI::App& app, int& exit_code);
 void AddMesh(CLI::App& app, int& exit_code);
 void AddInfo(CLI::App& app, int& exit_code);

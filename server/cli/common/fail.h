@@ -1,4 +1,4 @@
-// How a command ends.
+// Error messages and the end of output of a command.
 #pragma once
 
 #include <cstdio>
@@ -14,7 +14,7 @@ inline int Fail(const std::string& message, int code) {
   return code;
 }
 
-// What was asked for on stdout is not there before it has been taken: returns the exit code, or that of a failure.
+// Flushes stdout. Returns `code`, or kExitFailure if stdout could not be written.
 inline int FinishOutput(int code) {
   if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return code;
   std::perror("terrace: stdout cannot be written");

@@ -1,4 +1,4 @@
-// How `--help` looks: descriptions in a column of their own, broken into lines that fit a terminal.
+// The format of `--help`: descriptions in their own column, wrapped to the width of a terminal.
 #pragma once
 
 #include <string>
@@ -9,10 +9,10 @@ class App;
 
 namespace terrace::cli {
 
-// For the program and the commands that are added to it from then on.
+// Sets the format for the program and for commands that are added later.
 void SetHelpFormat(CLI::App& program);
 
-// `text` in lines of `width` at most, broken at blanks. Longer words stay whole.
+// Wraps `text` at blanks into lines of at most `width` characters. Longer words stay whole.
 std::string WrapLines(const std::string& text, std::size_t width);
 
 }  // namespace terrace::cli

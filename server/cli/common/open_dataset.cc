@@ -15,7 +15,7 @@
 namespace terrace::cli {
 namespace {
 
-// What a source states itself comes before what its dataset states.
+// A source's own options override those of its dataset.
 dem::SourceOptions SourceOptionsOf(const config::DatasetConfig& dataset, const config::SourceConfig& source) {
   const config::NodataConfig nodata = source.nodata.value_or(dataset.nodata);
   dem::SourceOptions options;
@@ -25,7 +25,7 @@ dem::SourceOptions SourceOptionsOf(const config::DatasetConfig& dataset, const c
   return options;
 }
 
-// All files of the sources, each entry one rank.
+// All files of the sources. Each entry has its own rank.
 std::vector<dem::DemFile> FilesOf(const config::DatasetConfig& dataset) {
   const std::vector<config::SourceConfig>& sources = dataset.sources;
   std::vector<dem::DemFile> files;

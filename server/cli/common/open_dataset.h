@@ -1,4 +1,4 @@
-// A dataset as its configuration describes it: the one place that makes engine options of a DatasetConfig.
+// Opens a dataset from its configuration. Only this file converts a DatasetConfig to engine options.
 #pragma once
 
 #include <functional>
@@ -23,7 +23,8 @@ Result<std::unique_ptr<dem::DemSource>> OpenSource(const config::DatasetConfig& 
 // A dataset of an open source, with its water mask and its imagery, ready to be served. `version`: of this program; it
 // stands in tiles, and another one is another generation.
 Result<tiler::Dataset> MakeDataset(const config::DatasetConfig& wanted, std::shared_ptr<const dem::DemSource> source,
-                                   const dem::RasterCache& cache, const std::string& version, std::stop_token stop = {});
+                                   const dem::RasterCache& cache, const std::string& version,
+                                   std::stop_token stop = {});
 
 // OpenSource and MakeDataset.
 Result<tiler::Dataset> OpenDataset(const config::DatasetConfig& wanted, const dem::RasterCache& cache,

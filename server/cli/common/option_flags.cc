@@ -7,7 +7,7 @@
 namespace terrace::cli {
 namespace {
 
-// As the flag takes it, which needs no quotes; JSON is what the configuration file takes.
+// The default in the flag's notation, without the quotes of JSON.
 std::string ShownDefault(const config::OptionInfo& option) {
   std::string text = option.default_value;
   std::erase_if(text, [](char c) { return c == '"' || c == '[' || c == ']'; });

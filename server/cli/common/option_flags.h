@@ -1,4 +1,4 @@
-// Options of the configuration as flags of a command.
+// Adds options of the configuration as flags of a command.
 #pragma once
 
 #include <map>
@@ -13,8 +13,9 @@ class App;
 
 namespace terrace::cli {
 
-// A flag for each option that has one. Its text is kept in `values`, by the option's key: it is checked when it is set
-// (config::SetServerOption, config::SetDatasetOption), after a file has been read. `values` must outlive the command.
+// Adds a flag for each option that has one. Stores its text in `values` by the option's key. The text is checked later
+// by config::SetServerOption or config::SetDatasetOption, after the file has been read. `values` must outlive the
+// command.
 void AddFlags(CLI::App& command, const std::vector<config::OptionInfo>& options, const std::string& group,
               std::map<std::string, std::string>& values);
 

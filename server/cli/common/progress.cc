@@ -35,7 +35,7 @@ Progress::~Progress() {
   if (shown_ && terminal_) std::fputs("\r\033[K", stderr);
 }
 
-// By the pace since the first share that was told: work that was done in an earlier run took no time in this one.
+// Estimated from the pace since the first reported share, because work of an earlier run took no time in this one.
 std::string Progress::TimeLeft(Clock::time_point now) const {
   const double seconds = std::chrono::duration<double>(now - start_).count();
   if (!(share_ > first_share_)) return {};

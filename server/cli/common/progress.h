@@ -8,9 +8,9 @@
 
 namespace terrace::cli {
 
-// "terrace: reading alps.tif 42 %, 3 min left"; of many things "terrace: reading dems 1,234 of 5,000". On a terminal
-// the line is rewritten in place, elsewhere a line comes every ten seconds. Says nothing about work that is over within
-// a second.
+// Prints "terrace: reading alps.tif 42 %, 3 min left", or "terrace: reading dems 1,234 of 5,000" for many items. On a
+// terminal the line is rewritten in place; otherwise a line is printed every ten seconds. Prints nothing if the work
+// takes less than a second.
 class Progress {
  public:
   explicit Progress(std::string what, std::size_t count = 1);
@@ -24,7 +24,7 @@ class Progress {
   std::function<void(double)> Callback();
 
  private:
-  // ", 12 s left"; empty while nothing can be said.
+  // ", 12 s left"; empty as long as no estimate is possible.
   std::string TimeLeft(std::chrono::steady_clock::time_point now) const;
 
   const std::string what_;
@@ -32,7 +32,7 @@ class Progress {
   const bool terminal_;
   const std::chrono::steady_clock::time_point start_;
   std::chrono::steady_clock::time_point last_;
-  double share_ = 0;  // never falls
+  double share_ = 0;  // never decreases
   double first_share_ = 0;
   bool shown_ = false;
 };

@@ -24,7 +24,7 @@ std::string NameOf(const std::vector<config::SourceConfig>& sources) {
 
 Result<void> TryReading(const config::DatasetConfig& dataset) {
   const auto read = [&](const std::string& path, const char* remedy) -> Result<void> {
-    // Other names are GDAL's to resolve.
+    // GDAL resolves other names.
     if (!path.starts_with('/') || path.starts_with("/vsi") || ::access(path.c_str(), R_OK) == 0) return {};
     return MakeError(ErrorCode::kNotFound, "dataset {}: {}: {}; give the path of a raster file on this machine{}",
                      dataset.name, path, std::generic_category().message(errno), remedy);
@@ -45,8 +45,8 @@ Result<void> TryPolicy(const config::DatasetConfig& dataset) {
   };
   for (const config::SourceConfig& source : dataset.sources) {
     for (const std::string& file : source.files) {
-      if (source.is_folder && !dem::IsOneLine(file)) continue;  // left out, and told
-      // What a folder has besides rasters is left out when it is opened, whatever it is.
+      if (source.is_folder && !dem::IsOneLine(file)) continue;  // left out, with a message
+      // Other files of a folder are left out when it is opened.
       const Result<void> allowed = source.is_folder ? dem::CheckPlainFile(file) : dem::CheckSourceName(file);
       if (!allowed) return checked(allowed);
     }

@@ -1,4 +1,4 @@
-// The files that a dataset names: what messages call them, and whether they may be read.
+// The files of a dataset: their names in messages, and checks that they can be read.
 #pragma once
 
 #include <cstddef>
@@ -15,10 +15,10 @@ std::size_t FileCount(const std::vector<config::SourceConfig>& sources);
 // For messages: "alps.tif", "alps.tif and 2 more sources".
 std::string NameOf(const std::vector<config::SourceConfig>& sources);
 
-// Whether the dataset's files on this machine exist and may be read, without opening them: masks and images as well.
-// The error names the first that may not.
+// Checks that all local files of the dataset, including masks and images, exist and are readable, without opening them.
+// The error names the first one that is not.
 Result<void> TryReading(const config::DatasetConfig& dataset);
-// The same by the policy of sources (dem::SetSourcePolicy) that is in force.
+// Checks that the source policy in force (dem::SetSourcePolicy) allows all files of the dataset.
 Result<void> TryPolicy(const config::DatasetConfig& dataset);
 
 }  // namespace terrace::cli

@@ -11,7 +11,7 @@ Result<void> TryFolder(const std::filesystem::path& folder) {
   std::error_code failed;
   const std::filesystem::path wanted = std::filesystem::absolute(folder, failed);
   std::filesystem::path existing = wanted;
-  // A link to nowhere is there: no folder can be made of its name.
+  // A dangling symbolic link exists: no folder can be created under its name.
   const auto is_missing = [&failed](const std::filesystem::path& path) {
     return std::filesystem::symlink_status(path, failed).type() == std::filesystem::file_type::not_found;
   };

@@ -1,4 +1,4 @@
-// Whether a folder can be written to, told without making it.
+// Checks that a folder is writable, without creating it.
 #pragma once
 
 #include <filesystem>
@@ -7,7 +7,8 @@
 
 namespace terrace::cli {
 
-// Where it is missing, whether it could be made. kUnavailable: names what is in the way, and the remedy.
+// If the folder does not exist, checks that it could be created. kUnavailable: the message names the obstacle and the
+// remedy.
 Result<void> TryFolder(const std::filesystem::path& folder);
 
 }  // namespace terrace::cli

@@ -25,7 +25,7 @@ std::string ExplainCommand(const CLI::App& program, const std::string& word) {
   return "unknown command " + word + DidYouMean(meant);
 }
 
-// What others call the options of the configuration, by flag.
+// Names that other programs use for options of the configuration, by flag.
 std::map<std::string, std::string_view> OtherWords() {
   std::map<std::string, std::string_view> words;
   for (const auto& options : {config::ServerOptions(), config::DatasetOptions()}) {
@@ -58,7 +58,7 @@ std::vector<std::string> NearestFlags(const CLI::App& command, const std::string
   return nearest;
 }
 
-// The key of the configuration that this would be the flag of, if there were one; empty: there is no such key.
+// The configuration key that corresponds to this flag; empty: there is no such key.
 std::string_view KeyWithoutFlag(const std::string& flag) {
   for (const auto& options : {config::ServerOptions(), config::DatasetOptions()}) {
     for (const config::OptionInfo& option : options) {
@@ -68,7 +68,7 @@ std::string_view KeyWithoutFlag(const std::string& flag) {
   return {};
 }
 
-// `command`: the one among whose arguments it stands; before it, the program.
+// `command`: the command whose argument it is; the program for arguments before the command.
 std::string ExplainFlag(const CLI::App& command, const CLI::App& program, const std::string& flag) {
   const std::string unknown = "unknown option " + flag;
   std::vector<const CLI::App*> others;
@@ -127,7 +127,7 @@ std::string ExplainUsage(const CLI::App& program, const CLI::ParseError& error,
   if (dynamic_cast<const CLI::RequiredError*>(&error) != nullptr && chosen.empty()) {
     return explain(program, arguments.front());
   }
-  // A mistyped option often lacks as well.
+  // A mistyped option is often reported as missing, too.
   for (const CLI::App* parsed_by : {&program, &command}) {
     for (const std::string& word : parsed_by->remaining()) {
       if (IsFlag(word)) return explain(*parsed_by, word);

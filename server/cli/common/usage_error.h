@@ -1,4 +1,4 @@
-// What is wrong with the arguments of the command line, and what was meant.
+// Messages for wrong command lines, with suggestions.
 #pragma once
 
 #include <string>
@@ -11,11 +11,11 @@ class ParseError;
 
 namespace terrace::cli {
 
-// Whether it stands where a command should. Help is given all the same to who asks for it.
+// Whether the first argument that should be a command is not one. False if help is requested.
 bool HasUnknownCommand(const CLI::App& program, const std::vector<std::string>& arguments);
 
-// `program`: with all its commands, after it has thrown `error` while it parsed `arguments`. Says what was mistyped
-// rather than what is missing, and never the value of an option: a secret may stand there by mistake.
+// Returns the message for `error`, which `program` has thrown while it parsed `arguments`. Prefers mistyped arguments
+// over missing ones as the cause. Never quotes the value of an option, because it may be a secret.
 std::string ExplainUsage(const CLI::App& program, const CLI::ParseError& error,
                          const std::vector<std::string>& arguments);
 

@@ -1,4 +1,4 @@
-// terrace info: what a raster holds, how deep it can be served, and what its owner should mend.
+// terrace info: the properties of a raster, its deepest level, and what to improve.
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
@@ -48,7 +48,7 @@ std::string NoOverviewsAdvice(const dem::RasterInfo& info) {
                      what, info.least_kept_factor > 0 ? "many samples" : "the whole raster", info.path);
 }
 
-// What a user should do about this raster; empty when nothing.
+// Advice about this raster; empty: none.
 std::vector<std::string> AdviceFor(const dem::RasterInfo& info, double floor) {
   std::vector<std::string> advice;
   if (info.needs_averages) {
@@ -178,7 +178,7 @@ struct InfoArguments {
 };
 
 int Info(const InfoArguments& arguments) {
-  spdlog::set_level(spdlog::level::err);  // what opening logs is printed below
+  spdlog::set_level(spdlog::level::err);  // what opening would log is printed below
   const auto& [dems, dataset_flags, cache_flags, json, mosaic] = arguments;
   config::DatasetConfig flags;
   config::Config config;
@@ -198,9 +198,9 @@ int Info(const InfoArguments& arguments) {
     Progress progress((cache.folder ? "preparing " : "reading ") + name, FileCount(sources));
     config::DatasetConfig dataset = flags;
     dataset.sources = sources;
-    std::vector<Error> faults;  // of files, all of them
-    auto opened = OpenSource(dataset, cache, progress.Callback(), {},
-                             [&faults](const Error& fault) { faults.push_back(fault); });
+    std::vector<Error> faults;  // of all files
+    auto opened =
+        OpenSource(dataset, cache, progress.Callback(), {}, [&faults](const Error& fault) { faults.push_back(fault); });
     if (!opened) {
       if (faults.empty()) faults.push_back(opened.error());
       for (const Error& fault : faults) exit_code = Fail(fault.message, kExitFailure);

@@ -41,8 +41,8 @@ class BoundsIndex {
  public:
   explicit BoundsIndex(const std::vector<dem::RasterInfo>& sources) : sources_(sources), index_(EntriesOf(sources)) {}
 
-  // How many sources have one before them for which is_so(upper, lower) holds. Precondition: it holds of none that lie
-  // apart.
+  // Counts the sources that have an earlier source for which is_so(upper, lower) holds. Precondition: it does not hold
+  // for sources that do not overlap.
   template <typename IsSo>
   std::ptrdiff_t CountUnder(const IsSo& is_so) const {
     std::ptrdiff_t count = 0;
@@ -70,13 +70,13 @@ class BoundsIndex {
   const dem::BoxIndex index_;
 };
 
-// Sources that lie, in part at least, under one that comes before them.
+// Counts sources that are at least partly hidden by an earlier one.
 std::ptrdiff_t CountOverlapped(const std::vector<dem::RasterInfo>& sources) {
   return BoundsIndex(sources).CountUnder(
       [](const dem::RasterInfo& upper, const dem::RasterInfo& lower) { return Overlap(upper.bounds, lower.bounds); });
 }
 
-// Sources under a coarser one that lies over all of them.
+// Counts sources that are completely hidden by a coarser one.
 std::ptrdiff_t CountHidden(const std::vector<dem::RasterInfo>& sources) {
   return BoundsIndex(sources).CountUnder([](const dem::RasterInfo& upper, const dem::RasterInfo& lower) {
     return upper.spacing_m > lower.spacing_m && Covers(upper.bounds, lower.bounds);

@@ -1,4 +1,4 @@
-// What `terrace info` tells of rasters that make one dataset.
+// Output of `terrace info` for rasters that form one dataset.
 #pragma once
 
 #include <string>
@@ -10,7 +10,7 @@ namespace terrace::cli {
 std::string TextOfBounds(const dem::GeoBounds& bounds);
 
 void PrintMosaic(const std::string& name, const dem::DemInfo& info);
-// One JSON object, as text.
+// The same as the text of a JSON object.
 std::string MosaicJson(const std::string& name, const dem::DemInfo& info);
 
 }  // namespace terrace::cli

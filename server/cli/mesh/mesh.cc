@@ -53,7 +53,7 @@ struct MeshArguments {
   ColorArguments color;
 };
 
-// What is wrong with the arguments, or nothing.
+// Returns what is wrong with the arguments; nothing if they are valid.
 std::string Complain(const MeshArguments& arguments) {
   const int goals = (arguments.max_error >= 0) + (arguments.points > 0) + (arguments.rms >= 0);
   if (goals != 1) return "mesh needs exactly one goal: --max-error METRES, --points N or --rms METRES";
@@ -84,7 +84,7 @@ tin::GreedyOptions OptionsOf(const MeshArguments& arguments) {
   return options;
 }
 
-// Runs towards the goal in steps, so that progress can be shown: the error falls about as 1 / vertices.
+// Runs towards the goal in steps, so that progress can be shown. The error decreases roughly as 1 / vertices.
 void RunTo(const tin::GreedyGoal& goal, std::size_t samples, tin::GreedyTriangulation& greedy) {
   Progress progress("meshing");
   const std::size_t step = std::max<std::size_t>(10'000, samples / 200);
@@ -103,7 +103,7 @@ void RunTo(const tin::GreedyGoal& goal, std::size_t samples, tin::GreedyTriangul
   }
 }
 
-// Only an error can be asked of every block alone; the other goals are about the whole raster.
+// Only an error goal applies to each block separately; the other goals apply to the whole raster.
 tin::TinMesh Triangulate(const MeshArguments& arguments, const tin::HeightField& field) {
   if (arguments.max_error >= 0) {
     const tin::FieldCut cut = tin::FieldCut::For(field, arguments.max_error);
@@ -144,7 +144,7 @@ void Print(const MeshArguments& arguments, const tin::HeightField& field, const 
       PlainNumber(error.max, 4), PlainNumber(error.rms, 4), seconds.read, seconds.triangulate, seconds.write);
 }
 
-// Checks of arguments; what they say is read after the name of the option. Their own descriptions stay out of the help.
+// Checks of arguments. Their messages follow the name of the option. Their descriptions are not part of the help.
 CLI::Validator NumberFrom(double min, double max, const std::string& what) {
   const auto check = [=](const std::string& text) {
     double number = 0;
@@ -198,7 +198,7 @@ int Mesh(const MeshArguments& arguments) {
 
   start = Clock::now();
   tin::TinMesh mesh = Triangulate(arguments, *field);
-  // Nobody stops it.
+  // The run cannot be stopped.
   if (arguments.compact) mesh = *tin::DropVertices(*field, mesh, {.max_error = arguments.max_error});
   seconds.triangulate = SecondsSince(start);
 

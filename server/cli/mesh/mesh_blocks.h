@@ -1,4 +1,4 @@
-// The blocks of a large raster, meshed on several threads.
+// Meshes the blocks of a large raster on several threads.
 #pragma once
 
 #include "engine/tin/extended/field_cut.h"
@@ -8,8 +8,8 @@
 
 namespace terrace::cli {
 
-// The joined mesh of the cut's blocks: the same whatever `threads`, 1 at least, is. Shows how many blocks are done.
-// An exception of any thread stops the others and is thrown here.
+// Returns the joined mesh of all blocks. It does not depend on `threads`, which is at least 1. Shows the number of
+// finished blocks. If a thread throws, stops the others and rethrows.
 tin::TinMesh MeshBlocks(const tin::HeightField& field, const tin::FieldCut& cut, double max_error_m,
                         const tin::GreedyOptions& options, int threads);
 

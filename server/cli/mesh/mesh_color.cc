@@ -71,7 +71,7 @@ Result<Source> ReadPicture(const ColoredMeshArguments& arguments) {
                     image->geo_transform);
 }
 
-// An image without a place of its own is upright: y counts from the lowest row of pixels.
+// An image without a georeference is shown upright: y counts from the lowest row of pixels.
 Result<Placement> PlacementFor(const ColoredMeshArguments& arguments, const Source& source) {
   auto placement = PlacementOf(arguments.raster, source.georeferenced, source.geo_transform, arguments.coordinates);
   if (!placement || source.georeferenced || !arguments.color.is_image || !arguments.coordinates.empty())
@@ -79,7 +79,7 @@ Result<Placement> PlacementFor(const ColoredMeshArguments& arguments, const Sour
   return Placement{0.5, {-0.5, 1, 0, source.field.heights().height() - 0.5, 0, -1}};
 }
 
-// In steps, so that progress can be shown: the error falls about as 1 / vertices.
+// Runs in steps, so that progress can be shown. The error decreases roughly as 1 / vertices.
 tin::ColoredMesh Triangulate(const tin::ExtendedField& field, const tin::ExtendedGoal& goal) {
   constexpr std::size_t kStep = 10'000, kNoLimit = tin::ExtendedGoal{}.max_points;
   Progress progress("meshing");

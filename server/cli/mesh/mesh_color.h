@@ -1,4 +1,4 @@
-// terrace mesh with colours: a DEM and an image that covers it, or an image alone.
+// `terrace mesh` with colours: of a DEM and an image that covers it, or of an image.
 #pragma once
 
 #include <string>
@@ -14,7 +14,7 @@ namespace terrace::cli {
 struct ColorArguments {
   std::string image;      // covers the DEM; empty: none
   double weight = 0.1;    // of colour against height, 0 to 1
-  bool is_image = false;  // the raster to mesh is an image: no heights
+  bool is_image = false;  // the raster is an image without heights
 
   bool IsUsed() const { return is_image || !image.empty(); }
 };
@@ -23,7 +23,7 @@ struct ColorArguments {
 void AddColorOptions(CLI::App& command, ColorArguments& arguments);
 
 struct ColoredMeshArguments {
-  std::string raster, nodata, out, coordinates;  // as given; `coordinates` empty: by the raster
+  std::string raster, nodata, out, coordinates;  // as given; `coordinates` empty: the raster's default
   tin::ExtendedGoal goal;
   ColorArguments color;
   bool json = false;

@@ -1,4 +1,4 @@
-// What the kinds of `terrace mesh` that read heights have in common: which samples are voids, and what is told of them.
+// Shared by the variants of `terrace mesh` that read heights: the option for voids, and warnings about the raster.
 #pragma once
 
 #include <functional>
@@ -16,10 +16,11 @@ namespace terrace::cli {
 // Adds --nodata to the command; `nodata` is its text.
 void AddNodataOption(CLI::App& command, std::string& nodata);
 
-// Precondition: the option took the text.
+// Precondition: the option accepted the text.
 dem::ReadOptions ReadOptionsOf(const std::string& nodata, std::function<void(double)> progress);
 
-// On stderr, what a mesh of the raster in these coordinates (--coordinates), in the file `out`, may surprise by.
+// Warns on stderr about unexpected properties of the mesh in these coordinates (--coordinates) and in the format of
+// `out`.
 void WarnAbout(const std::string& path, const dem::RasterHeights& raster, const std::string& coordinates,
                const std::string& out);
 

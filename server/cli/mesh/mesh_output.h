@@ -1,4 +1,4 @@
-// What the kinds of `terrace mesh` have in common: the file they write, and what they tell of it.
+// Shared by the variants of `terrace mesh`: the output file and messages about it.
 #pragma once
 
 #include <array>
@@ -17,11 +17,11 @@ namespace terrace::cli {
 
 class MeshOutput {
  public:
-  // Before the work: a folder that is missing costs no time. kInvalidArgument: no such format, or one of the files that
-  // are read.
+  // Call it before the work, so that a missing folder is found early. kInvalidArgument: unknown format, or the file is
+  // one of `inputs`.
   static Result<MeshOutput> Open(const std::string& path, const std::vector<std::string>& inputs);
 
-  // The whole file. The vertices lie on the placement's grid; `colors` is empty or by vertex.
+  // Writes the whole file. The vertices lie on the placement's grid; `colors` is empty or has one entry per vertex.
   Result<void> Write(std::vector<proto::MeshVertex> vertices,
                      const std::vector<std::array<std::uint32_t, 3>>& triangles, const proto::GridPlacement& placement,
                      const std::vector<proto::VertexColor>& colors = {});
@@ -37,13 +37,14 @@ struct MeshSeconds {
   double read = 0, triangulate = 0, write = 0;
 };
 
-// Samples without a height, of which `measured` have one.
+// Number of samples without a height. `measured`: number of samples with one.
 inline std::size_t VoidsOf(const tin::HeightField& field, std::size_t measured) {
   return static_cast<std::size_t>(field.width()) * static_cast<std::size_t>(field.height()) - measured;
 }
-std::string TextOfVoids(std::size_t voids);  // empty where there are none
+std::string TextOfVoids(std::size_t voids);  // empty if there are none
 
-// On stderr, where fewer vertices meet every sample than were asked for. 0: no number was.
+// Reports on stderr if the mesh fits every sample with fewer vertices than requested. `points` 0: no number was
+// requested.
 void ReportUnused(const std::string& input, std::size_t points, std::size_t vertices);
 
 inline double SecondsSince(std::chrono::steady_clock::time_point start) {

@@ -22,7 +22,8 @@ std::vector<proto::MeshVertex> VerticesOf(const tin::TinMesh& mesh, const tin::H
   return vertices;
 }
 
-// The mesh is counter-clockwise in (column, row). A transform that mirrors, as north-up rasters do, turns it over.
+// The mesh is counter-clockwise in (column, row). A mirroring transform, as of north-up rasters, reverses the
+// orientation.
 std::vector<std::array<std::uint32_t, 3>> TrianglesOf(const tin::TinMesh& mesh, const Placement& placement) {
   std::vector<std::array<std::uint32_t, 3>> triangles = mesh.triangles;
   const proto::GridPlacement& t = placement.grid;

@@ -1,4 +1,4 @@
-// Where the vertices of a raster's mesh lie in the file.
+// The coordinates of a raster mesh's vertices in the output file.
 #pragma once
 
 #include <array>
@@ -13,21 +13,21 @@
 
 namespace terrace::cli {
 
-// Where samples lie in the file. Those of a raster with a georeference are the centres of its pixels.
+// Maps samples to coordinates in the file. Samples of a raster with a georeference lie at the centres of its pixels.
 struct Placement {
   double first = 0;                                // column and row of the first sample
   proto::GridPlacement grid = {0, 1, 0, 0, 0, 1};  // without a georeference x is the column and y the row
 };
 
-// What `--coordinates` asks for; empty: the reference system where the raster has one.
+// `coordinates`: value of `--coordinates`; empty: the reference system if the raster has one, else pixels.
 Result<Placement> PlacementOf(const std::string& path, bool georeferenced, const std::array<double, 6>& geo_transform,
                               const std::string& coordinates);
 
-// Columns, rows and heights, on the placement's grid.
+// Returns columns, rows and heights on the placement's grid.
 std::vector<proto::MeshVertex> VerticesOf(const tin::TinMesh& mesh, const tin::HeightField& field,
                                           const Placement& placement);
 
-// Counter-clockwise in the file's x and y.
+// Returns triangles that are counter-clockwise in the file's x and y.
 std::vector<std::array<std::uint32_t, 3>> TrianglesOf(const tin::TinMesh& mesh, const Placement& placement);
 
 }  // namespace terrace::cli

@@ -18,7 +18,7 @@ fs::path TargetOf(const fs::path& path) {
   if (!fs::is_symlink(path, failed)) return path;
   fs::path target = fs::canonical(path, failed);
   if (!failed) return target;
-  target = path;  // which leads to a file that is yet to be
+  target = path;  // whose target does not exist yet
   constexpr int kMaxLinks = 40;
   for (int links = 0; links < kMaxLinks && fs::is_symlink(target, failed); ++links) {
     target = target.parent_path() / fs::read_symlink(target, failed);
@@ -48,7 +48,7 @@ Result<OutputFile> OutputFile::Open(const std::string& path) {
     return MakeError(ErrorCode::kUnavailable, "cannot write {}: {}; choose a folder that exists and is writable", path,
                      std::generic_category().message(errno));
   }
-  // At once: nobody shall read meanwhile what was not theirs to read.
+  // Set before anything is written, so that nobody can read data without permission.
   const fs::perms permissions = fs::status(file.target_, ignored).permissions();
   if (permissions != fs::perms::unknown) fs::permissions(file.unfinished_->path(), permissions, ignored);
   return file;

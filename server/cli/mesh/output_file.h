@@ -1,4 +1,5 @@
-// A file that is there complete or not at all: written beside its name, and renamed to it at the end.
+// A file that is written completely or not at all: written to a temporary name in the same folder and renamed at the
+// end.
 #pragma once
 
 #include <filesystem>
@@ -14,21 +15,21 @@ namespace terrace::cli {
 
 class OutputFile {
  public:
-  // A symbolic link stays one: what it leads to is written. kUnavailable: the folder is missing or cannot be written
-  // to, or the file is there and may not be written.
+  // If `path` is a symbolic link, writes its target. kUnavailable: the folder is missing or not writable, or the
+  // existing file is not writable.
   static Result<OutputFile> Open(const std::string& path);
 
-  // Without Commit nothing is left, and what was at `path` before is still there (UnfinishedFile).
+  // Without Commit, the new file is removed (UnfinishedFile) and the old file at `path` stays.
   std::ostream& stream() { return stream_; }
 
-  // Replaces what is at `path`, whose permissions stay. kUnavailable: what was written did not all reach the disk.
+  // Replaces the file at `path` and keeps its permissions. kUnavailable: not all data could be written to the disk.
   Result<void> Commit();
 
  private:
   OutputFile(std::string path, std::filesystem::path target);
 
-  std::string path_;              // as it was given
-  std::filesystem::path target_;  // what is replaced
+  std::string path_;              // as given
+  std::filesystem::path target_;  // the file that is replaced
   std::unique_ptr<UnfinishedFile> unfinished_;
   std::ofstream stream_;
 };

@@ -13,7 +13,7 @@
 namespace terrace::cli {
 namespace {
 
-// For the handler, which may run in any thread: memory that stays.
+// Static memory for the signal handler, which may run on any thread.
 std::array<char, PATH_MAX> path_of_file{};
 std::atomic<bool> has_file = false;
 static_assert(std::atomic<bool>::is_always_lock_free);
@@ -26,7 +26,7 @@ void RemoveAndEnd(int signal) {
 
 }  // namespace
 
-// A longer path is none that a file could be opened by.
+// Files with longer paths cannot be opened.
 UnfinishedFile::UnfinishedFile(std::string path) : path_(std::move(path)) {
   TERRACE_CHECK(!has_file.load());
   if (path_.size() >= path_of_file.size()) return;
@@ -40,7 +40,7 @@ UnfinishedFile::UnfinishedFile(std::string path) : path_(std::move(path)) {
   }
 }
 
-// Where it was renamed, there is none to remove.
+// After a rename there is no file to remove.
 UnfinishedFile::~UnfinishedFile() {
   has_file.store(false);
   ::unlink(path_.c_str());

@@ -1,12 +1,12 @@
-// A file that goes when the process is interrupted.
+// A temporary file that is removed when the process is interrupted.
 #pragma once
 
 #include <string>
 
 namespace terrace::cli {
 
-// One at a time. The file goes with this object, and where SIGINT, SIGTERM or SIGHUP ends the process, which they then
-// do as ever; those that are ignored stay ignored. Whatever else ends a process leaves it.
+// At most one at a time. The destructor removes the file; so do SIGINT, SIGTERM and SIGHUP before they end the process.
+// Ignored signals stay ignored. If the process ends in another way, the file stays.
 class UnfinishedFile {
  public:
   explicit UnfinishedFile(std::string path);

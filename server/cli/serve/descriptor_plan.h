@@ -1,4 +1,4 @@
-// How a configuration shares out the process's file descriptors.
+// Divides the process's file descriptors according to the configuration.
 #pragma once
 
 #include "config/config.h"
@@ -7,11 +7,11 @@
 
 namespace terrace::cli {
 
-// Raises the limit on open files as far as it may. kUnavailable: the limit is too low. Before the server opens files
-// of its own.
+// Raises the limit on open files as far as permitted. kUnavailable: the limit is too low. Call before the server opens
+// files.
 Result<server::DescriptorBudget> PlanDescriptors(const config::Config& config);
 
-// In the log, where something gets less than the configuration says.
+// Logs a warning if some part gets fewer descriptors than configured.
 void WarnAboutFewDescriptors(const config::Config& config, const server::DescriptorBudget& budget);
 
 }  // namespace terrace::cli

@@ -31,7 +31,7 @@ class JsonMessage final : public spdlog::custom_flag_formatter {
   std::unique_ptr<custom_flag_formatter> clone() const override { return std::make_unique<JsonMessage>(); }
 };
 
-// Lines that a reader who stalls has kept out are told of once he goes on.
+// Reports the number of dropped lines when the reader continues.
 class StderrSink final : public spdlog::sinks::base_sink<std::mutex> {
  protected:
   void sink_it_(const spdlog::details::log_msg& message) override {
@@ -51,7 +51,7 @@ class StderrSink final : public spdlog::sinks::base_sink<std::mutex> {
   }
 };
 
-// A terminal has colours, and somebody before it.
+// On a terminal: colours, and no time limit for the reader.
 std::shared_ptr<spdlog::logger> MakeLogger(const std::string& name) {
   if (::isatty(STDERR_FILENO) != 0) return spdlog::stderr_color_mt(name);
   return std::make_shared<spdlog::logger>(name, std::make_shared<StderrSink>());

@@ -1,11 +1,11 @@
-// The process's log: spdlog on stderr, so that stdout belongs to results.
+// The process's log: spdlog on stderr. Results go to stdout.
 #pragma once
 
 #include "config/config.h"
 
 namespace terrace::cli {
 
-// From any thread, while others log. Says so.
+// Thread-safe. Logs the change.
 void SetLogLevel(config::LogLevel level);
 
 void SetUpLog(config::LogLevel level, config::LogFormat format);

@@ -51,9 +51,9 @@ namespace terrace::cli {
 namespace {
 
 struct ServeArguments {
-  std::filesystem::path directory;  // the working directory at the start; empty: it cannot be named
+  std::filesystem::path directory;  // the working directory at the start; empty: it has no name
   std::vector<std::string> dems;
-  std::string config_file, config_path;  // as it was given, and in full
+  std::string config_file, config_path;  // as given; absolute
   bool print_config = false, check_config = false;
   std::map<std::string, std::string> server_flags, dataset_flags;  // by option key
 };
@@ -69,7 +69,7 @@ int Report(const std::vector<config::ConfigError>& errors, const std::string& fi
   return kExitUsage;
 }
 
-// A folder keeps what looks like an extension, and a trailing slash changes nothing.
+// For folders, keeps what looks like an extension, and ignores a trailing slash.
 std::string StemOf(const std::string& dem) {
   std::error_code ignored;
   const std::filesystem::path path = std::filesystem::path(dem).lexically_normal();
@@ -77,14 +77,14 @@ std::string StemOf(const std::string& dem) {
   return path.has_filename() ? path.filename().string() : path.parent_path().filename().string();
 }
 
-// Something that can be read once, or without end.
+// A file that can be read only once, or endlessly.
 bool IsPipe(const std::string& path) {
   std::error_code ignored;
   return std::filesystem::is_other(path, ignored);
 }
 
-// DEMs of the command line are the last datasets of `config`; `dems`: as they are written there. Each is named after
-// its file, so that two may have one name.
+// The DEMs of the command line are the last datasets of `config`. `dems`: the arguments as written. Each dataset is
+// named after its file, so two may have the same name.
 std::vector<config::ConfigError> FindSameNames(const config::Config& config, const std::vector<std::string>& dems) {
   const std::size_t configured = config.datasets.size() - dems.size();
   std::map<std::string_view, std::size_t> first_of;
@@ -109,7 +109,7 @@ std::vector<config::ConfigError> FindSameNames(const config::Config& config, con
   return errors;
 }
 
-// The file's options, then the flags, then a dataset per DEM of the command line. Everything wrong is collected.
+// Applies the file's options, then the flags, then adds a dataset per DEM of the command line. Collects all errors.
 config::Config MakeConfig(const ServeArguments& arguments, std::vector<config::ConfigError>& errors) {
   config::Config config;
   if (!arguments.config_file.empty()) {
@@ -136,7 +136,7 @@ config::Config MakeConfig(const ServeArguments& arguments, std::vector<config::C
   for (const auto& [key, text] : arguments.dataset_flags) {
     config::SetDatasetOption(key, text, arguments.directory, flags, errors);
   }
-  std::vector<std::string> taken;  // of the DEMs, those that are datasets now
+  std::vector<std::string> taken;  // the DEMs that became datasets
   for (const std::string& written : arguments.dems) {
     if (written.empty()) {
       errors.push_back({"", "a DEM on the command line has an empty name"});
@@ -170,7 +170,7 @@ config::Config MakeConfig(const ServeArguments& arguments, std::vector<config::C
   return config;
 }
 
-// Opens every source; false if one could not be, after all of them had their message, or if it was stopped.
+// Opens every source. Returns false if one failed, after the errors of all were printed, or if it was stopped.
 bool OpenDatasets(const config::Config& config, const dem::RasterCache& cache, const std::stop_token& stop,
                   std::vector<tiler::Dataset>& datasets) {
   bool all_open = true;
@@ -190,10 +190,10 @@ bool OpenDatasets(const config::Config& config, const dem::RasterCache& cache, c
   return all_open;
 }
 
-// What the server runs with: with the viewer that comes with the program, where that is wanted.
+// The configuration of the server: with the installed viewer, if the configuration asks for it.
 config::Config WithViewer(config::Config config) {
   if (!config.viewer.enabled || !config.viewer.directory.empty()) return config;
-  // Installed beside the binary, else where it was built.
+  // Beside the binary if installed, else in the build tree.
   std::error_code ignored;
   const std::filesystem::path binary = std::filesystem::read_symlink("/proc/self/exe", ignored);
   config.viewer.directory = binary.parent_path().parent_path() / "share/terrace/viewer";
@@ -201,13 +201,13 @@ config::Config WithViewer(config::Config config) {
   return config;
 }
 
-// What stopping may take beyond the drain timeout.
+// The time that stopping may take beyond the drain timeout.
 constexpr std::chrono::seconds kStopTime{1};
 
-// Signals that mean something to the running server, besides those that end it.
+// Signals that the running server handles, except those that end it.
 const std::vector<int> kAnsweredSignals = {SIGUSR1, SIGUSR2, SIGHUP};
 
-// `how`: SIG_BLOCK or SIG_UNBLOCK. For this thread and those that it begins.
+// `how`: SIG_BLOCK or SIG_UNBLOCK. For this thread and threads that it starts.
 void MaskSignals(int how, const std::vector<int>& signals) {
   sigset_t set;
   ::sigemptyset(&set);
@@ -232,8 +232,8 @@ int Fail(const Error& error) {
 }
 
 int Serve(const ServeArguments& arguments) {
-  std::signal(SIGPIPE, SIG_IGN);  // whoever reads the log may go away; the server stays
-  std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow fails to be written, as on a full disk
+  std::signal(SIGPIPE, SIG_IGN);  // the server continues if the reader of the log closes its pipe
+  std::signal(SIGXFSZ, SIG_IGN);  // writing beyond a file size limit fails, as on a full disk
   std::vector<config::ConfigError> errors;
   const bool is_read_once = IsPipe(arguments.config_path);
   const config::Config config = MakeConfig(arguments, errors);
@@ -246,9 +246,10 @@ int Serve(const ServeArguments& arguments) {
   if (arguments.check_config) return CheckConfig(arguments, config);
   const Result<std::optional<int>> passed = TakeListenSocket();
   if (!passed) return Fail(passed.error());
-  // Until they are answered they would be the end, and who rotates logs does not ask how long sources take to open.
+  // Until handlers are installed, these signals would end the process; log rotation may send them while sources are
+  // being opened.
   MaskSignals(SIG_BLOCK, kAnsweredSignals);
-  tiler::BuildId();  // of the libraries there are, before GDAL or the system's resolver loads others
+  tiler::BuildId();  // before GDAL or the system's resolver loads further libraries
   server::ServerOptions options;
   options.config = WithViewer(config);
   options.stop_on_signals = true;
@@ -262,7 +263,7 @@ int Serve(const ServeArguments& arguments) {
   dem::SetGdalCache(config.gdal_cache_bytes);
   dem::SetOpenSources(budget->open_sources, budget->vrt_parts);
 
-  StopLimit stop_limit;  // first, as it bounds how long the others take to end
+  StopLimit stop_limit;  // first, because it limits how long the others take to end
   Result<std::shared_ptr<server::DiskCache>> disk(nullptr);
   if (!config.disk_cache.directory.empty()) disk = server::DiskCache::Open(config.disk_cache, budget->store_files);
   if (!disk) return Fail(disk.error());
@@ -273,7 +274,7 @@ int Serve(const ServeArguments& arguments) {
   options.refinement_stats = [refinements] { return refinements->stats(); };
   const dem::RasterCache cache = OpenCache(config);
   options.cache_trouble = [folder = cache.folder] { return folder ? folder->trouble() : std::string(); };
-  std::unique_ptr<server::Reloader> reloader;  // once there is something to look after
+  std::unique_ptr<server::Reloader> reloader;  // once there are datasets to watch
   options.on_source_changed = config.watch ? std::function<void()>([&reloader] { reloader->Look(); }) : nullptr;
   options.on_signal[SIGHUP] = [&reloader] {
     NotifyReloading();
@@ -288,7 +289,7 @@ int Serve(const ServeArguments& arguments) {
   const auto level = std::make_shared<std::atomic<config::LogLevel>>(config.log_level);  // the configured one
   options.on_signal[SIGUSR1] = [] { SetLogLevel(config::LogLevel::kDebug); };
   options.on_signal[SIGUSR2] = [level] { SetLogLevel(*level); };
-  // Before sources are opened, which may take long: who asks meanwhile waits.
+  // Listens before sources are opened, which may take long; requests wait meanwhile.
   auto started = server::Server::Start(nullptr, options);
   if (!started) return Fail(started.error());
   const std::unique_ptr<server::Server> server = *std::move(started);
@@ -344,7 +345,7 @@ int Serve(const ServeArguments& arguments) {
   if (const Result<void> served = server->Replace(catalog_of(datasets, config), config); !served) {
     return Fail(served.error());
   }
-  datasets.clear();  // what is replaced must not stay open
+  datasets.clear();  // replaced files must not stay open
   reloader->Start(config.watch);
   fmt::print("terrace: serving {}\n", served_text());
   std::fflush(stdout);

@@ -10,7 +10,7 @@ namespace terrace::cli {
 
 Result<std::optional<int>> TakeListenSocket() {
   const int count = ::sd_listen_fds(/*unset_environment=*/1);
-  if (count <= 0) return std::nullopt;  // below 0: the variables are not for us, or make no sense
+  if (count <= 0) return std::nullopt;  // below 0: the variables are for another process, or invalid
   if (count > 1) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "{} sockets were passed, and one is served: give the .socket unit one ListenStream=, which may be "
@@ -33,7 +33,7 @@ void NotifyOpening() { ::sd_notify(0, "STATUS=listening, opening the sources"); 
 void NotifyReady(const std::string& status) { ::sd_notify(0, fmt::format("READY=1\nSTATUS={}", status).c_str()); }
 
 void NotifyReloading() {
-  // systemd compares with CLOCK_MONOTONIC, which is what steady_clock is on Linux.
+  // systemd expects CLOCK_MONOTONIC, which steady_clock is on Linux.
   const auto now = std::chrono::steady_clock::now().time_since_epoch();
   const auto us = std::chrono::duration_cast<std::chrono::microseconds>(now).count();
   ::sd_notify(0, fmt::format("RELOADING=1\nMONOTONIC_USEC={}", us).c_str());

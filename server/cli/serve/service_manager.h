@@ -1,5 +1,5 @@
-// What the service manager (systemd) passes to a service and is told by one of Type=notify. Without one nothing
-// happens.
+// Socket activation and notification for the service manager (systemd, Type=notify). Does nothing without a service
+// manager.
 #pragma once
 
 #include <optional>
@@ -9,12 +9,12 @@
 
 namespace terrace::cli {
 
-// The TCP socket that was passed to this process (socket activation, sd_listen_fds(3)); nothing where there is none.
-// kInvalidArgument: it is none to serve HTTP on, or there are several. Once, before there are threads: it changes the
-// environment.
+// Returns the TCP socket that was passed to this process (socket activation, sd_listen_fds(3)); nothing if there is
+// none. kInvalidArgument: the socket is not a listening TCP socket, or there are several. Call once, before threads are
+// started, because it changes the environment.
 Result<std::optional<int>> TakeListenSocket();
 
-// `status`: what `systemctl status` shows, one line.
+// `status`: the line that `systemctl status` shows.
 void NotifyOpening();  // NotifyReady follows
 void NotifyReady(const std::string& status);
 void NotifyReloading();  // NotifyReady follows

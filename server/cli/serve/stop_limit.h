@@ -1,5 +1,5 @@
-// Bounds how long the process takes to stop. Jobs end when they ask their stop token, but a read of a source on a dead
-// mount never returns, and neither joining its thread nor opening a source anew can be given up.
+// Limits the time that the process takes to stop. Jobs check their stop tokens, but a read from a dead mount never
+// returns, and its thread cannot be joined.
 #pragma once
 
 #include <chrono>
@@ -9,7 +9,7 @@ namespace terrace::cli {
 
 class StopLimit {
  public:
-  // From now on the process may go on for `limit`; then it ends with status 1, whatever its threads do. Once.
+  // Ends the process with status 1 after `limit`, whatever its threads do. Call once.
   void Begin(std::chrono::milliseconds limit);
 
  private:

@@ -25,7 +25,7 @@ int TryStart(const config::Config& config, const config::Config& served,
     note(MakeError(ErrorCode::kNotFound, "viewer {}: is no folder; name one with a web page, or true or false",
                    viewer.string()));
   }
-  // One that is there is opened even where its disk has become read-only: a cache is no reason not to start.
+  // An existing cache is opened even if its disk is read-only now: the server can start without it.
   const std::filesystem::path cache = config.disk_cache.directory;
   if (!cache.empty() && !std::filesystem::exists(cache / "lock", ignored)) {
     if (const auto folder = TryFolder(cache); !folder) {

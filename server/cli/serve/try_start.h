@@ -1,4 +1,4 @@
-// What is tried before a server starts.
+// Checks before a server starts.
 #pragma once
 
 #include "config/config.h"
@@ -7,9 +7,9 @@
 
 namespace terrace::cli {
 
-// Tells, on stderr, of everything that keeps the server from starting and can be known before sources are opened; the
-// exit code, kExitOk if there is nothing. The policy of sources is in force then. `served`: `config` as the server gets
-// it; `descriptors`: made of it. `tries_address`: whether the address is to be free.
+// Reports on stderr everything that would keep the server from starting, as far as it can be known before sources are
+// opened. Returns the exit code; kExitOk if there is nothing. Puts the source policy in force. `served`: `config` as
+// passed to the server. `descriptors`: its descriptor budget. `tries_address`: checks that the address is free.
 int TryStart(const config::Config& config, const config::Config& served,
              const Result<server::DescriptorBudget>& descriptors, bool tries_address);
 
