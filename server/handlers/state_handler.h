@@ -11,7 +11,7 @@
 
 namespace terrace::server {
 
-// Stands among troubles for the folder of what is learnt of sources. No dataset has such a name.
+// The key of the statistics cache's folder among the problems. No dataset has such a name.
 inline constexpr const char* kCacheTrouble = "/cache_dir";
 
 // The current state of the process. Thread-safe.

@@ -29,7 +29,7 @@ class UndulationRanges {
   HeightRange Query(double west, double south, double width, double height) const;
 
   HeightRange whole() const { return whole_; }
-  bool is_complete() const { return is_complete_; }  // known all over the area
+  bool is_complete() const { return is_complete_; }  // known in the whole area
 
  private:
   explicit UndulationRanges(const UndulationGrid& grid) : grid_(&grid) {}

@@ -67,7 +67,7 @@ class StatisticsPages {
 
 class RasterSource {
  public:
-  // Opens a raster, checks it, and scans it once for its heights. Errors name the file, what is wrong and the remedy.
+  // Opens and checks a raster, and reads it once for its statistics. Errors name the file, the fault and the remedy.
   // What is learnt is kept in `cache`, or taken from there. `pages` bounds the memory of the tables of this and other
   // rasters; null: nothing does. kCancelled: stopped.
   static Result<std::unique_ptr<RasterSource>> Open(const std::string& path, const SourceOptions& options = {},

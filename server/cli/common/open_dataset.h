@@ -13,8 +13,8 @@
 
 namespace terrace::cli {
 
-// Opens and scans all files of the dataset; statistics are kept in `cache`. Errors name the file and the remedy.
-// `fault`: dem::DemOptions.
+// Opens all files of the dataset and reads their statistics, which are stored in `cache`. Errors name the file and the
+// remedy. `fault`: dem::DemOptions.
 Result<std::unique_ptr<dem::DemSource>> OpenSource(const config::DatasetConfig& wanted, const dem::RasterCache& cache,
                                                    const std::function<void(double)>& progress,
                                                    std::stop_token stop = {},
