@@ -131,7 +131,7 @@ struct TlsConfig {
   friend bool operator==(const TlsConfig&, const TlsConfig&) = default;
 };
 
-// Stands for the place that common/cache_place.h finds. As a path it would not be relative.
+// Means the default folder of common/cache_place.h.
 inline constexpr std::string_view kDefaultCacheDir = "default";
 
 struct Config {
@@ -146,8 +146,8 @@ struct Config {
   std::size_t cache_bytes = std::size_t{256} << 20;             // 0: no cache
   std::size_t refinement_cache_bytes = std::size_t{128} << 20;  // 0: no cache
   DiskCacheConfig disk_cache;
-  std::string cache_dir = std::string(kDefaultCacheDir);  // statistics of sources are kept there; empty: nowhere
-  std::size_t cache_dir_bytes = std::size_t{2} << 30;     // of its files; 0: as if it were empty
+  std::string cache_dir = std::string(kDefaultCacheDir);  // folder of the statistics cache; empty: none
+  std::size_t cache_dir_bytes = std::size_t{2} << 30;     // limit of its files; 0: no cache
   std::size_t gdal_cache_bytes = std::size_t{256} << 20;  // blocks of sources
   std::size_t max_open_sources = 256;                     // files of all datasets kept open between reads
   std::size_t max_connections = 1024;

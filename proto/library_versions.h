@@ -1,12 +1,12 @@
-// The libraries that write bytes of tiles.
+// The libraries that tiles are written with.
 #pragma once
 
 #include <string>
 
 namespace terrace::proto {
 
-// "Draco 1.5.5, meshoptimizer 180, ...": names and versions of the encoders and compressors that are in use. Another
-// version of one may write other bytes of the same tile.
+// Names and versions of the encoders and compressors in use: "Draco 1.5.5, meshoptimizer 180, ...". Other versions may
+// write other bytes for the same tile.
 std::string LibraryVersions();
 
 }  // namespace terrace::proto

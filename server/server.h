@@ -28,8 +28,8 @@ struct ServerOptions {
   std::shared_ptr<DiskCache> disk_cache;                            // of finished tiles, below memory; may be null
   std::vector<std::shared_ptr<tiler::TileStore>> tile_stores = {};  // further tiers, below the disk
   std::function<tiler::ByteCacheStats()> refinement_stats;          // of the refinement cache; may be empty
-  std::function<std::string()> cache_trouble = {};  // why sources are not kept in cache_dir, "": they are; thread-safe
-  std::chrono::milliseconds metrics_age{1'000};     // how long a text of /metrics is reused
+  std::function<std::string()> cache_trouble = {};                  // why cache_dir is not used; "": it is; thread-safe
+  std::chrono::milliseconds metrics_age{1'000};                     // how long a text of /metrics is reused
   std::chrono::milliseconds drain_grace{
       500};                      // how long new requests are still served after a stop; part of drain_timeout
   bool stop_on_signals = false;  // SIGINT and SIGTERM act like RequestStop; the second ends the process with status 1
@@ -66,8 +66,8 @@ class Server {
   // Call it after a rotation of logs.
   void ReopenAccessLog();
 
-  // What /readyz calls degraded besides cache_trouble: troubles by dataset, "" is the configuration. Nobody waits for a
-  // source in trouble.
+  // Sets the problems that /readyz reports as "degraded" besides cache_trouble, by dataset; "" is the configuration.
+  // Requests do not wait for a source with a problem.
   void SetTroubles(std::map<std::string, std::string> troubles);
 
   std::uint16_t port() const;

@@ -1,12 +1,13 @@
-// Where statistics of sources are kept unless the configuration says otherwise.
+// The default folder of the statistics cache.
 #pragma once
 
 #include <string>
 
 namespace terrace::config {
 
-// By the environment: CACHE_DIRECTORY, which systemd sets (the first of several folders), else XDG_CACHE_HOME/terrace,
-// else HOME/.cache/terrace. Relative paths do not count, as the XDG specification wants. Empty: there is no such place.
+// Derived from the environment: CACHE_DIRECTORY, which systemd sets (the first of several folders), else
+// XDG_CACHE_HOME/terrace, else HOME/.cache/terrace. Ignores relative paths, as the XDG specification requires. Empty:
+// there is none.
 std::string DefaultCachePlace();
 
 }  // namespace terrace::config

@@ -80,12 +80,11 @@ class DemSource {
   // Samples read since Open, by all threads. For metrics.
   SampleCounts CountSamples() const;
 
-  // A hash of all that decides heights, the same of every copy of the files: their samples as they are read, in order
-  // of precedence, where they lie and what they count from, and every option that changes heights.
+  // A hash of everything that heights depend on: samples, positions and vertical datums of all sources in order of
+  // precedence, and every option that changes heights. Copies of the files have the same hash.
   std::uint64_t fingerprint() const;
 
-  // What was kept of a source in the cache folder cannot be read any more. Its tiles take longer until it is opened
-  // anew.
+  // Whether a source's data in the cache folder can no longer be read. Its tiles then take longer until it is reopened.
   bool has_lost_cache() const;
 
   // The files of all sources with their stamps at Open.

@@ -44,7 +44,7 @@ enum class HeightDatum : std::uint8_t {
 class AveragesBudget;
 class CacheFolder;
 
-// Where statistics and averages of rasters are kept, so that no raster is read whole twice.
+// The storage of statistics and averages of rasters, so that no raster is read completely twice.
 struct RasterCache {
   std::shared_ptr<CacheFolder> folder = {};     // the statistics cache (statistics/cache_folder.h); null: none
   std::shared_ptr<AveragesBudget> memory = {};  // for averages that the folder does not keep; null: none
@@ -101,12 +101,12 @@ struct NodeWindow {
   int columns = 0, rows = 0;
 };
 
-// Elements of a grid of so many columns and rows, or before a row.
+// The number of elements of a grid, or before a row of it.
 constexpr std::size_t Area(std::int64_t columns, std::int64_t rows) {
   return static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);
 }
 
-// 0 .. modulus - 1, as of columns around the Earth.
+// The remainder in 0 .. modulus - 1, for example of columns around the Earth.
 constexpr std::int64_t FloorMod(std::int64_t value, std::int64_t modulus) {
   return (value % modulus + modulus) % modulus;
 }
@@ -139,8 +139,8 @@ struct RasterInfo {
   std::string overviews_unused;  // why overviews are ignored, with the remedy; empty: none are
   std::string transform;         // PROJ operation from EPSG:4326 to the source, for the log; empty: none needed
   bool needs_averages = false;   // large, and without overviews
-  int least_kept_factor = 0;     // of averages that are kept; 0: none are
-  bool is_in_folder = false;     // they are in the statistics cache; false: in memory
+  int least_kept_factor = 0;     // smallest factor of stored averages; 0: none
+  bool is_in_folder = false;     // averages are in the statistics cache; false: in memory
   double seconds_to_open = 0;
 };
 

@@ -18,7 +18,7 @@ Side SideOf(const HeightField& field, const Corner& a, const Corner& b);
 
 // A border edge along its axis, and the samples beside it. Precondition: (b - a) stride < 2^31, as in any HeightField.
 struct Chord {
-  int a = 0, b = 0;                // where it begins and ends; a < b
+  int a = 0, b = 0;                // first and last sample; a < b
   double h_a = 0, h_b = 0;         // heights of the ends, metres
   const float* heights = nullptr;  // the sample at a, metres; NaN is void
   int stride = 1;                  // from one sample to the next

@@ -12,7 +12,7 @@ namespace terrace::proto {
 struct LayerDescription {
   std::string name;
   std::string attribution;
-  std::string version;                                 // of the tiles: what the template asks for, [0-9A-Za-z._~-]
+  std::string version;                                 // of the tiles, for the template: [0-9A-Za-z._~-]
   std::vector<std::vector<geo::TileRange>> available;  // by level, from 0
   // Degrees. west > east, or east > 180, is a box across the antimeridian: layer.json then spans all longitudes,
   // because its readers know only boxes with west < east.

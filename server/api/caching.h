@@ -1,4 +1,4 @@
-// How long a reply may be kept: the value of its Cache-Control.
+// How long a reply may be cached: the value of its Cache-Control.
 #pragma once
 
 #include <string_view>
@@ -7,13 +7,14 @@
 
 namespace terrace::server {
 
-// Of documents that name the current version: clients ask again each time, and usually hear 304.
+// For documents that contain the current version: clients must revalidate, and usually get 304.
 inline constexpr std::string_view kRevalidate = "no-cache";
 
-// Of a reply whose bytes the dataset's version and the URL decide, by the `v` parameter of its query: for a year where
-// that is the current version, since the URL never means anything else; not at all where it is another one, since the
-// reply is of the current version nevertheless; `unversioned` where there is none. Of several the first counts: clients
-// append their own behind that of a template. The result may be a view of `unversioned`.
+// For a reply whose bytes depend only on the dataset's version and the URL. The value depends on the `v` parameter of
+// the query. If it is the current version, the reply may be cached for a year, because the URL always means the same
+// bytes. If it is another version, it may not be cached, because the reply is of the current version. Without `v`, the
+// value is `unversioned`. Of several `v`, the first is used, because clients append their own after that of a template.
+// The result may be a view of `unversioned`.
 std::string_view CacheControlOf(std::string_view query, const DatasetView& dataset, std::string_view unversioned);
 
 }  // namespace terrace::server

@@ -9,8 +9,8 @@
 namespace terrace::server {
 
 struct HandlerOptions {
-  std::string cache_control = "public, max-age=3600";  // of replies that are asked for without a version
-  // A literal: the headers in which a trusted proxy tells the origin that clients ask; empty: no proxy is trusted.
+  std::string cache_control = "public, max-age=3600";  // for requests without a version
+  // A literal: the headers in which a trusted proxy reports the origin; empty: no proxy is trusted.
   std::string_view origin_headers = {};
   std::chrono::milliseconds deadline{30'000};  // of an answer that has to be made
   // Delay of a refusal for overload. A client that is refused at once retries at once, and answering tens of thousands

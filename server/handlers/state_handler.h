@@ -20,7 +20,7 @@ class ProcessState {
   virtual ~ProcessState() = default;
   virtual bool draining() const = 0;
   virtual bool opening() const = 0;  // the first catalog has not been opened yet
-  // By dataset; "" is the configuration, and kCacheTrouble what it says.
+  // Problems by dataset; "" is the configuration, kCacheTrouble the cache folder.
   virtual std::map<std::string, std::string> troubles() const = 0;
   virtual asio::awaitable<std::shared_ptr<const std::string>> MetricsText() const = 0;
 };

@@ -15,7 +15,7 @@ namespace terrace::server {
 class TileJsonHandler {
  public:
   // `datasets` must outlive this.
-  // `origin_headers`: HandlerOptions.
+  // `origin_headers`: as in HandlerOptions.
   TileJsonHandler(std::span<const DatasetView> datasets, std::string_view origin_headers);
 
   // Precondition: a route of tiles.json. `?encoding` and `?size` go into the tile template.

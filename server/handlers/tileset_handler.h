@@ -19,7 +19,7 @@ namespace terrace::server {
 class TilesetHandler {
  public:
   // `datasets` must outlive this.
-  // `cache_control`: of subtrees that are asked for without a version.
+  // `cache_control`: for requests of subtrees without a version.
   TilesetHandler(std::span<const DatasetView> datasets, std::string cache_control);
 
   // `?error=E` and `?fraction=F` go into the templates.

@@ -24,9 +24,8 @@ struct Response {
   std::string_view content_encoding;  // a literal; empty: none
   std::string etag;                   // with its quotes; may be empty
   std::string cache_control;          // may be empty
-  std::string_view vary;              // a literal: names of the headers it depends on, of which each divides the
-                                      // caches on the way; may be empty
-  std::string_view vary_too;          // further ones, likewise
+  std::string_view vary;              // a literal: the request headers that the reply depends on; may be empty
+  std::string_view vary_too;          // a literal: further request headers; may be empty
   bool for_grant = false;             // the reply depends on the request's token
   bool close = false;                 // end the connection after this reply
   bool is_vital = false;              // reports the server's state: may use memory beyond the limits of other replies

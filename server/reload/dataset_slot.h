@@ -73,7 +73,7 @@ class DatasetSlot {
   bool reopen_ = false;                               // the dataset being opened is no longer the wanted one
   std::string problem_;                               // of the last attempt
   std::vector<std::optional<dem::FileStamp>> tried_;  // the named files at the last attempt that failed
-  Clock::time_point recover_at_;                      // when to open it anew next for what the cache folder has lost
+  Clock::time_point recover_at_;                      // when to reopen it next, after data in the cache folder was lost
   Clock::duration recover_delay_{0};
   Clock::time_point retry_at_;
   Clock::duration retry_delay_{0};

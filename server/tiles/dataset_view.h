@@ -42,7 +42,7 @@ struct DatasetView {
   int metadata_levels = 0;                      // tiles at multiples of this level have metadata; 0: none
   int max_mercator_depth = 1;                   // the deepest geo::MercatorGrid that height tiles are cut from
 
-  // As it stands in URLs, changes with the generation.
+  // The version in URLs; changes with the generation.
   std::string version() const { return tiler::VersionText(generation); }
   int max_level() const { return static_cast<int>(available.size()) - 1; }
 };

@@ -8,12 +8,12 @@
 namespace terrace::dem {
 
 struct Box {
-  double west = 0, south = 0, east = 0, north = 0;  // of pixels: south is the first row
+  double west = 0, south = 0, east = 0, north = 0;  // in pixels, `south` is the first row
 
   void Grow(double x, double y) { west -= x, east += x, south -= y, north += y; }
 };
 
-// An R-tree. Thread-safe unless entries are removed; an empty index finds nothing.
+// An R-tree. Thread-safe as long as no entries are removed. An empty index finds nothing.
 class BoxIndex {
  public:
   struct Entry {
@@ -30,7 +30,7 @@ class BoxIndex {
   // Returns the values of the entries that intersect or touch the box, ascending, without duplicates.
   std::vector<std::size_t> Find(const Box& box) const;
 
-  // Precondition: the index was made with this entry.
+  // Removes an entry. Precondition: the index was made with it.
   void Remove(const Entry& entry);
 
  private:

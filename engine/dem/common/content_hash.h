@@ -1,4 +1,4 @@
-// Hashes of contents: the same on every machine, and of every copy.
+// Hashes of contents: equal on every machine and for every copy.
 #pragma once
 
 #include <cstddef>
@@ -23,7 +23,7 @@ class ContentHasher {
   ContentHasher();
 
   void AddBytes(const void* bytes, std::size_t size);
-  // With its length, so that texts that follow each other are told apart.
+  // Adds the length as well, so that different divisions into texts have different hashes.
   void AddText(std::string_view text);
   template <typename T>
   void Add(T value) {

@@ -41,7 +41,7 @@ class AnyIdlePool {
 template <typename T>
 class IdlePool : public AnyIdlePool {
  public:
-  // Belongs to the holder until it goes out of scope; then its pool, which outlives it, keeps the object.
+  // An object on loan. Its destructor returns the object to the pool, which must outlive it.
   class Handle {
    public:
     Handle(IdlePool& pool, Lease lease)
@@ -59,10 +59,10 @@ class IdlePool : public AnyIdlePool {
    private:
     IdlePool* pool_;
     std::shared_ptr<T> item_;
-    std::uint64_t epoch_;  // tells whether Clear was called since
+    std::uint64_t epoch_;  // detects calls of Clear since then
   };
 
-  // The one used last; false: none is idle, and the caller makes one (Set).
+  // Takes the most recently used object. False: none is idle, and the caller makes one (Set).
   Handle Take() { return Handle(*this, TakeAny()); }
 };
 

@@ -56,7 +56,7 @@ class Geoid {
   const std::string& pipeline() const { return operations_.pipeline(); }  // as PROJ runs it
   // The files that the operation reads, as they were when it was set up.
   const StampedFiles& files() const { return files_; }
-  // Adds the operation and its grids' bytes; where a grid lies makes no difference. Errors: those of HashFiles.
+  // Adds the operation and the bytes of its grids to a hash, but not the paths of grids. Errors: those of HashFiles.
   Result<void> AddTo(ContentHasher& hasher, const FileContentOptions& options) const;
   // The grid, if the operation is only bilinear interpolation in one grid; else null.
   const UndulationGrid* grid() const { return grid_.get(); }
@@ -71,7 +71,7 @@ class Geoid {
 
   AreaOfUse area_;
   std::string name_, unit_, description_;
-  bool is_of_file_ = false;  // OfGrid: the pipeline names a file by its path
+  bool is_of_file_ = false;  // made by OfGrid: the pipeline contains a path
   StampedFiles files_;
   std::shared_ptr<const UndulationGrid> grid_;
   double finest_cell_ = 0;

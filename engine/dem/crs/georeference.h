@@ -92,10 +92,10 @@ class Georeference {
   std::string transform() const { return projector_ == nullptr ? "" : projector_->description(); }
   std::string pipeline() const { return projector_ == nullptr ? "" : projector_->pipeline(); }
 
-  // Adds all that decides where pixels lie. Which operation of PROJ places them, and by which grids, depends on what is
-  // installed. Errors: those of HashFiles.
+  // Adds to a hash everything that the positions of pixels depend on, including the PROJ operation and its grids, which
+  // depend on the installation. Errors: those of HashFiles.
   Result<void> AddTo(ContentHasher& hasher, const FileContentOptions& options) const;
-  // Identifies the bytes of the files of a raster that lies there. Errors: those of HashFiles.
+  // A hash of this georeference and of the bytes of a raster's files. Errors: those of HashFiles.
   Result<std::uint64_t> FingerprintWith(const StampedFiles& files, const FileContentOptions& options) const;
 
  private:
@@ -119,7 +119,7 @@ class Georeference {
   std::string crs_, vertical_datum_, vertical_unit_, vertical_crs_, pixel_unit_;
 };
 
-// A reference system without what heights count from.
+// Returns the horizontal part of a reference system.
 OGRSpatialReference HorizontalPart(const OGRSpatialReference& srs);
 
 }  // namespace terrace::dem

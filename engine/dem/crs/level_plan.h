@@ -28,8 +28,9 @@ double SamplesPerCell(const geo::Lattice& lattice, const SourceSpacing& spacing)
 // Returns the number of samples per axis that are averaged into one: the nearest power of two, at least 1.
 int AveragingFactor(double samples_per_cell);
 
-// Lattices of levels 0 .. geo::kMaxLevel for a dataset whose finest source is this one: at least as fine as the source,
-// from the level above `max_level`, the deepest one served, at least twice as fine; at most 257 nodes a side.
+// Returns the lattices of levels 0 .. geo::kMaxLevel for a dataset whose finest source has this spacing. They are at
+// least as fine as the source; from the level above `max_level`, the deepest one served, at least twice as fine; and
+// have at most 257 nodes per side.
 std::vector<geo::Lattice> PlanLattices(const SourceSpacing& finest, int max_level);
 
 // Returns the first depth of Web Mercator whose pixels are at least as fine as the source at its centre, 1 ..

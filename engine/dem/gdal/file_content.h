@@ -1,4 +1,4 @@
-// Hashes of the bytes of files that are not read through for statistics: masks, images, grids of PROJ.
+// Hashes of the bytes of files that have no statistics: masks, images, PROJ grids.
 #pragma once
 
 #include <stop_token>
@@ -11,14 +11,14 @@
 namespace terrace::dem {
 
 struct FileContentOptions {
-  std::string cache_dir = {};  // keeps the hashes of large files; empty: none
+  std::string cache_dir = {};  // folder that stores the hashes of large files; empty: none
   std::stop_token stop = {};
 };
 
-// Of all files in order. The path, the inode and the times of a file make no difference. Files with a GDAL path, which
-// may be remote, are not read: they count by StampedFiles::other_fingerprints. The hash of a file is kept for as long
-// as its stamp is the same: in memory, that of a large file in `cache_dir` as well.
-// kChanged: a file is not the one that was stamped. kUnavailable: it cannot be read. kCancelled: stopped.
+// Hashes all files in order, but not their paths, inodes and times. Files with a GDAL path, which may be remote, are
+// not read: StampedFiles::other_fingerprints is used instead. The hash of a file is cached as long as its stamp is
+// unchanged: in memory, and for large files in `cache_dir` as well. kChanged: a file has changed since it was stamped.
+// kUnavailable: it cannot be read. kCancelled: stopped.
 Result<ContentHash> HashFiles(const StampedFiles& files, const FileContentOptions& options = {});
 
 }  // namespace terrace::dem

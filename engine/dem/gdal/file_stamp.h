@@ -57,7 +57,7 @@ class StampedFiles {
 
   // Returns a hash of all stamps and GDAL paths.
   std::uint64_t fingerprint() const;
-  // Of the GDAL paths alone, in order.
+  // Fingerprints of the GDAL paths, in order.
   const std::vector<std::uint64_t>& other_fingerprints() const { return others_; }
 
  private:

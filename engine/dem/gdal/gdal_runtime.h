@@ -19,7 +19,7 @@ struct GdalCounts {
 };
 GdalCounts CountGdalErrors();
 
-// "GDAL 3.6.2, PROJ 9.1.1": those in use. Another version of one may read or place samples otherwise.
+// The versions in use: "GDAL 3.6.2, PROJ 9.1.1". Other versions may read or locate samples differently.
 std::string LibraryVersions();
 
 // Sets the size of GDAL's block cache, for all threads together.

@@ -47,7 +47,7 @@ class Imagery {
   // as above. kUnavailable: the image cannot be read now. kCancelled: stopped.
   Result<std::optional<TilePicture>> Read(const geo::TileKey& key, int side, std::stop_token stop = {}) const;
 
-  // Identifies the content: the bytes of its files, and where they lie on the Earth. The same of every copy.
+  // A hash of the bytes of its files and of their georeference. Copies have the same hash.
   std::uint64_t fingerprint() const;
 
   // The files of the image with their stamps at Open.

@@ -34,7 +34,7 @@ class WaterRaster {
   // as water. Precondition: a valid key. kUnavailable: the raster cannot be read now. kCancelled: stopped.
   Result<std::vector<std::uint8_t>> Read(const geo::TileKey& key, std::stop_token stop = {}) const;
 
-  // Identifies the content: the bytes of its files, and where they lie on the Earth. The same of every copy.
+  // A hash of the bytes of its files and of their georeference. Copies have the same hash.
   std::uint64_t fingerprint() const;
 
   // The files of the raster with their stamps at Open.

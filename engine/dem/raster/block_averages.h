@@ -117,8 +117,8 @@ class BlockAverages {
   std::vector<BlockSum> outer_;
 };
 
-// A window of averages of block x block values each. The values stand for blocks of `step` samples; `columns` and
-// `rows` are their axes. Calls read(window, out) for windows of values that do not wrap.
+// Computes a window of averages of block x block values. Each value covers a block of `step` samples; `columns` and
+// `rows` are the axes of the values. Calls read(window, out) for windows of values that do not wrap.
 template <typename Read>
 Result<std::vector<float>> AverageBlocks(const GridAxis& columns, const GridAxis& rows, int step, int block,
                                          const GridWindow& window, const Read& read) {
@@ -131,7 +131,7 @@ Result<std::vector<float>> AverageBlocks(const GridAxis& columns, const GridAxis
     const std::int64_t first = FloorMod(window.column + column, turn) * block;
     const std::int64_t blocks = std::min(window.columns - column, turn - first / block);
     const std::int64_t width = std::min(columns.count() - first, blocks * block);
-    // In rows: a row of blocks can be the whole raster.
+    // A limited number of rows at a time, because a row of blocks can be the whole raster.
     const std::int64_t strip = std::max<std::int64_t>(1, kValuesPerStrip / width);
     const bool is_plain = block == 1 && width == blocks;
     // Not initialized, because it is written before it is read.

@@ -81,7 +81,7 @@ class NodeCells {
 // Returns the smallest window that contains all cells. If the axis wraps, moves the cells to columns near one of them.
 // Precondition: not empty.
 GridWindow WindowOf(std::span<GridCell> cells, const GridAxes& axes);
-// The same with cells as they are.
+// The same without moving the cells.
 GridWindow HullOf(std::span<const GridCell> cells, const GridAxes& axes);
 
 // Interpolates bilinearly, with weights renormalized over valid samples; nothing if there is none.

@@ -17,7 +17,7 @@ namespace terrace::dem {
 
 // What must be known of a raster to read it. Immutable after Open.
 struct RasterLayout {
-  // `crs_unit`: SampleRules::Of's.
+  // `crs_unit`: as for SampleRules::Of.
   static RasterLayout Of(GDALDataset& dataset, const Georeference& georeference, const std::string& crs_unit);
 
   int width = 0, height = 0;  // of the file

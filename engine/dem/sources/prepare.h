@@ -38,14 +38,14 @@ struct PreparedRaster {
   DetectedNodata detected;  // undeclared nodata; the statistics exclude it
   RasterStatistics statistics;
   std::shared_ptr<const CachedAverages> averages;         // null: none
-  std::shared_ptr<const MemoryAverages> memory_averages;  // where the file is not stored; null: none
+  std::shared_ptr<const MemoryAverages> memory_averages;  // if the file is not stored; null: none
   std::string cache_file;                                 // empty: not stored
   std::shared_ptr<const CacheFolder::Use> use;            // of the cache file, stored or not; null: no cache folder
   StatisticsShape shape;                                  // of the cache file
   Preparation preparation;
 };
 
-// `layout`: as the file and the configuration state it. Where the cache folder cannot keep the statistics, or there is
+// `layout`: as the file and the configuration state it. If the cache folder cannot store the statistics, or there is
 // none, averages are kept in memory as far as they fit. Errors name the file. kCancelled: stopped; finished chunks stay
 // in the cache.
 Result<PreparedRaster> PrepareRaster(GDALDataset& dataset, const RasterLayout& layout, const std::string& path,

@@ -68,8 +68,8 @@ class StatisticsPages {
 class RasterSource {
  public:
   // Opens and checks a raster, and reads it once for its statistics. Errors name the file, the fault and the remedy.
-  // What is learnt is kept in `cache`, or taken from there. `pages` bounds the memory of the tables of this and other
-  // rasters; null: nothing does. kCancelled: stopped.
+  // Statistics are stored in `cache`, or loaded from it. `pages`: limits the memory of the statistics of this and other
+  // rasters; null: no limit. kCancelled: stopped.
   static Result<std::unique_ptr<RasterSource>> Open(const std::string& path, const SourceOptions& options = {},
                                                     const RasterCache& cache = {},
                                                     const std::function<void(double)>& progress = {},
@@ -85,7 +85,7 @@ class RasterSource {
   const Footprint& footprint() const { return footprint_; }
   const SourceSpacing& spacing() const { return spacing_; }
   const RimVoids& rim_voids() const { return rim_voids_; }
-  // Of its heights, in metres as they are read: a copy of the file has the same.
+  // A hash of the heights in metres. Copies of the file have the same hash.
   const ContentHash& content() const { return content_; }
   // Means of the valid samples of the first and the last row.
   const std::array<std::optional<double>, 2>& edge_row_means() const { return edge_row_means_; }
@@ -101,7 +101,7 @@ class RasterSource {
   const CachedAverages* averages() const { return averages_.get(); }
   // Null: none.
   const MemoryAverages* memory_averages() const { return memory_averages_.get(); }
-  // What was in the cache file cannot be read any more: opened anew, the raster has it again, or averages in memory.
+  // Whether the cache file can no longer be read. Reopening the raster restores it, or keeps averages in memory.
   bool has_lost_cache() const { return has_lost_cache_; }
 
   // How the statistics were made.

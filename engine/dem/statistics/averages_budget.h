@@ -1,4 +1,4 @@
-// The memory of averages that no cache folder keeps (memory_averages.h).
+// Memory budget for averages that are not in a cache folder (memory_averages.h).
 #pragma once
 
 #include <atomic>
@@ -6,7 +6,7 @@
 
 namespace terrace::dem {
 
-// Bytes for averages of all rasters of a process. Thread-safe.
+// The bytes available for averages of all rasters of the process. Thread-safe.
 class AveragesBudget {
  public:
   static constexpr std::size_t kDefaultBytes = std::size_t{128} << 20;
@@ -14,7 +14,7 @@ class AveragesBudget {
   explicit AveragesBudget(std::size_t bytes = kDefaultBytes) : left_(bytes) {}
 
   std::size_t left() const { return left_; }
-  // False: there are not so many left.
+  // Takes bytes from the budget. Returns false if fewer are left.
   bool Take(std::size_t bytes) {
     std::size_t left = left_;
     while (left >= bytes) {

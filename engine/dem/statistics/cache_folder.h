@@ -1,9 +1,8 @@
-// A folder of statistics files (statistics_cache.h) within a budget of bytes.
-//
-// Several processes may share it. Before a file grows, those that were not used for longest are removed until there is
-// room. A file counts as used when it is loaded, and once an hour while averages are read from it; its time of
-// modification tells when. Files in use by this process stay. What terrace did not write is neither counted nor
-// removed: a file is known by its name and by its first bytes.
+// A folder of statistics files (statistics_cache.h) with a limited total size.
+// Several processes may share it. Before a file grows, the least recently used files are removed until it fits. Loading
+// a file counts as use, and so do reads of averages, at most once an hour; the time of the last use is the file's
+// modification time. Files in use by this process are not removed. Files that terrace did not write are neither counted
+// nor removed: a file is recognized by its name and its first bytes.
 #pragma once
 
 #include <chrono>
@@ -25,7 +24,7 @@ namespace terrace::dem {
 class CacheFolder {
  public:
   static constexpr std::uint64_t kUnbounded = ~std::uint64_t{0};
-  // Of the names of finished files, and what follows it while a file is made.
+  // The extension of finished files, and the suffix of files that are being written.
   static constexpr std::string_view kEnding = ".statistics", kPartial = ".partial";
   static constexpr std::uint64_t kMagic = 0x31'53'54'41'54'53'52'54;  // "TRSTATS1", the first bytes of each file
 
@@ -37,7 +36,7 @@ class CacheFolder {
   const std::string& path() const { return path_; }
   std::uint64_t max_bytes() const { return max_bytes_; }
 
-  // One raster's file, in use until this ends. The file need not exist.
+  // Marks one raster's file as in use until the object is destroyed. The file need not exist.
   class Use {
    public:
     Use(std::shared_ptr<CacheFolder> folder, const std::string& file);
@@ -46,7 +45,7 @@ class CacheFolder {
     Use& operator=(const Use&) = delete;
 
     CacheFolder& folder() const { return *folder_; }
-    // The file can be neither kept nor read. `reason`: "cannot be written: No space left on device".
+    // Reports that the file can be neither stored nor read. `reason`: "cannot be written: No space left on device".
     void Fail(const std::string& reason) const;
     void Succeed() const;
 
@@ -55,14 +54,14 @@ class CacheFolder {
     const std::string name_;
   };
 
-  // Makes room for bytes that a file is about to grow by. kUnavailable: files in use take it.
+  // Reserves bytes by which a file is about to grow. kUnavailable: files in use occupy the budget.
   Result<void> Reserve(std::uint64_t bytes);
-  // They were reserved, and are not there any more.
+  // Releases bytes that were reserved.
   void Release(std::uint64_t bytes);
-  // Removes what is beyond the budget. A warning tells of files in use that are beyond it.
+  // Removes files until the budget is met. Logs a warning if files in use exceed it.
   void Trim();
 
-  // Why a file in use is not kept; names no path. Empty: all are.
+  // The reason why a file in use is not stored, without its path. Empty: all are stored.
   std::string trouble() const;
 
  private:
@@ -81,9 +80,9 @@ class CacheFolder {
   mutable std::mutex mutex_;
   std::multiset<std::string> in_use_;           // names; guarded by mutex_, as are these
   std::map<const Use*, std::string> troubles_;  // reasons
-  std::uint64_t bytes_ = 0, since_scan_ = 0;    // of all files, as far as known; reserved since the last scan
+  std::uint64_t bytes_ = 0, since_scan_ = 0;    // known size of all files; bytes reserved since the last scan
   std::optional<std::chrono::steady_clock::time_point> scanned_at_;
-  std::multimap<std::int64_t, File> oldest_first_;  // files that are not in use, of the last scan, by their time
+  std::multimap<std::int64_t, File> oldest_first_;  // files that were not in use at the last scan, by modification time
 };
 
 }  // namespace terrace::dem

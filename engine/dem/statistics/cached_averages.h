@@ -21,8 +21,9 @@ class CachedAverages {
   CachedAverages(const OpenFile& file, std::string path, RasterLayout layout, std::vector<std::uint64_t> offsets);
 
   bool Has(int factor) const { return factor < kLargestDirect && (factors_ & static_cast<unsigned>(factor)) != 0; }
-  // The same values as ReadGrid. kInvalidArgument: the file is damaged. kNotFound: it is gone, or cannot be reached any
-  // more. kUnavailable: it cannot be opened now, for want of descriptors or memory. Precondition: Has(factor).
+  // The same values as ReadGrid. kInvalidArgument: the file is damaged. kNotFound: it was removed, or is no longer
+  // accessible. kUnavailable: it cannot be opened now, because descriptors or memory have run out. Precondition:
+  // Has(factor).
   Result<std::vector<float>> Read(int factor, const GridWindow& window) const;
 
   // Removes the file, unless another one has replaced it.
@@ -30,7 +31,7 @@ class CachedAverages {
 
   int least_factor() const { return static_cast<int>(factors_ & (~factors_ + 1)); }
 
-  // By all reads so far.
+  // Bytes read so far.
   std::uint64_t bytes_read() const { return bytes_read_; }
 
  private:

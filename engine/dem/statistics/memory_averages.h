@@ -1,4 +1,4 @@
-// Averages of a raster in memory, where no cache folder keeps them.
+// Averages of a raster in memory, for rasters whose averages are not in a cache folder.
 #pragma once
 
 #include <cstddef>
@@ -11,11 +11,12 @@
 
 namespace terrace::dem {
 
-// Those of KeptFactors from the least factor on that fits. Filled by one thread, then immutable and thread-safe.
+// Averages by the factors of KeptFactors, from the smallest factor that fits on. Filled by one thread, then immutable
+// and thread-safe.
 class MemoryAverages {
  public:
-  // Null: the raster needs none, or none fit. One raster takes at most an eighth of what is left, so that each of many
-  // gets coarse ones at least.
+  // Null: the raster needs none, or none fit. One raster takes at most an eighth of the remaining budget, so that each
+  // of many gets at least coarse averages.
   static std::unique_ptr<MemoryAverages> Make(const RasterLayout& layout, std::shared_ptr<AveragesBudget> budget);
   ~MemoryAverages();
   MemoryAverages(const MemoryAverages&) = delete;

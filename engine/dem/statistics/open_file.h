@@ -36,18 +36,18 @@ struct FileIdentity {
 std::optional<FileIdentity> IdentityOf(int file);
 std::optional<FileIdentity> IdentityOf(const std::string& path);
 
-// 0 if it cannot be told.
+// 0 if unknown.
 std::uint64_t SizeOf(int file);
 
-// All of it, or false.
+// Reads all bytes, or returns false.
 bool ReadAt(int file, std::uint64_t offset, void* to, std::size_t bytes);
-// Nothing where the file, of `file_bytes`, ends before.
+// Returns nothing if the file of `file_bytes` bytes ends before.
 std::optional<std::string> ReadAt(int file, std::uint64_t offset, std::uint64_t bytes, std::uint64_t file_bytes);
 
-// The file counts as used now (CacheFolder). Quietly does nothing where it may not.
+// Marks the file as used now (CacheFolder). Does nothing if that is not permitted.
 void Touch(int file);
 
-// errno in words.
+// The text of errno.
 std::string ErrorText();
 
 }  // namespace terrace::dem

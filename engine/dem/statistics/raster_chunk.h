@@ -61,12 +61,11 @@ struct ChunkStatistics {
   std::vector<VoidRun> voids;      // in the columns in use, row by row; empty if the whole chunk is void
   // By factor 2, 4, .. kLargestDirect, as far as the raster has them:
   std::vector<std::vector<float>> errors;    // by AveragingErrors block, or for the share of a block
-  std::vector<std::vector<float>> averages;  // row by row; empty if an overview has them and they are not kept
+  std::vector<std::vector<float>> averages;  // row by row; empty if an overview has them and they are not stored
   std::vector<std::vector<BlockSum>> sums;   // of factors 128 .. 1024, as the averages
 
   bool is_void() const { return valid == 0; }
-  // Of any of these factors (KeptFactors), and then of all of them. A void chunk has some where an overview has
-  // heights.
+  // For factors of KeptFactors: for all of them or none. A void chunk has averages if an overview has heights there.
   bool has_averages(unsigned factors) const;
 };
 

@@ -26,7 +26,7 @@ struct AveragesGrid {
   std::int64_t columns = 0, rows = 0;
   std::vector<float> heights;
 
-  // What ReadGrid gives: columns may lie around the Earth.
+  // The same result as ReadGrid: columns may lie around the Earth.
   std::vector<float> Read(const GridWindow& window) const;
 };
 
@@ -47,7 +47,7 @@ class CoarseAverages {
 };
 
 struct RasterStatistics {
-  ContentHash content;            // of all heights, those of overviews that are read included
+  ContentHash content;            // of all heights, including those of overviews that are read
   RangeTable table;               // overviews that are read count too: their resampling may overshoot the samples
   float lowest = 0, highest = 0;  // of the samples
   std::uint64_t valid = 0, voids = 0;

@@ -1,4 +1,4 @@
-// The samples that a triangle is scanned for: exact integer spans, row by row, and what loops over them find.
+// The samples of a triangle as exact integer spans, row by row, and loops over them.
 #pragma once
 
 #include <algorithm>

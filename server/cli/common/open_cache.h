@@ -1,4 +1,4 @@
-// Where a command keeps what it learns of sources.
+// Opens the statistics cache of a command.
 #pragma once
 
 #include "config/config.h"
@@ -6,8 +6,8 @@
 
 namespace terrace::cli {
 
-// As cache_dir and cache_dir_bytes say. A line of the log tells the place and the bound. A default place that cannot be
-// made is none; one that was asked for is tried with each source.
+// Uses cache_dir and cache_dir_bytes, and logs both. If the default folder cannot be created, there is no cache; a
+// configured folder is tried again with each source.
 dem::RasterCache OpenCache(const config::Config& config);
 
 }  // namespace terrace::cli

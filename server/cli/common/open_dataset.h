@@ -20,13 +20,13 @@ Result<std::unique_ptr<dem::DemSource>> OpenSource(const config::DatasetConfig& 
                                                    std::stop_token stop = {},
                                                    std::function<void(const Error&)> fault = {});
 
-// A dataset of an open source, with its water mask and its imagery, ready to be served. `version`: of this program; it
-// stands in tiles, and another one is another generation.
+// Makes a dataset from an open source, with its water mask and imagery. `version`: of this program. Tiles contain it,
+// so a new version is a new generation.
 Result<tiler::Dataset> MakeDataset(const config::DatasetConfig& wanted, std::shared_ptr<const dem::DemSource> source,
                                    const dem::RasterCache& cache, const std::string& version,
                                    std::stop_token stop = {});
 
-// OpenSource and MakeDataset.
+// OpenSource, then MakeDataset.
 Result<tiler::Dataset> OpenDataset(const config::DatasetConfig& wanted, const dem::RasterCache& cache,
                                    const std::string& version, const std::function<void(double)>& progress = {},
                                    std::stop_token stop = {});
