@@ -1,4 +1,4 @@
-// What of the program decides the bytes of a tile, and how a dataset's version is written.
+// The version of the encoders, and the text of a dataset's version.
 #pragma once
 
 #include <cstdint>
@@ -7,19 +7,19 @@
 
 namespace terrace::tiler {
 
-// Raise it with every change of the program after which the same sources and options give other bytes, or another error
-// in a header, of any tile, subtree, mesh or list of heights. Clients and CDNs keep what has a version for a year: with
-// the old number they would mix old bytes with new ones. Changes of libraries count by themselves (EncoderText), and so
-// do options. A test knows the bytes of some tiles with this number.
+// Raise it with every change of the program that changes the bytes of a tile, subtree, mesh or list of heights, or an
+// error in a header, for the same sources and options. Clients and CDNs keep versioned replies for a year: without a
+// new number they would mix old bytes with new ones. Changes of options and libraries need no new number: both are part
+// of the version. A test records the bytes of some tiles for this number.
 inline constexpr int kEncoderVersion = 1;
 
-// The encoder version, and the versions of the libraries that decide bytes: GDAL, PROJ, Draco and the like.
+// Returns kEncoderVersion and the versions of the libraries that affect bytes: GDAL, PROJ, Draco and others.
 std::string EncoderText();
 
-// As it stands in URLs and documents: the first 12 of the 16 hexadecimal digits of a dataset's generation.
+// Returns the version as URLs and documents contain it: the first 12 of the 16 hexadecimal digits of a generation.
 std::string VersionText(std::uint64_t generation);
 
-// Whether a text is the VersionText of that generation.
+// Whether `text` is the VersionText of `generation`.
 bool IsVersionOf(std::string_view text, std::uint64_t generation);
 
 }  // namespace terrace::tiler

@@ -150,7 +150,7 @@ const std::vector<Option<Config>>& ServerOptionTable() {
        .other_words = "workers jobs"},
       {.key = "cache_dir",
        .value = "DIR|none",
-       .section = "listening",
+       .section = "load",
        .help = "Folder for statistics and averages of sources, so that the next start needs no scan; none is no folder",
        .details = "By default `$CACHE_DIRECTORY`, which systemd sets, else `$XDG_CACHE_HOME/terrace`, else "
                   "`~/.cache/terrace`; a line of the log says where it is. An empty text is `none`, and a folder of "
@@ -165,7 +165,7 @@ const std::vector<Option<Config>>& ServerOptionTable() {
        .codec = CacheDir()},
       {.key = "cache_dir_bytes",
        .value = "BYTES",
-       .section = "listening",
+       .section = "load",
        .help = "Size of the files in cache_dir; 0 is no folder",
        .details = "Before it is exceeded, files that were not used for longest are removed, but none that this server "
                   "uses, and nothing that terrace did not write. What finds no room is kept in memory as far as it "

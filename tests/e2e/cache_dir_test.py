@@ -1,8 +1,6 @@
 """Where the real binary keeps what it learns of sources, and what it does without: cache_dir_test.py BINARY SOURCE_DIR."""
-import array
 import http.client
 import json
-import math
 import os
 import pathlib
 import re
@@ -13,21 +11,11 @@ import tempfile
 import time
 import unittest
 
+from srtm import write_hgt
+
 BINARY = pathlib.Path(sys.argv.pop(1)).resolve()
 SOURCE_DIR = pathlib.Path(sys.argv.pop(1)).resolve()
-SIDE = 1201
 VARIABLES = ("CACHE_DIRECTORY", "XDG_CACHE_HOME", "HOME")
-
-
-def write_hgt(path):
-    """A square degree of hills in the form of SRTM."""
-    heights = array.array("h", (int(1000 + 400 * math.sin(x / 37) * math.cos(y / 53) + 30 * math.sin(x * .7 + y * .3))
-                                for y in range(SIDE) for x in range(SIDE)))
-    if sys.byteorder == "little":
-        heights.byteswap()
-    path.write_bytes(heights.tobytes())
-    an_hour_ago = time.time() - 3600
-    os.utime(path, (an_hour_ago, an_hour_ago))
 
 
 def kept_in(folder):

@@ -5,11 +5,9 @@ are known beforehand, so each answer is told to be of one, of the other, or of n
 
 TERRACE_LONG_TESTS=1: 200 swaps instead of 30.
 """
-import array
 import hashlib
 import http.client
 import json
-import math
 import os
 import pathlib
 import random
@@ -24,25 +22,14 @@ import threading
 import time
 import unittest
 
+from srtm import write_hgt
+
 BINARY = pathlib.Path(sys.argv.pop(1)).resolve()
 SOURCE_DIR = pathlib.Path(sys.argv.pop(1)).resolve()
 SWAPS = 200 if os.environ.get("TERRACE_LONG_TESTS") else 30
-SIDE = 1201
 NAME = "N46E007.hgt"
 # What the manual promises is 2 s; the machine that runs this may be busy.
 SEEN_WITHIN = 8.0
-
-
-def write_hgt(path, phase):
-    """A square degree of hills in the form of SRTM, one file without companions."""
-    rows = [[math.sin(i / 37 + phase) for i in range(SIDE)], [math.cos(i / 53 + phase) for i in range(SIDE)]]
-    heights = array.array("h", (int(1000 + 400 * rows[0][x] * rows[1][y] + 30 * rows[0][(x * 7 + y * 3) % SIDE])
-                                for y in range(SIDE) for x in range(SIDE)))
-    if sys.byteorder == "little":
-        heights.byteswap()
-    path.write_bytes(heights.tobytes())
-    an_hour_ago = time.time() - 3600
-    os.utime(path, (an_hour_ago, an_hour_ago))
 
 
 def replace(path, by):

@@ -3,10 +3,8 @@
 Two servers on copies of one elevation model are replicas: everything that they say of it is the same. What differs in a
 sample, an option or the order of its sources has another version, and nothing of the old one is kept under it.
 """
-import array
 import http.client
 import json
-import math
 import os
 import pathlib
 import re
@@ -18,20 +16,13 @@ import tempfile
 import time
 import unittest
 
+from srtm import SIDE, write_hgt
+
 BINARY = pathlib.Path(sys.argv.pop(1)).resolve()
 SOURCE_DIR = pathlib.Path(sys.argv.pop(1)).resolve()
-SIDE = 1201
 NAME = "N46E007.hgt"
 FOR_GOOD = "public, max-age=31536000, immutable"
 GZIP = {"Accept-Encoding": "gzip"}
-
-
-def write_hgt(path, phase=0.0):
-    rows = [[math.sin(i / 37 + phase) for i in range(SIDE)], [math.cos(i / 53) for i in range(SIDE)]]
-    heights = array.array("h", (int(1000 + 400 * rows[0][x] * rows[1][y]) for y in range(SIDE) for x in range(SIDE)))
-    if sys.byteorder == "little":
-        heights.byteswap()
-    path.write_bytes(heights.tobytes())
 
 
 def set_sample(path, column, row, height):

@@ -17,6 +17,7 @@
 
 #include "engine/core/bytes.h"
 #include "engine/dem/common/all_cores.h"
+#include "engine/dem/common/open_file.h"
 #include "engine/dem/common/source_log.h"
 
 namespace terrace::dem {
@@ -64,9 +65,7 @@ Known& KnownHashes() {
 class KeptHash {
  public:
   KeptHash(const std::string& cache_dir, const std::string& path, const FileStamp& stamp) {
-    std::error_code unresolved;
-    std::filesystem::path whole = std::filesystem::weakly_canonical(path, unresolved);
-    if (unresolved) whole = path;
+    const std::filesystem::path whole = WholePath(path);
     const std::string text = whole.string();
     file_ = std::filesystem::path(cache_dir) /
             fmt::format("{}-{:016x}.content", whole.filename().string(), XXH3_64bits(text.data(), text.size()));
@@ -115,28 +114,15 @@ class KeptHash {
   std::string head_;
 };
 
-struct Descriptor {
-  explicit Descriptor(const std::string& path) : number(::open(path.c_str(), O_RDONLY | O_CLOEXEC)) {}
-  ~Descriptor() {
-    if (number >= 0) ::close(number);
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-
-  const int number;
-};
-
 Result<ContentHash> ReadThrough(const std::string& path, const std::stop_token& stop) {
-  const auto failed = [&] {
-    return MakeError(ErrorCode::kUnavailable, "{}: cannot be read: {}", path, std::generic_category().message(errno));
-  };
-  const Descriptor file(path);
-  if (file.number < 0) return failed();
+  const auto failed = [&] { return MakeError(ErrorCode::kUnavailable, "{}: cannot be read: {}", path, ErrorText()); };
+  const OpenFile file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  if (!file.is_open()) return failed();
   ContentHasher hasher;
   std::vector<char> buffer(kReadBytes);
   for (;;) {
     if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "{}: reading it was stopped", path);
-    const ssize_t got = ::read(file.number, buffer.data(), buffer.size());
+    const ssize_t got = ::read(file.get(), buffer.data(), buffer.size());
     if (got < 0 && errno == EINTR) continue;
     if (got < 0) return failed();
     if (got == 0) return hasher.Hash();

@@ -78,7 +78,9 @@ int Imagery::SideOf(int level, int most) const {
 
 Result<std::optional<TilePicture>> Imagery::Read(const geo::TileKey& key, int side, std::stop_token stop) const {
   TERRACE_CHECK(geo::IsValid(key) && IsSide(side));
-  auto& [pool, georeference, spacing, footprint, _] = *impl_;
+  ImagePool& pool = impl_->pool;
+  const Georeference& georeference = impl_->georeference;
+  const Footprint& footprint = impl_->footprint;
   if (auto unchanged = pool.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
   const geo::Lattice lattice{key.level, side};
   const double extent = lattice.cells * lattice.StepDegrees();
@@ -86,7 +88,7 @@ Result<std::optional<TilePicture>> Imagery::Read(const geo::TileKey& key, int si
                          extent)) {
     return std::nullopt;
   }
-  const int factor = std::min(AveragingFactor(SamplesPerCell(lattice, spacing)), pool.MostAveraged());
+  const int factor = std::min(AveragingFactor(SamplesPerCell(lattice, impl_->spacing)), pool.MostAveraged());
   auto image = pool.Borrow(factor);
   if (!image) return tl::unexpected(image.error());
 

@@ -74,16 +74,17 @@ Result<std::unique_ptr<WaterRaster>> WaterRaster::Open(const std::string& path, 
 
 Result<std::vector<std::uint8_t>> WaterRaster::Read(const geo::TileKey& key, std::stop_token stop) const {
   TERRACE_CHECK(geo::IsValid(key));
-  auto& [path, handles, georeference, spacing, layout, footprint, _] = *impl_;
+  HandlePool& handles = impl_->handles;
+  const RasterLayout& layout = impl_->layout;
   std::vector<std::uint8_t> pixels(std::size_t{kSide} * kSide, 0);
   const geo::Lattice lattice{key.level, kSide};
-  const double samples_per_pixel = SamplesPerCell(lattice, spacing);
+  const double samples_per_pixel = SamplesPerCell(lattice, impl_->spacing);
   const int factor = AveragingFactor(samples_per_pixel);
   // The transition from land to water takes one pixel, whatever the spacing of samples is.
   const double sharpness = std::max(1.0, factor / samples_per_pixel);
 
   const std::vector<Position> positions =
-      CellCentrePositions(georeference, footprint, lattice, key, kWaterPositionTolerance * factor);
+      CellCentrePositions(impl_->georeference, impl_->footprint, lattice, key, kWaterPositionTolerance * factor);
   const GridAxes axes{
       {layout.columns, factor, layout.wraps}, {layout.height, factor, false}, layout.width, layout.height};
   std::vector<GridCell> cells;
@@ -102,7 +103,7 @@ Result<std::vector<std::uint8_t>> WaterRaster::Read(const geo::TileKey& key, std
   const auto shares = ReadGrid(**handle, layout, factor, window, stop);
   if (auto unchanged = handles.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
   if (!shares) {
-    return MakeError(shares.error().code, "{}: tile {}: {}", path, geo::ToString(key), shares.error().message);
+    return MakeError(shares.error().code, "{}: tile {}: {}", impl_->path, geo::ToString(key), shares.error().message);
   }
   for (std::size_t i = 0; i < cells.size(); ++i) {
     const double share = Interpolate(*shares, window, cells[i]).value_or(0);

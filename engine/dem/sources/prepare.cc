@@ -6,7 +6,6 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
-#include <system_error>
 #include <utility>
 
 #include "engine/core/bytes.h"
@@ -204,9 +203,7 @@ class Preparer {
 
 std::string StatisticsPath(const std::string& cache_dir, const std::string& path,
                            const std::vector<double>& extra_nodata, bool find_voids, bool has_overviews) {
-  std::error_code unresolved;
-  std::filesystem::path whole = std::filesystem::weakly_canonical(path, unresolved);
-  if (unresolved) whole = path;
+  const std::filesystem::path whole = WholePath(path);
   ByteWriter writer;
   writer.PutBytes(whole.string());
   for (const double value : extra_nodata) writer.Put(value);

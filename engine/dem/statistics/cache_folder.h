@@ -16,7 +16,7 @@
 #include <string_view>
 
 #include "engine/core/result.h"
-#include "engine/dem/statistics/open_file.h"
+#include "engine/dem/common/open_file.h"
 
 namespace terrace::dem {
 

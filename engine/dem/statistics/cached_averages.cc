@@ -10,6 +10,8 @@
 #include <cstring>
 #include <utility>
 
+#include "engine/dem/dem_types.h"
+
 namespace terrace::dem {
 namespace {
 
@@ -17,18 +19,16 @@ std::int64_t SteadySeconds() {
   return std::chrono::duration_cast<std::chrono::seconds>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-// Size and offset of a chunk's averages of one factor. Each factor is preceded by its checksum.
+// Size and offset of a chunk's averages of one factor, of the stored `factors`. Each factor is preceded by its
+// checksum.
 struct AveragesPlace {
   std::uint64_t offset = 0;
   int columns = 0, rows = 0;
-  std::size_t bytes() const {
-    return static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows) * sizeof(float);
-  }
+  std::size_t bytes() const { return Area(columns, rows) * sizeof(float); }
 };
-AveragesPlace PlaceOf(const Chunk& chunk, const RasterLayout& layout, int factor) {
+AveragesPlace PlaceOf(const Chunk& chunk, const RasterLayout& layout, unsigned factors, int factor) {
   AveragesPlace place;
   const int used = std::clamp(layout.columns - chunk.col, 0, chunk.cols);
-  const unsigned factors = KeptFactors(layout);
   for (int f = 2;; f *= 2) {
     place.columns = DivideUp(used, f);
     place.rows = DivideUp(chunk.rows, f);
@@ -73,7 +73,7 @@ void CachedAverages::TouchHourly(const OpenFile& file) const {
 Result<void> CachedAverages::CopyChunk(const OpenFile& file, int factor, int index, const GridWindow& window,
                                        float* out) const {
   const Chunk chunk = chunks_.At(index);
-  const AveragesPlace place = PlaceOf(chunk, layout_, factor);
+  const AveragesPlace place = PlaceOf(chunk, layout_, factors_, factor);
   const std::int64_t left = chunk.col / factor, top = chunk.row / factor;
   const std::int64_t west = std::max(left, window.column),
                      east = std::min(left + place.columns, window.column + window.columns);

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "engine/core/result.h"
+#include "engine/dem/common/open_file.h"
 #include "engine/dem/statistics/kept_factors.h"
-#include "engine/dem/statistics/open_file.h"
 #include "engine/dem/statistics/raster_chunk.h"
 
 namespace terrace::dem {

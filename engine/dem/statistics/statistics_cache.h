@@ -14,9 +14,9 @@
 #include <vector>
 
 #include "engine/core/result.h"
+#include "engine/dem/common/open_file.h"
 #include "engine/dem/statistics/cache_folder.h"
 #include "engine/dem/statistics/cached_averages.h"
-#include "engine/dem/statistics/open_file.h"
 #include "engine/dem/statistics/raster_statistics.h"
 
 namespace terrace::dem {

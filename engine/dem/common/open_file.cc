@@ -1,4 +1,4 @@
-#include "engine/dem/statistics/open_file.h"
+#include "engine/dem/common/open_file.h"
 
 #include <sys/stat.h>
 #include <unistd.h>
@@ -51,5 +51,11 @@ std::uint64_t SizeOf(int file) {
 void Touch(int file) { ::futimens(file, nullptr); }
 
 std::string ErrorText() { return std::generic_category().message(errno); }
+
+std::filesystem::path WholePath(const std::string& path) {
+  std::error_code unresolved;
+  std::filesystem::path whole = std::filesystem::weakly_canonical(path, unresolved);
+  return unresolved ? std::filesystem::path(path) : whole;
+}
 
 }  // namespace terrace::dem

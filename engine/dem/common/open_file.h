@@ -1,8 +1,9 @@
-// Files of the cache folder: descriptors, identities, reads of whole ranges.
+// Files by descriptor: their identity, reads of whole ranges. Thread-safe.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <utility>
@@ -44,10 +45,13 @@ bool ReadAt(int file, std::uint64_t offset, void* to, std::size_t bytes);
 // Returns nothing if the file of `file_bytes` bytes ends before.
 std::optional<std::string> ReadAt(int file, std::uint64_t offset, std::uint64_t bytes, std::uint64_t file_bytes);
 
-// Marks the file as used now (CacheFolder). Does nothing if that is not permitted.
+// Sets the time of modification to now. Does nothing if that is not permitted.
 void Touch(int file);
 
 // The text of errno.
 std::string ErrorText();
+
+// `path` without links and relative parts; as it is if it cannot be resolved.
+std::filesystem::path WholePath(const std::string& path);
 
 }  // namespace terrace::dem
