@@ -9,6 +9,7 @@
 #include "engine/dem/bound/source_error_bound.h"
 #include "engine/dem/crs/node_positions.h"
 #include "engine/dem/dem_impl.h"
+#include "engine/dem/raster/node_rows.h"
 
 namespace terrace::dem {
 namespace {
@@ -106,8 +107,7 @@ Result<void> FillAny(const RasterGrid& grid, const NodeGrid& node_grid, const No
   copy_back(smooth, nodes.smooth);
   if (traced != nullptr) {
     traced->part = part;
-    trace->positions = {};  // can be computed again, like cells
-    trace->cells = {};
+    trace->cells = {};  // can be located again
   }
   return filled;
 }
@@ -121,8 +121,7 @@ GridTrace Widened(PartTrace&& of_part, const RasterGrid& grid, const geo::Lattic
   std::vector<float> heights(nodes, SampleRules::kVoid);
   ForPart(*of_part.part, window, [&](std::size_t from, std::size_t to) { heights[to] = trace.heights[from]; });
   trace.heights = std::move(heights);
-  trace.positions = grid.PositionsOf(lattice, PartOf(grid, lattice, window, kAround), trace.factor);
-  if (!trace.samples.empty()) trace.cells = grid.CellsOf(trace.positions, trace.factor, trace.window);
+  trace.cells = grid.CellsOf(lattice, PartOf(grid, lattice, window, kAround), trace.factor, trace.window);
   if (!trace.undulations.empty()) {
     auto undulations = grid.undulations()->At(lattice, window);
     constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();  // then the bound is infinite, too
@@ -209,12 +208,13 @@ Result<std::vector<float>> DemSource::Impl::ReadGrids(const NodeGrid& node_grid,
       return MakeError(filled.error().code, "{}: {}", what, filled.error().message);
     }
     if (feathers) blend.Add(heights, weights);
-    if (feathers ? blend.is_done() : std::ranges::none_of(heights, IsVoid)) break;
+    if (feathers ? blend.is_done() : !HasVoids(heights)) break;
   }
   if (feathers) heights = blend.Heights();
   // A coarse measurement in a hole is better than a surface between the heights around it.
+  if (!HasVoids(heights)) return heights;
   for (std::size_t i = 0; i < nodes; ++i) {
-    if (std::isnan(heights[i])) heights[i] = smooth[i];
+    if (IsVoid(heights[i])) heights[i] = smooth[i];
   }
   return heights;
 }
@@ -234,7 +234,7 @@ Result<std::vector<float>> DemSource::Impl::ReadNodes(int level, const NodeWindo
                                                       std::vector<PartTrace>* traces) const {
   const geo::Lattice& lattice = LatticeOf(level);
   auto heights = ReadGrids(lattice, window, datum, what, stop, traces);
-  if (!heights || std::ranges::none_of(*heights, IsVoid)) return heights;
+  if (!heights || !HasVoids(*heights)) return heights;
   if (datum == HeightDatum::kEllipsoid || floor_undulations == nullptr) {
     std::ranges::replace_if(*heights, IsVoid, floor);
     return heights;
@@ -276,9 +276,10 @@ Result<double> DemSource::Impl::BoundError(const TileHeights& tile, const NodeWi
     if (const auto added = bound.Add(grid, trace, stop); !added) return tl::unexpected(added.error());
   }
   // All nodes have a height, but samples of further raster grids may still be visible between them.
-  std::vector<float> none_wanted = tile.heights;
+  std::vector<float> none_wanted;
   for (std::size_t k = traces.size(); k < order.size() && !bound.is_covered(); ++k) {
     const RasterGrid& grid = grids[order[k]];
+    if (none_wanted.empty()) none_wanted = tile.heights;
     PartTrace traced;
     const auto filled =
         FillAny(grid, tile.lattice, window, order.size(), HeightDatum::kEllipsoid, {none_wanted}, stop, &traced);

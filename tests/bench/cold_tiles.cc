@@ -63,7 +63,7 @@ Result<void> Run(const Arguments& arguments) {
   if (!keys) return tl::unexpected(keys.error());
   Result<std::vector<tiler::Dataset>> datasets = Open(arguments);
   if (!datasets) return tl::unexpected(datasets.error());
-  const tiler::TilePipeline pipeline(*std::move(datasets));
+  const tiler::TilePipeline pipeline(*std::move(datasets), 0);  // no tile is a replay of an earlier one
 
   std::atomic<std::size_t> next{0}, bytes{0}, failed{0};
   std::atomic<std::int64_t> read{0}, refine{0}, encode{0}, compress{0};  // microseconds

@@ -194,11 +194,11 @@ std::optional<std::array<Position, 4>> CellErrorBound::CornersOf(const TileCell&
   std::array<Position, 4> corners;
   for (std::size_t k = 0; k < 4; ++k) {
     const auto [column, row] = tile_.NodeAt(cell, k);
-    corners[k] = trace_.positions.OfNode(column, row);
+    corners[k] = trace_.cells.positions().OfNode(column, row);
     if (grid_.georeference().is_geographic_grid()) {
       // The nodes of a pole may share one position: use the columns of the row beside it.
-      if (row == 0) corners[k].x = trace_.positions.OfNode(column, row + 1).x;
-      if (row == tile_.lattice.rows()) corners[k].x = trace_.positions.OfNode(column, row - 1).x;
+      if (row == 0) corners[k].x = trace_.cells.positions().OfNode(column, row + 1).x;
+      if (row == tile_.lattice.rows()) corners[k].x = trace_.cells.positions().OfNode(column, row - 1).x;
       const double turn = grid_.georeference().period(), near = k == 0 ? grid_.columns() / 2.0 : corners[0].x;
       corners[k].x += turn * std::round((near - corners[k].x) / turn);
     }

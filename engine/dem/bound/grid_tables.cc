@@ -27,7 +27,7 @@ GridTables::GridTables(const RasterGrid& grid, const GridTrace& trace)
 Box GridTables::BoxAround() const {
   Box hull{1e300, 1e300, -1e300, -1e300};
   if (grid_.members().size() == 1) return hull;  // near members are not needed
-  const NodePositions& positions = trace_.positions;
+  const NodePositions& positions = trace_.cells.positions();
   // For separable nodes, the first row and the first column represent all others.
   const bool is_separable = positions.is_separable();
   double of_row = grid_.columns() / 2.0;

@@ -6,6 +6,8 @@
 #include <limits>
 #include <numeric>
 
+#include "engine/dem/raster/node_rows.h"
+
 namespace terrace::dem {
 namespace {
 
@@ -99,8 +101,11 @@ void SmoothErrorBound::PlaceNodes(const RasterGrid& grid) {
   const auto south = static_cast<std::size_t>(part.row - tile_.window.row);
   is_separable_ = cells.is_separable();
   if (is_separable_) {
-    x_.assign(tile_.stride(), kUnknown);
-    y_.assign(static_cast<std::size_t>(tile_.window.rows), kUnknown);
+    const auto rows_there = static_cast<std::size_t>(tile_.window.rows);
+    x_ = std::make_unique_for_overwrite<double[]>(tile_.stride());
+    y_ = std::make_unique_for_overwrite<double[]>(rows_there);
+    std::fill_n(x_.get(), tile_.stride(), kUnknown);
+    std::fill_n(y_.get(), rows_there, kUnknown);
     for (std::size_t i = 0; i < cells.columns().size(); ++i) {
       x_[west + i] = of_column(cells.columns()[i].index, cells.columns()[i].weight);
     }
@@ -109,17 +114,25 @@ void SmoothErrorBound::PlaceNodes(const RasterGrid& grid) {
     }
     return;
   }
-  x_.assign(trace_.heights.size(), kUnknown);
-  y_ = x_;
-  for (std::size_t j = 0; j < static_cast<std::size_t>(part.rows); ++j) {
-    std::size_t n = (south + j) * tile_.stride() + west;
-    for (std::size_t i = 0; i < static_cast<std::size_t>(part.columns); ++i, ++n) {
-      if (std::isnan(trace_.heights[n])) continue;
+  const std::size_t nodes = trace_.heights.size(), columns_here = cells.positions().columns();
+  x_ = std::make_unique_for_overwrite<double[]>(nodes);
+  y_ = std::make_unique_for_overwrite<double[]>(nodes);
+  if (cells.positions().rows() < static_cast<std::size_t>(tile_.window.rows) || columns_here < tile_.stride()) {
+    std::fill_n(x_.get(), nodes, kUnknown);
+    std::fill_n(y_.get(), nodes, kUnknown);
+  }
+  for (std::size_t j = 0; j < cells.positions().rows(); ++j) {
+    const std::size_t first = (south + j) * tile_.stride() + west;
+    double *const x = x_.get() + first, *const y = y_.get() + first;
+    const float* const heights = trace_.heights.data() + first;
+    const bool are_all_known = PlacesOf(cells.positions().Row(j), cells.axes(), {heights, columns_here},
+                                        {last_x, last_y}, {x, columns_here}, {y, columns_here});
+    for (std::size_t i = 0; !are_all_known && i < columns_here; ++i) {
+      if (std::isnan(heights[i]) || !std::isnan(x[i])) continue;
       const GridCell cell = cells.At(i, j);
-      const double x = of_column(cell.column, cell.x), y = of_row(cell.row, cell.y);
-      if (std::isnan(x) || std::isnan(y)) continue;
-      x_[n] = x;
-      y_[n] = y;
+      x[i] = of_column(cell.column, cell.x);
+      y[i] = of_row(cell.row, cell.y);
+      if (std::isnan(x[i] + y[i])) x[i] = y[i] = kUnknown;
     }
   }
 }
@@ -146,7 +159,7 @@ PixelBounds SmoothErrorBound::BoundsOf(const CellBox& box) const {
   return bounds;
 }
 
-double SmoothErrorBound::Largest(const Bends& bends, const Steps& steps) {
+double SmoothErrorBound::Largest(const Bends& bends, const NodeSteps& steps) {
   const auto along = [&](double x, double y) {
     return ChordError(x) * bends.xx + ChordError(y) * bends.yy + x * y * bends.xy / 4;
   };
@@ -167,8 +180,14 @@ double SmoothErrorBound::LargestBlend(const CellBox& box) const {
   return largest;
 }
 
-bool SmoothErrorBound::Measure(const CellBox& box, Steps& steps, PixelBounds& at) const {
-  if (!(is_separable_ ? MeasureAxes(box, steps, at) : MeasureNodes(box, steps, at))) return false;
+bool SmoothErrorBound::Measure(const CellBox& box, NodeSteps& steps, PixelBounds& at) const {
+  if (is_separable_) {
+    if (!MeasureAxes(box, steps, at)) return false;
+  } else {
+    const std::size_t n = tile_.NodeOf(box.west, box.south);
+    const NodePlaces places{x_.get() + n, y_.get() + n, tile_.stride()};
+    if (!MeasureSteps(places, box.east - box.west, box.north - box.south, steps, at)) return false;
+  }
   // A line with second difference b deviates from its chord by b / 8; half as much again covers changes of b in both
   // directions. Positions are exact to a hundred-thousandth, those of samples to their misplacement.
   constexpr double kOffChord = 1.5 * 2 / 8, kPosition = 4e-5;
@@ -179,7 +198,7 @@ bool SmoothErrorBound::Measure(const CellBox& box, Steps& steps, PixelBounds& at
 }
 
 // Columns of nodes run along columns of samples, rows along rows: each step has one axis.
-bool SmoothErrorBound::MeasureAxes(const CellBox& box, Steps& steps, PixelBounds& at) const {
+bool SmoothErrorBound::MeasureAxes(const CellBox& box, NodeSteps& steps, PixelBounds& at) const {
   const auto west = static_cast<std::size_t>(box.west + 1), south = static_cast<std::size_t>(box.south + 1);
   const auto east = static_cast<std::size_t>(box.east + 1), north = static_cast<std::size_t>(box.north + 1);
   // A node's neighbours count as well.
@@ -188,8 +207,7 @@ bool SmoothErrorBound::MeasureAxes(const CellBox& box, Steps& steps, PixelBounds
     if (!GaveHeights(j, west - 1, east + 2)) return false;
   }
   double finite = 0;  // becomes NaN with any place
-  const auto measure = [&](const std::vector<double>& places, std::size_t first, std::size_t last, double& step,
-                           double& bend) {
+  const auto measure = [&](const double* places, std::size_t first, std::size_t last, double& step, double& bend) {
     for (std::size_t k = first; k <= last; ++k) {
       const double after = places[k + 1] - places[k], before = places[k] - places[k - 1];
       finite += after + before;
@@ -197,40 +215,15 @@ bool SmoothErrorBound::MeasureAxes(const CellBox& box, Steps& steps, PixelBounds
       bend = std::max(bend, std::abs(after - before));
     }
   };
-  measure(x_, west, east, steps.east_x, steps.bend_x);
-  measure(y_, south, north, steps.north_y, steps.bend_y);
+  measure(x_.get(), west, east, steps.east_x, steps.bend_x);
+  measure(y_.get(), south, north, steps.north_y, steps.bend_y);
   for (std::size_t i = west; i <= east; ++i) at.Add(x_[i], y_[south]);
   for (std::size_t j = south; j <= north; ++j) at.Add(x_[west], y_[j]);
   return std::isfinite(finite);
 }
 
-bool SmoothErrorBound::MeasureNodes(const CellBox& box, Steps& steps, PixelBounds& at) const {
-  const std::size_t stride = tile_.stride();
-  double finite = 0;  // becomes NaN with any position
-  const auto raise = [](double& largest, double value) { largest = std::max(largest, std::abs(value)); };
-  for (int j = box.south; j <= box.north; ++j) {
-    std::size_t n = tile_.NodeOf(box.west, j);
-    for (int i = box.west; i <= box.east; ++i, ++n) {
-      const double x = x_[n], y = y_[n];
-      const double east_x = x_[n + 1] - x, east_y = y_[n + 1] - y;
-      const double north_x = x_[n + stride] - x, north_y = y_[n + stride] - y;
-      const double west_x = x - x_[n - 1], west_y = y - y_[n - 1];
-      const double south_x = x - x_[n - stride], south_y = y - y_[n - stride];
-      finite += east_x + north_x + west_x + south_x;
-      raise(steps.east_x, i < box.east ? east_x : 0);
-      raise(steps.east_y, i < box.east ? east_y : 0);
-      raise(steps.north_x, j < box.north ? north_x : 0);
-      raise(steps.north_y, j < box.north ? north_y : 0);
-      steps.bend_x = std::max({steps.bend_x, std::abs(east_x - west_x), std::abs(north_x - south_x)});
-      steps.bend_y = std::max({steps.bend_y, std::abs(east_y - west_y), std::abs(north_y - south_y)});
-      at.Add(x, y);
-    }
-  }
-  return std::isfinite(finite);
-}
-
 double SmoothErrorBound::Over(const CellBox& box) const {
-  Steps steps;
+  NodeSteps steps;
   PixelBounds at;
   if (!Measure(box, steps, at)) return kUnknown;
   Bends bends;

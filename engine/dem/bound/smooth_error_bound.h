@@ -4,10 +4,12 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "engine/dem/bound/geoid_error_bound.h"
 #include "engine/dem/bound/grid_tables.h"
+#include "engine/dem/bound/node_steps.h"
 #include "engine/dem/bound/tile_cells.h"
 #include "engine/dem/mosaic/raster_grid.h"
 
@@ -34,18 +36,11 @@ class SmoothErrorBound {
   struct Bends {
     double x = 0, y = 0, xx = 0, yy = 0, xy = 0;
   };
-  // Largest steps between neighbouring nodes of a box (east_*, north_*), and largest deviation of a position from even
-  // steps (bend_*). In samples.
-  struct Steps {
-    double east_x = 0, east_y = 0, north_x = 0, north_y = 0, bend_x = 0, bend_y = 0;
-  };
-
   void PlaceNodes(const RasterGrid& grid);
   bool GaveHeights(std::size_t row, std::size_t first, std::size_t end) const;
-  bool MeasureAxes(const CellBox& box, Steps& steps, PixelBounds& at) const;
-  bool MeasureNodes(const CellBox& box, Steps& steps, PixelBounds& at) const;
+  bool MeasureAxes(const CellBox& box, NodeSteps& steps, PixelBounds& at) const;
   // Returns false if a node or a neighbour of one is not evenly spaced.
-  bool Measure(const CellBox& box, Steps& steps, PixelBounds& at) const;
+  bool Measure(const CellBox& box, NodeSteps& steps, PixelBounds& at) const;
   // Columns and rows of averages, ends included.
   struct SampleRange {
     std::int64_t left = 0, top = 0, right = -1, bottom = -1;
@@ -56,7 +51,7 @@ class SmoothErrorBound {
   bool Measure(const SampleRange& range, Bends& bends) const;
   template <typename Step>
   void ForRows(const SampleRange& range, const Step& step) const;
-  static double Largest(const Bends& bends, const Steps& steps);
+  static double Largest(const Bends& bends, const NodeSteps& steps);
   double LargestBlend(const CellBox& box) const;
 
   const TileNodes tile_;
@@ -66,7 +61,7 @@ class SmoothErrorBound {
   const bool blends_;
   const Position misplacement_;  // of samples, in averages
   // In averages; NaN where not evenly spaced: per column and per row of the tile's window if separable, else per node.
-  std::vector<double> x_, y_;
+  std::unique_ptr<double[]> x_, y_;
   bool is_separable_ = false;
 
   // Of rows `top` to `bottom` of the averages, by column of the trace's window: the largest differences, as in Bends,

@@ -61,6 +61,7 @@ class NodePositions {
   std::span<const double> y() const { return y_; }
   // One per node. Precondition: !is_separable().
   std::span<const Position> nodes() const { return nodes_; }
+  std::span<const Position> Row(std::size_t j) const { return nodes().subspan(j * columns(), columns()); }
 
   Position At(std::size_t i, std::size_t j) const {
     return is_separable() ? Position{x_[i], y_[j]} : nodes_[j * columns() + i];

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <utility>
 
+#include "engine/dem/raster/node_rows.h"
 #include "engine/geo/tile_cover.h"
 
 namespace terrace::dem {
@@ -16,16 +17,6 @@ Box Grown(const Box& box, double by) { return {box.west - by, box.south - by, bo
 
 bool Holds(const Box& box, const Position& p) {
   return (p.x >= box.west) & (p.x <= box.east) & (p.y >= box.south) & (p.y <= box.north);
-}
-
-// Skips unknown positions: comparisons with NaN are false.
-Box HullOf(std::span<const Position> positions) {
-  Box hull = kNowhereBox;
-  for (const auto& [x, y] : positions) {
-    hull = {x < hull.west ? x : hull.west, y < hull.south ? y : hull.south, x > hull.east ? x : hull.east,
-            y > hull.north ? y : hull.north};
-  }
-  return hull;
 }
 
 }  // namespace
@@ -88,11 +79,16 @@ std::vector<std::uint8_t> GridCover::Inside(std::span<const Position> positions)
   // Up to this number, boxes are checked one by one; for more, the index is used.
   constexpr std::size_t kFewBoxes = 8;
   std::vector<std::uint8_t> inside(positions.size());
-  const Box hull = HullOf(positions);
+  const PositionHull known = HullOf(positions);
+  const Box hull{known.least.x, known.least.y, known.most.x, known.most.y};
   if (hull.west > hull.east) return inside;
   const std::vector<std::size_t> near = index_.Find(Grown(hull, 2 * kEdgeTolerance));
   if (near.size() == 1) {
     const Box box = Grown(BoxOf(boxes_[near.front()]), kEdgeTolerance);
+    if (known.are_all_known && Holds(box, known.least) && Holds(box, known.most)) {
+      std::ranges::fill(inside, std::uint8_t{1});
+      return inside;
+    }
     std::ranges::transform(positions, inside.begin(), [&](const Position& p) { return std::uint8_t{Holds(box, p)}; });
     return inside;
   }

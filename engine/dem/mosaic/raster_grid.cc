@@ -5,11 +5,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <utility>
 
 #include "engine/dem/crs/node_positions.h"
 #include "engine/dem/mosaic/void_fill.h"
 #include "engine/dem/raster/grid_cells.h"
+#include "engine/dem/raster/node_rows.h"
 
 namespace terrace::dem {
 namespace {
@@ -85,7 +87,7 @@ std::vector<float> FeatherWeights(const std::vector<float>& wide_heights, const 
 // Interpolates whole rows at a time, for requested nodes that have valid samples around them.
 void FillRows(const std::vector<float>& samples, const GridWindow& window, const NodeCells& cells,
               std::span<const std::uint8_t> wanted, std::span<const double> undulations, std::span<float> heights) {
-  const std::size_t stride = cells.columns().size(), rows = cells.rows().size();
+  const std::size_t stride = cells.positions().columns(), rows = cells.positions().rows();
   std::vector<std::uint8_t> of_column(stride);
   for (std::size_t n = 0; n < wanted.size(); n += stride) {
     for (std::size_t i = 0; i < stride; ++i) of_column[i] |= wanted[n + i];
@@ -99,18 +101,17 @@ void FillRows(const std::vector<float>& samples, const GridWindow& window, const
     const std::size_t of_row = j * stride + first;
     const auto row = wanted.subspan(of_row, rounded.size());
     if (std::ranges::find(row, std::uint8_t{1}) == row.end()) continue;
-    const std::span<const double> line = lines.Row(j);
-    if (undulations.empty()) {
-      for (std::size_t i = 0; i < line.size(); ++i) rounded[i] = RoundHeight(line[i]);
+    RoundHeights(lines.Row(j), undulations.empty() ? undulations : undulations.subspan(of_row, rounded.size()),
+                 rounded);
+    if (std::memchr(row.data(), 0, row.size()) == nullptr) {
+      std::ranges::copy(rounded, heights.begin() + static_cast<std::ptrdiff_t>(of_row));
     } else {
-      for (std::size_t i = 0; i < line.size(); ++i) rounded[i] = RoundHeight(line[i] + undulations[of_row + i]);
+      for (std::size_t i = 0; i < row.size(); ++i) {
+        float& height = heights[of_row + i];
+        height = row[i] != 0 ? rounded[i] : height;
+      }
     }
-    bool has_voids = false;
-    for (std::size_t i = 0; i < row.size(); ++i) {
-      float& height = heights[of_row + i];
-      height = row[i] != 0 ? rounded[i] : height;
-      has_voids |= row[i] != 0 && std::isnan(height);
-    }
+    const bool has_voids = HasVoids(rounded);
     for (std::size_t i = 0; has_voids && i < row.size(); ++i) {
       if (row[i] == 0 || !IsVoid(rounded[i])) continue;
       if (!undulations.empty() && std::isnan(undulations[of_row + i])) continue;
@@ -286,12 +287,13 @@ Result<void> RasterGrid::FillAt(NodePositions positions, std::span<const std::ui
     wanted[n] = inside[n] & static_cast<std::uint8_t>(IsVoid(heights[n]));
     is_any_wanted |= wanted[n] != 0;
   }
-  NodeCells cells;
-  if (is_any_wanted) cells = NodeCells(positions, Axes(factor), traces_others ? inside : wanted);
-  if (trace != nullptr) trace->positions = std::move(positions);
   if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "reading was stopped");
-  if (!is_any_wanted) return CheckUnread();
-  GridWindow window = cells.MoveIntoWindow(Axes(factor), wanted);
+  NodeCells cells(std::move(positions), Axes(factor));
+  if (!is_any_wanted) {
+    if (trace != nullptr) trace->cells = std::move(cells);
+    return CheckUnread();
+  }
+  GridWindow window = cells.MoveIntoWindow(wanted);
   // Samples between the outermost nodes and the rim are needed, too.
   constexpr int kRim = 3;
   if (trace != nullptr) window = Grown(window, kRim, factor);
@@ -334,9 +336,11 @@ Result<void> RasterGrid::FillAt(NodePositions positions, std::span<const std::ui
     const double weight = counts.empty() ? 1 : Interpolate(counts, window, cell).value_or(1);
     weights[node] = static_cast<float>(std::max(kLeast, std::nearbyint(weight * 1024) / 1024));
   };
-  if (cells.is_separable() && !has_holes && weights.empty()) {
+  if (!has_holes && weights.empty()) {
     FillRows(samples, window, cells, wanted, undulations, heights);
-    if (trace != nullptr) {
+    if (trace != nullptr && std::memchr(wanted.data(), 0, wanted.size()) == nullptr) {
+      trace->heights.assign(heights.begin(), heights.end());
+    } else if (trace != nullptr) {
       for (std::size_t n = 0; n < wanted.size(); ++n) {
         trace->heights[n] = wanted[n] != 0 ? heights[n] : SampleRules::kVoid;
       }
@@ -381,10 +385,10 @@ void RasterGrid::TraceOthers(std::span<const std::uint8_t> others, const std::ve
   }
 }
 
-NodeCells RasterGrid::CellsOf(const NodePositions& positions, int factor, const GridWindow& window) const {
-  const std::vector<std::uint8_t> inside = cover_.Inside(positions);
-  NodeCells cells(positions, Axes(factor), inside);
-  cells.MoveNear(window.column + window.columns / 2, Columns(factor));
+NodeCells RasterGrid::CellsOf(const geo::Lattice& lattice, const NodeWindow& window, int factor,
+                              const GridWindow& samples) const {
+  NodeCells cells(PositionsOf(lattice, window, factor), Axes(factor));
+  cells.MoveNear(samples.column + samples.columns / 2);
   return cells;
 }
 
@@ -392,7 +396,6 @@ template <typename NodeGrid>
 NodePositions RasterGrid::PositionsOf(const NodeGrid& node_grid, const NodeWindow& window, int factor) const {
   return NodePositions::Of(georeference_, reach_, node_grid, window, kGridPositionTolerance * factor);
 }
-template NodePositions RasterGrid::PositionsOf(const geo::Lattice&, const NodeWindow&, int) const;
 
 template <typename NodeGrid>
 Result<void> RasterGrid::Fill(const NodeGrid& node_grid, const NodeWindow& window, HeightDatum datum,

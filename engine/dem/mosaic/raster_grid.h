@@ -37,9 +37,8 @@ struct GridRange {
 
 // What Fill read for a window. The error bounds compare served heights with these samples. Heights in metres.
 struct GridTrace {
-  // In pixels. Nodes far from the raster grid may have none.
-  NodePositions positions;
-  // Between averages by `factor`. Valid where `heights` is not NaN.
+  // Between averages by `factor`. Valid where `heights` is not NaN. Nodes far from the raster grid may have no
+  // position.
   NodeCells cells;
   // Per node, the raster grid's interpolated height before blending; NaN where it has none. With blending, nodes that
   // other raster grids filled have one too, if their cell lies in `window` and has a sample.
@@ -112,11 +111,8 @@ class RasterGrid {
   Result<void> Fill(const NodeGrid& node_grid, const NodeWindow& window, HeightDatum datum, const NodeHeights& nodes,
                     const std::stop_token& stop, GridTrace* trace = nullptr) const;
 
-  // Returns the pixel positions of the window's nodes that Fill uses for averages by `factor`.
-  template <typename NodeGrid>
-  NodePositions PositionsOf(const NodeGrid& node_grid, const NodeWindow& window, int factor) const;
-  // Returns the cells of nodes, their columns near those of a trace's window.
-  NodeCells CellsOf(const NodePositions& positions, int factor, const GridWindow& window) const;
+  // Returns the cells of the window's nodes that Fill uses, their columns near those of a trace's window.
+  NodeCells CellsOf(const geo::Lattice& lattice, const NodeWindow& window, int factor, const GridWindow& samples) const;
 
   // Fill for single points, at full resolution. `filled`, one per point, becomes 1 where the point's pixel is void, for
   // points that get a height. Precondition: `nodes.smooth` has one entry per point. Errors: those of Fill and of the
@@ -176,6 +172,9 @@ class RasterGrid {
                           const std::stop_token& stop) const;
   GridWindow Grown(const GridWindow& window, int halo, int factor) const;
 
+  // Returns the pixel positions of the window's nodes for averages by `factor`.
+  template <typename NodeGrid>
+  NodePositions PositionsOf(const NodeGrid& node_grid, const NodeWindow& window, int factor) const;
   // `inside`: one entry per node, 0 where it is not to be filled. `undulations`: one per node, added to heights; empty:
   // none are.
   Result<void> FillAt(NodePositions positions, std::span<const std::uint8_t> inside,

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
+
+#include "engine/dem/raster/node_rows.h"
 
 namespace terrace::dem {
 namespace {
@@ -54,46 +57,75 @@ GridCell GridAxes::CellAt(const Position& position) const {
   return {column.index, row.index, column.weight, row.weight};
 }
 
-NodeCells::NodeCells(const NodePositions& positions, const GridAxes& axes, std::span<const std::uint8_t> inside)
-    : window_(positions.window()) {
-  if (positions.is_separable()) {
-    for (const double x : positions.x()) columns_.push_back(axes.Column(x));
-    for (const double y : positions.y()) rows_.push_back(axes.Row(y));
-    return;
+NodeCells::NodeCells(NodePositions positions, const GridAxes& axes) : positions_(std::move(positions)), axes_(axes) {
+  if (!is_separable()) return;
+  for (const double x : positions_.x()) columns_.push_back(axes.Column(x));
+  for (const double y : positions_.y()) rows_.push_back(axes.Row(y));
+}
+
+GridCell NodeCells::At(std::size_t i, std::size_t j) const {
+  if (is_separable()) return {columns_[i].index, rows_[j].index, columns_[i].weight, rows_[j].weight};
+  GridCell cell = axes_.CellAt(positions_.At(i, j));
+  if (near_) cell.column = NearestTurn(cell.column, *near_, axes_.columns);
+  return cell;
+}
+
+void NodeCells::MoveNear(std::int64_t column) {
+  if (!axes_.columns.wraps()) return;
+  if (!is_separable()) near_ = column;
+  for (GridAxis::Location& place : columns_) place.index = NearestTurn(place.index, column, axes_.columns);
+}
+
+// Indices grow with positions, so without wrapping the outermost positions have the outermost cells.
+GridWindow NodeCells::HullOfNodes(std::span<const std::uint8_t> wanted) const {
+  CellHull hull;
+  const std::span<const Position> nodes = positions_.nodes();
+  if (!axes_.columns.wraps()) {
+    PositionHull all;
+    const auto add = [&](const Position& least, const Position& most) {
+      all.least = {std::min(all.least.x, least.x), std::min(all.least.y, least.y)};
+      all.most = {std::max(all.most.x, most.x), std::max(all.most.y, most.y)};
+    };
+    for (std::size_t first = 0; first < nodes.size(); first += positions_.columns()) {
+      const std::span<const std::uint8_t> row = wanted.subspan(first, positions_.columns());
+      if (std::ranges::find(row, std::uint8_t{0}) == row.end()) {
+        const PositionHull of_row = HullOf(nodes.subspan(first, row.size()));
+        add(of_row.least, of_row.most);
+        continue;
+      }
+      for (std::size_t i = 0; i < row.size(); ++i) {
+        if (row[i] != 0) add(nodes[first + i], nodes[first + i]);
+      }
+    }
+    for (const Position& position : {all.least, all.most}) {
+      const GridCell cell = axes_.CellAt(position);
+      hull.AddColumn(cell.column);
+      hull.AddRow(cell.row);
+    }
+    return hull.Window(axes_);
   }
-  const std::span<const Position> nodes = positions.nodes();
-  cells_.resize(nodes.size());
   for (std::size_t n = 0; n < nodes.size(); ++n) {
-    if (inside[n] != 0) cells_[n] = axes.CellAt(nodes[n]);
+    if (wanted[n] == 0) continue;
+    const GridCell cell = At(n % positions_.columns(), n / positions_.columns());
+    hull.AddColumn(cell.column);
+    hull.AddRow(cell.row);
   }
+  return hull.Window(axes_);
 }
 
-void NodeCells::MoveNear(std::int64_t column, const GridAxis& columns) {
-  if (!columns.wraps()) return;
-  for (GridAxis::Location& place : columns_) place.index = NearestTurn(place.index, column, columns);
-  for (GridCell& cell : cells_) cell.column = NearestTurn(cell.column, column, columns);
-}
-
-GridWindow NodeCells::MoveIntoWindow(const GridAxes& axes, std::span<const std::uint8_t> wanted) {
-  const auto stride = static_cast<std::size_t>(window_.columns);
-  if (axes.columns.wraps()) {
+GridWindow NodeCells::MoveIntoWindow(std::span<const std::uint8_t> wanted) {
+  const std::size_t stride = positions_.columns();
+  if (axes_.columns.wraps()) {
     // The middle column, so that columns over half a turn stay in order; else the column of the nearest requested node.
     std::size_t nearest = wanted.size();
     const auto distance = [&](std::size_t n) { return std::abs(static_cast<std::ptrdiff_t>(n % stride - stride / 2)); };
     for (std::size_t n = 0; n < wanted.size() && !is_separable(); ++n) {
       if (wanted[n] != 0 && (nearest == wanted.size() || distance(n) < distance(nearest))) nearest = n;
     }
-    MoveNear(is_separable() ? columns_[stride / 2].index : cells_[nearest].column, axes.columns);
+    MoveNear(is_separable() ? columns_[stride / 2].index : At(nearest % stride, nearest / stride).column);
   }
+  if (!is_separable()) return HullOfNodes(wanted);
   CellHull hull;
-  if (!is_separable()) {
-    for (std::size_t n = 0; n < cells_.size(); ++n) {
-      if (wanted[n] == 0) continue;
-      hull.AddColumn(cells_[n].column);
-      hull.AddRow(cells_[n].row);
-    }
-    return hull.Window(axes);
-  }
   std::vector<std::uint8_t> of_column(stride);
   for (std::size_t j = 0; j < rows_.size(); ++j) {
     std::uint8_t of_row = 0;
@@ -106,7 +138,7 @@ GridWindow NodeCells::MoveIntoWindow(const GridAxes& axes, std::span<const std::
   for (std::size_t i = 0; i < stride; ++i) {
     if (of_column[i] != 0) hull.AddColumn(columns_[i].index);
   }
-  return hull.Window(axes);
+  return hull.Window(axes_);
 }
 
 GridWindow WindowOf(std::span<GridCell> cells, const GridAxes& axes) {
@@ -147,41 +179,6 @@ std::optional<double> Interpolate(const std::vector<float>& heights, const GridW
   add(1, 1, cell.x * cell.y);
   if (weights == 0) return std::nullopt;
   return sum / weights;
-}
-
-NodeRows::NodeRows(const std::vector<float>& samples, const GridWindow& window, const NodeCells& cells,
-                   std::size_t first, std::size_t end)
-    : samples_(samples), window_(window), cells_(cells), heights_(end - first) {
-  for (const GridAxis::Location& place : cells.columns().subspan(first, end - first)) {
-    // Columns of nodes that are not requested may lie outside.
-    const std::int64_t last = window.columns - 1, west = std::clamp<std::int64_t>(place.index - window.column, 0, last);
-    west_.push_back(static_cast<std::int32_t>(west));
-    east_.push_back(static_cast<std::int32_t>(std::min(west + (place.weight > 0 ? 1 : 0), last)));
-    weights_.push_back(place.weight);
-  }
-  for (Line& line : lines_) line.heights.resize(heights_.size());
-}
-
-const NodeRows::Line& NodeRows::LineOf(std::int64_t row) {
-  Line& line = lines_[static_cast<std::size_t>(row % 2)];
-  if (line.row == row) return line;
-  line.row = row;
-  const float* const samples = samples_.data() + (row - window_.row) * window_.columns;
-  for (std::size_t i = 0; i < weights_.size(); ++i) {
-    line.heights[i] = Between(samples[west_[i]], samples[east_[i]], weights_[i]);
-  }
-  return line;
-}
-
-std::span<const double> NodeRows::Row(std::size_t j) {
-  const GridAxis::Location& place = cells_.rows()[j];
-  const Line& north = LineOf(place.index);
-  if (place.weight <= 0) return north.heights;
-  const Line& south = LineOf(place.index + 1);
-  for (std::size_t i = 0; i < heights_.size(); ++i) {
-    heights_[i] = Between(north.heights[i], south.heights[i], place.weight);
-  }
-  return heights_;
 }
 
 bool HasSample(const std::vector<float>& heights, const GridWindow& window, const GridCell& cell) {

@@ -55,6 +55,7 @@ class GridAxis {
   std::int64_t count() const { return count_; }
   bool wraps() const { return wraps_; }
   int samples() const { return samples_; }
+  int factor() const { return factor_; }
   // The centre of a block; the last block of an axis may be smaller.
   double Center(std::int64_t index) const;
 

@@ -1,5 +1,5 @@
-// Nodes whose positions are those of their columns and rows are read by lines of samples; what comes out is what each
-// node gives on its own.
+// Nodes are located and read by rows, in vectors; what comes out is what each node gives on its own, on every set of
+// instructions.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -13,6 +13,8 @@
 #include <vector>
 
 #include "engine/dem/raster/grid_cells.h"
+#include "engine/dem/raster/node_rows.h"
+#include "tests/engine/tin/instruction_sets.h"
 
 namespace terrace::dem {
 namespace {
@@ -97,11 +99,11 @@ TEST(NodeCells, OfAxesAreThoseOfSingleNodes) {
     const Case one(seed);
     if (!one.is_any_wanted()) continue;
     ++tried;
-    NodeCells by_axes(one.ByAxes(), one.axes(), one.wanted()), by_nodes(one.ByNodes(), one.axes(), one.wanted());
+    NodeCells by_axes(one.ByAxes(), one.axes()), by_nodes(one.ByNodes(), one.axes());
     ASSERT_TRUE(by_axes.is_separable());
     ASSERT_FALSE(by_nodes.is_separable());
-    const GridWindow window = by_axes.MoveIntoWindow(one.axes(), one.wanted());
-    const GridWindow of_nodes = by_nodes.MoveIntoWindow(one.axes(), one.wanted());
+    const GridWindow window = by_axes.MoveIntoWindow(one.wanted());
+    const GridWindow of_nodes = by_nodes.MoveIntoWindow(one.wanted());
     ASSERT_NO_FATAL_FAILURE(ExpectInside(by_axes, window, one));
     ASSERT_NO_FATAL_FAILURE(ExpectInside(by_nodes, of_nodes, one));
     const GridAxis axis = one.axes().columns;
@@ -122,41 +124,147 @@ TEST(NodeCells, OfAxesAreThoseOfSingleNodes) {
   EXPECT_GT(around, 100);
 }
 
-TEST(NodeRows, AreBitForBitWhatEachNodeGives) {
-  int compared = 0, voids = 0;
-  for (unsigned seed = 0; seed < 4000; ++seed) {
-    Case one(seed);
-    if (!one.is_any_wanted()) continue;
-    NodeCells cells(one.ByAxes(), one.axes(), one.wanted());
-    const GridWindow window = cells.MoveIntoWindow(one.axes(), one.wanted());
-    const std::vector<float> samples = one.Samples(window);
-    const auto columns = static_cast<std::size_t>(one.nodes().columns);
-    std::size_t first = columns, end = 0;
-    for (std::size_t n = 0; n < one.wanted().size(); ++n) {
-      if (one.wanted()[n] != 0) first = std::min(first, n % columns), end = std::max(end, n % columns + 1);
-    }
-    NodeRows rows(samples, window, cells, first, end);
-    for (std::size_t j = 0; j < static_cast<std::size_t>(one.nodes().rows); ++j) {
-      const auto row = std::span(one.wanted()).subspan(j * columns, columns);
-      if (std::ranges::count(row, std::uint8_t{1}) == 0) continue;
-      const std::span<const double> heights = rows.Row(j);
-      ASSERT_EQ(heights.size(), end - first);
-      for (std::size_t i = first; i < end; ++i) {
-        if (row[i] == 0) continue;
-        const auto expected = Interpolate(samples, window, cells.At(i, j));
-        const double height = heights[i - first];
-        if (std::isnan(height)) {  // one of its samples is void; what the others give is for Interpolate
-          ++voids;
-          continue;
-        }
+struct Compared {
+  int heights = 0, voids = 0, left = 0;
+};
+
+// Rows of nodes against Interpolate at each of them.
+void ExpectRows(Case one, NodePositions positions, Compared& compared) {
+  NodeCells cells(std::move(positions), one.axes());
+  const GridWindow window = cells.MoveIntoWindow(one.wanted());
+  const std::vector<float> samples = one.Samples(window);
+  const auto columns = static_cast<std::size_t>(one.nodes().columns);
+  std::size_t first = columns, end = 0;
+  for (std::size_t n = 0; n < one.wanted().size(); ++n) {
+    if (one.wanted()[n] != 0) first = std::min(first, n % columns), end = std::max(end, n % columns + 1);
+  }
+  NodeRows rows(samples, window, cells, first, end);
+  for (std::size_t j = 0; j < static_cast<std::size_t>(one.nodes().rows); ++j) {
+    const auto row = std::span(one.wanted()).subspan(j * columns, columns);
+    if (std::ranges::count(row, std::uint8_t{1}) == 0) continue;
+    const std::span<const double> heights = rows.Row(j);
+    ASSERT_EQ(heights.size(), end - first);
+    for (std::size_t i = first; i < end; ++i) {
+      if (row[i] == 0) continue;
+      const GridCell cell = cells.At(i, j);
+      const auto expected = Interpolate(samples, window, cell);
+      const double height = heights[i - first];
+      if (!std::isnan(height)) {
         ASSERT_TRUE(expected);
-        ASSERT_EQ(std::bit_cast<std::uint64_t>(height), std::bit_cast<std::uint64_t>(*expected)) << seed;
-        ++compared;
+        ASSERT_EQ(std::bit_cast<std::uint64_t>(height), std::bit_cast<std::uint64_t>(*expected));
+        ++compared.heights;
+      } else if (HasSample(samples, window, cell)) {  // what its other samples give is for Interpolate
+        ++compared.left;
+      } else {
+        ++compared.voids;
       }
     }
   }
-  EXPECT_GT(compared, 100'000);
-  EXPECT_GT(voids, 10'000);
+}
+
+TEST(NodeRows, AreBitForBitWhatEachNodeGives) {
+  tin::ForEachInstructionSet([] {
+    Compared by_axes, by_nodes;
+    for (unsigned seed = 0; seed < 2000; ++seed) {
+      SCOPED_TRACE(seed);
+      const Case one(seed);
+      if (!one.is_any_wanted()) continue;
+      ASSERT_NO_FATAL_FAILURE(ExpectRows(one, one.ByAxes(), by_axes));
+      ASSERT_NO_FATAL_FAILURE(ExpectRows(one, one.ByNodes(), by_nodes));
+    }
+    EXPECT_GT(by_axes.heights, 50'000);
+    EXPECT_GT(by_axes.left, 5'000);
+    EXPECT_GT(by_nodes.heights, by_axes.heights / 3) << "only ends of axes and columns that wrap are left";
+  });
+}
+
+TEST(NodeRows, RoundsAsSingleHeights) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> metres(-12'000, 9'000), small(-0x1p-9, 0x1p-9);
+  std::vector<double> heights = {0, -0.0, 0x1p-11, -0x1p-11, 0x1.8p-10, -0x1.8p-10, 0x1p41, -0x1p41}, added;
+  for (int i = 0; i < 999; ++i) heights.push_back(i % 3 == 0 ? small(random) : metres(random));
+  for (std::size_t i = 0; i < heights.size(); ++i) added.push_back(i % 5 == 0 ? 0 : small(random));
+  heights[100] = std::numeric_limits<double>::quiet_NaN();
+  tin::ForEachInstructionSet([&] {
+    for (const std::size_t count : {std::size_t{1}, std::size_t{7}, heights.size()}) {
+      for (const bool adds : {false, true}) {
+        std::vector<float> rounded(count);
+        RoundHeights(std::span(heights).first(count), adds ? std::span(added).first(count) : std::span<double>(),
+                     rounded);
+        for (std::size_t i = 0; i < count; ++i) {
+          const float expected = RoundHeight(adds ? heights[i] + added[i] : heights[i]);
+          if (std::isnan(expected)) {
+            EXPECT_TRUE(std::isnan(rounded[i]));
+          } else {
+            EXPECT_EQ(std::bit_cast<std::uint32_t>(rounded[i]), std::bit_cast<std::uint32_t>(expected)) << heights[i];
+          }
+        }
+        EXPECT_EQ(HasVoids(rounded), count > 100);
+      }
+    }
+  });
+}
+
+TEST(NodeRows, PlacesAreThoseOfCells) {
+  tin::ForEachInstructionSet([] {
+    int known = 0, asked = 0;
+    for (unsigned seed = 0; seed < 2000; ++seed) {
+      SCOPED_TRACE(seed);
+      Case one(seed);
+      const NodePositions positions = one.ByNodes();
+      const auto columns = positions.columns();
+      const std::vector<float> heights = one.Samples({0, 0, one.nodes().columns, one.nodes().rows});
+      const GridAxes axes = one.axes();
+      const Position limit{static_cast<double>(axes.columns.count() - 1), static_cast<double>(axes.rows.count() - 1)};
+      std::vector<double> x(columns), y(columns);
+      for (std::size_t j = 0; j < positions.rows(); ++j) {
+        const auto of_row = std::span(heights).subspan(j * columns, columns);
+        const bool are_all_known = PlacesOf(positions.Row(j), axes, of_row, limit, x, y);
+        bool is_one_left = false;
+        for (std::size_t i = 0; i < columns; ++i) {
+          ASSERT_EQ(std::isnan(x[i]), std::isnan(y[i]));
+          is_one_left |= std::isnan(x[i]) && !std::isnan(of_row[i]);
+          if (std::isnan(x[i])) continue;
+          ASSERT_FALSE(std::isnan(of_row[i]));
+          const GridCell cell = axes.CellAt(positions.At(i, j));
+          ASSERT_EQ(x[i], static_cast<double>(cell.column) + cell.x);
+          ASSERT_EQ(y[i], static_cast<double>(cell.row) + cell.y);
+          ++known;
+        }
+        ASSERT_EQ(is_one_left || axes.columns.wraps(), !are_all_known);
+        asked += is_one_left ? 1 : 0;
+      }
+    }
+    EXPECT_GT(known, 50'000);
+    EXPECT_GT(asked, 1'000);
+  });
+}
+
+TEST(NodeRows, HullLeavesUnknownPositionsOut) {
+  tin::ForEachInstructionSet([] {
+    std::mt19937 random(9);
+    std::uniform_real_distribution<double> place(-50, 2000);
+    for (std::size_t count = 1; count < 40; ++count) {
+      for (const unsigned share : {0U, 4U, 1U}) {  // one in so many is unknown; 0: none
+        std::vector<Position> positions(count);
+        PositionHull expected;
+        for (Position& p : positions) {
+          p = {place(random), place(random)};
+          if (share != 0 && random() % share == 0) {
+            p = kNowhere;
+            expected.are_all_known = false;
+            continue;
+          }
+          expected.least = {std::min(expected.least.x, p.x), std::min(expected.least.y, p.y)};
+          expected.most = {std::max(expected.most.x, p.x), std::max(expected.most.y, p.y)};
+        }
+        const PositionHull hull = HullOf(positions);
+        ASSERT_EQ(
+            std::tuple(hull.least.x, hull.least.y, hull.most.x, hull.most.y, hull.are_all_known),
+            std::tuple(expected.least.x, expected.least.y, expected.most.x, expected.most.y, expected.are_all_known));
+      }
+    }
+  });
 }
 
 // Between four samples the surface is bilinear; of voids it takes those that are there by their weights.

@@ -1,0 +1,26 @@
+// Steps between the places of neighbouring nodes, in vectors. Results are bit-equal on all sets of instructions.
+#pragma once
+
+#include <cstddef>
+
+#include "engine/dem/bound/tile_cells.h"
+
+namespace terrace::dem {
+
+// Largest steps between neighbouring nodes of a box (east_*, north_*), and largest change from a node's one step to its
+// next one, as double the deviation of a position from even steps (bend_*).
+struct NodeSteps {
+  double east_x = 0, east_y = 0, north_x = 0, north_y = 0, bend_x = 0, bend_y = 0;
+};
+
+// Places by node, row by row from the south.
+struct NodePlaces {
+  const double *x, *y;  // of the south-western node of the box
+  std::size_t stride;
+};
+
+// Measures a box of columns x rows cells and adds its nodes to `at`. Returns false if a node or a neighbour of one has
+// no place (NaN).
+bool MeasureSteps(const NodePlaces& places, int columns, int rows, NodeSteps& steps, PixelBounds& at);
+
+}  // namespace terrace::dem
