@@ -7,6 +7,7 @@
 #include <limits>
 #include <numbers>
 
+#include "proto/error/edge_bound.h"
 #include "proto/error/plumb_nodes.h"
 #include "proto/lattice_angles.h"
 #include "proto/mesh/tile_geometry.h"
@@ -19,11 +20,6 @@ constexpr double kSmallestRadius = geo::kSemiMinorAxis * geo::kSemiMinorAxis / g
 
 // The relative difference in curvature between the ellipsoid and ground up to 100 km from it.
 constexpr double kHeights = 1.02;
-
-// Lattice columns and rows, from the tile's south-western sample.
-struct LatticePoint {
-  double x = 0, y = 0;
-};
 
 LatticePoint Between(LatticePoint a, LatticePoint b, double t) {
   return {a.x + t * (b.x - a.x), a.y + t * (b.y - a.y)};
@@ -146,20 +142,8 @@ double LargestOn(double length, double edge_bend, double first, double last, dou
 
 class EdgeMeter {
  public:
-  // Differences of these floats are exact: heights are multiples of 2^-10 m, and differences are below 2^14 m.
-  explicit EdgeMeter(const LatticeView& lattice) : lattice_(lattice), cells_(lattice.cells()) {
-    const auto row_of = [&](int j) { return lattice.heights.data() + (j + 1) * (cells_ + 3) + 1; };
-    float east = 0, north = 0;
-    for (int j = 0; j <= cells_; ++j) {
-      const float *const row = row_of(j), *const next = row_of(std::min(j + 1, cells_));
-      for (int i = 0; i < cells_; ++i) {
-        east = std::max(east, std::abs(row[i + 1] - row[i]));
-        north = std::max(north, std::abs(next[i] - row[i]));
-      }
-      north = std::max(north, std::abs(next[cells_] - row[cells_]));
-    }
-    steepest_ = {static_cast<double>(east), static_cast<double>(north)};
-  }
+  EdgeMeter(const LatticeView& lattice, const EdgeBound& bound)
+      : lattice_(lattice), cells_(lattice.cells()), steepest_{bound.steepest_east(), bound.steepest_north()} {}
 
   // An upper bound, in metres, on the change of the lattice surface over these steps.
   double LargestChange(LatticePoint steps) const {
@@ -355,11 +339,18 @@ double ChordDeviation(const Ground& ground, double steps) {
 //
 // A chord is at most its sagitta below the line between its ends, and the lattice surface changes little over its
 // shift. So most chords are known to matter less than what was found already, without a look at them.
-double MeasureEdges(const EdgeMeter& meter, const Ground& ground, const std::vector<LatticePoint>& places,
+double MeasureEdges(const LatticeView& lattice, const std::vector<LatticePoint>& places,
                     const std::vector<double>& heights, const std::vector<geo::Vec3>& ecef, double beside_m,
                     const std::vector<std::array<std::uint32_t, 3>>& triangles) {
+  const EdgeBound bound(lattice);
+  const EdgeMeter meter(lattice, bound);
+  const Ground ground(lattice);
   std::vector<End> ends(places.size());
-  for (std::size_t k = 0; k < places.size(); ++k) ends[k] = {places[k], ecef[k], ground.HeightOf(ecef[k], places[k])};
+  std::vector<EdgeBound::End> bounded(places.size());
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    ends[k] = {places[k], ecef[k], ground.HeightOf(ecef[k], places[k])};
+    bounded[k] = bound.EndAt(places[k], heights.empty() ? ends[k].height : heights[k]);
+  }
   double span = 0;
   ForEachEdge(triangles, places, meter,
               [&](std::uint32_t a, std::uint32_t b) { span = std::max(span, SpanOf(places[a], places[b])); });
@@ -376,10 +367,10 @@ double MeasureEdges(const EdgeMeter& meter, const Ground& ground, const std::vec
     if (!heights.empty())
       rounding = std::max(std::abs(heights[a] - ends[a].height), std::abs(heights[b] - ends[b].height));
     const double beyond = sagitta + meter.LargestChange(shift) + rounding + deviation;
-    const double first = heights.empty() ? ends[a].height : heights[a],
-                 last = heights.empty() ? ends[b].height : heights[b];
     const double known = std::max(largest - beyond, 0.0);
-    const double linear = LargestOfLine(meter, places[a], places[b], first, last, known);
+    const double linear = bound.Over(bounded[a], bounded[b]) <= known
+                              ? known
+                              : LargestOfLine(meter, places[a], places[b], bounded[a].height, bounded[b].height, known);
     if (linear <= known && known + beyond <= largest) return;
     if (!heights.empty() && linear > known) largest = std::max(largest, linear);
     largest = LargestOfHalves(meter, ground, ends[a], ends[b], 0, largest - deviation) + deviation;
@@ -397,7 +388,7 @@ double MeasureEdgeError(const LatticeView& lattice, const QuantizedTile& tile) {
     places.push_back({tile.u[k] * scale, tile.v[k] * scale});
     heights.push_back(HeightAt(tile, tile.h[k]));
   }
-  return MeasureEdges(EdgeMeter(lattice), Ground(lattice), places, heights, DecodePositions(tile), 0, tile.triangles);
+  return MeasureEdges(lattice, places, heights, DecodePositions(tile), 0, tile.triangles);
 }
 
 double MeasureFlatEdgeError(const LatticeView& lattice, const tin::TinMesh& mesh,
@@ -412,7 +403,7 @@ double MeasureFlatEdgeError(const LatticeView& lattice, const tin::TinMesh& mesh
     const tin::SamplePosition node = mesh.vertices[k];
     beside_m = std::max(beside_m, plumb.PositionOf(positions[k], node.x, node.y).beside_m);
   }
-  return MeasureEdges(EdgeMeter(lattice), Ground(lattice), places, {}, positions, beside_m, mesh.triangles);
+  return MeasureEdges(lattice, places, {}, positions, beside_m, mesh.triangles);
 }
 
 }  // namespace terrace::proto

@@ -1,0 +1,59 @@
+// How far a line between two vertices is from the lattice surface at most: found in vectors, from its crossings with
+// the lattice's lines, and a little too large. Most edges need no closer look.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "proto/lattice_view.h"
+
+namespace terrace::proto {
+
+// Lattice columns and rows, from the tile's south-western sample.
+struct LatticePoint {
+  double x = 0, y = 0;
+};
+
+// Where an edge crosses the lattice's lines of one direction. Axes are named for lines of columns.
+struct LatticeCrossings {
+  double from, to;           // across the lines
+  double along_from, along;  // along them: at the first end, and the difference to the last one
+  double height, rise;       // the same of the height
+  double bend;               // of a cell's twist, what the surface may bend away between two crossings
+  const float *heights, *twists;
+  std::int32_t line_stride, step;  // from one line to the next, and along a line
+  int cells;
+};
+
+class EdgeBound {
+ public:
+  // The lattice must outlive this object.
+  explicit EdgeBound(const LatticeView& lattice);
+
+  // A vertex as the end of edges.
+  struct End {
+    LatticePoint place;
+    double height = 0;
+    double error = 0;  // metres between the height and the lattice surface
+    double twist = 0;  // of the cells around
+  };
+  // Precondition: the place is on the tile.
+  End EndAt(LatticePoint place, double height) const;
+
+  // An upper bound on the difference between the lattice surface and the height that is linear from end to end.
+  double Over(const End& a, const End& b) const;
+
+  // The largest steps, in metres, between neighbouring samples of a row and of a column. Exact: heights are multiples
+  // of 2^-10 m, and differences are below 2^14 m.
+  double steepest_east() const { return steepest_east_; }
+  double steepest_north() const { return steepest_north_; }
+
+ private:
+  const LatticeView& lattice_;
+  float steepest_east_ = 0, steepest_north_ = 0;
+  // By node, as the lattice's heights: the largest |twist| of a cell at the node. A cell's twist is the coefficient of
+  // xy of its surface.
+  std::vector<float> twists_;
+};
+
+}  // namespace terrace::proto

@@ -1,0 +1,78 @@
+// The bound of an edge is never below the largest difference from the lattice surface along it, nor far above.
+#include "proto/error/edge_bound.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include "tests/engine/tin/instruction_sets.h"
+
+namespace terrace::proto {
+namespace {
+
+double SurfaceAt(const LatticeView& lattice, double x, double y) {
+  const int i = std::clamp(static_cast<int>(x), 0, lattice.cells() - 1);
+  const int j = std::clamp(static_cast<int>(y), 0, lattice.cells() - 1);
+  const double south = lattice.At(i, j) + (x - i) * (double{lattice.At(i + 1, j)} - lattice.At(i, j));
+  const double north = lattice.At(i, j + 1) + (x - i) * (double{lattice.At(i + 1, j + 1)} - lattice.At(i, j + 1));
+  return south + (y - j) * (north - south);
+}
+
+// By many points of the edge.
+double LargestAlong(const LatticeView& lattice, const EdgeBound::End& a, const EdgeBound::End& b) {
+  constexpr int kPoints = 3000;
+  double largest = 0;
+  for (int k = 0; k <= kPoints; ++k) {
+    const double t = static_cast<double>(k) / kPoints;
+    const double x = a.place.x + t * (b.place.x - a.place.x), y = a.place.y + t * (b.place.y - a.place.y);
+    largest = std::max(largest, std::abs(a.height + t * (b.height - a.height) - SurfaceAt(lattice, x, y)));
+  }
+  return largest;
+}
+
+TEST(EdgeBound, IsAboveEveryPointOfTheEdge) {
+  constexpr int kCells = 32;
+  std::mt19937 random(8);
+  const auto pick = [&](int count) { return static_cast<int>(random() % static_cast<unsigned>(count)); };
+  std::vector<float> heights(static_cast<std::size_t>((kCells + 3) * (kCells + 3)));
+  for (float& height : heights) height = static_cast<float>(500 + pick(40 << 10) / 1024.0);
+  const LatticeView lattice{{10, 5, 5}, {10, kCells}, heights};
+  double east = 0, north = 0;
+  for (int j = 0; j <= kCells; ++j) {
+    for (int i = 0; i <= kCells; ++i) {
+      if (i < kCells) east = std::max(east, std::abs(double{lattice.At(i + 1, j)} - lattice.At(i, j)));
+      if (j < kCells) north = std::max(north, std::abs(double{lattice.At(i, j + 1)} - lattice.At(i, j)));
+    }
+  }
+  tin::ForEachInstructionSet([&] {
+    const EdgeBound bound(lattice);
+    EXPECT_EQ(bound.steepest_east(), east);
+    EXPECT_EQ(bound.steepest_north(), north);
+    double sum = 0;
+    constexpr int kEdges = 600;
+    for (int round = 0; round < kEdges; ++round) {
+      // At nodes, near them as positions of 15 bits are, and anywhere.
+      const auto coordinate = [&](double node) {
+        const double at = round % 3 == 0   ? node
+                          : round % 3 == 1 ? std::round(node * 1023.97) / 1023.97
+                                           : node + pick(1000) / 1000.0;
+        return std::clamp(at, 0.0, double{kCells});
+      };
+      const auto end = [&] {
+        const LatticePoint place{coordinate(pick(kCells + 1)), coordinate(pick(kCells + 1))};
+        return bound.EndAt(place, SurfaceAt(lattice, place.x, place.y) + pick(100) / 100.0);
+      };
+      const EdgeBound::End a = end(), b = end();
+      const double largest = LargestAlong(lattice, a, b), over = bound.Over(a, b);
+      ASSERT_GE(over, largest) << a.place.x << ' ' << a.place.y << " - " << b.place.x << ' ' << b.place.y;
+      if (largest > 0) sum += over / largest;
+    }
+    EXPECT_LT(sum / kEdges, 1.6);
+  });
+}
+
+}  // namespace
+}  // namespace terrace::proto
