@@ -21,7 +21,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 HWY_INLINE double LargestAt(const LatticeCrossings& edge) {
   const double first = std::floor(std::min(edge.from, edge.to)) + 1, last = std::ceil(std::max(edge.from, edge.to)) - 1;
   if (!(first <= last)) return 0;
-  const hn::CappedTag<double, 8> d;
+  const hn::CappedTag<double, 4> d;
   const hn::Rebind<std::int32_t, decltype(d)> integers;
   const hn::Rebind<float, decltype(d)> floats;
   using V = hn::Vec<decltype(d)>;

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <utility>
 
+#include "proto/error/row_error.h"
 #include "proto/lattice_angles.h"
 
 namespace terrace::proto {
@@ -45,28 +46,15 @@ PlumbNodes::Plane::Plane(const std::array<Vec3, 3>& corners) {
 
 double PlumbNodes::LargestOfRow(const Plane& plane, int j, std::int64_t first, std::int64_t last,
                                 const float* samples) const {
-  // Several running maxima, which the compiler vectorizes. The smallest |up| of all shows whether the plane is too
-  // steep for a height at some node.
-  constexpr std::int64_t kLanes = 4;
-  std::array<double, kLanes> largest{}, steepest;
-  steepest.fill(std::numeric_limits<double>::infinity());
   const Parallel& row = rows_[static_cast<std::size_t>(j)];
-  const double rest = plane.offset - row.z * plane.normal.z, north = row.sin * plane.normal.z;
-  const auto measure = [&](std::int64_t i, std::size_t lane) {
-    const geo::SinCos& column = columns_[static_cast<std::size_t>(i)];
-    const double across = column.cos * plane.normal.x + column.sin * plane.normal.y;
-    const double up = row.cos * across + north;
-    const double error = std::abs((rest - row.radius * across) / up - samples[i]);
-    largest[lane] = error > largest[lane] ? error : largest[lane];
-    steepest[lane] = std::abs(up) < steepest[lane] ? std::abs(up) : steepest[lane];
-  };
-  std::int64_t i = first;
-  for (; i + kLanes <= last + 1; i += kLanes) {
-    for (std::size_t lane = 0; lane < kLanes; ++lane) measure(i + static_cast<std::int64_t>(lane), lane);
-  }
-  for (; i <= last; ++i) measure(i, 0);
-  if (*std::ranges::min_element(steepest) <= plane.least) return std::numeric_limits<double>::infinity();
-  return *std::ranges::max_element(largest);
+  const PlumbRow plumb{
+      plane.normal.x, plane.normal.y, row.cos, row.sin * plane.normal.z, plane.offset - row.z * plane.normal.z,
+      row.radius};
+  double steepest = 0;
+  const double largest = LargestOfPlumbRow(plumb, columns_.data() + first, samples + first,
+                                           static_cast<std::size_t>(last + 1 - first), steepest);
+  // Whether the plane is too steep for a height at some node.
+  return steepest <= plane.least ? std::numeric_limits<double>::infinity() : largest;
 }
 
 bool PlumbNodes::Meets(const std::array<Vec3, 3>& corners, int i, int j) const {

@@ -9,6 +9,7 @@
 
 #include "engine/geo/ellipsoid.h"
 #include "proto/error/plumb_nodes.h"
+#include "proto/error/row_error.h"
 #include "proto/mesh/edge_rows.h"
 #include "proto/mesh/tile_geometry.h"
 
@@ -33,26 +34,19 @@ struct Surface {
 };
 
 // The largest difference between `count` samples of a row and a plane. The first sample lies at (x, y), each further
-// one `unit` to the east. Several running maxima, which are independent, so that the compiler can vectorize.
+// one `unit` to the east.
 double LargestOfRow(const Linear& plane, double x, double y, double unit, const float* samples, std::int64_t count) {
-  constexpr std::int64_t kLanes = 4;
-  std::array<double, kLanes> largest{};
+  constexpr std::int64_t kFew = 8;  // most rows of rough ground: a call would cost more
   const double up = plane.dy * y;
-  // 32 bits, because SSE2 can convert only these to doubles in vectors.
-  const auto error = [&](std::int64_t i) {
-    const double height = plane.origin + plane.dx * (x + unit * static_cast<double>(static_cast<std::int32_t>(i))) + up;
-    return std::abs(height - samples[i]);
-  };
-  std::int64_t i = 0;
-  for (; i + kLanes <= count; i += kLanes) {
-    for (std::int64_t lane = 0; lane < kLanes; ++lane) {
-      const double at = error(i + lane);
-      double& value = largest[static_cast<std::size_t>(lane)];
-      value = at > value ? at : value;
-    }
+  if (count >= kFew) {
+    return LargestOfLinearRow({plane.origin, plane.dx, x, unit, up}, samples, static_cast<std::size_t>(count));
   }
-  for (; i < count; ++i) largest[0] = std::max(largest[0], error(i));
-  return std::max(std::max(largest[0], largest[1]), std::max(largest[2], largest[3]));
+  double largest = 0;
+  for (std::int64_t i = 0; i < count; ++i) {
+    const double height = plane.origin + plane.dx * (x + unit * static_cast<double>(i)) + up;
+    largest = std::max(largest, std::abs(height - samples[i]));
+  }
+  return largest;
 }
 
 template <typename Value>

@@ -67,8 +67,13 @@ class GridNodes {
     } else {
       const std::int64_t last_row = std::min(window_.row + window_.rows - 1, grid_.rows() - 1);
       const std::int64_t east = window_.column + window_.columns;
-      for (std::int64_t row = FloorCell(std::max<std::int64_t>(window_.row, 0)); row <= last_row; row += kCellNodes) {
-        for (std::int64_t column = FloorCell(window_.column); column < east; column += kCellNodes) {
+      first_column_ = FloorCell(window_.column);
+      first_row_ = FloorCell(std::max<std::int64_t>(window_.row, 0));
+      knots_across_ = (FloorCell(east - 1) - first_column_) / kKnotSpacing + kKnots;
+      const std::int64_t knots_up = std::max<std::int64_t>(FloorCell(last_row) - first_row_, 0) / kKnotSpacing + kKnots;
+      knots_.assign(static_cast<std::size_t>(knots_across_ * knots_up), kNotAsked);
+      for (std::int64_t row = first_row_; row <= last_row; row += kCellNodes) {
+        for (std::int64_t column = first_column_; column < east; column += kCellNodes) {
           Fill({column, row, kCellNodes});
         }
       }
@@ -145,14 +150,29 @@ class GridNodes {
     const int spacing = cell.size / (kKnots - 1), half = cell.size / 2, near = cell.size / 8;
     const std::array<std::array<int, 2>, kTried> tried = {
         {{near, half}, {half, near}, {cell.size - near, half}, {half, cell.size - near}}};
-    std::array<Position, kKnots * kKnots + kTried> known;
+    constexpr std::size_t kAll = kKnots * kKnots + kTried;
+    std::array<Position, kAll> known, fresh;
+    std::array<Position*, kAll> place_of;
+    std::size_t asked = 0;
+    const auto ask = [&](std::int64_t column, std::int64_t row, Position* place) {
+      fresh[asked] = Degrees(column, row);
+      place_of[asked++] = place;
+    };
+    // Whole cells share the knots on their edges.
+    const bool is_whole = cell.size == kCellNodes;
     for (int i = 0; i < kKnots * kKnots; ++i) {
-      known[static_cast<std::size_t>(i)] = Degrees(cell.column + i % kKnots * spacing, cell.row + i / kKnots * spacing);
+      const std::int64_t column = cell.column + i % kKnots * spacing, row = cell.row + i / kKnots * spacing;
+      Position* const place = is_whole ? KnotAt(column, row) : &known[static_cast<std::size_t>(i)];
+      if (!is_whole || !IsAsked(*place)) ask(column, row, place);
     }
     for (std::size_t i = 0; i < kTried; ++i) {
-      known[kKnots * kKnots + i] = Degrees(cell.column + tried[i][0], cell.row + tried[i][1]);
+      ask(cell.column + tried[i][0], cell.row + tried[i][1], &known[kKnots * kKnots + i]);
     }
-    georeference_.ToPixels(known);
+    georeference_.ToPixels({fresh.data(), asked});
+    for (std::size_t i = 0; i < asked; ++i) *place_of[i] = fresh[i];
+    for (int i = 0; i < kKnots * kKnots && is_whole; ++i) {
+      known[static_cast<std::size_t>(i)] = *KnotAt(cell.column + i % kKnots * spacing, cell.row + i / kKnots * spacing);
+    }
     if (std::ranges::any_of(known, [](const Position& p) { return std::isnan(p.x); })) return false;
     // Interpolates the knots' columns at one row, then any node of that row.
     const auto row_at = [&](std::int64_t row) {
@@ -193,6 +213,12 @@ class GridNodes {
     return true;
   }
 
+  Position* KnotAt(std::int64_t column, std::int64_t row) {
+    return &knots_[static_cast<std::size_t>((row - first_row_) / kKnotSpacing * knots_across_ +
+                                            (column - first_column_) / kKnotSpacing)];
+  }
+  static bool IsAsked(const Position& knot) { return knot.x != kNotAsked.x; }  // NaN: it has no position
+
   void FillPoleRows() {
     for (std::int64_t row = window_.row; row < window_.row + window_.rows; ++row) {
       if (!IsPoleRow(grid_, row)) continue;
@@ -208,6 +234,12 @@ class GridNodes {
   const NodeWindow window_;
   const double tolerance_;
   std::vector<Position> positions_;
+
+  // Of whole cells, row by row from the first one.
+  static constexpr int kKnotSpacing = kCellNodes / (kKnots - 1);
+  static constexpr Position kNotAsked{std::numeric_limits<double>::infinity(), 0};
+  std::int64_t first_column_ = 0, first_row_ = 0, knots_across_ = 0;
+  std::vector<Position> knots_;
 };
 
 }  // namespace

@@ -1,0 +1,28 @@
+// The largest error of a row of samples, in vectors. Results are bit-equal on all sets of instructions.
+#pragma once
+
+#include <cstddef>
+
+#include "engine/geo/ellipsoid.h"
+
+namespace terrace::proto {
+
+// Heights along a row of nodes, linear in longitude and latitude: origin + dx (x + unit i) + up, in that order.
+struct LinearRow {
+  double origin = 0, dx = 0, x = 0, unit = 1, up = 0;
+};
+
+// The largest difference from `count` samples.
+double LargestOfLinearRow(const LinearRow& row, const float* samples, std::size_t count);
+
+// Heights along a row of nodes where their plumb lines meet a plane: (rest - radius across) / (cos across + north),
+// across = x cos + y sin of a node's longitude.
+struct PlumbRow {
+  double x = 0, y = 0, cos = 0, north = 0, rest = 0, radius = 0;
+};
+
+// The largest difference from `count` samples. `steepest`: becomes the smallest |cos across + north|.
+double LargestOfPlumbRow(const PlumbRow& row, const geo::SinCos* columns, const float* samples, std::size_t count,
+                         double& steepest);
+
+}  // namespace terrace::proto
