@@ -74,6 +74,24 @@ double Plumb(const PlumbRow& row, const geo::SinCos* columns, const float* sampl
   return PlumbWith(hn::CappedTag<double, 1>(), row, columns, samples, count, steepest);
 }
 
+HeightExtent Extent(const float* heights, std::size_t count) {
+  const hn::CappedTag<float, 16> d;
+  const std::size_t lanes = hn::Lanes(d);
+  auto lowest = hn::Set(d, heights[0]), highest = lowest;
+  std::size_t i = 0;
+  for (; i + lanes <= count; i += lanes) {
+    const auto here = hn::LoadU(d, heights + i);
+    lowest = hn::Min(lowest, here);
+    highest = hn::Max(highest, here);
+  }
+  HeightExtent extent{hn::GetLane(hn::MinOfLanes(d, lowest)), hn::GetLane(hn::MaxOfLanes(d, highest))};
+  for (; i < count; ++i) {
+    if (heights[i] < extent.lowest) extent.lowest = heights[i];
+    if (heights[i] > extent.highest) extent.highest = heights[i];
+  }
+  return extent;
+}
+
 }  // namespace
 }  // namespace HWY_NAMESPACE
 }  // namespace terrace::proto
@@ -85,8 +103,13 @@ namespace {
 
 HWY_EXPORT(Linear);
 HWY_EXPORT(Plumb);
+HWY_EXPORT(Extent);
 
 }  // namespace
+
+HeightExtent ExtentOf(std::span<const float> heights) {
+  return HWY_DYNAMIC_DISPATCH(Extent)(heights.data(), heights.size());
+}
 
 double LargestOfLinearRow(const LinearRow& row, const float* samples, std::size_t count) {
   return HWY_DYNAMIC_DISPATCH(Linear)(row, samples, count);

@@ -1,11 +1,19 @@
-// The largest error of a row of samples, in vectors. Results are bit-equal on all sets of instructions.
+// The largest error of a row of samples, and the extent of samples, in vectors. Results are bit-equal on all sets of
+// instructions.
 #pragma once
 
 #include <cstddef>
+#include <span>
 
 #include "engine/geo/ellipsoid.h"
 
 namespace terrace::proto {
+
+struct HeightExtent {
+  float lowest = 0, highest = 0;
+};
+// Precondition: not empty.
+HeightExtent ExtentOf(std::span<const float> heights);
 
 // Heights along a row of nodes, linear in longitude and latitude: origin + dx (x + unit i) + up, in that order.
 struct LinearRow {

@@ -37,6 +37,9 @@ TEST(RowError, IsThatOfTheWorstNode) {
     }
     tin::ForEachInstructionSet([&] {
       EXPECT_EQ(LargestOfLinearRow(linear, samples.data(), count), of_linear) << count;
+      const auto [lowest, highest] = ExtentOf(samples);
+      EXPECT_EQ(lowest, std::ranges::min(samples));
+      EXPECT_EQ(highest, std::ranges::max(samples));
       double steepest = 0;
       EXPECT_EQ(LargestOfPlumbRow(plumb, columns.data(), samples.data(), count, steepest), of_plumb) << count;
       EXPECT_EQ(steepest, least) << count;

@@ -202,9 +202,12 @@ bool SmoothErrorBound::MeasureAxes(const CellBox& box, NodeSteps& steps, PixelBo
   const auto west = static_cast<std::size_t>(box.west + 1), south = static_cast<std::size_t>(box.south + 1);
   const auto east = static_cast<std::size_t>(box.east + 1), north = static_cast<std::size_t>(box.north + 1);
   // A node's neighbours count as well.
-  if (!GaveHeights(south - 1, west, east + 1) || !GaveHeights(north + 1, west, east + 1)) return false;
-  for (std::size_t j = south; j <= north; ++j) {
-    if (!GaveHeights(j, west - 1, east + 2)) return false;
+  const bool are_known = box.south >= known_south_ && box.north <= known_north_;
+  if (!are_known) {
+    if (!GaveHeights(south - 1, west, east + 1) || !GaveHeights(north + 1, west, east + 1)) return false;
+    for (std::size_t j = south; j <= north; ++j) {
+      if (!GaveHeights(j, west - 1, east + 2)) return false;
+    }
   }
   double finite = 0;  // becomes NaN with any place
   const auto measure = [&](const double* places, std::size_t first, std::size_t last, double& step, double& bend) {
@@ -295,6 +298,11 @@ void SmoothErrorBound::ForRows(const SampleRange& range, const Step& step) const
 void SmoothErrorBound::PrepareRows(int south, int north) {
   band_ = {};
   if (!is_separable_ || trace_.samples.empty()) return;
+  const auto rows = static_cast<std::size_t>(north - south + 3);
+  const auto nodes = std::span(trace_.heights).subspan(static_cast<std::size_t>(south) * tile_.stride());
+  const bool are_known = !HasVoids(nodes.first(rows * tile_.stride()));
+  known_south_ = are_known ? south : 0;
+  known_north_ = are_known ? north : -1;
   const double y0 = y_[static_cast<std::size_t>(south + 1)], y1 = y_[static_cast<std::size_t>(north + 1)];
   if (std::isnan(y0 + y1)) return;
   PixelBounds at;

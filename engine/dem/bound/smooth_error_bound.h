@@ -63,6 +63,7 @@ class SmoothErrorBound {
   // In averages; NaN where not evenly spaced: per column and per row of the tile's window if separable, else per node.
   std::unique_ptr<double[]> x_, y_;
   bool is_separable_ = false;
+  int known_south_ = 0, known_north_ = -1;  // rows of cells whose nodes all have heights, of those prepared
 
   // Of rows `top` to `bottom` of the averages, by column of the trace's window: the largest differences, as in Bends,
   // between this average and the next ones to the east and to the south; and the sum, NaN if one of them is void.
