@@ -84,6 +84,37 @@ std::vector<float> FeatherWeights(const std::vector<float>& wide_heights, const 
   return weights;
 }
 
+std::size_t IndexIn(const GridWindow& window, std::int64_t column, std::int64_t row) {
+  return static_cast<std::size_t>((row - window.row) * window.columns + column - window.column);
+}
+
+// Copies a part into the window that it lies in.
+void CopyInto(const std::vector<float>& part, const GridWindow& at, const GridWindow& window,
+              std::vector<float>& heights) {
+  for (std::int64_t row = 0; row < at.rows; ++row) {
+    const auto to = static_cast<std::ptrdiff_t>(IndexIn(window, at.column, at.row + row));
+    std::copy_n(part.begin() + row * at.columns, at.columns, heights.begin() + to);
+  }
+}
+
+// The smallest window with all voids of a window. Precondition: it has one.
+GridWindow HullOfVoids(const std::vector<float>& heights, const GridWindow& window) {
+  std::int64_t west = window.columns, east = -1, north = window.rows, south = -1;
+  for (std::int64_t row = 0; row < window.rows; ++row) {
+    const std::span<const float> of_row = std::span(heights).subspan(static_cast<std::size_t>(row * window.columns),
+                                                                     static_cast<std::size_t>(window.columns));
+    if (!HasVoids(of_row)) continue;
+    north = std::min(north, row);
+    south = row;
+    const auto first = std::ranges::find_if(of_row, IsVoid) - of_row.begin();
+    std::int64_t last = window.columns - 1;
+    while (!IsVoid(of_row[static_cast<std::size_t>(last)])) --last;
+    west = std::min<std::int64_t>(west, first);
+    east = std::max(east, last);
+  }
+  return {window.column + west, window.row + north, east - west + 1, south - north + 1};
+}
+
 // Interpolates whole rows at a time, for requested nodes that have valid samples around them.
 void FillRows(const std::vector<float>& samples, const GridWindow& window, const NodeCells& cells,
               std::span<const std::uint8_t> wanted, std::span<const double> undulations, std::span<float> heights) {
@@ -239,11 +270,36 @@ Result<RasterGrid::Bridged> RasterGrid::ReadBridged(int factor, const GridWindow
   bridged.voids = static_cast<std::uint64_t>(std::ranges::count_if(bridged.heights, IsVoid));
   const int gap = options_.max_void_gap / factor;
   if (gap < 2 || bridged.voids == 0) return bridged;
-  const GridWindow wide = Grown(window, gap, factor);
-  const auto around = ReadBlocks(factor, wide, stop);
+  const GridWindow voids = HullOfVoids(bridged.heights, window), wide = Grown(voids, gap, factor);
+  const auto around = ReadAround(factor, wide, window, bridged.heights, stop);
   if (!around) return tl::unexpected(around.error());
-  if (!std::ranges::all_of(*around, IsVoid)) bridged.heights = FillVoids(*around, wide, window, gap);
+  if (std::ranges::all_of(*around, IsVoid)) return bridged;
+  CopyInto(FillVoids(*around, wide, voids, gap), voids, window, bridged.heights);
   return bridged;
+}
+
+// ReadBlocks of `wide`, a part of which was read: `known`, of the window `core`.
+Result<std::vector<float>> RasterGrid::ReadAround(int factor, const GridWindow& wide, const GridWindow& core,
+                                                  const std::vector<float>& known, const std::stop_token& stop) const {
+  std::vector<float> all(static_cast<std::size_t>(wide.columns * wide.rows));
+  const std::int64_t west = std::max(wide.column, core.column), north = std::max(wide.row, core.row);
+  const std::int64_t east = std::min(wide.column + wide.columns, core.column + core.columns);
+  const std::int64_t south = std::min(wide.row + wide.rows, core.row + core.rows);
+  for (std::int64_t row = north; row < south; ++row) {
+    const auto from = known.begin() + static_cast<std::ptrdiff_t>(IndexIn(core, west, row));
+    std::copy_n(from, east - west, all.begin() + static_cast<std::ptrdiff_t>(IndexIn(wide, west, row)));
+  }
+  const std::int64_t wide_east = wide.column + wide.columns, wide_south = wide.row + wide.rows;
+  for (const GridWindow& rest : {GridWindow{wide.column, wide.row, wide.columns, north - wide.row},
+                                 GridWindow{wide.column, south, wide.columns, wide_south - south},
+                                 GridWindow{wide.column, north, west - wide.column, south - north},
+                                 GridWindow{east, north, wide_east - east, south - north}}) {
+    if (rest.columns == 0 || rest.rows == 0) continue;
+    const auto read = ReadBlocks(factor, rest, stop);
+    if (!read) return read;
+    CopyInto(*read, rest, wide, all);
+  }
+  return all;
 }
 
 std::optional<float> RasterGrid::PoleHeight(int pole, HeightDatum datum) const {

@@ -161,6 +161,8 @@ class RasterGrid {
   };
   Result<Bridged> ReadBridged(int factor, const GridWindow& window, const std::stop_token& stop,
                               std::vector<float>* measured = nullptr) const;
+  Result<std::vector<float>> ReadAround(int factor, const GridWindow& wide, const GridWindow& core,
+                                        const std::vector<float>& known, const std::stop_token& stop) const;
   // The same with smooth surfaces in the holes that are left (grid_holes.cc); empty where there are none.
   // Precondition: `bridged` is what ReadBridged gives.
   Result<std::vector<float>> FillHoles(int factor, const GridWindow& window, const Bridged& bridged,
