@@ -1,7 +1,7 @@
 // A digital elevation model: heights at lattice nodes, anywhere on the globe, at any level.
 //
-// A model has one or more rasters. A node takes its height from the first source, ordered by rank and resolution, that
-// has one there. Nodes without a source take the floor (docs/decisions/0010-mosaics.md).
+// A model has one or more rasters. Sources are ordered by rank and resolution; a node takes its height from the first
+// one that has one there. Nodes without a source take the floor (docs/decisions/0010-mosaics.md).
 //
 // Immutable after Open. Thread-safe: each thread uses its own GDAL handle. No GDAL type appears in this header.
 #pragma once

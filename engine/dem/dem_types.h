@@ -58,7 +58,7 @@ struct DemOptions {
   std::optional<double> floor = {};  // metres above the ellipsoid, used outside the sources and in collars; default:
                                      // a height at or below the lowest one
   HoleFill voids = HoleFill::kSmooth;
-  int max_void_gap = 64;  // samples: voids narrower than this along a row, column or diagonal are bridged
+  int max_void_gap = 64;  // samples: voids narrower than this along a row, column or diagonal are filled
   RasterCache cache = {};
   // Mosaics, metres: within this distance of its edges and voids a source is blended with the sources below. 0: hard
   // edges.

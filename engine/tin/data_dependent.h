@@ -5,10 +5,10 @@
 //      /   \         p-w, and the edges that take its place are suspect in turn. Spokes (edges at p) are not.
 //     u-----v
 //      \   /         With S the squared quality of a cut's shape (quadrilateral.h), E how badly it fits, q = qthresh:
-//        p               p-w is taken where S(u-v) < q^2 S(p-w),
-//                        u-v is kept where S(p-w) < q^(5/4) S(u-v), and already where S(p-w) < q^(1/4) S(u-v) if a cut
-//                        by its fit, or one that came after it, has brought the edge into the outline,
-//                        else that with less E^2 / S; equal ones by the shape; equal in both: p-w.
+//        p               p-w is taken if S(u-v) < q^2 S(p-w),
+//                        u-v is kept if S(p-w) < q^(5/4) S(u-v), or already if S(p-w) < q^(1/4) S(u-v) for an edge
+//                        that a cut decided by fit, or a later cut, has added to the outline,
+//                        else the cut with less E^2 / S is taken; if equal, the better shape; if equal too, p-w.
 // For the angle between normals, S is squared once more, and the thresholds do not depend on how the edge came into the
 // outline. With q = 0 the fit alone decides, as in the paper. The paper compares E alone and has one threshold. A cut
 // that makes the shape worse rarely pays in the end, more rarely still further out, and adds two triangles to scan.

@@ -80,7 +80,7 @@ class SingleFlight {
   std::atomic<std::uint64_t> joined_total_{0};
 };
 
-// Everything but `stop` and what is const is guarded by SingleFlight::mutex_.
+// SingleFlight::mutex_ guards everything except `stop` and const members.
 template <typename Key, typename Value, typename Hash>
 struct SingleFlight<Key, Value, Hash>::Flight {
   Flight(const Key& k, std::string n, std::stop_token cancelled)

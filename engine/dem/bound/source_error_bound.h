@@ -35,7 +35,8 @@ class SourceErrorBound {
   double bound() const { return bound_ + kRounding; }
 
  private:
-  // Of heights at nodes and of what they are blended from, to 2^-10 m, with room for the arithmetic.
+  // The rounding of heights at nodes and of the heights they are blended from, to 2^-10 m, with a margin for the
+  // arithmetic.
   static constexpr double kRounding = 0x1p-10;
 
   const geo::Lattice lattice_;

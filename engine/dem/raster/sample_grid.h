@@ -15,7 +15,7 @@
 
 namespace terrace::dem {
 
-// What must be known of a raster to read it. Immutable after Open.
+// The properties of a raster that are needed to read it. Immutable after Open.
 struct RasterLayout {
   // `crs_unit`: as for SampleRules::Of.
   static RasterLayout Of(GDALDataset& dataset, const Georeference& georeference, const std::string& crs_unit);
