@@ -175,7 +175,7 @@ asio::awaitable<Result<T>> WorkerPool::Run(Work<T> work, JobOrder order) {
   const Seat<T> seat(*this, errand, job);
   if (Result<void> submitted = Submit(job); !submitted) co_return tl::unexpected(std::move(submitted.error()));
 
-  boost::system::error_code ignored;  // finished, expired or cancelled: the outcome tells
+  boost::system::error_code ignored;  // finished, expired or cancelled; the outcome shows which
   co_await waiter->async_wait(asio::redirect_error(asio::use_awaitable, ignored));
 
   const std::lock_guard lock(errand->mutex);

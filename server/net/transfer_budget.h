@@ -104,7 +104,7 @@ class TransferBudget {
     const void* charge;  // key of its charge: the body, or the entry itself if it is not shared
     std::size_t room = 0;
     Clock::time_point late_at;         // max: its time has not begun
-    std::weak_ptr<Connection> holder;  // empty once it was told to make room
+    std::weak_ptr<Connection> holder;  // empty once it was told to release memory
     std::uint64_t client = 0;
   };
   using Entries = std::list<Entry>;
