@@ -136,7 +136,7 @@ TEST(Cliffs, CostGlbTilesNoMoreThanTheirGrid) {
       const auto glb = proto::DecodeGlb(encoded->bytes);
       ASSERT_TRUE(glb.has_value());
       const proto::LatticeView lattice{request.key, heights.lattice, heights.heights};
-      // Without the rim, where skirts hang.
+      // Leaves out the rim, which has skirts.
       EXPECT_LE(proto::LargestFlatError(lattice, glb->positions, glb->triangles, 1).least,
                 encoded->max_error_m * 1.0001 + 0.001);
     }
