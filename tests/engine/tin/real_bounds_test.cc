@@ -19,7 +19,7 @@
 #include "engine/core/check.h"
 #include "engine/tin/decimate/drop_pass.h"
 #include "engine/tin/extended/block_joiner.h"
-#include "engine/tin/extended/field_cut.h"
+#include "engine/tin/extended/field_partition.h"
 #include "engine/tin/greedy.h"
 #include "tests/engine/tin/rasterizer.h"
 #include "tests/support/test_data.h"
@@ -112,8 +112,9 @@ class RealBounds : public testing::TestWithParam<Dem> {
 };
 
 TinMesh MeshInBlocks(const HeightField& field, double error, Criterion criterion) {
-  FieldCut cut = FieldCut::For(field, error);
-  if (cut.size() == 1) cut = FieldCut(field.width(), field.height(), kBlock);  // also if one block would be better
+  FieldPartition cut = FieldPartition::For(field, error);
+  if (cut.size() == 1)
+    cut = FieldPartition(field.width(), field.height(), kBlock);  // also if one block would be better
   BlockJoiner joiner(cut);
   GreedyOptions options;
   options.criterion = criterion;
