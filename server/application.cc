@@ -42,11 +42,11 @@ class TerrainApplication::Handler final : public ConnectionHandler {
   Admission Admit(Request& request, std::chrono::milliseconds longest_wait) override {
     AdmissionControl& admission_control = application_.parts_.frontend.admission_control;
     context_.request = &request;
-    caller_ = admission_control.Identify(request, peer_, context_);
+    client_ = admission_control.Identify(request, peer_, context_);
     Result<Route> route = Routes().Match(request.target);
     context_.route = route ? *std::move(route) : Route();
     Admission admission;
-    const RateLimiter::Turn turn = admission_control.TakeTurn(context_, caller_, longest_wait);
+    const RateLimiter::Turn turn = admission_control.TakeTurn(context_, client_, longest_wait);
     if (!turn.granted) {
       admission.refusal = AdmissionControl::TooManyRequests(turn, context_);
       admission.delays_refusal = true;
@@ -101,7 +101,7 @@ class TerrainApplication::Handler final : public ConnectionHandler {
 
   TerrainApplication& application_;
   const ClientIdentity peer_;
-  ClientIdentity caller_;
+  ClientIdentity client_;
   RequestContext context_;
 };
 
@@ -154,7 +154,7 @@ void TerrainApplication::Handler::Report(const SentReply& reply) {
   record.user_agent = request.fields->user_agent;
   record.request_id = request.id;
   record.peer = reply.peer;
-  if (reply.is_admitted && caller_.address != peer_.address) record.client = caller_.text;
+  if (reply.is_admitted && client_.address != peer_.address) record.client = client_.text;
   if (reply.is_admitted && context_.grant) record.token_name = context_.grant->name;
   application_.parts_.metrics.CountReply(record);
   application_.parts_.access_log.Write(record);

@@ -1,5 +1,5 @@
 // The tile formats, one row each: suffix of its URLs, parameters, and headers of replies. Also the parts that all
-// formats share: parameters, codings, errors. tiler::EncoderOf has the encoders.
+// formats share: parameters, codings, errors. tiler/encoders.h has the encoders.
 #pragma once
 
 #include <cstdint>

@@ -36,8 +36,8 @@ bool HasName(const RequestContext& context) { return context.grant && !context.g
 
 // The key of a client for rate limits: a token's name after a slash, with which no address begins, or the block of the
 // address.
-std::string Who(const RequestContext& context, const ClientIdentity& caller) {
-  return HasName(context) ? "/" + context.grant->name : caller.block;
+std::string Who(const RequestContext& context, const ClientIdentity& client) {
+  return HasName(context) ? "/" + context.grant->name : client.block;
 }
 
 Response Unauthorized(bool has_token, std::string_view request_id) {
@@ -125,12 +125,12 @@ ClientIdentity AdmissionControl::Identify(Request& request, const ClientIdentity
   }
   const asio::ip::address address =
       options_.proxies.trusted.empty() ? peer.address : ResolveClient(request, peer.address, options_.proxies);
-  ClientIdentity caller = client == peer.address ? peer : ClientIdentity(client);
-  request.client = HasName(context) ? std::hash<std::string>{}(Who(context, caller)) | 1 : caller.number;
-  return caller;
+  ClientIdentity client = address == peer.address ? peer : ClientIdentity(address);
+  request.client = HasName(context) ? std::hash<std::string>{}(Who(context, client)) | 1 : client.number;
+  return client;
 }
 
-RateLimiter::Turn AdmissionControl::TakeTurn(const RequestContext& context, const ClientIdentity& caller,
+RateLimiter::Turn AdmissionControl::TakeTurn(const RequestContext& context, const ClientIdentity& client,
                                              std::chrono::milliseconds longest_wait) {
   if (context.route.row != nullptr && context.route.row->is_probe) return {};
   RateLimiter::Rate rate = options_.rate;
@@ -139,7 +139,7 @@ RateLimiter::Turn AdmissionControl::TakeTurn(const RequestContext& context, cons
     rate.burst = 2 * rate.per_second;
   }
   if (rate.per_second <= 0) return {};
-  return limiter_.Take(Who(context, caller), rate, RateLimiter::Clock::now(), longest_wait);
+  return limiter_.Take(Who(context, client), rate, RateLimiter::Clock::now(), longest_wait);
 }
 
 Response AdmissionControl::TooManyRequests(const RateLimiter::Turn& turn, const RequestContext& context) {

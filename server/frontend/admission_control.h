@@ -77,7 +77,7 @@ class AdmissionControl {
 
   // When the request may continue, at most after `longest_wait`: clients that exceed their rate wait. All requests
   // count but probes, also those with unknown URLs.
-  RateLimiter::Turn TakeTurn(const RequestContext& context, const ClientIdentity& caller,
+  RateLimiter::Turn TakeTurn(const RequestContext& context, const ClientIdentity& client,
                              std::chrono::milliseconds longest_wait);
   // 429, for a request whose turn was not granted.
   static Response TooManyRequests(const RateLimiter::Turn& turn, const RequestContext& context);
