@@ -36,7 +36,8 @@ class DemSource {
   geo::Lattice LatticeOf(int level) const;
 
   // The available tiles of a level, as ranges without overlap, sorted by row and column: tiles that touch a source fine
-  // enough for the level, and all ancestors of available tiles. Level 0 has both roots (availability.h).
+  // enough for the level, and the ancestors of available tiles with their siblings. Level 0 has both roots
+  // (mosaic/availability.h).
   const std::vector<geo::TileRange>& Available(int level) const;
   // Available() of all levels, from 0.
   const std::vector<std::vector<geo::TileRange>>& Availability() const;

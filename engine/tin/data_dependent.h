@@ -6,13 +6,14 @@
 //     u-----v
 //      \   /         With S the squared quality of a cut's shape (quadrilateral.h), E how badly it fits, q = qthresh:
 //        p               p-w is taken if S(u-v) < q^2 S(p-w),
-//                        u-v is kept if S(p-w) < q^(5/4) S(u-v), or already if S(p-w) < q^(1/4) S(u-v) for an edge
-//                        that a cut decided by fit, or a later cut, has added to the outline,
+//                        u-v is kept if S(p-w) < q^(5/4) S(u-v); the factor is q^(1/4) if the edge came into the
+//                        outline by a cut that was decided by fit, or by a cut after such a cut,
 //                        else the cut with less E^2 / S is taken; if equal, the better shape; if equal too, p-w.
 // For the angle between normals, S is squared once more, and the thresholds do not depend on how the edge came into the
 // outline. With q = 0 the fit alone decides, as in the paper. The paper compares E alone and has one threshold. A cut
-// that makes the shape worse rarely pays in the end, more rarely still further out, and adds two triangles to scan.
-// Hence there are three thresholds. All of this together saves 3 to 6 % of the vertices (docs/decisions/0007).
+// that makes the shape worse rarely saves vertices in the end, and even more rarely farther from p. It also adds two
+// triangles to scan. Hence there are three thresholds. All of this together saves 3 to 6 % of the vertices
+// (docs/decisions/0007).
 //
 // A test depends on its quadrilateral, on which of the corners beyond the edge is the youngest, and on how its edge
 // came into the outline. The cavity therefore does not depend on the order of the tests, on the triangle that the

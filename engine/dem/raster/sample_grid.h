@@ -74,7 +74,7 @@ class GridAxis {
 // up to f pixels at the end of the axis.
 class OverviewAxis {
  public:
-  // `pixels`: of the file; the grid may leave out some at the end (RasterLayout::columns).
+  // `pixels`: of the file; the grid may leave out some at the end (RasterLayout::columns). `is_own`: HasOwnOverviews.
   OverviewAxis(const GridAxis& blocks, int pixels, int samples, bool is_own)
       : blocks_(blocks), pixels_(pixels), samples_(samples), is_own_(is_own) {}
 

@@ -72,7 +72,7 @@ bool MayHideVoids(const SampleRules& rules, double lowest, double highest, bool 
 // - Zeros are voids if they are a collar; voids then grow by one sample, if at most a quarter of all samples are near
 //   voids.
 //
-// The limits of a quarter keep the samples beside scattered voids, and sparse data between voids.
+// Because of the limits of a quarter, samples beside scattered voids and sparse data between voids remain heights.
 Result<DetectedNodata> FindVoids(GDALRasterBand& band, const SampleRules& rules, bool has_collar, double coast_step_m,
                                  const std::stop_token& stop = {});
 
