@@ -19,9 +19,9 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 # A room is a module. The order is core <- {geo, tin} <- {dem, proto} <- tiler <- server, and core <- config <- server
 # (config may also include VALUES). In the server, asio.h is below all modules, the files of the folder itself combine
 # the modules, and the command line is above all: net <- http, which do not depend on terrain; jobs; store, jobs <-
-# tiles; http <- query; {http, tiles} <- {telemetry, api}; {telemetry, api} <- edge; {query, api} <- documents <-
-# handlers; {edge, handlers} <- server <- cli, and tiles <- reload <- cli. In the command line common <- {serve, mesh,
-# info} <- cli.
+# tiles; http <- query; {http, tiles} <- {telemetry, api}; {telemetry, api} <- frontend; {query, api} <- documents
+# <- handlers; {frontend, handlers} <- server <- cli, and tiles <- reload <- cli. In the command line common <- {serve,
+# mesh, info} <- cli.
 TIN = ["engine/tin/mesh", "engine/tin/scan", "engine/tin", "engine/tin/extended", "engine/tin/decimate"]
 GEOMETRY = ["engine/core", "engine/geo"] + TIN
 PROTO = ["proto", "proto/mesh", "proto/error", "proto/gltf", "proto/documents"]

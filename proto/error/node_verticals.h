@@ -63,12 +63,11 @@ class NodeVerticals {
   struct Shift {
     double x = 0, y = 0;
   };
-  //
-  // The point's longitude is the mean of the corners' weighted with their distances from the axis, up to the cube of
-  // their difference. Its latitude is off by less than sin cos d^2 / 8, d the difference in longitude, since the point
-  // is nearer to the axis, by the covariance of latitude and height, and by that of latitude with the radius of
-  // curvature. All bounds are a few times too large. That costs time, but the result is the same: triangles within the
-  // shift are measured exactly.
+  // Bounds for one triangle (BoundsOf). The longitude of a point is the mean of the corners' longitudes, weighted with
+  // their distances from the axis, up to the cube of their difference. The offset of its latitude has three parts. The
+  // point is nearer to the axis than the corners: less than sin cos d^2 / 8 for a difference d in longitude. The other
+  // two are the covariances of latitude with height and with the radius of curvature. All bounds are a few times too
+  // large. That costs time, but the result is the same: triangles within the shift are measured exactly.
   struct Bounds {
     Shift shift;
     // Metres by which the triangle lies below its corners' linear interpolation, at most: half the square of the radius

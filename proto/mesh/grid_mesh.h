@@ -42,8 +42,8 @@ std::vector<GridPoint> SnapVertices(const LatticeView& lattice, const tin::TinMe
 
 // Whether decoders that compute in 32-bit floats decode all points, and the lower rim of skirts of this depth, exactly.
 // This is so if the tile spans less than 2^23 steps. A float has one bit more, but Draco adds one half. False for very
-// high cliffs in deep tiles with small errors: hundreds of metres within a few. The caller then doubles the step until
-// the tile fits, and its edges are off by up to half of that step.
+// high cliffs in deep tiles with small errors: hundreds of metres of height within a few metres. The caller then
+// doubles the step until the tile fits, and its edges are off by up to half of that step.
 bool FitsFloats(const std::vector<GridPoint>& points, double step_m, double skirt_depth_m);
 
 // Metres.
@@ -56,7 +56,7 @@ struct GridMesh {
   std::vector<geo::Vec3> normals;                       // unit, ECEF, one per position
   std::vector<std::array<std::uint32_t, 3>> triangles;  // counter-clockwise from outside
   // Where each position is in a picture of the tile: lattice columns from the west, rows from the NORTH, 0 .. cells.
-  // The feet of skirts have those of the rim above them.
+  // Vertices of the lower rim of skirts have those of the vertices above them.
   int cells = 1;
   std::vector<std::array<std::uint16_t, 2>> uv;
 };

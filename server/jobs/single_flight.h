@@ -145,7 +145,7 @@ asio::awaitable<typename SingleFlight<Key, Value, Hash>::FlightResult> SingleFli
   if (joined) joined_total_.fetch_add(1, std::memory_order_relaxed);
   if (!has_job) Launch(flight, std::move(build), order);
 
-  boost::system::error_code ignored;  // landed, expired or cancelled; the outcome shows which
+  boost::system::error_code ignored;  // finished, expired or cancelled; the outcome shows which
   co_await waiter->async_wait(asio::redirect_error(asio::use_awaitable, ignored));
 
   lock.lock();

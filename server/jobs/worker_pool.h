@@ -137,7 +137,8 @@ struct WorkerPool::RunState {
   std::optional<Result<T>> outcome;  // nothing: not yet
 };
 
-// The caller's part of an errand. Lives in the frame of Run, so that the job is given up however the coroutine ends.
+// The caller's part of a call of Run. Lives in the frame of Run, so that the job is given up however the coroutine
+// ends.
 template <typename T>
 class WorkerPool::WaitGuard {
  public:

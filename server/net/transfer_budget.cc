@@ -17,10 +17,10 @@ constexpr std::chrono::milliseconds kLook{250};
 
 // Parts of the memory.
 constexpr std::size_t kRepliesPart = 2, kLargePart = 4, kUploadsPart = 4;
-// The largest small reply, as a part of its room.
+// The largest small reply, as a part of its pool.
 constexpr std::size_t kSmallPart = 8;
 
-// Use is compared in steps of an eighth of the room for a second: smaller differences do not change the order.
+// Use is compared in steps of an eighth of the pool for a second: smaller differences do not change the order.
 constexpr double kClaimSteps = 8;
 constexpr std::chrono::duration<double> kHalfLife{10};
 
