@@ -102,7 +102,7 @@ class TransferBudget {
 
   struct Entry {
     const void* charge;  // key of its charge: the body, or the entry itself if it is not shared
-    std::size_t room = 0;
+    std::size_t pool = 0;
     Clock::time_point late_at;         // max: its time has not begun
     std::weak_ptr<Connection> holder;  // empty once it was told to release memory
     std::uint64_t client = 0;
@@ -121,18 +121,18 @@ class TransferBudget {
 
   std::size_t PoolOf(const HoldRequest& ask) const;
   // mutex_ is held, as for the following.
-  static std::size_t HeldBy(std::uint64_t client, const Pool& room);
+  static std::size_t HeldBy(std::uint64_t client, const Pool& pool);
   static void Age(Share& share, Clock::time_point now);
-  static std::uint64_t Claim(std::uint64_t client, const Pool& room, Clock::time_point now);
-  static Share& ShareOf(std::uint64_t client, Pool& room, Clock::time_point now);
+  static std::uint64_t Claim(std::uint64_t client, const Pool& pool, Clock::time_point now);
+  static Share& ShareOf(std::uint64_t client, Pool& pool, Clock::time_point now);
   bool HasRoom(const HoldRequest& ask) const;
   bool MayTake(const HoldRequest& ask, Clock::time_point now, const Waiter* waiter) const;
-  Waiter* NextWaiter(std::size_t room, Clock::time_point now) const;
+  Waiter* NextWaiter(std::size_t pool, Clock::time_point now) const;
   void ChooseLate(const HoldRequest& ask, Clock::time_point now, Victims& victims);
   void ChooseUploads(const HoldRequest& ask, Clock::time_point now, Victims& victims);
   bool Tell(Entry& entry, std::vector<std::shared_ptr<Connection>>& whom);
   std::optional<Hold> Take(const HoldRequest& ask, Clock::time_point now, const Waiter* waiter);
-  void WakeNext(std::size_t room, Clock::time_point now);
+  void WakeNext(std::size_t pool, Clock::time_point now);
 
   void Release(Entries::iterator entry);
   void AddTaken(Entries::iterator entry, std::size_t bytes);
