@@ -115,12 +115,13 @@ class DataDependentCriterion {
   static constexpr double kUnknown = -1;
   static constexpr std::size_t kLikelyEdges = 64;  // of an outline
   static constexpr std::size_t kSpareSlots = std::size_t{1} << 10;
-  static constexpr std::size_t kMaxPairs = (Star::kMaxLeftOut + 1) / 3;  // in a scan of nothing else
+  static constexpr std::size_t kMaxPairs = (Star::kMaxLeftOut + 1) / 3;  // in a scan without other triangles
+  // Star::left_out of such a scan: the triangle between two pairs, which are the triangles of p-w of two suspects.
   static constexpr std::uint32_t kBetweenPairs = 0b100'100'100'100'100'100'100'100'100'100;
 
-  // Of a triangle with p.
+  // Of a triangle that has p as a corner.
   struct Fit {
-    PlaneMisfit misfit;  // with maxima only
+    PlaneMisfit misfit;  // only if FitErrors::are_maxima()
     double error = kUnknown;
   };
 
@@ -128,7 +129,7 @@ class DataDependentCriterion {
   struct Suspect {
     std::uint32_t edge = 0;  // by its place in the outline
     HalfEdgeId outside = 0;
-    bool is_certain = false;  // for its shape
+    bool is_certain = false;  // its shape alone decides for p-w
     ShapeQuality quality;
     Triangulation::Beyond beyond;
   };
@@ -166,6 +167,7 @@ class DataDependentCriterion {
   void ReplaceEdge(Star& star, const Flip& flip);
   void SuspectEdge(Star& star, std::uint32_t index);
   Ends EndsOf(const Star& star, std::uint32_t edge) const;
+  // The misfits of the triangle of p and an edge of the outline, and of a triangle beyond the outline.
   double& NearError(std::uint32_t edge) { return edge_count_ == 0 ? errors_[edge] : edges_[edge].fit.error; }
   double ErrorBeyond(TriangleId t);
   void PrefetchError(TriangleId t) const;
