@@ -31,7 +31,7 @@ class SourceErrorBound {
   // Whether the raster grids added so far hide all others.
   bool is_covered() const;
 
-  // Metres. Infinite only if a source's overviews hide samples of unknown height.
+  // Metres. Infinite only if an overview of a source is void around samples that have a height.
   double bound() const { return bound_ + kRounding; }
 
  private:
